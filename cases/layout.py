@@ -1,0 +1,33 @@
+"""Names in a run's folder: plain files that stay complete without the server.
+
+::
+
+    <runs>/<id>/
+      case.toml | case.json  as submitted          case.resolved.json  every default filled in, SI
+      journal.jsonl          every event, one JSON line each, with seq: the truth
+      history.csv            time history: clock, ledger, probes
+      frames/000012.vtkhdf   one file a frame      frames/frames.vtkhdf.series  for ParaView
+      log/rank-0.log         one a rank            log/launcher.log
+      outcome.json           written last
+"""
+
+from pathlib import Path
+
+RESOLVED_CASE = "case.resolved.json"
+JOURNAL = "journal.jsonl"
+HISTORY = "history.csv"
+OUTCOME = "outcome.json"
+FRAMES = "frames"
+FRAME_SERIES = "frames.vtkhdf.series"
+LOGS = "log"
+LAUNCHER_LOG = "launcher.log"
+
+
+def frame(folder: Path, index: int) -> Path:
+    """Path of frame ``index`` in the run folder ``folder``."""
+    return folder / FRAMES / f"{index:06d}.vtkhdf"
+
+
+def rank_log(folder: Path, rank: int) -> Path:
+    """Path of the log of ``rank`` in the run folder ``folder``."""
+    return folder / LOGS / f"rank-{rank}.log"

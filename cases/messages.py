@@ -1,0 +1,141 @@
+"""What a run says while it lives: the lines of journal.jsonl and the samples on Zenoh are these same messages.
+
+Every message is numbered by ``seq`` (1, 2, 3 ... per run, no holes), so a reader sees a gap and refills it from the
+journal. JSON in the journal and on SSE, MessagePack on Zenoh. A reader ignores fields that it does not know.
+"""
+
+from typing import ClassVar
+
+import msgspec
+
+VERSION = 1
+
+
+class Message(msgspec.Struct, tag_field="type", tag=str.lower, kw_only=True, frozen=True):
+    """The envelope. ``wall`` is Unix time in s, ``t`` simulated time in s."""
+
+    channel: ClassVar[str] = "event"
+    """Which class of Zenoh key the message is published under (cases/keys.py)."""
+
+    run: str
+    seq: int = 0
+    wall: float = 0.0
+    step: int = 0
+    t: float = 0.0
+    v: int = VERSION
+
+
+class Status(Message, frozen=True):
+    """The run has changed its state."""
+
+    channel: ClassVar[str] = "state"
+    state: str
+    cause: str | None = None
+    message: str = ""
+
+
+class Started(Message, frozen=True):
+    """The mesh stands and the first step is about to begin. ``setup`` is s since the worker's start."""
+
+    ranks: int
+    elements: int
+    nodes: int
+    end_time: float
+    setup: float
+    parts: dict[str, int]
+
+
+class Energy(msgspec.Struct, kw_only=True, frozen=True):
+    """The ledger, J: kinetic + elastic + plastic + viscous + contact = initial + external, up to the residual."""
+
+    kinetic: float
+    elastic: float
+    plastic: float
+    viscous: float
+    contact: float
+    external: float
+    initial: float
+    residual: float
+    """|sum of all lines - initial - external| over the largest energy that came in; dimensionless."""
+
+
+class Progress(Message, frozen=True):
+    """How far the run is. ``eta`` is wall time left, s; ``limiter`` says what holds the time step down."""
+
+    end_time: float
+    dt: float
+    limiter: str
+    eta: float
+    energy: Energy
+    updates_per_second: float
+
+
+class Load(Message, frozen=True):
+    """Seconds per rank and phase since the last Load message, and max/mean of the busy time."""
+
+    channel: ClassVar[str] = "load"
+    phases: dict[str, list[float]]
+    imbalance: float
+
+
+class Counts(Message, frozen=True):
+    """How large the model is now. ``shared`` is the number of nodes on more than one rank."""
+
+    channel: ClassVar[str] = "counts"
+    elements: int
+    nodes: int
+    shared: int
+    fragments: int
+    elements_per_rank: list[int]
+
+
+class Frame(Message, frozen=True):
+    """A frame was written; ``path`` is relative to the run's folder."""
+
+    index: int
+    path: str
+
+
+class Log(Message, frozen=True):
+    """A line for people."""
+
+    channel: ClassVar[str] = "log"
+    level: str
+    text: str
+    rank: int = 0
+
+
+class Finished(Message, frozen=True):
+    """The outcome is on disk. The last message of a worker."""
+
+    state: str
+    digest: str
+    steps: int
+    elapsed: float
+
+
+AnyMessage = Status | Started | Progress | Load | Counts | Frame | Log | Finished
+
+_to_json, _to_msgpack = msgspec.json.Encoder(), msgspec.msgpack.Encoder()
+_from_json = msgspec.json.Decoder(AnyMessage)
+_from_msgpack = msgspec.msgpack.Decoder(AnyMessage)
+
+
+def to_json(message: AnyMessage) -> bytes:
+    """One journal line, without the line feed."""
+    return _to_json.encode(message)
+
+
+def to_msgpack(message: AnyMessage) -> bytes:
+    """The payload of a Zenoh sample."""
+    return _to_msgpack.encode(message)
+
+
+def from_json(line: bytes | str) -> AnyMessage:
+    """Raises msgspec.ValidationError for what is not a message, msgspec.DecodeError for what is not JSON."""
+    return _from_json.decode(line)
+
+
+def from_msgpack(payload: bytes) -> AnyMessage:
+    """Raises as ``from_json`` does."""
+    return _from_msgpack.decode(payload)

@@ -1,0 +1,59 @@
+"""outcome.json: the last file a run writes, and the only proof that it ended."""
+
+import msgspec
+
+from .messages import Energy
+
+
+class Check(msgspec.Struct, kw_only=True, frozen=True):
+    """One line of ``[[reference]]``, measured."""
+
+    name: str
+    value: float
+    expected: float
+    tolerance: float
+    passed: bool = msgspec.field(name="pass")
+    unit: str = ""
+    source: str = ""
+
+
+class Outcome(msgspec.Struct, kw_only=True, frozen=True):
+    """How a run ended; times in s, energies in J."""
+
+    state: str
+    cause: str | None = None
+    message: str = ""
+    steps: int = 0
+    time: float = 0.0
+    ranks: int = 1
+    elapsed: float = 0.0
+    setup: float = 0.0
+    """s from the worker's start to its first step."""
+    cpu: float = 0.0
+    """CPU s of all ranks together, in the step loop."""
+    digest: str = ""
+    """sha256 over node and tet state in global-id order: equal for any number of ranks."""
+    elements: int = 0
+    nodes_initial: int = 0
+    nodes: int = 0
+    fragments: int = 0
+    rebalances: int = 0
+    energy: Energy | None = None
+    worst_residual: float = 0.0
+    """The largest energy residual of any ledger line of the run."""
+    phases: dict[str, list[float]] = {}
+    """CPU seconds per phase, one number a rank."""
+    element_updates_per_second: float = 0.0
+    """Per CPU-second and core."""
+    reference: list[Check] = []
+    warnings: list[str] = []
+
+
+def to_json(outcome: Outcome) -> bytes:
+    """Indented, for people too."""
+    return msgspec.json.format(msgspec.json.encode(outcome), indent=2)
+
+
+def from_json(text: bytes | str) -> Outcome:
+    """Raises msgspec.ValidationError or msgspec.DecodeError."""
+    return msgspec.json.decode(text, type=Outcome)

@@ -1,0 +1,350 @@
+"""What a case is. Frozen models, unknown keys forbidden, every quantity in SI once read.
+
+``load_case`` in ``cases/load.py`` is the way in: it reads TOML or JSON and reports every error at once.
+"""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+from .units import AngularSpeed, Density, Length, Rate, Ratio, SpecificHeat, Speed, Stress, Temperature, Time
+
+Axis = Literal["x", "y", "z"]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,63}$")]
+Point = tuple[Length, Length, Length]
+Velocity = tuple[Speed, Speed, Speed]
+Positive = Field(gt=0)
+
+
+def _floats(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
+
+
+Direction = Annotated[tuple[float, float, float], BeforeValidator(_floats)]
+
+
+class Model(BaseModel):
+    """Base of everything in a case."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+# Meshes ---------------------------------------------------------------------------------------------------------------
+
+
+class Grading(Model):
+    """Element size grows from ``element_size`` to ``far_size`` with the distance from a point or from an axis line.
+
+    Within ``near`` of the origin (or the line through it along ``axis``) the size is ``element_size``, beyond ``far``
+    it is ``far_size``, linear between.
+    """
+
+    origin: Point = (0.0, 0.0, 0.0)
+    axis: Axis | None = None
+    near: Annotated[Length, Field(ge=0)]
+    far: Annotated[Length, Positive]
+    far_size: Annotated[Length, Positive]
+
+
+class Primitive(Model):
+    """What all generated meshes share. ``structured`` is the regular generator kept for verification."""
+
+    element_size: Annotated[Length, Positive]
+    generator: Literal["gmsh", "structured"] = "gmsh"
+    split: Literal[5, 6] = 6
+    """Tets per hexahedron of the structured generator."""
+    sector: Literal["full", "half", "quarter"] = "full"
+    """Which part of the body is modelled: the positive side of its centre in the first, or both, of the two directions
+    across ``axis`` (in cyclic order: x, y for z; y, z for x; z, x for y)."""
+    grading: Grading | None = None
+
+
+class Box(Primitive):
+    """A rectangular block between two corners. The sector is cut at the origin of the coordinates."""
+
+    shape: Literal["box"]
+    low: Point
+    high: Point
+    axis: Axis = "z"
+
+
+class Plate(Primitive):
+    """A rectangular plate: ``thickness`` along ``axis``, ``width`` x ``height`` across it, centred on ``base``'s axis.
+
+    ``base`` is the centre of the face from which the thickness is measured in the positive direction.
+    """
+
+    shape: Literal["plate"]
+    base: Point = (0.0, 0.0, 0.0)
+    axis: Axis = "z"
+    width: Annotated[Length, Positive]
+    height: Annotated[Length, Positive]
+    thickness: Annotated[Length, Positive]
+
+
+class Cylinder(Primitive):
+    """A solid cylinder; ``base`` is the centre of its lower end face."""
+
+    shape: Literal["cylinder"]
+    base: Point = (0.0, 0.0, 0.0)
+    axis: Axis = "z"
+    radius: Annotated[Length, Positive]
+    length: Annotated[Length, Positive]
+
+
+class Tube(Primitive):
+    """A hollow cylinder."""
+
+    shape: Literal["tube"]
+    base: Point = (0.0, 0.0, 0.0)
+    axis: Axis = "z"
+    inner_radius: Annotated[Length, Positive]
+    radius: Annotated[Length, Positive]
+    length: Annotated[Length, Positive]
+
+
+class Sphere(Primitive):
+    """A ball."""
+
+    shape: Literal["sphere"]
+    centre: Point = (0.0, 0.0, 0.0)
+    axis: Axis = "z"
+    radius: Annotated[Length, Positive]
+
+
+class MeshFile(Model):
+    """A mesh made elsewhere: gmsh .msh 4.1 or 2.2, or Abaqus .inp. ``unit`` is the length unit of its coordinates."""
+
+    shape: Literal["file"]
+    path: str
+    unit: Annotated[Length, Positive]
+    group: str | None = None
+    """Physical group or element set; all tets when absent."""
+    sha256: str | None = None
+
+
+Mesh = Annotated[Box | Plate | Cylinder | Tube | Sphere | MeshFile, Field(discriminator="shape")]
+
+
+# Materials ------------------------------------------------------------------------------------------------------------
+
+
+class Elastic(Model):
+    """Isotropic elasticity: Young's modulus, Pa, and Poisson's ratio."""
+
+    young: Annotated[Stress, Positive]
+    poisson: Annotated[Ratio, Field(gt=-1, lt=0.5)]
+
+
+class LinearHardening(Model):
+    """J2 plasticity: yield stress ``yield + hardening * plastic strain``, Pa."""
+
+    model: Literal["linear_hardening"]
+    yield_stress: Annotated[Stress, Positive]
+    hardening: Annotated[Stress, Field(ge=0)] = 0.0
+
+
+class JohnsonCook(Model):
+    """Flow stress (A + B e^n)(1 + C ln max(rate/reference_rate, 1))(1 - T*^m), adiabatic heating.
+
+    T* = (T - reference_temperature) / (melt_temperature - reference_temperature), clamped to [0, 1].
+    """
+
+    model: Literal["johnson_cook"]
+    A: Annotated[Stress, Positive]
+    B: Annotated[Stress, Field(ge=0)]
+    n: Annotated[Ratio, Field(gt=0, le=1)]
+    C: Annotated[Ratio, Field(ge=0)]
+    m: Annotated[Ratio, Positive]
+    reference_rate: Annotated[Rate, Positive] = 1.0
+    reference_temperature: Annotated[Temperature, Field(ge=0)] = 293.15
+    melt_temperature: Annotated[Temperature, Positive]
+    specific_heat: Annotated[SpecificHeat, Positive]
+    taylor_quinney: Annotated[Ratio, Field(ge=0, le=1)] = 0.9
+    """Share of the plastic work that becomes heat."""
+
+
+Strength = Annotated[LinearHardening | JohnsonCook, Field(discriminator="model")]
+
+
+class MieGruneisen(Model):
+    """Mie-Grueneisen equation of state on the Hugoniot U_s = c0 + S u_p."""
+
+    model: Literal["mie_gruneisen"]
+    c0: Annotated[Speed, Positive]
+    S: Annotated[Ratio, Field(ge=0)]
+    gamma0: Annotated[Ratio, Field(ge=0)]
+
+
+class Material(Model):
+    """Density, kg/m^3; elasticity; strength (none: elastic); equation of state (none: linear, from the elasticity)."""
+
+    density: Annotated[Density, Positive]
+    elastic: Elastic
+    strength: Strength | None = None
+    eos: MieGruneisen | None = None
+    description: str = ""
+
+
+# The scene ------------------------------------------------------------------------------------------------------------
+
+
+class Spin(Model):
+    """Rigid rotation about a line through ``centre``; ``rate`` is the rotation vector, rad/s."""
+
+    centre: Point
+    rate: tuple[AngularSpeed, AngularSpeed, AngularSpeed]
+
+
+class Part(Model):
+    """A body: where it is, what it is made of, how it moves at the start."""
+
+    name: Name
+    material: Name
+    """A name from ``[materials]`` of the case or from the library."""
+    mesh: Mesh
+    velocity: Velocity = (0.0, 0.0, 0.0)
+    spin: Spin | None = None
+    temperature: Annotated[Temperature, Field(ge=0)] = 293.15
+
+
+class Symmetry(Model):
+    """Nodes that start on the plane ``axis = at`` stay on it; no friction. All parts when ``parts`` is empty."""
+
+    kind: Literal["symmetry"]
+    axis: Axis
+    at: Length = 0.0
+    parts: tuple[Name, ...] = ()
+
+
+class Wall(Model):
+    """A rigid, fixed, frictionless half-space: nodes cannot go to the side that ``normal`` points away from."""
+
+    kind: Literal["wall"]
+    name: Name = "wall"
+    point: Point
+    normal: Direction
+    parts: tuple[Name, ...] = ()
+
+
+class Prescribed(Model):
+    """Nodes that start inside the box ``low``..``high`` (all of the parts when absent) move with a given velocity.
+
+    Only the components that are given are prescribed.
+    """
+
+    kind: Literal["velocity"]
+    parts: tuple[Name, ...] = ()
+    low: Point | None = None
+    high: Point | None = None
+    x: Speed | None = None
+    y: Speed | None = None
+    z: Speed | None = None
+
+
+class Rotation(Model):
+    """All nodes of the parts turn rigidly, exactly, at the given spin."""
+
+    kind: Literal["rotation"]
+    parts: tuple[Name, ...] = ()
+    spin: Spin
+
+
+Boundary = Annotated[Symmetry | Wall | Prescribed | Rotation, Field(discriminator="kind")]
+
+ProbeField = Literal[
+    "stress_xx", "stress_yy", "stress_zz", "stress_yz", "stress_zx", "stress_xy",
+    "pressure", "mises", "plastic_strain", "temperature", "density", "internal_energy",
+    "velocity_x", "velocity_y", "velocity_z",
+]  # fmt: skip
+
+
+class Probe(Model):
+    """A column of history.csv: the mean of a field over the tets of a part whose centre starts in a box.
+
+    ``internal_energy`` is per mass, J/kg; stresses are positive in tension, pressure in compression.
+    """
+
+    name: Name
+    part: Name
+    field: ProbeField
+    low: Point
+    high: Point
+
+
+class Viscosity(Model):
+    """Bulk viscosity q = density * l * (quadratic * l * rate^2 + linear * c * |rate|) in compression, l = V^(1/3)."""
+
+    linear: Annotated[Ratio, Field(ge=0)] = 0.06
+    quadratic: Annotated[Ratio, Field(ge=0)] = 1.5
+
+
+class Numerics(Model):
+    """How the equations are solved."""
+
+    pressure: Literal["standard", "nodal", "split"] = "nodal"
+    """``standard``: pressure from each tet (locks in plastic flow). ``nodal``: averaged nodal pressure. ``split``: the
+    operator split, stabilised by pressure-gradient projection."""
+    viscosity: Viscosity | None = Viscosity()
+    dt_safety: Annotated[Ratio, Field(gt=0, le=1)] = 0.9
+    """Share of the rigorous element bound 1 / (c sqrt(sum |grad N|^2))."""
+    dt_growth: Annotated[Ratio, Field(gt=1, le=2)] = 1.05
+    """Largest growth of the time step in one step."""
+
+
+class Run(Model):
+    """How long, on how many ranks, and what is written."""
+
+    end_time: Annotated[Time, Positive]
+    ranks: Annotated[int, Field(ge=1, le=4096)] = 1
+    frames: Annotated[int, Field(ge=0, le=100_000)] = 20
+    """Number of frames, evenly spaced to the end; the initial state is frame 0 (0: none are written)."""
+    samples: Annotated[int, Field(ge=1, le=1_000_000)] = 500
+    """Number of lines of history.csv, evenly spaced."""
+    max_steps: Annotated[int, Field(ge=1)] = 100_000_000
+    max_wall_time: Annotated[Time, Positive] | None = None
+    residual_limit: Annotated[Ratio, Positive] = 0.05
+    """The run fails with cause ``energy`` when the energy residual passes this."""
+
+
+Quantity = Literal[
+    "extent", "radius", "plastic_strain_max", "temperature_max", "speed_mean", "stress_max",
+    "probe_mean", "probe_max", "probe_min", "contact_time", "worst_residual",
+]  # fmt: skip
+
+
+class Reference(Model):
+    """A published or derived number that the finished run is compared with.
+
+    ``extent``: largest minus smallest coordinate of a part along ``axis``, m. ``radius``: largest distance of a
+    part's nodes from the line through the origin along ``axis``, m. ``plastic_strain_max``, ``temperature_max`` (K),
+    ``stress_max`` (largest |stress component|, Pa) over a part. ``speed_mean``: mass-mean velocity of a part along
+    ``axis``, m/s. ``probe_*``: of a history column between ``since`` and ``until``. ``contact_time``: last time at
+    which a wall pushes, s. ``worst_residual``: of the energy ledger.
+    """
+
+    quantity: Quantity
+    value: float
+    tolerance: Annotated[float, Positive]
+    """Absolute, in SI as ``value``."""
+    source: str
+    part: Name | None = None
+    probe: Name | None = None
+    axis: Axis | None = None
+    since: Time = 0.0
+    until: Time | None = None
+
+
+class Case(Model):
+    """A whole case."""
+
+    name: Name
+    title: str = ""
+    description: str = ""
+    materials: dict[Name, Material] = Field(default_factory=dict)
+    parts: Annotated[tuple[Part, ...], Field(min_length=1, max_length=256)]
+    boundaries: tuple[Boundary, ...] = ()
+    probes: tuple[Probe, ...] = ()
+    numerics: Numerics = Numerics()
+    run: Run
+    reference: tuple[Reference, ...] = ()

@@ -1,0 +1,105 @@
+"""Physical quantities as text: ``"210 m/s"`` becomes 210.0 in SI.
+
+The grammar is closed (no evaluation of any kind)::
+
+    quantity = number [ unit { ("*" | "/" | " ") unit } ]
+    unit     = symbol [ "^" integer ]
+
+A bare number is taken as SI. Errors name the text, what was wrong and what would be allowed.
+"""
+
+import math
+import re
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, WithJsonSchema
+
+Dimension = tuple[int, int, int, int]
+"""Exponents of metre, kilogram, second, kelvin."""
+
+_LENGTH, _MASS, _TIME, _TEMPERATURE = (1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)
+_FORCE, _STRESS, _ENERGY, _POWER = (1, 1, -2, 0), (-1, 1, -2, 0), (2, 1, -2, 0), (2, 1, -3, 0)
+_NONE, _FREQUENCY = (0, 0, 0, 0), (0, 0, -1, 0)
+
+UNITS: dict[str, tuple[float, Dimension]] = {
+    "1": (1.0, (0, 0, 0, 0)),
+    "m": (1.0, _LENGTH), "km": (1e3, _LENGTH), "cm": (1e-2, _LENGTH), "mm": (1e-3, _LENGTH),
+    "um": (1e-6, _LENGTH), "µm": (1e-6, _LENGTH), "nm": (1e-9, _LENGTH), "in": (0.0254, _LENGTH),
+    "kg": (1.0, _MASS), "g": (1e-3, _MASS), "mg": (1e-6, _MASS), "t": (1e3, _MASS),
+    "s": (1.0, _TIME), "ms": (1e-3, _TIME), "us": (1e-6, _TIME), "µs": (1e-6, _TIME), "ns": (1e-9, _TIME),
+    "min": (60.0, _TIME), "h": (3600.0, _TIME),
+    "K": (1.0, _TEMPERATURE),
+    "Hz": (1.0, _FREQUENCY), "kHz": (1e3, _FREQUENCY), "rad": (1.0, _NONE), "rev": (2.0 * math.pi, _NONE),
+    "N": (1.0, _FORCE), "kN": (1e3, _FORCE), "MN": (1e6, _FORCE),
+    "Pa": (1.0, _STRESS), "kPa": (1e3, _STRESS), "MPa": (1e6, _STRESS), "GPa": (1e9, _STRESS),
+    "bar": (1e5, _STRESS), "Mbar": (1e11, _STRESS),
+    "J": (1.0, _ENERGY), "mJ": (1e-3, _ENERGY), "kJ": (1e3, _ENERGY), "MJ": (1e6, _ENERGY),
+    "W": (1.0, _POWER), "%": (1e-2, _NONE),
+}  # fmt: skip
+
+_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*")
+_FACTOR = re.compile(r"\s*([*/·]?)\s*([A-Za-zµ%]+|1)(?:\^([+-]?\d))?")
+_LONGEST = 80
+
+
+def parse_unit(text: str) -> tuple[float, Dimension]:
+    """Factor to SI and dimension of a unit such as ``kg/m^3``. Raises ValueError."""
+    factor, dimension, position = 1.0, [0, 0, 0, 0], 0
+    while position < len(text):
+        match = _FACTOR.match(text, position)
+        if match is None:
+            raise ValueError(f"cannot read the unit {text!r}; write it like 'kg/m^3'")
+        operator, symbol, power = match.groups()
+        if symbol not in UNITS:
+            raise ValueError(f"unknown unit {symbol!r} in {text!r}; known: {', '.join(UNITS)}")
+        exponent = int(power or 1) * (-1 if operator == "/" else 1)
+        scale, base = UNITS[symbol]
+        factor *= scale**exponent
+        dimension = [d + exponent * b for d, b in zip(dimension, base, strict=True)]
+        position = match.end()
+    return factor, (dimension[0], dimension[1], dimension[2], dimension[3])
+
+
+def parse_quantity(value: object, unit: str) -> float:
+    """The SI value of ``value``, a number (already SI) or text with a unit of the same dimension as ``unit``.
+
+    Raises ValueError for a wrong dimension, an unknown unit, NaN or infinity.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise ValueError(f"expected a quantity in {unit or 'plain numbers'}, got {value!r}")
+    if isinstance(value, int | float):
+        number = float(value)
+    else:
+        match = _QUANTITY.fullmatch(value[:_LONGEST])
+        if match is None:
+            raise ValueError(f"{value[:_LONGEST]!r} is not a quantity; write a number and a unit, such as '1.5 {unit}'")
+        factor, dimension = parse_unit(match[2])
+        if dimension != parse_unit(unit)[1] and match[2]:
+            raise ValueError(f"{value!r} has the wrong dimension; expected a unit of the kind {unit or '(no unit)'!r}")
+        number = float(match[1]) * factor
+    if not math.isfinite(number):
+        raise ValueError(f"{value!r} is not finite")
+    return number
+
+
+def _reader(unit: str) -> BeforeValidator:
+    def read(value: Any) -> float:
+        return parse_quantity(value, unit)
+
+    return BeforeValidator(read)
+
+
+def _schema(unit: str) -> WithJsonSchema:
+    return WithJsonSchema({"type": ["number", "string"], "unit": unit, "examples": [f"1 {unit}".strip()]})
+
+
+Length = Annotated[float, _reader("m"), _schema("m")]
+Time = Annotated[float, _reader("s"), _schema("s")]
+Speed = Annotated[float, _reader("m/s"), _schema("m/s")]
+Rate = Annotated[float, _reader("1/s"), _schema("1/s")]
+AngularSpeed = Annotated[float, _reader("rad/s"), _schema("rad/s")]
+Temperature = Annotated[float, _reader("K"), _schema("K")]
+Density = Annotated[float, _reader("kg/m^3"), _schema("kg/m^3")]
+Stress = Annotated[float, _reader("Pa"), _schema("Pa")]
+SpecificHeat = Annotated[float, _reader("J/kg/K"), _schema("J/kg/K")]
+Ratio = Annotated[float, _reader(""), _schema("")]
