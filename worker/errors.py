@@ -1,0 +1,42 @@
+"""What can go wrong in a worker, and the exit code that each failure gives.
+
+::
+
+    ConoidError                      exit 1   anything the worker raises on purpose
+    ├── InputError (ValueError)      exit 2   the case, or a file it names, is wrong
+    │   └── MeshError                exit 2   the mesh cannot be made, read or used
+    └── PhysicsError                 exit 3   the run itself failed: diverged, or energy out of its limit
+
+The text of every one of them is a single line for the person who wrote the case: key, value, what is allowed.
+"""
+
+from typing import ClassVar
+
+from conoid.cases.run import Cause, ExitCode
+
+
+class ConoidError(Exception):
+    """Base of the tree."""
+
+    exit_code: ClassVar[int] = ExitCode.CRASHED
+    cause: ClassVar[Cause] = Cause.SERVICE
+
+
+class InputError(ConoidError, ValueError):
+    """The case, or a file it names, is wrong."""
+
+    exit_code = ExitCode.BAD_INPUT
+    cause = Cause.INPUT
+
+
+class MeshError(InputError):
+    """The mesh cannot be made, read or used."""
+
+    cause = Cause.MESH
+
+
+class PhysicsError(ConoidError):
+    """The run failed by itself."""
+
+    exit_code = ExitCode.PHYSICS
+    cause = Cause.DIVERGED
