@@ -117,8 +117,8 @@ class Finished(Message, frozen=True):
 AnyMessage = Status | Started | Progress | Load | Counts | Frame | Log | Finished
 
 _to_json, _to_msgpack = msgspec.json.Encoder(), msgspec.msgpack.Encoder()
-_from_json = msgspec.json.Decoder(AnyMessage)
-_from_msgpack = msgspec.msgpack.Decoder(AnyMessage)
+_from_json: msgspec.json.Decoder[AnyMessage] = msgspec.json.Decoder(AnyMessage)
+_from_msgpack: msgspec.msgpack.Decoder[AnyMessage] = msgspec.msgpack.Decoder(AnyMessage)
 
 
 def to_json(message: AnyMessage) -> bytes:

@@ -37,6 +37,13 @@ UNITS: dict[str, tuple[float, Dimension]] = {
     "W": (1.0, _POWER), "%": (1e-2, _NONE),
 }  # fmt: skip
 
+KINDS: dict[Dimension, str] = {
+    _NONE: "a plain number, without a unit", _LENGTH: "a length", _MASS: "a mass", _TIME: "a time",
+    _TEMPERATURE: "a temperature", _FREQUENCY: "a rate", (1, 0, -1, 0): "a speed", _STRESS: "a stress",
+    (-3, 1, 0, 0): "a density", (2, 0, -2, -1): "a specific heat", (2, 0, -2, 0): "an energy per mass",
+}  # fmt: skip
+"""What a quantity of a dimension is called."""
+
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*")
 _FACTOR = re.compile(r"\s*([*/·]?)\s*([A-Za-zµ%]+|1)(?:\^([+-]?\d))?")
 _LONGEST = 80
@@ -67,19 +74,34 @@ def parse_quantity(value: object, unit: str) -> float:
     """
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise ValueError(f"expected a quantity in {unit or 'plain numbers'}, got {value!r}")
-    if isinstance(value, int | float):
-        number = float(value)
-    else:
-        match = _QUANTITY.fullmatch(value[:_LONGEST])
-        if match is None:
-            raise ValueError(f"{value[:_LONGEST]!r} is not a quantity; write a number and a unit, such as '1.5 {unit}'")
-        factor, dimension = parse_unit(match[2])
-        if dimension != parse_unit(unit)[1] and match[2]:
-            raise ValueError(f"{value!r} has the wrong dimension; expected a unit of the kind {unit or '(no unit)'!r}")
-        number = float(match[1]) * factor
+    number = _read_text(value, unit) if isinstance(value, str) else _to_float(value)
     if not math.isfinite(number):
         raise ValueError(f"{value!r} is not finite")
     return number
+
+
+def _to_float(number: float) -> float:
+    try:
+        return float(number)
+    except OverflowError:
+        raise ValueError("a whole number this large cannot be used") from None
+
+
+def _read_text(text: str, unit: str) -> float:
+    match = _QUANTITY.fullmatch(text) if len(text) <= _LONGEST else None
+    if match is None:
+        example = f"1.5 {unit}".strip()
+        raise ValueError(f"{text[:_LONGEST]!r} is not a quantity; write a number and a unit, such as {example!r}")
+    factor, dimension = parse_unit(match[2])
+    if match[2] and dimension != parse_unit(unit)[1]:
+        raise ValueError(f"{text!r} has the wrong dimension; expected {kind_of(unit)}")
+    return float(match[1]) * factor
+
+
+def kind_of(unit: str) -> str:
+    """``a length, in a unit such as 'm'``: what a quantity in ``unit`` is, for an error message."""
+    kind = KINDS.get(parse_unit(unit)[1], "a quantity")
+    return f"{kind}, in a unit such as {unit!r}" if unit else kind
 
 
 def _reader(unit: str) -> BeforeValidator:

@@ -1,0 +1,234 @@
+"""What the models cannot check one by one: names that must exist, sizes that must fit, planes that must be there."""
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from itertools import chain
+
+from .geometry import AXES, bounds, centre, cut_directions, lowest_along, thinnest, whole_bounds
+from .library import library
+from .problems import Location, Problem, choices, dotted, nearest, problem
+from .schema import Box, Case, JohnsonCook, MeshFile, Part, Prescribed, Reference, Symmetry, Tube, Wall
+
+NEEDED: dict[str, frozenset[str]] = {
+    "extent": frozenset({"part", "axis"}),
+    "radius": frozenset({"part", "axis"}),
+    "plastic_strain_max": frozenset({"part"}),
+    "temperature_max": frozenset({"part"}),
+    "stress_max": frozenset({"part"}),
+    "speed_mean": frozenset({"part", "axis"}),
+    "probe_mean": frozenset({"probe"}),
+    "probe_max": frozenset({"probe"}),
+    "probe_min": frozenset({"probe"}),
+    "contact_time": frozenset(),
+    "worst_residual": frozenset(),
+}
+"""The keys that each reference quantity needs; the others of part, probe and axis are refused."""
+
+_ROUNDING = 1e-9
+
+
+def check(case: Case) -> list[Problem]:
+    """Every cross-field problem of a case, in the order of its keys."""
+    checks: tuple[Callable[[Case], Iterable[Problem]], ...] = (
+        _materials, _parts, _sectors, _boundaries, _walls, _probes, _references,
+    )  # fmt: skip
+    return list(chain.from_iterable(found(case) for found in checks))
+
+
+def _materials(case: Case) -> Iterator[Problem]:
+    for name, made in case.materials.items():
+        law = made.strength
+        if isinstance(law, JohnsonCook) and law.melt_temperature <= law.reference_temperature:
+            location = ("materials", name, "strength", "melt_temperature")
+            yield problem(location, law.melt_temperature, f"must be above {law.reference_temperature} K, the reference")
+
+
+def _parts(case: Case) -> Iterator[Problem]:
+    yield from _unique([part.name for part in case.parts], "parts")
+    known = {**library(), **case.materials}
+    for i, part in enumerate(case.parts):
+        if part.material not in known:
+            message = f"unknown material; {nearest(part.material, sorted(known))}"
+            yield problem(("parts", i, "material"), part.material, message)
+            continue
+        law = known[part.material].strength
+        if isinstance(law, JohnsonCook) and part.temperature >= law.melt_temperature:
+            message = f"must be below {law.melt_temperature} K, where {part.material} melts"
+            yield problem(("parts", i, "temperature"), part.temperature, message)
+        yield from _mesh(part, ("parts", i, "mesh"))
+
+
+def _mesh(part: Part, location: Location) -> Iterator[Problem]:
+    mesh = part.mesh
+    if isinstance(mesh, MeshFile):
+        if "://" in mesh.path or not mesh.path.strip():
+            yield problem((*location, "path"), mesh.path, "expected the path of a .msh or .inp file")
+        return
+    yield from _grading(part, location)
+    if isinstance(mesh, Tube) and mesh.inner_radius >= mesh.radius:
+        yield problem((*location, "inner_radius"), mesh.inner_radius, f"must be below the radius, {mesh.radius} m")
+        return
+    if isinstance(mesh, Box):
+        empty = [d for d in range(3) if mesh.low[d] >= mesh.high[d]]
+        for d in empty:
+            yield problem((*location, "high", d), mesh.high[d], f"must be above low[{d}], {mesh.low[d]} m")
+        if empty:
+            return
+        away = [d for d in cut_directions(mesh, mesh.axis) if mesh.high[d] <= 0]
+        for d in away:
+            yield problem((*location, "high", d), mesh.high[d], f"a {mesh.sector} box keeps the side {AXES[d]} > 0")
+        if away:
+            return
+    if mesh.element_size > thinnest(mesh) * (1 + _ROUNDING):
+        message = f"must not be above the smallest extent of what is modelled, {thinnest(mesh):g} m"
+        yield problem((*location, "element_size"), mesh.element_size, message)
+
+
+def _grading(part: Part, location: Location) -> Iterator[Problem]:
+    mesh = part.mesh
+    if isinstance(mesh, MeshFile) or mesh.grading is None:
+        return
+    grading, location = mesh.grading, (*location, "grading")
+    if mesh.generator == "structured":
+        yield problem(location, ..., "the structured generator has one element size; remove grading, or use gmsh")
+    if grading.near >= grading.far:
+        yield problem((*location, "near"), grading.near, f"must be below far, {grading.far} m")
+    if grading.far_size < mesh.element_size:
+        message = f"must not be below the element size, {mesh.element_size} m"
+        yield problem((*location, "far_size"), grading.far_size, message)
+
+
+def _sectors(case: Case) -> Iterator[Problem]:
+    """The planes along which a half or quarter body was cut need their symmetry boundary."""
+    for i, part in enumerate(case.parts):
+        mesh = part.mesh
+        if isinstance(mesh, MeshFile):
+            continue
+        for d in cut_directions(mesh, mesh.axis):
+            at, low = centre(mesh)[d], whole_bounds(mesh)[0][d]
+            if low < at and not any(_holds(boundary, part, d, at) for boundary in case.boundaries):
+                message = (
+                    f"needs a boundary with kind = 'symmetry', axis = {AXES[d]!r}, at = {at:g} "
+                    f"for part {part.name!r}, or sector = 'full'"
+                )
+                yield problem(("parts", i, "mesh", "sector"), mesh.sector, message)
+
+
+def _holds(boundary: object, part: Part, direction: int, at: float) -> bool:
+    if not isinstance(boundary, Symmetry) or boundary.axis != AXES[direction]:
+        return False
+    return math.isclose(boundary.at, at, abs_tol=1e-9) and (not boundary.parts or part.name in boundary.parts)
+
+
+def _boundaries(case: Case) -> Iterator[Problem]:
+    names = [part.name for part in case.parts]
+    for i, boundary in enumerate(case.boundaries):
+        for j, name in enumerate(boundary.parts):
+            if name not in names:
+                yield problem(("boundaries", i, "parts", j), name, f"no part of this name; {nearest(name, names)}")
+        if isinstance(boundary, Prescribed):
+            yield from _prescribed(boundary, ("boundaries", i))
+
+
+def _prescribed(boundary: Prescribed, location: Location) -> Iterator[Problem]:
+    if boundary.x is None and boundary.y is None and boundary.z is None:
+        yield problem(location, ..., "prescribes nothing; give one or more of x, y, z")
+    if (boundary.low is None) != (boundary.high is None):
+        yield problem(location, ..., "give both low and high, or neither for all nodes of the parts")
+    elif boundary.low is not None and boundary.high is not None:
+        yield from _ordered(boundary.low, boundary.high, location)
+
+
+def _ordered(low: tuple[float, ...], high: tuple[float, ...], location: Location) -> Iterator[Problem]:
+    for d, (a, b) in enumerate(zip(low, high, strict=True)):
+        if a > b:
+            yield problem((*location, "high", d), b, f"must not be below low[{d}], {a}")
+
+
+def _walls(case: Case) -> Iterator[Problem]:
+    walls = [(i, boundary) for i, boundary in enumerate(case.boundaries) if isinstance(boundary, Wall)]
+    seen: set[str] = set()
+    for i, wall in walls:
+        if wall.name in seen:
+            yield problem(("boundaries", i, "name"), wall.name, "an earlier wall has this name; give each its own")
+        seen.add(wall.name)
+        length = math.hypot(*wall.normal)
+        if length == 0.0:
+            yield problem(("boundaries", i, "normal"), "0, 0, 0", "must not be zero")
+        else:
+            yield from _behind(case, i, wall, length)
+
+
+def _behind(case: Case, number: int, wall: Wall, length: float) -> Iterator[Problem]:
+    normal = (wall.normal[0] / length, wall.normal[1] / length, wall.normal[2] / length)
+    level = sum(n * x for n, x in zip(normal, wall.point, strict=True))
+    for part in case.parts:
+        if isinstance(part.mesh, MeshFile) or (wall.parts and part.name not in wall.parts):
+            continue
+        depth = level - lowest_along(part.mesh, normal)
+        if depth > _ROUNDING * max(1.0, abs(level)):
+            message = f"part {part.name!r} starts {depth:g} m behind this wall; move it, or turn the normal round"
+            yield problem(("boundaries", number), ..., message)
+
+
+def _probes(case: Case) -> Iterator[Problem]:
+    yield from _unique([probe.name for probe in case.probes], "probes")
+    parts = {part.name: part for part in case.parts}
+    for i, probe in enumerate(case.probes):
+        yield from _ordered(probe.low, probe.high, ("probes", i))
+        if probe.part not in parts:
+            yield problem(("probes", i, "part"), probe.part, f"no part of this name; {nearest(probe.part, parts)}")
+            continue
+        body = bounds(parts[probe.part].mesh)
+        if body is None:
+            continue
+        for d, (a, b) in enumerate(zip(*body, strict=True)):
+            if probe.high[d] < a or probe.low[d] > b:
+                message = f"the box misses part {probe.part!r}, which lies between {a:g} and {b:g} m along {AXES[d]}"
+                yield problem(("probes", i), ..., message)
+
+
+def _references(case: Case) -> Iterator[Problem]:
+    parts = [part.name for part in case.parts]
+    probes = [probe.name for probe in case.probes]
+    walls = any(isinstance(boundary, Wall) for boundary in case.boundaries)
+    for i, reference in enumerate(case.reference):
+        location = ("reference", i)
+        yield from _reference_keys(reference, location)
+        if reference.part is not None and reference.part not in parts:
+            message = f"no part of this name; {nearest(reference.part, parts)}"
+            yield problem((*location, "part"), reference.part, message)
+        if reference.probe is not None and reference.probe not in probes:
+            message = f"no probe of this name; {nearest(reference.probe, probes)}"
+            yield problem((*location, "probe"), reference.probe, message)
+        if reference.quantity == "contact_time" and not walls:
+            yield problem((*location, "quantity"), reference.quantity, "needs a boundary with kind = 'wall'")
+        yield from _window(case, reference, location)
+
+
+def _reference_keys(reference: Reference, location: Location) -> Iterator[Problem]:
+    given = {key for key in ("part", "probe", "axis") if getattr(reference, key) is not None}
+    needed = NEEDED[reference.quantity]
+    for key in sorted(needed - given):
+        yield problem(
+            (*location, key), ..., f"this key is missing; {reference.quantity!r} needs {choices(sorted(needed))}"
+        )
+    for key in sorted(given - needed):
+        message = f"{reference.quantity!r} does not use this key; it needs {choices(sorted(needed))}"
+        yield problem((*location, key), getattr(reference, key), message)
+
+
+def _window(case: Case, reference: Reference, location: Location) -> Iterator[Problem]:
+    end = case.run.end_time
+    if reference.since >= end:
+        yield problem((*location, "since"), reference.since, f"must be below run.end_time, {end} s")
+    if reference.until is not None and not reference.since < reference.until <= end * (1 + _ROUNDING):
+        message = f"must be above since, {reference.since} s, and not above run.end_time, {end} s"
+        yield problem((*location, "until"), reference.until, message)
+
+
+def _unique(names: list[str], key: str) -> Iterator[Problem]:
+    for i, name in enumerate(names):
+        if name in names[:i]:
+            first = dotted((key, names.index(name)))
+            yield problem((key, i, "name"), name, f"{first} has this name; give each its own")

@@ -1,0 +1,208 @@
+"""The way in: TOML or JSON text becomes a Case, or a CaseError that says everything that is wrong at once."""
+
+import copy
+import json
+import re
+import tomllib
+from collections.abc import Iterable, Mapping
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from .checks import check
+from .library import library, material
+from .problems import CaseError, Problem, from_pydantic, nearest, problem, shown
+from .quantities import read_references
+from .schema import Case
+
+__all__ = [
+    "CaseError", "Problem", "apply_overrides", "material", "parse_case", "parse_json", "parse_toml",
+    "read_case", "read_data", "resolved_json", "shipped", "shipped_path",
+]  # fmt: skip
+
+_KEY = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*(?:\[\d{1,6}\])*(?:\.[A-Za-z_][A-Za-z0-9_-]*(?:\[\d{1,6}\])*)*")
+_ITEM = re.compile(r"([A-Za-z_][A-Za-z0-9_-]*)|\[(\d+)\]")
+_LINE = re.compile(r"\(at line (\d+), column \d+\)")
+
+
+def parse_case(data: Mapping[str, Any]) -> Case:
+    """The case in plain data, as TOML or JSON gives it. Raises CaseError with every problem."""
+    if not isinstance(data, Mapping):
+        raise CaseError([problem((), data, "a case is a table of keys")])
+    read, problems = read_references(data)
+    try:
+        case = Case.model_validate(read)
+    except ValidationError as error:
+        raise CaseError([*problems, *from_pydantic(error, data)]) from None
+    problems += check(case)
+    if problems:
+        raise CaseError(problems)
+    return case
+
+
+def parse_toml(text: str) -> Case:
+    """The case in TOML text. Raises CaseError; for broken TOML it names the line."""
+    return parse_case(toml_data(text))
+
+
+def parse_json(text: str | bytes) -> Case:
+    """The case in JSON text. Raises CaseError; for broken JSON it names the line."""
+    return parse_case(json_data(text))
+
+
+def read_case(path: Path) -> Case:
+    """The case in a file that ends in .toml or .json. Raises CaseError."""
+    return parse_case(read_data(path))
+
+
+def read_data(path: Path) -> dict[str, Any]:
+    """The plain data in a file that ends in .toml or .json, before any check. Raises CaseError."""
+    if path.suffix not in {".toml", ".json"}:
+        raise CaseError([Problem("case", shown(str(path)), "a case file ends in .toml or .json")])
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        raise CaseError([Problem("case", shown(str(path)), "this file is not UTF-8 text")]) from None
+    except OSError as error:
+        raise CaseError([Problem("case", shown(str(path)), f"cannot read this file: {error.strerror}")]) from None
+    return toml_data(text) if path.suffix == ".toml" else json_data(text)
+
+
+def toml_data(text: str) -> dict[str, Any]:
+    """The tables in TOML text. Raises CaseError that names the line."""
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise CaseError([_syntax(str(error), text)]) from None
+    except RecursionError:
+        raise CaseError([Problem("", "", "this TOML is nested too deeply")]) from None
+
+
+def json_data(text: str | bytes) -> dict[str, Any]:
+    """The object in JSON text; a repeated key is an error. Raises CaseError that names the line."""
+    try:
+        data = json.loads(text, object_pairs_hook=_no_repeats)
+    except json.JSONDecodeError as error:
+        raise CaseError([_at_line(error.lineno, str(error.doc), f"broken JSON: {error.msg}")]) from None
+    except UnicodeDecodeError:
+        raise CaseError([Problem("", "", "this JSON is not UTF-8 text")]) from None
+    except RecursionError:
+        raise CaseError([Problem("", "", "this JSON is nested too deeply")]) from None
+    except _Repeated as error:
+        raise CaseError([Problem("", "", f"broken JSON: {error}")]) from None
+    except ValueError:
+        raise CaseError([Problem("", "", "broken JSON: a whole number has too many digits")]) from None
+    if not isinstance(data, dict):
+        raise CaseError([problem((), data, "a case is an object of keys")])
+    return data
+
+
+class _Repeated(ValueError):
+    """A key stands twice in a JSON object."""
+
+
+def _no_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    data = dict(pairs)
+    if len(data) < len(pairs):
+        names = [name for name, _ in pairs]
+        raise _Repeated(f"the key {next(name for name in names if names.count(name) > 1)!r} is given twice")
+    return data
+
+
+def _syntax(message: str, text: str) -> Problem:
+    place = _LINE.search(message)
+    said = f"broken TOML: {_LINE.sub('', message).strip()}"
+    return _at_line(int(place[1]), text, said) if place else Problem("", "", said)
+
+
+def _at_line(number: int, text: str, message: str) -> Problem:
+    lines = text.splitlines()
+    written = lines[number - 1].strip() if 0 < number <= len(lines) else ""
+    return Problem(f"line {number}", shown(written) if written else "", message)
+
+
+def apply_overrides(data: Mapping[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
+    """A copy of ``data`` with assignments such as ``run.ranks=2`` or ``parts[0].mesh.element_size=0.5 mm``.
+
+    The value is read as TOML where it is TOML and as text otherwise. Tables that are missing on the way are made;
+    list items must exist. Raises CaseError with every assignment that cannot be made.
+    """
+    changed: dict[str, Any] = copy.deepcopy(dict(data))
+    problems: list[Problem] = []
+    for override in overrides:
+        key, equals, text = override.partition("=")
+        try:
+            if not equals or not _KEY.fullmatch(key.strip()):
+                raise ValueError("write an assignment such as run.ranks=2 or parts[0].velocity[2]='-200 m/s'")
+            _assign(changed, _items(key.strip()), _toml_value(text.strip()))
+        except ValueError as error:
+            problems.append(Problem(key.strip(), shown(text.strip()) if equals else "", str(error)))
+    if problems:
+        raise CaseError(problems)
+    return changed
+
+
+def _items(key: str) -> list[int | str]:
+    return [name or int(index) for name, index in _ITEM.findall(key)]
+
+
+def _toml_value(text: str) -> Any:
+    try:
+        data = tomllib.loads(f"value = {text}")
+    except tomllib.TOMLDecodeError:
+        return text
+    return data["value"] if len(data) == 1 else text
+
+
+def _assign(target: Any, items: list[int | str], value: Any) -> None:
+    for item, following in pairwise(items):
+        if isinstance(target, dict) and isinstance(following, str):
+            target = target.setdefault(item, {})
+        else:
+            target = _entry(target, item)
+    if isinstance(target, dict) and isinstance(items[-1], str):
+        target[items[-1]] = value
+    else:
+        _entry(target, items[-1])
+        target[items[-1]] = value
+
+
+def _entry(target: Any, item: int | str) -> Any:
+    if isinstance(item, str):
+        if not isinstance(target, dict):
+            raise ValueError(f"{item!r} cannot be set: what holds it is not a table")
+        if item not in target:
+            raise ValueError(f"there is no list {item!r} to set an item of")
+        return target[item]
+    if not isinstance(target, list):
+        raise ValueError(f"[{item}] cannot be set: what holds it is not a list")
+    if item >= len(target):
+        raise ValueError(f"[{item}] is outside the list, which has {len(target)} items, counted from 0")
+    return target[item]
+
+
+def resolved_json(case: Case) -> bytes:
+    """The case with every default filled in, in SI, with every material that its parts use; ends in a line feed."""
+    used = {part.material: material(case, part.material) for part in case.parts}
+    full = case.model_copy(update={"materials": {**case.materials, **used}})
+    return full.model_dump_json(indent=2).encode() + b"\n"
+
+
+def shipped() -> dict[str, Path]:
+    """The cases that come with Conoid, by name."""
+    return {path.stem: path for path in sorted((Path(__file__).parent / "shipped").glob("*.toml"))}
+
+
+def shipped_path(name: str) -> Path:
+    """The file of a shipped case. Raises CaseError with the nearest names."""
+    known = shipped()
+    if name not in known:
+        raise CaseError([Problem("case", shown(name), f"no shipped case of this name; {nearest(name, known)}")])
+    return known[name]
+
+
+def materials() -> list[str]:
+    """The names in the material library."""
+    return sorted(library())

@@ -1,0 +1,190 @@
+"""What is wrong with a case, one clear line each, under the keys that the user wrote."""
+
+import difflib
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from .schema import Case
+
+Location = tuple[int | str, ...]
+
+_DISCRIMINATORS = ("shape", "kind", "model")
+_LONGEST = 80
+_MOST = 100
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One error: the key as the user wrote it, its value as text (empty when there is none), what is allowed."""
+
+    key: str
+    value: str
+    message: str
+
+    def __str__(self) -> str:
+        """``parts[0].mesh.radius = '3 s': expected a length ...``."""
+        head = " = ".join(text for text in (self.key, self.value) if text)
+        return f"{head}: {self.message}" if head else self.message
+
+
+class CaseError(ValueError):
+    """A case cannot be used; ``problems`` says everything that is wrong, its text one line each."""
+
+    def __init__(self, problems: Iterable[Problem]) -> None:
+        """Keeps at most a hundred problems, in the order given."""
+        self.problems: tuple[Problem, ...] = tuple(problems)[:_MOST]
+        super().__init__("\n".join(str(problem) for problem in self.problems))
+
+
+def problem(location: Location, value: object, message: str) -> Problem:
+    """A problem at ``location``; ``value`` is shown as written, shortened; Ellipsis shows nothing."""
+    return Problem(dotted(location), "" if value is ... else shown(value), message)
+
+
+def dotted(location: Location) -> str:
+    """``("parts", 0, "mesh")`` as ``parts[0].mesh``."""
+    text = "".join(f"[{item}]" if isinstance(item, int) else f".{item}" for item in location)
+    return text.removeprefix(".")
+
+
+def shown(value: object) -> str:
+    """A value as text of at most 80 characters, on one line."""
+    if isinstance(value, int) and not isinstance(value, bool) and abs(value) >= 10**_LONGEST:
+        return "a whole number of more than 80 digits"
+    if isinstance(value, Mapping | list | tuple):
+        return "a table" if isinstance(value, Mapping) else "a list"
+    text = repr(value[: _LONGEST + 1]) if isinstance(value, str) else repr(value)
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 4]} ..."
+
+
+def choices(names: Iterable[str]) -> str:
+    """``'a', 'b'``: the allowed words, in the order given."""
+    return ", ".join(repr(name) for name in names) or "none"
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """``did you mean 'radius'?`` or the list of the known names, for the end of a message."""
+    names = list(known)
+    close = difflib.get_close_matches(word, names, n=3, cutoff=0.6)
+    return f"did you mean {' or '.join(map(repr, close))}?" if close else f"known: {choices(names)}"
+
+
+def from_pydantic(error: ValidationError, data: Mapping[str, Any]) -> list[Problem]:
+    """Every error of ``error`` under the keys of ``data``, without pydantic's own words where ours are clearer."""
+    details = error.errors(include_url=False, include_context=True)
+    return [_translate(detail, data) for detail in details if not _follows_from_others(detail)]
+
+
+def _follows_from_others(detail: ErrorDetails) -> bool:
+    """A list whose entries are all in error is called too short as well."""
+    return detail["type"] == "too_short" and bool(detail["input"])
+
+
+def _translate(detail: ErrorDetails, data: Mapping[str, Any]) -> Problem:
+    location, value, kind = _written(detail["loc"], data), detail["input"], detail["type"]
+    context = detail.get("ctx", {})
+    match kind:
+        case "missing":
+            return problem(location, ..., "this key is missing")
+        case "extra_forbidden":
+            return problem(location, ..., f"unknown key; {nearest(str(location[-1]), _keys(detail['loc'][:-1]))}")
+        case "union_tag_not_found":
+            tag = str(context["discriminator"]).strip("'")
+            return problem((*location, tag), ..., f"this key is missing; allowed: {choices(_tags(detail['loc']))}")
+        case "union_tag_invalid":
+            tag = str(context["discriminator"]).strip("'")
+            known = _tags(detail["loc"])
+            return problem((*location, tag), context["tag"], f"allowed: {choices(known)}")
+        case "value_error":
+            return problem(location, value, str(context["error"]).removeprefix(f"{value!r} "))
+        case "string_pattern_mismatch":
+            return problem(location, value, "a name starts with a letter and has up to 64 letters, digits, _ or -")
+        case "tuple_type":
+            return problem(location, value, _list_wanted(location))
+        case "model_type" | "model_attributes_type" | "dict_type":
+            return problem(location, value, "expected a table of keys")
+        case "too_short":
+            return problem(location, ..., "at least one is needed")
+        case "int_parsing" | "int_type" | "int_from_float":
+            return problem(location, value, "expected a whole number")
+        case "float_parsing" | "float_type":
+            return problem(location, value, "expected a number")
+        case _:
+            message = detail["msg"].removeprefix("Input should be ")
+            return problem(location, value, f"allowed: {message}" if message != detail["msg"] else message)
+
+
+def _list_wanted(location: Location) -> str:
+    if len(location) == 1:
+        return f"expected a list of tables; in TOML each one begins with [[{location[0]}]]"
+    return "expected a list"
+
+
+def _written(location: Location, data: Any) -> Location:
+    """The location without the union tags that pydantic puts in it."""
+    kept: list[int | str] = []
+    for item in location:
+        if isinstance(data, Mapping) and item in _values(data):
+            continue
+        if item == "[key]":
+            continue
+        kept.append(item)
+        data = _step(data, item)
+    return tuple(kept)
+
+
+def _values(data: Mapping[str, Any]) -> list[str]:
+    return [data[key] for key in _DISCRIMINATORS if isinstance(data.get(key), str)]
+
+
+def _step(data: Any, item: int | str) -> Any:
+    if isinstance(data, Mapping):
+        return data.get(item)
+    if isinstance(data, list | tuple) and isinstance(item, int) and item < len(data):
+        return data[item]
+    return None
+
+
+def _keys(location: Location) -> list[str]:
+    """The keys that the model at a pydantic location knows."""
+    return sorted({key for model in _models_at(location) for key in model.model_fields})
+
+
+def _tags(location: Location) -> list[str]:
+    """The values that the discriminator of the union at a pydantic location may have."""
+    return [tag for model in _models_at(location) for tag in _tags_of(model)]
+
+
+def _tags_of(model: type[BaseModel]) -> Iterator[str]:
+    for key in _DISCRIMINATORS:
+        if key in model.model_fields and get_origin(model.model_fields[key].annotation) is Literal:
+            yield from get_args(model.model_fields[key].annotation)
+
+
+def _models_at(location: Location) -> list[type[BaseModel]]:
+    """The models that may stand at a pydantic location (several for a union that has not been decided)."""
+    models: list[type[BaseModel]] = [Case]
+    named = False
+    for item in location:
+        tagged = [model for model in models if item in set(_tags_of(model))]
+        if isinstance(item, int) or named:
+            named = False
+        elif tagged:
+            models = tagged
+        else:
+            annotations = [model.model_fields[item].annotation for model in models if item in model.model_fields]
+            models = [found for annotation in annotations for found in _models_in(annotation)]
+            named = any(get_origin(annotation) is dict for annotation in annotations)
+    return models
+
+
+def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+        return
+    for argument in get_args(annotation):
+        yield from _models_in(argument)
