@@ -90,7 +90,7 @@ def json_data(text: str | bytes) -> dict[str, Any]:
         raise CaseError([Problem("", "", "this JSON is not UTF-8 text")]) from None
     except RecursionError:
         raise CaseError([Problem("", "", "this JSON is nested too deeply")]) from None
-    except _Repeated as error:
+    except _RepeatedKeyError as error:
         raise CaseError([Problem("", "", f"broken JSON: {error}")]) from None
     except ValueError:
         raise CaseError([Problem("", "", "broken JSON: a whole number has too many digits")]) from None
@@ -99,7 +99,7 @@ def json_data(text: str | bytes) -> dict[str, Any]:
     return data
 
 
-class _Repeated(ValueError):
+class _RepeatedKeyError(ValueError):
     """A key stands twice in a JSON object."""
 
 
@@ -107,7 +107,7 @@ def _no_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     data = dict(pairs)
     if len(data) < len(pairs):
         names = [name for name, _ in pairs]
-        raise _Repeated(f"the key {next(name for name in names if names.count(name) > 1)!r} is given twice")
+        raise _RepeatedKeyError(f"the key {next(name for name in names if names.count(name) > 1)!r} is given twice")
     return data
 
 
