@@ -4,6 +4,7 @@
 
     <runs>/<id>/
       case.toml | case.json  as submitted          case.resolved.json  every default filled in, SI
+      submission.json        who submitted it, when, with which key        worker.json  the process that runs it
       journal.jsonl          every event, one JSON line each, with seq: the truth
       history.csv            time history: clock, ledger, probes
       frames/000012.vtkhdf   one file a frame      frames/frames.vtkhdf.series  for ParaView
@@ -21,6 +22,9 @@ FRAMES = "frames"
 FRAME_SERIES = "frames.vtkhdf.series"
 LOGS = "log"
 LAUNCHER_LOG = "launcher.log"
+SUBMISSION = "submission.json"
+"""Written by the server only, as is ``worker.json``: a run without a server has neither."""
+WORKER = "worker.json"
 
 
 def frame(folder: Path, index: int) -> Path:
