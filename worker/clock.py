@@ -1,0 +1,68 @@
+"""Time: the stable step, its growth, and landing on output times without a sliver of a step."""
+
+import math
+
+
+class Clock:
+    """Simulated time, compensated (Kahan), and the step that leads on."""
+
+    def __init__(self, end: float, safety: float, growth: float, frames: int) -> None:
+        self.t = 0.0
+        self.step = 0
+        self.dt = 0.0
+        self._lost = 0.0
+        self._stable = math.inf
+        self._end = end
+        self._safety = safety
+        self._growth = growth
+        self._frames = frames
+        self.frame = 0
+        """Index of the next frame time to land on."""
+
+    @property
+    def done(self) -> bool:
+        """Whether the end time is reached."""
+        return self.t >= self._end
+
+    def frame_time(self, index: int) -> float:
+        """Time of frame ``index``, s; the last is the end of the run."""
+        return self._end * (index / self._frames) if self._frames and index < self._frames else self._end
+
+    @property
+    def frame_due(self) -> bool:
+        """Whether a frame belongs to the present time."""
+        return self._frames > 0 and self.frame <= self._frames and self.t >= self.frame_time(self.frame)
+
+    def choose(self, limit: float) -> float:
+        """The next step, s: ``limit`` is the largest one-over-stable-step of all tets, 1/s. Returns the mean step.
+
+        The mean of the old and the new step carries v(n-1/2) to v(n+1/2). The way to the next frame is divided evenly
+        over its last two steps.
+        """
+        old = self.dt
+        self._stable = min(self._safety / limit, self._growth * self._stable)
+        target = self.frame_time(self.frame + 1 if self.frame_due else self.frame)
+        left = target - self.t
+        if left <= self._stable:
+            self.dt = max(left, 0.0)
+        elif left < 2.0 * self._stable:
+            self.dt = 0.5 * left
+        else:
+            self.dt = self._stable
+        return 0.5 * (old + self.dt)
+
+    @property
+    def stable(self) -> float:
+        """The step that stability and growth allow, s, before landing on an output time."""
+        return self._stable
+
+    def advance(self) -> None:
+        """Moves on by the chosen step; lands on a frame time exactly."""
+        increment = self.dt - self._lost
+        new = self.t + increment
+        self._lost = (new - self.t) - increment
+        self.t = new
+        self.step += 1
+        target = self.frame_time(self.frame)
+        if abs(target - self.t) <= 1e-9 * self.dt:
+            self.t, self._lost = target, 0.0

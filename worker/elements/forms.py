@@ -1,0 +1,161 @@
+"""The pressure forms as the time step sees them: advance the elements by a step and start completing shared nodes.
+
+Border chunks come first: they hold every tet of a shared node, so the exchange runs while the interior is computed.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..parallel.comm import Comm
+from ..parallel.ownership import Neighbour, SharedSum
+from ..state import CHUNK, Block, Floats, Ints, Model
+from . import pressure, sweep, tet4
+
+_FORCE_TAG, _VOLUME_TAG = 1, 2
+
+
+class Elements:
+    """The elements of one rank in the ``standard`` pressure form; the averaged forms extend it."""
+
+    split = False
+
+    def __init__(self, model: Model, comm: Comm, neighbours: list[Neighbour]) -> None:
+        self.model = model
+        self.peaks: Ints = np.zeros(3, np.int64)
+        """Bits of the largest 1/step, the element that sets it (local number within ``limiting``), bits of the largest force."""
+        self.limiting = 0
+        """Index of the block whose element limits the step."""
+        self._w = np.zeros(tet4.SCRATCH)
+        self._wi = np.zeros(12 * CHUNK, np.int64)
+        self._bits = self._w.view(np.int64)
+        self.shared_forces = SharedSum(comm, neighbours, model.nodes.force, _FORCE_TAG)
+        self.pressure = np.zeros(1)
+        """(nodes,) nodal pressure, Pa; kept by the ``split`` form only."""
+
+    @property
+    def bytes_sent(self) -> int:
+        """Bytes this rank sends in a step."""
+        return self.shared_forces.bytes_sent
+
+    def advance(self, dt: float, scale: float) -> None:
+        """Stress and forces at n+1; the completion of the shared forces is under way when it returns."""
+        self.peaks[:] = 0
+        self.model.nodes.force[:] = 0
+        self._both_regions(lambda block, begin, end: self._standard(block, begin, end, dt, scale), self.shared_forces)
+
+    def again(self, scale: float) -> None:
+        """The forces of the present stress in a coarser quantum."""
+        limit = self.peaks[:2].copy()
+        self.peaks[2] = 0
+        self.model.nodes.force[:] = 0
+        self._both_regions(lambda block, begin, end: self._again(block, begin, end, scale), self.shared_forces)
+        self.peaks[:2] = limit
+
+    def finish(self) -> None:
+        """Returns when the forces of shared nodes are complete."""
+        self.shared_forces.finish()
+
+    def _both_regions(self, work: Callable[[Block, int, int], None], shared: SharedSum) -> None:
+        for number, block in enumerate(self.model.blocks):
+            self._tracked(number, block, 0, block.border_chunks, work)
+        shared.begin()
+        for number, block in enumerate(self.model.blocks):
+            self._tracked(number, block, block.border_chunks, block.chunks, work)
+
+    def _tracked(self, number: int, block: Block, begin: int, end: int, work: Callable[[Block, int, int], None]) -> None:
+        if begin == end:
+            return
+        before = self.peaks[0]
+        work(block, begin, end)
+        if self.peaks[0] > before:
+            self.limiting = number
+
+    def _standard(self, block: Block, begin: int, end: int, dt: float, scale: float) -> None:
+        nodes = self.model.nodes
+        sweep.standard_pass(
+            nodes.x, nodes.v, nodes.force, block.tets, block.state.reshape(-1), block.params, self._w, self._wi,
+            self._bits, self.peaks, block.kind, block.eos, block.state.shape[1], begin, end, dt, scale,
+        )  # fmt: skip
+
+    def _again(self, block: Block, begin: int, end: int, scale: float) -> None:
+        nodes = self.model.nodes
+        sweep.forces_again(
+            nodes.x, nodes.force, self.pressure, self._gradients(), self.split, block.tets, block.state.reshape(-1),
+            self._w, self._wi, self._bits, self.peaks, block.state.shape[1], begin, end, scale,
+        )  # fmt: skip
+
+    def _gradients(self) -> Ints:
+        return self.model.nodes.force
+
+
+class AveragedElements(Elements):
+    """The ``nodal`` and ``split`` forms: two passes with the completed nodal volume sums between them."""
+
+    def __init__(
+        self, model: Model, comm: Comm, neighbours: list[Neighbour], weight: Floats, bulk: Floats, split: bool
+    ) -> None:
+        n = model.nodes.n
+        self.split = split
+        self._gradient = np.zeros((n if split else 1, 3), np.int64)
+        super().__init__(model, comm, neighbours)
+        self._weight = weight
+        self._bulk = bulk
+        self._volumes = np.zeros((n, 2), np.int64)
+        self.shared_volumes = SharedSum(comm, neighbours, self._volumes, _VOLUME_TAG)
+        self._strain = np.zeros(n)
+        self._projected = np.zeros((n if split else 1, 3))
+        self.pressure = np.zeros(n if split else 1)
+        self._scale = 1.0
+        if split:
+            self.shared_gradients = SharedSum(comm, neighbours, self._gradient, _FORCE_TAG + 2)
+
+    @property
+    def bytes_sent(self) -> int:
+        extra = self.shared_gradients.bytes_sent if self.split else 0
+        return self.shared_forces.bytes_sent + self.shared_volumes.bytes_sent + extra
+
+    def advance(self, dt: float, scale: float) -> None:
+        nodes = self.model.nodes
+        self.peaks[:] = 0
+        self._volumes[:] = 0
+        self._both_regions(lambda block, begin, end: self._strains(block, begin, end, dt), self.shared_volumes)
+        self.shared_volumes.finish()
+        self._strain = pressure.nodal_strains(self._volumes)
+        if self.split:
+            self.pressure -= self._bulk * self._strain
+        nodes.force[:] = 0
+        self._gradient[:] = 0
+        self._scale = scale
+        self._both_regions(lambda block, begin, end: self._forces(block, begin, end, dt, scale), self.shared_forces)
+
+    def again(self, scale: float) -> None:
+        self._gradient[:] = 0
+        self._scale = scale
+        super().again(scale)
+
+    def finish(self) -> None:
+        super().finish()
+        if self.split:
+            self.shared_gradients.begin()
+            self.shared_gradients.finish()
+            volumes = self._volumes[:, 1] / (self._weight * pressure.QUANTA)
+            self._projected = self._gradient / (self._scale * volumes[:, None])
+
+    def _gradients(self) -> Ints:
+        return self._gradient
+
+    def _strains(self, block: Block, begin: int, end: int, dt: float) -> None:
+        nodes = self.model.nodes
+        sweep.strain_pass(
+            nodes.x, nodes.v, self._volumes, self._weight, self.pressure, self._projected, self.split, block.tets,
+            block.state.reshape(-1), block.params, self._w, block.kind, block.state.shape[1], begin, end, dt,
+        )  # fmt: skip
+
+    def _forces(self, block: Block, begin: int, end: int, dt: float, scale: float) -> None:
+        nodes = self.model.nodes
+        sweep.force_pass(
+            nodes.x, self._strain, nodes.force, self.pressure, self._gradient, self.split, block.tets,
+            block.state.reshape(-1), block.params, self._w, self._wi, self._bits, self.peaks, block.eos,
+            block.state.shape[1], begin, end, dt, scale,
+        )  # fmt: skip

@@ -1,0 +1,154 @@
+"""Averaged pressure forms: the volume strain that the pressure sees is averaged over the nodes of each tet.
+
+One-point tets with their own pressure lock in plastic flow. ``nodal`` replaces the volume strain of a tet by the mean
+of its nodes' values, each the volume-weighted mean over the tets round it (averaged nodal pressure, Bonet and Burton
+1998, in rate form; the pressure stays with the tet, so any equation of state works and a node that splits loses
+nothing). ``split`` adds to the nodal balance the pressure-gradient-projection form of the operator split
+(Zienkiewicz et al. 1998): Oñate-Codina stabilisation that acts on the difference between a tet's pressure gradient and
+the mean of the projected gradients of its nodes, and vanishes where pressure is linear.
+
+Nodal sums are integers. Each contribution is taken relative to the node's reference volume and so lies near one,
+whatever the size of the tets: one fixed scale, QUANTA, serves every scene.
+"""
+
+import numpy as np
+from numba import njit
+
+from ..state import CHUNK, MASS, VOLUME_FLUX, Floats, Ints
+from .tet4 import CHANGE, DILATATION, EDGE, FORCE, NODAL, SEEN, VOLUME, VOLUME_MID
+
+QUANTA = float(2**52)
+"""Quanta per unit of volume strain, and per unit of relative nodal volume."""
+
+_FLUX, _MASS = VOLUME_FLUX * CHUNK, MASS * CHUNK
+_STABILISE = NODAL
+"""Rows of the scratch: the four stabilising volume fluxes, m^3/s."""
+_PROJECTED = NODAL + 4 * CHUNK
+"""Rows of the scratch: mean projected pressure gradient, Pa/m."""
+_DIFFERENCE = NODAL + 7 * CHUNK
+"""Rows of the scratch: nodal pressure differences to node 0, Pa."""
+
+
+@njit("void(float64[::1], float64[::1], int64)", cache=True)
+def keep_flux(w, s, n):  # type: ignore[no-untyped-def]
+    """Keeps the tet's own volume flux, m^3/s, for the second pass over the elements."""
+    for i in range(n):
+        s[_FLUX + i] = w[DILATATION + i] * w[VOLUME_MID + i]
+
+
+@njit("void(float64[::1], float64[::1], int64, float64)", cache=True)
+def recall_flux(w, s, n, dt):  # type: ignore[no-untyped-def]
+    """CHANGE: the tet's own change of volume in the step, m^3."""
+    for i in range(n):
+        w[CHANGE + i] = s[_FLUX + i] * dt
+
+
+@njit("void(int64[:, ::1], float64[::1], float64[::1], int32[:, ::1], int64, float64)", cache=True)
+def scatter_volumes(sums, w, weight, tets, n, dt):  # type: ignore[no-untyped-def]
+    """Adds a quarter of each tet's volume change and of its volume to the sums of its nodes.
+
+    ``weight`` (nodes,) is one over the reference volume, 1/m^3; ``sums`` (nodes, 2).
+    """
+    for i in range(n):
+        volume = 0.25 * w[VOLUME_MID + i]
+        change = volume * w[DILATATION + i] * dt
+        for k in range(4):
+            a = tets[i, k]
+            quanta = weight[a] * QUANTA
+            sums[a, 0] += np.int64(np.rint(change * quanta))
+            sums[a, 1] += np.int64(np.rint(volume * quanta))
+
+
+@njit("void(int64[:, ::1], float64[::1], float64[::1], int32[:, ::1], int64, float64)", cache=True)
+def scatter_stabilised(sums, w, weight, tets, n, dt):  # type: ignore[no-untyped-def]
+    """As ``scatter_volumes``, with the stabilising fluxes of ``stabilise`` added to the change of volume."""
+    for i in range(n):
+        volume = 0.25 * w[VOLUME_MID + i]
+        flux = volume * w[DILATATION + i]
+        for k in range(4):
+            a = tets[i, k]
+            quanta = weight[a] * QUANTA
+            sums[a, 0] += np.int64(np.rint((flux + w[_STABILISE + k * CHUNK + i]) * dt * quanta))
+            sums[a, 1] += np.int64(np.rint(volume * quanta))
+
+
+@njit("void(float64[::1], float64[::1], float64[:, ::1], int32[:, ::1], int64)", cache=True)
+def gather_projection(w, pressure, projected, tets, n):  # type: ignore[no-untyped-def]
+    """Nodal pressure differences and the mean projected gradient of ``n`` tets."""
+    for i in range(n):
+        a, b, c, d = tets[i, 0], tets[i, 1], tets[i, 2], tets[i, 3]
+        w[_DIFFERENCE + i] = pressure[b] - pressure[a]
+        w[_DIFFERENCE + CHUNK + i] = pressure[c] - pressure[a]
+        w[_DIFFERENCE + 2 * CHUNK + i] = pressure[d] - pressure[a]
+        for k in range(3):
+            w[_PROJECTED + k * CHUNK + i] = 0.25 * (
+                (projected[a, k] + projected[b, k]) + (projected[c, k] + projected[d, k])
+            )
+
+
+@njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
+def stabilise(w, s, n, dt):  # type: ignore[no-untyped-def]
+    """Stabilising volume fluxes dt V / rho grad N_a . (grad p - mean projected grad p), from b at the end of the step.
+
+    They add to zero over the four nodes: the body's volume is not touched.
+    """
+    for i in range(n):
+        volume, mass = w[VOLUME + i], s[_MASS + i]
+        p1, p2, p3 = w[_DIFFERENCE + i], w[_DIFFERENCE + CHUNK + i], w[_DIFFERENCE + 2 * CHUNK + i]
+        f1, f2, f3 = 0.0, 0.0, 0.0
+        for k in range(3):
+            b1 = w[EDGE + k * CHUNK + i]
+            b2 = w[EDGE + (3 + k) * CHUNK + i]
+            b3 = w[EDGE + (6 + k) * CHUNK + i]
+            excess = (p1 * b1 + p2 * b2 + p3 * b3) / volume - w[_PROJECTED + k * CHUNK + i]
+            f1 += b1 * excess
+            f2 += b2 * excess
+            f3 += b3 * excess
+        factor = dt * volume / mass
+        w[_STABILISE + CHUNK + i] = factor * f1
+        w[_STABILISE + 2 * CHUNK + i] = factor * f2
+        w[_STABILISE + 3 * CHUNK + i] = factor * f3
+        w[_STABILISE + i] = -factor * (f1 + f2 + f3)
+
+
+@njit("void(float64[::1], float64[::1], int32[:, ::1], int64)", cache=True)
+def gather_strains(w, strain, tets, n):  # type: ignore[no-untyped-def]
+    """SEEN: mean volume strain of the step of the four nodes."""
+    for i in range(n):
+        w[SEEN + i] = 0.25 * ((strain[tets[i, 0]] + strain[tets[i, 1]]) + (strain[tets[i, 2]] + strain[tets[i, 3]]))
+
+
+@njit("void(float64[::1], int64, float64)", cache=True)
+def own_strains(w, n, dt):  # type: ignore[no-untyped-def]
+    """SEEN and CHANGE of the ``standard`` form: each tet sees its own volume strain."""
+    for i in range(n):
+        w[SEEN + i] = w[DILATATION + i] * dt
+        w[CHANGE + i] = w[DILATATION + i] * dt * w[VOLUME_MID + i]
+
+
+@njit("void(float64[::1], float64[::1], int32[:, ::1], int64)", cache=True)
+def pressure_fluxes(w, pressure, tets, n):  # type: ignore[no-untyped-def]
+    """Rows after the nine forces: V grad p / 4 of the tet, N, for the projection."""
+    for i in range(n):
+        p0 = pressure[tets[i, 0]]
+        p1, p2, p3 = pressure[tets[i, 1]] - p0, pressure[tets[i, 2]] - p0, pressure[tets[i, 3]] - p0
+        for k in range(3):
+            w[FORCE + (9 + k) * CHUNK + i] = 0.25 * (
+                p1 * w[EDGE + k * CHUNK + i] + p2 * w[EDGE + (3 + k) * CHUNK + i] + p3 * w[EDGE + (6 + k) * CHUNK + i]
+            )
+
+
+@njit("void(int64[:, ::1], int64[::1], int32[:, ::1], int64)", cache=True)
+def scatter_fluxes(gradient, wi, tets, n):  # type: ignore[no-untyped-def]
+    """Adds the quantised V grad p / 4 to the four nodes of each tet."""
+    for i in range(n):
+        for k in range(3):
+            flux = wi[(9 + k) * CHUNK + i]
+            for a in range(4):
+                gradient[tets[i, a], k] += flux
+
+
+def nodal_strains(sums: Ints) -> Floats:
+    """(n,) volume strain of the step at the nodes from the completed sums (n, 2)."""
+    strains: Floats = sums[:, 0] / sums[:, 1]
+    return strains

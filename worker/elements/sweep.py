@@ -1,0 +1,176 @@
+"""Passes over the elements of a block, chunk by chunk: what the time step calls.
+
+``standard_pass`` does everything in one pass. The averaged pressure forms need two, with the completed nodal sums
+between them: ``strain_pass`` (velocity gradient, deviatoric stress, nodal volume sums) and ``force_pass`` (pressure,
+viscosity, forces). ``forces_again`` repeats only the sum of forces, in a coarser quantum.
+
+``peaks`` collects, as bits of float64: 0 the largest one-over-stable-step, 2 the largest force; 1 is the element that
+sets the first.
+"""
+
+from numba import njit
+
+from ..materials import models
+from ..materials.elastic import deviatoric_work, rotate, trial
+from ..materials.equation_of_state import linear, mie_gruneisen
+from ..materials.johnson_cook import johnson_cook
+from ..materials.plastic import linear_hardening
+from ..materials.viscosity import bulk_viscosity
+from ..state import CHUNK
+from . import pressure as averaged
+from . import tet4
+
+_LIMIT, _FORCE = tet4.LIMIT, tet4.FORCE
+_F1, _F2, _I1, _I2, _T2 = "float64[::1]", "float64[:, ::1]", "int64[::1]", "int64[:, ::1]", "int32[:, ::1]"
+
+
+@njit(f"void(int64, {_F1}, {_F1}, {_F1}, int64, float64)", cache=True, error_model="numpy")
+def deviatoric_stress(strength, w, s, params, n, dt):  # type: ignore[no-untyped-def]
+    """Rotation, elastic trial and plastic return of a chunk; books the work of the deviatoric stress."""
+    rotate(w, s, n)
+    deviatoric_work(w, s, n, dt)
+    trial(w, s, n, 2.0 * params[models.SHEAR] * dt)
+    if strength == models.LINEAR_HARDENING:
+        linear_hardening(w, s, params, n, dt)
+    elif strength == models.JOHNSON_COOK:
+        johnson_cook(w, s, params, n, dt)
+    deviatoric_work(w, s, n, dt)
+
+
+@njit(f"void(int64, {_F1}, {_F1}, {_F1}, int64, float64)", cache=True, error_model="numpy")
+def pressure_and_limit(eos, w, s, params, n, dt):  # type: ignore[no-untyped-def]
+    """Equation of state, bulk viscosity and stable step of a chunk."""
+    if eos == models.MIE_GRUNEISEN:
+        mie_gruneisen(w, s, params, n)
+    else:
+        linear(w, s, params, n)
+    if params[models.Q_LINEAR] > 0.0 or params[models.Q_QUADRATIC] > 0.0:
+        frequency = 1.0 / dt if dt > 0.0 else 0.0
+        bulk_viscosity(w, s, n, params[models.Q_LINEAR], params[models.Q_QUADRATIC], frequency)
+    else:
+        tet4.step_limit(w, s, n)
+
+
+@njit(f"void({_I1}, {_I1}, int64, int64, int64)", cache=True)
+def note_peaks(peaks, bits, first, n, rows):  # type: ignore[no-untyped-def]
+    """Raises the peaks by a chunk whose first element is ``first``."""
+    peaks[2] = max(peaks[2], tet4.peak(bits, _FORCE, rows, n))
+    limit = tet4.peak(bits, _LIMIT, 1, n)
+    if limit > peaks[0]:
+        peaks[0] = limit
+        for i in range(n):
+            if bits[_LIMIT + i] & tet4.MAGNITUDE == limit:
+                peaks[1] = first + i
+                break
+
+
+@njit(
+    f"void({_I2}, {_F1}, {_I2}, boolean, {_T2}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, int64, int64, float64)",
+    cache=True,
+    error_model="numpy",
+)
+def sum_forces(force, pressure, gradient, split, t, s, w, wi, bits, peaks, first, n, scale):  # type: ignore[no-untyped-def]
+    """Adds the forces of a chunk, and with ``split`` its share of the projected pressure gradient."""
+    tet4.internal_forces(w, s, n)
+    rows = 9
+    if split:
+        note_peaks(peaks, bits, first, n, rows)
+        averaged.pressure_fluxes(w, pressure, t, n)
+        rows = 12
+        peaks[2] = max(peaks[2], tet4.peak(bits, _FORCE, rows, n))
+    else:
+        note_peaks(peaks, bits, first, n, rows)
+    tet4.quantise(w, wi, rows, n, scale)
+    tet4.scatter_forces(force, wi, t, n)
+    if split:
+        averaged.scatter_fluxes(gradient, wi, t, n)
+
+
+@njit(
+    f"void({_F2}, {_F2}, {_I2}, {_T2}, {_F1}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, "
+    "int64, int64, int64, int64, int64, float64, float64)",
+    cache=True,
+    error_model="numpy",
+)
+def standard_pass(x, v, force, tets, state, params, w, wi, bits, peaks, strength, eos, rows, begin, end, dt, scale):  # type: ignore[no-untyped-def]
+    """Stress and forces at n+1 of chunks ``begin`` to ``end``, each tet with its own pressure."""
+    for c in range(begin, end):
+        t = tets[c * CHUNK : (c + 1) * CHUNK]
+        s = state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
+        n = len(t)
+        tet4.gather_edges(w, x, t, n)
+        tet4.gather_rates(w, v, t, n)
+        tet4.kinematics(w, n, dt)
+        deviatoric_stress(strength, w, s, params, n, dt)
+        tet4.end_gradients(w, n)
+        averaged.own_strains(w, n, dt)
+        pressure_and_limit(eos, w, s, params, n, dt)
+        tet4.internal_forces(w, s, n)
+        note_peaks(peaks, bits, c * CHUNK, n, 9)
+        tet4.quantise(w, wi, 9, n, scale)
+        tet4.scatter_forces(force, wi, t, n)
+
+
+@njit(
+    f"void({_F2}, {_F2}, {_I2}, {_F1}, {_F1}, {_F2}, boolean, {_T2}, {_F1}, {_F1}, {_F1}, "
+    "int64, int64, int64, int64, float64)",
+    cache=True,
+    error_model="numpy",
+)
+def strain_pass(x, v, sums, weight, pressure, projected, split, tets, state, params, w, strength, rows, begin, end, dt):  # type: ignore[no-untyped-def]
+    """Deviatoric stress at n+1, and the nodal sums of volume change; with ``split``, stabilised."""
+    for c in range(begin, end):
+        t = tets[c * CHUNK : (c + 1) * CHUNK]
+        s = state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
+        n = len(t)
+        tet4.gather_edges(w, x, t, n)
+        tet4.gather_rates(w, v, t, n)
+        tet4.kinematics(w, n, dt)
+        deviatoric_stress(strength, w, s, params, n, dt)
+        averaged.keep_flux(w, s, n)
+        if split:
+            tet4.end_gradients(w, n)
+            averaged.gather_projection(w, pressure, projected, t, n)
+            averaged.stabilise(w, s, n, dt)
+            averaged.scatter_stabilised(sums, w, weight, t, n, dt)
+        else:
+            averaged.scatter_volumes(sums, w, weight, t, n, dt)
+
+
+@njit(
+    f"void({_F2}, {_F1}, {_I2}, {_F1}, {_I2}, boolean, {_T2}, {_F1}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, "
+    "int64, int64, int64, int64, float64, float64)",
+    cache=True,
+    error_model="numpy",
+)
+def force_pass(  # type: ignore[no-untyped-def]
+    x, strain, force, pressure, gradient, split, tets, state, params, w, wi, bits, peaks, eos, rows, begin, end, dt, scale
+):
+    """Pressure from the averaged volume strain, viscosity and forces at n+1; with ``split``, pressure gradients."""
+    for c in range(begin, end):
+        t = tets[c * CHUNK : (c + 1) * CHUNK]
+        s = state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
+        n = len(t)
+        tet4.gather_edges(w, x, t, n)
+        tet4.end_gradients(w, n)
+        averaged.gather_strains(w, strain, t, n)
+        averaged.recall_flux(w, s, n, dt)
+        pressure_and_limit(eos, w, s, params, n, dt)
+        sum_forces(force, pressure, gradient, split, t, s, w, wi, bits, peaks, c * CHUNK, n, scale)
+
+
+@njit(
+    f"void({_F2}, {_I2}, {_F1}, {_I2}, boolean, {_T2}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, int64, int64, int64, float64)",
+    cache=True,
+    error_model="numpy",
+)
+def forces_again(x, force, pressure, gradient, split, tets, state, w, wi, bits, peaks, rows, begin, end, scale):  # type: ignore[no-untyped-def]
+    """The forces of the present stress once more, in another quantum; changes no state and no limit."""
+    for c in range(begin, end):
+        t = tets[c * CHUNK : (c + 1) * CHUNK]
+        s = state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
+        n = len(t)
+        tet4.gather_edges(w, x, t, n)
+        tet4.end_gradients(w, n)
+        w[_LIMIT : _LIMIT + n] = 0.0
+        sum_forces(force, pressure, gradient, split, t, s, w, wi, bits, peaks, c * CHUNK, n, scale)

@@ -1,0 +1,210 @@
+r"""The four-node tetrahedron: gradients, velocity gradient, internal force and stable time step, a chunk at a time.
+
+::
+
+              3                  node 0: origin of the edges      6 V   = e1 . (e2 x e3)
+             /|\                 e1 = x1 - x0                     V grad N_1 = (e2 x e3) / 6 = b1
+            / | \                e2 = x2 - x0                     V grad N_2 = (e3 x e1) / 6 = b2
+           0--|--2               e3 = x3 - x0                     V grad N_3 = (e1 x e2) / 6 = b3
+            \ | /                                                 V grad N_0 = -(b1 + b2 + b3)
+             \|/
+              1     1, 2, 3 run counter-clockwise seen from outside the face opposite to 0 when V > 0
+
+Every function works on one chunk: ``w`` is scratch (rows of CHUNK numbers at the places below), ``s`` the state of
+the chunk. Loops over a chunk use no function that could round differently in a vector lane and in a scalar.
+"""
+
+import numpy as np
+from numba import njit
+
+from ..state import (
+    CHUNK,
+    MASS,
+    PRESSURE,
+    S_XX,
+    S_XY,
+    S_YY,
+    S_YZ,
+    S_ZX,
+    S_ZZ,
+    VISCOUS,
+)
+
+# Rows of the scratch, in numbers of float64. EDGE holds e1, e2, e3 and later b1, b2, b3 at the end of the step;
+# RATE holds the velocity differences, then the rate of deformation and the spin, then the nodal forces.
+EDGE = 0
+RATE = 9 * CHUNK
+D_XX, D_YY, D_ZZ, D_YZ, D_ZX, D_XY = (RATE + k * CHUNK for k in range(6))
+SPIN = RATE + 6 * CHUNK
+FORCE = RATE
+VOLUME_MID = 18 * CHUNK
+DILATATION = 19 * CHUNK
+VOLUME = 20 * CHUNK
+AREAS = 21 * CHUNK
+MODULUS = 22 * CHUNK
+LIMIT = 23 * CHUNK
+TRIAL = 24 * CHUNK
+SEEN = 25 * CHUNK
+CHANGE = 26 * CHUNK
+NODAL = 27 * CHUNK
+SCRATCH = 40 * CHUNK
+
+_SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
+_SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
+_P, _Q, _MASS = PRESSURE * CHUNK, VISCOUS * CHUNK, MASS * CHUNK
+_SIXTH = 1.0 / 6.0
+LENGTH_FACTOR = 1.2009369551760027
+"""V^(1/3) times sqrt(sum |grad N|^2) of a regular tet, sqrt(6) / (6 sqrt(2))^(1/3): with l = LENGTH_FACTOR over that
+root, l is V^(1/3) for a regular tet and shrinks with the altitude of a flat one."""
+MAGNITUDE = 0x7FFFFFFFFFFFFFFF
+"""Mask of a float64's bits without the sign: as integers these order like absolute values, with NaN above all."""
+
+
+
+@njit("void(float64[::1], float64[:, ::1], int32[:, ::1], int64)", cache=True, error_model="numpy")
+def gather_edges(w, x, tets, n):  # type: ignore[no-untyped-def]
+    """Edges e1, e2, e3 of ``n`` tets from the positions x (nodes, 3)."""
+    for i in range(n):
+        a, b, c, d = tets[i, 0], tets[i, 1], tets[i, 2], tets[i, 3]
+        for k in range(3):
+            w[EDGE + k * CHUNK + i] = x[b, k] - x[a, k]
+            w[EDGE + (3 + k) * CHUNK + i] = x[c, k] - x[a, k]
+            w[EDGE + (6 + k) * CHUNK + i] = x[d, k] - x[a, k]
+
+
+@njit("void(float64[::1], float64[:, ::1], int32[:, ::1], int64)", cache=True, error_model="numpy")
+def gather_rates(w, v, tets, n):  # type: ignore[no-untyped-def]
+    """Velocity differences to node 0 of ``n`` tets from the velocities v (nodes, 3)."""
+    for i in range(n):
+        a, b, c, d = tets[i, 0], tets[i, 1], tets[i, 2], tets[i, 3]
+        for k in range(3):
+            w[RATE + k * CHUNK + i] = v[b, k] - v[a, k]
+            w[RATE + (3 + k) * CHUNK + i] = v[c, k] - v[a, k]
+            w[RATE + (6 + k) * CHUNK + i] = v[d, k] - v[a, k]
+
+
+@njit("void(float64[::1], int64, float64)", cache=True, error_model="numpy")
+def kinematics(w, n, dt):  # type: ignore[no-untyped-def]
+    """Rate of deformation and spin at mid-step from the edges at the end of the step and the velocities at mid-step.
+
+    The gradient is taken at x(n+1/2) = x(n+1) - dt/2 v: a rigid rotation then has exactly no rate of deformation
+    (the paper's modified central difference). SPIN holds the axial vector of dt/2 times the spin, VOLUME_MID the
+    volume and DILATATION the trace of the rate of deformation.
+    """
+    h = 0.5 * dt
+    for i in range(n):
+        ax, ay, az = w[RATE + i], w[RATE + CHUNK + i], w[RATE + 2 * CHUNK + i]
+        bx, by, bz = w[RATE + 3 * CHUNK + i], w[RATE + 4 * CHUNK + i], w[RATE + 5 * CHUNK + i]
+        cx, cy, cz = w[RATE + 6 * CHUNK + i], w[RATE + 7 * CHUNK + i], w[RATE + 8 * CHUNK + i]
+        e1x, e1y, e1z = w[EDGE + i] - h * ax, w[EDGE + CHUNK + i] - h * ay, w[EDGE + 2 * CHUNK + i] - h * az
+        e2x, e2y, e2z = w[EDGE + 3 * CHUNK + i] - h * bx, w[EDGE + 4 * CHUNK + i] - h * by, w[EDGE + 5 * CHUNK + i] - h * bz
+        e3x, e3y, e3z = w[EDGE + 6 * CHUNK + i] - h * cx, w[EDGE + 7 * CHUNK + i] - h * cy, w[EDGE + 8 * CHUNK + i] - h * cz
+        g1x, g1y, g1z = e2y * e3z - e2z * e3y, e2z * e3x - e2x * e3z, e2x * e3y - e2y * e3x
+        g2x, g2y, g2z = e3y * e1z - e3z * e1y, e3z * e1x - e3x * e1z, e3x * e1y - e3y * e1x
+        g3x, g3y, g3z = e1y * e2z - e1z * e2y, e1z * e2x - e1x * e2z, e1x * e2y - e1y * e2x
+        six_volumes = e1x * g1x + e1y * g1y + e1z * g1z
+        r = 1.0 / six_volumes
+        lxx = (ax * g1x + bx * g2x + cx * g3x) * r
+        lxy = (ax * g1y + bx * g2y + cx * g3y) * r
+        lxz = (ax * g1z + bx * g2z + cx * g3z) * r
+        lyx = (ay * g1x + by * g2x + cy * g3x) * r
+        lyy = (ay * g1y + by * g2y + cy * g3y) * r
+        lyz = (ay * g1z + by * g2z + cy * g3z) * r
+        lzx = (az * g1x + bz * g2x + cz * g3x) * r
+        lzy = (az * g1y + bz * g2y + cz * g3y) * r
+        lzz = (az * g1z + bz * g2z + cz * g3z) * r
+        w[VOLUME_MID + i] = six_volumes * _SIXTH
+        w[DILATATION + i] = lxx + lyy + lzz
+        w[D_XX + i], w[D_YY + i], w[D_ZZ + i] = lxx, lyy, lzz
+        w[D_YZ + i], w[D_ZX + i], w[D_XY + i] = 0.5 * (lyz + lzy), 0.5 * (lzx + lxz), 0.5 * (lxy + lyx)
+        w[SPIN + i] = 0.5 * h * (lzy - lyz)
+        w[SPIN + CHUNK + i] = 0.5 * h * (lxz - lzx)
+        w[SPIN + 2 * CHUNK + i] = 0.5 * h * (lyx - lxy)
+
+
+@njit("void(float64[::1], int64)", cache=True, error_model="numpy")
+def end_gradients(w, n):  # type: ignore[no-untyped-def]
+    """Replaces the edges by b1, b2, b3 (m^2), and sets VOLUME (m^3) and AREAS, the sum of |b|^2 over four nodes."""
+    for i in range(n):
+        e1x, e1y, e1z = w[EDGE + i], w[EDGE + CHUNK + i], w[EDGE + 2 * CHUNK + i]
+        e2x, e2y, e2z = w[EDGE + 3 * CHUNK + i], w[EDGE + 4 * CHUNK + i], w[EDGE + 5 * CHUNK + i]
+        e3x, e3y, e3z = w[EDGE + 6 * CHUNK + i], w[EDGE + 7 * CHUNK + i], w[EDGE + 8 * CHUNK + i]
+        b1x, b1y, b1z = (e2y * e3z - e2z * e3y) * _SIXTH, (e2z * e3x - e2x * e3z) * _SIXTH, (e2x * e3y - e2y * e3x) * _SIXTH
+        b2x, b2y, b2z = (e3y * e1z - e3z * e1y) * _SIXTH, (e3z * e1x - e3x * e1z) * _SIXTH, (e3x * e1y - e3y * e1x) * _SIXTH
+        b3x, b3y, b3z = (e1y * e2z - e1z * e2y) * _SIXTH, (e1z * e2x - e1x * e2z) * _SIXTH, (e1x * e2y - e1y * e2x) * _SIXTH
+        b0x, b0y, b0z = b1x + b2x + b3x, b1y + b2y + b3y, b1z + b2z + b3z
+        w[VOLUME + i] = e1x * b1x + e1y * b1y + e1z * b1z
+        w[AREAS + i] = (
+            (b0x * b0x + b0y * b0y + b0z * b0z)
+            + (b1x * b1x + b1y * b1y + b1z * b1z)
+            + (b2x * b2x + b2y * b2y + b2z * b2z)
+            + (b3x * b3x + b3y * b3y + b3z * b3z)
+        )
+        w[EDGE + i], w[EDGE + CHUNK + i], w[EDGE + 2 * CHUNK + i] = b1x, b1y, b1z
+        w[EDGE + 3 * CHUNK + i], w[EDGE + 4 * CHUNK + i], w[EDGE + 5 * CHUNK + i] = b2x, b2y, b2z
+        w[EDGE + 6 * CHUNK + i], w[EDGE + 7 * CHUNK + i], w[EDGE + 8 * CHUNK + i] = b3x, b3y, b3z
+
+
+@njit("void(float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
+def internal_forces(w, s, n):  # type: ignore[no-untyped-def]
+    """FORCE: -V stress grad N of nodes 1, 2, 3, N; node 0 gets minus their sum when they are scattered."""
+    for i in range(n):
+        pressure = s[_P + i] + s[_Q + i]
+        sxx, syy, szz = pressure - s[_SXX + i], pressure - s[_SYY + i], pressure - s[_SZZ + i]
+        syz, szx, sxy = -s[_SYZ + i], -s[_SZX + i], -s[_SXY + i]
+        b1x, b1y, b1z = w[EDGE + i], w[EDGE + CHUNK + i], w[EDGE + 2 * CHUNK + i]
+        b2x, b2y, b2z = w[EDGE + 3 * CHUNK + i], w[EDGE + 4 * CHUNK + i], w[EDGE + 5 * CHUNK + i]
+        b3x, b3y, b3z = w[EDGE + 6 * CHUNK + i], w[EDGE + 7 * CHUNK + i], w[EDGE + 8 * CHUNK + i]
+        w[FORCE + i] = sxx * b1x + sxy * b1y + szx * b1z
+        w[FORCE + CHUNK + i] = sxy * b1x + syy * b1y + syz * b1z
+        w[FORCE + 2 * CHUNK + i] = szx * b1x + syz * b1y + szz * b1z
+        w[FORCE + 3 * CHUNK + i] = sxx * b2x + sxy * b2y + szx * b2z
+        w[FORCE + 4 * CHUNK + i] = sxy * b2x + syy * b2y + syz * b2z
+        w[FORCE + 5 * CHUNK + i] = szx * b2x + syz * b2y + szz * b2z
+        w[FORCE + 6 * CHUNK + i] = sxx * b3x + sxy * b3y + szx * b3z
+        w[FORCE + 7 * CHUNK + i] = sxy * b3x + syy * b3y + syz * b3z
+        w[FORCE + 8 * CHUNK + i] = szx * b3x + syz * b3y + szz * b3z
+
+
+@njit("void(float64[::1], int64[::1], int64, int64, float64)", cache=True, error_model="numpy")
+def quantise(w, wi, rows, n, scale):  # type: ignore[no-untyped-def]
+    """``rows`` rows of the scratch from FORCE on, in quanta of 1/scale, rounded to the nearest integer."""
+    for k in range(rows):
+        source, target = w[FORCE + k * CHUNK : FORCE + k * CHUNK + n], wi[k * CHUNK : k * CHUNK + n]
+        for i in range(n):
+            target[i] = np.int64(np.rint(source[i] * scale))
+
+
+@njit("void(int64[:, ::1], int64[::1], int32[:, ::1], int64)", cache=True)
+def scatter_forces(force, wi, tets, n):  # type: ignore[no-untyped-def]
+    """Adds the quantised forces to the nodal sums; node 0 gets minus the sum, so that they add to zero exactly."""
+    for i in range(n):
+        a, b, c, d = tets[i, 0], tets[i, 1], tets[i, 2], tets[i, 3]
+        for k in range(3):
+            f1, f2, f3 = wi[k * CHUNK + i], wi[(3 + k) * CHUNK + i], wi[(6 + k) * CHUNK + i]
+            force[b, k] += f1
+            force[c, k] += f2
+            force[d, k] += f3
+            force[a, k] -= f1 + f2 + f3
+
+
+@njit("int64(int64[::1], int64, int64, int64)", cache=True)
+def peak(bits, row, rows, n):  # type: ignore[no-untyped-def]
+    """Largest magnitude in ``rows`` rows of the scratch from ``row`` on, as the bits of a float64; NaN is above all."""
+    largest = np.int64(0)
+    for k in range(rows):
+        part = bits[row + k * CHUNK : row + k * CHUNK + n]
+        for i in range(n):
+            largest = max(largest, part[i] & MAGNITUDE)
+    return largest
+
+
+@njit("void(float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
+def step_limit(w, s, n):  # type: ignore[no-untyped-def]
+    """LIMIT: c sqrt(sum |grad N|^2), one over the largest stable step, 1/s; NaN where the volume is not positive.
+
+    Twice this is never below the highest frequency of a tet with lumped mass (derived in docs/numerics.md).
+    """
+    for i in range(n):
+        volume = w[VOLUME + i]
+        w[LIMIT + i] = np.sqrt(w[AREAS + i] * w[MODULUS + i] / (volume * s[_MASS + i]))

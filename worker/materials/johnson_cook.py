@@ -1,0 +1,111 @@
+"""Johnson-Cook flow stress, radial return with adiabatic heating.
+
+sigma = (A + B e^n) (1 + C ln max(rate / rate_0, 1)) (1 - T*^m). Johnson and Cook 1983.
+"""
+
+import math
+
+from numba import njit
+
+from ..elements.tet4 import TRIAL, VOLUME_MID
+from ..state import CHUNK, FLOW, MASS, PLASTIC_STRAIN, TEMPERATURE, WORK_PLASTIC, YIELD
+from .models import JC_A, JC_B, JC_C, JC_HEAT, JC_M, JC_MELT, JC_N, JC_RATE, JC_T0, SHEAR
+from .plastic import equivalent_stress, scale_deviator
+
+_STRAIN, _WORK, _YIELD, _FLOW = PLASTIC_STRAIN * CHUNK, WORK_PLASTIC * CHUNK, YIELD * CHUNK, FLOW * CHUNK
+_TEMPERATURE, _MASS = TEMPERATURE * CHUNK, MASS * CHUNK
+_MOST = 60
+_CLOSE = 1e-4
+"""A Newton step below this share of the strain increment leaves an error of its square: below 1e-8 of the stress."""
+
+
+@njit("UniTuple(float64, 2)(float64[::1], float64)", cache=True, error_model="numpy")
+def softening(params, temperature):  # type: ignore[no-untyped-def]
+    """1 - T*^m and its derivative by temperature, 1/K; 1 below the reference temperature, 0 from melting on."""
+    span = params[JC_MELT] - params[JC_T0]
+    homologous = (temperature - params[JC_T0]) / span
+    if homologous <= 0.0:
+        return 1.0, 0.0
+    if homologous >= 1.0:
+        return 0.0, 0.0
+    m = params[JC_M]
+    power = homologous if m == 1.0 else homologous**m
+    return 1.0 - power, -m * power / (homologous * span)
+
+
+@njit("UniTuple(float64, 4)(float64[::1], float64, float64, float64, float64)", cache=True, error_model="numpy")
+def flow_stress(params, strain, increment, dt, temperature):  # type: ignore[no-untyped-def]
+    """Flow stress, Pa, its derivatives by the strain increment and by temperature, and the rate-free flow stress.
+
+    ``strain`` is the plastic strain at the end of the increment.
+    """
+    power = params[JC_B] * strain ** params[JC_N] if strain > 0.0 else 0.0
+    hardening = params[JC_A] + power
+    slope = params[JC_N] * power / strain if strain > 0.0 else 0.0
+    relative = increment / (dt * params[JC_RATE])
+    rate, rate_slope = 1.0, 0.0
+    if relative > 1.0:
+        rate, rate_slope = 1.0 + params[JC_C] * math.log(relative), params[JC_C] / increment
+    heat, heat_slope = softening(params, temperature)
+    return (
+        hardening * rate * heat,
+        (slope * rate + hardening * rate_slope) * heat,
+        hardening * rate * heat_slope,
+        hardening * heat,
+    )
+
+
+@njit(
+    "UniTuple(float64, 3)(float64[::1], float64, float64, float64, float64, float64, float64)",
+    cache=True,
+    error_model="numpy",
+)
+def plastic_increment(params, q, strain, temperature, dt, guess, heat):  # type: ignore[no-untyped-def]
+    """Solves q - 3 G d = flow stress(d) for the plastic strain increment d in [0, q / 3G].
+
+    The left side falls and the right side rises with d until the metal softens, so the root is bracketed: Newton,
+    halving when it leaves the bracket. ``heat`` is K per J/m^3 of plastic work. Returns d, the flow stress there and
+    the rate-free flow stress.
+    """
+    shear3 = 3.0 * params[SHEAR]
+    low, high = 0.0, q / shear3
+    d = min(max(guess, 1e-3 * high), high)
+    for _ in range(_MOST):
+        stress = q - shear3 * d
+        flow, by_strain, by_heat, static = flow_stress(params, strain + d, d, dt, temperature + heat * d * stress)
+        residual = stress - flow
+        if residual > 0.0:
+            low = d
+        else:
+            high = d
+        slope = -shear3 - by_strain - by_heat * heat * (stress - shear3 * d)
+        step = -residual / slope if slope < 0.0 else 0.0
+        new = d + step
+        if not low <= new <= high or slope >= 0.0:
+            new = 0.5 * (low + high)
+            step = new - d
+        d = new
+        if abs(step) <= _CLOSE * d or high - low <= 1e-12 * high:
+            break
+    return d, max(q - shear3 * d, 0.0), static
+
+
+@njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
+def johnson_cook(w, s, params, n, dt):  # type: ignore[no-untyped-def]
+    """Returns the trial stress of the tets beyond their rate-free flow stress; heats them by the plastic work."""
+    equivalent_stress(w, s, n)
+    shear3 = 3.0 * params[SHEAR]
+    for i in range(n):
+        q = w[TRIAL + i]
+        if q <= s[_YIELD + i]:
+            continue
+        density = s[_MASS + i] / w[VOLUME_MID + i]
+        heat = params[JC_HEAT] / density
+        guess = (q - s[_FLOW + i]) / shear3
+        d, flow, static = plastic_increment(params, q, s[_STRAIN + i], s[_TEMPERATURE + i], dt, guess, heat)
+        scale_deviator(s, i, flow / q)
+        s[_STRAIN + i] += d
+        s[_WORK + i] += flow * d * w[VOLUME_MID + i]
+        s[_TEMPERATURE + i] += heat * flow * d
+        s[_YIELD + i] = static
+        s[_FLOW + i] = flow

@@ -1,0 +1,68 @@
+"""J2 plasticity with linear isotropic hardening: radial return in closed form."""
+
+import numpy as np
+from numba import njit
+
+from ..elements.tet4 import TRIAL, VOLUME_MID
+from ..state import (
+    CHUNK,
+    FLOW,
+    PLASTIC_STRAIN,
+    S_XX,
+    S_XY,
+    S_YY,
+    S_YZ,
+    S_ZX,
+    S_ZZ,
+    WORK_PLASTIC,
+    YIELD,
+)
+from .models import HARDENING, SHEAR
+
+_SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
+_SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
+_STRAIN, _WORK, _YIELD, _FLOW = PLASTIC_STRAIN * CHUNK, WORK_PLASTIC * CHUNK, YIELD * CHUNK, FLOW * CHUNK
+
+
+@njit("void(float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
+def equivalent_stress(w, s, n):  # type: ignore[no-untyped-def]
+    """TRIAL: the von Mises stress sqrt(3/2 s : s), Pa."""
+    for i in range(n):
+        sxx, syy, szz = s[_SXX + i], s[_SYY + i], s[_SZZ + i]
+        syz, szx, sxy = s[_SYZ + i], s[_SZX + i], s[_SXY + i]
+        w[TRIAL + i] = np.sqrt(
+            1.5 * (sxx * sxx + syy * syy + szz * szz + 2.0 * (syz * syz + szx * szx + sxy * sxy))
+        )
+
+
+@njit("void(float64[::1], int64, float64)", cache=True)
+def scale_deviator(s, i, factor):  # type: ignore[no-untyped-def]
+    """Multiplies the deviatoric stress of element ``i`` of the chunk."""
+    s[_SXX + i] *= factor
+    s[_SYY + i] *= factor
+    s[_SZZ + i] *= factor
+    s[_SYZ + i] *= factor
+    s[_SZX + i] *= factor
+    s[_SXY + i] *= factor
+
+
+@njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
+def linear_hardening(w, s, params, n, dt):  # type: ignore[no-untyped-def]
+    """Returns the trial stress to the yield surface; strain increment (q - yield) / (3 G + H), exact for this law."""
+    equivalent_stress(w, s, n)
+    shear3, hardening = 3.0 * params[SHEAR], params[HARDENING]
+    for i in range(n):
+        q, old = w[TRIAL + i], s[_YIELD + i]
+        over = max(q - old, 0.0)
+        increment = over / (shear3 + hardening)
+        new = old + hardening * increment
+        factor = new / q if over > 0.0 else 1.0
+        s[_SXX + i] *= factor
+        s[_SYY + i] *= factor
+        s[_SZZ + i] *= factor
+        s[_SYZ + i] *= factor
+        s[_SZX + i] *= factor
+        s[_SXY + i] *= factor
+        s[_YIELD + i] = new
+        s[_STRAIN + i] += increment
+        s[_WORK + i] += new * increment * w[VOLUME_MID + i]

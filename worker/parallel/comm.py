@@ -1,0 +1,184 @@
+"""The one module that knows MPI: what ranks say to each other, and its meaning on one rank.
+
+Everything that decides is a maximum over int64 words, or a sum of integers: no order of ranks can change a bit of it.
+"""
+
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from ..state import Ints
+
+
+class Pending(Protocol):
+    """A communication under way."""
+
+    def finish(self) -> None:
+        """Returns when the data has arrived."""
+
+
+class Comm(Protocol):
+    """What the worker asks of a communicator."""
+
+    rank: int
+    size: int
+
+    def begin_maximum(self, words: Ints, result: Ints) -> Pending:
+        """Element-wise maximum of ``words`` over all ranks, in ``result`` once finished."""
+
+    def sum(self, words: Ints) -> Ints:
+        """Element-wise sum over all ranks."""
+
+    def maximum(self, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Element-wise maximum over all ranks."""
+
+    def exchange(self, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: int) -> "Exchange":
+        """A repeatable exchange of fixed buffers with other ranks."""
+
+    def gather(self, item: Any) -> list[Any] | None:
+        """The items of all ranks, in order, on rank 0; None elsewhere."""
+
+    def scatter(self, items: list[Any] | None) -> Any:
+        """Item ``rank`` of rank 0's list."""
+
+    def broadcast(self, item: Any) -> Any:
+        """Rank 0's item."""
+
+    def barrier(self) -> None:
+        """Returns when every rank has come here."""
+
+    def abort(self, code: int) -> None:
+        """Ends every rank of the job at once."""
+
+
+class Exchange(Protocol):
+    """A set of messages with fixed partners and buffers, sent again and again."""
+
+    def begin(self) -> None:
+        """Starts all sends and receives."""
+
+    def finish(self) -> None:
+        """Returns when the receive buffers are filled and the send buffers may be written again."""
+
+
+class _Done:
+    def begin(self) -> None:
+        pass
+
+    def finish(self) -> None:
+        pass
+
+
+class SerialComm:
+    """One rank: every verb keeps its meaning."""
+
+    rank = 0
+    size = 1
+
+    def begin_maximum(self, words: Ints, result: Ints) -> Pending:
+        result[:] = words
+        return _Done()
+
+    def sum(self, words: Ints) -> Ints:
+        return words.copy()
+
+    def maximum(self, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        return values.copy()
+
+    def exchange(self, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: int) -> Exchange:
+        if sends or receives:
+            raise ValueError("one rank has nobody to exchange with")
+        return _Done()
+
+    def gather(self, item: Any) -> list[Any] | None:
+        return [item]
+
+    def scatter(self, items: list[Any] | None) -> Any:
+        assert items is not None
+        return items[0]
+
+    def broadcast(self, item: Any) -> Any:
+        return item
+
+    def barrier(self) -> None:
+        pass
+
+    def abort(self, code: int) -> None:
+        raise SystemExit(code)
+
+
+class MpiComm:
+    """All ranks of MPI's world."""
+
+    def __init__(self) -> None:
+        from mpi4py import MPI
+
+        self._mpi = MPI
+        self._world = MPI.COMM_WORLD
+        self.rank: int = self._world.Get_rank()
+        self.size: int = self._world.Get_size()
+
+    def begin_maximum(self, words: Ints, result: Ints) -> Pending:
+        return _MpiPending(self._world.Iallreduce(words, result, self._mpi.MAX))
+
+    def sum(self, words: Ints) -> Ints:
+        result = np.empty_like(words)
+        self._world.Allreduce(words, result, self._mpi.SUM)
+        return result
+
+    def maximum(self, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        result = np.empty_like(values)
+        self._world.Allreduce(values, result, self._mpi.MAX)
+        return result
+
+    def exchange(self, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: int) -> Exchange:
+        requests = [self._world.Recv_init(buffer, source, tag) for source, buffer in receives]
+        requests += [self._world.Send_init(buffer, target, tag) for target, buffer in sends]
+        return _MpiExchange(self._mpi.Prequest, requests)
+
+    def gather(self, item: Any) -> list[Any] | None:
+        return self._world.gather(item)
+
+    def scatter(self, items: list[Any] | None) -> Any:
+        if self.rank == 0:
+            assert items is not None
+            for target in range(1, self.size):
+                self._world.send(items[target], target)
+            return items[0]
+        return self._world.recv(source=0)
+
+    def broadcast(self, item: Any) -> Any:
+        return self._world.bcast(item)
+
+    def barrier(self) -> None:
+        self._world.Barrier()
+
+    def abort(self, code: int) -> None:
+        self._world.Abort(code)
+
+
+class _MpiPending:
+    def __init__(self, request: Any) -> None:
+        self._request = request
+
+    def finish(self) -> None:
+        self._request.Wait()
+
+
+class _MpiExchange:
+    def __init__(self, kind: Any, requests: list[Any]) -> None:
+        self._kind = kind
+        self._requests = requests
+
+    def begin(self) -> None:
+        self._kind.Startall(self._requests)
+
+    def finish(self) -> None:
+        self._kind.Waitall(self._requests)
+
+
+def connect() -> Comm:
+    """MPI's world when it has more than one rank, else the serial twin."""
+    world = MpiComm()
+    return world if world.size > 1 else SerialComm()

@@ -1,0 +1,53 @@
+"""Sums that do not depend on their order: integers in units of a power of two.
+
+The scale of the nodal forces follows the largest contribution of the step before; when a step outgrows it, the sum is
+repeated in a coarser quantum. A contribution has 52 bits, the sum ten more: nothing ever wraps.
+"""
+
+import math
+
+import numpy as np
+
+from ..state import Floats, Ints
+from .comm import Comm
+
+CONTRIBUTION_BITS = 52
+"""A contribution stays below 2^52 quanta, where float64 still counts integers one by one."""
+HEADROOM_BITS = 6
+"""The next step may grow 64-fold before its sum has to be repeated."""
+_LIMB = 2.0**30
+
+
+def float_of(bits: int) -> float:
+    """The float64 with these bits."""
+    return float(np.int64(bits).view(np.float64))
+
+
+def scale_for(largest: float) -> float:
+    """Quanta per newton for contributions up to ``largest``, N, with room to grow."""
+    return math.ldexp(1.0, CONTRIBUTION_BITS - HEADROOM_BITS - math.frexp(largest)[1])
+
+
+def outgrown(largest: float, scale: float) -> bool:
+    """Whether a contribution of ``largest``, N, does not fit the scale."""
+    return not largest * scale < 2.0**CONTRIBUTION_BITS
+
+
+def exact_sums(comm: Comm, columns: Floats) -> Floats:
+    """(k,) sums of the columns of ``columns`` (n, k) over all ranks: the same bits for any order and partition.
+
+    Each value is split into two integer limbs of a common quantum, 2^-60 of the column's largest magnitude; the
+    result is off by at most n times that quantum.
+    """
+    largest = np.zeros(columns.shape[1]) if not len(columns) else np.abs(columns).max(axis=0)
+    largest = comm.maximum(largest)
+    exponent = np.frexp(largest)[1]
+    scaled = np.ldexp(columns, 30 - exponent)
+    high = np.rint(scaled)
+    low = np.rint((scaled - high) * _LIMB)
+    words = np.concatenate([high.astype(np.int64).sum(axis=0), low.astype(np.int64).sum(axis=0)])
+    total: Ints = comm.sum(words)
+    k = columns.shape[1]
+    return np.array(
+        [math.ldexp(int(total[j]) * 2**30 + int(total[k + j]), int(exponent[j]) - 60) for j in range(k)]
+    )

@@ -1,0 +1,66 @@
+"""Shared nodes: which ranks hold them, and how their integer sums are completed.
+
+Each rank sums the contributions of its own tets; one exchange with the neighbours adds the others'. Integer addition
+does not care for the order, so every holder of a node ends with the same bits and integrates the same motion.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from ..state import Indices, Ints
+from .comm import Comm
+
+
+@dataclass(frozen=True)
+class Neighbour:
+    """Another rank, and the local nodes shared with it in the order of their global ids."""
+
+    rank: int
+    nodes: Indices
+
+
+@njit("void(int64[:, ::1], int32[::1], int64[:, ::1])", cache=True)
+def _pack(buffer, nodes, sums):  # type: ignore[no-untyped-def]
+    for i in range(len(nodes)):
+        for k in range(sums.shape[1]):
+            buffer[i, k] = sums[nodes[i], k]
+
+
+@njit("void(int64[:, ::1], int32[::1], int64[:, ::1])", cache=True)
+def _add(sums, nodes, buffer):  # type: ignore[no-untyped-def]
+    for i in range(len(nodes)):
+        for k in range(sums.shape[1]):
+            sums[nodes[i], k] += buffer[i, k]
+
+
+class SharedSum:
+    """Completes one array of nodal sums, (nodes, columns) int64, again and again."""
+
+    def __init__(self, comm: Comm, neighbours: list[Neighbour], sums: Ints, tag: int) -> None:
+        self._sums = sums
+        self._nodes = [n.nodes for n in neighbours]
+        self._out = [np.zeros((len(n.nodes), sums.shape[1]), np.int64) for n in neighbours]
+        self._in = [np.zeros_like(buffer) for buffer in self._out]
+        ranks = [n.rank for n in neighbours]
+        self._exchange = comm.exchange(
+            list(zip(ranks, self._out, strict=True)), list(zip(ranks, self._in, strict=True)), tag
+        )
+
+    @property
+    def bytes_sent(self) -> int:
+        """Bytes this rank sends in one exchange."""
+        return sum(buffer.nbytes for buffer in self._out)
+
+    def begin(self) -> None:
+        """Sends the local sums of the shared nodes; the tets of shared nodes must all have been summed."""
+        for buffer, nodes in zip(self._out, self._nodes, strict=True):
+            _pack(buffer, nodes, self._sums)
+        self._exchange.begin()
+
+    def finish(self) -> None:
+        """Adds what the neighbours sent: the sums of the shared nodes are complete."""
+        self._exchange.finish()
+        for buffer, nodes in zip(self._in, self._nodes, strict=True):
+            _add(self._sums, nodes, buffer)

@@ -1,0 +1,127 @@
+"""How the model lies in memory: node arrays, and blocks of elements in chunks.
+
+Elements of one part form a block. Their state is stored chunk by chunk, ``(chunks, rows, CHUNK)``: the rows of a
+chunk stand side by side, at offsets the compiler knows, so that the loops over a chunk use vector instructions and a
+chunk's whole state stays in the first cache levels. All in SI; stress positive in tension, pressure in compression.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+Indices = npt.NDArray[np.int32]
+
+CHUNK = 128
+"""Elements a chunk."""
+
+# Rows of the element state. Rows up to WORK_VISCOUS exist in every block, the others where the scene needs them.
+S_XX, S_YY, S_ZZ, S_YZ, S_ZX, S_XY = range(6)
+"""Deviatoric Cauchy stress, Pa."""
+PRESSURE = 6
+"""Pa, without the viscous part."""
+VISCOUS = 7
+"""Bulk-viscosity pressure q, Pa."""
+MASS = 8
+"""kg."""
+WORK = 9
+"""Work of the stress so far, without the viscous part, J."""
+WORK_VISCOUS = 10
+"""Work of the bulk viscosity so far, J."""
+VOLUME_FLUX = 11
+"""Rate of change of the volume at mid-step, m^3/s (averaged pressure forms)."""
+VOLUME_RATIO = 12
+"""Current over initial volume, by the dilatation that the pressure sees."""
+PLASTIC_STRAIN = 13
+"""Effective plastic strain."""
+WORK_PLASTIC = 14
+"""J."""
+YIELD = 15
+"""Flow stress at vanishing rate, Pa: below it no plastic flow."""
+FLOW = 16
+"""Flow stress of the last plastic step, Pa (the next one's first guess)."""
+TEMPERATURE = 17
+"""K."""
+
+
+@dataclass
+class Nodes:
+    """Nodal arrays of one rank; ``n`` nodes, in the order of their global ids."""
+
+    id: Ints
+    """(n,) global ids."""
+    part: Indices
+    """(n,) index of the part."""
+    owned: npt.NDArray[np.bool_]
+    """(n,) True where this rank counts the node."""
+    x0: Floats
+    """(n, 3) initial position, m."""
+    x: Floats
+    """(n, 3) position, m."""
+    v: Floats
+    """(n, 3) velocity at mid-step, m/s."""
+    mass: Floats
+    """(n,) lumped mass, kg."""
+    force: Ints
+    """(n, 3) internal force in quanta of the force scale."""
+
+    @property
+    def n(self) -> int:
+        """Number of nodes on this rank."""
+        return len(self.id)
+
+
+@dataclass
+class Block:
+    """The elements of one part on one rank; the first ``border_chunks`` chunks touch every shared node."""
+
+    part: int
+    n: int
+    tets: Indices
+    """(n, 4) local nodes."""
+    id: Ints
+    """(n,) global tet ids."""
+    state: Floats
+    """(chunks, rows, CHUNK)."""
+    kind: int
+    """Which strength model (materials/models.py)."""
+    eos: int
+    """Which equation of state."""
+    params: Floats
+    """Material constants (materials/models.py)."""
+    border_chunks: int = 0
+
+    @property
+    def chunks(self) -> int:
+        """Number of chunks."""
+        return self.state.shape[0]
+
+    def row(self, row: int) -> Floats:
+        """(n,) copy of one row of the state."""
+        return np.ascontiguousarray(self.state[:, row, :]).reshape(-1)[: self.n]
+
+    def has(self, row: int) -> bool:
+        """Whether the block carries that row."""
+        return row < self.state.shape[1]
+
+
+@dataclass
+class Model:
+    """Everything one rank holds of the bodies."""
+
+    nodes: Nodes
+    blocks: list[Block] = field(default_factory=list)
+    parts: list[str] = field(default_factory=list)
+    elements_global: int = 0
+    nodes_global: int = 0
+
+
+def chunked(values: Floats) -> Floats:
+    """(n,) values as (chunks, CHUNK), the tail filled with the last value so that it is harmless in divisions."""
+    chunks = -(-len(values) // CHUNK)
+    filled = np.empty(chunks * CHUNK)
+    filled[: len(values)] = values
+    filled[len(values) :] = values[-1] if len(values) else 1.0
+    return filled.reshape(chunks, CHUNK)
