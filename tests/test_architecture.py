@@ -1,0 +1,158 @@
+"""The borders between the houses, read off the source tree itself."""
+
+import ast
+import re
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.version import Version
+
+ROOT = Path(__file__).parents[1]
+HOUSES = ("cases", "client", "server", "worker")
+CONTRACT = {"pydantic", "pydantic_core", "msgspec"}
+WORKER_ONLY = {"numba", "mpi4py", "gmsh", "meshio"}
+ONE_MODULE = {"mpi4py": "worker", "pyvista": "client"}
+"""Libraries that one module of one house imports, and no other."""
+HEAVY = WORKER_ONLY | {"pyvista", "vtk", "vtkmodules"}
+"""What the contract, the client and the server run without; pictures alone need pyvista."""
+SOURCES = sorted(path for house in HOUSES for path in (ROOT / house).rglob("*.py"))
+
+
+def name_of(path: Path) -> str:
+    return path.relative_to(ROOT).as_posix()
+
+
+@cache
+def tree(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+def imported(nodes: Iterator[ast.AST]) -> set[str]:
+    """Absolute names that the nodes import."""
+    names: set[str] = set()
+    for node in nodes:
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.level == 0:
+            names.add(node.module or "")
+    return names
+
+
+def heads(path: Path) -> set[str]:
+    return {name.partition(".")[0] for name in imported(ast.walk(tree(path)))}
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=name_of)
+def test_a_house_knows_only_itself_and_the_contract(path: Path) -> None:
+    house = path.relative_to(ROOT).parts[0]
+    allowed = set() if house == "cases" else {"cases"}
+    for name in imported(ast.walk(tree(path))):
+        parts = name.split(".")
+        assert parts[0] not in HOUSES, f"{name_of(path)}: write conoid.{name}, or a relative import"
+        if parts[0] == "conoid":
+            assert len(parts) > 1, f"{name_of(path)}: import from a house, not from conoid"
+            assert parts[1] in allowed, f"{name_of(path)}: {house} may not import {name}"
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=name_of)
+def test_relative_imports_stay_at_home(path: Path) -> None:
+    depth = len(path.relative_to(ROOT).parts) - 1
+    for node in ast.walk(tree(path)):
+        if isinstance(node, ast.ImportFrom):
+            assert node.level <= depth, f"{name_of(path)}:{node.lineno}: this relative import leaves the house"
+
+
+def test_the_contract_is_light() -> None:
+    for path in SOURCES:
+        if path.relative_to(ROOT).parts[0] == "cases":
+            strangers = heads(path) - set(sys.stdlib_module_names) - CONTRACT
+            assert not strangers, f"{name_of(path)} imports {strangers}"
+
+
+def test_the_solver_stays_in_the_worker() -> None:
+    for path in SOURCES:
+        if path.relative_to(ROOT).parts[0] != "worker":
+            assert not heads(path) & WORKER_ONLY, name_of(path)
+
+
+@pytest.mark.parametrize(("library", "house"), ONE_MODULE.items())
+def test_one_module_knows(library: str, house: str) -> None:
+    users = [name_of(path) for path in SOURCES if library in heads(path)]
+    assert len(users) <= 1, f"{library} is imported by {users}"
+    assert all(user.startswith(f"{house}/") for user in users)
+
+
+@pytest.mark.parametrize("house", HOUSES)
+def test_one_module_of_a_house_knows_zenoh(house: str) -> None:
+    users = [name_of(path) for path in SOURCES if name_of(path).startswith(f"{house}/") and "zenoh" in heads(path)]
+    assert len(users) <= 1, f"zenoh is imported by {users}"
+
+
+@pytest.mark.parametrize("house", ["cases", "client", "server"])
+def test_importing_a_house_loads_no_solver(house: str) -> None:
+    """The contract, the client and the server work where MPI, numba and VTK are not installed."""
+    light = [path for path in SOURCES if name_of(path).startswith(f"{house}/") and not heads(path) & HEAVY]
+    modules = [module_of(path) for path in light if path.name != "__main__.py"]
+    code = f"""
+import importlib, sys
+for absent in {sorted(HEAVY)!r}:
+    sys.modules[absent] = None
+for module in {modules!r}:
+    importlib.import_module(module)
+"""
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
+    assert ended.returncode == 0, ended.stderr
+
+
+def module_of(path: Path) -> str:
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(("conoid", *(part for part in parts if part != "__init__")))
+
+
+@cache
+def project() -> dict[str, Any]:
+    return tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+
+
+def test_every_package_is_shipped() -> None:
+    listed = set(project()["tool"]["setuptools"]["packages"])
+    found = {module_of(path) for path in SOURCES if path.name == "__init__.py"}
+    homes = {module_of(path.parent / "__init__.py") for path in SOURCES}
+    assert listed == found == homes
+
+
+@pytest.mark.parametrize("path", [p for h in HOUSES for p in (ROOT / h).rglob("*") if p.is_file()], ids=name_of)
+def test_every_file_of_a_package_is_shipped(path: Path) -> None:
+    if "__pycache__" in path.parts or path.suffix in {".py", ".pyc"}:
+        return
+    tables = project()["tool"]["setuptools"]["package-data"]
+    package = next(p for p in path.parents if (p / "__init__.py").exists())
+    patterns = [*tables["*"], *tables.get(module_of(package / "__init__.py"), [])]
+    assert any(path.relative_to(package).match(pattern) for pattern in patterns), f"{name_of(path)} is not shipped"
+
+
+def requirements() -> dict[str, Requirement]:
+    """Direct dependencies of every extra but ``peers``, whose package is for comparison only."""
+    extras = project()["project"]["optional-dependencies"]
+    texts = [*project()["project"]["dependencies"], *(t for name in extras if name != "peers" for t in extras[name])]
+    found = {requirement.name: requirement for requirement in map(Requirement, texts)}
+    return {name: requirement for name, requirement in found.items() if name != "conoid"}
+
+
+def locked() -> dict[str, Version]:
+    lines = (ROOT / "requirements.lock").read_text(encoding="utf-8").splitlines()
+    pins = [line.split("==") for line in lines if line and not line.startswith("#")]
+    return {name: Version(version) for name, version in pins}
+
+
+@pytest.mark.parametrize("name", sorted(requirements()))
+def test_a_direct_dependency_is_locked_and_has_its_reason(name: str) -> None:
+    assert locked()[name] in requirements()[name].specifier
+    assert re.search(rf"\b{re.escape(name)}\b", (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")), name
