@@ -81,8 +81,6 @@ class PrescribedVelocity(Boundary):
         model.v[self.nodes] = self._target(model, 0.0)
 
     def apply(self, model: Nodes, quantum: float, dt: float, t: float) -> None:
-        if dt <= 0.0:
-            return
         free, mass = model.v[self.nodes], model.mass[self.nodes, None]
         before = free - model.force[self.nodes] * (quantum / mass)
         new = self._target(model, dt)

@@ -5,7 +5,8 @@
     ConoidError                      exit 1   anything the worker raises on purpose
     ├── InputError (ValueError)      exit 2   the case, or a file it names, is wrong
     │   └── MeshError                exit 2   the mesh cannot be made, read or used
-    └── PhysicsError                 exit 3   the run itself failed: diverged, or energy out of its limit
+    └── PhysicsError                 exit 3   the run itself failed: diverged
+        └── EnergyError              exit 3   the energy ledger does not close
 
 The text of every one of them is a single line for the person who wrote the case: key, value, what is allowed.
 """
@@ -40,3 +41,9 @@ class PhysicsError(ConoidError):
 
     exit_code = ExitCode.PHYSICS
     cause = Cause.DIVERGED
+
+
+class EnergyError(PhysicsError):
+    """The energy ledger does not close."""
+
+    cause = Cause.ENERGY

@@ -1,0 +1,11 @@
+"""``mpiexec -n N python -m mpi4py -m conoid.worker CASE --out DIR``: one run, from a case to an outcome."""
+
+import sys
+
+from . import kernels
+
+if __name__ == "__main__":
+    kernels.use_cache()
+    from .main import main
+
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,76 @@
+"""From a case to an outcome, with the kernels loaded: build, step, look, sum up."""
+
+import time
+from pathlib import Path
+
+import numpy as np
+
+from conoid.cases import messages
+from conoid.cases.outcome import Outcome
+from conoid.cases.run import State
+from conoid.cases.schema import Case
+
+from . import digest, reference, simulation
+from .errors import PhysicsError
+from .loop import STOPS, Loop
+from .output.history import History
+from .output.journal import Journal
+from .parallel.comm import Comm
+from .simulation import Simulation
+from .timers import PHASES
+
+
+def compute(
+    case: Case, meshes: Path, folder: Path, comm: Comm, journal: Journal | None, began: float
+) -> Outcome:
+    """Runs the case in ``folder`` on all ranks; relative mesh paths start at ``meshes``. Raises ConoidError."""
+    sim = simulation.build(case, meshes, comm)
+    history = History(folder, sim.probes.names) if comm.rank == 0 else None
+    setup = time.monotonic() - began
+    if journal is not None:
+        _announce(sim, journal, setup)
+    loop = Loop(sim, folder, journal, history)
+    cpu = time.thread_time()
+    failure = None
+    try:
+        loop.run()
+    except PhysicsError as error:
+        failure = error
+    cpu = time.thread_time() - cpu
+    if history is not None:
+        history.close()
+    return _sum_up(loop, folder, failure, cpu, setup, time.monotonic() - began)
+
+
+def _announce(sim: Simulation, journal: Journal, setup: float) -> None:
+    case, model = sim.case, sim.model
+    journal.write(messages.Status, state=State.RUNNING)
+    parts = {part.name: 0 for part in case.parts}
+    for block in model.blocks:
+        parts[model.parts[block.part]] += block.n
+    journal.write(
+        messages.Started, ranks=sim.comm.size, elements=model.elements_global, nodes=model.nodes_global,
+        end_time=case.run.end_time, setup=setup, parts=parts,
+    )  # fmt: skip
+
+
+def _sum_up(
+    loop: Loop, folder: Path, failure: PhysicsError | None, cpu: float, setup: float, elapsed: float
+) -> Outcome:
+    sim = loop.sim
+    seconds = sim.comm.gather(sim.timers.seconds)
+    total_cpu = sum(sim.comm.gather(cpu) or [])
+    hexdigest = digest.digest(sim.model, sim.comm)
+    checks = reference.measure(sim, folder) if failure is None and not loop.stopped else []
+    state, cause, message = STOPS[loop.stopped] if loop.stopped else (State.SUCCEEDED, None, "")
+    if failure is not None:
+        state, cause, message = State.FAILED, failure.cause, str(failure)
+    updates = sim.clock.step * sim.model.elements_global
+    return Outcome(
+        state=state, cause=cause, message=message, steps=sim.clock.step, time=sim.clock.t, ranks=sim.comm.size,
+        elapsed=elapsed, setup=setup, cpu=total_cpu, digest=hexdigest or "", elements=sim.model.elements_global,
+        nodes_initial=sim.model.nodes_global, nodes=sim.model.nodes_global, fragments=len(sim.model.parts),
+        energy=loop.energy, worst_residual=float(np.float64(sim.ledger.worst)),
+        phases={name: [s[name] for s in seconds] for name in PHASES} if seconds else {},
+        element_updates_per_second=updates / total_cpu if total_cpu > 0.0 else 0.0, reference=checks,
+    )  # fmt: skip

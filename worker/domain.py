@@ -1,0 +1,198 @@
+"""From parts to what each rank holds: meshes, masses, initial motion, bisection, shared nodes.
+
+Rank 0 builds the whole mesh, numbers it and cuts it; every rank receives its own piece. Global ids follow the order
+of the parts and, within a part, the order of the mesh: they do not know how many ranks there are.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from conoid.cases import schema
+from conoid.cases.library import material as find_material
+
+from .materials import models
+from .mesh.build import build as build_mesh
+from .parallel.comm import Comm
+from .parallel.decompose import bisect
+from .parallel.ownership import Neighbour
+from .state import (
+    CHUNK,
+    FLOW,
+    MASS,
+    TEMPERATURE,
+    VOLUME_RATIO,
+    YIELD,
+    Block,
+    Floats,
+    Indices,
+    Ints,
+    Model,
+    Nodes,
+    chunked,
+)
+
+
+@dataclass
+class Whole:
+    """The whole mesh, on rank 0."""
+
+    points: Floats
+    node_part: Indices
+    tets: Indices
+    tet_part: Indices
+    volumes: Floats
+    node_volume: Floats
+    mass: Floats
+    velocity: Floats
+
+
+@dataclass
+class Piece:
+    """What one rank receives."""
+
+    node_ids: Ints
+    node_part: Indices
+    owned: "np.ndarray"
+    points: Floats
+    velocity: Floats
+    mass: Floats
+    node_volume: Floats
+    tet_ids: Ints
+    tet_part: Indices
+    tets: Indices
+    tet_volume: Floats
+    border: "np.ndarray"
+    neighbours: list[Neighbour]
+    totals: tuple[int, int, int]
+    """Tets, nodes and shared nodes of the whole."""
+
+
+def assemble(case: schema.Case, folder: Path) -> Whole:
+    """Builds the meshes of all parts; ``folder`` is where relative mesh paths start. Raises MeshError."""
+    points, tets, node_part, tet_part, density = [], [], [], [], []
+    offset = 0
+    for index, part in enumerate(case.parts):
+        mesh = build_mesh(part.mesh, folder)
+        points.append(mesh.points)
+        tets.append(mesh.tets.astype(np.int64) + offset)
+        node_part.append(np.full(len(mesh.points), index, np.int32))
+        tet_part.append(np.full(len(mesh.tets), index, np.int32))
+        density.append(find_material(case, part.material).density)
+        offset += len(mesh.points)
+    x, t = np.concatenate(points), np.concatenate(tets).astype(np.int32)
+    part_of_tet = np.concatenate(tet_part)
+    volumes = _volumes(x, t)
+    node_volume = np.bincount(t.reshape(-1), np.repeat(volumes / 4.0, 4), len(x))
+    mass = np.bincount(t.reshape(-1), np.repeat(volumes * np.array(density)[part_of_tet] / 4.0, 4), len(x))
+    part_of_node = np.concatenate(node_part)
+    return Whole(x, part_of_node, t, part_of_tet, volumes, node_volume, mass, _velocities(case, x, part_of_node))
+
+
+def _volumes(x: Floats, tets: Indices) -> Floats:
+    origin = x[tets[:, 0]]
+    e1, e2, e3 = x[tets[:, 1]] - origin, x[tets[:, 2]] - origin, x[tets[:, 3]] - origin
+    volumes: Floats = np.einsum("ij,ij->i", e1, np.cross(e2, e3)) / 6.0
+    return volumes
+
+
+def _velocities(case: schema.Case, x: Floats, part: Indices) -> Floats:
+    v = np.zeros_like(x)
+    for index, spec in enumerate(case.parts):
+        chosen = part == index
+        v[chosen] = spec.velocity
+        if spec.spin is not None:
+            v[chosen] += np.cross(np.array(spec.spin.rate), x[chosen] - np.array(spec.spin.centre))
+    return v
+
+
+def cut(whole: Whole, ranks: int) -> list[Piece]:
+    """The pieces of ``ranks`` ranks: tets by recursive bisection of their centres, nodes with every tet's rank."""
+    owner = bisect(whole.points[whole.tets].mean(axis=1), np.ones(len(whole.tets)), ranks)
+    nodes_of = [np.unique(whole.tets[owner == rank]) for rank in range(ranks)]
+    holders = np.zeros(len(whole.points), np.int32)
+    for nodes in nodes_of:
+        holders[nodes] += 1
+    home = _home(whole, owner)
+    shared = holders > 1
+    totals = (len(whole.tets), len(whole.points), int(shared.sum()))
+    return [_piece(whole, owner, rank, nodes_of, shared, home, totals) for rank in range(ranks)]
+
+
+def _home(whole: Whole, owner: Indices) -> Indices:
+    """The rank that owns each node: the one that holds its tet of smallest id."""
+    home = np.zeros(len(whole.points), np.int32)
+    home[whole.tets[::-1].reshape(-1)] = np.repeat(owner[::-1], 4)
+    return home
+
+
+def _piece(
+    whole: Whole, owner: Indices, rank: int, nodes_of: list[Ints], shared: "np.ndarray", home: Indices,
+    totals: tuple[int, int, int],
+) -> Piece:  # fmt: skip
+    nodes, ids = nodes_of[rank], np.flatnonzero(owner == rank)
+    local = np.full(len(whole.points), -1, np.int32)
+    local[nodes] = np.arange(len(nodes), dtype=np.int32)
+    mine = nodes[shared[nodes]]
+    neighbours = []
+    for other, theirs in enumerate(nodes_of):
+        common = np.intersect1d(mine, theirs, assume_unique=True) if other != rank else mine[:0]
+        if len(common):
+            neighbours.append(Neighbour(other, local[common]))
+    tets = whole.tets[ids]
+    return Piece(
+        nodes.astype(np.int64), whole.node_part[nodes], home[nodes] == rank, whole.points[nodes],
+        whole.velocity[nodes], whole.mass[nodes], whole.node_volume[nodes], ids.astype(np.int64),
+        whole.tet_part[ids], local[tets], whole.volumes[ids], shared[tets].any(axis=1), neighbours, totals,
+    )  # fmt: skip
+
+
+def build(case: schema.Case, folder: Path, comm: Comm) -> tuple[Model, Piece]:
+    """This rank's model. Raises MeshError on every rank when rank 0 cannot build a mesh."""
+    pieces: list[Piece] | None = None
+    failure: Exception | None = None
+    if comm.rank == 0:
+        try:
+            pieces = cut(assemble(case, folder), comm.size)
+        except Exception as error:
+            failure = error
+    failure = comm.broadcast(failure)
+    if failure is not None:
+        raise failure
+    piece: Piece = comm.scatter(pieces)
+    return _model(case, piece), piece
+
+
+def _model(case: schema.Case, piece: Piece) -> Model:
+    nodes = Nodes(
+        id=piece.node_ids, part=piece.node_part, owned=piece.owned, x0=piece.points.copy(), x=piece.points,
+        v=piece.velocity, mass=piece.mass, force=np.zeros(piece.points.shape, np.int64),
+    )  # fmt: skip
+    blocks = [_block(case, piece, index) for index in range(len(case.parts)) if (piece.tet_part == index).any()]
+    return Model(nodes, blocks, [p.name for p in case.parts], piece.totals[0], piece.totals[1])
+
+
+def _block(case: schema.Case, piece: Piece, index: int) -> Block:
+    part, chosen = case.parts[index], np.flatnonzero(piece.tet_part == index)
+    material = find_material(case, part.material)
+    chosen = chosen[np.argsort(~piece.border[chosen], kind="stable")]
+    rows = models.rows_of(material, case.numerics.pressure)
+    n = len(chosen)
+    state = np.zeros((-(-n // CHUNK), rows, CHUNK))
+    state[:, MASS, :] = chunked(piece.tet_volume[chosen] * material.density)
+    initial = {
+        VOLUME_RATIO: 1.0,
+        YIELD: models.initial_yield(material, part.temperature),
+        FLOW: models.initial_yield(material, part.temperature),
+        TEMPERATURE: part.temperature,
+    }
+    for row, value in initial.items():
+        if row < rows:
+            state[:, row, :] = value
+    return Block(
+        part=index, n=n, tets=np.ascontiguousarray(piece.tets[chosen]), id=piece.tet_ids[chosen], state=state,
+        kind=models.strength_of(material), eos=models.eos_of(material),
+        params=models.parameters(material, case.numerics.viscosity),
+        border_chunks=-(-int(piece.border[chosen].sum()) // CHUNK),
+    )  # fmt: skip

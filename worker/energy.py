@@ -1,0 +1,72 @@
+"""The ledger: every joule has a line, and the residual says whether the lines close.
+
+Kinetic energy is 1/2 m v(n-1/2) . v(n+1/2), the form that the leapfrog step conserves together with the trapezoidal
+work of the forces. Work of the stress is summed tet by tet from stress and strain rate, not from nodal forces, so the
+residual compares two independent accounts.
+"""
+
+import numpy as np
+
+from conoid.cases.messages import Energy
+
+from .boundaries import Boundary
+from .parallel.comm import Comm
+from .parallel.fixed_point import exact_sums
+from .state import WORK, WORK_PLASTIC, WORK_VISCOUS, Floats, Model
+
+
+class Ledger:
+    """Sums the accounts of all ranks; the first call sets the initial energy."""
+
+    def __init__(self, model: Model, boundaries: list[Boundary], comm: Comm) -> None:
+        self._model = model
+        self._boundaries = boundaries
+        self._comm = comm
+        nodes = model.nodes
+        self.initial = float(self._node_sum(0.5 * nodes.mass * (nodes.v * nodes.v).sum(axis=1)))
+        self.worst = 0.0
+        """Largest residual so far."""
+        self.momentum = np.zeros(3)
+        """Linear momentum at the last call, kg m/s."""
+
+    def close(self, before: Floats) -> Energy:
+        """The ledger at time n; ``before`` is v(n-1/2), the model holds v(n+1/2)."""
+        nodes = self._model.nodes
+        kinetic = 0.5 * nodes.mass * (before * nodes.v).sum(axis=1)
+        momentum = 0.5 * nodes.mass[:, None] * (before + nodes.v)
+        loss, external = self._boundary_work()
+        columns = np.column_stack([kinetic, loss, external, momentum])[nodes.owned]
+        node_sums = exact_sums(self._comm, np.ascontiguousarray(columns))
+        work, viscous, plastic = exact_sums(self._comm, self._element_work())
+        self.momentum = node_sums[3:6]
+        return self._energy(node_sums[0], work, plastic, viscous, node_sums[1], node_sums[2])
+
+    def _energy(
+        self, kinetic: float, work: float, plastic: float, viscous: float, contact: float, external: float
+    ) -> Energy:
+        total = kinetic + work + viscous + contact
+        scale = max(self.initial, abs(external), abs(work), abs(kinetic))
+        residual = abs(total - self.initial - external) / scale if scale > 0.0 else 0.0
+        self.worst = max(self.worst, residual)
+        return Energy(
+            kinetic=float(kinetic), elastic=float(work - plastic), plastic=float(plastic), viscous=float(viscous),
+            contact=float(contact), external=float(external), initial=self.initial, residual=float(residual),
+        )  # fmt: skip
+
+    def _node_sum(self, values: Floats) -> float:
+        return float(exact_sums(self._comm, values[self._model.nodes.owned][:, None])[0])
+
+    def _boundary_work(self) -> tuple[Floats, Floats]:
+        n = self._model.nodes.n
+        loss, external = np.zeros(n), np.zeros(n)
+        for boundary in self._boundaries:
+            np.add.at(loss, boundary.nodes, boundary.contact_loss)
+            np.add.at(external, boundary.nodes, boundary.external_work)
+        return loss, external
+
+    def _element_work(self) -> Floats:
+        columns = [np.zeros((0, 3))]
+        for block in self._model.blocks:
+            plastic = block.row(WORK_PLASTIC) if block.has(WORK_PLASTIC) else np.zeros(block.n)
+            columns.append(np.column_stack([block.row(WORK), block.row(WORK_VISCOUS), plastic]))
+        return np.concatenate(columns)

@@ -1,0 +1,137 @@
+"""The run: steps, and whoever is due to look at them. Signals, wall time and the ledger end it in good order."""
+
+import signal
+import time
+from pathlib import Path
+from typing import Any
+
+from conoid.cases import messages
+from conoid.cases.messages import Energy
+from conoid.cases.run import Cause, State
+
+from . import step
+from .errors import EnergyError
+from .output import frames
+from .output.history import History
+from .output.journal import Journal
+from .simulation import Simulation
+from .state import Floats
+
+CANCELLED, WALL_TIME, MAX_STEPS = 1, 2, 3
+"""Reasons to stop early, in the vote of the ranks: the largest wins."""
+STOPS = {
+    CANCELLED: (State.CANCELLED, Cause.CANCELLED, "stopped by a signal"),
+    WALL_TIME: (State.TIMED_OUT, Cause.WALLTIME, "run.max_wall_time is used up"),
+    MAX_STEPS: (State.FAILED, Cause.DIVERGED, "run.max_steps is used up before run.end_time"),
+}
+_REPORT_EVERY = 0.25
+
+
+class Loop:
+    """Runs a simulation to its end, and tells. ``journal`` and ``history`` exist on rank 0 only."""
+
+    def __init__(self, sim: Simulation, folder: Path, journal: Journal | None, history: History | None) -> None:
+        self.sim = sim
+        self.energy: Energy | None = None
+        self.stopped = 0
+        self._folder = folder
+        self._journal = journal
+        self._history = history
+        self._sample = 0
+        self._signalled = False
+        self._began = self._reported = time.monotonic()
+        self._reported_step = 0
+        for number in (signal.SIGTERM, signal.SIGUSR1, signal.SIGINT):
+            signal.signal(number, self._on_signal)
+
+    def _on_signal(self, number: int, stack: object) -> None:
+        self._signalled = True
+
+    def run(self) -> None:
+        """Steps until the end time, or until a reason to stop. Raises PhysicsError."""
+        sim = self.sim
+        step.prepare(sim)
+        while True:
+            if sim.vote.report:
+                self._report()
+            self._propose()
+            self._first_half()
+            if sim.clock.done or sim.vote.stop:
+                self.stopped = 0 if sim.clock.done else sim.vote.stop
+                return
+            step.second_half(sim)
+
+    def _first_half(self) -> None:
+        sim, clock = self.sim, self.sim.clock
+        ending = clock.done or bool(sim.vote.stop)
+        sampling = ending or clock.t >= self._sample * sim.case.run.end_time / sim.case.run.samples
+        before = sim.model.nodes.v.copy() if sampling else None
+        step.first_half(sim)
+        with sim.timers.phase("output"):
+            if before is not None:
+                self._look(before)
+            if clock.frame_due:
+                self._write_frame()
+
+    def _propose(self) -> None:
+        """This rank's words for the next vote."""
+        sim, now = self.sim, time.monotonic()
+        limit = sim.case.run.max_wall_time
+        stop = CANCELLED if self._signalled else 0
+        if limit is not None and now - self._began > limit:
+            stop = WALL_TIME
+        if sim.clock.step + 1 >= sim.case.run.max_steps:
+            stop = MAX_STEPS
+        sim.vote.words[2] = stop
+        sim.vote.words[3] = sim.comm.rank == 0 and now - self._reported > _REPORT_EVERY
+
+    def _look(self, before: Floats) -> None:
+        """A line of the history: ledger, momentum and probes at time n."""
+        sim, clock = self.sim, self.sim.clock
+        self.energy = sim.ledger.close(before)
+        probes = sim.probes.measure()
+        self._sample = int(clock.t * sim.case.run.samples / sim.case.run.end_time) + 1
+        limiter = sim.limiter()
+        if self._history is not None:
+            extra = [*sim.ledger.momentum, *probes]
+            self._history.write(clock.step, clock.t, clock.dt, limiter, self.energy, extra)
+        if self.energy.residual > sim.case.run.residual_limit:
+            raise EnergyError(
+                f"the energy residual {self.energy.residual:.3g} passed run.residual_limit "
+                f"{sim.case.run.residual_limit:g} at step {clock.step}, t = {clock.t:.6g} s"
+            )
+
+    def _write_frame(self) -> None:
+        sim, clock = self.sim, self.sim.clock
+        index = clock.frame
+        path = frames.write(self._folder, index, clock.t, sim.model, sim.comm)
+        clock.frame += 1
+        if path is not None:
+            self._tell(messages.Frame, index=index, path=path)
+
+    def _report(self) -> None:
+        """Progress and loads to the journal; all ranks take part."""
+        sim, clock = self.sim, self.sim.clock
+        with sim.timers.phase("output"):
+            limiter = sim.limiter()
+            loads = sim.comm.gather(sim.timers.since_last())
+        if loads is None:
+            return
+        now = time.monotonic()
+        steps, elapsed = clock.step - self._reported_step, now - self._reported
+        busy = [load["elements"] + load["nodes"] for load in loads]
+        left = (sim.case.run.end_time - clock.t) / clock.stable
+        if self.energy is not None:
+            self._tell(
+                messages.Progress, end_time=sim.case.run.end_time, dt=clock.dt, limiter=limiter,
+                eta=left * elapsed / max(steps, 1), energy=self.energy,
+                updates_per_second=steps * sim.model.elements_global / elapsed,
+            )  # fmt: skip
+        mean = sum(busy) / len(busy)
+        phases = {name: [load[name] for load in loads] for name in loads[0]}
+        self._tell(messages.Load, phases=phases, imbalance=max(busy) / mean if mean > 0.0 else 1.0)
+        self._reported, self._reported_step = now, clock.step
+
+    def _tell(self, kind: type[messages.Message], **fields: Any) -> None:
+        if self._journal is not None:
+            self._journal.write(kind, self.sim.clock.step, self.sim.clock.t, **fields)

@@ -1,0 +1,118 @@
+"""Frames: one VTKHDF file each (version 2.3, UnstructuredGrid), readable while the run goes on.
+
+A file is written beside its place, flushed to disk and renamed: whoever sees it sees all of it.
+"""
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from conoid.cases import layout
+
+from ..parallel.comm import Comm
+from ..state import (
+    PLASTIC_STRAIN,
+    PRESSURE,
+    S_XX,
+    S_XY,
+    TEMPERATURE,
+    Block,
+    Floats,
+    Model,
+)
+
+_TETRA = 10
+_PACKING = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
+
+
+def von_mises(deviator: Floats) -> Floats:
+    """sqrt(3/2 s : s) of deviatoric stresses (6, n) in the order xx, yy, zz, yz, zx, xy."""
+    squares = (deviator[:3] ** 2).sum(axis=0) + 2.0 * (deviator[3:] ** 2).sum(axis=0)
+    mises: Floats = np.sqrt(1.5 * squares)
+    return mises
+
+
+def _cells(block: Block, rank: int) -> dict[str, Any]:
+    deviator = np.array([block.row(row) for row in range(S_XX, S_XY + 1)])
+    zeros = np.zeros(block.n, np.float32)
+    return {
+        "part": np.full(block.n, block.part, np.int32),
+        "rank": np.full(block.n, rank, np.int32),
+        "tet": block.id,
+        "pressure": block.row(PRESSURE).astype(np.float32),
+        "mises": von_mises(deviator).astype(np.float32),
+        "plastic_strain": block.row(PLASTIC_STRAIN).astype(np.float32) if block.has(PLASTIC_STRAIN) else zeros,
+        "temperature": block.row(TEMPERATURE).astype(np.float32) if block.has(TEMPERATURE) else zeros,
+    }
+
+
+def _snapshot(model: Model, rank: int) -> dict[str, Any]:
+    nodes = model.nodes
+    cells = [_cells(block, rank) for block in model.blocks]
+    return {
+        "ids": nodes.id,
+        "points": nodes.x,
+        "velocity": nodes.v.astype(np.float32),
+        "displacement": (nodes.x - nodes.x0).astype(np.float32),
+        "tets": np.concatenate([nodes.id[b.tets] for b in model.blocks] or [np.zeros((0, 4), np.int64)]),
+        "cells": {name: np.concatenate([c[name] for c in cells]) for name in cells[0]} if cells else {},
+    }
+
+
+def write(folder: Path, index: int, t: float, model: Model, comm: Comm) -> str | None:
+    """Writes frame ``index``; on rank 0 returns its path relative to the run's folder, elsewhere None."""
+    pieces = comm.gather(_snapshot(model, comm.rank))
+    if pieces is None:
+        return None
+    path = layout.frame(folder, index)
+    path.parent.mkdir(exist_ok=True)
+    beside = path.with_suffix(".part")
+    with h5py.File(beside, "w") as file:
+        _write_grid(file, pieces, model.nodes_global)
+        file["VTKHDF/FieldData/time"] = np.array([t])
+    with beside.open("rb") as handle:
+        os.fsync(handle.fileno())
+    beside.rename(path)
+    _append_series(path, t)
+    return str(path.relative_to(folder))
+
+
+def _write_grid(file: "h5py.File", pieces: list[dict[str, Any]], total: int) -> None:
+    root = file.create_group("VTKHDF", track_order=True)
+    root.attrs["Version"] = (2, 3)
+    root.attrs.create("Type", b"UnstructuredGrid", dtype=h5py.string_dtype("ascii", 16))
+    point_data = {name: _by_id(pieces, name, total) for name in ("points", "velocity", "displacement")}
+    cells = {name: np.concatenate([p["cells"][name] for p in pieces if p["cells"]]) for name in pieces[0]["cells"]}
+    order = np.argsort(cells["tet"])
+    tets = np.concatenate([p["tets"] for p in pieces])[order]
+    n = len(tets)
+    root["NumberOfPoints"], root["NumberOfCells"] = np.array([total]), np.array([n])
+    root["NumberOfConnectivityIds"] = np.array([4 * n])
+    root.create_dataset("Points", data=point_data.pop("points"), **_PACKING)
+    root.create_dataset("Connectivity", data=tets.reshape(-1), **_PACKING)
+    root.create_dataset("Offsets", data=np.arange(0, 4 * n + 1, 4), **_PACKING)
+    root.create_dataset("Types", data=np.full(n, _TETRA, np.uint8), **_PACKING)
+    for name, values in point_data.items():
+        root.create_dataset(f"PointData/{name}", data=values, **_PACKING)
+    for name, values in cells.items():
+        root.create_dataset(f"CellData/{name}", data=values[order], **_PACKING)
+
+
+def _by_id(pieces: list[dict[str, Any]], name: str, total: int) -> "np.ndarray":
+    values = np.empty((total, 3), pieces[0][name].dtype)
+    for piece in pieces:
+        values[piece["ids"]] = piece[name]
+    return values
+
+
+def _append_series(path: Path, t: float) -> None:
+    series = path.parent / layout.FRAME_SERIES
+    content = json.loads(series.read_text()) if series.exists() else {"file-series-version": "1.0", "files": []}
+    content["files"] = [f for f in content["files"] if f["name"] != path.name] + [{"name": path.name, "time": t}]
+    beside = series.with_suffix(".part")
+    beside.write_text(json.dumps(content, indent=1))
+    beside.rename(series)

@@ -1,0 +1,98 @@
+"""Messages on Zenoh, from a thread of their own behind a bounded ring: the solver never waits for the network.
+
+``put`` reports no loss and may stall its caller, so it runs here; when the ring is full the oldest message is dropped
+and counted, and a reader who sees the gap in ``seq`` refills it from the journal. Without a router the thread tries
+again now and then; the run does not mind.
+"""
+
+import json
+import os
+import threading
+from collections import deque
+
+import zenoh
+
+from conoid.cases import keys, messages
+
+_RING = 1024
+_RETRY = 2.0
+_LINGER = 1.0
+
+
+class Telemetry:
+    """Publishes what it is told. ``dropped`` counts the messages that found the ring full."""
+
+    def __init__(self, endpoint: str, prefix: str) -> None:
+        self.dropped = 0
+        self._endpoint = endpoint
+        self._prefix = prefix
+        self._ring: deque[messages.AnyMessage] = deque()
+        self._wake = threading.Condition()
+        self._closing = False
+        self._thread = threading.Thread(target=self._work, name="telemetry", daemon=True)
+        self._thread.start()
+
+    def tell(self, message: messages.AnyMessage) -> None:
+        """Queues a message; O(1), never waits for the network."""
+        with self._wake:
+            if len(self._ring) == _RING:
+                self._ring.popleft()
+                self.dropped += 1
+            self._ring.append(message)
+            self._wake.notify()
+
+    def close(self) -> None:
+        """Gives the thread a moment to send what is left; it dies with the process if the network hangs."""
+        with self._wake:
+            self._closing = True
+            self._wake.notify()
+        self._thread.join(_LINGER)
+
+    def _work(self) -> None:
+        session = None
+        while session is None:
+            session = self._open()
+            if session is None and self._pause(_RETRY):
+                return
+        token = session.liveliness().declare_token(keys.alive(self._prefix))
+        while (message := self._next()) is not None:
+            session.put(
+                keys.message_key(self._prefix, message.channel),
+                messages.to_msgpack(message),
+                congestion_control=zenoh.CongestionControl.DROP,
+            )
+        token.undeclare()
+        session.close()
+
+    def _open(self) -> "zenoh.Session | None":
+        try:
+            return zenoh.open(_config(self._endpoint))
+        except zenoh.ZError:
+            return None
+
+    def _pause(self, seconds: float) -> bool:
+        with self._wake:
+            return self._closing or self._wake.wait_for(lambda: self._closing, seconds)
+
+    def _next(self) -> messages.AnyMessage | None:
+        with self._wake:
+            self._wake.wait_for(lambda: self._ring or self._closing)
+            return self._ring.popleft() if self._ring else None
+
+
+def _config(endpoint: str) -> zenoh.Config:
+    config = zenoh.Config()
+    settings: dict[str, object] = {
+        "mode": "client",
+        "connect/endpoints": [endpoint],
+        "connect/timeout_ms": 1000,
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/enabled": False,
+        "transport/shared_memory/enabled": False,
+    }
+    if user := os.environ.get("CONOID_ZENOH_USER"):
+        settings["transport/auth/usrpwd/user"] = user
+        settings["transport/auth/usrpwd/password"] = os.environ.get("CONOID_ZENOH_PASSWORD", "")
+    for key, value in settings.items():
+        config.insert_json5(key, json.dumps(value))
+    return config

@@ -1,0 +1,126 @@
+"""What a case needs, built once: the model, its pressure form, its boundaries, its accounts. The step uses it."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from conoid.cases.library import material as find_material
+from conoid.cases.schema import Case
+
+from . import boundaries, domain
+from .boundaries import Boundary
+from .clock import Clock
+from .elements.forms import AveragedElements, Elements
+from .energy import Ledger
+from .materials.models import BULK, moduli
+from .parallel import fixed_point
+from .parallel.comm import Comm
+from .probes import Probes
+from .state import MASS, Ints, Model
+from .timers import Timers
+
+_SMALLEST_STRAIN = 1e-12
+"""Forces of a smaller strain than this need no finer quantum."""
+
+
+@dataclass
+class Vote:
+    """What the ranks agree on in a step: a maximum over int64 words. Bits of non-negative floats order like floats."""
+
+    words: Ints = field(default_factory=lambda: np.zeros(4, np.int64))
+    """0: one over the stable step; 1: largest force (both as bits); 2: reason to stop; 3: rank 0 wants a report."""
+    result: Ints = field(default_factory=lambda: np.zeros(4, np.int64))
+
+    @property
+    def limit(self) -> float:
+        """Largest one-over-stable-step of all tets, 1/s; NaN when some tet is inverted or not a number."""
+        return fixed_point.float_of(int(self.result[0]))
+
+    @property
+    def force(self) -> float:
+        """Largest contribution to a nodal force, N."""
+        return fixed_point.float_of(int(self.result[1]))
+
+    @property
+    def stop(self) -> int:
+        """Reason to stop, 0 for none (see worker/loop.py)."""
+        return int(self.result[2])
+
+    @property
+    def report(self) -> bool:
+        """Whether rank 0 wants the loads of all ranks."""
+        return bool(self.result[3])
+
+
+@dataclass
+class Simulation:
+    """Everything one rank needs to take steps."""
+
+    case: Case
+    comm: Comm
+    model: Model
+    elements: Elements
+    boundaries: list[Boundary]
+    clock: Clock
+    ledger: Ledger
+    probes: Probes
+    timers: Timers
+    shared_nodes: int
+    floor: float
+    """Forces below this, N, do not refine the force quantum."""
+    scale: float = 1.0
+    """Quanta per newton of the nodal forces as they stand."""
+    vote: Vote = field(default_factory=Vote)
+
+    def limiter(self) -> str:
+        """Which tet holds the time step down, and why; all ranks take part."""
+        elements, stable = self.elements, self.clock.stable
+        mine = int(elements.peaks[0]) == int(self.vote.result[0])
+        block = self.model.blocks[elements.limiting] if mine else None
+        tet = -float(block.id[elements.peaks[1]]) if block else -np.inf
+        part = float(block.part) if block else -1.0
+        first, of_part = self.comm.maximum(np.array([tet, part]))
+        why = "stability" if stable * self.vote.limit >= 0.999 * self.case.numerics.dt_safety else "growth"
+        if self.clock.dt < stable:
+            why = "output time"
+        return f"{why}: tet {int(-first)} of {self.model.parts[int(of_part)]}"
+
+    def next_scale(self) -> float:
+        """The scale for the next sum of forces."""
+        return fixed_point.scale_for(max(self.vote.force, self.floor))
+
+
+def build(case: Case, folder: Path, comm: Comm) -> Simulation:
+    """Meshes, cuts and distributes the case. Raises InputError on every rank alike."""
+    model, piece = domain.build(case, folder, comm)
+    scene = boundaries.build(case, model.nodes, model.parts)
+    for boundary in scene:
+        boundary.start(model.nodes)
+    elements = _elements(case, model, piece, comm)
+    run, numerics = case.run, case.numerics
+    floor = _force_floor(model, comm)
+    return Simulation(
+        case=case, comm=comm, model=model, elements=elements, boundaries=scene,
+        clock=Clock(run.end_time, numerics.dt_safety, numerics.dt_growth, run.frames),
+        ledger=Ledger(model, scene, comm), probes=Probes(case, model, comm), timers=Timers(),
+        shared_nodes=piece.totals[2], floor=floor, scale=fixed_point.scale_for(floor),
+    )  # fmt: skip
+
+
+def _elements(case: Case, model: Model, piece: domain.Piece, comm: Comm) -> Elements:
+    form = case.numerics.pressure
+    if form == "standard":
+        return Elements(model, comm, piece.neighbours)
+    bulk = np.array([moduli(find_material(case, part.material))[0] for part in case.parts])
+    return AveragedElements(
+        model, comm, piece.neighbours, 1.0 / piece.node_volume, bulk[model.nodes.part], form == "split"
+    )
+
+
+def _force_floor(model: Model, comm: Comm) -> float:
+    largest = 0.0
+    for block in model.blocks:
+        volume = float(block.row(MASS).max()) / float(block.params[0])
+        largest = max(largest, float(block.params[BULK]) * volume ** (2.0 / 3.0))
+    return _SMALLEST_STRAIN * float(comm.maximum(np.array([largest]))[0])
