@@ -32,7 +32,10 @@ class Boundary:
         """Makes the initial velocities agree with the boundary."""
 
     def apply(self, model: Nodes, quantum: float, dt: float, t: float) -> None:
-        """Corrects v(n+1/2) at time ``t``; ``quantum``: the impulse of one force quantum, N s; ``dt``: the step ahead."""
+        """Corrects v(n+1/2) at time ``t``.
+
+        ``quantum`` is the impulse of one force quantum over the mean step, N s; ``dt`` the step ahead, s.
+        """
         raise NotImplementedError
 
 
@@ -60,7 +63,16 @@ class RigidWall(Boundary):
 
     def apply(self, model: Nodes, quantum: float, dt: float, t: float) -> None:
         if dt > 0.0 and _push_out(
-            model.x, model.v, model.force, model.mass, self.nodes, self._point, self._normal, quantum, dt, self.contact_loss
+            model.x,
+            model.v,
+            model.force,
+            model.mass,
+            self.nodes,
+            self._point,
+            self._normal,
+            quantum,
+            dt,
+            self.contact_loss,
         ):
             self.last_push = t
 

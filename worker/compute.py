@@ -20,9 +20,7 @@ from .simulation import Simulation
 from .timers import PHASES
 
 
-def compute(
-    case: Case, meshes: Path, folder: Path, comm: Comm, journal: Journal | None, began: float
-) -> Outcome:
+def compute(case: Case, meshes: Path, folder: Path, comm: Comm, journal: Journal | None, began: float) -> Outcome:
     """Runs the case in ``folder`` on all ranks; relative mesh paths start at ``meshes``. Raises ConoidError."""
     sim = simulation.build(case, meshes, comm)
     history = History(folder, sim.probes.names) if comm.rank == 0 else None
@@ -37,6 +35,7 @@ def compute(
     except PhysicsError as error:
         failure = error
     cpu = time.thread_time() - cpu
+    sim.elements.free()
     if history is not None:
         history.close()
     return _sum_up(loop, folder, failure, cpu, setup, time.monotonic() - began)

@@ -1,4 +1,4 @@
-"""The digest: sha256 over the state of nodes and tets in the order of their global ids, the same on any number of ranks."""
+"""The digest: sha256 over the state of nodes and tets in the order of their global ids, for any number of ranks."""
 
 import hashlib
 

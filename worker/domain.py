@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from conoid.cases import schema
 from conoid.cases.library import material as find_material
@@ -33,6 +34,8 @@ from .state import (
     chunked,
 )
 
+Flags = npt.NDArray[np.bool_]
+
 
 @dataclass
 class Whole:
@@ -54,7 +57,7 @@ class Piece:
 
     node_ids: Ints
     node_part: Indices
-    owned: "np.ndarray"
+    owned: Flags
     points: Floats
     velocity: Floats
     mass: Floats
@@ -63,7 +66,7 @@ class Piece:
     tet_part: Indices
     tets: Indices
     tet_volume: Floats
-    border: "np.ndarray"
+    border: Flags
     neighbours: list[Neighbour]
     totals: tuple[int, int, int]
     """Tets, nodes and shared nodes of the whole."""
@@ -84,10 +87,17 @@ def assemble(case: schema.Case, folder: Path) -> Whole:
     x, t = np.concatenate(points), np.concatenate(tets).astype(np.int32)
     part_of_tet = np.concatenate(tet_part)
     volumes = _volumes(x, t)
-    node_volume = np.bincount(t.reshape(-1), np.repeat(volumes / 4.0, 4), len(x))
-    mass = np.bincount(t.reshape(-1), np.repeat(volumes * np.array(density)[part_of_tet] / 4.0, 4), len(x))
     part_of_node = np.concatenate(node_part)
-    return Whole(x, part_of_node, t, part_of_tet, volumes, node_volume, mass, _velocities(case, x, part_of_node))
+    return Whole(
+        points=x, node_part=part_of_node, tets=t, tet_part=part_of_tet, volumes=volumes,
+        node_volume=_quarters(t, volumes, len(x)), mass=_quarters(t, volumes * np.array(density)[part_of_tet], len(x)),
+        velocity=_velocities(case, x, part_of_node),
+    )  # fmt: skip
+
+
+def _quarters(tets: Indices, values: Floats, n: int) -> Floats:
+    """(n,) a quarter of each tet's value summed at its nodes, in the order of the tets."""
+    return np.bincount(tets.reshape(-1), np.repeat(values / 4.0, 4), n).astype(np.float64)
 
 
 def _volumes(x: Floats, tets: Indices) -> Floats:
@@ -128,7 +138,7 @@ def _home(whole: Whole, owner: Indices) -> Indices:
 
 
 def _piece(
-    whole: Whole, owner: Indices, rank: int, nodes_of: list[Ints], shared: "np.ndarray", home: Indices,
+    whole: Whole, owner: Indices, rank: int, nodes_of: list[Ints], shared: Flags, home: Indices,
     totals: tuple[int, int, int],
 ) -> Piece:  # fmt: skip
     nodes, ids = nodes_of[rank], np.flatnonzero(owner == rank)
@@ -144,7 +154,7 @@ def _piece(
     return Piece(
         nodes.astype(np.int64), whole.node_part[nodes], home[nodes] == rank, whole.points[nodes],
         whole.velocity[nodes], whole.mass[nodes], whole.node_volume[nodes], ids.astype(np.int64),
-        whole.tet_part[ids], local[tets], whole.volumes[ids], shared[tets].any(axis=1), neighbours, totals,
+        whole.tet_part[ids], local[tets], whole.volumes[ids], np.any(shared[tets], axis=1), neighbours, totals,
     )  # fmt: skip
 
 

@@ -4,9 +4,9 @@ import numpy as np
 
 from conoid.cases.schema import Case, Probe
 
+from .output.frames import von_mises
 from .parallel.comm import Comm
 from .parallel.fixed_point import exact_sums
-from .output.frames import von_mises
 from .state import (
     MASS,
     PLASTIC_STRAIN,
@@ -41,7 +41,7 @@ def tet_volumes(block: Block, x: Floats) -> Floats:
 
 
 def field(block: Block, name: str, model: Model) -> Floats:
-    """(n,) a field of ``cases.schema.ProbeField`` over the tets of a block; stress and pressure with the viscous part."""
+    """(n,) a field of ``cases.schema.ProbeField`` over the tets of a block; stress includes the viscous part."""
     if name in _NORMAL:
         return block.row(_NORMAL[name]) - block.row(PRESSURE) - block.row(VISCOUS)
     if name in _ROWS:

@@ -26,9 +26,13 @@ def measure(sim: Simulation, folder: Path) -> list[Check]:
         value = _measured(sim, spec, folder)
         checks.append(
             Check(
-                name=_name(spec), value=value, expected=spec.value, tolerance=spec.tolerance,
-                passed=bool(abs(value - spec.value) <= spec.tolerance), source=spec.source,
-            )  # fmt: skip
+                name=_name(spec),
+                value=value,
+                expected=spec.value,
+                tolerance=spec.tolerance,
+                passed=bool(abs(value - spec.value) <= spec.tolerance),
+                source=spec.source,
+            )
         )
     return checks
 

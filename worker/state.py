@@ -96,7 +96,7 @@ class Block:
     @property
     def chunks(self) -> int:
         """Number of chunks."""
-        return self.state.shape[0]
+        return int(self.state.shape[0])
 
     def row(self, row: int) -> Floats:
         """(n,) copy of one row of the state."""
@@ -104,7 +104,7 @@ class Block:
 
     def has(self, row: int) -> bool:
         """Whether the block carries that row."""
-        return row < self.state.shape[1]
+        return row < int(self.state.shape[1])
 
 
 @dataclass

@@ -23,7 +23,7 @@ class Elements:
     def __init__(self, model: Model, comm: Comm, neighbours: list[Neighbour]) -> None:
         self.model = model
         self.peaks: Ints = np.zeros(3, np.int64)
-        """Bits of the largest 1/step, the element that sets it (local number within ``limiting``), bits of the largest force."""
+        """See elements/sweep.py; the element is numbered within the block ``limiting``."""
         self.limiting = 0
         """Index of the block whose element limits the step."""
         self._w = np.zeros(tet4.SCRATCH)
@@ -36,7 +36,7 @@ class Elements:
     @property
     def bytes_sent(self) -> int:
         """Bytes this rank sends in a step."""
-        return self.shared_forces.bytes_sent
+        return sum(shared.bytes_sent for shared in self._exchanges())
 
     def advance(self, dt: float, scale: float) -> None:
         """Stress and forces at n+1; the completion of the shared forces is under way when it returns."""
@@ -56,6 +56,14 @@ class Elements:
         """Returns when the forces of shared nodes are complete."""
         self.shared_forces.finish()
 
+    def free(self) -> None:
+        """Gives the messages of the exchanges back to MPI."""
+        for shared in self._exchanges():
+            shared.free()
+
+    def _exchanges(self) -> list[SharedSum]:
+        return [self.shared_forces]
+
     def _both_regions(self, work: Callable[[Block, int, int], None], shared: SharedSum) -> None:
         for number, block in enumerate(self.model.blocks):
             self._tracked(number, block, 0, block.border_chunks, work)
@@ -63,7 +71,9 @@ class Elements:
         for number, block in enumerate(self.model.blocks):
             self._tracked(number, block, block.border_chunks, block.chunks, work)
 
-    def _tracked(self, number: int, block: Block, begin: int, end: int, work: Callable[[Block, int, int], None]) -> None:
+    def _tracked(
+        self, number: int, block: Block, begin: int, end: int, work: Callable[[Block, int, int], None]
+    ) -> None:
         if begin == end:
             return
         before = self.peaks[0]
@@ -110,10 +120,8 @@ class AveragedElements(Elements):
         if split:
             self.shared_gradients = SharedSum(comm, neighbours, self._gradient, _FORCE_TAG + 2)
 
-    @property
-    def bytes_sent(self) -> int:
-        extra = self.shared_gradients.bytes_sent if self.split else 0
-        return self.shared_forces.bytes_sent + self.shared_volumes.bytes_sent + extra
+    def _exchanges(self) -> list[SharedSum]:
+        return [self.shared_forces, self.shared_volumes, *([self.shared_gradients] if self.split else [])]
 
     def advance(self, dt: float, scale: float) -> None:
         nodes = self.model.nodes

@@ -144,7 +144,25 @@ def strain_pass(x, v, sums, weight, pressure, projected, split, tets, state, par
     error_model="numpy",
 )
 def force_pass(  # type: ignore[no-untyped-def]
-    x, strain, force, pressure, gradient, split, tets, state, params, w, wi, bits, peaks, eos, rows, begin, end, dt, scale
+    x,
+    strain,
+    force,
+    pressure,
+    gradient,
+    split,
+    tets,
+    state,
+    params,
+    w,
+    wi,
+    bits,
+    peaks,
+    eos,
+    rows,
+    begin,
+    end,
+    dt,
+    scale,
 ):
     """Pressure from the averaged volume strain, viscosity and forces at n+1; with ``split``, pressure gradients."""
     for c in range(begin, end):
@@ -160,7 +178,8 @@ def force_pass(  # type: ignore[no-untyped-def]
 
 
 @njit(
-    f"void({_F2}, {_I2}, {_F1}, {_I2}, boolean, {_T2}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, int64, int64, int64, float64)",
+    f"void({_F2}, {_I2}, {_F1}, {_I2}, boolean, {_T2}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, "
+    "int64, int64, int64, float64)",
     cache=True,
     error_model="numpy",
 )

@@ -60,7 +60,6 @@ MAGNITUDE = 0x7FFFFFFFFFFFFFFF
 """Mask of a float64's bits without the sign: as integers these order like absolute values, with NaN above all."""
 
 
-
 @njit("void(float64[::1], float64[:, ::1], int32[:, ::1], int64)", cache=True, error_model="numpy")
 def gather_edges(w, x, tets, n):  # type: ignore[no-untyped-def]
     """Edges e1, e2, e3 of ``n`` tets from the positions x (nodes, 3)."""
@@ -97,8 +96,9 @@ def kinematics(w, n, dt):  # type: ignore[no-untyped-def]
         bx, by, bz = w[RATE + 3 * CHUNK + i], w[RATE + 4 * CHUNK + i], w[RATE + 5 * CHUNK + i]
         cx, cy, cz = w[RATE + 6 * CHUNK + i], w[RATE + 7 * CHUNK + i], w[RATE + 8 * CHUNK + i]
         e1x, e1y, e1z = w[EDGE + i] - h * ax, w[EDGE + CHUNK + i] - h * ay, w[EDGE + 2 * CHUNK + i] - h * az
-        e2x, e2y, e2z = w[EDGE + 3 * CHUNK + i] - h * bx, w[EDGE + 4 * CHUNK + i] - h * by, w[EDGE + 5 * CHUNK + i] - h * bz
-        e3x, e3y, e3z = w[EDGE + 6 * CHUNK + i] - h * cx, w[EDGE + 7 * CHUNK + i] - h * cy, w[EDGE + 8 * CHUNK + i] - h * cz
+        e2x, e2y = w[EDGE + 3 * CHUNK + i] - h * bx, w[EDGE + 4 * CHUNK + i] - h * by
+        e2z, e3x = w[EDGE + 5 * CHUNK + i] - h * bz, w[EDGE + 6 * CHUNK + i] - h * cx
+        e3y, e3z = w[EDGE + 7 * CHUNK + i] - h * cy, w[EDGE + 8 * CHUNK + i] - h * cz
         g1x, g1y, g1z = e2y * e3z - e2z * e3y, e2z * e3x - e2x * e3z, e2x * e3y - e2y * e3x
         g2x, g2y, g2z = e3y * e1z - e3z * e1y, e3z * e1x - e3x * e1z, e3x * e1y - e3y * e1x
         g3x, g3y, g3z = e1y * e2z - e1z * e2y, e1z * e2x - e1x * e2z, e1x * e2y - e1y * e2x
@@ -129,9 +129,11 @@ def end_gradients(w, n):  # type: ignore[no-untyped-def]
         e1x, e1y, e1z = w[EDGE + i], w[EDGE + CHUNK + i], w[EDGE + 2 * CHUNK + i]
         e2x, e2y, e2z = w[EDGE + 3 * CHUNK + i], w[EDGE + 4 * CHUNK + i], w[EDGE + 5 * CHUNK + i]
         e3x, e3y, e3z = w[EDGE + 6 * CHUNK + i], w[EDGE + 7 * CHUNK + i], w[EDGE + 8 * CHUNK + i]
-        b1x, b1y, b1z = (e2y * e3z - e2z * e3y) * _SIXTH, (e2z * e3x - e2x * e3z) * _SIXTH, (e2x * e3y - e2y * e3x) * _SIXTH
-        b2x, b2y, b2z = (e3y * e1z - e3z * e1y) * _SIXTH, (e3z * e1x - e3x * e1z) * _SIXTH, (e3x * e1y - e3y * e1x) * _SIXTH
-        b3x, b3y, b3z = (e1y * e2z - e1z * e2y) * _SIXTH, (e1z * e2x - e1x * e2z) * _SIXTH, (e1x * e2y - e1y * e2x) * _SIXTH
+        b1x, b1y = (e2y * e3z - e2z * e3y) * _SIXTH, (e2z * e3x - e2x * e3z) * _SIXTH
+        b1z, b2x = (e2x * e3y - e2y * e3x) * _SIXTH, (e3y * e1z - e3z * e1y) * _SIXTH
+        b2y, b2z = (e3z * e1x - e3x * e1z) * _SIXTH, (e3x * e1y - e3y * e1x) * _SIXTH
+        b3x, b3y = (e1y * e2z - e1z * e2y) * _SIXTH, (e1z * e2x - e1x * e2z) * _SIXTH
+        b3z = (e1x * e2y - e1y * e2x) * _SIXTH
         b0x, b0y, b0z = b1x + b2x + b3x, b1y + b2y + b3y, b1z + b2z + b3z
         w[VOLUME + i] = e1x * b1x + e1y * b1y + e1z * b1z
         w[AREAS + i] = (

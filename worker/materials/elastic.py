@@ -16,7 +16,6 @@ def rotate(w, s, n):  # type: ignore[no-untyped-def]
     """s becomes Q s Q^T with Q = (I - W dt/2)^-1 (I + W dt/2), a rotation to the last bit of round-off.
 
     Hughes and Winget 1980; in closed form with a the axial vector of W dt/2: Q = I + 2 (A + A^2) / (1 + a.a).
-    Rotated components, not yet written back by the compiler's eye, keep the trace at zero.
     """
     for i in range(n):
         ax, ay, az = w[SPIN + i], w[SPIN + CHUNK + i], w[SPIN + 2 * CHUNK + i]
@@ -27,9 +26,11 @@ def rotate(w, s, n):  # type: ignore[no-untyped-def]
         qyz, qzy = f * (ay * az - ax), f * (ay * az + ax)
         sxx, syy, szz = s[_SXX + i], s[_SYY + i], s[_SZZ + i]
         syz, szx, sxy = s[_SYZ + i], s[_SZX + i], s[_SXY + i]
-        txx, txy, txz = qxx * sxx + qxy * sxy + qxz * szx, qxx * sxy + qxy * syy + qxz * syz, qxx * szx + qxy * syz + qxz * szz
-        tyx, tyy, tyz = qyx * sxx + qyy * sxy + qyz * szx, qyx * sxy + qyy * syy + qyz * syz, qyx * szx + qyy * syz + qyz * szz
-        tzx, tzy, tzz = qzx * sxx + qzy * sxy + qzz * szx, qzx * sxy + qzy * syy + qzz * syz, qzx * szx + qzy * syz + qzz * szz
+        txx, txy = qxx * sxx + qxy * sxy + qxz * szx, qxx * sxy + qxy * syy + qxz * syz
+        txz, tyx = qxx * szx + qxy * syz + qxz * szz, qyx * sxx + qyy * sxy + qyz * szx
+        tyy, tyz = qyx * sxy + qyy * syy + qyz * syz, qyx * szx + qyy * syz + qyz * szz
+        tzx, tzy = qzx * sxx + qzy * sxy + qzz * szx, qzx * sxy + qzy * syy + qzz * syz
+        tzz = qzx * szx + qzy * syz + qzz * szz
         s[_SXX + i] = txx * qxx + txy * qxy + txz * qxz
         s[_SYY + i] = tyx * qyx + tyy * qyy + tyz * qyz
         s[_SZZ + i] = tzx * qzx + tzy * qzy + tzz * qzz

@@ -30,9 +30,7 @@ def equivalent_stress(w, s, n):  # type: ignore[no-untyped-def]
     for i in range(n):
         sxx, syy, szz = s[_SXX + i], s[_SYY + i], s[_SZZ + i]
         syz, szx, sxy = s[_SYZ + i], s[_SZX + i], s[_SXY + i]
-        w[TRIAL + i] = np.sqrt(
-            1.5 * (sxx * sxx + syy * syy + szz * szz + 2.0 * (syz * syz + szx * szx + sxy * sxy))
-        )
+        w[TRIAL + i] = np.sqrt(1.5 * (sxx * sxx + syy * syy + szz * szz + 2.0 * (syz * syz + szx * szx + sxy * sxy)))
 
 
 @njit("void(float64[::1], int64, float64)", cache=True)

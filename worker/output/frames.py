@@ -111,8 +111,9 @@ def _by_id(pieces: list[dict[str, Any]], name: str, total: int) -> "np.ndarray":
 
 def _append_series(path: Path, t: float) -> None:
     series = path.parent / layout.FRAME_SERIES
-    content = json.loads(series.read_text()) if series.exists() else {"file-series-version": "1.0", "files": []}
-    content["files"] = [f for f in content["files"] if f["name"] != path.name] + [{"name": path.name, "time": t}]
+    known = json.loads(series.read_text())["files"] if series.exists() else []
+    files = [f for f in known if f["name"] != path.name] + [{"name": path.name, "time": t}]
+    content = {"file-series-version": "1.0", "files": files}
     beside = series.with_suffix(".part")
     beside.write_text(json.dumps(content, indent=1))
     beside.rename(series)

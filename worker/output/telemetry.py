@@ -61,8 +61,8 @@ class Telemetry:
                 messages.to_msgpack(message),
                 congestion_control=zenoh.CongestionControl.DROP,
             )
-        token.undeclare()
-        session.close()
+        token.undeclare()  # type: ignore[no-untyped-call]
+        session.close()  # type: ignore[no-untyped-call]
 
     def _open(self) -> "zenoh.Session | None":
         try:

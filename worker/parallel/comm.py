@@ -61,12 +61,18 @@ class Exchange(Protocol):
     def finish(self) -> None:
         """Returns when the receive buffers are filled and the send buffers may be written again."""
 
+    def free(self) -> None:
+        """Gives the messages back to MPI."""
+
 
 class _Done:
     def begin(self) -> None:
         pass
 
     def finish(self) -> None:
+        pass
+
+    def free(self) -> None:
         pass
 
 
@@ -176,6 +182,10 @@ class _MpiExchange:
 
     def finish(self) -> None:
         self._kind.Waitall(self._requests)
+
+    def free(self) -> None:
+        for request in self._requests:
+            request.Free()
 
 
 def connect() -> Comm:

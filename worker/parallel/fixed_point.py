@@ -48,6 +48,4 @@ def exact_sums(comm: Comm, columns: Floats) -> Floats:
     words = np.concatenate([high.astype(np.int64).sum(axis=0), low.astype(np.int64).sum(axis=0)])
     total: Ints = comm.sum(words)
     k = columns.shape[1]
-    return np.array(
-        [math.ldexp(int(total[j]) * 2**30 + int(total[k + j]), int(exponent[j]) - 60) for j in range(k)]
-    )
+    return np.array([math.ldexp(int(total[j]) * 2**30 + int(total[k + j]), int(exponent[j]) - 60) for j in range(k)])

@@ -64,3 +64,7 @@ class SharedSum:
         self._exchange.finish()
         for buffer, nodes in zip(self._in, self._nodes, strict=True):
             _add(self._sums, nodes, buffer)
+
+    def free(self) -> None:
+        """Gives the messages back to MPI."""
+        self._exchange.free()
