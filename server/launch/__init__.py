@@ -1,0 +1,72 @@
+"""How workers are started and ended: one protocol, one module a way of doing it."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+
+class LaunchError(Exception):
+    """The worker could not be started; the text is one line."""
+
+
+@dataclass(frozen=True)
+class Access:
+    """Where a worker publishes, and as whom (no user: the router asks for none)."""
+
+    endpoint: str
+    prefix: str
+    user: str = ""
+    password: str = ""
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is to be run."""
+
+    run: str
+    ranks: int
+    case: Path
+    folder: Path
+    telemetry: Access | None
+
+
+@dataclass(frozen=True)
+class Exit:
+    """How a worker ended. ``code`` is None when this server is not its parent; negative: minus the signal."""
+
+    code: int | None
+    out_of_memory: bool
+    last_words: str
+
+
+class Worker(Protocol):
+    """A worker that was started: all its ranks, as one."""
+
+    def exited(self) -> Exit | None:
+        """None while any of its processes lives."""
+
+    def stop(self) -> None:
+        """Asks it to stop at its next step."""
+
+    def kill(self) -> None:
+        """Ends all its processes now."""
+
+
+@dataclass(frozen=True)
+class Trace:
+    """What is left of an earlier launch: the worker when it lives, whether there was one, whether it was before
+    the machine's last start."""
+
+    worker: Worker | None
+    launched: bool
+    rebooted: bool
+
+
+class Launcher(Protocol):
+    """A way to run workers."""
+
+    def start(self, job: Job) -> Worker:
+        """Starts the ranks and records them in the run's folder. Raises LaunchError."""
+
+    def find(self, run: str, folder: Path) -> Trace:
+        """The worker that an earlier server started for the run."""

@@ -1,0 +1,134 @@
+"""``python -m conoid.server``: runs the server; ``token add | list | revoke`` decides who may use it."""
+
+import argparse
+import logging
+import os
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from .auth import SCOPES, TokenError, create_token
+from .serve import ServeError, serve
+from .settings import Caps, Settings, SettingsError, command
+from .store import Store, StoreError
+from .telemetry import TelemetryError
+
+_EXPECTED = (SettingsError, ServeError, StoreError, TelemetryError, TokenError)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Exit code 0, or 2 with one line that says what is wrong."""
+    options = _parser().parse_args(arguments)
+    logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", level=logging.INFO)
+    try:
+        act: Callable[[argparse.Namespace], None] = options.act
+        act(options)
+    except _EXPECTED as error:
+        print(f"conoid.server: {error}", file=sys.stderr)
+        return 2
+    except OSError as error:
+        print(f"conoid.server: {error.filename or ''}: {error.strerror}", file=sys.stderr)
+        return 2
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser("python -m conoid.server", description="The job server.", allow_abbrev=False)
+    parser.set_defaults(act=_serve)
+    _common(parser)
+    add = parser.add_argument
+    add("--host", default="127.0.0.1", help="address to listen on (default: this machine only)")
+    add("--port", type=int, default=8750, help="0: any free port (default 8750)")
+    add("--zenoh-port", type=int, default=7447, help="port of the Zenoh router; 0: any free port (default 7447)")
+    add("--no-zenoh", action="store_true", help="no Zenoh router; clients watch over SSE")
+    add("--slots", type=int, help="ranks that may run at a time (default: the cores of this machine)")
+    add("--no-auth", action="store_true", help="no tokens; only on a loopback address")
+    add("--web", type=Path, help="folder of the live page, served at /")
+    add("--mpiexec", default=os.environ.get("CONOID_MPIEXEC", ""), help="the site's own launcher [CONOID_MPIEXEC]")
+    add("--worker", default=os.environ.get("CONOID_WORKER"), help="command of the worker [CONOID_WORKER]")
+    add("--grace", type=float, default=30.0, help="seconds between the request to stop and the kill (default 30)")
+    for name, kind, text in _CAPS:
+        add(f"--max-{name.replace('_', '-')}", type=kind, help=text)
+    _token_commands(parser)
+    return parser
+
+
+_CAPS: tuple[tuple[str, Callable[[str], float], str], ...] = (
+    ("elements", int, "largest number of elements of a case"),
+    ("steps", int, "largest number of steps of a case"),
+    ("memory", int, "largest memory of a case, bytes (default: what the machine has)"),
+    ("core_seconds", float, "largest expected cost of a case, s"),
+    ("wall_time", float, "longest run, s"),
+    ("queued", int, "open runs of one owner (default 1000)"),
+)
+
+
+def _common(parser: argparse.ArgumentParser) -> None:
+    runs = os.environ.get("CONOID_RUNS", "runs")
+    parser.add_argument("--runs", type=Path, default=Path(runs), help=f"folder of all runs [CONOID_RUNS] ({runs})")
+    parser.set_defaults(database=os.environ.get("CONOID_DATABASE", ""))
+
+
+def _token_commands(parser: argparse.ArgumentParser) -> None:
+    token = parser.add_subparsers(metavar="token").add_parser("token", help="who may use the server")
+    commands = token.add_subparsers(required=True, metavar="add|list|revoke")
+    add = commands.add_parser("add", help="make a token and print it, once")
+    add.add_argument("name", help="whose runs it is for")
+    scopes = "; ".join(f"{name}: {text}" for name, text in SCOPES.items())
+    add.add_argument("--scopes", default="read,submit", help=f"with commas between (default read,submit). {scopes}")
+    add.set_defaults(act=_add)
+    listing = commands.add_parser("list", help="the tokens that are valid")
+    listing.set_defaults(act=_list)
+    revoke = commands.add_parser("revoke", help="end a token for good")
+    revoke.add_argument("id", help="as 'token list' shows it")
+    revoke.set_defaults(act=_revoke)
+    for one in (add, listing, revoke):
+        one.add_argument("--runs", type=Path, default=argparse.SUPPRESS, help="folder of the server's runs")
+
+
+def _settings(options: argparse.Namespace) -> Settings:
+    given = {name: value for name, _, _ in _CAPS if (value := getattr(options, f"max_{name}")) is not None}
+    chosen = {"slots": options.slots} if options.slots is not None else {}
+    if options.worker:
+        chosen["worker"] = command(options.worker)
+    return Settings(
+        runs=options.runs.resolve(), host=options.host, port=options.port,
+        zenoh_port=None if options.no_zenoh else options.zenoh_port, auth=not options.no_auth, web=options.web,
+        database=options.database, mpiexec=options.mpiexec, grace=options.grace, caps=Caps(**given), **chosen,
+    )  # fmt: skip
+
+
+def _serve(options: argparse.Namespace) -> None:
+    serve(_settings(options))
+
+
+def _store(options: argparse.Namespace) -> Store:
+    settings = _settings(options)
+    settings.runs.mkdir(parents=True, exist_ok=True)
+    return Store(settings.database_url)
+
+
+def _add(options: argparse.Namespace) -> None:
+    store = _store(options)
+    print(create_token(store, options.name, frozenset(options.scopes.split(","))))
+    store.close()
+
+
+def _list(options: argparse.Namespace) -> None:
+    store = _store(options)
+    for token in store.tokens():
+        made = time.strftime("%Y-%m-%d %H:%M", time.localtime(token.created))
+        print(f"{token.id}  {token.owner}  {','.join(sorted(token.scopes))}  {made}")
+    store.close()
+
+
+def _revoke(options: argparse.Namespace) -> None:
+    store = _store(options)
+    if not store.revoke(options.id):
+        raise TokenError(f"token {options.id!r}: there is none; 'token list' shows all")
+    store.close()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,98 @@
+"""Wiring: the parts of the server, put together; nothing is decided here."""
+
+import asyncio
+from collections.abc import AsyncIterator, Iterator
+from contextlib import ExitStack, asynccontextmanager, contextmanager
+
+from fastapi import FastAPI
+from fastapi.staticfiles import StaticFiles
+from starlette.datastructures import MutableHeaders
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from . import errors
+from .bell import Bell
+from .launch.local import LocalLauncher
+from .routes import cases, events, files, health, logs, me, runs
+from .service import Service
+from .settings import Settings
+from .store import Store
+from .submission import Desk
+from .supervisor import Supervisor
+from .telemetry import Telemetry
+
+ROUTERS = (cases.router, runs.router, events.router, logs.router, files.router, me.router, health.router)
+_SAFE_HEADERS = {
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Content-Security-Policy": (
+        "default-src 'self'; script-src 'self' 'unsafe-inline'; style-src 'self' 'unsafe-inline'; "
+        "img-src 'self' data: blob:; worker-src 'self' blob:; frame-ancestors 'none'; base-uri 'none'; "
+        "form-action 'none'"
+    ),
+}
+
+
+@contextmanager
+def opened(settings: Settings) -> Iterator[Service]:
+    """The parts of a server, the supervisor last; closed in reverse, while workers go on.
+
+    Raises StoreError, TelemetryError, OSError.
+    """
+    settings.runs.mkdir(parents=True, exist_ok=True)
+    with ExitStack() as stack:
+        store = Store(settings.database_url)
+        stack.callback(store.close)
+        telemetry = None
+        if settings.zenoh_port is not None:
+            tokens = store.tokens() if settings.auth else None
+            telemetry = Telemetry(settings.runs, settings.host, settings.zenoh_port, tokens)
+            stack.callback(telemetry.close)
+        bell = Bell()
+        supervisor = Supervisor(settings, store, LocalLauncher(settings), telemetry, bell.ring)
+        supervisor.start()
+        stack.callback(supervisor.close)
+        yield Service(settings, store, bell, telemetry, supervisor, Desk(settings, store, supervisor))
+
+
+def build_app(service: Service) -> FastAPI:
+    """The application over the parts that are open."""
+
+    @asynccontextmanager
+    async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        service.bell.attach(asyncio.get_running_loop())
+        yield
+        service.bell.close()
+
+    app = FastAPI(
+        title="Conoid",
+        description="Impact simulations as a service.",
+        version="1",
+        docs_url=None,
+        redoc_url=None,
+        lifespan=lifespan,
+    )
+    app.state.service = service
+    errors.install(app)
+    app.add_middleware(_SafeHeaders)
+    for router in ROUTERS:
+        app.include_router(router)
+    if service.settings.web is not None:
+        app.mount("/", StaticFiles(directory=service.settings.web, html=True), name="page")
+    return app
+
+
+class _SafeHeaders:
+    """Adds to every answer what keeps a browser from reading more into it than was meant; streams pass untouched."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        async def send_safely(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                for name, value in _SAFE_HEADERS.items():
+                    headers.setdefault(name, value)
+            await send(message)
+
+        await self._app(scope, receive, send_safely)

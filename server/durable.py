@@ -1,0 +1,32 @@
+"""Writing that survives a power cut: data first, then its name, then the folder that holds the name."""
+
+import os
+from pathlib import Path
+
+
+def write(path: Path, content: bytes, mode: int = 0o644) -> None:
+    """Puts ``content`` at ``path`` whole or not at all: a temporary name, fsync, rename, fsync of the folder."""
+    beside = path.with_name(f".{path.name}.new")
+    with open(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, mode), "wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+    os.replace(beside, path)
+    sync_folder(path.parent)
+
+
+def write_new(path: Path, content: bytes) -> None:
+    """A file in a folder that nobody reads yet; the caller syncs the folder. Raises FileExistsError."""
+    with open(path, "xb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def sync_folder(folder: Path) -> None:
+    """Makes the names in ``folder`` durable."""
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,127 @@
+"""What the server answers when it cannot do what was asked: RFC 9457 problem+json, one shape for all.
+
+::
+
+    ServiceError            anything below
+    ├── invalid_case        the case is wrong; every error at once
+    ├── not_found, unauthorized, forbidden, ...
+    └── unavailable         the same request may succeed later
+"""
+
+import logging
+import re
+from collections.abc import Mapping, Sequence
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse, Response
+from starlette.exceptions import HTTPException
+
+from conoid.cases.problems import Problem
+
+MEDIA_TYPE = "application/problem+json"
+_log = logging.getLogger("conoid.server")
+_CODES = {400: "bad_request", 401: "unauthorized", 404: "not_found", 405: "method_not_allowed"}
+
+
+class ServiceError(Exception):
+    """An answer other than success. ``detail`` is one line for people, ``code`` a word for programs."""
+
+    def __init__(
+        self,
+        status: int,
+        code: str,
+        detail: str,
+        *,
+        pointer: str | None = None,
+        hint: str | None = None,
+        retryable: bool = False,
+        errors: Sequence[Problem] = (),
+        headers: Mapping[str, str] | None = None,
+    ) -> None:
+        """``pointer`` is a JSON pointer into the body, or the name of a parameter or header."""
+        super().__init__(detail)
+        self.status, self.headers = status, dict(headers or {})
+        body: dict[str, Any] = {
+            "type": f"urn:conoid:problem:{code}",
+            "title": HTTPStatus(status).phrase,
+            "status": status,
+            "detail": detail,
+            "code": code,
+            "retryable": retryable,
+        }
+        if pointer is not None:
+            body["pointer"] = pointer
+        if hint is not None:
+            body["hint"] = hint
+        if errors:
+            body["errors"] = [entry(problem) for problem in errors]
+        self.body = body
+
+    def response(self) -> Response:
+        """The answer itself."""
+        return JSONResponse(self.body, self.status, self.headers, MEDIA_TYPE)
+
+
+def invalid_case(problems: Sequence[Problem]) -> ServiceError:
+    """422 with every problem; ``detail`` and ``pointer`` are the first one's."""
+    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+    first = problems[0]
+    return ServiceError(
+        422, "invalid_case", f"{first}{more}", pointer=json_pointer(first.key) if first.key else None, errors=problems
+    )
+
+
+def not_found(what: str) -> ServiceError:
+    """404; the same for what does not exist and for what belongs to somebody else."""
+    return ServiceError(404, "not_found", f"{what}: there is none")
+
+
+def entry(problem: Problem) -> dict[str, str]:
+    """A problem of a case as JSON."""
+    return {
+        "key": problem.key, "value": problem.value, "message": problem.message, "pointer": json_pointer(problem.key),
+    }  # fmt: skip
+
+
+def json_pointer(key: str) -> str:
+    """``parts[0].mesh.radius`` as ``#/parts/0/mesh/radius``; ``#`` for the whole body."""
+    items = [item for item in re.split(r"[.\[\]]+", key) if item]
+    return "#" + "".join(f"/{item}" for item in items)
+
+
+def install(app: FastAPI) -> None:
+    """Makes every error of ``app`` a problem+json."""
+    app.add_exception_handler(ServiceError, _service_error)
+    app.add_exception_handler(HTTPException, _http_error)
+    app.add_exception_handler(RequestValidationError, _parameter_error)
+    app.add_exception_handler(Exception, _crash)
+
+
+async def _service_error(_: Request, error: Exception) -> Response:
+    assert isinstance(error, ServiceError)
+    return error.response()
+
+
+async def _http_error(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)
+    code = _CODES.get(error.status_code, "error")
+    detail = f"{request.method} {request.url.path}: {error.detail}"
+    return ServiceError(error.status_code, code, detail, headers=error.headers).response()
+
+
+async def _parameter_error(_: Request, error: Exception) -> Response:
+    assert isinstance(error, RequestValidationError)
+    first = error.errors()[0]
+    name = str(first["loc"][-1])
+    detail = f"{name} = {str(first.get('input'))[:80]!r}: {first['msg']}"
+    return ServiceError(400, "bad_parameter", detail, pointer=name).response()
+
+
+async def _crash(request: Request, error: Exception) -> Response:
+    """The log gets the traceback, the caller does not."""
+    _log.error("%s %s failed", request.method, request.url.path, exc_info=error)
+    detail = "the server failed to answer; its log says why"
+    return ServiceError(500, "internal", detail, retryable=True).response()

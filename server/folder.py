@@ -1,0 +1,157 @@
+"""A run's folder as the server uses it: the submission, the outcome, the process record; all readable without it."""
+
+import os
+import re
+import secrets
+import shutil
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+
+from conoid.cases import layout
+from conoid.cases.messages import Status, to_json
+from conoid.cases.outcome import Outcome
+from conoid.cases.outcome import from_json as outcome_from_json
+from conoid.cases.outcome import to_json as outcome_to_json
+from conoid.cases.run import Cause, State
+
+from . import durable, journal
+from .lifecycle import Run
+
+_ID = re.compile(r"[0-9a-z]{22}")
+_LETTERS = "0123456789abcdefghjkmnpqrstvwxyz"
+_NEW = ".new-"
+
+
+class Submission(msgspec.Struct, kw_only=True, frozen=True):
+    """submission.json: what the server must know again when its database is gone. Times are Unix s."""
+
+    id: str
+    owner: str
+    name: str
+    title: str
+    ranks: int
+    submitted: float
+    case_file: str
+    body_sha256: str
+    idempotency_key: str | None
+    wall_time: float | None
+    """s after which the run is stopped."""
+    estimate: dict[str, float]
+
+
+class Process(msgspec.Struct, kw_only=True, frozen=True):
+    """worker.json: which process runs it. ``started`` and ``boot`` tell it from a later one with the same number."""
+
+    pid: int
+    started: int
+    """Clock ticks after the boot."""
+    boot: str
+    launched: float
+    oom_kills: int
+    """How many processes the machine had killed for want of memory by then."""
+
+
+_submission = msgspec.json.Decoder(Submission)
+_process = msgspec.json.Decoder(Process)
+_last_stamp = 0
+
+
+def new_id() -> tuple[str, float]:
+    """An id of 22 letters and digits, and its Unix time in s. Ids sort by time; half of each is random.
+
+    Not for several threads at a time.
+    """
+    global _last_stamp
+    _last_stamp = max(time.time_ns() // 1000, _last_stamp + 1)
+    return _letters(_last_stamp, 11) + _letters(secrets.randbits(55), 11), _last_stamp / 1e6
+
+
+def is_id(text: str) -> bool:
+    """True for what ``new_id`` could have made."""
+    return _ID.fullmatch(text) is not None
+
+
+def _letters(number: int, length: int) -> str:
+    return "".join(_LETTERS[number >> 5 * place & 31] for place in reversed(range(length)))
+
+
+def create(runs: Path, submission: Submission, case: bytes, resolved: bytes) -> Path:
+    """Makes the folder of an accepted run; it appears whole, and is on disk when this returns. Raises OSError."""
+    beside, folder = runs / f"{_NEW}{submission.id}", runs / submission.id
+    accepted = Status(run=submission.id, seq=1, wall=submission.submitted, state=State.ACCEPTED)
+    (beside / layout.LOGS).mkdir(parents=True)
+    durable.write_new(beside / submission.case_file, case)
+    durable.write_new(beside / layout.RESOLVED_CASE, resolved)
+    durable.write_new(beside / layout.SUBMISSION, msgspec.json.format(msgspec.json.encode(submission), indent=2))
+    durable.write_new(beside / layout.JOURNAL, to_json(accepted) + b"\n")
+    durable.sync_folder(beside)
+    os.rename(beside, folder)
+    durable.sync_folder(runs)
+    return folder
+
+
+def discard(runs: Path, run_id: str) -> None:
+    """Removes what ``create`` made of a run that nobody was promised."""
+    for path in (runs / f"{_NEW}{run_id}", runs / run_id):
+        shutil.rmtree(path, ignore_errors=True)
+
+
+def scan(runs: Path) -> Iterator[Path]:
+    """The folders of all runs, oldest first; what a killed server left half made is removed."""
+    for path in sorted(runs.iterdir()):
+        if path.name.startswith(_NEW):
+            shutil.rmtree(path)
+        elif is_id(path.name) and (path / layout.SUBMISSION).is_file():
+            yield path
+
+
+def submission(folder: Path) -> Submission:
+    """Raises OSError, or msgspec.MsgspecError when the file is not one."""
+    return _submission.decode((folder / layout.SUBMISSION).read_bytes())
+
+
+def run(folder: Path) -> Run:
+    """The run as its folder tells it: the submission, and the Status lines of the journal."""
+    made = submission(folder)
+    told = Run(made.id, made.owner, made.name, made.ranks, made.submitted)
+    for status in journal.statuses(folder / layout.JOURNAL):
+        told = _after(told, status)
+    return told
+
+
+def _after(told: Run, status: Status) -> Run:
+    state, cause = State(status.state), Cause(status.cause) if status.cause else None
+    after = replace(told, state=state, cause=cause, message=status.message)
+    if state in {State.QUEUED, State.STARTING}:
+        return replace(after, started=status.wall if state is State.STARTING else 0.0)
+    return replace(after, finished=status.wall) if state.final else after
+
+
+def outcome(folder: Path) -> Outcome | None:
+    """What outcome.json says; None when there is none, or none that can be read."""
+    try:
+        return outcome_from_json((folder / layout.OUTCOME).read_bytes())
+    except (FileNotFoundError, msgspec.MsgspecError, UnicodeDecodeError):
+        return None
+
+
+def write_outcome(folder: Path, ended: Outcome) -> None:
+    """Writes outcome.json whole. Raises OSError."""
+    durable.write(folder / layout.OUTCOME, outcome_to_json(ended))
+
+
+def process(folder: Path) -> Process | None:
+    """The process that was started for the run; None when there was none."""
+    try:
+        return _process.decode((folder / layout.WORKER).read_bytes())
+    except (FileNotFoundError, msgspec.MsgspecError):
+        return None
+
+
+def write_process(folder: Path, started: Process) -> None:
+    """Records the process. Raises OSError."""
+    durable.write(folder / layout.WORKER, msgspec.json.encode(started))

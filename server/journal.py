@@ -1,0 +1,122 @@
+"""journal.jsonl: the truth about a run. One writer at a time: the server before and after the worker, not beside it."""
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from conoid.cases.messages import Status, to_json
+
+_CHUNK = 1 << 18
+
+
+class _Head(msgspec.Struct):
+    """The part of a message that the server reads of every line, whatever else a newer worker puts in it."""
+
+    seq: int
+    type: str
+
+
+_head = msgspec.json.Decoder(_Head)
+_status = msgspec.json.Decoder(Status)
+
+
+@dataclass(frozen=True)
+class Line:
+    """One event as it stands in the journal, without the line feed."""
+
+    seq: int
+    type: str
+    raw: bytes
+
+
+class Tail:
+    """Follows a journal from its beginning; gives complete lines only, so a line that is being written is never torn.
+
+    A journal that does not exist yet is empty.
+    """
+
+    def __init__(self, path: Path, after: int = 0) -> None:
+        """Skips the lines whose ``seq`` is at most ``after``."""
+        self._path, self._after = path, after
+        self._offset = 0
+
+    def read(self) -> list[Line]:
+        """The new lines, at most about 256 kB of them; an empty list when there are none now."""
+        while True:
+            chunk = self._chunk()
+            if not chunk:
+                return []
+            self._offset += len(chunk)
+            lines = [line for raw in chunk.splitlines() if (line := _line(raw)) and line.seq > self._after]
+            if lines:
+                return lines
+
+    def _chunk(self) -> bytes:
+        """The next complete lines. A line longer than the chunk size is read whole."""
+        size = _CHUNK
+        try:
+            with open(self._path, "rb", buffering=0) as file:
+                while True:
+                    data = os.pread(file.fileno(), size, self._offset)
+                    end = data.rfind(b"\n") + 1
+                    if end or len(data) < size:
+                        return data[:end]
+                    size *= 4
+        except FileNotFoundError:
+            return b""
+
+
+def _line(raw: bytes) -> Line | None:
+    try:
+        head = _head.decode(raw)
+    except msgspec.MsgspecError:
+        return None
+    return Line(head.seq, head.type, raw)
+
+
+def lines(path: Path, after: int = 0) -> Iterator[Line]:
+    """Every complete line with ``seq`` above ``after``, in order."""
+    tail = Tail(path, after)
+    while batch := tail.read():
+        yield from batch
+
+
+def statuses(path: Path) -> list[Status]:
+    """The Status messages of a journal, in order."""
+    return [_status.decode(line.raw) for line in lines(path) if line.type == "status"]
+
+
+def append(path: Path, status: Status) -> Status:
+    """Appends ``status`` under the next number and returns it as written; on disk when this returns. Raises OSError.
+
+    A line that a killed worker left half written is no event: it is cut off first.
+    """
+    with open(path, "a+b") as file:
+        numbered = msgspec.structs.replace(status, seq=_mend(file.fileno()) + 1)
+        file.write(to_json(numbered) + b"\n")
+        file.flush()
+        os.fsync(file.fileno())
+    return numbered
+
+
+def _mend(descriptor: int) -> int:
+    """The number of the last line; what stands after the last line feed is completed or cut off."""
+    size, window = os.fstat(descriptor).st_size, _CHUNK
+    while True:
+        start = max(0, size - window)
+        data = os.pread(descriptor, size - start, start)
+        end = data.rfind(b"\n") + 1
+        if start and not end:
+            window *= 4
+            continue
+        if end < len(data):
+            torn = _line(data[end:])
+            if torn is not None:
+                os.write(descriptor, b"\n")
+                return torn.seq
+            os.ftruncate(descriptor, start + end)
+        known = [line.seq for raw in data[:end].splitlines()[-3:] if (line := _line(raw))]
+        return known[-1] if known else 0

@@ -1,0 +1,148 @@
+"""Workers on this machine: ``mpiexec`` in a session of its own, so that they outlive the server that started them."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+
+from conoid.cases import layout
+
+from .. import folder as run_folder
+from ..folder import Process
+from ..settings import Settings, command, usable_cores
+from . import Exit, Job, LaunchError, Trace, Worker, processes
+
+_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+_NOT_FOR_WORKERS = ("CONOID_DATABASE", "CONOID_TOKEN")
+_CROWDED = 4
+"""Ranks a core from which MPICH's waiting ranks had better sleep than spin."""
+_LAST_WORDS, _LOG_TAIL = 300, 1 << 14
+
+
+class LocalLauncher:
+    """Starts ``mpiexec -n N <worker> CASE --out DIR ...``."""
+
+    def __init__(self, settings: Settings) -> None:
+        """Takes the two commands from ``settings``."""
+        self._mpiexec, self._worker = settings.mpiexec, settings.worker
+
+    def start(self, job: Job) -> Worker:
+        """Starts the ranks; their terminal output goes to log/launcher.log. Raises LaunchError."""
+        argv = [*find_mpiexec(self._mpiexec), "-n", str(job.ranks), *self._worker, *_arguments(job)]
+        oom_kills = processes.oom_kills()
+        try:
+            with open(job.folder / layout.LOGS / layout.LAUNCHER_LOG, "ab") as log:
+                child = subprocess.Popen(
+                    argv, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT, cwd=job.folder,
+                    env=environment(os.environ, job), start_new_session=True,
+                )  # fmt: skip
+        except OSError as error:
+            raise LaunchError(f"{argv[0]} cannot be started: {error.strerror}") from None
+        worker = LocalWorker(job.run, job.folder, _record(child.pid, oom_kills), child)
+        try:
+            run_folder.write_process(job.folder, worker.process)
+        except OSError as error:
+            worker.kill()
+            raise LaunchError(f"the worker cannot be recorded: {error.strerror}") from None
+        return worker
+
+    def find(self, run: str, folder: Path) -> Trace:
+        """By its record; for a server that was killed between the launch and the record, by its environment."""
+        process = run_folder.process(folder)
+        if process is None:
+            leader = processes.leader_of(run)
+            if leader is None:
+                return Trace(None, False, False)
+            process = _record(leader, processes.oom_kills())
+            run_folder.write_process(folder, process)
+        worker = LocalWorker(run, folder, process)
+        rebooted = process.boot != processes.boot()
+        return Trace(worker if not rebooted and worker.alive() else None, True, rebooted)
+
+
+def find_mpiexec(chosen: str) -> tuple[str, ...]:
+    """The site's own when it names one, then the one beside this Python, then the one in PATH. Raises LaunchError."""
+    if chosen:
+        return command(chosen)
+    beside = Path(sys.executable).with_name("mpiexec")
+    found = str(beside) if beside.is_file() else shutil.which("mpiexec")
+    if found is None:
+        raise LaunchError("no mpiexec: install conoid[mpich], or name the site's own with --mpiexec")
+    return (found,)
+
+
+def environment(base: Mapping[str, str], job: Job) -> dict[str, str]:
+    """The worker's environment: one thread a rank, the run's mark, its Zenoh credentials, none of the server's own."""
+    env = {name: value for name, value in base.items() if name not in _NOT_FOR_WORKERS}
+    env.update(dict.fromkeys(_ONE_THREAD, "1"))
+    env[processes.RUN_VARIABLE] = job.run
+    env.setdefault("HYDRA_LAUNCHER", "fork")
+    env.setdefault("HYDRA_IFACE", "lo")
+    if job.ranks >= _CROWDED * usable_cores():
+        env.setdefault("MPIR_CVAR_ENABLE_HEAVY_YIELD", "1")
+    if job.telemetry is not None and job.telemetry.user:
+        env["CONOID_ZENOH_USER"], env["CONOID_ZENOH_PASSWORD"] = job.telemetry.user, job.telemetry.password
+    return env
+
+
+def _arguments(job: Job) -> list[str]:
+    arguments = [str(job.case), "--out", str(job.folder), "--run", job.run]
+    if job.telemetry is not None:
+        arguments += ["--telemetry", job.telemetry.endpoint, "--prefix", job.telemetry.prefix]
+    return arguments
+
+
+def _record(pid: int, oom_kills: int) -> Process:
+    started = processes.start_time(pid) or 0
+    return Process(pid=pid, started=started, boot=processes.boot(), launched=time.time(), oom_kills=oom_kills)
+
+
+class LocalWorker:
+    """A worker on this machine, started by this server or by one before it."""
+
+    def __init__(self, run: str, folder: Path, process: Process, child: subprocess.Popen[bytes] | None = None) -> None:
+        """``child`` when this server is the parent."""
+        self._run, self._folder, self._child = run, folder, child
+        self.process = process
+
+    def alive(self) -> bool:
+        """True while ``mpiexec`` lives."""
+        if self._child is not None:
+            return self._child.poll() is None
+        return processes.start_time(self.process.pid) == self.process.started
+
+    def exited(self) -> Exit | None:
+        """None while ``mpiexec`` lives. Ranks that it left behind are killed, so that nobody writes any more."""
+        if self.alive() or processes.end_run(self._run):
+            return None
+        starved = processes.oom_kills() > self.process.oom_kills
+        return Exit(self._child.returncode if self._child else None, starved, self._last_words())
+
+    def stop(self) -> None:
+        """SIGTERM to ``mpiexec``, which passes it on to every rank."""
+        if self.alive():
+            with suppress(ProcessLookupError):
+                os.kill(self.process.pid, signal.SIGTERM)
+
+    def kill(self) -> None:
+        """SIGKILL to ``mpiexec``'s process group, then to what is left of the run."""
+        if self.alive():
+            with suppress(ProcessLookupError):
+                os.killpg(self.process.pid, signal.SIGKILL)
+        processes.end_run(self._run)
+
+    def _last_words(self) -> str:
+        """The last line that is not part of the launcher's own banner."""
+        try:
+            with open(self._folder / layout.LOGS / layout.LAUNCHER_LOG, "rb") as log:
+                log.seek(max(0, os.fstat(log.fileno()).st_size - _LOG_TAIL))
+                text = log.read().decode(errors="replace")
+        except OSError:
+            return ""
+        said = text.partition("=====")[0].strip().splitlines()
+        return said[-1].strip()[:_LAST_WORDS] if said else ""

@@ -1,0 +1,75 @@
+"""Processes as Linux shows them under /proc: who they are, which run they belong to."""
+
+import os
+import signal
+from contextlib import suppress
+from pathlib import Path
+
+RUN_VARIABLE = "CONOID_RUN"
+"""In the environment of every process of a run. MPI launchers put their ranks into sessions of their own, so that a
+process group does not hold a run together; this does, helpers that a rank starts included."""
+
+_PROC = Path("/proc")
+_AFTER_NAME_STATE, _AFTER_NAME_PARENT, _AFTER_NAME_START = 0, 1, 19
+
+
+def boot() -> str:
+    """Differs from one start of the machine to the next."""
+    return (_PROC / "sys/kernel/random/boot_id").read_text().strip()
+
+
+def oom_kills() -> int:
+    """Processes that the kernel has ended for want of memory since the boot."""
+    for line in (_PROC / "vmstat").read_text().splitlines():
+        if line.startswith("oom_kill "):
+            return int(line.split()[1])
+    return 0
+
+
+def start_time(pid: int) -> int | None:
+    """Clock ticks from the boot to the start of process ``pid``; None when it has ended, reaped or not."""
+    fields = _stat(pid)
+    if fields is None or fields[_AFTER_NAME_STATE] in {"Z", "X"}:
+        return None
+    return int(fields[_AFTER_NAME_START])
+
+
+def parent(pid: int) -> int:
+    """The parent of process ``pid``; 0 when it has ended."""
+    fields = _stat(pid)
+    return 0 if fields is None else int(fields[_AFTER_NAME_PARENT])
+
+
+def _stat(pid: int) -> list[str] | None:
+    try:
+        text = (_PROC / str(pid) / "stat").read_text()
+    except (FileNotFoundError, ProcessLookupError):
+        return None
+    return text.rpartition(")")[2].split()
+
+
+def of_run(run: str) -> list[int]:
+    """The living processes of a run, smallest number first; those of this user only."""
+    marker = f"{RUN_VARIABLE}={run}".encode()
+    found = []
+    for entry in _PROC.iterdir():
+        if entry.name.isdigit():
+            with suppress(OSError):
+                if marker in (entry / "environ").read_bytes().split(b"\0"):
+                    found.append(int(entry.name))
+    return sorted(found)
+
+
+def leader_of(run: str) -> int | None:
+    """The process of a run whose parent does not belong to it: the one that the server started."""
+    members = set(of_run(run))
+    return next((pid for pid in sorted(members) if parent(pid) not in members), None)
+
+
+def end_run(run: str) -> int:
+    """Kills the living processes of a run; how many there were."""
+    members = of_run(run)
+    for pid in members:
+        with suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGKILL)
+    return len(members)

@@ -1,0 +1,98 @@
+"""What the server refuses before it costs anything: large bodies, cases beyond the caps, full queues and disks."""
+
+import asyncio
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+from fastapi import Request
+
+from conoid.cases.estimate import Estimate
+from conoid.cases.problems import Problem
+from conoid.cases.schema import Case, MeshFile
+
+from .errors import ServiceError
+from .settings import Caps, Settings
+
+BODY = 1 << 20
+"""Bytes of the largest body."""
+_BODY_TIMEOUT = 30.0
+
+
+async def read_body(request: Request) -> bytes:
+    """The body, never more than ``BODY`` of it in memory. Raises ServiceError 413, 408."""
+    length = request.headers.get("content-length", "0")
+    if length.isdigit() and int(length) > BODY:
+        raise _too_large(int(length))
+    try:
+        return await asyncio.wait_for(_collect(request), _BODY_TIMEOUT)
+    except TimeoutError:
+        raise ServiceError(408, "timeout", "the body did not arrive in time", retryable=True) from None
+
+
+async def _collect(request: Request) -> bytes:
+    body = bytearray()
+    async for chunk in request.stream():
+        body += chunk
+        if len(body) > BODY:
+            raise _too_large(len(body))
+    return bytes(body)
+
+
+def _too_large(size: int) -> ServiceError:
+    return ServiceError(413, "too_large", f"the body has {size} bytes or more; allowed: {BODY}")
+
+
+def check(case: Case, settings: Settings) -> list[Problem]:
+    """Everything that a valid case says and this server does not allow."""
+    return [*_ranks(case, settings), *_files(case), *_time(case, settings.caps)]
+
+
+def check_size(estimate: Estimate, caps: Caps) -> list[Problem]:
+    """Everything that the case needs more of than this server allows."""
+    needs = (
+        ("parts", "elements", estimate.elements, caps.elements),
+        ("run.end_time", "steps", estimate.steps, caps.steps),
+        ("parts", "bytes of memory", estimate.memory_bytes, caps.memory),
+        ("run.end_time", "core-seconds", estimate.core_seconds, caps.core_seconds),
+    )
+    return [
+        Problem(key, "", f"the case needs about {value:.3g} {what}; this server allows {cap:.3g}")
+        for key, what, value, cap in needs
+        if cap is not None and value > cap
+    ]
+
+
+def _ranks(case: Case, settings: Settings) -> Iterator[Problem]:
+    if case.run.ranks > settings.slots:
+        yield Problem("run.ranks", str(case.run.ranks), f"this server has {settings.slots} slots; allowed: 1 to that")
+
+
+def _files(case: Case) -> Iterator[Problem]:
+    for index, part in enumerate(case.parts):
+        if isinstance(part.mesh, MeshFile):
+            message = "a server does not read mesh files; allowed: box, plate, cylinder, tube, sphere"
+            yield Problem(f"parts[{index}].mesh.path", repr(part.mesh.path), message)
+
+
+def _time(case: Case, caps: Caps) -> Iterator[Problem]:
+    asked, cap = case.run.max_wall_time, caps.wall_time
+    if asked is not None and cap is not None and asked > cap:
+        yield Problem("run.max_wall_time", f"{asked:g} s", f"this server allows {cap:g} s")
+
+
+def wall_time(case: Case, caps: Caps) -> float | None:
+    """Seconds after which the run is stopped; None: never."""
+    asked = [limit for limit in (case.run.max_wall_time, caps.wall_time) if limit is not None]
+    return min(asked) if asked else None
+
+
+def check_room(runs: Path, open_runs: int, caps: Caps) -> None:
+    """Raises ServiceError 429 when the owner has too many open runs, 507 when the disk is nearly full."""
+    if open_runs >= caps.queued:
+        detail = f"{open_runs} of your runs have not ended; this server allows {caps.queued}"
+        raise ServiceError(429, "queue_full", detail, retryable=True, headers={"Retry-After": "60"})
+    free = shutil.disk_usage(runs).free
+    if free < caps.free_disk:
+        detail = f"{free} bytes are free on the server's disk; it keeps {caps.free_disk}"
+        raise ServiceError(507, "disk_full", detail, retryable=True)

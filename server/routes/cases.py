@@ -1,0 +1,49 @@
+"""Cases: the check before anything runs, and the gallery that comes with Conoid."""
+
+from dataclasses import asdict
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Header, Response
+
+from conoid.cases.load import CaseError, read_case, shipped
+
+from ..auth import Reader, Submitter
+from ..errors import entry, not_found
+from ..service import ServiceOf
+from .runs import Body
+
+router = APIRouter()
+
+
+@router.post("/v1/cases:validate")
+def validate(
+    service: ServiceOf, identity: Submitter, body: Body, content_type: Annotated[str, Header()] = ""
+) -> dict[str, Any]:
+    """Whether the case could be submitted: every problem at once, or the estimate and the case with all defaults."""
+    try:
+        reading = service.desk.read(body, content_type)
+    except CaseError as error:
+        return {"valid": False, "problems": [entry(problem) for problem in error.problems]}
+    case = reading.case.model_dump(mode="json")
+    return {"valid": True, "problems": [], "estimate": asdict(reading.estimate), "case": case}
+
+
+@router.get("/v1/cases")
+def gallery(identity: Reader) -> dict[str, Any]:
+    """The shipped cases."""
+    cases = {name: read_case(path) for name, path in shipped().items()}
+    return {
+        "cases": [
+            {"name": name, "title": case.title, "description": case.description, "url": f"/v1/cases/{name}"}
+            for name, case in cases.items()
+        ]
+    }
+
+
+@router.get("/v1/cases/{name}")
+def shipped_case(identity: Reader, name: str) -> Response:
+    """The TOML of a shipped case, ready to be changed and submitted."""
+    path = shipped().get(name)
+    if path is None:
+        raise not_found(f"case {name[:80]!r}")
+    return Response(path.read_bytes(), media_type="application/toml")

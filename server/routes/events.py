@@ -1,0 +1,70 @@
+"""What a run has said and says: replay and live stream, from the journal."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Header, Query, Response
+from fastapi.responses import StreamingResponse
+from starlette.concurrency import run_in_threadpool
+
+from conoid.cases import layout
+
+from .. import journal, stream
+from ..auth import Reader
+from ..errors import ServiceError
+from ..service import ServiceOf
+from .runs import OwnedRun
+
+router = APIRouter()
+After = Annotated[int, Query(ge=0, description="the seq of the last event that is known")]
+
+
+@router.get("/v1/runs/{run_id}/events")
+def replay(
+    run: OwnedRun, service: ServiceOf, after: After = 0, limit: Annotated[int, Query(ge=1, le=10_000)] = 1000
+) -> Response:
+    """The events with ``seq`` above ``after``, oldest first; ``last`` is the seq to go on from, ``more`` says whether
+    there are more already."""
+    path = service.settings.runs / run.id / layout.JOURNAL
+    found: list[journal.Line] = []
+    for line in journal.lines(path, after):
+        if len(found) == limit:
+            return _page(found, after, more=True)
+        found.append(line)
+    return _page(found, after, more=False)
+
+
+def _page(found: list[journal.Line], after: int, *, more: bool) -> Response:
+    """The lines go out as they stand in the journal."""
+    last = found[-1].seq if found else after
+    body = b'{"events":[%s],"last":%d,"more":%s}' % (
+        b",".join(line.raw for line in found),
+        last,
+        b"true" if more else b"false",
+    )
+    return Response(body, media_type="application/json")
+
+
+@router.get("/v1/runs/{run_id}/stream")
+async def follow(
+    run: OwnedRun,
+    service: ServiceOf,
+    identity: Reader,
+    after: After = 0,
+    last_event_id: Annotated[str | None, Header()] = None,
+) -> Response:
+    """Server-sent events: first those after ``Last-Event-ID`` (or ``after``), then the new ones until the run ends.
+
+    A reader who has everything of a run that has ended gets 204, which tells a browser not to connect again.
+    """
+    if last_event_id:
+        if not last_event_id.isdecimal() or len(last_event_id) > 18:
+            detail = f"Last-Event-ID {last_event_id[:40]!r}: the seq of an event, a whole number"
+            raise ServiceError(400, "bad_parameter", detail, pointer="Last-Event-ID")
+        after = int(last_event_id)
+    path = service.settings.runs / run.id / layout.JOURNAL
+    if not service.supervisor.is_open(run.id):
+        tail = journal.Tail(path, after)
+        if not await run_in_threadpool(tail.read):
+            return Response(status_code=204)
+    body = stream.events(service, identity, run.id, path, after)
+    return StreamingResponse(body, media_type=stream.MEDIA_TYPE, headers=stream.HEADERS)

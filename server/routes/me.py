@@ -1,0 +1,51 @@
+"""Who asks, and what this server offers them."""
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Request
+
+from ..auth import Identity, identify
+from ..errors import ServiceError
+from ..limits import BODY
+from ..service import Service, ServiceOf
+from ..telemetry import TelemetryError
+
+router = APIRouter()
+
+
+@router.get("/v1/me")
+def me(request: Request, service: ServiceOf, identity: Annotated[Identity, Depends(identify)]) -> dict[str, Any]:
+    """Name and scopes; how to subscribe over Zenoh (null: not possible); slots and caps."""
+    caps = service.settings.caps
+    return {
+        "owner": identity.owner,
+        "scopes": sorted(identity.token.scopes) if identity.token else ["metrics", "read", "submit"],
+        "zenoh": _zenoh(request, service, identity),
+        "slots": {"total": service.settings.slots, "used": service.supervisor.slots_used()},
+        "limits": {
+            "body_bytes": BODY,
+            "ranks": service.settings.slots,
+            "elements": caps.elements,
+            "steps": caps.steps,
+            "memory_bytes": caps.memory,
+            "core_seconds": caps.core_seconds,
+            "wall_time": caps.wall_time,
+        },
+    }
+
+
+def _zenoh(request: Request, service: Service, identity: Identity) -> dict[str, Any] | None:
+    """The endpoint is at the host name by which the client has reached this server."""
+    if service.telemetry is None or not identity.allows("read"):
+        return None
+    try:
+        reader = service.telemetry.reader(identity.owner, identity.token)
+    except TelemetryError as error:
+        raise ServiceError(503, "unavailable", str(error), retryable=True) from None
+    host = request.url.hostname or "127.0.0.1"
+    return {
+        "endpoint": f"tcp/{f'[{host}]' if ':' in host else host}:{reader.port}",
+        "prefix": reader.prefix,
+        "user": reader.user or None,
+        "password": reader.password or None,
+    }

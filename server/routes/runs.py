@@ -1,0 +1,114 @@
+"""Runs: submit, list, look at, cancel."""
+
+import time
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Header, Query, Request, Response
+from fastapi.responses import JSONResponse
+from starlette.concurrency import run_in_threadpool
+
+from conoid.cases.run import State
+
+from .. import view
+from ..auth import Identity, Reader, Submitter
+from ..errors import ServiceError, not_found
+from ..lifecycle import Run
+from ..limits import read_body
+from ..service import Service, ServiceOf
+
+router = APIRouter()
+Body = Annotated[bytes, Depends(read_body)]
+MAX_WAIT = 60.0
+"""s that ``?wait=`` may ask for."""
+
+
+@router.post("/v1/runs", status_code=202)
+def submit(
+    service: ServiceOf,
+    identity: Submitter,
+    body: Body,
+    content_type: Annotated[str, Header()] = "",
+    idempotency_key: Annotated[str | None, Header()] = None,
+) -> Response:
+    """Takes a case as TOML or JSON. The same Idempotency-Key and body give the same run and the same answer."""
+    receipt = service.desk.submit(identity.owner, body, content_type, idempotency_key)
+    return JSONResponse(receipt, 202, {"Location": receipt["url"]})
+
+
+@router.get("/v1/runs")
+def page(
+    service: ServiceOf,
+    identity: Reader,
+    state: Annotated[str | None, Query(description="one or more states, with commas between")] = None,
+    cursor: str | None = None,
+    limit: Annotated[int, Query(ge=1, le=500)] = 50,
+) -> dict[str, Any]:
+    """Own runs, newest first; ``next`` is the cursor of the following page, null on the last."""
+    before = None if cursor is None else view.from_cursor(cursor)
+    runs = service.store.page(identity.owner, _states(state), before, limit + 1)
+    following = view.to_cursor(runs[limit - 1]) if len(runs) > limit else None
+    return {"runs": [view.brief(service, run) for run in runs[:limit]], "next": following}
+
+
+def _states(text: str | None) -> list[State]:
+    try:
+        return [State(word) for word in text.split(",")] if text else []
+    except ValueError as error:
+        allowed = ", ".join(State)
+        raise ServiceError(400, "bad_parameter", f"state: {error}; allowed: {allowed}", pointer="state") from None
+
+
+def owned_run(run_id: str, service: ServiceOf, identity: Reader) -> Run:
+    """The run, when it belongs to who asks. Raises ServiceError 404 alike for no run and for somebody else's."""
+    return find(service, identity, run_id)
+
+
+OwnedRun = Annotated[Run, Depends(owned_run)]
+
+
+def find(service: Service, identity: Identity, run_id: str) -> Run:
+    """The run as it is now. Raises ServiceError 404."""
+    run = service.supervisor.current(run_id) or service.store.get(run_id)
+    if run is None or run.owner != identity.owner:
+        raise not_found(f"run {run_id[:40]!r}")
+    return run
+
+
+@router.get("/v1/runs/{run_id}")
+async def show(
+    request: Request,
+    run: OwnedRun,
+    service: ServiceOf,
+    identity: Reader,
+    wait: Annotated[float, Query(ge=0, le=MAX_WAIT)] = 0.0,
+) -> Response:
+    """The run. With ``wait``, the answer comes when its state has changed, or, when If-None-Match is sent, when
+    anything has; at most so many seconds later. A run that has ended is answered at once."""
+    known = request.headers.get("if-none-match")
+    first = await run_in_threadpool(view.snapshot, service, run)
+    latest, deadline = first, time.monotonic() + wait
+    with service.bell.listen(run.id) as listener:
+        while not (latest.state.final or service.bell.closed):
+            changed = latest.state is not first.state if known is None else latest.etag != known
+            left = deadline - time.monotonic()
+            if changed or left <= 0:
+                break
+            await listener.wait(left)
+            listener.clear()
+            latest = await run_in_threadpool(lambda: view.snapshot(service, find(service, identity, run.id)))
+    headers = {"ETag": latest.etag, "Cache-Control": "private, no-cache"}
+    if latest.etag == known:
+        return Response(status_code=304, headers=headers)
+    return Response(latest.body, 200, headers, "application/json")
+
+
+@router.post("/v1/runs/{run_id}:cancel", status_code=202)
+def cancel(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
+    """Stops a run: at its next step, or hard when it does not. Asking again changes nothing."""
+    run = find(service, identity, run_id)
+    try:
+        service.supervisor.cancel(run.id)
+    except Exception as error:
+        detail = f"the request could not be recorded: {str(error) or 'no answer in time'}".splitlines()[0]
+        raise ServiceError(503, "unavailable", detail, retryable=True) from error
+    return Response(view.snapshot(service, find(service, identity, run_id)).body, 202, media_type="application/json")

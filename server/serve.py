@@ -1,0 +1,106 @@
+"""The server as a process: one a folder of runs, its address in server.json, a clean end on SIGTERM."""
+
+import fcntl
+import json
+import os
+import signal
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+
+import uvicorn
+
+from . import durable
+from .app import build_app, opened
+from .service import Service
+from .settings import Settings
+
+ADDRESS_FILE = "server.json"
+_LOCK = "server.lock"
+_FAREWELL = 3
+"""s that open requests get when the server stops."""
+
+
+class ServeError(Exception):
+    """The server cannot start; the text is one line."""
+
+
+def serve(settings: Settings) -> None:
+    """Runs the server until SIGTERM or SIGINT. Raises ServeError, and what ``opened`` raises."""
+    settings.runs.mkdir(parents=True, exist_ok=True)
+    with _only_one(settings.runs), _listening(settings) as listener, opened(settings) as service:
+        for number in (signal.SIGTERM, signal.SIGINT):
+            signal.signal(number, _leave)
+        try:
+            _Server(service).run(sockets=[listener])
+        finally:
+            (settings.runs / ADDRESS_FILE).unlink(missing_ok=True)
+
+
+class _Server(uvicorn.Server):
+    """Tells its address once it answers, and ends open streams before it waits for open requests."""
+
+    def __init__(self, service: Service) -> None:
+        self._service = service
+        super().__init__(
+            uvicorn.Config(
+                build_app(service),
+                log_level="warning",
+                access_log=False,
+                server_header=False,
+                timeout_keep_alive=30,
+                timeout_graceful_shutdown=_FAREWELL,
+            )
+        )
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        if sockets and self.started:
+            announce(self._service, sockets[0])
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        self._service.bell.close()
+        await super().shutdown(sockets)
+
+
+def announce(service: Service, listener: socket.socket) -> None:
+    """Writes server.json and prints one line."""
+    host, port = listener.getsockname()[:2]
+    url = f"http://{f'[{host}]' if ':' in host else host}:{port}"
+    endpoint = service.telemetry.local_endpoint if service.telemetry else None
+    address = {"url": url, "zenoh": endpoint, "pid": os.getpid(), "auth": service.settings.auth}
+    durable.write(service.settings.runs / ADDRESS_FILE, json.dumps(address, indent=2).encode() + b"\n")
+    slots = service.settings.slots
+    print(
+        f"conoid.server: {url}  zenoh {endpoint or 'off'}  {slots} slots  runs in {service.settings.runs}", flush=True
+    )
+
+
+def _leave(_signal: int, _frame: FrameType | None) -> None:
+    """uvicorn raises the signal again once it has shut down; then this ends the process with code 0."""
+    raise SystemExit(0)
+
+
+@contextmanager
+def _only_one(runs: Path) -> Iterator[None]:
+    """Two servers on one folder would start every run twice."""
+    with open(runs / _LOCK, "w") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise ServeError(f"--runs {runs}: another server uses this folder") from None
+        yield
+
+
+@contextmanager
+def _listening(settings: Settings) -> Iterator[socket.socket]:
+    family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
+    with socket.socket(family) as listener:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            listener.bind((settings.host, settings.port))
+        except OSError as error:
+            raise ServeError(f"--host {settings.host} --port {settings.port}: {error.strerror}") from None
+        yield listener

@@ -1,0 +1,33 @@
+"""What the routes work with, wired once in ``app``."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from fastapi import Depends, Request
+
+from .bell import Bell
+from .settings import Settings
+from .store import Store
+from .submission import Desk
+from .supervisor import Supervisor
+from .telemetry import Telemetry
+
+
+@dataclass(frozen=True)
+class Service:
+    """The parts of a server that is up."""
+
+    settings: Settings
+    store: Store
+    bell: Bell
+    telemetry: Telemetry | None
+    supervisor: Supervisor
+    desk: Desk
+
+
+def _service(request: Request) -> Service:
+    service: Service = request.app.state.service
+    return service
+
+
+ServiceOf = Annotated[Service, Depends(_service)]

@@ -1,0 +1,106 @@
+"""What a site decides: where runs live, how many ranks at a time, how workers are started, the caps."""
+
+import ipaddress
+import os
+import shlex
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+
+WORKER = (sys.executable, "-m", "mpi4py", "-m", "conoid.worker")
+"""The worker's command after ``mpiexec -n N``; ``-m mpi4py`` makes one rank's exception end all ranks."""
+
+
+class SettingsError(ValueError):
+    """A setting cannot be used; the text names it, its value and what is allowed."""
+
+
+def usable_cores() -> int:
+    """Cores that this process may run on, which can be fewer than the machine has."""
+    return len(os.sched_getaffinity(0))
+
+
+def memory_bytes() -> int:
+    """Physical memory of this machine, bytes."""
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+
+
+@dataclass(frozen=True)
+class Caps:
+    """The largest case that is accepted, by its estimate; None: no cap."""
+
+    elements: int | None = 100_000_000
+    steps: int | None = 100_000_000
+    memory: int | None = field(default_factory=memory_bytes)
+    """Bytes, of all ranks together."""
+    core_seconds: float | None = None
+    wall_time: float | None = None
+    """s; a case that asks for less is stopped at its own ``run.max_wall_time``."""
+    queued: int = 1000
+    """Open runs of one owner."""
+    free_disk: int = 1 << 30
+    """Bytes that must be free under the runs' folder before a run is accepted."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Everything that ``python -m conoid.server`` can be told. Raises SettingsError when it does not fit together."""
+
+    runs: Path
+    host: str = "127.0.0.1"
+    port: int = 8750
+    """0: any free port."""
+    zenoh_port: int | None = 7447
+    """0: any free port; None: no Zenoh router, clients watch over SSE."""
+    slots: int = field(default_factory=usable_cores)
+    """Ranks that may run at a time, of all runs together."""
+    auth: bool = True
+    web: Path | None = None
+    """Folder of the live page, served at ``/``."""
+    database: str = ""
+    """SQLAlchemy URL; empty: SQLite in the runs' folder."""
+    mpiexec: str = ""
+    """A site's own launcher; empty: the one beside this Python, then the one in PATH."""
+    worker: tuple[str, ...] = WORKER
+    grace: float = 30.0
+    """s between the request to stop and the kill."""
+    caps: Caps = field(default_factory=Caps)
+
+    def __post_init__(self) -> None:
+        if not self.auth and not loopback(self.host):
+            raise SettingsError(f"--no-auth with --host {self.host}: allowed only on a loopback address")
+        if self.slots < 1:
+            raise SettingsError(f"--slots {self.slots}: at least one rank must be able to run")
+        if self.grace <= 0:
+            raise SettingsError(f"--grace {self.grace}: a number of seconds above 0")
+        for name, port in (("--port", self.port), ("--zenoh-port", self.zenoh_port or 0)):
+            if not 0 <= port <= 65535:
+                raise SettingsError(f"{name} {port}: 0 (any free port) to 65535")
+        if self.web is not None and not self.web.is_dir():
+            raise SettingsError(f"--web {self.web}: there is no such folder")
+
+    @property
+    def database_url(self) -> str:
+        """The URL in use."""
+        return self.database or f"sqlite:///{self.runs / 'server.sqlite'}"
+
+
+def loopback(host: str) -> bool:
+    """True when ``host`` can be reached from this machine only."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def command(text: str) -> tuple[str, ...]:
+    """A command line as a list of arguments; no shell is involved. Raises SettingsError."""
+    try:
+        words = tuple(shlex.split(text))
+    except ValueError as error:
+        raise SettingsError(f"--worker {text!r}: {error}") from None
+    if not words:
+        raise SettingsError("--worker '': a command is needed")
+    return words

@@ -1,0 +1,207 @@
+"""The server's tables: runs, idempotency keys, tokens. SQLite by default, PostgreSQL by URL.
+
+Runs and keys are an index over the runs' folders and can be rebuilt from them; tokens live here only.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+from typing import Any
+
+import sqlalchemy as sa
+from sqlalchemy.exc import SQLAlchemyError
+
+from conoid.cases.run import Cause, State
+
+from .lifecycle import Run
+
+_meta = sa.MetaData()
+_runs = sa.Table(
+    "runs",
+    _meta,
+    sa.Column("id", sa.String(22), primary_key=True),
+    sa.Column("owner", sa.String(64), nullable=False),
+    sa.Column("name", sa.String(64), nullable=False),
+    sa.Column("ranks", sa.Integer, nullable=False),
+    sa.Column("submitted", sa.Float(53), nullable=False),
+    sa.Column("state", sa.String(16), nullable=False),
+    sa.Column("cause", sa.String(16)),
+    sa.Column("message", sa.Text, nullable=False),
+    sa.Column("started", sa.Float(53), nullable=False),
+    sa.Column("finished", sa.Float(53), nullable=False),
+    sa.Column("stopping_for", sa.String(16)),
+    sa.Index("runs_of_owner", "owner", "id"),
+    sa.Index("runs_by_state", "state"),
+)
+_keys = sa.Table(
+    "idempotency",
+    _meta,
+    sa.Column("owner", sa.String(64), nullable=False),
+    sa.Column("key", sa.String(255), nullable=False),
+    sa.Column("run", sa.String(22), nullable=False),
+    sa.UniqueConstraint("owner", "key"),
+)
+_tokens = sa.Table(
+    "tokens",
+    _meta,
+    sa.Column("id", sa.String(16), primary_key=True),
+    sa.Column("owner", sa.String(64), nullable=False),
+    sa.Column("sha256", sa.String(64), nullable=False),
+    sa.Column("scopes", sa.String(64), nullable=False),
+    sa.Column("created", sa.Float(53), nullable=False),
+    sa.Column("revoked", sa.Boolean, nullable=False),
+)
+_OPEN = [state.value for state in State if not state.final]
+
+
+@dataclass(frozen=True)
+class Token:
+    """A token as it is kept: never the secret, only its hash."""
+
+    id: str
+    owner: str
+    sha256: str
+    scopes: frozenset[str]
+    created: float
+    """Unix s."""
+
+
+class StoreError(Exception):
+    """The database cannot be used; the text is one line."""
+
+
+class Store:
+    """All methods may be called from any thread; each is one transaction and raises SQLAlchemyError when it fails."""
+
+    def __init__(self, url: str) -> None:
+        """Opens the database and makes its tables where they are missing. Raises StoreError."""
+        try:
+            self._engine = _engine(url)
+            _meta.create_all(self._engine)
+        except (SQLAlchemyError, ImportError) as error:
+            reason = str(error).splitlines()[0]
+            raise StoreError(f"the database cannot be opened: {reason}") from None
+
+    def close(self) -> None:
+        """Closes every connection."""
+        self._engine.dispose()
+
+    # Runs -------------------------------------------------------------------------------------------------------------
+
+    def add(self, run: Run, key: str | None) -> None:
+        """A run, and the idempotency key that made it; adding it again changes nothing but its state."""
+        known = sa.select(_keys.c.run).where(_keys.c.owner == run.owner, _keys.c.key == key)
+        with self._engine.begin() as connection:
+            self._put(connection, run)
+            if key is not None and connection.execute(known).first() is None:
+                connection.execute(sa.insert(_keys).values(owner=run.owner, key=key, run=run.id))
+
+    def save(self, run: Run) -> None:
+        """The run as it is now."""
+        with self._engine.begin() as connection:
+            self._put(connection, run)
+
+    @staticmethod
+    def _put(connection: sa.Connection, run: Run) -> None:
+        values = {name: str(value) if isinstance(value, StrEnum) else value for name, value in asdict(run).items()}
+        if connection.execute(sa.update(_runs).where(_runs.c.id == run.id).values(values)).rowcount == 0:
+            connection.execute(sa.insert(_runs).values(values))
+
+    def get(self, run_id: str) -> Run | None:
+        """The run, whoever owns it."""
+        with self._engine.connect() as connection:
+            row = connection.execute(sa.select(_runs).where(_runs.c.id == run_id)).mappings().first()
+        return None if row is None else _run(row)
+
+    def page(self, owner: str, states: Sequence[State], before: str | None, limit: int) -> list[Run]:
+        """At most ``limit`` runs of ``owner``, newest first, older than the run ``before``; all states when none."""
+        query = sa.select(_runs).where(_runs.c.owner == owner).order_by(_runs.c.id.desc()).limit(limit)
+        if states:
+            query = query.where(_runs.c.state.in_([state.value for state in states]))
+        if before is not None:
+            query = query.where(_runs.c.id < before)
+        with self._engine.connect() as connection:
+            return [_run(row) for row in connection.execute(query).mappings()]
+
+    def open_runs(self, owner: str) -> int:
+        """How many runs of ``owner`` have not ended."""
+        query = sa.select(sa.func.count()).select_from(_runs).where(_runs.c.owner == owner, _runs.c.state.in_(_OPEN))
+        with self._engine.connect() as connection:
+            return connection.execute(query).scalar_one()
+
+    def ended(self) -> set[str]:
+        """The ids of all runs that are known to have ended."""
+        with self._engine.connect() as connection:
+            return set(connection.execute(sa.select(_runs.c.id).where(_runs.c.state.not_in(_OPEN))).scalars())
+
+    def forget_all_but(self, known: Iterable[str]) -> None:
+        """Drops the runs whose folders are gone, and their keys."""
+        with self._engine.begin() as connection:
+            gone = set(connection.execute(sa.select(_runs.c.id)).scalars()) - set(known)
+            for run_id in gone:
+                connection.execute(sa.delete(_runs).where(_runs.c.id == run_id))
+                connection.execute(sa.delete(_keys).where(_keys.c.run == run_id))
+
+    def count_by_state(self) -> Mapping[State, int]:
+        """How many runs are in each state; no entry for none."""
+        query = sa.select(_runs.c.state, sa.func.count()).group_by(_runs.c.state)
+        with self._engine.connect() as connection:
+            return {State(state): number for state, number in connection.execute(query).all()}
+
+    def run_of_key(self, owner: str, key: str) -> str | None:
+        """The run that ``owner`` made with this idempotency key."""
+        query = sa.select(_keys.c.run).where(_keys.c.owner == owner, _keys.c.key == key)
+        with self._engine.connect() as connection:
+            return connection.execute(query).scalar_one_or_none()
+
+    # Tokens -----------------------------------------------------------------------------------------------------------
+
+    def add_token(self, token: Token) -> None:
+        """A new token."""
+        values = {**asdict(token), "scopes": " ".join(sorted(token.scopes)), "revoked": False}
+        with self._engine.begin() as connection:
+            connection.execute(sa.insert(_tokens).values(values))
+
+    def token(self, token_id: str) -> Token | None:
+        """The token, unless it was revoked."""
+        query = sa.select(_tokens).where(_tokens.c.id == token_id, _tokens.c.revoked.is_(False))
+        with self._engine.connect() as connection:
+            row = connection.execute(query).mappings().first()
+        return None if row is None else _token(row)
+
+    def tokens(self) -> list[Token]:
+        """Every token that is not revoked, oldest first."""
+        query = sa.select(_tokens).where(_tokens.c.revoked.is_(False)).order_by(_tokens.c.created, _tokens.c.id)
+        with self._engine.connect() as connection:
+            return [_token(row) for row in connection.execute(query).mappings()]
+
+    def revoke(self, token_id: str) -> bool:
+        """Ends a token for good; False when there is none to end."""
+        query = sa.update(_tokens).where(_tokens.c.id == token_id, _tokens.c.revoked.is_(False)).values(revoked=True)
+        with self._engine.begin() as connection:
+            return connection.execute(query).rowcount == 1
+
+
+def _run(row: sa.RowMapping) -> Run:
+    values: dict[str, Any] = dict(row)
+    values["state"] = State(row["state"])
+    for name in ("cause", "stopping_for"):
+        values[name] = Cause(row[name]) if row[name] else None
+    return Run(**values)
+
+
+def _token(row: sa.RowMapping) -> Token:
+    return Token(row["id"], row["owner"], row["sha256"], frozenset(row["scopes"].split()), row["created"])
+
+
+def _engine(url: str) -> sa.Engine:
+    engine = sa.create_engine(url, pool_pre_ping=not url.startswith("sqlite"))
+    if engine.dialect.name == "sqlite":
+        sa.event.listen(engine, "connect", _tune)
+    return engine
+
+
+def _tune(connection: Any, _record: object) -> None:
+    """WAL lets readers go on while one writes."""
+    for pragma in ("journal_mode=wal", "busy_timeout=10000"):
+        connection.execute(f"pragma {pragma}").close()

@@ -1,0 +1,133 @@
+"""From a body to an accepted run: read, check, estimate, write to disk, and only then say yes."""
+
+import hashlib
+import re
+import threading
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from sqlalchemy.exc import SQLAlchemyError
+
+from conoid.cases.estimate import Estimate, estimate
+from conoid.cases.load import CaseError, Problem, parse_json, parse_toml, resolved_json
+from conoid.cases.schema import Case
+
+from . import folder, limits
+from .errors import ServiceError, invalid_case
+from .folder import Submission
+from .lifecycle import Run
+from .settings import Settings
+from .store import Store
+from .supervisor import Supervisor
+
+KINDS = {"application/toml": "case.toml", "application/json": "case.json"}
+"""Content types of a case, and the names under which they are kept."""
+_KEY = re.compile(r"[\x21-\x7e]{1,255}")
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A case that can be run here."""
+
+    case: Case
+    estimate: Estimate
+
+
+class Desk:
+    """Where cases are handed in. Methods may be called from any thread."""
+
+    def __init__(self, settings: Settings, store: Store, supervisor: Supervisor) -> None:
+        """One desk a server: its lock is what makes two requests with one key one run."""
+        self._settings, self._store, self._supervisor = settings, store, supervisor
+        self._lock = threading.Lock()
+
+    def read(self, body: bytes, content_type: str) -> Reading:
+        """The case in ``body``. Raises CaseError with every problem, ServiceError 415."""
+        text = _text(body)
+        case = parse_json(text) if _file_name(content_type) == "case.json" else parse_toml(text)
+        if problems := limits.check(case, self._settings):
+            raise CaseError(problems)
+        expected = estimate(case)
+        if problems := limits.check_size(expected, self._settings.caps):
+            raise CaseError(problems)
+        return Reading(case, expected)
+
+    def submit(self, owner: str, body: bytes, content_type: str, key: str | None) -> dict[str, Any]:
+        """Accepts a run and returns its receipt: the same one for the same key and body.
+
+        Raises ServiceError. The case and the first line of the journal are on disk when this returns.
+        """
+        if key is not None and not _KEY.fullmatch(key):
+            raise ServiceError(
+                400, "bad_key", f"Idempotency-Key {key[:80]!r}: 1 to 255 visible ASCII characters",
+                pointer="Idempotency-Key",
+            )  # fmt: skip
+        digest = hashlib.sha256(_file_name(content_type).encode() + b"\0" + body).hexdigest()
+        if earlier := self._earlier(owner, key, digest):
+            return earlier
+        try:
+            reading = self.read(body, content_type)
+        except CaseError as error:
+            raise invalid_case(error.problems) from None
+        with self._lock:
+            return self._earlier(owner, key, digest) or self._accept(owner, body, content_type, key, digest, reading)
+
+    def _earlier(self, owner: str, key: str | None, digest: str) -> dict[str, Any] | None:
+        run_id = self._store.run_of_key(owner, key) if key is not None else None
+        if run_id is None:
+            return None
+        try:
+            made = folder.submission(self._settings.runs / run_id)
+        except OSError:
+            raise ServiceError(410, "gone", f"the run of Idempotency-Key {key!r} has been removed") from None
+        if made.body_sha256 != digest:
+            detail = f"Idempotency-Key {key!r} was used for another case"
+            raise ServiceError(422, "key_reused", detail, pointer="Idempotency-Key", hint="use a new key for a new run")
+        return receipt(made)
+
+    def _accept(
+        self, owner: str, body: bytes, content_type: str, key: str | None, digest: str, reading: Reading
+    ) -> dict[str, Any]:
+        caps, case = self._settings.caps, reading.case
+        limits.check_room(self._settings.runs, self._store.open_runs(owner), caps)
+        run_id, now = folder.new_id()
+        made = Submission(
+            id=run_id, owner=owner, name=case.name, title=case.title, ranks=case.run.ranks, submitted=now,
+            case_file=_file_name(content_type), body_sha256=digest, idempotency_key=key,
+            wall_time=limits.wall_time(case, caps), estimate=asdict(reading.estimate),
+        )  # fmt: skip
+        run = Run(run_id, owner, case.name, case.run.ranks, now)
+        try:
+            folder.create(self._settings.runs, made, body, resolved_json(case))
+            self._store.add(run, key)
+        except (OSError, SQLAlchemyError) as error:
+            folder.discard(self._settings.runs, run_id)
+            detail = f"the run cannot be kept: {error}".splitlines()[0]
+            raise ServiceError(507, "storage", detail, retryable=True) from error
+        self._supervisor.admit(run)
+        return receipt(made)
+
+
+def receipt(made: Submission) -> dict[str, Any]:
+    """What the submitter is told; it does not depend on when it is asked."""
+    return {
+        "id": made.id, "owner": made.owner, "name": made.name, "title": made.title, "state": "accepted",
+        "ranks": made.ranks, "submitted": made.submitted, "estimate": made.estimate, "url": f"/v1/runs/{made.id}",
+    }  # fmt: skip
+
+
+def _file_name(content_type: str) -> str:
+    kind = content_type.partition(";")[0].strip().lower()
+    if kind not in KINDS:
+        raise ServiceError(
+            415, "unsupported_type", f"Content-Type {kind[:80]!r}: a case is sent as {' or '.join(KINDS)}",
+            pointer="Content-Type",
+        )  # fmt: skip
+    return KINDS[kind]
+
+
+def _text(body: bytes) -> str:
+    try:
+        return body.decode()
+    except UnicodeDecodeError as error:
+        raise CaseError([Problem("", "", f"the body is not UTF-8 text (at byte {error.start})")]) from None

@@ -1,0 +1,328 @@
+"""Performs what ``lifecycle`` decides. One thread owns every open run, so that no two events ever meet."""
+
+import logging
+import queue
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+from sqlalchemy.exc import SQLAlchemyError
+
+from conoid.cases import layout
+from conoid.cases.messages import Progress, Status
+from conoid.cases.run import State
+
+from . import folder, journal
+from .launch import Job, Launcher, LaunchError, Worker
+from .lifecycle import (
+    Action,
+    Admitted,
+    Adopt,
+    CancelAsked,
+    Event,
+    Found,
+    Granted,
+    Journal,
+    Kill,
+    Launch,
+    LaunchFailed,
+    Run,
+    Stop,
+    WriteOutcome,
+    advance,
+)
+from .settings import Settings
+from .store import Store
+from .telemetry import Telemetry, TelemetryError
+from .watch import Watch
+
+_log = logging.getLogger("conoid.server")
+_LOOK = 0.02
+"""s between two looks at the running workers: what a live event waits at most before it is passed on."""
+_TIDY = 5.0
+"""s between two looks at the tokens."""
+_AGAIN = 1.0
+"""s after which an action that failed (a full disk, a locked database) is tried again."""
+_ANSWER = 10.0
+
+
+@dataclass(frozen=True)
+class _Cancel:
+    run: str
+    done: Future[None]
+
+
+class Supervisor:
+    """Its public methods may be called from any thread."""
+
+    def __init__(
+        self,
+        settings: Settings,
+        store: Store,
+        launcher: Launcher,
+        telemetry: Telemetry | None,
+        ring: Callable[[str], None],
+    ) -> None:
+        """``ring`` is called with a run's id when there is news of it."""
+        self._settings, self._store, self._launcher = settings, store, launcher
+        self._telemetry, self._ring = telemetry, ring
+        self._inbox: queue.SimpleQueue[_Cancel | None] = queue.SimpleQueue()
+        self._open: dict[str, Run] = {}
+        self._watches: dict[str, Watch] = {}
+        self._found: dict[str, Worker] = {}
+        self._hold: dict[str, float] = {}
+        self._unsaved: set[str] = set()
+        self._left: set[Path] = set()
+        self._thread = threading.Thread(target=self._work, name="supervisor", daemon=True)
+        self._leaving = False
+        self._tidied = time.monotonic()
+
+    # From any thread --------------------------------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Takes up what an earlier server left, then begins to work. Raises OSError, SQLAlchemyError."""
+        self._take_up()
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stops supervising. Workers go on; the next server adopts them."""
+        self._leaving = True
+        self._inbox.put(None)
+        self._thread.join(_ANSWER)
+
+    @property
+    def alive(self) -> bool:
+        """False when runs are not looked after any more."""
+        return self._thread.is_alive()
+
+    def admit(self, run: Run) -> None:
+        """A new run, which is on disk and in the store."""
+        self._open[run.id] = run
+        self._inbox.put(None)
+
+    def cancel(self, run_id: str) -> None:
+        """Returns when the request is recorded. Raises TimeoutError, or what kept it from being recorded."""
+        asked = _Cancel(run_id, Future())
+        self._inbox.put(asked)
+        asked.done.result(_ANSWER)
+
+    def current(self, run_id: str) -> Run | None:
+        """The run as it is now; None when it has ended or is not known."""
+        return self._open.get(run_id)
+
+    def is_open(self, run_id: str) -> bool:
+        """False once the run has ended and its last line stands in the journal."""
+        run = self._open.get(run_id)
+        return run is not None and not run.state.final
+
+    def progress(self, run_id: str) -> Progress | None:
+        """The newest progress of a worker that lives."""
+        watch = self._watches.get(run_id)
+        return None if watch is None else watch.progress
+
+    def slots_used(self) -> int:
+        """Ranks that run now."""
+        return sum(run.ranks for run_id in tuple(self._watches) if (run := self._open.get(run_id)))
+
+    def reason(self, run_id: str) -> str:
+        """What a queued run waits for; empty for any other."""
+        waiting = self._in_state(State.QUEUED)
+        place = next((place for place, run in enumerate(waiting) if run.id == run_id), None)
+        if place is None:
+            return ""
+        if place:
+            return f"waiting for {place} earlier run{'s' if place > 1 else ''}"
+        free = max(0, self._settings.slots - self.slots_used())
+        return f"waiting for {waiting[0].ranks} of {self._settings.slots} slots; {free} free"
+
+    def _in_state(self, state: State) -> list[Run]:
+        """The open runs in ``state``, first come first."""
+        return sorted((run for run in tuple(self._open.values()) if run.state is state), key=lambda run: run.id)
+
+    # The supervisor's own thread --------------------------------------------------------------------------------------
+
+    def _work(self) -> None:
+        while not self._leaving:
+            self._answer()
+            for run_id in tuple(self._watches):
+                self._attend(run_id)
+            for run in self._in_state(State.ACCEPTED):
+                if not self._held(run.id):
+                    self._apply(run.id, Admitted())
+            self._grant()
+            if time.monotonic() - self._tidied > _TIDY:
+                self._tidy()
+
+    def _answer(self) -> None:
+        """Takes what was asked; waits for it no longer than until the next look."""
+        try:
+            asked = self._inbox.get(timeout=_LOOK if self._watches else _AGAIN if self._hold else _TIDY)
+        except queue.Empty:
+            return
+        if asked is not None:
+            failed = self._apply(asked.run, CancelAsked())
+            asked.done.set_exception(failed) if failed else asked.done.set_result(None)
+
+    def _attend(self, run_id: str) -> None:
+        watch = self._watches[run_id]
+        if self._held(run_id):
+            return
+        try:
+            for event in watch.look(time.time()):
+                self._apply(run_id, event)
+        except Exception as error:
+            self._put_off(run_id, error)
+        if watch.news:
+            self._ring(run_id)
+
+    def _grant(self) -> None:
+        """Starts the first of the queue while it fits: a large run is not overtaken by small ones for ever."""
+        for run in self._in_state(State.QUEUED):
+            if self.slots_used() + run.ranks > self._settings.slots or self._held(run.id):
+                return
+            self._apply(run.id, Granted())
+
+    def _apply(self, run_id: str, event: Event) -> Exception | None:
+        """One step of a run; what kept it from being made, if anything.
+
+        A step that fails (a full disk) changes nothing and comes up again by itself: a run in the queue gets its turn
+        again, a worker's end is seen again. What the first try did write is found, so that nothing is done twice.
+        """
+        before = self._open.get(run_id)
+        if before is None:
+            return None
+        after, actions = advance(before, event, time.time())
+        try:
+            for action in actions:
+                self._perform(after, action)
+        except LaunchError as error:
+            self._settle(after)
+            return self._apply(run_id, LaunchFailed(str(error)))
+        except Exception as error:
+            return self._put_off(run_id, error)
+        if after != before:
+            self._settle(after)
+        return None
+
+    def _settle(self, run: Run) -> None:
+        """The step is made: memory first, then the database, then those who wait for news."""
+        self._open[run.id] = run
+        if run.state.final:
+            self._watches.pop(run.id, None)
+        try:
+            self._store.save(run)
+        except SQLAlchemyError as error:
+            self._unsaved.add(run.id)
+            _log.error("run %s is not in the database yet: %s", run.id, error)
+        else:
+            self._unsaved.discard(run.id)
+            if run.state.final:
+                del self._open[run.id]
+        self._ring(run.id)
+
+    def _put_off(self, run_id: str, error: Exception) -> Exception:
+        _log.error("run %s: tried again in %g s", run_id, _AGAIN, exc_info=error)
+        self._hold[run_id] = time.monotonic() + _AGAIN
+        return error
+
+    def _held(self, run_id: str) -> bool:
+        if self._hold.get(run_id, 0.0) > time.monotonic():
+            return True
+        self._hold.pop(run_id, None)
+        return False
+
+    def _perform(self, run: Run, action: Action) -> None:
+        path = self._settings.runs / run.id
+        match action:
+            case Journal(state, cause, message):
+                self._tell(run, Status(run=run.id, wall=time.time(), state=state, cause=cause, message=message))
+            case WriteOutcome(outcome):
+                folder.write_outcome(path, outcome)
+            case Launch():
+                self._watches[run.id] = self._launch(run, path)
+            case Adopt():
+                self._watches[run.id] = self._watch(run, path, self._found.pop(run.id))
+                if run.state is State.STOPPING:
+                    self._watches[run.id].stop(self._settings.grace)
+            case Stop():
+                self._watches[run.id].stop(self._settings.grace)
+            case Kill():
+                self._watches[run.id].worker.kill()
+
+    def _tell(self, run: Run, status: Status) -> None:
+        written = journal.append(self._settings.runs / run.id / layout.JOURNAL, status)
+        if self._telemetry is not None:
+            self._telemetry.publish(run.owner, written)
+
+    def _launch(self, run: Run, path: Path) -> Watch:
+        access = None if self._telemetry is None else self._telemetry.worker(run.owner, run.id)
+        try:
+            (path / layout.OUTCOME).unlink(missing_ok=True)
+            case = path / folder.submission(path).case_file
+            worker = self._launcher.start(Job(run.id, run.ranks, case, path, access))
+            return self._watch(run, path, worker)
+        except (OSError, msgspec.MsgspecError) as error:
+            raise LaunchError(str(error)) from error
+
+    def _watch(self, run: Run, path: Path, worker: Worker) -> Watch:
+        """The worker itself ends at ``run.max_wall_time``; the server steps in a grace later."""
+        allowed = folder.submission(path).wall_time
+        deadline = None if allowed is None else run.started + allowed + self._settings.grace
+        return Watch(path, worker, deadline)
+
+    # Housekeeping -----------------------------------------------------------------------------------------------------
+
+    def _tidy(self) -> None:
+        """Does again what failed before, and lets the router know the tokens as they are."""
+        self._tidied = time.monotonic()
+        for path in tuple(self._left):
+            self._take_up_run(path)
+        for run_id in tuple(self._unsaved):
+            self._settle(self._open[run_id])
+        if self._telemetry is not None:
+            try:
+                self._telemetry.follow(self._store.tokens())
+            except (SQLAlchemyError, TelemetryError) as error:
+                _log.error("the router does not know the newest tokens: %s", error)
+
+    def _take_up(self) -> None:
+        """Makes memory and database agree with the runs' folders, and goes on with what an earlier server left."""
+        ended, known = self._store.ended(), []
+        for path in folder.scan(self._settings.runs):
+            known.append(path.name)
+            if path.name in ended:
+                continue
+            self._take_up_run(path)
+        self._store.forget_all_but(known)
+
+    def _take_up_run(self, path: Path) -> None:
+        """What fails is logged and comes up again with the next tidying."""
+        self._left.discard(path)
+        try:
+            failed = self._resume(path)
+        except (OSError, ValueError, SQLAlchemyError) as error:
+            failed = error
+            _log.error("run %s cannot be taken up: %s", path.name, error)
+        if failed is not None:
+            self._left.add(path)
+
+    def _resume(self, path: Path) -> Exception | None:
+        run, before = folder.run(path), self._store.get(path.name)
+        if before is not None and before.stopping_for is not None and run.state in {State.STARTING, State.RUNNING}:
+            run = replace(run, state=State.STOPPING, stopping_for=before.stopping_for)
+        self._store.add(run, folder.submission(path).idempotency_key)
+        if run.state.final:
+            return None
+        trace = self._launcher.find(run.id, path)
+        if trace.worker is not None:
+            self._found[run.id] = trace.worker
+        worker: Literal["none", "alive", "gone"] = (
+            "alive" if trace.worker is not None else "gone" if trace.launched else "none"
+        )
+        self._open[run.id] = run
+        return self._apply(run.id, Found(worker, folder.outcome(path), trace.rebooted))

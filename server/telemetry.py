@@ -1,0 +1,219 @@
+"""The Zenoh router inside the server: workers publish to it, native clients subscribe to it. The only zenoh module.
+
+Every token is a Zenoh user of its own and hears its owner's runs; every owner has one more user for his workers, who
+may publish there. Zenoh reads users and rules once, so the session is closed and opened again when the tokens change;
+its clients connect again by themselves and refill what they missed from the journal.
+"""
+
+import hashlib
+import hmac
+import json
+import logging
+import secrets
+import socket
+import threading
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import zenoh
+
+from conoid.cases import keys
+from conoid.cases.messages import Status, to_msgpack
+
+from . import durable
+from .launch import Access
+from .settings import loopback
+from .store import Token
+
+_log = logging.getLogger("conoid.server")
+_SECRET, _USERS = "server.secret", ".zenoh-users"
+_HEARS = ["put", "delete", "reply", "declare_queryable", "liveliness_token"]
+_ASKS = ["declare_subscriber", "query", "liveliness_query", "declare_liveliness_subscriber"]
+_ANSWERS = ["query", "declare_subscriber"]
+
+
+class TelemetryError(Exception):
+    """The router cannot be opened; the text is one line."""
+
+
+@dataclass(frozen=True)
+class Reader:
+    """What a client needs to subscribe; ``user`` is empty when the router asks for none."""
+
+    port: int
+    prefix: str
+    user: str
+    password: str
+
+
+class Telemetry:
+    """An open router session. Methods may be called from any thread."""
+
+    def __init__(self, runs: Path, host: str, port: int, tokens: Iterable[Token] | None) -> None:
+        """``tokens`` is None for a router without access control. Raises TelemetryError."""
+        self._runs, self._host = runs, host
+        self.port = port or _free_port(host)
+        self._secret = _read_secret(runs)
+        self._lock = threading.Lock()
+        self._tokens = None if tokens is None else frozenset((token.id, token.owner) for token in tokens)
+        self._session: zenoh.Session | None = self._open()
+
+    @property
+    def local_endpoint(self) -> str:
+        """Where the workers of this machine connect."""
+        host = self._host if loopback(self._host) else _local(self._host)
+        return f"tcp/{_bracketed(host)}:{self.port}"
+
+    def worker(self, owner: str, run: str) -> Access:
+        """The credentials of a worker."""
+        prefix = keys.run_prefix(owner, run)
+        if self._tokens is None:
+            return Access(self.local_endpoint, prefix)
+        user = _worker_user(owner)
+        return Access(self.local_endpoint, prefix, user, self._password(user))
+
+    def reader(self, owner: str, token: Token | None) -> Reader:
+        """The credentials of a client; the router knows them when this returns. Raises TelemetryError."""
+        prefix = keys.owner_prefix(owner)
+        if self._tokens is None or token is None:
+            return Reader(self.port, prefix, "", "")
+        if (token.id, owner) not in self._tokens:
+            self.admit({*self._tokens, (token.id, owner)})
+        return Reader(self.port, prefix, token.id, self._password(token.id))
+
+    def follow(self, tokens: Iterable[Token]) -> None:
+        """Opens the router again when the tokens have changed."""
+        if self._tokens is not None:
+            self.admit({(token.id, token.owner) for token in tokens})
+
+    def admit(self, tokens: Iterable[tuple[str, str]]) -> None:
+        """Lets exactly these (token id, owner) in. Raises TelemetryError; the next call tries again."""
+        with self._lock:
+            wanted = frozenset(tokens)
+            if wanted == self._tokens and self._session is not None:
+                return
+            self._close()
+            self._tokens = wanted
+            self._session = self._open()
+
+    def publish(self, owner: str, status: Status) -> None:
+        """Tells the subscribers; the journal has it already, so a loss here loses nothing."""
+        key = keys.message_key(keys.run_prefix(owner, status.run), status.channel)
+        with self._lock:
+            try:
+                if self._session is not None:
+                    self._session.put(key, to_msgpack(status), congestion_control=zenoh.CongestionControl.DROP)
+            except zenoh.ZError as error:
+                _log.warning("a message of run %s was not published: %s", status.run, error)
+
+    def close(self) -> None:
+        """Closes the router."""
+        with self._lock:
+            self._close()
+
+    def _close(self) -> None:
+        if self._session is not None:
+            self._session.close()  # type: ignore[no-untyped-call]
+        self._session = None
+
+    def _password(self, user: str) -> str:
+        return hmac.new(self._secret, user.encode(), hashlib.sha256).hexdigest()
+
+    def _open(self) -> zenoh.Session:
+        users = self._runs / _USERS
+        config = zenoh.Config()
+        for key, value in self._config(users).items():
+            config.insert_json5(key, json.dumps(value))
+        try:
+            return zenoh.open(config)
+        except zenoh.ZError as error:
+            raise TelemetryError(f"the Zenoh router cannot listen on port {self.port}: {_reason(error)}") from None
+        finally:
+            users.unlink(missing_ok=True)
+
+    def _config(self, users: Path) -> dict[str, Any]:
+        config: dict[str, Any] = {
+            "mode": "router",
+            "listen/endpoints": [f"tcp/{_bracketed(self._host)}:{self.port}"],
+            "scouting/multicast/enabled": False,
+            "scouting/delay": 0,
+            "transport/shared_memory/enabled": False,
+        }
+        if self._tokens is not None:
+            owners = {owner for _, owner in self._tokens}
+            names = [*(token for token, _ in self._tokens), *map(_worker_user, owners)]
+            lines = "".join(f"{name}:{self._password(name)}\n" for name in names)
+            durable.write(users, lines.encode(), mode=0o600)
+            config["transport/auth/usrpwd"] = {
+                "user": "server", "password": secrets.token_hex(), "dictionary_file": str(users),
+            }  # fmt: skip
+            config["access_control"] = access_rules(self._tokens)
+        return config
+
+
+def access_rules(tokens: Iterable[tuple[str, str]]) -> dict[str, Any]:
+    """Zenoh's access control: each owner's tokens hear his keys, his workers' user publishes there, nothing else."""
+    readers: dict[str, list[str]] = {}
+    for token, owner in tokens:
+        readers.setdefault(owner, []).append(token)
+    rules, subjects, policies = [], [], []
+    for owner, users in readers.items():
+        below = keys.everything(keys.owner_prefix(owner))
+        # `**` does not match the `@adv` chunk that carries the history of an advanced publisher.
+        expressions = [below, f"{below}/@adv/**"]
+        for name, flow, messages in (
+            ("asks", "ingress", _ASKS),
+            ("hears", "egress", _HEARS),
+            ("tells", "ingress", _HEARS),
+            ("answers", "egress", _ANSWERS),
+        ):
+            rules.append(
+                {
+                    "id": f"{owner} {name}", "permission": "allow", "flows": [flow], "messages": messages,
+                    "key_exprs": expressions,
+                }
+            )  # fmt: skip
+        subjects += [
+            {"id": f"{owner} reads", "usernames": sorted(users)},
+            {"id": f"{owner} works", "usernames": [_worker_user(owner)]},
+        ]
+        policies += [
+            {"rules": [f"{owner} asks", f"{owner} hears"], "subjects": [f"{owner} reads"]},
+            {"rules": [f"{owner} tells", f"{owner} answers"], "subjects": [f"{owner} works"]},
+        ]
+    return {
+        "enabled": True, "default_permission": "deny", "rules": rules, "subjects": subjects, "policies": policies,
+    }  # fmt: skip
+
+
+def _worker_user(owner: str) -> str:
+    return f"worker.{owner}"
+
+
+def _read_secret(runs: Path) -> bytes:
+    """32 bytes from which all passwords follow, made at the first start."""
+    path = runs / _SECRET
+    if not path.exists():
+        durable.write(path, secrets.token_bytes(32), mode=0o600)
+    return path.read_bytes()
+
+
+def _free_port(host: str) -> int:
+    with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as probe:
+        probe.bind((host, 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+def _local(host: str) -> str:
+    return {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
+
+
+def _bracketed(host: str) -> str:
+    return f"[{host}]" if ":" in host else host
+
+
+def _reason(error: Exception) -> str:
+    return "address already in use" if "in use" in str(error) else str(error).partition(" at /")[0]

@@ -1,0 +1,80 @@
+"""A run as JSON. Times are Unix s unless their name says otherwise."""
+
+import base64
+import hashlib
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+
+from conoid.cases.outcome import Outcome
+from conoid.cases.run import State
+
+from . import folder
+from .errors import ServiceError
+from .lifecycle import Run
+from .service import Service
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """A run at one moment, as it is sent."""
+
+    state: State
+    body: bytes
+
+    @property
+    def etag(self) -> str:
+        """Changes when anything in the body does."""
+        return f'"{hashlib.sha256(self.body).hexdigest()[:32]}"'
+
+
+def snapshot(service: Service, run: Run) -> Snapshot:
+    """Everything about a run: where it is, how far, and once it has ended the whole outcome."""
+    path = service.settings.runs / run.id
+    made = folder.submission(path)
+    progress = service.supervisor.progress(run.id)
+    ended: Outcome | None = folder.outcome(path) if run.state.final else None
+    body = {
+        **brief(service, run),
+        "title": made.title,
+        "case_file": made.case_file,
+        "estimate": made.estimate,
+        "progress": progress,
+        "outcome": ended,
+    }
+    return Snapshot(run.state, msgspec.json.encode(body))
+
+
+def brief(service: Service, run: Run) -> dict[str, Any]:
+    """A run's line in a list."""
+    return {
+        "id": run.id,
+        "owner": run.owner,
+        "name": run.name,
+        "state": run.state,
+        "cause": run.cause,
+        "message": run.message,
+        "reason": service.supervisor.reason(run.id) if run.state is State.QUEUED else "",
+        "ranks": run.ranks,
+        "submitted": run.submitted,
+        "started": run.started or None,
+        "finished": run.finished or None,
+        "url": f"/v1/runs/{run.id}",
+    }
+
+
+def to_cursor(run: Run) -> str:
+    """Where the next page begins; an opaque word for the client."""
+    return base64.urlsafe_b64encode(run.id.encode()).decode().rstrip("=")
+
+
+def from_cursor(cursor: str) -> str:
+    """The id in a cursor. Raises ServiceError 400."""
+    try:
+        run_id = base64.urlsafe_b64decode(cursor + "=" * (-len(cursor) % 4)).decode("ascii")
+    except ValueError:
+        run_id = ""
+    if not folder.is_id(run_id):
+        raise ServiceError(400, "bad_parameter", f"cursor = {cursor[:80]!r}: send 'next' of a page", pointer="cursor")
+    return run_id

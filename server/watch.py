@@ -1,0 +1,71 @@
+"""One worker as the supervisor sees it: its journal, its process, its deadlines."""
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import msgspec
+
+from conoid.cases import layout
+from conoid.cases.messages import Progress, Status
+from conoid.cases.run import State
+
+from . import folder, journal
+from .launch import Worker
+from .lifecycle import Event, GraceOver, WallTimeOver, WorkerExited, WorkerRuns
+
+_FAREWELL = 10.0
+"""s that a worker may take to leave after it has said that it finished; its launcher may hang when a helper of it was
+killed from outside."""
+
+_progress = msgspec.json.Decoder(Progress)
+_status = msgspec.json.Decoder(Status)
+
+
+class Watch:
+    """Looks at a worker a few dozen times a second; says what happened to it as events."""
+
+    def __init__(self, run_folder: Path, worker: Worker, deadline: float | None) -> None:
+        """``deadline`` is the Unix time at which the run has used up its wall time."""
+        self.worker, self._folder = worker, run_folder
+        self._tail = journal.Tail(run_folder / layout.JOURNAL)
+        self._deadline, self._kill_at, self._runs = deadline, float("inf"), False
+        self.progress: Progress | None = None
+        self.news = False
+        """True when the last look found new lines in the journal."""
+
+    def look(self, now: float) -> Iterator[Event]:
+        """What has happened since the last look; ``now`` in Unix s. Raises OSError."""
+        exit_ = self.worker.exited()
+        if self._read(now):
+            yield WorkerRuns()
+        if exit_ is not None:
+            told = folder.outcome(self._folder)
+            yield WorkerExited(exit_.code, told, exit_.out_of_memory, exit_.last_words)
+        elif now >= self._kill_at:
+            self._kill_at = now + 1.0
+            self.worker.kill()
+            yield GraceOver()
+        elif self._deadline is not None and now >= self._deadline:
+            self._deadline = None
+            yield WallTimeOver()
+
+    def stop(self, grace: float) -> None:
+        """Asks the worker to stop, and sets the time at which it is killed."""
+        self.worker.stop()
+        self._kill_at = min(self._kill_at, time.time() + grace)
+
+    def _read(self, now: float) -> bool:
+        """Takes in the new lines; True when the worker has just said that it runs."""
+        runs, self.news = False, False
+        while lines := self._tail.read():
+            self.news = True
+            for line in lines:
+                if line.type == "progress":
+                    self.progress = _progress.decode(line.raw)
+                elif line.type == "status":
+                    runs |= _status.decode(line.raw).state == State.RUNNING
+                elif line.type == "finished":
+                    self._kill_at = min(self._kill_at, now + _FAREWELL)
+        fresh, self._runs = runs and not self._runs, self._runs or runs
+        return fresh
