@@ -13,8 +13,10 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Indices = npt.NDArray[np.int32]
+Tets = npt.NDArray[np.uint32]
+"""Unsigned: an index that cannot be negative needs no test for counting from the end."""
 
-CHUNK = 128
+CHUNK = 376
 """Elements a chunk."""
 
 # Rows of the element state. Rows up to WORK_VISCOUS exist in every block, the others where the scene needs them.
@@ -79,7 +81,7 @@ class Block:
 
     part: int
     n: int
-    tets: Indices
+    tets: Tets
     """(n, 4) local nodes."""
     id: Ints
     """(n,) global tet ids."""

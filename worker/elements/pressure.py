@@ -43,7 +43,7 @@ def recall_flux(w, s, n, dt):  # type: ignore[no-untyped-def]
         w[CHANGE + i] = s[_FLUX + i] * dt
 
 
-@njit("void(int64[:, ::1], float64[::1], float64[::1], int32[:, ::1], int64, float64)", cache=True)
+@njit("void(int64[:, ::1], float64[::1], float64[::1], uint32[:, ::1], int64, float64)", cache=True)
 def scatter_volumes(sums, w, weight, tets, n, dt):  # type: ignore[no-untyped-def]
     """Adds a quarter of each tet's volume change and of its volume to the sums of its nodes.
 
@@ -59,7 +59,7 @@ def scatter_volumes(sums, w, weight, tets, n, dt):  # type: ignore[no-untyped-de
             sums[a, 1] += np.int64(np.rint(volume * quanta))
 
 
-@njit("void(int64[:, ::1], float64[::1], float64[::1], int32[:, ::1], int64, float64)", cache=True)
+@njit("void(int64[:, ::1], float64[::1], float64[::1], uint32[:, ::1], int64, float64)", cache=True)
 def scatter_stabilised(sums, w, weight, tets, n, dt):  # type: ignore[no-untyped-def]
     """As ``scatter_volumes``, with the stabilising fluxes of ``stabilise`` added to the change of volume."""
     for i in range(n):
@@ -72,7 +72,7 @@ def scatter_stabilised(sums, w, weight, tets, n, dt):  # type: ignore[no-untyped
             sums[a, 1] += np.int64(np.rint(volume * quanta))
 
 
-@njit("void(float64[::1], float64[::1], float64[:, ::1], int32[:, ::1], int64)", cache=True)
+@njit("void(float64[::1], float64[::1], float64[:, ::1], uint32[:, ::1], int64)", cache=True)
 def gather_projection(w, pressure, projected, tets, n):  # type: ignore[no-untyped-def]
     """Nodal pressure differences and the mean projected gradient of ``n`` tets."""
     for i in range(n):
@@ -111,7 +111,7 @@ def stabilise(w, s, n, dt):  # type: ignore[no-untyped-def]
         w[_STABILISE + i] = -factor * (f1 + f2 + f3)
 
 
-@njit("void(float64[::1], float64[::1], int32[:, ::1], int64)", cache=True)
+@njit("void(float64[::1], float64[::1], uint32[:, ::1], int64)", cache=True)
 def gather_strains(w, strain, tets, n):  # type: ignore[no-untyped-def]
     """SEEN: mean volume strain of the step of the four nodes."""
     for i in range(n):
@@ -126,7 +126,7 @@ def own_strains(w, n, dt):  # type: ignore[no-untyped-def]
         w[CHANGE + i] = w[DILATATION + i] * dt * w[VOLUME_MID + i]
 
 
-@njit("void(float64[::1], float64[::1], int32[:, ::1], int64)", cache=True)
+@njit("void(float64[::1], float64[::1], uint32[:, ::1], int64)", cache=True)
 def pressure_fluxes(w, pressure, tets, n):  # type: ignore[no-untyped-def]
     """Rows after the nine forces: V grad p / 4 of the tet, N, for the projection."""
     for i in range(n):
@@ -138,7 +138,7 @@ def pressure_fluxes(w, pressure, tets, n):  # type: ignore[no-untyped-def]
             )
 
 
-@njit("void(int64[:, ::1], int64[::1], int32[:, ::1], int64)", cache=True)
+@njit("void(int64[:, ::1], int64[::1], uint32[:, ::1], int64)", cache=True)
 def scatter_fluxes(gradient, wi, tets, n):  # type: ignore[no-untyped-def]
     """Adds the quantised V grad p / 4 to the four nodes of each tet."""
     for i in range(n):

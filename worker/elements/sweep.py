@@ -11,7 +11,7 @@ sets the first.
 from numba import njit
 
 from ..materials import models
-from ..materials.elastic import deviatoric_work, rotate, trial
+from ..materials.elastic import deviatoric_work, predict
 from ..materials.equation_of_state import linear, mie_gruneisen
 from ..materials.johnson_cook import johnson_cook
 from ..materials.plastic import linear_hardening
@@ -21,15 +21,13 @@ from . import pressure as averaged
 from . import tet4
 
 _LIMIT, _FORCE = tet4.LIMIT, tet4.FORCE
-_F1, _F2, _I1, _I2, _T2 = "float64[::1]", "float64[:, ::1]", "int64[::1]", "int64[:, ::1]", "int32[:, ::1]"
+_F1, _F2, _I1, _I2, _T2 = "float64[::1]", "float64[:, ::1]", "int64[::1]", "int64[:, ::1]", "uint32[:, ::1]"
 
 
 @njit(f"void(int64, {_F1}, {_F1}, {_F1}, int64, float64)", cache=True, error_model="numpy")
 def deviatoric_stress(strength, w, s, params, n, dt):  # type: ignore[no-untyped-def]
     """Rotation, elastic trial and plastic return of a chunk; books the work of the deviatoric stress."""
-    rotate(w, s, n)
-    deviatoric_work(w, s, n, dt)
-    trial(w, s, n, 2.0 * params[models.SHEAR] * dt)
+    predict(w, s, n, params[models.SHEAR], dt)
     if strength == models.LINEAR_HARDENING:
         linear_hardening(w, s, params, n, dt)
     elif strength == models.JOHNSON_COOK:

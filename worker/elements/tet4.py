@@ -60,7 +60,7 @@ MAGNITUDE = 0x7FFFFFFFFFFFFFFF
 """Mask of a float64's bits without the sign: as integers these order like absolute values, with NaN above all."""
 
 
-@njit("void(float64[::1], float64[:, ::1], int32[:, ::1], int64)", cache=True, error_model="numpy")
+@njit("void(float64[::1], float64[:, ::1], uint32[:, ::1], int64)", cache=True, error_model="numpy")
 def gather_edges(w, x, tets, n):  # type: ignore[no-untyped-def]
     """Edges e1, e2, e3 of ``n`` tets from the positions x (nodes, 3)."""
     for i in range(n):
@@ -71,7 +71,7 @@ def gather_edges(w, x, tets, n):  # type: ignore[no-untyped-def]
             w[EDGE + (6 + k) * CHUNK + i] = x[d, k] - x[a, k]
 
 
-@njit("void(float64[::1], float64[:, ::1], int32[:, ::1], int64)", cache=True, error_model="numpy")
+@njit("void(float64[::1], float64[:, ::1], uint32[:, ::1], int64)", cache=True, error_model="numpy")
 def gather_rates(w, v, tets, n):  # type: ignore[no-untyped-def]
     """Velocity differences to node 0 of ``n`` tets from the velocities v (nodes, 3)."""
     for i in range(n):
@@ -177,7 +177,7 @@ def quantise(w, wi, rows, n, scale):  # type: ignore[no-untyped-def]
             target[i] = np.int64(np.rint(source[i] * scale))
 
 
-@njit("void(int64[:, ::1], int64[::1], int32[:, ::1], int64)", cache=True)
+@njit("void(int64[:, ::1], int64[::1], uint32[:, ::1], int64)", cache=True)
 def scatter_forces(force, wi, tets, n):  # type: ignore[no-untyped-def]
     """Adds the quantised forces to the nodal sums; node 0 gets minus the sum, so that they add to zero exactly."""
     for i in range(n):

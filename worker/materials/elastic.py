@@ -11,12 +11,15 @@ _WORK = WORK * CHUNK
 _THIRD = 1.0 / 3.0
 
 
-@njit("void(float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
-def rotate(w, s, n):  # type: ignore[no-untyped-def]
-    """s becomes Q s Q^T with Q = (I - W dt/2)^-1 (I + W dt/2), a rotation to the last bit of round-off.
+@njit("void(float64[::1], float64[::1], int64, float64, float64)", cache=True, error_model="numpy")
+def predict(w, s, n, shear, dt):  # type: ignore[no-untyped-def]
+    """Rotates the deviatoric stress, books its half of the work, and adds 2 G dt dev D: the trial stress.
 
-    Hughes and Winget 1980; in closed form with a the axial vector of W dt/2: Q = I + 2 (A + A^2) / (1 + a.a).
+    s becomes Q s Q^T with Q = (I - W dt/2)^-1 (I + W dt/2), a rotation to round-off (Hughes and Winget 1980); in closed
+    form, with a the axial vector of W dt/2, Q = I + 2 (A + A^2) / (1 + a.a). The work is V s : D over the step by the
+    trapezoidal rule; ``deviatoric_work`` adds the other half once the new stress is known.
     """
+    twice_shear_dt = 2.0 * shear * dt
     for i in range(n):
         ax, ay, az = w[SPIN + i], w[SPIN + CHUNK + i], w[SPIN + 2 * CHUNK + i]
         f = 2.0 / (1.0 + ax * ax + ay * ay + az * az)
@@ -31,17 +34,36 @@ def rotate(w, s, n):  # type: ignore[no-untyped-def]
         tyy, tyz = qyx * sxy + qyy * syy + qyz * syz, qyx * szx + qyy * syz + qyz * szz
         tzx, tzy = qzx * sxx + qzy * sxy + qzz * szx, qzx * sxy + qzy * syy + qzz * syz
         tzz = qzx * szx + qzy * syz + qzz * szz
-        s[_SXX + i] = txx * qxx + txy * qxy + txz * qxz
-        s[_SYY + i] = tyx * qyx + tyy * qyy + tyz * qyz
-        s[_SZZ + i] = tzx * qzx + tzy * qzy + tzz * qzz
-        s[_SYZ + i] = tyx * qzx + tyy * qzy + tyz * qzz
-        s[_SZX + i] = tzx * qxx + tzy * qxy + tzz * qxz
-        s[_SXY + i] = txx * qyx + txy * qyy + txz * qyz
+        sxx, syy, szz = (
+            txx * qxx + txy * qxy + txz * qxz,
+            tyx * qyx + tyy * qyy + tyz * qyz,
+            tzx * qzx + tzy * qzy + tzz * qzz,
+        )
+        syz, szx, sxy = (
+            tyx * qzx + tyy * qzy + tyz * qzz,
+            tzx * qxx + tzy * qxy + tzz * qxz,
+            txx * qyx + txy * qyy + txz * qyz,
+        )
+        mean = w[DILATATION + i] * _THIRD
+        dxx, dyy, dzz = w[D_XX + i] - mean, w[D_YY + i] - mean, w[D_ZZ + i] - mean
+        dyz, dzx, dxy = w[D_YZ + i], w[D_ZX + i], w[D_XY + i]
+        power = sxx * dxx + syy * dyy + szz * dzz + 2.0 * (syz * dyz + szx * dzx + sxy * dxy)
+        s[_WORK + i] += 0.5 * dt * w[VOLUME_MID + i] * power
+        s[_SXX + i], s[_SYY + i], s[_SZZ + i] = (
+            sxx + twice_shear_dt * dxx,
+            syy + twice_shear_dt * dyy,
+            szz + twice_shear_dt * dzz,
+        )
+        s[_SYZ + i], s[_SZX + i], s[_SXY + i] = (
+            syz + twice_shear_dt * dyz,
+            szx + twice_shear_dt * dzx,
+            sxy + twice_shear_dt * dxy,
+        )
 
 
 @njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def deviatoric_work(w, s, n, dt):  # type: ignore[no-untyped-def]
-    """Adds V dt/2 s : D to the work: called with the old (rotated) and the new stress, it is the trapezoidal rule."""
+    """Adds V dt/2 s : D, the half of the step's work that the new stress does."""
     for i in range(n):
         mean = w[DILATATION + i] * _THIRD
         power = (
@@ -51,16 +73,3 @@ def deviatoric_work(w, s, n, dt):  # type: ignore[no-untyped-def]
             + 2.0 * (s[_SYZ + i] * w[D_YZ + i] + s[_SZX + i] * w[D_ZX + i] + s[_SXY + i] * w[D_XY + i])
         )
         s[_WORK + i] += 0.5 * dt * w[VOLUME_MID + i] * power
-
-
-@njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
-def trial(w, s, n, twice_shear_dt):  # type: ignore[no-untyped-def]
-    """s += 2 G dt dev D."""
-    for i in range(n):
-        mean = w[DILATATION + i] * _THIRD
-        s[_SXX + i] += twice_shear_dt * (w[D_XX + i] - mean)
-        s[_SYY + i] += twice_shear_dt * (w[D_YY + i] - mean)
-        s[_SZZ + i] += twice_shear_dt * (w[D_ZZ + i] - mean)
-        s[_SYZ + i] += twice_shear_dt * w[D_YZ + i]
-        s[_SZX + i] += twice_shear_dt * w[D_ZX + i]
-        s[_SXY + i] += twice_shear_dt * w[D_XY + i]

@@ -19,11 +19,12 @@ def bulk_viscosity(w, s, n, linear, quadratic, rate_of_change):  # type: ignore[
     """
     for i in range(n):
         volume, mass, change = w[VOLUME + i], s[_MASS + i], w[CHANGE + i]
-        gradient = np.sqrt(w[AREAS + i]) / volume
-        c = np.sqrt(w[MODULUS + i] * volume / mass)
-        length = LENGTH_FACTOR / gradient
+        density = mass / volume
+        area = np.sqrt(w[AREAS + i])
+        c = np.sqrt(w[MODULUS + i] / density)
+        gradient, length = area / volume, LENGTH_FACTOR * volume / area
         rate = max(-change * rate_of_change / volume, 0.0)
-        new = mass / volume * length * rate * (linear * c + quadratic * length * rate)
+        new = density * length * rate * (linear * c + quadratic * length * rate)
         tangent = LENGTH_FACTOR * (linear * c + 2.0 * quadratic * length * rate) if rate > 0.0 else 0.0
         s[_WORK + i] -= 0.5 * (s[_Q + i] + new) * change
         s[_Q + i] = new
