@@ -3,8 +3,6 @@
 import time
 from pathlib import Path
 
-import numpy as np
-
 from conoid.cases import messages
 from conoid.cases.outcome import Outcome
 from conoid.cases.run import State
@@ -69,7 +67,7 @@ def _sum_up(
         state=state, cause=cause, message=message, steps=sim.clock.step, time=sim.clock.t, ranks=sim.comm.size,
         elapsed=elapsed, setup=setup, cpu=total_cpu, digest=hexdigest or "", elements=sim.model.elements_global,
         nodes_initial=sim.model.nodes_global, nodes=sim.model.nodes_global, fragments=len(sim.model.parts),
-        energy=loop.energy, worst_residual=float(np.float64(sim.ledger.worst)),
+        energy=loop.energy, worst_residual=sim.ledger.worst,
         phases={name: [s[name] for s in seconds] for name in PHASES} if seconds else {},
         element_updates_per_second=updates / total_cpu if total_cpu > 0.0 else 0.0, reference=checks,
     )  # fmt: skip

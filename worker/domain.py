@@ -201,7 +201,8 @@ def _block(case: schema.Case, piece: Piece, index: int) -> Block:
         if row < rows:
             state[:, row, :] = value
     return Block(
-        part=index, n=n, tets=np.ascontiguousarray(piece.tets[chosen], np.uint32), id=piece.tet_ids[chosen], state=state,
+        part=index, n=n, id=piece.tet_ids[chosen], state=state,
+        tets=np.ascontiguousarray(piece.tets[chosen], np.uint32),
         kind=models.strength_of(material), eos=models.eos_of(material),
         params=models.parameters(material, case.numerics.viscosity),
         border_chunks=-(-int(piece.border[chosen].sum()) // CHUNK),

@@ -39,18 +39,14 @@ class Ledger:
         node_sums = exact_sums(self._comm, np.ascontiguousarray(columns))
         work, viscous, plastic = exact_sums(self._comm, self._element_work())
         self.momentum = node_sums[3:6]
-        return self._energy(node_sums[0], work, plastic, viscous, node_sums[1], node_sums[2])
-
-    def _energy(
-        self, kinetic: float, work: float, plastic: float, viscous: float, contact: float, external: float
-    ) -> Energy:
-        total = kinetic + work + viscous + contact
-        scale = max(self.initial, abs(external), abs(work), abs(kinetic))
-        residual = abs(total - self.initial - external) / scale if scale > 0.0 else 0.0
+        kinetic_sum, loss_sum, external_sum = (float(v) for v in node_sums[:3])
+        total = kinetic_sum + float(work) + float(viscous) + loss_sum
+        scale = max(self.initial, abs(external_sum), abs(float(work)), abs(kinetic_sum))
+        residual = abs(total - self.initial - external_sum) / scale if scale > 0.0 else 0.0
         self.worst = max(self.worst, residual)
         return Energy(
-            kinetic=float(kinetic), elastic=float(work - plastic), plastic=float(plastic), viscous=float(viscous),
-            contact=float(contact), external=float(external), initial=self.initial, residual=float(residual),
+            kinetic=kinetic_sum, elastic=float(work - plastic), plastic=float(plastic), viscous=float(viscous),
+            contact=loss_sum, external=external_sum, initial=self.initial, residual=residual,
         )  # fmt: skip
 
     def _node_sum(self, values: Floats) -> float:
