@@ -72,6 +72,37 @@ def volume(mesh: Generated) -> float:
     return share * math.pi * (mesh.radius**2 - inner**2) * mesh.length
 
 
+def surface(mesh: Generated) -> float:
+    """Surface of what is modelled, m^2, the cut faces of a sector included."""
+    if isinstance(mesh, Box | Plate):
+        low, high = bounds(mesh) or ((0.0,) * 3, (0.0,) * 3)
+        a, b, c = (y - x for x, y in zip(low, high, strict=True))
+        return 2.0 * (a * b + b * c + c * a)
+    share = {"full": 1.0, "half": 0.5, "quarter": 0.25}[mesh.sector]
+    cut = 0.0 if mesh.sector == "full" else 1.0
+    if isinstance(mesh, Sphere):
+        return share * 4.0 * math.pi * mesh.radius**2 + cut * math.pi * mesh.radius**2
+    inner = mesh.inner_radius if isinstance(mesh, Tube) else 0.0
+    ends = 2.0 * math.pi * (mesh.radius**2 - inner**2)
+    sides = 2.0 * math.pi * (mesh.radius + inner) * mesh.length
+    return share * (ends + sides) + cut * 2.0 * (mesh.radius - inner) * mesh.length
+
+
+def holds(mesh: Generated, point: Vector) -> bool:
+    """Whether ``point`` lies inside what is modelled."""
+    low, high = bounds(mesh) or ((0.0,) * 3, (0.0,) * 3)
+    if not all(a <= x <= b for a, x, b in zip(low, point, high, strict=True)):
+        return False
+    if isinstance(mesh, Box | Plate):
+        return True
+    from_centre = [x - c for x, c in zip(point, centre(mesh), strict=True)]
+    if isinstance(mesh, Sphere):
+        return math.hypot(*from_centre) <= mesh.radius
+    i, j = across(mesh.axis)
+    inner = mesh.inner_radius if isinstance(mesh, Tube) else 0.0
+    return inner <= math.hypot(from_centre[i], from_centre[j]) <= mesh.radius
+
+
 def thinnest(mesh: Generated) -> float:
     """The smallest extent of the body, m: the wall of a tube, the diameter of a ball."""
     low, high = bounds(mesh) or ((0.0,) * 3, (0.0,) * 3)
