@@ -13,6 +13,7 @@ from typing import BinaryIO
 
 from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
+from starlette.types import Receive, Scope, Send
 
 from .errors import ServiceError, not_found
 
@@ -106,7 +107,7 @@ def respond(request: Request, folder: Path, relative: str) -> Response:
         if request.method == "HEAD":
             file.close()
             return Response(status_code=status, headers=headers)
-        return StreamingResponse(_send(file, begin, end), status, headers)
+        return _FileResponse(file, begin, end, status, headers)
     except BaseException:
         file.close()
         raise
@@ -131,12 +132,25 @@ def _part(request: Request, size: int, etag: str) -> tuple[int, int, int]:
     return begin, end, 206
 
 
-def _send(file: BinaryIO, begin: int, end: int) -> Iterator[bytes]:
-    with file:
-        file.seek(begin)
-        while begin < end and (chunk := file.read(min(_CHUNK, end - begin))):
-            begin += len(chunk)
-            yield chunk
+class _FileResponse(StreamingResponse):
+    """A part of an open file; closes it, also when the client leaves in the middle."""
+
+    def __init__(self, file: BinaryIO, begin: int, end: int, status: int, headers: dict[str, str]) -> None:
+        super().__init__(_chunks(file, begin, end), status, headers)
+        self._file = file
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        try:
+            await super().__call__(scope, receive, send)
+        finally:
+            self._file.close()
+
+
+def _chunks(file: BinaryIO, begin: int, end: int) -> Iterator[bytes]:
+    file.seek(begin)
+    while begin < end and (chunk := file.read(min(_CHUNK, end - begin))):
+        begin += len(chunk)
+        yield chunk
 
 
 def _identify(file: BinaryIO) -> tuple[int, str, bytes]:

@@ -40,7 +40,7 @@ class Submission(msgspec.Struct, kw_only=True, frozen=True):
     idempotency_key: str | None
     wall_time: float | None
     """s after which the run is stopped."""
-    estimate: dict[str, float]
+    estimate: dict[str, int | float]
 
 
 class Process(msgspec.Struct, kw_only=True, frozen=True):

@@ -104,19 +104,18 @@ def append(path: Path, status: Status) -> Status:
 
 def _mend(descriptor: int) -> int:
     """The number of the last line; what stands after the last line feed is completed or cut off."""
-    size, window = os.fstat(descriptor).st_size, _CHUNK
+    window = _CHUNK
     while True:
+        size = os.fstat(descriptor).st_size
         start = max(0, size - window)
         data = os.pread(descriptor, size - start, start)
         end = data.rfind(b"\n") + 1
-        if start and not end:
-            window *= 4
-            continue
-        if end < len(data):
-            torn = _line(data[end:])
-            if torn is not None:
-                os.write(descriptor, b"\n")
-                return torn.seq
-            os.ftruncate(descriptor, start + end)
+        torn = _line(data[end:]) if end or not start else None
+        if torn is not None:
+            os.write(descriptor, b"\n")
+            return torn.seq
         known = [line.seq for raw in data[:end].splitlines()[-3:] if (line := _line(raw))]
-        return known[-1] if known else 0
+        if known or not start:
+            os.ftruncate(descriptor, start + end)
+            return known[-1] if known else 0
+        window *= 4

@@ -49,7 +49,7 @@ def check(case: Case, settings: Settings) -> list[Problem]:
 
 
 def check_size(estimate: Estimate, caps: Caps) -> list[Problem]:
-    """Everything that the case needs more of than this server allows."""
+    """Everything that the case needs more of than this server allows; what is not known is no reason to refuse."""
     needs = (
         ("parts", "elements", estimate.elements, caps.elements),
         ("run.end_time", "steps", estimate.steps, caps.steps),
@@ -59,13 +59,15 @@ def check_size(estimate: Estimate, caps: Caps) -> list[Problem]:
     return [
         Problem(key, "", f"the case needs about {value:.3g} {what}; this server allows {cap:.3g}")
         for key, what, value, cap in needs
-        if cap is not None and value > cap
+        if cap is not None and value is not None and value > cap
     ]
 
 
 def _ranks(case: Case, settings: Settings) -> Iterator[Problem]:
     if case.run.ranks > settings.slots:
-        yield Problem("run.ranks", str(case.run.ranks), f"this server has {settings.slots} slots; allowed: 1 to that")
+        yield Problem(
+            "run.ranks", str(case.run.ranks), f"this server has {settings.slots} slots; allowed: 1 to {settings.slots}"
+        )
 
 
 def _files(case: Case) -> Iterator[Problem]:
@@ -79,6 +81,19 @@ def _time(case: Case, caps: Caps) -> Iterator[Problem]:
     asked, cap = case.run.max_wall_time, caps.wall_time
     if asked is not None and cap is not None and asked > cap:
         yield Problem("run.max_wall_time", f"{asked:g} s", f"this server allows {cap:g} s")
+
+
+def figures(estimate: Estimate) -> dict[str, int | float]:
+    """The numbers of an estimate that are known: elements, nodes, dt, steps, memory_bytes, core_seconds."""
+    values = {
+        "elements": estimate.elements,
+        "nodes": estimate.nodes,
+        "dt": estimate.dt,
+        "steps": estimate.steps,
+        "memory_bytes": estimate.memory_bytes,
+        "core_seconds": estimate.core_seconds,
+    }
+    return {name: value for name, value in values.items() if value is not None}
 
 
 def wall_time(case: Case, caps: Caps) -> float | None:

@@ -3,7 +3,7 @@
 import hashlib
 import re
 import threading
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy.exc import SQLAlchemyError
@@ -94,7 +94,7 @@ class Desk:
         made = Submission(
             id=run_id, owner=owner, name=case.name, title=case.title, ranks=case.run.ranks, submitted=now,
             case_file=_file_name(content_type), body_sha256=digest, idempotency_key=key,
-            wall_time=limits.wall_time(case, caps), estimate=asdict(reading.estimate),
+            wall_time=limits.wall_time(case, caps), estimate=limits.figures(reading.estimate),
         )  # fmt: skip
         run = Run(run_id, owner, case.name, case.run.ranks, now)
         try:

@@ -1,6 +1,5 @@
 """Cases: the check before anything runs, and the gallery that comes with Conoid."""
 
-from dataclasses import asdict
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Response
@@ -9,6 +8,7 @@ from conoid.cases.load import CaseError, read_case, shipped
 
 from ..auth import Reader, Submitter
 from ..errors import entry, not_found
+from ..limits import figures
 from ..service import ServiceOf
 from .runs import Body
 
@@ -25,7 +25,7 @@ def validate(
     except CaseError as error:
         return {"valid": False, "problems": [entry(problem) for problem in error.problems]}
     case = reading.case.model_dump(mode="json")
-    return {"valid": True, "problems": [], "estimate": asdict(reading.estimate), "case": case}
+    return {"valid": True, "problems": [], "estimate": figures(reading.estimate), "case": case}
 
 
 @router.get("/v1/cases")

@@ -19,7 +19,8 @@ def listing(run: OwnedRun, service: ServiceOf) -> dict[str, Any]:
     return {"files": [{**asdict(entry), "url": f"/v1/runs/{run.id}/files/{entry.path}"} for entry in entries]}
 
 
-@router.api_route("/v1/runs/{run_id}/files/{path:path}", methods=["GET", "HEAD"])
+@router.head("/v1/runs/{run_id}/files/{path:path}", include_in_schema=False)
+@router.get("/v1/runs/{run_id}/files/{path:path}")
 def content(request: Request, run: OwnedRun, path: str, service: ServiceOf) -> Response:
     """One file, whole or a Range of it; ETag, and its sha256 in Repr-Digest."""
     return download.respond(request, service.settings.runs / run.id, path)

@@ -23,7 +23,8 @@ _LOOK = 0.25
 Rank = Annotated[str, PathParameter(pattern=r"^(\d{1,5}|launcher)$", description="a rank, or 'launcher'")]
 
 
-@router.api_route("/v1/runs/{run_id}/logs/{rank}", methods=["GET", "HEAD"])
+@router.head("/v1/runs/{run_id}/logs/{rank}", include_in_schema=False)
+@router.get("/v1/runs/{run_id}/logs/{rank}")
 def log(request: Request, run: OwnedRun, service: ServiceOf, rank: Rank, follow: bool = False) -> Response:
     """The log of one rank, or of the launcher; Range as for files. ``follow`` goes on until the run has ended."""
     folder = service.settings.runs / run.id

@@ -1,0 +1,208 @@
+"""Servers to test: one in this process, one of its own, both with a worker that computes nothing."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import httpx2
+import pytest
+from starlette.testclient import TestClient
+
+from conoid.cases.run import State
+from conoid.server.app import build_app, opened
+from conoid.server.auth import create_token
+from conoid.server.service import Service
+from conoid.server.settings import Caps, Settings
+from conoid.server.store import Store
+
+FAKE = (sys.executable, str(Path(__file__).with_name("fake_worker.py")))
+PATIENCE = 20.0
+TOML = {"Content-Type": "application/toml"}
+
+
+def case_text(name: str = "bar", ranks: int = 1, end_time: str = "1 us", extra: str = "", **plan: Any) -> str:
+    """A small case in TOML; ``plan`` is for the fake worker."""
+    return f"""
+name = "{name}"
+title = "A bar"
+description = {json.dumps(json.dumps(plan))}
+
+[[parts]]
+name = "rod"
+material = "steel"
+[parts.mesh]
+shape = "box"
+low = ["0 mm", "0 mm", "0 mm"]
+high = ["1 mm", "1 mm", "4 mm"]
+element_size = "0.5 mm"
+generator = "structured"
+
+[materials.steel]
+density = "7800 kg/m^3"
+elastic = {{ young = "200 GPa", poisson = 0.3 }}
+
+[run]
+end_time = "{end_time}"
+ranks = {ranks}
+{extra}
+"""
+
+
+@dataclass
+class User:
+    """One who talks to a server; ``http`` carries the token."""
+
+    http: httpx2.Client
+    name: str
+
+    def submit(self, text: str | None = None, **plan: Any) -> str:
+        """The id of a new run."""
+        answer = self.http.post("/v1/runs", content=text or case_text(**plan), headers=TOML)
+        assert answer.status_code == 202, answer.text
+        return str(answer.json()["id"])
+
+    def show(self, run: str) -> dict[str, Any]:
+        """The run as it is now."""
+        answer = self.http.get(f"/v1/runs/{run}")
+        assert answer.status_code == 200, answer.text
+        found: dict[str, Any] = answer.json()
+        return found
+
+    def wait_for(self, run: str, *states: State) -> dict[str, Any]:
+        """The run once it is in one of ``states`` (any final one when none is named)."""
+        wanted = states or tuple(state for state in State if state.final)
+        deadline = time.monotonic() + PATIENCE
+        while (seen := self.show(run))["state"] not in wanted:
+            assert time.monotonic() < deadline, f"run {run} is still {seen['state']}, not {wanted}"
+            self.http.get(f"/v1/runs/{run}", params={"wait": 0.5})
+        return seen
+
+    def events(self, run: str, **query: int) -> list[dict[str, Any]]:
+        """The journal over REST."""
+        found: list[dict[str, Any]] = self.http.get(f"/v1/runs/{run}/events", params=query).json()["events"]
+        return found
+
+    def states(self, run: str) -> list[str]:
+        """The states that the journal tells, in order."""
+        return [event["state"] for event in self.events(run) if event["type"] == "status"]
+
+
+@dataclass
+class Running:
+    """A server in this process and two who use it."""
+
+    service: Service
+    ann: User
+    bob: User
+    nobody: User
+
+
+@pytest.fixture
+def settings(tmp_path: Path) -> Settings:
+    return Settings(
+        runs=tmp_path / "runs", port=0, zenoh_port=None, slots=2, worker=FAKE, grace=0.5, caps=Caps(free_disk=0)
+    )
+
+
+@pytest.fixture
+def server(settings: Settings) -> Iterator[Running]:
+    with opened(settings) as service, TestClient(build_app(service), base_url="http://127.0.0.1") as client:
+        users = []
+        for name in ("ann", "bob"):
+            token = create_token(service.store, name, frozenset({"read", "submit", "metrics"}))
+            users.append(User(_like(client, token), name))
+        yield Running(service, users[0], users[1], User(client, "nobody"))
+        _end_runs(service)
+
+
+def _end_runs(service: Service) -> None:
+    """Cancels what a test has left open, so that no worker outlives it."""
+    deadline = time.monotonic() + PATIENCE
+    while left := list(service.supervisor._open):
+        for run_id in left if service.supervisor.alive else ():
+            service.supervisor.cancel(run_id)
+        assert time.monotonic() < deadline, f"runs {left} do not end"
+        time.sleep(0.01)
+
+
+def _like(client: TestClient, token: str) -> TestClient:
+    """A client of the same server, inside the same event loop, with a token."""
+    other = TestClient(client.app, base_url="http://127.0.0.1", headers={"Authorization": f"Bearer {token}"})
+    other.portal = client.portal
+    return other
+
+
+@dataclass
+class Process:
+    """A server of its own process on a folder, and what it needs to be started again."""
+
+    runs: Path
+    arguments: tuple[str, ...]
+    child: subprocess.Popen[bytes] | None = None
+    clients: list[httpx2.Client] = field(default_factory=list)
+
+    def start(self) -> dict[str, Any]:
+        """Starts it and returns its server.json."""
+        address = self.runs / "server.json"
+        address.unlink(missing_ok=True)
+        command = [sys.executable, "-m", "conoid.server", "--runs", str(self.runs), "--port", "0", *self.arguments]
+        self.child = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+        deadline = time.monotonic() + PATIENCE
+        while not address.exists():
+            assert self.child.poll() is None, "the server ended at its start"
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        told: dict[str, Any] = json.loads(address.read_text())
+        return told
+
+    def user(self, url: str, name: str = "ann") -> User:
+        """One with a new token."""
+        store = Store(f"sqlite:///{self.runs / 'server.sqlite'}")
+        token = create_token(store, name, frozenset({"read", "submit"}))
+        store.close()
+        client = httpx2.Client(base_url=url, headers={"Authorization": f"Bearer {token}"}, timeout=PATIENCE)
+        self.clients.append(client)
+        return User(client, name)
+
+    def end(self, number: signal.Signals) -> int:
+        """Sends a signal and waits for the end."""
+        assert self.child is not None
+        self.child.send_signal(number)
+        return self.child.wait(PATIENCE)
+
+
+@pytest.fixture
+def process(tmp_path: Path) -> Iterator[Callable[..., Process]]:
+    made: list[Process] = []
+
+    def make(*arguments: str) -> Process:
+        fake = " ".join(FAKE)
+        made.append(Process(tmp_path / "runs", ("--worker", fake, "--slots", "2", "--grace", "0.5", *arguments)))
+        return made[-1]
+
+    yield make
+    for one in made:
+        for client in one.clients:
+            client.close()
+        if one.child is not None and one.child.poll() is None:
+            one.child.kill()
+            one.child.wait(PATIENCE)
+    _end_workers(tmp_path)
+
+
+def _end_workers(folder: Path) -> None:
+    """Kills what the servers of a test have left running below ``folder``."""
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit() and int(entry.name) != os.getpid():
+            try:
+                if str(folder).encode() in (entry / "cmdline").read_bytes():
+                    os.kill(int(entry.name), signal.SIGKILL)
+            except OSError:
+                continue

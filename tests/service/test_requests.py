@@ -1,0 +1,407 @@
+"""What the server refuses, and how it says so; who may see what."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi.routing import APIRoute
+from starlette.testclient import TestClient
+
+from conoid.server.app import ROUTERS, build_app, opened
+from conoid.server.auth import check_token, create_token
+from conoid.server.limits import BODY
+from conoid.server.settings import Caps, Settings
+
+from .conftest import TOML, Running, case_text
+
+OPEN = {"/healthz", "/readyz"}
+ROUTES = [
+    (method, route.path)
+    for router in ROUTERS
+    for route in router.routes
+    if isinstance(route, APIRoute) and route.path not in OPEN
+    for method in sorted(route.methods or ())
+]
+
+
+def refusal(answer: Any, status: int, code: str) -> dict[str, Any]:
+    """The problem in an answer, which must have the shape of RFC 9457."""
+    assert answer.status_code == status, answer.text
+    assert answer.headers["content-type"] == "application/problem+json"
+    problem: dict[str, Any] = answer.json()
+    assert (problem["status"], problem["code"], problem["type"]) == (status, code, f"urn:conoid:problem:{code}")
+    assert problem["title"]
+    assert "\n" not in problem["detail"]
+    assert "Traceback" not in answer.text
+    assert isinstance(problem["retryable"], bool)
+    return problem
+
+
+# Who asks -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("method", "path"), ROUTES)
+@pytest.mark.parametrize("token", [None, "", "Bearer", "Bearer x", "Bearer conoid_0000000000_x", "Basic YTpi"])
+def test_every_route_needs_a_token(server: Running, method: str, path: str, token: str | None) -> None:
+    place = path.replace("{run_id}", "x").replace("{path:path}", "case.toml").replace("{rank}", "0")
+    headers = {} if token is None else {"Authorization": token}
+    answer = server.nobody.http.request(method, place.replace("{name}", "demo"), headers=headers)
+    assert answer.status_code == 401
+    assert answer.headers["www-authenticate"] == "Bearer"
+    if method != "HEAD":
+        refusal(answer, 401, "unauthorized")
+
+
+def test_the_list_of_routes_is_the_one_that_is_served(server: Running) -> None:
+    told = server.nobody.http.get("/openapi.json").json()["paths"]
+    assert {path for _, path in ROUTES} | OPEN == {path.replace("{path}", "{path:path}") for path in told}
+    assert len(ROUTES) >= 15
+
+
+@pytest.mark.parametrize("path", sorted(OPEN))
+def test_health_needs_none(server: Running, path: str) -> None:
+    assert server.nobody.http.get(path).json()["status"] == "ok"
+
+
+def test_another_users_run_is_not_there(server: Running) -> None:
+    run = server.ann.submit()
+    server.ann.wait_for(run)
+    for method, path in ROUTES:
+        if "{run_id}" in path:
+            place = path.replace("{path:path}", "case.toml").replace("{rank}", "0")
+            theirs = server.bob.http.request(method, place.replace("{run_id}", run))
+            none = server.bob.http.request(method, place.replace("{run_id}", "0" * 22))
+            assert theirs.status_code == none.status_code == 404
+            if method != "HEAD":
+                assert refusal(theirs, 404, "not_found")["detail"] == f"run {run!r}: there is none"
+    assert server.bob.http.get("/v1/runs").json()["runs"] == []
+
+
+def test_a_revoked_token_opens_nothing(server: Running) -> None:
+    text = create_token(server.service.store, "ann", frozenset({"read"}))
+    headers = {"Authorization": f"Bearer {text}"}
+    assert server.nobody.http.get("/v1/runs", headers=headers).status_code == 200
+    assert server.service.store.revoke(text.split("_")[1])
+    assert server.nobody.http.get("/v1/runs", headers=headers).status_code == 401
+    assert not server.service.store.revoke(text.split("_")[1])
+
+
+def test_a_token_is_kept_as_a_hash_only(server: Running) -> None:
+    text = create_token(server.service.store, "ann", frozenset({"read"}))
+    secret = text.split("_", 2)[2]
+    assert len(secret) >= 43, "256 bits"
+    for path in server.service.settings.runs.glob("server.sqlite*"):
+        assert secret.encode() not in path.read_bytes()
+    found = check_token(server.service.store, text)
+    assert found is not None
+    assert found.owner == "ann"
+    assert check_token(server.service.store, text[:-1]) is None
+
+
+@pytest.mark.parametrize(
+    ("scopes", "request_", "allowed"),
+    [
+        ("read", ("POST", "/v1/runs"), False),
+        ("read", ("GET", "/v1/runs"), True),
+        ("submit", ("GET", "/v1/runs"), False),
+        ("read", ("GET", "/metrics"), False),
+        ("metrics", ("GET", "/metrics"), True),
+        ("metrics", ("GET", "/v1/me"), True),
+        ("metrics", ("GET", "/v1/cases"), False),
+    ],
+)
+def test_scopes(server: Running, scopes: str, request_: tuple[str, str], allowed: bool) -> None:
+    token = create_token(server.service.store, "ann", frozenset(scopes.split()))
+    answer = server.nobody.http.request(*request_, headers={"Authorization": f"Bearer {token}"})
+    if allowed:
+        assert answer.status_code == 200
+    else:
+        assert "scope" in refusal(answer, 403, "forbidden")["detail"]
+
+
+@pytest.mark.parametrize(
+    ("headers", "status"),
+    [
+        ({}, 200),
+        ({"Host": "localhost:8750"}, 200),
+        ({"Host": "evil.example"}, 403),
+        ({"Origin": "http://evil.example"}, 403),
+        ({"Origin": "http://127.0.0.1"}, 200),
+    ],
+)
+def test_without_tokens_pages_of_other_sites_are_kept_out(tmp_path: Path, headers: dict[str, str], status: int) -> None:
+    settings = Settings(runs=tmp_path, auth=False, zenoh_port=None)
+    with opened(settings) as service, TestClient(build_app(service), base_url="http://127.0.0.1") as client:
+        assert client.get("/v1/me", headers=headers).status_code == status
+
+
+# What is sent ---------------------------------------------------------------------------------------------------------
+
+
+def test_a_body_of_two_mebibytes(server: Running) -> None:
+    for content in (b"#" * (2 << 20), iter([b"#" * 65536] * 32)):
+        problem = refusal(server.ann.http.post("/v1/runs", content=content, headers=TOML), 413, "too_large")
+        assert str(BODY) in problem["detail"]
+    refusal(server.nobody.http.post("/v1/runs", content=b"#" * (2 << 20), headers=TOML), 401, "unauthorized")
+
+
+def test_the_largest_body_is_read(server: Running) -> None:
+    text = case_text()
+    body = text + "#" * (BODY - len(text))
+    assert server.ann.http.post("/v1/cases:validate", content=body, headers=TOML).json()["valid"]
+
+
+@pytest.mark.parametrize("kind", [None, "text/plain", "application/x-www-form-urlencoded", "multipart/form-data"])
+@pytest.mark.parametrize("path", ["/v1/runs", "/v1/cases:validate"])
+def test_a_wrong_content_type(server: Running, kind: str | None, path: str) -> None:
+    headers = {} if kind is None else {"Content-Type": kind}
+    problem = refusal(server.ann.http.post(path, content=case_text(), headers=headers), 415, "unsupported_type")
+    assert "application/toml or application/json" in problem["detail"]
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "words"),
+    [
+        (case_text().replace('"1 us"', '"1 mm"'), "run.end_time", "wrong dimension"),
+        (case_text().replace('"1 us"', '"1 parsec"'), "run.end_time", "parsec"),
+        (case_text().replace('"1 us"', "nan"), "run.end_time", ""),
+        (case_text().replace("element_size", "element_sise"), "parts[0].mesh.element_sise", "element_size"),
+        (case_text().replace('material = "steel"', 'material = "steal"'), "parts[0].material", "steel"),
+        (case_text(ranks=3), "run.ranks", "2 slots"),
+        ("name = = 3", "line 1", "TOML"),
+    ],
+)
+def test_a_wrong_case_names_key_value_and_what_is_allowed(server: Running, text: str, key: str, words: str) -> None:
+    problem = refusal(server.ann.http.post("/v1/runs", content=text, headers=TOML), 422, "invalid_case")
+    entry = next(entry for entry in problem["errors"] if entry["key"] == key)
+    assert words in entry["message"]
+    assert problem["errors"][0]["key"] in problem["detail"]
+    verdict = server.ann.http.post("/v1/cases:validate", content=text, headers=TOML).json()
+    assert verdict == {"valid": False, "problems": problem["errors"]}
+    assert server.ann.http.get("/v1/runs").json()["runs"] == []
+
+
+def test_ranks_beyond_the_slots(server: Running) -> None:
+    answer = server.ann.http.post("/v1/runs", content=case_text(ranks=64), headers=TOML)
+    problem = refusal(answer, 422, "invalid_case")
+    assert problem["errors"] == [
+        {
+            "key": "run.ranks",
+            "value": "64",
+            "message": "this server has 2 slots; allowed: 1 to 2",
+            "pointer": "#/run/ranks",
+        }
+    ]
+    assert problem["pointer"] == "#/run/ranks"
+
+
+def test_all_problems_at_once(server: Running) -> None:
+    text = case_text().replace('"1 us"', '"1 mm"').replace('"200 GPa"', '"200 kg"').replace("poisson", "poison")
+    problem = refusal(server.ann.http.post("/v1/runs", content=text, headers=TOML), 422, "invalid_case")
+    assert len(problem["errors"]) >= 3
+
+
+@pytest.mark.parametrize("body", [b"{", b"[1]", b"\xff\xfe", b'{"name": 1e999}', b"[" * 100_000, b""])
+def test_bad_json(server: Running, body: bytes) -> None:
+    answer = server.ann.http.post("/v1/runs", content=body, headers={"Content-Type": "application/json"})
+    refusal(answer, 422, "invalid_case")
+
+
+def test_json_is_as_good_as_toml(server: Running) -> None:
+    import tomllib
+
+    body = json.dumps(tomllib.loads(case_text()))
+    headers = {"Content-Type": "application/json; charset=utf-8"}
+    answer = server.ann.http.post("/v1/runs", content=body, headers=headers)
+    assert server.ann.wait_for(answer.json()["id"])["state"] == "succeeded"
+
+
+def test_a_mesh_file_is_refused_before_anything_is_read(server: Running) -> None:
+    text = case_text()
+    head, tail = text.split("[parts.mesh]")[0], text.split('generator = "structured"')[1]
+    text = f'{head}[parts.mesh]\nshape = "file"\npath = "/etc/passwd"\nunit = "1 mm"\n{tail}'
+    problem = refusal(server.ann.http.post("/v1/runs", content=text, headers=TOML), 422, "invalid_case")
+    assert [entry["key"] for entry in problem["errors"]] == ["parts[0].mesh.path"]
+    assert "does not read mesh files" in problem["detail"]
+
+
+@pytest.mark.parametrize(
+    ("caps", "key"),
+    [
+        (Caps(elements=1, free_disk=0), "parts"),
+        (Caps(memory=1, free_disk=0), "parts"),
+        (Caps(steps=1, free_disk=0), "run.end_time"),
+        (Caps(core_seconds=1e-9, free_disk=0), "run.end_time"),
+    ],
+)
+def test_caps_come_from_the_estimate(tmp_path: Path, caps: Caps, key: str) -> None:
+    settings = Settings(runs=tmp_path, auth=False, zenoh_port=None, caps=caps)
+    with opened(settings) as service, TestClient(build_app(service), base_url="http://127.0.0.1") as client:
+        problem = refusal(client.post("/v1/runs", content=case_text(), headers=TOML), 422, "invalid_case")
+        assert [entry["key"] for entry in problem["errors"]] == [key]
+        assert "this server allows" in problem["detail"]
+
+
+@pytest.mark.parametrize(
+    ("caps", "status", "code"),
+    [(Caps(queued=0, free_disk=0), 429, "queue_full"), (Caps(free_disk=1 << 60), 507, "disk_full")],
+)
+def test_no_room(tmp_path: Path, caps: Caps, status: int, code: str) -> None:
+    settings = Settings(runs=tmp_path, auth=False, zenoh_port=None, caps=caps)
+    with opened(settings) as service, TestClient(build_app(service), base_url="http://127.0.0.1") as client:
+        assert refusal(client.post("/v1/runs", content=case_text(), headers=TOML), status, code)["retryable"]
+        assert [path.name for path in tmp_path.iterdir() if path.is_dir()] == []
+
+
+def test_wall_time_beyond_the_cap(tmp_path: Path) -> None:
+    settings = Settings(runs=tmp_path, auth=False, zenoh_port=None, caps=Caps(wall_time=60, free_disk=0))
+    text = case_text(extra='max_wall_time = "2 min"')
+    with opened(settings) as service, TestClient(build_app(service), base_url="http://127.0.0.1") as client:
+        problem = refusal(client.post("/v1/runs", content=text, headers=TOML), 422, "invalid_case")
+        assert problem["errors"][0]["key"] == "run.max_wall_time"
+
+
+# Idempotency ----------------------------------------------------------------------------------------------------------
+
+
+def test_the_same_key_and_case_are_one_run(server: Running) -> None:
+    headers = {**TOML, "Idempotency-Key": "k1"}
+    first = server.ann.http.post("/v1/runs", content=case_text(), headers=headers)
+    server.ann.wait_for(first.json()["id"])
+    second = server.ann.http.post("/v1/runs", content=case_text(), headers=headers)
+    assert (second.status_code, second.content) == (202, first.content)
+    assert first.headers["location"] == second.headers["location"] == f"/v1/runs/{first.json()['id']}"
+    assert len(server.ann.http.get("/v1/runs").json()["runs"]) == 1
+    other = server.ann.http.post("/v1/runs", content=case_text(name="other"), headers=headers)
+    assert refusal(other, 422, "key_reused")["pointer"] == "Idempotency-Key"
+    theirs = server.bob.http.post("/v1/runs", content=case_text(), headers=headers)
+    assert theirs.json()["id"] != first.json()["id"]
+
+
+def test_the_same_key_at_the_same_time_is_one_run(server: Running) -> None:
+    from concurrent.futures import ThreadPoolExecutor
+
+    desk, body = server.service.desk, case_text().encode()
+    with ThreadPoolExecutor(8) as pool:
+        made = list(pool.map(lambda _: desk.submit("ann", body, "application/toml", "k"), range(16)))
+    assert len({receipt["id"] for receipt in made}) == 1
+    server.ann.wait_for(made[0]["id"])
+
+
+@pytest.mark.parametrize("key", ["", "x" * 256, "two words"])
+def test_a_bad_key(server: Running, key: str) -> None:
+    answer = server.ann.http.post("/v1/runs", content=case_text(), headers={**TOML, "Idempotency-Key": key})
+    refusal(answer, 400, "bad_key")
+
+
+# Lists and the rest ---------------------------------------------------------------------------------------------------
+
+
+def test_pages(server: Running) -> None:
+    runs = [server.ann.submit() for _ in range(5)]
+    for run in runs:
+        server.ann.wait_for(run)
+    seen, cursor = [], None
+    while True:
+        query = {"limit": 2, **({"cursor": cursor} if cursor else {})}
+        page = server.ann.http.get("/v1/runs", params=query).json()
+        seen += [run["id"] for run in page["runs"]]
+        cursor = page["next"]
+        if cursor is None:
+            break
+    assert seen == runs[::-1]
+    assert server.ann.http.get("/v1/runs", params={"state": "failed,running"}).json()["runs"] == []
+    assert len(server.ann.http.get("/v1/runs", params={"state": "succeeded"}).json()["runs"]) == 5
+
+
+@pytest.mark.parametrize(
+    ("path", "pointer"),
+    [
+        ("/v1/runs?limit=0", "limit"),
+        ("/v1/runs?limit=x", "limit"),
+        ("/v1/runs?state=done", "state"),
+        ("/v1/runs?cursor=nonsense", "cursor"),
+        ("/v1/runs?cursor=%C3%A4", "cursor"),
+    ],
+)
+def test_bad_parameters(server: Running, path: str, pointer: str) -> None:
+    assert refusal(server.ann.http.get(path), 400, "bad_parameter")["pointer"] == pointer
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "status", "code"),
+    [
+        ("GET", "/v1/nothing", 404, "not_found"),
+        ("GET", "/v1/runs/nothing", 404, "not_found"),
+        ("GET", "/v1/cases/nothing", 404, "not_found"),
+        ("POST", "/v1/runs/nothing:cancel", 404, "not_found"),
+        ("DELETE", "/v1/runs", 405, "method_not_allowed"),
+    ],
+)
+def test_what_is_not_there(server: Running, method: str, path: str, status: int, code: str) -> None:
+    refusal(server.ann.http.request(method, path), status, code)
+
+
+def test_the_gallery(server: Running) -> None:
+    cases = server.ann.http.get("/v1/cases").json()["cases"]
+    assert "demo" in {case["name"] for case in cases}
+    for case in cases:
+        answer = server.ann.http.get(case["url"])
+        assert answer.headers["content-type"].startswith("application/toml")
+        assert f'name = "{case["name"]}"' in answer.text
+
+
+def test_validate_gives_the_estimate_and_every_default(server: Running) -> None:
+    verdict = server.ann.http.post("/v1/cases:validate", content=case_text(), headers=TOML).json()
+    assert verdict["valid"]
+    assert verdict["estimate"]["elements"] > 0
+    assert verdict["case"]["numerics"]["pressure"] == "nodal"
+    assert server.ann.http.get("/v1/runs").json()["runs"] == []
+
+
+def test_me(server: Running) -> None:
+    me = server.ann.http.get("/v1/me").json()
+    assert (me["owner"], me["zenoh"]) == ("ann", None)
+    assert me["limits"]["ranks"] == me["slots"]["total"] == 2
+
+
+def test_metrics(server: Running) -> None:
+    server.ann.wait_for(server.ann.submit())
+    text = server.ann.http.get("/metrics").text
+    assert 'conoid_runs{state="succeeded"} 1' in text
+    assert "conoid_slots 2" in text
+
+
+def test_readiness_tells_a_dead_supervisor(server: Running) -> None:
+    server.service.supervisor.close()
+    answer = server.nobody.http.get("/readyz")
+    assert (answer.status_code, answer.json()["checks"]["supervisor"]) == (503, False)
+
+
+def test_a_crash_tells_the_log_and_not_the_caller(
+    server: Running, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def fail(*_: object) -> None:
+        raise RuntimeError("a secret of the inside")
+
+    monkeypatch.setattr(server.service.store, "page", fail)
+    client = TestClient(build_app(server.service), raise_server_exceptions=False, headers=dict(server.ann.http.headers))
+    answer = client.get("/v1/runs")
+    assert "secret" not in answer.text
+    refusal(answer, 500, "internal")
+    assert "a secret of the inside" in caplog.text
+
+
+def test_the_page(tmp_path: Path) -> None:
+    web = tmp_path / "web"
+    web.mkdir()
+    (web / "index.html").write_text("<title>Conoid</title>")
+    settings = Settings(runs=tmp_path / "runs", zenoh_port=None, web=web)
+    with opened(settings) as service, TestClient(build_app(service), base_url="http://127.0.0.1") as client:
+        page = client.get("/")
+        assert page.text == "<title>Conoid</title>"
+        assert "frame-ancestors 'none'" in page.headers["content-security-policy"]
+        assert client.get("/../server.secret").status_code == 404
+        refusal(client.get("/nothing.js"), 404, "not_found")
+        refusal(client.get("/v1/runs"), 401, "unauthorized")
