@@ -1,0 +1,15 @@
+"""What a user imports: ``import conoid.client as c; c.connect().submit("taylor_copper").watch()``.
+
+The same words as on the command line: a session validates, submits and lists; a run is watched, cancelled, waited for
+and gives its result; a result is viewed.
+"""
+
+from .errors import ClientError, ServiceError, UnfinishedError, UnreachableError, ViewError
+from .result import Result
+from .run import Run, RunInfo
+from .session import Session, connect
+
+__all__ = [
+    "ClientError", "Result", "Run", "RunInfo", "ServiceError", "Session", "UnfinishedError", "UnreachableError",
+    "ViewError", "connect",
+]  # fmt: skip

@@ -1,0 +1,290 @@
+"""The command line: ``conoid serve | validate | submit | ls | show | watch | cancel | get | view | run``."""
+
+import os
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+import typer
+from rich.console import Console, RenderableType
+from typer.core import TyperGroup
+
+from conoid.cases.estimate import estimate
+from conoid.cases.load import CaseError
+from conoid.cases.run import ExitCode, State
+
+from . import tables
+from .errors import ClientError, ServiceError
+from .live import Live, exit_code
+from .once import run_once
+from .run import Run
+from .session import Session, connect
+from .submission import case_of, locate
+from .view import FIELDS, view
+from .watch import watch
+
+
+class Guarded(TyperGroup):
+    """Turns what can go wrong into one clear line on standard error, and an exit code."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Runs the command."""
+        try:
+            return super().invoke(ctx)
+        except CaseError as error:
+            _complain(*(str(problem) for problem in error.problems))
+            raise typer.Exit(ExitCode.BAD_INPUT) from None
+        except ServiceError as error:
+            _complain(*(error.problems or [str(error)]))
+            raise typer.Exit(error.exit_code) from None
+        except ClientError as error:
+            _complain(str(error))
+            raise typer.Exit(error.exit_code) from None
+        except KeyboardInterrupt:
+            raise typer.Exit(130) from None
+
+
+def _complain(*lines: str) -> None:
+    for line in lines:
+        typer.echo(f"conoid: {line}", err=True)
+
+
+app = typer.Typer(
+    cls=Guarded, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
+    help="Impact simulations: submit them, watch them, look at them.",
+)  # fmt: skip
+
+Url = Annotated[str | None, typer.Option("--url", help="The server [CONOID_URL, or the configuration file].")]
+Token = Annotated[str | None, typer.Option("--token", help="Who asks [CONOID_TOKEN, or the configuration file].")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
+CaseArgument = Annotated[str, typer.Argument(metavar="CASE", help="A .toml or .json file, or a shipped case by name.")]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Change a key of the case, as run.end_time='20 us'."),
+]
+RunArgument = Annotated[str, typer.Argument(metavar="RUN", help="The id of a run, or 'last'.")]
+FieldOption = Annotated[str, typer.Option("--field", help=f"What to colour by: {', '.join(FIELDS)}.")]
+
+
+def show(thing: RenderableType) -> None:
+    """Prints for people."""
+    Console(highlight=False).print(thing)
+
+
+def show_json(thing: Any) -> None:
+    """Prints for scripts: one JSON document."""
+    typer.echo(msgspec.json.format(msgspec.json.encode(thing), indent=2).decode())
+
+
+def find(session: Session, run: str) -> Run:
+    """The run of an id, or the newest one for ``last``. Raises ClientError when there is none yet."""
+    if run != "last":
+        return session.run(run)
+    newest = session.runs(limit=1)
+    if not newest:
+        raise ClientError("there is no run yet")
+    return session.run(newest[0].id)
+
+
+@app.command(
+    context_settings={"allow_extra_args": True, "ignore_unknown_options": True}, add_help_option=False,
+)  # fmt: skip
+def serve(ctx: typer.Context) -> None:
+    """Start the job server; takes the options of the server (conoid serve --help)."""
+    page = Path(__file__).parent / "web"
+    web = [] if "token" in ctx.args else ["--web", str(page)]
+    command = [sys.executable, "-m", "conoid.server", *web, *ctx.args]
+    sys.stdout.flush()
+    os.execv(command[0], command)
+
+
+@app.command()
+def validate(case: CaseArgument, overrides: Overrides = None, as_json: Json = False) -> None:
+    """Check a case and estimate what it needs; no server is asked."""
+    checked = case_of(case, overrides or ())
+    expected = estimate(checked, locate(case).parent)
+    if as_json:
+        show_json({"name": checked.name, "valid": True, "estimate": expected})
+        return
+    show(f"{checked.name}: valid")
+    show(tables.estimate_table(expected))
+
+
+@app.command()
+def submit(
+    case: CaseArgument,
+    overrides: Overrides = None,
+    key: Annotated[str | None, typer.Option("--key", help="Idempotency key: the same one makes no second run.")] = None,
+    url: Url = None,
+    token: Token = None,
+    as_json: Json = False,
+) -> None:
+    """Hand a case to the server; prints the run's id."""
+    with connect(url, token) as session:
+        run = session.submit(case, overrides or (), key)
+        if as_json:
+            show_json(run.status())
+        else:
+            typer.echo(run.id)
+
+
+@app.command(name="ls")
+def list_runs(
+    state: Annotated[list[State] | None, typer.Option("--state", help="Only runs in this state.")] = None,
+    limit: Annotated[int, typer.Option("--limit", min=1, help="At most so many.")] = 20,
+    url: Url = None,
+    token: Token = None,
+    as_json: Json = False,
+) -> None:
+    """List runs, newest first."""
+    with connect(url, token) as session:
+        runs = session.runs([one.value for one in state or ()], limit)
+    if as_json:
+        show_json(runs)
+    elif runs:
+        show(tables.runs_table(runs))
+    else:
+        typer.echo("no runs")
+
+
+@app.command(name="show")
+def show_run(run: RunArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
+    """Show one run: where it is, or how it ended."""
+    with connect(url, token) as session:
+        info = find(session, run).status()
+    if as_json:
+        show_json(info)
+        return
+    show(tables.run_table(info))
+    if info.outcome is not None:
+        show("")
+        show(tables.outcome_table(info.outcome))
+        if info.outcome.reference:
+            show(tables.checks_table(info.outcome.reference))
+
+
+@app.command(name="watch")
+def watch_run(
+    run: RunArgument,
+    plain: Annotated[bool, typer.Option("--plain", help="Lines instead of the panel.")] = False,
+    url: Url = None,
+    token: Token = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print every message as one line of JSON.")] = False,
+) -> None:
+    """Follow a run until it ends: 0 succeeded, 1 failed, 2 bad input, 4 cancelled. Ctrl-C leaves it running."""
+    with connect(url, token) as session:
+        found = find(session, run)
+        if as_json:
+            raise typer.Exit(_print_messages(found))
+        known = watch(found, False if plain else None)
+    if known.message or known.cause:
+        _complain(f"{known.run} {known.state.value}: {known.message or known.cause}")
+    raise typer.Exit(exit_code(known.state, known.cause))
+
+
+def _print_messages(run: Run) -> int:
+    known = Live(run.id)
+    for message in run.messages():
+        known.take(message)
+        typer.echo(msgspec.json.encode(message).decode())
+        sys.stdout.flush()
+    return exit_code(known.state, known.cause)
+
+
+@app.command()
+def cancel(run: RunArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
+    """Stop a run at its next step."""
+    with connect(url, token) as session:
+        info = find(session, run).cancel()
+    if as_json:
+        show_json(info)
+    else:
+        typer.echo(f"{info.id} {info.state.value}")
+
+
+@app.command()
+def get(
+    run: RunArgument,
+    names: Annotated[
+        list[str] | None, typer.Argument(metavar="[FILE]...", help="Files to fetch; all when none.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Folder to copy into; the run's id when not given.")] = None,
+    url: Url = None,
+    token: Token = None,
+    as_json: Annotated[bool, typer.Option("--json", help="List the run's files as JSON; copies nothing.")] = False,
+) -> None:
+    """Copy a run's files here."""
+    with connect(url, token) as session:
+        found = find(session, run)
+        if as_json:
+            show_json(found.files())
+            return
+        target = out or Path(found.id)
+        for name in names or [file.path for file in found.files()]:
+            typer.echo(str(found.download(target, name)))
+
+
+@app.command(name="view")
+def view_frame(
+    source: Annotated[str, typer.Argument(metavar="SOURCE", help="A run's id, its folder, or a frame file.")],
+    field: FieldOption = "mises",
+    out: Annotated[
+        Path | None, typer.Option("--out", help="The PNG; named after the run and the field if not given.")
+    ] = None,
+    frame: Annotated[int, typer.Option("--frame", help="Number of the frame; -1 is the last one.")] = -1,
+    mirror: Annotated[
+        str, typer.Option("--mirror", help="Complete a half or quarter model: auto, or planes such as x,y=0.002 (m).")
+    ] = "none",
+    limits: Annotated[tuple[float, float] | None, typer.Option("--range", help="Ends of the colour bar.")] = None,
+    size: Annotated[tuple[int, int], typer.Option("--size", min=64, max=16384, help="Width and height.")] = (
+        1600,
+        1200,
+    ),
+    raw: Annotated[bool, typer.Option("--raw", help="Values of every tet instead of means at the nodes.")] = False,
+    edges: Annotated[bool, typer.Option("--edges", help="Draw the edges of the mesh.")] = False,
+    url: Url = None,
+    token: Token = None,
+    as_json: Json = False,
+) -> None:
+    """Draw a frame as a PNG, off screen."""
+    options: dict[str, Any] = {
+        "out": out, "frame": frame, "mirror": mirror, "size": size, "limits": limits, "raw": raw, "edges": edges,
+    }  # fmt: skip
+    if Path(source).exists() or Path(source).suffix:
+        drawn = view(source, field, **options)
+    else:
+        with connect(url, token) as session:
+            drawn = view(find(session, source).result(), field, **options)
+    if as_json:
+        show_json(drawn)
+    else:
+        typer.echo(drawn.out)
+
+
+@app.command(name="run")
+def run_case(
+    case: CaseArgument,
+    ranks: Annotated[
+        int | None, typer.Option("--ranks", min=1, help="MPI ranks; the case's own number if not given.")
+    ] = None,
+    overrides: Overrides = None,
+    out: Annotated[Path, typer.Option("--out", help="Folder of the runs.")] = Path("runs/local"),
+    picture: Annotated[Path | None, typer.Option("--view", help="Draw the last frame to this PNG.")] = None,
+    field: Annotated[str | None, typer.Option("--field", help=f"What to colour by: {', '.join(FIELDS)}.")] = None,
+    plain: Annotated[bool, typer.Option("--plain", help="Lines instead of the panel.")] = False,
+    check: Annotated[bool, typer.Option("--check", help="End with 1 when a reference number is missed.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the outcome as JSON and nothing else.")] = False,
+) -> None:
+    """Do it all here: start a server, submit, watch, check, draw, stop the server. Ctrl-C cancels the run."""
+    chosen = [*(overrides or ()), *([f"run.ranks={ranks}"] if ranks is not None else [])]
+    raise typer.Exit(run_once(case, chosen, out, picture, field, plain=plain, check=check, as_json=as_json))
+
+
+def main() -> None:
+    """The entry point ``conoid``."""
+    app()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,51 @@
+"""Where the server is and who asks: options first, then the environment, then the user's configuration file."""
+
+import os
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+from .errors import ClientError
+
+DEFAULT_URL = "http://127.0.0.1:8750"
+
+
+@dataclass(frozen=True)
+class Target:
+    """Address of a server, and the token to show it (None: a server without access control)."""
+
+    url: str
+    token: str | None
+
+
+def config_file() -> Path:
+    """``~/.config/conoid/client.toml``; XDG_CONFIG_HOME is respected."""
+    base = os.environ.get("XDG_CONFIG_HOME") or str(Path.home() / ".config")
+    return Path(base) / "conoid" / "client.toml"
+
+
+def target(url: str | None = None, token: str | None = None) -> Target:
+    """The server to talk to. A token from the file is only shown to the server that the file names."""
+    saved = read_config()
+    chosen = (url or os.environ.get("CONOID_URL") or saved.get("url") or DEFAULT_URL).rstrip("/")
+    if not chosen.startswith(("http://", "https://")):
+        raise ClientError(f"url = {chosen!r}: write it with http:// or https://, such as {DEFAULT_URL}")
+    shown = token or os.environ.get("CONOID_TOKEN")
+    if not shown and chosen == saved.get("url", DEFAULT_URL).rstrip("/"):
+        shown = saved.get("token")
+    return Target(chosen, shown or None)
+
+
+def read_config() -> dict[str, str]:
+    """The keys of the configuration file; empty when there is none. Raises ClientError when it cannot be used."""
+    path = config_file()
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return {}
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise ClientError(f"{path}: cannot be read: {error}") from None
+    for key, value in data.items():
+        if key not in {"url", "token"} or not isinstance(value, str):
+            raise ClientError(f"{path}: {key} = {value!r}: allowed are url and token, each as text")
+    return data

@@ -1,0 +1,68 @@
+"""What can go wrong for a user, as one clear line each.
+
+::
+
+    ClientError
+    ├── ServiceError     the server refused: the fields of an RFC 9457 problem
+    ├── UnreachableError no server answered
+    ├── UnfinishedError  a result was asked of a run that has none yet
+    └── ViewError        no picture could be made
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+
+class ClientError(Exception):
+    """Its text is one line for people; ``exit_code`` is what the command line ends with."""
+
+    exit_code = 1
+
+
+class ServiceError(ClientError):
+    """The server refused. ``status`` is the HTTP status, ``problem`` the body as the server sent it."""
+
+    def __init__(self, status: int, problem: Mapping[str, Any]) -> None:
+        """``problem`` holds what RFC 9457 names (title, detail) and what Conoid adds (code, pointer, hint, errors)."""
+        self.status = status
+        self.problem = dict(problem)
+        super().__init__(_line(status, problem))
+
+    @property
+    def exit_code(self) -> int:  # type: ignore[override]
+        """2 for input that was refused, 1 for anything else."""
+        return 2 if self.status in {400, 413, 422} else 1
+
+    @property
+    def retryable(self) -> bool:
+        """True when the same request may succeed later."""
+        return bool(self.problem.get("retryable", self.status in {429, 502, 503, 504}))
+
+    @property
+    def problems(self) -> list[str]:
+        """Every error of a case that was refused, one line each; empty for other refusals."""
+        return [_entry(entry) for entry in self.problem.get("errors") or [] if isinstance(entry, Mapping)]
+
+
+class UnreachableError(ClientError):
+    """No server answered at the address, or the answer broke off."""
+
+
+class UnfinishedError(ClientError):
+    """The run has not written what was asked for yet."""
+
+
+class ViewError(ClientError):
+    """No picture could be made; the text says what is missing."""
+
+
+def _line(status: int, problem: Mapping[str, Any]) -> str:
+    said = str(problem.get("detail") or problem.get("title") or f"the server answered {status}")
+    hint = str(problem.get("hint") or "")
+    return f"{said} ({hint})" if hint and hint not in said else said
+
+
+def _entry(entry: Mapping[str, Any]) -> str:
+    key, value, message = (str(entry.get(name) or "") for name in ("key", "value", "message"))
+    head = " = ".join(text for text in (key, value) if text)
+    return f"{head}: {message}" if head else message

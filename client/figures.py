@@ -1,0 +1,52 @@
+"""Numbers and times as people read them: ``33.7 µs``, ``1.24 M``, ``2 min 05 s``."""
+
+import math
+from datetime import datetime
+
+_PREFIXES = ((1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+
+
+def si(value: float, unit: str, digits: int = 3) -> str:
+    """``value`` with an SI prefix before ``unit`` and ``digits`` significant digits."""
+    if not math.isfinite(value):
+        return f"{value} {unit}".strip()
+    if value == 0:
+        return f"0 {unit}".strip()
+    factor, prefix = next((pair for pair in _PREFIXES if abs(value) >= 0.9995 * pair[0]), (1e-12, "p"))
+    scaled = value / factor
+    before = max(1, math.floor(math.log10(abs(scaled)) + 1e-3) + 1)
+    return f"{scaled:.{max(0, digits - before)}f} {prefix}{unit}".strip()
+
+
+def count(value: float) -> str:
+    """A whole number with spaces between thousands: ``12 400``."""
+    return f"{round(value):,}".replace(",", " ")
+
+
+def duration(seconds: float) -> str:
+    """Wall time: ``0.4 s``, ``42 s``, ``2 min 05 s``, ``3 h 04 min``; a dash when it is not known."""
+    if not math.isfinite(seconds) or seconds < 0:
+        return "–"
+    if seconds < 9.95:
+        return f"{seconds:.1f} s"
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60:02d} s"
+    return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
+
+
+def clock(wall: float) -> str:
+    """The time of day of a Unix time, in the local zone: ``14:03:27``."""
+    return datetime.fromtimestamp(wall).strftime("%H:%M:%S")
+
+
+def day(wall: float) -> str:
+    """Date and time of a Unix time, in the local zone: ``2026-11-21 14:03``."""
+    return datetime.fromtimestamp(wall).strftime("%Y-%m-%d %H:%M")
+
+
+def number(value: float) -> str:
+    """Six significant digits, for tables."""
+    return f"{value:.6g}"

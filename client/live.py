@@ -1,0 +1,122 @@
+"""What is known of a run from the messages read so far: messages in, one picture out; no input or output here."""
+
+import time
+from collections import deque
+from dataclasses import dataclass, field
+
+from conoid.cases.messages import AnyMessage, Counts, Finished, Frame, Load, Log, Progress, Started, Status
+from conoid.cases.run import Cause, ExitCode, State
+
+PHASE_GROUPS = ("compute", "contact", "exchange", "output", "wait")
+_LOG_TAIL = 200
+
+
+@dataclass
+class Live:
+    """The newest message of each kind, and the tail of the log. ``seq`` is the number of the last message taken."""
+
+    run: str
+    title: str = ""
+    link: str = ""
+    """How the messages come: Zenoh or SSE."""
+    state: State = State.ACCEPTED
+    cause: str | None = None
+    message: str = ""
+    seq: int = 0
+    wall: float = 0.0
+    """Unix time of the last message, s."""
+    began: float | None = None
+    """Unix time at which the worker began to run, s."""
+    started: Started | None = None
+    progress: Progress | None = None
+    load: Load | None = None
+    phases: dict[str, list[float]] = field(default_factory=dict)
+    """Seconds of each rank in each of PHASE_GROUPS between the last two Load messages."""
+    loaded: float = 0.0
+    """Unix time of the last Load message, at first that of Started, s."""
+    counts: Counts | None = None
+    finished: Finished | None = None
+    frames: int = 0
+    log: deque[Log] = field(default_factory=lambda: deque(maxlen=_LOG_TAIL))
+
+    def take(self, message: AnyMessage) -> None:
+        """Takes one message in."""
+        self.seq, self.wall = message.seq, message.wall
+        match message:
+            case Status():
+                self._status(message)
+            case Started():
+                self.started, self.loaded = message, message.wall
+            case Progress():
+                self.progress = message
+            case Load():
+                self._load(message)
+            case Counts():
+                self.counts = message
+            case Frame():
+                self.frames += 1
+            case Log():
+                self.log.append(message)
+            case Finished():
+                self.finished = message
+
+    def _status(self, message: Status) -> None:
+        self.state = State(message.state)
+        self.cause, self.message = message.cause, message.message
+        if self.state is State.RUNNING and self.began is None:
+            self.began = message.wall
+
+    def _load(self, message: Load) -> None:
+        interval = message.wall - self.loaded if self.loaded else 0.0
+        self.load, self.loaded = message, message.wall
+        self.phases = grouped(message.phases, interval)
+
+    @property
+    def fraction(self) -> float:
+        """Share of the simulated time that is done, 0 to 1."""
+        if self.state is State.SUCCEEDED:
+            return 1.0
+        if self.progress is None or self.progress.end_time <= 0:
+            return 0.0
+        return min(1.0, max(0.0, self.progress.t / self.progress.end_time))
+
+    @property
+    def elapsed(self) -> float:
+        """Wall time since the worker began, s: to now while it lives, to its last message once it has ended."""
+        if self.began is None:
+            return 0.0
+        return max(0.0, (self.wall if self.state.final else time.time()) - self.began)
+
+    @property
+    def busy(self) -> list[float]:
+        """Share of the last interval that each rank spent on the model itself: neither exchange nor wait."""
+        totals = [sum(seconds) for seconds in zip(*self.phases.values(), strict=True)]
+        idle = [sum(self.phases[name][rank] for name in ("exchange", "wait") if name in self.phases)
+                for rank in range(len(totals))]  # fmt: skip
+        return [1.0 - lost / total if total > 0 else 0.0 for lost, total in zip(idle, totals, strict=True)]
+
+
+def grouped(phases: dict[str, list[float]], interval: float = 0.0) -> dict[str, list[float]]:
+    """Phases of the worker summed into PHASE_GROUPS; ``elements``, ``nodes`` and the like count as compute.
+
+    Where the worker does not time its waits, what is left of the ``interval``, s, is the wait.
+    """
+    sums: dict[str, list[float]] = {}
+    for name, seconds in phases.items():
+        group = name if name in PHASE_GROUPS else "compute"
+        before = sums.get(group, [0.0] * len(seconds))
+        sums[group] = [a + b for a, b in zip(before, seconds, strict=True)]
+    if sums and "wait" not in sums and interval > 0:
+        sums["wait"] = [max(0.0, interval - sum(spent)) for spent in zip(*sums.values(), strict=True)]
+    return {group: sums[group] for group in PHASE_GROUPS if group in sums}
+
+
+def exit_code(state: State, cause: str | None) -> int:
+    """What ``watch`` and ``run`` end with: 0 succeeded, 2 bad input, 4 cancelled, 1 anything else."""
+    if state is State.SUCCEEDED:
+        return ExitCode.SUCCEEDED
+    if state is State.CANCELLED:
+        return ExitCode.INTERRUPTED
+    if cause in {Cause.INPUT, Cause.MESH}:
+        return ExitCode.BAD_INPUT
+    return ExitCode.CRASHED

@@ -1,0 +1,108 @@
+"""``conoid run``: one case, from start to picture, on this machine."""
+
+import signal
+from pathlib import Path
+
+import msgspec
+from rich.console import Console
+
+from conoid.cases.load import material, parse_case
+from conoid.cases.outcome import Outcome
+from conoid.cases.run import ExitCode
+from conoid.cases.schema import Case
+
+from . import tables
+from .errors import ClientError
+from .live import Live, exit_code
+from .local import GRACE, LocalServer
+from .result import Result
+from .run import Run, RunInfo
+from .submission import data_of
+from .view import FIELDS, Drawn, view
+from .watch import show, tell
+
+_LAST_WORDS = 30.0
+"""s that the server gets to tell the end of a run whose last message has come."""
+
+
+def run_once(
+    case: str,
+    overrides: list[str],
+    runs: Path,
+    picture: Path | None = None,
+    field: str | None = None,
+    *,
+    plain: bool = False,
+    check: bool = False,
+    as_json: bool = False,
+) -> int:
+    """Runs a case with a server of its own and returns the exit code. Raises CaseError, ClientError.
+
+    Ctrl-C, and SIGTERM, cancel the run, wait for its end and stop the server.
+    """
+    if field is not None and field not in FIELDS:
+        raise ClientError(f"field = {field!r}: allowed: {', '.join(FIELDS)}")
+    data = data_of(case, overrides)
+    checked = parse_case(data)
+    out = Console(quiet=as_json, highlight=False)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    with LocalServer(runs, checked.run.ranks) as server:
+        run = server.session.submit(data)
+        info = _follow(run, checked, out, plain)
+    result = Result.open(server.runs / run.id)
+    drawn = None
+    if info.outcome is not None:
+        _report(result, info.outcome, out)
+        if picture is not None and result.frames:
+            drawn = view(result, field or _telling_field(checked), picture)
+            out.print(f"picture    {drawn.out}", soft_wrap=True)
+    if as_json:
+        print(_document(run.id, result, info, drawn))
+    return _code(info, check)
+
+
+def _follow(run: Run, case: Case, out: Console, plain: bool) -> RunInfo:
+    """Shows the run to its end; a first Ctrl-C cancels it, further ones change nothing."""
+    known = Live(run.id, title=case.title or case.name)
+    try:
+        link = run.link()
+        known.link = link.name
+        messages = run.messages(link=link)
+        if out.is_terminal and not plain and not out.quiet:
+            show(messages, known, out)
+        else:
+            tell(messages, known, lambda text: out.print(text, markup=False, soft_wrap=True))
+    except KeyboardInterrupt:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        out.print("cancelling: the run stops at its next step")
+        run.cancel()
+        return run.wait(GRACE + _LAST_WORDS)
+    return run.wait(_LAST_WORDS)
+
+
+def _report(result: Result, outcome: Outcome, out: Console) -> None:
+    out.print()
+    out.print(tables.outcome_table(outcome))
+    if outcome.reference:
+        out.print(tables.checks_table(outcome.reference))
+    out.print(f"results    {result.folder.path('outcome.json').parent}", soft_wrap=True)
+
+
+def _telling_field(case: Case) -> str:
+    """Plastic strain where something can yield, else the stress."""
+    yields = any(material(case, part.material).strength is not None for part in case.parts)
+    return "plastic_strain" if yields else "mises"
+
+
+def _document(run: str, result: Result, info: RunInfo, drawn: Drawn | None) -> str:
+    folder = result.folder.path("case.resolved.json").parent
+    document = {"run": run, "folder": str(folder), "state": info.state, "outcome": info.outcome, "picture": drawn}
+    return msgspec.json.format(msgspec.json.encode(document), indent=2).decode()
+
+
+def _code(info: RunInfo, check: bool) -> int:
+    missed = info.outcome is not None and not all(each.passed for each in info.outcome.reference)
+    if check and missed:
+        return ExitCode.CRASHED
+    return exit_code(info.state, info.cause)

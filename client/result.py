@@ -1,0 +1,162 @@
+"""What a run leaves, read when it is asked for: the outcome, the time history, the frames, the resolved case."""
+
+import csv
+import io
+import json
+from array import array
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+
+import msgspec
+
+from conoid.cases import layout, outcome
+from conoid.cases.outcome import Outcome
+
+from .errors import ClientError, UnfinishedError
+
+if TYPE_CHECKING:
+    from .view import Drawn
+
+Column: TypeAlias = "array[float] | list[str]"
+"""Numbers as a double array; text, such as the limiter of dt, as a list."""
+
+
+class Folder(Protocol):
+    """A run's folder, on this machine or behind a server."""
+
+    @property
+    def name(self) -> str:
+        """What to call the run."""
+
+    def names(self) -> list[str]:
+        """Every file, relative to the folder, with ``/``."""
+
+    def path(self, name: str) -> Path:
+        """A local path of a file. Raises UnfinishedError when the run has not written it."""
+
+
+@dataclass(frozen=True)
+class LocalFolder:
+    """A run's folder on this machine."""
+
+    root: Path
+
+    @property
+    def name(self) -> str:
+        """The name of the folder, which is the run's id where a server made it."""
+        return self.root.resolve().name
+
+    def names(self) -> list[str]:
+        """Every file, relative to the folder."""
+        return sorted(path.relative_to(self.root).as_posix() for path in self.root.rglob("*") if path.is_file())
+
+    def path(self, name: str) -> Path:
+        """The file itself."""
+        path = self.root / name
+        if not path.is_file():
+            raise UnfinishedError(f"{self.root} has no {name}")
+        return path
+
+
+@dataclass(frozen=True)
+class FrameFile:
+    """One written frame: its number, its simulated time in s (None when it is not listed), its name in the folder."""
+
+    index: int
+    time: float | None
+    name: str
+
+
+class Result:
+    """What a run left. Nothing is read before it is asked for; what has been read is kept."""
+
+    def __init__(self, folder: Folder) -> None:
+        """Reads nothing yet."""
+        self.folder = folder
+
+    @classmethod
+    def open(cls, path: Path | str) -> "Result":
+        """The result in a run's folder on this machine. Raises ClientError when there is no such folder."""
+        root = Path(path)
+        if not root.is_dir():
+            raise ClientError(f"{root}: there is no such folder")
+        return cls(LocalFolder(root))
+
+    def __repr__(self) -> str:
+        """Names the run."""
+        return f"<result of {self.folder.name}>"
+
+    @cached_property
+    def outcome(self) -> Outcome:
+        """How the run ended. Raises UnfinishedError before its end."""
+        path = self.folder.path(layout.OUTCOME)
+        try:
+            return outcome.from_json(path.read_bytes())
+        except msgspec.MsgspecError as error:
+            raise ClientError(f"{path}: this outcome cannot be read: {error}") from None
+
+    @cached_property
+    def case(self) -> dict[str, Any]:
+        """The case with every default filled in, in SI, as plain data."""
+        data: dict[str, Any] = json.loads(self.folder.path(layout.RESOLVED_CASE).read_bytes())
+        return data
+
+    @cached_property
+    def history(self) -> dict[str, Column]:
+        """The columns of history.csv, in its order: step, t (s), dt (s), the energies (J), the probes."""
+        return read_columns(self.folder.path(layout.HISTORY).read_text(encoding="utf-8"))
+
+    @cached_property
+    def frames(self) -> list[FrameFile]:
+        """The frames, in the order of their numbers."""
+        times = self._frame_times()
+        names = [name for name in self.folder.names() if name.startswith(f"{layout.FRAMES}/")]
+        return [
+            FrameFile(int(path.stem), times.get(path.name), path.as_posix())
+            for path in sorted(map(Path, names))
+            if path.suffix == ".vtkhdf" and path.stem.isdecimal()
+        ]
+
+    def frame(self, index: int = -1) -> Path:
+        """The file of a frame by its number; -1 is the last one. Raises UnfinishedError when it is not there."""
+        found = self.frames[-1:] if index == -1 else [frame for frame in self.frames if frame.index == index]
+        if not found:
+            wanted = "any frame" if index == -1 else f"frame {index}"
+            raise UnfinishedError(f"{self.folder.name} has not written {wanted}; it has {len(self.frames)}")
+        return self.folder.path(found[0].name)
+
+    def view(self, field: str = "mises", out: Path | str | None = None, **options: Any) -> "Drawn":
+        """Draws a frame as a PNG; takes the options of ``conoid.client.view.view``. Raises ViewError."""
+        from .view import view
+
+        return view(self, field, out, **options)
+
+    def _frame_times(self) -> dict[str, float]:
+        try:
+            text = self.folder.path(f"{layout.FRAMES}/{layout.FRAME_SERIES}").read_bytes()
+            return {entry["name"]: float(entry["time"]) for entry in json.loads(text)["files"]}
+        except (UnfinishedError, ValueError, KeyError):
+            return {}
+
+
+def read_columns(text: str) -> dict[str, Column]:
+    """The columns of CSV text with a header line; a column that is not all numbers stays text."""
+    rows = csv.reader(io.StringIO(text))
+    names = next(rows, [])
+    columns: list[list[str]] = [list(column) for column in zip(*_whole(rows, len(names)), strict=True)]
+    return {name: _column(column) for name, column in zip(names, columns or [[] for _ in names], strict=True)}
+
+
+def _whole(rows: Iterator[list[str]], length: int) -> Iterator[list[str]]:
+    """The rows that have every column: the last line of a file that is being written may be cut."""
+    return (row for row in rows if len(row) == length)
+
+
+def _column(column: list[str]) -> Column:
+    try:
+        return array("d", map(float, column))
+    except ValueError:
+        return column

@@ -1,0 +1,207 @@
+"""A handle of a run on a server: status, wait, watch, cancel, events, files, download, result."""
+
+import shutil
+import tempfile
+import time
+import weakref
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
+
+import msgspec
+
+from conoid.cases import keys
+from conoid.cases.messages import AnyMessage, Progress
+from conoid.cases.outcome import Outcome
+from conoid.cases.run import State
+
+from .errors import ClientError, ServiceError, UnfinishedError
+from .journal import from_line
+from .live import Live
+from .result import Result
+
+if TYPE_CHECKING:
+    from .session import Session
+    from .stream import Link
+
+_WAIT = 20.0
+
+
+class RunInfo(msgspec.Struct, kw_only=True, frozen=True):
+    """What the server tells of a run. Times are Unix s, None when they have not come yet."""
+
+    id: str
+    owner: str
+    name: str
+    state: State
+    ranks: int
+    submitted: float
+    cause: str | None = None
+    message: str = ""
+    reason: str = ""
+    """What a queued run waits for."""
+    started: float | None = None
+    finished: float | None = None
+    title: str = ""
+    """This and what follows is told of one run, not in a list."""
+    estimate: dict[str, Any] = {}
+    progress: Progress | None = None
+    outcome: Outcome | None = None
+
+
+class FileInfo(msgspec.Struct, kw_only=True, frozen=True):
+    """A file in a run's folder: its path there, its bytes."""
+
+    path: str
+    size: int
+
+
+class Listing(msgspec.Struct, kw_only=True, frozen=True):
+    """What lies in a run's folder."""
+
+    files: list[FileInfo]
+
+
+class EventPage(msgspec.Struct, kw_only=True, frozen=True):
+    """Journal lines, the number of the last one, and whether there are more."""
+
+    events: list[msgspec.Raw]
+    last: int
+    more: bool
+
+
+@dataclass
+class Run:
+    """A run on a server. Nothing is asked before a method is called."""
+
+    session: "Session"
+    id: str
+
+    # State ------------------------------------------------------------------------------------------------------------
+
+    @property
+    def path(self) -> str:
+        """Its place in the REST interface."""
+        return f"/v1/runs/{quoted(self.id)}"
+
+    def status(self) -> RunInfo:
+        """What the server knows of it now."""
+        return self.session.get(RunInfo, self.path)
+
+    def wait(self, timeout: float | None = None) -> RunInfo:
+        """Returns when the run has ended. Raises TimeoutError after ``timeout`` s."""
+        deadline = None if timeout is None else time.monotonic() + timeout
+        while True:
+            left = _WAIT if deadline is None else deadline - time.monotonic()
+            info = self.session.get(RunInfo, self.path, wait=max(0.0, min(_WAIT, left)))
+            if info.state.final:
+                return info
+            if deadline is not None and time.monotonic() >= deadline:
+                raise TimeoutError(f"run {self.id} is still {info.state.value} after {timeout:g} s")
+
+    def cancel(self) -> RunInfo:
+        """Asks it to stop; to ask twice does no harm."""
+        return self.session.post(RunInfo, f"{self.path}:cancel")
+
+    # Messages ---------------------------------------------------------------------------------------------------------
+
+    def events(self, after: int = 0) -> list[AnyMessage]:
+        """The messages in its journal with a number above ``after``."""
+        found: list[AnyMessage] = []
+        more = True
+        while more:
+            page = self.session.get(EventPage, f"{self.path}/events", after=after)
+            found += map(from_line, page.events)
+            after, more = page.last, page.more
+        return found
+
+    def messages(self, after: int = 0, link: "Link | None" = None) -> Iterator[AnyMessage]:
+        """Every message after ``after``, once and in order: what was said, then what is said, to the run's end.
+
+        Over Zenoh where it can be reached, else over SSE; ``link`` chooses.
+        """
+        from .stream import follow
+
+        return follow(link or self.link(), self.events, lambda: self.status().state.final, after)
+
+    def link(self) -> "Link":
+        """A subscription to the run: over Zenoh where it can be reached, else over SSE."""
+        from .stream import SseLink, StreamError, ZenohLink
+
+        me = self.session.me()
+        if me.zenoh is not None:
+            with suppress(StreamError):
+                return ZenohLink(me.zenoh, keys.run_prefix(me.owner, self.id))
+        return SseLink(lambda: self.session.stream(f"{self.path}/stream"))
+
+    def watch(self, live: bool | None = None) -> Live:
+        """Shows the run in the terminal until it ends. ``live`` chooses the panel or plain lines; None: as it fits."""
+        from .watch import watch
+
+        return watch(self, live)
+
+    # Files ------------------------------------------------------------------------------------------------------------
+
+    def files(self) -> list[FileInfo]:
+        """What lies in its folder."""
+        return self.session.get(Listing, f"{self.path}/files").files
+
+    def download(self, folder: Path | str, name: str | None = None) -> Path:
+        """Copies one file, or all, into ``folder`` and returns the path of the file, or the folder."""
+        root = Path(folder)
+        names = [name] if name is not None else [file.path for file in self.files()]
+        for each in names:
+            self._fetch(each, inside(root, each))
+        return inside(root, name) if name is not None else root
+
+    def _fetch(self, name: str, target: Path) -> None:
+        try:
+            self.session.download(f"{self.path}/files/{quoted(name, safe='/')}", target)
+        except ServiceError as error:
+            if error.status == 404:
+                raise UnfinishedError(f"run {self.id} has no {name}") from None
+            raise
+
+    def result(self) -> Result:
+        """What it has written: fetched when it is asked for, kept until the result is gone."""
+        return Result(RemoteFolder(self))
+
+
+class RemoteFolder:
+    """A run's folder behind a server; each file is fetched once, into a folder that goes away with this one."""
+
+    def __init__(self, run: Run) -> None:
+        """Fetches nothing yet."""
+        self.run = run
+        self.root = Path(tempfile.mkdtemp(prefix="conoid-"))
+        weakref.finalize(self, shutil.rmtree, self.root, ignore_errors=True)
+
+    @property
+    def name(self) -> str:
+        """The run's id."""
+        return self.run.id
+
+    def names(self) -> list[str]:
+        """Every file, relative to the folder."""
+        return [file.path for file in self.run.files()]
+
+    def path(self, name: str) -> Path:
+        """A local copy."""
+        target = inside(self.root, name)
+        return target if target.is_file() else self.run.download(self.root, name)
+
+
+def quoted(text: str, safe: str = "") -> str:
+    """``text`` as a part of an address."""
+    return quote(text, safe=safe)
+
+
+def inside(root: Path, name: str) -> Path:
+    """The path of ``name`` below ``root``. Raises ClientError for a name that would leave it."""
+    path = PurePosixPath(name)
+    if path.is_absolute() or ".." in path.parts or not path.parts:
+        raise ClientError(f"the server names a file {name!r}, which lies outside the run's folder")
+    return root.joinpath(*path.parts)

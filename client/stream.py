@@ -1,0 +1,201 @@
+"""A run's messages, live: over Zenoh where it can be reached, else over SSE; gaps are refilled over REST.
+
+The only module of the client that knows Zenoh. A late joiner subscribes first, then reads the history, then the
+stream: nothing is missed and nothing told twice.
+"""
+
+import json
+import queue
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from typing import Protocol, TypeVar, cast
+
+import msgspec
+import zenoh
+
+from conoid.cases import keys
+from conoid.cases.messages import AnyMessage, Status, from_msgpack
+from conoid.cases.run import State
+
+from .errors import ClientError, UnreachableError
+from .order import InOrder, Refill
+from .session import Router
+
+T = TypeVar("T")
+
+_CAPACITY = 4096
+_OPEN_SECONDS = 5.0
+_CLOSE_SECONDS = 2.0
+_SILENCE = 3.0
+_PATIENCE = 60.0
+
+
+class StreamError(ClientError):
+    """Zenoh cannot be used: no router, or it refuses the user."""
+
+
+class Link(Protocol):
+    """Messages as they arrive, perhaps with gaps and repeats."""
+
+    name: str
+
+    def get(self, timeout: float) -> AnyMessage | None:
+        """The next message; None after ``timeout`` s without one."""
+
+    def close(self) -> None:
+        """Lets go; a second call does nothing."""
+
+
+class Mailbox:
+    """A bounded queue between the threads that receive and the one that reads; when it is full, the new are dropped.
+
+    What is dropped leaves a gap in ``seq``, and gaps are refilled.
+    """
+
+    def __init__(self) -> None:
+        """Empty."""
+        self._queue: queue.Queue[AnyMessage] = queue.Queue(_CAPACITY)
+
+    def put(self, message: AnyMessage) -> None:
+        """Never waits."""
+        with suppress(queue.Full):
+            self._queue.put_nowait(message)
+
+    def get(self, timeout: float) -> AnyMessage | None:
+        """The oldest message, or None after ``timeout`` s."""
+        try:
+            return self._queue.get(timeout=timeout)
+        except queue.Empty:
+            return None
+
+
+class ZenohLink:
+    """A native subscription to everything that a run says."""
+
+    name = "Zenoh"
+
+    def __init__(self, router: Router, prefix: str) -> None:
+        """Opens a session and subscribes. Raises StreamError when that does not succeed within seconds."""
+        self._mailbox = Mailbox()
+        self._session = _within(_OPEN_SECONDS, lambda: zenoh.open(_config(router)))
+        self._subscriber = self._session.declare_subscriber(keys.everything(prefix), self._receive)
+
+    def _receive(self, sample: zenoh.Sample) -> None:
+        with suppress(msgspec.MsgspecError):
+            self._mailbox.put(from_msgpack(sample.payload.to_bytes()))
+
+    def get(self, timeout: float) -> AnyMessage | None:
+        """The next message; None after ``timeout`` s without one."""
+        return self._mailbox.get(timeout)
+
+    def close(self) -> None:
+        """Closes the session; a router that does not answer is not waited for."""
+        with suppress(StreamError):
+            _within(_CLOSE_SECONDS, self._session.close)
+
+
+def _config(router: Router) -> zenoh.Config:
+    config = zenoh.Config()
+    settings: dict[str, object] = {
+        "mode": "client", "connect/endpoints": [router.endpoint], "connect/timeout_ms": 500,
+        "scouting/multicast/enabled": False, "scouting/gossip/enabled": False,
+        "transport/shared_memory/enabled": False, "transport/unicast/open_timeout": 3000,
+    }  # fmt: skip
+    if router.user is not None:
+        settings |= {"transport/auth/usrpwd/user": router.user, "transport/auth/usrpwd/password": router.password}
+    for key, value in settings.items():
+        config.insert_json5(key, json.dumps(value))
+    return config
+
+
+def _within(seconds: float, work: Callable[[], T]) -> T:
+    """The value of ``work``, done in a thread of its own. Raises StreamError when it fails or takes longer."""
+    done: queue.Queue[tuple[T | None, Exception | None]] = queue.Queue()
+
+    def attempt() -> None:
+        try:
+            done.put((work(), None))
+        except Exception as error:
+            done.put((None, error))
+
+    threading.Thread(target=attempt, name="zenoh", daemon=True).start()
+    try:
+        value, error = done.get(timeout=seconds)
+    except queue.Empty:
+        raise StreamError(f"the Zenoh router did not answer within {seconds:g} s") from None
+    if error is not None:
+        raise StreamError(f"the Zenoh router refused or cannot be reached: {' '.join(str(error).split())}") from None
+    return cast(T, value)
+
+
+class SseLink:
+    """The server's SSE bridge, read in a thread; when it breaks off it says no more, and the journal is polled."""
+
+    name = "SSE"
+
+    def __init__(self, events: Callable[[], Iterator[AnyMessage]]) -> None:
+        """``events`` opens the stream and gives its messages."""
+        self._mailbox = Mailbox()
+        self._closed = threading.Event()
+        threading.Thread(target=self._read, args=(events,), name="sse", daemon=True).start()
+
+    def _read(self, events: Callable[[], Iterator[AnyMessage]]) -> None:
+        with suppress(ClientError):
+            for message in events():
+                if self._closed.is_set():
+                    return
+                self._mailbox.put(message)
+
+    def get(self, timeout: float) -> AnyMessage | None:
+        """The next message; None after ``timeout`` s without one."""
+        return self._mailbox.get(timeout)
+
+    def close(self) -> None:
+        """The thread ends with its next message, or with the process."""
+        self._closed.set()
+
+
+def follow(link: Link, refill: Refill, ended: Callable[[], bool], after: int = 0) -> Iterator[AnyMessage]:
+    """Every message after ``after``, once and in order, to the run's final status; closes ``link``.
+
+    ``refill`` reads the journal, ``ended`` asks the server whether the run is over. While the link is silent both are
+    asked every few seconds, so a dead router delays messages and loses none. A server that does not answer is waited
+    for, a minute long; then UnreachableError is raised.
+    """
+    order = InOrder(_patient(refill), after)
+    try:
+        for message in _told(link, order, ended):
+            yield message
+            if isinstance(message, Status) and State(message.state).final:
+                return
+    finally:
+        link.close()
+
+
+def _told(link: Link, order: InOrder, ended: Callable[[], bool]) -> Iterator[AnyMessage]:
+    yield from order.catch_up()
+    over = False
+    while not over:
+        message = link.get(_SILENCE)
+        if message is not None:
+            yield from order.take(message)
+            continue
+        with suppress(UnreachableError):
+            over = ended()
+        yield from order.catch_up()
+
+
+def _patient(refill: Refill) -> Refill:
+    def refilled(after: int) -> list[AnyMessage]:
+        deadline = time.monotonic() + _PATIENCE
+        while True:
+            try:
+                return refill(after)
+            except UnreachableError:
+                if time.monotonic() > deadline:
+                    raise
+                time.sleep(1.0)
+
+    return refilled

@@ -1,0 +1,55 @@
+"""A case as the user names it: a file, the name of a shipped case, or plain data; sent as it is written."""
+
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from conoid.cases.load import CaseError, apply_overrides, parse_case, read_data, shipped, shipped_path
+from conoid.cases.problems import Problem, nearest, shown
+from conoid.cases.schema import Case
+
+CaseSource = str | Path | Mapping[str, Any] | Case
+_SUFFIXES = {".toml": "application/toml", ".json": "application/json"}
+
+
+def locate(source: str | Path) -> Path:
+    """The file that is meant: a path, or the name of a shipped case. Raises CaseError."""
+    path = Path(source)
+    if path.suffix in _SUFFIXES or path.exists():
+        return path
+    if str(source) in shipped():
+        return shipped_path(str(source))
+    hint = nearest(str(source), shipped())
+    raise CaseError([Problem("case", shown(str(source)), f"neither a .toml or .json file nor a shipped case; {hint}")])
+
+
+def data_of(source: CaseSource, overrides: Iterable[str] = ()) -> dict[str, Any]:
+    """The plain data of a case with the overrides made, not checked yet. Raises CaseError."""
+    if isinstance(source, Case):
+        data = source.model_dump(mode="json", exclude_unset=True)
+    elif isinstance(source, Mapping):
+        data = dict(source)
+    else:
+        data = read_data(locate(source))
+    return apply_overrides(data, overrides)
+
+
+def case_of(source: CaseSource, overrides: Iterable[str] = ()) -> Case:
+    """The checked case. Raises CaseError with every error."""
+    return parse_case(data_of(source, overrides))
+
+
+def body_of(source: CaseSource, overrides: Iterable[str] = ()) -> tuple[str, bytes]:
+    """Content type and body to send: a file as it is written, anything else as JSON. The server checks it.
+
+    Raises CaseError when there is no such file, or an override cannot be made.
+    """
+    changes = list(overrides)
+    if isinstance(source, str | Path) and not changes:
+        path = locate(source)
+        try:
+            return _SUFFIXES[path.suffix], path.read_bytes()
+        except (OSError, KeyError):
+            read_data(path)
+    return "application/json", json.dumps(data_of(source, changes), default=str).encode()

@@ -1,0 +1,113 @@
+"""What the command line prints once: lists of runs, one run, estimates, outcomes, reference numbers."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+from rich import box
+from rich.table import Table
+from rich.text import Text
+
+from conoid.cases.estimate import Estimate
+from conoid.cases.outcome import Check, Outcome
+from conoid.cases.run import State
+
+from .display import STATE_STYLE
+from .figures import count, day, duration, number, si
+from .run import RunInfo
+
+
+def table(*columns: str, right: Sequence[str] = ()) -> Table:
+    """An open table with these columns; those named in ``right`` are numbers."""
+    made = Table(box=box.SIMPLE_HEAD, header_style="bold", pad_edge=False)
+    for column in columns:
+        made.add_column(column, justify="right" if column in right else "left", no_wrap=column == "run")
+    return made
+
+
+def pairs(entries: Mapping[str, str | Text]) -> Table:
+    """Names and values in two columns; entries without a value are left out."""
+    grid = Table.grid(padding=(0, 2))
+    grid.add_column(style="bright_black", no_wrap=True)
+    grid.add_column(overflow="fold")
+    for name, value in entries.items():
+        if value:
+            grid.add_row(name, value)
+    return grid
+
+
+def state_text(state: State, cause: str | None = None) -> Text:
+    """The state in its colour, with the cause of the end."""
+    text = Text(state.value, style=STATE_STYLE.get(state, "bold"))
+    return text.append(f" ({cause})", style="default") if cause and cause != state.value else text
+
+
+def runs_table(runs: Sequence[RunInfo]) -> Table:
+    """One line a run."""
+    made = table("run", "case", "state", "ranks", "submitted", "took", right=("ranks", "took"))
+    for run in runs:
+        took = duration((run.finished or 0) - run.started) if run.started and run.finished else ""
+        state = state_text(run.state, run.cause)
+        made.add_row(run.id, run.name, state, str(run.ranks), day(run.submitted), took)
+    return made
+
+
+def run_table(run: RunInfo) -> Table:
+    """Everything about one run."""
+    progress = run.progress
+    done = None if progress is None else 100 * progress.t / progress.end_time
+    return pairs({
+        "run": run.id,
+        "case": f"{run.name}  {run.title}".strip(),
+        "state": state_text(run.state, run.cause),
+        "why": run.message or run.reason,
+        "owner": run.owner,
+        "ranks": str(run.ranks),
+        "submitted": day(run.submitted),
+        "started": day(run.started) if run.started else "",
+        "finished": day(run.finished) if run.finished else "",
+        "progress": "" if progress is None or done is None else (
+            f"{done:.1f} %, step {count(progress.step)}, dt {si(progress.dt, 's')} held by {progress.limiter}, "
+            f"{duration(progress.eta)} left"
+        ),
+    })  # fmt: skip
+
+
+def estimate_table(expected: Estimate) -> Table:
+    """What a case needs, about; a dash where a mesh file does not tell."""
+    return pairs({
+        "tets": _about(expected.elements, count),
+        "nodes": _about(expected.nodes, count),
+        "time step": _about(expected.dt, lambda value: si(value, "s")),
+        "steps": _about(expected.steps, count),
+        "memory": _about(expected.memory_bytes, lambda value: si(value, "B")),
+        "core time": _about(expected.core_seconds, duration),
+    })  # fmt: skip
+
+
+def _about(value: float | None, shown: Callable[[float], str]) -> str:
+    return "–" if value is None else f"about {shown(value)}"
+
+
+def outcome_table(outcome: Outcome) -> Table:
+    """How a run ended."""
+    energy, ranks = outcome.energy, f"{outcome.ranks} rank{'' if outcome.ranks == 1 else 's'}"
+    return pairs({
+        "state": state_text(State(outcome.state), outcome.cause),
+        "why": outcome.message,
+        "simulated": f"{si(outcome.time, 's')} in {count(outcome.steps)} steps",
+        "took": f"{duration(outcome.elapsed)} on {ranks}, {duration(outcome.setup)} to the first step",
+        "model": f"{count(outcome.elements)} tets, {count(outcome.nodes)} nodes",
+        "speed": f"{si(outcome.element_updates_per_second, '')} element updates a CPU-second and core",
+        "energy": "" if energy is None else f"residual {energy.residual:.1e}, worst {outcome.worst_residual:.1e}",
+        "digest": outcome.digest[:16],
+        "warnings": "\n".join(outcome.warnings),
+    })  # fmt: skip
+
+
+def checks_table(checks: Sequence[Check]) -> Table:
+    """The reference numbers: value, expected, tolerance, and whether they agree."""
+    made = table("reference", "value", "expected", "tolerance", "", right=("value", "expected", "tolerance"))
+    for check in checks:
+        verdict = Text("pass", style="bold green") if check.passed else Text("FAIL", style="bold red")
+        value, expected = (f"{number(each)} {check.unit}".strip() for each in (check.value, check.expected))
+        made.add_row(check.name, value, expected, f"± {number(check.tolerance)}", verdict)
+    return made

@@ -1,0 +1,56 @@
+"""Shows a run in the terminal until it ends: a live panel on a terminal, plain lines anywhere else."""
+
+import time
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.live import Live as Screen
+
+from conoid.cases.messages import AnyMessage, Log, Progress, Status
+
+from .display import line, panel
+from .figures import clock
+from .live import Live
+
+if TYPE_CHECKING:
+    from .run import Run
+
+LINE_EVERY = 2.0
+"""s between two plain lines of progress; changes of state and warnings are told at once."""
+
+
+def watch(run: "Run", live: bool | None = None, console: Console | None = None) -> Live:
+    """Follows ``run`` to its end. ``live``: the panel (True), plain lines (False), what the terminal can (None)."""
+    out = console or Console()
+    known = Live(run.id, title=run.status().title)
+    link = run.link()
+    known.link = link.name
+    messages = run.messages(link=link)
+    if out.is_terminal if live is None else live:
+        return show(messages, known, out)
+    return tell(messages, known, lambda text: out.print(text, highlight=False, markup=False, soft_wrap=True))
+
+
+def show(messages: Iterable[AnyMessage], known: Live, out: Console) -> Live:
+    """The panel, drawn four times a second."""
+    with Screen(get_renderable=lambda: panel(known), console=out, refresh_per_second=4) as screen:
+        for message in messages:
+            known.take(message)
+        screen.refresh()
+    return known
+
+
+def tell(messages: Iterable[AnyMessage], known: Live, write: Callable[[str], None]) -> Live:
+    """One plain line an update, at most one of progress every ``LINE_EVERY`` s."""
+    told = 0.0
+    for message in messages:
+        known.take(message)
+        if isinstance(message, Log):
+            if message.level in {"warning", "error"}:
+                write(f"{clock(message.wall)}  {known.run}  {message.level}: {message.text}")
+        elif isinstance(message, Status) or (isinstance(message, Progress) and time.monotonic() - told >= LINE_EVERY):
+            if isinstance(message, Progress):
+                told = time.monotonic()
+            write(line(known))
+    return known

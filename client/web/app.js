@@ -1,0 +1,126 @@
+// Which page is shown: sign in, the list of runs, or one run.
+
+import { Problem, call, token } from "./api.js";
+import { duration, h, meter, moment, pill } from "./figures.js";
+import { FINAL } from "./live.js";
+import { RunPage } from "./run.js";
+
+const page = document.getElementById("page");
+const who = document.getElementById("who");
+const leave = document.getElementById("leave");
+const MOST_ASKED = 8; // A list tells no progress; this many running ones are asked for theirs.
+let shown = null;
+
+function show(next) {
+  shown?.close?.();
+  shown = next;
+  page.replaceChildren(next.element);
+}
+
+// Sign in --------------------------------------------------------------------------------------------------------------
+
+function signIn(told = "") {
+  who.textContent = "";
+  leave.hidden = true;
+  const field = h("input", { type: "password", autocomplete: "off", "aria-label": "token", placeholder: "token", required: "" });
+  const submit = async (event) => {
+    event.preventDefault();
+    token.set(field.value.trim());
+    await start();
+  };
+  const form = h("form.card.sign-in", { onsubmit: submit },
+    h("h1", {}, "Sign in"),
+    h("p.hint", {}, "Paste the token that the server gave you. It is kept in this tab only, and forgotten when you close it."),
+    field,
+    told ? h("p.problem", {}, told) : "",
+    h("div", {}, h("button", {}, "Sign in")));
+  show({ element: form });
+  field.focus();
+}
+
+// The list -------------------------------------------------------------------------------------------------------------
+
+class RunsPage {
+  constructor() {
+    this.body = h("tbody");
+    this.note = h("p.hint", { hidden: "" });
+    const head = h("thead", {}, h("tr", {}, ["run", "state", "progress", "ranks", ""].map((name) => h("th", { scope: "col" }, name))));
+    this.table = h("table.runs", {}, head, this.body);
+    this.element = h("div", {}, h("div.card-head", {}, h("h1", {}, "Runs")), h("div.card", {}, this.table, this.note));
+    document.title = "Conoid";
+    this.read();
+    this.timer = setInterval(() => document.hidden || this.read(), 3000);
+  }
+
+  close() {
+    clearInterval(this.timer);
+    this.closed = true;
+  }
+
+  async read() {
+    try {
+      const { runs } = await call("v1/runs?limit=100");
+      await Promise.all(runs.filter((run) => run.state === "running").slice(0, MOST_ASKED).map(async (run) => {
+        Object.assign(run, await call(`v1/runs/${encodeURIComponent(run.id)}`));
+      }));
+      if (!this.closed) this.draw(runs);
+    } catch (error) {
+      if (this.closed) return;
+      if (error instanceof Problem && error.status === 401) signIn("The server does not accept this token any more.");
+      else this.say(h("span.problem", {}, `No answer from the server: ${error.message}`));
+    }
+  }
+
+  say(...children) {
+    this.note.hidden = !children.length;
+    this.note.replaceChildren(...children);
+  }
+
+  draw(runs) {
+    this.body.replaceChildren(...runs.map(row));
+    this.table.hidden = !runs.length;
+    if (runs.length) this.say();
+    else this.say("No runs yet. Submit one: ", h("code", {}, "conoid submit taylor_copper"));
+  }
+}
+
+function row(run) {
+  const link = `#/runs/${encodeURIComponent(run.id)}`;
+  const open = () => { location.hash = link; };
+  const share = run.state === "succeeded" ? 1 : run.progress ? run.progress.t / run.progress.end_time : 0;
+  const took = FINAL.has(run.state) && run.started ? ` · ${duration(run.finished - run.started)}` : "";
+  return h("tr", { onclick: open },
+    h("td", {}, h("a.name", { href: link }, run.title || run.name), h("span.id", {}, run.id)),
+    h("td", { title: run.message || run.reason }, pill(run.state)),
+    h("td.bar", { style: { minWidth: "120px" } }, meter(run.state, share)),
+    h("td.ranks-of", {}, String(run.ranks)),
+    h("td.right.when", {}, moment(run.submitted) + took));
+}
+
+// Where we are ---------------------------------------------------------------------------------------------------------
+
+function route() {
+  const [, run] = /^#\/runs\/([^/]+)$/.exec(location.hash) ?? [];
+  show(run ? new RunPage(decodeURIComponent(run)) : new RunsPage());
+}
+
+async function start() {
+  try {
+    const me = await call("v1/me");
+    who.textContent = me.owner;
+    leave.hidden = !token.get();
+    route();
+  } catch (error) {
+    const known = error instanceof Problem && (error.status === 401 || error.status === 403);
+    if (known) signIn(token.get() ? "The server does not know this token." : "");
+    else page.replaceChildren(h("p.problem", {}, `No answer from the server: ${error.message}`));
+    if (known) token.clear();
+  }
+}
+
+leave.addEventListener("click", () => {
+  token.clear();
+  signIn();
+});
+addEventListener("hashchange", () => (shown?.element?.matches?.("form") ? start() : route()));
+start();

@@ -1,0 +1,39 @@
+"""Numbers as people read them."""
+
+import math
+
+import pytest
+
+from conoid.client.figures import count, duration, number, si
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (80e-6, "s", "80.0 µs"),
+        (8.1e-9, "s", "8.10 ns"),
+        (0.99999e-6, "s", "1.00 µs"),
+        (999.96, "J", "1.00 kJ"),
+        (-215e6, "Pa", "-215 MPa"),
+        (9.7e6, "", "9.70 M"),
+        (0.0, "J", "0 J"),
+        (2e-15, "s", "0.00 ps"),
+        (math.inf, "s", "inf s"),
+    ],
+)
+def test_si(value: float, unit: str, text: str) -> None:
+    assert si(value, unit) == text
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [(0.42, "0.4 s"), (9.96, "10 s"), (59.6, "1 min 00 s"), (125, "2 min 05 s"), (11040, "3 h 04 min"), (-1, "–"),
+     (math.nan, "–")],
+)  # fmt: skip
+def test_duration(seconds: float, text: str) -> None:
+    assert duration(seconds) == text
+
+
+def test_counts_and_numbers() -> None:
+    assert count(1234567.4) == "1 234 567"
+    assert number(0.0214612345) == "0.0214612"

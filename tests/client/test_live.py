@@ -1,0 +1,116 @@
+"""The picture that follows from the messages, and how it looks in a terminal."""
+
+import io
+
+import pytest
+from rich.console import Console
+
+from conoid.cases.run import State
+from conoid.client import display
+from conoid.client.live import Live, exit_code, grouped
+from conoid.client.watch import show, tell
+
+from . import stories
+
+
+def told(last: int) -> Live:
+    live = Live(stories.RUN, title="A bar")
+    for message in stories.whole()[:last]:
+        live.take(message)
+    return live
+
+
+def test_progress_is_a_share_of_the_simulated_time() -> None:
+    assert told(4).fraction == 0.0
+    assert told(6).fraction == 0.25
+    assert told(15).fraction == 1.0
+
+
+def test_time_stands_still_once_the_run_has_ended() -> None:
+    assert told(15).elapsed == 15 - 4
+
+
+def test_phases_are_grouped_and_the_rest_of_the_interval_is_the_wait() -> None:
+    live = told(7)
+    assert live.phases == {
+        "compute": pytest.approx([1.2, 0.7]), "exchange": [0.2, 0.8], "output": [0.1, 0.0],
+        "wait": pytest.approx([0.5, 0.5]),
+    }  # fmt: skip
+    assert live.busy == pytest.approx([1.3 / 2.0, 0.7 / 2.0])
+
+
+def test_a_wait_that_the_worker_times_is_taken_as_it_is() -> None:
+    assert grouped({"elements": [1.0], "wait": [0.25]}, interval=9.0) == {"compute": [1.0], "wait": [0.25]}
+
+
+@pytest.mark.parametrize(
+    ("state", "cause", "code"),
+    [
+        (State.SUCCEEDED, None, 0),
+        (State.FAILED, "diverged", 1),
+        (State.FAILED, "input", 2),
+        (State.FAILED, "mesh", 2),
+        (State.CANCELLED, "cancelled", 4),
+        (State.TIMED_OUT, "walltime", 1),
+        (State.LOST, "node", 1),
+    ],
+)
+def test_exit_codes(state: State, cause: str | None, code: int) -> None:
+    assert exit_code(state, cause) == code
+
+
+def rendered(live: Live, width: int = 100) -> str:
+    out = Console(file=io.StringIO(), width=width, force_terminal=False)
+    out.print(display.panel(live))
+    assert isinstance(out.file, io.StringIO)
+    return out.file.getvalue()
+
+
+def test_the_panel_shows_everything_that_is_watched() -> None:
+    text = rendered(told(11))
+    for shown in (
+        "A bar", "running", "50.0 %", "40.0 µs of 80.0 µs", "8.10 ns", "tet 7 (bar): sound speed", "30 s",
+        "9.70 M updates/s", "rank 0", "65 % busy", "35 % busy", "imbalance 1.20", "kinetic", "6.00 J", "2.0e-04",
+        "the foot has folded", "310 nodes",
+    ):  # fmt: skip
+        assert shown in text, shown
+    assert "elastic" not in text, "terms that are zero are left out"
+
+
+@pytest.mark.parametrize("width", [60, 100, 200])
+def test_the_panel_fits_the_terminal(width: int) -> None:
+    assert max(map(len, rendered(told(13), width).splitlines())) <= width
+
+
+def test_bars_of_the_ranks_are_in_proportion() -> None:
+    lines = [line for line in rendered(told(7)).splitlines() if "rank" in line and "busy" in line]
+    assert [line.count("█") for line in lines] == [36, 36], "both ranks took the whole interval"
+
+
+def test_many_ranks_are_cut_and_said_so() -> None:
+    live = told(6)
+    live.phases = {"compute": [1.0] * 40}
+    assert "and 28 more ranks" in rendered(live)
+
+
+def test_plain_lines_tell_states_and_warnings_at_once_and_progress_now_and_then() -> None:
+    lines: list[str] = []
+    live = tell(stories.whole(), Live(stories.RUN), lines.append)
+    assert live.state is State.SUCCEEDED
+    assert [line.split()[2] for line in lines] == [
+        "accepted", "queued", "starting", "running", "running", "warning:", "succeeded",
+    ]  # fmt: skip
+    assert "25.0 %" in lines[4], "the first progress is told, the others come within two seconds"
+
+
+def test_a_failure_tells_its_cause() -> None:
+    lines: list[str] = []
+    tell([stories.status(1, "failed", "energy", "the residual passed 0.05")], Live(stories.RUN), lines.append)
+    assert lines[0].endswith("failed  energy the residual passed 0.05")
+
+
+def test_the_live_screen_ends_with_the_last_picture() -> None:
+    out = Console(file=io.StringIO(), width=100, height=40, force_terminal=True)
+    show(stories.whole(), Live(stories.RUN), out)
+    assert isinstance(out.file, io.StringIO)
+    assert "succeeded" in out.file.getvalue()

@@ -1,0 +1,70 @@
+"""What a run leaves, read when it is asked for."""
+
+from array import array
+from pathlib import Path
+
+import pytest
+
+from conoid.client.errors import ClientError, UnfinishedError
+from conoid.client.result import Result, read_columns
+
+from .bodies import write_run
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return write_run(tmp_path / "bar")
+
+
+def test_the_outcome_with_its_reference(folder: Path) -> None:
+    outcome = Result.open(folder).outcome
+    assert outcome.state == "succeeded"
+    assert [check.passed for check in outcome.reference] == [True]
+
+
+def test_history_is_columns_of_numbers_and_text(folder: Path) -> None:
+    history = Result.open(folder).history
+    assert list(history) == ["step", "t", "dt", "limiter", "kinetic"]
+    assert history["t"] == array("d", [0.0, 8e-8])
+    assert history["limiter"] == ["tet 1", "tet 9"]
+
+
+def test_a_line_that_is_being_written_is_left_out() -> None:
+    assert read_columns("step,t\n1,2.0\n2,4.")["t"] == array("d", [2.0, 4.0])
+    assert read_columns("step,t\n1,2.0\n2")["t"] == array("d", [2.0])
+    assert read_columns("step,t\n") == {"step": array("d"), "t": array("d")}
+
+
+def test_frames_have_numbers_and_times(folder: Path) -> None:
+    result = Result.open(folder)
+    assert [(frame.index, frame.time) for frame in result.frames] == [(0, 0.0), (7, 80e-6)]
+    assert result.frame().name == "000007.vtkhdf"
+    assert result.frame(0).name == "000000.vtkhdf"
+    with pytest.raises(UnfinishedError, match="has not written frame 3; it has 2"):
+        result.frame(3)
+
+
+def test_frames_without_a_series_have_no_times(folder: Path) -> None:
+    (folder / "frames" / "frames.vtkhdf.series").unlink()
+    assert [frame.time for frame in Result.open(folder).frames] == [None, None]
+
+
+def test_a_run_that_goes_on_has_no_outcome(tmp_path: Path) -> None:
+    with pytest.raises(UnfinishedError, match=r"has no outcome\.json"):
+        _ = Result.open(tmp_path).outcome
+
+
+def test_no_folder_and_a_damaged_outcome_are_one_line(tmp_path: Path) -> None:
+    with pytest.raises(ClientError, match="no such folder"):
+        Result.open(tmp_path / "nothing")
+    (tmp_path / "outcome.json").write_text('{"state": 1')
+    with pytest.raises(ClientError, match="cannot be read"):
+        _ = Result.open(tmp_path).outcome
+
+
+def test_nothing_is_read_before_it_is_asked_for_and_then_kept(folder: Path) -> None:
+    result = Result.open(folder)
+    (folder / "history.csv").write_text("step\n5\n")
+    assert result.history["step"] == array("d", [5.0])
+    (folder / "history.csv").unlink()
+    assert result.history["step"] == array("d", [5.0])

@@ -1,0 +1,191 @@
+"""The native subscription: a real Zenoh router, real samples; the journal stands in for the server."""
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+
+import msgspec
+import pytest
+
+from conoid.cases import keys
+from conoid.cases.messages import AnyMessage
+from conoid.client import stream
+from conoid.client.errors import UnreachableError
+from conoid.client.session import Router
+from conoid.client.stream import SseLink, StreamError, ZenohLink, follow
+
+from . import stories
+from .conftest import OWNER, Broker, free_port
+
+PREFIX = keys.run_prefix(OWNER, stories.RUN)
+
+
+class Journal:
+    """What has been written so far; ``reads`` counts how often it was asked for."""
+
+    def __init__(self) -> None:
+        self.lines: list[AnyMessage] = []
+        self.reads = 0
+
+    def after(self, last: int) -> list[AnyMessage]:
+        self.reads += 1
+        return [message for message in self.lines if message.seq > last]
+
+
+@pytest.fixture(autouse=True)
+def _short_silence(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stream, "_SILENCE", 0.3)
+
+
+def reading(
+    link: stream.Link, journal: Journal, ended: Callable[[], bool] = lambda: False
+) -> tuple[list[int], threading.Thread]:
+    """Follows in a thread; the list fills with the numbers that it told."""
+    told: list[int] = []
+
+    def read() -> None:
+        for message in follow(link, journal.after, ended):
+            told.append(message.seq)  # noqa: PERF401  (it is looked at while it grows)
+
+    thread = threading.Thread(target=read, daemon=True)
+    thread.start()
+    return told, thread
+
+
+def subscribed(broker: Broker) -> ZenohLink:
+    """A link that the router knows: a declaration takes a moment to arrive. What it heard meanwhile has seq 0."""
+    link = ZenohLink(broker.router, PREFIX)
+    deadline = time.monotonic() + 10
+    broker.publish(stories.status(0, "running"))
+    while link.get(0.02) is None:
+        assert time.monotonic() < deadline
+        broker.publish(stories.status(0, "running"))
+    while link.get(0.05) is not None:
+        pass
+    return link
+
+
+def until(truth: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + 10
+    while not truth():
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+
+
+def test_a_late_joiner_reads_history_then_stream_without_gap_or_repeat(broker: Broker) -> None:
+    journal, story = Journal(), stories.whole()
+    journal.lines = story[:6]
+    link = subscribed(broker)
+    broker.publish(story[4])  # It was on its way while the reader subscribed.
+    told, thread = reading(link, journal)
+    until(lambda: len(told) == 6)
+    for message in story[6:]:
+        journal.lines.append(message)
+        broker.publish(message)
+    thread.join(10)
+    assert told == list(range(1, 16))
+    assert journal.reads == 1, "the stream itself told the rest"
+
+
+def test_a_gap_is_refilled_from_the_journal(broker: Broker) -> None:
+    journal, story = Journal(), stories.whole()
+    told, thread = reading(subscribed(broker), journal)
+    until(lambda: journal.reads == 1)
+    for message in story:
+        journal.lines.append(message)
+        if message.seq not in {3, 4, 9}:
+            broker.publish(message)
+    thread.join(10)
+    assert told == list(range(1, 16))
+
+
+def test_a_router_that_falls_silent_loses_nothing(broker: Broker) -> None:
+    journal, story = Journal(), stories.whole()
+    told, thread = reading(subscribed(broker), journal)
+    broker.publish(story[0])
+    journal.lines = story
+    thread.join(10)
+    assert told == list(range(1, 16)), "the journal is polled while nothing comes"
+
+
+def test_a_run_that_ended_without_a_last_word_ends_the_stream(broker: Broker) -> None:
+    journal = Journal()
+    journal.lines = stories.whole()[:9]
+    told, thread = reading(subscribed(broker), journal, ended=lambda: True)
+    thread.join(10)
+    assert not thread.is_alive()
+    assert told == list(range(1, 10))
+
+
+def test_other_runs_and_rubbish_are_not_heard(broker: Broker) -> None:
+    link = subscribed(broker)
+    try:
+        other = msgspec.structs.replace(stories.status(1, "running"), run="r2")
+        broker.publish(other)
+        broker.session.put(f"{PREFIX}/event", b"not a message")
+        broker.publish(stories.status(2, "queued"))
+        heard = link.get(5.0)
+        assert heard == stories.status(2, "queued")
+        assert link.get(0.05) is None
+    finally:
+        link.close()
+
+
+def test_a_wrong_password_is_told(broker: Broker) -> None:
+    wrong = Router(endpoint=broker.router.endpoint, user="ann", password="guess")
+    with pytest.raises(StreamError, match="refused or cannot be reached"):
+        ZenohLink(wrong, PREFIX)
+
+
+def test_no_router_is_told_at_once() -> None:
+    began = time.monotonic()
+    with pytest.raises(StreamError):
+        ZenohLink(Router(endpoint=f"tcp/127.0.0.1:{free_port()}"), PREFIX)
+    assert time.monotonic() - began < 6.0
+
+
+def test_sse_tells_the_same_and_its_break_is_bridged_by_the_journal() -> None:
+    journal, story = Journal(), stories.whole()
+    journal.lines = story
+
+    def events() -> Iterator[AnyMessage]:
+        yield from story[2:5]
+        raise UnreachableError("the proxy gave up")
+
+    told, thread = reading(SseLink(events), journal)
+    thread.join(10)
+    assert told == list(range(1, 16))
+
+
+def test_a_server_that_restarts_is_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stream.time, "sleep", lambda _: None)
+    journal = Journal()
+    journal.lines = stories.whole()
+    failures = iter([True, True, False])
+
+    def refill(after: int) -> list[AnyMessage]:
+        if next(failures):
+            raise UnreachableError("no answer")
+        return journal.after(after)
+
+    link = SseLink(lambda: iter(()))
+    assert [message.seq for message in follow(link, refill, lambda: False)] == list(range(1, 16))
+
+
+def test_a_server_that_stays_away_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stream, "_PATIENCE", 0.0)
+
+    def refill(_after: int) -> list[AnyMessage]:
+        raise UnreachableError("no answer from http://127.0.0.1:1")
+
+    with pytest.raises(UnreachableError, match="no answer"):
+        list(follow(SseLink(lambda: iter(())), refill, lambda: False))
+
+
+def test_a_full_mailbox_drops_instead_of_waiting() -> None:
+    mailbox = stream.Mailbox()
+    for seq in range(1, stream._CAPACITY + 100):
+        mailbox.put(stories.status(seq, "running"))
+    first = mailbox.get(0.0)
+    assert first is not None
+    assert first.seq == 1
