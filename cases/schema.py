@@ -1,6 +1,6 @@
 """What a case is. Frozen models, unknown keys forbidden, every quantity in SI once read.
 
-``load_case`` in ``cases/load.py`` is the way in: it reads TOML or JSON and reports every error at once.
+``parse_case`` in ``cases/load.py`` is the way in: it reads TOML or JSON and reports every error at once.
 """
 
 from typing import Annotated, Any, Literal
@@ -20,6 +20,17 @@ def _floats(value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else value
 
 
+def _off(value: Any) -> Any:
+    return None if value == "none" else value
+
+
+def _no_truth(value: Any) -> Any:
+    if isinstance(value, bool):
+        raise ValueError("expected a whole number")
+    return value
+
+
+Count = Annotated[int, BeforeValidator(_no_truth)]
 Direction = Annotated[tuple[float, float, float], BeforeValidator(_floats)]
 
 
@@ -285,7 +296,8 @@ class Numerics(Model):
     pressure: Literal["standard", "nodal", "split"] = "nodal"
     """``standard``: pressure from each tet (locks in plastic flow). ``nodal``: averaged nodal pressure. ``split``: the
     operator split, stabilised by pressure-gradient projection."""
-    viscosity: Viscosity | None = Viscosity()
+    viscosity: Annotated[Viscosity | None, BeforeValidator(_off)] = Viscosity()
+    """``viscosity = "none"`` switches it off."""
     dt_safety: Annotated[Ratio, Field(gt=0, le=1)] = 0.9
     """Share of the rigorous element bound 1 / (c sqrt(sum |grad N|^2))."""
     dt_growth: Annotated[Ratio, Field(gt=1, le=2)] = 1.05
@@ -296,12 +308,12 @@ class Run(Model):
     """How long, on how many ranks, and what is written."""
 
     end_time: Annotated[Time, Positive]
-    ranks: Annotated[int, Field(ge=1, le=4096)] = 1
-    frames: Annotated[int, Field(ge=0, le=100_000)] = 20
+    ranks: Annotated[Count, Field(ge=1, le=4096)] = 1
+    frames: Annotated[Count, Field(ge=0, le=100_000)] = 20
     """Number of frames, evenly spaced to the end; the initial state is frame 0 (0: none are written)."""
-    samples: Annotated[int, Field(ge=1, le=1_000_000)] = 500
+    samples: Annotated[Count, Field(ge=1, le=1_000_000)] = 500
     """Number of lines of history.csv, evenly spaced."""
-    max_steps: Annotated[int, Field(ge=1)] = 100_000_000
+    max_steps: Annotated[Count, Field(ge=1)] = 100_000_000
     max_wall_time: Annotated[Time, Positive] | None = None
     residual_limit: Annotated[Ratio, Positive] = 0.05
     """The run fails with cause ``energy`` when the energy residual passes this."""

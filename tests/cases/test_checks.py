@@ -1,0 +1,135 @@
+"""Cross-field checks: each fault of a scene is found, and a sound scene has none."""
+
+import pytest
+
+from conoid.cases.load import parse_case
+
+from .scenes import problems, rod, said
+
+BOX = 'parts[0].mesh={shape="box", low=[0, 0, 0], high=["1 mm", "1 mm", "9 mm"], element_size="0.5 mm"}'
+TUBE = 'parts[0].mesh={shape="tube", inner_radius="2 mm", radius="3 mm", length="30 mm", element_size="0.5 mm"}'
+
+
+def test_the_rod_is_sound() -> None:
+    parse_case(rod())
+    parse_case(rod(TUBE))
+
+
+@pytest.mark.parametrize(
+    ("overrides", "key", "message"),
+    [
+        (["parts[0].material=stel"], "parts[0].material", "did you mean 'steel'?"),
+        (["boundaries[0].parts=['road']"], "boundaries[0].parts[0]", "did you mean 'rod'?"),
+        (["probes[0].part=road"], "probes[0].part", "did you mean 'rod'?"),
+        (["reference[0].part=road"], "reference[0].part", "did you mean 'rod'?"),
+        ([TUBE, "parts[0].mesh.inner_radius=3 mm"], "parts[0].mesh.inner_radius", "must be below the radius, 0.003 m"),
+        ([BOX, "parts[0].mesh.high[1]=0", "probes=[]"], "parts[0].mesh.high[1]", "must be above low[1]"),
+        ([BOX, "parts[0].mesh.sector=half", "parts[0].mesh.low[0]=-1", "parts[0].mesh.high[0]=0", "probes=[]"],
+         "parts[0].mesh.high[0]", "keeps the side x > 0"),
+        (["parts[0].mesh.element_size=4 mm"], "parts[0].mesh.element_size", "what is modelled, 0.003"),
+        ([TUBE, "parts[0].mesh.element_size=1.1 mm"], "parts[0].mesh.element_size", "0.001 m"),
+        (["parts[0].mesh.grading={near=2, far=1, far_size=1}"], "parts[0].mesh.grading.near", "must be below far"),
+        (["parts[0].mesh.grading={near=0, far=1, far_size='0.5 mm'}"], "parts[0].mesh.grading.far_size", "below the"),
+        (["parts[0].mesh.grading={near=0, far=1, far_size=1}", "parts[0].mesh.generator=structured"],
+         "parts[0].mesh.grading", "remove grading, or use gmsh"),
+        (["boundaries[1].axis=z"], "parts[0].mesh.sector", "axis = 'x', at = 0 for part 'rod'"),
+        (["boundaries[2].at=1 mm"], "parts[0].mesh.sector", "axis = 'y', at = 0 for part 'rod'"),
+        (["boundaries[0].normal=[0, 0, 0]"], "boundaries[0].normal", "must not be zero"),
+        (["boundaries[0].normal=[0, 0, -1]"], "boundaries[0]", "part 'rod' starts 0.03 m behind this wall"),
+        (["boundaries[0].point=[0, 0, '1 mm']"], "boundaries[0]", "part 'rod' starts 0.001 m behind this wall"),
+        (["boundaries[0]={kind='velocity'}"], "boundaries[0]", "prescribes nothing"),
+        (["boundaries[0]={kind='velocity', x=1, low=[0, 0, 0]}"], "boundaries[0]", "give both low and high"),
+        (["boundaries[0]={kind='velocity', x=1, low=[0, 0, 1], high=[1, 1, 0]}"], "boundaries[0].high[2]", "low[2]"),
+        (["probes[0].low[2]=17 mm"], "probes[0].high[2]", "must not be below low[2]"),
+        (["probes[0].low[2]=31 mm", "probes[0].high[2]=32 mm"], "probes[0]", "lies between 0 and 0.03 m along z"),
+        (["probes[0].low[0]=-2 mm", "probes[0].high[0]=-1 mm"], "probes[0]", "lies between 0 and 0.003 m along x"),
+        (["reference[0].probe=middle"], "reference[0].probe", "'extent' does not use this key"),
+        (["reference[0].since=10 us"], "reference[0].since", "must be below run.end_time"),
+        (["reference[0].until=11 us"], "reference[0].until", "not above run.end_time"),
+        (["reference[0].since=5 us", "reference[0].until=5 us"], "reference[0].until", "must be above since"),
+        (["parts[0].material=steel_42crmo4", "parts[0].temperature=2000"], "parts[0].temperature", "melts"),
+    ],
+)  # fmt: skip
+def test_a_fault_is_named(overrides: list[str], key: str, message: str) -> None:
+    found = said(*overrides)
+    assert list(found) == [key]
+    assert message in found[key]
+
+
+def test_names_are_unique() -> None:
+    data = rod()
+    data["parts"].append({**data["parts"][0]})
+    data["probes"].append({**data["probes"][0]})
+    data["boundaries"].append({**data["boundaries"][0]})
+    found = [(p.key, p.message) for p in problems(*_as_overrides(data))]
+    assert found == [
+        ("parts[1].name", "parts[0] has this name; give each its own"),
+        ("boundaries[3].name", "an earlier wall has this name; give each its own"),
+        ("probes[1].name", "probes[0] has this name; give each its own"),
+    ]
+
+
+def _as_overrides(data: dict[str, object]) -> list[str]:
+    """Overrides that put whole lists of ``data`` in place; TOML writes a Python list of dicts with equals signs."""
+    return [f"{key}={_toml(data[key])}" for key in ("parts", "probes", "boundaries")]
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key} = {_toml(entry)}" for key, entry in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    return repr(value)
+
+
+def test_a_reference_needs_the_keys_of_its_quantity() -> None:
+    assert said("reference[0]={quantity='probe_max', value=1, tolerance=1, source='s'}") == {
+        "reference[0].probe": "this key is missing; 'probe_max' needs 'probe'"
+    }
+    assert said("reference[0]={quantity='radius', value=1, tolerance=1, source='s'}") == {
+        "reference[0].axis": "this key is missing; 'radius' needs 'axis', 'part'",
+        "reference[0].part": "this key is missing; 'radius' needs 'axis', 'part'",
+    }
+
+
+def test_contact_time_needs_a_wall() -> None:
+    contact = "reference[0]={quantity='contact_time', value='1 us', tolerance='1 us', source='s'}"
+    parse_case(rod(contact))
+    found = said(contact, "boundaries[0]={kind='symmetry', axis='z'}")
+    assert found == {"reference[0].quantity": "needs a boundary with kind = 'wall'"}
+
+
+@pytest.mark.parametrize(
+    ("mesh", "lowest"),
+    [
+        ('{shape="sphere", radius="2 mm", element_size="1 mm", centre=[0, 0, "5 mm"]}', 3e-3),
+        ('{shape="plate", width="4 mm", height="4 mm", thickness="2 mm", element_size="1 mm"}', 0.0),
+        ('{shape="cylinder", axis="x", radius="2 mm", length="9 mm", element_size="1 mm"}', -2e-3),
+        ('{shape="box", low=[0, 0, "1 mm"], high=["1 mm", "1 mm", "2 mm"], element_size="1 mm"}', 1e-3),
+    ],
+)
+def test_a_body_touches_the_wall_and_no_more(mesh: str, lowest: float) -> None:
+    at = [f"parts[0].mesh={mesh}", f"boundaries[0].point=[0, 0, {lowest}]", "probes=[]"]
+    parse_case(rod(*at))
+    assert "behind this wall" in said(*at, f"boundaries[0].point[2]={lowest + 1e-6}")["boundaries[0]"]
+
+
+def test_an_oblique_wall_meets_a_cylinder_at_its_rim() -> None:
+    at = ["boundaries[0].normal=[0, 1, 1]", "boundaries[0].point=[0, '-3 mm', 0]"]
+    parse_case(rod(*at))
+    assert "behind this wall" in said(*at, "boundaries[0].point[1]=-2.99 mm")["boundaries[0]"]
+
+
+def test_a_mesh_file_is_a_path() -> None:
+    file = 'parts[0].mesh={shape="file", unit="1 mm", path="rod.msh"}'
+    parse_case(rod(file))
+    for path in ("https://example.org/rod.msh", " "):
+        assert said(file, f"parts[0].mesh.path='{path}'") == {
+            "parts[0].mesh.path": "expected the path of a .msh or .inp file"
+        }
+
+
+def test_melting_lies_above_the_reference_temperature() -> None:
+    law = "{model='johnson_cook', A=1, B=1, n=1, C=0, m=1, melt_temperature=200, specific_heat=1}"
+    found = said("materials.m={density=1, elastic={young=1, poisson=0}, strength=" + law + "}")
+    assert found == {"materials.m.strength.melt_temperature": "must be above 293.15 K, the reference"}

@@ -1,0 +1,98 @@
+"""Messages, outcome, states and keys: what crosses the borders between the houses."""
+
+import typing
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from conoid.cases import keys, layout, messages, outcome
+from conoid.cases.run import FINAL, FOLLOWERS, State
+
+ENERGY = messages.Energy(
+    kinetic=1.0, elastic=2.0, plastic=3.0, viscous=4.0, contact=5.0, external=6.0, initial=7.0, residual=1e-17
+)
+EXAMPLES: list[messages.AnyMessage] = [
+    messages.Status(run="r", seq=1, state=State.RUNNING, cause=None, message="all ranks up"),
+    messages.Started(run="r", seq=2, ranks=2, elements=6, nodes=8, end_time=1e-3, setup=0.5, parts={"rod": 6}),
+    messages.Progress(
+        run="r", seq=3, step=7, t=1e-6, end_time=1e-3, dt=1e-9, limiter="tet 3 of rod: sound", eta=3.0, energy=ENERGY,
+        updates_per_second=1e7,
+    ),
+    messages.Load(run="r", seq=4, phases={"forces": [0.1, 0.2]}, imbalance=4 / 3),
+    messages.Counts(run="r", seq=5, elements=6, nodes=8, shared=4, fragments=1, elements_per_rank=[3, 3]),
+    messages.Frame(run="r", seq=6, index=12, path="frames/000012.vtkhdf"),
+    messages.Log(run="r", seq=7, level="warning", text="a rank waits", rank=1),
+    messages.Finished(run="r", seq=8, state=State.SUCCEEDED, digest="0" * 64, steps=7, elapsed=1.5),
+]  # fmt: skip
+
+
+def test_there_is_an_example_of_every_message() -> None:
+    assert {type(example) for example in EXAMPLES} == set(typing.get_args(messages.AnyMessage))
+
+
+@pytest.mark.parametrize("message", EXAMPLES, ids=lambda message: type(message).__name__)
+def test_messages_travel_unchanged(message: messages.AnyMessage) -> None:
+    line = messages.to_json(message)
+    assert b"\n" not in line
+    assert messages.from_json(line) == message
+    assert messages.from_msgpack(messages.to_msgpack(message)) == message
+    plain = msgspec.json.decode(line)
+    assert plain["type"] == type(message).__name__.lower()
+    assert plain["v"] == messages.VERSION
+    assert message.channel in keys.CLASSES
+
+
+def test_a_reader_ignores_fields_of_later_versions() -> None:
+    later = b'{"type": "frame", "run": "r", "seq": 6, "v": 2, "index": 1, "path": "p", "colour": "red"}'
+    assert messages.from_json(later) == messages.Frame(run="r", seq=6, v=2, index=1, path="p")
+
+
+@pytest.mark.parametrize("line", [b'{"type": "gossip", "run": "r"}', b'{"type": "frame", "run": "r"}', b"[]"])
+def test_what_is_no_message_is_refused(line: bytes) -> None:
+    with pytest.raises(msgspec.ValidationError):
+        messages.from_json(line)
+
+
+def test_an_outcome_travels_unchanged() -> None:
+    check = outcome.Check(name="extent rod z", value=1.0, expected=1.1, tolerance=0.2, passed=True, source="paper")
+    ended = outcome.Outcome(state=State.SUCCEEDED, steps=3, energy=ENERGY, phases={"forces": [1.0]}, reference=[check])
+    text = outcome.to_json(ended)
+    assert outcome.from_json(text) == ended
+    assert msgspec.json.decode(text)["reference"][0]["pass"] is True
+
+
+def test_final_states_have_no_followers_and_the_others_reach_one() -> None:
+    assert set(FOLLOWERS) == set(State)
+    for state in State:
+        assert state.final == (state in FINAL) == (not FOLLOWERS[state])
+        reached, ahead = {state}, {state}
+        while ahead:
+            ahead = {follower for one in ahead for follower in FOLLOWERS[one]} - reached
+            reached |= ahead
+        assert reached & FINAL
+
+
+def test_keys() -> None:
+    prefix = keys.run_prefix("ann", "20260101-1")
+    assert prefix == "conoid/v1/ann/20260101-1"
+    assert prefix.startswith(keys.owner_prefix("ann") + "/")
+    assert keys.message_key(prefix, "event") == "conoid/v1/ann/20260101-1/event"
+    assert keys.alive(prefix).startswith(prefix)
+    with pytest.raises(ValueError, match="unknown message class 'gossip'; known: state, event"):
+        keys.message_key(prefix, "gossip")
+
+
+@pytest.mark.parametrize("chunk", ["", "a/b", "*", "a b", "$", "@x", "?", "#", "é"])
+def test_a_key_cannot_be_broken_out_of(chunk: str) -> None:
+    with pytest.raises(ValueError, match="cannot stand in a key"):
+        keys.run_prefix(chunk, "run")
+    with pytest.raises(ValueError, match="cannot stand in a key"):
+        keys.run_prefix("owner", chunk)
+
+
+def test_frames_sort_by_name() -> None:
+    folder = Path("run")
+    assert layout.frame(folder, 12) == folder / "frames" / "000012.vtkhdf"
+    assert str(layout.frame(folder, 9)) < str(layout.frame(folder, 10))
+    assert layout.rank_log(folder, 0) == folder / "log" / "rank-0.log"

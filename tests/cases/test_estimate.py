@@ -1,0 +1,142 @@
+"""Estimates against the meshes that are really made, and against runs that were measured."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pydantic import TypeAdapter
+
+from conoid.cases.estimate import RANK_BYTES, estimate
+from conoid.cases.geometry import Generated, surface, volume
+from conoid.cases.load import parse_case, read_case, shipped
+from conoid.cases.mesh_size import graded_size, mesh_size
+from conoid.cases.schema import Mesh
+from conoid.worker.mesh.build import build
+from conoid.worker.mesh.model import quality
+from conoid.worker.mesh.structured import structured
+
+from .scenes import rod
+
+UNIT: Any = TypeAdapter(Mesh)
+STRUCTURED = [
+    {"shape": "box", "low": (0, 0, 0), "high": (1, 2, 3), "element_size": 0.3},
+    {"shape": "box", "low": (-1, -2, 0), "high": (1, 2, 3), "element_size": 0.4, "sector": "quarter", "split": 5},
+    {"shape": "plate", "width": 2, "height": 3, "thickness": 0.2, "element_size": 0.1, "axis": "x", "sector": "half"},
+    {"shape": "cylinder", "radius": 1, "length": 4, "element_size": 0.2},
+    {"shape": "cylinder", "radius": 1, "length": 4, "element_size": 0.2, "sector": "half"},
+    {"shape": "cylinder", "radius": 1, "length": 4, "element_size": 0.2, "sector": "quarter"},
+    {"shape": "tube", "inner_radius": 0.6, "radius": 1, "length": 1, "element_size": 0.1},
+    {"shape": "tube", "inner_radius": 0.6, "radius": 1, "length": 1, "element_size": 0.1, "sector": "half"},
+    {"shape": "tube", "inner_radius": 0.6, "radius": 1, "length": 1, "element_size": 0.1, "sector": "quarter"},
+]
+UNSTRUCTURED = [
+    {"shape": "box", "low": (0, 0, 0), "high": (1, 1, 2), "element_size": 0.15},
+    {"shape": "sphere", "radius": 1, "element_size": 0.2, "sector": "half"},
+    {"shape": "cylinder", "radius": 1, "length": 3, "element_size": 0.1,
+     "grading": {"near": 0.5, "far": 2.5, "far_size": 0.4}},
+]  # fmt: skip
+STEPS = {
+    "elastic_bar_wall": 2660, "elastic_bar_confined": 2750, "plastic_wave": 1620, "plastic_bar_wave": 2470,
+    "shock_copper": 741, "shock_tungsten": 998, "spinning_cube": 4892, "free_spin": 6859,
+    "taylor_42crmo4": 8998, "taylor_copper": 21529, "taylor_copper_split": 20091, "demo": 8998,
+}  # fmt: skip
+"""Steps that the shipped cases were seen to take."""
+
+
+def mesh(written: dict[str, Any], **more: Any) -> Generated:
+    made: Generated = UNIT.validate_python({**written, **more})
+    return made
+
+
+@pytest.mark.parametrize("written", STRUCTURED, ids=str)
+def test_structured_counts_are_exact(written: dict[str, Any]) -> None:
+    body = mesh(written, generator="structured")
+    made, expected = structured(body), mesh_size(body)
+    assert (expected.elements, expected.nodes) == (len(made.tets), len(made.points))
+    assert expected.step_length == pytest.approx(quality(made).worst, rel=0.1)
+
+
+@pytest.mark.parametrize("written", UNSTRUCTURED, ids=str)
+def test_unstructured_counts_are_near(written: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CONOID_CACHE_DIR", str(tmp_path))
+    body = mesh(written)
+    made, expected = build(body, tmp_path), mesh_size(body)
+    assert expected.elements == pytest.approx(len(made.tets), rel=0.15)
+    assert expected.nodes == pytest.approx(len(made.points), rel=0.15)
+    assert 0.6 < expected.step_length / quality(made).worst < 1.6
+
+
+@pytest.mark.parametrize("sector", ["full", "half", "quarter"])
+@pytest.mark.parametrize(
+    ("written", "filled", "covered"),
+    [
+        ({"shape": "sphere", "radius": 1}, 4 / 3 * math.pi, 4 * math.pi),
+        ({"shape": "cylinder", "radius": 1, "length": 3}, 3 * math.pi, 8 * math.pi),
+        ({"shape": "tube", "inner_radius": 0.5, "radius": 1, "length": 2}, 1.5 * math.pi, 7.5 * math.pi),
+        ({"shape": "plate", "width": 2, "height": 4, "thickness": 1}, 8, 28),
+        ({"shape": "box", "low": (-1, -2, 0), "high": (1, 2, 1)}, 8, 28),
+    ],
+)
+def test_sectors_share_volume_and_outer_surface(
+    written: dict[str, Any], filled: float, covered: float, sector: str
+) -> None:
+    share = {"full": 1.0, "half": 0.5, "quarter": 0.25}[sector]
+    cuts = {
+        "sphere": (0, math.pi, math.pi), "cylinder": (0, 6, 6), "tube": (0, 2, 2), "plate": (0, 4, 3), "box": (0, 4, 3),
+    }[written["shape"]][("full", "half", "quarter").index(sector)]  # fmt: skip
+    body = mesh(written, element_size=0.1, sector=sector)
+    assert volume(body) == pytest.approx(share * filled)
+    assert surface(body) == pytest.approx(share * covered + cuts)
+
+
+def test_graded_size_runs_from_near_to_far() -> None:
+    grading = {"near": 1, "far": 3, "far_size": 0.5, "axis": "z"}
+    body = mesh({"shape": "sphere", "radius": 5}, element_size=0.1, grading=grading)
+    sizes = [graded_size(body, (x, 0.0, 9.0)) for x in (0.0, 1.0, 2.0, 3.0, 4.0)]
+    assert sizes == pytest.approx([0.1, 0.1, 0.3, 0.5, 0.5])
+
+
+@pytest.mark.parametrize("name", sorted(shipped()))
+def test_steps_are_within_a_factor_of_two_of_what_was_measured(name: str) -> None:
+    steps = estimate(read_case(shipped()[name])).steps
+    assert steps is not None
+    assert 0.5 < steps / STEPS[name] < 2.0
+
+
+def test_the_first_step_is_the_bound_of_the_worst_tet() -> None:
+    size = "0.5 mm"
+    case = parse_case(rod(
+        f'parts[0].mesh={{shape="box", low=[0, 0, 0], high=["2 mm", "2 mm", "30 mm"], element_size="{size}"}}',
+        "parts[0].mesh.generator=structured", "numerics.viscosity=none", "numerics.dt_safety=0.8",
+    ))  # fmt: skip
+    c = math.sqrt(200e9 * 0.7 / (1.3 * 0.4) / 7850)
+    assert estimate(case).dt == pytest.approx(0.8 * 0.5e-3 / math.sqrt(6) / c, rel=1e-9)
+
+
+def test_cost_follows_size_law_and_ranks() -> None:
+    plain, ranked = estimate(parse_case(rod())), estimate(parse_case(rod("run.ranks=4")))
+    hard = estimate(parse_case(rod("parts[0].material=steel_4340", "numerics.pressure=split")))
+    fine = estimate(parse_case(rod("parts[0].mesh.element_size=0.5 mm")))
+    assert plain.memory_bytes is not None
+    assert ranked.memory_bytes == plain.memory_bytes + 3 * RANK_BYTES
+    assert plain.core_seconds is not None
+    assert hard.core_seconds is not None
+    assert fine.core_seconds is not None
+    assert plain.core_seconds < hard.core_seconds
+    assert plain.core_seconds < fine.core_seconds
+    assert plain.elements == plain.parts[0].elements
+    assert plain.dt == plain.parts[0].dt
+
+
+def test_a_mesh_file_tells_its_tets_by_its_size_only(tmp_path: Path) -> None:
+    file = parse_case(rod('parts[0].mesh={shape="file", unit="1 mm", path="rod.msh"}'))
+    assert estimate(file, tmp_path).elements is None
+    (tmp_path / "rod.msh").write_bytes(b"x" * 42_000)
+    known = estimate(file, tmp_path)
+    assert (known.elements, known.dt, known.steps, known.core_seconds) == (1000, None, None, None)
+    assert known.memory_bytes is not None
+
+
+def test_max_steps_bounds_the_estimate() -> None:
+    assert estimate(parse_case(rod("run.max_steps=3"))).steps == 3

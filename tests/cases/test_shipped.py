@@ -1,0 +1,210 @@
+"""The shipped cases: sound, and every derived reference number worked out again from its formula."""
+
+import math
+from collections.abc import Callable
+
+import pytest
+
+from conoid.cases.estimate import estimate
+from conoid.cases.load import parse_json, read_case, resolved_json, shipped
+from conoid.cases.schema import Case, Reference
+
+NAMES = sorted(shipped())
+TAYLOR = ["demo", "taylor_42crmo4", "taylor_copper", "taylor_copper_split"]
+
+
+def load(name: str) -> Case:
+    return read_case(shipped()[name])
+
+
+def reference(name: str, quantity: str) -> Reference:
+    """The reference of a case by its quantity or its probe."""
+    found = [entry for entry in load(name).reference if quantity in (entry.probe, entry.quantity)]
+    assert len(found) == 1
+    return found[0]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_shipped_case_is_sound_and_explains_itself(name: str) -> None:
+    case = load(name)
+    assert case.name == name
+    assert case.title
+    assert len(case.description) > 150
+    assert case.reference
+    assert all(entry.source for entry in case.reference)
+    assert parse_json(resolved_json(case)).model_copy(update={"materials": case.materials}) == case
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_shipped_case_runs_in_minutes(name: str) -> None:
+    cost = estimate(load(name)).core_seconds
+    assert cost is not None
+    assert cost < 200
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_energy_is_held_to_one_percent_and_elastic_scenes_to_a_tenth(name: str) -> None:
+    if name == "spinning_cube":
+        return
+    elastic = name.startswith("elastic") or name == "free_spin"
+    assert reference(name, "worst_residual").tolerance == (0.001 if elastic else 0.01)
+
+
+@pytest.mark.parametrize("name", TAYLOR)
+def test_taylor_bars_have_the_published_geometry_and_size(name: str) -> None:
+    elements = estimate(load(name)).elements
+    assert elements is not None
+    assert elements >= 12_000
+    length, radius = reference(name, "extent"), reference(name, "radius")
+    copper = "copper" in name
+    assert (length.tolerance, radius.tolerance) == pytest.approx((0.15e-3, 0.15e-3) if copper else (0.1e-3, 0.125e-3))
+    assert length.value == pytest.approx(21.475e-3 if copper else 26.54e-3, abs=0.01e-3)
+
+
+# Bars -----------------------------------------------------------------------------------------------------------------
+
+DENSITY, YOUNG, POISSON, LENGTH, SPEED = 7850.0, 200e9, 0.3, 0.1, 10.0
+BAR_SPEED = math.sqrt(YOUNG / DENSITY)
+PLANE_SPEED = math.sqrt(YOUNG * (1 - POISSON) / ((1 + POISSON) * (1 - 2 * POISSON)) / DENSITY)
+
+
+@pytest.mark.parametrize(("name", "c"), [("elastic_bar_wall", BAR_SPEED), ("elastic_bar_confined", PLANE_SPEED)])
+def test_elastic_bars(name: str, c: float) -> None:
+    stress, contact, rebound = (reference(name, q) for q in ("middle_stress", "contact_time", "speed_mean"))
+    assert stress.value == pytest.approx(-DENSITY * c * SPEED, rel=5e-4)
+    assert stress.tolerance <= 0.0101 * -stress.value
+    assert contact.value == pytest.approx(2 * LENGTH / c, rel=5e-4)
+    assert contact.tolerance <= 1.02 * 0.25e-3 / c
+    assert (rebound.value, rebound.tolerance) == (SPEED, 0.01 * SPEED)
+    for entry in (stress,):
+        assert 0.052 / c < entry.since
+        assert entry.until is not None
+        assert entry.until < (2 * LENGTH - 0.052) / c
+
+
+def test_the_confined_bar_pushes_sideways() -> None:
+    sideways = -DENSITY * PLANE_SPEED * SPEED * POISSON / (1 - POISSON)
+    assert reference("elastic_bar_confined", "lateral_stress").value == pytest.approx(sideways, rel=5e-4)
+
+
+# Plastic waves --------------------------------------------------------------------------------------------------------
+
+
+class Copper:
+    """The benchmark's copper: stress linear in logarithmic strain, J2 with linear hardening."""
+
+    density, young, poisson, yielding = 8930.0, 117e9, 0.35, 0.4e9
+    bulk = young / (3 * (1 - 2 * poisson))
+    shear = young / (2 * (1 + poisson))
+
+
+def jump(density: float, stress: tuple[float, float], stretch: tuple[float, float]) -> tuple[float, float]:
+    """Speeds of the shock and of the matter behind it, m/s, from the state ahead and behind (pressure positive)."""
+    pressure, shortening = stress[1] - stress[0], stretch[0] - stretch[1]
+    return math.sqrt(pressure / density / shortening), math.sqrt(pressure * shortening / density)
+
+
+def solve(f: Callable[[float], float], low: float, high: float) -> float:
+    """The root of a rising function by bisection."""
+    for _ in range(200):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if f(middle) > 0 else (middle, high)
+    return 0.5 * (low + high)
+
+
+def test_plastic_wave() -> None:
+    hardening = 0.1e9
+    elastic = Copper.bulk + 4 / 3 * Copper.shear
+    plastic = Copper.bulk + 4 / 3 * Copper.shear * hardening / (3 * Copper.shear + hardening)
+    limit = Copper.yielding * (1 - Copper.poisson) / (1 - 2 * Copper.poisson)
+    strain = limit / elastic
+    precursor, slowed = jump(Copper.density, (0.0, limit), (1.0, math.exp(-strain)))
+
+    def law(e: float) -> float:
+        return limit + plastic * (e - strain)
+
+    def behind(e: float) -> tuple[float, float]:
+        return jump(Copper.density, (limit, law(e)), (math.exp(-strain), math.exp(-e)))
+
+    total = solve(lambda e: behind(e)[1] - (100.0 - slowed), strain * 1.0001, 0.2)
+    front = behind(total)[0]
+    assert (math.sqrt(elastic / Copper.density), math.sqrt(plastic / Copper.density)) == pytest.approx(
+        (4586, 3816), abs=1
+    )
+    assert reference("plastic_wave", "precursor_stress").value == pytest.approx(-limit, rel=1e-4)
+    assert reference("plastic_wave", "precursor_speed").value == pytest.approx(slowed - 100.0, rel=1e-4)
+    assert reference("plastic_wave", "plateau_stress").value == pytest.approx(-law(total), rel=1e-3)
+    flow = (4 / 3 * Copper.shear * total - 2 / 3 * Copper.yielding) / (2 * Copper.shear + 2 / 3 * hardening)
+    assert reference("plastic_wave", "plateau_strain").value == pytest.approx(flow, rel=1e-3)
+    window = reference("plastic_wave", "precursor_stress")
+    assert window.until is not None
+    assert 0.0805 / precursor < window.since < window.until < 0.0795 / front
+    assert 0.051 / front < reference("plastic_wave", "plateau_stress").since
+
+
+def test_plastic_bar_wave() -> None:
+    tangent = Copper.young * 20e9 / (Copper.young + 20e9)
+    at_yield = Copper.yielding / Copper.young
+
+    def stress(e: float) -> float:
+        return Copper.young * e if e <= at_yield else Copper.yielding + tangent * (e - at_yield)
+
+    def force(e: float) -> float:
+        """Over the initial area: the section swells by 2 nu of the elastic and by all of the plastic strain."""
+        elastic = stress(e) / Copper.young
+        return stress(e) * math.exp(2 * Copper.poisson * elastic + (e - elastic))
+
+    def behind(ahead: float, e: float) -> tuple[float, float]:
+        return jump(Copper.density, (force(ahead), force(e)), (math.exp(-ahead), math.exp(-e)))
+
+    precursor, slowed = behind(0.0, at_yield)
+    assert slowed == pytest.approx(Copper.yielding / math.sqrt(Copper.young * Copper.density), rel=1e-3)
+    total = solve(lambda e: behind(at_yield, e)[1] - (25.0 - slowed), at_yield * 1.0001, 0.2)
+    front = behind(at_yield, total)[0]
+    assert front == pytest.approx(math.sqrt(tangent / Copper.density), rel=0.03)
+    assert reference("plastic_bar_wave", "precursor_stress").value == -Copper.yielding
+    assert reference("plastic_bar_wave", "precursor_speed").value == pytest.approx(slowed - 25.0, rel=1e-3)
+    assert reference("plastic_bar_wave", "plateau_stress").value == pytest.approx(-stress(total), rel=1e-3)
+    window = reference("plastic_bar_wave", "precursor_stress")
+    assert window.until is not None
+    assert 0.062 / precursor < window.since < window.until < (2 * LENGTH - 0.062) / precursor
+    assert 0.027 / front < reference("plastic_bar_wave", "plateau_stress").since
+
+
+# Shocks ---------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "density", "c0", "slope", "speed"),
+    [("shock_copper", 8930.0, 3940.0, 1.49, 300.0), ("shock_tungsten", 19235.0, 3980.0, 1.24, 1618.0)],
+)
+def test_shocks(name: str, density: float, c0: float, slope: float, speed: float) -> None:
+    shock = c0 + slope * speed
+    pressure, dense = density * shock * speed, density * shock / (shock - speed)
+    assert reference(name, "pressure").value == pytest.approx(pressure, rel=1e-4)
+    assert reference(name, "density").value == pytest.approx(dense, rel=1e-4)
+    assert reference(name, "energy").value == pytest.approx(speed**2 / 2, rel=1e-3)
+    assert 0.5 * pressure * (1 / density - 1 / dense) == pytest.approx(speed**2 / 2, rel=1e-12)
+    assert reference(name, "pressure").tolerance <= 0.01 * pressure
+    assert reference(name, "energy").tolerance <= 0.01 * speed**2 / 2
+    assert reference(name, "density").tolerance <= 0.01 * (dense - density)
+    for probe in ("pressure", "density", "energy"):
+        window = reference(name, probe)
+        assert window.until is not None
+        assert 10.5e-3 / shock < window.since < window.until < 20e-3 / shock
+
+
+# Motion ---------------------------------------------------------------------------------------------------------------
+
+
+def test_the_cube_turns_a_hundred_times() -> None:
+    case = load("spinning_cube")
+    rate = math.hypot(*case.boundaries[0].spin.rate)  # type: ignore[union-attr]
+    assert rate * case.run.end_time / (2 * math.pi) == pytest.approx(100, rel=1e-6)
+    assert reference("spinning_cube", "stress_max").tolerance <= 1e-10 * 200e9
+
+
+def test_the_free_body_keeps_its_velocity() -> None:
+    case = load("free_spin")
+    means = [entry.value for entry in case.reference if entry.quantity == "speed_mean"]
+    assert tuple(means) == case.parts[0].velocity

@@ -1,0 +1,66 @@
+"""Quantities: the closed grammar, SI values, and one clear line for everything else."""
+
+import math
+
+import pytest
+
+from conoid.cases.units import parse_quantity, parse_unit
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        ("210 m/s", "m/s", 210.0),
+        ("21.47 mm", "m", 0.02147),
+        ("7.85 g/cm^3", "kg/m^3", 7850.0),
+        ("206.9GPa", "Pa", 206.9e9),
+        ("460 J/kg/K", "J/kg/K", 460.0),
+        ("460 J kg^-1 K^-1", "J/kg/K", 460.0),
+        ("-2.5e-3 km/ms", "m/s", -2500.0),
+        ("10000 rev/s", "rad/s", 20000.0 * math.pi),
+        ("1 1/s", "1/s", 1.0),
+        ("80 us", "s", 8e-5),
+        ("80 µs", "s", 8e-5),
+        ("5 %", "", 0.05),
+        ("0.3", "", 0.3),
+        ("0.3", "m", 0.3),
+        (7, "m", 7.0),
+    ],
+)
+def test_reads(text: str | float, unit: str, value: float) -> None:
+    assert parse_quantity(text, unit) == pytest.approx(value, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "said"),
+    [
+        ("3 s", "m", "expected a length, in a unit such as 'm'"),
+        ("3 mm", "Pa", "expected a stress"),
+        ("3 m", "", "expected a plain number, without a unit"),
+        ("3 furlong", "m", "unknown unit 'furlong'"),
+        ("three mm", "m", "write a number and a unit, such as '1.5 m'"),
+        ("9**9**9", "m", "cannot read the unit"),
+        ("__import__('os')", "m", "is not a quantity"),
+        ("1" + " " * 100 + "mm", "m", "is not a quantity"),
+        ("1e999 m", "m", "is not finite"),
+        ("1e300 km^9", "m", "wrong dimension"),
+        ("nan", "m", "is not a quantity"),
+        (float("nan"), "m", "is not finite"),
+        (float("inf"), "m", "is not finite"),
+        (10**400, "m", "this large"),
+        (True, "m", "expected a quantity"),
+        (None, "m", "expected a quantity"),
+        ("", "m", "is not a quantity"),
+        ("mm", "m", "is not a quantity"),
+        ("1 m2", "m", "cannot read the unit"),
+    ],
+)
+def test_refuses(text: object, unit: str, said: str) -> None:
+    with pytest.raises(ValueError, match=r"^[^\n]*$") as caught:
+        parse_quantity(text, unit)
+    assert said in str(caught.value)
+
+
+def test_units_multiply_and_divide_from_the_left() -> None:
+    assert parse_unit("J/kg/K") == parse_unit("J kg^-1*K^-1")
+    assert parse_unit("kg/m^3") == (1.0, (-3, 1, 0, 0))
