@@ -7,5 +7,6 @@ from . import kernels
 if __name__ == "__main__":
     kernels.use_cache()
     from .main import main
+    from .parallel.comm import leave
 
-    sys.exit(main(sys.argv[1:]))
+    leave(main(sys.argv[1:]))

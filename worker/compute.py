@@ -1,7 +1,10 @@
 """From a case to an outcome, with the kernels loaded: build, step, look, sum up."""
 
+import logging
 import time
 from pathlib import Path
+
+import numpy as np
 
 from conoid.cases import messages
 from conoid.cases.outcome import Outcome
@@ -14,18 +17,27 @@ from .loop import STOPS, Loop
 from .output.history import History
 from .output.journal import Journal
 from .parallel.comm import Comm
+from .signals import Signals
 from .simulation import Simulation
+from .state import Ints
 from .timers import PHASES
 
+log = logging.getLogger("conoid.worker")
 
-def compute(case: Case, meshes: Path, folder: Path, comm: Comm, journal: Journal | None, began: float) -> Outcome:
+
+def compute(
+    case: Case, meshes: Path, folder: Path, comm: Comm, journal: Journal | None, signals: Signals, began: float
+) -> Outcome:
     """Runs the case in ``folder`` on all ranks; relative mesh paths start at ``meshes``. Raises ConoidError."""
     sim = simulation.build(case, meshes, comm)
     history = History(folder, sim.probes.names) if comm.rank == 0 else None
     setup = time.monotonic() - began
+    held = sum(block.n for block in sim.model.blocks)
+    log.info("%d tets, %d nodes here; set-up %.2f s", held, sim.model.nodes.n, setup)
+    sizes = comm.sum(np.array([sum(b.n for b in sim.model.blocks if b.part == k) for k in range(len(case.parts))]))
     if journal is not None:
-        _announce(sim, journal, setup)
-    loop = Loop(sim, folder, journal, history)
+        _announce(sim, journal, setup, sizes)
+    loop = Loop(sim, folder, journal, history, signals)
     cpu = time.thread_time()
     failure = None
     try:
@@ -39,12 +51,10 @@ def compute(case: Case, meshes: Path, folder: Path, comm: Comm, journal: Journal
     return _sum_up(loop, folder, failure, cpu, setup, time.monotonic() - began)
 
 
-def _announce(sim: Simulation, journal: Journal, setup: float) -> None:
+def _announce(sim: Simulation, journal: Journal, setup: float, sizes: Ints) -> None:
     case, model = sim.case, sim.model
     journal.write(messages.Status, state=State.RUNNING)
-    parts = {part.name: 0 for part in case.parts}
-    for block in model.blocks:
-        parts[model.parts[block.part]] += block.n
+    parts = {name: int(n) for name, n in zip(model.parts, sizes, strict=True)}
     journal.write(
         messages.Started, ranks=sim.comm.size, elements=model.elements_global, nodes=model.nodes_global,
         end_time=case.run.end_time, setup=setup, parts=parts,

@@ -1,6 +1,7 @@
 """The run: steps, and whoever is due to look at them. Signals, wall time and the ledger end it in good order."""
 
-import signal
+import logging
+import math
 import time
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from .errors import EnergyError
 from .output import frames
 from .output.history import History
 from .output.journal import Journal
+from .signals import Signals
 from .simulation import Simulation
 from .state import Floats
 
@@ -25,27 +27,28 @@ STOPS = {
     MAX_STEPS: (State.FAILED, Cause.DIVERGED, "run.max_steps is used up before run.end_time"),
 }
 _REPORT_EVERY = 0.25
+_LOG_EVERY = 10.0
+
+log = logging.getLogger("conoid.worker")
 
 
 class Loop:
     """Runs a simulation to its end, and tells. ``journal`` and ``history`` exist on rank 0 only."""
 
-    def __init__(self, sim: Simulation, folder: Path, journal: Journal | None, history: History | None) -> None:
+    def __init__(
+        self, sim: Simulation, folder: Path, journal: Journal | None, history: History | None, signals: Signals
+    ) -> None:
         self.sim = sim
         self.energy: Energy | None = None
         self.stopped = 0
         self._folder = folder
         self._journal = journal
         self._history = history
+        self._signals = signals
         self._sample = 0
-        self._signalled = False
         self._began = self._reported = time.monotonic()
         self._reported_step = 0
-        for number in (signal.SIGTERM, signal.SIGUSR1, signal.SIGINT):
-            signal.signal(number, self._on_signal)
-
-    def _on_signal(self, number: int, stack: object) -> None:
-        self._signalled = True
+        self._logged = -math.inf
 
     def run(self) -> None:
         """Steps until the end time, or until a reason to stop. Raises PhysicsError."""
@@ -77,7 +80,7 @@ class Loop:
         """This rank's words for the next vote."""
         sim, now = self.sim, time.monotonic()
         limit = sim.case.run.max_wall_time
-        stop = CANCELLED if self._signalled else 0
+        stop = CANCELLED if self._signals.raised else 0
         if limit is not None and now - self._began > limit:
             stop = WALL_TIME
         if sim.clock.step + 1 >= sim.case.run.max_steps:
@@ -118,6 +121,9 @@ class Loop:
         if loads is None:
             return
         now = time.monotonic()
+        if now - self._logged > _LOG_EVERY:
+            self._logged = now
+            log.info("step %d, t %.4g s, dt %.3g s, %s", clock.step, clock.t, clock.dt, limiter)
         steps, elapsed = clock.step - self._reported_step, now - self._reported
         busy = [load["elements"] + load["nodes"] for load in loads]
         left = (sim.case.run.end_time - clock.t) / clock.stable

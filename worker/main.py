@@ -10,34 +10,68 @@ from pathlib import Path
 
 from conoid.cases import layout, load, messages
 from conoid.cases import outcome as outcomes
+from conoid.cases.outcome import Outcome
 from conoid.cases.problems import CaseError
 from conoid.cases.run import Cause, ExitCode, State
 from conoid.cases.schema import Case
 
-from .errors import ConoidError, InputError
+from .errors import ConoidError
 from .output.journal import Journal
 from .output.telemetry import Telemetry
 from .parallel.comm import Comm, connect
+from .signals import Signals
 
 log = logging.getLogger("conoid.worker")
+
+_CODES = {
+    State.SUCCEEDED: ExitCode.SUCCEEDED,
+    State.FAILED: ExitCode.PHYSICS,
+    State.CANCELLED: ExitCode.INTERRUPTED,
+    State.TIMED_OUT: ExitCode.INTERRUPTED,
+}
 
 
 def main(arguments: list[str]) -> int:
     """Runs one case on all ranks of MPI's world; returns the exit code of the process."""
     began = time.monotonic()
     options = _parse(arguments)
+    signals = Signals()
     comm = connect()
-    folder: Path = options.out
-    _prepare_folder(folder, comm)
+    _prepare_folder(options.out, comm)
+    telemetry = journal = None
+    if comm.rank == 0:
+        telemetry = Telemetry(options.telemetry, options.prefix) if options.telemetry else None
+        journal = Journal(options.out, options.run or options.out.resolve().name, telemetry)
     try:
-        case = _case(options)
-        if comm.size != case.run.ranks:
-            case = case.model_copy(update={"run": case.run.model_copy(update={"ranks": comm.size})})
-        return _run(case, options, comm, began)
+        outcome, code = _outcome(options, comm, journal, signals, began)
+    except BaseException:
+        log.error("rank %d stops the job\n%s", comm.rank, traceback.format_exc())
+        raise
+    if journal is not None:
+        _close(outcome, options.out, journal, telemetry)
+    comm.barrier()
+    return code
+
+
+def _outcome(
+    options: argparse.Namespace, comm: Comm, journal: Journal | None, signals: Signals, began: float
+) -> tuple[Outcome, int]:
+    """Runs the case; whatever is wrong with it or happens in it on purpose becomes a failed outcome."""
+    try:
+        case = _case(options, comm)
+        if comm.rank == 0:
+            (options.out / layout.RESOLVED_CASE).write_bytes(load.resolved_json(case))
+        outcome = _compute(case, Path(options.case).resolve().parent, options.out, comm, journal, signals, began)
+        return outcome, _CODES[State(outcome.state)]
     except CaseError as error:
-        return _fail(folder, comm, State.FAILED, Cause.INPUT, str(error), ExitCode.BAD_INPUT)
-    except InputError as error:
-        return _fail(folder, comm, State.FAILED, error.cause, str(error), error.exit_code)
+        return _failed(Cause.INPUT, str(error), comm, began), ExitCode.BAD_INPUT
+    except ConoidError as error:
+        return _failed(error.cause, str(error), comm, began), error.exit_code
+
+
+def _failed(cause: Cause, message: str, comm: Comm, began: float) -> Outcome:
+    elapsed = time.monotonic() - began
+    return Outcome(state=State.FAILED, cause=cause, message=message, ranks=comm.size, elapsed=elapsed)
 
 
 def _parse(arguments: list[str]) -> argparse.Namespace:
@@ -54,11 +88,13 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
     return options
 
 
-def _case(options: argparse.Namespace) -> Case:
+def _case(options: argparse.Namespace, comm: Comm) -> Case:
+    """The case with its overrides; it runs on as many ranks as MPI has started."""
     path = Path(options.case)
     if not path.exists() and options.case in load.shipped():
         path = load.shipped_path(options.case)
-    return load.parse_case(load.apply_overrides(load.read_data(path), options.set))
+    overrides = [*options.set, f"run.ranks={comm.size}"]
+    return load.parse_case(load.apply_overrides(load.read_data(path), overrides))
 
 
 def _prepare_folder(folder: Path, comm: Comm) -> None:
@@ -72,75 +108,32 @@ def _prepare_folder(folder: Path, comm: Comm) -> None:
     log.info("rank %d of %d, process %d", comm.rank, comm.size, os.getpid())
 
 
-def _run(case: Case, options: argparse.Namespace, comm: Comm, began: float) -> int:
-    folder, run = options.out, options.run or options.out.resolve().name
-    journal = telemetry = None
-    if comm.rank == 0:
-        telemetry = Telemetry(options.telemetry, options.prefix) if options.telemetry else None
-        journal = Journal(folder, run, telemetry)
-        (folder / layout.RESOLVED_CASE).write_bytes(load.resolved_json(case))
-    try:
-        outcome = _compute(case, _mesh_folder(options), folder, comm, journal, began)
-    except ConoidError as error:
-        if isinstance(error, InputError):
-            raise
-        outcome = outcomes.Outcome(
-            state=State.FAILED, cause=error.cause, message=str(error), ranks=comm.size, elapsed=time.monotonic() - began
-        )
-    except BaseException:
-        log.error("rank %d\n%s", comm.rank, traceback.format_exc())
-        raise
-    return _finish(outcome, folder, comm, journal, telemetry)
-
-
-def _mesh_folder(options: argparse.Namespace) -> Path:
-    return Path(options.case).resolve().parent
-
-
 def _compute(
-    case: Case, meshes: Path, folder: Path, comm: Comm, journal: Journal | None, began: float
-) -> outcomes.Outcome:
+    case: Case, meshes: Path, folder: Path, comm: Comm, journal: Journal | None, signals: Signals, began: float
+) -> Outcome:
     if comm.rank == 0:
         from . import compute
     comm.barrier()
     if comm.rank != 0:
         from . import compute
-    return compute.compute(case, meshes, folder, comm, journal, began)
+    return compute.compute(case, meshes, folder, comm, journal, signals, began)
 
 
-def _finish(
-    outcome: outcomes.Outcome, folder: Path, comm: Comm, journal: Journal | None, telemetry: Telemetry | None
-) -> int:
-    if comm.rank == 0 and journal is not None:
-        _write_outcome(folder, outcome)
-        journal.write(
-            messages.Finished, outcome.steps, outcome.time, state=outcome.state, digest=outcome.digest,
-            steps=outcome.steps, elapsed=outcome.elapsed,
-        )  # fmt: skip
-        journal.close()
-        if telemetry is not None:
-            telemetry.close()
-        if outcome.message:
-            print(outcome.message, file=sys.stderr)
-    comm.barrier()
-    return _exit_code(outcome)
+def _close(outcome: Outcome, folder: Path, journal: Journal, telemetry: Telemetry | None) -> None:
+    """The outcome first, then the last message: whoever hears of the end finds it on disk."""
+    _write_outcome(folder, outcome)
+    journal.write(
+        messages.Finished, outcome.steps, outcome.time, state=outcome.state, digest=outcome.digest,
+        steps=outcome.steps, elapsed=outcome.elapsed,
+    )  # fmt: skip
+    journal.close()
+    if telemetry is not None:
+        telemetry.close()
+    if outcome.message:
+        print(outcome.message, file=sys.stderr)
 
 
-def _exit_code(outcome: outcomes.Outcome) -> int:
-    if outcome.state == State.SUCCEEDED:
-        return ExitCode.SUCCEEDED
-    return ExitCode.INTERRUPTED if outcome.state in (State.CANCELLED, State.TIMED_OUT) else ExitCode.PHYSICS
-
-
-def _fail(folder: Path, comm: Comm, state: State, cause: Cause, message: str, code: int) -> int:
-    if comm.rank == 0:
-        _write_outcome(folder, outcomes.Outcome(state=state, cause=cause, message=message, ranks=comm.size))
-        print(message, file=sys.stderr)
-    comm.barrier()
-    return code
-
-
-def _write_outcome(folder: Path, outcome: outcomes.Outcome) -> None:
+def _write_outcome(folder: Path, outcome: Outcome) -> None:
     """Written beside, flushed to disk, renamed: it is there whole or not at all."""
     beside = folder / (layout.OUTCOME + ".part")
     with beside.open("wb") as file:

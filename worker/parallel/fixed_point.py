@@ -42,7 +42,7 @@ def exact_sums(comm: Comm, columns: Floats) -> Floats:
     largest = np.zeros(columns.shape[1]) if not len(columns) else np.abs(columns).max(axis=0)
     largest = comm.maximum(largest)
     exponent = np.frexp(largest)[1]
-    scaled = np.ldexp(columns, 30 - exponent)
+    scaled = columns * np.ldexp(1.0, 30 - exponent)
     high = np.rint(scaled)
     low = np.rint((scaled - high) * _LIMB)
     words = np.concatenate([high.astype(np.int64).sum(axis=0), low.astype(np.int64).sum(axis=0)])

@@ -1,0 +1,15 @@
+"""A request to stop from outside: SIGTERM, SIGUSR1 or SIGINT raise a flag, and the vote of the next step carries it."""
+
+import signal
+
+
+class Signals:
+    """Listens from its making on; the set-up of a run is finished before the flag is looked at."""
+
+    def __init__(self) -> None:
+        self.raised = False
+        for number in (signal.SIGTERM, signal.SIGUSR1, signal.SIGINT):
+            signal.signal(number, self._on_signal)
+
+    def _on_signal(self, number: int, stack: object) -> None:
+        self.raised = True
