@@ -196,10 +196,11 @@ class Supervisor:
         before = self._open.get(run_id)
         if before is None:
             return None
-        after, actions = advance(before, event, time.time())
+        now = time.time()
+        after, actions = advance(before, event, now)
         try:
             for action in actions:
-                self._perform(after, action)
+                self._perform(after, action, now)
         except LaunchError as error:
             self._settle(after)
             return self._apply(run_id, LaunchFailed(str(error)))
@@ -236,11 +237,11 @@ class Supervisor:
         self._hold.pop(run_id, None)
         return False
 
-    def _perform(self, run: Run, action: Action) -> None:
+    def _perform(self, run: Run, action: Action, now: float) -> None:
         path = self._settings.runs / run.id
         match action:
             case Journal(state, cause, message):
-                self._tell(run, Status(run=run.id, wall=time.time(), state=state, cause=cause, message=message))
+                self._tell(run, Status(run=run.id, wall=now, state=state, cause=cause, message=message))
             case WriteOutcome(outcome):
                 folder.write_outcome(path, outcome)
             case Launch():

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -61,6 +62,8 @@ class User:
 
     http: httpx2.Client
     name: str
+    runs: Path
+    """The server's folder of runs."""
 
     def submit(self, text: str | None = None, **plan: Any) -> str:
         """The id of a new run."""
@@ -117,8 +120,8 @@ def server(settings: Settings) -> Iterator[Running]:
         users = []
         for name in ("ann", "bob"):
             token = create_token(service.store, name, frozenset({"read", "submit", "metrics"}))
-            users.append(User(_like(client, token), name))
-        yield Running(service, users[0], users[1], User(client, "nobody"))
+            users.append(User(_like(client, token), name, settings.runs))
+        yield Running(service, users[0], users[1], User(client, "nobody", settings.runs))
         _end_runs(service)
 
 
@@ -169,7 +172,7 @@ class Process:
         store.close()
         client = httpx2.Client(base_url=url, headers={"Authorization": f"Bearer {token}"}, timeout=PATIENCE)
         self.clients.append(client)
-        return User(client, name)
+        return User(client, name, self.runs)
 
     def end(self, number: signal.Signals) -> int:
         """Sends a signal and waits for the end."""
@@ -178,13 +181,17 @@ class Process:
         return self.child.wait(PATIENCE)
 
 
-@pytest.fixture
-def process(tmp_path: Path) -> Iterator[Callable[..., Process]]:
+MakeProcess = Callable[..., Process]
+
+
+@contextmanager
+def processes(folder: Path) -> Iterator[MakeProcess]:
+    """Makes servers, with arguments of their own, on ``folder``/runs; ends them and their workers."""
     made: list[Process] = []
 
     def make(*arguments: str) -> Process:
         fake = " ".join(FAKE)
-        made.append(Process(tmp_path / "runs", ("--worker", fake, "--slots", "2", "--grace", "0.5", *arguments)))
+        made.append(Process(folder / "runs", ("--worker", fake, "--slots", "2", "--grace", "0.5", *arguments)))
         return made[-1]
 
     yield make
@@ -194,7 +201,13 @@ def process(tmp_path: Path) -> Iterator[Callable[..., Process]]:
         if one.child is not None and one.child.poll() is None:
             one.child.kill()
             one.child.wait(PATIENCE)
-    _end_workers(tmp_path)
+    _end_workers(folder)
+
+
+@pytest.fixture
+def process(tmp_path: Path) -> Iterator[MakeProcess]:
+    with processes(tmp_path) as make:
+        yield make
 
 
 def _end_workers(folder: Path) -> None:

@@ -1,0 +1,183 @@
+"""A server that is killed loses nothing that it has acknowledged, and its workers go on."""
+
+import json
+import os
+import signal
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from conoid.cases.run import State
+from conoid.server.folder import Submission, create, new_id
+
+from .conftest import PATIENCE, TOML, MakeProcess, Process, User, case_text, processes
+
+SLOTS = 12
+
+
+@dataclass
+class Aftermath:
+    """A server that follows one that was killed with runs in every situation."""
+
+    ann: User
+    runs: Path
+    go: Path
+    names: dict[str, str]
+    pids: dict[str, int]
+
+    def show(self, name: str) -> dict[str, Any]:
+        """The run of that name as the new server tells it."""
+        return self.ann.show(self.names[name])
+
+    def states(self, name: str) -> list[str]:
+        """What its journal tells."""
+        return self.ann.states(self.names[name])
+
+
+@pytest.fixture(scope="module")
+def after(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Aftermath]:
+    folder = tmp_path_factory.mktemp("killed")
+    with processes(folder) as make:
+        server = make("--no-zenoh", "--slots", str(SLOTS))
+        yield stage(server, folder)
+
+
+def stage(server: Process, folder: Path) -> Aftermath:
+    """Brings runs into every situation, kills the server, lets time pass, and starts the next one."""
+    ann, go, soon = server.user(server.start()["url"]), folder / "go", folder / "soon"
+    names = {
+        "lives": ann.submit(ranks=2, wait=str(go)),
+        "unrecorded": ann.submit(wait=str(go)),
+        "obeys": ann.submit(steps=100_000, pace=0.01),
+        "deaf": ann.submit(end="deaf", steps=1),
+        "finishes": ann.submit(wait=str(soon)),
+        "dies": ann.submit(wait=str(go)),
+        "rebooted": ann.submit(wait=str(go)),
+        "replaced": ann.submit(wait=str(go)),
+    }
+    for run in names.values():
+        ann.wait_for(run, State.RUNNING)
+    names["large"] = ann.submit(ranks=SLOTS)
+    names["announced"] = ann.submit()
+    names |= {f"small {number}": ann.submit(steps=1) for number in range(8)}
+    ann.wait_for(names["small 7"], State.QUEUED)
+    ann.http.post(f"/v1/runs/{names['deaf']}:cancel")
+    server.end(signal.SIGKILL)
+
+    soon.touch()
+    records = {name: server.runs / names[name] / "worker.json" for name in names}
+    told = {name: json.loads(path.read_text()) for name, path in records.items() if path.exists()}
+    records["unrecorded"].unlink()
+    for name in ("dies", "rebooted", "replaced"):
+        os.kill(told[name]["pid"], signal.SIGKILL)
+    for name in ("finishes", "dies", "rebooted", "replaced"):
+        gone(names[name])
+    records["rebooted"].write_text(json.dumps({**told["rebooted"], "boot": "another"}))
+    records["replaced"].write_text(json.dumps({**told["replaced"], "pid": os.getpid()}))
+    with (server.runs / names["announced"] / "journal.jsonl").open("a") as file:
+        line = {"type": "status", "run": names["announced"], "seq": 3, "wall": 1.0, "state": "starting"}
+        file.write(json.dumps(line) + "\n")
+    names["accepted"] = accepted(server.runs)
+    (server.runs / f".new-{names['accepted']}").mkdir()
+    ann = server.user(server.start()["url"])
+    return Aftermath(ann, server.runs, go, names, {name: record["pid"] for name, record in told.items()})
+
+
+def accepted(runs: Path) -> str:
+    """A run whose server died right after it said yes."""
+    run, now = new_id()
+    made = Submission(
+        id=run, owner="ann", name="bar", title="", ranks=1, submitted=now, case_file="case.toml", body_sha256="",
+        idempotency_key=None, wall_time=None, estimate={},
+    )  # fmt: skip
+    create(runs, made, case_text().encode(), b"{}")
+    return run
+
+
+def test_a_living_worker_is_adopted_and_keeps_its_slots(after: Aftermath) -> None:
+    assert after.show("lives")["state"] == "running"
+    assert after.show("large")["state"] == "queued"
+    assert after.ann.http.get("/v1/me").json()["slots"]["used"] >= 2
+
+
+def test_a_worker_without_a_record_is_found(after: Aftermath) -> None:
+    assert after.show("unrecorded")["state"] == "running"
+    record = json.loads((after.runs / after.names["unrecorded"] / "worker.json").read_text())
+    assert record["pid"] == after.pids["unrecorded"]
+
+
+def test_an_adopted_worker_can_be_cancelled(after: Aftermath) -> None:
+    after.ann.http.post(f"/v1/runs/{after.names['obeys']}:cancel")
+    assert after.ann.wait_for(after.names["obeys"])["state"] == "cancelled"
+
+
+def test_a_deaf_worker_is_killed_by_the_next_server(after: Aftermath) -> None:
+    ended = after.ann.wait_for(after.names["deaf"])
+    assert (ended["state"], ended["cause"]) == ("cancelled", "cancelled")
+
+
+def test_a_worker_that_finished_meanwhile_is_read_from_its_outcome(after: Aftermath) -> None:
+    assert after.show("finishes")["state"] == "succeeded"
+    assert after.states("finishes")[-1] == "succeeded"
+
+
+@pytest.mark.parametrize(("name", "cause"), [("dies", "service"), ("rebooted", "node"), ("replaced", "service")])
+def test_a_worker_that_died_meanwhile_is_lost(after: Aftermath, name: str, cause: str) -> None:
+    ended = after.show(name)
+    assert (ended["state"], ended["cause"], ended["outcome"]["state"]) == ("lost", cause, "lost")
+    assert after.states(name)[-1] == "lost"
+
+
+def test_everything_acknowledged_runs_once(after: Aftermath) -> None:
+    after.go.touch()
+    for name in ("lives", "unrecorded", "large", "announced", "accepted", *(f"small {n}" for n in range(8))):
+        assert after.ann.wait_for(after.names[name])["state"] == "succeeded", name
+        assert after.states(name).count("running") == 1, name
+        events = after.ann.events(after.names[name])
+        assert [event["seq"] for event in events] == list(range(1, len(events) + 1)), name
+    assert after.states("unrecorded").count("starting") == 1
+    again = ["accepted", "queued", "starting", "queued", "starting", "running", "succeeded"]
+    assert after.states("announced") == again
+    assert not list(after.runs.glob(".new-*"))
+
+
+def test_a_stopped_server_leaves_its_workers_and_can_lose_its_database(process: MakeProcess, tmp_path: Path) -> None:
+    server = process("--no-zenoh")
+    ann = server.user(server.start()["url"])
+    headers = {**TOML, "Idempotency-Key": "k"}
+    first = ann.http.post("/v1/runs", content=case_text(), headers=headers)
+    before = ann.wait_for(first.json()["id"])
+    living = ann.submit(wait=str(tmp_path / "go"))
+    ann.wait_for(living, State.RUNNING)
+    assert server.end(signal.SIGTERM) == 0
+    for path in server.runs.glob("server.sqlite*"):
+        path.unlink()
+    ann = server.user(server.start()["url"])
+    assert ann.show(first.json()["id"]) == before
+    assert ann.http.post("/v1/runs", content=case_text(), headers=headers).content == first.content
+    (tmp_path / "go").touch()
+    assert ann.wait_for(living)["state"] == "succeeded"
+
+
+def gone(run: str) -> None:
+    """Returns when no process of the run lives any more."""
+    deadline = time.monotonic() + PATIENCE
+    while living(run):
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def living(run: str) -> bool:
+    """True while a process has the run in its command line."""
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            try:
+                if run.encode() in (entry / "cmdline").read_bytes():
+                    return True
+            except OSError:
+                continue
+    return False
