@@ -1,0 +1,174 @@
+"""The server's command line: one clear line for what cannot be, tokens, one server a folder."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from conoid.server.__main__ import main
+from conoid.server.auth import check_token
+from conoid.server.launch import Access, Job, LaunchError, processes
+from conoid.server.launch.local import environment, find_mpiexec
+from conoid.server.settings import Settings, SettingsError, loopback, usable_cores
+from conoid.server.store import Store, StoreError
+
+from .conftest import MakeProcess
+
+Said = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def say(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Said:
+    """Runs the command on a folder of its own: exit code, output, errors."""
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        code = main(["--runs", str(tmp_path / "runs"), *arguments])
+        told = capsys.readouterr()
+        return code, told.out, told.err
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--host", "0.0.0.0", "--no-auth"], "--no-auth with --host 0.0.0.0: allowed only on a loopback address"),
+        (["--slots", "0"], "--slots 0: at least one rank"),
+        (["--port", "70000"], "--port 70000: 0 (any free port) to 65535"),
+        (["--web", "/no/such/folder"], "--web /no/such/folder: there is no such folder"),
+        (["--grace", "0"], "--grace 0.0: a number of seconds above 0"),
+        (["--worker", "'"], '--worker "\'": No closing quotation'),
+        (["--host", "192.0.2.1"], "--host 192.0.2.1 --port 8750: "),
+    ],
+)
+def test_what_cannot_be_is_one_line(say: Said, arguments: list[str], words: str) -> None:
+    code, out, err = say(*arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith(f"conoid.server: {words}")
+    assert err.count("\n") == 1
+
+
+def test_a_port_that_is_taken(say: Said) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = str(taken.getsockname()[1])
+        assert say("--port", port)[2] == f"conoid.server: --host 127.0.0.1 --port {port}: Address already in use\n"
+        told = say("--port", "0", "--zenoh-port", port)
+        assert told[0] == 2
+        assert told[2] == f"conoid.server: the Zenoh router cannot listen on port {port}: address already in use\n"
+
+
+def test_a_database_that_cannot_be_opened(tmp_path: Path) -> None:
+    for url in (f"sqlite:///{tmp_path}/no/such/folder/x", "nonsense", "postgresql+nodriver://x"):
+        with pytest.raises(StoreError, match="the database cannot be opened") as told:
+            Store(url)
+        assert "\n" not in str(told.value)
+
+
+def test_tokens(say: Said, tmp_path: Path) -> None:
+    code, out, err = say("token", "add", "ann", "--scopes", "read")
+    assert (code, err) == (0, "")
+    store = Store(f"sqlite:///{tmp_path}/runs/server.sqlite")
+    found = check_token(store, out.strip())
+    assert found is not None
+    assert (found.owner, found.scopes) == ("ann", frozenset({"read"}))
+    listed = say("token", "list")[1]
+    assert listed.split()[:3] == [found.id, "ann", "read"]
+    assert out.strip().split("_")[2] not in listed
+    assert say("token", "revoke", found.id)[0] == 0
+    assert check_token(store, out.strip()) is None
+    assert say("token", "list")[1] == ""
+    assert say("token", "revoke", found.id)[::2] == (
+        2,
+        f"conoid.server: token '{found.id}': there is none; 'token list' shows all\n",
+    )
+    store.close()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [(["a/b"], "a name starts with"), (["ann", "--scopes", "read,rule"], "unknown scope rule; known: read, submit")],
+)
+def test_tokens_that_cannot_be(say: Said, arguments: list[str], words: str) -> None:
+    code, out, err = say("token", "add", *arguments)
+    assert (code, out) == (2, "")
+    assert words in err
+
+
+def test_one_server_a_folder(process: MakeProcess) -> None:
+    first = process("--no-zenoh")
+    told = first.start()
+    assert told["pid"] == first.child.pid if first.child else False
+    assert told["zenoh"] is None
+    second = subprocess.run(
+        [sys.executable, "-m", "conoid.server", "--runs", str(first.runs), "--port", "0", "--no-zenoh"],
+        capture_output=True, text=True, timeout=60, check=False,
+    )  # fmt: skip
+    assert second.returncode == 2
+    assert second.stderr == f"conoid.server: --runs {first.runs}: another server uses this folder\n"
+    assert first.end(signal.SIGINT) == 0
+
+
+@pytest.mark.parametrize(
+    ("host", "own"),
+    [("127.0.0.1", True), ("127.8.8.8", True), ("::1", True), ("localhost", True), ("0.0.0.0", False), ("a.b", False)],
+)
+def test_loopback(host: str, own: bool) -> None:
+    assert loopback(host) is own
+
+
+def test_settings_guard_themselves_without_the_command_line(tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match="--no-auth"):
+        Settings(runs=tmp_path, host="0.0.0.0", auth=False)
+
+
+# The launch -----------------------------------------------------------------------------------------------------------
+
+
+def job(ranks: int, telemetry: Access | None = None) -> Job:
+    return Job("r1", ranks, Path("case.toml"), Path("."), telemetry)
+
+
+def test_crowded_ranks_sleep_while_they_wait() -> None:
+    assert "MPIR_CVAR_ENABLE_HEAVY_YIELD" not in environment({}, job(4 * usable_cores() - 1))
+    assert environment({}, job(4 * usable_cores()))["MPIR_CVAR_ENABLE_HEAVY_YIELD"] == "1"
+    chosen = {"MPIR_CVAR_ENABLE_HEAVY_YIELD": "0"}
+    assert environment(chosen, job(1000))["MPIR_CVAR_ENABLE_HEAVY_YIELD"] == "0"
+
+
+def test_the_environment_of_a_worker() -> None:
+    access = Access("tcp/127.0.0.1:7447", "conoid/v1/ann/r1", "worker.ann", "secret")
+    env = environment({"PATH": "/bin", "OMP_NUM_THREADS": "8", "CONOID_TOKEN": "x"}, job(1, access))
+    assert (env["PATH"], env["OMP_NUM_THREADS"], env["CONOID_RUN"]) == ("/bin", "1", "r1")
+    assert (env["CONOID_ZENOH_USER"], env["CONOID_ZENOH_PASSWORD"]) == ("worker.ann", "secret")
+    assert "CONOID_TOKEN" not in env
+
+
+def test_the_sites_own_launcher_comes_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert find_mpiexec("/opt/mpi/mpiexec --oversubscribe") == ("/opt/mpi/mpiexec", "--oversubscribe")
+    (tmp_path / "mpiexec").touch(mode=0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    beside = Path(sys.executable).with_name("mpiexec")
+    assert find_mpiexec("") == (str(beside if beside.is_file() else tmp_path / "mpiexec"),)
+    monkeypatch.setattr(sys, "executable", "/nowhere/python")
+    assert find_mpiexec("") == (str(tmp_path / "mpiexec"),)
+    monkeypatch.setenv("PATH", "/nowhere")
+    with pytest.raises(LaunchError, match="no mpiexec"):
+        find_mpiexec("")
+
+
+def test_all_processes_of_a_run_are_known_and_ended() -> None:
+    env = {**os.environ, processes.RUN_VARIABLE: "a-run-of-this-test"}
+    code = "import subprocess, sys; subprocess.run([sys.executable, '-c', 'import time; time.sleep(60)'])"
+    leader = subprocess.Popen([sys.executable, "-c", code], env=env, start_new_session=True)
+    while len(processes.of_run("a-run-of-this-test")) < 2:
+        assert leader.poll() is None
+    assert processes.leader_of("a-run-of-this-test") == leader.pid
+    assert processes.end_run("a-run-of-this-test") == 2
+    assert leader.wait(10) == -signal.SIGKILL
+    assert processes.start_time(leader.pid) is None
+    assert processes.start_time(os.getpid()) is not None
