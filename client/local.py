@@ -49,7 +49,7 @@ class LocalServer:
     def __enter__(self) -> Self:
         """Starts the server and waits until it answers. Raises ClientError with its own last words."""
         self.runs.mkdir(parents=True, exist_ok=True)
-        token = _token(self.runs)
+        self.token = _token(self.runs)
         options = ["--port", "0", "--zenoh-port", "0", "--slots", str(self.slots), "--grace", str(GRACE)]
         with (self.runs / LOG_FILE).open("wb") as log:
             self._process = subprocess.Popen(
@@ -57,7 +57,7 @@ class LocalServer:
                 start_new_session=True, preexec_fn=_end_with_parent, env=_environment(),
             )  # fmt: skip
         try:
-            self.session = Session(self._await().url, token)
+            self.session = Session(self._await().url, self.token)
         except BaseException:
             self.stop()
             raise

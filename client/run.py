@@ -4,7 +4,7 @@ import shutil
 import tempfile
 import time
 import weakref
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -118,7 +118,7 @@ class Run:
             after, more = page.last, page.more
         return found
 
-    def messages(self, after: int = 0, link: "Link | None" = None) -> Iterator[AnyMessage]:
+    def messages(self, after: int = 0, link: "Link | None" = None) -> Generator[AnyMessage]:
         """Every message after ``after``, once and in order: what was said, then what is said, to the run's end.
 
         Over Zenoh where it can be reached, else over SSE; ``link`` chooses.

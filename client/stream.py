@@ -8,7 +8,7 @@ import json
 import queue
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import suppress
 from typing import Protocol, TypeVar, cast
 
@@ -157,7 +157,7 @@ class SseLink:
         self._closed.set()
 
 
-def follow(link: Link, refill: Refill, ended: Callable[[], bool], after: int = 0) -> Iterator[AnyMessage]:
+def follow(link: Link, refill: Refill, ended: Callable[[], bool], after: int = 0) -> Generator[AnyMessage]:
     """Every message after ``after``, once and in order, to the run's final status; closes ``link``.
 
     ``refill`` reads the journal, ``ended`` asks the server whether the run is over. While the link is silent both are

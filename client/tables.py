@@ -90,17 +90,17 @@ def _about(value: float | None, shown: Callable[[float], str]) -> str:
 def outcome_table(outcome: Outcome) -> Table:
     """How a run ended."""
     energy, ranks = outcome.energy, f"{outcome.ranks} rank{'' if outcome.ranks == 1 else 's'}"
-    return pairs({
-        "state": state_text(State(outcome.state), outcome.cause),
-        "why": outcome.message,
-        "simulated": f"{si(outcome.time, 's')} in {count(outcome.steps)} steps",
-        "took": f"{duration(outcome.elapsed)} on {ranks}, {duration(outcome.setup)} to the first step",
-        "model": f"{count(outcome.elements)} tets, {count(outcome.nodes)} nodes",
-        "speed": f"{si(outcome.element_updates_per_second, '')} element updates a CPU-second and core",
-        "energy": "" if energy is None else f"residual {energy.residual:.1e}, worst {outcome.worst_residual:.1e}",
-        "digest": outcome.digest[:16],
-        "warnings": "\n".join(outcome.warnings),
-    })  # fmt: skip
+    entries: dict[str, str | Text] = {"state": state_text(State(outcome.state), outcome.cause), "why": outcome.message}
+    if outcome.steps:
+        entries |= {
+            "simulated": f"{si(outcome.time, 's')} in {count(outcome.steps)} steps",
+            "took": f"{duration(outcome.elapsed)} on {ranks}, {duration(outcome.setup)} to the first step",
+            "model": f"{count(outcome.elements)} tets, {count(outcome.nodes)} nodes",
+            "speed": f"{si(outcome.element_updates_per_second, '')} element updates a CPU-second and core",
+            "energy": "" if energy is None else f"residual {energy.residual:.1e}, worst {outcome.worst_residual:.1e}",
+            "digest": outcome.digest[:16],
+        }
+    return pairs({**entries, "warnings": "\n".join(outcome.warnings)})
 
 
 def checks_table(checks: Sequence[Check]) -> Table:

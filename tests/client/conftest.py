@@ -2,6 +2,7 @@
 
 import json
 import socket
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +12,7 @@ import zenoh
 
 from conoid.cases import keys
 from conoid.cases.messages import AnyMessage, to_msgpack
+from conoid.client.local import LocalServer
 from conoid.client.session import Router
 
 OWNER = "ann"
@@ -59,8 +61,39 @@ def broker(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Broker]:
 
 @pytest.fixture
 def quiet_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A home without configuration and an environment without a server."""
+    """An empty folder to work in, no configuration, and an environment without a server."""
+    monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
     for name in ("CONOID_URL", "CONOID_TOKEN"):
         monkeypatch.delenv(name, raising=False)
     return tmp_path
+
+
+FAKE_WORKER = f"{sys.executable} {Path(__file__).with_name('fake_worker.py')}"
+
+
+def case_file(folder: Path, ranks: int = 1, **plan: object) -> Path:
+    """A small case; ``plan`` is for the fake worker."""
+    path = folder / "bar.toml"
+    path.write_text(f"""
+name = "bar"
+title = "A steel bar"
+description = '{json.dumps(plan)}'
+[[parts]]
+name = "rod"
+material = "steel_42crmo4"
+mesh = {{ shape = "box", low = [0, 0, 0], high = [1e-3, 1e-3, 4e-3], element_size = 5e-4, generator = "structured" }}
+[run]
+end_time = "1 us"
+ranks = {ranks}
+""")
+    return path
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalServer]:
+    """A real server in a process of its own; its workers are fake."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("CONOID_WORKER", FAKE_WORKER)
+        with LocalServer(tmp_path_factory.mktemp("server") / "runs", slots=4) as running:
+            yield running

@@ -1,0 +1,243 @@
+"""The command line: in this process with a real server, and as processes of their own."""
+
+import fcntl
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from conoid.client.cli import app
+from conoid.client.local import LocalServer
+
+from .bodies import write_run
+from .conftest import FAKE_WORKER, case_file
+
+CONOID = [sys.executable, "-m", "conoid.client.cli"]
+
+
+@pytest.fixture
+def user(server: LocalServer, quiet_home: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder to work in, and a server in the environment."""
+    monkeypatch.setenv("CONOID_URL", server.session.url)
+    monkeypatch.setenv("CONOID_TOKEN", server.token)
+    return quiet_home
+
+
+def conoid(*words: object) -> Result:
+    return CliRunner().invoke(app, [str(word) for word in words])
+
+
+def submitted(folder: Path, **plan: object) -> str:
+    result = conoid("submit", case_file(folder, **plan))
+    assert result.exit_code == 0, result.output
+    return result.stdout.strip()
+
+
+def read(result: Result) -> Any:
+    assert result.exit_code == 0, result.output
+    return json.loads(result.stdout)
+
+
+# Without a server -----------------------------------------------------------------------------------------------------
+
+
+def test_validate_estimates_without_a_server(quiet_home: Path) -> None:
+    result = conoid("validate", "demo")
+    assert result.exit_code == 0
+    assert "demo: valid" in result.stdout
+    assert "about 25 920" in result.stdout
+    assert read(conoid("validate", "demo", "--json"))["estimate"]["elements"] == 25920
+
+
+def test_validate_tells_every_error_and_ends_with_2(quiet_home: Path) -> None:
+    result = conoid("validate", "demo", "--set", "run.end_tim=1", "--set", "run.ranks=many")
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    said = result.stderr.splitlines()
+    assert said[0].startswith("conoid: run.ranks = 'many': ")
+    assert said[1:] == ["conoid: run.end_tim: unknown key; did you mean 'end_time'?"]
+
+
+@pytest.mark.parametrize("words", [("ls",), ("submit", "demo"), ("watch", "last"), ("show", "x"), ("cancel", "x")])
+def test_no_server_is_one_line(words: tuple[str, ...], quiet_home: Path) -> None:
+    result = conoid(*words, "--url", "http://127.0.0.1:1")
+    assert result.exit_code == 1
+    assert result.stderr == "conoid: no answer from http://127.0.0.1:1: is it running there? (conoid serve)\n"
+
+
+def test_view_draws_a_folder(quiet_home: Path) -> None:
+    folder = write_run(quiet_home / "bar")
+    result = conoid(
+        "view", folder, "--field", "rank", "--mirror", "auto", "--size", 200, 150, "--json", "--out", "p.png"
+    )
+    drawn = read(result)
+    assert (drawn["field"], drawn["low"], drawn["high"]) == ("rank", 0.0, 1.0)
+    assert (quiet_home / "p.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_view_says_what_it_knows(quiet_home: Path) -> None:
+    result = conoid("view", write_run(quiet_home / "bar"), "--field", "misses")
+    assert result.exit_code == 1
+    assert result.stderr.startswith("conoid: field = 'misses': allowed: mises, pressure, plastic_strain, temperature")
+
+
+# With a server --------------------------------------------------------------------------------------------------------
+
+
+def test_submit_show_ls_get(user: Path) -> None:
+    run = submitted(user, steps=2)
+    assert conoid("watch", run, "--plain").exit_code == 0
+    shown = conoid("show", "last")
+    assert run in shown.stdout
+    assert "succeeded" in shown.stdout
+    assert "FAIL" in shown.stdout, "a reference number that is missed is told"
+    listed = conoid("ls", "--limit", 5)
+    assert run in listed.stdout
+    assert read(conoid("ls", "--json"))[0]["id"] == run
+    assert read(conoid("show", run, "--json"))["outcome"]["steps"] == 2
+    got = conoid("get", run, "outcome.json", "history.csv", "--out", "here")
+    assert got.stdout.split() == ["here/outcome.json", "here/history.csv"]
+    assert (user / "here" / "history.csv").read_text().startswith("step,t")
+    assert {file["path"] for file in read(conoid("get", run, "--json"))} >= {"outcome.json", "journal.jsonl"}
+
+
+@pytest.mark.parametrize(
+    ("plan", "code", "said"),
+    [
+        ({}, 0, ""),
+        ({"fail": "diverged"}, 1, "the diverged of the tale"),
+        ({"fail": "input"}, 2, "the input of the tale"),
+    ],
+)
+def test_watch_ends_as_the_run_does(plan: dict[str, str], code: int, said: str, user: Path) -> None:
+    result = conoid("watch", submitted(user, **plan))
+    assert result.exit_code == code, result.output
+    assert said in result.stderr
+
+
+def test_cancel_and_the_exit_code_of_watch(user: Path) -> None:
+    run = submitted(user, steps=2000, pace=0.02)
+    assert conoid("cancel", run).exit_code == 0
+    assert conoid("watch", run).exit_code == 4
+
+
+def test_watch_as_json_lines(user: Path) -> None:
+    result = conoid("watch", submitted(user, steps=3), "--json")
+    lines = [json.loads(line) for line in result.stdout.splitlines()]
+    assert [line["seq"] for line in lines] == list(range(1, len(lines) + 1))
+    assert (lines[0]["state"], lines[-1]["state"]) == ("accepted", "succeeded")
+
+
+def test_an_unknown_run_is_one_line(user: Path) -> None:
+    for words in (("show", "nothing"), ("watch", "nothing"), ("get", "nothing"), ("view", "nothing")):
+        result = conoid(*words)
+        assert result.exit_code == 1
+        assert result.stderr == "conoid: run 'nothing': there is none\n"
+
+
+def test_a_process_that_has_no_terminal_prints_plain_lines(user: Path) -> None:
+    run = submitted(user, steps=20, pace=0.01)
+    done = subprocess.run([*CONOID, "watch", run], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert all(run in line for line in lines)
+    assert "\x1b" not in done.stdout
+    assert 6 <= len(lines) <= 10, "progress is told every two seconds, not every step"
+
+
+# All in one -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def alone(quiet_home: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("CONOID_WORKER", FAKE_WORKER)
+    return quiet_home
+
+
+def processes_of(folder: Path) -> list[str]:
+    found = []
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit() and int(entry.name) != os.getpid():
+            try:
+                command = (entry / "cmdline").read_bytes()
+            except OSError:
+                continue
+            if str(folder).encode() in command:
+                found.append(command.replace(b"\0", b" ").decode())
+    return found
+
+
+def test_run_does_it_all_and_leaves_no_process(alone: Path) -> None:
+    case = case_file(alone, steps=3)
+    words = ["run", str(case), "--ranks", "2", "--set", "title=Short", "--out", str(alone / "runs")]
+    done = subprocess.run([*CONOID, *words], capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "extent of rod" in done.stdout
+    assert "pass" in done.stdout
+    assert "FAIL" in done.stdout
+    folders = [path for path in (alone / "runs").iterdir() if path.is_dir()]
+    assert json.loads((folders[0] / "case.resolved.json").read_bytes())["run"]["ranks"] == 2
+    assert f"results    {folders[0]}" in done.stdout
+    assert processes_of(alone / "runs") == []
+    checked = subprocess.run(
+        [*CONOID, *words, "--check", "--json"], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert checked.returncode == 1, "a reference number is missed"
+    assert json.loads(checked.stdout)["outcome"]["steps"] == 3
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_is_cancelled(alone: Path, number: signal.Signals) -> None:
+    runs = alone / "runs"
+    words = ["run", str(case_file(alone, steps=2000, pace=0.02)), "--out", str(runs)]
+    child = subprocess.Popen([*CONOID, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        deadline = time.monotonic() + 60
+        while not any(b'"running"' in path.read_bytes() for path in runs.glob("*/journal.jsonl")):
+            assert time.monotonic() < deadline
+            assert child.poll() is None
+            time.sleep(0.05)
+        child.send_signal(number)
+        printed, complained = child.communicate(timeout=60)
+    finally:
+        child.kill()
+    assert child.returncode == 4, complained
+    assert "cancelling: the run stops at its next step" in printed
+    outcome = next(runs.glob("*/outcome.json"))
+    assert json.loads(outcome.read_bytes())["state"] == "cancelled"
+    assert processes_of(runs) == []
+
+
+def test_a_server_that_cannot_start_says_why(alone: Path) -> None:
+    (alone / "runs").mkdir()
+    with (alone / "runs" / "server.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        result = conoid("run", case_file(alone), "--out", alone / "runs")
+    assert result.exit_code == 1
+    assert "the server did not start: " in result.stderr
+    assert "another server uses this folder" in result.stderr
+
+
+def test_run_refuses_a_wrong_case_before_anything_starts(alone: Path) -> None:
+    began = time.monotonic()
+    result = conoid("run", "demo", "--set", "run.end_time=-1", "--out", alone / "runs")
+    assert result.exit_code == 2
+    assert result.stderr.startswith("conoid: run.end_time = -1: ")
+    assert not (alone / "runs").exists()
+    assert time.monotonic() - began < 10
+    assert conoid("run", "demo", "--field", "colour").exit_code == 1
+
+
+def test_serve_hands_its_options_on(alone: Path) -> None:
+    helped = subprocess.run([*CONOID, "serve", "--help"], capture_output=True, text=True, timeout=60, check=True)
+    assert "--zenoh-port" in helped.stdout
+    token = [*CONOID, "serve", "token", "add", "ann", "--runs", str(alone / "runs")]
+    made = subprocess.run(token, capture_output=True, text=True, timeout=60, check=True)
+    assert made.stdout.startswith("conoid_")

@@ -1,0 +1,120 @@
+"""The Python API against a real server in a process of its own, over Zenoh and over SSE."""
+
+from pathlib import Path
+
+import pytest
+
+from conoid.cases.run import State
+from conoid.client.errors import ServiceError, UnfinishedError
+from conoid.client.local import LocalServer
+from conoid.client.session import Session
+from conoid.client.stream import SseLink, ZenohLink
+
+from .conftest import case_file
+
+
+@pytest.fixture
+def session(server: LocalServer) -> Session:
+    return server.session
+
+
+def test_a_run_is_submitted_watched_and_read(
+    session: Session, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = session.submit(case_file(tmp_path, steps=4, pace=0.02))
+    known = run.watch()
+    assert (known.state, known.link, known.title) == (State.SUCCEEDED, "Zenoh", "A steel bar")
+    printed = capsys.readouterr().out.splitlines()
+    assert [line.split()[2] for line in printed][:4] == ["accepted", "queued", "starting", "running"]
+    assert printed[-1].split()[2] == "succeeded"
+    result = run.result()
+    assert result.outcome.steps == 4
+    assert list(result.history["t"]) == [0.5, 1.0]
+    assert result.case["name"] == "bar"
+    with pytest.raises(UnfinishedError, match="has not written any frame"):
+        result.frame()
+
+
+@pytest.mark.parametrize("lose", [0, 3])
+def test_zenoh_tells_every_message_once_and_in_order(session: Session, tmp_path: Path, lose: int) -> None:
+    run = session.submit(case_file(tmp_path, steps=40, pace=0.01, lose=lose))
+    link = run.link()
+    assert isinstance(link, ZenohLink)
+    told = list(run.messages(link=link))
+    assert [message.seq for message in told] == list(range(1, len(told) + 1))
+    assert told == run.events()
+
+
+def test_a_late_joiner_is_told_the_whole_story(session: Session, tmp_path: Path) -> None:
+    run = session.submit(case_file(tmp_path, steps=60, pace=0.01))
+    first = run.messages()
+    while next(first).seq < 40:
+        pass
+    first.close()
+    joined = [message.seq for message in run.messages()]
+    assert joined == list(range(1, len(run.events()) + 1))
+    assert [message.seq for message in run.messages(after=joined[-1] - 2)] == joined[-2:]
+
+
+def test_sse_tells_the_same(session: Session, tmp_path: Path) -> None:
+    run = session.submit(case_file(tmp_path, steps=20, pace=0.01))
+    told = list(run.messages(link=SseLink(lambda: session.stream(f"{run.path}/stream"))))
+    assert told == run.events()
+
+
+def test_without_a_router_the_stream_falls_back_to_sse(
+    session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    me = session.me()
+    monkeypatch.setattr(session, "me", lambda: type(me)(owner=me.owner, zenoh=None))
+    known = session.submit(case_file(tmp_path)).watch()
+    assert (known.state, known.link) == (State.SUCCEEDED, "SSE")
+
+
+def test_a_run_is_cancelled(session: Session, tmp_path: Path) -> None:
+    run = session.submit(case_file(tmp_path, steps=1000, pace=0.02))
+    with pytest.raises(TimeoutError, match="is still"):
+        run.wait(0.05)
+    run.cancel()
+    assert run.wait(20).state is State.CANCELLED
+    assert run.cancel().state is State.CANCELLED, "to ask twice does no harm"
+
+
+def test_files_are_listed_and_copied(session: Session, tmp_path: Path) -> None:
+    run = session.submit(case_file(tmp_path))
+    run.wait(20)
+    names = [file.path for file in run.files()]
+    assert {"case.toml", "journal.jsonl", "outcome.json"} <= set(names)
+    assert run.download(tmp_path / "one", "outcome.json").read_bytes().startswith(b"{")
+    copy = run.download(tmp_path / "all")
+    assert sorted(path.relative_to(copy).as_posix() for path in copy.rglob("*") if path.is_file()) == sorted(names)
+    assert (copy / "case.toml").read_bytes() == (tmp_path / "bar.toml").read_bytes()
+    with pytest.raises(UnfinishedError, match=r"has no frames/000000\.vtkhdf"):
+        run.download(tmp_path, "frames/000000.vtkhdf")
+
+
+def test_the_same_key_makes_one_run(session: Session, tmp_path: Path) -> None:
+    case = case_file(tmp_path)
+    assert session.submit(case, key="once").id == session.submit(case, key="once").id
+    with pytest.raises(ServiceError, match="used for another case"):
+        session.submit(case, ["run.end_time=2 us"], key="once")
+
+
+def test_runs_are_listed_newest_first(session: Session, tmp_path: Path) -> None:
+    ids = [session.submit(case_file(tmp_path)).id for _ in range(3)]
+    assert [run.id for run in session.runs(limit=3)] == ids[::-1]
+    for run_id in ids:
+        session.run(run_id).wait(20)
+    assert {run.state for run in session.runs(["succeeded"], limit=200)} == {State.SUCCEEDED}
+
+
+def test_the_server_says_what_is_wrong(session: Session, tmp_path: Path) -> None:
+    with pytest.raises(ServiceError) as caught:
+        session.submit(case_file(tmp_path, ranks=64), ["run.end_tim=1"])
+    assert caught.value.problems == ["run.end_tim: unknown key; did you mean 'end_time'?"]
+    with pytest.raises(ServiceError, match=r"run\.ranks"):
+        session.submit(case_file(tmp_path, ranks=64))
+    with pytest.raises(ServiceError, match="there is none"):
+        session.run("nothing").status()
+    with Session(session.url, "conoid_0_guess") as stranger, pytest.raises(ServiceError, match="valid token"):
+        stranger.runs()

@@ -1,0 +1,192 @@
+"""Requests and refusals, with answers made up by a transport in this process."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import httpx2
+import pytest
+
+from conoid.cases.load import CaseError
+from conoid.client import session as sessions
+from conoid.client.config import DEFAULT_URL, target
+from conoid.client.errors import ClientError, ServiceError, UnreachableError
+from conoid.client.run import inside
+from conoid.client.session import Session
+from conoid.client.submission import body_of
+
+Answer = Callable[[httpx2.Request], httpx2.Response]
+RECEIPT = {"id": "r1", "owner": "ann", "name": "bar", "state": "accepted", "ranks": 1, "submitted": 1.0}
+
+
+def served(answer: Answer, token: str | None = "conoid_1_secret") -> Session:
+    return Session("http://conoid.test", token, transport=httpx2.MockTransport(answer))
+
+
+def problem(status: int, **body: Any) -> Answer:
+    return lambda _: httpx2.Response(status, json={"title": "Bad", "status": status, **body})
+
+
+@pytest.fixture(autouse=True)
+def _no_pauses(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sessions.time, "sleep", lambda _: None)
+
+
+def test_a_refusal_is_its_detail_and_hint() -> None:
+    session = served(problem(401, detail="this needs a valid token", hint="ask the operator"))
+    with pytest.raises(ServiceError) as caught:
+        session.me()
+    assert str(caught.value) == "this needs a valid token (ask the operator)"
+    assert (caught.value.status, caught.value.exit_code, caught.value.retryable) == (401, 1, False)
+
+
+def test_a_refused_case_tells_every_error() -> None:
+    errors = [
+        {"key": "run.ranks", "value": "9", "message": "this server has 2 slots"},
+        {"key": "parts[0].mesh", "value": "", "message": "this key is missing"},
+    ]
+    session = served(problem(422, detail="run.ranks = 9: this server has 2 slots (and 1 more)", errors=errors))
+    with pytest.raises(ServiceError) as caught:
+        session.submit({"name": "bar"})
+    assert caught.value.problems == ["run.ranks = 9: this server has 2 slots", "parts[0].mesh: this key is missing"]
+    assert caught.value.exit_code == 2
+
+
+def test_an_answer_that_is_no_problem_json_is_still_one_line() -> None:
+    with pytest.raises(ServiceError, match=r"^the server answered 502$") as caught:
+        served(lambda _: httpx2.Response(502, text="<html>Bad gateway</html>")).me()
+    assert caught.value.retryable
+    with pytest.raises(UnreachableError, match="cannot be read"):
+        served(lambda _: httpx2.Response(200, text="<html>Welcome</html>")).me()
+
+
+def test_no_server_says_how_to_start_one() -> None:
+    with Session("http://127.0.0.1:1") as session, pytest.raises(UnreachableError) as caught:
+        session.me()
+    assert str(caught.value) == "no answer from http://127.0.0.1:1: is it running there? (conoid serve)"
+
+
+def test_a_submission_is_tried_again_with_the_same_key() -> None:
+    keys: list[str | None] = []
+
+    def answer(request: httpx2.Request) -> httpx2.Response:
+        keys.append(request.headers.get("Idempotency-Key"))
+        if len(keys) < 3:
+            raise httpx2.ReadError("connection reset")
+        return httpx2.Response(202, json=RECEIPT)
+
+    assert served(answer).submit({"name": "bar"}).id == "r1"
+    assert len(keys) == 3
+    assert keys[0]
+    assert set(keys) == {keys[0]}
+
+
+def test_a_cancel_is_sent_once() -> None:
+    sent: list[str] = []
+
+    def answer(request: httpx2.Request) -> httpx2.Response:
+        sent.append(str(request.url))
+        raise httpx2.ReadError("connection reset")
+
+    with pytest.raises(UnreachableError, match="connection reset"):
+        served(answer).run("r1").cancel()
+    assert sent == ["http://conoid.test/v1/runs/r1:cancel"]
+
+
+def test_the_token_is_shown_and_nothing_else_with_it() -> None:
+    seen: list[httpx2.Request] = []
+
+    def answer(request: httpx2.Request) -> httpx2.Response:
+        seen.append(request)
+        return httpx2.Response(200, json={"owner": "ann"})
+
+    assert served(answer).me().zenoh is None
+    assert seen[0].headers["Authorization"] == "Bearer conoid_1_secret"
+    served(answer, token=None).me()
+    assert "Authorization" not in seen[1].headers
+
+
+def test_lists_are_read_page_by_page() -> None:
+    def answer(request: httpx2.Request) -> httpx2.Response:
+        page = {"a": ("r2", None)}.get(request.url.params.get("cursor", ""), ("r1", "a"))
+        assert request.url.params["state"] == "queued,running"
+        return httpx2.Response(200, json={"runs": [{**RECEIPT, "id": page[0]}], "next": page[1]})
+
+    assert [run.id for run in served(answer).runs(["queued", "running"])] == ["r1", "r2"]
+
+
+def test_a_download_that_arrives_damaged_is_not_kept(tmp_path: Path) -> None:
+    answer = httpx2.Response(200, content=b"abc", headers={"Repr-Digest": "sha-256=:AAAA:"})
+    with pytest.raises(UnreachableError, match="arrived damaged"):
+        served(lambda _: answer).run("r1").download(tmp_path, "outcome.json")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["../x", "/etc/passwd", "a/../../x", ""])
+def test_a_file_name_cannot_leave_the_folder(name: str, tmp_path: Path) -> None:
+    with pytest.raises(ClientError, match="outside"):
+        inside(tmp_path, name)
+
+
+# The case that is sent ------------------------------------------------------------------------------------------------
+
+
+def test_a_file_is_sent_as_it_is_written(tmp_path: Path) -> None:
+    path = tmp_path / "bar.toml"
+    path.write_text("# a comment\nname = 'bar'\n")
+    assert body_of(path) == ("application/toml", b"# a comment\nname = 'bar'\n")
+
+
+def test_a_shipped_case_is_named_and_overridden() -> None:
+    kind, body = body_of("demo", ["run.ranks=1", "run.end_time=5 us"])
+    assert kind == "application/json"
+    assert json.loads(body)["run"]["ranks"] == 1
+    assert json.loads(body)["run"]["end_time"] == "5 us"
+
+
+@pytest.mark.parametrize(
+    ("source", "said"),
+    [("dmeo", "did you mean 'demo'"), ("nothing.toml", "cannot read this file"), ("README.md", r"ends in \.toml or")],
+)
+def test_what_is_no_case_is_said(source: str, said: str) -> None:
+    with pytest.raises(CaseError, match=said):
+        body_of(source)
+
+
+# Where the server is --------------------------------------------------------------------------------------------------
+
+
+def save(home: Path, text: str) -> None:
+    path = home / "config" / "conoid" / "client.toml"
+    path.parent.mkdir(parents=True)
+    path.write_text(text)
+
+
+def test_options_come_before_environment_before_file(quiet_home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert (target().url, target().token) == (DEFAULT_URL, None)
+    save(quiet_home, 'url = "http://site:1/"\ntoken = "from-file"\n')
+    assert (target().url, target().token) == ("http://site:1", "from-file")
+    monkeypatch.setenv("CONOID_TOKEN", "from-environment")
+    assert target().token == "from-environment"
+    assert target(token="given").token == "given"
+
+
+def test_a_saved_token_is_not_shown_to_another_server(quiet_home: Path) -> None:
+    save(quiet_home, 'url = "http://site:1"\ntoken = "from-file"\n')
+    assert target("http://elsewhere:1").token is None
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [("url = 3", "allowed are url and token"), ("key = 'x'", "allowed are"), ("url = ", "cannot be read")],
+)
+def test_a_wrong_configuration_names_the_file(quiet_home: Path, text: str, said: str) -> None:
+    save(quiet_home, text)
+    with pytest.raises(ClientError, match=rf"client\.toml.*{said}"):
+        target()
+
+
+def test_an_address_needs_its_scheme(quiet_home: Path) -> None:
+    with pytest.raises(ClientError, match="http://"):
+        target("localhost:8750")
