@@ -17,8 +17,8 @@ from packaging.version import Version
 ROOT = Path(__file__).parents[1]
 HOUSES = ("cases", "client", "server", "worker")
 CONTRACT = {"pydantic", "pydantic_core", "msgspec"}
-WORKER_ONLY = {"numba", "mpi4py", "gmsh", "meshio"}
-ONE_MODULE = {"mpi4py": "worker", "pyvista": "client"}
+WORKER_ONLY = {"numba", "mpi4py", "gmsh"}
+ONE_MODULE = {"mpi4py": "worker", "gmsh": "worker", "pyvista": "client"}
 """Libraries that one module of one house imports, and no other."""
 HEAVY = WORKER_ONLY | {"pyvista", "vtk", "vtkmodules"}
 """What the contract, the client and the server run without; pictures alone need pyvista."""
