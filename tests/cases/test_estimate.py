@@ -1,6 +1,8 @@
 """Estimates against the meshes that are really made, and against runs that were measured."""
 
 import math
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +61,8 @@ def test_structured_counts_are_exact(written: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("written", UNSTRUCTURED, ids=str)
 def test_unstructured_counts_are_near(written: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    if subprocess.run([sys.executable, "-c", "import gmsh"], capture_output=True, timeout=60, check=False).returncode:
+        pytest.skip("gmsh cannot be loaded: a library of the system is missing")
     monkeypatch.setenv("CONOID_CACHE_DIR", str(tmp_path))
     body = mesh(written)
     made, expected = build(body, tmp_path), mesh_size(body)
