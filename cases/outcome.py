@@ -1,5 +1,8 @@
 """outcome.json: the last file a run writes, and the only proof that it ended."""
 
+import math
+from typing import Any
+
 import msgspec
 
 from .messages import Energy
@@ -55,5 +58,21 @@ def to_json(outcome: Outcome) -> bytes:
 
 
 def from_json(text: bytes | str) -> Outcome:
-    """Raises msgspec.ValidationError or msgspec.DecodeError."""
-    return msgspec.json.decode(text, type=Outcome)
+    """Raises msgspec.ValidationError or msgspec.DecodeError.
+
+    JSON has no NaN: a number that was none was written as null, and is read back as NaN.
+    """
+    data = msgspec.json.decode(text)
+    if isinstance(data, dict):
+        checks = data.get("reference")
+        _null_to_nan(Outcome, data)
+        _null_to_nan(Energy, data.get("energy"))
+        for check in checks if isinstance(checks, list) else ():
+            _null_to_nan(Check, check)
+    return msgspec.convert(data, Outcome)
+
+
+def _null_to_nan(kind: type[msgspec.Struct], table: Any) -> None:
+    if isinstance(table, dict):
+        numbers = {field.encode_name for field in msgspec.structs.fields(kind) if field.type is float}
+        table.update({name: math.nan for name in numbers if table.get(name, 0.0) is None})

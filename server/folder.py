@@ -24,6 +24,7 @@ from .lifecycle import Run
 _ID = re.compile(r"[0-9a-z]{22}")
 _LETTERS = "0123456789abcdefghjkmnpqrstvwxyz"
 _NEW = ".new-"
+_UNREADABLE = "outcome.unreadable.json"
 
 
 class Submission(msgspec.Struct, kw_only=True, frozen=True):
@@ -139,8 +140,21 @@ def outcome(folder: Path) -> Outcome | None:
         return None
 
 
+def outcome_error(folder: Path) -> str:
+    """Why outcome.json cannot be read; empty when it can, or when there is none."""
+    try:
+        outcome_from_json((folder / layout.OUTCOME).read_bytes())
+    except FileNotFoundError:
+        return ""
+    except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+        return str(error)
+    return ""
+
+
 def write_outcome(folder: Path, ended: Outcome) -> None:
-    """Writes outcome.json whole. Raises OSError."""
+    """Writes outcome.json whole; one that nobody can read is kept beside it. Raises OSError."""
+    if outcome_error(folder):
+        os.replace(folder / layout.OUTCOME, folder / _UNREADABLE)
     durable.write(folder / layout.OUTCOME, outcome_to_json(ended))
 
 

@@ -74,7 +74,8 @@ class WorkerExited:
     code: int | None
     outcome: Outcome | None
     out_of_memory: bool = False
-    last_words: str = ""
+    traces: str = ""
+    """What it left for people in place of an outcome."""
 
 
 @dataclass(frozen=True)
@@ -205,7 +206,7 @@ def _readable(outcome: Outcome) -> bool:
 def _without_outcome(run: Run, event: WorkerExited) -> Outcome:
     """The end of a worker that could not write its own: the exit code is a hint, never a proof of success."""
     state, cause, message = _reading_of(run, event)
-    said = f"; its last words: {event.last_words}" if event.last_words else ""
+    said = f"; {event.traces}" if event.traces else ""
     return Outcome(state=state, cause=cause, message=f"{message}{said}", ranks=run.ranks)
 
 
@@ -223,7 +224,7 @@ def _reading_of(run: Run, event: WorkerExited) -> tuple[State, Cause, str]:
         return State.FAILED, Cause.DIVERGED, "the computation failed"
     if run.state is State.STARTING:
         return State.FAILED, Cause.LAUNCH, f"the worker ended with code {event.code} before its first step"
-    return State.FAILED, Cause.SERVICE, f"the worker ended with code {event.code} and left no outcome"
+    return State.FAILED, Cause.SERVICE, f"the worker ended with code {event.code} and left no readable outcome"
 
 
 def _found(run: Run, event: Found, now: float) -> Next:

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import msgspec
@@ -41,7 +42,7 @@ class Watch:
             yield WorkerRuns()
         if exit_ is not None:
             told = folder.outcome(self._folder)
-            yield WorkerExited(exit_.code, told, exit_.out_of_memory, exit_.last_words)
+            yield WorkerExited(exit_.code, told, exit_.out_of_memory, self._traces(exit_.last_words))
         elif now >= self._kill_at:
             self._kill_at = now + 1.0
             self.worker.kill()
@@ -55,6 +56,10 @@ class Watch:
         self.worker.stop()
         self._kill_at = min(self._kill_at, time.time() + grace)
 
+    def _traces(self, last_words: str) -> str:
+        wrong = folder.outcome_error(self._folder)
+        return f"{layout.OUTCOME}: {wrong}" if wrong else f"its last words: {last_words}" if last_words else ""
+
     def _read(self, now: float) -> bool:
         """Takes in the new lines; True when the worker has just said that it runs."""
         runs, self.news = False, False
@@ -62,7 +67,8 @@ class Watch:
             self.news = True
             for line in lines:
                 if line.type == "progress":
-                    self.progress = _progress.decode(line.raw)
+                    with suppress(msgspec.MsgspecError):
+                        self.progress = _progress.decode(line.raw)
                 elif line.type == "status":
                     runs |= _status.decode(line.raw).state == State.RUNNING
                 elif line.type == "finished":
