@@ -32,6 +32,24 @@ _LOG_EVERY = 10.0
 log = logging.getLogger("conoid.worker")
 
 
+class Pace:
+    """Simulated seconds per second of wall time, as a mean that forgets over some ten reports."""
+
+    def __init__(self, began: float) -> None:
+        self._last = (0.0, began)
+        self._rate: float | None = None
+
+    def add(self, t: float, now: float) -> None:
+        """Notes that time ``t`` was reached at wall time ``now``."""
+        rate = (t - self._last[0]) / (now - self._last[1])
+        self._rate = rate if self._rate is None else 0.9 * self._rate + 0.1 * rate
+        self._last = (t, now)
+
+    def left(self, t: float) -> float:
+        """Wall time for another ``t``, s."""
+        return t / self._rate if self._rate else 0.0
+
+
 class Loop:
     """Runs a simulation to its end, and tells. ``journal`` and ``history`` exist on rank 0 only."""
 
@@ -48,6 +66,7 @@ class Loop:
         self._sample = 0
         self._began = self._reported = time.monotonic()
         self._reported_step = 0
+        self._pace = Pace(self._began)
         self._logged = -math.inf
 
     def run(self) -> None:
@@ -126,11 +145,11 @@ class Loop:
             log.info("step %d, t %.4g s, dt %.3g s, %s", clock.step, clock.t, clock.dt, limiter)
         steps, elapsed = clock.step - self._reported_step, now - self._reported
         busy = [load["elements"] + load["nodes"] for load in loads]
-        left = (sim.case.run.end_time - clock.t) / clock.stable
+        self._pace.add(clock.t, now)
         if self.energy is not None:
             self._tell(
                 messages.Progress, end_time=sim.case.run.end_time, dt=clock.dt, limiter=limiter,
-                eta=left * elapsed / max(steps, 1), energy=self.energy,
+                eta=self._pace.left(sim.case.run.end_time - clock.t), energy=self.energy,
                 updates_per_second=steps * sim.model.elements_global / elapsed,
             )  # fmt: skip
         mean = sum(busy) / len(busy)
