@@ -41,7 +41,7 @@ class Tail:
     def __init__(self, path: Path, after: int = 0) -> None:
         """Skips the lines whose ``seq`` is at most ``after``."""
         self._path, self._after = path, after
-        self._offset = 0
+        self._offset = _line_before(path, after) if after else 0
 
     def read(self) -> list[Line]:
         """The new lines, at most about 256 kB of them; an empty list when there are none now."""
@@ -67,6 +67,24 @@ class Tail:
                     size *= 4
         except FileNotFoundError:
             return b""
+
+
+def _line_before(path: Path, after: int) -> int:
+    """Where some line with ``seq`` at most ``after`` begins, close to the last of them: numbers rise along the file."""
+    if not path.exists():
+        return 0
+    with open(path, "rb", buffering=0) as file:
+        low, high = 0, os.fstat(file.fileno()).st_size
+        while high - low > _CHUNK:
+            middle = (low + high) // 2
+            data = os.pread(file.fileno(), _CHUNK, middle)
+            begin = data.find(b"\n") + 1
+            end = data.find(b"\n", begin)
+            line = _line(data[begin:end]) if begin and end > 0 else None
+            if line is None:
+                break
+            low, high = (middle + begin, high) if line.seq <= after else (low, middle)
+        return low
 
 
 def _line(raw: bytes) -> Line | None:

@@ -47,7 +47,10 @@ class Desk:
         case = parse_json(text) if _file_name(content_type) == "case.json" else parse_toml(text)
         if problems := limits.check(case, self._settings):
             raise CaseError(problems)
-        expected = estimate(case)
+        try:
+            expected = estimate(case)
+        except ArithmeticError:
+            raise CaseError([Problem("parts", "", "the elements are too many or too small to be counted")]) from None
         if problems := limits.check_size(expected, self._settings.caps):
             raise CaseError(problems)
         return Reading(case, expected)

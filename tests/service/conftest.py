@@ -174,6 +174,15 @@ class Process:
         self.clients.append(client)
         return User(client, name, self.runs)
 
+    def close(self) -> None:
+        """Kills it and its workers."""
+        for client in self.clients:
+            client.close()
+        if self.child is not None and self.child.poll() is None:
+            self.child.kill()
+            self.child.wait(PATIENCE)
+        _end_workers(self.runs)
+
     def end(self, number: signal.Signals) -> int:
         """Sends a signal and waits for the end."""
         assert self.child is not None
@@ -196,12 +205,7 @@ def processes(folder: Path) -> Iterator[MakeProcess]:
 
     yield make
     for one in made:
-        for client in one.clients:
-            client.close()
-        if one.child is not None and one.child.poll() is None:
-            one.child.kill()
-            one.child.wait(PATIENCE)
-    _end_workers(folder)
+        one.close()
 
 
 @pytest.fixture

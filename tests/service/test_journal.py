@@ -3,6 +3,8 @@
 import threading
 from pathlib import Path
 
+import pytest
+
 from conoid.cases.messages import Status, from_json, to_json
 from conoid.server.journal import Tail, append, lines, statuses
 
@@ -75,3 +77,14 @@ def test_a_reader_beside_a_writer_sees_every_line_once(tmp_path: Path) -> None:
 
 def test_no_journal_yet(tmp_path: Path) -> None:
     assert Tail(tmp_path / "journal.jsonl").read() == []
+
+
+def test_reading_from_any_number_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("conoid.server.journal._CHUNK", 400)
+    path, last = tmp_path / "journal.jsonl", 300
+    for seq in range(1, last + 1):
+        length = 3000 if seq in {100, 101} else seq % 37
+        with path.open("ab") as file:
+            file.write(to_json(Status(run="a", seq=seq, state="running", message="x" * length)) + b"\n")
+    for after in range(last + 2):
+        assert [line.seq for line in lines(path, after)] == list(range(after + 1, last + 1))

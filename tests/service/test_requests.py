@@ -169,6 +169,7 @@ def test_a_wrong_content_type(server: Running, kind: str | None, path: str) -> N
         (case_text().replace("element_size", "element_sise"), "parts[0].mesh.element_sise", "element_size"),
         (case_text().replace('material = "steel"', 'material = "steal"'), "parts[0].material", "steel"),
         (case_text(ranks=3), "run.ranks", "2 slots"),
+        (case_text().replace('"0.5 mm"', '"1e-300 m"'), "parts", "too many"),
         ("name = = 3", "line 1", "TOML"),
     ],
 )

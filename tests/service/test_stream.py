@@ -108,6 +108,15 @@ def test_a_log_is_followed_to_the_end_of_the_run(ann: User, tmp_path: Path) -> N
         assert "".join(chunks) == ""
 
 
+def test_small_answers_are_not_held_back(ann: User) -> None:
+    times = []
+    for _ in range(20):
+        began = time.perf_counter()
+        ann.http.get("/healthz")
+        times.append(time.perf_counter() - began)
+    assert min(times) < 0.035, "Nagle's algorithm and a delayed acknowledgement cost 0.04 s each time"
+
+
 def test_a_stopping_server_ends_its_streams(process: MakeProcess, tmp_path: Path) -> None:
     server = process("--no-zenoh")
     ann = server.user(server.start()["url"])

@@ -1,0 +1,117 @@
+"""The real worker under the real server: from HTTP to a result, live over Zenoh."""
+
+import base64
+import hashlib
+import json
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import zenoh
+
+from conoid.cases.messages import from_msgpack
+from conoid.cases.run import State
+
+from .conftest import PATIENCE, Process, User
+
+COLD = 240.0
+"""s for a run whose kernels must be compiled first."""
+BAR = """
+name = "bar"
+
+[[parts]]
+name = "rod"
+material = "steel"
+velocity = ["0 m/s", "0 m/s", "-10 m/s"]
+[parts.mesh]
+shape = "box"
+low = ["0 mm", "0 mm", "0 mm"]
+high = ["1 mm", "1 mm", "4 mm"]
+element_size = "0.5 mm"
+generator = "structured"
+
+[materials.steel]
+density = "7800 kg/m^3"
+elastic = {{ young = "200 GPa", poisson = 0.3 }}
+
+[[boundaries]]
+kind = "wall"
+point = ["0 mm", "0 mm", "0 mm"]
+normal = [0, 0, 1]
+
+[run]
+end_time = "{end_time}"
+ranks = 2
+frames = 3
+"""
+
+
+@pytest.fixture(scope="module")
+def ann(tmp_path_factory: pytest.TempPathFactory) -> Iterator[User]:
+    server = Process(tmp_path_factory.mktemp("worker") / "runs", ("--zenoh-port", "0", "--slots", "2"))
+    yield server.user(server.start()["url"])
+    server.close()
+
+
+def ended(ann: User, run: str) -> dict[str, Any]:
+    deadline = time.monotonic() + COLD
+    while not State((seen := ann.show(run))["state"]).final:
+        assert time.monotonic() < deadline, seen
+        ann.http.get(f"/v1/runs/{run}", params={"wait": 5})
+    return seen
+
+
+def test_from_http_to_a_result_live(ann: User) -> None:
+    told = ann.http.get("/v1/me").json()["zenoh"]
+    config = zenoh.Config()
+    for key, value in {
+        "mode": "client",
+        "connect/endpoints": [told["endpoint"]],
+        "scouting/multicast/enabled": False,
+        "transport/shared_memory/enabled": False,
+        "transport/auth/usrpwd": {"user": told["user"], "password": told["password"]},
+    }.items():
+        config.insert_json5(key, json.dumps(value))
+    heard: list[Any] = []
+    over = threading.Event()
+
+    def hear(sample: zenoh.Sample) -> None:
+        heard.append(from_msgpack(sample.payload.to_bytes()))
+        if getattr(heard[-1], "state", "") == "succeeded" and type(heard[-1]).__name__ == "Status":
+            over.set()
+
+    with zenoh.open(config) as session:
+        subscriber = session.declare_subscriber(f"{told['prefix']}/**", hear)
+        run = ann.submit(BAR.format(end_time="10 us"))
+        seen = ended(ann, run)
+        assert seen["state"] == "succeeded", seen
+        assert over.wait(PATIENCE)
+        subscriber.undeclare()  # type: ignore[no-untyped-call]
+
+    events = ann.events(run)
+    assert [event["seq"] for event in events] == list(range(1, len(events) + 1))
+    assert {"started", "progress", "load", "frame", "finished", "status"} <= {event["type"] for event in events}
+    assert ann.states(run) == ["accepted", "queued", "starting", "running", "succeeded"]
+    assert {message.seq for message in heard} <= set(range(1, len(events) + 1))
+    assert {type(message).__name__ for message in heard} >= {"Started", "Progress", "Load", "Finished"}
+    assert len(seen["outcome"]["digest"]) == 64
+    assert seen["outcome"]["elements"] == seen["estimate"]["elements"]
+    for name in ("frames/000003.vtkhdf", "history.csv", "log/rank-1.log"):
+        answer = ann.http.get(f"/v1/runs/{run}/files/{name}")
+        digest = base64.b64encode(hashlib.sha256(answer.content).digest()).decode()
+        assert answer.headers["repr-digest"] == f"sha-256=:{digest}:"
+
+
+def test_cancel(ann: User) -> None:
+    run = ann.submit(BAR.format(end_time="10 s"))
+    ann.wait_for(run, State.RUNNING)
+    while not ann.show(run)["progress"]:
+        time.sleep(0.05)
+    ann.http.post(f"/v1/runs/{run}:cancel")
+    seen = ended(ann, run)
+    assert (seen["state"], seen["cause"], seen["outcome"]["state"]) == ("cancelled", "cancelled", "cancelled")
+    assert seen["outcome"]["steps"] > 0
+    assert not Path(f"/proc/{json.loads((ann.runs / run / 'worker.json').read_text())['pid']}").exists()
