@@ -46,6 +46,8 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     """The largest energy residual of any ledger line of the run."""
     phases: dict[str, list[float]] = {}
     """CPU seconds per phase, one number a rank."""
+    peak_memory: list[int] = []
+    """Largest resident memory, bytes, one number a rank."""
     element_updates_per_second: float = 0.0
     """Per CPU-second and core."""
     reference: list[Check] = []

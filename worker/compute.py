@@ -1,6 +1,7 @@
 """From a case to an outcome, with the kernels loaded: build, step, look, sum up."""
 
 import logging
+import resource
 import time
 from pathlib import Path
 
@@ -67,6 +68,7 @@ def _sum_up(
     sim = loop.sim
     seconds = sim.comm.gather(sim.timers.seconds)
     total_cpu = sum(sim.comm.gather(cpu) or [])
+    memory = sim.comm.gather(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
     hexdigest = digest.digest(sim.model, sim.comm)
     checks = reference.measure(sim, folder) if failure is None and not loop.stopped else []
     state, cause, message = STOPS[loop.stopped] if loop.stopped else (State.SUCCEEDED, None, "")
@@ -79,5 +81,6 @@ def _sum_up(
         nodes_initial=sim.model.nodes_global, nodes=sim.model.nodes_global, fragments=len(sim.model.parts),
         energy=loop.energy, worst_residual=sim.ledger.worst,
         phases={name: [s[name] for s in seconds] for name in PHASES} if seconds else {},
+        peak_memory=memory or [],
         element_updates_per_second=updates / total_cpu if total_cpu > 0.0 else 0.0, reference=checks,
     )  # fmt: skip
