@@ -14,7 +14,7 @@ HOUSES := cases client server worker
 .DEFAULT_GOAL := test
 
 demo: $(READY)
-	$(BIN)/conoid run demo --ranks 2 --view demo.png
+	$(BIN)/conoid run demo --ranks 2 --view demo.png --check
 
 test: lint
 	$(BIN)/pytest -q -m "not slow"
