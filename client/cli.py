@@ -89,6 +89,7 @@ def find(session: Session, run: str) -> Run:
 
 @app.command(
     context_settings={"allow_extra_args": True, "ignore_unknown_options": True}, add_help_option=False,
+    short_help="Start the job server.",
 )  # fmt: skip
 def serve(ctx: typer.Context) -> None:
     """Start the job server; takes the options of the server (conoid serve --help)."""
@@ -99,7 +100,7 @@ def serve(ctx: typer.Context) -> None:
     os.execv(command[0], command)
 
 
-@app.command()
+@app.command(short_help="Check a case and estimate what it needs.")
 def validate(case: CaseArgument, overrides: Overrides = None, as_json: Json = False) -> None:
     """Check a case and estimate what it needs; no server is asked."""
     checked = case_of(case, overrides or ())
@@ -111,7 +112,7 @@ def validate(case: CaseArgument, overrides: Overrides = None, as_json: Json = Fa
     show(tables.estimate_table(expected))
 
 
-@app.command()
+@app.command(short_help="Hand a case to the server.")
 def submit(
     case: CaseArgument,
     overrides: Overrides = None,
@@ -164,7 +165,7 @@ def show_run(run: RunArgument, url: Url = None, token: Token = None, as_json: Js
             show(tables.checks_table(info.outcome.reference))
 
 
-@app.command(name="watch")
+@app.command(name="watch", short_help="Follow a run until it ends.")
 def watch_run(
     run: RunArgument,
     plain: Annotated[bool, typer.Option("--plain", help="Lines instead of the panel.")] = False,
@@ -177,7 +178,11 @@ def watch_run(
         found = find(session, run)
         if as_json:
             raise typer.Exit(_print_messages(found))
-        known = watch(found, False if plain else None)
+        try:
+            known = watch(found, False if plain else None)
+        except KeyboardInterrupt:
+            _complain(f"the run goes on; conoid watch {found.id} shows it again")
+            raise
     if known.message or known.cause:
         _complain(f"{known.run} {known.state.value}: {known.message or known.cause}")
     raise typer.Exit(exit_code(known.state, known.cause))
@@ -262,7 +267,7 @@ def view_frame(
         typer.echo(drawn.out)
 
 
-@app.command(name="run")
+@app.command(name="run", short_help="Do it all on this machine: run, watch, check, draw.")
 def run_case(
     case: CaseArgument,
     ranks: Annotated[

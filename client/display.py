@@ -48,8 +48,13 @@ def panel(live: Live, log_lines: int = 6) -> RenderableType:
 
 def _state(live: Live) -> Text:
     text = Text(live.state.value, style=STATE_STYLE.get(live.state, "bold"))
-    told = " · ".join(part for part in (live.cause or "", live.message) if part)
+    told = " · ".join(_told(live))
     return text.append(f"  {told}", style="default") if told else text
+
+
+def _told(live: Live) -> list[str]:
+    """Cause and message, where they say more than the state."""
+    return [part for part in (live.cause, live.message) if part and part != live.state.value]
 
 
 def _bar(live: Live) -> RenderableType:
@@ -161,8 +166,7 @@ def _log_line(entry: Log) -> Text:
 def line(live: Live) -> str:
     """One update as one plain line."""
     parts = [clock(live.wall) if live.wall else "", live.run, live.state.value]
-    if live.cause or live.message:
-        parts.append(" ".join(part for part in (live.cause, live.message) if part))
+    parts += _told(live)
     progress = live.progress
     if progress is not None:
         parts += [

@@ -43,8 +43,9 @@ def clock(wall: float) -> str:
 
 
 def day(wall: float) -> str:
-    """Date and time of a Unix time, in the local zone: ``2026-11-21 14:03``."""
-    return datetime.fromtimestamp(wall).strftime("%Y-%m-%d %H:%M")
+    """Date and time of a Unix time, in the local zone: ``21 Nov 14:03``, of another year ``2025-11-21``."""
+    then = datetime.fromtimestamp(wall)
+    return then.strftime("%d %b %H:%M" if then.year == datetime.now().year else "%Y-%m-%d")
 
 
 def number(value: float) -> str:

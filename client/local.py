@@ -1,8 +1,6 @@
 """A server of one's own for the time of one run: started as a process, known by its server.json, stopped after."""
 
-import ctypes
 import os
-import signal
 import subprocess
 import sys
 import time
@@ -53,8 +51,8 @@ class LocalServer:
         options = ["--port", "0", "--zenoh-port", "0", "--slots", str(self.slots), "--grace", str(GRACE)]
         with (self.runs / LOG_FILE).open("wb") as log:
             self._process = subprocess.Popen(
-                [*_SERVER, "--runs", str(self.runs), *options], stdin=subprocess.DEVNULL, stdout=log, stderr=log,
-                start_new_session=True, preexec_fn=_end_with_parent, env=_environment(),
+                [*_TETHERED, str(os.getpid()), "--runs", str(self.runs), *options], stdin=subprocess.DEVNULL,
+                stdout=log, stderr=log, start_new_session=True, env=_environment(),
             )  # fmt: skip
         try:
             self.session = Session(self._await().url, self.token)
@@ -97,6 +95,18 @@ class LocalServer:
 
 
 _SERVER = [sys.executable, "-m", "conoid.server"]
+_TETHER = """
+import ctypes, os, runpy, signal, sys
+parent = int(sys.argv.pop(1))
+if sys.platform == "linux":
+    PR_SET_PDEATHSIG = 1
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+    if os.getppid() != parent:
+        sys.exit(1)
+runpy.run_module("conoid.server", run_name="__main__", alter_sys=True)
+"""
+_TETHERED = [sys.executable, "-c", _TETHER]
+"""The server, to which the kernel sends SIGTERM when the process of the first argument dies, however it dies."""
 
 
 def _token(runs: Path) -> str:
@@ -130,13 +140,3 @@ def _address(path: Path) -> Address | None:
 def _last_line(path: Path) -> str:
     lines = path.read_text(errors="replace").strip().splitlines() if path.is_file() else []
     return lines[-1] if lines else "it said nothing"
-
-
-_PR_SET_PDEATHSIG = 1
-_libc = ctypes.CDLL(None) if sys.platform == "linux" else None
-
-
-def _end_with_parent() -> None:
-    """In the child, before the server begins: the kernel sends SIGTERM when the parent dies, however it dies."""
-    if _libc is not None:
-        _libc.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)

@@ -17,9 +17,11 @@ from .run import RunInfo
 
 def table(*columns: str, right: Sequence[str] = ()) -> Table:
     """An open table with these columns; those named in ``right`` are numbers."""
-    made = Table(box=box.SIMPLE_HEAD, header_style="bold", pad_edge=False)
+    made = Table(box=box.SIMPLE_HEAD, header_style="bold", pad_edge=False, show_edge=False, padding=(0, 1, 0, 0))
     for column in columns:
-        made.add_column(column, justify="right" if column in right else "left", no_wrap=column == "run")
+        made.add_column(
+            column, justify="right" if column in right else "left", overflow="fold", no_wrap=column != "case"
+        )
     return made
 
 

@@ -90,7 +90,7 @@ function row(run) {
   const share = run.state === "succeeded" ? 1 : run.progress ? run.progress.t / run.progress.end_time : 0;
   const took = FINAL.has(run.state) && run.started ? ` · ${duration(run.finished - run.started)}` : "";
   return h("tr", { onclick: open },
-    h("td", {}, h("a.name", { href: link }, run.title || run.name), h("span.id", {}, run.id)),
+    h("td", {}, h("a.name", { href: link }, run.name), h("span.id", {}, run.id)),
     h("td", { title: run.message || run.reason }, pill(run.state)),
     h("td.bar", { style: { minWidth: "120px" } }, meter(run.state, share)),
     h("td.ranks-of", {}, String(run.ranks)),

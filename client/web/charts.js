@@ -3,6 +3,7 @@
 import { h, si } from "./figures.js";
 
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+const MOST_DECADES = 6;
 const PAD = { left: 58, right: 10, top: 8, bottom: 24 };
 
 // A canvas of a fixed height that follows the width of its holder and the theme, with a tip under the pointer.
@@ -118,16 +119,16 @@ export function line(context, area, points, name, { end, log = false, floor = 0,
   const measure = log ? (value) => Math.log10(Math.max(value, 1e-12)) : (value) => value;
   const values = points.map(({ value }) => measure(value));
   const top = Math.max(...values, ...marks.map(measure));
-  const low = log ? Math.floor(Math.min(...values)) : floor;
-  const high = log ? Math.max(Math.ceil(top + 1e-9), low + 1) : Math.max(1.1 * top, floor + 0.1);
+  const high = log ? Math.ceil(top + 1e-9) : Math.max(1.1 * top, floor + 0.1);
+  const low = log ? Math.max(high - MOST_DECADES, Math.min(Math.floor(Math.min(...values)), high - 2)) : floor;
   const { x, y } = scales(area, 0, end, low, high);
-  const ys = log ? ticks(low, high, 4).filter(Number.isInteger) : ticks(low, high, 4);
+  const ys = log ? ticks(low, high, MOST_DECADES) : ticks(low, high, 4);
   axes(context, area, { xs: ticks(0, end, area.width / 90), x, xUnit: "s", ys, y, yLabel: label });
   context.strokeStyle = colour(name);
   context.lineWidth = 1.8;
   context.lineJoin = "round";
   context.beginPath();
-  points.forEach(({ t }, i) => context.lineTo(x(t), y(values[i])));
+  points.forEach(({ t }, i) => context.lineTo(x(t), y(Math.max(values[i], low))));
   context.stroke();
   context.setLineDash([4, 4]);
   context.strokeStyle = colour("bad");

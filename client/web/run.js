@@ -167,7 +167,7 @@ export class RunPage {
     const { live, info } = this;
     const state = this.cancelling && !FINAL.has(live.state) ? "stopping" : live.state;
     const waits = live.state === "queued" ? info.reason : "";
-    const told = [live.cause, live.message, waits, this.notice].filter(Boolean).join(" · ");
+    const told = [live.cause, live.message, waits, this.notice].filter((text) => text && text !== live.state).join(" · ");
     const stop = FINAL.has(state) ? null
       : this.stop ??= h("button.stop", { type: "button", onclick: () => this.cancel(this.stop) }, "Cancel");
     this.head.replaceChildren(
@@ -232,9 +232,11 @@ export class RunPage {
 
   drawLog() {
     const { log } = this.live;
-    if (this.logged === log.at(-1)?.seq) return;
-    this.logged = log.at(-1)?.seq;
+    const last = log.at(-1)?.seq ?? 0;
+    if (this.logged === last) return;
+    this.logged = last;
     const atEnd = this.log.scrollTop + this.log.clientHeight >= this.log.scrollHeight - 8;
+    if (!log.length) return this.log.replaceChildren(h("span.hint", {}, "nothing yet"));
     this.log.replaceChildren(...log.map((entry) =>
       h(`div.${entry.level}`, {}, h("time", {}, clock(entry.wall)), `  [${entry.rank ?? 0}] ${entry.text}`)));
     if (atEnd) this.log.scrollTop = this.log.scrollHeight;

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 import zenoh
@@ -56,7 +57,7 @@ def broker(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Broker]:
         config.insert_json5(key, json.dumps(value))
     session = zenoh.open(config)
     yield Broker(session, Router(endpoint=f"tcp/127.0.0.1:{port}", user="ann", password="secret"))
-    session.close()
+    session.close()  # type: ignore[no-untyped-call]
 
 
 @pytest.fixture
@@ -72,7 +73,7 @@ def quiet_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 FAKE_WORKER = f"{sys.executable} {Path(__file__).with_name('fake_worker.py')}"
 
 
-def case_file(folder: Path, ranks: int = 1, **plan: object) -> Path:
+def case_file(folder: Path, ranks: int = 1, **plan: Any) -> Path:
     """A small case; ``plan`` is for the fake worker."""
     path = folder / "bar.toml"
     path.write_text(f"""

@@ -80,7 +80,7 @@ def main() -> int:
     leave(options.out, state, cause, step)
     voice.say(messages.Finished, state=state, digest="d" * 64, steps=step, elapsed=0.1)
     if voice.session is not None:
-        voice.session.close()
+        voice.session.close()  # type: ignore[no-untyped-call]
     return {"succeeded": 0, "cancelled": 4, "failed": 3}[state]
 
 

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +35,7 @@ def conoid(*words: object) -> Result:
     return CliRunner().invoke(app, [str(word) for word in words])
 
 
-def submitted(folder: Path, **plan: object) -> str:
+def submitted(folder: Path, **plan: Any) -> str:
     result = conoid("submit", case_file(folder, **plan))
     assert result.exit_code == 0, result.output
     return result.stdout.strip()
@@ -174,6 +175,17 @@ def processes_of(folder: Path) -> list[str]:
     return found
 
 
+def wait_for(truth: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + 60
+    while not truth():
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+def a_run_runs(runs: Path) -> bool:
+    return any(b'"running"' in path.read_bytes() for path in runs.glob("*/journal.jsonl"))
+
+
 def test_run_does_it_all_and_leaves_no_process(alone: Path) -> None:
     case = case_file(alone, steps=3)
     words = ["run", str(case), "--ranks", "2", "--set", "title=Short", "--out", str(alone / "runs")]
@@ -199,11 +211,7 @@ def test_an_interrupted_run_is_cancelled(alone: Path, number: signal.Signals) ->
     words = ["run", str(case_file(alone, steps=2000, pace=0.02)), "--out", str(runs)]
     child = subprocess.Popen([*CONOID, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
-        deadline = time.monotonic() + 60
-        while not any(b'"running"' in path.read_bytes() for path in runs.glob("*/journal.jsonl")):
-            assert time.monotonic() < deadline
-            assert child.poll() is None
-            time.sleep(0.05)
+        wait_for(lambda: a_run_runs(runs))
         child.send_signal(number)
         printed, complained = child.communicate(timeout=60)
     finally:
@@ -213,6 +221,31 @@ def test_an_interrupted_run_is_cancelled(alone: Path, number: signal.Signals) ->
     outcome = next(runs.glob("*/outcome.json"))
     assert json.loads(outcome.read_bytes())["state"] == "cancelled"
     assert processes_of(runs) == []
+
+
+def test_a_killed_client_leaves_no_server(alone: Path) -> None:
+    runs = alone / "runs"
+    words = ["run", str(case_file(alone, steps=150, pace=0.02)), "--out", str(runs)]
+    child = subprocess.Popen([*CONOID, *words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    wait_for(lambda: a_run_runs(runs))
+    child.kill()
+    child.wait(10)
+    wait_for(lambda: not processes_of(runs))
+    outcome = next(runs.glob("*/outcome.json"))
+    assert json.loads(outcome.read_bytes())["state"] == "succeeded", "the worker went on to its end"
+
+
+def test_watch_can_be_left(user: Path) -> None:
+    run = submitted(user, steps=200, pace=0.02)
+    child = subprocess.Popen([*CONOID, "watch", run], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert child.stdout is not None
+    child.stdout.readline()
+    child.send_signal(signal.SIGINT)
+    _, said = child.communicate(timeout=60)
+    assert child.returncode == 130
+    assert said == f"conoid: the run goes on; conoid watch {run} shows it again\n"
+    assert read(conoid("show", run, "--json"))["state"] in {"starting", "running"}
+    conoid("cancel", run)
 
 
 def test_a_server_that_cannot_start_says_why(alone: Path) -> None:

@@ -106,7 +106,7 @@ def test_plain_lines_tell_states_and_warnings_at_once_and_progress_now_and_then(
 def test_a_failure_tells_its_cause() -> None:
     lines: list[str] = []
     tell([stories.status(1, "failed", "energy", "the residual passed 0.05")], Live(stories.RUN), lines.append)
-    assert lines[0].endswith("failed  energy the residual passed 0.05")
+    assert lines[0].endswith("failed  energy  the residual passed 0.05")
 
 
 def test_the_live_screen_ends_with_the_last_picture() -> None:

@@ -9,7 +9,6 @@ import httpx2
 import pytest
 
 from conoid.cases.load import CaseError
-from conoid.client import session as sessions
 from conoid.client.config import DEFAULT_URL, target
 from conoid.client.errors import ClientError, ServiceError, UnreachableError
 from conoid.client.run import inside
@@ -30,7 +29,7 @@ def problem(status: int, **body: Any) -> Answer:
 
 @pytest.fixture(autouse=True)
 def _no_pauses(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sessions.time, "sleep", lambda _: None)
+    monkeypatch.setattr("conoid.client.session.time.sleep", lambda _: None)
 
 
 def test_a_refusal_is_its_detail_and_hint() -> None:

@@ -158,7 +158,7 @@ def test_sse_tells_the_same_and_its_break_is_bridged_by_the_journal() -> None:
 
 
 def test_a_server_that_restarts_is_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stream.time, "sleep", lambda _: None)
+    monkeypatch.setattr("conoid.client.stream.time.sleep", lambda _: None)
     journal = Journal()
     journal.lines = stories.whole()
     failures = iter([True, True, False])

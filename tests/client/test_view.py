@@ -35,6 +35,7 @@ def body_box(path: Path) -> tuple[float, float, float, float]:
 
 def test_a_picture_shows_the_body_whole_and_large(folder: Path, tmp_path: Path) -> None:
     drawn = view(folder, "temperature", tmp_path / "t.png", size=SIZE)
+    assert drawn.faces == 4 * 2 * 4 * 16 + 2 * 2 * 4 * 4, "four sides and two ends of 4 x 4 x 16 cells"
     left, right, top, bottom = body_box(tmp_path / "t.png")
     assert bottom - top > 0.6, "the camera fits"
     assert left > 0.05
@@ -46,17 +47,15 @@ def test_a_picture_shows_the_body_whole_and_large(folder: Path, tmp_path: Path) 
 
 
 def test_mirrors_double_the_model_and_hide_its_sections(folder: Path, tmp_path: Path) -> None:
-    one = view(folder, "mises", tmp_path / "a.png", size=SIZE)
     two = view(folder, "mises", tmp_path / "b.png", size=SIZE, mirror="x")
     four = view(folder, "mises", tmp_path / "c.png", size=SIZE, mirror="auto")
     across, along = 4, 16
     sides, ends = 2 * across * along, 2 * across * across
-    assert one.faces == 4 * sides + 2 * ends
     assert two.faces == 2 * (3 * sides + 2 * ends)
     assert four.faces == 4 * (2 * sides + 2 * ends)
 
 
-@pytest.mark.parametrize("field", ["pressure", "speed", "part", "rank"])
+@pytest.mark.parametrize("field", ["pressure", "speed", "part"])
 def test_every_kind_of_field_can_be_drawn(field: str, folder: Path, tmp_path: Path) -> None:
     drawn = view(folder / "frames" / "000007.vtkhdf", field, tmp_path / "p.png", size=SIZE, raw=field == "speed")
     pixels = imread(drawn.out)
