@@ -1,0 +1,139 @@
+"""From a mesh in a case to the tets: the one way in. Made once, then found again by content."""
+
+import contextlib
+import hashlib
+import importlib.metadata
+import importlib.util
+import os
+import tempfile
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+from conoid.cases.schema import Mesh, MeshFile
+
+from ..errors import MeshError
+from .child import Limits, run_child
+from .model import TetMesh, check
+from .order import morton_ordered
+from .store import load, save
+from .structured import structured
+
+_CACHE_BYTES = 4 * 2**30
+"""When the cache is larger than this, the meshes that were not used for longest go."""
+
+
+def build(mesh: Mesh, folder: Path, key: str = "mesh", limits: Limits | None = None) -> TetMesh:
+    """The tets of ``mesh``: checked, in Morton order, the same bits every time.
+
+    ``folder`` is where a relative path of a mesh file starts, ``key`` where the mesh stands in its case, for messages.
+    What needs gmsh, and every file, is handled by a child process within ``limits``. Raises MeshError.
+    """
+    source = _source(mesh, folder, key) if isinstance(mesh, MeshFile) else None
+    if isinstance(mesh, MeshFile) or mesh.generator == "gmsh":
+        _need_gmsh(mesh, key)
+    name = _content(mesh, source, key) + ".npz"
+    cached = cache_folder()
+    found = load(cached / name)
+    if found is None:
+        return _make_and_keep(mesh, source, cached / name, key, limits or Limits())
+    with contextlib.suppress(OSError):
+        os.utime(cached / name)
+    return found
+
+
+def cache_folder() -> Path:
+    """Where meshes are kept: below ``CONOID_CACHE_DIR``, else ``~/.cache/conoid``."""
+    root = os.environ.get("CONOID_CACHE_DIR")
+    return (Path(root) if root else Path.home() / ".cache" / "conoid") / "meshes"
+
+
+def _make_and_keep(mesh: Mesh, source: Path | None, target: Path, key: str, limits: Limits) -> TetMesh:
+    """A cache that cannot be written costs time, not the run."""
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=target.parent).close()
+    except OSError:
+        with tempfile.TemporaryDirectory(prefix="conoid-mesh-") as apart:
+            return _make(mesh, source, Path(apart) / target.name, key, limits)
+    made = _make(mesh, source, target, key, limits)
+    with contextlib.suppress(OSError):
+        _trim(target.parent)
+    return made
+
+
+def _make(mesh: Mesh, source: Path | None, target: Path, key: str, limits: Limits) -> TetMesh:
+    if not isinstance(mesh, MeshFile) and mesh.generator == "structured":
+        made = morton_ordered(check(structured(mesh, key)))
+        save(made, target)
+        return made
+    run_child(mesh, source, target, key, limits)
+    found = load(target)
+    if found is None:
+        raise MeshError(f"{key}: the mesh process left no mesh in {target}")
+    return found
+
+
+def _source(mesh: MeshFile, folder: Path, key: str) -> Path:
+    """The file itself; MeshError when it is not there, or not the one that was meant."""
+    if "://" in mesh.path:
+        raise MeshError(f"{key}.path = {mesh.path!r}: expected a file, not an address")
+    path = folder / mesh.path
+    if not path.is_file():
+        raise MeshError(f"{key}.path = {mesh.path!r}: no such file ({path.absolute()})")
+    return path.absolute()
+
+
+def _need_gmsh(mesh: Mesh, key: str) -> None:
+    text_only = isinstance(mesh, MeshFile) and mesh.path.lower().endswith(".inp")
+    if not text_only and importlib.util.find_spec("gmsh") is None:
+        cure = "" if isinstance(mesh, MeshFile) else ", or use generator = 'structured'"
+        raise MeshError(f"{key}: gmsh is not installed here; pip install 'conoid[mesh]'{cure}")
+
+
+def _content(mesh: Mesh, source: Path | None, key: str) -> str:
+    """sha256 over everything that decides the mesh: what is asked for, the file's bytes, our source, the versions."""
+    digest = hashlib.sha256("\n".join((_maker(), mesh.model_dump_json(exclude={"path"}))).encode())
+    if source is not None and isinstance(mesh, MeshFile):
+        file = _file_digest(source, mesh, key)
+        digest.update(f"{source.suffix.lower()} {file}".encode())
+    return digest.hexdigest()
+
+
+def _file_digest(source: Path, mesh: MeshFile, key: str) -> str:
+    try:
+        with source.open("rb") as file:
+            found = hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise MeshError(f"{key}.path = {mesh.path!r}: {error.strerror}") from error
+    if mesh.sha256 is not None and mesh.sha256.lower() != found:
+        raise MeshError(f"{key}.sha256 = {mesh.sha256!r}: {mesh.path!r} has {found}")
+    return found
+
+
+@cache
+def _maker() -> str:
+    """The sources of this package and the versions of what it calls."""
+    sources = hashlib.sha256()
+    for path in sorted(Path(__file__).parent.glob("*.py")):
+        sources.update(path.name.encode() + path.read_bytes())
+    return " ".join([sources.hexdigest(), *_versions("gmsh", "numpy")])
+
+
+def _versions(*packages: str) -> Iterator[str]:
+    for package in packages:
+        try:
+            yield f"{package} {importlib.metadata.version(package)}"
+        except importlib.metadata.PackageNotFoundError:
+            yield f"{package} unknown"
+
+
+def _trim(folder: Path) -> None:
+    """Removes the meshes that were not used for longest until the rest fits."""
+    kept = sorted((file.stat().st_mtime, file.stat().st_size, file) for file in folder.glob("*.npz"))
+    total = sum(size for _, size, _ in kept)
+    for _, size, file in kept[:-1]:
+        if total <= _CACHE_BYTES:
+            break
+        file.unlink(missing_ok=True)
+        total -= size

@@ -1,0 +1,164 @@
+"""The child process in which gmsh runs and foreign files are read: ``python -m conoid.worker.mesh.child``.
+
+gmsh is GPL, and it and any parser may crash, hang or ask for all memory. So they get a process of their own with limits
+on memory, CPU time and wall time, an environment without secrets and an empty working folder. One JSON request on
+stdin; the mesh comes back as an .npz file, an error as one line on stderr.
+"""
+
+import ctypes
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from pydantic import TypeAdapter
+
+from conoid.cases.run import ExitCode
+from conoid.cases.schema import Mesh, MeshFile
+
+from ..errors import InputError, MeshError
+
+_PASSED_ON = ("HOME", "LANG", "LC_ALL", "LD_LIBRARY_PATH", "PATH", "PYTHONPATH", "TMPDIR", "VIRTUAL_ENV")
+"""The environment variables that the child gets."""
+
+_LOOK = 0.2
+"""Seconds between two looks at a child that is still at work."""
+
+_FULL = 0.97
+"""A child with this share of its memory limit has no room left to say so."""
+
+_DIES_WITH_PARENT = 1
+"""Linux: prctl(PR_SET_PDEATHSIG)."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a child may use: address space in bytes, CPU time and wall time in s."""
+
+    memory: int = 12 * 2**30
+    cpu: int = 900
+    wall: int = 900
+
+
+def run_child(mesh: Mesh, source: Path | None, target: Path, key: str, limits: Limits) -> None:
+    """Makes ``mesh`` (reads ``source`` when it is a file) in a child process, which leaves it in ``target``.
+
+    Raises MeshError with the child's own line, or with the limit that it broke.
+    """
+    request = {
+        "mesh": mesh.model_dump(mode="json"),
+        "source": None if source is None else str(source),
+        "target": str(target),
+        "key": key,
+        "limits": asdict(limits),
+    }
+    environment = {name: os.environ[name] for name in _PASSED_ON if name in os.environ} | {"OMP_NUM_THREADS": "1"}
+    command = [sys.executable, "-m", "conoid.worker.mesh.child"]
+    with tempfile.TemporaryDirectory(prefix="conoid-mesh-") as folder:
+        pipe = subprocess.PIPE
+        with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, cwd=folder, env=environment) as child:
+            errors = _watched(child, json.dumps(request).encode(), key, limits)
+    if child.returncode != 0:
+        raise MeshError(_reason(key, child.returncode, errors.decode("utf-8", "replace"), limits))
+
+
+def _watched(child: subprocess.Popen[bytes], request: bytes, key: str, limits: Limits) -> bytes:
+    """What the child says on stderr, once it has ended. Ends it, and raises MeshError, when it breaks a limit.
+
+    Memory is looked at from here too: Python can turn in circles when not even an exception fits any more.
+    """
+    last, message = time.monotonic() + limits.wall, request
+    try:
+        while True:
+            try:
+                return child.communicate(message, timeout=_LOOK)[1]
+            except subprocess.TimeoutExpired:
+                message = b""
+            if time.monotonic() > last:
+                raise MeshError(f"{key}: not ready after {limits.wall} s and stopped; is the mesh too fine?")
+            if _address_space(child.pid) > _FULL * limits.memory:
+                raise MeshError(_too_much_memory(key, limits))
+    finally:
+        child.kill()
+
+
+def _address_space(process: int) -> int:
+    """Bytes, 0 where the system does not say (no /proc) or the process has just ended."""
+    try:
+        return int(Path(f"/proc/{process}/statm").read_text().split()[0]) * resource.getpagesize()
+    except (OSError, IndexError, ValueError):
+        return 0
+
+
+def _too_much_memory(key: str, limits: Limits) -> str:
+    return f"{key}: needs more than the {limits.memory / 2**30:.3g} GiB of memory that it may have"
+
+
+def _reason(key: str, code: int, errors: str, limits: Limits) -> str:
+    lines = errors.strip().splitlines()
+    if code == ExitCode.BAD_INPUT and lines:
+        return lines[-1]
+    if -code in (signal.SIGXCPU, signal.SIGKILL):
+        return f"{key}: took more than {limits.cpu} s of CPU time, or was killed; is the mesh too fine?"
+    how = f"was ended by {signal.Signals(-code).name}" if code < 0 else f"ended with code {code}"
+    memory = limits.memory / 2**30
+    return f"{key}: the mesh process {how} (memory limit {memory:.3g} GiB): {lines[-1] if lines else 'it said nothing'}"
+
+
+def main() -> int:
+    """Answers the request on stdin; the exit code."""
+    request = json.load(sys.stdin)
+    limits = Limits(**request["limits"])
+    _limit(limits)
+    key, target = str(request["key"]), Path(request["target"])
+    try:
+        mesh: Mesh = TypeAdapter[Mesh](Mesh).validate_python(request["mesh"])
+        _perform(mesh, key, request["source"], target)
+    except InputError as error:
+        text = str(error)
+        return _told(text if text.startswith(key) else f"{key}: {text}", ExitCode.BAD_INPUT)
+    except MemoryError:
+        return _told(_too_much_memory(key, limits), ExitCode.BAD_INPUT)
+    except (Exception, SystemExit) as error:
+        return _told(f"{type(error).__name__}: {error}", ExitCode.CRASHED)
+    return ExitCode.SUCCEEDED
+
+
+def _perform(mesh: Mesh, key: str, source: str | None, target: Path) -> None:
+    """Makes or reads, checks, orders and stores. Imports gmsh and numpy only now, within the limits."""
+    from .model import check
+    from .order import morton_ordered
+    from .store import save
+
+    if isinstance(mesh, MeshFile):
+        from .read import read
+
+        made = read(mesh, Path(source or mesh.path), key)
+    else:
+        from .unstructured import unstructured
+
+        made = check(unstructured(mesh, key))
+    save(morton_ordered(made), target)
+
+
+def _limit(limits: Limits) -> None:
+    resource.setrlimit(resource.RLIMIT_AS, (limits.memory, limits.memory))
+    resource.setrlimit(resource.RLIMIT_CPU, (limits.cpu, limits.cpu + 5))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_DIES_WITH_PARENT, signal.SIGKILL)
+
+
+def _told(text: str, code: int) -> int:
+    print(" ".join(text.split()), file=sys.stderr)
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,41 @@
+"""Triangular faces of tets. Face ``i`` lies opposite to node ``i`` and runs anticlockwise, seen from outside."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .model import Floats, Ints
+
+FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]], np.int32)
+"""Local nodes of the four faces."""
+
+
+def boundary_faces(tets: Ints) -> Ints:
+    """(k, 3) nodes of the faces that belong to one tet only, outward, in the order of tet and local face."""
+    faces = tets[:, FACES].reshape(-1, 3)
+    group, size = _groups(faces)
+    outer: Ints = faces[size[group] == 1]
+    return outer
+
+
+def face_counts(tets: Ints) -> NDArray[np.int64]:
+    """(k,) how many tets share each distinct face: 1 on the boundary, 2 inside, more only in a broken mesh."""
+    return _groups(tets[:, FACES].reshape(-1, 3))[1]
+
+
+def areas(points: Floats, faces: Ints) -> Floats:
+    """(k,) areas, m^2, of ``faces``, (k, 3)."""
+    a, b, c = (points[faces[:, i]] for i in range(3))
+    normals: Floats = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    return normals / 2
+
+
+def _groups(faces: Ints) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Number of the distinct face that each row is, and how many rows each distinct face has."""
+    low, middle, high = np.sort(faces, axis=1).astype(np.int64).T
+    order = np.lexsort((high, low << 32 | middle))
+    pair, last = (low << 32 | middle)[order], high[order]
+    new = np.ones(len(order), bool)
+    new[1:] = (pair[1:] != pair[:-1]) | (last[1:] != last[:-1])
+    group = np.empty(len(order), np.int64)
+    group[order] = np.cumsum(new) - 1
+    return group, np.bincount(group)

@@ -1,0 +1,159 @@
+"""The tet mesh: nodes, tets, and what makes a mesh usable.
+
+Node order of a tet, positive: seen from node 3, nodes 0, 1, 2 run clockwise::
+
+          3
+         /|\\
+        / | \\          6 V = (x1 - x0) x (x2 - x0) . (x3 - x0) > 0
+       /  |  \\
+      0---|---2
+       \\  |  /
+        \\ | /
+          1
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import MeshError
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+Ids = NDArray[np.int64]
+
+MAX_TETS = 50_000_000
+"""More than this is taken for a slip in ``element_size``, not for a wish."""
+
+REGULAR_STEP = 6**-0.5
+"""Step length of the regular tet with edge 1: half its altitude."""
+
+_FLAT = 1e-9
+"""A tet whose volume is below this share of (root of the sum of its squared face areas)^(3/2) has none."""
+
+
+@dataclass(frozen=True, eq=False)
+class TetMesh:
+    """``points``: (n, 3) float64, m. ``tets``: (m, 4) int32 rows of node indices, positively oriented.
+
+    Treat both arrays as read-only. Raises MeshError for another shape.
+    """
+
+    points: Floats
+    tets: Ints
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", np.ascontiguousarray(self.points, np.float64))
+        object.__setattr__(self, "tets", np.ascontiguousarray(self.tets, np.int32))
+        if self.points.ndim != 2 or self.points.shape[1] != 3:
+            raise MeshError(f"points have the shape {self.points.shape}; expected (n, 3)")
+        if self.tets.ndim != 2 or self.tets.shape[1] != 4:
+            raise MeshError(f"tets have the shape {self.tets.shape}; expected (m, 4)")
+
+    def volumes(self) -> Floats:
+        """(m,) signed volumes, m^3."""
+        return _volume_and_area(self.points, self.tets)[0]
+
+    def step_lengths(self) -> Floats:
+        """(m,) 1 / sqrt(sum |grad N|^2), m, with the sign of the volume: the stable time step is this over the speed
+        of sound (lumped linear tets: omega_max^2 <= 4 c^2 sum |grad N|^2)."""
+        return step_lengths(self.points, self.tets)
+
+
+@dataclass(frozen=True)
+class Names:
+    """What the file that a mesh came from calls its nodes, (n,), and tets, (m,)."""
+
+    nodes: Ids
+    tets: Ids
+
+
+@dataclass(frozen=True)
+class Quality:
+    """Step lengths, m: ``worst`` decides the time step, ``mean`` is what the mesh could do if all tets were alike."""
+
+    worst: float
+    mean: float
+    worst_tet: int
+
+    @property
+    def ratio(self) -> float:
+        """Worst over mean; 1 for a mesh of equal tets."""
+        return self.worst / self.mean
+
+
+def step_lengths(points: Floats, tets: NDArray[np.integer]) -> Floats:
+    """Step lengths, m, of the tets (..., 4) over ``points``; see ``TetMesh.step_lengths``."""
+    volume, area = _volume_and_area(points, tets)
+    return np.divide(3 * volume, area, out=np.zeros_like(volume), where=area > 0)
+
+
+def quality(mesh: TetMesh) -> Quality:
+    """Worst and mean step length of a mesh with at least one tet."""
+    steps = mesh.step_lengths()
+    worst = int(steps.argmin())
+    return Quality(float(steps[worst]), float(steps.mean()), worst)
+
+
+def check(mesh: TetMesh, names: Names | None = None) -> TetMesh:
+    """The mesh itself when it can be computed with: else MeshError.
+
+    Finite coordinates, at least one tet, every index in range, every node used, every volume positive. Nodes and tets
+    are called by ``names`` when given, by their index from 0 otherwise.
+    """
+    points, tets = mesh.points, mesh.tets
+    names = names or Names(np.arange(len(points)), np.arange(len(tets)))
+    if len(tets) == 0:
+        raise MeshError("the mesh has no tets")
+    lost = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if len(lost):
+        raise MeshError(
+            f"node {names.nodes[lost[0]]} has a coordinate that is not finite ({_count(lost, points)} nodes)"
+        )
+    wild = np.flatnonzero(((tets < 0) | (tets >= len(points))).any(axis=1))
+    if len(wild):
+        raise MeshError(
+            f"tet {names.tets[wild[0]]} has the node indices {_list(tets[wild[0]])}; allowed: 0 to {len(points) - 1}"
+        )
+    unused = np.flatnonzero(np.bincount(tets.ravel(), minlength=len(points)) == 0)
+    if len(unused):
+        raise MeshError(f"node {names.nodes[unused[0]]} belongs to no tet ({_count(unused, points)} nodes)")
+    _check_volumes(mesh, names)
+    return mesh
+
+
+def _check_volumes(mesh: TetMesh, names: Names) -> None:
+    volumes, areas = _volume_and_area(mesh.points, mesh.tets)
+    nothing = _FLAT * areas**1.5
+    bad = np.flatnonzero(volumes <= nothing)
+    if len(bad):
+        tet, inverted = bad[0], volumes[bad[0]] < -nothing[bad[0]]
+        raise MeshError(
+            f"tet {names.tets[tet]} is {'inverted' if inverted else 'flat'}: its nodes "
+            f"{_list(names.nodes[mesh.tets[tet]])} span a volume of {volumes[tet]:.3g} m^3; it must be positive "
+            f"({_count(bad, volumes)} tets are inverted or flat)"
+        )
+
+
+def _volume_and_area(points: Floats, tets: NDArray[np.integer]) -> tuple[Floats, Floats]:
+    """Signed volume, m^3, and root of the sum of the four squared face areas, m^2."""
+    x, y, z = ([column[tets[..., i]] for i in range(4)] for column in points.T)
+    e = [[x[i] - x[0], y[i] - y[0], z[i] - z[0]] for i in (1, 2, 3)]
+    a, b, c = _cross(e[1], e[2]), _cross(e[2], e[0]), _cross(e[0], e[1])
+    volume: Floats = (e[0][0] * a[0] + e[0][1] * a[1] + e[0][2] * a[2]) / 6
+    squares = [p * p + q * q + r * r + (p + q + r) ** 2 for p, q, r in zip(a, b, c, strict=True)]
+    area: Floats = 0.5 * np.sqrt(squares[0] + squares[1] + squares[2])
+    return volume, area
+
+
+def _cross(u: list[Floats], v: list[Floats]) -> list[Floats]:
+    return [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
+
+
+def _count(some: NDArray[np.intp], every: Floats) -> str:
+    return f"{len(some):,} of {len(every):,}"
+
+
+def _list(numbers: NDArray[np.integer]) -> str:
+    return ", ".join(str(n) for n in numbers)

@@ -1,0 +1,54 @@
+"""Order along the Morton curve: neighbours in space become neighbours in memory.
+
+A kernel over tets gathers and scatters nodes, so the order decides how often the cache helps: on unstructured meshes
+it is worth a factor of 1.3 to 1.6. It also makes the numbering independent of how the mesh was made.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .model import Floats, TetMesh
+
+_BITS = 21
+_SPREAD = [
+    (32, 0x1F00000000FFFF),
+    (16, 0x1F0000FF0000FF),
+    (8, 0x100F00F00F00F00F),
+    (4, 0x10C30C30C30C30C3),
+    (2, 0x1249249249249249),
+]
+
+
+def morton_codes(points: Floats, low: Floats, edge: float) -> NDArray[np.uint64]:
+    """(n,) position of ``points``, (n, 3), along the Z-curve through the cube at ``low``, (3,), with ``edge``, m.
+
+    21 bits a direction; x is the fastest.
+    """
+    cells = 2**_BITS
+    scale = cells / edge if edge > 0 else 0.0
+    box = np.clip((points - low) * scale, 0, cells - 1).astype(np.uint64)
+    x, y, z = (_spread(box[:, i]) for i in range(3))
+    codes: NDArray[np.uint64] = x | y << np.uint64(1) | z << np.uint64(2)
+    return codes
+
+
+def _spread(bits: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """Two zero bits between any two bits."""
+    for shift, mask in _SPREAD:
+        bits = (bits | bits << np.uint64(shift)) & np.uint64(mask)
+    return bits
+
+
+def morton_ordered(mesh: TetMesh) -> TetMesh:
+    """The same mesh with nodes, and tets by centroid, along the Morton curve of the mesh's bounding cube.
+
+    Ties keep their order; the node order within a tet is kept too.
+    """
+    low = mesh.points.min(axis=0)
+    edge = float((mesh.points.max(axis=0) - low).max())
+    by_node = np.argsort(morton_codes(mesh.points, low, edge), kind="stable")
+    place = np.empty(len(by_node), np.int32)
+    place[by_node] = np.arange(len(by_node), dtype=np.int32)
+    centroids = np.stack([column[mesh.tets].sum(axis=1) / 4 for column in mesh.points.T], axis=1)
+    by_tet = np.argsort(morton_codes(centroids, low, edge), kind="stable")
+    return TetMesh(mesh.points[by_node], place[mesh.tets[by_tet]])

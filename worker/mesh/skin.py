@@ -1,0 +1,70 @@
+"""Where the nodes of a body may go without changing its shape: nodes of a flat face in it, of a round one along it."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conoid.cases.geometry import Generated, cut_directions
+from conoid.cases.schema import Box, Cylinder, Plate, Sphere, Tube
+
+from .faces import boundary_faces
+from .frame import block
+from .model import Floats, TetMesh
+
+_NEAR = 1e-9
+"""Nodes this near to a surface of the body, in lengths that ``scale`` makes of order one, are on it."""
+
+
+@dataclass(frozen=True)
+class Skin:
+    """``held``: (n, 3), coordinates that a node keeps. ``radius``: (n,), distance that it keeps from the axis (the
+    centre for a sphere), 0 for none. ``round``: how many of a, b, c that distance is made of."""
+
+    held: NDArray[np.bool_]
+    radius: Floats
+    round: int
+
+    @classmethod
+    def of(cls, body: Generated, mesh: TetMesh, scale: float) -> tuple[Self, Floats]:
+        """The skin of a ``mesh`` in the body's frame, lengths over ``scale``, and its points, put exactly on it."""
+        points, round_in = mesh.points.copy(), 3 if isinstance(body, Sphere) else 2
+        skin = np.zeros(len(points), bool)
+        skin[boundary_faces(mesh.tets)] = True
+        held = np.zeros(points.shape, bool)
+        for direction, planes in _planes(body).items():
+            for plane in planes:
+                on = skin & (np.abs(points[:, direction] - plane / scale) < _NEAR)
+                points[on, direction], held[on, direction] = plane / scale, True
+        distance, radius = np.linalg.norm(points[:, :round_in], axis=1), np.zeros(len(points))
+        for length in _radii(body):
+            radius[skin & (np.abs(distance - length / scale) < 1e3 * _NEAR)] = length / scale
+        held[skin & (radius == 0) & ~held.any(axis=1)] = True
+        return cls(held, radius, round_in), points
+
+    def movable(self, node: int) -> bool:
+        """Whether ``node`` can go anywhere at all."""
+        return int(self.held[node].sum()) + int(self.radius[node] > 0) < 3
+
+    def allowed(self, node: int, start: Floats, places: Floats) -> Floats:
+        """The places (k, 3) nearest to ``places`` that ``node``, now at ``start``, may take."""
+        places = np.where(self.held[node], start, places)
+        if self.radius[node] > 0:
+            places[:, : self.round] *= (self.radius[node] / np.linalg.norm(places[:, : self.round], axis=1))[:, None]
+        return places
+
+
+def _planes(body: Generated) -> dict[int, tuple[float, ...]]:
+    """The flat faces of a body: for each direction, where they stand, m."""
+    low, high = block(body)
+    if isinstance(body, Box | Plate):
+        return {i: (low[i], high[i]) for i in range(3)}
+    cuts = dict.fromkeys(range(len(cut_directions(body, body.axis))), (0.0,))
+    return {**cuts} if isinstance(body, Sphere) else {**cuts, 2: (low[2], high[2])}
+
+
+def _radii(body: Generated) -> tuple[float, ...]:
+    if isinstance(body, Tube):
+        return body.inner_radius, body.radius
+    return (body.radius,) if isinstance(body, Cylinder | Sphere) else ()

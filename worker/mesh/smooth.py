@@ -1,0 +1,98 @@
+"""Moves nodes away from where they hold the time step down.
+
+An explicit run pays for its worst tet in every step. The tets with the shortest step length are taken in turn, worst
+first; one of their nodes is moved along the gradient of that length as far as the worst tet around the node gains.
+Nodes on the boundary slide along it, so the body keeps its shape.
+"""
+
+import heapq
+
+import numpy as np
+
+from .model import Floats, Ids, TetMesh, step_lengths
+from .skin import Skin
+
+_MOVES = np.array([0.6, 0.3, 0.15, 0.07, 0.03])
+"""Tried moves, in step lengths of the worst tet."""
+
+_GAIN = 1.01
+"""A move counts when the worst tet around the node grows by this factor."""
+
+
+_MOST, _PATIENCE = 10_000, 4
+"""How many tets are looked at: in all, and for each one that starts too low."""
+
+_AHEAD = 1.25
+"""Tets that are this much better than one that cannot be helped are left alone: the time step is lost already."""
+
+
+def smoothed(mesh: TetMesh, skin: Skin, wanted: float) -> TetMesh:
+    """The mesh with step lengths below ``wanted``, m, raised where possible within a bounded number of moves."""
+    work = _Smoothing(mesh, skin, wanted)
+    waiting = [(length, tet) for tet, length in enumerate(work.lengths.tolist()) if length < wanted]
+    heapq.heapify(waiting)
+    stuck = wanted
+    for _ in range(min(_MOST, _PATIENCE * len(waiting))):
+        if not waiting or waiting[0][0] > _AHEAD * stuck:
+            break
+        length, tet = heapq.heappop(waiting)
+        if length == work.lengths[tet]:
+            changed = work.raise_tet(tet)
+            stuck = stuck if len(changed) else min(stuck, length)
+            for other in changed[work.lengths[changed] < wanted]:
+                heapq.heappush(waiting, (float(work.lengths[other]), int(other)))
+    return TetMesh(work.points, mesh.tets)
+
+
+class _Smoothing:
+    """Points that move, and the step lengths that follow."""
+
+    def __init__(self, mesh: TetMesh, skin: Skin, wanted: float) -> None:
+        self.points = mesh.points.copy()
+        self.tets = mesh.tets
+        self.wanted = wanted
+        self.lengths = mesh.step_lengths()
+        self.skin = skin
+        self.by_node = np.argsort(mesh.tets, axis=None, kind="stable") // 4
+        self.first = np.concatenate([[0], np.cumsum(np.bincount(mesh.tets.ravel(), minlength=len(mesh.points)))])
+
+    def raise_tet(self, tet: int) -> Ids:
+        """Moves one node of ``tet`` if that helps; the tets around that node, which have changed."""
+        for node in self.tets[tet].tolist():
+            if self.skin.movable(node):
+                star = self.by_node[self.first[node] : self.first[node + 1]]
+                if self._move(node, tet, star):
+                    return star
+        return np.empty(0, np.int64)
+
+    def _move(self, node: int, tet: int, star: Ids) -> bool:
+        place, before = self.points[node], self.lengths[star].min()
+        reach = max(float(self.lengths[tet]), 1e-3 * self.wanted)
+        slope = self._slope(node, tet, 1e-3 * reach)
+        centre = self.points[self.tets[star]].mean(axis=(0, 1)) - place
+        ways = np.array([_unit(slope), _unit(centre), _unit(_unit(slope) + _unit(centre))])
+        places = self.skin.allowed(node, place, place + (reach * _MOVES[:, None, None] * ways).reshape(-1, 3))
+        lengths = self._lengths_at(node, star, places)
+        best = int(lengths.min(axis=1).argmax())
+        if lengths[best].min() <= before * _GAIN:
+            return False
+        self.points[node], self.lengths[star] = places[best], lengths[best]
+        return True
+
+    def _slope(self, node: int, tet: int, small: float) -> Floats:
+        """Gradient of the step length of ``tet`` with the place of ``node``, by central differences."""
+        shifts = small * np.concatenate([np.eye(3), -np.eye(3)])
+        lengths = self._lengths_at(node, np.array([tet]), self.points[node] + shifts)[:, 0]
+        slope: Floats = (lengths[:3] - lengths[3:]) / (2 * small)
+        return slope
+
+    def _lengths_at(self, node: int, tets: Ids, places: Floats) -> Floats:
+        """(k, s) step lengths of the s ``tets`` if ``node`` were at each of the k ``places``."""
+        corners = np.repeat(self.points[self.tets[tets]][None], len(places), axis=0)
+        corners[:, self.tets[tets] == node] = places[:, None]
+        return step_lengths(corners.reshape(-1, 3), np.arange(corners.size // 3).reshape(*corners.shape[:2], 4))
+
+
+def _unit(vector: Floats) -> Floats:
+    length = np.linalg.norm(vector)
+    return vector / length if length > 0 else vector
