@@ -8,13 +8,9 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from .auth import SCOPES, TokenError, create_token
-from .serve import ServeError, serve
-from .settings import Caps, Settings, SettingsError, command
-from .store import Store, StoreError
-from .telemetry import TelemetryError
-
-_EXPECTED = (SettingsError, ServeError, StoreError, TelemetryError, TokenError)
+from .settings import Caps, Settings, StartError, command
+from .store import Store
+from .tokens import SCOPES, TokenError, create_token
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -24,7 +20,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         act: Callable[[argparse.Namespace], None] = options.act
         act(options)
-    except _EXPECTED as error:
+    except StartError as error:
         print(f"conoid.server: {error}", file=sys.stderr)
         return 2
     except OSError as error:
@@ -48,6 +44,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--mpiexec", default=os.environ.get("CONOID_MPIEXEC", ""), help="the site's own launcher [CONOID_MPIEXEC]")
     add("--worker", default=os.environ.get("CONOID_WORKER"), help="command of the worker [CONOID_WORKER]")
     add("--grace", type=float, default=30.0, help="seconds between the request to stop and the kill (default 30)")
+    add("--end-runs", action="store_true", help="cancel all runs when the server stops (default: workers go on)")
     for name, kind, text in _CAPS:
         add(f"--max-{name.replace('_', '-')}", type=kind, help=text)
     _token_commands(parser)
@@ -93,13 +90,24 @@ def _settings(options: argparse.Namespace) -> Settings:
     if options.worker:
         chosen["worker"] = command(options.worker)
     return Settings(
-        runs=options.runs.resolve(), host=options.host, port=options.port,
-        zenoh_port=None if options.no_zenoh else options.zenoh_port, auth=not options.no_auth, web=options.web,
-        database=options.database, mpiexec=options.mpiexec, grace=options.grace, caps=Caps(**given), **chosen,
-    )  # fmt: skip
+        runs=options.runs.resolve(),
+        host=options.host,
+        port=options.port,
+        zenoh_port=None if options.no_zenoh else options.zenoh_port,
+        auth=not options.no_auth,
+        web=options.web,
+        database=options.database,
+        mpiexec=options.mpiexec,
+        grace=options.grace,
+        end_runs=options.end_runs,
+        caps=Caps(**given),
+        **chosen,
+    )
 
 
 def _serve(options: argparse.Namespace) -> None:
+    from .serve import serve
+
     serve(_settings(options))
 
 

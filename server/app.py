@@ -51,6 +51,8 @@ def opened(settings: Settings) -> Iterator[Service]:
         supervisor = Supervisor(settings, store, LocalLauncher(settings), telemetry, bell.ring)
         supervisor.start()
         stack.callback(supervisor.close)
+        if settings.end_runs:
+            stack.callback(supervisor.end_all)
         yield Service(settings, store, bell, telemetry, supervisor, Desk(settings, store, supervisor))
 
 

@@ -15,7 +15,7 @@ import uvicorn
 from . import durable
 from .app import build_app, opened
 from .service import Service
-from .settings import Settings
+from .settings import Settings, StartError
 
 ADDRESS_FILE = "server.json"
 _LOCK = "server.lock"
@@ -23,7 +23,7 @@ _FAREWELL = 3
 """s that open requests get when the server stops."""
 
 
-class ServeError(Exception):
+class ServeError(StartError):
     """The server cannot start; the text is one line."""
 
 

@@ -11,7 +11,11 @@ WORKER = (sys.executable, "-m", "mpi4py", "-m", "conoid.worker")
 """The worker's command after ``mpiexec -n N``; ``-m mpi4py`` makes one rank's exception end all ranks."""
 
 
-class SettingsError(ValueError):
+class StartError(Exception):
+    """The server, or a command of it, cannot do its work; the text is one line for people."""
+
+
+class SettingsError(StartError):
     """A setting cannot be used; the text names it, its value and what is allowed."""
 
 
@@ -64,6 +68,8 @@ class Settings:
     worker: tuple[str, ...] = WORKER
     grace: float = 30.0
     """s between the request to stop and the kill."""
+    end_runs: bool = False
+    """Cancel all runs when the server stops; otherwise workers go on, and the next server adopts them."""
     caps: Caps = field(default_factory=Caps)
 
     def __post_init__(self) -> None:

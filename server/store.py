@@ -14,6 +14,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from conoid.cases.run import Cause, State
 
 from .lifecycle import Run
+from .settings import StartError
 
 _meta = sa.MetaData()
 _runs = sa.Table(
@@ -66,7 +67,7 @@ class Token:
     """Unix s."""
 
 
-class StoreError(Exception):
+class StoreError(StartError):
     """The database cannot be used; the text is one line."""
 
 

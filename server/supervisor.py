@@ -95,6 +95,14 @@ class Supervisor:
         self._inbox.put(None)
         self._thread.join(_ANSWER)
 
+    def end_all(self) -> None:
+        """Cancels every open run; returns when all have ended, or after twice the grace."""
+        deadline = time.monotonic() + 2 * self._settings.grace
+        for run_id in tuple(self._open):
+            self._inbox.put(_Cancel(run_id, Future()))
+        while self._open and self.alive and time.monotonic() < deadline:
+            time.sleep(_LOOK)
+
     @property
     def alive(self) -> bool:
         """False when runs are not looked after any more."""

@@ -24,7 +24,7 @@ from conoid.cases.messages import Status, to_msgpack
 
 from . import durable
 from .launch import Access
-from .settings import loopback
+from .settings import StartError, loopback
 from .store import Token
 
 _log = logging.getLogger("conoid.server")
@@ -34,7 +34,7 @@ _ASKS = ["declare_subscriber", "query", "liveliness_query", "declare_liveliness_
 _ANSWERS = ["query", "declare_subscriber"]
 
 
-class TelemetryError(Exception):
+class TelemetryError(StartError):
     """The router cannot be opened; the text is one line."""
 
 

@@ -8,6 +8,7 @@ from ..auth import Identity, identify
 from ..errors import ServiceError
 from ..limits import BODY
 from ..service import Service, ServiceOf
+from ..settings import loopback
 from ..telemetry import TelemetryError
 
 router = APIRouter()
@@ -35,14 +36,15 @@ def me(request: Request, service: ServiceOf, identity: Annotated[Identity, Depen
 
 
 def _zenoh(request: Request, service: Service, identity: Identity) -> dict[str, Any] | None:
-    """The endpoint is at the host name by which the client has reached this server."""
-    if service.telemetry is None or not identity.allows("read"):
+    """The endpoint is at the host name by which the client has reached this server, if Zenoh listens there."""
+    host = request.url.hostname or "127.0.0.1"
+    hidden = loopback(service.settings.host) and not loopback(host)
+    if service.telemetry is None or hidden or not identity.allows("read"):
         return None
     try:
         reader = service.telemetry.reader(identity.owner, identity.token)
     except TelemetryError as error:
         raise ServiceError(503, "unavailable", str(error), retryable=True) from None
-    host = request.url.hostname or "127.0.0.1"
     return {
         "endpoint": f"tcp/{f'[{host}]' if ':' in host else host}:{reader.port}",
         "prefix": reader.prefix,

@@ -18,10 +18,10 @@ from starlette.testclient import TestClient
 
 from conoid.cases.run import State
 from conoid.server.app import build_app, opened
-from conoid.server.auth import create_token
 from conoid.server.service import Service
 from conoid.server.settings import Caps, Settings
 from conoid.server.store import Store
+from conoid.server.tokens import create_token
 
 FAKE = (sys.executable, str(Path(__file__).with_name("fake_worker.py")))
 PATIENCE = 20.0
@@ -122,17 +122,8 @@ def server(settings: Settings) -> Iterator[Running]:
             token = create_token(service.store, name, frozenset({"read", "submit", "metrics"}))
             users.append(User(_like(client, token), name, settings.runs))
         yield Running(service, users[0], users[1], User(client, "nobody", settings.runs))
-        _end_runs(service)
-
-
-def _end_runs(service: Service) -> None:
-    """Cancels what a test has left open, so that no worker outlives it."""
-    deadline = time.monotonic() + PATIENCE
-    while left := list(service.supervisor._open):
-        for run_id in left if service.supervisor.alive else ():
-            service.supervisor.cancel(run_id)
-        assert time.monotonic() < deadline, f"runs {left} do not end"
-        time.sleep(0.01)
+        service.supervisor.end_all()
+        assert not service.supervisor._watches, "a worker outlived its test"
 
 
 def _like(client: TestClient, token: str) -> TestClient:

@@ -9,9 +9,9 @@ from fastapi.routing import APIRoute
 from starlette.testclient import TestClient
 
 from conoid.server.app import ROUTERS, build_app, opened
-from conoid.server.auth import check_token, create_token
 from conoid.server.limits import BODY
 from conoid.server.settings import Caps, Settings
+from conoid.server.tokens import check_token, create_token
 
 from .conftest import TOML, Running, case_text
 

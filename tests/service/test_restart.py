@@ -163,6 +163,16 @@ def test_a_stopped_server_leaves_its_workers_and_can_lose_its_database(process: 
     assert ann.wait_for(living)["state"] == "succeeded"
 
 
+def test_a_server_that_is_told_to_ends_its_runs(process: MakeProcess, tmp_path: Path) -> None:
+    server = process("--no-zenoh", "--end-runs")
+    ann = server.user(server.start()["url"])
+    run = ann.submit(steps=100_000, pace=0.01)
+    ann.wait_for(run, State.RUNNING)
+    assert server.end(signal.SIGTERM) == 0
+    assert not living(run)
+    assert json.loads((server.runs / run / "outcome.json").read_text())["state"] == "cancelled"
+
+
 def gone(run: str) -> None:
     """Returns when no process of the run lives any more."""
     deadline = time.monotonic() + PATIENCE

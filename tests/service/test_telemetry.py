@@ -161,6 +161,8 @@ def test_the_server_tells_the_states_that_are_its_own(process: MakeProcess, tmp_
         states = [(message.seq, getattr(message, "state", "")) for message in heard]
         assert states == [(2, "queued"), (3, "starting"), (ann.events(run)[-1]["seq"], "succeeded")]
         assert {key for key, _ in ear.heard} == {f"conoid/v1/ann/{run}/state"}
+    elsewhere = {"Host": "conoid.example.org"}
+    assert ann.http.get("/v1/me", headers=elsewhere).json()["zenoh"] is None, "it listens on loopback only"
     seen = json.loads((tmp_path / "runs" / run / "environment.json").read_text())
     with client(port, seen["CONOID_ZENOH_USER"], seen["CONOID_ZENOH_PASSWORD"]):
         pass
