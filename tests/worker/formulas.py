@@ -1,0 +1,75 @@
+"""The kernels once more, in numpy that reads as the formulas. Tensors are (n, 3, 3), compression has positive pressure."""
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+IDENTITY = np.eye(3)
+
+
+def gradients(corners: Floats) -> tuple[Floats, Floats]:
+    """Volumes (n,) and shape-function gradients (n, 4, 3) of tets with the nodes ``corners`` (n, 4, 3)."""
+    jacobian = corners[:, 1:] - corners[:, :1]
+    inner = np.linalg.inv(jacobian).transpose(0, 2, 1)
+    return np.linalg.det(jacobian) / 6.0, np.concatenate([-inner.sum(axis=1, keepdims=True), inner], axis=1)
+
+
+def velocity_gradient(velocities: Floats, grad: Floats) -> Floats:
+    """L_ij = sum_a v_ai dN_a/dx_j from nodal velocities (n, 4, 3)."""
+    return np.einsum("nai,naj->nij", velocities, grad)
+
+
+def deviator(a: Floats) -> Floats:
+    """a - tr(a) / 3 I of the symmetric part of a."""
+    symmetric = 0.5 * (a + a.transpose(0, 2, 1))
+    return np.asarray(symmetric - np.trace(symmetric, axis1=1, axis2=2)[:, None, None] / 3.0 * IDENTITY)
+
+
+def cayley(spin: Floats, dt: float) -> Floats:
+    """(I - W dt/2)^-1 (I + W dt/2)."""
+    return np.linalg.solve(IDENTITY - 0.5 * dt * spin, IDENTITY + 0.5 * dt * spin)
+
+
+def rotated(s: Floats, L: Floats, dt: float) -> Floats:
+    """Q s Q^T with the rotation of the step."""
+    q = cayley(0.5 * (L - L.transpose(0, 2, 1)), dt)
+    return q @ s @ q.transpose(0, 2, 1)
+
+
+def mises(s: Floats) -> Floats:
+    """sqrt(3/2 s : s)."""
+    return np.asarray(np.sqrt(1.5 * (s * s).sum(axis=(1, 2))))
+
+
+def power(s: Floats, L: Floats) -> Floats:
+    """s : D."""
+    return np.asarray((s * deviator(L)).sum(axis=(1, 2)))
+
+
+def forces(volume: Floats, stress: Floats, grad: Floats) -> Floats:
+    """Forces on the four nodes, -V stress . grad N_a, (n, 4, 3)."""
+    return -volume[:, None, None] * np.einsum("nij,naj->nai", stress, grad)
+
+
+def at_nodes(tets: npt.NDArray[np.integer], values: Floats, nodes: int) -> Floats:
+    """Sums at the nodes of values (n, 4, ...) given for the four nodes of each tet."""
+    total = np.zeros((nodes, *values.shape[2:]))
+    np.add.at(total, tets, values)
+    return total
+
+
+def inverse_length(grad: Floats) -> Floats:
+    """sqrt(sum_a |grad N_a|^2), 1/m."""
+    return np.asarray(np.sqrt((grad * grad).sum(axis=(1, 2))))
+
+
+def stiffness(volume: float, grad: Floats, bulk: float, shear: float) -> Floats:
+    """(12, 12) stiffness of one tet, V B^T D B, from isotropic elasticity."""
+    strains = np.zeros((12, 3, 3))
+    for a in range(4):
+        for i in range(3):
+            strains[3 * a + i, i] += grad[a]
+    strains = 0.5 * (strains + strains.transpose(0, 2, 1))
+    trace = np.trace(strains, axis1=1, axis2=2)
+    parts = strains - trace[:, None, None] / 3.0 * IDENTITY
+    return volume * (bulk * np.outer(trace, trace) + 2.0 * shear * np.einsum("aij,bij->ab", parts, parts))

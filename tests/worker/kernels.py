@@ -1,0 +1,206 @@
+"""What the tests ask of the kernels, and how it is asked of the worker as it is: a changed signature changes this file.
+
+A ``Patch`` is a built simulation of one part on one rank, with plain arrays in and out; ``run`` takes its time steps.
+"""
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any, Literal
+from unittest.mock import patch
+
+import numpy as np
+import numpy.typing as npt
+
+from conoid.cases import schema
+from conoid.worker import domain, simulation, step, state
+from conoid.worker.boundaries import Boundary
+from conoid.worker.mesh.model import TetMesh
+from conoid.worker.parallel import fixed_point
+from conoid.worker.parallel.comm import Comm, SerialComm
+from conoid.worker.simulation import Simulation
+
+Floats = npt.NDArray[np.float64]
+Form = Literal["standard", "nodal", "split"]
+FORMS: tuple[Form, ...] = ("standard", "nodal", "split")
+
+STEEL = schema.Material(density=7850.0, elastic=schema.Elastic(young=200e9, poisson=0.3))
+COPPER = schema.Material(
+    density=8930.0, elastic=schema.Elastic(young=117e9, poisson=0.35),
+    strength=schema.LinearHardening(model="linear_hardening", yield_stress=0.4e9, hardening=0.1e9),
+)  # fmt: skip
+STEEL_42CRMO4 = schema.Material(
+    density=7830.0, elastic=schema.Elastic(young=206.9e9, poisson=0.3),
+    strength=schema.JohnsonCook(
+        model="johnson_cook", A=806e6, B=614e6, n=0.168, C=0.0089, m=1.1, reference_temperature=293.15,
+        melt_temperature=1813.15, specific_heat=460.0,
+    ),
+)  # fmt: skip
+COPPER_GAS = schema.Material(
+    density=8930.0, elastic=schema.Elastic(young=117e9, poisson=0.35),
+    eos=schema.MieGruneisen(model="mie_gruneisen", c0=3940.0, S=1.49, gamma0=1.96),
+)  # fmt: skip
+"""Copper with the Mie-Grueneisen equation of state, elastic in shear."""
+
+DUMMY = schema.Box(shape="box", low=(0.0, 0.0, 0.0), high=(1.0, 1.0, 1.0), element_size=1.0)
+"""Stands in a case for a mesh that the test hands over itself."""
+
+
+def scene(material: schema.Material = STEEL, form: Form = "standard", end: float = 1.0, **keys: Any) -> schema.Case:
+    """A case of one part ``body`` without viscosity; ``keys`` are those of the part, of ``numerics`` and of the case."""
+    of_part = {key: keys.pop(key) for key in ("velocity", "spin", "temperature") if key in keys}
+    numerics = {key: keys.pop(key) for key in ("dt_safety", "dt_growth") if key in keys}
+    viscosity = schema.Viscosity(**keys.pop("viscosity")) if "viscosity" in keys else None
+    return schema.Case(
+        name="test", materials={"metal": material},
+        parts=(schema.Part(name="body", material="metal", mesh=DUMMY, **of_part),),
+        numerics=schema.Numerics(pressure=form, viscosity=viscosity, **numerics),
+        run=schema.Run(end_time=end, frames=keys.pop("frames", 0)), **keys,
+    )  # fmt: skip
+
+
+def build(case: schema.Case, meshes: Iterable[TetMesh], comm: Comm | None = None) -> Simulation:
+    """The simulation of a case whose parts have these meshes."""
+    ready = iter(meshes)
+    with patch.object(domain, "build_mesh", lambda *_: next(ready)):
+        return simulation.build(case, Path(), comm or SerialComm())
+
+
+def whole_of(mesh: TetMesh, case: schema.Case | None = None) -> domain.Whole:
+    """The whole mesh as rank 0 has it before the cut."""
+    with patch.object(domain, "build_mesh", lambda *_: mesh):
+        return domain.assemble(case or scene(), Path())
+
+
+def pieces_of(pieces: list[domain.Piece], case: schema.Case | None = None) -> list[tuple[domain.Piece, state.Model]]:
+    """Each piece with the model that its rank makes of it."""
+    return [(piece, domain._model(case or scene(), piece)) for piece in pieces]
+
+
+class Patch:
+    """The tets of one material on one rank, and passes over them outside of any time step."""
+
+    def __init__(
+        self, mesh: TetMesh, material: schema.Material = STEEL, form: Form = "standard", scale: float = 0.0, **keys: Any
+    ) -> None:
+        self.sim = build(scene(material, form, **keys), [mesh])
+        self.elements = self.sim.elements
+        self.nodes = self.sim.model.nodes
+        self.block = self.sim.model.blocks[0]
+        self.tets = np.asarray(self.block.tets, np.int64)
+        self.scale = scale
+        """Quanta per newton; 0: chosen for the forces at hand, as the step does."""
+
+    def advance(self, dt: float) -> None:
+        """One pass: x(n+1) and v(n+1/2) stand in ``nodes``; stress and forces become those of n+1."""
+        scale = self.scale or self.sim.next_scale()
+        while True:
+            self.elements.advance(dt, scale)
+            self.elements.finish()
+            largest = fixed_point.float_of(int(self.elements.peaks[2]))
+            self._used = scale
+            if not fixed_point.outgrown(largest, scale):
+                return
+            self._used = scale = fixed_point.scale_for(largest)
+            self.elements.again(scale)
+            self.elements.finish()
+            return
+
+    def corners(self, values: Floats | None = None) -> Floats:
+        """(n, 4, 3) nodal values (positions when absent) of the tets."""
+        return np.asarray((self.nodes.x if values is None else values)[self.tets])
+
+    def strain(self, L: Floats, dt: float) -> None:
+        """Free tets under velocity gradients L, (3, 3) or (n, 3, 3), 1/s, about the origin.
+
+        The present positions become those of mid-step; those of the end of the step, ``dt`` s, are set.
+        """
+        middle = self.corners()
+        self.nodes.v[self.tets] = np.einsum("ij,naj->nai" if L.ndim == 2 else "nij,naj->nai", L, middle)
+        self.nodes.x += 0.5 * dt * self.nodes.v
+
+    def get(self, row: int) -> Floats:
+        """(n,) a row of the element state."""
+        return self.block.row(row)
+
+    def put(self, row: int, values: Floats | float) -> None:
+        """Sets a row of the element state, a number or (n,)."""
+        flat = self.block.state[:, row, :].reshape(-1)
+        flat[: self.block.n] = values
+        self.block.state[:, row, :] = flat.reshape(self.block.state[:, row, :].shape)
+
+    @property
+    def deviator(self) -> Floats:
+        """(n, 3, 3) deviatoric stress, Pa."""
+        xx, yy, zz, yz, zx, xy = (self.get(row) for row in range(state.S_XX, state.S_XY + 1))
+        return np.stack([xx, xy, zx, xy, yy, yz, zx, yz, zz], axis=1).reshape(-1, 3, 3)
+
+    @deviator.setter
+    def deviator(self, s: Floats) -> None:
+        places = [(0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1)]
+        for row, (i, j) in zip(range(state.S_XX, state.S_XY + 1), places, strict=True):
+            self.put(row, s[:, i, j])
+
+    @property
+    def stress(self) -> Floats:
+        """(n, 3, 3) Cauchy stress, the viscous part included, Pa."""
+        pressure = self.get(state.PRESSURE) + self.get(state.VISCOUS)
+        return np.asarray(self.deviator - pressure[:, None, None] * np.eye(3))
+
+    @property
+    def force(self) -> Floats:
+        """(nodes, 3) sums of the internal forces, N."""
+        return np.asarray(self.nodes.force / self._used)
+
+    @property
+    def quantum(self) -> float:
+        """N: what one unit of the integer forces stands for."""
+        return 1.0 / self._used
+
+    @property
+    def limit(self) -> float:
+        """The largest one-over-stable-step of the last pass, 1/s."""
+        return fixed_point.float_of(int(self.elements.peaks[0]))
+
+
+def drive(material: schema.Material, L: Floats, dt: float, steps: int, **keys: Any) -> Patch:
+    """One regular tet of 1 m under a constant velocity gradient L (3, 3), 1/s: a material point.
+
+    The positions are put so that the middle of every step is the same tet: the volume stays, L is exact.
+    """
+    from .meshes import REGULAR
+
+    point = Patch(TetMesh(REGULAR, np.array([[0, 1, 2, 3]], np.int32)), material, **keys)
+    point.strain(L, dt)
+    for _ in range(steps):
+        point.advance(dt)
+    return point
+
+
+Watch = Callable[[Simulation, Floats], None]
+
+
+def around(boundary: Boundary, look: Callable[[Floats, Floats], None]) -> None:
+    """Lets ``look`` see the velocities (nodes, 3) before and after each time that a boundary is applied."""
+    apply = boundary.apply
+
+    def applied(model: state.Nodes, *rest: Any) -> None:
+        before = model.v.copy()
+        apply(model, *rest)
+        look(before, model.v)
+
+    boundary.apply = applied  # type: ignore[method-assign]
+
+
+def run(sim: Simulation, watch: Watch | None = None, steps: int = -1) -> Simulation:
+    """Steps to the end time, or ``steps`` steps; ``watch`` looks at each time n, and is told v(n-1/2)."""
+    step.prepare(sim)
+    while True:
+        before = sim.model.nodes.v.copy()
+        step.first_half(sim)
+        if watch is not None:
+            watch(sim, before)
+        if sim.clock.frame_due:
+            sim.clock.frame += 1
+        if sim.clock.done or sim.clock.step == steps:
+            return sim
+        step.second_half(sim)

@@ -1,0 +1,60 @@
+"""Irregular tets for the tests: blocks with shaken nodes, heaps of free tets of every size and shape."""
+
+import itertools
+
+import numpy as np
+import numpy.typing as npt
+
+from conoid.worker.mesh.model import TetMesh
+
+Floats = npt.NDArray[np.float64]
+
+REGULAR = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, 0.75**0.5, 0.0], [0.5, 0.75**0.5 / 3.0, (2.0 / 3.0) ** 0.5]])
+"""Nodes of the regular tet with edge 1."""
+
+
+def block(cells: tuple[int, int, int], size: float = 1.0, shake: float = 0.2, seed: int = 1) -> TetMesh:
+    """A block of cubes of edge ``size``, m, each cut into six tets; nodes moved by up to ``shake`` of the edge.
+
+    Nodes on a face stay in its plane, so that the block keeps its shape.
+    """
+    steps = [np.arange(n + 1) for n in cells]
+    grid = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 3).astype(float)
+    move = np.random.default_rng(seed).uniform(-shake, shake, grid.shape)
+    move[(grid == 0.0) | (grid == np.array(cells))] = 0.0
+    strides = np.array([(cells[1] + 1) * (cells[2] + 1), cells[2] + 1, 1])
+    corner = np.stack(np.meshgrid(*[np.arange(n) for n in cells], indexing="ij"), axis=-1).reshape(-1, 3) @ strides
+    tets = np.concatenate([corner[:, None] + path for path in _paths(strides)])
+    return TetMesh((grid + move) * size, positive(grid, tets))
+
+
+def _paths(strides: npt.NDArray[np.int64]) -> list[npt.NDArray[np.int64]]:
+    """The six ways from a cube's near corner to its far one."""
+    return [np.array([0, strides[a], strides[a] + strides[b], strides.sum()]) for a, b, _ in itertools.permutations(range(3))]
+
+
+def positive(points: Floats, tets: npt.NDArray[np.integer]) -> npt.NDArray[np.int32]:
+    """The tets with two nodes exchanged where the volume was negative."""
+    edges = points[tets[:, 1:]] - points[tets[:, :1]]
+    wrong = np.linalg.det(edges) < 0.0
+    turned = tets.astype(np.int32)
+    turned[wrong] = turned[wrong][:, [0, 1, 3, 2]]
+    return turned
+
+
+def free_tets(n: int, seed: int, flattest: float = 0.05) -> TetMesh:
+    """``n`` tets that share no node, edges from 0.1 to 10 mm, any direction; none flatter than ``flattest``.
+
+    Flatness is volume over that of a regular tet with the same root mean square of the edges.
+    """
+    random = np.random.default_rng(seed)
+    kept: list[Floats] = []
+    while sum(map(len, kept)) < n:
+        corners = random.normal(size=(2 * n, 4, 3))
+        edges = corners[:, 1:] - corners[:, :1]
+        size = np.sqrt(((corners[:, :, None] - corners[:, None]) ** 2).sum(axis=(1, 2, 3)) / 12.0)
+        good = np.abs(np.linalg.det(edges)) / 6.0 > flattest * size**3 / (6.0 * 2.0**0.5)
+        kept.append((corners / size[:, None, None])[good])
+    scale = 10.0 ** random.uniform(-4.0, -2.0, n)
+    points = (np.concatenate(kept)[:n] * scale[:, None, None]).reshape(-1, 3)
+    return TetMesh(points, positive(points, np.arange(4 * n).reshape(n, 4)))

@@ -1,0 +1,63 @@
+"""Recursive bisection: even, compact, the same again, for any number of parts."""
+
+import numpy as np
+import pytest
+
+from conoid.worker.parallel.decompose import bisect
+
+from .meshes import Floats
+
+PARTS = [1, 2, 3, 4, 5, 7, 8, 16, 31]
+
+
+def cloud(n: int, seed: int) -> Floats:
+    return np.asarray(np.random.default_rng(seed).uniform(size=(n, 3)) * [3.0, 1.0, 0.5])
+
+
+@pytest.mark.parametrize("parts", PARTS)
+def test_equal_weights_are_shared_evenly(parts: int) -> None:
+    """Each cut is off by less than one point, so a part is off by less than two."""
+    owner = bisect(cloud(1000, 1), np.ones(1000), parts)
+    counts = np.bincount(owner, minlength=parts)
+    assert len(counts) == parts
+    assert np.abs(counts - 1000 / parts).max() < 2.0
+
+
+@pytest.mark.parametrize("parts", [2, 4, 8])
+def test_powers_of_two_divide_exactly(parts: int) -> None:
+    assert np.bincount(bisect(cloud(64, 2), np.ones(64), parts)).tolist() == [64 // parts] * parts
+
+
+@pytest.mark.parametrize("parts", PARTS)
+def test_unequal_weights_are_shared_evenly(parts: int) -> None:
+    weights = np.random.default_rng(3).uniform(0.1, 5.0, 2000)
+    shares = np.bincount(bisect(cloud(2000, 4), weights, parts), weights, minlength=parts)
+    assert np.abs(shares - weights.sum() / parts).max() < 2.0 * 5.0
+
+
+@pytest.mark.parametrize("parts", PARTS)
+def test_the_same_arguments_give_the_same_parts(parts: int) -> None:
+    points = cloud(500, 5)
+    assert (bisect(points, np.ones(500), parts) == bisect(points.copy(), np.ones(500), parts)).all()
+
+
+def test_ties_are_told_apart_by_their_index() -> None:
+    """All points in one place: the cut follows the order of the points."""
+    owner = bisect(np.zeros((40, 3)), np.ones(40), 4)
+    assert owner.tolist() == sorted(owner.tolist())
+    assert len(set(owner.tolist())) == 4
+
+
+def test_cuts_run_across_the_longest_side() -> None:
+    points = cloud(4000, 6)
+    owner = bisect(points, np.ones(4000), 3)
+    lows = [points[owner == part].min(axis=0) for part in range(3)]
+    highs = [points[owner == part].max(axis=0) for part in range(3)]
+    assert highs[0][0] <= lows[1][0]
+    assert highs[1][0] <= lows[2][0]
+
+
+@pytest.mark.parametrize("parts", [4, 7, 9])
+def test_more_parts_than_points(parts: int) -> None:
+    owner = bisect(cloud(4, 7), np.ones(4), parts)
+    assert np.bincount(owner, minlength=parts).max() == 1

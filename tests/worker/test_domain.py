@@ -1,0 +1,153 @@
+"""The cut of the mesh: every tet once, every shared node known to all who hold it and owned once; their sums complete."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+
+from conoid.worker import domain
+from conoid.worker.domain import Piece, Whole
+from conoid.worker.mesh.model import TetMesh
+from conoid.worker.parallel.comm import SerialComm
+from conoid.worker.parallel.ownership import SharedSum
+from conoid.worker.state import CHUNK, Ints
+
+from .kernels import pieces_of, whole_of
+from .meshes import block, free_tets
+
+RANKS = [1, 2, 3, 4, 5, 7, 16]
+MESH = block((7, 4, 4), 1e-3, seed=3)
+
+
+def cut(ranks: int) -> tuple[Whole, list[Piece]]:
+    whole = whole_of(MESH)
+    return whole, domain.cut(whole, ranks)
+
+
+@pytest.mark.parametrize("ranks", RANKS)
+def test_every_tet_belongs_to_one_rank(ranks: int) -> None:
+    whole, pieces = cut(ranks)
+    assert np.concatenate([p.tet_ids for p in pieces]).tolist() != list(range(len(whole.tets))) or ranks == 1
+    assert sorted(np.concatenate([p.tet_ids for p in pieces])) == list(range(len(whole.tets)))
+    for piece in pieces:
+        assert (piece.node_ids[piece.tets] == whole.tets[piece.tet_ids]).all()
+        assert (np.diff(piece.node_ids) > 0).all()
+        assert set(piece.tets.ravel()) == set(range(len(piece.node_ids)))
+
+
+@pytest.mark.parametrize("ranks", RANKS)
+def test_every_node_is_owned_once_by_the_rank_of_its_first_tet(ranks: int) -> None:
+    whole, pieces = cut(ranks)
+    owners = np.concatenate([p.node_ids[p.owned] for p in pieces])
+    assert sorted(owners) == list(range(len(whole.points)))
+    first = {int(node): tet for tet in range(len(whole.tets) - 1, -1, -1) for node in whole.tets[tet]}
+    for piece in pieces:
+        mine = set(piece.tet_ids.tolist())
+        assert all(first[int(node)] in mine for node in piece.node_ids[piece.owned])
+
+
+@pytest.mark.parametrize("ranks", RANKS)
+def test_holders_of_a_node_know_each_other(ranks: int) -> None:
+    """Each pair of ranks lists the nodes that both hold, in one order; masses and positions are those of the whole."""
+    whole, pieces = cut(ranks)
+    for (a, one), (b, other) in product(enumerate(pieces), repeat=2):
+        if a == b:
+            continue
+        common = np.intersect1d(one.node_ids, other.node_ids)
+        listed = [n for n in one.neighbours if n.rank == b]
+        assert [n.rank for n in one.neighbours] == sorted({n.rank for n in one.neighbours})
+        assert len(listed) == (len(common) > 0)
+        if listed:
+            assert (one.node_ids[listed[0].nodes] == common).all()
+    for piece in pieces:
+        assert (piece.mass == whole.mass[piece.node_ids]).all()
+        assert (piece.points == whole.points[piece.node_ids]).all()
+        assert piece.totals[2] == sum((np.concatenate([p.node_ids for p in pieces]) == n).sum() > 1 for n in range(len(whole.points)))
+
+
+@pytest.mark.parametrize("ranks", RANKS)
+def test_border_chunks_hold_every_tet_of_a_shared_node(ranks: int) -> None:
+    _, pieces = cut(ranks)
+    for piece, model in pieces_of(pieces):
+        shared = {int(node) for neighbour in piece.neighbours for node in neighbour.nodes}
+        for block_ in model.blocks:
+            inside = block_.tets[block_.border_chunks * CHUNK :]
+            assert not shared & set(inside.ravel().tolist())
+            assert block_.border_chunks <= -(-len(block_.tets) // CHUNK)
+            assert (block_.border_chunks == 0) == (not piece.border.any())
+
+
+def test_mass_is_shared_by_quarters() -> None:
+    whole = whole_of(MESH)
+    assert whole.volumes.sum() == pytest.approx(7e-3 * 4e-3 * 4e-3, rel=1e-13)
+    assert whole.mass.sum() == pytest.approx(7850.0 * 112e-9, rel=1e-13)
+    corner = int(np.flatnonzero((whole.points == 0.0).all(axis=1))[0])
+    round_it = (whole.tets == corner).any(axis=1)
+    assert whole.mass[corner] == pytest.approx(7850.0 / 4.0 * whole.volumes[round_it].sum(), rel=1e-14)
+
+
+class Postbox:
+    """A communicator whose ranks take turns in one process: ``begin`` of all before ``finish`` of any."""
+
+    def __init__(self) -> None:
+        self.letters: dict[tuple[int, int, int], Ints] = {}
+
+    def of(self, rank: int) -> "Desk":
+        return Desk(self, rank)
+
+
+class Desk(SerialComm):
+    def __init__(self, box: Postbox, rank: int) -> None:
+        self.box, self.rank = box, rank
+
+    def exchange(self, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: int) -> "Round":
+        return Round(self, sends, receives, tag)
+
+
+class Round:
+    def __init__(self, desk: Desk, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: int) -> None:
+        self.desk, self.sends, self.receives, self.tag = desk, sends, receives, tag
+
+    def begin(self) -> None:
+        for target, buffer in self.sends:
+            self.desk.box.letters[self.desk.rank, target, self.tag] = buffer.copy()
+
+    def finish(self) -> None:
+        for source, buffer in self.receives:
+            buffer[:] = self.desk.box.letters.pop((source, self.desk.rank, self.tag))
+
+    def free(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize("ranks", RANKS)
+def test_shared_sums_are_those_of_one_rank(ranks: int) -> None:
+    """Random integers of each tet at its nodes: with the neighbours' added, every holder has the whole's sum."""
+    whole, pieces = cut(ranks)
+    words = np.random.default_rng(7).integers(-(2**52), 2**52, (len(whole.tets), 4, 3))
+    total = np.zeros((len(whole.points), 3), np.int64)
+    np.add.at(total, whole.tets, words)
+    box, sums, shared = Postbox(), [], []
+    for rank, piece in enumerate(pieces):
+        own = np.zeros((len(piece.node_ids), 3), np.int64)
+        sums.append(own)
+        shared.append(SharedSum(box.of(rank), piece.neighbours, own, 1))
+    for _ in range(2):
+        for piece, own, exchange in zip(pieces, sums, shared, strict=True):
+            own[:] = 0
+            np.add.at(own, piece.tets, words[piece.tet_ids])
+            exchange.begin()
+        for exchange in shared:
+            exchange.finish()
+        for piece, own in zip(pieces, sums, strict=True):
+            assert (own == total[piece.node_ids]).all()
+    assert not box.letters
+    assert shared[0].bytes_sent == 24 * sum(len(n.nodes) for n in pieces[0].neighbours)
+
+
+def test_tets_without_common_nodes_need_no_neighbours() -> None:
+    heap = free_tets(40, 8)
+    for piece in domain.cut(whole_of(TetMesh(heap.points, heap.tets)), 4):
+        assert not piece.neighbours
+        assert piece.owned.all()
+        assert not piece.border.any()

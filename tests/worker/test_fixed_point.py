@@ -1,0 +1,106 @@
+"""Sums that do not depend on their order, and the quantum of the forces: chosen, outgrown, repeated."""
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from conoid.worker.parallel.comm import SerialComm
+from conoid.worker.parallel.fixed_point import CONTRIBUTION_BITS, HEADROOM_BITS, exact_sums, outgrown, scale_for
+from conoid.worker.simulation import Simulation
+from conoid.worker.state import WORK
+
+from .kernels import COPPER, FORMS, Form, build, run, scene
+from .meshes import Floats, block
+
+
+def values(n: int, seed: int) -> Floats:
+    """Columns of one size, of sizes over 30 decades, of numbers that almost cancel, of zeros."""
+    random = np.random.default_rng(seed)
+    even = random.normal(size=n)
+    mixed = random.normal(size=n) * 10.0 ** random.uniform(-20.0, 10.0, n)
+    half = random.normal(size=n // 2) * 1e6
+    cancel = np.concatenate([half, -half * (1.0 + 1e-12)])
+    return np.column_stack([even, mixed, cancel, np.zeros(n)])
+
+
+def test_sums_are_within_the_stated_error() -> None:
+    columns = values(10_000, 1)
+    found = exact_sums(SerialComm(), columns)
+    for j in range(4):
+        exact = sum(map(Fraction, columns[:, j].tolist()), Fraction(0))
+        quantum = math.ldexp(1.0, math.frexp(np.abs(columns[:, j]).max())[1] - 60)
+        assert abs(Fraction(float(found[j])) - exact) <= 10_000 * Fraction(quantum) + Fraction(abs(float(found[j])) * 2.0**-53)
+
+
+def test_sums_do_not_depend_on_the_order() -> None:
+    columns = values(5000, 2)
+    first = exact_sums(SerialComm(), columns)
+    for seed in range(5):
+        shuffled = columns[np.random.default_rng(seed).permutation(5000)]
+        assert exact_sums(SerialComm(), shuffled).tobytes() == first.tobytes()
+
+
+def test_plain_sums_do_depend_on_it() -> None:
+    """The control: without the limbs the same shuffles give other bits."""
+    columns = values(5000, 2)
+    sums = {columns[np.random.default_rng(seed).permutation(5000), 1].cumsum()[-1] for seed in range(5)}
+    assert len(sums) > 1
+
+
+def test_sums_of_nothing_and_of_one() -> None:
+    assert exact_sums(SerialComm(), np.zeros((0, 2))).tolist() == [0.0, 0.0]
+    assert exact_sums(SerialComm(), np.array([[-3.25, 1e-200]])).tolist() == [-3.25, 1e-200]
+
+
+@pytest.mark.parametrize("largest", [1e-9, 0.75, 1.0, 3.0, 1e5, 2.0**40, 1e300])
+def test_scale_leaves_the_stated_headroom(largest: float) -> None:
+    """A power of two; the largest contribution uses all bits but the headroom, and may grow 64-fold."""
+    scale = scale_for(largest)
+    assert math.frexp(scale)[0] == 0.5
+    bits = CONTRIBUTION_BITS - HEADROOM_BITS
+    assert 2.0 ** (bits - 1) <= largest * scale <= 2.0**bits
+    assert not outgrown(largest * 63.0, scale)
+    assert outgrown(largest * 129.0, scale)
+    assert outgrown(math.nan, scale)
+    assert outgrown(math.inf, scale)
+
+
+def collision(form: Form, floor: float) -> tuple[Simulation, int]:
+    """A copper cube that flies free, without stress, and then hits a wall; and how many sums were repeated.
+
+    ``floor`` is the force, N, up to which no quantum is refined.
+    """
+    wall = {"kind": "wall", "point": (0.0, 0.0, -1e-4), "normal": (0.0, 0.0, 1.0)}
+    case = scene(COPPER, form, end=1.5e-6, velocity=(0.0, 0.0, -200.0), boundaries=(wall,))
+    sim = build(case, [block((3, 3, 3), 1e-3, seed=4)])
+    sim.floor = max(sim.floor, floor)
+    repeats: list[float] = []
+    again = sim.elements.again
+
+    def counted(scale: float) -> None:
+        repeats.append(scale)
+        again(scale)
+
+    def look(sim: Simulation, before: Floats) -> None:
+        assert (sim.model.nodes.force.sum(axis=0) == 0).all()
+
+    sim.elements.again = counted  # type: ignore[method-assign]
+    run(sim, look)
+    return sim, len(repeats)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_sum_that_outgrows_its_quantum_is_repeated(form: Form) -> None:
+    """The impact multiplies the forces far beyond 64: the repeated sums give what a coarse quantum gives from the start."""
+    fine, repeats = collision(form, 0.0)
+    coarse, none = collision(form, 1e4)
+    assert 1 <= repeats <= 4
+    assert none == 0
+    assert fine.clock.step == coarse.clock.step
+    assert np.abs(fine.model.nodes.x - coarse.model.nodes.x).max() < 1e-12
+    assert np.abs(fine.model.nodes.v - coarse.model.nodes.v).max() < 1e-6
+    work = [sim.model.blocks[0].row(WORK).sum() for sim in (fine, coarse)]
+    assert math.isclose(work[0], work[1], rel_tol=1e-9)
+    assert fine.ledger.close(fine.model.nodes.v).residual < 0.02

@@ -1,0 +1,86 @@
+"""Work of the stress and the return with linear hardening, against the formulas."""
+
+import numpy as np
+
+from conoid.worker.state import PLASTIC_STRAIN, WORK, WORK_PLASTIC, YIELD
+
+from . import formulas
+from .kernels import COPPER, STEEL, Patch, drive
+from .meshes import Floats, free_tets
+
+SHEAR = 117e9 / 2.7
+YOUNG_STEEL_SHEAR = 200e9 / 2.6
+HARDENING, YIELD_0 = 0.1e9, 0.4e9
+N = 500
+DT = 1e-7
+
+
+def strained(seed: int, rate: float) -> tuple[Patch, Floats]:
+    """Copper tets with random stress inside the yield surface and a random volume-keeping velocity gradient."""
+    patch = Patch(free_tets(N, seed), COPPER)
+    random = np.random.default_rng(seed)
+    L = random.normal(size=(N, 3, 3)) * rate
+    L -= np.trace(L, axis1=1, axis2=2)[:, None, None] / 3.0 * np.eye(3)
+    patch.strain(L, DT)
+    s = formulas.deviator(random.normal(size=(N, 3, 3)))
+    patch.deviator = s / formulas.mises(s)[:, None, None] * random.uniform(0.0, YIELD_0, N)[:, None, None]
+    return patch, L
+
+
+def test_elastic_work_is_trapezoidal() -> None:
+    patch, L = strained(1, 2e3)
+    elastic = Patch(free_tets(N, 1), STEEL)
+    elastic.nodes.x[:], elastic.nodes.v[:], elastic.deviator = patch.nodes.x, patch.nodes.v, patch.deviator
+    start = formulas.rotated(patch.deviator, L, DT)
+    volume, _ = formulas.gradients(elastic.corners() - 0.5 * DT * elastic.corners(elastic.nodes.v))
+    elastic.advance(DT)
+    end = start + 2.0 * YOUNG_STEEL_SHEAR * DT * formulas.deviator(L)
+    work = 0.5 * DT * volume * (formulas.power(start, L) + formulas.power(end, L))
+    scale = DT * volume * formulas.mises(end) * np.sqrt((L * L).sum(axis=(1, 2)))
+    assert np.abs((elastic.get(WORK) - work) / scale).max() < 1e-13
+
+
+def test_linear_hardening_return() -> None:
+    """The increment (q - Y) / (3 G + H), the stress scaled back to the new yield stress, the work booked."""
+    patch, L = strained(2, 2e4)
+    old, start = patch.deviator, np.random.default_rng(3).uniform(0.0, 2.0, N)
+    patch.put(PLASTIC_STRAIN, start)
+    patch.put(YIELD, YIELD_0 + HARDENING * start)
+    volume, _ = formulas.gradients(patch.corners() - 0.5 * DT * patch.corners(patch.nodes.v))
+    patch.advance(DT)
+    turned = formulas.rotated(old, L, DT)
+    trial = turned + 2.0 * SHEAR * DT * formulas.deviator(L)
+    q = formulas.mises(trial)
+    increment = np.maximum(q - YIELD_0 - HARDENING * start, 0.0) / (3.0 * SHEAR + HARDENING)
+    assert 50 < (increment > 0.0).sum() < N - 50
+    flow = YIELD_0 + HARDENING * (start + increment)
+    stress = trial * np.where(increment > 0.0, flow / q, 1.0)[:, None, None]
+    assert np.abs(patch.get(PLASTIC_STRAIN) - start - increment).max() < 1e-15 * 8
+    assert np.abs(patch.get(YIELD) / flow - 1.0).max() < 1e-14
+    assert np.abs(patch.deviator - stress).max() < 1e-12 * np.abs(stress).max()
+    assert np.abs(patch.get(WORK_PLASTIC) - volume * flow * increment).max() < 1e-12 * (volume * flow * increment).max()
+    work = 0.5 * DT * volume * (formulas.power(turned, L) + formulas.power(stress, L))
+    assert np.abs(patch.get(WORK) - work).max() < 1e-12 * np.abs(work).max()
+
+
+def test_the_return_is_idempotent() -> None:
+    """A state on the yield surface that is not strained further does not flow."""
+    patch, _ = strained(4, 1e5)
+    patch.advance(DT)
+    flowed, stress = patch.get(PLASTIC_STRAIN), patch.deviator
+    patch.nodes.v[:] = 0.0
+    patch.advance(DT)
+    assert np.abs(patch.get(PLASTIC_STRAIN) - flowed).max() < 1e-15
+    assert np.abs(patch.deviator - stress).max() < 1e-12 * np.abs(stress).max()
+
+
+def test_work_is_elastic_energy_plus_plastic_work() -> None:
+    """Along a proportional path the whole work is s : s / 4 G V plus the plastic work, to second order in the step."""
+    L = np.diag([1.0, -0.5, -0.5]) * 1e3
+    missing = []
+    for steps in (100, 200):
+        point = drive(COPPER, L, 1e-4 / steps, steps)
+        volume = float(np.linalg.det(point.corners()[0, 1:] - point.corners()[0, 0])) / 6.0
+        elastic = float((point.deviator**2).sum()) / (4.0 * SHEAR) * volume
+        missing.append(abs(float(point.get(WORK)[0] - point.get(WORK_PLASTIC)[0]) - elastic) / elastic)
+    assert missing[1] < 0.6 * missing[0] < 0.05
