@@ -97,7 +97,7 @@ def _telling_field(case: Case) -> str:
 
 def _document(run: str, result: Result, info: RunInfo, drawn: Drawn | None) -> str:
     folder = result.folder.path("case.resolved.json").parent
-    document = {"run": run, "folder": str(folder), "state": info.state, "outcome": info.outcome, "picture": drawn}
+    document = {"run": run, "folder": str(folder), "state": info.state, "outcome": info.outcome_json, "picture": drawn}
     return msgspec.json.format(msgspec.json.encode(document), indent=2).decode()
 
 

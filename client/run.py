@@ -13,7 +13,7 @@ from urllib.parse import quote
 
 import msgspec
 
-from conoid.cases import keys
+from conoid.cases import keys, outcome
 from conoid.cases.messages import AnyMessage, Progress
 from conoid.cases.outcome import Outcome
 from conoid.cases.run import State
@@ -49,7 +49,17 @@ class RunInfo(msgspec.Struct, kw_only=True, frozen=True):
     """This and what follows is told of one run, not in a list."""
     estimate: dict[str, Any] = {}
     progress: Progress | None = None
-    outcome: Outcome | None = None
+    outcome_json: msgspec.Raw = msgspec.field(name="outcome", default=msgspec.Raw(b"null"))
+
+    @property
+    def outcome(self) -> Outcome | None:
+        """How it ended; None before its end. Raises ClientError when this client cannot read it."""
+        if bytes(self.outcome_json) == b"null":
+            return None
+        try:
+            return outcome.from_json(bytes(self.outcome_json))
+        except msgspec.MsgspecError as error:
+            raise ClientError(f"the outcome of run {self.id} cannot be read: {error}") from None
 
 
 class FileInfo(msgspec.Struct, kw_only=True, frozen=True):

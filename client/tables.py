@@ -99,6 +99,7 @@ def outcome_table(outcome: Outcome) -> Table:
             "took": f"{duration(outcome.elapsed)} on {ranks}, {duration(outcome.setup)} to the first step",
             "model": f"{count(outcome.elements)} tets, {count(outcome.nodes)} nodes",
             "speed": f"{si(outcome.element_updates_per_second, '')} element updates a CPU-second and core",
+            "memory": f"{si(max(outcome.peak_memory), 'B')} in the largest rank" if outcome.peak_memory else "",
             "energy": "" if energy is None else f"residual {energy.residual:.1e}, worst {outcome.worst_residual:.1e}",
             "digest": outcome.digest[:16],
         }

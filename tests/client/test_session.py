@@ -1,6 +1,7 @@
 """Requests and refusals, with answers made up by a transport in this process."""
 
 import json
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -113,6 +114,15 @@ def test_lists_are_read_page_by_page() -> None:
         return httpx2.Response(200, json={"runs": [{**RECEIPT, "id": page[0]}], "next": page[1]})
 
     assert [run.id for run in served(answer).runs(["queued", "running"])] == ["r1", "r2"]
+
+
+def test_an_outcome_is_read_also_where_a_number_is_none() -> None:
+    check = {"name": "contact_time", "value": None, "expected": 1.0, "tolerance": 0.1, "pass": False}
+    ended = {**RECEIPT, "state": "failed", "outcome": {"state": "failed", "reference": [check]}}
+    outcome = served(lambda _: httpx2.Response(200, json=ended)).run("r1").status().outcome
+    assert outcome is not None
+    assert math.isnan(outcome.reference[0].value)
+    assert served(lambda _: httpx2.Response(200, json=RECEIPT)).run("r1").status().outcome is None
 
 
 def test_a_download_that_arrives_damaged_is_not_kept(tmp_path: Path) -> None:
