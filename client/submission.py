@@ -16,10 +16,10 @@ _SUFFIXES = {".toml": "application/toml", ".json": "application/json"}
 def locate(source: str | Path) -> Path:
     """The file that is meant: a path, or the name of a shipped case. Raises CaseError."""
     path = Path(source)
-    if path.suffix in _SUFFIXES or path.exists():
-        return path
     if str(source) in shipped():
         return shipped_path(str(source))
+    if path.suffix in _SUFFIXES or path.exists():
+        return path
     hint = nearest(str(source), shipped())
     raise CaseError([Problem("case", shown(str(source)), f"neither a .toml or .json file nor a shipped case; {hint}")])
 

@@ -147,7 +147,8 @@ def test_a_file_is_sent_as_it_is_written(tmp_path: Path) -> None:
     assert body_of(path) == ("application/toml", b"# a comment\nname = 'bar'\n")
 
 
-def test_a_shipped_case_is_named_and_overridden() -> None:
+def test_a_shipped_case_is_named_and_overridden(quiet_home: Path) -> None:
+    (quiet_home / "demo").mkdir()
     kind, body = body_of("demo", ["run.ranks=1", "run.end_time=5 us"])
     assert kind == "application/json"
     assert json.loads(body)["run"]["ranks"] == 1
