@@ -28,10 +28,10 @@ class Boundary:
         self.last_push = 0.0
         """Last time at which the boundary pushed, s."""
 
-    def start(self, model: Nodes) -> None:
+    def start(self, state: Nodes) -> None:
         """Makes the initial velocities agree with the boundary."""
 
-    def apply(self, model: Nodes, quantum: float, dt: float, t: float) -> None:
+    def apply(self, state: Nodes, quantum: float, dt: float, t: float) -> None:
         """Corrects v(n+1/2) at time ``t``.
 
         ``quantum`` is the impulse of one force quantum over the mean step, N s; ``dt`` the step ahead, s.
@@ -46,11 +46,11 @@ class SymmetryPlane(Boundary):
         super().__init__(nodes)
         self._axis = axis
 
-    def start(self, model: Nodes) -> None:
-        _hold(model.v, self.nodes, self._axis)
+    def start(self, state: Nodes) -> None:
+        _hold(state.v, self.nodes, self._axis)
 
-    def apply(self, model: Nodes, quantum: float, dt: float, t: float) -> None:
-        _hold(model.v, self.nodes, self._axis)
+    def apply(self, state: Nodes, quantum: float, dt: float, t: float) -> None:
+        _hold(state.v, self.nodes, self._axis)
 
 
 class RigidWall(Boundary):
@@ -61,12 +61,12 @@ class RigidWall(Boundary):
         self._point = point
         self._normal = normal / np.linalg.norm(normal)
 
-    def apply(self, model: Nodes, quantum: float, dt: float, t: float) -> None:
+    def apply(self, state: Nodes, quantum: float, dt: float, t: float) -> None:
         if dt > 0.0 and _push_out(
-            model.x,
-            model.v,
-            model.force,
-            model.mass,
+            state.x,
+            state.v,
+            state.force,
+            state.mass,
             self.nodes,
             self._point,
             self._normal,
@@ -85,21 +85,21 @@ class PrescribedVelocity(Boundary):
         self._velocity = np.broadcast_to(velocity, (len(nodes), 3))
         self._pending = np.zeros(len(nodes))
 
-    def _target(self, model: Nodes, dt: float) -> Floats:
-        free = model.v[self.nodes]
+    def _target(self, state: Nodes, dt: float) -> Floats:
+        free = state.v[self.nodes]
         return np.where(np.isnan(self._velocity), free, self._velocity)
 
-    def start(self, model: Nodes) -> None:
-        model.v[self.nodes] = self._target(model, 0.0)
+    def start(self, state: Nodes) -> None:
+        state.v[self.nodes] = self._target(state, 0.0)
 
-    def apply(self, model: Nodes, quantum: float, dt: float, t: float) -> None:
-        free, mass = model.v[self.nodes], model.mass[self.nodes, None]
-        before = free - model.force[self.nodes] * (quantum / mass)
-        new = self._target(model, dt)
+    def apply(self, state: Nodes, quantum: float, dt: float, t: float) -> None:
+        free, mass = state.v[self.nodes], state.mass[self.nodes, None]
+        before = free - state.force[self.nodes] * (quantum / mass)
+        new = self._target(state, dt)
         impulse = mass * (new - free)
         self.external_work += self._pending + 0.5 * (impulse * before).sum(axis=1)
         self._pending = 0.5 * (impulse * new).sum(axis=1)
-        model.v[self.nodes] = new
+        state.v[self.nodes] = new
 
 
 class PrescribedRotation(PrescribedVelocity):
@@ -110,8 +110,8 @@ class PrescribedRotation(PrescribedVelocity):
         self._centre = centre
         self._rate = rate
 
-    def _target(self, model: Nodes, dt: float) -> Floats:
-        r = model.x[self.nodes] - self._centre
+    def _target(self, state: Nodes, dt: float) -> Floats:
+        r = state.x[self.nodes] - self._centre
         speed = float(np.linalg.norm(self._rate))
         if dt == 0.0 or speed == 0.0:
             return np.cross(self._rate, r)
