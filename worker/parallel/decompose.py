@@ -24,6 +24,6 @@ def _bisect(points: Floats, weights: Floats, chosen: "np.ndarray", first: int, p
     order = chosen[np.argsort(points[chosen, axis], kind="stable")]
     left = parts // 2
     sums = np.cumsum(weights[order])
-    cut = int(np.searchsorted(sums, sums[-1] * left / parts)) if len(order) else 0
+    cut = int(np.searchsorted(sums, sums[-1] * left / parts, side="right")) if len(order) else 0
     _bisect(points, weights, order[:cut], first, left, owner)
     _bisect(points, weights, order[cut:], first + left, parts - left, owner)
