@@ -1,8 +1,8 @@
 """Reads the mesh of an Abaqus input file: *NODE, *ELEMENT (C3D4), *ELSET, parts and instances.
 
-A reader of its own, because gmsh writes .inp but does not read it, and meshio ends the process on an element type that it
-does not know, does not place instances and cannot say which line is wrong. The file is only text here: nothing in it makes
-this reader open another file. Everything that is not mesh (materials, steps, node sets) is passed over.
+A reader of its own, because gmsh writes .inp but does not read it, and meshio ends the process on an element type that
+it does not know, does not place instances and cannot say which line is wrong. The file is only text here: nothing in it
+makes this reader open another file. Everything that is not mesh (materials, steps, node sets) is passed over.
 """
 
 from array import array
