@@ -30,7 +30,13 @@ class ServeError(StartError):
 def serve(settings: Settings) -> None:
     """Runs the server until SIGTERM or SIGINT. Raises ServeError, and what ``opened`` raises."""
     settings.runs.mkdir(parents=True, exist_ok=True)
-    with _only_one(settings.runs), _listening(settings) as listener, opened(settings) as service:
+    with _only_one(settings.runs), _listening(settings) as listener:
+        (settings.runs / ADDRESS_FILE).unlink(missing_ok=True)
+        _answer(settings, listener)
+
+
+def _answer(settings: Settings, listener: socket.socket) -> None:
+    with opened(settings) as service:
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, _leave)
         try:

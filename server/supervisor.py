@@ -6,9 +6,8 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import msgspec
 from sqlalchemy.exc import SQLAlchemyError
@@ -17,7 +16,7 @@ from conoid.cases import layout
 from conoid.cases.messages import Progress, Status
 from conoid.cases.run import State
 
-from . import folder, journal
+from . import folder, journal, recovery
 from .launch import Job, Launcher, LaunchError, Worker
 from .lifecycle import (
     Action,
@@ -25,7 +24,6 @@ from .lifecycle import (
     Adopt,
     CancelAsked,
     Event,
-    Found,
     Granted,
     Journal,
     Kill,
@@ -86,6 +84,7 @@ class Supervisor:
 
     def start(self) -> None:
         """Takes up what an earlier server left, then begins to work. Raises OSError, SQLAlchemyError."""
+        self._launcher.tidy()
         self._take_up()
         self._thread.start()
 
@@ -156,15 +155,22 @@ class Supervisor:
 
     def _work(self) -> None:
         while not self._leaving:
-            self._answer()
-            for run_id in tuple(self._watches):
-                self._attend(run_id)
-            for run in self._in_state(State.ACCEPTED):
-                if not self._held(run.id):
-                    self._apply(run.id, Admitted())
-            self._grant()
-            if time.monotonic() - self._tidied > _TIDY:
-                self._tidy()
+            try:
+                self._turn()
+            except Exception:
+                _log.exception("the supervisor goes on in %g s", _AGAIN)
+                time.sleep(_AGAIN)
+
+    def _turn(self) -> None:
+        self._answer()
+        for run_id in tuple(self._watches):
+            self._attend(run_id)
+        for run in self._in_state(State.ACCEPTED):
+            if not self._held(run.id):
+                self._apply(run.id, Admitted())
+        self._grant()
+        if time.monotonic() - self._tidied > _TIDY:
+            self._tidy()
 
     def _answer(self) -> None:
         """Takes what was asked; waits for it no longer than until the next look."""
@@ -321,17 +327,11 @@ class Supervisor:
             self._left.add(path)
 
     def _resume(self, path: Path) -> Exception | None:
-        run, before = folder.run(path), self._store.get(path.name)
-        if before is not None and before.stopping_for is not None and run.state in {State.STARTING, State.RUNNING}:
-            run = replace(run, state=State.STOPPING, stopping_for=before.stopping_for)
-        self._store.add(run, folder.submission(path).idempotency_key)
-        if run.state.final:
+        left = recovery.look(path, self._store.get(path.name), self._launcher)
+        self._store.add(left.run, left.key)
+        if left.run.state.final:
             return None
-        trace = self._launcher.find(run.id, path)
-        if trace.worker is not None:
-            self._found[run.id] = trace.worker
-        worker: Literal["none", "alive", "gone"] = (
-            "alive" if trace.worker is not None else "gone" if trace.launched else "none"
-        )
-        self._open[run.id] = run
-        return self._apply(run.id, Found(worker, folder.outcome(path), trace.rebooted))
+        if left.worker is not None:
+            self._found[left.run.id] = left.worker
+        self._open[left.run.id] = left.run
+        return self._apply(left.run.id, left.found)

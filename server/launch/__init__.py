@@ -70,3 +70,6 @@ class Launcher(Protocol):
 
     def find(self, run: str, folder: Path) -> Trace:
         """The worker that an earlier server started for the run."""
+
+    def tidy(self) -> None:
+        """Removes what killed workers may have left behind outside of their folders."""

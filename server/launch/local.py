@@ -22,6 +22,7 @@ _NOT_FOR_WORKERS = ("CONOID_DATABASE", "CONOID_TOKEN")
 _CROWDED = 4
 """Ranks a core from which MPICH's waiting ranks had better sleep than spin."""
 _LAST_WORDS, _LOG_TAIL = 300, 1 << 14
+_HOUR = 3600.0
 
 
 class LocalLauncher:
@@ -63,6 +64,11 @@ class LocalLauncher:
         worker = LocalWorker(run, folder, process)
         rebooted = process.boot != processes.boot()
         return Trace(worker if not rebooted and worker.alive() else None, True, rebooted)
+
+    def tidy(self) -> None:
+        """MPICH's ranks share memory through files that a kill leaves behind, 2 MB each time."""
+        for path in processes.unused_shared_memory(Path("/dev/shm"), "mpich_shm_", _HOUR):
+            path.unlink(missing_ok=True)
 
 
 def find_mpiexec(chosen: str) -> tuple[str, ...]:

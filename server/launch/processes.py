@@ -2,6 +2,7 @@
 
 import os
 import signal
+import time
 from contextlib import suppress
 from pathlib import Path
 
@@ -73,3 +74,19 @@ def end_run(run: str) -> int:
         with suppress(ProcessLookupError):
             os.kill(pid, signal.SIGKILL)
     return len(members)
+
+
+def unused_shared_memory(folder: Path, prefix: str, age: float) -> list[Path]:
+    """The files of this user in ``folder``, older than ``age`` s, that no process has mapped into its memory."""
+    old = time.time() - age
+    found = {}
+    for path in folder.glob(f"{prefix}*"):
+        with suppress(OSError):
+            status = path.lstat()
+            if status.st_uid == os.getuid() and status.st_mtime < old:
+                found[str(path)] = path
+    for maps in _PROC.glob("[0-9]*/maps") if found else ():
+        with suppress(OSError):
+            for line in maps.read_text().splitlines():
+                found.pop(line.partition("/")[1] + line.partition("/")[2], None)
+    return sorted(found.values())

@@ -1,5 +1,6 @@
 """The server's command line: one clear line for what cannot be, tokens, one server a folder."""
 
+import mmap
 import os
 import signal
 import socket
@@ -172,3 +173,13 @@ def test_all_processes_of_a_run_are_known_and_ended() -> None:
     assert leader.wait(10) == -signal.SIGKILL
     assert processes.start_time(leader.pid) is None
     assert processes.start_time(os.getpid()) is not None
+
+
+def test_shared_memory_that_nobody_uses_is_found(tmp_path: Path) -> None:
+    for name in ("mpich_shm_old", "mpich_shm_new", "mpich_shm_used", "other_old"):
+        (tmp_path / name).write_bytes(b"x" * 4096)
+        if not name.endswith("new"):
+            os.utime(tmp_path / name, (1.0, 1.0))
+    with (tmp_path / "mpich_shm_used").open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ):
+        found = processes.unused_shared_memory(tmp_path, "mpich_shm_", 60.0)
+    assert found == [tmp_path / "mpich_shm_old"]

@@ -41,16 +41,16 @@ def refusal(answer: Any, status: int, code: str) -> dict[str, Any]:
 # Who asks -------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("method", "path"), ROUTES)
 @pytest.mark.parametrize("token", [None, "", "Bearer", "Bearer x", "Bearer conoid_0000000000_x", "Basic YTpi"])
-def test_every_route_needs_a_token(server: Running, method: str, path: str, token: str | None) -> None:
-    place = path.replace("{run_id}", "x").replace("{path:path}", "case.toml").replace("{rank}", "0")
+def test_every_route_needs_a_token(server: Running, token: str | None) -> None:
     headers = {} if token is None else {"Authorization": token}
-    answer = server.nobody.http.request(method, place.replace("{name}", "demo"), headers=headers)
-    assert answer.status_code == 401
-    assert answer.headers["www-authenticate"] == "Bearer"
-    if method != "HEAD":
-        refusal(answer, 401, "unauthorized")
+    for method, path in ROUTES:
+        place = path.replace("{run_id}", "x").replace("{path:path}", "case.toml").replace("{rank}", "0")
+        answer = server.nobody.http.request(method, place.replace("{name}", "demo"), headers=headers)
+        assert answer.status_code == 401, f"{method} {path}"
+        assert answer.headers["www-authenticate"] == "Bearer"
+        if method != "HEAD":
+            refusal(answer, 401, "unauthorized")
 
 
 def test_the_list_of_routes_is_the_one_that_is_served(server: Running) -> None:
