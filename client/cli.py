@@ -162,6 +162,7 @@ def show_run(run: RunArgument, url: Url = None, token: Token = None, as_json: Js
         show("")
         show(tables.outcome_table(info.outcome))
         if info.outcome.reference:
+            show("")
             show(tables.checks_table(info.outcome.reference))
 
 

@@ -1,5 +1,6 @@
 """A run in the terminal: a panel that is drawn again and again, or one line an update where there is no terminal."""
 
+import time
 from itertools import pairwise
 
 from rich.console import Group, RenderableType
@@ -48,7 +49,8 @@ def panel(live: Live, log_lines: int = 6) -> RenderableType:
 
 def _state(live: Live) -> Text:
     text = Text(live.state.value, style=STATE_STYLE.get(live.state, "bold"))
-    told = " · ".join(_told(live))
+    waiting = live.progress is None and not live.state.final and live.changed
+    told = " · ".join([*_told(live), *([duration(time.time() - live.changed)] if waiting else [])])
     return text.append(f"  {told}", style="default") if told else text
 
 

@@ -25,6 +25,8 @@ class Live:
     seq: int = 0
     wall: float = 0.0
     """Unix time of the last message, s."""
+    changed: float = 0.0
+    """Unix time of the last change of state, s."""
     began: float | None = None
     """Unix time at which the worker began to run, s."""
     started: Started | None = None
@@ -62,7 +64,7 @@ class Live:
 
     def _status(self, message: Status) -> None:
         self.state = State(message.state)
-        self.cause, self.message = message.cause, message.message
+        self.cause, self.message, self.changed = message.cause, message.message, message.wall
         if self.state is State.RUNNING and self.began is None:
             self.began = message.wall
 

@@ -85,7 +85,9 @@ def _report(result: Result, outcome: Outcome, out: Console) -> None:
     out.print()
     out.print(tables.outcome_table(outcome))
     if outcome.reference:
+        out.print()
         out.print(tables.checks_table(outcome.reference))
+    out.print()
     out.print(f"results    {result.folder.path('outcome.json').parent}", soft_wrap=True)
 
 

@@ -59,6 +59,12 @@ def test_exit_codes(state: State, cause: str | None, code: int) -> None:
     assert exit_code(state, cause) == code
 
 
+def test_a_run_that_has_not_begun_says_how_long_it_waits(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("conoid.client.display.time.time", lambda: stories.START + 3 + 42)
+    assert "starting  42 s" in rendered(told(3))
+    assert "running  42 s" not in rendered(told(6))
+
+
 def rendered(live: Live, width: int = 100) -> str:
     out = Console(file=io.StringIO(), width=width, force_terminal=False)
     out.print(display.panel(live))
