@@ -7,6 +7,7 @@ import numpy as np
 
 from conoid.cases import layout
 from conoid.cases.outcome import Check
+from conoid.cases.quantities import unit_of
 from conoid.cases.schema import Reference
 
 from .parallel.comm import Comm
@@ -21,20 +22,15 @@ _STRESSES = ("stress_xx", "stress_yy", "stress_zz", "stress_yz", "stress_zx", "s
 
 def measure(sim: Simulation, folder: Path) -> list[Check]:
     """Every reference of the case, measured; all ranks take part, all get the same answer."""
-    checks = []
-    for spec in sim.case.reference:
-        value = _measured(sim, spec, folder)
-        checks.append(
-            Check(
-                name=_name(spec),
-                value=value,
-                expected=spec.value,
-                tolerance=spec.tolerance,
-                passed=bool(abs(value - spec.value) <= spec.tolerance),
-                source=spec.source,
-            )
-        )
-    return checks
+    fields = {probe.name: probe.field for probe in sim.case.probes}
+    return [_check(spec, _measured(sim, spec, folder), fields.get(spec.probe or "")) for spec in sim.case.reference]
+
+
+def _check(spec: Reference, value: float, field_name: str | None) -> Check:
+    return Check(
+        name=_name(spec), value=value, expected=spec.value, tolerance=spec.tolerance,
+        passed=abs(value - spec.value) <= spec.tolerance, unit=unit_of(spec.quantity, field_name), source=spec.source,
+    )  # fmt: skip
 
 
 def _name(spec: Reference) -> str:
