@@ -1,4 +1,4 @@
-"""Points numba to the worker's kernel cache before anything imports it: the kernels are compiled once, not once a run."""
+"""Points numba to the worker's kernel cache before anything imports it: compiled once, not once a run."""
 
 from conoid.worker.kernels import use_cache
 

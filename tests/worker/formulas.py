@@ -1,4 +1,4 @@
-"""The kernels once more, in numpy that reads as the formulas. Tensors are (n, 3, 3), compression has positive pressure."""
+"""The kernels once more, in numpy that reads as the formulas. Tensors are (n, 3, 3), pressure is minus the mean."""
 
 import numpy as np
 import numpy.typing as npt
@@ -11,12 +11,12 @@ def gradients(corners: Floats) -> tuple[Floats, Floats]:
     """Volumes (n,) and shape-function gradients (n, 4, 3) of tets with the nodes ``corners`` (n, 4, 3)."""
     jacobian = corners[:, 1:] - corners[:, :1]
     inner = np.linalg.inv(jacobian).transpose(0, 2, 1)
-    return np.linalg.det(jacobian) / 6.0, np.concatenate([-inner.sum(axis=1, keepdims=True), inner], axis=1)
+    return np.asarray(np.linalg.det(jacobian) / 6.0), np.concatenate([-inner.sum(axis=1, keepdims=True), inner], axis=1)
 
 
 def velocity_gradient(velocities: Floats, grad: Floats) -> Floats:
     """L_ij = sum_a v_ai dN_a/dx_j from nodal velocities (n, 4, 3)."""
-    return np.einsum("nai,naj->nij", velocities, grad)
+    return np.asarray(np.einsum("nai,naj->nij", velocities, grad))
 
 
 def deviator(a: Floats) -> Floats:
@@ -27,7 +27,7 @@ def deviator(a: Floats) -> Floats:
 
 def cayley(spin: Floats, dt: float) -> Floats:
     """(I - W dt/2)^-1 (I + W dt/2)."""
-    return np.linalg.solve(IDENTITY - 0.5 * dt * spin, IDENTITY + 0.5 * dt * spin)
+    return np.asarray(np.linalg.solve(IDENTITY - 0.5 * dt * spin, IDENTITY + 0.5 * dt * spin), np.float64)
 
 
 def rotated(s: Floats, L: Floats, dt: float) -> Floats:
@@ -48,7 +48,7 @@ def power(s: Floats, L: Floats) -> Floats:
 
 def forces(volume: Floats, stress: Floats, grad: Floats) -> Floats:
     """Forces on the four nodes, -V stress . grad N_a, (n, 4, 3)."""
-    return -volume[:, None, None] * np.einsum("nij,naj->nai", stress, grad)
+    return np.asarray(-volume[:, None, None] * np.einsum("nij,naj->nai", stress, grad))
 
 
 def at_nodes(tets: npt.NDArray[np.integer], values: Floats, nodes: int) -> Floats:
@@ -72,4 +72,4 @@ def stiffness(volume: float, grad: Floats, bulk: float, shear: float) -> Floats:
     strains = 0.5 * (strains + strains.transpose(0, 2, 1))
     trace = np.trace(strains, axis1=1, axis2=2)
     parts = strains - trace[:, None, None] / 3.0 * IDENTITY
-    return volume * (bulk * np.outer(trace, trace) + 2.0 * shear * np.einsum("aij,bij->ab", parts, parts))
+    return np.asarray(volume * (bulk * np.outer(trace, trace) + 2.0 * shear * np.einsum("aij,bij->ab", parts, parts)))

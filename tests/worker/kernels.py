@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from conoid.cases import schema
-from conoid.worker import domain, simulation, step, state
+from conoid.worker import domain, simulation, state, step
 from conoid.worker.boundaries import Boundary
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.parallel import fixed_point
@@ -46,7 +46,7 @@ DUMMY = schema.Box(shape="box", low=(0.0, 0.0, 0.0), high=(1.0, 1.0, 1.0), eleme
 
 
 def scene(material: schema.Material = STEEL, form: Form = "standard", end: float = 1.0, **keys: Any) -> schema.Case:
-    """A case of one part ``body`` without viscosity; ``keys`` are those of the part, of ``numerics`` and of the case."""
+    """A case of one part ``body``, without viscosity; ``keys`` are those of the part, of ``numerics``, of the case."""
     of_part = {key: keys.pop(key) for key in ("velocity", "spin", "temperature") if key in keys}
     numerics = {key: keys.pop(key) for key in ("dt_safety", "dt_growth") if key in keys}
     viscosity = schema.Viscosity(**keys.pop("viscosity")) if "viscosity" in keys else None
@@ -92,18 +92,14 @@ class Patch:
 
     def advance(self, dt: float) -> None:
         """One pass: x(n+1) and v(n+1/2) stand in ``nodes``; stress and forces become those of n+1."""
-        scale = self.scale or self.sim.next_scale()
-        while True:
-            self.elements.advance(dt, scale)
+        self._used = self.scale or self.sim.next_scale()
+        self.elements.advance(dt, self._used)
+        self.elements.finish()
+        largest = fixed_point.float_of(int(self.elements.peaks[2]))
+        if fixed_point.outgrown(largest, self._used):
+            self._used = fixed_point.scale_for(largest)
+            self.elements.again(self._used)
             self.elements.finish()
-            largest = fixed_point.float_of(int(self.elements.peaks[2]))
-            self._used = scale
-            if not fixed_point.outgrown(largest, scale):
-                return
-            self._used = scale = fixed_point.scale_for(largest)
-            self.elements.again(scale)
-            self.elements.finish()
-            return
 
     def corners(self, values: Floats | None = None) -> Floats:
         """(n, 4, 3) nodal values (positions when absent) of the tets."""
@@ -188,7 +184,7 @@ def around(boundary: Boundary, look: Callable[[Floats, Floats], None]) -> None:
         apply(model, *rest)
         look(before, model.v)
 
-    boundary.apply = applied  # type: ignore[method-assign]
+    boundary.apply = applied  # type: ignore[assignment, method-assign]
 
 
 def run(sim: Simulation, watch: Watch | None = None, steps: int = -1) -> Simulation:

@@ -9,7 +9,9 @@ from conoid.worker.mesh.model import TetMesh
 
 Floats = npt.NDArray[np.float64]
 
-REGULAR = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, 0.75**0.5, 0.0], [0.5, 0.75**0.5 / 3.0, (2.0 / 3.0) ** 0.5]])
+REGULAR = np.array(
+    [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, 0.75**0.5, 0.0], [0.5, 0.75**0.5 / 3.0, (2.0 / 3.0) ** 0.5]]
+)
 """Nodes of the regular tet with edge 1."""
 
 
@@ -30,7 +32,10 @@ def block(cells: tuple[int, int, int], size: float = 1.0, shake: float = 0.2, se
 
 def _paths(strides: npt.NDArray[np.int64]) -> list[npt.NDArray[np.int64]]:
     """The six ways from a cube's near corner to its far one."""
-    return [np.array([0, strides[a], strides[a] + strides[b], strides.sum()]) for a, b, _ in itertools.permutations(range(3))]
+    return [
+        np.array([0, strides[a], strides[a] + strides[b], strides.sum()])
+        for a, b, _ in itertools.permutations(range(3))
+    ]
 
 
 def positive(points: Floats, tets: npt.NDArray[np.integer]) -> npt.NDArray[np.int32]:

@@ -1,4 +1,4 @@
-"""The cut of the mesh: every tet once, every shared node known to all who hold it and owned once; their sums complete."""
+"""The cut of the mesh: every tet once, every shared node known to all its holders and owned once; complete sums."""
 
 from itertools import product
 
@@ -62,7 +62,9 @@ def test_holders_of_a_node_know_each_other(ranks: int) -> None:
     for piece in pieces:
         assert (piece.mass == whole.mass[piece.node_ids]).all()
         assert (piece.points == whole.points[piece.node_ids]).all()
-        assert piece.totals[2] == sum((np.concatenate([p.node_ids for p in pieces]) == n).sum() > 1 for n in range(len(whole.points)))
+        assert piece.totals[2] == sum(
+            (np.concatenate([p.node_ids for p in pieces]) == n).sum() > 1 for n in range(len(whole.points))
+        )
 
 
 @pytest.mark.parametrize("ranks", RANKS)

@@ -1,6 +1,7 @@
 """Linear and Mie-Grueneisen pressure, the energy that goes with it, the speed of sound."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ N = 500
 DT = 1e-8
 
 
-def cold(ratio: Floats) -> Floats:
+def cold(ratio: Floats | float) -> Floats:
     """The part of the pressure that does not depend on the energy; ``ratio`` is V / V0."""
     chi = 1.0 - ratio
     hugoniot = DENSITY * GAS.c0**2 * chi / (1.0 - GAS.S * np.maximum(chi, 0.0)) ** 2
@@ -48,7 +49,7 @@ def test_linear_pressure_is_logarithmic() -> None:
         tet = free_tets(1, 3)
         patch = Patch(tet, STEEL)
         scales = np.linspace(1.0, 0.9, steps + 1)
-        for old, new in zip(scales[:-1], scales[1:], strict=True):
+        for old, new in pairwise(scales):
             patch.nodes.v[:] = tet.points * (new - old) / DT
             patch.nodes.x[:] = tet.points * new
             patch.advance(DT)
@@ -81,7 +82,7 @@ def test_the_law_gives_the_hugoniot(speed: float) -> None:
     """At the energy u_p^2 / 2 and the compression u_p / U_s the pressure is rho0 U_s u_p."""
     shock = GAS.c0 + GAS.S * speed
     ratio = 1.0 - speed / shock
-    pressure = cold(np.float64(ratio)) + GAS.gamma0 * DENSITY * 0.5 * speed**2
+    pressure = cold(ratio) + GAS.gamma0 * DENSITY * 0.5 * speed**2
     assert math.isclose(float(pressure), DENSITY * shock * speed, rel_tol=1e-12)
     tet = free_tets(1, 2)
     patch = Patch(tet, COPPER_GAS)
@@ -96,7 +97,7 @@ def test_an_adiabat_of_many_steps() -> None:
     from scipy.integrate import solve_ivp
 
     def heated(chi: float, energy: Floats) -> Floats:
-        return np.asarray((cold(np.float64(1.0 - chi)) + GAS.gamma0 * DENSITY * energy) / DENSITY)
+        return np.asarray((cold(1.0 - chi) + GAS.gamma0 * DENSITY * energy) / DENSITY)
 
     exact = solve_ivp(heated, (0.0, 0.2), [0.0], rtol=1e-12, atol=1e-3).y[0, -1]
     wrong = []
@@ -104,7 +105,7 @@ def test_an_adiabat_of_many_steps() -> None:
         tet = free_tets(1, 5)
         patch = Patch(tet, COPPER_GAS)
         scales = np.linspace(1.0, 0.8, steps + 1) ** (1.0 / 3.0)
-        for old, new in zip(scales[:-1], scales[1:], strict=True):
+        for old, new in pairwise(scales):
             patch.nodes.v[:] = tet.points * (new - old) / DT
             patch.nodes.x[:] = tet.points * new
             patch.advance(DT)

@@ -31,7 +31,9 @@ def test_sums_are_within_the_stated_error() -> None:
     for j in range(4):
         exact = sum(map(Fraction, columns[:, j].tolist()), Fraction(0))
         quantum = math.ldexp(1.0, math.frexp(np.abs(columns[:, j]).max())[1] - 60)
-        assert abs(Fraction(float(found[j])) - exact) <= 10_000 * Fraction(quantum) + Fraction(abs(float(found[j])) * 2.0**-53)
+        assert abs(Fraction(float(found[j])) - exact) <= 10_000 * Fraction(quantum) + Fraction(
+            abs(float(found[j])) * 2.0**-53
+        )
 
 
 def test_sums_do_not_depend_on_the_order() -> None:
@@ -93,7 +95,7 @@ def collision(form: Form, floor: float) -> tuple[Simulation, int]:
 
 @pytest.mark.parametrize("form", FORMS)
 def test_a_sum_that_outgrows_its_quantum_is_repeated(form: Form) -> None:
-    """The impact multiplies the forces far beyond 64: the repeated sums give what a coarse quantum gives from the start."""
+    """Forces grow far beyond 64-fold at the impact: repeated sums give what a coarse quantum gives from the start."""
     fine, repeats = collision(form, 0.0)
     coarse, none = collision(form, 1e4)
     assert 1 <= repeats <= 4

@@ -78,7 +78,7 @@ def test_rotation_changes_no_invariant(rate: float) -> None:
 def rotation(axis: Floats, angle: float) -> Floats:
     """Rodrigues: the rotation by ``angle`` about the unit vector ``axis``."""
     cross = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
-    return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+    return np.asarray(np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross)
 
 
 def test_forces_are_minus_volume_stress_gradient() -> None:
@@ -89,7 +89,9 @@ def test_forces_are_minus_volume_stress_gradient() -> None:
     volume, grad = formulas.gradients(patch.corners())
     expected = formulas.forces(volume, patch.stress, grad)
     found = patch.corners(patch.force)
-    assert (np.abs(found - expected).max(axis=(1, 2)) <= 1e-12 * np.abs(expected).max(axis=(1, 2)) + 3 * patch.quantum).all()
+    assert (
+        np.abs(found - expected).max(axis=(1, 2)) <= 1e-12 * np.abs(expected).max(axis=(1, 2)) + 3 * patch.quantum
+    ).all()
 
 
 def test_forces_add_to_zero_as_integers() -> None:

@@ -1,5 +1,7 @@
 """The averaged pressure forms: nodal averaging, and the stabilisation of the split form."""
 
+from itertools import pairwise
+
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -69,7 +71,9 @@ def test_work_is_that_of_the_nodal_forces(form: Form) -> None:
     pressure = patch.get(PRESSURE)
     expected = -0.5 * pressure * rate * DT * volume
     shear = patch.get(WORK) - expected
-    L = formulas.velocity_gradient(patch.corners(patch.nodes.v), formulas.gradients(patch.corners() - 0.5 * DT * patch.corners(patch.nodes.v))[1])
+    L = formulas.velocity_gradient(
+        patch.corners(patch.nodes.v), formulas.gradients(patch.corners() - 0.5 * DT * patch.corners(patch.nodes.v))[1]
+    )
     deviatoric = 0.5 * DT * volume * formulas.power(patch.deviator, L)
     assert np.abs(shear - deviatoric).max() < 1e-12 * np.abs(deviatoric).max()
 
@@ -116,7 +120,7 @@ def test_a_checkerboard_is_damped() -> None:
     for _ in range(12):
         energy.append(float((volume * patch.elements.pressure**2).sum()))
         patch.advance(dt)
-    assert all(new < old for old, new in zip(energy[:-1], energy[1:], strict=True))
+    assert all(new < old for old, new in pairwise(energy))
     assert energy[-1] < 0.6 * energy[0]
 
 

@@ -1,6 +1,7 @@
 """The stable step against exact frequencies of single tets, with and without bulk viscosity."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ def moduli(poisson: float) -> tuple[float, float]:
     return YOUNG / (3.0 * (1.0 - 2.0 * poisson)), YOUNG / (2.0 * (1.0 + poisson))
 
 
-def one(mesh: TetMesh, i: int, poisson: float, **keys: object) -> Patch:
+def one(mesh: TetMesh, i: int, poisson: float, **keys: Any) -> Patch:
     """Tet ``i`` of a heap alone: with it alone, the limit of a pass is its own."""
     points = mesh.points[mesh.tets[i]]
     metal = STEEL.model_copy(update={"elastic": STEEL.elastic.model_copy(update={"poisson": poisson})})
@@ -66,7 +67,9 @@ def test_bound_of_the_regular_tet() -> None:
 
 def test_length_factor_makes_the_length_of_a_regular_tet_its_cube_root() -> None:
     volume, grad = formulas.gradients(REGULAR[None])
-    assert math.isclose(LENGTH_FACTOR / formulas.inverse_length(grad)[0], float(volume[0]) ** (1.0 / 3.0), rel_tol=1e-15)
+    assert math.isclose(
+        LENGTH_FACTOR / formulas.inverse_length(grad)[0], float(volume[0]) ** (1.0 / 3.0), rel_tol=1e-15
+    )
 
 
 def squeezed(i: int, mesh: TetMesh, rate: float, poisson: float = 0.3) -> Patch:
