@@ -20,7 +20,6 @@ from .output.journal import Journal
 from .parallel.comm import Comm
 from .signals import Signals
 from .simulation import Simulation
-from .state import Ints
 from .timers import PHASES
 
 log = logging.getLogger("conoid.worker")
@@ -33,11 +32,7 @@ def compute(
     sim = simulation.build(case, meshes, comm)
     history = History(folder, sim.probes.names) if comm.rank == 0 else None
     setup = time.monotonic() - began
-    held = sum(block.n for block in sim.model.blocks)
-    log.info("%d tets, %d nodes here; set-up %.2f s", held, sim.model.nodes.n, setup)
-    sizes = comm.sum(np.array([sum(b.n for b in sim.model.blocks if b.part == k) for k in range(len(case.parts))]))
-    if journal is not None:
-        _announce(sim, journal, setup, sizes)
+    _announce(sim, journal, setup)
     loop = Loop(sim, folder, journal, history, signals)
     cpu = time.thread_time()
     failure = None
@@ -52,13 +47,25 @@ def compute(
     return _sum_up(loop, folder, failure, cpu, setup, time.monotonic() - began)
 
 
-def _announce(sim: Simulation, journal: Journal, setup: float, sizes: Ints) -> None:
-    case, model = sim.case, sim.model
+def _announce(sim: Simulation, journal: Journal | None, setup: float) -> None:
+    """Tells how large the model is and how it is spread; all ranks take part."""
+    model, nodes = sim.model, sim.model.nodes
+    sizes = np.zeros(len(model.parts), np.int64)
+    for block in model.blocks:
+        sizes[block.part] += block.n
+    log.info("%d tets, %d nodes here; set-up %.2f s", sizes.sum(), nodes.n, setup)
+    held = sim.comm.gather(int(sizes.sum()))
+    parts = dict(zip(model.parts, (int(n) for n in sim.comm.sum(sizes)), strict=True))
+    if journal is None:
+        return
     journal.write(messages.Status, state=State.RUNNING)
-    parts = {name: int(n) for name, n in zip(model.parts, sizes, strict=True)}
     journal.write(
         messages.Started, ranks=sim.comm.size, elements=model.elements_global, nodes=model.nodes_global,
-        end_time=case.run.end_time, setup=setup, parts=parts,
+        end_time=sim.case.run.end_time, setup=setup, parts=parts,
+    )  # fmt: skip
+    journal.write(
+        messages.Counts, elements=model.elements_global, nodes=model.nodes_global, shared=sim.shared_nodes,
+        fragments=len(parts), elements_per_rank=held or [],
     )  # fmt: skip
 
 

@@ -80,6 +80,7 @@ class Loop:
             self._first_half()
             if sim.clock.done or sim.vote.stop:
                 self.stopped = 0 if sim.clock.done else sim.vote.stop
+                self._report()
                 return
             step.second_half(sim)
 
@@ -117,7 +118,7 @@ class Loop:
         if self._history is not None:
             extra = [*sim.ledger.momentum, *probes]
             self._history.write(clock.step, clock.t, clock.dt, limiter, self.energy, extra)
-        if self.energy.residual > sim.case.run.residual_limit:
+        if not self.energy.residual <= sim.case.run.residual_limit:
             raise EnergyError(
                 f"the energy residual {self.energy.residual:.3g} passed run.residual_limit "
                 f"{sim.case.run.residual_limit:g} at step {clock.step}, t = {clock.t:.6g} s"
