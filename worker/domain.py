@@ -77,7 +77,7 @@ def assemble(case: schema.Case, folder: Path) -> Whole:
     points, tets, node_part, tet_part, density = [], [], [], [], []
     offset = 0
     for index, part in enumerate(case.parts):
-        mesh = build_mesh(part.mesh, folder)
+        mesh = build_mesh(part.mesh, folder, key=f"parts[{index}].mesh")
         points.append(mesh.points)
         tets.append(mesh.tets.astype(np.int64) + offset)
         node_part.append(np.full(len(mesh.points), index, np.int32))
