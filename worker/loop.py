@@ -80,6 +80,8 @@ class Loop:
             self._first_half()
             if sim.clock.done or sim.vote.stop:
                 self.stopped = 0 if sim.clock.done else sim.vote.stop
+                if self.stopped:
+                    self._tell(messages.Status, state=State.STOPPING, message=STOPS[self.stopped][2])
                 self._report()
                 return
             step.second_half(sim)

@@ -4,6 +4,7 @@ import numpy as np
 
 from conoid.cases.schema import Case, Probe
 
+from .errors import InputError
 from .output.frames import von_mises
 from .parallel.comm import Comm
 from .parallel.fixed_point import exact_sums
@@ -58,7 +59,7 @@ def field(block: Block, name: str, model: Model) -> Floats:
 
 
 class Probes:
-    """The probes of a case on this rank."""
+    """The probes of a case on this rank. Raises InputError, on every rank alike, when one holds no tet."""
 
     def __init__(self, case: Case, model: Model, comm: Comm) -> None:
         self.names = [probe.name for probe in case.probes]
@@ -66,14 +67,19 @@ class Probes:
         self._model = model
         self._comm = comm
         self._chosen = [[_inside(probe, block, model) for block in model.blocks] for probe in case.probes]
+        counts = comm.sum(np.array([sum(len(c) for c in chosen) for chosen in self._chosen], np.int64))
+        for index in np.flatnonzero(counts == 0):
+            raise InputError(
+                f"probes[{index}]: no tet of part {case.probes[index].part!r} starts with its centre between low and high"
+            )
 
     def measure(self) -> Floats:
-        """(probes,) the present values; NaN for a probe that holds no tet. Equal on any number of ranks."""
+        """(probes,) the present values, equal on any number of ranks."""
         if not self.names:
             return np.zeros(0)
         sums = [self._sums(name, chosen) for name, chosen in zip(self._fields, self._chosen, strict=True)]
         totals = [exact_sums(self._comm, s) for s in sums]
-        return np.array([total / mass if mass > 0.0 else np.nan for total, mass in totals])
+        return np.array([total / mass for total, mass in totals])
 
     def _sums(self, name: str, chosen: list["np.ndarray"]) -> Floats:
         columns = [np.zeros((0, 2))]
