@@ -70,7 +70,7 @@ class Probes:
         counts = comm.sum(np.array([sum(len(c) for c in chosen) for chosen in self._chosen], np.int64))
         for index in np.flatnonzero(counts == 0):
             raise InputError(
-                f"probes[{index}]: no tet of part {case.probes[index].part!r} starts with its centre between low and high"
+                f"probes[{index}]: no tet of part {case.probes[index].part!r} has its centre between low and high"
             )
 
     def measure(self) -> Floats:

@@ -97,13 +97,14 @@ def build(case: Case, folder: Path, comm: Comm) -> Simulation:
     scene = boundaries.build(case, model.nodes, model.parts)
     for boundary in scene:
         boundary.start(model.nodes)
+    probes = Probes(case, model, comm)
     elements = _elements(case, model, piece, comm)
     run, numerics = case.run, case.numerics
     floor = _force_floor(model, comm)
     return Simulation(
         case=case, comm=comm, model=model, elements=elements, boundaries=scene,
         clock=Clock(run.end_time, numerics.dt_safety, numerics.dt_growth, run.frames),
-        ledger=Ledger(model, scene, comm), probes=Probes(case, model, comm), timers=Timers(),
+        ledger=Ledger(model, scene, comm), probes=probes, timers=Timers(),
         shared_nodes=piece.totals[2], floor=floor, scale=fixed_point.scale_for(floor),
     )  # fmt: skip
 
