@@ -284,7 +284,10 @@ class Probe(Model):
 
 
 class Viscosity(Model):
-    """Bulk viscosity q = density * l * (quadratic * l * rate^2 + linear * c * |rate|) in compression, l = V^(1/3)."""
+    """Bulk viscosity q = density * l * (quadratic * l * rate^2 + linear * c * |rate|) in compression.
+
+    l is V^(1/3) for a regular tet and follows the altitude of a flat one: 1.2009 / sqrt(sum |grad N|^2).
+    """
 
     linear: Annotated[Ratio, Field(ge=0)] = 0.06
     quadratic: Annotated[Ratio, Field(ge=0)] = 1.5
@@ -315,6 +318,7 @@ class Run(Model):
     """Number of lines of history.csv, evenly spaced."""
     max_steps: Annotated[Count, Field(ge=1)] = 100_000_000
     max_wall_time: Annotated[Time, Positive] | None = None
+    """Counted from the first step."""
     residual_limit: Annotated[Ratio, Positive] = 0.05
     """The run fails with cause ``energy`` when the energy residual passes this."""
 

@@ -4,16 +4,19 @@ Each books the work that it does on the body. The kick at time n does it in two 
 after: at time n only the first has been spent (the kinetic energy of the ledger is 1/2 m v(n-1/2) . v(n+1/2)).
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 from numba import njit
 
 from conoid.cases import schema
 
-from .state import Floats, Indices, Nodes
+from .errors import InputError
+from .parallel.comm import Comm
+from .state import Flags, Floats, Indices, Model, Nodes
 
 _AXES = {"x": 0, "y": 1, "z": 2}
+_ON_PLANE = 1e-9
+"""Of the size of the mesh: closer than this is on a plane."""
+_SWEEPS = 4
 
 
 class Boundary:
@@ -44,36 +47,44 @@ class SymmetryPlane(Boundary):
 
     def __init__(self, nodes: Indices, axis: int) -> None:
         super().__init__(nodes)
-        self._axis = axis
+        self.axis = axis
 
     def start(self, state: Nodes) -> None:
-        _hold(state.v, self.nodes, self._axis)
+        _hold(state.v, self.nodes, self.axis)
 
     def apply(self, state: Nodes, quantum: float, dt: float, t: float) -> None:
-        _hold(state.v, self.nodes, self._axis)
+        _hold(state.v, self.nodes, self.axis)
 
 
-class RigidWall(Boundary):
-    """No node ends the step behind the wall: an impulse along the normal stops it there, never pulls."""
+class RigidWalls(Boundary):
+    """No node ends the step behind a wall: an impulse along its normal stops the node there, never pulls.
 
-    def __init__(self, nodes: Indices, point: Floats, normal: Floats) -> None:
+    ``points`` and ``normals`` (w, 3), ``held`` (n, w): which walls hold which node. A node between two walls is taken
+    to each in turn, a few times.
+    """
+
+    def __init__(self, nodes: Indices, points: Floats, normals: Floats, held: Flags) -> None:
         super().__init__(nodes)
-        self._point = point
-        self._normal = normal / np.linalg.norm(normal)
+        self._points = points
+        self._normals = normals / np.linalg.norm(normals, axis=1)[:, None]
+        self._held = held
+        self._pending = np.zeros(len(nodes))
+
+    def depths(self, state: Nodes) -> Floats:
+        """(w,) how deep the deepest node starts behind each wall, m."""
+        depths = np.full(len(self._points), -np.inf)
+        for k, (point, normal) in enumerate(zip(self._points, self._normals, strict=True)):
+            behind = (point - state.x[self.nodes[self._held[:, k]]]) @ normal
+            depths[k] = behind.max(initial=-np.inf)
+        return depths
 
     def apply(self, state: Nodes, quantum: float, dt: float, t: float) -> None:
+        self.contact_loss += self._pending
+        self._pending[:] = 0.0
         if dt > 0.0 and _push_out(
-            state.x,
-            state.v,
-            state.force,
-            state.mass,
-            self.nodes,
-            self._point,
-            self._normal,
-            quantum,
-            dt,
-            self.contact_loss,
-        ):
+            state.x, state.v, state.force, state.mass, self.nodes, self._points, self._normals, self._held,
+            quantum, dt, self.contact_loss, self._pending,
+        ):  # fmt: skip
             self.last_push = t
 
 
@@ -128,62 +139,116 @@ def _hold(v, nodes, axis):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    "boolean(float64[:, ::1], float64[:, ::1], int64[:, ::1], float64[::1], int32[::1], float64[::1], float64[::1], "
-    "float64, float64, float64[::1])",
+    "boolean(float64[:, ::1], float64[:, ::1], int64[:, ::1], float64[::1], int32[::1], float64[:, ::1], "
+    "float64[:, ::1], boolean[:, ::1], float64, float64, float64[::1], float64[::1])",
     cache=True,
     error_model="numpy",
 )
-def _push_out(x, v, force, mass, nodes, point, normal, quantum, dt, loss):  # type: ignore[no-untyped-def]
-    """Impulse form: gap at the end of the step, never negative. Returns whether the wall pushed."""
+def _push_out(x, v, force, mass, nodes, points, normals, held, quantum, dt, loss, pending):  # type: ignore[no-untyped-def]
+    """Impulse form: the gap at the end of the step is never negative. Returns whether a wall pushed.
+
+    The half of the loss that goes with v(n-1/2) is booked in ``loss``, the other in ``pending``.
+    """
     pushed = False
     for j in range(len(nodes)):
         a = nodes[j]
-        gap, speed, kicked = 0.0, 0.0, 0.0
-        for k in range(3):
-            gap += (x[a, k] - point[k]) * normal[k]
-            speed += v[a, k] * normal[k]
-        if gap + dt * speed >= 0.0:
-            continue
-        for k in range(3):
-            kicked += force[a, k] * normal[k]
-        change = -gap / dt - speed
-        before = speed - kicked * quantum / mass[a]
-        for k in range(3):
-            v[a, k] += change * normal[k]
-        loss[j] -= 0.5 * mass[a] * change * (before + speed + change)
-        pushed = True
+        fx, fy, fz = v[a, 0], v[a, 1], v[a, 2]
+        touched = False
+        for _ in range(_SWEEPS):
+            moved = False
+            for k in range(len(points)):
+                gap, speed = 0.0, 0.0
+                for i in range(3):
+                    gap += (x[a, i] - points[k, i]) * normals[k, i]
+                    speed += v[a, i] * normals[k, i]
+                if held[j, k] and gap + dt * speed < 0.0:
+                    for i in range(3):
+                        v[a, i] -= (gap / dt + speed) * normals[k, i]
+                    moved = touched = True
+            if not moved or len(points) == 1:
+                break
+        if touched:
+            kick = quantum / mass[a]
+            jx, jy, jz = v[a, 0] - fx, v[a, 1] - fy, v[a, 2] - fz
+            bx, by, bz = fx - force[a, 0] * kick, fy - force[a, 1] * kick, fz - force[a, 2] * kick
+            loss[j] -= 0.5 * mass[a] * (jx * bx + jy * by + jz * bz)
+            pending[j] = -0.5 * mass[a] * (jx * v[a, 0] + jy * v[a, 1] + jz * v[a, 2])
+            pushed = True
     return pushed
 
 
-def _chosen(nodes: Nodes, parts: Sequence[str], names: list[str]) -> "np.ndarray":
-    if not parts:
-        return np.ones(nodes.n, bool)
-    return np.isin(nodes.part, [names.index(p) for p in parts])
+def build(case: schema.Case, model: Model, comm: Comm) -> list[Boundary]:
+    """The boundaries of a case on this rank's nodes; prescribed motion last, so that it has the last word.
 
-
-def build(case: schema.Case, nodes: Nodes, names: list[str]) -> list[Boundary]:
-    """The boundaries of a case on this rank's nodes; prescribed motion last, so that it has the last word."""
-    boundaries: list[Boundary] = []
-    for spec in sorted(case.boundaries, key=lambda b: b.kind in ("velocity", "rotation")):
-        chosen = _chosen(nodes, spec.parts, names)
-        if isinstance(spec, schema.Symmetry):
-            axis = _AXES[spec.axis]
-            on = np.abs(nodes.x0[:, axis] - spec.at) <= 1e-9 * max(float(np.abs(nodes.x0).max()), abs(spec.at))
-            boundaries.append(SymmetryPlane(_indices(chosen & on), axis))
-        elif isinstance(spec, schema.Wall):
-            boundaries.append(RigidWall(_indices(chosen), np.array(spec.point), np.array(spec.normal)))
-        elif isinstance(spec, schema.Prescribed):
-            for bound, inside in ((spec.low, np.greater_equal), (spec.high, np.less_equal)):
-                if bound is not None:
-                    chosen &= inside(nodes.x0, np.array(bound)).all(axis=1)
+    Raises InputError, on every rank alike, for a boundary that holds no node, a body that starts behind a wall, and
+    motion prescribed across a symmetry plane.
+    """
+    nodes = model.nodes
+    held = [_held_by(spec, model) for spec in case.boundaries]
+    counts = comm.sum(np.array([int(h.sum()) for h in held], np.int64))
+    for index in np.flatnonzero(counts == 0):
+        raise InputError(f"boundaries[{index}]: holds no node; check its place and its parts")
+    pairs = list(zip(case.boundaries, held, strict=True))
+    boundaries: list[Boundary] = [
+        SymmetryPlane(_indices(h), _AXES[spec.axis]) for spec, h in pairs if isinstance(spec, schema.Symmetry)
+    ]
+    boundaries += _walls(case, model, held, comm)
+    for spec, h in pairs:
+        if isinstance(spec, schema.Prescribed):
             velocity = np.array([np.nan if c is None else c for c in (spec.x, spec.y, spec.z)])
-            boundaries.append(PrescribedVelocity(_indices(chosen), velocity))
-        else:
-            boundaries.append(
-                PrescribedRotation(_indices(chosen), np.array(spec.spin.centre), np.array(spec.spin.rate))
-            )
+            boundaries.append(PrescribedVelocity(_indices(h), velocity))
+        elif isinstance(spec, schema.Rotation):
+            centre, rate = np.array(spec.spin.centre), np.array(spec.spin.rate)
+            boundaries.append(PrescribedRotation(_indices(h), centre, rate))
+    _refuse_conflicts(boundaries, nodes, comm)
     return boundaries
 
 
-def _indices(chosen: "np.ndarray") -> Indices:
+def _held_by(spec: schema.Boundary, model: Model) -> Flags:
+    """(n,) the nodes that a boundary acts on."""
+    nodes = model.nodes
+    chosen = np.ones(nodes.n, bool)
+    if spec.parts:
+        chosen = np.isin(nodes.part, [model.parts.index(p) for p in spec.parts])
+    if isinstance(spec, schema.Symmetry):
+        chosen &= np.abs(nodes.x0[:, _AXES[spec.axis]] - spec.at) <= _ON_PLANE * max(model.size, abs(spec.at))
+    elif isinstance(spec, schema.Prescribed):
+        if spec.low is not None:
+            chosen &= (nodes.x0 >= np.array(spec.low)).all(axis=1)
+        if spec.high is not None:
+            chosen &= (nodes.x0 <= np.array(spec.high)).all(axis=1)
+    return chosen
+
+
+def _walls(case: schema.Case, model: Model, held: list[Flags], comm: Comm) -> list[Boundary]:
+    found = [(i, spec, held[i]) for i, spec in enumerate(case.boundaries) if isinstance(spec, schema.Wall)]
+    if not found:
+        return []
+    touched = np.any([h for _, _, h in found], axis=0)
+    walls = RigidWalls(
+        _indices(touched), np.array([spec.point for _, spec, _ in found]),
+        np.array([spec.normal for _, spec, _ in found]),
+        np.ascontiguousarray(np.array([h[touched] for _, _, h in found]).T),
+    )  # fmt: skip
+    depths = comm.maximum(walls.depths(model.nodes))
+    for (index, _, _), depth in zip(found, depths, strict=True):
+        if depth > _ON_PLANE * model.size:
+            raise InputError(f"boundaries[{index}]: a body starts {depth:.3g} m behind this wall")
+    return [walls]
+
+
+def _refuse_conflicts(boundaries: list[Boundary], nodes: Nodes, comm: Comm) -> None:
+    """Motion prescribed across a symmetry plane would do work on it that never happened."""
+    before = nodes.v.copy()
+    for boundary in boundaries:
+        boundary.start(nodes)
+    planes = [b for b in boundaries if isinstance(b, SymmetryPlane)]
+    speeds = [float(np.abs(nodes.v[b.nodes, b.axis]).max(initial=0.0)) for b in planes]
+    nodes.v[:] = before
+    fastest = comm.maximum(np.array([max(speeds, default=0.0)]))[0]
+    if fastest > 0.0:
+        raise InputError("boundaries: a prescribed motion leads nodes off their symmetry plane; allowed: along it")
+
+
+def _indices(chosen: Flags) -> Indices:
     return np.flatnonzero(chosen).astype(np.int32)

@@ -2,6 +2,9 @@
 
 import math
 
+COLLAPSE = 1e-6
+"""A stable step below this share of the first one means that a tet is being crushed, not that it needs patience."""
+
 
 class Clock:
     """Simulated time, compensated (Kahan), and the step that leads on."""
@@ -10,6 +13,12 @@ class Clock:
         self.t = 0.0
         self.step = 0
         self.dt = 0.0
+        """The step ahead, s."""
+        self.last_dt = 0.0
+        """The step behind, s."""
+        self.mean_dt = 0.0
+        """Mean of the two: it carries v(n-1/2) to v(n+1/2)."""
+        self._first = 0.0
         self._lost = 0.0
         self._stable = math.inf
         self._end = end
@@ -36,10 +45,10 @@ class Clock:
     def choose(self, limit: float) -> float:
         """The next step, s: ``limit`` is the largest one-over-stable-step of all tets, 1/s. Returns the mean step.
 
-        The mean of the old and the new step carries v(n-1/2) to v(n+1/2). The way to the next frame is divided evenly
-        over its last two steps.
+        The way to the next frame is divided evenly over its last two steps. ``growth`` bounds the stable step; after
+        landing on a frame the step comes back to it at once.
         """
-        old = self.dt
+        self.last_dt = self.dt
         self._stable = min(self._safety / limit, self._growth * self._stable)
         target = self.frame_time(self.frame + 1 if self.frame_due else self.frame)
         left = target - self.t
@@ -49,7 +58,14 @@ class Clock:
             self.dt = 0.5 * left
         else:
             self.dt = self._stable
-        return 0.5 * (old + self.dt)
+        self._first = self._first or self._stable
+        self.mean_dt = 0.5 * (self.last_dt + self.dt)
+        return self.mean_dt
+
+    @property
+    def collapsed(self) -> bool:
+        """Whether the stable step has fallen so far below the first that the run would not end."""
+        return self._stable < COLLAPSE * self._first
 
     @property
     def stable(self) -> float:

@@ -76,7 +76,7 @@ def _sum_up(
     seconds = sim.comm.gather(sim.timers.seconds)
     total_cpu = sum(sim.comm.gather(cpu) or [])
     memory = sim.comm.gather(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
-    hexdigest = digest.digest(sim.model, sim.comm)
+    hexdigest = digest.digest(sim.model, sim.comm, [sim.elements.pressure] if sim.elements.split else [])
     checks = reference.measure(sim, folder) if failure is None and not loop.stopped else []
     state, cause, message = STOPS[loop.stopped] if loop.stopped else (State.SUCCEEDED, None, "")
     if failure is not None:

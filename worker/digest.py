@@ -5,14 +5,17 @@ import hashlib
 import numpy as np
 
 from .parallel.comm import Comm
-from .state import VOLUME_FLUX, Model
+from .state import VOLUME_FLUX, Floats, Model
 
 
-def digest(model: Model, comm: Comm) -> str | None:
-    """Hex digest on rank 0, None elsewhere. Positions, velocities, and every row of state but the scratch one."""
+def digest(model: Model, comm: Comm, nodal: list[Floats]) -> str | None:
+    """Hex digest on rank 0, None elsewhere.
+
+    Positions, velocities, what else the nodes carry (``nodal``), and every row of the tets' state but the scratch one.
+    """
     nodes, h = model.nodes, hashlib.sha256()
     owned = nodes.owned
-    for values in (nodes.x, nodes.v):
+    for values in (nodes.x, nodes.v, *nodal):
         _add(h, comm, nodes.id[owned], values[owned])
     for part in range(len(model.parts)):
         block = next((b for b in model.blocks if b.part == part), None)

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from conoid.cases import schema
 from conoid.cases.library import material as find_material
 
+from .errors import InputError
 from .materials import models
 from .mesh.build import build as build_mesh
 from .parallel.comm import Comm
@@ -26,6 +26,7 @@ from .state import (
     VOLUME_RATIO,
     YIELD,
     Block,
+    Flags,
     Floats,
     Indices,
     Ints,
@@ -33,8 +34,6 @@ from .state import (
     Nodes,
     chunked,
 )
-
-Flags = npt.NDArray[np.bool_]
 
 
 @dataclass
@@ -70,6 +69,10 @@ class Piece:
     neighbours: list[Neighbour]
     totals: tuple[int, int, int]
     """Tets, nodes and shared nodes of the whole."""
+    part_starts: Ints
+    """Global id of the first tet of each part."""
+    size: float
+    """Largest coordinate of the whole, m."""
 
 
 def assemble(case: schema.Case, folder: Path) -> Whole:
@@ -118,7 +121,12 @@ def _velocities(case: schema.Case, x: Floats, part: Indices) -> Floats:
 
 
 def cut(whole: Whole, ranks: int) -> list[Piece]:
-    """The pieces of ``ranks`` ranks: tets by recursive bisection of their centres, nodes with every tet's rank."""
+    """The pieces of ``ranks`` ranks: tets by recursive bisection of their centres, nodes with every tet's rank.
+
+    Raises InputError when there are more ranks than tets.
+    """
+    if ranks > len(whole.tets):
+        raise InputError(f"run.ranks = {ranks}: at most {len(whole.tets)}, the number of tets")
     owner = bisect(whole.points[whole.tets].mean(axis=1), np.ones(len(whole.tets)), ranks)
     nodes_of = [np.unique(whole.tets[owner == rank]) for rank in range(ranks)]
     holders = np.zeros(len(whole.points), np.int32)
@@ -155,6 +163,7 @@ def _piece(
         nodes.astype(np.int64), whole.node_part[nodes], home[nodes] == rank, whole.points[nodes],
         whole.velocity[nodes], whole.mass[nodes], whole.node_volume[nodes], ids.astype(np.int64),
         whole.tet_part[ids], local[tets], whole.volumes[ids], np.any(shared[tets], axis=1), neighbours, totals,
+        np.searchsorted(whole.tet_part, np.arange(whole.tet_part[-1] + 1)), float(np.abs(whole.points).max()),
     )  # fmt: skip
 
 
@@ -180,7 +189,9 @@ def _model(case: schema.Case, piece: Piece) -> Model:
         v=piece.velocity, mass=piece.mass, force=np.zeros(piece.points.shape, np.int64),
     )  # fmt: skip
     blocks = [_block(case, piece, index) for index in range(len(case.parts)) if (piece.tet_part == index).any()]
-    return Model(nodes, blocks, [p.name for p in case.parts], piece.totals[0], piece.totals[1])
+    return Model(
+        nodes, blocks, [p.name for p in case.parts], piece.totals[0], piece.totals[1], piece.part_starts, piece.size
+    )
 
 
 def _block(case: schema.Case, piece: Piece, index: int) -> Block:
@@ -205,5 +216,5 @@ def _block(case: schema.Case, piece: Piece, index: int) -> Block:
         tets=np.ascontiguousarray(piece.tets[chosen], np.uint32),
         kind=models.strength_of(material), eos=models.eos_of(material),
         params=models.parameters(material, case.numerics.viscosity),
-        border_chunks=-(-int(piece.border[chosen].sum()) // CHUNK),
+        border_chunks=-(-int(piece.border[chosen].sum()) // CHUNK), temperature=part.temperature,
     )  # fmt: skip

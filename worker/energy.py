@@ -1,8 +1,9 @@
 """The ledger: every joule has a line, and the residual says whether the lines close.
 
-Kinetic energy is 1/2 m v(n-1/2) . v(n+1/2), the form that the leapfrog step conserves together with the trapezoidal
-work of the forces. Work of the stress is summed tet by tet from stress and strain rate, not from nodal forces, so the
-residual compares two independent accounts.
+Kinetic energy is the form that the leapfrog step conserves together with the trapezoidal work of the forces:
+1/2 m v(n-1/2) . v(n+1/2) for equal steps, and with the old step dt- beside the mean step dt of the kick
+1/2 m v(n-1/2) . v(n+1/2) + 1/2 (dt- - dt) v(n-1/2) . f(n). Work of the stress is summed tet by tet from stress and
+strain rate, not from nodal forces, so the residual compares two independent accounts.
 """
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from conoid.cases.messages import Energy
 
 from .boundaries import Boundary
+from .clock import Clock
 from .parallel.comm import Comm
 from .parallel.fixed_point import exact_sums
 from .state import WORK, WORK_PLASTIC, WORK_VISCOUS, Floats, Model
@@ -18,10 +20,11 @@ from .state import WORK, WORK_PLASTIC, WORK_VISCOUS, Floats, Model
 class Ledger:
     """Sums the accounts of all ranks; the first call sets the initial energy."""
 
-    def __init__(self, model: Model, boundaries: list[Boundary], comm: Comm) -> None:
+    def __init__(self, model: Model, boundaries: list[Boundary], comm: Comm, clock: Clock) -> None:
         self._model = model
         self._boundaries = boundaries
         self._comm = comm
+        self._clock = clock
         nodes = model.nodes
         self.initial = float(self._node_sum(0.5 * nodes.mass * (nodes.v * nodes.v).sum(axis=1)))
         self.worst = 0.0
@@ -32,7 +35,8 @@ class Ledger:
     def close(self, before: Floats) -> Energy:
         """The ledger at time n; ``before`` is v(n-1/2), the model holds v(n+1/2)."""
         nodes = self._model.nodes
-        kinetic = 0.5 * nodes.mass * (before * nodes.v).sum(axis=1)
+        uneven = 0.5 * (self._clock.last_dt - self._clock.mean_dt) / nodes.scale
+        kinetic = 0.5 * nodes.mass * (before * nodes.v).sum(axis=1) + uneven * (before * nodes.force).sum(axis=1)
         momentum = 0.5 * nodes.mass[:, None] * (before + nodes.v)
         loss, external = self._boundary_work()
         columns = np.column_stack([kinetic, loss, external, momentum])[nodes.owned]

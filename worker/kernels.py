@@ -58,5 +58,5 @@ def _processor() -> str:
 
 def use_cache() -> None:
     """Points numba to the folder; must come before numba is imported."""
-    os.environ.setdefault(_VARIABLE, str(cache_folder()))
+    os.environ[_VARIABLE] = str(cache_folder())
     os.environ.setdefault("NUMBA_NUM_THREADS", "1")

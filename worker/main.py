@@ -89,11 +89,26 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
 
 
 def _case(options: argparse.Namespace, comm: Comm) -> Case:
-    """The case with its overrides; it runs on as many ranks as MPI has started."""
+    """The case with its overrides, read by rank 0; it runs on as many ranks as MPI has started."""
+    case: Case | None = None
+    failure: Exception | None = None
+    if comm.rank == 0:
+        try:
+            case = _read(options, comm.size)
+        except (CaseError, OSError) as error:
+            failure = error
+    case, failure = comm.broadcast((case, failure))
+    if failure is not None:
+        raise failure
+    assert case is not None
+    return case
+
+
+def _read(options: argparse.Namespace, ranks: int) -> Case:
     path = Path(options.case)
     if not path.exists() and options.case in load.shipped():
         path = load.shipped_path(options.case)
-    overrides = [*options.set, f"run.ranks={comm.size}"]
+    overrides = [*options.set, f"run.ranks={ranks}"]
     return load.parse_case(load.apply_overrides(load.read_data(path), overrides))
 
 

@@ -45,6 +45,8 @@ def field(block: Block, name: str, model: Model) -> Floats:
     """(n,) a field of ``cases.schema.ProbeField`` over the tets of a block; stress includes the viscous part."""
     if name in _NORMAL:
         return block.row(_NORMAL[name]) - block.row(PRESSURE) - block.row(VISCOUS)
+    if name == "temperature" and not block.has(TEMPERATURE):
+        return np.full(block.n, block.temperature)
     if name in _ROWS:
         return block.row(_ROWS[name]) if block.has(_ROWS[name]) else np.zeros(block.n)
     if name in _VELOCITY:

@@ -4,6 +4,7 @@ import csv
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from conoid.cases import layout
 from conoid.cases.outcome import Check
@@ -53,8 +54,8 @@ def _measured(sim: Simulation, spec: Reference, folder: Path) -> float:
     return _largest(sim, spec)
 
 
-def _maximum(comm: Comm, values: list[float]) -> float:
-    return float(comm.maximum(np.array([max(values, default=-np.inf)]))[0])
+def _maximum(comm: Comm, values: npt.ArrayLike) -> float:
+    return float(comm.maximum(np.array([np.max(values, initial=-np.inf)]))[0])
 
 
 def _nodes(sim: Simulation, part: str | None) -> "np.ndarray":
@@ -70,9 +71,9 @@ def _size(sim: Simulation, spec: Reference) -> float:
     axis = _AXES[spec.axis or "z"]
     x = sim.model.nodes.x[_nodes(sim, spec.part)]
     if spec.quantity == "extent":
-        return _maximum(sim.comm, list(x[:, axis])) + _maximum(sim.comm, list(-x[:, axis]))
+        return _maximum(sim.comm, x[:, axis]) + _maximum(sim.comm, -x[:, axis])
     across = np.delete(x, axis, axis=1)
-    return _maximum(sim.comm, list(np.hypot(across[:, 0], across[:, 1])))
+    return _maximum(sim.comm, np.hypot(across[:, 0], across[:, 1]))
 
 
 def _mean_speed(sim: Simulation, spec: Reference) -> float:

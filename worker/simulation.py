@@ -69,22 +69,31 @@ class Simulation:
     shared_nodes: int
     floor: float
     """Forces below this, N, do not refine the force quantum."""
-    scale: float = 1.0
-    """Quanta per newton of the nodal forces as they stand."""
     vote: Vote = field(default_factory=Vote)
+
+    @property
+    def scale(self) -> float:
+        """Quanta per newton of the nodal forces as they stand."""
+        return self.model.nodes.scale
+
+    @scale.setter
+    def scale(self, scale: float) -> None:
+        self.model.nodes.scale = scale
+
+    def limiting_tet(self) -> str:
+        """The tet that holds the time step down, of smallest id when several do; all ranks take part."""
+        mine = int(self.elements.peaks[0]) == int(self.vote.result[0])
+        first = -int(self.comm.maximum(np.array([-float(self.elements.peaks[1]) if mine else -np.inf]))[0])
+        part = int(np.searchsorted(self.model.part_starts, first, side="right")) - 1
+        return f"tet {first} of {self.model.parts[part]}"
 
     def limiter(self) -> str:
         """Which tet holds the time step down, and why; all ranks take part."""
-        elements, stable = self.elements, self.clock.stable
-        mine = int(elements.peaks[0]) == int(self.vote.result[0])
-        block = self.model.blocks[elements.limiting] if mine else None
-        tet = -float(block.id[elements.peaks[1]]) if block else -np.inf
-        part = float(block.part) if block else -1.0
-        first, of_part = self.comm.maximum(np.array([tet, part]))
+        stable = self.clock.stable
         why = "stability" if stable * self.vote.limit >= 0.999 * self.case.numerics.dt_safety else "growth"
         if self.clock.dt < stable:
             why = "output time"
-        return f"{why}: tet {int(-first)} of {self.model.parts[int(of_part)]}"
+        return f"{why}: {self.limiting_tet()}"
 
     def next_scale(self) -> float:
         """The scale for the next sum of forces."""
@@ -94,28 +103,30 @@ class Simulation:
 def build(case: Case, folder: Path, comm: Comm) -> Simulation:
     """Meshes, cuts and distributes the case. Raises InputError on every rank alike."""
     model, piece = domain.build(case, folder, comm)
-    scene = boundaries.build(case, model.nodes, model.parts)
+    scene = boundaries.build(case, model, comm)
     for boundary in scene:
         boundary.start(model.nodes)
     probes = Probes(case, model, comm)
-    elements = _elements(case, model, piece, comm)
+    timers = Timers()
+    elements = _elements(case, model, piece, comm, timers)
     run, numerics = case.run, case.numerics
     floor = _force_floor(model, comm)
+    clock = Clock(run.end_time, numerics.dt_safety, numerics.dt_growth, run.frames)
     return Simulation(
         case=case, comm=comm, model=model, elements=elements, boundaries=scene,
-        clock=Clock(run.end_time, numerics.dt_safety, numerics.dt_growth, run.frames),
-        ledger=Ledger(model, scene, comm), probes=probes, timers=Timers(),
-        shared_nodes=piece.totals[2], floor=floor, scale=fixed_point.scale_for(floor),
+        clock=clock,
+        ledger=Ledger(model, scene, comm, clock), probes=probes, timers=timers,
+        shared_nodes=piece.totals[2], floor=floor,
     )  # fmt: skip
 
 
-def _elements(case: Case, model: Model, piece: domain.Piece, comm: Comm) -> Elements:
+def _elements(case: Case, model: Model, piece: domain.Piece, comm: Comm, timers: Timers) -> Elements:
     form = case.numerics.pressure
     if form == "standard":
-        return Elements(model, comm, piece.neighbours)
+        return Elements(model, comm, piece.neighbours, timers)
     bulk = np.array([moduli(find_material(case, part.material))[0] for part in case.parts])
     return AveragedElements(
-        model, comm, piece.neighbours, 1.0 / piece.node_volume, bulk[model.nodes.part], form == "split"
+        model, comm, piece.neighbours, timers, 1.0 / piece.node_volume, bulk[model.nodes.part], form == "split"
     )
 
 

@@ -13,6 +13,7 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Indices = npt.NDArray[np.int32]
+Flags = npt.NDArray[np.bool_]
 Tets = npt.NDArray[np.uint32]
 """Unsigned: an index that cannot be negative needs no test for counting from the end."""
 
@@ -67,7 +68,9 @@ class Nodes:
     mass: Floats
     """(n,) lumped mass, kg."""
     force: Ints
-    """(n, 3) internal force in quanta of the force scale."""
+    """(n, 3) internal force in quanta."""
+    scale: float = 1.0
+    """Quanta per newton of ``force`` as it stands."""
 
     @property
     def n(self) -> int:
@@ -94,6 +97,8 @@ class Block:
     params: Floats
     """Material constants (materials/models.py)."""
     border_chunks: int = 0
+    temperature: float = 293.15
+    """Initial temperature, K; it stays where no material of the block heats up."""
 
     @property
     def chunks(self) -> int:
@@ -118,6 +123,10 @@ class Model:
     parts: list[str] = field(default_factory=list)
     elements_global: int = 0
     nodes_global: int = 0
+    part_starts: Ints = field(default_factory=lambda: np.zeros(1, np.int64))
+    """Global id of the first tet of each part."""
+    size: float = 0.0
+    """Largest coordinate of the whole mesh at the start, m: what round-off in positions is measured by."""
 
 
 def chunked(values: Floats) -> Floats:

@@ -18,6 +18,8 @@ and at once f(n+1) from it, so a step begins with forces that are already at han
 between them); 8 is started after the border tets and finished after the interior ones.
 """
 
+import math
+
 from .errors import PhysicsError
 from .motion import kick, move
 from .parallel import fixed_point
@@ -34,6 +36,10 @@ def first_half(sim: Simulation) -> None:
     nodes, clock = sim.model.nodes, sim.clock
     with sim.timers.phase("nodes"):
         mean_dt = clock.choose(sim.vote.limit)  # 1: dt between n and n+1
+        if clock.collapsed:
+            raise PhysicsError(
+                f"{_when(sim)}: {sim.limiting_tet()} is crushed; the stable step is {clock.stable:.3g} s"
+            )
         quantum = mean_dt / sim.scale
         kick(nodes.v, nodes.force, nodes.mass, quantum)  # 2: v*(n+1/2) = v(n-1/2) + dt f(n) / m
         for boundary in sim.boundaries:  # 3: v(n+1/2)
@@ -60,11 +66,15 @@ def _elements(sim: Simulation, dt: float) -> None:
         pending = sim.comm.begin_maximum(vote.words, vote.result)
         elements.finish()
         pending.finish()
-    if vote.limit != vote.limit or vote.force != vote.force:
-        raise PhysicsError("a tetrahedron turned inside out, or its stress is not a number")
+    if not (math.isfinite(vote.limit) and math.isfinite(vote.force)):
+        raise PhysicsError(f"{_when(sim)}: {sim.limiting_tet()} turned inside out, or its stress is not a number")
     if fixed_point.outgrown(vote.force, sim.scale):
         sim.scale = fixed_point.scale_for(vote.force)
         with sim.timers.phase("elements"):
             elements.again(sim.scale)
         with sim.timers.phase("exchange"):
             elements.finish()
+
+
+def _when(sim: Simulation) -> str:
+    return f"step {sim.clock.step}, t = {sim.clock.t:.6g} s"

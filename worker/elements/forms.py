@@ -10,6 +10,7 @@ import numpy as np
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum
 from ..state import CHUNK, Block, Floats, Ints, Model
+from ..timers import Timers
 from . import pressure, sweep, tet4
 
 _FORCE_TAG, _VOLUME_TAG = 1, 2
@@ -20,12 +21,11 @@ class Elements:
 
     split = False
 
-    def __init__(self, model: Model, comm: Comm, neighbours: list[Neighbour]) -> None:
+    def __init__(self, model: Model, comm: Comm, neighbours: list[Neighbour], timers: Timers) -> None:
         self.model = model
+        self._timers = timers
         self.peaks: Ints = np.zeros(3, np.int64)
-        """See elements/sweep.py; the element is numbered within the block ``limiting``."""
-        self.limiting = 0
-        """Index of the block whose element limits the step."""
+        """See elements/sweep.py."""
         self._w = np.zeros(tet4.SCRATCH)
         self._wi = np.zeros(12 * CHUNK, np.int64)
         self._bits = self._w.view(np.int64)
@@ -65,34 +65,24 @@ class Elements:
         return [self.shared_forces]
 
     def _both_regions(self, work: Callable[[Block, int, int], None], shared: SharedSum) -> None:
-        for number, block in enumerate(self.model.blocks):
-            self._tracked(number, block, 0, block.border_chunks, work)
+        for block in self.model.blocks:
+            work(block, 0, block.border_chunks)
         shared.begin()
-        for number, block in enumerate(self.model.blocks):
-            self._tracked(number, block, block.border_chunks, block.chunks, work)
-
-    def _tracked(
-        self, number: int, block: Block, begin: int, end: int, work: Callable[[Block, int, int], None]
-    ) -> None:
-        if begin == end:
-            return
-        before = self.peaks[0]
-        work(block, begin, end)
-        if self.peaks[0] > before:
-            self.limiting = number
+        for block in self.model.blocks:
+            work(block, block.border_chunks, block.chunks)
 
     def _standard(self, block: Block, begin: int, end: int, dt: float, scale: float) -> None:
         nodes = self.model.nodes
         sweep.standard_pass(
             nodes.x, nodes.v, nodes.force, block.tets, block.state.reshape(-1), block.params, self._w, self._wi,
-            self._bits, self.peaks, block.kind, block.eos, block.state.shape[1], begin, end, dt, scale,
+            self._bits, self.peaks, block.id, block.kind, block.eos, block.state.shape[1], begin, end, dt, scale,
         )  # fmt: skip
 
     def _again(self, block: Block, begin: int, end: int, scale: float) -> None:
         nodes = self.model.nodes
         sweep.forces_again(
             nodes.x, nodes.force, self.pressure, self._gradients(), self.split, block.tets, block.state.reshape(-1),
-            self._w, self._wi, self._bits, self.peaks, block.state.shape[1], begin, end, scale,
+            self._w, self._wi, self._bits, self.peaks, block.id, block.state.shape[1], begin, end, scale,
         )  # fmt: skip
 
     def _gradients(self) -> Ints:
@@ -103,12 +93,14 @@ class AveragedElements(Elements):
     """The ``nodal`` and ``split`` forms: two passes with the completed nodal volume sums between them."""
 
     def __init__(
-        self, model: Model, comm: Comm, neighbours: list[Neighbour], weight: Floats, bulk: Floats, split: bool
-    ) -> None:
+        self, model: Model, comm: Comm, neighbours: list[Neighbour], timers: Timers,
+        weight: Floats, bulk: Floats, split: bool,
+    ) -> None:  # fmt: skip
+        """``weight`` (nodes,): one over the reference volume, 1/m^3; ``bulk`` (nodes,): modulus of the part, Pa."""
         n = model.nodes.n
         self.split = split
         self._gradient = np.zeros((n if split else 1, 3), np.int64)
-        super().__init__(model, comm, neighbours)
+        super().__init__(model, comm, neighbours, timers)
         self._weight = weight
         self._bulk = bulk
         self._volumes = np.zeros((n, 2), np.int64)
@@ -128,7 +120,8 @@ class AveragedElements(Elements):
         self.peaks[:] = 0
         self._volumes[:] = 0
         self._both_regions(lambda block, begin, end: self._strains(block, begin, end, dt), self.shared_volumes)
-        self.shared_volumes.finish()
+        with self._timers.phase("exchange"):
+            self.shared_volumes.finish()
         self._strain = pressure.nodal_strains(self._volumes)
         if self.split:
             self.pressure -= self._bulk * self._strain
@@ -164,6 +157,6 @@ class AveragedElements(Elements):
         nodes = self.model.nodes
         sweep.force_pass(
             nodes.x, self._strain, nodes.force, self.pressure, self._gradient, self.split, block.tets,
-            block.state.reshape(-1), block.params, self._w, self._wi, self._bits, self.peaks, block.eos,
+            block.state.reshape(-1), block.params, self._w, self._wi, self._bits, self.peaks, block.id, block.eos,
             block.state.shape[1], begin, end, dt, scale,
         )  # fmt: skip

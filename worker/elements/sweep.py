@@ -4,8 +4,8 @@
 between them: ``strain_pass`` (velocity gradient, deviatoric stress, nodal volume sums) and ``force_pass`` (pressure,
 viscosity, forces). ``forces_again`` repeats only the sum of forces, in a coarser quantum.
 
-``peaks`` collects, as bits of float64: 0 the largest one-over-stable-step, 2 the largest force; 1 is the element that
-sets the first.
+``peaks`` collects, as bits of float64: 0 the largest one-over-stable-step, 2 the largest force; 1 is the smallest
+global id of the tets that set the first.
 """
 
 from numba import njit
@@ -21,6 +21,7 @@ from . import pressure as averaged
 from . import tet4
 
 _LIMIT, _FORCE = tet4.LIMIT, tet4.FORCE
+_NO_TET = 2**62
 _F1, _F2, _I1, _I2, _T2 = "float64[::1]", "float64[:, ::1]", "int64[::1]", "int64[:, ::1]", "uint32[:, ::1]"
 
 
@@ -49,35 +50,35 @@ def pressure_and_limit(eos, w, s, params, n, dt):  # type: ignore[no-untyped-def
         tet4.step_limit(w, s, n)
 
 
-@njit(f"void({_I1}, {_I1}, int64, int64, int64)", cache=True)
-def note_peaks(peaks, bits, first, n, rows):  # type: ignore[no-untyped-def]
-    """Raises the peaks by a chunk whose first element is ``first``."""
+@njit(f"void({_I1}, {_I1}, {_I1}, int64, int64)", cache=True)
+def note_peaks(peaks, bits, ids, n, rows):  # type: ignore[no-untyped-def]
+    """Raises the peaks by a chunk of tets with these global ids."""
     peaks[2] = max(peaks[2], tet4.peak(bits, _FORCE, rows, n))
     limit = tet4.peak(bits, _LIMIT, 1, n)
     if limit > peaks[0]:
-        peaks[0] = limit
+        peaks[0], peaks[1] = limit, _NO_TET
+    if limit == peaks[0]:
         for i in range(n):
             if bits[_LIMIT + i] & tet4.MAGNITUDE == limit:
-                peaks[1] = first + i
-                break
+                peaks[1] = min(peaks[1], ids[i])
 
 
 @njit(
-    f"void({_I2}, {_F1}, {_I2}, boolean, {_T2}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, int64, int64, float64)",
+    f"void({_I2}, {_F1}, {_I2}, boolean, {_T2}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, {_I1}, int64, float64)",
     cache=True,
     error_model="numpy",
 )
-def sum_forces(force, pressure, gradient, split, t, s, w, wi, bits, peaks, first, n, scale):  # type: ignore[no-untyped-def]
+def sum_forces(force, pressure, gradient, split, t, s, w, wi, bits, peaks, ids, n, scale):  # type: ignore[no-untyped-def]
     """Adds the forces of a chunk, and with ``split`` its share of the projected pressure gradient."""
     tet4.internal_forces(w, s, n)
     rows = 9
     if split:
-        note_peaks(peaks, bits, first, n, rows)
+        note_peaks(peaks, bits, ids, n, rows)
         averaged.pressure_fluxes(w, pressure, t, n)
         rows = 12
         peaks[2] = max(peaks[2], tet4.peak(bits, _FORCE, rows, n))
     else:
-        note_peaks(peaks, bits, first, n, rows)
+        note_peaks(peaks, bits, ids, n, rows)
     tet4.quantise(w, wi, rows, n, scale)
     tet4.scatter_forces(force, wi, t, n)
     if split:
@@ -85,12 +86,14 @@ def sum_forces(force, pressure, gradient, split, t, s, w, wi, bits, peaks, first
 
 
 @njit(
-    f"void({_F2}, {_F2}, {_I2}, {_T2}, {_F1}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, "
+    f"void({_F2}, {_F2}, {_I2}, {_T2}, {_F1}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, {_I1}, "
     "int64, int64, int64, int64, int64, float64, float64)",
     cache=True,
     error_model="numpy",
 )
-def standard_pass(x, v, force, tets, state, params, w, wi, bits, peaks, strength, eos, rows, begin, end, dt, scale):  # type: ignore[no-untyped-def]
+def standard_pass(  # type: ignore[no-untyped-def]
+    x, v, force, tets, state, params, w, wi, bits, peaks, ids, strength, eos, rows, begin, end, dt, scale
+):
     """Stress and forces at n+1 of chunks ``begin`` to ``end``, each tet with its own pressure."""
     for c in range(begin, end):
         t = tets[c * CHUNK : (c + 1) * CHUNK]
@@ -104,7 +107,7 @@ def standard_pass(x, v, force, tets, state, params, w, wi, bits, peaks, strength
         averaged.own_strains(w, n, dt)
         pressure_and_limit(eos, w, s, params, n, dt)
         tet4.internal_forces(w, s, n)
-        note_peaks(peaks, bits, c * CHUNK, n, 9)
+        note_peaks(peaks, bits, ids[c * CHUNK : c * CHUNK + n], n, 9)
         tet4.quantise(w, wi, 9, n, scale)
         tet4.scatter_forces(force, wi, t, n)
 
@@ -136,7 +139,7 @@ def strain_pass(x, v, sums, weight, pressure, projected, split, tets, state, par
 
 
 @njit(
-    f"void({_F2}, {_F1}, {_I2}, {_F1}, {_I2}, boolean, {_T2}, {_F1}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, "
+    f"void({_F2}, {_F1}, {_I2}, {_F1}, {_I2}, boolean, {_T2}, {_F1}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, {_I1}, "
     "int64, int64, int64, int64, float64, float64)",
     cache=True,
     error_model="numpy",
@@ -155,6 +158,7 @@ def force_pass(  # type: ignore[no-untyped-def]
     wi,
     bits,
     peaks,
+    ids,
     eos,
     rows,
     begin,
@@ -172,16 +176,16 @@ def force_pass(  # type: ignore[no-untyped-def]
         averaged.gather_strains(w, strain, t, n)
         averaged.recall_flux(w, s, n, dt)
         pressure_and_limit(eos, w, s, params, n, dt)
-        sum_forces(force, pressure, gradient, split, t, s, w, wi, bits, peaks, c * CHUNK, n, scale)
+        sum_forces(force, pressure, gradient, split, t, s, w, wi, bits, peaks, ids[c * CHUNK : c * CHUNK + n], n, scale)
 
 
 @njit(
-    f"void({_F2}, {_I2}, {_F1}, {_I2}, boolean, {_T2}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, "
+    f"void({_F2}, {_I2}, {_F1}, {_I2}, boolean, {_T2}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, {_I1}, "
     "int64, int64, int64, float64)",
     cache=True,
     error_model="numpy",
 )
-def forces_again(x, force, pressure, gradient, split, tets, state, w, wi, bits, peaks, rows, begin, end, scale):  # type: ignore[no-untyped-def]
+def forces_again(x, force, pressure, gradient, split, tets, state, w, wi, bits, peaks, ids, rows, begin, end, scale):  # type: ignore[no-untyped-def]
     """The forces of the present stress once more, in another quantum; changes no state and no limit."""
     for c in range(begin, end):
         t = tets[c * CHUNK : (c + 1) * CHUNK]
@@ -190,4 +194,4 @@ def forces_again(x, force, pressure, gradient, split, tets, state, w, wi, bits, 
         tet4.gather_edges(w, x, t, n)
         tet4.end_gradients(w, n)
         w[_LIMIT : _LIMIT + n] = 0.0
-        sum_forces(force, pressure, gradient, split, t, s, w, wi, bits, peaks, c * CHUNK, n, scale)
+        sum_forces(force, pressure, gradient, split, t, s, w, wi, bits, peaks, ids[c * CHUNK : c * CHUNK + n], n, scale)

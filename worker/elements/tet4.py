@@ -31,7 +31,8 @@ from ..state import (
 )
 
 # Rows of the scratch, in numbers of float64. EDGE holds e1, e2, e3 and later b1, b2, b3 at the end of the step;
-# RATE holds the velocity differences, then the rate of deformation and the spin, then the nodal forces.
+# RATE holds the velocity differences, then the rate of deformation and the spin, then the nodal forces; with the split
+# form three more rows of pressure fluxes follow them, over volumes and dilatation, which are spent by then.
 EDGE = 0
 RATE = 9 * CHUNK
 D_XX, D_YY, D_ZZ, D_YZ, D_ZX, D_XY = (RATE + k * CHUNK for k in range(6))

@@ -73,7 +73,7 @@ def rows_of(material: Material, pressure: str) -> int:
     if strength == JOHNSON_COOK:
         return state.TEMPERATURE + 1
     if strength == LINEAR_HARDENING:
-        return state.FLOW + 1
+        return state.YIELD + 1
     if eos == MIE_GRUNEISEN:
         return state.VOLUME_RATIO + 1
     return state.WORK_VISCOUS + 1 if pressure == "standard" else state.VOLUME_FLUX + 1

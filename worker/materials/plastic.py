@@ -6,7 +6,6 @@ from numba import njit
 from ..elements.tet4 import TRIAL, VOLUME_MID
 from ..state import (
     CHUNK,
-    FLOW,
     PLASTIC_STRAIN,
     S_XX,
     S_XY,
@@ -21,7 +20,7 @@ from .models import HARDENING, SHEAR
 
 _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
-_STRAIN, _WORK, _YIELD, _FLOW = PLASTIC_STRAIN * CHUNK, WORK_PLASTIC * CHUNK, YIELD * CHUNK, FLOW * CHUNK
+_STRAIN, _WORK, _YIELD = PLASTIC_STRAIN * CHUNK, WORK_PLASTIC * CHUNK, YIELD * CHUNK
 
 
 @njit("void(float64[::1], float64[::1], int64)", cache=True, error_model="numpy")

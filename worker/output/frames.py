@@ -38,15 +38,16 @@ def von_mises(deviator: Floats) -> Floats:
 
 def _cells(block: Block, rank: int) -> dict[str, Any]:
     deviator = np.array([block.row(row) for row in range(S_XX, S_XY + 1)])
-    zeros = np.zeros(block.n, np.float32)
+    strain = block.row(PLASTIC_STRAIN) if block.has(PLASTIC_STRAIN) else np.zeros(block.n)
+    temperature = block.row(TEMPERATURE) if block.has(TEMPERATURE) else np.full(block.n, block.temperature)
     return {
         "part": np.full(block.n, block.part, np.int32),
         "rank": np.full(block.n, rank, np.int32),
         "tet": block.id,
         "pressure": block.row(PRESSURE).astype(np.float32),
         "mises": von_mises(deviator).astype(np.float32),
-        "plastic_strain": block.row(PLASTIC_STRAIN).astype(np.float32) if block.has(PLASTIC_STRAIN) else zeros,
-        "temperature": block.row(TEMPERATURE).astype(np.float32) if block.has(TEMPERATURE) else zeros,
+        "plastic_strain": strain.astype(np.float32),
+        "temperature": temperature.astype(np.float32),
     }
 
 

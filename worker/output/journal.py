@@ -1,5 +1,6 @@
 """journal.jsonl, the truth of a run: every message numbered, written and flushed before anybody else hears of it."""
 
+import contextlib
 import time
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
@@ -26,6 +27,8 @@ class Journal:
         self._run = run
         self._seq = _last_seq(path)
         self._file = path.open("ab", buffering=0)
+        if path.stat().st_size and not path.read_bytes().endswith(b"\n"):
+            self._file.write(b"\n")
         self._listener = listener
 
     def write(self, kind: type[M], step: int = 0, t: float = 0.0, **fields: Any) -> M:
@@ -43,7 +46,10 @@ class Journal:
 
 
 def _last_seq(path: Path) -> int:
+    """The number of the last line that is whole; one that a crash has torn is passed over."""
     if not path.exists():
         return 0
-    lines = path.read_bytes().splitlines()
-    return messages.from_json(lines[-1]).seq if lines else 0
+    for line in reversed(path.read_bytes().splitlines()):
+        with contextlib.suppress(msgspec.DecodeError):
+            return messages.from_json(line).seq
+    return 0

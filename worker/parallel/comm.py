@@ -50,9 +50,6 @@ class Comm(Protocol):
     def barrier(self) -> None:
         """Returns when every rank has come here."""
 
-    def abort(self, code: int) -> None:
-        """Ends every rank of the job at once."""
-
 
 class Exchange(Protocol):
     """A set of messages with fixed partners and buffers, sent again and again."""
@@ -112,9 +109,6 @@ class SerialComm:
     def barrier(self) -> None:
         pass
 
-    def abort(self, code: int) -> None:
-        raise SystemExit(code)
-
 
 class MpiComm:
     """All ranks of MPI's world."""
@@ -161,9 +155,6 @@ class MpiComm:
 
     def barrier(self) -> None:
         self._world.Barrier()
-
-    def abort(self, code: int) -> None:
-        self._world.Abort(code)
 
 
 class _MpiPending:

@@ -1,7 +1,8 @@
 """Sums that do not depend on their order: integers in units of a power of two.
 
 The scale of the nodal forces follows the largest contribution of the step before; when a step outgrows it, the sum is
-repeated in a coarser quantum. A contribution has 52 bits, the sum ten more: nothing ever wraps.
+repeated in a coarser quantum. A contribution has 52 bits; node 0 of a tet may get three of them, so a node could have
+340 tets before its sum wraps: ten times what a mesh has.
 """
 
 import math
