@@ -1,0 +1,164 @@
+"""``make bench``: everything in turn; tables to the terminal and to build/bench/bench.md, numbers to bench.json.
+
+``BENCH=quick`` takes some two minutes, the default a quarter of an hour, ``BENCH=long`` an hour. A part can be named:
+``python -m tests.bench speed taylor``.
+"""
+
+import json
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from . import accuracy, axisymmetric, gates, growth, machine, speed, startup, taylor_cost, telemetry
+from .gates import Gate
+from .scene import box
+
+OUT = Path(__file__).parents[2] / "build" / "bench"
+
+
+@dataclass(frozen=True)
+class Extent:
+    """How much is measured; a part with a count of 0 is left out."""
+
+    sizes: tuple[int, ...]
+    metals: tuple[speed.Metal, ...]
+    rounds: int
+    akantu: bool
+    stages: int
+    growth: tuple[int, ...]
+    startup: int
+    plans: list[accuracy.Plan]
+    telemetry: int
+    quads: tuple[int, ...]
+
+
+QUICK = Extent(
+    sizes=(50_000,), metals=(speed.METALS[0], speed.METALS[3]), rounds=3, akantu=False, stages=0,
+    growth=(50_000, 150_000), startup=0, plans=accuracy.grid([1.07], [0.9]), telemetry=0, quads=(3,),
+)  # fmt: skip
+FULL = Extent(
+    sizes=(50_000, 144_000, 500_000), metals=speed.METALS, rounds=3, akantu=True, stages=10,
+    growth=(50_000, 150_000, 500_000, 2_000_000), startup=3,
+    plans=accuracy.grid([0.54, 0.8, 1.07], [0.9]) + accuracy.grid([1.07], [0.45]), telemetry=5, quads=(3, 4, 6),
+)  # fmt: skip
+LONG = Extent(
+    sizes=FULL.sizes, metals=FULL.metals, rounds=6, akantu=True, stages=10, growth=FULL.growth,
+    startup=5,
+    plans=[
+        *accuracy.grid([0.4], [0.9]), *FULL.plans, *accuracy.grid([0.54, 0.8], [0.45]),
+        *accuracy.variants(0.54), *accuracy.variants(0.8),
+    ],
+    telemetry=15, quads=(3, 4, 6, 8, 12),
+)  # fmt: skip
+
+
+@dataclass
+class Book:
+    """Collects what the parts say, and writes it as they go."""
+
+    text: list[str] = field(default_factory=list)
+    data: dict[str, Any] = field(default_factory=dict)
+    shown: list[Gate] = field(default_factory=list)
+
+    def add(self, title: str, text: str, data: object, shown: Iterator[Gate] | None = None) -> None:
+        """A section, its numbers, and the requirements that it speaks to."""
+        self.text.append(f"## {title}\n\n{text.rstrip()}\n")
+        print(f"\n{self.text[-1]}", flush=True)
+        self.data[title] = data
+        self.shown += shown or ()
+        self.write()
+
+    def write(self) -> None:
+        """To build/bench."""
+        OUT.mkdir(parents=True, exist_ok=True)
+        (OUT / "bench.md").write_text("\n".join([*self.text, ""]), encoding="utf-8")
+        (OUT / "bench.json").write_text(json.dumps(self.data, indent=1), encoding="utf-8")
+
+
+def _speed(extent: Extent, book: Book) -> None:
+    speeds = list(speed.measure([box(size) for size in extent.sizes], extent.metals, extent.rounds))
+    book.add("Speed", speed.tables(speeds), speed.as_data(speeds), gates.of_speed(speeds))
+
+
+def _akantu(extent: Extent, book: Book) -> None:
+    if extent.akantu:
+        peers = speed.beside_akantu(box(144_000))
+        book.add("Beside Akantu", speed.peer_table(peers), speed.as_data(peers))
+
+
+def _taylor(extent: Extent, book: Book) -> None:
+    if extent.stages:
+        stages = taylor_cost.measure("nodal", extent.stages)
+        book.add(
+            "Johnson-Cook over a Taylor bar",
+            taylor_cost.report(stages),
+            [asdict(s) for s in stages],
+            gates.of_taylor(stages),
+        )
+
+
+def _growth(extent: Extent, book: Book) -> None:
+    sizes = growth.measure(extent.growth, extent.rounds)
+    book.add("Cost and memory of a tet", growth.report(sizes), [asdict(s) for s in sizes], gates.of_growth(sizes))
+
+
+def _startup(extent: Extent, book: Book) -> None:
+    if extent.startup:
+        started = startup.measure(extent.startup)
+        book.add("Start-up", startup.report(started), asdict(started), gates.of_startup(started))
+
+
+def _accuracy(extent: Extent, book: Book) -> None:
+    from . import plot
+
+    answers = accuracy.measure(extent.plans)
+    quads = [axisymmetric.run(cells) for cells in extent.quads]
+    text = f"{accuracy.report(answers)}\n\n{axisymmetric.report(quads)}"
+    data = {"runs": accuracy.as_data(answers), "quads": [asdict(q) for q in quads]}
+    finest = quads[-1]
+    limits = {("taylor_copper", "radius"): 1e3 * finest.radius, ("taylor_copper", "extent"): 1e3 * finest.length}
+    book.add("Speed against error", text, data, gates.of_accuracy(answers))
+    plot.speed_and_error(answers, OUT / "speed_error.png", limits)
+
+
+def _telemetry(extent: Extent, book: Book) -> None:
+    handed = telemetry.hand_over()
+    costs = telemetry.measure(extent.telemetry) if extent.telemetry else []
+    text = telemetry.message_table(handed) + (f"\n\n{telemetry.report(costs)}" if costs else "")
+    data = {"runs": [asdict(c) for c in costs], "messages": [asdict(m) for m in handed]}
+    book.add("Telemetry", text, data, gates.of_telemetry(costs))
+
+
+PARTS: dict[str, Callable[[Extent, Book], None]] = {
+    "speed": _speed, "akantu": _akantu, "taylor": _taylor, "growth": _growth, "startup": _startup,
+    "accuracy": _accuracy, "telemetry": _telemetry,
+}  # fmt: skip
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Runs the named parts, or all."""
+    extents = {"quick": QUICK, "full": FULL, "long": LONG}
+    wanted = os.environ.get("BENCH") or "full"
+    unknown = [name for name in arguments if name not in PARTS]
+    if wanted not in extents or unknown:
+        print(f"BENCH={wanted} {' '.join(unknown)}: BENCH is one of {', '.join(extents)}; parts are {', '.join(PARTS)}")
+        return 2
+    book, began = Book(), time.monotonic()
+    facts = machine.describe()
+    book.add("Machine", "\n".join(f"- {name}: {value}" for name, value in facts.items()), facts)
+    for name in arguments or PARTS:
+        begin = time.monotonic()
+        PARTS[name](extents[wanted], book)
+        print(f"({name}: {time.monotonic() - begin:.0f} s, load {machine.load()})", flush=True)
+    if book.shown:
+        book.add("Must show", gates.report(book.shown), [asdict(gate) for gate in book.shown])
+    print(f"{(time.monotonic() - began) / 60:.1f} minutes; tables, numbers and picture in {OUT}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

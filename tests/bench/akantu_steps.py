@@ -1,0 +1,59 @@
+"""Akantu on a mesh, in a process of its own: ``python akantu_steps.py MESH.npz true|false``, finite deformation or not.
+
+Says "ready", then for each line with a number takes so many explicit steps and says the CPU seconds that they took.
+Imports nothing of Conoid: it may run under another interpreter.
+"""
+
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import akantu
+import numpy as np
+
+_STEEL = """
+material elastic [
+  name = steel
+  rho = 7850
+  E = 200e9
+  nu = 0.3
+  finite_deformation = {finite}
+]
+"""
+
+
+def main(mesh_path: str, finite: str) -> None:
+    """Builds the model and answers until standard input ends."""
+    with np.load(mesh_path) as stored:
+        model = _model(stored["points"], stored["tets"], finite)
+    print("ready", flush=True)
+    for line in sys.stdin:
+        begin = time.process_time()
+        for _ in range(int(line)):
+            model.solveStep()
+        print(time.process_time() - begin, flush=True)
+
+
+def _model(points: "np.ndarray", tets: "np.ndarray", finite: str) -> "akantu.SolidMechanicsModel":
+    with tempfile.TemporaryDirectory() as folder:
+        material = Path(folder) / "material.dat"
+        material.write_text(_STEEL.format(finite=finite), encoding="utf-8")
+        akantu.parseInput(str(material))
+    mesh = akantu.Mesh(3)
+    access = akantu.MeshAccessor(mesh)
+    access.resizeNodes(len(points))
+    mesh.getNodes()[:] = points
+    mesh.addConnectivityType(akantu._tetrahedron_4)
+    access.resizeConnectivity(len(tets), akantu._tetrahedron_4)
+    mesh.getConnectivity(akantu._tetrahedron_4)[:] = tets
+    access.makeReady()
+    model = akantu.SolidMechanicsModel(mesh)
+    model.initFull(_analysis_method=akantu._explicit_lumped_mass)
+    model.setTimeStep(0.8 * model.getStableTimeStep())
+    model.getVelocity()[:] = 1.0 * (points - points.mean(axis=0)) / np.ptp(points)
+    return model
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], sys.argv[2])

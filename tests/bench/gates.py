@@ -1,0 +1,90 @@
+"""What the project has to show, beside what was measured. The bench reports; it does not fail."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from .accuracy import Answer
+from .growth import Growth
+from .speed import Speed
+from .startup import Startup
+from .table import table
+from .taylor_cost import Stage, mean_speed
+from .telemetry import Cost
+
+
+@dataclass(frozen=True)
+class Gate:
+    """One requirement."""
+
+    what: str
+    wanted: str
+    measured: str
+    met: bool
+
+
+def of_speed(speeds: Sequence[Speed]) -> Iterator[Gate]:
+    """Elastic, at 136,000 to 150,000 tets."""
+    for s in speeds:
+        if (s.material, s.form) == ("elastic", "standard") and 1.3e5 < s.tets < 1.6e5:
+            yield Gate(f"elastic, {s.tets:,} tets", ">= 12 M updates / CPU-s", f"{s.best:.1f} M", s.best >= 12.0)
+            yield Gate(f"elastic, {s.tets:,} tets", ">= 25 % of gather-scatter", f"{s.share:.0%}", s.share >= 0.25)
+
+
+def of_taylor(stages: Sequence[Stage]) -> Iterator[Gate]:
+    """Johnson-Cook with nodal pressure, mean over the bar."""
+    best, _ = mean_speed(stages)
+    what = f"Johnson-Cook, nodal, Taylor bar, {stages[0].tets:,} tets"
+    yield Gate(what, ">= 4 M updates / CPU-s", f"{best:.2f} M", best >= 4.0)
+
+
+def of_growth(sizes: Sequence[Growth]) -> Iterator[Gate]:
+    """Memory between the first and the last size, and the cost of a tet over all."""
+    peak, steady = sizes[-1].bytes_a_tet(sizes[0])
+    yield Gate("memory, elastic, while it is set up", "<= 400 bytes a tet", f"{peak:.0f}", peak <= 400.0)
+    yield Gate("memory, elastic, while it steps", "<= 400 bytes a tet", f"{steady:.0f}", steady <= 400.0)
+    worst = max(s.best for s in sizes) / min(s.best for s in sizes)
+    span = f"cost a tet, {sizes[0].tets:,} to {sizes[-1].tets:,} tets, dearest / cheapest"
+    yield Gate(span, "<= 1.30", f"{worst:.2f}", worst <= 1.3)
+
+
+def of_startup(startup: Startup) -> Iterator[Gate]:
+    """Warm start, and who compiles."""
+    yield Gate("submit to first step, warm", "<= 3 s", f"{startup.submitted:.2f} s", startup.submitted <= 3.0)
+    others = sum(count for rank, count in startup.compiled.items() if rank)
+    yield Gate("kernels that ranks other than 0 compile", "0", str(others), others == 0 < startup.compiled[0])
+
+
+def of_accuracy(answers: Sequence[Answer]) -> Iterator[Gate]:
+    """The Taylor bars as the shipped cases have them: 12,960 tets."""
+    for a in answers:
+        if a.plan.size != 0.54 or a.plan.safety != 0.9 or a.plan.generator != "structured" or not a.plan.viscosity:
+            continue
+        for name, unit in (("extent", "length"), ("radius", "radius")):
+            check = next((c for c in a.checks if c.name.startswith(name)), None)
+            if check is not None and a.plan.form != "standard":
+                wanted = f"{1000 * check.expected:.3f} +- {1000 * check.tolerance:.3f} mm"
+                what = f"{a.plan.bar}, {a.plan.form}, {a.tets:,} tets, {unit}"
+                yield Gate(what, wanted, f"{1000 * check.value:.3f} mm", check.passed)
+            elif check is not None and name == "radius":
+                limit = 6.0 if a.plan.bar == "taylor_copper" else 4.5
+                what = f"{a.plan.bar}, standard locks, radius"
+                yield Gate(what, f"< {limit} mm", f"{1000 * check.value:.3f} mm", 1000 * check.value < limit)
+        yield Gate(f"{a.plan.bar}, {a.plan.form}, energy residual", "< 1 %", f"{a.residual:.1e}", a.residual < 0.01)
+
+
+def of_telemetry(costs: Sequence[Cost]) -> Iterator[Gate]:
+    """Each way against no telemetry."""
+    if not costs:
+        return
+    for cost in costs[1:]:
+        cpu, _ = cost.against(costs[0])
+        change = f"{100 * (cpu - 1):+.1f} %"
+        yield Gate(f"telemetry, router {cost.way}: CPU time a step", "within 1 %", change, abs(cpu - 1) <= 0.01)
+    digests = {digest for cost in costs for digest in cost.digests}
+    yield Gate("telemetry: digests over all ways", "1", str(len(digests)), len(digests) == 1)
+
+
+def report(gates: Sequence[Gate]) -> str:
+    """One line each."""
+    rows = [[gate.what, gate.wanted, gate.measured, "yes" if gate.met else "NO"] for gate in gates]
+    return table(["what", "wanted", "measured", "met"], rows) + "\n"

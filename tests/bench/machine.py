@@ -1,0 +1,37 @@
+"""On what, and with what, a number was measured."""
+
+import os
+import platform
+import subprocess
+from importlib.metadata import version
+from pathlib import Path
+
+
+def describe() -> dict[str, str]:
+    """Processor, cores, load, versions and commit, as text."""
+    return {
+        "processor": f"{_processor()}, {os.cpu_count()} cores",
+        "load": load(),
+        "python": platform.python_version(),
+        "numba": version("numba"),
+        "numpy": version("numpy"),
+        "commit": _commit(),
+    }
+
+
+def load() -> str:
+    """Runnable processes, mean over 1, 5 and 15 minutes: more than the cores means that others computed too."""
+    return " ".join(f"{mean:.1f}" for mean in os.getloadavg())
+
+
+def _processor() -> str:
+    for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+        if line.startswith("model name"):
+            return line.split(":", 1)[1].strip()
+    return platform.machine()
+
+
+def _commit() -> str:
+    here = Path(__file__).parent
+    made = subprocess.run(["git", "describe", "--always", "--dirty"], cwd=here, capture_output=True, text=True)
+    return made.stdout.strip() or "unknown"

@@ -1,0 +1,53 @@
+"""A tet mesh with every tet cut into eight at its corners and edge midpoints, and how nodal values follow."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from conoid.worker.mesh.model import TetMesh
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+_EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
+_CHILDREN = np.array([
+    (0, 4, 5, 6), (1, 7, 4, 8), (2, 5, 7, 9), (3, 8, 6, 9), (4, 7, 5, 9), (4, 8, 7, 9), (4, 6, 8, 9), (4, 5, 6, 9),
+])  # fmt: skip
+"""Corners 0-3, midpoints 4-9 in the order of _EDGES; the inner octahedron is cut along 4-9."""
+
+
+@dataclass(frozen=True)
+class Refined:
+    """A finer mesh, and where it came from."""
+
+    mesh: TetMesh
+    ends: Ints
+    """(nodes, 2) the two old nodes that each new node lies between, the same one twice for an old node."""
+    parent: Ints
+    """(tets,) the old tet of each new one."""
+
+    def nodal(self, values: Floats) -> Floats:
+        """Values at the old nodes, (old, ...), at the new ones."""
+        mean: Floats = 0.5 * (values[self.ends[:, 0]] + values[self.ends[:, 1]])
+        return mean
+
+
+def refined(mesh: TetMesh) -> Refined:
+    """Cuts every tet into eight of equal volume; nodes are numbered as the tets come to them."""
+    n, tets = len(mesh.points), mesh.tets.astype(np.int64)
+    pairs = np.sort(np.stack([tets[:, list(edge)] for edge in _EDGES], axis=1), axis=2).reshape(-1, 2)
+    edges, number = np.unique(pairs, axis=0, return_inverse=True)
+    corners = np.concatenate([tets, n + number.reshape(-1, 6)], axis=1)
+    fine = corners[:, _CHILDREN].reshape(-1, 4)
+    ends = np.concatenate([np.repeat(np.arange(n)[:, None], 2, axis=1), edges])
+    _, first = np.unique(fine, return_index=True)
+    order = fine.reshape(-1)[np.sort(first)]
+    place = np.empty(len(ends), np.int64)
+    place[order] = np.arange(len(order))
+    ends = ends[order]
+    points = 0.5 * (mesh.points[ends[:, 0]] + mesh.points[ends[:, 1]])
+    made = TetMesh(points, place[fine].astype(np.int32))
+    turned = made.volumes() < 0
+    made.tets[turned] = made.tets[turned][:, [0, 2, 1, 3]]
+    return Refined(made, ends, np.repeat(np.arange(len(tets)), 8))

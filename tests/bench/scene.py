@@ -1,0 +1,97 @@
+"""Bodies to time: a box of about so many tets, of one material, that is stretched as a whole.
+
+The stretch keeps the volume and is the same everywhere, so every tet of a plastic material yields within some ten steps
+and goes on yielding; of an elastic one it stays small.
+"""
+
+import time
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
+from typing import Literal
+from unittest.mock import patch
+
+import numpy as np
+
+from conoid.cases import schema
+from conoid.worker import domain, simulation, state, step
+from conoid.worker.mesh.model import TetMesh
+from conoid.worker.parallel.comm import SerialComm
+
+Form = Literal["standard", "nodal", "split"]
+Generator = Literal["gmsh", "structured"]
+FORMS: tuple[Form, ...] = ("standard", "nodal", "split")
+SAMPLE_EVERY = 20
+"""Steps between two lines of the ledger: the default 500 samples in a run of 10,000 steps."""
+
+_EDGE = 0.01
+_GMSH_TETS = 5.9
+"""Tets of gmsh in the cube of ``element_size``, of which the structured generator makes 6."""
+
+
+def box(tets: int, generator: Generator = "gmsh") -> schema.Box:
+    """A cube of 10 mm in about ``tets`` tets."""
+    size = _EDGE / round((tets / 6) ** (1 / 3)) if generator == "structured" else _EDGE * (_GMSH_TETS / tets) ** (1 / 3)
+    return schema.Box(
+        shape="box", low=(0.0, 0.0, 0.0), high=(_EDGE,) * 3, element_size=float(f"{size:.4g}"), generator=generator
+    )
+
+
+def case(material: str, form: Form, mesh: schema.Box, viscosity: bool = True) -> schema.Case:
+    """One part of ``material``, a name of the library."""
+    return schema.Case(
+        name="bench", parts=(schema.Part(name="body", material=material, mesh=mesh),),
+        numerics=schema.Numerics(pressure=form, viscosity=schema.Viscosity() if viscosity else None),
+        run=schema.Run(end_time=1.0, frames=0),
+    )  # fmt: skip
+
+
+class Ride:
+    """A simulation that takes whole steps as the worker does, ledger, probes and limiter every SAMPLE_EVERY steps."""
+
+    def __init__(self, scene: schema.Case, mesh: TetMesh | None = None) -> None:
+        """``mesh``: of the only part, instead of the one that the case asks for."""
+        ready: AbstractContextManager[object] = nullcontext()
+        if mesh is not None:
+            ready = patch.object(domain, "build_mesh", lambda *_, **__: mesh)
+        with ready:
+            self.sim = simulation.build(scene, Path(), SerialComm())
+        step.prepare(self.sim)
+
+    @property
+    def tets(self) -> int:
+        """Number of tets."""
+        return self.sim.model.elements_global
+
+    def stretch(self, strain: float) -> None:
+        """Sets the body in motion: ``strain`` a step along z, minus half of it across."""
+        nodes = self.sim.model.nodes
+        rate = strain * self.sim.vote.limit / self.sim.case.numerics.dt_safety
+        nodes.v[:] = (nodes.x - nodes.x.mean(axis=0)) * rate * np.array([-0.5, -0.5, 1.0])
+
+    def steps(self, count: int) -> float:
+        """CPU seconds of ``count`` steps."""
+        begin = time.thread_time()
+        for _ in range(count):
+            self._step()
+        return time.thread_time() - begin
+
+    def _step(self) -> None:
+        sim = self.sim
+        before = sim.model.nodes.v.copy() if sim.clock.step % SAMPLE_EVERY == 0 else None
+        step.first_half(sim)
+        with sim.timers.phase("output"):
+            if before is not None:
+                sim.ledger.close(before)
+                sim.probes.measure()
+                sim.limiter()
+        step.second_half(sim)
+
+    def yielding(self) -> float:
+        """Share of the tets that yield in the next step, which it takes."""
+        before = self._plastic_strain()
+        self._step()
+        return float((self._plastic_strain() > before).mean()) if len(before) else 0.0
+
+    def _plastic_strain(self) -> state.Floats:
+        blocks = [block for block in self.sim.model.blocks if block.has(state.PLASTIC_STRAIN)]
+        return np.concatenate([np.zeros(0), *(block.row(state.PLASTIC_STRAIN) for block in blocks)])

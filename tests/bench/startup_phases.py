@@ -1,0 +1,83 @@
+"""One worker's way to its first step, timed: ``python -m tests.bench.startup_phases LAUNCHED CASE``, seconds as JSON.
+
+``LAUNCHED`` is the Unix time at which the process was launched. The order is that of the worker's own start. Each phase
+has two numbers, seconds of wall time and of CPU time.
+"""
+
+import json
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from conoid.worker import kernels
+
+PHASES = (
+    "interpreter, contract, Zenoh",
+    "MPI",
+    "numba and kernels",
+    "meshes",
+    "cut",
+    "model",
+    "first pass",
+    "first step",
+)
+
+
+class Stamps:
+    """Wall and CPU seconds between one stamp and the next, by name."""
+
+    def __init__(self, start: float) -> None:
+        self._last = (start, 0.0)
+        self.seconds = {name: [0.0, 0.0] for name in PHASES}
+
+    def stamp(self, name: str) -> None:
+        """Books the time since the last stamp."""
+        now = (time.time(), time.process_time())
+        for clock in range(2):
+            self.seconds[name][clock] += now[clock] - self._last[clock]
+        self._last = now
+
+    def around(self, work: Callable[..., Any], before: str, name: str) -> Callable[..., Any]:
+        """``work``, whose time is booked to ``name``, and the time until it begins to ``before``."""
+
+        def timed(*arguments: Any) -> Any:
+            self.stamp(before)
+            result = work(*arguments)
+            self.stamp(name)
+            return result
+
+        return timed
+
+
+def main(launched: float, case: str) -> None:
+    """Goes the way and prints the seconds of each phase."""
+    stamps = Stamps(launched)
+    kernels.use_cache()
+    from conoid.cases import load
+    from conoid.worker.parallel.comm import connect
+
+    scene = load.read_case(load.shipped_path(case))
+    stamps.stamp("interpreter, contract, Zenoh")
+    comm = connect()
+    stamps.stamp("MPI")
+    from conoid.worker import compute as all_kernels
+    from conoid.worker import domain, simulation, step
+
+    assert all_kernels
+    stamps.stamp("numba and kernels")
+    domain.assemble = stamps.around(domain.assemble, "model", "meshes")
+    domain.cut = stamps.around(domain.cut, "meshes", "cut")
+    sim = simulation.build(scene, Path(), comm)
+    stamps.stamp("model")
+    step.prepare(sim)
+    stamps.stamp("first pass")
+    step.first_half(sim)
+    step.second_half(sim)
+    stamps.stamp("first step")
+    print(json.dumps(stamps.seconds))
+
+
+if __name__ == "__main__":
+    main(float(sys.argv[1]), sys.argv[2])
