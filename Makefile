@@ -1,6 +1,6 @@
 # make demo   a Taylor bar: submitted over HTTP, run on 2 MPI ranks, watched live, checked, drawn (demo.png)
 # make test   linters, types and every test that takes seconds
-# make bench  speed, and speed against error: tables in bench/out
+# make bench  speed, and speed against error, in 15 minutes: tables in build/bench (BENCH=quick: 2, BENCH=long: 60)
 # make drill  the long tests: studies and failures that take minutes
 #
 # Each target first brings .venv to the versions of requirements.lock, when that file or pyproject.toml has changed.
@@ -25,7 +25,7 @@ lint: $(READY)
 	$(BIN)/mypy
 
 bench: $(READY)
-	$(BIN)/python -m pytest -q -m slow --timeout 7200 tests/bench
+	$(BIN)/python -m tests.bench
 
 drill: $(READY)
 	$(BIN)/python -m pytest -q -m slow --timeout 3600 --ignore tests/bench tests
