@@ -1,4 +1,4 @@
-"""Time: the stable step, its growth, and landing on output times without a sliver of a step."""
+"""Time: the stable step, its growth, and steps that land on output times."""
 
 import math
 
@@ -45,19 +45,13 @@ class Clock:
     def choose(self, limit: float) -> float:
         """The next step, s: ``limit`` is the largest one-over-stable-step of all tets, 1/s. Returns the mean step.
 
-        The way to the next frame is divided evenly over its last two steps. ``growth`` bounds the stable step; after
-        landing on a frame the step comes back to it at once.
+        The way to the next frame is divided into equal steps, as few as are stable: steps that change little cost
+        little energy, and none is a sliver. ``growth`` bounds the stable step.
         """
         self.last_dt = self.dt
         self._stable = min(self._safety / limit, self._growth * self._stable)
-        target = self.frame_time(self.frame + 1 if self.frame_due else self.frame)
-        left = target - self.t
-        if left <= self._stable:
-            self.dt = max(left, 0.0)
-        elif left < 2.0 * self._stable:
-            self.dt = 0.5 * left
-        else:
-            self.dt = self._stable
+        left = self.frame_time(self.frame + 1 if self.frame_due else self.frame) - self.t
+        self.dt = left / math.ceil(left / self._stable) if left > 0.0 else 0.0
         self._first = self._first or self._stable
         self.mean_dt = 0.5 * (self.last_dt + self.dt)
         return self.mean_dt

@@ -91,7 +91,7 @@ class Simulation:
         """Which tet holds the time step down, and why; all ranks take part."""
         stable = self.clock.stable
         why = "stability" if stable * self.vote.limit >= 0.999 * self.case.numerics.dt_safety else "growth"
-        if self.clock.dt < stable:
+        if self.clock.dt < 0.9 * stable:
             why = "output time"
         return f"{why}: {self.limiting_tet()}"
 

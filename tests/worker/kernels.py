@@ -61,13 +61,13 @@ def scene(material: schema.Material = STEEL, form: Form = "standard", end: float
 def build(case: schema.Case, meshes: Iterable[TetMesh], comm: Comm | None = None) -> Simulation:
     """The simulation of a case whose parts have these meshes."""
     ready = iter(meshes)
-    with patch.object(domain, "build_mesh", lambda *_: next(ready)):
+    with patch.object(domain, "build_mesh", lambda *_, **__: next(ready)):
         return simulation.build(case, Path(), comm or SerialComm())
 
 
 def whole_of(mesh: TetMesh, case: schema.Case | None = None) -> domain.Whole:
     """The whole mesh as rank 0 has it before the cut."""
-    with patch.object(domain, "build_mesh", lambda *_: mesh):
+    with patch.object(domain, "build_mesh", lambda *_, **__: mesh):
         return domain.assemble(case or scene(), Path())
 
 

@@ -56,17 +56,20 @@ def test_step_is_within_safety_and_growth() -> None:
     for limit in limits * 20:
         mean = clock.choose(limit)
         assert clock.dt <= 0.7 / limit
-        assert clock.dt == min(0.7 / limit, 1.1 * old)
-        assert mean == 0.5 * ((0.0 if old == math.inf else old) + clock.dt)
-        old = clock.dt
+        assert clock.stable == min(0.7 / limit, 1.1 * old)
+        assert clock.dt == pytest.approx(clock.stable, rel=1e-6)
+        assert clock.dt <= clock.stable
+        assert mean == 0.5 * (clock.last_dt + clock.dt)
+        old = clock.stable
         clock.advance()
 
 
-def test_growth_goes_on_after_an_output_time() -> None:
-    """The short steps before an output time do not hold the next ones down."""
+def test_steps_to_an_output_time_are_equal_and_as_few_as_are_stable() -> None:
     seen = steps_of(Clock(1e-5, 0.9, 1.05, 3), [1e7])
-    after = [b for (_, _, due), (_, b, _) in pairwise(seen) if due]
-    assert after[0] == pytest.approx(0.9e-7, rel=1e-12)
+    steps = np.array([dt for _, dt, _ in seen if dt > 0.0])
+    wanted = 3 * math.ceil(1e-5 / 3 / 0.9e-7)
+    assert len(steps) == wanted
+    assert steps == pytest.approx(1e-5 / wanted, rel=1e-9)
 
 
 def test_time_is_compensated_over_a_million_steps() -> None:

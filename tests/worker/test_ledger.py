@@ -39,9 +39,6 @@ def test_an_impact_closes_to_a_percent(material: schema.Material, form: Form) ->
     assert worst(material, form, viscosity={}, **FLIGHT) < 0.02
 
 
-@pytest.mark.xfail(
-    strict=True, reason="kinetic energy is read with the step ahead, impulses are booked before they act"
-)
 @pytest.mark.parametrize("frames", [0, 20])
 @pytest.mark.parametrize("keys", [FLIGHT, PULL], ids=["wall", "pull"])
 def test_every_line_closes_to_second_order(keys: dict[str, Any], frames: int) -> None:

@@ -95,7 +95,7 @@ def test_a_linear_pressure_is_left_alone() -> None:
 
 
 def test_stabilisation_against_the_formula() -> None:
-    """K dt^2 / V_a sum of V / rho grad N_a . (grad p - mean of the nodes' projected gradients), and nothing in sum."""
+    """K dt^2/2 / V_a sum of V / rho grad N_a . (grad p - mean projected grad p), and nothing in sum."""
     pressure = np.random.default_rng(5).normal(size=len(MESH.points)) * 1e9
     patch, change = stabilised(pressure)
     volume, grad = formulas.gradients(patch.corners())
@@ -104,7 +104,7 @@ def test_stabilisation_against_the_formula() -> None:
     projected = np.stack([quarter_sums(patch, volume * own[:, i]) for i in range(3)], axis=1) / nodal_volume[:, None]
     excess = own - projected[patch.tets].mean(axis=1)
     flux = volume[:, None] / DENSITY * np.einsum("nai,ni->na", grad, excess)
-    expected = -BULK * DT**2 * formulas.at_nodes(patch.tets, flux, patch.nodes.n) / nodal_volume
+    expected = -0.5 * BULK * DT**2 * formulas.at_nodes(patch.tets, flux, patch.nodes.n) / nodal_volume
     assert np.abs(change - expected).max() < 1e-11 * np.abs(expected).max()
     assert abs((nodal_volume * change).sum()) < QUANTUM * BULK * volume.sum()
 
