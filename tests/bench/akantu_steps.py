@@ -26,7 +26,8 @@ material elastic [
 def main(mesh_path: str, finite: str) -> None:
     """Builds the model and answers until standard input ends."""
     with np.load(mesh_path) as stored:
-        model = _model(stored["points"], stored["tets"], finite)
+        mesh = _mesh(stored["points"], stored["tets"])
+        model = _model(mesh, stored["points"], finite)
     print("ready", flush=True)
     for line in sys.stdin:
         begin = time.process_time()
@@ -35,11 +36,8 @@ def main(mesh_path: str, finite: str) -> None:
         print(time.process_time() - begin, flush=True)
 
 
-def _model(points: "np.ndarray", tets: "np.ndarray", finite: str) -> "akantu.SolidMechanicsModel":
-    with tempfile.TemporaryDirectory() as folder:
-        material = Path(folder) / "material.dat"
-        material.write_text(_STEEL.format(finite=finite), encoding="utf-8")
-        akantu.parseInput(str(material))
+def _mesh(points: "np.ndarray", tets: "np.ndarray") -> "akantu.Mesh":
+    """Must outlive its model, which does not hold it."""
     mesh = akantu.Mesh(3)
     access = akantu.MeshAccessor(mesh)
     access.resizeNodes(len(points))
@@ -48,6 +46,14 @@ def _model(points: "np.ndarray", tets: "np.ndarray", finite: str) -> "akantu.Sol
     access.resizeConnectivity(len(tets), akantu._tetrahedron_4)
     mesh.getConnectivity(akantu._tetrahedron_4)[:] = tets
     access.makeReady()
+    return mesh
+
+
+def _model(mesh: "akantu.Mesh", points: "np.ndarray", finite: str) -> "akantu.SolidMechanicsModel":
+    with tempfile.TemporaryDirectory() as folder:
+        material = Path(folder) / "material.dat"
+        material.write_text(_STEEL.format(finite=finite), encoding="utf-8")
+        akantu.parseInput(str(material))
     model = akantu.SolidMechanicsModel(mesh)
     model.initFull(_analysis_method=akantu._explicit_lumped_mass)
     model.setTimeStep(0.8 * model.getStableTimeStep())
