@@ -1,0 +1,18 @@
+"""Orders of convergence: measured here, expected in rates.toml."""
+
+import math
+import tomllib
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+
+RATES = tomllib.loads(Path(__file__).with_name("rates.toml").read_text(encoding="utf-8"))
+
+
+def assert_converges(name: str, errors: Sequence[float]) -> None:
+    """The errors, each at half the size of the one before, fall with the order of the table, and as far as it says."""
+    rate = RATES[name]
+    orders = [math.log2(coarse / fine) for coarse, fine in pairwise(errors)]
+    assert min(orders) > rate["order"] - rate["within"], f"{name}: orders {orders}"
+    for error, first in zip(errors, rate["errors"], strict=True):
+        assert error < 1.1 * first, f"{name}: errors {errors}, first measured {rate['errors']}"
