@@ -8,6 +8,7 @@ repeated in a coarser quantum. A contribution has 52 bits; node 0 of a tet may g
 import math
 
 import numpy as np
+from numba import njit
 
 from ..state import Floats, Ints
 from .comm import Comm
@@ -34,19 +35,38 @@ def outgrown(largest: float, scale: float) -> bool:
     return not largest * scale < 2.0**CONTRIBUTION_BITS
 
 
+@njit("float64[::1](float64[:, ::1])", cache=True)
+def _largest(columns):  # type: ignore[no-untyped-def]
+    """(k,) largest magnitude of each column."""
+    largest = np.zeros(columns.shape[1])
+    for i in range(columns.shape[0]):
+        for j in range(columns.shape[1]):
+            largest[j] = max(largest[j], abs(columns[i, j]))
+    return largest
+
+
+@njit("int64[::1](float64[:, ::1], float64[::1])", cache=True)
+def _limbs(columns, scale):  # type: ignore[no-untyped-def]
+    """(2k,) sums of the high and of the low limbs of each column."""
+    k = columns.shape[1]
+    words = np.zeros(2 * k, np.int64)
+    for i in range(columns.shape[0]):
+        for j in range(k):
+            scaled = columns[i, j] * scale[j]
+            high = np.rint(scaled)
+            words[j] += np.int64(high)
+            words[k + j] += np.int64(np.rint((scaled - high) * _LIMB))
+    return words
+
+
 def exact_sums(comm: Comm, columns: Floats) -> Floats:
     """(k,) sums of the columns of ``columns`` (n, k) over all ranks: the same bits for any order and partition.
 
     Each value is split into two integer limbs of a common quantum, 2^-60 of the column's largest magnitude; the
     result is off by at most n times that quantum.
     """
-    largest = np.zeros(columns.shape[1]) if not len(columns) else np.abs(columns).max(axis=0)
-    largest = comm.maximum(largest)
-    exponent = np.frexp(largest)[1]
-    scaled = columns * np.ldexp(1.0, 30 - exponent)
-    high = np.rint(scaled)
-    low = np.rint((scaled - high) * _LIMB)
-    words = np.concatenate([high.astype(np.int64).sum(axis=0), low.astype(np.int64).sum(axis=0)])
-    total: Ints = comm.sum(words)
     k = columns.shape[1]
+    largest = comm.maximum(_largest(columns))
+    exponent = np.frexp(largest)[1]
+    total: Ints = comm.sum(_limbs(columns, np.ldexp(1.0, 30 - exponent)))
     return np.array([math.ldexp(int(total[j]) * 2**30 + int(total[k + j]), int(exponent[j]) - 60) for j in range(k)])
