@@ -1,13 +1,14 @@
-"""An answer for the copper Taylor bar from another element altogether: axisymmetric quadrilaterals.
+"""An answer for the Taylor bars from another element altogether: axisymmetric quadrilaterals.
 
 Four-node quads with 2 x 2 points for the deviator and one pressure for each quad (mean dilatation), which do not lock;
-J2 plasticity with linear hardening, leapfrog, a rigid frictionless wall at z = 0. It shares no code with the worker.
-Masses, volumes and forces are per radian of the circumference.
+J2 plasticity, leapfrog, a rigid frictionless wall at z = 0. It shares no code with the worker. Masses, volumes and
+forces are per radian of the circumference.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -17,11 +18,47 @@ from .table import Cell, table
 
 Floats = npt.NDArray[np.float64]
 
-LENGTH, RADIUS, SPEED, END = 32.4e-3, 3.2e-3, 227.0, 80e-6
-DENSITY, YOUNG, POISSON, YIELD, HARDENING = 8930.0, 117e9, 0.35, 0.4e9, 0.1e9
-BULK, SHEAR = YOUNG / (3.0 * (1.0 - 2.0 * POISSON)), YOUNG / (2.0 * (1.0 + POISSON))
+LENGTH, RADIUS, END = 32.4e-3, 3.2e-3, 80e-6
 LINEAR, QUADRATIC = 0.06, 1.5
+"""Bulk viscosity, as in the shipped cases."""
 SAFETY = 0.8
+
+
+class Metal(NamedTuple):
+    """Flow stress (A + B e^n) (1 + C ln(rate / 1 s^-1)) (1 - T*^m), T* from ``cold`` to ``melt``; SI."""
+
+    speed: float
+    density: float
+    bulk: float
+    shear: float
+    A: float
+    B: float
+    n: float
+    C: float
+    m: float
+    cold: float
+    melt: float
+    heat: float
+    """K per J/m^3 of plastic work."""
+
+
+METALS = {
+    "taylor_copper": Metal(227.0, 8930.0, 117e9 / 0.9, 117e9 / 2.7, 0.4e9, 0.1e9, 1.0, 0.0, 1.0, 293.15, 1e9, 0.0),
+    "taylor_42crmo4": Metal(
+        287.0,
+        7830.0,
+        206.9e9 / 1.2,
+        206.9e9 / 2.6,
+        806e6,
+        614e6,
+        0.168,
+        0.0089,
+        1.1,
+        293.15,
+        1813.15,
+        0.9 / (7830.0 * 460.0),
+    ),
+}
 
 _G = 1.0 / math.sqrt(3.0)
 _U, _V = np.array([-1.0, 1.0, 1.0, -1.0]), np.array([-1.0, -1.0, 1.0, 1.0])
@@ -57,28 +94,55 @@ def _gradients(x, v, h, quad, g, hoop, weight):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _return(s, strain, p, grad, around, dt):  # type: ignore[no-untyped-def]
-    """Deviator (rr, zz, tt, rz) at a point: rotation by the exact angle, elastic trial, radial return."""
-    mean = (grad[0, 0] + grad[1, 1] + around) / 3.0
-    angle = (grad[0, 1] - grad[1, 0]) * dt
-    half, cos, sin = 0.5 * (s[p, 0] - s[p, 1]), math.cos(angle), math.sin(angle)
-    turned, sheared = half * cos + s[p, 3] * sin, s[p, 3] * cos - half * sin
-    middle = 0.5 * (s[p, 0] + s[p, 1])
-    s[p, 0] = middle + turned + 2.0 * SHEAR * dt * (grad[0, 0] - mean)
-    s[p, 1] = middle - turned + 2.0 * SHEAR * dt * (grad[1, 1] - mean)
-    s[p, 2] += 2.0 * SHEAR * dt * (around - mean)
-    s[p, 3] = sheared + SHEAR * dt * (grad[0, 1] + grad[1, 0])
-    mises = math.sqrt(1.5 * (s[p, 0] ** 2 + s[p, 1] ** 2 + s[p, 2] ** 2 + 2.0 * s[p, 3] ** 2))
-    flow = YIELD + HARDENING * strain[p]
-    if mises > flow:
-        grown = (mises - flow) / (3.0 * SHEAR + HARDENING)
-        strain[p] += grown
-        for k in range(4):
-            s[p, k] *= 1.0 - 3.0 * SHEAR * grown / mises
+def _flow(metal, strain, rate, temperature):  # type: ignore[no-untyped-def]
+    warm = min(max((temperature - metal.cold) / (metal.melt - metal.cold), 0.0), 1.0)
+    return (
+        (metal.A + metal.B * strain**metal.n)
+        * (1.0 + metal.C * math.log(max(rate, 1.0)))
+        * (1.0 - (warm**metal.m if warm > 0.0 else 0.0))
+    )
 
 
 @njit
-def _forces(x, v, quads, mass, stress, pressure, strain, force, dt):  # type: ignore[no-untyped-def]
+def _growth(metal, mises, strain, temperature, dt):  # type: ignore[no-untyped-def]
+    """Plastic strain of the step: where the flow stress meets what is left of the trial stress (false position)."""
+    low, high = 0.0, mises / (3.0 * metal.shear)
+    below, above = mises - _flow(metal, strain, 0.0, temperature), -_flow(metal, strain + high, high / dt, temperature)
+    for _ in range(100):
+        grown = (low * above - high * below) / (above - below)
+        rest = mises - 3.0 * metal.shear * grown - _flow(metal, strain + grown, grown / dt, temperature)
+        if abs(rest) < 1e-9 * mises:
+            break
+        if rest > 0.0:
+            low, below, above = grown, rest, 0.5 * above
+        else:
+            high, above, below = grown, rest, 0.5 * below
+    return grown
+
+
+@njit
+def _return(metal, s, strain, temperature, p, grad, around, dt):  # type: ignore[no-untyped-def]
+    """Deviator (rr, zz, tt, rz) at a point: rotation by the exact angle, elastic trial, radial return, heat."""
+    mean = (grad[0, 0] + grad[1, 1] + around) / 3.0
+    angle, twice = (grad[0, 1] - grad[1, 0]) * dt, 2.0 * metal.shear * dt
+    half, cos, sin = 0.5 * (s[p, 0] - s[p, 1]), math.cos(angle), math.sin(angle)
+    turned, sheared = half * cos + s[p, 3] * sin, s[p, 3] * cos - half * sin
+    middle = 0.5 * (s[p, 0] + s[p, 1])
+    s[p, 0] = middle + turned + twice * (grad[0, 0] - mean)
+    s[p, 1] = middle - turned + twice * (grad[1, 1] - mean)
+    s[p, 2] += twice * (around - mean)
+    s[p, 3] = sheared + 0.5 * twice * (grad[0, 1] + grad[1, 0])
+    mises = math.sqrt(1.5 * (s[p, 0] ** 2 + s[p, 1] ** 2 + s[p, 2] ** 2 + 2.0 * s[p, 3] ** 2))
+    if mises > _flow(metal, strain[p], 0.0, temperature[p]):
+        grown = _growth(metal, mises, strain[p], temperature[p], dt)
+        strain[p] += grown
+        temperature[p] += metal.heat * grown * (mises - 3.0 * metal.shear * grown)
+        for k in range(4):
+            s[p, k] *= 1.0 - 3.0 * metal.shear * grown / mises
+
+
+@njit
+def _forces(metal, x, v, quads, mass, stress, pressure, strain, temperature, force, dt):  # type: ignore[no-untyped-def]
     """Stress and forces at n+1; returns the largest one-over-stable-step, -1 when a quad is inside out."""
     force[:] = 0.0
     limit = 0.0
@@ -97,8 +161,8 @@ def _forces(x, v, quads, mass, stress, pressure, strain, force, dt):  # type: ig
                         grad[i, j] += v[quad[k], i] * g[p, k, j]
                 around += v[quad[k], 0] * hoop[p, k]
             dilatation += weight[p] / volume * (grad[0, 0] + grad[1, 1] + around)
-            _return(stress[e], strain[e], p, grad, around, dt)
-        pressure[e] -= BULK * dilatation * dt
+            _return(metal, stress[e], strain[e], temperature[e], p, grad, around, dt)
+        pressure[e] -= metal.bulk * dilatation * dt
         volume = _gradients(x, v, 0.0, quad, g, hoop, weight)
         if volume < 0.0:
             return -1.0
@@ -106,7 +170,7 @@ def _forces(x, v, quads, mass, stress, pressure, strain, force, dt):  # type: ig
         for p in range(4):
             steepest = max(steepest, (g[p] * g[p]).sum())
         steepest, density, rate = math.sqrt(steepest), mass[e] / volume, max(-dilatation, 0.0)
-        c = math.sqrt((BULK + 4.0 / 3.0 * SHEAR) / density)
+        c = math.sqrt((metal.bulk + 4.0 / 3.0 * metal.shear) / density)
         q = density / steepest * rate * (LINEAR * c + QUADRATIC * rate / steepest)
         tangent = LINEAR * c + 2.0 * QUADRATIC * rate / steepest if rate > 0.0 else 0.0
         limit = max(limit, steepest * (tangent + math.sqrt(tangent * tangent + c * c)))
@@ -135,6 +199,7 @@ def _move(x, v, force, mass, mean_dt, dt):  # type: ignore[no-untyped-def]
 class Bar:
     """The bar at the end; lengths in m."""
 
+    bar: str
     cells: int
     """Along the radius."""
     quads: int
@@ -143,39 +208,64 @@ class Bar:
     radius: float
     strain: float
     """Largest plastic strain at a point."""
+    foot_strain: float
+    """Mean over the quads that start within 0.6 mm of the centre of the foot."""
+    foot_temperature: float
+    """K, likewise."""
 
 
-def run(cells: int) -> Bar:
-    """The bar with ``cells`` cells along the radius and cells of the same size along its length."""
-    layers = round(cells * LENGTH / RADIUS)
+def run(bar: str, cells: int) -> Bar:
+    """A bar with ``cells`` cells along the radius and cells of the same size along its length."""
+    metal, layers = METALS[bar], round(cells * LENGTH / RADIUS)
     r, z = np.linspace(0.0, RADIUS, cells + 1), np.linspace(0.0, LENGTH, layers + 1)
     x = np.stack(np.meshgrid(r, z, indexing="xy"), axis=-1).reshape(-1, 2)
     corner = (np.arange(layers)[:, None] * (cells + 1) + np.arange(cells)).reshape(-1, 1)
     quads = corner + np.array([0, 1, cells + 2, cells + 1])
-    shares = _N * (x[quads, 0] @ _N.T)[:, :, None] * (DENSITY * 0.25 * (RADIUS / cells) * (LENGTH / layers))
-    mass = np.bincount(quads.reshape(-1), shares.sum(axis=1).reshape(-1))
-    quad_mass = shares.sum(axis=(1, 2))
+    shares = _N * (x[quads, 0] @ _N.T)[:, :, None] * (metal.density * 0.25 * (RADIUS / cells) * (LENGTH / layers))
+    mass, quad_mass = np.bincount(quads.reshape(-1), shares.sum(axis=1).reshape(-1)), shares.sum(axis=(1, 2))
+    foot = (x[quads].mean(axis=1) < 0.6e-3).all(axis=1)
     v, force = np.zeros_like(x), np.zeros_like(x)
-    v[:, 1] = -SPEED
-    stress, pressure, strain = np.zeros((len(quads), 4, 4)), np.zeros(len(quads)), np.zeros((len(quads), 4))
+    v[:, 1] = -metal.speed
+    stress, pressure = np.zeros((len(quads), 4, 4)), np.zeros(len(quads))
+    strain, temperature = np.zeros((len(quads), 4)), np.full((len(quads), 4), 293.15)
     t, dt, steps = 0.0, math.inf, 0
-    limit = _forces(x, v, quads, quad_mass, stress, pressure, strain, force, 0.0)
+    limit = _forces(metal, x, v, quads, quad_mass, stress, pressure, strain, temperature, force, 0.0)
     while t < END:
         old = dt if steps else 0.0
         dt = min(SAFETY / limit, 1.05 * dt, END - t)
         _move(x, v, force, mass, 0.5 * (old + dt), dt)
-        limit = _forces(x, v, quads, quad_mass, stress, pressure, strain, force, dt)
+        limit = _forces(metal, x, v, quads, quad_mass, stress, pressure, strain, temperature, force, dt)
         t, steps = t + dt, steps + 1
         if limit < 0.0:
             raise ArithmeticError(f"a quad turned inside out at {t * 1e6:.1f} us")
-    return Bar(cells, len(quads), steps, float(np.ptp(x[:, 1])), float(x[:, 0].max()), float(strain.max()))
+    return Bar(
+        bar, cells, len(quads), steps, float(np.ptp(x[:, 1])), float(x[:, 0].max()), float(strain.max()),
+        _mean(strain, quad_mass, foot), _mean(temperature, quad_mass, foot),
+    )  # fmt: skip
+
+
+def _mean(values: Floats, mass: Floats, chosen: npt.NDArray[np.bool_]) -> float:
+    return float(np.average(values.mean(axis=1)[chosen], weights=mass[chosen])) if chosen.any() else math.nan
 
 
 def report(bars: Sequence[Bar]) -> str:
     """One line a mesh."""
     rows: list[list[Cell]] = [
-        [1e3 * RADIUS / b.cells, b.quads, b.steps, f"{1e3 * b.length:.3f}", f"{1e3 * b.radius:.3f}", f"{b.strain:.2f}"]
+        [
+            b.bar, 1e3 * RADIUS / b.cells, b.quads, b.steps, f"{1e3 * b.length:.3f}", f"{1e3 * b.radius:.3f}",
+            f"{b.strain:.2f}", f"{b.foot_strain:.2f}", f"{b.foot_temperature:.0f}",
+        ]
         for b in bars
+    ]  # fmt: skip
+    head = [
+        "bar",
+        "mm",
+        "quads",
+        "steps",
+        "length mm",
+        "radius mm",
+        "largest strain",
+        "foot strain",
+        "foot temperature",
     ]
-    head = ["mm", "quads", "steps", "length mm", "radius mm", "largest strain"]
-    return f"taylor_copper with axisymmetric quads, by a code of its own:\n\n{table(head, rows)}"
+    return f"Axisymmetric quads, by a code of its own:\n\n{table(head, rows)}"
