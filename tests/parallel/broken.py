@@ -1,0 +1,24 @@
+"""Under mpiexec: a worker one rank of which raises in its tenth step. The first argument is that rank."""
+
+import itertools
+import sys
+
+from conoid.worker import kernels
+
+if __name__ == "__main__":
+    kernels.use_cache()
+    from conoid.worker import step
+    from conoid.worker.main import main
+    from conoid.worker.parallel.comm import connect
+    from conoid.worker.simulation import Simulation
+
+    whole, calls = step.second_half, itertools.count(1)
+
+    def second_half(sim: Simulation) -> None:
+        if next(calls) == 10:
+            raise RuntimeError("the tenth step goes wrong")
+        whole(sim)
+
+    if connect().rank == int(sys.argv[1]):
+        step.second_half = second_half
+    sys.exit(main(sys.argv[2:]))

@@ -1,0 +1,74 @@
+"""Real workers under the real mpiexec, started and awaited with a limit; nothing outlives a test."""
+
+import os
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+MPIEXEC = Path(sys.executable).with_name("mpiexec")
+PATIENCE = 180.0
+_PROCESS = re.compile(r"rank \d+ of \d+, process (\d+)")
+
+
+def command(ranks: int, *arguments: str, module: Sequence[str] = ("-m", "conoid.worker")) -> list[str]:
+    """The command line of a worker; ``module`` may be another program that runs it."""
+    return [str(MPIEXEC), "-n", str(ranks), sys.executable, "-m", "mpi4py", *module, *arguments]
+
+
+@contextmanager
+def started(words: list[str]) -> Iterator[subprocess.Popen[str]]:
+    """A launcher under way, in a process group of its own; ended by force when the block is left."""
+    with subprocess.Popen(
+        words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as launcher:
+        try:
+            yield launcher
+        finally:
+            if launcher.poll() is None:
+                launcher.terminate()
+                try:
+                    launcher.wait(20.0)
+                except subprocess.TimeoutExpired:
+                    os.killpg(launcher.pid, 9)
+
+
+def ended(words: list[str]) -> subprocess.CompletedProcess[str]:
+    """The launcher after its end."""
+    with started(words) as launcher:
+        out, err = launcher.communicate(timeout=PATIENCE)
+    return subprocess.CompletedProcess(words, launcher.returncode, out, err)
+
+
+def processes(folder: Path) -> list[int]:
+    """Process ids that the ranks of a run wrote into their logs."""
+    return [
+        int(number) for log in sorted(folder.glob("log/rank-*.log")) for number in _PROCESS.findall(log.read_text())
+    ]
+
+
+def wait_until_gone(numbers: list[int], seconds: float = 20.0) -> list[int]:
+    """Waits for processes to end; those that have not."""
+    limit = time.monotonic() + seconds
+    while (left := [n for n in numbers if _lives(n)]) and time.monotonic() < limit:
+        time.sleep(0.05)
+    return left
+
+
+def _lives(number: int) -> bool:
+    try:
+        return Path(f"/proc/{number}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def wait_for(path: Path, text: str, launcher: subprocess.Popen[str], seconds: float = 90.0) -> None:
+    """Waits until a file holds a text; fails when the launcher ends or time is up."""
+    limit = time.monotonic() + seconds
+    while not path.exists() or text not in path.read_text(encoding="utf-8"):
+        assert launcher.poll() is None, "the worker ended before it wrote that"
+        assert time.monotonic() < limit, f"{text!r} did not appear in {path}"
+        time.sleep(0.05)

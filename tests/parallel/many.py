@@ -1,0 +1,17 @@
+"""Under mpiexec: runs several cases one after the other in the same ranks, so that the start is paid once.
+
+The arguments of the runs stand in a JSON file, a list of lists as the worker's command line takes them.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+from conoid.worker import kernels
+
+if __name__ == "__main__":
+    kernels.use_cache()
+    from conoid.worker.main import main
+
+    codes = [main(arguments) for arguments in json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))]
+    sys.exit(max(codes))

@@ -1,0 +1,138 @@
+"""How a run ends: whatever happens, soon, with the right code, with a reason on disk, and with nobody left behind."""
+
+import os
+import signal
+from pathlib import Path
+
+import pytest
+
+from conoid.cases import layout, messages
+from conoid.cases.outcome import Outcome, from_json
+
+from .launching import command, ended, processes, started, wait_for, wait_until_gone
+
+pytestmark = pytest.mark.slow
+
+LONG = ("--set", "run.end_time=1 s", "--set", "reference=[]", "--set", "run.frames=0")
+"""Makes hours of a case."""
+
+
+def outcome(folder: Path) -> Outcome:
+    return from_json((folder / layout.OUTCOME).read_bytes())
+
+
+def journal(folder: Path) -> list[messages.AnyMessage]:
+    return [messages.from_json(line) for line in (folder / layout.JOURNAL).read_bytes().splitlines()]
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGUSR1])
+def test_a_signal_to_the_launcher_cancels_the_run(number: signal.Signals, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    with started(command(2, "free_spin", "--out", str(folder), *LONG)) as launcher:
+        wait_for(folder / layout.JOURNAL, '"progress"', launcher)
+        launcher.send_signal(number)
+        launcher.communicate(timeout=30.0)
+    assert launcher.returncode == 4
+    assert outcome(folder).state == "cancelled"
+    assert outcome(folder).cause == "cancelled"
+    assert outcome(folder).steps > 0
+    assert outcome(folder).digest
+    said = journal(folder)
+    assert isinstance(said[-1], messages.Finished)
+    assert said[-1].state == "cancelled"
+    assert [message.seq for message in said] == list(range(1, len(said) + 1))
+    assert not wait_until_gone(processes(folder))
+
+
+def test_a_rank_that_raises_ends_the_job(tmp_path: Path) -> None:
+    """Its log names the rank and holds the traceback; the others do not wait for it."""
+    folder, program = tmp_path / "run", Path(__file__).with_name("broken.py")
+    done = ended(command(3, "1", "free_spin", "--out", str(folder), *LONG, module=[str(program)]))
+    assert done.returncode not in (0, 2, 3, 4)
+    log = layout.rank_log(folder, 1).read_text(encoding="utf-8")
+    assert "rank 1" in log
+    assert "Traceback (most recent call last)" in log
+    assert "RuntimeError: the tenth step goes wrong" in log
+    assert "Traceback" not in layout.rank_log(folder, 0).read_text(encoding="utf-8")
+    assert not (folder / layout.OUTCOME).exists()
+    assert len(processes(folder)) == 3
+    assert not wait_until_gone(processes(folder))
+
+
+def test_a_rank_that_is_killed_ends_the_job(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    with started(command(3, "free_spin", "--out", str(folder), *LONG)) as launcher:
+        wait_for(folder / layout.JOURNAL, '"progress"', launcher)
+        numbers = processes(folder)
+        assert len(numbers) == 3
+        os.kill(numbers[2], signal.SIGKILL)
+        launcher.communicate(timeout=30.0)
+    assert launcher.returncode != 0
+    assert not (folder / layout.OUTCOME).exists()
+    assert not wait_until_gone(numbers)
+
+
+@pytest.mark.xfail(strict=True, reason="a CaseError that was broadcast comes back with one problem a letter")
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        (("run.end_time=-1 s",), ("run.end_time", "-1 s")),
+        (("parts[0].material=stele",), ("parts[0].material", "stele", "steel")),
+        (("numerics.presure=nodal",), ("numerics.presure", "pressure")),
+        (("parts[0].mesh.element_size=3 kg",), ("parts[0].mesh.element_size", "3 kg")),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_two(
+    changes: tuple[str, ...], words: tuple[str, ...], tmp_path: Path
+) -> None:
+    folder = tmp_path / "run"
+    sets = [word for change in changes for word in ("--set", change)]
+    done = ended(command(2, "free_spin", "--out", str(folder), *sets))
+    assert done.returncode == 2
+    said = [line for line in done.stderr.splitlines() if "application called MPI_Abort" not in line]
+    assert len(said) == 1, done.stderr
+    assert all(word in said[0] for word in words)
+    assert "Traceback" not in done.stdout + done.stderr
+    end = outcome(folder)
+    assert (end.state, end.cause, end.message) == ("failed", "input", said[0])
+
+
+@pytest.mark.xfail(strict=True, reason="a name that is no file and no shipped case is taken for a file")
+def test_a_case_that_is_not_there(tmp_path: Path) -> None:
+    done = ended(command(1, "fre_spin", "--out", str(tmp_path / "run")))
+    assert done.returncode == 2
+    assert "free_spin" in done.stderr
+    assert outcome(tmp_path / "run").cause == "input"
+
+
+def test_a_ledger_that_does_not_close_fails_the_run(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    done = ended(command(2, "free_spin", "--out", str(folder), *LONG, "--set", "run.residual_limit=1e-14"))
+    assert done.returncode == 3
+    assert (outcome(folder).state, outcome(folder).cause) == ("failed", "energy")
+    assert "run.residual_limit" in outcome(folder).message
+
+
+def test_wall_time_and_steps_run_out(tmp_path: Path) -> None:
+    slow = ended(command(2, "free_spin", "--out", str(tmp_path / "slow"), *LONG, "--set", "run.max_wall_time=0.5 s"))
+    assert slow.returncode == 4
+    assert outcome(tmp_path / "slow").state == "timed_out"
+    assert outcome(tmp_path / "slow").cause == "walltime"
+    short = ended(command(1, "free_spin", "--out", str(tmp_path / "short"), *LONG, "--set", "run.max_steps=20"))
+    assert short.returncode == 3
+    assert outcome(tmp_path / "short").steps == 20
+    assert "run.max_steps" in outcome(tmp_path / "short").message
+
+
+def test_as_many_ranks_as_tets_and_not_more(tmp_path: Path) -> None:
+    """Five tets: the same answer on one and on five ranks; a sixth would have nothing to do and is refused."""
+    few = ("--set", "parts[0].mesh.element_size=10 mm", "--set", "parts[0].mesh.split=5", "--set", "run.end_time=20 us")
+    digests = []
+    for ranks in (1, 5, 6):
+        folder = tmp_path / str(ranks)
+        done = ended(command(ranks, "free_spin", "--out", str(folder), *few, "--set", "reference=[]"))
+        assert done.returncode == (2 if ranks == 6 else 0), done.stderr
+        digests.append(outcome(folder).digest)
+    assert digests[0] == digests[1]
+    assert outcome(tmp_path / "5").elements == 5
+    assert "run.ranks = 6: at most 5" in outcome(tmp_path / "6").message
