@@ -39,6 +39,10 @@ class CaseError(ValueError):
         self.problems: tuple[Problem, ...] = tuple(problems)[:_MOST]
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
+    def __reduce__(self) -> tuple[type["CaseError"], tuple[tuple[Problem, ...]]]:
+        """Made again from its problems, not from its text, where it was sent to another process."""
+        return CaseError, (self.problems,)
+
 
 def problem(location: Location, value: object, message: str) -> Problem:
     """A problem at ``location``; ``value`` is shown as written, shortened; Ellipsis shows nothing."""

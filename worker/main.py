@@ -106,7 +106,7 @@ def _case(options: argparse.Namespace, comm: Comm) -> Case:
 
 def _read(options: argparse.Namespace, ranks: int) -> Case:
     path = Path(options.case)
-    if not path.exists() and options.case in load.shipped():
+    if not path.exists() and not path.suffix:
         path = load.shipped_path(options.case)
     overrides = [*options.set, f"run.ranks={ranks}"]
     return load.parse_case(load.apply_overrides(load.read_data(path), overrides))

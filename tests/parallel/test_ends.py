@@ -72,7 +72,6 @@ def test_a_rank_that_is_killed_ends_the_job(tmp_path: Path) -> None:
     assert not wait_until_gone(numbers)
 
 
-@pytest.mark.xfail(strict=True, reason="a CaseError that was broadcast comes back with one problem a letter")
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
@@ -97,7 +96,6 @@ def test_bad_input_is_one_line_and_exit_code_two(
     assert (end.state, end.cause, end.message) == ("failed", "input", said[0])
 
 
-@pytest.mark.xfail(strict=True, reason="a name that is no file and no shipped case is taken for a file")
 def test_a_case_that_is_not_there(tmp_path: Path) -> None:
     done = ended(command(1, "fre_spin", "--out", str(tmp_path / "run")))
     assert done.returncode == 2
