@@ -1,7 +1,8 @@
 """Symmetry planes, rigid walls, prescribed motion: what acts on velocities between the kick and the move.
 
-Each books the work that it does on the body. The kick at time n does it in two halves, with the velocity before and
-after: at time n only the first has been spent (the kinetic energy of the ledger is 1/2 m v(n-1/2) . v(n+1/2)).
+Each books the work that it does on the body. An impulse at time n does it in two halves, with the velocity before and
+after: at time n only the first has been spent (the kinetic energy of the ledger is 1/2 m v(n-1/2) . v(n+1/2)), and the
+second is booked when ``note`` is called before the next kick.
 """
 
 import numpy as np
@@ -31,14 +32,19 @@ class Boundary:
         self.last_push = 0.0
         """Last time at which the boundary pushed, s."""
 
+        self._before = np.zeros((len(nodes), 3))
+        """(n, 3) v(n-1/2), m/s."""
+        self._impulse = np.zeros((len(nodes), 3))
+        """(n, 3) of the last step, N s."""
+
     def start(self, state: Nodes) -> None:
         """Makes the initial velocities agree with the boundary."""
 
-    def apply(self, state: Nodes, quantum: float, dt: float, t: float) -> None:
-        """Corrects v(n+1/2) at time ``t``.
+    def note(self, state: Nodes) -> None:
+        """Before the kick: keeps v(n-1/2), and books the second half of the last impulses' work."""
 
-        ``quantum`` is the impulse of one force quantum over the mean step, N s; ``dt`` the step ahead, s.
-        """
+    def apply(self, state: Nodes, dt: float, t: float) -> None:
+        """Corrects v(n+1/2) at time ``t``, s; ``dt`` is the step ahead, s."""
         raise NotImplementedError
 
 
@@ -52,7 +58,7 @@ class SymmetryPlane(Boundary):
     def start(self, state: Nodes) -> None:
         _hold(state.v, self.nodes, self.axis)
 
-    def apply(self, state: Nodes, quantum: float, dt: float, t: float) -> None:
+    def apply(self, state: Nodes, dt: float, t: float) -> None:
         _hold(state.v, self.nodes, self.axis)
 
 
@@ -68,7 +74,6 @@ class RigidWalls(Boundary):
         self._points = points
         self._normals = normals / np.linalg.norm(normals, axis=1)[:, None]
         self._held = held
-        self._pending = np.zeros(len(nodes))
 
     def depths(self, state: Nodes) -> Floats:
         """(w,) how deep the deepest node starts behind each wall, m."""
@@ -78,14 +83,20 @@ class RigidWalls(Boundary):
             depths[k] = behind.max(initial=-np.inf)
         return depths
 
-    def apply(self, state: Nodes, quantum: float, dt: float, t: float) -> None:
-        self.contact_loss += self._pending
-        self._pending[:] = 0.0
+    def note(self, state: Nodes) -> None:
+        self._before = state.v[self.nodes]
+        self._book()
+
+    def apply(self, state: Nodes, dt: float, t: float) -> None:
+        self._impulse[:] = 0.0
         if dt > 0.0 and _push_out(
-            state.x, state.v, state.force, state.mass, self.nodes, self._points, self._normals, self._held,
-            quantum, dt, self.contact_loss, self._pending,
-        ):  # fmt: skip
+            state.x, state.v, self._impulse, state.mass, self.nodes, self._points, self._normals, self._held, dt
+        ):
             self.last_push = t
+            self._book()
+
+    def _book(self) -> None:
+        self.contact_loss -= 0.5 * (self._impulse * self._before).sum(axis=1)
 
 
 class PrescribedVelocity(Boundary):
@@ -94,7 +105,11 @@ class PrescribedVelocity(Boundary):
     def __init__(self, nodes: Indices, velocity: Floats) -> None:
         super().__init__(nodes)
         self._velocity = np.broadcast_to(velocity, (len(nodes), 3))
-        self._pending = np.zeros(len(nodes))
+
+    @property
+    def held(self) -> Flags:
+        """(n, 3) which components are prescribed."""
+        return ~np.isnan(self._velocity)
 
     def _target(self, state: Nodes, dt: float) -> Floats:
         free = state.v[self.nodes]
@@ -103,14 +118,18 @@ class PrescribedVelocity(Boundary):
     def start(self, state: Nodes) -> None:
         state.v[self.nodes] = self._target(state, 0.0)
 
-    def apply(self, state: Nodes, quantum: float, dt: float, t: float) -> None:
-        free, mass = state.v[self.nodes], state.mass[self.nodes, None]
-        before = free - state.force[self.nodes] * (quantum / mass)
+    def note(self, state: Nodes) -> None:
+        self._before = state.v[self.nodes]
+        self._book()
+
+    def apply(self, state: Nodes, dt: float, t: float) -> None:
         new = self._target(state, dt)
-        impulse = mass * (new - free)
-        self.external_work += self._pending + 0.5 * (impulse * before).sum(axis=1)
-        self._pending = 0.5 * (impulse * new).sum(axis=1)
+        self._impulse = state.mass[self.nodes, None] * (new - state.v[self.nodes])
         state.v[self.nodes] = new
+        self._book()
+
+    def _book(self) -> None:
+        self.external_work += 0.5 * (self._impulse * self._before).sum(axis=1)
 
 
 class PrescribedRotation(PrescribedVelocity):
@@ -139,21 +158,16 @@ def _hold(v, nodes, axis):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    "boolean(float64[:, ::1], float64[:, ::1], int64[:, ::1], float64[::1], int32[::1], float64[:, ::1], "
-    "float64[:, ::1], boolean[:, ::1], float64, float64, float64[::1], float64[::1])",
+    "boolean(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], int32[::1], float64[:, ::1], "
+    "float64[:, ::1], boolean[:, ::1], float64)",
     cache=True,
     error_model="numpy",
 )
-def _push_out(x, v, force, mass, nodes, points, normals, held, quantum, dt, loss, pending):  # type: ignore[no-untyped-def]
-    """Impulse form: the gap at the end of the step is never negative. Returns whether a wall pushed.
-
-    The half of the loss that goes with v(n-1/2) is booked in ``loss``, the other in ``pending``.
-    """
+def _push_out(x, v, impulse, mass, nodes, points, normals, held, dt):  # type: ignore[no-untyped-def]
+    """Impulse form: the gap at the end of the step is never negative. Adds to ``impulse``; whether a wall pushed."""
     pushed = False
     for j in range(len(nodes)):
         a = nodes[j]
-        fx, fy, fz = v[a, 0], v[a, 1], v[a, 2]
-        touched = False
         for _ in range(_SWEEPS):
             moved = False
             for k in range(len(points)):
@@ -163,17 +177,12 @@ def _push_out(x, v, force, mass, nodes, points, normals, held, quantum, dt, loss
                     speed += v[a, i] * normals[k, i]
                 if held[j, k] and gap + dt * speed < 0.0:
                     for i in range(3):
-                        v[a, i] -= (gap / dt + speed) * normals[k, i]
-                    moved = touched = True
+                        change = -(gap / dt + speed) * normals[k, i]
+                        v[a, i] += change
+                        impulse[j, i] += mass[a] * change
+                    moved = pushed = True
             if not moved or len(points) == 1:
                 break
-        if touched:
-            kick = quantum / mass[a]
-            jx, jy, jz = v[a, 0] - fx, v[a, 1] - fy, v[a, 2] - fz
-            bx, by, bz = fx - force[a, 0] * kick, fy - force[a, 1] * kick, fz - force[a, 2] * kick
-            loss[j] -= 0.5 * mass[a] * (jx * bx + jy * by + jz * bz)
-            pending[j] = -0.5 * mass[a] * (jx * v[a, 0] + jy * v[a, 1] + jz * v[a, 2])
-            pushed = True
     return pushed
 
 

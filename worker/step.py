@@ -40,10 +40,11 @@ def first_half(sim: Simulation) -> None:
             raise PhysicsError(
                 f"{_when(sim)}: {sim.limiting_tet()} is crushed; the stable step is {clock.stable:.3g} s"
             )
-        quantum = mean_dt / sim.scale
-        kick(nodes.v, nodes.force, nodes.mass, quantum)  # 2: v*(n+1/2) = v(n-1/2) + dt f(n) / m
+        for boundary in sim.boundaries:
+            boundary.note(nodes)
+        kick(nodes.v, nodes.force, nodes.mass, mean_dt / sim.scale)  # 2: v*(n+1/2) = v(n-1/2) + dt f(n) / m
         for boundary in sim.boundaries:  # 3: v(n+1/2)
-            boundary.apply(nodes, quantum, clock.dt, clock.t)
+            boundary.apply(nodes, clock.dt, clock.t)
 
 
 def second_half(sim: Simulation) -> None:
