@@ -43,7 +43,7 @@ QUICK = Extent(
 FULL = Extent(
     sizes=(50_000, 144_000, 500_000), metals=speed.METALS, rounds=3, akantu=True, stages=10,
     growth=(50_000, 150_000, 500_000, 2_000_000), startup=3,
-    plans=accuracy.grid([0.54, 0.8, 1.07], [0.9]) + accuracy.grid([1.07], [0.45]), telemetry=5, quads=(3, 4, 6),
+    plans=accuracy.grid([0.54, 0.8, 1.07], [0.9]) + accuracy.grid([1.07], [0.45]), telemetry=40, quads=(3, 4, 6),
 )  # fmt: skip
 LONG = Extent(
     sizes=FULL.sizes, metals=FULL.metals, rounds=6, akantu=True, stages=10, growth=FULL.growth,
@@ -52,7 +52,7 @@ LONG = Extent(
         *accuracy.grid([0.4], [0.9]), *FULL.plans, *accuracy.grid([0.54, 0.8], [0.45]),
         *accuracy.variants(0.54), *accuracy.variants(0.8),
     ],
-    telemetry=15, quads=(3, 4, 6, 8, 12),
+    telemetry=120, quads=(3, 4, 6, 8, 12),
 )  # fmt: skip
 
 
@@ -127,9 +127,10 @@ def _accuracy(extent: Extent, book: Book) -> None:
 def _telemetry(extent: Extent, book: Book) -> None:
     handed = telemetry.hand_over()
     costs = telemetry.measure(extent.telemetry) if extent.telemetry else []
-    text = telemetry.message_table(handed) + (f"\n\n{telemetry.report(costs)}" if costs else "")
-    data = {"runs": [asdict(c) for c in costs], "messages": [asdict(m) for m in handed]}
-    book.add("Telemetry", text, data, gates.of_telemetry(costs))
+    answers = telemetry.digests() if costs else {}
+    text = telemetry.message_table(handed) + (f"\n\n{telemetry.report(costs, answers)}" if costs else "")
+    data = {"blocks": [asdict(c) for c in costs], "digests": answers, "messages": [asdict(m) for m in handed]}
+    book.add("Telemetry", text, data, gates.of_telemetry(costs, answers))
 
 
 PARTS: dict[str, Callable[[Extent, Book], None]] = {

@@ -1,10 +1,38 @@
 """A Zenoh router in a process of its own, with a subscriber to everything: ``python -m tests.bench.router PORT``."""
 
 import json
+import socket
+import subprocess
 import sys
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 
 import zenoh
+
+Router = subprocess.Popen[bytes]
+
+
+@contextmanager
+def started() -> Iterator[tuple[Router, str]]:
+    """A router that listens, and its endpoint; it is killed when the block is left."""
+    port = _free_port()
+    words = [sys.executable, "-m", "tests.bench.router", str(port)]
+    with subprocess.Popen(words, cwd=Path(__file__).parents[2], stdout=subprocess.PIPE) as router:
+        try:
+            assert router.stdout is not None
+            router.stdout.readline()
+            yield router, f"tcp/127.0.0.1:{port}"
+        finally:
+            router.kill()
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
 
 
 def main(port: str) -> None:

@@ -1,89 +1,76 @@
-"""What telemetry costs a run: without it, to a live router, to one that freezes and to one that dies at the first step.
+"""What telemetry costs a run: to a live router, to one that freezes and to one that dies.
 
-Whole runs of the worker, in turns: CPU time of the solver's thread, and wall time, which holds everything. And single
-messages, which a neighbour on the machine cannot hide: how long the solver waits to hand one over.
+The cost of a step, with and without (``switch``). Single messages: how long the solver waits to hand one over. And the
+answer of a whole run each way, which has to be the same.
 """
 
 import os
 import signal
-import socket
 import statistics
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
 from conoid.cases import layout, messages
-from conoid.cases.outcome import Outcome, from_json
+from conoid.cases.outcome import from_json
 from conoid.worker.output.telemetry import Telemetry
 
+from . import router, switch
+from .switch import Pairs
 from .table import Cell, table
 
-WAYS = ("off", "live", "frozen", "killed")
-_ROOT = Path(__file__).parents[2]
+WAYS = ("live", "frozen", "killed")
 _PREFIX = "conoid/v1/bench/run"
 _SIGNALS = {"frozen": signal.SIGSTOP, "killed": signal.SIGKILL}
 _PATIENCE = 120.0
 
 
-@dataclass(frozen=True)
-class Cost:
-    """Seconds of the step loop of each run, in order, and the digests that came out."""
+def _harm(process: router.Router, way: str) -> Callable[[], None]:
+    """Does to a router what ``way`` says."""
 
-    way: str
-    cpu: list[float]
-    wall: list[float]
-    steps: int
-    digests: list[str]
+    def harm() -> None:
+        if way in _SIGNALS:
+            process.send_signal(_SIGNALS[way])
 
-    def against(self, other: "Cost") -> tuple[float, float]:
-        """Median over the turns of CPU and wall time over those of ``other`` in the same turn."""
-        return _ratio(self.cpu, other.cpu), _ratio(self.wall, other.wall)
+    return harm
 
 
-def _ratio(mine: Sequence[float], theirs: Sequence[float]) -> float:
-    return statistics.median(a / b for a, b in zip(mine, theirs, strict=True))
+def measure(pairs: int) -> list[Pairs]:
+    """The cost of a step each way, from ``pairs`` pairs of blocks."""
+    found = []
+    for way in WAYS:
+        with router.started() as (process, endpoint):
+            found.append(switch.measure(way, endpoint, _PREFIX, pairs, _harm(process, way)))
+    return found
 
 
-def measure(rounds: int, end_time: str = "80 us") -> list[Cost]:
-    """``rounds`` runs each way, of a Taylor bar of 1,620 tets: with so few the messages weigh most."""
-    runs: dict[str, list[Outcome]] = {way: [] for way in WAYS}
-    for turn in range(rounds):
-        for way in WAYS if turn % 2 == 0 else reversed(WAYS):
-            runs[way].append(_run(way, end_time))
-    return [_cost(way, done) for way, done in runs.items()]
+def digests(end_time: str = "5 us") -> dict[str, str]:
+    """What a short Taylor bar answers without telemetry and each way."""
+    return {way: _digest(way, end_time) for way in ("off", *WAYS)}
 
 
-def _cost(way: str, done: Sequence[Outcome]) -> Cost:
-    cpu, wall = [o.cpu for o in done], [o.elapsed - o.setup for o in done]
-    return Cost(way, cpu, wall, done[0].steps, sorted({o.digest for o in done}))
-
-
-def _run(way: str, end_time: str) -> Outcome:
-    with tempfile.TemporaryDirectory(prefix="conoid-bench-") as out:
-        folder = Path(out)
+def _digest(way: str, end_time: str) -> str:
+    with tempfile.TemporaryDirectory(prefix="conoid-bench-") as out, ExitStack() as stack:
         command = [sys.executable, "-m", "conoid.worker", "taylor_copper", "--out", out]
-        for override in ("parts[0].mesh.element_size=1.07 mm", f"run.end_time={end_time}", "run.frames=0"):
+        for override in (f"run.end_time={end_time}", "run.frames=0", "reference=[]"):
             command += ["--set", override]
-        router = None
+        harm = None
         if way != "off":
-            router, endpoint = _router()
+            process, endpoint = stack.enter_context(router.started())
             command += ["--telemetry", endpoint, "--prefix", _PREFIX]
-        worker = subprocess.Popen(command)
-        try:
-            if router is not None and way != "live":
-                _await_first_step(folder, worker)
-                router.send_signal(_SIGNALS[way])
-            worker.wait(_PATIENCE)
-        finally:
-            for process in (worker, router):
-                if process is not None:
-                    process.kill()
-                    process.communicate()
-        return from_json((folder / layout.OUTCOME).read_bytes())
+            harm = _harm(process, way)
+        worker = stack.enter_context(subprocess.Popen(command))
+        stack.callback(worker.kill)
+        if harm is not None:
+            _await_first_step(Path(out), worker)
+            harm()
+        worker.wait(_PATIENCE)
+        return from_json((Path(out) / layout.OUTCOME).read_bytes()).digest
 
 
 def _await_first_step(folder: Path, worker: "subprocess.Popen[bytes]") -> None:
@@ -95,24 +82,6 @@ def _await_first_step(folder: Path, worker: "subprocess.Popen[bytes]") -> None:
             return
         time.sleep(0.01)
     raise RuntimeError(f"the worker took no step: {os.listdir(folder)}")
-
-
-def _router() -> tuple["subprocess.Popen[bytes]", str]:
-    """A router that listens, and its endpoint."""
-    port = _free_port()
-    router = subprocess.Popen(
-        [sys.executable, "-m", "tests.bench.router", str(port)], cwd=_ROOT, stdout=subprocess.PIPE
-    )
-    assert router.stdout is not None
-    router.stdout.readline()
-    return router, f"tcp/127.0.0.1:{port}"
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
 
 
 @dataclass(frozen=True)
@@ -127,29 +96,29 @@ class Message:
 
 def hand_over(count: int = 500, pause: float = 0.002) -> list[Message]:
     """Hands over ``count`` messages, one every ``pause`` s; the worker sends some eight a second."""
-    return [_hand_over(way, count, pause) for way in WAYS if way != "off"]
+    return [_hand_over(way, count, pause) for way in WAYS]
 
 
 def _hand_over(way: str, count: int, pause: float) -> Message:
-    router, endpoint = _router()
-    telemetry = Telemetry(endpoint, _PREFIX)
-    try:
+    with router.started() as (process, endpoint):
+        telemetry = Telemetry(endpoint, _PREFIX)
         time.sleep(1.0)
-        if way != "live":
-            router.send_signal(_SIGNALS[way])
-        process, thread, waits = time.process_time(), time.thread_time(), []
-        for number in range(count):
-            message = messages.Log(run="run", seq=number, level="info", text="x" * 200)
-            begin = time.perf_counter()
-            telemetry.tell(message)
-            waits.append(time.perf_counter() - begin)
-            time.sleep(pause)
-        beside = time.process_time() - process - (time.thread_time() - thread)
-    finally:
-        router.kill()
-        router.communicate()
-        telemetry.close()
+        _harm(process, way)()
+        begin, thread = time.process_time(), time.thread_time()
+        waits = [_wait(telemetry, number, pause) for number in range(count)]
+        beside = time.process_time() - begin - (time.thread_time() - thread)
+    telemetry.close()
     return Message(way, statistics.median(waits) * 1e6, max(waits) * 1e6, beside / count * 1e6)
+
+
+def _wait(telemetry: Telemetry, number: int, pause: float) -> float:
+    """s to hand over a message, and then a pause."""
+    message = messages.Log(run="run", seq=number, level="info", text="x" * 200)
+    begin = time.perf_counter()
+    telemetry.tell(message)
+    wait = time.perf_counter() - begin
+    time.sleep(pause)
+    return wait
 
 
 def message_table(handed: Sequence[Message]) -> str:
@@ -158,25 +127,23 @@ def message_table(handed: Sequence[Message]) -> str:
     return table(["router", "solver waits, us a message, median", "longest", "other threads, CPU us a message"], rows)
 
 
-def report(costs: Sequence[Cost]) -> str:
-    """us a step each way, and the median ratio to the runs without telemetry."""
-    rows: list[list[Cell]] = []
-    for cost in costs:
-        cpu, wall = cost.against(costs[0])
-        step = 1e6 / cost.steps
-        rows.append([
-            cost.way, f"{min(cost.cpu) * step:.1f} ({statistics.median(cost.cpu) * step:.1f})",
-            f"{min(cost.wall) * step:.1f} ({statistics.median(cost.wall) * step:.1f})",
-            f"{100 * (min(cost.cpu) / min(costs[0].cpu) - 1):+.2f} ({100 * (cpu - 1):+.2f})",
-            f"{100 * (min(cost.wall) / min(costs[0].wall) - 1):+.2f} ({100 * (wall - 1):+.2f})",
-            " ".join(digest[:12] for digest in cost.digests),
-        ])  # fmt: skip
+def report(costs: Sequence[Pairs], answers: dict[str, str]) -> str:
+    """us a step with and without, and the median ratio of a pair with its interval."""
+    rows = [[c.way, *_medians(c, "cpu"), _change(c, "cpu"), _change(c, "wall"), *_medians(c, "beside")] for c in costs]
     head = [
-        "router",
-        "CPU us a step, best (median)",
-        "wall us a step",
-        "CPU against off, %",
-        "wall against off, %",
-        "digest",
-    ]
-    return table(head, rows) + f"\n\n{len(costs[0].cpu)} runs each way, in turns, {costs[0].steps:,} steps each.\n"
+        "router", "CPU us a step, with", "without", "change, %", "change of wall time, %", "other threads, with",
+        "without",
+    ]  # fmt: skip
+    pairs = len(costs[0].blocks) // 2
+    how = f"{pairs} pairs of blocks each way; medians, in brackets where that of all pairs lies at 95 % (sign test)."
+    said = ", ".join(f"{way} {digest[:12]}" for way, digest in answers.items())
+    return f"{table(head, rows)}\n\n{how}\n\nDigest of a short Taylor bar: {said}."
+
+
+def _medians(cost: Pairs, what: str) -> list[str]:
+    return [f"{1e6 * cost.median(told, what):.2f}" for told in (True, False)]
+
+
+def _change(cost: Pairs, what: str) -> str:
+    middle, low, high = (100 * (ratio - 1) for ratio in cost.ratio(what))
+    return f"{middle:+.2f} ({low:+.2f} to {high:+.2f})"

@@ -1,11 +1,15 @@
 """The bench still runs: each of its instruments on something small."""
 
+import time
+from unittest.mock import Mock
+
 import numpy as np
 import pytest
 
+from conoid.cases import messages
 from conoid.worker.mesh.structured import structured
 
-from . import accuracy, gates, taylor_cost
+from . import accuracy, gates, switch, taylor_cost
 from .gather_scatter import GatherScatter
 from .refine import refined
 from .scene import Ride, box, case
@@ -71,3 +75,44 @@ def test_a_coarse_bar_answers_every_reference() -> None:
     assert answer.problem == ""
     assert answer.value("radius") == pytest.approx(4.3e-3, rel=0.1)
     assert "foot strain" in accuracy.report([answer])
+
+
+def spin(seconds: float) -> None:
+    """Burns CPU time."""
+    end = time.thread_time() + seconds
+    while time.thread_time() < end:
+        pass
+
+
+def progress(step: int) -> messages.Progress:
+    names = ("kinetic", "elastic", "plastic", "viscous", "contact", "external", "initial", "residual")
+    energy = messages.Energy(**dict.fromkeys(names, 0.0))
+    return messages.Progress(
+        run="run", step=step, end_time=1.0, dt=1.0, limiter="", eta=0.0, energy=energy, updates_per_second=1.0
+    )
+
+
+@pytest.mark.parametrize("cost", [0.0, 1e-3])
+def test_the_switch_finds_what_telling_costs(cost: float) -> None:
+    """Blocks of ten steps and 5 ms; a message that costs the solver 1 ms is a fifth, whoever of a pair is first."""
+    slow, end, ready = Mock(), switch.End(), Mock()
+    slow.tell = lambda message: spin(cost)
+    listener = switch.Switch(slow, switch.turns(20), ready, end)
+    step = 0
+    while not end.raised:
+        listener.tell(progress(step))
+        spin(5e-3)
+        step += 10
+    assert ready.call_count == 1
+    pairs = switch.Pairs("live", listener.blocks)
+    assert [block.told for block in pairs.blocks] == switch.turns(20)
+    middle, low, high = pairs.ratio("cpu")
+    assert low <= middle <= high
+    assert middle == pytest.approx(1.0 + cost / 5e-3, abs=0.05)
+
+
+def test_turns_are_balanced() -> None:
+    turns = switch.turns(40)
+    assert all(a is not b for a, b in zip(turns[::2], turns[1::2], strict=True))
+    assert sum(turns[::2]) == 20
+    assert turns[::2] != [True, False] * 20
