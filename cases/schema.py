@@ -263,6 +263,35 @@ class Rotation(Model):
 
 Boundary = Annotated[Symmetry | Wall | Prescribed | Rotation, Field(discriminator="kind")]
 
+class ContactPair(Model):
+    """Two parts whose friction differs from that of the others."""
+
+    parts: tuple[Name, Name]
+    friction: Annotated[Ratio, Field(ge=0)]
+
+
+class Contact(Model):
+    """Bodies push each other where they meet: nodes on faces, sharp edges on edges; by impulses, no stiffness."""
+
+    parts: tuple[Name, ...] = ()
+    """Parts that meet each other; all when empty."""
+    self_contact: tuple[Name, ...] = ()
+    """Parts whose surface can meet itself."""
+    friction: Annotated[Ratio, Field(ge=0)] = 0.0
+    """Coulomb's coefficient."""
+    pairs: tuple[ContactPair, ...] = ()
+    edges: bool = True
+    """Whether sharp edges meet edges."""
+    overlap: Literal["refuse", "push"] = "refuse"
+    """What becomes of bodies that overlap at the start: an error, or a tenth of the overlap is taken back in a step."""
+    sweeps: Annotated[Count, Field(ge=1, le=1000)] = 5
+    """Jacobi sweeps over the meetings of a step."""
+    skin: Annotated[Ratio, Positive] = 0.25
+    """Of the mean face size: how far a node may stray from free flight before the next search, twice."""
+    domain: Literal["arbitrary", "box"] = "arbitrary"
+    """How a rank finds the faces that others must see: by occupied cells, or by bounding boxes."""
+
+
 ProbeField = Literal[
     "stress_xx", "stress_yy", "stress_zz", "stress_yz", "stress_zx", "stress_xy",
     "pressure", "mises", "plastic_strain", "temperature", "density", "internal_energy",
@@ -360,7 +389,14 @@ class Case(Model):
     materials: dict[Name, Material] = Field(default_factory=dict)
     parts: Annotated[tuple[Part, ...], Field(min_length=1, max_length=256)]
     boundaries: tuple[Boundary, ...] = ()
+    contact: Annotated[Contact | None, BeforeValidator(_off)] = Contact()
+    """``contact = "none"`` lets bodies pass through each other. A single part meets only itself, if it may."""
     probes: tuple[Probe, ...] = ()
     numerics: Numerics = Numerics()
     run: Run
     reference: tuple[Reference, ...] = ()
+
+    @property
+    def in_contact(self) -> bool:
+        """Whether anything of the scene can meet anything."""
+        return self.contact is not None and (len(self.parts) > 1 or bool(self.contact.self_contact))

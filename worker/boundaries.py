@@ -187,7 +187,7 @@ def _push_out(x, v, impulse, mass, nodes, points, normals, held, dt):  # type: i
 
 
 def build(case: schema.Case, model: Model, comm: Comm) -> list[Boundary]:
-    """The boundaries of a case on this rank's nodes; prescribed motion last, so that it has the last word.
+    """The boundaries of a case on this rank's nodes; walls last, and they leave alone what has a prescribed motion.
 
     Raises InputError, on every rank alike, for a boundary that holds no node, a body that starts behind a wall, and
     motion prescribed across a symmetry plane.
@@ -201,7 +201,6 @@ def build(case: schema.Case, model: Model, comm: Comm) -> list[Boundary]:
     boundaries: list[Boundary] = [
         SymmetryPlane(_indices(h), _AXES[spec.axis]) for spec, h in pairs if isinstance(spec, schema.Symmetry)
     ]
-    boundaries += _walls(case, model, held, comm)
     for spec, h in pairs:
         if isinstance(spec, schema.Prescribed):
             velocity = np.array([np.nan if c is None else c for c in (spec.x, spec.y, spec.z)])
@@ -210,7 +209,11 @@ def build(case: schema.Case, model: Model, comm: Comm) -> list[Boundary]:
             centre, rate = np.array(spec.spin.centre), np.array(spec.spin.rate)
             boundaries.append(PrescribedRotation(_indices(h), centre, rate))
     _refuse_conflicts(boundaries, nodes, comm)
-    return boundaries
+    moved = np.zeros(nodes.n, bool)
+    for boundary in boundaries:
+        if isinstance(boundary, PrescribedVelocity):
+            moved[boundary.nodes] = True
+    return [*boundaries, *_walls(case, model, [h & ~moved for h in held], comm)]
 
 
 def _held_by(spec: schema.Boundary, model: Model) -> Flags:

@@ -41,7 +41,7 @@ def compute(
     except PhysicsError as error:
         failure = error
     cpu = time.thread_time() - cpu
-    sim.elements.free()
+    sim.free()
     if history is not None:
         history.close()
     return _sum_up(loop, folder, failure, cpu, setup, time.monotonic() - began)

@@ -20,7 +20,7 @@ def digest(model: Model, comm: Comm, nodal: list[Floats]) -> str | None:
     for part in range(len(model.parts)):
         block = next((b for b in model.blocks if b.part == part), None)
         ids = block.id if block else np.zeros(0, np.int64)
-        rows = comm.maximum(np.array([block.state.shape[1] if block else 0.0]))
+        rows = comm.maximum(np.array([float(block.state.shape[1]) if block else 0.0]))
         for row in range(int(rows[0])):
             if row != VOLUME_FLUX:
                 _add(h, comm, ids, block.row(row) if block else np.zeros(0))

@@ -15,6 +15,7 @@ from conoid.cases.library import material as find_material
 from .errors import InputError
 from .materials import models
 from .mesh.build import build as build_mesh
+from .mesh.faces import across
 from .parallel.comm import Comm
 from .parallel.decompose import bisect
 from .parallel.ownership import Neighbour
@@ -45,6 +46,8 @@ class Whole:
     tets: Indices
     tet_part: Indices
     volumes: Floats
+    exposed: Flags
+    """(tets, 4) faces that have no tet behind them, in scenes with contact; else (0, 4)."""
     node_volume: Floats
     mass: Floats
     velocity: Floats
@@ -56,6 +59,7 @@ class Piece:
 
     node_ids: Ints
     node_part: Indices
+    node_owner: Indices
     owned: Flags
     points: Floats
     velocity: Floats
@@ -65,6 +69,8 @@ class Piece:
     tet_part: Indices
     tets: Indices
     tet_volume: Floats
+    exposed: Flags
+    """(tets, 4) faces that have no tet behind them, in scenes with contact; else empty."""
     border: Flags
     neighbours: list[Neighbour]
     totals: tuple[int, int, int]
@@ -93,6 +99,7 @@ def assemble(case: schema.Case, folder: Path) -> Whole:
     part_of_node = np.concatenate(node_part)
     return Whole(
         points=x, node_part=part_of_node, tets=t, tet_part=part_of_tet, volumes=volumes,
+        exposed=across(t) < 0 if case.in_contact else np.zeros((0, 4), bool),
         node_volume=_quarters(t, volumes, len(x)), mass=_quarters(t, volumes * np.array(density)[part_of_tet], len(x)),
         velocity=_velocities(case, x, part_of_node),
     )  # fmt: skip
@@ -160,9 +167,10 @@ def _piece(
             neighbours.append(Neighbour(other, local[common]))
     tets = whole.tets[ids]
     return Piece(
-        nodes.astype(np.int64), whole.node_part[nodes], home[nodes] == rank, whole.points[nodes],
+        nodes.astype(np.int64), whole.node_part[nodes], home[nodes], home[nodes] == rank, whole.points[nodes],
         whole.velocity[nodes], whole.mass[nodes], whole.node_volume[nodes], ids.astype(np.int64),
-        whole.tet_part[ids], local[tets], whole.volumes[ids], np.any(shared[tets], axis=1), neighbours, totals,
+        whole.tet_part[ids], local[tets], whole.volumes[ids],
+        whole.exposed[ids] if len(whole.exposed) else whole.exposed, np.any(shared[tets], axis=1), neighbours, totals,
         np.searchsorted(whole.tet_part, np.arange(whole.tet_part[-1] + 1)), float(np.abs(whole.points).max()),
     )  # fmt: skip
 
@@ -185,8 +193,8 @@ def build(case: schema.Case, folder: Path, comm: Comm) -> tuple[Model, Piece]:
 
 def _model(case: schema.Case, piece: Piece) -> Model:
     nodes = Nodes(
-        id=piece.node_ids, part=piece.node_part, owned=piece.owned, x0=piece.points.copy(), x=piece.points,
-        v=piece.velocity, mass=piece.mass, force=np.zeros(piece.points.shape, np.int64),
+        id=piece.node_ids, part=piece.node_part, owner=piece.node_owner, owned=piece.owned, x0=piece.points.copy(),
+        x=piece.points, v=piece.velocity, mass=piece.mass, force=np.zeros(piece.points.shape, np.int64),
     )  # fmt: skip
     blocks = [_block(case, piece, index) for index in range(len(case.parts)) if (piece.tet_part == index).any()]
     return Model(

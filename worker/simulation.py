@@ -9,8 +9,9 @@ from conoid.cases.library import material as find_material
 from conoid.cases.schema import Case
 
 from . import boundaries, domain
-from .boundaries import Boundary
+from .boundaries import Boundary, RigidWalls
 from .clock import Clock
+from .contact.stage import Contact
 from .elements.forms import AveragedElements, Elements
 from .energy import Ledger
 from .materials.models import BULK, moduli
@@ -28,9 +29,10 @@ _SMALLEST_STRAIN = 1e-12
 class Vote:
     """What the ranks agree on in a step: a maximum over int64 words. Bits of non-negative floats order like floats."""
 
-    words: Ints = field(default_factory=lambda: np.zeros(4, np.int64))
-    """0: one over the stable step; 1: largest force (both as bits); 2: reason to stop; 3: rank 0 wants a report."""
-    result: Ints = field(default_factory=lambda: np.zeros(4, np.int64))
+    words: Ints = field(default_factory=lambda: np.zeros(5, np.int64))
+    """0: one over the stable step; 1: largest force (both as bits); 2: reason to stop; 3: rank 0 wants a report; 4: a
+    search for contact is due."""
+    result: Ints = field(default_factory=lambda: np.zeros(5, np.int64))
 
     @property
     def limit(self) -> float:
@@ -52,6 +54,11 @@ class Vote:
         """Whether rank 0 wants the loads of all ranks."""
         return bool(self.result[3])
 
+    @property
+    def search(self) -> bool:
+        """Whether some rank's surface has used up the last search for contact."""
+        return bool(self.result[4])
+
 
 @dataclass
 class Simulation:
@@ -62,6 +69,8 @@ class Simulation:
     model: Model
     elements: Elements
     boundaries: list[Boundary]
+    """In the order in which they act; contact is one of them."""
+    contact: Contact | None
     clock: Clock
     ledger: Ledger
     probes: Probes
@@ -80,6 +89,11 @@ class Simulation:
     def scale(self, scale: float) -> None:
         self.model.nodes.scale = scale
 
+    @property
+    def limit(self) -> float:
+        """Largest one-over-stable-step of tets and contact, 1/s."""
+        return max(self.vote.limit, self.contact.limit) if self.contact is not None else self.vote.limit
+
     def limiting_tet(self) -> str:
         """The tet that holds the time step down, of smallest id when several do; all ranks take part."""
         mine = int(self.elements.peaks[0]) == int(self.vote.result[0])
@@ -90,10 +104,18 @@ class Simulation:
     def limiter(self) -> str:
         """Which tet holds the time step down, and why; all ranks take part."""
         stable = self.clock.stable
+        if self.limit > self.vote.limit:
+            return "contact: speed of approach"
         why = "stability" if stable * self.vote.limit >= 0.999 * self.case.numerics.dt_safety else "growth"
         if self.clock.dt < 0.9 * stable:
             why = "output time"
         return f"{why}: {self.limiting_tet()}"
+
+    def free(self) -> None:
+        """Gives all standing messages back to MPI."""
+        self.elements.free()
+        if self.contact is not None:
+            self.contact.free()
 
     def next_scale(self) -> float:
         """The scale for the next sum of forces."""
@@ -103,21 +125,31 @@ class Simulation:
 def build(case: Case, folder: Path, comm: Comm) -> Simulation:
     """Meshes, cuts and distributes the case. Raises InputError on every rank alike."""
     model, piece = domain.build(case, folder, comm)
-    scene = boundaries.build(case, model, comm)
+    scene, timers = boundaries.build(case, model, comm), Timers()
     for boundary in scene:
         boundary.start(model.nodes)
-    probes = Probes(case, model, comm)
-    timers = Timers()
-    elements = _elements(case, model, piece, comm, timers)
     run, numerics = case.run, case.numerics
-    floor = _force_floor(model, comm)
     clock = Clock(run.end_time, numerics.dt_safety, numerics.dt_growth, run.frames)
+    contact = _contact(case, model, piece, scene, comm, clock, timers) if case.in_contact else None
+    if contact is not None:
+        scene.insert(sum(not isinstance(bound, RigidWalls) for bound in scene), contact)
+    probes = Probes(case, model, comm)
+    elements = _elements(case, model, piece, comm, timers)
+    floor = _force_floor(model, comm)
     return Simulation(
-        case=case, comm=comm, model=model, elements=elements, boundaries=scene,
+        case=case, comm=comm, model=model, elements=elements, boundaries=scene, contact=contact,
         clock=clock,
         ledger=Ledger(model, scene, comm, clock), probes=probes, timers=timers,
         shared_nodes=piece.totals[2], floor=floor,
     )  # fmt: skip
+
+
+def _contact(
+    case: Case, model: Model, piece: domain.Piece, scene: list[Boundary], comm: Comm, clock: Clock, timers: Timers
+) -> Contact:
+    rows = [piece.exposed[np.searchsorted(piece.tet_ids, block.id)] for block in model.blocks]
+    exposed = np.concatenate([piece.exposed[:0], *rows])
+    return Contact(case, model, exposed, piece.neighbours, scene, comm, clock, timers)
 
 
 def _elements(case: Case, model: Model, piece: domain.Piece, comm: Comm, timers: Timers) -> Elements:

@@ -57,8 +57,10 @@ class Nodes:
     """(n,) global ids."""
     part: Indices
     """(n,) index of the part."""
+    owner: Indices
+    """(n,) rank that counts the node."""
     owned: npt.NDArray[np.bool_]
-    """(n,) True where this rank counts the node."""
+    """(n,) True where that is this rank."""
     x0: Floats
     """(n, 3) initial position, m."""
     x: Floats

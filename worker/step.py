@@ -6,7 +6,8 @@ and at once f(n+1) from it, so a step begins with forces that are already at han
 ==  =====================================================  ==========================
  1  choose dt                                              from the limits at n
  2  velocities                                             v(n-1/2) -> v*(n+1/2)
- 3  boundaries: symmetry, walls, prescribed motion         v*(n+1/2) -> v(n+1/2)
+ 3  boundaries: symmetry, prescribed motion, contact,     v*(n+1/2) -> v(n+1/2)
+    walls
  4  whoever looks at time n: ledger, probes, frames        x(n), stress(n)
  5  positions                                              x(n) -> x(n+1)
  6  velocity gradient at x(n+1/2), stress, pressure        stress(n) -> stress(n+1)
@@ -35,7 +36,7 @@ def first_half(sim: Simulation) -> None:
     """1 to 3: from f(n) to v(n+1/2)."""
     nodes, clock = sim.model.nodes, sim.clock
     with sim.timers.phase("nodes"):
-        mean_dt = clock.choose(sim.vote.limit)  # 1: dt between n and n+1
+        mean_dt = clock.choose(sim.limit)  # 1: dt between n and n+1
         if clock.collapsed:
             raise PhysicsError(
                 f"{_when(sim)}: {sim.limiting_tet()} is crushed; the stable step is {clock.stable:.3g} s"
@@ -53,6 +54,8 @@ def second_half(sim: Simulation) -> None:
     with sim.timers.phase("nodes"):
         move(nodes.x, nodes.v, clock.dt)  # 5: x(n+1) = x(n) + dt v(n+1/2)
         clock.advance()
+        if sim.contact is not None:
+            sim.vote.words[4] = sim.contact.spent(nodes)
     _elements(sim, clock.dt)  # 6 to 8
 
 
@@ -69,6 +72,8 @@ def _elements(sim: Simulation, dt: float) -> None:
         pending.finish()
     if not (math.isfinite(vote.limit) and math.isfinite(vote.force)):
         raise PhysicsError(f"{_when(sim)}: {sim.limiting_tet()} turned inside out, or its stress is not a number")
+    if sim.contact is not None:
+        sim.contact.due |= vote.search
     if fixed_point.outgrown(vote.force, sim.scale):
         sim.scale = fixed_point.scale_for(vote.force)
         with sim.timers.phase("elements"):

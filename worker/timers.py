@@ -7,7 +7,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-PHASES = ("elements", "exchange", "nodes", "output")
+PHASES = ("elements", "exchange", "nodes", "contact", "output")
 
 
 class Timers:

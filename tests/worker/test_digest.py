@@ -27,9 +27,6 @@ def moved() -> Simulation:
     return run(sim, steps=3)
 
 
-@pytest.mark.xfail(
-    strict=True, reason="ranks with and without a part reduce int64 and float64: the run hangs at its end"
-)
 def test_ranks_reduce_one_type() -> None:
     digest(moved().model, Strict(), [])
 

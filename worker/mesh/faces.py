@@ -22,6 +22,19 @@ def face_counts(tets: Ints) -> NDArray[np.int64]:
     return _groups(tets[:, FACES].reshape(-1, 3))[1]
 
 
+def across(tets: Ints) -> NDArray[np.int64]:
+    """(n, 4) the tet on the other side of each face, -1 where there is none."""
+    group, size = _groups(tets[:, FACES].reshape(-1, 3))
+    order = np.argsort(group, kind="stable")
+    first = order[np.concatenate([[0], np.cumsum(size)[:-1]])]
+    inner = size == 2
+    partner = np.full(len(group), -1, np.int64)
+    one = first[inner]
+    other = order[np.cumsum(size)[inner] - 1]
+    partner[one], partner[other] = other // 4, one // 4
+    return partner.reshape(-1, 4)
+
+
 def areas(points: Floats, faces: Ints) -> Floats:
     """(k,) areas, m^2, of ``faces``, (k, 3)."""
     a, b, c = (points[faces[:, i]] for i in range(3))

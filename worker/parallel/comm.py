@@ -12,6 +12,8 @@ import numpy.typing as npt
 
 from ..state import Ints
 
+_SWAP_TAG = 90
+
 
 class Pending(Protocol):
     """A communication under way."""
@@ -37,6 +39,12 @@ class Comm(Protocol):
 
     def exchange(self, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: int) -> "Exchange":
         """A repeatable exchange of fixed buffers with other ranks."""
+
+    def swap(self, sends: dict[int, Ints]) -> dict[int, Ints]:
+        """What each rank has for this one, flat, by ascending rank, its own included; nothing is sent for no key."""
+
+    def share(self, item: Any) -> list[Any]:
+        """The items of all ranks, in order, on every rank."""
 
     def gather(self, item: Any) -> list[Any] | None:
         """The items of all ranks, in order, on rank 0; None elsewhere."""
@@ -96,6 +104,12 @@ class SerialComm:
             raise ValueError("one rank has nobody to exchange with")
         return _Done()
 
+    def swap(self, sends: dict[int, Ints]) -> dict[int, Ints]:
+        return {rank: words.reshape(-1) for rank, words in sends.items()}
+
+    def share(self, item: Any) -> list[Any]:
+        return [item]
+
     def gather(self, item: Any) -> list[Any] | None:
         return [item]
 
@@ -138,6 +152,20 @@ class MpiComm:
         requests = [self._world.Recv_init(buffer, source, tag) for source, buffer in receives]
         requests += [self._world.Send_init(buffer, target, tag) for target, buffer in sends]
         return _MpiExchange(self._mpi.Prequest, requests)
+
+    def swap(self, sends: dict[int, Ints]) -> dict[int, Ints]:
+        mine = {rank: np.ascontiguousarray(words).reshape(-1) for rank, words in sends.items()}
+        counts = np.array([len(mine[rank]) if rank in mine else 0 for rank in range(self.size)], np.int64)
+        theirs = np.empty_like(counts)
+        self._world.Alltoall(counts, theirs)
+        received = {int(rank): np.empty(theirs[rank], np.int64) for rank in np.flatnonzero(theirs)}
+        requests = [self._world.Irecv(buffer, rank, _SWAP_TAG) for rank, buffer in received.items()]
+        requests += [self._world.Isend(words, rank, _SWAP_TAG) for rank, words in mine.items() if len(words)]
+        self._mpi.Request.Waitall(requests)
+        return received
+
+    def share(self, item: Any) -> list[Any]:
+        return self._world.allgather(item)
 
     def gather(self, item: Any) -> list[Any] | None:
         return self._world.gather(item)

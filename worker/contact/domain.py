@@ -1,0 +1,91 @@
+"""The contact domain: which faces and edges of this rank another rank must see.
+
+``box`` compares bounding boxes (Paik et al.): a thing goes to every rank whose box of nodes and edges it touches.
+``arbitrary`` asks once more (the paper's eqs 5 to 16, in three dimensions): the other rank names the cells that its
+nodes and edges lie in, and gets what touches one of them. Since only nodes of the surface are entered, every
+occupied cell is an outside cell already, and the paper's test of a cell's neighbours has nothing left to do.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..parallel.comm import Comm
+from ..state import Flags, Floats, Ints
+
+
+@dataclass
+class Boxes:
+    """(n, 3) lowest and highest corner of the space that each thing may need before the next search."""
+
+    low: Floats
+    high: Floats
+
+    @property
+    def hull(self) -> Floats:
+        """(6,) lowest corner and minus the highest of them all; empty: infinities."""
+        if not len(self.low):
+            return np.full(6, np.inf)
+        return np.concatenate([self.low.min(axis=0), -self.high.max(axis=0)])
+
+
+def touching(boxes: Boxes, hull: Floats) -> Flags:
+    """(n,) which boxes touch a hull (6,)."""
+    return np.asarray(((boxes.low <= -hull[3:]) & (boxes.high >= hull[:3])).all(axis=1))
+
+
+def choose(kind: str, askers: Boxes, things: list[Boxes], edge: float, comm: Comm) -> dict[int, list[Flags]]:
+    """For every other rank that needs some: which of each list of this rank's ``things`` go there.
+
+    ``askers`` are the boxes of this rank's nodes and edges; ``edge`` that of a cell, m, equal on all ranks.
+    """
+    hulls = comm.share((askers.hull, np.minimum.reduce([t.hull for t in things])))
+    near = {
+        rank: [touching(t, asker) for t in things] for rank, (asker, _) in enumerate(hulls) if rank != comm.rank
+    }  # fmt: skip
+    if kind == "arbitrary":
+        near = _in_cells(near, askers, things, [offer for _, offer in hulls], edge, comm)
+    return {rank: flags for rank, flags in near.items() if any(f.any() for f in flags)}
+
+
+def _in_cells(
+    near: dict[int, list[Flags]], askers: Boxes, things: list[Boxes], offers: list[Floats], edge: float, comm: Comm
+) -> dict[int, list[Flags]]:
+    """Keeps what touches a cell that the other rank has named."""
+    asked = {rank: touching(askers, offers[rank]) for rank in near}
+    cells = comm.swap({
+        rank: np.unique(_cells(Boxes(askers.low[a], askers.high[a]), edge)[1], axis=0)
+        for rank, a in asked.items() if a.any()
+    })  # fmt: skip
+    kept = {}
+    for rank, flags in near.items():
+        named = cells[rank].reshape(-1, 3) if rank in cells else np.zeros((0, 3), np.int64)
+        kept[rank] = [_named(f, t, named, edge) for f, t in zip(flags, things, strict=True)]
+    return kept
+
+
+def _named(flags: Flags, things: Boxes, cells: Ints, edge: float) -> Flags:
+    who, mine = _cells(Boxes(things.low[flags], things.high[flags]), edge)
+    hit = np.isin(_codes(mine), _codes(cells))
+    result = np.zeros(len(flags), bool)
+    result[np.flatnonzero(flags)[who[hit]]] = True
+    return result
+
+
+def _codes(cells: Ints) -> "np.ndarray":
+    """Cells (n, 3) as single values that can be compared."""
+    return np.ascontiguousarray(cells).view([("", np.int64)] * 3).reshape(-1)
+
+
+def _cells(boxes: Boxes, edge: float) -> tuple[Ints, Ints]:
+    """Index of the box and the cell (3,) for every cell that every box touches."""
+    first = np.floor(boxes.low / edge).astype(np.int64)
+    counts = np.floor(boxes.high / edge).astype(np.int64) - first + 1
+    total = counts.prod(axis=1)
+    who = np.repeat(np.arange(len(total)), total)
+    number = np.arange(len(who)) - np.repeat(np.cumsum(total) - total, total)
+    cells = np.empty((len(who), 3), np.int64)
+    for axis in range(3):
+        cells[:, axis] = first[who, axis] + number % counts[who, axis]
+        number = number // counts[who, axis]
+    return who, cells

@@ -1,0 +1,124 @@
+"""Nodes that several ranks push: who they are, copies of their state, and the lists for completing sums over them."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from ..parallel.comm import Comm, Exchange
+from ..parallel.ownership import Neighbour
+from ..state import Floats, Indices, Ints, Nodes
+from .records import Crowd, Edges, Faces
+
+_CROWD_WORDS = 12
+
+
+def pack(faces: Faces, edges: Edges, crowd: Crowd) -> Ints:
+    """One flat message of things and their nodes; floats travel as their bits."""
+    return np.concatenate([
+        np.array([faces.n, edges.n], np.int64),
+        faces.id, faces.nodes.reshape(-1), faces.size.view(np.int64),
+        edges.nodes.reshape(-1), edges.size.view(np.int64), pack_crowd(crowd).reshape(-1),
+    ])  # fmt: skip
+
+
+def unpack(words: Ints) -> tuple[Faces, Edges, Crowd]:
+    """What ``pack`` made one message of."""
+    f, e = int(words[0]), int(words[1])
+    ends = np.cumsum([2, f, 4 * f, f, 4 * e, e])
+    pieces = [words[a:b] for a, b in pairwise(ends)]
+    faces = Faces(pieces[0], pieces[1].reshape(f, 4), pieces[2].view(np.float64))
+    edges = Edges(pieces[3].reshape(e, 4), pieces[4].view(np.float64))
+    return faces, edges, unpack_crowd(words[ends[-1] :])
+
+
+def pack_crowd(crowd: Crowd) -> Ints:
+    """(n, 12) rows of nodes."""
+    floats = np.concatenate([crowd.mobility, crowd.x, crowd.v], axis=1)
+    return np.column_stack([crowd.id, crowd.owner, crowd.part, np.ascontiguousarray(floats).view(np.int64)])
+
+
+def unpack_crowd(words: Ints) -> Crowd:
+    """The nodes of ``pack_crowd``, as copies."""
+    rows = words.reshape(-1, _CROWD_WORDS)
+    floats = np.ascontiguousarray(rows[:, 3:]).view(np.float64)
+    return Crowd(
+        rows[:, 0].copy(), np.full(len(rows), -1, np.int32), rows[:, 1].astype(np.int32), rows[:, 2].astype(np.int32),
+        floats[:, :3].copy(), floats[:, 3:6].copy(), floats[:, 6:].copy(),
+    )  # fmt: skip
+
+
+def fetch(ids: Ints, owners: Indices, held: Crowd, comm: Comm) -> Crowd:
+    """Copies of nodes (ids, owners) that this rank does not hold; all ranks take part. ``held``: every own node."""
+    asked = comm.swap({int(rank): ids[owners == rank] for rank in np.unique(owners)})
+    answers = comm.swap({rank: pack_crowd(held.take(held.places(want))) for rank, want in asked.items()})
+    return unpack_crowd(np.concatenate([np.zeros(0, np.int64), *answers.values()]))
+
+
+def members(used: Ints, owners: Indices, holders: list[Neighbour], nodes: Nodes, comm: Comm) -> dict[int, Ints]:
+    """For every other rank: the ids, ascending, of the nodes that it and this rank both hold or push.
+
+    ``used`` (k,) ids of the nodes that this rank pushes and ``owners`` (k,) who owns each; ``holders``: shared nodes.
+    The owner of a node hears of everybody who pushes it and tells all of them, and all who hold it.
+    """
+    heard = comm.swap({int(rank): used[owners == rank] for rank in np.unique(owners)})
+    rows = [np.column_stack([ids, np.full(len(ids), rank)]) for rank, ids in heard.items()]
+    pushed = np.unique(np.concatenate([np.zeros(0, np.int64), *heard.values()]))
+    rows.append(np.column_stack([pushed, np.full(len(pushed), comm.rank)]))
+    for other in holders:
+        ids = nodes.id[other.nodes[nodes.owned[other.nodes]]]
+        ids = ids[np.isin(ids, pushed)]
+        rows.append(np.column_stack([ids, np.full(len(ids), other.rank)]))
+    table = np.unique(np.concatenate(rows), axis=0)
+    told = comm.swap({int(rank): _company(table, int(rank)) for rank in np.unique(table[:, 1])})
+    pairs = np.concatenate([np.zeros((0, 2), np.int64), *(words.reshape(-1, 2) for words in told.values())])
+    pairs = pairs[np.lexsort((pairs[:, 0], pairs[:, 1]))]
+    return {int(rank): pairs[pairs[:, 1] == rank, 0] for rank in np.unique(pairs[:, 1]) if rank != comm.rank}
+
+
+def _company(table: Ints, rank: int) -> Ints:
+    """Rows (node, rank) of the nodes that ``rank`` is a member of, its own rows left out."""
+    mine = table[table[:, 1] == rank, 0]
+    company: Ints = table[np.isin(table[:, 0], mine) & (table[:, 1] != rank)]
+    return company
+
+
+@dataclass
+class Copies:
+    """Positions and velocities of nodes, sent by their owners before every use."""
+
+    exchange: Exchange
+    sends: list[tuple[Indices, Floats]]
+    """Local nodes, and the (n, 6) buffer."""
+    receives: list[tuple[Indices, Floats]]
+    """Places in the crowd, and the (n, 6) buffer."""
+
+    def refresh(self, nodes: Nodes, x: Floats, v: Floats) -> None:
+        """Fills the copies' rows of ``x`` and ``v``, (crowd, 3)."""
+        for local, buffer in self.sends:
+            buffer[:, :3], buffer[:, 3:] = nodes.x[local], nodes.v[local]
+        self.exchange.begin()
+        self.exchange.finish()
+        for places, buffer in self.receives:
+            x[places], v[places] = buffer[:, :3], buffer[:, 3:]
+
+    def free(self) -> None:
+        """Gives the messages back to MPI."""
+        self.exchange.free()
+
+
+def copies(crowd: Crowd, nodes: Nodes, comm: Comm, tag: int) -> Copies:
+    """The standing order for the state of the nodes of ``crowd`` that are not held here; all ranks take part."""
+    far = np.flatnonzero(crowd.local < 0)
+    owners = crowd.owner[far]
+    asked = comm.swap({int(rank): crowd.id[far[owners == rank]] for rank in np.unique(owners)})
+    receives = [(far[owners == rank].astype(np.int32), int(rank)) for rank in np.unique(owners)]
+    sends = [(np.searchsorted(nodes.id, ids).astype(np.int32), rank) for rank, ids in asked.items()]
+    into = [(places, np.empty((len(places), 6)), rank) for places, rank in receives]
+    out = [(local, np.empty((len(local), 6)), rank) for local, rank in sends]
+    exchange = comm.exchange(
+        [(rank, buffer.view(np.int64)) for _, buffer, rank in out],
+        [(rank, buffer.view(np.int64)) for _, buffer, rank in into],
+        tag,
+    )
+    return Copies(exchange, [(local, b) for local, b, _ in out], [(places, b) for places, b, _ in into])

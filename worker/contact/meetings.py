@@ -1,0 +1,229 @@
+"""Which candidates meet in the step ahead, and where: one row a meeting, of four nodes, their weights and a normal.
+
+The gap is that of the end of the step as it would come without contact, positive outside; it is a linear function of
+the velocities, dt n . sum(w_k v_k) plus a constant, with the weights w of ``weights``: 1 for the node and minus the
+area coordinates of the point of the face (the defence node, Zhong 1993), or the two ends of two edges. The point is the
+one where the node passes the plane of the face, so that a node that slides from facet to facet is handed over.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from ..state import Floats, Indices
+
+NEAR = 0.02
+"""Of the size of a face: a gap that is watched although it does not close by itself."""
+DEEP = 0.25
+"""Of the size of a face: deepest penetration that is still taken for one, not for the back of a thin body."""
+DEEP_SELF = 0.05
+"""The same on one part, whose nodes lie behind its own faces anyway."""
+_TOUCHING = 1e-3
+"""Of the size of a face: deeper than this, a node is held by the nearest face only."""
+_MARGIN = 1e-3
+"""Of the area coordinates: how far outside of a face its point may lie."""
+_PUSH_OUT = 0.1
+"""Share of a penetration that is taken back in a step."""
+_PARALLEL = 0.05
+"""Sine of the angle below which edges are left to nodes and faces."""
+
+
+@dataclass
+class Meetings:
+    """Room for meetings, and how many there are."""
+
+    nodes: Indices
+    """(room, 4) places of nodes."""
+    weights: Floats
+    """(room, 4)."""
+    normals: Floats
+    """(room, 3) unit, out of the face or out of the first edge's body."""
+    wanted: Floats
+    """(room,) n . sum(w_k v_k) must not be below this, m/s."""
+    friction: Floats
+    """(room,) Coulomb's coefficient."""
+    n: int = 0
+
+    @classmethod
+    def room(cls, n: int) -> "Meetings":
+        """Room for ``n`` meetings."""
+        return cls(np.empty((n, 4), np.int32), np.empty((n, 4)), np.empty((n, 3)), np.empty(n), np.empty(n))
+
+
+_V2, _N2 = "float64[:, ::1]", "int32[:, ::1]"
+_OUT = f"{_N2}, {_V2}, {_V2}, float64[::1], float64[::1]"
+_IN = f"{_N2}, {_V2}, {_V2}, int32[::1], {_V2}, float64"
+
+
+@njit(f"float64(float64[::1], {_V2}, {_V2}, int64, int64, int64, int64, float64)", cache=True, error_model="numpy")
+def _height(normal, x, v, s, i, j, k, h):  # type: ignore[no-untyped-def]
+    """Height of node s over the face i, j, k after a time ``h``, m, and the unit normal; NaN for a face of no area."""
+    ex, ey, ez = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
+    fx, fy, fz = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
+    rx, ry, rz = x[s, 0] - x[i, 0], x[s, 1] - x[i, 1], x[s, 2] - x[i, 2]
+    ex, ey, ez = ex + h * (v[j, 0] - v[i, 0]), ey + h * (v[j, 1] - v[i, 1]), ez + h * (v[j, 2] - v[i, 2])
+    fx, fy, fz = fx + h * (v[k, 0] - v[i, 0]), fy + h * (v[k, 1] - v[i, 1]), fz + h * (v[k, 2] - v[i, 2])
+    rx, ry, rz = rx + h * (v[s, 0] - v[i, 0]), ry + h * (v[s, 1] - v[i, 1]), rz + h * (v[s, 2] - v[i, 2])
+    nx, ny, nz = ey * fz - ez * fy, ez * fx - ex * fz, ex * fy - ey * fx
+    r = 1.0 / np.sqrt(nx * nx + ny * ny + nz * nz)
+    normal[0], normal[1], normal[2] = nx * r, ny * r, nz * r
+    return (nx * rx + ny * ry + nz * rz) * r
+
+
+@njit(f"boolean(float64[::1], {_V2}, {_V2}, int64, int64, int64, int64, float64)", cache=True, error_model="numpy")
+def _foot(b, x, v, s, i, j, k, h):  # type: ignore[no-untyped-def]
+    """Area coordinates ``b`` of the foot of node s on the face after a time ``h``; whether it lies on the face."""
+    ee, ff, ef, er, fr = 0.0, 0.0, 0.0, 0.0, 0.0
+    for a in range(3):
+        e = x[j, a] - x[i, a] + h * (v[j, a] - v[i, a])
+        f = x[k, a] - x[i, a] + h * (v[k, a] - v[i, a])
+        r = x[s, a] - x[i, a] + h * (v[s, a] - v[i, a])
+        ee, ff, ef, er, fr = ee + e * e, ff + f * f, ef + e * f, er + e * r, fr + f * r
+    area = ee * ff - ef * ef
+    b[1], b[2] = (ff * er - ef * fr) / area, (ee * fr - ef * er) / area
+    b[0] = 1.0 - b[1] - b[2]
+    if not min(b[0], b[1], b[2]) >= -_MARGIN:
+        return False
+    for a in range(3):
+        b[a] = max(b[a], 0.0)
+    total = b[0] + b[1] + b[2]
+    for a in range(3):
+        b[a] /= total
+    return True
+
+
+@njit(f"int64({_OUT}, int64, {_N2}, float64[::1], {_IN})", cache=True, error_model="numpy")
+def node_face(nodes, weights, normals, wanted, friction, n, faces, size, pairs, x, v, part, mu, dt):  # type: ignore[no-untyped-def]
+    """Nodes that pass a face, from row ``n`` on; returns the new number of rows.
+
+    ``pairs`` (p, 2): node and face, sorted by node, then by the id of the face; ``faces`` (f, 4), the node opposite
+    last; ``mu`` (parts, parts).
+    """
+    b, m = np.empty(3), np.empty(3)
+    nearest, row = 0.0, -1
+    for p in range(len(pairs)):
+        s, f = pairs[p, 0], pairs[p, 1]
+        if p == 0 or pairs[p - 1, 0] != s:
+            row = -1
+        i, j, k, d = faces[f, 0], faces[f, 1], faces[f, 2], faces[f, 3]
+        gap1 = _height(m, x, v, s, i, j, k, dt)
+        if not gap1 <= NEAR * size[f]:
+            continue
+        gap0 = _height(b, x, v, s, i, j, k, 0.0)
+        if not gap0 >= -(DEEP_SELF if part[s] == part[i] else DEEP) * size[f]:
+            continue
+        if gap0 < 0.0:
+            altitude = 0.0
+            for a in range(3):
+                altitude -= b[a] * (x[d, a] - x[i, a])
+            if gap0 < -0.5 * altitude:
+                continue
+        tau = 0.0
+        if gap0 > 0.0:
+            tau = 1.0 if gap1 >= 0.0 else gap0 / (gap0 - gap1)
+        if not _foot(b, x, v, s, i, j, k, tau * dt):
+            continue
+        at = n
+        if gap0 < -_TOUCHING * size[f]:
+            if row >= 0 and gap0 <= nearest:
+                continue
+            at = row if row >= 0 else n
+            nearest, row = gap0, at
+        n += at == n
+        nodes[at, 0], nodes[at, 1], nodes[at, 2], nodes[at, 3] = s, i, j, k
+        weights[at, 0] = 1.0
+        speed = 0.0
+        for a in range(3):
+            weights[at, a + 1] = -b[a]
+            normals[at, a] = m[a]
+            speed += m[a] * (v[s, a] - (b[0] * v[i, a] + b[1] * v[j, a] + b[2] * v[k, a]))
+        wanted[at] = speed + ((1.0 - _PUSH_OUT) * min(gap0, 0.0) - gap1) / dt
+        friction[at] = mu[part[s], part[i]]
+    return n
+
+
+@njit("float64(float64[::1], float64[::1])", cache=True)
+def _dot(a, b):  # type: ignore[no-untyped-def]
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit("float64[::1](float64[::1], float64[::1])", cache=True)
+def _cross(a, b):  # type: ignore[no-untyped-def]
+    out = np.empty(3)
+    out[0], out[1], out[2] = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+    return out
+
+
+@njit(f"boolean(float64[::1], float64[::1], {_V2}, {_V2}, int64[::1], float64)", cache=True, error_model="numpy")
+def _between(n, u, x, v, edge, h):  # type: ignore[no-untyped-def]
+    """Whether the edge is convex and n, square to it, points out between the normals of its two faces."""
+    a = edge[0]
+    c, d = np.empty(3), np.empty(3)
+    for k in range(3):
+        c[k] = x[edge[2], k] - x[a, k] + h * (v[edge[2], k] - v[a, k])
+        d[k] = x[edge[3], k] - x[a, k] + h * (v[edge[3], k] - v[a, k])
+    first, second = _cross(u, c), _cross(d, u)
+    if not _dot(first, d) < 0.0:
+        return False
+    turn = np.sign(_dot(_cross(first, second), u))
+    return turn * _dot(_cross(first, n), u) >= 0.0 and turn * _dot(_cross(n, second), u) >= 0.0
+
+
+@njit(
+    f"float64(float64[::1], {_V2}, {_V2}, int64, int64, int64, int64, float64, float64, float64)",
+    cache=True,
+    error_model="numpy",
+)
+def _apart(m, x, v, a, b, c, d, s, t, h):  # type: ignore[no-untyped-def]
+    """How far point t of cd lies beyond point s of ab along m after a time ``h``, m."""
+    gap = 0.0
+    for k in range(3):
+        near = (1.0 - s) * (x[a, k] + h * v[a, k]) + s * (x[b, k] + h * v[b, k])
+        gap += m[k] * ((1.0 - t) * (x[c, k] + h * v[c, k]) + t * (x[d, k] + h * v[d, k]) - near)
+    return gap
+
+
+@njit(f"int64({_OUT}, int64, {_N2}, float64[::1], {_IN})", cache=True, error_model="numpy")
+def edge_edge(nodes, weights, normals, wanted, friction, n, edges, size, pairs, x, v, part, mu, dt):  # type: ignore[no-untyped-def]
+    """Edges that pass an edge, from row ``n`` on; returns the new number of rows.
+
+    ``pairs`` (p, 2): two edges; ``edges`` (e, 4): records.Edges.
+    """
+    u, w, m = np.empty(3), np.empty(3), np.empty(3)
+    one, two = np.empty(4, np.int64), np.empty(4, np.int64)
+    for p in range(len(pairs)):
+        for k in range(4):
+            one[k], two[k] = edges[pairs[p, 0], k], edges[pairs[p, 1], k]
+        a, b, c, d = one[0], one[1], two[0], two[1]
+        uu, uw, ww, ur, wr = 0.0, 0.0, 0.0, 0.0, 0.0
+        for k in range(3):
+            u[k] = x[b, k] - x[a, k] + dt * (v[b, k] - v[a, k])
+            w[k] = x[d, k] - x[c, k] + dt * (v[d, k] - v[c, k])
+            r = x[c, k] - x[a, k] + dt * (v[c, k] - v[a, k])
+            uu, uw, ww, ur, wr = uu + u[k] * u[k], uw + u[k] * w[k], ww + w[k] * w[k], ur + u[k] * r, wr + w[k] * r
+        area = uu * ww - uw * uw
+        if not area > _PARALLEL * _PARALLEL * uu * ww:
+            continue
+        s, t = (ww * ur - uw * wr) / area, (uw * ur - uu * wr) / area
+        if not (min(s, t) >= 0.0 and max(s, t) <= 1.0):
+            continue
+        m[:] = _cross(u, w) / np.sqrt(area)
+        gap0, gap1 = _apart(m, x, v, a, b, c, d, s, t, 0.0), _apart(m, x, v, a, b, c, d, s, t, dt)
+        if not _between(m, u, x, v, one, dt):
+            m, gap0, gap1 = -m, -gap0, -gap1
+            if not _between(m, u, x, v, one, dt):
+                continue
+        smaller = min(size[pairs[p, 0]], size[pairs[p, 1]])
+        if gap1 > NEAR * smaller or gap0 < -DEEP_SELF * smaller or not _between(-m, w, x, v, two, dt):
+            continue
+        nodes[n, 0], nodes[n, 1], nodes[n, 2], nodes[n, 3] = c, d, a, b
+        weights[n, 0], weights[n, 1], weights[n, 2], weights[n, 3] = 1.0 - t, t, s - 1.0, -s
+        speed = 0.0
+        for k in range(3):
+            normals[n, k] = m[k]
+            speed += m[k] * ((1.0 - t) * v[c, k] + t * v[d, k] - (1.0 - s) * v[a, k] - s * v[b, k])
+        wanted[n] = speed + ((1.0 - _PUSH_OUT) * min(gap0, 0.0) - gap1) / dt
+        friction[n] = mu[part[a], part[c]]
+        n += 1
+    return n

@@ -1,0 +1,193 @@
+"""A search: who may meet until the next one, the ghosts that are needed for it, and the room to work in."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..parallel.comm import Comm
+from ..parallel.ownership import Neighbour, SharedSum
+from ..state import Flags, Floats, Indices, Ints, Nodes
+from . import domain, ghosts, search
+from .domain import Boxes
+from .ghosts import Copies
+from .meetings import DEEP, Meetings
+from .records import Crowd, Edges, Faces, merged
+from .search import Things
+
+_COPY_TAG, _SHARE_TAG, _PUSH_TAG = 11, 12, 13
+
+
+@dataclass(frozen=True)
+class Rules:
+    """How to search; equal on all ranks."""
+
+    domain: str
+    allowed: Flags
+    """(parts, parts) which parts meet."""
+    skin: float
+    """m."""
+    cell: float
+    """Edge of a cell of the contact domain, m."""
+
+
+@dataclass
+class Sides:
+    """This rank's share of the surface, with its nodes."""
+
+    faces: Faces
+    edges: Edges
+    crowd: Crowd
+    """Every node of the faces and edges, and every node of the surface that is held here."""
+    slaves: Ints
+    """Ids of the owned nodes of the surface."""
+
+
+@dataclass
+class Scene:
+    """What a search left."""
+
+    crowd: Crowd
+    held: Indices
+    """(h,) places of the nodes that this rank holds."""
+    faces: Indices
+    """(f, 4) places."""
+    face_size: Floats
+    edges: Indices
+    """(e, 4) places."""
+    edge_size: Floats
+    node_face: Indices
+    """(p, 2) place of a node, index of a face."""
+    edge_edge: Indices
+    """(q, 2) indices of edges."""
+    faces_sent: int
+    room: Meetings
+    diagonal: Floats
+    push: Floats
+    copies: Copies
+    shares: Ints
+    impulse: Ints
+    total: Ints
+    """(crowd, 3) impulses of the last step, quanta."""
+    before: Floats
+    """(h, 3) v(n-1/2) of the held nodes."""
+    shared_shares: SharedSum
+    shared_impulse: SharedSum
+
+    def free(self) -> None:
+        """Gives its messages back to MPI."""
+        self.copies.free()
+        self.shared_shares.free()
+        self.shared_impulse.free()
+
+
+def build(sides: Sides, rules: Rules, horizon: float, nodes: Nodes, neighbours: list[Neighbour], comm: Comm) -> Scene:
+    """Searches what flies on for ``horizon``, s; all ranks take part."""
+    seen, sent = _with_ghosts(sides, rules, horizon, comm)
+    order = np.argsort(seen.faces.id)
+    faces = seen.faces.take(order)
+    node_face = _node_face(seen, faces, rules, horizon)
+    edge_edge = _edge_edge(seen, sides.edges.n, rules, horizon)
+    return _compact(seen, faces, node_face, edge_edge, sent, nodes, neighbours, comm)
+
+
+def _things(rows: Ints, crowd: Crowd, reach: Floats) -> Things:
+    return Things(np.ascontiguousarray(crowd.places(rows)), reach)
+
+
+def _face_things(faces: Faces, crowd: Crowd, skin: float) -> Things:
+    return _things(faces.nodes[:, :3], crowd, 0.5 * skin + DEEP * faces.size)
+
+
+def _edge_things(edges: Edges, crowd: Crowd, skin: float) -> Things:
+    return _things(edges.nodes[:, :2], crowd, 0.5 * skin + 0.5 * DEEP * edges.size)
+
+
+def _with_ghosts(sides: Sides, rules: Rules, horizon: float, comm: Comm) -> tuple[Sides, int]:
+    """The sides with what other ranks' surfaces have near this one's; own things first. And the faces sent."""
+    if comm.size == 1:
+        return sides, 0
+    crowd, skin = sides.crowd, rules.skin
+
+    def boxes(things: Things) -> Boxes:
+        return Boxes(*search.swept(things, crowd.x, crowd.v, horizon))
+
+    nodes = _things(sides.slaves[:, None], crowd, np.full(len(sides.slaves), 0.5 * skin))
+    faces, edges = boxes(_face_things(sides.faces, crowd, skin)), boxes(_edge_things(sides.edges, crowd, skin))
+    own = boxes(nodes)
+    askers = Boxes(np.concatenate([own.low, edges.low]), np.concatenate([own.high, edges.high]))
+    chosen = domain.choose(rules.domain, askers, [faces, edges], rules.cell, comm)
+    parcels = {rank: (sides.faces.take(flags[0]), sides.edges.take(flags[1])) for rank, flags in chosen.items()}
+    got = comm.swap({rank: ghosts.pack(f, e, _nodes_of(f, e, crowd)) for rank, (f, e) in parcels.items()})
+    others = [ghosts.unpack(words) for words in got.values()]
+    sent = sum(f.n for f, _ in parcels.values())
+    return _joined(sides, others), sent
+
+
+def _nodes_of(faces: Faces, edges: Edges, crowd: Crowd) -> Crowd:
+    ids = np.unique(np.concatenate([faces.nodes.reshape(-1), edges.nodes.reshape(-1)]))
+    return crowd.take(crowd.places(ids))
+
+
+def _joined(sides: Sides, others: list[tuple[Faces, Edges, Crowd]]) -> Sides:
+    faces, edges = [sides.faces, *(o[0] for o in others)], [sides.edges, *(o[1] for o in others)]
+    return Sides(
+        Faces(*(np.concatenate([getattr(f, name) for f in faces]) for name in ("id", "nodes", "size"))),
+        Edges(*(np.concatenate([getattr(e, name) for e in edges]) for name in ("nodes", "size"))),
+        merged([sides.crowd, *(o[2] for o in others)]), sides.slaves,
+    )  # fmt: skip
+
+
+def _node_face(seen: Sides, faces: Faces, rules: Rules, horizon: float) -> Indices:
+    """(p, 2) place of a node and index of a face, sorted by node, then by face."""
+    crowd = seen.crowd
+    slaves = _things(seen.slaves[:, None], crowd, np.full(len(seen.slaves), 0.5 * rules.skin))
+    large = _face_things(faces, crowd, rules.skin)
+    pairs = search.find(slaves, large, crowd.x, crowd.v, crowd.part, rules.allowed, horizon, None)
+    pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+    return np.column_stack([slaves.corners[pairs[:, 0], 0], pairs[:, 1]])
+
+
+def _edge_edge(seen: Sides, own: int, rules: Rules, horizon: float) -> Indices:
+    """(q, 2) indices of edges; the rank of the edge of smaller ids has the pair."""
+    crowd, edges = seen.crowd, seen.edges
+    things = _edge_things(edges, crowd, rules.skin)
+    rank = np.empty(edges.n, np.int64)
+    rank[np.lexsort((edges.nodes[:, 1], edges.nodes[:, 0]))] = np.arange(edges.n)
+    mine = Things(things.corners[:own], things.reach[:own])
+    pairs = search.find(mine, things, crowd.x, crowd.v, crowd.part, rules.allowed, horizon, rank)
+    return pairs[np.lexsort((rank[pairs[:, 1]], rank[pairs[:, 0]]))]
+
+
+def _compact(
+    seen: Sides, faces: Faces, node_face: Indices, edge_edge: Indices, sent: int, nodes: Nodes,
+    neighbours: list[Neighbour], comm: Comm,
+) -> Scene:  # fmt: skip
+    """Keeps the nodes, faces and edges of candidates only, and settles who shares which node."""
+    crowd = seen.crowd
+    which_faces, face_at = np.unique(node_face[:, 1], return_inverse=True)
+    which_edges, edge_at = np.unique(edge_edge, return_inverse=True)
+    faces, edges = faces.take(which_faces), seen.edges.take(which_edges)
+    pushed = np.unique(
+        np.concatenate([crowd.id[node_face[:, 0]], faces.nodes[:, :3].reshape(-1), edges.nodes[:, :2].reshape(-1)])
+    )
+    shared: dict[int, Ints] = {}
+    if comm.size > 1:
+        shared = ghosts.members(pushed, crowd.owner[crowd.places(pushed)], neighbours, nodes, comm)
+    needed = np.unique(np.concatenate([pushed, faces.nodes.reshape(-1), edges.nodes.reshape(-1), *shared.values()]))
+    slave_ids = crowd.id[node_face[:, 0]]
+    crowd = crowd.take(crowd.places(needed))
+    company = [Neighbour(rank, crowd.places(ids)) for rank, ids in sorted(shared.items())]
+    room = len(node_face) + len(edge_edge)
+    shares, impulse = np.zeros((crowd.n, 1), np.int64), np.zeros((crowd.n, 3), np.int64)
+    held = np.flatnonzero(crowd.local >= 0).astype(np.int32)
+    return Scene(
+        crowd=crowd, held=held, faces=crowd.places(faces.nodes), face_size=faces.size,
+        edges=crowd.places(edges.nodes), edge_size=edges.size,
+        node_face=np.column_stack([crowd.places(slave_ids), face_at.reshape(-1)]).astype(np.int32),
+        edge_edge=edge_at.reshape(-1, 2).astype(np.int32), faces_sent=sent,
+        room=Meetings.room(room), diagonal=np.empty((room, 2)), push=np.empty((room, 4)),
+        copies=ghosts.copies(crowd, nodes, comm, _COPY_TAG), shares=shares, impulse=impulse,
+        total=np.zeros((crowd.n, 3), np.int64), before=np.zeros((len(held), 3)),
+        shared_shares=SharedSum(comm, company, shares, _SHARE_TAG),
+        shared_impulse=SharedSum(comm, company, impulse, _PUSH_TAG),
+    )  # fmt: skip

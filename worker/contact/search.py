@@ -1,0 +1,130 @@
+"""Candidates: nodes and faces, edges and edges, that may meet before the next search.
+
+Everything is taken to fly on for a while, the horizon, and two things are candidates when their paths come closer than
+their reach. A candidate list stays good until the horizon has passed or something has strayed from its path by half the
+skin; so a body in free flight spends no skin, however fast it is. The list may hold more than is needed, never less.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from ..state import Flags, Floats, Indices, Ints
+from . import buckets
+from .buckets import bucket_of, first_at
+
+
+@dataclass
+class Things:
+    """What is searched: points, edges or faces as corners of nodes; all the same number of corners."""
+
+    corners: Indices
+    """(n, k) places of nodes."""
+    reach: Floats
+    """(n,) how far from its corners' hull a thing must be seen, m."""
+
+
+def swept(things: Things, x: Floats, v: Floats, horizon: float) -> tuple[Floats, Floats]:
+    """(n, 3) lowest and highest corner of the box that a thing flies through, reach included."""
+    ends = np.concatenate([x[things.corners], (x + horizon * v)[things.corners]], axis=1)
+    reach = things.reach[:, None]
+    return ends.min(axis=1) - reach, ends.max(axis=1) + reach
+
+
+def find(
+    small: Things, large: Things, x: Floats, v: Floats, part: Indices, allowed: Flags, horizon: float,
+    rank: Ints | None,
+) -> Indices:  # fmt: skip
+    """(pairs, 2) candidates: index of a small thing and of a large one.
+
+    ``x``, ``v`` (nodes, 3) and ``part`` (nodes,) belong to the places that corners name; ``allowed`` (parts, parts)
+    says which parts meet. Things with a corner in common are no candidates. ``rank`` (large,): the small things are the
+    first of the large ones, and only the one of lower rank finds a pair.
+    """
+    if not len(small.corners) or not len(large.corners):
+        return np.zeros((0, 2), np.int32)
+    v = v - v[large.corners[:, 0]].mean(axis=0)
+    low, high = swept(small, x, v, horizon)
+    box_low, box_high = swept(large, x, v, horizon)
+    edge = 1.5 * float(np.median((box_high - box_low).max(axis=1)))
+    points, who, half = _samples(low, high, edge)
+    sorted_points = buckets.sort(points, edge)
+    out = np.empty((4 * len(small.corners) + 1024, 2), np.int32)
+    while True:
+        mark = np.full(len(small.corners), -1, np.int32)
+        n = _walk(
+            out, mark, small.corners, large.corners, low, high, box_low, box_high, half, part, allowed,
+            sorted_points.codes, who[sorted_points.order].astype(np.int32), sorted_points.origin,
+            sorted_points.inverse, sorted_points.shape, np.zeros(0, np.int64) if rank is None else rank,
+        )  # fmt: skip
+        if n <= len(out):
+            return out[:n]
+        out = np.empty((n, 2), np.int32)
+
+
+def _samples(low: Floats, high: Floats, edge: float) -> tuple[Floats, "np.ndarray", Floats]:
+    """Points that fill the boxes (n, 3) so densely that none of a box is further than ``half`` from one of its own."""
+    counts = np.maximum(np.ceil((high - low) / edge), 1.0).astype(np.int64)
+    total = counts.prod(axis=1)
+    who = np.repeat(np.arange(len(low)), total)
+    number = np.arange(len(who)) - np.repeat(np.cumsum(total) - total, total)
+    index = np.empty((len(who), 3))
+    for axis in range(3):
+        index[:, axis] = number % counts[who, axis]
+        number = number // counts[who, axis]
+    points = low[who] + (index + 0.5) * ((high - low) / counts)[who]
+    return points, who, (0.5 * ((high - low) / counts)).max(axis=0)
+
+
+@njit("boolean(int32[:, ::1], int32[:, ::1], int64, int64)", cache=True)
+def _meet(small, large, i, j):  # type: ignore[no-untyped-def]
+    """Whether two things have a corner in common."""
+    for a in range(small.shape[1]):
+        for b in range(large.shape[1]):
+            if small[i, a] == large[j, b]:
+                return True
+    return False
+
+
+@njit(
+    "int64(int32[:, ::1], int32[::1], int32[:, ::1], int32[:, ::1], float64[:, ::1], float64[:, ::1], "
+    "float64[:, ::1], float64[:, ::1], float64[::1], int32[::1], boolean[:, ::1], int64[::1], int32[::1], "
+    "float64[::1], float64, int64[::1], int64[::1])",
+    cache=True,
+)
+def _walk(  # type: ignore[no-untyped-def]
+    out, mark, small, large, low, high, box_low, box_high, half, part, allowed, codes, who, origin, inverse, shape, rank
+):
+    """Each large thing asks the buckets that its box touches. Returns how many pairs there are, stored or not."""
+    n = 0
+    for j in range(len(large)):
+        ix0 = bucket_of(box_low[j, 0] - half[0], origin[0], inverse, shape[0])
+        ix1 = bucket_of(box_high[j, 0] + half[0], origin[0], inverse, shape[0])
+        iy0 = bucket_of(box_low[j, 1] - half[1], origin[1], inverse, shape[1])
+        iy1 = bucket_of(box_high[j, 1] + half[1], origin[1], inverse, shape[1])
+        iz0 = bucket_of(box_low[j, 2] - half[2], origin[2], inverse, shape[2])
+        iz1 = bucket_of(box_high[j, 2] + half[2], origin[2], inverse, shape[2])
+        for iz in range(iz0, iz1 + 1):
+            for iy in range(iy0, iy1 + 1):
+                row = shape[0] * (iy + shape[1] * iz)
+                at = first_at(codes, row + ix0)
+                while at < len(codes) and codes[at] <= row + ix1:
+                    i = who[at]
+                    at += 1
+                    if mark[i] == j:
+                        continue
+                    mark[i] = j
+                    if len(rank) > 0 and rank[i] >= rank[j]:
+                        continue
+                    if not allowed[part[small[i, 0]], part[large[j, 0]]]:
+                        continue
+                    apart = False
+                    for k in range(3):
+                        apart |= low[i, k] > box_high[j, k] or high[i, k] < box_low[j, k]
+                    if apart or _meet(small, large, i, j):
+                        continue
+                    if n < len(out):
+                        out[n, 0], out[n, 1] = i, j
+                    n += 1
+    return n

@@ -1,0 +1,255 @@
+"""Contact in the time step: search when it is due, find who meets, push them apart, book what it cost.
+
+Every meeting is computed by one rank, the one that owns its node or has its first edge; ghosts of other ranks'
+surfaces make that possible. The impulses on a node are completed over all ranks that push or hold it, so that
+everybody ends with the same velocity, to the bit.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from conoid.cases.schema import Case
+
+from ..boundaries import Boundary, PrescribedVelocity, SymmetryPlane
+from ..clock import Clock
+from ..materials.models import BULK, DENSITY, SHEAR
+from ..parallel import fixed_point
+from ..parallel.comm import Comm
+from ..parallel.fixed_point import exact_sums
+from ..parallel.ownership import Neighbour
+from ..state import Flags, Floats, Model, Nodes
+from ..timers import Timers
+from . import ghosts, meetings, scene, surface, sweeps
+from .records import Crowd, merged
+from .scene import Rules, Scene, Sides
+
+_HORIZON = 30.0
+"""Steps of free flight that a search looks ahead."""
+_SPENT = 0.4
+"""Of the skin: a node that strays further than this from its path calls for a new search."""
+_KINEMATIC = 2.0
+"""One over the share of a tet's altitude that anything may pass in a step."""
+
+
+class Contact(Boundary):
+    """The contact of a case on one rank."""
+
+    def __init__(
+        self, case: Case, model: Model, exposed: Flags, neighbours: list[Neighbour], bounds: list[Boundary],
+        comm: Comm, clock: Clock, timers: Timers,
+    ) -> None:  # fmt: skip
+        super().__init__(np.arange(model.nodes.n, dtype=np.int32))
+        assert case.contact is not None
+        self._sweeps = case.contact.sweeps
+        self._comm, self._neighbours, self._clock, self._timers = comm, neighbours, clock, timers
+        self._mobility, planes = _mobility(model.nodes, bounds)
+        self._surface = surface.build(model, exposed, planes, neighbours, comm, case.contact.edges)
+        self._mu = _friction(case)
+        size = _mean_size(self._surface.faces.size, comm)
+        self._rules = Rules(case.contact.domain, ~np.isnan(self._mu), case.contact.skin * size, 2.0 * size)
+        largest, fastest = _bounds(model, comm)
+        self._scale = fixed_point.scale_for(largest * fastest)
+        self._joule = math.ldexp(1.0, 30 - math.frexp(largest * fastest * fastest)[1])
+        self._friction = np.zeros(2, np.int64)
+        self._scene: Scene | None = None
+        self._x, self._v, self._t, self._until = model.nodes.x, model.nodes.v, 0.0, 0.0
+        """Where the nodes of the surface were at the last search, and how fast."""
+        self.due = True
+        """Whether the next step begins with a search."""
+        self.limit = 0.0
+        """One over the step in which nothing passes more than half a tet, 1/s."""
+        self.searches = self.meetings = 0
+
+    @property
+    def candidates(self) -> int:
+        """Pairs that this rank looks at in a step."""
+        return 0 if self._scene is None else len(self._scene.node_face) + len(self._scene.edge_edge)
+
+    @property
+    def faces_sent(self) -> int:
+        """Faces that this rank has sent to others for the present search."""
+        return 0 if self._scene is None else self._scene.faces_sent
+
+    @property
+    def friction_work(self) -> float:
+        """Heat of friction so far of the meetings of all ranks, J; all ranks take part."""
+        high, low = (int(word) for word in self._comm.sum(self._friction))
+        return math.ldexp(high * 2**30 + low, -30) / self._joule
+
+    def note(self, state: Nodes) -> None:
+        with self._timers.phase("contact"):
+            if self._scene is not None:
+                self._look(self._scene, state)
+                self._book(self._scene)
+                self._scene.total[:] = 0
+            if self.due or self._scene is None:
+                self._search(state)
+
+    def apply(self, state: Nodes, dt: float, t: float) -> None:
+        if dt > 0.0 and self._scene is not None:
+            with self._timers.phase("contact"):
+                self._push(self._scene, state, dt, t)
+
+    def free(self) -> None:
+        """Gives the messages back to MPI."""
+        if self._scene is not None:
+            self._scene.free()
+
+    def _look(self, now: Scene, state: Nodes) -> None:
+        now.before = state.v[now.crowd.local[now.held]]
+
+    def _search(self, state: Nodes) -> None:
+        """Looks for candidates; all ranks take part."""
+        clock = self._clock
+        if self._scene is not None:
+            self._scene.free()
+        sides = self._sides(state)
+        self._scene = scene.build(sides, self._rules, _HORIZON * clock.dt, state, self._neighbours, self._comm)
+        self._look(self._scene, state)
+        self._x, self._v, self._t = state.x.copy(), state.v.copy(), clock.t
+        self._until = clock.t + _HORIZON * clock.dt
+        self.limit = self._kinematic(sides)
+        self.due = False
+        self.searches += 1
+
+    def spent(self, state: Nodes) -> bool:
+        """Whether a node of the surface will leave, in a step more, what the last search has allowed for."""
+        ahead = self._clock.t + self._clock.dt
+        if ahead > self._until:
+            return True
+        with self._timers.phase("contact"):
+            then = (self._x, self._v)
+            far = _strayed(state.x, state.v, *then, self._surface.flags, self._clock.dt, ahead - self._t)
+            return bool(far > (_SPENT * self._rules.skin) ** 2)
+
+    def _sides(self, state: Nodes) -> Sides:
+        nodes, found = state, self._surface
+        here = Crowd(
+            nodes.id, np.arange(nodes.n, dtype=np.int32), nodes.owner, nodes.part, self._mobility, nodes.x, nodes.v
+        )
+        far = ghosts.fetch(found.far, found.far_owner, here, self._comm)
+        used = np.zeros(nodes.n, bool)
+        used[np.searchsorted(nodes.id, found.faces.nodes.reshape(-1))] = True
+        crowd = merged([here.take(used | found.flags), far])
+        return Sides(found.faces, found.edges, crowd, nodes.id[found.flags & nodes.owned])
+
+    def _kinematic(self, sides: Sides) -> float:
+        """2 |dv| / h: the largest difference of velocities on the surface, and the lowest altitude of its tets."""
+        crowd = sides.crowd
+        x = crowd.x[crowd.places(sides.faces.nodes)]
+        normals = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
+        normals /= np.linalg.norm(normals, axis=1)[:, None]
+        altitudes = np.abs((normals * (x[:, 3] - x[:, 0])).sum(axis=1))
+        words = np.array([-np.min(altitudes, initial=np.inf), *crowd.v.max(axis=0), *-crowd.v.min(axis=0)])
+        most = self._comm.maximum(words)
+        return float(_KINEMATIC * np.linalg.norm(most[1:4] + most[4:7]) / -most[0])
+
+    def _push(self, now: Scene, state: Nodes, dt: float, t: float) -> None:
+        crowd, room, held = now.crowd, now.room, now.held
+        local = crowd.local[held]
+        crowd.x[held], crowd.v[held] = state.x[local], state.v[local]
+        now.copies.refresh(state, crowd.x, crowd.v)
+        n = self._meet(now, dt)
+        self._weigh(now, n)
+        room_of = (room.nodes, room.weights, room.normals)
+        now.push[:n] = 0.0
+        slip = sweeps.rates(crowd.v, room.nodes, room.weights, n)
+        for _ in range(self._sweeps):
+            sweeps.sweep(
+                now.impulse, now.push, crowd.v, *room_of, room.wanted, room.friction, now.diagonal, self._scale, n
+            )
+            now.shared_impulse.begin()
+            now.shared_impulse.finish()
+            sweeps.give(crowd.v, now.total, now.impulse, crowd.mobility, self._scale)
+        sweeps.heat(self._friction, now.push, slip, crowd.v, *room_of, room.friction, self._joule, n)
+        state.v[local] = crowd.v[held]
+        self._book(now)
+        self.meetings = n
+        if now.total.any():
+            self.last_push = t
+
+    def _meet(self, now: Scene, dt: float) -> int:
+        crowd, room = now.crowd, now.room
+        out = (room.nodes, room.weights, room.normals, room.wanted, room.friction)
+        found = (crowd.x, crowd.v, crowd.part, self._mu, dt)
+        n = meetings.node_face(*out, 0, now.faces, now.face_size, now.node_face, *found)
+        return int(meetings.edge_edge(*out, n, now.edges, now.edge_size, now.edge_edge, *found))
+
+    def _weigh(self, now: Scene, n: int) -> None:
+        room = now.room
+        now.shares[:] = 0
+        sweeps.add_shares(now.shares, room.nodes, room.weights, n)
+        now.shared_shares.begin()
+        now.shared_shares.finish()
+        sweeps.mobilities(now.diagonal, room.nodes, room.weights, room.normals, now.shares, now.crowd.mobility, n)
+
+    def _book(self, now: Scene) -> None:
+        """Half of the work of the last impulses, with the velocities in ``before``."""
+        local = now.crowd.local[now.held]
+        work = 0.5 * now.before * (now.total[now.held] / self._scale)
+        self.contact_loss[local] -= work.sum(axis=1)
+        self.external_work[local] -= np.where(now.crowd.mobility[now.held] == 0.0, work, 0.0).sum(axis=1)
+
+
+@njit(
+    "float64(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], boolean[::1], float64, float64)",
+    cache=True,
+)
+def _strayed(x, v, x_then, v_then, flags, dt, ahead):  # type: ignore[no-untyped-def]
+    """Largest squared distance, m^2, of a flagged node a step ahead from where free flight would have taken it."""
+    most = 0.0
+    for a in range(len(x)):
+        if flags[a]:
+            far = 0.0
+            for i in range(3):
+                off = x[a, i] + dt * v[a, i] - (x_then[a, i] + ahead * v_then[a, i])
+                far += off * off
+            most = max(most, far)
+    return most
+
+
+def _mobility(nodes: Nodes, bounds: list[Boundary]) -> tuple[Floats, Flags]:
+    """(nodes, 3) one over the mass, zero where a velocity is held; and which nodes lie on a symmetry plane."""
+    mobility = np.repeat(1.0 / nodes.mass[:, None], 3, axis=1)
+    planes = np.zeros((nodes.n, 3), bool)
+    for bound in bounds:
+        if isinstance(bound, SymmetryPlane):
+            planes[bound.nodes, bound.axis] = True
+        elif isinstance(bound, PrescribedVelocity):
+            rows = mobility[bound.nodes]
+            rows[bound.held] = 0.0
+            mobility[bound.nodes] = rows
+    mobility[planes] = 0.0
+    return mobility, planes
+
+
+def _friction(case: Case) -> Floats:
+    """(parts, parts) Coulomb's coefficient, NaN where two parts do not meet."""
+    assert case.contact is not None
+    spec, names = case.contact, [part.name for part in case.parts]
+    meets = np.array([name in spec.parts or not spec.parts for name in names])
+    mu = np.where(meets[:, None] & meets[None, :], spec.friction, np.nan)
+    for i, name in enumerate(names):
+        if name not in spec.self_contact:
+            mu[i, i] = np.nan
+    for pair in spec.pairs:
+        i, j = (names.index(name) for name in pair.parts)
+        mu[i, j] = mu[j, i] = pair.friction
+    return mu
+
+
+def _mean_size(sizes: Floats, comm: Comm) -> float:
+    total, count = exact_sums(comm, np.column_stack([sizes, np.ones(len(sizes))]))
+    return float(total / count)
+
+
+def _bounds(model: Model, comm: Comm) -> tuple[float, float]:
+    """The largest nodal mass, kg, and the largest of wave speed and velocity, m/s."""
+    speeds = [float(np.linalg.norm(model.nodes.v, axis=1).max(initial=0.0))]
+    for block in model.blocks:
+        p = block.params
+        speeds.append(math.sqrt((p[BULK] + 4.0 / 3.0 * p[SHEAR]) / p[DENSITY]))
+    largest, fastest = comm.maximum(np.array([float(model.nodes.mass.max(initial=0.0)), max(speeds)]))
+    return float(largest), float(fastest)

@@ -1,0 +1,121 @@
+"""Impulses that keep meetings from passing: projected Jacobi sweeps whose order does not matter.
+
+Every meeting asks for a normal velocity of at least ``wanted``. A sweep corrects each by its own want over the l1 norm
+of its row of the contact matrix (Baker, Falgout, Kolev and Yang 2011), the sum over its nodes of |w_k| S_k / m_k with
+S_k the sum of the weights of all meetings at node k: exact for one meeting alone, and never an overshoot however many
+share a node. Impulses never pull; friction is Coulomb's, on the sum over the sweeps. Impulses are integers: a meeting's
+add up to zero, and no order of meetings or ranks changes a bit.
+"""
+
+import numpy as np
+from numba import njit
+
+SHARES = float(2**30)
+"""Quanta per unit of weight."""
+
+_V2, _N2, _I2 = "float64[:, ::1]", "int32[:, ::1]", "int64[:, ::1]"
+
+
+@njit(f"void({_I2}, {_N2}, {_V2}, int64)", cache=True)
+def add_shares(shares, nodes, weights, n):  # type: ignore[no-untyped-def]
+    """Adds |w| of the first ``n`` meetings to ``shares`` (nodes, 1), in quanta."""
+    for p in range(n):
+        for k in range(4):
+            shares[nodes[p, k], 0] += np.int64(np.rint(abs(weights[p, k]) * SHARES))
+
+
+@njit(f"void({_V2}, {_N2}, {_V2}, {_V2}, {_I2}, {_V2}, int64)", cache=True, error_model="numpy")
+def mobilities(diagonal, nodes, weights, normals, shares, mobility, n):  # type: ignore[no-untyped-def]
+    """(room, 2) l1 norms of the rows along the normal and across it, 1/kg; infinite where nothing can move."""
+    for p in range(n):
+        along, across = 0.0, 0.0
+        for k in range(4):
+            a = nodes[p, k]
+            share = abs(weights[p, k]) * (shares[a, 0] / SHARES)
+            most, part = 0.0, 0.0
+            for i in range(3):
+                part += normals[p, i] * normals[p, i] * mobility[a, i]
+                most = max(most, mobility[a, i])
+            along, across = along + share * part, across + share * most
+        diagonal[p, 0] = along if along > 0.0 else np.inf
+        diagonal[p, 1] = across if across > 0.0 else np.inf
+
+
+@njit(
+    f"void({_I2}, {_V2}, {_V2}, {_N2}, {_V2}, {_V2}, float64[::1], float64[::1], {_V2}, float64, int64)",
+    cache=True,
+    error_model="numpy",
+)
+def sweep(impulse, push, v, nodes, weights, normals, wanted, friction, diagonal, scale, n):  # type: ignore[no-untyped-def]
+    """Adds the corrections of ``n`` meetings to ``impulse`` (nodes, 3), in quanta of 1 / ``scale`` N s.
+
+    ``push`` (room, 4) holds each meeting's sum over the sweeps so far: along the normal, and the friction vector, N s.
+    """
+    rate, change = np.empty(3), np.empty(3)
+    for p in range(n):
+        speed = 0.0
+        for i in range(3):
+            rate[i] = 0.0
+            for k in range(4):
+                rate[i] += weights[p, k] * v[nodes[p, k], i]
+            speed += normals[p, i] * rate[i]
+        old = push[p, 0]
+        push[p, 0] = max(0.0, old + (wanted[p] - speed) / diagonal[p, 0])
+        for i in range(3):
+            change[i] = (push[p, 0] - old) * normals[p, i]
+        if friction[p] > 0.0 and (push[p, 0] > 0.0 or old > 0.0):
+            size = 0.0
+            for i in range(3):
+                rate[i] = push[p, 1 + i] - (rate[i] - speed * normals[p, i]) / diagonal[p, 1]
+                size += rate[i] * rate[i]
+            most = friction[p] * push[p, 0]
+            factor = most / np.sqrt(size) if size > most * most else 1.0
+            for i in range(3):
+                change[i] += factor * rate[i] - push[p, 1 + i]
+                push[p, 1 + i] = factor * rate[i]
+        for i in range(3):
+            rest = np.int64(0)
+            for k in range(1, 4):
+                part = np.int64(np.rint(weights[p, k] * change[i] * scale))
+                impulse[nodes[p, k], i] += part
+                rest += part
+            impulse[nodes[p, 0], i] -= rest
+
+
+@njit(f"void({_V2}, {_I2}, {_I2}, {_V2}, float64)", cache=True)
+def give(v, total, impulse, mobility, scale):  # type: ignore[no-untyped-def]
+    """Turns the completed impulses (nodes, 3) of a sweep into velocities, adds them to ``total`` and clears them."""
+    for a in range(len(v)):
+        for i in range(3):
+            j = impulse[a, i]
+            if j != 0:
+                v[a, i] += j * (mobility[a, i] / scale)
+                total[a, i] += j
+                impulse[a, i] = 0
+
+
+@njit(f"{_V2}({_V2}, {_N2}, {_V2}, int64)", cache=True)
+def rates(v, nodes, weights, n):  # type: ignore[no-untyped-def]
+    """(n, 3) relative velocity at each meeting, m/s."""
+    out = np.zeros((n, 3))
+    for p in range(n):
+        for k in range(4):
+            for i in range(3):
+                out[p, i] += weights[p, k] * v[nodes[p, k], i]
+    return out
+
+
+@njit(f"void(int64[::1], {_V2}, {_V2}, {_V2}, {_N2}, {_V2}, {_V2}, float64[::1], float64, int64)", cache=True)
+def heat(words, push, slip, v, nodes, weights, normals, friction, joule, n):  # type: ignore[no-untyped-def]
+    """Adds the work of friction, mean sliding velocity times impulse, to two limbs of quanta of 1 / ``joule`` J."""
+    for p in range(n):
+        if friction[p] > 0.0 and push[p, 0] > 0.0:
+            work = 0.0
+            for i in range(3):
+                rate = slip[p, i]
+                for k in range(4):
+                    rate += weights[p, k] * v[nodes[p, k], i]
+                work -= 0.5 * push[p, 1 + i] * rate
+            high = np.rint(work * joule)
+            words[0] += np.int64(high)
+            words[1] += np.int64(np.rint((work * joule - high) * 2.0**30))
