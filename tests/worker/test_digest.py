@@ -2,7 +2,6 @@
 
 import numpy as np
 import numpy.typing as npt
-import pytest
 
 from conoid.worker.digest import digest
 from conoid.worker.parallel.comm import SerialComm

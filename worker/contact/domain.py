@@ -6,32 +6,11 @@ nodes and edges lie in, and gets what touches one of them. Since only nodes of t
 occupied cell is an outside cell already, and the paper's test of a cell's neighbours has nothing left to do.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..parallel.comm import Comm
 from ..state import Flags, Floats, Ints
-
-
-@dataclass
-class Boxes:
-    """(n, 3) lowest and highest corner of the space that each thing may need before the next search."""
-
-    low: Floats
-    high: Floats
-
-    @property
-    def hull(self) -> Floats:
-        """(6,) lowest corner and minus the highest of them all; empty: infinities."""
-        if not len(self.low):
-            return np.full(6, np.inf)
-        return np.concatenate([self.low.min(axis=0), -self.high.max(axis=0)])
-
-
-def touching(boxes: Boxes, hull: Floats) -> Flags:
-    """(n,) which boxes touch a hull (6,)."""
-    return np.asarray(((boxes.low <= -hull[3:]) & (boxes.high >= hull[:3])).all(axis=1))
+from .search import Boxes
 
 
 def choose(kind: str, askers: Boxes, things: list[Boxes], edge: float, comm: Comm) -> dict[int, list[Flags]]:
@@ -41,7 +20,7 @@ def choose(kind: str, askers: Boxes, things: list[Boxes], edge: float, comm: Com
     """
     hulls = comm.share((askers.hull, np.minimum.reduce([t.hull for t in things])))
     near = {
-        rank: [touching(t, asker) for t in things] for rank, (asker, _) in enumerate(hulls) if rank != comm.rank
+        rank: [t.touching(asker) for t in things] for rank, (asker, _) in enumerate(hulls) if rank != comm.rank
     }  # fmt: skip
     if kind == "arbitrary":
         near = _in_cells(near, askers, things, [offer for _, offer in hulls], edge, comm)
@@ -52,9 +31,9 @@ def _in_cells(
     near: dict[int, list[Flags]], askers: Boxes, things: list[Boxes], offers: list[Floats], edge: float, comm: Comm
 ) -> dict[int, list[Flags]]:
     """Keeps what touches a cell that the other rank has named."""
-    asked = {rank: touching(askers, offers[rank]) for rank in near}
+    asked = {rank: askers.touching(offers[rank]) for rank in near}
     cells = comm.swap({
-        rank: np.unique(_cells(Boxes(askers.low[a], askers.high[a]), edge)[1], axis=0)
+        rank: np.unique(_cells(askers.take(a), edge)[1], axis=0)
         for rank, a in asked.items() if a.any()
     })  # fmt: skip
     kept = {}
@@ -65,7 +44,7 @@ def _in_cells(
 
 
 def _named(flags: Flags, things: Boxes, cells: Ints, edge: float) -> Flags:
-    who, mine = _cells(Boxes(things.low[flags], things.high[flags]), edge)
+    who, mine = _cells(things.take(flags), edge)
     hit = np.isin(_codes(mine), _codes(cells))
     result = np.zeros(len(flags), bool)
     result[np.flatnonzero(flags)[who[hit]]] = True

@@ -1,6 +1,7 @@
 """A search: who may meet until the next one, the ghosts that are needed for it, and the room to work in."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -8,11 +9,10 @@ from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum
 from ..state import Flags, Floats, Indices, Ints, Nodes
 from . import domain, ghosts, search
-from .domain import Boxes
 from .ghosts import Copies
 from .meetings import DEEP, Meetings
 from .records import Crowd, Edges, Faces, merged
-from .search import Things
+from .search import Boxes, Things
 
 _COPY_TAG, _SHARE_TAG, _PUSH_TAG = 11, 12, 13
 
@@ -24,22 +24,44 @@ class Rules:
     domain: str
     allowed: Flags
     """(parts, parts) which parts meet."""
-    skin: float
-    """m."""
     cell: float
     """Edge of a cell of the contact domain, m."""
 
 
 @dataclass
 class Sides:
-    """This rank's share of the surface, with its nodes."""
+    """A share of the surface, with its nodes."""
 
     faces: Faces
+    """By ascending id."""
     edges: Edges
     crowd: Crowd
     """Every node of the faces and edges, and every node of the surface that is held here."""
     slaves: Ints
     """Ids of the owned nodes of the surface."""
+    skin: float
+    """m."""
+
+    @cached_property
+    def nodes(self) -> Things:
+        """The slaves, to be searched."""
+        return Things(self.crowd.places(self.slaves[:, None]), np.full(len(self.slaves), 0.5 * self.skin))
+
+    @cached_property
+    def face_places(self) -> Indices:
+        """(f, 4)."""
+        return self.crowd.places(self.faces.nodes)
+
+    @cached_property
+    def face_things(self) -> Things:
+        """The faces, to be searched."""
+        return Things(np.ascontiguousarray(self.face_places[:, :3]), 0.5 * self.skin + DEEP * self.faces.size)
+
+    @cached_property
+    def edge_things(self) -> Things:
+        """The edges, to be searched."""
+        places = self.crowd.places(np.ascontiguousarray(self.edges.nodes[:, :2]))
+        return Things(places, 0.5 * self.skin + 0.5 * DEEP * self.edges.size)
 
 
 @dataclass
@@ -82,39 +104,21 @@ class Scene:
 
 def build(sides: Sides, rules: Rules, horizon: float, nodes: Nodes, neighbours: list[Neighbour], comm: Comm) -> Scene:
     """Searches what flies on for ``horizon``, s; all ranks take part."""
-    seen, sent = _with_ghosts(sides, rules, horizon, comm)
-    order = np.argsort(seen.faces.id)
-    faces = seen.faces.take(order)
-    node_face = _node_face(seen, faces, rules, horizon)
+    seen, sent = _with_ghosts(sides, rules, horizon, comm) if comm.size > 1 else (sides, 0)
+    node_face = _node_face(seen, rules, horizon)
     edge_edge = _edge_edge(seen, sides.edges.n, rules, horizon)
-    return _compact(seen, faces, node_face, edge_edge, sent, nodes, neighbours, comm)
-
-
-def _things(rows: Ints, crowd: Crowd, reach: Floats) -> Things:
-    return Things(np.ascontiguousarray(crowd.places(rows)), reach)
-
-
-def _face_things(faces: Faces, crowd: Crowd, skin: float) -> Things:
-    return _things(faces.nodes[:, :3], crowd, 0.5 * skin + DEEP * faces.size)
-
-
-def _edge_things(edges: Edges, crowd: Crowd, skin: float) -> Things:
-    return _things(edges.nodes[:, :2], crowd, 0.5 * skin + 0.5 * DEEP * edges.size)
+    return _compact(seen, node_face, edge_edge, sent, nodes, neighbours, comm)
 
 
 def _with_ghosts(sides: Sides, rules: Rules, horizon: float, comm: Comm) -> tuple[Sides, int]:
-    """The sides with what other ranks' surfaces have near this one's; own things first. And the faces sent."""
-    if comm.size == 1:
-        return sides, 0
-    crowd, skin = sides.crowd, rules.skin
+    """The sides with what other ranks' surfaces have near this one's, own edges first. And the faces sent."""
+    crowd = sides.crowd
 
     def boxes(things: Things) -> Boxes:
-        return Boxes(*search.swept(things, crowd.x, crowd.v, horizon))
+        return search.swept(things, crowd.x, crowd.v, horizon)
 
-    nodes = _things(sides.slaves[:, None], crowd, np.full(len(sides.slaves), 0.5 * skin))
-    faces, edges = boxes(_face_things(sides.faces, crowd, skin)), boxes(_edge_things(sides.edges, crowd, skin))
-    own = boxes(nodes)
-    askers = Boxes(np.concatenate([own.low, edges.low]), np.concatenate([own.high, edges.high]))
+    nodes, faces, edges = boxes(sides.nodes), boxes(sides.face_things), boxes(sides.edge_things)
+    askers = Boxes(np.concatenate([nodes.low, edges.low]), np.concatenate([nodes.high, edges.high]))
     chosen = domain.choose(rules.domain, askers, [faces, edges], rules.cell, comm)
     parcels = {rank: (sides.faces.take(flags[0]), sides.edges.take(flags[1])) for rank, flags in chosen.items()}
     got = comm.swap({rank: ghosts.pack(f, e, _nodes_of(f, e, crowd)) for rank, (f, e) in parcels.items()})
@@ -130,27 +134,23 @@ def _nodes_of(faces: Faces, edges: Edges, crowd: Crowd) -> Crowd:
 
 def _joined(sides: Sides, others: list[tuple[Faces, Edges, Crowd]]) -> Sides:
     faces, edges = [sides.faces, *(o[0] for o in others)], [sides.edges, *(o[1] for o in others)]
-    return Sides(
-        Faces(*(np.concatenate([getattr(f, name) for f in faces]) for name in ("id", "nodes", "size"))),
-        Edges(*(np.concatenate([getattr(e, name) for e in edges]) for name in ("nodes", "size"))),
-        merged([sides.crowd, *(o[2] for o in others)]), sides.slaves,
-    )  # fmt: skip
+    all_faces = Faces(*(np.concatenate([getattr(f, name) for f in faces]) for name in ("id", "nodes", "size")))
+    all_edges = Edges(*(np.concatenate([getattr(e, name) for e in edges]) for name in ("nodes", "size")))
+    crowd = merged([sides.crowd, *(o[2] for o in others)])
+    return Sides(all_faces.take(np.argsort(all_faces.id)), all_edges, crowd, sides.slaves, sides.skin)
 
 
-def _node_face(seen: Sides, faces: Faces, rules: Rules, horizon: float) -> Indices:
+def _node_face(seen: Sides, rules: Rules, horizon: float) -> Indices:
     """(p, 2) place of a node and index of a face, sorted by node, then by face."""
-    crowd = seen.crowd
-    slaves = _things(seen.slaves[:, None], crowd, np.full(len(seen.slaves), 0.5 * rules.skin))
-    large = _face_things(faces, crowd, rules.skin)
-    pairs = search.find(slaves, large, crowd.x, crowd.v, crowd.part, rules.allowed, horizon, None)
+    crowd, slaves = seen.crowd, seen.nodes
+    pairs = search.find(slaves, seen.face_things, crowd.x, crowd.v, crowd.part, rules.allowed, horizon, None)
     pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
     return np.column_stack([slaves.corners[pairs[:, 0], 0], pairs[:, 1]])
 
 
 def _edge_edge(seen: Sides, own: int, rules: Rules, horizon: float) -> Indices:
     """(q, 2) indices of edges; the rank of the edge of smaller ids has the pair."""
-    crowd, edges = seen.crowd, seen.edges
-    things = _edge_things(edges, crowd, rules.skin)
+    crowd, edges, things = seen.crowd, seen.edges, seen.edge_things
     rank = np.empty(edges.n, np.int64)
     rank[np.lexsort((edges.nodes[:, 1], edges.nodes[:, 0]))] = np.arange(edges.n)
     mine = Things(things.corners[:own], things.reach[:own])
@@ -159,14 +159,14 @@ def _edge_edge(seen: Sides, own: int, rules: Rules, horizon: float) -> Indices:
 
 
 def _compact(
-    seen: Sides, faces: Faces, node_face: Indices, edge_edge: Indices, sent: int, nodes: Nodes,
+    seen: Sides, node_face: Indices, edge_edge: Indices, sent: int, nodes: Nodes,
     neighbours: list[Neighbour], comm: Comm,
 ) -> Scene:  # fmt: skip
     """Keeps the nodes, faces and edges of candidates only, and settles who shares which node."""
     crowd = seen.crowd
     which_faces, face_at = np.unique(node_face[:, 1], return_inverse=True)
     which_edges, edge_at = np.unique(edge_edge, return_inverse=True)
-    faces, edges = faces.take(which_faces), seen.edges.take(which_edges)
+    faces, edges = seen.faces.take(which_faces), seen.edges.take(which_edges)
     pushed = np.unique(
         np.concatenate([crowd.id[node_face[:, 0]], faces.nodes[:, :3].reshape(-1), edges.nodes[:, :2].reshape(-1)])
     )

@@ -25,11 +25,49 @@ class Things:
     """(n,) how far from its corners' hull a thing must be seen, m."""
 
 
-def swept(things: Things, x: Floats, v: Floats, horizon: float) -> tuple[Floats, Floats]:
-    """(n, 3) lowest and highest corner of the box that a thing flies through, reach included."""
-    ends = np.concatenate([x[things.corners], (x + horizon * v)[things.corners]], axis=1)
-    reach = things.reach[:, None]
-    return ends.min(axis=1) - reach, ends.max(axis=1) + reach
+@dataclass
+class Boxes:
+    """(n, 3) lowest and highest corner of the space that each thing may need before the next search."""
+
+    low: Floats
+    high: Floats
+
+    @property
+    def hull(self) -> Floats:
+        """(6,) lowest corner and minus the highest of them all; infinities when there is none."""
+        if not len(self.low):
+            return np.full(6, np.inf)
+        return np.concatenate([self.low.min(axis=0), -self.high.max(axis=0)])
+
+    def take(self, chosen: "np.ndarray") -> "Boxes":
+        """Some of the boxes."""
+        return Boxes(self.low[chosen], self.high[chosen])
+
+    def touching(self, hull: Floats) -> Flags:
+        """(n,) which boxes touch a hull."""
+        return np.asarray(((self.low <= -hull[3:]) & (self.high >= hull[:3])).all(axis=1))
+
+
+def swept(things: Things, x: Floats, v: Floats, horizon: float) -> Boxes:
+    """The boxes that things fly through, reach included; ``x`` and ``v`` are (nodes, 3)."""
+    boxes = Boxes(np.empty((len(things.corners), 3)), np.empty((len(things.corners), 3)))
+    _sweep_out(boxes.low, boxes.high, things.corners, things.reach, x, v, horizon)
+    return boxes
+
+
+@njit(
+    "void(float64[:, ::1], float64[:, ::1], int32[:, ::1], float64[::1], float64[:, ::1], float64[:, ::1], float64)",
+    cache=True,
+)
+def _sweep_out(low, high, corners, reach, x, v, horizon):  # type: ignore[no-untyped-def]
+    for j in range(len(corners)):
+        for i in range(3):
+            least, most = np.inf, -np.inf
+            for k in range(corners.shape[1]):
+                now = x[corners[j, k], i]
+                then = now + horizon * v[corners[j, k], i]
+                least, most = min(least, now, then), max(most, now, then)
+            low[j, i], high[j, i] = least - reach[j], most + reach[j]
 
 
 def find(
@@ -45,18 +83,42 @@ def find(
     if not len(small.corners) or not len(large.corners):
         return np.zeros((0, 2), np.int32)
     v = v - v[large.corners[:, 0]].mean(axis=0)
-    low, high = swept(small, x, v, horizon)
-    box_low, box_high = swept(large, x, v, horizon)
-    edge = 1.5 * float(np.median((box_high - box_low).max(axis=1)))
-    points, who, half = _samples(low, high, edge)
-    sorted_points = buckets.sort(points, edge)
-    out = np.empty((4 * len(small.corners) + 1024, 2), np.int32)
+    small_boxes, large_boxes = swept(small, x, v, horizon), swept(large, x, v, horizon)
+    small_part, large_part = part[small.corners[:, 0]], part[large.corners[:, 0]]
+    few = _near(small_boxes, small_part, large_boxes, large_part, allowed)
+    many = _near(large_boxes, large_part, small_boxes, small_part, allowed)
+    if not len(few) or not len(many):
+        return np.zeros((0, 2), np.int32)
+    order = np.zeros(0, np.int64) if rank is None else rank
+    pairs = _pairs(
+        small_boxes.take(few), large_boxes.take(many), small.corners[few], large.corners[many], part, allowed,
+        order[:0] if rank is None else order[few], order[:0] if rank is None else order[many],
+    )  # fmt: skip
+    return np.column_stack([few[pairs[:, 0]], many[pairs[:, 1]]]).astype(np.int32)
+
+
+def _near(boxes: Boxes, part: Indices, others: Boxes, their_part: Indices, allowed: Flags) -> "np.ndarray":
+    """Indices of the boxes that touch the hull of a part that theirs may meet."""
+    near = np.zeros(len(part), bool)
+    for theirs in np.unique(their_part):
+        near |= boxes.touching(others.take(their_part == theirs).hull) & allowed[part, theirs]
+    return np.flatnonzero(near)
+
+
+def _pairs(
+    small: Boxes, large: Boxes, small_corners: Indices, large_corners: Indices, part: Indices, allowed: Flags,
+    small_rank: Ints, large_rank: Ints,
+) -> Indices:  # fmt: skip
+    edge = 1.5 * float(np.median((large.high - large.low).max(axis=1)))
+    points, who, half = _samples(small.low, small.high, edge)
+    bucketed = buckets.sort(points, edge)
+    out = np.empty((4 * len(who) + 1024, 2), np.int32)
     while True:
-        mark = np.full(len(small.corners), -1, np.int32)
+        mark = np.full(len(small_corners), -1, np.int32)
         n = _walk(
-            out, mark, small.corners, large.corners, low, high, box_low, box_high, half, part, allowed,
-            sorted_points.codes, who[sorted_points.order].astype(np.int32), sorted_points.origin,
-            sorted_points.inverse, sorted_points.shape, np.zeros(0, np.int64) if rank is None else rank,
+            out, mark, small_corners, large_corners, small.low, small.high, large.low, large.high, half, part, allowed,
+            bucketed.codes, who[bucketed.order].astype(np.int32), bucketed.origin, bucketed.inverse, bucketed.shape,
+            small_rank, large_rank,
         )  # fmt: skip
         if n <= len(out):
             return out[:n]
@@ -90,11 +152,28 @@ def _meet(small, large, i, j):  # type: ignore[no-untyped-def]
 @njit(
     "int64(int32[:, ::1], int32[::1], int32[:, ::1], int32[:, ::1], float64[:, ::1], float64[:, ::1], "
     "float64[:, ::1], float64[:, ::1], float64[::1], int32[::1], boolean[:, ::1], int64[::1], int32[::1], "
-    "float64[::1], float64, int64[::1], int64[::1])",
+    "float64[::1], float64, int64[::1], int64[::1], int64[::1])",
     cache=True,
 )
 def _walk(  # type: ignore[no-untyped-def]
-    out, mark, small, large, low, high, box_low, box_high, half, part, allowed, codes, who, origin, inverse, shape, rank
+    out,
+    mark,
+    small,
+    large,
+    low,
+    high,
+    box_low,
+    box_high,
+    half,
+    part,
+    allowed,
+    codes,
+    who,
+    origin,
+    inverse,
+    shape,
+    small_rank,
+    large_rank,
 ):
     """Each large thing asks the buckets that its box touches. Returns how many pairs there are, stored or not."""
     n = 0
@@ -115,7 +194,7 @@ def _walk(  # type: ignore[no-untyped-def]
                     if mark[i] == j:
                         continue
                     mark[i] = j
-                    if len(rank) > 0 and rank[i] >= rank[j]:
+                    if len(small_rank) > 0 and small_rank[i] >= large_rank[j]:
                         continue
                     if not allowed[part[small[i, 0]], part[large[j, 0]]]:
                         continue

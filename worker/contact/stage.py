@@ -25,8 +25,8 @@ from . import ghosts, meetings, scene, surface, sweeps
 from .records import Crowd, merged
 from .scene import Rules, Scene, Sides
 
-_HORIZON = 30.0
-"""Steps of free flight that a search looks ahead."""
+_SHORTEST, _LONGEST = 10.0, 300.0
+"""Steps of free flight that a search looks ahead: as many as the fastest takes past a face, within these bounds."""
 _SPENT = 0.4
 """Of the skin: a node that strays further than this from its path calls for a new search."""
 _KINEMATIC = 2.0
@@ -48,7 +48,9 @@ class Contact(Boundary):
         self._surface = surface.build(model, exposed, planes, neighbours, comm, case.contact.edges)
         self._mu = _friction(case)
         size = _mean_size(self._surface.faces.size, comm)
-        self._rules = Rules(case.contact.domain, ~np.isnan(self._mu), case.contact.skin * size, 2.0 * size)
+        self._rules = Rules(case.contact.domain, ~np.isnan(self._mu), 2.0 * size)
+        self._size = size
+        self._sides = self._whole_sides(model.nodes, case.contact.skin * size)
         largest, fastest = _bounds(model, comm)
         self._scale = fixed_point.scale_for(largest * fastest)
         self._joule = math.ldexp(1.0, 30 - math.frexp(largest * fastest * fastest)[1])
@@ -102,15 +104,17 @@ class Contact(Boundary):
 
     def _search(self, state: Nodes) -> None:
         """Looks for candidates; all ranks take part."""
-        clock = self._clock
+        clock, sides = self._clock, self._sides
         if self._scene is not None:
             self._scene.free()
-        sides = self._sides(state)
-        self._scene = scene.build(sides, self._rules, _HORIZON * clock.dt, state, self._neighbours, self._comm)
+        self._refresh(state)
+        fastest, lowest = self._extremes()
+        self.limit = _KINEMATIC * fastest / lowest
+        steps = min(max(self._size / (fastest * clock.dt), _SHORTEST), _LONGEST) if fastest > 0.0 else _LONGEST
+        self._scene = scene.build(sides, self._rules, steps * clock.dt, state, self._neighbours, self._comm)
         self._look(self._scene, state)
         self._x, self._v, self._t = state.x.copy(), state.v.copy(), clock.t
-        self._until = clock.t + _HORIZON * clock.dt
-        self.limit = self._kinematic(sides)
+        self._until = clock.t + steps * clock.dt
         self.due = False
         self.searches += 1
 
@@ -122,29 +126,35 @@ class Contact(Boundary):
         with self._timers.phase("contact"):
             then = (self._x, self._v)
             far = _strayed(state.x, state.v, *then, self._surface.flags, self._clock.dt, ahead - self._t)
-            return bool(far > (_SPENT * self._rules.skin) ** 2)
+            return bool(far > (_SPENT * self._sides.skin) ** 2)
 
-    def _sides(self, state: Nodes) -> Sides:
-        nodes, found = state, self._surface
-        here = Crowd(
-            nodes.id, np.arange(nodes.n, dtype=np.int32), nodes.owner, nodes.part, self._mobility, nodes.x, nodes.v
-        )
-        far = ghosts.fetch(found.far, found.far_owner, here, self._comm)
-        used = np.zeros(nodes.n, bool)
+    def _here(self, nodes: Nodes) -> Crowd:
+        every = np.arange(nodes.n, dtype=np.int32)
+        return Crowd(nodes.id, every, nodes.owner, nodes.part, self._mobility, nodes.x, nodes.v)
+
+    def _whole_sides(self, nodes: Nodes, skin: float) -> Sides:
+        found, here = self._surface, self._here(nodes)
+        used = found.flags.copy()
         used[np.searchsorted(nodes.id, found.faces.nodes.reshape(-1))] = True
-        crowd = merged([here.take(used | found.flags), far])
-        return Sides(found.faces, found.edges, crowd, nodes.id[found.flags & nodes.owned])
+        far = ghosts.fetch(found.far, found.far_owner, here, self._comm)
+        slaves = nodes.id[found.flags & nodes.owned]
+        return Sides(found.faces, found.edges, merged([here.take(used), far]), slaves, skin)
 
-    def _kinematic(self, sides: Sides) -> float:
-        """2 |dv| / h: the largest difference of velocities on the surface, and the lowest altitude of its tets."""
-        crowd = sides.crowd
-        x = crowd.x[crowd.places(sides.faces.nodes)]
-        normals = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
-        normals /= np.linalg.norm(normals, axis=1)[:, None]
-        altitudes = np.abs((normals * (x[:, 3] - x[:, 0])).sum(axis=1))
-        words = np.array([-np.min(altitudes, initial=np.inf), *crowd.v.max(axis=0), *-crowd.v.min(axis=0)])
-        most = self._comm.maximum(words)
-        return float(_KINEMATIC * np.linalg.norm(most[1:4] + most[4:7]) / -most[0])
+    def _refresh(self, nodes: Nodes) -> None:
+        """Positions and velocities of the surface as they are."""
+        crowd, found = self._sides.crowd, self._surface
+        held = crowd.local >= 0
+        crowd.x[held], crowd.v[held] = nodes.x[crowd.local[held]], nodes.v[crowd.local[held]]
+        far = ghosts.fetch(found.far, found.far_owner, self._here(nodes), self._comm)
+        places = crowd.places(far.id)
+        crowd.x[places], crowd.v[places] = far.x, far.v
+
+    def _extremes(self) -> tuple[float, float]:
+        """Largest difference of velocities on the surface, m/s, and lowest altitude of its tets, m."""
+        crowd = self._sides.crowd
+        altitude = _lowest(crowd.x, self._sides.face_places)
+        most = self._comm.maximum(np.array([-altitude, *crowd.v.max(axis=0), *-crowd.v.min(axis=0)]))
+        return float(np.linalg.norm(most[1:4] + most[4:7])), -float(most[0])
 
     def _push(self, now: Scene, state: Nodes, dt: float, t: float) -> None:
         crowd, room, held = now.crowd, now.room, now.held
@@ -191,6 +201,20 @@ class Contact(Boundary):
         work = 0.5 * now.before * (now.total[now.held] / self._scale)
         self.contact_loss[local] -= work.sum(axis=1)
         self.external_work[local] -= np.where(now.crowd.mobility[now.held] == 0.0, work, 0.0).sum(axis=1)
+
+
+@njit("float64(float64[:, ::1], int32[:, ::1])", cache=True, error_model="numpy")
+def _lowest(x, faces):  # type: ignore[no-untyped-def]
+    """Lowest altitude, m, of tets over their faces (f, 4)."""
+    lowest = np.inf
+    for f in range(len(faces)):
+        a, b, c, d = faces[f, 0], faces[f, 1], faces[f, 2], faces[f, 3]
+        ex, ey, ez = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
+        fx, fy, fz = x[c, 0] - x[a, 0], x[c, 1] - x[a, 1], x[c, 2] - x[a, 2]
+        nx, ny, nz = ey * fz - ez * fy, ez * fx - ex * fz, ex * fy - ey * fx
+        height = nx * (x[d, 0] - x[a, 0]) + ny * (x[d, 1] - x[a, 1]) + nz * (x[d, 2] - x[a, 2])
+        lowest = min(lowest, abs(height) / np.sqrt(nx * nx + ny * ny + nz * nz))
+    return lowest
 
 
 @njit(
