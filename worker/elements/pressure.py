@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 
 from ..state import CHUNK, MASS, VOLUME_FLUX, Floats, Ints
-from .tet4 import CHANGE, DILATATION, EDGE, FORCE, NODAL, SEEN, VOLUME, VOLUME_MID
+from .tet4 import CHANGE, DILATATION, EDGE, NODAL, SEEN, VOLUME, VOLUME_MID, largest_of, quanta
 
 QUANTA = float(2**52)
 """Quanta per unit of volume strain, and per unit of relative nodal volume."""
@@ -127,26 +127,33 @@ def own_strains(w, n, dt):  # type: ignore[no-untyped-def]
         w[CHANGE + i] = w[DILATATION + i] * dt * w[VOLUME_MID + i]
 
 
-@njit("void(float64[::1], float64[::1], uint32[:, ::1], int64)", cache=True)
-def pressure_fluxes(w, pressure, tets, n):  # type: ignore[no-untyped-def]
-    """Rows after the nine forces: V grad p / 4 of the tet, N, for the projection."""
+@njit("int64(int64[::1], float64[::1], float64[::1], uint32[:, ::1], int64, float64)", cache=True)
+def pressure_fluxes(wi, w, pressure, tets, n, scale):  # type: ignore[no-untyped-def]
+    """Three rows of V grad p / 4 of the tet, N, in quanta of 1/scale; returns the bits of the largest."""
+    b1, b2, b3 = w[EDGE:], w[EDGE + 3 * CHUNK :], w[EDGE + 6 * CHUNK :]
+    peak = 0
     for i in range(n):
         p0 = pressure[tets[i, 0]]
         p1, p2, p3 = pressure[tets[i, 1]] - p0, pressure[tets[i, 2]] - p0, pressure[tets[i, 3]] - p0
-        for k in range(3):
-            w[FORCE + (9 + k) * CHUNK + i] = 0.25 * (
-                p1 * w[EDGE + k * CHUNK + i] + p2 * w[EDGE + (3 + k) * CHUNK + i] + p3 * w[EDGE + (6 + k) * CHUNK + i]
-            )
+        fx = 0.25 * (p1 * b1[i] + p2 * b2[i] + p3 * b3[i])
+        fy = 0.25 * (p1 * b1[CHUNK + i] + p2 * b2[CHUNK + i] + p3 * b3[CHUNK + i])
+        fz = 0.25 * (p1 * b1[2 * CHUNK + i] + p2 * b2[2 * CHUNK + i] + p3 * b3[2 * CHUNK + i])
+        wi[i], wi[CHUNK + i], wi[2 * CHUNK + i] = quanta(fx, fy, fz, scale)
+        peak = max(peak, largest_of(fx, fy, fz))
+    return peak
 
 
 @njit("void(int64[:, ::1], int64[::1], uint32[:, ::1], int64)", cache=True)
 def scatter_fluxes(gradient, wi, tets, n):  # type: ignore[no-untyped-def]
     """Adds the quantised V grad p / 4 to the four nodes of each tet."""
     for i in range(n):
+        a, b, c, d = tets[i, 0], tets[i, 1], tets[i, 2], tets[i, 3]
         for k in range(3):
-            flux = wi[(9 + k) * CHUNK + i]
-            for a in range(4):
-                gradient[tets[i, a], k] += flux
+            flux = wi[k * CHUNK + i]
+            gradient[a, k] += flux
+            gradient[b, k] += flux
+            gradient[c, k] += flux
+            gradient[d, k] += flux
 
 
 def nodal_strains(sums: Ints) -> Floats:

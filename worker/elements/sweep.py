@@ -20,7 +20,7 @@ from ..state import CHUNK
 from . import pressure as averaged
 from . import tet4
 
-_LIMIT, _FORCE = tet4.LIMIT, tet4.FORCE
+_LIMIT = tet4.LIMIT
 _NO_TET = 2**62
 _F1, _F2, _I1, _I2, _T2 = "float64[::1]", "float64[:, ::1]", "int64[::1]", "int64[:, ::1]", "uint32[:, ::1]"
 
@@ -28,12 +28,13 @@ _F1, _F2, _I1, _I2, _T2 = "float64[::1]", "float64[:, ::1]", "int64[::1]", "int6
 @njit(f"void(int64, {_F1}, {_F1}, {_F1}, int64, float64)", cache=True, error_model="numpy")
 def deviatoric_stress(strength, w, s, params, n, dt):  # type: ignore[no-untyped-def]
     """Rotation, elastic trial and plastic return of a chunk; books the work of the deviatoric stress."""
-    predict(w, s, n, params[models.SHEAR], dt)
+    predict(w, s, n, params[models.SHEAR], dt, strength == models.ELASTIC)
     if strength == models.LINEAR_HARDENING:
         linear_hardening(w, s, params, n, dt)
     elif strength == models.JOHNSON_COOK:
         johnson_cook(w, s, params, n, dt)
-    deviatoric_work(w, s, n, dt)
+    if strength != models.ELASTIC:
+        deviatoric_work(w, s, n, dt)
 
 
 @njit(f"void(int64, {_F1}, {_F1}, {_F1}, int64, float64)", cache=True, error_model="numpy")
@@ -51,10 +52,12 @@ def pressure_and_limit(eos, w, s, params, n, dt):  # type: ignore[no-untyped-def
 
 
 @njit(f"void({_I1}, {_I1}, {_I1}, int64, int64)", cache=True)
-def note_peaks(peaks, bits, ids, n, rows):  # type: ignore[no-untyped-def]
-    """Raises the peaks by a chunk of tets with these global ids."""
-    peaks[2] = max(peaks[2], tet4.peak(bits, _FORCE, rows, n))
-    limit = tet4.peak(bits, _LIMIT, 1, n)
+def note_peaks(peaks, bits, ids, n, force):  # type: ignore[no-untyped-def]
+    """Raises the peaks by a chunk of tets with these global ids, whose largest force has the bits ``force``."""
+    peaks[2] = max(peaks[2], force)
+    limit = 0
+    for i in range(n):
+        limit = max(limit, bits[_LIMIT + i] & tet4.MAGNITUDE)
     if limit > peaks[0]:
         peaks[0], peaks[1] = limit, _NO_TET
     if limit == peaks[0]:
@@ -70,19 +73,12 @@ def note_peaks(peaks, bits, ids, n, rows):  # type: ignore[no-untyped-def]
 )
 def sum_forces(force, pressure, gradient, split, t, s, w, wi, bits, peaks, ids, n, scale):  # type: ignore[no-untyped-def]
     """Adds the forces of a chunk, and with ``split`` its share of the projected pressure gradient."""
-    tet4.internal_forces(w, s, n)
-    rows = 9
-    if split:
-        note_peaks(peaks, bits, ids, n, rows)
-        averaged.pressure_fluxes(w, pressure, t, n)
-        rows = 12
-        peaks[2] = max(peaks[2], tet4.peak(bits, _FORCE, rows, n))
-    else:
-        note_peaks(peaks, bits, ids, n, rows)
-    tet4.quantise(w, wi, rows, n, scale)
+    largest = tet4.internal_forces(wi, w, s, n, scale)
     tet4.scatter_forces(force, wi, t, n)
     if split:
+        largest = max(largest, averaged.pressure_fluxes(wi, w, pressure, t, n, scale))
         averaged.scatter_fluxes(gradient, wi, t, n)
+    note_peaks(peaks, bits, ids, n, largest)
 
 
 @njit(
@@ -99,17 +95,16 @@ def standard_pass(  # type: ignore[no-untyped-def]
         t = tets[c * CHUNK : (c + 1) * CHUNK]
         s = state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
         n = len(t)
-        tet4.gather_edges(w, x, t, n)
-        tet4.gather_rates(w, v, t, n)
+        tet4.gather(w[tet4.EDGE :], x, t, n)
+        tet4.gather(w[tet4.RATE :], v, t, n)
         tet4.kinematics(w, n, dt)
         deviatoric_stress(strength, w, s, params, n, dt)
         tet4.end_gradients(w, n)
         averaged.own_strains(w, n, dt)
         pressure_and_limit(eos, w, s, params, n, dt)
-        tet4.internal_forces(w, s, n)
-        note_peaks(peaks, bits, ids[c * CHUNK : c * CHUNK + n], n, 9)
-        tet4.quantise(w, wi, 9, n, scale)
+        largest = tet4.internal_forces(wi, w, s, n, scale)
         tet4.scatter_forces(force, wi, t, n)
+        note_peaks(peaks, bits, ids[c * CHUNK : c * CHUNK + n], n, largest)
 
 
 @njit(
@@ -124,8 +119,8 @@ def strain_pass(x, v, sums, weight, pressure, projected, split, tets, state, par
         t = tets[c * CHUNK : (c + 1) * CHUNK]
         s = state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
         n = len(t)
-        tet4.gather_edges(w, x, t, n)
-        tet4.gather_rates(w, v, t, n)
+        tet4.gather(w[tet4.EDGE :], x, t, n)
+        tet4.gather(w[tet4.RATE :], v, t, n)
         tet4.kinematics(w, n, dt)
         deviatoric_stress(strength, w, s, params, n, dt)
         averaged.keep_flux(w, s, n)
@@ -171,7 +166,7 @@ def force_pass(  # type: ignore[no-untyped-def]
         t = tets[c * CHUNK : (c + 1) * CHUNK]
         s = state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
         n = len(t)
-        tet4.gather_edges(w, x, t, n)
+        tet4.gather(w[tet4.EDGE :], x, t, n)
         tet4.end_gradients(w, n)
         averaged.gather_strains(w, strain, t, n)
         averaged.recall_flux(w, s, n, dt)
@@ -191,7 +186,7 @@ def forces_again(x, force, pressure, gradient, split, tets, state, w, wi, bits, 
         t = tets[c * CHUNK : (c + 1) * CHUNK]
         s = state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
         n = len(t)
-        tet4.gather_edges(w, x, t, n)
+        tet4.gather(w[tet4.EDGE :], x, t, n)
         tet4.end_gradients(w, n)
         w[_LIMIT : _LIMIT + n] = 0.0
         sum_forces(force, pressure, gradient, split, t, s, w, wi, bits, peaks, ids[c * CHUNK : c * CHUNK + n], n, scale)

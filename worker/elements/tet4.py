@@ -31,13 +31,11 @@ from ..state import (
 )
 
 # Rows of the scratch, in numbers of float64. EDGE holds e1, e2, e3 and later b1, b2, b3 at the end of the step;
-# RATE holds the velocity differences, then the rate of deformation and the spin, then the nodal forces; with the split
-# form three more rows of pressure fluxes follow them, over volumes and dilatation, which are spent by then.
+# RATE holds the velocity differences, then the rate of deformation and the spin.
 EDGE = 0
 RATE = 9 * CHUNK
 D_XX, D_YY, D_ZZ, D_YZ, D_ZX, D_XY = (RATE + k * CHUNK for k in range(6))
 SPIN = RATE + 6 * CHUNK
-FORCE = RATE
 VOLUME_MID = 18 * CHUNK
 DILATATION = 19 * CHUNK
 VOLUME = 20 * CHUNK
@@ -62,25 +60,19 @@ MAGNITUDE = 0x7FFFFFFFFFFFFFFF
 
 
 @njit("void(float64[::1], float64[:, ::1], uint32[:, ::1], int64)", cache=True, error_model="numpy")
-def gather_edges(w, x, tets, n):  # type: ignore[no-untyped-def]
-    """Edges e1, e2, e3 of ``n`` tets from the positions x (nodes, 3)."""
+def gather(rows, values, tets, n):  # type: ignore[no-untyped-def]
+    """Nine rows: the differences of nodes 1, 2, 3 to node 0 in nodal ``values`` (nodes, 3).
+
+    With x and the rows from EDGE on the edges, with v and those from RATE on the velocity differences.
+    """
+    first, second, third = rows, rows[3 * CHUNK :], rows[6 * CHUNK :]
     for i in range(n):
         a, b, c, d = tets[i, 0], tets[i, 1], tets[i, 2], tets[i, 3]
         for k in range(3):
-            w[EDGE + k * CHUNK + i] = x[b, k] - x[a, k]
-            w[EDGE + (3 + k) * CHUNK + i] = x[c, k] - x[a, k]
-            w[EDGE + (6 + k) * CHUNK + i] = x[d, k] - x[a, k]
-
-
-@njit("void(float64[::1], float64[:, ::1], uint32[:, ::1], int64)", cache=True, error_model="numpy")
-def gather_rates(w, v, tets, n):  # type: ignore[no-untyped-def]
-    """Velocity differences to node 0 of ``n`` tets from the velocities v (nodes, 3)."""
-    for i in range(n):
-        a, b, c, d = tets[i, 0], tets[i, 1], tets[i, 2], tets[i, 3]
-        for k in range(3):
-            w[RATE + k * CHUNK + i] = v[b, k] - v[a, k]
-            w[RATE + (3 + k) * CHUNK + i] = v[c, k] - v[a, k]
-            w[RATE + (6 + k) * CHUNK + i] = v[d, k] - v[a, k]
+            origin = values[a, k]
+            first[k * CHUNK + i] = values[b, k] - origin
+            second[k * CHUNK + i] = values[c, k] - origin
+            third[k * CHUNK + i] = values[d, k] - origin
 
 
 @njit("void(float64[::1], int64, float64)", cache=True, error_model="numpy")
@@ -148,9 +140,28 @@ def end_gradients(w, n):  # type: ignore[no-untyped-def]
         w[EDGE + 6 * CHUNK + i], w[EDGE + 7 * CHUNK + i], w[EDGE + 8 * CHUNK + i] = b3x, b3y, b3z
 
 
-@njit("void(float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
-def internal_forces(w, s, n):  # type: ignore[no-untyped-def]
-    """FORCE: -V stress grad N of nodes 1, 2, 3, N; node 0 gets minus their sum when they are scattered."""
+@njit("UniTuple(int64, 3)(float64, float64, float64, float64)", cache=True, error_model="numpy")
+def quanta(a, b, c, scale):  # type: ignore[no-untyped-def]
+    """In quanta of 1/scale, rounded to the nearest integer."""
+    return np.int64(np.rint(a * scale)), np.int64(np.rint(b * scale)), np.int64(np.rint(c * scale))
+
+
+@njit("int64(float64, float64, float64)", cache=True, error_model="numpy")
+def largest_of(a, b, c):  # type: ignore[no-untyped-def]
+    """The largest magnitude, as the bits of a float64; NaN is above all."""
+    return max(
+        max(np.float64(a).view(np.int64) & MAGNITUDE, np.float64(b).view(np.int64) & MAGNITUDE),
+        np.float64(c).view(np.int64) & MAGNITUDE,
+    )
+
+
+@njit("int64(int64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
+def internal_forces(wi, w, s, n, scale):  # type: ignore[no-untyped-def]
+    """Nine rows of -V stress grad N of nodes 1, 2, 3, N, in quanta of 1/scale; returns the bits of the largest.
+
+    Node 0 gets minus their sum when they are scattered.
+    """
+    peak = 0
     for i in range(n):
         pressure = s[_P + i] + s[_Q + i]
         sxx, syy, szz = pressure - s[_SXX + i], pressure - s[_SYY + i], pressure - s[_SZZ + i]
@@ -158,48 +169,41 @@ def internal_forces(w, s, n):  # type: ignore[no-untyped-def]
         b1x, b1y, b1z = w[EDGE + i], w[EDGE + CHUNK + i], w[EDGE + 2 * CHUNK + i]
         b2x, b2y, b2z = w[EDGE + 3 * CHUNK + i], w[EDGE + 4 * CHUNK + i], w[EDGE + 5 * CHUNK + i]
         b3x, b3y, b3z = w[EDGE + 6 * CHUNK + i], w[EDGE + 7 * CHUNK + i], w[EDGE + 8 * CHUNK + i]
-        w[FORCE + i] = sxx * b1x + sxy * b1y + szx * b1z
-        w[FORCE + CHUNK + i] = sxy * b1x + syy * b1y + syz * b1z
-        w[FORCE + 2 * CHUNK + i] = szx * b1x + syz * b1y + szz * b1z
-        w[FORCE + 3 * CHUNK + i] = sxx * b2x + sxy * b2y + szx * b2z
-        w[FORCE + 4 * CHUNK + i] = sxy * b2x + syy * b2y + syz * b2z
-        w[FORCE + 5 * CHUNK + i] = szx * b2x + syz * b2y + szz * b2z
-        w[FORCE + 6 * CHUNK + i] = sxx * b3x + sxy * b3y + szx * b3z
-        w[FORCE + 7 * CHUNK + i] = sxy * b3x + syy * b3y + syz * b3z
-        w[FORCE + 8 * CHUNK + i] = szx * b3x + syz * b3y + szz * b3z
-
-
-@njit("void(float64[::1], int64[::1], int64, int64, float64)", cache=True, error_model="numpy")
-def quantise(w, wi, rows, n, scale):  # type: ignore[no-untyped-def]
-    """``rows`` rows of the scratch from FORCE on, in quanta of 1/scale, rounded to the nearest integer."""
-    for k in range(rows):
-        source, target = w[FORCE + k * CHUNK : FORCE + k * CHUNK + n], wi[k * CHUNK : k * CHUNK + n]
-        for i in range(n):
-            target[i] = np.int64(np.rint(source[i] * scale))
+        f1x, f1y, f1z = (
+            sxx * b1x + sxy * b1y + szx * b1z,
+            sxy * b1x + syy * b1y + syz * b1z,
+            szx * b1x + syz * b1y + szz * b1z,
+        )
+        f2x, f2y, f2z = (
+            sxx * b2x + sxy * b2y + szx * b2z,
+            sxy * b2x + syy * b2y + syz * b2z,
+            szx * b2x + syz * b2y + szz * b2z,
+        )
+        f3x, f3y, f3z = (
+            sxx * b3x + sxy * b3y + szx * b3z,
+            sxy * b3x + syy * b3y + syz * b3z,
+            szx * b3x + syz * b3y + szz * b3z,
+        )
+        wi[i], wi[CHUNK + i], wi[2 * CHUNK + i] = quanta(f1x, f1y, f1z, scale)
+        wi[3 * CHUNK + i], wi[4 * CHUNK + i], wi[5 * CHUNK + i] = quanta(f2x, f2y, f2z, scale)
+        wi[6 * CHUNK + i], wi[7 * CHUNK + i], wi[8 * CHUNK + i] = quanta(f3x, f3y, f3z, scale)
+        first, second, third = largest_of(f1x, f1y, f1z), largest_of(f2x, f2y, f2z), largest_of(f3x, f3y, f3z)
+        peak = max(peak, max(max(first, second), third))
+    return peak
 
 
 @njit("void(int64[:, ::1], int64[::1], uint32[:, ::1], int64)", cache=True)
 def scatter_forces(force, wi, tets, n):  # type: ignore[no-untyped-def]
     """Adds the quantised forces to the nodal sums; node 0 gets minus the sum, so that they add to zero exactly."""
+    first, second, third = wi, wi[3 * CHUNK :], wi[6 * CHUNK :]
     for i in range(n):
         a, b, c, d = tets[i, 0], tets[i, 1], tets[i, 2], tets[i, 3]
         for k in range(3):
-            f1, f2, f3 = wi[k * CHUNK + i], wi[(3 + k) * CHUNK + i], wi[(6 + k) * CHUNK + i]
+            f1, f2, f3 = first[k * CHUNK + i], second[k * CHUNK + i], third[k * CHUNK + i]
             force[b, k] += f1
             force[c, k] += f2
             force[d, k] += f3
             force[a, k] -= f1 + f2 + f3
-
-
-@njit("int64(int64[::1], int64, int64, int64)", cache=True)
-def peak(bits, row, rows, n):  # type: ignore[no-untyped-def]
-    """Largest magnitude in ``rows`` rows of the scratch from ``row`` on, as the bits of a float64; NaN is above all."""
-    largest = np.int64(0)
-    for k in range(rows):
-        part = bits[row + k * CHUNK : row + k * CHUNK + n]
-        for i in range(n):
-            largest = max(largest, part[i] & MAGNITUDE)
-    return largest
 
 
 @njit("void(float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
