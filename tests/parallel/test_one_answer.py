@@ -1,4 +1,7 @@
-"""One answer for any number of ranks: the digest and the history, to the bit."""
+"""One answer for any number of ranks: the digest and the history, to the bit.
+
+On one rank and on 2, 3, 4 and 7: every shipped case for some fifty steps, and a scene of everything in each form.
+"""
 
 import json
 from collections.abc import Callable
@@ -11,9 +14,9 @@ from conoid.cases.outcome import Outcome, from_json
 
 from .launching import command, ended
 
-pytestmark = pytest.mark.slow
-
-RANKS = (1, 2, 3, 4, 7)
+RANKS = (2, 3, 4, 7)
+QUICK = (2, 3)
+"""Numbers of ranks at which the scene of everything is compared in seconds; the rest is a drill."""
 SHORT = {
     "demo": "1 us",
     "elastic_bar_confined": "1.5 us",
@@ -108,16 +111,18 @@ high = ["1 m", "1 m", "1 m"]
     return text
 
 
-def batch(folder: Path, case: Path) -> dict[str, list[str]]:
-    """The worker's arguments for every run, by the name of its folder."""
-    runs = {
-        name: [name, "--set", f"run.end_time={end}", "--set", "run.frames=0", "--set", "run.samples=10"]
-        for name, end in SHORT.items()
-    }
-    runs |= {f"everything_{form}": [str(case), "--set", f"numerics.pressure={form}"] for form in FORMS}
-    return {
-        name: [*words, "--set", "reference=[]", "--out", str(folder / name)] for name, words in sorted(runs.items())
-    }
+EVERYTHING = [f"everything_{form}" for form in FORMS]
+NAMES = sorted([*SHORT, *EVERYTHING])
+
+
+def arguments(name: str, folder: Path) -> list[str]:
+    """The worker's, for a run by its name; ``everything.toml`` lies beside the folder."""
+    words = ["run.frames=0", "run.samples=10", f"run.end_time={SHORT.get(name, '')}"]
+    case = name
+    if name in EVERYTHING:
+        case, words = str(folder.parent / "everything.toml"), [f"numerics.pressure={name.partition('_')[2]}"]
+    sets = [word for change in [*words, "reference=[]"] for word in ("--set", change)]
+    return [case, *sets, "--out", str(folder / name)]
 
 
 Answers = Callable[[int, str], Path]
@@ -125,21 +130,19 @@ Answers = Callable[[int, str], Path]
 
 @pytest.fixture(scope="module")
 def answers(tmp_path_factory: pytest.TempPathFactory) -> Answers:
-    """The folder of a run by the number of ranks and the name; the runs of one number are done at the first call."""
+    """The folder of a run by the number of ranks and the name; it is done at the first call, together with its like."""
     root = tmp_path_factory.mktemp("answers")
-    case = root / "everything.toml"
-    case.write_text(everything(), encoding="utf-8")
-    done: set[int] = set()
+    (root / "everything.toml").write_text(everything(), encoding="utf-8")
 
     def folder(ranks: int, name: str) -> Path:
         place = root / str(ranks)
-        if ranks not in done:
-            place.mkdir()
-            (place / "runs.json").write_text(json.dumps(list(batch(place, case).values())), encoding="utf-8")
+        if not (place / name).exists():
+            place.mkdir(exist_ok=True)
+            alike = EVERYTHING if name in EVERYTHING else sorted(SHORT)
+            (place / "runs.json").write_text(json.dumps([arguments(each, place) for each in alike]), encoding="utf-8")
             program = Path(__file__).with_name("many.py")
             finished = ended(command(ranks, str(place / "runs.json"), module=[str(program)]))
             assert finished.returncode == 0, finished.stderr
-            done.add(ranks)
         return place / name
 
     return folder
@@ -149,45 +152,48 @@ def outcome(folder: Path) -> Outcome:
     return from_json((folder / layout.OUTCOME).read_bytes())
 
 
-NAMES = sorted([*SHORT, *(f"everything_{form}" for form in FORMS)])
+def slowly(name: str, ranks: int = 1) -> list[pytest.MarkDecorator]:
+    """The marks of a comparison."""
+    return [] if name in EVERYTHING and ranks in (1, *QUICK) else [pytest.mark.slow]
 
 
 def test_every_shipped_case_is_here() -> None:
     assert set(SHORT) == set(load.shipped())
 
 
-@pytest.mark.parametrize("ranks", RANKS[1:])
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    ("name", "ranks"), [pytest.param(name, n, marks=slowly(name, n)) for n in RANKS for name in NAMES]
+)
 def test_the_answer_is_the_same_on_any_number_of_ranks(name: str, ranks: int, answers: Answers) -> None:
     one, many = answers(1, name), answers(ranks, name)
     first, other = outcome(one), outcome(many)
     assert (first.state, other.state) == ("succeeded", "succeeded")
-    assert (first.ranks, other.ranks) == (1, ranks)
+    assert (first.ranks, other.ranks, len(other.phases["elements"])) == (1, ranks, ranks)
     assert other.digest == first.digest
     assert (other.steps, other.time, other.energy) == (first.steps, first.time, first.energy)
     assert (many / layout.HISTORY).read_bytes() == (one / layout.HISTORY).read_bytes()
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=slowly(name)) for name in NAMES])
 def test_the_runs_are_worth_comparing(name: str, answers: Answers) -> None:
-    """Dozens of steps, and energy that went somewhere; several ranks share the work."""
+    """Dozens of steps, and energy that went somewhere."""
     end = outcome(answers(1, name))
     assert end.steps >= 40
     assert len(end.digest) == 64
     assert end.energy is not None
-    if name.startswith("everything"):
+    if name in EVERYTHING:
         assert end.energy.plastic > 0.01 * end.energy.initial
         assert end.energy.elastic > 0.001 * end.energy.initial
         assert end.energy.contact != 0.0
-    assert len(outcome(answers(7, name)).phases["elements"]) == 7
 
 
+@pytest.mark.slow
 def test_other_runs_have_other_digests(answers: Answers) -> None:
     assert len({outcome(answers(1, name)).digest for name in NAMES}) == len(NAMES)
 
 
 def test_the_answer_is_the_same_again(answers: Answers, tmp_path: Path) -> None:
     """Twice the same run, started by the plain command line."""
-    words = batch(tmp_path, Path())["shock_copper"]
-    assert ended(command(2, *words)).returncode == 0
-    assert outcome(tmp_path / "shock_copper").digest == outcome(answers(1, "shock_copper")).digest
+    (tmp_path / "everything.toml").write_text(everything(), encoding="utf-8")
+    assert ended(command(2, *arguments(EVERYTHING[0], tmp_path / "again"))).returncode == 0
+    assert outcome(tmp_path / "again" / EVERYTHING[0]).digest == outcome(answers(2, EVERYTHING[0])).digest
