@@ -96,6 +96,53 @@ def test_bad_input_is_one_line_and_exit_code_two(
     assert (end.state, end.cause, end.message) == ("failed", "input", said[0])
 
 
+MESH = """$MeshFormat
+2.2 0 8
+$EndMeshFormat
+$Nodes
+4
+1 0 0 0
+2 1 0 0
+3 0 1 0
+4 0 0 {height}
+$EndNodes
+$Elements
+1
+7 4 2 1 1 1 2 3 4
+$EndElements
+"""
+CASE = """
+name = "one"
+[[parts]]
+name = "tet"
+material = "steel"
+[parts.mesh]
+shape = "file"
+path = "one.msh"
+unit = "1 mm"
+[run]
+end_time = "1 us"
+"""
+
+
+@pytest.mark.parametrize(
+    ("height", "words"),
+    [(None, ("one.msh", "no such file")), (-1, ("tet 7", "inverted")), (0, ("tet 7", "flat")), ("nan", ("node 4",))],
+)
+def test_a_bad_mesh_is_one_line_and_exit_code_two(height: object, words: tuple[str, ...], tmp_path: Path) -> None:
+    (tmp_path / "one.toml").write_text(CASE, encoding="utf-8")
+    if height is not None:
+        (tmp_path / "one.msh").write_text(MESH.format(height=height), encoding="utf-8")
+    done = ended(command(2, str(tmp_path / "one.toml"), "--out", str(tmp_path / "run")))
+    assert done.returncode == 2
+    end = outcome(tmp_path / "run")
+    assert (end.state, end.cause) == ("failed", "mesh")
+    assert "\n" not in end.message
+    assert end.message in done.stderr
+    assert "Traceback" not in done.stdout + done.stderr
+    assert all(word in end.message for word in ("parts[0].mesh", *words)), end.message
+
+
 def test_a_case_that_is_not_there(tmp_path: Path) -> None:
     done = ended(command(1, "fre_spin", "--out", str(tmp_path / "run")))
     assert done.returncode == 2
