@@ -1,0 +1,81 @@
+"""Bodies for the tests of contact: scenes of several blocks, their pieces on some ranks, clouds of nodes and faces."""
+
+from collections.abc import Sequence
+from itertools import product
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+import numpy.typing as npt
+
+from conoid.cases import schema
+from conoid.worker import domain
+from conoid.worker.contact import surface
+from conoid.worker.contact.records import Crowd
+from conoid.worker.contact.surface import Surface
+from conoid.worker.mesh.model import TetMesh
+from conoid.worker.parallel.comm import Comm, SerialComm
+from conoid.worker.state import Model
+
+from ..worker.kernels import DUMMY, scene
+
+Floats = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.int32]
+Flags = npt.NDArray[np.bool_]
+
+
+def moved(mesh: TetMesh, by: Sequence[float], turn: Floats | None = None) -> TetMesh:
+    """The mesh turned about its middle, then moved by ``by``, m."""
+    middle = 0.5 * (mesh.points.min(axis=0) + mesh.points.max(axis=0))
+    turned = mesh.points if turn is None else middle + (mesh.points - middle) @ turn.T
+    return TetMesh(turned + np.asarray(by), mesh.tets)
+
+
+def rotation(axis: Sequence[float], angle: float) -> Floats:
+    """(3, 3) rotation about ``axis`` by ``angle``, rad (Rodrigues)."""
+    n = np.asarray(axis, float) / np.linalg.norm(axis)
+    cross = np.cross(np.eye(3), -n)
+    return np.asarray(np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross)
+
+
+def meeting_of(motions: Sequence[dict[str, Any]], contact: dict[str, Any] | None = None, **keys: Any) -> schema.Case:
+    """A case of as many parts, body0, body1 ..., as there are ``motions`` (velocity, spin), and their contact."""
+    parts = tuple(
+        schema.Part(name=f"body{i}", material="metal", mesh=DUMMY, **motion) for i, motion in enumerate(motions)
+    )
+    return scene(**keys).model_copy(update={"parts": parts, "contact": schema.Contact(**contact or {})})
+
+
+def pieces_of(case: schema.Case, meshes: Sequence[TetMesh], ranks: int = 1) -> list[tuple[domain.Piece, Model]]:
+    """What each rank holds of a scene whose parts have these meshes."""
+    ready = iter(meshes)
+    with patch.object(domain, "build_mesh", lambda *_, **__: next(ready)):
+        whole = domain.assemble(case, Path())
+    return [(piece, domain._model(case, piece)) for piece in domain.cut(whole, ranks)]
+
+
+def surface_of(
+    piece: domain.Piece, model: Model, comm: Comm | None = None, planes: Flags | None = None, edges: bool = True
+) -> Surface:
+    """The surface of a rank's piece; ``planes`` (nodes, 3): nodes on symmetry planes."""
+    rows = [piece.exposed[np.searchsorted(piece.tet_ids, block.id)] for block in model.blocks]
+    on_planes = np.zeros((model.nodes.n, 3), bool) if planes is None else planes
+    return surface.build(model, np.concatenate(rows), on_planes, piece.neighbours, comm or SerialComm(), edges)
+
+
+def crowd_of(x: Floats, v: Floats | None = None, part: Indices | None = None) -> Crowd:
+    """Free nodes of 1 kg with ids 0, 1, ... at ``x``."""
+    n = len(x)
+    return Crowd(
+        np.arange(n), np.arange(n, dtype=np.int32), np.zeros(n, np.int32),
+        np.zeros(n, np.int32) if part is None else part, np.ones((n, 3)), x, np.zeros((n, 3)) if v is None else v,
+    )  # fmt: skip
+
+
+def sheet(cells: int, size: float) -> tuple[Floats, Indices]:
+    """Nodes and triangles, looking up, of a square sheet at z = 0."""
+    grid = np.array(list(product(range(cells + 1), range(cells + 1))), float) * size
+    a = (np.array(list(product(range(cells), range(cells)))) @ [cells + 1, 1])[:, None]
+    faces = np.concatenate([a + np.array([0, cells + 1, cells + 2]), a + np.array([0, cells + 2, 1])])
+    return np.column_stack([grid, np.zeros(len(grid))]), faces.astype(np.int32)

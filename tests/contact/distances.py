@@ -1,0 +1,41 @@
+"""Exact distances in numpy, for brute-force tests of the search."""
+
+import numpy as np
+
+from ..worker.meshes import Floats
+
+
+def _along(p: Floats, a: Floats, b: Floats) -> Floats:
+    """Distance of points from segments; all of one shape (..., 3)."""
+    along = b - a
+    length = np.maximum((along * along).sum(axis=-1), 1e-300)
+    share = np.clip(((p - a) * along).sum(axis=-1) / length, 0.0, 1.0)
+    return np.asarray(np.linalg.norm(p - a - share[..., None] * along, axis=-1))
+
+
+def point_triangle(points: Floats, triangles: Floats) -> Floats:
+    """(n, m) distances of points (n, 3) from triangles (m, 3, 3): above the triangle its height, else to its rim."""
+    p = points[:, None, :]
+    a, b, c = (triangles[None, :, k] for k in range(3))
+    rim = np.minimum(np.minimum(_along(p, a, b), _along(p, b, c)), _along(p, c, a))
+    normal = np.cross(b - a, c - a)
+    normal /= np.maximum(np.linalg.norm(normal, axis=-1), 1e-300)[..., None]
+    inside = np.ones(rim.shape, bool)
+    for start, end in ((a, b), (b, c), (c, a)):
+        inside &= (np.cross(normal, end - start) * (p - start)).sum(axis=-1) >= 0.0
+    height = np.abs(((p - a) * normal).sum(axis=-1))
+    return np.where(inside, height, rim)
+
+
+def segment_segment(segments: Floats) -> Floats:
+    """(n, n) distances between segments (n, 2, 3), none parallel: at an end of one, or along the common normal."""
+    a, b = segments[:, None, 0], segments[:, None, 1]
+    c, d = segments[None, :, 0], segments[None, :, 1]
+    ends = np.minimum(np.minimum(_along(a, c, d), _along(b, c, d)), np.minimum(_along(c, a, b), _along(d, a, b)))
+    u, w, r = b - a, d - c, c - a
+    normal = np.cross(u, w)
+    area = np.maximum((normal * normal).sum(axis=-1), 1e-300)
+    s = (np.cross(r, w) * normal).sum(axis=-1) / area
+    t = (np.cross(r, u) * normal).sum(axis=-1) / area
+    crossed = (np.minimum(s, t) >= 0.0) & (np.maximum(s, t) <= 1.0)
+    return np.where(crossed, np.abs((r * normal).sum(axis=-1)) / np.sqrt(area), ends)

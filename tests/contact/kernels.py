@@ -1,0 +1,94 @@
+"""What the tests ask of the contact kernels, and how it is asked of them: a changed signature changes this file."""
+
+import numpy as np
+
+from conoid.worker.contact import meetings as kernels
+from conoid.worker.contact import sweeps
+from conoid.worker.contact.meetings import Meetings
+
+from ..worker.meshes import Floats
+from .bodies import Indices
+
+
+def every_pair(slaves: "np.ndarray", things: int) -> Indices:
+    """(p, 2) every slave with every thing, sorted by slave, then by thing."""
+    return np.column_stack([np.repeat(slaves, things), np.tile(np.arange(things), len(slaves))]).astype(np.int32)
+
+
+def face_sizes(x: Floats, faces: Indices) -> Floats:
+    """(f,) square root of twice the area, m."""
+    a, b, c = (x[faces[:, k]] for k in range(3))
+    return np.asarray(np.sqrt(np.linalg.norm(np.cross(b - a, c - a), axis=1)))
+
+
+def edge_sizes(x: Floats, edges: Indices) -> Floats:
+    """(e,) lengths, m."""
+    return np.asarray(np.linalg.norm(x[edges[:, 1]] - x[edges[:, 0]], axis=1))
+
+
+def taken(met: Meetings, rows: "np.ndarray") -> Meetings:
+    """Some of the meetings, in this order."""
+    return Meetings(
+        met.nodes[rows], met.weights[rows], met.normals[rows], met.wanted[rows], met.friction[rows], len(rows)
+    )
+
+
+def _filled(room: Meetings, n: int) -> Meetings:
+    return taken(room, np.arange(n))
+
+
+def node_face(
+    x: Floats, v: Floats, faces: Indices, pairs: Indices, dt: float, part: "np.ndarray | None" = None,
+    mu: Floats | None = None, out: Floats | None = None,
+) -> Meetings:  # fmt: skip
+    """The nodes that pass a face; the slaves are of another part unless ``part`` says something else."""
+    own = np.where(np.isin(np.arange(len(x)), faces), 0, 1) if part is None else part
+    room, n = Meetings.room(len(pairs)), len(x)
+    found = kernels.node_face(
+        room.nodes, room.weights, room.normals, room.wanted, room.friction, 0, faces, face_sizes(x, faces),
+        np.zeros((n, 3)) if out is None else out, pairs, x, v, own.astype(np.int32),
+        np.zeros((9, 9)) if mu is None else mu, dt,
+    )  # fmt: skip
+    return _filled(room, found)
+
+
+def edge_edge(x: Floats, v: Floats, edges: Indices, pairs: Indices, dt: float, mu: Floats | None = None) -> Meetings:
+    """The edges that pass an edge."""
+    room = Meetings.room(len(pairs))
+    found = kernels.edge_edge(
+        room.nodes, room.weights, room.normals, room.wanted, room.friction, 0, edges, edge_sizes(x, edges), pairs, x,
+        v, np.zeros(len(x), np.int32), np.zeros((9, 9)) if mu is None else mu, dt,
+    )  # fmt: skip
+    return _filled(room, found)
+
+
+class Solver:
+    """Sweeps over meetings of nodes with a mobility (nodes, 3), 1/kg; impulses in quanta of 1 / ``scale`` N s."""
+
+    def __init__(self, met: Meetings, v: Floats, mobility: Floats, scale: float = 2.0**40) -> None:
+        self.met, self.v, self.mobility, self.scale = met, v.copy(), mobility, scale
+        n, nodes = met.n, len(v)
+        self.push, self.diagonal = np.zeros((n, 4)), np.empty((n, 2))
+        self.impulse, self.total = np.zeros((nodes, 3), np.int64), np.zeros((nodes, 3), np.int64)
+        shares = np.zeros((nodes, 4), np.int64)
+        sweeps.add_shares(shares, met.nodes, met.weights, met.normals, n)
+        sweeps.mobilities(self.diagonal, met.nodes, met.weights, met.normals, shares, mobility, n)
+
+    def sweep(self, times: int = 1) -> Floats:
+        """The velocities after some sweeps."""
+        met = self.met
+        for _ in range(times):
+            sweeps.sweep(
+                self.impulse, self.push, self.v, met.nodes, met.weights, met.normals, met.wanted, met.friction,
+                self.diagonal, self.scale, met.n,
+            )  # fmt: skip
+            assert (self.impulse.sum(axis=0) == 0).all()
+            sweeps.give(self.v, self.total, self.impulse, self.mobility, self.scale)
+        return self.v
+
+    def heat(self, v_old: Floats, joule: float = 2.0**40) -> float:
+        """Work of friction, J, of the meetings that were pushed from the velocities ``v_old``."""
+        met, words = self.met, np.zeros(2, np.int64)
+        slip = sweeps.rates(v_old, met.nodes, met.weights, met.n)
+        sweeps.heat(words, self.push, slip, self.v, met.nodes, met.weights, met.normals, met.friction, joule, met.n)
+        return float(words[0] + words[1] * 2.0**-30) / joule

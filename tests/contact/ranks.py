@@ -1,0 +1,131 @@
+"""Several ranks in one process: a thread each, and a communicator that keeps what the worker's protocol promises.
+
+A rank that fails wakes all others, so that a test ends with the first error instead of waiting for it.
+"""
+
+import threading
+from collections import defaultdict
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from queue import SimpleQueue
+from typing import Any, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+Ints = npt.NDArray[np.int64]
+Floats = npt.NDArray[np.float64]
+T = TypeVar("T")
+_PATIENCE = 60.0
+"""s; a rank that waits longer for another than this has been forgotten by it."""
+
+
+class World:
+    """What the ranks share."""
+
+    def __init__(self, size: int) -> None:
+        self.size = size
+        self.meeting = threading.Barrier(size, timeout=_PATIENCE)
+        self.table: list[Any] = [None] * size
+        self.mail: defaultdict[tuple[int, int, int], SimpleQueue[Ints]] = defaultdict(SimpleQueue)
+
+
+class ThreadComm:
+    """One rank of a world."""
+
+    def __init__(self, world: World, rank: int) -> None:
+        self._world = world
+        self.rank, self.size = rank, world.size
+
+    def share(self, item: Any) -> list[Any]:
+        world = self._world
+        world.table[self.rank] = item
+        world.meeting.wait()
+        everything = list(world.table)
+        world.meeting.wait()
+        return everything
+
+    def sum(self, words: Ints) -> Ints:
+        assert words.dtype == np.int64
+        return np.asarray(np.sum(self.share(words.copy()), axis=0))
+
+    def maximum(self, values: Floats) -> Floats:
+        assert values.dtype == np.float64
+        return np.asarray(np.max(self.share(values.copy()), axis=0))
+
+    def begin_maximum(self, words: Ints, result: Ints) -> "Finished":
+        result[:] = np.max(self.share(words.copy()), axis=0)
+        return Finished()
+
+    def swap(self, sends: dict[int, Ints]) -> dict[int, Ints]:
+        mine = {rank: np.ascontiguousarray(words).reshape(-1).copy() for rank, words in sends.items()}
+        assert all(words.dtype == np.int64 for words in mine.values())
+        rows = self.share(mine)
+        return {rank: row[self.rank].copy() for rank, row in enumerate(rows) if len(row.get(self.rank, ()))}
+
+    def exchange(self, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: int) -> "Mail":
+        return Mail(self._world, self.rank, sends, receives, tag)
+
+    def gather(self, item: Any) -> list[Any] | None:
+        everything = self.share(item)
+        return everything if self.rank == 0 else None
+
+    def scatter(self, items: list[Any] | None) -> Any:
+        whole = self.share(items)[0]
+        assert whole is not None
+        return whole[self.rank]
+
+    def broadcast(self, item: Any) -> Any:
+        return self.share(item)[0]
+
+    def barrier(self) -> None:
+        self._world.meeting.wait()
+
+
+class Finished:
+    """A communication that is over."""
+
+    def finish(self) -> None:
+        pass
+
+
+class Mail:
+    """Messages of fixed partners and buffers, as often as wanted; a message of the wrong length is an error."""
+
+    def __init__(
+        self, world: World, rank: int, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: int
+    ) -> None:
+        self._sends = [(world.mail[rank, target, tag], buffer) for target, buffer in sends]
+        self._receives = [(world.mail[source, rank, tag], buffer) for source, buffer in receives]
+
+    def begin(self) -> None:
+        for box, buffer in self._sends:
+            box.put(buffer.copy())
+
+    def finish(self) -> None:
+        for box, buffer in self._receives:
+            words = box.get(timeout=_PATIENCE)
+            assert words.shape == buffer.shape
+            buffer[:] = words
+
+    def free(self) -> None:
+        pass
+
+
+def on_ranks(size: int, work: Callable[[ThreadComm], T]) -> list[T]:
+    """What ``work`` returns on each of ``size`` ranks."""
+    world = World(size)
+
+    def one(rank: int) -> T:
+        try:
+            return work(ThreadComm(world, rank))
+        except BaseException:
+            world.meeting.abort()
+            raise
+
+    with ThreadPoolExecutor(size) as pool:
+        futures = [pool.submit(one, rank) for rank in range(size)]
+    errors = [error for error in (future.exception() for future in futures) if error is not None]
+    for error in sorted(errors, key=lambda error: isinstance(error, threading.BrokenBarrierError)):
+        raise error
+    return [future.result() for future in futures]

@@ -1,0 +1,160 @@
+"""Ghosts: messages keep every bit, and all ranks that hold or push a node agree on who they are."""
+
+from collections import defaultdict
+from itertools import permutations
+
+import numpy as np
+import pytest
+
+from conoid.worker.contact import ghosts
+from conoid.worker.contact.records import Crowd, Edges, Faces, merged
+from conoid.worker.parallel.comm import SerialComm
+from conoid.worker.parallel.ownership import Neighbour
+from conoid.worker.state import Model
+
+from ..worker.meshes import block
+from .bodies import crowd_of, meeting_of, moved, pieces_of
+from .ranks import ThreadComm, on_ranks
+
+
+def random_crowd(random: np.random.Generator, n: int) -> Crowd:
+    crowd = crowd_of(random.normal(size=(n, 3)), random.normal(size=(n, 3)), random.integers(0, 5, n).astype(np.int32))
+    crowd.id = np.sort(random.choice(2**40, n, replace=False))
+    crowd.owner = random.integers(0, 9, n).astype(np.int32)
+    crowd.mobility = random.uniform(size=(n, 3)) * random.integers(0, 2, (n, 3))
+    return crowd
+
+
+def same(one: Crowd, two: Crowd) -> bool:
+    """All but ``local``, bit by bit."""
+    names = ("id", "owner", "part", "mobility", "x", "v")
+    return all(
+        getattr(one, name).dtype == getattr(two, name).dtype
+        and getattr(one, name).shape == getattr(two, name).shape
+        and getattr(one, name).tobytes() == getattr(two, name).tobytes()
+        for name in names
+    )
+
+
+@pytest.mark.parametrize(("f", "e", "n"), [(7, 5, 11), (0, 5, 3), (7, 0, 3), (0, 0, 3), (0, 0, 0)])
+def test_what_is_packed_comes_out_bit_by_bit(f: int, e: int, n: int) -> None:
+    random = np.random.default_rng(1)
+    faces = Faces(random.integers(0, 2**50, f), random.integers(0, 2**40, (f, 4)), random.normal(size=f))
+    edges = Edges(random.integers(0, 2**40, (e, 4)), random.normal(size=e))
+    crowd = random_crowd(random, n)
+    got_faces, got_edges, got_crowd = ghosts.unpack(ghosts.pack(faces, edges, crowd))
+    assert (got_faces.id == faces.id).all()
+    assert (got_faces.nodes == faces.nodes).all()
+    assert (got_faces.size == faces.size).all()
+    assert (got_edges.nodes == edges.nodes).all()
+    assert (got_edges.size == edges.size).all()
+    assert same(got_crowd, crowd)
+    assert (got_crowd.local == -1).all()
+
+
+def test_merged_crowds_have_every_node_once_and_prefer_the_first() -> None:
+    random = np.random.default_rng(2)
+    whole = random_crowd(random, 50)
+    here, there = whole.take(np.arange(0, 50, 2)), whole.take(np.arange(5, 45))
+    there.x = there.x + 1.0
+    both = merged([here, there])
+    ids = np.union1d(here.id, there.id)
+    assert (both.id == ids).all()
+    from_here = np.isin(both.id, here.id)
+    assert same(both.take(from_here), here)
+    assert same(both.take(~from_here), there.take(~np.isin(there.id, here.id)))
+    assert (both.id[both.places(ids[::-1])] == ids[::-1]).all()
+
+
+def models_of(ranks: int) -> tuple[list[Model], list[list[Neighbour]]]:
+    pieces = pieces_of(meeting_of([{}, {}]), [block((3, 3, 3)), moved(block((2, 2, 2)), (3.0, 0.0, 0.0))], ranks)
+    return [model for _, model in pieces], [piece.neighbours for piece, _ in pieces]
+
+
+def everything_of(model: Model) -> Crowd:
+    nodes = model.nodes
+    crowd = crowd_of(nodes.x, nodes.v, nodes.part)
+    crowd.id, crowd.owner = nodes.id, nodes.owner
+    return crowd
+
+
+@pytest.mark.parametrize("ranks", [2, 3, 5, 8])
+def test_a_fetched_node_is_its_owners(ranks: int) -> None:
+    models, _ = models_of(ranks)
+    rows = {
+        int(i): (m.nodes.x[k], int(o))
+        for m in models
+        for k, (i, o) in enumerate(zip(m.nodes.id, m.nodes.owner, strict=True))
+    }
+    wanted = [np.random.default_rng([ranks, r]).choice(sorted(rows), 10 * r % 40, replace=False) for r in range(ranks)]
+
+    def work(comm: ThreadComm) -> Crowd:
+        ids = wanted[comm.rank].astype(np.int64)
+        owners = np.array([rows[int(i)][1] for i in ids], np.int32)
+        return ghosts.fetch(ids, owners, everything_of(models[comm.rank]), comm)
+
+    for ids, got in zip(wanted, on_ranks(ranks, work), strict=True):
+        assert sorted(got.id.tolist()) == sorted(ids.tolist())
+        assert all((x == rows[int(i)][0]).all() for i, x in zip(got.id, got.x, strict=True))
+
+
+@pytest.mark.parametrize("ranks", [1, 2, 3, 5, 8])
+@pytest.mark.parametrize("share", [0.0, 0.05, 0.5])
+def test_all_who_hold_or_push_a_node_see_the_same_lists(ranks: int, share: float) -> None:
+    """Of nodes that anybody pushes: its owner, its holders and its pushers, each pair of them with the same ids."""
+    models, neighbours = models_of(ranks)
+    random = np.random.default_rng([ranks, int(100 * share)])
+    owner = {int(i): int(o) for m in models for i, o in zip(m.nodes.id, m.nodes.owner, strict=True)}
+    pushed = [np.array(sorted(i for i in owner if random.uniform() < share), np.int64) for _ in range(ranks)]
+
+    def work(comm: ThreadComm) -> "dict[int, np.ndarray]":
+        used = pushed[comm.rank]
+        owners = np.array([owner[int(i)] for i in used], np.int32)
+        nodes = models[comm.rank].nodes
+        return dict(ghosts.members(used, owners, neighbours[comm.rank], nodes, comm))
+
+    found = on_ranks(ranks, work)
+    company: dict[tuple[int, int], set[int]] = defaultdict(set)
+    for node in {int(i) for ids in pushed for i in ids}:
+        ranks_of = {r for r in range(ranks) if node in pushed[r] or node in models[r].nodes.id}
+        for one, two in permutations(ranks_of | {owner[node]}, 2):
+            company[one, two].add(node)
+    for rank, lists in enumerate(found):
+        assert {(rank, other) for other in lists} == {pair for pair in company if pair[0] == rank}
+        for other, ids in lists.items():
+            assert ids.tolist() == sorted(company[rank, other])
+            assert (found[other][rank] == ids).all()
+    assert bool(company) == (ranks > 1 and share > 0.0)
+
+
+@pytest.mark.parametrize("ranks", [2, 3, 5])
+def test_copies_follow_their_owners_whenever_they_are_refreshed(ranks: int) -> None:
+    models, _ = models_of(ranks)
+    every = merged([everything_of(model) for model in models])
+
+    def work(comm: ThreadComm) -> None:
+        nodes = models[comm.rank].nodes
+        random = np.random.default_rng([7, comm.rank])
+        crowd = every.take(np.sort(random.choice(every.n, 30, replace=False)))
+        held = np.isin(crowd.id, nodes.id)
+        crowd.local = np.where(held, np.searchsorted(nodes.id, crowd.id), -1).astype(np.int32)
+        order = ghosts.copies(crowd, nodes, comm, 99)
+        for turn in range(3):
+            nodes.x[:] = 1000.0 * turn + nodes.id[:, None]
+            nodes.v[:] = -nodes.x
+            x, v = np.full((crowd.n, 3), np.nan), np.full((crowd.n, 3), np.nan)
+            comm.barrier()
+            order.refresh(nodes, x, v)
+            assert (x[~held] == 1000.0 * turn + crowd.id[~held, None]).all()
+            assert (v[~held] == -x[~held]).all()
+            assert np.isnan(x[held]).all()
+            comm.barrier()
+        order.free()
+
+    on_ranks(ranks, work)
+
+
+def test_one_rank_has_no_company() -> None:
+    (model,), _ = models_of(1)
+    ids = model.nodes.id[:5]
+    assert ghosts.members(ids, np.zeros(5, np.int32), [], model.nodes, SerialComm()) == {}

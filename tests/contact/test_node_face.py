@@ -1,0 +1,239 @@
+"""Nodes and faces: who meets in the step ahead, where, and what is asked of them."""
+
+import numpy as np
+import pytest
+
+from conoid.worker.contact import meetings, search
+from conoid.worker.contact.meetings import DEEP, DEEP_SELF, NEAR, Meetings
+from conoid.worker.contact.search import Things
+
+from ..worker.meshes import Floats, block
+from .bodies import Indices, crowd_of, meeting_of, pieces_of, sheet, surface_of
+from .kernels import every_pair, face_sizes, node_face
+
+TRIANGLE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.2, 0.2, -1.0]])
+FACE = np.array([[0, 1, 2, 3]], np.int32)
+SIZE = 1.0
+
+
+def height(x: Floats, corners: Floats) -> tuple[float, Floats]:
+    """Of a point over a face, and the face's unit normal."""
+    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    normal /= np.linalg.norm(normal)
+    return float(normal @ (x - corners[0])), normal
+
+
+def foot(x: Floats, corners: Floats) -> Floats:
+    """Area coordinates of the point of a face's plane that is nearest to x."""
+    sides = (corners[1:3] - corners[0]).T
+    b = np.linalg.lstsq(sides, x - corners[0], rcond=None)[0]
+    return np.array([1.0 - b.sum(), *b])
+
+
+class Expected:
+    """One meeting in the words of the docstrings, or None of it."""
+
+    def __init__(self, x: Floats, v: Floats, s: int, face: "np.ndarray", size: float, own: bool, dt: float) -> None:
+        three, then = face[:3], x + dt * v
+        self.nodes = np.array([s, *three])
+        self.gap0 = height(x[s], x[three])[0]
+        self.gap1, self.normal = height(then[s], then[three])
+        deep = min((DEEP_SELF if own else DEEP) * size, 0.5 * -height(x[face[3]], x[three])[0])
+        share = 0.0 if self.gap0 <= 0.0 else min(self.gap0 / (self.gap0 - self.gap1), 1.0) if self.gap1 < 0.0 else 1.0
+        at = x + share * dt * v
+        b = foot(at[s], at[three])
+        self.meets = self.gap1 <= NEAR * size and self.gap0 >= -deep and b.min() >= -meetings._MARGIN
+        self.weights = np.array([1.0, *-(np.maximum(b, 0.0) / np.maximum(b, 0.0).sum())])
+        speed = self.normal @ (self.weights @ v[[s, *three]])
+        self.wanted = speed + ((1.0 - meetings._PUSH_OUT) * min(self.gap0, 0.0) - self.gap1) / dt
+        self.deep = self.gap0 < -meetings._TOUCHING * size
+
+
+def random_scene(seed: int, nodes: int = 40, faces: int = 12) -> tuple[Floats, Floats, Indices, "np.ndarray"]:
+    """Nodes around faces of sizes 10:1, all moving; a third of the nodes belongs to the faces' part."""
+    random = np.random.default_rng(seed)
+    size = 10.0 ** random.uniform(-0.5, 0.5, (faces, 1, 1))
+    tets = TRIANGLE[None] * size * random.uniform(0.5, 1.5, (faces, 1, 3)) + random.uniform(-0.3, 0.3, (faces, 1, 3))
+    points = random.uniform(-0.2, 0.8, (nodes, 3)) * np.array([1.0, 1.0, 0.5])
+    x = np.concatenate([tets.reshape(-1, 3), points])
+    v = random.normal(size=x.shape) * 10.0 ** random.uniform(-2.0, 0.5, (len(x), 1))
+    part = np.concatenate([np.zeros(4 * faces), random.integers(0, 3, nodes)])
+    return x, v, np.arange(4 * faces, dtype=np.int32).reshape(faces, 4), part.astype(np.int32)
+
+
+def expected(
+    x: Floats, v: Floats, faces: Indices, part: "np.ndarray", slaves: "np.ndarray", dt: float
+) -> list[Expected]:
+    """Rows in order: by node, then by face; a node that is deep in several faces is held by the nearest of these."""
+    sizes, rows = face_sizes(x, faces), []
+    for s in slaves:
+        mine = [Expected(x, v, s, f, sizes[i], part[s] == part[f[0]], dt) for i, f in enumerate(faces)]
+        mine = [row for row in mine if row.meets]
+        deep = [row for row in mine if row.deep]
+        nearest = max(deep, key=lambda row: row.gap0, default=None)
+        rows += [row for row in mine if not row.deep or row is nearest]
+    return rows
+
+
+@pytest.mark.parametrize("dt", [1.0, 0.1, 1e-3])
+def test_meetings_are_those_of_the_formulas(dt: float) -> None:
+    count = 0
+    for seed in range(8):
+        x, v, faces, part = random_scene(seed)
+        slaves = np.arange(4 * len(faces), len(x))
+        got = node_face(
+            x, v, faces, every_pair(slaves, len(faces)), dt, part, mu=np.repeat([[1.0], [2.0], [3.0]], 3, axis=1)
+        )
+        want = sorted(expected(x, v, faces, part, slaves, dt), key=lambda row: tuple(row.nodes))
+        order = np.lexsort(got.nodes.T[::-1])
+        assert got.nodes[order].tolist() == [row.nodes.tolist() for row in want]
+        assert got.weights[order] == pytest.approx(np.array([row.weights for row in want]), abs=1e-9)
+        assert got.normals[order] == pytest.approx(np.array([row.normal for row in want]), abs=1e-9)
+        assert got.wanted[order] == pytest.approx(np.array([row.wanted for row in want]), rel=1e-9, abs=1e-9 / dt)
+        assert (got.friction == 1.0 + part[got.nodes[:, 0]]).all()
+        assert np.abs(got.weights.sum(axis=1)).max() < 1e-14
+        assert np.linalg.norm(got.normals, axis=1) == pytest.approx(1.0, abs=1e-14)
+        count += got.n
+    assert count > 150
+
+
+@pytest.mark.parametrize("gap", [0.3, 0.0, -0.05, -0.2])
+def test_what_is_wanted_ends_the_step_on_the_face_or_takes_back_a_tenth_of_the_depth(gap: float) -> None:
+    x = np.concatenate([TRIANGLE, [[0.3, 0.25, gap]]])
+    v = np.zeros_like(x)
+    v[4] = 0.5, -0.2, -7.0
+    dt = 0.1
+    met = node_face(x, v, FACE, every_pair(np.array([4]), 1), dt)
+    assert met.n == 1
+    rate = met.weights[0] @ v[met.nodes[0]] @ met.normals[0]
+    v[4] += (met.wanted[0] - rate) * met.normals[0]
+    assert height((x + dt * v)[4], (x + dt * v)[:3])[0] == pytest.approx(0.9 * min(gap, 0.0), abs=1e-14)
+
+
+def met_from(start: Floats, speed: Floats, dt: float = 1.0, own: bool = False, below: float = -1.0) -> Meetings:
+    """Meetings of one node with the triangle, whose tet reaches down to ``below``."""
+    x = np.concatenate([TRIANGLE, start[None]])
+    x[3, 2] = below
+    v = np.concatenate([np.zeros((4, 3)), speed[None]])
+    return node_face(x, v, FACE, every_pair(np.array([4]), 1), dt, np.array([0, 0, 0, 0, 0 if own else 1]))
+
+
+@pytest.mark.parametrize(
+    ("gap", "own", "below", "meets"),
+    [
+        (-0.99 * DEEP, False, -1.0, True), (-1.01 * DEEP, False, -1.0, False),
+        (-0.99 * DEEP_SELF, True, -1.0, True), (-1.01 * DEEP_SELF, True, -1.0, False),
+        (-0.099, False, -0.2, True), (-0.101, False, -0.2, False),
+    ],
+)  # fmt: skip
+def test_a_node_deeper_than_the_limit_is_not_met(gap: float, own: bool, below: float, meets: bool) -> None:
+    """A quarter of the face's size; a twentieth on one part; half the height of the tet behind it."""
+    assert (met_from(np.array([0.3, 0.3, gap]), np.zeros(3), own=own, below=below).n == 1) == meets
+
+
+@pytest.mark.parametrize(("gap", "meets"), [(0.99 * NEAR, True), (1.01 * NEAR, False)])
+def test_a_node_that_stays_near_is_watched(gap: float, meets: bool) -> None:
+    assert (met_from(np.array([0.3, 0.3, gap]), np.zeros(3)).n == 1) == meets
+
+
+def test_a_node_that_looks_the_way_the_face_does_is_not_met() -> None:
+    """The rim of a bar beside another of the same width; a node without a direction meets any face."""
+    x, v = np.concatenate([TRIANGLE, [[0.3, 0.3, -0.01]]]), np.zeros((5, 3))
+    for direction, meets in (((0, 0, 0.2), False), ((0, 0, 0.05), True), ((0, 0, -1.0), True), ((1.0, 0, 0), True)):
+        out = np.zeros((5, 3))
+        out[4] = direction
+        assert (node_face(x, v, FACE, every_pair(np.array([4]), 1), 1.0, out=out).n == 1) == meets
+
+
+def test_a_deep_node_is_held_by_the_nearest_face_and_a_touching_one_by_all() -> None:
+    """In the corner of a cube: three faces about one node."""
+    ((piece, model),) = pieces_of(meeting_of([{}], {"self_contact": ("body0",)}), [block((1, 1, 1), shake=0.0)])
+    faces = surface_of(piece, model).faces.nodes.astype(np.int32)
+    for depth, count in ((np.array([0.03, 0.02, 0.04]), 1), (np.array([3e-4, 2e-4, 4e-4]), 3)):
+        x = np.concatenate([model.nodes.x, 1.0 - depth[None]])
+        met = node_face(x, np.zeros_like(x), faces, every_pair(np.array([8]), len(faces)), 1.0)
+        assert len(np.unique(met.normals.round(9), axis=0)) == count
+        assert met.n == 1 or count > 1
+        assert (met.normals == [0.0, 1.0, 0.0]).all(axis=1).any()
+
+
+@pytest.mark.parametrize("gap", [0.0, 5e-4, -5e-4, -0.05])
+def test_a_sliding_node_is_handed_over_between_coplanar_facets(gap: float) -> None:
+    """Always met, at the point where it is; by one facet wherever it is inside of one, or deep."""
+    x, faces = sheet(6, 1.0)
+    faces = np.column_stack([faces, np.full(len(faces), len(x))]).astype(np.int32)
+    random = np.random.default_rng(3)
+    slides = np.column_stack([random.uniform(0.5, 5.5, (2000, 2)), np.full(2000, gap)])
+    slides[:500, 0] = np.round(slides[:500, 0])
+    slides[500:700, 1] = slides[500:700, 0]
+    slides[700:800, :2] = np.round(slides[700:800, :2])
+    points = np.concatenate([x, [[3.0, 3.0, -5.0]], slides])
+    v = np.zeros_like(points)
+    v[len(x) + 1 :, :2] = random.normal(size=(2000, 2)) * 0.01
+    slaves = np.arange(len(x) + 1, len(points))
+    met = node_face(points, v, faces, every_pair(slaves, len(faces)), 0.5)
+    at = -(met.weights[:, 1:, None] * points[met.nodes[:, 1:]]).sum(axis=1)
+    start = points[met.nodes[:, 0]]
+    looked_at = start + (0.5 * v[met.nodes[:, 0]] if gap > 0.0 else 0.0)
+    assert np.abs((at - looked_at)[:, :2]).max() < 3e-3
+    assert (met.normals == [0.0, 0.0, 1.0]).all()
+    counts = np.bincount(met.nodes[:, 0], minlength=len(points))[slaves]
+    assert counts.min() == 1
+    looked_at = points[slaves] + (0.5 * v[slaves] if gap > 0.0 else 0.0)
+    share = looked_at[:, :2] % 1.0
+    rim = np.minimum(np.minimum(share, 1.0 - share).min(axis=1), np.abs(share[:, 0] - share[:, 1]))
+    assert (counts[rim > 5e-3] == 1).all()
+    assert (counts == 1).all() == (gap == -0.05)
+
+
+def crossings(start: Floats, path: Floats, corners: Floats) -> tuple["np.ndarray", Floats]:
+    """Exact: which straight paths pass which triangles from the front, and the area coordinates (n, f, 3) where."""
+    a, b, c = (corners[None, :, k] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    before = ((start[:, None] - a) * normal).sum(axis=2)
+    after = before + (path[:, None] * normal).sum(axis=2)
+    passes = (before > 0.0) & (after < 0.0)
+    share = np.where(passes, before / np.where(passes, before - after, 1.0), 0.0)
+    at = start[:, None] + share[..., None] * path[:, None]
+    area = (normal * normal).sum(axis=2)
+    b0 = (np.cross(c - b, at - b) * normal).sum(axis=2) / area
+    b1 = (np.cross(a - c, at - c) * normal).sum(axis=2) / area
+    return passes, np.stack([b0, b1, 1.0 - b0 - b1], axis=2)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_no_fast_node_passes_a_closed_surface_unmet(seed: int) -> None:
+    """10^4 nodes each, any direction, speed and start outside of a flying body; paths longer than the body too.
+
+    Pairs come from the search. The first face that a node passes is among those that it meets; a face that it passes
+    beside is not.
+    """
+    random = np.random.default_rng(seed)
+    ((piece, model),) = pieces_of(
+        meeting_of([{}], {"self_contact": ("body0",)}), [block((2, 2, 2), shake=0.3, seed=seed)]
+    )
+    body, faces = model.nodes.x, surface_of(piece, model).faces.nodes.astype(np.int32)
+    n, dt, flight = 10_000, 1e-3, random.normal(size=3) * 300.0
+    aim = random.uniform(-0.3, 2.3, (n, 3))
+    way = random.normal(size=(n, 3))
+    way /= np.linalg.norm(way, axis=1)[:, None]
+    start = aim - 4.0 * way
+    path = way * random.uniform(0.5, 12.0, (n, 1))
+    x, v = np.concatenate([body, start]), np.concatenate([np.zeros_like(body), path / dt]) + flight
+    crowd = crowd_of(x, v)
+    nodes = Things(np.arange(len(body), len(x), dtype=np.int32)[:, None], np.full(n, 0.01))
+    part = np.repeat([0, 1], [len(body), n]).astype(np.int32)
+    things = Things(np.ascontiguousarray(faces[:, :3]), np.full(len(faces), 0.3))
+    pairs = search.find(nodes, things, crowd.x, crowd.v, part, ~np.eye(2, dtype=bool), dt, None)
+    pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+    pairs[:, 0] += len(body)
+    met = node_face(x, v, faces, pairs, dt, part)
+    found = np.zeros((n, len(faces)), bool)
+    where = {tuple(face[:3]): i for i, face in enumerate(faces.tolist())}
+    found[met.nodes[:, 0] - len(body), [where[tuple(row)] for row in met.nodes[:, 1:].tolist()]] = True
+    passes, b = crossings(start, path, body[faces[:, :3]])
+    hits = passes & (b.min(axis=2) > 0.0)
+    assert 1000 < hits.any(axis=1).sum() < n
+    assert not (hits & ~found).any()
+    beside = passes & (b.min(axis=2) < -1.01 * meetings._MARGIN)
+    assert not (beside & found).any()

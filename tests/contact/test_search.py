@@ -1,0 +1,221 @@
+"""Candidates: never one too few, each once, and in memory that does not know how far things fly."""
+
+import tracemalloc
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from conoid.worker.contact import buckets, search
+from conoid.worker.contact.search import Things
+
+from ..worker.meshes import Floats
+from .bodies import Flags, Indices, sheet
+from .distances import point_triangle, segment_segment
+
+SETS = 250
+LOOKS = np.linspace(0.0, 1.0, 5)
+"""Times of the horizon at which distances are measured."""
+NEVER_SELF = ~np.eye(3, dtype=bool)
+
+
+class Cloud:
+    """Random things: nodes, faces and edges of sizes up to 100:1, in three parts that fly; some far and fast ones."""
+
+    def __init__(self, seed: int, n: int = 36) -> None:
+        random = np.random.default_rng(seed)
+        self.horizon = float(random.uniform(0.0, 2.0))
+        corners = [random.normal(size=(n, k, 3)) * 10.0 ** random.uniform(-1.5, 0.5, (n, 1, 1)) for k in (1, 3, 2)]
+        middles = random.uniform(-1.5, 1.5, (3, n, 1, 3)) * 10.0 ** (3.0 * (random.uniform(size=(3, n, 1, 1)) > 0.95))
+        drift = random.normal(size=3) * 100.0
+        sets = zip(middles, corners, strict=True)
+        self.x = np.concatenate([(m + c - c.mean(axis=1, keepdims=True)).reshape(-1, 3) for m, c in sets])
+        speed = 10.0 ** random.uniform(-2.0, 1.0, (len(self.x), 1))
+        self.v = drift + speed * random.normal(size=self.x.shape)
+        starts = np.array([0, n, 4 * n])
+        self.nodes = self.things(starts[0] + np.arange(n)[:, None], random)
+        self.faces = self.things(starts[1] + np.arange(3 * n).reshape(n, 3), random)
+        self.edges = self.things(starts[2] + np.arange(2 * n).reshape(n, 2), random)
+        self.part = random.integers(0, 3, len(self.x)).astype(np.int32)
+        for things in (self.faces, self.edges):
+            self.part[things.corners] = self.part[things.corners[:, :1]]
+
+    @staticmethod
+    def things(corners: "np.ndarray", random: np.random.Generator) -> Things:
+        return Things(corners.astype(np.int32), 10.0 ** random.uniform(-2.0, 0.0, len(corners)))
+
+    def at(self, things: Things, share: float) -> Floats:
+        """(n, k, 3) corners after a share of the horizon."""
+        return np.asarray((self.x + share * self.horizon * self.v)[things.corners])
+
+    def find(
+        self, small: Things, large: Things, rank: "np.ndarray | None" = None, allowed: Flags = NEVER_SELF
+    ) -> Indices:
+        return search.find(small, large, self.x, self.v, self.part, allowed, self.horizon, rank)
+
+
+def clouds() -> Iterator[Cloud]:
+    return map(Cloud, range(SETS))
+
+
+def reached(cloud: Cloud, small: Things, large: Things, distance: Floats) -> Flags:
+    """(small, large) pairs that may meet and come within reach, by their distances (looks, small, large)."""
+    near = distance.min(axis=0) < small.reach[:, None] + large.reach[None, :]
+    of = [cloud.part[things.corners[:, 0]] for things in (small, large)]
+    return np.asarray(near & NEVER_SELF[of[0][:, None], of[1][None, :]])
+
+
+def as_matrix(pairs: Indices, rows: int, columns: int) -> Flags:
+    """The pairs as flags; none may stand in the list twice."""
+    counts = np.zeros((rows, columns), int)
+    np.add.at(counts, tuple(pairs.T), 1)
+    assert counts.max(initial=0) <= 1
+    return np.asarray(counts > 0)
+
+
+def test_no_node_that_comes_near_a_face_is_missed() -> None:
+    seen = looked = 0
+    for cloud in clouds():
+        nodes, faces = cloud.nodes, cloud.faces
+        distance = np.stack([point_triangle(cloud.at(nodes, s)[:, 0], cloud.at(faces, s)) for s in LOOKS])
+        needed = reached(cloud, nodes, faces, distance)
+        found = as_matrix(cloud.find(nodes, faces), len(nodes.corners), len(faces.corners))
+        assert not (needed & ~found).any()
+        looked, seen = looked + needed.size, seen + needed.sum()
+    assert looked > 100_000
+    assert 0.05 * looked < seen < 0.9 * looked
+
+
+def test_no_edge_that_comes_near_an_edge_is_missed_and_each_pair_is_found_once() -> None:
+    seen = looked = 0
+    for seed, cloud in enumerate(clouds()):
+        edges, n = cloud.edges, len(cloud.edges.corners)
+        rank = np.random.default_rng(seed).permutation(n)
+        distance = np.stack([segment_segment(cloud.at(edges, s)) for s in LOOKS])
+        needed = reached(cloud, edges, edges, distance)
+        found = as_matrix(cloud.find(edges, edges, rank), n, n)
+        assert not (found & found.T).any()
+        assert not (needed & ~(found | found.T)).any()
+        assert (rank[:, None] < rank[None, :])[found].all()
+        looked, seen = looked + needed.size, seen + needed.sum()
+    assert looked > 100_000
+    assert 0.05 * looked < seen < 0.9 * looked
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_two_ranks_that_see_each_others_edges_find_every_pair_once_between_them(seed: int) -> None:
+    """Each has its own edges first, then copies of the other's, whose order it does not know."""
+    cloud, n = Cloud(seed), 36
+    half = np.random.default_rng(seed).permutation(n)
+    total = np.zeros((n, n), int)
+    for mine, theirs in ((half[:15], half[15:]), (half[15:], half[:15])):
+        seen = np.concatenate([mine, theirs])
+        large = Things(cloud.edges.corners[seen], cloud.edges.reach[seen])
+        small = Things(large.corners[: len(mine)], large.reach[: len(mine)])
+        pairs = seen[cloud.find(small, large, seen.astype(np.int64))]
+        np.add.at(total, tuple(pairs.T), 1)
+    alone = as_matrix(cloud.find(cloud.edges, cloud.edges, np.arange(n)), n, n)
+    assert (np.tril(total) == 0).all()
+    assert total.max() == 1
+    distance = np.stack([segment_segment(cloud.at(cloud.edges, s)) for s in LOOKS])
+    needed = np.triu(reached(cloud, cloud.edges, cloud.edges, distance), 1)
+    assert not (needed & ~(total > 0)).any()
+    assert not (needed & ~alone).any()
+
+
+def test_candidates_are_the_boxes_that_touch() -> None:
+    """No list is much longer than it must be: boxes around the paths, seen by somebody who flies along."""
+    for seed in range(50):
+        cloud = Cloud(seed)
+        frame = cloud.v[cloud.faces.corners[:, 0]].mean(axis=0)
+        boxes = []
+        for things in (cloud.nodes, cloud.faces):
+            flown = cloud.x + cloud.horizon * (cloud.v - frame)
+            path = np.concatenate([cloud.x[things.corners], flown[things.corners]], axis=1)
+            boxes.append((path.min(axis=1) - things.reach[:, None], path.max(axis=1) + things.reach[:, None]))
+        (low, high), (their_low, their_high) = boxes
+        touch = ((low[:, None] <= their_high[None]) & (high[:, None] >= their_low[None])).all(axis=2)
+        of = [cloud.part[things.corners[:, 0]] for things in (cloud.nodes, cloud.faces)]
+        touch &= NEVER_SELF[of[0][:, None], of[1][None, :]]
+        found = as_matrix(cloud.find(cloud.nodes, cloud.faces), *touch.shape)
+        assert (found == touch).all()
+
+
+def test_things_with_a_node_in_common_are_no_candidates() -> None:
+    cloud = Cloud(3)
+    nodes = Things(np.arange(len(cloud.x), dtype=np.int32)[:, None], np.full(len(cloud.x), 10.0))
+    found = cloud.find(nodes, cloud.faces, allowed=np.ones((3, 3), bool))
+    shared = (nodes.corners[found[:, 0]] == cloud.faces.corners[found[:, 1]]).any(axis=1)
+    assert len(found) > 100
+    assert not shared.any()
+
+
+def test_only_parts_that_meet_are_candidates() -> None:
+    allowed = np.array([[False, True, False], [True, True, False], [False, False, False]])
+    met = set()
+    for cloud in clouds():
+        pairs = cloud.find(cloud.nodes, cloud.faces, allowed=allowed)
+        of = cloud.part[cloud.nodes.corners[pairs[:, 0], 0]], cloud.part[cloud.faces.corners[pairs[:, 1], 0]]
+        met |= set(zip(of[0].tolist(), of[1].tolist(), strict=True))
+    assert met == {(0, 1), (1, 0), (1, 1)}
+
+
+@pytest.mark.parametrize("empty", ["small", "large", "both"])
+def test_nothing_meets_nothing(empty: str) -> None:
+    cloud = Cloud(1)
+    none = Things(np.zeros((0, 3), np.int32), np.zeros(0))
+    small = cloud.nodes if empty == "large" else none
+    large = cloud.faces if empty == "small" else none
+    assert cloud.find(small, large).shape == (0, 2)
+
+
+def peak_of(away: float, coarse: int = 40) -> tuple[int, int]:
+    """Bytes that the search needs for two sheets, a hundredth of whose nodes is ``away``, and the pairs it finds."""
+    (x0, _), (x1, faces1) = sheet(40, 1.0), sheet(coarse, 40.0 / coarse)
+    x1, faces1 = x1 + np.array([0.0, 0.0, 0.1]), faces1 + np.int32(len(x0))
+    x = np.concatenate([x0, x1])
+    nodes = np.arange(len(x0), dtype=np.int32)[:, None]
+    random = np.random.default_rng(1)
+    gone = random.choice(len(x0), len(x0) // 100, replace=False)
+    x[gone] += away * random.normal(size=(len(gone), 3))
+    part = np.repeat([0, 1], [len(x0), len(x1)]).astype(np.int32)
+    faces = Things(faces1, np.full(len(faces1), 0.25 * 40.0 / coarse))
+    tracemalloc.start()
+    found = search.find(
+        Things(nodes, np.full(len(nodes), 0.1)), faces, x, np.zeros_like(x), part, ~np.eye(2, dtype=bool), 1.0, None
+    )
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return peak, len(found)
+
+
+def test_memory_does_not_follow_the_extent() -> None:
+    near, _ = peak_of(0.0)
+    for away in (1e2, 1e4, 1e8, 1e12):
+        assert peak_of(away)[0] < 1.2 * near
+
+
+@pytest.mark.parametrize("coarse", [4, 400])
+def test_memory_stays_with_the_number_of_things_where_sizes_differ_tenfold(coarse: int) -> None:
+    """Faces ten times as large, or as small, as what they meet: bytes a candidate or thing as with equal ones."""
+    equal, pairs = peak_of(0.0)
+    other, their_pairs = peak_of(0.0, coarse)
+    assert other / (their_pairs + 2 * coarse * coarse) < 4.0 * equal / (pairs + 2 * 40 * 40)
+
+
+@pytest.mark.parametrize("spread", [1.0, 1e3, 1e9])
+def test_position_codes_find_every_point_of_a_bucket(spread: float) -> None:
+    """Each row of buckets is one range of the sorted codes."""
+    random = np.random.default_rng(2)
+    points = random.uniform(0.0, 1.0, (500, 3)) * np.array([spread, 1.0, 0.5])
+    sorted_points = buckets.sort(points, 0.1)
+    assert (np.diff(sorted_points.codes) >= 0).all()
+    assert sorted(sorted_points.order.tolist()) == list(range(500))
+    index = np.floor((points - points.min(axis=0)) * sorted_points.inverse).astype(int)
+    index = np.minimum(index, sorted_points.shape - 1)
+    code = index[:, 0] + sorted_points.shape[0] * (index[:, 1] + sorted_points.shape[1] * index[:, 2])
+    assert (code[sorted_points.order] == sorted_points.codes).all()
+    for wanted in code[:50]:
+        first = buckets.first_at(sorted_points.codes, wanted)
+        last = buckets.first_at(sorted_points.codes, wanted + 1)
+        assert set(sorted_points.order[first:last].tolist()) == set(np.flatnonzero(code == wanted).tolist())
