@@ -20,6 +20,7 @@ NEEDED: dict[str, frozenset[str]] = {
     "probe_max": frozenset({"probe"}),
     "probe_min": frozenset({"probe"}),
     "contact_time": frozenset(),
+    "contact_loss": frozenset(),
     "worst_residual": frozenset(),
 }
 """The keys that each reference quantity needs; the others of part, probe and axis are refused."""
@@ -30,7 +31,7 @@ _ROUNDING = 1e-9
 def check(case: Case) -> list[Problem]:
     """Every cross-field problem of a case, in the order of its keys."""
     checks: tuple[Callable[[Case], Iterable[Problem]], ...] = (
-        _materials, _parts, _sectors, _boundaries, _walls, _probes, _references,
+        _materials, _parts, _sectors, _boundaries, _walls, _contact, _probes, _references,
     )  # fmt: skip
     return list(chain.from_iterable(found(case) for found in checks))
 
@@ -171,16 +172,37 @@ def _behind(case: Case, number: int, wall: Wall, length: float) -> Iterator[Prob
             yield problem(("boundaries", number), ..., message)
 
 
+def _contact(case: Case) -> Iterator[Problem]:
+    contact, names = case.contact, [part.name for part in case.parts]
+    if contact is None:
+        return
+    named: list[tuple[Location, tuple[str, ...]]] = [
+        (("contact", "parts"), contact.parts), (("contact", "self_contact"), contact.self_contact),
+        *((("contact", "pairs", i, "parts"), pair.parts) for i, pair in enumerate(contact.pairs)),
+    ]  # fmt: skip
+    for location, listed in named:
+        for k, name in enumerate(listed):
+            if name not in names:
+                yield problem((*location, k), name, f"no part of this name; {nearest(name, names)}")
+            elif contact.parts and name not in contact.parts:
+                yield problem((*location, k), name, f"must be in contact.parts: {choices(contact.parts)}")
+
+
 def _probes(case: Case) -> Iterator[Problem]:
     yield from _unique([probe.name for probe in case.probes], "probes")
     parts = {part.name: part for part in case.parts}
     for i, probe in enumerate(case.probes):
-        yield from _ordered(probe.low, probe.high, ("probes", i))
+        if (probe.low is None) != (probe.high is None):
+            yield problem(("probes", i), ..., "low and high go together; give both, or none for the whole part")
+        elif probe.low is not None and probe.high is not None:
+            yield from _ordered(probe.low, probe.high, ("probes", i))
         if probe.part not in parts:
             yield problem(("probes", i, "part"), probe.part, f"no part of this name; {nearest(probe.part, parts)}")
             continue
         body = bounds(parts[probe.part].mesh)
-        if body is None:
+        if probe.low is not None and probe.field.startswith("contact_force"):
+            yield problem(("probes", i), ..., "contact_force is that of the whole part; remove low and high")
+        if body is None or probe.low is None or probe.high is None:
             continue
         for d, (a, b) in enumerate(zip(*body, strict=True)):
             if probe.high[d] < a or probe.low[d] > b:
@@ -201,8 +223,9 @@ def _references(case: Case) -> Iterator[Problem]:
         if reference.probe is not None and reference.probe not in probes:
             message = f"no probe of this name; {nearest(reference.probe, probes)}"
             yield problem((*location, "probe"), reference.probe, message)
-        if reference.quantity == "contact_time" and not walls:
-            yield problem((*location, "quantity"), reference.quantity, "needs a boundary with kind = 'wall'")
+        if reference.quantity in ("contact_time", "contact_loss") and not (walls or case.in_contact):
+            message = "needs a boundary with kind = 'wall', or contact"
+            yield problem((*location, "quantity"), reference.quantity, message)
         yield from _window(case, reference, location)
 
 

@@ -10,12 +10,13 @@ FIELD_UNITS: dict[str, str] = {
     "stress_xx": "Pa", "stress_yy": "Pa", "stress_zz": "Pa", "stress_yz": "Pa", "stress_zx": "Pa", "stress_xy": "Pa",
     "pressure": "Pa", "mises": "Pa", "plastic_strain": "", "temperature": "K", "density": "kg/m^3",
     "internal_energy": "J/kg", "velocity_x": "m/s", "velocity_y": "m/s", "velocity_z": "m/s",
+    "contact_force_x": "N", "contact_force_y": "N", "contact_force_z": "N",
 }  # fmt: skip
 """Unit of every field that a probe reads."""
 
 QUANTITY_UNITS: dict[str, str] = {
     "extent": "m", "radius": "m", "plastic_strain_max": "", "temperature_max": "K", "speed_mean": "m/s",
-    "stress_max": "Pa", "contact_time": "s", "worst_residual": "",
+    "stress_max": "Pa", "contact_time": "s", "contact_loss": "", "worst_residual": "",
 }  # fmt: skip
 """Unit of every reference quantity that does not read a probe."""
 

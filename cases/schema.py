@@ -263,6 +263,7 @@ class Rotation(Model):
 
 Boundary = Annotated[Symmetry | Wall | Prescribed | Rotation, Field(discriminator="kind")]
 
+
 class ContactPair(Model):
     """Two parts whose friction differs from that of the others."""
 
@@ -287,7 +288,7 @@ class Contact(Model):
     sweeps: Annotated[Count, Field(ge=1, le=1000)] = 5
     """Jacobi sweeps over the meetings of a step."""
     skin: Annotated[Ratio, Positive] = 0.25
-    """Of the mean face size: how far a node may stray from free flight before the next search, twice."""
+    """Of the (harmonic) mean face size: how far a node may stray from free flight before the next search, twice."""
     domain: Literal["arbitrary", "box"] = "arbitrary"
     """How a rank finds the faces that others must see: by occupied cells, or by bounding boxes."""
 
@@ -295,21 +296,23 @@ class Contact(Model):
 ProbeField = Literal[
     "stress_xx", "stress_yy", "stress_zz", "stress_yz", "stress_zx", "stress_xy",
     "pressure", "mises", "plastic_strain", "temperature", "density", "internal_energy",
-    "velocity_x", "velocity_y", "velocity_z",
+    "velocity_x", "velocity_y", "velocity_z", "contact_force_x", "contact_force_y", "contact_force_z",
 ]  # fmt: skip
 
 
 class Probe(Model):
     """A column of history.csv: the mean of a field over the tets of a part whose centre starts in a box.
 
-    ``internal_energy`` is per mass, J/kg; stresses are positive in tension, pressure in compression.
+    Without ``low`` and ``high`` it is the whole part. ``internal_energy`` is per mass, J/kg; stresses are positive in
+    tension, pressure in compression. ``contact_force`` is what other bodies push the whole part with, N, as a mean
+    since the line before.
     """
 
     name: Name
     part: Name
     field: ProbeField
-    low: Point
-    high: Point
+    low: Point | None = None
+    high: Point | None = None
 
 
 class Viscosity(Model):
@@ -354,7 +357,7 @@ class Run(Model):
 
 Quantity = Literal[
     "extent", "radius", "plastic_strain_max", "temperature_max", "speed_mean", "stress_max",
-    "probe_mean", "probe_max", "probe_min", "contact_time", "worst_residual",
+    "probe_mean", "probe_max", "probe_min", "contact_time", "contact_loss", "worst_residual",
 ]  # fmt: skip
 
 
@@ -365,7 +368,8 @@ class Reference(Model):
     part's nodes from the line through the origin along ``axis``, m. ``plastic_strain_max``, ``temperature_max`` (K),
     ``stress_max`` (largest |stress component|, Pa) over a part. ``speed_mean``: mass-mean velocity of a part along
     ``axis``, m/s. ``probe_*``: of a history column between ``since`` and ``until``. ``contact_time``: last time at
-    which a wall pushes, s. ``worst_residual``: of the energy ledger.
+    which a wall or another body pushes, s. ``contact_loss``: energy lost by contact over the initial energy.
+    ``worst_residual``: of the energy ledger.
     """
 
     quantity: Quantity

@@ -12,10 +12,11 @@ import numpy as np
 from conoid.cases import schema
 from conoid.cases.library import material as find_material
 
+from .contact import overlap, pairing
 from .errors import InputError
 from .materials import models
 from .mesh.build import build as build_mesh
-from .mesh.faces import across
+from .mesh.faces import FACES, across
 from .parallel.comm import Comm
 from .parallel.decompose import bisect
 from .parallel.ownership import Neighbour
@@ -97,12 +98,37 @@ def assemble(case: schema.Case, folder: Path) -> Whole:
     part_of_tet = np.concatenate(tet_part)
     volumes = _volumes(x, t)
     part_of_node = np.concatenate(node_part)
+    exposed = across(t) < 0 if case.in_contact else np.zeros((0, 4), bool)
+    if case.in_contact:
+        x = _apart(case, x, t, part_of_node, exposed)
+        volumes = _volumes(x, t)
     return Whole(
         points=x, node_part=part_of_node, tets=t, tet_part=part_of_tet, volumes=volumes,
-        exposed=across(t) < 0 if case.in_contact else np.zeros((0, 4), bool),
+        exposed=exposed,
         node_volume=_quarters(t, volumes, len(x)), mass=_quarters(t, volumes * np.array(density)[part_of_tet], len(x)),
         velocity=_velocities(case, x, part_of_node),
     )  # fmt: skip
+
+
+def _apart(case: schema.Case, x: Floats, tets: Indices, part: Indices, exposed: Flags) -> Floats:
+    """The points, when no part overlaps another; moved apart where the case asks for that. Raises InputError."""
+    assert case.contact is not None
+    tet, face = np.nonzero(exposed)
+    faces = tets[tet[:, None], FACES[face]]
+    surface, allowed = overlap.Surface(faces, part[faces[:, 0]]), ~np.isnan(pairing.friction(case))
+    if case.contact.overlap == "push":
+        x = overlap.move_apart(x, tets, part, surface, allowed)
+    found = overlap.find(x, tets, part, surface, allowed)
+    if not len(found.nodes):
+        return x
+    worst = int(np.argmax(found.depth))
+    node = found.nodes[worst]
+    one, other = case.parts[part[node]].name, case.parts[found.part[worst]].name
+    place = ", ".join(f"{c:.6g}" for c in x[node])
+    way = "set contact.overlap = 'push'" if case.contact.overlap == "refuse" else "contact.overlap = 'push' could not"
+    raise InputError(
+        f"parts: {one!r} overlaps {other!r} by {found.depth[worst]:.3g} m at ({place}) m; move them apart, or {way}"
+    )
 
 
 def _quarters(tets: Indices, values: Floats, n: int) -> Floats:

@@ -12,6 +12,7 @@ from conoid.cases.messages import Energy
 
 from .boundaries import Boundary
 from .clock import Clock
+from .contact.stage import Contact
 from .parallel.comm import Comm
 from .parallel.fixed_point import exact_sums
 from .state import WORK, WORK_PLASTIC, WORK_VISCOUS, Floats, Model
@@ -20,15 +21,20 @@ from .state import WORK, WORK_PLASTIC, WORK_VISCOUS, Floats, Model
 class Ledger:
     """Sums the accounts of all ranks; the first call sets the initial energy."""
 
-    def __init__(self, model: Model, boundaries: list[Boundary], comm: Comm, clock: Clock) -> None:
+    def __init__(
+        self, model: Model, boundaries: list[Boundary], contact: Contact | None, comm: Comm, clock: Clock
+    ) -> None:
         self._model = model
         self._boundaries = boundaries
+        self._contact = contact
         self._comm = comm
         self._clock = clock
         nodes = model.nodes
         self.initial = float(self._node_sum(0.5 * nodes.mass * (nodes.v * nodes.v).sum(axis=1)))
         self.worst = 0.0
         """Largest residual so far."""
+        self.lost = 0.0
+        """Share of the initial energy that contact has taken, friction included, at the last call."""
         self.momentum = np.zeros(3)
         """Linear momentum at the last call, kg m/s."""
 
@@ -43,14 +49,17 @@ class Ledger:
         node_sums = exact_sums(self._comm, np.ascontiguousarray(columns))
         work, viscous, plastic = exact_sums(self._comm, self._element_work())
         self.momentum = node_sums[3:6]
+        self.lost = float(node_sums[1]) / self.initial if self.initial > 0.0 else 0.0
         kinetic_sum, loss_sum, external_sum = (float(v) for v in node_sums[:3])
         total = kinetic_sum + float(work) + float(viscous) + loss_sum
+        friction = self._contact.friction_work() if self._contact is not None else 0.0
         scale = max(self.initial, abs(external_sum), abs(float(work)), abs(kinetic_sum))
         residual = abs(total - self.initial - external_sum) / scale if scale > 0.0 else 0.0
         self.worst = max(self.worst, residual)
         return Energy(
             kinetic=kinetic_sum, elastic=float(work - plastic), plastic=float(plastic), viscous=float(viscous),
-            contact=loss_sum, external=external_sum, initial=self.initial, residual=residual,
+            contact=loss_sum - friction, friction=friction, external=external_sum, initial=self.initial,
+            residual=residual,
         )  # fmt: skip
 
     def _node_sum(self, values: Floats) -> float:

@@ -4,6 +4,8 @@ import numpy as np
 
 from conoid.cases.schema import Case, Probe
 
+from .clock import Clock
+from .contact.stage import Contact
 from .errors import InputError
 from .output.frames import von_mises
 from .parallel.comm import Comm
@@ -30,6 +32,7 @@ from .state import (
 _NORMAL = {"stress_xx": S_XX, "stress_yy": S_YY, "stress_zz": S_ZZ}
 _SHEAR = {"stress_yz": S_YZ, "stress_zx": S_ZX, "stress_xy": S_XY}
 _ROWS = {"plastic_strain": PLASTIC_STRAIN, "temperature": TEMPERATURE, **_SHEAR}
+_FORCE = {"contact_force_x": 0, "contact_force_y": 1, "contact_force_z": 2}
 _VELOCITY = {"velocity_x": 0, "velocity_y": 1, "velocity_z": 2}
 
 
@@ -63,9 +66,12 @@ def field(block: Block, name: str, model: Model) -> Floats:
 class Probes:
     """The probes of a case on this rank. Raises InputError, on every rank alike, when one holds no tet."""
 
-    def __init__(self, case: Case, model: Model, comm: Comm) -> None:
+    def __init__(self, case: Case, model: Model, contact: Contact | None, clock: Clock, comm: Comm) -> None:
         self.names = [probe.name for probe in case.probes]
         self._fields = [probe.field for probe in case.probes]
+        self._parts = [model.parts.index(probe.part) for probe in case.probes]
+        self._contact, self._clock = contact, clock
+        self._pushed, self._since = np.zeros((len(model.parts), 3)), 0.0
         self._model = model
         self._comm = comm
         self._chosen = [[_inside(probe, block, model) for block in model.blocks] for probe in case.probes]
@@ -79,9 +85,24 @@ class Probes:
         """(probes,) the present values, equal on any number of ranks."""
         if not self.names:
             return np.zeros(0)
-        sums = [self._sums(name, chosen) for name, chosen in zip(self._fields, self._chosen, strict=True)]
-        totals = [exact_sums(self._comm, s) for s in sums]
-        return np.array([total / mass for total, mass in totals])
+        forces = self._forces()
+        values = []
+        for name, part, chosen in zip(self._fields, self._parts, self._chosen, strict=True):
+            if name in _FORCE:
+                values.append(float(forces[part, _FORCE[name]]))
+            else:
+                total, mass = exact_sums(self._comm, self._sums(name, chosen))
+                values.append(float(total / mass))
+        return np.array(values)
+
+    def _forces(self) -> Floats:
+        """(parts, 3) mean force of contact on each part since the last call, N; zero when no time has passed."""
+        if self._contact is None or not any(name in _FORCE for name in self._fields):
+            return self._pushed
+        pushed, passed = self._contact.impulses(), self._clock.t - self._since
+        forces = (pushed - self._pushed) / passed if passed > 0.0 else np.zeros_like(pushed)
+        self._pushed, self._since = pushed, self._clock.t
+        return np.asarray(forces)
 
     def _sums(self, name: str, chosen: list["np.ndarray"]) -> Floats:
         columns = [np.zeros((0, 2))]
@@ -95,5 +116,7 @@ class Probes:
 def _inside(probe: Probe, block: Block, model: Model) -> "np.ndarray":
     if model.parts[block.part] != probe.part:
         return np.zeros(0, np.int64)
+    if probe.low is None or probe.high is None:
+        return np.arange(block.n)
     centres = model.nodes.x0[block.tets].mean(axis=1)
     return np.flatnonzero(((centres >= np.array(probe.low)) & (centres <= np.array(probe.high))).all(axis=1))

@@ -47,6 +47,8 @@ def _measured(sim: Simulation, spec: Reference, folder: Path) -> float:
         return sim.ledger.worst
     if quantity == "contact_time":
         return _maximum(sim.comm, [b.last_push for b in sim.boundaries])
+    if quantity == "contact_loss":
+        return sim.ledger.lost
     if quantity == "speed_mean":
         return _mean_speed(sim, spec)
     if quantity in ("extent", "radius"):

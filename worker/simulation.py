@@ -133,13 +133,13 @@ def build(case: Case, folder: Path, comm: Comm) -> Simulation:
     contact = _contact(case, model, piece, scene, comm, clock, timers) if case.in_contact else None
     if contact is not None:
         scene.insert(sum(not isinstance(bound, RigidWalls) for bound in scene), contact)
-    probes = Probes(case, model, comm)
+    probes = Probes(case, model, contact, clock, comm)
     elements = _elements(case, model, piece, comm, timers)
     floor = _force_floor(model, comm)
     return Simulation(
         case=case, comm=comm, model=model, elements=elements, boundaries=scene, contact=contact,
         clock=clock,
-        ledger=Ledger(model, scene, comm, clock), probes=probes, timers=timers,
+        ledger=Ledger(model, scene, contact, comm, clock), probes=probes, timers=timers,
         shared_nodes=piece.totals[2], floor=floor,
     )  # fmt: skip
 

@@ -47,6 +47,11 @@ def test_the_rod_is_sound() -> None:
         (["reference[0].since=10 us"], "reference[0].since", "must be below run.end_time"),
         (["reference[0].until=11 us"], "reference[0].until", "not above run.end_time"),
         (["reference[0].since=5 us", "reference[0].until=5 us"], "reference[0].until", "must be above since"),
+        (["contact={parts=['road']}"], "contact.parts[0]", "did you mean 'rod'?"),
+        (["contact={self_contact=['rode']}"], "contact.self_contact[0]", "did you mean 'rod'?"),
+        (["contact={pairs=[{parts=['rod', 'plate'], friction=0.1}]}"], "contact.pairs[0].parts[1]", "known: 'rod'"),
+        (["contact={friction=-0.1}"], "contact.friction", "greater than or equal to 0"),
+        (["contact={domain='sphere'}"], "contact.domain", "'arbitrary' or 'box'"),
         (["parts[0].material=steel_42crmo4", "parts[0].temperature=2000"], "parts[0].temperature", "melts"),
     ],
 )  # fmt: skip
@@ -92,11 +97,11 @@ def test_a_reference_needs_the_keys_of_its_quantity() -> None:
     }
 
 
-def test_contact_time_needs_a_wall() -> None:
+def test_contact_time_needs_a_wall_or_contact() -> None:
     contact = "reference[0]={quantity='contact_time', value='1 us', tolerance='1 us', source='s'}"
     parse_case(rod(contact))
     found = said(contact, "boundaries[0]={kind='symmetry', axis='z'}")
-    assert found == {"reference[0].quantity": "needs a boundary with kind = 'wall'"}
+    assert found == {"reference[0].quantity": "needs a boundary with kind = 'wall', or contact"}
 
 
 @pytest.mark.parametrize(

@@ -18,10 +18,14 @@ RANKS = (2, 3, 4, 7)
 QUICK = (2, 3)
 """Numbers of ranks at which the scene of everything is compared in seconds; the rest is a drill."""
 SHORT = {
+    "bar_on_bar": "2 us",
     "demo": "1 us",
+    "dissimilar_bars": "2 us",
     "elastic_bar_confined": "1.5 us",
     "elastic_bar_wall": "1.5 us",
     "free_spin": "10 us",
+    "hertz_spheres": "0.2 us",
+    "newton_cradle": "2 us",
     "plastic_bar_wave": "1.5 us",
     "plastic_wave": "1.5 us",
     "shock_copper": "0.5 us",

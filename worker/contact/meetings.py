@@ -25,6 +25,8 @@ _MARGIN = 1e-3
 """Of the area coordinates: how far outside of a face its point may lie."""
 _PUSH_OUT = 0.1
 """Share of a penetration that is taken back in a step."""
+FACING = 0.1
+"""Cosine between the outward normals of a node and of a face above which they do not face each other."""
 _PARALLEL = 0.05
 """Sine of the angle below which edges are left to nodes and faces."""
 
@@ -56,29 +58,28 @@ _OUT = f"{_N2}, {_V2}, {_V2}, float64[::1], float64[::1]"
 _IN = f"{_N2}, {_V2}, {_V2}, int32[::1], {_V2}, float64"
 
 
-@njit(f"float64(float64[::1], {_V2}, {_V2}, int64, int64, int64, int64, float64)", cache=True, error_model="numpy")
-def _height(normal, x, v, s, i, j, k, h):  # type: ignore[no-untyped-def]
-    """Height of node s over the face i, j, k after a time ``h``, m, and the unit normal; NaN for a face of no area."""
+@njit(f"float64(float64[::1], {_V2}, int64, int64, int64, int64)", cache=True, error_model="numpy")
+def _height(normal, x, s, i, j, k):  # type: ignore[no-untyped-def]
+    """Height of node s over the face i, j, k, m, and the unit normal; NaN for a face of no area."""
     ex, ey, ez = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
     fx, fy, fz = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
-    rx, ry, rz = x[s, 0] - x[i, 0], x[s, 1] - x[i, 1], x[s, 2] - x[i, 2]
-    ex, ey, ez = ex + h * (v[j, 0] - v[i, 0]), ey + h * (v[j, 1] - v[i, 1]), ez + h * (v[j, 2] - v[i, 2])
-    fx, fy, fz = fx + h * (v[k, 0] - v[i, 0]), fy + h * (v[k, 1] - v[i, 1]), fz + h * (v[k, 2] - v[i, 2])
-    rx, ry, rz = rx + h * (v[s, 0] - v[i, 0]), ry + h * (v[s, 1] - v[i, 1]), rz + h * (v[s, 2] - v[i, 2])
     nx, ny, nz = ey * fz - ez * fy, ez * fx - ex * fz, ex * fy - ey * fx
     r = 1.0 / np.sqrt(nx * nx + ny * ny + nz * nz)
     normal[0], normal[1], normal[2] = nx * r, ny * r, nz * r
-    return (nx * rx + ny * ry + nz * rz) * r
+    return (nx * (x[s, 0] - x[i, 0]) + ny * (x[s, 1] - x[i, 1]) + nz * (x[s, 2] - x[i, 2])) * r
 
 
 @njit(f"boolean(float64[::1], {_V2}, {_V2}, int64, int64, int64, int64, float64)", cache=True, error_model="numpy")
-def _foot(b, x, v, s, i, j, k, h):  # type: ignore[no-untyped-def]
-    """Area coordinates ``b`` of the foot of node s on the face after a time ``h``; whether it lies on the face."""
+def _foot(b, x, ahead, s, i, j, k, tau):  # type: ignore[no-untyped-def]
+    """Area coordinates ``b`` of the foot of node s on the face, the share ``tau`` of the way from x to ``ahead``;
+    whether it lies on the face.
+    """
     ee, ff, ef, er, fr = 0.0, 0.0, 0.0, 0.0, 0.0
     for a in range(3):
-        e = x[j, a] - x[i, a] + h * (v[j, a] - v[i, a])
-        f = x[k, a] - x[i, a] + h * (v[k, a] - v[i, a])
-        r = x[s, a] - x[i, a] + h * (v[s, a] - v[i, a])
+        e, f, r = x[j, a] - x[i, a], x[k, a] - x[i, a], x[s, a] - x[i, a]
+        e += tau * (ahead[j, a] - ahead[i, a] - e)
+        f += tau * (ahead[k, a] - ahead[i, a] - f)
+        r += tau * (ahead[s, a] - ahead[i, a] - r)
         ee, ff, ef, er, fr = ee + e * e, ff + f * f, ef + e * f, er + e * r, fr + f * r
     area = ee * ff - ef * ef
     b[1], b[2] = (ff * er - ef * fr) / area, (ee * fr - ef * er) / area
@@ -93,24 +94,30 @@ def _foot(b, x, v, s, i, j, k, h):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(f"int64({_OUT}, int64, {_N2}, float64[::1], {_IN})", cache=True, error_model="numpy")
-def node_face(nodes, weights, normals, wanted, friction, n, faces, size, pairs, x, v, part, mu, dt):  # type: ignore[no-untyped-def]
+@njit(f"int64({_OUT}, int64, {_N2}, float64[::1], {_V2}, {_IN})", cache=True, error_model="numpy")
+def node_face(nodes, weights, normals, wanted, friction, n, faces, size, out, pairs, x, v, part, mu, dt):  # type: ignore[no-untyped-def]
     """Nodes that pass a face, from row ``n`` on; returns the new number of rows.
+
+    ``out`` (nodes, 3): unit outward normals of the nodes; a node and a face that look the same way do not meet, such as
+    the rim of a bar and the side of another one of the same width. Zero for a node without faces, which meets any.
 
     ``pairs`` (p, 2): node and face, sorted by node, then by the id of the face; ``faces`` (f, 4), the node opposite
     last; ``mu`` (parts, parts).
     """
     b, m = np.empty(3), np.empty(3)
+    ahead = x + dt * v
     nearest, row = 0.0, -1
     for p in range(len(pairs)):
         s, f = pairs[p, 0], pairs[p, 1]
         if p == 0 or pairs[p - 1, 0] != s:
             row = -1
         i, j, k, d = faces[f, 0], faces[f, 1], faces[f, 2], faces[f, 3]
-        gap1 = _height(m, x, v, s, i, j, k, dt)
+        gap1 = _height(m, ahead, s, i, j, k)
         if not gap1 <= NEAR * size[f]:
             continue
-        gap0 = _height(b, x, v, s, i, j, k, 0.0)
+        if out[s, 0] * m[0] + out[s, 1] * m[1] + out[s, 2] * m[2] > FACING:
+            continue
+        gap0 = _height(b, x, s, i, j, k)
         if not gap0 >= -(DEEP_SELF if part[s] == part[i] else DEEP) * size[f]:
             continue
         if gap0 < 0.0:
@@ -122,7 +129,7 @@ def node_face(nodes, weights, normals, wanted, friction, n, faces, size, pairs, 
         tau = 0.0
         if gap0 > 0.0:
             tau = 1.0 if gap1 >= 0.0 else gap0 / (gap0 - gap1)
-        if not _foot(b, x, v, s, i, j, k, tau * dt):
+        if not _foot(b, x, ahead, s, i, j, k, tau):
             continue
         at = n
         if gap0 < -_TOUCHING * size[f]:

@@ -71,6 +71,8 @@ class Scene:
     crowd: Crowd
     held: Indices
     """(h,) places of the nodes that this rank holds."""
+    local: Indices
+    """(h,) their indices on this rank."""
     faces: Indices
     """(f, 4) places."""
     face_size: Floats
@@ -90,6 +92,8 @@ class Scene:
     impulse: Ints
     total: Ints
     """(crowd, 3) impulses of the last step, quanta."""
+    normals: Floats
+    """(crowd, 3) unit outward normals of the nodes, as they were at the search."""
     before: Floats
     """(h, 3) v(n-1/2) of the held nodes."""
     shared_shares: SharedSum
@@ -178,16 +182,16 @@ def _compact(
     crowd = crowd.take(crowd.places(needed))
     company = [Neighbour(rank, crowd.places(ids)) for rank, ids in sorted(shared.items())]
     room = len(node_face) + len(edge_edge)
-    shares, impulse = np.zeros((crowd.n, 1), np.int64), np.zeros((crowd.n, 3), np.int64)
+    shares, impulse = np.zeros((crowd.n, 4), np.int64), np.zeros((crowd.n, 3), np.int64)
     held = np.flatnonzero(crowd.local >= 0).astype(np.int32)
     return Scene(
-        crowd=crowd, held=held, faces=crowd.places(faces.nodes), face_size=faces.size,
+        crowd=crowd, held=held, local=crowd.local[held], faces=crowd.places(faces.nodes), face_size=faces.size,
         edges=crowd.places(edges.nodes), edge_size=edges.size,
         node_face=np.column_stack([crowd.places(slave_ids), face_at.reshape(-1)]).astype(np.int32),
         edge_edge=edge_at.reshape(-1, 2).astype(np.int32), faces_sent=sent,
         room=Meetings.room(room), diagonal=np.empty((room, 2)), push=np.empty((room, 4)),
         copies=ghosts.copies(crowd, nodes, comm, _COPY_TAG), shares=shares, impulse=impulse,
-        total=np.zeros((crowd.n, 3), np.int64), before=np.zeros((len(held), 3)),
+        total=np.zeros((crowd.n, 3), np.int64), normals=np.zeros((crowd.n, 3)), before=np.zeros((len(held), 3)),
         shared_shares=SharedSum(comm, company, shares, _SHARE_TAG),
         shared_impulse=SharedSum(comm, company, impulse, _PUSH_TAG),
     )  # fmt: skip

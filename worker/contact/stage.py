@@ -18,13 +18,14 @@ from ..materials.models import BULK, DENSITY, SHEAR
 from ..parallel import fixed_point
 from ..parallel.comm import Comm
 from ..parallel.fixed_point import exact_sums
-from ..parallel.ownership import Neighbour
+from ..parallel.ownership import Neighbour, SharedSum
 from ..state import Flags, Floats, Model, Nodes
 from ..timers import Timers
-from . import ghosts, meetings, scene, surface, sweeps
+from . import ghosts, meetings, pairing, scene, surface, sweeps
 from .records import Crowd, merged
 from .scene import Rules, Scene, Sides
 
+_NORMAL_TAG = 14
 _SHORTEST, _LONGEST = 10.0, 300.0
 """Steps of free flight that a search looks ahead: as many as the fastest takes past a face, within these bounds."""
 _SPENT = 0.4
@@ -46,8 +47,10 @@ class Contact(Boundary):
         self._comm, self._neighbours, self._clock, self._timers = comm, neighbours, clock, timers
         self._mobility, planes = _mobility(model.nodes, bounds)
         self._surface = surface.build(model, exposed, planes, neighbours, comm, case.contact.edges)
-        self._mu = _friction(case)
-        size = _mean_size(self._surface.faces.size, comm)
+        self._mu = pairing.friction(case)
+        ids = self._surface.faces.nodes[:, :3]
+        self._face_nodes = np.searchsorted(model.nodes.id, ids).astype(np.int32).reshape(-1, 3)
+        size = _typical(self._surface.faces.size, comm)
         self._rules = Rules(case.contact.domain, ~np.isnan(self._mu), 2.0 * size)
         self._size = size
         self._sides = self._whole_sides(model.nodes, case.contact.skin * size)
@@ -55,6 +58,7 @@ class Contact(Boundary):
         self._scale = fixed_point.scale_for(largest * fastest)
         self._joule = math.ldexp(1.0, 30 - math.frexp(largest * fastest * fastest)[1])
         self._friction = np.zeros(2, np.int64)
+        self._parts = np.zeros((len(case.parts), 3), np.int64)
         self._scene: Scene | None = None
         self._x, self._v, self._t, self._until = model.nodes.x, model.nodes.v, 0.0, 0.0
         """Where the nodes of the surface were at the last search, and how fast."""
@@ -74,11 +78,14 @@ class Contact(Boundary):
         """Faces that this rank has sent to others for the present search."""
         return 0 if self._scene is None else self._scene.faces_sent
 
-    @property
     def friction_work(self) -> float:
         """Heat of friction so far of the meetings of all ranks, J; all ranks take part."""
         high, low = (int(word) for word in self._comm.sum(self._friction))
         return math.ldexp(high * 2**30 + low, -30) / self._joule
+
+    def impulses(self) -> Floats:
+        """(parts, 3) what contact has given each part so far, N s; all ranks take part."""
+        return np.asarray(self._comm.sum(self._parts) / self._scale)
 
     def note(self, state: Nodes) -> None:
         with self._timers.phase("contact"):
@@ -100,7 +107,7 @@ class Contact(Boundary):
             self._scene.free()
 
     def _look(self, now: Scene, state: Nodes) -> None:
-        now.before = state.v[now.crowd.local[now.held]]
+        _gather(now.before, state.v, now.local)
 
     def _search(self, state: Nodes) -> None:
         """Looks for candidates; all ranks take part."""
@@ -113,6 +120,7 @@ class Contact(Boundary):
         steps = min(max(self._size / (fastest * clock.dt), _SHORTEST), _LONGEST) if fastest > 0.0 else _LONGEST
         self._scene = scene.build(sides, self._rules, steps * clock.dt, state, self._neighbours, self._comm)
         self._look(self._scene, state)
+        self._scene.normals[self._scene.held] = self._normals(state)[self._scene.local]
         self._x, self._v, self._t = state.x.copy(), state.v.copy(), clock.t
         self._until = clock.t + steps * clock.dt
         self.due = False
@@ -149,6 +157,17 @@ class Contact(Boundary):
         places = crowd.places(far.id)
         crowd.x[places], crowd.v[places] = far.x, far.v
 
+    def _normals(self, nodes: Nodes) -> Floats:
+        """(nodes, 3) unit outward normals of the nodes of the surface, zero off it; all ranks take part."""
+        sums = np.zeros((nodes.n, 3), np.int64)
+        _add_normals(sums, nodes.x, self._face_nodes, sweeps.SHARES / self._size**2)
+        shared = SharedSum(self._comm, self._neighbours, sums, _NORMAL_TAG)
+        shared.begin()
+        shared.finish()
+        shared.free()
+        length = np.sqrt((sums.astype(np.float64) ** 2).sum(axis=1))
+        return np.asarray(sums / np.where(length > 0.0, length, 1.0)[:, None])
+
     def _extremes(self) -> tuple[float, float]:
         """Largest difference of velocities on the surface, m/s, and lowest altitude of its tets, m."""
         crowd = self._sides.crowd
@@ -158,8 +177,7 @@ class Contact(Boundary):
 
     def _push(self, now: Scene, state: Nodes, dt: float, t: float) -> None:
         crowd, room, held = now.crowd, now.room, now.held
-        local = crowd.local[held]
-        crowd.x[held], crowd.v[held] = state.x[local], state.v[local]
+        _take(crowd.x, crowd.v, held, state.x, state.v, now.local)
         now.copies.refresh(state, crowd.x, crowd.v)
         n = self._meet(now, dt)
         self._weigh(now, n)
@@ -174,33 +192,93 @@ class Contact(Boundary):
             now.shared_impulse.finish()
             sweeps.give(crowd.v, now.total, now.impulse, crowd.mobility, self._scale)
         sweeps.heat(self._friction, now.push, slip, crowd.v, *room_of, room.friction, self._joule, n)
-        state.v[local] = crowd.v[held]
         self._book(now)
         self.meetings = n
-        if now.total.any():
+        if _give_back(state.v, self._parts, now.local, held, crowd.v, now.total, state.part, state.owned):
             self.last_push = t
 
     def _meet(self, now: Scene, dt: float) -> int:
         crowd, room = now.crowd, now.room
         out = (room.nodes, room.weights, room.normals, room.wanted, room.friction)
         found = (crowd.x, crowd.v, crowd.part, self._mu, dt)
-        n = meetings.node_face(*out, 0, now.faces, now.face_size, now.node_face, *found)
+        n = meetings.node_face(*out, 0, now.faces, now.face_size, now.normals, now.node_face, *found)
         return int(meetings.edge_edge(*out, n, now.edges, now.edge_size, now.edge_edge, *found))
 
     def _weigh(self, now: Scene, n: int) -> None:
         room = now.room
         now.shares[:] = 0
-        sweeps.add_shares(now.shares, room.nodes, room.weights, n)
+        sweeps.add_shares(now.shares, room.nodes, room.weights, room.normals, n)
         now.shared_shares.begin()
         now.shared_shares.finish()
         sweeps.mobilities(now.diagonal, room.nodes, room.weights, room.normals, now.shares, now.crowd.mobility, n)
 
     def _book(self, now: Scene) -> None:
         """Half of the work of the last impulses, with the velocities in ``before``."""
-        local = now.crowd.local[now.held]
-        work = 0.5 * now.before * (now.total[now.held] / self._scale)
-        self.contact_loss[local] -= work.sum(axis=1)
-        self.external_work[local] -= np.where(now.crowd.mobility[now.held] == 0.0, work, 0.0).sum(axis=1)
+        _book(
+            self.contact_loss, self.external_work, now.local, now.held, now.before, now.total, now.crowd.mobility,
+            self._scale,
+        )  # fmt: skip
+
+
+@njit("void(float64[:, ::1], float64[:, ::1], int32[::1])", cache=True)
+def _gather(out, v, local):  # type: ignore[no-untyped-def]
+    for h in range(len(local)):
+        for i in range(3):
+            out[h, i] = v[local[h], i]
+
+
+@njit("void(float64[:, ::1], float64[:, ::1], int32[::1], float64[:, ::1], float64[:, ::1], int32[::1])", cache=True)
+def _take(x, v, held, node_x, node_v, local):  # type: ignore[no-untyped-def]
+    """Positions and velocities of the held nodes of a crowd."""
+    for h in range(len(held)):
+        for i in range(3):
+            x[held[h], i], v[held[h], i] = node_x[local[h], i], node_v[local[h], i]
+
+
+@njit(
+    "boolean(float64[:, ::1], int64[:, ::1], int32[::1], int32[::1], float64[:, ::1], int64[:, ::1], int32[::1], "
+    "boolean[::1])",
+    cache=True,
+)
+def _give_back(node_v, parts, local, held, v, total, part, owned):  # type: ignore[no-untyped-def]
+    """Velocities of the held nodes, and the impulses of the owned ones to the sums of their parts; whether any."""
+    pushed = False
+    for h in range(len(held)):
+        for i in range(3):
+            j = total[held[h], i]
+            node_v[local[h], i] = v[held[h], i]
+            pushed |= j != 0
+            if owned[local[h]]:
+                parts[part[local[h]], i] += j
+    return pushed
+
+
+@njit(
+    "void(float64[::1], float64[::1], int32[::1], int32[::1], float64[:, ::1], int64[:, ::1], float64[:, ::1], "
+    "float64)",
+    cache=True,
+)
+def _book(loss, external, local, held, before, total, mobility, scale):  # type: ignore[no-untyped-def]
+    """Half of the impulse times velocity: lost by contact; where a velocity is held, taken in from outside."""
+    for h in range(len(held)):
+        for i in range(3):
+            work = 0.5 * before[h, i] * (total[held[h], i] / scale)
+            loss[local[h]] -= work
+            if mobility[held[h], i] == 0.0:
+                external[local[h]] -= work
+
+
+@njit("void(int64[:, ::1], float64[:, ::1], int32[:, ::1], float64)", cache=True)
+def _add_normals(sums, x, faces, scale):  # type: ignore[no-untyped-def]
+    """Adds the area vectors of faces (f, 3), in quanta of 1 / ``scale``, to the sums (nodes, 3) of their nodes."""
+    for f in range(len(faces)):
+        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            area = (x[b, j] - x[a, j]) * (x[c, k] - x[a, k]) - (x[b, k] - x[a, k]) * (x[c, j] - x[a, j])
+            quanta = np.int64(np.rint(area * scale))
+            for m in range(3):
+                sums[faces[f, m], i] += quanta
 
 
 @njit("float64(float64[:, ::1], int32[:, ::1])", cache=True, error_model="numpy")
@@ -249,24 +327,10 @@ def _mobility(nodes: Nodes, bounds: list[Boundary]) -> tuple[Floats, Flags]:
     return mobility, planes
 
 
-def _friction(case: Case) -> Floats:
-    """(parts, parts) Coulomb's coefficient, NaN where two parts do not meet."""
-    assert case.contact is not None
-    spec, names = case.contact, [part.name for part in case.parts]
-    meets = np.array([name in spec.parts or not spec.parts for name in names])
-    mu = np.where(meets[:, None] & meets[None, :], spec.friction, np.nan)
-    for i, name in enumerate(names):
-        if name not in spec.self_contact:
-            mu[i, i] = np.nan
-    for pair in spec.pairs:
-        i, j = (names.index(name) for name in pair.parts)
-        mu[i, j] = mu[j, i] = pair.friction
-    return mu
-
-
-def _mean_size(sizes: Floats, comm: Comm) -> float:
-    total, count = exact_sums(comm, np.column_stack([sizes, np.ones(len(sizes))]))
-    return float(total / count)
+def _typical(sizes: Floats, comm: Comm) -> float:
+    """Harmonic mean of the sizes of all faces, m: near the small ones where a mesh is graded."""
+    total, count = exact_sums(comm, np.column_stack([1.0 / sizes, np.ones(len(sizes))]))
+    return float(count / total)
 
 
 def _bounds(model: Model, comm: Comm) -> tuple[float, float]:

@@ -1,10 +1,11 @@
 """Impulses that keep meetings from passing: projected Jacobi sweeps whose order does not matter.
 
-Every meeting asks for a normal velocity of at least ``wanted``. A sweep corrects each by its own want over the l1 norm
-of its row of the contact matrix (Baker, Falgout, Kolev and Yang 2011), the sum over its nodes of |w_k| S_k / m_k with
-S_k the sum of the weights of all meetings at node k: exact for one meeting alone, and never an overshoot however many
-share a node. Impulses never pull; friction is Coulomb's, on the sum over the sweeps. Impulses are integers: a meeting's
-add up to zero, and no order of meetings or ranks changes a bit.
+Every meeting asks for a normal velocity of at least ``wanted``. A sweep corrects each by its own want over a bound of
+the l1 norm of its row of the contact matrix (Baker, Falgout, Kolev and Yang 2011): the sum over its nodes k and axes i
+of |w_k| |n_i| S_ki / m_k, with S_ki the sum of |w| |n_i| over all meetings at the node. That is exact for one meeting
+alone and for any number along one normal, and never an overshoot however many share a node. Impulses never pull;
+friction is Coulomb's, on the sum over the sweeps. Impulses are integers: a meeting's add up to zero, and no order of
+meetings or ranks changes a bit.
 """
 
 import numpy as np
@@ -16,27 +17,30 @@ SHARES = float(2**30)
 _V2, _N2, _I2 = "float64[:, ::1]", "int32[:, ::1]", "int64[:, ::1]"
 
 
-@njit(f"void({_I2}, {_N2}, {_V2}, int64)", cache=True)
-def add_shares(shares, nodes, weights, n):  # type: ignore[no-untyped-def]
-    """Adds |w| of the first ``n`` meetings to ``shares`` (nodes, 1), in quanta."""
+@njit(f"void({_I2}, {_N2}, {_V2}, {_V2}, int64)", cache=True)
+def add_shares(shares, nodes, weights, normals, n):  # type: ignore[no-untyped-def]
+    """Adds |w| |n_i| and |w| of the first ``n`` meetings to ``shares`` (nodes, 4), in quanta."""
     for p in range(n):
         for k in range(4):
-            shares[nodes[p, k], 0] += np.int64(np.rint(abs(weights[p, k]) * SHARES))
+            weight = abs(weights[p, k]) * SHARES
+            for i in range(3):
+                shares[nodes[p, k], i] += np.int64(np.rint(weight * abs(normals[p, i])))
+            shares[nodes[p, k], 3] += np.int64(np.rint(weight))
 
 
 @njit(f"void({_V2}, {_N2}, {_V2}, {_V2}, {_I2}, {_V2}, int64)", cache=True, error_model="numpy")
 def mobilities(diagonal, nodes, weights, normals, shares, mobility, n):  # type: ignore[no-untyped-def]
-    """(room, 2) l1 norms of the rows along the normal and across it, 1/kg; infinite where nothing can move."""
+    """(room, 2) bounds of the l1 norms of the rows along the normal and across, 1/kg; infinite where nothing moves."""
     for p in range(n):
         along, across = 0.0, 0.0
         for k in range(4):
             a = nodes[p, k]
-            share = abs(weights[p, k]) * (shares[a, 0] / SHARES)
-            most, part = 0.0, 0.0
+            weight = abs(weights[p, k]) / SHARES
+            most = 0.0
             for i in range(3):
-                part += normals[p, i] * normals[p, i] * mobility[a, i]
+                along += weight * abs(normals[p, i]) * shares[a, i] * mobility[a, i]
                 most = max(most, mobility[a, i])
-            along, across = along + share * part, across + share * most
+            across += weight * shares[a, 3] * most
         diagonal[p, 0] = along if along > 0.0 else np.inf
         diagonal[p, 1] = across if across > 0.0 else np.inf
 

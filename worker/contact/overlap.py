@@ -1,0 +1,104 @@
+"""Bodies that overlap before the first step: where and how deep; and moving them apart."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..state import Flags, Floats, Indices
+from . import search
+from .meetings import FACING
+from .search import Things
+
+_INSIDE = 1e-9
+"""Smallest share of a tet's corners, negative, at which a node still counts as inside."""
+_ROUNDING = 1e-6
+"""Of the size of a face: depths below this are none."""
+_TRIES = 30
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Exposed faces of all parts: ``faces`` (f, 3), nodes of the mesh, and the part (f,) of each."""
+
+    faces: Indices
+    part: Indices
+
+
+@dataclass(frozen=True)
+class Overlaps:
+    """Nodes inside another part: their depth below its surface, m, and the unit way out."""
+
+    nodes: Indices
+    part: Indices
+    """(n,) the part that each is inside of."""
+    depth: Floats
+    way: Floats
+
+
+def find(points: Floats, tets: Indices, part: Indices, surface: Surface, allowed: Flags) -> Overlaps:
+    """Nodes (n, 3) of the surface that lie inside the tets (k, 4) of another part that theirs meets."""
+    others = allowed & ~np.eye(len(allowed), dtype=bool)
+    nodes = np.unique(surface.faces).astype(np.int32)
+    small = Things(nodes[:, None].copy(), np.zeros(len(nodes)))
+    large = Things(np.ascontiguousarray(tets, np.int32), np.zeros(len(tets)))
+    pairs = search.find(small, large, points, np.zeros_like(points), part, others, 0.0, None)
+    node, corners = nodes[pairs[:, 0]], tets[pairs[:, 1]]
+    inside = _inside(points[node], points[corners])
+    outward = _normals(points, surface.faces)
+    met = np.unique(np.column_stack([node[inside], part[corners[inside, 0]]]), axis=0)
+    depth, way = np.zeros(len(met)), np.zeros((len(met), 3))
+    for k, (a, other) in enumerate(met):
+        depth[k], way[k] = _nearest(points[a], outward[a], points[surface.faces[surface.part == other]])
+    kept = depth > 0.0
+    return Overlaps(met[kept, 0].astype(np.int32), met[kept, 1].astype(np.int32), depth[kept], way[kept])
+
+
+def move_apart(points: Floats, tets: Indices, part: Indices, surface: Surface, allowed: Flags) -> Floats:
+    """Points with overlapping nodes moved to the surface that they are below, half the way at a time, in turns."""
+    moved = points.copy()
+    for _ in range(_TRIES):
+        found = find(moved, tets, part, surface, allowed)
+        if not len(found.nodes):
+            break
+        moved[found.nodes] += 0.51 * found.depth[:, None] * found.way
+    return moved
+
+
+def _inside(nodes: Floats, corners: Floats) -> Flags:
+    """(p,) whether nodes (p, 3) lie in tets (p, 4, 3), their faces included."""
+    edges = corners[:, 1:] - corners[:, :1]
+    tail = np.einsum("pi,pij->pj", nodes - corners[:, 0], np.linalg.inv(edges))
+    shares = np.column_stack([1.0 - tail.sum(axis=1), tail])
+    return np.asarray((shares >= -_INSIDE).all(axis=1))
+
+
+def _normals(points: Floats, faces: Indices) -> Floats:
+    """(n, 3) outward normals of the nodes, of any length."""
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    normals = np.zeros_like(points)
+    for k in range(3):
+        np.add.at(normals, faces[:, k], np.cross(b - a, c - a))
+    lengths = np.linalg.norm(normals, axis=1)
+    return np.asarray(normals / np.where(lengths > 0.0, lengths, 1.0)[:, None])
+
+
+def _nearest(node: Floats, outward: Floats, triangles: Floats) -> tuple[float, Floats]:
+    """Depth below the nearest of the triangles (f, 3, 3) that the node faces, m, and the unit normal there.
+
+    The depth is zero for a node on the surface.
+    """
+    e, f, r = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0], node - triangles[:, 0]
+    normals = np.cross(e, f)
+    area = np.linalg.norm(normals, axis=1)
+    normals /= area[:, None]
+    heights = (normals * r).sum(axis=1)
+    ee, ff, ef = (e * e).sum(axis=1), (f * f).sum(axis=1), (e * f).sum(axis=1)
+    er, fr = (e * r).sum(axis=1), (f * r).sum(axis=1)
+    s, t = (ff * er - ef * fr) / area**2, (ee * fr - ef * er) / area**2
+    over = (np.minimum(np.minimum(s, t), 1.0 - s - t) >= -_INSIDE) & (heights <= _ROUNDING * np.sqrt(area))
+    over &= normals @ outward <= FACING
+    if not over.any():
+        return 0.0, np.zeros(3)
+    best = np.flatnonzero(over)[np.argmax(heights[over])]
+    depth = -float(heights[best])
+    return (depth if depth > _ROUNDING * np.sqrt(area[best]) else 0.0), normals[best]
