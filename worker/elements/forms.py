@@ -26,8 +26,8 @@ class Elements:
         self._timers = timers
         self.peaks: Ints = np.zeros(3, np.int64)
         """See elements/sweep.py."""
-        self._w = np.zeros(tet4.SCRATCH)
-        self._wi = np.zeros(12 * CHUNK, np.int64)
+        self._w = _aligned(tet4.SCRATCH)
+        self._wi = np.zeros(9 * CHUNK, np.int64)
         self._bits = self._w.view(np.int64)
         self.shared_forces = SharedSum(comm, neighbours, model.nodes.force, _FORCE_TAG)
         self.pressure = np.zeros(1)
@@ -87,6 +87,13 @@ class Elements:
 
     def _gradients(self) -> Ints:
         return self.model.nodes.force
+
+
+def _aligned(n: int) -> Floats:
+    """(n,) zeros that begin on a cache line: the same speed wherever memory is given."""
+    line = 64
+    room = np.zeros(n + line // 8)
+    return room[(-room.ctypes.data % line) // 8 :][:n]
 
 
 class AveragedElements(Elements):
