@@ -24,7 +24,8 @@ _TOUCHING = 1e-3
 _MARGIN = 1e-3
 """Of the area coordinates: how far outside of a face its point may lie."""
 _PUSH_OUT = 0.1
-"""Share of a penetration that is taken back in a step."""
+"""Largest share of a penetration that is taken back in a step, and of the speed of closing that is given back for it:
+less than an elastic impact returns, so that it makes no energy."""
 FACING = 0.1
 """Cosine between the outward normals of a node and of a face above which they do not face each other."""
 _PARALLEL = 0.05
@@ -94,6 +95,13 @@ def _foot(b, x, ahead, s, i, j, k, tau):  # type: ignore[no-untyped-def]
     return True
 
 
+@njit("float64(float64, float64, float64, float64)", cache=True)
+def _wanted(gap0, gap1, speed, dt):  # type: ignore[no-untyped-def]
+    """By how much the normal speed must rise, m/s: not to pass, and when that has happened already, not deeper."""
+    back = _PUSH_OUT * min(max(-gap0, 0.0) / dt, max(-speed, 0.0))
+    return (min(gap0, 0.0) - gap1) / dt + back
+
+
 @njit(f"int64({_OUT}, int64, {_N2}, float64[::1], {_V2}, {_IN})", cache=True, error_model="numpy")
 def node_face(nodes, weights, normals, wanted, friction, n, faces, size, out, pairs, x, v, part, mu, dt):  # type: ignore[no-untyped-def]
     """Nodes that pass a face, from row ``n`` on; returns the new number of rows.
@@ -145,7 +153,7 @@ def node_face(nodes, weights, normals, wanted, friction, n, faces, size, out, pa
             weights[at, a + 1] = -b[a]
             normals[at, a] = m[a]
             speed += m[a] * (v[s, a] - (b[0] * v[i, a] + b[1] * v[j, a] + b[2] * v[k, a]))
-        wanted[at] = speed + ((1.0 - _PUSH_OUT) * min(gap0, 0.0) - gap1) / dt
+        wanted[at] = speed + _wanted(gap0, gap1, speed, dt)
         friction[at] = mu[part[s], part[i]]
     return n
 
@@ -230,7 +238,7 @@ def edge_edge(nodes, weights, normals, wanted, friction, n, edges, size, pairs, 
         for k in range(3):
             normals[n, k] = m[k]
             speed += m[k] * ((1.0 - t) * v[c, k] + t * v[d, k] - (1.0 - s) * v[a, k] - s * v[b, k])
-        wanted[n] = speed + ((1.0 - _PUSH_OUT) * min(gap0, 0.0) - gap1) / dt
+        wanted[n] = speed + _wanted(gap0, gap1, speed, dt)
         friction[n] = mu[part[a], part[c]]
         n += 1
     return n
