@@ -19,7 +19,7 @@ from conoid.worker.simulation import Simulation
 
 from ..worker.kernels import Watch, build, run
 from ..worker.meshes import Floats, block
-from .bodies import meeting_of, moved, rotation
+from .bodies import meeting_of, moved, pieces_of, rotation
 from .ranks import on_ranks
 
 SIZE = 1e-3
@@ -90,6 +90,34 @@ def test_the_ledger_closes_and_contact_only_loses(friction: float) -> None:
     assert all(line.friction >= 0.0 for line in lines)
 
 
+FLAT = [block((3, 3, 3), SIZE, seed=1), moved(block((2, 2, 2), 1.3 * SIZE, seed=2), (3.02 * SIZE, 0.0, 0.0))]
+"""Two blocks a little apart along x, with two sides in common planes."""
+BOUNDARIES: dict[str, Any] = {
+    "pusher": ({"kind": "velocity", "parts": ("body0",), "x": 50.0, "y": 0.0, "z": 0.0},),
+    "guide": ({"kind": "velocity", "parts": ("body0",), "x": 50.0},),
+    "planes": ({"kind": "symmetry", "axis": "y"}, {"kind": "symmetry", "axis": "z"}),
+    "wall": ({"kind": "wall", "point": (5.7 * SIZE, 0.0, 0.0), "normal": (-1.0, 0.0, 0.0)},),
+    "turn": ({"kind": "rotation", "parts": ("body0",), "spin": {"centre": (0.0, 0.0, 0.0), "rate": (0.0, 0.0, -1e4)}},),
+}
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.2])
+@pytest.mark.parametrize("kind", BOUNDARIES)
+def test_the_ledger_closes_where_boundaries_hold_what_contact_pushes(kind: str, friction: float) -> None:
+    """What holds a node takes the impulse; a node on a symmetry plane stays there, to the bit."""
+    motions: list[dict[str, Any]] = [{"velocity": (50.0, 0.0, 0.0)}, {}]
+    sim = build(meeting_of(motions, {"friction": friction}, end=3e-6, boundaries=BOUNDARIES[kind]), FLAT)
+    lines: list[Energy] = []
+    run(sim, lambda sim, before: lines.append(sim.ledger.close(before)))
+    assert sim.contact is not None
+    assert sim.contact.last_push > 0.0
+    assert sim.ledger.worst < 1e-3
+    nodes = sim.model.nodes
+    if kind == "planes":
+        assert (nodes.x[nodes.x0[:, 1] == 0.0, 1] == 0.0).all()
+        assert (nodes.x[nodes.x0[:, 2] == 0.0, 2] == 0.0).all()
+
+
 def test_bodies_that_collide_have_bounced_in_the_end() -> None:
     sim = run(build(meeting_of(MOTIONS, end=3.0 * END), MESHES))
     nodes = sim.model.nodes
@@ -150,6 +178,16 @@ def test_any_number_of_ranks_gives_the_same_bits(ranks: int, kind: str) -> None:
     case = case_of(friction=0.3, domain=kind)
     parts = on_threads(ranks, case, lambda sim: state_of(run(sim)), MESHES)
     assert parts[0] == whole
+
+
+@pytest.mark.xfail(strict=True, raises=ValueError, reason="stage._extremes: the maximum of no velocities")
+def test_ranks_inside_of_a_body_take_part_without_a_surface() -> None:
+    meshes = [block((9, 9, 9), SIZE), moved(block((1, 1, 1), SIZE), (9.05 * SIZE, 4 * SIZE, 4 * SIZE))]
+    case, ranks = meeting_of([{}, {"velocity": (-50.0, 0.0, 0.0)}], end=1e-6), 40
+    inner = [not ((m.nodes.x0 == 0.0) | (m.nodes.x0 >= 9 * SIZE)).any() for _, m in pieces_of(case, meshes, ranks)]
+    assert any(inner)
+    parts = on_threads(ranks, case, lambda sim: state_of(run(sim, steps=3)), meshes)
+    assert parts[0] == state_of(run(build(case, meshes), steps=3))
 
 
 @pytest.mark.parametrize("ranks", [1, 3])

@@ -44,8 +44,10 @@ class Expected:
         b = foot(at[s], at[three])
         self.meets = self.gap1 <= NEAR * size and self.gap0 >= -deep and b.min() >= -meetings._MARGIN
         self.weights = np.array([1.0, *-(np.maximum(b, 0.0) / np.maximum(b, 0.0).sum())])
-        speed = self.normal @ (self.weights @ v[[s, *three]])
-        self.wanted = speed + ((1.0 - meetings._PUSH_OUT) * min(self.gap0, 0.0) - self.gap1) / dt
+        speed = float(self.normal @ (self.weights @ v[[s, *three]]))
+        depth = max(-self.gap0, 0.0)
+        back = meetings._PUSH_OUT * min(depth / dt, max(-speed, 0.0))
+        self.wanted = speed - (depth + self.gap1) / dt + back
         self.deep = self.gap0 < -meetings._TOUCHING * size
 
 

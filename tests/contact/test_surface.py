@@ -157,7 +157,7 @@ def test_no_edges_are_looked_for_when_none_are_wanted() -> None:
 
 @pytest.mark.parametrize("ranks", [2, 3, 5])
 def test_ranks_together_have_the_surface_that_one_has(ranks: int) -> None:
-    meshes = [block(CELLS, SIZE), moved(block((3, 3, 3), 0.8 * SIZE), (2 * SIZE, 0.0, 0.0), rotation((1, 1, 0), 0.6))]
+    meshes = [block(CELLS, SIZE), moved(block((3, 3, 3), 0.8 * SIZE), (3 * SIZE, 0.0, 0.0), rotation((1, 1, 0), 0.6))]
     case = meeting_of([{}, {}])
     ((piece, model),) = pieces_of(case, meshes)
     one, pieces = surface_of(piece, model), pieces_of(case, meshes, ranks)
