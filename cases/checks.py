@@ -57,6 +57,10 @@ def _parts(case: Case) -> Iterator[Problem]:
             message = f"must be below {law.melt_temperature} K, where {part.material} melts"
             yield problem(("parts", i, "temperature"), part.temperature, message)
         yield from _mesh(part, ("parts", i, "mesh"))
+        if part.turn is not None and not isinstance(part.mesh, MeshFile) and part.mesh.sector != "full":
+            yield problem(
+                ("parts", i, "turn"), ..., f"a {part.mesh.sector} of a body cannot be turned; model all of it"
+            )
 
 
 def _mesh(part: Part, location: Location) -> Iterator[Problem]:
@@ -164,7 +168,7 @@ def _behind(case: Case, number: int, wall: Wall, length: float) -> Iterator[Prob
     normal = (wall.normal[0] / length, wall.normal[1] / length, wall.normal[2] / length)
     level = sum(n * x for n, x in zip(normal, wall.point, strict=True))
     for part in case.parts:
-        if isinstance(part.mesh, MeshFile) or (wall.parts and part.name not in wall.parts):
+        if isinstance(part.mesh, MeshFile) or part.turn is not None or (wall.parts and part.name not in wall.parts):
             continue
         depth = level - lowest_along(part.mesh, normal)
         if depth > _ROUNDING * max(1.0, abs(level)):
@@ -202,7 +206,8 @@ def _probes(case: Case) -> Iterator[Problem]:
         body = bounds(parts[probe.part].mesh)
         if probe.low is not None and probe.field.startswith("contact_force"):
             yield problem(("probes", i), ..., "contact_force is that of the whole part; remove low and high")
-        if body is None or probe.low is None or probe.high is None:
+        turned = parts[probe.part].turn is not None
+        if body is None or turned or probe.low is None or probe.high is None:
             continue
         for d, (a, b) in enumerate(zip(*body, strict=True)):
             if probe.high[d] < a or probe.low[d] > b:

@@ -207,6 +207,15 @@ class Spin(Model):
     rate: tuple[AngularSpeed, AngularSpeed, AngularSpeed]
 
 
+class Turn(Model):
+    """A body is turned about the line along ``axis`` through ``centre`` before anything else, right-handed."""
+
+    axis: Axis
+    angle: Ratio
+    """rad; ``"45 deg"``."""
+    centre: Point = (0.0, 0.0, 0.0)
+
+
 class Part(Model):
     """A body: where it is, what it is made of, how it moves at the start."""
 
@@ -214,6 +223,8 @@ class Part(Model):
     material: Name
     """A name from ``[materials]`` of the case or from the library."""
     mesh: Mesh
+    turn: Turn | None = None
+    """Only whole bodies can be turned, no sectors."""
     velocity: Velocity = (0.0, 0.0, 0.0)
     spin: Spin | None = None
     temperature: Annotated[Temperature, Field(ge=0)] = 293.15

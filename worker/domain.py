@@ -4,6 +4,7 @@ Rank 0 builds the whole mesh, numbers it and cuts it; every rank receives its ow
 of the parts and, within a part, the order of the mesh: they do not know how many ranks there are.
 """
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -88,7 +89,7 @@ def assemble(case: schema.Case, folder: Path) -> Whole:
     offset = 0
     for index, part in enumerate(case.parts):
         mesh = build_mesh(part.mesh, folder, key=f"parts[{index}].mesh")
-        points.append(mesh.points)
+        points.append(mesh.points if part.turn is None else _turned(mesh.points, part.turn))
         tets.append(mesh.tets.astype(np.int64) + offset)
         node_part.append(np.full(len(mesh.points), index, np.int32))
         tet_part.append(np.full(len(mesh.tets), index, np.int32))
@@ -108,6 +109,16 @@ def assemble(case: schema.Case, folder: Path) -> Whole:
         node_volume=_quarters(t, volumes, len(x)), mass=_quarters(t, volumes * np.array(density)[part_of_tet], len(x)),
         velocity=_velocities(case, x, part_of_node),
     )  # fmt: skip
+
+
+def _turned(points: Floats, turn: schema.Turn) -> Floats:
+    """Points (n, 3) after the rotation."""
+    i, j = ((1, 2), (2, 0), (0, 1))["xyz".index(turn.axis)]
+    cosine, sine = math.cos(turn.angle), math.sin(turn.angle)
+    arms, turned = points - np.array(turn.centre), points.copy()
+    turned[:, i] = turn.centre[i] + cosine * arms[:, i] - sine * arms[:, j]
+    turned[:, j] = turn.centre[j] + sine * arms[:, i] + cosine * arms[:, j]
+    return turned
 
 
 def _apart(case: schema.Case, x: Floats, tets: Indices, part: Indices, exposed: Flags) -> Floats:

@@ -73,13 +73,7 @@ def test_a_collision_keeps_the_momentum(friction: float) -> None:
     assert np.abs(end_angular - angular).max() < (1e-6 if friction == 0.0 else 1e-4) * size
 
 
-_STICKING = pytest.mark.xfail(
-    strict=True,
-    reason="stage._push: the slip before is that after the kick, not v(n-1/2): what sticks is booked as heat",
-)
-
-
-@pytest.mark.parametrize("friction", [0.0, pytest.param(0.3, marks=_STICKING)])
+@pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_the_ledger_closes_and_contact_only_loses(friction: float) -> None:
     lines: list[Energy] = []
     sim = run(build(case_of(friction=friction), MESHES), lambda sim, before: lines.append(sim.ledger.close(before)))
@@ -142,7 +136,6 @@ def test_a_search_in_every_step_finds_no_more_than_one_now_and_then() -> None:
     assert often[1] > 5 * seldom[1]
 
 
-@pytest.mark.xfail(strict=True, raises=ZeroDivisionError, reason="stage._search: the step ahead of the end is 0")
 def test_a_search_that_is_due_in_the_end_does_no_harm() -> None:
     def search(sim: Simulation, before: Floats) -> None:
         assert sim.contact is not None
@@ -180,7 +173,6 @@ def test_any_number_of_ranks_gives_the_same_bits(ranks: int, kind: str) -> None:
     assert parts[0] == whole
 
 
-@pytest.mark.xfail(strict=True, raises=ValueError, reason="stage._extremes: the maximum of no velocities")
 def test_ranks_inside_of_a_body_take_part_without_a_surface() -> None:
     meshes = [block((9, 9, 9), SIZE), moved(block((1, 1, 1), SIZE), (9.05 * SIZE, 4 * SIZE, 4 * SIZE))]
     case, ranks = meeting_of([{}, {"velocity": (-50.0, 0.0, 0.0)}], end=1e-6), 40

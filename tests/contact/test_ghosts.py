@@ -142,11 +142,14 @@ def test_copies_follow_their_owners_whenever_they_are_refreshed(ranks: int) -> N
         for turn in range(3):
             nodes.x[:] = 1000.0 * turn + nodes.id[:, None]
             nodes.v[:] = -nodes.x
-            x, v = np.full((crowd.n, 3), np.nan), np.full((crowd.n, 3), np.nan)
+            x, v, before = (np.full((crowd.n, 3), np.nan) for _ in range(3))
+            order.note(nodes)
+            nodes.v[:] -= 1.0
             comm.barrier()
-            order.refresh(nodes, x, v)
+            order.refresh(nodes, x, v, before)
             assert (x[~held] == 1000.0 * turn + crowd.id[~held, None]).all()
-            assert (v[~held] == -x[~held]).all()
+            assert (before[~held] == -x[~held]).all()
+            assert (v[~held] == -x[~held] - 1.0).all()
             assert np.isnan(x[held]).all()
             comm.barrier()
         order.free()

@@ -194,10 +194,6 @@ def test_concave_edges_belong_to_the_list_too() -> None:
     assert found.edges.n == 18 + 4
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="surface._paired: two of the four faces alone on a rank pass for a pair; on one rank there is none",
-)
 @pytest.mark.parametrize("ranks", [2, 3])
 def test_an_edge_with_four_faces_is_treated_alike_on_any_number_of_ranks(ranks: int) -> None:
     mesh = cubes(CUBES[2])

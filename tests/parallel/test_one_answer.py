@@ -19,6 +19,7 @@ QUICK = (2, 3)
 """Numbers of ranks at which the scene of everything is compared in seconds; the rest is a drill."""
 SHORT = {
     "bar_on_bar": "2 us",
+    "crossed_bars": "2 us",
     "demo": "1 us",
     "dissimilar_bars": "2 us",
     "elastic_bar_confined": "1.5 us",

@@ -85,22 +85,27 @@ def _company(table: Ints, rank: int) -> Ints:
 
 @dataclass
 class Copies:
-    """Positions and velocities of nodes, sent by their owners before every use."""
+    """Positions and velocities of nodes, before and after the kick, sent by their owners in every step."""
 
     exchange: Exchange
     sends: list[tuple[Indices, Floats]]
-    """Local nodes, and the (n, 6) buffer."""
+    """Local nodes, and the (n, 9) buffer."""
     receives: list[tuple[Indices, Floats]]
-    """Places in the crowd, and the (n, 6) buffer."""
+    """Places in the crowd, and the (n, 9) buffer."""
 
-    def refresh(self, nodes: Nodes, x: Floats, v: Floats) -> None:
-        """Fills the copies' rows of ``x`` and ``v``, (crowd, 3)."""
+    def note(self, nodes: Nodes) -> None:
+        """Keeps v(n-1/2) for the others."""
         for local, buffer in self.sends:
-            buffer[:, :3], buffer[:, 3:] = nodes.x[local], nodes.v[local]
+            buffer[:, 6:] = nodes.v[local]
+
+    def refresh(self, nodes: Nodes, x: Floats, v: Floats, before: Floats) -> None:
+        """Fills the copies' rows of ``x``, of ``v`` and of v(n-1/2), (crowd, 3) each."""
+        for local, buffer in self.sends:
+            buffer[:, :3], buffer[:, 3:6] = nodes.x[local], nodes.v[local]
         self.exchange.begin()
         self.exchange.finish()
         for places, buffer in self.receives:
-            x[places], v[places] = buffer[:, :3], buffer[:, 3:]
+            x[places], v[places], before[places] = buffer[:, :3], buffer[:, 3:6], buffer[:, 6:]
 
     def free(self) -> None:
         """Gives the messages back to MPI."""
@@ -114,8 +119,8 @@ def copies(crowd: Crowd, nodes: Nodes, comm: Comm, tag: int) -> Copies:
     asked = comm.swap({int(rank): crowd.id[far[owners == rank]] for rank in np.unique(owners)})
     receives = [(far[owners == rank].astype(np.int32), int(rank)) for rank in np.unique(owners)]
     sends = [(np.searchsorted(nodes.id, ids).astype(np.int32), rank) for rank, ids in asked.items()]
-    into = [(places, np.empty((len(places), 6)), rank) for places, rank in receives]
-    out = [(local, np.empty((len(local), 6)), rank) for local, rank in sends]
+    into = [(places, np.empty((len(places), 9)), rank) for places, rank in receives]
+    out = [(local, np.empty((len(local), 9)), rank) for local, rank in sends]
     exchange = comm.exchange(
         [(rank, buffer.view(np.int64)) for _, buffer, rank in out],
         [(rank, buffer.view(np.int64)) for _, buffer, rank in into],

@@ -95,7 +95,7 @@ class Scene:
     normals: Floats
     """(crowd, 3) unit outward normals of the nodes, as they were at the search."""
     before: Floats
-    """(h, 3) v(n-1/2) of the held nodes."""
+    """(crowd, 3) v(n-1/2)."""
     shared_shares: SharedSum
     shared_impulse: SharedSum
 
@@ -106,20 +106,22 @@ class Scene:
         self.shared_impulse.free()
 
 
-def build(sides: Sides, rules: Rules, horizon: float, nodes: Nodes, neighbours: list[Neighbour], comm: Comm) -> Scene:
-    """Searches what flies on for ``horizon``, s; all ranks take part."""
-    seen, sent = _with_ghosts(sides, rules, horizon, comm) if comm.size > 1 else (sides, 0)
+def build(
+    sides: Sides, rules: Rules, horizon: float, drift: Floats, nodes: Nodes, neighbours: list[Neighbour], comm: Comm
+) -> Scene:
+    """Searches what flies on for ``horizon``, s; all ranks take part and know of the same ``drift`` (3,), m/s."""
+    seen, sent = _with_ghosts(sides, rules, horizon, drift, comm) if comm.size > 1 else (sides, 0)
     node_face = _node_face(seen, rules, horizon)
     edge_edge = _edge_edge(seen, sides.edges.n, rules, horizon)
     return _compact(seen, node_face, edge_edge, sent, nodes, neighbours, comm)
 
 
-def _with_ghosts(sides: Sides, rules: Rules, horizon: float, comm: Comm) -> tuple[Sides, int]:
+def _with_ghosts(sides: Sides, rules: Rules, horizon: float, drift: Floats, comm: Comm) -> tuple[Sides, int]:
     """The sides with what other ranks' surfaces have near this one's, own edges first. And the faces sent."""
     crowd = sides.crowd
 
     def boxes(things: Things) -> Boxes:
-        return search.swept(things, crowd.x, crowd.v, horizon)
+        return search.swept(things, crowd.x, crowd.v - drift, horizon)
 
     nodes, faces, edges = boxes(sides.nodes), boxes(sides.face_things), boxes(sides.edge_things)
     askers = Boxes(np.concatenate([nodes.low, edges.low]), np.concatenate([nodes.high, edges.high]))
@@ -191,7 +193,7 @@ def _compact(
         edge_edge=edge_at.reshape(-1, 2).astype(np.int32), faces_sent=sent,
         room=Meetings.room(room), diagonal=np.empty((room, 2)), push=np.empty((room, 4)),
         copies=ghosts.copies(crowd, nodes, comm, _COPY_TAG), shares=shares, impulse=impulse,
-        total=np.zeros((crowd.n, 3), np.int64), normals=np.zeros((crowd.n, 3)), before=np.zeros((len(held), 3)),
+        total=np.zeros((crowd.n, 3), np.int64), normals=np.zeros((crowd.n, 3)), before=np.zeros((crowd.n, 3)),
         shared_shares=SharedSum(comm, company, shares, _SHARE_TAG),
         shared_impulse=SharedSum(comm, company, impulse, _PUSH_TAG),
     )  # fmt: skip

@@ -93,7 +93,7 @@ class Contact(Boundary):
                 self._look(self._scene, state)
                 self._book(self._scene)
                 self._scene.total[:] = 0
-            if self.due or self._scene is None:
+            if (self.due or self._scene is None) and self._clock.dt > 0.0:
                 self._search(state)
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
@@ -107,7 +107,8 @@ class Contact(Boundary):
             self._scene.free()
 
     def _look(self, now: Scene, state: Nodes) -> None:
-        _gather(now.before, state.v, now.local)
+        _gather(now.before, state.v, now.held, now.local)
+        now.copies.note(state)
 
     def _search(self, state: Nodes) -> None:
         """Looks for candidates; all ranks take part."""
@@ -115,10 +116,10 @@ class Contact(Boundary):
         if self._scene is not None:
             self._scene.free()
         self._refresh(state)
-        fastest, lowest = self._extremes()
+        fastest, drift, lowest = self._extremes()
         self.limit = _KINEMATIC * fastest / lowest
         steps = min(max(self._size / (fastest * clock.dt), _SHORTEST), _LONGEST) if fastest > 0.0 else _LONGEST
-        self._scene = scene.build(sides, self._rules, steps * clock.dt, state, self._neighbours, self._comm)
+        self._scene = scene.build(sides, self._rules, steps * clock.dt, drift, state, self._neighbours, self._comm)
         self._look(self._scene, state)
         self._scene.normals[self._scene.held] = self._normals(state)[self._scene.local]
         self._x, self._v, self._t = state.x.copy(), state.v.copy(), clock.t
@@ -168,22 +169,23 @@ class Contact(Boundary):
         length = np.sqrt((sums.astype(np.float64) ** 2).sum(axis=1))
         return np.asarray(sums / np.where(length > 0.0, length, 1.0)[:, None])
 
-    def _extremes(self) -> tuple[float, float]:
-        """Largest difference of velocities on the surface, m/s, and lowest altitude of its tets, m."""
+    def _extremes(self) -> tuple[float, Floats, float]:
+        """Largest difference of velocities on the surface, their middle (3,), m/s, and its tets' lowest altitude, m."""
         crowd = self._sides.crowd
         altitude = _lowest(crowd.x, self._sides.face_places)
-        most = self._comm.maximum(np.array([-altitude, *crowd.v.max(axis=0), *-crowd.v.min(axis=0)]))
-        return float(np.linalg.norm(most[1:4] + most[4:7])), -float(most[0])
+        ends = (crowd.v.max(axis=0, initial=-np.inf), (-crowd.v).max(axis=0, initial=-np.inf))
+        most = self._comm.maximum(np.array([-altitude, *ends[0], *ends[1]]))
+        return float(np.linalg.norm(most[1:4] + most[4:7])), 0.5 * (most[1:4] - most[4:7]), -float(most[0])
 
     def _push(self, now: Scene, state: Nodes, dt: float, t: float) -> None:
         crowd, room, held = now.crowd, now.room, now.held
         _take(crowd.x, crowd.v, held, state.x, state.v, now.local)
-        now.copies.refresh(state, crowd.x, crowd.v)
+        now.copies.refresh(state, crowd.x, crowd.v, now.before)
         n = self._meet(now, dt)
         self._weigh(now, n)
         room_of = (room.nodes, room.weights, room.normals)
         now.push[:n] = 0.0
-        slip = sweeps.rates(crowd.v, room.nodes, room.weights, n)
+        slip = sweeps.rates(now.before, room.nodes, room.weights, n)
         for _ in range(self._sweeps):
             sweeps.sweep(
                 now.impulse, now.push, crowd.v, *room_of, room.wanted, room.friction, now.diagonal, self._scale, n
@@ -220,11 +222,11 @@ class Contact(Boundary):
         )  # fmt: skip
 
 
-@njit("void(float64[:, ::1], float64[:, ::1], int32[::1])", cache=True)
-def _gather(out, v, local):  # type: ignore[no-untyped-def]
+@njit("void(float64[:, ::1], float64[:, ::1], int32[::1], int32[::1])", cache=True)
+def _gather(out, v, held, local):  # type: ignore[no-untyped-def]
     for h in range(len(local)):
         for i in range(3):
-            out[h, i] = v[local[h], i]
+            out[held[h], i] = v[local[h], i]
 
 
 @njit("void(float64[:, ::1], float64[:, ::1], int32[::1], float64[:, ::1], float64[:, ::1], int32[::1])", cache=True)
@@ -262,7 +264,7 @@ def _book(loss, external, local, held, before, total, mobility, scale):  # type:
     """Half of the impulse times velocity: lost by contact; where a velocity is held, taken in from outside."""
     for h in range(len(held)):
         for i in range(3):
-            work = 0.5 * before[h, i] * (total[held[h], i] / scale)
+            work = 0.5 * before[held[h], i] * (total[held[h], i] / scale)
             loss[local[h]] -= work
             if mobility[held[h], i] == 0.0:
                 external[local[h]] -= work

@@ -44,7 +44,7 @@ def build(model: Model, exposed: Flags, planes: Flags, neighbours: list[Neighbou
     faces = Faces(ids, nodes.id[local], np.sqrt(np.linalg.norm(_normals(nodes.x0, local), axis=1)))
     order = np.argsort(ids)
     flags = _flags(local, nodes.n, neighbours, comm)
-    sharp, far, owner = _sharp(model, local, ids, comm) if edges else _none()
+    sharp, far, owner = _sharp(model, local, ids, neighbours, comm) if edges else _none()
     return Surface(faces.take(order), sharp, flags, far, owner)
 
 
@@ -86,20 +86,25 @@ _LOW, _HIGH, _THIRD, _OWNER, _FACE, _TURNED, _LENGTH, _NORMAL = 0, 1, 2, 3, 4, 5
 whether the face runs from high to low, initial length, m, and the unit normal of the face; floats as their bits."""
 
 
-def _sharp(model: Model, faces: "np.ndarray", ids: Ints, comm: Comm) -> tuple[Edges, Ints, Indices]:
+def _sharp(
+    model: Model, faces: "np.ndarray", ids: Ints, neighbours: list[Neighbour], comm: Comm
+) -> tuple[Edges, Ints, Indices]:
     """Sharp edges, and the nodes of theirs that are not held here, with their owners.
 
-    Where the two faces lie on different ranks, the owner of the lower node brings them together, and the rank of the
+    Where other ranks may hold faces of an edge, the owner of the lower node brings them together, and the rank of the
     face of smaller id has the edge.
     """
     nodes = model.nodes
     halves = _halves(model, faces, ids)
-    here, alone = _paired(halves)
-    home = nodes.owner[np.searchsorted(nodes.id, alone[:, _LOW])]
-    found = comm.swap({int(rank): alone[home == rank] for rank in np.unique(home)})
+    shared = np.zeros(nodes.n, bool)
+    shared[np.concatenate([np.zeros(0, np.int32), *(other.nodes for other in neighbours)])] = True
+    ends = np.searchsorted(nodes.id, halves[:, :2])
+    common = shared[ends].all(axis=1)
+    here, home = _paired(halves[~common]), nodes.owner[ends[:, 0]]
+    found = comm.swap({int(rank): halves[common & (home == rank)] for rank in np.unique(home[common])})
     gathered = np.concatenate([halves[:0], *(f.reshape(-1, 10) for f in found.values())])
     sender = np.concatenate([np.zeros(0, np.int64), *(np.full(len(f) // 10, r) for r, f in found.items())])
-    met, _ = _paired(gathered)
+    met = _paired(gathered)
     order = np.argsort(gathered[:, _FACE])
     target = sender[order[np.searchsorted(gathered[order, _FACE], met[:, 6])]]
     back = comm.swap({int(rank): met[target == rank] for rank in np.unique(target)})
@@ -127,14 +132,11 @@ def _halves(model: Model, faces: "np.ndarray", ids: Ints) -> Ints:
     return np.concatenate(parts)
 
 
-def _paired(halves: Ints) -> tuple[Ints, Ints]:
-    """Rows (a, b, c, d, owner of c, owner of d, smaller face, length) of sharp edges, and the halves left alone."""
+def _paired(halves: Ints) -> Ints:
+    """Rows (a, b, c, d, owner of c, owner of d, smaller face, length) of sharp edges between two faces, not more."""
     halves = halves[np.lexsort((halves[:, _FACE], halves[:, _HIGH], halves[:, _LOW]))]
     same = (halves[1:, :2] == halves[:-1, :2]).all(axis=1)
     first = np.flatnonzero(same & ~np.r_[False, same[:-1]] & ~np.r_[same[1:], False]) if len(same) else np.zeros(0, int)
-    paired = np.zeros(len(halves), bool)
-    paired[1:] |= same
-    paired[:-1] |= same
     one, two = halves[first], halves[first + 1]
     cosine = (one[:, _NORMAL:].copy().view(np.float64) * two[:, _NORMAL:].copy().view(np.float64)).sum(axis=1)
     kept = (cosine < SHARP) & (one[:, _TURNED] != two[:, _TURNED])
@@ -146,5 +148,4 @@ def _paired(halves: Ints) -> tuple[Ints, Ints]:
     owners = np.where(
         ahead, np.column_stack([one[:, _OWNER], two[:, _OWNER]]), np.column_stack([two[:, _OWNER], one[:, _OWNER]])
     )
-    rows = np.column_stack([one[:, :2], ends, owners, one[:, _FACE], one[:, _LENGTH]])
-    return rows, halves[~paired]
+    return np.column_stack([one[:, :2], ends, owners, one[:, _FACE], one[:, _LENGTH]])

@@ -1,0 +1,55 @@
+"""Bodies that overlap at the start are refused with the place and the depth, or moved apart without a stress."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from conoid.worker.errors import InputError
+from conoid.worker.mesh.model import TetMesh
+from conoid.worker.simulation import Simulation
+
+from ..worker.kernels import build, run
+from ..worker.meshes import block
+from .bodies import meeting_of
+
+SIZE = 1e-3
+
+
+def lowered(depth: float, across: float = 0.0) -> list[TetMesh]:
+    """A block of four cubes' height, and one on top of it that reaches ``depth``, m, into it."""
+    upper = block((2, 2, 2), SIZE, seed=3)
+    return [
+        block((4, 4, 4), SIZE, seed=2),
+        TetMesh(upper.points + np.array([across, across, 4 * SIZE - depth]), upper.tets),
+    ]
+
+
+def met(depth: float, across: float = 0.0, **contact: Any) -> Simulation:
+    case = meeting_of([{}, {"velocity": (0.0, 0.0, -1.0)}], contact, end=2e-7)
+    return build(case, lowered(depth, across))
+
+
+@pytest.mark.parametrize("across", [0.0, 1.3 * SIZE])
+def test_an_overlap_is_refused_with_its_place_and_depth(across: float) -> None:
+    with pytest.raises(InputError, match=r"'body[01]' overlaps 'body[01]' by 0\.0002 m at \(.*\) m; move them apart"):
+        met(0.2 * SIZE, across)
+
+
+def test_bodies_that_touch_do_not_overlap() -> None:
+    met(0.0)
+    met(1e-9 * SIZE)
+
+
+def test_what_does_not_meet_may_overlap() -> None:
+    met(0.2 * SIZE, parts=("body0",))
+
+
+@pytest.mark.parametrize("across", [0.0, 1.3 * SIZE])
+def test_bodies_are_moved_apart_without_a_stress(across: float) -> None:
+    sim = met(0.1 * SIZE, across, overlap="push")
+    before = np.concatenate([mesh.points for mesh in lowered(0.1 * SIZE, across)])
+    assert 0.04 * SIZE < np.abs(sim.model.nodes.x - before).max() < 0.1 * SIZE
+    run(sim)
+    assert abs(sim.ledger.lost) < 0.3
+    assert np.abs(sim.model.nodes.v).max() < 1.5
