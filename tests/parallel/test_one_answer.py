@@ -18,10 +18,10 @@ RANKS = (2, 3, 4, 7)
 QUICK = (2, 3)
 """Numbers of ranks at which the scene of everything is compared in seconds; the rest is a drill."""
 SHORT = {
-    "bar_on_bar": "2 us",
+    "bar_on_bar": "3 us",
     "crossed_bars": "2 us",
     "demo": "1 us",
-    "dissimilar_bars": "2 us",
+    "dissimilar_bars": "3 us",
     "elastic_bar_confined": "1.5 us",
     "elastic_bar_wall": "1.5 us",
     "free_spin": "10 us",
