@@ -48,7 +48,7 @@ class Started(Message, frozen=True):
 class Energy(msgspec.Struct, kw_only=True, frozen=True):
     """The ledger, J: what is there and what was lost = initial + external, up to the residual.
 
-    There: kinetic, elastic. Lost: plastic, viscous, contact, friction, eroded.
+    There: kinetic, elastic. Lost: plastic, viscous, contact, friction.
     """
 
     kinetic: float
@@ -58,8 +58,6 @@ class Energy(msgspec.Struct, kw_only=True, frozen=True):
     contact: float
     """By impulses where bodies meet each other or a wall, without friction."""
     friction: float = 0.0
-    eroded: float = 0.0
-    """Energy that eroded tets held."""
     external: float
     initial: float
     residual: float

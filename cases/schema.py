@@ -295,7 +295,7 @@ class Contact(Model):
     edges: bool = True
     """Whether sharp edges meet edges."""
     overlap: Literal["refuse", "push"] = "refuse"
-    """What becomes of bodies that overlap at the start: an error, or a tenth of the overlap is taken back in a step."""
+    """What becomes of bodies that overlap at the start: an error, or they are moved apart without a stress."""
     sweeps: Annotated[Count, Field(ge=1, le=1000)] = 5
     """Jacobi sweeps over the meetings of a step."""
     skin: Annotated[Ratio, Positive] = 0.25

@@ -39,6 +39,18 @@ def sort(points: Floats, edge: float) -> Buckets:
     return Buckets(low, 1.0 / edge, shape, codes[order], order)
 
 
+def grid(counts: Ints) -> tuple[Ints, Ints]:
+    """Every cell of n boxes of ``counts`` (n, 3) cells: the index of its box, and its own (3,) from zero."""
+    total = counts.prod(axis=1)
+    who = np.repeat(np.arange(len(total)), total)
+    number = np.arange(len(who)) - np.repeat(np.cumsum(total) - total, total)
+    index = np.empty((len(who), 3), np.int64)
+    for axis in range(3):
+        index[:, axis] = number % counts[who, axis]
+        number = number // counts[who, axis]
+    return who, index
+
+
 @njit("int64(float64, float64, float64, int64)", cache=True)
 def bucket_of(x, origin, inverse, n):  # type: ignore[no-untyped-def]
     """Index of a coordinate along an axis, clamped to 0 ... n - 1."""

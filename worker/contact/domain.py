@@ -10,6 +10,7 @@ import numpy as np
 
 from ..parallel.comm import Comm
 from ..state import Flags, Floats, Ints
+from .buckets import grid
 from .search import Boxes
 
 
@@ -60,11 +61,5 @@ def _cells(boxes: Boxes, edge: float) -> tuple[Ints, Ints]:
     """Index of the box and the cell (3,) for every cell that every box touches."""
     first = np.floor(boxes.low / edge).astype(np.int64)
     counts = np.floor(boxes.high / edge).astype(np.int64) - first + 1
-    total = counts.prod(axis=1)
-    who = np.repeat(np.arange(len(total)), total)
-    number = np.arange(len(who)) - np.repeat(np.cumsum(total) - total, total)
-    cells = np.empty((len(who), 3), np.int64)
-    for axis in range(3):
-        cells[:, axis] = first[who, axis] + number % counts[who, axis]
-        number = number // counts[who, axis]
-    return who, cells
+    who, index = grid(counts)
+    return who, first[who] + index

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..mesh.faces import normals as face_normals
 from ..state import Flags, Floats, Indices
 from . import search
 from .meetings import FACING
@@ -73,11 +74,10 @@ def _inside(nodes: Floats, corners: Floats) -> Flags:
 
 
 def _normals(points: Floats, faces: Indices) -> Floats:
-    """(n, 3) outward normals of the nodes, of any length."""
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    normals = np.zeros_like(points)
+    """(n, 3) unit outward normals of the nodes, zero off the faces (f, 3)."""
+    normals, areas = np.zeros_like(points), face_normals(points, faces)
     for k in range(3):
-        np.add.at(normals, faces[:, k], np.cross(b - a, c - a))
+        np.add.at(normals, faces[:, k], areas)
     lengths = np.linalg.norm(normals, axis=1)
     return np.asarray(normals / np.where(lengths > 0.0, lengths, 1.0)[:, None])
 

@@ -4,7 +4,9 @@ A face is three nodes, counter-clockwise seen from outside, and the node of its 
 two nodes and, of each of the two faces that meet there, the third one. Rows travel between ranks as they are.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Self
 
 import numpy as np
 
@@ -12,8 +14,31 @@ from ..state import Floats, Indices, Ints
 
 
 @dataclass
-class Faces:
-    """Exposed faces, ``n`` of them."""
+class Rows:
+    """Columns of equal length."""
+
+    @property
+    def n(self) -> int:
+        """Number of rows."""
+        return len(self.columns()[0])
+
+    def columns(self) -> list["np.ndarray"]:
+        """The columns, in the order of their names here."""
+        return [getattr(self, column.name) for column in fields(self)]
+
+    def take(self, chosen: "np.ndarray") -> Self:
+        """Some of the rows."""
+        return type(self)(*(column[chosen] for column in self.columns()))
+
+    @classmethod
+    def joined(cls, tables: Sequence[Self]) -> Self:
+        """All rows of all tables, in turn."""
+        return cls(*map(np.concatenate, zip(*(table.columns() for table in tables), strict=True)))
+
+
+@dataclass
+class Faces(Rows):
+    """Exposed faces."""
 
     id: Ints
     """(n,) 4 * global tet id + local face."""
@@ -22,37 +47,19 @@ class Faces:
     size: Floats
     """(n,) square root of twice the initial area, m."""
 
-    @property
-    def n(self) -> int:
-        """Number of faces."""
-        return len(self.id)
-
-    def take(self, chosen: "np.ndarray") -> "Faces":
-        """Some of the faces."""
-        return Faces(self.id[chosen], self.nodes[chosen], self.size[chosen])
-
 
 @dataclass
-class Edges:
-    """Sharp edges, ``n`` of them; a row (a, b, c, d): edge ab between face abc and face bad, a < b."""
+class Edges(Rows):
+    """Sharp edges; a row (a, b, c, d): edge ab between face abc and face bad, a < b."""
 
     nodes: Ints
     """(n, 4) global ids."""
     size: Floats
     """(n,) initial length, m."""
 
-    @property
-    def n(self) -> int:
-        """Number of edges."""
-        return len(self.size)
-
-    def take(self, chosen: "np.ndarray") -> "Edges":
-        """Some of the edges."""
-        return Edges(self.nodes[chosen], self.size[chosen])
-
 
 @dataclass
-class Crowd:
+class Crowd(Rows):
     """Nodes by ascending global id, those of this rank and copies of others'."""
 
     id: Ints
@@ -70,18 +77,6 @@ class Crowd:
     v: Floats
     """(n, 3) velocity, m/s."""
 
-    @property
-    def n(self) -> int:
-        """Number of nodes."""
-        return len(self.id)
-
-    def take(self, chosen: "np.ndarray") -> "Crowd":
-        """Some of the nodes."""
-        return Crowd(
-            self.id[chosen], self.local[chosen], self.owner[chosen], self.part[chosen], self.mobility[chosen],
-            self.x[chosen], self.v[chosen],
-        )  # fmt: skip
-
     def places(self, ids: Ints) -> Indices:
         """Where these global ids stand, in the shape of ``ids``; all must be here."""
         return np.searchsorted(self.id, ids).astype(np.int32)
@@ -89,10 +84,5 @@ class Crowd:
 
 def merged(crowds: list[Crowd]) -> Crowd:
     """All nodes once, by ascending id; the first crowd that has a node gives its row."""
-    every = [np.concatenate(columns) for columns in zip(*(_columns(c) for c in crowds), strict=True)]
-    _, first = np.unique(every[0], return_index=True)
-    return Crowd(*(column[first] for column in every))
-
-
-def _columns(crowd: Crowd) -> tuple["np.ndarray", ...]:
-    return (crowd.id, crowd.local, crowd.owner, crowd.part, crowd.mobility, crowd.x, crowd.v)
+    every = Crowd.joined(crowds)
+    return every.take(np.unique(every.id, return_index=True)[1])

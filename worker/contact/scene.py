@@ -139,11 +139,10 @@ def _nodes_of(faces: Faces, edges: Edges, crowd: Crowd) -> Crowd:
 
 
 def _joined(sides: Sides, others: list[tuple[Faces, Edges, Crowd]]) -> Sides:
-    faces, edges = [sides.faces, *(o[0] for o in others)], [sides.edges, *(o[1] for o in others)]
-    all_faces = Faces(*(np.concatenate([getattr(f, name) for f in faces]) for name in ("id", "nodes", "size")))
-    all_edges = Edges(*(np.concatenate([getattr(e, name) for e in edges]) for name in ("nodes", "size")))
-    crowd = merged([sides.crowd, *(o[2] for o in others)])
-    return Sides(all_faces.take(np.argsort(all_faces.id)), all_edges, crowd, sides.slaves, sides.skin)
+    faces = Faces.joined([sides.faces, *(faces for faces, _, _ in others)])
+    edges = Edges.joined([sides.edges, *(edges for _, edges, _ in others)])
+    crowd = merged([sides.crowd, *(crowd for _, _, crowd in others)])
+    return Sides(faces.take(np.argsort(faces.id)), edges, crowd, sides.slaves, sides.skin)
 
 
 def _node_face(seen: Sides, rules: Rules, horizon: float) -> Indices:

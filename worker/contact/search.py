@@ -128,13 +128,7 @@ def _pairs(
 def _samples(low: Floats, high: Floats, edge: float) -> tuple[Floats, "np.ndarray", Floats]:
     """Points that fill the boxes (n, 3) so densely that none of a box is further than ``half`` from one of its own."""
     counts = np.maximum(np.ceil((high - low) / edge), 1.0).astype(np.int64)
-    total = counts.prod(axis=1)
-    who = np.repeat(np.arange(len(low)), total)
-    number = np.arange(len(who)) - np.repeat(np.cumsum(total) - total, total)
-    index = np.empty((len(who), 3))
-    for axis in range(3):
-        index[:, axis] = number % counts[who, axis]
-        number = number // counts[who, axis]
+    who, index = buckets.grid(counts)
     points = low[who] + (index + 0.5) * ((high - low) / counts)[who]
     return points, who, (0.5 * ((high - low) / counts)).max(axis=0)
 

@@ -17,19 +17,15 @@ from ..clock import Clock
 from ..materials.models import BULK, DENSITY, SHEAR
 from ..parallel import fixed_point
 from ..parallel.comm import Comm
-from ..parallel.fixed_point import exact_sums
-from ..parallel.ownership import Neighbour, SharedSum
+from ..parallel.ownership import Neighbour
 from ..state import Flags, Floats, Model, Nodes
 from ..timers import Timers
-from . import ghosts, meetings, pairing, scene, surface, sweeps
-from .records import Crowd, merged
-from .scene import Rules, Scene, Sides
+from . import meetings, pairing, scene, surface, sweeps
+from .flight import Flight
+from .scene import Rules, Scene
 
-_NORMAL_TAG = 14
 _SHORTEST, _LONGEST = 10.0, 300.0
 """Steps of free flight that a search looks ahead: as many as the fastest takes past a face, within these bounds."""
-_SPENT = 0.4
-"""Of the skin: a node that strays further than this from its path calls for a new search."""
 _KINEMATIC = 2.0
 """One over the share of a tet's altitude that anything may pass in a step."""
 
@@ -45,38 +41,22 @@ class Contact(Boundary):
         assert case.contact is not None
         self._sweeps = case.contact.sweeps
         self._comm, self._neighbours, self._clock, self._timers = comm, neighbours, clock, timers
-        self._mobility, planes = _mobility(model.nodes, bounds)
-        self._surface = surface.build(model, exposed, planes, neighbours, comm, case.contact.edges)
+        mobility, planes = _mobility(model.nodes, bounds)
+        found = surface.build(model, exposed, planes, neighbours, comm, case.contact.edges)
+        self._flight = Flight(found, model.nodes, mobility, case.contact.skin, neighbours, comm)
         self._mu = pairing.friction(case)
-        ids = self._surface.faces.nodes[:, :3]
-        self._face_nodes = np.searchsorted(model.nodes.id, ids).astype(np.int32).reshape(-1, 3)
-        size = _typical(self._surface.faces.size, comm)
-        self._rules = Rules(case.contact.domain, ~np.isnan(self._mu), 2.0 * size)
-        self._size = size
-        self._sides = self._whole_sides(model.nodes, case.contact.skin * size)
+        self._rules = Rules(case.contact.domain, ~np.isnan(self._mu), 2.0 * self._flight.size)
         largest, fastest = _bounds(model, comm)
         self._scale = fixed_point.scale_for(largest * fastest)
         self._joule = math.ldexp(1.0, 30 - math.frexp(largest * fastest * fastest)[1])
         self._friction = np.zeros(2, np.int64)
         self._parts = np.zeros((len(case.parts), 3), np.int64)
         self._scene: Scene | None = None
-        self._x, self._v, self._t, self._until = model.nodes.x, model.nodes.v, 0.0, 0.0
-        """Where the nodes of the surface were at the last search, and how fast."""
         self.due = True
         """Whether the next step begins with a search."""
         self.limit = 0.0
         """One over the step in which nothing passes more than half a tet, 1/s."""
-        self.searches = self.meetings = 0
-
-    @property
-    def candidates(self) -> int:
-        """Pairs that this rank looks at in a step."""
-        return 0 if self._scene is None else len(self._scene.node_face) + len(self._scene.edge_edge)
-
-    @property
-    def faces_sent(self) -> int:
-        """Faces that this rank has sent to others for the present search."""
-        return 0 if self._scene is None else self._scene.faces_sent
+        self.searches = 0
 
     def friction_work(self) -> float:
         """Heat of friction so far of the meetings of all ranks, J; all ranks take part."""
@@ -112,70 +92,25 @@ class Contact(Boundary):
 
     def _search(self, state: Nodes) -> None:
         """Looks for candidates; all ranks take part."""
-        clock, sides = self._clock, self._sides
+        clock, flight = self._clock, self._flight
         if self._scene is not None:
             self._scene.free()
-        self._refresh(state)
-        fastest, drift, lowest = self._extremes()
+        flight.refresh(state)
+        fastest, drift, lowest = flight.extremes()
         self.limit = _KINEMATIC * fastest / lowest
-        steps = min(max(self._size / (fastest * clock.dt), _SHORTEST), _LONGEST) if fastest > 0.0 else _LONGEST
-        self._scene = scene.build(sides, self._rules, steps * clock.dt, drift, state, self._neighbours, self._comm)
+        steps = min(max(flight.size / (fastest * clock.dt), _SHORTEST), _LONGEST) if fastest > 0.0 else _LONGEST
+        horizon = steps * clock.dt
+        self._scene = scene.build(flight.sides, self._rules, horizon, drift, state, self._neighbours, self._comm)
         self._look(self._scene, state)
-        self._scene.normals[self._scene.held] = self._normals(state)[self._scene.local]
-        self._x, self._v, self._t = state.x.copy(), state.v.copy(), clock.t
-        self._until = clock.t + steps * clock.dt
+        self._scene.normals[self._scene.held] = flight.normals(state)[self._scene.local]
+        flight.begin(state, clock.t, clock.t + horizon)
         self.due = False
         self.searches += 1
 
     def spent(self, state: Nodes) -> bool:
         """Whether a node of the surface will leave, in a step more, what the last search has allowed for."""
-        ahead = self._clock.t + self._clock.dt
-        if ahead > self._until:
-            return True
         with self._timers.phase("contact"):
-            then = (self._x, self._v)
-            far = _strayed(state.x, state.v, *then, self._surface.flags, self._clock.dt, ahead - self._t)
-            return bool(far > (_SPENT * self._sides.skin) ** 2)
-
-    def _here(self, nodes: Nodes) -> Crowd:
-        every = np.arange(nodes.n, dtype=np.int32)
-        return Crowd(nodes.id, every, nodes.owner, nodes.part, self._mobility, nodes.x, nodes.v)
-
-    def _whole_sides(self, nodes: Nodes, skin: float) -> Sides:
-        found, here = self._surface, self._here(nodes)
-        used = found.flags.copy()
-        used[np.searchsorted(nodes.id, found.faces.nodes.reshape(-1))] = True
-        far = ghosts.fetch(found.far, found.far_owner, here, self._comm)
-        slaves = nodes.id[found.flags & nodes.owned]
-        return Sides(found.faces, found.edges, merged([here.take(used), far]), slaves, skin)
-
-    def _refresh(self, nodes: Nodes) -> None:
-        """Positions and velocities of the surface as they are."""
-        crowd, found = self._sides.crowd, self._surface
-        held = crowd.local >= 0
-        crowd.x[held], crowd.v[held] = nodes.x[crowd.local[held]], nodes.v[crowd.local[held]]
-        far = ghosts.fetch(found.far, found.far_owner, self._here(nodes), self._comm)
-        places = crowd.places(far.id)
-        crowd.x[places], crowd.v[places] = far.x, far.v
-
-    def _normals(self, nodes: Nodes) -> Floats:
-        """(nodes, 3) unit outward normals of the nodes of the surface, zero off it; all ranks take part."""
-        sums = np.zeros((nodes.n, 3), np.int64)
-        _add_normals(sums, nodes.x, self._face_nodes, sweeps.SHARES / self._size**2)
-        shared = SharedSum(self._comm, self._neighbours, sums, _NORMAL_TAG)
-        shared.begin()
-        shared.finish()
-        shared.free()
-        length = np.sqrt((sums.astype(np.float64) ** 2).sum(axis=1))
-        return np.asarray(sums / np.where(length > 0.0, length, 1.0)[:, None])
-
-    def _extremes(self) -> tuple[float, Floats, float]:
-        """Largest difference of velocities on the surface, their middle (3,), m/s, and its tets' lowest altitude, m."""
-        crowd = self._sides.crowd
-        altitude = _lowest(crowd.x, self._sides.face_places)
-        ends = (crowd.v.max(axis=0, initial=-np.inf), (-crowd.v).max(axis=0, initial=-np.inf))
-        most = self._comm.maximum(np.array([-altitude, *ends[0], *ends[1]]))
-        return float(np.linalg.norm(most[1:4] + most[4:7])), 0.5 * (most[1:4] - most[4:7]), -float(most[0])
+            return self._flight.spent(state, self._clock.t, self._clock.dt)
 
     def _push(self, now: Scene, state: Nodes, dt: float, t: float) -> None:
         crowd, room, held = now.crowd, now.room, now.held
@@ -195,7 +130,6 @@ class Contact(Boundary):
             sweeps.give(crowd.v, now.total, now.impulse, crowd.mobility, self._scale)
         sweeps.heat(self._friction, now.push, slip, crowd.v, *room_of, room.friction, self._joule, n)
         self._book(now)
-        self.meetings = n
         if _give_back(state.v, self._parts, now.local, held, crowd.v, now.total, state.part, state.owned):
             self.last_push = t
 
@@ -270,50 +204,6 @@ def _book(loss, external, local, held, before, total, mobility, scale):  # type:
                 external[local[h]] -= work
 
 
-@njit("void(int64[:, ::1], float64[:, ::1], int32[:, ::1], float64)", cache=True)
-def _add_normals(sums, x, faces, scale):  # type: ignore[no-untyped-def]
-    """Adds the area vectors of faces (f, 3), in quanta of 1 / ``scale``, to the sums (nodes, 3) of their nodes."""
-    for f in range(len(faces)):
-        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
-        for i in range(3):
-            j, k = (i + 1) % 3, (i + 2) % 3
-            area = (x[b, j] - x[a, j]) * (x[c, k] - x[a, k]) - (x[b, k] - x[a, k]) * (x[c, j] - x[a, j])
-            quanta = np.int64(np.rint(area * scale))
-            for m in range(3):
-                sums[faces[f, m], i] += quanta
-
-
-@njit("float64(float64[:, ::1], int32[:, ::1])", cache=True, error_model="numpy")
-def _lowest(x, faces):  # type: ignore[no-untyped-def]
-    """Lowest altitude, m, of tets over their faces (f, 4)."""
-    lowest = np.inf
-    for f in range(len(faces)):
-        a, b, c, d = faces[f, 0], faces[f, 1], faces[f, 2], faces[f, 3]
-        ex, ey, ez = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
-        fx, fy, fz = x[c, 0] - x[a, 0], x[c, 1] - x[a, 1], x[c, 2] - x[a, 2]
-        nx, ny, nz = ey * fz - ez * fy, ez * fx - ex * fz, ex * fy - ey * fx
-        height = nx * (x[d, 0] - x[a, 0]) + ny * (x[d, 1] - x[a, 1]) + nz * (x[d, 2] - x[a, 2])
-        lowest = min(lowest, abs(height) / np.sqrt(nx * nx + ny * ny + nz * nz))
-    return lowest
-
-
-@njit(
-    "float64(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], boolean[::1], float64, float64)",
-    cache=True,
-)
-def _strayed(x, v, x_then, v_then, flags, dt, ahead):  # type: ignore[no-untyped-def]
-    """Largest squared distance, m^2, of a flagged node a step ahead from where free flight would have taken it."""
-    most = 0.0
-    for a in range(len(x)):
-        if flags[a]:
-            far = 0.0
-            for i in range(3):
-                off = x[a, i] + dt * v[a, i] - (x_then[a, i] + ahead * v_then[a, i])
-                far += off * off
-            most = max(most, far)
-    return most
-
-
 def _mobility(nodes: Nodes, bounds: list[Boundary]) -> tuple[Floats, Flags]:
     """(nodes, 3) one over the mass, zero where a velocity is held; and which nodes lie on a symmetry plane."""
     mobility = np.repeat(1.0 / nodes.mass[:, None], 3, axis=1)
@@ -327,12 +217,6 @@ def _mobility(nodes: Nodes, bounds: list[Boundary]) -> tuple[Floats, Flags]:
             mobility[bound.nodes] = rows
     mobility[planes] = 0.0
     return mobility, planes
-
-
-def _typical(sizes: Floats, comm: Comm) -> float:
-    """Harmonic mean of the sizes of all faces, m: near the small ones where a mesh is graded."""
-    total, count = exact_sums(comm, np.column_stack([1.0 / sizes, np.ones(len(sizes))]))
-    return float(count / total)
 
 
 def _bounds(model: Model, comm: Comm) -> tuple[float, float]:

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..mesh.faces import FACES
+from ..mesh.faces import normals as face_normals
 from ..parallel.comm import Comm
-from ..parallel.ownership import Neighbour, SharedSum
-from ..state import Flags, Floats, Indices, Ints, Model
+from ..parallel.ownership import Neighbour, complete
+from ..state import Flags, Indices, Ints, Model
 from .records import Edges, Faces
 
 SHARP = np.cos(np.radians(25.0))
@@ -41,7 +42,7 @@ def build(model: Model, exposed: Flags, planes: Flags, neighbours: list[Neighbou
     local, ids = _faces(model, exposed)
     mirrored = planes[local[:, :3]].all(axis=1).any(axis=1)
     local, ids = local[~mirrored], ids[~mirrored]
-    faces = Faces(ids, nodes.id[local], np.sqrt(np.linalg.norm(_normals(nodes.x0, local), axis=1)))
+    faces = Faces(ids, nodes.id[local], np.sqrt(np.linalg.norm(face_normals(nodes.x0, local), axis=1)))
     order = np.argsort(ids)
     flags = _flags(local, nodes.n, neighbours, comm)
     sharp, far, owner = _sharp(model, local, ids, neighbours, comm) if edges else _none()
@@ -61,19 +62,10 @@ def _faces(model: Model, exposed: Flags) -> tuple["np.ndarray", Ints]:
     return np.concatenate(rows), np.concatenate(ids)
 
 
-def _normals(x: Floats, faces: "np.ndarray") -> Floats:
-    """(f, 3) outward normals of twice the area."""
-    a, b, c = (x[faces[:, k]] for k in range(3))
-    return np.asarray(np.cross(b - a, c - a))
-
-
 def _flags(faces: "np.ndarray", n: int, neighbours: list[Neighbour], comm: Comm) -> Flags:
     counts = np.zeros((n, 1), np.int64)
     counts[faces[:, :3]] = 1
-    shared = SharedSum(comm, neighbours, counts, _FLAG_TAG)
-    shared.begin()
-    shared.finish()
-    shared.free()
+    complete(comm, neighbours, counts, _FLAG_TAG)
     return np.asarray(counts[:, 0] > 0)
 
 
@@ -119,7 +111,7 @@ def _sharp(
 def _halves(model: Model, faces: "np.ndarray", ids: Ints) -> Ints:
     """(3 f, 10) half edges of the faces."""
     nodes = model.nodes
-    normals = _normals(nodes.x0, faces)
+    normals = face_normals(nodes.x0, faces)
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     parts = []
     for k in range(3):

@@ -37,9 +37,13 @@ def across(tets: Ints) -> NDArray[np.int64]:
 
 def areas(points: Floats, faces: Ints) -> Floats:
     """(k,) areas, m^2, of ``faces``, (k, 3)."""
+    return np.asarray(np.linalg.norm(normals(points, faces), axis=1) / 2)
+
+
+def normals(points: Floats, faces: NDArray[np.integer]) -> Floats:
+    """(k, 3) outward normals of ``faces``, (k, 3), as long as twice the area, m^2."""
     a, b, c = (points[faces[:, i]] for i in range(3))
-    normals: Floats = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    return normals / 2
+    return np.asarray(np.cross(b - a, c - a))
 
 
 def _groups(faces: Ints) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

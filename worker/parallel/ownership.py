@@ -35,6 +35,14 @@ def _add(sums, nodes, buffer):  # type: ignore[no-untyped-def]
             sums[nodes[i], k] += buffer[i, k]
 
 
+def complete(comm: Comm, neighbours: list[Neighbour], sums: Ints, tag: int) -> None:
+    """Completes nodal sums (nodes, columns) once; all ranks take part."""
+    shared = SharedSum(comm, neighbours, sums, tag)
+    shared.begin()
+    shared.finish()
+    shared.free()
+
+
 class SharedSum:
     """Completes one array of nodal sums, (nodes, columns) int64, again and again."""
 

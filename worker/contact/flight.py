@@ -1,0 +1,131 @@
+"""The surface between two searches: where it is, which way it looks, and whether it still flies as it did."""
+
+import numpy as np
+from numba import njit
+
+from ..parallel.comm import Comm
+from ..parallel.fixed_point import exact_sums
+from ..parallel.ownership import Neighbour, complete
+from ..state import Floats, Nodes
+from . import ghosts, sweeps
+from .records import Crowd, merged
+from .scene import Sides
+from .surface import Surface
+
+_NORMAL_TAG = 14
+_SPENT = 0.4
+"""Of the skin: a node that strays further than this from its path calls for a new search."""
+
+
+class Flight:
+    """The surface of one rank in motion."""
+
+    def __init__(
+        self, found: Surface, nodes: Nodes, mobility: Floats, skin: float, neighbours: list[Neighbour], comm: Comm
+    ) -> None:
+        """``mobility`` (nodes, 3): see records.Crowd; ``skin``: of the typical size of a face."""
+        self._found, self._mobility, self._neighbours, self._comm = found, mobility, neighbours, comm
+        self._face_nodes = np.searchsorted(nodes.id, found.faces.nodes[:, :3]).astype(np.int32).reshape(-1, 3)
+        self.size = _typical(found.faces.size, comm)
+        """Of the faces of all ranks, m."""
+        self.sides = self._whole(nodes, skin * self.size)
+        """What this rank has of the surface."""
+        self._x, self._v, self._t, self._until = nodes.x, nodes.v, 0.0, 0.0
+
+    def begin(self, nodes: Nodes, t: float, until: float) -> None:
+        """Free flight from time ``t`` on, good to the time ``until``, s."""
+        self._x, self._v, self._t, self._until = nodes.x.copy(), nodes.v.copy(), t, until
+
+    def spent(self, nodes: Nodes, t: float, dt: float) -> bool:
+        """Whether the flight is over, or a node strays by ``_SPENT`` of the skin, a step ``dt`` after ``t``."""
+        if t + dt > self._until:
+            return True
+        far = _strayed(nodes.x, nodes.v, self._x, self._v, self._found.flags, dt, t + dt - self._t)
+        return bool(far > (_SPENT * self.sides.skin) ** 2)
+
+    def _here(self, nodes: Nodes) -> Crowd:
+        every = np.arange(nodes.n, dtype=np.int32)
+        return Crowd(nodes.id, every, nodes.owner, nodes.part, self._mobility, nodes.x, nodes.v)
+
+    def _whole(self, nodes: Nodes, skin: float) -> Sides:
+        found, here = self._found, self._here(nodes)
+        used = found.flags.copy()
+        used[np.searchsorted(nodes.id, found.faces.nodes.reshape(-1))] = True
+        far = ghosts.fetch(found.far, found.far_owner, here, self._comm)
+        slaves = nodes.id[found.flags & nodes.owned]
+        return Sides(found.faces, found.edges, merged([here.take(used), far]), slaves, skin)
+
+    def refresh(self, nodes: Nodes) -> None:
+        """Positions and velocities of the surface as they are."""
+        crowd, found = self.sides.crowd, self._found
+        held = crowd.local >= 0
+        crowd.x[held], crowd.v[held] = nodes.x[crowd.local[held]], nodes.v[crowd.local[held]]
+        far = ghosts.fetch(found.far, found.far_owner, self._here(nodes), self._comm)
+        places = crowd.places(far.id)
+        crowd.x[places], crowd.v[places] = far.x, far.v
+
+    def normals(self, nodes: Nodes) -> Floats:
+        """(nodes, 3) unit outward normals of the nodes of the surface, zero off it; all ranks take part."""
+        sums = np.zeros((nodes.n, 3), np.int64)
+        _add_normals(sums, nodes.x, self._face_nodes, sweeps.SHARES / self.size**2)
+        complete(self._comm, self._neighbours, sums, _NORMAL_TAG)
+        length = np.sqrt((sums.astype(np.float64) ** 2).sum(axis=1))
+        return np.asarray(sums / np.where(length > 0.0, length, 1.0)[:, None])
+
+    def extremes(self) -> tuple[float, Floats, float]:
+        """Largest difference of velocities on the surface, their middle (3,), m/s, and its tets' lowest altitude, m."""
+        crowd = self.sides.crowd
+        altitude = _lowest(crowd.x, self.sides.face_places)
+        ends = (crowd.v.max(axis=0, initial=-np.inf), (-crowd.v).max(axis=0, initial=-np.inf))
+        most = self._comm.maximum(np.array([-altitude, *ends[0], *ends[1]]))
+        return float(np.linalg.norm(most[1:4] + most[4:7])), 0.5 * (most[1:4] - most[4:7]), -float(most[0])
+
+
+@njit("void(int64[:, ::1], float64[:, ::1], int32[:, ::1], float64)", cache=True)
+def _add_normals(sums, x, faces, scale):  # type: ignore[no-untyped-def]
+    """Adds the area vectors of faces (f, 3), in quanta of 1 / ``scale``, to the sums (nodes, 3) of their nodes."""
+    for f in range(len(faces)):
+        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            area = (x[b, j] - x[a, j]) * (x[c, k] - x[a, k]) - (x[b, k] - x[a, k]) * (x[c, j] - x[a, j])
+            quanta = np.int64(np.rint(area * scale))
+            for m in range(3):
+                sums[faces[f, m], i] += quanta
+
+
+@njit("float64(float64[:, ::1], int32[:, ::1])", cache=True, error_model="numpy")
+def _lowest(x, faces):  # type: ignore[no-untyped-def]
+    """Lowest altitude, m, of tets over their faces (f, 4)."""
+    lowest = np.inf
+    for f in range(len(faces)):
+        a, b, c, d = faces[f, 0], faces[f, 1], faces[f, 2], faces[f, 3]
+        ex, ey, ez = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
+        fx, fy, fz = x[c, 0] - x[a, 0], x[c, 1] - x[a, 1], x[c, 2] - x[a, 2]
+        nx, ny, nz = ey * fz - ez * fy, ez * fx - ex * fz, ex * fy - ey * fx
+        height = nx * (x[d, 0] - x[a, 0]) + ny * (x[d, 1] - x[a, 1]) + nz * (x[d, 2] - x[a, 2])
+        lowest = min(lowest, abs(height) / np.sqrt(nx * nx + ny * ny + nz * nz))
+    return lowest
+
+
+@njit(
+    "float64(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], boolean[::1], float64, float64)",
+    cache=True,
+)
+def _strayed(x, v, x_then, v_then, flags, dt, ahead):  # type: ignore[no-untyped-def]
+    """Largest squared distance, m^2, of a flagged node a step ahead from where free flight would have taken it."""
+    most = 0.0
+    for a in range(len(x)):
+        if flags[a]:
+            far = 0.0
+            for i in range(3):
+                off = x[a, i] + dt * v[a, i] - (x_then[a, i] + ahead * v_then[a, i])
+                far += off * off
+            most = max(most, far)
+    return most
+
+
+def _typical(sizes: Floats, comm: Comm) -> float:
+    """Harmonic mean of the sizes of all faces, m: near the small ones where a mesh is graded."""
+    total, count = exact_sums(comm, np.column_stack([1.0 / sizes, np.ones(len(sizes))]))
+    return float(count / total)
