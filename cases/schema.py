@@ -7,7 +7,19 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
-from .units import AngularSpeed, Density, Length, Rate, Ratio, SpecificHeat, Speed, Stress, Temperature, Time
+from .units import (
+    Acceleration,
+    AngularSpeed,
+    Density,
+    Length,
+    Rate,
+    Ratio,
+    SpecificHeat,
+    Speed,
+    Stress,
+    Temperature,
+    Time,
+)
 
 Axis = Literal["x", "y", "z"]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,63}$")]
@@ -216,6 +228,23 @@ class Turn(Model):
     centre: Point = (0.0, 0.0, 0.0)
 
 
+class Erosion(Model):
+    """Tets that are worn out leave the body: what lay behind them is laid bare, and meets other bodies from then on.
+
+    A tet leaves when any of the three is passed. Its elastic energy is booked as eroded.
+    """
+
+    plastic_strain: Annotated[Ratio, Positive] | None = None
+    """Largest effective plastic strain; none by default."""
+    volume: tuple[Annotated[Ratio, Field(gt=0, lt=1)], Annotated[Ratio, Field(gt=1)]] = (0.1, 10.0)
+    """Smallest and largest volume, of the initial one."""
+    time_step: Annotated[Ratio, Field(gt=0, lt=1)] = 0.02
+    """Smallest stable step of a tet, of the first step of the run."""
+    nodes: Literal["particles", "remove"] = "particles"
+    """What becomes of a node without tets: it flies on with its mass and meets faces, or it leaves with its mass,
+    momentum and energy, which are booked."""
+
+
 class Part(Model):
     """A body: where it is, what it is made of, how it moves at the start."""
 
@@ -228,6 +257,7 @@ class Part(Model):
     velocity: Velocity = (0.0, 0.0, 0.0)
     spin: Spin | None = None
     temperature: Annotated[Temperature, Field(ge=0)] = 293.15
+    erosion: Erosion | None = None
 
 
 class Symmetry(Model):
@@ -272,7 +302,15 @@ class Rotation(Model):
     spin: Spin
 
 
-Boundary = Annotated[Symmetry | Wall | Prescribed | Rotation, Field(discriminator="kind")]
+class Gravity(Model):
+    """A constant acceleration of all nodes of the parts, of all parts when ``parts`` is empty."""
+
+    kind: Literal["gravity"]
+    acceleration: tuple[Acceleration, Acceleration, Acceleration]
+    parts: tuple[Name, ...] = ()
+
+
+Boundary = Annotated[Symmetry | Wall | Prescribed | Rotation | Gravity, Field(discriminator="kind")]
 
 
 class ContactPair(Model):

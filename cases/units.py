@@ -40,7 +40,7 @@ UNITS: dict[str, tuple[float, Dimension]] = {
 
 KINDS: dict[Dimension, str] = {
     _NONE: "a plain number, without a unit", _LENGTH: "a length", _MASS: "a mass", _TIME: "a time",
-    _TEMPERATURE: "a temperature", _FREQUENCY: "a rate", (1, 0, -1, 0): "a speed", _STRESS: "a stress",
+    _TEMPERATURE: "a temperature", _FREQUENCY: "a rate", (1, 0, -1, 0): "a speed", (1, 0, -2, 0): "an acceleration", _STRESS: "a stress",
     (-3, 1, 0, 0): "a density", (2, 0, -2, -1): "a specific heat", (2, 0, -2, 0): "an energy per mass",
 }  # fmt: skip
 """What a quantity of a dimension is called."""
@@ -119,6 +119,7 @@ def _schema(unit: str) -> WithJsonSchema:
 Length = Annotated[float, _reader("m"), _schema("m")]
 Time = Annotated[float, _reader("s"), _schema("s")]
 Speed = Annotated[float, _reader("m/s"), _schema("m/s")]
+Acceleration = Annotated[float, _reader("m/s^2"), _schema("m/s^2")]
 Rate = Annotated[float, _reader("1/s"), _schema("1/s")]
 AngularSpeed = Annotated[float, _reader("rad/s"), _schema("rad/s")]
 Temperature = Annotated[float, _reader("K"), _schema("K")]
