@@ -40,7 +40,8 @@ UNITS: dict[str, tuple[float, Dimension]] = {
 
 KINDS: dict[Dimension, str] = {
     _NONE: "a plain number, without a unit", _LENGTH: "a length", _MASS: "a mass", _TIME: "a time",
-    _TEMPERATURE: "a temperature", _FREQUENCY: "a rate", (1, 0, -1, 0): "a speed", (1, 0, -2, 0): "an acceleration", _STRESS: "a stress",
+    _TEMPERATURE: "a temperature", _FREQUENCY: "a rate", (1, 0, -1, 0): "a speed",
+    (1, 0, -2, 0): "an acceleration", _STRESS: "a stress",
     (-3, 1, 0, 0): "a density", (2, 0, -2, -1): "a specific heat", (2, 0, -2, 0): "an energy per mass",
 }  # fmt: skip
 """What a quantity of a dimension is called."""
