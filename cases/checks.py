@@ -7,7 +7,7 @@ from itertools import chain
 from .geometry import AXES, bounds, centre, cut_directions, lowest_along, thinnest, whole_bounds
 from .library import library
 from .problems import Location, Problem, choices, dotted, nearest, problem
-from .schema import Box, Case, JohnsonCook, MeshFile, Part, Prescribed, Reference, Symmetry, Tube, Wall
+from .schema import Box, Case, Gravity, JohnsonCook, MeshFile, Part, Prescribed, Reference, Symmetry, Tube, Wall
 
 NEEDED: dict[str, frozenset[str]] = {
     "extent": frozenset({"part", "axis"}),
@@ -21,6 +21,7 @@ NEEDED: dict[str, frozenset[str]] = {
     "probe_min": frozenset({"probe"}),
     "contact_time": frozenset(),
     "contact_loss": frozenset(),
+    "penetration": frozenset({"part", "axis"}),
     "worst_residual": frozenset(),
 }
 """The keys that each reference quantity needs; the others of part, probe and axis are refused."""
@@ -57,6 +58,9 @@ def _parts(case: Case) -> Iterator[Problem]:
             message = f"must be below {law.melt_temperature} K, where {part.material} melts"
             yield problem(("parts", i, "temperature"), part.temperature, message)
         yield from _mesh(part, ("parts", i, "mesh"))
+        if law is None and part.erosion is not None and part.erosion.plastic_strain is not None:
+            message = f"{part.material} has no strength, so it never strains plastically; remove the key"
+            yield problem(("parts", i, "erosion", "plastic_strain"), part.erosion.plastic_strain, message)
         if part.turn is not None and not isinstance(part.mesh, MeshFile) and part.mesh.sector != "full":
             yield problem(
                 ("parts", i, "turn"), ..., f"a {part.mesh.sector} of a body cannot be turned; model all of it"
@@ -133,6 +137,8 @@ def _boundaries(case: Case) -> Iterator[Problem]:
                 yield problem(("boundaries", i, "parts", j), name, f"no part of this name; {nearest(name, names)}")
         if isinstance(boundary, Prescribed):
             yield from _prescribed(boundary, ("boundaries", i))
+        elif isinstance(boundary, Gravity) and not any(boundary.acceleration):
+            yield problem(("boundaries", i, "acceleration"), "0, 0, 0", "must not be zero")
 
 
 def _prescribed(boundary: Prescribed, location: Location) -> Iterator[Problem]:

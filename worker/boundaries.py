@@ -1,4 +1,4 @@
-"""Symmetry planes, rigid walls, prescribed motion: what acts on velocities between the kick and the move.
+"""Gravity, symmetry planes, rigid walls, prescribed motion: what acts on velocities between the kick and the move.
 
 Each books the work that it does on the body. An impulse at time n does it in two halves, with the velocity before and
 after: at time n only the first has been spent (the kinetic energy of the ledger is 1/2 m v(n-1/2) . v(n+1/2)), and the
@@ -99,7 +99,34 @@ class RigidWalls(Boundary):
         self.contact_loss -= 0.5 * (self._impulse * self._before).sum(axis=1)
 
 
-class PrescribedVelocity(Boundary):
+class Driver(Boundary):
+    """A boundary whose impulses are work from outside."""
+
+    def note(self, state: Nodes) -> None:
+        self._before = state.v[self.nodes]
+        self._book()
+
+    def _book(self) -> None:
+        self.external_work += 0.5 * (self._impulse * self._before).sum(axis=1)
+
+
+class Gravity(Driver):
+    """A constant ``acceleration`` (3,), m/s^2, over the mean step of the kick: free fall is exact at n and at n+1/2."""
+
+    def __init__(self, nodes: Indices, acceleration: Floats) -> None:
+        super().__init__(nodes)
+        self._acceleration = acceleration
+        self._last_dt = 0.0
+
+    def apply(self, state: Nodes, dt: float, t: float) -> None:
+        gained = 0.5 * (self._last_dt + dt) * self._acceleration
+        self._last_dt = dt
+        self._impulse = state.mass[self.nodes, None] * gained
+        state.v[self.nodes] += gained
+        self._book()
+
+
+class PrescribedVelocity(Driver):
     """Nodes whose velocity has given components; NaN leaves a component free."""
 
     def __init__(self, nodes: Indices, velocity: Floats) -> None:
@@ -118,18 +145,11 @@ class PrescribedVelocity(Boundary):
     def start(self, state: Nodes) -> None:
         state.v[self.nodes] = self._target(state, 0.0)
 
-    def note(self, state: Nodes) -> None:
-        self._before = state.v[self.nodes]
-        self._book()
-
     def apply(self, state: Nodes, dt: float, t: float) -> None:
         new = self._target(state, dt)
         self._impulse = state.mass[self.nodes, None] * (new - state.v[self.nodes])
         state.v[self.nodes] = new
         self._book()
-
-    def _book(self) -> None:
-        self.external_work += 0.5 * (self._impulse * self._before).sum(axis=1)
 
 
 class PrescribedRotation(PrescribedVelocity):
@@ -187,7 +207,8 @@ def _push_out(x, v, impulse, mass, nodes, points, normals, held, dt):  # type: i
 
 
 def build(case: schema.Case, model: Model, comm: Comm) -> list[Boundary]:
-    """The boundaries of a case on this rank's nodes; walls last, and they leave alone what has a prescribed motion.
+    """The boundaries of a case on this rank's nodes: gravity first, so that what is held stays held; walls last, and
+    they leave alone what has a prescribed motion.
 
     Raises InputError, on every rank alike, for a boundary that holds no node, a body that starts behind a wall, and
     motion prescribed across a symmetry plane.
@@ -199,6 +220,9 @@ def build(case: schema.Case, model: Model, comm: Comm) -> list[Boundary]:
         raise InputError(f"boundaries[{index}]: holds no node; check its place and its parts")
     pairs = list(zip(case.boundaries, held, strict=True))
     boundaries: list[Boundary] = [
+        Gravity(_indices(h), np.array(spec.acceleration)) for spec, h in pairs if isinstance(spec, schema.Gravity)
+    ]
+    boundaries += [
         SymmetryPlane(_indices(h), _AXES[spec.axis]) for spec, h in pairs if isinstance(spec, schema.Symmetry)
     ]
     for spec, h in pairs:

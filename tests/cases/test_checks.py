@@ -37,6 +37,8 @@ def test_the_rod_is_sound() -> None:
         (["boundaries[0].normal=[0, 0, 0]"], "boundaries[0].normal", "must not be zero"),
         (["boundaries[0].normal=[0, 0, -1]"], "boundaries[0]", "part 'rod' starts 0.03 m behind this wall"),
         (["boundaries[0].point=[0, 0, '1 mm']"], "boundaries[0]", "part 'rod' starts 0.001 m behind this wall"),
+        (["boundaries[0]={kind='gravity', acceleration=[0, 0, 0]}"], "boundaries[0].acceleration", "must not be zero"),
+        (["boundaries[0]={kind='gravity', acceleration=[0, 0, -1], parts=['road']}"], "boundaries[0].parts[0]", "'rod'"),
         (["boundaries[0]={kind='velocity'}"], "boundaries[0]", "prescribes nothing"),
         (["boundaries[0]={kind='velocity', x=1, low=[0, 0, 0]}"], "boundaries[0]", "give both low and high"),
         (["boundaries[0]={kind='velocity', x=1, low=[0, 0, 1], high=[1, 1, 0]}"], "boundaries[0].high[2]", "low[2]"),

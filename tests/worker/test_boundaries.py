@@ -1,4 +1,4 @@
-"""Walls push and never pull, symmetry planes hold, prescribed motion is exact; what they do is booked."""
+"""Walls push and never pull, planes hold, prescribed motion and free fall are exact; what they do is booked."""
 
 import math
 from typing import Any
@@ -6,15 +6,20 @@ from typing import Any
 import numpy as np
 import pytest
 
+from conoid.cases import schema
 from conoid.worker import step
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import WORK
+from conoid.worker.state import PRESSURE, S_ZZ, WORK, Flags
 
-from .kernels import COPPER, STEEL, around, build, run, scene
+from ..contact.bodies import meeting_of, moved
+from .kernels import COPPER, STEEL, Watch, around, build, run, scene
 from .meshes import Floats, block
 
 MESH = block((3, 3, 3), 1e-3, seed=2)
 TILTED = (1.0, -2.0, 3.0)
+BAR = schema.Material(density=7850.0, elastic=schema.Elastic(young=200e9, poisson=0.0))
+FALL = (2e6, -1e6, -3e7)
+GRAVITY: dict[str, Any] = {"kind": "gravity", "acceleration": FALL}
 
 
 def with_boundary(spec: dict[str, Any], end: float = 1e-6, **keys: Any) -> Simulation:
@@ -135,3 +140,105 @@ def test_the_last_boundary_has_the_last_word() -> None:
     step.prepare(sim)
     step.first_half(sim)
     assert (sim.model.nodes.v[:, 2] == -5.0).all()
+
+
+def uneven(watch: Watch) -> Watch:
+    """Makes every step another share of the stable one."""
+    random = np.random.default_rng(4)
+
+    def look(sim: Simulation, before: Floats) -> None:
+        watch(sim, before)
+        sim.clock._safety = random.uniform(0.2, 0.9)
+
+    return look
+
+
+def test_free_fall_is_exact_at_every_time() -> None:
+    """x(n) and v(n+1/2) of the centre of mass, of a body that rings, with steps of any size; the momentum is booked."""
+    sim = with_boundary(GRAVITY, velocity=(30.0, 0.0, -5.0), dt_growth=2.0)
+    nodes, g, flight = sim.model.nodes, np.array(FALL), np.array([30.0, 0.0, -5.0])
+    noise = np.random.default_rng(3).normal(size=nodes.v.shape) * 20.0
+    nodes.v += noise - np.average(noise, axis=0, weights=nodes.mass)
+    start, steps = np.average(nodes.x, axis=0, weights=nodes.mass), set()
+
+    def look(sim: Simulation, before: Floats) -> None:
+        t, dt = sim.clock.t, sim.clock.dt
+        centre, v = (np.average(values, axis=0, weights=nodes.mass) for values in (nodes.x, nodes.v))
+        assert np.abs(v - flight - g * (t + 0.5 * dt)).max() < 1e-12 * 40.0
+        assert np.abs(centre - start - flight * t - 0.5 * g * t * t).max() < 1e-12 * 1e-3
+        steps.add(dt)
+
+    run(sim, uneven(look))
+    assert len(steps) > 10
+    assert np.linalg.norm(g) * sim.clock.t > 20.0
+
+
+def test_the_ledger_of_a_free_fall_closes_to_round_off() -> None:
+    """Whatever the steps are; gravity has done 1/2 m v(n-1/2) . v(n+1/2), the kinetic energy of the ledger."""
+    sim = with_boundary(GRAVITY, dt_growth=2.0)
+    energy = 0.5 * float(sim.model.nodes.mass.sum()) * float(np.dot(FALL, FALL))
+    steps = set()
+
+    def look(sim: Simulation, before: Floats) -> None:
+        clock = sim.clock
+        line = sim.ledger.close(before)
+        expected = energy * (clock.t - 0.5 * clock.last_dt) * (clock.t + 0.5 * clock.dt)
+        assert line.external == pytest.approx(expected, rel=1e-12, abs=1e-12 * energy * 1e-12)
+        assert line.external == pytest.approx(line.kinetic, rel=1e-12)
+        steps.add(clock.dt)
+
+    run(sim, uneven(look))
+    assert len(steps) > 10
+    assert sim.ledger.worst < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("hold", "rows", "axes"),
+    [
+        ({"kind": "symmetry", "axis": "z", "at": 0.0}, MESH.points[:, 2] == 0.0, [2]),
+        ({"kind": "velocity", "low": (0.0, 0.0, 2.9e-3), "high": (1.0, 1.0, 1.0), "x": 1.0, "z": 7.0},
+         MESH.points[:, 2] > 2.9e-3, [0, 2]),
+    ],
+    ids=["plane", "prescribed"],
+)  # fmt: skip
+def test_gravity_does_not_move_what_is_held(hold: dict[str, Any], rows: Flags, axes: list[int]) -> None:
+    """Whichever comes first in the case; the ledger closes with the work of both."""
+    sim = build(scene(STEEL, end=5e-6, boundaries=(hold, GRAVITY)), [MESH])
+    held = [hold.get("xyz"[axis], 0.0) for axis in axes]
+
+    def look(sim: Simulation, before: Floats) -> None:
+        assert (sim.model.nodes.v[rows][:, axes] == held).all()
+        sim.ledger.close(before)
+
+    run(sim, look)
+    assert np.abs(sim.model.nodes.v[:, 1]).max() > 1.0
+    assert sim.ledger.worst < 1e-3
+
+
+def test_gravity_acts_on_its_parts_only() -> None:
+    boundaries = ({**GRAVITY, "parts": ("body1",)},)
+    sim = build(meeting_of([{}, {}], end=1e-7, boundaries=boundaries), [MESH, moved(MESH, (0.0, 0.0, 5e-3))])
+    run(sim)
+    nodes = sim.model.nodes
+    assert not nodes.v[nodes.part == 0].any()
+    assert nodes.v[nodes.part == 1] == pytest.approx(np.tile(np.array(FALL) * 1e-7, (len(MESH.points), 1)), rel=1e-9)
+
+
+def test_a_body_on_a_wall_carries_its_weight() -> None:
+    """Damped until it rests: the stress in the middle of each layer of tets is the weight above it."""
+    down = {"kind": "gravity", "acceleration": (0.0, 0.0, -1e6)}
+    boundaries = (
+        wall(0.0, (0.0, 0.0, 1.0)),
+        down,
+        {"kind": "symmetry", "axis": "x"},
+        {"kind": "symmetry", "axis": "y"},
+    )
+    mesh = block((2, 2, 4), 1e-3, shake=0.0)
+    sim = build(scene(BAR, end=1e-4, boundaries=boundaries, viscosity={"linear": 1.0}), [mesh])
+    run(sim)
+    centre = sim.model.nodes.x0[sim.model.blocks[0].tets, 2].mean(axis=1)
+    weight = 7850.0 * 1e6 * (4e-3 - centre)
+    stress = sim.model.blocks[0].row(S_ZZ) - sim.model.blocks[0].row(PRESSURE)
+    for layer in range(4):
+        inside = (centre > layer * 1e-3) & (centre < (layer + 1) * 1e-3)
+        assert stress[inside].mean() == pytest.approx(-weight[inside].mean(), rel=1e-3)
