@@ -1,0 +1,131 @@
+"""V18: Hertz's impact of two equal steel spheres; how force and duration grow with the speed.
+
+Theory: with R* = R / 2, E* = E / (2 (1 - nu^2)), m* = m / 2 and k = 4/3 E* sqrt(R*) the deepest approach is
+d = (5 m* v^2 / (4 k))^(2/5), the force k d^(3/2) ~ v^(6/5), the duration 2.9432 d / v ~ v^(-1/5), and the circle of
+contact has the radius sqrt(R* d). It takes the balls for half-spaces: measured exponents come nearer to it as the
+circle becomes small beside the ball.
+"""
+
+import math
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from conoid.cases import layout
+from conoid.cases.outcome import from_json
+
+pytestmark = pytest.mark.slow
+
+RADIUS, YOUNG, POISSON, DENSITY = 10e-3, 200e9, 0.3, 7850.0
+STIFFNESS = 4 / 3 * YOUNG / (2 * (1 - POISSON**2)) * math.sqrt(RADIUS / 2)
+MASS = DENSITY * 4 / 3 * math.pi * RADIUS**3 / 2
+FINE, COARSE = (0.08e-3, 0.5e-3), (0.1e-3, 0.7e-3)
+"""Size of the elements at the point of contact, and how far it reaches, m."""
+
+
+def approach(closing: float) -> float:
+    """Deepest, m, at a speed of closing, m/s."""
+    return float((5 * MASS * closing**2 / (4 * STIFFNESS)) ** 0.4)
+
+
+def force(closing: float) -> float:
+    """Largest, N."""
+    return STIFFNESS * approach(closing) ** 1.5
+
+
+def duration(closing: float) -> float:
+    """s."""
+    return 2.9432 * approach(closing) / closing
+
+
+def elements_across(closing: float, size: float) -> float:
+    """The circle of contact at its largest."""
+    return 2.0 * math.sqrt(RADIUS / 2 * approach(closing)) / size
+
+
+@dataclass(frozen=True)
+class Impact:
+    """What the run of an impact measured."""
+
+    force: float
+    """N, of whole spheres."""
+    time: float
+    """s."""
+    restitution: float
+    residual: float
+
+
+Impacts = Callable[[float, tuple[float, float]], Impact]
+
+
+@pytest.fixture(scope="module")
+def impacts(tmp_path_factory: pytest.TempPathFactory) -> Impacts:
+    """The shipped spheres at a speed of closing, m/s, and a mesh; each is run once."""
+    root, done = tmp_path_factory.mktemp("hertz"), dict[tuple[float, tuple[float, float]], Impact]()
+
+    def impact(closing: float, mesh: tuple[float, float]) -> Impact:
+        if (closing, mesh) not in done:
+            done[closing, mesh] = _run(root / f"{closing}_{mesh[0]}", closing, mesh)
+        return done[closing, mesh]
+
+    return impact
+
+
+def _run(folder: Path, closing: float, mesh: tuple[float, float]) -> Impact:
+    """200 samples of the mean force between them: the peak of a half wave is lowered by less than 1e-4."""
+    changes = [f"run.end_time={1.1 * duration(closing)}", "run.frames=0"]
+    for part, way in ((0, 1), (1, -1)):
+        changes += [
+            f"parts[{part}].velocity=[0, 0, {way * closing / 2}]", f"parts[{part}].mesh.element_size={mesh[0]}",
+            f"parts[{part}].mesh.grading.near={mesh[1]}",
+        ]  # fmt: skip
+    sets = [word for change in changes for word in ("--set", change)]
+    words = [sys.executable, "-m", "conoid.worker", "hertz_spheres", "--out", str(folder), *sets]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stderr
+    end = from_json((folder / layout.OUTCOME).read_bytes())
+    seen = {check.name.split()[0]: check.value for check in end.reference}
+    return Impact(4 * seen["probe_max"], seen["contact_time"], seen["speed_mean"] * 2 / closing, end.worst_residual)
+
+
+def exponent(values: tuple[float, float], speeds: tuple[float, float]) -> float:
+    """Of the power law through two points."""
+    return math.log(values[1] / values[0]) / math.log(speeds[1] / speeds[0])
+
+
+@pytest.mark.timeout(660)
+def test_at_low_speeds_the_exponents_are_those_of_the_law(impacts: Impacts) -> None:
+    """6/5 and -1/5 to 2 % each of itself, from 1 and 2 m/s; force to 5 %, duration to 3 %."""
+    speeds = (1.0, 2.0)
+    assert elements_across(speeds[0], FINE[0]) > 8.0
+    slow, fast = (impacts(speed, FINE) for speed in speeds)
+    for speed, seen in zip(speeds, (slow, fast), strict=True):
+        assert seen.force == pytest.approx(force(speed), rel=0.05)
+        assert seen.time == pytest.approx(duration(speed), rel=0.03)
+        assert 0.98 < seen.restitution <= 1.0
+        assert seen.residual < 1e-3
+    assert exponent((slow.force, fast.force), speeds) == pytest.approx(1.2, rel=0.02)
+    assert exponent((slow.time, fast.time), speeds) == pytest.approx(-0.2, rel=0.02)
+
+
+@pytest.mark.timeout(660)
+def test_up_to_four_times_the_speed_force_and_duration_follow_the_law(impacts: Impacts) -> None:
+    """F / v^(6/5) and T v^(1/5) stay within 2 % of each other at 2, 4 and 8 m/s on one mesh."""
+    speeds = (2.0, 4.0, 8.0)
+    assert elements_across(speeds[0], COARSE[0]) > 8.0
+    seen = [impacts(speed, COARSE) for speed in speeds]
+    forces = [impact.force / speed**1.2 for impact, speed in zip(seen, speeds, strict=True)]
+    times = [impact.time * speed**0.2 for impact, speed in zip(seen, speeds, strict=True)]
+    assert max(forces) < 1.02 * min(forces)
+    assert max(times) < 1.02 * min(times)
+
+
+def test_the_theory_gives_the_numbers_of_the_table() -> None:
+    assert force(1.0) == pytest.approx(985.9, rel=1e-4)
+    assert duration(1.0) == pytest.approx(61.35e-6, rel=1e-4)
+    assert force(10.0) == pytest.approx(15626, rel=1e-4)
+    assert duration(10.0) == pytest.approx(38.71e-6, rel=2e-4)
