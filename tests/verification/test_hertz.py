@@ -34,7 +34,7 @@ def approach(closing: float) -> float:
 
 def force(closing: float) -> float:
     """Largest, N."""
-    return STIFFNESS * approach(closing) ** 1.5
+    return float(STIFFNESS * approach(closing) ** 1.5)
 
 
 def duration(closing: float) -> float:
