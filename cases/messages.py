@@ -48,7 +48,7 @@ class Started(Message, frozen=True):
 class Energy(msgspec.Struct, kw_only=True, frozen=True):
     """The ledger, J: what is there and what was lost = initial + external, up to the residual.
 
-    There: kinetic, elastic. Lost: plastic, viscous, contact, friction.
+    There: kinetic, elastic. Lost: plastic, viscous, contact, friction, eroded.
     """
 
     kinetic: float
@@ -58,6 +58,8 @@ class Energy(msgspec.Struct, kw_only=True, frozen=True):
     contact: float
     """By impulses where bodies meet each other or a wall, without friction."""
     friction: float = 0.0
+    eroded: float = 0.0
+    """Elastic energy of tets that were taken out, and kinetic energy of nodes that left with them."""
     external: float
     initial: float
     residual: float
@@ -84,7 +86,8 @@ class Load(Message, frozen=True):
 
 
 class Counts(Message, frozen=True):
-    """How large the model is now. ``shared`` is the number of nodes on more than one rank."""
+    """How large the model is now. ``shared`` is the number of nodes on more than one rank, ``particles`` of those
+    that have lost all their tets and fly on."""
 
     channel: ClassVar[str] = "counts"
     elements: int
@@ -92,6 +95,7 @@ class Counts(Message, frozen=True):
     shared: int
     fragments: int
     elements_per_rank: list[int]
+    particles: int = 0
 
 
 class Frame(Message, frozen=True):

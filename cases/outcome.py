@@ -37,6 +37,8 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     digest: str = ""
     """sha256 over node and tet state in global-id order: equal for any number of ranks."""
     elements: int = 0
+    eroded: int = 0
+    """Tets that have left."""
     nodes_initial: int = 0
     nodes: int = 0
     fragments: int = 0

@@ -16,7 +16,7 @@ FIELD_UNITS: dict[str, str] = {
 
 QUANTITY_UNITS: dict[str, str] = {
     "extent": "m", "radius": "m", "plastic_strain_max": "", "temperature_max": "K", "speed_mean": "m/s",
-    "stress_max": "Pa", "contact_time": "s", "contact_loss": "", "worst_residual": "",
+    "stress_max": "Pa", "contact_time": "s", "contact_loss": "", "penetration": "m", "worst_residual": "",
 }  # fmt: skip
 """Unit of every reference quantity that does not read a probe."""
 

@@ -406,7 +406,7 @@ class Run(Model):
 
 Quantity = Literal[
     "extent", "radius", "plastic_strain_max", "temperature_max", "speed_mean", "stress_max",
-    "probe_mean", "probe_max", "probe_min", "contact_time", "contact_loss", "worst_residual",
+    "probe_mean", "probe_max", "probe_min", "contact_time", "contact_loss", "penetration", "worst_residual",
 ]  # fmt: skip
 
 
@@ -418,6 +418,8 @@ class Reference(Model):
     ``stress_max`` (largest |stress component|, Pa) over a part. ``speed_mean``: mass-mean velocity of a part along
     ``axis``, m/s. ``probe_*``: of a history column between ``since`` and ``until``. ``contact_time``: last time at
     which a wall or another body pushes, s. ``contact_loss``: energy lost by contact over the initial energy.
+    ``penetration``: how much of the thickness of all other parts along ``axis`` a part has opened round the axis
+    through the origin, m. Nodes without tets do not count for ``extent`` and ``radius``.
     ``worst_residual``: of the energy ledger.
     """
 
@@ -448,6 +450,11 @@ class Case(Model):
     numerics: Numerics = Numerics()
     run: Run
     reference: tuple[Reference, ...] = ()
+
+    @property
+    def erodes(self) -> bool:
+        """Whether tets may leave."""
+        return any(part.erosion is not None for part in self.parts)
 
     @property
     def in_contact(self) -> bool:

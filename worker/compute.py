@@ -33,6 +33,7 @@ def compute(
     history = History(folder, sim.probes.names) if comm.rank == 0 else None
     setup = time.monotonic() - began
     _announce(sim, journal, setup)
+    elements = sim.model.elements_global
     loop = Loop(sim, folder, journal, history, signals)
     cpu = time.thread_time()
     failure = None
@@ -44,7 +45,7 @@ def compute(
     sim.free()
     if history is not None:
         history.close()
-    return _sum_up(loop, folder, failure, cpu, setup, time.monotonic() - began)
+    return _sum_up(loop, folder, failure, elements, cpu, setup, time.monotonic() - began)
 
 
 def _announce(sim: Simulation, journal: Journal | None, setup: float) -> None:
@@ -54,7 +55,6 @@ def _announce(sim: Simulation, journal: Journal | None, setup: float) -> None:
     for block in model.blocks:
         sizes[block.part] += block.n
     log.info("%d tets, %d nodes here; set-up %.2f s", sizes.sum(), nodes.n, setup)
-    held = sim.comm.gather(int(sizes.sum()))
     parts = dict(zip(model.parts, (int(n) for n in sim.comm.sum(sizes)), strict=True))
     if journal is None:
         return
@@ -63,14 +63,10 @@ def _announce(sim: Simulation, journal: Journal | None, setup: float) -> None:
         messages.Started, ranks=sim.comm.size, elements=model.elements_global, nodes=model.nodes_global,
         end_time=sim.case.run.end_time, setup=setup, parts=parts,
     )  # fmt: skip
-    journal.write(
-        messages.Counts, elements=model.elements_global, nodes=model.nodes_global, shared=sim.shared_nodes,
-        fragments=len(parts), elements_per_rank=held or [],
-    )  # fmt: skip
 
 
 def _sum_up(
-    loop: Loop, folder: Path, failure: PhysicsError | None, cpu: float, setup: float, elapsed: float
+    loop: Loop, folder: Path, failure: PhysicsError | None, elements: int, cpu: float, setup: float, elapsed: float
 ) -> Outcome:
     sim = loop.sim
     seconds = sim.comm.gather(sim.timers.seconds)
@@ -81,13 +77,12 @@ def _sum_up(
     state, cause, message = STOPS[loop.stopped] if loop.stopped else (State.SUCCEEDED, None, "")
     if failure is not None:
         state, cause, message = State.FAILED, failure.cause, str(failure)
-    updates = sim.clock.step * sim.model.elements_global
     return Outcome(
         state=state, cause=cause, message=message, steps=sim.clock.step, time=sim.clock.t, ranks=sim.comm.size,
-        elapsed=elapsed, setup=setup, cpu=total_cpu, digest=hexdigest or "", elements=sim.model.elements_global,
-        nodes_initial=sim.model.nodes_global, nodes=sim.model.nodes_global, fragments=len(sim.model.parts),
-        energy=loop.energy, worst_residual=sim.ledger.worst,
+        elapsed=elapsed, setup=setup, cpu=total_cpu, digest=hexdigest or "", elements=elements,
+        eroded=elements - sim.model.elements_global, nodes_initial=sim.model.nodes_global, nodes=sim.model.nodes_global,
+        fragments=len(sim.model.parts), energy=loop.energy, worst_residual=sim.ledger.worst,
         phases={name: [s[name] for s in seconds] for name in PHASES} if seconds else {},
         peak_memory=memory or [],
-        element_updates_per_second=updates / total_cpu if total_cpu > 0.0 else 0.0, reference=checks,
+        element_updates_per_second=loop.updates / total_cpu if total_cpu > 0.0 else 0.0, reference=checks,
     )  # fmt: skip

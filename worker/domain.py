@@ -14,6 +14,7 @@ from conoid.cases import schema
 from conoid.cases.library import material as find_material
 
 from .contact import overlap, pairing
+from .elements import wear
 from .errors import InputError
 from .materials import models
 from .mesh.build import build as build_mesh
@@ -48,8 +49,8 @@ class Whole:
     tets: Indices
     tet_part: Indices
     volumes: Floats
-    exposed: Flags
-    """(tets, 4) faces that have no tet behind them, in scenes with contact; else (0, 4)."""
+    across: Indices
+    """(tets, 4) the tet behind each face, -1 where there is none, in scenes with contact; else (0, 4)."""
     node_volume: Floats
     mass: Floats
     velocity: Floats
@@ -71,8 +72,8 @@ class Piece:
     tet_part: Indices
     tets: Indices
     tet_volume: Floats
-    exposed: Flags
-    """(tets, 4) faces that have no tet behind them, in scenes with contact; else empty."""
+    across: Indices
+    """(tets, 4) global id of the tet behind each face, -1 where there is none, in scenes with contact; else (0, 4)."""
     border: Flags
     neighbours: list[Neighbour]
     totals: tuple[int, int, int]
@@ -99,13 +100,13 @@ def assemble(case: schema.Case, folder: Path) -> Whole:
     part_of_tet = np.concatenate(tet_part)
     volumes = _volumes(x, t)
     part_of_node = np.concatenate(node_part)
-    exposed = across(t) < 0 if case.in_contact else np.zeros((0, 4), bool)
+    behind = across(t) if case.in_contact else np.zeros((0, 4), np.int32)
     if case.in_contact:
-        x = _apart(case, x, t, part_of_node, exposed)
+        x = _apart(case, x, t, part_of_node, behind < 0)
         volumes = _volumes(x, t)
     return Whole(
         points=x, node_part=part_of_node, tets=t, tet_part=part_of_tet, volumes=volumes,
-        exposed=exposed,
+        across=behind,
         node_volume=_quarters(t, volumes, len(x)), mass=_quarters(t, volumes * np.array(density)[part_of_tet], len(x)),
         velocity=_velocities(case, x, part_of_node),
     )  # fmt: skip
@@ -207,7 +208,7 @@ def _piece(
         nodes.astype(np.int64), whole.node_part[nodes], home[nodes], home[nodes] == rank, whole.points[nodes],
         whole.velocity[nodes], whole.mass[nodes], whole.node_volume[nodes], ids.astype(np.int64),
         whole.tet_part[ids], local[tets], whole.volumes[ids],
-        whole.exposed[ids] if len(whole.exposed) else whole.exposed, np.any(shared[tets], axis=1), neighbours, totals,
+        whole.across[ids] if len(whole.across) else whole.across, np.any(shared[tets], axis=1), neighbours, totals,
         np.searchsorted(whole.tet_part, np.arange(whole.tet_part[-1] + 1)), float(np.abs(whole.points).max()),
     )  # fmt: skip
 
@@ -241,6 +242,7 @@ def _model(case: schema.Case, piece: Piece) -> Model:
 
 def _block(case: schema.Case, piece: Piece, index: int) -> Block:
     part, chosen = case.parts[index], np.flatnonzero(piece.tet_part == index)
+    wears = part.erosion is not None
     material = find_material(case, part.material)
     chosen = chosen[np.argsort(~piece.border[chosen], kind="stable")]
     rows = models.rows_of(material, case.numerics.pressure)
@@ -262,4 +264,6 @@ def _block(case: schema.Case, piece: Piece, index: int) -> Block:
         kind=models.strength_of(material), eos=models.eos_of(material),
         params=models.parameters(material, case.numerics.viscosity),
         border_chunks=-(-int(piece.border[chosen].sum()) // CHUNK), temperature=part.temperature,
+        across=piece.across[chosen] if len(piece.across) else piece.across,
+        worn=np.zeros(n if wears else 0, bool), life=wear.life(part.erosion),
     )  # fmt: skip

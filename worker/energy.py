@@ -13,6 +13,7 @@ from conoid.cases.messages import Energy
 from .boundaries import Boundary
 from .clock import Clock
 from .contact.stage import Contact
+from .erosion import Erosion
 from .parallel.comm import Comm
 from .parallel.fixed_point import exact_sums
 from .state import WORK, WORK_PLASTIC, WORK_VISCOUS, Floats, Model
@@ -22,11 +23,13 @@ class Ledger:
     """Sums the accounts of all ranks; the first call sets the initial energy."""
 
     def __init__(
-        self, model: Model, boundaries: list[Boundary], contact: Contact | None, comm: Comm, clock: Clock
-    ) -> None:
+        self, model: Model, boundaries: list[Boundary], contact: Contact | None, erosion: Erosion | None, comm: Comm,
+        clock: Clock,
+    ) -> None:  # fmt: skip
         self._model = model
         self._boundaries = boundaries
         self._contact = contact
+        self._erosion = erosion
         self._comm = comm
         self._clock = clock
         nodes = model.nodes
@@ -36,7 +39,9 @@ class Ledger:
         self.lost = 0.0
         """Share of the initial energy that contact has taken, friction included, at the last call."""
         self.momentum = np.zeros(3)
-        """Linear momentum at the last call, kg m/s."""
+        """Linear momentum at the last call, kg m/s, that of what has left included."""
+        self.eroded_mass = 0.0
+        """kg; of nodes that have left, at the last call."""
 
     def close(self, before: Floats) -> Energy:
         """The ledger at time n; ``before`` is v(n-1/2), the model holds v(n+1/2)."""
@@ -48,22 +53,34 @@ class Ledger:
         columns = np.column_stack([kinetic, loss, external, momentum])[nodes.owned]
         node_sums = exact_sums(self._comm, np.ascontiguousarray(columns))
         work, viscous, plastic = exact_sums(self._comm, self._element_work())
-        self.momentum = node_sums[3:6]
+        gone_work, gone_viscous, gone_plastic, gone_kinetic, gone_momentum = self._gone()
+        self.momentum = node_sums[3:6] + gone_momentum
         self.lost = float(node_sums[1]) / self.initial if self.initial > 0.0 else 0.0
         kinetic_sum, loss_sum, external_sum = (float(v) for v in node_sums[:3])
-        total = kinetic_sum + float(work) + float(viscous) + loss_sum
+        eroded = gone_work - gone_plastic + gone_kinetic
+        plastic_sum, viscous_sum = float(plastic) + gone_plastic, float(viscous) + gone_viscous
+        total = kinetic_sum + float(work - plastic) + plastic_sum + viscous_sum + loss_sum + eroded
         friction = self._contact.friction_work() if self._contact is not None else 0.0
         scale = max(self.initial, abs(external_sum), abs(float(work)), abs(kinetic_sum))
         residual = abs(total - self.initial - external_sum) / scale if scale > 0.0 else 0.0
         self.worst = max(self.worst, residual)
         return Energy(
-            kinetic=kinetic_sum, elastic=float(work - plastic), plastic=float(plastic), viscous=float(viscous),
-            contact=loss_sum - friction, friction=friction, external=external_sum, initial=self.initial,
-            residual=residual,
+            kinetic=kinetic_sum, elastic=float(work - plastic), plastic=plastic_sum, viscous=viscous_sum,
+            contact=loss_sum - friction, friction=friction, eroded=eroded, external=external_sum,
+            initial=self.initial, residual=residual,
         )  # fmt: skip
 
     def _node_sum(self, values: Floats) -> float:
         return float(exact_sums(self._comm, values[self._model.nodes.owned][:, None])[0])
+
+    def _gone(self) -> tuple[float, float, float, float, Floats]:
+        """Work, viscous and plastic work of eroded tets, J; energy, J, and momentum, kg m/s, of eroded nodes."""
+        if self._erosion is None:
+            return 0.0, 0.0, 0.0, 0.0, np.zeros(3)
+        work, viscous, plastic = self._erosion.work()
+        kinetic, mass, *momentum = self._erosion.nodal()
+        self.eroded_mass = float(mass)
+        return float(work), float(viscous), float(plastic), float(kinetic), np.array(momentum)
 
     def _boundary_work(self) -> tuple[Floats, Floats]:
         n = self._model.nodes.n

@@ -65,9 +65,11 @@ class Loop:
         self._signals = signals
         self._sample = 0
         self._began = self._reported = time.monotonic()
-        self._reported_step = 0
+        self.updates = self._reported_updates = 0
+        """Tets times steps so far."""
         self._pace = Pace(self._began)
         self._logged = -math.inf
+        self._counted = 0
 
     def run(self) -> None:
         """Steps until the end time, or until a reason to stop. Raises PhysicsError."""
@@ -84,6 +86,7 @@ class Loop:
                     self._tell(messages.Status, state=State.STOPPING, message=STOPS[self.stopped][2])
                 self._report()
                 return
+            self.updates += sim.model.elements_global
             step.second_half(sim)
 
     def _first_half(self) -> None:
@@ -140,25 +143,39 @@ class Loop:
         with sim.timers.phase("output"):
             limiter = sim.limiter()
             loads = sim.comm.gather(sim.timers.since_last())
+            self._count()
         if loads is None:
             return
         now = time.monotonic()
         if now - self._logged > _LOG_EVERY:
             self._logged = now
             log.info("step %d, t %.4g s, dt %.3g s, %s", clock.step, clock.t, clock.dt, limiter)
-        steps, elapsed = clock.step - self._reported_step, now - self._reported
+        elapsed = now - self._reported
         busy = [load["elements"] + load["nodes"] for load in loads]
         self._pace.add(clock.t, now)
         if self.energy is not None:
             self._tell(
                 messages.Progress, end_time=sim.case.run.end_time, dt=clock.dt, limiter=limiter,
                 eta=self._pace.left(sim.case.run.end_time - clock.t), energy=self.energy,
-                updates_per_second=steps * sim.model.elements_global / elapsed,
+                updates_per_second=(self.updates - self._reported_updates) / elapsed,
             )  # fmt: skip
         mean = sum(busy) / len(busy)
         phases = {name: [load[name] for load in loads] for name in loads[0]}
         self._tell(messages.Load, phases=phases, imbalance=max(busy) / mean if mean > 0.0 else 1.0)
-        self._reported, self._reported_step = now, clock.step
+        self._reported, self._reported_updates = now, self.updates
+
+    def _count(self) -> None:
+        """How large the model is, when that has changed; all ranks take part."""
+        sim, model = self.sim, self.sim.model
+        if model.elements_global == self._counted:
+            return
+        self._counted = model.elements_global
+        held = sim.comm.gather(sum(block.n for block in model.blocks))
+        self._tell(
+            messages.Counts, elements=model.elements_global, nodes=model.nodes_global, shared=sim.shared_nodes,
+            fragments=len(model.parts), elements_per_rank=held or [],
+            particles=sim.erosion.particles if sim.erosion is not None else 0,
+        )  # fmt: skip
 
     def _tell(self, kind: type[messages.Message], **fields: Any) -> None:
         if self._journal is not None:

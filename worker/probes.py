@@ -1,5 +1,7 @@
 """Probes: mass-weighted means of a field over chosen tets, as columns of history.csv."""
 
+import math
+
 import numpy as np
 
 from conoid.cases.schema import Case, Probe
@@ -75,6 +77,7 @@ class Probes:
         self._model = model
         self._comm = comm
         self._chosen = [[_inside(probe, block, model) for block in model.blocks] for probe in case.probes]
+        """Global ids of the tets that each probe has in each block."""
         counts = comm.sum(np.array([sum(len(c) for c in chosen) for chosen in self._chosen], np.int64))
         for index in np.flatnonzero(counts == 0):
             raise InputError(
@@ -82,7 +85,7 @@ class Probes:
             )
 
     def measure(self) -> Floats:
-        """(probes,) the present values, equal on any number of ranks."""
+        """(probes,) the present values, equal on any number of ranks; NaN when all tets of a probe have left."""
         if not self.names:
             return np.zeros(0)
         forces = self._forces()
@@ -92,7 +95,7 @@ class Probes:
                 values.append(float(forces[part, _FORCE[name]]))
             else:
                 total, mass = exact_sums(self._comm, self._sums(name, chosen))
-                values.append(float(total / mass))
+                values.append(float(total / mass) if mass > 0.0 else math.nan)
         return np.array(values)
 
     def _forces(self) -> Floats:
@@ -106,7 +109,8 @@ class Probes:
 
     def _sums(self, name: str, chosen: list["np.ndarray"]) -> Floats:
         columns = [np.zeros((0, 2))]
-        for block, inside in zip(self._model.blocks, chosen, strict=True):
+        for block, ids in zip(self._model.blocks, chosen, strict=True):
+            inside = np.flatnonzero(np.isin(block.id, ids)) if len(ids) else ids
             if len(inside):
                 mass = block.row(MASS)[inside]
                 columns.append(np.column_stack([field(block, name, self._model)[inside] * mass, mass]))
@@ -117,6 +121,7 @@ def _inside(probe: Probe, block: Block, model: Model) -> "np.ndarray":
     if model.parts[block.part] != probe.part:
         return np.zeros(0, np.int64)
     if probe.low is None or probe.high is None:
-        return np.arange(block.n)
+        return block.id.copy()
     centres = model.nodes.x0[block.tets].mean(axis=1)
-    return np.flatnonzero(((centres >= np.array(probe.low)) & (centres <= np.array(probe.high))).all(axis=1))
+    inside = ((centres >= np.array(probe.low)) & (centres <= np.array(probe.high))).all(axis=1)
+    return np.asarray(block.id[inside])

@@ -15,7 +15,7 @@ from .parallel.comm import Comm
 from .parallel.fixed_point import exact_sums
 from .probes import field
 from .simulation import Simulation
-from .state import Block
+from .state import Block, Floats, Tets
 
 _AXES = {"x": 0, "y": 1, "z": 2}
 _STRESSES = ("stress_xx", "stress_yy", "stress_zz", "stress_yz", "stress_zx", "stress_xy")
@@ -53,16 +53,13 @@ def _measured(sim: Simulation, spec: Reference, folder: Path) -> float:
         return _mean_speed(sim, spec)
     if quantity in ("extent", "radius"):
         return _size(sim, spec)
+    if quantity == "penetration":
+        return _penetration(sim, spec)
     return _largest(sim, spec)
 
 
 def _maximum(comm: Comm, values: npt.ArrayLike) -> float:
     return float(comm.maximum(np.array([np.max(values, initial=-np.inf)]))[0])
-
-
-def _nodes(sim: Simulation, part: str | None) -> "np.ndarray":
-    nodes = sim.model.nodes
-    return np.ones(nodes.n, bool) if part is None else nodes.part == sim.model.parts.index(part)
 
 
 def _blocks(sim: Simulation, part: str | None) -> list[Block]:
@@ -71,7 +68,8 @@ def _blocks(sim: Simulation, part: str | None) -> list[Block]:
 
 def _size(sim: Simulation, spec: Reference) -> float:
     axis = _AXES[spec.axis or "z"]
-    x = sim.model.nodes.x[_nodes(sim, spec.part)]
+    corners = [np.zeros(0, np.uint32), *(block.tets.reshape(-1) for block in _blocks(sim, spec.part))]
+    x = sim.model.nodes.x[np.concatenate(corners)]
     if spec.quantity == "extent":
         return _maximum(sim.comm, x[:, axis]) + _maximum(sim.comm, -x[:, axis])
     across = np.delete(x, axis, axis=1)
@@ -80,7 +78,7 @@ def _size(sim: Simulation, spec: Reference) -> float:
 
 def _mean_speed(sim: Simulation, spec: Reference) -> float:
     nodes = sim.model.nodes
-    chosen = _nodes(sim, spec.part) & nodes.owned
+    chosen = nodes.owned if spec.part is None else nodes.owned & (nodes.part == sim.model.parts.index(spec.part))
     mass = nodes.mass[chosen]
     momentum, total = exact_sums(sim.comm, np.column_stack([mass * nodes.v[chosen, _AXES[spec.axis or "z"]], mass]))
     return float(momentum / total)
@@ -88,8 +86,56 @@ def _mean_speed(sim: Simulation, spec: Reference) -> float:
 
 def _largest(sim: Simulation, spec: Reference) -> float:
     names = _STRESSES if spec.quantity == "stress_max" else (spec.quantity.removesuffix("_max"),)
-    values = [float(np.abs(field(b, name, sim.model)).max()) for b in _blocks(sim, spec.part) for name in names]
+    values = [
+        float(np.abs(field(b, name, sim.model)).max(initial=0.0)) for b in _blocks(sim, spec.part) for name in names
+    ]
     return _maximum(sim.comm, values)
+
+
+_LINES = (0.1, 0.3, 0.5)
+"""Distances from the axis, of the radius of the part, at which the thickness that is left is measured."""
+
+
+def _penetration(sim: Simulation, spec: Reference) -> float:
+    """The thickness of the other parts less the mean of what lines along the axis still pass of them, m.
+
+    The lines lie between the two directions across the axis, where every sector of a body is modelled.
+    """
+    nodes, axis = sim.model.nodes, _AXES[spec.axis or "z"]
+    own = nodes.part == sim.model.parts.index(spec.part or "")
+    radius, top, bottom = sim.comm.maximum(np.array([
+        np.hypot(*np.delete(nodes.x0[own], axis, axis=1).T).max(initial=0.0),
+        nodes.x0[~own, axis].max(initial=-np.inf), -nodes.x0[~own, axis].min(initial=np.inf),
+    ]))  # fmt: skip
+    others = [block for block in sim.model.blocks if sim.model.parts[block.part] != spec.part]
+    chords = [np.zeros((0, len(_LINES)))]
+    for block in others:
+        at = [float(share * radius / np.sqrt(2.0)) for share in _LINES]
+        chords.append(np.column_stack([chord_lengths(nodes.x, block.tets, axis, (c, c)) for c in at]))
+    return float(top + bottom - exact_sums(sim.comm, np.concatenate(chords)).mean())
+
+
+def chord_lengths(x: Floats, tets: Tets, axis: int, at: tuple[float, float]) -> Floats:
+    """(n,) length of a line along ``axis`` inside each tet, m; ``at``: where it passes the two directions across."""
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    low, high = (f(f(x[tets[:, 0]], x[tets[:, 1]]), f(x[tets[:, 2]], x[tets[:, 3]])) for f in (np.minimum, np.maximum))
+    met = np.flatnonzero(
+        (low[:, i] <= at[0]) & (high[:, i] >= at[0]) & (low[:, j] <= at[1]) & (high[:, j] >= at[1])
+    )  # fmt: skip
+    corners = x[tets[met]]
+    point = np.zeros(3)
+    point[i], point[j] = at
+    inverse = np.linalg.inv(corners[:, 1:] - corners[:, :1])
+    start = np.einsum("pi,pij->pj", point - corners[:, 0], inverse)
+    start = np.column_stack([1.0 - start.sum(axis=1), start])
+    slope = np.column_stack([-inverse[:, axis].sum(axis=1), inverse[:, axis]])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        crossing = -start / slope
+    enters = np.where(slope > 0.0, crossing, np.where((slope == 0.0) & (start < 0.0), np.inf, -np.inf)).max(axis=1)
+    leaves = np.where(slope < 0.0, crossing, np.inf).min(axis=1)
+    lengths = np.zeros(len(tets))
+    lengths[met] = np.maximum(leaves - enters, 0.0)
+    return lengths
 
 
 def _probe(folder: Path, spec: Reference) -> float:

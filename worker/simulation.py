@@ -1,5 +1,6 @@
 """What a case needs, built once: the model, its pressure form, its boundaries, its accounts. The step uses it."""
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -14,7 +15,8 @@ from .clock import Clock
 from .contact.stage import Contact
 from .elements.forms import AveragedElements, Elements
 from .energy import Ledger
-from .materials.models import BULK, moduli
+from .erosion import Erosion
+from .materials.models import BULK, DENSITY, SHEAR, moduli
 from .parallel import fixed_point
 from .parallel.comm import Comm
 from .probes import Probes
@@ -29,10 +31,10 @@ _SMALLEST_STRAIN = 1e-12
 class Vote:
     """What the ranks agree on in a step: a maximum over int64 words. Bits of non-negative floats order like floats."""
 
-    words: Ints = field(default_factory=lambda: np.zeros(5, np.int64))
+    words: Ints = field(default_factory=lambda: np.zeros(6, np.int64))
     """0: one over the stable step; 1: largest force (both as bits); 2: reason to stop; 3: rank 0 wants a report; 4: a
-    search for contact is due."""
-    result: Ints = field(default_factory=lambda: np.zeros(5, np.int64))
+    search for contact is due; 5: tets are worn out."""
+    result: Ints = field(default_factory=lambda: np.zeros(6, np.int64))
 
     @property
     def limit(self) -> float:
@@ -59,6 +61,11 @@ class Vote:
         """Whether some rank's surface has used up the last search for contact."""
         return bool(self.result[4])
 
+    @property
+    def worn(self) -> int:
+        """What was found of worn-out tets (elements/wear.py)."""
+        return int(self.result[5])
+
 
 @dataclass
 class Simulation:
@@ -69,8 +76,9 @@ class Simulation:
     model: Model
     elements: Elements
     boundaries: list[Boundary]
-    """In the order in which they act; contact is one of them."""
+    """In the order in which they act; erosion and contact are among them."""
     contact: Contact | None
+    erosion: Erosion | None
     clock: Clock
     ledger: Ledger
     probes: Probes
@@ -130,26 +138,32 @@ def build(case: Case, folder: Path, comm: Comm) -> Simulation:
         boundary.start(model.nodes)
     run, numerics = case.run, case.numerics
     clock = Clock(run.end_time, numerics.dt_safety, numerics.dt_growth, run.frames)
-    contact = _contact(case, model, piece, scene, comm, clock, timers) if case.in_contact else None
-    if contact is not None:
-        scene.insert(sum(not isinstance(bound, RigidWalls) for bound in scene), contact)
+    extremes = _extremes(model, comm)
+    contact, erosion = None, None
+    if case.in_contact:
+        contact = Contact(case, model, piece.neighbours, scene, comm, clock, timers, extremes)
+    if case.erodes:
+        erosion = Erosion(case, model, piece.neighbours, contact, comm, clock, extremes)
+    walls = sum(not isinstance(bound, RigidWalls) for bound in scene)
+    scene[walls:walls] = [bound for bound in (erosion, contact) if bound is not None]
     probes = Probes(case, model, contact, clock, comm)
     elements = _elements(case, model, piece, comm, timers)
     floor = _force_floor(model, comm)
     return Simulation(
-        case=case, comm=comm, model=model, elements=elements, boundaries=scene, contact=contact,
-        clock=clock,
-        ledger=Ledger(model, scene, contact, comm, clock), probes=probes, timers=timers,
+        case=case, comm=comm, model=model, elements=elements, boundaries=scene, contact=contact, erosion=erosion,
+        clock=clock, ledger=Ledger(model, scene, contact, erosion, comm, clock), probes=probes, timers=timers,
         shared_nodes=piece.totals[2], floor=floor,
     )  # fmt: skip
 
 
-def _contact(
-    case: Case, model: Model, piece: domain.Piece, scene: list[Boundary], comm: Comm, clock: Clock, timers: Timers
-) -> Contact:
-    rows = [piece.exposed[np.searchsorted(piece.tet_ids, block.id)] for block in model.blocks]
-    exposed = np.concatenate([piece.exposed[:0], *rows])
-    return Contact(case, model, exposed, piece.neighbours, scene, comm, clock, timers)
+def _extremes(model: Model, comm: Comm) -> tuple[float, float]:
+    """The largest nodal mass, kg, and the largest of wave speed and velocity, m/s."""
+    speeds = [float(np.linalg.norm(model.nodes.v, axis=1).max(initial=0.0))]
+    for block in model.blocks:
+        p = block.params
+        speeds.append(math.sqrt((p[BULK] + 4.0 / 3.0 * p[SHEAR]) / p[DENSITY]))
+    largest, fastest = comm.maximum(np.array([float(model.nodes.mass.max(initial=0.0)), max(speeds)]))
+    return float(largest), float(fastest)
 
 
 def _elements(case: Case, model: Model, piece: domain.Piece, comm: Comm, timers: Timers) -> Elements:

@@ -101,11 +101,17 @@ class Block:
     border_chunks: int = 0
     temperature: float = 293.15
     """Initial temperature, K; it stays where no material of the block heats up."""
+    across: Indices = field(default_factory=lambda: np.zeros((0, 4), np.int32))
+    """(n, 4) global id of the tet behind each face, -1 for an exposed face; (0, 4) in scenes without contact."""
+    worn: Flags = field(default_factory=lambda: np.zeros(0, bool))
+    """(n,) tets that are about to leave; (0,) where the part does not erode."""
+    life: Floats = field(default_factory=lambda: np.zeros(4))
+    """What a tet lives through (elements/wear.py)."""
 
     @property
     def chunks(self) -> int:
         """Number of chunks."""
-        return int(self.state.shape[0])
+        return -(-self.n // CHUNK)
 
     def row(self, row: int) -> Floats:
         """(n,) copy of one row of the state."""
@@ -114,6 +120,19 @@ class Block:
     def has(self, row: int) -> bool:
         """Whether the block carries that row."""
         return row < int(self.state.shape[1])
+
+    def drop(self, gone: Ints) -> None:
+        """Takes the tets at these places out; the last ones move into the holes."""
+        left = self.n - len(gone)
+        holes, movers = gone[gone < left], np.setdiff1d(np.arange(left, self.n), gone)
+        for table in (self.tets, self.id, self.across, self.worn):
+            if len(table):
+                table[holes] = table[movers]
+        self.state[holes // CHUNK, :, holes % CHUNK] = self.state[movers // CHUNK, :, movers % CHUNK]
+        self.n = left
+        self.tets, self.id = self.tets[:left], self.id[:left]
+        self.across, self.worn = self.across[:left], self.worn[:left]
+        self.border_chunks = min(self.border_chunks, self.chunks)
 
 
 @dataclass
@@ -124,6 +143,7 @@ class Model:
     blocks: list[Block] = field(default_factory=list)
     parts: list[str] = field(default_factory=list)
     elements_global: int = 0
+    """Tets of all ranks that are left."""
     nodes_global: int = 0
     part_starts: Ints = field(default_factory=lambda: np.zeros(1, np.int64))
     """Global id of the first tet of each part."""

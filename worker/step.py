@@ -30,6 +30,8 @@ from .simulation import Simulation
 def prepare(sim: Simulation) -> None:
     """Forces and limits of the initial state: a pass over the elements in no time at all."""
     _elements(sim, 0.0)
+    if sim.erosion is not None:
+        sim.erosion.begin(sim.vote.limit)
 
 
 def first_half(sim: Simulation) -> None:
@@ -41,7 +43,7 @@ def first_half(sim: Simulation) -> None:
             raise PhysicsError(
                 f"{_when(sim)}: {sim.limiting_tet()} is crushed; the stable step is {clock.stable:.3g} s"
             )
-        for boundary in sim.boundaries:
+        for boundary in sim.boundaries:  # worn-out tets leave here, before contact looks at the surface
             boundary.note(nodes)
         kick(nodes.v, nodes.force, nodes.mass, mean_dt / sim.scale)  # 2: v*(n+1/2) = v(n-1/2) + dt f(n) / m
         for boundary in sim.boundaries:  # 3: v(n+1/2)
@@ -66,7 +68,7 @@ def _elements(sim: Simulation, dt: float) -> None:
     with sim.timers.phase("elements"):
         elements.advance(dt, sim.scale)
     with sim.timers.phase("exchange"):
-        vote.words[0], vote.words[1] = elements.peaks[0], elements.peaks[2]
+        vote.words[0], vote.words[1], vote.words[5] = elements.peaks[0], elements.peaks[2], elements.peaks[3]
         pending = sim.comm.begin_maximum(vote.words, vote.result)
         elements.finish()
         pending.finish()
@@ -74,6 +76,8 @@ def _elements(sim: Simulation, dt: float) -> None:
         raise PhysicsError(f"{_when(sim)}: {sim.limiting_tet()} turned inside out, or its stress is not a number")
     if sim.contact is not None:
         sim.contact.due |= vote.search
+    if sim.erosion is not None:
+        sim.erosion.decide(vote.worn)
     if fixed_point.outgrown(vote.force, sim.scale):
         sim.scale = fixed_point.scale_for(vote.force)
         with sim.timers.phase("elements"):

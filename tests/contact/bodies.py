@@ -59,9 +59,8 @@ def surface_of(
     piece: domain.Piece, model: Model, comm: Comm | None = None, planes: Flags | None = None, edges: bool = True
 ) -> Surface:
     """The surface of a rank's piece; ``planes`` (nodes, 3): nodes on symmetry planes."""
-    rows = [piece.exposed[np.searchsorted(piece.tet_ids, block.id)] for block in model.blocks]
     on_planes = np.zeros((model.nodes.n, 3), bool) if planes is None else planes
-    return surface.build(model, np.concatenate(rows), on_planes, piece.neighbours, comm or SerialComm(), edges)
+    return surface.build(model, on_planes, piece.neighbours, comm or SerialComm(), edges)
 
 
 def crowd_of(x: Floats, v: Floats | None = None, part: Indices | None = None) -> Crowd:

@@ -24,13 +24,19 @@ class Flight:
         self, found: Surface, nodes: Nodes, mobility: Floats, skin: float, neighbours: list[Neighbour], comm: Comm
     ) -> None:
         """``mobility`` (nodes, 3): see records.Crowd; ``skin``: of the typical size of a face."""
-        self._found, self._mobility, self._neighbours, self._comm = found, mobility, neighbours, comm
-        self._face_nodes = np.searchsorted(nodes.id, found.faces.nodes[:, :3]).astype(np.int32).reshape(-1, 3)
+        self._mobility, self._neighbours, self._comm = mobility, neighbours, comm
         self.size = _typical(found.faces.size, comm)
-        """Of the faces of all ranks, m."""
-        self.sides = self._whole(nodes, skin * self.size)
-        """What this rank has of the surface."""
+        """Of the faces of all ranks at the start, m."""
+        self._skin = skin * self.size
+        self.follow(found, nodes)
         self._x, self._v, self._t, self._until = nodes.x, nodes.v, 0.0, 0.0
+
+    def follow(self, found: Surface, nodes: Nodes) -> None:
+        """Takes a new surface; all ranks take part."""
+        self._found = found
+        self._face_nodes = np.searchsorted(nodes.id, found.faces.nodes[:, :3]).astype(np.int32).reshape(-1, 3)
+        self.sides = self._whole(nodes)
+        """What this rank has of the surface."""
 
     def begin(self, nodes: Nodes, t: float, until: float) -> None:
         """Free flight from time ``t`` on, good to the time ``until``, s."""
@@ -41,19 +47,19 @@ class Flight:
         if t + dt > self._until:
             return True
         far = _strayed(nodes.x, nodes.v, self._x, self._v, self._found.flags, dt, t + dt - self._t)
-        return bool(far > (_SPENT * self.sides.skin) ** 2)
+        return bool(far > (_SPENT * self._skin) ** 2)
 
     def _here(self, nodes: Nodes) -> Crowd:
         every = np.arange(nodes.n, dtype=np.int32)
         return Crowd(nodes.id, every, nodes.owner, nodes.part, self._mobility, nodes.x, nodes.v)
 
-    def _whole(self, nodes: Nodes, skin: float) -> Sides:
+    def _whole(self, nodes: Nodes) -> Sides:
         found, here = self._found, self._here(nodes)
         used = found.flags.copy()
         used[np.searchsorted(nodes.id, found.faces.nodes.reshape(-1))] = True
         far = ghosts.fetch(found.far, found.far_owner, here, self._comm)
         slaves = nodes.id[found.flags & nodes.owned]
-        return Sides(found.faces, found.edges, merged([here.take(used), far]), slaves, skin)
+        return Sides(found.faces, found.edges, merged([here.take(used), far]), slaves, self._skin)
 
     def refresh(self, nodes: Nodes) -> None:
         """Positions and velocities of the surface as they are."""

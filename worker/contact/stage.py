@@ -5,8 +5,6 @@ surfaces make that possible. The impulses on a node are completed over all ranks
 everybody ends with the same velocity, to the bit.
 """
 
-import math
-
 import numpy as np
 from numba import njit
 
@@ -14,11 +12,10 @@ from conoid.cases.schema import Case
 
 from ..boundaries import Boundary, PrescribedVelocity, SymmetryPlane
 from ..clock import Clock
-from ..materials.models import BULK, DENSITY, SHEAR
 from ..parallel import fixed_point
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
-from ..state import Flags, Floats, Model, Nodes
+from ..state import Flags, Floats, Ints, Model, Nodes
 from ..timers import Timers
 from . import meetings, pairing, scene, surface, sweeps
 from .flight import Flight
@@ -34,22 +31,23 @@ class Contact(Boundary):
     """The contact of a case on one rank."""
 
     def __init__(
-        self, case: Case, model: Model, exposed: Flags, neighbours: list[Neighbour], bounds: list[Boundary],
-        comm: Comm, clock: Clock, timers: Timers,
+        self, case: Case, model: Model, neighbours: list[Neighbour], bounds: list[Boundary],
+        comm: Comm, clock: Clock, timers: Timers, extremes: tuple[float, float],
     ) -> None:  # fmt: skip
+        """``extremes``: largest nodal mass, kg, and speed, m/s, of the scene."""
         super().__init__(np.arange(model.nodes.n, dtype=np.int32))
         assert case.contact is not None
         self._sweeps = case.contact.sweeps
-        self._comm, self._neighbours, self._clock, self._timers = comm, neighbours, clock, timers
-        mobility, planes = _mobility(model.nodes, bounds)
-        found = surface.build(model, exposed, planes, neighbours, comm, case.contact.edges)
-        self._flight = Flight(found, model.nodes, mobility, case.contact.skin, neighbours, comm)
+        self._model, self._neighbours, self._comm = model, neighbours, comm
+        self._clock, self._timers = clock, timers
+        mobility, self._planes = _mobility(model.nodes, bounds)
+        self._surface = surface.build(model, self._planes, neighbours, comm, case.contact.edges)
+        self._flight = Flight(self._surface, model.nodes, mobility, case.contact.skin, neighbours, comm)
         self._mu = pairing.friction(case)
         self._rules = Rules(case.contact.domain, ~np.isnan(self._mu), 2.0 * self._flight.size)
-        largest, fastest = _bounds(model, comm)
+        largest, fastest = extremes
         self._scale = fixed_point.scale_for(largest * fastest)
-        self._joule = math.ldexp(1.0, 30 - math.frexp(largest * fastest * fastest)[1])
-        self._friction = np.zeros(2, np.int64)
+        self._friction = fixed_point.Tally(np.array([largest * fastest * fastest]))
         self._parts = np.zeros((len(case.parts), 3), np.int64)
         self._scene: Scene | None = None
         self.due = True
@@ -60,12 +58,23 @@ class Contact(Boundary):
 
     def friction_work(self) -> float:
         """Heat of friction so far of the meetings of all ranks, J; all ranks take part."""
-        high, low = (int(word) for word in self._comm.sum(self._friction))
-        return math.ldexp(high * 2**30 + low, -30) / self._joule
+        return float(self._friction.total(self._comm)[0])
 
     def impulses(self) -> Floats:
         """(parts, 3) what contact has given each part so far, N s; all ranks take part."""
         return np.asarray(self._comm.sum(self._parts) / self._scale)
+
+    def uncover(self, gone: Ints, removed: Flags) -> None:
+        """The surface without the tets of these ids (of this rank and its neighbours), and without ``removed`` nodes.
+
+        The blocks have been changed already; all ranks take part.
+        """
+        with self._timers.phase("contact"):
+            self._surface = surface.uncovered(
+                self._surface, gone, removed, self._model, self._planes, self._neighbours, self._comm
+            )
+            self._flight.follow(self._surface, self._model.nodes)
+            self.due = True
 
     def note(self, state: Nodes) -> None:
         with self._timers.phase("contact"):
@@ -128,7 +137,8 @@ class Contact(Boundary):
             now.shared_impulse.begin()
             now.shared_impulse.finish()
             sweeps.give(crowd.v, now.total, now.impulse, crowd.mobility, self._scale)
-        sweeps.heat(self._friction, now.push, slip, crowd.v, *room_of, room.friction, self._joule, n)
+        heat = self._friction
+        sweeps.heat(heat.words.reshape(-1), now.push, slip, crowd.v, *room_of, room.friction, heat.scale[0], n)
         self._book(now)
         if _give_back(state.v, self._parts, now.local, held, crowd.v, now.total, state.part, state.owned):
             self.last_push = t
@@ -217,13 +227,3 @@ def _mobility(nodes: Nodes, bounds: list[Boundary]) -> tuple[Floats, Flags]:
             mobility[bound.nodes] = rows
     mobility[planes] = 0.0
     return mobility, planes
-
-
-def _bounds(model: Model, comm: Comm) -> tuple[float, float]:
-    """The largest nodal mass, kg, and the largest of wave speed and velocity, m/s."""
-    speeds = [float(np.linalg.norm(model.nodes.v, axis=1).max(initial=0.0))]
-    for block in model.blocks:
-        p = block.params
-        speeds.append(math.sqrt((p[BULK] + 4.0 / 3.0 * p[SHEAR]) / p[DENSITY]))
-    largest, fastest = comm.maximum(np.array([float(model.nodes.mass.max(initial=0.0)), max(speeds)]))
-    return float(largest), float(fastest)

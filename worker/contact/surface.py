@@ -24,42 +24,61 @@ class Surface:
     """Of this rank's tets."""
     edges: Edges
     """Whose face of smaller id is of this rank's tets."""
+    sides: Ints
+    """(edges, 2) ids of the two faces of each edge."""
     flags: Flags
-    """(nodes,) which nodes of this rank are on the surface, by a face of any rank."""
+    """(nodes,) which nodes of this rank are on the surface, by a face of any rank; or were, and have lost it."""
     far: Ints
     """(k,) ids of nodes of ``edges`` that this rank does not hold."""
     far_owner: Indices
     """(k,) their owners."""
 
 
-def build(model: Model, exposed: Flags, planes: Flags, neighbours: list[Neighbour], comm: Comm, edges: bool) -> Surface:
+def build(model: Model, planes: Flags, neighbours: list[Neighbour], comm: Comm, edges: bool) -> Surface:
     """The surface; all ranks take part.
 
-    ``exposed`` (tets of all blocks, 4) says which faces have no tet behind them, ``planes`` (nodes, 3) which nodes lie
-    on a symmetry plane across an axis: faces in such a plane are no surface.
+    ``planes`` (nodes, 3) says which nodes lie on a symmetry plane across an axis: faces in such a plane are no surface.
     """
+    local, ids = _faces(model, planes)
+    flags = _flags(local, model.nodes.n, neighbours, comm)
+    sharp = _sharp(model, local, ids, neighbours, comm) if edges else _none()
+    return Surface(_table(model, local, ids), *sharp[:2], flags, *sharp[2:])
+
+
+def uncovered(
+    old: Surface, gone: Ints, removed: Flags, model: Model, planes: Flags, neighbours: list[Neighbour], comm: Comm
+) -> Surface:
+    """The surface after tets have left; all ranks take part.
+
+    ``gone``: ids of theirs, of this rank and its neighbours; ``removed`` (nodes,) nodes that have left with them. An
+    edge goes with either of its faces. Of what is laid bare, nodes meet faces; its edges meet no edges: they would be
+    as many as its faces, and all of them sharp.
+    """
+    local, ids = _faces(model, planes)
+    flags = (old.flags | _flags(local, model.nodes.n, neighbours, comm)) & ~removed
+    kept = ~np.asarray(np.isin(old.sides // 4, gone).any(axis=1))
+    return Surface(_table(model, local, ids), old.edges.take(kept), old.sides[kept], flags, old.far, old.far_owner)
+
+
+def _table(model: Model, local: "np.ndarray", ids: Ints) -> Faces:
     nodes = model.nodes
-    local, ids = _faces(model, exposed)
-    mirrored = planes[local[:, :3]].all(axis=1).any(axis=1)
-    local, ids = local[~mirrored], ids[~mirrored]
     faces = Faces(ids, nodes.id[local], np.sqrt(np.linalg.norm(face_normals(nodes.x0, local), axis=1)))
-    order = np.argsort(ids)
-    flags = _flags(local, nodes.n, neighbours, comm)
-    sharp, far, owner = _sharp(model, local, ids, neighbours, comm) if edges else _none()
-    return Surface(faces.take(order), sharp, flags, far, owner)
+    return faces.take(np.argsort(ids))
 
 
-def _faces(model: Model, exposed: Flags) -> tuple["np.ndarray", Ints]:
+def _faces(model: Model, planes: Flags) -> tuple["np.ndarray", Ints]:
     """(f, 4) local nodes of the exposed faces, the opposite one last, and their ids."""
-    rows, ids, begin = [np.zeros((0, 4), np.int64)], [np.zeros(0, np.int64)], 0
+    rows, ids = [np.zeros((0, 4), np.int64)], [np.zeros(0, np.int64)]
     for block in model.blocks:
-        tet, face = np.nonzero(exposed[begin : begin + block.n])
-        begin += block.n
+        tet, face = np.nonzero(block.across < 0)
         corners = block.tets.astype(np.int64)[tet]
         around = corners[np.arange(len(tet))[:, None], FACES[face]]
         rows.append(np.column_stack([around, corners[np.arange(len(tet)), face]]))
         ids.append(4 * block.id[tet] + face)
-    return np.concatenate(rows), np.concatenate(ids)
+    local: np.ndarray = np.concatenate(rows)
+    number = np.concatenate(ids)
+    mirrored = planes[local[:, :3]].all(axis=1).any(axis=1)
+    return local[~mirrored], number[~mirrored]
 
 
 def _flags(faces: "np.ndarray", n: int, neighbours: list[Neighbour], comm: Comm) -> Flags:
@@ -69,8 +88,9 @@ def _flags(faces: "np.ndarray", n: int, neighbours: list[Neighbour], comm: Comm)
     return np.asarray(counts[:, 0] > 0)
 
 
-def _none() -> tuple[Edges, Ints, Indices]:
-    return Edges(np.zeros((0, 4), np.int64), np.zeros(0)), np.zeros(0, np.int64), np.zeros(0, np.int32)
+def _none() -> tuple[Edges, Ints, Ints, Indices]:
+    none = np.zeros((0, 4), np.int64)
+    return Edges(none, np.zeros(0)), none[:, :2], np.zeros(0, np.int64), np.zeros(0, np.int32)
 
 
 _LOW, _HIGH, _THIRD, _OWNER, _FACE, _TURNED, _LENGTH, _NORMAL = 0, 1, 2, 3, 4, 5, 6, 7
@@ -80,8 +100,8 @@ whether the face runs from high to low, initial length, m, and the unit normal o
 
 def _sharp(
     model: Model, faces: "np.ndarray", ids: Ints, neighbours: list[Neighbour], comm: Comm
-) -> tuple[Edges, Ints, Indices]:
-    """Sharp edges, and the nodes of theirs that are not held here, with their owners.
+) -> tuple[Edges, Ints, Ints, Indices]:
+    """Sharp edges, their faces, and the nodes of theirs that are not held here, with their owners.
 
     Where other ranks may hold faces of an edge, the owner of the lower node brings them together, and the rank of the
     face of smaller id has the edge.
@@ -100,12 +120,13 @@ def _sharp(
     order = np.argsort(gathered[:, _FACE])
     target = sender[order[np.searchsorted(gathered[order, _FACE], met[:, 6])]]
     back = comm.swap({int(rank): met[target == rank] for rank in np.unique(target)})
-    rows = np.concatenate([here, *(f.reshape(-1, 8) for f in back.values())])
+    rows = np.concatenate([here, *(f.reshape(-1, 9) for f in back.values())])
     rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
     ends, owners = rows[:, 2:4].reshape(-1), rows[:, 4:6].reshape(-1)
     far, first = np.unique(ends[~np.isin(ends, nodes.id)], return_index=True)
     owner = owners[~np.isin(ends, nodes.id)][first]
-    return Edges(rows[:, :4].copy(), rows[:, 7].copy().view(np.float64)), far, owner.astype(np.int32)
+    edges = Edges(rows[:, :4].copy(), rows[:, 8].copy().view(np.float64))
+    return edges, rows[:, 6:8].copy(), far, owner.astype(np.int32)
 
 
 def _halves(model: Model, faces: "np.ndarray", ids: Ints) -> Ints:
@@ -125,7 +146,7 @@ def _halves(model: Model, faces: "np.ndarray", ids: Ints) -> Ints:
 
 
 def _paired(halves: Ints) -> Ints:
-    """Rows (a, b, c, d, owner of c, owner of d, smaller face, length) of sharp edges between two faces, not more."""
+    """Rows (a, b, c, d, owner of c, owner of d, smaller face, larger face, length) of sharp edges of two faces."""
     halves = halves[np.lexsort((halves[:, _FACE], halves[:, _HIGH], halves[:, _LOW]))]
     same = (halves[1:, :2] == halves[:-1, :2]).all(axis=1)
     first = np.flatnonzero(same & ~np.r_[False, same[:-1]] & ~np.r_[same[1:], False]) if len(same) else np.zeros(0, int)
@@ -140,4 +161,4 @@ def _paired(halves: Ints) -> Ints:
     owners = np.where(
         ahead, np.column_stack([one[:, _OWNER], two[:, _OWNER]]), np.column_stack([two[:, _OWNER], one[:, _OWNER]])
     )
-    return np.column_stack([one[:, :2], ends, owners, one[:, _FACE], one[:, _LENGTH]])
+    return np.column_stack([one[:, :2], ends, owners, one[:, _FACE], two[:, _FACE], one[:, _LENGTH]])

@@ -24,7 +24,7 @@ class Elements:
     def __init__(self, model: Model, comm: Comm, neighbours: list[Neighbour], timers: Timers) -> None:
         self.model = model
         self._timers = timers
-        self.peaks: Ints = np.zeros(3, np.int64)
+        self.peaks: Ints = np.zeros(4, np.int64)
         """See elements/sweep.py."""
         self._w = _aligned(tet4.SCRATCH)
         self._wi = np.zeros(9 * CHUNK, np.int64)
@@ -75,7 +75,8 @@ class Elements:
         nodes = self.model.nodes
         sweep.standard_pass(
             nodes.x, nodes.v, nodes.force, block.tets, block.state.reshape(-1), block.params, self._w, self._wi,
-            self._bits, self.peaks, block.id, block.kind, block.eos, block.state.shape[1], begin, end, dt, scale,
+            self._bits, self.peaks, block.id, block.worn, block.life, block.kind, block.eos, block.state.shape[1],
+            begin, end, dt, scale,
         )  # fmt: skip
 
     def _again(self, block: Block, begin: int, end: int, scale: float) -> None:
@@ -147,7 +148,7 @@ class AveragedElements(Elements):
         if self.split:
             self.shared_gradients.begin()
             self.shared_gradients.finish()
-            volumes = self._volumes[:, 1] / (self._weight * pressure.QUANTA)
+            volumes = np.maximum(self._volumes[:, 1], 1) / (self._weight * pressure.QUANTA)
             self._projected = self._gradient / (self._scale * volumes[:, None])
 
     def _gradients(self) -> Ints:
@@ -164,6 +165,6 @@ class AveragedElements(Elements):
         nodes = self.model.nodes
         sweep.force_pass(
             nodes.x, self._strain, nodes.force, self.pressure, self._gradient, self.split, block.tets,
-            block.state.reshape(-1), block.params, self._w, self._wi, self._bits, self.peaks, block.id, block.eos,
-            block.state.shape[1], begin, end, dt, scale,
+            block.state.reshape(-1), block.params, self._w, self._wi, self._bits, self.peaks, block.id, block.worn,
+            block.life, block.eos, block.state.shape[1], begin, end, dt, scale,
         )  # fmt: skip

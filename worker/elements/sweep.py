@@ -5,7 +5,7 @@ between them: ``strain_pass`` (velocity gradient, deviatoric stress, nodal volum
 viscosity, forces). ``forces_again`` repeats only the sum of forces, in a coarser quantum.
 
 ``peaks`` collects, as bits of float64: 0 the largest one-over-stable-step, 2 the largest force; 1 is the smallest
-global id of the tets that set the first.
+global id of the tets that set the first, 3 whether tets are worn out (wear.py).
 """
 
 from numba import njit
@@ -19,10 +19,12 @@ from ..materials.viscosity import bulk_viscosity
 from ..state import CHUNK
 from . import pressure as averaged
 from . import tet4
+from .wear import mark_worn
 
 _LIMIT = tet4.LIMIT
 _NO_TET = 2**62
 _F1, _F2, _I1, _I2, _T2 = "float64[::1]", "float64[:, ::1]", "int64[::1]", "int64[:, ::1]", "uint32[:, ::1]"
+_B1 = "boolean[::1]"
 
 
 @njit(f"void(int64, {_F1}, {_F1}, {_F1}, int64, float64)", cache=True, error_model="numpy")
@@ -82,13 +84,13 @@ def sum_forces(force, pressure, gradient, split, t, s, w, wi, bits, peaks, ids, 
 
 
 @njit(
-    f"void({_F2}, {_F2}, {_I2}, {_T2}, {_F1}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, {_I1}, "
+    f"void({_F2}, {_F2}, {_I2}, {_T2}, {_F1}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, {_I1}, {_B1}, {_F1}, "
     "int64, int64, int64, int64, int64, float64, float64)",
     cache=True,
     error_model="numpy",
 )
 def standard_pass(  # type: ignore[no-untyped-def]
-    x, v, force, tets, state, params, w, wi, bits, peaks, ids, strength, eos, rows, begin, end, dt, scale
+    x, v, force, tets, state, params, w, wi, bits, peaks, ids, worn, life, strength, eos, rows, begin, end, dt, scale
 ):
     """Stress and forces at n+1 of chunks ``begin`` to ``end``, each tet with its own pressure."""
     for c in range(begin, end):
@@ -102,6 +104,8 @@ def standard_pass(  # type: ignore[no-untyped-def]
         tet4.end_gradients(w, n)
         averaged.own_strains(w, n, dt)
         pressure_and_limit(eos, w, s, params, n, dt)
+        if len(worn) > 0:
+            peaks[3] = max(peaks[3], mark_worn(worn[c * CHUNK : c * CHUNK + n], w, s, params, life, rows, n))
         largest = tet4.internal_forces(wi, w, s, n, scale)
         tet4.scatter_forces(force, wi, t, n)
         note_peaks(peaks, bits, ids[c * CHUNK : c * CHUNK + n], n, largest)
@@ -135,7 +139,7 @@ def strain_pass(x, v, sums, weight, pressure, projected, split, tets, state, par
 
 @njit(
     f"void({_F2}, {_F1}, {_I2}, {_F1}, {_I2}, boolean, {_T2}, {_F1}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, {_I1}, "
-    "int64, int64, int64, int64, float64, float64)",
+    f"{_B1}, {_F1}, int64, int64, int64, int64, float64, float64)",
     cache=True,
     error_model="numpy",
 )
@@ -154,6 +158,8 @@ def force_pass(  # type: ignore[no-untyped-def]
     bits,
     peaks,
     ids,
+    worn,
+    life,
     eos,
     rows,
     begin,
@@ -171,6 +177,8 @@ def force_pass(  # type: ignore[no-untyped-def]
         averaged.gather_strains(w, strain, t, n)
         averaged.recall_flux(w, s, n, dt)
         pressure_and_limit(eos, w, s, params, n, dt)
+        if len(worn) > 0:
+            peaks[3] = max(peaks[3], mark_worn(worn[c * CHUNK : c * CHUNK + n], w, s, params, life, rows, n))
         sum_forces(force, pressure, gradient, split, t, s, w, wi, bits, peaks, ids[c * CHUNK : c * CHUNK + n], n, scale)
 
 

@@ -59,6 +59,30 @@ def _limbs(columns, scale):  # type: ignore[no-untyped-def]
     return words
 
 
+class Tally:
+    """Sums that grow through a whole run: integers in two limbs, so that neither order nor ranks matter."""
+
+    def __init__(self, largest: Floats) -> None:
+        """``largest`` (k,): the order of magnitude of what is added to each sum; 2^-60 of it is the quantum."""
+        self.scale = np.ldexp(1.0, 30 - np.frexp(largest)[1])
+        """(k,) quanta of the high limb per unit."""
+        self.words = np.zeros((2, len(largest)), np.int64)
+        """(2, k) high and low limbs."""
+
+    def add(self, values: Floats) -> None:
+        """Adds every row of ``values`` (n, k)."""
+        scaled = values * self.scale
+        high = np.rint(scaled)
+        self.words[0] += high.astype(np.int64).sum(axis=0)
+        self.words[1] += np.rint((scaled - high) * _LIMB).astype(np.int64).sum(axis=0)
+
+    def total(self, comm: Comm) -> Floats:
+        """(k,) sums over all ranks; all ranks take part."""
+        high, low = comm.sum(self.words)
+        whole = [math.ldexp(int(a) * 2**30 + int(b), -30) for a, b in zip(high, low, strict=True)]
+        return np.asarray(np.array(whole) / self.scale)
+
+
 def exact_sums(comm: Comm, columns: Floats) -> Floats:
     """(k,) sums of the columns of ``columns`` (n, k) over all ranks: the same bits for any order and partition.
 

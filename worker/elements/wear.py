@@ -1,0 +1,78 @@
+"""Which tets are worn out and leave the body: by plastic strain, by volume, by stable step (erosion).
+
+What flattens or turns inside out must leave before it collapses: its velocity gradient is measured by its altitude, and
+a single one that passes zero would throw its nodes away. Such a tet leaves at once; one that has only strained enough
+can wait for others (worker/erosion.py).
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from conoid.cases.schema import Erosion
+
+from ..materials.models import DENSITY
+from ..state import CHUNK, MASS, PLASTIC_STRAIN, S_XX, VISCOUS, WORK, WORK_PLASTIC, WORK_VISCOUS, Floats
+from .tet4 import LIMIT, VOLUME
+
+STRAIN, LOW, HIGH, FREQUENCY = range(4)
+"""Places in a block's ``life``: largest plastic strain, smallest and largest volume over the initial one, largest
+one-over-stable-step, 1/s."""
+SOUND, TIRED, BROKEN = range(3)
+"""What is found: no tet that leaves; some that can wait; some that cannot."""
+
+_MASS, _STRAIN = MASS * CHUNK, PLASTIC_STRAIN * CHUNK
+
+
+def life(erosion: Erosion | None) -> Floats:
+    """(4,) what a tet lives through; the frequency is known after the first step."""
+    if erosion is None:
+        return np.full(4, math.inf)
+    strain = math.inf if erosion.plastic_strain is None else erosion.plastic_strain
+    return np.array([strain, *erosion.volume, math.inf])
+
+
+@njit("boolean(float64[::1], int64)", cache=True, error_model="numpy")
+def _finite(s, i):  # type: ignore[no-untyped-def]
+    """Whether the whole stress of a tet is a number."""
+    total = 0.0
+    for row in range(S_XX, VISCOUS + 1):
+        total += abs(s[row * CHUNK + i])
+    return total < np.inf
+
+
+@njit("void(float64[::1], int64, int64)", cache=True, error_model="numpy")
+def _release(s, i, rows):  # type: ignore[no-untyped-def]
+    """Takes the stress of a tet, and of its work what is not a number."""
+    for row in range(S_XX, VISCOUS + 1):
+        s[row * CHUNK + i] = 0.0
+    for row in (WORK, WORK_VISCOUS, WORK_PLASTIC):
+        if row < rows and not abs(s[row * CHUNK + i]) < np.inf:
+            s[row * CHUNK + i] = 0.0
+
+
+@njit(
+    "int64(boolean[::1], float64[::1], float64[::1], float64[::1], float64[::1], int64, int64)",
+    cache=True,
+    error_model="numpy",
+)
+def mark_worn(worn, w, s, params, life, rows, n):  # type: ignore[no-untyped-def]
+    """Marks the tets of a chunk that leave; one that leaves at once no longer limits the step. Returns what is found.
+
+    A tet that is inside out, or whose stress is not a number, is relieved of it before it acts on a node.
+    """
+    found = SOUND
+    for i in range(n):
+        ratio = w[VOLUME + i] * params[DENSITY] / s[_MASS + i]
+        whole = w[VOLUME + i] > 0.0 and _finite(s, i)
+        if not (whole and life[LOW] <= ratio <= life[HIGH] and w[LIMIT + i] <= life[FREQUENCY]):
+            worn[i] = True
+            w[LIMIT + i] = 0.0
+            found = BROKEN
+            if not whole:
+                _release(s, i, rows)
+        elif rows > PLASTIC_STRAIN and s[_STRAIN + i] > life[STRAIN]:
+            worn[i] = True
+            found = max(found, TIRED)
+    return found

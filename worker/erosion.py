@@ -1,0 +1,191 @@
+"""Erosion: worn-out tets leave the body, what they covered is laid bare, and what left is booked.
+
+A tet is marked in the pass over the elements (elements/wear.py), with its force at n+1 already in the nodal sums. It
+leaves before the search for contact of the next step, so that what it covered meets other bodies in that very step. Its
+last force acts through one more kick: the second half of that work is booked a step later, as for a boundary. Tets that
+have only strained enough are gathered for a few steps, because every removal calls for a new search.
+"""
+
+import numpy as np
+
+from conoid.cases.schema import Case
+
+from .boundaries import Boundary
+from .clock import Clock
+from .contact.stage import Contact
+from .elements.wear import BROKEN, FREQUENCY, SOUND
+from .mesh.faces import FACES
+from .mesh.faces import normals as face_normals
+from .parallel.comm import Comm
+from .parallel.fixed_point import Tally
+from .parallel.ownership import Neighbour, complete
+from .state import (
+    CHUNK,
+    PRESSURE,
+    S_XX,
+    S_XY,
+    S_YY,
+    S_YZ,
+    S_ZX,
+    S_ZZ,
+    VISCOUS,
+    WORK,
+    WORK_PLASTIC,
+    WORK_VISCOUS,
+    Block,
+    Floats,
+    Ints,
+    Model,
+    Nodes,
+)
+
+GATHERED = 10
+"""Steps in which worn tets are gathered."""
+_TAG = 15
+
+
+class Erosion(Boundary):
+    """The erosion of a case on one rank. It stands before contact among the boundaries."""
+
+    def __init__(
+        self, case: Case, model: Model, neighbours: list[Neighbour], contact: Contact | None, comm: Comm,
+        clock: Clock, extremes: tuple[float, float],
+    ) -> None:  # fmt: skip
+        """``extremes``: largest nodal mass, kg, and speed, m/s, of the scene."""
+        super().__init__(np.zeros(0, np.int32))
+        self._model, self._neighbours, self._contact = model, neighbours, contact
+        self._comm, self._clock = comm, clock
+        self._specs = [part.erosion for part in case.parts]
+        leaves = np.array([spec is not None and spec.nodes == "remove" for spec in self._specs])
+        self._leaves = leaves[model.nodes.part]
+        self._removed = np.zeros(model.nodes.n, bool)
+        self._tets_at = self._completed([block.tets.astype(np.int64) for block in model.blocks])
+        self._last: list[tuple[Ints, Floats]] = []
+        self._leaving = np.zeros(0, np.int64)
+        mass, speed = extremes
+        energy, momentum = mass * speed * speed, mass * speed
+        self._work = Tally(np.full(3, energy))
+        self._nodal = Tally(np.array([energy, mass, momentum, momentum, momentum]))
+        self._half = np.zeros((0, 3))
+        self.due = False
+        """Whether the next step begins with a removal."""
+
+    def begin(self, limit: float) -> None:
+        """Takes the largest one-over-stable-step at the start, 1/s, as the measure of later ones."""
+        for block in self._model.blocks:
+            spec = self._specs[block.part]
+            if spec is not None:
+                block.life[FREQUENCY] = limit / spec.time_step
+
+    def decide(self, found: int) -> None:
+        """``found`` of all ranks (elements/wear.py): whether there is something to remove now."""
+        self.due = found == BROKEN or (found > SOUND and self._clock.step % GATHERED == 0)
+
+    def work(self) -> Floats:
+        """(3,) work, viscous work and plastic work of the tets that have left, J; all ranks take part."""
+        return self._work.total(self._comm)
+
+    def nodal(self) -> Floats:
+        """(5,) energy, J, mass, kg, and momentum, kg m/s, of the nodes that have left; all ranks take part."""
+        return self._nodal.total(self._comm)
+
+    @property
+    def particles(self) -> int:
+        """Nodes without tets that fly on; all ranks take part."""
+        nodes = self._model.nodes
+        return int(self._comm.sum(np.array([(nodes.owned & (self._tets_at == 0) & ~self._removed).sum()]))[0])
+
+    def note(self, state: Nodes) -> None:
+        self._book_last_work(state)
+        self._nodal.add(np.column_stack([np.zeros((len(self._half), 2)), self._half]))
+        self._half = np.zeros((0, 3))
+        self._leaving = np.zeros(0, np.int64)
+        if self.due:
+            self._remove(state)
+            self.due = False
+
+    def apply(self, state: Nodes, dt: float, t: float) -> None:
+        leaving = self._leaving
+        if len(leaving):
+            owned = leaving[state.owned[leaving]]
+            before, after, mass = self._before[state.owned[leaving]], state.v[owned], state.mass[owned]
+            uneven = 0.5 * (self._clock.last_dt - self._clock.mean_dt) / state.scale
+            energy = 0.5 * mass * (before * after).sum(axis=1) + uneven * (before * state.force[owned]).sum(axis=1)
+            self._half = 0.5 * mass[:, None] * after
+            self._nodal.add(np.column_stack([energy, mass, self._half]))
+            state.v[leaving] = 0.0
+            state.force[leaving] = 0
+
+    def _remove(self, state: Nodes) -> None:
+        """Takes the marked tets out; all ranks take part."""
+        gone, left = [np.zeros((0, 5), np.int64)], []
+        for block in self._model.blocks:
+            worn = np.flatnonzero(block.worn)
+            if len(worn):
+                if self._contact is not None:
+                    gone.append(np.column_stack([block.id[worn], block.across[worn]]))
+                left.append(block.tets[worn].astype(np.int64))
+                self._last.append((left[-1], _forces(block, worn, state.x)))
+                self._work.add(_energies(block, worn))
+                block.drop(worn)
+        self._tets_at -= self._completed(left)
+        self._model.elements_global -= int(self._comm.sum(np.array([sum(len(tets) for tets in left)]))[0])
+        alone = self._leaves & (self._tets_at == 0) & ~self._removed
+        self._leaving, self._removed = np.flatnonzero(alone), self._removed | alone
+        self._before = state.v[self._leaving]
+        if self._contact is not None:
+            self._contact.uncover(self._lay_bare(np.concatenate(gone)), self._removed)
+
+    def _lay_bare(self, gone: Ints) -> Ints:
+        """Marks the faces behind tets ``gone`` (k, 5: id, ids across) as exposed; ids of these and the neighbours'."""
+        told = self._comm.swap({other.rank: gone for other in self._neighbours})
+        every = np.concatenate([gone, *(words.reshape(-1, 5) for words in told.values())])
+        for block in self._model.blocks:
+            beside = np.flatnonzero(np.isin(block.id, every[:, 1:]))
+            rows = block.across[beside]
+            rows[np.isin(rows, every[:, 0])] = -1
+            block.across[beside] = rows
+        return every[:, 0]
+
+    def _completed(self, tets: list[Ints]) -> Ints:
+        """(nodes,) how many of these tets of all ranks have each node; all ranks take part."""
+        corners = np.concatenate([np.zeros(0, np.int64), *(rows.reshape(-1) for rows in tets)])
+        counts = np.bincount(corners, minlength=self._model.nodes.n)[:, None].astype(np.int64)
+        complete(self._comm, self._neighbours, counts, _TAG)
+        return counts[:, 0]
+
+    def _book_last_work(self, state: Nodes) -> None:
+        """The second half of what the last forces of removed tets have done, with the velocities after the kick."""
+        for tets, forces in self._last:
+            work = np.zeros(len(tets))
+            for corner in range(4):
+                for i in range(3):
+                    work -= 0.5 * self._clock.last_dt * forces[:, corner, i] * state.v[tets[:, corner], i]
+            self._work.add(np.column_stack([work, np.zeros((len(work), 2))]))
+        self._last = []
+
+
+def _rows(block: Block, chosen: Ints, rows: "np.ndarray") -> Floats:
+    """(len(chosen), len(rows)) of the block's state."""
+    return np.asarray(block.state[(chosen // CHUNK)[:, None], rows, (chosen % CHUNK)[:, None]])
+
+
+def _energies(block: Block, chosen: Ints) -> Floats:
+    """(k, 3) work, viscous work and plastic work of some tets, J."""
+    plastic = [WORK_PLASTIC] if block.has(WORK_PLASTIC) else []
+    values = _rows(block, chosen, np.array([WORK, WORK_VISCOUS, *plastic]))
+    return values if plastic else np.column_stack([values, np.zeros(len(values))])
+
+
+def _forces(block: Block, chosen: Ints, x: Floats) -> Floats:
+    """(k, 4, 3) -V stress grad N of some tets, N."""
+    values = _rows(block, chosen, np.arange(VISCOUS + 1))
+    stress = np.empty((len(chosen), 3, 3))
+    pressure = values[:, PRESSURE] + values[:, VISCOUS]
+    for (i, j), row in {(1, 2): S_YZ, (2, 0): S_ZX, (0, 1): S_XY}.items():
+        stress[:, i, j] = stress[:, j, i] = values[:, row]
+    for i, row in enumerate((S_XX, S_YY, S_ZZ)):
+        stress[:, i, i] = values[:, row] - pressure
+    return np.stack([
+        (stress * (face_normals(x, block.tets[chosen][:, face]) / 6.0)[:, None, :]).sum(axis=2) for face in FACES
+    ], axis=1)  # fmt: skip
