@@ -133,6 +133,18 @@ def test_hertz_spheres() -> None:
     assert speed.value - speed.tolerance >= 0.98 * closing / 2
 
 
+def test_fast_fragment() -> None:
+    speed, fragment, plate = 5000.0, 7830.0 * 0.6e-3**3, DENSITY * 8e-3 * 8e-3 * 1e-3
+    stuck = fragment * speed / (fragment + plate)
+    pushed, back = (
+        next(entry for entry in load("fast_fragment").reference if entry.part == part) for part in ("plate", "fragment")
+    )
+    assert pushed.value + pushed.tolerance == pytest.approx(-stuck, rel=2e-3)
+    assert pushed.value - pushed.tolerance == pytest.approx(-2 * stuck, rel=2e-3)
+    assert back.value - back.tolerance == pytest.approx(-stuck, rel=5e-3)
+    assert back.value + back.tolerance == pytest.approx(speed - 2 * stuck, rel=1e-4)
+
+
 # Plastic waves --------------------------------------------------------------------------------------------------------
 
 

@@ -24,6 +24,7 @@ SHORT = {
     "dissimilar_bars": "3 us",
     "elastic_bar_confined": "1.5 us",
     "elastic_bar_wall": "1.5 us",
+    "fast_fragment": "0.25 us",
     "free_spin": "10 us",
     "hertz_spheres": "0.2 us",
     "newton_cradle": "2 us",
