@@ -1,0 +1,215 @@
+"""No missed pair: on any number of ranks every meeting is found that all pairs of the whole surface give, once.
+
+The ranks are threads. What they compute in a step is written down, each meeting with its nodes and, to the bit, its
+weights, its normal and what is wanted of it. On one rank the same kernels are given every node with every face, and
+every edge with every edge, instead of what the search has found.
+"""
+
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+import pytest
+
+from conoid.cases.load import apply_overrides, parse_case, read_data, shipped
+from conoid.cases.schema import Case
+from conoid.worker import simulation, step
+from conoid.worker.contact import domain, meetings, search
+from conoid.worker.contact.meetings import Meetings
+from conoid.worker.contact.scene import Scene
+from conoid.worker.contact.search import Things
+from conoid.worker.parallel.comm import Comm, SerialComm
+from conoid.worker.simulation import Simulation
+from conoid.worker.state import Ints, Nodes
+
+from ..contact.bodies import Flags, Indices
+from ..contact.ranks import on_ranks
+from ..worker.meshes import Floats
+
+RANKS = (1, 2, 3, 4, 7)
+STEPS, EVERY = 60, 7
+"""Length of a run, and every how many steps all pairs are looked at."""
+CLOSER = {
+    "crossed_bars": ("parts[0].velocity[2]=100", "parts[1].velocity[2]=-100"),
+    "hertz_spheres": ("parts[0].velocity[2]=100", "parts[1].velocity[2]=-100"),
+    "meeting": ("parts[0].velocity[2]=800", "parts[2].velocity[2]=-800"),
+}
+"""Speeds at which some bodies touch, or much of them, in so few steps."""
+MEETING = Path(__file__).with_name("meeting.toml")
+_MOST = 1_000_000
+"""Pairs that are given to a kernel at once."""
+
+Met = Counter[tuple[bytes, ...]]
+
+
+def case_of(name: str) -> Case:
+    data = read_data(MEETING if name == "meeting" else shipped()[name])
+    return parse_case(apply_overrides(data, [*CLOSER.get(name, ()), "run.frames=0"]))
+
+
+NAMES = ["meeting", *(name for name in sorted(shipped()) if case_of(name).in_contact)]
+
+
+def written(room: Meetings, n: int, ids: "np.ndarray") -> Met:
+    """The first ``n`` meetings, by the global ids of their nodes."""
+    columns = ids[room.nodes[:n]], room.weights[:n], room.normals[:n], room.wanted[:n, None]
+    return Counter(tuple(np.ascontiguousarray(row).tobytes() for row in rows) for rows in zip(*columns, strict=True))
+
+
+class Found:
+    """The meetings of a rank at each step."""
+
+    def __init__(self, sim: Simulation) -> None:
+        assert sim.contact is not None
+        self.sim, self.contact, self.at = sim, sim.contact, dict[int, Met]()
+        self._meet, self.contact._meet = self.contact._meet, self.meet  # type: ignore[method-assign]
+
+    def meet(self, now: Scene, dt: float) -> int:
+        n = self._meet(now, dt)
+        self.at[self.sim.clock.step] = written(now.room, n, now.crowd.id)
+        return n
+
+    def run(self) -> dict[int, Met]:
+        """Of some steps, each with the meetings that this rank computed; boundaries and forces act as ever."""
+        step.prepare(self.sim)
+        for _ in range(STEPS):
+            step.first_half(self.sim)
+            step.second_half(self.sim)
+        self.sim.free()
+        return self.at
+
+
+class Brute(Found):
+    """And, on one rank, those of all pairs of the surface now and then."""
+
+    def __init__(self, sim: Simulation) -> None:
+        super().__init__(sim)
+        self.all = dict[int, Met]()
+        self._search, self.contact._search = self.contact._search, self.search  # type: ignore[method-assign]
+
+    def search(self, state: Nodes) -> None:
+        """Keeps the normals of the nodes, which are those of the last search."""
+        self._search(state)
+        self._out = self.contact._flight.normals(state)
+
+    def meet(self, now: Scene, dt: float) -> int:
+        if self.sim.clock.step % EVERY == 0:
+            self.all[self.sim.clock.step] = self._nodes(dt) + self._edges(dt)
+        return super().meet(now, dt)
+
+    def _state(self, dt: float) -> tuple[Any, ...]:
+        sides, nodes = self.contact._flight.sides, self.sim.model.nodes
+        local = sides.crowd.local
+        return nodes.x[local], nodes.v[local], sides.crowd.part, self.contact._mu, dt
+
+    def _nodes(self, dt: float) -> Met:
+        sides, state, met = self.contact._flight.sides, self._state(dt), Met()
+        faces, out = sides.face_places, self._out[sides.crowd.local]
+        for pairs in self._pairs(sides.nodes.corners, faces[:, :3]):
+            places, room = sides.nodes.corners[pairs[:, 0]], Meetings.room(len(pairs))
+            by_place = np.column_stack([places, pairs[:, 1:]])
+            rows = (room.nodes, room.weights, room.normals, room.wanted, room.friction)
+            n = meetings.node_face(*rows, 0, faces, sides.faces.size, out, by_place, *state)
+            met += written(room, n, sides.crowd.id)
+        return met
+
+    def _edges(self, dt: float) -> Met:
+        sides, state, met = self.contact._flight.sides, self._state(dt), Met()
+        edges = sides.edges.take(np.lexsort((sides.edges.nodes[:, 1], sides.edges.nodes[:, 0])))
+        places = sides.crowd.places(edges.nodes)
+        for every in self._pairs(places[:, :2], places[:, :2]):
+            pairs = every[every[:, 0] < every[:, 1]]
+            room = Meetings.room(len(pairs))
+            rows = (room.nodes, room.weights, room.normals, room.wanted, room.friction)
+            n = meetings.edge_edge(*rows, 0, places, edges.size, pairs, *state)
+            met += written(room, n, sides.crowd.id)
+        return met
+
+    def _pairs(self, small: Indices, large: Indices) -> Iterator[Indices]:
+        """(p, 2) all small things with all large ones that their part meets and that have no corner in common."""
+        part, allowed = self.contact._flight.sides.crowd.part, ~np.isnan(self.contact._mu)
+        for begin in range(0, len(small), max(_MOST // max(len(large), 1), 1)):
+            some = small[begin : begin + max(_MOST // max(len(large), 1), 1)]
+            meet = allowed[part[some[:, 0]][:, None], part[large[:, 0]][None, :]]
+            for corner in some.T:
+                meet &= (corner[:, None, None] != large[None]).all(axis=2)
+            i, j = np.nonzero(meet)
+            yield np.column_stack([i + begin, j]).astype(np.int32)
+
+
+def brute(case: Case) -> Brute:
+    """One rank that has taken its steps."""
+    ran = Brute(simulation.build(case, Path(), SerialComm()))
+    ran.run()
+    return ran
+
+
+def found(case: Case, ranks: int) -> dict[int, Met]:
+    """The meetings of all ranks together at each step."""
+
+    def one(comm: Comm) -> dict[int, Met]:
+        return Found(simulation.build(case, Path(), comm)).run()
+
+    together = dict[int, Met]()
+    for mine in on_ranks(ranks, one):
+        for number, met in mine.items():
+            together[number] = together.get(number, Met()) + met
+    return together
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_every_pair_that_meets_is_found_once_on_any_number_of_ranks(name: str) -> None:
+    """And what one rank finds in the steps between is found by all of them, too."""
+    case = case_of(name)
+    whole = brute(case)
+    assert sum(map(bool, whole.all.values())) > len(whole.all) // 3
+    assert whole.contact.searches < STEPS // 3
+    for number, met in whole.all.items():
+        assert set(met.values()) <= {1}
+        assert whole.at[number] == met
+    for ranks in RANKS[1:]:
+        assert found(case, ranks) == whole.at
+
+
+def missed(case: Case) -> int:
+    """Meetings of all pairs that one rank has not found."""
+    whole = brute(case)
+    return sum((met - whole.at[number]).total() for number, met in whole.all.items())
+
+
+def test_a_search_without_foresight_is_found_out() -> None:
+    """The check can fail: candidates that are near now, not those that will be."""
+    case, find = case_of("fast_fragment"), search.find
+
+    def blind(
+        small: Things, large: Things, x: Floats, v: Floats, part: Indices, allowed: Flags, horizon: float, rank: Ints
+    ) -> Indices:
+        return find(small, large, x, v, part, allowed, 0.0, rank)
+
+    assert missed(case) == 0
+    with patch.object(search, "find", blind):
+        assert missed(case) > 0
+
+
+@pytest.mark.slow
+def test_a_search_without_skin_is_found_out() -> None:
+    case, find = case_of("hertz_spheres"), search.find
+
+    def bare(small: Things, large: Things, *rest: Any) -> Indices:
+        one, other = (Things(each.corners, np.zeros_like(each.reach)) for each in (small, large))
+        return find(one, other, *rest)
+
+    with patch.object(search, "find", bare):
+        assert missed(case) > 0
+
+
+def test_ranks_that_send_no_surface_are_found_out() -> None:
+    case = case_of("fast_fragment")
+    whole = found(case, 1)
+    assert found(case, 2) == whole
+    with patch.object(domain, "choose", lambda *_: {}):
+        assert found(case, 2) != whole
