@@ -30,7 +30,7 @@ from ..contact.ranks import on_ranks
 from ..worker.meshes import Floats
 
 RANKS = (1, 2, 3, 4, 7)
-STEPS, EVERY = 60, 7
+STEPS, EVERY = 60, 3
 """Length of a run, and every how many steps all pairs are looked at."""
 CLOSER = {
     "crossed_bars": ("parts[0].velocity[2]=100", "parts[1].velocity[2]=-100"),
