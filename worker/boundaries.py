@@ -15,7 +15,7 @@ from .parallel.comm import Comm
 from .state import Flags, Floats, Indices, Model, Nodes
 
 _AXES = {"x": 0, "y": 1, "z": 2}
-_ON_PLANE = 1e-9
+ON_PLANE = 1e-9
 """Of the size of the mesh: closer than this is on a plane."""
 _SWEEPS = 4
 
@@ -74,6 +74,7 @@ class RigidWalls(Boundary):
         self._points = points
         self._normals = normals / np.linalg.norm(normals, axis=1)[:, None]
         self._held = held
+        self._pushed = False
 
     def depths(self, state: Nodes) -> Floats:
         """(w,) how deep the deepest node starts behind each wall, m."""
@@ -85,13 +86,15 @@ class RigidWalls(Boundary):
 
     def note(self, state: Nodes) -> None:
         self._before = state.v[self.nodes]
-        self._book()
+        if self._pushed:
+            self._book()
+            self._impulse[:] = 0.0
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
-        self._impulse[:] = 0.0
-        if dt > 0.0 and _push_out(
+        self._pushed = dt > 0.0 and _push_out(
             state.x, state.v, self._impulse, state.mass, self.nodes, self._points, self._normals, self._held, dt
-        ):
+        )
+        if self._pushed:
             self.last_push = t
             self._book()
 
@@ -247,7 +250,7 @@ def _held_by(spec: schema.Boundary, model: Model) -> Flags:
     if spec.parts:
         chosen = np.isin(nodes.part, [model.parts.index(p) for p in spec.parts])
     if isinstance(spec, schema.Symmetry):
-        chosen &= np.abs(nodes.x0[:, _AXES[spec.axis]] - spec.at) <= _ON_PLANE * max(model.size, abs(spec.at))
+        chosen &= np.abs(nodes.x0[:, _AXES[spec.axis]] - spec.at) <= ON_PLANE * max(model.size, abs(spec.at))
     elif isinstance(spec, schema.Prescribed):
         if spec.low is not None:
             chosen &= (nodes.x0 >= np.array(spec.low)).all(axis=1)
@@ -268,7 +271,7 @@ def _walls(case: schema.Case, model: Model, held: list[Flags], comm: Comm) -> li
     )  # fmt: skip
     depths = comm.maximum(walls.depths(model.nodes))
     for (index, _, _), depth in zip(found, depths, strict=True):
-        if depth > _ON_PLANE * model.size:
+        if depth > ON_PLANE * model.size:
             raise InputError(f"boundaries[{index}]: a body starts {depth:.3g} m behind this wall")
     return [walls]
 

@@ -6,11 +6,13 @@ last force acts through one more kick: the second half of that work is booked a 
 have only strained enough are gathered for a few steps, because every removal calls for a new search.
 """
 
+from typing import Self
+
 import numpy as np
 
-from conoid.cases.schema import Case
+from conoid.cases.schema import Case, Symmetry
 
-from .boundaries import Boundary
+from .boundaries import ON_PLANE, Boundary, RigidWalls
 from .clock import Clock
 from .contact.stage import Contact
 from .elements.wear import BROKEN, FREQUENCY, SOUND
@@ -42,6 +44,32 @@ from .state import (
 GATHERED = 10
 """Steps in which worn tets are gathered."""
 _TAG = 15
+
+
+class Mirrors(RigidWalls):
+    """Symmetry planes as they are for nodes that have lost their tets: walls, where they meet their mirror images."""
+
+    @classmethod
+    def of(cls, case: Case, model: Model) -> Self:
+        """A wall for either side of every plane, and the nodes of eroding parts that start on that side of it."""
+        nodes = model.nodes
+        wears = np.array([part.erosion is not None for part in case.parts])[nodes.part]
+        points, normals, held = np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((nodes.n, 0), bool)
+        for spec in case.boundaries:
+            if not isinstance(spec, Symmetry):
+                continue
+            there = np.array([part.name in spec.parts or not spec.parts for part in case.parts])[nodes.part]
+            axis = np.eye(3)["xyz".index(spec.axis)]
+            height = nodes.x0 @ axis - spec.at
+            off = wears & there & (np.abs(height) > ON_PLANE * max(model.size, abs(spec.at)))
+            points = np.vstack([points, spec.at * axis, spec.at * axis])
+            normals = np.vstack([normals, axis, -axis])
+            held = np.column_stack([held, off & (height > 0.0), off & (height < 0.0)])
+        some = held.any(axis=1)
+        return cls(np.flatnonzero(some).astype(np.int32), points, normals, np.ascontiguousarray(held[some]))
+
+    def apply(self, state: Nodes, dt: float, t: float) -> None:
+        super().apply(state, dt, self.last_push)
 
 
 class Erosion(Boundary):

@@ -15,7 +15,7 @@ from .clock import Clock
 from .contact.stage import Contact
 from .elements.forms import AveragedElements, Elements
 from .energy import Ledger
-from .erosion import Erosion
+from .erosion import Erosion, Mirrors
 from .materials.models import BULK, DENSITY, SHEAR, moduli
 from .parallel import fixed_point
 from .parallel.comm import Comm
@@ -144,6 +144,7 @@ def build(case: Case, folder: Path, comm: Comm) -> Simulation:
         contact = Contact(case, model, piece.neighbours, scene, comm, clock, timers, extremes)
     if case.erodes:
         erosion = Erosion(case, model, piece.neighbours, contact, comm, clock, extremes)
+        scene.append(Mirrors.of(case, model))
     walls = sum(not isinstance(bound, RigidWalls) for bound in scene)
     scene[walls:walls] = [bound for bound in (erosion, contact) if bound is not None]
     probes = Probes(case, model, contact, clock, comm)

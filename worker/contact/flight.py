@@ -78,13 +78,12 @@ class Flight:
         length = np.sqrt((sums.astype(np.float64) ** 2).sum(axis=1))
         return np.asarray(sums / np.where(length > 0.0, length, 1.0)[:, None])
 
-    def extremes(self) -> tuple[float, Floats, float]:
-        """Largest difference of velocities on the surface, their middle (3,), m/s, and its tets' lowest altitude, m."""
-        crowd = self.sides.crowd
-        altitude = _lowest(crowd.x, self.sides.face_places)
-        ends = (crowd.v.max(axis=0, initial=-np.inf), (-crowd.v).max(axis=0, initial=-np.inf))
-        most = self._comm.maximum(np.array([-altitude, *ends[0], *ends[1]]))
-        return float(np.linalg.norm(most[1:4] + most[4:7])), 0.5 * (most[1:4] - most[4:7]), -float(most[0])
+    def extremes(self) -> tuple[float, Floats]:
+        """Largest difference of velocities on the surface, and their middle (3,), m/s; all ranks take part."""
+        v = self.sides.crowd.v
+        ends = (v.max(axis=0, initial=-np.inf), (-v).max(axis=0, initial=-np.inf))
+        most = self._comm.maximum(np.concatenate(ends))
+        return float(np.linalg.norm(most[:3] + most[3:])), 0.5 * (most[:3] - most[3:])
 
 
 @njit("void(int64[:, ::1], float64[:, ::1], int32[:, ::1], float64)", cache=True)
@@ -98,20 +97,6 @@ def _add_normals(sums, x, faces, scale):  # type: ignore[no-untyped-def]
             quanta = np.int64(np.rint(area * scale))
             for m in range(3):
                 sums[faces[f, m], i] += quanta
-
-
-@njit("float64(float64[:, ::1], int32[:, ::1])", cache=True, error_model="numpy")
-def _lowest(x, faces):  # type: ignore[no-untyped-def]
-    """Lowest altitude, m, of tets over their faces (f, 4)."""
-    lowest = np.inf
-    for f in range(len(faces)):
-        a, b, c, d = faces[f, 0], faces[f, 1], faces[f, 2], faces[f, 3]
-        ex, ey, ez = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
-        fx, fy, fz = x[c, 0] - x[a, 0], x[c, 1] - x[a, 1], x[c, 2] - x[a, 2]
-        nx, ny, nz = ey * fz - ez * fy, ez * fx - ex * fz, ex * fy - ey * fx
-        height = nx * (x[d, 0] - x[a, 0]) + ny * (x[d, 1] - x[a, 1]) + nz * (x[d, 2] - x[a, 2])
-        lowest = min(lowest, abs(height) / np.sqrt(nx * nx + ny * ny + nz * nz))
-    return lowest
 
 
 @njit(

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numba import njit
 
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum
@@ -99,11 +100,38 @@ class Scene:
     shared_shares: SharedSum
     shared_impulse: SharedSum
 
+    def approach(self) -> float:
+        """Largest relative speed of a candidate node over the altitude of its candidate face's tet, 1/s."""
+        crowd = self.crowd
+        return float(_approach(crowd.x, crowd.v, self.faces, self.node_face))
+
     def free(self) -> None:
         """Gives its messages back to MPI."""
         self.copies.free()
         self.shared_shares.free()
         self.shared_impulse.free()
+
+
+@njit("float64(float64[:, ::1], float64[:, ::1], int32[:, ::1], int32[:, ::1])", cache=True, error_model="numpy")
+def _approach(x, v, faces, pairs):  # type: ignore[no-untyped-def]
+    """``faces`` (f, 4), the node opposite last; ``pairs`` (p, 2) node and face."""
+    e, f, r = np.empty(3), np.empty(3), np.empty(3)
+    most = 0.0
+    for p in range(len(pairs)):
+        s, face = pairs[p, 0], pairs[p, 1]
+        a, b, c, d = faces[face, 0], faces[face, 1], faces[face, 2], faces[face, 3]
+        fastest = 0.0
+        for m in range(3):
+            speed = 0.0
+            for i in range(3):
+                speed += (v[s, i] - v[faces[face, m], i]) ** 2
+            fastest = max(fastest, speed)
+        for i in range(3):
+            e[i], f[i], r[i] = x[b, i] - x[a, i], x[c, i] - x[a, i], x[d, i] - x[a, i]
+        nx, ny, nz = e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]
+        square = (nx * r[0] + ny * r[1] + nz * r[2]) ** 2 / (nx * nx + ny * ny + nz * nz)
+        most = max(most, fastest / square)
+    return np.sqrt(most)
 
 
 def build(

@@ -5,6 +5,8 @@ surfaces make that possible. The impulses on a node are completed over all ranks
 everybody ends with the same velocity, to the bit.
 """
 
+import math
+
 import numpy as np
 from numba import njit
 
@@ -22,7 +24,8 @@ from .flight import Flight
 from .scene import Rules, Scene
 
 _SHORTEST, _LONGEST = 10.0, 300.0
-"""Steps of free flight that a search looks ahead: as many as the fastest takes past a face, within these bounds."""
+"""Steps of free flight that a search looks ahead: as many as the fastest takes past a face, but not more than twice
+what the last search was good for, within these bounds."""
 _KINEMATIC = 2.0
 """One over the share of a tet's altitude that anything may pass in a step."""
 
@@ -53,8 +56,10 @@ class Contact(Boundary):
         self.due = True
         """Whether the next step begins with a search."""
         self.limit = 0.0
-        """One over the step in which nothing passes more than half a tet, 1/s."""
+        """One over the step in which no node passes more than half of a tet that it may meet, 1/s."""
         self.searches = 0
+        self._last = -math.inf
+        """Step of the last search."""
 
     def friction_work(self) -> float:
         """Heat of friction so far of the meetings of all ranks, J; all ranks take part."""
@@ -105,15 +110,15 @@ class Contact(Boundary):
         if self._scene is not None:
             self._scene.free()
         flight.refresh(state)
-        fastest, drift, lowest = flight.extremes()
-        self.limit = _KINEMATIC * fastest / lowest
-        steps = min(max(flight.size / (fastest * clock.dt), _SHORTEST), _LONGEST) if fastest > 0.0 else _LONGEST
-        horizon = steps * clock.dt
+        fastest, drift = flight.extremes()
+        steps = min(flight.size / (fastest * clock.dt) if fastest > 0.0 else _LONGEST, 2.0 * (clock.step - self._last))
+        horizon = min(max(steps, _SHORTEST), _LONGEST) * clock.dt
         self._scene = scene.build(flight.sides, self._rules, horizon, drift, state, self._neighbours, self._comm)
+        self.limit = _KINEMATIC * float(self._comm.maximum(np.array([self._scene.approach()]))[0])
         self._look(self._scene, state)
         self._scene.normals[self._scene.held] = flight.normals(state)[self._scene.local]
         flight.begin(state, clock.t, clock.t + horizon)
-        self.due = False
+        self.due, self._last = False, clock.step
         self.searches += 1
 
     def spent(self, state: Nodes) -> bool:
