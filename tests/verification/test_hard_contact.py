@@ -1,0 +1,328 @@
+"""H12, H14, H15, H16: contact where it is hard, and the shock that an impact sends out."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+from conoid.cases import schema
+from conoid.cases.load import apply_overrides, parse_case, read_data, shipped
+from conoid.worker import simulation, state, step
+from conoid.worker.mesh.model import TetMesh
+from conoid.worker.parallel.comm import SerialComm
+from conoid.worker.simulation import Simulation
+
+from ..contact.bodies import meeting_of, moved, rotation, sheet
+from ..contact.distances import point_triangle
+from ..contact.kernels import Solver, every_pair, node_face
+from ..worker.kernels import Floats, build, run, scene
+from ..worker.meshes import REGULAR, block
+
+SIZE = 1e-3
+
+
+def depth(sim: Simulation) -> float:
+    """How far the deepest node inside another part is from that part's surface, m; of two parts on one rank."""
+    assert sim.contact is not None
+    x, part = sim.model.nodes.x, sim.model.nodes.part
+    faces = sim.contact._flight.sides.faces.nodes[:, :3]
+    deepest = 0.0
+    for body in sim.model.blocks:
+        others, mine = x[np.unique(faces[part[faces[:, 0]] != body.part])], x[part == body.part]
+        near = others[((others > mine.min(axis=0)) & (others < mine.max(axis=0))).all(axis=1)]
+        corners = x[body.tets]
+        shares = (near[:, None, None] - corners[None, :, :1]) @ np.linalg.inv(corners[:, 1:] - corners[:, :1])
+        inside = near[((shares[:, :, 0].min(axis=2) > 0.0) & (shares[:, :, 0].sum(axis=2) < 1.0)).any(axis=1)]
+        if len(inside):
+            away = point_triangle(inside, x[faces[part[faces[:, 0]] == body.part]])
+            deepest = max(deepest, float(away.min(axis=1).max()))
+    return deepest
+
+
+# H12, V19: a node slides from facet to facet --------------------------------------------------------------------------
+
+CELLS = 8
+
+
+def facets(shake: float, fold: float = 0.0) -> tuple[Floats, "np.ndarray"]:
+    """A sheet of irregular facets of 1 m, and their faces; beyond its middle it rises with the slope ``fold``."""
+    x, faces = sheet(CELLS, 1.0)
+    inner = ((x[:, :2] > 0.0) & (x[:, :2] < CELLS)).all(axis=1) & (x[:, 0] != CELLS / 2)
+    x[inner, :2] += np.random.default_rng(5).uniform(-shake, shake, (int(inner.sum()), 2))
+    x[:, 2] += fold * np.maximum(x[:, 0] - CELLS / 2, 0.0)
+    return x, np.column_stack([faces, np.full(len(faces), len(x))]).astype(np.int32)
+
+
+class Slide:
+    """Nodes of 1 kg on a rigid sheet under a load of 1 m/s^2, in steps of 1 s."""
+
+    def __init__(self, ground: Floats, faces: "np.ndarray", start: Floats, v: Floats) -> None:
+        self.x = np.concatenate([ground, [[0.0, 0.0, -5.0]], start])
+        self.v = np.concatenate([np.zeros((len(ground) + 1, 3)), v])
+        self.faces, self.first = faces, len(ground) + 1
+        self.mobility = np.zeros_like(self.x)
+        self.mobility[self.first :] = 1.0
+
+    @property
+    def nodes(self) -> tuple[Floats, Floats]:
+        """Their positions and velocities."""
+        return self.x[self.first :], self.v[self.first :]
+
+    def step(self, load: float, friction: float = 0.0) -> Floats:
+        """(n, 3) the impulses of contact, N s."""
+        self.v[self.first :, 2] -= load
+        before = self.v.copy()
+        slaves = np.arange(self.first, len(self.x))
+        met = node_face(
+            self.x, self.v, self.faces, every_pair(slaves, len(self.faces)), 1.0, mu=np.full((2, 2), friction)
+        )
+        self.v = Solver(met, self.v, self.mobility, 2.0**50).sweep(5)
+        self.x += self.v
+        return np.asarray(self.v - before)[self.first :]
+
+
+def travellers(n: int, speed: float) -> tuple[Floats, Floats]:
+    """Starts on the sheet and velocities; some run along edges and through the sheet's nodes."""
+    random = np.random.default_rng(2)
+    start, angle = random.uniform(2.5, CELLS - 2.5, (n, 2)), random.uniform(0.0, 2.0 * np.pi, n)
+    start[: n // 2] = np.round(start[: n // 2])
+    angle[: n // 3] = np.round(angle[: n // 3] / (np.pi / 4)) * (np.pi / 4)
+    way = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(n)])
+    return np.column_stack([start, np.zeros(n)]), speed * way
+
+
+@pytest.mark.parametrize("shake", [0.0, 0.2])
+@pytest.mark.parametrize("speed", [0.037, 0.41])
+def test_a_node_slides_over_edges_and_vertices_as_on_a_plane(speed: float, shake: float) -> None:
+    """It is neither lost nor held twice: every step gives back the load, to round-off, and nothing along the plane."""
+    load = 1e-3 * speed
+    slide = Slide(*facets(shake), *travellers(120, speed))
+    v = slide.nodes[1].copy()
+    for _ in range(int(2.0 / speed)):
+        pushed = slide.step(load)
+        assert np.abs(pushed - [0.0, 0.0, load]).max() < 1e-9 * load + 1e-14
+    assert np.abs(slide.nodes[0][:, 2]).max() < 1e-12
+    assert np.abs(slide.nodes[1] - v).max() < 1e-12 * speed
+
+
+def test_friction_slows_it_down_evenly() -> None:
+    """By mu N / m in every step, whatever facets it passes; it never turns back."""
+    speed, load, mu = 0.1, 1e-2, 0.3
+    slide = Slide(*facets(0.2), *travellers(120, speed))
+    way = slide.nodes[1] / speed
+    for _ in range(20):
+        pushed = slide.step(load, mu)
+        assert np.abs(pushed + mu * load * way - [0.0, 0.0, load]).max() < 1e-9 * load
+    assert np.abs(slide.nodes[1] - (speed - 20 * mu * load) * way).max() < 1e-9 * speed
+    for _ in range(20):
+        slide.step(load, mu)
+    assert np.abs(slide.nodes[1]).max() < 1e-9 * speed
+
+
+@pytest.mark.parametrize("slope", [0.3, -0.3])
+def test_where_the_ground_rises_only_the_normal_part_is_lost_and_where_it_falls_nothing(slope: float) -> None:
+    """No load: into a fold the node loses v . n, less the tenth that contact may give back for a depth; over a ridge
+    it flies on, and nothing holds it."""
+    start, v = travellers(120, 0.2)
+    start[:, 0], v[:, 0] = CELLS / 2 - 0.5, np.abs(v[:, 0]) + 0.05
+    slide = Slide(*facets(0.0, slope), start, v)
+    pushes = np.zeros(120)
+    for _ in range(12):
+        pushes += np.abs(slide.step(0.0)).max(axis=1) > 1e-12
+    normal = np.array([-slope, 0.0, 1.0]) / np.hypot(slope, 1.0)
+    lost = np.minimum(v @ normal, 0.0)[:, None] * normal
+    done = slide.nodes[0][:, 0] > CELLS / 2 + 0.3
+    assert done.sum() > 50
+    assert (np.abs(slide.nodes[1] - (v - lost)).max(axis=1) <= 0.1 * np.abs(lost).max(axis=1))[done].all()
+    assert (slide.nodes[0] @ normal)[done].min() > CELLS / 2 * normal[0] - 1e-3
+    assert pushes.max() == 0.0 or slope > 0.0
+
+
+# H14: heavy on light, fine on coarse ----------------------------------------------------------------------------------
+
+HEAVY = schema.Material(density=17300.0, elastic=schema.Elastic(young=360e9, poisson=0.28))
+LIGHT = schema.Material(density=2500.0, elastic=schema.Elastic(young=72e9, poisson=0.22))
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.2])
+@pytest.mark.parametrize("heavy_is_fine", [True, False])
+def test_nothing_sinks_in_where_masses_differ_by_a_factor_of_fifty(heavy_is_fine: bool, tilt: float) -> None:
+    """Tungsten alloy and glass, elements 1:2, 100 m/s, flat and corner first: under 1 % of the smaller element."""
+    coarse = block((5, 5, 4), SIZE, seed=2)
+    fine = moved(block((6, 6, 6), SIZE / 2, seed=1), (0.0, 0.0, 0.0), rotation((1, 2, 0), tilt))
+    fine = moved(fine, (0.9 * SIZE, 1.1 * SIZE, 4.001 * SIZE - fine.points[:, 2].min()))
+    case = meeting_of([{"velocity": (0.0, 0.0, -100.0)}, {}], {}, end=2e-6, viscosity={})
+    parts = (case.parts[0], case.parts[1].model_copy(update={"material": "other"}))
+    metals = (HEAVY, LIGHT) if heavy_is_fine else (LIGHT, HEAVY)
+    materials = dict(zip(("metal", "other"), metals, strict=True))
+    sim = build(case.model_copy(update={"materials": materials, "parts": parts}), [fine, coarse])
+    deepest = [0.0]
+
+    def look(sim: Simulation, before: Floats) -> None:
+        sim.ledger.close(before)
+        if sim.clock.step % 4 == 0:
+            deepest.append(depth(sim))
+
+    run(sim, look)
+    assert sim.contact is not None
+    assert sim.contact.impulses()[1, 2] < 0.0
+    assert max(deepest) < 0.01 * SIZE / 2
+    assert sim.ledger.worst < 1e-3
+
+
+# H15: what is fast ----------------------------------------------------------------------------------------------------
+
+
+def test_a_fragment_of_five_kilometres_a_second_sinks_in_little() -> None:
+    """The shipped case, step by step: impulse and momentum agree, and no node is deeper than 1 % of an element."""
+    case = parse_case(apply_overrides(read_data(shipped()["fast_fragment"]), ["run.frames=0"]))
+    sim = simulation.build(case, Path(), SerialComm())
+    assert sim.contact is not None
+    nodes, deepest = sim.model.nodes, [0.0]
+    plate, fragment = (nodes.part == part for part in (0, 1))
+    start = (nodes.mass * nodes.v[:, 2])[fragment].sum()
+
+    def look(sim: Simulation, before: Floats) -> None:
+        sim.ledger.close(before)
+        deepest.append(depth(sim))
+
+    run(sim, look)
+    pushed = sim.contact.impulses()
+    assert np.abs(pushed.sum(axis=0)).max() < 1e-9 * -start
+    assert (nodes.mass * nodes.v[:, 2])[plate].sum() == pytest.approx(pushed[0, 2], rel=1e-6)
+    assert 1.0 < pushed[0, 2] / start < 2.0
+    assert sim.ledger.worst < 0.01
+    assert max(deepest) < 0.01 * 0.3e-3
+
+
+PLATE = np.array([4.0, 4.0, 1.0]) * SIZE
+
+
+class Shot:
+    """A tet of any size and direction, at 1 to 50 km/s past or into a plate of one layer of tets."""
+
+    def __init__(self, seed: int) -> None:
+        random = np.random.default_rng(seed)
+        self.speed = 10.0 ** random.uniform(3.0, 4.7)
+        self.way = random.normal(size=3)
+        self.way /= np.linalg.norm(self.way)
+        turn = rotation(tuple(random.normal(size=3)), random.uniform(0.0, np.pi))
+        corners = (REGULAR - REGULAR.mean(axis=0)) @ turn.T * SIZE * 10.0 ** random.uniform(-0.5, 0.5)
+        start = random.uniform(-0.6, 1.6, 3) * PLATE - random.uniform(11.0, 13.0) * SIZE * self.way
+        self.drift = 300.0 * random.normal(size=3)
+        self.meshes = [block((4, 4, 1), SIZE, seed=seed), TetMesh(corners + start, np.array([[0, 1, 2, 3]], np.int32))]
+
+    def way_in(self, larger: float = 1.0) -> float | None:
+        """Exact: how far the tet flies, m, until it touches the plate, both taken as ``larger`` times as large.
+
+        It does where the ray from the origin enters the hull of all differences of their corners.
+        """
+        box = np.stack(np.meshgrid(*np.column_stack([np.zeros(3), PLATE]), indexing="ij"), axis=-1).reshape(-1, 3)
+        middle, centre = PLATE / 2, self.meshes[1].points.mean(axis=0)
+        box, tet = middle + larger * (box - middle), centre + larger * (self.meshes[1].points - centre)
+        planes = ConvexHull((box[:, None] - tet[None]).reshape(-1, 3) / SIZE).equations
+        rate, off = planes[:, :3] @ self.way, planes[:, 3]
+        begin = np.max(-off[rate < 0.0] / rate[rate < 0.0], initial=0.0)
+        end = np.min(-off[rate > 0.0] / rate[rate > 0.0], initial=np.inf)
+        return float(begin) * SIZE if begin < end else None
+
+    def fly(self) -> tuple[float, float] | None:
+        """How far the tet has flown, m, at the step that pushes it first, and after it; None when none does."""
+        motions: list[dict[str, Any]] = [
+            {"velocity": tuple(self.drift + v)} for v in (0.0 * self.way, self.way * self.speed)
+        ]
+        sim = build(meeting_of(motions), self.meshes)
+        assert sim.contact is not None
+        step.prepare(sim)
+        while sim.clock.t * self.speed < 25.0 * SIZE:
+            step.first_half(sim)
+            if np.abs(sim.contact.impulses()).max() > 0.0:
+                return sim.clock.t * self.speed, (sim.clock.t + sim.clock.dt) * self.speed
+            step.second_half(sim)
+        return None
+
+
+def misjudged(seeds: range) -> tuple[int, list[int]]:
+    """How many shots hit, and the seeds of those that were pushed too early, too late or at all; grazing ones may be.
+
+    Grazing is what half a per cent more or less of either body's size decides; a hundredth of a face is near enough.
+    """
+    hits, wrong = 0, []
+    for seed in seeds:
+        shot = Shot(seed)
+        sure, possible = shot.way_in(0.995), shot.way_in(1.005)
+        seen = shot.fly()
+        hits += sure is not None
+        if seen is None:
+            ok = sure is None
+        else:
+            ok = possible is not None and possible - 0.01 * SIZE < seen[1]
+            ok &= sure is None or seen[0] < sure + 0.01 * SIZE
+        wrong += [] if ok else [seed]
+    return hits, wrong
+
+
+def test_no_shot_misses_what_its_ray_hits() -> None:
+    assert misjudged(range(40)) == (23, [])
+
+
+@pytest.mark.slow
+@pytest.mark.xfail(
+    strict=True,
+    reason="13 of 1000: edges are met where they are at the end of the step and not where they cross; and a node beside "
+    "an acute edge, below the plane of one of its faces, is taken for one inside",
+)
+def test_no_shot_of_a_thousand_misses_what_its_ray_hits() -> None:
+    hits, wrong = misjudged(range(40, 1040))
+    assert hits > 400
+    assert wrong == []
+
+
+# H16: the shock that an impact sends out ------------------------------------------------------------------------------
+
+
+def shocked(name: str, viscosity: dict[str, float]) -> Floats:
+    """Pressure, over that of the theory, of the layers of a row of 100 cubes when the shock has passed seventy."""
+    shipped_case = parse_case(read_data(shipped()[name]))
+    (metal,), speed = shipped_case.materials.values(), -shipped_case.parts[0].velocity[2]
+    assert metal.eos is not None
+    front, cells, size = metal.eos.c0 + metal.eos.S * speed, 100, 0.1e-3
+    rollers = tuple({"kind": "symmetry", "axis": axis, "at": at} for axis in "xy" for at in (0.0, size))
+    wall = {"kind": "wall", "point": (0.0, 0.0, 0.0), "normal": (0.0, 0.0, 1.0)}
+    case = scene(
+        metal, end=0.7 * cells * size / front, velocity=(0.0, 0.0, -speed), boundaries=(*rollers, wall),
+        viscosity=viscosity,
+    )  # fmt: skip
+    sim = run(build(case, [block((1, 1, cells), size, 0.0)]))
+    (row,) = sim.model.blocks
+    layer = (sim.model.nodes.x0[row.tets].mean(axis=1)[:, 2] / size).astype(int)
+    total = row.row(state.MASS) * (row.row(state.PRESSURE) + row.row(state.VISCOUS))
+    return np.asarray(
+        np.bincount(layer, total) / np.bincount(layer, row.row(state.MASS)) / (metal.density * front * speed)
+    )
+
+
+def where(profile: Floats, level: float) -> float:
+    """The layer, between two of them, at which the front has a level."""
+    k = int(np.flatnonzero(profile > level)[-1])
+    return k + float((profile[k] - level) / (profile[k] - profile[k + 1]))
+
+
+@pytest.mark.parametrize("name", ["shock_copper", "shock_tungsten"])
+def test_a_shock_of_few_elements_does_not_overshoot(name: str) -> None:
+    """Under 5 % of the jump, over at most five layers from 5 to 95 % of it, with viscosity 0.2 and 6 and the pressure of each tet.
+
+    A tet of a cube cut in six has half the length of the cube, so that 0.06 and 1.5 are 0.03 and 0.4 of a layer.
+    """
+    profile = shocked(name, {"linear": 0.2, "quadratic": 6.0})
+    assert profile[5:].max() < 1.05
+    assert where(profile, 0.05) - where(profile, 0.95) <= 5.0
+    assert profile[20:60].mean() == pytest.approx(1.0, rel=0.01)
+
+
+@pytest.mark.parametrize("name", ["shock_copper", "shock_tungsten"])
+def test_without_viscosity_it_rings(name: str) -> None:
+    """The check above can fail."""
+    assert shocked(name, {"linear": 0.0, "quadratic": 0.0})[5:].max() > 1.2
