@@ -271,8 +271,8 @@ def test_no_shot_misses_what_its_ray_hits() -> None:
 @pytest.mark.slow
 @pytest.mark.xfail(
     strict=True,
-    reason="13 of 1000: edges are met where they are at the end of the step and not where they cross; and a node beside "
-    "an acute edge, below the plane of one of its faces, is taken for one inside",
+    reason="13 of 1000: edges are met where they are at the end of the step and not where they cross; and a node "
+    "beside an acute edge, below the plane of one of its faces, is taken for one inside",
 )
 def test_no_shot_of_a_thousand_misses_what_its_ray_hits() -> None:
     hits, wrong = misjudged(range(40, 1040))
@@ -312,7 +312,7 @@ def where(profile: Floats, level: float) -> float:
 
 @pytest.mark.parametrize("name", ["shock_copper", "shock_tungsten"])
 def test_a_shock_of_few_elements_does_not_overshoot(name: str) -> None:
-    """Under 5 % of the jump, over at most five layers from 5 to 95 % of it, with viscosity 0.2 and 6 and the pressure of each tet.
+    """Under 5 % of the jump, at most five layers from 5 to 95 % of it, with viscosity 0.2 and 6 (standard form).
 
     A tet of a cube cut in six has half the length of the cube, so that 0.06 and 1.5 are 0.03 and 0.4 of a layer.
     """
