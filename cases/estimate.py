@@ -11,11 +11,13 @@ from pathlib import Path
 
 from .geometry import AXES, bounds
 from .library import material
-from .mesh_size import MeshSize, mesh_size
+from .mesh_size import MeshSize, mesh_size, surface_faces
 from .schema import Case, JohnsonCook, Material, MeshFile, Part, Rotation, Symmetry, Wall
 
 NANOSECONDS = {"tet": 80.0, "nodal": 45.0, "split": 90.0, "linear_hardening": 30.0, "johnson_cook": 85.0, "eos": 15.0}
 """Core time per tet and step: what every tet takes, and what each feature adds. Measured at 10,000 to 750,000 tets."""
+FACE_NANOSECONDS = {"contact": 50.0, "erosion": 1400.0}
+"""Core time per face of the surface and step; the second where parts erode, stay in touch and are searched often."""
 STEP_OVERHEAD = 0.3e-3
 """Core seconds that a rank takes for a step besides its tets."""
 START = 2.0
@@ -28,8 +30,9 @@ TET_BYTES = {"tet": 330, "nodal": 110, "split": 140, "strength": 50}
 FILE_BYTES = {".msh": 42, ".inp": 48}
 """Bytes of a text mesh file a tet, its share of the node lines included."""
 
-DEEPEST = 12.0
-"""The mean time step of a crushed body is never taken to be smaller than the initial one over this."""
+DEEPEST, DEEPEST_ERODING = 12.0, 4.0
+"""The mean time step of a crushed body is never taken to be smaller than the initial one over this: the flattest tets
+of a part that erodes leave."""
 
 
 @dataclass(frozen=True)
@@ -118,13 +121,14 @@ def shrinkage(case: Case, part: Part) -> float:
     falls as exp(4 strain), which fits Taylor bars of copper and steel. Held on all sides, it is compressed by a shock.
     """
     made, speed = material(case, part.material), impact_speed(case, part)
+    deepest = DEEPEST if part.erosion is None else DEEPEST_ERODING
     if _confined(case, part):
         shock = made.eos.c0 + made.eos.S * speed if made.eos is not None else wave_speed(made)
         faster = 1.0 + 2.0 * made.eos.S * speed / made.eos.c0 if made.eos is not None else 1.0
-        return min(DEEPEST, faster / (1.0 - min(speed / shock, 0.9)))
+        return min(deepest, faster / (1.0 - min(speed / shock, 0.9)))
     if made.strength is None:
         return 1.0
-    return min(DEEPEST, math.exp(min(4.0 * made.density * speed**2 / (2.0 * _flow_stress(made)), 10.0)))
+    return min(deepest, math.exp(min(4.0 * made.density * speed**2 / (2.0 * _flow_stress(made)), 10.0)))
 
 
 def impact_speed(case: Case, part: Part) -> float:
@@ -177,7 +181,15 @@ def _core_seconds(case: Case, parts: tuple[PartEstimate, ...], steps: int | None
     if steps is None or any(size.elements is None for size in parts):
         return None
     tets = sum((size.elements or 0) * _nanoseconds(case, part) for size, part in zip(parts, case.parts, strict=True))
-    return steps * (tets * 1e-9 + case.run.ranks * STEP_OVERHEAD) + case.run.ranks * START
+    return steps * ((tets + _contact(case)) * 1e-9 + case.run.ranks * STEP_OVERHEAD) + case.run.ranks * START
+
+
+def _contact(case: Case) -> float:
+    """Nanoseconds of contact in a step; parts from mesh files, whose surface is not known, are left out."""
+    if not case.in_contact:
+        return 0.0
+    faces = sum(surface_faces(part.mesh) for part in case.parts if not isinstance(part.mesh, MeshFile))
+    return faces * FACE_NANOSECONDS["erosion" if case.erodes else "contact"]
 
 
 def _nanoseconds(case: Case, part: Part) -> float:

@@ -11,6 +11,9 @@ TETS_PER_VOLUME, TETS_PER_SURFACE = 5.55, 1.42
 NODES_PER_VOLUME, NODES_PER_SURFACE = 0.87, 1.23
 """gmsh makes a V / h^3 + b S / h^2 tets and nodes of a body with volume V and surface S: fitted to seven bodies."""
 
+FACES_PER_SURFACE = 1.8
+"""Faces of a surface S over S / h^2; a structured mesh has 2."""
+
 REGULAR = 6**-0.5
 """Step length 1 / sqrt(sum |grad N|^2) of the regular tet, and of the tets of a cut cube, over the edge h."""
 WORST_UNSTRUCTURED = 0.68
@@ -41,6 +44,11 @@ def mesh_size(mesh: Generated) -> MeshSize:
     elements = TETS_PER_VOLUME * filling + TETS_PER_SURFACE * covering
     nodes = NODES_PER_VOLUME * filling + NODES_PER_SURFACE * covering
     return MeshSize(max(6, round(elements)), max(8, round(nodes)), WORST_UNSTRUCTURED * REGULAR * mesh.element_size)
+
+
+def surface_faces(mesh: Generated) -> int:
+    """How many faces the surface of a primitive has, cuts of its sector included: an estimate."""
+    return round(FACES_PER_SURFACE * surface(mesh) * _mean_powers(mesh)[1])
 
 
 def _mean_powers(mesh: Generated) -> tuple[float, float]:

@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from . import accuracy, axisymmetric, gates, growth, machine, speed, startup, taylor_cost, telemetry
+from . import accuracy, axisymmetric, gates, growth, long_rod, machine, speed, startup, taylor_cost, telemetry
 from .gates import Gate
 from .scene import box
 
@@ -34,16 +34,18 @@ class Extent:
     plans: list[accuracy.Plan]
     telemetry: int
     quads: tuple[int, ...]
+    shots: tuple[long_rod.Variant, ...]
 
 
 QUICK = Extent(
     sizes=(50_000,), metals=(speed.METALS[0], speed.METALS[3]), rounds=3, akantu=False, stages=0,
-    growth=(50_000, 150_000), startup=0, plans=accuracy.grid([1.07], [0.9]), telemetry=0, quads=(3,),
+    growth=(50_000, 150_000), startup=0, plans=accuracy.grid([1.07], [0.9]), telemetry=0, quads=(3,), shots=(),
 )  # fmt: skip
 FULL = Extent(
     sizes=(50_000, 144_000, 500_000), metals=speed.METALS, rounds=3, akantu=True, stages=10,
     growth=(50_000, 150_000, 500_000, 2_000_000), startup=3,
     plans=accuracy.grid([0.54, 0.8, 1.07], [0.9]) + accuracy.grid([1.07], [0.45]), telemetry=40, quads=(3, 4, 6),
+    shots=long_rod.MESHES[:2],
 )  # fmt: skip
 LONG = Extent(
     sizes=FULL.sizes, metals=FULL.metals, rounds=6, akantu=True, stages=10, growth=FULL.growth,
@@ -52,7 +54,7 @@ LONG = Extent(
         *accuracy.grid([0.4], [0.9]), *FULL.plans, *accuracy.grid([0.54, 0.8], [0.45]),
         *accuracy.variants(0.54), *accuracy.variants(0.8),
     ],
-    telemetry=120, quads=(3, 4, 6, 8, 12),
+    telemetry=120, quads=(3, 4, 6, 8, 12), shots=(*long_rod.MESHES, *long_rod.SPEEDS, *long_rod.OTHERS),
 )  # fmt: skip
 
 
@@ -133,9 +135,18 @@ def _telemetry(extent: Extent, book: Book) -> None:
     book.add("Telemetry", text, data, gates.of_telemetry(costs, answers))
 
 
+def _long_rod(extent: Extent, book: Book) -> None:
+    shots = []
+    for shot in long_rod.measure(extent.shots):
+        shots.append(shot)
+        print(long_rod.report([shot]).splitlines()[-1], flush=True)
+    if shots:
+        book.add("Long rod", long_rod.report(shots), long_rod.as_data(shots), gates.of_long_rod(shots))
+
+
 PARTS: dict[str, Callable[[Extent, Book], None]] = {
     "speed": _speed, "akantu": _akantu, "taylor": _taylor, "growth": _growth, "startup": _startup,
-    "accuracy": _accuracy, "telemetry": _telemetry,
+    "accuracy": _accuracy, "telemetry": _telemetry, "long_rod": _long_rod,
 }  # fmt: skip
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from .accuracy import Answer
 from .growth import Growth
+from .long_rod import BANDS, LENGTH, Shot
 from .speed import Speed
 from .startup import Startup
 from .switch import Pairs
@@ -105,3 +106,21 @@ def report(gates: Sequence[Gate]) -> str:
     """One line each."""
     rows = [[gate.what, gate.wanted, gate.measured, "yes" if gate.met else "NO"] for gate in gates]
     return table(["what", "wanted", "measured", "met"], rows) + "\n"
+
+
+def of_long_rod(shots: Sequence[Shot]) -> Iterator[Gate]:
+    """Bands of P/L, the change with the mesh, and the wall time."""
+    found = {shot.variant.name: shot for shot in shots}
+    for speed, (low, high) in BANDS.items():
+        if speed in found:
+            share = found[speed].depth / LENGTH
+            yield Gate(f"long rod, P/L at {speed}", f"{low:.2f} to {high:.2f}", f"{share:.3f}", low <= share <= high)
+    if "1 mm" in found and "0.7 mm" in found:
+        change = abs(found["0.7 mm"].depth / found["1 mm"].depth - 1.0)
+        yield Gate("long rod, P from 1 mm to 0.7 mm", "< 5 %", f"{change:.1%}", change < 0.05)
+    if "1 mm" in found:
+        outcome = found["1 mm"].outcome
+        wall = outcome.elapsed - outcome.setup
+        yield Gate("long rod, 1 mm, 2 ranks", "< 600 s", f"{wall:.0f} s", wall < 600.0)
+        share = sum(outcome.phases["contact"]) / sum(outcome.phases["elements"])
+        yield Gate("long rod, contact over elements", "<= 1", f"{share:.2f}", share <= 1.0)

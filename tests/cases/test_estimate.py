@@ -43,7 +43,7 @@ STEPS = {
     "shock_copper": 741, "shock_tungsten": 998, "spinning_cube": 4892, "free_spin": 6859, "bar_on_bar": 890,
     "crossed_bars": 3590, "dissimilar_bars": 410, "hertz_spheres": 18458, "newton_cradle": 1930,
     "taylor_42crmo4": 8998, "taylor_copper": 21529, "taylor_copper_split": 20091, "demo": 8998,
-    "fast_fragment": 335,
+    "fast_fragment": 335, "long_rod": 13442,
 }  # fmt: skip
 """Steps that the shipped cases were seen to take."""
 

@@ -27,6 +27,7 @@ SHORT = {
     "fast_fragment": "0.25 us",
     "free_spin": "10 us",
     "hertz_spheres": "0.2 us",
+    "long_rod": "2 us",
     "newton_cradle": "2 us",
     "plastic_bar_wave": "1.5 us",
     "plastic_wave": "1.5 us",

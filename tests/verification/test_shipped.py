@@ -10,7 +10,7 @@ from conoid.cases import layout, load
 from conoid.cases.library import material
 from conoid.cases.outcome import Outcome, from_json
 
-HEAVY = {"demo", "hertz_spheres", "taylor_42crmo4", "taylor_copper", "taylor_copper_split"}
+HEAVY = {"demo", "hertz_spheres", "long_rod", "taylor_42crmo4", "taylor_copper", "taylor_copper_split"}
 """Half a minute and more."""
 NAMES = [pytest.param(name, marks=[pytest.mark.slow] * (name in HEAVY)) for name in sorted(load.shipped())]
 

@@ -1,0 +1,171 @@
+"""The long rod through six plates: penetration against mesh, speed, erosion, pressure form, friction and strength.
+
+Every run is the shipped case with a few assignments, on two ranks, one run after the other.
+"""
+
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import numpy.typing as npt
+
+from conoid.cases import layout, load
+from conoid.cases.library import library
+from conoid.cases.outcome import Outcome, from_json
+from conoid.worker.mesh.faces import boundary_faces
+
+from .table import Cell, table
+
+Floats = npt.NDArray[np.float64]
+PARTS = range(7)
+LENGTH = 75.0
+"""Of the rod, mm."""
+BANDS = {"1057 m/s": (0.60, 0.80), "1301 m/s": (0.85, 1.05), "1566.4 m/s": (1.00, 1.20)}
+"""P/L of a tungsten rod in mild steel by Alekseevskii's and Tate's theory, with a rod strength of 1.5 to 2 GPa and a
+target resistance of 3 to 3.5 GPa that are assumed, not derived from the constants of the case."""
+_CRATER = (6.0, 40.0)
+"""Depths between which the diameter of the crater is measured, mm."""
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One run: what differs from the shipped case."""
+
+    name: str
+    assignments: tuple[str, ...] = ()
+    yields: tuple[tuple[str, float], ...] = ()
+    """Materials and their constant A, GPa, where it differs from the library's."""
+
+
+def eroding(key: str, value: object) -> tuple[str, ...]:
+    """An assignment to the erosion of every part."""
+    return tuple(f"parts[{k}].erosion.{key}={value}" for k in PARTS)
+
+
+def meshed(size: float, **grading: float) -> tuple[str, ...]:
+    """Another mesh: element size near the axis, mm."""
+    sizes = [f"parts[{k}].mesh.element_size={size:g} mm" for k in PARTS]
+    return *sizes, *(f"parts[{k}].mesh.grading.{key}={v:g} mm" for k in PARTS[1:] for key, v in grading.items())
+
+
+COARSE = meshed(1.4)
+QUICK = (Variant("1.4 mm", COARSE),)
+SPEEDS = tuple(
+    Variant(speed, (f"parts[0].velocity=['0 m/s', '0 m/s', '{speed}']", "run.end_time=180 us")) for speed in BANDS
+)
+MESHES = (
+    Variant("2 mm", meshed(2.0)), Variant("1.4 mm", COARSE), Variant("1 mm"), Variant("0.7 mm", meshed(0.7)),
+    Variant("1 mm, fine out to 8 mm", meshed(1.0, near=8.0)),
+)  # fmt: skip
+OTHERS = (
+    Variant("erosion at 1.5", (*COARSE, *eroding("plastic_strain", 1.5))),
+    Variant("erosion at 2.5", (*COARSE, *eroding("plastic_strain", 2.5))),
+    Variant("erosion at 4", (*COARSE, *eroding("plastic_strain", 4.0))),
+    Variant("time step of erosion 0.1", (*COARSE, *eroding("time_step", 0.1))),
+    Variant("nodes removed", (*COARSE, *eroding("nodes", '"remove"'))),
+    Variant("pressure standard", (*COARSE, 'numerics.pressure="standard"')),
+    Variant("pressure split", (*COARSE, 'numerics.pressure="split"')),
+    Variant("friction 0.1", (*COARSE, "contact.friction=0.1")),
+    Variant("20 sweeps", (*COARSE, "contact.sweeps=20")),
+    Variant("rod A 1.0 GPa", COARSE, (("wha", 1.0),)),
+    Variant("rod A 1.51 GPa", COARSE, (("wha", 1.51),)),
+    Variant("plates A 0.22 GPa", COARSE, (("mild_steel", 0.22),)),
+    Variant("plates A 0.40 GPa", COARSE, (("mild_steel", 0.40),)),
+    Variant("rod A 1.0, plates A 0.40 GPa", COARSE, (("wha", 1.0), ("mild_steel", 0.40))),
+)
+
+
+@dataclass(frozen=True)
+class Shot:
+    """What came out of a variant; lengths in mm."""
+
+    variant: Variant
+    outcome: Outcome
+    depth: float
+    crater: float
+    """Mean diameter between the depths of _CRATER."""
+
+
+def measure(variants: Sequence[Variant], ranks: int = 2) -> Iterator[Shot]:
+    """Every variant in turn."""
+    for variant in variants:
+        with tempfile.TemporaryDirectory(prefix="conoid-bench-") as folder:
+            yield run(variant, Path(folder), ranks)
+
+
+def run(variant: Variant, folder: Path, ranks: int) -> Shot:
+    """The variant in ``folder``, with the worker's command line."""
+    data = load.apply_overrides(load.read_data(load.shipped_path("long_rod")), ["run.frames=1", *variant.assignments])
+    data["materials"] = {name: _stronger(name, strength) for name, strength in variant.yields}
+    case = folder / "case.json"
+    case.write_text(json.dumps(data), encoding="utf-8")
+    command = ["-m", "conoid.worker", str(case), "--out", str(folder / "run")]
+    launch = [str(Path(sys.executable).with_name("mpiexec")), "-n", str(ranks), sys.executable, "-m", "mpi4py"]
+    subprocess.run([*launch, *command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=7200)
+    outcome = from_json((folder / "run" / layout.OUTCOME).read_bytes())
+    depth = next((c.value for c in outcome.reference if c.name.startswith("penetration")), float("nan"))
+    last = layout.frame(folder / "run", 1)
+    return Shot(variant, outcome, 1e3 * depth, 1e3 * crater(last) if last.exists() else float("nan"))
+
+
+def _stronger(name: str, strength: float) -> dict[str, Any]:
+    """A material of the library with another A, GPa."""
+    table: dict[str, Any] = library()[name].model_dump(exclude_none=True)
+    table["strength"]["A"] = 1e9 * strength
+    return table
+
+
+def crater(frame: Path) -> float:
+    """Mean diameter, m, of the hole in the plates of a frame, from the outward faces of what is left.
+
+    The wall is where the innermost faces are, in each of nine sectors and slices; the median of all is taken, so that
+    a flake in the hole does not count.
+    """
+    with h5py.File(frame) as file:
+        grid = file["VTKHDF"]
+        points, part = grid["Points"][:], grid["CellData/part"][:]
+        tets = grid["Connectivity"][:].reshape(-1, 4)[part > 0]
+    centres: Floats = points[boundary_faces(tets)].mean(axis=1)
+    radius, angle = np.hypot(centres[:, 0], centres[:, 1]), np.arctan2(centres[:, 1], centres[:, 0])
+    sector = np.minimum((angle / (np.pi / 2) * 9).astype(int), 8)
+    slices = np.linspace(*_CRATER, 10) * 1e-3
+    walls = []
+    for low, high in pairwise(slices):
+        for k in range(9):
+            there = radius[(centres[:, 2] > low) & (centres[:, 2] < high) & (sector == k)]
+            if len(there):
+                walls.append(there.min())
+    return 2.0 * float(np.median(walls))
+
+
+def report(shots: Sequence[Shot]) -> str:
+    """A table."""
+    head = ["variant", "tets", "eroded", "steps", "wall s", "CPU s", "contact / elements", "residual", "P mm", "P/L",
+            "crater mm"]  # fmt: skip
+    return table(head, [_row(shot) for shot in shots])
+
+
+def _row(shot: Shot) -> list[Cell]:
+    o = shot.outcome
+    share = sum(o.phases["contact"]) / sum(o.phases["elements"])
+    return [
+        shot.variant.name, o.elements, o.eroded, o.steps, round(o.elapsed - o.setup), round(o.cpu), round(share, 2),
+        o.worst_residual, f"{shot.depth:.1f}", f"{shot.depth / LENGTH:.3f}", f"{shot.crater:.1f}",
+    ]  # fmt: skip
+
+
+def as_data(shots: Sequence[Shot]) -> list[dict[str, object]]:
+    """For JSON."""
+    return [
+        {"variant": s.variant.name, "depth": s.depth, "crater": s.crater, "wall": s.outcome.elapsed - s.outcome.setup,
+         "cpu": s.outcome.cpu, "steps": s.outcome.steps, "tets": s.outcome.elements, "digest": s.outcome.digest}
+        for s in shots
+    ]  # fmt: skip
