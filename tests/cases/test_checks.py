@@ -12,6 +12,7 @@ TUBE = 'parts[0].mesh={shape="tube", inner_radius="2 mm", radius="3 mm", length=
 
 def test_the_rod_is_sound() -> None:
     parse_case(rod())
+    parse_case(rod("parts[0].material=copper_taylor", "parts[0].erosion={plastic_strain=1}"))
     parse_case(rod(TUBE))
 
 
@@ -38,7 +39,7 @@ def test_the_rod_is_sound() -> None:
         (["boundaries[0].normal=[0, 0, -1]"], "boundaries[0]", "part 'rod' starts 0.03 m behind this wall"),
         (["boundaries[0].point=[0, 0, '1 mm']"], "boundaries[0]", "part 'rod' starts 0.001 m behind this wall"),
         (["boundaries[0]={kind='gravity', acceleration=[0, 0, 0]}"], "boundaries[0].acceleration", "must not be zero"),
-        (["boundaries[0]={kind='gravity', acceleration=[0, 0, -1], parts=['road']}"], "boundaries[0].parts[0]", "'rod'"),
+        (["boundaries[0]={kind='gravity', acceleration=[0, 0, 1], parts=['a']}"], "boundaries[0].parts[0]", "no part"),
         (["boundaries[0]={kind='velocity'}"], "boundaries[0]", "prescribes nothing"),
         (["boundaries[0]={kind='velocity', x=1, low=[0, 0, 0]}"], "boundaries[0]", "give both low and high"),
         (["boundaries[0]={kind='velocity', x=1, low=[0, 0, 1], high=[1, 1, 0]}"], "boundaries[0].high[2]", "low[2]"),
@@ -55,6 +56,16 @@ def test_the_rod_is_sound() -> None:
         (["contact={friction=-0.1}"], "contact.friction", "greater than or equal to 0"),
         (["contact={domain='sphere'}"], "contact.domain", "'arbitrary' or 'box'"),
         (["parts[0].material=steel_42crmo4", "parts[0].temperature=2000"], "parts[0].temperature", "melts"),
+        (["parts[0].erosion={plastic_strain=1}"], "parts[0].erosion.plastic_strain", "steel has no strength"),
+        (["parts[0].erosion={plastic_strain=0}"], "parts[0].erosion.plastic_strain", "greater than 0"),
+        (["parts[0].erosion={volume=[0, 2]}"], "parts[0].erosion.volume[0]", "greater than 0"),
+        (["parts[0].erosion={volume=[2, 3]}"], "parts[0].erosion.volume[0]", "less than 1"),
+        (["parts[0].erosion={volume=[0.5, 1]}"], "parts[0].erosion.volume[1]", "greater than 1"),
+        (["parts[0].erosion={volume=0.1}"], "parts[0].erosion.volume", "expected a list"),
+        (["parts[0].erosion={time_step=1}"], "parts[0].erosion.time_step", "less than 1"),
+        (["parts[0].erosion={time_step=0}"], "parts[0].erosion.time_step", "greater than 0"),
+        (["parts[0].erosion={nodes='keep'}"], "parts[0].erosion.nodes", "'particles' or 'remove'"),
+        (["parts[0].erosion={strain=1}"], "parts[0].erosion.strain", "did you mean 'plastic_strain'?"),
     ],
 )  # fmt: skip
 def test_a_fault_is_named(overrides: list[str], key: str, message: str) -> None:

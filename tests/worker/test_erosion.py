@@ -1,0 +1,409 @@
+"""Erosion: accounts that close whatever leaves, a surface that follows, particles, parts and ranks without tets."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+from unittest.mock import patch
+
+import numpy as np
+import pytest
+
+from conoid.cases import schema
+from conoid.worker import digest, domain, simulation, state, step
+from conoid.worker.erosion import Mirrors
+from conoid.worker.mesh.faces import across, boundary_faces
+from conoid.worker.mesh.model import TetMesh
+from conoid.worker.probes import tet_volumes
+from conoid.worker.simulation import Simulation
+
+from ..contact.bodies import meeting_of, moved
+from ..contact.ranks import on_ranks
+from .kernels import COPPER, FORMS, STEEL, Form, build, run
+from .meshes import Floats, block, positive
+
+T = TypeVar("T")
+Ints = state.Ints
+MM = 1e-3
+EROSION = schema.Erosion()
+REMOVE = schema.Erosion(nodes="remove")
+LAST_TET = pytest.mark.xfail(strict=True, reason="without tets there is no step, and without a surface no drift")
+MOVED = pytest.mark.xfail(strict=True, reason="gravity and prescribed motion take hold of what has left")
+INSIDE_OUT = pytest.mark.xfail(strict=True, reason="the work of a stress is kept that never acts")
+
+
+def alone(
+    mesh: TetMesh, erosion: schema.Erosion = EROSION, velocity: Sequence[float] = (0, 0, 0), **keys: Any
+) -> Simulation:
+    """A copper body that wears, by itself and without contact."""
+    case = meeting_of([{"erosion": erosion, "velocity": velocity}], material=COPPER, **keys)
+    return build(case.model_copy(update={"contact": None}), [mesh])
+
+
+def wear_out(sim: Simulation, gone: "np.ndarray") -> None:
+    """The tets of these ids are to leave in the next step."""
+    assert sim.erosion is not None
+    for part in sim.model.blocks:
+        if len(part.worn):
+            part.worn[np.isin(part.id, gone)] = True
+    sim.erosion.due = True
+
+
+def tick(sim: Simulation, gone: "np.ndarray | None" = None) -> float:
+    """A step that begins with the loss of these tets; its residual."""
+    if gone is not None:
+        wear_out(sim, gone)
+    before = sim.model.nodes.v.copy()
+    step.first_half(sim)
+    residual = sim.ledger.close(before).residual
+    step.second_half(sim)
+    return residual
+
+
+def on(ranks: int, case: schema.Case, meshes: Sequence[TetMesh], work: Callable[[Simulation], T]) -> list[T]:
+    """What ``work`` makes of the simulation of each rank."""
+    ready = iter(meshes)
+    with patch.object(domain, "build_mesh", lambda *_, **__: next(ready)):
+        return on_ranks(ranks, lambda comm: work(simulation.build(case, Path(), comm)))
+
+
+# Accounts
+
+
+def crash(erosion: schema.Erosion, form: Form, speed: float = 600.0) -> Simulation:
+    """Two copper blocks that hit each other and wear out where they do."""
+    meshes = [block((4, 4, 4), MM, seed=3), moved(block((5, 5, 3), MM, seed=4), (-0.5 * MM, -0.5 * MM, 4.01 * MM))]
+    motions: list[dict[str, Any]] = [{"velocity": (0.0, 0.0, speed), "erosion": erosion}, {"erosion": erosion}]
+    return build(meeting_of(motions, material=COPPER, form=form, end=1.5e-6, viscosity={}), meshes)
+
+
+def nodes_of_tets(sim: Simulation) -> "np.ndarray":
+    """(nodes,) whether a node has tets."""
+    has = np.zeros(sim.model.nodes.n, bool)
+    for part in sim.model.blocks:
+        has[part.tets] = True
+    return has
+
+
+@pytest.mark.parametrize("nodes", ["particles", "remove"])
+@pytest.mark.parametrize("form", FORMS)
+def test_the_accounts_close_while_tets_leave(form: Form, nodes: Any) -> None:
+    """Energy as well as without erosion, momentum to round-off, mass to the last bits (H11)."""
+    sim = crash(schema.Erosion(plastic_strain=0.3, nodes=nodes), form)
+    mass, first, elements = sim.model.nodes.mass.copy(), sim.model.nodes.v.copy(), sim.model.elements_global
+    momentum = (mass[:, None] * first).sum(axis=0)
+    assert sim.erosion is not None
+
+    def look(sim: Simulation, before: Floats) -> None:
+        line = sim.ledger.close(before)
+        assert line.residual < 1e-4
+        assert np.abs(sim.ledger.momentum - momentum).max() < 1e-12 * np.abs(momentum).max()
+        assert sim.model.elements_global == sum(part.n for part in sim.model.blocks)
+
+    run(sim, look)
+    here = ~nodes_of_tets(sim)
+    removed = here if nodes == "remove" else np.zeros_like(here)
+    assert elements - sim.model.elements_global > 50
+    assert here.sum() > 5
+    assert sim.ledger.eroded_mass + mass[~removed].sum() == pytest.approx(mass.sum(), rel=1e-15)
+    assert (sim.ledger.eroded_mass > 0.0) == (nodes == "remove")
+    assert sim.erosion.particles == (0 if nodes == "remove" else here.sum())
+    assert not sim.model.nodes.v[removed].any()
+    assert not sim.model.nodes.force[here].any()
+
+
+def pulled(sim: Simulation, rounds: int = 4) -> tuple[list[float], Simulation]:
+    """Tets leave one time after another, from the top; the residuals."""
+    step.prepare(sim)
+    found = []
+    for k in range(4 * rounds):
+        part = sim.model.blocks[0]
+        top = sim.model.nodes.x0[part.tets].mean(axis=1)[:, 2] > (3.0 - 0.5 * (k // 4)) * MM
+        found.append(tick(sim, part.id[top] if k % 4 == 3 else None))
+    return found, sim
+
+
+SPIN = {"centre": (1.5 * MM, 1.5 * MM, 1.5 * MM), "rate": (4e4, 0.0, 5e4)}
+
+
+@pytest.mark.parametrize("nodes", ["particles", "remove"])
+@pytest.mark.parametrize("form", FORMS)
+def test_the_accounts_close_for_a_spinning_body_without_contact(form: Form, nodes: Any) -> None:
+    """A copper cube that turns at its elastic limit: work, kinetic energy and momentum leave at once."""
+    case = meeting_of([{"erosion": schema.Erosion(nodes=nodes), "spin": SPIN}], material=COPPER, form=form)
+    sim = build(case.model_copy(update={"contact": None}), [block((3, 3, 3), MM)])
+    momentum = (sim.model.nodes.mass[:, None] * sim.model.nodes.v).sum(axis=0)
+    largest = (sim.model.nodes.mass[:, None] * np.abs(sim.model.nodes.v)).sum()
+    residuals, sim = pulled(sim)
+    assert sim.model.elements_global < 120
+    assert max(residuals) < 1e-4
+    assert np.abs(sim.ledger.momentum - momentum).max() < 1e-12 * largest
+    assert (sim.ledger.eroded_mass > 0.0) == (nodes == "remove")
+
+
+GRAVITY = {"kind": "gravity", "acceleration": (0.0, 0.0, -1e7)}
+DRIVEN = {"kind": "velocity", "z": 100.0, "low": (0.0, 0.0, 2.9 * MM), "high": (1.0, 1.0, 1.0)}
+MIRROR = {"kind": "symmetry", "axis": "x"}
+WALL = {"kind": "wall", "point": (0.0, 0.0, 0.0), "normal": (0.0, 0.0, 1.0)}
+
+
+@pytest.mark.parametrize(
+    "bounds",
+    [pytest.param((GRAVITY,), marks=MOVED), pytest.param((DRIVEN,), marks=MOVED), (MIRROR,), (WALL,)],
+    ids=["gravity", "driven", "mirror", "wall"],
+)
+def test_what_has_left_is_not_moved_any_more(bounds: tuple[Any, ...]) -> None:
+    """Neither gravity nor a prescribed motion, and it stays in the accounts as it left."""
+    residuals, sim = pulled(alone(block((3, 3, 3), MM), REMOVE, (0, 0, 100), boundaries=bounds))
+    assert sim.erosion is not None
+    assert sim.erosion._removed.any()
+    assert not sim.model.nodes.v[sim.erosion._removed].any()
+    assert max(residuals) < 1e-4
+
+
+@pytest.mark.parametrize("form", [pytest.param("standard", marks=INSIDE_OUT), "nodal", "split"])
+@pytest.mark.parametrize("far", [1.0, 3.0])
+def test_a_tet_that_turns_inside_out_books_no_work_that_it_has_not_done(far: float, form: Form) -> None:
+    """A node passes the tets beside it in one step; their stress at the end of it has never acted on a node."""
+    sim = alone(block((3, 3, 3), MM), form=form)
+    nodes = sim.model.nodes
+    node = np.argmin(np.abs(nodes.x0 - 0.9 * MM).sum(axis=1))
+    step.prepare(sim)
+    nodes.v[node] = far * MM * sim.vote.limit / 0.9 * np.array([1.0, 0.2, 0.0])
+    sim.ledger.initial = float((0.5 * nodes.mass * (nodes.v**2).sum(axis=1)).sum())
+    tick(sim)
+    volumes = tet_volumes(sim.model.blocks[0], nodes.x)
+    assert (volumes < 0.0).sum() > 3
+    assert max(tick(sim) for _ in range(3)) < 0.006
+
+
+# The surface
+
+
+def scene_of_two() -> tuple[schema.Case, list[TetMesh]]:
+    case = meeting_of(
+        [{"erosion": REMOVE}, {"erosion": EROSION, "velocity": (0.0, 0.0, -300.0)}], {"self_contact": ["body0"]}
+    )
+    return case, [block((3, 3, 3), MM, seed=1), moved(block((2, 2, 3), MM, seed=2), (0.4 * MM, 0.5 * MM, 3.01 * MM))]
+
+
+def wearing(case: schema.Case, erosion: schema.Erosion) -> schema.Case:
+    """The same, and all parts wear."""
+    parts = tuple(part.model_copy(update={"erosion": erosion}) for part in case.parts)
+    return case.model_copy(update={"parts": parts})
+
+
+def plan(meshes: Sequence[TetMesh], seed: int, rounds: int) -> list[Ints]:
+    """Ids of tets that leave in each round: here and there, and a whole corner."""
+    random = np.random.default_rng(seed)
+    tets = sum(len(mesh.tets) for mesh in meshes)
+    left, rows = np.arange(tets), []
+    for _ in range(rounds):
+        first = random.integers(0, len(left))
+        here = np.isin(left, np.r_[random.choice(left, len(left) // 12, replace=False), left[first : first + 12]])
+        rows.append(left[here])
+        left = left[~here]
+    return rows
+
+
+@pytest.mark.parametrize("ranks", [1, 3, 4])
+def test_the_surface_follows_what_is_left(ranks: int) -> None:
+    """After each of many removals it is what the faces of the tets that are left give from scratch."""
+    case, meshes = scene_of_two()
+    offset = len(meshes[0].points)
+    tets = np.concatenate([meshes[0].tets, meshes[1].tets + np.int32(offset)])
+    rounds = plan(meshes, ranks, 8)
+
+    def work(sim: Simulation) -> list[tuple[Ints, Ints, Ints]]:
+        step.prepare(sim)
+        found = []
+        for gone in rounds:
+            tick(sim, gone)
+            assert sim.contact is not None
+            surface, nodes = sim.contact._surface, sim.model.nodes
+            found.append((surface.faces.nodes[:, :3], nodes.id[surface.flags], surface.edges.nodes))
+        sim.free()
+        return found
+
+    found = on(ranks, case, meshes, work)
+    left, removed = np.ones(len(tets), bool), np.zeros(offset + len(meshes[1].points), bool)
+    whole = boundary_faces(tets)
+    for k, gone in enumerate(rounds):
+        left[gone] = False
+        exposed = boundary_faces(tets[left])
+        faces = np.concatenate([rank[k][0] for rank in found])
+        assert sorted(map(tuple, faces.tolist())) == sorted(map(tuple, exposed.tolist()))
+        without = np.setdiff1d(np.arange(len(removed)), tets[left])
+        removed[without[without < offset]] = True
+        flags = np.unique(np.concatenate([rank[k][1] for rank in found]))
+        assert not removed[flags].any()
+        assert set(np.unique(exposed).tolist()) <= set(flags.tolist())
+        assert {int(i) for i in np.unique(whole) if not removed[i]} <= set(flags.tolist())
+        named = {frozenset(row) for row in exposed.tolist()}
+        edges = np.concatenate([rank[k][2] for rank in found])
+        assert all({frozenset((a, b, c)), frozenset((a, b, d))} <= named for a, b, c, d in edges.tolist())
+
+
+@pytest.mark.xfail(strict=True, reason="such a node is not among those that are searched")
+def test_a_node_that_loses_all_its_tets_at_once_meets_others() -> None:
+    """Also one from within the body, which had never been on the surface."""
+    case, meshes = scene_of_two()
+    sim = build(wearing(case, EROSION), meshes)
+    step.prepare(sim)
+    part = sim.model.blocks[0]
+    inner = int(np.argmin(np.abs(sim.model.nodes.x0 - 1.1 * MM).sum(axis=1)))
+    tick(sim, part.id[(part.tets == inner).any(axis=1)])
+    assert sim.contact is not None
+    particles = ~nodes_of_tets(sim)
+    assert particles[inner]
+    assert sim.contact._surface.flags[particles].all()
+
+
+def test_what_is_laid_bare_meets_in_the_same_step() -> None:
+    """The search of the step in which a tet leaves has its inner faces as candidates of the nodes above it."""
+    case, meshes = scene_of_two()
+    sim = build(case, meshes)
+    step.prepare(sim)
+    tick(sim)
+    assert sim.contact is not None
+    part, behind = sim.model.blocks[0], across(meshes[0].tets)
+    centres = sim.model.nodes.x0[part.tets].mean(axis=1)
+    worn = int(part.id[np.abs(centres - np.array([1.5, 1.5, 2.7]) * MM).sum(axis=1).argmin()])
+    bare = {4 * int(other) + int(np.flatnonzero(behind[other] == worn)[0]) for other in behind[worn] if other >= 0}
+    assert len(bare) == 3
+
+    def candidates() -> set[tuple[int, ...]]:
+        now = sim.contact._scene if sim.contact is not None else None
+        assert now is not None
+        return {tuple(sorted(row)) for row in now.crowd.id[now.faces[:, :3]].tolist()}
+
+    wanted = {tuple(sorted(int(n) for n in np.delete(meshes[0].tets[face // 4], face % 4))) for face in bare}
+    assert not wanted & candidates()
+    wear_out(sim, np.array([worn]))
+    searches = sim.contact.searches
+    step.first_half(sim)
+    assert sim.contact.searches == searches + 1
+    assert wanted <= candidates()
+
+
+def test_what_loses_its_support_is_held_by_what_lies_below() -> None:
+    """A driven tip is about to land when the tet under it leaves: in that step it lands on the slope behind."""
+    speed, aside = 1000.0, 3e-3
+    points = np.array([[2.0 - aside, 1.5, 2.14], [1.5, 1.0, 3.0], [2.5, 1.0, 3.0], [2.0, 2.2, 3.0]]) * MM
+    ground, tip = block((3, 3, 2), MM, shake=0.0), TetMesh(points, positive(points, np.arange(4)[None, :]))
+    drive = {"kind": "velocity", "parts": ("body1",), "x": 0.0, "y": 0.0, "z": -speed}
+    sim = build(meeting_of([{"erosion": EROSION}, {}], boundaries=(drive,)), [ground, tip])
+    step.prepare(sim)
+    nodes, part, end = sim.model.nodes, sim.model.blocks[0], len(ground.points)
+    slope = [node_at(sim, place) for place in ((1, 1, 1), (2, 1, 2), (2, 2, 2))]
+    while sim.clock.step == 0 or nodes.x[end, 2] - 2.0 * MM > speed * sim.clock.dt:
+        tick(sim)
+    gap = nodes.x[end, 2] - 2.0 * MM
+    tick(sim, part.id[np.isin(part.tets, [*slope, node_at(sim, (1, 1, 2))]).all(axis=1)])
+    sunk = gap - speed * sim.clock.last_dt
+    a, b, c = nodes.x[slope]
+    normal = np.cross(b - a, c - a)
+    height = (nodes.x[end] - a) @ normal / np.linalg.norm(normal) * np.sign(normal[2])
+    assert sunk + aside * MM < -2e-5
+    assert height > 0.05 * (sunk + aside * MM) / np.sqrt(2.0)
+    assert nodes.x[end, 2] - b[2] < 0.25 * sunk
+
+
+def node_at(sim: Simulation, place: Sequence[float]) -> int:
+    """The node that started there, in mm."""
+    return int(np.abs(sim.model.nodes.x0 - np.array(place) * MM).sum(axis=1).argmin())
+
+
+# Whole parts and ranks
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_a_rank_that_has_lost_all_its_tets_goes_on(ranks: int) -> None:
+    """To the same answer as one rank."""
+    case, meshes = scene_of_two()
+    ids: list[Ints] = []
+
+    def lost(sim: Simulation) -> Ints:
+        return np.concatenate([part.id for part in sim.model.blocks])
+
+    ids = on(ranks, case, meshes, lost)
+
+    def work(sim: Simulation) -> str | None:
+        step.prepare(sim)
+        for k in range(8):
+            tick(sim, ids[1] if k == 3 else None)
+        sim.free()
+        return digest.digest(sim.model, sim.comm, [])
+
+    assert on(ranks, case, meshes, work)[0] == on(1, case, meshes, work)[0]
+
+
+@pytest.mark.parametrize("erosion", [EROSION, REMOVE], ids=["particles", "remove"])
+@pytest.mark.parametrize("left", [1, pytest.param(0, marks=LAST_TET)], ids=["one part", "all parts"])
+def test_a_run_outlives_its_tets(left: int, erosion: schema.Erosion) -> None:
+    """And the accounts close, better than to first order of the step, though a loaded face is left alone at once."""
+    worst = []
+    for safety in (0.8, 0.2):
+        case, meshes = scene_of_two()
+        numerics = case.numerics.model_copy(update={"dt_safety": safety})
+        sim = build(wearing(case, erosion).model_copy(update={"numerics": numerics}), meshes)
+        step.prepare(sim)
+        residuals, ids = [], np.arange(len(meshes[0].tets) + (0 if left else len(meshes[1].tets)))
+        while sim.clock.t < 0.3e-6:
+            first = sim.clock.t >= 0.1e-6 and sim.model.elements_global > left * len(meshes[1].tets)
+            residuals.append(tick(sim, ids if first else None))
+        assert sim.model.elements_global == left * len(meshes[1].tets)
+        worst.append(max(residuals))
+    assert worst[0] < 1e-3
+    assert worst[1] < 0.25 * worst[0]
+
+
+def test_probes_of_what_has_left_are_no_number() -> None:
+    low, high = (0.0, 0.0, 2.0 * MM), (1.0, 1.0, 1.0)
+    probes = (
+        schema.Probe(name="top", part="body0", field="velocity_z", low=low, high=high),
+        schema.Probe(name="all", part="body0", field="density"),
+    )
+    sim = alone(block((3, 3, 3), MM, shake=0.0), EROSION, (0, 0, 100), probes=probes)
+    step.prepare(sim)
+    part = sim.model.blocks[0]
+    top = part.id[sim.model.nodes.x0[part.tets].mean(axis=1)[:, 2] > 2.0 * MM]
+    for gone, expected in ((None, 100.0), (top[::2], 100.0), (top, np.nan)):
+        tick(sim, gone)
+        assert sim.probes.measure() == pytest.approx([expected, 8930.0], rel=1e-9, nan_ok=True)
+    tick(sim, part.id.copy())
+    assert np.isnan(sim.probes.measure()).all()
+
+
+# Symmetry planes
+
+
+def flying(velocity: float, side: float, erosion: schema.Erosion | None = EROSION) -> Simulation:
+    """A cube on one side of the plane x = 0 and beside it, and a steady one far away that keeps the step."""
+    plane = {"kind": "symmetry", "axis": "x", "parts": ["body0"]}
+    motions = [{"velocity": (velocity, 0.0, 0.0), "erosion": erosion}, {}]
+    case = meeting_of(motions, material=STEEL, boundaries=(plane,))
+    cube = moved(block((2, 2, 2), MM), ((0.0 if side > 0.0 else -2.0) * MM, 0.0, 0.0))
+    sim = build(case, [cube, moved(block((2, 2, 2), MM), (20 * MM, 0.0, 0.0))])
+    step.prepare(sim)
+    return sim
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_particle_does_not_cross_a_symmetry_plane(side: float) -> None:
+    sim = flying(-side * 2000.0, side)
+    nodes, part = sim.model.nodes, sim.model.blocks[0]
+    mine = nodes.part == 0
+    residuals = [tick(sim, part.id.copy())]
+    residuals += [tick(sim) for _ in range(25)]
+    assert sim.clock.t * 2000.0 > 2.0 * MM
+    assert (side * nodes.x[mine, 0] >= -1e-15).all()
+    assert (np.abs(nodes.x[mine, 0]) < 1e-15).all()
+    assert max(residuals) < 1e-12
+    loss = sum(bound.contact_loss.sum() for bound in sim.boundaries if isinstance(bound, Mirrors))
+    assert loss == pytest.approx(sim.ledger.initial, rel=1e-12)
+
+
+def test_mirrors_hold_only_what_wears_and_starts_off_the_plane() -> None:
+    for erosion, held in ((EROSION, 18), (None, 0)):
+        sim = flying(0.0, 1.0, erosion)
+        assert sum(len(bound.nodes) for bound in sim.boundaries if isinstance(bound, Mirrors)) == held
