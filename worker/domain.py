@@ -127,7 +127,7 @@ def _apart(case: schema.Case, x: Floats, tets: Indices, part: Indices, exposed: 
     assert case.contact is not None
     tet, face = np.nonzero(exposed)
     faces = tets[tet[:, None], FACES[face]]
-    surface, allowed = overlap.Surface(faces, part[faces[:, 0]]), ~np.isnan(pairing.friction(case))
+    surface, allowed = overlap.Surface(faces, part[faces[:, 0]], exposed), ~np.isnan(pairing.friction(case))
     if case.contact.overlap == "push":
         x = overlap.move_apart(x, tets, part, surface, allowed)
     found = overlap.find(x, tets, part, surface, allowed)

@@ -13,7 +13,19 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from . import accuracy, axisymmetric, gates, growth, long_rod, machine, speed, startup, taylor_cost, telemetry
+from . import (
+    accuracy,
+    axisymmetric,
+    contact_cost,
+    gates,
+    growth,
+    long_rod,
+    machine,
+    speed,
+    startup,
+    taylor_cost,
+    telemetry,
+)
 from .gates import Gate
 from .scene import box
 
@@ -135,6 +147,14 @@ def _telemetry(extent: Extent, book: Book) -> None:
     book.add("Telemetry", text, data, gates.of_telemetry(costs, answers))
 
 
+def _contact(extent: Extent, book: Book) -> None:
+    costs = list(contact_cost.measure(contact_cost.SCENES[:1] if extent is QUICK else contact_cost.SCENES))
+    found = contact_cost.domains() if extent is not QUICK else {}
+    text = contact_cost.report(costs) + (f"\n\n{contact_cost.domain_report(found)}" if found else "")
+    data = {"scenes": {c.scene.name: c.outcome.phases for c in costs}, "domains": found}
+    book.add("Contact", text, data, gates.of_contact(costs))
+
+
 def _long_rod(extent: Extent, book: Book) -> None:
     shots = []
     for shot in long_rod.measure(extent.shots):
@@ -146,7 +166,7 @@ def _long_rod(extent: Extent, book: Book) -> None:
 
 PARTS: dict[str, Callable[[Extent, Book], None]] = {
     "speed": _speed, "akantu": _akantu, "taylor": _taylor, "growth": _growth, "startup": _startup,
-    "accuracy": _accuracy, "telemetry": _telemetry, "long_rod": _long_rod,
+    "accuracy": _accuracy, "telemetry": _telemetry, "contact": _contact, "long_rod": _long_rod,
 }  # fmt: skip
 
 

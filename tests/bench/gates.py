@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from .accuracy import Answer
+from .contact_cost import Cost
 from .growth import Growth
 from .long_rod import BANDS, LENGTH, Shot
 from .speed import Speed
@@ -124,3 +125,13 @@ def of_long_rod(shots: Sequence[Shot]) -> Iterator[Gate]:
         yield Gate("long rod, 1 mm, 2 ranks", "< 600 s", f"{wall:.0f} s", wall < 600.0)
         share = sum(outcome.phases["contact"]) / sum(outcome.phases["elements"])
         yield Gate("long rod, contact over elements", "<= 1", f"{share:.2f}", share <= 1.0)
+
+
+def of_contact(costs: Sequence[Cost]) -> Iterator[Gate]:
+    """Contact against elements, and the speed of a step with everything."""
+    for cost in costs:
+        what = f"{cost.scene.name}, {cost.outcome.elements:,} tets"
+        yield Gate(f"{what}: contact over elements", "<= 1", f"{cost.contact:.2f}", cost.contact <= 1.0)
+        if "elastic" in cost.scene.name and cost.outcome.elements < 1e5:
+            speed = cost.outcome.element_updates_per_second * 1e-6
+            yield Gate(f"{what}: everything", ">= 5 M updates / CPU-s", f"{speed:.1f} M", speed >= 5.0)

@@ -19,10 +19,14 @@ _TRIES = 30
 
 @dataclass(frozen=True)
 class Surface:
-    """Exposed faces of all parts: ``faces`` (f, 3), nodes of the mesh, and the part (f,) of each."""
+    """Exposed faces of all parts."""
 
     faces: Indices
+    """(f, 3) nodes of the mesh."""
     part: Indices
+    """(f,)."""
+    exposed: Flags
+    """(tets, 4) which faces of the tets these are."""
 
 
 @dataclass(frozen=True)
@@ -44,9 +48,12 @@ def find(points: Floats, tets: Indices, part: Indices, surface: Surface, allowed
     large = Things(np.ascontiguousarray(tets, np.int32), np.zeros(len(tets)))
     pairs = search.find(small, large, points, np.zeros_like(points), part, others, 0.0, None)
     node, corners = nodes[pairs[:, 0]], tets[pairs[:, 1]]
-    inside = _inside(points[node], points[corners])
+    shares = _shares(points[node], points[corners])
+    inside = np.asarray((shares >= -_INSIDE).all(axis=1))
+    resting = inside & ((shares < _ROUNDING) & surface.exposed[pairs[:, 1]]).any(axis=1)
     outward = _normals(points, surface.faces)
-    met = np.unique(np.column_stack([node[inside], part[corners[inside, 0]]]), axis=0)
+    met, at = np.unique(np.column_stack([node[inside], part[corners[inside, 0]]]), axis=0, return_inverse=True)
+    met = met[np.bincount(at.reshape(-1), resting[inside], len(met)) == 0]
     depth, way = np.zeros(len(met)), np.zeros((len(met), 3))
     for k, (a, other) in enumerate(met):
         depth[k], way[k] = _nearest(points[a], outward[a], points[surface.faces[surface.part == other]])
@@ -65,12 +72,11 @@ def move_apart(points: Floats, tets: Indices, part: Indices, surface: Surface, a
     return moved
 
 
-def _inside(nodes: Floats, corners: Floats) -> Flags:
-    """(p,) whether nodes (p, 3) lie in tets (p, 4, 3), their faces included."""
+def _shares(nodes: Floats, corners: Floats) -> Floats:
+    """(p, 4) volume coordinates of nodes (p, 3) in tets (p, 4, 3): none is negative inside, one is zero on a face."""
     edges = corners[:, 1:] - corners[:, :1]
     tail = np.einsum("pi,pij->pj", nodes - corners[:, 0], np.linalg.inv(edges))
-    shares = np.column_stack([1.0 - tail.sum(axis=1), tail])
-    return np.asarray((shares >= -_INSIDE).all(axis=1))
+    return np.column_stack([1.0 - tail.sum(axis=1), tail])
 
 
 def _normals(points: Floats, faces: Indices) -> Floats:
