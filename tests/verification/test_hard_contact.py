@@ -280,6 +280,25 @@ def test_no_shot_of_a_thousand_misses_what_its_ray_hits() -> None:
     assert wrong == []
 
 
+@pytest.mark.xfail(
+    strict=True, reason="22 searches: how far one looks ahead is what the fastest of all needs past a face"
+)
+def test_a_fast_fragment_makes_no_searches_for_others() -> None:
+    """Two bodies meet slowly, alone with one search in 200 steps; a tet flies by at 5 km/s: one in 50 at most."""
+    lower, upper = block((12, 12, 12), SIZE, seed=1), block((11, 11, 11), SIZE, seed=2)
+    away = TetMesh(REGULAR * SIZE + np.array([-20.0, 16.0, 3.0]) * SIZE, np.array([[0, 1, 2, 3]], np.int32))
+    meshes = [lower, moved(upper, (0.4 * SIZE, 0.3 * SIZE, 12.001 * SIZE)), away]
+    searches = []
+    for speed in (0.0, 5000.0):
+        motions: list[dict[str, Any]] = [{"velocity": (0.0, 0.0, v)} for v in (10.0, -10.0)]
+        sim = run(build(meeting_of([*motions, {"velocity": (speed, 0.0, 0.0)}], end=4e-6), meshes))
+        assert sim.contact is not None
+        assert sim.contact.last_push > 0.0
+        searches.append(sim.contact.searches * 50.0 / sim.clock.step)
+    assert searches[0] <= 0.25
+    assert searches[1] <= 1.0
+
+
 # H16: the shock that an impact sends out ------------------------------------------------------------------------------
 
 
