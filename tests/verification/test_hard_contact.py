@@ -281,7 +281,7 @@ def test_no_shot_of_a_thousand_misses_what_its_ray_hits() -> None:
 
 
 @pytest.mark.xfail(
-    strict=True, reason="22 searches: how far one looks ahead is what the fastest of all needs past a face"
+    strict=True, reason="21 searches: how far one looks ahead is what the fastest of all needs past a face"
 )
 def test_a_fast_fragment_makes_no_searches_for_others() -> None:
     """Two bodies meet slowly, alone with one search in 200 steps; a tet flies by at 5 km/s: one in 50 at most."""
