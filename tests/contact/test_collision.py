@@ -13,6 +13,7 @@ from conoid.cases import schema
 from conoid.cases.messages import Energy
 from conoid.worker import domain, simulation
 from conoid.worker.digest import digest
+from conoid.worker.errors import InputError
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.parallel.comm import Comm, SerialComm
 from conoid.worker.simulation import Simulation
@@ -228,3 +229,15 @@ def crossed(edges: bool) -> float:
 def test_crossed_edges_bounce_and_pass_where_edges_are_off() -> None:
     assert crossed(edges=True) > 2.0
     assert crossed(edges=False) == pytest.approx(-10.0, abs=1e-6)
+
+
+def test_a_part_whose_faces_all_lie_on_symmetry_planes_is_named() -> None:
+    cube = block((2, 2, 2), SIZE, shake=0.0)
+    planes = tuple(
+        schema.Symmetry(kind="symmetry", axis=axis, at=at, parts=("body1",))
+        for axis in ("x", "y", "z")
+        for at in (0.0, 2.0 * SIZE)
+    )
+    case = meeting_of([{}, {}], end=END).model_copy(update={"boundaries": planes})
+    with pytest.raises(InputError, match=r"part 'body1' has no exposed face.*leave it out of contact.parts"):
+        build(case, [moved(cube, (0.0, 0.0, 2.5 * SIZE)), cube])

@@ -14,6 +14,7 @@ from conoid.cases.schema import Case
 
 from ..boundaries import Boundary, PrescribedVelocity, SymmetryPlane
 from ..clock import Clock
+from ..errors import InputError
 from ..parallel import fixed_point
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
@@ -22,6 +23,7 @@ from ..timers import Timers
 from . import meetings, pairing, scene, surface, sweeps
 from .flight import Flight
 from .scene import Rules, Scene
+from .surface import Surface
 
 _SHORTEST, _LONGEST = 10.0, 300.0
 """Steps of free flight that a search looks ahead: as many as the fastest takes past a face, but not more than twice
@@ -45,8 +47,9 @@ class Contact(Boundary):
         self._clock, self._timers = clock, timers
         mobility, self._planes = _mobility(model.nodes, bounds)
         self._surface = surface.build(model, self._planes, neighbours, comm, case.contact.edges)
-        self._flight = Flight(self._surface, model.nodes, mobility, case.contact.skin, neighbours, comm)
         self._mu = pairing.friction(case)
+        _require_faces(self._surface, model, ~np.isnan(self._mu), comm)
+        self._flight = Flight(self._surface, model.nodes, mobility, case.contact.skin, neighbours, comm)
         self._rules = Rules(case.contact.domain, ~np.isnan(self._mu), 2.0 * self._flight.size)
         largest, fastest = extremes
         self._scale = fixed_point.scale_for(largest * fastest)
@@ -217,6 +220,17 @@ def _book(loss, external, local, held, before, total, mobility, scale):  # type:
             loss[local[h]] -= work
             if mobility[held[h], i] == 0.0:
                 external[local[h]] -= work
+
+
+def _require_faces(found: Surface, model: Model, allowed: Flags, comm: Comm) -> None:
+    """Raises InputError, on every rank alike, when a part that may meet has no face to meet with."""
+    first = np.searchsorted(model.nodes.id, found.faces.nodes[:, 0])
+    counts = comm.sum(np.bincount(model.nodes.part[first], minlength=len(model.parts)).astype(np.int64))
+    for index in np.flatnonzero((counts == 0) & allowed.any(axis=1)):
+        raise InputError(
+            f"contact: part {model.parts[index]!r} has no exposed face, all lie on symmetry planes; "
+            "leave it out of contact.parts"
+        )
 
 
 def _mobility(nodes: Nodes, bounds: list[Boundary]) -> tuple[Floats, Flags]:
