@@ -145,6 +145,37 @@ def test_fast_fragment() -> None:
     assert back.value + back.tolerance == pytest.approx(speed - 2 * stuck, rel=1e-4)
 
 
+def test_plate_stack() -> None:
+    case = load("plate_stack")
+    speeds = {entry.part: entry for entry in case.reference if entry.quantity == "speed_mean"}
+    block, stack = 24e-3, 4 * 2e-3
+    assert all(speeds[name].value == -SPEED for name in ("first", "second", "third", "fourth"))
+    assert all(entry.tolerance <= 0.06 * SPEED for entry in speeds.values())
+    assert speeds["block"].value == pytest.approx(-SPEED * (1.0 - stack / block), rel=1e-3)
+    assert speeds["block"].tolerance <= 0.03 * -speeds["block"].value
+    loss, layers = reference("plate_stack", "contact_loss"), (0.5e-3, 1e-3)
+    assert loss.value == pytest.approx(layers[0] * layers[1] / sum(layers) / block, rel=2e-3)
+    assert loss.tolerance <= 0.15 * loss.value
+
+
+def test_sliding_block() -> None:
+    case, friction, gravity = load("sliding_block"), 0.3, 9.81
+    assert case.contact is not None
+    assert (case.contact.friction, case.boundaries[0].acceleration) == (friction, (0.0, 0.0, -gravity))  # type: ignore[union-attr]
+    start, weight = case.parts[1].velocity[0], 1000.0 * 46e-3 * 46e-3 * 8e-3 * gravity
+    lost = friction * gravity * case.run.end_time
+    speed, loss = reference("sliding_block", "speed_mean"), reference("sliding_block", "contact_loss")
+    assert speed.value == pytest.approx(start - lost, rel=1e-3)
+    assert speed.tolerance <= 0.0103 * lost
+    assert loss.value == pytest.approx(1.0 - (1.0 - lost / start) ** 2, rel=1e-4)
+    assert loss.tolerance <= 0.01 * loss.value
+    forces = {(entry.quantity, entry.probe): entry for entry in case.reference if entry.probe}
+    for (quantity, probe), entry in forces.items():
+        expected = weight if probe == "weight" else -friction * weight
+        assert entry.value == pytest.approx(expected, rel=1e-3)
+        assert entry.tolerance <= (0.0103 if quantity == "probe_mean" else 0.05) * abs(expected)
+
+
 # Plastic waves --------------------------------------------------------------------------------------------------------
 
 
