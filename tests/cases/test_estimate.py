@@ -44,7 +44,7 @@ STEPS = {
     "crossed_bars": 3590, "dissimilar_bars": 410, "hertz_spheres": 18458, "newton_cradle": 1930,
     "plate_stack": 300, "sliding_block": 3558,
     "taylor_42crmo4": 8998, "taylor_copper": 21529, "taylor_copper_split": 20091, "demo": 8998,
-    "fast_fragment": 335, "long_rod": 13442,
+    "fast_fragment": 168, "long_rod": 13442,
 }  # fmt: skip
 """Steps that the shipped cases were seen to take."""
 
