@@ -97,6 +97,8 @@ def _number_rows(live: Live) -> list[list[str]]:
     if counts is not None:
         shared = f"{count(counts.shared)} nodes"
         rows.append(["shared", shared, "bodies", count(counts.fragments), "frames", str(live.frames)])
+        if counts.particles:
+            rows.append(["particles", f"{count(counts.particles)} nodes", "", "", "", ""])
     return rows
 
 

@@ -43,13 +43,15 @@ class Clock:
         return self._frames > 0 and self.frame <= self._frames and self.t >= self.frame_time(self.frame)
 
     def choose(self, limit: float) -> float:
-        """The next step, s: ``limit`` is the largest one-over-stable-step of all tets, 1/s. Returns the mean step.
+        """The next step, s: ``limit`` is the largest one-over-stable-step of all tets, 1/s, zero when none is left.
+
+        Returns the mean step.
 
         The way to the next frame is divided into equal steps, as few as are stable: steps that change little cost
         little energy, and none is a sliver. ``growth`` bounds the stable step.
         """
         self.last_dt = self.dt
-        self._stable = min(self._safety / limit, self._growth * self._stable)
+        self._stable = min(self._safety / limit if limit > 0.0 else math.inf, self._growth * self._stable)
         left = self.frame_time(self.frame + 1 if self.frame_due else self.frame) - self.t
         self.dt = left / math.ceil(left / self._stable) if left > 0.0 else 0.0
         self._first = self._first or self._stable

@@ -3,6 +3,7 @@
 import logging
 import resource
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -25,15 +26,25 @@ from .timers import PHASES
 log = logging.getLogger("conoid.worker")
 
 
+@dataclass(frozen=True)
+class Start:
+    """What is known when the first step begins."""
+
+    setup: float
+    """s since the worker's start."""
+    elements: int
+    thick: list[float]
+    """See reference.thicknesses."""
+
+
 def compute(
     case: Case, meshes: Path, folder: Path, comm: Comm, journal: Journal | None, signals: Signals, began: float
 ) -> Outcome:
     """Runs the case in ``folder`` on all ranks; relative mesh paths start at ``meshes``. Raises ConoidError."""
     sim = simulation.build(case, meshes, comm)
     history = History(folder, sim.probes.names) if comm.rank == 0 else None
-    setup = time.monotonic() - began
-    _announce(sim, journal, setup)
-    elements = sim.model.elements_global
+    start = Start(time.monotonic() - began, sim.model.elements_global, reference.thicknesses(sim))
+    _announce(sim, journal, start.setup)
     loop = Loop(sim, folder, journal, history, signals)
     cpu = time.thread_time()
     failure = None
@@ -45,7 +56,7 @@ def compute(
     sim.free()
     if history is not None:
         history.close()
-    return _sum_up(loop, folder, failure, elements, cpu, setup, time.monotonic() - began)
+    return _sum_up(loop, folder, failure, start, cpu, time.monotonic() - began)
 
 
 def _announce(sim: Simulation, journal: Journal | None, setup: float) -> None:
@@ -66,22 +77,23 @@ def _announce(sim: Simulation, journal: Journal | None, setup: float) -> None:
 
 
 def _sum_up(
-    loop: Loop, folder: Path, failure: PhysicsError | None, elements: int, cpu: float, setup: float, elapsed: float
+    loop: Loop, folder: Path, failure: PhysicsError | None, start: Start, cpu: float, elapsed: float
 ) -> Outcome:
     sim = loop.sim
     seconds = sim.comm.gather(sim.timers.seconds)
     total_cpu = sum(sim.comm.gather(cpu) or [])
     memory = sim.comm.gather(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
     hexdigest = digest.digest(sim.model, sim.comm, [sim.elements.pressure] if sim.elements.split else [])
-    checks = reference.measure(sim, folder) if failure is None and not loop.stopped else []
+    checks = reference.measure(sim, folder, start.thick) if failure is None and not loop.stopped else []
     state, cause, message = STOPS[loop.stopped] if loop.stopped else (State.SUCCEEDED, None, "")
     if failure is not None:
         state, cause, message = State.FAILED, failure.cause, str(failure)
     return Outcome(
         state=state, cause=cause, message=message, steps=sim.clock.step, time=sim.clock.t, ranks=sim.comm.size,
-        elapsed=elapsed, setup=setup, cpu=total_cpu, digest=hexdigest or "", elements=elements,
-        eroded=elements - sim.model.elements_global, nodes_initial=sim.model.nodes_global, nodes=sim.model.nodes_global,
-        fragments=len(sim.model.parts), energy=loop.energy, worst_residual=sim.ledger.worst,
+        elapsed=elapsed, setup=start.setup, cpu=total_cpu, digest=hexdigest or "", elements=start.elements,
+        eroded=start.elements - sim.model.elements_global, nodes_initial=sim.model.nodes_global,
+        nodes=sim.model.nodes_global, fragments=len(sim.model.parts), energy=loop.energy,
+        worst_residual=sim.ledger.worst,
         phases={name: [s[name] for s in seconds] for name in PHASES} if seconds else {},
         peak_memory=memory or [],
         element_updates_per_second=loop.updates / total_cpu if total_cpu > 0.0 else 0.0, reference=checks,

@@ -12,7 +12,7 @@ import numpy as np
 
 from conoid.cases.schema import Case, Symmetry
 
-from .boundaries import ON_PLANE, Boundary, RigidWalls
+from .boundaries import ON_PLANE, Boundary, PrescribedVelocity, RigidWalls
 from .clock import Clock
 from .contact.stage import Contact
 from .elements.wear import BROKEN, FREQUENCY, SOUND
@@ -50,10 +50,16 @@ class Mirrors(RigidWalls):
     """Symmetry planes as they are for nodes that have lost their tets: walls, where they meet their mirror images."""
 
     @classmethod
-    def of(cls, case: Case, model: Model) -> Self:
-        """A wall for either side of every plane, and the nodes of eroding parts that start on that side of it."""
+    def of(cls, case: Case, model: Model, bounds: list[Boundary]) -> Self:
+        """A wall for either side of every plane, and the nodes of eroding parts that start on that side of it.
+
+        Nodes of prescribed motion are left alone.
+        """
         nodes = model.nodes
         wears = np.array([part.erosion is not None for part in case.parts])[nodes.part]
+        for bound in bounds:
+            if isinstance(bound, PrescribedVelocity):
+                wears[bound.nodes] = False
         points, normals, held = np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((nodes.n, 0), bool)
         for spec in case.boundaries:
             if not isinstance(spec, Symmetry):
@@ -86,7 +92,8 @@ class Erosion(Boundary):
         self._specs = [part.erosion for part in case.parts]
         leaves = np.array([spec is not None and spec.nodes == "remove" for spec in self._specs])
         self._leaves = leaves[model.nodes.part]
-        self._removed = np.zeros(model.nodes.n, bool)
+        self.removed = np.zeros(model.nodes.n, bool)
+        """(nodes,) which have left; they stand still where they were."""
         self._tets_at = self._completed([block.tets.astype(np.int64) for block in model.blocks])
         self._last: list[tuple[Ints, Floats]] = []
         self._leaving = np.zeros(0, np.int64)
@@ -121,7 +128,7 @@ class Erosion(Boundary):
     def particles(self) -> int:
         """Nodes without tets that fly on; all ranks take part."""
         nodes = self._model.nodes
-        return int(self._comm.sum(np.array([(nodes.owned & (self._tets_at == 0) & ~self._removed).sum()]))[0])
+        return int(self._comm.sum(np.array([(nodes.owned & (self._tets_at == 0) & ~self.removed).sum()]))[0])
 
     def note(self, state: Nodes) -> None:
         self._book_last_work(state)
@@ -141,8 +148,8 @@ class Erosion(Boundary):
             energy = 0.5 * mass * (before * after).sum(axis=1) + uneven * (before * state.force[owned]).sum(axis=1)
             self._half = 0.5 * mass[:, None] * after
             self._nodal.add(np.column_stack([energy, mass, self._half]))
-            state.v[leaving] = 0.0
             state.force[leaving] = 0
+        state.v[self.removed] = 0.0
 
     def _remove(self, state: Nodes) -> None:
         """Takes the marked tets out; all ranks take part."""
@@ -158,11 +165,12 @@ class Erosion(Boundary):
                 block.drop(worn)
         self._tets_at -= self._completed(left)
         self._model.elements_global -= int(self._comm.sum(np.array([sum(len(tets) for tets in left)]))[0])
-        alone = self._leaves & (self._tets_at == 0) & ~self._removed
-        self._leaving, self._removed = np.flatnonzero(alone), self._removed | alone
+        alone = self._tets_at == 0
+        leaving = self._leaves & alone & ~self.removed
+        self._leaving, self.removed = np.flatnonzero(leaving), self.removed | leaving
         self._before = state.v[self._leaving]
         if self._contact is not None:
-            self._contact.uncover(self._lay_bare(np.concatenate(gone)), self._removed)
+            self._contact.uncover(self._lay_bare(np.concatenate(gone)), alone & ~self.removed, self.removed)
 
     def _lay_bare(self, gone: Ints) -> Ints:
         """Marks the faces behind tets ``gone`` (k, 5: id, ids across) as exposed; ids of these and the neighbours'."""

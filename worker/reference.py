@@ -21,10 +21,22 @@ _AXES = {"x": 0, "y": 1, "z": 2}
 _STRESSES = ("stress_xx", "stress_yy", "stress_zz", "stress_yz", "stress_zx", "stress_xy")
 
 
-def measure(sim: Simulation, folder: Path) -> list[Check]:
-    """Every reference of the case, measured; all ranks take part, all get the same answer."""
+def thicknesses(sim: Simulation) -> list[float]:
+    """For every reference that asks for a penetration: what there is to be pierced, m; zero for the others.
+
+    All ranks take part, all get the same answer.
+    """
+    return [_thickness(sim, spec) if spec.quantity == "penetration" else 0.0 for spec in sim.case.reference]
+
+
+def measure(sim: Simulation, folder: Path, thick: list[float]) -> list[Check]:
+    """Every reference of the case, measured; ``thick`` as ``thicknesses`` gave it at the start.
+
+    All ranks take part, all get the same answer.
+    """
     fields = {probe.name: probe.field for probe in sim.case.probes}
-    return [_check(spec, _measured(sim, spec, folder), fields.get(spec.probe or "")) for spec in sim.case.reference]
+    pairs = zip(sim.case.reference, thick, strict=True)
+    return [_check(spec, _measured(sim, spec, folder, start), fields.get(spec.probe or "")) for spec, start in pairs]
 
 
 def _check(spec: Reference, value: float, field_name: str | None) -> Check:
@@ -38,7 +50,7 @@ def _name(spec: Reference) -> str:
     return " ".join(word for word in (spec.quantity, spec.part, spec.probe, spec.axis) if word)
 
 
-def _measured(sim: Simulation, spec: Reference, folder: Path) -> float:
+def _measured(sim: Simulation, spec: Reference, folder: Path, thick: float) -> float:
     quantity = spec.quantity
     if quantity.startswith("probe_"):
         value = _probe(folder, spec) if sim.comm.rank == 0 else 0.0
@@ -54,7 +66,7 @@ def _measured(sim: Simulation, spec: Reference, folder: Path) -> float:
     if quantity in ("extent", "radius"):
         return _size(sim, spec)
     if quantity == "penetration":
-        return _penetration(sim, spec)
+        return thick - _thickness(sim, spec)
     return _largest(sim, spec)
 
 
@@ -79,6 +91,8 @@ def _size(sim: Simulation, spec: Reference) -> float:
 def _mean_speed(sim: Simulation, spec: Reference) -> float:
     nodes = sim.model.nodes
     chosen = nodes.owned if spec.part is None else nodes.owned & (nodes.part == sim.model.parts.index(spec.part))
+    if sim.erosion is not None:
+        chosen = chosen & ~sim.erosion.removed
     mass = nodes.mass[chosen]
     momentum, total = exact_sums(sim.comm, np.column_stack([mass * nodes.v[chosen, _AXES[spec.axis or "z"]], mass]))
     return float(momentum / total)
@@ -96,28 +110,28 @@ _LINES = (0.1, 0.3, 0.5)
 """Distances from the axis, of the radius of the part, at which the thickness that is left is measured."""
 
 
-def _penetration(sim: Simulation, spec: Reference) -> float:
-    """The thickness of the other parts less the mean of what lines along the axis still pass of them, m.
+def _thickness(sim: Simulation, spec: Reference) -> float:
+    """The mean of what lines along the axis pass of the other parts, m.
 
     The lines lie between the two directions across the axis, where every sector of a body is modelled.
     """
     nodes, axis = sim.model.nodes, _AXES[spec.axis or "z"]
-    own = nodes.part == sim.model.parts.index(spec.part or "")
-    radius, top, bottom = sim.comm.maximum(np.array([
-        np.hypot(*np.delete(nodes.x0[own], axis, axis=1).T).max(initial=0.0),
-        nodes.x0[~own, axis].max(initial=-np.inf), -nodes.x0[~own, axis].min(initial=np.inf),
-    ]))  # fmt: skip
+    own = np.delete(nodes.x0[nodes.part == sim.model.parts.index(spec.part or "")], axis, axis=1)
+    radius = _maximum(sim.comm, np.hypot(*own.T))
+    at = [float(share * radius / np.sqrt(2.0)) for share in _LINES]
     others = [block for block in sim.model.blocks if sim.model.parts[block.part] != spec.part]
-    chords = [np.zeros((0, len(_LINES)))]
-    for block in others:
-        at = [float(share * radius / np.sqrt(2.0)) for share in _LINES]
-        chords.append(np.column_stack([chord_lengths(nodes.x, block.tets, axis, (c, c)) for c in at]))
-    return float(top + bottom - exact_sums(sim.comm, np.concatenate(chords)).mean())
+    chords = [np.column_stack([chord_lengths(nodes.x, block.tets, axis, (c, c)) for c in at]) for block in others]
+    return float(exact_sums(sim.comm, np.concatenate([np.zeros((0, len(_LINES))), *chords])).mean())
 
 
 def chord_lengths(x: Floats, tets: Tets, axis: int, at: tuple[float, float]) -> Floats:
-    """(n,) length of a line along ``axis`` inside each tet, m; ``at``: where it passes the two directions across."""
+    """(n,) length of a line along ``axis`` inside each tet, m; ``at``: where it passes the two directions across.
+
+    The line is moved aside by some 1e-6 of its distance from the axis: in a face it would belong to two tets.
+    """
     i, j = (axis + 1) % 3, (axis + 2) % 3
+    aside = 1e-6 * max(map(abs, at))
+    at = (at[0] + aside, at[1] + 0.618 * aside)
     low, high = (f(f(x[tets[:, 0]], x[tets[:, 1]]), f(x[tets[:, 2]], x[tets[:, 3]])) for f in (np.minimum, np.maximum))
     met = np.flatnonzero(
         (low[:, i] <= at[0]) & (high[:, i] >= at[0]) & (low[:, j] <= at[1]) & (high[:, j] >= at[1])

@@ -144,7 +144,7 @@ def build(case: Case, folder: Path, comm: Comm) -> Simulation:
         contact = Contact(case, model, piece.neighbours, scene, comm, clock, timers, extremes)
     if case.erodes:
         erosion = Erosion(case, model, piece.neighbours, contact, comm, clock, extremes)
-        scene.append(Mirrors.of(case, model))
+        scene.append(Mirrors.of(case, model, scene))
     walls = sum(not isinstance(bound, RigidWalls) for bound in scene)
     scene[walls:walls] = [bound for bound in (erosion, contact) if bound is not None]
     probes = Probes(case, model, contact, clock, comm)

@@ -197,7 +197,8 @@ export class RunPage {
       entry("elements", count(counts?.elements ?? started?.elements)),
       entry("nodes", count(counts?.nodes ?? started?.nodes)),
       entry("shared nodes", count(counts?.shared)),
-      entry("bodies", count(counts?.fragments)));
+      entry("bodies", count(counts?.fragments)),
+      counts?.particles ? entry("particles", count(counts.particles)) : "");
   }
 
   drawRanks() {

@@ -219,7 +219,6 @@ def test_a_line_through_a_box_is_as_long_as_the_box(axis: int) -> None:
         assert not chord_lengths(mesh.points, mesh.tets.astype(np.uint32), axis, at).any()
 
 
-@pytest.mark.xfail(strict=True, reason="counted once for every tet that it touches")
 @pytest.mark.parametrize("shares", [(0.1, 0.1), (0.3, 0.3), (1.0 / 3.0, 0.5), (2.0 / 3.0, 0.5)])
 def test_a_line_in_the_faces_or_edges_of_tets_is_counted_once(shares: tuple[float, float]) -> None:
     """The diagonals of the cubes of a structured mesh lie in the plane of a penetration's lines."""

@@ -79,10 +79,15 @@ class Flight:
         return np.asarray(sums / np.where(length > 0.0, length, 1.0)[:, None])
 
     def extremes(self) -> tuple[float, Floats]:
-        """Largest difference of velocities on the surface, and their middle (3,), m/s; all ranks take part."""
+        """Largest difference of velocities on the surface, and their middle (3,), m/s; all ranks take part.
+
+        Zero when nothing is left.
+        """
         v = self.sides.crowd.v
         ends = (v.max(axis=0, initial=-np.inf), (-v).max(axis=0, initial=-np.inf))
         most = self._comm.maximum(np.concatenate(ends))
+        if not np.isfinite(most).all():
+            return 0.0, np.zeros(3)
         return float(np.linalg.norm(most[:3] + most[3:])), 0.5 * (most[:3] - most[3:])
 
 

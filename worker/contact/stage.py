@@ -72,14 +72,11 @@ class Contact(Boundary):
         """(parts, 3) what contact has given each part so far, N s; all ranks take part."""
         return np.asarray(self._comm.sum(self._parts) / self._scale)
 
-    def uncover(self, gone: Ints, removed: Flags) -> None:
-        """The surface without the tets of these ids (of this rank and its neighbours), and without ``removed`` nodes.
-
-        The blocks have been changed already; all ranks take part.
-        """
+    def uncover(self, gone: Ints, loose: Flags, removed: Flags) -> None:
+        """The surface after tets have left; see surface.uncovered. All ranks take part."""
         with self._timers.phase("contact"):
             self._surface = surface.uncovered(
-                self._surface, gone, removed, self._model, self._planes, self._neighbours, self._comm
+                self._surface, gone, loose, removed, self._model, self._planes, self._neighbours, self._comm
             )
             self._flight.follow(self._surface, self._model.nodes)
             self.due = True

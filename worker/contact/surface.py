@@ -46,16 +46,17 @@ def build(model: Model, planes: Flags, neighbours: list[Neighbour], comm: Comm, 
 
 
 def uncovered(
-    old: Surface, gone: Ints, removed: Flags, model: Model, planes: Flags, neighbours: list[Neighbour], comm: Comm
-) -> Surface:
-    """The surface after tets have left; all ranks take part.
+    old: Surface, gone: Ints, loose: Flags, removed: Flags, model: Model, planes: Flags,
+    neighbours: list[Neighbour], comm: Comm,
+) -> Surface:  # fmt: skip
+    """The surface after tets have left the blocks; all ranks take part.
 
-    ``gone``: ids of theirs, of this rank and its neighbours; ``removed`` (nodes,) nodes that have left with them. An
-    edge goes with either of its faces. Of what is laid bare, nodes meet faces; its edges meet no edges: they would be
-    as many as its faces, and all of them sharp.
+    ``gone``: ids of theirs, of this rank and its neighbours; ``loose`` (nodes,) nodes without tets that fly on,
+    ``removed`` those that have left. An edge goes with either of its faces. Of what is laid bare, nodes meet faces; its
+    edges meet no edges: they would be as many as its faces, and all of them sharp.
     """
     local, ids = _faces(model, planes)
-    flags = (old.flags | _flags(local, model.nodes.n, neighbours, comm)) & ~removed
+    flags = (old.flags | loose | _flags(local, model.nodes.n, neighbours, comm)) & ~removed
     kept = ~np.asarray(np.isin(old.sides // 4, gone).any(axis=1))
     return Surface(_table(model, local, ids), old.edges.take(kept), old.sides[kept], flags, old.far, old.far_owner)
 

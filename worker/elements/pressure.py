@@ -158,5 +158,5 @@ def scatter_fluxes(gradient, wi, tets, n):  # type: ignore[no-untyped-def]
 
 def nodal_strains(sums: Ints) -> Floats:
     """(n,) volume strain of the step at the nodes from the completed sums (n, 2); zero at a node without tets."""
-    strains: Floats = sums[:, 0] / np.maximum(sums[:, 1], 1)
+    strains: Floats = np.where(sums[:, 1] > 0, sums[:, 0] / np.maximum(sums[:, 1], 1), 0.0)
     return strains
