@@ -29,24 +29,35 @@ def edge_sizes(x: Floats, edges: Indices) -> Floats:
 def taken(met: Meetings, rows: "np.ndarray") -> Meetings:
     """Some of the meetings, in this order."""
     return Meetings(
-        met.nodes[rows], met.weights[rows], met.normals[rows], met.wanted[rows], met.friction[rows], len(rows)
-    )
+        met.nodes[rows], met.weights[rows], met.normals[rows], met.wanted[rows], met.friction[rows], met.pair[rows],
+        len(rows),
+    )  # fmt: skip
 
 
 def _filled(room: Meetings, n: int) -> Meetings:
     return taken(room, np.arange(n))
 
 
+def moments(out: Floats) -> Floats:
+    """(n, 9) means of n and of n n (xx, yy, zz, yz, zx, xy) of the normals (n, faces, 3) of nodes' faces."""
+    squares = np.einsum("nfi,nfj->nij", out, out) / out.shape[1]
+    pairs = [squares[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1))]
+    return np.ascontiguousarray(np.column_stack([out.mean(axis=1), *pairs]))
+
+
 def node_face(
     x: Floats, v: Floats, faces: Indices, pairs: Indices, dt: float, part: "np.ndarray | None" = None,
     mu: Floats | None = None, out: Floats | None = None,
 ) -> Meetings:  # fmt: skip
-    """The nodes that pass a face; the slaves are of another part unless ``part`` says something else."""
+    """The nodes that pass a face; the slaves are of another part unless ``part`` says something else.
+
+    ``out`` (n, faces, 3): unit normals of a node's faces, all of one area, zero for a node without faces.
+    """
     own = np.where(np.isin(np.arange(len(x)), faces), 0, 1) if part is None else part
     room, n = Meetings.room(len(pairs)), len(x)
     found = kernels.node_face(
-        room.nodes, room.weights, room.normals, room.wanted, room.friction, 0, faces, face_sizes(x, faces),
-        np.zeros((n, 3)) if out is None else out, pairs, x, v, own.astype(np.int32),
+        room.nodes, room.weights, room.normals, room.wanted, room.friction, room.pair, 0, faces, face_sizes(x, faces),
+        np.zeros((n, 9)) if out is None else moments(out), pairs, x, v, own.astype(np.int32),
         np.zeros((9, 9)) if mu is None else mu, dt,
     )  # fmt: skip
     return _filled(room, found)
@@ -56,8 +67,8 @@ def edge_edge(x: Floats, v: Floats, edges: Indices, pairs: Indices, dt: float, m
     """The edges that pass an edge."""
     room = Meetings.room(len(pairs))
     found = kernels.edge_edge(
-        room.nodes, room.weights, room.normals, room.wanted, room.friction, 0, edges, edge_sizes(x, edges), pairs, x,
-        v, np.zeros(len(x), np.int32), np.zeros((9, 9)) if mu is None else mu, dt,
+        room.nodes, room.weights, room.normals, room.wanted, room.friction, room.pair, 0, edges, edge_sizes(x, edges),
+        pairs, x, v, np.zeros(len(x), np.int32), np.zeros((9, 9)) if mu is None else mu, dt,
     )  # fmt: skip
     return _filled(room, found)
 
@@ -85,6 +96,14 @@ class Solver:
             assert (self.impulse.sum(axis=0) == 0).all()
             sweeps.give(self.v, self.total, self.impulse, self.mobility, self.scale)
         return self.v
+
+    def resume(self, kept: Floats, ratio: float = 1.0) -> None:
+        """Begins with ``ratio`` times the pushes (candidates, 4) that were kept."""
+        met = self.met
+        rows = (met.nodes, met.weights, met.normals, met.friction)
+        sweeps.resume(self.impulse, self.push, kept, met.pair, *rows, ratio, self.scale, met.n)
+        assert (self.impulse.sum(axis=0) == 0).all()
+        sweeps.give(self.v, self.total, self.impulse, self.mobility, self.scale)
 
     def heat(self, v_old: Floats, joule: float = 2.0**40) -> float:
         """Work of friction, J, of the meetings that were pushed from the velocities ``v_old``."""

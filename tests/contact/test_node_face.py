@@ -138,13 +138,23 @@ def test_a_node_that_stays_near_is_watched(gap: float, meets: bool) -> None:
     assert (met_from(np.array([0.3, 0.3, gap]), np.zeros(3)).n == 1) == meets
 
 
-def test_a_node_that_looks_the_way_the_face_does_is_not_met() -> None:
-    """The rim of a bar beside another of the same width; a node without a direction meets any face."""
+@pytest.mark.parametrize(
+    ("faces", "meets"),
+    [
+        ([(0, 0, -1.0)], True), ([(0, 0, 1.0)], False), ([(1.0, 0, 0)], False), ([(0, 0, 0)], True),
+        ([(1.0, 0, 0), (0, 0, 1.0)], False), ([(1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0)], False),
+        ([(1.0, 0, 0), (0, 0, -1.0)], True), ([(0.6, 0, 0.8), (0.6, 0, -0.8)], True),
+        ([(0.96, 0.28, 0), (0.96, -0.28, 0)], False),
+    ],
+)  # fmt: skip
+def test_a_node_meets_what_its_faces_look_at(faces: list[tuple[float, ...]], meets: bool) -> None:
+    """Not the rim of a bar the side of another of the same width, nor the surface under a block its front; a blunt edge
+    and a sharp one do, and a node without faces.
+    """
     x, v = np.concatenate([TRIANGLE, [[0.3, 0.3, -0.01]]]), np.zeros((5, 3))
-    for direction, meets in (((0, 0, 0.2), False), ((0, 0, 0.05), True), ((0, 0, -1.0), True), ((1.0, 0, 0), True)):
-        out = np.zeros((5, 3))
-        out[4] = direction
-        assert (node_face(x, v, FACE, every_pair(np.array([4]), 1), 1.0, out=out).n == 1) == meets
+    out = np.zeros((5, len(faces), 3))
+    out[4] = faces
+    assert (node_face(x, v, FACE, every_pair(np.array([4]), 1), 1.0, out=out).n == 1) == meets
 
 
 def test_a_deep_node_is_held_by_the_nearest_face_and_a_touching_one_by_all() -> None:

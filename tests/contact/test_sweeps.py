@@ -30,7 +30,8 @@ def network(
     normals = np.tile(unit(random, 1), (meetings, 1)) if one_normal else unit(random, meetings)
     want, mu = -wanted * random.uniform(size=meetings), np.full(meetings, friction)
     mobility = np.repeat(10.0 ** random.uniform(-1.5, 1.5, (nodes, 1)), 3, axis=1)
-    return Meetings(rows, weights, normals, want, mu, meetings), 10.0 * random.normal(size=(nodes, 3)), mobility
+    pair = np.arange(meetings, dtype=np.int32)
+    return Meetings(rows, weights, normals, want, mu, pair, meetings), 10.0 * random.normal(size=(nodes, 3)), mobility
 
 
 def energy(v: Floats, mobility: Floats) -> float:
@@ -272,3 +273,19 @@ def test_energy_lost_is_friction_heat_and_the_work_of_the_normal_impulse(seed: i
     assert heat >= 0.0
     assert (heat > 0.0) == (mu > 0.0)
     assert lost == pytest.approx(normal + heat, rel=1e-7)
+
+
+def test_a_step_begins_with_the_impulses_of_the_one_before() -> None:
+    """Friction whole, across the normal as it is now, and the push along it in part; nothing without friction."""
+    met, v, mobility = network(7, friction=0.4)
+    first, again = Solver(met, v, mobility), Solver(met, v, mobility)
+    solved = first.sweep(2000)
+    again.resume(first.push)
+    across = first.push[:, 1:] - (first.push[:, 1:] * met.normals).sum(axis=1)[:, None] * met.normals
+    assert again.push[:, 1:] == pytest.approx(across, abs=1e-9)
+    assert again.push[:, 0] == pytest.approx(0.8 * first.push[:, 0], abs=1e-9)
+    assert np.abs(again.sweep(5) - solved).max() < 0.5 * np.abs(Solver(met, v, mobility).sweep(5) - solved).max()
+    met.friction[:] = 0.0
+    bare = Solver(met, v, mobility)
+    bare.resume(first.push)
+    assert (bare.v == v).all()

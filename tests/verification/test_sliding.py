@@ -98,7 +98,6 @@ def test_a_block_on_a_steep_incline_slides_with_what_friction_leaves() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(strict=True, reason="sweeps that begin from nothing let it creep by 6e-5 of an edge in 1000 steps")
 def test_a_block_on_a_gentle_incline_stays() -> None:
     """A slope of 0.25 below mu = 0.3: less than 1e-6 of a tet's edge in 1000 steps, and nothing gains energy."""
     watch = slid(*tilted(0.25), "run.end_time=120 ms")

@@ -15,6 +15,8 @@ from .surface import Surface
 _NORMAL_TAG = 14
 _SPENT = 0.4
 """Of the skin: a node that strays further than this from its path calls for a new search."""
+_NOTHING = 1e-300
+"""m^2: keeps a face of no area from a division by zero."""
 
 
 class Flight:
@@ -71,12 +73,14 @@ class Flight:
         crowd.x[places], crowd.v[places] = far.x, far.v
 
     def normals(self, nodes: Nodes) -> Floats:
-        """(nodes, 3) unit outward normals of the nodes of the surface, zero off it; all ranks take part."""
-        sums = np.zeros((nodes.n, 3), np.int64)
+        """(nodes, 9) means over a node's faces, by area, of n and n n (meetings.node_face), zero off the surface; all
+        ranks take part.
+        """
+        sums = np.zeros((nodes.n, 9), np.int64)
         _add_normals(sums, nodes.x, self._face_nodes, sweeps.SHARES / self.size**2)
         complete(self._comm, self._neighbours, sums, _NORMAL_TAG)
-        length = np.sqrt((sums.astype(np.float64) ** 2).sum(axis=1))
-        return np.asarray(sums / np.where(length > 0.0, length, 1.0)[:, None])
+        area = sums[:, 3:6].sum(axis=1)
+        return np.asarray(sums / np.where(area > 0, area, 1)[:, None])
 
     def extremes(self) -> tuple[float, Floats]:
         """Largest difference of velocities on the surface, and their middle (3,), m/s; all ranks take part.
@@ -91,15 +95,24 @@ class Flight:
         return float(np.linalg.norm(most[:3] + most[3:])), 0.5 * (most[:3] - most[3:])
 
 
-@njit("void(int64[:, ::1], float64[:, ::1], int32[:, ::1], float64)", cache=True)
+@njit("void(int64[:, ::1], float64[:, ::1], int32[:, ::1], float64)", cache=True, error_model="numpy")
 def _add_normals(sums, x, faces, scale):  # type: ignore[no-untyped-def]
-    """Adds the area vectors of faces (f, 3), in quanta of 1 / ``scale``, to the sums (nodes, 3) of their nodes."""
+    """Adds n and n n of faces (f, 3), times their area in quanta of 1 / ``scale``, to the sums (nodes, 9) of their
+    nodes.
+    """
+    area, moments = np.empty(3), np.empty(9)
     for f in range(len(faces)):
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
         for i in range(3):
             j, k = (i + 1) % 3, (i + 2) % 3
-            area = (x[b, j] - x[a, j]) * (x[c, k] - x[a, k]) - (x[b, k] - x[a, k]) * (x[c, j] - x[a, j])
-            quanta = np.int64(np.rint(area * scale))
+            area[i] = (x[b, j] - x[a, j]) * (x[c, k] - x[a, k]) - (x[b, k] - x[a, k]) * (x[c, j] - x[a, j])
+        size = max(np.sqrt(area[0] * area[0] + area[1] * area[1] + area[2] * area[2]), _NOTHING)
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            moments[i], moments[3 + i] = area[i], area[i] * area[i] / size
+            moments[6 + i] = area[j] * area[k] / size
+        for i in range(9):
+            quanta = np.int64(np.rint(moments[i] * scale))
             for m in range(3):
                 sums[faces[f, m], i] += quanta
 

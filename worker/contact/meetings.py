@@ -27,7 +27,8 @@ _PUSH_OUT = 0.1
 """Largest share of a penetration that is taken back in a step, and of the speed of closing that is given back for it:
 less than an elastic impact returns, so that it makes no energy."""
 FACING = 0.1
-"""Cosine between the outward normals of a node and of a face above which they do not face each other."""
+"""A node looks at a face when the cosine of the face's normal and its own mean one is below this, and when the
+cosines with the normals of its faces, their mean less their deviation, come below minus this."""
 _PARALLEL = 0.05
 """Sine of the angle below which edges are left to nodes and faces."""
 
@@ -46,16 +47,19 @@ class Meetings:
     """(room,) n . sum(w_k v_k) must not be below this, m/s."""
     friction: Floats
     """(room,) Coulomb's coefficient."""
+    pair: Indices
+    """(room,) which candidate of a node and a face it was; -1 for edges."""
     n: int = 0
 
     @classmethod
     def room(cls, n: int) -> "Meetings":
         """Room for ``n`` meetings."""
-        return cls(np.empty((n, 4), np.int32), np.empty((n, 4)), np.empty((n, 3)), np.empty(n), np.empty(n))
+        rows, numbers = np.empty((n, 4), np.int32), np.empty(n, np.int32)
+        return cls(rows, np.empty((n, 4)), np.empty((n, 3)), np.empty(n), np.empty(n), numbers)
 
 
 _V2, _N2 = "float64[:, ::1]", "int32[:, ::1]"
-_OUT = f"{_N2}, {_V2}, {_V2}, float64[::1], float64[::1]"
+_OUT = f"{_N2}, {_V2}, {_V2}, float64[::1], float64[::1], int32[::1]"
 _IN = f"{_N2}, {_V2}, {_V2}, int32[::1], {_V2}, float64"
 
 
@@ -102,12 +106,27 @@ def _wanted(gap0, gap1, speed, dt):  # type: ignore[no-untyped-def]
     return (min(gap0, 0.0) - gap1) / dt + back
 
 
+@njit(f"boolean({_V2}, int64, float64[::1])", cache=True)
+def _looks_at(out, s, m):  # type: ignore[no-untyped-def]
+    """Whether node s looks at a face of normal m; one without faces looks at any."""
+    mean, square, length = 0.0, 0.0, 0.0
+    for a in range(3):
+        b, c = (a + 1) % 3, (a + 2) % 3
+        mean += out[s, a] * m[a]
+        length += out[s, a] * out[s, a]
+        square += out[s, 3 + a] * m[a] * m[a] + 2.0 * out[s, 6 + a] * m[b] * m[c]
+    if length == 0.0:
+        return True
+    return mean <= FACING * np.sqrt(length) and mean - np.sqrt(max(square - mean * mean, 0.0)) <= -FACING
+
+
 @njit(f"int64({_OUT}, int64, {_N2}, float64[::1], {_V2}, {_IN})", cache=True, error_model="numpy")
-def node_face(nodes, weights, normals, wanted, friction, n, faces, size, out, pairs, x, v, part, mu, dt):  # type: ignore[no-untyped-def]
+def node_face(nodes, weights, normals, wanted, friction, pair, n, faces, size, out, pairs, x, v, part, mu, dt):  # type: ignore[no-untyped-def]
     """Nodes that pass a face, from row ``n`` on; returns the new number of rows.
 
-    ``out`` (nodes, 3): unit outward normals of the nodes; a node and a face that look the same way do not meet, such as
-    the rim of a bar and the side of another one of the same width. Zero for a node without faces, which meets any.
+    ``out`` (nodes, 9): means of n and of n n (xx, yy, zz, yz, zx, xy) of the outward normals of a node's faces. A node
+    meets a face that it looks at: the rim of a bar not the side of another one of the same width, the surface under a
+    block that slides not its front, which stands across. Zero for a node without faces, which meets any.
 
     ``pairs`` (p, 2): node and face, sorted by node, then by the id of the face; ``faces`` (f, 4), the node opposite
     last; ``mu`` (parts, parts).
@@ -123,7 +142,7 @@ def node_face(nodes, weights, normals, wanted, friction, n, faces, size, out, pa
         gap1 = _height(m, ahead, s, i, j, k)
         if not gap1 <= NEAR * size[f]:
             continue
-        if out[s, 0] * m[0] + out[s, 1] * m[1] + out[s, 2] * m[2] > FACING:
+        if not _looks_at(out, s, m):
             continue
         gap0 = _height(b, x, s, i, j, k)
         if not gap0 >= -(DEEP_SELF if part[s] == part[i] else DEEP) * size[f]:
@@ -154,7 +173,7 @@ def node_face(nodes, weights, normals, wanted, friction, n, faces, size, out, pa
             normals[at, a] = m[a]
             speed += m[a] * (v[s, a] - (b[0] * v[i, a] + b[1] * v[j, a] + b[2] * v[k, a]))
         wanted[at] = speed + _wanted(gap0, gap1, speed, dt)
-        friction[at] = mu[part[s], part[i]]
+        friction[at], pair[at] = mu[part[s], part[i]], p
     return n
 
 
@@ -200,7 +219,7 @@ def _apart(m, x, v, a, b, c, d, s, t, h):  # type: ignore[no-untyped-def]
 
 
 @njit(f"int64({_OUT}, int64, {_N2}, float64[::1], {_IN})", cache=True, error_model="numpy")
-def edge_edge(nodes, weights, normals, wanted, friction, n, edges, size, pairs, x, v, part, mu, dt):  # type: ignore[no-untyped-def]
+def edge_edge(nodes, weights, normals, wanted, friction, pair, n, edges, size, pairs, x, v, part, mu, dt):  # type: ignore[no-untyped-def]
     """Edges that pass an edge, from row ``n`` on; returns the new number of rows.
 
     ``pairs`` (p, 2): two edges; ``edges`` (e, 4): records.Edges.
@@ -239,6 +258,6 @@ def edge_edge(nodes, weights, normals, wanted, friction, n, edges, size, pairs, 
             normals[n, k] = m[k]
             speed += m[k] * ((1.0 - t) * v[c, k] + t * v[d, k] - (1.0 - s) * v[a, k] - s * v[b, k])
         wanted[n] = speed + _wanted(gap0, gap1, speed, dt)
-        friction[n] = mu[part[a], part[c]]
+        friction[n], pair[n] = mu[part[a], part[c]], -1
         n += 1
     return n

@@ -84,6 +84,10 @@ class Scene:
     """(p, 2) place of a node, index of a face."""
     edge_edge: Indices
     """(q, 2) indices of edges."""
+    keys: Ints
+    """(p, 2) ids of the node and of the face of each candidate, ascending."""
+    kept: Floats
+    """(p, 4) its ``push`` of the last step, zero where it did not meet."""
     faces_sent: int
     room: Meetings
     diagonal: Floats
@@ -94,7 +98,7 @@ class Scene:
     total: Ints
     """(crowd, 3) impulses of the last step, quanta."""
     normals: Floats
-    """(crowd, 3) unit outward normals of the nodes, as they were at the search."""
+    """(crowd, 9) what the faces of the nodes look at, as they did at the search; see meetings.node_face."""
     before: Floats
     """(crowd, 3) v(n-1/2)."""
     shared_shares: SharedSum
@@ -104,6 +108,13 @@ class Scene:
         """Largest relative speed of a candidate node over the altitude of its candidate face's tet, 1/s."""
         crowd = self.crowd
         return float(_approach(crowd.x, crowd.v, self.faces, self.node_face))
+
+    def remember(self, old: "Scene") -> None:
+        """Takes over what candidates of another search have kept."""
+        kind = [("node", np.int64), ("face", np.int64)]
+        mine, theirs = (np.ascontiguousarray(keys).view(kind).reshape(-1) for keys in (self.keys, old.keys))
+        _, here, there = np.intersect1d(mine, theirs, assume_unique=True, return_indices=True)
+        self.kept[here] = old.kept[there]
 
     def free(self) -> None:
         """Gives its messages back to MPI."""
@@ -208,6 +219,7 @@ def _compact(
         shared = ghosts.members(pushed, crowd.owner[crowd.places(pushed)], neighbours, nodes, comm)
     needed = np.unique(np.concatenate([pushed, faces.nodes.reshape(-1), edges.nodes.reshape(-1), *shared.values()]))
     slave_ids = crowd.id[node_face[:, 0]]
+    keys = np.column_stack([slave_ids, seen.faces.id[node_face[:, 1]]])
     crowd = crowd.take(crowd.places(needed))
     company = [Neighbour(rank, crowd.places(ids)) for rank, ids in sorted(shared.items())]
     room = len(node_face) + len(edge_edge)
@@ -217,10 +229,10 @@ def _compact(
         crowd=crowd, held=held, local=crowd.local[held], faces=crowd.places(faces.nodes), face_size=faces.size,
         edges=crowd.places(edges.nodes), edge_size=edges.size,
         node_face=np.column_stack([crowd.places(slave_ids), face_at.reshape(-1)]).astype(np.int32),
-        edge_edge=edge_at.reshape(-1, 2).astype(np.int32), faces_sent=sent,
+        edge_edge=edge_at.reshape(-1, 2).astype(np.int32), keys=keys, kept=np.zeros((len(keys), 4)), faces_sent=sent,
         room=Meetings.room(room), diagonal=np.empty((room, 2)), push=np.empty((room, 4)),
         copies=ghosts.copies(crowd, nodes, comm, _COPY_TAG), shares=shares, impulse=impulse,
-        total=np.zeros((crowd.n, 3), np.int64), normals=np.zeros((crowd.n, 3)), before=np.zeros((crowd.n, 3)),
+        total=np.zeros((crowd.n, 3), np.int64), normals=np.zeros((crowd.n, 9)), before=np.zeros((crowd.n, 3)),
         shared_shares=SharedSum(comm, company, shares, _SHARE_TAG),
         shared_impulse=SharedSum(comm, company, impulse, _PUSH_TAG),
     )  # fmt: skip

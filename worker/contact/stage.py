@@ -63,6 +63,9 @@ class Contact(Boundary):
         self.searches = 0
         self._last = -math.inf
         """Step of the last search."""
+        self._rubs = bool(np.nanmax(self._mu, initial=0.0) > 0.0)
+        self._mean_dt = 0.0
+        """Of the last step with a scene, s."""
 
     def friction_work(self) -> float:
         """Heat of friction so far of the meetings of all ranks, J; all ranks take part."""
@@ -106,15 +109,17 @@ class Contact(Boundary):
 
     def _search(self, state: Nodes) -> None:
         """Looks for candidates; all ranks take part."""
-        clock, flight = self._clock, self._flight
-        if self._scene is not None:
-            self._scene.free()
+        clock, flight, old = self._clock, self._flight, self._scene
+        if old is not None:
+            old.free()
         flight.refresh(state)
         fastest, drift = flight.extremes()
         steps = min(flight.size / (fastest * clock.dt) if fastest > 0.0 else _LONGEST, 2.0 * (clock.step - self._last))
         horizon = min(max(steps, _SHORTEST), _LONGEST) * clock.dt
         self._scene = scene.build(flight.sides, self._rules, horizon, drift, state, self._neighbours, self._comm)
         self.limit = _KINEMATIC * float(self._comm.maximum(np.array([self._scene.approach()]))[0])
+        if old is not None and self._rubs:
+            self._scene.remember(old)
         self._look(self._scene, state)
         self._scene.normals[self._scene.held] = flight.normals(state)[self._scene.local]
         flight.begin(state, clock.t, clock.t + horizon)
@@ -133,24 +138,43 @@ class Contact(Boundary):
         n = self._meet(now, dt)
         self._weigh(now, n)
         room_of = (room.nodes, room.weights, room.normals)
-        now.push[:n] = 0.0
         slip = sweeps.rates(now.before, room.nodes, room.weights, n)
+        now.push[:n] = 0.0
+        if self._rubs:
+            self._resume(now, n)
         for _ in range(self._sweeps):
             sweeps.sweep(
                 now.impulse, now.push, crowd.v, *room_of, room.wanted, room.friction, now.diagonal, self._scale, n
             )
-            now.shared_impulse.begin()
-            now.shared_impulse.finish()
-            sweeps.give(crowd.v, now.total, now.impulse, crowd.mobility, self._scale)
+            self._give(now)
+        if self._rubs:
+            now.kept[:] = 0.0
+            faces = room.pair[:n] >= 0
+            now.kept[room.pair[:n][faces]] = now.push[:n][faces]
         heat = self._friction
         sweeps.heat(heat.words.reshape(-1), now.push, slip, crowd.v, *room_of, room.friction, heat.scale[0], n)
         self._book(now)
         if _give_back(state.v, self._parts, now.local, held, crowd.v, now.total, state.part, state.owned):
             self.last_push = t
 
+    def _resume(self, now: Scene, n: int) -> None:
+        """Begins with what the same pairs were pushed with in the step before."""
+        room, mean_dt = now.room, self._clock.mean_dt
+        ratio = mean_dt / self._mean_dt if self._mean_dt > 0.0 else 0.0
+        self._mean_dt = mean_dt
+        room_of = (room.nodes, room.weights, room.normals)
+        sweeps.resume(now.impulse, now.push, now.kept, room.pair, *room_of, room.friction, ratio, self._scale, n)
+        self._give(now)
+
+    def _give(self, now: Scene) -> None:
+        """Completes the impulses of a sweep and turns them into velocities."""
+        now.shared_impulse.begin()
+        now.shared_impulse.finish()
+        sweeps.give(now.crowd.v, now.total, now.impulse, now.crowd.mobility, self._scale)
+
     def _meet(self, now: Scene, dt: float) -> int:
         crowd, room = now.crowd, now.room
-        out = (room.nodes, room.weights, room.normals, room.wanted, room.friction)
+        out = (room.nodes, room.weights, room.normals, room.wanted, room.friction, room.pair)
         found = (crowd.x, crowd.v, crowd.part, self._mu, dt)
         n = meetings.node_face(*out, 0, now.faces, now.face_size, now.normals, now.node_face, *found)
         return int(meetings.edge_edge(*out, n, now.edges, now.edge_size, now.edge_edge, *found))
