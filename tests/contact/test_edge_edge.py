@@ -70,6 +70,18 @@ def test_edges_that_cross_beyond_an_end_do_not_meet() -> None:
         assert meets(shift=shift).n == 1
 
 
+def test_edges_meet_where_they_cross_not_where_they_end_the_step() -> None:
+    """The upper edge slides off sideways in the same step, after it has passed; or has come from there."""
+    x = np.concatenate([ONE, turned(np.pi / 2) + np.array([0.5, 0.0, 0.1])])
+    for sideways, found in ((0.9, 1), (1.1, 0), (-1.0, 1)):
+        v = np.concatenate([np.zeros((4, 3)), np.tile([sideways, 0.0, -0.2], (4, 1))])
+        met = edge_edge(x, v, EDGES, PAIR, 1.0)
+        assert met.n == found
+        if found:
+            at = -(met.weights[0, 2:, None] * x[met.nodes[0, 2:]]).sum(axis=0)
+            assert at == pytest.approx([0.5 + 0.5 * sideways, 0.0, 0.0], abs=1e-12)
+
+
 def test_a_concave_edge_meets_nothing() -> None:
     assert meets(one=ONE * [1.0, 1.0, -1.0] @ np.diag([1.0, -1.0, 1.0])).n == 0
 

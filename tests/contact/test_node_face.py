@@ -9,6 +9,7 @@ from conoid.worker.contact.search import Things
 
 from ..worker.meshes import Floats, block
 from .bodies import Indices, crowd_of, meeting_of, pieces_of, sheet, surface_of
+from .distances import point_triangle
 from .kernels import every_pair, face_sizes, node_face
 
 TRIANGLE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.2, 0.2, -1.0]])
@@ -66,11 +67,14 @@ def random_scene(seed: int, nodes: int = 40, faces: int = 12) -> tuple[Floats, F
 def expected(
     x: Floats, v: Floats, faces: Indices, part: "np.ndarray", slaves: "np.ndarray", dt: float
 ) -> list[Expected]:
-    """Rows in order: by node, then by face; a node that is deep in several faces is held by the nearest of these."""
+    """Rows in order: by node, then by face; a node that is deep in several faces is held by the nearest of these, but
+    not by one of a part to whose front it is nearer."""
     sizes, rows = face_sizes(x, faces), []
     for s in slaves:
         mine = [Expected(x, v, s, f, sizes[i], part[s] == part[f[0]], dt) for i, f in enumerate(faces)]
-        mine = [row for row in mine if row.meets]
+        away = point_triangle(x[s][None], x[faces[:, :3]])[0]
+        ahead = [away[i] for i, row in enumerate(mine) if row.gap0 > 0.0 and away[i] < DEEP * sizes[i]]
+        mine = [row for row in mine if row.meets and not (row.deep and min(ahead, default=np.inf) < -row.gap0)]
         deep = [row for row in mine if row.deep]
         nearest = max(deep, key=lambda row: row.gap0, default=None)
         rows += [row for row in mine if not row.deep or row is nearest]
@@ -155,6 +159,17 @@ def test_a_node_meets_what_its_faces_look_at(faces: list[tuple[float, ...]], mee
     out = np.zeros((5, len(faces), 3))
     out[4] = faces
     assert (node_face(x, v, FACE, every_pair(np.array([4]), 1), 1.0, out=out).n == 1) == meets
+
+
+def test_a_node_beside_an_acute_edge_is_not_inside() -> None:
+    """Below the plane of a face, with its foot on it, but in front of the face that meets it at an acute angle."""
+    x = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.2, 0.9, -0.7], [0.45, 0.0, -0.1]])
+    faces = np.array([[0, 1, 2, 3], [0, 3, 1, 2], [1, 3, 2, 0], [0, 2, 3, 1]], np.int32)
+    x[4, 1] = 0.02
+    assert node_face(x, np.zeros_like(x), faces[:1], every_pair(np.array([4]), 1), 1.0).n == 1
+    assert node_face(x, np.zeros_like(x), faces, every_pair(np.array([4]), 4), 1.0).n == 0
+    x[4, 1] = 0.25
+    assert node_face(x, np.zeros_like(x), faces, every_pair(np.array([4]), 4), 1.0).n == 1
 
 
 def test_a_deep_node_is_held_by_the_nearest_face_and_a_touching_one_by_all() -> None:

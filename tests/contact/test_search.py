@@ -203,6 +203,23 @@ def test_memory_stays_with_the_number_of_things_where_sizes_differ_tenfold(coars
     assert other / (their_pairs + 2 * coarse * coarse) < 4.0 * equal / (pairs + 2 * 40 * 40)
 
 
+@pytest.mark.parametrize("size", [1e2, 1e3, 1e4])
+def test_memory_does_not_follow_a_huge_thing(size: float) -> None:
+    """A long edge across two sheets of short ones: nothing is filled with points of the others' distance."""
+    (x0, faces), (x1, _) = sheet(20, 1.0), sheet(20, 1.0)
+    short = faces[:, :2]
+    x = np.concatenate([x0, x1 + np.array([0.0, 0.0, 0.1]), [[-size, -size, -size], [size, size, size]]])
+    corners = np.concatenate([short, short + len(x0), [[2 * len(x0), 2 * len(x0) + 1]]]).astype(np.int32)
+    part = np.repeat([0, 1, 2], [len(x0), len(x0), 2]).astype(np.int32)
+    edges = Things(corners, np.full(len(corners), 0.2))
+    tracemalloc.start()
+    found = search.find(edges, edges, x, np.zeros_like(x), part, NEVER_SELF, 1.0, np.arange(len(corners)))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert (found == len(corners) - 1).any(axis=1).sum() == 2 * len(short)
+    assert peak < 4e6
+
+
 @pytest.mark.parametrize("spread", [1.0, 1e3, 1e9])
 def test_position_codes_find_every_point_of_a_bucket(spread: float) -> None:
     """Each row of buckets is one range of the sorted codes."""

@@ -269,20 +269,12 @@ def test_no_shot_misses_what_its_ray_hits() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(
-    strict=True,
-    reason="13 of 1000: edges are met where they are at the end of the step and not where they cross; and a node "
-    "beside an acute edge, below the plane of one of its faces, is taken for one inside",
-)
 def test_no_shot_of_a_thousand_misses_what_its_ray_hits() -> None:
     hits, wrong = misjudged(range(40, 1040))
     assert hits > 400
     assert wrong == []
 
 
-@pytest.mark.xfail(
-    strict=True, reason="21 searches: how far one looks ahead is what the fastest of all needs past a face"
-)
 def test_a_fast_fragment_makes_no_searches_for_others() -> None:
     """Two bodies meet slowly, alone with one search in 200 steps; a tet flies by at 5 km/s: one in 50 at most."""
     lower, upper = block((12, 12, 12), SIZE, seed=1), block((11, 11, 11), SIZE, seed=2)

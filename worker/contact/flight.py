@@ -13,6 +13,10 @@ from .scene import Sides
 from .surface import Surface
 
 _NORMAL_TAG = 14
+_LOOKS = np.array([10.0, 20.0, 40.0, 80.0, 160.0, 300.0])
+"""Steps of free flight that a search may look ahead."""
+_SWEPT = 8.0
+"""How many cells a node may sweep in the mean: two along each axis."""
 _SPENT = 0.4
 """Of the skin: a node that strays further than this from its path calls for a new search."""
 _NOTHING = 1e-300
@@ -82,17 +86,22 @@ class Flight:
         area = sums[:, 3:6].sum(axis=1)
         return np.asarray(sums / np.where(area > 0, area, 1)[:, None])
 
-    def extremes(self) -> tuple[float, Floats]:
-        """Largest difference of velocities on the surface, and their middle (3,), m/s; all ranks take part.
+    def foresight(self, dt: float) -> tuple[float, Floats]:
+        """How many steps ``dt`` a search may look ahead, and the mean velocity (3,), m/s; all ranks take part.
 
-        Zero when nothing is left.
+        As many as leave the space that nodes sweep, in cells of a face's size, a few times what they need at rest:
+        about a face's length for all, much more for the few that are fast.
         """
-        v = self.sides.crowd.v
-        ends = (v.max(axis=0, initial=-np.inf), (-v).max(axis=0, initial=-np.inf))
-        most = self._comm.maximum(np.concatenate(ends))
-        if not np.isfinite(most).all():
-            return 0.0, np.zeros(3)
-        return float(np.linalg.norm(most[:3] + most[3:])), 0.5 * (most[:3] - most[3:])
+        crowd, slaves = self.sides.crowd, self.sides.slaves
+        v = crowd.v[crowd.places(slaves)]
+        sums = exact_sums(self._comm, np.column_stack([v, np.ones(len(v))]))
+        if sums[3] == 0.0:
+            return float(_LOOKS[0]), np.zeros(3)
+        drift = sums[:3] / sums[3]
+        paths = np.linalg.norm(v - drift, axis=1)[:, None] * (dt / self.size) * _LOOKS
+        swept = np.rint(np.minimum((1.0 + paths) ** 3, 2.0**30)).sum(axis=0)
+        total = self._comm.sum(np.append(swept, len(v)).astype(np.int64))
+        return float(_LOOKS[total[:-1] <= _SWEPT * total[-1]].max(initial=_LOOKS[0])), np.asarray(drift)
 
 
 @njit("void(int64[:, ::1], float64[:, ::1], int32[:, ::1], float64)", cache=True, error_model="numpy")

@@ -99,6 +99,44 @@ def _foot(b, x, ahead, s, i, j, k, tau):  # type: ignore[no-untyped-def]
     return True
 
 
+@njit(f"float64({_V2}, int64, int64, int64)", cache=True)
+def _off(x, s, a, b):  # type: ignore[no-untyped-def]
+    """Distance of node s from the segment ab, m."""
+    along, length, square = 0.0, 0.0, 0.0
+    for i in range(3):
+        along += (x[s, i] - x[a, i]) * (x[b, i] - x[a, i])
+        length += (x[b, i] - x[a, i]) ** 2
+    share = min(max(along / length, 0.0), 1.0)
+    for i in range(3):
+        square += (x[s, i] - x[a, i] - share * (x[b, i] - x[a, i])) ** 2
+    return np.sqrt(square)
+
+
+@njit(f"boolean({_V2}, int64, {_N2}, {_N2}, float64[::1], int32[::1], float64)", cache=True, error_model="numpy")
+def _outside(x, p, pairs, faces, size, part, depth):  # type: ignore[no-untyped-def]
+    """Whether the node of pair ``p``, ``depth`` below its face, is nearer to the front of another face of that part.
+
+    Then it is beside an acute edge and not in the body: the nearest face decides on which side a node is. Only faces
+    within ``DEEP`` of their size are asked, which every list of candidates has.
+    """
+    b, m, s = np.empty(3), np.empty(3), pairs[p, 0]
+    q = p
+    while q > 0 and pairs[q - 1, 0] == s:
+        q -= 1
+    while q < len(pairs) and pairs[q, 0] == s:
+        f = pairs[q, 1]
+        q += 1
+        i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
+        off = _height(m, x, s, i, j, k)
+        if part[i] != part[faces[pairs[p, 1], 0]] or not off > 0.0:
+            continue
+        if not _foot(b, x, x, s, i, j, k, 0.0):
+            off = min(_off(x, s, i, j), _off(x, s, j, k), _off(x, s, k, i))
+        if off < min(depth, DEEP * size[f]):
+            return True
+    return False
+
+
 @njit("float64(float64, float64, float64, float64)", cache=True)
 def _wanted(gap0, gap1, speed, dt):  # type: ignore[no-untyped-def]
     """By how much the normal speed must rise, m/s: not to pass, and when that has happened already, not deeper."""
@@ -162,6 +200,8 @@ def node_face(nodes, weights, normals, wanted, friction, pair, n, faces, size, o
         if gap0 < -_TOUCHING * size[f]:
             if row >= 0 and gap0 <= nearest:
                 continue
+            if _outside(x, p, pairs, faces, size, part, -gap0):
+                continue
             at = row if row >= 0 else n
             nearest, row = gap0, at
         n += at == n
@@ -218,9 +258,21 @@ def _apart(m, x, v, a, b, c, d, s, t, h):  # type: ignore[no-untyped-def]
     return gap
 
 
+@njit(f"float64({_V2}, {_V2}, int64, int64, int64, int64, float64)", cache=True)
+def _volume(x, v, a, b, c, d, h):  # type: ignore[no-untyped-def]
+    """Six times the volume, m^3, between ab and cd after a time ``h``: it changes sign when their lines cross."""
+    total = 0.0
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        ui, uj = x[b, i] - x[a, i] + h * (v[b, i] - v[a, i]), x[b, j] - x[a, j] + h * (v[b, j] - v[a, j])
+        wi, wj = x[d, i] - x[c, i] + h * (v[d, i] - v[c, i]), x[d, j] - x[c, j] + h * (v[d, j] - v[c, j])
+        total += (ui * wj - uj * wi) * (x[c, k] - x[a, k] + h * (v[c, k] - v[a, k]))
+    return total
+
+
 @njit(f"int64({_OUT}, int64, {_N2}, float64[::1], {_IN})", cache=True, error_model="numpy")
 def edge_edge(nodes, weights, normals, wanted, friction, pair, n, edges, size, pairs, x, v, part, mu, dt):  # type: ignore[no-untyped-def]
-    """Edges that pass an edge, from row ``n`` on; returns the new number of rows.
+    """Edges that pass an edge, from row ``n`` on; returns the new number of rows. They meet where they cross.
 
     ``pairs`` (p, 2): two edges; ``edges`` (e, 4): records.Edges.
     """
@@ -230,11 +282,13 @@ def edge_edge(nodes, weights, normals, wanted, friction, pair, n, edges, size, p
         for k in range(4):
             one[k], two[k] = edges[pairs[p, 0], k], edges[pairs[p, 1], k]
         a, b, c, d = one[0], one[1], two[0], two[1]
+        start, end = _volume(x, v, a, b, c, d, 0.0), _volume(x, v, a, b, c, d, dt)
+        h = dt * start / (start - end) if start * end < 0.0 else dt
         uu, uw, ww, ur, wr = 0.0, 0.0, 0.0, 0.0, 0.0
         for k in range(3):
-            u[k] = x[b, k] - x[a, k] + dt * (v[b, k] - v[a, k])
-            w[k] = x[d, k] - x[c, k] + dt * (v[d, k] - v[c, k])
-            r = x[c, k] - x[a, k] + dt * (v[c, k] - v[a, k])
+            u[k] = x[b, k] - x[a, k] + h * (v[b, k] - v[a, k])
+            w[k] = x[d, k] - x[c, k] + h * (v[d, k] - v[c, k])
+            r = x[c, k] - x[a, k] + h * (v[c, k] - v[a, k])
             uu, uw, ww, ur, wr = uu + u[k] * u[k], uw + u[k] * w[k], ww + w[k] * w[k], ur + u[k] * r, wr + w[k] * r
         area = uu * ww - uw * uw
         if not area > _PARALLEL * _PARALLEL * uu * ww:
@@ -244,12 +298,12 @@ def edge_edge(nodes, weights, normals, wanted, friction, pair, n, edges, size, p
             continue
         m[:] = _cross(u, w) / np.sqrt(area)
         gap0, gap1 = _apart(m, x, v, a, b, c, d, s, t, 0.0), _apart(m, x, v, a, b, c, d, s, t, dt)
-        if not _between(m, u, x, v, one, dt):
+        if not _between(m, u, x, v, one, h):
             m, gap0, gap1 = -m, -gap0, -gap1
-            if not _between(m, u, x, v, one, dt):
+            if not _between(m, u, x, v, one, h):
                 continue
         smaller = min(size[pairs[p, 0]], size[pairs[p, 1]])
-        if gap1 > NEAR * smaller or gap0 < -DEEP_SELF * smaller or not _between(-m, w, x, v, two, dt):
+        if gap1 > NEAR * smaller or gap0 < -DEEP_SELF * smaller or not _between(-m, w, x, v, two, h):
             continue
         nodes[n, 0], nodes[n, 1], nodes[n, 2], nodes[n, 3] = c, d, a, b
         weights[n, 0], weights[n, 1], weights[n, 2], weights[n, 3] = 1.0 - t, t, s - 1.0, -s

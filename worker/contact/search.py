@@ -14,6 +14,9 @@ from ..state import Flags, Floats, Indices, Ints
 from . import buckets
 from .buckets import bucket_of, first_at
 
+_FILLED = 4.0
+"""Buckets along an axis that a small thing may fill."""
+
 
 @dataclass
 class Things:
@@ -109,7 +112,25 @@ def _pairs(
     small: Boxes, large: Boxes, small_corners: Indices, large_corners: Indices, part: Indices, allowed: Flags,
     small_rank: Ints, large_rank: Ints,
 ) -> Indices:  # fmt: skip
+    """Small things of like size together, in buckets twice as large for each level: none fills more than a few."""
     edge = 1.5 * float(np.median((large.high - large.low).max(axis=1)))
+    extent = (small.high - small.low).max(axis=1)
+    level = np.maximum(np.ceil(np.log2(np.maximum(extent / (_FILLED * edge), 1.0))), 0.0).astype(np.int64)
+    found = []
+    for each in np.unique(level):
+        chosen = np.flatnonzero(level == each)
+        pairs = _of_a_level(
+            small.take(chosen), large, small_corners[chosen], large_corners, part, allowed,
+            small_rank[chosen] if len(small_rank) else small_rank, large_rank, edge * 2.0**each,
+        )  # fmt: skip
+        found.append(np.column_stack([chosen[pairs[:, 0]], pairs[:, 1]]))
+    return np.concatenate(found).astype(np.int32)
+
+
+def _of_a_level(
+    small: Boxes, large: Boxes, small_corners: Indices, large_corners: Indices, part: Indices, allowed: Flags,
+    small_rank: Ints, large_rank: Ints, edge: float,
+) -> Indices:  # fmt: skip
     points, who, half = _samples(small.low, small.high, edge)
     bucketed = buckets.sort(points, edge)
     out = np.empty((4 * len(who) + 1024, 2), np.int32)
@@ -169,7 +190,10 @@ def _walk(  # type: ignore[no-untyped-def]
     small_rank,
     large_rank,
 ):
-    """Each large thing asks the buckets that its box touches. Returns how many pairs there are, stored or not."""
+    """Each large thing asks the buckets that its box touches, or all points where these are fewer than its rows.
+
+    Returns how many pairs there are, stored or not.
+    """
     n = 0
     for j in range(len(large)):
         ix0 = bucket_of(box_low[j, 0] - half[0], origin[0], inverse, shape[0])
@@ -178,11 +202,14 @@ def _walk(  # type: ignore[no-untyped-def]
         iy1 = bucket_of(box_high[j, 1] + half[1], origin[1], inverse, shape[1])
         iz0 = bucket_of(box_low[j, 2] - half[2], origin[2], inverse, shape[2])
         iz1 = bucket_of(box_high[j, 2] + half[2], origin[2], inverse, shape[2])
+        every = (iy1 - iy0 + 1) * (iz1 - iz0 + 1) > len(codes)
+        if every:
+            iy1, iz1 = iy0, iz0
         for iz in range(iz0, iz1 + 1):
             for iy in range(iy0, iy1 + 1):
                 row = shape[0] * (iy + shape[1] * iz)
-                at = first_at(codes, row + ix0)
-                while at < len(codes) and codes[at] <= row + ix1:
+                at = 0 if every else first_at(codes, row + ix0)
+                while at < len(codes) and (every or codes[at] <= row + ix1):
                     i = who[at]
                     at += 1
                     if mark[i] == j:

@@ -25,9 +25,8 @@ from .flight import Flight
 from .scene import Rules, Scene
 from .surface import Surface
 
-_SHORTEST, _LONGEST = 10.0, 300.0
-"""Steps of free flight that a search looks ahead: as many as the fastest takes past a face, but not more than twice
-what the last search was good for, within these bounds."""
+_SHORTEST = 10.0
+"""Steps of free flight that a search looks ahead at least; at most twice what the last search was good for."""
 _KINEMATIC = 2.0
 """One over the share of a tet's altitude that anything may pass in a step."""
 
@@ -113,9 +112,8 @@ class Contact(Boundary):
         if old is not None:
             old.free()
         flight.refresh(state)
-        fastest, drift = flight.extremes()
-        steps = min(flight.size / (fastest * clock.dt) if fastest > 0.0 else _LONGEST, 2.0 * (clock.step - self._last))
-        horizon = min(max(steps, _SHORTEST), _LONGEST) * clock.dt
+        steps, drift = flight.foresight(clock.dt)
+        horizon = max(min(steps, 2.0 * (clock.step - self._last)), _SHORTEST) * clock.dt
         self._scene = scene.build(flight.sides, self._rules, horizon, drift, state, self._neighbours, self._comm)
         self.limit = _KINEMATIC * float(self._comm.maximum(np.array([self._scene.approach()]))[0])
         if old is not None and self._rubs:
