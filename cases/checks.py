@@ -4,10 +4,11 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from itertools import chain
 
+from .bodies import Box, MeshFile, Tube
 from .geometry import AXES, bounds, centre, cut_directions, lowest_along, thinnest, whole_bounds
 from .library import library
 from .problems import Location, Problem, choices, dotted, nearest, problem
-from .schema import Box, Case, Gravity, JohnsonCook, MeshFile, Part, Prescribed, Reference, Symmetry, Tube, Wall
+from .schema import Case, Gravity, JohnsonCook, Part, Prescribed, Reference, Symmetry, Wall
 
 NEEDED: dict[str, frozenset[str]] = {
     "extent": frozenset({"part", "axis"}),

@@ -2,7 +2,8 @@
 
 import math
 
-from .schema import Axis, Box, Cylinder, Mesh, MeshFile, Plate, Primitive, Sphere, Tube
+from .bodies import Box, Cylinder, Mesh, MeshFile, Plate, Primitive, Sphere, Tube
+from .tables import Axis
 
 Vector = tuple[float, float, float]
 Generated = Box | Plate | Cylinder | Tube | Sphere

@@ -4,8 +4,8 @@ import itertools
 import math
 from dataclasses import dataclass
 
+from .bodies import Box, Cylinder, Grading, Plate, Sphere, Tube
 from .geometry import Generated, bounds, centre, cut_directions, holds, index, surface, volume
-from .schema import Box, Cylinder, Grading, Plate, Sphere, Tube
 
 TETS_PER_VOLUME, TETS_PER_SURFACE = 5.55, 1.42
 NODES_PER_VOLUME, NODES_PER_SURFACE = 0.87, 1.23

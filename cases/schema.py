@@ -1,12 +1,15 @@
 """What a case is. Frozen models, unknown keys forbidden, every quantity in SI once read.
 
-``parse_case`` in ``cases/load.py`` is the way in: it reads TOML or JSON and reports every error at once.
+``parse_case`` in ``cases/load.py`` is the way in: it reads TOML or JSON and reports every error at once. Bodies and
+their meshes are in ``cases/bodies.py``.
 """
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BeforeValidator, Field
 
+from .bodies import Mesh
+from .tables import Axis, Count, Direction, Model, Name, Point, Positive, Velocity
 from .units import (
     Acceleration,
     AngularSpeed,
@@ -21,132 +24,9 @@ from .units import (
     Time,
 )
 
-Axis = Literal["x", "y", "z"]
-Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,63}$")]
-Point = tuple[Length, Length, Length]
-Velocity = tuple[Speed, Speed, Speed]
-Positive = Field(gt=0)
-
-
-def _floats(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
-
 
 def _off(value: Any) -> Any:
     return None if value == "none" else value
-
-
-def _no_truth(value: Any) -> Any:
-    if isinstance(value, bool):
-        raise ValueError("expected a whole number")
-    return value
-
-
-Count = Annotated[int, BeforeValidator(_no_truth)]
-Direction = Annotated[tuple[float, float, float], BeforeValidator(_floats)]
-
-
-class Model(BaseModel):
-    """Base of everything in a case."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-# Meshes ---------------------------------------------------------------------------------------------------------------
-
-
-class Grading(Model):
-    """Element size grows from ``element_size`` to ``far_size`` with the distance from a point or from an axis line.
-
-    Within ``near`` of the origin (or the line through it along ``axis``) the size is ``element_size``, beyond ``far``
-    it is ``far_size``, linear between.
-    """
-
-    origin: Point = (0.0, 0.0, 0.0)
-    axis: Axis | None = None
-    near: Annotated[Length, Field(ge=0)]
-    far: Annotated[Length, Positive]
-    far_size: Annotated[Length, Positive]
-
-
-class Primitive(Model):
-    """What all generated meshes share. ``structured`` is the regular generator kept for verification."""
-
-    element_size: Annotated[Length, Positive]
-    generator: Literal["gmsh", "structured"] = "gmsh"
-    split: Literal[5, 6] = 6
-    """Tets per hexahedron of the structured generator."""
-    sector: Literal["full", "half", "quarter"] = "full"
-    """Which part of the body is modelled: the positive side of its centre in the first, or both, of the two directions
-    across ``axis`` (in cyclic order: x, y for z; y, z for x; z, x for y)."""
-    grading: Grading | None = None
-
-
-class Box(Primitive):
-    """A rectangular block between two corners. The sector is cut at the origin of the coordinates."""
-
-    shape: Literal["box"]
-    low: Point
-    high: Point
-    axis: Axis = "z"
-
-
-class Plate(Primitive):
-    """A rectangular plate: ``thickness`` along ``axis``, ``width`` x ``height`` across it, centred on ``base``'s axis.
-
-    ``base`` is the centre of the face from which the thickness is measured in the positive direction.
-    """
-
-    shape: Literal["plate"]
-    base: Point = (0.0, 0.0, 0.0)
-    axis: Axis = "z"
-    width: Annotated[Length, Positive]
-    height: Annotated[Length, Positive]
-    thickness: Annotated[Length, Positive]
-
-
-class Cylinder(Primitive):
-    """A solid cylinder; ``base`` is the centre of its lower end face."""
-
-    shape: Literal["cylinder"]
-    base: Point = (0.0, 0.0, 0.0)
-    axis: Axis = "z"
-    radius: Annotated[Length, Positive]
-    length: Annotated[Length, Positive]
-
-
-class Tube(Primitive):
-    """A hollow cylinder."""
-
-    shape: Literal["tube"]
-    base: Point = (0.0, 0.0, 0.0)
-    axis: Axis = "z"
-    inner_radius: Annotated[Length, Positive]
-    radius: Annotated[Length, Positive]
-    length: Annotated[Length, Positive]
-
-
-class Sphere(Primitive):
-    """A ball."""
-
-    shape: Literal["sphere"]
-    centre: Point = (0.0, 0.0, 0.0)
-    axis: Axis = "z"
-    radius: Annotated[Length, Positive]
-
-
-class MeshFile(Model):
-    """A mesh made elsewhere: gmsh .msh 4.1 or 2.2, or Abaqus .inp. ``unit`` is the length unit of its coordinates."""
-
-    shape: Literal["file"]
-    path: str
-    unit: Annotated[Length, Positive]
-    group: str | None = None
-    """Physical group or element set; all tets when absent."""
-    sha256: str | None = None
-
-
-Mesh = Annotated[Box | Plate | Cylinder | Tube | Sphere | MeshFile, Field(discriminator="shape")]
 
 
 # Materials ------------------------------------------------------------------------------------------------------------

@@ -7,9 +7,10 @@ from pathlib import Path
 
 from fastapi import Request
 
+from conoid.cases.bodies import MeshFile
 from conoid.cases.estimate import Estimate
 from conoid.cases.problems import Problem
-from conoid.cases.schema import Case, MeshFile
+from conoid.cases.schema import Case
 
 from .errors import ServiceError
 from .settings import Caps, Settings

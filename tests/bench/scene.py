@@ -12,7 +12,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from conoid.cases import schema
+from conoid.cases import bodies, schema
 from conoid.worker import domain, simulation, state, step
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.parallel.comm import SerialComm
@@ -28,15 +28,15 @@ _GMSH_TETS = 5.9
 """Tets of gmsh in the cube of ``element_size``, of which the structured generator makes 6."""
 
 
-def box(tets: int, generator: Generator = "gmsh") -> schema.Box:
+def box(tets: int, generator: Generator = "gmsh") -> bodies.Box:
     """A cube of 10 mm in about ``tets`` tets."""
     size = _EDGE / round((tets / 6) ** (1 / 3)) if generator == "structured" else _EDGE * (_GMSH_TETS / tets) ** (1 / 3)
-    return schema.Box(
+    return bodies.Box(
         shape="box", low=(0.0, 0.0, 0.0), high=(_EDGE,) * 3, element_size=float(f"{size:.4g}"), generator=generator
     )
 
 
-def case(material: str, form: Form, mesh: schema.Box, viscosity: bool = True) -> schema.Case:
+def case(material: str, form: Form, mesh: bodies.Box, viscosity: bool = True) -> schema.Case:
     """One part of ``material``, a name of the library."""
     return schema.Case(
         name="bench", parts=(schema.Part(name="body", material=material, mesh=mesh),),

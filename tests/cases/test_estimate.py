@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 from pydantic import TypeAdapter
 
+from conoid.cases.bodies import Mesh
 from conoid.cases.estimate import RANK_BYTES, estimate
 from conoid.cases.geometry import Generated, surface, volume
 from conoid.cases.load import parse_case, read_case, shipped
 from conoid.cases.mesh_size import graded_size, mesh_size
-from conoid.cases.schema import Mesh
 from conoid.worker.mesh.build import build
 from conoid.worker.mesh.model import quality
 from conoid.worker.mesh.structured import structured

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from conoid.cases.bodies import Cylinder
 from conoid.cases.load import (
     CaseError,
     apply_overrides,
@@ -17,7 +18,6 @@ from conoid.cases.load import (
     shipped,
     shipped_path,
 )
-from conoid.cases.schema import Cylinder
 
 from .scenes import ROD, problems, rod, said
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conoid.cases.schema import Box
+from conoid.cases.bodies import Box
 from conoid.worker.errors import MeshError
 from conoid.worker.mesh.faces import FACES, areas, boundary_faces, face_counts
 from conoid.worker.mesh.model import REGULAR_STEP, Ints, Names, TetMesh, check, quality

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
+from conoid.cases.bodies import Box, Cylinder, Grading, Mesh, MeshFile, Sphere
 from conoid.cases.geometry import Generated, bounds, centre, cut_directions, volume
-from conoid.cases.schema import Box, Cylinder, Grading, Mesh, MeshFile, Sphere
 from conoid.worker.errors import MeshError
 from conoid.worker.mesh.faces import areas, boundary_faces, face_counts
 from conoid.worker.mesh.model import REGULAR_STEP, TetMesh, check, quality

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from conoid.cases import schema
+from conoid.cases import bodies, schema
 from conoid.worker.mesh.structured import structured
 from conoid.worker.simulation import Simulation
 from conoid.worker.state import PLASTIC_STRAIN, PRESSURE, S_XX, S_XY
@@ -85,7 +85,7 @@ class Bar:
 def taylor(form: Form, split: int = 6) -> Bar:
     """V15 on a coarse mesh."""
     mesh = structured(
-        schema.Cylinder(
+        bodies.Cylinder(
             shape="cylinder", radius=3.2e-3, length=32.4e-3, sector="quarter", element_size=1.07e-3,
             generator="structured", split=5 if split == 5 else 6,
         )
@@ -138,7 +138,7 @@ def test_forms_are_stable_at_the_whole_bound(form: Form, poisson: float) -> None
 
     With the whole step in place of half of it in the stabilisation, nu = 0.45 and 0.499 blow up within 120 steps.
     """
-    cube = schema.Box(
+    cube = bodies.Box(
         shape="box", low=(0.0, 0.0, 0.0), high=(6e-3, 6e-3, 6e-3), element_size=1e-3, generator="structured", split=5
     )
     metal = RUBBERY.model_copy(update={"elastic": schema.Elastic(young=200e9, poisson=poisson)})

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conoid.cases import schema
+from conoid.cases import bodies, schema
 from conoid.worker.mesh.structured import structured
 from conoid.worker.simulation import Simulation
 
@@ -21,7 +21,7 @@ SOFT = schema.Material(
 def bar(safety: float) -> tuple[float, float, float]:
     """Length and radius, mm, and the worst residual, of a quarter of a rod of 3,840 tets, 227 m/s against a wall."""
     mesh = structured(
-        schema.Cylinder(
+        bodies.Cylinder(
             shape="cylinder", radius=3.2e-3, length=32.4e-3, sector="quarter", element_size=0.8e-3,
             generator="structured",
         )

@@ -11,7 +11,7 @@ from unittest.mock import patch
 import numpy as np
 import numpy.typing as npt
 
-from conoid.cases import schema
+from conoid.cases import bodies, schema
 from conoid.worker import domain, simulation, state, step
 from conoid.worker.boundaries import Boundary
 from conoid.worker.mesh.model import TetMesh
@@ -41,7 +41,7 @@ COPPER_GAS = schema.Material(
 )  # fmt: skip
 """Copper with the Mie-Grueneisen equation of state, elastic in shear."""
 
-DUMMY = schema.Box(shape="box", low=(0.0, 0.0, 0.0), high=(1.0, 1.0, 1.0), element_size=1.0)
+DUMMY = bodies.Box(shape="box", low=(0.0, 0.0, 0.0), high=(1.0, 1.0, 1.0), element_size=1.0)
 """Stands in a case for a mesh that the test hands over itself."""
 
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-from conoid.cases.schema import Mesh, MeshFile
+from conoid.cases.bodies import Mesh, MeshFile
 
 from ..errors import MeshError
 from .child import Limits, run_child

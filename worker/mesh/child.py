@@ -19,8 +19,8 @@ from pathlib import Path
 
 from pydantic import TypeAdapter
 
+from conoid.cases.bodies import Mesh, MeshFile
 from conoid.cases.run import ExitCode
-from conoid.cases.schema import Mesh, MeshFile
 
 from ..errors import InputError, MeshError
 

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from conoid.cases.schema import MeshFile
+from conoid.cases.bodies import MeshFile
 
 from ..errors import MeshError
 from .abaqus import read_inp

@@ -9,8 +9,8 @@ import itertools
 import numpy as np
 from numpy.typing import NDArray
 
+from conoid.cases.bodies import Box, Cylinder, Plate, Tube
 from conoid.cases.geometry import Generated
-from conoid.cases.schema import Box, Cylinder, Plate, Tube
 
 from ..errors import MeshError
 from .frame import block, refuse_impossible, to_space

@@ -8,8 +8,8 @@ request gives the same bits.
 import math
 from typing import Any
 
+from conoid.cases.bodies import Box, Cylinder, Grading, Plate, Sphere, Tube
 from conoid.cases.geometry import AXES, Generated
-from conoid.cases.schema import Box, Cylinder, Grading, Plate, Sphere, Tube
 
 from .frame import block, directions, refuse_impossible, to_frame, to_space
 from .gmsh_session import session, tet_mesh
