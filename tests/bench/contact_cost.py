@@ -29,8 +29,8 @@ def _bars(size: str, end: str) -> tuple[str, ...]:
 
 SCENES = (
     Scene("bar_on_bar, elastic", "bar_on_bar", _bars("0.4 mm", "30 us")),
-    Scene("bar_on_bar, elastic", "bar_on_bar", _bars("0.3125 mm", "20 us")),
-    Scene("bar_on_bar, nodal pressure", "bar_on_bar", (*_bars("0.3125 mm", "20 us"), 'numerics.pressure="nodal"')),
+    Scene("bar_on_bar, elastic", "bar_on_bar", _bars("0.3125 mm", "30 us")),
+    Scene("bar_on_bar, nodal pressure", "bar_on_bar", (*_bars("0.3125 mm", "30 us"), 'numerics.pressure="nodal"')),
     Scene("long_rod to 30 us", "long_rod", ("run.end_time=30 us", "run.frames=0")),
 )
 
