@@ -111,8 +111,8 @@ def with_values(xx, yy, zz, yz, zx, xy, d1, d2, d3, e1, e2, e3):  # type: ignore
 def mohr_coulomb(w, s, params, n, dt):  # type: ignore[no-untyped-def]
     """Returns the trial deviators that are too strong for their new pressure; books the plastic work.
 
-    A stress that was within its strength flows at it; where the strength itself has fallen in the step, by a release of
-    pressure or by failure, the work is the mean of before and after, and so all of the elastic energy that is lost.
+    Plastic work is that of the mean of the rotated old stress and the new one, as the whole work is: what remains is
+    the elastic energy of the stress, also where the strength itself falls, by a release of pressure or by failure.
     """
     equivalent_stress(w, s, n)
     shear2, cap = 2.0 * params[SHEAR], params[MC_CAP]
@@ -143,6 +143,5 @@ def mohr_coulomb(w, s, params, n, dt):  # type: ignore[no-untyped-def]
             + (szz - nzz) * w[D_ZZ + i]
             + 2.0 * ((syz - nyz) * w[D_YZ + i] + (szx - nzx) * w[D_ZX + i] + (sxy - nxy) * w[D_XY + i])
         )
-        fallen = max(square - r * shear2 * dt * moved, 0.0)
         s[_STRAIN + i] += q / shear2 * np.sqrt(_TWO_THIRDS * square)
-        s[_WORK + i] += w[VOLUME_MID + i] * q * q / shear2 * (work + 0.5 * fallen)
+        s[_WORK + i] += w[VOLUME_MID + i] * q * q / shear2 * max(work + 0.5 * (square - r * shear2 * dt * moved), 0.0)
