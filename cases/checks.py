@@ -8,7 +8,7 @@ from .bodies import Box, MeshFile, Tube
 from .geometry import AXES, bounds, centre, cut_directions, lowest_along, thinnest, whole_bounds
 from .library import library
 from .problems import Location, Problem, choices, dotted, nearest, problem
-from .schema import Case, Gravity, JohnsonCook, Part, Prescribed, Reference, Symmetry, Wall
+from .schema import Case, Gravity, JohnsonCook, MohrCoulomb, Part, Prescribed, Reference, Symmetry, Wall
 
 NEEDED: dict[str, frozenset[str]] = {
     "extent": frozenset({"part", "axis"}),
@@ -44,6 +44,19 @@ def _materials(case: Case) -> Iterator[Problem]:
         if isinstance(law, JohnsonCook) and law.melt_temperature <= law.reference_temperature:
             location = ("materials", name, "strength", "melt_temperature")
             yield problem(location, law.melt_temperature, f"must be above {law.reference_temperature} K, the reference")
+        if isinstance(law, MohrCoulomb):
+            yield from _residual(law, ("materials", name, "strength"))
+
+
+def _residual(law: MohrCoulomb, location: Location) -> Iterator[Problem]:
+    for key in ("cohesion", "friction_angle"):
+        value, intact = getattr(law, f"residual_{key}"), getattr(law, key)
+        here = (*location, f"residual_{key}")
+        if value is not None and law.failure_strain is None:
+            yield problem(here, value, "needs failure_strain, beyond which it holds")
+        elif value is not None and value > intact:
+            unit = "Pa" if key == "cohesion" else "rad"
+            yield problem(here, value, f"must not be above {intact:g} {unit}, the {key} of what has not failed")
 
 
 def _parts(case: Case) -> Iterator[Problem]:

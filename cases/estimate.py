@@ -13,9 +13,12 @@ from .bodies import MeshFile
 from .geometry import AXES, bounds
 from .library import material
 from .mesh_size import MeshSize, mesh_size, surface_faces
-from .schema import Case, JohnsonCook, Material, Part, Rotation, Symmetry, Wall
+from .schema import Case, JohnsonCook, Material, MohrCoulomb, Part, Rotation, Symmetry, Wall
 
-NANOSECONDS = {"tet": 80.0, "nodal": 45.0, "split": 90.0, "linear_hardening": 30.0, "johnson_cook": 85.0, "eos": 15.0}
+NANOSECONDS = {
+    "tet": 80.0, "nodal": 45.0, "split": 90.0, "eos": 15.0,
+    "linear_hardening": 30.0, "johnson_cook": 85.0, "mohr_coulomb": 60.0,
+}  # fmt: skip
 """Core time per tet and step: what every tet takes, and what each feature adds. Measured at 10,000 to 750,000 tets."""
 FACE_NANOSECONDS = {"contact": 50.0, "erosion": 1400.0}
 """Core time per face of the surface and step; the second where parts erode, stay in touch and are searched often."""
@@ -143,6 +146,9 @@ def _flow_stress(made: Material) -> float:
     law = made.strength
     if isinstance(law, JohnsonCook):
         return law.A + law.B * math.pow(0.1, law.n)
+    if isinstance(law, MohrCoulomb):
+        free = 2.0 * law.cohesion * math.cos(law.friction_angle) / (1.0 - math.sin(law.friction_angle))
+        return min(free, law.strength_cap or math.inf)
     return law.yield_stress + 0.1 * law.hardening if law is not None else math.inf
 
 

@@ -4,9 +4,10 @@
 their meshes are in ``cases/bodies.py``.
 """
 
+import math
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from .bodies import Mesh
 from .tables import Axis, Count, Direction, Model, Name, Point, Positive, Velocity
@@ -27,6 +28,12 @@ from .units import (
 
 def _off(value: Any) -> Any:
     return None if value == "none" else value
+
+
+def _acute(angle: float) -> float:
+    if not 0.0 <= angle < 0.5 * math.pi:
+        raise ValueError("must be at least 0 and below 90 deg; without a unit it is in rad, write it like '55 deg'")
+    return angle
 
 
 # Materials ------------------------------------------------------------------------------------------------------------
@@ -67,7 +74,28 @@ class JohnsonCook(Model):
     """Share of the plastic work that becomes heat."""
 
 
-Strength = Annotated[LinearHardening | JohnsonCook, Field(discriminator="model")]
+class MohrCoulomb(Model):
+    """Brittle strength (s1 - s3) + (s1 + s3) sin(friction_angle) <= 2 cohesion cos(friction_angle), s1 >= s2 >= s3.
+
+    Tension is positive. Flow keeps the volume: there is no dilation. Tension beyond the apex takes the deviatoric
+    stress and leaves the pressure as it is.
+    """
+
+    model: Literal["mohr_coulomb"]
+    cohesion: Annotated[Stress, Positive]
+    friction_angle: Annotated[Ratio, AfterValidator(_acute)]
+    """``"55 deg"``."""
+    strength_cap: Annotated[Stress, Positive] | None = None
+    """Largest s1 - s3, however high the pressure; none by default."""
+    failure_strain: Annotated[Ratio, Positive] | None = None
+    """Effective plastic strain beyond which the residual values hold; without it material never fails."""
+    residual_cohesion: Annotated[Stress, Field(ge=0)] | None = None
+    """0 by default."""
+    residual_friction_angle: Annotated[Ratio, AfterValidator(_acute)] | None = None
+    """30 deg by default, or the friction angle if that is smaller."""
+
+
+Strength = Annotated[LinearHardening | JohnsonCook | MohrCoulomb, Field(discriminator="model")]
 
 
 class MieGruneisen(Model):

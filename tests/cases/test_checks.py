@@ -151,3 +151,24 @@ def test_melting_lies_above_the_reference_temperature() -> None:
     law = "{model='johnson_cook', A=1, B=1, n=1, C=0, m=1, melt_temperature=200, specific_heat=1}"
     found = said("materials.m={density=1, elastic={young=1, poisson=0}, strength=" + law + "}")
     assert found == {"materials.m.strength.melt_temperature": "must be above 293.15 K, the reference"}
+
+
+@pytest.mark.parametrize(
+    ("law", "key", "message"),
+    [
+        ("friction_angle=55", "friction_angle", "'55 deg'"),
+        ("friction_angle='90 deg'", "friction_angle", "below 90 deg"),
+        ("friction_angle=-0.1", "friction_angle", "at least 0"),
+        ("friction_angle='55 deg', residual_cohesion=1", "residual_cohesion", "needs failure_strain"),
+        ("friction_angle='55 deg', residual_friction_angle=0.5", "residual_friction_angle", "needs failure_strain"),
+        ("friction_angle='55 deg', failure_strain=1, residual_cohesion=11", "residual_cohesion", "above 10 Pa"),
+        ("friction_angle='20 deg', failure_strain=1, residual_friction_angle='30 deg'", "residual_friction_angle",
+         "above 0.349066 rad"),
+        ("friction_angle='20 deg', strength_cap=0", "strength_cap", "greater than 0"),
+    ],
+)  # fmt: skip
+def test_brittle_strength(law: str, key: str, message: str) -> None:
+    strength = f"{{model='mohr_coulomb', cohesion=10, {law}}}"
+    found = said(f"materials.m={{density=1, elastic={{young=1, poisson=0}}, strength={strength}}}")
+    assert list(found) == [f"materials.m.strength.{key}"]
+    assert message in found[f"materials.m.strength.{key}"]

@@ -7,7 +7,7 @@ import pytest
 from pydantic import BaseModel
 
 from conoid.cases.library import CONFIDENCES, library, provenance, sources
-from conoid.cases.schema import Elastic, JohnsonCook, Material
+from conoid.cases.schema import Elastic, JohnsonCook, Material, MohrCoulomb
 
 NAMES = sorted(library())
 
@@ -92,3 +92,15 @@ def test_the_constants_make_a_solid(name: str) -> None:
     assert 3000 < math.sqrt((bulk + 4 / 3 * shear) / made.density) < 12000
     if made.eos is not None:
         assert made.density * made.eos.c0**2 == pytest.approx(bulk, rel=0.4)
+
+
+def test_the_glass_has_the_strengths_that_it_was_derived_from() -> None:
+    """1 GPa in compression, 0.1 GPa in tension, and the cap at a Hugoniot elastic limit of 5 GPa; three digits."""
+    made, law = library()["soda_lime_mohr_coulomb"], library()["soda_lime_mohr_coulomb"].strength
+    assert isinstance(law, MohrCoulomb)
+    cohesion, sine = 2.0 * law.cohesion * math.cos(law.friction_angle), math.sin(law.friction_angle)
+    assert math.isclose(cohesion / (1.0 - sine), 1e9, rel_tol=2e-3)
+    assert math.isclose(cohesion / (1.0 + sine), 1e8, rel_tol=2e-3)
+    poisson = made.elastic.poisson
+    assert math.isclose(law.strength_cap or 0.0, 5e9 * (1.0 - 2.0 * poisson) / (1.0 - poisson), rel_tol=4e-3)
+    assert (made.density, made.elastic) == (library()["soda_lime"].density, library()["soda_lime"].elastic)

@@ -61,6 +61,14 @@ m = 1.1
 melt_temperature = "1400 K"
 specific_heat = "400 J/kg/K"
 """,
+    "mohr_coulomb": """
+[materials.NAME.strength]
+model = "mohr_coulomb"
+cohesion = "50 MPa"
+friction_angle = "40 deg"
+strength_cap = "500 MPa"
+failure_strain = 0.02
+""",
 }
 EQUATIONS = {
     "linear": "",
@@ -75,7 +83,7 @@ gamma0 = 1.96
 
 
 def everything() -> str:
-    """Six bars of every strength and equation of state fly, spin and hit a tilted wall; one mesh is unstructured."""
+    """Eight bars of every strength and equation of state fly, spin and hit a tilted wall; one mesh is unstructured."""
     text = """
 name = "everything"
 [run]

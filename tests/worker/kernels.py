@@ -3,6 +3,7 @@
 A ``Patch`` is a built simulation of one part on one rank, with plain arrays in and out; ``run`` takes its time steps.
 """
 
+import math
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, Literal
@@ -40,6 +41,14 @@ COPPER_GAS = schema.Material(
     eos=schema.MieGruneisen(model="mie_gruneisen", c0=3940.0, S=1.49, gamma0=1.96),
 )  # fmt: skip
 """Copper with the Mie-Grueneisen equation of state, elastic in shear."""
+GLASS = schema.Material(
+    density=2500.0, elastic=schema.Elastic(young=72e9, poisson=0.22),
+    strength=schema.MohrCoulomb(
+        model="mohr_coulomb", cohesion=0.158e9, friction_angle=math.radians(54.9), strength_cap=3.6e9,
+        failure_strain=0.05,
+    ),
+)  # fmt: skip
+"""Soda-lime glass that crumbles to a residual friction angle of 30 deg."""
 
 DUMMY = bodies.Box(shape="box", low=(0.0, 0.0, 0.0), high=(1.0, 1.0, 1.0), element_size=1.0)
 """Stands in a case for a mesh that the test hands over itself."""

@@ -8,7 +8,7 @@ from conoid.cases import schema
 from conoid.cases.messages import Energy
 from conoid.worker.simulation import Simulation
 
-from .kernels import COPPER, COPPER_GAS, FORMS, STEEL, STEEL_42CRMO4, Form, build, run, scene
+from .kernels import COPPER, COPPER_GAS, FORMS, GLASS, STEEL, STEEL_42CRMO4, Form, build, run, scene
 from .meshes import Floats, block
 
 MESH = block((3, 3, 6), 1e-3, seed=5)
@@ -33,7 +33,9 @@ def worst(material: schema.Material, form: Form, **keys: Any) -> float:
 
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(
-    "material", [STEEL, COPPER, STEEL_42CRMO4, COPPER_GAS], ids=["elastic", "plastic", "hot", "gas"]
+    "material",
+    [STEEL, COPPER, STEEL_42CRMO4, COPPER_GAS, GLASS],
+    ids=["elastic", "plastic", "hot", "gas", "brittle"],
 )
 def test_an_impact_closes_to_a_percent(material: schema.Material, form: Form) -> None:
     assert worst(material, form, viscosity={}, **FLIGHT) < 0.02

@@ -164,7 +164,7 @@ class AveragedElements(Elements):
     def _forces(self, block: Block, begin: int, end: int, dt: float, scale: float) -> None:
         nodes = self.model.nodes
         sweep.force_pass(
-            nodes.x, self._strain, nodes.force, self.pressure, self._gradient, self.split, block.tets,
+            nodes.x, nodes.v, self._strain, nodes.force, self.pressure, self._gradient, self.split, block.tets,
             block.state.reshape(-1), block.params, self._w, self._wi, self._bits, self.peaks, block.id, block.worn,
-            block.life, block.eos, block.state.shape[1], begin, end, dt, scale,
+            block.life, block.kind, block.eos, block.state.shape[1], begin, end, dt, scale,
         )  # fmt: skip

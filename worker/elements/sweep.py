@@ -2,7 +2,9 @@
 
 ``standard_pass`` does everything in one pass. The averaged pressure forms need two, with the completed nodal sums
 between them: ``strain_pass`` (velocity gradient, deviatoric stress, nodal volume sums) and ``force_pass`` (pressure,
-viscosity, forces). ``forces_again`` repeats only the sum of forces, in a coarser quantum.
+viscosity, forces). ``forces_again`` repeats only the sum of forces, in a coarser quantum. Where the strength depends on
+the pressure, the plastic return comes after the equation of state, and with it, in two passes, the whole deviatoric
+stress: then the second pass makes the velocity gradient again.
 
 ``peaks`` collects, as bits of float64: 0 the largest one-over-stable-step, 2 the largest force; 1 is the smallest
 global id of the tets that set the first, 3 whether tets are worn out (wear.py).
@@ -14,6 +16,7 @@ from ..materials import models
 from ..materials.elastic import deviatoric_work, predict
 from ..materials.equation_of_state import linear, mie_gruneisen
 from ..materials.johnson_cook import johnson_cook
+from ..materials.mohr_coulomb import mohr_coulomb
 from ..materials.plastic import linear_hardening
 from ..materials.viscosity import bulk_viscosity
 from ..state import CHUNK
@@ -29,13 +32,24 @@ _B1 = "boolean[::1]"
 
 @njit(f"void(int64, {_F1}, {_F1}, {_F1}, int64, float64)", cache=True, error_model="numpy")
 def deviatoric_stress(strength, w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """Rotation, elastic trial and plastic return of a chunk; books the work of the deviatoric stress."""
+    """Rotation, elastic trial and plastic return of a chunk; books the work of the deviatoric stress.
+
+    With Mohr-Coulomb only the trial: ``return_at_pressure`` does the rest.
+    """
     predict(w, s, n, params[models.SHEAR], dt, strength == models.ELASTIC)
     if strength == models.LINEAR_HARDENING:
         linear_hardening(w, s, params, n, dt)
     elif strength == models.JOHNSON_COOK:
         johnson_cook(w, s, params, n, dt)
-    if strength != models.ELASTIC:
+    if strength != models.ELASTIC and strength != models.MOHR_COULOMB:
+        deviatoric_work(w, s, n, dt)
+
+
+@njit(f"void(int64, {_F1}, {_F1}, {_F1}, int64, float64)", cache=True, error_model="numpy")
+def return_at_pressure(strength, w, s, params, n, dt):  # type: ignore[no-untyped-def]
+    """Plastic return of a chunk whose strength depends on the new pressure; books the work of the new deviator."""
+    if strength == models.MOHR_COULOMB:
+        mohr_coulomb(w, s, params, n, dt)
         deviatoric_work(w, s, n, dt)
 
 
@@ -104,6 +118,7 @@ def standard_pass(  # type: ignore[no-untyped-def]
         tet4.end_gradients(w, n)
         averaged.own_strains(w, n, dt)
         pressure_and_limit(eos, w, s, params, n, dt)
+        return_at_pressure(strength, w, s, params, n, dt)
         if len(worn) > 0:
             peaks[3] = max(peaks[3], mark_worn(worn[c * CHUNK : c * CHUNK + n], w, s, params, life, rows, n))
         largest = tet4.internal_forces(wi, w, s, n, scale)
@@ -126,7 +141,8 @@ def strain_pass(x, v, sums, weight, pressure, projected, split, tets, state, par
         tet4.gather(w[tet4.EDGE :], x, t, n)
         tet4.gather(w[tet4.RATE :], v, t, n)
         tet4.kinematics(w, n, dt)
-        deviatoric_stress(strength, w, s, params, n, dt)
+        if strength != models.MOHR_COULOMB:
+            deviatoric_stress(strength, w, s, params, n, dt)
         averaged.keep_flux(w, s, n)
         if split:
             tet4.end_gradients(w, n)
@@ -138,13 +154,14 @@ def strain_pass(x, v, sums, weight, pressure, projected, split, tets, state, par
 
 
 @njit(
-    f"void({_F2}, {_F1}, {_I2}, {_F1}, {_I2}, boolean, {_T2}, {_F1}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, {_I1}, "
-    f"{_B1}, {_F1}, int64, int64, int64, int64, float64, float64)",
+    f"void({_F2}, {_F2}, {_F1}, {_I2}, {_F1}, {_I2}, boolean, {_T2}, {_F1}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, {_I1}, "
+    f"{_B1}, {_F1}, int64, int64, int64, int64, int64, float64, float64)",
     cache=True,
     error_model="numpy",
 )
 def force_pass(  # type: ignore[no-untyped-def]
     x,
+    v,
     strain,
     force,
     pressure,
@@ -160,6 +177,7 @@ def force_pass(  # type: ignore[no-untyped-def]
     ids,
     worn,
     life,
+    strength,
     eos,
     rows,
     begin,
@@ -173,10 +191,15 @@ def force_pass(  # type: ignore[no-untyped-def]
         s = state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
         n = len(t)
         tet4.gather(w[tet4.EDGE :], x, t, n)
+        if strength == models.MOHR_COULOMB:
+            tet4.gather(w[tet4.RATE :], v, t, n)
+            tet4.kinematics(w, n, dt)
+            deviatoric_stress(strength, w, s, params, n, dt)
         tet4.end_gradients(w, n)
         averaged.gather_strains(w, strain, t, n)
         averaged.recall_flux(w, s, n, dt)
         pressure_and_limit(eos, w, s, params, n, dt)
+        return_at_pressure(strength, w, s, params, n, dt)
         if len(worn) > 0:
             peaks[3] = max(peaks[3], mark_worn(worn[c * CHUNK : c * CHUNK + n], w, s, params, life, rows, n))
         sum_forces(force, pressure, gradient, split, t, s, w, wi, bits, peaks, ids[c * CHUNK : c * CHUNK + n], n, scale)

@@ -4,15 +4,17 @@ A strength model or an equation of state is a number here, a declaration of cons
 elements in a file of its own; the sweep picks the function once a chunk.
 """
 
+import math
+
 import numpy as np
 
-from conoid.cases.schema import JohnsonCook, LinearHardening, Material, MieGruneisen, Viscosity
+from conoid.cases.schema import JohnsonCook, LinearHardening, Material, MieGruneisen, MohrCoulomb, Viscosity
 
 from .. import state
 from ..state import Floats
 
 # Strength models.
-ELASTIC, LINEAR_HARDENING, JOHNSON_COOK = range(3)
+ELASTIC, LINEAR_HARDENING, JOHNSON_COOK, MOHR_COULOMB = range(4)
 
 # Equations of state.
 LINEAR, MIE_GRUNEISEN = range(2)
@@ -22,6 +24,9 @@ DENSITY, BULK, SHEAR, Q_LINEAR, Q_QUADRATIC = range(5)
 C0, SLOPE, GAMMA = range(5, 8)
 YIELD_0, HARDENING = range(8, 10)
 JC_A, JC_B, JC_N, JC_C, JC_M, JC_RATE, JC_T0, JC_MELT, JC_HEAT = range(8, 17)
+MC_SINE, MC_COHESION, MC_CAP, MC_FAILURE = 8, 9, 12, 13
+MC_RESIDUAL = 2
+"""How far behind MC_SINE and MC_COHESION those of failed material stand."""
 SIZE = 17
 
 
@@ -29,6 +34,8 @@ def strength_of(material: Material) -> int:
     """The number of the material's strength model."""
     if isinstance(material.strength, JohnsonCook):
         return JOHNSON_COOK
+    if isinstance(material.strength, MohrCoulomb):
+        return MOHR_COULOMB
     return LINEAR_HARDENING if isinstance(material.strength, LinearHardening) else ELASTIC
 
 
@@ -64,7 +71,26 @@ def parameters(material: Material, viscosity: Viscosity | None) -> Floats:
             strength.A, strength.B, strength.n, strength.C, strength.m, strength.reference_rate,
             strength.reference_temperature, strength.melt_temperature, heat,
         )  # fmt: skip
+    elif isinstance(strength, MohrCoulomb):
+        params[MC_SINE : MC_FAILURE + 1] = _mohr_coulomb(strength)
     return params
+
+
+def _mohr_coulomb(strength: MohrCoulomb) -> tuple[float, ...]:
+    """The six constants from MC_SINE on; what is not given never happens."""
+    residual = strength.residual_friction_angle
+    angle = min(math.radians(30.0), strength.friction_angle) if residual is None else residual
+    return (
+        *_sine_and_cohesion(strength.cohesion, strength.friction_angle),
+        *_sine_and_cohesion(strength.residual_cohesion or 0.0, angle),
+        math.inf if strength.strength_cap is None else strength.strength_cap,
+        math.inf if strength.failure_strain is None else strength.failure_strain,
+    )
+
+
+def _sine_and_cohesion(cohesion: float, angle: float) -> tuple[float, float]:
+    """sin(phi) and 2 c cos(phi), Pa."""
+    return math.sin(angle), 2.0 * cohesion * math.cos(angle)
 
 
 def rows_of(material: Material, pressure: str) -> int:
@@ -72,6 +98,8 @@ def rows_of(material: Material, pressure: str) -> int:
     strength, eos = strength_of(material), eos_of(material)
     if strength == JOHNSON_COOK:
         return state.TEMPERATURE + 1
+    if strength == MOHR_COULOMB:
+        return state.WORK_PLASTIC + 1
     if strength == LINEAR_HARDENING:
         return state.YIELD + 1
     if eos == MIE_GRUNEISEN:

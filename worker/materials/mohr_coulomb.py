@@ -1,0 +1,147 @@
+"""Mohr-Coulomb strength of brittle materials with flow at constant volume: the deviator returns at the given pressure.
+
+f = (s1 - s3) + (s1 + s3) sin(phi) - 2 c cos(phi) <= 0 with s1 >= s2 >= s3, tension positive, and s1 - s3 <= cap.
+Derived in docs/numerics.md. The steps of the return are inlined by force: as calls they take three times as long.
+"""
+
+import numpy as np
+from numba import njit
+
+from ..elements.tet4 import D_XX, D_XY, D_YY, D_YZ, D_ZX, D_ZZ, TRIAL, VOLUME_MID
+from ..state import CHUNK, PLASTIC_STRAIN, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, WORK_PLASTIC
+from .models import MC_CAP, MC_COHESION, MC_FAILURE, MC_RESIDUAL, MC_SINE, SHEAR
+from .plastic import equivalent_stress
+
+_SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
+_SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
+_P, _STRAIN, _WORK = PRESSURE * CHUNK, PLASTIC_STRAIN * CHUNK, WORK_PLASTIC * CHUNK
+_THIRD, _TWO_THIRDS = 1.0 / 3.0, 2.0 / 3.0
+_MISES = 2.0 / 3.0**0.5
+"""Largest s1 - s3 at a von Mises stress of one, in pure shear."""
+_SHEAR, _AXIAL = 1.0 / 3.0**0.5, 2.0 / 3.0
+"""Largest principal deviatoric stress at a von Mises stress of one, in pure shear and in tension along an axis."""
+
+
+@njit(
+    "UniTuple(float64, 3)(float64, float64, float64, float64, float64, float64)",
+    cache=True,
+    error_model="numpy",
+    forceinline=True,
+)
+def principal(xx, yy, zz, yz, zx, xy):  # type: ignore[no-untyped-def]
+    """Principal values, the largest first, of a deviator with the von Mises stress one; to round-off, equal ones too.
+
+    The value x that stands apart solves x^3 - x / 3 = det s, always well: three steps of Newton from the chord. The
+    rest of s, without x and its projector (s^2 + x s + x^2 - 1/3) / (3 x^2 - 1/3), is the distance of the other two.
+    """
+    det = xx * (yy * zz - yz * yz) + xy * (yz * zx - xy * zz) + zx * (xy * yz - yy * zx)
+    size = abs(det)
+    x = _SHEAR + size * (_AXIAL - _SHEAR) * 13.5
+    for _ in range(3):
+        x -= (x * (x * x - _THIRD) - size) / (3.0 * x * x - _THIRD)
+    x = x if det >= 0.0 else -x
+    h = 1.5 * x / (3.0 * x * x - _THIRD)
+    g, k = 1.0 - h * x, 0.5 * x - h * (x * x - _THIRD)
+    rxx = g * xx + k - h * (xx * xx + xy * xy + zx * zx)
+    ryy = g * yy + k - h * (xy * xy + yy * yy + yz * yz)
+    rzz = g * zz + k - h * (zx * zx + yz * yz + zz * zz)
+    ryz = g * yz - h * (xy * zx + yy * yz + yz * zz)
+    rzx = g * zx - h * (xx * zx + xy * yz + zx * zz)
+    rxy = g * xy - h * (xx * xy + xy * yy + zx * yz)
+    half = np.sqrt(0.5 * (rxx * rxx + ryy * ryy + rzz * rzz) + ryz * ryz + rzx * rzx + rxy * rxy)
+    high, low = half - 0.5 * x, -half - 0.5 * x
+    return (x, high, low) if x > 0.0 else (high, low, x)
+
+
+@njit(
+    "UniTuple(float64, 3)(float64, float64, float64, float64, float64, float64)",
+    cache=True,
+    error_model="numpy",
+    forceinline=True,
+)
+def returned(d1, d2, d3, strength, sine, cap):  # type: ignore[no-untyped-def]
+    """The principal deviatoric stresses d1 >= d2 >= d3 brought back to the strength; unchanged where they are below it.
+
+    (1 + sine) d1 - (1 - sine) d3 <= strength and d1 - d3 <= cap. Flow is along (1, 0, -1), at constant d2, for both
+    planes; where it would change the order two of the three are equal, and only one point is left.
+    """
+    new = min(0.5 * (strength - (1.0 - sine) * d2), 0.5 * (cap - d2))
+    if not new < d1:
+        return d1, d2, d3
+    if new < d2:
+        low = min(strength / (3.0 - sine), cap / 3.0)
+        return low, low, -2.0 * low
+    if d3 + (d1 - new) > d2:
+        high = min(strength / (3.0 + sine), cap / 3.0)
+        return 2.0 * high, -high, -high
+    return new, d2, d3 + (d1 - new)
+
+
+@njit(
+    "UniTuple(float64, 6)(float64, float64, float64, float64, float64, float64, "
+    "float64, float64, float64, float64, float64, float64)",
+    cache=True,
+    error_model="numpy",
+    forceinline=True,
+)
+def with_values(xx, yy, zz, yz, zx, xy, d1, d2, d3, e1, e2, e3):  # type: ignore[no-untyped-def]
+    """The tensor with the principal directions of the given one and the values e instead of its values d.
+
+    e2 + [e2, e3] (s - d2) + [e1, e2, e3] (s - d2) (s - d3), Newton's interpolation: no directions are needed. After
+    ``returned`` the first differences lie between 0 and 1, so equal values do no harm: e is equal where d is.
+    """
+    upper = (e1 - e2) / (d1 - d2) if e1 > e2 else 0.0
+    lower = (e2 - e3) / (d2 - d3) if e2 > e3 else 0.0
+    second = (upper - lower) / (d1 - d3)
+    first = lower - second * d3
+    axx, ayy, azz = xx - d2, yy - d2, zz - d2
+    bxx, byy, bzz = first + second * xx, first + second * yy, first + second * zz
+    byz, bzx, bxy = second * yz, second * zx, second * xy
+    return (
+        e2 + axx * bxx + xy * bxy + zx * bzx,
+        e2 + xy * bxy + ayy * byy + yz * byz,
+        e2 + zx * bzx + yz * byz + azz * bzz,
+        xy * bzx + ayy * byz + yz * bzz,
+        axx * bzx + xy * byz + zx * bzz,
+        axx * bxy + xy * byy + zx * byz,
+    )
+
+
+@njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
+def mohr_coulomb(w, s, params, n, dt):  # type: ignore[no-untyped-def]
+    """Returns the trial deviators that are too strong for their new pressure; books the plastic work.
+
+    Plastic work is that of the mean of the rotated old stress and the new one, as the whole work is: what remains is
+    the elastic energy of the stress, also where the strength itself falls, by a release of pressure or by failure.
+    """
+    equivalent_stress(w, s, n)
+    shear2, cap = 2.0 * params[SHEAR], params[MC_CAP]
+    for i in range(n):
+        k = MC_RESIDUAL if s[_STRAIN + i] > params[MC_FAILURE] else 0
+        sine = params[MC_SINE + k]
+        strength = params[MC_COHESION + k] + 2.0 * sine * s[_P + i]
+        q = w[TRIAL + i]
+        most = _MISES * q
+        if (most * np.sqrt(1.0 + sine * sine * _THIRD) <= strength and most <= cap) or q == 0.0:
+            continue
+        r = 1.0 / q
+        mean = (s[_SXX + i] + s[_SYY + i] + s[_SZZ + i]) * _THIRD
+        sxx, syy, szz = r * (s[_SXX + i] - mean), r * (s[_SYY + i] - mean), r * (s[_SZZ + i] - mean)
+        syz, szx, sxy = r * s[_SYZ + i], r * s[_SZX + i], r * s[_SXY + i]
+        d1, d2, d3 = principal(sxx, syy, szz, syz, szx, sxy)
+        e1, e2, e3 = returned(d1, d2, d3, max(r * strength, 0.0), sine, r * cap)
+        if e1 == d1:
+            continue
+        nxx, nyy, nzz, nyz, nzx, nxy = with_values(sxx, syy, szz, syz, szx, sxy, d1, d2, d3, e1, e2, e3)
+        s[_SXX + i], s[_SYY + i], s[_SZZ + i] = q * nxx, q * nyy, q * nzz
+        s[_SYZ + i], s[_SZX + i], s[_SXY + i] = q * nyz, q * nzx, q * nxy
+        f1, f2, f3 = d1 - e1, d2 - e2, d3 - e3
+        square, work = f1 * f1 + f2 * f2 + f3 * f3, e1 * f1 + e2 * f2 + e3 * f3
+        moved = (
+            (sxx - nxx) * w[D_XX + i]
+            + (syy - nyy) * w[D_YY + i]
+            + (szz - nzz) * w[D_ZZ + i]
+            + 2.0 * ((syz - nyz) * w[D_YZ + i] + (szx - nzx) * w[D_ZX + i] + (sxy - nxy) * w[D_XY + i])
+        )
+        s[_STRAIN + i] += q / shear2 * np.sqrt(_TWO_THIRDS * square)
+        s[_WORK + i] += w[VOLUME_MID + i] * q * q / shear2 * max(work + 0.5 * (square - r * shear2 * dt * moved), 0.0)
