@@ -39,6 +39,8 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     elements: int = 0
     eroded: int = 0
     """Tets that have left."""
+    eroded_mass: float = 0.0
+    """kg; of nodes that have left with the last of their tets."""
     nodes_initial: int = 0
     nodes: int = 0
     fragments: int = 0

@@ -91,7 +91,8 @@ def _sum_up(
     return Outcome(
         state=state, cause=cause, message=message, steps=sim.clock.step, time=sim.clock.t, ranks=sim.comm.size,
         elapsed=elapsed, setup=start.setup, cpu=total_cpu, digest=hexdigest or "", elements=start.elements,
-        eroded=start.elements - sim.model.elements_global, nodes_initial=sim.model.nodes_global,
+        eroded=start.elements - sim.model.elements_global, eroded_mass=sim.ledger.eroded_mass,
+        nodes_initial=sim.model.nodes_global,
         nodes=sim.model.nodes_global, fragments=len(sim.model.parts), energy=loop.energy,
         worst_residual=sim.ledger.worst,
         phases={name: [s[name] for s in seconds] for name in PHASES} if seconds else {},

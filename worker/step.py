@@ -6,8 +6,8 @@ and at once f(n+1) from it, so a step begins with forces that are already at han
 ==  =====================================================  ==========================
  1  choose dt                                              from the limits at n
  2  velocities                                             v(n-1/2) -> v*(n+1/2)
- 3  boundaries: symmetry, prescribed motion, contact,     v*(n+1/2) -> v(n+1/2)
-    walls
+ 3  boundaries: gravity, symmetry, prescribed motion,     v*(n+1/2) -> v(n+1/2)
+    contact, walls
  4  whoever looks at time n: ledger, probes, frames        x(n), stress(n)
  5  positions                                              x(n) -> x(n+1)
  6  velocity gradient at x(n+1/2), stress, pressure        stress(n) -> stress(n+1)

@@ -161,7 +161,10 @@ def _long_rod(extent: Extent, book: Book) -> None:
         shots.append(shot)
         print(long_rod.report([shot]).splitlines()[-1], flush=True)
     if shots:
-        book.add("Long rod", long_rod.report(shots), long_rod.as_data(shots), gates.of_long_rod(shots))
+        times = [f"{s.variant.name}\n\n{long_rod.course(s.course)}" for s in shots if s.variant.name == "1 mm"]
+        book.add(
+            "Long rod", "\n\n".join([long_rod.report(shots), *times]), long_rod.as_data(shots), gates.of_long_rod(shots)
+        )
 
 
 PARTS: dict[str, Callable[[Extent, Book], None]] = {

@@ -21,6 +21,7 @@ from conoid.cases import layout, load
 from conoid.cases.library import library
 from conoid.cases.outcome import Outcome, from_json
 from conoid.worker.mesh.faces import boundary_faces
+from conoid.worker.reference import chord_lengths
 
 from .table import Cell, table
 
@@ -31,6 +32,8 @@ LENGTH = 75.0
 BANDS = {"1057 m/s": (0.60, 0.80), "1301 m/s": (0.85, 1.05), "1566.4 m/s": (1.00, 1.20)}
 """P/L of a tungsten rod in mild steel by Alekseevskii's and Tate's theory, with a rod strength of 1.5 to 2 GPa and a
 target resistance of 3 to 3.5 GPa that are assumed, not derived from the constants of the case."""
+_RADIUS, _THICKNESS = 3.5e-3, 0.132
+"""Of the rod, and of the plates together, m."""
 _CRATER = (6.0, 40.0)
 """Depths between which the diameter of the crater is measured, mm."""
 
@@ -57,7 +60,6 @@ def meshed(size: float, **grading: float) -> tuple[str, ...]:
 
 
 COARSE = meshed(1.4)
-QUICK = (Variant("1.4 mm", COARSE),)
 SPEEDS = tuple(
     Variant(speed, (f"parts[0].velocity=['0 m/s', '0 m/s', '{speed}']", "run.end_time=180 us")) for speed in BANDS
 )
@@ -84,6 +86,17 @@ OTHERS = (
 
 
 @dataclass(frozen=True)
+class Moment:
+    """A frame: time, s; depth, ends of the rod, m; speed of its last 8 mm, m/s. NaN without a rod."""
+
+    t: float
+    depth: float
+    tail: float
+    nose: float
+    speed: float
+
+
+@dataclass(frozen=True)
 class Shot:
     """What came out of a variant; lengths in mm."""
 
@@ -92,6 +105,8 @@ class Shot:
     depth: float
     crater: float
     """Mean diameter between the depths of _CRATER."""
+    course: tuple[Moment, ...]
+    """Frame by frame."""
 
 
 def measure(variants: Sequence[Variant], ranks: int = 2) -> Iterator[Shot]:
@@ -103,7 +118,7 @@ def measure(variants: Sequence[Variant], ranks: int = 2) -> Iterator[Shot]:
 
 def run(variant: Variant, folder: Path, ranks: int) -> Shot:
     """The variant in ``folder``, with the worker's command line."""
-    data = load.apply_overrides(load.read_data(load.shipped_path("long_rod")), ["run.frames=1", *variant.assignments])
+    data = load.apply_overrides(load.read_data(load.shipped_path("long_rod")), variant.assignments)
     data["materials"] = {name: _stronger(name, strength) for name, strength in variant.yields}
     case = folder / "case.json"
     case.write_text(json.dumps(data), encoding="utf-8")
@@ -112,8 +127,8 @@ def run(variant: Variant, folder: Path, ranks: int) -> Shot:
     subprocess.run([*launch, *command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=7200)
     outcome = from_json((folder / "run" / layout.OUTCOME).read_bytes())
     depth = next((c.value for c in outcome.reference if c.name.startswith("penetration")), float("nan"))
-    last = layout.frame(folder / "run", 1)
-    return Shot(variant, outcome, 1e3 * depth, 1e3 * crater(last) if last.exists() else float("nan"))
+    frames = sorted((folder / "run").glob(layout.frame(Path(), 0).parent.name + "/*.vtkhdf"))
+    return Shot(variant, outcome, 1e3 * depth, 1e3 * crater(frames[-1]), tuple(moment(frame) for frame in frames))
 
 
 def _stronger(name: str, strength: float) -> dict[str, Any]:
@@ -144,6 +159,42 @@ def crater(frame: Path) -> float:
             if len(there):
                 walls.append(there.min())
     return 2.0 * float(np.median(walls))
+
+
+def moment(frame: Path) -> Moment:
+    """What a frame says of rod and plates; depth as the reference ``penetration`` has it."""
+    with h5py.File(frame) as file:
+        grid = file["VTKHDF"]
+        points, part, t = grid["Points"][:], grid["CellData/part"][:], float(grid["FieldData/time"][0])
+        tets, velocity = grid["Connectivity"][:].reshape(-1, 4), grid["PointData/velocity"][:]
+    plates = tets[part > 0].astype(np.uint32)
+    lines = [share * _RADIUS / 2**0.5 for share in (0.1, 0.3, 0.5)]
+    left = float(np.mean([chord_lengths(points, plates, 2, (c, c)).sum() for c in lines]))
+    rod = np.unique(tets[part == 0])
+    if not len(rod):
+        return Moment(t, _THICKNESS - left, *3 * [float("nan")])
+    z = points[rod, 2]
+    speed = velocity[rod[z < z.min() + 8e-3], 2].mean()
+    return Moment(t, _THICKNESS - left, float(z.min()), float(z.max()), float(speed))
+
+
+def course(moments: Sequence[Moment]) -> str:
+    """Depth and rod over time; the strength that slows the tail down, and the resistance that the nose then meets.
+
+    Alekseevskii's and Tate's equations, over 30 us about each line: Y = -rho L dV/dt, R = rho (V - U)^2 / 2 + Y -
+    rho_t U^2 / 2.
+    """
+    rows: list[list[Cell]] = []
+    for before, now, after in zip(moments, moments[3:], moments[6:], strict=False):
+        dt, length = after.t - before.t, now.nose - now.tail
+        inward, slowed = (after.nose - before.nose) / dt, (before.speed - after.speed) / dt
+        strength = 17300.0 * length * slowed
+        resistance = 0.5 * 17300.0 * (now.speed - inward) ** 2 + strength - 0.5 * 7870.0 * inward**2
+        rows.append([
+            round(1e6 * now.t), f"{1e3 * now.depth:.1f}", f"{1e3 * length:.1f}", round(now.speed), round(inward),
+            f"{1e-9 * strength:.2f}", f"{1e-9 * resistance:.2f}",
+        ])  # fmt: skip
+    return table(["t us", "P mm", "rod mm", "V m/s", "U m/s", "Y GPa", "R GPa"], rows)
 
 
 def report(shots: Sequence[Shot]) -> str:

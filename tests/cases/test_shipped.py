@@ -326,20 +326,42 @@ def cavity_resistance(name: str) -> float:
     return pressure
 
 
-def alekseevskii_tate(speed: float, strength: float, resistance: float, rod: float, target: float) -> float:
-    """Depth, m, that a rod of 75 mm and the density ``rod`` digs into a target, kg/m^3; stresses in Pa."""
-    length, depth, dt = 0.075, 0.0, 1e-8
-    while length > 1e-5 and 0.5 * rod * speed**2 + strength > resistance:
+def alekseevskii_tate(speed: float, strength: float, resistance: float, until: float = math.inf) -> float:
+    """Depth, m, that the long rod digs into steel by a time, s, or while it moves and erodes; stresses in Pa."""
+    rod, target = library()["wha"].density, library()["mild_steel"].density
+    length, depth, t, dt = 0.075, 0.0, 0.0, 1e-8
+    while t < until and length > 1e-5:
+        if 0.5 * rod * speed**2 + strength <= resistance or 0.5 * target * speed**2 + resistance <= strength:
+            break
         a, b, c = rod - target, 2.0 * rod * speed, rod * speed**2 + 2.0 * (strength - resistance)
         inward = (b - math.sqrt(b * b - 4.0 * a * c)) / (2.0 * a)
         depth += inward * dt
         length -= (speed - inward) * dt
         speed -= strength / (rod * length) * dt
+        t += dt
     return depth
 
 
 def test_the_depth_of_the_long_rod_is_that_of_a_rod_which_erodes() -> None:
     strength, resistance = flow_stress("wha", 0.05, 293.15), cavity_resistance("mild_steel")
     assert (strength, resistance) == pytest.approx((1.87e9, 2.36e9), rel=0.005)
-    depth = alekseevskii_tate(1566.4, strength, resistance, 17300.0, 7870.0)
+    depth = alekseevskii_tate(1566.4, strength, resistance)
     assert reference("long_rod", "penetration").value == pytest.approx(depth, rel=0.002)
+
+
+@pytest.mark.parametrize(
+    ("strength", "resistance", "depths"),
+    [(1.87e9, 2.36e9, (77.5, 92.0, 100.2)), (2.24e9, 2.00e9, (100.7, 110.8, 114.2))],
+)
+def test_what_the_theory_gives_beside_the_long_rod(
+    strength: float, resistance: float, depths: tuple[float, ...]
+) -> None:
+    """The numbers of docs/long_rod.md, mm."""
+    found = [1e3 * alekseevskii_tate(speed, strength, resistance) for speed in (1057.0, 1301.0, 1566.4)]
+    assert found == pytest.approx(depths, abs=0.2)
+
+
+def test_what_the_theory_gives_in_time() -> None:
+    times = (30e-6, 60e-6, 90e-6, 120e-6)
+    found = [1e3 * alekseevskii_tate(1566.4, 1.87e9, 2.36e9, until) for until in times]
+    assert found == pytest.approx((26.8, 52.6, 76.6, 96.9), abs=0.2)

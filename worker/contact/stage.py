@@ -59,6 +59,8 @@ class Contact(Boundary):
         """Whether the next step begins with a search."""
         self.limit = 0.0
         """One over the step in which no node passes more than half of a tet that it may meet, 1/s."""
+        self._changed = False
+        """Whether the surface is another one than that of the last search."""
         self.searches = 0
         self._last = -math.inf
         """Step of the last search."""
@@ -80,8 +82,7 @@ class Contact(Boundary):
             self._surface = surface.uncovered(
                 self._surface, gone, loose, removed, self._model, self._planes, self._neighbours, self._comm
             )
-            self._flight.follow(self._surface, self._model.nodes)
-            self.due = True
+            self.due = self._changed = True
 
     def note(self, state: Nodes) -> None:
         with self._timers.phase("contact"):
@@ -111,7 +112,11 @@ class Contact(Boundary):
         clock, flight, old = self._clock, self._flight, self._scene
         if old is not None:
             old.free()
-        flight.refresh(state)
+        if self._changed:
+            flight.follow(self._surface, state)
+            self._changed = False
+        else:
+            flight.refresh(state)
         steps, drift = flight.foresight(clock.dt)
         horizon = max(min(steps, 2.0 * (clock.step - self._last)), _SHORTEST) * clock.dt
         self._scene = scene.build(flight.sides, self._rules, horizon, drift, state, self._neighbours, self._comm)
