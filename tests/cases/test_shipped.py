@@ -351,7 +351,12 @@ def test_the_depth_of_the_long_rod_is_that_of_a_rod_which_erodes() -> None:
 
 @pytest.mark.parametrize(
     ("strength", "resistance", "depths"),
-    [(1.87e9, 2.36e9, (77.5, 92.0, 100.2)), (2.24e9, 2.00e9, (100.7, 110.8, 114.2))],
+    [
+        (1.87e9, 2.36e9, (77.5, 92.0, 100.2)),
+        (2.24e9, 2.00e9, (100.7, 110.8, 114.2)),
+        (1.40e9, 2.63e9, (64.2, 80.1, 90.2)),
+        (1.87e9, 1.80e9, (100.6, 108.8, 111.6)),
+    ],
 )
 def test_what_the_theory_gives_beside_the_long_rod(
     strength: float, resistance: float, depths: tuple[float, ...]
