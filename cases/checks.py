@@ -7,8 +7,9 @@ from itertools import chain
 from .bodies import Box, MeshFile, Tube
 from .geometry import AXES, bounds, centre, cut_directions, lowest_along, thinnest, whole_bounds
 from .library import library
+from .materials import JohnsonCook, Material, MohrCoulomb
 from .problems import Location, Problem, choices, dotted, nearest, problem
-from .schema import Case, Gravity, JohnsonCook, MohrCoulomb, Part, Prescribed, Reference, Symmetry, Wall
+from .schema import Case, Gravity, Part, Prescribed, Reference, Symmetry, Wall
 
 NEEDED: dict[str, frozenset[str]] = {
     "extent": frozenset({"part", "axis"}),
@@ -75,10 +76,28 @@ def _parts(case: Case) -> Iterator[Problem]:
         if law is None and part.erosion is not None and part.erosion.plastic_strain is not None:
             message = f"{part.material} has no strength, so it never strains plastically; remove the key"
             yield problem(("parts", i, "erosion", "plastic_strain"), part.erosion.plastic_strain, message)
+        yield from _fracture(part, known[part.material], ("parts", i, "fracture"))
         if part.turn is not None and not isinstance(part.mesh, MeshFile) and part.mesh.sector != "full":
             yield problem(
                 ("parts", i, "turn"), ..., f"a {part.mesh.sector} of a body cannot be turned; model all of it"
             )
+
+
+def _fracture(part: Part, made: Material, location: Location) -> Iterator[Problem]:
+    spec = part.fracture
+    if spec is None:
+        return
+    if made.brittle is None:
+        message = f"{part.material} has no strength and fracture energy; give it a table brittle with strength, energy"
+        yield problem(location, ..., message)
+    elif made.brittle.scatter is not None and made.brittle.scatter.minimum >= made.brittle.strength:
+        message = f"must be below the strength, {made.brittle.strength:g} Pa"
+        where = ("materials", part.material, "brittle", "scatter", "minimum")
+        yield problem(where, made.brittle.scatter.minimum, message)
+    if spec.model == "cohesive" and spec.shear_weight == 0.0:
+        yield problem((*location, "shear_weight"), 0.0, "must be above 0 with model = 'cohesive', which shears too")
+    if part.erosion is not None:
+        yield problem(location, ..., "a part cannot erode and fracture; remove erosion or fracture")
 
 
 def _mesh(part: Part, location: Location) -> Iterator[Problem]:

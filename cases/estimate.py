@@ -12,8 +12,9 @@ from pathlib import Path
 from .bodies import MeshFile
 from .geometry import AXES, bounds
 from .library import material
+from .materials import JohnsonCook, Material, MohrCoulomb
 from .mesh_size import MeshSize, mesh_size, surface_faces
-from .schema import Case, JohnsonCook, Material, MohrCoulomb, Part, Rotation, Symmetry, Wall
+from .schema import Case, Part, Rotation, Symmetry, Wall
 
 NANOSECONDS = {
     "tet": 80.0, "nodal": 45.0, "split": 90.0, "eos": 15.0,

@@ -5,8 +5,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Literal, get_args
 
+from .materials import Material
 from .problems import CaseError, nearest, problem
-from .schema import Case, Material
+from .schema import Case
 
 PATH = Path(__file__).with_name("materials.toml")
 Confidence = Literal["paper", "read", "derived", "memory", "assumed"]

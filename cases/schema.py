@@ -1,123 +1,21 @@
 """What a case is. Frozen models, unknown keys forbidden, every quantity in SI once read.
 
 ``parse_case`` in ``cases/load.py`` is the way in: it reads TOML or JSON and reports every error at once. Bodies and
-their meshes are in ``cases/bodies.py``.
+their meshes are in ``cases/bodies.py``, materials in ``cases/materials.py``.
 """
 
-import math
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import BeforeValidator, Field
 
 from .bodies import Mesh
+from .materials import Material
 from .tables import Axis, Count, Direction, Model, Name, Point, Positive, Velocity
-from .units import (
-    Acceleration,
-    AngularSpeed,
-    Density,
-    Length,
-    Rate,
-    Ratio,
-    SpecificHeat,
-    Speed,
-    Stress,
-    Temperature,
-    Time,
-)
+from .units import Acceleration, AngularSpeed, Length, Ratio, Speed, Temperature, Time
 
 
 def _off(value: Any) -> Any:
     return None if value == "none" else value
-
-
-def _acute(angle: float) -> float:
-    if not 0.0 <= angle < 0.5 * math.pi:
-        raise ValueError("must be at least 0 and below 90 deg; without a unit it is in rad, write it like '55 deg'")
-    return angle
-
-
-# Materials ------------------------------------------------------------------------------------------------------------
-
-
-class Elastic(Model):
-    """Isotropic elasticity: Young's modulus, Pa, and Poisson's ratio."""
-
-    young: Annotated[Stress, Positive]
-    poisson: Annotated[Ratio, Field(gt=-1, lt=0.5)]
-
-
-class LinearHardening(Model):
-    """J2 plasticity: yield stress ``yield + hardening * plastic strain``, Pa."""
-
-    model: Literal["linear_hardening"]
-    yield_stress: Annotated[Stress, Positive]
-    hardening: Annotated[Stress, Field(ge=0)] = 0.0
-
-
-class JohnsonCook(Model):
-    """Flow stress (A + B e^n)(1 + C ln max(rate/reference_rate, 1))(1 - T*^m), adiabatic heating.
-
-    T* = (T - reference_temperature) / (melt_temperature - reference_temperature), clamped to [0, 1].
-    """
-
-    model: Literal["johnson_cook"]
-    A: Annotated[Stress, Positive]
-    B: Annotated[Stress, Field(ge=0)]
-    n: Annotated[Ratio, Field(gt=0, le=1)]
-    C: Annotated[Ratio, Field(ge=0)]
-    m: Annotated[Ratio, Positive]
-    reference_rate: Annotated[Rate, Positive] = 1.0
-    reference_temperature: Annotated[Temperature, Field(ge=0)] = 293.15
-    melt_temperature: Annotated[Temperature, Positive]
-    specific_heat: Annotated[SpecificHeat, Positive]
-    taylor_quinney: Annotated[Ratio, Field(ge=0, le=1)] = 0.9
-    """Share of the plastic work that becomes heat."""
-
-
-class MohrCoulomb(Model):
-    """Brittle strength (s1 - s3) + (s1 + s3) sin(friction_angle) <= 2 cohesion cos(friction_angle), s1 >= s2 >= s3.
-
-    Tension is positive. Flow keeps the volume: there is no dilation. Tension beyond the apex takes the deviatoric
-    stress and leaves the pressure as it is.
-    """
-
-    model: Literal["mohr_coulomb"]
-    cohesion: Annotated[Stress, Positive]
-    friction_angle: Annotated[Ratio, AfterValidator(_acute)]
-    """``"55 deg"``."""
-    strength_cap: Annotated[Stress, Positive] | None = None
-    """Largest s1 - s3, however high the pressure; none by default."""
-    failure_strain: Annotated[Ratio, Positive] | None = None
-    """Effective plastic strain beyond which the residual values hold; without it material never fails."""
-    residual_cohesion: Annotated[Stress, Field(ge=0)] | None = None
-    """0 by default."""
-    residual_friction_angle: Annotated[Ratio, AfterValidator(_acute)] | None = None
-    """30 deg by default, or the friction angle if that is smaller."""
-
-
-Strength = Annotated[LinearHardening | JohnsonCook | MohrCoulomb, Field(discriminator="model")]
-
-
-class MieGruneisen(Model):
-    """Mie-Grueneisen equation of state on the Hugoniot U_s = c0 + S u_p."""
-
-    model: Literal["mie_gruneisen"]
-    c0: Annotated[Speed, Positive]
-    S: Annotated[Ratio, Field(ge=0)]
-    gamma0: Annotated[Ratio, Field(ge=0)]
-
-
-class Material(Model):
-    """Density, kg/m^3; elasticity; strength (none: elastic); equation of state (none: linear, from the elasticity)."""
-
-    density: Annotated[Density, Positive]
-    elastic: Elastic
-    strength: Strength | None = None
-    eos: MieGruneisen | None = None
-    description: str = ""
-
-
-# The scene ------------------------------------------------------------------------------------------------------------
 
 
 class Spin(Model):
@@ -153,6 +51,29 @@ class Erosion(Model):
     momentum and energy, which are booked."""
 
 
+class Fracture(Model):
+    """Facets between tets break, nodes separate, and the pieces meet each other. The material must be ``brittle``."""
+
+    model: Literal["instant", "cohesive"] = "instant"
+    """``instant``: a facet that breaks carries nothing from then on (the paper). ``cohesive``: its traction falls
+    linearly with the opening and takes the fracture energy with it (Camacho and Ortiz 1996)."""
+    shear_weight: Annotated[Ratio, Field(ge=0)] | None = None
+    """beta_tau of sqrt(<t_n>^2 + beta_tau t_s^2): 0 for ``instant`` (the paper: largest normal traction), 1 for
+    ``cohesive`` by default."""
+    friction: Annotated[Ratio, Field(ge=0)] = 0.0
+    """Internal friction: under a pressure |t_n| a facet breaks by t_s - friction * |t_n|."""
+    delay: Annotated[Ratio, Field(ge=0)] = 1.0
+    """t_c = delay * density * c * energy / strength^2 of the delayed criterion. The paper prints 0.5, its own equations
+    give 1; 0 breaks a facet in the step in which it passes the strength."""
+    traction: Literal["tets", "nodes"] = "tets"
+    """From the mean stress of the two tets of a facet, or from the volume-weighted mean stress round its nodes."""
+    order: Literal["simultaneous", "local_maximum"] = "simultaneous"
+    """Which of the facets that pass break in a step: all, or of those that share a node only the strongest loaded."""
+    resolve: Literal["none", "strength"] = "none"
+    """``strength`` lowers the strength until ``resolution`` elements fit in the cohesive zone, with the same energy."""
+    resolution: Annotated[Ratio, Positive] = 3.0
+
+
 class Part(Model):
     """A body: where it is, what it is made of, how it moves at the start."""
 
@@ -166,6 +87,7 @@ class Part(Model):
     spin: Spin | None = None
     temperature: Annotated[Temperature, Field(ge=0)] = 293.15
     erosion: Erosion | None = None
+    fracture: Fracture | None = None
 
 
 class Symmetry(Model):
@@ -234,7 +156,7 @@ class Contact(Model):
     parts: tuple[Name, ...] = ()
     """Parts that meet each other; all when empty."""
     self_contact: tuple[Name, ...] = ()
-    """Parts whose surface can meet itself."""
+    """Parts whose surface can meet itself; those that fracture always can."""
     friction: Annotated[Ratio, Field(ge=0)] = 0.0
     """Coulomb's coefficient."""
     pairs: tuple[ContactPair, ...] = ()
@@ -365,6 +287,13 @@ class Case(Model):
         return any(part.erosion is not None for part in self.parts)
 
     @property
+    def fractures(self) -> bool:
+        """Whether facets may break."""
+        return any(part.fracture is not None for part in self.parts)
+
+    @property
     def in_contact(self) -> bool:
         """Whether anything of the scene can meet anything."""
-        return self.contact is not None and (len(self.parts) > 1 or bool(self.contact.self_contact))
+        if self.contact is None:
+            return False
+        return len(self.parts) > 1 or bool(self.contact.self_contact) or self.fractures

@@ -43,6 +43,7 @@ KINDS: dict[Dimension, str] = {
     _TEMPERATURE: "a temperature", _FREQUENCY: "a rate", (1, 0, -1, 0): "a speed",
     (1, 0, -2, 0): "an acceleration", _STRESS: "a stress",
     (-3, 1, 0, 0): "a density", (2, 0, -2, -1): "a specific heat", (2, 0, -2, 0): "an energy per mass",
+    (2, 0, 0, 0): "an area", (0, 1, -2, 0): "an energy per area",
 }  # fmt: skip
 """What a quantity of a dimension is called."""
 
@@ -126,5 +127,7 @@ AngularSpeed = Annotated[float, _reader("rad/s"), _schema("rad/s")]
 Temperature = Annotated[float, _reader("K"), _schema("K")]
 Density = Annotated[float, _reader("kg/m^3"), _schema("kg/m^3")]
 Stress = Annotated[float, _reader("Pa"), _schema("Pa")]
+Area = Annotated[float, _reader("m^2"), _schema("m^2")]
+FractureEnergy = Annotated[float, _reader("J/m^2"), _schema("J/m^2")]
 SpecificHeat = Annotated[float, _reader("J/kg/K"), _schema("J/kg/K")]
 Ratio = Annotated[float, _reader(""), _schema("")]

@@ -7,7 +7,7 @@ import pytest
 from pydantic import BaseModel
 
 from conoid.cases.library import CONFIDENCES, library, provenance, sources
-from conoid.cases.schema import Elastic, JohnsonCook, Material, MohrCoulomb
+from conoid.cases.materials import Elastic, JohnsonCook, Material, MohrCoulomb
 
 NAMES = sorted(library())
 

@@ -8,7 +8,8 @@ import pytest
 from conoid.cases.estimate import estimate
 from conoid.cases.library import library
 from conoid.cases.load import parse_json, read_case, resolved_json, shipped
-from conoid.cases.schema import Case, JohnsonCook, Reference
+from conoid.cases.materials import JohnsonCook
+from conoid.cases.schema import Case, Reference
 
 NAMES = sorted(shipped())
 TAYLOR = ["demo", "taylor_42crmo4", "taylor_copper", "taylor_copper_split"]

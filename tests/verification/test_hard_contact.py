@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from conoid.cases import schema
+from conoid.cases import materials
 from conoid.cases.load import apply_overrides, parse_case, read_data, shipped
 from conoid.worker import simulation, state, step
 from conoid.worker.mesh.model import TetMesh
@@ -142,8 +142,8 @@ def test_where_the_ground_rises_only_the_normal_part_is_lost_and_where_it_falls_
 
 # H14: heavy on light, fine on coarse ----------------------------------------------------------------------------------
 
-HEAVY = schema.Material(density=17300.0, elastic=schema.Elastic(young=360e9, poisson=0.28))
-LIGHT = schema.Material(density=2500.0, elastic=schema.Elastic(young=72e9, poisson=0.22))
+HEAVY = materials.Material(density=17300.0, elastic=materials.Elastic(young=360e9, poisson=0.28))
+LIGHT = materials.Material(density=2500.0, elastic=materials.Elastic(young=72e9, poisson=0.22))
 
 
 @pytest.mark.parametrize("tilt", [0.0, 0.2])

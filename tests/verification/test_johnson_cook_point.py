@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from conoid.cases.schema import JohnsonCook
+from conoid.cases.materials import JohnsonCook
 from conoid.worker.state import PLASTIC_STRAIN, TEMPERATURE
 
 from ..worker import formulas

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from conoid.cases import schema
+from conoid.cases import materials
 from conoid.worker.boundaries import PrescribedVelocity
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.simulation import Simulation
@@ -39,8 +39,8 @@ class Metal:
         return self.young * self.poisson / ((1.0 + self.poisson) * (1.0 - 2.0 * self.poisson))
 
     @property
-    def material(self) -> schema.Material:
-        return schema.Material(density=DENSITY, elastic=schema.Elastic(young=self.young, poisson=self.poisson))
+    def material(self) -> materials.Material:
+        return materials.Material(density=DENSITY, elastic=materials.Elastic(young=self.young, poisson=self.poisson))
 
 
 class Drive(PrescribedVelocity):

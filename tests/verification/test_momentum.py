@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from conoid.cases import schema
+from conoid.cases import materials
 from conoid.worker.simulation import Simulation
 
 from ..worker.kernels import COPPER, COPPER_GAS, FORMS, STEEL, STEEL_42CRMO4, Form, build, run, scene
@@ -29,7 +29,7 @@ def test_a_spinning_bursting_body_keeps_its_momentum(metal: str, form: Form) -> 
     x(n) x m v(n+1/2) is what the leapfrog keeps: v does not turn the way it goes, forces of a symmetric stress have
     no moment.
     """
-    material: schema.Material = METALS[metal]
+    material: materials.Material = METALS[metal]
     spin = {"centre": (5e-3, 5e-3, 5e-3), "rate": (3e3, 0.0, 1e4)}
     sim = build(scene(material, form, end=1.0, velocity=(120.0, -50.0, 7.0), spin=spin, viscosity={}), [MESH])
     nodes = sim.model.nodes

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from conoid.cases import bodies, schema
+from conoid.cases import bodies, materials
 from conoid.worker.mesh.structured import structured
 from conoid.worker.simulation import Simulation
 from conoid.worker.state import PLASTIC_STRAIN, PRESSURE, S_XX, S_XY
@@ -14,7 +14,7 @@ from ..worker import formulas
 from ..worker.kernels import COPPER, FORMS, Form, build, run, scene
 from ..worker.meshes import Floats, block
 
-RUBBERY = schema.Material(density=7850.0, elastic=schema.Elastic(young=10e9, poisson=0.49))
+RUBBERY = materials.Material(density=7850.0, elastic=materials.Elastic(young=10e9, poisson=0.49))
 
 
 def roughness(sim: Simulation) -> float:
@@ -141,7 +141,7 @@ def test_forms_are_stable_at_the_whole_bound(form: Form, poisson: float) -> None
     cube = bodies.Box(
         shape="box", low=(0.0, 0.0, 0.0), high=(6e-3, 6e-3, 6e-3), element_size=1e-3, generator="structured", split=5
     )
-    metal = RUBBERY.model_copy(update={"elastic": schema.Elastic(young=200e9, poisson=poisson)})
+    metal = RUBBERY.model_copy(update={"elastic": materials.Elastic(young=200e9, poisson=poisson)})
     sim = build(scene(metal, form, dt_safety=1.0), [structured(cube)])
     nodes = sim.model.nodes
     nodes.v[:] = np.random.default_rng(6).normal(size=nodes.v.shape) * 1e-3

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conoid.cases import bodies, schema
+from conoid.cases import bodies, materials
 from conoid.worker.mesh.structured import structured
 from conoid.worker.simulation import Simulation
 
@@ -11,9 +11,9 @@ from ..worker.kernels import Floats, build, run, scene
 
 pytestmark = pytest.mark.slow
 
-SOFT = schema.Material(
-    density=8970.0, elastic=schema.Elastic(young=110e9, poisson=0.3),
-    strength=schema.LinearHardening(model="linear_hardening", yield_stress=314e6, hardening=0.0),
+SOFT = materials.Material(
+    density=8970.0, elastic=materials.Elastic(young=110e9, poisson=0.3),
+    strength=materials.LinearHardening(model="linear_hardening", yield_stress=314e6, hardening=0.0),
 )  # fmt: skip
 """Copper that is perfectly plastic."""
 

@@ -12,7 +12,7 @@ from unittest.mock import patch
 import numpy as np
 import numpy.typing as npt
 
-from conoid.cases import bodies, schema
+from conoid.cases import bodies, materials, schema
 from conoid.worker import domain, simulation, state, step
 from conoid.worker.boundaries import Boundary
 from conoid.worker.mesh.model import TetMesh
@@ -24,26 +24,26 @@ Floats = npt.NDArray[np.float64]
 Form = Literal["standard", "nodal", "split"]
 FORMS: tuple[Form, ...] = ("standard", "nodal", "split")
 
-STEEL = schema.Material(density=7850.0, elastic=schema.Elastic(young=200e9, poisson=0.3))
-COPPER = schema.Material(
-    density=8930.0, elastic=schema.Elastic(young=117e9, poisson=0.35),
-    strength=schema.LinearHardening(model="linear_hardening", yield_stress=0.4e9, hardening=0.1e9),
+STEEL = materials.Material(density=7850.0, elastic=materials.Elastic(young=200e9, poisson=0.3))
+COPPER = materials.Material(
+    density=8930.0, elastic=materials.Elastic(young=117e9, poisson=0.35),
+    strength=materials.LinearHardening(model="linear_hardening", yield_stress=0.4e9, hardening=0.1e9),
 )  # fmt: skip
-STEEL_42CRMO4 = schema.Material(
-    density=7830.0, elastic=schema.Elastic(young=206.9e9, poisson=0.3),
-    strength=schema.JohnsonCook(
+STEEL_42CRMO4 = materials.Material(
+    density=7830.0, elastic=materials.Elastic(young=206.9e9, poisson=0.3),
+    strength=materials.JohnsonCook(
         model="johnson_cook", A=806e6, B=614e6, n=0.168, C=0.0089, m=1.1, reference_temperature=293.15,
         melt_temperature=1813.15, specific_heat=460.0,
     ),
 )  # fmt: skip
-COPPER_GAS = schema.Material(
-    density=8930.0, elastic=schema.Elastic(young=117e9, poisson=0.35),
-    eos=schema.MieGruneisen(model="mie_gruneisen", c0=3940.0, S=1.49, gamma0=1.96),
+COPPER_GAS = materials.Material(
+    density=8930.0, elastic=materials.Elastic(young=117e9, poisson=0.35),
+    eos=materials.MieGruneisen(model="mie_gruneisen", c0=3940.0, S=1.49, gamma0=1.96),
 )  # fmt: skip
 """Copper with the Mie-Grueneisen equation of state, elastic in shear."""
-GLASS = schema.Material(
-    density=2500.0, elastic=schema.Elastic(young=72e9, poisson=0.22),
-    strength=schema.MohrCoulomb(
+GLASS = materials.Material(
+    density=2500.0, elastic=materials.Elastic(young=72e9, poisson=0.22),
+    strength=materials.MohrCoulomb(
         model="mohr_coulomb", cohesion=0.158e9, friction_angle=math.radians(54.9), strength_cap=3.6e9,
         failure_strain=0.05,
     ),
@@ -54,7 +54,7 @@ DUMMY = bodies.Box(shape="box", low=(0.0, 0.0, 0.0), high=(1.0, 1.0, 1.0), eleme
 """Stands in a case for a mesh that the test hands over itself."""
 
 
-def scene(material: schema.Material = STEEL, form: Form = "standard", end: float = 1.0, **keys: Any) -> schema.Case:
+def scene(material: materials.Material = STEEL, form: Form = "standard", end: float = 1.0, **keys: Any) -> schema.Case:
     """A case of one part ``body``, without viscosity; ``keys`` are those of the part, of ``numerics``, of the case."""
     of_part = {key: keys.pop(key) for key in ("velocity", "spin", "temperature") if key in keys}
     numerics = {key: keys.pop(key) for key in ("dt_safety", "dt_growth") if key in keys}
@@ -89,7 +89,12 @@ class Patch:
     """The tets of one material on one rank, and passes over them outside of any time step."""
 
     def __init__(
-        self, mesh: TetMesh, material: schema.Material = STEEL, form: Form = "standard", scale: float = 0.0, **keys: Any
+        self,
+        mesh: TetMesh,
+        material: materials.Material = STEEL,
+        form: Form = "standard",
+        scale: float = 0.0,
+        **keys: Any,
     ) -> None:
         self.sim = build(scene(material, form, **keys), [mesh])
         self.elements = self.sim.elements
@@ -167,7 +172,7 @@ class Patch:
         return fixed_point.float_of(int(self.elements.peaks[0]))
 
 
-def drive(material: schema.Material, L: Floats, dt: float, steps: int, **keys: Any) -> Patch:
+def drive(material: materials.Material, L: Floats, dt: float, steps: int, **keys: Any) -> Patch:
     """One regular tet of 1 m under a constant velocity gradient L (3, 3), 1/s: a material point.
 
     The positions are put so that the middle of every step is the same tet: the volume stays, L is exact.

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conoid.cases import schema
+from conoid.cases import materials
 from conoid.worker import step
 from conoid.worker.simulation import Simulation
 from conoid.worker.state import PRESSURE, S_ZZ, WORK, Flags
@@ -17,7 +17,7 @@ from .meshes import Floats, block
 
 MESH = block((3, 3, 3), 1e-3, seed=2)
 TILTED = (1.0, -2.0, 3.0)
-BAR = schema.Material(density=7850.0, elastic=schema.Elastic(young=200e9, poisson=0.0))
+BAR = materials.Material(density=7850.0, elastic=materials.Elastic(young=200e9, poisson=0.0))
 FALL = (2e6, -1e6, -3e7)
 GRAVITY: dict[str, Any] = {"kind": "gravity", "acceleration": FALL}
 

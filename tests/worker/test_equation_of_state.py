@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from conoid.cases.schema import MieGruneisen
+from conoid.cases.materials import MieGruneisen
 from conoid.worker.state import MASS, PRESSURE, VOLUME_RATIO, WORK, WORK_VISCOUS
 
 from . import formulas

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from conoid.cases.schema import JohnsonCook
+from conoid.cases.materials import JohnsonCook
 from conoid.worker.materials.models import initial_yield
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.state import FLOW, MASS, PLASTIC_STRAIN, TEMPERATURE, WORK_PLASTIC, YIELD

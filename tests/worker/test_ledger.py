@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from conoid.cases import schema
+from conoid.cases import materials
 from conoid.cases.messages import Energy
 from conoid.worker.simulation import Simulation
 
@@ -26,7 +26,7 @@ def lines(sim: Simulation) -> list[Energy]:
     return found
 
 
-def worst(material: schema.Material, form: Form, **keys: Any) -> float:
+def worst(material: materials.Material, form: Form, **keys: Any) -> float:
     sim = build(scene(material, form, end=4e-6, **keys), [MESH])
     return max(line.residual for line in lines(sim))
 
@@ -37,7 +37,7 @@ def worst(material: schema.Material, form: Form, **keys: Any) -> float:
     [STEEL, COPPER, STEEL_42CRMO4, COPPER_GAS, GLASS],
     ids=["elastic", "plastic", "hot", "gas", "brittle"],
 )
-def test_an_impact_closes_to_a_percent(material: schema.Material, form: Form) -> None:
+def test_an_impact_closes_to_a_percent(material: materials.Material, form: Form) -> None:
     assert worst(material, form, viscosity={}, **FLIGHT) < 0.02
 
 

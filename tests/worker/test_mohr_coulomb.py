@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conoid.cases import schema
+from conoid.cases import materials
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.state import CHUNK, PLASTIC_STRAIN, PRESSURE, WORK, WORK_PLASTIC
 
@@ -19,10 +19,10 @@ DT = 1e-7
 C, PHI = 0.158e9, math.radians(54.9)
 
 
-def brittle(cohesion: float = C, angle: float = PHI, **keys: Any) -> schema.Material:
+def brittle(cohesion: float = C, angle: float = PHI, **keys: Any) -> materials.Material:
     """Glass with this strength."""
-    law = schema.MohrCoulomb(model="mohr_coulomb", cohesion=cohesion, friction_angle=angle, **keys)
-    return schema.Material(density=2500.0, elastic=GLASS.elastic, strength=law)
+    law = materials.MohrCoulomb(model="mohr_coulomb", cohesion=cohesion, friction_angle=angle, **keys)
+    return materials.Material(density=2500.0, elastic=GLASS.elastic, strength=law)
 
 
 LAWS = {
@@ -33,7 +33,7 @@ LAWS = {
 }
 
 
-def free(n: int, material: schema.Material, s: Floats, pressure: Floats | float) -> Patch:
+def free(n: int, material: materials.Material, s: Floats, pressure: Floats | float) -> Patch:
     """``n`` regular tets at rest with deviators (n, 3, 3) and pressures, Pa."""
     points = np.tile(REGULAR, (n, 1))
     patch = Patch(TetMesh(points, np.arange(4 * n, dtype=np.int32).reshape(n, 4)), material)
@@ -61,7 +61,7 @@ def random_deviators(n: int, random: np.random.Generator) -> Floats:
     return s * (10.0 ** random.uniform(7.0, 11.0, n) / formulas.mises(s))[:, None, None]
 
 
-def excess(s: Floats, pressure: Floats | float, law: schema.MohrCoulomb) -> Floats:
+def excess(s: Floats, pressure: Floats | float, law: materials.MohrCoulomb) -> Floats:
     """The larger of f and s1 - s3 - cap, Pa; f of the apex where the pressure is beyond it."""
     d = np.linalg.eigvalsh(s)
     sine, cosine = math.sin(law.friction_angle), math.cos(law.friction_angle)
@@ -74,7 +74,7 @@ def excess(s: Floats, pressure: Floats | float, law: schema.MohrCoulomb) -> Floa
 def test_a_hundred_thousand_random_stresses(name: str) -> None:
     """On the surface, in the same directions, by flow along (1, 0, -1) or its neighbours; what is lost is booked."""
     n, random, law = 25_000, np.random.default_rng(len(name)), LAWS[name].strength
-    assert isinstance(law, schema.MohrCoulomb)
+    assert isinstance(law, materials.MohrCoulomb)
     trial, pressure = random_deviators(n, random), random.normal(size=n) * 10.0 ** random.uniform(7.0, 10.0, n)
     patch = free(n, LAWS[name], trial, pressure)
     volume = float(np.linalg.det(REGULAR[1:] - REGULAR[0])) / 6.0

@@ -13,8 +13,8 @@ def friction(case: Case) -> Floats:
     spec, names = case.contact, [part.name for part in case.parts]
     meets = np.array([name in spec.parts or not spec.parts for name in names])
     mu = np.where(meets[:, None] & meets[None, :], spec.friction, np.nan)
-    for i, name in enumerate(names):
-        if name not in spec.self_contact:
+    for i, part in enumerate(case.parts):
+        if part.name not in spec.self_contact and part.fracture is None:
             mu[i, i] = np.nan
     for pair in spec.pairs:
         i, j = (names.index(name) for name in pair.parts)

@@ -8,7 +8,8 @@ import math
 
 import numpy as np
 
-from conoid.cases.schema import JohnsonCook, LinearHardening, Material, MieGruneisen, MohrCoulomb, Viscosity
+from conoid.cases.materials import JohnsonCook, LinearHardening, Material, MieGruneisen, MohrCoulomb
+from conoid.cases.schema import Viscosity
 
 from .. import state
 from ..state import Floats
