@@ -48,7 +48,7 @@ class Started(Message, frozen=True):
 class Energy(msgspec.Struct, kw_only=True, frozen=True):
     """The ledger, J: what is there and what was lost = initial + external, up to the residual.
 
-    There: kinetic, elastic. Lost: plastic, viscous, contact, friction, eroded.
+    There: kinetic, elastic, cohesive. Lost: plastic, viscous, contact, friction, eroded, fracture.
     """
 
     kinetic: float
@@ -60,6 +60,10 @@ class Energy(msgspec.Struct, kw_only=True, frozen=True):
     friction: float = 0.0
     eroded: float = 0.0
     """Elastic energy of tets that were taken out, and kinetic energy of nodes that left with them."""
+    fracture: float = 0.0
+    """By cohesive facets, for good."""
+    cohesive: float = 0.0
+    """What the closing of cohesive facets would give back."""
     external: float
     initial: float
     residual: float

@@ -12,7 +12,7 @@ from conoid.cases import schema
 
 from .errors import InputError
 from .parallel.comm import Comm
-from .state import Flags, Floats, Indices, Model, Nodes
+from .state import Flags, Floats, Indices, Ints, Model, Nodes, extended
 
 _AXES = {"x": 0, "y": 1, "z": 2}
 ON_PLANE = 1e-9
@@ -46,6 +46,24 @@ class Boundary:
     def apply(self, state: Nodes, dt: float, t: float) -> None:
         """Corrects v(n+1/2) at time ``t``, s; ``dt`` is the step ahead, s."""
         raise NotImplementedError
+
+    def grow(self, parents: Ints, first: int) -> None:
+        """Takes up copies of those of its nodes that are among ``parents``: local indices, the first copy is ``first``.
+
+        What has been booked, and the impulse of the last step, stay with the parent.
+        """
+        at = np.minimum(np.searchsorted(self.nodes, parents), max(len(self.nodes) - 1, 0))
+        held = self.nodes[at] == parents if len(self.nodes) else np.zeros(len(parents), bool)
+        self._inherit(at[held], (first + np.flatnonzero(held)).astype(np.int32))
+
+    def _inherit(self, at: Ints, copies: Indices) -> None:
+        """Takes up ``copies`` of the nodes at the places ``at``."""
+        none = np.zeros((len(at), 3))
+        self.nodes = extended(self.nodes, copies)
+        self.contact_loss = extended(self.contact_loss, none[:, 0])
+        self.external_work = extended(self.external_work, none[:, 0])
+        self._impulse = extended(self._impulse, none)
+        self._before = extended(self._before, self._before[at])
 
 
 class SymmetryPlane(Boundary):
@@ -83,6 +101,10 @@ class RigidWalls(Boundary):
             behind = (point - state.x[self.nodes[self._held[:, k]]]) @ normal
             depths[k] = behind.max(initial=-np.inf)
         return depths
+
+    def _inherit(self, at: Ints, copies: Indices) -> None:
+        super()._inherit(at, copies)
+        self._held = extended(self._held, self._held[at])
 
     def note(self, state: Nodes) -> None:
         self._before = state.v[self.nodes]
@@ -140,6 +162,10 @@ class PrescribedVelocity(Driver):
     def held(self) -> Flags:
         """(n, 3) which components are prescribed."""
         return ~np.isnan(self._velocity)
+
+    def _inherit(self, at: Ints, copies: Indices) -> None:
+        super()._inherit(at, copies)
+        self._velocity = np.concatenate([self._velocity, self._velocity[at]])
 
     def _target(self, state: Nodes, dt: float) -> Floats:
         free = state.v[self.nodes]

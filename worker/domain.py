@@ -50,7 +50,7 @@ class Whole:
     tet_part: Indices
     volumes: Floats
     across: Indices
-    """(tets, 4) the tet behind each face, -1 where there is none, in scenes with contact; else (0, 4)."""
+    """(tets, 4) see state.Block."""
     node_volume: Floats
     mass: Floats
     velocity: Floats
@@ -73,7 +73,7 @@ class Piece:
     tets: Indices
     tet_volume: Floats
     across: Indices
-    """(tets, 4) global id of the tet behind each face, -1 where there is none, in scenes with contact; else (0, 4)."""
+    """(tets, 4) see state.Block."""
     border: Flags
     neighbours: list[Neighbour]
     totals: tuple[int, int, int]
@@ -100,7 +100,7 @@ def assemble(case: schema.Case, folder: Path) -> Whole:
     part_of_tet = np.concatenate(tet_part)
     volumes = _volumes(x, t)
     part_of_node = np.concatenate(node_part)
-    behind = across(t) if case.in_contact else np.zeros((0, 4), np.int32)
+    behind = across(t) if case.in_contact or case.fractures else np.zeros((0, 4), np.int32)
     if case.in_contact:
         x = _apart(case, x, t, part_of_node, behind < 0)
         volumes = _volumes(x, t)

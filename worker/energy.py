@@ -14,6 +14,7 @@ from .boundaries import Boundary
 from .clock import Clock
 from .contact.stage import Contact
 from .erosion import Erosion
+from .fracture.stage import Fracture
 from .parallel.comm import Comm
 from .parallel.fixed_point import exact_sums
 from .state import WORK, WORK_PLASTIC, WORK_VISCOUS, Floats, Model
@@ -23,13 +24,14 @@ class Ledger:
     """Sums the accounts of all ranks; the first call sets the initial energy."""
 
     def __init__(
-        self, model: Model, boundaries: list[Boundary], contact: Contact | None, erosion: Erosion | None, comm: Comm,
-        clock: Clock,
+        self, model: Model, boundaries: list[Boundary], contact: Contact | None, erosion: Erosion | None,
+        fracture: Fracture | None, comm: Comm, clock: Clock,
     ) -> None:  # fmt: skip
         self._model = model
         self._boundaries = boundaries
         self._contact = contact
         self._erosion = erosion
+        self._fracture = fracture
         self._comm = comm
         self._clock = clock
         nodes = model.nodes
@@ -59,14 +61,17 @@ class Ledger:
         kinetic_sum, loss_sum, external_sum = (float(v) for v in node_sums[:3])
         eroded = gone_work - gone_plastic + gone_kinetic
         plastic_sum, viscous_sum = float(plastic) + gone_plastic, float(viscous) + gone_viscous
-        total = kinetic_sum + float(work - plastic) + plastic_sum + viscous_sum + loss_sum + eroded
+        lost, cohesive = 0.0, 0.0
+        if self._fracture is not None and self._fracture.cohesion is not None:
+            lost, cohesive = self._fracture.cohesion.energies(self._comm)
+        total = kinetic_sum + float(work - plastic) + plastic_sum + viscous_sum + loss_sum + eroded + lost + cohesive
         friction = self._contact.friction_work() if self._contact is not None else 0.0
         scale = max(self.initial, abs(external_sum), abs(float(work)), abs(kinetic_sum))
         residual = abs(total - self.initial - external_sum) / scale if scale > 0.0 else 0.0
         self.worst = max(self.worst, residual)
         return Energy(
             kinetic=kinetic_sum, elastic=float(work - plastic), plastic=plastic_sum, viscous=viscous_sum,
-            contact=loss_sum - friction, friction=friction, eroded=eroded, external=external_sum,
+            contact=loss_sum - friction, friction=friction, eroded=eroded, fracture=lost, cohesive=cohesive, external=external_sum,
             initial=self.initial, residual=residual,
         )  # fmt: skip
 

@@ -39,6 +39,7 @@ from .state import (
     Ints,
     Model,
     Nodes,
+    extended,
 )
 
 GATHERED = 10
@@ -112,6 +113,11 @@ class Erosion(Boundary):
             if spec is not None:
                 block.life[FREQUENCY] = limit / spec.time_step
 
+    def grow(self, parents: Ints, first: int) -> None:
+        self.removed = extended(self.removed, self.removed[parents])
+        self._leaves = extended(self._leaves, self._leaves[parents])
+        self._tets_at = extended(self._tets_at, np.ones(len(parents), np.int64))
+
     def decide(self, found: int) -> None:
         """``found`` of all ranks (elements/wear.py): whether there is something to remove now."""
         self.due = found == BROKEN or (found > SOUND and self._clock.step % GATHERED == 0)
@@ -173,13 +179,13 @@ class Erosion(Boundary):
             self._contact.uncover(self._lay_bare(np.concatenate(gone)), alone & ~self.removed, self.removed)
 
     def _lay_bare(self, gone: Ints) -> Ints:
-        """Marks the faces behind tets ``gone`` (k, 5: id, ids across) as exposed; ids of these and the neighbours'."""
+        """Exposes the faces behind tets ``gone`` (k, 5: id, faces across); ids of these and the neighbours'."""
         told = self._comm.swap({other.rank: gone for other in self._neighbours})
         every = np.concatenate([gone, *(words.reshape(-1, 5) for words in told.values())])
         for block in self._model.blocks:
-            beside = np.flatnonzero(np.isin(block.id, every[:, 1:]))
+            beside = np.flatnonzero(np.isin(block.id, every[:, 1:] // 4))
             rows = block.across[beside]
-            rows[np.isin(rows, every[:, 0])] = -1
+            rows[np.isin(rows // 4, every[:, 0])] = -1
             block.across[beside] = rows
         return every[:, 0]
 

@@ -16,6 +16,7 @@ from .contact.stage import Contact
 from .elements.forms import AveragedElements, Elements
 from .energy import Ledger
 from .erosion import Erosion, Mirrors
+from .fracture.stage import Fracture
 from .materials.models import BULK, DENSITY, SHEAR, moduli
 from .parallel import fixed_point
 from .parallel.comm import Comm
@@ -31,10 +32,10 @@ _SMALLEST_STRAIN = 1e-12
 class Vote:
     """What the ranks agree on in a step: a maximum over int64 words. Bits of non-negative floats order like floats."""
 
-    words: Ints = field(default_factory=lambda: np.zeros(6, np.int64))
+    words: Ints = field(default_factory=lambda: np.zeros(7, np.int64))
     """0: one over the stable step; 1: largest force (both as bits); 2: reason to stop; 3: rank 0 wants a report; 4: a
-    search for contact is due; 5: tets are worn out."""
-    result: Ints = field(default_factory=lambda: np.zeros(6, np.int64))
+    search for contact is due; 5: tets are worn out; 6: faces may break."""
+    result: Ints = field(default_factory=lambda: np.zeros(7, np.int64))
 
     @property
     def limit(self) -> float:
@@ -62,6 +63,11 @@ class Vote:
         return bool(self.result[4])
 
     @property
+    def hot(self) -> bool:
+        """Whether some tet's face has passed the strength by the tet's own stress."""
+        return bool(self.result[6])
+
+    @property
     def worn(self) -> int:
         """What was found of worn-out tets (elements/wear.py)."""
         return int(self.result[5])
@@ -79,6 +85,7 @@ class Simulation:
     """In the order in which they act; erosion and contact are among them."""
     contact: Contact | None
     erosion: Erosion | None
+    fracture: Fracture | None
     clock: Clock
     ledger: Ledger
     probes: Probes
@@ -122,6 +129,8 @@ class Simulation:
     def free(self) -> None:
         """Gives all standing messages back to MPI."""
         self.elements.free()
+        if self.fracture is not None:
+            self.fracture.free()
         if self.contact is not None:
             self.contact.free()
 
@@ -149,10 +158,14 @@ def build(case: Case, folder: Path, comm: Comm) -> Simulation:
     scene[walls:walls] = [bound for bound in (erosion, contact) if bound is not None]
     probes = Probes(case, model, contact, clock, comm)
     elements = _elements(case, model, piece, comm, timers)
+    fracture = None
+    if case.fractures:
+        fracture = Fracture(case, model, piece.neighbours, elements, scene, contact, comm, clock)
     floor = _force_floor(model, comm)
     return Simulation(
         case=case, comm=comm, model=model, elements=elements, boundaries=scene, contact=contact, erosion=erosion,
-        clock=clock, ledger=Ledger(model, scene, contact, erosion, comm, clock), probes=probes, timers=timers,
+        fracture=fracture, clock=clock, ledger=Ledger(model, scene, contact, erosion, fracture, comm, clock),
+        probes=probes, timers=timers,
         shared_nodes=piece.totals[2], floor=floor,
     )  # fmt: skip
 

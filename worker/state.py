@@ -14,6 +14,7 @@ Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Indices = npt.NDArray[np.int32]
 Flags = npt.NDArray[np.bool_]
+Bits = npt.NDArray[np.uint8]
 Tets = npt.NDArray[np.uint32]
 """Unsigned: an index that cannot be negative needs no test for counting from the end."""
 
@@ -49,6 +50,22 @@ TEMPERATURE = 17
 """K."""
 
 
+INTACT, PINNED, OPEN = range(3)
+"""Bond of a face to the one behind it: whole; broken, with all three nodes still in common; broken and exposed."""
+
+
+def extended(array: "np.ndarray", rows: "np.ndarray") -> "np.ndarray":
+    """``array`` with ``rows`` behind it: in the room that its buffer has left, or in a new one half as large again."""
+    n, m = len(array), len(array) + len(rows)
+    room = array.base
+    fits = isinstance(room, np.ndarray) and room.shape[1:] == array.shape[1:] and room.dtype == array.dtype
+    if room is None or not fits or room.ctypes.data != array.ctypes.data or len(room) < m:
+        room = np.empty((m + m // 2, *array.shape[1:]), array.dtype)
+        room[:n] = array
+    room[n:m] = rows
+    return room[:m]
+
+
 @dataclass
 class Nodes:
     """Nodal arrays of one rank; ``n`` nodes, in the order of their global ids."""
@@ -79,6 +96,37 @@ class Nodes:
         """Number of nodes on this rank."""
         return len(self.id)
 
+    def grow(self, copies: "Copies") -> None:
+        """Takes up copies of nodes: they begin as their parents are, whose mass is their own less the copies'."""
+        for name in ("part", "x0", "x", "v"):
+            values = getattr(self, name)
+            setattr(self, name, extended(values, values[copies.parents]))
+        self.id, self.mass = extended(self.id, copies.id), extended(self.mass, copies.mass)
+        self.owner, self.owned = extended(self.owner, copies.owner), extended(self.owned, copies.owned)
+        self.force = extended(self.force, np.zeros((len(copies.id), 3), np.int64))
+        np.subtract.at(self.mass, copies.parents, copies.mass)
+
+
+@dataclass
+class Copies:
+    """Nodes that come into being when others separate; by ascending global id, behind all that a rank has."""
+
+    parents: Ints
+    """(n,) local nodes that they have been part of."""
+    id: Ints
+    """(n,) global ids."""
+    owner: Indices
+    """(n,) rank that counts the node."""
+    owned: Flags
+    """(n,) True where that is this rank."""
+    mass: Floats
+    """(n,) kg."""
+
+    @property
+    def n(self) -> int:
+        """Number of copies."""
+        return len(self.id)
+
 
 @dataclass
 class Block:
@@ -102,7 +150,16 @@ class Block:
     temperature: float = 293.15
     """Initial temperature, K; it stays where no material of the block heats up."""
     across: Indices = field(default_factory=lambda: np.zeros((0, 4), np.int32))
-    """(n, 4) global id of the tet behind each face, -1 for an exposed face; (0, 4) in scenes without contact."""
+    """(n, 4) what was behind each face at the start, 4 * global tet id + local face, -1 for an exposed face; (0, 4) in
+    scenes without contact and fracture."""
+    bond: Bits = field(default_factory=lambda: np.zeros((0, 4), np.uint8))
+    """(n, 4) INTACT, PINNED or OPEN; (0, 4) where the part does not fracture."""
+    weakest: Floats = field(default_factory=lambda: np.zeros(0))
+    """(n,) smallest strength of the faces of each tet, Pa; (0,) where the part does not fracture."""
+    hot: Bits = field(default_factory=lambda: np.zeros(0, np.uint8))
+    """(n,) bit k: the tet's own traction on its face k is beyond ``weakest``."""
+    shear_weight: float = 0.0
+    """Of shear against normal traction."""
     worn: Flags = field(default_factory=lambda: np.zeros(0, bool))
     """(n,) tets that are about to leave; (0,) where the part does not erode."""
     life: Floats = field(default_factory=lambda: np.zeros(4))
@@ -120,6 +177,11 @@ class Block:
     def has(self, row: int) -> bool:
         """Whether the block carries that row."""
         return row < int(self.state.shape[1])
+
+    def exposed(self) -> Flags:
+        """(n, 4) which faces are part of the surface."""
+        bare: Flags = self.across < 0
+        return bare | (self.bond == OPEN) if len(self.bond) else bare
 
     def drop(self, gone: Ints) -> None:
         """Takes the tets at these places out; the last ones move into the holes."""

@@ -13,6 +13,7 @@ and at once f(n+1) from it, so a step begins with forces that are already at han
  6  velocity gradient at x(n+1/2), stress, pressure        stress(n) -> stress(n+1)
  7  internal forces, limits of the next step               f(n+1)
  8  complete shared nodes and the vote                     the exchange of the step
+ 9  facets that pass break, nodes separate                 topology(n+1), f(n+1)
 ==  =====================================================  ==========================
 
 6 and 7 are one pass over each chunk of tets (two with an averaged pressure, with the exchange of the nodal volumes
@@ -51,7 +52,7 @@ def first_half(sim: Simulation) -> None:
 
 
 def second_half(sim: Simulation) -> None:
-    """5 to 8: from v(n+1/2) to f(n+1)."""
+    """5 to 9: from v(n+1/2) to f(n+1)."""
     nodes, clock = sim.model.nodes, sim.clock
     with sim.timers.phase("nodes"):
         move(nodes.x, nodes.v, clock.dt)  # 5: x(n+1) = x(n) + dt v(n+1/2)
@@ -59,6 +60,9 @@ def second_half(sim: Simulation) -> None:
         if sim.contact is not None:
             sim.vote.words[4] = sim.contact.spent(nodes)
     _elements(sim, clock.dt)  # 6 to 8
+    if sim.fracture is not None and sim.vote.hot:
+        with sim.timers.phase("fracture"):
+            sim.fracture.advance()  # 9: facets break, nodes separate, f(n+1) goes with them
 
 
 def _elements(sim: Simulation, dt: float) -> None:
@@ -68,7 +72,7 @@ def _elements(sim: Simulation, dt: float) -> None:
     with sim.timers.phase("elements"):
         elements.advance(dt, sim.scale)
     with sim.timers.phase("exchange"):
-        vote.words[0], vote.words[1], vote.words[5] = elements.peaks[0], elements.peaks[2], elements.peaks[3]
+        vote.words[0], vote.words[1], vote.words[5:7] = elements.peaks[0], elements.peaks[2], elements.peaks[3:5]
         pending = sim.comm.begin_maximum(vote.words, vote.result)
         elements.finish()
         pending.finish()

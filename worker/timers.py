@@ -7,7 +7,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-PHASES = ("elements", "exchange", "nodes", "contact", "output")
+PHASES = ("elements", "exchange", "nodes", "contact", "fracture", "output")
 
 
 class Timers:

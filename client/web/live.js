@@ -2,7 +2,7 @@
 
 export const FINAL = new Set(["succeeded", "failed", "cancelled", "timed_out", "lost"]);
 export const PHASES = ["compute", "contact", "exchange", "output", "wait"];
-export const TERMS = [["kinetic", "kinetic"], ["elastic", "elastic"], ["plastic", "plastic"], ["viscous", "viscous"], ["contact", "contact-work"], ["friction", "friction"], ["eroded", "eroded"]];
+export const TERMS = [["kinetic", "kinetic"], ["elastic", "elastic"], ["plastic", "plastic"], ["viscous", "viscous"], ["contact", "contact-work"], ["friction", "friction"], ["eroded", "eroded"], ["fracture", "fracture"], ["cohesive", "cohesive"]];
 
 const MOST_POINTS = 1200;
 const MOST_LINES = 500;

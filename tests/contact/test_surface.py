@@ -67,7 +67,9 @@ def test_the_tet_across_a_face_is_the_other_one_with_its_three_nodes(seed: int) 
         for face in range(4):
             three = set(nodes[FACES[face]].tolist())
             others = [i for i, four in enumerate(mesh.tets) if i != tet and three <= set(four.tolist())]
-            assert behind[tet, face] == (others[0] if others else -1)
+            assert behind[tet, face] // 4 == (others[0] if others else -1)
+            if others:
+                assert set(mesh.tets[others[0]][FACES[behind[tet, face] % 4]].tolist()) == three
 
 
 def test_parts_that_touch_but_share_no_node_are_exposed_to_each_other() -> None:

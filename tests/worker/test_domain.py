@@ -133,14 +133,14 @@ def test_shared_sums_are_those_of_one_rank(ranks: int) -> None:
     for rank, piece in enumerate(pieces):
         own = np.zeros((len(piece.node_ids), 3), np.int64)
         sums.append(own)
-        shared.append(SharedSum(box.of(rank), piece.neighbours, own, 1))
+        shared.append(SharedSum(box.of(rank), piece.neighbours, 3, 1))
     for _ in range(2):
         for piece, own, exchange in zip(pieces, sums, shared, strict=True):
             own[:] = 0
             np.add.at(own, piece.tets, words[piece.tet_ids])
-            exchange.begin()
-        for exchange in shared:
-            exchange.finish()
+            exchange.begin(own)
+        for own, exchange in zip(sums, shared, strict=True):
+            exchange.finish(own)
         for piece, own in zip(pieces, sums, strict=True):
             assert (own == total[piece.node_ids]).all()
     assert not box.letters

@@ -30,16 +30,16 @@ class Flight:
         self, found: Surface, nodes: Nodes, mobility: Floats, skin: float, neighbours: list[Neighbour], comm: Comm
     ) -> None:
         """``mobility`` (nodes, 3): see records.Crowd; ``skin``: of the typical size of a face."""
-        self._mobility, self._neighbours, self._comm = mobility, neighbours, comm
+        self._neighbours, self._comm = neighbours, comm
         self.size = _typical(found.faces.size, comm)
         """Of the faces of all ranks at the start, m."""
         self._skin = skin * self.size
-        self.follow(found, nodes)
+        self.follow(found, nodes, mobility)
         self._x, self._v, self._t, self._until = nodes.x, nodes.v, 0.0, 0.0
 
-    def follow(self, found: Surface, nodes: Nodes) -> None:
+    def follow(self, found: Surface, nodes: Nodes, mobility: Floats) -> None:
         """Takes a new surface; all ranks take part."""
-        self._found = found
+        self._found, self._mobility = found, mobility
         self._face_nodes = np.searchsorted(nodes.id, found.faces.nodes[:, :3]).astype(np.int32).reshape(-1, 3)
         self.sides = self._whole(nodes)
         """What this rank has of the surface."""

@@ -233,6 +233,6 @@ def _compact(
         room=Meetings.room(room), diagonal=np.empty((room, 2)), push=np.empty((room, 4)),
         copies=ghosts.copies(crowd, nodes, comm, _COPY_TAG), shares=shares, impulse=impulse,
         total=np.zeros((crowd.n, 3), np.int64), normals=np.zeros((crowd.n, 9)), before=np.zeros((crowd.n, 3)),
-        shared_shares=SharedSum(comm, company, shares, _SHARE_TAG),
-        shared_impulse=SharedSum(comm, company, impulse, _PUSH_TAG),
+        shared_shares=SharedSum(comm, company, 4, _SHARE_TAG),
+        shared_impulse=SharedSum(comm, company, 3, _PUSH_TAG),
     )  # fmt: skip

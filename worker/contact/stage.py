@@ -18,7 +18,7 @@ from ..errors import InputError
 from ..parallel import fixed_point
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
-from ..state import Flags, Floats, Ints, Model, Nodes
+from ..state import Flags, Floats, Indices, Ints, Model, Nodes, extended
 from ..timers import Timers
 from . import meetings, pairing, scene, surface, sweeps
 from .flight import Flight
@@ -44,11 +44,12 @@ class Contact(Boundary):
         self._sweeps = case.contact.sweeps
         self._model, self._neighbours, self._comm = model, neighbours, comm
         self._clock, self._timers = clock, timers
-        mobility, self._planes = _mobility(model.nodes, bounds)
-        self._surface = surface.build(model, self._planes, neighbours, comm, case.contact.edges)
+        self._mobility, self._planes = _mobility(model.nodes, bounds)
+        self._edges = case.contact.edges
+        self._surface = surface.build(model, self._planes, neighbours, comm, self._edges)
         self._mu = pairing.friction(case)
         _require_faces(self._surface, model, ~np.isnan(self._mu), comm)
-        self._flight = Flight(self._surface, model.nodes, mobility, case.contact.skin, neighbours, comm)
+        self._flight = Flight(self._surface, model.nodes, self._mobility, case.contact.skin, neighbours, comm)
         self._rules = Rules(case.contact.domain, ~np.isnan(self._mu), 2.0 * self._flight.size)
         largest, fastest = extremes
         self._scale = fixed_point.scale_for(largest * fastest)
@@ -84,6 +85,22 @@ class Contact(Boundary):
             )
             self.due = self._changed = True
 
+    def separate(self) -> None:
+        """The surface after nodes have separated. All ranks take part."""
+        with self._timers.phase("contact"):
+            old = self._surface.flags
+            self._surface = surface.build(self._model, self._planes, self._neighbours, self._comm, self._edges)
+            self._surface.flags[: len(old)] |= old
+            self.due = self._changed = True
+
+    def _inherit(self, at: Ints, copies: Indices) -> None:
+        super()._inherit(at, copies)
+        self._mobility = extended(self._mobility, self._mobility[at])
+        self._planes = extended(self._planes, self._planes[at])
+        for some in (at, copies):
+            free = self._mobility[some] > 0.0
+            self._mobility[some] = np.where(free, 1.0 / self._model.nodes.mass[some, None], 0.0)
+
     def note(self, state: Nodes) -> None:
         with self._timers.phase("contact"):
             if self._scene is not None:
@@ -113,7 +130,7 @@ class Contact(Boundary):
         if old is not None:
             old.free()
         if self._changed:
-            flight.follow(self._surface, state)
+            flight.follow(self._surface, state, self._mobility)
             self._changed = False
         else:
             flight.refresh(state)
@@ -171,8 +188,8 @@ class Contact(Boundary):
 
     def _give(self, now: Scene) -> None:
         """Completes the impulses of a sweep and turns them into velocities."""
-        now.shared_impulse.begin()
-        now.shared_impulse.finish()
+        now.shared_impulse.begin(now.impulse)
+        now.shared_impulse.finish(now.impulse)
         sweeps.give(now.crowd.v, now.total, now.impulse, now.crowd.mobility, self._scale)
 
     def _meet(self, now: Scene, dt: float) -> int:
@@ -186,8 +203,8 @@ class Contact(Boundary):
         room = now.room
         now.shares[:] = 0
         sweeps.add_shares(now.shares, room.nodes, room.weights, room.normals, n)
-        now.shared_shares.begin()
-        now.shared_shares.finish()
+        now.shared_shares.begin(now.shares)
+        now.shared_shares.finish(now.shares)
         sweeps.mobilities(now.diagonal, room.nodes, room.weights, room.normals, now.shares, now.crowd.mobility, n)
 
     def _book(self, now: Scene) -> None:

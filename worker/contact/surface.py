@@ -71,7 +71,7 @@ def _faces(model: Model, planes: Flags) -> tuple["np.ndarray", Ints]:
     """(f, 4) local nodes of the exposed faces, the opposite one last, and their ids."""
     rows, ids = [np.zeros((0, 4), np.int64)], [np.zeros(0, np.int64)]
     for block in model.blocks:
-        tet, face = np.nonzero(block.across < 0)
+        tet, face = np.nonzero(block.exposed())
         corners = block.tets.astype(np.int64)[tet]
         around = corners[np.arange(len(tet))[:, None], FACES[face]]
         rows.append(np.column_stack([around, corners[np.arange(len(tet)), face]]))

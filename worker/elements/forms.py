@@ -4,16 +4,27 @@ Border chunks come first: they hold every tet of a shared node, so the exchange 
 """
 
 from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum
-from ..state import CHUNK, Block, Floats, Ints, Model
+from ..state import CHUNK, Block, Copies, Floats, Ints, Model, extended
 from ..timers import Timers
 from . import pressure, sweep, tet4
 
 _FORCE_TAG, _VOLUME_TAG = 1, 2
+
+
+class Bridges(Protocol):
+    """Forces between nodes besides those of tets."""
+
+    def open(self, x: Floats) -> None:
+        """Takes the positions of the end of the step."""
+
+    def scatter(self, force: Ints, scale: float) -> int:
+        """Adds the forces in quanta of 1 / ``scale`` N; returns the bits of the largest."""
 
 
 class Elements:
@@ -24,12 +35,15 @@ class Elements:
     def __init__(self, model: Model, comm: Comm, neighbours: list[Neighbour], timers: Timers) -> None:
         self.model = model
         self._timers = timers
-        self.peaks: Ints = np.zeros(4, np.int64)
+        self.peaks: Ints = np.zeros(5, np.int64)
         """See elements/sweep.py."""
         self._w = _aligned(tet4.SCRATCH)
         self._wi = np.zeros(9 * CHUNK, np.int64)
         self._bits = self._w.view(np.int64)
-        self.shared_forces = SharedSum(comm, neighbours, model.nodes.force, _FORCE_TAG)
+        self._comm, self._neighbours = comm, neighbours
+        self._connect()
+        self.cohesion: Bridges | None = None
+        """What pulls besides the tets."""
         self.pressure = np.zeros(1)
         """(nodes,) nodal pressure, Pa; kept by the ``split`` form only."""
 
@@ -41,20 +55,51 @@ class Elements:
     def advance(self, dt: float, scale: float) -> None:
         """Stress and forces at n+1; the completion of the shared forces is under way when it returns."""
         self.peaks[:] = 0
-        self.model.nodes.force[:] = 0
-        self._both_regions(lambda block, begin, end: self._standard(block, begin, end, dt, scale), self.shared_forces)
+        self._begin(scale)
+        self._both_regions(lambda block, begin, end: self._standard(block, begin, end, dt, scale), self._send)
 
     def again(self, scale: float) -> None:
         """The forces of the present stress in a coarser quantum."""
         limit = self.peaks[:2].copy()
         self.peaks[2] = 0
-        self.model.nodes.force[:] = 0
-        self._both_regions(lambda block, begin, end: self._again(block, begin, end, scale), self.shared_forces)
+        self._begin(scale, again=True)
+        self._both_regions(lambda block, begin, end: self._again(block, begin, end, scale), self._send)
         self.peaks[:2] = limit
+
+    def _begin(self, scale: float, again: bool = False) -> None:
+        """Forces other than those of tets."""
+        nodes = self.model.nodes
+        nodes.force[:] = 0
+        if self.cohesion is not None:
+            if not again:
+                self.cohesion.open(nodes.x)
+            self.peaks[2] = max(int(self.peaks[2]), self.cohesion.scatter(nodes.force, scale))
+
+    def forces_of(self, block: Block, places: Ints, scale: float) -> Ints:
+        """(k, 4, 3) forces of the present stress of some tets on their nodes, in quanta of 1 / ``scale`` N."""
+        forces = np.empty((len(places), 4, 3), np.int64)
+        state = np.zeros((block.state.shape[1], CHUNK))
+        for start in range(0, len(places), CHUNK):
+            chosen = places[start : start + CHUNK]
+            n = len(chosen)
+            state[:, :n] = block.state[chosen // CHUNK, :, chosen % CHUNK].T
+            tets, flat = np.ascontiguousarray(block.tets[chosen]), state.reshape(-1)
+            tet4.gather(self._w[tet4.EDGE :], self.model.nodes.x, tets, n)
+            tet4.end_gradients(self._w, n)
+            tet4.internal_forces(self._wi, self._w, flat, n, scale)
+            forces[start : start + n, 1:] = self._wi.reshape(3, 3, CHUNK)[:, :, :n].transpose(2, 0, 1)
+        forces[:, 0] = -forces[:, 1:].sum(axis=1)
+        return forces
+
+    def grow(self, copies: Copies) -> None:
+        """Takes up copies of nodes; they are shared already."""
+        if self._neighbours:
+            self.free()
+            self._connect()
 
     def finish(self) -> None:
         """Returns when the forces of shared nodes are complete."""
-        self.shared_forces.finish()
+        self.shared_forces.finish(self.model.nodes.force)
 
     def free(self) -> None:
         """Gives the messages of the exchanges back to MPI."""
@@ -64,10 +109,16 @@ class Elements:
     def _exchanges(self) -> list[SharedSum]:
         return [self.shared_forces]
 
-    def _both_regions(self, work: Callable[[Block, int, int], None], shared: SharedSum) -> None:
+    def _connect(self) -> None:
+        self.shared_forces = SharedSum(self._comm, self._neighbours, 3, _FORCE_TAG)
+
+    def _send(self) -> None:
+        self.shared_forces.begin(self.model.nodes.force)
+
+    def _both_regions(self, work: Callable[[Block, int, int], None], send: Callable[[], None]) -> None:
         for block in self.model.blocks:
             work(block, 0, block.border_chunks)
-        shared.begin()
+        send()
         for block in self.model.blocks:
             work(block, block.border_chunks, block.chunks)
 
@@ -75,8 +126,8 @@ class Elements:
         nodes = self.model.nodes
         sweep.standard_pass(
             nodes.x, nodes.v, nodes.force, block.tets, block.state.reshape(-1), block.params, self._w, self._wi,
-            self._bits, self.peaks, block.id, block.worn, block.life, block.kind, block.eos, block.state.shape[1],
-            begin, end, dt, scale,
+            self._bits, self.peaks, block.id, block.worn, block.life, block.hot, block.weakest, block.shear_weight,
+            block.kind, block.eos, block.state.shape[1], begin, end, dt, scale,
         )  # fmt: skip
 
     def _again(self, block: Block, begin: int, end: int, scale: float) -> None:
@@ -112,13 +163,23 @@ class AveragedElements(Elements):
         self._weight = weight
         self._bulk = bulk
         self._volumes = np.zeros((n, 2), np.int64)
-        self.shared_volumes = SharedSum(comm, neighbours, self._volumes, _VOLUME_TAG)
         self._strain = np.zeros(n)
         self._projected = np.zeros((n if split else 1, 3))
         self.pressure = np.zeros(n if split else 1)
         self._scale = 1.0
-        if split:
-            self.shared_gradients = SharedSum(comm, neighbours, self._gradient, _FORCE_TAG + 2)
+
+    def _connect(self) -> None:
+        super()._connect()
+        self.shared_volumes = SharedSum(self._comm, self._neighbours, 2, _VOLUME_TAG)
+        if self.split:
+            self.shared_gradients = SharedSum(self._comm, self._neighbours, 3, _FORCE_TAG + 2)
+
+    def grow(self, copies: Copies) -> None:
+        super().grow(copies)
+        parents = copies.parents
+        for name in ("_weight", "_bulk", "_volumes", *(("_gradient", "_projected", "pressure") if self.split else ())):
+            values = getattr(self, name)
+            setattr(self, name, extended(values, values[parents]))
 
     def _exchanges(self) -> list[SharedSum]:
         return [self.shared_forces, self.shared_volumes, *([self.shared_gradients] if self.split else [])]
@@ -127,16 +188,17 @@ class AveragedElements(Elements):
         nodes = self.model.nodes
         self.peaks[:] = 0
         self._volumes[:] = 0
-        self._both_regions(lambda block, begin, end: self._strains(block, begin, end, dt), self.shared_volumes)
+        send = self.shared_volumes.begin
+        self._both_regions(lambda block, begin, end: self._strains(block, begin, end, dt), lambda: send(self._volumes))
         with self._timers.phase("exchange"):
-            self.shared_volumes.finish()
+            self.shared_volumes.finish(self._volumes)
         self._strain = pressure.nodal_strains(self._volumes)
         if self.split:
             self.pressure -= self._bulk * self._strain
-        nodes.force[:] = 0
+        self._begin(scale)
         self._gradient[:] = 0
         self._scale = scale
-        self._both_regions(lambda block, begin, end: self._forces(block, begin, end, dt, scale), self.shared_forces)
+        self._both_regions(lambda block, begin, end: self._forces(block, begin, end, dt, scale), self._send)
 
     def again(self, scale: float) -> None:
         self._gradient[:] = 0
@@ -146,8 +208,8 @@ class AveragedElements(Elements):
     def finish(self) -> None:
         super().finish()
         if self.split:
-            self.shared_gradients.begin()
-            self.shared_gradients.finish()
+            self.shared_gradients.begin(self._gradient)
+            self.shared_gradients.finish(self._gradient)
             volumes = np.maximum(self._volumes[:, 1], 1) / (self._weight * pressure.QUANTA)
             self._projected = self._gradient / (self._scale * volumes[:, None])
 
@@ -166,5 +228,6 @@ class AveragedElements(Elements):
         sweep.force_pass(
             nodes.x, nodes.v, self._strain, nodes.force, self.pressure, self._gradient, self.split, block.tets,
             block.state.reshape(-1), block.params, self._w, self._wi, self._bits, self.peaks, block.id, block.worn,
-            block.life, block.kind, block.eos, block.state.shape[1], begin, end, dt, scale,
+            block.life, block.hot, block.weakest, block.shear_weight, block.kind, block.eos, block.state.shape[1],
+            begin, end, dt, scale,
         )  # fmt: skip

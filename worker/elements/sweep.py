@@ -7,7 +7,8 @@ the pressure, the plastic return comes after the equation of state, and with it,
 stress: then the second pass makes the velocity gradient again.
 
 ``peaks`` collects, as bits of float64: 0 the largest one-over-stable-step, 2 the largest force; 1 is the smallest
-global id of the tets that set the first, 3 whether tets are worn out (wear.py).
+global id of the tets that set the first, 3 whether tets are worn out (wear.py), 4 whether faces are hot
+(fracture/criterion.py).
 """
 
 from numba import njit
@@ -22,6 +23,7 @@ from ..materials.viscosity import bulk_viscosity
 from ..state import CHUNK
 from . import pressure as averaged
 from . import tet4
+from .hot import mark_hot
 from .wear import mark_worn
 
 _LIMIT = tet4.LIMIT
@@ -99,12 +101,34 @@ def sum_forces(force, pressure, gradient, split, t, s, w, wi, bits, peaks, ids, 
 
 @njit(
     f"void({_F2}, {_F2}, {_I2}, {_T2}, {_F1}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, {_I1}, {_B1}, {_F1}, "
-    "int64, int64, int64, int64, int64, float64, float64)",
+    f"uint8[::1], {_F1}, float64, int64, int64, int64, int64, int64, float64, float64)",
     cache=True,
     error_model="numpy",
 )
 def standard_pass(  # type: ignore[no-untyped-def]
-    x, v, force, tets, state, params, w, wi, bits, peaks, ids, worn, life, strength, eos, rows, begin, end, dt, scale
+    x,
+    v,
+    force,
+    tets,
+    state,
+    params,
+    w,
+    wi,
+    bits,
+    peaks,
+    ids,
+    worn,
+    life,
+    hot,
+    weakest,
+    shear,
+    strength,
+    eos,
+    rows,
+    begin,
+    end,
+    dt,
+    scale,
 ):
     """Stress and forces at n+1 of chunks ``begin`` to ``end``, each tet with its own pressure."""
     for c in range(begin, end):
@@ -121,6 +145,9 @@ def standard_pass(  # type: ignore[no-untyped-def]
         return_at_pressure(strength, w, s, params, n, dt)
         if len(worn) > 0:
             peaks[3] = max(peaks[3], mark_worn(worn[c * CHUNK : c * CHUNK + n], w, s, params, life, rows, n))
+        if len(hot) > 0:
+            at = c * CHUNK
+            peaks[4] |= mark_hot(hot[at : at + n], w, s, weakest[at : at + n], shear, n)
         largest = tet4.internal_forces(wi, w, s, n, scale)
         tet4.scatter_forces(force, wi, t, n)
         note_peaks(peaks, bits, ids[c * CHUNK : c * CHUNK + n], n, largest)
@@ -155,7 +182,7 @@ def strain_pass(x, v, sums, weight, pressure, projected, split, tets, state, par
 
 @njit(
     f"void({_F2}, {_F2}, {_F1}, {_I2}, {_F1}, {_I2}, boolean, {_T2}, {_F1}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, {_I1}, "
-    f"{_B1}, {_F1}, int64, int64, int64, int64, int64, float64, float64)",
+    f"{_B1}, {_F1}, uint8[::1], {_F1}, float64, int64, int64, int64, int64, int64, float64, float64)",
     cache=True,
     error_model="numpy",
 )
@@ -177,6 +204,9 @@ def force_pass(  # type: ignore[no-untyped-def]
     ids,
     worn,
     life,
+    hot,
+    weakest,
+    shear,
     strength,
     eos,
     rows,
@@ -202,6 +232,9 @@ def force_pass(  # type: ignore[no-untyped-def]
         return_at_pressure(strength, w, s, params, n, dt)
         if len(worn) > 0:
             peaks[3] = max(peaks[3], mark_worn(worn[c * CHUNK : c * CHUNK + n], w, s, params, life, rows, n))
+        if len(hot) > 0:
+            at = c * CHUNK
+            peaks[4] |= mark_hot(hot[at : at + n], w, s, weakest[at : at + n], shear, n)
         sum_forces(force, pressure, gradient, split, t, s, w, wi, bits, peaks, ids[c * CHUNK : c * CHUNK + n], n, scale)
 
 

@@ -23,7 +23,7 @@ def face_counts(tets: Ints) -> NDArray[np.int64]:
 
 
 def across(tets: Ints) -> Ints:
-    """(n, 4) the tet on the other side of each face, -1 where there is none."""
+    """(n, 4) what lies behind each face: 4 * tet + local face of its other side, -1 where there is none."""
     group, size = _groups(tets[:, FACES].reshape(-1, 3))
     order = np.argsort(group, kind="stable")
     first = order[np.concatenate([[0], np.cumsum(size)[:-1]])]
@@ -31,7 +31,7 @@ def across(tets: Ints) -> Ints:
     partner = np.full(len(group), -1, np.int32)
     one = first[inner]
     other = order[np.cumsum(size)[inner] - 1]
-    partner[one], partner[other] = other // 4, one // 4
+    partner[one], partner[other] = other, one
     return partner.reshape(-1, 4)
 
 

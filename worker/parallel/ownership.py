@@ -13,9 +13,9 @@ from ..state import Indices, Ints
 from .comm import Comm
 
 
-@dataclass(frozen=True)
+@dataclass
 class Neighbour:
-    """Another rank, and the local nodes shared with it in the order of their global ids."""
+    """Another rank, and the local nodes shared with it in the order of their global ids; they grow with copies."""
 
     rank: int
     nodes: Indices
@@ -37,19 +37,18 @@ def _add(sums, nodes, buffer):  # type: ignore[no-untyped-def]
 
 def complete(comm: Comm, neighbours: list[Neighbour], sums: Ints, tag: int) -> None:
     """Completes nodal sums (nodes, columns) once; all ranks take part."""
-    shared = SharedSum(comm, neighbours, sums, tag)
-    shared.begin()
-    shared.finish()
+    shared = SharedSum(comm, neighbours, sums.shape[1], tag)
+    shared.begin(sums)
+    shared.finish(sums)
     shared.free()
 
 
 class SharedSum:
-    """Completes one array of nodal sums, (nodes, columns) int64, again and again."""
+    """Completes nodal sums, (nodes, ``columns``) int64, again and again."""
 
-    def __init__(self, comm: Comm, neighbours: list[Neighbour], sums: Ints, tag: int) -> None:
-        self._sums = sums
+    def __init__(self, comm: Comm, neighbours: list[Neighbour], columns: int, tag: int) -> None:
         self._nodes = [n.nodes for n in neighbours]
-        self._out = [np.zeros((len(n.nodes), sums.shape[1]), np.int64) for n in neighbours]
+        self._out = [np.zeros((len(n.nodes), columns), np.int64) for n in neighbours]
         self._in = [np.zeros_like(buffer) for buffer in self._out]
         ranks = [n.rank for n in neighbours]
         self._exchange = comm.exchange(
@@ -61,17 +60,17 @@ class SharedSum:
         """Bytes this rank sends in one exchange."""
         return sum(buffer.nbytes for buffer in self._out)
 
-    def begin(self) -> None:
+    def begin(self, sums: Ints) -> None:
         """Sends the local sums of the shared nodes; the tets of shared nodes must all have been summed."""
         for buffer, nodes in zip(self._out, self._nodes, strict=True):
-            _pack(buffer, nodes, self._sums)
+            _pack(buffer, nodes, sums)
         self._exchange.begin()
 
-    def finish(self) -> None:
+    def finish(self, sums: Ints) -> None:
         """Adds what the neighbours sent: the sums of the shared nodes are complete."""
         self._exchange.finish()
         for buffer, nodes in zip(self._in, self._nodes, strict=True):
-            _add(self._sums, nodes, buffer)
+            _add(sums, nodes, buffer)
 
     def free(self) -> None:
         """Gives the messages back to MPI."""

@@ -1,0 +1,45 @@
+"""Which faces a tet would break by its own stress: the cheap test before the criterion (fracture/criterion.py)."""
+
+from numba import njit
+
+from ..state import CHUNK, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ
+from .tet4 import EDGE
+
+_SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
+_SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
+_P = PRESSURE * CHUNK
+
+
+@njit("boolean(float64, float64, float64, float64, float64, float64, float64, float64, float64, float64, float64)",
+      cache=True, error_model="numpy")  # fmt: skip
+def _passes(bx, by, bz, xx, yy, zz, yz, zx, xy, weight, square):  # type: ignore[no-untyped-def]
+    """Whether the traction on the area vector b has a ``square`` of the criterion's first form, Pa^2, or more."""
+    tx, ty, tz = xx * bx + xy * by + zx * bz, xy * bx + yy * by + yz * bz, zx * bx + yz * by + zz * bz
+    area = bx * bx + by * by + bz * bz
+    normal = tx * bx + ty * by + tz * bz
+    tension = max(normal, 0.0)
+    return tension * tension + weight * ((tx * tx + ty * ty + tz * tz) * area - normal * normal) >= square * area * area
+
+
+@njit("boolean(uint8[::1], float64[::1], float64[::1], float64[::1], float64, int64)", cache=True, error_model="numpy")
+def mark_hot(hot, w, s, weakest, weight, n):  # type: ignore[no-untyped-def]
+    """Sets bit k of ``hot`` where face k of a tet passes by its own stress, without the viscous part; whether any.
+
+    ``w`` holds the area vectors b1, b2, b3 of a chunk (elements/tet4.py).
+    """
+    some = 0
+    for i in range(n):
+        p = s[_P + i]
+        xx, yy, zz = s[_SXX + i] - p, s[_SYY + i] - p, s[_SZZ + i] - p
+        yz, zx, xy = s[_SYZ + i], s[_SZX + i], s[_SXY + i]
+        ax, ay, az = w[EDGE + i], w[EDGE + CHUNK + i], w[EDGE + 2 * CHUNK + i]
+        bx, by, bz = w[EDGE + 3 * CHUNK + i], w[EDGE + 4 * CHUNK + i], w[EDGE + 5 * CHUNK + i]
+        cx, cy, cz = w[EDGE + 6 * CHUNK + i], w[EDGE + 7 * CHUNK + i], w[EDGE + 8 * CHUNK + i]
+        square = weakest[i] * weakest[i]
+        found = 1 * _passes(ax + bx + cx, ay + by + cy, az + bz + cz, xx, yy, zz, yz, zx, xy, weight, square)
+        found |= 2 * _passes(ax, ay, az, xx, yy, zz, yz, zx, xy, weight, square)
+        found |= 4 * _passes(bx, by, bz, xx, yy, zz, yz, zx, xy, weight, square)
+        found |= 8 * _passes(cx, cy, cz, xx, yy, zz, yz, zx, xy, weight, square)
+        hot[i] = found
+        some |= found
+    return some != 0

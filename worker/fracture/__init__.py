@@ -1,0 +1,1 @@
+"""Fracture: facets between tets break, nodes separate, fragments come into being."""

@@ -1,0 +1,162 @@
+"""The parts that fracture, as one rank has them: what lies beside each tet, how strong its faces are, who is behind."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from conoid.cases.schema import Fracture as Spec
+
+from ..mesh.faces import FACES
+from ..mesh.faces import areas as face_areas
+from ..parallel.comm import Comm, Exchange
+from ..parallel.ownership import Neighbour
+from ..state import INTACT, MASS, Block, Flags, Floats, Indices, Ints, Tets
+from . import criterion
+from .strength import Toughness
+
+_FAR_TAG = 17
+ELSEWHERE = -2
+"""Place of a tet that another rank has; -1 where there is none."""
+
+
+@dataclass
+class Body:
+    """A block that fractures."""
+
+    index: int
+    """Of the block among those of the rank."""
+    block: Block
+    spec: Spec
+    tough: Toughness
+    beside: Indices
+    """(n, 4) place of the tet behind each face, -1, or ELSEWHERE."""
+
+
+@dataclass
+class Loaded:
+    """Intact facets under traction, of one body."""
+
+    places: Indices
+    """(m,) on the side of the smaller tet id, if this rank has it; else on the other."""
+    faces: Indices
+    """(m,)."""
+    traction: Floats
+    """(m, 4) on the outward normal of the side of the smaller tet id, and the effective one, Pa."""
+
+    def take(self, chosen: "np.ndarray") -> "Loaded":
+        """Some of them."""
+        return Loaded(self.places[chosen], self.faces[chosen], self.traction[chosen])
+
+
+def arm(index: int, block: Block, spec: Spec, tough: Toughness, x0: Floats) -> Body:
+    """Makes a block ready to fracture; ``x0`` (nodes, 3): where its nodes start."""
+    block.shear_weight = spec.shear_weight if spec.shear_weight is not None else float(spec.model == "cohesive")
+    block.bond = np.full((block.n, 4), INTACT, np.uint8)
+    block.hot = np.zeros(block.n, np.uint8)
+    strengths = np.full((block.n, 4), np.inf)
+    place, face = np.nonzero(block.across >= 0)
+    strengths[place, face] = tough.strengths(facet_ids(block, place, face), areas(block.tets, place, face, x0))
+    block.weakest = strengths.min(axis=1)
+    order = np.argsort(block.id)
+    behind = block.across // 4
+    at = order[np.minimum(np.searchsorted(block.id[order], behind), block.n - 1)]
+    beside = np.where(block.id[at] == behind, at, ELSEWHERE)
+    return Body(index, block, spec, tough, np.where(block.across < 0, -1, beside).astype(np.int32))
+
+
+def facet_ids(block: Block, places: "np.ndarray", faces: "np.ndarray") -> Ints:
+    """(m,) ids of facets, on the side of the smaller tet id."""
+    return np.asarray(np.minimum(4 * block.id[places] + faces, block.across[places, faces]))
+
+
+def areas(tets: Tets, places: "np.ndarray", faces: "np.ndarray", x: Floats) -> Floats:
+    """(m,) areas of faces, m^2: the same bits from either side."""
+    return face_areas(x, np.sort(tets[places[:, None], FACES[faces]].astype(np.int64), axis=1))
+
+
+def look(body: Body, x: Floats) -> Loaded:
+    """The facets within this rank that have a hot face."""
+    block = body.block
+    hot = np.flatnonzero(block.hot)
+    sides, traction = np.empty((4 * len(hot), 2), np.int32), np.empty((4 * len(hot), 4))
+    n = criterion.look(
+        sides, traction, hot, block.hot, block.bond, block.across, body.beside, block.id, block.tets,
+        block.state.reshape(-1), x, block.state.shape[1], block.shear_weight, body.spec.friction,
+    )  # fmt: skip
+    return Loaded(sides[:n, 0].copy(), sides[:n, 1].copy(), traction[:n].copy())
+
+
+class Far:
+    """Facets whose two tets are on different ranks: their tractions are exchanged."""
+
+    def __init__(self, bodies: list[Body], neighbours: list[Neighbour], comm: Comm) -> None:
+        """All ranks take part."""
+        rows = [np.zeros((0, 5), np.int64)]
+        for b, body in enumerate(bodies):
+            block = body.block
+            place, face = np.nonzero(body.beside == ELSEWHERE)
+            mass = block.row(MASS)[place].view(np.int64)
+            own = 4 * block.id[place] + face
+            rows.append(np.column_stack([own, block.across[place, face], mass, place, np.full(len(place), b)]))
+        mine = np.concatenate(rows)
+        told = comm.swap({other.rank: mine[:, [0, 2]] for other in neighbours}) if comm.size > 1 else {}
+        pieces, ranks, masses = [mine[:0]], [], [np.zeros(0, np.int64)]
+        for rank, words in told.items():
+            theirs = words.reshape(-1, 2)[np.argsort(words.reshape(-1, 2)[:, 0])]
+            at = np.minimum(np.searchsorted(theirs[:, 0], mine[:, 1]), max(len(theirs) - 1, 0))
+            met = theirs[at, 0] == mine[:, 1] if len(theirs) else np.zeros(len(mine), bool)
+            chosen = mine[met]
+            order = np.argsort(chosen[:, :2].min(axis=1))
+            pieces.append(chosen[order])
+            masses.append(theirs[at[met], 1][order])
+            ranks.append((rank, len(chosen)))
+        table = np.concatenate(pieces)
+        self.body: Ints = table[:, 4]
+        """(m,) which body."""
+        self.sides: Indices = np.column_stack([table[:, 3], table[:, 0] % 4]).astype(np.int32)
+        """(m, 2) place and face of this rank's tet."""
+        self.first: Flags = table[:, 0] < table[:, 1]
+        """(m,) whether this rank has the side of the smaller tet id."""
+        self.mass: Floats = np.concatenate(masses).view(np.float64)
+        """(m,) of the other rank's tet, kg."""
+        self._bodies = bodies
+        self._own, self._theirs = np.zeros((len(table), 3)), np.zeros((len(table), 3))
+        ends = np.cumsum([0, *(n for _, n in ranks)])
+        cuts = [(rank, slice(a, b)) for (rank, n), a, b in zip(ranks, ends[:-1], ends[1:], strict=True) if n]
+        self._exchange: Exchange = comm.exchange(
+            [(rank, self._own[cut].view(np.int64)) for rank, cut in cuts],
+            [(rank, self._theirs[cut].view(np.int64)) for rank, cut in cuts],
+            _FAR_TAG,
+        )
+
+    def look(self, x: Floats) -> list[tuple[Loaded, Ints]]:
+        """For every body its facets that are intact, and which of this table's they are; neighbours take part."""
+        parts = []
+        for b, body in enumerate(self._bodies):
+            at = np.flatnonzero(self.body == b)
+            sides = self.sides[at]
+            at = at[body.block.bond[sides[:, 0], sides[:, 1]] == INTACT]
+            own = np.zeros((len(at), 3))
+            criterion.own_tractions(
+                own, self.sides[at], self.first[at], body.block.tets, body.block.state.reshape(-1), x,
+                body.block.state.shape[1],
+            )  # fmt: skip
+            self._own[at] = own
+            parts.append((body, at))
+        self._exchange.begin()
+        self._exchange.finish()
+        return [(self._meet(body, at, x), at) for body, at in parts]
+
+    def _meet(self, body: Body, at: Ints, x: Floats) -> Loaded:
+        traction = np.zeros((len(at), 4))
+        traction[:, :3] = self._own[at]
+        sides = self.sides[at]
+        criterion.meet(
+            traction, self._theirs[at], sides, self.first[at], body.block.tets, x, body.block.shear_weight,
+            body.spec.friction,
+        )  # fmt: skip
+        return Loaded(sides[:, 0], sides[:, 1], traction)
+
+    def free(self) -> None:
+        """Gives the messages back to MPI."""
+        self._exchange.free()

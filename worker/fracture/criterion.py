@@ -1,0 +1,128 @@
+"""Which facets pass the criterion: the traction on a facet, from the stress of the tets on either side.
+
+A facet breaks by sqrt(<t_n>^2 + w t_s^2), with the Macaulay bracket that the paper's eq. (1) lacks, and under pressure
+by sqrt(w) <t_s - mu |t_n|> (Camacho and Ortiz 1996). Both are bounded by the first form, which is convex: the mean of
+two tractions passes only where one of them does. So the pass over the elements marks each tet's own faces that pass,
+and only facets with such a face are looked at.
+"""
+
+import numpy as np
+from numba import njit
+
+from ..mesh.faces import FACES
+from ..state import CHUNK, INTACT, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ
+
+_SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
+_SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
+_P = PRESSURE * CHUNK
+
+
+@njit("void(float64[::1], float64[::1], int64, int64, float64[::1])", cache=True)
+def traction(t, state, rows, e, normal):  # type: ignore[no-untyped-def]
+    """``t`` (3,): stress of tet ``e`` without the viscous part times ``normal``, Pa."""
+    at = (e // CHUNK) * rows * CHUNK + e % CHUNK
+    p = state[at + _P]
+    xx, yy, zz = state[at + _SXX] - p, state[at + _SYY] - p, state[at + _SZZ] - p
+    yz, zx, xy = state[at + _SYZ], state[at + _SZX], state[at + _SXY]
+    nx, ny, nz = normal[0], normal[1], normal[2]
+    t[0], t[1], t[2] = xx * nx + xy * ny + zx * nz, xy * nx + yy * ny + yz * nz, zx * nx + yz * ny + zz * nz
+
+
+@njit("float64(float64[::1], float64[:, ::1], uint32[::1], int64)", cache=True, error_model="numpy")
+def outward(normal, x, tet, face):  # type: ignore[no-untyped-def]
+    """Unit normal of a face of a tet, out of it, from the present positions; returns the area, m^2.
+
+    Computed in the order of the nodes' ids, so that the two sides have the same bits with opposite signs.
+    """
+    a, b, c = tet[FACES[face, 0]], tet[FACES[face, 1]], tet[FACES[face, 2]]
+    sign = 1.0
+    if a > b:
+        a, b, sign = b, a, -sign
+    if b > c:
+        b, c, sign = c, b, -sign
+    if a > b:
+        a, b, sign = b, a, -sign
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        normal[i] = (x[b, j] - x[a, j]) * (x[c, k] - x[a, k]) - (x[b, k] - x[a, k]) * (x[c, j] - x[a, j])
+    length = np.sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2])
+    for i in range(3):
+        normal[i] *= sign / length
+    return 0.5 * length
+
+
+@njit("float64(float64[::1], float64[::1], float64, float64)", cache=True)
+def effective(t, normal, weight, friction):  # type: ignore[no-untyped-def]
+    """The effective traction, Pa, of a traction ``t`` on a facet."""
+    along = t[0] * normal[0] + t[1] * normal[1] + t[2] * normal[2]
+    across = max(t[0] * t[0] + t[1] * t[1] + t[2] * t[2] - along * along, 0.0)
+    if along >= 0.0:
+        return np.sqrt(along * along + weight * across)
+    return np.sqrt(weight) * max(np.sqrt(across) + friction * along, 0.0)
+
+
+@njit(
+    "int64(int32[:, ::1], float64[:, ::1], int64[::1], uint8[::1], uint8[:, ::1], int32[:, ::1], int32[:, ::1], "
+    "int64[::1], uint32[:, ::1], float64[::1], float64[:, ::1], int64, float64, float64)",
+    cache=True,
+)
+def look(out, tractions, chosen, hot, bond, across, beside, ids, tets, state, x, rows, weight, friction):  # type: ignore[no-untyped-def]
+    """Tractions on the intact facets within this rank that have a hot face, of the tets at ``chosen``.
+
+    Fills ``out`` (m, 2), place and face on the side of the smaller tet id, and ``tractions`` (m, 4), the vector on that
+    side's outward normal and the effective traction, Pa; returns how many there are.
+    """
+    n = 0
+    normal, one, two = np.empty(3), np.empty(3), np.empty(3)
+    for e in chosen:
+        for k in range(4):
+            if not (hot[e] >> k) & 1 or bond[e, k] != INTACT or beside[e, k] < 0:
+                continue
+            other, far = beside[e, k], across[e, k] % 4
+            first = ids[e] < ids[other]
+            if not first and (hot[other] >> far) & 1:
+                continue
+            a, b, face = (e, other, k) if first else (other, e, far)
+            outward(normal, x, tets[a], face)
+            traction(one, state, rows, a, normal)
+            traction(two, state, rows, b, normal)
+            for i in range(3):
+                one[i] = 0.5 * (one[i] + two[i])
+                tractions[n, i] = one[i]
+            out[n, 0], out[n, 1] = a, face
+            tractions[n, 3] = effective(one, normal, weight, friction)
+            n += 1
+    return n
+
+
+@njit(
+    "void(float64[:, ::1], int32[:, ::1], boolean[::1], uint32[:, ::1], float64[::1], float64[:, ::1], int64)",
+    cache=True,
+)
+def own_tractions(tractions, sides, first, tets, state, x, rows):  # type: ignore[no-untyped-def]
+    """``tractions`` (m, 3), Pa, of this rank's tets on facets shared with another rank, on the outward normal of the
+    side of the smaller tet id. ``sides`` (m, 2): place and face; ``first`` (m,): whether that side is this one.
+    """
+    normal = np.empty(3)
+    for m in range(len(sides)):
+        outward(normal, x, tets[sides[m, 0]], sides[m, 1])
+        if not first[m]:
+            normal *= -1.0
+        traction(tractions[m], state, rows, sides[m, 0], normal)
+
+
+@njit(
+    "void(float64[:, ::1], float64[:, ::1], int32[:, ::1], boolean[::1], uint32[:, ::1], float64[:, ::1], float64, "
+    "float64)",
+    cache=True,
+)
+def meet(tractions, theirs, sides, first, tets, x, weight, friction):  # type: ignore[no-untyped-def]
+    """``tractions`` (m, 4): means of this rank's and ``theirs`` (m, 3), and the effective tractions, Pa."""
+    normal = np.empty(3)
+    for m in range(len(sides)):
+        outward(normal, x, tets[sides[m, 0]], sides[m, 1])
+        if not first[m]:
+            normal *= -1.0
+        for i in range(3):
+            tractions[m, i] = 0.5 * (tractions[m, i] + theirs[m, i])
+        tractions[m, 3] = effective(tractions[m, :3], normal, weight, friction)

@@ -1,0 +1,229 @@
+"""Node separation: what breaks in a step becomes copies of nodes, numbered alike on any number of ranks.
+
+Every rank that holds a node holds all its copies, too: the nodal sums that it completes with the others then reach both
+sides of a facet, whichever rank computes them. Each holder learns the whole star of a touched node from the others and
+cuts it by itself. The new ids follow from a list of all pieces of all ranks, sorted by the id of the node and the
+smallest tet of the piece (the paper's eqs 17 and 18 count per rank, so that ids would depend on the ranks).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..mesh.faces import FACES
+from ..parallel.comm import Comm
+from ..parallel.ownership import Neighbour
+from ..state import PINNED, Copies, Flags, Indices, Ints, Model, extended
+from . import stars
+from .stars import Stars
+
+_KEY = 2**31
+"""More than there are tets."""
+
+
+@dataclass
+class Broken:
+    """Facets of one block that break, as this rank's tets have them."""
+
+    places: Indices
+    """(m,) of tets; both sides when both are here."""
+    faces: Indices
+    """(m,) local faces."""
+
+
+@dataclass
+class Event:
+    """What separated in a step."""
+
+    copies: Copies
+    first: int
+    """Local index of the first copy."""
+    key: Ints
+    """(r,) of the tets whose node has become a copy: ids of the node and of the tet as one number, ascending."""
+    node: Indices
+    """(r,) the copy, local."""
+    place: Indices
+    """(r,) of the tet in its block, -1 for one of another rank."""
+    corner: Indices
+    """(r,) of the tet."""
+    block: Indices
+    """(r,) index of the block."""
+
+    def followed(self, nodes: Indices, ids: Ints, tets: Ints) -> Indices:
+        """What local ``nodes`` (n, k) of tets of global ids ``tets`` (n,) have become; ``ids``: of the local nodes."""
+        wanted = ids[nodes] * _KEY + tets[:, None]
+        at = np.minimum(np.searchsorted(self.key, wanted), len(self.key) - 1)
+        return np.where(self.key[at] == wanted, self.node[at], nodes).astype(np.int32)
+
+
+class Separation:
+    """The topology of the parts that fracture, on one rank."""
+
+    def __init__(self, model: Model, neighbours: list[Neighbour], comm: Comm) -> None:
+        self._model, self._neighbours, self._comm = model, neighbours, comm
+        n = model.nodes.n
+        self._stars = {b: Stars(block.tets, n) for b, block in enumerate(model.blocks) if len(block.bond)}
+        self._block_of = np.full(len(model.parts), -1, np.int32)
+        for b, block in enumerate(model.blocks):
+            self._block_of[block.part] = b
+
+    def break_facets(self, broken: dict[int, Broken]) -> Event | None:
+        """Breaks facets, by index of their block, and separates nodes; None where no node of any rank does.
+
+        All ranks take part. Connectivity, masses, shared nodes and bonds are changed; forces are left to the caller.
+        """
+        touched = self._touched(broken)
+        rows, label, places, own = self._cut(touched)
+        kept = label[np.searchsorted(rows[:, stars.NODE], rows[:, stars.NODE])]
+        leaving = label != kept
+        mine = np.unique(np.column_stack([rows[leaving, stars.NODE], label[leaving]]), axis=0)
+        every = self._number(mine)
+        if not len(every):
+            return None
+        self._open(rows, label, places, own)
+        return self._separate(rows, label, places, own, leaving, mine, every)
+
+    def _touched(self, broken: dict[int, Broken]) -> Ints:
+        """Local nodes of the facets that break on any rank, ascending; marks the bonds."""
+        found = [np.zeros(0, np.int64)]
+        for b, facets in broken.items():
+            block = self._model.blocks[b]
+            block.bond[facets.places, facets.faces] = PINNED
+            found.append(block.tets[facets.places[:, None], FACES[facets.faces]].reshape(-1).astype(np.int64))
+        nodes, mine = self._model.nodes, np.unique(np.concatenate(found))
+        if self._comm.size == 1:
+            return mine
+        flags = np.zeros(nodes.n, bool)
+        flags[mine] = True
+        told = self._comm.swap({o.rank: nodes.id[o.nodes[flags[o.nodes]]] for o in self._neighbours})
+        return np.unique(np.concatenate([mine, *(np.searchsorted(nodes.id, ids) for ids in told.values())]))
+
+    def _cut(self, touched: Ints) -> tuple[Ints, Ints, Ints, Ints]:
+        """Rows of the whole stars of the touched nodes, sorted, and their labels; place, corner and block of the
+        tets of this rank, and which of these a row is, -1 for a row of another rank.
+        """
+        nodes = self._model.nodes
+        block_of = self._block_of[nodes.part[touched]]
+        tables, where = [np.zeros((0, stars.COLUMNS), np.int64)], [np.zeros((0, 3), np.int64)]
+        for b, star in self._stars.items():
+            block, chosen = self._model.blocks[b], touched[block_of == b]
+            count = int(star.count[chosen].sum())
+            table, place = np.empty((count, stars.COLUMNS), np.int64), np.empty((count, 3), np.int64)
+            place[:, 2] = b
+            found = np.empty((count, 2), np.int64)
+            stars.describe(
+                table, found, chosen, star.first, star.count, star.pool, block.tets, block.id, nodes.id,
+                block.state.reshape(-1).view(np.int64), block.across, block.bond, block.state.shape[1], self._comm.rank,
+            )  # fmt: skip
+            place[:, :2] = found
+            tables.append(table)
+            where.append(place)
+        mine, places = np.concatenate(tables), np.concatenate(where)
+        own = np.arange(len(mine))
+        rows = self._with_others(mine, touched)
+        own = np.concatenate([own, np.full(len(rows) - len(mine), -1)])
+        order = np.lexsort((rows[:, stars.TET], rows[:, stars.NODE]))
+        rows = np.ascontiguousarray(rows[order])
+        return rows, stars.pieces(rows), places, own[order]
+
+    def _with_others(self, mine: Ints, touched: Ints) -> Ints:
+        """The rows of this rank's tets and those of the others' round shared nodes."""
+        if self._comm.size == 1:
+            return mine
+        nodes = self._model.nodes
+        local, flags, sends = np.searchsorted(nodes.id, mine[:, stars.NODE]), np.zeros(nodes.n, bool), {}
+        for other in self._neighbours:
+            flags[other.nodes] = True
+            sends[other.rank] = mine[flags[local]]
+            flags[other.nodes] = False
+        told = self._comm.swap(sends)
+        return np.concatenate([mine, *(words.reshape(-1, stars.COLUMNS) for words in told.values())])
+
+    def _number(self, mine: Ints) -> Ints:
+        """(k, 2) node and label of every piece of all ranks that gets a copy, in the order of the new ids."""
+        if self._comm.size == 1:
+            return mine
+        nodes = self._model.nodes
+        owned = nodes.owned[np.searchsorted(nodes.id, mine[:, 0])]
+        every = np.concatenate(self._comm.share(mine[owned]))
+        return every[np.lexsort((every[:, 1], every[:, 0]))]
+
+    def _open(self, rows: Ints, label: Ints, places: Ints, own: Ints) -> None:
+        for b in self._stars:
+            here = np.where(own >= 0, own, 0)
+            inside = (own >= 0) & (places[here, 2] == b) if len(places) else own >= 0
+            ours = np.where(inside, own, -1)
+            stars.lay_open(self._model.blocks[b].bond, rows, label, np.ascontiguousarray(places[:, :2]), ours)
+
+    def _separate(
+        self, rows: Ints, label: Ints, places: Ints, own: Ints, leaving: Flags, mine: Ints, every: Ints
+    ) -> Event:
+        model, nodes = self._model, self._model.nodes
+        at = np.searchsorted(_key(every), _key(mine))
+        gone = rows[leaving]
+        piece = np.searchsorted(_key(mine), _key(np.column_stack([gone[:, stars.NODE], label[leaving]])))
+        quarters = 0.25 * np.ascontiguousarray(gone[:, stars.MASS]).view(np.float64)
+        masses = np.bincount(piece, quarters, len(mine)).astype(np.float64)
+        smallest = gone[:, stars.TET] == label[leaving]
+        owner = np.zeros(len(mine), np.int32)
+        owner[piece[smallest]] = gone[smallest, stars.RANK]
+        parents, first = np.searchsorted(nodes.id, mine[:, 0]), nodes.n
+        copies = Copies(parents, model.nodes_global + at, owner, owner == self._comm.rank, masses)
+        nodes.grow(copies)
+        model.nodes_global += len(every)
+        self._share(copies, first)
+        ours = own[leaving]
+        here = places[np.maximum(ours, 0)] if len(places) else np.zeros((len(ours), 3), np.int64)
+        place, corner, block = np.where(ours >= 0, here[:, 0], -1), here[:, 1], here[:, 2]
+        node = (first + piece).astype(np.int32)
+        self._retie(rows, label, places, own, place, corner, block, node)
+        return Event(
+            copies, first, _key(gone), node, place.astype(np.int32), corner.astype(np.int32), block.astype(np.int32)
+        )
+
+    def _share(self, copies: Copies, first: int) -> None:
+        """Whoever holds a node holds its copies."""
+        shared = np.zeros(self._model.nodes.n, bool)
+        for other in self._neighbours:
+            shared[other.nodes] = True
+            new = first + np.flatnonzero(shared[copies.parents])
+            shared[other.nodes] = False
+            other.nodes = extended(other.nodes, new.astype(np.int32))
+
+    def _retie(
+        self, rows: Ints, label: Ints, places: Ints, own: Ints, place: Ints, corner: Ints, block: Ints, node: Indices
+    ) -> None:
+        """Gives tets their new nodes, and every node its star."""
+        here = place >= 0
+        for b, star in self._stars.items():
+            star.grow(self._model.nodes.n - len(star.count))
+            chosen = here & (block == b)
+            self._model.blocks[b].tets[place[chosen], corner[chosen]] = node[chosen]
+        ours = own >= 0
+        index = own[ours]
+        for b, star in self._stars.items():
+            inside = places[index, 2] == b
+            at = places[index[inside]]
+            block_tets = self._model.blocks[b].tets
+            after = block_tets[at[:, 0], at[:, 1]].astype(np.int64)
+            before = np.searchsorted(self._model.nodes.id, rows[ours][inside, stars.NODE])
+            order = np.lexsort((after, before))
+            before, after, tets = before[order], after[order], at[order, 0]
+            _restock(star.pool, star.first, star.count, before, after, tets)
+
+
+def _key(rows: Ints) -> Ints:
+    """(n,) the first two columns, ids of a node and of a tet, as one number that orders like them."""
+    return rows[:, 0] * _KEY + rows[:, 1]
+
+
+def _restock(pool: Ints, first: Ints, count: Ints, before: Ints, after: Ints, tets: Ints) -> None:
+    """Writes the stars of nodes ``before`` and of their copies ``after`` anew, in the stretch of the pool they have."""
+    starts = np.flatnonzero(np.r_[True, before[1:] != before[:-1]]) if len(before) else np.zeros(0, np.int64)
+    rank = np.arange(len(before)) - np.repeat(starts, np.diff(np.r_[starts, len(before)]))
+    at = first[before] + rank
+    pool[at] = tets
+    count[before] = 0
+    change = np.flatnonzero(np.r_[True, after[1:] != after[:-1]]) if len(after) else starts
+    first[after[change]] = at[change]
+    count[after[change]] = np.diff(np.r_[change, len(after)])

@@ -1,0 +1,241 @@
+"""Fracture in the time step: which facets break, what separates, and what that changes everywhere else.
+
+At the end of a step, with the stress of n+1 at hand: facets that pass the criterion break; nodes whose star has come
+apart become copies; the forces that the tets of a copy have given to its parent are handed over, in integers; and
+everybody who keeps something by node takes up the copies. In ``cohesive`` parts a facet keeps its traction when it
+breaks and gives it up with the opening.
+"""
+
+import logging
+
+import numpy as np
+
+from conoid.cases.library import material as find_material
+from conoid.cases.schema import Case
+
+from ..boundaries import Boundary
+from ..clock import Clock
+from ..contact.stage import Contact
+from ..elements.forms import Elements
+from ..mesh.faces import FACES
+from ..parallel.comm import Comm
+from ..parallel.fixed_point import exact_sums
+from ..parallel.ownership import Neighbour, complete
+from ..state import CHUNK, MASS, Block, Floats, Indices, Ints, Model
+from . import bodies
+from .bodies import Body, Far, Loaded
+from .cohesive import Cohesion, Facets, inserted
+from .separation import Broken, Event, Separation
+from .strength import Toughness, toughness
+
+_TAG = 16
+_LEAST = 0.05
+"""Of the square of the highest frequency that a step resolves: what cohesive facets may use at least."""
+_SHARES = 24.0
+"""A node has a quarter of its tet's mass, up to three of whose faces open there, between two nodes that move."""
+_REGULAR = (6.0 * 2.0**0.5) ** (1.0 / 3.0)
+"""Edge of a regular tet over the cube root of its volume."""
+
+log = logging.getLogger("conoid.worker")
+
+
+class Fracture:
+    """The fracture of a case on one rank."""
+
+    def __init__(
+        self, case: Case, model: Model, neighbours: list[Neighbour], elements: Elements, boundaries: list[Boundary],
+        contact: Contact | None, comm: Comm, clock: Clock,
+    ) -> None:  # fmt: skip
+        """All ranks take part."""
+        self._model, self._neighbours, self._elements = model, neighbours, elements
+        self._boundaries, self._contact = boundaries, contact
+        self._comm, self._clock = comm, clock
+        self._unused = max(1.0 - case.numerics.dt_safety**2, _LEAST)
+        self._bodies: list[Body] = []
+        work = 0.0
+        for index, part in enumerate(case.parts):
+            if part.fracture is not None:
+                volume, size = _tet(model, index, find_material(case, part.material).density, comm)
+                tough = toughness(find_material(case, part.material), part.fracture, size)
+                work = max(work, tough.energy * volume ** (2.0 / 3.0))
+                if comm.rank == 0:
+                    _tell(part.name, tough, size)
+                self._bodies += [
+                    bodies.arm(i, block, part.fracture, tough, model.nodes.x0)
+                    for i, block in enumerate(model.blocks) if block.part == index
+                ]  # fmt: skip
+        self._far = Far(self._bodies, neighbours, comm)
+        self._separation = Separation(model, neighbours, comm)
+        self._since: tuple[Ints, Floats] = (np.zeros(0, np.int64), np.zeros(0))
+        """Ids, ascending, of the facets beyond their strength, and since when, s."""
+        self.broken = 0
+        """Facets of all ranks that have broken."""
+        self._longest = 0.0
+        self.cohesion: Cohesion | None = None
+        if any(part.fracture is not None and part.fracture.model == "cohesive" for part in case.parts):
+            self.cohesion = elements.cohesion = Cohesion(work)
+
+    def advance(self) -> None:
+        """Breaks what the stress of the present has overcome; all ranks take part."""
+        x = self._model.nodes.x
+        self._longest = max(self._longest, self._clock.stable)
+        near = [bodies.look(body, x) for body in self._bodies]
+        far = self._far.look(x)
+        passed: list[tuple[Ints, Floats]] = []
+        broken: dict[int, Broken] = {}
+        new: list[tuple[Body, Loaded, Floats]] = []
+        count = 0
+        for body, loaded, (remote, at) in zip(self._bodies, near, far, strict=True):
+            block = body.block
+            within = self._beyond(body, loaded, passed)
+            loaded = loaded.take(within)
+            across = self._beyond(body, remote, passed)
+            remote, at = remote.take(across), at[across]
+            there = body.beside[loaded.places, loaded.faces]
+            back = block.across[loaded.places, loaded.faces] % 4
+            broken[body.index] = Broken(
+                np.concatenate([loaded.places, there, remote.places]),
+                np.concatenate([loaded.faces, back, remote.faces]),
+            )
+            first = self._far.first[at]
+            count += len(loaded.places) + int(first.sum())
+            if body.spec.model == "cohesive":
+                mass = np.concatenate([_masses(block, there), self._far.mass[at[first]]])
+                mine = remote.take(first)
+                both = Loaded(
+                    np.concatenate([loaded.places, mine.places]), np.concatenate([loaded.faces, mine.faces]),
+                    np.concatenate([loaded.traction, mine.traction]),
+                )  # fmt: skip
+                new.append((body, both, np.minimum(mass, _masses(block, both.places))))
+        ids = np.concatenate([np.zeros(0, np.int64), *(ids for ids, _ in passed)])
+        order = np.argsort(ids)
+        self._since = ids[order], np.concatenate([np.zeros(0), *(since for _, since in passed)])[order]
+        total = int(self._comm.sum(np.array([count]))[0])
+        if total:
+            self.broken += total
+            self._break(broken, new)
+
+    def free(self) -> None:
+        """Gives the messages back to MPI."""
+        self._far.free()
+
+    def _beyond(self, body: Body, loaded: Loaded, passed: list[tuple[Ints, Floats]]) -> "np.ndarray":
+        """Which facets break; notes those beyond their strength with their clocks in ``passed``."""
+        block = body.block
+        ids = bodies.facet_ids(block, loaded.places, loaded.faces)
+        size = bodies.areas(block.tets, loaded.places, loaded.faces, self._model.nodes.x0)
+        strength = body.tough.strengths(ids, size)
+        effective = loaded.traction[:, 3]
+        since, now = np.full(len(ids), self._clock.t), self._clock.t
+        known, times = self._since
+        if len(known):
+            at = np.minimum(np.searchsorted(known, ids), len(known) - 1)
+            since = np.where(known[at] == ids, times[at], since)
+        over = effective >= strength
+        breaks = over & (effective >= body.tough.required(strength, now - since))
+        clocked = over & ~breaks
+        passed.append((ids[clocked], since[clocked]))
+        return np.flatnonzero(breaks)
+
+    def _break(self, broken: dict[int, Broken], new: list[tuple[Body, Loaded, Floats]]) -> None:
+        shared = [(_corners(body, loaded), _sides(body.block, loaded)) for body, loaded, _ in new]
+        event = self._separation.break_facets(broken)
+        fresh = [
+            self._insert(body, loaded, mass, before, tets, event)
+            for (body, loaded, mass), (before, tets) in zip(new, shared, strict=True)
+        ]
+        if event is not None:
+            self._tell_everybody(event)
+            self._hand_over(event, fresh)
+        for facets in fresh:
+            assert self.cohesion is not None
+            self.cohesion.insert(facets)
+        if event is not None and self._contact is not None:
+            self._contact.separate()
+
+    def _insert(
+        self, body: Body, loaded: Loaded, mass: Floats, before: Indices, tets: Ints, event: Event | None
+    ) -> Facets:
+        """The new cohesive facets of a body, ``before`` (m, 3) their nodes until now, ``tets`` (m, 2) their sides."""
+        nodes, block = self._model.nodes, body.block
+        after = np.concatenate([before, before], axis=1)
+        if event is not None:
+            ids = nodes.id
+            after = np.concatenate([event.followed(before, ids, tets[:, k]) for k in (0, 1)], axis=1)
+        size = bodies.areas(block.tets, loaded.places, loaded.faces, nodes.x)
+        frequency = 4.0 * self._unused / self._longest**2
+        m, stiffness = len(size), 3.0 * mass / _SHARES * frequency / size
+        return inserted(
+            nodes, np.concatenate([before, before], axis=1), after, tets, loaded.traction[:, :3], loaded.traction[:, 3],
+            np.full(m, body.tough.energy), np.full(m, block.shear_weight), stiffness, size,
+        )  # fmt: skip
+
+    def _tell_everybody(self, event: Event) -> None:
+        self._elements.grow(event.copies)
+        for boundary in self._boundaries:
+            boundary.grow(event.copies.parents, event.first)
+
+    def _hand_over(self, event: Event, fresh: list[Facets]) -> None:
+        """Forces of the present, of the tets and cohesive facets of copies, from their parents to them."""
+        nodes, copies = self._model.nodes, event.copies
+        some = np.unique(np.concatenate([copies.parents, event.first + np.arange(copies.n)]))
+        change = np.zeros((len(some), 3), np.int64)
+        for b in np.unique(event.block[event.place >= 0]):
+            rows = np.flatnonzero((event.block == b) & (event.place >= 0))
+            tets, at = np.unique(event.place[rows].astype(np.int64), return_inverse=True)
+            force = self._elements.forces_of(self._model.blocks[b], tets, nodes.scale)[at, event.corner[rows]]
+            copy = event.node[rows]
+            np.add.at(change, np.searchsorted(some, copy), force)
+            np.subtract.at(change, np.searchsorted(some, copies.parents[copy - event.first]), force)
+        if self.cohesion is not None:
+            facets = self.cohesion.facets
+            moved = np.isin(facets.nodes, copies.parents).any(axis=1)
+            old = facets.nodes[moved]
+            sides = np.repeat(facets.tets[moved], 3, axis=1)
+            now = np.stack([event.followed(old[:, [k]], nodes.id, sides[:, k])[:, 0] for k in range(6)], axis=1)
+            facets.nodes[moved] = now
+            self._scatter(change, some, old, facets.pull[moved], -1)
+            self._scatter(change, some, now, facets.pull[moved], 1)
+            for facets in fresh:
+                self._scatter(change, some, facets.nodes, facets.pull, 1)
+        holders = [Neighbour(o.rank, np.flatnonzero(np.isin(some, o.nodes)).astype(np.int32)) for o in self._neighbours]
+        complete(self._comm, holders, change, _TAG)
+        nodes.force[some] += change
+
+    def _scatter(self, change: Ints, some: Ints, nodes: Indices, pull: Floats, sign: int) -> None:
+        """Adds the forces on facets ``nodes`` (m, 6) to those nodes that are among ``some``; on others they cancel."""
+        force = sign * np.rint(pull * self._model.nodes.scale).astype(np.int64)
+        for k in range(6):
+            at = np.minimum(np.searchsorted(some, nodes[:, k]), len(some) - 1)
+            here = some[at] == nodes[:, k]
+            np.add.at(change, at[here], force[here, k % 3] * (1 if k < 3 else -1))
+
+
+def _tet(model: Model, part: int, density: float, comm: Comm) -> tuple[float, float]:
+    """Mean volume of the tets of a part, m^3, and the edge of a regular tet of that volume, m; all ranks take part."""
+    masses = np.concatenate([np.zeros(0), *(block.row(MASS) for block in model.blocks if block.part == part)])
+    mass, count = exact_sums(comm, np.column_stack([masses, np.ones(len(masses))]))
+    volume = float(mass / count) / density
+    return volume, _REGULAR * volume ** (1.0 / 3.0)
+
+
+def _tell(part: str, tough: Toughness, size: float) -> None:
+    ratio = size / tough.zone
+    log.info(
+        "%s breaks at %.4g MPa with %.4g J/m^2: cohesive zone %.3g mm, elements %.3g mm, %.3g to 1",
+        part, tough.strength * 1e-6, tough.energy, tough.zone * 1e3, size * 1e3, ratio,
+    )  # fmt: skip
+
+
+def _masses(block: Block, places: "np.ndarray") -> Floats:
+    return np.asarray(block.state[places // CHUNK, MASS, places % CHUNK])
+
+
+def _corners(body: Body, loaded: Loaded) -> Indices:
+    """(m, 3) local nodes of facets, counter-clockwise seen from outside of the first side."""
+    return body.block.tets[loaded.places[:, None], FACES[loaded.faces]].astype(np.int32)
+
+
+def _sides(block: Block, loaded: Loaded) -> Ints:
+    """(m, 2) global ids of the tets of either side."""
+    return np.column_stack([block.id[loaded.places], block.across[loaded.places, loaded.faces] // 4]).astype(np.int64)

@@ -1,0 +1,144 @@
+"""The stars of nodes: the tets round each, and the pieces into which broken facets have cut them.
+
+Two tets of a star belong together when a chain of tets leads from one to the other through intact facets that contain
+the node. What holds by an edge or by the node alone is a hinge, which carries no moment: it is let go. When a star is
+in more than one piece, the piece with the smallest tet id keeps the node and every other gets a copy of it. One broken
+facet inside a body separates nothing; a closed sheet of them round a node does.
+"""
+
+import numpy as np
+from numba import njit
+
+from ..mesh.faces import FACES
+from ..state import CHUNK, INTACT, OPEN, PINNED, Ints, Tets, extended
+from ..state import MASS as MASS_ROW
+
+NODE, TET, RANK, MASS, BEHIND = 0, 1, 2, 3, 4
+"""Columns of a row, one a node and tet of its star: global ids of the node and the tet, rank of the tet, bits of its
+mass, kg; and for the three faces that contain the node the id of the tet behind an intact one, ``_PINNED`` minus that
+of a tet behind a pinned one, -1 for others."""
+COLUMNS = 7
+_PINNED = -2
+
+
+class Stars:
+    """The tets of every node of one block: a pool in which each node's tets stand together.
+
+    When a node separates, its stretch of the pool is cut into those of its copies.
+    """
+
+    def __init__(self, tets: Tets, nodes: int) -> None:
+        """``tets`` (n, 4) over ``nodes`` local nodes."""
+        corners = tets.reshape(-1)
+        self.pool: Ints = np.argsort(corners, kind="stable") // 4
+        """Places of tets."""
+        self.count: Ints = np.bincount(corners, minlength=nodes).astype(np.int64)
+        """(nodes,)."""
+        self.first: Ints = np.cumsum(self.count) - self.count
+        """(nodes,) where the node's tets begin in the pool."""
+
+    def grow(self, copies: int) -> None:
+        """Takes up new nodes, which have no tets yet."""
+        none = np.zeros(copies, np.int64)
+        self.first, self.count = extended(self.first, none), extended(self.count, none)
+
+
+@njit(
+    "void(int64[:, ::1], int64[:, ::1], int64[::1], int64[::1], int64[::1], int64[::1], uint32[:, ::1], int64[::1], "
+    "int64[::1], int64[::1], int32[:, ::1], uint8[:, ::1], int64, int64)",
+    cache=True,
+)
+def describe(rows, places, nodes, first, count, pool, tets, ids, node_ids, state, across, bond, columns, rank):  # type: ignore[no-untyped-def]
+    """Fills ``rows`` (r, COLUMNS) and ``places`` (r, 2), place and corner of the tet, for the stars of ``nodes``.
+
+    ``state``: that of the block, flat, with ``columns`` rows a chunk.
+    """
+    r = 0
+    for a in nodes:
+        for s in range(first[a], first[a] + count[a]):
+            e = pool[s]
+            corner = 0
+            while tets[e, corner] != a:
+                corner += 1
+            places[r, 0], places[r, 1] = e, corner
+            rows[r, NODE], rows[r, TET], rows[r, RANK] = node_ids[a], ids[e], rank
+            rows[r, MASS] = state[(e // CHUNK * columns + MASS_ROW) * CHUNK + e % CHUNK]
+            for m in range(3):
+                k = FACES[corner, m]
+                behind = -1
+                if across[e, k] >= 0 and bond[e, k] == INTACT:
+                    behind = across[e, k] // 4
+                elif across[e, k] >= 0 and bond[e, k] == PINNED:
+                    behind = _PINNED - across[e, k] // 4
+                rows[r, BEHIND + m] = behind
+            r += 1
+
+
+@njit("int64(int64[:, ::1], int64, int64, int64)", cache=True)
+def _row_of(rows, begin, end, tet):  # type: ignore[no-untyped-def]
+    """The row of a tet among those of a star, which are sorted; -1 where it is not."""
+    last = end
+    while begin < end:
+        middle = (begin + end) // 2
+        if rows[middle, TET] < tet:
+            begin = middle + 1
+        else:
+            end = middle
+    return begin if begin < last and rows[begin, TET] == tet else -1
+
+
+@njit("int64(int64[::1], int64)", cache=True)
+def _root(parent, i):  # type: ignore[no-untyped-def]
+    while parent[i] != i:
+        parent[i] = parent[parent[i]]
+        i = parent[i]
+    return i
+
+
+@njit("int64[::1](int64[:, ::1])", cache=True)
+def pieces(rows):  # type: ignore[no-untyped-def]
+    """(r,) the smallest tet id of the piece that each row belongs to; ``rows`` sorted by node, then by tet."""
+    n = len(rows)
+    parent = np.arange(n)
+    begin = 0
+    while begin < n:
+        end = begin
+        while end < n and rows[end, NODE] == rows[begin, NODE]:
+            end += 1
+        for i in range(begin, end):
+            for m in range(BEHIND, COLUMNS):
+                if rows[i, m] < 0:
+                    continue
+                j = _row_of(rows, begin, end, rows[i, m])
+                if j < 0:
+                    continue
+                one, two = _root(parent, i), _root(parent, j)
+                parent[max(one, two)] = min(one, two)
+        begin = end
+    label = np.empty(n, np.int64)
+    for i in range(n):
+        label[i] = rows[_root(parent, i), TET]
+    return label
+
+
+@njit("void(uint8[:, ::1], int64[:, ::1], int64[::1], int64[:, ::1], int64[::1])", cache=True)
+def lay_open(bond, rows, label, places, own):  # type: ignore[no-untyped-def]
+    """Opens pinned faces whose two sides lie in different pieces of a star.
+
+    ``own`` (r,): which of the ``places`` (m, 2) is that of the row's tet, -1 for one not of this block and rank.
+    """
+    begin = 0
+    while begin < len(rows):
+        end = begin
+        while end < len(rows) and rows[end, NODE] == rows[begin, NODE]:
+            end += 1
+        for i in range(begin, end):
+            if own[i] < 0:
+                continue
+            for m in range(3):
+                if rows[i, BEHIND + m] > _PINNED:
+                    continue
+                j = _row_of(rows, begin, end, _PINNED - rows[i, BEHIND + m])
+                if j < 0 or label[j] != label[i]:
+                    bond[places[own[i], 0], FACES[places[own[i], 1], m]] = OPEN
+        begin = end

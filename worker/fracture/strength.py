@@ -1,0 +1,87 @@
+"""How strong a facet is: its strength from the material, the mesh and a hash of its id, and the delayed criterion.
+
+The paper's eqs (2) to (4): an interface opens fully by the time t after it first passed the strength if the incident
+stress is strength * e^(t/t_c) / (e^(t/t_c) - 1). That follows from two half-spaces with a linearly falling traction,
+and with the energy as its area it gives t_c = density * c * energy / strength^2, twice the printed value.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from conoid.cases.materials import Brittle, Material, Scatter
+from conoid.cases.schema import Fracture
+
+from ..state import Floats, Ints
+
+_GOLDEN, _MIX_1, _MIX_2 = (np.uint64(n) for n in (0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB))
+
+
+@dataclass(frozen=True)
+class Toughness:
+    """The constants of a part that fractures, SI."""
+
+    strength: float
+    energy: float
+    scatter: Scatter | None
+    delay: float
+    """t_c times the square of the strength: t_c of a facet is this over the square of its own."""
+    zone: float
+    """Length of the cohesive zone, m, 9 pi / 32 E' G_c / strength^2 with E' = E / (1 - nu^2)."""
+
+    def strengths(self, face: Ints, area: Floats) -> Floats:
+        """(n,) strengths, Pa, of facets with these ids and areas, m^2."""
+        scatter = self.scatter
+        if scatter is None:
+            return np.full(len(face), self.strength)
+        chance = -np.log1p(-uniform(scatter.seed, face))
+        if scatter.area is not None:
+            chance = chance * (scatter.area / area)
+        return np.asarray(scatter.minimum + (self.strength - scatter.minimum) * chance ** (1.0 / scatter.modulus))
+
+    def required(self, strength: Floats, since: Floats) -> Floats:
+        """(n,) traction, Pa, that breaks facets by the time ``since``, s, after they first passed their strength."""
+        if self.delay == 0.0:
+            return strength
+        with np.errstate(divide="ignore"):
+            return np.asarray(strength / -np.expm1(-since * strength * strength / self.delay))
+
+
+def toughness(material: Material, spec: Fracture, size: float) -> Toughness:
+    """The constants of a part whose tets have the mean edge ``size``, m."""
+    brittle = material.brittle
+    assert brittle is not None
+    elastic = material.elastic
+    plane = elastic.young / (1.0 - elastic.poisson**2)
+    strength = brittle.strength
+    if spec.resolve == "strength":
+        strength = min(strength, math.sqrt(_zone(plane, brittle.energy) / (spec.resolution * size)))
+    lame = elastic.young * (1.0 - elastic.poisson) / ((1.0 + elastic.poisson) * (1.0 - 2.0 * elastic.poisson))
+    impedance = math.sqrt(lame * material.density)
+    return Toughness(
+        strength, brittle.energy, _scaled(brittle, strength), spec.delay * impedance * brittle.energy,
+        _zone(plane, brittle.energy) / strength**2,
+    )  # fmt: skip
+
+
+def _zone(plane: float, energy: float) -> float:
+    return 9.0 * math.pi / 32.0 * plane * energy
+
+
+def _scaled(brittle: Brittle, strength: float) -> Scatter | None:
+    """The scatter about a strength that the mesh has lowered."""
+    if brittle.scatter is None:
+        return None
+    lowest = brittle.scatter.minimum * strength / brittle.strength
+    return brittle.scatter.model_copy(update={"minimum": lowest})
+
+
+def uniform(seed: int, face: Ints) -> Floats:
+    """(n,) numbers in [0, 1) that depend on the seed and the id alone: splitmix64 (Steele, Lea and Flood 2014)."""
+    with np.errstate(over="ignore"):
+        z = (face.astype(np.uint64) + np.uint64(seed) * _MIX_1 + np.uint64(1)) * _GOLDEN
+        z = (z ^ (z >> np.uint64(30))) * _MIX_1
+        z = (z ^ (z >> np.uint64(27))) * _MIX_2
+        z = z ^ (z >> np.uint64(31))
+    return np.asarray((z >> np.uint64(11)).astype(np.float64) * 2.0**-53)
