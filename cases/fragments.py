@@ -1,0 +1,124 @@
+"""Fragments of a frame as a table in a run's folder, and what is said of many of them: N(m), laws of size, shares.
+
+::
+
+    <run>/fragments/fragments_0012.csv   one line a fragment, those of frame 12
+"""
+
+import csv
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+FOLDER = "fragments"
+_AXES = ("x", "y", "z")
+_PAIRS = ("xx", "yy", "zz", "yz", "zx", "xy")
+COLUMNS: dict[str, str] = {
+    "t": "s", "label": "", "part": "", "tets": "", "nodes": "", "mass": "kg",
+    **{f"centre_{i}": "m" for i in _AXES},
+    **{f"velocity_{i}": "m/s" for i in _AXES},
+    **{f"angular_momentum_{i}": "kg m^2/s" for i in _AXES},
+    **{f"inertia_{ij}": "kg m^2" for ij in _PAIRS},
+    "translation": "J", "rotation": "J", "deformation": "J",
+    **{f"low_{i}": "m" for i in _AXES},
+    **{f"high_{i}": "m" for i in _AXES},
+    "extent": "m", "new_surface": "m^2",
+}  # fmt: skip
+"""Columns and their units. ``label`` is the smallest global tet id; angular momentum and inertia are about the centre;
+translation, rotation and deformation share the kinetic energy; ``extent`` is the longest side of the box from low to
+high; ``new_surface`` is the initial area of broken faces, both sides of a crack."""
+_WHOLE = ("label", "tets", "nodes")
+DUST = 10
+"""Tets: a fragment of fewer has no shape of its own and is counted as dust."""
+
+
+def path(folder: Path, index: int) -> Path:
+    """Path of the table of frame ``index`` in the run folder ``folder``."""
+    return folder / FOLDER / f"fragments_{index:04d}.csv"
+
+
+def header() -> list[str]:
+    """The first line: ``mass [kg]``."""
+    return [f"{name} [{unit}]" if unit else name for name, unit in COLUMNS.items()]
+
+
+def read(table: Path) -> list[dict[str, float | int | str]]:
+    """The lines of a table, by the names of ``COLUMNS``. Raises ValueError for a file of other columns."""
+    with table.open(newline="", encoding="utf-8") as file:
+        lines = list(csv.reader(file))
+    if not lines or lines[0] != header():
+        raise ValueError(f"{table}: not a table of fragments")
+    return [{name: _value(name, text) for name, text in zip(COLUMNS, line, strict=True)} for line in lines[1:]]
+
+
+def _value(name: str, text: str) -> float | int | str:
+    if name == "part":
+        return text
+    return int(text) if name in _WHOLE else float(text)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A law with its most likely parameter: of laws fitted to the same values, the larger likelihood fits better."""
+
+    law: str
+    """``rayleigh``, ``exponential`` or ``power``."""
+    parameter: float
+    """Mode, mean, or exponent of the density."""
+    log_likelihood: float
+    """Sum of ln(density), with the values in SI."""
+
+
+def fits(values: Sequence[float]) -> list[Fit]:
+    """Rayleigh, exponential and power law by maximum likelihood; none for fewer than two distinct positive values.
+
+    Densities x / s^2 exp(-x^2 / 2 s^2), exp(-x / mu) / mu, and (a - 1) / x_0 (x / x_0)^-a above x_0, the smallest value
+    there is. The last has in x_0 a second parameter.
+    """
+    n = len(values)
+    if n < 2 or min(values) <= 0.0 or min(values) == max(values):
+        return []
+    smallest, mean = min(values), math.fsum(values) / n
+    mode = math.sqrt(math.fsum(x * x for x in values) / (2 * n))
+    logs, above = math.fsum(map(math.log, values)), math.fsum(math.log(x / smallest) for x in values)
+    exponent = 1.0 + n / above
+    return [
+        Fit("rayleigh", mode, logs - 2 * n * math.log(mode) - n),
+        Fit("exponential", mean, -n * math.log(mean) - n),
+        Fit("power", exponent, n * math.log((exponent - 1.0) / smallest) - exponent * above),
+    ]
+
+
+def cumulative(masses: Sequence[float]) -> list[tuple[float, int]]:
+    """N(m): every distinct mass, ascending, and how many have at least that."""
+    ascending = sorted(masses)
+    n = len(ascending)
+    return [(m, n - k) for k, m in enumerate(ascending) if k == 0 or m != ascending[k - 1]]
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a table says as a whole; dust is in the masses, not in the laws."""
+
+    fragments: int
+    dust: int
+    dust_share: float
+    """Of the mass."""
+    largest_share: float
+    """Of the mass."""
+    sizes: list[Fit]
+    """Laws of the extent."""
+    masses: list[Fit]
+
+
+def summary(tets: Sequence[int], masses: Sequence[float], extents: Sequence[float]) -> Summary:
+    """Of the columns of one table, kg and m."""
+    whole = [k for k, count in enumerate(tets) if count >= DUST]
+    total = math.fsum(masses)
+    dust = math.fsum(m for m, count in zip(masses, tets, strict=True) if count < DUST)
+    return Summary(
+        fragments=len(whole), dust=len(tets) - len(whole), dust_share=dust / total if total > 0.0 else 0.0,
+        largest_share=max(masses) / total if total > 0.0 else 0.0,
+        sizes=fits([extents[k] for k in whole]), masses=fits([masses[k] for k in whole]),
+    )  # fmt: skip

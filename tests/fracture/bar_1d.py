@@ -1,0 +1,195 @@
+"""A bar that is stretched evenly and breaks, in one dimension and plain numpy: what fracture in tets is compared with.
+
+Linear elements of length h with half of their mass at each end, and between every two an interface that may open. The
+ends of the bar are driven at the speeds of the even stretch: to the bar they are mirrors, and what is left at either
+end is half a fragment.
+
+With D the largest opening d so far and S = strength (1 - D / critical), not below 0, the law is
+
+    T = S d / D              the linear law while D grows, the secant through the origin when the opening falls back
+    T = min(S, S o / (D + a S))   where S a > 2 D, with 0 for o < 0
+
+The secant is as stiff as it likes to be: where it is too stiff for the step it is taken at the end of it. There the
+opening is o - a T, if o = d + dt w is what it would be without T (w: relative velocity after the kick of the elements),
+a = 2 dt^2 / m and m the mass of either side. D = 0 is an interface that has never opened and is rigid up to S. Faces
+that would still pass each other are brought to rest against each other by an impulse: no overlap.
+
+The energy taken by an interface is strength D / 2, or G_c when it has failed, and T d / 2 can be had back.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Bar:
+    """SI; the material of the literature's ceramic."""
+
+    length: float = 0.05
+    elements: int = 4000
+    young: float = 275e9
+    density: float = 2750.0
+    strength: float = 300e6
+    toughness: float = 100.0
+    """G_c, J/m^2."""
+    scatter: float = 0.01
+    """Strengths are uniform from ``strength`` to this share above it."""
+    courant: float = 0.2
+    """dt c / h."""
+    seed: int = 1
+
+    @property
+    def c(self) -> float:
+        """Speed of waves, m/s."""
+        return float(np.sqrt(self.young / self.density))
+
+    @property
+    def s_0(self) -> float:
+        """E G_c / strength^2, m."""
+        return self.young * self.toughness / self.strength**2
+
+    @property
+    def t_0(self) -> float:
+        """s_0 / c, s."""
+        return self.s_0 / self.c
+
+    @property
+    def rate_0(self) -> float:
+        """strength / (E t_0), 1/s."""
+        return self.strength / (self.young * self.t_0)
+
+
+@dataclass(frozen=True)
+class Energies:
+    """J/m^2: of the cross-section."""
+
+    kinetic: float
+    elastic: float
+    cohesive: float
+    """Taken by opening."""
+    stored: float
+    """That open interfaces give back when they close."""
+    contact: float
+    external: float
+    initial: float
+
+    @property
+    def residual(self) -> float:
+        """What the lines do not close by, as a share of elastic, cohesive and contact energy."""
+        inside = self.kinetic + self.elastic + self.cohesive + self.stored + self.contact
+        return (inside - self.initial - self.external) / (self.elastic + self.cohesive + self.contact)
+
+
+class Run:
+    """A bar in an even stretch at ``rate``, 1/s, that begins with the stress ``share`` of the smallest strength.
+
+    ``kick`` and ``move`` are a step: leapfrog, velocities half a step behind or ahead of positions.
+    """
+
+    def __init__(self, bar: Bar, rate: float, share: float = 0.999) -> None:
+        n = bar.elements
+        self.bar, self.rate, self.t = bar, rate, 0.0
+        self.h = bar.length / n
+        self.dt = bar.courant * self.h / bar.c
+        self.mass = bar.density * self.h / 2.0
+        place = (np.arange(n)[:, None] + np.array([0.0, 1.0])) * self.h
+        self.u, self.v = share * bar.strength / bar.young * place, rate * place
+        """(elements, 2) displacements, m, and velocities, m/s."""
+        self.strength = bar.strength * (1.0 + np.random.default_rng(bar.seed).uniform(0.0, bar.scatter, n - 1))
+        self.critical = 2.0 * bar.toughness / self.strength
+        self.largest = np.zeros(n - 1)
+        """(elements - 1,) largest opening so far, m."""
+        self.push = np.zeros(n - 1)
+        """(elements - 1,) impulse of contact over dt, not above 0, Pa."""
+        self.deepest = 0.0
+        """Largest overlap so far, m."""
+        self._before = self.v
+        self._contact = 0.0
+        self._external = -0.5 * self.dt * self._power
+        self._initial = 0.5 * self.mass * float((self.v * self.v).sum()) + self._elastic
+
+    @property
+    def stress(self) -> Floats:
+        """(elements,) Pa."""
+        return np.asarray(self.bar.young / self.h * (self.u[:, 1] - self.u[:, 0]))
+
+    @property
+    def opening(self) -> Floats:
+        """(elements - 1,) m."""
+        return _apart(self.u)
+
+    @property
+    def failed(self) -> int:
+        """Interfaces that are open for good."""
+        return int((self.largest >= self.critical).sum())
+
+    @property
+    def size(self) -> float:
+        """Mean size of the fragments in s_0; the two at the ends are halves."""
+        return self.bar.length / max(self.failed, 1) / self.bar.s_0
+
+    @property
+    def _elastic(self) -> float:
+        return 0.5 * self.h / self.bar.young * float((self.stress**2).sum())
+
+    @property
+    def _power(self) -> float:
+        """Of the ends, W/m^2."""
+        stress = self.stress
+        return float(stress[-1] * self.v[-1, 1] - stress[0] * self.v[0, 0])
+
+    def kick(self) -> None:
+        """v(n-1/2) -> v(n+1/2)."""
+        opening, stress, impulse = self.opening, self.stress, self.dt / self.mass
+        self.largest = np.maximum(self.largest, opening)
+        v = self.v.copy()
+        v[1:, 0] += impulse * stress[1:]
+        v[:-1, 1] -= impulse * stress[:-1]
+        left = self.strength * np.maximum(1.0 - self.largest / self.critical, 0.0)
+        a = 2.0 * self.dt * impulse
+        without = opening + self.dt * _apart(v)
+        held = law(opening, without, self.largest, left, a)
+        self.push = np.minimum(without / a - held, 0.0)
+        v[1:, 0] -= impulse * (held + self.push)
+        v[:-1, 1] += impulse * (held + self.push)
+        self._before, self.v = self.v, v
+        self._external += self.dt * self._power
+        self._contact += 0.5 * self.dt * float(self.push @ (_apart(self._before) + _apart(v)))
+
+    def move(self) -> None:
+        """u(n) -> u(n+1)."""
+        self.u = self.u + self.dt * self.v
+        self.t += self.dt
+        self.deepest = max(self.deepest, float(-self.opening.min()))
+
+    def energies(self) -> Energies:
+        """At time n, between ``kick`` and ``move``: of the impulses of this step only the first half has been spent."""
+        left = self.strength * np.maximum(1.0 - self.largest / self.critical, 0.0)
+        opened = np.maximum(self.opening, 0.0)
+        share = np.divide(opened, self.largest, out=np.zeros_like(opened), where=self.largest > 0.0)
+        return Energies(
+            kinetic=0.5 * self.mass * float((self._before * self.v).sum()),
+            elastic=self._elastic,
+            cohesive=0.5 * float(self.strength @ np.minimum(self.largest, self.critical)),
+            stored=0.5 * float((left * share) @ opened),
+            contact=float(self._contact - 0.5 * self.dt * self.push @ _apart(self.v)),
+            external=self._external - 0.5 * self.dt * self._power,
+            initial=self._initial,
+        )
+
+
+def _apart(values: Floats) -> Floats:
+    """(elements - 1,) right side less left side of every interface."""
+    return np.asarray(values[1:, 0] - values[:-1, 1])
+
+
+def law(opening: Floats, without: Floats, largest: Floats, left: Floats, a: float) -> Floats:
+    """(n,) T of d, o, D, S and a, Pa."""
+    explicit = left * np.divide(opening, largest, out=np.zeros_like(left), where=largest > 0.0)
+    ahead = np.maximum(without, 0.0) * left
+    implicit = np.minimum(left, np.divide(ahead, largest + a * left, out=np.zeros_like(left), where=left > 0.0))
+    return np.where(left * a > 2.0 * largest, implicit, explicit)

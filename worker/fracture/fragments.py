@@ -1,0 +1,309 @@
+"""Fragments: what whole faces and facets that still hold keep together, how it moves, and what has become of it.
+
+A fragment is called by the smallest global id of its tets. Every rank finds its own connected pieces; then all ranks
+resolve the small graph of the pieces that meet at borders, each in the same way.
+
+A tet gives a quarter of its mass to each of its nodes, at the node's place and velocity: so mass, momentum, angular
+momentum and energy of all fragments are those of the nodes. (The inertia is that of lumped masses, larger than that of
+a solid, five-fold for a lone tet.) Nodes that have lost all tets belong to no fragment. The values of a tet are summed
+by fragment as integers of a quantum of its own for every fragment, 2^-60 of its largest term: neither order nor ranks
+can change a bit, and dust keeps its digits beside a large body. Centre and velocity come first, and what is relative
+to them in a second pass: sums about the origin would lose the digits of r^2 / extent^2.
+"""
+
+import csv
+import io
+import os
+from pathlib import Path
+
+import numpy as np
+
+from conoid.cases import fragments as tables
+
+from ..mesh.faces import FACES, areas
+from ..parallel.comm import Comm
+from ..state import MASS, Block, Floats, Ints, Model
+
+_PART = 1 << 62
+"""Added to the number of a part: the name of what joins its tets, above all tet ids."""
+_NODE_BITS = 40
+"""A node's global id stays below 2^40."""
+_LIMB = 2.0**30
+_FLAT = 1e-10
+"""Share of the largest principal moment below which an axis is taken to have no inertia."""
+
+FRAGMENT = np.dtype([
+    ("label", np.int64), ("part", np.int64), ("tets", np.int64), ("nodes", np.int64), ("mass", float),
+    ("centre", float, 3), ("velocity", float, 3), ("angular_momentum", float, 3), ("inertia", float, 6),
+    ("translation", float), ("rotation", float), ("deformation", float), ("low", float, 3), ("high", float, 3),
+    ("extent", float), ("new_surface", float),
+])  # fmt: skip
+"""A row of the table; the columns are those of cases/fragments.py."""
+
+
+def labels(model: Model, held: Ints, comm: Comm) -> list[Ints]:
+    """For each block (n,) the smallest global id of the tets that hold together with each tet; all ranks take part.
+
+    Tets hold together through faces whose bond is whole, and through ``held``, (m, 2) global ids of pairs that a facet
+    still joins; a pair is given on a rank that has one of the two. Without ``across`` a part is one piece.
+    """
+    ids = np.concatenate([np.zeros(0, np.int64), *(block.id for block in model.blocks)])
+    order = np.argsort(ids)
+    known = ids[order]
+    pairs = np.concatenate([held.reshape(-1, 2), *(_joints(block) for block in model.blocks)])
+    at = _places(known, pairs)
+    here = at >= 0
+    piece = known[components(len(known), at[here.all(axis=1)])]
+    outer = np.flatnonzero(here[:, 0] != here[:, 1])
+    inside = np.where(here[outer, 0], 0, 1)
+    border = np.column_stack([piece[at[outer, inside]], pairs[outer, 1 - inside]])
+    found = np.empty_like(ids)
+    found[order] = _joined(np.unique(border, axis=0), known, piece, comm)
+    return np.split(found, np.cumsum([block.n for block in model.blocks])[:-1]) if model.blocks else []
+
+
+def components(n: int, edges: Ints) -> Ints:
+    """(n,) the smallest number that each of n things is connected with by ``edges``, (m, 2).
+
+    Every root hooks onto the smallest of its neighbours, then all things climb to their roots; edges inside a tree go.
+    """
+    root = np.arange(n)
+    while len(edges):
+        np.minimum.at(root, np.maximum(*edges.T), np.minimum(*edges.T))
+        while not np.array_equal(up := root[root], root):
+            root = up
+        edges = root[edges]
+        edges = edges[edges[:, 0] != edges[:, 1]]
+    return root
+
+
+def _joints(block: Block) -> Ints:
+    """(k, 2) global ids of tets of the block and of what they hold together with."""
+    if not len(block.across):
+        if not block.n:
+            return np.zeros((0, 2), np.int64)
+        chain = np.column_stack([block.id[:-1], block.id[1:]])
+        return np.vstack([chain, [[block.id[0], _PART + block.part]]])
+    whole = block.across >= 0
+    if len(block.bond):
+        whole &= block.bond == 0
+    tet, face = np.nonzero(whole)
+    return np.column_stack([block.id[tet], block.across[tet, face] // 4]).astype(np.int64)
+
+
+def _places(known: Ints, wanted: Ints) -> Ints:
+    """Where ``wanted`` stand in the ascending ``known``, -1 for those that do not."""
+    if not len(known):
+        return np.full(wanted.shape, -1)
+    at = np.minimum(np.searchsorted(known, wanted), len(known) - 1)
+    return np.asarray(np.where(known[at] == wanted, at, -1))
+
+
+def _joined(border: Ints, known: Ints, piece: Ints, comm: Comm) -> Ints:
+    """``piece``, the names of the pieces of the tets ``known``, when those that meet at borders have become one.
+
+    ``border`` (k, 2): pieces of this rank, and the tets of others that they hold together with.
+    """
+    borders = np.concatenate(comm.share(border))
+    asked = np.unique(borders[:, 1])
+    at = _places(known, asked)
+    answer = np.concatenate(comm.share(np.column_stack([asked[at >= 0], piece[at[at >= 0]]])))
+    parts = asked[asked >= _PART]
+    answer = np.vstack([answer[np.argsort(answer[:, 0])], np.column_stack([parts, parts])])
+    at = _places(answer[:, 0], borders[:, 1])
+    edges = np.column_stack([borders[:, 0], answer[at, 1]])[at >= 0] if len(answer) else borders[:0]
+    names = np.unique(edges)
+    one = names[components(len(names), _places(names, edges))]
+    at = _places(names, piece)
+    return np.asarray(np.where(at >= 0, one[at], piece)) if len(one) else piece
+
+
+class Groups:
+    """The fragments of one rank's tets, and sums over them that know no order; all ranks take part in everything."""
+
+    def __init__(self, labels: Ints, comm: Comm) -> None:
+        """``labels`` (n,): the fragment of each tet."""
+        self._comm = comm
+        self.label, self.of = np.unique(labels, return_inverse=True)
+        """(g,) fragments with a tet here, ascending; (n,) the place there of each tet's."""
+        self._order = np.argsort(self.of, kind="stable")
+        self._starts = np.searchsorted(self.of[self._order], np.arange(len(self.label)))
+        everywhere, ranks = np.unique(np.concatenate(comm.share(self.label)), return_counts=True)
+        self.split = everywhere[ranks > 1]
+        """(s,) fragments of several ranks, the same on every rank."""
+        at = _places(self.split, self.label)
+        self._here, self._at = np.flatnonzero(at >= 0), at[at >= 0]
+
+    def largest(self, values: Floats) -> Floats:
+        """(g, k) the largest of each column of ``values``, (n, k), in every fragment."""
+        found = np.maximum.reduceat(values[self._order], self._starts, axis=0)
+        if len(self.split):
+            parts = np.full((len(self.split), values.shape[1]), -np.inf)
+            parts[self._at] = found[self._here]
+            found[self._here] = self._comm.maximum(parts)[self._at]
+        return np.asarray(found)
+
+    def count(self, words: Ints) -> Ints:
+        """(g, k) sums of the columns of ``words``, (n, k), in every fragment."""
+        return self.complete(np.add.reduceat(words[self._order], self._starts, axis=0))
+
+    def complete(self, found: Ints, elsewhere: Ints | None = None) -> Ints:
+        """``found`` (g, k) of this rank summed over ranks; ``elsewhere`` (s, k) is added to that of ``split``."""
+        if len(self.split):
+            parts = np.zeros((len(self.split), found.shape[1]), np.int64) if elsewhere is None else elsewhere
+            parts[self._at] += found[self._here]
+            found[self._here] = self._comm.sum(parts)[self._at]
+        return found
+
+    def sums(self, values: Floats) -> Floats:
+        """(g, k) sums of the columns of ``values``, (n, k), in every fragment: n quanta are the most they are off."""
+        exponent = np.maximum(np.frexp(self.largest(np.abs(values)))[1], -900)
+        scaled = values * np.ldexp(1.0, 30 - exponent)[self.of]
+        high = np.rint(scaled)
+        k = values.shape[1]
+        words = self.count(np.column_stack([high, np.rint((scaled - high) * _LIMB)]).astype(np.int64))
+        return np.asarray(np.ldexp(words[:, :k] * _LIMB + words[:, k:], exponent - 60))
+
+
+def table(model: Model, labels: list[Ints], comm: Comm) -> "np.ndarray | None":
+    """(fragments,) of ``FRAGMENT``, by ascending label, on rank 0, elsewhere None; velocities are those of the nodes.
+
+    The same bits on any number of ranks: the values of a tet are made by the same operations everywhere, sums over
+    tets are exact, and what follows from them is computed once.
+    """
+    blocks, nodes = model.blocks, model.nodes
+    tets = np.concatenate([np.zeros((0, 4), np.int64), *(block.tets for block in blocks)]).astype(np.int64)
+    mass = np.concatenate([np.zeros(0), *(block.row(MASS) for block in blocks)])
+    groups = Groups(np.concatenate([np.zeros(0, np.int64), *labels]), comm)
+    rows = np.zeros(len(groups.label), FRAGMENT)
+    rows["label"] = groups.label
+    rows["part"][groups.of] = np.concatenate([np.zeros(0, np.int64), *(np.full(b.n, b.part) for b in blocks)])
+    rows["tets"] = groups.count(np.ones((len(tets), 1), np.int64))[:, 0]
+    rows["nodes"] = _node_counts(model, tets, groups, comm)
+    _move(rows, groups, tets, mass, nodes.x, nodes.v)
+    broken = np.concatenate([np.zeros(0), *(_broken_area(block, nodes.x0) for block in blocks)])
+    rows["new_surface"] = groups.sums(broken[:, None])[:, 0]
+    pieces = comm.gather(rows)
+    if pieces is None:
+        return None
+    everything = np.concatenate(pieces)
+    return _finished(everything[np.unique(everything["label"], return_index=True)[1]])
+
+
+def _move(rows: "np.ndarray", groups: Groups, tets: Ints, mass: Floats, x: Floats, v: Floats) -> None:
+    """Mass, centre, velocity, box; then, relative to them, angular momentum, inertia and kinetic energy."""
+    quarter, corners = mass / 4.0, tets.T
+    moment, momentum = np.zeros((2, len(tets), 3))
+    reach = np.full((len(tets), 6), -np.inf)
+    for corner in corners:
+        moment += quarter[:, None] * x[corner]
+        momentum += quarter[:, None] * v[corner]
+        reach = np.maximum(reach, np.column_stack([x[corner], -x[corner]]))
+    sums, box = groups.sums(np.column_stack([mass, moment, momentum])), groups.largest(reach)
+    rows["mass"], rows["high"], rows["low"] = sums[:, 0], box[:, :3], -box[:, 3:]
+    rows["centre"], rows["velocity"] = sums[:, 1:4] / sums[:, :1], sums[:, 4:7] / sums[:, :1]
+    centre, velocity = rows["centre"][groups.of], rows["velocity"][groups.of]
+    about = np.zeros((len(tets), 10))
+    for corner in corners:
+        about += quarter[:, None] * _about(x[corner] - centre, v[corner] - velocity)
+    sums = groups.sums(about)
+    rows["angular_momentum"], rows["inertia"], rows["deformation"] = sums[:, :3], sums[:, 3:9], sums[:, 9]
+
+
+def _about(r: Floats, w: Floats) -> Floats:
+    """(n, 10) per mass at ``r``, m, with velocity ``w``, m/s: angular momentum, inertia and kinetic energy.
+
+    Inertia in the order xx, yy, zz, yz, zx, xy. Written out, since the sums of a library of linear algebra may depend
+    on the length of the arrays.
+    """
+    x, y, z = r.T
+    u, v, o = w.T
+    return np.column_stack([
+        y * o - z * v, z * u - x * o, x * v - y * u,
+        y * y + z * z, z * z + x * x, x * x + y * y, -(y * z), -(z * x), -(x * y),
+        0.5 * (u * u + v * v + o * o),
+    ])  # fmt: skip
+
+
+def _broken_area(block: Block, x0: Floats) -> Floats:
+    """(n,) initial area of the broken faces of each tet, m^2."""
+    area = np.zeros(block.n)
+    if len(block.bond):
+        for face in range(4):
+            broken = np.flatnonzero(block.bond[:, face])
+            area[broken] += areas(x0, block.tets[broken][:, FACES[face]].astype(np.int64))
+    return area
+
+
+def _node_counts(model: Model, tets: Ints, groups: Groups, comm: Comm) -> Ints:
+    """(g,) nodes of each fragment. Those of a fragment of several ranks are counted by the nodes' owners."""
+    nodes = model.nodes
+    group, node = np.divmod(np.unique(groups.of[:, None] * np.int64(nodes.n) + tets), max(nodes.n, 1))
+    place = _places(groups.split, groups.label)[group]
+    found = np.bincount(group[place < 0], minlength=len(groups.label)).astype(np.int64)
+    named = (place << _NODE_BITS | nodes.id[node])[place >= 0]
+    owner = nodes.owner[node[place >= 0]]
+    received = comm.swap({int(rank): named[owner == rank] for rank in np.unique(owner)})
+    counted = np.unique(np.concatenate([np.zeros(0, np.int64), *received.values()])) >> _NODE_BITS
+    elsewhere = np.bincount(counted, minlength=len(groups.split)).astype(np.int64)
+    return groups.complete(found[:, None], elsewhere[:, None])[:, 0]
+
+
+def _finished(rows: "np.ndarray") -> "np.ndarray":
+    """Rows with what follows from sums: the energies, and the extent. Rotation is 1/2 L . I^-1 L.
+
+    Axes without inertia have no angular momentum either and are left out. ``deformation`` comes in as the energy
+    relative to the centre.
+    """
+    xx, yy, zz, yz, zx, xy = rows["inertia"].T
+    tensors = np.stack([xx, xy, zx, xy, yy, yz, zx, yz, zz], axis=1).reshape(-1, 3, 3)
+    moments, axes = np.linalg.eigh(tensors)
+    about_axes = (axes * rows["angular_momentum"][:, :, None]).sum(axis=1)
+    heavy = moments > _FLAT * moments[:, 2:]
+    rows["rotation"] = 0.5 * np.divide(about_axes**2, moments, out=np.zeros_like(moments), where=heavy).sum(axis=1)
+    rows["deformation"] -= rows["rotation"]
+    rows["translation"] = 0.5 * rows["mass"] * (rows["velocity"] ** 2).sum(axis=1)
+    rows["extent"] = (rows["high"] - rows["low"]).max(axis=1, initial=0.0)
+    return rows
+
+
+def genealogy(before: tuple[Ints, Ints], after: tuple[Ints, Ints], comm: Comm) -> Ints | None:
+    """(k, 3) parent, child and how many tets they have in common, ascending, on rank 0, elsewhere None.
+
+    ``before`` and ``after`` are ids and labels of a rank's tets, of an earlier and a later frame; a tet is on the same
+    rank in both. A fragment keeps its label for as long as its smallest tet stays; tets that have eroded are in no row.
+    """
+    ids, old, new = np.intersect1d(before[0], after[0], assume_unique=True, return_indices=True)
+    found, tets = np.unique(np.column_stack([before[1][old], after[1][new]]), axis=0, return_counts=True)
+    pieces = comm.gather(np.column_stack([found, tets]) if len(ids) else np.zeros((0, 3), np.int64))
+    if pieces is None:
+        return None
+    everything = np.concatenate(pieces)
+    rows, at = np.unique(everything[:, :2], axis=0, return_inverse=True)
+    common = np.zeros(len(rows), np.int64)
+    np.add.at(common, at.reshape(-1), everything[:, 2])
+    return np.column_stack([rows, common])
+
+
+def write(folder: Path, index: int, t: float, parts: list[str], rows: "np.ndarray") -> str:
+    """Writes the table of frame ``index`` and returns its path relative to the run's folder; whole or not at all."""
+    path = tables.path(folder, index)
+    path.parent.mkdir(exist_ok=True)
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(tables.header())
+    for row in rows.tolist():
+        label, part, *values = row
+        writer.writerow([repr(t), label, parts[part], *(text for value in values for text in _written(value))])
+    beside = path.with_suffix(".part")
+    with beside.open("w", encoding="utf-8") as file:
+        file.write(text.getvalue())
+        file.flush()
+        os.fsync(file.fileno())
+    beside.rename(path)
+    return str(path.relative_to(folder))
+
+
+def _written(value: "float | int | np.ndarray") -> list[str]:
+    """Numbers, so that they read back to the same bits."""
+    return [repr(v) for v in value.tolist()] if isinstance(value, np.ndarray) else [repr(value)]
