@@ -51,6 +51,8 @@ class Event:
 
     def followed(self, nodes: Indices, ids: Ints, tets: Ints) -> Indices:
         """What local ``nodes`` (n, k) of tets of global ids ``tets`` (n,) have become; ``ids``: of the local nodes."""
+        if not len(self.key):
+            return nodes.astype(np.int32)
         wanted = ids[nodes] * _KEY + tets[:, None]
         at = np.minimum(np.searchsorted(self.key, wanted), len(self.key) - 1)
         return np.where(self.key[at] == wanted, self.node[at], nodes).astype(np.int32)

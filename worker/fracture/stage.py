@@ -204,6 +204,8 @@ class Fracture:
 
     def _scatter(self, change: Ints, some: Ints, nodes: Indices, pull: Floats, sign: int) -> None:
         """Adds the forces on facets ``nodes`` (m, 6) to those nodes that are among ``some``; on others they cancel."""
+        if not len(some):
+            return
         force = sign * np.rint(pull * self._model.nodes.scale).astype(np.int64)
         for k in range(6):
             at = np.minimum(np.searchsorted(some, nodes[:, k]), len(some) - 1)
