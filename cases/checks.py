@@ -9,7 +9,7 @@ from .geometry import AXES, bounds, centre, cut_directions, lowest_along, thinne
 from .library import library
 from .materials import JohnsonCook, Material, MohrCoulomb
 from .problems import Location, Problem, choices, dotted, nearest, problem
-from .schema import Case, Gravity, Part, Prescribed, Reference, Symmetry, Wall
+from .schema import Case, Gravity, Part, Prescribed, Reference, Symmetry, Traction, Wall
 
 NEEDED: dict[str, frozenset[str]] = {
     "extent": frozenset({"part", "axis"}),
@@ -172,13 +172,21 @@ def _boundaries(case: Case) -> Iterator[Problem]:
             yield from _prescribed(boundary, ("boundaries", i))
         elif isinstance(boundary, Gravity) and not any(boundary.acceleration):
             yield problem(("boundaries", i, "acceleration"), "0, 0, 0", "must not be zero")
+        elif isinstance(boundary, Traction):
+            if not any(boundary.stress):
+                yield problem(("boundaries", i, "stress"), "0, 0, 0", "must not be zero")
+            yield from _box(boundary, ("boundaries", i))
 
 
 def _prescribed(boundary: Prescribed, location: Location) -> Iterator[Problem]:
     if boundary.x is None and boundary.y is None and boundary.z is None:
         yield problem(location, ..., "prescribes nothing; give one or more of x, y, z")
+    yield from _box(boundary, location)
+
+
+def _box(boundary: Prescribed | Traction, location: Location) -> Iterator[Problem]:
     if (boundary.low is None) != (boundary.high is None):
-        yield problem(location, ..., "give both low and high, or neither for all nodes of the parts")
+        yield problem(location, ..., "give both low and high, or neither for all of the parts")
     elif boundary.low is not None and boundary.high is not None:
         yield from _ordered(boundary.low, boundary.high, location)
 
