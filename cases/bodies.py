@@ -106,7 +106,7 @@ class Sphere(Primitive):
 
 
 class Loose(Primitive):
-    """Regular tets of edge ``element_size``, put one by one: there are no sectors, and one generator."""
+    """Tets of edge ``element_size``, put one by one: there are no sectors, and one generator."""
 
     generator: Literal["structured"] = "structured"
     sector: Literal["full"] = "full"
@@ -115,11 +115,13 @@ class Loose(Primitive):
 
 class TwoTets(Loose):
     """Two tets with a common face, whose centre is ``centre`` and whose normal is ``axis``; one corner of the face lies
-    in the first direction across ``axis``."""
+    in the first direction across ``axis``. The line through their free corners and the centre leans that way, too."""
 
     shape: Literal["two_tets"]
     centre: Point = (0.0, 0.0, 0.0)
     axis: Axis = "z"
+    lean: Annotated[Ratio, Field(ge=0, le=1.1)] = 0.0
+    """rad; ``"30 deg"``. The tets keep their altitude, and are regular when they do not lean."""
 
 
 class Shards(Loose):

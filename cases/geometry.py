@@ -56,11 +56,24 @@ def whole_bounds(mesh: Generated) -> tuple[Vector, Vector]:
 def _two_tets(mesh: TwoTets, i: int, j: int) -> tuple[Vector, Vector]:
     """The common face has a corner in the direction i, and an edge across it."""
     edge, low, high = mesh.element_size, [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
-    low[i], high[i] = -edge / math.sqrt(12.0), edge / math.sqrt(3.0)
+    off = altitude(mesh) * math.tan(mesh.lean)
+    low[i], high[i] = min(-edge / math.sqrt(12.0), -off), max(edge / math.sqrt(3.0), off)
     low[j], high[j] = -edge / 2.0, edge / 2.0
-    high[index(mesh.axis)] = edge * math.sqrt(2.0 / 3.0)
+    high[index(mesh.axis)] = altitude(mesh)
     low[index(mesh.axis)] = -high[index(mesh.axis)]
     return _shift(mesh.centre, tuple(low)), _shift(mesh.centre, tuple(high))
+
+
+def altitude(mesh: TwoTets) -> float:
+    """How far the free corners are from the common face, m."""
+    return mesh.element_size * math.sqrt(2.0 / 3.0)
+
+
+def side_areas(mesh: TwoTets) -> tuple[float, ...]:
+    """Areas of the six exposed faces of two tets, m^2: the edges of the common face look along 60, 180 and 300 deg."""
+    edge, off = mesh.element_size, altitude(mesh) * math.tan(mesh.lean)
+    feet = [edge / math.sqrt(12.0) + sign * off * share for sign in (-1.0, 1.0) for share in (0.5, -1.0, 0.5)]
+    return tuple(0.5 * edge * math.hypot(altitude(mesh), foot) for foot in feet)
 
 
 def pitch(mesh: Shards) -> float:
@@ -106,9 +119,10 @@ def surface(mesh: Generated) -> float:
         a, b, c = (y - x for x, y in zip(low, high, strict=True))
         slit = 2.0 * math.prod(slit_extents(mesh)) if mesh.slit is not None else 0.0
         return 2.0 * (a * b + b * c + c * a) + slit
-    if isinstance(mesh, TwoTets | Shards):
-        faces = 6 if isinstance(mesh, TwoTets) else 4 * tets(mesh)
-        return faces * math.sqrt(3.0) / 4.0 * mesh.element_size**2
+    if isinstance(mesh, TwoTets):
+        return sum(side_areas(mesh))
+    if isinstance(mesh, Shards):
+        return tets(mesh) * math.sqrt(3.0) * mesh.element_size**2
     share = {"full": 1.0, "half": 0.5, "quarter": 0.25}[mesh.sector]
     cut = 0.0 if mesh.sector == "full" else 1.0
     if isinstance(mesh, Sphere):

@@ -5,7 +5,7 @@ import math
 from dataclasses import dataclass
 
 from .bodies import Box, Cylinder, Grading, Plate, Shards, Sphere, Tube, TwoTets
-from .geometry import Generated, across, bounds, centre, cut_directions, holds, index, surface, tets, volume
+from .geometry import Generated, across, bounds, centre, cut_directions, holds, index, side_areas, surface, tets, volume
 
 TETS_PER_VOLUME, TETS_PER_SURFACE = 5.55, 1.42
 NODES_PER_VOLUME, NODES_PER_SURFACE = 0.87, 1.23
@@ -138,7 +138,8 @@ def _doubled(row: Row, low: float, high: float) -> int:
 
 def _loose(mesh: TwoTets | Shards) -> MeshSize:
     if isinstance(mesh, TwoTets):
-        return MeshSize(2, 5, REGULAR * mesh.element_size)
+        areas = math.hypot(math.sqrt(3.0) / 4.0 * mesh.element_size**2, *side_areas(mesh)[:3])
+        return MeshSize(2, 5, 1.5 * volume(mesh) / areas)
     shrunk = 1.0 - WORST_SHARD * mesh.perturbation
     return MeshSize(tets(mesh), 4 * tets(mesh), shrunk * REGULAR * mesh.element_size)
 

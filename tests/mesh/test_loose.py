@@ -1,12 +1,14 @@
 """Meshes that are given tet by tet: two regular tets with a common face, and shards that do not touch."""
 
 import itertools
+import math
 
 import numpy as np
 import pytest
 
 from conoid.cases.bodies import Shards, TwoTets
 from conoid.cases.geometry import bounds, pitch, surface, volume
+from conoid.cases.mesh_size import mesh_size
 from conoid.worker.hashing import uniform
 from conoid.worker.mesh.faces import areas, boundary_faces, face_counts, normals
 from conoid.worker.mesh.loose import rotations
@@ -43,6 +45,21 @@ def test_two_tets_share_a_face(axis: str) -> None:
     assert mesh.points.max(axis=0) == pytest.approx(high)
     assert mesh.volumes().sum() == pytest.approx(volume(made), rel=1e-14)
     assert areas(mesh.points, boundary_faces(mesh.tets)).sum() == pytest.approx(surface(made), rel=1e-14)
+
+
+def test_two_tets_lean() -> None:
+    """The free corners stand on a line through the centre of the common face; volumes and bounds are as told."""
+    made = TwoTets.model_validate({"shape": "two_tets", "element_size": 0.2, "axis": "y", "lean": "50 deg"})
+    mesh = check(structured(made))
+    free = mesh.points[np.setxor1d(mesh.tets[0], mesh.tets[1])]
+    assert free.sum(axis=0) == pytest.approx(0.0, abs=1e-15)
+    assert free[0, 2] / free[0, 1] == pytest.approx(math.tan(math.radians(50.0)))
+    assert mesh.volumes() == pytest.approx(volume(made) / 2, rel=1e-14)
+    assert areas(mesh.points, boundary_faces(mesh.tets)).sum() == pytest.approx(surface(made), rel=1e-14)
+    assert mesh.step_lengths() == pytest.approx(mesh_size(made).step_length, rel=1e-14)
+    low, high = bounds(made) or ((), ())
+    assert mesh.points.min(axis=0) == pytest.approx(low)
+    assert mesh.points.max(axis=0) == pytest.approx(high)
 
 
 def test_shards_are_regular_and_free() -> None:

@@ -48,17 +48,18 @@ def test_both_sides_are_exposed(written: dict[str, Any], axis: str, split: int) 
     if written["shape"] == "plate":
         turned |= {"axis": "xyz"[(2 + shift) % 3], "base": tuple(np.roll(written["base"], shift).tolist())}
     made = body(turned | {"slit": {**written["slit"], "axis": axis}}, split=split)
-    mesh = morton_ordered(check(structured(made)))
+    mesh, slit = morton_ordered(check(structured(made))), made.slit
+    assert slit is not None
     centres, outward = crack(made, mesh)
-    whole, corner = np.prod(slit_extents(made)), 0.5 * 0.1**2
+    whole, corner = float(np.prod(slit_extents(made))), 0.5 * 0.1**2
     corners = 0 if written is FROM_ONE_SIDE else 4
     for sign in (-1.0, 1.0):
-        side = sign * outward[:, index(made.slit.axis)] > 0.0  # type: ignore[union-attr]
+        side = np.flatnonzero(sign * outward[:, index(slit.axis)] > 0.0)
         area = 0.5 * np.linalg.norm(outward[side], axis=1).sum()
         assert whole - corners * corner - 1e-12 <= area <= whole + 1e-12
-        for k, d in enumerate(across(made.slit.axis)):  # type: ignore[union-attr]
-            assert (centres[side, d] > made.slit.low[k]).all()  # type: ignore[union-attr]
-            assert (centres[side, d] < made.slit.high[k]).all()  # type: ignore[union-attr]
+        for k, d in enumerate(across(slit.axis)):
+            assert (centres[side, d] > slit.low[k]).all()
+            assert (centres[side, d] < slit.high[k]).all()
     assert mesh.volumes().sum() == pytest.approx(volume(made), rel=1e-12)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conoid.cases.bodies import Shards, TwoTets
-from conoid.cases.geometry import pitch
+from conoid.cases.geometry import altitude, pitch
 
 from ..hashing import uniform
 from .model import Floats, TetMesh
@@ -47,5 +47,5 @@ def two_tets(body: TwoTets) -> tuple[Floats, NDArray[np.int32]]:
     edge = body.element_size
     turn = 2.0 * math.pi / 3.0 * np.arange(3)
     face = edge / 3**0.5 * np.stack([np.cos(turn), np.sin(turn), np.zeros(3)], axis=1)
-    tops = edge * (2.0 / 3.0) ** 0.5 * np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
-    return np.concatenate([face, tops]), np.array([[0, 1, 2, 3], [0, 2, 1, 4]], np.int32)
+    top = altitude(body) * np.array([math.tan(body.lean), 0.0, 1.0])
+    return np.concatenate([face, [top, -top]]), np.array([[0, 1, 2, 3], [0, 2, 1, 4]], np.int32)
