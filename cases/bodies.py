@@ -4,8 +4,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from .tables import Axis, Model, Point, Positive
-from .units import Length
+from .tables import Axis, Count, Model, Point, Positive
+from .units import Length, Ratio
+
+Edge = Annotated[Count, Field(ge=1, le=1000)]
 
 
 class Grading(Model):
@@ -35,6 +37,19 @@ class Primitive(Model):
     grading: Grading | None = None
 
 
+class Slit(Model):
+    """A crack that is there from the start: a rectangle across ``axis`` at ``at``, on planes of nodes of the structured
+    generator. It ends at those of its borders that lie inside the body.
+
+    ``low`` and ``high`` are its corners in the two directions across ``axis`` (x, y for z; y, z for x; z, x for y).
+    """
+
+    axis: Axis
+    at: Length
+    low: tuple[Length, Length]
+    high: tuple[Length, Length]
+
+
 class Box(Primitive):
     """A rectangular block between two corners. The sector is cut at the origin of the coordinates."""
 
@@ -42,6 +57,7 @@ class Box(Primitive):
     low: Point
     high: Point
     axis: Axis = "z"
+    slit: Slit | None = None
 
 
 class Plate(Primitive):
@@ -56,6 +72,7 @@ class Plate(Primitive):
     width: Annotated[Length, Positive]
     height: Annotated[Length, Positive]
     thickness: Annotated[Length, Positive]
+    slit: Slit | None = None
 
 
 class Cylinder(Primitive):
@@ -88,6 +105,44 @@ class Sphere(Primitive):
     radius: Annotated[Length, Positive]
 
 
+class Loose(Primitive):
+    """Tets of edge ``element_size``, put one by one: there are no sectors, and one generator."""
+
+    generator: Literal["structured"] = "structured"
+    sector: Literal["full"] = "full"
+    grading: None = None
+
+
+class TwoTets(Loose):
+    """Two tets with a common face, whose centre is ``centre`` and whose normal is ``axis``; one corner of the face lies
+    in the first direction across ``axis``. The line through their free corners and the centre leans that way, too."""
+
+    shape: Literal["two_tets"]
+    centre: Point = (0.0, 0.0, 0.0)
+    axis: Axis = "z"
+    lean: Annotated[Ratio, Field(ge=0, le=1.1)] = 0.0
+    """rad; ``"30 deg"``. The tets keep their altitude, and are regular when they do not lean."""
+
+
+class Shards(Loose):
+    """Tets that are not connected with each other: ``count`` of them along x, y, z from the corner ``base``, each in a
+    cube of its own and turned at random."""
+
+    shape: Literal["shards"]
+    base: Point = (0.0, 0.0, 0.0)
+    count: tuple[Edge, Edge, Edge]
+    gap: Annotated[Length, Field(ge=0)] = 0.0
+    """Smallest distance of neighbours, however they are turned."""
+    perturbation: Annotated[Ratio, Field(ge=0, le=0.15)] = 0.0
+    """How far each coordinate of a node is moved at most, at random, of the edge."""
+    seed: Annotated[Count, Field(ge=0, lt=2**63)] = 0
+
+    @property
+    def axis(self) -> Axis:
+        """Of no meaning here; every body has one."""
+        return "z"
+
+
 class MeshFile(Model):
     """A mesh made elsewhere: gmsh .msh 4.1 or 2.2, or Abaqus .inp. ``unit`` is the length unit of its coordinates."""
 
@@ -99,4 +154,4 @@ class MeshFile(Model):
     sha256: str | None = None
 
 
-Mesh = Annotated[Box | Plate | Cylinder | Tube | Sphere | MeshFile, Field(discriminator="shape")]
+Mesh = Annotated[Box | Plate | Cylinder | Tube | Sphere | TwoTets | Shards | MeshFile, Field(discriminator="shape")]

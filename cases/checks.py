@@ -4,12 +4,13 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from itertools import chain
 
-from .bodies import Box, MeshFile, Tube
-from .geometry import AXES, bounds, centre, cut_directions, lowest_along, thinnest, whole_bounds
+from .bodies import MeshFile
+from .geometry import AXES, bounds, centre, cut_directions, lowest_along, whole_bounds
 from .library import library
 from .materials import JohnsonCook, Material, MohrCoulomb
+from .mesh_checks import check_mesh
 from .problems import Location, Problem, choices, dotted, nearest, problem
-from .schema import Case, Gravity, Part, Prescribed, Reference, Symmetry, Wall
+from .schema import Case, Gravity, Part, Prescribed, Reference, Symmetry, Traction, Wall
 
 NEEDED: dict[str, frozenset[str]] = {
     "extent": frozenset({"part", "axis"}),
@@ -72,7 +73,7 @@ def _parts(case: Case) -> Iterator[Problem]:
         if isinstance(law, JohnsonCook) and part.temperature >= law.melt_temperature:
             message = f"must be below {law.melt_temperature} K, where {part.material} melts"
             yield problem(("parts", i, "temperature"), part.temperature, message)
-        yield from _mesh(part, ("parts", i, "mesh"))
+        yield from check_mesh(part.mesh, ("parts", i, "mesh"))
         if law is None and part.erosion is not None and part.erosion.plastic_strain is not None:
             message = f"{part.material} has no strength, so it never strains plastically; remove the key"
             yield problem(("parts", i, "erosion", "plastic_strain"), part.erosion.plastic_strain, message)
@@ -98,46 +99,6 @@ def _fracture(part: Part, made: Material, location: Location) -> Iterator[Proble
         yield problem((*location, "shear_weight"), 0.0, "must be above 0 with model = 'cohesive', which shears too")
     if part.erosion is not None:
         yield problem(location, ..., "a part cannot erode and fracture; remove erosion or fracture")
-
-
-def _mesh(part: Part, location: Location) -> Iterator[Problem]:
-    mesh = part.mesh
-    if isinstance(mesh, MeshFile):
-        if "://" in mesh.path or not mesh.path.strip():
-            yield problem((*location, "path"), mesh.path, "expected the path of a .msh or .inp file")
-        return
-    yield from _grading(part, location)
-    if isinstance(mesh, Tube) and mesh.inner_radius >= mesh.radius:
-        yield problem((*location, "inner_radius"), mesh.inner_radius, f"must be below the radius, {mesh.radius} m")
-        return
-    if isinstance(mesh, Box):
-        empty = [d for d in range(3) if mesh.low[d] >= mesh.high[d]]
-        for d in empty:
-            yield problem((*location, "high", d), mesh.high[d], f"must be above low[{d}], {mesh.low[d]} m")
-        if empty:
-            return
-        away = [d for d in cut_directions(mesh, mesh.axis) if mesh.high[d] <= 0]
-        for d in away:
-            yield problem((*location, "high", d), mesh.high[d], f"a {mesh.sector} box keeps the side {AXES[d]} > 0")
-        if away:
-            return
-    if mesh.element_size > thinnest(mesh) * (1 + _ROUNDING):
-        message = f"must not be above the smallest extent of what is modelled, {thinnest(mesh):g} m"
-        yield problem((*location, "element_size"), mesh.element_size, message)
-
-
-def _grading(part: Part, location: Location) -> Iterator[Problem]:
-    mesh = part.mesh
-    if isinstance(mesh, MeshFile) or mesh.grading is None:
-        return
-    grading, location = mesh.grading, (*location, "grading")
-    if mesh.generator == "structured":
-        yield problem(location, ..., "the structured generator has one element size; remove grading, or use gmsh")
-    if grading.near >= grading.far:
-        yield problem((*location, "near"), grading.near, f"must be below far, {grading.far} m")
-    if grading.far_size < mesh.element_size:
-        message = f"must not be below the element size, {mesh.element_size} m"
-        yield problem((*location, "far_size"), grading.far_size, message)
 
 
 def _sectors(case: Case) -> Iterator[Problem]:
@@ -172,13 +133,21 @@ def _boundaries(case: Case) -> Iterator[Problem]:
             yield from _prescribed(boundary, ("boundaries", i))
         elif isinstance(boundary, Gravity) and not any(boundary.acceleration):
             yield problem(("boundaries", i, "acceleration"), "0, 0, 0", "must not be zero")
+        elif isinstance(boundary, Traction):
+            if not any(boundary.stress):
+                yield problem(("boundaries", i, "stress"), "0, 0, 0", "must not be zero")
+            yield from _box(boundary, ("boundaries", i))
 
 
 def _prescribed(boundary: Prescribed, location: Location) -> Iterator[Problem]:
     if boundary.x is None and boundary.y is None and boundary.z is None:
         yield problem(location, ..., "prescribes nothing; give one or more of x, y, z")
+    yield from _box(boundary, location)
+
+
+def _box(boundary: Prescribed | Traction, location: Location) -> Iterator[Problem]:
     if (boundary.low is None) != (boundary.high is None):
-        yield problem(location, ..., "give both low and high, or neither for all nodes of the parts")
+        yield problem(location, ..., "give both low and high, or neither for all of the parts")
     elif boundary.low is not None and boundary.high is not None:
         yield from _ordered(boundary.low, boundary.high, location)
 

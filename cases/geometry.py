@@ -2,11 +2,11 @@
 
 import math
 
-from .bodies import Box, Cylinder, Mesh, MeshFile, Plate, Primitive, Sphere, Tube
+from .bodies import Box, Cylinder, Mesh, MeshFile, Plate, Primitive, Shards, Sphere, Tube, TwoTets
 from .tables import Axis
 
 Vector = tuple[float, float, float]
-Generated = Box | Plate | Cylinder | Tube | Sphere
+Generated = Box | Plate | Cylinder | Tube | Sphere | TwoTets | Shards
 
 AXES: tuple[Axis, Axis, Axis] = ("x", "y", "z")
 
@@ -30,7 +30,7 @@ def centre(mesh: Generated) -> Vector:
     """The point through which a sector is cut: the origin for a box, the centre or base of the other bodies."""
     if isinstance(mesh, Box):
         return (0.0, 0.0, 0.0)
-    return mesh.centre if isinstance(mesh, Sphere) else mesh.base
+    return mesh.centre if isinstance(mesh, Sphere | TwoTets) else mesh.base
 
 
 def whole_bounds(mesh: Generated) -> tuple[Vector, Vector]:
@@ -39,7 +39,11 @@ def whole_bounds(mesh: Generated) -> tuple[Vector, Vector]:
         return mesh.low, mesh.high
     if isinstance(mesh, Sphere):
         return _shift(mesh.centre, (-mesh.radius,) * 3), _shift(mesh.centre, (mesh.radius,) * 3)
+    if isinstance(mesh, Shards):
+        return mesh.base, _shift(mesh.base, tuple(n * pitch(mesh) for n in mesh.count))
     i, j = across(mesh.axis)
+    if isinstance(mesh, TwoTets):
+        return _two_tets(mesh, i, j)
     half = (mesh.width / 2, mesh.height / 2) if isinstance(mesh, Plate) else (mesh.radius, mesh.radius)
     along = mesh.thickness if isinstance(mesh, Plate) else mesh.length
     low, high = list(mesh.base), list(mesh.base)
@@ -47,6 +51,39 @@ def whole_bounds(mesh: Generated) -> tuple[Vector, Vector]:
     low[j], high[j] = low[j] - half[1], high[j] + half[1]
     high[index(mesh.axis)] += along
     return _vector(low), _vector(high)
+
+
+def _two_tets(mesh: TwoTets, i: int, j: int) -> tuple[Vector, Vector]:
+    """The common face has a corner in the direction i, and an edge across it."""
+    edge, low, high = mesh.element_size, [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
+    off = altitude(mesh) * math.tan(mesh.lean)
+    low[i], high[i] = min(-edge / math.sqrt(12.0), -off), max(edge / math.sqrt(3.0), off)
+    low[j], high[j] = -edge / 2.0, edge / 2.0
+    high[index(mesh.axis)] = altitude(mesh)
+    low[index(mesh.axis)] = -high[index(mesh.axis)]
+    return _shift(mesh.centre, tuple(low)), _shift(mesh.centre, tuple(high))
+
+
+def altitude(mesh: TwoTets) -> float:
+    """How far the free corners are from the common face, m."""
+    return mesh.element_size * math.sqrt(2.0 / 3.0)
+
+
+def side_areas(mesh: TwoTets) -> tuple[float, ...]:
+    """Areas of the six exposed faces of two tets, m^2: the edges of the common face look along 60, 180 and 300 deg."""
+    edge, off = mesh.element_size, altitude(mesh) * math.tan(mesh.lean)
+    feet = [edge / math.sqrt(12.0) + sign * off * share for sign in (-1.0, 1.0) for share in (0.5, -1.0, 0.5)]
+    return tuple(0.5 * edge * math.hypot(altitude(mesh), foot) for foot in feet)
+
+
+def pitch(mesh: Shards) -> float:
+    """Edge of the cube of a shard, m: the sphere round the tet, what its nodes are moved by, and the gap."""
+    return 2.0 * mesh.element_size * (math.sqrt(3.0 / 8.0) + math.sqrt(3.0) * mesh.perturbation) + mesh.gap
+
+
+def tets(mesh: TwoTets | Shards) -> int:
+    """How many tets a body has that is given tet by tet."""
+    return 2 if isinstance(mesh, TwoTets) else math.prod(mesh.count)
 
 
 def bounds(mesh: Mesh) -> tuple[Vector, Vector] | None:
@@ -60,10 +97,12 @@ def bounds(mesh: Mesh) -> tuple[Vector, Vector] | None:
 
 
 def volume(mesh: Generated) -> float:
-    """Volume of what is modelled, m^3."""
+    """Volume of what is modelled, m^3; of shards before their nodes are moved."""
     if isinstance(mesh, Box):
         low, high = bounds(mesh) or ((0.0,) * 3, (0.0,) * 3)
         return math.prod(max(0.0, b - a) for a, b in zip(low, high, strict=True))
+    if isinstance(mesh, TwoTets | Shards):
+        return tets(mesh) * mesh.element_size**3 / math.sqrt(72.0)
     share = {"full": 1.0, "half": 0.5, "quarter": 0.25}[mesh.sector]
     if isinstance(mesh, Plate):
         return share * mesh.width * mesh.height * mesh.thickness
@@ -74,11 +113,16 @@ def volume(mesh: Generated) -> float:
 
 
 def surface(mesh: Generated) -> float:
-    """Surface of what is modelled, m^2, the cut faces of a sector included."""
+    """Surface of what is modelled, m^2, the cut faces of a sector and both sides of a slit included."""
     if isinstance(mesh, Box | Plate):
         low, high = bounds(mesh) or ((0.0,) * 3, (0.0,) * 3)
         a, b, c = (y - x for x, y in zip(low, high, strict=True))
-        return 2.0 * (a * b + b * c + c * a)
+        slit = 2.0 * math.prod(slit_extents(mesh)) if mesh.slit is not None else 0.0
+        return 2.0 * (a * b + b * c + c * a) + slit
+    if isinstance(mesh, TwoTets):
+        return sum(side_areas(mesh))
+    if isinstance(mesh, Shards):
+        return tets(mesh) * math.sqrt(3.0) * mesh.element_size**2
     share = {"full": 1.0, "half": 0.5, "quarter": 0.25}[mesh.sector]
     cut = 0.0 if mesh.sector == "full" else 1.0
     if isinstance(mesh, Sphere):
@@ -89,12 +133,24 @@ def surface(mesh: Generated) -> float:
     return share * (ends + sides) + cut * 2.0 * (mesh.radius - inner) * mesh.length
 
 
+def slit_extents(mesh: Box | Plate) -> tuple[float, float]:
+    """How far the slit of a body reaches in it along the two directions across the slit's axis, m; 0 without one."""
+    if mesh.slit is None:
+        return 0.0, 0.0
+    low, high = bounds(mesh) or ((0.0,) * 3, (0.0,) * 3)
+    i, j = across(mesh.slit.axis)
+    first, second = (
+        max(0.0, min(high[d], mesh.slit.high[k]) - max(low[d], mesh.slit.low[k])) for k, d in enumerate((i, j))
+    )
+    return first, second
+
+
 def holds(mesh: Generated, point: Vector) -> bool:
-    """Whether ``point`` lies inside what is modelled."""
+    """Whether ``point`` lies inside what is modelled; inside its bounds where it is given tet by tet."""
     low, high = bounds(mesh) or ((0.0,) * 3, (0.0,) * 3)
     if not all(a <= x <= b for a, x, b in zip(low, point, high, strict=True)):
         return False
-    if isinstance(mesh, Box | Plate):
+    if isinstance(mesh, Box | Plate | TwoTets | Shards):
         return True
     from_centre = [x - c for x, c in zip(point, centre(mesh), strict=True)]
     if isinstance(mesh, Sphere):
@@ -114,9 +170,10 @@ def thinnest(mesh: Generated) -> float:
 
 
 def lowest_along(mesh: Generated, normal: Vector) -> float:
-    """The smallest value of ``normal . x`` over the whole body, m, for a unit normal."""
-    if isinstance(mesh, Box):
-        return sum(min(n * a, n * b) for n, a, b in zip(normal, mesh.low, mesh.high, strict=True))
+    """The smallest value of ``normal . x`` over the whole body, m, for a unit normal; over its bounds where it is given
+    tet by tet."""
+    if isinstance(mesh, Box | TwoTets | Shards):
+        return sum(min(n * a, n * b) for n, a, b in zip(normal, *whole_bounds(mesh), strict=True))
     start = _dot(normal, centre(mesh))
     if isinstance(mesh, Sphere):
         return start - mesh.radius

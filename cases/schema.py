@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field
 from .bodies import Mesh
 from .materials import Material
 from .tables import Axis, Count, Direction, Model, Name, Point, Positive, Velocity
-from .units import Acceleration, AngularSpeed, Length, Ratio, Speed, Temperature, Time
+from .units import Acceleration, AngularSpeed, Length, Rate, Ratio, Speed, Stress, Temperature, Time
 
 
 def _off(value: Any) -> Any:
@@ -23,6 +23,13 @@ class Spin(Model):
 
     centre: Point
     rate: tuple[AngularSpeed, AngularSpeed, AngularSpeed]
+
+
+class Stretch(Model):
+    """Uniform stretching: ``rate`` times the distance from ``centre`` is the velocity along each of x, y, z; 1/s."""
+
+    centre: Point = (0.0, 0.0, 0.0)
+    rate: tuple[Rate, Rate, Rate]
 
 
 class Turn(Model):
@@ -85,6 +92,10 @@ class Part(Model):
     """Only whole bodies can be turned, no sectors."""
     velocity: Velocity = (0.0, 0.0, 0.0)
     spin: Spin | None = None
+    stretch: Stretch | None = None
+    jitter: Annotated[Speed, Field(ge=0)] = 0.0
+    """Each node starts with a random velocity besides, each component between minus and plus this: the same in every
+    run."""
     temperature: Annotated[Temperature, Field(ge=0)] = 293.15
     erosion: Erosion | None = None
     fracture: Fracture | None = None
@@ -140,7 +151,18 @@ class Gravity(Model):
     parts: tuple[Name, ...] = ()
 
 
-Boundary = Annotated[Symmetry | Wall | Prescribed | Rotation | Gravity, Field(discriminator="kind")]
+class Traction(Model):
+    """A force per initial area, Pa, on the exposed faces whose three nodes start inside the box ``low``..``high`` (all
+    of the parts when absent): constant from the first moment on, and turning with nothing."""
+
+    kind: Literal["traction"]
+    stress: tuple[Stress, Stress, Stress]
+    parts: tuple[Name, ...] = ()
+    low: Point | None = None
+    high: Point | None = None
+
+
+Boundary = Annotated[Symmetry | Wall | Prescribed | Rotation | Gravity | Traction, Field(discriminator="kind")]
 
 
 class ContactPair(Model):

@@ -1,4 +1,4 @@
-"""Gravity, symmetry planes, rigid walls, prescribed motion: what acts on velocities between the kick and the move.
+"""Gravity, tractions, symmetry planes, walls, prescribed motion: what acts on velocities between kick and move.
 
 Each books the work that it does on the body. An impulse at time n does it in two halves, with the velocity before and
 after: at time n only the first has been spent (the kinetic energy of the ledger is 1/2 m v(n-1/2) . v(n+1/2)), and the
@@ -151,6 +151,21 @@ class Gravity(Driver):
         self._book()
 
 
+class Traction(Driver):
+    """A constant ``force`` (n, 3), N, over the mean step of the kick."""
+
+    def __init__(self, nodes: Indices, force: Floats) -> None:
+        super().__init__(nodes)
+        self.force = force
+        self._last_dt = 0.0
+
+    def apply(self, state: Nodes, dt: float, t: float) -> None:
+        self._impulse = 0.5 * (self._last_dt + dt) * self.force
+        self._last_dt = dt
+        state.v[self.nodes] += self._impulse / state.mass[self.nodes, None]
+        self._book()
+
+
 class PrescribedVelocity(Driver):
     """Nodes whose velocity has given components; NaN leaves a component free."""
 
@@ -235,9 +250,9 @@ def _push_out(x, v, impulse, mass, nodes, points, normals, held, dt):  # type: i
     return pushed
 
 
-def build(case: schema.Case, model: Model, comm: Comm) -> list[Boundary]:
-    """The boundaries of a case on this rank's nodes: gravity first, so that what is held stays held; walls last, and
-    they leave alone what has a prescribed motion.
+def build(case: schema.Case, model: Model, traction: Floats, comm: Comm) -> list[Boundary]:
+    """The boundaries of a case on this rank's nodes: gravity and tractions first, so that what is held stays held;
+    walls last, and they leave alone what has a prescribed motion. ``traction`` (k, n, 3): the forces of the tractions.
 
     Raises InputError, on every rank alike, for a boundary that holds no node, a body that starts behind a wall, and
     motion prescribed across a symmetry plane.
@@ -251,6 +266,7 @@ def build(case: schema.Case, model: Model, comm: Comm) -> list[Boundary]:
     boundaries: list[Boundary] = [
         Gravity(_indices(h), np.array(spec.acceleration)) for spec, h in pairs if isinstance(spec, schema.Gravity)
     ]
+    boundaries += [Traction(_indices(loaded), force[loaded]) for force in traction for loaded in [force.any(axis=1)]]
     boundaries += [
         SymmetryPlane(_indices(h), _AXES[spec.axis]) for spec, h in pairs if isinstance(spec, schema.Symmetry)
     ]

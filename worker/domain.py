@@ -16,9 +16,10 @@ from conoid.cases.library import material as find_material
 from .contact import overlap, pairing
 from .elements import wear
 from .errors import InputError
+from .hashing import uniform
 from .materials import models
 from .mesh.build import build as build_mesh
-from .mesh.faces import FACES, across
+from .mesh.faces import FACES, across, boundary_faces, normals
 from .parallel.comm import Comm
 from .parallel.decompose import bisect
 from .parallel.ownership import Neighbour
@@ -39,6 +40,9 @@ from .state import (
     chunked,
 )
 
+_JITTER = 0x6A697474
+"""Seed of the random velocities of the start."""
+
 
 @dataclass
 class Whole:
@@ -54,6 +58,8 @@ class Whole:
     node_volume: Floats
     mass: Floats
     velocity: Floats
+    traction: Floats
+    """(k, nodes, 3) forces of the k tractions of the case, N."""
 
 
 @dataclass
@@ -68,6 +74,8 @@ class Piece:
     velocity: Floats
     mass: Floats
     node_volume: Floats
+    traction: Floats
+    """(k, nodes, 3) complete forces of the k tractions of the case, N."""
     tet_ids: Ints
     tet_part: Indices
     tets: Indices
@@ -108,7 +116,7 @@ def assemble(case: schema.Case, folder: Path) -> Whole:
         points=x, node_part=part_of_node, tets=t, tet_part=part_of_tet, volumes=volumes,
         across=behind,
         node_volume=_quarters(t, volumes, len(x)), mass=_quarters(t, volumes * np.array(density)[part_of_tet], len(x)),
-        velocity=_velocities(case, x, part_of_node),
+        velocity=_velocities(case, x, part_of_node), traction=_tractions(case, x, part_of_node, t),
     )  # fmt: skip
 
 
@@ -162,7 +170,32 @@ def _velocities(case: schema.Case, x: Floats, part: Indices) -> Floats:
         v[chosen] = spec.velocity
         if spec.spin is not None:
             v[chosen] += np.cross(np.array(spec.spin.rate), x[chosen] - np.array(spec.spin.centre))
+        if spec.stretch is not None:
+            v[chosen] += np.array(spec.stretch.rate) * (x[chosen] - np.array(spec.stretch.centre))
+        if spec.jitter > 0.0:
+            places = 3 * np.flatnonzero(chosen)[:, None] + np.arange(3)
+            v[chosen] += spec.jitter * (2.0 * uniform(places, _JITTER) - 1.0)
     return v
+
+
+def _tractions(case: schema.Case, x: Floats, part: Indices, tets: Indices) -> Floats:
+    """(k, n, 3) forces of the tractions of the case on the nodes, N: a third of each face's, in the order of the tets.
+
+    Raises InputError for one that acts on no face.
+    """
+    found = [(i, spec) for i, spec in enumerate(case.boundaries) if isinstance(spec, schema.Traction)]
+    forces = np.zeros((len(found), len(x), 3))
+    faces = boundary_faces(tets) if found else np.zeros((0, 3), np.int32)
+    for force, (index, spec) in zip(forces, found, strict=True):
+        chosen = np.isin(part, [i for i, p in enumerate(case.parts) if not spec.parts or p.name in spec.parts])
+        if spec.low is not None and spec.high is not None:
+            chosen &= ((x >= np.array(spec.low)) & (x <= np.array(spec.high))).all(axis=1)
+        loaded = faces[chosen[faces].all(axis=1)]
+        if not len(loaded):
+            raise InputError(f"boundaries[{index}]: acts on no face; check its box and its parts")
+        area = 0.5 * np.linalg.norm(normals(x, loaded), axis=1)
+        np.add.at(force, loaded, (area[:, None] / 3.0 * np.array(spec.stress))[:, None, :])
+    return forces
 
 
 def cut(whole: Whole, ranks: int) -> list[Piece]:
@@ -206,7 +239,8 @@ def _piece(
     tets = whole.tets[ids]
     return Piece(
         nodes.astype(np.int64), whole.node_part[nodes], home[nodes], home[nodes] == rank, whole.points[nodes],
-        whole.velocity[nodes], whole.mass[nodes], whole.node_volume[nodes], ids.astype(np.int64),
+        whole.velocity[nodes], whole.mass[nodes], whole.node_volume[nodes], whole.traction[:, nodes],
+        ids.astype(np.int64),
         whole.tet_part[ids], local[tets], whole.volumes[ids],
         whole.across[ids] if len(whole.across) else whole.across, np.any(shared[tets], axis=1), neighbours, totals,
         np.searchsorted(whole.tet_part, np.arange(whole.tet_part[-1] + 1)), float(np.abs(whole.points).max()),

@@ -7,6 +7,8 @@ from conoid.cases.load import parse_case
 from .scenes import problems, rod, said
 
 BOX = 'parts[0].mesh={shape="box", low=[0, 0, 0], high=["1 mm", "1 mm", "9 mm"], element_size="0.5 mm"}'
+SLIT = BOX[:-1] + ', generator="structured", slit={axis="z", at="3 mm", low=[0, 0], high=["0.5 mm", "1 mm"]}}'
+SHARDS = 'parts[0].mesh={shape="shards", count=[2, 2, 2], element_size="1 mm"}'
 TUBE = 'parts[0].mesh={shape="tube", inner_radius="2 mm", radius="3 mm", length="30 mm", element_size="0.5 mm"}'
 
 
@@ -14,6 +16,9 @@ def test_the_rod_is_sound() -> None:
     parse_case(rod())
     parse_case(rod("parts[0].material=copper_taylor", "parts[0].erosion={plastic_strain=1}"))
     parse_case(rod(TUBE))
+    parse_case(rod(SLIT, "probes=[]"))
+    parse_case(rod(SHARDS, "probes=[]"))
+    parse_case(rod('parts[0].mesh={shape="two_tets", element_size=1, centre=[0, 0, 1]}', "probes=[]"))
 
 
 @pytest.mark.parametrize(
@@ -33,6 +38,17 @@ def test_the_rod_is_sound() -> None:
         (["parts[0].mesh.grading={near=0, far=1, far_size='0.5 mm'}"], "parts[0].mesh.grading.far_size", "below the"),
         (["parts[0].mesh.grading={near=0, far=1, far_size=1}", "parts[0].mesh.generator=structured"],
          "parts[0].mesh.grading", "remove grading, or use gmsh"),
+        ([SLIT, "probes=[]", "parts[0].mesh.generator=gmsh"], "parts[0].mesh.slit", "set generator = 'structured'"),
+        ([SLIT, "probes=[]", "parts[0].mesh.slit.at=3.1 mm"], "parts[0].mesh.slit.at", "every 0.0005 m from z = 0 m"),
+        ([SLIT, "probes=[]", "parts[0].mesh.slit.at=9 mm"], "parts[0].mesh.slit.at", "inside the body"),
+        ([SLIT, "probes=[]", "parts[0].mesh.slit.high[1]=0.6 mm"], "parts[0].mesh.slit.high[1]", "or outside the body"),
+        ([SLIT, "probes=[]", "parts[0].mesh.slit.low[1]=1 mm"], "parts[0].mesh.slit.high[1]", "must be above low[1]"),
+        ([SLIT, "probes=[]", "parts[0].mesh.slit.low[1]=0.5 mm", "parts[0].mesh.slit.high[1]=3 mm",
+          "parts[0].mesh.slit.low[0]=-2 mm", "parts[0].mesh.slit.high[0]=-1 mm"], "parts[0].mesh.slit", "outside the"),
+        ([SHARDS, "probes=[]", "parts[0].mesh.count[0]=0"], "parts[0].mesh.count[0]", "greater than or equal to 1"),
+        ([SHARDS, "probes=[]", "parts[0].mesh.perturbation=0.2"], "parts[0].mesh.perturbation", "less than or equal"),
+        ([SHARDS, "probes=[]", "parts[0].mesh.sector=half"], "parts[0].mesh.sector", "'full'"),
+        ([SHARDS, "probes=[]", "parts[0].mesh.axis=x"], "parts[0].mesh.axis", "unknown key"),
         (["boundaries[1].axis=z"], "parts[0].mesh.sector", "axis = 'x', at = 0 for part 'rod'"),
         (["boundaries[2].at=1 mm"], "parts[0].mesh.sector", "axis = 'y', at = 0 for part 'rod'"),
         (["boundaries[0].normal=[0, 0, 0]"], "boundaries[0].normal", "must not be zero"),
@@ -40,6 +56,12 @@ def test_the_rod_is_sound() -> None:
         (["boundaries[0].point=[0, 0, '1 mm']"], "boundaries[0]", "part 'rod' starts 0.001 m behind this wall"),
         (["boundaries[0]={kind='gravity', acceleration=[0, 0, 0]}"], "boundaries[0].acceleration", "must not be zero"),
         (["boundaries[0]={kind='gravity', acceleration=[0, 0, 1], parts=['a']}"], "boundaries[0].parts[0]", "no part"),
+        (["boundaries[0]={kind='traction', stress=[0, 0, 0]}"], "boundaries[0].stress", "must not be zero"),
+        (["boundaries[0]={kind='traction', stress=[0, 0, 1], high=[0, 0, 0]}"], "boundaries[0]", "give both low and"),
+        (["boundaries[0]={kind='traction', stress=[0, 0, 1], low=[0, 0, 1], high=[1, 1, 0]}"], "boundaries[0].high[2]",
+         "below low[2]"),
+        (["boundaries[0]={kind='traction', stress=[0, 0, 1], parts=['a']}"], "boundaries[0].parts[0]", "no part"),
+        (["parts[0].jitter=-1"], "parts[0].jitter", "greater than or equal to 0"),
         (["boundaries[0]={kind='velocity'}"], "boundaries[0]", "prescribes nothing"),
         (["boundaries[0]={kind='velocity', x=1, low=[0, 0, 0]}"], "boundaries[0]", "give both low and high"),
         (["boundaries[0]={kind='velocity', x=1, low=[0, 0, 1], high=[1, 1, 0]}"], "boundaries[0].high[2]", "low[2]"),

@@ -31,7 +31,13 @@ STRUCTURED = [
     {"shape": "tube", "inner_radius": 0.6, "radius": 1, "length": 1, "element_size": 0.1},
     {"shape": "tube", "inner_radius": 0.6, "radius": 1, "length": 1, "element_size": 0.1, "sector": "half"},
     {"shape": "tube", "inner_radius": 0.6, "radius": 1, "length": 1, "element_size": 0.1, "sector": "quarter"},
-]
+    {"shape": "box", "low": (0, 0, 0), "high": (1, 2, 3), "element_size": 0.25,
+     "slit": {"axis": "z", "at": 1, "low": (0.25, -1), "high": (0.75, 1.5)}},
+    {"shape": "plate", "width": 2, "height": 3, "thickness": 0.2, "element_size": 0.1,
+     "slit": {"axis": "y", "at": 0.3, "low": (0, -1.5), "high": (0.2, 0.5)}},
+    {"shape": "two_tets", "element_size": 0.2},
+    {"shape": "shards", "count": (9, 10, 11), "element_size": 0.2, "perturbation": 0.1, "seed": 3},
+]  # fmt: skip
 UNSTRUCTURED = [
     {"shape": "box", "low": (0, 0, 0), "high": (1, 1, 2), "element_size": 0.15},
     {"shape": "sphere", "radius": 1, "element_size": 0.2, "sector": "half"},

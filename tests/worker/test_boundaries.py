@@ -7,12 +7,15 @@ import numpy as np
 import pytest
 
 from conoid.cases import materials
-from conoid.worker import step
+from conoid.worker import domain, step
+from conoid.worker.boundaries import Traction
+from conoid.worker.errors import InputError
+from conoid.worker.mesh.faces import boundary_faces
 from conoid.worker.simulation import Simulation
 from conoid.worker.state import PRESSURE, S_ZZ, WORK, Flags
 
 from ..contact.bodies import meeting_of, moved
-from .kernels import COPPER, STEEL, Watch, around, build, run, scene
+from .kernels import COPPER, STEEL, Watch, around, build, run, scene, whole_of
 from .meshes import Floats, block
 
 MESH = block((3, 3, 3), 1e-3, seed=2)
@@ -212,6 +215,110 @@ def test_gravity_does_not_move_what_is_held(hold: dict[str, Any], rows: Flags, a
 
     run(sim, look)
     assert np.abs(sim.model.nodes.v[:, 1]).max() > 1.0
+    assert sim.ledger.worst < 1e-3
+
+
+PULL: dict[str, Any] = {"kind": "traction", "stress": (2e6, -1e6, 5e7)}
+TOP: dict[str, Any] = {"low": (0.0, 0.0, 2.9e-3), "high": (1.0, 1.0, 1.0)}
+
+
+def pushed(sim: Simulation) -> Traction:
+    (boundary,) = (b for b in sim.boundaries if isinstance(b, Traction))
+    return boundary
+
+
+def booked(sim: Simulation, before: Floats) -> None:
+    sim.ledger.close(before)
+
+
+def test_a_traction_loads_the_faces_in_its_box() -> None:
+    """Each node by a third of the faces of the top round it: the sum is stress times area."""
+    sim = with_boundary({**PULL, **TOP})
+    load, top = pushed(sim), np.flatnonzero(MESH.points[:, 2] > 2.9e-3)
+    assert load.nodes.tolist() == top.tolist()
+    assert load.force.sum(axis=0) == pytest.approx(9e-6 * np.array(PULL["stress"]), rel=1e-13)
+    shares = np.zeros(len(MESH.points))
+    for face in boundary_faces(MESH.tets):
+        if set(face) <= set(top.tolist()):
+            (a, b), (c, d) = (MESH.points[face[k]][:2] - MESH.points[face[0]][:2] for k in (1, 2))
+            shares[face] += abs(a * d - b * c) / 6.0
+    assert load.force == pytest.approx(shares[top, None] * np.array(PULL["stress"]), rel=1e-12)
+
+
+def test_a_traction_on_the_whole_surface_is_no_force_on_the_nodes_inside() -> None:
+    load = pushed(with_boundary(PULL))
+    inside = ((MESH.points > 1e-9) & (MESH.points < 3e-3 - 1e-9)).all(axis=1)
+    assert load.nodes.tolist() == np.flatnonzero(~inside).tolist()
+    assert load.force.sum(axis=0) == pytest.approx(54e-6 * np.array(PULL["stress"]), rel=1e-12)
+
+
+@pytest.mark.parametrize("ranks", [2, 3, 5])
+def test_every_rank_has_the_whole_load_of_its_nodes(ranks: int) -> None:
+    whole = whole_of(MESH, scene(STEEL, boundaries=({**PULL, **TOP}, PULL)))
+    assert whole.traction.shape == (2, len(MESH.points), 3)
+    for piece in domain.cut(whole, ranks):
+        assert (piece.traction == whole.traction[:, piece.node_ids]).all()
+
+
+def test_a_traction_without_a_face_is_refused() -> None:
+    for box in ({"low": (0.0, 0.0, 1.4e-3), "high": (1.0, 1.0, 1.6e-3)}, {"parts": ("nobody",)}):
+        with pytest.raises(InputError, match=r"^boundaries\[1\]: acts on no face; check its box and its parts$"):
+            build(scene(STEEL, boundaries=(GRAVITY, {**PULL, **box})), [MESH])
+
+
+def test_a_free_body_under_traction_is_accelerated_exactly() -> None:
+    """x(n) and v(n+1/2) of the centre of mass, with steps of any size; the books of its work close."""
+    sim = with_boundary({**PULL, **TOP}, end=3e-6, velocity=(3.0, 0.0, -5.0), dt_growth=2.0)
+    nodes, flight = sim.model.nodes, np.array([3.0, 0.0, -5.0])
+    a = 9e-6 * np.array(PULL["stress"]) / (7850.0 * 27e-9)
+    start, steps = np.average(nodes.x, axis=0, weights=nodes.mass), set()
+
+    def look(sim: Simulation, before: Floats) -> None:
+        t, dt = sim.clock.t, sim.clock.dt
+        centre, v = (np.average(values, axis=0, weights=nodes.mass) for values in (nodes.x, nodes.v))
+        assert v == pytest.approx(flight + a * (t + 0.5 * dt), rel=1e-10, abs=1e-10)
+        assert np.abs(centre - start - flight * t - 0.5 * a * t * t).max() < 1e-12 * 1e-3
+        sim.ledger.close(before)
+        steps.add(dt)
+
+    run(sim, uneven(look))
+    assert len(steps) > 10
+    assert np.linalg.norm(a) * sim.clock.t > 5.0
+    assert sim.ledger.worst < 1e-3
+
+
+def pulled(length: float, end: float, **keys: Any) -> Simulation:
+    """A bar of 2 x 2 mm and ``length`` m that begins at a symmetry plane; 100 MPa pull at its free end."""
+    load = {"kind": "traction", "stress": (0.0, 0.0, 1e8), "low": (0.0, 0.0, length), "high": (1.0, 1.0, length)}
+    planes = ({"kind": "symmetry", "axis": axis} for axis in "xyz")
+    mesh = block((2, 2, round(length / 1e-3)), 1e-3, shake=0.0)
+    return build(scene(BAR, end=end, boundaries=(load, *planes), **keys), [mesh])
+
+
+def test_a_bar_carries_the_traction_at_its_end() -> None:
+    """Damped until it rests: the stress in every tet is the traction."""
+    sim = pulled(4e-3, 1e-4, viscosity={"linear": 1.0})
+    run(sim)
+    stress = sim.model.blocks[0].row(S_ZZ) - sim.model.blocks[0].row(PRESSURE)
+    assert stress == pytest.approx(1e8, rel=1e-3)
+
+
+def test_a_traction_does_the_work_of_the_wave_that_it_sends() -> None:
+    """Until the wave is back the end moves at stress / (rho c): so much force times way is in the books."""
+    sim = pulled(16e-3, 5e-6)
+    run(sim, booked)
+    speed = 1e8 / math.sqrt(200e9 * 7850.0)
+    external = float(sim.boundaries[0].external_work.sum())
+    assert external == pytest.approx(1e8 * 4e-6 * speed * 5e-6, rel=0.01)
+    assert sim.ledger.worst < 1e-3
+
+
+def test_a_traction_does_not_move_what_is_held() -> None:
+    hold = {"kind": "velocity", "z": 7.0, **TOP}
+    sim = build(scene(STEEL, end=1e-6, boundaries=(hold, {**PULL, **TOP})), [MESH])
+    run(sim, booked)
+    top = MESH.points[:, 2] > 2.9e-3
+    assert (sim.model.nodes.v[top, 2] == 7.0).all()
     assert sim.ledger.worst < 1e-3
 
 

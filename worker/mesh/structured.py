@@ -9,12 +9,14 @@ import itertools
 import numpy as np
 from numpy.typing import NDArray
 
-from conoid.cases.bodies import Box, Cylinder, Plate, Tube
+from conoid.cases.bodies import Box, Cylinder, Plate, Shards, Tube, TwoTets
 from conoid.cases.geometry import Generated
 
 from ..errors import MeshError
 from .frame import block, refuse_impossible, to_space
+from .loose import shards, two_tets
 from .model import Floats, Ints, TetMesh
+from .slit import opened
 
 Cells = tuple[NDArray[np.int64], NDArray[np.int64]]
 """Near and far node number of each cell along one direction."""
@@ -23,10 +25,15 @@ Lines = NDArray[np.int64]
 
 
 def structured(body: Generated, key: str = "mesh") -> TetMesh:
-    """The regular mesh of a box, plate, cylinder or tube; MeshError, naming ``key``, for anything else."""
+    """The regular mesh of a body, all but a sphere; MeshError, naming ``key``."""
     refuse_impossible(body, key)
     if body.grading is not None:
         raise MeshError(f"{key}.grading: the structured generator has one element size; remove it, or use gmsh")
+    if isinstance(body, Shards):
+        return shards(body)
+    if isinstance(body, TwoTets):
+        corners, pair = two_tets(body)
+        return TetMesh(to_space(body, corners), pair)
     if isinstance(body, Box | Plate):
         points, shape, cells = _block(body)
     elif isinstance(body, Cylinder):
@@ -35,7 +42,8 @@ def structured(body: Generated, key: str = "mesh") -> TetMesh:
         points, shape, cells = _tube(body)
     else:
         raise MeshError(f"{key}.generator = 'structured': there is no regular mesh of a {body.shape}; use gmsh")
-    return TetMesh(to_space(body, points), _cut(shape, cells, body.split))
+    mesh = TetMesh(to_space(body, points), _cut(shape, cells, body.split))
+    return opened(body, mesh) if isinstance(body, Box | Plate) else mesh
 
 
 def divisions(length: float, size: float) -> int:

@@ -11,6 +11,7 @@ from typing import Any
 from conoid.cases.bodies import Box, Cylinder, Grading, Plate, Sphere, Tube
 from conoid.cases.geometry import AXES, Generated
 
+from ..errors import MeshError
 from .frame import block, directions, refuse_impossible, to_frame, to_space
 from .gmsh_session import session, tet_mesh
 from .model import REGULAR_STEP, TetMesh
@@ -62,8 +63,10 @@ def _draw(gmsh: Any, body: Generated, scale: float) -> None:
         gmsh.model.occ.addBox(*low, *(b - a for a, b in zip(low, high, strict=True)))
     elif isinstance(body, Sphere):
         _draw_sphere(gmsh.model.occ, body, scale)
-    else:
+    elif isinstance(body, Cylinder | Tube):
         _draw_cylinder(gmsh.model.occ, body, scale)
+    else:
+        raise MeshError(f"gmsh does not draw {body.shape}; use generator = 'structured'")
 
 
 def _draw_sphere(occ: Any, body: Sphere, scale: float) -> None:

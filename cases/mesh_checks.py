@@ -1,0 +1,87 @@
+"""What the models cannot check one by one in a mesh: sizes that must fit, slits on planes of nodes."""
+
+from collections.abc import Iterator
+
+from .bodies import Box, Loose, Mesh, MeshFile, Plate, Primitive, Tube
+from .geometry import AXES, across, cut_directions, index, thinnest
+from .mesh_size import Row, grid, slit_lines
+from .problems import Location, Problem, problem
+from .tables import Axis
+
+
+def check_mesh(mesh: Mesh, location: Location) -> Iterator[Problem]:
+    """Every problem of a mesh that stands at ``location``."""
+    if isinstance(mesh, MeshFile):
+        if "://" in mesh.path or not mesh.path.strip():
+            yield problem((*location, "path"), mesh.path, "expected the path of a .msh or .inp file")
+        return
+    yield from _grading(mesh, location)
+    if isinstance(mesh, Tube) and mesh.inner_radius >= mesh.radius:
+        yield problem((*location, "inner_radius"), mesh.inner_radius, f"must be below the radius, {mesh.radius} m")
+        return
+    if isinstance(mesh, Box):
+        empty = [d for d in range(3) if mesh.low[d] >= mesh.high[d]]
+        for d in empty:
+            yield problem((*location, "high", d), mesh.high[d], f"must be above low[{d}], {mesh.low[d]} m")
+        if empty:
+            return
+        away = [d for d in cut_directions(mesh, mesh.axis) if mesh.high[d] <= 0]
+        for d in away:
+            yield problem((*location, "high", d), mesh.high[d], f"a {mesh.sector} box keeps the side {AXES[d]} > 0")
+        if away:
+            return
+    if not isinstance(mesh, Loose) and mesh.element_size > thinnest(mesh) * (1 + 1e-9):
+        message = f"must not be above the smallest extent of what is modelled, {thinnest(mesh):g} m"
+        yield problem((*location, "element_size"), mesh.element_size, message)
+    elif isinstance(mesh, Box | Plate):
+        yield from _slit(mesh, (*location, "slit"))
+
+
+def _slit(mesh: Box | Plate, location: Location) -> Iterator[Problem]:
+    slit = mesh.slit
+    if slit is None:
+        return
+    if mesh.generator != "structured":
+        yield problem(location, ..., "only the structured generator makes slits; set generator = 'structured'")
+        return
+    rows = grid(mesh)
+    if not (_between(rows[index(slit.axis)], slit.at) and _on_plane(rows[index(slit.axis)], slit.at)):
+        yield problem(
+            (*location, "at"), slit.at, f"must be a plane of nodes inside the body; {_planes(mesh, slit.axis)}"
+        )
+    for k, d in enumerate(across(slit.axis)):
+        if slit.low[k] >= slit.high[k]:
+            yield problem((*location, "high", k), slit.high[k], f"must be above low[{k}], {slit.low[k]}")
+            return
+        for key, x in (("low", slit.low[k]), ("high", slit.high[k])):
+            if _between(rows[d], x) and not _on_plane(rows[d], x):
+                message = f"must be a plane of nodes, or outside the body; {_planes(mesh, AXES[d])}"
+                yield problem((*location, key, k), x, message)
+    if 0 in slit_lines(mesh):
+        yield problem(location, ..., "is outside the body, or too narrow: no node lies within its border")
+
+
+def _planes(mesh: Box | Plate, axis: Axis) -> str:
+    row = grid(mesh)[index(axis)]
+    return f"they stand every {row.spacing:g} m from {axis} = {row.start:g} m"
+
+
+def _between(row: Row, x: float) -> bool:
+    return 0 < row.place(x) < row.cells
+
+
+def _on_plane(row: Row, x: float) -> bool:
+    return row.place(x) == round(row.place(x))
+
+
+def _grading(mesh: Primitive, location: Location) -> Iterator[Problem]:
+    if mesh.grading is None:
+        return
+    grading, location = mesh.grading, (*location, "grading")
+    if mesh.generator == "structured":
+        yield problem(location, ..., "the structured generator has one element size; remove grading, or use gmsh")
+    if grading.near >= grading.far:
+        yield problem((*location, "near"), grading.near, f"must be below far, {grading.far} m")
+    if grading.far_size < mesh.element_size:
+        message = f"must not be below the element size, {mesh.element_size} m"
+        yield problem((*location, "far_size"), grading.far_size, message)

@@ -1,0 +1,35 @@
+"""A crack that is there from the start: the nodes on it are doubled, so that the faces on both sides are exposed."""
+
+import numpy as np
+
+from conoid.cases.bodies import Box, Plate
+from conoid.cases.geometry import across, bounds, index
+
+from .model import TetMesh
+
+_NEAR = 1e-6
+"""Of the element size: closer than this is on a plane."""
+
+
+def opened(body: Box | Plate, mesh: TetMesh) -> TetMesh:
+    """The mesh with the nodes of the body's slit doubled; the copies belong to the tets on the positive side.
+
+    Nodes on the border of the slit keep both sides together, unless that border lies on the surface of the body.
+    """
+    slit = body.slit
+    if slit is None:
+        return mesh
+    near, normal = _NEAR * body.element_size, index(slit.axis)
+    lowest, highest = bounds(body) or ((0.0,) * 3, (0.0,) * 3)
+    doubled = np.abs(mesh.points[:, normal] - slit.at) < near
+    for low, high, d in zip(slit.low, slit.high, across(slit.axis), strict=True):
+        x = mesh.points[:, d]
+        doubled &= (x > low + near) | (low < lowest[d] + near)
+        doubled &= (x < high - near) | (high > highest[d] - near)
+    nodes = np.flatnonzero(doubled)
+    copies = np.arange(len(mesh.points), dtype=np.int32)
+    copies[nodes] = len(mesh.points) + np.arange(len(nodes))
+    behind = mesh.points[mesh.tets, normal].mean(axis=1) > slit.at
+    return TetMesh(
+        np.concatenate([mesh.points, mesh.points[nodes]]), np.where(behind[:, None], copies[mesh.tets], mesh.tets)
+    )
