@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 
 from conoid.cases.bodies import TwoTets
@@ -12,6 +13,8 @@ from conoid.cases.library import library
 from conoid.cases.load import parse_json, read_case, resolved_json, shipped
 from conoid.cases.materials import JohnsonCook
 from conoid.cases.schema import Case, Prescribed, Reference
+
+from .one_dimension import broken_rod
 
 NAMES = sorted(shipped())
 TAYLOR = ["demo", "taylor_42crmo4", "taylor_copper", "taylor_copper_split"]
@@ -352,6 +355,44 @@ def test_spall_glass() -> None:
     assert (target + 2 * depth) / c < least.until < 3 * flyer / c
     unbroken = speed * (3 - least.until * c / flyer)
     assert unbroken < least.value - least.tolerance
+
+
+def test_a_spall_of_eighty_layers_in_one_dimension() -> None:
+    """The rear's velocity falls by the pull-back, less what the mesh smears, when the theory says so; not unbroken."""
+    glass, flyer, layers = library()["soda_lime"], 5e-3, 80
+    assert glass.brittle is not None
+    c, h, v = wave_speed(glass), flyer / layers, np.zeros((3 * layers, 2))
+    v[:layers] = 21.0 * (np.arange(layers)[:, None] + np.arange(2)) / layers
+    found = {}
+    for strength in (glass.brittle.strength, np.inf):
+        joints = np.full(3 * layers - 1, strength)
+        joints[: layers - 1], joints[layers - 1] = np.inf, 0.0
+        rod = broken_rod(h, v, glass.density * c**2, glass.density, joints, 0.0, 2.6e-6, (0.06, 1.5), step=0.4)
+        seen = (rod.t > 1.918e-6) & (rod.t < 2.53e-6)
+        found[strength] = rod.end[seen].min(), rod.t[seen][rod.end[seen].argmin()]
+    assert found[glass.brittle.strength] == pytest.approx((7.4, 2.32e-6), rel=0.01)
+    assert found[np.inf][0] < 2.5
+
+
+def test_the_stretched_bar_in_one_dimension() -> None:
+    """With elements of the case's size: peak of the mean stress; four fifths or more of the 40 pieces of the fit."""
+    case = load("stretched_bar")
+    made, n, rate = case.materials["ceramic"], 200, 35700.0
+    assert made.brittle is not None
+    nodes = np.linspace(-5e-3, 5e-3, n + 1)
+    v = rate * np.stack([nodes[:-1], nodes[1:]], axis=1)
+    pieces = []
+    for seed in range(3):
+        scatter = (-np.log(1.0 - np.random.default_rng(seed).random(n - 1))) ** 0.01
+        rod = broken_rod(
+            10e-3 / n, v, made.elastic.young, made.density, made.brittle.strength * scatter,
+            made.brittle.energy, 0.5e-6, held=True,
+        )  # fmt: skip
+        assert rod.stress.max() == pytest.approx(322e6, rel=0.01)
+        pieces.append(float(rod.apart[-1]) + 1.0)
+    assert np.abs(np.array(pieces) - 36.0).max() <= 4.0
+    peak = next(entry for entry in case.reference if entry.quantity == "probe_max")
+    assert abs(peak.value - 322e6) < peak.tolerance
 
 
 def test_stretched_bar() -> None:
