@@ -71,8 +71,8 @@ class Ledger:
         self.worst = max(self.worst, residual)
         return Energy(
             kinetic=kinetic_sum, elastic=float(work - plastic), plastic=plastic_sum, viscous=viscous_sum,
-            contact=loss_sum - friction, friction=friction, eroded=eroded, fracture=lost, cohesive=cohesive, external=external_sum,
-            initial=self.initial, residual=residual,
+            contact=loss_sum - friction, friction=friction, eroded=eroded, fracture=lost, cohesive=cohesive,
+            external=external_sum, initial=self.initial, residual=residual,
         )  # fmt: skip
 
     def _node_sum(self, values: Floats) -> float:

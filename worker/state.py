@@ -96,6 +96,11 @@ class Nodes:
         """Number of nodes on this rank."""
         return len(self.id)
 
+    def places(self, ids: Ints) -> Indices:
+        """Local indices of nodes with these global ids, -1 for those that are not here."""
+        at = np.minimum(np.searchsorted(self.id, ids), len(self.id) - 1)
+        return np.where(self.id[at] == ids, at, -1).astype(np.int32)
+
     def grow(self, copies: "Copies") -> None:
         """Takes up copies of nodes: they begin as their parents are, whose mass is their own less the copies'."""
         for name in ("part", "x0", "x", "v"):

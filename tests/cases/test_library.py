@@ -104,3 +104,11 @@ def test_the_glass_has_the_strengths_that_it_was_derived_from() -> None:
     poisson = made.elastic.poisson
     assert math.isclose(law.strength_cap or 0.0, 5e9 * (1.0 - 2.0 * poisson) / (1.0 - poisson), rel_tol=4e-3)
     assert (made.density, made.elastic) == (library()["soda_lime"].density, library()["soda_lime"].elastic)
+
+
+def test_the_fracture_energy_of_glass_is_that_of_its_toughness() -> None:
+    made = library()["soda_lime"]
+    assert made.brittle is not None
+    toughness = 0.75e6**2 * (1.0 - made.elastic.poisson**2) / made.elastic.young
+    assert made.brittle.energy == pytest.approx(toughness, rel=5e-3)
+    assert (made.brittle.strength, provenance("soda_lime")["brittle.strength"][0]) == (1e8, "paper")

@@ -74,7 +74,7 @@ def test_all_errors_at_once() -> None:
 @pytest.mark.parametrize(
     ("override", "key", "message"),
     [
-        ("parts[0].mesh.shape=cilinder", "parts[0].mesh.shape", "'box', 'plate', 'cylinder', 'tube', 'sphere', 'file'"),
+        ("parts[0].mesh.shape=cilinder", "parts[0].mesh.shape", "'plate', 'cylinder', 'tube', 'sphere', 'two_tets'"),
         ("boundaries[0].kind=wal", "boundaries[0].kind", "'symmetry', 'wall', 'velocity', 'rotation'"),
         ("probes[0].field=stress", "probes[0].field", "'stress_xx'"),
         ("reference[0].quantity=length", "reference[0].quantity", "'extent'"),

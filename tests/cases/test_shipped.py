@@ -3,13 +3,18 @@
 import math
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 
-from conoid.cases.estimate import estimate
+from conoid.cases.bodies import TwoTets
+from conoid.cases.estimate import estimate, wave_speed
+from conoid.cases.geometry import altitude, volume
 from conoid.cases.library import library
 from conoid.cases.load import parse_json, read_case, resolved_json, shipped
 from conoid.cases.materials import JohnsonCook
-from conoid.cases.schema import Case, Reference
+from conoid.cases.schema import Case, Prescribed, Reference
+
+from .one_dimension import broken_rod
 
 NAMES = sorted(shipped())
 TAYLOR = ["demo", "taylor_42crmo4", "taylor_copper", "taylor_copper_split"]
@@ -51,7 +56,11 @@ def test_energy_is_held_to_one_percent_and_elastic_scenes_to_a_tenth(name: str) 
     case = load(name)
     made = {**library(), **case.materials}
     elastic = all(made[part.material].strength is None and made[part.material].eos is None for part in case.parts)
-    assert reference(name, "worst_residual").tolerance == (0.001 if elastic else 0.01)
+    tolerance = reference(name, "worst_residual").tolerance
+    if case.fractures:
+        assert tolerance <= 0.01
+    else:
+        assert tolerance == (0.001 if elastic else 0.01)
 
 
 @pytest.mark.parametrize("name", TAYLOR)
@@ -282,6 +291,171 @@ def test_shocks(name: str, density: float, c0: float, slope: float, speed: float
         window = reference(name, probe)
         assert window.until is not None
         assert 10.5e-3 / shock < window.since < window.until < 20e-3 / shock
+
+
+# Fracture -------------------------------------------------------------------------------------------------------------
+
+
+def test_two_tets_pass_on_a_third_of_their_stress() -> None:
+    """F = 1/3 A traction(stress); peak where F / A has the strength, area under F of energy A, both along the line."""
+    case = load("two_tets")
+    law, pair = case.materials["soft"].brittle, case.parts[0].mesh
+    pulls = [boundary for boundary in case.boundaries if isinstance(boundary, Prescribed)]
+    assert law is not None
+    assert isinstance(pair, TwoTets)
+    apart = [2.0 * (pulls[0].x or 0.0), 2.0 * (pulls[0].z or 0.0)]
+    assert [(pulls[1].x, pulls[1].z)] == [(-apart[0] / 2, -apart[1] / 2)]
+    speed, lean = math.hypot(*apart), pair.lean
+    assert (speed, math.atan2(*apart)) == pytest.approx((0.1, lean), rel=1e-8)
+    assert speed * case.run.end_time == pytest.approx(2 * 2 * law.energy / law.strength)
+    peak, mean = 3 * law.strength, 3 * law.energy / (speed * case.run.end_time)
+    for name, share in (("normal_stress", math.cos(lean)), ("shear_stress", math.sin(lean))):
+        found = {entry.quantity: entry for entry in case.reference if entry.probe == name}
+        assert found["probe_max"].value == pytest.approx(peak * share, rel=1e-3)
+        assert found["probe_mean"].value == pytest.approx(mean * share, rel=1e-3)
+        assert found["probe_max"].tolerance <= 0.0301 * peak * share
+        assert found["probe_mean"].tolerance <= 0.0101 * mean * share
+    assert law.strength / case.materials["soft"].elastic.young == pytest.approx(1e-3)
+
+
+def test_the_breathing_facet_breaks_and_holds() -> None:
+    """The corners bring more than it takes until the force has the strength, and a quarter of what opens the facet."""
+    case = load("breathing_facet")
+    made, pair, stretch = case.materials["metal"], case.parts[0].mesh, case.parts[0].stretch
+    assert isinstance(pair, TwoTets)
+    assert stretch is not None
+    assert made.brittle is not None
+    speed = stretch.rate[2] * altitude(pair)
+    assert speed == pytest.approx(1.0, rel=1e-3)
+    kinetic = 2 * 0.5 * made.density * volume(pair) / 8 * speed**2
+    opened = made.brittle.energy * math.sqrt(3) / 4 * pair.element_size**2
+    strained = 0.5 * (3 * made.brittle.strength) ** 2 / made.elastic.young * volume(pair)
+    assert (kinetic, opened) == pytest.approx((0.23e-3, 0.87e-3), rel=0.02)
+    assert strained < 0.25 * kinetic
+
+
+def test_spall_glass() -> None:
+    case, glass, flyer, target = load("spall_glass"), library()["soda_lime"], 5e-3, 10e-3
+    c, speed, stretch = wave_speed(glass), case.parts[0].velocity[2], case.parts[0].stretch
+    assert glass.brittle is not None
+    assert stretch is not None
+    assert stretch.rate[2] == speed / flyer
+    front = glass.density * c * speed / 2
+    assert front == pytest.approx(150e6, rel=5e-3)
+    depth = glass.brittle.strength / front * flyer / 2
+    fall = 2 * glass.brittle.strength / (glass.density * c)
+    assert (depth, fall) == pytest.approx((flyer / 3, 13.95), rel=5e-3)
+    least = next(entry for entry in case.reference if entry.quantity == "probe_min")
+    early = next(entry for entry in case.reference if entry.quantity == "probe_mean")
+    assert least.value == pytest.approx(speed - fall, rel=5e-3)
+    assert least.tolerance <= 0.101 * fall
+    assert (early.since, early.until) == pytest.approx((2.2 * flyer / c, 2.4 * flyer / c), rel=1e-3)
+    assert early.value == pytest.approx(speed * (3 - 2.3), rel=1e-6)
+    assert least.until is not None
+    assert (target + 2 * depth) / c < least.until < 3 * flyer / c
+    unbroken = speed * (3 - least.until * c / flyer)
+    assert unbroken < least.value - least.tolerance
+
+
+def test_a_spall_of_eighty_layers_in_one_dimension() -> None:
+    """The rear's velocity falls by the pull-back, less what the mesh smears, when the theory says so; not unbroken."""
+    glass, flyer, layers = library()["soda_lime"], 5e-3, 80
+    assert glass.brittle is not None
+    c, h, v = wave_speed(glass), flyer / layers, np.zeros((3 * layers, 2))
+    v[:layers] = 21.0 * (np.arange(layers)[:, None] + np.arange(2)) / layers
+    found = {}
+    for strength in (glass.brittle.strength, np.inf):
+        joints = np.full(3 * layers - 1, strength)
+        joints[: layers - 1], joints[layers - 1] = np.inf, 0.0
+        rod = broken_rod(h, v, glass.density * c**2, glass.density, joints, 0.0, 2.6e-6, (0.06, 1.5), step=0.4)
+        seen = (rod.t > 1.918e-6) & (rod.t < 2.53e-6)
+        found[strength] = rod.end[seen].min(), rod.t[seen][rod.end[seen].argmin()]
+    assert found[glass.brittle.strength] == pytest.approx((7.4, 2.32e-6), rel=0.01)
+    assert found[np.inf][0] < 2.5
+
+
+def test_the_stretched_bar_in_one_dimension() -> None:
+    """With elements of the case's size: peak of the mean stress; four fifths or more of the 40 pieces of the fit."""
+    case = load("stretched_bar")
+    made, n, rate = case.materials["ceramic"], 200, 35700.0
+    assert made.brittle is not None
+    nodes = np.linspace(-5e-3, 5e-3, n + 1)
+    v = rate * np.stack([nodes[:-1], nodes[1:]], axis=1)
+    pieces = []
+    for seed in range(3):
+        scatter = (-np.log(1.0 - np.random.default_rng(seed).random(n - 1))) ** 0.01
+        rod = broken_rod(
+            10e-3 / n, v, made.elastic.young, made.density, made.brittle.strength * scatter,
+            made.brittle.energy, 0.5e-6, held=True,
+        )  # fmt: skip
+        assert rod.stress.max() == pytest.approx(322e6, rel=0.01)
+        pieces.append(float(rod.apart[-1]) + 1.0)
+    assert np.abs(np.array(pieces) - 36.0).max() <= 4.0
+    peak = next(entry for entry in case.reference if entry.quantity == "probe_max")
+    assert abs(peak.value - 322e6) < peak.tolerance
+
+
+def test_stretched_bar() -> None:
+    case = load("stretched_bar")
+    made, stretch = case.materials["ceramic"], case.parts[0].stretch
+    assert made.brittle is not None
+    assert stretch is not None
+    young, strength, energy = made.elastic.young, made.brittle.strength, made.brittle.energy
+    c = math.sqrt(young / made.density)
+    time = young * energy / (strength**2 * c)
+    assert time == pytest.approx(30.56e-9, rel=1e-3)
+    assert stretch.rate[0] == pytest.approx(strength / (young * time), rel=1e-3)
+    assert 4.5 / (1 + 4.5) * c * time == pytest.approx(0.25e-3, rel=1e-3)
+    rise = next(entry for entry in case.reference if entry.quantity == "probe_mean")
+    assert rise.value == pytest.approx(young * stretch.rate[0] * 0.5 * (rise.since + (rise.until or 0.0)), rel=1e-3)
+    assert rise.tolerance <= 0.021 * rise.value
+    assert (rise.until or 0.0) < 0.7 * time
+    ends = sorted(boundary.x or 0.0 for boundary in case.boundaries if isinstance(boundary, Prescribed))
+    assert ends == pytest.approx([-stretch.rate[0] * 5e-3, stretch.rate[0] * 5e-3])
+
+
+def test_branching_plate() -> None:
+    made, ahead = load("branching_plate").materials["glass"], reference("branching_plate", "stress_ahead")
+    assert made.brittle is not None
+    plane = made.elastic.young / (1 - made.elastic.poisson**2)
+    c = math.sqrt(plane / made.density)
+    assert ahead.value == 2e6 < made.brittle.strength
+    assert ahead.tolerance <= 0.03 * ahead.value
+    assert ahead.until is not None
+    assert 23e-3 / c < ahead.since < ahead.until < 37e-3 / c
+    zone = 9 * math.pi / 32 * made.elastic.young * made.brittle.energy / made.brittle.strength**2
+    assert zone == pytest.approx(6.9e-3, rel=1e-2)
+
+
+def impedances(plane: bool) -> tuple[float, float]:
+    """Density times wave speed of steel and soda-lime glass: of plane waves, or of bars; kg/m^2/s."""
+    steel, glass = library()["steel"], library()["soda_lime"]
+    if plane:
+        return steel.density * wave_speed(steel), glass.density * wave_speed(glass)
+    return math.sqrt(steel.elastic.young * steel.density), math.sqrt(glass.elastic.young * glass.density)
+
+
+def test_glass_steel_bars() -> None:
+    speed = load("glass_steel_bar").parts[0].velocity[2]
+    (bar, held), (moved, carried) = (
+        ((speed * s * g / (s + g)), speed * s / (s + g)) for s, g in (impedances(False), impedances(True))
+    )
+    assert (bar, held) == pytest.approx((2.10e9, 156.9), rel=3e-3)
+    assert (moved, carried) == pytest.approx((2.294e9, 160.1), rel=1e-3)
+    stress, fast = reference("glass_steel_bar", "stress_near"), reference("glass_steel_bar", "speed_near")
+    assert (stress.value, fast.value) == pytest.approx((-moved, carried), rel=1e-3)
+    assert stress.tolerance <= 0.0502 * moved
+    assert fast.tolerance <= 0.05 * carried
+    stress, fast = reference("glass_steel_demo", "stress_near"), reference("glass_steel_demo", "speed_near")
+    assert (stress.value, fast.value) == pytest.approx((-(bar + moved) / 2, (held + carried) / 2), rel=3e-3)
+    assert stress.tolerance <= 0.1001 * -stress.value
+    assert fast.tolerance <= 0.102 * fast.value
+
+
+def test_the_glass_bar_has_the_size_of_the_paper() -> None:
+    cost = estimate(load("glass_steel_bar"))
+    assert cost.elements == pytest.approx(145_754, rel=0.03)
+    assert cost.nodes == pytest.approx(33_520, rel=0.03)
 
 
 # Motion ---------------------------------------------------------------------------------------------------------------

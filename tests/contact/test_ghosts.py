@@ -40,7 +40,7 @@ def same(one: Crowd, two: Crowd) -> bool:
 def test_what_is_packed_comes_out_bit_by_bit(f: int, e: int, n: int) -> None:
     random = np.random.default_rng(1)
     faces = Faces(random.integers(0, 2**50, f), random.integers(0, 2**40, (f, 4)), random.normal(size=f))
-    edges = Edges(random.integers(0, 2**40, (e, 4)), random.normal(size=e))
+    edges = Edges(random.integers(0, 2**40, (e, 4)), random.integers(0, 2**40, (e, 2)), random.normal(size=e))
     crowd = random_crowd(random, n)
     got_faces, got_edges, got_crowd = ghosts.unpack(ghosts.pack(faces, edges, crowd))
     assert (got_faces.id == faces.id).all()

@@ -6,7 +6,7 @@ from numba import njit
 from ..parallel.comm import Comm
 from ..parallel.fixed_point import exact_sums
 from ..parallel.ownership import Neighbour, complete
-from ..state import Floats, Nodes
+from ..state import Floats, Ints, Nodes, extended
 from . import ghosts, sweeps
 from .records import Crowd, merged
 from .scene import Sides
@@ -39,7 +39,7 @@ class Flight:
 
     def follow(self, found: Surface, nodes: Nodes, mobility: Floats) -> None:
         """Takes a new surface; all ranks take part."""
-        self._found, self._mobility = found, mobility
+        self._found, self.mobility = found, mobility
         self._face_nodes = np.searchsorted(nodes.id, found.faces.nodes[:, :3]).astype(np.int32).reshape(-1, 3)
         self.sides = self._whole(nodes)
         """What this rank has of the surface."""
@@ -55,12 +55,22 @@ class Flight:
         far = _strayed(nodes.x, nodes.v, self._x, self._v, self._found.flags, dt, t + dt - self._t)
         return bool(far > (_SPENT * self._skin) ** 2)
 
-    def _here(self, nodes: Nodes) -> Crowd:
+    def grow(self, parents: Ints, nodes: Nodes, t: float) -> None:
+        """Takes up copies of nodes: they fly as their parents do, those that were inside from now on."""
+        found, n = self._found, len(self._x)
+        inside = parents[~found.flags[parents]]
+        self._x[inside], self._v[inside] = nodes.x[inside] - (t - self._t) * nodes.v[inside], nodes.v[inside]
+        found.flags[parents] = True
+        found.flags = extended(found.flags, np.ones(nodes.n - n, bool))
+        self._x, self._v = extended(self._x, self._x[parents]), extended(self._v, self._v[parents])
+
+    def here(self, nodes: Nodes) -> Crowd:
+        """Every node of this rank, by local index."""
         every = np.arange(nodes.n, dtype=np.int32)
-        return Crowd(nodes.id, every, nodes.owner, nodes.part, self._mobility, nodes.x, nodes.v)
+        return Crowd(nodes.id, every, nodes.owner, nodes.part, self.mobility, nodes.x, nodes.v)
 
     def _whole(self, nodes: Nodes) -> Sides:
-        found, here = self._found, self._here(nodes)
+        found, here = self._found, self.here(nodes)
         used = found.flags.copy()
         used[np.searchsorted(nodes.id, found.faces.nodes.reshape(-1))] = True
         far = ghosts.fetch(found.far, found.far_owner, here, self._comm)
@@ -72,7 +82,7 @@ class Flight:
         crowd, found = self.sides.crowd, self._found
         held = crowd.local >= 0
         crowd.x[held], crowd.v[held] = nodes.x[crowd.local[held]], nodes.v[crowd.local[held]]
-        far = ghosts.fetch(found.far, found.far_owner, self._here(nodes), self._comm)
+        far = ghosts.fetch(found.far, found.far_owner, self.here(nodes), self._comm)
         places = crowd.places(far.id)
         crowd.x[places], crowd.v[places] = far.x, far.v
 

@@ -138,7 +138,7 @@ def _outside(x, p, pairs, faces, size, part, depth):  # type: ignore[no-untyped-
 
 
 @njit("float64(float64, float64, float64, float64)", cache=True)
-def _wanted(gap0, gap1, speed, dt):  # type: ignore[no-untyped-def]
+def needed(gap0, gap1, speed, dt):  # type: ignore[no-untyped-def]
     """By how much the normal speed must rise, m/s: not to pass, and when that has happened already, not deeper."""
     back = _PUSH_OUT * min(max(-gap0, 0.0) / dt, max(-speed, 0.0))
     return (min(gap0, 0.0) - gap1) / dt + back
@@ -212,7 +212,7 @@ def node_face(nodes, weights, normals, wanted, friction, pair, n, faces, size, o
             weights[at, a + 1] = -b[a]
             normals[at, a] = m[a]
             speed += m[a] * (v[s, a] - (b[0] * v[i, a] + b[1] * v[j, a] + b[2] * v[k, a]))
-        wanted[at] = speed + _wanted(gap0, gap1, speed, dt)
+        wanted[at] = speed + needed(gap0, gap1, speed, dt)
         friction[at], pair[at] = mu[part[s], part[i]], p
     return n
 
@@ -311,7 +311,7 @@ def edge_edge(nodes, weights, normals, wanted, friction, pair, n, edges, size, p
         for k in range(3):
             normals[n, k] = m[k]
             speed += m[k] * ((1.0 - t) * v[c, k] + t * v[d, k] - (1.0 - s) * v[a, k] - s * v[b, k])
-        wanted[n] = speed + _wanted(gap0, gap1, speed, dt)
+        wanted[n] = speed + needed(gap0, gap1, speed, dt)
         friction[n], pair[n] = mu[part[a], part[c]], -1
         n += 1
     return n

@@ -54,6 +54,8 @@ class Edges(Rows):
 
     nodes: Ints
     """(n, 4) global ids."""
+    sides: Ints
+    """(n, 2) ids of the faces abc and bad."""
     size: Floats
     """(n,) initial length, m."""
 

@@ -1,6 +1,6 @@
 """A search: who may meet until the next one, the ghosts that are needed for it, and the room to work in."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -76,9 +76,12 @@ class Scene:
     """(h,) their indices on this rank."""
     faces: Indices
     """(f, 4) places."""
+    face_id: Ints
     face_size: Floats
     edges: Indices
     """(e, 4) places."""
+    edge_sides: Ints
+    """(e, 2) ids of their faces."""
     edge_size: Floats
     node_face: Indices
     """(p, 2) place of a node, index of a face."""
@@ -92,7 +95,6 @@ class Scene:
     room: Meetings
     diagonal: Floats
     push: Floats
-    copies: Copies
     shares: Ints
     impulse: Ints
     total: Ints
@@ -101,8 +103,19 @@ class Scene:
     """(crowd, 9) what the faces of the nodes look at, as they did at the search; see meetings.node_face."""
     before: Floats
     """(crowd, 3) v(n-1/2)."""
-    shared_shares: SharedSum
-    shared_impulse: SharedSum
+    pushes: Flags
+    """(crowd,) which nodes a meeting of this rank may push."""
+    cracks: Indices
+    """(m, 6) places of the nodes on either side of open cracks (contact/cracks.py)."""
+    shared_shares: SharedSum = field(init=False)
+    shared_impulse: SharedSum = field(init=False)
+    copies: Copies = field(init=False)
+
+    def connect(self, company: list[Neighbour], nodes: Nodes, comm: Comm) -> None:
+        """Sets up the messages: sums over nodes that others push or hold, copies of what is not held here."""
+        self.copies = ghosts.copies(self.crowd, nodes, comm, _COPY_TAG)
+        self.shared_shares = SharedSum(comm, company, 4, _SHARE_TAG)
+        self.shared_impulse = SharedSum(comm, company, 3, _PUSH_TAG)
 
     def approach(self) -> float:
         """Largest relative speed of a candidate node over the altitude of its candidate face's tet, 1/s."""
@@ -221,18 +234,19 @@ def _compact(
     slave_ids = crowd.id[node_face[:, 0]]
     keys = np.column_stack([slave_ids, seen.faces.id[node_face[:, 1]]])
     crowd = crowd.take(crowd.places(needed))
+    crowd.local = nodes.places(crowd.id)
     company = [Neighbour(rank, crowd.places(ids)) for rank, ids in sorted(shared.items())]
     room = len(node_face) + len(edge_edge)
     shares, impulse = np.zeros((crowd.n, 4), np.int64), np.zeros((crowd.n, 3), np.int64)
     held = np.flatnonzero(crowd.local >= 0).astype(np.int32)
-    return Scene(
-        crowd=crowd, held=held, local=crowd.local[held], faces=crowd.places(faces.nodes), face_size=faces.size,
-        edges=crowd.places(edges.nodes), edge_size=edges.size,
+    found = Scene(
+        crowd=crowd, held=held, local=crowd.local[held], faces=crowd.places(faces.nodes), face_id=faces.id,
+        face_size=faces.size, edges=crowd.places(edges.nodes), edge_sides=edges.sides, edge_size=edges.size,
         node_face=np.column_stack([crowd.places(slave_ids), face_at.reshape(-1)]).astype(np.int32),
         edge_edge=edge_at.reshape(-1, 2).astype(np.int32), keys=keys, kept=np.zeros((len(keys), 4)), faces_sent=sent,
         room=Meetings.room(room), diagonal=np.empty((room, 2)), push=np.empty((room, 4)),
-        copies=ghosts.copies(crowd, nodes, comm, _COPY_TAG), shares=shares, impulse=impulse,
+        shares=shares, impulse=impulse, pushes=np.isin(crowd.id, pushed), cracks=np.zeros((0, 6), np.int32),
         total=np.zeros((crowd.n, 3), np.int64), normals=np.zeros((crowd.n, 9)), before=np.zeros((crowd.n, 3)),
-        shared_shares=SharedSum(comm, company, 4, _SHARE_TAG),
-        shared_impulse=SharedSum(comm, company, 3, _PUSH_TAG),
     )  # fmt: skip
+    found.connect(company, nodes, comm)
+    return found

@@ -20,7 +20,9 @@ from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
 from ..state import Flags, Floats, Indices, Ints, Model, Nodes, extended
 from ..timers import Timers
+from ..topology import Split
 from . import meetings, pairing, scene, surface, sweeps
+from .cracks import Cracks, Follower, across, news
 from .flight import Flight
 from .scene import Rules, Scene
 from .surface import Surface
@@ -62,6 +64,11 @@ class Contact(Boundary):
         """One over the step in which no node passes more than half of a tet that it may meet, 1/s."""
         self._changed = False
         """Whether the surface is another one than that of the last search."""
+        self._stale = False
+        """Whether nodes have separated since the surface was made."""
+        self._cracks = Cracks.none()
+        self._apart = False
+        """Whether some crack is wide enough for a search."""
         self.searches = 0
         self._last = -math.inf
         """Step of the last search."""
@@ -85,13 +92,36 @@ class Contact(Boundary):
             )
             self.due = self._changed = True
 
-    def separate(self) -> None:
-        """The surface after nodes have separated. All ranks take part."""
+    def crack(self, tets: Ints, nodes: Indices) -> None:
+        """Takes up broken facets: either side (m, 2), the first one of this rank, and the three local ``nodes`` (m, 3)
+        that they have in common, counter-clockwise seen from outside of the first side.
+        """
+        self._cracks.add(tets, nodes)
+
+    def separate(self, split: Split) -> None:
+        """Follows nodes as they separate; all ranks take part."""
         with self._timers.phase("contact"):
-            old = self._surface.flags
-            self._surface = surface.build(self._model, self._planes, self._neighbours, self._comm, self._edges)
-            self._surface.flags[: len(old)] |= old
-            self.due = self._changed = True
+            state = self._model.nodes
+            self._cracks.nodes = split.followed_sides(self._cracks.nodes, state.id, self._cracks.tets)
+            self._stale = True
+            if self._scene is None:
+                return
+            self._flight.grow(split.copies.parents, state, self._clock.t)
+            self._flight.mobility = self._mobility
+            here = self._flight.here(state)
+            follower = Follower(self._scene, here)
+            follower.follow(news(split, here, state, self._comm), self._cracks)
+            if self._comm.size > 1:
+                self._scene.free()
+                follower.share(state, self._neighbours, self._comm)
+
+    def _expose(self, state: Nodes) -> None:
+        """The surface anew, with what has separated."""
+        old = self._surface.flags
+        self._surface = surface.build(self._model, self._planes, self._neighbours, self._comm, self._edges)
+        self._surface.flags[: len(old)] |= old
+        self._cracks.surface()
+        self._stale, self._changed = False, True
 
     def _inherit(self, at: Ints, copies: Indices) -> None:
         super()._inherit(at, copies)
@@ -129,6 +159,8 @@ class Contact(Boundary):
         clock, flight, old = self._clock, self._flight, self._scene
         if old is not None:
             old.free()
+        if self._stale:
+            self._expose(state)
         if self._changed:
             flight.follow(self._surface, state, self._mobility)
             self._changed = False
@@ -143,13 +175,13 @@ class Contact(Boundary):
         self._look(self._scene, state)
         self._scene.normals[self._scene.held] = flight.normals(state)[self._scene.local]
         flight.begin(state, clock.t, clock.t + horizon)
-        self.due, self._last = False, clock.step
+        self.due, self._apart, self._last = False, False, clock.step
         self.searches += 1
 
     def spent(self, state: Nodes) -> bool:
         """Whether a node of the surface will leave, in a step more, what the last search has allowed for."""
         with self._timers.phase("contact"):
-            return self._flight.spent(state, self._clock.t, self._clock.dt)
+            return self._apart or self._flight.spent(state, self._clock.t, self._clock.dt)
 
     def _push(self, now: Scene, state: Nodes, dt: float, t: float) -> None:
         crowd, room, held = now.crowd, now.room, now.held
@@ -197,7 +229,10 @@ class Contact(Boundary):
         out = (room.nodes, room.weights, room.normals, room.wanted, room.friction, room.pair)
         found = (crowd.x, crowd.v, crowd.part, self._mu, dt)
         n = meetings.node_face(*out, 0, now.faces, now.face_size, now.normals, now.node_face, *found)
-        return int(meetings.edge_edge(*out, n, now.edges, now.edge_size, now.edge_edge, *found))
+        n = meetings.edge_edge(*out, n, now.edges, now.edge_size, now.edge_edge, *found)
+        n, apart = across(*out, n, now.cracks, *found)
+        self._apart |= bool(apart)
+        return int(n)
 
     def _weigh(self, now: Scene, n: int) -> None:
         room = now.room

@@ -24,8 +24,6 @@ class Surface:
     """Of this rank's tets."""
     edges: Edges
     """Whose face of smaller id is of this rank's tets."""
-    sides: Ints
-    """(edges, 2) ids of the two faces of each edge."""
     flags: Flags
     """(nodes,) which nodes of this rank are on the surface, by a face of any rank; or were, and have lost it."""
     far: Ints
@@ -42,7 +40,7 @@ def build(model: Model, planes: Flags, neighbours: list[Neighbour], comm: Comm, 
     local, ids = _faces(model, planes)
     flags = _flags(local, model.nodes.n, neighbours, comm)
     sharp = _sharp(model, local, ids, neighbours, comm) if edges else _none()
-    return Surface(_table(model, local, ids), *sharp[:2], flags, *sharp[2:])
+    return Surface(_table(model, local, ids), sharp[0], flags, *sharp[1:])
 
 
 def uncovered(
@@ -57,8 +55,8 @@ def uncovered(
     """
     local, ids = _faces(model, planes)
     flags = (old.flags | loose | _flags(local, model.nodes.n, neighbours, comm)) & ~removed
-    kept = ~np.asarray(np.isin(old.sides // 4, gone).any(axis=1))
-    return Surface(_table(model, local, ids), old.edges.take(kept), old.sides[kept], flags, old.far, old.far_owner)
+    kept = ~np.asarray(np.isin(old.edges.sides // 4, gone).any(axis=1))
+    return Surface(_table(model, local, ids), old.edges.take(kept), flags, old.far, old.far_owner)
 
 
 def _table(model: Model, local: "np.ndarray", ids: Ints) -> Faces:
@@ -89,9 +87,9 @@ def _flags(faces: "np.ndarray", n: int, neighbours: list[Neighbour], comm: Comm)
     return np.asarray(counts[:, 0] > 0)
 
 
-def _none() -> tuple[Edges, Ints, Ints, Indices]:
+def _none() -> tuple[Edges, Ints, Indices]:
     none = np.zeros((0, 4), np.int64)
-    return Edges(none, np.zeros(0)), none[:, :2], np.zeros(0, np.int64), np.zeros(0, np.int32)
+    return Edges(none, none[:, :2], np.zeros(0)), np.zeros(0, np.int64), np.zeros(0, np.int32)
 
 
 _LOW, _HIGH, _THIRD, _OWNER, _FACE, _TURNED, _LENGTH, _NORMAL = 0, 1, 2, 3, 4, 5, 6, 7
@@ -101,8 +99,8 @@ whether the face runs from high to low, initial length, m, and the unit normal o
 
 def _sharp(
     model: Model, faces: "np.ndarray", ids: Ints, neighbours: list[Neighbour], comm: Comm
-) -> tuple[Edges, Ints, Ints, Indices]:
-    """Sharp edges, their faces, and the nodes of theirs that are not held here, with their owners.
+) -> tuple[Edges, Ints, Indices]:
+    """Sharp edges, and the nodes of theirs that are not held here, with their owners.
 
     Where other ranks may hold faces of an edge, the owner of the lower node brings them together, and the rank of the
     face of smaller id has the edge.
@@ -119,15 +117,15 @@ def _sharp(
     sender = np.concatenate([np.zeros(0, np.int64), *(np.full(len(f) // 10, r) for r, f in found.items())])
     met = _paired(gathered)
     order = np.argsort(gathered[:, _FACE])
-    target = sender[order[np.searchsorted(gathered[order, _FACE], met[:, 6])]]
+    target = sender[order[np.searchsorted(gathered[order, _FACE], met[:, 6:8].min(axis=1))]]
     back = comm.swap({int(rank): met[target == rank] for rank in np.unique(target)})
     rows = np.concatenate([here, *(f.reshape(-1, 9) for f in back.values())])
     rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
     ends, owners = rows[:, 2:4].reshape(-1), rows[:, 4:6].reshape(-1)
     far, first = np.unique(ends[~np.isin(ends, nodes.id)], return_index=True)
     owner = owners[~np.isin(ends, nodes.id)][first]
-    edges = Edges(rows[:, :4].copy(), rows[:, 8].copy().view(np.float64))
-    return edges, rows[:, 6:8].copy(), far, owner.astype(np.int32)
+    edges = Edges(rows[:, :4].copy(), rows[:, 6:8].copy(), rows[:, 8].copy().view(np.float64))
+    return edges, far, owner.astype(np.int32)
 
 
 def _halves(model: Model, faces: "np.ndarray", ids: Ints) -> Ints:
@@ -147,7 +145,7 @@ def _halves(model: Model, faces: "np.ndarray", ids: Ints) -> Ints:
 
 
 def _paired(halves: Ints) -> Ints:
-    """Rows (a, b, c, d, owner of c, owner of d, smaller face, larger face, length) of sharp edges of two faces."""
+    """Rows (a, b, c, d, owner of c, owner of d, face abc, face bad, length) of sharp edges of two faces."""
     halves = halves[np.lexsort((halves[:, _FACE], halves[:, _HIGH], halves[:, _LOW]))]
     same = (halves[1:, :2] == halves[:-1, :2]).all(axis=1)
     first = np.flatnonzero(same & ~np.r_[False, same[:-1]] & ~np.r_[same[1:], False]) if len(same) else np.zeros(0, int)
@@ -162,4 +160,7 @@ def _paired(halves: Ints) -> Ints:
     owners = np.where(
         ahead, np.column_stack([one[:, _OWNER], two[:, _OWNER]]), np.column_stack([two[:, _OWNER], one[:, _OWNER]])
     )
-    return np.column_stack([one[:, :2], ends, owners, one[:, _FACE], two[:, _FACE], one[:, _LENGTH]])
+    sides = np.where(
+        ahead, np.column_stack([one[:, _FACE], two[:, _FACE]]), np.column_stack([two[:, _FACE], one[:, _FACE]])
+    )
+    return np.column_stack([one[:, :2], ends, owners, sides, one[:, _LENGTH]])

@@ -185,7 +185,6 @@ class AveragedElements(Elements):
         return [self.shared_forces, self.shared_volumes, *([self.shared_gradients] if self.split else [])]
 
     def advance(self, dt: float, scale: float) -> None:
-        nodes = self.model.nodes
         self.peaks[:] = 0
         self._volumes[:] = 0
         send = self.shared_volumes.begin

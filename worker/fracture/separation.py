@@ -14,11 +14,9 @@ from ..mesh.faces import FACES
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
 from ..state import PINNED, Copies, Flags, Indices, Ints, Model, extended
+from ..topology import Split, keys
 from . import stars
 from .stars import Stars
-
-_KEY = 2**31
-"""More than there are tets."""
 
 
 @dataclass
@@ -29,33 +27,6 @@ class Broken:
     """(m,) of tets; both sides when both are here."""
     faces: Indices
     """(m,) local faces."""
-
-
-@dataclass
-class Event:
-    """What separated in a step."""
-
-    copies: Copies
-    first: int
-    """Local index of the first copy."""
-    key: Ints
-    """(r,) of the tets whose node has become a copy: ids of the node and of the tet as one number, ascending."""
-    node: Indices
-    """(r,) the copy, local."""
-    place: Indices
-    """(r,) of the tet in its block, -1 for one of another rank."""
-    corner: Indices
-    """(r,) of the tet."""
-    block: Indices
-    """(r,) index of the block."""
-
-    def followed(self, nodes: Indices, ids: Ints, tets: Ints) -> Indices:
-        """What local ``nodes`` (n, k) of tets of global ids ``tets`` (n,) have become; ``ids``: of the local nodes."""
-        if not len(self.key):
-            return nodes.astype(np.int32)
-        wanted = ids[nodes] * _KEY + tets[:, None]
-        at = np.minimum(np.searchsorted(self.key, wanted), len(self.key) - 1)
-        return np.where(self.key[at] == wanted, self.node[at], nodes).astype(np.int32)
 
 
 class Separation:
@@ -69,7 +40,7 @@ class Separation:
         for b, block in enumerate(model.blocks):
             self._block_of[block.part] = b
 
-    def break_facets(self, broken: dict[int, Broken]) -> Event | None:
+    def break_facets(self, broken: dict[int, Broken]) -> Split | None:
         """Breaks facets, by index of their block, and separates nodes; None where no node of any rank does.
 
         All ranks take part. Connectivity, masses, shared nodes and bonds are changed; forces are left to the caller.
@@ -159,11 +130,11 @@ class Separation:
 
     def _separate(
         self, rows: Ints, label: Ints, places: Ints, own: Ints, leaving: Flags, mine: Ints, every: Ints
-    ) -> Event:
+    ) -> Split:
         model, nodes = self._model, self._model.nodes
-        at = np.searchsorted(_key(every), _key(mine))
+        at = np.searchsorted(keys(*every.T), keys(*mine.T))
         gone = rows[leaving]
-        piece = np.searchsorted(_key(mine), _key(np.column_stack([gone[:, stars.NODE], label[leaving]])))
+        piece = np.searchsorted(keys(*mine.T), keys(gone[:, stars.NODE], label[leaving]))
         quarters = 0.25 * np.ascontiguousarray(gone[:, stars.MASS]).view(np.float64)
         masses = np.bincount(piece, quarters, len(mine)).astype(np.float64)
         smallest = gone[:, stars.TET] == label[leaving]
@@ -179,9 +150,8 @@ class Separation:
         place, corner, block = np.where(ours >= 0, here[:, 0], -1), here[:, 1], here[:, 2]
         node = (first + piece).astype(np.int32)
         self._retie(rows, label, places, own, place, corner, block, node)
-        return Event(
-            copies, first, _key(gone), node, place.astype(np.int32), corner.astype(np.int32), block.astype(np.int32)
-        )
+        key = keys(gone[:, stars.NODE], gone[:, stars.TET])
+        return Split(copies, first, key, node, *(n.astype(np.int32) for n in (place, corner, block)))
 
     def _share(self, copies: Copies, first: int) -> None:
         """Whoever holds a node holds its copies."""
@@ -212,11 +182,6 @@ class Separation:
             order = np.lexsort((after, before))
             before, after, tets = before[order], after[order], at[order, 0]
             _restock(star.pool, star.first, star.count, before, after, tets)
-
-
-def _key(rows: Ints) -> Ints:
-    """(n,) the first two columns, ids of a node and of a tet, as one number that orders like them."""
-    return rows[:, 0] * _KEY + rows[:, 1]
 
 
 def _restock(pool: Ints, first: Ints, count: Ints, before: Ints, after: Ints, tets: Ints) -> None:

@@ -22,10 +22,11 @@ from ..parallel.comm import Comm
 from ..parallel.fixed_point import exact_sums
 from ..parallel.ownership import Neighbour, complete
 from ..state import CHUNK, MASS, Block, Floats, Indices, Ints, Model
+from ..topology import Split
 from . import bodies
 from .bodies import Body, Far, Loaded
 from .cohesive import Cohesion, Facets, inserted
-from .separation import Broken, Event, Separation
+from .separation import Broken, Separation
 from .strength import Toughness, toughness
 
 _TAG = 16
@@ -99,14 +100,13 @@ class Fracture:
             )
             first = self._far.first[at]
             count += len(loaded.places) + int(first.sum())
-            if body.spec.model == "cohesive":
-                mass = np.concatenate([_masses(block, there), self._far.mass[at[first]]])
-                mine = remote.take(first)
-                both = Loaded(
-                    np.concatenate([loaded.places, mine.places]), np.concatenate([loaded.faces, mine.faces]),
-                    np.concatenate([loaded.traction, mine.traction]),
-                )  # fmt: skip
-                new.append((body, both, np.minimum(mass, _masses(block, both.places))))
+            mass = np.concatenate([_masses(block, there), self._far.mass[at[first]]])
+            mine = remote.take(first)
+            both = Loaded(
+                np.concatenate([loaded.places, mine.places]), np.concatenate([loaded.faces, mine.faces]),
+                np.concatenate([loaded.traction, mine.traction]),
+            )  # fmt: skip
+            new.append((body, both, np.minimum(mass, _masses(block, both.places))))
         ids = np.concatenate([np.zeros(0, np.int64), *(ids for ids, _ in passed)])
         order = np.argsort(ids)
         self._since = ids[order], np.concatenate([np.zeros(0), *(since for _, since in passed)])[order]
@@ -139,60 +139,61 @@ class Fracture:
 
     def _break(self, broken: dict[int, Broken], new: list[tuple[Body, Loaded, Floats]]) -> None:
         shared = [(_corners(body, loaded), _sides(body.block, loaded)) for body, loaded, _ in new]
-        event = self._separation.break_facets(broken)
+        split = self._separation.break_facets(broken)
         fresh = [
-            self._insert(body, loaded, mass, before, tets, event)
+            self._insert(body, loaded, mass, before, tets, split)
             for (body, loaded, mass), (before, tets) in zip(new, shared, strict=True)
+            if body.spec.model == "cohesive"
         ]
-        if event is not None:
-            self._tell_everybody(event)
-            self._hand_over(event, fresh)
+        if split is not None:
+            self._tell_everybody(split)
+            self._hand_over(split, fresh)
         for facets in fresh:
             assert self.cohesion is not None
             self.cohesion.insert(facets)
-        if event is not None and self._contact is not None:
-            self._contact.separate()
+        if self._contact is not None:
+            for before, tets in shared:
+                self._contact.crack(tets, before)
+            if split is not None:
+                self._contact.separate(split)
 
     def _insert(
-        self, body: Body, loaded: Loaded, mass: Floats, before: Indices, tets: Ints, event: Event | None
+        self, body: Body, loaded: Loaded, mass: Floats, before: Indices, tets: Ints, split: Split | None
     ) -> Facets:
         """The new cohesive facets of a body, ``before`` (m, 3) their nodes until now, ``tets`` (m, 2) their sides."""
         nodes, block = self._model.nodes, body.block
-        after = np.concatenate([before, before], axis=1)
-        if event is not None:
-            ids = nodes.id
-            after = np.concatenate([event.followed(before, ids, tets[:, k]) for k in (0, 1)], axis=1)
+        twice = np.concatenate([before, before], axis=1)
+        after = twice if split is None else split.followed_sides(twice, nodes.id, tets)
         size = bodies.areas(block.tets, loaded.places, loaded.faces, nodes.x)
         frequency = 4.0 * self._unused / self._longest**2
         m, stiffness = len(size), 3.0 * mass / _SHARES * frequency / size
         return inserted(
-            nodes, np.concatenate([before, before], axis=1), after, tets, loaded.traction[:, :3], loaded.traction[:, 3],
+            nodes, twice, after, tets, loaded.traction[:, :3], loaded.traction[:, 3],
             np.full(m, body.tough.energy), np.full(m, block.shear_weight), stiffness, size,
         )  # fmt: skip
 
-    def _tell_everybody(self, event: Event) -> None:
-        self._elements.grow(event.copies)
+    def _tell_everybody(self, split: Split) -> None:
+        self._elements.grow(split.copies)
         for boundary in self._boundaries:
-            boundary.grow(event.copies.parents, event.first)
+            boundary.grow(split.copies.parents, split.first)
 
-    def _hand_over(self, event: Event, fresh: list[Facets]) -> None:
+    def _hand_over(self, split: Split, fresh: list[Facets]) -> None:
         """Forces of the present, of the tets and cohesive facets of copies, from their parents to them."""
-        nodes, copies = self._model.nodes, event.copies
-        some = np.unique(np.concatenate([copies.parents, event.first + np.arange(copies.n)]))
+        nodes, copies = self._model.nodes, split.copies
+        some = np.unique(np.concatenate([copies.parents, split.first + np.arange(copies.n)]))
         change = np.zeros((len(some), 3), np.int64)
-        for b in np.unique(event.block[event.place >= 0]):
-            rows = np.flatnonzero((event.block == b) & (event.place >= 0))
-            tets, at = np.unique(event.place[rows].astype(np.int64), return_inverse=True)
-            force = self._elements.forces_of(self._model.blocks[b], tets, nodes.scale)[at, event.corner[rows]]
-            copy = event.node[rows]
+        for b in np.unique(split.block[split.place >= 0]):
+            rows = np.flatnonzero((split.block == b) & (split.place >= 0))
+            tets, at = np.unique(split.place[rows].astype(np.int64), return_inverse=True)
+            force = self._elements.forces_of(self._model.blocks[b], tets, nodes.scale)[at, split.corner[rows]]
+            copy = split.node[rows]
             np.add.at(change, np.searchsorted(some, copy), force)
-            np.subtract.at(change, np.searchsorted(some, copies.parents[copy - event.first]), force)
+            np.subtract.at(change, np.searchsorted(some, copies.parents[copy - split.first]), force)
         if self.cohesion is not None:
             facets = self.cohesion.facets
             moved = np.isin(facets.nodes, copies.parents).any(axis=1)
             old = facets.nodes[moved]
-            sides = np.repeat(facets.tets[moved], 3, axis=1)
-            now = np.stack([event.followed(old[:, [k]], nodes.id, sides[:, k])[:, 0] for k in range(6)], axis=1)
+            now = split.followed_sides(old, nodes.id, facets.tets[moved])
             facets.nodes[moved] = now
             self._scatter(change, some, old, facets.pull[moved], -1)
             self._scatter(change, some, now, facets.pull[moved], 1)

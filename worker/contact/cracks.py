@@ -1,0 +1,266 @@
+"""Contact across fresh cracks, and a scene that follows nodes as they separate, until the next search.
+
+The two sides of a facet that has just broken lie on each other, and no search is needed to know that they meet: from
+the moment of separation the nodes across, which were one, push each other apart along the normal of their facet, from a
+gap of exactly zero. That holds as long as they are near: when the two have moved apart by a share of the facet's size,
+a search is due, after which they are nodes and faces like all others. Nothing else can have come between until then:
+whatever else reaches the faces of a crack has to enter it. Edges of cracks meet edges from the next search on.
+
+What the last search has found stays good: faces take up the copies of their corners, and a copy has the candidates of
+the node that it was part of, with the rank that computes that one's.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from ..parallel.comm import Comm
+from ..parallel.ownership import Neighbour
+from ..state import Flags, Indices, Ints, Nodes, extended
+from ..topology import Split, keys
+from . import ghosts
+from .meetings import DEEP_SELF, NEAR, Meetings, needed
+from .records import Crowd
+from .scene import Scene
+
+_APART = 0.2
+"""Of the size of a facet: two sides that have moved so far apart call for a search."""
+
+
+@dataclass
+class Cracks:
+    """Facets that have broken and are not yet surface, whose first side is this rank's."""
+
+    tets: Ints
+    """(m, 2) global ids."""
+    nodes: Indices
+    """(m, 6) local nodes of the first side, counter-clockwise seen from outside of it, and those across."""
+
+    @classmethod
+    def none(cls) -> "Cracks":
+        """No facet."""
+        return cls(np.zeros((0, 2), np.int64), np.zeros((0, 6), np.int32))
+
+    @property
+    def open(self) -> Flags:
+        """(m,) which have nodes across that are not their own."""
+        return np.asarray((self.nodes[:, :3] != self.nodes[:, 3:]).any(axis=1))
+
+    def add(self, tets: Ints, nodes: Indices) -> None:
+        """Takes up facets with their three ``nodes`` (m, 3)."""
+        self.tets = np.concatenate([self.tets, tets])
+        self.nodes = np.concatenate([self.nodes, np.concatenate([nodes, nodes], axis=1)])
+
+    def surface(self) -> None:
+        """Lets go of what is open: a search knows it as surface."""
+        kept = ~self.open
+        self.tets, self.nodes = self.tets[kept], self.nodes[kept]
+
+
+@dataclass
+class News:
+    """What every rank hears of a split."""
+
+    key: Ints
+    """(r,) ids of a node and of a tet as one number, ascending."""
+    became: Ints
+    """(r,) id of the copy that the node of that tet has become."""
+    parent: Ints
+    """(c,) ids of the parents of all copies, ascending."""
+    copy: Ints
+    """(c,) ids of the copies."""
+    rows: Crowd
+    """Parents and copies."""
+
+
+def news(split: Split, here: Crowd, nodes: Nodes, comm: Comm) -> News:
+    """All ranks take part. ``here``: every node of this rank, by local index."""
+    ids, copies = here.id, split.copies
+    owned = here.owner[copies.parents] == comm.rank
+    mine = split.first + np.flatnonzero(owned)
+    told = owned[split.node - split.first]
+    table = np.column_stack([split.key[told], ids[split.node[told]]])
+    family = np.column_stack([ids[copies.parents[owned]], ids[mine]])
+    some = here.take(np.unique(np.concatenate([copies.parents[owned], mine])))
+    if comm.size > 1:
+        parts = comm.share((table, family, ghosts.pack_crowd(some)))
+        table, family, packed = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+        some = ghosts.unpack_crowd(packed)
+        some.local = nodes.places(some.id)
+    table, family = table[np.argsort(table[:, 0])], family[np.lexsort((family[:, 1], family[:, 0]))]
+    return News(table[:, 0].copy(), table[:, 1].copy(), family[:, 0].copy(), family[:, 1].copy(), some)
+
+
+class Follower:
+    """Brings one scene up to date with a split."""
+
+    def __init__(self, scene: Scene, here: Crowd) -> None:
+        """``here``: every node of this rank, by local index."""
+        self._scene, self._here = scene, here
+        self._index()
+
+    def _index(self) -> None:
+        self._order = np.argsort(self._scene.crowd.id, kind="stable")
+
+    def places(self, ids: Ints) -> Indices:
+        """Where ids stand in the crowd, -1 where they do not."""
+        known = self._scene.crowd.id
+        if not len(known):
+            return np.full(ids.shape, -1, np.int32)
+        at = self._order[np.minimum(np.searchsorted(known, ids, sorter=self._order), len(known) - 1)]
+        return np.where(known[at] == ids, at, -1).astype(np.int32)
+
+    def follow(self, heard: News, cracks: Cracks) -> None:
+        """Faces, edges and candidates after the split, and the places of the open cracks."""
+        scene = self._scene
+        have = self.places(heard.parent) >= 0
+        self._add(heard.rows.take(np.isin(heard.rows.id, heard.copy[have])))
+        at = self.places(heard.rows.id)
+        scene.crowd.mobility[at[at >= 0]] = heard.rows.mobility[at >= 0]
+        parents = np.zeros(scene.crowd.n, bool)
+        at = self.places(heard.parent)
+        parents[at[at >= 0]] = True
+        self._faces(heard, parents)
+        self._edges(heard, parents)
+        self._candidates(heard, parents)
+        nodes = cracks.nodes[cracks.open]
+        self._hold(self._here.id[np.unique(nodes)])
+        scene.cracks = self.places(self._here.id[nodes])
+        scene.pushes[scene.cracks] = True
+        room = len(scene.node_face) + len(scene.edge_edge) + 3 * len(nodes)
+        if room > len(scene.push):
+            scene.room = Meetings.room(2 * room)
+            scene.diagonal, scene.push = np.empty((2 * room, 2)), np.empty((2 * room, 4))
+
+    def share(self, nodes: Nodes, neighbours: list[Neighbour], comm: Comm) -> None:
+        """Settles anew who shares which node; all ranks take part."""
+        scene = self._scene
+        used = np.sort(scene.crowd.id[scene.pushes])
+        owners = scene.crowd.owner[self.places(used)]
+        shared = ghosts.members(used, owners, neighbours, nodes, comm)
+        self._hold(np.unique(np.concatenate([used[:0], *shared.values()])))
+        scene.connect([Neighbour(rank, self.places(ids)) for rank, ids in sorted(shared.items())], nodes, comm)
+
+    def _hold(self, ids: Ints) -> None:
+        """Adds those of this rank's nodes that the crowd lacks."""
+        here = self._here.id
+        at = np.minimum(np.searchsorted(here, ids), len(here) - 1)
+        self._add(self._here.take(at[here[at] == ids]))
+
+    def _add(self, rows: Crowd) -> None:
+        scene = self._scene
+        rows = rows.take(self.places(rows.id) < 0)
+        if not rows.n:
+            return
+        first, n = scene.crowd.n, rows.n
+        scene.crowd = Crowd(*(extended(a, b) for a, b in zip(scene.crowd.columns(), rows.columns(), strict=True)))
+        held = np.flatnonzero(rows.local >= 0).astype(np.int32)
+        scene.held = extended(scene.held, first + held)
+        scene.local = extended(scene.local, rows.local[held])
+        for name, width in (("shares", 4), ("impulse", 3), ("total", 3)):
+            setattr(scene, name, extended(getattr(scene, name), np.zeros((n, width), np.int64)))
+        scene.normals = extended(scene.normals, np.zeros((n, 9)))
+        scene.before = extended(scene.before, rows.v)
+        scene.pushes = extended(scene.pushes, np.zeros(n, bool))
+        self._index()
+
+    def _followed(self, heard: News, places: Indices, tets: Ints) -> Indices:
+        """What nodes at ``places`` (n, k) of tets (n,) have become."""
+        if not len(heard.key):
+            return places
+        wanted = keys(self._scene.crowd.id[places], tets[:, None])
+        at = np.minimum(np.searchsorted(heard.key, wanted), len(heard.key) - 1)
+        now = heard.key[at] == wanted
+        out = places.copy()
+        out[now] = self.places(heard.became[at[now]])
+        return out
+
+    def _faces(self, heard: News, parents: Flags) -> None:
+        scene = self._scene
+        rows = np.flatnonzero(parents[scene.faces].any(axis=1))
+        now = self._followed(heard, scene.faces[rows], scene.face_id[rows] // 4)
+        scene.faces[rows] = now
+        scene.pushes[now[:, :3]] = True
+
+    def _edges(self, heard: News, parents: Flags) -> None:
+        """An edge goes when its two faces have separated there."""
+        scene = self._scene
+        rows = np.flatnonzero(parents[scene.edges].any(axis=1))
+        nodes, sides = scene.edges[rows], scene.edge_sides[rows] // 4
+        one = self._followed(heard, nodes[:, [0, 1, 2]], sides[:, 0])
+        two = self._followed(heard, nodes[:, [0, 1, 3]], sides[:, 1])
+        now = np.column_stack([one, two[:, 2]]).astype(np.int32)
+        gone = (one[:, :2] != two[:, :2]).any(axis=1)
+        now[gone] = now[gone][:, [0, 0, 0, 0]]
+        scene.edges[rows] = now
+        scene.pushes[now[:, :2]] = True
+
+    def _candidates(self, heard: News, parents: Flags) -> None:
+        """A copy has the candidates of its parent, and looks where that one does."""
+        scene = self._scene
+        rows = np.flatnonzero(parents[scene.node_face[:, 0]])
+        ids = scene.crowd.id[scene.node_face[rows, 0]]
+        begin, end = np.searchsorted(heard.parent, ids), np.searchsorted(heard.parent, ids, side="right")
+        many = end - begin
+        which = np.repeat(np.arange(len(rows)), many)
+        copy = heard.copy[np.repeat(begin - np.cumsum(many) + many, many) + np.arange(many.sum())]
+        slave, face = self.places(copy), scene.node_face[rows[which], 1]
+        scene.normals[slave] = scene.normals[scene.node_face[rows[which], 0]]
+        order = np.lexsort((face, slave))
+        slave, face = slave[order], face[order]
+        scene.node_face = extended(scene.node_face, np.column_stack([slave, face]).astype(np.int32))
+        scene.keys = extended(scene.keys, np.column_stack([copy[order], scene.face_id[face]]))
+        scene.kept = extended(scene.kept, np.zeros((len(face), 4)))
+        scene.pushes[slave] = True
+
+
+@njit(
+    "UniTuple(int64, 2)(int32[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], int32[::1], int64, "
+    "int32[:, ::1], float64[:, ::1], float64[:, ::1], int32[::1], float64[:, ::1], float64)",
+    cache=True,
+    error_model="numpy",
+)
+def across(nodes, weights, normals, wanted, friction, pair, n, cracks, x, v, part, mu, dt):  # type: ignore[no-untyped-def]
+    """Nodes across ``cracks`` (m, 6) that close on each other, from row ``n`` on (meetings.node_face).
+
+    Returns the new number of rows, and 1 when two sides have moved so far apart that a search is due, else 0.
+    """
+    e, f, m = np.empty(3), np.empty(3), np.empty(3)
+    far = 0
+    for c in range(len(cracks)):
+        for i in range(3):
+            start = x[cracks[c, 0], i] + x[cracks[c, 3], i]
+            e[i] = 0.5 * (x[cracks[c, 1], i] + x[cracks[c, 4], i] - start)
+            f[i] = 0.5 * (x[cracks[c, 2], i] + x[cracks[c, 5], i] - start)
+        square = 0.0
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            m[i] = e[j] * f[k] - e[k] * f[j]
+            square += m[i] * m[i]
+        size = np.sqrt(np.sqrt(square))
+        for i in range(3):
+            m[i] /= np.sqrt(square)
+        for k in range(3):
+            p, q = cracks[c, k], cracks[c, 3 + k]
+            if p == q:
+                continue
+            gap0, speed, apart = 0.0, 0.0, 0.0
+            for i in range(3):
+                opening = x[q, i] - x[p, i]
+                gap0 += m[i] * opening
+                speed += m[i] * (v[q, i] - v[p, i])
+                apart += opening * opening
+            if apart > (_APART * size) ** 2:
+                far = 1
+            gap1 = gap0 + dt * speed
+            if not (gap1 <= NEAR * size and gap0 >= -DEEP_SELF * size):
+                continue
+            nodes[n, 0], nodes[n, 1], nodes[n, 2], nodes[n, 3] = q, p, p, p
+            weights[n, 0], weights[n, 1], weights[n, 2], weights[n, 3] = 1.0, -1.0, 0.0, 0.0
+            for i in range(3):
+                normals[n, i] = m[i]
+            wanted[n] = speed + needed(gap0, gap1, speed, dt)
+            friction[n], pair[n] = mu[part[p], part[q]], -1
+            n += 1
+    return n, far
