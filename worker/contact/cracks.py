@@ -216,8 +216,8 @@ class Follower:
 
 
 @njit(
-    "UniTuple(int64, 2)(int32[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], int32[::1], int64, "
-    "int32[:, ::1], float64[:, ::1], float64[:, ::1], int32[::1], float64[:, ::1], float64)",
+    "UniTuple(int64, 2)(int32[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], int32[::1], "
+    "int64, int32[:, ::1], float64[:, ::1], float64[:, ::1], int32[::1], float64[:, ::1], float64)",
     cache=True,
     error_model="numpy",
 )

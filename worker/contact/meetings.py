@@ -171,13 +171,21 @@ def node_face(nodes, weights, normals, wanted, friction, pair, n, faces, size, o
     """
     b, m = np.empty(3), np.empty(3)
     ahead = x + dt * v
+    planes = np.empty((len(faces), 3))
+    for f in range(len(faces)):
+        i = faces[f, 0]
+        _height(m, ahead, i, i, faces[f, 1], faces[f, 2])
+        planes[f, 0], planes[f, 1], planes[f, 2] = m[0], m[1], m[2]
     nearest, row = 0.0, -1
     for p in range(len(pairs)):
         s, f = pairs[p, 0], pairs[p, 1]
         if p == 0 or pairs[p - 1, 0] != s:
             row = -1
         i, j, k, d = faces[f, 0], faces[f, 1], faces[f, 2], faces[f, 3]
-        gap1 = _height(m, ahead, s, i, j, k)
+        gap1 = 0.0
+        for a in range(3):
+            m[a] = planes[f, a]
+            gap1 += m[a] * (ahead[s, a] - ahead[i, a])
         if not gap1 <= NEAR * size[f]:
             continue
         if not _looks_at(out, s, m):
@@ -222,26 +230,37 @@ def _dot(a, b):  # type: ignore[no-untyped-def]
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit("float64[::1](float64[::1], float64[::1])", cache=True)
-def _cross(a, b):  # type: ignore[no-untyped-def]
-    out = np.empty(3)
+@njit("void(float64[::1], float64[::1], float64[::1])", cache=True)
+def _cross(out, a, b):  # type: ignore[no-untyped-def]
     out[0], out[1], out[2] = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-    return out
 
 
-@njit(f"boolean(float64[::1], float64[::1], {_V2}, {_V2}, int64[::1], float64)", cache=True, error_model="numpy")
-def _between(n, u, x, v, edge, h):  # type: ignore[no-untyped-def]
-    """Whether the edge is convex and n, square to it, points out between the normals of its two faces."""
-    a = edge[0]
-    c, d = np.empty(3), np.empty(3)
+@njit(f"float64({_V2}, float64[::1], {_V2}, {_V2}, {_N2}, int64, float64)", cache=True, error_model="numpy")
+def _sides(turned, u, x, v, edges, e, h):  # type: ignore[no-untyped-def]
+    """Rows of ``turned``: u times the normals of the two faces of edge e, along u, after a time ``h``.
+
+    Returns the sense in which the first normal turns to the second one, 0 where the edge is not convex.
+    """
+    a, c, d = edges[e, 0], edges[e, 2], edges[e, 3]
     for k in range(3):
-        c[k] = x[edge[2], k] - x[a, k] + h * (v[edge[2], k] - v[a, k])
-        d[k] = x[edge[3], k] - x[a, k] + h * (v[edge[3], k] - v[a, k])
-    first, second = _cross(u, c), _cross(d, u)
-    if not _dot(first, d) < 0.0:
-        return False
-    turn = np.sign(_dot(_cross(first, second), u))
-    return turn * _dot(_cross(first, n), u) >= 0.0 and turn * _dot(_cross(n, second), u) >= 0.0
+        turned[2, k] = x[c, k] - x[a, k] + h * (v[c, k] - v[a, k])
+        turned[3, k] = x[d, k] - x[a, k] + h * (v[d, k] - v[a, k])
+    _cross(turned[0], u, turned[2])
+    _cross(turned[1], turned[3], u)
+    if not _dot(turned[0], turned[3]) < 0.0:
+        return 0.0
+    _cross(turned[2], turned[0], turned[1])
+    sense = np.sign(_dot(turned[2], u))
+    _cross(turned[2], u, turned[0])
+    _cross(turned[3], u, turned[1])
+    return sense
+
+
+@njit(f"boolean({_V2}, float64, float64[::1], float64)", cache=True)
+def _between(turned, sense, n, sign):  # type: ignore[no-untyped-def]
+    """Whether ``sign`` n, square to a convex edge, points out between the normals of its two faces (``_sides``)."""
+    along = sense * sign
+    return sense != 0.0 and along * _dot(turned[2], n) >= 0.0 and along * _dot(turned[3], n) <= 0.0
 
 
 @njit(
@@ -258,16 +277,10 @@ def _apart(m, x, v, a, b, c, d, s, t, h):  # type: ignore[no-untyped-def]
     return gap
 
 
-@njit(f"float64({_V2}, {_V2}, int64, int64, int64, int64, float64)", cache=True)
-def _volume(x, v, a, b, c, d, h):  # type: ignore[no-untyped-def]
-    """Six times the volume, m^3, between ab and cd after a time ``h``: it changes sign when their lines cross."""
-    total = 0.0
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        ui, uj = x[b, i] - x[a, i] + h * (v[b, i] - v[a, i]), x[b, j] - x[a, j] + h * (v[b, j] - v[a, j])
-        wi, wj = x[d, i] - x[c, i] + h * (v[d, i] - v[c, i]), x[d, j] - x[c, j] + h * (v[d, j] - v[c, j])
-        total += (ui * wj - uj * wi) * (x[c, k] - x[a, k] + h * (v[c, k] - v[a, k]))
-    return total
+@njit("float64(float64[::1], float64[::1], float64[::1])", cache=True)
+def _volume(u, w, r):  # type: ignore[no-untyped-def]
+    """u x w . r: six times the volume, m^3, between two edges; it changes sign when their lines cross."""
+    return (u[1] * w[2] - u[2] * w[1]) * r[0] + (u[2] * w[0] - u[0] * w[2]) * r[1] + (u[0] * w[1] - u[1] * w[0]) * r[2]
 
 
 @njit(f"int64({_OUT}, int64, {_N2}, float64[::1], {_IN})", cache=True, error_model="numpy")
@@ -276,35 +289,51 @@ def edge_edge(nodes, weights, normals, wanted, friction, pair, n, edges, size, p
 
     ``pairs`` (p, 2): two edges; ``edges`` (e, 4): records.Edges.
     """
-    u, w, m = np.empty(3), np.empty(3), np.empty(3)
-    one, two = np.empty(4, np.int64), np.empty(4, np.int64)
+    u, w, r, m = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    u0, w0, r0 = np.empty(3), np.empty(3), np.empty(3)
+    turned = np.empty((4, 3))
+    ahead = x + dt * v
     for p in range(len(pairs)):
-        for k in range(4):
-            one[k], two[k] = edges[pairs[p, 0], k], edges[pairs[p, 1], k]
-        a, b, c, d = one[0], one[1], two[0], two[1]
-        start, end = _volume(x, v, a, b, c, d, 0.0), _volume(x, v, a, b, c, d, dt)
-        h = dt * start / (start - end) if start * end < 0.0 else dt
-        uu, uw, ww, ur, wr = 0.0, 0.0, 0.0, 0.0, 0.0
+        one, two = pairs[p, 0], pairs[p, 1]
+        a, b, c, d = edges[one, 0], edges[one, 1], edges[two, 0], edges[two, 1]
         for k in range(3):
-            u[k] = x[b, k] - x[a, k] + h * (v[b, k] - v[a, k])
-            w[k] = x[d, k] - x[c, k] + h * (v[d, k] - v[c, k])
-            r = x[c, k] - x[a, k] + h * (v[c, k] - v[a, k])
-            uu, uw, ww, ur, wr = uu + u[k] * u[k], uw + u[k] * w[k], ww + w[k] * w[k], ur + u[k] * r, wr + w[k] * r
+            u0[k], w0[k], r0[k] = x[b, k] - x[a, k], x[d, k] - x[c, k], x[c, k] - x[a, k]
+            u[k], w[k], r[k] = ahead[b, k] - ahead[a, k], ahead[d, k] - ahead[c, k], ahead[c, k] - ahead[a, k]
+        start, end = _volume(u0, w0, r0), _volume(u, w, r)
+        share = 1.0
+        if start * end < 0.0:
+            share = start / (start - end)
+            for k in range(3):
+                u[k], w[k] = u0[k] + share * (u[k] - u0[k]), w0[k] + share * (w[k] - w0[k])
+                r[k] = r0[k] + share * (r[k] - r0[k])
+        uu, uw, ww, ur, wr = _dot(u, u), _dot(u, w), _dot(w, w), _dot(u, r), _dot(w, r)
         area = uu * ww - uw * uw
         if not area > _PARALLEL * _PARALLEL * uu * ww:
             continue
         s, t = (ww * ur - uw * wr) / area, (uw * ur - uu * wr) / area
         if not (min(s, t) >= 0.0 and max(s, t) <= 1.0):
             continue
-        m[:] = _cross(u, w) / np.sqrt(area)
+        h = share * dt
+        _cross(m, u, w)
+        for k in range(3):
+            m[k] /= np.sqrt(area)
         gap0, gap1 = _apart(m, x, v, a, b, c, d, s, t, 0.0), _apart(m, x, v, a, b, c, d, s, t, dt)
-        if not _between(m, u, x, v, one, h):
-            m, gap0, gap1 = -m, -gap0, -gap1
-            if not _between(m, u, x, v, one, h):
-                continue
-        smaller = min(size[pairs[p, 0]], size[pairs[p, 1]])
-        if gap1 > NEAR * smaller or gap0 < -DEEP_SELF * smaller or not _between(-m, w, x, v, two, h):
+        near, deep = NEAR * min(size[one], size[two]), DEEP_SELF * min(size[one], size[two])
+        if (gap1 > near or gap0 < -deep) and (-gap1 > near or -gap0 < -deep):
             continue
+        sense, sign = _sides(turned, u, x, v, edges, one, h), 1.0
+        if not _between(turned, sense, m, 1.0):
+            sign = -1.0
+            if not _between(turned, sense, m, -1.0):
+                continue
+        gap0, gap1 = sign * gap0, sign * gap1
+        if gap1 > near or gap0 < -deep:
+            continue
+        sense = _sides(turned, w, x, v, edges, two, h)
+        if not _between(turned, sense, m, -sign):
+            continue
+        for k in range(3):
+            m[k] *= sign
         nodes[n, 0], nodes[n, 1], nodes[n, 2], nodes[n, 3] = c, d, a, b
         weights[n, 0], weights[n, 1], weights[n, 2], weights[n, 3] = 1.0 - t, t, s - 1.0, -s
         speed = 0.0
