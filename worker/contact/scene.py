@@ -9,7 +9,7 @@ from numba import njit
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum
 from ..state import Flags, Floats, Indices, Ints, Nodes
-from . import domain, ghosts, search
+from . import domain, ghosts, search, sift
 from .ghosts import Copies
 from .meetings import DEEP, Meetings
 from .records import Crowd, Edges, Faces, merged
@@ -201,8 +201,9 @@ def _node_face(seen: Sides, rules: Rules, horizon: float) -> Indices:
     """(p, 2) place of a node and index of a face, sorted by node, then by face."""
     crowd, slaves = seen.crowd, seen.nodes
     pairs = search.find(slaves, seen.face_things, crowd.x, crowd.v, crowd.part, rules.allowed, horizon, None)
-    pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
-    return np.column_stack([slaves.corners[pairs[:, 0], 0], pairs[:, 1]])
+    pairs = np.column_stack([slaves.corners[pairs[:, 0], 0], pairs[:, 1]])
+    pairs = sift.faces(pairs, seen.face_places, seen.faces.size, crowd, seen.skin, horizon)
+    return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
 
 
 def _edge_edge(seen: Sides, own: int, rules: Rules, horizon: float) -> Indices:
@@ -212,6 +213,7 @@ def _edge_edge(seen: Sides, own: int, rules: Rules, horizon: float) -> Indices:
     rank[np.lexsort((edges.nodes[:, 1], edges.nodes[:, 0]))] = np.arange(edges.n)
     mine = Things(things.corners[:own], things.reach[:own])
     pairs = search.find(mine, things, crowd.x, crowd.v, crowd.part, rules.allowed, horizon, rank)
+    pairs = sift.edges(pairs, crowd.places(edges.nodes), edges.size, crowd, seen.skin, horizon)
     return pairs[np.lexsort((rank[pairs[:, 1]], rank[pairs[:, 0]]))]
 
 
