@@ -3,6 +3,7 @@
 ::
 
     <run>/fragments/fragments_0012.csv   one line a fragment, those of frame 12
+    <run>/fragments/genealogy.csv        one line a new fragment: frame, whom it broke off from, its label, tets
 """
 
 import csv
@@ -36,6 +37,15 @@ DUST = 10
 def path(folder: Path, index: int) -> Path:
     """Path of the table of frame ``index`` in the run folder ``folder``."""
     return folder / FOLDER / f"fragments_{index:04d}.csv"
+
+
+GENEALOGY = ("frame", "parent", "child", "tets")
+"""Columns of the genealogy."""
+
+
+def genealogy(folder: Path) -> Path:
+    """Path of the genealogy in the run folder ``folder``."""
+    return folder / FOLDER / "genealogy.csv"
 
 
 def header() -> list[str]:

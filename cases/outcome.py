@@ -44,6 +44,8 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     nodes_initial: int = 0
     nodes: int = 0
     fragments: int = 0
+    broken: int = 0
+    """Facets that have broken."""
     rebalances: int = 0
     energy: Energy | None = None
     worst_residual: float = 0.0

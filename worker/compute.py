@@ -33,6 +33,7 @@ class Start:
     setup: float
     """s since the worker's start."""
     elements: int
+    nodes: int
     thick: list[float]
     """See reference.thicknesses."""
 
@@ -43,7 +44,9 @@ def compute(
     """Runs the case in ``folder`` on all ranks; relative mesh paths start at ``meshes``. Raises ConoidError."""
     sim = simulation.build(case, meshes, comm)
     history = History(folder, sim.probes.names) if comm.rank == 0 else None
-    start = Start(time.monotonic() - began, sim.model.elements_global, reference.thicknesses(sim))
+    start = Start(
+        time.monotonic() - began, sim.model.elements_global, sim.model.nodes_global, reference.thicknesses(sim)
+    )
     _announce(sim, journal, start.setup)
     loop = Loop(sim, folder, journal, history, signals)
     cpu = time.thread_time()
@@ -85,6 +88,10 @@ def _sum_up(
     memory = sim.comm.gather(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
     hexdigest = digest.digest(sim.model, sim.comm, [sim.elements.pressure] if sim.elements.split else [])
     checks = reference.measure(sim, folder, start.thick) if failure is None and not loop.stopped else []
+    fragments = len(sim.model.parts)
+    if loop.record is not None:
+        loop.record.look()
+        fragments = loop.record.count
     state, cause, message = STOPS[loop.stopped] if loop.stopped else (State.SUCCEEDED, None, "")
     if failure is not None:
         state, cause, message = State.FAILED, failure.cause, str(failure)
@@ -92,8 +99,8 @@ def _sum_up(
         state=state, cause=cause, message=message, steps=sim.clock.step, time=sim.clock.t, ranks=sim.comm.size,
         elapsed=elapsed, setup=start.setup, cpu=total_cpu, digest=hexdigest or "", elements=start.elements,
         eroded=start.elements - sim.model.elements_global, eroded_mass=sim.ledger.eroded_mass,
-        nodes_initial=sim.model.nodes_global,
-        nodes=sim.model.nodes_global, fragments=len(sim.model.parts), energy=loop.energy,
+        nodes_initial=start.nodes, nodes=sim.model.nodes_global, fragments=fragments,
+        broken=sim.fracture.broken if sim.fracture is not None else 0, energy=loop.energy,
         worst_residual=sim.ledger.worst,
         phases={name: [s[name] for s in seconds] for name in PHASES} if seconds else {},
         peak_memory=memory or [],

@@ -12,6 +12,7 @@ from conoid.cases.run import Cause, State
 
 from . import step
 from .errors import EnergyError
+from .fracture.record import Record
 from .output import frames
 from .output.history import History
 from .output.journal import Journal
@@ -69,7 +70,8 @@ class Loop:
         """Tets times steps so far."""
         self._pace = Pace(self._began)
         self._logged = -math.inf
-        self._counted = 0
+        self._counted = (0, 0)
+        self.record = Record(sim.model, sim.fracture, sim.comm) if sim.fracture is not None else None
 
     def run(self) -> None:
         """Steps until the end time, or until a reason to stop. Raises PhysicsError."""
@@ -132,7 +134,12 @@ class Loop:
     def _write_frame(self) -> None:
         sim, clock = self.sim, self.sim.clock
         index = clock.frame
-        path = frames.write(self._folder, index, clock.t, sim.model, sim.comm)
+        if self.record is None:
+            path = frames.write(self._folder, index, clock.t, sim.model, sim.comm)
+        else:
+            self.record.look()
+            path = frames.write(self._folder, index, clock.t, sim.model, sim.comm, self.record.labels)
+            self.record.write(self._folder, index, clock.t)
         clock.frame += 1
         if path is not None:
             self._tell(messages.Frame, index=index, path=path)
@@ -167,13 +174,13 @@ class Loop:
     def _count(self) -> None:
         """How large the model is, when that has changed; all ranks take part."""
         sim, model = self.sim, self.sim.model
-        if model.elements_global == self._counted:
+        if (model.elements_global, model.nodes_global) == self._counted:
             return
-        self._counted = model.elements_global
+        self._counted = model.elements_global, model.nodes_global
         held = sim.comm.gather(sum(block.n for block in model.blocks))
         self._tell(
             messages.Counts, elements=model.elements_global, nodes=model.nodes_global, shared=sim.shared_nodes,
-            fragments=len(model.parts), elements_per_rank=held or [],
+            fragments=self.record.count if self.record is not None else len(model.parts), elements_per_rank=held or [],
             particles=sim.erosion.particles if sim.erosion is not None else 0,
         )  # fmt: skip
 

@@ -19,6 +19,8 @@ QUICK = (2, 3)
 """Numbers of ranks at which the scene of everything is compared in seconds; the rest is a drill."""
 SHORT = {
     "bar_on_bar": "3 us",
+    "branching_plate": "9 us",
+    "breathing_facet": "30 us",
     "crossed_bars": "2 us",
     "demo": "1 us",
     "dissimilar_bars": "3 us",
@@ -26,6 +28,9 @@ SHORT = {
     "elastic_bar_wall": "1.5 us",
     "fast_fragment": "0.3 us",
     "free_spin": "10 us",
+    "free_tets": "5 us",
+    "glass_steel_bar": "0.9 us",
+    "glass_steel_demo": "4 us",
     "hertz_spheres": "0.2 us",
     "long_rod": "2 us",
     "newton_cradle": "2 us",
@@ -35,10 +40,13 @@ SHORT = {
     "shock_copper": "0.5 us",
     "shock_tungsten": "0.3 us",
     "sliding_block": "1.4 ms",
+    "spall_glass": "2.15 us",
     "spinning_cube": "20 us",
+    "stretched_bar": "0.09 us",
     "taylor_42crmo4": "1.5 us",
     "taylor_copper": "1.5 us",
     "taylor_copper_split": "1.5 us",
+    "two_tets": "0.3 ms",
 }
 """End times at which every shipped case has taken some fifty steps."""
 FORMS = ("standard", "nodal", "split")

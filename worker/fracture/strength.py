@@ -13,9 +13,8 @@ import numpy as np
 from conoid.cases.materials import Brittle, Material, Scatter
 from conoid.cases.schema import Fracture
 
+from ..hashing import uniform
 from ..state import Floats, Ints
-
-_GOLDEN, _MIX_1, _MIX_2 = (np.uint64(n) for n in (0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB))
 
 
 @dataclass(frozen=True)
@@ -35,7 +34,7 @@ class Toughness:
         scatter = self.scatter
         if scatter is None:
             return np.full(len(face), self.strength)
-        chance = -np.log1p(-uniform(scatter.seed, face))
+        chance = -np.log1p(-uniform(face, scatter.seed))
         if scatter.area is not None:
             chance = chance * (scatter.area / area)
         return np.asarray(scatter.minimum + (self.strength - scatter.minimum) * chance ** (1.0 / scatter.modulus))
@@ -75,13 +74,3 @@ def _scaled(brittle: Brittle, strength: float) -> Scatter | None:
         return None
     lowest = brittle.scatter.minimum * strength / brittle.strength
     return brittle.scatter.model_copy(update={"minimum": lowest})
-
-
-def uniform(seed: int, face: Ints) -> Floats:
-    """(n,) numbers in [0, 1) that depend on the seed and the id alone: splitmix64 (Steele, Lea and Flood 2014)."""
-    with np.errstate(over="ignore"):
-        z = (face.astype(np.uint64) + np.uint64(seed) * _MIX_1 + np.uint64(1)) * _GOLDEN
-        z = (z ^ (z >> np.uint64(30))) * _MIX_1
-        z = (z ^ (z >> np.uint64(27))) * _MIX_2
-        z = z ^ (z >> np.uint64(31))
-    return np.asarray((z >> np.uint64(11)).astype(np.float64) * 2.0**-53)

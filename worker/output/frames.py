@@ -22,6 +22,7 @@ from ..state import (
     TEMPERATURE,
     Block,
     Floats,
+    Ints,
     Model,
 )
 
@@ -36,11 +37,11 @@ def von_mises(deviator: Floats) -> Floats:
     return mises
 
 
-def _cells(block: Block, rank: int) -> dict[str, Any]:
+def _cells(block: Block, rank: int, fragment: Ints | None) -> dict[str, Any]:
     deviator = np.array([block.row(row) for row in range(S_XX, S_XY + 1)])
     strain = block.row(PLASTIC_STRAIN) if block.has(PLASTIC_STRAIN) else np.zeros(block.n)
     temperature = block.row(TEMPERATURE) if block.has(TEMPERATURE) else np.full(block.n, block.temperature)
-    return {
+    cells = {
         "part": np.full(block.n, block.part, np.int32),
         "rank": np.full(block.n, rank, np.int32),
         "tet": block.id,
@@ -49,11 +50,12 @@ def _cells(block: Block, rank: int) -> dict[str, Any]:
         "plastic_strain": strain.astype(np.float32),
         "temperature": temperature.astype(np.float32),
     }
+    return cells if fragment is None else {**cells, "fragment": fragment}
 
 
-def _snapshot(model: Model, rank: int) -> dict[str, Any]:
+def _snapshot(model: Model, rank: int, labels: list[Ints] | None) -> dict[str, Any]:
     nodes = model.nodes
-    cells = [_cells(block, rank) for block in model.blocks]
+    cells = [_cells(block, rank, labels[b] if labels else None) for b, block in enumerate(model.blocks)]
     return {
         "ids": nodes.id,
         "points": nodes.x,
@@ -64,9 +66,12 @@ def _snapshot(model: Model, rank: int) -> dict[str, Any]:
     }
 
 
-def write(folder: Path, index: int, t: float, model: Model, comm: Comm) -> str | None:
-    """Writes frame ``index``; on rank 0 returns its path relative to the run's folder, elsewhere None."""
-    pieces = comm.gather(_snapshot(model, comm.rank))
+def write(folder: Path, index: int, t: float, model: Model, comm: Comm, labels: list[Ints] | None = None) -> str | None:
+    """Writes frame ``index``; on rank 0 returns its path relative to the run's folder, elsewhere None.
+
+    ``labels``: for each block the fragment of each tet, where there are any.
+    """
+    pieces = comm.gather(_snapshot(model, comm.rank, labels))
     if pieces is None:
         return None
     path = layout.frame(folder, index)
