@@ -103,11 +103,14 @@ class Cohesion:
         return int(_scatter(force, self.facets.nodes, self.facets.pull, scale))
 
     def energies(self, comm: Comm) -> tuple[float, float]:
-        """Energy, J, that is lost for good, and that the closing of facets would give back; all ranks take part."""
+        """Energy, J, that is lost for good, and that the closing of facets would give back; all ranks take part.
+
+        Facets that are pressed together beyond where they began have given back more than that: the second is negative.
+        """
         f = self.facets
         e = sizes(f.offset, f.shear)
         stiffness = f.strength[:, None] * np.maximum(1.0 - (f.top - e[:, None]) / f.critical[:, None], 0.0) / f.top
-        stored = 0.5 * stiffness * np.maximum(f.size**2 - (e * e)[:, None], 0.0)
+        stored = 0.5 * stiffness * (f.size**2 - (e * e)[:, None])
         back = (f.area / 3.0) * stored.sum(axis=1)
         work, reversible = exact_sums(comm, np.column_stack([f.work, back]))
         return float(work + self._gone.total(comm)[0] - reversible), float(reversible)

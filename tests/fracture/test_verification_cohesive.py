@@ -1,0 +1,219 @@
+"""V24, H5: a cohesive facet driven by prescribed positions, against its law on paper.
+
+From the moment of insertion on the pairs of nodes open by ``u``. With e the offset, n the normal, b^2 = 1 / weight and
+D = |(e + u)| in the norm of the law, the traction is strength (1 - (D - |e|) / critical) in size, along
+<d_n> n + b^2 d_t, and what it has taken when D = |e| + critical is energy times area, whatever the way.
+"""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from conoid.worker.fracture.cohesive import Cohesion, Facets, inserted, sizes
+from conoid.worker.parallel.comm import SerialComm
+from conoid.worker.state import Nodes
+
+Floats = npt.NDArray[np.float64]
+
+STRENGTH, ENERGY, STIFFNESS = 2e6, 50.0, 1e12
+CRITICAL = 2.0 * ENERGY / STRENGTH
+CORNERS = np.array([[0.1, 0.2, 0.3], [2.1, 0.4, 0.1], [0.6, 1.9, 0.8]]) * 1e-3
+EDGES = CORNERS[1:] - CORNERS[0]
+AREA = 0.5 * float(np.linalg.norm(np.cross(*EDGES)))
+NORMAL = np.cross(*EDGES) / (2.0 * AREA)
+ALONG = EDGES[0] / np.linalg.norm(EDGES[0])
+ANGLES = [0.0, 20.0, 45.0, 70.0, 90.0]
+"""Between the traction at insertion and the normal, degrees."""
+
+
+def direction(angle: float, turn: float = 0.4) -> Floats:
+    """A unit vector at ``angle``, rad, to the normal; ``turn``, rad: of its shear in the plane of the facet."""
+    shear = math.cos(turn) * ALONG + math.sin(turn) * np.cross(NORMAL, ALONG)
+    return np.asarray(math.cos(angle) * NORMAL + math.sin(angle) * shear)
+
+
+class Facet:
+    """One facet, inserted under ``traction`` (3,), Pa, and opened by displacements of the far side."""
+
+    def __init__(self, traction: Floats, weight: float = 1.0, effective: float = STRENGTH) -> None:
+        x = np.concatenate([CORNERS, CORNERS])
+        n = len(x)
+        nodes = Nodes(
+            np.arange(n), np.zeros(n, np.int32), np.zeros(n, np.int32), np.ones(n, bool), x.copy(), x.copy(),
+            np.zeros((n, 3)), np.ones(n), np.zeros((n, 3), np.int64),
+        )  # fmt: skip
+        one = np.ones(1)
+        sides = np.arange(6, dtype=np.int32)[None]
+        new: Facets = inserted(
+            nodes, sides, sides, np.array([[0, 1]]), traction[None], effective * one, ENERGY * one, weight * one,
+            STIFFNESS * one, AREA * one,
+        )  # fmt: skip
+        self.x0, self.weight = x, weight
+        self.offset = float(sizes(new.offset, new.shear)[0])
+        self.cohesion = Cohesion(ENERGY * AREA)
+        self.cohesion.insert(new)
+
+    @property
+    def facets(self) -> Facets:
+        return self.cohesion.facets
+
+    @property
+    def pull(self) -> Floats:
+        """(3,) traction on the first side, Pa."""
+        return np.asarray(self.facets.pull[0].sum(axis=0) / AREA)
+
+    @property
+    def work(self) -> float:
+        """Done so far, J."""
+        return sum(self.cohesion.energies(SerialComm()))
+
+    def open(self, u: Floats, turned: Floats | None = None) -> None:
+        """The far side stands ``u`` (3,), m, from the first; ``turned`` (3, 3): rotation of everything."""
+        x = self.x0.copy()
+        x[3:] += u
+        self.cohesion.open(x if turned is None else np.ascontiguousarray(x @ turned.T))
+
+
+def tear(facet: Facet, way: Floats, steps: int = 4000, turned: bool = False) -> None:
+    """Opens a facet along ``way`` (3,) until it has failed; ``turned``: while it turns by 1 rad."""
+    along = float(way @ NORMAL)
+    end = 1.01 * (CRITICAL + 2.0 * facet.offset) / math.sqrt(along**2 + (1.0 - along**2) / facet.weight)
+    for k in range(1, steps + 1):
+        spin = rotation(k / steps) if turned else None
+        facet.open(end * k / steps * way, spin)
+    assert not len(facet.facets.work)
+
+
+def rotation(angle: float) -> Floats:
+    """About the z axis."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+@pytest.mark.parametrize("weight", [1.0, 0.25, 4.0])
+@pytest.mark.parametrize("angle", ANGLES)
+def test_the_traction_at_insertion_is_that_before(angle: float, weight: float) -> None:
+    mixed = direction(math.radians(angle))
+    traction = STRENGTH * mixed / math.sqrt((mixed @ NORMAL) ** 2 + weight * (1.0 - (mixed @ NORMAL) ** 2))
+    facet = Facet(traction, weight)
+    assert facet.pull == pytest.approx(traction, abs=1e-12 * STRENGTH)
+    facet.open(np.zeros(3))
+    assert facet.pull == pytest.approx(traction, abs=1e-12 * STRENGTH)
+    assert facet.offset == pytest.approx(STRENGTH / STIFFNESS, rel=1e-12)
+
+
+@pytest.mark.parametrize("weight", [1.0, 0.25])
+@pytest.mark.parametrize("insertion", [0.0, 45.0, 90.0])
+@pytest.mark.parametrize("angle", ANGLES)
+def test_tearing_takes_the_energy_whatever_the_direction(angle: float, insertion: float, weight: float) -> None:
+    """Also along another direction than that of the traction at insertion."""
+    mixed = direction(math.radians(insertion))
+    size = math.sqrt((mixed @ NORMAL) ** 2 + weight * (1.0 - (mixed @ NORMAL) ** 2))
+    facet = Facet(STRENGTH * mixed / size, weight)
+    tear(facet, direction(math.radians(angle), turn=-0.9))
+    assert facet.work == pytest.approx(ENERGY * AREA, rel=1e-6)
+
+
+@pytest.mark.parametrize("angle", ANGLES)
+def test_the_traction_falls_linearly_with_the_opening(angle: float) -> None:
+    way = direction(math.radians(angle))
+    facet = Facet(STRENGTH * way)
+    for share in np.linspace(0.05, 0.95, 19):
+        facet.open(share * CRITICAL * way)
+        assert facet.pull == pytest.approx((1.0 - share) * STRENGTH * way, abs=1e-9 * STRENGTH)
+
+
+@pytest.mark.parametrize("angle", ANGLES)
+def test_a_facet_returns_on_the_secant_and_gives_back_what_lies_under_it(angle: float) -> None:
+    way, most = direction(math.radians(angle)), 0.4 * CRITICAL
+    facet = Facet(STRENGTH * way)
+    e, top = facet.offset, 0.6 * STRENGTH
+    for share in np.linspace(0.0, 1.0, 401):
+        facet.open(share * most * way)
+    secant = top / (most + e)
+    taken = facet.work
+    for share in (0.9, 0.5, 0.1, 0.0, 0.3, 0.8, 1.0):
+        facet.open(share * most * way)
+        assert facet.pull == pytest.approx(secant * (share * most + e) * way, abs=1e-9 * STRENGTH)
+    assert facet.work == pytest.approx(taken, rel=1e-9)
+    lost, back = facet.cohesion.energies(SerialComm())
+    assert back == pytest.approx(AREA * 0.5 * secant * ((most + e) ** 2 - e**2), rel=1e-9)
+    assert lost + back == pytest.approx(AREA * 0.5 * (STRENGTH + top) * most, rel=1e-6)
+    facet.open(0.0 * way)
+    assert facet.work == pytest.approx(lost, rel=1e-9)
+    assert facet.cohesion.energies(SerialComm())[1] == pytest.approx(0.0, abs=1e-12 * lost)
+    tear(facet, way)
+    assert facet.work == pytest.approx(ENERGY * AREA, rel=1e-6)
+
+
+def test_what_is_lost_never_comes_back() -> None:
+    """A random walk of the opening, closing beyond the start included. A step across the bracket <d_n>, where the mean
+    of two forces is not exact, may take stiffness times step^2 / 8.
+    """
+    random, u, lost, largest = np.random.default_rng(3), np.zeros(3), [0.0], 0.0
+    facet = Facet(STRENGTH * direction(0.7), weight=0.5)
+    for _ in range(3000):
+        change = random.normal(scale=0.004 * CRITICAL, size=3) + 2e-5 * CRITICAL * NORMAL
+        u, largest = u + change, max(largest, abs(change @ NORMAL))
+        facet.open(u)
+        lost.append(facet.cohesion.energies(SerialComm())[0])
+        if not len(facet.facets.work):
+            break
+    assert np.diff(lost).min() > -STIFFNESS * AREA * largest**2 / 8.0
+    assert lost[-1] > 0.2 * ENERGY * AREA
+
+
+def test_closing_beyond_the_start_is_no_loss() -> None:
+    facet = Facet(STRENGTH * NORMAL)
+    for share in np.linspace(0.0, 2.0, 201):
+        facet.open(-share * facet.offset * NORMAL)
+    lost, back = facet.cohesion.energies(SerialComm())
+    assert lost == pytest.approx(0.0, abs=1e-12 * ENERGY * AREA)
+    assert back == pytest.approx(-0.5 * STRENGTH * facet.offset * AREA, rel=1e-6)
+
+
+def test_a_facet_that_turns_with_its_bodies_takes_the_same() -> None:
+    facet = Facet(STRENGTH * direction(0.5))
+    tear(facet, direction(0.5), turned=True)
+    assert facet.work == pytest.approx(ENERGY * AREA, rel=1e-6)
+
+
+def test_an_offset_across_the_opening_does_no_more_work_when_a_facet_turns_than_its_size_allows() -> None:
+    """Traction and opening are not along one line then: turning by an angle takes up to strength offset angle more."""
+    facet = Facet(STRENGTH * direction(0.0))
+    tear(facet, direction(math.pi / 2), turned=True)
+    assert abs(facet.work - ENERGY * AREA) < STRENGTH * facet.offset * AREA
+
+
+@pytest.mark.parametrize("depth", [0.0, 0.3, 3.0])
+def test_under_pressure_only_shear_counts(depth: float) -> None:
+    """Sides that have passed each other slide: the traction lies in the facet, whatever the depth."""
+    shear = direction(math.pi / 2)
+    facet = Facet(STRENGTH * shear)
+    for share in np.linspace(0.1, 0.9, 9):
+        facet.open(share * CRITICAL * shear - depth * CRITICAL * NORMAL)
+        assert facet.pull == pytest.approx((1.0 - share) * STRENGTH * shear, abs=1e-9 * STRENGTH)
+
+
+def test_a_facet_that_broke_under_pressure_holds_the_shear_that_friction_leaves() -> None:
+    """The effective traction under pressure is sqrt(weight) (t_s - friction |t_n|): 3 - 0.5 * 2 = 2 MPa at weight 1."""
+    shear = direction(math.pi / 2)
+    facet = Facet(3e6 * shear - 2e6 * NORMAL, effective=2e6)
+    assert facet.pull == pytest.approx(2e6 * shear, abs=1e-6 * STRENGTH)
+    tear(facet, shear)
+    assert facet.work == pytest.approx(ENERGY * AREA, rel=1e-6)
+
+
+def test_one_pair_fails_after_the_other() -> None:
+    """Opened as a hinge about the first edge: only one of three pairs opens, and takes a third of the energy."""
+    facet = Facet(STRENGTH * NORMAL)
+    x = facet.x0.copy()
+    steps = 4000
+    for k in range(1, steps + 1):
+        x[5] = facet.x0[5] + 1.5 * CRITICAL * k / steps * NORMAL
+        facet.cohesion.open(x)
+    assert len(facet.facets.work) == 1
+    assert facet.facets.pull[0, 2] == pytest.approx(np.zeros(3))
+    assert facet.work == pytest.approx(ENERGY * AREA / 3.0, rel=2e-3)
