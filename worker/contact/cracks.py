@@ -1,13 +1,13 @@
-"""Contact across fresh cracks, and a scene that follows nodes as they separate, until the next search.
+"""Contact across cracks, and a scene that follows nodes as they separate, until the next search.
 
-The two sides of a facet that has just broken lie on each other, and no search is needed to know that they meet: from
-the moment of separation the nodes across, which were one, push each other apart along the normal of their facet, from a
-gap of exactly zero. That holds as long as they are near: when the two have moved apart by a share of the facet's size,
-a search is due, after which they are nodes and faces like all others. Nothing else can have come between until then:
-whatever else reaches the faces of a crack has to enter it. Edges of cracks meet edges from the next search on.
+The two sides of a facet that has broken lie on each other, and no search is needed to know that they meet: from the
+moment of separation the nodes across, which were one, push each other apart along the normal of their facet, from a gap
+of exactly zero. That holds as long as they are near. What else could reach the faces of a crack has to enter it, so they
+are no part of the surface until they are apart by a share of a facet's size: then a search is due, after which they and
+their nodes and edges are surface like all other. However finely a body shatters, what has not moved costs no search.
 
-What the last search has found stays good: faces take up the copies of their corners, and a copy has the candidates of
-the node that it was part of, with the rank that computes that one's.
+What the last search has found stays good while nodes separate: faces take up the copies of their corners, and a copy
+has the candidates of the node that it was part of, with the rank that computes that one's.
 """
 
 from dataclasses import dataclass
@@ -17,45 +17,63 @@ from numba import njit
 
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
-from ..state import Flags, Indices, Ints, Nodes, extended
+from ..state import WIDE, Block, Flags, Floats, Indices, Ints, Nodes, extended
 from ..topology import Split, keys
 from . import ghosts
 from .meetings import DEEP_SELF, NEAR, Meetings, needed
 from .records import Crowd
 from .scene import Scene
 
-_APART = 0.2
-"""Of the size of a facet: two sides that have moved so far apart call for a search."""
+_APART = 0.3
+"""Of the typical size of a face: two sides that have moved so far apart call for a search."""
+_WIDE = 0.1
+"""Of it: those that a search makes surface, so that it serves many."""
 
 
 @dataclass
 class Cracks:
-    """Facets that have broken and are not yet surface, whose first side is this rank's."""
+    """Facets that have broken and are not surface yet, with a side on this rank."""
 
     tets: Ints
-    """(m, 2) global ids."""
+    """(m, 2) global ids, the smaller first."""
     nodes: Indices
     """(m, 6) local nodes of the first side, counter-clockwise seen from outside of it, and those across."""
+    sides: Indices
+    """(m, 2, 3) block, place and face of either side, -1 for one of another rank."""
 
     @classmethod
     def none(cls) -> "Cracks":
         """No facet."""
-        return cls(np.zeros((0, 2), np.int64), np.zeros((0, 6), np.int32))
+        return cls(np.zeros((0, 2), np.int64), np.zeros((0, 6), np.int32), np.zeros((0, 2, 3), np.int32))
 
     @property
-    def open(self) -> Flags:
-        """(m,) which have nodes across that are not their own."""
-        return np.asarray((self.nodes[:, :3] != self.nodes[:, 3:]).any(axis=1))
+    def active(self) -> Flags:
+        """(m,) which have nodes that have separated, and the first side here: this rank computes them."""
+        return np.asarray((self.nodes[:, :3] != self.nodes[:, 3:]).any(axis=1) & (self.sides[:, 0, 1] >= 0))
 
-    def add(self, tets: Ints, nodes: Indices) -> None:
+    def add(self, tets: Ints, nodes: Indices, sides: Indices) -> None:
         """Takes up facets with their three ``nodes`` (m, 3)."""
-        self.tets = np.concatenate([self.tets, tets])
-        self.nodes = np.concatenate([self.nodes, np.concatenate([nodes, nodes], axis=1)])
+        self.tets, self.sides = extended(self.tets, tets), extended(self.sides, sides)
+        self.nodes = extended(self.nodes, np.concatenate([nodes, nodes], axis=1))
 
-    def surface(self) -> None:
-        """Lets go of what is open: a search knows it as surface."""
-        kept = ~self.open
-        self.tets, self.nodes = self.tets[kept], self.nodes[kept]
+    def follow(self, split: Split, ids: Ints) -> None:
+        """Takes up the copies of a split; ``ids``: of the local nodes."""
+        parents = np.zeros(len(ids), bool)
+        parents[split.copies.parents] = True
+        rows = np.flatnonzero(parents[self.nodes].any(axis=1))
+        self.nodes[rows] = split.followed_sides(self.nodes[rows], ids, self.tets[rows])
+
+    def release(self, blocks: list[Block], x: Floats, size: float) -> int:
+        """Makes surface of what is wide at the positions ``x`` (nodes, 3); returns how many facets."""
+        apart = x[self.nodes[:, 3:]] - x[self.nodes[:, :3]]
+        wide = ((apart * apart).sum(axis=2) > (_WIDE * size) ** 2).any(axis=1)
+        sides = self.sides[wide].reshape(-1, 3)
+        for b, block in enumerate(blocks):
+            mine = sides[(sides[:, 0] == b) & (sides[:, 1] >= 0)]
+            if len(mine):
+                block.bond[mine[:, 1], mine[:, 2]] = WIDE
+        self.tets, self.nodes, self.sides = self.tets[~wide], self.nodes[~wide], self.sides[~wide]
+        return int(wide.sum())
 
 
 @dataclass
@@ -95,24 +113,27 @@ def news(split: Split, here: Crowd, nodes: Nodes, comm: Comm) -> News:
 class Follower:
     """Brings one scene up to date with a split."""
 
-    def __init__(self, scene: Scene, here: Crowd) -> None:
+    def __init__(self, scene: Scene, here: Crowd, nodes: Nodes) -> None:
         """``here``: every node of this rank, by local index."""
         self._scene, self._here = scene, here
-        self._index()
-
-    def _index(self) -> None:
-        self._order = np.argsort(self._scene.crowd.id, kind="stable")
+        self._nodes = nodes
+        if len(scene.place) < nodes.n:
+            scene.place = extended(scene.place, np.full(nodes.n - len(scene.place), -1, np.int32))
 
     def places(self, ids: Ints) -> Indices:
         """Where ids stand in the crowd, -1 where they do not."""
-        known = self._scene.crowd.id
-        if not len(known):
-            return np.full(ids.shape, -1, np.int32)
-        at = self._order[np.minimum(np.searchsorted(known, ids, sorter=self._order), len(known) - 1)]
-        return np.where(known[at] == ids, at, -1).astype(np.int32)
+        local = self._nodes.places(ids)
+        out = np.where(local >= 0, self._scene.place[local], -1).astype(np.int32)
+        crowd = self._scene.crowd
+        ghosts = np.flatnonzero(crowd.local < 0)
+        if len(ghosts):
+            ghosts = ghosts[np.argsort(crowd.id[ghosts])]
+            at = ghosts[np.minimum(np.searchsorted(crowd.id[ghosts], ids), len(ghosts) - 1)]
+            out = np.where(crowd.id[at] == ids, at, out).astype(np.int32)
+        return out
 
     def follow(self, heard: News, cracks: Cracks) -> None:
-        """Faces, edges and candidates after the split, and the places of the open cracks."""
+        """Faces, edges and candidates after the split, and the places of the cracks."""
         scene = self._scene
         have = self.places(heard.parent) >= 0
         self._add(heard.rows.take(np.isin(heard.rows.id, heard.copy[have])))
@@ -124,18 +145,25 @@ class Follower:
         self._faces(heard, parents)
         self._edges(heard, parents)
         self._candidates(heard, parents)
-        nodes = cracks.nodes[cracks.open]
-        self._hold(self._here.id[np.unique(nodes)])
-        scene.cracks = self.places(self._here.id[nodes])
+        self.cracks(cracks)
+
+    def cracks(self, cracks: Cracks) -> None:
+        """The places of the cracks that this rank computes, and room for all that may meet."""
+        scene = self._scene
+        nodes = cracks.nodes[cracks.active]
+        held = np.zeros(self._nodes.n, bool)
+        held[nodes] = True
+        self._add(self._here.take(np.flatnonzero(held & (scene.place < 0))))
+        scene.cracks = scene.place[nodes]
         scene.pushes[scene.cracks] = True
         room = len(scene.node_face) + len(scene.edge_edge) + 3 * len(nodes)
         if room > len(scene.push):
             scene.room = Meetings.room(2 * room)
             scene.diagonal, scene.push = np.empty((2 * room, 2)), np.empty((2 * room, 4))
 
-    def share(self, nodes: Nodes, neighbours: list[Neighbour], comm: Comm) -> None:
+    def share(self, neighbours: list[Neighbour], comm: Comm) -> None:
         """Settles anew who shares which node; all ranks take part."""
-        scene = self._scene
+        scene, nodes = self._scene, self._nodes
         used = np.sort(scene.crowd.id[scene.pushes])
         owners = scene.crowd.owner[self.places(used)]
         shared = ghosts.members(used, owners, neighbours, nodes, comm)
@@ -158,12 +186,12 @@ class Follower:
         held = np.flatnonzero(rows.local >= 0).astype(np.int32)
         scene.held = extended(scene.held, first + held)
         scene.local = extended(scene.local, rows.local[held])
+        scene.place[rows.local[held]] = first + held
         for name, width in (("shares", 4), ("impulse", 3), ("total", 3)):
             setattr(scene, name, extended(getattr(scene, name), np.zeros((n, width), np.int64)))
         scene.normals = extended(scene.normals, np.zeros((n, 9)))
         scene.before = extended(scene.before, rows.v)
         scene.pushes = extended(scene.pushes, np.zeros(n, bool))
-        self._index()
 
     def _followed(self, heard: News, places: Indices, tets: Ints) -> Indices:
         """What nodes at ``places`` (n, k) of tets (n,) have become."""
@@ -217,14 +245,15 @@ class Follower:
 
 @njit(
     "UniTuple(int64, 2)(int32[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], int32[::1], "
-    "int64, int32[:, ::1], float64[:, ::1], float64[:, ::1], int32[::1], float64[:, ::1], float64)",
+    "int64, int32[:, ::1], float64, float64[:, ::1], float64[:, ::1], int32[::1], float64[:, ::1], float64)",
     cache=True,
     error_model="numpy",
 )
-def across(nodes, weights, normals, wanted, friction, pair, n, cracks, x, v, part, mu, dt):  # type: ignore[no-untyped-def]
+def across(nodes, weights, normals, wanted, friction, pair, n, cracks, typical, x, v, part, mu, dt):  # type: ignore[no-untyped-def]
     """Nodes across ``cracks`` (m, 6) that close on each other, from row ``n`` on (meetings.node_face).
 
-    Returns the new number of rows, and 1 when two sides have moved so far apart that a search is due, else 0.
+    ``typical``: size of a face, m. Returns the new number of rows, and 1 when two sides have moved so far apart that a
+    search is due, else 0.
     """
     e, f, m = np.empty(3), np.empty(3), np.empty(3)
     far = 0
@@ -251,7 +280,7 @@ def across(nodes, weights, normals, wanted, friction, pair, n, cracks, x, v, par
                 gap0 += m[i] * opening
                 speed += m[i] * (v[q, i] - v[p, i])
                 apart += opening * opening
-            if apart > (_APART * size) ** 2:
+            if apart > (_APART * typical) ** 2:
                 far = 1
             gap1 = gap0 + dt * speed
             if not (gap1 <= NEAR * size and gap0 >= -DEEP_SELF * size):

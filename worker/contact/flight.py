@@ -55,13 +55,10 @@ class Flight:
         far = _strayed(nodes.x, nodes.v, self._x, self._v, self._found.flags, dt, t + dt - self._t)
         return bool(far > (_SPENT * self._skin) ** 2)
 
-    def grow(self, parents: Ints, nodes: Nodes, t: float) -> None:
-        """Takes up copies of nodes: they fly as their parents do, those that were inside from now on."""
-        found, n = self._found, len(self._x)
-        inside = parents[~found.flags[parents]]
-        self._x[inside], self._v[inside] = nodes.x[inside] - (t - self._t) * nodes.v[inside], nodes.v[inside]
-        found.flags[parents] = True
-        found.flags = extended(found.flags, np.ones(nodes.n - n, bool))
+    def grow(self, parents: Ints) -> None:
+        """Takes up copies of nodes: they fly as their parents do."""
+        found = self._found
+        found.flags = extended(found.flags, found.flags[parents])
         self._x, self._v = extended(self._x, self._x[parents]), extended(self._v, self._v[parents])
 
     def here(self, nodes: Nodes) -> Crowd:

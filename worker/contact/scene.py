@@ -103,6 +103,8 @@ class Scene:
     """(crowd, 9) what the faces of the nodes look at, as they did at the search; see meetings.node_face."""
     before: Floats
     """(crowd, 3) v(n-1/2)."""
+    place: Indices
+    """(nodes,) place of each node of this rank, -1 for those that are not in the crowd."""
     pushes: Flags
     """(crowd,) which nodes a meeting of this rank may push."""
     cracks: Indices
@@ -241,13 +243,15 @@ def _compact(
     room = len(node_face) + len(edge_edge)
     shares, impulse = np.zeros((crowd.n, 4), np.int64), np.zeros((crowd.n, 3), np.int64)
     held = np.flatnonzero(crowd.local >= 0).astype(np.int32)
+    place = np.full(nodes.n, -1, np.int32)
+    place[crowd.local[held]] = held
     found = Scene(
         crowd=crowd, held=held, local=crowd.local[held], faces=crowd.places(faces.nodes), face_id=faces.id,
         face_size=faces.size, edges=crowd.places(edges.nodes), edge_sides=edges.sides, edge_size=edges.size,
         node_face=np.column_stack([crowd.places(slave_ids), face_at.reshape(-1)]).astype(np.int32),
         edge_edge=edge_at.reshape(-1, 2).astype(np.int32), keys=keys, kept=np.zeros((len(keys), 4)), faces_sent=sent,
         room=Meetings.room(room), diagonal=np.empty((room, 2)), push=np.empty((room, 4)),
-        shares=shares, impulse=impulse, pushes=np.isin(crowd.id, pushed), cracks=np.zeros((0, 6), np.int32),
+        shares=shares, impulse=impulse, place=place, pushes=np.isin(crowd.id, pushed), cracks=np.zeros((0, 6), np.int32),
         total=np.zeros((crowd.n, 3), np.int64), normals=np.zeros((crowd.n, 9)), before=np.zeros((crowd.n, 3)),
     )  # fmt: skip
     found.connect(company, nodes, comm)

@@ -64,6 +64,7 @@ class Contact(Boundary):
         """One over the step in which no node passes more than half of a tet that it may meet, 1/s."""
         self._changed = False
         """Whether the surface is another one than that of the last search."""
+        self._fractures = case.fractures
         self._stale = False
         """Whether nodes have separated since the surface was made."""
         self._cracks = Cracks.none()
@@ -92,35 +93,37 @@ class Contact(Boundary):
             )
             self.due = self._changed = True
 
-    def crack(self, tets: Ints, nodes: Indices) -> None:
-        """Takes up broken facets: either side (m, 2), the first one of this rank, and the three local ``nodes`` (m, 3)
-        that they have in common, counter-clockwise seen from outside of the first side.
+    def crack(self, tets: Ints, nodes: Indices, sides: Indices) -> None:
+        """Takes up broken facets that have a side here, with the local ``nodes`` (m, 3) that the sides have in common;
+        see ``Cracks`` for ``tets`` and ``sides``.
         """
-        self._cracks.add(tets, nodes)
+        self._cracks.add(tets, nodes, sides)
 
     def separate(self, split: Split) -> None:
         """Follows nodes as they separate; all ranks take part."""
         with self._timers.phase("contact"):
             state = self._model.nodes
-            self._cracks.nodes = split.followed_sides(self._cracks.nodes, state.id, self._cracks.tets)
+            self._cracks.follow(split, state.id)
             self._stale = True
             if self._scene is None:
                 return
-            self._flight.grow(split.copies.parents, state, self._clock.t)
+            self._flight.grow(split.copies.parents)
             self._flight.mobility = self._mobility
             here = self._flight.here(state)
-            follower = Follower(self._scene, here)
+            follower = Follower(self._scene, here, state)
             follower.follow(news(split, here, state, self._comm), self._cracks)
             if self._comm.size > 1:
                 self._scene.free()
-                follower.share(state, self._neighbours, self._comm)
+                follower.share(self._neighbours, self._comm)
 
     def _expose(self, state: Nodes) -> None:
-        """The surface anew, with what has separated."""
+        """The surface anew, with the cracks that are wide; all ranks take part."""
+        released = self._cracks.release(self._model.blocks, state.x, self._flight.size)
+        if not int(self._comm.sum(np.array([released]))[0]) and not self._stale:
+            return
         old = self._surface.flags
         self._surface = surface.build(self._model, self._planes, self._neighbours, self._comm, self._edges)
         self._surface.flags[: len(old)] |= old
-        self._cracks.surface()
         self._stale, self._changed = False, True
 
     def _inherit(self, at: Ints, copies: Indices) -> None:
@@ -159,7 +162,7 @@ class Contact(Boundary):
         clock, flight, old = self._clock, self._flight, self._scene
         if old is not None:
             old.free()
-        if self._stale:
+        if self._fractures:
             self._expose(state)
         if self._changed:
             flight.follow(self._surface, state, self._mobility)
@@ -170,6 +173,12 @@ class Contact(Boundary):
         horizon = max(min(steps, 2.0 * (clock.step - self._last)), _SHORTEST) * clock.dt
         self._scene = scene.build(flight.sides, self._rules, horizon, drift, state, self._neighbours, self._comm)
         self.limit = _KINEMATIC * float(self._comm.maximum(np.array([self._scene.approach()]))[0])
+        if self._fractures:
+            follower = Follower(self._scene, flight.here(state), state)
+            follower.cracks(self._cracks)
+            if self._comm.size > 1:
+                self._scene.free()
+                follower.share(self._neighbours, self._comm)
         if old is not None and self._rubs:
             self._scene.remember(old)
         self._look(self._scene, state)
@@ -230,7 +239,7 @@ class Contact(Boundary):
         found = (crowd.x, crowd.v, crowd.part, self._mu, dt)
         n = meetings.node_face(*out, 0, now.faces, now.face_size, now.normals, now.node_face, *found)
         n = meetings.edge_edge(*out, n, now.edges, now.edge_size, now.edge_edge, *found)
-        n, apart = across(*out, n, now.cracks, *found)
+        n, apart = across(*out, n, now.cracks, self._flight.size, *found)
         self._apart |= bool(apart)
         return int(n)
 

@@ -15,6 +15,8 @@ from . import criterion
 from .strength import Toughness
 
 _FAR_TAG = 17
+_BATCH = 10_000
+"""Tets that are made ready together, so that it takes no memory to speak of."""
 ELSEWHERE = -2
 """Place of a tet that another rank has; -1 where there is none."""
 
@@ -53,15 +55,23 @@ def arm(index: int, block: Block, spec: Spec, tough: Toughness, x0: Floats) -> B
     block.shear_weight = spec.shear_weight if spec.shear_weight is not None else float(spec.model == "cohesive")
     block.bond = np.full((block.n, 4), INTACT, np.uint8)
     block.hot = np.zeros(block.n, np.uint8)
-    strengths = np.full((block.n, 4), np.inf)
-    place, face = np.nonzero(block.across >= 0)
-    strengths[place, face] = tough.strengths(facet_ids(block, place, face), areas(block.tets, place, face, x0))
-    block.weakest = strengths.min(axis=1)
+    block.weakest = np.empty(block.n)
+    beside = np.empty((block.n, 4), np.int32)
     order = np.argsort(block.id)
-    behind = block.across // 4
-    at = order[np.minimum(np.searchsorted(block.id[order], behind), block.n - 1)]
-    beside = np.where(block.id[at] == behind, at, ELSEWHERE)
-    return Body(index, block, spec, tough, np.where(block.across < 0, -1, beside).astype(np.int32))
+    known = block.id[order]
+    for start in range(0, block.n, _BATCH):
+        some = slice(start, start + _BATCH)
+        inside = block.across[some] >= 0
+        place, face = np.nonzero(inside)
+        strengths = np.full(inside.shape, np.inf)
+        strengths[inside] = tough.strengths(
+            facet_ids(block, start + place, face), areas(block.tets, start + place, face, x0)
+        )
+        block.weakest[some] = strengths.min(axis=1)
+        behind = block.across[some] // 4
+        at = order[np.minimum(np.searchsorted(known, behind), block.n - 1)]
+        beside[some] = np.where(inside, np.where(block.id[at] == behind, at, ELSEWHERE), -1)
+    return Body(index, block, spec, tough, beside)
 
 
 def facet_ids(block: Block, places: "np.ndarray", faces: "np.ndarray") -> Ints:

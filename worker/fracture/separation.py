@@ -184,7 +184,7 @@ class Separation:
             _restock(star.pool, star.first, star.count, before, after, tets)
 
 
-def _restock(pool: Ints, first: Ints, count: Ints, before: Ints, after: Ints, tets: Ints) -> None:
+def _restock(pool: Indices, first: Indices, count: Indices, before: Ints, after: Ints, tets: Ints) -> None:
     """Writes the stars of nodes ``before`` and of their copies ``after`` anew, in the stretch of the pool they have."""
     starts = np.flatnonzero(np.r_[True, before[1:] != before[:-1]]) if len(before) else np.zeros(0, np.int64)
     rank = np.arange(len(before)) - np.repeat(starts, np.diff(np.r_[starts, len(before)]))

@@ -7,6 +7,7 @@ breaks and gives it up with the opening.
 """
 
 import logging
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from ..mesh.faces import FACES
 from ..parallel.comm import Comm
 from ..parallel.fixed_point import exact_sums
 from ..parallel.ownership import Neighbour, complete
-from ..state import CHUNK, MASS, Block, Floats, Indices, Ints, Model
+from ..state import CHUNK, MASS, Block, Flags, Floats, Indices, Ints, Model
 from ..topology import Split
 from . import bodies
 from .bodies import Body, Far, Loaded
@@ -38,6 +39,34 @@ _REGULAR = (6.0 * 2.0**0.5) ** (1.0 / 3.0)
 """Edge of a regular tet over the cube root of its volume."""
 
 log = logging.getLogger("conoid.worker")
+
+
+@dataclass
+class Breaking:
+    """Facets of one body that break in a step."""
+
+    body: Body
+    broken: Broken
+    """All sides that are here."""
+    tets: Ints
+    """(m, 2) global ids of the tets of either side, the smaller first."""
+    nodes: Indices
+    """(m, 3) local nodes, counter-clockwise seen from outside of the first side."""
+    sides: Indices
+    """(m, 2, 3) block, place and face of either side, -1 for one of another rank."""
+    first: Flags
+    """(m,) whether the first side is here."""
+    traction: Floats
+    """(m, 4) on the outward normal of the first side, and the effective one, Pa."""
+    mass: Floats
+    """(m,) of the lighter tet, kg."""
+
+    def take(self, chosen: Flags) -> "Breaking":
+        """Some of the facets; ``broken`` stays as it is."""
+        return Breaking(
+            self.body, self.broken, self.tets[chosen], self.nodes[chosen], self.sides[chosen], self.first[chosen],
+            self.traction[chosen], self.mass[chosen],
+        )  # fmt: skip
 
 
 class Fracture:
@@ -83,37 +112,18 @@ class Fracture:
         near = [bodies.look(body, x) for body in self._bodies]
         far = self._far.look(x)
         passed: list[tuple[Ints, Floats]] = []
-        broken: dict[int, Broken] = {}
-        new: list[tuple[Body, Loaded, Floats]] = []
-        count = 0
+        broken: list[Breaking] = []
         for body, loaded, (remote, at) in zip(self._bodies, near, far, strict=True):
-            block = body.block
-            within = self._beyond(body, loaded, passed)
-            loaded = loaded.take(within)
-            across = self._beyond(body, remote, passed)
-            remote, at = remote.take(across), at[across]
-            there = body.beside[loaded.places, loaded.faces]
-            back = block.across[loaded.places, loaded.faces] % 4
-            broken[body.index] = Broken(
-                np.concatenate([loaded.places, there, remote.places]),
-                np.concatenate([loaded.faces, back, remote.faces]),
-            )
-            first = self._far.first[at]
-            count += len(loaded.places) + int(first.sum())
-            mass = np.concatenate([_masses(block, there), self._far.mass[at[first]]])
-            mine = remote.take(first)
-            both = Loaded(
-                np.concatenate([loaded.places, mine.places]), np.concatenate([loaded.faces, mine.faces]),
-                np.concatenate([loaded.traction, mine.traction]),
-            )  # fmt: skip
-            new.append((body, both, np.minimum(mass, _masses(block, both.places))))
+            within, across = self._beyond(body, loaded, passed), self._beyond(body, remote, passed)
+            first, mass = self._far.first[at[across]], self._far.mass[at[across]]
+            broken.append(_breaking(body, loaded.take(within), remote.take(across), first, mass))
         ids = np.concatenate([np.zeros(0, np.int64), *(ids for ids, _ in passed)])
         order = np.argsort(ids)
         self._since = ids[order], np.concatenate([np.zeros(0), *(since for _, since in passed)])[order]
-        total = int(self._comm.sum(np.array([count]))[0])
+        total = int(self._comm.sum(np.array([sum(int(b.first.sum()) for b in broken)]))[0])
         if total:
             self.broken += total
-            self._break(broken, new)
+            self._break(broken)
 
     def free(self) -> None:
         """Gives the messages back to MPI."""
@@ -137,14 +147,9 @@ class Fracture:
         passed.append((ids[clocked], since[clocked]))
         return np.flatnonzero(breaks)
 
-    def _break(self, broken: dict[int, Broken], new: list[tuple[Body, Loaded, Floats]]) -> None:
-        shared = [(_corners(body, loaded), _sides(body.block, loaded)) for body, loaded, _ in new]
-        split = self._separation.break_facets(broken)
-        fresh = [
-            self._insert(body, loaded, mass, before, tets, split)
-            for (body, loaded, mass), (before, tets) in zip(new, shared, strict=True)
-            if body.spec.model == "cohesive"
-        ]
+    def _break(self, broken: list[Breaking]) -> None:
+        split = self._separation.break_facets({b.body.index: b.broken for b in broken})
+        fresh = [self._insert(b.take(b.first), split) for b in broken if b.body.spec.model == "cohesive"]
         if split is not None:
             self._tell_everybody(split)
             self._hand_over(split, fresh)
@@ -152,24 +157,22 @@ class Fracture:
             assert self.cohesion is not None
             self.cohesion.insert(facets)
         if self._contact is not None:
-            for before, tets in shared:
-                self._contact.crack(tets, before)
+            for b in broken:
+                self._contact.crack(b.tets, b.nodes, b.sides)
             if split is not None:
                 self._contact.separate(split)
 
-    def _insert(
-        self, body: Body, loaded: Loaded, mass: Floats, before: Indices, tets: Ints, split: Split | None
-    ) -> Facets:
-        """The new cohesive facets of a body, ``before`` (m, 3) their nodes until now, ``tets`` (m, 2) their sides."""
-        nodes, block = self._model.nodes, body.block
-        twice = np.concatenate([before, before], axis=1)
-        after = twice if split is None else split.followed_sides(twice, nodes.id, tets)
-        size = bodies.areas(block.tets, loaded.places, loaded.faces, nodes.x)
+    def _insert(self, b: Breaking, split: Split | None) -> Facets:
+        """The new cohesive facets of a body."""
+        nodes, block = self._model.nodes, b.body.block
+        before = np.concatenate([b.nodes, b.nodes], axis=1)
+        after = before if split is None else split.followed_sides(before, nodes.id, b.tets)
+        size = bodies.areas(block.tets, b.sides[:, 0, 1], b.sides[:, 0, 2], nodes.x)
         frequency = 4.0 * self._unused / self._longest**2
-        m, stiffness = len(size), 3.0 * mass / _SHARES * frequency / size
+        m, stiffness = len(size), 3.0 * b.mass / _SHARES * frequency / size
         return inserted(
-            nodes, twice, after, tets, loaded.traction[:, :3], loaded.traction[:, 3],
-            np.full(m, body.tough.energy), np.full(m, block.shear_weight), stiffness, size,
+            nodes, before, after, b.tets, b.traction[:, :3], b.traction[:, 3],
+            np.full(m, b.body.tough.energy), np.full(m, block.shear_weight), stiffness, size,
         )  # fmt: skip
 
     def _tell_everybody(self, split: Split) -> None:
@@ -234,11 +237,31 @@ def _masses(block: Block, places: "np.ndarray") -> Floats:
     return np.asarray(block.state[places // CHUNK, MASS, places % CHUNK])
 
 
-def _corners(body: Body, loaded: Loaded) -> Indices:
-    """(m, 3) local nodes of facets, counter-clockwise seen from outside of the first side."""
-    return body.block.tets[loaded.places[:, None], FACES[loaded.faces]].astype(np.int32)
+def _breaking(body: Body, near: Loaded, far: Loaded, first: Flags, mass: Floats) -> Breaking:
+    """Facets that break: those within this rank, and ``far`` ones, with whether their ``first`` side is here and the
+    ``mass`` of the tet on the other rank.
+    """
+    block, n = body.block, len(near.places)
+    there = body.beside[near.places, near.faces]
+    back = block.across[near.places, near.faces] % 4
+    own = np.stack([_side(body, near.places, near.faces), _side(body, there, back)], axis=1)
+    alone = _side(body, far.places, far.faces)
+    none = np.full_like(alone, -1)
+    flags = first[:, None, None]
+    sides = np.concatenate([own, np.where(flags, np.stack([alone, none], axis=1), np.stack([none, alone], axis=1))])
+    places, faces = np.concatenate([near.places, far.places]), np.concatenate([near.faces, far.faces])
+    ids = np.column_stack([block.id[places], block.across[places, faces] // 4])
+    corners = block.tets[places[:, None], FACES[faces]].astype(np.int32)
+    corners[n:] = np.where(first[:, None], corners[n:], corners[n:][:, [0, 2, 1]])
+    return Breaking(
+        body=body,
+        broken=Broken(np.concatenate([near.places, there, far.places]), np.concatenate([near.faces, back, far.faces])),
+        tets=np.sort(ids, axis=1).astype(np.int64), nodes=corners, sides=sides,
+        first=np.concatenate([np.ones(n, bool), first]), traction=np.concatenate([near.traction, far.traction]),
+        mass=np.minimum(_masses(block, places), np.concatenate([_masses(block, there), mass])),
+    )  # fmt: skip
 
 
-def _sides(block: Block, loaded: Loaded) -> Ints:
-    """(m, 2) global ids of the tets of either side."""
-    return np.column_stack([block.id[loaded.places], block.across[loaded.places, loaded.faces] // 4]).astype(np.int64)
+def _side(body: Body, places: "np.ndarray", faces: "np.ndarray") -> Indices:
+    """(m, 3) block, place and face."""
+    return np.column_stack([np.full(len(places), body.index), places, faces]).astype(np.int32)

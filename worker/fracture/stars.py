@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from ..mesh.faces import FACES
-from ..state import CHUNK, INTACT, OPEN, PINNED, Ints, Tets, extended
+from ..state import CHUNK, INTACT, OPEN, PINNED, Indices, Tets, extended
 from ..state import MASS as MASS_ROW
 
 NODE, TET, RANK, MASS, BEHIND = 0, 1, 2, 3, 4
@@ -30,21 +30,21 @@ class Stars:
     def __init__(self, tets: Tets, nodes: int) -> None:
         """``tets`` (n, 4) over ``nodes`` local nodes."""
         corners = tets.reshape(-1)
-        self.pool: Ints = np.argsort(corners, kind="stable") // 4
+        self.pool: Indices = (np.argsort(corners, kind="stable") // 4).astype(np.int32)
         """Places of tets."""
-        self.count: Ints = np.bincount(corners, minlength=nodes).astype(np.int64)
+        self.count: Indices = np.bincount(corners, minlength=nodes).astype(np.int32)
         """(nodes,)."""
-        self.first: Ints = np.cumsum(self.count) - self.count
+        self.first: Indices = (np.cumsum(self.count) - self.count).astype(np.int32)
         """(nodes,) where the node's tets begin in the pool."""
 
     def grow(self, copies: int) -> None:
         """Takes up new nodes, which have no tets yet."""
-        none = np.zeros(copies, np.int64)
+        none = np.zeros(copies, np.int32)
         self.first, self.count = extended(self.first, none), extended(self.count, none)
 
 
 @njit(
-    "void(int64[:, ::1], int64[:, ::1], int64[::1], int64[::1], int64[::1], int64[::1], uint32[:, ::1], int64[::1], "
+    "void(int64[:, ::1], int64[:, ::1], int64[::1], int32[::1], int32[::1], int32[::1], uint32[:, ::1], int64[::1], "
     "int64[::1], int64[::1], int32[:, ::1], uint8[:, ::1], int64, int64)",
     cache=True,
 )
