@@ -1,0 +1,342 @@
+"""Node separation: pieces of stars as scipy finds them, and copies numbered alike on any number of ranks."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from conoid.cases import materials, schema
+from conoid.worker import step
+from conoid.worker.fracture import stars
+from conoid.worker.fracture.separation import Broken, Separation
+from conoid.worker.mesh.faces import FACES, across
+from conoid.worker.mesh.model import TetMesh
+from conoid.worker.parallel.comm import Comm
+from conoid.worker.parallel.fixed_point import exact_sums
+from conoid.worker.parallel.ownership import complete
+from conoid.worker.simulation import Simulation
+from conoid.worker.state import INTACT, MASS, OPEN, PINNED, Floats, Ints, Model
+
+from ..contact.bodies import meeting_of, pieces_of
+from ..contact.ranks import on_ranks
+from ..worker.meshes import block, positive
+from ..worker.test_erosion import on
+
+BRITTLE = materials.Material(
+    density=2500.0, elastic=materials.Elastic(young=70e9, poisson=0.2),
+    brittle=materials.Brittle(strength=50e6, energy=20.0, scatter=materials.Scatter(modulus=5.0)),
+)  # fmt: skip
+RANKS = (1, 2, 3, 5)
+STEPS = 40
+
+
+def inner(mesh: TetMesh) -> Ints:
+    """(m, 2) both sides of every facet, 4 * tet + face, the smaller first."""
+    behind = across(mesh.tets).reshape(-1).astype(np.int64)
+    one = np.flatnonzero(behind > np.arange(len(behind)))
+    return np.column_stack([one, behind[one]])
+
+
+def corners_of(mesh: TetMesh, facets: Ints) -> Ints:
+    """(m, 3) nodes of facets."""
+    return np.asarray(mesh.tets[facets[:, 0, None] // 4, FACES[facets[:, 0] % 4]].astype(np.int64))
+
+
+# Pieces
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_pieces_are_those_of_scipy(seed: int) -> None:
+    """Of every node of a block whose facets broke at random, in three shares."""
+    random = np.random.default_rng(seed)
+    mesh = block((4, 3, 3), seed=seed)
+    facets = inner(mesh)
+    whole = facets[random.uniform(size=len(facets)) > (0.2, 0.5, 0.7, 0.9)[seed]]
+    behind = np.full(4 * len(mesh.tets), -1, np.int64)
+    behind[whole], behind[whole[:, ::-1]] = whole[:, ::-1] // 4, whole // 4
+    tet, corner = np.divmod(np.arange(4 * len(mesh.tets)), 4)
+    rows = np.full((len(tet), stars.COLUMNS), -1, np.int64)
+    rows[:, stars.NODE], rows[:, stars.TET] = mesh.tets[tet, corner], tet
+    rows[:, stars.BEHIND :] = behind[4 * tet[:, None] + FACES[corner]]
+    rows = np.ascontiguousarray(rows[np.lexsort((rows[:, stars.TET], rows[:, stars.NODE]))])
+    many = 0
+    label = stars.pieces(rows)
+    for node in range(len(mesh.points)):
+        star = np.flatnonzero(rows[:, stars.NODE] == node)
+        ids = rows[star, stars.TET]
+        pairs = whole[(corners_of(mesh, whole) == node).any(axis=1)] // 4
+        place = np.searchsorted(ids, pairs)
+        graph = coo_array((np.ones(len(pairs)), tuple(place.T)), shape=(len(ids), len(ids)))
+        count, component = connected_components(graph, directed=False)
+        expected = [ids[component == component[i]].min() for i in range(len(ids))]
+        assert label[star].tolist() == expected
+        many += count > 1
+    assert many > 3
+
+
+# Separation on several ranks
+
+
+@dataclass
+class Cracked:
+    """A whole mesh after some events."""
+
+    tets: Ints
+    """(n, 4) global nodes."""
+    bond: Ints
+    """(n, 4)."""
+    x: Floats
+    v: Floats
+    mass: Floats
+    owner: Ints
+
+
+def expected_tets(mesh: TetMesh, events: Sequence[Ints]) -> tuple[Ints, list[int]]:
+    """Connectivity after some events, by plain search through sets; and how often each node of the end was a copy."""
+    tets, broken, n = mesh.tets.astype(np.int64), set[int](), len(mesh.points)
+    depth = [0] * n
+    behind = across(mesh.tets)
+    for facets in events:
+        broken |= set(facets.reshape(-1).tolist())
+        touched = sorted({int(a) for side in facets.reshape(-1) for a in tets[side // 4, FACES[side % 4]]})
+        changes = []
+        for node in touched:
+            left, pieces = set(np.flatnonzero((tets == node).any(axis=1)).tolist()), []
+            while left:
+                piece, waiting = set(), [min(left)]
+                while waiting:
+                    tet = waiting.pop()
+                    if tet in piece:
+                        continue
+                    piece.add(tet)
+                    corner = tets[tet].tolist().index(node)
+                    for face in set(range(4)) - {corner}:
+                        if 4 * tet + face not in broken and behind[tet, face] >= 0:
+                            waiting.append(int(behind[tet, face]) // 4)
+                pieces.append(piece)
+                left -= piece
+            changes += [(node, piece) for piece in pieces[1:]]
+        for node, piece in changes:
+            for tet in piece:
+                tets[tet, tets[tet].tolist().index(node)] = n
+            depth.append(depth[node] + 1)
+            n += 1
+    return tets, depth
+
+
+def case_of(**fracture: object) -> schema.Case:
+    case = meeting_of([{"fracture": schema.Fracture(**fracture)}], material=BRITTLE)  # type: ignore[arg-type]
+    return case.model_copy(update={"contact": None})
+
+
+def arranged(model: Model) -> None:
+    """Velocities that tell nodes apart, and bonds."""
+    model.nodes.v[:] = np.sin(model.nodes.id[:, None] + np.arange(3.0))
+    for b in model.blocks:
+        b.bond = np.full((b.n, 4), INTACT, np.uint8)
+
+
+def break_on(model: Model, separation: Separation, facets: Ints) -> None:
+    broken = {}
+    for b, part in enumerate(model.blocks):
+        here = np.isin(facets.reshape(-1) // 4, part.id)
+        order = np.argsort(part.id)
+        places = order[np.searchsorted(part.id[order], facets.reshape(-1)[here] // 4)]
+        broken[b] = Broken(places, facets.reshape(-1)[here] % 4)
+    split = separation.break_facets(broken)
+    nodes = model.nodes
+    assert (np.diff(nodes.id) > 0).all()
+    assert all(
+        len(column) == nodes.n for column in (nodes.x, nodes.v, nodes.mass, nodes.owner, nodes.part, nodes.force)
+    )
+    assert split is None or (nodes.id[split.first :] == split.copies.id).all()
+
+
+def cracked(mesh: TetMesh, events: Sequence[Ints], ranks: int) -> Cracked:
+    """The mesh after some events, put together from the ranks, whose copies of a node must not differ."""
+    pieces = pieces_of(case_of(), [mesh], ranks)
+
+    def work(comm: Comm) -> tuple[Model, list[Ints]]:
+        piece, model = pieces[comm.rank]
+        arranged(model)
+        separation = Separation(model, piece.neighbours, comm)
+        for facets in events:
+            break_on(model, separation, facets)
+        return model, [model.nodes.id[other.nodes] for other in piece.neighbours]
+
+    done = on_ranks(ranks, work)
+    total = done[0][0].nodes_global
+    assert all(model.nodes_global == total for model, _ in done)
+    out = Cracked(
+        np.zeros(mesh.tets.shape, np.int64), np.zeros(mesh.tets.shape, np.int64), np.zeros((total, 3)),
+        np.zeros((total, 3)), np.zeros(total), np.full(total, -1),
+    )  # fmt: skip
+    for rank, (model, _) in enumerate(done):
+        nodes = model.nodes
+        out.x[nodes.id], out.v[nodes.id], out.mass[nodes.id] = nodes.x, nodes.v, nodes.mass
+        assert (out.owner[nodes.id[nodes.owned]] == -1).all()
+        out.owner[nodes.id[nodes.owned]] = rank
+        for b in model.blocks:
+            out.tets[b.id], out.bond[b.id] = nodes.id[b.tets], b.bond
+    assert (out.owner >= 0).all()
+    for rank, (model, lists) in enumerate(done):
+        nodes = model.nodes
+        for mine, whole in ((nodes.x, out.x), (nodes.v, out.v), (nodes.mass, out.mass), (nodes.owner, out.owner)):
+            assert (mine == whole[nodes.id]).all()
+        for other, ids in zip(pieces[rank][0].neighbours, lists, strict=True):
+            back = next(n for n in pieces[other.rank][0].neighbours if n.rank == rank)
+            assert (done[other.rank][0].nodes.id[back.nodes] == ids).all()
+    return out
+
+
+def random_events(mesh: TetMesh, seed: int, shares: Sequence[float]) -> list[Ints]:
+    """Facets that break in one event after the other, these shares of all."""
+    facets = np.random.default_rng(seed).permutation(inner(mesh))
+    ends = np.cumsum([0, *(int(share * len(facets)) for share in shares)])
+    return [facets[a:b] for a, b in zip(ends[:-1], ends[1:], strict=True)]
+
+
+@pytest.mark.parametrize("ranks", RANKS)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_nodes_separate_as_by_hand_on_any_number_of_ranks(seed: int, ranks: int) -> None:
+    """Five events: nodes that split again, copies that split, and in the end no facet that holds."""
+    mesh = block((3, 2, 2), seed=seed)
+    events = random_events(mesh, seed, (0.35, 0.2, 0.15, 0.1, 0.1))
+    events.append(inner(mesh)[~np.isin(inner(mesh)[:, 0], np.concatenate(events)[:, 0])])
+    tets, depth = expected_tets(mesh, events)
+    found = cracked(mesh, events, ranks)
+    assert (found.tets == tets).all()
+    assert max(depth) > 2
+    assert len(found.mass) == len(depth) == 4 * len(mesh.tets)
+    assert (found.bond[across(mesh.tets) >= 0] == OPEN).all()
+
+
+@pytest.mark.parametrize("ranks", RANKS)
+def test_mass_and_momentum_stay(ranks: int) -> None:
+    """Of every node with its copies; a copy is where its parent is, and has the mass of its tets."""
+    mesh = block((3, 2, 2), seed=3)
+    events = random_events(mesh, 3, (0.5, 0.2))
+    found, before = cracked(mesh, events, ranks), cracked(mesh, [], 1)
+    family = np.zeros(len(found.mass), np.int64)
+    family[found.tets] = mesh.tets
+    assert (found.x == before.x[family]).all()
+    assert (found.v == before.v[family]).all()
+    assert np.bincount(family, found.mass) == pytest.approx(before.mass, rel=4e-16)
+    (_, model), = pieces_of(case_of(), [mesh])  # fmt: skip
+    quarters = np.repeat(0.25 * model.blocks[0].row(MASS)[np.argsort(model.blocks[0].id)], 4)
+    assert found.mass == pytest.approx(np.bincount(found.tets.reshape(-1), quarters), rel=1e-14)
+    assert found.mass.min() > 0.0
+    assert len(found.mass) > 2 * len(before.mass)
+
+
+def plane(mesh: TetMesh, height: float) -> Ints:
+    """Facets whose nodes all start at this height."""
+    facets = inner(mesh)
+    return np.asarray(facets[(mesh.points[corners_of(mesh, facets), 2] == height).all(axis=1)])
+
+
+@pytest.mark.parametrize("ranks", RANKS)
+def test_a_facet_inside_separates_nothing(ranks: int) -> None:
+    mesh = block((3, 3, 3), shake=0.0)
+    facets = plane(mesh, 1.0)
+    inside = facets[((mesh.points[corners_of(mesh, facets)] % 3.0)[:, :, :2] > 0.0).all(axis=(1, 2))][:1]
+    found = cracked(mesh, [inside], ranks)
+    assert (found.tets == mesh.tets).all()
+    assert np.flatnonzero(found.bond.reshape(-1)).tolist() == inside[0].tolist()
+    assert (found.bond.reshape(-1)[inside] == PINNED).all()
+
+
+@pytest.mark.parametrize("ranks", RANKS)
+def test_a_closed_sheet_round_a_node_separates_that_node_alone(ranks: int) -> None:
+    mesh = block((4, 4, 4), shake=0.0)
+    facets = plane(mesh, 2.0)
+    centre = int(np.flatnonzero((mesh.points == 2.0).all(axis=1))[0])
+    disc = facets[(corners_of(mesh, facets) == centre).any(axis=1)]
+    but_one = cracked(mesh, [disc[1:]], ranks)
+    assert (but_one.tets == mesh.tets).all()
+    found = cracked(mesh, [disc[1:], disc[:1]], ranks)
+    assert len(found.mass) == len(mesh.points) + 1
+    assert set(mesh.tets[found.tets != mesh.tets].tolist()) == {centre}
+    assert (found.bond.reshape(-1)[disc] == OPEN).all()
+    assert (found.bond == OPEN).sum() == disc.size
+
+
+@pytest.mark.parametrize("ranks", RANKS)
+def test_a_sheet_through_the_body_cuts_it_in_two(ranks: int) -> None:
+    mesh = block((3, 3, 3), shake=0.0)
+    found = cracked(mesh, [plane(mesh, 1.0)], ranks)
+    above = mesh.points[mesh.tets].mean(axis=1)[:, 2] > 1.0
+    assert len(found.mass) == len(mesh.points) + 16
+    assert not np.intersect1d(found.tets[above], found.tets[~above]).size
+
+
+@pytest.mark.parametrize("ranks", (1, 2, 3))
+def test_hinges_are_let_go(ranks: int) -> None:
+    """Two tets on a facet, and two more that hold to them by a node and by an edge only."""
+    points = np.array(
+        [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, -1], [-1, 0, 0], [-1, -1, 0], [-1, 0, 1], [2, 1, 0], [2, 0, 1]],
+        float,
+    )  # fmt: skip
+    tets = positive(points, np.array([[0, 1, 2, 3], [0, 1, 2, 4], [0, 5, 6, 7], [1, 3, 8, 9]]))
+    mesh = TetMesh(points, tets)
+    (facet,) = inner(mesh)
+    found = cracked(mesh, [facet[None]], ranks)
+    assert found.tets[0].tolist() == tets[0].tolist()
+    assert len(found.mass) == len(points) + 5
+    at_0, at_1 = (set(found.tets[mesh.tets == node].tolist()) for node in (0, 1))
+    assert (at_0, at_1) == ({0, 10, 11}, {1, 12, 13})
+    assert (found.tets[3] == mesh.tets[3]).sum() == 3
+
+
+# In the time step
+
+
+def pulled(**fracture: object) -> schema.Case:
+    """A bar that is stretched and sheared by its own inertia until it breaks."""
+    part = {"stretch": schema.Stretch(rate=(0.0, 0.0, 3e4), centre=(0.0, 0.0, 2e-3)), "jitter": 3.0,
+            "fracture": schema.Fracture(**fracture)}  # type: ignore[arg-type]  # fmt: skip
+    return meeting_of([part], material=BRITTLE, end=1.0)
+
+
+@pytest.mark.parametrize("model", ["instant", "cohesive"])
+@pytest.mark.parametrize("form", ["standard", "split"])
+def test_forces_are_those_of_the_tets_after_every_event(model: str, form: str) -> None:
+    """In integers, on one, two and three ranks; momentum to round-off; and all ranks break the same."""
+    mesh = block((2, 2, 4), 1e-3, seed=5)
+    case = pulled(model=model, delay=0.2)
+    case = case.model_copy(update={"numerics": case.numerics.model_copy(update={"pressure": form})})
+
+    def momentum(sim: Simulation) -> Floats:
+        nodes = sim.model.nodes
+        return exact_sums(sim.comm, (nodes.mass[:, None] * nodes.v)[nodes.owned])
+
+    def work(sim: Simulation) -> tuple[int, int, list[float]]:
+        assert sim.fracture is not None
+        nodes = sim.model.nodes
+        step.prepare(sim)
+        before, grown = momentum(sim), sim.model.nodes_global
+        for _ in range(STEPS):
+            step.first_half(sim)
+            step.second_half(sim)
+            if sim.model.nodes_global == grown:
+                continue
+            grown = sim.model.nodes_global
+            forces = np.zeros_like(nodes.force)
+            for part in sim.model.blocks:
+                np.add.at(forces, part.tets, sim.elements.forces_of(part, np.arange(part.n), nodes.scale))
+            if sim.fracture.cohesion is not None:
+                sim.fracture.cohesion.scatter(forces, nodes.scale)
+            complete(sim.comm, sim.fracture._neighbours, forces, 99)
+            assert (forces == nodes.force).all()
+            assert len(sim.elements.pressure) == (nodes.n if sim.elements.split else 1)
+        size = float(np.abs(exact_sums(sim.comm, np.abs(nodes.mass[:, None] * nodes.v)[nodes.owned])).max())
+        assert np.abs(momentum(sim) - before).max() < 1e-13 * size
+        return sim.model.nodes_global, sim.fracture.broken, momentum(sim).tolist()
+
+    runs = [on(ranks, case, [mesh], work) for ranks in (1, 2, 3)]
+    assert runs[0][0][0] > 1.5 * len(mesh.points)
+    assert runs[0][0][1] > 100
+    assert all(one == runs[0][0] for found in runs for one in found)
