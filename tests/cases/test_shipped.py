@@ -299,23 +299,24 @@ def test_shocks(name: str, density: float, c0: float, slope: float, speed: float
 def test_two_tets_pass_on_a_third_of_their_stress() -> None:
     """F = 1/3 A traction(stress); peak where F / A has the strength, area under F of energy A, both along the line."""
     case = load("two_tets")
-    law, pair = case.materials["soft"].brittle, case.parts[0].mesh
+    soft, pair = case.materials["soft"], case.parts[0].mesh
+    law = soft.brittle
     pulls = [boundary for boundary in case.boundaries if isinstance(boundary, Prescribed)]
     assert law is not None
     assert isinstance(pair, TwoTets)
     apart = [2.0 * (pulls[0].x or 0.0), 2.0 * (pulls[0].z or 0.0)]
     assert [(pulls[1].x, pulls[1].z)] == [(-apart[0] / 2, -apart[1] / 2)]
     speed, lean = math.hypot(*apart), pair.lean
-    assert (speed, math.atan2(*apart)) == pytest.approx((0.1, lean), rel=1e-8)
+    assert (speed, math.atan2(*apart)) == pytest.approx((0.5, lean), rel=1e-8)
     assert speed * case.run.end_time == pytest.approx(2 * 2 * law.energy / law.strength)
     peak, mean = 3 * law.strength, 3 * law.energy / (speed * case.run.end_time)
     for name, share in (("normal_stress", math.cos(lean)), ("shear_stress", math.sin(lean))):
         found = {entry.quantity: entry for entry in case.reference if entry.probe == name}
         assert found["probe_max"].value == pytest.approx(peak * share, rel=1e-3)
         assert found["probe_mean"].value == pytest.approx(mean * share, rel=1e-3)
-        assert found["probe_max"].tolerance <= 0.0301 * peak * share
+        assert found["probe_max"].tolerance <= wave_speed(soft) * soft.density * speed / 2 * share
         assert found["probe_mean"].tolerance <= 0.0101 * mean * share
-    assert law.strength / case.materials["soft"].elastic.young == pytest.approx(1e-3)
+    assert law.strength / soft.elastic.young == pytest.approx(1e-3)
 
 
 def test_the_breathing_facet_breaks_and_holds() -> None:

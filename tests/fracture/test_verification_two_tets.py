@@ -1,0 +1,166 @@
+"""V24, H6, H8 in the whole solver: two tets torn apart, a facet that breathes, free tets that ring."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from conoid.cases import load
+from conoid.cases.messages import Energy
+from conoid.worker import simulation
+from conoid.worker.fracture.cohesive import sizes
+from conoid.worker.parallel.comm import SerialComm
+from conoid.worker.simulation import Simulation
+
+from ..worker.kernels import run
+from ..worker.meshes import Floats
+
+EDGE, ENERGY, STRENGTH, YOUNG, SPEED = 10e-3, 500.0, 1e6, 1e9, 0.25
+AREA = math.sqrt(3.0) / 4.0 * EDGE**2
+HEIGHT = math.sqrt(2.0 / 3.0) * EDGE
+
+
+def shipped(name: str, *overrides: str) -> Simulation:
+    data = load.read_data(load.shipped_path(name))
+    case = load.parse_case(load.apply_overrides(data, [*overrides, "run.frames=0", "probes=[]", "reference=[]"]))
+    return simulation.build(case, Path(), SerialComm())
+
+
+def torn(lean: float, *overrides: str) -> Simulation:
+    """The shipped pair, drawn apart along a line that leans by ``lean``, rad."""
+    x, z = SPEED * math.sin(lean), SPEED * math.cos(lean)
+    pull = [f"boundaries[{i}].{c}={s * v!r}" for i, s in ((0, 1.0), (1, -1.0)) for c, v in (("x", x), ("z", z))]
+    stretch = f"parts[0].stretch.rate=[0,0,{z / HEIGHT!r}]"
+    return shipped("two_tets", f"parts[0].mesh.lean={lean!r}", stretch, *pull, *overrides)
+
+
+@pytest.mark.parametrize(
+    "lean", [0.0, 60.0, *(pytest.param(lean, marks=pytest.mark.slow) for lean in (15.0, 30.0, 45.0, 63.0))]
+)
+def test_tearing_two_tets_takes_the_fracture_energy(lean: float) -> None:
+    """From pure opening to mostly shear, as the whole ledger has it: of the area at which the facet broke, which is
+    that of the mesh but for elastic strain.
+    """
+    sim, area = torn(math.radians(lean)), 0.0
+    energies: list[Energy] = []
+
+    def look(sim: Simulation, before: Floats) -> None:
+        nonlocal area
+        energies.append(sim.ledger.close(before))
+        assert sim.fracture is not None
+        assert sim.fracture.cohesion is not None
+        if len(sim.fracture.cohesion.facets.work):
+            area = float(sim.fracture.cohesion.facets.area[0])
+
+    run(sim, look)
+    assert sim.fracture is not None
+    assert sim.fracture.broken == 1
+    assert sim.model.nodes.n == 8
+    assert area == pytest.approx(AREA, rel=3.0 * STRENGTH / YOUNG)
+    assert energies[-1].fracture == pytest.approx(ENERGY * area, rel=1e-3)
+    assert energies[-1].cohesive == 0.0
+    assert sim.ledger.worst < 1e-4
+
+
+def test_the_traction_follows_the_law_in_every_step() -> None:
+    """Each pair for itself: a third of the area times strength (1 - opening / critical), or the secant."""
+    sim = torn(math.radians(30.0))
+    worst, seen, top = 0.0, 0, np.zeros(3)
+
+    def look(sim: Simulation, _: Floats) -> None:
+        nonlocal worst, seen, top
+        assert sim.fracture is not None
+        assert sim.fracture.cohesion is not None
+        f = sim.fracture.cohesion.facets
+        if not len(f.work):
+            return
+        x, e = sim.model.nodes.x, float(sizes(f.offset, f.shear)[0])
+        one, two = x[f.nodes[0, :3]], x[f.nodes[0, 3:]]
+        middle = 0.5 * (one + two)
+        first = middle[1] - middle[0]
+        normal = np.cross(first, middle[2] - middle[0])
+        axes = np.stack([normal, first, np.cross(normal, first)])
+        axes /= np.linalg.norm(axes, axis=1)[:, None]
+        opening = f.offset[0] + (two - one) @ axes.T
+        opening[:, 0] = np.maximum(opening[:, 0], 0.0)
+        size = np.linalg.norm(opening, axis=1)
+        top = np.maximum(np.maximum(top, e), size)
+        traction = np.maximum(f.strength[0] * (1.0 - (top - e) / f.critical[0]), 0.0) * size / top
+        force = np.linalg.norm(f.pull[0], axis=1)
+        worst = max(worst, float(np.abs(3.0 * force / f.area[0] - traction).max()))
+        seen += 1
+
+    run(sim, look)
+    assert seen > 500
+    assert worst < 1e-9 * STRENGTH
+
+
+def breathing(end: str) -> tuple[int, float, float]:
+    """How often the facet closed, the largest growth of the energy as a share of it, and the worst residual."""
+    sim = shipped("breathing_facet", f"run.end_time={end}", "run.residual_limit=1")
+    totals, closed = list[float](), list[bool]()
+
+    def look(sim: Simulation, before: Floats) -> None:
+        line = sim.ledger.close(before)
+        totals.append(line.kinetic + line.elastic + line.cohesive)
+        assert sim.fracture is not None
+        assert sim.fracture.cohesion is not None
+        f, x = sim.fracture.cohesion.facets, sim.model.nodes.x
+        if len(f.work):
+            gap = (x[f.nodes[0, 3:]] - x[f.nodes[0, :3]]).mean(axis=0)
+            closed.append(float(np.linalg.norm(gap)) < 1e-5 * float(f.critical[0]))
+
+    run(sim, look)
+    return int(np.sum(np.diff(np.array(closed, int)) == 1)), max(totals) / totals[0] - 1.0, sim.ledger.worst
+
+
+def test_a_facet_that_breathes_gains_no_energy() -> None:
+    cycles, growth, residual = breathing("0.3 ms")
+    print(f"{cycles} cycles, growth {growth:.2e}, residual {residual:.2e}")
+    assert cycles > 30
+    assert growth < 1e-3
+    assert residual < 1e-3
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_a_facet_that_breathes_for_long_gains_no_energy() -> None:
+    cycles, growth, residual = breathing("10 ms")
+    print(f"{cycles} cycles, growth {growth:.2e}, residual {residual:.2e}")
+    assert cycles > 300
+    assert growth < 1e-3
+    assert residual < 1e-3
+
+
+def rings(count: str, steps: int) -> tuple[float, float]:
+    """Largest growth of kinetic and elastic energy of free tets, and the drift of their time average."""
+    sim = shipped("free_tets", f"parts[0].mesh.count={count}", "run.end_time=1")
+    totals: list[float] = []
+    every = max(steps // 1000, 1)
+
+    def look(sim: Simulation, before: Floats) -> None:
+        if sim.clock.step % every == 0:
+            line = sim.ledger.close(before)
+            totals.append(line.kinetic + line.elastic)
+
+    run(sim, look, steps=steps)
+    values = np.array(totals) / totals[0]
+    tenth = len(values) // 10
+    return float(values.max() - 1.0), float(values[-tenth:].mean() - values[:tenth].mean())
+
+
+def test_free_tets_keep_their_energy() -> None:
+    growth, drift = rings("[5, 5, 4]", 2000)
+    print(f"growth {growth:.2e}, drift {drift:.2e}")
+    assert growth < 1e-4
+    assert abs(drift) < 1e-4
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_free_tets_keep_their_energy_for_a_hundred_thousand_steps() -> None:
+    growth, drift = rings("[5, 5, 4]", 100_000)
+    print(f"growth {growth:.2e}, drift {drift:.2e}")
+    assert growth < 1e-4
+    assert abs(drift) < 1e-4
