@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -113,9 +114,8 @@ def expected_tets(mesh: TetMesh, events: Sequence[Ints]) -> tuple[Ints, list[int
                         continue
                     piece.add(tet)
                     corner = tets[tet].tolist().index(node)
-                    for face in set(range(4)) - {corner}:
-                        if 4 * tet + face not in broken and behind[tet, face] >= 0:
-                            waiting.append(int(behind[tet, face]) // 4)
+                    faces = [f for f in range(4) if f != corner and 4 * tet + f not in broken and behind[tet, f] >= 0]
+                    waiting += [int(behind[tet, f]) // 4 for f in faces]
                 pieces.append(piece)
                 left -= piece
             changes += [(node, piece) for piece in pieces[1:]]
@@ -145,7 +145,7 @@ def break_on(model: Model, separation: Separation, facets: Ints) -> None:
         here = np.isin(facets.reshape(-1) // 4, part.id)
         order = np.argsort(part.id)
         places = order[np.searchsorted(part.id[order], facets.reshape(-1)[here] // 4)]
-        broken[b] = Broken(places, facets.reshape(-1)[here] % 4)
+        broken[b] = Broken(places.astype(np.int32), (facets.reshape(-1)[here] % 4).astype(np.int32))
     split = separation.break_facets(broken)
     nodes = model.nodes
     assert (np.diff(nodes.id) > 0).all()
@@ -196,7 +196,7 @@ def random_events(mesh: TetMesh, seed: int, shares: Sequence[float]) -> list[Int
     """Facets that break in one event after the other, these shares of all."""
     facets = np.random.default_rng(seed).permutation(inner(mesh))
     ends = np.cumsum([0, *(int(share * len(facets)) for share in shares)])
-    return [facets[a:b] for a, b in zip(ends[:-1], ends[1:], strict=True)]
+    return [facets[a:b] for a, b in pairwise(ends)]
 
 
 @pytest.mark.parametrize("ranks", RANKS)
@@ -273,12 +273,12 @@ def test_a_sheet_through_the_body_cuts_it_in_two(ranks: int) -> None:
     assert not np.intersect1d(found.tets[above], found.tets[~above]).size
 
 
-@pytest.mark.parametrize("ranks", (1, 2, 3))
+@pytest.mark.parametrize("ranks", [1, 2, 3])
 def test_hinges_are_let_go(ranks: int) -> None:
     """Two tets on a facet, and two more that hold to them by a node and by an edge only."""
     points = np.array(
-        [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, -1], [-1, 0, 0], [-1, -1, 0], [-1, 0, 1], [2, 1, 0], [2, 0, 1]],
-        float,
+        [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, -1),
+         (-1, 0, 0), (-1, -1, 0), (-1, 0, 1), (2, 1, 0), (2, 0, 1)], float,
     )  # fmt: skip
     tets = positive(points, np.array([[0, 1, 2, 3], [0, 1, 2, 4], [0, 5, 6, 7], [1, 3, 8, 9]]))
     mesh = TetMesh(points, tets)
