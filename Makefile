@@ -1,4 +1,4 @@
-# make demo   a Taylor bar: submitted over HTTP, run on 2 MPI ranks, watched live, checked, drawn (demo.png)
+# make demo   steel breaks glass: submitted over HTTP, run on 2 MPI ranks, watched live, checked, drawn (demo.png)
 # make test   linters, types and every test that takes seconds
 # make bench  speed, and speed against error, in 15 minutes: tables in build/bench (BENCH=quick: 2, BENCH=long: 60)
 # make drill  the long tests: studies and failures that take minutes
@@ -14,7 +14,7 @@ HOUSES := cases client server worker
 .DEFAULT_GOAL := test
 
 demo: $(READY)
-	$(BIN)/conoid run demo --ranks 2 --view demo.png --check
+	$(BIN)/conoid run glass_steel_demo --ranks 2 --view demo.png --check
 
 test: lint
 	$(BIN)/pytest -q -m "not slow"

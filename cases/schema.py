@@ -72,6 +72,9 @@ class Fracture(Model):
     delay: Annotated[Ratio, Field(ge=0)] = 1.0
     """t_c = delay * density * c * energy / strength^2 of the delayed criterion. The paper prints 0.5, its own equations
     give 1; 0 breaks a facet in the step in which it passes the strength."""
+    order: Literal["simultaneous", "local_maximum"] = "simultaneous"
+    """Which of the facets that pass break in a step: all, or of those that share a node only the one that is furthest
+    beyond its strength."""
     resolve: Literal["none", "strength"] = "none"
     """``strength`` lowers the strength until ``resolution`` elements fit in the cohesive zone, with the same energy."""
     resolution: Annotated[Ratio, Positive] = 3.0

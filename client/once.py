@@ -92,7 +92,9 @@ def _report(result: Result, outcome: Outcome, out: Console) -> None:
 
 
 def _telling_field(case: Case) -> str:
-    """Plastic strain where something can yield, else the stress."""
+    """The fragments where something can break, plastic strain where something can yield, else the stress."""
+    if case.fractures:
+        return "fragment"
     yields = any(material(case, part.material).strength is not None for part in case.parts)
     return "plastic_strain" if yields else "mises"
 

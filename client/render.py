@@ -15,6 +15,9 @@ from .errors import ViewError
 from .view import FIELDS, Drawn, Field, Mirror, Picture, Wall
 
 _INK, _PAPER, _HAZE = "#1d2733", "#ffffff", "#dfe6ee"
+_NAMED = ("classes", "fragments")
+"""Kinds of fields whose values are names."""
+_WHOLE = "#c9d3dc"
 _CLASSES = [
     "#4c78a8",
     "#f58518",
@@ -74,7 +77,7 @@ def _read(path: str) -> Any:
 def _surface(mesh: Any, picture: Picture) -> Any:
     """The outer faces with the field as ``shown``, reflected in every mirror."""
     field = FIELDS[picture.field]
-    cells = picture.raw or field.kind == "classes"
+    cells = picture.raw or field.kind in _NAMED
     mesh = _with_field(mesh, picture.field, cells)
     surface = mesh.extract_surface(algorithm="dataset_surface")
     for mirror in picture.mirrors:
@@ -92,7 +95,7 @@ def _with_field(mesh: Any, name: str, cells: bool) -> Any:
         return bare.point_data_to_cell_data() if cells else bare
     _require(mesh.cell_data, name)
     values = np.asarray(mesh.cell_data[name])
-    bare.cell_data["shown"] = values if FIELDS[name].kind == "classes" else values * factor
+    bare.cell_data["shown"] = values if FIELDS[name].kind in _NAMED else values * factor
     return bare if cells else bare.cell_data_to_point_data()
 
 
@@ -131,8 +134,9 @@ def _add_body(plotter: Any, surface: Any, field: Field, picture: Picture) -> Non
         "feature_angle": 35.0, "ambient": 0.38, "diffuse": 0.85, "specular": 0.10, "specular_power": 20.0,
         "show_edges": picture.edges, "edge_color": _INK, "edge_opacity": 0.25,
     }  # fmt: skip
-    if field.kind == "classes":
-        _add_classes(plotter, surface, look, picture)
+    if field.kind in _NAMED:
+        add = _add_classes if field.kind == "classes" else _add_fragments
+        add(plotter, surface, look, picture)
         return
     low, high, labels = _scale(np.asarray(surface["shown"]), field, picture.limits)
     bar = {
@@ -186,6 +190,16 @@ def _add_classes(plotter: Any, surface: Any, look: dict[str, Any], picture: Pict
         loc="upper right",
         size=(0.13, 0.032 * len(entries) + 0.01),
     )
+
+
+def _add_fragments(plotter: Any, surface: Any, look: dict[str, Any], picture: Picture) -> None:
+    """One colour a fragment, from its name; what is largest to the eye is grey."""
+    _, which, faces = np.unique(np.asarray(surface["shown"]).astype(np.int64), return_inverse=True, return_counts=True)
+    palette = np.array([pv.Color(colour).int_rgb for colour in _CLASSES], np.uint8)
+    colours = palette[np.random.default_rng(0).integers(len(palette), size=len(faces))]
+    colours[np.argmax(faces)] = pv.Color(_WHOLE).int_rgb
+    surface.cell_data["colours"] = colours[which.reshape(-1)]
+    plotter.add_mesh(surface, **{**look, "scalars": "colours", "rgb": True, "smooth_shading": False})
 
 
 def _view_from(surface: Any, picture: Picture) -> Any:

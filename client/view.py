@@ -23,7 +23,8 @@ _SECONDS = 180.0
 
 @dataclass(frozen=True)
 class Field:
-    """How a field is shown: value times ``factor`` is in ``unit``; ``kind`` is linear, centred on 0, or classes.
+    """How a field is shown: value times ``factor`` is in ``unit``; ``kind`` is linear, centred on 0, classes, or
+    fragments: a colour each, the largest one grey.
 
     ``colours`` is a map of matplotlib's, or colours to blend.
     """
@@ -43,6 +44,7 @@ FIELDS = {
     "speed": Field("speed", "m/s", 1.0, "cividis"),
     "part": Field("part", kind="classes"),
     "rank": Field("rank", kind="classes"),
+    "fragment": Field("fragment", kind="fragments"),
 }
 """The fields that ``view`` knows."""
 

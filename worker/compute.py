@@ -72,6 +72,8 @@ def _announce(sim: Simulation, journal: Journal | None, setup: float) -> None:
     parts = dict(zip(model.parts, (int(n) for n in sim.comm.sum(sizes)), strict=True))
     if journal is None:
         return
+    for text in sim.fracture.warnings if sim.fracture is not None else []:
+        journal.write(messages.Log, level="warning", text=text)
     journal.write(messages.Status, state=State.RUNNING)
     journal.write(
         messages.Started, ranks=sim.comm.size, elements=model.elements_global, nodes=model.nodes_global,
@@ -105,4 +107,5 @@ def _sum_up(
         phases={name: [s[name] for s in seconds] for name in PHASES} if seconds else {},
         peak_memory=memory or [],
         element_updates_per_second=loop.updates / total_cpu if total_cpu > 0.0 else 0.0, reference=checks,
+        warnings=sim.fracture.warnings if sim.fracture is not None else [],
     )  # fmt: skip

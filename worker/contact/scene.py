@@ -124,12 +124,20 @@ class Scene:
         crowd = self.crowd
         return float(_approach(crowd.x, crowd.v, self.faces, self.node_face))
 
-    def remember(self, old: "Scene") -> None:
-        """Takes over what candidates of another search have kept."""
+    def remember(self, old: "Scene", nodes: Nodes, comm: Comm) -> None:
+        """Takes over what candidates of another search have kept; all ranks take part.
+
+        The pairs of a copy were with the rank of its parent's, and are with its own from now on.
+        """
+        rows = np.column_stack([old.keys, old.kept.view(np.int64)])
+        if comm.size > 1:
+            owner = nodes.owner[nodes.places(old.keys[:, 0])]
+            told = comm.swap({int(rank): rows[owner == rank] for rank in np.unique(owner)})
+            rows = np.concatenate([rows[:0], *(words.reshape(-1, 6) for words in told.values())])
         kind = [("node", np.int64), ("face", np.int64)]
-        mine, theirs = (np.ascontiguousarray(keys).view(kind).reshape(-1) for keys in (self.keys, old.keys))
+        mine, theirs = (np.ascontiguousarray(keys).view(kind).reshape(-1) for keys in (self.keys, rows[:, :2]))
         _, here, there = np.intersect1d(mine, theirs, assume_unique=True, return_indices=True)
-        self.kept[here] = old.kept[there]
+        self.kept[here] = np.ascontiguousarray(rows[there, 2:]).view(np.float64)
 
     def free(self) -> None:
         """Gives its messages back to MPI."""
@@ -251,7 +259,8 @@ def _compact(
         node_face=np.column_stack([crowd.places(slave_ids), face_at.reshape(-1)]).astype(np.int32),
         edge_edge=edge_at.reshape(-1, 2).astype(np.int32), keys=keys, kept=np.zeros((len(keys), 4)), faces_sent=sent,
         room=Meetings.room(room), diagonal=np.empty((room, 2)), push=np.empty((room, 4)),
-        shares=shares, impulse=impulse, place=place, pushes=np.isin(crowd.id, pushed), cracks=np.zeros((0, 6), np.int32),
+        shares=shares, impulse=impulse, place=place, pushes=np.isin(crowd.id, pushed),
+        cracks=np.zeros((0, 6), np.int32),
         total=np.zeros((crowd.n, 3), np.int64), normals=np.zeros((crowd.n, 9)), before=np.zeros((crowd.n, 3)),
     )  # fmt: skip
     found.connect(company, nodes, comm)

@@ -180,7 +180,7 @@ class Contact(Boundary):
                 self._scene.free()
                 follower.share(self._neighbours, self._comm)
         if old is not None and self._rubs:
-            self._scene.remember(old)
+            self._scene.remember(old, state, self._comm)
         self._look(self._scene, state)
         self._scene.normals[self._scene.held] = flight.normals(state)[self._scene.local]
         flight.begin(state, clock.t, clock.t + horizon)

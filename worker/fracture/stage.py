@@ -13,6 +13,7 @@ import numpy as np
 
 from conoid.cases.library import material as find_material
 from conoid.cases.schema import Case
+from conoid.cases.schema import Fracture as Spec
 
 from ..boundaries import Boundary
 from ..clock import Clock
@@ -27,6 +28,7 @@ from ..topology import Split
 from . import bodies
 from .bodies import Body, Far, Loaded
 from .cohesive import Cohesion, Facets, inserted
+from .order import strongest
 from .separation import Broken, Separation
 from .strength import Toughness, toughness
 
@@ -35,6 +37,10 @@ _LEAST = 0.05
 """Of the square of the highest frequency that a step resolves: what cohesive facets may use at least."""
 _SHARES = 24.0
 """A node has a quarter of its tet's mass, up to three of whose faces open there, between two nodes that move."""
+_RESOLVED = 1.0 / 3.0
+"""Elements to a cohesive zone, at most, for its energy to be that of the law."""
+_STEP = 6.0**-0.5
+"""Stable step of a regular tet times the speed of sound, over its edge."""
 _REGULAR = (6.0 * 2.0**0.5) ** (1.0 / 3.0)
 """Edge of a regular tet over the cube root of its volume."""
 
@@ -46,8 +52,6 @@ class Breaking:
     """Facets of one body that break in a step."""
 
     body: Body
-    broken: Broken
-    """All sides that are here."""
     tets: Ints
     """(m, 2) global ids of the tets of either side, the smaller first."""
     nodes: Indices
@@ -61,10 +65,31 @@ class Breaking:
     mass: Floats
     """(m,) of the lighter tet, kg."""
 
+    @property
+    def ids(self) -> Ints:
+        """(m,) of the facets."""
+        at = np.where(self.sides[:, 0, 1] >= 0, 0, 1)
+        side = self.sides[np.arange(len(at)), at]
+        return bodies.facet_ids(self.body.block, side[:, 1], side[:, 2])
+
+    @property
+    def broken(self) -> Broken:
+        """All sides that are here."""
+        sides = self.sides.reshape(-1, 3)
+        sides = sides[sides[:, 1] >= 0]
+        return Broken(sides[:, 1], sides[:, 2])
+
+    def load(self, x0: Floats) -> Floats:
+        """(m,) effective traction over strength."""
+        sides = self.sides[:, 0].copy()
+        sides[sides[:, 1] < 0] = self.sides[sides[:, 1] < 0, 1]
+        area = bodies.areas(self.body.block.tets, sides[:, 1], sides[:, 2], x0)
+        return np.asarray(self.traction[:, 3] / self.body.tough.strengths(self.ids, area))
+
     def take(self, chosen: Flags) -> "Breaking":
-        """Some of the facets; ``broken`` stays as it is."""
+        """Some of the facets."""
         return Breaking(
-            self.body, self.broken, self.tets[chosen], self.nodes[chosen], self.sides[chosen], self.first[chosen],
+            self.body, self.tets[chosen], self.nodes[chosen], self.sides[chosen], self.first[chosen],
             self.traction[chosen], self.mass[chosen],
         )  # fmt: skip
 
@@ -80,16 +105,20 @@ class Fracture:
         self._model, self._neighbours, self._elements = model, neighbours, elements
         self._boundaries, self._contact = boundaries, contact
         self._comm, self._clock = comm, clock
+        specs = [part.fracture for part in case.parts if part.fracture is not None]
+        self._one_by_one = any(spec.order == "local_maximum" for spec in specs)
         self._unused = max(1.0 - case.numerics.dt_safety**2, _LEAST)
         self._bodies: list[Body] = []
+        self.warnings: list[str] = []
+        """What the user should know of the mesh."""
         work = 0.0
         for index, part in enumerate(case.parts):
             if part.fracture is not None:
                 volume, size = _tet(model, index, find_material(case, part.material).density, comm)
                 tough = toughness(find_material(case, part.material), part.fracture, size)
                 work = max(work, tough.energy * volume ** (2.0 / 3.0))
-                if comm.rank == 0:
-                    _tell(part.name, tough, size)
+                step = case.numerics.dt_safety * _STEP * size / tough.speed
+                self.warnings += _warnings(part.name, part.fracture, tough, size, step)
                 self._bodies += [
                     bodies.arm(i, block, part.fracture, tough, model.nodes.x0)
                     for i, block in enumerate(model.blocks) if block.part == index
@@ -102,7 +131,7 @@ class Fracture:
         """Facets of all ranks that have broken."""
         self._longest = 0.0
         self.cohesion: Cohesion | None = None
-        if any(part.fracture is not None and part.fracture.model == "cohesive" for part in case.parts):
+        if any(spec.model == "cohesive" for spec in specs):
             self.cohesion = elements.cohesion = Cohesion(work)
 
     def advance(self) -> None:
@@ -117,6 +146,8 @@ class Fracture:
             within, across = self._beyond(body, loaded, passed), self._beyond(body, remote, passed)
             first, mass = self._far.first[at[across]], self._far.mass[at[across]]
             broken.append(_breaking(body, loaded.take(within), remote.take(across), first, mass))
+        if self._one_by_one:
+            broken = self._strongest(broken)
         ids = np.concatenate([np.zeros(0, np.int64), *(ids for ids, _ in passed)])
         order = np.argsort(ids)
         self._since = ids[order], np.concatenate([np.zeros(0), *(since for _, since in passed)])[order]
@@ -146,6 +177,19 @@ class Fracture:
         clocked = over & ~breaks
         passed.append((ids[clocked], since[clocked]))
         return np.flatnonzero(breaks)
+
+    def _strongest(self, broken: list[Breaking]) -> list[Breaking]:
+        """Those that are loaded most strongly round all of their nodes, where the part asks for that."""
+        waiting = [b for b in broken if b.body.spec.order == "local_maximum"]
+        none = np.zeros(0, np.int64)
+        chosen = strongest(
+            np.concatenate([none, *(b.ids for b in waiting)]),
+            np.concatenate([np.zeros(0), *(b.load(self._model.nodes.x0) for b in waiting)]),
+            np.concatenate([np.zeros((0, 3), np.int32), *(b.nodes for b in waiting)]),
+            self._model.nodes.id, self._neighbours, self._comm,
+        )  # fmt: skip
+        ends = iter(np.split(chosen, np.cumsum([len(b.first) for b in waiting])))
+        return [b.take(next(ends)) if b.body.spec.order == "local_maximum" else b for b in broken]
 
     def _break(self, broken: list[Breaking]) -> None:
         split = self._separation.break_facets({b.body.index: b.broken for b in broken})
@@ -225,12 +269,27 @@ def _tet(model: Model, part: int, density: float, comm: Comm) -> tuple[float, fl
     return volume, _REGULAR * volume ** (1.0 / 3.0)
 
 
-def _tell(part: str, tough: Toughness, size: float) -> None:
-    ratio = size / tough.zone
+def _warnings(part: str, spec: Spec, tough: Toughness, size: float, step: float) -> list[str]:
+    """What to know of a part with tets of edge ``size``, m, and a stable step of about ``step``, s, before it runs."""
+    ratio, told = size / tough.zone, []
     log.info(
         "%s breaks at %.4g MPa with %.4g J/m^2: cohesive zone %.3g mm, elements %.3g mm, %.3g to 1",
         part, tough.strength * 1e-6, tough.energy, tough.zone * 1e3, size * 1e3, ratio,
     )  # fmt: skip
+    if ratio > _RESOLVED:
+        told.append(
+            f"{part}: elements of {size * 1e3:.3g} mm in a cohesive zone of {tough.zone * 1e3:.3g} mm ({ratio:.3g} to 1, "
+            f"resolved below {_RESOLVED:.2g}): the mesh decides on the energy of fracture; "
+            "fracture.resolve = 'strength' keeps it and lowers the strength"
+        )
+    opening = tough.strength * step / tough.impedance
+    if spec.model == "cohesive" and opening > tough.critical:
+        told.append(
+            f"{part}: a facet opens by {opening * 1e6:.3g} um in a step of {step * 1e9:.3g} ns, its critical opening is "
+            f"{tough.critical * 1e6:.3g} um: no law can be followed; use fracture.model = 'instant', "
+            f"fracture.resolve = 'strength', or numerics.dt_safety {opening / tough.critical:.0f} times smaller"
+        )
+    return told
 
 
 def _masses(block: Block, places: "np.ndarray") -> Floats:
@@ -254,9 +313,7 @@ def _breaking(body: Body, near: Loaded, far: Loaded, first: Flags, mass: Floats)
     corners = block.tets[places[:, None], FACES[faces]].astype(np.int32)
     corners[n:] = np.where(first[:, None], corners[n:], corners[n:][:, [0, 2, 1]])
     return Breaking(
-        body=body,
-        broken=Broken(np.concatenate([near.places, there, far.places]), np.concatenate([near.faces, back, far.faces])),
-        tets=np.sort(ids, axis=1).astype(np.int64), nodes=corners, sides=sides,
+        body=body, tets=np.sort(ids, axis=1).astype(np.int64), nodes=corners, sides=sides,
         first=np.concatenate([np.ones(n, bool), first]), traction=np.concatenate([near.traction, far.traction]),
         mass=np.minimum(_masses(block, places), np.concatenate([_masses(block, there), mass])),
     )  # fmt: skip

@@ -28,6 +28,19 @@ class Toughness:
     """t_c times the square of the strength: t_c of a facet is this over the square of its own."""
     zone: float
     """Length of the cohesive zone, m, 9 pi / 32 E' G_c / strength^2 with E' = E / (1 - nu^2)."""
+    speed: float
+    """Of plane waves, m/s."""
+    density: float
+
+    @property
+    def impedance(self) -> float:
+        """Of plane waves, kg/m^2/s."""
+        return self.density * self.speed
+
+    @property
+    def critical(self) -> float:
+        """Opening at which nothing is left, m."""
+        return 2.0 * self.energy / self.strength
 
     def strengths(self, face: Ints, area: Floats) -> Floats:
         """(n,) strengths, Pa, of facets with these ids and areas, m^2."""
@@ -57,10 +70,10 @@ def toughness(material: Material, spec: Fracture, size: float) -> Toughness:
     if spec.resolve == "strength":
         strength = min(strength, math.sqrt(_zone(plane, brittle.energy) / (spec.resolution * size)))
     lame = elastic.young * (1.0 - elastic.poisson) / ((1.0 + elastic.poisson) * (1.0 - 2.0 * elastic.poisson))
-    impedance = math.sqrt(lame * material.density)
+    speed = math.sqrt(lame / material.density)
     return Toughness(
-        strength, brittle.energy, _scaled(brittle, strength), spec.delay * impedance * brittle.energy,
-        _zone(plane, brittle.energy) / strength**2,
+        strength, brittle.energy, _scaled(brittle, strength), spec.delay * material.density * speed * brittle.energy,
+        _zone(plane, brittle.energy) / strength**2, speed, material.density,
     )  # fmt: skip
 
 
