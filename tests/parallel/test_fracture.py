@@ -23,6 +23,7 @@ SCENES = {
     "instant": ["parts[0].fracture.model=instant", "parts[0].fracture.delay=0"],
     "cohesive": ["parts[1].fracture.model=cohesive", "parts[1].fracture.delay=0"],
     "box": ["contact.domain=box"],
+    "ordered": ["parts[0].fracture.order=local_maximum", "parts[1].fracture.order=local_maximum"],
     "no_edges": ["contact.edges=false"],
     "traction": [],
 }

@@ -1,0 +1,206 @@
+"""Contact across fresh cracks: nothing is pushed out, what closes stops, and a search changes nothing of that."""
+
+from collections.abc import Callable, Iterator
+from unittest.mock import patch
+
+import numpy as np
+import pytest
+
+from conoid.cases import materials, schema
+from conoid.worker import state, step
+from conoid.worker.fracture.strength import Toughness
+from conoid.worker.mesh.model import TetMesh
+from conoid.worker.parallel.fixed_point import exact_sums
+from conoid.worker.simulation import Simulation
+from conoid.worker.state import Flags, Floats, Ints
+
+from ..contact.bodies import meeting_of, moved
+from ..worker.kernels import build
+from ..worker.meshes import block
+from ..worker.test_erosion import on
+from .test_separation import plane
+
+MM = 1e-3
+SOFT = materials.Material(
+    density=2500.0, elastic=materials.Elastic(young=70e9, poisson=0.2),
+    brittle=materials.Brittle(strength=1e6, energy=1e-3),
+)  # fmt: skip
+HEIGHT = 2.0 * MM
+
+
+@pytest.fixture(autouse=True)
+def only_the_plane_breaks() -> Iterator[None]:
+    """Its facets have a strength of 1 Pa, all others hold."""
+    weak = plane(mesh_of(), HEIGHT)[:, 0]
+
+    def strengths(self: Toughness, ids: Ints, area: Floats) -> Floats:
+        return np.where(np.isin(ids, weak), 1.0, 1e30)
+
+    with patch.object(Toughness, "strengths", strengths):
+        yield
+
+
+def mesh_of() -> TetMesh:
+    """A block of 3 x 3 x 4 mm, with a plane of facets in the middle."""
+    return block((3, 3, 4), MM, shake=0.0)
+
+
+def case_of(friction: float = 0.0, **fracture: object) -> schema.Case:
+    part = {"fracture": schema.Fracture(delay=0.0, **fracture)}  # type: ignore[arg-type]
+    return meeting_of([part], {"friction": friction}, material=SOFT, end=1.0)
+
+
+def sides(sim: Simulation) -> Flags:
+    """(nodes,) which nodes belong to tets above the plane."""
+    above = np.zeros(sim.model.nodes.n, bool)
+    for b in sim.model.blocks:
+        above[b.tets[sim.model.nodes.x0[b.tets].mean(axis=1)[:, 2] > HEIGHT]] = True
+    return above
+
+
+def at_rest(sim: Simulation) -> Simulation:
+    """The block just after all of the plane has broken by a stress of a few Pa: without stress, force and motion."""
+    nodes = sim.model.nodes
+    step.prepare(sim)
+    first = sim.model.nodes_global
+    nodes.v[:, 2] = np.where(nodes.x0[:, 2] > HEIGHT, 1e-6, np.where(nodes.x0[:, 2] < HEIGHT, -1e-6, 0.0))
+    for _ in range(4):
+        step.first_half(sim)
+        step.second_half(sim)
+        if sim.model.nodes_global > first:
+            break
+    assert sim.model.nodes_global == first + 16
+    nodes.x[:], nodes.v[:], nodes.force[:] = nodes.x0, 0.0, 0
+    for b in sim.model.blocks:
+        b.state[:, : state.VISCOUS + 1, :] = 0.0
+    return sim
+
+
+def gaps(sim: Simulation) -> Floats:
+    """(16,) distance across the crack, m; one rank."""
+    nodes, above = sim.model.nodes, sides(sim)
+    plane_nodes = np.flatnonzero(np.abs(nodes.x0[:, 2] - HEIGHT) < 1e-9)
+    order = plane_nodes[np.lexsort((above[plane_nodes], nodes.x0[plane_nodes, 1], nodes.x0[plane_nodes, 0]))]
+    low, high = order[0::2], order[1::2]
+    assert (nodes.x0[low] == nodes.x0[high]).all()
+    assert (above[high] & ~above[low]).all()
+    return np.asarray(nodes.x[high, 2] - nodes.x[low, 2])
+
+
+def cracked(**keys: object) -> Simulation:
+    return at_rest(build(case_of(**keys), [mesh_of()]))  # type: ignore[arg-type]
+
+
+def ticks(sim: Simulation, steps: int, look: Callable[[], None] = lambda: None) -> None:
+    for _ in range(steps):
+        step.first_half(sim)
+        look()
+        step.second_half(sim)
+
+
+@pytest.mark.parametrize("searched", [False, True])
+def test_nothing_is_pushed_out(searched: bool) -> None:
+    """The gap is zero, to the bit, and what is at rest stays there."""
+    sim = cracked()
+    assert sim.contact is not None
+    assert (gaps(sim) == 0.0).all()
+    sim.contact.due = searched
+    ticks(sim, 5)
+    assert (gaps(sim) == 0.0).all()
+    assert not sim.model.nodes.v.any()
+    assert (sim.model.nodes.x == sim.model.nodes.x0).all()
+
+
+@pytest.mark.parametrize("searched", [False, True])
+def test_sides_that_close_stop(searched: bool) -> None:
+    """In the step itself, with the momentum of both; the gap never falls below nothing."""
+    sim = cracked()
+    assert sim.contact is not None
+    nodes, above = sim.model.nodes, sides(sim)
+    nodes.v[:, 2] = np.where(above, -3.0, 1.0)
+    momentum = float((nodes.mass * nodes.v[:, 2]).sum())
+    sim.contact.due = searched
+    depth = []
+    ticks(sim, 40, lambda: depth.append(float(gaps(sim).min())))
+    assert min(depth) > -1e-6 * MM
+    assert float((nodes.mass * nodes.v[:, 2]).sum()) == pytest.approx(momentum, rel=1e-12)
+    assert sim.contact.last_push > 0.0
+
+
+def test_a_crack_that_closes_acts_as_two_bodies_do() -> None:
+    """The same two halves as parts of their own, which meet by nodes and faces from the beginning: the same motion as
+    long as they touch, and with it the same momentum of each."""
+    sim = cracked()
+    above = sides(sim)
+    half = block((3, 3, 2), MM, shake=0.0)
+    motions = [{"velocity": (0.0, 0.0, 1.0)}, {"velocity": (0.0, 0.0, -3.0)}]
+    apart = moved(half, (0.0, 0.0, HEIGHT))
+    two = build(meeting_of(motions, {"friction": 0.0}, material=SOFT, end=1.0), [half, apart])
+    step.prepare(two)
+    sim.model.nodes.v[:, 2] = np.where(above, -3.0, 1.0)
+    for _ in range(30):
+        for each in (sim, two):
+            step.first_half(each)
+            step.second_half(each)
+    upper = two.model.nodes.part == 1
+    one, other = (
+        float((s.model.nodes.mass * s.model.nodes.v[:, 2])[chosen].sum()) for s, chosen in ((sim, above), (two, upper))
+    )
+    mass = float(two.model.nodes.mass[upper].sum())
+    assert abs(one - other) < 1e-4 * mass * 4.0
+    assert abs(other + 3.0 * mass) > 0.5 * mass
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_sides_that_slide_rub(friction: float) -> None:
+    """Pressed and sheared, the sides lose mu times the impulse that presses them, and without friction nothing but what
+    the strain, v / c = 2e-4, turns the faces by."""
+    sim = cracked(friction=friction)
+    assert sim.contact is not None
+    nodes, above = sim.model.nodes, sides(sim)
+    nodes.v[:] = np.where(above[:, None], [4.0, 0.0, -1.0], 0.0)
+    before = (nodes.mass[above, None] * nodes.v[above]).sum(axis=0)
+    ticks(sim, 6)
+    change = (nodes.mass[above, None] * nodes.v[above]).sum(axis=0) - before
+    assert change[2] > 0.0
+    assert -change[0] == pytest.approx(friction * change[2], rel=0.02, abs=2e-4 * change[2])
+    assert (sim.contact.friction_work() > 0.0) == (friction > 0.0)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.2])
+def test_cracks_close_alike_on_any_number_of_ranks(friction: float) -> None:
+    """Closing and sliding, through searches, to the bit."""
+
+    def work(sim: Simulation) -> tuple[list[float], int]:
+        at_rest(sim)
+        assert sim.contact is not None
+        nodes = sim.model.nodes
+        nodes.v[:] = np.where(sides(sim)[:, None], [5.0, 2.0, -3.0], [0.0, 0.0, 1.0])
+        spread = np.array([nodes.id * 0.37 % 1.0, nodes.id * 0.61 % 1.0]).T
+        nodes.v[:, :2] += spread
+        for n in range(40):
+            sim.contact.due |= n in (10, 11, 25)
+            step.first_half(sim)
+            step.second_half(sim)
+        moments = np.concatenate([nodes.x, nodes.v], axis=1) * (1.0 + nodes.id[:, None])
+        return exact_sums(sim.comm, moments[nodes.owned]).tolist(), sim.contact.searches
+
+    runs = [on(ranks, case_of(friction=friction), [mesh_of()], work) for ranks in (1, 2, 3)]
+    assert runs[0][0][1] > 3
+    assert all(one == runs[0][0] for found in runs for one in found)
+
+
+def test_an_open_crack_carries_nothing_and_is_surface_after_a_search() -> None:
+    """Halves that part fly on as they are; a search finds the new faces when they are wide enough for others."""
+    sim = cracked()
+    assert sim.contact is not None
+    nodes, above = sim.model.nodes, sides(sim)
+    nodes.v[:, 2] = np.where(above, 200.0, 0.0)
+    searches = sim.contact.searches
+    ticks(sim, 60)
+    assert gaps(sim).min() > 0.3 * MM
+    assert (nodes.v[above, 2] == 200.0).all()
+    assert not nodes.v[~above].any()
+    assert sim.contact.searches > searches
+    faces = sum(int(b.exposed().sum()) for b in sim.model.blocks)
+    assert faces == 2 * (2 * 9 + 4 * 3 * 4 + 18)
