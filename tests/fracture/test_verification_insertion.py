@@ -1,0 +1,195 @@
+"""H5, H7, H17, V25, H27: what a facet does to its neighbours when it breaks, and where a body breaks."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from conoid.cases import load
+from conoid.worker import simulation, step
+from conoid.worker.mesh.faces import FACES
+from conoid.worker.parallel.comm import SerialComm
+from conoid.worker.simulation import Simulation
+from conoid.worker.state import CHUNK, PRESSURE, S_XX, S_YY, S_ZZ
+
+from ..worker.kernels import run
+from ..worker.meshes import Floats
+
+YOUNG, DENSITY, STRENGTH = 72e9, 2500.0, 60e6
+"""No lateral contraction: the wave speed is that of bars."""
+C = (YOUNG / DENSITY) ** 0.5
+BAR = """
+name = "bar"
+contact = {contact}
+[materials.glass]
+density = 2500
+elastic = {{ young = 72e9, poisson = 0 }}
+brittle = {{ strength = {strength}, energy = {energy} }}
+[[parts]]
+name = "bar"
+material = "glass"
+stretch = {{ rate = [0, 0, {rate}] }}
+fracture = {{ model = "{model}", delay = 0 }}
+[parts.mesh]
+shape = "box"
+low = [0, 0, {low}]
+high = [{wide}, {wide}, {high}]
+generator = "structured"
+element_size = {size}
+[numerics]
+pressure = "standard"
+dt_safety = {safety}
+viscosity = "none"
+[run]
+end_time = {end}
+frames = 0
+"""
+
+
+def bar(extra: str = "", **keys: Any) -> Simulation:
+    """A square bar along z; ``extra``: more tables of the case."""
+    given: dict[str, Any] = {
+        "contact": "{ friction = 0 }", "strength": STRENGTH, "energy": 5.0, "rate": 0.0, "model": "instant", "low": 0.0,
+        "high": 8e-3, "wide": 2e-3, "size": 1e-3, "safety": 0.5, "end": 1e-6, **keys,
+    }  # fmt: skip
+    case = load.parse_toml(BAR.format(**given) + extra)
+    return simulation.build(case, Path(), SerialComm())
+
+
+def drawn(low: float, high: float, rate: float) -> str:
+    """The ends of a bar go on as the stretch lets them begin."""
+    return "".join(
+        f'[[boundaries]]\nkind = "velocity"\nlow = [-1, -1, {z - 1e-6}]\nhigh = [1, 1, {z + 1e-6}]\nz = {rate * z}\n'
+        for z in (low, high)
+    )
+
+
+def test_a_cohesive_facet_that_breaks_leaves_the_acceleration_as_it_is() -> None:
+    """Even tension, slowly: every plane across breaks at once, and no node's acceleration changes by more than 1 % of
+    what the loss of its traction would make."""
+    rate = 100.0
+    sim = bar(drawn(0.0, 8e-3, rate), rate=rate, model="cohesive", end=10e-6, contact='"none"')
+    assert sim.fracture is not None
+    advance, jumps, alone = sim.fracture.advance, list[float](), list[float]()
+
+    def watched() -> None:
+        nodes, broken = sim.model.nodes, sim.fracture.broken
+        before = nodes.force / (nodes.scale * nodes.mass[:, None])
+        x = nodes.x.copy()
+        advance()
+        if sim.fracture.broken == broken:
+            return
+        after = nodes.force / (nodes.scale * nodes.mass[:, None])
+        parent = np.array([int(np.flatnonzero((x == place).all(axis=1))[0]) for place in nodes.x])
+        copies = nodes.n - len(before)
+        tets = sim.elements
+        jumps.append(float(np.abs(after - before[parent]).max()))
+        facets = sim.fracture.cohesion.facets
+        held = facets.pull.copy()
+        facets.pull[:] = 0.0
+        tets.again(nodes.scale)
+        alone.append(float(np.abs(nodes.force / (nodes.scale * nodes.mass[:, None])).max()))
+        facets.pull[:] = held
+        tets.again(nodes.scale)
+        assert copies > 0
+
+    sim.fracture.advance = watched  # type: ignore[method-assign]
+    run(sim)
+    print(f"{len(jumps)} events, jumps {max(jumps):.3g} of {alone[0]:.3g} m/s^2: {max(jumps) / alone[0]:.2e}")
+    assert jumps[0] < 0.01 * alone[0]
+
+
+def test_facets_that_open_evenly_do_not_touch() -> None:
+    """Even tension, all planes break at once: the layers shrink away from each other, and contact has nothing to do.
+
+    When they are turned back, it has.
+    """
+    rate = 1000.0
+    sim = bar(drawn(0.0, 8e-3, rate), rate=rate, end=1e-3)
+    pushed = 0.0
+
+    def go_on(end: float) -> None:
+        nonlocal pushed
+        while sim.clock.t < end:
+            step.first_half(sim)
+            assert sim.contact is not None
+            pushed = max(
+                pushed, float(np.abs(sim.contact.contact_loss).max()), float(np.abs(sim.contact._impulse).max())
+            )
+            step.second_half(sim)
+
+    step.prepare(sim)
+    go_on(1.1e-6)
+    assert sim.fracture is not None
+    assert sim.fracture.broken >= 7 * 8
+    assert pushed == 0.0
+    sim.model.nodes.v *= -1.0
+    go_on(2.2e-6)
+    assert pushed > 0.0
+
+
+LENGTH, LAYER, PULSE, BEGIN = 20e-3, 0.4e-3, 8e-3, 4e-3
+
+
+def shape(z: Floats) -> Floats:
+    """Of a smooth pulse that begins at BEGIN, m: no jump that a mesh of layers would let ring."""
+    return np.where((z > BEGIN) & (z < BEGIN + PULSE), np.sin(np.pi * (z - BEGIN) / PULSE) ** 2, 0.0)
+
+
+def pulse(peak: float, model: str, end: float) -> Simulation:
+    """A bar in which a compression of ``peak``, Pa, runs towards the far end."""
+    sim = bar(low=0.0, high=LENGTH, wide=2 * LAYER, size=LAYER, end=end, model=model)
+    nodes, block = sim.model.nodes, sim.model.blocks[0]
+    nodes.v[:, 2] = peak / (DENSITY * C) * shape(nodes.x[:, 2])
+    stress = np.full(block.state.shape[0] * CHUNK, 0.0)
+    stress[: block.n] = -peak * shape(nodes.x[block.tets.astype(np.int64), 2].mean(axis=1))
+    for row, share in ((S_XX, -1.0), (S_YY, -1.0), (S_ZZ, 2.0), (PRESSURE, -1.0)):
+        block.state[:, row, :] = share / 3.0 * stress.reshape(-1, CHUNK)
+    return sim
+
+
+def first_spall(peak: float) -> tuple[float, float]:
+    """Where, m, and when, s, incident and reflected pulse first add up to the strength, on paper."""
+    z = np.linspace(0.0, LENGTH, 8001)
+    for t in np.arange(0.0, 3e-6, 1e-9):
+        stress = peak * (shape(2.0 * LENGTH - z - C * t) - shape(z - C * t))
+        if stress.max() >= STRENGTH:
+            return float(z[stress.argmax()]), float(t)
+    raise AssertionError("the pulse is too weak")
+
+
+@pytest.mark.parametrize(("ratio", "model"), [(1.1, "instant"), (1.1, "cohesive"), (1.5, "cohesive"), (2.5, "instant")])
+def test_a_pulse_spalls_a_bar_where_it_should(ratio: float, model: str) -> None:
+    """Within one layer of the plane, and a layer's time of the moment.
+
+    Shear counts in a cohesive facet: twice the strength would break it in compression already.
+    """
+    where, when = first_spall(ratio * STRENGTH)
+    sim = pulse(ratio * STRENGTH, model, when + 2.0 * LAYER / C)
+    found: list[tuple[float, float]] = []
+
+    def look(sim: Simulation, _: Floats) -> None:
+        block = sim.model.blocks[0]
+        if sim.fracture is not None and sim.fracture.broken and not found:
+            tet, face = np.nonzero(block.bond)
+            z = sim.model.nodes.x0[block.tets[tet[:, None], FACES[face]].astype(np.int64), 2]
+            found.extend((float(row.mean()), sim.clock.t) for row in z)
+
+    run(sim, look)
+    places = np.array([place for place, _ in found])
+    print(
+        f"{ratio} {model}: at {places.min() * 1e3:.3f} to {places.max() * 1e3:.3f} mm, {found[0][1] * 1e6:.3f} us; "
+        f"{where * 1e3:.3f} mm, {when * 1e6:.3f} us; {sim.fracture and sim.fracture.broken} facets"
+    )
+    assert np.abs(places - where).max() <= LAYER
+    assert found[0][1] == pytest.approx(when, abs=LAYER / C)
+
+
+@pytest.mark.parametrize("model", ["instant", "cohesive"])
+def test_a_pulse_below_the_strength_breaks_nothing(model: str) -> None:
+    """At 0.95 of the strength, reflected at the free end."""
+    sim = run(pulse(0.95 * STRENGTH, model, 3e-6))
+    assert sim.fracture is not None
+    assert sim.fracture.broken == 0
+    assert sim.model.nodes.n == sim.model.nodes_global == 51 * 9
