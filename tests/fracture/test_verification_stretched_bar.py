@@ -1,0 +1,70 @@
+"""V26: the stretched bar in three dimensions breaks into fragments of the published size, from slow to fast.
+
+The step is small: what a facet is beyond its strength by when it breaks becomes its strength, and a stress that rises
+by more in a step than the strengths scatter makes them all alike.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from conoid.cases import load
+from conoid.worker import simulation
+from conoid.worker.fracture import fragments
+from conoid.worker.parallel.comm import SerialComm
+
+from ..worker.kernels import run
+from .bar_1d import Bar
+from .test_stretched_bar_1d import published
+
+SCENE = """
+name = "bar"
+[materials.ceramic]
+density = 2750
+elastic = {{ young = 275e9, poisson = 0 }}
+brittle = {{ strength = 300e6, energy = 100, scatter = {{ modulus = 100, seed = {seed} }} }}
+[[parts]]
+name = "bar"
+material = "ceramic"
+stretch = {{ rate = [{rate}, 0, 0] }}
+fracture = {{ model = "cohesive", delay = 0 }}
+[parts.mesh]
+shape = "box"
+low = [{low}, 0, 0]
+high = [{high}, {wide}, {wide}]
+generator = "structured"
+element_size = {size}
+"""
+
+
+def sizes(x: float, length: float, layers: int, end: float, seed: int) -> float:
+    """Mean size of the fragments, in s_0, of a bar of ``length`` s_0 at ``x`` times rate_0 after ``end`` t_0."""
+    bar = Bar()
+    rate, half, size = x * bar.rate_0, 0.5 * length * bar.s_0, length * bar.s_0 / layers
+    keys = {"rate": rate, "low": -half, "high": half, "size": size, "wide": 2.0 * size, "seed": seed}
+    text = SCENE.format(**keys) + "".join(
+        f'[[boundaries]]\nkind = "velocity"\nlow = [{z - size / 4}, -1, -1]\nhigh = [{z + size / 4}, 1, 1]\n'
+        f"x = {rate * z}\n"
+        for z in (-half, half)
+    )
+    text += f'[numerics]\npressure = "standard"\ndt_safety = 0.15\n[run]\nend_time = {end * bar.t_0}\nframes = 0\n'
+    sim = run(simulation.build(load.parse_toml(text), Path(), SerialComm()))
+    assert sim.fracture is not None
+    assert sim.fracture.cohesion is not None
+    found = fragments.labels(sim.model, sim.fracture.cohesion.facets.tets, sim.comm)
+    _, tets = np.unique(np.concatenate(found), return_counts=True)
+    return length / float(np.count_nonzero(tets >= 10))
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize(
+    ("x", "length", "end"), [(0.3, 20.0, 15.0), (1.0, 10.0, 12.0), (3.0, 5.0, 10.0), (10.0, 2.0, 8.0)]
+)
+def test_a_bar_breaks_into_fragments_of_the_published_size(x: float, length: float, end: float) -> None:
+    """Within a factor of two of the fit of Zhou, Molinari and Ramesh; two bars of some ten fragments each."""
+    found = [sizes(x, length, 60 if x > 1.0 else 80, end, seed) for seed in (0, 1)]
+    size = float(np.mean(found))
+    print(f"x {x:g}: {found} s_0, published {published(x):.3f}, ratio {size / published(x):.2f}")
+    assert 0.5 < size / published(x) < 2.0
