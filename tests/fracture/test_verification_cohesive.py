@@ -156,7 +156,7 @@ def test_what_is_lost_never_comes_back() -> None:
     facet = Facet(STRENGTH * direction(0.7), weight=0.5)
     for _ in range(3000):
         change = random.normal(scale=0.004 * CRITICAL, size=3) + 2e-5 * CRITICAL * NORMAL
-        u, largest = u + change, max(largest, abs(change @ NORMAL))
+        u, largest = u + change, max(largest, abs(float(change @ NORMAL)))
         facet.open(u)
         lost.append(facet.cohesion.energies(SerialComm())[0])
         if not len(facet.facets.work):

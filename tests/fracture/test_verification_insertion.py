@@ -70,22 +70,25 @@ def test_a_cohesive_facet_that_breaks_leaves_the_acceleration_as_it_is() -> None
     what the loss of its traction would make."""
     rate = 100.0
     sim = bar(drawn(0.0, 8e-3, rate), rate=rate, model="cohesive", end=10e-6, contact='"none"')
-    assert sim.fracture is not None
-    advance, jumps, alone = sim.fracture.advance, list[float](), list[float]()
+    fracture = sim.fracture
+    assert fracture is not None
+    assert fracture.cohesion is not None
+    cohesion, advance = fracture.cohesion, fracture.advance
+    jumps, alone = list[float](), list[float]()
 
     def watched() -> None:
-        nodes, broken = sim.model.nodes, sim.fracture.broken
+        nodes, broken = sim.model.nodes, fracture.broken
         before = nodes.force / (nodes.scale * nodes.mass[:, None])
         x = nodes.x.copy()
         advance()
-        if sim.fracture.broken == broken:
+        if fracture.broken == broken:
             return
         after = nodes.force / (nodes.scale * nodes.mass[:, None])
         parent = np.array([int(np.flatnonzero((x == place).all(axis=1))[0]) for place in nodes.x])
         copies = nodes.n - len(before)
         tets = sim.elements
         jumps.append(float(np.abs(after - before[parent]).max()))
-        facets = sim.fracture.cohesion.facets
+        facets = cohesion.facets
         held = facets.pull.copy()
         facets.pull[:] = 0.0
         tets.again(nodes.scale)
@@ -94,7 +97,7 @@ def test_a_cohesive_facet_that_breaks_leaves_the_acceleration_as_it_is() -> None
         tets.again(nodes.scale)
         assert copies > 0
 
-    sim.fracture.advance = watched  # type: ignore[method-assign]
+    fracture.advance = watched  # type: ignore[method-assign]
     run(sim)
     print(f"{len(jumps)} events, jumps {max(jumps):.3g} of {alone[0]:.3g} m/s^2: {max(jumps) / alone[0]:.2e}")
     assert jumps[0] < 0.01 * alone[0]

@@ -67,7 +67,7 @@ def check_topology(sim: Simulation, before: Ints) -> None:
     for t, corners in enumerate(tets):
         for a in corners:
             star[int(a)].append(t)
-    behind = across(before)
+    behind = across(before.astype(np.int32))
     place = {int(i): t for t, i in enumerate(block.id)}
     assert np.array_equal(np.argsort(block.id[np.argsort(block.id)]), np.arange(len(tets)))
     bonds: defaultdict[int, list[tuple[int, int]]] = defaultdict(list)
