@@ -12,7 +12,8 @@ from conoid.cases import schema
 
 from .errors import InputError
 from .parallel.comm import Comm
-from .state import Flags, Floats, Indices, Ints, Model, Nodes, extended
+from .state import Flags, Floats, Indices, Ints, Load, Model, Nodes, extended
+from .topology import Split
 
 _AXES = {"x": 0, "y": 1, "z": 2}
 ON_PLANE = 1e-9
@@ -47,11 +48,12 @@ class Boundary:
         """Corrects v(n+1/2) at time ``t``, s; ``dt`` is the step ahead, s."""
         raise NotImplementedError
 
-    def grow(self, parents: Ints, first: int) -> None:
-        """Takes up copies of those of its nodes that are among ``parents``: local indices, the first copy is ``first``.
+    def grow(self, split: Split, ids: Ints) -> None:
+        """Takes up the copies of its nodes; ``ids``: of the local nodes.
 
         What has been booked, and the impulse of the last step, stay with the parent.
         """
+        parents, first = split.copies.parents, split.first
         at = np.minimum(np.searchsorted(self.nodes, parents), max(len(self.nodes) - 1, 0))
         held = self.nodes[at] == parents if len(self.nodes) else np.zeros(len(parents), bool)
         self._inherit(at[held], (first + np.flatnonzero(held)).astype(np.int32))
@@ -152,12 +154,27 @@ class Gravity(Driver):
 
 
 class Traction(Driver):
-    """A constant ``force`` (n, 3), N, over the mean step of the kick."""
+    """Constant forces on corners of tets, over the mean step of the kick.
 
-    def __init__(self, nodes: Indices, force: Floats) -> None:
-        super().__init__(nodes)
-        self.force = force
+    ``corners`` (m,) local nodes and ``tets`` (m,) global ids, by ascending tet; ``forces`` (m, 3), N.
+    """
+
+    def __init__(self, corners: Indices, tets: Ints, forces: Floats) -> None:
+        super().__init__(np.unique(corners))
+        self._corners, self._tets, self._forces = corners, tets, forces
+        self.force = self._summed()
+        """(n, 3) N."""
         self._last_dt = 0.0
+
+    def grow(self, split: Split, ids: Ints) -> None:
+        super().grow(split, ids)
+        self._corners = split.followed(self._corners[:, None], ids, self._tets)[:, 0]
+        self.force = self._summed()
+
+    def _summed(self) -> Floats:
+        force = np.zeros((len(self.nodes), 3))
+        np.add.at(force, np.searchsorted(self.nodes, self._corners), self._forces)
+        return force
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
         self._impulse = 0.5 * (self._last_dt + dt) * self.force
@@ -250,9 +267,9 @@ def _push_out(x, v, impulse, mass, nodes, points, normals, held, dt):  # type: i
     return pushed
 
 
-def build(case: schema.Case, model: Model, traction: Floats, comm: Comm) -> list[Boundary]:
+def build(case: schema.Case, model: Model, loads: list[Load], comm: Comm) -> list[Boundary]:
     """The boundaries of a case on this rank's nodes: gravity and tractions first, so that what is held stays held;
-    walls last, and they leave alone what has a prescribed motion. ``traction`` (k, n, 3): the forces of the tractions.
+    walls last, and they leave alone what has a prescribed motion. ``loads``: of the tractions.
 
     Raises InputError, on every rank alike, for a boundary that holds no node, a body that starts behind a wall, and
     motion prescribed across a symmetry plane.
@@ -266,7 +283,7 @@ def build(case: schema.Case, model: Model, traction: Floats, comm: Comm) -> list
     boundaries: list[Boundary] = [
         Gravity(_indices(h), np.array(spec.acceleration)) for spec, h in pairs if isinstance(spec, schema.Gravity)
     ]
-    boundaries += [Traction(_indices(loaded), force[loaded]) for force in traction for loaded in [force.any(axis=1)]]
+    boundaries += [Traction(nodes.places(load.nodes), load.tets, load.force) for load in loads]
     boundaries += [
         SymmetryPlane(_indices(h), _AXES[spec.axis]) for spec, h in pairs if isinstance(spec, schema.Symmetry)
     ]

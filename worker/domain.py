@@ -19,7 +19,7 @@ from .errors import InputError
 from .hashing import uniform
 from .materials import models
 from .mesh.build import build as build_mesh
-from .mesh.faces import FACES, across, boundary_faces, normals
+from .mesh.faces import FACES, across, normals
 from .parallel.comm import Comm
 from .parallel.decompose import bisect
 from .parallel.ownership import Neighbour
@@ -35,6 +35,7 @@ from .state import (
     Floats,
     Indices,
     Ints,
+    Load,
     Model,
     Nodes,
     chunked,
@@ -58,8 +59,8 @@ class Whole:
     node_volume: Floats
     mass: Floats
     velocity: Floats
-    traction: Floats
-    """(k, nodes, 3) forces of the k tractions of the case, N."""
+    loads: list[Load]
+    """Of the tractions of the case."""
 
 
 @dataclass
@@ -74,8 +75,8 @@ class Piece:
     velocity: Floats
     mass: Floats
     node_volume: Floats
-    traction: Floats
-    """(k, nodes, 3) complete forces of the k tractions of the case, N."""
+    loads: list[Load]
+    """Of the tractions of the case, on all nodes that this rank holds."""
     tet_ids: Ints
     tet_part: Indices
     tets: Indices
@@ -116,7 +117,7 @@ def assemble(case: schema.Case, folder: Path) -> Whole:
         points=x, node_part=part_of_node, tets=t, tet_part=part_of_tet, volumes=volumes,
         across=behind,
         node_volume=_quarters(t, volumes, len(x)), mass=_quarters(t, volumes * np.array(density)[part_of_tet], len(x)),
-        velocity=_velocities(case, x, part_of_node), traction=_tractions(case, x, part_of_node, t),
+        velocity=_velocities(case, x, part_of_node), loads=_loads(case, x, part_of_node, t),
     )  # fmt: skip
 
 
@@ -178,24 +179,27 @@ def _velocities(case: schema.Case, x: Floats, part: Indices) -> Floats:
     return v
 
 
-def _tractions(case: schema.Case, x: Floats, part: Indices, tets: Indices) -> Floats:
-    """(k, n, 3) forces of the tractions of the case on the nodes, N: a third of each face's, in the order of the tets.
+def _loads(case: schema.Case, x: Floats, part: Indices, tets: Indices) -> list[Load]:
+    """The tractions of the case: a third of the force on each face for each of its nodes, in the order of the tets.
 
     Raises InputError for one that acts on no face.
     """
     found = [(i, spec) for i, spec in enumerate(case.boundaries) if isinstance(spec, schema.Traction)]
-    forces = np.zeros((len(found), len(x), 3))
-    faces = boundary_faces(tets) if found else np.zeros((0, 3), np.int32)
-    for force, (index, spec) in zip(forces, found, strict=True):
+    loads = []
+    tet, face = np.nonzero(across(tets) < 0) if found else (np.zeros(0, np.int64), np.zeros(0, np.int64))
+    faces = tets[tet[:, None], FACES[face]]
+    for index, spec in found:
         chosen = np.isin(part, [i for i, p in enumerate(case.parts) if not spec.parts or p.name in spec.parts])
         if spec.low is not None and spec.high is not None:
             chosen &= ((x >= np.array(spec.low)) & (x <= np.array(spec.high))).all(axis=1)
-        loaded = faces[chosen[faces].all(axis=1)]
+        inside = chosen[faces].all(axis=1)
+        loaded = faces[inside]
         if not len(loaded):
             raise InputError(f"boundaries[{index}]: acts on no face; check its box and its parts")
         area = 0.5 * np.linalg.norm(normals(x, loaded), axis=1)
-        np.add.at(force, loaded, (area[:, None] / 3.0 * np.array(spec.stress))[:, None, :])
-    return forces
+        force = area[:, None] / 3.0 * np.array(spec.stress)
+        loads.append(Load(np.repeat(tet[inside], 3), loaded.reshape(-1).astype(np.int64), np.repeat(force, 3, axis=0)))
+    return loads
 
 
 def cut(whole: Whole, ranks: int) -> list[Piece]:
@@ -239,7 +243,8 @@ def _piece(
     tets = whole.tets[ids]
     return Piece(
         nodes.astype(np.int64), whole.node_part[nodes], home[nodes], home[nodes] == rank, whole.points[nodes],
-        whole.velocity[nodes], whole.mass[nodes], whole.node_volume[nodes], whole.traction[:, nodes],
+        whole.velocity[nodes], whole.mass[nodes], whole.node_volume[nodes],
+        [load.take(np.isin(load.nodes, nodes)) for load in whole.loads],
         ids.astype(np.int64),
         whole.tet_part[ids], local[tets], whole.volumes[ids],
         whole.across[ids] if len(whole.across) else whole.across, np.any(shared[tets], axis=1), neighbours, totals,

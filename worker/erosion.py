@@ -41,6 +41,7 @@ from .state import (
     Nodes,
     extended,
 )
+from .topology import Split
 
 GATHERED = 10
 """Steps in which worn tets are gathered."""
@@ -113,7 +114,8 @@ class Erosion(Boundary):
             if spec is not None:
                 block.life[FREQUENCY] = limit / spec.time_step
 
-    def grow(self, parents: Ints, first: int) -> None:
+    def grow(self, split: Split, ids: Ints) -> None:
+        parents = split.copies.parents
         self.removed = extended(self.removed, self.removed[parents])
         self._leaves = extended(self._leaves, self._leaves[parents])
         self._tets_at = extended(self._tets_at, np.ones(len(parents), np.int64))

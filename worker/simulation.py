@@ -142,7 +142,7 @@ class Simulation:
 def build(case: Case, folder: Path, comm: Comm) -> Simulation:
     """Meshes, cuts and distributes the case. Raises InputError on every rank alike."""
     model, piece = domain.build(case, folder, comm)
-    scene, timers = boundaries.build(case, model, piece.traction, comm), Timers()
+    scene, timers = boundaries.build(case, model, piece.loads, comm), Timers()
     for boundary in scene:
         boundary.start(model.nodes)
     run, numerics = case.run, case.numerics

@@ -135,6 +135,22 @@ class Copies:
 
 
 @dataclass
+class Load:
+    """Constant forces on corners of tets, in the order of the tets."""
+
+    tets: Ints
+    """(m,) global ids."""
+    nodes: Ints
+    """(m,) global ids."""
+    force: Floats
+    """(m, 3) N."""
+
+    def take(self, chosen: Flags) -> "Load":
+        """Some of them."""
+        return Load(self.tets[chosen], self.nodes[chosen], self.force[chosen])
+
+
+@dataclass
 class Block:
     """The elements of one part on one rank; the first ``border_chunks`` chunks touch every shared node."""
 

@@ -60,9 +60,12 @@ def second_half(sim: Simulation) -> None:
         if sim.contact is not None:
             sim.vote.words[4] = sim.contact.spent(nodes)
     _elements(sim, clock.dt)  # 6 to 8
-    if sim.fracture is not None and sim.vote.hot:
+    if sim.fracture is not None:
         with sim.timers.phase("fracture"):
-            sim.fracture.advance()  # 9: facets break, nodes separate, f(n+1) goes with them
+            if sim.vote.hot:
+                sim.fracture.advance()  # 9: facets break, nodes separate, f(n+1) goes with them
+            else:
+                sim.fracture.rest()
 
 
 def _elements(sim: Simulation, dt: float) -> None:

@@ -10,7 +10,10 @@ from conoid.cases import layout, load
 from conoid.cases.library import material
 from conoid.cases.outcome import Outcome, from_json
 
-HEAVY = {"demo", "hertz_spheres", "long_rod", "taylor_42crmo4", "taylor_copper", "taylor_copper_split"}
+HEAVY = {
+    "branching_plate", "breathing_facet", "demo", "free_tets", "glass_steel_bar", "glass_steel_demo", "hertz_spheres",
+    "long_rod", "taylor_42crmo4", "taylor_copper", "taylor_copper_split",
+}  # fmt: skip
 """Half a minute and more."""
 NAMES = [pytest.param(name, marks=[pytest.mark.slow] * (name in HEAVY)) for name in sorted(load.shipped())]
 

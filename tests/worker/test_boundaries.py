@@ -255,9 +255,13 @@ def test_a_traction_on_the_whole_surface_is_no_force_on_the_nodes_inside() -> No
 @pytest.mark.parametrize("ranks", [2, 3, 5])
 def test_every_rank_has_the_whole_load_of_its_nodes(ranks: int) -> None:
     whole = whole_of(MESH, scene(STEEL, boundaries=({**PULL, **TOP}, PULL)))
-    assert whole.traction.shape == (2, len(MESH.points), 3)
+    assert len(whole.loads) == 2
     for piece in domain.cut(whole, ranks):
-        assert (piece.traction == whole.traction[:, piece.node_ids]).all()
+        for mine, load in zip(piece.loads, whole.loads, strict=True):
+            here = np.isin(load.nodes, piece.node_ids)
+            assert (mine.nodes == load.nodes[here]).all()
+            assert (mine.tets == load.tets[here]).all()
+            assert (mine.force == load.force[here]).all()
 
 
 def test_a_traction_without_a_face_is_refused() -> None:

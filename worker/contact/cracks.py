@@ -283,7 +283,7 @@ def across(nodes, weights, normals, wanted, friction, pair, n, cracks, typical, 
             if apart > (_APART * typical) ** 2:
                 far = 1
             gap1 = gap0 + dt * speed
-            if not (gap1 <= NEAR * size and gap0 >= -DEEP_SELF * size):
+            if not (gap1 <= NEAR * size and gap0 >= -DEEP_SELF * size and mu[part[p], part[q]] >= 0.0):
                 continue
             nodes[n, 0], nodes[n, 1], nodes[n, 2], nodes[n, 3] = q, p, p, p
             weights[n, 0], weights[n, 1], weights[n, 2], weights[n, 3] = 1.0, -1.0, 0.0, 0.0

@@ -215,7 +215,7 @@ def inserted(
     shear = 1.0 / weight
     # T = strength / e (<d_n> n + b^2 d_t) is the traction where d_n = e t_n / strength, d_t = e t_t / (b^2 strength);
     # under pressure the effective traction counts the shear that friction leaves.
-    e = effective / stiffness
+    e = np.maximum(1.0, shear) * effective / stiffness
     pressed = along[:, 0] == 0.0
     across = np.hypot(along[:, 1], along[:, 2])
     held = np.where(pressed, effective * np.sqrt(shear) / np.where(across > 0.0, across, 1.0), 1.0)

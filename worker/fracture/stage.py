@@ -156,6 +156,10 @@ class Fracture:
             self.broken += total
             self._break(broken)
 
+    def rest(self) -> None:
+        """Nothing is beyond its strength: no clock runs."""
+        self._since = np.zeros(0, np.int64), np.zeros(0)
+
     def free(self) -> None:
         """Gives the messages back to MPI."""
         self._far.free()
@@ -174,8 +178,7 @@ class Fracture:
             since = np.where(known[at] == ids, times[at], since)
         over = effective >= strength
         breaks = over & (effective >= body.tough.required(strength, now - since))
-        clocked = over & ~breaks
-        passed.append((ids[clocked], since[clocked]))
+        passed.append((ids[over], since[over]))
         return np.flatnonzero(breaks)
 
     def _strongest(self, broken: list[Breaking]) -> list[Breaking]:
@@ -222,7 +225,7 @@ class Fracture:
     def _tell_everybody(self, split: Split) -> None:
         self._elements.grow(split.copies)
         for boundary in self._boundaries:
-            boundary.grow(split.copies.parents, split.first)
+            boundary.grow(split, self._model.nodes.id)
 
     def _hand_over(self, split: Split, fresh: list[Facets]) -> None:
         """Forces of the present, of the tets and cohesive facets of copies, from their parents to them."""
@@ -278,15 +281,15 @@ def _warnings(part: str, spec: Spec, tough: Toughness, size: float, step: float)
     )  # fmt: skip
     if ratio > _RESOLVED:
         told.append(
-            f"{part}: elements of {size * 1e3:.3g} mm in a cohesive zone of {tough.zone * 1e3:.3g} mm ({ratio:.3g} to 1, "
-            f"resolved below {_RESOLVED:.2g}): the mesh decides on the energy of fracture; "
+            f"{part}: elements of {size * 1e3:.3g} mm in a cohesive zone of {tough.zone * 1e3:.3g} mm, "
+            f"{ratio:.3g} to 1, resolved below {_RESOLVED:.2g}: the mesh decides on the energy of fracture; "
             "fracture.resolve = 'strength' keeps it and lowers the strength"
         )
     opening = tough.strength * step / tough.impedance
     if spec.model == "cohesive" and opening > tough.critical:
         told.append(
-            f"{part}: a facet opens by {opening * 1e6:.3g} um in a step of {step * 1e9:.3g} ns, its critical opening is "
-            f"{tough.critical * 1e6:.3g} um: no law can be followed; use fracture.model = 'instant', "
+            f"{part}: a facet opens by {opening * 1e6:.3g} um in a step of {step * 1e9:.3g} ns, and by "
+            f"{tough.critical * 1e6:.3g} um altogether: no law can be followed; use fracture.model = 'instant', "
             f"fracture.resolve = 'strength', or numerics.dt_safety {opening / tough.critical:.0f} times smaller"
         )
     return told
