@@ -2,9 +2,10 @@
 
 The two sides of a facet that has broken lie on each other, and no search is needed to know that they meet: from the
 moment of separation the nodes across, which were one, push each other apart along the normal of their facet, from a gap
-of exactly zero. That holds as long as they are near. What else could reach the faces of a crack has to enter it, so they
-are no part of the surface until they are apart by a share of a facet's size: then a search is due, after which they and
-their nodes and edges are surface like all other. However finely a body shatters, what has not moved costs no search.
+of exactly zero. That holds as long as they are near. What else could reach the faces of a crack has to enter it, so
+they are no part of the surface until they are apart by a share of a facet's size: then a search is due, after which
+they, their nodes and edges are surface like all other. However finely a body shatters, what has not moved costs no
+search.
 
 What the last search has found stays good while nodes separate: faces take up the copies of their corners, and a copy
 has the candidates of the node that it was part of, with the rank that computes that one's.
