@@ -17,6 +17,7 @@ from . import (
     accuracy,
     axisymmetric,
     contact_cost,
+    fracture_cost,
     gates,
     growth,
     long_rod,
@@ -155,6 +156,13 @@ def _contact(extent: Extent, book: Book) -> None:
     book.add("Contact", text, data, gates.of_contact(costs))
 
 
+def _fracture(extent: Extent, book: Book) -> None:
+    cost = fracture_cost.armed(4 if extent is QUICK else 20)
+    bars = list(fracture_cost.shatter(fracture_cost.SIZES[: 1 if extent is QUICK else len(fracture_cost.SIZES)]))
+    data = {"armed": asdict(cost), "bars": {b.size: b.outcome.element_updates_per_second for b in bars}}
+    book.add("Fracture", fracture_cost.report(cost, bars), data, gates.of_fracture(cost, bars))
+
+
 def _long_rod(extent: Extent, book: Book) -> None:
     shots = []
     for shot in long_rod.measure(extent.shots):
@@ -169,7 +177,7 @@ def _long_rod(extent: Extent, book: Book) -> None:
 
 PARTS: dict[str, Callable[[Extent, Book], None]] = {
     "speed": _speed, "akantu": _akantu, "taylor": _taylor, "growth": _growth, "startup": _startup,
-    "accuracy": _accuracy, "telemetry": _telemetry, "contact": _contact, "long_rod": _long_rod,
+    "accuracy": _accuracy, "telemetry": _telemetry, "contact": _contact, "fracture": _fracture, "long_rod": _long_rod,
 }  # fmt: skip
 
 

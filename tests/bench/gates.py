@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from .accuracy import Answer
 from .contact_cost import Cost
+from .fracture_cost import Armed, Shattered
 from .growth import Growth
 from .long_rod import BANDS, LENGTH, Shot
 from .speed import Speed
@@ -125,6 +126,17 @@ def of_long_rod(shots: Sequence[Shot]) -> Iterator[Gate]:
         yield Gate("long rod, 1 mm, 2 ranks", "< 600 s", f"{wall:.0f} s", wall < 600.0)
         share = sum(outcome.phases["contact"]) / sum(outcome.phases["elements"])
         yield Gate("long rod, contact over elements", "<= 1", f"{share:.2f}", share <= 1.0)
+
+
+def of_fracture(cost: Armed, bars: Sequence[Shattered]) -> Iterator[Gate]:
+    """Fracture armed, and while a bar shatters."""
+    yield Gate(
+        f"fracture armed, {cost.tets:,} tets", ">= 5 M updates / CPU-s", f"{cost.armed:.1f} M", cost.armed >= 5.0
+    )
+    for bar in bars:
+        speed = bar.outcome.element_updates_per_second * 1e-6
+        what = f"glass bar that shatters, {bar.outcome.elements:,} tets, everything"
+        yield Gate(what, ">= 1 M updates / CPU-s", f"{speed:.2f} M", speed >= 1.0)
 
 
 def of_contact(costs: Sequence[Cost]) -> Iterator[Gate]:

@@ -51,7 +51,7 @@ STEPS = {
     "plate_stack": 300, "sliding_block": 3558,
     "taylor_42crmo4": 8998, "taylor_copper": 21529, "taylor_copper_split": 20091, "demo": 8998,
     "fast_fragment": 168, "long_rod": 13442,
-    "two_tets": 6140, "breathing_facet": 31880, "free_tets": 1860, "spall_glass": 810, "stretched_bar": 280,
+    "two_tets": 2180, "breathing_facet": 14360, "free_tets": 1860, "spall_glass": 900, "stretched_bar": 889,
     "branching_plate": 920, "glass_steel_bar": 4271, "glass_steel_demo": 682,
 }  # fmt: skip
 """Steps that the shipped cases were seen to take."""
