@@ -50,9 +50,8 @@ TEMPERATURE = 17
 """K."""
 
 
-INTACT, PINNED, OPEN, WIDE = range(4)
-"""Bond of a face to the one behind it: whole; broken, with all three nodes still in common; broken, with nodes that
-have separated; so far apart that it is part of the surface."""
+INTACT, BROKEN, WIDE = range(3)
+"""Bond of a face to the one behind it: whole; broken; broken and so far apart that it is part of the surface."""
 
 
 def extended(array: "np.ndarray", rows: "np.ndarray") -> "np.ndarray":
@@ -175,7 +174,7 @@ class Block:
     """(n, 4) what was behind each face at the start, 4 * global tet id + local face, -1 for an exposed face; (0, 4) in
     scenes without contact and fracture."""
     bond: Bits = field(default_factory=lambda: np.zeros((0, 4), np.uint8))
-    """(n, 4) INTACT, PINNED, OPEN or WIDE; (0, 4) where the part does not fracture."""
+    """(n, 4) INTACT, BROKEN or WIDE; (0, 4) where the part does not fracture."""
     weakest: Floats = field(default_factory=lambda: np.zeros(0))
     """(n,) smallest strength of the faces of each tet, Pa; (0,) where the part does not fracture."""
     hot: Bits = field(default_factory=lambda: np.zeros(0, np.uint8))

@@ -19,7 +19,7 @@ from conoid.worker.parallel.comm import Comm
 from conoid.worker.parallel.fixed_point import exact_sums
 from conoid.worker.parallel.ownership import complete
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import INTACT, MASS, OPEN, PINNED, Floats, Ints, Model
+from conoid.worker.state import BROKEN, INTACT, MASS, Floats, Ints, Model
 
 from ..contact.bodies import meeting_of, pieces_of
 from ..contact.ranks import on_ranks
@@ -211,7 +211,7 @@ def test_nodes_separate_as_by_hand_on_any_number_of_ranks(seed: int, ranks: int)
     assert (found.tets == tets).all()
     assert max(depth) > 2
     assert len(found.mass) == len(depth) == 4 * len(mesh.tets)
-    assert (found.bond[across(mesh.tets) >= 0] == OPEN).all()
+    assert (found.bond[across(mesh.tets) >= 0] == BROKEN).all()
 
 
 @pytest.mark.parametrize("ranks", RANKS)
@@ -246,7 +246,7 @@ def test_a_facet_inside_separates_nothing(ranks: int) -> None:
     found = cracked(mesh, [inside], ranks)
     assert (found.tets == mesh.tets).all()
     assert np.flatnonzero(found.bond.reshape(-1)).tolist() == inside[0].tolist()
-    assert (found.bond.reshape(-1)[inside] == PINNED).all()
+    assert (found.bond.reshape(-1)[inside] == BROKEN).all()
 
 
 @pytest.mark.parametrize("ranks", RANKS)
@@ -260,8 +260,8 @@ def test_a_closed_sheet_round_a_node_separates_that_node_alone(ranks: int) -> No
     found = cracked(mesh, [disc[1:], disc[:1]], ranks)
     assert len(found.mass) == len(mesh.points) + 1
     assert set(mesh.tets[found.tets != mesh.tets].tolist()) == {centre}
-    assert (found.bond.reshape(-1)[disc] == OPEN).all()
-    assert (found.bond == OPEN).sum() == disc.size
+    assert (found.bond.reshape(-1)[disc] == BROKEN).all()
+    assert (found.bond == BROKEN).sum() == disc.size
 
 
 @pytest.mark.parametrize("ranks", RANKS)

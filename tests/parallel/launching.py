@@ -1,5 +1,6 @@
 """Real workers under the real mpiexec, started and awaited with a limit; nothing outlives a test."""
 
+import json
 import os
 import re
 import subprocess
@@ -41,6 +42,17 @@ def ended(words: list[str]) -> subprocess.CompletedProcess[str]:
     with started(words) as launcher:
         out, err = launcher.communicate(timeout=PATIENCE)
     return subprocess.CompletedProcess(words, launcher.returncode, out, err)
+
+
+def together(ranks: int, place: Path, runs: Sequence[Sequence[str]]) -> None:
+    """Many runs, by the arguments of their workers, one after the other in one program of ``ranks`` ranks; ``place`` is
+    made for them.
+    """
+    place.mkdir(exist_ok=True)
+    (place / "runs.json").write_text(json.dumps(runs), encoding="utf-8")
+    program = Path(__file__).with_name("many.py")
+    finished = ended(command(ranks, str(place / "runs.json"), module=[str(program)]))
+    assert finished.returncode == 0, finished.stderr
 
 
 def processes(folder: Path) -> list[int]:

@@ -1,6 +1,5 @@
 """What breaks, breaks alike on any number of ranks: digest, history and counts, to the bit."""
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,7 +8,7 @@ import pytest
 from conoid.cases import layout
 from conoid.cases.outcome import Outcome, from_json
 
-from .launching import command, ended
+from .launching import together
 
 RANKS = (2, 3, 4, 7)
 CASE = Path(__file__).with_name("breaking.toml")
@@ -37,8 +36,6 @@ low = ["-1 mm", "2.9 mm", "-1 mm"]
 high = ["9 mm", "3.1 mm", "9 mm"]
 stress = ["20 MPa", "150 MPa", "0 Pa"]
 """
-BROKEN: dict[str, str] = {}
-"""Scenes that do not run yet, and why."""
 Answers = Callable[[int, str], Path]
 
 
@@ -57,12 +54,8 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> Answers:
     def folder(ranks: int, name: str) -> Path:
         place = root / str(ranks)
         if not (place / name).exists():
-            place.mkdir(exist_ok=True)
-            alike = [name] if name in (FAST, *BROKEN) else [n for n in SCENES if n not in (FAST, *BROKEN)]
-            (place / "runs.json").write_text(json.dumps([arguments(n, root, place) for n in alike]), encoding="utf-8")
-            program = Path(__file__).with_name("many.py")
-            finished = ended(command(ranks, str(place / "runs.json"), module=[str(program)]))
-            assert finished.returncode == 0, finished.stderr
+            alike = [name] if name == FAST else [n for n in SCENES if n != FAST]
+            together(ranks, place, [arguments(n, root, place) for n in alike])
         return place / name
 
     return folder
@@ -73,8 +66,7 @@ def outcome(folder: Path) -> Outcome:
 
 
 def marks(name: str, ranks: int = 1) -> list[pytest.MarkDecorator]:
-    slow = [] if name == FAST and ranks < 3 else [pytest.mark.slow]
-    return [*slow, *([pytest.mark.xfail(strict=True, reason=BROKEN[name])] if name in BROKEN else [])]
+    return [] if name == FAST and ranks < 3 else [pytest.mark.slow]
 
 
 @pytest.mark.parametrize(

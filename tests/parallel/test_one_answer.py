@@ -3,7 +3,6 @@
 On one rank and on 2, 3, 4 and 7: every shipped case for some fifty steps, and a scene of everything in each form.
 """
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,7 +11,7 @@ import pytest
 from conoid.cases import layout, load
 from conoid.cases.outcome import Outcome, from_json
 
-from .launching import command, ended
+from .launching import command, ended, together
 
 RANKS = (2, 3, 4, 7)
 QUICK = (2, 3)
@@ -170,12 +169,8 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> Answers:
     def folder(ranks: int, name: str) -> Path:
         place = root / str(ranks)
         if not (place / name).exists():
-            place.mkdir(exist_ok=True)
             alike = SCENES if name in SCENES else sorted(SHORT)
-            (place / "runs.json").write_text(json.dumps([arguments(each, place) for each in alike]), encoding="utf-8")
-            program = Path(__file__).with_name("many.py")
-            finished = ended(command(ranks, str(place / "runs.json"), module=[str(program)]))
-            assert finished.returncode == 0, finished.stderr
+            together(ranks, place, [arguments(each, place) for each in alike])
         return place / name
 
     return folder

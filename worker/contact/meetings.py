@@ -226,12 +226,14 @@ def node_face(nodes, weights, normals, wanted, friction, pair, n, faces, size, o
 
 
 @njit("float64(float64[::1], float64[::1])", cache=True)
-def _dot(a, b):  # type: ignore[no-untyped-def]
+def dot(a, b):  # type: ignore[no-untyped-def]
+    """a . b of two vectors (3,)."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @njit("void(float64[::1], float64[::1], float64[::1])", cache=True)
-def _cross(out, a, b):  # type: ignore[no-untyped-def]
+def cross(out, a, b):  # type: ignore[no-untyped-def]
+    """``out`` (3,): a x b."""
     out[0], out[1], out[2] = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
@@ -245,14 +247,14 @@ def _sides(turned, u, x, v, edges, e, h):  # type: ignore[no-untyped-def]
     for k in range(3):
         turned[2, k] = x[c, k] - x[a, k] + h * (v[c, k] - v[a, k])
         turned[3, k] = x[d, k] - x[a, k] + h * (v[d, k] - v[a, k])
-    _cross(turned[0], u, turned[2])
-    _cross(turned[1], turned[3], u)
-    if not _dot(turned[0], turned[3]) < 0.0:
+    cross(turned[0], u, turned[2])
+    cross(turned[1], turned[3], u)
+    if not dot(turned[0], turned[3]) < 0.0:
         return 0.0
-    _cross(turned[2], turned[0], turned[1])
-    sense = np.sign(_dot(turned[2], u))
-    _cross(turned[2], u, turned[0])
-    _cross(turned[3], u, turned[1])
+    cross(turned[2], turned[0], turned[1])
+    sense = np.sign(dot(turned[2], u))
+    cross(turned[2], u, turned[0])
+    cross(turned[3], u, turned[1])
     return sense
 
 
@@ -260,7 +262,7 @@ def _sides(turned, u, x, v, edges, e, h):  # type: ignore[no-untyped-def]
 def _between(turned, sense, n, sign):  # type: ignore[no-untyped-def]
     """Whether ``sign`` n, square to a convex edge, points out between the normals of its two faces (``_sides``)."""
     along = sense * sign
-    return sense != 0.0 and along * _dot(turned[2], n) >= 0.0 and along * _dot(turned[3], n) <= 0.0
+    return sense != 0.0 and along * dot(turned[2], n) >= 0.0 and along * dot(turned[3], n) <= 0.0
 
 
 @njit(
@@ -306,7 +308,7 @@ def edge_edge(nodes, weights, normals, wanted, friction, pair, n, edges, size, p
             for k in range(3):
                 u[k], w[k] = u0[k] + share * (u[k] - u0[k]), w0[k] + share * (w[k] - w0[k])
                 r[k] = r0[k] + share * (r[k] - r0[k])
-        uu, uw, ww, ur, wr = _dot(u, u), _dot(u, w), _dot(w, w), _dot(u, r), _dot(w, r)
+        uu, uw, ww, ur, wr = dot(u, u), dot(u, w), dot(w, w), dot(u, r), dot(w, r)
         area = uu * ww - uw * uw
         if not area > _PARALLEL * _PARALLEL * uu * ww:
             continue
@@ -314,7 +316,7 @@ def edge_edge(nodes, weights, normals, wanted, friction, pair, n, edges, size, p
         if not (min(s, t) >= 0.0 and max(s, t) <= 1.0):
             continue
         h = share * dt
-        _cross(m, u, w)
+        cross(m, u, w)
         for k in range(3):
             m[k] /= np.sqrt(area)
         gap0, gap1 = _apart(m, x, v, a, b, c, d, s, t, 0.0), _apart(m, x, v, a, b, c, d, s, t, dt)

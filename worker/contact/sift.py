@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from ..state import Floats, Indices
-from .meetings import DEEP, DEEP_SELF
+from .meetings import DEEP, DEEP_SELF, cross, dot
 from .records import Crowd
 
 _V2, _N2 = "float64[:, ::1]", "int32[:, ::1]"
@@ -42,16 +42,6 @@ def _most(f):  # type: ignore[no-untyped-def]
     return max(f[0], f[1], f[2]) + 0.25 * abs(f[0] - 2.0 * f[1] + f[2])
 
 
-@njit("void(float64[::1], float64[::1], float64[::1])", cache=True)
-def _cross(out, a, b):  # type: ignore[no-untyped-def]
-    out[0], out[1], out[2] = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@njit("float64(float64[::1], float64[::1])", cache=True)
-def _dot(a, b):  # type: ignore[no-untyped-def]
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
 @njit(
     f"boolean[::1]({_N2}, {_N2}, float64[::1], {_V2}, {_V2}, int32[::1], float64, float64)",
     cache=True,
@@ -73,17 +63,17 @@ def _near_faces(pairs, faces, size, x, v, part, skin, horizon):  # type: ignore[
                 f[a] = x[k, a] + t * v[k, a] - x0
                 r[a] = x[s, a] + t * v[s, a] - x0
                 g[a] = f[a] - e[a]
-            _cross(n, e, f)
-            length = np.sqrt(_dot(n, n))
-            height[m] = _dot(n, r) / length
-            _cross(side, n, e)
-            off[0, m] = -_dot(side, r) / (length * np.sqrt(_dot(e, e)))
-            _cross(side, f, n)
-            off[1, m] = -_dot(side, r) / (length * np.sqrt(_dot(f, f)))
+            cross(n, e, f)
+            length = np.sqrt(dot(n, n))
+            height[m] = dot(n, r) / length
+            cross(side, n, e)
+            off[0, m] = -dot(side, r) / (length * np.sqrt(dot(e, e)))
+            cross(side, f, n)
+            off[1, m] = -dot(side, r) / (length * np.sqrt(dot(f, f)))
             for a in range(3):
                 r[a] -= e[a]
-            _cross(side, n, g)
-            off[2, m] = -_dot(side, r) / (length * np.sqrt(_dot(g, g)))
+            cross(side, n, g)
+            off[2, m] = -dot(side, r) / (length * np.sqrt(dot(g, g)))
         far = skin + (DEEP_SELF if part[s] == part[i] else DEEP) * size[face]
         kept[p] = not (
             _least(height) > far
@@ -110,11 +100,11 @@ def _near_edges(pairs, edges, size, x, v, skin, horizon):  # type: ignore[no-unt
                 x0 = x[a, i] + t * v[a, i]
                 z0 = x[c, i] + t * v[c, i]
                 u[i], w[i], r[i] = x[b, i] + t * v[b, i] - x0, x[d, i] + t * v[d, i] - z0, z0 - x0
-            _cross(n, u, w)
-            uu, uw, ww, ur, wr, area = _dot(u, u), _dot(u, w), _dot(w, w), _dot(u, r), _dot(w, r), _dot(n, n)
+            cross(n, u, w)
+            uu, uw, ww, ur, wr, area = dot(u, u), dot(u, w), dot(w, w), dot(u, r), dot(w, r), dot(n, n)
             sine = np.sqrt(area / (uu * ww))
             flat = min(flat, sine)
-            apart[m] = _dot(n, r) / np.sqrt(area)
+            apart[m] = dot(n, r) / np.sqrt(area)
             along[m], across[m] = (ww * ur - uw * wr) / area, (uw * ur - uu * wr) / area
             long, wide = max(long, 1.0 / (sine * np.sqrt(uu))), max(wide, 1.0 / (sine * np.sqrt(ww)))
         if not flat > _STEEPEST:

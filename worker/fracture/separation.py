@@ -13,7 +13,7 @@ import numpy as np
 from ..mesh.faces import FACES
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
-from ..state import PINNED, Copies, Flags, Indices, Ints, Model, extended
+from ..state import BROKEN, Copies, Flags, Indices, Ints, Model, extended
 from ..topology import Split, keys
 from . import stars
 from .stars import Stars
@@ -53,7 +53,6 @@ class Separation:
         every = self._number(mine)
         if not len(every):
             return None
-        self._open(rows, label, places, own)
         return self._separate(rows, label, places, own, leaving, mine, every)
 
     def _touched(self, broken: dict[int, Broken]) -> Ints:
@@ -61,7 +60,7 @@ class Separation:
         found = [np.zeros(0, np.int64)]
         for b, facets in broken.items():
             block = self._model.blocks[b]
-            block.bond[facets.places, facets.faces] = PINNED
+            block.bond[facets.places, facets.faces] = BROKEN
             found.append(block.tets[facets.places[:, None], FACES[facets.faces]].reshape(-1).astype(np.int64))
         nodes, mine = self._model.nodes, np.unique(np.concatenate(found))
         if self._comm.size == 1:
@@ -93,13 +92,13 @@ class Separation:
             where.append(place)
         mine, places = np.concatenate(tables), np.concatenate(where)
         own = np.arange(len(mine))
-        rows = self._with_others(mine, touched)
+        rows = self._with_others(mine)
         own = np.concatenate([own, np.full(len(rows) - len(mine), -1)])
         order = np.lexsort((rows[:, stars.TET], rows[:, stars.NODE]))
         rows = np.ascontiguousarray(rows[order])
         return rows, stars.pieces(rows), places, own[order]
 
-    def _with_others(self, mine: Ints, touched: Ints) -> Ints:
+    def _with_others(self, mine: Ints) -> Ints:
         """The rows of this rank's tets and those of the others' round shared nodes."""
         if self._comm.size == 1:
             return mine
@@ -120,13 +119,6 @@ class Separation:
         owned = nodes.owned[np.searchsorted(nodes.id, mine[:, 0])]
         every = np.concatenate(self._comm.share(mine[owned]))
         return every[np.lexsort((every[:, 1], every[:, 0]))]
-
-    def _open(self, rows: Ints, label: Ints, places: Ints, own: Ints) -> None:
-        for b in self._stars:
-            here = np.where(own >= 0, own, 0)
-            inside = (own >= 0) & (places[here, 2] == b) if len(places) else own >= 0
-            ours = np.where(inside, own, -1)
-            stars.lay_open(self._model.blocks[b].bond, rows, label, np.ascontiguousarray(places[:, :2]), ours)
 
     def _separate(
         self, rows: Ints, label: Ints, places: Ints, own: Ints, leaving: Flags, mine: Ints, every: Ints

@@ -10,15 +10,13 @@ import numpy as np
 from numba import njit
 
 from ..mesh.faces import FACES
-from ..state import CHUNK, INTACT, OPEN, PINNED, Indices, Tets, extended
+from ..state import CHUNK, INTACT, Indices, Tets, extended
 from ..state import MASS as MASS_ROW
 
 NODE, TET, RANK, MASS, BEHIND = 0, 1, 2, 3, 4
 """Columns of a row, one a node and tet of its star: global ids of the node and the tet, rank of the tet, bits of its
-mass, kg; and for the three faces that contain the node the id of the tet behind an intact one, ``_PINNED`` minus that
-of a tet behind a pinned one, -1 for others."""
+mass, kg; and for the three faces that contain the node the id of the tet behind an intact one, -1 for others."""
 COLUMNS = 7
-_PINNED = -2
 
 
 class Stars:
@@ -65,12 +63,8 @@ def describe(rows, places, nodes, first, count, pool, tets, ids, node_ids, state
             rows[r, MASS] = state[(e // CHUNK * columns + MASS_ROW) * CHUNK + e % CHUNK]
             for m in range(3):
                 k = FACES[corner, m]
-                behind = -1
-                if across[e, k] >= 0 and bond[e, k] == INTACT:
-                    behind = across[e, k] // 4
-                elif across[e, k] >= 0 and bond[e, k] == PINNED:
-                    behind = _PINNED - across[e, k] // 4
-                rows[r, BEHIND + m] = behind
+                held = across[e, k] >= 0 and bond[e, k] == INTACT
+                rows[r, BEHIND + m] = across[e, k] // 4 if held else -1
             r += 1
 
 
@@ -119,26 +113,3 @@ def pieces(rows):  # type: ignore[no-untyped-def]
     for i in range(n):
         label[i] = rows[_root(parent, i), TET]
     return label
-
-
-@njit("void(uint8[:, ::1], int64[:, ::1], int64[::1], int64[:, ::1], int64[::1])", cache=True)
-def lay_open(bond, rows, label, places, own):  # type: ignore[no-untyped-def]
-    """Opens pinned faces whose two sides lie in different pieces of a star.
-
-    ``own`` (r,): which of the ``places`` (m, 2) is that of the row's tet, -1 for one not of this block and rank.
-    """
-    begin = 0
-    while begin < len(rows):
-        end = begin
-        while end < len(rows) and rows[end, NODE] == rows[begin, NODE]:
-            end += 1
-        for i in range(begin, end):
-            if own[i] < 0:
-                continue
-            for m in range(3):
-                if rows[i, BEHIND + m] > _PINNED:
-                    continue
-                j = _row_of(rows, begin, end, _PINNED - rows[i, BEHIND + m])
-                if j < 0 or label[j] != label[i]:
-                    bond[places[own[i], 0], FACES[places[own[i], 1], m]] = OPEN
-        begin = end
