@@ -34,19 +34,21 @@ WORK = 9
 """Work of the stress so far, without the viscous part, J."""
 WORK_VISCOUS = 10
 """Work of the bulk viscosity so far, J."""
-VOLUME_FLUX = 11
+DISTORTION = 11
+"""Elastic energy of the deviatoric stress, J (materials without a strength)."""
+VOLUME_FLUX = 12
 """Rate of change of the volume at mid-step, m^3/s (averaged pressure forms)."""
-VOLUME_RATIO = 12
+VOLUME_RATIO = 13
 """Current over initial volume, by the dilatation that the pressure sees."""
-PLASTIC_STRAIN = 13
+PLASTIC_STRAIN = 14
 """Effective plastic strain."""
-WORK_PLASTIC = 14
+WORK_PLASTIC = 15
 """J."""
-YIELD = 15
+YIELD = 16
 """Flow stress at vanishing rate, Pa: below it no plastic flow."""
-FLOW = 16
+FLOW = 17
 """Flow stress of the last plastic step, Pa (the next one's first guess)."""
-TEMPERATURE = 17
+TEMPERATURE = 18
 """K."""
 
 

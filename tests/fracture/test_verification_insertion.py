@@ -5,14 +5,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import cumulative_simpson
 
 from conoid.cases import load
 from conoid.worker import simulation, step
 from conoid.worker.mesh.faces import FACES
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import CHUNK, PRESSURE, S_XX, S_YY, S_ZZ
+from conoid.worker.state import CHUNK, PRESSURE
 
+from ..worker import formulas
 from ..worker.kernels import run
 from ..worker.meshes import Floats
 
@@ -145,10 +147,13 @@ def pulse(peak: float, model: str, end: float) -> Simulation:
     sim = bar(low=0.0, high=LENGTH, wide=2 * LAYER, size=LAYER, end=end, model=model)
     nodes, block = sim.model.nodes, sim.model.blocks[0]
     nodes.v[:, 2] = peak / (DENSITY * C) * shape(nodes.x[:, 2])
-    stress = np.full(block.state.shape[0] * CHUNK, 0.0)
-    stress[: block.n] = -peak * shape(nodes.x[block.tets.astype(np.int64), 2].mean(axis=1))
-    for row, share in ((S_XX, -1.0), (S_YY, -1.0), (S_ZZ, 2.0), (PRESSURE, -1.0)):
-        block.state[:, row, :] = share / 3.0 * stress.reshape(-1, CHUNK)
+    fine = np.linspace(0.0, LENGTH, 8001)
+    moved = -peak / YOUNG * cumulative_simpson(shape(fine), x=fine, initial=0.0)
+    nodes.x[:, 2] += np.interp(nodes.x[:, 2], fine, moved)
+    stretch = formulas.gradients(nodes.x[block.tets])[0] / formulas.gradients(nodes.x0[block.tets])[0]
+    pressure = np.zeros(block.state.shape[0] * CHUNK)
+    pressure[: block.n] = -YOUNG / 3.0 * np.log(stretch)
+    block.state[:, PRESSURE, :] = pressure.reshape(-1, CHUNK)
     return sim
 
 

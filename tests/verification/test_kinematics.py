@@ -1,4 +1,4 @@
-"""V9 to V11: patch test, rigid rotation, simple shear."""
+"""V9 to V11: patch test, rigid rotation, simple shear; elastic materials and those with a strength, not reached."""
 
 from itertools import pairwise
 
@@ -10,6 +10,7 @@ from conoid.worker.state import PRESSURE, S_XX, S_XY, S_YY
 from ..worker import formulas
 from ..worker.kernels import FORMS, STEEL, Form, Patch
 from ..worker.meshes import Floats, block
+from ..worker.test_kinematics import HARD
 from .convergence import assert_converges
 
 YOUNG, SHEAR, BULK = 200e9, 200e9 / 2.6, 200e9 / 1.2
@@ -48,10 +49,10 @@ def test_patch_of_irregular_tets_has_uniform_stress(form: Form) -> None:
 
 
 def test_pure_stretch_gives_logarithmic_strain() -> None:
-    """V9: stretched along the axes, p = -K ln J and s = 2 G dev ln F, to second order in the step."""
+    """V9: stretched along the axes, p = -K ln J and s = 2 G dev ln F, to second order in the step; with a strength."""
     wrong = []
     for steps in (10, 20):
-        patch = Patch(MESH)
+        patch = Patch(MESH, HARD)
         carry(
             patch, [np.diag([1.0 + 0.3 * s, 1.0 - 0.1 * s, 1.0 + 0.05 * s]) for s in np.linspace(0.0, 1.0, steps + 1)]
         )
@@ -72,7 +73,7 @@ def test_a_hundred_turns_leave_no_stress(form: Form) -> None:
 
 def test_stress_turns_with_the_body() -> None:
     """V10: a stress along x stands along y after a quarter turn, and is back after 25 turns."""
-    patch = Patch(MESH)
+    patch = Patch(MESH, HARD)
     patch.put(S_XX, 2e8)
     patch.put(S_YY, -1e8)
     patch.put(S_XY, 0.5e8)
@@ -99,7 +100,7 @@ def test_a_gradient_at_the_start_of_the_step_would_strain_the_body() -> None:
 
 def shear_errors(steps: int) -> float:
     """Largest error of the stress on the way to a shear of 10, over G: s_xy = G sin, s_xx = -s_yy = G (1 - cos)."""
-    patch = Patch(MESH)
+    patch = Patch(MESH, HARD)
     worst = 0.0
     shear = np.linspace(0.0, 10.0, steps + 1)
     for old, new in pairwise(shear):
@@ -111,6 +112,15 @@ def shear_errors(steps: int) -> float:
 
 
 def test_simple_shear_follows_the_jaumann_rate() -> None:
-    """V11: to a shear of 10 the stress turns as the rate says; the error is the shear of one step, times G."""
+    """V11: to a shear of 10 the stress of a material with a strength turns as the rate says; the error is the shear of
+    one step, times G."""
     errors = [shear_errors(steps) for steps in (250, 500, 1000, 2000)]
     assert_converges("simple_shear", errors)
+
+
+def test_an_elastic_body_in_simple_shear_follows_its_potential() -> None:
+    """V11, elastic: s_xy = G g, to a shear of 10, in steps of any size; nothing turns it back."""
+    patch = Patch(MESH)
+    for g in (0.1, 1.0, 10.0):
+        carry(patch, [np.eye(3), np.array([[1.0, g, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])])
+        assert np.abs(patch.get(S_XY) / SHEAR - g).max() < 1e-12 * (1.0 + g**4)

@@ -36,6 +36,15 @@ def rotated(s: Floats, L: Floats, dt: float) -> Floats:
     return q @ s @ q.transpose(0, 2, 1)
 
 
+def hyperelastic(F: Floats, shear: float) -> tuple[Floats, Floats]:
+    """Deviatoric Cauchy stress G / 2J dev(b - b^-1), Pa, and its energy a volume, G/4 (tr b + tr b^-1 - 6), J/m^3."""
+    J = np.linalg.det(F)
+    b = J[:, None, None] ** (-2.0 / 3.0) * F @ F.transpose(0, 2, 1)
+    inverse = np.linalg.inv(b)
+    stress = 0.5 * shear / J[:, None, None] * deviator(b - inverse)
+    return stress, np.asarray(0.25 * shear * (np.trace(b + inverse, axis1=1, axis2=2) - 6.0))
+
+
 def mises(s: Floats) -> Floats:
     """sqrt(3/2 s : s)."""
     return np.asarray(np.sqrt(1.5 * (s * s).sum(axis=(1, 2))))

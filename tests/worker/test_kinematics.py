@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from conoid.worker.state import PRESSURE
+from conoid.cases.materials import LinearHardening, Material
+from conoid.worker.state import PRESSURE, WORK
 
 from . import formulas
 from .kernels import STEEL, Patch
@@ -11,12 +12,14 @@ from .meshes import Floats, block, free_tets
 
 BULK, SHEAR = 200e9 / (3 * (1 - 0.6)), 200e9 / 2.6
 """Of STEEL, Pa."""
+HARD = STEEL.model_copy(update={"strength": LinearHardening(model="linear_hardening", yield_stress=1e15)})
+"""Steel with a yield stress that nothing reaches: the hypoelastic law of materials with a strength."""
 DT = 1e-7
 
 
 def moving(seed: int, rate: float = 1e5) -> Patch:
     """Free tets at the end of a step of ``DT`` in random motion, all flying along."""
-    patch = Patch(free_tets(600, seed))
+    patch = Patch(free_tets(600, seed), HARD)
     random = np.random.default_rng(seed)
     patch.strain(random.normal(size=(600, 3, 3)) * rate, DT)
     flight = random.normal(size=3) * 100.0
@@ -59,7 +62,7 @@ def test_rotation_is_the_cayley_transform() -> None:
 @pytest.mark.parametrize("rate", [1e3, 1e6, 1e7])
 def test_rotation_changes_no_invariant(rate: float) -> None:
     """A rigid spin of up to a radian a step: s turns, its magnitude and determinant stay to round-off."""
-    patch = Patch(free_tets(300, 4))
+    patch = Patch(free_tets(300, 4), HARD)
     before = formulas.deviator(np.random.default_rng(5).normal(size=(300, 3, 3)) * 1e9)
     patch.deviator = before
     axis = np.array([0.36, 0.48, 0.8])
@@ -105,11 +108,22 @@ def test_forces_add_to_zero_as_integers() -> None:
     assert np.abs(patch.force - expected).max() < 1e-12 * np.abs(expected).max()
 
 
-def test_a_part_that_only_flies_has_no_stress() -> None:
-    """Velocities that are equal cancel exactly, whatever their size: not one bit of stress."""
-    patch = Patch(block((3, 3, 3), 1e-3), STEEL)
+@pytest.mark.parametrize("material", [STEEL, HARD], ids=["elastic", "strong"])
+def test_a_part_that_only_flies_has_no_stress(material: Material) -> None:
+    """Velocities that are equal cancel exactly; what is elastic feels the rounding of its positions, G eps x / h."""
+    patch = Patch(block((3, 3, 3), 1e-3), material)
     patch.nodes.v[:] = [1234.5, -678.9, 1e4]
     patch.nodes.x += 1e-8 * patch.nodes.v
     patch.advance(1e-8)
+    if material is HARD:
+        assert not patch.stress.any()
+        assert not patch.nodes.force.any()
+    assert np.abs(patch.stress).max() < 20.0 * SHEAR * np.finfo(float).eps * patch.nodes.x.max() / 1e-3
+
+
+def test_a_part_at_rest_has_no_stress() -> None:
+    """Not one bit, though the law of elastic materials starts from the shape."""
+    patch = Patch(block((3, 3, 3), 1e-3, shake=0.2), STEEL)
+    patch.advance(1e-8)
     assert not patch.stress.any()
-    assert not patch.nodes.force.any()
+    assert not patch.get(WORK).any()

@@ -27,8 +27,8 @@ _PUSH_OUT = 0.1
 """Largest share of a penetration that is taken back in a step, and of the speed of closing that is given back for it:
 less than an elastic impact returns, so that it makes no energy."""
 FACING = 0.1
-"""A node looks at a face when the cosine of the face's normal and its own mean one is below this, and when the
-cosines with the normals of its faces, their mean less their deviation, come below minus this."""
+"""A node looks at a face when the cosines of the face's normal and those of its own faces have a mean below this, and
+their mean less their deviation comes below minus this."""
 _PARALLEL = 0.05
 """Sine of the angle below which edges are left to nodes and faces."""
 
@@ -155,7 +155,7 @@ def _looks_at(out, s, m):  # type: ignore[no-untyped-def]
         square += out[s, 3 + a] * m[a] * m[a] + 2.0 * out[s, 6 + a] * m[b] * m[c]
     if length == 0.0:
         return True
-    return mean <= FACING * np.sqrt(length) and mean - np.sqrt(max(square - mean * mean, 0.0)) <= -FACING
+    return mean <= FACING and mean - np.sqrt(max(square - mean * mean, 0.0)) <= -FACING
 
 
 @njit(f"int64({_OUT}, int64, {_N2}, float64[::1], {_V2}, {_IN})", cache=True, error_model="numpy")

@@ -133,13 +133,14 @@ def _of_a_level(
 ) -> Indices:  # fmt: skip
     points, who, half = _samples(small.low, small.high, edge)
     bucketed = buckets.sort(points, edge)
+    who = who[bucketed.order].astype(np.int32)
+    boxes = np.hstack([small.low, -small.high])[who]
     out = np.empty((4 * len(who) + 1024, 2), np.int32)
     while True:
         mark = np.full(len(small_corners), -1, np.int32)
         n = _walk(
-            out, mark, small_corners, large_corners, small.low, small.high, large.low, large.high, half, part, allowed,
-            bucketed.codes, who[bucketed.order].astype(np.int32), bucketed.origin, bucketed.inverse, bucketed.shape,
-            small_rank, large_rank,
+            out, mark, small_corners, large_corners, boxes, large.low, large.high, half, part, allowed,
+            bucketed.codes, who, bucketed.origin, bucketed.inverse, bucketed.shape, small_rank, large_rank,
         )  # fmt: skip
         if n <= len(out):
             return out[:n]
@@ -165,7 +166,7 @@ def _meet(small, large, i, j):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    "int64(int32[:, ::1], int32[::1], int32[:, ::1], int32[:, ::1], float64[:, ::1], float64[:, ::1], "
+    "int64(int32[:, ::1], int32[::1], int32[:, ::1], int32[:, ::1], float64[:, ::1], "
     "float64[:, ::1], float64[:, ::1], float64[::1], int32[::1], boolean[:, ::1], int64[::1], int32[::1], "
     "float64[::1], float64, int64[::1], int64[::1], int64[::1])",
     cache=True,
@@ -175,8 +176,7 @@ def _walk(  # type: ignore[no-untyped-def]
     mark,
     small,
     large,
-    low,
-    high,
+    boxes,
     box_low,
     box_high,
     half,
@@ -192,7 +192,8 @@ def _walk(  # type: ignore[no-untyped-def]
 ):
     """Each large thing asks the buckets that its box touches, or all points where these are fewer than its rows.
 
-    Returns how many pairs there are, stored or not.
+    ``boxes`` (m, 6): of the thing that each sorted point belongs to, lowest corner and minus the highest. Returns how
+    many pairs there are, stored or not.
     """
     n = 0
     for j in range(len(large)):
@@ -210,19 +211,19 @@ def _walk(  # type: ignore[no-untyped-def]
                 row = shape[0] * (iy + shape[1] * iz)
                 at = 0 if every else first_at(codes, row + ix0)
                 while at < len(codes) and (every or codes[at] <= row + ix1):
-                    i = who[at]
+                    p = at
                     at += 1
+                    if boxes[p, 0] > box_high[j, 0] or boxes[p, 1] > box_high[j, 1] or boxes[p, 2] > box_high[j, 2]:
+                        continue
+                    if -boxes[p, 3] < box_low[j, 0] or -boxes[p, 4] < box_low[j, 1] or -boxes[p, 5] < box_low[j, 2]:
+                        continue
+                    i = who[p]
                     if mark[i] == j:
                         continue
                     mark[i] = j
                     if len(small_rank) > 0 and small_rank[i] >= large_rank[j]:
                         continue
-                    if not allowed[part[small[i, 0]], part[large[j, 0]]]:
-                        continue
-                    apart = False
-                    for k in range(3):
-                        apart |= low[i, k] > box_high[j, k] or high[i, k] < box_low[j, k]
-                    if apart or _meet(small, large, i, j):
+                    if not allowed[part[small[i, 0]], part[large[j, 0]]] or _meet(small, large, i, j):
                         continue
                     if n < len(out):
                         out[n, 0], out[n, 1] = i, j

@@ -125,9 +125,9 @@ class Elements:
     def _standard(self, block: Block, begin: int, end: int, dt: float, scale: float) -> None:
         nodes = self.model.nodes
         sweep.standard_pass(
-            nodes.x, nodes.v, nodes.force, block.tets, block.state.reshape(-1), block.params, self._w, self._wi,
-            self._bits, self.peaks, block.id, block.worn, block.life, block.hot, block.weakest, block.shear_weight,
-            block.kind, block.eos, block.state.shape[1], begin, end, dt, scale,
+            nodes.x0, nodes.x, nodes.v, nodes.force, block.tets, block.state.reshape(-1), block.params, self._w,
+            self._wi, self._bits, self.peaks, block.id, block.worn, block.life, block.hot, block.weakest,
+            block.shear_weight, block.kind, block.eos, block.state.shape[1], begin, end, dt, scale,
         )  # fmt: skip
 
     def _again(self, block: Block, begin: int, end: int, scale: float) -> None:
@@ -218,8 +218,9 @@ class AveragedElements(Elements):
     def _strains(self, block: Block, begin: int, end: int, dt: float) -> None:
         nodes = self.model.nodes
         sweep.strain_pass(
-            nodes.x, nodes.v, self._volumes, self._weight, self.pressure, self._projected, self.split, block.tets,
-            block.state.reshape(-1), block.params, self._w, block.kind, block.state.shape[1], begin, end, dt,
+            nodes.x0, nodes.x, nodes.v, self._volumes, self._weight, self.pressure, self._projected, self.split,
+            block.tets, block.state.reshape(-1), block.params, self._w, block.kind, block.state.shape[1], begin, end,
+            dt,
         )  # fmt: skip
 
     def _forces(self, block: Block, begin: int, end: int, dt: float, scale: float) -> None:

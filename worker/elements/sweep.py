@@ -16,6 +16,7 @@ from numba import njit
 from ..materials import models
 from ..materials.elastic import deviatoric_work, predict
 from ..materials.equation_of_state import linear, mie_gruneisen
+from ..materials.hyperelastic import hyperelastic, stiffen
 from ..materials.johnson_cook import johnson_cook
 from ..materials.mohr_coulomb import mohr_coulomb
 from ..materials.plastic import linear_hardening
@@ -34,16 +35,19 @@ _B1 = "boolean[::1]"
 
 @njit(f"void(int64, {_F1}, {_F1}, {_F1}, int64, float64)", cache=True, error_model="numpy")
 def deviatoric_stress(strength, w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """Rotation, elastic trial and plastic return of a chunk; books the work of the deviatoric stress.
+    """The deviatoric stress of a chunk, and its work: from the shape, or rotation, elastic trial and plastic return.
 
     With Mohr-Coulomb only the trial: ``return_at_pressure`` does the rest.
     """
-    predict(w, s, n, params[models.SHEAR], dt, strength == models.ELASTIC)
+    if strength == models.ELASTIC:
+        hyperelastic(w, s, params, n)
+        return
+    predict(w, s, n, params[models.SHEAR], dt)
     if strength == models.LINEAR_HARDENING:
         linear_hardening(w, s, params, n, dt)
     elif strength == models.JOHNSON_COOK:
         johnson_cook(w, s, params, n, dt)
-    if strength != models.ELASTIC and strength != models.MOHR_COULOMB:
+    if strength != models.MOHR_COULOMB:
         deviatoric_work(w, s, n, dt)
 
 
@@ -55,13 +59,15 @@ def return_at_pressure(strength, w, s, params, n, dt):  # type: ignore[no-untype
         deviatoric_work(w, s, n, dt)
 
 
-@njit(f"void(int64, {_F1}, {_F1}, {_F1}, int64, float64)", cache=True, error_model="numpy")
-def pressure_and_limit(eos, w, s, params, n, dt):  # type: ignore[no-untyped-def]
+@njit(f"void(int64, int64, {_F1}, {_F1}, {_F1}, int64, float64)", cache=True, error_model="numpy")
+def pressure_and_limit(strength, eos, w, s, params, n, dt):  # type: ignore[no-untyped-def]
     """Equation of state, bulk viscosity and stable step of a chunk."""
     if eos == models.MIE_GRUNEISEN:
         mie_gruneisen(w, s, params, n)
     else:
         linear(w, s, params, n)
+    if strength == models.ELASTIC:
+        stiffen(w, s, params, n)
     if params[models.Q_LINEAR] > 0.0 or params[models.Q_QUADRATIC] > 0.0:
         frequency = 1.0 / dt if dt > 0.0 else 0.0
         bulk_viscosity(w, s, n, params[models.Q_LINEAR], params[models.Q_QUADRATIC], frequency)
@@ -100,12 +106,13 @@ def sum_forces(force, pressure, gradient, split, t, s, w, wi, bits, peaks, ids, 
 
 
 @njit(
-    f"void({_F2}, {_F2}, {_I2}, {_T2}, {_F1}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, {_I1}, {_B1}, {_F1}, "
+    f"void({_F2}, {_F2}, {_F2}, {_I2}, {_T2}, {_F1}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, {_I1}, {_B1}, {_F1}, "
     f"uint8[::1], {_F1}, float64, int64, int64, int64, int64, int64, float64, float64)",
     cache=True,
     error_model="numpy",
 )
 def standard_pass(  # type: ignore[no-untyped-def]
+    x0,
     x,
     v,
     force,
@@ -138,10 +145,12 @@ def standard_pass(  # type: ignore[no-untyped-def]
         tet4.gather(w[tet4.EDGE :], x, t, n)
         tet4.gather(w[tet4.RATE :], v, t, n)
         tet4.kinematics(w, n, dt)
+        if strength == models.ELASTIC:
+            tet4.gather(w[tet4.REFERENCE :], x0, t, n)
         deviatoric_stress(strength, w, s, params, n, dt)
         tet4.end_gradients(w, n)
         averaged.own_strains(w, n, dt)
-        pressure_and_limit(eos, w, s, params, n, dt)
+        pressure_and_limit(strength, eos, w, s, params, n, dt)
         return_at_pressure(strength, w, s, params, n, dt)
         if len(worn) > 0:
             peaks[3] = max(peaks[3], mark_worn(worn[c * CHUNK : c * CHUNK + n], w, s, params, life, rows, n))
@@ -154,12 +163,14 @@ def standard_pass(  # type: ignore[no-untyped-def]
 
 
 @njit(
-    f"void({_F2}, {_F2}, {_I2}, {_F1}, {_F1}, {_F2}, boolean, {_T2}, {_F1}, {_F1}, {_F1}, "
+    f"void({_F2}, {_F2}, {_F2}, {_I2}, {_F1}, {_F1}, {_F2}, boolean, {_T2}, {_F1}, {_F1}, {_F1}, "
     "int64, int64, int64, int64, float64)",
     cache=True,
     error_model="numpy",
 )
-def strain_pass(x, v, sums, weight, pressure, projected, split, tets, state, params, w, strength, rows, begin, end, dt):  # type: ignore[no-untyped-def]
+def strain_pass(  # type: ignore[no-untyped-def]
+    x0, x, v, sums, weight, pressure, projected, split, tets, state, params, w, strength, rows, begin, end, dt
+):
     """Deviatoric stress at n+1, and the nodal sums of volume change; with ``split``, stabilised."""
     for c in range(begin, end):
         t = tets[c * CHUNK : (c + 1) * CHUNK]
@@ -168,6 +179,8 @@ def strain_pass(x, v, sums, weight, pressure, projected, split, tets, state, par
         tet4.gather(w[tet4.EDGE :], x, t, n)
         tet4.gather(w[tet4.RATE :], v, t, n)
         tet4.kinematics(w, n, dt)
+        if strength == models.ELASTIC:
+            tet4.gather(w[tet4.REFERENCE :], x0, t, n)
         if strength != models.MOHR_COULOMB:
             deviatoric_stress(strength, w, s, params, n, dt)
         averaged.keep_flux(w, s, n)
@@ -228,7 +241,7 @@ def force_pass(  # type: ignore[no-untyped-def]
         tet4.end_gradients(w, n)
         averaged.gather_strains(w, strain, t, n)
         averaged.recall_flux(w, s, n, dt)
-        pressure_and_limit(eos, w, s, params, n, dt)
+        pressure_and_limit(strength, eos, w, s, params, n, dt)
         return_at_pressure(strength, w, s, params, n, dt)
         if len(worn) > 0:
             peaks[3] = max(peaks[3], mark_worn(worn[c * CHUNK : c * CHUNK + n], w, s, params, life, rows, n))

@@ -31,7 +31,8 @@ from ..state import (
 )
 
 # Rows of the scratch, in numbers of float64. EDGE holds e1, e2, e3 and later b1, b2, b3 at the end of the step;
-# RATE holds the velocity differences, then the rate of deformation and the spin.
+# RATE holds the velocity differences, then the rate of deformation and the spin; REFERENCE the edges of the undeformed
+# tet.
 EDGE = 0
 RATE = 9 * CHUNK
 D_XX, D_YY, D_ZZ, D_YZ, D_ZX, D_XY = (RATE + k * CHUNK for k in range(6))
@@ -46,7 +47,8 @@ TRIAL = 24 * CHUNK
 SEEN = 25 * CHUNK
 CHANGE = 26 * CHUNK
 NODAL = 27 * CHUNK
-SCRATCH = 40 * CHUNK
+REFERENCE = 40 * CHUNK
+SCRATCH = 49 * CHUNK
 
 _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
@@ -63,7 +65,8 @@ MAGNITUDE = 0x7FFFFFFFFFFFFFFF
 def gather(rows, values, tets, n):  # type: ignore[no-untyped-def]
     """Nine rows: the differences of nodes 1, 2, 3 to node 0 in nodal ``values`` (nodes, 3).
 
-    With x and the rows from EDGE on the edges, with v and those from RATE on the velocity differences.
+    With x and the rows from EDGE on the edges, with x0 and those from REFERENCE on the edges of the undeformed tet,
+    with v and those from RATE on the velocity differences.
     """
     first, second, third = rows, rows[3 * CHUNK :], rows[6 * CHUNK :]
     for i in range(n):

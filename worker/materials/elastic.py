@@ -1,4 +1,4 @@
-"""Hypoelastic deviatoric stress with the exact rotation update: the trial stress of every material."""
+"""Hypoelastic deviatoric stress with the exact rotation update: the trial stress of materials with a strength."""
 
 from numba import njit
 
@@ -11,17 +11,16 @@ _WORK = WORK * CHUNK
 _THIRD = 1.0 / 3.0
 
 
-@njit("void(float64[::1], float64[::1], int64, float64, float64, boolean)", cache=True, error_model="numpy")
-def predict(w, s, n, shear, dt, final):  # type: ignore[no-untyped-def]
+@njit("void(float64[::1], float64[::1], int64, float64, float64)", cache=True, error_model="numpy")
+def predict(w, s, n, shear, dt):  # type: ignore[no-untyped-def]
     """Rotates the deviatoric stress, adds 2 G dt dev D, and books its work: the trial stress.
 
     s becomes Q s Q^T with Q = (I - W dt/2)^-1 (I + W dt/2), a rotation to round-off (Hughes and Winget 1980); in closed
     form, with a the axial vector of W dt/2, Q = I + 2 (A + A^2) / (1 + a.a). The work is V s : D over the step by the
-    trapezoidal rule, dt V (s + G dt dev D) : D if the trial stress is ``final``. If not, only the half of the rotated
-    stress is booked, and ``deviatoric_work`` adds the other once the new stress is known.
+    trapezoidal rule; here the half of the rotated stress is booked, and ``deviatoric_work`` adds the other once the new
+    stress is known.
     """
     twice_shear_dt = 2.0 * shear * dt
-    rotated, added = (1.0, shear * dt) if final else (0.5, 0.0)
     for i in range(n):
         ax, ay, az = w[SPIN + i], w[SPIN + CHUNK + i], w[SPIN + 2 * CHUNK + i]
         f = 2.0 / (1.0 + ax * ax + ay * ay + az * az)
@@ -50,8 +49,7 @@ def predict(w, s, n, shear, dt, final):  # type: ignore[no-untyped-def]
         dxx, dyy, dzz = w[D_XX + i] - mean, w[D_YY + i] - mean, w[D_ZZ + i] - mean
         dyz, dzx, dxy = w[D_YZ + i], w[D_ZX + i], w[D_XY + i]
         power = sxx * dxx + syy * dyy + szz * dzz + 2.0 * (syz * dyz + szx * dzx + sxy * dxy)
-        square = dxx * dxx + dyy * dyy + dzz * dzz + 2.0 * (dyz * dyz + dzx * dzx + dxy * dxy)
-        s[_WORK + i] += dt * w[VOLUME_MID + i] * (rotated * power + added * square)
+        s[_WORK + i] += 0.5 * dt * w[VOLUME_MID + i] * power
         s[_SXX + i], s[_SYY + i], s[_SZZ + i] = (
             sxx + twice_shear_dt * dxx,
             syy + twice_shear_dt * dyy,

@@ -105,7 +105,7 @@ def rows_of(material: Material, pressure: str) -> int:
         return state.YIELD + 1
     if eos == MIE_GRUNEISEN:
         return state.VOLUME_RATIO + 1
-    return state.WORK_VISCOUS + 1 if pressure == "standard" else state.VOLUME_FLUX + 1
+    return state.DISTORTION + 1 if pressure == "standard" else state.VOLUME_FLUX + 1
 
 
 def initial_yield(material: Material, temperature: float) -> float:
