@@ -187,7 +187,7 @@ class Contact(Model):
     """What becomes of bodies that overlap at the start: an error, or they are moved apart without a stress."""
     sweeps: Annotated[Count, Field(ge=1, le=1000)] = 5
     """Jacobi sweeps over the meetings of a step."""
-    skin: Annotated[Ratio, Positive] = 0.25
+    skin: Annotated[Ratio, Positive] = 0.4
     """Of the (harmonic) mean face size: how far a node may stray from free flight before the next search, twice."""
     domain: Literal["arbitrary", "box"] = "arbitrary"
     """How a rank finds the faces that others must see: by occupied cells, or by bounding boxes."""

@@ -232,7 +232,9 @@ def test_position_codes_find_every_point_of_a_bucket(spread: float) -> None:
     index = np.minimum(index, sorted_points.shape - 1)
     code = index[:, 0] + sorted_points.shape[0] * (index[:, 1] + sorted_points.shape[1] * index[:, 2])
     assert (code[sorted_points.order] == sorted_points.codes).all()
+    assert len(sorted_points.rows) > 0
     for wanted in code[:50]:
-        first = buckets.first_at(sorted_points.codes, wanted)
-        last = buckets.first_at(sorted_points.codes, wanted + 1)
+        row = wanted // sorted_points.shape[0]
+        first = buckets.first_at(sorted_points.codes, sorted_points.rows, row, wanted)
+        last = buckets.first_at(sorted_points.codes, sorted_points.rows, row, wanted + 1)
         assert set(sorted_points.order[first:last].tolist()) == set(np.flatnonzero(code == wanted).tolist())

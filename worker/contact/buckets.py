@@ -14,6 +14,8 @@ from ..state import Floats, Ints
 
 _MOST = 2.0**20
 """Buckets along an axis: codes of three stay far below 2^63."""
+_ROWS = 4
+"""Rows of buckets to a point, at most, that are worth a table."""
 
 
 @dataclass
@@ -27,6 +29,8 @@ class Buckets:
     """(3,) buckets along each axis."""
     codes: Ints
     order: Ints
+    rows: Ints
+    """Where each row of buckets along the first axis begins in ``codes``, and the end; empty if too many have none."""
 
 
 def sort(points: Floats, edge: float) -> Buckets:
@@ -36,7 +40,9 @@ def sort(points: Floats, edge: float) -> Buckets:
     shape = np.floor((high - low) / edge).astype(np.int64) + 1
     codes = position_codes(points, low, 1.0 / edge, shape)
     order = np.argsort(codes, kind="stable")
-    return Buckets(low, 1.0 / edge, shape, codes[order], order)
+    codes, rows = codes[order], int(shape[1] * shape[2])
+    starts = np.arange(rows + 1 if rows <= _ROWS * len(codes) else 0) * shape[0]
+    return Buckets(low, 1.0 / edge, shape, codes, order, np.searchsorted(codes, starts))
 
 
 def grid(counts: Ints) -> tuple[Ints, Ints]:
@@ -69,10 +75,12 @@ def position_codes(points, origin, inverse, shape):  # type: ignore[no-untyped-d
     return codes
 
 
-@njit("int64(int64[::1], int64)", cache=True)
-def first_at(codes, code):  # type: ignore[no-untyped-def]
-    """Index of the first of the sorted codes that is not below ``code``."""
+@njit("int64(int64[::1], int64[::1], int64, int64)", cache=True)
+def first_at(codes, rows, row, code):  # type: ignore[no-untyped-def]
+    """Index of the first of the sorted codes that is not below ``code``, which lies in ``row``."""
     low, high = 0, len(codes)
+    if len(rows) > 0:
+        low, high = rows[row], rows[row + 1]
     while low < high:
         middle = (low + high) // 2
         if codes[middle] < code:

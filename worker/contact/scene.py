@@ -11,7 +11,7 @@ from ..parallel.ownership import Neighbour, SharedSum
 from ..state import Flags, Floats, Indices, Ints, Nodes
 from . import domain, ghosts, search, sift
 from .ghosts import Copies
-from .meetings import DEEP, Meetings
+from .meetings import DEEP, DEEP_SELF, Meetings
 from .records import Crowd, Edges, Faces, merged
 from .search import Boxes, Things
 
@@ -53,16 +53,15 @@ class Sides:
         """(f, 4)."""
         return self.crowd.places(self.faces.nodes)
 
-    @cached_property
-    def face_things(self) -> Things:
-        """The faces, to be searched."""
-        return Things(np.ascontiguousarray(self.face_places[:, :3]), 0.5 * self.skin + DEEP * self.faces.size)
+    def face_things(self, deep: float) -> Things:
+        """The faces, to be searched by nodes as ``deep`` below them, of their size."""
+        return Things(np.ascontiguousarray(self.face_places[:, :3]), 0.5 * self.skin + deep * self.faces.size)
 
     @cached_property
     def edge_things(self) -> Things:
         """The edges, to be searched."""
         places = self.crowd.places(np.ascontiguousarray(self.edges.nodes[:, :2]))
-        return Things(places, 0.5 * self.skin + 0.5 * DEEP * self.edges.size)
+        return Things(places, 0.5 * self.skin + 0.5 * DEEP_SELF * self.edges.size)
 
 
 @dataclass
@@ -185,7 +184,7 @@ def _with_ghosts(sides: Sides, rules: Rules, horizon: float, drift: Floats, comm
     def boxes(things: Things) -> Boxes:
         return search.swept(things, crowd.x, crowd.v - drift, horizon)
 
-    nodes, faces, edges = boxes(sides.nodes), boxes(sides.face_things), boxes(sides.edge_things)
+    nodes, faces, edges = boxes(sides.nodes), boxes(sides.face_things(DEEP)), boxes(sides.edge_things)
     askers = Boxes(np.concatenate([nodes.low, edges.low]), np.concatenate([nodes.high, edges.high]))
     chosen = domain.choose(rules.domain, askers, [faces, edges], rules.cell, comm)
     parcels = {rank: (sides.faces.take(flags[0]), sides.edges.take(flags[1])) for rank, flags in chosen.items()}
@@ -210,7 +209,12 @@ def _joined(sides: Sides, others: list[tuple[Faces, Edges, Crowd]]) -> Sides:
 def _node_face(seen: Sides, rules: Rules, horizon: float) -> Indices:
     """(p, 2) place of a node and index of a face, sorted by node, then by face."""
     crowd, slaves = seen.crowd, seen.nodes
-    pairs = search.find(slaves, seen.face_things, crowd.x, crowd.v, crowd.part, rules.allowed, horizon, None)
+    own = np.eye(len(rules.allowed), dtype=bool)
+    found = [
+        search.find(slaves, seen.face_things(deep), crowd.x, crowd.v, crowd.part, rules.allowed & which, horizon, None)
+        for deep, which in ((DEEP_SELF, own), (DEEP, ~own))
+    ]
+    pairs = np.concatenate(found)
     pairs = np.column_stack([slaves.corners[pairs[:, 0], 0], pairs[:, 1]])
     pairs = sift.faces(pairs, seen.face_places, seen.faces.size, crowd, seen.skin, horizon)
     return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]

@@ -14,8 +14,10 @@ from ..state import Flags, Floats, Indices, Ints
 from . import buckets
 from .buckets import bucket_of, first_at
 
+_SAMPLE, _BUCKET = 1.5, 0.5
+"""Largest distance of the points of a small thing, and edge of a bucket, of the median extent of the large things."""
 _FILLED = 4.0
-"""Buckets along an axis that a small thing may fill."""
+"""Points along an axis that a small thing may have."""
 
 
 @dataclass
@@ -112,8 +114,8 @@ def _pairs(
     small: Boxes, large: Boxes, small_corners: Indices, large_corners: Indices, part: Indices, allowed: Flags,
     small_rank: Ints, large_rank: Ints,
 ) -> Indices:  # fmt: skip
-    """Small things of like size together, in buckets twice as large for each level: none fills more than a few."""
-    edge = 1.5 * float(np.median((large.high - large.low).max(axis=1)))
+    """Small things of like size together, in buckets twice as large for each level: none has more than a few points."""
+    edge = _SAMPLE * float(np.median((large.high - large.low).max(axis=1)))
     extent = (small.high - small.low).max(axis=1)
     level = np.maximum(np.ceil(np.log2(np.maximum(extent / (_FILLED * edge), 1.0))), 0.0).astype(np.int64)
     found = []
@@ -132,7 +134,7 @@ def _of_a_level(
     small_rank: Ints, large_rank: Ints, edge: float,
 ) -> Indices:  # fmt: skip
     points, who, half = _samples(small.low, small.high, edge)
-    bucketed = buckets.sort(points, edge)
+    bucketed = buckets.sort(points, _BUCKET / _SAMPLE * edge)
     who = who[bucketed.order].astype(np.int32)
     boxes = np.hstack([small.low, -small.high])[who]
     out = np.empty((4 * len(who) + 1024, 2), np.int32)
@@ -140,7 +142,8 @@ def _of_a_level(
         mark = np.full(len(small_corners), -1, np.int32)
         n = _walk(
             out, mark, small_corners, large_corners, boxes, large.low, large.high, half, part, allowed,
-            bucketed.codes, who, bucketed.origin, bucketed.inverse, bucketed.shape, small_rank, large_rank,
+            bucketed.codes, bucketed.rows, who, bucketed.origin, bucketed.inverse, bucketed.shape, small_rank,
+            large_rank,
         )  # fmt: skip
         if n <= len(out):
             return out[:n]
@@ -167,8 +170,8 @@ def _meet(small, large, i, j):  # type: ignore[no-untyped-def]
 
 @njit(
     "int64(int32[:, ::1], int32[::1], int32[:, ::1], int32[:, ::1], float64[:, ::1], "
-    "float64[:, ::1], float64[:, ::1], float64[::1], int32[::1], boolean[:, ::1], int64[::1], int32[::1], "
-    "float64[::1], float64, int64[::1], int64[::1], int64[::1])",
+    "float64[:, ::1], float64[:, ::1], float64[::1], int32[::1], boolean[:, ::1], int64[::1], int64[::1], "
+    "int32[::1], float64[::1], float64, int64[::1], int64[::1], int64[::1])",
     cache=True,
 )
 def _walk(  # type: ignore[no-untyped-def]
@@ -183,6 +186,7 @@ def _walk(  # type: ignore[no-untyped-def]
     part,
     allowed,
     codes,
+    rows,
     who,
     origin,
     inverse,
@@ -209,7 +213,7 @@ def _walk(  # type: ignore[no-untyped-def]
         for iz in range(iz0, iz1 + 1):
             for iy in range(iy0, iy1 + 1):
                 row = shape[0] * (iy + shape[1] * iz)
-                at = 0 if every else first_at(codes, row + ix0)
+                at = 0 if every else first_at(codes, rows, iy + shape[1] * iz, row + ix0)
                 while at < len(codes) and (every or codes[at] <= row + ix1):
                     p = at
                     at += 1
