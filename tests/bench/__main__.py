@@ -17,6 +17,7 @@ from . import (
     accuracy,
     axisymmetric,
     contact_cost,
+    cracks,
     fracture_cost,
     gates,
     growth,
@@ -163,6 +164,12 @@ def _fracture(extent: Extent, book: Book) -> None:
     book.add("Fracture", fracture_cost.report(cost, bars), data, gates.of_fracture(cost, bars))
 
 
+def _cracks(extent: Extent, book: Book) -> None:
+    if extent is not QUICK:
+        runs = list(cracks.measure([*cracks.PLATES, *cracks.SIBLINGS, *cracks.STRIPS, *cracks.BARS]))
+        book.add("Cracks", cracks.report(runs), cracks.as_data(runs))
+
+
 def _long_rod(extent: Extent, book: Book) -> None:
     shots = []
     for shot in long_rod.measure(extent.shots):
@@ -177,7 +184,8 @@ def _long_rod(extent: Extent, book: Book) -> None:
 
 PARTS: dict[str, Callable[[Extent, Book], None]] = {
     "speed": _speed, "akantu": _akantu, "taylor": _taylor, "growth": _growth, "startup": _startup,
-    "accuracy": _accuracy, "telemetry": _telemetry, "contact": _contact, "fracture": _fracture, "long_rod": _long_rod,
+    "accuracy": _accuracy, "telemetry": _telemetry, "contact": _contact, "fracture": _fracture, "cracks": _cracks,
+    "long_rod": _long_rod,
 }  # fmt: skip
 
 

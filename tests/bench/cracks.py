@@ -1,0 +1,471 @@
+"""Cracks that run: when they start and branch, how fast they are, what they take, on one mesh and on others.
+
+A facet counts from when it carries nothing any more, not from when it breaks: between the two lies the cohesive zone.
+"""
+
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+from unittest.mock import patch
+
+import numpy as np
+
+from conoid.cases import load
+from conoid.cases.bodies import Box, Plate
+from conoid.cases.geometry import bounds
+from conoid.cases.materials import Material
+from conoid.cases.messages import Energy
+from conoid.cases.schema import Case
+from conoid.worker import domain, simulation, step
+from conoid.worker.fracture import fragments
+from conoid.worker.materials.models import DENSITY
+from conoid.worker.mesh import build
+from conoid.worker.mesh.faces import FACES, areas
+from conoid.worker.mesh.model import TetMesh, step_lengths
+from conoid.worker.parallel.comm import SerialComm
+from conoid.worker.simulation import Simulation
+from conoid.worker.state import INTACT, MASS, Floats, Ints
+
+from .table import Cell, table
+
+Generator = Literal["structured", "gmsh"]
+_LOOK = 0.25e-6
+"""s between two looks at a crack."""
+_SPAN = 12.0
+"""Elements that the crack passes while its speed is fitted: where a facet ahead is open first the tip moves on by two at
+once, a sixth of that."""
+_GAP = 3.0
+"""Elements of solid between two branches, at least."""
+_MOVED = 0.2
+"""Of the element: how far each coordinate of a node is moved at most."""
+_FLAT = 0.6
+"""Of the mean step length: what a tet keeps when its nodes are moved."""
+
+STRIP = """
+name = "strip"
+[materials.glass]
+density = 2450
+elastic = { young = 32e9, poisson = 0.2 }
+brittle = { strength = 7e6, energy = 3 }
+[[parts]]
+name = "strip"
+material = "glass"
+stretch = { rate = [0, 6, 0] }
+fracture = { model = "cohesive", delay = 0 }
+[parts.mesh]
+shape = "plate"
+base = ["20 mm", 0, 0]
+width = "40 mm"
+height = "20 mm"
+thickness = "0.5 mm"
+generator = "structured"
+element_size = "0.5 mm"
+slit = { axis = "y", at = 0, low = [0, 0], high = ["1 mm", "10 mm"] }
+[[boundaries]]
+kind = "velocity"
+low = [-1, "9.9 mm", -1]
+high = [1, 1, 1]
+y = 0.06
+[[boundaries]]
+kind = "velocity"
+low = [-1, -1, -1]
+high = [1, "-9.9 mm", 1]
+y = -0.06
+[numerics]
+pressure = "standard"
+[run]
+end_time = "34 us"
+frames = 0
+"""
+"""A strip that is pulled evenly: what a long crack would release, E' strain^2 H / 2, passes G_c after 16 us and is four
+times that after 31 us."""
+
+BAR = """
+name = "bar"
+[materials.ceramic]
+density = 2750
+elastic = { young = 275e9, poisson = 0 }
+brittle = { strength = 300e6, energy = 100, scatter = { modulus = 100 } }
+[[parts]]
+name = "bar"
+material = "ceramic"
+stretch = { rate = [35703, 0, 0] }
+fracture = { model = "cohesive", delay = 0 }
+[parts.mesh]
+shape = "box"
+low = [-1.528e-3, 0, 0]
+high = [1.528e-3, 7.64e-5, 7.64e-5]
+generator = "structured"
+element_size = 7.64e-5
+[[boundaries]]
+kind = "velocity"
+low = [-1, -1, -1]
+high = [-1.527e-3, 1, 1]
+x = -54.55
+[[boundaries]]
+kind = "velocity"
+low = [1.527e-3, -1, -1]
+high = [1, 1, 1]
+x = 54.55
+[numerics]
+pressure = "standard"
+dt_safety = 0.15
+[run]
+end_time = 3.67e-7
+frames = 0
+"""
+"""The ceramic bar of the stretched-bar study, 10 s_0 long and s_0 / 4 wide, at rate_0 for 12 t_0."""
+
+
+def rayleigh(made: Material) -> float:
+    """Speed of surface waves, m/s: the root below 1 of z^3 - 8 z^2 + 8 (3 - 2 k) z - 16 (1 - k), z = (c / c_s)^2,
+    k = (c_s / c_p)^2."""
+    poisson = made.elastic.poisson
+    k = (1.0 - 2.0 * poisson) / (2.0 - 2.0 * poisson)
+    roots = np.roots([1.0, -8.0, 8.0 * (3.0 - 2.0 * k), -16.0 * (1.0 - k)])
+    z = min(float(r.real) for r in roots if abs(r.imag) < 1e-9)
+    return float(np.sqrt(z * made.elastic.young / (2.0 * (1.0 + poisson) * made.density)))
+
+
+def slit(mesh: TetMesh, length: float) -> TetMesh:
+    """The mesh with a slit along the facets that lie closest to y = 0, up to x = ``length``, m: its tip holds."""
+    behind = mesh.points[mesh.tets, 1].mean(axis=1) > 0.0
+    sides = np.zeros((2, len(mesh.points)), bool)
+    for side in (0, 1):
+        sides[side, mesh.tets[behind == side]] = True
+    nodes = np.flatnonzero(sides.all(axis=0) & (mesh.points[:, 0] < length * (1.0 - 1e-9)))
+    copies = np.arange(len(mesh.points), dtype=np.int32)
+    copies[nodes] = len(mesh.points) + np.arange(len(nodes))
+    points = np.concatenate([mesh.points, mesh.points[nodes]])
+    return TetMesh(points, np.where(behind[:, None], copies[mesh.tets], mesh.tets))
+
+
+def perturbed(mesh: TetMesh, size: float, seed: int) -> TetMesh:
+    """Each coordinate of the nodes inside moved at random by up to _MOVED of ``size``, m; less where tets get flat."""
+    points, low, high = mesh.points, mesh.points.min(axis=0), mesh.points.max(axis=0)
+    least = min(_FLAT * float(mesh.step_lengths().mean()), float(mesh.step_lengths().min()))
+    move = np.random.default_rng(seed).uniform(-_MOVED * size, _MOVED * size, points.shape)
+    near = 1e-6 * size
+    move[(points < low + near) | (points > high - near)] = 0.0
+    while (flat := step_lengths(points + move, mesh.tets) < least).any():
+        move[mesh.tets[flat]] *= 0.5
+    return TetMesh(points + move, mesh.tets)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A case, the element size, m, and the mesh: moved at random when there is a ``seed``."""
+
+    case: str
+    size: float
+    generator: Generator = "structured"
+    seed: int | None = None
+    words: tuple[str, ...] = ()
+    """Overrides of the case."""
+
+    @property
+    def name(self) -> str:
+        """For tables."""
+        kind = self.generator + (f", moved ({self.seed})" if self.seed is not None else "")
+        return f"{kind}, {1e3 * self.size:.2g} mm"
+
+
+def prepared(plan: Plan) -> tuple[Case, TetMesh]:
+    """The case, and its mesh with the slit. A plate is one element thick."""
+    shipped = {"strip": STRIP, "bar": BAR}
+    data = load.toml_data(shipped[plan.case]) if plan.case in shipped else load.read_data(load.shipped_path(plan.case))
+    words = ["run.frames=0", f"parts[0].mesh.element_size={plan.size}", *plan.words]
+    if data["parts"][0]["mesh"]["shape"] == "plate":
+        words.append(f"parts[0].mesh.thickness={plan.size}")
+    case = load.parse_case(load.apply_overrides(data, words))
+    body = case.parts[0].mesh
+    assert isinstance(body, Box | Plate)
+    mesh = build.build(body.model_copy(update={"generator": plan.generator, "slit": None}), Path())
+    if plan.seed is not None:
+        mesh = perturbed(mesh, plan.size, plan.seed)
+    return case, slit(mesh, body.slit.high[1]) if body.slit is not None else mesh
+
+
+def open_facets(sim: Simulation) -> tuple[Ints, Floats, Floats]:
+    """(m,) ids, (m, 3) initial centres, m, and (m,) initial areas, m^2, of the facets that carry nothing any more."""
+    assert sim.fracture is not None
+    assert sim.fracture.cohesion is not None
+    held, x0 = sim.fracture.cohesion.facets.tets, sim.model.nodes.x0
+    (block,) = sim.model.blocks
+    own = 4 * block.id[:, None] + np.arange(4)
+    place, face = np.nonzero((block.bond != INTACT) & (own < block.across))
+    pairs = np.sort(np.column_stack([block.id[place], block.across[place, face] // 4]), axis=1)
+    key = np.int64(sim.model.elements_global)
+    free = ~np.isin(pairs[:, 0] * key + pairs[:, 1], held.min(axis=1) * key + held.max(axis=1))
+    place, face = place[free], face[free]
+    corners = np.sort(block.tets[place[:, None], FACES[face]].astype(np.int32), axis=1)
+    return own[place, face], x0[corners].mean(axis=1), areas(x0, corners)
+
+
+@dataclass
+class Crack:
+    """The open facets of a run in the order in which they opened, and the ledger."""
+
+    size: float
+    """Of the elements, m."""
+    begin: float
+    end: float
+    """x of the slit's tip and of the far edge, m."""
+    id: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    centre: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    area: Floats = field(default_factory=lambda: np.zeros(0))
+    time: Floats = field(default_factory=lambda: np.zeros(0))
+    broken: float = np.nan
+    """When the first facet broke, s."""
+
+    def look(self, sim: Simulation) -> None:
+        """Takes up the facets that are open since the last look."""
+        assert sim.fracture is not None
+        if not sim.fracture.broken:
+            return
+        if np.isnan(self.broken):
+            self.broken = sim.clock.t
+        ids, centres, sizes = open_facets(sim)
+        new = ~np.isin(ids, self.id)
+        self.id, self.centre = np.concatenate([self.id, ids[new]]), np.concatenate([self.centre, centres[new]])
+        self.area = np.concatenate([self.area, sizes[new]])
+        self.time = np.concatenate([self.time, np.full(int(new.sum()), sim.clock.t)])
+
+    @property
+    def start(self) -> float:
+        """When the first facet was open, s; NaN if none is."""
+        return float(self.time.min()) if len(self.time) else np.nan
+
+    def front(self) -> tuple[Floats, Floats]:
+        """Times, s, and x, m, of the tip whenever it has moved on; it begins at the slit's tip."""
+        order = np.lexsort((-self.centre[:, 0], self.time))
+        x = self.centre[order, 0]
+        ahead = x > np.concatenate([[self.begin], np.maximum.accumulate(x)[:-1]])
+        return self.time[order][ahead], x[ahead]
+
+    def passed(self, x: float) -> float:
+        """When the tip passed ``x``, s; NaN if it has not."""
+        times, tip = self.front()
+        return float(times[tip >= x][0]) if (tip >= x).any() else np.nan
+
+    def speeds(self) -> tuple[Floats, Floats]:
+        """x, m, and speed along x, m/s: straight lines through _SPAN elements of the course of the tip."""
+        times, tip = self.front()
+        where, speed = [], []
+        for first in tip:
+            some = (tip >= first) & (tip <= first + _SPAN * self.size)
+            if np.ptp(tip[some]) > 0.75 * _SPAN * self.size:
+                t = times[some] - times[some].mean()
+                where.append(float(tip[some].mean()))
+                speed.append(float((t @ (tip[some] - tip[some].mean())) / (t @ t)))
+        return np.array(where), np.array(speed)
+
+    def branches(self) -> tuple[Floats, list[Floats]]:
+        """(bins,) x, m, and the y of each branch there: open facets with _GAP elements of solid between them."""
+        step = 2.0 * self.size
+        edges = np.arange(self.begin, self.end, step)
+        found = []
+        for low in edges:
+            y = np.sort(self.centre[(self.centre[:, 0] >= low) & (self.centre[:, 0] < low + step), 1])
+            cuts = np.flatnonzero(np.diff(y) > _GAP * self.size) + 1
+            found.append(np.array([float(part.mean()) for part in np.split(y, cuts) if len(part)]))
+        return edges + 0.5 * step, found
+
+    @property
+    def branched(self) -> float:
+        """x, m, from which on there are two branches for 10 elements; NaN if there are none."""
+        x, ways = self.branches()
+        two = np.array([len(y) > 1 for y in ways])
+        long = [k for k in range(len(two) - 4) if two[k : k + 5].all()]
+        return float(x[long[0]]) if long else np.nan
+
+    @property
+    def straight(self) -> float:
+        """Length of the branches, m: lines from bin to bin."""
+        x, ways = self.branches()
+        total, before = 0.0, np.zeros(1)
+        for y in ways:
+            for at in y:
+                total += float(np.hypot(x[1] - x[0], np.abs(before - at).min()))
+            before = y if len(y) else before
+        return total
+
+
+@dataclass(frozen=True)
+class Run:
+    """What came out."""
+
+    plan: Plan
+    case: Case
+    tets: int
+    crack: Crack
+    energy: Energy
+    fragments: int
+    """Of a tenth of a cubic width and more."""
+    steps: int
+    cpu: float
+    worst: float
+
+    @property
+    def made(self) -> Material:
+        """The material of the only part."""
+        return self.case.materials[self.case.parts[0].material]
+
+    @property
+    def toughness(self) -> float:
+        """G_c, J/m^2."""
+        assert self.made.brittle is not None
+        return self.made.brittle.energy
+
+    @property
+    def taken(self) -> float:
+        """Work done on the cohesive facets, J."""
+        return self.energy.fracture + self.energy.cohesive
+
+    @property
+    def fastest(self) -> tuple[float, float]:
+        """Largest speed along x until the crack branches, and of all, over the Rayleigh speed."""
+        x, speed = self.crack.speeds()
+        single = x < self.crack.branched if np.isfinite(self.crack.branched) else np.ones(len(x), bool)
+        return tuple(float(v.max(initial=0.0)) / rayleigh(self.made) for v in (speed[single], speed))  # type: ignore[return-value]
+
+    @property
+    def inflation(self) -> float:
+        """Open area of a plate over that of straight lines along its branches."""
+        return float(self.crack.area.sum()) / (self.plan.size * self.crack.straight)
+
+    @property
+    def share(self) -> float:
+        """Work of a plate over G_c times the open area."""
+        return self.taken / (self.toughness * float(self.crack.area.sum()))
+
+
+def watch(plan: Plan) -> Run:
+    """Takes the steps of a case and looks at its crack, 20 times for a bar."""
+    case, mesh = prepared(plan)
+    low, high = bounds(case.parts[0].mesh) or ((0.0,) * 3, (0.0,) * 3)
+    body = case.parts[0].mesh
+    begin = body.slit.high[1] if isinstance(body, Box | Plate) and body.slit is not None else low[0]
+    began = time.process_time()
+    with patch.object(domain, "build_mesh", lambda *_, **__: mesh):
+        sim = simulation.build(case, Path(), SerialComm())
+    crack, due, every = Crack(plan.size, begin, high[0]), 0.0, min(_LOOK, case.run.end_time / 20)
+    step.prepare(sim)
+    while True:
+        looks = sim.clock.t >= due or sim.clock.done
+        before = sim.model.nodes.v.copy() if looks else None
+        step.first_half(sim)
+        if before is not None:
+            energy = sim.ledger.close(before)
+            crack.look(sim)
+            due += every
+        if sim.clock.done:
+            break
+        step.second_half(sim)
+    return Run(
+        plan, case, len(mesh.tets), crack, energy, _fragments(sim, min(np.subtract(high, low)) ** 3), sim.clock.step,
+        time.process_time() - began, sim.ledger.worst,
+    )  # fmt: skip
+
+
+def _fragments(sim: Simulation, cube: float) -> int:
+    """Those of a tenth of ``cube``, m^3, and more."""
+    assert sim.fracture is not None
+    assert sim.fracture.cohesion is not None
+    (labels,) = fragments.labels(sim.model, sim.fracture.cohesion.facets.tets, sim.comm)
+    (block,) = sim.model.blocks
+    _, of = np.unique(labels, return_inverse=True)
+    return int((np.bincount(of, block.row(MASS)) > 0.1 * cube * block.params[DENSITY]).sum())
+
+
+FINE = 1e-3 / 1.5
+_KINDS: tuple[tuple[Generator, int | None], ...] = (("structured", None), ("structured", 0), ("gmsh", None))
+PLATES = tuple(Plan("branching_plate", size, kind, seed) for size in (1e-3, FINE) for kind, seed in _KINDS)
+"""The branching benchmark on three kinds of meshes."""
+SIBLINGS = tuple(Plan("branching_plate", FINE, "gmsh", seed) for seed in range(4))
+"""With the last of PLATES five meshes of one kind."""
+STRIPS = (Plan("strip", 0.5e-3), Plan("strip", 0.5e-3, "gmsh", 0))
+_WIDTH = 7.64e-5
+BARS = tuple(
+    Plan("bar", _WIDTH / n, "structured", seed) for seed, finest in ((None, 5), (0, 4)) for n in range(1, finest + 1)
+)
+"""From one element across the bar to five."""
+
+
+def measure(plans: Iterable[Plan]) -> Iterator[Run]:
+    """One after the other."""
+    for plan in plans:
+        yield watch(plan)
+
+
+def as_data(runs: Sequence[Run]) -> dict[str, list[float]]:
+    """Work, J, fragments, CPU-s and, of cracks, the columns of the table."""
+    return {
+        f"{r.plan.case}, {r.plan.name}": [
+            r.taken,
+            float(r.fragments),
+            r.cpu,
+            *(_columns(r) if r.plan.case != "bar" else []),
+        ]
+        for r in runs
+    }
+
+
+def report(runs: Sequence[Run]) -> str:
+    """All tables."""
+    of = {name: [r for r in runs if r.plan.case == name] for name in ("branching_plate", "strip", "bar")}
+    texts = [_cracks(of["branching_plate"]), _scatter([r for r in of["branching_plate"] if _sibling(r)])]
+    return "\n\n".join([*texts, _cracks(of["strip"]), _bars(of["bar"])])
+
+
+def _sibling(run: Run) -> bool:
+    return run.plan in (*SIBLINGS, PLATES[-1])
+
+
+def _some(value: float, digits: int = 1) -> Cell:
+    return f"{value:.{digits}f}" if np.isfinite(value) else None
+
+
+def _columns(r: Run) -> list[float]:
+    """us to the first broken and the first open facet, mm and us where and when it branches, us at the edge, speeds,
+    inflation, share of energy."""
+    c = r.crack
+    times = [1e6 * c.broken, 1e6 * c.start, 1e3 * c.branched, 1e6 * c.passed(c.branched)]
+    return [*times, 1e6 * c.passed(c.end - 1.5 * c.size), *r.fastest, r.inflation, r.share]
+
+
+_DIGITS = (1, 1, 1, 1, 1, 2, 2, 2, 2)
+_HEAD = (
+    "breaks, us", "opens, us", "branches, mm", "us", "edge, us", "c / c_R, one crack", "largest", "area / straight",
+    "work / G_c area",
+)  # fmt: skip
+
+
+def _cracks(runs: Sequence[Run]) -> str:
+    rows: list[list[Cell]] = []
+    for r in runs:
+        cells = [_some(v, d) for v, d in zip(_columns(r), _DIGITS, strict=True)]
+        rows.append([r.plan.name, r.tets, *cells, round(r.cpu, 1), r.worst])
+    return table(["mesh", "tets", *_HEAD, "CPU s", "residual"], rows)
+
+
+def _scatter(runs: Sequence[Run]) -> str:
+    values = np.array([_columns(r) for r in runs])
+    rows: list[list[Cell]] = [
+        [name, *(_some(float(v), d) for v, d in zip(of(values, axis=0), _DIGITS, strict=True))]
+        for name, of in (("mean", np.mean), ("standard deviation", np.std), ("smallest", np.min), ("largest", np.max))
+    ]
+    return table([f"{len(runs)} meshes", *_HEAD], rows)
+
+
+def _bars(runs: Sequence[Run]) -> str:
+    """Energy of a bar over that of the finest mesh."""
+    finest = min(runs, key=lambda r: (r.plan.size, r.plan.seed is not None)).taken
+    rows: list[list[Cell]] = []
+    for r in runs:
+        ratio, moved = 3.056e-4 / r.plan.size, "" if r.plan.seed is None else "moved"
+        cells: list[Cell] = [f"s_0 / {ratio:.0f} {moved}".rstrip(), r.tets, f"{r.taken / finest:.3f}", r.fragments]
+        rows.append([*cells, r.steps, round(r.cpu, 1), r.worst])
+    return table(["element", "tets", "E / E finest", "fragments", "steps", "CPU s", "residual"], rows)
