@@ -69,6 +69,9 @@ class Fracture(Model):
     ``cohesive`` by default."""
     friction: Annotated[Ratio, Field(ge=0)] = 0.0
     """Internal friction: under a pressure |t_n| a facet breaks by t_s - friction * |t_n|."""
+    traction: Literal["tets", "nodes"] = "tets"
+    """On a facet, from the stress of its two tets; or besides from that of its three nodes, each the mean of the tets
+    round it by volume, and the facet must pass by both: smoother."""
     delay: Annotated[Ratio, Field(ge=0)] = 1.0
     """t_c = delay * density * c * energy / strength^2 of the delayed criterion. The paper prints 0.5, its own equations
     give 1; 0 breaks a facet in the step in which it passes the strength."""

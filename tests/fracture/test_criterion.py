@@ -1,6 +1,7 @@
 """What breaks a facet: the traction of the two sides, the cheap test before it, strengths and the delay."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,9 +15,10 @@ from conoid.worker.fracture.bodies import Loaded
 from conoid.worker.fracture.strength import Toughness, toughness
 from conoid.worker.mesh.faces import FACES
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import CHUNK, PRESSURE, S_XX, S_XY, VISCOUS, Floats, Ints
+from conoid.worker.state import CHUNK, MASS, PRESSURE, S_XX, S_XY, VISCOUS, Floats, Ints
 
 from ..contact.bodies import meeting_of
+from ..worker.formulas import at_nodes
 from ..worker.kernels import build
 from ..worker.meshes import REGULAR, block
 from ..worker.test_erosion import on
@@ -112,29 +114,30 @@ def loaded_sim(sim: Simulation) -> Simulation:
 def tractions(sim: Simulation) -> dict[int, list[float]]:
     """Of the facets of which this rank has the side of smaller id, by that side: the traction and the effective one."""
     assert sim.fracture is not None
-    x = sim.model.nodes.x
     found: dict[int, list[float]] = {}
 
     def take(block: state.Block, loaded: Loaded, chosen: "np.ndarray") -> None:
         ids = bodies.facet_ids(block, loaded.places, loaded.faces)
         found.update(zip(ids[chosen].tolist(), loaded.traction[chosen].tolist(), strict=True))
 
-    far = sim.fracture._far
-    for body, (remote, at) in zip(sim.fracture._bodies, far.look(x), strict=True):
-        near = bodies.look(body, x)
+    inside, shared = sim.fracture.loaded()
+    for body, near, (remote, at) in zip(sim.fracture._bodies, inside, shared, strict=True):
         take(body.block, near, np.ones(len(near.places), bool))
-        take(body.block, remote, far.first[at])
+        take(body.block, remote, sim.fracture._far.first[at])
     return found
 
 
-def case_of(**fracture: float) -> schema.Case:
-    case = meeting_of([{"fracture": schema.Fracture(**fracture)}], material=GLASS)  # type: ignore[arg-type]
+def case_of(**fracture: Any) -> schema.Case:
+    case = meeting_of([{"fracture": schema.Fracture(**fracture)}], material=GLASS)
     return case.model_copy(update={"contact": None})
 
 
-def test_tractions_are_those_of_numpy_and_the_same_on_any_number_of_ranks() -> None:
-    """The mean of both sides without the viscous part, on the outward normal of the tet of smaller id, once a facet."""
-    mesh, case = block((3, 3, 2), 1e-3, seed=2), case_of(shear_weight=0.7, friction=0.4)
+@pytest.mark.parametrize("source", ["tets", "nodes"])
+def test_tractions_are_those_of_numpy_and_the_same_on_any_number_of_ranks(source: str) -> None:
+    """The mean of both sides, or of the three nodes by volume, without the viscous part, on the outward normal of the
+    tet of smaller id, once a facet.
+    """
+    mesh, case = block((3, 3, 2), 1e-3, seed=2), case_of(shear_weight=0.7, friction=0.4, traction=source)
     sim = loaded_sim(build(case, [mesh]))
     found = tractions(sim)
     (b,) = sim.model.blocks
@@ -145,13 +148,22 @@ def test_tractions_are_those_of_numpy_and_the_same_on_any_number_of_ranks() -> N
     a, c, d = (sim.model.nodes.x[b.tets[place, FACES[face, k]]] for k in range(3))
     normal = np.cross(c - a, d - a)
     normal /= np.linalg.norm(normal, axis=1)[:, None]
-    mean = 0.5 * (stress[b.id[place]] + stress[b.across[place, face] // 4])
-    expected = np.einsum("nij,nj->ni", mean, normal)
+    mean = beside = 0.5 * (stress[b.id[place]] + stress[b.across[place, face] // 4])
+    if source == "nodes":
+        mass = b.row(MASS)
+        weighted = at_nodes(
+            b.tets, np.repeat((mass[:, None, None] * stress[b.id])[:, None], 4, axis=1), len(mesh.points)
+        )
+        nodal = weighted / at_nodes(b.tets, np.repeat(mass[:, None], 4, axis=1), len(mesh.points))[:, None, None]
+        mean = sum(nodal[b.tets[place, FACES[face, k]]] for k in range(3)) / 3.0
+    expected, of_tets = (np.einsum("nij,nj->ni", each, normal) for each in (mean, beside))
     keys = (4 * b.id[place] + face).tolist()
     assert sorted(found) == sorted(keys)
     got = np.array([found[key] for key in keys])
-    assert got[:, :3] == pytest.approx(expected, abs=1e-12 * 1e8)
-    assert got[:, 3] == pytest.approx(effective(expected, normal, 0.7, 0.4), rel=1e-11, abs=1e-3)
+    near = (1e-12, 1e-11) if source == "tets" else (1e-7, 1e-6)  # nodal sums are in quanta of 2^-30
+    assert got[:, :3] == pytest.approx(expected, abs=near[0] * 1e8)
+    passes = np.minimum(effective(expected, normal, 0.7, 0.4), effective(of_tets, normal, 0.7, 0.4))
+    assert got[:, 3] == pytest.approx(passes, rel=near[1], abs=1e8 * near[1])
     assert (got[:, 3] == 0.0).any()
     for ranks in (2, 3, 5):
         parts = on(ranks, case, [mesh], lambda sim: tractions(loaded_sim(sim)))

@@ -24,6 +24,7 @@ SCENES = {
     "box": ["contact.domain=box"],
     "ordered": ["parts[0].fracture.order=local_maximum", "parts[1].fracture.order=local_maximum"],
     "no_edges": ["contact.edges=false"],
+    "nodes": ["parts[0].fracture.traction=nodes", "parts[1].fracture.traction=nodes"],
     "traction": [],
 }
 FAST = "nodal"

@@ -165,7 +165,7 @@ class Far:
             traction, self._theirs[at], sides, self.first[at], body.block.tets, x, body.block.shear_weight,
             body.spec.friction,
         )  # fmt: skip
-        return Loaded(sides[:, 0], sides[:, 1], traction)
+        return Loaded(sides[:, 0].copy(), sides[:, 1].copy(), traction)
 
     def free(self) -> None:
         """Gives the messages back to MPI."""

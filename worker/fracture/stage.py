@@ -25,7 +25,7 @@ from ..parallel.fixed_point import exact_sums
 from ..parallel.ownership import Neighbour, complete
 from ..state import CHUNK, MASS, Block, Flags, Floats, Indices, Ints, Model
 from ..topology import Split
-from . import bodies
+from . import bodies, nodal
 from .bodies import Body, Far, Loaded
 from .cohesive import Cohesion, Facets, inserted
 from .order import strongest
@@ -106,16 +106,18 @@ class Fracture:
         self._boundaries, self._contact = boundaries, contact
         self._comm, self._clock = comm, clock
         specs = [part.fracture for part in case.parts if part.fracture is not None]
+        self._smooth = any(spec.traction == "nodes" for spec in specs)
         self._one_by_one = any(spec.order == "local_maximum" for spec in specs)
         self._unused = max(1.0 - case.numerics.dt_safety**2, _LEAST)
         self._bodies: list[Body] = []
         self.warnings: list[str] = []
         """What the user should know of the mesh."""
-        work = 0.0
+        work, self._strength = 0.0, 0.0
         for index, part in enumerate(case.parts):
             if part.fracture is not None:
                 volume, size = _tet(model, index, find_material(case, part.material).density, comm)
                 tough = toughness(find_material(case, part.material), part.fracture, size)
+                self._strength = max(self._strength, tough.strength)
                 work = max(work, tough.energy * volume ** (2.0 / 3.0))
                 step = case.numerics.dt_safety * _STEP * size / tough.speed
                 self.warnings += _warnings(part.name, part.fracture, tough, size, step)
@@ -123,6 +125,9 @@ class Fracture:
                     bodies.arm(i, block, part.fracture, tough, model.nodes.x0)
                     for i, block in enumerate(model.blocks) if block.part == index
                 ]  # fmt: skip
+        masses = [float(body.block.row(MASS).max(initial=0.0)) for body in self._bodies]
+        self._heaviest = float(comm.maximum(np.array([max(masses, default=0.0)]))[0])
+        """Tet of all ranks, kg."""
         self._far = Far(self._bodies, neighbours, comm)
         self._separation = Separation(model, neighbours, comm)
         self._since: tuple[Ints, Floats] = (np.zeros(0, np.int64), np.zeros(0))
@@ -136,10 +141,8 @@ class Fracture:
 
     def advance(self) -> None:
         """Breaks what the stress of the present has overcome; all ranks take part."""
-        x = self._model.nodes.x
         self._longest = max(self._longest, self._clock.stable)
-        near = [bodies.look(body, x) for body in self._bodies]
-        far = self._far.look(x)
+        near, far = self.loaded()
         passed: list[tuple[Ints, Floats]] = []
         broken: list[Breaking] = []
         for body, loaded, (remote, at) in zip(self._bodies, near, far, strict=True):
@@ -155,6 +158,24 @@ class Fracture:
         if total:
             self.broken += total
             self._break(broken)
+
+    def loaded(self) -> tuple[list[Loaded], list[tuple[Loaded, Ints]]]:
+        """Of every body the facets within this rank that have a hot face, and those shared with another, with their
+        places among all such; all ranks take part.
+        """
+        nodes = self._model.nodes
+        near = [bodies.look(body, nodes.x) for body in self._bodies]
+        far = self._far.look(nodes.x)
+        if not self._smooth:
+            return near, far
+        some = [k for k, body in enumerate(self._bodies) if body.spec.traction == "nodes"]
+        chosen = [self._bodies[k] for k in some]
+        stress = nodal.stresses(chosen, nodes, self._strength, self._heaviest, self._neighbours, self._comm)
+        for k, body in zip(some, chosen, strict=True):
+            remote, at = far[k]
+            nodal.replace(near[k], np.ones(len(near[k].places), bool), body, stress, nodes.x)
+            nodal.replace(remote, self._far.first[at], body, stress, nodes.x)
+        return near, far
 
     def rest(self) -> None:
         """Nothing is beyond its strength: no clock runs."""

@@ -1,0 +1,92 @@
+"""Facet tractions from nodal stress: means over the stars of the three nodes, smoother than those of the two tets.
+
+Each node has the mean stress of the tets that hang on it, weighted with their initial volumes; sums of integers, so
+that both sides of a facet, on whichever ranks, find the same traction. A facet must pass by its two tets as well: only
+such facets are looked at (elements/hot.py).
+"""
+
+import numpy as np
+from numba import njit
+
+from ..mesh.faces import FACES
+from ..parallel.comm import Comm
+from ..parallel.ownership import Neighbour, complete
+from ..state import CHUNK, MASS, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, Flags, Floats, Nodes
+from .bodies import Body, Loaded
+from .criterion import effective, outward
+
+_TAG = 18
+_QUANTA = 2.0**30
+"""Quanta to the strength, and to the mass of the heaviest tet."""
+_SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
+_SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
+_P, _MASS = PRESSURE * CHUNK, MASS * CHUNK
+
+
+def stresses(
+    bodies: list[Body], nodes: Nodes, strength: float, heaviest: float, neighbours: list[Neighbour], comm: Comm
+) -> Floats:
+    """(nodes, 6) mean Cauchy stress xx, yy, zz, yz, zx, xy without the viscous part, Pa; zero at nodes of other bodies.
+
+    ``strength``, Pa, and ``heaviest``, the mass of a tet, kg: the largest of all bodies and ranks, in whose quanta the
+    sums are made. All ranks take part.
+    """
+    sums = np.zeros((nodes.n, 7), np.int64)
+    for body in bodies:
+        block = body.block
+        _add(sums, block.tets, block.state.reshape(-1), block.state.shape[1], _QUANTA / strength, _QUANTA / heaviest)
+    complete(comm, neighbours, sums, _TAG)
+    return np.asarray(sums[:, :6] / np.maximum(sums[:, 6:], 1) * strength)
+
+
+@njit("void(int64[:, ::1], uint32[:, ::1], float64[::1], int64, float64, float64)", cache=True, error_model="numpy")
+def _add(sums, tets, state, rows, of_stress, of_mass):  # type: ignore[no-untyped-def]
+    for e in range(len(tets)):
+        at = (e // CHUNK) * rows * CHUNK + e % CHUNK
+        p, weight = state[at + _P], np.rint(state[at + _MASS] * of_mass)
+        share = weight / _QUANTA * of_stress
+        xx, yy = np.int64(np.rint((state[at + _SXX] - p) * share)), np.int64(np.rint((state[at + _SYY] - p) * share))
+        zz, yz = np.int64(np.rint((state[at + _SZZ] - p) * share)), np.int64(np.rint(state[at + _SYZ] * share))
+        zx, xy = np.int64(np.rint(state[at + _SZX] * share)), np.int64(np.rint(state[at + _SXY] * share))
+        for k in range(4):
+            a = tets[e, k]
+            sums[a, 0] += xx
+            sums[a, 1] += yy
+            sums[a, 2] += zz
+            sums[a, 3] += yz
+            sums[a, 4] += zx
+            sums[a, 5] += xy
+            sums[a, 6] += np.int64(weight)
+
+
+def replace(loaded: Loaded, first: Flags, body: Body, stress: Floats, x: Floats) -> None:
+    """The tractions of facets of ``body`` from the ``stress`` (nodes, 6) of their nodes; the effective one is the
+    smaller of this and that of the two tets. ``first`` (m,): whether the places are on the side of the smaller tet id.
+    """
+    block = body.block
+    _tractions(
+        loaded.traction, loaded.places, loaded.faces, first, block.tets, stress, x, block.shear_weight,
+        body.spec.friction,
+    )  # fmt: skip
+
+
+@njit(
+    "void(float64[:, ::1], int32[::1], int32[::1], boolean[::1], uint32[:, ::1], float64[:, ::1], float64[:, ::1], "
+    "float64, float64)",
+    cache=True,
+)
+def _tractions(out, places, faces, first, tets, stress, x, weight, friction):  # type: ignore[no-untyped-def]
+    normal = np.empty(3)
+    for m in range(len(places)):
+        tet = tets[places[m]]
+        outward(normal, x, tet, faces[m])
+        if not first[m]:
+            normal *= -1.0
+        out[m, :3] = 0.0
+        for a in np.sort(tet[FACES[faces[m]]]):
+            s = stress[a]
+            out[m, 0] += s[0] * normal[0] + s[5] * normal[1] + s[4] * normal[2]
+            out[m, 1] += s[5] * normal[0] + s[1] * normal[1] + s[3] * normal[2]
+            out[m, 2] += s[4] * normal[0] + s[3] * normal[1] + s[2] * normal[2]
+        out[m, :3] /= 3.0
+        out[m, 3] = min(out[m, 3], effective(out[m, :3], normal, weight, friction))
