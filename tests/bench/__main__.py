@@ -167,7 +167,10 @@ def _fracture(extent: Extent, book: Book) -> None:
 def _cracks(extent: Extent, book: Book) -> None:
     if extent is not QUICK:
         runs = list(cracks.measure([*cracks.PLATES, *cracks.SIBLINGS, *cracks.STRIPS, *cracks.BARS]))
+        from . import plot
+
         book.add("Cracks", cracks.report(runs), cracks.as_data(runs))
+        plot.paths([r for r in runs if r.plan in cracks.SHOWN], OUT / "branching.png")
 
 
 def _long_rod(extent: Extent, book: Book) -> None:

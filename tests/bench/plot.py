@@ -1,4 +1,4 @@
-"""Speed against error, drawn: what each quantity of a Taylor bar costs, and how it approaches its limit."""
+"""Speed against error, drawn: what a quantity of a Taylor bar costs, how it approaches its limit; paths of cracks."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,6 +11,7 @@ import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 
 from .accuracy import BARS, Answer
+from .cracks import Run
 from .scene import FORMS
 
 _TITLES = {"taylor_copper": "Copper, 227 m/s", "taylor_42crmo4": "42CrMo4 steel, 287 m/s"}
@@ -36,6 +37,25 @@ def speed_and_error(answers: Sequence[Answer], path: Path, limits: dict[tuple[st
     for ax in axes[1]:
         ax.set_xlabel("CPU time of the run, s (one core)")
     figure.savefig(path, dpi=120)
+    plt.close(figure)
+
+
+def paths(runs: Sequence[Run], path: Path) -> None:
+    """The open facets of plates with a slit, a panel a mesh, coloured by when they opened, as a PNG."""
+    figure, axes = plt.subplots(
+        -(-len(runs) // 3), 3, figsize=(10, 5.6), sharex=True, sharey=True, layout="constrained"
+    )
+    for ax, run in zip(axes.ravel(), runs, strict=False):
+        crack = run.crack
+        x, y = 1e3 * crack.centre[:, 0], 1e3 * crack.centre[:, 1]
+        dots = ax.scatter(x, y, c=1e6 * crack.time, s=5, cmap="viridis", vmin=14, vmax=80)
+        ax.plot([0, 1e3 * crack.begin], [0, 0], color="black", linewidth=1)
+        ax.set(title=run.plan.name, xlim=(40, 1e3 * crack.end), ylim=(-20, 20), aspect="equal")
+        ax.title.set_fontsize(10)
+    figure.supxlabel("x, mm", fontsize=10)
+    figure.supylabel("y, mm", fontsize=10)
+    figure.colorbar(dots, ax=axes, label="open since, us", shrink=0.8)
+    figure.savefig(path, dpi=110)
     plt.close(figure)
 
 
