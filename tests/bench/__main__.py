@@ -20,6 +20,7 @@ from . import (
     cracks,
     fracture_cost,
     gates,
+    glass_bar,
     growth,
     long_rod,
     machine,
@@ -173,6 +174,12 @@ def _cracks(extent: Extent, book: Book) -> None:
         plot.paths([r for r in runs if r.plan in cracks.SHOWN], OUT / "branching.png")
 
 
+def _glass_bar(extent: Extent, book: Book) -> None:
+    if extent is not QUICK:
+        bars = list(glass_bar.measure(glass_bar.SIZES if extent is LONG else glass_bar.SIZES[:2]))
+        book.add("Glass bar", glass_bar.report(bars), glass_bar.as_data(bars))
+
+
 def _long_rod(extent: Extent, book: Book) -> None:
     shots = []
     for shot in long_rod.measure(extent.shots):
@@ -188,7 +195,7 @@ def _long_rod(extent: Extent, book: Book) -> None:
 PARTS: dict[str, Callable[[Extent, Book], None]] = {
     "speed": _speed, "akantu": _akantu, "taylor": _taylor, "growth": _growth, "startup": _startup,
     "accuracy": _accuracy, "telemetry": _telemetry, "contact": _contact, "fracture": _fracture, "cracks": _cracks,
-    "long_rod": _long_rod,
+    "glass_bar": _glass_bar, "long_rod": _long_rod,
 }  # fmt: skip
 
 

@@ -1,0 +1,161 @@
+"""The paper's glass bar: where the front of failure is, how the glass behind it swells, nodes and pieces, against time.
+
+``python -m tests.bench glass_bar`` runs the shipped case, coarser; ``python -m tests.bench.glass_bar FOLDER`` reads a
+run that has been done, at the paper's size.
+"""
+
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import h5py
+import numpy as np
+import numpy.typing as npt
+
+from conoid.cases import fragments, layout
+from conoid.cases.outcome import Outcome, from_json
+
+from .table import Cell, table
+
+Floats = npt.NDArray[np.float64]
+SIZES = ("2.4 mm", "1.8 mm", "1.2 mm")
+"""Of the elements; the case has 0.9 mm."""
+LENGTH, RADIUS, SOUND = 170e-3, 6.35e-3, 5367.0
+"""Of the glass bar, m; its bar wave speed sqrt(E / rho), m/s."""
+_SLICE = 5e-3
+"""Thickness, m, of the slices in which nodes are counted."""
+_FAILED = 1.1
+"""Nodes over those at the start: a slice with more is behind the front, if all between it and the impact are."""
+_EVERY = 10e-6
+"""s between two lines of a table."""
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A frame of the bar, SI."""
+
+    time: float
+    front: float
+    """How far from the impact the last slice behind the front ends."""
+    nodes: int
+    """Of the glass."""
+    swelling: float
+    """Mean radius of the rim behind the front over the initial one; 1 where there is no front."""
+    outward: float
+    """Mean radial velocity of that rim."""
+    pieces: fragments.Summary
+    """Of the glass."""
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A run."""
+
+    size: str
+    outcome: Outcome
+    course: list[Moment]
+
+
+def measure(sizes: Sequence[str], ranks: int = 2) -> Iterator[Bar]:
+    """The shipped case with elements of these sizes, one after the other."""
+    for size in sizes:
+        with tempfile.TemporaryDirectory() as place:
+            folder = Path(place) / "run"
+            given = [f"parts[{k}].mesh.element_size={size}" for k in range(2)] + [f"run.ranks={ranks}"]
+            words = [word for each in given for word in ("--set", each)]
+            launch = ["mpiexec", "-n", str(ranks), sys.executable, "-m", "mpi4py", "-m", "conoid.worker"]
+            launch[0] = str(Path(sys.executable).with_name("mpiexec"))
+            subprocess.run([*launch, "glass_steel_bar", "--out", str(folder), *words], check=True, capture_output=True)
+            yield read(size, folder)
+
+
+def read(size: str, folder: Path) -> Bar:
+    """What a run's folder says."""
+    frames = sorted((folder / layout.FRAMES).glob("*.vtkhdf"))
+    with h5py.File(frames[0]) as file:
+        start = _glass(file)[0][:, 2]
+    outcome = from_json((folder / layout.OUTCOME).read_bytes())
+    moments = [moment(folder, index, frame, start) for index, frame in enumerate(frames)]
+    return Bar(size, outcome, moments)
+
+
+def _glass(file: h5py.File) -> tuple[Floats, Floats, Floats]:
+    """(n, 3) initial positions, positions and velocities of the nodes of the glass."""
+    mesh = file["VTKHDF"]
+    glass = np.unique(mesh["Connectivity"][:].reshape(-1, 4)[mesh["CellData/part"][:] == 1])
+    x = mesh["Points"][:][glass]
+    return x - mesh["PointData/displacement"][:][glass], x, mesh["PointData/velocity"][:][glass]
+
+
+def moment(folder: Path, index: int, frame: Path, start: Floats) -> Moment:
+    """A frame; ``start``: axial positions of the nodes of the glass at first."""
+    with h5py.File(frame) as file:
+        x0, x, v = _glass(file)
+        time = float(file["VTKHDF/FieldData/time"][0])
+    cuts = np.arange(0.0, LENGTH + _SLICE / 2.0, _SLICE)
+    cuts[0], cuts[-1] = -np.inf, np.inf
+    growth = np.histogram(x0[:, 2], cuts)[0] / np.histogram(start, cuts)[0]
+    front = _SLICE * int(np.argmin(np.append(growth > _FAILED, False)))
+    rim = (np.hypot(x0[:, 0], x0[:, 1]) > 0.97 * RADIUS) & (x0[:, 2] < front)
+    radius = np.hypot(x[rim, 0], x[rim, 1])
+    outward = (x[rim, :2] * v[rim, :2]).sum(axis=1) / np.maximum(radius, 1e-9)
+    lines = [line for line in fragments.read(fragments.path(folder, index)) if line["part"] == "glass"]
+    columns = [[line[name] for line in lines] for name in ("tets", "mass", "extent")]
+    return Moment(
+        time, front, len(x), float(radius.mean() / RADIUS) if front else 1.0, float(outward.mean()) if front else 0.0,
+        fragments.summary(*columns),  # type: ignore[arg-type]
+    )  # fmt: skip
+
+
+def report(bars: Sequence[Bar]) -> str:
+    """A line a run, and the course of the finest."""
+    head = ["size", "tets", "nodes at first", "nodes", "ratio", "front stops at, mm", "its speed to 50 mm, mm/us",
+            "rim, m/s", "pieces", "dust, of the mass", "residual", "CPU s", "M upd/s"]  # fmt: skip
+    return f"{table(head, [_row(bar) for bar in bars])}\n\n{bars[-1].size}:\n\n{course(bars[-1].course)}"
+
+
+def _row(bar: Bar) -> list[Cell]:
+    out, last = bar.outcome, bar.course[-1]
+    past = next((m for m in bar.course if m.front >= 50e-3), None)
+    pieces = last.pieces
+    return [
+        bar.size, out.elements, out.nodes_initial, out.nodes, out.nodes / out.nodes_initial, 1e3 * arrested(bar.course),
+        1e-3 * past.front / past.time if past else None, last.outward, pieces.fragments, pieces.dust_share,
+        out.worst_residual, out.cpu,
+        1e-6 * out.element_updates_per_second,
+    ]  # fmt: skip
+
+
+def arrested(moments: Sequence[Moment]) -> float:
+    """Where the front was when the wave came back from the far end, m."""
+    return max((m.front for m in moments if m.time < LENGTH / SOUND), default=0.0)
+
+
+def course(moments: Sequence[Moment]) -> str:
+    """Some moments as a table."""
+    head = ["t, us", "front, mm", "speed, mm/us", "rim radius", "rim, m/s", "glass nodes", "pieces", "dust", "largest"]
+    chosen = [moments[0]]
+    for each in moments[1:]:
+        if each.time >= chosen[-1].time + 0.999 * _EVERY:
+            chosen.append(each)
+    rows: list[list[Cell]] = []
+    for before, m in pairwise(chosen):
+        speed = 1e-3 * (m.front - before.front) / (m.time - before.time)
+        rows.append([
+            1e6 * m.time, 1e3 * m.front, speed, m.swelling, m.outward, m.nodes, m.pieces.fragments, m.pieces.dust,
+            m.pieces.largest_share,
+        ])  # fmt: skip
+    return table(head, rows)
+
+
+def as_data(bars: Sequence[Bar]) -> list[dict[str, object]]:
+    """For bench.json."""
+    return [{"size": bar.size, "course": [asdict(m) for m in bar.course]} for bar in bars]
+
+
+if __name__ == "__main__":
+    print(report([read(Path(folder).name, Path(folder)) for folder in sys.argv[1:]]))
