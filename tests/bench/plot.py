@@ -43,7 +43,7 @@ def speed_and_error(answers: Sequence[Answer], path: Path, limits: dict[tuple[st
 def paths(runs: Sequence[Run], path: Path) -> None:
     """The open facets of plates with a slit, a panel a mesh, coloured by when they opened, as a PNG."""
     figure, axes = plt.subplots(
-        -(-len(runs) // 3), 3, figsize=(10, 5.6), sharex=True, sharey=True, layout="constrained"
+        -(-len(runs) // 3), 3, figsize=(10, 4.6), sharex=True, sharey=True, layout="constrained"
     )
     for ax, run in zip(axes.ravel(), runs, strict=False):
         crack = run.crack

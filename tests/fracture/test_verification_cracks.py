@@ -124,6 +124,8 @@ def test_a_random_mesh_has_no_direction_and_no_flat_tets() -> None:
 def test_branching_plate_starts_branches_and_ends_as_published() -> None:
     """On a mesh without directions: start, below 0.6 of the Rayleigh speed, branches, at the edge after 75 to 80 us.
 
+    This is the first of five such meshes. One more branches, and later: which is what docs/bench.md is about.
+
     It cannot start before K = 2 s / (1 - m) sqrt(c t (1 - 2 m) / pi) = sqrt(E G) (Freund 1990) for crack faces with the
     sudden pressure s = 2 MPa that makes them free of stress, in plane stress, m = nu / (1 + nu). A fully open facet is
     the far end of a cohesive zone, which has to form first: later than the published 11 to 14 us.
