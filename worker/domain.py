@@ -202,14 +202,16 @@ def _loads(case: schema.Case, x: Floats, part: Indices, tets: Indices) -> list[L
     return loads
 
 
-def cut(whole: Whole, ranks: int) -> list[Piece]:
+def cut(whole: Whole, ranks: int, scale: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> list[Piece]:
     """The pieces of ``ranks`` ranks: tets by recursive bisection of their centres, nodes with every tet's rank.
 
+    ``scale`` multiplies the centres first: a direction that is small is cut last.
     Raises InputError when there are more ranks than tets.
     """
     if ranks > len(whole.tets):
         raise InputError(f"run.ranks = {ranks}: at most {len(whole.tets)}, the number of tets")
-    owner = bisect(whole.points[whole.tets].mean(axis=1), np.ones(len(whole.tets)), ranks)
+    centres = whole.points[whole.tets].mean(axis=1) * np.array(scale)
+    owner = bisect(centres, np.ones(len(whole.tets)), ranks)
     nodes_of = [np.unique(whole.tets[owner == rank]) for rank in range(ranks)]
     holders = np.zeros(len(whole.points), np.int32)
     for nodes in nodes_of:
@@ -258,7 +260,7 @@ def build(case: schema.Case, folder: Path, comm: Comm) -> tuple[Model, Piece]:
     failure: Exception | None = None
     if comm.rank == 0:
         try:
-            pieces = cut(assemble(case, folder), comm.size)
+            pieces = cut(assemble(case, folder), comm.size, case.run.cut_scale)
         except Exception as error:
             failure = error
     failure = comm.broadcast(failure)

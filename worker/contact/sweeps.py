@@ -99,6 +99,8 @@ def sweep(impulse, push, v, nodes, weights, normals, wanted, friction, diagonal,
             speed += normals[p, i] * rate[i]
         old = push[p, 0]
         push[p, 0] = max(0.0, old + (wanted[p] - speed) / diagonal[p, 0])
+        if push[p, 0] == old and (old == 0.0 or friction[p] == 0.0):
+            continue
         for i in range(3):
             change[i] = (push[p, 0] - old) * normals[p, i]
         if friction[p] > 0.0:
