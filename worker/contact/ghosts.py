@@ -61,19 +61,25 @@ def members(used: Ints, owners: Indices, holders: list[Neighbour], nodes: Nodes,
     ``used`` (k,) ids of the nodes that this rank pushes and ``owners`` (k,) who owns each; ``holders``: shared nodes.
     The owner of a node hears of everybody who pushes it and tells all of them, and all who hold it.
     """
-    heard = comm.swap({int(rank): used[owners == rank] for rank in np.unique(owners)})
-    rows = [np.column_stack([ids, np.full(len(ids), rank)]) for rank, ids in heard.items()]
-    pushed = np.unique(np.concatenate([np.zeros(0, np.int64), *heard.values()]))
-    rows.append(np.column_stack([pushed, np.full(len(pushed), comm.rank)]))
+    own = used[owners == comm.rank]
+    asked = {int(rank): used[owners == rank] for rank in np.unique(owners) if rank != comm.rank}
+    rows = [_rows(ids, rank, comm) for rank, ids in comm.swap(asked).items()]
     for other in holders:
         ids = nodes.id[other.nodes[nodes.owned[other.nodes]]]
-        ids = ids[np.isin(ids, pushed)]
-        rows.append(np.column_stack([ids, np.full(len(ids), other.rank)]))
-    table = np.unique(np.concatenate(rows), axis=0)
+        pushed = np.isin(ids, own) | np.isin(ids, np.concatenate([ids[:0], *rows]) // comm.size)
+        rows.append(_rows(ids[pushed], other.rank, comm))
+    table = np.unique(np.concatenate([own[:0], *rows]))
+    table = np.unique(np.concatenate([table, _rows(np.unique(table // comm.size), comm.rank, comm)]))
+    table = np.column_stack([table // comm.size, table % comm.size])
     told = comm.swap({int(rank): _company(table, int(rank)) for rank in np.unique(table[:, 1])})
     pairs = np.concatenate([np.zeros((0, 2), np.int64), *(words.reshape(-1, 2) for words in told.values())])
     pairs = pairs[np.lexsort((pairs[:, 0], pairs[:, 1]))]
     return {int(rank): pairs[pairs[:, 1] == rank, 0] for rank in np.unique(pairs[:, 1]) if rank != comm.rank}
+
+
+def _rows(ids: Ints, rank: int, comm: Comm) -> Ints:
+    """Node and rank as one number."""
+    return ids * comm.size + rank
 
 
 def _company(table: Ints, rank: int) -> Ints:
