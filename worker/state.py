@@ -21,7 +21,7 @@ Tets = npt.NDArray[np.uint32]
 CHUNK = 376
 """Elements a chunk."""
 
-# Rows of the element state. Rows up to WORK_VISCOUS exist in every block, the others where the scene needs them.
+# Rows of the element state. Rows up to DISTORTION exist in every block, the others where the scene needs them.
 S_XX, S_YY, S_ZZ, S_YZ, S_ZX, S_XY = range(6)
 """Deviatoric Cauchy stress, Pa."""
 PRESSURE = 6

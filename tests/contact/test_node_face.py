@@ -73,7 +73,8 @@ def expected(
     for s in slaves:
         mine = [Expected(x, v, s, f, sizes[i], part[s] == part[f[0]], dt) for i, f in enumerate(faces)]
         away = point_triangle(x[s][None], x[faces[:, :3]])[0]
-        ahead = [away[i] for i, row in enumerate(mine) if row.gap0 > 0.0 and away[i] < DEEP * sizes[i]]
+        deepest = [DEEP_SELF if part[s] == part[f[0]] else DEEP for f in faces]
+        ahead = [away[i] for i, row in enumerate(mine) if row.gap0 > 0.0 and away[i] < deepest[i] * sizes[i]]
         mine = [row for row in mine if row.meets and not (row.deep and min(ahead, default=np.inf) < -row.gap0)]
         deep = [row for row in mine if row.deep]
         nearest = max(deep, key=lambda row: row.gap0, default=None)

@@ -1,6 +1,7 @@
 """The elastic law with a potential: its stress against the formulas, its energy, its stable step."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -40,6 +41,21 @@ def volumes(patch: Patch) -> Floats:
 def test_cube_root(power: float) -> None:
     u = 10.0**power
     assert math.isclose(inverse_cube_root(u), u ** (-1.0 / 3.0), rel_tol=1e-15)
+
+
+@pytest.mark.parametrize("power", [-8.0, 4.0, 6.0, 8.0, 12.0])
+def test_the_cube_root_of_what_is_far_off_is_no_nonsense(power: float) -> None:
+    """Volumes that change by factors of 100 and more: positive, and at most the root."""
+    u = 10.0**power
+    assert 0.0 < inverse_cube_root(u) < u ** (-1.0 / 3.0) * (1.0 + 1e-15)
+
+
+@pytest.mark.parametrize("viscosity", [{}, {"viscosity": {}}], ids=["plain", "viscous"])
+@pytest.mark.parametrize("height", [-1e-3, -0.1, -0.5, -0.9, -1.5])
+def test_a_tet_that_is_inside_out_has_no_stable_step(height: float, viscosity: dict[str, Any]) -> None:
+    patch = Patch(TetMesh(REGULAR, np.array([[0, 1, 2, 3]], np.int32)), **viscosity)
+    carry(patch, np.diag([1.0, 1.0, height])[None])
+    assert math.isnan(patch.limit)
 
 
 def test_nothing_is_left_of_no_strain() -> None:
@@ -145,6 +161,7 @@ def test_bound_of_strained_tets_is_near_the_exact_limit(size: float) -> None:
         exact = 2.0 / frequency(patch)
         shares.append(1.0 / patch.limit / exact)
     print(f"at most {max(shares):.4f} of the exact limit, at least {min(shares):.4f}")
+    assert min(shares) > 0.6
     assert max(shares) <= (1.0 if size < 0.1 else 1.03)
 
 

@@ -120,18 +120,24 @@ class Follower:
         self._nodes = nodes
         if len(scene.place) < nodes.n:
             scene.place = extended(scene.place, np.full(nodes.n - len(scene.place), -1, np.int32))
+        self._sort()
 
     def places(self, ids: Ints) -> Indices:
         """Where ids stand in the crowd, -1 where they do not."""
         local = self._nodes.places(ids)
         out = np.where(local >= 0, self._scene.place[local], -1).astype(np.int32)
-        crowd = self._scene.crowd
-        ghosts = np.flatnonzero(crowd.local < 0)
-        if len(ghosts):
-            ghosts = ghosts[np.argsort(crowd.id[ghosts])]
-            at = ghosts[np.minimum(np.searchsorted(crowd.id[ghosts], ids), len(ghosts) - 1)]
-            out = np.where(crowd.id[at] == ids, at, out).astype(np.int32)
+        far, far_ids = self._far
+        if len(far):
+            at = np.minimum(np.searchsorted(far_ids, ids), len(far) - 1)
+            out = np.where(far_ids[at] == ids, far[at], out).astype(np.int32)
         return out
+
+    def _sort(self) -> None:
+        """Places and ids, ascending, of the nodes of the crowd that this rank does not hold."""
+        crowd = self._scene.crowd
+        far = np.flatnonzero(crowd.local < 0)
+        far = far[np.argsort(crowd.id[far])]
+        self._far = far, crowd.id[far]
 
     def follow(self, heard: News, cracks: Cracks) -> None:
         """Faces, edges and candidates after the split, and the places of the cracks."""
@@ -193,6 +199,8 @@ class Follower:
         scene.normals = extended(scene.normals, np.zeros((n, 9)))
         scene.before = extended(scene.before, rows.v)
         scene.pushes = extended(scene.pushes, np.zeros(n, bool))
+        if (rows.local < 0).any():
+            self._sort()
 
     def _followed(self, heard: News, places: Indices, tets: Ints) -> Indices:
         """What nodes at ``places`` (n, k) of tets (n,) have become."""

@@ -50,7 +50,7 @@ def unpack_crowd(words: Ints) -> Crowd:
 
 def fetch(ids: Ints, owners: Indices, held: Crowd, comm: Comm) -> Crowd:
     """Copies of nodes (ids, owners) that this rank does not hold; all ranks take part. ``held``: every own node."""
-    asked = comm.swap({int(rank): ids[owners == rank] for rank in np.unique(owners)})
+    asked = comm.swap({rank: ids[owners == rank] for rank in _ranks(owners)})
     answers = comm.swap({rank: pack_crowd(held.take(held.places(want))) for rank, want in asked.items()})
     return unpack_crowd(np.concatenate([np.zeros(0, np.int64), *answers.values()]))
 
@@ -61,20 +61,28 @@ def members(used: Ints, owners: Indices, holders: list[Neighbour], nodes: Nodes,
     ``used`` (k,) ids of the nodes that this rank pushes and ``owners`` (k,) who owns each; ``holders``: shared nodes.
     The owner of a node hears of everybody who pushes it and tells all of them, and all who hold it.
     """
-    own = used[owners == comm.rank]
-    asked = {int(rank): used[owners == rank] for rank in np.unique(owners) if rank != comm.rank}
-    rows = [_rows(ids, rank, comm) for rank, ids in comm.swap(asked).items()]
+    pushed, rows = np.zeros(nodes.n, bool), [used[:0]]
+    pushed[nodes.places(used[owners == comm.rank])] = True
+    asked = {rank: used[owners == rank] for rank in _ranks(owners) if rank != comm.rank}
+    for rank, ids in comm.swap(asked).items():
+        pushed[nodes.places(ids)] = True
+        rows.append(_rows(ids, rank, comm))
     for other in holders:
-        ids = nodes.id[other.nodes[nodes.owned[other.nodes]]]
-        pushed = np.isin(ids, own) | np.isin(ids, np.concatenate([ids[:0], *rows]) // comm.size)
-        rows.append(_rows(ids[pushed], other.rank, comm))
-    table = np.unique(np.concatenate([own[:0], *rows]))
+        some = other.nodes[pushed[other.nodes] & nodes.owned[other.nodes]]
+        rows.append(_rows(nodes.id[some], other.rank, comm))
+    table = np.unique(np.concatenate(rows))
     table = np.unique(np.concatenate([table, _rows(np.unique(table // comm.size), comm.rank, comm)]))
     table = np.column_stack([table // comm.size, table % comm.size])
     told = comm.swap({int(rank): _company(table, int(rank)) for rank in np.unique(table[:, 1])})
     pairs = np.concatenate([np.zeros((0, 2), np.int64), *(words.reshape(-1, 2) for words in told.values())])
     pairs = pairs[np.lexsort((pairs[:, 0], pairs[:, 1]))]
     return {int(rank): pairs[pairs[:, 1] == rank, 0] for rank in np.unique(pairs[:, 1]) if rank != comm.rank}
+
+
+def _ranks(owners: Indices) -> list[int]:
+    """Those that own something, ascending."""
+    found: list[int] = np.flatnonzero(np.bincount(owners)).tolist()
+    return found
 
 
 def _rows(ids: Ints, rank: int, comm: Comm) -> Ints:
@@ -122,8 +130,8 @@ def copies(crowd: Crowd, nodes: Nodes, comm: Comm, tag: int) -> Copies:
     """The standing order for the state of the nodes of ``crowd`` that are not held here; all ranks take part."""
     far = np.flatnonzero(crowd.local < 0)
     owners = crowd.owner[far]
-    asked = comm.swap({int(rank): crowd.id[far[owners == rank]] for rank in np.unique(owners)})
-    receives = [(far[owners == rank].astype(np.int32), int(rank)) for rank in np.unique(owners)]
+    asked = comm.swap({rank: crowd.id[far[owners == rank]] for rank in _ranks(owners)})
+    receives = [(far[owners == rank].astype(np.int32), rank) for rank in _ranks(owners)]
     sends = [(np.searchsorted(nodes.id, ids).astype(np.int32), rank) for rank, ids in asked.items()]
     into = [(places, np.empty((len(places), 9)), rank) for places, rank in receives]
     out = [(local, np.empty((len(local), 9)), rank) for local, rank in sends]

@@ -117,7 +117,7 @@ def _outside(x, p, pairs, faces, size, part, depth):  # type: ignore[no-untyped-
     """Whether the node of pair ``p``, ``depth`` below its face, is nearer to the front of another face of that part.
 
     Then it is beside an acute edge and not in the body: the nearest face decides on which side a node is. Only faces
-    within ``DEEP`` of their size are asked, which every list of candidates has.
+    within the share of their size that every list of candidates has are asked.
     """
     b, m, s = np.empty(3), np.empty(3), pairs[p, 0]
     q = p
@@ -132,7 +132,7 @@ def _outside(x, p, pairs, faces, size, part, depth):  # type: ignore[no-untyped-
             continue
         if not _foot(b, x, x, s, i, j, k, 0.0):
             off = min(_off(x, s, i, j), _off(x, s, j, k), _off(x, s, k, i))
-        if off < min(depth, DEEP * size[f]):
+        if off < min(depth, (DEEP_SELF if part[s] == part[i] else DEEP) * size[f]):
             return True
     return False
 

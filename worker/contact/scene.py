@@ -54,7 +54,7 @@ class Sides:
         return self.crowd.places(self.faces.nodes)
 
     def face_things(self, deep: float) -> Things:
-        """The faces, to be searched by nodes as ``deep`` below them, of their size."""
+        """The faces, to be searched by nodes; ``deep``: of their size, how far below."""
         return Things(np.ascontiguousarray(self.face_places[:, :3]), 0.5 * self.skin + deep * self.faces.size)
 
     @cached_property
@@ -172,8 +172,8 @@ def build(
 ) -> Scene:
     """Searches what flies on for ``horizon``, s; all ranks take part and know of the same ``drift`` (3,), m/s."""
     seen, sent = _with_ghosts(sides, rules, horizon, drift, comm) if comm.size > 1 else (sides, 0)
-    node_face = _node_face(seen, rules, horizon)
-    edge_edge = _edge_edge(seen, sides.edges.n, rules, horizon)
+    node_face = _node_face(seen, rules, horizon, drift)
+    edge_edge = _edge_edge(seen, sides.edges.n, rules, horizon, drift)
     return _compact(seen, node_face, edge_edge, sent, nodes, neighbours, comm)
 
 
@@ -206,27 +206,28 @@ def _joined(sides: Sides, others: list[tuple[Faces, Edges, Crowd]]) -> Sides:
     return Sides(faces.take(np.argsort(faces.id)), edges, crowd, sides.slaves, sides.skin)
 
 
-def _node_face(seen: Sides, rules: Rules, horizon: float) -> Indices:
+def _node_face(seen: Sides, rules: Rules, horizon: float, drift: Floats) -> Indices:
     """(p, 2) place of a node and index of a face, sorted by node, then by face."""
-    crowd, slaves = seen.crowd, seen.nodes
+    crowd, slaves, v = seen.crowd, seen.nodes, seen.crowd.v - drift
     own = np.eye(len(rules.allowed), dtype=bool)
     found = [
-        search.find(slaves, seen.face_things(deep), crowd.x, crowd.v, crowd.part, rules.allowed & which, horizon, None)
+        search.find(slaves, seen.face_things(deep), crowd.x, v, crowd.part, rules.allowed & which, horizon, None)
         for deep, which in ((DEEP_SELF, own), (DEEP, ~own))
+        if (rules.allowed & which).any()
     ]
-    pairs = np.concatenate(found)
+    pairs = np.concatenate([np.zeros((0, 2), np.int32), *found])
     pairs = np.column_stack([slaves.corners[pairs[:, 0], 0], pairs[:, 1]])
     pairs = sift.faces(pairs, seen.face_places, seen.faces.size, crowd, seen.skin, horizon)
     return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
 
 
-def _edge_edge(seen: Sides, own: int, rules: Rules, horizon: float) -> Indices:
+def _edge_edge(seen: Sides, own: int, rules: Rules, horizon: float, drift: Floats) -> Indices:
     """(q, 2) indices of edges; the rank of the edge of smaller ids has the pair."""
     crowd, edges, things = seen.crowd, seen.edges, seen.edge_things
     rank = np.empty(edges.n, np.int64)
     rank[np.lexsort((edges.nodes[:, 1], edges.nodes[:, 0]))] = np.arange(edges.n)
     mine = Things(things.corners[:own], things.reach[:own])
-    pairs = search.find(mine, things, crowd.x, crowd.v, crowd.part, rules.allowed, horizon, rank)
+    pairs = search.find(mine, things, crowd.x, crowd.v - drift, crowd.part, rules.allowed, horizon, rank)
     pairs = sift.edges(pairs, crowd.places(edges.nodes), edges.size, crowd, seen.skin, horizon)
     return pairs[np.lexsort((rank[pairs[:, 1]], rank[pairs[:, 0]]))]
 

@@ -81,13 +81,12 @@ def find(
 ) -> Indices:  # fmt: skip
     """(pairs, 2) candidates: index of a small thing and of a large one.
 
-    ``x``, ``v`` (nodes, 3) and ``part`` (nodes,) belong to the places that corners name; ``allowed`` (parts, parts)
-    says which parts meet. Things with a corner in common are no candidates. ``rank`` (large,): the small things are the
-    first of the large ones, and only the one of lower rank finds a pair.
+    ``x``, ``v`` (nodes, 3), less what all drift with, and ``part`` (nodes,) belong to the places that corners name;
+    ``allowed`` (parts, parts) says which parts meet. Things with a corner in common are no candidates. ``rank``
+    (large,): the small things are the first of the large ones, and only the one of lower rank finds a pair.
     """
     if not len(small.corners) or not len(large.corners):
         return np.zeros((0, 2), np.int32)
-    v = v - v[large.corners[:, 0]].mean(axis=0)
     small_boxes, large_boxes = swept(small, x, v, horizon), swept(large, x, v, horizon)
     small_part, large_part = part[small.corners[:, 0]], part[large.corners[:, 0]]
     few = _near(small_boxes, small_part, large_boxes, large_part, allowed)

@@ -33,6 +33,16 @@ _F1, _F2, _I1, _I2, _T2 = "float64[::1]", "float64[:, ::1]", "int64[::1]", "int6
 _B1 = "boolean[::1]"
 
 
+@njit(f"void(int64, {_F1}, {_F2}, {_T2}, int64, float64)", cache=True, error_model="numpy")
+def motion(strength, w, x0, t, n, dt):  # type: ignore[no-untyped-def]
+    """What the stress of a chunk is made from: rates of deformation, or dilatation and the undeformed shape."""
+    if strength == models.ELASTIC:
+        tet4.dilatation(w, n, dt)
+        tet4.gather(w[tet4.REFERENCE :], x0, t, n)
+    else:
+        tet4.kinematics(w, n, dt)
+
+
 @njit(f"void(int64, {_F1}, {_F1}, {_F1}, int64, float64)", cache=True, error_model="numpy")
 def deviatoric_stress(strength, w, s, params, n, dt):  # type: ignore[no-untyped-def]
     """The deviatoric stress of a chunk, and its work: from the shape, or rotation, elastic trial and plastic return.
@@ -144,9 +154,7 @@ def standard_pass(  # type: ignore[no-untyped-def]
         n = len(t)
         tet4.gather(w[tet4.EDGE :], x, t, n)
         tet4.gather(w[tet4.RATE :], v, t, n)
-        tet4.kinematics(w, n, dt)
-        if strength == models.ELASTIC:
-            tet4.gather(w[tet4.REFERENCE :], x0, t, n)
+        motion(strength, w, x0, t, n, dt)
         deviatoric_stress(strength, w, s, params, n, dt)
         tet4.end_gradients(w, n)
         averaged.own_strains(w, n, dt)
@@ -178,9 +186,7 @@ def strain_pass(  # type: ignore[no-untyped-def]
         n = len(t)
         tet4.gather(w[tet4.EDGE :], x, t, n)
         tet4.gather(w[tet4.RATE :], v, t, n)
-        tet4.kinematics(w, n, dt)
-        if strength == models.ELASTIC:
-            tet4.gather(w[tet4.REFERENCE :], x0, t, n)
+        motion(strength, w, x0, t, n, dt)
         if strength != models.MOHR_COULOMB:
             deviatoric_stress(strength, w, s, params, n, dt)
         averaged.keep_flux(w, s, n)

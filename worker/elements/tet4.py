@@ -118,6 +118,29 @@ def kinematics(w, n, dt):  # type: ignore[no-untyped-def]
         w[SPIN + 2 * CHUNK + i] = 0.5 * h * (lyx - lxy)
 
 
+@njit("void(float64[::1], int64, float64)", cache=True, error_model="numpy")
+def dilatation(w, n, dt):  # type: ignore[no-untyped-def]
+    """Of ``kinematics`` only VOLUME_MID and DILATATION."""
+    h = 0.5 * dt
+    for i in range(n):
+        ax, ay, az = w[RATE + i], w[RATE + CHUNK + i], w[RATE + 2 * CHUNK + i]
+        bx, by, bz = w[RATE + 3 * CHUNK + i], w[RATE + 4 * CHUNK + i], w[RATE + 5 * CHUNK + i]
+        cx, cy, cz = w[RATE + 6 * CHUNK + i], w[RATE + 7 * CHUNK + i], w[RATE + 8 * CHUNK + i]
+        e1x, e1y, e1z = w[EDGE + i] - h * ax, w[EDGE + CHUNK + i] - h * ay, w[EDGE + 2 * CHUNK + i] - h * az
+        e2x, e2y = w[EDGE + 3 * CHUNK + i] - h * bx, w[EDGE + 4 * CHUNK + i] - h * by
+        e2z, e3x = w[EDGE + 5 * CHUNK + i] - h * bz, w[EDGE + 6 * CHUNK + i] - h * cx
+        e3y, e3z = w[EDGE + 7 * CHUNK + i] - h * cy, w[EDGE + 8 * CHUNK + i] - h * cz
+        g1x, g1y, g1z = e2y * e3z - e2z * e3y, e2z * e3x - e2x * e3z, e2x * e3y - e2y * e3x
+        six_volumes = e1x * g1x + e1y * g1y + e1z * g1z
+        flux = (
+            (ax * g1x + ay * g1y + az * g1z)
+            + (bx * (e3y * e1z - e3z * e1y) + by * (e3z * e1x - e3x * e1z) + bz * (e3x * e1y - e3y * e1x))
+            + (cx * (e1y * e2z - e1z * e2y) + cy * (e1z * e2x - e1x * e2z) + cz * (e1x * e2y - e1y * e2x))
+        )
+        w[VOLUME_MID + i] = six_volumes * _SIXTH
+        w[DILATATION + i] = flux / six_volumes
+
+
 @njit("void(float64[::1], int64)", cache=True, error_model="numpy")
 def end_gradients(w, n):  # type: ignore[no-untyped-def]
     """Replaces the edges by b1, b2, b3 (m^2), and sets VOLUME (m^3) and AREAS, the sum of |b|^2 over four nodes."""

@@ -23,20 +23,26 @@ _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _P, _MASS = PRESSURE * CHUNK, MASS * CHUNK
 
 
-def stresses(
-    bodies: list[Body], nodes: Nodes, strength: float, heaviest: float, neighbours: list[Neighbour], comm: Comm
-) -> Floats:
-    """(nodes, 6) mean Cauchy stress xx, yy, zz, yz, zx, xy without the viscous part, Pa; zero at nodes of other bodies.
+def stresses(bodies: list[Body], nodes: Nodes, heaviest: Floats, neighbours: list[Neighbour], comm: Comm) -> Floats:
+    """(nodes, 6) mean Cauchy stress xx, yy, zz, yz, zx, xy without the viscous part, Pa; zero at other bodies.
 
-    ``strength``, Pa, and ``heaviest``, the mass of a tet, kg: the largest of all bodies and ranks, in whose quanta the
-    sums are made. All ranks take part.
+    ``heaviest`` (parts,): mass of the heaviest tet of each part on all ranks, kg. Sums are in quanta of that and of the
+    part's strength. All ranks take part.
     """
-    sums = np.zeros((nodes.n, 7), np.int64)
+    sums, strength = np.zeros((nodes.n, 7), np.int64), np.zeros(len(heaviest))
     for body in bodies:
-        block = body.block
-        _add(sums, block.tets, block.state.reshape(-1), block.state.shape[1], _QUANTA / strength, _QUANTA / heaviest)
+        block, k = body.block, body.block.part
+        strength[k] = body.tough.strength
+        _add(
+            sums,
+            block.tets,
+            block.state.reshape(-1),
+            block.state.shape[1],
+            _QUANTA / strength[k],
+            _QUANTA / heaviest[k],
+        )
     complete(comm, neighbours, sums, _TAG)
-    return np.asarray(sums[:, :6] / np.maximum(sums[:, 6:], 1) * strength)
+    return np.asarray(sums[:, :6] / np.maximum(sums[:, 6:], 1) * strength[nodes.part][:, None])
 
 
 @njit("void(int64[:, ::1], uint32[:, ::1], float64[::1], int64, float64, float64)", cache=True, error_model="numpy")
@@ -60,8 +66,9 @@ def _add(sums, tets, state, rows, of_stress, of_mass):  # type: ignore[no-untype
 
 
 def replace(loaded: Loaded, first: Flags, body: Body, stress: Floats, x: Floats) -> None:
-    """The tractions of facets of ``body`` from the ``stress`` (nodes, 6) of their nodes; the effective one is the
-    smaller of this and that of the two tets. ``first`` (m,): whether the places are on the side of the smaller tet id.
+    """The tractions of facets of ``body`` from the ``stress`` (nodes, 6) of their nodes, made as
+    small as the effective one of the two tets where they pass it. ``first`` (m,): whether the places are on the side of
+    the smaller tet id.
     """
     block = body.block
     _tractions(
@@ -89,4 +96,8 @@ def _tractions(out, places, faces, first, tets, stress, x, weight, friction):  #
             out[m, 1] += s[5] * normal[0] + s[1] * normal[1] + s[3] * normal[2]
             out[m, 2] += s[4] * normal[0] + s[3] * normal[1] + s[2] * normal[2]
         out[m, :3] /= 3.0
-        out[m, 3] = min(out[m, 3], effective(out[m, :3], normal, weight, friction))
+        own = effective(out[m, :3], normal, weight, friction)
+        if own > out[m, 3]:
+            out[m, :3] *= out[m, 3] / own
+        else:
+            out[m, 3] = own

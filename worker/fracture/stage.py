@@ -112,12 +112,11 @@ class Fracture:
         self._bodies: list[Body] = []
         self.warnings: list[str] = []
         """What the user should know of the mesh."""
-        work, self._strength = 0.0, 0.0
+        work = 0.0
         for index, part in enumerate(case.parts):
             if part.fracture is not None:
                 volume, size = _tet(model, index, find_material(case, part.material).density, comm)
                 tough = toughness(find_material(case, part.material), part.fracture, size)
-                self._strength = max(self._strength, tough.strength)
                 work = max(work, tough.energy * volume ** (2.0 / 3.0))
                 step = case.numerics.dt_safety * _STEP * size / tough.speed
                 self.warnings += _warnings(part.name, part.fracture, tough, size, step)
@@ -125,9 +124,11 @@ class Fracture:
                     bodies.arm(i, block, part.fracture, tough, model.nodes.x0)
                     for i, block in enumerate(model.blocks) if block.part == index
                 ]  # fmt: skip
-        masses = [float(body.block.row(MASS).max(initial=0.0)) for body in self._bodies]
-        self._heaviest = float(comm.maximum(np.array([max(masses, default=0.0)]))[0])
-        """Tet of all ranks, kg."""
+        heaviest = np.zeros(len(case.parts))
+        for body in self._bodies:
+            heaviest[body.block.part] = body.block.row(MASS).max(initial=0.0)
+        self._heaviest = comm.maximum(heaviest)
+        """(parts,) mass of the heaviest tet of all ranks, kg; 0 where a part does not fracture."""
         self._far = Far(self._bodies, neighbours, comm)
         self._separation = Separation(model, neighbours, comm)
         self._since: tuple[Ints, Floats] = (np.zeros(0, np.int64), np.zeros(0))
@@ -170,7 +171,7 @@ class Fracture:
             return near, far
         some = [k for k, body in enumerate(self._bodies) if body.spec.traction == "nodes"]
         chosen = [self._bodies[k] for k in some]
-        stress = nodal.stresses(chosen, nodes, self._strength, self._heaviest, self._neighbours, self._comm)
+        stress = nodal.stresses(chosen, nodes, self._heaviest, self._neighbours, self._comm)
         for k, body in zip(some, chosen, strict=True):
             remote, at = far[k]
             nodal.replace(near[k], np.ones(len(near[k].places), bool), body, stress, nodes.x)

@@ -7,7 +7,7 @@ order in strain is Hencky's, G (ln V : ln V). Derived in docs/numerics.md.
 import numpy as np
 from numba import njit
 
-from ..elements.tet4 import EDGE, MODULUS, REFERENCE, VOLUME
+from ..elements.tet4 import EDGE, MODULUS, RATE, REFERENCE, SEEN, TRIAL, VOLUME
 from ..state import CHUNK, DISTORTION, MASS, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, WORK
 from .models import DENSITY, SHEAR
 
@@ -15,31 +15,28 @@ _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _WORK, _MASS, _DISTORTION = WORK * CHUNK, MASS * CHUNK, DISTORTION * CHUNK
 _THIRD, _SIXTH = 1.0 / 3.0, 1.0 / 6.0
+# Rows of the scratch: rate of deformation and spin are not needed here.
+_BXX, _BYY, _BZZ, _BYZ, _BZX, _BXY = (RATE + k * CHUNK for k in range(6))
+_MORE, _LESS, _HALF_SHEAR, _K, _SIX_VOLUMES = RATE + 6 * CHUNK, RATE + 7 * CHUNK, RATE + 8 * CHUNK, TRIAL, SEEN
 
 
 @njit("float64(float64)", cache=True, error_model="numpy", forceinline=True)
 def inverse_cube_root(u):  # type: ignore[no-untyped-def]
     """u^(-1/3), to round-off for u from 0.01 to 100: with t = u^(1/4) it is t^(-1/3) / t, by Newton's method.
 
-    Only + - * / and roots, which round alike in a vector lane and in a scalar. The start is the Pade approximant at 1.
+    Only + - * / and roots, which round alike in a vector lane and in a scalar. The start is the Pade approximant at 1,
+    and below the root for large t, from where the method is safe, if slow.
     """
     t = np.sqrt(np.sqrt(u))
-    y = (2.0 + t) / (1.0 + 2.0 * t)
+    y = min((2.0 + t) / (1.0 + 2.0 * t), 3.0 / (1.0 + t))
     for _ in range(4):
         y *= (4.0 - t * y * y * y) * _THIRD
     return y / t
 
 
-@njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
-def hyperelastic(w, s, params, n):  # type: ignore[no-untyped-def]
-    """The deviatoric stress G / 2J dev(b - b^-1) of a chunk, Pa; its work is the change of its potential.
-
-    ``w`` holds the edges of the end of the step and, from REFERENCE on, those of the undeformed tets. All is made of
-    B = F F^T - 1 = H + H^T + H H^T, H the displacement gradient, so that small strains keep their digits and none
-    leaves nothing: with k = det(1 + B)^(-1/3), b - 1 = k B + (k - 1), and b^-1 is the adjugate of b, whose determinant
-    is one.
-    """
-    shear = params[SHEAR]
+@njit("void(float64[::1], int64)", cache=True, error_model="numpy")
+def _strains(w, n):  # type: ignore[no-untyped-def]
+    """Rows of B = F F^T - 1 = H + H^T + H H^T, of det(1 + B) - 1, and six times the undeformed volume, m^3."""
     for i in range(n):
         r1x, r1y, r1z = w[REFERENCE + i], w[REFERENCE + CHUNK + i], w[REFERENCE + 2 * CHUNK + i]
         r2x, r2y, r2z = w[REFERENCE + 3 * CHUNK + i], w[REFERENCE + 4 * CHUNK + i], w[REFERENCE + 5 * CHUNK + i]
@@ -64,23 +61,53 @@ def hyperelastic(w, s, params, n):  # type: ignore[no-untyped-def]
         bzx = hzx + hxz + (hzx * hxx + hzy * hxy + hzz * hxz)
         bxy = hxy + hyx + (hxx * hyx + hxy * hyy + hxz * hyz)
         axx, ayy, azz = byy * bzz - byz * byz, bzz * bxx - bzx * bzx, bxx * byy - bxy * bxy
-        ayz, azx, axy = bzx * bxy - bxx * byz, bxy * byz - byy * bzx, byz * bzx - bzz * bxy
+        azx, axy = bxy * byz - byy * bzx, byz * bzx - bzz * bxy
         trace = bxx + byy + bzz
-        more = trace + (axx + ayy + azz) + (bxx * axx + bxy * axy + bzx * azx)
+        w[_MORE + i] = trace + (axx + ayy + azz) + (bxx * axx + bxy * axy + bzx * azx)
+        w[_BXX + i], w[_BYY + i], w[_BZZ + i] = bxx, byy, bzz
+        w[_BYZ + i], w[_BZX + i], w[_BXY + i] = byz, bzx, bxy
+        w[_SIX_VOLUMES + i] = six_volumes
+
+
+@njit("void(float64[::1], int64, float64)", cache=True, error_model="numpy")
+def _roots(w, n, shear):  # type: ignore[no-untyped-def]
+    """Rows k = det(1 + B)^(-1/3), k - 1 without cancellation, G / 2J: long chains, which overlap in a loop alone."""
+    for i in range(n):
+        more = w[_MORE + i]
         k = inverse_cube_root(1.0 + more)
-        less = -more / ((1.0 + more) * (1.0 + k + k * k))
+        w[_LESS + i] = -more / ((1.0 + more) * (1.0 + k + k * k))
+        w[_K + i] = k
+        w[_HALF_SHEAR + i] = 0.5 * shear / np.sqrt(1.0 + more)
+
+
+@njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
+def hyperelastic(w, s, params, n):  # type: ignore[no-untyped-def]
+    """The deviatoric stress G / 2J dev(b - b^-1) of a chunk, Pa; its work is the change of its potential.
+
+    ``w`` holds the edges of the end of the step and, from REFERENCE on, those of the undeformed tets. All is made of B
+    and so of the displacement gradient H, so that small strains keep their digits and none leaves nothing:
+    b - 1 = k B + (k - 1), and b^-1 is the adjugate of b, whose determinant is one.
+    """
+    _strains(w, n)
+    _roots(w, n, params[SHEAR])
+    of_energy = 0.25 * _SIXTH * params[SHEAR]
+    for i in range(n):
+        bxx, byy, bzz = w[_BXX + i], w[_BYY + i], w[_BZZ + i]
+        byz, bzx, bxy = w[_BYZ + i], w[_BZX + i], w[_BXY + i]
+        axx, ayy, azz = byy * bzz - byz * byz, bzz * bxx - bzx * bzx, bxx * byy - bxy * bxy
+        ayz, azx, axy = bzx * bxy - bxx * byz, bxy * byz - byy * bzx, byz * bzx - bzz * bxy
+        k, less, g = w[_K + i], w[_LESS + i], w[_HALF_SHEAR + i]
         square = k * k
-        own = square * trace + (k + 1.0) * less
+        own = square * (bxx + byy + bzz) + (k + 1.0) * less
         excess = (
             (k * bxx + less) * (square * (bxx - axx) - own)
             + (k * byy + less) * (square * (byy - ayy) - own)
             + (k * bzz + less) * (square * (bzz - azz) - own)
             + 2.0 * k * square * (byz * (byz - ayz) + bzx * (bzx - azx) + bxy * (bxy - axy))
         )
-        energy = 0.25 * _SIXTH * shear * six_volumes * excess
+        energy = of_energy * w[_SIX_VOLUMES + i] * excess
         s[_WORK + i] += energy - s[_DISTORTION + i]
         s[_DISTORTION + i] = energy
-        g = 0.5 * shear / np.sqrt(1.0 + more)
         one, two = g * (k + square), g * square
         sxx, syy, szz = one * bxx - two * axx, one * byy - two * ayy, one * bzz - two * azz
         mean = (sxx + syy + szz) * _THIRD
@@ -90,9 +117,12 @@ def hyperelastic(w, s, params, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def stiffen(w, s, params, n):  # type: ignore[no-untyped-def]
-    """Raises MODULUS to what a strained tet has at most: K + 4/3 (G + 2 W / V0) / J instead of K + 4/3 G."""
+    """Raises MODULUS to what a strained tet has at most: K + 4/3 (G + 2 W / V0) / |J| instead of K + 4/3 G.
+
+    Positive for a tet that is inside out too: that is how the limit of its step finds it (tet4.step_limit).
+    """
     shear = params[SHEAR]
     of_mass = shear / params[DENSITY]
     for i in range(n):
-        stiff = (of_mass * s[_MASS + i] + 2.0 * s[_DISTORTION + i]) / w[VOLUME + i]
+        stiff = (of_mass * s[_MASS + i] + 2.0 * s[_DISTORTION + i]) / abs(w[VOLUME + i])
         w[MODULUS + i] += 4.0 * _THIRD * (stiff - shear)
