@@ -91,15 +91,22 @@ def _glass(file: h5py.File) -> tuple[Floats, Floats, Floats]:
     return x - mesh["PointData/displacement"][:][glass], x, mesh["PointData/velocity"][:][glass]
 
 
+def front_of(z: Floats, start: Floats) -> float:
+    """How far from the impact nodes have separated, m; axial positions of the nodes where they were at first, all that
+    there are and those that there were.
+    """
+    cuts = np.arange(0.0, LENGTH + _SLICE / 2.0, _SLICE)
+    cuts[0], cuts[-1] = -np.inf, np.inf
+    growth = np.histogram(z, cuts)[0] / np.histogram(start, cuts)[0]
+    return _SLICE * int(np.argmin(np.append(growth > _FAILED, False)))
+
+
 def moment(folder: Path, index: int, frame: Path, start: Floats) -> Moment:
     """A frame; ``start``: axial positions of the nodes of the glass at first."""
     with h5py.File(frame) as file:
         x0, x, v = _glass(file)
         time = float(file["VTKHDF/FieldData/time"][0])
-    cuts = np.arange(0.0, LENGTH + _SLICE / 2.0, _SLICE)
-    cuts[0], cuts[-1] = -np.inf, np.inf
-    growth = np.histogram(x0[:, 2], cuts)[0] / np.histogram(start, cuts)[0]
-    front = _SLICE * int(np.argmin(np.append(growth > _FAILED, False)))
+    front = front_of(x0[:, 2], start)
     rim = (np.hypot(x0[:, 0], x0[:, 1]) > 0.97 * RADIUS) & (x0[:, 2] < front)
     radius = np.hypot(x[rim, 0], x[rim, 1])
     outward = (x[rim, :2] * v[rim, :2]).sum(axis=1) / np.maximum(radius, 1e-9)
