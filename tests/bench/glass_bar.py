@@ -1,7 +1,7 @@
 """The paper's glass bar: where the front of failure is, how the glass behind it swells, nodes and pieces, against time.
 
-``python -m tests.bench glass_bar`` runs the shipped case, coarser; ``python -m tests.bench.glass_bar FOLDER`` reads a
-run that has been done, at the paper's size.
+``python -m tests.bench glass_bar`` runs the shipped case, coarser; ``python -m tests.bench.glass_bar FOLDER PNG`` reads
+a run that has been done, at the paper's size, and draws it at four times.
 """
 
 import subprocess
@@ -15,6 +15,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import numpy.typing as npt
+from PIL import Image
 
 from conoid.cases import fragments, layout
 from conoid.cases.outcome import Outcome, from_json
@@ -32,6 +33,8 @@ _FAILED = 1.1
 """Nodes over those at the start: a slice with more is behind the front, if all between it and the impact are."""
 _EVERY = 10e-6
 """s between two lines of a table."""
+_DRAWN = (10e-6, 30e-6, 60e-6, 110e-6)
+"""s."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +108,7 @@ def moment(folder: Path, index: int, frame: Path, start: Floats) -> Moment:
     """A frame; ``start``: axial positions of the nodes of the glass at first."""
     with h5py.File(frame) as file:
         x0, x, v = _glass(file)
-        time = float(file["VTKHDF/FieldData/time"][0])
+    time = _time(frame)
     front = front_of(x0[:, 2], start)
     rim = (np.hypot(x0[:, 0], x0[:, 1]) > 0.97 * RADIUS) & (x0[:, 2] < front)
     radius = np.hypot(x[rim, 0], x[rim, 1])
@@ -164,5 +167,30 @@ def as_data(bars: Sequence[Bar]) -> list[dict[str, object]]:
     return [{"size": bar.size, "course": [asdict(m) for m in bar.course]} for bar in bars]
 
 
+def draw(folder: Path, png: Path) -> None:
+    """The bars at four times, side by side, a colour for every fragment."""
+    views = []
+    with tempfile.TemporaryDirectory() as place:
+        for time in _DRAWN:
+            frames = sorted((folder / layout.FRAMES).glob("*.vtkhdf"))
+            index = min(range(len(frames)), key=lambda k: abs(_time(frames[k]) - time))
+            out = Path(place) / "view.png"
+            words = ["view", str(folder), "--field", "fragment", "--frame", str(index), "--size", "900", "1500"]
+            subprocess.run([str(Path(sys.executable).with_name("conoid")), *words, "--out", str(out)], check=True)
+            with Image.open(out) as image:
+                views.append(image.convert("RGB").crop((260, 110, 640, 1340)).resize((228, 738)))
+    sheet = Image.new("RGB", (228 * len(views), 738))
+    for k, view in enumerate(views):
+        sheet.paste(view, (228 * k, 0))
+    sheet.quantize(128).save(png, optimize=True)
+
+
+def _time(frame: Path) -> float:
+    with h5py.File(frame) as file:
+        return float(file["VTKHDF/FieldData/time"][0])
+
+
 if __name__ == "__main__":
-    print(report([read(Path(folder).name, Path(folder)) for folder in sys.argv[1:]]))
+    print(report([read(Path(sys.argv[1]).name, Path(sys.argv[1]))]))
+    if len(sys.argv) > 2:
+        draw(Path(sys.argv[1]), Path(sys.argv[2]))
