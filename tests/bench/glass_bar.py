@@ -70,9 +70,9 @@ def measure(sizes: Sequence[str], ranks: int = 2) -> Iterator[Bar]:
             folder = Path(place) / "run"
             given = [f"parts[{k}].mesh.element_size={size}" for k in range(2)] + [f"run.ranks={ranks}"]
             words = [word for each in given for word in ("--set", each)]
-            launch = ["mpiexec", "-n", str(ranks), sys.executable, "-m", "mpi4py", "-m", "conoid.worker"]
-            launch[0] = str(Path(sys.executable).with_name("mpiexec"))
-            subprocess.run([*launch, "glass_steel_bar", "--out", str(folder), *words], check=True, capture_output=True)
+            launch = [str(Path(sys.executable).with_name("mpiexec")), "-n", str(ranks), sys.executable, "-m", "mpi4py"]
+            run = ["-m", "conoid.worker", "glass_steel_bar", "--out", str(folder), *words]
+            subprocess.run([*launch, *run], check=True, capture_output=True)
             yield read(size, folder)
 
 

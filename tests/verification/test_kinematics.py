@@ -8,9 +8,8 @@ import pytest
 from conoid.worker.state import PRESSURE, S_XX, S_XY, S_YY
 
 from ..worker import formulas
-from ..worker.kernels import FORMS, STEEL, Form, Patch
+from ..worker.kernels import FORMS, HARD, STEEL, Form, Patch
 from ..worker.meshes import Floats, block
-from ..worker.test_kinematics import HARD
 from .convergence import assert_converges
 
 YOUNG, SHEAR, BULK = 200e9, 200e9 / 2.6, 200e9 / 1.2

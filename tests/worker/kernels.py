@@ -25,6 +25,10 @@ Form = Literal["standard", "nodal", "split"]
 FORMS: tuple[Form, ...] = ("standard", "nodal", "split")
 
 STEEL = materials.Material(density=7850.0, elastic=materials.Elastic(young=200e9, poisson=0.3))
+HARD = STEEL.model_copy(
+    update={"strength": materials.LinearHardening(model="linear_hardening", yield_stress=1e15)}
+)  # fmt: skip
+"""Steel with a yield stress that nothing reaches: the hypoelastic law of materials with a strength."""
 COPPER = materials.Material(
     density=8930.0, elastic=materials.Elastic(young=117e9, poisson=0.35),
     strength=materials.LinearHardening(model="linear_hardening", yield_stress=0.4e9, hardening=0.1e9),

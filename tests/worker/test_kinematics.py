@@ -3,17 +3,15 @@
 import numpy as np
 import pytest
 
-from conoid.cases.materials import LinearHardening, Material
+from conoid.cases.materials import Material
 from conoid.worker.state import PRESSURE, WORK
 
 from . import formulas
-from .kernels import STEEL, Patch
+from .kernels import HARD, STEEL, Patch
 from .meshes import Floats, block, free_tets
 
 BULK, SHEAR = 200e9 / (3 * (1 - 0.6)), 200e9 / 2.6
 """Of STEEL, Pa."""
-HARD = STEEL.model_copy(update={"strength": LinearHardening(model="linear_hardening", yield_stress=1e15)})
-"""Steel with a yield stress that nothing reaches: the hypoelastic law of materials with a strength."""
 DT = 1e-7
 
 

@@ -5,9 +5,8 @@ import numpy as np
 from conoid.worker.state import PLASTIC_STRAIN, WORK, WORK_PLASTIC, YIELD
 
 from . import formulas
-from .kernels import COPPER, Patch, drive
+from .kernels import COPPER, HARD, Patch, drive
 from .meshes import Floats, free_tets
-from .test_kinematics import HARD
 
 SHEAR = 117e9 / 2.7
 YOUNG_STEEL_SHEAR = 200e9 / 2.6
