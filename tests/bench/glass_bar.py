@@ -4,6 +4,7 @@
 a run that has been done, at the paper's size, and draws it at four times.
 """
 
+import csv
 import subprocess
 import sys
 import tempfile
@@ -33,6 +34,10 @@ _FAILED = 1.1
 """Nodes over those at the start: a slice with more is behind the front, if all between it and the impact are."""
 _EVERY = 10e-6
 """s between two lines of a table."""
+_BEHIND = 3e-6
+"""s behind the front, after which means are taken."""
+_LOADED = 39e-6
+"""s until which the steel pushes: its own wave is back after 2 * 100 mm / 5048 m/s."""
 _DRAWN = (10e-6, 30e-6, 60e-6, 110e-6)
 """s."""
 
@@ -124,8 +129,23 @@ def moment(folder: Path, index: int, frame: Path, start: Floats) -> Moment:
 def report(bars: Sequence[Bar]) -> str:
     """A line a run, and the course of the finest."""
     head = ["size", "tets", "nodes at first", "nodes", "ratio", "front stops at, mm", "its speed to 50 mm, mm/us",
-            "rim, m/s", "pieces", "dust, of the mass", "residual", "CPU s", "M upd/s"]  # fmt: skip
+            "rim, m/s", "pieces", "dust, of the mass", "residual", "wall s", "CPU s", "M upd/s"]  # fmt: skip
     return f"{table(head, [_row(bar) for bar in bars])}\n\n{bars[-1].size}:\n\n{course(bars[-1].course)}"
+
+
+def waves(folder: Path) -> str:
+    """What passes the probes before the release comes back from the far end: peaks, and means behind the front."""
+    with (folder / layout.HISTORY).open(encoding="utf-8") as file:
+        lines = [
+            {name: float(text) for name, text in line.items() if name != "limiter"} for line in csv.DictReader(file)
+        ]
+    rows: list[list[Cell]] = []
+    for place in (20, 40, 80, 120):
+        arrival, back = 1e-3 * place / SOUND, (2.0 * LENGTH - 1e-3 * place) / SOUND
+        some = [line for line in lines if arrival + _BEHIND < line["t"] < min(back, _LOADED) - 1e-6]
+        stress, speed = ([line[f"{name}_{place}"] for line in some] for name in ("stress", "speed"))
+        rows.append([place, -1e-9 * min(stress), -1e-9 * float(np.mean(stress)), max(speed), float(np.mean(speed))])
+    return table(["mm", "stress, GPa, peak", "mean", "speed, m/s, peak", "mean"], rows)
 
 
 def _row(bar: Bar) -> list[Cell]:
@@ -135,7 +155,7 @@ def _row(bar: Bar) -> list[Cell]:
     return [
         bar.size, out.elements, out.nodes_initial, out.nodes, out.nodes / out.nodes_initial, 1e3 * arrested(bar.course),
         1e-3 * past.front / past.time if past else None, last.outward, pieces.fragments, pieces.dust_share,
-        out.worst_residual, out.cpu,
+        out.worst_residual, out.elapsed, out.cpu,
         1e-6 * out.element_updates_per_second,
     ]  # fmt: skip
 
@@ -191,6 +211,6 @@ def _time(frame: Path) -> float:
 
 
 if __name__ == "__main__":
-    print(report([read(Path(sys.argv[1]).name, Path(sys.argv[1]))]))
+    print(report([read(Path(sys.argv[1]).name, Path(sys.argv[1]))]), waves(Path(sys.argv[1])), sep="\n\n")
     if len(sys.argv) > 2:
         draw(Path(sys.argv[1]), Path(sys.argv[2]))

@@ -14,6 +14,7 @@ from ..parallel.ownership import Neighbour, complete
 from ..state import CHUNK, MASS, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, Flags, Floats, Nodes
 from .bodies import Body, Loaded
 from .criterion import effective, outward
+from .stars import Stars
 
 _TAG = 18
 _QUANTA = 2.0**30
@@ -23,45 +24,53 @@ _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _P, _MASS = PRESSURE * CHUNK, MASS * CHUNK
 
 
-def stresses(bodies: list[Body], nodes: Nodes, heaviest: Floats, neighbours: list[Neighbour], comm: Comm) -> Floats:
-    """(nodes, 6) mean Cauchy stress xx, yy, zz, yz, zx, xy without the viscous part, Pa; zero at other bodies.
+def stresses(
+    bodies: list[tuple[Body, Stars]],
+    wanted: Flags,
+    nodes: Nodes,
+    heaviest: Floats,
+    neighbours: list[Neighbour],
+    comm: Comm,
+) -> Floats:
+    """(nodes, 6) mean Cauchy stress xx, yy, zz, yz, zx, xy without the viscous part, Pa, of the ``wanted`` (nodes,) and
+    the shared nodes of these bodies; zero at others.
 
     ``heaviest`` (parts,): mass of the heaviest tet of each part on all ranks, kg. Sums are in quanta of that and of the
     part's strength. All ranks take part.
     """
     sums, strength = np.zeros((nodes.n, 7), np.int64), np.zeros(len(heaviest))
-    for body in bodies:
+    for other in neighbours:
+        wanted[other.nodes] = True
+    for body, star in bodies:
         block, k = body.block, body.block.part
         strength[k] = body.tough.strength
+        some = np.flatnonzero(wanted & (nodes.part == k))
         _add(
-            sums,
-            block.tets,
-            block.state.reshape(-1),
-            block.state.shape[1],
-            _QUANTA / strength[k],
-            _QUANTA / heaviest[k],
-        )
+            sums, some, star.first, star.count, star.pool, block.state.reshape(-1), block.state.shape[1],
+            _QUANTA / strength[k], _QUANTA / heaviest[k],
+        )  # fmt: skip
     complete(comm, neighbours, sums, _TAG)
     return np.asarray(sums[:, :6] / np.maximum(sums[:, 6:], 1) * strength[nodes.part][:, None])
 
 
-@njit("void(int64[:, ::1], uint32[:, ::1], float64[::1], int64, float64, float64)", cache=True, error_model="numpy")
-def _add(sums, tets, state, rows, of_stress, of_mass):  # type: ignore[no-untyped-def]
-    for e in range(len(tets)):
-        at = (e // CHUNK) * rows * CHUNK + e % CHUNK
-        p, weight = state[at + _P], np.rint(state[at + _MASS] * of_mass)
-        share = weight / _QUANTA * of_stress
-        xx, yy = np.int64(np.rint((state[at + _SXX] - p) * share)), np.int64(np.rint((state[at + _SYY] - p) * share))
-        zz, yz = np.int64(np.rint((state[at + _SZZ] - p) * share)), np.int64(np.rint(state[at + _SYZ] * share))
-        zx, xy = np.int64(np.rint(state[at + _SZX] * share)), np.int64(np.rint(state[at + _SXY] * share))
-        for k in range(4):
-            a = tets[e, k]
-            sums[a, 0] += xx
-            sums[a, 1] += yy
-            sums[a, 2] += zz
-            sums[a, 3] += yz
-            sums[a, 4] += zx
-            sums[a, 5] += xy
+@njit(
+    "void(int64[:, ::1], int64[::1], int32[::1], int32[::1], int32[::1], float64[::1], int64, float64, float64)",
+    cache=True,
+    error_model="numpy",
+)
+def _add(sums, nodes, first, count, pool, state, rows, of_stress, of_mass):  # type: ignore[no-untyped-def]
+    """Adds the stresses of the stars of ``nodes`` times their masses, and the masses, to ``sums``."""
+    for a in nodes:
+        for e in pool[first[a] : first[a] + count[a]]:
+            at = (e // CHUNK) * rows * CHUNK + e % CHUNK
+            p, weight = state[at + _P], np.rint(state[at + _MASS] * of_mass)
+            share = weight / _QUANTA * of_stress
+            sums[a, 0] += np.int64(np.rint((state[at + _SXX] - p) * share))
+            sums[a, 1] += np.int64(np.rint((state[at + _SYY] - p) * share))
+            sums[a, 2] += np.int64(np.rint((state[at + _SZZ] - p) * share))
+            sums[a, 3] += np.int64(np.rint(state[at + _SYZ] * share))
+            sums[a, 4] += np.int64(np.rint(state[at + _SZX] * share))
+            sums[a, 5] += np.int64(np.rint(state[at + _SXY] * share))
             sums[a, 6] += np.int64(weight)
 
 

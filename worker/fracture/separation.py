@@ -35,7 +35,8 @@ class Separation:
     def __init__(self, model: Model, neighbours: list[Neighbour], comm: Comm) -> None:
         self._model, self._neighbours, self._comm = model, neighbours, comm
         n = model.nodes.n
-        self._stars = {b: Stars(block.tets, n) for b, block in enumerate(model.blocks) if len(block.bond)}
+        self.stars = {b: Stars(block.tets, n) for b, block in enumerate(model.blocks) if len(block.bond)}
+        """By index of the block."""
         self._block_of = np.full(len(model.parts), -1, np.int32)
         for b, block in enumerate(model.blocks):
             self._block_of[block.part] = b
@@ -77,7 +78,7 @@ class Separation:
         nodes = self._model.nodes
         block_of = self._block_of[nodes.part[touched]]
         tables, where = [np.zeros((0, stars.COLUMNS), np.int64)], [np.zeros((0, 3), np.int64)]
-        for b, star in self._stars.items():
+        for b, star in self.stars.items():
             block, chosen = self._model.blocks[b], touched[block_of == b]
             count = int(star.count[chosen].sum())
             table, place = np.empty((count, stars.COLUMNS), np.int64), np.empty((count, 3), np.int64)
@@ -159,13 +160,13 @@ class Separation:
     ) -> None:
         """Gives tets their new nodes, and every node its star."""
         here = place >= 0
-        for b, star in self._stars.items():
+        for b, star in self.stars.items():
             star.grow(self._model.nodes.n - len(star.count))
             chosen = here & (block == b)
             self._model.blocks[b].tets[place[chosen], corner[chosen]] = node[chosen]
         ours = own >= 0
         index = own[ours]
-        for b, star in self._stars.items():
+        for b, star in self.stars.items():
             inside = places[index, 2] == b
             at = places[index[inside]]
             block_tets = self._model.blocks[b].tets

@@ -170,9 +170,12 @@ class Fracture:
         if not self._smooth:
             return near, far
         some = [k for k, body in enumerate(self._bodies) if body.spec.traction == "nodes"]
-        chosen = [self._bodies[k] for k in some]
-        stress = nodal.stresses(chosen, nodes, self._heaviest, self._neighbours, self._comm)
-        for k, body in zip(some, chosen, strict=True):
+        chosen = [(self._bodies[k], self._separation.stars[self._bodies[k].index]) for k in some]
+        wanted = np.zeros(nodes.n, bool)
+        for k in some:
+            wanted[self._bodies[k].block.tets[near[k].places]] = True
+        stress = nodal.stresses(chosen, wanted, nodes, self._heaviest, self._neighbours, self._comm)
+        for k, (body, _) in zip(some, chosen, strict=True):
             remote, at = far[k]
             nodal.replace(near[k], np.ones(len(near[k].places), bool), body, stress, nodes.x)
             nodal.replace(remote, self._far.first[at], body, stress, nodes.x)
