@@ -11,6 +11,7 @@ from numba import njit
 from conoid.cases import schema
 
 from .errors import InputError
+from .migration.parcel import Parcel, length
 from .parallel.comm import Comm
 from .state import Flags, Floats, Indices, Ints, Load, Model, Nodes, extended
 from .topology import Split
@@ -19,6 +20,8 @@ _AXES = {"x": 0, "y": 1, "z": 2}
 ON_PLANE = 1e-9
 """Of the size of the mesh: closer than this is on a plane."""
 _SWEEPS = 4
+_KEPT = ("contact_loss", "external_work", "_impulse")
+"""What every boundary remembers of its nodes."""
 
 
 class Boundary:
@@ -57,6 +60,20 @@ class Boundary:
         at = np.minimum(np.searchsorted(self.nodes, parents), max(len(self.nodes) - 1, 0))
         held = self.nodes[at] == parents if len(self.nodes) else np.zeros(len(parents), bool)
         self._inherit(at[held], (first + np.flatnonzero(held)).astype(np.int32))
+
+    def keep(self, parcel: Parcel, name: str) -> None:
+        """Adds what the boundary must remember to a parcel, under its ``name``."""
+        for key in _KEPT:
+            values = getattr(self, key)
+            column = np.zeros((length(parcel.nodes), *values.shape[1:]))
+            column[self.nodes] = values
+            parcel.nodes[f"{name}.{key}"] = column
+
+    def resume(self, parcel: Parcel, name: str, dt: float) -> None:
+        """Takes it back; ``dt``: of the last step, s."""
+        for key in _KEPT:
+            setattr(self, key, parcel.nodes[f"{name}.{key}"][self.nodes])
+        self._before = np.zeros((len(self.nodes), 3))
 
     def _inherit(self, at: Ints, copies: Indices) -> None:
         """Takes up ``copies`` of the nodes at the places ``at``."""
@@ -108,6 +125,10 @@ class RigidWalls(Boundary):
         super()._inherit(at, copies)
         self._held = extended(self._held, self._held[at])
 
+    def resume(self, parcel: Parcel, name: str, dt: float) -> None:
+        super().resume(parcel, name, dt)
+        self._pushed = True
+
     def note(self, state: Nodes) -> None:
         self._before = state.v[self.nodes]
         if self._pushed:
@@ -145,6 +166,10 @@ class Gravity(Driver):
         self._acceleration = acceleration
         self._last_dt = 0.0
 
+    def resume(self, parcel: Parcel, name: str, dt: float) -> None:
+        super().resume(parcel, name, dt)
+        self._last_dt = dt
+
     def apply(self, state: Nodes, dt: float, t: float) -> None:
         gained = 0.5 * (self._last_dt + dt) * self._acceleration
         self._last_dt = dt
@@ -156,24 +181,40 @@ class Gravity(Driver):
 class Traction(Driver):
     """Constant forces on corners of tets, over the mean step of the kick.
 
-    ``corners`` (m,) local nodes and ``tets`` (m,) global ids, by ascending tet; ``forces`` (m, 3), N.
+    ``load`` is on all ``corners`` (m,) that are local nodes.
     """
 
-    def __init__(self, corners: Indices, tets: Ints, forces: Floats) -> None:
+    def __init__(self, corners: Indices, load: Load) -> None:
         super().__init__(np.unique(corners))
-        self._corners, self._tets, self._forces = corners, tets, forces
+        self._corners, self._load = corners, load
         self.force = self._summed()
         """(n, 3) N."""
         self._last_dt = 0.0
 
+    def keep(self, parcel: Parcel, name: str) -> None:
+        super().keep(parcel, name)
+        load, ids = self._load, parcel.nodes["id"]
+        parcel.rows[f"{name}.load"] = {
+            "of": ids[self._corners], "key": load.place, "tets": load.tets, "force": load.force
+        }  # fmt: skip
+
+    def resume(self, parcel: Parcel, name: str, dt: float) -> None:
+        booked = [(parcel.nodes[f"{name}.{key}"] != 0.0).reshape(len(parcel.nodes["id"]), -1) for key in _KEPT]
+        used: Flags = np.concatenate(booked, axis=1).any(axis=1, keepdims=True)[:, 0]
+        used[self._corners] = True
+        self.nodes = _indices(used)
+        super().resume(parcel, name, dt)
+        self.force = self._summed()
+        self._last_dt = dt
+
     def grow(self, split: Split, ids: Ints) -> None:
         super().grow(split, ids)
-        self._corners = split.followed(self._corners[:, None], ids, self._tets)[:, 0]
+        self._corners = split.followed(self._corners[:, None], ids, self._load.tets)[:, 0]
         self.force = self._summed()
 
     def _summed(self) -> Floats:
         force = np.zeros((len(self.nodes), 3))
-        np.add.at(force, np.searchsorted(self.nodes, self._corners), self._forces)
+        np.add.at(force, np.searchsorted(self.nodes, self._corners), self._load.force)
         return force
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
@@ -267,23 +308,24 @@ def _push_out(x, v, impulse, mass, nodes, points, normals, held, dt):  # type: i
     return pushed
 
 
-def build(case: schema.Case, model: Model, loads: list[Load], comm: Comm) -> list[Boundary]:
+def loads(parcel: Parcel) -> list[Load]:
+    """The loads of the tractions that a parcel has, in their order."""
+    names = (f"boundary{index}.load" for index in range(len(parcel.known["last_push"])))
+    tables = [parcel.rows[name] for name in names if name in parcel.rows]
+    return [Load(table["key"], table["tets"], table["of"], table["force"]) for table in tables]
+
+
+def build(case: schema.Case, model: Model, loads: list[Load]) -> list[Boundary]:
     """The boundaries of a case on this rank's nodes: gravity and tractions first, so that what is held stays held;
     walls last, and they leave alone what has a prescribed motion. ``loads``: of the tractions.
-
-    Raises InputError, on every rank alike, for a boundary that holds no node, a body that starts behind a wall, and
-    motion prescribed across a symmetry plane.
     """
     nodes = model.nodes
     held = [_held_by(spec, model) for spec in case.boundaries]
-    counts = comm.sum(np.array([int(h.sum()) for h in held], np.int64))
-    for index in np.flatnonzero(counts == 0):
-        raise InputError(f"boundaries[{index}]: holds no node; check its place and its parts")
     pairs = list(zip(case.boundaries, held, strict=True))
     boundaries: list[Boundary] = [
         Gravity(_indices(h), np.array(spec.acceleration)) for spec, h in pairs if isinstance(spec, schema.Gravity)
     ]
-    boundaries += [Traction(nodes.places(load.nodes), load.tets, load.force) for load in loads]
+    boundaries += [Traction(nodes.places(load.nodes), load) for load in loads]
     boundaries += [
         SymmetryPlane(_indices(h), _AXES[spec.axis]) for spec, h in pairs if isinstance(spec, schema.Symmetry)
     ]
@@ -294,12 +336,26 @@ def build(case: schema.Case, model: Model, loads: list[Load], comm: Comm) -> lis
         elif isinstance(spec, schema.Rotation):
             centre, rate = np.array(spec.spin.centre), np.array(spec.spin.rate)
             boundaries.append(PrescribedRotation(_indices(h), centre, rate))
-    _refuse_conflicts(boundaries, nodes, comm)
     moved = np.zeros(nodes.n, bool)
     for boundary in boundaries:
         if isinstance(boundary, PrescribedVelocity):
             moved[boundary.nodes] = True
-    return [*boundaries, *_walls(case, model, [h & ~moved for h in held], comm)]
+    return [*boundaries, *_walls(case, [h & ~moved for h in held])]
+
+
+def start(case: schema.Case, model: Model, boundaries: list[Boundary], comm: Comm) -> None:
+    """Makes the initial velocities agree with the boundaries; all ranks take part.
+
+    Raises InputError, on every rank alike, for a boundary that holds no node, a body that starts behind a wall, and
+    motion prescribed across a symmetry plane.
+    """
+    counts = comm.sum(np.array([int(_held_by(spec, model).sum()) for spec in case.boundaries], np.int64))
+    for index in np.flatnonzero(counts == 0):
+        raise InputError(f"boundaries[{index}]: holds no node; check its place and its parts")
+    _refuse_conflicts(boundaries, model.nodes, comm)
+    _refuse_overlaps(case, model, boundaries, comm)
+    for boundary in boundaries:
+        boundary.start(model.nodes)
 
 
 def _held_by(spec: schema.Boundary, model: Model) -> Flags:
@@ -318,21 +374,23 @@ def _held_by(spec: schema.Boundary, model: Model) -> Flags:
     return chosen
 
 
-def _walls(case: schema.Case, model: Model, held: list[Flags], comm: Comm) -> list[Boundary]:
-    found = [(i, spec, held[i]) for i, spec in enumerate(case.boundaries) if isinstance(spec, schema.Wall)]
+def _walls(case: schema.Case, held: list[Flags]) -> list[Boundary]:
+    found = [(spec, h) for spec, h in zip(case.boundaries, held, strict=True) if isinstance(spec, schema.Wall)]
     if not found:
         return []
-    touched = np.any([h for _, _, h in found], axis=0)
-    walls = RigidWalls(
-        _indices(touched), np.array([spec.point for _, spec, _ in found]),
-        np.array([spec.normal for _, spec, _ in found]),
-        np.ascontiguousarray(np.array([h[touched] for _, _, h in found]).T),
-    )  # fmt: skip
-    depths = comm.maximum(walls.depths(model.nodes))
-    for (index, _, _), depth in zip(found, depths, strict=True):
-        if depth > ON_PLANE * model.size:
-            raise InputError(f"boundaries[{index}]: a body starts {depth:.3g} m behind this wall")
-    return [walls]
+    touched = np.any([h for _, h in found], axis=0)
+    points, normals = np.array([spec.point for spec, _ in found]), np.array([spec.normal for spec, _ in found])
+    which = np.ascontiguousarray(np.array([h[touched] for _, h in found]).T)
+    return [RigidWalls(_indices(touched), points, normals, which)]
+
+
+def _refuse_overlaps(case: schema.Case, model: Model, boundaries: list[Boundary], comm: Comm) -> None:
+    indices = [i for i, spec in enumerate(case.boundaries) if isinstance(spec, schema.Wall)]
+    for walls in boundaries:
+        if isinstance(walls, RigidWalls):
+            for index, depth in zip(indices, comm.maximum(walls.depths(model.nodes)), strict=True):
+                if depth > ON_PLANE * model.size:
+                    raise InputError(f"boundaries[{index}]: a body starts {depth:.3g} m behind this wall")
 
 
 def _refuse_conflicts(boundaries: list[Boundary], nodes: Nodes, comm: Comm) -> None:

@@ -28,6 +28,14 @@ class Clock:
         self.frame = 0
         """Index of the next frame time to land on."""
 
+    def keep(self) -> dict[str, float]:
+        """All that it knows."""
+        return dict(vars(self))
+
+    def resume(self, known: dict[str, float]) -> None:
+        """Takes it back."""
+        vars(self).update(known)
+
     @property
     def done(self) -> bool:
         """Whether the end time is reached."""

@@ -56,7 +56,7 @@ def compute(
     except PhysicsError as error:
         failure = error
     cpu = time.thread_time() - cpu
-    sim.free()
+    loop.sim.free()
     if history is not None:
         history.close()
     return _sum_up(loop, folder, failure, start, cpu, time.monotonic() - began)

@@ -20,7 +20,7 @@ from .hashing import uniform
 from .materials import models
 from .mesh.build import build as build_mesh
 from .mesh.faces import FACES, across, normals
-from .parallel.comm import Comm
+from .parallel.comm import Comm, SerialComm
 from .parallel.decompose import bisect
 from .parallel.ownership import Neighbour
 from .state import (
@@ -38,6 +38,7 @@ from .state import (
     Load,
     Model,
     Nodes,
+    Tets,
     chunked,
 )
 
@@ -198,7 +199,8 @@ def _loads(case: schema.Case, x: Floats, part: Indices, tets: Indices) -> list[L
             raise InputError(f"boundaries[{index}]: acts on no face; check its box and its parts")
         area = 0.5 * np.linalg.norm(normals(x, loaded), axis=1)
         force = area[:, None] / 3.0 * np.array(spec.stress)
-        loads.append(Load(np.repeat(tet[inside], 3), loaded.reshape(-1).astype(np.int64), np.repeat(force, 3, axis=0)))
+        of, nodes = np.repeat(tet[inside], 3).astype(np.int64), loaded.reshape(-1).astype(np.int64)
+        loads.append(Load(np.arange(len(of)), of, nodes, np.repeat(force, 3, axis=0)))
     return loads
 
 
@@ -211,7 +213,7 @@ def cut(whole: Whole, ranks: int, scale: tuple[float, float, float] = (1.0, 1.0,
     if ranks > len(whole.tets):
         raise InputError(f"run.ranks = {ranks}: at most {len(whole.tets)}, the number of tets")
     centres = whole.points[whole.tets].mean(axis=1) * np.array(scale)
-    owner = bisect(centres, np.ones(len(whole.tets)), ranks)
+    owner, _ = bisect(centres, np.arange(len(centres)), np.ones(len(centres)), ranks, SerialComm())
     nodes_of = [np.unique(whole.tets[owner == rank]) for rank in range(ranks)]
     holders = np.zeros(len(whole.points), np.int32)
     for nodes in nodes_of:
@@ -283,12 +285,10 @@ def _model(case: schema.Case, piece: Piece) -> Model:
 
 def _block(case: schema.Case, piece: Piece, index: int) -> Block:
     part, chosen = case.parts[index], np.flatnonzero(piece.tet_part == index)
-    wears = part.erosion is not None
     material = find_material(case, part.material)
     chosen = chosen[np.argsort(~piece.border[chosen], kind="stable")]
     rows = models.rows_of(material, case.numerics.pressure)
-    n = len(chosen)
-    state = np.zeros((-(-n // CHUNK), rows, CHUNK))
+    state = np.zeros((-(-len(chosen) // CHUNK), rows, CHUNK))
     state[:, MASS, :] = chunked(piece.tet_volume[chosen] * material.density)
     initial = {
         VOLUME_RATIO: 1.0,
@@ -299,12 +299,21 @@ def _block(case: schema.Case, piece: Piece, index: int) -> Block:
     for row, value in initial.items():
         if row < rows:
             state[:, row, :] = value
+    across = piece.across[chosen] if len(piece.across) else piece.across
+    tets = np.ascontiguousarray(piece.tets[chosen], np.uint32)
+    return block(case, index, piece.tet_ids[chosen], tets, state, across, int(piece.border[chosen].sum()))
+
+
+def block(
+    case: schema.Case, index: int, ids: Ints, tets: Tets, state: Floats, across: Indices, border: int
+) -> Block:  # fmt: skip
+    """The block of part ``index``: what is known of its tets, the ``border`` ones first, and what the case says."""
+    part = case.parts[index]
+    material = find_material(case, part.material)
     return Block(
-        part=index, n=n, id=piece.tet_ids[chosen], state=state,
-        tets=np.ascontiguousarray(piece.tets[chosen], np.uint32),
+        part=index, n=len(ids), id=ids, state=state, tets=tets,
         kind=models.strength_of(material), eos=models.eos_of(material),
         params=models.parameters(material, case.numerics.viscosity),
-        border_chunks=-(-int(piece.border[chosen].sum()) // CHUNK), temperature=part.temperature,
-        across=piece.across[chosen] if len(piece.across) else piece.across,
-        worn=np.zeros(n if wears else 0, bool), life=wear.life(part.erosion),
+        border_chunks=-(-border // CHUNK), temperature=part.temperature, across=across,
+        worn=np.zeros(len(ids) if part.erosion is not None else 0, bool), life=wear.life(part.erosion),
     )  # fmt: skip

@@ -45,6 +45,14 @@ class Ledger:
         self.eroded_mass = 0.0
         """kg; of nodes that have left, at the last call."""
 
+    def keep(self) -> tuple[float, float, float, Floats, float]:
+        """What it remembers, equal on all ranks."""
+        return self.initial, self.worst, self.lost, self.momentum, self.eroded_mass
+
+    def resume(self, known: tuple[float, float, float, Floats, float]) -> None:
+        """Takes it back."""
+        self.initial, self.worst, self.lost, self.momentum, self.eroded_mass = known
+
     def close(self, before: Floats) -> Energy:
         """The ledger at time n; ``before`` is v(n-1/2), the model holds v(n+1/2)."""
         nodes = self._model.nodes

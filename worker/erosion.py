@@ -18,6 +18,7 @@ from .contact.stage import Contact
 from .elements.wear import BROKEN, FREQUENCY, SOUND
 from .mesh.faces import FACES
 from .mesh.faces import normals as face_normals
+from .migration.parcel import Parcel
 from .parallel.comm import Comm
 from .parallel.fixed_point import Tally
 from .parallel.ownership import Neighbour, complete
@@ -103,12 +104,14 @@ class Erosion(Boundary):
         energy, momentum = mass * speed * speed, mass * speed
         self._work = Tally(np.full(3, energy))
         self._nodal = Tally(np.array([energy, mass, momentum, momentum, momentum]))
-        self._half = np.zeros((0, 3))
+        self._half = self._nodal.quanta(np.zeros((0, 5)))
+        self._limit = 0.0
         self.due = False
         """Whether the next step begins with a removal."""
 
     def begin(self, limit: float) -> None:
         """Takes the largest one-over-stable-step at the start, 1/s, as the measure of later ones."""
+        self._limit = limit
         for block in self._model.blocks:
             spec = self._specs[block.part]
             if spec is not None:
@@ -119,6 +122,28 @@ class Erosion(Boundary):
         self.removed = extended(self.removed, self.removed[parents])
         self._leaves = extended(self._leaves, self._leaves[parents])
         self._tets_at = extended(self._tets_at, np.ones(len(parents), np.int64))
+
+    def keep(self, parcel: Parcel, name: str) -> None:
+        nodes, ids = self._model.nodes, parcel.nodes["id"]
+        parcel.known["erosion"] = self._limit, self.due, self._work.scale, self._nodal.scale
+        for key, words in (("work", self._work.words), ("nodal", self._nodal.words), ("half", self._half)):
+            parcel.sums[f"erosion.{key}"] = words
+        parcel.nodes["erosion.removed"], parcel.nodes["erosion.tets_at"] = self.removed, self._tets_at
+        alone = np.flatnonzero((self._tets_at == 0) & nodes.owned)
+        parcel.rows["erosion.alone"] = {"at": nodes.x[alone], "with": ids[alone][:, None]}
+        tets = np.concatenate([np.zeros((0, 4), np.int64), *(tets for tets, _ in self._last)])
+        forces = np.concatenate([np.zeros((0, 4, 3)), *(forces for _, forces in self._last)])
+        parcel.rows["erosion.last"] = {"at": nodes.x[tets].mean(axis=1), "with": ids[tets], "force": forces}
+
+    def resume(self, parcel: Parcel, name: str, dt: float) -> None:
+        limit, self.due, self._work.scale, self._nodal.scale = parcel.known["erosion"]
+        self.begin(limit)
+        self._work.words, self._nodal.words, self._half = (
+            parcel.sums[f"erosion.{key}"].copy() for key in ("work", "nodal", "half")
+        )
+        self.removed, self._tets_at = parcel.nodes["erosion.removed"], parcel.nodes["erosion.tets_at"]
+        last = parcel.rows["erosion.last"]
+        self._last = [(np.searchsorted(parcel.nodes["id"], last["with"]), last["force"])]
 
     def decide(self, found: int) -> None:
         """``found`` of all ranks (elements/wear.py): whether there is something to remove now."""
@@ -140,8 +165,8 @@ class Erosion(Boundary):
 
     def note(self, state: Nodes) -> None:
         self._book_last_work(state)
-        self._nodal.add(np.column_stack([np.zeros((len(self._half), 2)), self._half]))
-        self._half = np.zeros((0, 3))
+        self._nodal.words += self._half
+        self._half[:] = 0
         self._leaving = np.zeros(0, np.int64)
         if self.due:
             self._remove(state)
@@ -154,8 +179,9 @@ class Erosion(Boundary):
             before, after, mass = self._before[state.owned[leaving]], state.v[owned], state.mass[owned]
             uneven = 0.5 * (self._clock.last_dt - self._clock.mean_dt) / state.scale
             energy = 0.5 * mass * (before * after).sum(axis=1) + uneven * (before * state.force[owned]).sum(axis=1)
-            self._half = 0.5 * mass[:, None] * after
-            self._nodal.add(np.column_stack([energy, mass, self._half]))
+            half = 0.5 * mass[:, None] * after
+            self._half = self._nodal.quanta(np.column_stack([np.zeros((len(half), 2)), half]))
+            self._nodal.add(np.column_stack([energy, mass, half]))
             state.force[leaving] = 0
         state.v[self.removed] = 0.0
 

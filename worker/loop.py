@@ -81,6 +81,7 @@ class Loop:
             if sim.vote.report:
                 self._report()
             self._propose()
+            sim = self.sim
             self._first_half()
             if sim.clock.done or sim.vote.stop:
                 self.stopped = 0 if sim.clock.done else sim.vote.stop

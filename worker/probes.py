@@ -66,7 +66,7 @@ def field(block: Block, name: str, model: Model) -> Floats:
 
 
 class Probes:
-    """The probes of a case on this rank. Raises InputError, on every rank alike, when one holds no tet."""
+    """The probes of a case on this rank."""
 
     def __init__(self, case: Case, model: Model, contact: Contact | None, clock: Clock, comm: Comm) -> None:
         self.names = [probe.name for probe in case.probes]
@@ -78,11 +78,22 @@ class Probes:
         self._comm = comm
         self._chosen = [[_inside(probe, block, model) for block in model.blocks] for probe in case.probes]
         """Global ids of the tets that each probe has in each block."""
-        counts = comm.sum(np.array([sum(len(c) for c in chosen) for chosen in self._chosen], np.int64))
+
+    def require_tets(self, case: Case) -> None:
+        """Raises InputError, on every rank alike, when a probe holds no tet."""
+        counts = self._comm.sum(np.array([sum(len(c) for c in chosen) for chosen in self._chosen], np.int64))
         for index in np.flatnonzero(counts == 0):
             raise InputError(
                 f"probes[{index}]: no tet of part {case.probes[index].part!r} has its centre between low and high"
             )
+
+    def keep(self) -> tuple[Floats, float]:
+        """What they remember, equal on all ranks."""
+        return self._pushed, self._since
+
+    def resume(self, known: tuple[Floats, float]) -> None:
+        """Takes it back."""
+        self._pushed, self._since = known
 
     def measure(self) -> Floats:
         """(probes,) the present values, equal on any number of ranks; NaN when all tets of a probe have left."""

@@ -18,10 +18,14 @@ from .energy import Ledger
 from .erosion import Erosion, Mirrors
 from .fracture.stage import Fracture
 from .materials.models import BULK, DENSITY, SHEAR, moduli
+from .migration import model as model_of
+from .migration.parcel import Parcel
+from .migration.route import Arrived
 from .parallel import fixed_point
 from .parallel.comm import Comm
+from .parallel.ownership import Neighbour
 from .probes import Probes
-from .state import MASS, Ints, Model
+from .state import MASS, Floats, Ints, Model
 from .timers import Timers
 
 _SMALLEST_STRAIN = 1e-12
@@ -142,32 +146,85 @@ class Simulation:
 def build(case: Case, folder: Path, comm: Comm) -> Simulation:
     """Meshes, cuts and distributes the case. Raises InputError on every rank alike."""
     model, piece = domain.build(case, folder, comm)
-    scene, timers = boundaries.build(case, model, piece.loads, comm), Timers()
-    for boundary in scene:
-        boundary.start(model.nodes)
+    scene = boundaries.build(case, model, piece.loads)
+    boundaries.start(case, model, scene, comm)
+    sim = _assemble(case, model, piece.neighbours, scene, piece.node_volume, comm, Timers())
+    sim.probes.require_tets(case)
+    if sim.contact is not None:
+        sim.contact.require_faces()
+    return sim
+
+
+def _assemble(
+    case: Case, model: Model, neighbours: list[Neighbour], scene: list[Boundary], node_volume: Floats, comm: Comm,
+    timers: Timers,
+) -> Simulation:  # fmt: skip
+    """The stages that the case needs, round a model and its boundaries; ``node_volume`` (nodes,): at the start, m^3."""
     run, numerics = case.run, case.numerics
     clock = Clock(run.end_time, numerics.dt_safety, numerics.dt_growth, run.frames)
     extremes = _extremes(model, comm)
     contact, erosion = None, None
     if case.in_contact:
-        contact = Contact(case, model, piece.neighbours, scene, comm, clock, timers, extremes)
+        contact = Contact(case, model, neighbours, scene, comm, clock, timers, extremes)
     if case.erodes:
-        erosion = Erosion(case, model, piece.neighbours, contact, comm, clock, extremes)
+        erosion = Erosion(case, model, neighbours, contact, comm, clock, extremes)
         scene.append(Mirrors.of(case, model, scene))
     walls = sum(not isinstance(bound, RigidWalls) for bound in scene)
     scene[walls:walls] = [bound for bound in (erosion, contact) if bound is not None]
     probes = Probes(case, model, contact, clock, comm)
-    elements = _elements(case, model, piece, comm, timers)
+    elements = _elements(case, model, neighbours, node_volume, comm, timers)
     fracture = None
     if case.fractures:
-        fracture = Fracture(case, model, piece.neighbours, elements, scene, contact, comm, clock)
-    floor = _force_floor(model, comm)
+        fracture = Fracture(case, model, neighbours, elements, scene, contact, comm, clock)
     return Simulation(
         case=case, comm=comm, model=model, elements=elements, boundaries=scene, contact=contact, erosion=erosion,
         fracture=fracture, clock=clock, ledger=Ledger(model, scene, contact, erosion, fracture, comm, clock),
-        probes=probes, timers=timers,
-        shared_nodes=piece.totals[2], floor=floor,
+        probes=probes, timers=timers, shared_nodes=_shared(model, neighbours, comm), floor=_force_floor(model, comm),
     )  # fmt: skip
+
+
+def keep(sim: Simulation) -> Parcel:
+    """All that this rank must remember between two steps; all ranks take part."""
+    parcel = model_of.keep(sim.model)
+    pushes = sim.comm.maximum(np.array([bound.last_push for bound in sim.boundaries]))
+    parcel.known |= {
+        "vote": sim.vote.result.copy(), "clock": sim.clock.keep(), "ledger": sim.ledger.keep(),
+        "probes": sim.probes.keep(), "floor": sim.floor, "last_push": pushes.tolist(),
+    }  # fmt: skip
+    for index, bound in enumerate(sim.boundaries):
+        bound.keep(parcel, f"boundary{index}")
+    sim.elements.keep(parcel)
+    if sim.fracture is not None:
+        sim.fracture.keep(parcel)
+    return parcel
+
+
+def resume(case: Case, arrived: Arrived, comm: Comm, timers: Timers) -> Simulation:
+    """Goes on with what has arrived; all ranks take part."""
+    parcel, known = arrived.parcel, arrived.parcel.known
+    model = model_of.resume(case, arrived, comm)
+    scene = boundaries.build(case, model, boundaries.loads(parcel))
+    sim = _assemble(case, model, arrived.neighbours, scene, np.ones(model.nodes.n), comm, timers)
+    sim.vote.result[:] = known["vote"]
+    sim.clock.resume(known["clock"])
+    sim.ledger.resume(known["ledger"])
+    sim.probes.resume(known["probes"])
+    sim.floor = known["floor"]
+    for index, (bound, last_push) in enumerate(zip(sim.boundaries, known["last_push"], strict=True)):
+        bound.resume(parcel, f"boundary{index}", sim.clock.dt)
+        bound.last_push = last_push
+    sim.elements.resume(parcel)
+    if sim.fracture is not None:
+        sim.fracture.resume(parcel)
+    return sim
+
+
+def _shared(model: Model, neighbours: list[Neighbour], comm: Comm) -> int:
+    """Nodes of all ranks that several hold."""
+    shared = np.zeros(model.nodes.n, bool)
+    for other in neighbours:
+        shared[other.nodes] = True
+    return int(comm.sum(np.array([(shared & model.nodes.owned).sum()]))[0])
 
 
 def _extremes(model: Model, comm: Comm) -> tuple[float, float]:
@@ -180,14 +237,14 @@ def _extremes(model: Model, comm: Comm) -> tuple[float, float]:
     return float(largest), float(fastest)
 
 
-def _elements(case: Case, model: Model, piece: domain.Piece, comm: Comm, timers: Timers) -> Elements:
+def _elements(
+    case: Case, model: Model, neighbours: list[Neighbour], node_volume: Floats, comm: Comm, timers: Timers
+) -> Elements:  # fmt: skip
     form = case.numerics.pressure
     if form == "standard":
-        return Elements(model, comm, piece.neighbours, timers)
+        return Elements(model, comm, neighbours, timers)
     bulk = np.array([moduli(find_material(case, part.material))[0] for part in case.parts])
-    return AveragedElements(
-        model, comm, piece.neighbours, timers, 1.0 / piece.node_volume, bulk[model.nodes.part], form == "split"
-    )
+    return AveragedElements(model, comm, neighbours, timers, 1.0 / node_volume, bulk[model.nodes.part], form == "split")
 
 
 def _force_floor(model: Model, comm: Comm) -> float:

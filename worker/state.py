@@ -139,6 +139,8 @@ class Copies:
 class Load:
     """Constant forces on corners of tets, in the order of the tets."""
 
+    place: Ints
+    """(m,) of each among all of the load."""
     tets: Ints
     """(m,) global ids."""
     nodes: Ints
@@ -148,7 +150,7 @@ class Load:
 
     def take(self, chosen: Flags) -> "Load":
         """Some of them."""
-        return Load(self.tets[chosen], self.nodes[chosen], self.force[chosen])
+        return Load(self.place[chosen], self.tets[chosen], self.nodes[chosen], self.force[chosen])
 
 
 @dataclass

@@ -3,11 +3,17 @@
 import numpy as np
 import pytest
 
-from conoid.worker.parallel.decompose import bisect
+from conoid.worker.parallel import decompose
+from conoid.worker.parallel.comm import SerialComm
+from conoid.worker.state import Indices
 
 from .meshes import Floats
 
 PARTS = [1, 2, 3, 4, 5, 7, 8, 16, 31]
+
+
+def bisect(points: Floats, weights: Floats, parts: int) -> Indices:
+    return decompose.bisect(points, np.arange(len(points)), weights, parts, SerialComm())[0]
 
 
 def cloud(n: int, seed: int) -> Floats:
@@ -41,8 +47,8 @@ def test_the_same_arguments_give_the_same_parts(parts: int) -> None:
     assert (bisect(points, np.ones(500), parts) == bisect(points.copy(), np.ones(500), parts)).all()
 
 
-def test_ties_are_told_apart_by_their_index() -> None:
-    """All points in one place: the cut follows the order of the points."""
+def test_ties_are_told_apart_by_their_ids() -> None:
+    """All points in one place: the cut follows the ids."""
     owner = bisect(np.zeros((40, 3)), np.ones(40), 4)
     assert owner.tolist() == sorted(owner.tolist())
     assert len(set(owner.tolist())) == 4

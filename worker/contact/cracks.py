@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from ..migration.parcel import Table
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
 from ..state import WIDE, Block, Flags, Floats, Indices, Ints, Nodes, extended
@@ -63,6 +64,37 @@ class Cracks:
         parents[split.copies.parents] = True
         rows = np.flatnonzero(parents[self.nodes].any(axis=1))
         self.nodes[rows] = split.followed_sides(self.nodes[rows], ids, self.tets[rows])
+
+    def keep(self, blocks: list[Block], ids: Ints) -> Table:
+        """The facets as a table; ``ids``: of the local nodes."""
+        one, two = (self._seen_from(blocks, k) for k in (0, 1))
+        faces = np.where(one >= 0, one, two[:, ::-1])
+        rows = np.concatenate([np.flatnonzero(self.sides[:, k, 1] >= 0) for k in (0, 1)])
+        tet = np.concatenate([self.tets[self.sides[:, k, 1] >= 0, k] for k in (0, 1)])
+        return {
+            "tet": tet, "key": keys(*self.tets[rows].T), "tets": self.tets[rows], "faces": faces[rows],
+            "with": ids[self.nodes[rows]],
+        }  # fmt: skip
+
+    def _seen_from(self, blocks: list[Block], k: int) -> Ints:
+        """(m, 2) local faces of side ``k`` and of the other, as side ``k`` knows them; -1 where it is elsewhere."""
+        found = np.full((len(self.tets), 2), -1, np.int64)
+        for b, block in enumerate(blocks):
+            here = np.flatnonzero((self.sides[:, k, 0] == b) & (self.sides[:, k, 1] >= 0))
+            place, face = self.sides[here, k, 1], self.sides[here, k, 2]
+            found[here] = np.column_stack([face, block.across[place, face] % 4])
+        return found
+
+    @classmethod
+    def resume(cls, table: Table, blocks: list[Block], nodes: Nodes) -> "Cracks":
+        """Facets from a table."""
+        sides = np.full((len(table["tets"]), 2, 3), -1, np.int32)
+        for b, block in enumerate(blocks):
+            order = np.argsort(block.id)
+            at = order[np.minimum(np.searchsorted(block.id[order], table["tets"]), block.n - 1)]
+            rows, k = np.nonzero(block.id[at] == table["tets"])
+            sides[rows, k] = np.column_stack([np.full(len(rows), b), at[rows, k], table["faces"][rows, k]])
+        return cls(table["tets"], nodes.places(table["with"]), sides)
 
     def release(self, blocks: list[Block], x: Floats, size: float) -> int:
         """Makes surface of what is wide at the positions ``x`` (nodes, 3); returns how many facets."""

@@ -3,6 +3,7 @@
 import numpy as np
 from numba import njit
 
+from ..migration.parcel import Parcel
 from ..parallel.comm import Comm
 from ..parallel.fixed_point import exact_sums
 from ..parallel.ownership import Neighbour, complete
@@ -54,6 +55,18 @@ class Flight:
             return True
         far = _strayed(nodes.x, nodes.v, self._x, self._v, self._found.flags, dt, t + dt - self._t)
         return bool(far > (_SPENT * self._skin) ** 2)
+
+    def keep(self, parcel: Parcel) -> None:
+        """Adds the surface and its flight to a parcel."""
+        parcel.known["flight"] = self.size, self._skin, self._t, self._until
+        parcel.nodes["flight.flags"], parcel.nodes["flight.x"] = self._found.flags, self._x
+        parcel.nodes["flight.v"] = self._v
+
+    def resume(self, found: Surface, nodes: Nodes, mobility: Floats, parcel: Parcel) -> None:
+        """Takes them back, but for the surface, which is ``found``; all ranks take part."""
+        self.size, self._skin, self._t, self._until = parcel.known["flight"]
+        self._x, self._v = parcel.nodes["flight.x"], parcel.nodes["flight.v"]
+        self.follow(found, nodes, mobility)
 
     def grow(self, parents: Ints) -> None:
         """Takes up copies of nodes: they fly as their parents do."""

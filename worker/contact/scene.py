@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 from numba import njit
 
+from ..migration.parcel import Table, take
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum
 from ..state import Flags, Floats, Indices, Ints, Nodes
@@ -138,6 +139,21 @@ class Scene:
         _, here, there = np.intersect1d(mine, theirs, assume_unique=True, return_indices=True)
         self.kept[here] = np.ascontiguousarray(rows[there, 2:]).view(np.float64)
 
+    def keep(self) -> tuple[Table, Table]:
+        """Its candidates as tables, nodes and faces, edges and edges, with what they have kept."""
+        ids, (slave, face), (one, two) = self.crowd.id, self.node_face.T, self.edge_edge.T
+        faces = ids[self.faces[face]]
+        pairs = {
+            "node": ids[slave], "face": self.face_id[face], "ends": faces, "size": self.face_size[face],
+            "kept": self.kept, "normals": self.normals[slave],
+        }  # fmt: skip
+        edges = {
+            "node": ids[self.edges[one, 0]], "ends": ids[np.column_stack([self.edges[one], self.edges[two]])],
+            "sides": np.column_stack([self.edge_sides[one], self.edge_sides[two]]),
+            "size": np.column_stack([self.edge_size[one], self.edge_size[two]]),
+        }  # fmt: skip
+        return pairs, edges
+
     def free(self) -> None:
         """Gives its messages back to MPI."""
         self.copies.free()
@@ -174,7 +190,7 @@ def build(
     seen, sent = _with_ghosts(sides, rules, horizon, drift, comm) if comm.size > 1 else (sides, 0)
     node_face = _node_face(seen, rules, horizon, drift)
     edge_edge = _edge_edge(seen, sides.edges.n, rules, horizon, drift)
-    return _compact(seen, node_face, edge_edge, sent, nodes, neighbours, comm)
+    return compact(seen, node_face, edge_edge, sent, nodes, neighbours, comm)
 
 
 def _with_ghosts(sides: Sides, rules: Rules, horizon: float, drift: Floats, comm: Comm) -> tuple[Sides, int]:
@@ -232,7 +248,7 @@ def _edge_edge(seen: Sides, own: int, rules: Rules, horizon: float, drift: Float
     return pairs[np.lexsort((rank[pairs[:, 1]], rank[pairs[:, 0]]))]
 
 
-def _compact(
+def compact(
     seen: Sides, node_face: Indices, edge_edge: Indices, sent: int, nodes: Nodes,
     neighbours: list[Neighbour], comm: Comm,
 ) -> Scene:  # fmt: skip
@@ -269,4 +285,30 @@ def _compact(
         total=np.zeros((crowd.n, 3), np.int64), normals=np.zeros((crowd.n, 9)), before=np.zeros((crowd.n, 3)),
     )  # fmt: skip
     found.connect(company, nodes, comm)
+    return found
+
+
+def resume(
+    pairs: Table, edges: Table, here: Crowd, skin: float, nodes: Nodes, neighbours: list[Neighbour], comm: Comm
+) -> Scene:  # fmt: skip
+    """The scene of candidates that another has kept; all ranks take part. ``here``: every node of this rank."""
+    pairs = take(pairs, np.lexsort((pairs["face"], pairs["node"])))
+    which, first, face = np.unique(pairs["face"], return_index=True, return_inverse=True)
+    faces = Faces(which, pairs["ends"][first], pairs["size"][first])
+    rows = np.column_stack([edges["ends"], edges["sides"], edges["size"].view(np.int64)])
+    columns = [[*range(k, k + 4), 8 + 2 * m, 9 + 2 * m, 12 + m] for m, k in enumerate((0, 4))]
+    table, edge = np.unique(np.concatenate([rows[:, c] for c in columns]), axis=0, return_inverse=True)
+    sharp = Edges(*(np.ascontiguousarray(c) for c in (table[:, :4], table[:, 4:6], table[:, 6].view(np.float64))))
+    ids = np.concatenate([pairs["node"], pairs["ends"].reshape(-1), edges["ends"].reshape(-1)])
+    owners = np.concatenate(
+        [np.full(len(pairs["node"]), comm.rank), *(t["owners"].reshape(-1) for t in (pairs, edges))]
+    )
+    used, at = np.unique(ids, return_index=True)
+    held = nodes.places(used)
+    far = ghosts.fetch(used[held < 0], owners[at][held < 0].astype(np.int32), here, comm)
+    seen = Sides(faces, sharp, merged([here, far]), used[:0], skin)
+    node_face = np.column_stack([seen.crowd.places(pairs["node"]), face.reshape(-1)]).astype(np.int32)
+    found = compact(seen, node_face, edge.reshape(2, -1).T.astype(np.int32), 0, nodes, neighbours, comm)
+    found.kept[:] = pairs["kept"]
+    found.normals[found.node_face[:, 0]] = pairs["normals"]
     return found

@@ -6,6 +6,7 @@ everybody ends with the same velocity, to the bit.
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numba import njit
@@ -15,6 +16,7 @@ from conoid.cases.schema import Case
 from ..boundaries import Boundary, PrescribedVelocity, SymmetryPlane
 from ..clock import Clock
 from ..errors import InputError
+from ..migration.parcel import Parcel
 from ..parallel import fixed_point
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
@@ -25,7 +27,6 @@ from . import meetings, pairing, scene, surface, sweeps
 from .cracks import Cracks, Follower, across, news
 from .flight import Flight
 from .scene import Rules, Scene
-from .surface import Surface
 
 _SHORTEST = 10.0
 """Steps of free flight that a search looks ahead at least; at most twice what the last search was good for."""
@@ -50,7 +51,6 @@ class Contact(Boundary):
         self._edges = case.contact.edges
         self._surface = surface.build(model, self._planes, neighbours, comm, self._edges)
         self._mu = pairing.friction(case)
-        _require_faces(self._surface, model, ~np.isnan(self._mu), comm)
         self._flight = Flight(self._surface, model.nodes, self._mobility, case.contact.skin, neighbours, comm)
         self._rules = Rules(case.contact.domain, ~np.isnan(self._mu), 2.0 * self._flight.size)
         largest, fastest = extremes
@@ -76,6 +76,58 @@ class Contact(Boundary):
         self._rubs = bool(np.nanmax(self._mu, initial=0.0) > 0.0)
         self._mean_dt = 0.0
         """Of the last step with a scene, s."""
+
+    def keep(self, parcel: Parcel, name: str) -> None:
+        super().keep(parcel, name)
+        parcel.known["contact"] = (
+            self._scale, self._friction.scale, self.due, self.limit, self._stale, self.searches, self._last,
+            self._mean_dt, self._scene is not None,
+        )  # fmt: skip
+        parcel.sums["contact.parts"], parcel.sums["contact.friction"] = self._parts, self._friction.words
+        self._flight.keep(parcel)
+        edges = self._surface.edges if not self._stale else self._surface.edges.take(np.zeros(0, np.int64))
+        parcel.rows["contact.edges"] = {
+            "tet": edges.sides.min(axis=1, initial=np.iinfo(np.int64).max) // 4, "ends": edges.nodes,
+            "sides": edges.sides, "size": edges.size,
+        }  # fmt: skip
+        parcel.rows["contact.cracks"] = self._cracks.keep(self._model.blocks, parcel.nodes["id"])
+        total = np.zeros((self._model.nodes.n, 3), np.int64)
+        if self._scene is not None:
+            total[self._scene.local] = self._scene.total[self._scene.held]
+            parcel.rows["contact.pairs"], parcel.rows["contact.sharp"] = self._scene.keep()
+        parcel.nodes["contact.total"] = total
+
+    def resume(self, parcel: Parcel, name: str, dt: float) -> None:
+        super().resume(parcel, name, dt)
+        (
+            self._scale, self._friction.scale, self.due, self.limit, self._stale, self.searches, self._last,
+            self._mean_dt, searched,
+        ) = parcel.known["contact"]  # fmt: skip
+        self._parts, self._friction.words = parcel.sums["contact.parts"], parcel.sums["contact.friction"]
+        state = self._model.nodes
+        self._surface.flags = parcel.nodes["flight.flags"]
+        self._surface = surface.with_edges(self._surface, parcel.rows["contact.edges"], state)
+        self._flight.resume(self._surface, state, self._mobility, parcel)
+        self._rules = replace(self._rules, cell=2.0 * self._flight.size)
+        self._cracks = Cracks.resume(parcel.rows["contact.cracks"], self._model.blocks, state)
+        if searched:
+            pairs, sharp = parcel.rows["contact.pairs"], parcel.rows["contact.sharp"]
+            here = self._flight.here(state)
+            skin = self._flight.sides.skin
+            self._scene = scene.resume(pairs, sharp, here, skin, state, self._neighbours, self._comm)
+            self._connect(self._scene, state)
+            self._scene.total[self._scene.held] = parcel.nodes["contact.total"][self._scene.local]
+
+    def require_faces(self) -> None:
+        """Raises InputError, on every rank alike, when a part that may meet has no face to meet with."""
+        model, allowed = self._model, ~np.isnan(self._mu)
+        first = np.searchsorted(model.nodes.id, self._surface.faces.nodes[:, 0])
+        counts = self._comm.sum(np.bincount(model.nodes.part[first], minlength=len(model.parts)).astype(np.int64))
+        for index in np.flatnonzero((counts == 0) & allowed.any(axis=1)):
+            raise InputError(
+                f"contact: part {model.parts[index]!r} has no exposed face, all lie on symmetry planes; "
+                "leave it out of contact.parts"
+            )
 
     def friction_work(self) -> float:
         """Heat of friction so far of the meetings of all ranks, J; all ranks take part."""
@@ -173,12 +225,7 @@ class Contact(Boundary):
         horizon = max(min(steps, 2.0 * (clock.step - self._last)), _SHORTEST) * clock.dt
         self._scene = scene.build(flight.sides, self._rules, horizon, drift, state, self._neighbours, self._comm)
         self.limit = _KINEMATIC * float(self._comm.maximum(np.array([self._scene.approach()]))[0])
-        if self._fractures:
-            follower = Follower(self._scene, flight.here(state), state)
-            follower.cracks(self._cracks)
-            if self._comm.size > 1:
-                self._scene.free()
-                follower.share(self._neighbours, self._comm)
+        self._connect(self._scene, state)
         if old is not None and self._rubs:
             self._scene.remember(old, state, self._comm)
         self._look(self._scene, state)
@@ -186,6 +233,15 @@ class Contact(Boundary):
         flight.begin(state, clock.t, clock.t + horizon)
         self.due, self._apart, self._last = False, False, clock.step
         self.searches += 1
+
+    def _connect(self, found: Scene, state: Nodes) -> None:
+        """Takes the cracks up into a new scene; all ranks take part."""
+        if self._fractures:
+            follower = Follower(found, self._flight.here(state), state)
+            follower.cracks(self._cracks)
+            if self._comm.size > 1:
+                found.free()
+                follower.share(self._neighbours, self._comm)
 
     def spent(self, state: Nodes) -> bool:
         """Whether a node of the surface will leave, in a step more, what the last search has allowed for."""
@@ -305,17 +361,6 @@ def _book(loss, external, local, held, before, total, mobility, scale):  # type:
             loss[local[h]] -= work
             if mobility[held[h], i] == 0.0:
                 external[local[h]] -= work
-
-
-def _require_faces(found: Surface, model: Model, allowed: Flags, comm: Comm) -> None:
-    """Raises InputError, on every rank alike, when a part that may meet has no face to meet with."""
-    first = np.searchsorted(model.nodes.id, found.faces.nodes[:, 0])
-    counts = comm.sum(np.bincount(model.nodes.part[first], minlength=len(model.parts)).astype(np.int64))
-    for index in np.flatnonzero((counts == 0) & allowed.any(axis=1)):
-        raise InputError(
-            f"contact: part {model.parts[index]!r} has no exposed face, all lie on symmetry planes; "
-            "leave it out of contact.parts"
-        )
 
 
 def _mobility(nodes: Nodes, bounds: list[Boundary]) -> tuple[Floats, Flags]:

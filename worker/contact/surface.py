@@ -6,9 +6,10 @@ import numpy as np
 
 from ..mesh.faces import FACES
 from ..mesh.faces import normals as face_normals
+from ..migration.parcel import Table
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, complete
-from ..state import Flags, Indices, Ints, Model
+from ..state import Flags, Indices, Ints, Model, Nodes
 from .records import Edges, Faces
 
 SHARP = np.cos(np.radians(25.0))
@@ -57,6 +58,17 @@ def uncovered(
     flags = (old.flags | loose | _flags(local, model.nodes.n, neighbours, comm)) & ~removed
     kept = ~np.asarray(np.isin(old.edges.sides // 4, gone).any(axis=1))
     return Surface(_table(model, local, ids), old.edges.take(kept), flags, old.far, old.far_owner)
+
+
+def with_edges(found: Surface, edges: Table, nodes: Nodes) -> Surface:
+    """The surface with the edges of a table, ``owners`` of their nodes included."""
+    ends, owners = edges["ends"].reshape(-1), edges["owners"].reshape(-1)
+    elsewhere = nodes.places(ends) < 0
+    far, first = np.unique(ends[elsewhere], return_index=True)
+    return Surface(
+        found.faces, Edges(edges["ends"], edges["sides"], edges["size"]), found.flags, far,
+        owners[elsewhere][first].astype(np.int32),
+    )  # fmt: skip
 
 
 def _table(model: Model, local: "np.ndarray", ids: Ints) -> Faces:

@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
+from ..migration.parcel import Parcel
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum
 from ..state import CHUNK, Block, Copies, Floats, Ints, Model, extended
@@ -97,6 +98,16 @@ class Elements:
             self.free()
             self._connect()
 
+    def keep(self, parcel: Parcel) -> None:
+        """Adds what the elements must remember besides their state to a parcel; all ranks take part."""
+        limit = int(self._comm.maximum(self.peaks[:1].view(np.float64))[:1].view(np.int64)[0])
+        mine = -float(self.peaks[1]) if int(self.peaks[0]) == limit else -np.inf
+        parcel.known["peaks"] = limit, -int(self._comm.maximum(np.array([mine]))[0])
+
+    def resume(self, parcel: Parcel) -> None:
+        """Takes it back."""
+        self.peaks[:2] = parcel.known["peaks"]
+
     def finish(self) -> None:
         """Returns when the forces of shared nodes are complete."""
         self.shared_forces.finish(self.model.nodes.force)
@@ -180,6 +191,20 @@ class AveragedElements(Elements):
         for name in ("_weight", "_bulk", "_volumes", *(("_gradient", "_projected", "pressure") if self.split else ())):
             values = getattr(self, name)
             setattr(self, name, extended(values, values[parents]))
+
+    def keep(self, parcel: Parcel) -> None:
+        super().keep(parcel)
+        for name in self._kept:
+            parcel.nodes[f"elements.{name}"] = getattr(self, name)
+
+    def resume(self, parcel: Parcel) -> None:
+        super().resume(parcel)
+        for name in self._kept:
+            setattr(self, name, np.ascontiguousarray(parcel.nodes[f"elements.{name}"]))
+
+    @property
+    def _kept(self) -> tuple[str, ...]:
+        return ("_weight", "pressure", "_projected") if self.split else ("_weight",)
 
     def _exchanges(self) -> list[SharedSum]:
         return [self.shared_forces, self.shared_volumes, *([self.shared_gradients] if self.split else [])]

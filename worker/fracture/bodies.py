@@ -51,23 +51,26 @@ class Loaded:
 
 
 def arm(index: int, block: Block, spec: Spec, tough: Toughness, x0: Floats) -> Body:
-    """Makes a block ready to fracture; ``x0`` (nodes, 3): where its nodes start."""
+    """Makes a block ready to fracture, or to go on; ``x0`` (nodes, 3): where its nodes start."""
     block.shear_weight = spec.shear_weight if spec.shear_weight is not None else float(spec.model == "cohesive")
-    block.bond = np.full((block.n, 4), INTACT, np.uint8)
-    block.hot = np.zeros(block.n, np.uint8)
-    block.weakest = np.empty(block.n)
+    begins = not len(block.bond)
+    if begins:
+        block.bond = np.full((block.n, 4), INTACT, np.uint8)
+        block.hot = np.zeros(block.n, np.uint8)
+        block.weakest = np.empty(block.n)
     beside = np.empty((block.n, 4), np.int32)
     order = np.argsort(block.id)
     known = block.id[order]
     for start in range(0, block.n, _BATCH):
         some = slice(start, start + _BATCH)
         inside = block.across[some] >= 0
-        place, face = np.nonzero(inside)
-        strengths = np.full(inside.shape, np.inf)
-        strengths[inside] = tough.strengths(
-            facet_ids(block, start + place, face), areas(block.tets, start + place, face, x0)
-        )
-        block.weakest[some] = strengths.min(axis=1)
+        if begins:
+            place, face = np.nonzero(inside)
+            strengths = np.full(inside.shape, np.inf)
+            strengths[inside] = tough.strengths(
+                facet_ids(block, start + place, face), areas(block.tets, start + place, face, x0)
+            )
+            block.weakest[some] = strengths.min(axis=1)
         behind = block.across[some] // 4
         at = order[np.minimum(np.searchsorted(known, behind), block.n - 1)]
         beside[some] = np.where(inside, np.where(block.id[at] == behind, at, ELSEWHERE), -1)
@@ -77,6 +80,15 @@ def arm(index: int, block: Block, spec: Spec, tough: Toughness, x0: Floats) -> B
 def facet_ids(block: Block, places: "np.ndarray", faces: "np.ndarray") -> Ints:
     """(m,) ids of facets, on the side of the smaller tet id."""
     return np.asarray(np.minimum(4 * block.id[places] + faces, block.across[places, faces]))
+
+
+def sides_of(block: Block, facets: Ints) -> tuple[Ints, Ints]:
+    """Which of ``facets`` (m,), by ascending id, have a side in the block, and the id of the tet there: (k,) each."""
+    place, face = np.nonzero(np.isin(block.across, facets) | np.isin(block.id, facets // 4)[:, None])
+    ids = facet_ids(block, place, face)
+    at = np.minimum(np.searchsorted(facets, ids), max(len(facets) - 1, 0))
+    met = facets[at] == ids if len(facets) else np.zeros(len(ids), bool)
+    return at[met], block.id[place[met]]
 
 
 def areas(tets: Tets, places: "np.ndarray", faces: "np.ndarray", x: Floats) -> Floats:

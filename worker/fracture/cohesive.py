@@ -26,6 +26,7 @@ import numpy as np
 from numba import njit
 
 from ..elements.tet4 import largest_of, quanta
+from ..migration.parcel import Parcel
 from ..parallel.comm import Comm
 from ..parallel.fixed_point import Tally, exact_sums
 from ..state import Floats, Indices, Ints, Nodes, extended
@@ -65,6 +66,9 @@ class Facets:
         return [getattr(self, column.name) for column in fields(self)]
 
 
+_COLUMNS = [column.name for column in fields(Facets) if column.name != "nodes"]
+
+
 def _none() -> Facets:
     one, three, nine = np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3, 3))
     tets, nodes = np.zeros((0, 2), np.int64), np.zeros((0, 6), np.int32)
@@ -97,6 +101,19 @@ class Cohesion:
             kept = ~((f.top - e[:, None] >= f.critical[:, None]).all(axis=1))
             self._gone.add(f.work[~kept][:, None])
             self.facets = Facets(*(column[kept] for column in f.columns()))
+
+    def keep(self, parcel: Parcel) -> None:
+        """Adds the facets to a parcel."""
+        f, ids = self.facets, parcel.nodes["id"]
+        columns = {name: getattr(f, name) for name in _COLUMNS}
+        parcel.rows["cohesive"] = {"tet": f.tets[:, 0], "with": ids[f.nodes], **columns}
+        parcel.sums["cohesive.gone"], parcel.known["cohesive"] = self._gone.words, self._gone.scale
+
+    def resume(self, parcel: Parcel, nodes: Nodes) -> None:
+        """Takes them back."""
+        table = parcel.rows["cohesive"]
+        self.facets = Facets(nodes=nodes.places(table["with"]), **{name: table[name] for name in _COLUMNS})
+        self._gone.words, self._gone.scale = parcel.sums["cohesive.gone"], parcel.known["cohesive"]
 
     def scatter(self, force: Ints, scale: float) -> int:
         """Adds the forces in quanta of 1 / ``scale`` N to the nodal sums; returns the bits of the largest."""

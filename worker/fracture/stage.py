@@ -20,6 +20,7 @@ from ..clock import Clock
 from ..contact.stage import Contact
 from ..elements.forms import Elements
 from ..mesh.faces import FACES
+from ..migration.parcel import Parcel
 from ..parallel.comm import Comm
 from ..parallel.fixed_point import exact_sums
 from ..parallel.ownership import Neighbour, complete
@@ -159,6 +160,28 @@ class Fracture:
         if total:
             self.broken += total
             self._break(broken)
+
+    def keep(self, parcel: Parcel) -> None:
+        """Adds what fracture must remember to a parcel."""
+        parcel.known["fracture"] = self.broken, self._longest
+        facet, since = self._since
+        tets, rows = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
+        for body in self._bodies:
+            of, tet = bodies.sides_of(body.block, facet)
+            rows.append(of)
+            tets.append(tet)
+        every = np.concatenate(rows)
+        parcel.rows["fracture.since"] = {"tet": np.concatenate(tets), "key": facet[every], "since": since[every]}
+        if self.cohesion is not None:
+            self.cohesion.keep(parcel)
+
+    def resume(self, parcel: Parcel) -> None:
+        """Takes it back."""
+        self.broken, self._longest = parcel.known["fracture"]
+        table = parcel.rows["fracture.since"]
+        self._since = table["key"], table["since"]
+        if self.cohesion is not None:
+            self.cohesion.resume(parcel, self._model.nodes)
 
     def loaded(self) -> tuple[list[Loaded], list[tuple[Loaded, Ints]]]:
         """Of every body the facets within this rank that have a hot face, and those shared with another, with their

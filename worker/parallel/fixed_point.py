@@ -69,12 +69,16 @@ class Tally:
         self.words = np.zeros((2, len(largest)), np.int64)
         """(2, k) high and low limbs."""
 
-    def add(self, values: Floats) -> None:
-        """Adds every row of ``values`` (n, k)."""
+    def quanta(self, values: Floats) -> Ints:
+        """(2, k) what every row of ``values`` (n, k) would add to the words."""
         scaled = values * self.scale
         high = np.rint(scaled)
-        self.words[0] += high.astype(np.int64).sum(axis=0)
-        self.words[1] += np.rint((scaled - high) * _LIMB).astype(np.int64).sum(axis=0)
+        low = np.rint((scaled - high) * _LIMB)
+        return np.array([high.astype(np.int64).sum(axis=0), low.astype(np.int64).sum(axis=0)])
+
+    def add(self, values: Floats) -> None:
+        """Adds every row of ``values`` (n, k)."""
+        self.words += self.quanta(values)
 
     def total(self, comm: Comm) -> Floats:
         """(k,) sums over all ranks; all ranks take part."""

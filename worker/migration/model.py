@@ -1,0 +1,67 @@
+"""The model in a parcel, and a model from one."""
+
+import numpy as np
+
+from conoid.cases.schema import Case
+
+from .. import domain
+from ..parallel.comm import Comm
+from ..state import CHUNK, Bits, Block, Indices, Ints, Model, Nodes, Tets
+from .parcel import Parcel, Table, length, take
+from .route import Arrived
+
+_NODAL = ("id", "part", "x0", "x", "v", "mass", "force")
+_OF_TETS = ("across", "bond", "weakest", "worn")
+"""Columns that a block has where the scene needs them."""
+
+
+def keep(model: Model) -> Parcel:
+    """A parcel with the nodes and tets of this rank."""
+    nodes = model.nodes
+    known = {
+        "parts": model.parts, "elements_global": model.elements_global, "nodes_global": model.nodes_global,
+        "part_starts": model.part_starts, "size": model.size, "scale": nodes.scale,
+    }  # fmt: skip
+    columns = {name: getattr(nodes, name) for name in _NODAL}
+    return Parcel(known, {}, columns, {b.part: _keep_block(b, nodes.id) for b in model.blocks if b.n}, {})
+
+
+def _keep_block(block: Block, ids: Ints) -> Table:
+    state = block.state.transpose(0, 2, 1).reshape(-1, block.state.shape[1])[: block.n]
+    some = {name: getattr(block, name) for name in _OF_TETS if len(getattr(block, name))}
+    return {"id": block.id, "corners": ids[block.tets], "state": state, "weight": np.ones(block.n), **some}
+
+
+def resume(case: Case, arrived: Arrived, comm: Comm) -> Model:
+    """The model of what has arrived, whose tables are put in the order that tets and nodes have in it."""
+    parcel, known = arrived.parcel, arrived.parcel.known
+    values = {name: np.ascontiguousarray(parcel.nodes[name]) for name in _NODAL}
+    nodes = Nodes(owner=arrived.owner, owned=arrived.owner == comm.rank, scale=known["scale"], **values)
+    blocks = []
+    for part in sorted(parcel.tets):
+        if length(parcel.tets[part]):
+            corners = np.searchsorted(nodes.id, parcel.tets[part]["corners"])
+            border = arrived.border[corners].any(axis=1)
+            order = np.lexsort((parcel.tets[part]["id"], ~border))
+            parcel.tets[part] = take(parcel.tets[part], order)
+            blocks.append(_resume_block(case, part, parcel.tets[part], corners[order], int(border.sum())))
+    return Model(
+        nodes, blocks, known["parts"], known["elements_global"], known["nodes_global"], known["part_starts"],
+        known["size"],
+    )  # fmt: skip
+
+
+def _resume_block(case: Case, part: int, table: Table, corners: Ints, border: int) -> Block:
+    n, rows = table["state"].shape
+    state = np.empty((-(-n // CHUNK) * CHUNK, rows))
+    state[:n], state[n:] = table["state"], table["state"][-1]
+    chunks = np.ascontiguousarray(state.reshape(-1, CHUNK, rows).transpose(0, 2, 1))
+    across: Indices = table.get("across", np.zeros((0, 4), np.int32))
+    tets: Tets = np.ascontiguousarray(corners, np.uint32)
+    block = domain.block(case, part, table["id"], tets, chunks, across, border)
+    if "worn" in table:
+        block.worn = table["worn"]
+    if "bond" in table:
+        bond: Bits = table["bond"]
+        block.bond, block.weakest, block.hot = bond, table["weakest"], np.zeros(n, np.uint8)
+    return block

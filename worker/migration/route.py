@@ -1,0 +1,175 @@
+"""Where everything goes: a cut of all tets, parcels from rank to rank, and who holds and owns what afterwards.
+
+Tets take along the nodes that they need. Who shares a node with whom is settled by a directory: the rank that a node's
+id falls to hears of all who hold it and tells each of them of the others.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..parallel.comm import Comm
+from ..parallel.decompose import Cut, bisect, place
+from ..parallel.ownership import Neighbour
+from ..state import Flags, Floats, Indices, Ints
+from .parcel import Parcel, Table, joined, length, take
+
+_NOBODY = np.iinfo(np.int64).max
+"""Stands for the smallest tet of a rank that has none at a node."""
+
+
+@dataclass
+class Directory:
+    """This rank's share of the list of all nodes: those whose id falls to it."""
+
+    comm: Comm
+    id: Ints
+    """(n,) ascending."""
+    owner: Indices
+    """(n,) who counts each: the rank of its tet of smallest id."""
+
+    def owners(self, ids: Ints) -> Indices:
+        """(k,) owners of any nodes; all ranks take part."""
+        home = ids % self.comm.size
+        asked = self.comm.swap({rank: ids[home == rank] for rank in range(self.comm.size)})
+        told = self.comm.swap({
+            rank: self.owner[np.searchsorted(self.id, want)].astype(np.int64) for rank, want in asked.items()
+        })  # fmt: skip
+        found = np.zeros(len(ids), np.int32)
+        for rank, answer in told.items():
+            found[home == rank] = answer
+        return found
+
+
+@dataclass
+class Arrived:
+    """A parcel at the ranks that its contents go to, and who has what there."""
+
+    parcel: Parcel
+    owner: Indices
+    """(nodes,) rank that counts each of the parcel's nodes."""
+    border: Flags
+    """(nodes,) which are held by others, too."""
+    neighbours: list[Neighbour]
+    moved: tuple[int, int]
+    """Tets and nodes that came from another rank."""
+
+
+def route(parcel: Parcel, scale: tuple[float, float, float], comm: Comm) -> Arrived:
+    """Cuts all tets by their ``weight`` and moves everything to where it belongs; all ranks take part.
+
+    ``scale`` multiplies positions before the cut.
+    """
+    targets, cuts = _cut(parcel, np.array(scale), comm)
+    sends = {rank: _share(parcel, targets, cuts, rank, np.array(scale)) for rank in range(comm.size)}
+    mine = sends.pop(comm.rank)
+    received = comm.swap({rank: share.packed() for rank, share in sends.items() if length(share.nodes)})
+    others = [Parcel.unpacked(words) for words in received.values()]
+    whole = Parcel.of([mine, *others])
+    whole.known, whole.sums = parcel.known, parcel.sums
+    moved = (sum(length(t) for p in others for t in p.tets.values()), length(whole.nodes) - length(mine.nodes))
+    directory, neighbours, owner = _settle(whole, comm)
+    _to_owners(parcel, whole, directory)
+    for name in sorted(parcel.rows):
+        _name_owners(whole.rows[name], directory)
+    border = np.zeros(length(whole.nodes), bool)
+    for other in neighbours:
+        border[other.nodes] = True
+    return Arrived(whole, owner, border, neighbours, moved)
+
+
+def _cut(parcel: Parcel, scale: Floats, comm: Comm) -> tuple[dict[int, Indices], list[Cut]]:
+    """The rank of every tet, by part."""
+    nodes, points, ids, weights = parcel.nodes, [np.zeros((0, 3))], [np.zeros(0, np.int64)], [np.zeros(0)]
+    for table in parcel.tets.values():
+        corners = np.searchsorted(nodes["id"], table["corners"])
+        points.append(nodes["x"][corners].mean(axis=1) * scale)
+        ids.append(table["id"])
+        weights.append(table["weight"])
+    owner, cuts = bisect(np.concatenate(points), np.concatenate(ids), np.concatenate(weights), comm.size, comm)
+    ends = np.cumsum([len(i) for i in ids[1:]])[:-1]
+    return dict(zip(parcel.tets, np.split(owner, ends), strict=True)) if parcel.tets else {}, cuts
+
+
+def _share(parcel: Parcel, targets: dict[int, Indices], cuts: list[Cut], rank: int, scale: Floats) -> Parcel:
+    """What goes to ``rank``, but for what goes to owners of nodes, whom nobody knows yet."""
+    tets = {part: take(table, targets[part] == rank) for part, table in parcel.tets.items()}
+    there = np.sort(np.concatenate([np.zeros(0, np.int64), *(table["id"] for table in tets.values())]))
+    rows, needed = {}, [np.zeros(0, np.int64), *(table["corners"].reshape(-1) for table in tets.values())]
+    for name, table in parcel.rows.items():
+        if "tet" in table:
+            rows[name] = take(table, _among(there, table["tet"]))
+        elif "at" in table:
+            rows[name] = take(table, place(cuts, table["at"] * scale) == rank)
+        if name in rows and "with" in table:
+            needed.append(rows[name]["with"].reshape(-1))
+    wanted = np.unique(np.concatenate(needed))
+    chosen = _among(wanted, parcel.nodes["id"])
+    for name, table in parcel.rows.items():
+        if "of" in table:
+            rows[name] = take(table, _among(wanted, table["of"]))
+    return Parcel({}, {}, take(parcel.nodes, chosen), tets, rows)
+
+
+def _among(known: Ints, wanted: Ints) -> Flags:
+    """(n,) which of ``wanted`` are in the ascending ``known``."""
+    if not len(known):
+        return np.zeros(len(wanted), bool)
+    return np.asarray(known[np.minimum(np.searchsorted(known, wanted), len(known) - 1)] == wanted)
+
+
+def _settle(whole: Parcel, comm: Comm) -> tuple[Directory, list[Neighbour], Indices]:
+    """The directory, the neighbours of this rank, and who owns its nodes."""
+    ids = whole.nodes["id"]
+    smallest = np.full(len(ids), _NOBODY)
+    for table in whole.tets.values():
+        np.minimum.at(smallest, np.searchsorted(ids, table["corners"]), table["id"][:, None])
+    home, words = ids % comm.size, np.column_stack([ids, smallest])
+    told = comm.swap({rank: words[home == rank] for rank in range(comm.size)})
+    rows = [np.column_stack([w.reshape(-1, 2), np.full(len(w) // 2, rank)]) for rank, w in told.items()]
+    every = np.concatenate([np.zeros((0, 3), np.int64), *rows])
+    every = every[np.lexsort((every[:, 2], every[:, 1], every[:, 0]))]
+    first = np.r_[True, every[1:, 0] != every[:-1, 0]] if len(every) else np.zeros(0, bool)
+    owners = every[first, 2]
+    directory = Directory(comm, every[first, 0], owners.astype(np.int32))
+    group = np.cumsum(first) - 1
+    back = {rank: _company(every, group, owners, rank) for rank in told}
+    answers = comm.swap(back)
+    shared = np.concatenate([np.zeros((0, 3), np.int64), *(w.reshape(-1, 3) for w in answers.values())])
+    shared = shared[np.lexsort((shared[:, 0], shared[:, 1]))]
+    owner = np.full(len(ids), comm.rank, np.int32)
+    owner[np.searchsorted(ids, shared[:, 0])] = shared[:, 2]
+    neighbours = [
+        Neighbour(int(rank), np.searchsorted(ids, shared[shared[:, 1] == rank, 0]).astype(np.int32))
+        for rank in np.unique(shared[:, 1])
+    ]
+    return directory, neighbours, owner
+
+
+def _company(every: Ints, group: Ints, owners: Ints, rank: int) -> Ints:
+    """(k, 3) node, other holder and owner, for the nodes that ``rank`` shares; ``group``: which node a row is of."""
+    held = np.zeros(len(owners), bool)
+    held[group[every[:, 2] == rank]] = True
+    rows = held[group] & (every[:, 2] != rank)
+    return np.column_stack([every[rows, 0], every[rows, 2], owners[group[rows]]])
+
+
+def _to_owners(parcel: Parcel, whole: Parcel, directory: Directory) -> None:
+    """Moves the tables that go to the owners of their nodes."""
+    comm = directory.comm
+    for name in sorted(parcel.rows):
+        table = parcel.rows[name]
+        if "node" not in table:
+            continue
+        owner = directory.owners(table["node"])
+        told = comm.swap({
+            rank: Parcel(rows={name: take(table, owner == rank)}).packed() for rank in range(comm.size)
+        })  # fmt: skip
+        whole.rows[name] = joined([Parcel.unpacked(words).rows[name] for words in told.values()])
+
+
+def _name_owners(table: Table, directory: Directory) -> None:
+    """Adds ``owners`` of the nodes ``ends`` (k, m) of a table that has such."""
+    if "ends" in table:
+        ids, back = np.unique(table["ends"], return_inverse=True)
+        table["owners"] = directory.owners(ids)[back].reshape(table["ends"].shape)
