@@ -200,7 +200,7 @@ class Traction(Driver):
 
     def resume(self, parcel: Parcel, name: str, dt: float) -> None:
         booked = [(parcel.nodes[f"{name}.{key}"] != 0.0).reshape(len(parcel.nodes["id"]), -1) for key in _KEPT]
-        used: Flags = np.concatenate(booked, axis=1).any(axis=1, keepdims=True)[:, 0]
+        used = np.asarray(np.concatenate(booked, axis=1).any(axis=1))
         used[self._corners] = True
         self.nodes = _indices(used)
         super().resume(parcel, name, dt)
