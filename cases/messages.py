@@ -102,6 +102,24 @@ class Counts(Message, frozen=True):
     particles: int = 0
 
 
+class Balance(Message, frozen=True):
+    """Tets have moved to other ranks."""
+
+    channel: ClassVar[str] = "load"
+    cause: str
+    before: dict[str, list[float]]
+    """CPU seconds a step, by phase, one number a rank, over the last Load before."""
+    predicted: list[float]
+    """What each rank has from now on of what was divided: CPU seconds a step, outside nodes, or tets."""
+    tets: int
+    nodes: int
+    """Moved to other ranks."""
+    cost: float
+    """Wall time, s."""
+    saved: float
+    """By the cuts before, s: what steps would have taken with the imbalance from before each, less what they took."""
+
+
 class Frame(Message, frozen=True):
     """A frame was written; ``path`` is relative to the run's folder."""
 
@@ -127,7 +145,7 @@ class Finished(Message, frozen=True):
     elapsed: float
 
 
-AnyMessage = Status | Started | Progress | Load | Counts | Frame | Log | Finished
+AnyMessage = Status | Started | Progress | Load | Balance | Counts | Frame | Log | Finished
 
 _to_json, _to_msgpack = msgspec.json.Encoder(), msgspec.msgpack.Encoder()
 _from_json: msgspec.json.Decoder[AnyMessage] = msgspec.json.Decoder(AnyMessage)

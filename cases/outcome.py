@@ -47,6 +47,10 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     broken: int = 0
     """Facets that have broken."""
     rebalances: int = 0
+    balancing_cost: float = 0.0
+    """s; of all cuts."""
+    balancing_saved: float = 0.0
+    """s: what steps would have taken with the imbalance from before each cut, less what they took."""
     energy: Energy | None = None
     worst_residual: float = 0.0
     """The largest energy residual of any ledger line of the run."""

@@ -264,6 +264,19 @@ class Run(Model):
     """The run fails with cause ``energy`` when the energy residual passes this."""
 
 
+class Balance(Model):
+    """When tets move to other ranks so that all have the same to do, and what counts. No answer depends on it."""
+
+    policy: Literal["measured", "outside", "every", "never"] = "measured"
+    """``measured``: when the time lost to imbalance since the last cut exceeds what a cut costs. ``outside``: when a
+    rank has more than ``alpha`` times the outside nodes that it had at the last cut (Moon, Kim and Lee's trigger).
+    ``every``: each so many steps."""
+    alpha: Annotated[Ratio, Field(gt=1)] = 1.2
+    every: Annotated[Count, Field(ge=1)] = 1000
+    weights: Literal["measured", "outside", "tets"] = "measured"
+    """What is divided evenly: CPU time as measured, outside nodes, or tets."""
+
+
 Quantity = Literal[
     "extent", "radius", "plastic_strain_max", "temperature_max", "speed_mean", "stress_max",
     "probe_mean", "probe_max", "probe_min", "contact_time", "contact_loss", "penetration", "worst_residual",
@@ -309,6 +322,7 @@ class Case(Model):
     probes: tuple[Probe, ...] = ()
     numerics: Numerics = Numerics()
     run: Run
+    balance: Balance = Balance()
     reference: tuple[Reference, ...] = ()
 
     @property

@@ -14,6 +14,7 @@ from conoid.cases.run import State
 from conoid.cases.schema import Case
 
 from . import digest, reference, simulation
+from .balance import Balance
 from .errors import PhysicsError
 from .loop import STOPS, Loop
 from .output.history import History
@@ -48,7 +49,8 @@ def compute(
         time.monotonic() - began, sim.model.elements_global, sim.model.nodes_global, reference.thicknesses(sim)
     )
     _announce(sim, journal, start.setup)
-    loop = Loop(sim, folder, journal, history, signals)
+    balance = Balance(case, comm, sim.assembled)
+    loop = Loop(sim, folder, journal, history, signals, balance)
     cpu = time.thread_time()
     failure = None
     try:
@@ -91,9 +93,9 @@ def _sum_up(
     hexdigest = digest.digest(sim.model, sim.comm, [sim.elements.pressure] if sim.elements.split else [])
     checks = reference.measure(sim, folder, start.thick) if failure is None and not loop.stopped else []
     fragments = len(sim.model.parts)
-    if loop.record is not None:
-        loop.record.look()
-        fragments = loop.record.count
+    if sim.record is not None:
+        sim.record.look()
+        fragments = sim.record.count
     state, cause, message = STOPS[loop.stopped] if loop.stopped else (State.SUCCEEDED, None, "")
     if failure is not None:
         state, cause, message = State.FAILED, failure.cause, str(failure)
@@ -103,7 +105,8 @@ def _sum_up(
         eroded=start.elements - sim.model.elements_global, eroded_mass=sim.ledger.eroded_mass,
         nodes_initial=start.nodes, nodes=sim.model.nodes_global, fragments=fragments,
         broken=sim.fracture.broken if sim.fracture is not None else 0, energy=loop.energy,
-        worst_residual=sim.ledger.worst,
+        worst_residual=sim.ledger.worst, rebalances=loop.balance.events, balancing_cost=loop.balance.spent,
+        balancing_saved=loop.balance.saved,
         phases={name: [s[name] for s in seconds] for name in PHASES} if seconds else {},
         peak_memory=memory or [],
         element_updates_per_second=loop.updates / total_cpu if total_cpu > 0.0 else 0.0, reference=checks,

@@ -11,8 +11,8 @@ from conoid.cases.messages import Energy
 from conoid.cases.run import Cause, State
 
 from . import step
+from .balance import Balance, Window
 from .errors import EnergyError
-from .fracture.record import Record
 from .output import frames
 from .output.history import History
 from .output.journal import Journal
@@ -55,8 +55,9 @@ class Loop:
     """Runs a simulation to its end, and tells. ``journal`` and ``history`` exist on rank 0 only."""
 
     def __init__(
-        self, sim: Simulation, folder: Path, journal: Journal | None, history: History | None, signals: Signals
-    ) -> None:
+        self, sim: Simulation, folder: Path, journal: Journal | None, history: History | None, signals: Signals,
+        balance: Balance,
+    ) -> None:  # fmt: skip
         self.sim = sim
         self.energy: Energy | None = None
         self.stopped = 0
@@ -68,18 +69,19 @@ class Loop:
         self._began = self._reported = time.monotonic()
         self.updates = self._reported_updates = 0
         """Tets times steps so far."""
+        self._reported_step = 0
         self._pace = Pace(self._began)
         self._logged = -math.inf
         self._counted = (0, 0)
-        self.record = Record(sim.model, sim.fracture, sim.comm) if sim.fracture is not None else None
+        self.balance = balance
 
     def run(self) -> None:
         """Steps until the end time, or until a reason to stop. Raises PhysicsError."""
-        sim = self.sim
-        step.prepare(sim)
+        step.prepare(self.sim)
         while True:
-            if sim.vote.report:
+            if self.sim.vote.report:
                 self._report()
+            self._move()
             self._propose()
             sim = self.sim
             self._first_half()
@@ -104,6 +106,13 @@ class Loop:
             if clock.frame_due:
                 self._write_frame()
 
+    def _move(self) -> None:
+        """Tets to other ranks, when that is due."""
+        cause = self.balance.cause(self.sim)
+        if cause is not None:
+            self.sim, told = self.balance.move(self.sim)
+            self._tell(messages.Balance, cause=cause, **told)
+
     def _propose(self) -> None:
         """This rank's words for the next vote."""
         sim, now = self.sim, time.monotonic()
@@ -115,6 +124,7 @@ class Loop:
             stop = MAX_STEPS
         sim.vote.words[2] = stop
         sim.vote.words[3] = sim.comm.rank == 0 and now - self._reported > _REPORT_EVERY
+        sim.vote.words[7] = self.balance.grown(sim)
 
     def _look(self, before: Floats) -> None:
         """A line of the history: ledger, momentum and probes at time n."""
@@ -135,12 +145,12 @@ class Loop:
     def _write_frame(self) -> None:
         sim, clock = self.sim, self.sim.clock
         index = clock.frame
-        if self.record is None:
+        if self.sim.record is None:
             path = frames.write(self._folder, index, clock.t, sim.model, sim.comm)
         else:
-            self.record.look()
-            path = frames.write(self._folder, index, clock.t, sim.model, sim.comm, self.record.labels)
-            self.record.write(self._folder, index, clock.t)
+            self.sim.record.look()
+            path = frames.write(self._folder, index, clock.t, sim.model, sim.comm, self.sim.record.labels)
+            self.sim.record.write(self._folder, index, clock.t)
         clock.frame += 1
         if path is not None:
             self._tell(messages.Frame, index=index, path=path)
@@ -150,16 +160,19 @@ class Loop:
         sim, clock = self.sim, self.sim.clock
         with sim.timers.phase("output"):
             limiter = sim.limiter()
-            loads = sim.comm.gather(sim.timers.since_last())
+            loads = sim.comm.share(sim.timers.since_last())
             self._count()
-        if loads is None:
+        work = {name: [load[name] for load in loads] for name in loads[0]}
+        window = Window(clock.step - self._reported_step, work)
+        self._reported_step = clock.step
+        self.balance.look(window)
+        if self._journal is None:
             return
         now = time.monotonic()
         if now - self._logged > _LOG_EVERY:
             self._logged = now
             log.info("step %d, t %.4g s, dt %.3g s, %s", clock.step, clock.t, clock.dt, limiter)
         elapsed = now - self._reported
-        busy = [load["elements"] + load["nodes"] for load in loads]
         self._pace.add(clock.t, now)
         if self.energy is not None:
             self._tell(
@@ -167,9 +180,7 @@ class Loop:
                 eta=self._pace.left(sim.case.run.end_time - clock.t), energy=self.energy,
                 updates_per_second=(self.updates - self._reported_updates) / elapsed,
             )  # fmt: skip
-        mean = sum(busy) / len(busy)
-        phases = {name: [load[name] for load in loads] for name in loads[0]}
-        self._tell(messages.Load, phases=phases, imbalance=max(busy) / mean if mean > 0.0 else 1.0)
+        self._tell(messages.Load, phases=work, imbalance=window.imbalance)
         self._reported, self._reported_updates = now, self.updates
 
     def _count(self) -> None:
@@ -181,7 +192,7 @@ class Loop:
         held = sim.comm.gather(sum(block.n for block in model.blocks))
         self._tell(
             messages.Counts, elements=model.elements_global, nodes=model.nodes_global, shared=sim.shared_nodes,
-            fragments=self.record.count if self.record is not None else len(model.parts), elements_per_rank=held or [],
+            fragments=sim.record.count if sim.record is not None else len(model.parts), elements_per_rank=held or [],
             particles=sim.erosion.particles if sim.erosion is not None else 0,
         )  # fmt: skip
 

@@ -1,6 +1,7 @@
 """What a case needs, built once: the model, its pressure form, its boundaries, its accounts. The step uses it."""
 
 import math
+import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from .contact.stage import Contact
 from .elements.forms import AveragedElements, Elements
 from .energy import Ledger
 from .erosion import Erosion, Mirrors
+from .fracture.record import Record
 from .fracture.stage import Fracture
 from .materials.models import BULK, DENSITY, SHEAR, moduli
 from .migration import model as model_of
@@ -36,10 +38,11 @@ _SMALLEST_STRAIN = 1e-12
 class Vote:
     """What the ranks agree on in a step: a maximum over int64 words. Bits of non-negative floats order like floats."""
 
-    words: Ints = field(default_factory=lambda: np.zeros(7, np.int64))
+    words: Ints = field(default_factory=lambda: np.zeros(9, np.int64))
     """0: one over the stable step; 1: largest force (both as bits); 2: reason to stop; 3: rank 0 wants a report; 4: a
-    search for contact is due; 5: tets are worn out; 6: faces may break."""
-    result: Ints = field(default_factory=lambda: np.zeros(7, np.int64))
+    search for contact is due; 5: tets are worn out; 6: faces may break; 7: a rank has more outside nodes than it may;
+    8: a checkpoint is asked for."""
+    result: Ints = field(default_factory=lambda: np.zeros(9, np.int64))
 
     @property
     def limit(self) -> float:
@@ -72,6 +75,16 @@ class Vote:
         return bool(self.result[6])
 
     @property
+    def grown(self) -> bool:
+        """Whether some rank has more outside nodes than it may."""
+        return bool(self.result[7])
+
+    @property
+    def checkpoint(self) -> bool:
+        """Whether a checkpoint is asked for."""
+        return bool(self.result[8])
+
+    @property
     def worn(self) -> int:
         """What was found of worn-out tets (elements/wear.py)."""
         return int(self.result[5])
@@ -94,7 +107,11 @@ class Simulation:
     ledger: Ledger
     probes: Probes
     timers: Timers
+    record: Record | None
+    """Of the fragments."""
     shared_nodes: int
+    assembled: float
+    """Wall time that it took to make the stages, s."""
     floor: float
     """Forces below this, N, do not refine the force quantum."""
     vote: Vote = field(default_factory=Vote)
@@ -148,7 +165,7 @@ def build(case: Case, folder: Path, comm: Comm) -> Simulation:
     model, piece = domain.build(case, folder, comm)
     scene = boundaries.build(case, model, piece.loads)
     boundaries.start(case, model, scene, comm)
-    sim = _assemble(case, model, piece.neighbours, scene, piece.node_volume, comm, Timers())
+    sim = _assemble(case, model, piece.neighbours, scene, piece.node_volume, comm, Timers(comm))
     sim.probes.require_tets(case)
     if sim.contact is not None:
         sim.contact.require_faces()
@@ -160,7 +177,7 @@ def _assemble(
     timers: Timers,
 ) -> Simulation:  # fmt: skip
     """The stages that the case needs, round a model and its boundaries; ``node_volume`` (nodes,): at the start, m^3."""
-    run, numerics = case.run, case.numerics
+    began, run, numerics = time.monotonic(), case.run, case.numerics
     clock = Clock(run.end_time, numerics.dt_safety, numerics.dt_growth, run.frames)
     extremes = _extremes(model, comm)
     contact, erosion = None, None
@@ -179,7 +196,9 @@ def _assemble(
     return Simulation(
         case=case, comm=comm, model=model, elements=elements, boundaries=scene, contact=contact, erosion=erosion,
         fracture=fracture, clock=clock, ledger=Ledger(model, scene, contact, erosion, fracture, comm, clock),
-        probes=probes, timers=timers, shared_nodes=_shared(model, neighbours, comm), floor=_force_floor(model, comm),
+        probes=probes, timers=timers, record=Record(model, fracture, comm) if fracture is not None else None,
+        shared_nodes=_shared(model, neighbours, comm), floor=_force_floor(model, comm),
+        assembled=float(comm.maximum(np.array([time.monotonic() - began]))[0]),
     )  # fmt: skip
 
 
@@ -196,6 +215,8 @@ def keep(sim: Simulation) -> Parcel:
     sim.elements.keep(parcel)
     if sim.fracture is not None:
         sim.fracture.keep(parcel)
+    if sim.record is not None:
+        sim.record.keep(parcel)
     return parcel
 
 
@@ -216,6 +237,8 @@ def resume(case: Case, arrived: Arrived, comm: Comm, timers: Timers) -> Simulati
     sim.elements.resume(parcel)
     if sim.fracture is not None:
         sim.fracture.resume(parcel)
+    if sim.record is not None:
+        sim.record.resume(parcel)
     return sim
 
 

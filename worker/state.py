@@ -189,6 +189,8 @@ class Block:
     """(n,) tets that are about to leave; (0,) where the part does not erode."""
     life: Floats = field(default_factory=lambda: np.zeros(4))
     """What a tet lives through (elements/wear.py)."""
+    seconds: float = 0.0
+    """CPU time of the passes over the block so far."""
 
     @property
     def chunks(self) -> int:

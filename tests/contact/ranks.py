@@ -35,7 +35,7 @@ class ThreadComm:
 
     def __init__(self, world: World, rank: int) -> None:
         self._world = world
-        self.rank, self.size = rank, world.size
+        self.rank, self.size, self.waited = rank, world.size, 0.0
 
     def share(self, item: Any) -> list[Any]:
         world = self._world

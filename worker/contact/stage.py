@@ -30,6 +30,8 @@ from .scene import Rules, Scene
 
 _SHORTEST = 10.0
 """Steps of free flight that a search looks ahead at least; at most twice what the last search was good for."""
+_SURFACE = 2.0
+"""Candidates that cost as much as the search for those of a node."""
 _KINEMATIC = 2.0
 """One over the share of a tet's altitude that anything may pass in a step."""
 
@@ -132,6 +134,21 @@ class Contact(Boundary):
     def friction_work(self) -> float:
         """Heat of friction so far of the meetings of all ranks, J; all ranks take part."""
         return float(self._friction.total(self._comm)[0])
+
+    @property
+    def outside(self) -> int:
+        """Nodes of the surface that this rank owns."""
+        return int((self._surface.flags & self._model.nodes.owned).sum())
+
+    def effort(self) -> Floats:
+        """(nodes,) what contact does here for each node, in candidates."""
+        effort = _SURFACE * (self._surface.flags & self._model.nodes.owned)
+        if self._scene is not None:
+            local = self._scene.crowd.local
+            firsts = self._scene.edges[self._scene.edge_edge[:, 0], 0]
+            at = local[np.concatenate([self._scene.node_face[:, 0], firsts, self._scene.cracks[:, :3].reshape(-1)])]
+            effort += np.bincount(at[at >= 0], minlength=len(effort))
+        return np.asarray(effort)
 
     def impulses(self) -> Floats:
         """(parts, 3) what contact has given each part so far, N s; all ranks take part."""

@@ -7,6 +7,7 @@ import numpy as np
 
 from conoid.cases import fragments as tables
 
+from ..migration.parcel import Parcel, length
 from ..parallel.comm import Comm
 from ..state import Ints, Model
 from . import fragments
@@ -23,6 +24,22 @@ class Record:
         self._before: tuple[Ints, Ints] | None = None
         self.count = 0
         """Fragments at the last look."""
+
+    def keep(self, parcel: Parcel) -> None:
+        """Adds the fragments of the last frame to a parcel."""
+        parcel.known["record"] = self.count, self._before is not None
+        if self._before is not None:
+            order = np.argsort(self._before[0])
+            ids, labels = self._before[0][order], self._before[1][order]
+            for table in parcel.tets.values():
+                table["fragment"] = labels[np.searchsorted(ids, table["id"])]
+
+    def resume(self, parcel: Parcel) -> None:
+        """Takes them back."""
+        self.count, looked = parcel.known["record"]
+        if looked:
+            tables = [table for table in parcel.tets.values() if length(table)]
+            self._before = _flat([table["id"] for table in tables]), _flat([table["fragment"] for table in tables])
 
     def look(self) -> None:
         """Finds the fragments as they are."""

@@ -5,6 +5,9 @@ Everything that decides is a maximum over int64 words, or a sum of integers: no 
 
 import os
 import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, Protocol
 
 import numpy as np
@@ -27,6 +30,8 @@ class Comm(Protocol):
 
     rank: int
     size: int
+    waited: float
+    """CPU seconds of this thread in calls that may wait for other ranks."""
 
     def begin_maximum(self, words: Ints, result: Ints) -> Pending:
         """Element-wise maximum of ``words`` over all ranks, in ``result`` once finished."""
@@ -88,6 +93,7 @@ class SerialComm:
 
     rank = 0
     size = 1
+    waited = 0.0
 
     def begin_maximum(self, words: Ints, result: Ints) -> Pending:
         result[:] = words
@@ -134,41 +140,57 @@ class MpiComm:
         self._world = MPI.COMM_WORLD
         self.rank: int = self._world.Get_rank()
         self.size: int = self._world.Get_size()
+        self.waited = 0.0
+
+    @contextmanager
+    def waiting(self) -> Iterator[None]:
+        """Counts the CPU time of the block as waiting."""
+        start = time.thread_time()
+        try:
+            yield
+        finally:
+            self.waited += time.thread_time() - start
 
     def begin_maximum(self, words: Ints, result: Ints) -> Pending:
-        return _MpiPending(self._world.Iallreduce(words, result, self._mpi.MAX))
+        return _MpiPending(self, self._world.Iallreduce(words, result, self._mpi.MAX))
 
     def sum(self, words: Ints) -> Ints:
         result = np.empty_like(words)
-        self._world.Allreduce(words, result, self._mpi.SUM)
+        with self.waiting():
+            self._world.Allreduce(words, result, self._mpi.SUM)
         return result
 
     def maximum(self, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         result = np.empty_like(values)
-        self._world.Allreduce(values, result, self._mpi.MAX)
+        with self.waiting():
+            self._world.Allreduce(values, result, self._mpi.MAX)
         return result
 
     def exchange(self, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: int) -> Exchange:
         requests = [self._world.Recv_init(buffer, source, tag) for source, buffer in receives]
         requests += [self._world.Send_init(buffer, target, tag) for target, buffer in sends]
-        return _MpiExchange(self._mpi.Prequest, requests)
+        return _MpiExchange(self, self._mpi.Prequest, requests)
 
     def swap(self, sends: dict[int, Ints]) -> dict[int, Ints]:
         mine = {rank: np.ascontiguousarray(words).reshape(-1) for rank, words in sends.items()}
         counts = np.array([len(mine[rank]) if rank in mine else 0 for rank in range(self.size)], np.int64)
         theirs = np.empty_like(counts)
-        self._world.Alltoall(counts, theirs)
+        with self.waiting():
+            self._world.Alltoall(counts, theirs)
         received = {int(rank): np.empty(theirs[rank], np.int64) for rank in np.flatnonzero(theirs)}
         requests = [self._world.Irecv(buffer, rank, _SWAP_TAG) for rank, buffer in received.items()]
         requests += [self._world.Isend(words, rank, _SWAP_TAG) for rank, words in mine.items() if len(words)]
-        self._mpi.Request.Waitall(requests)
+        with self.waiting():
+            self._mpi.Request.Waitall(requests)
         return received
 
     def share(self, item: Any) -> list[Any]:
-        return self._world.allgather(item)
+        with self.waiting():
+            return self._world.allgather(item)
 
     def gather(self, item: Any) -> list[Any] | None:
-        return self._world.gather(item)
+        with self.waiting():
+            return self._world.gather(item)
 
     def scatter(self, items: list[Any] | None) -> Any:
         if self.rank == 0:
@@ -179,22 +201,27 @@ class MpiComm:
         return self._world.recv(source=0)
 
     def broadcast(self, item: Any) -> Any:
-        return self._world.bcast(item)
+        with self.waiting():
+            return self._world.bcast(item)
 
     def barrier(self) -> None:
-        self._world.Barrier()
+        with self.waiting():
+            self._world.Barrier()
 
 
 class _MpiPending:
-    def __init__(self, request: Any) -> None:
+    def __init__(self, comm: MpiComm, request: Any) -> None:
+        self._comm = comm
         self._request = request
 
     def finish(self) -> None:
-        self._request.Wait()
+        with self._comm.waiting():
+            self._request.Wait()
 
 
 class _MpiExchange:
-    def __init__(self, kind: Any, requests: list[Any]) -> None:
+    def __init__(self, comm: MpiComm, kind: Any, requests: list[Any]) -> None:
+        self._comm = comm
         self._kind = kind
         self._requests = requests
 
@@ -202,7 +229,8 @@ class _MpiExchange:
         self._kind.Startall(self._requests)
 
     def finish(self) -> None:
-        self._kind.Waitall(self._requests)
+        with self._comm.waiting():
+            self._kind.Waitall(self._requests)
 
     def free(self) -> None:
         for request in self._requests:
