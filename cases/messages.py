@@ -120,6 +120,15 @@ class Balance(Message, frozen=True):
     """By the cuts before, s: what steps would have taken with the imbalance from before each, less what they took."""
 
 
+class Checkpoint(Message, frozen=True):
+    """The complete state is on disk; ``path`` is relative to the run's folder, ``seconds`` wall time."""
+
+    path: str
+    bytes: int
+    seconds: float
+    cause: str
+
+
 class Frame(Message, frozen=True):
     """A frame was written; ``path`` is relative to the run's folder."""
 
@@ -145,7 +154,7 @@ class Finished(Message, frozen=True):
     elapsed: float
 
 
-AnyMessage = Status | Started | Progress | Load | Balance | Counts | Frame | Log | Finished
+AnyMessage = Status | Started | Progress | Load | Balance | Checkpoint | Counts | Frame | Log | Finished
 
 _to_json, _to_msgpack = msgspec.json.Encoder(), msgspec.msgpack.Encoder()
 _from_json: msgspec.json.Decoder[AnyMessage] = msgspec.json.Decoder(AnyMessage)

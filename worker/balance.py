@@ -59,6 +59,8 @@ class Balance:
     comm: Comm
     cost: float
     """Wall time of the last cut, s; at first that of the set-up."""
+    _step: int
+    """Of the last cut."""
     spent: float = 0.0
     """Wall time of all cuts, s."""
     saved: float = 0.0
@@ -66,8 +68,6 @@ class Balance:
     events: int = 0
     _began: dict[str, float] = field(default_factory=dict)
     """The timers at the last cut."""
-    _step: int = 0
-    """Of the last cut."""
     _lost: float = 0.0
     """To imbalance since then, beyond what cannot be helped, s."""
     _helpless: float = 0.0

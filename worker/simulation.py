@@ -74,6 +74,10 @@ class Vote:
         """Whether some tet's face has passed the strength by the tet's own stress."""
         return bool(self.result[6])
 
+    def begin_again(self) -> None:
+        """Forgets what was to be done besides the next step."""
+        self.result[[2, 3, 7, 8]] = 0
+
     @property
     def grown(self) -> bool:
         """Whether some rank has more outside nodes than it may."""

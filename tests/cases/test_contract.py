@@ -24,6 +24,9 @@ EXAMPLES: list[messages.AnyMessage] = [
         run="r", seq=9, step=200, cause="time lost exceeds the cost", before={"elements": [1e-3, 3e-3]},
         predicted=[2e-3, 2e-3], tets=12, nodes=9, cost=0.25, saved=0.5,
     ),
+    messages.Checkpoint(
+        run="r", seq=10, step=200, path="checkpoints/000000200", bytes=1024, seconds=0.1, cause="asked for"
+    ),
     messages.Counts(run="r", seq=5, elements=6, nodes=8, shared=4, fragments=1, elements_per_rank=[3, 3]),
     messages.Frame(run="r", seq=6, index=12, path="frames/000012.vtkhdf"),
     messages.Log(run="r", seq=7, level="warning", text="a rank waits", rank=1),
