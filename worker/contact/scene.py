@@ -108,13 +108,27 @@ class Scene:
     """(crowd,) which nodes a meeting of this rank may push."""
     cracks: Indices
     """(m, 6) places of the nodes on either side of open cracks (contact/cracks.py)."""
+    company: list[Neighbour] = field(init=False)
+    """Other ranks, and the places of the nodes that either pushes or holds and any rank pushes."""
     shared_shares: SharedSum = field(init=False)
     shared_impulse: SharedSum = field(init=False)
     copies: Copies = field(init=False)
 
     def connect(self, company: list[Neighbour], nodes: Nodes, comm: Comm) -> None:
-        """Sets up the messages: sums over nodes that others push or hold, copies of what is not held here."""
+        """Sets up the messages: sums over the nodes of the company, copies of what is not held here; all ranks take
+        part.
+        """
         self.copies = ghosts.copies(self.crowd, nodes, comm, _COPY_TAG)
+        self._sum(company, comm)
+
+    def extend(self, company: list[Neighbour], sends: list[Neighbour], receives: list[Neighbour], comm: Comm) -> None:
+        """The messages with more nodes, of which this rank knows as the others do."""
+        self.free()
+        self.copies = Copies(sends, receives, comm, _COPY_TAG)
+        self._sum(company, comm)
+
+    def _sum(self, company: list[Neighbour], comm: Comm) -> None:
+        self.company = company
         self.shared_shares = SharedSum(comm, company, 4, _SHARE_TAG)
         self.shared_impulse = SharedSum(comm, company, 3, _PUSH_TAG)
 
@@ -167,14 +181,15 @@ def _approach(x, v, faces, pairs):  # type: ignore[no-untyped-def]
     return np.sqrt(most)
 
 
-def build(
-    sides: Sides, rules: Rules, horizon: float, drift: Floats, nodes: Nodes, neighbours: list[Neighbour], comm: Comm
-) -> Scene:
-    """Searches what flies on for ``horizon``, s; all ranks take part and know of the same ``drift`` (3,), m/s."""
+def build(sides: Sides, rules: Rules, horizon: float, drift: Floats, nodes: Nodes, comm: Comm) -> Scene:
+    """Searches what flies on for ``horizon``, s; all ranks take part and know of the same ``drift`` (3,), m/s.
+
+    Who shares which node is settled by a Follower.
+    """
     seen, sent = _with_ghosts(sides, rules, horizon, drift, comm) if comm.size > 1 else (sides, 0)
     node_face = _node_face(seen, rules, horizon, drift)
     edge_edge = _edge_edge(seen, sides.edges.n, rules, horizon, drift)
-    return _compact(seen, node_face, edge_edge, sent, nodes, neighbours, comm)
+    return _compact(seen, node_face, edge_edge, sent, nodes)
 
 
 def _with_ghosts(sides: Sides, rules: Rules, horizon: float, drift: Floats, comm: Comm) -> tuple[Sides, int]:
@@ -232,11 +247,8 @@ def _edge_edge(seen: Sides, own: int, rules: Rules, horizon: float, drift: Float
     return pairs[np.lexsort((rank[pairs[:, 1]], rank[pairs[:, 0]]))]
 
 
-def _compact(
-    seen: Sides, node_face: Indices, edge_edge: Indices, sent: int, nodes: Nodes,
-    neighbours: list[Neighbour], comm: Comm,
-) -> Scene:  # fmt: skip
-    """Keeps the nodes, faces and edges of candidates only, and settles who shares which node."""
+def _compact(seen: Sides, node_face: Indices, edge_edge: Indices, sent: int, nodes: Nodes) -> Scene:
+    """Keeps the nodes, faces and edges of candidates only."""
     crowd = seen.crowd
     which_faces, face_at = np.unique(node_face[:, 1], return_inverse=True)
     which_edges, edge_at = np.unique(edge_edge, return_inverse=True)
@@ -244,21 +256,17 @@ def _compact(
     pushed = np.unique(
         np.concatenate([crowd.id[node_face[:, 0]], faces.nodes[:, :3].reshape(-1), edges.nodes[:, :2].reshape(-1)])
     )
-    shared: dict[int, Ints] = {}
-    if comm.size > 1:
-        shared = ghosts.members(pushed, crowd.owner[crowd.places(pushed)], neighbours, nodes, comm)
-    needed = np.unique(np.concatenate([pushed, faces.nodes.reshape(-1), edges.nodes.reshape(-1), *shared.values()]))
+    needed = np.unique(np.concatenate([pushed, faces.nodes.reshape(-1), edges.nodes.reshape(-1)]))
     slave_ids = crowd.id[node_face[:, 0]]
     keys = np.column_stack([slave_ids, seen.faces.id[node_face[:, 1]]])
     crowd = crowd.take(crowd.places(needed))
     crowd.local = nodes.places(crowd.id)
-    company = [Neighbour(rank, crowd.places(ids)) for rank, ids in sorted(shared.items())]
     room = len(node_face) + len(edge_edge)
     shares, impulse = np.zeros((crowd.n, 4), np.int64), np.zeros((crowd.n, 3), np.int64)
     held = np.flatnonzero(crowd.local >= 0).astype(np.int32)
     place = np.full(nodes.n, -1, np.int32)
     place[crowd.local[held]] = held
-    found = Scene(
+    return Scene(
         crowd=crowd, held=held, local=crowd.local[held], faces=crowd.places(faces.nodes), face_id=faces.id,
         face_size=faces.size, edges=crowd.places(edges.nodes), edge_sides=edges.sides, edge_size=edges.size,
         node_face=np.column_stack([crowd.places(slave_ids), face_at.reshape(-1)]).astype(np.int32),
@@ -268,5 +276,3 @@ def _compact(
         cracks=np.zeros((0, 6), np.int32),
         total=np.zeros((crowd.n, 3), np.int64), normals=np.zeros((crowd.n, 9)), before=np.zeros((crowd.n, 3)),
     )  # fmt: skip
-    found.connect(company, nodes, comm)
-    return found

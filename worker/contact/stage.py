@@ -111,10 +111,10 @@ class Contact(Boundary):
             self._flight.mobility = self._mobility
             here = self._flight.here(state)
             follower = Follower(self._scene, here, state)
-            follower.follow(news(split, here, state, self._comm), self._cracks)
+            heard = news(split, self._scene, here, self._comm)
+            follower.follow(heard, self._cracks, self._neighbours)
             if self._comm.size > 1:
-                self._scene.free()
-                follower.share(self._neighbours, self._comm)
+                follower.share(heard, self._neighbours, self._comm)
 
     def _expose(self, state: Nodes) -> None:
         """The surface anew, with the cracks that are wide; all ranks take part."""
@@ -171,14 +171,12 @@ class Contact(Boundary):
             flight.refresh(state)
         steps, drift = flight.foresight(clock.dt)
         horizon = max(min(steps, 2.0 * (clock.step - self._last)), _SHORTEST) * clock.dt
-        self._scene = scene.build(flight.sides, self._rules, horizon, drift, state, self._neighbours, self._comm)
+        self._scene = scene.build(flight.sides, self._rules, horizon, drift, state, self._comm)
         self.limit = _KINEMATIC * float(self._comm.maximum(np.array([self._scene.approach()]))[0])
+        follower = Follower(self._scene, flight.here(state), state)
         if self._fractures:
-            follower = Follower(self._scene, flight.here(state), state)
             follower.cracks(self._cracks)
-            if self._comm.size > 1:
-                self._scene.free()
-                follower.share(self._neighbours, self._comm)
+        follower.settle(self._neighbours, self._comm)
         if old is not None and self._rubs:
             self._scene.remember(old, state, self._comm)
         self._look(self._scene, state)
