@@ -174,10 +174,10 @@ class Follower:
         """The places of the cracks that this rank computes, and room for all that may meet."""
         scene = self._scene
         nodes = cracks.nodes[cracks.active]
-        absent = touching(nodes, scene.place < 0)
-        if len(absent):
-            some = np.unique(nodes[absent])
-            self._add(self._here.take(some[scene.place[some] < 0]))
+        absent = scene.place < 0
+        some = np.zeros(self._nodes.n, bool)
+        some[nodes[touching(nodes, absent)]] = True
+        self._add(self._here.take(np.flatnonzero(some & absent)))
         scene.cracks = np.empty_like(nodes)
         _place(scene.cracks, scene.pushes, nodes, scene.place)
         room = len(scene.node_face) + len(scene.edge_edge) + 3 * len(nodes)
