@@ -197,9 +197,9 @@ class Contact(Boundary):
         n = self._meet(now, dt)
         self._weigh(now, n)
         room_of = (room.nodes, room.weights, room.normals)
-        slip = sweeps.rates(now.before, room.nodes, room.weights, n)
         now.push[:n] = 0.0
         if self._rubs:
+            slip = sweeps.rates(now.before, room.nodes, room.weights, n)
             self._resume(now, n)
         for _ in range(self._sweeps):
             sweeps.sweep(
@@ -210,8 +210,8 @@ class Contact(Boundary):
             now.kept[:] = 0.0
             faces = room.pair[:n] >= 0
             now.kept[room.pair[:n][faces]] = now.push[:n][faces]
-        heat = self._friction
-        sweeps.heat(heat.words.reshape(-1), now.push, slip, crowd.v, *room_of, room.friction, heat.scale[0], n)
+            heat = self._friction
+            sweeps.heat(heat.words.reshape(-1), now.push, slip, crowd.v, *room_of, room.friction, heat.scale[0], n)
         self._book(now)
         if _give_back(state.v, self._parts, now.local, held, crowd.v, now.total, state.part, state.owned):
             self.last_push = t
