@@ -113,7 +113,9 @@ class Brute(Found):
             places, room = sides.nodes.corners[pairs[:, 0]], Meetings.room(len(pairs))
             by_place = np.column_stack([places, pairs[:, 1:]])
             rows = (room.nodes, room.weights, room.normals, room.wanted, room.friction, room.pair)
-            n = meetings.node_face(*rows, 0, faces, sides.faces.size, out, by_place, *state)
+            n = meetings.node_face(
+                *rows, 0, faces, sides.faces.size, out, by_place, np.arange(len(pairs), dtype=np.int32), *state
+            )
             met += written(room, n, sides.crowd.id)
         return met
 
@@ -125,7 +127,8 @@ class Brute(Found):
             pairs = every[every[:, 0] < every[:, 1]]
             room = Meetings.room(len(pairs))
             rows = (room.nodes, room.weights, room.normals, room.wanted, room.friction, room.pair)
-            n = meetings.edge_edge(*rows, 0, places, edges.size, pairs, *state)
+            some = np.arange(len(pairs), dtype=np.int32)
+            n = meetings.edge_edge(*rows, 0, places, edges.size, pairs, some, *state)
             met += written(room, n, sides.crowd.id)
         return met
 

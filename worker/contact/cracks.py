@@ -274,6 +274,7 @@ class Follower:
         scene.normals = extended(scene.normals, np.zeros((n, 9)))
         scene.before = extended(scene.before, rows.v)
         scene.pushes = extended(scene.pushes, np.zeros(n, bool))
+        scene.rest.add(rows.x, rows.v)
         if (rows.local < 0).any():
             self._sort()
 
@@ -292,7 +293,7 @@ class Follower:
         scene = self._scene
         rows = touching(scene.faces, parents)
         now = self._followed(heard, scene.faces[rows], scene.face_id[rows] // 4)
-        scene.faces[rows] = now
+        scene.faces[rows], scene.rest.faces[rows] = now, True
         scene.pushes[now[:, :3]] = True
 
     def _edges(self, heard: News, parents: Flags) -> None:
@@ -305,7 +306,7 @@ class Follower:
         now = np.column_stack([one, two[:, 2]]).astype(np.int32)
         gone = (one[:, :2] != two[:, :2]).any(axis=1)
         now[gone] = now[gone][:, [0, 0, 0, 0]]
-        scene.edges[rows] = now
+        scene.edges[rows], scene.rest.edges[rows] = now, True
         scene.pushes[now[:, :2]] = True
 
     def _candidates(self, heard: News, parents: Flags) -> None:
@@ -324,6 +325,7 @@ class Follower:
         scene.node_face = extended(scene.node_face, np.column_stack([slave, face]).astype(np.int32))
         scene.keys = extended(scene.keys, np.column_stack([copy[order], scene.face_id[face]]))
         scene.kept = extended(scene.kept, np.zeros((len(face), 4)))
+        scene.rest.add_candidates(len(face))
         scene.pushes[slave] = True
 
 

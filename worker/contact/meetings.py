@@ -60,11 +60,11 @@ class Meetings:
 
 _V2, _N2 = "float64[:, ::1]", "int32[:, ::1]"
 _OUT = f"{_N2}, {_V2}, {_V2}, float64[::1], float64[::1], int32[::1]"
-_IN = f"{_N2}, {_V2}, {_V2}, int32[::1], {_V2}, float64"
+_IN = f"{_N2}, int32[::1], {_V2}, {_V2}, int32[::1], {_V2}, float64"
 
 
 @njit(f"float64(float64[::1], {_V2}, int64, int64, int64, int64)", cache=True, error_model="numpy")
-def _height(normal, x, s, i, j, k):  # type: ignore[no-untyped-def]
+def height(normal, x, s, i, j, k):  # type: ignore[no-untyped-def]
     """Height of node s over the face i, j, k, m, and the unit normal; NaN for a face of no area."""
     ex, ey, ez = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
     fx, fy, fz = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
@@ -75,7 +75,7 @@ def _height(normal, x, s, i, j, k):  # type: ignore[no-untyped-def]
 
 
 @njit(f"boolean(float64[::1], {_V2}, {_V2}, int64, int64, int64, int64, float64)", cache=True, error_model="numpy")
-def _foot(b, x, ahead, s, i, j, k, tau):  # type: ignore[no-untyped-def]
+def foot(b, x, ahead, s, i, j, k, tau):  # type: ignore[no-untyped-def]
     """Area coordinates ``b`` of the foot of node s on the face, the share ``tau`` of the way from x to ``ahead``;
     whether it lies on the face.
     """
@@ -100,7 +100,7 @@ def _foot(b, x, ahead, s, i, j, k, tau):  # type: ignore[no-untyped-def]
 
 
 @njit(f"float64({_V2}, int64, int64, int64)", cache=True)
-def _off(x, s, a, b):  # type: ignore[no-untyped-def]
+def off(x, s, a, b):  # type: ignore[no-untyped-def]
     """Distance of node s from the segment ab, m."""
     along, length, square = 0.0, 0.0, 0.0
     for i in range(3):
@@ -127,12 +127,12 @@ def _outside(x, p, pairs, faces, size, part, depth):  # type: ignore[no-untyped-
         f = pairs[q, 1]
         q += 1
         i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
-        off = _height(m, x, s, i, j, k)
-        if part[i] != part[faces[pairs[p, 1], 0]] or not off > 0.0:
+        away = height(m, x, s, i, j, k)
+        if part[i] != part[faces[pairs[p, 1], 0]] or not away > 0.0:
             continue
-        if not _foot(b, x, x, s, i, j, k, 0.0):
-            off = min(_off(x, s, i, j), _off(x, s, j, k), _off(x, s, k, i))
-        if off < min(depth, (DEEP_SELF if part[s] == part[i] else DEEP) * size[f]):
+        if not foot(b, x, x, s, i, j, k, 0.0):
+            away = min(off(x, s, i, j), off(x, s, j, k), off(x, s, k, i))
+        if away < min(depth, (DEEP_SELF if part[s] == part[i] else DEEP) * size[f]):
             return True
     return False
 
@@ -159,7 +159,7 @@ def _looks_at(out, s, m):  # type: ignore[no-untyped-def]
 
 
 @njit(f"int64({_OUT}, int64, {_N2}, float64[::1], {_V2}, {_IN})", cache=True, error_model="numpy")
-def node_face(nodes, weights, normals, wanted, friction, pair, n, faces, size, out, pairs, x, v, part, mu, dt):  # type: ignore[no-untyped-def]
+def node_face(nodes, weights, normals, wanted, friction, pair, n, faces, size, out, pairs, some, x, v, part, mu, dt):  # type: ignore[no-untyped-def]
     """Nodes that pass a face, from row ``n`` on; returns the new number of rows.
 
     ``out`` (nodes, 9): means of n and of n n (xx, yy, zz, yz, zx, xy) of the outward normals of a node's faces. A node
@@ -167,30 +167,25 @@ def node_face(nodes, weights, normals, wanted, friction, pair, n, faces, size, o
     block that slides not its front, which stands across. Zero for a node without faces, which meets any.
 
     ``pairs`` (p, 2): node and face, sorted by node, then by the id of the face; ``faces`` (f, 4), the node opposite
-    last; ``mu`` (parts, parts).
+    last; ``some`` of the pairs, ascending, are looked at; ``mu`` (parts, parts).
     """
     b, m = np.empty(3), np.empty(3)
     ahead = x + dt * v
-    planes = np.empty((len(faces), 3))
-    for f in range(len(faces)):
-        i = faces[f, 0]
-        _height(m, ahead, i, i, faces[f, 1], faces[f, 2])
-        planes[f, 0], planes[f, 1], planes[f, 2] = m[0], m[1], m[2]
-    nearest, row = 0.0, -1
-    for p in range(len(pairs)):
+    nearest, row, before = 0.0, -1, -1
+    for p in some:
         s, f = pairs[p, 0], pairs[p, 1]
-        if p == 0 or pairs[p - 1, 0] != s:
-            row = -1
+        if s != before:
+            row, before = -1, s
         i, j, k, d = faces[f, 0], faces[f, 1], faces[f, 2], faces[f, 3]
+        height(m, ahead, s, i, j, k)
         gap1 = 0.0
         for a in range(3):
-            m[a] = planes[f, a]
             gap1 += m[a] * (ahead[s, a] - ahead[i, a])
         if not gap1 <= NEAR * size[f]:
             continue
         if not _looks_at(out, s, m):
             continue
-        gap0 = _height(b, x, s, i, j, k)
+        gap0 = height(b, x, s, i, j, k)
         if not gap0 >= -(DEEP_SELF if part[s] == part[i] else DEEP) * size[f]:
             continue
         if gap0 < 0.0:
@@ -202,7 +197,7 @@ def node_face(nodes, weights, normals, wanted, friction, pair, n, faces, size, o
         tau = 0.0
         if gap0 > 0.0:
             tau = 1.0 if gap1 >= 0.0 else gap0 / (gap0 - gap1)
-        if not _foot(b, x, ahead, s, i, j, k, tau):
+        if not foot(b, x, ahead, s, i, j, k, tau):
             continue
         at = n
         if gap0 < -_TOUCHING * size[f]:
@@ -286,16 +281,16 @@ def _volume(u, w, r):  # type: ignore[no-untyped-def]
 
 
 @njit(f"int64({_OUT}, int64, {_N2}, float64[::1], {_IN})", cache=True, error_model="numpy")
-def edge_edge(nodes, weights, normals, wanted, friction, pair, n, edges, size, pairs, x, v, part, mu, dt):  # type: ignore[no-untyped-def]
+def edge_edge(nodes, weights, normals, wanted, friction, pair, n, edges, size, pairs, some, x, v, part, mu, dt):  # type: ignore[no-untyped-def]
     """Edges that pass an edge, from row ``n`` on; returns the new number of rows. They meet where they cross.
 
-    ``pairs`` (p, 2): two edges; ``edges`` (e, 4): records.Edges.
+    ``pairs`` (p, 2): two edges, of which ``some`` are looked at; ``edges`` (e, 4): records.Edges.
     """
     u, w, r, m = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     u0, w0, r0 = np.empty(3), np.empty(3), np.empty(3)
     turned = np.empty((4, 3))
     ahead = x + dt * v
-    for p in range(len(pairs)):
+    for p in some:
         one, two = pairs[p, 0], pairs[p, 1]
         a, b, c, d = edges[one, 0], edges[one, 1], edges[two, 0], edges[two, 1]
         for k in range(3):

@@ -14,6 +14,7 @@ from . import domain, ghosts, search, sift
 from .ghosts import Copies
 from .meetings import DEEP, DEEP_SELF, Meetings
 from .records import Crowd, Edges, Faces, merged
+from .rest import Rest
 from .search import Boxes, Things
 
 _COPY_TAG, _SHARE_TAG, _PUSH_TAG = 11, 12, 13
@@ -112,6 +113,7 @@ class Scene:
     """(nodes,) place of each node of this rank, -1 for those that are not in the crowd."""
     pushes: Flags
     """(crowd,) which nodes a meeting of this rank may push."""
+    rest: Rest
     cracks: Indices
     """(m, 6) places of the nodes on either side of open cracks (contact/cracks.py)."""
     company: list[Neighbour] = field(init=False)
@@ -301,6 +303,7 @@ def compact(seen: Sides, node_face: Indices, edge_edge: Indices, sent: int, node
         room=Meetings.room(room), diagonal=np.empty((room, 2)), push=np.empty((room, 4)),
         shares=shares, impulse=impulse, place=place, pushes=pushes,
         cracks=np.zeros((0, 6), np.int32),
+        rest=Rest(crowd.x, crowd.v, len(which_faces), len(which_edges), len(node_face), len(edge_edge)),
         total=np.zeros((crowd.n, 3), np.int64), normals=np.zeros((crowd.n, 9)), before=np.zeros((crowd.n, 3)),
     )  # fmt: skip
 

@@ -308,8 +308,15 @@ class Contact(Boundary):
         crowd, room = now.crowd, now.room
         out = (room.nodes, room.weights, room.normals, room.wanted, room.friction, room.pair)
         found = (crowd.x, crowd.v, crowd.part, self._mu, dt)
-        n = meetings.node_face(*out, 0, now.faces, now.face_size, now.normals, now.node_face, *found)
-        n = meetings.edge_edge(*out, n, now.edges, now.edge_size, now.edge_edge, *found)
+        rest = now.rest
+        rest.move(crowd.x, crowd.v, now.faces, now.edges, dt)
+        pairs, edges = rest.awake(now.node_face, now.edge_edge)
+        n = meetings.node_face(*out, 0, now.faces, now.face_size, now.normals, now.node_face, pairs, *found)
+        n = meetings.edge_edge(*out, n, now.edges, now.edge_size, now.edge_edge, edges, *found)
+        rest.settle(
+            pairs, edges, now.node_face, now.edge_edge, now.faces, now.face_size, now.edges, now.edge_size,
+            crowd.x + dt * crowd.v, crowd.part,
+        )  # fmt: skip
         n, apart = across(*out, n, now.cracks, self._flight.size, *found)
         self._apart |= bool(apart)
         return int(n)
