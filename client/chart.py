@@ -2,65 +2,68 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 from .study import Study
 
-_WIDTH, _HEIGHT, _LEFT, _TOP, _SIDE = 460, 400, 56, 36, 320
+_WIDTH, _HEIGHT, _LEFT, _TOP, _SIDE = 500, 400, 56, 36, 320
 _BLUE, _RED, _GREY = "#1b6ca8", "#c8553d", "#999999"
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """Logarithmic axes from 1 to 2^``most`` ranks, and to the same speed-up from 2^``least``."""
+
+    least: int
+    most: int
+
+    def place(self, ranks: float, value: float) -> tuple[float, float]:
+        x, y = math.log2(ranks) / self.most, (math.log2(value) - self.least) / (self.most - self.least)
+        return _LEFT + _SIDE * x, _TOP + _SIDE * (1.0 - y)
+
+    def grid(self) -> str:
+        drawn = []
+        for power in range(self.least, self.most + 1):
+            x, y = self.place(2 ** max(power, 0), 2.0**power)
+            drawn.append(f'<path d="M{_LEFT} {y:.1f}h{_SIDE}M{x:.1f} {_TOP}v{_SIDE}" stroke="#dddddd"/>')
+            drawn.append(f'<text x="{_LEFT - 8}" y="{y + 4:.1f}" text-anchor="end">{2.0**power:g}</text>')
+            if power >= 0:
+                drawn.append(f'<text x="{x:.1f}" y="{_TOP + _SIDE + 18}" text-anchor="middle">{2**power}</text>')
+        return "\n".join(drawn)
+
+    def line(self, values: Mapping[int, float], colour: str, dashes: str = "none") -> str:
+        points = " ".join("{:.1f},{:.1f}".format(*self.place(*pair)) for pair in values.items())
+        return f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-dasharray="{dashes}"/>'
+
+    def marks(self, values: Mapping[int, float], colour: str, fill: str) -> str:
+        return "\n".join(_mark(*self.place(*pair), colour, fill) for pair in values.items())
 
 
 def speed_up(study: Study) -> str:
     """The figure; both axes are logarithmic."""
-    one = study.runs[0]
     projected = {run.ranks: study.speed_up(run) for run in study.runs}
-    measured = {run.ranks: one.wall / run.wall for run in study.runs if run.ranks <= study.cores}
-    decades = max(1, math.ceil(math.log2(max([2, *projected, *study.paper]))))
-    paper = f"Moon, Kim and Lee, {study.case}"
+    measured = {run.ranks: study.runs[0].wall / run.wall for run in study.runs if run.ranks <= study.cores}
+    values = (*projected.values(), *measured.values())
+    most = max(1, math.ceil(math.log2(max(*projected, *study.paper, 2))))
+    frame = _Frame(min(0, math.floor(math.log2(min(values)))), most)
     return "\n".join([
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {_HEIGHT}" font-family="sans-serif" '
         'font-size="12">',
-        f'<rect width="{_WIDTH}" height="{_HEIGHT}" fill="white"/>',
-        f'<text x="{_LEFT}" y="20" font-size="14">{study.case}: speed-up, projected with a core a rank</text>',
-        *(_grid(2**power, decades) for power in range(decades + 1)),
-        _line({1: 1.0, 2**decades: 2.0**decades}, decades, _GREY, "4 4"),
-        _line(projected, decades, _BLUE),
-        *(_mark(ranks, value, decades, _BLUE, _BLUE) for ranks, value in projected.items()),
-        *(_mark(ranks, value, decades, _BLUE, "white") for ranks, value in measured.items()),
-        *(_mark(ranks, value, decades, _RED, _RED) for ranks, value in study.paper.items()),
-        _legend(0, "projected", _BLUE, _BLUE), _legend(1, "wall time", _BLUE, "white"),
-        *([_legend(2, paper, _RED, _RED)] if study.paper else []),
-        f'<text x="{_LEFT + _SIDE / 2}" y="{_TOP + _SIDE + 36}" text-anchor="middle">ranks</text>',
-        "</svg>", "",
+        f'<rect width="{_WIDTH}" height="{_HEIGHT}" fill="white"/>', frame.grid(),
+        frame.line({1: 1.0, 2**most: 2.0**most}, _GREY, "4 4"), frame.line(projected, _BLUE),
+        frame.marks(projected, _BLUE, _BLUE), frame.marks(measured, _BLUE, "white"),
+        frame.marks(study.paper, _RED, _RED),
+        _legend(0, "projected, a core a rank", _BLUE, _BLUE), _legend(1, "wall time, this machine", _BLUE, "white"),
+        *([_legend(2, "Moon, Kim and Lee, measured", _RED, _RED)] if study.paper else []),
+        f'<text x="{_LEFT}" y="20" font-size="14">{study.case}: speed-up</text>',
+        f'<text x="{_LEFT + _SIDE / 2}" y="{_TOP + _SIDE + 36}" text-anchor="middle">ranks</text>', "</svg>", "",
     ])  # fmt: skip
 
 
-def _place(ranks: float, value: float, decades: int) -> tuple[float, float]:
-    unit = _SIDE / decades
-    return _LEFT + unit * math.log2(ranks), _TOP + _SIDE - unit * max(math.log2(value), 0.0)
-
-
-def _grid(number: int, decades: int) -> str:
-    x, y = _place(number, number, decades)
-    return (
-        f'<path d="M{x:.1f} {_TOP}V{_TOP + _SIDE}M{_LEFT} {y:.1f}H{_LEFT + _SIDE}" stroke="#dddddd"/>'
-        f'<text x="{x:.1f}" y="{_TOP + _SIDE + 18}" text-anchor="middle">{number}</text>'
-        f'<text x="{_LEFT - 8}" y="{y + 4:.1f}" text-anchor="end">{number}</text>'
-    )
-
-
-def _line(values: Mapping[int, float], decades: int, colour: str, dashes: str = "none") -> str:
-    points = " ".join("{:.1f},{:.1f}".format(*_place(ranks, value, decades)) for ranks, value in values.items())
-    return f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="1.5" stroke-dasharray="{dashes}"/>'
-
-
-def _mark(ranks: float, value: float, decades: int, colour: str, fill: str) -> str:
-    x, y = _place(ranks, value, decades)
+def _mark(x: float, y: float, colour: str, fill: str) -> str:
     return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="{fill}" stroke="{colour}" stroke-width="1.5"/>'
 
 
 def _legend(row: int, text: str, colour: str, fill: str) -> str:
     x, y = _LEFT + 16, _TOP + 18 + 20 * row
-    return (
-        f'<circle cx="{x}" cy="{y - 4}" r="4" fill="{fill}" stroke="{colour}" stroke-width="1.5"/>'
-        f'<text x="{x + 12}" y="{y}">{text}</text>'
-    )
+    return _mark(x, y - 4, colour, fill) + f'<text x="{x + 12}" y="{y}">{text}</text>'

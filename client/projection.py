@@ -58,6 +58,8 @@ class Projection(msgspec.Struct, frozen=True, kw_only=True):
     """CPU time of all ranks but for their waiting."""
     longest: float
     """Sum over windows of the largest work of a rank."""
+    longest_coarse: float
+    """The same over windows twice as long."""
     messages: float
     """What messages between two ranks take."""
     collectives: float
@@ -77,6 +79,11 @@ class Projection(msgspec.Struct, frozen=True, kw_only=True):
     def time(self) -> float:
         """T_P."""
         return self.longest + self.messages + self.collectives
+
+    @property
+    def coarse(self) -> float:
+        """T_P from windows twice as long: how much depends on them."""
+        return self.time - self.longest + self.longest_coarse
 
     @property
     def worst(self) -> float:
@@ -115,11 +122,13 @@ def project(journal: Iterable[AnyMessage], outcome: Outcome, network: Network) -
             loads.append(message)
             shared_steps += shared * message.steps
     works = [_work(load) for load in loads]
+    busy = [_busy(work) for work in works]
     ranks, steps = outcome.ranks, max(outcome.steps, 1)
     sent = sum(sum(load.bytes) for load in loads)
     return Projection(
         ranks=ranks, steps=outcome.steps, windows=len(loads), wall=outcome.elapsed - outcome.setup,
-        work=sum(sum(map(sum, work.values())) for work in works), longest=sum(max(_busy(work)) for work in works),
+        work=sum(map(sum, busy)), longest=sum(map(max, busy)),
+        longest_coarse=sum(max(map(sum, zip(*busy[i : i + 2], strict=True))) for i in range(0, len(busy), 2)),
         messages=sum(_messages(load, network) for load in loads),
         collectives=sum(_collectives(load, network) for load in loads),
         phases={name: _phase([work[name] for work in works]) for name in (works[0] if works else ())},

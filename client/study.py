@@ -45,9 +45,12 @@ class Study:
 def to_json(study: Study) -> bytes:
     """All numbers."""
     runs = [
-        {**msgspec.to_builtins(run), "projected": run.time, "at_worst": run.worst, "speed_up": study.speed_up(run)}
+        {
+            **msgspec.to_builtins(run), "projected": run.time, "coarser": run.coarse, "at_worst": run.worst,
+            "speed_up": study.speed_up(run),
+        }
         for run in study.runs
-    ]
+    ]  # fmt: skip
     data = {
         "case": study.case, "cores": study.cores, "network": study.network, "digests_equal": study.equal, "runs": runs,
     }  # fmt: skip
@@ -59,7 +62,8 @@ def to_markdown(study: Study) -> str:
     network, crowded = study.network, [str(run.ranks) for run in study.runs if run.ranks > study.cores]
     parts = [
         f"`{study.case}` on {study.cores} cores. Projected: with a core a rank, {si(network.latency, 's')} a message, "
-        f"{si(network.bandwidth, 'B/s')}; at worst: if ranks waited for each other after every phase.",
+        f"{si(network.bandwidth, 'B/s')}; coarser: from windows twice as long; at worst: if ranks waited for each "
+        "other after every phase.",
         f"Ranks took turns on the cores, with MPIR_CVAR_ENABLE_HEAVY_YIELD=1: {', '.join(crowded)}." if crowded else "",
         _speeds(study),
         "Projected time of a rank beyond that of one rank over the number of ranks, s: more work + imbalance, and the "
@@ -74,14 +78,14 @@ def to_markdown(study: Study) -> str:
 
 def _speeds(study: Study) -> str:
     head = (
-        "ranks", "steps", "steps a window", "wall s", "work of one / of all %", "projected s", "at worst s",
-        "projected speed-up", "projected efficiency %", "imbalance", "rebalances", "paper's speed-up",
+        "ranks", "steps", "steps a window", "wall s", "work of one / of all %", "projected s", "coarser s",
+        "at worst s", "projected speed-up", "projected efficiency %", "imbalance", "rebalances", "paper's speed-up",
     )  # fmt: skip
     rows = [
         [
             str(run.ranks), count(run.steps), f"{run.steps / run.windows:.1f}",
             f"{run.wall:.1f}" if run.ranks <= study.cores else "-", f"{100 * study.runs[0].work / run.work:.0f}",
-            _seconds(run.time), _seconds(run.worst), f"{study.speed_up(run):.2f}",
+            _seconds(run.time), _seconds(run.coarse), _seconds(run.worst), f"{study.speed_up(run):.2f}",
             f"{100 * study.speed_up(run) / run.ranks:.0f}", f"{run.imbalance:.2f}", str(run.rebalances),
             f"{study.paper[run.ranks]:.2f}" if run.ranks in study.paper else "-",
         ]

@@ -63,6 +63,7 @@ def test_the_projection_is_the_sum_by_hand() -> None:
     assert run.messages == pytest.approx(0.010 + 0.004)
     assert run.collectives == pytest.approx(3 * 2 * 0.001 + 0.004 + 2 * 0.001)
     assert run.time == pytest.approx(5.276)
+    assert run.coarse == pytest.approx(3.0 + 1.5 + 0.026)
     assert (run.work, run.wall) == (7.75, 7.0)
     assert run.imbalance == pytest.approx(5.25 / 3.875)
     assert {name: (p.total, p.imbalance) for name, p in run.phases.items()} == {
@@ -99,7 +100,7 @@ def test_the_tables_say_it() -> None:
     assert "1.00 ms a message, 1.00 MB/s" in text
     row = next(line for line in text.splitlines() if line.startswith("| 2 "))
     cells = [cell.strip() for cell in row.strip("|").split("|")]
-    assert cells == ["2", "4", "2.0", "7.0", "90", "5.28", "5.78", "1.33", "66", "1.35", "1", "-"]
+    assert cells == ["2", "4", "2.0", "7.0", "90", "5.28", "4.53", "5.78", "1.33", "66", "1.35", "1", "-"]
     assert "Digests: equal, abc." in text
     document = json.loads(to_json(study(one_rank(), two_ranks())))
     assert document["runs"][1]["projected"] == pytest.approx(5.276)

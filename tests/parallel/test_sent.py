@@ -5,10 +5,13 @@ import pickle
 from pathlib import Path
 
 import numpy as np
+import pytest
 
+from conoid.cases.load import apply_overrides, parse_case, read_data, shipped
+from conoid.worker import simulation, step
 from conoid.worker.parallel.comm import SerialComm
 
-from ..contact.ranks import on_ranks
+from ..contact.ranks import ThreadComm, on_ranks
 from .launching import command, ended
 from .sending import talk
 
@@ -42,3 +45,29 @@ def test_one_rank_sends_nothing() -> None:
     comm.swap({0: comm.sum(np.arange(3))})
     comm.share("item")
     assert set(comm.sent.since_last().values()) == {0}
+
+
+@pytest.mark.parametrize(("form", "words"), [("standard", 3), ("nodal", 5), ("split", 8)])
+def test_a_shared_node_costs_these_words_a_step(form: str, words: int) -> None:
+    """Both holders of a node send forces (3), the nodal form the volumes besides (2), split the gradients (3).
+
+    Forces that outgrow their quantum are sent again: the least of some steps counts.
+    """
+    data = apply_overrides(read_data(shipped()["elastic_bar_wall"]), [f"numerics.pressure={form}", "run.frames=0"])
+    case = parse_case(data)
+
+    def run(comm: ThreadComm) -> tuple[int, int]:
+        sim = simulation.build(case, Path(), comm)
+        shared = sim.shared_nodes()
+        step.prepare(sim)
+        sent = []
+        for _ in range(10):
+            comm.sent.since_last()
+            step.first_half(sim)
+            step.second_half(sim)
+            sent.append(comm.sent.since_last()["bytes"])
+        return min(sent), shared
+
+    (first, shared), (second, _) = on_ranks(2, run)
+    assert shared > 0
+    assert first == second == shared * words * 8
