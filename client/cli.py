@@ -321,7 +321,7 @@ def bench_scale(
         for run in scale(case, overrides or (), numbers, out or Path(passing), network):
             _complain(f"ranks {run.ranks}: {run.steps} steps in {run.wall:.1f} s")
             runs.append(run)
-    done = study.Study(case_of(case, overrides or ()).name, CORES, network, runs)
+    done = study.Study(case_of(case, overrides or ()).name, overrides or (), CORES, network, runs)
     if out is not None:
         (out / "scale.md").write_text(study.to_markdown(done), encoding="utf-8")
         (out / "scale.json").write_bytes(study.to_json(done))

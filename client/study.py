@@ -17,6 +17,8 @@ class Study:
     """Runs of a case by their ranks; the first is on one."""
 
     case: str
+    changes: Sequence[str]
+    """Keys of the case that were set."""
     cores: int
     network: Network
     runs: Sequence[Projection]
@@ -52,7 +54,8 @@ def to_json(study: Study) -> bytes:
         for run in study.runs
     ]  # fmt: skip
     data = {
-        "case": study.case, "cores": study.cores, "network": study.network, "digests_equal": study.equal, "runs": runs,
+        "case": study.case, "changes": study.changes, "cores": study.cores, "network": study.network,
+        "digests_equal": study.equal, "runs": runs,
     }  # fmt: skip
     return msgspec.json.format(msgspec.json.encode(data), indent=2)
 
@@ -60,12 +63,15 @@ def to_json(study: Study) -> bytes:
 def to_markdown(study: Study) -> str:
     """The tables, with what they mean."""
     network, crowded = study.network, [str(run.ranks) for run in study.runs if run.ranks > study.cores]
+    paper = ", ".join(f"{value:.2f} on {ranks} ({100 * value / ranks:.1f} %)" for ranks, value in study.paper.items())
     parts = [
-        f"`{study.case}` on {study.cores} cores. Projected: with a core a rank, {si(network.latency, 's')} a message, "
+        ", ".join(f"`{text}`" for text in (study.case, *study.changes)),
+        f"On {study.cores} cores. Projected: with a core a rank, {si(network.latency, 's')} a message, "
         f"{si(network.bandwidth, 'B/s')}; coarser: from windows twice as long; at worst: if ranks waited for each "
         "other after every phase.",
         f"Ranks took turns on the cores, with MPIR_CVAR_ENABLE_HEAVY_YIELD=1: {', '.join(crowded)}." if crowded else "",
         _speeds(study),
+        f"Moon, Kim and Lee measured a speed-up of {paper}." if paper else "",
         "Projected time of a rank beyond that of one rank over the number of ranks, s: more work + imbalance, and the "
         "share in all of it.",
         _losses(study),
@@ -79,7 +85,7 @@ def to_markdown(study: Study) -> str:
 def _speeds(study: Study) -> str:
     head = (
         "ranks", "steps", "steps a window", "wall s", "work of one / of all %", "projected s", "coarser s",
-        "at worst s", "projected speed-up", "projected efficiency %", "imbalance", "rebalances", "paper's speed-up",
+        "at worst s", "projected speed-up", "projected efficiency %", "imbalance", "rebalances",
     )  # fmt: skip
     rows = [
         [
@@ -87,7 +93,6 @@ def _speeds(study: Study) -> str:
             f"{run.wall:.1f}" if run.ranks <= study.cores else "-", f"{100 * study.runs[0].work / run.work:.0f}",
             _seconds(run.time), _seconds(run.coarse), _seconds(run.worst), f"{study.speed_up(run):.2f}",
             f"{100 * study.speed_up(run) / run.ranks:.0f}", f"{run.imbalance:.2f}", str(run.rebalances),
-            f"{study.paper[run.ranks]:.2f}" if run.ranks in study.paper else "-",
         ]
         for run in study.runs
     ]  # fmt: skip
@@ -102,6 +107,7 @@ def _losses(study: Study) -> str:
         [name, _seconds(one[name].total) if name in one else "-"]
         + [_loss(*table[name], whole) for table, whole in zip(tables, wholes, strict=True)]
         for name in (tables[0] if tables else ())
+        if any(sum(table[name]) for table in tables)
     ]
     return _table(["phase", "one rank s", *(f"{run.ranks} ranks" for run in runs)], rows)
 

@@ -77,6 +77,7 @@ class Loop:
 
     def run(self) -> None:
         """Steps until the end time, or until a reason to stop. Raises PhysicsError."""
+        self.sim.timers.begin()
         self.sim.comm.sent.since_last()
         step.prepare(self.sim)
         while True:
@@ -160,9 +161,9 @@ class Loop:
     def _report(self) -> None:
         """Progress and loads to the journal; all ranks take part."""
         sim, clock = self.sim, self.sim.clock
+        seconds, waiting = sim.timers.since_last()
         with sim.timers.phase("output"):
             limiter = sim.limiter()
-            seconds, waiting = sim.timers.since_last()
             loads = sim.comm.share((seconds, {"waiting": waiting, **sim.comm.sent.since_last()}))
             self._count()
         work, sent = ({name: [load[i][name] for load in loads] for name in loads[0][i]} for i in (0, 1))
