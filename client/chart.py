@@ -42,8 +42,9 @@ class _Frame:
 def speed_up(study: Study) -> str:
     """The figure; both axes are logarithmic."""
     projected = {run.ranks: study.speed_up(run) for run in study.runs}
+    worst = {run.ranks: study.runs[0].time / run.worst for run in study.runs}
     measured = {run.ranks: study.runs[0].wall / run.wall for run in study.runs if run.ranks <= study.cores}
-    values = (*projected.values(), *measured.values())
+    values = (*worst.values(), *measured.values())
     most = max(1, math.ceil(math.log2(max(*projected, *study.paper, 2))))
     frame = _Frame(min(0, math.floor(math.log2(min(values)))), most)
     return "\n".join([
@@ -51,9 +52,11 @@ def speed_up(study: Study) -> str:
         'font-size="12">',
         f'<rect width="{_WIDTH}" height="{_HEIGHT}" fill="white"/>', frame.grid(),
         frame.line({1: 1.0, 2**most: 2.0**most}, _GREY, "4 4"), frame.line(projected, _BLUE),
+        frame.line(worst, _BLUE, "2 3"),
         frame.marks(projected, _BLUE, _BLUE), frame.marks(measured, _BLUE, "white"),
         frame.marks(study.paper, _RED, _RED),
-        _legend(0, "projected, a core a rank", _BLUE, _BLUE), _legend(1, "wall time, this machine", _BLUE, "white"),
+        _legend(0, "projected, a core a rank; dots: at worst", _BLUE, _BLUE),
+        _legend(1, "wall time, this machine", _BLUE, "white"),
         *([_legend(2, "Moon, Kim and Lee, measured", _RED, _RED)] if study.paper else []),
         f'<text x="{_LEFT}" y="20" font-size="14">{study.case}: speed-up</text>',
         f'<text x="{_LEFT + _SIDE / 2}" y="{_TOP + _SIDE + 36}" text-anchor="middle">ranks</text>', "</svg>", "",

@@ -85,14 +85,16 @@ def to_markdown(study: Study) -> str:
 def _speeds(study: Study) -> str:
     head = (
         "ranks", "steps", "steps a window", "wall s", "work of one / of all %", "projected s", "coarser s",
-        "at worst s", "projected speed-up", "projected efficiency %", "imbalance", "rebalances",
+        "at worst s", "projected speed-up", "projected efficiency %", "speed-up at worst", "imbalance",
+        "rebalances",
     )  # fmt: skip
     rows = [
         [
             str(run.ranks), count(run.steps), f"{run.steps / run.windows:.1f}",
             f"{run.wall:.1f}" if run.ranks <= study.cores else "-", f"{100 * study.runs[0].work / run.work:.0f}",
             _seconds(run.time), _seconds(run.coarse), _seconds(run.worst), f"{study.speed_up(run):.2f}",
-            f"{100 * study.speed_up(run) / run.ranks:.0f}", f"{run.imbalance:.2f}", str(run.rebalances),
+            f"{100 * study.speed_up(run) / run.ranks:.0f}", f"{study.runs[0].time / run.worst:.2f}",
+            f"{run.imbalance:.2f}", str(run.rebalances),
         ]
         for run in study.runs
     ]  # fmt: skip

@@ -62,7 +62,7 @@ class Comm(Protocol):
     rank: int
     size: int
     waited: float
-    """CPU seconds of this thread in calls that may wait for other ranks."""
+    """CPU seconds of this thread in calls that may wait for other ranks, but for the packing of objects."""
     sent: Sent
 
     def begin_maximum(self, words: Ints, result: Ints) -> Pending:
@@ -177,21 +177,27 @@ class MpiComm:
         self.size: int = self._world.Get_size()
         self.waited = 0.0
         self.sent = Sent()
-        MPI.pickle.__init__(self._pickled, pickle.loads)  # type: ignore[misc]
-
-    def _pickled(self, item: Any, protocol: int | None = None) -> bytes:
-        data = pickle.dumps(item, protocol)
-        self.sent.collective_bytes += len(data)
-        return data
+        MPI.pickle.__init__(self._pickled, self._unpickled)  # type: ignore[misc]
 
     @contextmanager
-    def waiting(self) -> Iterator[None]:
-        """Counts the CPU time of the block as waiting."""
+    def waiting(self, sign: int = 1) -> Iterator[None]:
+        """Counts the CPU time of the block as waiting; -1: takes it out again."""
         start = time.thread_time()
         try:
             yield
         finally:
-            self.waited += time.thread_time() - start
+            self.waited += sign * (time.thread_time() - start)
+
+    def _pickled(self, item: Any, protocol: int | None = None) -> bytes:
+        """Within a call that waits, this is work."""
+        with self.waiting(-1):
+            data = pickle.dumps(item, protocol)
+        self.sent.collective_bytes += len(data)
+        return data
+
+    def _unpickled(self, data: Any) -> Any:
+        with self.waiting(-1):
+            return pickle.loads(data)
 
     def begin_maximum(self, words: Ints, result: Ints) -> Pending:
         self.sent.collective(words.nbytes)
@@ -245,12 +251,13 @@ class MpiComm:
 
     def scatter(self, items: list[Any] | None) -> Any:
         self.sent.collective()
-        if self.rank == 0:
-            assert items is not None
-            for target in range(1, self.size):
-                self._world.send(items[target], target)
-            return items[0]
-        return self._world.recv(source=0)
+        with self.waiting():
+            if self.rank == 0:
+                assert items is not None
+                for target in range(1, self.size):
+                    self._world.send(items[target], target)
+                return items[0]
+            return self._world.recv(source=0)
 
     def broadcast(self, item: Any) -> Any:
         self.sent.collective(number=2)
