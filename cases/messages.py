@@ -82,11 +82,25 @@ class Progress(Message, frozen=True):
 
 
 class Load(Message, frozen=True):
-    """Seconds per rank and phase since the last Load message, and max/mean of the busy time."""
+    """CPU seconds per rank and phase since the last Load message, max/mean of the work, and what each rank has sent.
+
+    Lists have one number a rank.
+    """
 
     channel: ClassVar[str] = "load"
     phases: dict[str, list[float]]
     imbalance: float
+    steps: int = 0
+    waiting: list[float] = []
+    """Of ``exchange``: CPU seconds in calls that wait for other ranks."""
+    messages: list[int] = []
+    """To single ranks."""
+    bytes: list[int] = []
+    """Of these messages."""
+    collectives: list[int] = []
+    """Calls in which all ranks take part."""
+    collective_bytes: list[int] = []
+    """That the rank puts into them."""
 
 
 class Counts(Message, frozen=True):

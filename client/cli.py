@@ -1,7 +1,8 @@
-"""The command line: ``conoid serve | validate | submit | ls | show | watch | cancel | get | view | run``."""
+"""The command line: ``conoid serve | validate | submit | ls | show | watch | cancel | get | view | run | bench``."""
 
 import os
 import sys
+import tempfile
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,12 +14,15 @@ from typer.core import TyperGroup
 from conoid.cases.estimate import estimate
 from conoid.cases.load import CaseError
 from conoid.cases.run import ExitCode, State
+from conoid.cases.units import parse_quantity
 
-from . import tables
+from . import chart, study, tables
 from .errors import ClientError, ServiceError
 from .live import Live, exit_code
 from .once import run_once
+from .projection import Network, bandwidth
 from .run import Run
+from .scaling import CORES, scale
 from .session import Session, connect
 from .submission import case_of, locate
 from .view import FIELDS, view
@@ -54,6 +58,8 @@ app = typer.Typer(
     cls=Guarded, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
     help="Impact simulations: submit them, watch them, look at them.",
 )  # fmt: skip
+bench = typer.Typer(no_args_is_help=True, help="Measure.")
+app.add_typer(bench, name="bench")
 
 Url = Annotated[str | None, typer.Option("--url", help="The server [CONOID_URL, or the configuration file].")]
 Token = Annotated[str | None, typer.Option("--token", help="Who asks [CONOID_TOKEN, or the configuration file].")]
@@ -296,6 +302,43 @@ def run_case(
     """Do it all here: start a server, submit, watch, check, draw, stop the server. Ctrl-C cancels the run."""
     chosen = [*(overrides or ()), *([f"run.ranks={ranks}"] if ranks is not None else [])]
     raise typer.Exit(run_once(case, chosen, out, picture, field, plain=plain, check=check, as_json=as_json))
+
+
+@bench.command(name="scale", short_help="Run a case on several numbers of ranks; speed-up, projected beyond the cores.")
+def bench_scale(
+    case: CaseArgument,
+    ranks: Annotated[str, typer.Option("--ranks", help="Numbers of ranks; one is always among them.")] = "1,2,4,8",
+    overrides: Overrides = None,
+    latency: Annotated[str, typer.Option("--latency", help="Of a message, for the projection.")] = "2 us",
+    width: Annotated[str, typer.Option("--bandwidth", help="Of a rank's messages, for the projection.")] = "5 GB/s",
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", help="Folder for scale.md, .json and .svg and for the runs; those of an earlier call are read."
+        ),
+    ] = None,
+) -> None:
+    """Run a case on several numbers of ranks: speed-up, where it is lost, and whether all give the same answer.
+
+    Ends with 1 when they do not.
+    """
+    try:
+        numbers = [int(word) for word in ranks.split(",")]
+        network = Network(parse_quantity(latency, "s"), bandwidth(width))
+    except ValueError as error:
+        raise ClientError(str(error)) from None
+    with tempfile.TemporaryDirectory() as passing:
+        runs = []
+        for run in scale(case, overrides or (), numbers, out or Path(passing), network):
+            _complain(f"ranks {run.ranks}: {run.steps} steps in {run.wall:.1f} s")
+            runs.append(run)
+    done = study.Study(case_of(case, overrides or ()).name, overrides or (), CORES, network, runs)
+    if out is not None:
+        (out / "scale.md").write_text(study.to_markdown(done), encoding="utf-8")
+        (out / "scale.json").write_bytes(study.to_json(done))
+        (out / "scale.svg").write_text(chart.speed_up(done), encoding="utf-8")
+    typer.echo(study.to_markdown(done), nl=False)
+    raise typer.Exit(ExitCode.SUCCEEDED if done.equal else ExitCode.CRASHED)
 
 
 def main() -> None:

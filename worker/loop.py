@@ -93,11 +93,13 @@ class Loop:
         self._reported_step = sim.clock.step
         self._pace = Pace(sim.clock.t, self._began)
         self._logged = -math.inf
-        self._counted = (0, 0)
+        self._counted = (0, 0, 0)
         self.balance = balance
 
     def run(self) -> None:
         """Steps until the end time, or until a reason to stop. Raises PhysicsError."""
+        self.sim.timers.begin()
+        self.sim.comm.sent.since_last()
         if not self._start.resumed:
             step.prepare(self.sim)
         while True:
@@ -133,7 +135,8 @@ class Loop:
         """Tets to other ranks, when that is due."""
         cause = self.balance.cause(self.sim)
         if cause is not None:
-            self.sim, told = self.balance.move(self.sim)
+            with self.sim.timers.phase("balance"):
+                self.sim, told = self.balance.move(self.sim)
             self._tell(messages.Balance, cause=cause, **told)
 
     def _checkpoint(self) -> None:
@@ -209,11 +212,12 @@ class Loop:
     def _report(self) -> None:
         """Progress and loads to the journal; all ranks take part."""
         sim, clock = self.sim, self.sim.clock
+        seconds, waiting = sim.timers.since_last()
         with sim.timers.phase("output"):
             limiter = sim.limiter()
-            loads = sim.comm.share(sim.timers.since_last())
+            loads = sim.comm.share((seconds, {"waiting": waiting, **sim.comm.sent.since_last()}))
             self._count()
-        work = {name: [load[name] for load in loads] for name in loads[0]}
+        work, sent = ({name: [load[i][name] for load in loads] for name in loads[0][i]} for i in (0, 1))
         window = Window(clock.step - self._reported_step, work)
         self._reported_step = clock.step
         self.balance.look(window)
@@ -231,18 +235,18 @@ class Loop:
                 eta=self._pace.left(sim.case.run.end_time - clock.t), energy=self.energy,
                 updates_per_second=(self.updates - self._reported_updates) / elapsed,
             )  # fmt: skip
-        self._tell(messages.Load, phases=work, imbalance=window.imbalance)
+        self._tell(messages.Load, phases=work, imbalance=window.imbalance, steps=window.steps, **sent)
         self._reported, self._reported_updates = now, self.updates
 
     def _count(self) -> None:
         """How large the model is, when that has changed; all ranks take part."""
         sim, model = self.sim, self.sim.model
-        if (model.elements_global, model.nodes_global) == self._counted:
+        if (model.elements_global, model.nodes_global, self.balance.events) == self._counted:
             return
-        self._counted = model.elements_global, model.nodes_global
-        held = sim.comm.gather(sum(block.n for block in model.blocks))
+        self._counted = model.elements_global, model.nodes_global, self.balance.events
+        held, shared = sim.comm.gather(sum(block.n for block in model.blocks)), sim.shared_nodes()
         self._tell(
-            messages.Counts, elements=model.elements_global, nodes=model.nodes_global, shared=sim.shared_nodes,
+            messages.Counts, elements=model.elements_global, nodes=model.nodes_global, shared=shared,
             fragments=sim.record.count if sim.record is not None else len(model.parts), elements_per_rank=held or [],
             particles=sim.erosion.particles if sim.erosion is not None else 0,
         )  # fmt: skip

@@ -113,7 +113,7 @@ class Simulation:
     timers: Timers
     record: Record | None
     """Of the fragments."""
-    shared_nodes: int
+    neighbours: list[Neighbour]
     assembled: float
     """Wall time that it took to make the stages, s."""
     floor: float
@@ -150,6 +150,13 @@ class Simulation:
         if self.clock.dt < 0.9 * stable:
             why = "output time"
         return f"{why}: {self.limiting_tet()}"
+
+    def shared_nodes(self) -> int:
+        """Nodes that several ranks hold; all ranks take part."""
+        shared = np.zeros(self.model.nodes.n, bool)
+        for other in self.neighbours:
+            shared[other.nodes] = True
+        return int(self.comm.sum(np.array([(shared & self.model.nodes.owned).sum()]))[0])
 
     def free(self) -> None:
         """Gives all standing messages back to MPI."""
@@ -201,7 +208,7 @@ def _assemble(
         case=case, comm=comm, model=model, elements=elements, boundaries=scene, contact=contact, erosion=erosion,
         fracture=fracture, clock=clock, ledger=Ledger(model, scene, contact, erosion, fracture, comm, clock),
         probes=probes, timers=timers, record=Record(model, fracture, comm) if fracture is not None else None,
-        shared_nodes=_shared(model, neighbours, comm), floor=_force_floor(model, comm),
+        neighbours=neighbours, floor=_force_floor(model, comm),
         assembled=float(comm.maximum(np.array([time.monotonic() - began]))[0]),
     )  # fmt: skip
 
@@ -244,14 +251,6 @@ def resume(case: Case, arrived: Arrived, comm: Comm, timers: Timers) -> Simulati
     if sim.record is not None:
         sim.record.resume(parcel)
     return sim
-
-
-def _shared(model: Model, neighbours: list[Neighbour], comm: Comm) -> int:
-    """Nodes of all ranks that several hold."""
-    shared = np.zeros(model.nodes.n, bool)
-    for other in neighbours:
-        shared[other.nodes] = True
-    return int(comm.sum(np.array([(shared & model.nodes.owned).sum()]))[0])
 
 
 def _extremes(model: Model, comm: Comm) -> tuple[float, float]:

@@ -10,7 +10,8 @@ from contextlib import contextmanager
 
 from .parallel.comm import Comm
 
-PHASES = ("elements", "exchange", "nodes", "contact", "fracture", "output")
+PHASES = ("elements", "exchange", "nodes", "contact", "fracture", "output", "balance", "rest")
+"""``rest`` is what lies between the others."""
 WORK = ("elements", "nodes", "contact", "fracture")
 """Phases that ranks share."""
 
@@ -20,11 +21,16 @@ class Timers:
 
     def __init__(self, comm: Comm) -> None:
         self._comm = comm
+        self.begin()
         self.seconds = dict.fromkeys(PHASES, 0.0)
         self._reported = dict.fromkeys(PHASES, 0.0)
         self._inner = 0.0
-        self._booked = 0.0
-        """Of the waiting: what has been added to a phase."""
+        self._booked = self._told = 0.0
+        """Of the waiting: what has been added to ``exchange``, and how much of it has been reported."""
+
+    def begin(self) -> None:
+        """Counts ``rest`` from here on."""
+        self._asked = time.thread_time()
 
     @contextmanager
     def phase(self, name: str) -> Iterator[None]:
@@ -42,8 +48,12 @@ class Timers:
             self.seconds["exchange"] += idle
             self._inner = outside + spent
 
-    def since_last(self) -> dict[str, float]:
-        """Seconds per phase since the last call."""
+    def since_last(self) -> tuple[dict[str, float], float]:
+        """Seconds per phase since the last call, and how many of ``exchange`` were waiting; asked between phases."""
+        spent = time.thread_time() - self._asked
+        self.begin()
+        self.seconds["rest"] += spent - (sum(self.seconds.values()) - sum(self._reported.values()))
         delta = {name: self.seconds[name] - self._reported[name] for name in PHASES}
-        self._reported = dict(self.seconds)
-        return delta
+        waiting = self._booked - self._told
+        self._reported, self._told = dict(self.seconds), self._booked
+        return delta, waiting

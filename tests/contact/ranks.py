@@ -13,6 +13,8 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from conoid.worker.parallel.comm import Sent
+
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
 T = TypeVar("T")
@@ -36,8 +38,13 @@ class ThreadComm:
     def __init__(self, world: World, rank: int) -> None:
         self._world = world
         self.rank, self.size, self.waited = rank, world.size, 0.0
+        self.sent = Sent()
 
     def share(self, item: Any) -> list[Any]:
+        self.sent.collective(number=2)
+        return self._table(item)
+
+    def _table(self, item: Any) -> list[Any]:
         world = self._world
         world.table[self.rank] = item
         world.meeting.wait()
@@ -47,24 +54,30 @@ class ThreadComm:
 
     def sum(self, words: Ints) -> Ints:
         assert words.dtype == np.int64
-        return np.asarray(np.sum(self.share(words.copy()), axis=0))
+        self.sent.collective(words.nbytes)
+        return np.asarray(np.sum(self._table(words.copy()), axis=0))
 
     def maximum(self, values: Floats) -> Floats:
         assert values.dtype == np.float64
-        return np.asarray(np.max(self.share(values.copy()), axis=0))
+        self.sent.collective(values.nbytes)
+        return np.asarray(np.max(self._table(values.copy()), axis=0))
 
     def begin_maximum(self, words: Ints, result: Ints) -> "Finished":
-        result[:] = np.max(self.share(words.copy()), axis=0)
+        self.sent.collective(words.nbytes)
+        result[:] = np.max(self._table(words.copy()), axis=0)
         return Finished()
 
     def swap(self, sends: dict[int, Ints]) -> dict[int, Ints]:
         mine = {rank: np.ascontiguousarray(words).reshape(-1).copy() for rank, words in sends.items()}
         assert all(words.dtype == np.int64 for words in mine.values())
-        rows = self.share(mine)
+        self.sent.collective(8 * self.size)
+        others = [words.nbytes for rank, words in mine.items() if rank != self.rank and len(words)]
+        self.sent.message(len(others), sum(others))
+        rows = self._table(mine)
         return {rank: row[self.rank].copy() for rank, row in enumerate(rows) if len(row.get(self.rank, ()))}
 
     def exchange(self, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: int) -> "Mail":
-        return Mail(self._world, self.rank, sends, receives, tag)
+        return Mail(self._world, self, sends, receives, tag)
 
     def gather(self, item: Any) -> list[Any] | None:
         everything = self.share(item)
@@ -93,12 +106,14 @@ class Mail:
     """Messages of fixed partners and buffers, as often as wanted; a message of the wrong length is an error."""
 
     def __init__(
-        self, world: World, rank: int, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: int
+        self, world: World, comm: ThreadComm, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: int
     ) -> None:
+        self._sent, rank = comm.sent, comm.rank
         self._sends = [(world.mail[rank, target, tag], buffer) for target, buffer in sends]
         self._receives = [(world.mail[source, rank, tag], buffer) for source, buffer in receives]
 
     def begin(self) -> None:
+        self._sent.message(len(self._sends), sum(buffer.nbytes for _, buffer in self._sends))
         for box, buffer in self._sends:
             box.put(buffer.copy())
 

@@ -17,7 +17,7 @@ EDGES = np.array([[0, 1, 2, 3], [0, 2, 3, 1], [0, 3, 1, 2], [1, 2, 0, 3], [1, 3,
 def apart(one: Indices, two: Indices) -> Indices:
     """Places of pairs of rows of different shards: shard of ``one`` below that of ``two`` for edges."""
     pairs = np.stack(np.meshgrid(np.arange(len(one)), np.arange(len(two)), indexing="ij"), axis=-1).reshape(-1, 2)
-    return pairs[one[pairs[:, 0]] != two[pairs[:, 1]]].astype(np.int32)
+    return np.asarray(pairs[one[pairs[:, 0]] != two[pairs[:, 1]]], np.int32)
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -4,10 +4,12 @@ Everything that decides is a maximum over int64 words, or a sum of integers: no 
 """
 
 import os
+import pickle
 import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -16,6 +18,35 @@ import numpy.typing as npt
 from ..state import Ints
 
 _SWAP_TAG = 90
+
+
+@dataclass
+class Sent:
+    """What a rank has sent since the last report: messages to single ranks, and collectives.
+
+    The bytes of a collective are those that the rank puts in. An object takes two of them: its length goes ahead.
+    """
+
+    messages: int = 0
+    bytes: int = 0
+    collectives: int = 0
+    collective_bytes: int = 0
+
+    def message(self, number: int, size: int) -> None:
+        """Counts a number of messages of ``size`` bytes in all."""
+        self.messages += number
+        self.bytes += size
+
+    def collective(self, size: int = 0, number: int = 1) -> None:
+        """Counts a collective to which this rank gives ``size`` bytes."""
+        self.collectives += number
+        self.collective_bytes += size
+
+    def since_last(self) -> dict[str, int]:
+        """The counts, which begin anew."""
+        counts = asdict(self)
+        self.messages = self.bytes = self.collectives = self.collective_bytes = 0
+        return counts
 
 
 class Pending(Protocol):
@@ -31,7 +62,8 @@ class Comm(Protocol):
     rank: int
     size: int
     waited: float
-    """CPU seconds of this thread in calls that may wait for other ranks."""
+    """CPU seconds of this thread in calls that may wait for other ranks, but for the packing of objects."""
+    sent: Sent
 
     def begin_maximum(self, words: Ints, result: Ints) -> Pending:
         """Element-wise maximum of ``words`` over all ranks, in ``result`` once finished."""
@@ -95,6 +127,9 @@ class SerialComm:
     size = 1
     waited = 0.0
 
+    def __init__(self) -> None:
+        self.sent = Sent()
+
     def begin_maximum(self, words: Ints, result: Ints) -> Pending:
         result[:] = words
         return _Done()
@@ -141,27 +176,43 @@ class MpiComm:
         self.rank: int = self._world.Get_rank()
         self.size: int = self._world.Get_size()
         self.waited = 0.0
+        self.sent = Sent()
+        MPI.pickle.__init__(self._pickled, self._unpickled)  # type: ignore[misc]
 
     @contextmanager
-    def waiting(self) -> Iterator[None]:
-        """Counts the CPU time of the block as waiting."""
+    def waiting(self, sign: int = 1) -> Iterator[None]:
+        """Counts the CPU time of the block as waiting; -1: takes it out again."""
         start = time.thread_time()
         try:
             yield
         finally:
-            self.waited += time.thread_time() - start
+            self.waited += sign * (time.thread_time() - start)
+
+    def _pickled(self, item: Any, protocol: int | None = None) -> bytes:
+        """Within a call that waits, this is work."""
+        with self.waiting(-1):
+            data = pickle.dumps(item, protocol)
+        self.sent.collective_bytes += len(data)
+        return data
+
+    def _unpickled(self, data: Any) -> Any:
+        with self.waiting(-1):
+            return pickle.loads(data)
 
     def begin_maximum(self, words: Ints, result: Ints) -> Pending:
+        self.sent.collective(words.nbytes)
         return _MpiPending(self, self._world.Iallreduce(words, result, self._mpi.MAX))
 
     def sum(self, words: Ints) -> Ints:
         result = np.empty_like(words)
+        self.sent.collective(words.nbytes)
         with self.waiting():
             self._world.Allreduce(words, result, self._mpi.SUM)
         return result
 
     def maximum(self, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         result = np.empty_like(values)
+        self.sent.collective(values.nbytes)
         with self.waiting():
             self._world.Allreduce(values, result, self._mpi.MAX)
         return result
@@ -169,42 +220,52 @@ class MpiComm:
     def exchange(self, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: int) -> Exchange:
         requests = [self._world.Recv_init(buffer, source, tag) for source, buffer in receives]
         requests += [self._world.Send_init(buffer, target, tag) for target, buffer in sends]
-        return _MpiExchange(self, self._mpi.Prequest, requests)
+        size = sum(buffer.nbytes for _, buffer in sends)
+        return _MpiExchange(self, self._mpi.Prequest, requests, (len(sends), size))
 
     def swap(self, sends: dict[int, Ints]) -> dict[int, Ints]:
         mine = {rank: np.ascontiguousarray(words).reshape(-1) for rank, words in sends.items()}
         counts = np.array([len(mine[rank]) if rank in mine else 0 for rank in range(self.size)], np.int64)
         theirs = np.empty_like(counts)
+        self.sent.collective(counts.nbytes)
         with self.waiting():
             self._world.Alltoall(counts, theirs)
         received = {int(rank): np.empty(theirs[rank], np.int64) for rank in np.flatnonzero(theirs)}
         requests = [self._world.Irecv(buffer, rank, _SWAP_TAG) for rank, buffer in received.items()]
         requests += [self._world.Isend(words, rank, _SWAP_TAG) for rank, words in mine.items() if len(words)]
+        others = np.delete(counts, self.rank)
+        self.sent.message(int(np.count_nonzero(others)), 8 * int(others.sum()))
         with self.waiting():
             self._mpi.Request.Waitall(requests)
         return received
 
     def share(self, item: Any) -> list[Any]:
+        self.sent.collective(number=2)
         with self.waiting():
             return self._world.allgather(item)
 
     def gather(self, item: Any) -> list[Any] | None:
+        self.sent.collective(number=2)
         with self.waiting():
             return self._world.gather(item)
 
     def scatter(self, items: list[Any] | None) -> Any:
-        if self.rank == 0:
-            assert items is not None
-            for target in range(1, self.size):
-                self._world.send(items[target], target)
-            return items[0]
-        return self._world.recv(source=0)
+        self.sent.collective()
+        with self.waiting():
+            if self.rank == 0:
+                assert items is not None
+                for target in range(1, self.size):
+                    self._world.send(items[target], target)
+                return items[0]
+            return self._world.recv(source=0)
 
     def broadcast(self, item: Any) -> Any:
+        self.sent.collective(number=2)
         with self.waiting():
             return self._world.bcast(item)
 
     def barrier(self) -> None:
+        self.sent.collective()
         with self.waiting():
             self._world.Barrier()
 
@@ -220,12 +281,15 @@ class _MpiPending:
 
 
 class _MpiExchange:
-    def __init__(self, comm: MpiComm, kind: Any, requests: list[Any]) -> None:
+    def __init__(self, comm: MpiComm, kind: Any, requests: list[Any], sends: tuple[int, int]) -> None:
+        """``sends``: number of messages, and their bytes."""
         self._comm = comm
         self._kind = kind
         self._requests = requests
+        self._sends = sends
 
     def begin(self) -> None:
+        self._comm.sent.message(*self._sends)
         self._kind.Startall(self._requests)
 
     def finish(self) -> None:

@@ -1,0 +1,72 @@
+"""Speed-up against ranks, drawn as SVG: projected, as measured where there are cores enough, and the paper's."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from .study import Study
+
+_WIDTH, _HEIGHT, _LEFT, _TOP, _SIDE = 500, 400, 56, 36, 320
+_BLUE, _RED, _GREY = "#1b6ca8", "#c8553d", "#999999"
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """Logarithmic axes from 1 to 2^``most`` ranks, and to the same speed-up from 2^``least``."""
+
+    least: int
+    most: int
+
+    def place(self, ranks: float, value: float) -> tuple[float, float]:
+        x, y = math.log2(ranks) / self.most, (math.log2(value) - self.least) / (self.most - self.least)
+        return _LEFT + _SIDE * x, _TOP + _SIDE * (1.0 - y)
+
+    def grid(self) -> str:
+        drawn = []
+        for power in range(self.least, self.most + 1):
+            x, y = self.place(2 ** max(power, 0), 2.0**power)
+            drawn.append(f'<path d="M{_LEFT} {y:.1f}h{_SIDE}M{x:.1f} {_TOP}v{_SIDE}" stroke="#dddddd"/>')
+            drawn.append(f'<text x="{_LEFT - 8}" y="{y + 4:.1f}" text-anchor="end">{2.0**power:g}</text>')
+            if power >= 0:
+                drawn.append(f'<text x="{x:.1f}" y="{_TOP + _SIDE + 18}" text-anchor="middle">{2**power}</text>')
+        return "\n".join(drawn)
+
+    def line(self, values: Mapping[int, float], colour: str, dashes: str = "none") -> str:
+        points = " ".join("{:.1f},{:.1f}".format(*self.place(*pair)) for pair in values.items())
+        return f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-dasharray="{dashes}"/>'
+
+    def marks(self, values: Mapping[int, float], colour: str, fill: str) -> str:
+        return "\n".join(_mark(*self.place(*pair), colour, fill) for pair in values.items())
+
+
+def speed_up(study: Study) -> str:
+    """The figure; both axes are logarithmic."""
+    projected = {run.ranks: study.speed_up(run) for run in study.runs}
+    worst = {run.ranks: study.runs[0].time / run.worst for run in study.runs}
+    measured = {run.ranks: study.runs[0].wall / run.wall for run in study.runs if run.ranks <= study.cores}
+    values = (*worst.values(), *measured.values())
+    most = max(1, math.ceil(math.log2(max(*projected, *study.paper, 2))))
+    frame = _Frame(min(0, math.floor(math.log2(min(values)))), most)
+    return "\n".join([
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {_HEIGHT}" font-family="sans-serif" '
+        'font-size="12">',
+        f'<rect width="{_WIDTH}" height="{_HEIGHT}" fill="white"/>', frame.grid(),
+        frame.line({1: 1.0, 2**most: 2.0**most}, _GREY, "4 4"), frame.line(projected, _BLUE),
+        frame.line(worst, _BLUE, "2 3"),
+        frame.marks(projected, _BLUE, _BLUE), frame.marks(measured, _BLUE, "white"),
+        frame.marks(study.paper, _RED, _RED),
+        _legend(0, "projected, a core a rank; dots: at worst", _BLUE, _BLUE),
+        _legend(1, "wall time, this machine", _BLUE, "white"),
+        *([_legend(2, "Moon, Kim and Lee, measured", _RED, _RED)] if study.paper else []),
+        f'<text x="{_LEFT}" y="20" font-size="14">{study.case}: speed-up</text>',
+        f'<text x="{_LEFT + _SIDE / 2}" y="{_TOP + _SIDE + 36}" text-anchor="middle">ranks</text>', "</svg>", "",
+    ])  # fmt: skip
+
+
+def _mark(x: float, y: float, colour: str, fill: str) -> str:
+    return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="{fill}" stroke="{colour}" stroke-width="1.5"/>'
+
+
+def _legend(row: int, text: str, colour: str, fill: str) -> str:
+    x, y = _LEFT + 16, _TOP + 18 + 20 * row
+    return _mark(x, y - 4, colour, fill) + f'<text x="{x + 12}" y="{y}">{text}</text>'

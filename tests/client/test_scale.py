@@ -1,0 +1,181 @@
+"""The projection against sums by hand, the tables, and the command."""
+
+import json
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from conoid.cases.messages import AnyMessage, Counts, Load
+from conoid.cases.outcome import Outcome
+from conoid.client import cli
+from conoid.client.chart import speed_up
+from conoid.client.projection import Network, Projection, bandwidth, project
+from conoid.client.study import Study, to_json, to_markdown
+
+SLOW = Network(latency=1e-3, bandwidth=1e6)
+"""A millisecond a message and a microsecond a byte."""
+
+
+def load(**fields: Any) -> Load:
+    return Load(run="r", imbalance=1.0, **fields)
+
+
+def counts(shared: int) -> Counts:
+    return Counts(run="r", elements=9, nodes=9, shared=shared, fragments=1, elements_per_rank=[])
+
+
+def two_ranks(digest: str = "abc") -> Projection:
+    journal: list[AnyMessage] = [
+        counts(10),
+        load(
+            phases={"elements": [1.0, 2.0], "exchange": [0.5, 0.25], "contact": [0.5, 0.0]}, waiting=[0.5, 0.0],
+            steps=3, messages=[2, 4], bytes=[8000, 0], collectives=[3, 3], collective_bytes=[1000, 3000],
+        ),
+        counts(20),
+        load(
+            phases={"elements": [2.0, 1.0], "exchange": [0.0, 0.0], "contact": [1.0, 0.0]}, waiting=[0.0, 0.0],
+            steps=1, messages=[1, 1], bytes=[0, 3000], collectives=[1, 1], collective_bytes=[0, 0],
+        ),
+    ]  # fmt: skip
+    outcome = Outcome(state="succeeded", ranks=2, steps=4, elapsed=8.0, setup=1.0, rebalances=1, digest=digest)
+    return project(journal, outcome, SLOW)
+
+
+def one_rank() -> Projection:
+    alone = load(
+        phases={"elements": [5.0], "exchange": [0.0], "contact": [2.0]}, waiting=[0.0], steps=4, messages=[0],
+        bytes=[0], collectives=[0], collective_bytes=[0],
+    )  # fmt: skip
+    return project([counts(0), alone], Outcome(state="succeeded", steps=4, elapsed=9.0, digest="abc"), SLOW)
+
+
+def study(*runs: Projection, case: str = "long_rod") -> Study:
+    return Study(case, ["run.samples=7"], 2, SLOW, runs)
+
+
+def test_the_projection_is_the_sum_by_hand() -> None:
+    run = two_ranks()
+    assert run.longest == pytest.approx(2.25 + 3.0)
+    assert run.messages == pytest.approx(0.010 + 0.004)
+    assert run.collectives == pytest.approx(3 * 2 * 0.001 + 0.004 + 2 * 0.001)
+    assert run.time == pytest.approx(5.276)
+    assert run.coarse == pytest.approx(3.0 + 1.5 + 0.026)
+    assert (run.work, run.wall) == (7.75, 7.0)
+    assert run.imbalance == pytest.approx(5.25 / 3.875)
+    assert {name: (p.total, p.imbalance) for name, p in run.phases.items()} == {
+        "elements": (6.0, 1.0), "exchange": (0.25, 0.125), "contact": (1.5, 0.75),
+    }  # fmt: skip
+    assert run.worst == pytest.approx(3.875 + 1.875 + 0.026)
+    assert (run.messages_sent, run.bytes_sent, run.collectives_made, run.bytes_shared) == (1.0, 1375.0, 1.0, 220.0)
+
+
+def test_one_rank_takes_what_it_works() -> None:
+    assert one_rank().time == one_rank().worst == one_rank().work == 7.0
+
+
+@pytest.mark.parametrize(("ranks", "levels"), [(2, 1), (3, 2), (4, 2), (5, 3), (32, 5), (33, 6)])
+def test_a_collective_goes_up_and_down_a_tree(ranks: int, levels: int) -> None:
+    zeros = [0] * ranks
+    window = load(
+        phases={"exchange": [0.0] * ranks}, waiting=[0.0] * ranks, steps=1, messages=zeros, bytes=zeros,
+        collectives=[1] * ranks, collective_bytes=zeros,
+    )  # fmt: skip
+    run = project([window], Outcome(state="succeeded", ranks=ranks), SLOW)
+    assert run.collectives == pytest.approx(2 * levels * 1e-3)
+
+
+def test_losses_are_all_that_lies_between_the_ideal_and_the_worst() -> None:
+    one, run = one_rank(), two_ranks()
+    losses = study(one, run).losses(run)
+    assert losses["contact"] == pytest.approx((-0.25, 0.75))
+    assert one.time / 2 + sum(map(sum, losses.values())) == pytest.approx(run.worst)
+
+
+def test_the_tables_say_it() -> None:
+    text = to_markdown(study(one_rank(), two_ranks()))
+    assert "1.00 ms a message, 1.00 MB/s" in text
+    row = next(line for line in text.splitlines() if line.startswith("| 2 "))
+    cells = [cell.strip() for cell in row.strip("|").split("|")]
+    assert cells == ["2", "4", "2.0", "7.0", "90", "5.28", "4.53", "5.78", "1.33", "66", "1.21", "1.35", "1"]
+    assert text.startswith("`long_rod`, `run.samples=7`\n")
+    assert "measured a speed-up of 23.79 on 32 (74.3 %)" in text
+    assert "Digests: equal, abc." in text
+    document = json.loads(to_json(study(one_rank(), two_ranks())))
+    assert document["runs"][1]["projected"] == pytest.approx(5.276)
+    assert "Digests: NOT EQUAL." in to_markdown(study(one_rank(), two_ranks("xyz")))
+
+
+def test_the_figure_has_the_papers_points() -> None:
+    for case, points in {"long_rod": 1, "glass_steel_bar": 2, "demo": 0}.items():
+        drawn = ElementTree.fromstring(speed_up(study(one_rank(), two_ranks(), case=case)))
+        red = [e for e in drawn.iter("{http://www.w3.org/2000/svg}circle") if e.get("fill") == "#c8553d"]
+        assert len(red) == points + (points > 0), "the points and their mark in the legend"
+
+
+@pytest.mark.parametrize(
+    ("text", "value"), [("5GB/s", 5e9), ("12.5 MB/s", 12.5e6), ("800 B/s", 800.0), ("1e3 kB/s", 1e6)]
+)
+def test_bandwidths(text: str, value: float) -> None:
+    assert bandwidth(text) == value
+
+
+@pytest.mark.parametrize("text", ["5", "GB/s", "0 GB/s", "5 Gb/s", "-1 GB/s"])
+def test_what_is_no_bandwidth(text: str) -> None:
+    with pytest.raises(ValueError, match="is no bandwidth"):
+        bandwidth(text)
+
+
+def conoid(*words: object) -> Result:
+    return CliRunner().invoke(cli.app, ["bench", "scale", *map(str, words)])
+
+
+@pytest.mark.parametrize(("digest", "code"), [("abc", 0), ("xyz", 1)])
+def test_another_answer_on_more_ranks_is_an_error(
+    digest: str, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def scale(*_: object) -> Iterator[Projection]:
+        return iter((one_rank(), two_ranks(digest)))
+
+    monkeypatch.setattr(cli, "scale", scale)
+    result = conoid("demo", "--ranks", "2", "--out", tmp_path)
+    assert result.exit_code == code
+    assert result.stdout == (tmp_path / "scale.md").read_text()
+    assert json.loads((tmp_path / "scale.json").read_bytes())["digests_equal"] is (code == 0)
+    assert (tmp_path / "scale.svg").read_text().startswith("<svg")
+
+
+@pytest.mark.parametrize(("option", "value"), [("--ranks", "two"), ("--latency", "2 m"), ("--bandwidth", "5")])
+def test_what_cannot_be_read_is_one_line(option: str, value: str) -> None:
+    result = conoid("demo", option, value)
+    assert result.exit_code == 1
+    assert len(result.stderr.splitlines()) == 1
+
+
+def test_a_folder_with_something_else_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "ranks-1").mkdir()
+    result = conoid("demo", "--out", tmp_path)
+    assert result.exit_code == 1
+    assert "ranks-1 holds another run" in result.stderr
+
+
+@pytest.mark.slow
+def test_a_case_on_one_and_two_ranks(tmp_path: Path) -> None:
+    short = ("--set", "reference=[]", "--set", "run.end_time='3 us'", "--set", "run.frames=0")
+    words = ("bar_on_bar", "--ranks", "1,2", *short, "--out", tmp_path)
+    result = conoid(*words)
+    assert result.exit_code == 0, result.stderr
+    one, two = json.loads((tmp_path / "scale.json").read_bytes())["runs"]
+    assert one["digest"] == two["digest"] != ""
+    assert one["messages_sent"] == one["collectives_made"] == 0 < two["messages_sent"]
+    assert 0.0 < one["work"] == pytest.approx(one["projected"])
+    assert two["work"] / 2 < two["projected"] <= two["at_worst"]
+    written = (tmp_path / "ranks-2" / "journal.jsonl").stat().st_mtime
+    assert conoid(*words, "--latency", "1 ms").exit_code == 0
+    assert (tmp_path / "ranks-2" / "journal.jsonl").stat().st_mtime == written, "runs that are there are only read"
+    again = json.loads((tmp_path / "scale.json").read_bytes())["runs"][1]
+    assert again["collectives"] > two["collectives"]
+    assert conoid(*words, "--set", "run.samples=7").exit_code == 1
