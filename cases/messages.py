@@ -87,6 +87,8 @@ class Load(Message, frozen=True):
     channel: ClassVar[str] = "load"
     phases: dict[str, list[float]]
     imbalance: float
+    outside: list[int] = []
+    """Nodes of the surface that each rank owns; empty without contact."""
 
 
 class Counts(Message, frozen=True):
@@ -120,6 +122,25 @@ class Balance(Message, frozen=True):
     """By the cuts before, s: what steps would have taken with the imbalance from before each, less what they took."""
 
 
+class Groups(Message, frozen=True):
+    """What each of some parts of the mesh costs since the last Groups message, on any number of ranks.
+
+    The parts are neighbours at the start and stay together. The first message of a worker knows no loads: all are 0.
+    """
+
+    channel: ClassVar[str] = "load"
+    load: list[int]
+    """CPU time, ns a step."""
+    outside: list[int]
+    """Nodes of the surface."""
+    centres: list[tuple[float, float, float]] = []
+    """At the start, m. This and the next in the first message only."""
+    tets: list[int] = []
+    """At the start."""
+    cost: float = 0.0
+    """What a cut is taken to cost before there has been one, wall time, s."""
+
+
 class Frame(Message, frozen=True):
     """A frame was written; ``path`` is relative to the run's folder."""
 
@@ -145,7 +166,7 @@ class Finished(Message, frozen=True):
     elapsed: float
 
 
-AnyMessage = Status | Started | Progress | Load | Balance | Counts | Frame | Log | Finished
+AnyMessage = Status | Started | Progress | Load | Balance | Groups | Counts | Frame | Log | Finished
 
 _to_json, _to_msgpack = msgspec.json.Encoder(), msgspec.msgpack.Encoder()
 _from_json: msgspec.json.Decoder[AnyMessage] = msgspec.json.Decoder(AnyMessage)

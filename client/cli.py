@@ -1,7 +1,9 @@
-"""The command line: ``conoid serve | validate | submit | ls | show | watch | cancel | get | view | run``."""
+"""The command line: ``conoid serve | validate | submit | ls | show | watch | cancel | get | view | replay-balance | run``."""
 
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,11 +15,13 @@ from typer.core import TyperGroup
 from conoid.cases.estimate import estimate
 from conoid.cases.load import CaseError
 from conoid.cases.run import ExitCode, State
+from conoid.cases.schema import Balance
 
-from . import tables
+from . import replay, tables
 from .errors import ClientError, ServiceError
 from .live import Live, exit_code
 from .once import run_once
+from .result import Result
 from .run import Run
 from .session import Session, connect
 from .submission import case_of, locate
@@ -64,6 +68,7 @@ Overrides = Annotated[
     typer.Option("--set", metavar="KEY=VALUE", help="Change a key of the case, as run.end_time='20 us'."),
 ]
 RunArgument = Annotated[str, typer.Argument(metavar="RUN", help="The id of a run, or 'last'.")]
+SourceArgument = Annotated[str, typer.Argument(metavar="RUN", help="The id of a run, 'last', or its folder.")]
 FieldOption = Annotated[str, typer.Option("--field", help=f"What to colour by: {', '.join(FIELDS)}.")]
 
 
@@ -75,6 +80,16 @@ def show(thing: RenderableType) -> None:
 def show_json(thing: Any) -> None:
     """Prints for scripts: one JSON document."""
     typer.echo(msgspec.json.format(msgspec.json.encode(thing), indent=2).decode())
+
+
+@contextmanager
+def opened(source: str, url: str | None, token: str | None) -> Iterator[Result]:
+    """The result of a run by its id, or in its folder."""
+    if Path(source).is_dir():
+        yield Result.open(source)
+        return
+    with connect(url, token) as session:
+        yield find(session, source).result()
 
 
 def find(session: Session, run: str) -> Run:
@@ -266,6 +281,39 @@ def view_frame(
         show_json(drawn)
     else:
         typer.echo(drawn.out)
+
+
+@app.command(name="replay-balance", short_help="The loads of a run under another balance policy.")
+def replay_balance(
+    source: SourceArgument,
+    policy: Annotated[
+        str | None,
+        typer.Option("--policy", help="measured, outside, every, every:N or never; the run's own if not given."),
+    ] = None,
+    alpha: Annotated[float | None, typer.Option("--alpha", help="Of the policy 'outside'.")] = None,
+    ranks: Annotated[int | None, typer.Option("--ranks", min=1, help="Ranks; those of the run if not given.")] = None,
+    cost: Annotated[
+        float | None, typer.Option("--cost", min=0.0, help="Of a cut, s; what the run has measured if not given.")
+    ] = None,
+    url: Url = None,
+    token: Token = None,
+    as_json: Json = False,
+) -> None:
+    """Tell what other balance policies would have cost and saved, from the loads that a run has told."""
+    with opened(source, url, token) as result:
+        spec = Balance.model_validate(result.case.get("balance", {}))
+        record = replay.read(result.messages, replay.named(spec))
+        x, y, z = result.case["run"].get("cut_scale", (1.0, 1.0, 1.0))
+    other, each = replay.chosen(spec, policy or spec.policy, alpha), record.cost if cost is None else cost
+    accounts = replay.compare(record, other, ranks or record.happened.ranks, each, (x, y, z))
+    if as_json:
+        show_json({"policies": accounts, "run": record.happened, "cost": each, "heaviest_group": record.heaviest})
+        return
+    show(tables.balance_table(accounts, record.happened))
+    typer.echo(
+        f"a cut costs {each:.3g} s; {len(record.moments)} moments, {len(record.centres)} groups, "
+        f"of which the heaviest has {record.heaviest:.1%} of the work"
+    )
 
 
 @app.command(name="run", short_help="Do it all on this machine: run, watch, check, draw.")

@@ -49,8 +49,7 @@ def compute(
         time.monotonic() - began, sim.model.elements_global, sim.model.nodes_global, reference.thicknesses(sim)
     )
     _announce(sim, journal, start.setup)
-    balance = Balance(case, comm, sim.assembled)
-    loop = Loop(sim, folder, journal, history, signals, balance)
+    loop = Loop(sim, folder, journal, history, signals, Balance.of(sim))
     cpu = time.thread_time()
     failure = None
     try:

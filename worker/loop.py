@@ -13,6 +13,7 @@ from conoid.cases.run import Cause, State
 from . import step
 from .balance import Balance, Window
 from .errors import EnergyError
+from .groups import Groups
 from .output import frames
 from .output.history import History
 from .output.journal import Journal
@@ -74,10 +75,12 @@ class Loop:
         self._logged = -math.inf
         self._counted = (0, 0)
         self.balance = balance
+        self._groups = Groups(sim, balance.trigger.cost)
 
     def run(self) -> None:
         """Steps until the end time, or until a reason to stop. Raises PhysicsError."""
         step.prepare(self.sim)
+        self._record()
         while True:
             if self.sim.vote.report:
                 self._report()
@@ -111,6 +114,7 @@ class Loop:
         cause = self.balance.cause(self.sim)
         if cause is not None:
             self.sim, told = self.balance.move(self.sim)
+            self._groups.moved(self.sim)
             self._tell(messages.Balance, cause=cause, **told)
 
     def _propose(self) -> None:
@@ -123,7 +127,8 @@ class Loop:
         if sim.clock.step + 1 >= sim.case.run.max_steps:
             stop = MAX_STEPS
         sim.vote.words[2] = stop
-        sim.vote.words[3] = sim.comm.rank == 0 and now - self._reported > _REPORT_EVERY
+        reporting = sim.comm.rank == 0 and now - self._reported > _REPORT_EVERY
+        sim.vote.words[3] = reporting + (reporting and self._groups.due(sim.clock.t, now))
         sim.vote.words[7] = self.balance.grown(sim)
 
     def _look(self, before: Floats) -> None:
@@ -160,12 +165,15 @@ class Loop:
         sim, clock = self.sim, self.sim.clock
         with sim.timers.phase("output"):
             limiter = sim.limiter()
-            loads = sim.comm.share(sim.timers.since_last())
+            outside = sim.contact.outside if sim.contact is not None else 0
+            loads, outsides = zip(*sim.comm.share((sim.timers.since_last(), outside)), strict=True)
             self._count()
         work = {name: [load[name] for load in loads] for name in loads[0]}
         window = Window(clock.step - self._reported_step, work)
         self._reported_step = clock.step
         self.balance.look(window)
+        if sim.vote.groups or clock.done or sim.vote.stop:
+            self._record()
         if self._journal is None:
             return
         now = time.monotonic()
@@ -180,8 +188,16 @@ class Loop:
                 eta=self._pace.left(sim.case.run.end_time - clock.t), energy=self.energy,
                 updates_per_second=(self.updates - self._reported_updates) / elapsed,
             )  # fmt: skip
-        self._tell(messages.Load, phases=work, imbalance=window.imbalance)
+        self._tell(
+            messages.Load, phases=work, imbalance=window.imbalance,
+            outside=list(outsides) if sim.contact is not None else [],
+        )  # fmt: skip
         self._reported, self._reported_updates = now, self.updates
+
+    def _record(self) -> None:
+        """Loads of groups to the journal; all ranks take part."""
+        with self.sim.timers.phase("output"):
+            self._tell(messages.Groups, **self._groups.record(self.sim))
 
     def _count(self) -> None:
         """How large the model is, when that has changed; all ranks take part."""

@@ -11,8 +11,6 @@ from contextlib import contextmanager
 from .parallel.comm import Comm
 
 PHASES = ("elements", "exchange", "nodes", "contact", "fracture", "output")
-WORK = ("elements", "nodes", "contact", "fracture")
-"""Phases that ranks share."""
 
 
 class Timers:
