@@ -133,6 +133,8 @@ class Groups(Message, frozen=True):
     """CPU time, ns a step."""
     outside: list[int]
     """Nodes of the surface."""
+    rank: int = 0
+    """CPU time of a rank whatever it has, ns a step."""
     centres: list[tuple[float, float, float]] = []
     """At the start, m. This and the next in the first message only."""
     tets: list[int] = []

@@ -1,4 +1,4 @@
-"""The command line: ``conoid serve | validate | submit | ls | show | watch | cancel | get | view | replay-balance | run``."""
+"""The command line: ``conoid serve | validate | submit | ls | show | watch | cancel | get | view | run``, and more."""
 
 import os
 import sys

@@ -7,7 +7,7 @@ cuts, as in the run: first by tets, then by the loads of the moment. See docs/ba
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
-from conoid.cases.balancing import WORK, Guard, Trigger, imbalance, lost
+from conoid.cases.balancing import WORK, Guard, Trigger, lost
 from conoid.cases.messages import AnyMessage, Balance, Groups, Load
 from conoid.cases.schema import Balance as Spec
 
@@ -113,14 +113,15 @@ def replay(record: Record, spec: Spec, ranks: int, cost: float, scale: Point = (
     account, trigger, first = Account(named(spec), ranks), Trigger(spec, cost), record.moments[0]
     held = divide(places, record.tets, ranks)
     guards = _guards(spec, first, held)
-    before = trigger.step = first.step
+    before, end = first.step, record.moments[-1].step
+    trigger.step = before
     for moment in record.moments[1:]:
         for step in _looks(spec, before, moment.step):
-            loads = _sums(held, [1e-9 * load for load in moment.load])
+            loads = [1e-9 * (moment.rank + load) for load in _sums(held, moment.load)]
             account.book(loads, step - before)
             trigger.look(loads, step - before)
             grown = [g.grown(round(n)) for g, n in zip(guards, _sums(held, moment.outside), strict=True)]
-            if ranks > 1 and trigger.cause(step, any(grown)) is not None:
+            if ranks > 1 and step < end and trigger.cause(step, any(grown)) is not None:
                 account.cut(step, cost)
                 trigger.settle(step, cost)
                 held = divide(places, _weights(spec, record, moment), ranks)
@@ -181,8 +182,8 @@ def _sums(held: list[Shares], values: Sequence[float]) -> list[float]:
 def divide(places: Sequence[Point], weights: Sequence[float], ranks: int) -> list[Shares]:
     """The groups of each rank: boxes cut across their longest axis so that the ``weights`` (groups,) are equal.
 
-    A group through which a cut goes is divided, as its tets would be. A number of ranks that is no power of two is split
-    as floor : ceiling.
+    A group through which a cut goes is divided, as its tets would be. A number of ranks that is no power of two is
+    split as floor : ceiling.
     """
     return _halved([(group, 1.0) for group in range(len(places))], places, weights, ranks)
 

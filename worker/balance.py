@@ -16,6 +16,7 @@ from conoid.cases.balancing import WORK, Guard, Trigger
 from conoid.cases.schema import Case
 
 from . import simulation
+from .meter import Meter, Slope
 from .migration.parcel import Parcel
 from .migration.route import route
 from .parallel.comm import Comm
@@ -46,44 +47,6 @@ class Window:
 
 
 @dataclass
-class Meter:
-    """What tets of each part, and candidates, take since it was set."""
-
-    step: int
-    seconds: dict[str, float]
-    """The timers when it was set."""
-    on_parts: Floats
-    """(parts,) CPU time of the passes over the tets by then, s."""
-
-    @classmethod
-    def of(cls, sim: Simulation) -> Self:
-        """Set at the present."""
-        return cls(sim.clock.step, dict(sim.timers.seconds), _on_parts(sim))
-
-    def rates(self, sim: Simulation, effort: float) -> tuple[Floats, float]:
-        """CPU seconds a step of a tet, by part (parts,), and of a candidate: ``effort`` of them are here now.
-
-        All ranks take part.
-        """
-        tets, steps = np.zeros(len(self.on_parts)), max(sim.clock.step - self.step, 1)
-        for block in sim.model.blocks:
-            tets[block.part] = block.n
-        spent = {name: sim.timers.seconds[name] - self.seconds[name] for name in WORK}
-        around = [spent["nodes"], spent["contact"] + spent["fracture"], effort]
-        every = np.sum(sim.comm.share(np.concatenate([_on_parts(sim) - self.on_parts, tets, around])), axis=0)
-        (on_tets, tets), (on_nodes, surrounded, effort) = every[:-3].reshape(2, -1), every[-3:]
-        per_tet = on_tets / np.maximum(tets, 1.0) + on_nodes / max(float(tets.sum()), 1.0)
-        return per_tet / steps, float(surrounded / max(float(effort), 1.0) / steps)
-
-
-def _on_parts(sim: Simulation) -> Floats:
-    seconds = np.zeros(len(sim.model.parts))
-    for block in sim.model.blocks:
-        seconds[block.part] = block.seconds
-    return seconds
-
-
-@dataclass
 class Balance:
     """Watches the loads of a run and moves tets where that pays."""
 
@@ -106,7 +69,12 @@ class Balance:
     def of(cls, sim: Simulation) -> Self:
         """For a run that begins or goes on."""
         trigger = Trigger(sim.case.balance, sim.assembled, sim.clock.step)
-        return cls(sim.case, sim.comm, trigger, Meter.of(sim))
+        return cls(sim.case, sim.comm, trigger, Meter.of(sim, Slope()))
+
+    @property
+    def slope(self) -> Slope:
+        """What is known of the cost of a candidate."""
+        return self._meter.slope
 
     def look(self, window: Window) -> None:
         """Takes the work of all ranks since the last look."""
@@ -149,7 +117,7 @@ class Balance:
         self.events, self.spent = self.events + 1, self.spent + cost
         self._before, self._latest = before.imbalance if before is not None else None, None
         self.trigger.settle(sim.clock.step, cost)
-        self._meter = Meter.of(sim)
+        self._meter = Meter.of(sim, self.slope)
         self._guard = Guard(self.case.balance.alpha, sim.contact.outside if sim.contact is not None else 0)
 
     def weigh(self, sim: Simulation, parcel: Parcel) -> None:
@@ -161,7 +129,8 @@ class Balance:
             effort = (effort > 0.0).astype(float)
             per_tet, per_effort = np.zeros(len(sim.model.parts)), 1.0
         else:
-            per_tet, per_effort = self._meter.rates(sim, float(effort.sum()))
+            costs = self._meter.costs(sim, float(effort.sum()))
+            per_tet, per_effort = costs.tet, costs.candidate
         nodes = _with_their_first_tets(parcel, effort)
         for part, table in parcel.tets.items():
             table["weight"] = _LEAST + per_tet[part] + per_effort * nodes[part]

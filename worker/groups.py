@@ -1,8 +1,8 @@
 """Loads of parts of the mesh, told now and then: what another balance policy would have done follows from them.
 
-``conoid replay-balance`` reads them (docs/balance.md). A group is a fixed set of tets and nodes with its copies, cut out
-at the start; the counts are integers and so the same for any number of ranks, but for candidates of edges and cracks
-whose nodes lie on other ranks.
+``conoid replay-balance`` reads them (docs/balance.md). A group is a fixed set of tets, cut out at the
+start, and of nodes and their copies; it goes with them from rank to rank. Counts are integers and the same for any
+number of ranks, but for candidates of edges and cracks whose nodes lie on other ranks.
 """
 
 import time
@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .balance import Meter
+from .meter import Meter, Slope
 from .simulation import Simulation
 
 _TIMES = 200
@@ -24,10 +24,10 @@ _SHARE = 1.0 / 400.0
 class Groups:
     """Keeps the record of the groups of a run."""
 
-    def __init__(self, sim: Simulation, cost: float) -> None:
-        """``cost``: of a cut as it is expected, s."""
+    def __init__(self, sim: Simulation, cost: float, slope: Slope) -> None:
+        """``cost``: of a cut as it is expected, s; ``slope`` learns from every record."""
         self._cost = cost
-        self._meter = Meter.of(sim)
+        self._meter = Meter.of(sim, slope)
         self._t = sim.clock.t
         self._told = time.monotonic()
         self._took = 0.0
@@ -36,7 +36,7 @@ class Groups:
 
     def moved(self, sim: Simulation) -> None:
         """Tets have moved: what the blocks have counted begins anew."""
-        self._meter = Meter.of(sim)
+        self._meter = Meter.of(sim, self._meter.slope)
 
     def due(self, t: float, now: float) -> bool:
         """Whether another record is due at time ``t`` and wall time ``now``; asked on rank 0 alone."""
@@ -53,14 +53,20 @@ class Groups:
         if sim.contact is not None:
             counts[:, -2] = np.bincount(model.nodes.group, sim.contact.effort(), n)
             counts[:, -1] = np.bincount(model.nodes.group, sim.contact.on_surface, n)
-        per_tet, per_candidate = self._meter.rates(sim, float(counts[:, -2].sum()))
+        costs = self._meter.costs(sim, float(counts[:, -2].sum()))
         counts = sim.comm.sum(counts)
-        load = counts[:, :-2] @ per_tet + per_candidate * counts[:, -2]
-        told: dict[str, Any] = {"load": np.rint(1e9 * load).astype(np.int64).tolist(), "outside": counts[:, -1].tolist()}
+        load = counts[:, :-2] @ costs.tet + costs.candidate * counts[:, -2]
+        told: dict[str, Any] = {
+            "load": np.rint(1e9 * load).astype(np.int64).tolist(), "outside": counts[:, -1].tolist(),
+            "rank": round(1e9 * costs.rank),
+        }  # fmt: skip
         if self._first:
-            told["load"], told["cost"] = [0] * n, self._cost
+            told |= {"load": [0] * n, "rank": 0, "cost": self._cost}
             told |= {"centres": model.groups[:, :3].tolist(), "tets": model.groups[:, 3].astype(np.int64).tolist()}
-        self._meter, self._first = Meter.of(sim), False
+        else:
+            self._meter.slope.add(*costs.around.T)
+        self.moved(sim)
+        self._first = False
         self._t = end / _TIMES * (int(sim.clock.t * _TIMES / end) + 1)
         self._told = time.monotonic()
         self._took = _worked(sim) - began

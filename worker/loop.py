@@ -75,7 +75,7 @@ class Loop:
         self._logged = -math.inf
         self._counted = (0, 0)
         self.balance = balance
-        self._groups = Groups(sim, balance.trigger.cost)
+        self._groups = Groups(sim, balance.trigger.cost, balance.slope)
 
     def run(self) -> None:
         """Steps until the end time, or until a reason to stop. Raises PhysicsError."""
@@ -110,8 +110,8 @@ class Loop:
                 self._write_frame()
 
     def _move(self) -> None:
-        """Tets to other ranks, when that is due."""
-        cause = self.balance.cause(self.sim)
+        """Tets to other ranks, when that is due and a step is left."""
+        cause = None if self.sim.clock.done else self.balance.cause(self.sim)
         if cause is not None:
             self.sim, told = self.balance.move(self.sim)
             self._groups.moved(self.sim)

@@ -29,7 +29,8 @@ def keep(model: Model) -> Parcel:
 def _keep_block(block: Block, ids: Ints) -> Table:
     state = block.state.transpose(0, 2, 1).reshape(-1, block.state.shape[1])[: block.n]
     some = {name: getattr(block, name) for name in _OF_TETS if len(getattr(block, name))}
-    return {"id": block.id, "corners": ids[block.tets], "state": state, "weight": np.ones(block.n), "group": block.group, **some}
+    known = {"id": block.id, "corners": ids[block.tets], "group": block.group}
+    return {**known, "state": state, "weight": np.ones(block.n), **some}
 
 
 def resume(case: Case, arrived: Arrived, comm: Comm) -> Model:
