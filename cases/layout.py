@@ -8,6 +8,7 @@
       journal.jsonl          every event, one JSON line each, with seq: the truth
       history.csv            time history: clock, ledger, probes
       frames/000012.vtkhdf   one file a frame      frames/frames.vtkhdf.series  for ParaView
+      checkpoints/000001200/ complete state, by global ids; checkpoint.request asks for one
       log/rank-0.log         one a rank            log/launcher.log
       outcome.json           written last
 """
@@ -20,6 +21,9 @@ HISTORY = "history.csv"
 OUTCOME = "outcome.json"
 FRAMES = "frames"
 FRAME_SERIES = "frames.vtkhdf.series"
+CHECKPOINTS = "checkpoints"
+CHECKPOINT_REQUEST = "checkpoint.request"
+"""Whoever makes this file asks the worker for a checkpoint; the worker takes it away."""
 LOGS = "log"
 LAUNCHER_LOG = "launcher.log"
 SUBMISSION = "submission.json"
@@ -30,6 +34,11 @@ WORKER = "worker.json"
 def frame(folder: Path, index: int) -> Path:
     """Path of frame ``index`` in the run folder ``folder``."""
     return folder / FRAMES / f"{index:06d}.vtkhdf"
+
+
+def checkpoint(folder: Path, step: int) -> Path:
+    """Path of the checkpoint before ``step`` in the run folder ``folder``."""
+    return folder / CHECKPOINTS / f"{step:09d}"
 
 
 def rank_log(folder: Path, rank: int) -> Path:

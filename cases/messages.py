@@ -143,6 +143,15 @@ class Groups(Message, frozen=True):
     """What a cut is taken to cost before there has been one, wall time, s."""
 
 
+class Checkpoint(Message, frozen=True):
+    """The complete state is on disk; ``path`` is relative to the run's folder, ``seconds`` wall time."""
+
+    path: str
+    bytes: int
+    seconds: float
+    cause: str
+
+
 class Frame(Message, frozen=True):
     """A frame was written; ``path`` is relative to the run's folder."""
 
@@ -168,7 +177,7 @@ class Finished(Message, frozen=True):
     elapsed: float
 
 
-AnyMessage = Status | Started | Progress | Load | Balance | Groups | Counts | Frame | Log | Finished
+AnyMessage = Status | Started | Progress | Load | Balance | Groups | Checkpoint | Counts | Frame | Log | Finished
 
 _to_json, _to_msgpack = msgspec.json.Encoder(), msgspec.msgpack.Encoder()
 _from_json: msgspec.json.Decoder[AnyMessage] = msgspec.json.Decoder(AnyMessage)

@@ -260,6 +260,9 @@ class Run(Model):
     max_steps: Annotated[Count, Field(ge=1)] = 100_000_000
     max_wall_time: Annotated[Time, Positive] | None = None
     """Counted from the first step."""
+    checkpoint_every: Annotated[Annotated[Time, Positive] | None, BeforeValidator(_off)] = 600.0
+    """Wall time between checkpoints; one is also written when a run is stopped by a signal or by ``max_wall_time``.
+    ``"none"``: then alone."""
     residual_limit: Annotated[Ratio, Positive] = 0.05
     """The run fails with cause ``energy`` when the energy residual passes this."""
 

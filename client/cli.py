@@ -225,6 +225,17 @@ def cancel(run: RunArgument, url: Url = None, token: Token = None, as_json: Json
 
 
 @app.command()
+def checkpoint(run: RunArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
+    """Ask a run for a checkpoint, from which it can go on if it is lost."""
+    with connect(url, token) as session:
+        info = find(session, run).checkpoint()
+    if as_json:
+        show_json(info)
+    else:
+        typer.echo(f"{info.id} asked for a checkpoint")
+
+
+@app.command()
 def get(
     run: RunArgument,
     names: Annotated[

@@ -116,6 +116,10 @@ class Run:
         """Asks it to stop; to ask twice does no harm."""
         return self.session.post(RunInfo, f"{self.path}:cancel")
 
+    def checkpoint(self) -> RunInfo:
+        """Asks it for a checkpoint; a ``Checkpoint`` message tells of it when it is on disk."""
+        return self.session.post(RunInfo, f"{self.path}:checkpoint")
+
     # Messages ---------------------------------------------------------------------------------------------------------
 
     def events(self, after: int = 0) -> list[AnyMessage]:

@@ -3,8 +3,9 @@
 import logging
 import resource
 import time
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,41 +16,41 @@ from conoid.cases.schema import Case
 
 from . import digest, reference, simulation
 from .balance import Balance
-from .errors import PhysicsError
-from .loop import STOPS, Loop
+from .errors import InputError, PhysicsError
+from .loop import STOPS, Loop, Start
+from .migration import checkpoint
+from .migration.route import route
+from .output import rewind
 from .output.history import History
 from .output.journal import Journal
 from .parallel.comm import Comm
 from .signals import Signals
 from .simulation import Simulation
-from .timers import PHASES
+from .timers import PHASES, Timers
 
 log = logging.getLogger("conoid.worker")
 
 
-@dataclass(frozen=True)
-class Start:
-    """What is known when the first step begins."""
-
-    setup: float
-    """s since the worker's start."""
-    elements: int
-    nodes: int
-    thick: list[float]
-    """See reference.thicknesses."""
-
-
 def compute(
-    case: Case, meshes: Path, folder: Path, comm: Comm, journal: Journal | None, signals: Signals, began: float
-) -> Outcome:
-    """Runs the case in ``folder`` on all ranks; relative mesh paths start at ``meshes``. Raises ConoidError."""
-    sim = simulation.build(case, meshes, comm)
+    case: Case, meshes: Path, folder: Path, comm: Comm, journal: Journal | None, signals: Signals, began: float,
+    restart: bool,
+) -> Outcome:  # fmt: skip
+    """Runs the case in ``folder`` on all ranks; relative mesh paths start at ``meshes``.
+
+    With ``restart`` from the latest checkpoint that is there. Raises ConoidError.
+    """
+    if restart:
+        sim, start = _resumed(case, folder, comm)
+    else:
+        sim = simulation.build(case, meshes, comm)
+        start = Start(sim.model.elements_global, sim.model.nodes_global, reference.thicknesses(sim))
+    if comm.rank == 0:
+        rewind.rewind(folder, sim.clock.step, sim.clock.frame)
+        checkpoint.forget(folder, sim.clock.step)
     history = History(folder, sim.probes.names) if comm.rank == 0 else None
-    start = Start(
-        time.monotonic() - began, sim.model.elements_global, sim.model.nodes_global, reference.thicknesses(sim)
-    )
-    _announce(sim, journal, start.setup)
-    loop = Loop(sim, folder, journal, history, signals, Balance.of(sim))
+    setup = time.monotonic() - began
+    _announce(sim, journal, setup)
+    loop = Loop(sim, folder, journal, history, signals, Balance.of(sim), start)
     cpu = time.thread_time()
     failure = None
     try:
@@ -60,7 +61,29 @@ def compute(
     loop.sim.free()
     if history is not None:
         history.close()
-    return _sum_up(loop, folder, failure, start, cpu, time.monotonic() - began)
+    return _sum_up(loop, folder, failure, start, cpu, setup, time.monotonic() - began)
+
+
+def _resumed(case: Case, folder: Path, comm: Comm) -> tuple[Simulation, Start]:
+    """The run in ``folder`` as its latest checkpoint has it; all ranks take part. Raises InputError on all alike."""
+    found: tuple[Path, dict[str, Any]] | None = None
+    failure: InputError | None = None
+    if comm.rank == 0:
+        try:
+            found = checkpoint.latest(folder)
+            checkpoint.require_same(case, found[1])
+        except InputError as error:
+            failure = error
+    found, failure = comm.broadcast((found, failure))
+    if failure is not None:
+        raise failure
+    assert found is not None
+    place, manifest = found
+    parcel = checkpoint.read(place, manifest, comm)
+    sim = simulation.resume(case, route(parcel, case.run.cut_scale, comm), comm, Timers(comm))
+    sim.vote.begin_again()
+    log.info("goes on from %s, step %d, t %.6g s", place.name, sim.clock.step, sim.clock.t)
+    return sim, replace(Start(**parcel.known["start"]), resumed=True)
 
 
 def _announce(sim: Simulation, journal: Journal | None, setup: float) -> None:
@@ -83,7 +106,13 @@ def _announce(sim: Simulation, journal: Journal | None, setup: float) -> None:
 
 
 def _sum_up(
-    loop: Loop, folder: Path, failure: PhysicsError | None, start: Start, cpu: float, elapsed: float
+    loop: Loop,
+    folder: Path,
+    failure: PhysicsError | None,
+    start: Start,
+    cpu: float,
+    setup: float,
+    elapsed: float,
 ) -> Outcome:
     sim = loop.sim
     seconds = sim.comm.gather(sim.timers.seconds)
@@ -100,7 +129,7 @@ def _sum_up(
         state, cause, message = State.FAILED, failure.cause, str(failure)
     return Outcome(
         state=state, cause=cause, message=message, steps=sim.clock.step, time=sim.clock.t, ranks=sim.comm.size,
-        elapsed=elapsed, setup=start.setup, cpu=total_cpu, digest=hexdigest or "", elements=start.elements,
+        elapsed=elapsed, setup=setup, cpu=total_cpu, digest=hexdigest or "", elements=start.elements,
         eroded=start.elements - sim.model.elements_global, eroded_mass=sim.ledger.eroded_mass,
         nodes_initial=start.nodes, nodes=sim.model.nodes_global, fragments=fragments,
         broken=sim.fracture.broken if sim.fracture is not None else 0, energy=loop.energy,

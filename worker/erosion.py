@@ -12,8 +12,9 @@ import numpy as np
 
 from conoid.cases.schema import Case, Symmetry
 
-from .boundaries import ON_PLANE, Boundary, PrescribedVelocity, RigidWalls
+from .boundaries import Boundary, PrescribedVelocity, RigidWalls
 from .clock import Clock
+from .conditions import ON_PLANE
 from .contact.stage import Contact
 from .elements.wear import BROKEN, FREQUENCY, SOUND
 from .mesh.faces import FACES

@@ -3,17 +3,19 @@
 import logging
 import math
 import time
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from conoid.cases import messages
+from conoid.cases import layout, messages
 from conoid.cases.messages import Energy
 from conoid.cases.run import Cause, State
 
-from . import step
+from . import simulation, step
 from .balance import Balance, Window
 from .errors import EnergyError
 from .groups import Groups
+from .migration import checkpoint
 from .output import frames
 from .output.history import History
 from .output.journal import Journal
@@ -28,17 +30,34 @@ STOPS = {
     WALL_TIME: (State.TIMED_OUT, Cause.WALLTIME, "run.max_wall_time is used up"),
     MAX_STEPS: (State.FAILED, Cause.DIVERGED, "run.max_steps is used up before run.end_time"),
 }
+_KEPT = (CANCELLED, WALL_TIME)
+"""Reasons after which the run can go on from a checkpoint."""
 _REPORT_EVERY = 0.25
 _LOG_EVERY = 10.0
 
 log = logging.getLogger("conoid.worker")
 
 
+@dataclass(frozen=True)
+class Start:
+    """What is known when the first step begins, and what a run that goes on knows besides."""
+
+    elements: int
+    nodes: int
+    thick: list[float]
+    """See reference.thicknesses."""
+    sample: int = 0
+    """Lines of the history that have been due."""
+    updates: int = 0
+    """Tets times steps so far."""
+    resumed: bool = False
+
+
 class Pace:
     """Simulated seconds per second of wall time, as a mean that forgets over some ten reports."""
 
-    def __init__(self, began: float) -> None:
-        self._last = (0.0, began)
+    def __init__(self, t: float, began: float) -> None:
+        self._last = (t, began)
         self._rate: float | None = None
 
     def add(self, t: float, now: float) -> None:
@@ -57,8 +76,9 @@ class Loop:
 
     def __init__(
         self, sim: Simulation, folder: Path, journal: Journal | None, history: History | None, signals: Signals,
-        balance: Balance,
+        balance: Balance, start: Start,
     ) -> None:  # fmt: skip
+        """``start``: what is known when the first step begins."""
         self.sim = sim
         self.energy: Energy | None = None
         self.stopped = 0
@@ -66,12 +86,13 @@ class Loop:
         self._journal = journal
         self._history = history
         self._signals = signals
-        self._sample = 0
-        self._began = self._reported = time.monotonic()
-        self.updates = self._reported_updates = 0
+        self._start = start
+        self._sample = start.sample
+        self._began = self._reported = self._kept = time.monotonic()
+        self.updates = self._reported_updates = start.updates
         """Tets times steps so far."""
-        self._reported_step = 0
-        self._pace = Pace(self._began)
+        self._reported_step = sim.clock.step
+        self._pace = Pace(sim.clock.t, self._began)
         self._logged = -math.inf
         self._counted = (0, 0)
         self.balance = balance
@@ -79,12 +100,14 @@ class Loop:
 
     def run(self) -> None:
         """Steps until the end time, or until a reason to stop. Raises PhysicsError."""
-        step.prepare(self.sim)
+        if not self._start.resumed:
+            step.prepare(self.sim)
         self._record()
         while True:
             if self.sim.vote.report:
                 self._report()
             self._move()
+            self._checkpoint()
             self._propose()
             sim = self.sim
             self._first_half()
@@ -117,6 +140,29 @@ class Loop:
             self._groups.moved(self.sim)
             self._tell(messages.Balance, cause=cause, **told)
 
+    def _checkpoint(self) -> None:
+        """The complete state to disk, when that is due."""
+        sim, stop = self.sim, self.sim.vote.stop
+        if not sim.vote.checkpoint and stop not in _KEPT:
+            return
+        began, clock = time.monotonic(), sim.clock
+        with sim.timers.phase("output"):
+            parcel = simulation.keep(sim)
+            self.balance.weigh(sim, parcel)
+            parcel.known["start"] = asdict(replace(self._start, sample=self._sample, updates=self.updates))
+            place, size = checkpoint.write(parcel, sim.case, self._folder, clock.step, clock.t, sim.comm)
+        cause = "the run stops" if stop else ("asked for" if self._asked() else "run.checkpoint_every")
+        if sim.comm.rank == 0:
+            (self._folder / layout.CHECKPOINT_REQUEST).unlink(missing_ok=True)
+        self._kept = time.monotonic()
+        self._tell(
+            messages.Checkpoint, path=str(place.relative_to(self._folder)), bytes=size, cause=cause,
+            seconds=self._kept - began,
+        )  # fmt: skip
+
+    def _asked(self) -> bool:
+        return (self._folder / layout.CHECKPOINT_REQUEST).exists()
+
     def _propose(self) -> None:
         """This rank's words for the next vote."""
         sim, now = self.sim, time.monotonic()
@@ -130,6 +176,10 @@ class Loop:
         reporting = sim.comm.rank == 0 and now - self._reported > _REPORT_EVERY
         sim.vote.words[3] = reporting + (reporting and self._groups.due(sim.clock.t, now))
         sim.vote.words[7] = self.balance.grown(sim)
+        every = sim.case.run.checkpoint_every
+        sim.vote.words[8] = sim.comm.rank == 0 and (
+            (every is not None and now - self._kept > every) or (bool(sim.vote.words[3]) and self._asked())
+        )
 
     def _look(self, before: Floats) -> None:
         """A line of the history: ledger, momentum and probes at time n."""
@@ -157,7 +207,8 @@ class Loop:
             path = frames.write(self._folder, index, clock.t, sim.model, sim.comm, self.sim.record.labels)
             self.sim.record.write(self._folder, index, clock.t)
         clock.frame += 1
-        if path is not None:
+        if path is not None and self._journal is not None and index not in self._journal.frames:
+            self._journal.frames.add(index)
             self._tell(messages.Frame, index=index, path=path)
 
     def _report(self) -> None:

@@ -61,7 +61,7 @@ def _outcome(
         case = _case(options, comm)
         if comm.rank == 0:
             (options.out / layout.RESOLVED_CASE).write_bytes(load.resolved_json(case))
-        outcome = _compute(case, Path(options.case).resolve().parent, options.out, comm, journal, signals, began)
+        outcome = _compute(case, options, comm, journal, signals, began)
         return outcome, _CODES[State(outcome.state)]
     except CaseError as error:
         return _failed(Cause.INPUT, str(error), comm, began), ExitCode.BAD_INPUT
@@ -79,6 +79,7 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("case", help="a .toml or .json file, or the name of a shipped case")
     parser.add_argument("--out", type=Path, required=True, help="the run folder")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="override a key of the case")
+    parser.add_argument("--restart", action="store_true", help="go on from the latest checkpoint in the run folder")
     parser.add_argument("--run", help="the run's id; the folder's name when absent")
     parser.add_argument("--telemetry", metavar="ENDPOINT", help="a Zenoh router, such as tcp/127.0.0.1:7447")
     parser.add_argument("--prefix", help="key prefix of the run, conoid/v1/<owner>/<run>")
@@ -124,14 +125,15 @@ def _prepare_folder(folder: Path, comm: Comm) -> None:
 
 
 def _compute(
-    case: Case, meshes: Path, folder: Path, comm: Comm, journal: Journal | None, signals: Signals, began: float
+    case: Case, options: argparse.Namespace, comm: Comm, journal: Journal | None, signals: Signals, began: float
 ) -> Outcome:
     if comm.rank == 0:
         from . import compute
     comm.barrier()
     if comm.rank != 0:
         from . import compute
-    return compute.compute(case, meshes, folder, comm, journal, signals, began)
+    meshes = Path(options.case).resolve().parent
+    return compute.compute(case, meshes, options.out, comm, journal, signals, began, options.restart)
 
 
 def _close(outcome: Outcome, folder: Path, journal: Journal, telemetry: Telemetry | None) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from conoid.cases.library import material as find_material
 from conoid.cases.schema import Case
 
-from . import boundaries, domain
+from . import conditions, domain
 from .boundaries import Boundary, RigidWalls
 from .clock import Clock
 from .contact.stage import Contact
@@ -78,6 +78,10 @@ class Vote:
     def hot(self) -> bool:
         """Whether some tet's face has passed the strength by the tet's own stress."""
         return bool(self.result[6])
+
+    def begin_again(self) -> None:
+        """Forgets what was to be done besides the next step."""
+        self.result[[2, 3, 7, 8]] = 0
 
     @property
     def grown(self) -> bool:
@@ -168,8 +172,8 @@ class Simulation:
 def build(case: Case, folder: Path, comm: Comm) -> Simulation:
     """Meshes, cuts and distributes the case. Raises InputError on every rank alike."""
     model, piece = domain.build(case, folder, comm)
-    scene = boundaries.build(case, model, piece.loads)
-    boundaries.start(case, model, scene, comm)
+    scene = conditions.build(case, model, piece.loads)
+    conditions.start(case, model, scene, comm)
     sim = _assemble(case, model, piece.neighbours, scene, piece.node_volume, comm, Timers(comm))
     sim.probes.require_tets(case)
     if sim.contact is not None:
@@ -229,7 +233,7 @@ def resume(case: Case, arrived: Arrived, comm: Comm, timers: Timers) -> Simulati
     """Goes on with what has arrived; all ranks take part."""
     parcel, known = arrived.parcel, arrived.parcel.known
     model = model_of.resume(case, arrived, comm)
-    scene = boundaries.build(case, model, boundaries.loads(parcel))
+    scene = conditions.build(case, model, conditions.loads(parcel))
     sim = _assemble(case, model, arrived.neighbours, scene, np.ones(model.nodes.n), comm, timers)
     sim.vote.result[:] = known["vote"]
     sim.clock.resume(known["clock"])

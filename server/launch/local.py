@@ -98,6 +98,8 @@ def environment(base: Mapping[str, str], job: Job) -> dict[str, str]:
 
 def _arguments(job: Job) -> list[str]:
     arguments = [str(job.case), "--out", str(job.folder), "--run", job.run]
+    if any((job.folder / layout.CHECKPOINTS).glob("*[0-9]")):
+        arguments.append("--restart")
     if job.telemetry is not None:
         arguments += ["--telemetry", job.telemetry.endpoint, "--prefix", job.telemetry.prefix]
     return arguments

@@ -1,4 +1,4 @@
-"""Runs: submit, list, look at, cancel."""
+"""Runs: submit, list, look at, cancel, ask for a checkpoint."""
 
 import time
 from typing import Annotated, Any
@@ -7,6 +7,7 @@ from fastapi import APIRouter, Depends, Header, Query, Request, Response
 from fastapi.responses import JSONResponse
 from starlette.concurrency import run_in_threadpool
 
+from conoid.cases import layout
 from conoid.cases.run import State
 
 from .. import view
@@ -112,3 +113,17 @@ def cancel(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
         detail = f"the request could not be recorded: {str(error) or 'no answer in time'}".splitlines()[0]
         raise ServiceError(503, "unavailable", detail, retryable=True) from error
     return Response(view.snapshot(service, find(service, identity, run_id)).body, 202, media_type="application/json")
+
+
+@router.post("/v1/runs/{run_id}:checkpoint", status_code=202)
+def checkpoint(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
+    """Asks the worker for a checkpoint; the journal tells of it when it is on disk. Asking again changes nothing."""
+    run = find(service, identity, run_id)
+    if run.state is not State.RUNNING:
+        raise ServiceError(409, "not_running", f"run {run.id} is {run.state.value}; a run that is running keeps one")
+    try:
+        (service.settings.runs / run.id / layout.CHECKPOINT_REQUEST).touch()
+    except OSError as error:
+        detail = f"the request could not be recorded: {error.strerror}"
+        raise ServiceError(503, "unavailable", detail, retryable=True) from error
+    return Response(view.snapshot(service, run).body, 202, media_type="application/json")

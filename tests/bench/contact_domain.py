@@ -65,11 +65,10 @@ def _looked(sim: simulation.Simulation) -> tuple[float, ...]:
     assert sim.contact is not None
     now = sim.contact._scene
     assert now is not None
-    copied = sum(len(places) for places, _ in now.copies.receives)
-    sent = sum(buffer.nbytes for _, buffer in now.copies.sends)
+    copied = sum(len(some.nodes) for some in now.copies.receives)
     assert sim.case.contact is not None
     sums = now.shared_shares.bytes_sent + sim.case.contact.sweeps * now.shared_impulse.bytes_sent
-    return float(now.faces_sent), float(copied), float(sent + sums)
+    return float(now.faces_sent), float(copied), float(now.copies.bytes_sent + sums)
 
 
 def _timed(function: Any, spent: list[float]) -> Any:

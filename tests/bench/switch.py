@@ -123,7 +123,7 @@ def measure(way: str, endpoint: str, prefix: str, pairs: int, ready: Callable[[]
     with tempfile.TemporaryDirectory(prefix="conoid-bench-") as out:
         folder = Path(out)
         journal = Journal(folder, "run", switch)
-        compute(case, folder, folder, SerialComm(), journal, end, time.monotonic())
+        compute(case, folder, folder, SerialComm(), journal, end, time.monotonic(), False)
         journal.close()
     telemetry.close()
     return Pairs(way, switch.blocks)

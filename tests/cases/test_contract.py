@@ -25,8 +25,11 @@ EXAMPLES: list[messages.AnyMessage] = [
         predicted=[2e-3, 2e-3], tets=12, nodes=9, cost=0.25, saved=0.5,
     ),
     messages.Groups(
-        run="r", seq=10, load=[120, 80], outside=[4, 4], centres=[(0.0, 0.0, 0.25), (0.0, 0.0, 0.75)], tets=[3, 3],
+        run="r", seq=11, load=[120, 80], outside=[4, 4], centres=[(0.0, 0.0, 0.25), (0.0, 0.0, 0.75)], tets=[3, 3],
         cost=0.5,
+    ),
+    messages.Checkpoint(
+        run="r", seq=10, step=200, path="checkpoints/000000200", bytes=1024, seconds=0.1, cause="asked for"
     ),
     messages.Counts(run="r", seq=5, elements=6, nodes=8, shared=4, fragments=1, elements_per_rank=[3, 3]),
     messages.Frame(run="r", seq=6, index=12, path="frames/000012.vtkhdf"),

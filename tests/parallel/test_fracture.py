@@ -1,13 +1,22 @@
 """What breaks, breaks alike on any number of ranks: digest, history and counts, to the bit."""
 
+from collections import defaultdict
 from collections.abc import Callable
+from itertools import permutations
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from conoid.cases import layout
+from conoid.cases.load import parse_case, read_data
 from conoid.cases.outcome import Outcome, from_json
+from conoid.worker import simulation, step
+from conoid.worker.parallel.comm import Comm
+from conoid.worker.simulation import Simulation
+from conoid.worker.topology import Split
 
+from ..contact.ranks import on_ranks
 from .launching import together
 
 RANKS = (2, 3, 4, 7)
@@ -95,3 +104,62 @@ def test_the_scenes_break_thoroughly(name: str, answers: Answers) -> None:
     assert end.energy.residual < 1e-3
     assert end.energy.contact != 0.0
     assert (end.energy.friction > 0.0) == (name != "smooth")
+
+
+def shared(sim: Simulation) -> dict[str, Any]:
+    """Of the scene of a rank, as ids in their order: what it holds, pushes and has copies of; by the other rank, what
+    it sums with it, sends to it and receives from it.
+    """
+    assert sim.contact is not None
+    now, nodes = sim.contact._scene, sim.model.nodes
+    assert now is not None
+    ids = now.crowd.id
+    return {
+        "holds": set(nodes.id.tolist()), "pushes": set(ids[now.pushes].tolist()),
+        "lacks": sorted(ids[now.crowd.local < 0].tolist()),
+        "sums": {some.rank: ids[some.nodes].tolist() for some in now.company},
+        "sends": {some.rank: nodes.id[some.nodes].tolist() for some in now.copies.sends},
+        "receives": {some.rank: ids[some.nodes].tolist() for some in now.copies.receives},
+    }  # fmt: skip
+
+
+def test_all_ranks_know_who_shares_what_separates() -> None:
+    """After every split: the lists of two ranks are the same, in the same order, each node once; all who push or hold
+    a node that any rank pushes are among those who sum it; and what a rank has not, it receives, once.
+    """
+    case, ranks = parse_case(read_data(CASE)), 3
+
+    def work(comm: Comm) -> list[list[dict[str, Any]]]:
+        sim = simulation.build(case, Path(), comm)
+        assert sim.contact is not None
+        separate, seen = sim.contact.separate, []
+
+        def watched(split: Split) -> None:
+            separate(split)
+            if sim.contact is not None and sim.contact._scene is not None:
+                seen.append(comm.share(shared(sim)))
+
+        sim.contact.separate = watched  # type: ignore[method-assign]
+        step.prepare(sim)
+        for _ in range(25):
+            step.first_half(sim)
+            step.second_half(sim)
+        sim.free()
+        return seen
+
+    splits = on_ranks(ranks, work)[0]
+    assert len(splits) > 10
+    assert any(rank["lacks"] for rank in splits[-1])
+    for split in splits:
+        members = defaultdict[int, set[int]](set)
+        for node in set[int]().union(*(rank["pushes"] for rank in split)):
+            members[node] = {r for r, rank in enumerate(split) if node in rank["holds"] | rank["pushes"]}
+        for one, other in permutations(range(ranks), 2):
+            mine, theirs = split[one], split[other]
+            listed = mine["sums"].get(other, [])
+            assert listed == theirs["sums"].get(one, [])
+            assert len(set(listed)) == len(listed)
+            assert {node for node, who in members.items() if {one, other} <= who} <= set(listed)
+            assert mine["sends"].get(other, []) == theirs["receives"].get(one, [])
+        for rank in split:
+            assert sorted(node for some in rank["receives"].values() for node in some) == rank["lacks"]

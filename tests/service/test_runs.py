@@ -71,6 +71,19 @@ def test_cancel_while_it_runs(server: Running) -> None:
     assert (again.status_code, again.json()["state"]) == (202, "cancelled")
 
 
+def test_a_checkpoint_is_asked_for_while_it_runs(server: Running, tmp_path: Path) -> None:
+    first = server.ann.submit(ranks=2, wait=str(tmp_path / "go"))
+    second = server.ann.submit()
+    server.ann.wait_for(first, State.RUNNING)
+    assert server.ann.http.post(f"/v1/runs/{first}:checkpoint").status_code == 202
+    assert (server.ann.runs / first / layout.CHECKPOINT_REQUEST).exists()
+    refused = server.ann.http.post(f"/v1/runs/{second}:checkpoint")
+    assert (refused.status_code, refused.json()["code"]) == (409, "not_running")
+    assert server.bob.http.post(f"/v1/runs/{first}:checkpoint").status_code == 404
+    (tmp_path / "go").touch()
+    assert server.ann.wait_for(first)["state"] == "succeeded"
+
+
 def test_a_worker_that_does_not_listen_is_killed(server: Running) -> None:
     run = server.ann.submit(end="deaf", steps=1)
     server.ann.wait_for(run, State.RUNNING)

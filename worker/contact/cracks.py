@@ -51,7 +51,7 @@ class Cracks:
     @property
     def active(self) -> Flags:
         """(m,) which have nodes that have separated, and the first side here: this rank computes them."""
-        return np.asarray((self.nodes[:, :3] != self.nodes[:, 3:]).any(axis=1) & (self.sides[:, 0, 1] >= 0))
+        return np.asarray(_active(self.nodes, self.sides))
 
     def add(self, tets: Ints, nodes: Indices, sides: Indices) -> None:
         """Takes up facets with their three ``nodes`` (m, 3)."""
@@ -62,7 +62,7 @@ class Cracks:
         """Takes up the copies of a split; ``ids``: of the local nodes."""
         parents = np.zeros(len(ids), bool)
         parents[split.copies.parents] = True
-        rows = np.flatnonzero(parents[self.nodes].any(axis=1))
+        rows = touching(self.nodes, parents)
         self.nodes[rows] = split.followed_sides(self.nodes[rows], ids, self.tets[rows])
 
     def keep(self, blocks: list[Block], ids: Ints) -> Table:
@@ -111,7 +111,7 @@ class Cracks:
 
 @dataclass
 class News:
-    """What every rank hears of a split."""
+    """What a rank knows of a split: round every node that it holds or has a copy of."""
 
     key: Ints
     """(r,) ids of a node and of a tet as one number, ascending."""
@@ -125,22 +125,35 @@ class News:
     """Parents and copies."""
 
 
-def news(split: Split, here: Crowd, nodes: Nodes, comm: Comm) -> News:
-    """All ranks take part. ``here``: every node of this rank, by local index."""
-    ids, copies = here.id, split.copies
-    owned = here.owner[copies.parents] == comm.rank
-    mine = split.first + np.flatnonzero(owned)
-    told = owned[split.node - split.first]
-    table = np.column_stack([split.key[told], ids[split.node[told]]])
-    family = np.column_stack([ids[copies.parents[owned]], ids[mine]])
-    some = here.take(np.unique(np.concatenate([copies.parents[owned], mine])))
+def news(split: Split, scene: Scene, here: Crowd, comm: Comm) -> News:
+    """All ranks take part. ``here``: every node of this rank, by local index. Of nodes that it does not hold, a rank
+    hears from the one that sends it their state.
+    """
+    parents, copies = split.copies.parents, split.first + np.arange(split.copies.n)
+    table = np.column_stack([split.key, here.id[split.node]])
+    family = np.column_stack([here.id[parents], here.id[copies]])
+    rows = here.take(np.unique(np.concatenate([parents, copies])))
     if comm.size > 1:
-        parts = comm.share((table, family, ghosts.pack_crowd(some)))
-        table, family, packed = (np.concatenate(columns) for columns in zip(*parts, strict=True))
-        some = ghosts.unpack_crowd(packed)
-        some.local = nodes.places(some.id)
-    table, family = table[np.argsort(table[:, 0])], family[np.lexsort((family[:, 1], family[:, 0]))]
-    return News(table[:, 0].copy(), table[:, 1].copy(), family[:, 0].copy(), family[:, 1].copy(), some)
+        told, flags = {}, np.zeros(here.n, bool)
+        for other in scene.copies.sends:
+            flags[other.nodes] = True
+            for_it = flags[parents]
+            flags[other.nodes] = False
+            if for_it.any():
+                some = np.unique(np.concatenate([parents[for_it], copies[for_it]]))
+                round_it = table[for_it[split.node - split.first]]
+                packed = ghosts.pack_crowd(here.take(some))
+                lengths = np.array([len(round_it), int(for_it.sum())])
+                told[other.rank] = np.concatenate([
+                    lengths, round_it.reshape(-1), family[for_it].reshape(-1), packed.reshape(-1)
+                ])  # fmt: skip
+        for words in comm.swap(told).values():
+            ends = 2 + 2 * np.cumsum(words[:2])
+            table = np.concatenate([table, words[2 : ends[0]].reshape(-1, 2)])
+            family = np.concatenate([family, words[ends[0] : ends[1]].reshape(-1, 2)])
+            rows = Crowd.joined([rows, ghosts.unpack_crowd(words[ends[1] :])])
+        table, family = table[np.argsort(table[:, 0])], family[np.lexsort((family[:, 1], family[:, 0]))]
+    return News(table[:, 0].copy(), table[:, 1].copy(), family[:, 0].copy(), family[:, 1].copy(), rows)
 
 
 class Follower:
@@ -171,11 +184,14 @@ class Follower:
         far = far[np.argsort(crowd.id[far])]
         self._far = far, crowd.id[far]
 
-    def follow(self, heard: News, cracks: Cracks) -> None:
+    def follow(self, heard: News, cracks: Cracks, neighbours: list[Neighbour]) -> None:
         """Faces, edges and candidates after the split, and the places of the cracks."""
         scene = self._scene
         have = self.places(heard.parent) >= 0
-        self._add(heard.rows.take(np.isin(heard.rows.id, heard.copy[have])))
+        for other in neighbours:
+            have |= _flagged(other.nodes, self._nodes.n)[self._nodes.places(heard.parent)]
+        families = np.concatenate([heard.parent[have], heard.copy[have]])
+        self._add(heard.rows.take(np.isin(heard.rows.id, families)))
         at = self.places(heard.rows.id)
         scene.crowd.mobility[at[at >= 0]] = heard.rows.mobility[at >= 0]
         parents = np.zeros(scene.crowd.n, bool)
@@ -190,24 +206,51 @@ class Follower:
         """The places of the cracks that this rank computes, and room for all that may meet."""
         scene = self._scene
         nodes = cracks.nodes[cracks.active]
-        held = np.zeros(self._nodes.n, bool)
-        held[nodes] = True
-        self._add(self._here.take(np.flatnonzero(held & (scene.place < 0))))
-        scene.cracks = scene.place[nodes]
-        scene.pushes[scene.cracks] = True
+        absent = scene.place < 0
+        some = np.zeros(self._nodes.n, bool)
+        some[nodes[touching(nodes, absent)]] = True
+        self._add(self._here.take(np.flatnonzero(some & absent)))
+        scene.cracks = np.empty_like(nodes)
+        _place(scene.cracks, scene.pushes, nodes, scene.place)
         room = len(scene.node_face) + len(scene.edge_edge) + 3 * len(nodes)
         if room > len(scene.push):
             scene.room = Meetings.room(2 * room)
             scene.diagonal, scene.push = np.empty((2 * room, 2)), np.empty((2 * room, 4))
 
-    def share(self, neighbours: list[Neighbour], comm: Comm) -> None:
-        """Settles anew who shares which node; all ranks take part."""
+    def settle(self, neighbours: list[Neighbour], comm: Comm) -> None:
+        """Asks all ranks who shares which node; all take part."""
         scene, nodes = self._scene, self._nodes
+        if comm.size == 1:
+            scene.connect([], nodes, comm)
+            return
         used = np.sort(scene.crowd.id[scene.pushes])
         owners = scene.crowd.owner[self.places(used)]
         shared = ghosts.members(used, owners, neighbours, nodes, comm)
         self._hold(np.unique(np.concatenate([used[:0], *shared.values()])))
         scene.connect([Neighbour(rank, self.places(ids)) for rank, ids in sorted(shared.items())], nodes, comm)
+
+    def share(self, heard: News, neighbours: list[Neighbour], comm: Comm) -> None:
+        """Follows who shares which node. Nobody has to be asked: who shares a node shares its copies, since they are
+        held, pushed and sent by the same ranks as it; and a node that separates is shared by all that hold it, since it
+        may be pushed across the crack.
+        """
+        scene = self._scene
+        order = np.argsort(heard.copy)
+        family = np.column_stack([heard.parent, heard.copy])[order]
+        local, at = self._nodes.places(family), self.places(family)
+        company, none = {some.rank: some for some in scene.company}, np.zeros(0, np.int32)
+        for other in neighbours:
+            shared = _flagged(other.nodes, self._nodes.n)[local[:, 0]]
+            some = company.get(other.rank, Neighbour(other.rank, none))
+            fresh = shared & ~_flagged(some.nodes, scene.crowd.n)[at[:, 0]]
+            if fresh.any():
+                parents = self.places(np.unique(family[fresh, 0]))
+                company[other.rank] = Neighbour(other.rank, extended(some.nodes, parents))
+        scene.extend(
+            [_heirs(some, at, scene.crowd.n) for _, some in sorted(company.items())],
+            [_heirs(some, local, self._nodes.n) for some in scene.copies.sends],
+            [_heirs(some, at, scene.crowd.n) for some in scene.copies.receives], comm,
+        )  # fmt: skip
 
     def _hold(self, ids: Ints) -> None:
         """Adds those of this rank's nodes that the crowd lacks."""
@@ -247,7 +290,7 @@ class Follower:
 
     def _faces(self, heard: News, parents: Flags) -> None:
         scene = self._scene
-        rows = np.flatnonzero(parents[scene.faces].any(axis=1))
+        rows = touching(scene.faces, parents)
         now = self._followed(heard, scene.faces[rows], scene.face_id[rows] // 4)
         scene.faces[rows] = now
         scene.pushes[now[:, :3]] = True
@@ -255,7 +298,7 @@ class Follower:
     def _edges(self, heard: News, parents: Flags) -> None:
         """An edge goes when its two faces have separated there."""
         scene = self._scene
-        rows = np.flatnonzero(parents[scene.edges].any(axis=1))
+        rows = touching(scene.edges, parents)
         nodes, sides = scene.edges[rows], scene.edge_sides[rows] // 4
         one = self._followed(heard, nodes[:, [0, 1, 2]], sides[:, 0])
         two = self._followed(heard, nodes[:, [0, 1, 3]], sides[:, 1])
@@ -282,6 +325,52 @@ class Follower:
         scene.keys = extended(scene.keys, np.column_stack([copy[order], scene.face_id[face]]))
         scene.kept = extended(scene.kept, np.zeros((len(face), 4)))
         scene.pushes[slave] = True
+
+
+def _flagged(some: Indices, n: int) -> Flags:
+    """(n + 1,) which of n are among ``some``; the last stands for what is not there, -1."""
+    flags = np.zeros(n + 1, bool)
+    flags[some] = True
+    return flags
+
+
+def _heirs(some: Neighbour, family: Indices, n: int) -> Neighbour:
+    """Nodes shared with a rank, and behind them their copies: ``family`` (c, 2) parents and copies, out of ``n``."""
+    return Neighbour(some.rank, extended(some.nodes, family[_flagged(some.nodes, n)[family[:, 0]], 1]))
+
+
+@njit("boolean[::1](int32[:, ::1], int32[:, :, ::1])", cache=True)
+def _active(nodes, sides):  # type: ignore[no-untyped-def]
+    """Cracks.active."""
+    out = np.empty(len(nodes), np.bool_)
+    for c in range(len(nodes)):
+        apart = nodes[c, 0] != nodes[c, 3] or nodes[c, 1] != nodes[c, 4] or nodes[c, 2] != nodes[c, 5]
+        out[c] = apart and sides[c, 0, 1] >= 0
+    return out
+
+
+@njit("void(int32[:, ::1], boolean[::1], int32[:, ::1], int32[::1])", cache=True)
+def _place(out, pushes, nodes, place):  # type: ignore[no-untyped-def]
+    """The places of the ``nodes`` (m, 6) of cracks; those that have separated may be pushed."""
+    for c in range(len(nodes)):
+        for k in range(6):
+            out[c, k] = place[nodes[c, k]]
+            if nodes[c, k] != nodes[c, (k + 3) % 6]:
+                pushes[out[c, k]] = True
+
+
+@njit("int64[::1](int32[:, ::1], boolean[::1])", cache=True)
+def touching(table, flags):  # type: ignore[no-untyped-def]
+    """Rows of ``table`` (n, k) with an entry that is flagged."""
+    rows = np.empty(len(table), np.int64)
+    n = 0
+    for i in range(len(table)):
+        for k in range(table.shape[1]):
+            if flags[table[i, k]]:
+                rows[n] = i
+                n += 1
+                break
+    return rows[:n].copy()
 
 
 @njit(

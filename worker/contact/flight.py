@@ -7,7 +7,7 @@ from ..migration.parcel import Parcel
 from ..parallel.comm import Comm
 from ..parallel.fixed_point import exact_sums
 from ..parallel.ownership import Neighbour, complete
-from ..state import Floats, Ints, Nodes, extended
+from ..state import Floats, Indices, Ints, Nodes, extended
 from . import ghosts, sweeps
 from .records import Crowd, merged
 from .scene import Sides
@@ -41,8 +41,9 @@ class Flight:
     def follow(self, found: Surface, nodes: Nodes, mobility: Floats) -> None:
         """Takes a new surface; all ranks take part."""
         self._found, self.mobility = found, mobility
-        self._face_nodes = np.searchsorted(nodes.id, found.faces.nodes[:, :3]).astype(np.int32).reshape(-1, 3)
-        self.sides = self._whole(nodes)
+        local = np.searchsorted(nodes.id, found.faces.nodes).astype(np.int32)
+        self._face_nodes = np.ascontiguousarray(local[:, :3])
+        self.sides = self._whole(nodes, local)
         """What this rank has of the surface."""
 
     def begin(self, nodes: Nodes, t: float, until: float) -> None:
@@ -79,10 +80,11 @@ class Flight:
         every = np.arange(nodes.n, dtype=np.int32)
         return Crowd(nodes.id, every, nodes.owner, nodes.part, self.mobility, nodes.x, nodes.v)
 
-    def _whole(self, nodes: Nodes) -> Sides:
+    def _whole(self, nodes: Nodes, local: Indices) -> Sides:
+        """``local`` (f, 4): nodes of the faces."""
         found, here = self._found, self.here(nodes)
         used = found.flags.copy()
-        used[np.searchsorted(nodes.id, found.faces.nodes.reshape(-1))] = True
+        used[local] = True
         far = ghosts.fetch(found.far, found.far_owner, here, self._comm)
         slaves = nodes.id[found.flags & nodes.owned]
         return Sides(found.faces, found.edges, merged([here.take(used), far]), slaves, self._skin)

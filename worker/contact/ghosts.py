@@ -1,11 +1,10 @@
 """Nodes that several ranks push: who they are, copies of their state, and the lists for completing sums over them."""
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
-from ..parallel.comm import Comm, Exchange
+from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
 from ..state import Floats, Indices, Ints, Nodes
 from .records import Crowd, Edges, Faces
@@ -97,47 +96,52 @@ def _company(table: Ints, rank: int) -> Ints:
     return company
 
 
-@dataclass
 class Copies:
-    """Positions and velocities of nodes, before and after the kick, sent by their owners in every step."""
+    """Positions and velocities of nodes, before and after the kick, sent in every step by a rank that holds them."""
 
-    exchange: Exchange
-    sends: list[tuple[Indices, Floats]]
-    """Local nodes, and the (n, 9) buffer."""
-    receives: list[tuple[Indices, Floats]]
-    """Places in the crowd, and the (n, 9) buffer."""
+    def __init__(self, sends: list[Neighbour], receives: list[Neighbour], comm: Comm, tag: int) -> None:
+        """``sends``: local nodes, ``receives``: places in the crowd."""
+        self.sends, self.receives = sends, receives
+        self._out = [np.empty((len(some.nodes), 9)) for some in sends]
+        self._in = [np.empty((len(some.nodes), 9)) for some in receives]
+        self._exchange = comm.exchange(
+            [(some.rank, buffer.view(np.int64)) for some, buffer in zip(sends, self._out, strict=True)],
+            [(some.rank, buffer.view(np.int64)) for some, buffer in zip(receives, self._in, strict=True)],
+            tag,
+        )
+
+    @property
+    def bytes_sent(self) -> int:
+        """Bytes this rank sends in one exchange."""
+        return sum(buffer.nbytes for buffer in self._out)
 
     def note(self, nodes: Nodes) -> None:
         """Keeps v(n-1/2) for the others."""
-        for local, buffer in self.sends:
-            buffer[:, 6:] = nodes.v[local]
+        for some, buffer in zip(self.sends, self._out, strict=True):
+            buffer[:, 6:] = nodes.v[some.nodes]
 
     def refresh(self, nodes: Nodes, x: Floats, v: Floats, before: Floats) -> None:
         """Fills the copies' rows of ``x``, of ``v`` and of v(n-1/2), (crowd, 3) each."""
-        for local, buffer in self.sends:
-            buffer[:, :3], buffer[:, 3:6] = nodes.x[local], nodes.v[local]
-        self.exchange.begin()
-        self.exchange.finish()
-        for places, buffer in self.receives:
-            x[places], v[places], before[places] = buffer[:, :3], buffer[:, 3:6], buffer[:, 6:]
+        for some, buffer in zip(self.sends, self._out, strict=True):
+            buffer[:, :3], buffer[:, 3:6] = nodes.x[some.nodes], nodes.v[some.nodes]
+        self._exchange.begin()
+        self._exchange.finish()
+        for some, buffer in zip(self.receives, self._in, strict=True):
+            at = some.nodes
+            x[at], v[at], before[at] = buffer[:, :3], buffer[:, 3:6], buffer[:, 6:]
 
     def free(self) -> None:
         """Gives the messages back to MPI."""
-        self.exchange.free()
+        self._exchange.free()
 
 
 def copies(crowd: Crowd, nodes: Nodes, comm: Comm, tag: int) -> Copies:
-    """The standing order for the state of the nodes of ``crowd`` that are not held here; all ranks take part."""
+    """The standing order for the state of the nodes of ``crowd`` that are not held here, with their owners; all ranks
+    take part.
+    """
     far = np.flatnonzero(crowd.local < 0)
     owners = crowd.owner[far]
     asked = comm.swap({rank: crowd.id[far[owners == rank]] for rank in _ranks(owners)})
-    receives = [(far[owners == rank].astype(np.int32), rank) for rank in _ranks(owners)]
-    sends = [(np.searchsorted(nodes.id, ids).astype(np.int32), rank) for rank, ids in asked.items()]
-    into = [(places, np.empty((len(places), 9)), rank) for places, rank in receives]
-    out = [(local, np.empty((len(local), 9)), rank) for local, rank in sends]
-    exchange = comm.exchange(
-        [(rank, buffer.view(np.int64)) for _, buffer, rank in out],
-        [(rank, buffer.view(np.int64)) for _, buffer, rank in into],
-        tag,
-    )
-    return Copies(exchange, [(local, b) for local, b, _ in out], [(places, b) for places, b, _ in into])
+    receives = [Neighbour(rank, far[owners == rank].astype(np.int32)) for rank in _ranks(owners)]
+    sends = [Neighbour(rank, np.searchsorted(nodes.id, ids).astype(np.int32)) for rank, ids in asked.items()]
+    return Copies(sends, receives, comm, tag)

@@ -59,9 +59,14 @@ class Sides:
         return Things(np.ascontiguousarray(self.face_places[:, :3]), 0.5 * self.skin + deep * self.faces.size)
 
     @cached_property
+    def edge_places(self) -> Indices:
+        """(e, 4)."""
+        return self.crowd.places(self.edges.nodes)
+
+    @cached_property
     def edge_things(self) -> Things:
         """The edges, to be searched."""
-        places = self.crowd.places(np.ascontiguousarray(self.edges.nodes[:, :2]))
+        places = np.ascontiguousarray(self.edge_places[:, :2])
         return Things(places, 0.5 * self.skin + 0.5 * DEEP_SELF * self.edges.size)
 
 
@@ -109,13 +114,27 @@ class Scene:
     """(crowd,) which nodes a meeting of this rank may push."""
     cracks: Indices
     """(m, 6) places of the nodes on either side of open cracks (contact/cracks.py)."""
+    company: list[Neighbour] = field(init=False)
+    """Other ranks, and the places of the nodes that either pushes or holds and any rank pushes."""
     shared_shares: SharedSum = field(init=False)
     shared_impulse: SharedSum = field(init=False)
     copies: Copies = field(init=False)
 
     def connect(self, company: list[Neighbour], nodes: Nodes, comm: Comm) -> None:
-        """Sets up the messages: sums over nodes that others push or hold, copies of what is not held here."""
+        """Sets up the messages: sums over the nodes of the company, copies of what is not held here; all ranks take
+        part.
+        """
         self.copies = ghosts.copies(self.crowd, nodes, comm, _COPY_TAG)
+        self._sum(company, comm)
+
+    def extend(self, company: list[Neighbour], sends: list[Neighbour], receives: list[Neighbour], comm: Comm) -> None:
+        """The messages with more nodes, of which this rank knows as the others do."""
+        self.free()
+        self.copies = Copies(sends, receives, comm, _COPY_TAG)
+        self._sum(company, comm)
+
+    def _sum(self, company: list[Neighbour], comm: Comm) -> None:
+        self.company = company
         self.shared_shares = SharedSum(comm, company, 4, _SHARE_TAG)
         self.shared_impulse = SharedSum(comm, company, 3, _PUSH_TAG)
 
@@ -183,14 +202,15 @@ def _approach(x, v, faces, pairs):  # type: ignore[no-untyped-def]
     return np.sqrt(most)
 
 
-def build(
-    sides: Sides, rules: Rules, horizon: float, drift: Floats, nodes: Nodes, neighbours: list[Neighbour], comm: Comm
-) -> Scene:
-    """Searches what flies on for ``horizon``, s; all ranks take part and know of the same ``drift`` (3,), m/s."""
+def build(sides: Sides, rules: Rules, horizon: float, drift: Floats, nodes: Nodes, comm: Comm) -> Scene:
+    """Searches what flies on for ``horizon``, s; all ranks take part and know of the same ``drift`` (3,), m/s.
+
+    Who shares which node is settled by a Follower.
+    """
     seen, sent = _with_ghosts(sides, rules, horizon, drift, comm) if comm.size > 1 else (sides, 0)
     node_face = _node_face(seen, rules, horizon, drift)
     edge_edge = _edge_edge(seen, sides.edges.n, rules, horizon, drift)
-    return compact(seen, node_face, edge_edge, sent, nodes, neighbours, comm)
+    return compact(seen, node_face, edge_edge, sent, nodes)
 
 
 def _with_ghosts(sides: Sides, rules: Rules, horizon: float, drift: Floats, comm: Comm) -> tuple[Sides, int]:
@@ -234,62 +254,59 @@ def _node_face(seen: Sides, rules: Rules, horizon: float, drift: Floats) -> Indi
     pairs = np.concatenate([np.zeros((0, 2), np.int32), *found])
     pairs = np.column_stack([slaves.corners[pairs[:, 0], 0], pairs[:, 1]])
     pairs = sift.faces(pairs, seen.face_places, seen.faces.size, crowd, seen.skin, horizon)
-    return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+    return _sorted(pairs[:, 0], pairs[:, 1], seen.faces.n)
+
+
+def _sorted(one: "np.ndarray", two: "np.ndarray", n: int) -> Indices:
+    """Rows of ``one`` and ``two``, which is less than ``n``, in their order; no row stands twice."""
+    words = one.astype(np.int64) * n + two
+    words.sort()
+    return np.column_stack(np.divmod(words, max(n, 1))).astype(np.int32)
 
 
 def _edge_edge(seen: Sides, own: int, rules: Rules, horizon: float, drift: Floats) -> Indices:
     """(q, 2) indices of edges; the rank of the edge of smaller ids has the pair."""
     crowd, edges, things = seen.crowd, seen.edges, seen.edge_things
-    rank = np.empty(edges.n, np.int64)
-    rank[np.lexsort((edges.nodes[:, 1], edges.nodes[:, 0]))] = np.arange(edges.n)
+    rank, order = np.empty(edges.n, np.int64), np.lexsort((edges.nodes[:, 1], edges.nodes[:, 0]))
+    rank[order] = np.arange(edges.n)
     mine = Things(things.corners[:own], things.reach[:own])
     pairs = search.find(mine, things, crowd.x, crowd.v - drift, crowd.part, rules.allowed, horizon, rank)
-    pairs = sift.edges(pairs, crowd.places(edges.nodes), edges.size, crowd, seen.skin, horizon)
-    return pairs[np.lexsort((rank[pairs[:, 1]], rank[pairs[:, 0]]))]
+    pairs = sift.edges(pairs, seen.edge_places, edges.size, crowd, seen.skin, horizon)
+    return order[_sorted(rank[pairs[:, 0]], rank[pairs[:, 1]], edges.n)].astype(np.int32)
 
 
-def compact(
-    seen: Sides, node_face: Indices, edge_edge: Indices, sent: int, nodes: Nodes,
-    neighbours: list[Neighbour], comm: Comm,
-) -> Scene:  # fmt: skip
-    """Keeps the nodes, faces and edges of candidates only, and settles who shares which node."""
+def compact(seen: Sides, node_face: Indices, edge_edge: Indices, sent: int, nodes: Nodes) -> Scene:
+    """Keeps the nodes, faces and edges of candidates only."""
     crowd = seen.crowd
-    which_faces, face_at = np.unique(node_face[:, 1], return_inverse=True)
-    which_edges, edge_at = np.unique(edge_edge, return_inverse=True)
+    which_faces, face_at = _used(seen.faces.n, node_face[:, 1])
+    which_edges, edge_at = _used(seen.edges.n, edge_edge)
     faces, edges = seen.faces.take(which_faces), seen.edges.take(which_edges)
-    pushed = np.unique(
-        np.concatenate([crowd.id[node_face[:, 0]], faces.nodes[:, :3].reshape(-1), edges.nodes[:, :2].reshape(-1)])
-    )
-    shared: dict[int, Ints] = {}
-    if comm.size > 1:
-        shared = ghosts.members(pushed, crowd.owner[crowd.places(pushed)], neighbours, nodes, comm)
-    needed = np.unique(np.concatenate([pushed, faces.nodes.reshape(-1), edges.nodes.reshape(-1), *shared.values()]))
-    slave_ids = crowd.id[node_face[:, 0]]
-    keys = np.column_stack([slave_ids, seen.faces.id[node_face[:, 1]]])
-    crowd = crowd.take(crowd.places(needed))
+    corners, ends, slaves = seen.face_places[which_faces], seen.edge_places[which_edges], node_face[:, 0]
+    pushed, _ = _used(crowd.n, slaves, corners[:, :3], ends[:, :2])
+    needed, now = _used(crowd.n, slaves, corners, ends)
+    keys = np.column_stack([crowd.id[slaves], seen.faces.id[node_face[:, 1]]])
+    crowd, pushes = crowd.take(needed), np.zeros(len(needed), bool)
+    pushes[now[pushed]] = True
     crowd.local = nodes.places(crowd.id)
-    company = [Neighbour(rank, crowd.places(ids)) for rank, ids in sorted(shared.items())]
     room = len(node_face) + len(edge_edge)
     shares, impulse = np.zeros((crowd.n, 4), np.int64), np.zeros((crowd.n, 3), np.int64)
     held = np.flatnonzero(crowd.local >= 0).astype(np.int32)
     place = np.full(nodes.n, -1, np.int32)
     place[crowd.local[held]] = held
-    found = Scene(
-        crowd=crowd, held=held, local=crowd.local[held], faces=crowd.places(faces.nodes), face_id=faces.id,
-        face_size=faces.size, edges=crowd.places(edges.nodes), edge_sides=edges.sides, edge_size=edges.size,
-        node_face=np.column_stack([crowd.places(slave_ids), face_at.reshape(-1)]).astype(np.int32),
-        edge_edge=edge_at.reshape(-1, 2).astype(np.int32), keys=keys, kept=np.zeros((len(keys), 4)), faces_sent=sent,
+    return Scene(
+        crowd=crowd, held=held, local=crowd.local[held], faces=now[corners], face_id=faces.id,
+        face_size=faces.size, edges=now[ends], edge_sides=edges.sides, edge_size=edges.size,
+        node_face=np.column_stack([now[slaves], face_at[node_face[:, 1]]]), edge_edge=edge_at[edge_edge],
+        keys=keys, kept=np.zeros((len(keys), 4)), faces_sent=sent,
         room=Meetings.room(room), diagonal=np.empty((room, 2)), push=np.empty((room, 4)),
-        shares=shares, impulse=impulse, place=place, pushes=np.isin(crowd.id, pushed),
+        shares=shares, impulse=impulse, place=place, pushes=pushes,
         cracks=np.zeros((0, 6), np.int32),
         total=np.zeros((crowd.n, 3), np.int64), normals=np.zeros((crowd.n, 9)), before=np.zeros((crowd.n, 3)),
     )  # fmt: skip
-    found.connect(company, nodes, comm)
-    return found
 
 
 def resume(
-    pairs: Table, edges: Table, here: Crowd, skin: float, nodes: Nodes, neighbours: list[Neighbour], comm: Comm
+    pairs: Table, edges: Table, here: Crowd, skin: float, nodes: Nodes, comm: Comm
 ) -> Scene:  # fmt: skip
     """The scene of candidates that another has kept; all ranks take part. ``here``: every node of this rank."""
     pairs = take(pairs, np.lexsort((pairs["face"], pairs["node"])))
@@ -308,7 +325,16 @@ def resume(
     far = ghosts.fetch(used[held < 0], owners[at][held < 0].astype(np.int32), here, comm)
     seen = Sides(faces, sharp, merged([here, far]), used[:0], skin)
     node_face = np.column_stack([seen.crowd.places(pairs["node"]), face.reshape(-1)]).astype(np.int32)
-    found = compact(seen, node_face, edge.reshape(2, -1).T.astype(np.int32), 0, nodes, neighbours, comm)
+    pairs_of_edges = np.ascontiguousarray(edge.reshape(2, -1).T, np.int32)
+    found = compact(seen, node_face, pairs_of_edges, 0, nodes)
     found.kept[:] = pairs["kept"]
     found.normals[found.node_face[:, 0]] = pairs["normals"]
     return found
+
+
+def _used(n: int, *some: Indices) -> tuple["np.ndarray", Indices]:
+    """Which of ``n`` things are among ``some``, ascending, and (n,) where each of these stands among them."""
+    flags = np.zeros(n, bool)
+    for each in some:
+        flags[each] = True
+    return np.flatnonzero(flags), (np.cumsum(flags) - 1).astype(np.int32)

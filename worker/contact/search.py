@@ -44,6 +44,11 @@ class Boxes:
             return np.full(6, np.inf)
         return np.concatenate([self.low.min(axis=0), -self.high.max(axis=0)])
 
+    @property
+    def extent(self) -> Floats:
+        """(n,) the longest side."""
+        return np.asarray(np.maximum.reduce((self.high - self.low).T.copy()))
+
     def take(self, chosen: "np.ndarray") -> "Boxes":
         """Some of the boxes."""
         return Boxes(self.low[chosen], self.high[chosen])
@@ -103,10 +108,28 @@ def find(
 
 def _near(boxes: Boxes, part: Indices, others: Boxes, their_part: Indices, allowed: Flags) -> "np.ndarray":
     """Indices of the boxes that touch the hull of a part that theirs may meet."""
-    near = np.zeros(len(part), bool)
-    for theirs in np.unique(their_part):
-        near |= boxes.touching(others.take(their_part == theirs).hull) & allowed[part, theirs]
-    return np.flatnonzero(near)
+    return np.flatnonzero(_touching(boxes.low, boxes.high, part, others.low, others.high, their_part, allowed))
+
+
+@njit(
+    "boolean[::1](float64[:, ::1], float64[:, ::1], int32[::1], float64[:, ::1], float64[:, ::1], int32[::1], "
+    "boolean[:, ::1])",
+    cache=True,
+)
+def _touching(low, high, part, their_low, their_high, their_part, allowed):  # type: ignore[no-untyped-def]
+    least, most = np.full((len(allowed), 3), np.inf), np.full((len(allowed), 3), -np.inf)
+    for j in range(len(their_low)):
+        q = their_part[j]
+        for i in range(3):
+            least[q, i], most[q, i] = min(least[q, i], their_low[j, i]), max(most[q, i], their_high[j, i])
+    near = np.zeros(len(low), np.bool_)
+    for j in range(len(low)):
+        for q in range(len(allowed)):
+            touch = allowed[part[j], q]
+            for i in range(3):
+                touch &= low[j, i] <= most[q, i] and high[j, i] >= least[q, i]
+            near[j] |= touch
+    return near
 
 
 def _pairs(
@@ -114,8 +137,8 @@ def _pairs(
     small_rank: Ints, large_rank: Ints,
 ) -> Indices:  # fmt: skip
     """Small things of like size together, in buckets twice as large for each level: none has more than a few points."""
-    edge = _SAMPLE * float(np.median((large.high - large.low).max(axis=1)))
-    extent = (small.high - small.low).max(axis=1)
+    edge = _SAMPLE * float(np.median(large.extent))
+    extent = small.extent
     level = np.maximum(np.ceil(np.log2(np.maximum(extent / (_FILLED * edge), 1.0))), 0.0).astype(np.int64)
     found = []
     for each in np.unique(level):

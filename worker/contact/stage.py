@@ -116,7 +116,7 @@ class Contact(Boundary):
             pairs, sharp = parcel.rows["contact.pairs"], parcel.rows["contact.sharp"]
             here = self._flight.here(state)
             skin = self._flight.sides.skin
-            self._scene = scene.resume(pairs, sharp, here, skin, state, self._neighbours, self._comm)
+            self._scene = scene.resume(pairs, sharp, here, skin, state, self._comm)
             self._connect(self._scene, state)
             self._scene.total[self._scene.held] = parcel.nodes["contact.total"][self._scene.local]
 
@@ -185,10 +185,10 @@ class Contact(Boundary):
             self._flight.mobility = self._mobility
             here = self._flight.here(state)
             follower = Follower(self._scene, here, state)
-            follower.follow(news(split, here, state, self._comm), self._cracks)
+            heard = news(split, self._scene, here, self._comm)
+            follower.follow(heard, self._cracks, self._neighbours)
             if self._comm.size > 1:
-                self._scene.free()
-                follower.share(self._neighbours, self._comm)
+                follower.share(heard, self._neighbours, self._comm)
 
     def _expose(self, state: Nodes) -> None:
         """The surface anew, with the cracks that are wide; all ranks take part."""
@@ -245,7 +245,7 @@ class Contact(Boundary):
             flight.refresh(state)
         steps, drift = flight.foresight(clock.dt)
         horizon = max(min(steps, 2.0 * (clock.step - self._last)), _SHORTEST) * clock.dt
-        self._scene = scene.build(flight.sides, self._rules, horizon, drift, state, self._neighbours, self._comm)
+        self._scene = scene.build(flight.sides, self._rules, horizon, drift, state, self._comm)
         self.limit = _KINEMATIC * float(self._comm.maximum(np.array([self._scene.approach()]))[0])
         self._connect(self._scene, state)
         if old is not None and self._rubs:
@@ -257,13 +257,11 @@ class Contact(Boundary):
         self.searches += 1
 
     def _connect(self, found: Scene, state: Nodes) -> None:
-        """Takes the cracks up into a new scene; all ranks take part."""
+        """Takes the cracks up into a new scene, and settles who shares what of it; all ranks take part."""
+        follower = Follower(found, self._flight.here(state), state)
         if self._fractures:
-            follower = Follower(found, self._flight.here(state), state)
             follower.cracks(self._cracks)
-            if self._comm.size > 1:
-                found.free()
-                follower.share(self._neighbours, self._comm)
+        follower.settle(self._neighbours, self._comm)
 
     def spent(self, state: Nodes) -> bool:
         """Whether a node of the surface will leave, in a step more, what the last search has allowed for."""
@@ -277,9 +275,9 @@ class Contact(Boundary):
         n = self._meet(now, dt)
         self._weigh(now, n)
         room_of = (room.nodes, room.weights, room.normals)
-        slip = sweeps.rates(now.before, room.nodes, room.weights, n)
         now.push[:n] = 0.0
         if self._rubs:
+            slip = sweeps.rates(now.before, room.nodes, room.weights, n)
             self._resume(now, n)
         for _ in range(self._sweeps):
             sweeps.sweep(
@@ -290,8 +288,8 @@ class Contact(Boundary):
             now.kept[:] = 0.0
             faces = room.pair[:n] >= 0
             now.kept[room.pair[:n][faces]] = now.push[:n][faces]
-        heat = self._friction
-        sweeps.heat(heat.words.reshape(-1), now.push, slip, crowd.v, *room_of, room.friction, heat.scale[0], n)
+            heat = self._friction
+            sweeps.heat(heat.words.reshape(-1), now.push, slip, crowd.v, *room_of, room.friction, heat.scale[0], n)
         self._book(now)
         if _give_back(state.v, self._parts, now.local, held, crowd.v, now.total, state.part, state.owned):
             self.last_push = t

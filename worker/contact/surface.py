@@ -118,11 +118,10 @@ def _sharp(
     face of smaller id has the edge.
     """
     nodes = model.nodes
-    halves = _halves(model, faces, ids)
+    halves, ends = _halves(model, faces, ids)
     shared = np.zeros(nodes.n, bool)
     shared[np.concatenate([np.zeros(0, np.int32), *(other.nodes for other in neighbours)])] = True
-    ends = np.searchsorted(nodes.id, halves[:, :2])
-    common = shared[ends].all(axis=1)
+    common = shared[ends[:, 0]] & shared[ends[:, 1]]
     here, home = _paired(halves[~common]), nodes.owner[ends[:, 0]]
     found = comm.swap({int(rank): halves[common & (home == rank)] for rank in np.unique(home[common])})
     gathered = np.concatenate([halves[:0], *(f.reshape(-1, 10) for f in found.values())])
@@ -140,28 +139,30 @@ def _sharp(
     return edges, far, owner.astype(np.int32)
 
 
-def _halves(model: Model, faces: "np.ndarray", ids: Ints) -> Ints:
-    """(3 f, 10) half edges of the faces."""
+def _halves(model: Model, faces: "np.ndarray", ids: Ints) -> tuple[Ints, Ints]:
+    """(3 f, 10) half edges of the faces, and (3 f, 2) the local nodes of each."""
     nodes = model.nodes
     normals = face_normals(nodes.x0, faces)
     normals /= np.linalg.norm(normals, axis=1)[:, None]
-    parts = []
+    parts, ends = [], []
     for k in range(3):
         a, b, c = (faces[:, (k + i) % 3] for i in range(3))
-        turned = nodes.id[a] > nodes.id[b]
-        low, high = np.where(turned, b, a), np.where(turned, a, b)
+        turned = a > b
+        low, high = np.minimum(a, b), np.maximum(a, b)
+        ends.append(np.column_stack([low, high]))
         length = np.linalg.norm(nodes.x0[b] - nodes.x0[a], axis=1)
         floats = np.column_stack([length, normals]).view(np.int64)
         parts.append(np.column_stack([nodes.id[low], nodes.id[high], nodes.id[c], nodes.owner[c], ids, turned, floats]))
-    return np.concatenate(parts)
+    return np.concatenate(parts), np.concatenate(ends)
 
 
 def _paired(halves: Ints) -> Ints:
     """Rows (a, b, c, d, owner of c, owner of d, face abc, face bad, length) of sharp edges of two faces."""
-    halves = halves[np.lexsort((halves[:, _FACE], halves[:, _HIGH], halves[:, _LOW]))]
-    same = (halves[1:, :2] == halves[:-1, :2]).all(axis=1)
+    order = np.lexsort((halves[:, _FACE], halves[:, _HIGH], halves[:, _LOW]))
+    low, high = halves[order, _LOW], halves[order, _HIGH]
+    same = (low[1:] == low[:-1]) & (high[1:] == high[:-1])
     first = np.flatnonzero(same & ~np.r_[False, same[:-1]] & ~np.r_[same[1:], False]) if len(same) else np.zeros(0, int)
-    one, two = halves[first], halves[first + 1]
+    one, two = halves[order[first]], halves[order[first + 1]]
     cosine = (one[:, _NORMAL:].copy().view(np.float64) * two[:, _NORMAL:].copy().view(np.float64)).sum(axis=1)
     kept = (cosine < SHARP) & (one[:, _TURNED] != two[:, _TURNED])
     one, two = one[kept], two[kept]

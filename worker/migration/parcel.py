@@ -71,7 +71,7 @@ class Parcel:
 
     @classmethod
     def of(cls, parcels: Sequence["Parcel"]) -> "Parcel":
-        """All of them as one; what several hold is there once. At least one."""
+        """All of them as one; nodes that several hold are there once. At least one."""
         nodes = joined([p.nodes for p in parcels])
         parts = sorted({part for p in parcels for part in p.tets})
         names = sorted({name for p in parcels for name in p.rows})
@@ -81,5 +81,5 @@ class Parcel:
             {name: np.sum([p.sums[name] for p in parcels], axis=0) for name in parcels[0].sums},
             once(nodes, nodes["id"]) if nodes else {},
             {part: joined([p.tets.get(part, {}) for p in parcels]) for part in parts},
-            {name: once(table, table["key"]) if "key" in table else table for name, table in rows.items()},
+            rows,
         )

@@ -12,7 +12,7 @@ from ..parallel.comm import Comm
 from ..parallel.decompose import Cut, bisect, place
 from ..parallel.ownership import Neighbour
 from ..state import Flags, Floats, Indices, Ints
-from .parcel import Parcel, Table, joined, length, take
+from .parcel import Parcel, Table, joined, length, once, take
 
 _NOBODY = np.iinfo(np.int64).max
 """Stands for the smallest tet of a rank that has none at a node."""
@@ -67,6 +67,7 @@ def route(parcel: Parcel, scale: tuple[float, float, float], comm: Comm) -> Arri
     others = [Parcel.unpacked(words) for words in received.values()]
     whole = Parcel.of([mine, *others])
     whole.known, whole.sums = parcel.known, parcel.sums
+    whole.rows = {name: once(rows, rows["key"]) if "key" in rows else rows for name, rows in whole.rows.items()}
     moved = (sum(length(t) for p in others for t in p.tets.values()), length(whole.nodes) - length(mine.nodes))
     directory, neighbours, owner = _settle(whole, comm)
     _to_owners(parcel, whole, directory)

@@ -13,12 +13,15 @@ _MOMENTUM = ["momentum_x", "momentum_y", "momentum_z"]
 
 
 class History:
-    """Writes the lines, flushed one by one."""
+    """Writes the lines, flushed one by one, behind those that are there."""
 
     def __init__(self, folder: Path, probes: list[str]) -> None:
-        self._file = (folder / layout.HISTORY).open("w", newline="", encoding="utf-8")
+        path = folder / layout.HISTORY
+        new = not path.exists()
+        self._file = path.open("a", newline="", encoding="utf-8")
         self._writer = csv.writer(self._file)
-        self._writer.writerow([*_CLOCK, *Energy.__struct_fields__, *_MOMENTUM, *probes])
+        if new:
+            self._writer.writerow([*_CLOCK, *Energy.__struct_fields__, *_MOMENTUM, *probes])
 
     def write(self, step: int, t: float, dt: float, limiter: str, energy: Energy, extra: list[float]) -> None:
         """One line; ``extra`` is momentum and probes. Numbers are written so that they read back to the same bits."""

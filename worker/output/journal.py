@@ -26,6 +26,8 @@ class Journal:
         path = folder / layout.JOURNAL
         self._run = run
         self._seq = _last_seq(path)
+        self.frames = _frames(path)
+        """Indices of the frames that it tells of."""
         self._file = path.open("ab", buffering=0)
         if path.stat().st_size and not path.read_bytes().endswith(b"\n"):
             self._file.write(b"\n")
@@ -43,6 +45,18 @@ class Journal:
     def close(self) -> None:
         """Closes the file; the journal is complete."""
         self._file.close()
+
+
+def _frames(path: Path) -> set[int]:
+    if not path.exists():
+        return set()
+    found = set()
+    for line in path.read_bytes().splitlines():
+        with contextlib.suppress(msgspec.DecodeError):
+            message = messages.from_json(line)
+            if isinstance(message, messages.Frame):
+                found.add(message.index)
+    return found
 
 
 def _last_seq(path: Path) -> int:

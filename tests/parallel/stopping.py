@@ -1,0 +1,20 @@
+"""Under mpiexec: a worker that is told to stop before a step. The arguments: the step, then those of the worker."""
+
+import sys
+
+from conoid.worker import kernels
+
+if __name__ == "__main__":
+    kernels.use_cache()
+    from conoid.worker.loop import Loop
+    from conoid.worker.main import main
+    from conoid.worker.parallel.comm import leave
+
+    last, propose = int(sys.argv[1]), Loop._propose
+
+    def stop_there(loop: Loop) -> None:
+        loop._signals.raised |= loop.sim.clock.step + 1 >= last
+        propose(loop)
+
+    Loop._propose = stop_there  # type: ignore[method-assign,assignment]
+    leave(main(sys.argv[2:]))

@@ -1,0 +1,198 @@
+"""A run survives anything: cut anew in mid-flight, stopped and gone on with on other ranks, killed; the same bits."""
+
+import contextlib
+import os
+import random
+import signal
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pytest
+
+from conoid.cases import fragments, layout
+from conoid.cases.messages import Balance, Checkpoint, Frame, from_json
+from conoid.cases.outcome import Outcome
+from conoid.cases.outcome import from_json as outcome_from_json
+
+from .launching import command, ended, processes, started, together, wait_until_gone
+from .test_fracture import SCENES, arguments
+
+STOPPING = Path(__file__).with_name("stopping.py")
+STEPS = 54
+"""Of the breaking scene."""
+ERODING = Path(__file__).with_name("eroding.toml")
+SEED = int(os.environ.get("CONOID_FUZZ", time.strftime("%Y%m%d")))
+"""Of the day's sample; the tests name it, and it can be asked for again."""
+Made = Callable[[str], Path]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Made:
+    """The folder of an uninterrupted run on one rank, by its scene."""
+    root = tmp_path_factory.mktemp("whole")
+
+    def folder(name: str) -> Path:
+        if not (root / name).exists():
+            together(1, root, [case(name, root, root)])
+        return root / name
+
+    return folder
+
+
+def case(name: str, root: Path, folder: Path) -> list[str]:
+    """The arguments of a worker."""
+    if name == "eroding":
+        return [str(ERODING), "--out", str(folder / name)]
+    return arguments(name, root, folder)
+
+
+def outcome(folder: Path) -> Outcome:
+    return outcome_from_json((folder / layout.OUTCOME).read_bytes())
+
+
+def journal(folder: Path) -> list[object]:
+    return [from_json(line) for line in (folder / layout.JOURNAL).read_bytes().splitlines()]
+
+
+def must_be_one(whole: Path, other: Path) -> None:
+    """The same answer, and output without a repeated or a missing piece."""
+    one, two = outcome(whole), outcome(other)
+    assert two.state == "succeeded"
+    assert two.digest == one.digest
+    assert (two.steps, two.energy, two.eroded, two.nodes) == (one.steps, one.energy, one.eroded, one.nodes)
+    assert (two.elements, two.nodes_initial, two.worst_residual) == (
+        one.elements,
+        one.nodes_initial,
+        one.worst_residual,
+    )
+    assert (other / layout.HISTORY).read_bytes() == (whole / layout.HISTORY).read_bytes()
+    told = [message.index for message in journal(other) if isinstance(message, Frame)]
+    assert told == [message.index for message in journal(whole) if isinstance(message, Frame)]
+    for table in [fragments.genealogy(whole), *sorted((whole / "fragments").glob("fragments_*.csv"))]:
+        if table.exists():
+            assert (other / table.relative_to(whole)).read_bytes() == table.read_bytes()
+    numbers = [message.seq for message in journal(other)]  # type: ignore[attr-defined]
+    assert numbers == list(range(1, len(numbers) + 1))
+
+
+def go(words: Sequence[str], legs: Sequence[tuple[int, int]]) -> None:
+    """Runs a case in legs (ranks, the step before which to stop); the last leg should reach the end."""
+    for k, (ranks, last) in enumerate(legs):
+        again = ["--restart"] if k else []
+        launched = ended(command(ranks, str(last), *words, *again, module=[str(STOPPING)]))
+        assert launched.returncode == (0 if last > 10**6 else 4), launched.stderr
+
+
+def sample(seed: int, legs: int, steps: int) -> list[tuple[int, int]]:
+    """Random ranks and steps."""
+    draw = random.Random(seed)
+    stops = sorted(draw.sample(range(2, steps), legs - 1))
+    return [(draw.choice([1, 2, 3, 4, 7]), stop) for stop in [*stops, 10**9]]
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "ranks"),
+    [
+        pytest.param("nodal", ["balance.every=5"], 3, id="nodal, every 5 steps on 3 ranks"),
+        *(
+            pytest.param(name, [f"balance.every={n}", f"balance.weights={w}"], r, marks=pytest.mark.slow)
+            for name in [*SCENES, "eroding"] for n, w, r in ((1, "measured", 7), (3, "outside", 2), (50, "tets", 4))
+        ),
+    ],
+)  # fmt: skip
+def test_moving_tets_changes_no_bit(name: str, changes: list[str], ranks: int, whole: Made, tmp_path: Path) -> None:
+    words = [word for change in ["balance.policy=every", *changes] for word in ("--set", change)]
+    together(ranks, tmp_path, [[*case(name, tmp_path, tmp_path), *words]])
+    must_be_one(whole(name), tmp_path / name)
+    moved = [message for message in journal(tmp_path / name) if isinstance(message, Balance)]
+    assert len(moved) == outcome(tmp_path / name).rebalances > 0
+    assert sum(message.tets for message in moved) > 0
+
+
+@pytest.mark.parametrize("policy", ["outside", "measured"])
+@pytest.mark.slow
+def test_triggers_change_no_bit(policy: str, whole: Made, tmp_path: Path) -> None:
+    words = ["--set", f"balance.policy={policy}", "--set", "balance.alpha=1.01"]
+    together(4, tmp_path, [[*case("instant", tmp_path, tmp_path), *words]])
+    must_be_one(whole("instant"), tmp_path / "instant")
+    if policy == "outside":
+        assert outcome(tmp_path / "instant").rebalances > 0
+
+
+FIXED = [(2, 11), (3, 24), (1, 10**9)]
+
+
+@pytest.mark.parametrize(
+    ("name", "legs"),
+    [
+        pytest.param("nodal", FIXED, id="nodal, fixed"),
+        pytest.param("nodal", sample(SEED, 3, STEPS), id=f"nodal, sample {SEED}"),
+        *(
+            pytest.param(name, sample(SEED + k, 5, STEPS), id=f"{name}, sample {SEED + k}", marks=pytest.mark.slow)
+            for k, name in enumerate([*SCENES, "eroding"])
+        ),
+    ],
+)
+def test_a_run_goes_on_on_other_ranks(name: str, legs: list[tuple[int, int]], whole: Made, tmp_path: Path) -> None:
+    go(case(name, tmp_path, tmp_path), legs)
+    must_be_one(whole(name), tmp_path / name)
+    kept = [message for message in journal(tmp_path / name) if isinstance(message, Checkpoint)]
+    assert [message.step for message in kept] == [last for _, last in legs[:-1]]
+
+
+@pytest.mark.parametrize("kills", [2, pytest.param(50, marks=[pytest.mark.slow, pytest.mark.timeout(1200)])])
+def test_a_run_survives_being_killed(kills: int, whole: Made, tmp_path: Path) -> None:
+    """With a checkpoint in every step, killed at any moment, in the midst of writing one too."""
+    draw, words, killed = random.Random(SEED), case("nodal", tmp_path, tmp_path), 0
+    folder = tmp_path / "nodal"
+    words += ["--set", "run.checkpoint_every=1 ns"]
+    while not (folder / layout.OUTCOME).exists():
+        again = ["--restart"] if list((folder / layout.CHECKPOINTS).glob("*[0-9]")) else []
+        with started(command(draw.choice([1, 2, 3]), *words, *again)) as launcher:
+            limit = time.monotonic() + (draw.uniform(1.0, 3.5) if killed < kills else 120.0)
+            while launcher.poll() is None and time.monotonic() < limit:
+                time.sleep(0.01)
+            if launcher.poll() is None:
+                killed += 1
+                for process in processes(folder):
+                    _kill(process)
+                wait_until_gone(processes(folder))
+    must_be_one(whole("nodal"), folder)
+
+
+def _kill(process: int) -> None:
+    with contextlib.suppress(ProcessLookupError):
+        os.kill(process, signal.SIGKILL)
+
+
+def test_a_checkpoint_is_asked_for_by_a_file(whole: Made, tmp_path: Path) -> None:
+    words = case("nodal", tmp_path, tmp_path)
+    (tmp_path / "nodal").mkdir()
+    (tmp_path / "nodal" / layout.CHECKPOINT_REQUEST).touch()
+    together(2, tmp_path, [words])
+    must_be_one(whole("nodal"), tmp_path / "nodal")
+    kept = [message for message in journal(tmp_path / "nodal") if isinstance(message, Checkpoint)]
+    assert [message.cause for message in kept] == ["asked for"]
+    assert not (tmp_path / "nodal" / layout.CHECKPOINT_REQUEST).exists()
+
+
+def refused(words: Sequence[str]) -> str:
+    """What a worker says that does not go on."""
+    launched = ended(command(1, *words, "--restart"))
+    assert launched.returncode == 2
+    return launched.stderr.strip()
+
+
+def test_what_cannot_go_on_says_why(tmp_path: Path) -> None:
+    words = case("nodal", tmp_path, tmp_path)
+    assert refused(words) == f"--restart: {tmp_path / 'nodal'} has no checkpoint that is whole"
+    go(words, [(1, 4)])
+    assert refused([*words, "--set", "run.end_time=2 us"]) == (
+        "run.end_time: differs from the case of the checkpoint, and --restart goes on with that one"
+    )
+    file = next((tmp_path / "nodal" / layout.CHECKPOINTS).glob("*/rank-0.h5"))
+    data = bytearray(file.read_bytes())
+    data[len(data) // 2] ^= 1
+    file.write_bytes(data)
+    assert refused(words) == f"--restart: {tmp_path / 'nodal'} has no checkpoint that is whole"

@@ -1,0 +1,125 @@
+"""The boundary conditions of a case: which nodes each holds, and what of them cannot be."""
+
+import numpy as np
+
+from conoid.cases import schema
+
+from .boundaries import (
+    Boundary,
+    Gravity,
+    PrescribedRotation,
+    PrescribedVelocity,
+    RigidWalls,
+    SymmetryPlane,
+    Traction,
+)
+from .errors import InputError
+from .migration.parcel import Parcel
+from .parallel.comm import Comm
+from .state import Flags, Indices, Load, Model, Nodes
+
+_AXES = {"x": 0, "y": 1, "z": 2}
+ON_PLANE = 1e-9
+"""Of the size of the mesh: closer than this is on a plane."""
+
+
+def loads(parcel: Parcel) -> list[Load]:
+    """The loads of the tractions that a parcel has, in their order."""
+    names = (f"boundary{index}.load" for index in range(len(parcel.known["last_push"])))
+    tables = [parcel.rows[name] for name in names if name in parcel.rows]
+    return [Load(table["key"], table["tets"], table["of"], table["force"]) for table in tables]
+
+
+def build(case: schema.Case, model: Model, loads: list[Load]) -> list[Boundary]:
+    """The boundaries of a case on this rank's nodes: gravity and tractions first, so that what is held stays held;
+    walls last, and they leave alone what has a prescribed motion. ``loads``: of the tractions.
+    """
+    nodes = model.nodes
+    held = [_held_by(spec, model) for spec in case.boundaries]
+    pairs = list(zip(case.boundaries, held, strict=True))
+    boundaries: list[Boundary] = [
+        Gravity(_indices(h), np.array(spec.acceleration)) for spec, h in pairs if isinstance(spec, schema.Gravity)
+    ]
+    boundaries += [Traction(nodes.places(load.nodes), load) for load in loads]
+    boundaries += [
+        SymmetryPlane(_indices(h), _AXES[spec.axis]) for spec, h in pairs if isinstance(spec, schema.Symmetry)
+    ]
+    for spec, h in pairs:
+        if isinstance(spec, schema.Prescribed):
+            velocity = np.array([np.nan if c is None else c for c in (spec.x, spec.y, spec.z)])
+            boundaries.append(PrescribedVelocity(_indices(h), velocity))
+        elif isinstance(spec, schema.Rotation):
+            centre, rate = np.array(spec.spin.centre), np.array(spec.spin.rate)
+            boundaries.append(PrescribedRotation(_indices(h), centre, rate))
+    moved = np.zeros(nodes.n, bool)
+    for boundary in boundaries:
+        if isinstance(boundary, PrescribedVelocity):
+            moved[boundary.nodes] = True
+    return [*boundaries, *_walls(case, [h & ~moved for h in held])]
+
+
+def start(case: schema.Case, model: Model, boundaries: list[Boundary], comm: Comm) -> None:
+    """Makes the initial velocities agree with the boundaries; all ranks take part.
+
+    Raises InputError, on every rank alike, for a boundary that holds no node, a body that starts behind a wall, and
+    motion prescribed across a symmetry plane.
+    """
+    counts = comm.sum(np.array([int(_held_by(spec, model).sum()) for spec in case.boundaries], np.int64))
+    for index in np.flatnonzero(counts == 0):
+        raise InputError(f"boundaries[{index}]: holds no node; check its place and its parts")
+    _refuse_conflicts(boundaries, model.nodes, comm)
+    _refuse_overlaps(case, model, boundaries, comm)
+    for boundary in boundaries:
+        boundary.start(model.nodes)
+
+
+def _held_by(spec: schema.Boundary, model: Model) -> Flags:
+    """(n,) the nodes that a boundary acts on."""
+    nodes = model.nodes
+    chosen = np.ones(nodes.n, bool)
+    if spec.parts:
+        chosen = np.isin(nodes.part, [model.parts.index(p) for p in spec.parts])
+    if isinstance(spec, schema.Symmetry):
+        chosen &= np.abs(nodes.x0[:, _AXES[spec.axis]] - spec.at) <= ON_PLANE * max(model.size, abs(spec.at))
+    elif isinstance(spec, schema.Prescribed):
+        if spec.low is not None:
+            chosen &= (nodes.x0 >= np.array(spec.low)).all(axis=1)
+        if spec.high is not None:
+            chosen &= (nodes.x0 <= np.array(spec.high)).all(axis=1)
+    return chosen
+
+
+def _walls(case: schema.Case, held: list[Flags]) -> list[Boundary]:
+    found = [(spec, h) for spec, h in zip(case.boundaries, held, strict=True) if isinstance(spec, schema.Wall)]
+    if not found:
+        return []
+    touched = np.any([h for _, h in found], axis=0)
+    points, normals = np.array([spec.point for spec, _ in found]), np.array([spec.normal for spec, _ in found])
+    which = np.ascontiguousarray(np.array([h[touched] for _, h in found]).T)
+    return [RigidWalls(_indices(touched), points, normals, which)]
+
+
+def _refuse_overlaps(case: schema.Case, model: Model, boundaries: list[Boundary], comm: Comm) -> None:
+    indices = [i for i, spec in enumerate(case.boundaries) if isinstance(spec, schema.Wall)]
+    for walls in boundaries:
+        if isinstance(walls, RigidWalls):
+            for index, depth in zip(indices, comm.maximum(walls.depths(model.nodes)), strict=True):
+                if depth > ON_PLANE * model.size:
+                    raise InputError(f"boundaries[{index}]: a body starts {depth:.3g} m behind this wall")
+
+
+def _refuse_conflicts(boundaries: list[Boundary], nodes: Nodes, comm: Comm) -> None:
+    """Motion prescribed across a symmetry plane would do work on it that never happened."""
+    before = nodes.v.copy()
+    for boundary in boundaries:
+        boundary.start(nodes)
+    planes = [b for b in boundaries if isinstance(b, SymmetryPlane)]
+    speeds = [float(np.abs(nodes.v[b.nodes, b.axis]).max(initial=0.0)) for b in planes]
+    nodes.v[:] = before
+    fastest = comm.maximum(np.array([max(speeds, default=0.0)]))[0]
+    if fastest > 0.0:
+        raise InputError("boundaries: a prescribed motion leads nodes off their symmetry plane; allowed: along it")
+
+
+def _indices(chosen: Flags) -> Indices:
+    return np.flatnonzero(chosen).astype(np.int32)

@@ -1,0 +1,196 @@
+"""Checkpoints: a folder with a file a rank and a manifest, there whole and right, or not at all.
+
+::
+
+    checkpoints/000001200/rank-0.h5 ...   what each rank keeps: columns of nodes, tets and other things by global ids
+                          manifest.json   step, time, the case, what all ranks know, bytes and sha256 of each file
+
+The folder is written under another name, flushed to disk and renamed. Any number of ranks can read it.
+"""
+
+import hashlib
+import json
+import os
+import shutil
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from conoid.cases import layout
+from conoid.cases.load import resolved_json
+from conoid.cases.schema import Case
+
+from ..errors import InputError
+from ..parallel.comm import Comm
+from .parcel import Parcel, Table, take
+
+FORMAT = 1
+_KEPT = 2
+"""Checkpoints that stay; the older ones go."""
+_MANIFEST = "manifest.json"
+_FREE = ("ranks", "cut_scale", "max_steps", "max_wall_time", "checkpoint_every", "residual_limit")
+"""Keys of ``run`` that may change when a run goes on."""
+_PIECE = 1 << 24
+"""Bytes that are hashed at once."""
+
+
+def write(parcel: Parcel, case: Case, folder: Path, step: int, t: float, comm: Comm) -> tuple[Path, int]:
+    """Writes a checkpoint of the run in ``folder``; its place and its bytes. All ranks take part."""
+    place = layout.checkpoint(folder, step)
+    beside = place.with_suffix(".part")
+    if comm.rank == 0:
+        shutil.rmtree(beside, ignore_errors=True)
+        beside.mkdir(parents=True)
+    comm.barrier()
+    path = beside / f"rank-{comm.rank}.h5"
+    _write_parcel(path, parcel)
+    files = comm.gather({"name": path.name, "bytes": path.stat().st_size, "sha256": _sha256(path)})
+    total = 0
+    if files is not None:
+        total = sum(file["bytes"] for file in files)
+        known, data = _plain(parcel.known), json.loads(resolved_json(case))
+        manifest = {"format": FORMAT, "step": step, "t": t, "case": data, "files": files, "known": known}
+        with (beside / _MANIFEST).open("w", encoding="utf-8") as file:
+            json.dump(manifest, file)
+            _flush(file.fileno())
+        shutil.rmtree(place, ignore_errors=True)
+        beside.rename(place)
+        _flush_folder(place.parent)
+        for old in found(folder)[_KEPT:]:
+            shutil.rmtree(old, ignore_errors=True)
+    return place, int(comm.broadcast(total))
+
+
+def found(folder: Path) -> list[Path]:
+    """Checkpoints of the run in ``folder``, the latest first; not looked into."""
+    return sorted((p for p in (folder / layout.CHECKPOINTS).glob("*[0-9]") if p.is_dir()), reverse=True)
+
+
+def forget(folder: Path, step: int) -> None:
+    """Takes away checkpoints of ``folder`` beyond a step, and what was never finished."""
+    for place in (folder / layout.CHECKPOINTS).glob("*"):
+        if place.suffix or int(place.name) > step:
+            shutil.rmtree(place, ignore_errors=True)
+
+
+def latest(folder: Path) -> tuple[Path, dict[str, Any]]:
+    """The latest checkpoint that is whole, with its manifest. Raises InputError when there is none."""
+    for place in found(folder):
+        manifest = _manifest(place)
+        if manifest is not None:
+            return place, manifest
+    raise InputError(f"--restart: {folder} has no checkpoint that is whole")
+
+
+def _manifest(place: Path) -> dict[str, Any] | None:
+    """The manifest, when all files are as it says."""
+    try:
+        manifest: dict[str, Any] = json.loads((place / _MANIFEST).read_bytes())
+        whole = all(_sha256(place / file["name"]) == file["sha256"] for file in manifest["files"])
+    except (OSError, ValueError, KeyError):
+        return None
+    return manifest if whole and manifest["format"] == FORMAT else None
+
+
+def require_same(case: Case, manifest: dict[str, Any]) -> None:
+    """Raises InputError when the case differs from that of the checkpoint in what its answer depends on."""
+    now, then = (_answering(data) for data in (json.loads(resolved_json(case)), manifest["case"]))
+    for key in sorted({*now, *then}):
+        if now.get(key) != then.get(key):
+            raise InputError(f"{key}: differs from the case of the checkpoint, and --restart goes on with that one")
+
+
+def _answering(case: dict[str, Any]) -> dict[str, Any]:
+    """The keys of a case that its answer depends on, those of ``run`` one by one."""
+    run = {f"run.{key}": value for key, value in case["run"].items() if key not in _FREE}
+    return {key: value for key, value in case.items() if key not in ("run", "balance", "title", "description")} | run
+
+
+def read(place: Path, manifest: dict[str, Any], comm: Comm) -> Parcel:
+    """This rank's share of a checkpoint: some of its files, or none of their rows."""
+    names = [file["name"] for file in manifest["files"]]
+    mine = [_read_parcel(place / name) for name in names[comm.rank :: comm.size]]
+    whole = Parcel.of(mine or [_nothing_of(_read_parcel(place / names[0]))])
+    whole.known = _rich(manifest["known"])
+    return whole
+
+
+def _nothing_of(parcel: Parcel) -> Parcel:
+    """The names of all columns, without a row."""
+    none = np.zeros(0, np.int64)
+    return Parcel(
+        {}, {name: np.zeros_like(words) for name, words in parcel.sums.items()}, take(parcel.nodes, none), {},
+        {name: take(table, none) for name, table in parcel.rows.items()},
+    )  # fmt: skip
+
+
+def _write_parcel(path: Path, parcel: Parcel) -> None:
+    with h5py.File(path, "w") as file:
+        for name, words in parcel.sums.items():
+            file[f"sums/{name}"] = words
+        _write_table(file, "nodes", parcel.nodes)
+        for part, table in parcel.tets.items():
+            _write_table(file, f"tets/{part}", table)
+        for name, table in parcel.rows.items():
+            _write_table(file, f"rows/{name}", table)
+    with path.open("rb") as handle:
+        _flush(handle.fileno())
+
+
+def _write_table(file: "h5py.File", name: str, table: Table) -> None:
+    for column, values in table.items():
+        file[f"{name}/{column}"] = values
+
+
+def _read_parcel(path: Path) -> Parcel:
+    with h5py.File(path, "r") as file:
+        sums = {name: words[()] for name, words in file.get("sums", {}).items()}
+        tets = {int(part): _columns(table) for part, table in file.get("tets", {}).items()}
+        rows = {name: _columns(table) for name, table in file.get("rows", {}).items()}
+        return Parcel({}, sums, _columns(file["nodes"]), tets, rows)
+
+
+def _columns(group: "h5py.Group") -> Table:
+    return {name: column[()] for name, column in group.items()}
+
+
+def _plain(value: Any) -> Any:
+    """As JSON takes it: arrays with their kind."""
+    if isinstance(value, np.ndarray):
+        return {"dtype": str(value.dtype), "values": value.tolist()}
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _rich(value: Any) -> Any:
+    """What ``_plain`` was given, tuples as lists."""
+    if isinstance(value, dict):
+        if value.keys() == {"dtype", "values"}:
+            return np.array(value["values"], value["dtype"])
+        return {key: _rich(item) for key, item in value.items()}
+    return [_rich(item) for item in value] if isinstance(value, list) else value
+
+
+def _sha256(path: Path) -> str:
+    h = hashlib.sha256()
+    with path.open("rb") as file:
+        while piece := file.read(_PIECE):
+            h.update(piece)
+    return h.hexdigest()
+
+
+def _flush(handle: int) -> None:
+    os.fsync(handle)
+
+
+def _flush_folder(folder: Path) -> None:
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

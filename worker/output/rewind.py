@@ -1,0 +1,37 @@
+"""The output of a run that goes on: what was written beyond its checkpoint is taken back, and written again alike."""
+
+import csv
+import os
+from pathlib import Path
+
+from conoid.cases import fragments, layout
+
+
+def rewind(folder: Path, step: int, frame: int) -> None:
+    """Takes lines of the history from ``step`` on, and of the genealogy from ``frame`` on, out of a run's folder.
+
+    At step 0 nothing is left of them.
+    """
+    _keep_below(folder / layout.HISTORY, step)
+    _keep_below(fragments.genealogy(folder), frame)
+    (folder / layout.OUTCOME).unlink(missing_ok=True)
+
+
+def _keep_below(path: Path, limit: int) -> None:
+    """The head of a table, and its whole lines whose first column is below ``limit``."""
+    if not path.exists():
+        return
+    if limit == 0:
+        path.unlink()
+        return
+    with path.open(newline="", encoding="utf-8") as file:
+        head, *rows = csv.reader(file)
+    beside = path.with_suffix(".part")
+    with beside.open("w", newline="", encoding="utf-8") as file:
+        ending = "\r\n" if b"\r\n" in path.read_bytes()[:4096] else "\n"
+        writer = csv.writer(file, lineterminator=ending)
+        writer.writerow(head)
+        writer.writerows(row for row in rows if len(row) == len(head) and int(row[0]) < limit)
+        file.flush()
+        os.fsync(file.fileno())
+    beside.rename(path)
