@@ -2,28 +2,24 @@
 
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
 import msgspec
 import typer
-from rich.console import Console, RenderableType
 from typer.core import TyperGroup
 
 from conoid.cases.estimate import estimate
 from conoid.cases.load import CaseError
 from conoid.cases.run import ExitCode, State
-from conoid.cases.schema import Balance
 
-from . import replay, tables
+from . import reports, tables
 from .errors import ClientError, ServiceError
 from .live import Live, exit_code
 from .once import run_once
-from .result import Result
+from .options import Json, Token, Url, find, show, show_json
 from .run import Run
-from .session import Session, connect
+from .session import connect
 from .submission import case_of, locate
 from .view import FIELDS, view
 from .watch import watch
@@ -59,47 +55,13 @@ app = typer.Typer(
     help="Impact simulations: submit them, watch them, look at them.",
 )  # fmt: skip
 
-Url = Annotated[str | None, typer.Option("--url", help="The server [CONOID_URL, or the configuration file].")]
-Token = Annotated[str | None, typer.Option("--token", help="Who asks [CONOID_TOKEN, or the configuration file].")]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
 CaseArgument = Annotated[str, typer.Argument(metavar="CASE", help="A .toml or .json file, or a shipped case by name.")]
 Overrides = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Change a key of the case, as run.end_time='20 us'."),
 ]
 RunArgument = Annotated[str, typer.Argument(metavar="RUN", help="The id of a run, or 'last'.")]
-SourceArgument = Annotated[str, typer.Argument(metavar="RUN", help="The id of a run, 'last', or its folder.")]
 FieldOption = Annotated[str, typer.Option("--field", help=f"What to colour by: {', '.join(FIELDS)}.")]
-
-
-def show(thing: RenderableType) -> None:
-    """Prints for people."""
-    Console(highlight=False).print(thing)
-
-
-def show_json(thing: Any) -> None:
-    """Prints for scripts: one JSON document."""
-    typer.echo(msgspec.json.format(msgspec.json.encode(thing), indent=2).decode())
-
-
-@contextmanager
-def opened(source: str, url: str | None, token: str | None) -> Iterator[Result]:
-    """The result of a run by its id, or in its folder."""
-    if Path(source).is_dir():
-        yield Result.open(source)
-        return
-    with connect(url, token) as session:
-        yield find(session, source).result()
-
-
-def find(session: Session, run: str) -> Run:
-    """The run of an id, or the newest one for ``last``. Raises ClientError when there is none yet."""
-    if run != "last":
-        return session.run(run)
-    newest = session.runs(limit=1)
-    if not newest:
-        raise ClientError("there is no run yet")
-    return session.run(newest[0].id)
 
 
 @app.command(
@@ -294,37 +256,10 @@ def view_frame(
         typer.echo(drawn.out)
 
 
-@app.command(name="replay-balance", short_help="The loads of a run under another balance policy.")
-def replay_balance(
-    source: SourceArgument,
-    policy: Annotated[
-        str | None,
-        typer.Option("--policy", help="measured, outside, every, every:N or never; the run's own if not given."),
-    ] = None,
-    alpha: Annotated[float | None, typer.Option("--alpha", help="Of the policy 'outside'.")] = None,
-    ranks: Annotated[int | None, typer.Option("--ranks", min=1, help="Ranks; those of the run if not given.")] = None,
-    cost: Annotated[
-        float | None, typer.Option("--cost", min=0.0, help="Of a cut, s; what the run has measured if not given.")
-    ] = None,
-    url: Url = None,
-    token: Token = None,
-    as_json: Json = False,
-) -> None:
-    """Tell what other balance policies would have cost and saved, from the loads that a run has told."""
-    with opened(source, url, token) as result:
-        spec = Balance.model_validate(result.case.get("balance", {}))
-        record = replay.read(result.messages, replay.named(spec))
-        x, y, z = result.case["run"].get("cut_scale", (1.0, 1.0, 1.0))
-    other, each = replay.chosen(spec, policy or spec.policy, alpha), record.cost if cost is None else cost
-    accounts = replay.compare(record, other, ranks or record.happened.ranks, each, (x, y, z))
-    if as_json:
-        show_json({"policies": accounts, "run": record.happened, "cost": each, "heaviest_group": record.heaviest})
-        return
-    show(tables.balance_table(accounts, record.happened))
-    typer.echo(
-        f"a cut costs {each:.3g} s; {len(record.moments)} moments, {len(record.centres)} groups, "
-        f"of which the heaviest has {record.heaviest:.1%} of the work"
-    )
+app.command(name="replay-balance", short_help="The loads of a run under another balance policy.")(
+    reports.replay_balance
+)
+app.add_typer(reports.figures, name="figures")
 
 
 @app.command(name="run", short_help="Do it all on this machine: run, watch, check, draw.")

@@ -111,15 +111,15 @@ def outcome_table(outcome: Outcome) -> Table:
 def balance_table(accounts: Sequence[Account], happened: Account) -> Table:
     """What balance policies come to, beside what happened; the time saved is against no cut at all."""
     made = table(
-        "policy", "ranks", "cuts", "lost", "their cost", "total", "saved", "imbalance",
-        right=("ranks", "cuts", "lost", "their cost", "total", "saved", "imbalance"),
+        "policy", "cuts", "lost", "cost of cuts", "total", "saved", "imbalance",
+        right=("cuts", "lost", "cost of cuts", "total", "saved", "imbalance"),
     )  # fmt: skip
     never = next((account.total for account in accounts if account.policy == "never"), math.nan)
     for account in (*accounts, happened):
         saved = si(never - account.total, "s") if account is not happened else ""
         times = [si(seconds, "s") for seconds in (account.lost, account.cost, account.total)]
         name = f"the run: {account.policy}" if account is happened else account.policy
-        made.add_row(name, str(account.ranks), str(len(account.cuts)), *times, saved, f"{account.imbalance:.3f}")
+        made.add_row(name, str(len(account.cuts)), *times, saved, f"{account.imbalance:.3f}")
     return made
 
 
