@@ -90,9 +90,11 @@ def read(messages: Iterable[AnyMessage], policy: str = "") -> Record:
                 moments.append(message)
             first, expected = (message, message.cost) if message.centres else (first, expected)
         elif isinstance(message, Load):
-            work = [sum(phases) for phases in zip(*(message.phases[name] for name in WORK), strict=True)]
-            happened.ranks = len(work)
-            happened.book(work, 1)
+            shared = [seconds for name, seconds in message.phases.items() if name in WORK]
+            work = [sum(seconds) for seconds in zip(*shared, strict=True)]
+            if work:
+                happened.ranks = len(work)
+                happened.book(work, 1)
         elif isinstance(message, Balance):
             costs.append(message.cost)
             happened.cut(message.step, message.cost)
