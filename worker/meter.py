@@ -18,9 +18,10 @@ _LEAST = 0.02
 
 @dataclass
 class Slope:
-    """How the work of a rank grows with its candidates: by comparing ranks that have more of them and fewer.
+    """Which share of the work goes with the candidates: by comparing ranks that have more of them and fewer.
 
-    A part of what contact and fracture take is the same on every rank, however much it has to do: no cut moves that.
+    The rest of what contact and fracture take is the same on every rank, however much it has to do: no cut moves that.
+    Both are taken by their means, so that what has been seen holds on when all of it grows.
     """
 
     both: float = 0.0
@@ -28,13 +29,15 @@ class Slope:
 
     def add(self, effort: Floats, seconds: Floats) -> None:
         """Takes what ranks had and took (ranks,) over the same steps."""
-        effort, seconds = effort - effort.mean(), seconds - seconds.mean()
+        if not (effort.any() and seconds.any()):
+            return
+        effort, seconds = effort / effort.mean() - 1.0, seconds / seconds.mean() - 1.0
         self.both = _KEPT * self.both + float(effort @ seconds)
         self.squares = _KEPT * self.squares + float(effort @ effort)
 
     def of(self, mean: float) -> float:
         """Cost of a candidate, where all work over all candidates is ``mean``; that itself when ranks do not differ."""
-        return min(max(self.both / self.squares, _LEAST * mean), mean) if self.squares > 0.0 else mean
+        return mean * min(max(self.both / self.squares, _LEAST), 1.0) if self.squares > 0.0 else mean
 
 
 @dataclass(frozen=True)

@@ -126,7 +126,7 @@ def test_costs_add_up_to_the_work_of_all_ranks() -> None:
     case = breaking()
 
     def measured(sim: Simulation) -> tuple[float, float]:
-        slope = Slope(3e-7, 1.0)
+        slope = Slope(0.3, 1.0)
         step.prepare(sim)
         groups = Groups(sim, 0.0, slope)
         groups.record(sim)
@@ -143,13 +143,19 @@ def test_costs_add_up_to_the_work_of_all_ranks() -> None:
 
 
 def test_the_slope_is_that_between_ranks() -> None:
-    """Each rank takes 3 s whatever it has, and half a second a candidate; how much all have changes nothing."""
+    """Of 40 s each rank takes 30 s whatever it has, and the mean one 10 s for its candidates; how many all of them have
+    together changes nothing, nor how long it takes."""
     slope = Slope()
     assert slope.of(2.0) == 2.0, "nothing is known yet"
-    for effort in (np.array([10.0, 30.0]), np.array([100.0, 20.0])):
-        slope.add(effort, 3.0 + 0.5 * effort)
+    for effort in (np.array([10.0, 30.0]), np.array([100.0, 20.0, 60.0])):
+        slope.add(effort, 30.0 + 10.0 * effort / effort.mean())
+        slope.add(effort, 3.0 + 1.0 * effort / effort.mean())
     assert slope.of(2.0) == pytest.approx(0.5)
-    assert slope.of(0.1) == 0.1, "no more than all work there is"
+    slope.add(np.zeros(2), np.ones(2))
+    assert slope.of(2.0) == pytest.approx(0.5), "without candidates nothing is learnt"
+    steep = Slope()
+    steep.add(np.array([1.0, 2.0]), np.array([1.0, 9.0]))
+    assert steep.of(2.0) == 2.0, "no more than all work there is"
     alike = Slope()
     alike.add(np.array([7.0, 7.0]), np.array([1.0, 2.0]))
     assert alike.of(2.0) == 2.0
