@@ -101,6 +101,8 @@ class Load(Message, frozen=True):
     """Calls in which all ranks take part."""
     collective_bytes: list[int] = []
     """That the rank puts into them."""
+    outside: list[int] = []
+    """Nodes of the surface that each rank owns."""
 
 
 class Counts(Message, frozen=True):
@@ -132,6 +134,27 @@ class Balance(Message, frozen=True):
     """Wall time, s."""
     saved: float
     """By the cuts before, s: what steps would have taken with the imbalance from before each, less what they took."""
+
+
+class Groups(Message, frozen=True):
+    """What each of some parts of the mesh costs since the last Groups message, on any number of ranks.
+
+    The parts are neighbours at the start and stay together. The first message of a worker knows no loads: all are 0.
+    """
+
+    channel: ClassVar[str] = "load"
+    load: list[int]
+    """CPU time, ns a step."""
+    outside: list[int]
+    """Nodes of the surface."""
+    rank: int = 0
+    """CPU time of a rank whatever it has, ns a step."""
+    centres: list[tuple[float, float, float]] = []
+    """At the start, m. This and the next in the first message only."""
+    tets: list[int] = []
+    """At the start."""
+    cost: float = 0.0
+    """What a cut is taken to cost before there has been one, wall time, s."""
 
 
 class Checkpoint(Message, frozen=True):
@@ -168,7 +191,7 @@ class Finished(Message, frozen=True):
     elapsed: float
 
 
-AnyMessage = Status | Started | Progress | Load | Balance | Checkpoint | Counts | Frame | Log | Finished
+AnyMessage = Status | Started | Progress | Load | Balance | Groups | Checkpoint | Counts | Frame | Log | Finished
 
 _to_json, _to_msgpack = msgspec.json.Encoder(), msgspec.msgpack.Encoder()
 _from_json: msgspec.json.Decoder[AnyMessage] = msgspec.json.Decoder(AnyMessage)

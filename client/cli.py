@@ -1,4 +1,4 @@
-"""The command line: ``conoid serve | validate | submit | ls | show | watch | cancel | get | view | run | bench``."""
+"""The command line: ``conoid serve | validate | submit | ls | show | watch | cancel | get | view | run``, and more."""
 
 import os
 import sys
@@ -8,7 +8,6 @@ from typing import Annotated, Any
 
 import msgspec
 import typer
-from rich.console import Console, RenderableType
 from typer.core import TyperGroup
 
 from conoid.cases.estimate import estimate
@@ -16,14 +15,15 @@ from conoid.cases.load import CaseError
 from conoid.cases.run import ExitCode, State
 from conoid.cases.units import parse_quantity
 
-from . import chart, study, tables
+from . import chart, reports, study, tables
 from .errors import ClientError, ServiceError
 from .live import Live, exit_code
 from .once import run_once
+from .options import Json, Token, Url, find, show, show_json
 from .projection import Network, bandwidth
 from .run import Run
 from .scaling import CORES, scale
-from .session import Session, connect
+from .session import connect
 from .submission import case_of, locate
 from .view import FIELDS, view
 from .watch import watch
@@ -61,9 +61,6 @@ app = typer.Typer(
 bench = typer.Typer(no_args_is_help=True, help="Measure.")
 app.add_typer(bench, name="bench")
 
-Url = Annotated[str | None, typer.Option("--url", help="The server [CONOID_URL, or the configuration file].")]
-Token = Annotated[str | None, typer.Option("--token", help="Who asks [CONOID_TOKEN, or the configuration file].")]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
 CaseArgument = Annotated[str, typer.Argument(metavar="CASE", help="A .toml or .json file, or a shipped case by name.")]
 Overrides = Annotated[
     list[str] | None,
@@ -71,26 +68,6 @@ Overrides = Annotated[
 ]
 RunArgument = Annotated[str, typer.Argument(metavar="RUN", help="The id of a run, or 'last'.")]
 FieldOption = Annotated[str, typer.Option("--field", help=f"What to colour by: {', '.join(FIELDS)}.")]
-
-
-def show(thing: RenderableType) -> None:
-    """Prints for people."""
-    Console(highlight=False).print(thing)
-
-
-def show_json(thing: Any) -> None:
-    """Prints for scripts: one JSON document."""
-    typer.echo(msgspec.json.format(msgspec.json.encode(thing), indent=2).decode())
-
-
-def find(session: Session, run: str) -> Run:
-    """The run of an id, or the newest one for ``last``. Raises ClientError when there is none yet."""
-    if run != "last":
-        return session.run(run)
-    newest = session.runs(limit=1)
-    if not newest:
-        raise ClientError("there is no run yet")
-    return session.run(newest[0].id)
 
 
 @app.command(
@@ -283,6 +260,12 @@ def view_frame(
         show_json(drawn)
     else:
         typer.echo(drawn.out)
+
+
+app.command(name="replay-balance", short_help="The loads of a run under another balance policy.")(
+    reports.replay_balance
+)
+app.add_typer(reports.figures, name="figures")
 
 
 @app.command(name="run", short_help="Do it all on this machine: run, watch, check, draw.")

@@ -5,6 +5,7 @@ import io
 import json
 from array import array
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -13,9 +14,11 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 import msgspec
 
 from conoid.cases import layout, outcome
+from conoid.cases.messages import AnyMessage
 from conoid.cases.outcome import Outcome
 
 from .errors import ClientError, UnfinishedError
+from .journal import from_line
 
 if TYPE_CHECKING:
     from .view import Drawn
@@ -108,6 +111,15 @@ class Result:
     def history(self) -> dict[str, Column]:
         """The columns of history.csv, in its order: step, t (s), dt (s), the energies (J), the probes."""
         return read_columns(self.folder.path(layout.HISTORY).read_text(encoding="utf-8"))
+
+    @cached_property
+    def messages(self) -> list[AnyMessage]:
+        """What the run has said, in order; a line that is torn or still being written is left out."""
+        found = []
+        for line in self.folder.path(layout.JOURNAL).read_bytes().splitlines():
+            with suppress(msgspec.DecodeError):
+                found.append(from_line(line))
+        return found
 
     @cached_property
     def frames(self) -> list[FrameFile]:

@@ -1,5 +1,6 @@
 """What the command line prints once: lists of runs, one run, estimates, outcomes, reference numbers."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 
 from rich import box
@@ -12,6 +13,7 @@ from conoid.cases.run import State
 
 from .display import STATE_STYLE
 from .figures import count, day, duration, number, si
+from .replay import Account
 from .run import RunInfo
 
 
@@ -104,6 +106,21 @@ def outcome_table(outcome: Outcome) -> Table:
             "digest": outcome.digest[:16],
         }
     return pairs({**entries, "warnings": "\n".join(outcome.warnings)})
+
+
+def balance_table(accounts: Sequence[Account], happened: Account) -> Table:
+    """What balance policies come to, beside what happened; the time saved is against no cut at all."""
+    made = table(
+        "policy", "cuts", "lost", "cost of cuts", "total", "saved", "imbalance",
+        right=("cuts", "lost", "cost of cuts", "total", "saved", "imbalance"),
+    )  # fmt: skip
+    never = next((account.total for account in accounts if account.policy == "never"), math.nan)
+    for account in (*accounts, happened):
+        saved = si(never - account.total, "s") if account is not happened else ""
+        times = [si(seconds, "s") for seconds in (account.lost, account.cost, account.total)]
+        name = f"the run: {account.policy}" if account is happened else account.policy
+        made.add_row(name, str(len(account.cuts)), *times, saved, f"{account.imbalance:.3f}")
+    return made
 
 
 def checks_table(checks: Sequence[Check]) -> Table:

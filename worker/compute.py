@@ -50,7 +50,7 @@ def compute(
     history = History(folder, sim.probes.names) if comm.rank == 0 else None
     setup = time.monotonic() - began
     _announce(sim, journal, setup)
-    loop = Loop(sim, folder, journal, history, signals, Balance(case, comm, sim.assembled, sim.clock.step), start)
+    loop = Loop(sim, folder, journal, history, signals, Balance.of(sim), start)
     cpu = time.thread_time()
     failure = None
     try:

@@ -42,6 +42,8 @@ from .state import (
     chunked,
 )
 
+GROUPS = 256
+"""Parts of the mesh whose loads are told (worker/groups.py)."""
 _JITTER = 0x6A697474
 """Seed of the random velocities of the start."""
 
@@ -85,6 +87,10 @@ class Piece:
     across: Indices
     """(tets, 4) see state.Block."""
     border: Flags
+    node_group: Indices
+    tet_group: Indices
+    groups: Floats
+    """(groups, 4) see state.Model."""
     neighbours: list[Neighbour]
     totals: tuple[int, int, int]
     """Tets, nodes and shared nodes of the whole."""
@@ -218,14 +224,23 @@ def cut(whole: Whole, ranks: int, scale: tuple[float, float, float] = (1.0, 1.0,
     holders = np.zeros(len(whole.points), np.int32)
     for nodes in nodes_of:
         holders[nodes] += 1
-    home = _home(whole, owner)
+    home, grouped = _home(whole, owner), _grouped(whole, centres)
     shared = holders > 1
     totals = (len(whole.tets), len(whole.points), int(shared.sum()))
-    return [_piece(whole, owner, rank, nodes_of, shared, home, totals) for rank in range(ranks)]
+    return [_piece(whole, owner, rank, nodes_of, shared, home, grouped, totals) for rank in range(ranks)]
+
+
+def _grouped(whole: Whole, centres: Floats) -> tuple[Indices, Indices, Floats]:
+    """The groups of the nodes and of the tets, and the groups; the tets are bisected by their ``centres`` (tets, 3)."""
+    n = min(GROUPS, len(centres))
+    tets, _ = bisect(centres, np.arange(len(centres)), np.ones(len(centres)), n, SerialComm())
+    middle, sizes = whole.points[whole.tets].mean(axis=1), np.bincount(tets, minlength=n)
+    sums = [np.bincount(tets, middle[:, axis], n) / sizes for axis in range(3)]
+    return _home(whole, tets), tets, np.column_stack([*sums, sizes])
 
 
 def _home(whole: Whole, owner: Indices) -> Indices:
-    """The rank that owns each node: the one that holds its tet of smallest id."""
+    """Which part of a cut has each node: the one that has its tet of smallest id; that rank owns the node."""
     home = np.zeros(len(whole.points), np.int32)
     home[whole.tets[::-1].reshape(-1)] = np.repeat(owner[::-1], 4)
     return home
@@ -233,7 +248,7 @@ def _home(whole: Whole, owner: Indices) -> Indices:
 
 def _piece(
     whole: Whole, owner: Indices, rank: int, nodes_of: list[Ints], shared: Flags, home: Indices,
-    totals: tuple[int, int, int],
+    grouped: tuple[Indices, Indices, Floats], totals: tuple[int, int, int],
 ) -> Piece:  # fmt: skip
     nodes, ids = nodes_of[rank], np.flatnonzero(owner == rank)
     local = np.full(len(whole.points), -1, np.int32)
@@ -251,7 +266,8 @@ def _piece(
         [load.take(np.isin(load.nodes, nodes)) for load in whole.loads],
         ids.astype(np.int64),
         whole.tet_part[ids], local[tets], whole.volumes[ids],
-        whole.across[ids] if len(whole.across) else whole.across, np.any(shared[tets], axis=1), neighbours, totals,
+        whole.across[ids] if len(whole.across) else whole.across, np.any(shared[tets], axis=1),
+        grouped[0][nodes], grouped[1][ids], grouped[2], neighbours, totals,
         np.searchsorted(whole.tet_part, np.arange(whole.tet_part[-1] + 1)), float(np.abs(whole.points).max()),
     )  # fmt: skip
 
@@ -276,11 +292,13 @@ def _model(case: schema.Case, piece: Piece) -> Model:
     nodes = Nodes(
         id=piece.node_ids, part=piece.node_part, owner=piece.node_owner, owned=piece.owned, x0=piece.points.copy(),
         x=piece.points, v=piece.velocity, mass=piece.mass, force=np.zeros(piece.points.shape, np.int64),
+        group=piece.node_group,
     )  # fmt: skip
     blocks = [_block(case, piece, index) for index in range(len(case.parts)) if (piece.tet_part == index).any()]
     return Model(
-        nodes, blocks, [p.name for p in case.parts], piece.totals[0], piece.totals[1], piece.part_starts, piece.size
-    )
+        nodes, blocks, [p.name for p in case.parts], piece.totals[0], piece.totals[1], piece.part_starts, piece.size,
+        piece.groups,
+    )  # fmt: skip
 
 
 def _block(case: schema.Case, piece: Piece, index: int) -> Block:
@@ -301,7 +319,9 @@ def _block(case: schema.Case, piece: Piece, index: int) -> Block:
             state[:, row, :] = value
     across = piece.across[chosen] if len(piece.across) else piece.across
     tets = np.ascontiguousarray(piece.tets[chosen], np.uint32)
-    return block(case, index, piece.tet_ids[chosen], tets, state, across, int(piece.border[chosen].sum()))
+    made = block(case, index, piece.tet_ids[chosen], tets, state, across, int(piece.border[chosen].sum()))
+    made.group = piece.tet_group[chosen]
+    return made
 
 
 def block(

@@ -14,6 +14,7 @@ from conoid.cases.run import Cause, State
 from . import simulation, step
 from .balance import Balance, Window
 from .errors import EnergyError
+from .groups import Groups
 from .migration import checkpoint
 from .output import frames
 from .output.history import History
@@ -95,6 +96,7 @@ class Loop:
         self._logged = -math.inf
         self._counted = (0, 0, 0)
         self.balance = balance
+        self._groups = Groups(sim, balance.trigger.cost, balance.slope)
 
     def run(self) -> None:
         """Steps until the end time, or until a reason to stop. Raises PhysicsError."""
@@ -102,6 +104,7 @@ class Loop:
         self.sim.comm.sent.since_last()
         if not self._start.resumed:
             step.prepare(self.sim)
+        self._record()
         while True:
             if self.sim.vote.report:
                 self._report()
@@ -132,11 +135,12 @@ class Loop:
                 self._write_frame()
 
     def _move(self) -> None:
-        """Tets to other ranks, when that is due."""
-        cause = self.balance.cause(self.sim)
+        """Tets to other ranks, when that is due and a step is left."""
+        cause = None if self.sim.clock.done else self.balance.cause(self.sim)
         if cause is not None:
             with self.sim.timers.phase("balance"):
                 self.sim, told = self.balance.move(self.sim)
+            self._groups.moved(self.sim)
             self._tell(messages.Balance, cause=cause, **told)
 
     def _checkpoint(self) -> None:
@@ -172,7 +176,8 @@ class Loop:
         if sim.clock.step + 1 >= sim.case.run.max_steps:
             stop = MAX_STEPS
         sim.vote.words[2] = stop
-        sim.vote.words[3] = sim.comm.rank == 0 and now - self._reported > _REPORT_EVERY
+        reporting = sim.comm.rank == 0 and now - self._reported > _REPORT_EVERY
+        sim.vote.words[3] = reporting + (reporting and self._groups.due(sim.clock.t, now))
         sim.vote.words[7] = self.balance.grown(sim)
         every = sim.case.run.checkpoint_every
         sim.vote.words[8] = sim.comm.rank == 0 and (
@@ -215,12 +220,16 @@ class Loop:
         seconds, waiting = sim.timers.since_last()
         with sim.timers.phase("output"):
             limiter = sim.limiter()
-            loads = sim.comm.share((seconds, {"waiting": waiting, **sim.comm.sent.since_last()}))
+            outside = sim.contact.outside if sim.contact is not None else 0
+            sent = {"waiting": waiting, "outside": outside, **sim.comm.sent.since_last()}
+            loads = sim.comm.share((seconds, sent))
             self._count()
-        work, sent = ({name: [load[i][name] for load in loads] for name in loads[0][i]} for i in (0, 1))
+        work, told = ({name: [load[i][name] for load in loads] for name in loads[0][i]} for i in (0, 1))
         window = Window(clock.step - self._reported_step, work)
         self._reported_step = clock.step
         self.balance.look(window)
+        if sim.vote.groups or clock.done or sim.vote.stop:
+            self._record()
         if self._journal is None:
             return
         now = time.monotonic()
@@ -235,8 +244,13 @@ class Loop:
                 eta=self._pace.left(sim.case.run.end_time - clock.t), energy=self.energy,
                 updates_per_second=(self.updates - self._reported_updates) / elapsed,
             )  # fmt: skip
-        self._tell(messages.Load, phases=work, imbalance=window.imbalance, steps=window.steps, **sent)
+        self._tell(messages.Load, phases=work, imbalance=window.imbalance, steps=window.steps, **told)
         self._reported, self._reported_updates = now, self.updates
+
+    def _record(self) -> None:
+        """Loads of groups to the journal; all ranks take part."""
+        with self.sim.timers.phase("output"):
+            self._tell(messages.Groups, **self._groups.record(self.sim))
 
     def _count(self) -> None:
         """How large the model is, when that has changed; all ranks take part."""

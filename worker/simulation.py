@@ -39,9 +39,9 @@ class Vote:
     """What the ranks agree on in a step: a maximum over int64 words. Bits of non-negative floats order like floats."""
 
     words: Ints = field(default_factory=lambda: np.zeros(9, np.int64))
-    """0: one over the stable step; 1: largest force (both as bits); 2: reason to stop; 3: rank 0 wants a report; 4: a
-    search for contact is due; 5: tets are worn out; 6: faces may break; 7: a rank has more outside nodes than it may;
-    8: a checkpoint is asked for."""
+    """0: one over the stable step; 1: largest force (both as bits); 2: reason to stop; 3: rank 0 wants a
+    report, 2: with groups; 4: a search for contact is due; 5: tets are worn out; 6: faces may break; 7: a rank has more
+    outside nodes than it may; 8: a checkpoint is asked for."""
     result: Ints = field(default_factory=lambda: np.zeros(9, np.int64))
 
     @property
@@ -63,6 +63,11 @@ class Vote:
     def report(self) -> bool:
         """Whether rank 0 wants the loads of all ranks."""
         return bool(self.result[3])
+
+    @property
+    def groups(self) -> bool:
+        """Whether rank 0 wants the loads of groups besides."""
+        return int(self.result[3]) > 1
 
     @property
     def search(self) -> bool:

@@ -92,6 +92,8 @@ class Nodes:
     """(n, 3) internal force in quanta."""
     scale: float = 1.0
     """Quanta per newton of ``force`` as it stands."""
+    group: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
+    """(n,) see Model.groups; copies stay in that of their parents. (0,) where nobody asks."""
 
     @property
     def n(self) -> int:
@@ -105,7 +107,7 @@ class Nodes:
 
     def grow(self, copies: "Copies") -> None:
         """Takes up copies of nodes: they begin as their parents are, whose mass is their own less the copies'."""
-        for name in ("part", "x0", "x", "v"):
+        for name in ("part", "x0", "x", "v", *(("group",) if len(self.group) else ())):
             values = getattr(self, name)
             setattr(self, name, extended(values, values[copies.parents]))
         self.id, self.mass = extended(self.id, copies.id), extended(self.mass, copies.mass)
@@ -191,6 +193,8 @@ class Block:
     """What a tet lives through (elements/wear.py)."""
     seconds: float = 0.0
     """CPU time of the passes over the block so far."""
+    group: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
+    """(n,) see Model.groups; (0,) where nobody asks."""
 
     @property
     def chunks(self) -> int:
@@ -214,13 +218,13 @@ class Block:
         """Takes the tets at these places out; the last ones move into the holes."""
         left = self.n - len(gone)
         holes, movers = gone[gone < left], np.setdiff1d(np.arange(left, self.n), gone)
-        for table in (self.tets, self.id, self.across, self.worn):
+        for table in (self.tets, self.id, self.across, self.worn, self.group):
             if len(table):
                 table[holes] = table[movers]
         self.state[holes // CHUNK, :, holes % CHUNK] = self.state[movers // CHUNK, :, movers % CHUNK]
         self.n = left
         self.tets, self.id = self.tets[:left], self.id[:left]
-        self.across, self.worn = self.across[:left], self.worn[:left]
+        self.across, self.worn, self.group = self.across[:left], self.worn[:left], self.group[:left]
         self.border_chunks = min(self.border_chunks, self.chunks)
 
 
@@ -238,6 +242,9 @@ class Model:
     """Global id of the first tet of each part."""
     size: float = 0.0
     """Largest coordinate of the whole mesh at the start, m: what round-off in positions is measured by."""
+    groups: Floats = field(default_factory=lambda: np.zeros((0, 4)))
+    """(groups, 4) centre, m, and number of tets at the start of each group: parts of the mesh that are neighbours then,
+    and whose loads are told (worker/groups.py). They do not know how many ranks there are."""
 
 
 def chunked(values: Floats) -> Floats:

@@ -12,8 +12,6 @@ from .parallel.comm import Comm
 
 PHASES = ("elements", "exchange", "nodes", "contact", "fracture", "output", "balance", "rest")
 """``rest`` is what lies between the others."""
-WORK = ("elements", "nodes", "contact", "fracture")
-"""Phases that ranks share."""
 
 
 class Timers:

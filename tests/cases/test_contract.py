@@ -24,6 +24,10 @@ EXAMPLES: list[messages.AnyMessage] = [
         run="r", seq=9, step=200, cause="time lost exceeds the cost", before={"elements": [1e-3, 3e-3]},
         predicted=[2e-3, 2e-3], tets=12, nodes=9, cost=0.25, saved=0.5,
     ),
+    messages.Groups(
+        run="r", seq=11, load=[120, 80], outside=[4, 4], centres=[(0.0, 0.0, 0.25), (0.0, 0.0, 0.75)], tets=[3, 3],
+        cost=0.5,
+    ),
     messages.Checkpoint(
         run="r", seq=10, step=200, path="checkpoints/000000200", bytes=1024, seconds=0.1, cause="asked for"
     ),

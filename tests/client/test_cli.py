@@ -107,6 +107,7 @@ def test_submit_show_ls_get(user: Path) -> None:
     assert got.stdout.split() == ["here/outcome.json", "here/history.csv"]
     assert (user / "here" / "history.csv").read_text().startswith("step,t")
     assert {file["path"] for file in read(conoid("get", run, "--json"))} >= {"outcome.json", "journal.jsonl"}
+    assert conoid("replay-balance", "last").stderr == "conoid: this run has not told the loads of its groups\n"
 
 
 @pytest.mark.parametrize(

@@ -138,7 +138,12 @@ class Contact(Boundary):
     @property
     def outside(self) -> int:
         """Nodes of the surface that this rank owns."""
-        return int((self._surface.flags & self._model.nodes.owned).sum())
+        return int(self.on_surface.sum())
+
+    @property
+    def on_surface(self) -> Flags:
+        """(nodes,) which they are."""
+        return self._surface.flags & self._model.nodes.owned
 
     def effort(self) -> Floats:
         """(nodes,) what contact does here for each node, in candidates."""

@@ -10,7 +10,7 @@ from ..state import CHUNK, Bits, Block, Indices, Ints, Model, Nodes, Tets
 from .parcel import Parcel, Table, length, take
 from .route import Arrived
 
-_NODAL = ("id", "part", "x0", "x", "v", "mass", "force")
+_NODAL = ("id", "part", "x0", "x", "v", "mass", "force", "group")
 _OF_TETS = ("across", "bond", "weakest", "worn")
 """Columns that a block has where the scene needs them."""
 
@@ -20,7 +20,7 @@ def keep(model: Model) -> Parcel:
     nodes = model.nodes
     known = {
         "parts": model.parts, "elements_global": model.elements_global, "nodes_global": model.nodes_global,
-        "part_starts": model.part_starts, "size": model.size, "scale": nodes.scale,
+        "part_starts": model.part_starts, "size": model.size, "groups": model.groups, "scale": nodes.scale,
     }  # fmt: skip
     columns = {name: getattr(nodes, name) for name in _NODAL}
     return Parcel(known, {}, columns, {b.part: _keep_block(b, nodes.id) for b in model.blocks if b.n}, {})
@@ -29,7 +29,8 @@ def keep(model: Model) -> Parcel:
 def _keep_block(block: Block, ids: Ints) -> Table:
     state = block.state.transpose(0, 2, 1).reshape(-1, block.state.shape[1])[: block.n]
     some = {name: getattr(block, name) for name in _OF_TETS if len(getattr(block, name))}
-    return {"id": block.id, "corners": ids[block.tets], "state": state, "weight": np.ones(block.n), **some}
+    known = {"id": block.id, "corners": ids[block.tets], "group": block.group}
+    return {**known, "state": state, "weight": np.ones(block.n), **some}
 
 
 def resume(case: Case, arrived: Arrived, comm: Comm) -> Model:
@@ -47,7 +48,7 @@ def resume(case: Case, arrived: Arrived, comm: Comm) -> Model:
             blocks.append(_resume_block(case, part, parcel.tets[part], corners[order], int(border.sum())))
     return Model(
         nodes, blocks, known["parts"], known["elements_global"], known["nodes_global"], known["part_starts"],
-        known["size"],
+        known["size"], known["groups"],
     )  # fmt: skip
 
 
@@ -59,6 +60,7 @@ def _resume_block(case: Case, part: int, table: Table, corners: Ints, border: in
     across: Indices = table.get("across", np.zeros((0, 4), np.int32))
     tets: Tets = np.ascontiguousarray(corners, np.uint32)
     block = domain.block(case, part, table["id"], tets, chunks, across, border)
+    block.group = table["group"]
     if "worn" in table:
         block.worn = table["worn"]
     if "bond" in table:

@@ -1,0 +1,71 @@
+"""When to cut a mesh anew for its ranks: the rules by which a run decides, and its replay under another policy."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from .schema import Balance
+
+WORK = ("elements", "nodes", "contact", "fracture")
+"""Phases of a step that ranks share; the others wait or write."""
+
+
+def lost(loads: Sequence[float]) -> float:
+    """How much longer the most loaded rank takes than it would with equal loads."""
+    return max(loads) - sum(loads) / len(loads)
+
+
+def imbalance(loads: Sequence[float]) -> float:
+    """Largest load over the mean."""
+    mean = sum(loads) / len(loads)
+    return max(loads) / mean if mean > 0.0 else 1.0
+
+
+@dataclass
+class Guard:
+    """The outside nodes of one rank against those that it had at the last cut (the paper's trigger, its fig. 9)."""
+
+    alpha: float
+    at_cut: int | None = None
+
+    def grown(self, outside: int) -> bool:
+        """Whether a rank that has so many ``outside`` nodes has more than it may."""
+        if self.at_cut is None:
+            self.at_cut = outside
+        return outside > self.alpha * self.at_cut
+
+
+@dataclass
+class Trigger:
+    """Whether a cut is due, by the policy of a case; the same on all ranks."""
+
+    spec: Balance
+    cost: float
+    """Of the last cut, s; at first of what takes as long."""
+    step: int = 0
+    """Of the last cut."""
+    lost: float = 0.0
+    """To imbalance since then, beyond what cannot be helped, s."""
+    helpless: float = 0.0
+    """Smallest loss of a step since the last cut, s: what another cut is not expected to mend."""
+
+    def look(self, loads: Sequence[float], steps: int) -> None:
+        """Takes the ``loads`` of all ranks, s a step, over some steps."""
+        now = lost(loads)
+        self.helpless = min(self.helpless, now)
+        self.lost += (now - self.helpless) * steps
+
+    def cause(self, step: int, grown: bool) -> str | None:
+        """Why to cut before ``step``, if so; ``grown``: whether a rank has more outside nodes than it may."""
+        spec = self.spec
+        if spec.policy == "never" or step == self.step:
+            return None
+        if spec.policy == "every":
+            return f"every {spec.every} steps" if step % spec.every == 0 else None
+        if spec.policy == "outside":
+            return f"a rank has {spec.alpha:g} times its outside nodes" if grown else None
+        return "time lost exceeds the cost" if self.lost > self.cost else None
+
+    def settle(self, step: int, cost: float) -> None:
+        """Begins to count anew after a cut before ``step`` that took ``cost``, s."""
+        self.step, self.cost, self.lost, self.helpless = step, cost, 0.0, math.inf

@@ -1,0 +1,50 @@
+"""What the commands have in common: options, how a run is found, how things are printed."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+import typer
+from rich.console import Console, RenderableType
+
+from .errors import ClientError
+from .result import Result
+from .run import Run
+from .session import Session, connect
+
+Url = Annotated[str | None, typer.Option("--url", help="The server [CONOID_URL, or the configuration file].")]
+Token = Annotated[str | None, typer.Option("--token", help="Who asks [CONOID_TOKEN, or the configuration file].")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
+SourceArgument = Annotated[str, typer.Argument(metavar="RUN", help="The id of a run, 'last', or its folder.")]
+
+
+def show(thing: RenderableType) -> None:
+    """Prints for people."""
+    Console(highlight=False).print(thing)
+
+
+def show_json(thing: Any) -> None:
+    """Prints for scripts: one JSON document."""
+    typer.echo(msgspec.json.format(msgspec.json.encode(thing), indent=2).decode())
+
+
+def find(session: Session, run: str) -> Run:
+    """The run of an id, or the newest one for ``last``. Raises ClientError when there is none yet."""
+    if run != "last":
+        return session.run(run)
+    newest = session.runs(limit=1)
+    if not newest:
+        raise ClientError("there is no run yet")
+    return session.run(newest[0].id)
+
+
+@contextmanager
+def opened(source: str, url: str | None, token: str | None) -> Iterator[Result]:
+    """The result of a run by its id, or in its folder."""
+    if Path(source).is_dir():
+        yield Result.open(source)
+        return
+    with connect(url, token) as session:
+        yield find(session, source).result()

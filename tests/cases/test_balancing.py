@@ -1,0 +1,66 @@
+"""When to cut anew: the rules by hand."""
+
+import pytest
+
+from conoid.cases.balancing import Guard, Trigger, imbalance, lost
+from conoid.cases.schema import Balance
+
+EVEN, ODD = [2.0, 2.0], [3.0, 1.0]
+"""Loads of two ranks, s a step."""
+
+
+def test_what_is_lost_and_the_imbalance() -> None:
+    assert (lost([4.0, 1.0, 1.0]), imbalance([4.0, 1.0, 1.0])) == (2.0, 2.0)
+    assert (lost(EVEN), imbalance(EVEN)) == (0.0, 1.0)
+    assert imbalance([0.0, 0.0]) == 1.0
+
+
+def test_measured_cuts_when_more_is_lost_than_a_cut_costs() -> None:
+    """At first nothing is taken to be helpless: 1 s a step is lost, a cut costs 10 s."""
+    trigger = Trigger(Balance(policy="measured"), 10.0)
+    trigger.look(ODD, 10)
+    assert trigger.cause(10, False) is None, "10 s do not exceed 10 s"
+    trigger.look(EVEN, 5)
+    assert trigger.cause(15, False) is None
+    trigger.look(ODD, 1)
+    assert trigger.cause(16, False) == "time lost exceeds the cost"
+
+
+def test_measured_does_not_count_what_a_cut_has_not_mended() -> None:
+    """After a cut that leaves 1 s a step lost, 3 s a step count for 2, until less has been seen to be possible."""
+    trigger = Trigger(Balance(policy="measured"), 10.0)
+    trigger.settle(100, 4.0)
+    trigger.look(ODD, 50)
+    assert trigger.cause(150, False) is None
+    trigger.look([5.0, -1.0], 2)
+    assert trigger.cause(152, False) is None, "2 steps of 2 s do not exceed 4 s"
+    trigger.look([2.5, 1.5], 4)
+    trigger.look(ODD, 1)
+    assert trigger.cause(157, False) is not None, "4 s, and 0.5 s beyond the new least"
+
+
+def test_every_cuts_at_multiples_and_not_where_it_has_just_cut() -> None:
+    trigger = Trigger(Balance(policy="every", every=50), 1.0, step=0)
+    causes = {step: trigger.cause(step, True) for step in (0, 1, 49, 50, 51, 100)}
+    assert {step for step, cause in causes.items() if cause} == {50, 100}
+    assert causes[50] == "every 50 steps"
+    trigger.settle(100, 1.0)
+    assert trigger.cause(100, True) is None
+
+
+def test_outside_cuts_when_a_rank_has_grown_and_never_does_not() -> None:
+    assert Trigger(Balance(policy="outside", alpha=1.5), 0.0).cause(7, True) == "a rank has 1.5 times its outside nodes"
+    assert Trigger(Balance(policy="outside"), 0.0).cause(7, False) is None
+    never = Trigger(Balance(policy="never"), 0.0)
+    never.look(ODD, 1000)
+    assert never.cause(1000, True) is None
+
+
+@pytest.mark.parametrize(("outside", "grown"), [(100, False), (120, False), (121, True), (80, False)])
+def test_a_rank_has_grown_beyond_alpha_times_what_it_had(outside: int, grown: bool) -> None:
+    assert Guard(1.2, 100).grown(outside) is grown
+
+
+def test_a_rank_that_has_not_been_cut_remembers_its_first_count() -> None:
+    guard = Guard(1.5)
+    assert [guard.grown(n) for n in (10, 15, 16)] == [False, False, True]

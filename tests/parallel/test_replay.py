@@ -1,0 +1,65 @@
+"""A recorded run: what it tells of its groups, and its replay."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from conoid.cases.messages import Groups
+from conoid.client.result import Result
+
+from .launching import together
+
+CASE = Path(__file__).with_name("breaking.toml")
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int], Path]:
+    """The folder of a run of some dozens of steps by the number of ranks, among which it is cut anew every 8 steps."""
+    root = tmp_path_factory.mktemp("recorded")
+
+    @cache
+    def folder(ranks: int) -> Path:
+        found = root / str(ranks) / "run"
+        changes = ("run.end_time=0.6 us", "balance.policy=every", "balance.every=8")
+        words = [word for change in changes for word in ("--set", change)]
+        together(ranks, found.parent, [[str(CASE), "--out", str(found), *words]])
+        return found
+
+    return folder
+
+
+def groups(folder: Path) -> list[Groups]:
+    return [m for m in Result.open(folder).messages if isinstance(m, Groups)]
+
+
+@pytest.mark.slow
+def test_a_run_tells_its_groups_alike_on_any_number_of_ranks(run: Callable[[int], Path]) -> None:
+    one, two = groups(run(1)), groups(run(2))
+    assert (one[0].centres, one[0].tets, one[0].outside) == (two[0].centres, two[0].tets, two[0].outside)
+    assert (one[-1].step, one[-1].outside) == (two[-1].step, two[-1].outside)
+
+
+def test_a_run_begins_and_ends_with_its_groups(run: Callable[[int], Path]) -> None:
+    told = groups(run(2))
+    assert [bool(m.centres) for m in told] == [True] + [False] * (len(told) - 1)
+    assert (told[0].step, told[0].load) == (0, [0] * 256)
+    assert min(told[-1].load) > 0
+    assert sum(told[-1].outside) > sum(told[0].outside), "something has broken"
+
+
+def test_the_replay_of_a_run_knows_its_cuts(run: Callable[[int], Path]) -> None:
+    folder = run(2)
+    command = [sys.executable, "-m", "conoid.client.cli", "replay-balance", str(folder), "--json"]
+    told = json.loads(subprocess.run(command, check=True, capture_output=True, text=True, timeout=60).stdout)
+    happened, replayed = told["run"], told["policies"][0]
+    assert (happened["policy"], happened["ranks"]) == ("every:8", 2)
+    assert happened["cuts"] == replayed["cuts"] == list(range(8, groups(folder)[-1].step, 8))
+    assert len(replayed["cuts"]) > 1
+    assert replayed["cost"] == pytest.approx(happened["cost"])
+    assert 0.0 < replayed["lost"] < replayed["work"]
+    assert [p["policy"] for p in told["policies"]] == ["every:8", "measured", "outside 1.2", "never"]

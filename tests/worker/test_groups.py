@@ -1,0 +1,164 @@
+"""What a run tells of its groups, and what tets, candidates and ranks cost."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from conoid.cases import materials, schema
+from conoid.cases.balancing import WORK
+from conoid.worker import domain, step
+from conoid.worker.balance import Balance
+from conoid.worker.groups import Groups
+from conoid.worker.meter import Costs, Meter, Slope
+from conoid.worker.simulation import Simulation
+
+from ..contact.bodies import meeting_of, moved
+from .kernels import build, whole_of
+from .meshes import block
+from .test_erosion import on, tick
+
+MM = 1e-3
+MESH = block((7, 4, 4), 1e-3, seed=3)
+
+
+def test_groups_do_not_know_the_number_of_ranks() -> None:
+    one = domain.cut(whole_of(MESH), 1)[0]
+    sizes = np.bincount(one.tet_group)
+    assert len(sizes) == len(one.groups) == domain.GROUPS
+    assert sizes.max() - sizes.min() <= 2
+    assert (one.groups[:, 3] == sizes).all()
+    for ranks in (2, 3, 4, 8):
+        for piece in domain.cut(whole_of(MESH), ranks):
+            assert (piece.tet_group == one.tet_group[np.searchsorted(one.tet_ids, piece.tet_ids)]).all()
+            assert (piece.node_group == one.node_group[piece.node_ids]).all()
+            assert (piece.groups == one.groups).all()
+
+
+@pytest.mark.parametrize("ranks", [2, 4, 16])
+def test_ranks_begin_with_whole_groups_where_their_number_is_a_power_of_two(ranks: int) -> None:
+    held = [set(piece.tet_group.tolist()) for piece in domain.cut(whole_of(MESH), ranks)]
+    assert sum(map(len, held)) == len(set().union(*held)) == domain.GROUPS
+
+
+def test_a_group_lies_round_its_centre() -> None:
+    whole = whole_of(MESH)
+    piece = domain.cut(whole, 1)[0]
+    middle = whole.points[whole.tets].mean(axis=1)
+    mean = np.array([middle[piece.tet_group == g].mean(axis=0) for g in range(domain.GROUPS)])
+    assert piece.groups[:, :3] == pytest.approx(mean)
+
+
+def test_a_mesh_of_few_tets_has_a_group_for_each() -> None:
+    piece = domain.cut(whole_of(block((2, 1, 1), 1e-3)), 1)[0]
+    assert sorted(piece.tet_group) == list(range(12))
+
+
+# What is counted
+
+
+BRITTLE = materials.Material(
+    density=2500.0, elastic=materials.Elastic(young=70e9, poisson=0.2),
+    brittle=materials.Brittle(strength=50e6, energy=20.0, scatter=materials.Scatter(modulus=5.0)),
+)  # fmt: skip
+MESHES = [block((4, 4, 4), MM, seed=3), moved(block((5, 5, 3), MM, seed=4), (-0.5 * MM, -0.5 * MM, 4.01 * MM))]
+TETS = Costs(np.array([1e-9, 1e-6]), 0.0, 0.0, np.ones((1, 2)))
+"""1 ns for a tet of the first body, 1 us for one of the second."""
+
+
+def breaking() -> schema.Case:
+    """A brittle block hits another that wears out."""
+    motions: list[dict[str, Any]] = [
+        {"velocity": (0.0, 0.0, 150.0), "fracture": schema.Fracture(delay=0.0)}, {"erosion": schema.Erosion()},
+    ]  # fmt: skip
+    return meeting_of(motions, material=BRITTLE, viscosity={})
+
+
+def course(sim: Simulation) -> tuple[list[dict[str, Any]], Simulation]:
+    """Records of a run in which nodes separate, tets leave twice, and all is cut anew between."""
+    balance = Balance.of(sim)
+    groups = Groups(sim, 1.5, balance.slope)
+    step.prepare(sim)
+    told = [groups.record(sim)]
+    for moment in range(40):
+        if moment == 20:
+            sim, _ = balance.move(sim)
+            groups.moved(sim)
+        tick(sim, {10: np.arange(400, 500), 30: np.arange(450, 550)}.get(moment))
+    return [*told, groups.record(sim)], sim
+
+
+def test_groups_are_told_alike_on_any_number_of_ranks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of the same tets and nodes, moved or not; what has left is in none, and copies are where their parents were."""
+    case = breaking()
+    monkeypatch.setattr(Meter, "costs", lambda *_: TETS)
+    (first, last), sim = on(1, case, MESHES, course)[0]
+    assert first["tets"] == sim.model.groups[:, 3].tolist()
+    assert (first["load"], first["cost"]) == ([0] * 256, 1.5)
+    for told, _ in on(3, case, MESHES, course):
+        assert told == [first, last]
+    groups, nodes = np.array(first["centres"]), sim.model.nodes
+    assert sim.contact is not None
+    assert sum(last["outside"]) == sim.contact.outside > sum(first["outside"]) + 100
+    assert sum(last["load"]) == 384 + 1000 * (450 - 150)
+    for part in sim.model.blocks:
+        away = np.linalg.norm(nodes.x0[part.tets].mean(axis=1) - groups[part.group], axis=1)
+        assert away.max() < 2.0 * MM
+    assert np.linalg.norm(nodes.x0 - groups[nodes.group], axis=1).max() < 2.0 * MM
+
+
+def test_a_record_is_due_at_times_of_the_run_and_costs_little_of_it() -> None:
+    sim = build(breaking().model_copy(update={"run": schema.Run(end_time=1.0)}), MESHES)
+    groups = Groups(sim, 0.0, Slope())
+    began = groups._told
+    assert groups.due(0.0, began + 0.25)
+    groups._t, groups._took = 0.005, 1e-4
+    assert [groups.due(t, began + s) for t, s in ((0.004, 1.0), (0.005, 1.0), (0.004, 11.0), (0.005, 0.03))] == [
+        False, True, True, False,
+    ]  # fmt: skip
+
+
+# What it costs
+
+
+def test_costs_add_up_to_the_work_of_all_ranks() -> None:
+    """Whatever the slope says, groups and ranks have all of what was measured."""
+    case = breaking()
+
+    def measured(sim: Simulation) -> tuple[float, float]:
+        slope = Slope(0.3, 1.0)
+        step.prepare(sim)
+        groups = Groups(sim, 0.0, slope)
+        groups.record(sim)
+        then = sum(sim.timers.seconds[name] for name in WORK[1:]) + sum(b.seconds for b in sim.model.blocks)
+        for _ in range(5):
+            tick(sim)
+        now = sum(sim.timers.seconds[name] for name in WORK[1:]) + sum(b.seconds for b in sim.model.blocks)
+        told = groups.record(sim)
+        return 1e-9 * (sum(told["load"]) + sim.comm.size * told["rank"]), (now - then) / 5
+
+    for ranks in (1, 2):
+        results = on(ranks, case, MESHES, measured)
+        assert results[0][0] == pytest.approx(sum(work for _, work in results), abs=256e-9)
+
+
+def test_the_slope_is_that_between_ranks() -> None:
+    """Of 40 s each rank takes 30 s whatever it has, and the mean one 10 s for its candidates; how many all of them have
+    together changes nothing, nor how long it takes."""
+    slope = Slope()
+    assert slope.of(2.0) == 2.0, "nothing is known yet"
+    for effort in (np.array([10.0, 30.0]), np.array([100.0, 20.0, 60.0])):
+        slope.add(effort, 30.0 + 10.0 * effort / effort.mean())
+        slope.add(effort, 3.0 + 1.0 * effort / effort.mean())
+    assert slope.of(2.0) == pytest.approx(0.5)
+    slope.add(np.zeros(2), np.ones(2))
+    assert slope.of(2.0) == pytest.approx(0.5), "without candidates nothing is learnt"
+    steep = Slope()
+    steep.add(np.array([1.0, 2.0]), np.array([1.0, 9.0]))
+    assert steep.of(2.0) == 2.0, "no more than all work there is"
+    alike = Slope()
+    alike.add(np.array([7.0, 7.0]), np.array([1.0, 2.0]))
+    assert alike.of(2.0) == 2.0
+    falling = Slope()
+    falling.add(np.array([1.0, 2.0]), np.array([2.0, 1.0]))
+    assert falling.of(2.0) == pytest.approx(0.04)
