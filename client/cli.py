@@ -2,7 +2,6 @@
 
 import os
 import sys
-import tempfile
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,16 +12,13 @@ from typer.core import TyperGroup
 from conoid.cases.estimate import estimate
 from conoid.cases.load import CaseError
 from conoid.cases.run import ExitCode, State
-from conoid.cases.units import parse_quantity
 
-from . import chart, reports, study, tables
+from . import benches, reports, tables
 from .errors import ClientError, ServiceError
 from .live import Live, exit_code
 from .once import run_once
-from .options import Json, Token, Url, find, show, show_json
-from .projection import Network, bandwidth
+from .options import CaseArgument, Json, Overrides, Token, Url, complain, find, show, show_json
 from .run import Run
-from .scaling import CORES, scale
 from .session import connect
 from .submission import case_of, locate
 from .view import FIELDS, view
@@ -37,35 +33,24 @@ class Guarded(TyperGroup):
         try:
             return super().invoke(ctx)
         except CaseError as error:
-            _complain(*(str(problem) for problem in error.problems))
+            complain(*(str(problem) for problem in error.problems))
             raise typer.Exit(ExitCode.BAD_INPUT) from None
         except ServiceError as error:
-            _complain(*(error.problems or [str(error)]))
+            complain(*(error.problems or [str(error)]))
             raise typer.Exit(error.exit_code) from None
         except ClientError as error:
-            _complain(str(error))
+            complain(str(error))
             raise typer.Exit(error.exit_code) from None
         except KeyboardInterrupt:
             raise typer.Exit(130) from None
-
-
-def _complain(*lines: str) -> None:
-    for line in lines:
-        typer.echo(f"conoid: {line}", err=True)
 
 
 app = typer.Typer(
     cls=Guarded, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
     help="Impact simulations: submit them, watch them, look at them.",
 )  # fmt: skip
-bench = typer.Typer(no_args_is_help=True, help="Measure.")
-app.add_typer(bench, name="bench")
+app.add_typer(benches.bench, name="bench")
 
-CaseArgument = Annotated[str, typer.Argument(metavar="CASE", help="A .toml or .json file, or a shipped case by name.")]
-Overrides = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Change a key of the case, as run.end_time='20 us'."),
-]
 RunArgument = Annotated[str, typer.Argument(metavar="RUN", help="The id of a run, or 'last'.")]
 FieldOption = Annotated[str, typer.Option("--field", help=f"What to colour by: {', '.join(FIELDS)}.")]
 
@@ -165,10 +150,10 @@ def watch_run(
         try:
             known = watch(found, False if plain else None)
         except KeyboardInterrupt:
-            _complain(f"the run goes on; conoid watch {found.id} shows it again")
+            complain(f"the run goes on; conoid watch {found.id} shows it again")
             raise
     if known.message or known.cause:
-        _complain(f"{known.run} {known.state.value}: {known.message or known.cause}")
+        complain(f"{known.run} {known.state.value}: {known.message or known.cause}")
     raise typer.Exit(exit_code(known.state, known.cause))
 
 
@@ -285,43 +270,6 @@ def run_case(
     """Do it all here: start a server, submit, watch, check, draw, stop the server. Ctrl-C cancels the run."""
     chosen = [*(overrides or ()), *([f"run.ranks={ranks}"] if ranks is not None else [])]
     raise typer.Exit(run_once(case, chosen, out, picture, field, plain=plain, check=check, as_json=as_json))
-
-
-@bench.command(name="scale", short_help="Run a case on several numbers of ranks; speed-up, projected beyond the cores.")
-def bench_scale(
-    case: CaseArgument,
-    ranks: Annotated[str, typer.Option("--ranks", help="Numbers of ranks; one is always among them.")] = "1,2,4,8",
-    overrides: Overrides = None,
-    latency: Annotated[str, typer.Option("--latency", help="Of a message, for the projection.")] = "2 us",
-    width: Annotated[str, typer.Option("--bandwidth", help="Of a rank's messages, for the projection.")] = "5 GB/s",
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", help="Folder for scale.md, .json and .svg and for the runs; those of an earlier call are read."
-        ),
-    ] = None,
-) -> None:
-    """Run a case on several numbers of ranks: speed-up, where it is lost, and whether all give the same answer.
-
-    Ends with 1 when they do not.
-    """
-    try:
-        numbers = [int(word) for word in ranks.split(",")]
-        network = Network(parse_quantity(latency, "s"), bandwidth(width))
-    except ValueError as error:
-        raise ClientError(str(error)) from None
-    with tempfile.TemporaryDirectory() as passing:
-        runs = []
-        for run in scale(case, overrides or (), numbers, out or Path(passing), network):
-            _complain(f"ranks {run.ranks}: {run.steps} steps in {run.wall:.1f} s")
-            runs.append(run)
-    done = study.Study(case_of(case, overrides or ()).name, overrides or (), CORES, network, runs)
-    if out is not None:
-        (out / "scale.md").write_text(study.to_markdown(done), encoding="utf-8")
-        (out / "scale.json").write_bytes(study.to_json(done))
-        (out / "scale.svg").write_text(chart.speed_up(done), encoding="utf-8")
-    typer.echo(study.to_markdown(done), nl=False)
-    raise typer.Exit(ExitCode.SUCCEEDED if done.equal else ExitCode.CRASHED)
 
 
 def main() -> None:

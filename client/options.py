@@ -17,7 +17,18 @@ from .session import Session, connect
 Url = Annotated[str | None, typer.Option("--url", help="The server [CONOID_URL, or the configuration file].")]
 Token = Annotated[str | None, typer.Option("--token", help="Who asks [CONOID_TOKEN, or the configuration file].")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
+CaseArgument = Annotated[str, typer.Argument(metavar="CASE", help="A .toml or .json file, or a shipped case by name.")]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Change a key of the case, as run.end_time='20 us'."),
+]
 SourceArgument = Annotated[str, typer.Argument(metavar="RUN", help="The id of a run, 'last', or its folder.")]
+
+
+def complain(*lines: str) -> None:
+    """Tells people what is wrong, a line each."""
+    for line in lines:
+        typer.echo(f"conoid: {line}", err=True)
 
 
 def show(thing: RenderableType) -> None:

@@ -9,7 +9,6 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numba import njit
 
 from conoid.cases.schema import Case
 
@@ -23,7 +22,7 @@ from ..parallel.ownership import Neighbour
 from ..state import Flags, Floats, Indices, Ints, Model, Nodes, extended
 from ..timers import Timers
 from ..topology import Split
-from . import meetings, pairing, scene, surface, sweeps
+from . import held, meetings, pairing, scene, surface, sweeps
 from .cracks import Cracks, Follower, across, news
 from .flight import Flight
 from .scene import Rules, Scene
@@ -228,7 +227,7 @@ class Contact(Boundary):
             self._scene.free()
 
     def _look(self, now: Scene, state: Nodes) -> None:
-        _gather(now.before, state.v, now.held, now.local)
+        held.gather(now.before, state.v, now.held, now.local)
         now.copies.note(state)
 
     def _search(self, state: Nodes) -> None:
@@ -269,8 +268,8 @@ class Contact(Boundary):
             return self._apart or self._flight.spent(state, self._clock.t, self._clock.dt)
 
     def _push(self, now: Scene, state: Nodes, dt: float, t: float) -> None:
-        crowd, room, held = now.crowd, now.room, now.held
-        _take(crowd.x, crowd.v, held, state.x, state.v, now.local)
+        crowd, room = now.crowd, now.room
+        held.take(crowd.x, crowd.v, now.held, state.x, state.v, now.local)
         now.copies.refresh(state, crowd.x, crowd.v, now.before)
         n = self._meet(now, dt)
         self._weigh(now, n)
@@ -291,7 +290,7 @@ class Contact(Boundary):
             heat = self._friction
             sweeps.heat(heat.words.reshape(-1), now.push, slip, crowd.v, *room_of, room.friction, heat.scale[0], n)
         self._book(now)
-        if _give_back(state.v, self._parts, now.local, held, crowd.v, now.total, state.part, state.owned):
+        if held.give_back(state.v, self._parts, now.local, now.held, crowd.v, now.total, state.part, state.owned):
             self.last_push = t
 
     def _resume(self, now: Scene, n: int) -> None:
@@ -336,58 +335,10 @@ class Contact(Boundary):
 
     def _book(self, now: Scene) -> None:
         """Half of the work of the last impulses, with the velocities in ``before``."""
-        _book(
+        held.book(
             self.contact_loss, self.external_work, now.local, now.held, now.before, now.total, now.crowd.mobility,
             self._scale,
         )  # fmt: skip
-
-
-@njit("void(float64[:, ::1], float64[:, ::1], int32[::1], int32[::1])", cache=True)
-def _gather(out, v, held, local):  # type: ignore[no-untyped-def]
-    for h in range(len(local)):
-        for i in range(3):
-            out[held[h], i] = v[local[h], i]
-
-
-@njit("void(float64[:, ::1], float64[:, ::1], int32[::1], float64[:, ::1], float64[:, ::1], int32[::1])", cache=True)
-def _take(x, v, held, node_x, node_v, local):  # type: ignore[no-untyped-def]
-    """Positions and velocities of the held nodes of a crowd."""
-    for h in range(len(held)):
-        for i in range(3):
-            x[held[h], i], v[held[h], i] = node_x[local[h], i], node_v[local[h], i]
-
-
-@njit(
-    "boolean(float64[:, ::1], int64[:, ::1], int32[::1], int32[::1], float64[:, ::1], int64[:, ::1], int32[::1], "
-    "boolean[::1])",
-    cache=True,
-)
-def _give_back(node_v, parts, local, held, v, total, part, owned):  # type: ignore[no-untyped-def]
-    """Velocities of the held nodes, and the impulses of the owned ones to the sums of their parts; whether any."""
-    pushed = False
-    for h in range(len(held)):
-        for i in range(3):
-            j = total[held[h], i]
-            node_v[local[h], i] = v[held[h], i]
-            pushed |= j != 0
-            if owned[local[h]]:
-                parts[part[local[h]], i] += j
-    return pushed
-
-
-@njit(
-    "void(float64[::1], float64[::1], int32[::1], int32[::1], float64[:, ::1], int64[:, ::1], float64[:, ::1], "
-    "float64)",
-    cache=True,
-)
-def _book(loss, external, local, held, before, total, mobility, scale):  # type: ignore[no-untyped-def]
-    """Half of the impulse times velocity: lost by contact; where a velocity is held, taken in from outside."""
-    for h in range(len(held)):
-        for i in range(3):
-            work = 0.5 * before[held[h], i] * (total[held[h], i] / scale)
-            loss[local[h]] -= work
-            if mobility[held[h], i] == 0.0:
-                external[local[h]] -= work
 
 
 def _mobility(nodes: Nodes, bounds: list[Boundary]) -> tuple[Floats, Flags]:

@@ -1,0 +1,56 @@
+"""Commands that measure."""
+
+import tempfile
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from conoid.cases.run import ExitCode
+from conoid.cases.units import parse_quantity
+
+from . import chart, study
+from .errors import ClientError
+from .options import CaseArgument, Overrides, complain
+from .projection import Network, bandwidth
+from .scaling import CORES, scale
+from .submission import case_of
+
+bench = typer.Typer(no_args_is_help=True, help="Measure.")
+
+
+@bench.command(name="scale", short_help="Run a case on several numbers of ranks; speed-up, projected beyond the cores.")
+def bench_scale(
+    case: CaseArgument,
+    ranks: Annotated[str, typer.Option("--ranks", help="Numbers of ranks; one is always among them.")] = "1,2,4,8",
+    overrides: Overrides = None,
+    latency: Annotated[str, typer.Option("--latency", help="Of a message, for the projection.")] = "2 us",
+    width: Annotated[str, typer.Option("--bandwidth", help="Of a rank's messages, for the projection.")] = "5 GB/s",
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", help="Folder for scale.md, .json and .svg and for the runs; those of an earlier call are read."
+        ),
+    ] = None,
+) -> None:
+    """Run a case on several numbers of ranks: speed-up, where it is lost, and whether all give the same answer.
+
+    Ends with 1 when they do not.
+    """
+    try:
+        numbers = [int(word) for word in ranks.split(",")]
+        network = Network(parse_quantity(latency, "s"), bandwidth(width))
+    except ValueError as error:
+        raise ClientError(str(error)) from None
+    with tempfile.TemporaryDirectory() as passing:
+        runs = []
+        for run in scale(case, overrides or (), numbers, out or Path(passing), network):
+            complain(f"ranks {run.ranks}: {run.steps} steps in {run.wall:.1f} s")
+            runs.append(run)
+    done = study.Study(case_of(case, overrides or ()).name, overrides or (), CORES, network, runs)
+    if out is not None:
+        (out / "scale.md").write_text(study.to_markdown(done), encoding="utf-8")
+        (out / "scale.json").write_bytes(study.to_json(done))
+        (out / "scale.svg").write_text(chart.speed_up(done), encoding="utf-8")
+    typer.echo(study.to_markdown(done), nl=False)
+    raise typer.Exit(ExitCode.SUCCEEDED if done.equal else ExitCode.CRASHED)
