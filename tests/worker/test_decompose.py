@@ -7,6 +7,7 @@ from conoid.worker.parallel import decompose
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.state import Indices
 
+from ..contact.ranks import ThreadComm, on_ranks
 from .meshes import Floats
 
 PARTS = [1, 2, 3, 4, 5, 7, 8, 16, 31]
@@ -67,3 +68,28 @@ def test_cuts_run_across_the_longest_side() -> None:
 def test_more_parts_than_points(parts: int) -> None:
     owner = bisect(cloud(4, 7), np.ones(4), parts)
     assert np.bincount(owner, minlength=parts).max() == 1
+
+
+@pytest.mark.parametrize("parts", [2, 5, 16])
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_parts_do_not_depend_on_who_holds_the_points(parts: int, ranks: int) -> None:
+    """Ties among them: many points lie in planes across the axes."""
+    points = np.round(cloud(600, 8), 1)
+    weights, ids = np.random.default_rng(9).uniform(0.5, 2.0, 600), np.arange(600)
+    one, cuts = decompose.bisect(points, ids, weights, parts, SerialComm())
+    holder = np.random.default_rng(10).integers(0, ranks, 600)
+
+    def share(comm: ThreadComm) -> tuple[Indices, list[decompose.Cut]]:
+        mine = holder == comm.rank
+        return decompose.bisect(points[mine], ids[mine], weights[mine], parts, comm)
+
+    for rank, (owner, same) in enumerate(on_ranks(ranks, share)):
+        assert owner.tolist() == one[holder == rank].tolist()
+        assert same == cuts
+
+
+def test_other_points_lie_with_those_round_them() -> None:
+    points = cloud(4000, 11)
+    owner, cuts = decompose.bisect(points, np.arange(4000), np.ones(4000), 7, SerialComm())
+    near = points + 1e-12
+    assert (decompose.place(cuts, near) == owner).mean() > 0.99
