@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from numba import njit
 
-from ..migration.parcel import Table, take
+from ..migration.parcel import Parcel, take
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum
 from ..state import Flags, Floats, Indices, Ints, Nodes
@@ -18,6 +18,8 @@ from .rest import Rest
 from .search import Boxes, Things
 
 _COPY_TAG, _SHARE_TAG, _PUSH_TAG = 11, 12, 13
+_FACE_BITS = 30
+"""The id of a face stays below 2^30 where edges are kept by those of their two faces."""
 
 
 @dataclass(frozen=True)
@@ -160,20 +162,21 @@ class Scene:
         _, here, there = np.intersect1d(mine, theirs, assume_unique=True, return_indices=True)
         self.kept[here] = np.ascontiguousarray(rows[there, 2:]).view(np.float64)
 
-    def keep(self) -> tuple[Table, Table]:
-        """Its candidates as tables, nodes and faces, edges and edges, with what they have kept."""
-        ids, (slave, face), (one, two) = self.crowd.id, self.node_face.T, self.edge_edge.T
-        faces = ids[self.faces[face]]
-        pairs = {
-            "node": ids[slave], "face": self.face_id[face], "ends": faces, "size": self.face_size[face],
-            "kept": self.kept, "normals": self.normals[slave],
-        }  # fmt: skip
-        edges = {
-            "node": ids[self.edges[one, 0]], "ends": ids[np.column_stack([self.edges[one], self.edges[two]])],
-            "sides": np.column_stack([self.edge_sides[one], self.edge_sides[two]]),
-            "size": np.column_stack([self.edge_size[one], self.edge_size[two]]),
-        }  # fmt: skip
-        return pairs, edges
+    def keep(self, parcel: Parcel, rubs: bool) -> None:
+        """Adds its candidates to a parcel, nodes and faces, edges and edges; with ``rubs`` what they have kept."""
+        ids, (slave, face) = self.crowd.id, self.node_face.T
+        parcel.rows["contact.pairs"] = {"node": ids[slave], "face": self.face_id[face]}
+        if rubs:
+            parcel.rows["contact.pairs"]["kept"] = self.kept
+        edge = self.edge_sides[:, 0] << _FACE_BITS | self.edge_sides[:, 1]
+        first = self.edges[self.edge_edge[:, 0], 0]
+        parcel.rows["contact.sharp"] = {"node": ids[first], "edge": edge[self.edge_edge]}
+        slaves = np.unique(slave)
+        parcel.books |= {
+            "node": {"id": ids[slaves], "normals": self.normals[slaves]},
+            "face": {"id": self.face_id, "ends": ids[self.faces], "size": self.face_size},
+            "edge": {"id": edge, "ends": ids[self.edges], "sides": self.edge_sides, "size": self.edge_size},
+        }
 
     def free(self) -> None:
         """Gives its messages back to MPI."""
@@ -308,30 +311,28 @@ def compact(seen: Sides, node_face: Indices, edge_edge: Indices, sent: int, node
     )  # fmt: skip
 
 
-def resume(
-    pairs: Table, edges: Table, here: Crowd, skin: float, nodes: Nodes, comm: Comm
-) -> Scene:  # fmt: skip
-    """The scene of candidates that another has kept; all ranks take part. ``here``: every node of this rank."""
+def resume(parcel: Parcel, here: Crowd, skin: float, nodes: Nodes, comm: Comm) -> Scene:
+    """The scene of candidates that others have kept; all ranks take part. ``here``: every node of this rank."""
+    pairs, sharp, face, edge = (
+        parcel.rows["contact.pairs"], parcel.rows["contact.sharp"], parcel.books["face"], parcel.books["edge"]
+    )  # fmt: skip
     pairs = take(pairs, np.lexsort((pairs["face"], pairs["node"])))
-    which, first, face = np.unique(pairs["face"], return_index=True, return_inverse=True)
-    faces = Faces(which, pairs["ends"][first], pairs["size"][first])
-    rows = np.column_stack([edges["ends"], edges["sides"], edges["size"].view(np.int64)])
-    columns = [[*range(k, k + 4), 8 + 2 * m, 9 + 2 * m, 12 + m] for m, k in enumerate((0, 4))]
-    table, edge = np.unique(np.concatenate([rows[:, c] for c in columns]), axis=0, return_inverse=True)
-    sharp = Edges(*(np.ascontiguousarray(c) for c in (table[:, :4], table[:, 4:6], table[:, 6].view(np.float64))))
-    ids = np.concatenate([pairs["node"], pairs["ends"].reshape(-1), edges["ends"].reshape(-1)])
-    owners = np.concatenate(
-        [np.full(len(pairs["node"]), comm.rank), *(t["owners"].reshape(-1) for t in (pairs, edges))]
-    )
-    used, at = np.unique(ids, return_index=True)
-    held = nodes.places(used)
-    far = ghosts.fetch(used[held < 0], owners[at][held < 0].astype(np.int32), here, comm)
-    seen = Sides(faces, sharp, merged([here, far]), used[:0], skin)
-    node_face = np.column_stack([seen.crowd.places(pairs["node"]), face.reshape(-1)]).astype(np.int32)
-    pairs_of_edges = np.ascontiguousarray(edge.reshape(2, -1).T, np.int32)
-    found = compact(seen, node_face, pairs_of_edges, 0, nodes)
-    found.kept[:] = pairs["kept"]
-    found.normals[found.node_face[:, 0]] = pairs["normals"]
+    faces = Faces(face["id"], face["ends"], face["size"])
+    edges = Edges(edge["ends"], edge["sides"], edge["size"])
+    ids, at = np.unique(np.concatenate([t["ends"].reshape(-1) for t in (face, edge)]), return_index=True)
+    owners = np.concatenate([t["owners"].reshape(-1) for t in (face, edge)])[at]
+    absent = nodes.places(ids) < 0
+    far = ghosts.fetch(ids[absent], owners[absent].astype(np.int32), here, comm)
+    seen = Sides(faces, edges, merged([here, far]), ids[:0], skin)
+    which = np.searchsorted(face["id"], pairs["face"])
+    node_face = np.column_stack([seen.crowd.places(pairs["node"]), which]).astype(np.int32)
+    found = compact(seen, node_face, np.searchsorted(edge["id"], sharp["edge"]).astype(np.int32), 0, nodes)
+    if "kept" in pairs:
+        found.kept[:] = pairs["kept"]
+    slaves = parcel.books["node"]
+    place = found.crowd.places(slaves["id"])
+    known = found.crowd.id[np.minimum(place, found.crowd.n - 1)] == slaves["id"]
+    found.normals[place[known]] = slaves["normals"][known]
     return found
 
 

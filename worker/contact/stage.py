@@ -95,7 +95,7 @@ class Contact(Boundary):
         total = np.zeros((self._model.nodes.n, 3), np.int64)
         if self._scene is not None:
             total[self._scene.local] = self._scene.total[self._scene.held]
-            parcel.rows["contact.pairs"], parcel.rows["contact.sharp"] = self._scene.keep()
+            self._scene.keep(parcel, self._rubs)
         parcel.nodes["contact.total"] = total
 
     def resume(self, parcel: Parcel, name: str, dt: float) -> None:
@@ -112,10 +112,8 @@ class Contact(Boundary):
         self._rules = replace(self._rules, cell=2.0 * self._flight.size)
         self._cracks = Cracks.resume(parcel.rows["contact.cracks"], self._model.blocks, state)
         if searched:
-            pairs, sharp = parcel.rows["contact.pairs"], parcel.rows["contact.sharp"]
             here = self._flight.here(state)
-            skin = self._flight.sides.skin
-            self._scene = scene.resume(pairs, sharp, here, skin, state, self._comm)
+            self._scene = scene.resume(parcel, here, self._flight.sides.skin, state, self._comm)
             self._connect(self._scene, state)
             self._scene.total[self._scene.held] = parcel.nodes["contact.total"][self._scene.local]
 

@@ -109,7 +109,7 @@ def _share(parcel: Parcel, targets: dict[int, Indices], cuts: list[Cut], rank: i
     for name, table in parcel.rows.items():
         if "of" in table:
             rows[name] = take(table, _among(wanted, table["of"]))
-    return Parcel({}, {}, take(parcel.nodes, chosen), tets, rows)
+    return Parcel(nodes=take(parcel.nodes, chosen), tets=tets, rows=rows)
 
 
 def _among(known: Ints, wanted: Ints) -> Flags:
@@ -156,17 +156,26 @@ def _company(every: Ints, group: Ints, owners: Ints, rank: int) -> Ints:
 
 
 def _to_owners(parcel: Parcel, whole: Parcel, directory: Directory) -> None:
-    """Moves the tables that go to the owners of their nodes."""
-    comm = directory.comm
-    for name in sorted(parcel.rows):
-        table = parcel.rows[name]
-        if "node" not in table:
-            continue
-        owner = directory.owners(table["node"])
-        told = comm.swap({
-            rank: Parcel(rows={name: take(table, owner == rank)}).packed() for rank in range(comm.size)
-        })  # fmt: skip
-        whole.rows[name] = joined([Parcel.unpacked(words).rows[name] for words in told.values()])
+    """Moves the tables that go to the owners of their nodes, and what they refer to."""
+    comm, names = directory.comm, sorted(name for name, table in parcel.rows.items() if "node" in table)
+    owners = {name: directory.owners(parcel.rows[name]["node"]) for name in names}
+    sends = {}
+    for rank in range(comm.size):
+        rows = {name: take(parcel.rows[name], owners[name] == rank) for name in names}
+        sends[rank] = Parcel(rows=rows, books={name: _named(book, name, rows) for name, book in parcel.books.items()})
+    told = [Parcel.unpacked(words) for words in comm.swap({r: p.packed() for r, p in sends.items()}).values()]
+    for name in names:
+        whole.rows[name] = joined([p.rows[name] for p in told])
+    for name in sorted(parcel.books):
+        book = joined([p.books[name] for p in told])
+        whole.books[name] = once(book, book["id"])
+        _name_owners(whole.books[name], directory)
+
+
+def _named(book: Table, name: str, rows: dict[str, Table]) -> Table:
+    """What the rows of some tables refer to by ``name``."""
+    used = [table[name].reshape(-1) for table in rows.values() if name in table]
+    return take(book, _among(np.unique(np.concatenate([np.zeros(0, np.int64), *used])), book["id"]))
 
 
 def _name_owners(table: Table, directory: Directory) -> None:
