@@ -9,6 +9,7 @@ import msgspec
 import typer
 from typer.core import TyperGroup
 
+from conoid.cases import layout
 from conoid.cases.estimate import estimate
 from conoid.cases.load import CaseError
 from conoid.cases.run import ExitCode, State
@@ -192,7 +193,8 @@ def checkpoint(run: RunArgument, url: Url = None, token: Token = None, as_json: 
 def get(
     run: RunArgument,
     names: Annotated[
-        list[str] | None, typer.Argument(metavar="[FILE]...", help="Files to fetch; all when none.")
+        list[str] | None,
+        typer.Argument(metavar="[FILE]...", help="Files to fetch; all when none, but for checkpoints."),
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", help="Folder to copy into; the run's id when not given.")] = None,
     url: Url = None,
@@ -206,7 +208,8 @@ def get(
             show_json(found.files())
             return
         target = out or Path(found.id)
-        for name in names or [file.path for file in found.files()]:
+        every = (file.path for file in found.files())
+        for name in names or [path for path in every if not path.startswith(f"{layout.CHECKPOINTS}/")]:
             typer.echo(str(found.download(target, name)))
 
 

@@ -59,6 +59,8 @@ def compute(
         failure = error
     cpu = time.thread_time() - cpu
     loop.sim.free()
+    if comm.rank == 0 and failure is None and not loop.stopped:
+        checkpoint.forget(folder)
     if history is not None:
         history.close()
     return _sum_up(loop, folder, failure, start, cpu, setup, time.monotonic() - began)
@@ -137,6 +139,7 @@ def _sum_up(
         balancing_saved=loop.balance.saved,
         phases={name: [s[name] for s in seconds] for name in PHASES} if seconds else {},
         peak_memory=memory or [],
-        element_updates_per_second=loop.updates / total_cpu if total_cpu > 0.0 else 0.0, reference=checks,
+        element_updates_per_second=(loop.updates - start.updates) / total_cpu if total_cpu > 0.0 else 0.0,
+        reference=checks,
         warnings=sim.fracture.warnings if sim.fracture is not None else [],
     )  # fmt: skip

@@ -68,8 +68,10 @@ def found(folder: Path) -> list[Path]:
     return sorted((p for p in (folder / layout.CHECKPOINTS).glob("*[0-9]") if p.is_dir()), reverse=True)
 
 
-def forget(folder: Path, step: int) -> None:
-    """Takes away checkpoints of ``folder`` beyond a step, and what was never finished."""
+def forget(folder: Path, step: int = -1) -> None:
+    """Takes away checkpoints of ``folder`` beyond a step, and what was never finished; all of them without a step."""
+    if step < 0:
+        shutil.rmtree(folder / layout.CHECKPOINTS, ignore_errors=True)
     for place in (folder / layout.CHECKPOINTS).glob("*"):
         if place.suffix or int(place.name) > step:
             shutil.rmtree(place, ignore_errors=True)
