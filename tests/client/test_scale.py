@@ -11,7 +11,7 @@ from typer.testing import CliRunner, Result
 
 from conoid.cases.messages import AnyMessage, Counts, Load
 from conoid.cases.outcome import Outcome
-from conoid.client import cli
+from conoid.client import benches, cli
 from conoid.client.chart import speed_up
 from conoid.client.projection import Network, Projection, bandwidth, project
 from conoid.client.study import Study, to_json, to_markdown
@@ -140,7 +140,7 @@ def test_another_answer_on_more_ranks_is_an_error(
     def scale(*_: object) -> Iterator[Projection]:
         return iter((one_rank(), two_ranks(digest)))
 
-    monkeypatch.setattr(cli, "scale", scale)
+    monkeypatch.setattr(benches, "scale", scale)
     result = conoid("demo", "--ranks", "2", "--out", tmp_path)
     assert result.exit_code == code
     assert result.stdout == (tmp_path / "scale.md").read_text()
