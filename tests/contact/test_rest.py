@@ -1,9 +1,15 @@
 """A candidate that rests would not have met: random flights, knocks and turns, against looking at every pair."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from conoid.cases.load import parse_case, read_data
+from conoid.worker import simulation, step
 from conoid.worker.contact.rest import Rest
+from conoid.worker.digest import digest
+from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.state import Indices
 
 from .kernels import edge_edge, edge_sizes, face_sizes, node_face
@@ -67,3 +73,26 @@ def test_a_pair_whose_face_has_new_corners_is_looked_at() -> None:
         assert len(some) == fresh
         rest.settle(some, few, pairs, none, faces, sizes, edges, np.zeros(0), x, part)
         rest.faces[0] = not fresh
+
+
+def test_a_body_that_breaks_comes_to_the_same_without_rest(monkeypatch: pytest.MonkeyPatch) -> None:
+    """To the bit: pairs of copies and of faces with new corners among them."""
+    case = parse_case(read_data(Path(__file__).parents[1] / "parallel" / "breaking.toml"))
+
+    def end() -> tuple[str | None, int]:
+        sim = simulation.build(case, Path(), SerialComm())
+        step.prepare(sim)
+        for _ in range(40):
+            step.first_half(sim)
+            sim.clock.frame += sim.clock.frame_due
+            step.second_half(sim)
+        assert sim.fracture is not None
+        return digest(sim.model, sim.comm, []), sim.fracture.broken
+
+    def every(rest: Rest, node_face: Indices, edge_edge: Indices) -> tuple[Indices, Indices]:
+        return np.arange(len(node_face), dtype=np.int32), np.arange(len(edge_edge), dtype=np.int32)
+
+    rested = end()
+    monkeypatch.setattr(Rest, "awake", every)
+    assert end() == rested
+    assert rested[1] > 100
