@@ -143,22 +143,31 @@ def test_a_run_goes_on_on_other_ranks(name: str, legs: list[tuple[int, int]], wh
 
 @pytest.mark.parametrize("kills", [2, pytest.param(50, marks=[pytest.mark.slow, pytest.mark.timeout(1200)])])
 def test_a_run_survives_being_killed(kills: int, whole: Made, tmp_path: Path) -> None:
-    """With a checkpoint in every step, killed at any moment, in the midst of writing one too."""
-    draw, words, killed = random.Random(SEED), case("nodal", tmp_path, tmp_path), 0
-    folder = tmp_path / "nodal"
-    words += ["--set", "run.checkpoint_every=1 ns"]
-    while not (folder / layout.OUTCOME).exists():
+    """With a checkpoint in every step, killed at any moment, in the midst of writing one too; in one run or in many."""
+    draw, killed = random.Random(SEED), 0
+    while killed < kills:
+        root = tmp_path / str(killed)
+        root.mkdir()
+        words = [*case("nodal", root, root), "--set", "run.checkpoint_every=1 ns"]
+        killed += killed_and_ended(draw, words, root / "nodal", kills - killed)
+        must_be_one(whole("nodal"), root / "nodal")
+
+
+def killed_and_ended(draw: random.Random, words: list[str], folder: Path, most: int) -> int:
+    """How often a run was killed, at most, before it came to its end."""
+    killed = 0
+    while not (folder / layout.OUTCOME).exists() or outcome(folder).state != "succeeded":
         again = ["--restart"] if list((folder / layout.CHECKPOINTS).glob("*[0-9]")) else []
         with started(command(draw.choice([1, 2, 3]), *words, *again)) as launcher:
-            limit = time.monotonic() + (draw.uniform(1.0, 3.5) if killed < kills else 120.0)
+            limit = time.monotonic() + (draw.uniform(1.0, 3.5) if killed < most else 120.0)
             while launcher.poll() is None and time.monotonic() < limit:
                 time.sleep(0.01)
             if launcher.poll() is None:
                 killed += 1
-                for process in processes(folder):
+                for process in [launcher.pid, *processes(folder)]:
                     _kill(process)
                 wait_until_gone(processes(folder))
-    must_be_one(whole("nodal"), folder)
+    return killed
 
 
 def _kill(process: int) -> None:
