@@ -76,7 +76,11 @@ class Probes:
         self._pushed, self._since = np.zeros((len(model.parts), 3)), 0.0
         self._model = model
         self._comm = comm
-        self._chosen = [[_inside(probe, block, model) for block in model.blocks] for probe in case.probes]
+        centres = [model.nodes.x0[block.tets].mean(axis=1) for block in model.blocks] if case.probes else []
+        self._chosen = [
+            [_inside(probe, block, model, x) for block, x in zip(model.blocks, centres, strict=True)]
+            for probe in case.probes
+        ]
         """Global ids of the tets that each probe has in each block."""
 
     def require_tets(self, case: Case) -> None:
@@ -128,11 +132,10 @@ class Probes:
         return np.concatenate(columns)
 
 
-def _inside(probe: Probe, block: Block, model: Model) -> "np.ndarray":
+def _inside(probe: Probe, block: Block, model: Model, centres: Floats) -> "np.ndarray":
     if model.parts[block.part] != probe.part:
         return np.zeros(0, np.int64)
     if probe.low is None or probe.high is None:
         return block.id.copy()
-    centres = model.nodes.x0[block.tets].mean(axis=1)
     inside = ((centres >= np.array(probe.low)) & (centres <= np.array(probe.high))).all(axis=1)
     return np.asarray(block.id[inside])

@@ -54,7 +54,7 @@ def write(parcel: Parcel, case: Case, folder: Path, step: int, t: float, comm: C
         manifest = {"format": FORMAT, "step": step, "t": t, "case": data, "files": files, "known": known}
         with (beside / _MANIFEST).open("w", encoding="utf-8") as file:
             json.dump(manifest, file)
-            _flush(file.fileno())
+            os.fsync(file.fileno())
         shutil.rmtree(place, ignore_errors=True)
         beside.rename(place)
         _flush_folder(place.parent)
@@ -141,7 +141,7 @@ def _write_parcel(path: Path, parcel: Parcel) -> None:
         for name, table in parcel.books.items():
             _write_table(file, f"books/{name}", table)
     with path.open("rb") as handle:
-        _flush(handle.fileno())
+        os.fsync(handle.fileno())
 
 
 def _write_table(file: "h5py.File", name: str, table: Table) -> None:
@@ -188,10 +188,6 @@ def _sha256(path: Path) -> str:
         while piece := file.read(_PIECE):
             h.update(piece)
     return h.hexdigest()
-
-
-def _flush(handle: int) -> None:
-    os.fsync(handle)
 
 
 def _flush_folder(folder: Path) -> None:

@@ -2,6 +2,7 @@
 
 import contextlib
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
@@ -25,9 +26,13 @@ class Journal:
     def __init__(self, folder: Path, run: str, listener: Listener | None = None) -> None:
         path = folder / layout.JOURNAL
         self._run = run
-        self._seq = _last_seq(path)
-        self.frames = _frames(path)
+        self.frames: set[int] = set()
         """Indices of the frames that it tells of."""
+        self._seq = 0
+        for message in _written(path):
+            self._seq = message.seq
+            if isinstance(message, messages.Frame):
+                self.frames.add(message.index)
         self._file = path.open("ab", buffering=0)
         if path.stat().st_size and not path.read_bytes().endswith(b"\n"):
             self._file.write(b"\n")
@@ -47,23 +52,8 @@ class Journal:
         self._file.close()
 
 
-def _frames(path: Path) -> set[int]:
-    if not path.exists():
-        return set()
-    found = set()
-    for line in path.read_bytes().splitlines():
+def _written(path: Path) -> Iterator[messages.AnyMessage]:
+    """The messages of a journal; a line that a crash has torn is passed over."""
+    for line in path.read_bytes().splitlines() if path.exists() else ():
         with contextlib.suppress(msgspec.DecodeError):
-            message = messages.from_json(line)
-            if isinstance(message, messages.Frame):
-                found.add(message.index)
-    return found
-
-
-def _last_seq(path: Path) -> int:
-    """The number of the last line that is whole; one that a crash has torn is passed over."""
-    if not path.exists():
-        return 0
-    for line in reversed(path.read_bytes().splitlines()):
-        with contextlib.suppress(msgspec.DecodeError):
-            return messages.from_json(line).seq
-    return 0
+            yield messages.from_json(line)
