@@ -52,7 +52,7 @@ def together(ranks: int, place: Path, runs: Sequence[Sequence[str]]) -> None:
     (place / "runs.json").write_text(json.dumps(runs), encoding="utf-8")
     program = Path(__file__).with_name("many.py")
     finished = ended(command(ranks, str(place / "runs.json"), module=[str(program)]))
-    assert finished.returncode == 0, finished.stderr
+    assert finished.returncode == 0, finished.stdout + finished.stderr
 
 
 def processes(folder: Path) -> list[int]:

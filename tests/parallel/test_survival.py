@@ -81,7 +81,7 @@ def go(words: Sequence[str], legs: Sequence[tuple[int, int]]) -> None:
     for k, (ranks, last) in enumerate(legs):
         again = ["--restart"] if k else []
         launched = ended(command(ranks, str(last), *words, *again, module=[str(STOPPING)]))
-        assert launched.returncode == (0 if last > 10**6 else 4), launched.stderr
+        assert launched.returncode == (0 if last > 10**6 else 4), launched.stdout + launched.stderr
 
 
 def sample(seed: int, legs: int, steps: int) -> list[tuple[int, int]]:

@@ -3,14 +3,13 @@
 Everything that decides is a maximum over int64 words, or a sum of integers: no order of ranks can change a bit of it.
 """
 
-import os
 import pickle
 import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
-from typing import Any, Protocol
+from typing import Any, NoReturn, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -301,14 +300,16 @@ class _MpiExchange:
             request.Free()
 
 
-def leave(code: int) -> None:
-    """Ends this rank with an exit code after all of them have come to their end; no rank is aborted."""
+def leave(code: int) -> NoReturn:
+    """Ends this rank with an exit code after all of them have come to their end; no rank is aborted.
+
+    The process must end in good order (no ``os._exit``): MPICH takes its leave of the launcher only then, and where a
+    rank has not taken leave the launcher kills the others.
+    """
     from mpi4py import MPI
 
-    sys.stdout.flush()
-    sys.stderr.flush()
     MPI.Finalize()
-    os._exit(code)
+    sys.exit(code)
 
 
 def connect() -> Comm:

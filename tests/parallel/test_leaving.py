@@ -1,0 +1,14 @@
+"""Ranks take their leave of the launcher: nobody is killed at the end of a run that went well."""
+
+from pathlib import Path
+
+import pytest
+
+from .launching import command, ended
+
+
+@pytest.mark.parametrize("code", [0, 4])
+def test_many_ranks_end_with_their_own_code(code: int) -> None:
+    """Where ranks end without a word (``os._exit``), Hydra kills the rest: exit code 9 in most of these runs."""
+    done = ended(command(7, str(code), module=[str(Path(__file__).with_name("leaving.py"))]))
+    assert (done.returncode, done.stderr) == (code, ""), done.stdout
