@@ -66,9 +66,10 @@ def surface_of(
 def crowd_of(x: Floats, v: Floats | None = None, part: Indices | None = None) -> Crowd:
     """Free nodes of 1 kg with ids 0, 1, ... at ``x``."""
     n = len(x)
+    flown = np.zeros((n, 3)) if v is None else v
     return Crowd(
         np.arange(n), np.arange(n, dtype=np.int32), np.zeros(n, np.int32),
-        np.zeros(n, np.int32) if part is None else part, np.ones((n, 3)), x, np.zeros((n, 3)) if v is None else v,
+        np.zeros(n, np.int32) if part is None else part, np.ones((n, 3)), x, flown, flown,
     )  # fmt: skip
 
 

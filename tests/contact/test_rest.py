@@ -12,7 +12,7 @@ from conoid.worker.digest import digest
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.state import Indices
 
-from .kernels import edge_edge, edge_sizes, face_sizes, node_face
+from .kernels import edge_edge, edge_sizes, face_sizes, moments, node_face
 
 SHARDS = 60
 CORNERS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
@@ -29,7 +29,10 @@ def apart(one: Indices, two: Indices) -> Indices:
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("violence", [0.0, 0.02, 0.5])
 def test_who_rests_does_not_meet(seed: int, violence: float) -> None:
-    """Tets fly, turn and are knocked about; what the kernels find among all pairs is among those that are awake."""
+    """Tets fly, turn and are knocked about; what the kernels find among all pairs is among those that are awake.
+
+    Nodes look where their tet's corner points, more or less, and one in four everywhere.
+    """
     draw = np.random.default_rng(seed)
     x = (draw.uniform(-2.5, 2.5, (SHARDS, 1, 3)) + CORNERS).reshape(-1, 3)
     v = np.repeat(draw.normal(0.0, 0.4, (SHARDS, 3)), 4, axis=0)
@@ -41,6 +44,9 @@ def test_who_rests_does_not_meet(seed: int, violence: float) -> None:
     ridges = apart(np.repeat(shard, 6), np.repeat(shard, 6))
     ridges = ridges[ridges[:, 0] < ridges[:, 1]]
     size, length = face_sizes(x, faces), edge_sizes(x, edges)
+    outward = np.tile(CORNERS - CORNERS.mean(axis=0), (SHARDS, 1))[:, None] + draw.normal(0.0, 0.3, (len(x), 3, 3))
+    outward /= np.linalg.norm(outward, axis=2, keepdims=True)
+    outward[draw.uniform(size=len(x)) < 0.25] = 0.0
     rest = Rest(x, v, len(faces), len(edges), len(nodes), len(ridges))
     met, looked = 0, 0
     for _ in range(40):
@@ -48,14 +54,14 @@ def test_who_rests_does_not_meet(seed: int, violence: float) -> None:
         v = v + violence * draw.normal(0.0, 1.0, v.shape) * (draw.uniform(size=(len(v), 1)) < 0.1)
         rest.move(x, v, faces, edges, dt)
         some, few = rest.awake(nodes, ridges)
-        found = node_face(x, v, faces, nodes, dt, part)
+        found = node_face(x, v, faces, nodes, dt, part, out=outward)
         assert np.isin(found.pair[: found.n], some).all()
         alone = edge_edge(x, v, edges, np.ascontiguousarray(ridges[few]), dt)
         every = edge_edge(x, v, edges, ridges, dt)
         assert np.array_equal(alone.nodes[: alone.n], every.nodes[: every.n])
         met += found.n + every.n
         looked += len(some) + len(few)
-        rest.settle(some, few, nodes, ridges, faces, size, edges, length, x + dt * v, part)
+        rest.settle(some, few, nodes, ridges, faces, size, edges, length, moments(outward), x + dt * v, part)
         x = x + dt * v
     assert met > 20
     assert looked < 40 * (len(nodes) + len(ridges)) * (0.1 if violence < 0.1 else 0.5)
@@ -71,7 +77,7 @@ def test_a_pair_whose_face_has_new_corners_is_looked_at() -> None:
         rest.move(x, np.zeros_like(x), faces, edges, 1.0)
         some, few = rest.awake(pairs, none)
         assert len(some) == fresh
-        rest.settle(some, few, pairs, none, faces, sizes, edges, np.zeros(0), x, part)
+        rest.settle(some, few, pairs, none, faces, sizes, edges, np.zeros(0), np.zeros((5, 9)), x, part)
         rest.faces[0] = not fresh
 
 

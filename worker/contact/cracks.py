@@ -274,7 +274,7 @@ class Follower:
         scene.normals = extended(scene.normals, np.zeros((n, 9)))
         scene.before = extended(scene.before, rows.v)
         scene.pushes = extended(scene.pushes, np.zeros(n, bool))
-        scene.rest.add(rows.x, rows.v)
+        scene.rest.add(rows.x, rows.course)
         if (rows.local < 0).any():
             self._sort()
 

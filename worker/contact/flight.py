@@ -35,8 +35,10 @@ class Flight:
         self.size = _typical(found.faces.size, comm)
         """Of the faces of all ranks at the start, m."""
         self._skin = skin * self.size
+        self.until = 0.0
+        """Time to which the last search is good if nothing strays, s."""
+        self.begin(nodes, nodes.v, 0.0)
         self.follow(found, nodes, mobility)
-        self._x, self._v, self._t, self._until = nodes.x, nodes.v, 0.0, 0.0
 
     def follow(self, found: Surface, nodes: Nodes, mobility: Floats) -> None:
         """Takes a new surface; all ranks take part."""
@@ -46,39 +48,39 @@ class Flight:
         self.sides = self._whole(nodes, local)
         """What this rank has of the surface."""
 
-    def begin(self, nodes: Nodes, t: float, until: float) -> None:
-        """Free flight from time ``t`` on, good to the time ``until``, s."""
-        self._x, self._v, self._t, self._until = nodes.x.copy(), nodes.v.copy(), t, until
+    def begin(self, nodes: Nodes, course: Floats, t: float) -> None:
+        """Free flight with the velocities ``course`` (nodes, 3) from time ``t`` on."""
+        self._x, self._course, self._t = nodes.x.copy(), course.copy(), t
 
     def spent(self, nodes: Nodes, t: float, dt: float) -> bool:
         """Whether the flight is over, or a node strays by ``_SPENT`` of the skin, a step ``dt`` after ``t``."""
-        if t + dt > self._until:
+        if t + dt > self.until:
             return True
-        far = _strayed(nodes.x, nodes.v, self._x, self._v, self._found.flags, dt, t + dt - self._t)
+        far = _strayed(nodes.x, nodes.v, self._x, self._course, self._found.flags, dt, t + dt - self._t)
         return bool(far > (_SPENT * self._skin) ** 2)
 
     def keep(self, parcel: Parcel) -> None:
         """Adds the surface and its flight to a parcel."""
-        parcel.known["flight"] = self.size, self._skin, self._t, self._until
+        parcel.known["flight"] = self.size, self._skin, self._t, self.until
         parcel.nodes["flight.flags"], parcel.nodes["flight.x"] = self._found.flags, self._x
-        parcel.nodes["flight.v"] = self._v
+        parcel.nodes["flight.course"] = self._course
 
     def resume(self, found: Surface, nodes: Nodes, mobility: Floats, parcel: Parcel) -> None:
         """Takes them back, but for the surface, which is ``found``; all ranks take part."""
-        self.size, self._skin, self._t, self._until = parcel.known["flight"]
-        self._x, self._v = parcel.nodes["flight.x"], parcel.nodes["flight.v"]
+        self.size, self._skin, self._t, self.until = parcel.known["flight"]
+        self._x, self._course = parcel.nodes["flight.x"], parcel.nodes["flight.course"]
         self.follow(found, nodes, mobility)
 
     def grow(self, parents: Ints) -> None:
         """Takes up copies of nodes: they fly as their parents do."""
         found = self._found
         found.flags = extended(found.flags, found.flags[parents])
-        self._x, self._v = extended(self._x, self._x[parents]), extended(self._v, self._v[parents])
+        self._x, self._course = extended(self._x, self._x[parents]), extended(self._course, self._course[parents])
 
     def here(self, nodes: Nodes) -> Crowd:
         """Every node of this rank, by local index."""
         every = np.arange(nodes.n, dtype=np.int32)
-        return Crowd(nodes.id, every, nodes.owner, nodes.part, self.mobility, nodes.x, nodes.v)
+        return Crowd(nodes.id, every, nodes.owner, nodes.part, self.mobility, nodes.x, nodes.v, self._course)
 
     def _whole(self, nodes: Nodes, local: Indices) -> Sides:
         """``local`` (f, 4): nodes of the faces."""
@@ -93,10 +95,11 @@ class Flight:
         """Positions and velocities of the surface as they are."""
         crowd, found = self.sides.crowd, self._found
         held = crowd.local >= 0
-        crowd.x[held], crowd.v[held] = nodes.x[crowd.local[held]], nodes.v[crowd.local[held]]
+        local = crowd.local[held]
+        crowd.x[held], crowd.v[held], crowd.course[held] = nodes.x[local], nodes.v[local], self._course[local]
         far = ghosts.fetch(found.far, found.far_owner, self.here(nodes), self._comm)
         places = crowd.places(far.id)
-        crowd.x[places], crowd.v[places] = far.x, far.v
+        crowd.x[places], crowd.v[places], crowd.course[places] = far.x, far.v, far.course
 
     def normals(self, nodes: Nodes) -> Floats:
         """(nodes, 9) means over a node's faces, by area, of n and n n (meetings.node_face), zero off the surface; all
@@ -115,7 +118,7 @@ class Flight:
         about a face's length for all, much more for the few that are fast.
         """
         crowd, slaves = self.sides.crowd, self.sides.slaves
-        v = crowd.v[crowd.places(slaves)]
+        v = crowd.course[crowd.places(slaves)]
         sums = exact_sums(self._comm, np.column_stack([v, np.ones(len(v))]))
         if sums[3] == 0.0:
             return float(_LOOKS[0]), np.zeros(3)

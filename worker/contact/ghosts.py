@@ -9,7 +9,7 @@ from ..parallel.ownership import Neighbour
 from ..state import Floats, Indices, Ints, Nodes
 from .records import Crowd, Edges, Faces
 
-_CROWD_WORDS = 12
+_CROWD_WORDS = 15
 
 
 def pack(faces: Faces, edges: Edges, crowd: Crowd) -> Ints:
@@ -32,8 +32,8 @@ def unpack(words: Ints) -> tuple[Faces, Edges, Crowd]:
 
 
 def pack_crowd(crowd: Crowd) -> Ints:
-    """(n, 12) rows of nodes."""
-    floats = np.concatenate([crowd.mobility, crowd.x, crowd.v], axis=1)
+    """(n, 15) rows of nodes."""
+    floats = np.concatenate([crowd.mobility, crowd.x, crowd.v, crowd.course], axis=1)
     return np.column_stack([crowd.id, crowd.owner, crowd.part, np.ascontiguousarray(floats).view(np.int64)])
 
 
@@ -43,7 +43,7 @@ def unpack_crowd(words: Ints) -> Crowd:
     floats = np.ascontiguousarray(rows[:, 3:]).view(np.float64)
     return Crowd(
         rows[:, 0].copy(), np.full(len(rows), -1, np.int32), rows[:, 1].astype(np.int32), rows[:, 2].astype(np.int32),
-        floats[:, :3].copy(), floats[:, 3:6].copy(), floats[:, 6:].copy(),
+        floats[:, :3].copy(), floats[:, 3:6].copy(), floats[:, 6:9].copy(), floats[:, 9:].copy(),
     )  # fmt: skip
 
 

@@ -144,9 +144,11 @@ def needed(gap0, gap1, speed, dt):  # type: ignore[no-untyped-def]
     return (min(gap0, 0.0) - gap1) / dt + back
 
 
-@njit(f"boolean({_V2}, int64, float64[::1])", cache=True)
-def _looks_at(out, s, m):  # type: ignore[no-untyped-def]
-    """Whether node s looks at a face of normal m; one without faces looks at any."""
+@njit(f"UniTuple(float64, 2)({_V2}, int64, float64[::1])", cache=True)
+def facing(out, s, m):  # type: ignore[no-untyped-def]
+    """Mean, and mean less deviation, of the cosines of m and the normals of the faces of node s; -1 for one without
+    faces, which looks at any.
+    """
     mean, square, length = 0.0, 0.0, 0.0
     for a in range(3):
         b, c = (a + 1) % 3, (a + 2) % 3
@@ -154,8 +156,15 @@ def _looks_at(out, s, m):  # type: ignore[no-untyped-def]
         length += out[s, a] * out[s, a]
         square += out[s, 3 + a] * m[a] * m[a] + 2.0 * out[s, 6 + a] * m[b] * m[c]
     if length == 0.0:
-        return True
-    return mean <= FACING and mean - np.sqrt(max(square - mean * mean, 0.0)) <= -FACING
+        return -1.0, -1.0
+    return mean, mean - np.sqrt(max(square - mean * mean, 0.0))
+
+
+@njit(f"boolean({_V2}, int64, float64[::1])", cache=True)
+def _looks_at(out, s, m):  # type: ignore[no-untyped-def]
+    """Whether node s looks at a face of normal m."""
+    mean, least = facing(out, s, m)
+    return mean <= FACING and least <= -FACING
 
 
 @njit(f"int64({_OUT}, int64, {_N2}, float64[::1], {_V2}, {_IN})", cache=True, error_model="numpy")

@@ -78,6 +78,8 @@ class Crowd(Rows):
     """(n, 3) position, m."""
     v: Floats
     """(n, 3) velocity, m/s."""
+    course: Floats
+    """(n, 3) velocity with which it flies on for a search, m/s; see course.py."""
 
     def places(self, ids: Ints) -> Indices:
         """Where these global ids stand, in the shape of ``ids``; all must be here."""

@@ -8,6 +8,9 @@ and is ``slack`` further apart than it could meet at, it rests for as long as
 U the relative speed with which the two flew at the search, t the time since, and P how far each has strayed from that
 flight: the lengths of all deviations, step by step. Both sides of that are sums that only grow, so a pair keeps one
 number. It is exact: a pair that rests would not have met. No bit of the answer depends on it, and ranks need not agree.
+
+A node that does not look at a face rests until the face may have turned to it. The normal of a face of sides e, f and
+area A changes by less than D (|e| + |f| + D) / A while no two of its corners have moved by D against each other.
 """
 
 from dataclasses import dataclass
@@ -16,11 +19,13 @@ import numpy as np
 from numba import njit
 
 from ..state import Flags, Floats, Indices, extended
-from .meetings import DEEP, DEEP_SELF, NEAR, foot, height, off
+from .meetings import DEEP, DEEP_SELF, FACING, NEAR, facing, foot, height, off
 
 _V1, _V2, _N1, _N2 = "float64[::1]", "float64[:, ::1]", "int32[::1]", "int32[:, ::1]"
 _ROUND = 0.01
 """Of the size of a face and of the length of an edge: added to the distance at which a pair may meet."""
+_BEND = 0.1
+"""Largest D, of the two sides of a face."""
 
 
 @dataclass
@@ -81,6 +86,8 @@ class Rest:
         """(e,) the same."""
         self._none: Flags = np.zeros(len(x), bool)
         self._dt, self._t = 0.0, 0.0
+        self.fresh = True
+        """Whether no step has been made since the search."""
 
     def add(self, x: Floats, v: Floats) -> None:
         """Takes up more nodes, as they are, (n, 3) each."""
@@ -94,7 +101,7 @@ class Rest:
 
     def move(self, x: Floats, v: Floats, faces: Indices, edges: Indices, dt: float) -> None:
         """A step ``dt`` from the positions ``x`` on, with velocities ``v`` before contact."""
-        self._t += self._dt
+        self._t, self.fresh = self._t + self._dt, False
         _stray(*_of(self._nodes), self._x, self._v, x, v, self._dt, dt)
         _follow(*_of(self._faces), faces, 3, self._nodes.step, self._nodes.reach)
         _follow(*_of(self._edges), edges, 2, self._nodes.step, self._nodes.reach)
@@ -117,15 +124,15 @@ class Rest:
 
     def settle(
         self, pairs: Indices, edges: Indices, node_face: Indices, edge_edge: Indices, faces: Indices, size: Floats,
-        sides: Indices, length: Floats, x: Floats, part: Indices,
+        sides: Indices, length: Floats, normals: Floats, x: Floats, part: Indices,
     ) -> None:  # fmt: skip
-        """Lets candidates that were looked at, ``pairs`` and ``edges``, rest; ``x`` (crowd, 3) at the end of the step.
+        """Lets candidates, ``pairs`` and ``edges``, rest; ``x`` (crowd, 3) at the end of the step.
 
-        ``size`` of the ``faces`` and ``length`` of the edges ``sides``: meetings.py.
+        ``size`` of the ``faces``, ``length`` of the edges ``sides``, ``normals`` of the nodes: meetings.py.
         """
         end, wait, trail, nodes = self._t + self._dt, self._node_face, self._faces, self._nodes
         _settle_nodes(
-            wait.until, wait.speed, pairs, node_face, faces, size, x, self._v, part, nodes.path, nodes.reach,
+            wait.until, wait.speed, pairs, node_face, faces, size, normals, x, self._v, part, nodes.path, nodes.reach,
             trail.path, trail.reach, end,
         )  # fmt: skip
         wait, trail = self._edge_edge, self._edges
@@ -183,12 +190,25 @@ def _between(v, a, b):  # type: ignore[no-untyped-def]
     return np.sqrt(square)
 
 
+@njit(f"float64({_V2}, {_V2}, int64, int64, int64, int64, {_V1})", cache=True, error_model="numpy")
+def _bent(out, x, s, i, j, k, m):  # type: ignore[no-untyped-def]
+    """Half of the D, m, that a face of normal m has to spare before node s looks at it; none, or less, when it does."""
+    mean, least = facing(out, s, m)
+    turn = max(mean - FACING, 0.5 * (least + FACING))
+    ee, ff, ef = 0.0, 0.0, 0.0
+    for a in range(3):
+        e, f = x[j, a] - x[i, a], x[k, a] - x[i, a]
+        ee, ff, ef = ee + e * e, ff + f * f, ef + e * f
+    sides = np.sqrt(ee) + np.sqrt(ff)
+    return 0.5 * min(0.5 * turn * np.sqrt(ee * ff - ef * ef) / ((1.0 + _BEND) * sides), _BEND * sides)
+
+
 @njit(
-    f"void({_V1}, {_V1}, {_N1}, {_N2}, {_N2}, {_V1}, {_V2}, {_V2}, {_N1}, {_V1}, {_V1}, {_V1}, {_V1}, float64)",
+    f"void({_V1}, {_V1}, {_N1}, {_N2}, {_N2}, {_V1}, {_V2}, {_V2}, {_V2}, {_N1}, {_V1}, {_V1}, {_V1}, {_V1}, float64)",
     cache=True,
     error_model="numpy",
 )
-def _settle_nodes(until, speed, some, pairs, faces, size, x, v_then, part, path1, reach1, path2, reach2, end):  # type: ignore[no-untyped-def]
+def _settle_nodes(until, speed, some, pairs, faces, size, out, x, v_then, part, path1, reach1, path2, reach2, end):  # type: ignore[no-untyped-def]
     b, m = np.empty(3), np.empty(3)
     for p in some:
         if np.isnan(until[p]):
@@ -201,6 +221,9 @@ def _settle_nodes(until, speed, some, pairs, faces, size, x, v_then, part, path1
         speed[p] = max(_between(v_then, s, i), _between(v_then, s, j), _between(v_then, s, k))
         deep = _ROUND + max(DEEP_SELF if part[s] == part[i] else DEEP, NEAR)
         slack = apart - deep * size[f]
+        if not slack > 0.0:
+            slack = _bent(out, x, s, i, j, k, m)
+            speed[p] = max(_between(v_then, i, j), _between(v_then, i, k))
         until[p] = slack + path1[s] - reach1[s] + path2[f] - reach2[f] + speed[p] * end if slack > 0.0 else np.nan
 
 

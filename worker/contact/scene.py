@@ -223,7 +223,7 @@ def _with_ghosts(sides: Sides, rules: Rules, horizon: float, drift: Floats, comm
     crowd = sides.crowd
 
     def boxes(things: Things) -> Boxes:
-        return search.swept(things, crowd.x, crowd.v - drift, horizon)
+        return search.swept(things, crowd.x, crowd.course - drift, horizon)
 
     nodes, faces, edges = boxes(sides.nodes), boxes(sides.face_things(DEEP)), boxes(sides.edge_things)
     askers = Boxes(np.concatenate([nodes.low, edges.low]), np.concatenate([nodes.high, edges.high]))
@@ -249,7 +249,7 @@ def _joined(sides: Sides, others: list[tuple[Faces, Edges, Crowd]]) -> Sides:
 
 def _node_face(seen: Sides, rules: Rules, horizon: float, drift: Floats) -> Indices:
     """(p, 2) place of a node and index of a face, sorted by node, then by face."""
-    crowd, slaves, v = seen.crowd, seen.nodes, seen.crowd.v - drift
+    crowd, slaves, v = seen.crowd, seen.nodes, seen.crowd.course - drift
     own = np.eye(len(rules.allowed), dtype=bool)
     found = [
         search.find(slaves, seen.face_things(deep), crowd.x, v, crowd.part, rules.allowed & which, horizon, None)
@@ -275,7 +275,7 @@ def _edge_edge(seen: Sides, own: int, rules: Rules, horizon: float, drift: Float
     rank, order = np.empty(edges.n, np.int64), np.lexsort((edges.nodes[:, 1], edges.nodes[:, 0]))
     rank[order] = np.arange(edges.n)
     mine = Things(things.corners[:own], things.reach[:own])
-    pairs = search.find(mine, things, crowd.x, crowd.v - drift, crowd.part, rules.allowed, horizon, rank)
+    pairs = search.find(mine, things, crowd.x, crowd.course - drift, crowd.part, rules.allowed, horizon, rank)
     pairs = sift.edges(pairs, seen.edge_places, edges.size, crowd, seen.skin, horizon)
     return order[_sorted(rank[pairs[:, 0]], rank[pairs[:, 1]], edges.n)].astype(np.int32)
 
@@ -306,7 +306,7 @@ def compact(seen: Sides, node_face: Indices, edge_edge: Indices, sent: int, node
         room=Meetings.room(room), diagonal=np.empty((room, 2)), push=np.empty((room, 4)),
         shares=shares, impulse=impulse, place=place, pushes=pushes,
         cracks=np.zeros((0, 6), np.int32),
-        rest=Rest(crowd.x, crowd.v, len(which_faces), len(which_edges), len(node_face), len(edge_edge)),
+        rest=Rest(crowd.x, crowd.course, len(which_faces), len(which_edges), len(node_face), len(edge_edge)),
         total=np.zeros((crowd.n, 3), np.int64), normals=np.zeros((crowd.n, 9)), before=np.zeros((crowd.n, 3)),
     )  # fmt: skip
 

@@ -21,13 +21,13 @@ _STEEPEST = 0.05
 
 def faces(pairs: Indices, places: Indices, size: Floats, crowd: Crowd, skin: float, horizon: float) -> Indices:
     """Of ``pairs`` (p, 2), place of a node and index of a face, those that may meet; ``places`` (f, 4)."""
-    kept = _near_faces(pairs, places, size, crowd.x, crowd.v, crowd.part, skin, horizon)
+    kept = _near_faces(pairs, places, size, crowd.x, crowd.course, crowd.part, skin, horizon)
     return np.asarray(pairs[kept])
 
 
 def edges(pairs: Indices, places: Indices, size: Floats, crowd: Crowd, skin: float, horizon: float) -> Indices:
     """Of ``pairs`` (p, 2), indices of two edges, those that may meet; ``places`` (e, 4)."""
-    return np.asarray(pairs[_near_edges(pairs, places, size, crowd.x, crowd.v, skin, horizon)])
+    return np.asarray(pairs[_near_edges(pairs, places, size, crowd.x, crowd.course, skin, horizon)])
 
 
 @njit("float64(float64[::1])", cache=True)

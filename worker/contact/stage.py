@@ -23,6 +23,7 @@ from ..state import Flags, Floats, Indices, Ints, Model, Nodes, extended
 from ..timers import Timers
 from ..topology import Split
 from . import held, meetings, pairing, scene, surface, sweeps
+from .course import courses
 from .cracks import Cracks, Follower, across, news
 from .flight import Flight
 from .scene import Rules, Scene
@@ -235,6 +236,7 @@ class Contact(Boundary):
             old.free()
         if self._fractures:
             self._expose(state)
+        flight.begin(state, self._courses(state), clock.t)
         if self._changed:
             flight.follow(self._surface, state, self._mobility)
             self._changed = False
@@ -249,9 +251,15 @@ class Contact(Boundary):
             self._scene.remember(old, state, self._comm)
         self._look(self._scene, state)
         self._scene.normals[self._scene.held] = flight.normals(state)[self._scene.local]
-        flight.begin(state, clock.t, clock.t + horizon)
+        flight.until = clock.t + horizon
         self.due, self._apart, self._last = False, False, clock.step
         self.searches += 1
+
+    def _courses(self, state: Nodes) -> Floats:
+        """(nodes, 3) how the nodes fly on; all ranks take part."""
+        if not self._fractures:
+            return state.v
+        return courses(self._model.blocks, state, self._neighbours, self._comm)
 
     def _connect(self, found: Scene, state: Nodes) -> None:
         """Takes the cracks up into a new scene, and settles who shares what of it; all ranks take part."""
@@ -311,14 +319,15 @@ class Contact(Boundary):
         out = (room.nodes, room.weights, room.normals, room.wanted, room.friction, room.pair)
         found = (crowd.x, crowd.v, crowd.part, self._mu, dt)
         rest = now.rest
+        surfaces = now.faces, now.face_size, now.edges, now.edge_size, now.normals
+        if rest.fresh:
+            pairs, edges = _all(now.node_face), _all(now.edge_edge)
+            rest.settle(pairs, edges, now.node_face, now.edge_edge, *surfaces, crowd.x, crowd.part)
         rest.move(crowd.x, crowd.v, now.faces, now.edges, dt)
         pairs, edges = rest.awake(now.node_face, now.edge_edge)
         n = meetings.node_face(*out, 0, now.faces, now.face_size, now.normals, now.node_face, pairs, *found)
         n = meetings.edge_edge(*out, n, now.edges, now.edge_size, now.edge_edge, edges, *found)
-        rest.settle(
-            pairs, edges, now.node_face, now.edge_edge, now.faces, now.face_size, now.edges, now.edge_size,
-            crowd.x + dt * crowd.v, crowd.part,
-        )  # fmt: skip
+        rest.settle(pairs, edges, now.node_face, now.edge_edge, *surfaces, crowd.x + dt * crowd.v, crowd.part)
         n, apart = across(*out, n, now.cracks, self._flight.size, *found)
         self._apart |= bool(apart)
         return int(n)
@@ -337,6 +346,10 @@ class Contact(Boundary):
             self.contact_loss, self.external_work, now.local, now.held, now.before, now.total, now.crowd.mobility,
             self._scale,
         )  # fmt: skip
+
+
+def _all(rows: Indices) -> Indices:
+    return np.arange(len(rows), dtype=np.int32)
 
 
 def _mobility(nodes: Nodes, bounds: list[Boundary]) -> tuple[Floats, Flags]:
