@@ -163,9 +163,12 @@ def _contact_domain(extent: Extent, book: Book) -> None:
     if extent is not QUICK:
         from . import plot
 
-        found = contact_cost.domains()
-        book.add("Contact domain", contact_cost.domain_report(found), found)
-        plot.domains(found, OUT / "contact_domain.png")
+        found = {ranks: contact_cost.domains(ranks, steps) for ranks, steps in contact_cost.STEPS.items()}
+        texts = []
+        for ranks, steps in contact_cost.STEPS.items():
+            plot.domains(found[ranks], steps, OUT / f"contact_domain_{ranks}.png")
+            texts.append(f"{ranks} ranks, {steps} steps\n\n{contact_cost.domain_report(found[ranks], steps)}")
+        book.add("Contact domain", "\n\n".join(texts), found)
 
 
 def _fracture(extent: Extent, book: Book) -> None:

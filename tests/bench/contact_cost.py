@@ -76,9 +76,8 @@ def _row(cost: Cost, names: Sequence[str]) -> list[Cell]:
     ]  # fmt: skip
 
 
-RANKS = 8
-"""As many as the paper's."""
-STEPS = 4000
+STEPS = {8: 1500, 16: 400}
+"""By ranks; the paper has 8."""
 DOMAINS = ("box", "arbitrary")
 PAPER = {
     "faces that a search looks at": "1st: 7,284 / 5,467 = 1.33 (fig. 4)",
@@ -89,7 +88,7 @@ Run = list[dict[str, Any]]
 """What contact_domain tells, by rank."""
 
 
-def domains(ranks: int = RANKS, steps: int = STEPS) -> dict[str, list[Run]]:
+def domains(ranks: int, steps: int) -> dict[str, list[Run]]:
     """Both domains on the long rod, coarse and on its way, each twice."""
     launch = [str(Path(sys.executable).with_name("mpiexec")), "-n", str(ranks), sys.executable, "-m", "mpi4py"]
     words = [*launch, "-m", "tests.bench.contact_domain", str(steps), *DOMAINS]
@@ -99,7 +98,7 @@ def domains(ranks: int = RANKS, steps: int = STEPS) -> dict[str, list[Run]]:
     return found
 
 
-def kinds(runs: Sequence[Run], steps: int = STEPS) -> dict[str, list[float]]:
+def kinds(runs: Sequence[Run], steps: int) -> dict[str, list[float]]:
     """Rank by rank, the mean of the runs with one domain."""
 
     def mean(number: Callable[[dict[str, Any]], float]) -> list[float]:
@@ -115,7 +114,7 @@ def kinds(runs: Sequence[Run], steps: int = STEPS) -> dict[str, list[float]]:
     }
 
 
-def domain_report(found: dict[str, list[Run]], steps: int = STEPS) -> str:
+def domain_report(found: dict[str, list[Run]], steps: int) -> str:
     """Box / arbitrary: mean over the ranks, worst rank, first and sixth; the ratio of the means; the paper's."""
     box, other = (kinds(found[name], steps) for name in DOMAINS)
     rows: list[list[Cell]] = []
@@ -123,6 +122,10 @@ def domain_report(found: dict[str, list[Run]], steps: int = STEPS) -> str:
         two = other[kind]
         pairs = [(f(one), f(two)) for f in (statistics.fmean, max, lambda of: of[0], lambda of: of[5])]
         ratios = [f"{a / b:.2f}" if b else "-" for a, b in pairs[:2]]
-        rows.append([kind, *(f"{a:.3g} / {b:.3g}" for a, b in pairs), *ratios, PAPER.get(kind, "-")])
+        rows.append([kind, *(f"{_short(a)} / {_short(b)}" for a, b in pairs), *ratios, PAPER.get(kind, "-")])
     head = ["box / arbitrary", "mean of the ranks", "worst rank", "1st", "6th", "ratio of means", "of worst", "paper"]
     return table(head, rows)
+
+
+def _short(number: float) -> str:
+    return f"{number:,.0f}" if number >= 100.0 else f"{number:.3g}"

@@ -87,11 +87,11 @@ def growth(sizes: Sequence[Growth], path: Path) -> None:
     plt.close(figure)
 
 
-def domains(found: Mapping[str, Sequence[Ranks]], path: Path) -> None:
+def domains(found: Mapping[str, Sequence[Ranks]], steps: int, path: Path) -> None:
     """Box and arbitrary contact domain: faces and CPU time of each rank, and the course of two ranks, as a PNG."""
     figure, (looked, cpu, course) = plt.subplots(1, 3, figsize=(14, 4), layout="constrained")
     for name, colour, shift in zip(DOMAINS, (_COLOURS["split"], _COLOURS["nodal"]), (-0.2, 0.2), strict=True):
-        numbers = kinds(found[name])
+        numbers = kinds(found[name], steps)
         for ax, kind in ((looked, "faces that a search looks at"), (cpu, "contact, CPU s")):
             at = [k + 1 + shift for k in range(len(numbers[kind]))]
             ax.bar(at, numbers[kind], 0.4, color=colour, label=name)
