@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from .study import Study
 
-_WIDTH, _HEIGHT, _LEFT, _TOP, _SIDE = 500, 400, 56, 36, 320
+_WIDTH, _HEIGHT, _LEFT, _TOP, _SIDE = 424, 464, 56, 36, 320
 _BLUE, _RED, _GREY = "#1b6ca8", "#c8553d", "#999999"
 
 
@@ -38,6 +38,11 @@ class _Frame:
     def marks(self, values: Mapping[int, float], colour: str, fill: str) -> str:
         return "\n".join(_mark(*self.place(*pair), colour, fill) for pair in values.items())
 
+    def labels(self, values: Mapping[int, float], right: int, down: int) -> str:
+        """The values beside their marks."""
+        places = ((*self.place(*pair), pair[1]) for pair in values.items())
+        return "\n".join(f'<text x="{x + right:.1f}" y="{y + down:.1f}">{value:.2f}</text>' for x, y, value in places)
+
 
 def speed_up(study: Study) -> str:
     """The figure; both axes are logarithmic."""
@@ -45,7 +50,8 @@ def speed_up(study: Study) -> str:
     worst = {run.ranks: study.runs[0].time / run.worst for run in study.runs}
     measured = {run.ranks: study.runs[0].wall / run.wall for run in study.runs if run.ranks <= study.cores}
     values = (*worst.values(), *measured.values())
-    most = max(1, math.ceil(math.log2(max(*projected, *study.paper, 2))))
+    paper = study.paper.speed_up if study.paper else {}
+    most = max(1, math.ceil(math.log2(max(*projected, *paper, 2))))
     frame = _Frame(min(0, math.floor(math.log2(min(values)))), most)
     return "\n".join([
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {_HEIGHT}" font-family="sans-serif" '
@@ -54,10 +60,11 @@ def speed_up(study: Study) -> str:
         frame.line({1: 1.0, 2**most: 2.0**most}, _GREY, "4 4"), frame.line(projected, _BLUE),
         frame.line(worst, _BLUE, "2 3"),
         frame.marks(projected, _BLUE, _BLUE), frame.marks(measured, _BLUE, "white"),
-        frame.marks(study.paper, _RED, _RED),
+        frame.marks(paper, _RED, _RED), frame.labels(paper, 8, 4),
+        frame.labels({ranks: value for ranks, value in projected.items() if ranks > 1}, -10, -10),
         _legend(0, "projected, a core a rank; dots: at worst", _BLUE, _BLUE),
         _legend(1, "wall time, this machine", _BLUE, "white"),
-        *([_legend(2, "Moon, Kim and Lee, measured", _RED, _RED)] if study.paper else []),
+        *([_legend(2, f"measured, Moon, Kim and Lee, {study.paper.figure}", _RED, _RED)] if study.paper else []),
         f'<text x="{_LEFT}" y="20" font-size="14">{study.case}: speed-up</text>',
         f'<text x="{_LEFT + _SIDE / 2}" y="{_TOP + _SIDE + 36}" text-anchor="middle">ranks</text>', "</svg>", "",
     ])  # fmt: skip
@@ -68,5 +75,5 @@ def _mark(x: float, y: float, colour: str, fill: str) -> str:
 
 
 def _legend(row: int, text: str, colour: str, fill: str) -> str:
-    x, y = _LEFT + 16, _TOP + 18 + 20 * row
+    x, y = _LEFT + 4, _TOP + _SIDE + 58 + 20 * row
     return _mark(x, y - 4, colour, fill) + f'<text x="{x + 12}" y="{y}">{text}</text>'

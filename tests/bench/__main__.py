@@ -58,7 +58,7 @@ QUICK = Extent(
 )  # fmt: skip
 FULL = Extent(
     sizes=(50_000, 144_000, 500_000), metals=speed.METALS, rounds=3, akantu=True, stages=10,
-    growth=(50_000, 150_000, 500_000, 2_000_000), startup=3,
+    growth=(50_000, 150_000, 500_000, 2_000_000, 5_000_000), startup=3,
     plans=accuracy.grid([0.54, 0.8, 1.07], [0.9]) + accuracy.grid([1.07], [0.45]), telemetry=40, quads=(3, 4, 6),
     shots=long_rod.MESHES[:2],
 )  # fmt: skip
@@ -119,8 +119,11 @@ def _taylor(extent: Extent, book: Book) -> None:
 
 
 def _growth(extent: Extent, book: Book) -> None:
+    from . import plot
+
     sizes = growth.measure(extent.growth, extent.rounds)
     book.add("Cost and memory of a tet", growth.report(sizes), [asdict(s) for s in sizes], gates.of_growth(sizes))
+    plot.growth(sizes, OUT / "growth.png")
 
 
 def _startup(extent: Extent, book: Book) -> None:
@@ -152,10 +155,20 @@ def _telemetry(extent: Extent, book: Book) -> None:
 
 def _contact(extent: Extent, book: Book) -> None:
     costs = list(contact_cost.measure(contact_cost.SCENES[:1] if extent is QUICK else contact_cost.SCENES))
-    found = contact_cost.domains() if extent is not QUICK else {}
-    text = contact_cost.report(costs) + (f"\n\n{contact_cost.domain_report(found)}" if found else "")
-    data = {"scenes": {c.scene.name: c.outcome.phases for c in costs}, "domains": found}
-    book.add("Contact", text, data, gates.of_contact(costs))
+    data = {c.scene.name: c.outcome.phases for c in costs}
+    book.add("Contact", contact_cost.report(costs), data, gates.of_contact(costs))
+
+
+def _contact_domain(extent: Extent, book: Book) -> None:
+    if extent is not QUICK:
+        from . import plot
+
+        found = {ranks: contact_cost.domains(ranks, steps) for ranks, steps in contact_cost.STEPS.items()}
+        texts = []
+        for ranks, steps in contact_cost.STEPS.items():
+            plot.domains(found[ranks], steps, OUT / f"contact_domain_{ranks}.png")
+            texts.append(f"{ranks} ranks, {steps} steps\n\n{contact_cost.domain_report(found[ranks], steps)}")
+        book.add("Contact domain", "\n\n".join(texts), found)
 
 
 def _fracture(extent: Extent, book: Book) -> None:
@@ -194,8 +207,8 @@ def _long_rod(extent: Extent, book: Book) -> None:
 
 PARTS: dict[str, Callable[[Extent, Book], None]] = {
     "speed": _speed, "akantu": _akantu, "taylor": _taylor, "growth": _growth, "startup": _startup,
-    "accuracy": _accuracy, "telemetry": _telemetry, "contact": _contact, "fracture": _fracture, "cracks": _cracks,
-    "glass_bar": _glass_bar, "long_rod": _long_rod,
+    "accuracy": _accuracy, "telemetry": _telemetry, "contact": _contact, "contact_domain": _contact_domain,
+    "fracture": _fracture, "cracks": _cracks, "glass_bar": _glass_bar, "long_rod": _long_rod,
 }  # fmt: skip
 
 

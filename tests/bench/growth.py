@@ -1,4 +1,7 @@
-"""How cost and memory grow with the mesh: elastic, without viscosity, a structured box, up to 2 million tets."""
+"""How cost and memory grow with the mesh: an elastic structured box, without viscosity, of 50,000 to 5 million tets.
+
+``armed``: of glass that may fracture and whose surface may meet itself; it is stretched so little that nothing breaks.
+"""
 
 import json
 import re
@@ -8,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from conoid.cases import schema
 from conoid.worker.mesh.build import build as build_mesh
 
 from .gather_scatter import GatherScatter
@@ -20,6 +24,7 @@ from .table import Cell, table
 class Growth:
     """One size: CPU ns a tet and step, and bytes of the process."""
 
+    armed: bool
     tets: int
     best: float
     median: float
@@ -38,36 +43,51 @@ class Growth:
         more = self.tets - smaller.tets
         return (self.peak - smaller.peak) / more, (self.steady - smaller.steady) / more
 
+    @property
+    def bytes_each(self) -> tuple[float, float]:
+        """Bytes a tet beyond what the process takes without a mesh: at the peak, and steady."""
+        return (self.peak - self.base) / self.tets, (self.steady - self.base) / self.tets
+
 
 def measure(sizes: Sequence[int], rounds: int = 4) -> list[Growth]:
-    """Each size in a process of its own, so that its memory is its own; the mesh is in the cache by then."""
-    return [_apart(size, rounds) for size in sizes]
+    """Elastic, then armed; each in a process of its own, so that its memory is its own; its mesh is in the cache."""
+    return [_apart(size, rounds, armed) for armed in (False, True) for size in sizes]
 
 
-def _apart(size: int, rounds: int) -> Growth:
+def _apart(size: int, rounds: int, armed: bool) -> Growth:
     build_mesh(box(size, "structured"), Path())
     done = subprocess.run(
-        [sys.executable, "-m", "tests.bench.growth", str(size), str(rounds)],
+        [sys.executable, "-m", "tests.bench.growth", str(size), str(rounds), str(int(armed))],
         cwd=Path(__file__).parents[2], stdout=subprocess.PIPE, text=True, timeout=1800, check=True,
     )  # fmt: skip
     return Growth(**json.loads(done.stdout))
 
 
-def _here(size: int, rounds: int) -> Growth:
+def here(size: int, rounds: int, armed: bool) -> Growth:
+    """In this process, which must not have had another mesh. Raises RuntimeError if something breaks."""
     base = _resident("VmRSS")
-    ride = Ride(case("steel", "standard", box(size, "structured"), viscosity=False))
+    ride = Ride(scene(size, armed))
     peak = _resident("VmHWM")
-    ride.stretch(1e-5)
+    ride.stretch(1e-7 if armed else 1e-5)
     steps = SAMPLE_EVERY * max(1, round(4e6 / SAMPLE_EVERY / ride.tets))
     ride.steps(steps)
     steady = _resident("VmRSS")
     kernel = GatherScatter(ride.sim)
     work = {"step": lambda: ride.steps(steps), "limit": lambda: kernel.sweeps(steps)}
     times, per = take_turns(work, rounds), 1e9 / (steps * ride.tets)
+    if ride.sim.fracture is not None and ride.sim.fracture.broken:
+        raise RuntimeError("the glass has broken; this measures what does not")
     return Growth(
-        tets=ride.tets, best=times["step"].best * per, median=times["step"].median * per, spread=times["step"].spread,
-        limit=times["limit"].best * per, base=base, peak=peak, steady=steady,
+        armed=armed, tets=ride.tets, best=times["step"].best * per, median=times["step"].median * per,
+        spread=times["step"].spread, limit=times["limit"].best * per, base=base, peak=peak, steady=steady,
     )  # fmt: skip
+
+
+def scene(size: int, armed: bool) -> schema.Case:
+    """A box that is stretched: of steel, or of glass with fracture and contact."""
+    plain = case("soda_lime" if armed else "steel", "standard", box(size, "structured"), viscosity=False)
+    parts = tuple(part.model_copy(update={"fracture": schema.Fracture()}) for part in plain.parts)
+    return plain.model_copy(update={"parts": parts}) if armed else plain
 
 
 def _resident(name: str) -> int:
@@ -80,15 +100,17 @@ def report(sizes: Sequence[Growth]) -> str:
     """Cost and memory of each size; bytes a tet against the size before."""
     rows: list[list[Cell]] = []
     for before, now in zip([None, *sizes], sizes, strict=False):
-        peak, steady = now.bytes_a_tet(before) if before else (None, None)
+        first = next(s for s in sizes if s.armed == now.armed)
+        peak, steady = now.bytes_a_tet(before) if before and now is not first else (None, None)
         rows.append([
-            now.tets, f"{now.best:.0f} ({now.median:.0f})", f"{now.limit:.0f}", f"{now.best / sizes[0].best:.2f}",
-            round(now.peak / 2**20), round(now.steady / 2**20), peak and round(peak), steady and round(steady),
+            "armed" if now.armed else "elastic", now.tets, f"{now.best:.0f} ({now.median:.0f})", f"{now.limit:.0f}",
+            f"{now.best / first.best:.2f}", round(now.peak / 2**20), round(now.steady / 2**20),
+            peak and round(peak), steady and round(steady),
         ])  # fmt: skip
-    head = ["tets", "ns a tet, best (median)", "gather-scatter", "cost / first", "peak MiB", "steady MiB",
+    head = ["box", "tets", "ns a tet, best (median)", "gather-scatter", "cost / first", "peak MiB", "steady MiB",
             "peak bytes a tet more", "steady bytes a tet more"]  # fmt: skip
     return table(head, rows) + f"\n\nBefore the mesh a process takes {sizes[0].base / 2**20:.0f} MiB.\n"
 
 
 if __name__ == "__main__":
-    print(json.dumps(asdict(_here(int(sys.argv[1]), int(sys.argv[2])))))
+    print(json.dumps(asdict(here(int(sys.argv[1]), int(sys.argv[2]), sys.argv[3] == "1"))))

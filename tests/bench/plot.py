@@ -1,6 +1,6 @@
-"""Speed against error, drawn: what a quantity of a Taylor bar costs, how it approaches its limit; paths of cracks."""
+"""Drawn: what a quantity of a Taylor bar costs, how it approaches its limit; growth with the mesh; paths of cracks."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import matplotlib
@@ -11,7 +11,10 @@ import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 
 from .accuracy import BARS, Answer
+from .contact_cost import DOMAINS, kinds
+from .contact_cost import Run as Ranks
 from .cracks import Run
+from .growth import Growth
 from .scene import FORMS
 
 _TITLES = {"taylor_copper": "Copper, 227 m/s", "taylor_42crmo4": "42CrMo4 steel, 287 m/s"}
@@ -56,6 +59,51 @@ def paths(runs: Sequence[Run], path: Path) -> None:
     figure.supylabel("y, mm", fontsize=10)
     figure.colorbar(dots, ax=axes, label="open since, us", shrink=0.8)
     figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def growth(sizes: Sequence[Growth], path: Path) -> None:
+    """CPU time a tet and step, and bytes a tet, against the number of tets, elastic and armed, as a PNG.
+
+    Bytes are those beyond what a process takes without a mesh.
+    """
+    figure, (cost, memory) = plt.subplots(1, 2, figsize=(10, 4), layout="constrained")
+    for armed, name in ((False, "elastic"), (True, "fracture and contact armed")):
+        series = [s for s in sizes if s.armed == armed]
+        tets, colour = [s.tets for s in series], _COLOURS["split" if armed else "nodal"]
+        cost.plot(tets, [s.best for s in series], "o-", color=colour, label=name)
+        cost.plot(tets, [s.median for s in series], "o", color=colour, markerfacecolor="white", zorder=1)
+        memory.plot(tets, [s.bytes_each[0] for s in series], "^--", color=colour, label=f"{name}, while it is set up")
+        memory.plot(tets, [s.bytes_each[1] for s in series], "o-", color=colour, label=f"{name}, while it steps")
+    cost.plot([s.tets for s in sizes if not s.armed], [s.limit for s in sizes if not s.armed], "s:", color="#999999",
+              label="gather and scatter alone")  # fmt: skip
+    cost.set(ylabel="CPU ns a tet and step: best, open: median")
+    memory.set(ylabel="bytes a tet")
+    for ax in (cost, memory):
+        ax.set(xscale="log", xlabel="tets", ylim=(0, None))
+        ax.grid(alpha=0.3)
+        ax.legend(fontsize=8, frameon=False)
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def domains(found: Mapping[str, Sequence[Ranks]], steps: int, path: Path) -> None:
+    """Box and arbitrary contact domain: faces and CPU time of each rank, and the course of two ranks, as a PNG."""
+    figure, (looked, cpu, course) = plt.subplots(1, 3, figsize=(14, 4), layout="constrained")
+    for name, colour, shift in zip(DOMAINS, (_COLOURS["split"], _COLOURS["nodal"]), (-0.2, 0.2), strict=True):
+        numbers = kinds(found[name], steps)
+        for ax, kind in ((looked, "faces that a search looks at"), (cpu, "contact, CPU s")):
+            at = [k + 1 + shift for k in range(len(numbers[kind]))]
+            ax.bar(at, numbers[kind], 0.4, color=colour, label=name)
+            ax.set(xlabel="rank", ylabel=kind, xticks=range(1, len(at) + 1))
+        for rank, style in ((0, "-"), (5, "--")):
+            looks = found[name][0][rank]["course"]
+            course.plot([look[0] for look in looks], [look[2] for look in looks], style, color=colour, linewidth=1,
+                        label=f"{name}, {'1st' if rank == 0 else '6th'} rank")  # fmt: skip
+    course.set(xlabel="time, us", ylabel="faces sent, a search", ylim=(0, None))
+    for ax in (looked, cpu, course):
+        ax.legend(fontsize=8, frameon=False)
+    figure.savefig(path, dpi=100)
     plt.close(figure)
 
 

@@ -9,7 +9,7 @@ import pytest
 from conoid.cases import messages
 from conoid.worker.mesh.structured import structured
 
-from . import accuracy, gates, switch, taylor_cost
+from . import accuracy, contact_cost, gates, growth, switch, taylor_cost
 from .gather_scatter import GatherScatter
 from .refine import refined
 from .scene import Ride, box, case
@@ -116,3 +116,49 @@ def test_turns_are_balanced() -> None:
     assert all(a is not b for a, b in zip(turns[::2], turns[1::2], strict=True))
     assert sum(turns[::2]) == 20
     assert turns[::2] != [True, False] * 20
+
+
+def test_growth_is_that_of_a_tet_and_its_gates_are_for_elastic_tets() -> None:
+    now = growth.here(3_000, 1, armed=True)
+    assert now.tets == 3_072
+    assert 0.0 < now.limit < now.best
+    small, large = (
+        growth.Growth(False, n, best, best, 0.0, 10.0, base=1_000, peak=1_000 + 300 * n, steady=1_000 + 200 * n)
+        for n, best in ((1_000, 50.0), (5_000, 60.0))
+    )
+    assert large.bytes_a_tet(small) == large.bytes_each == (300.0, 200.0)
+    dear = growth.Growth(True, 1_000, 500.0, 500.0, 0.0, 10.0, base=0, peak=10**9, steady=10**9)
+    assert [gate.measured for gate in gates.of_growth([small, large, dear])] == ["300", "200", "1.20"]
+    assert [line.split("|")[5].strip() for line in growth.report([small, large, dear]).splitlines()[2:5]] == [
+        "1.00", "1.20", "1.00"
+    ]  # fmt: skip
+
+
+def test_an_armed_box_looks_for_cracks_and_for_contact_and_has_neither() -> None:
+    ride = Ride(growth.scene(3_000, armed=True))
+    ride.stretch(1e-7)
+    ride.steps(20)
+    fracture, contact = ride.sim.fracture, ride.sim.contact
+    assert fracture is not None
+    assert contact is not None
+    assert (fracture.broken, contact.searches) == (0, 1)
+    ride.stretch(1e-3)
+    ride.steps(20)
+    assert fracture.broken > 0, "it is armed"
+
+
+def test_contact_domains_are_compared_rank_by_rank_over_both_runs() -> None:
+    def run(faces: int, cpu: float) -> contact_cost.Run:
+        course = [[0.0, faces, faces // 2], [1.0, 3 * faces, faces // 2]]
+        return [
+            {"course": course, "cpu": cpu * (rank + 1), "searching": cpu, "bytes": 8_000 * faces, "messages": 40}
+            for rank in range(6)
+        ]
+
+    found = {"box": [run(40, 3.0), run(40, 5.0)], "arbitrary": [run(20, 2.0), run(20, 2.0)]}
+    rows = [
+        [cell.strip() for cell in line.split("|")[1:-1]] for line in contact_cost.domain_report(found, 8).splitlines()
+    ]
+    assert rows[2][:7] == ["faces that a search looks at", *["80 / 40"] * 4, "2.00", "2.00"]
+    assert rows[4] == ["contact, CPU s", "14 / 7", "24 / 12", "4 / 2", "24 / 12", "2.00", "2.00", "> 2 (fig. 5)"]
+    assert rows[6][1:3] == ["40 / 20", "40 / 20"], "kB a step"
