@@ -86,8 +86,9 @@ class Solver:
         n, nodes = met.n, len(v)
         self.push, self.diagonal = np.zeros((n, 4)), np.empty((n, 2))
         self.impulse, self.total = np.zeros((nodes, 3), np.int64), np.zeros((nodes, 3), np.int64)
+        self.every = np.arange(n, dtype=np.int32)
         shares = np.zeros((nodes, 4), np.int64)
-        sweeps.add_shares(shares, met.nodes, met.weights, met.normals, n)
+        sweeps.add_shares(shares, met.nodes, met.weights, met.normals, self.every)
         sweeps.mobilities(self.diagonal, met.nodes, met.weights, met.normals, shares, mobility, n)
 
     def sweep(self, times: int = 1) -> Floats:
@@ -96,7 +97,7 @@ class Solver:
         for _ in range(times):
             sweeps.sweep(
                 self.impulse, self.push, self.v, met.nodes, met.weights, met.normals, met.wanted, met.friction,
-                self.diagonal, self.scale, met.n,
+                self.diagonal, self.scale, self.every,
             )  # fmt: skip
             assert (self.impulse.sum(axis=0) == 0).all()
             sweeps.give(self.v, self.total, self.impulse, self.mobility, self.scale)
@@ -106,7 +107,7 @@ class Solver:
         """Begins with ``ratio`` times the pushes (candidates, 4) that were kept."""
         met = self.met
         rows = (met.nodes, met.weights, met.normals, met.friction)
-        sweeps.resume(self.impulse, self.push, kept, met.pair, *rows, ratio, self.scale, met.n)
+        sweeps.resume(self.impulse, self.push, kept, met.pair, *rows, ratio, self.scale, self.every)
         assert (self.impulse.sum(axis=0) == 0).all()
         sweeps.give(self.v, self.total, self.impulse, self.mobility, self.scale)
 

@@ -146,7 +146,8 @@ def test_copies_follow_their_owners_whenever_they_are_refreshed(ranks: int) -> N
             order.note(nodes)
             nodes.v[:] -= 1.0
             comm.barrier()
-            order.refresh(nodes, x, v, before)
+            order.begin(nodes)
+            order.finish(x, v, before)
             assert (x[~held] == 1000.0 * turn + crowd.id[~held, None]).all()
             assert (before[~held] == -x[~held]).all()
             assert (v[~held] == -x[~held] - 1.0).all()

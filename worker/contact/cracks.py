@@ -273,7 +273,7 @@ class Follower:
             setattr(scene, name, extended(getattr(scene, name), np.zeros((n, width), np.int64)))
         scene.normals = extended(scene.normals, np.zeros((n, 9)))
         scene.before = extended(scene.before, rows.v)
-        scene.pushes = extended(scene.pushes, np.zeros(n, bool))
+        scene.pushes, scene.shared = (extended(some, np.zeros(n, bool)) for some in (scene.pushes, scene.shared))
         scene.rest.add(rows.x, rows.course)
         if (rows.local < 0).any():
             self._sort()

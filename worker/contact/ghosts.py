@@ -120,11 +120,14 @@ class Copies:
         for some, buffer in zip(self.sends, self._out, strict=True):
             buffer[:, 6:] = nodes.v[some.nodes]
 
-    def refresh(self, nodes: Nodes, x: Floats, v: Floats, before: Floats) -> None:
-        """Fills the copies' rows of ``x``, of ``v`` and of v(n-1/2), (crowd, 3) each."""
+    def begin(self, nodes: Nodes) -> None:
+        """Sends positions and velocities."""
         for some, buffer in zip(self.sends, self._out, strict=True):
             buffer[:, :3], buffer[:, 3:6] = nodes.x[some.nodes], nodes.v[some.nodes]
         self._exchange.begin()
+
+    def finish(self, x: Floats, v: Floats, before: Floats) -> None:
+        """Fills the copies' rows of ``x``, of ``v`` and of v(n-1/2), (crowd, 3) each."""
         self._exchange.finish()
         for some, buffer in zip(self.receives, self._in, strict=True):
             at = some.nodes

@@ -115,6 +115,8 @@ class Scene:
     """(nodes,) place of each node of this rank, -1 for those that are not in the crowd."""
     pushes: Flags
     """(crowd,) which nodes a meeting of this rank may push."""
+    shared: Flags
+    """(crowd,) which nodes are in company with any rank."""
     rest: Rest
     cracks: Indices
     """(m, 6) places of the nodes on either side of open cracks (contact/cracks.py)."""
@@ -139,6 +141,9 @@ class Scene:
 
     def _sum(self, company: list[Neighbour], comm: Comm) -> None:
         self.company = company
+        self.shared = np.zeros(self.crowd.n, bool)
+        for some in company:
+            self.shared[some.nodes] = True
         self.shared_shares = SharedSum(comm, company, 4, _SHARE_TAG)
         self.shared_impulse = SharedSum(comm, company, 3, _PUSH_TAG)
 
@@ -304,7 +309,7 @@ def compact(seen: Sides, node_face: Indices, edge_edge: Indices, sent: int, node
         node_face=np.column_stack([now[slaves], face_at[node_face[:, 1]]]), edge_edge=edge_at[edge_edge],
         keys=keys, kept=np.zeros((len(keys), 4)), faces_sent=sent,
         room=Meetings.room(room), diagonal=np.empty((room, 2)), push=np.empty((room, 4)),
-        shares=shares, impulse=impulse, place=place, pushes=pushes,
+        shares=shares, impulse=impulse, place=place, pushes=pushes, shared=np.zeros(crowd.n, bool),
         cracks=np.zeros((0, 6), np.int32),
         rest=Rest(crowd.x, crowd.course, len(which_faces), len(which_edges), len(node_face), len(edge_edge)),
         total=np.zeros((crowd.n, 3), np.int64), normals=np.zeros((crowd.n, 9)), before=np.zeros((crowd.n, 3)),

@@ -6,7 +6,9 @@ everybody ends with the same velocity, to the bit.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -34,6 +36,10 @@ _SURFACE = 2.0
 """Candidates that cost as much as the search for those of a node."""
 _KINEMATIC = 2.0
 """One over the share of a tet's altitude that anything may pass in a step."""
+
+
+Rows = tuple[Indices, Indices]
+"""Which meetings have nodes that another rank shares, and which have none."""
 
 
 class Contact(Boundary):
@@ -275,20 +281,20 @@ class Contact(Boundary):
 
     def _push(self, now: Scene, state: Nodes, dt: float, t: float) -> None:
         crowd, room = now.crowd, now.room
+        now.copies.begin(state)
         held.take(crowd.x, crowd.v, now.held, state.x, state.v, now.local)
-        now.copies.refresh(state, crowd.x, crowd.v, now.before)
+        now.copies.finish(crowd.x, crowd.v, now.before)
         n = self._meet(now, dt)
-        self._weigh(now, n)
+        rows = sweeps.parted(room.nodes, now.shared, n)
+        self._weigh(now, n, rows)
         room_of = (room.nodes, room.weights, room.normals)
         now.push[:n] = 0.0
         if self._rubs:
             slip = sweeps.rates(now.before, room.nodes, room.weights, n)
-            self._resume(now, n)
+            self._resume(now, rows)
+        sweep = now.impulse, now.push, crowd.v, *room_of, room.wanted, room.friction, now.diagonal, self._scale
         for _ in range(self._sweeps):
-            sweeps.sweep(
-                now.impulse, now.push, crowd.v, *room_of, room.wanted, room.friction, now.diagonal, self._scale, n
-            )
-            self._give(now)
+            self._give(now, rows, sweeps.sweep, *sweep)
         if self._rubs:
             now.kept[:] = 0.0
             faces = room.pair[:n] >= 0
@@ -299,18 +305,23 @@ class Contact(Boundary):
         if held.give_back(state.v, self._parts, now.local, now.held, crowd.v, now.total, state.part, state.owned):
             self.last_push = t
 
-    def _resume(self, now: Scene, n: int) -> None:
+    def _resume(self, now: Scene, rows: Rows) -> None:
         """Begins with what the same pairs were pushed with in the step before."""
         room, mean_dt = now.room, self._clock.mean_dt
         ratio = mean_dt / self._mean_dt if self._mean_dt > 0.0 else 0.0
         self._mean_dt = mean_dt
         room_of = (room.nodes, room.weights, room.normals)
-        sweeps.resume(now.impulse, now.push, now.kept, room.pair, *room_of, room.friction, ratio, self._scale, n)
-        self._give(now)
+        resume = now.impulse, now.push, now.kept, room.pair, *room_of, room.friction, ratio, self._scale
+        self._give(now, rows, sweeps.resume, *resume)
 
-    def _give(self, now: Scene) -> None:
-        """Completes the impulses of a sweep and turns them into velocities."""
+    def _give(self, now: Scene, rows: Rows, sweep: Callable[..., None], *of: Any) -> None:
+        """Completes the impulses of a sweep and turns them into velocities; meetings of nodes that no other rank shares
+        are swept while those of the others travel.
+        """
+        border, inner = rows
+        sweep(*of, border)
         now.shared_impulse.begin(now.impulse)
+        sweep(*of, inner)
         now.shared_impulse.finish(now.impulse)
         sweeps.give(now.crowd.v, now.total, now.impulse, now.crowd.mobility, self._scale)
 
@@ -332,11 +343,12 @@ class Contact(Boundary):
         self._apart |= bool(apart)
         return int(n)
 
-    def _weigh(self, now: Scene, n: int) -> None:
-        room = now.room
+    def _weigh(self, now: Scene, n: int, rows: Rows) -> None:
+        room, (border, inner) = now.room, rows
         now.shares[:] = 0
-        sweeps.add_shares(now.shares, room.nodes, room.weights, room.normals, n)
+        sweeps.add_shares(now.shares, room.nodes, room.weights, room.normals, border)
         now.shared_shares.begin(now.shares)
+        sweeps.add_shares(now.shares, room.nodes, room.weights, room.normals, inner)
         now.shared_shares.finish(now.shares)
         sweeps.mobilities(now.diagonal, room.nodes, room.weights, room.normals, now.shares, now.crowd.mobility, n)
 

@@ -20,10 +20,25 @@ _KEPT = 0.8
 _V2, _N2, _I2 = "float64[:, ::1]", "int32[:, ::1]", "int64[:, ::1]"
 
 
-@njit(f"void({_I2}, {_N2}, {_V2}, {_V2}, int64)", cache=True)
-def add_shares(shares, nodes, weights, normals, n):  # type: ignore[no-untyped-def]
-    """Adds |w| |n_i| and |w| of the first ``n`` meetings to ``shares`` (nodes, 4), in quanta."""
+@njit(f"UniTuple(int32[::1], 2)({_N2}, boolean[::1], int64)", cache=True)
+def parted(nodes, shared, n):  # type: ignore[no-untyped-def]
+    """Which of ``n`` meetings have a node that is ``shared`` (nodes,) with another rank, and which have none."""
+    border, inner = np.empty(n, np.int32), np.empty(n, np.int32)
+    b, i = 0, 0
     for p in range(n):
+        if shared[nodes[p, 0]] or shared[nodes[p, 1]] or shared[nodes[p, 2]] or shared[nodes[p, 3]]:
+            border[b] = p
+            b += 1
+        else:
+            inner[i] = p
+            i += 1
+    return border[:b], inner[:i]
+
+
+@njit(f"void({_I2}, {_N2}, {_V2}, {_V2}, int32[::1])", cache=True)
+def add_shares(shares, nodes, weights, normals, some):  # type: ignore[no-untyped-def]
+    """Adds |w| |n_i| and |w| of ``some`` of the meetings to ``shares`` (nodes, 4), in quanta."""
+    for p in some:
         for k in range(4):
             weight = abs(weights[p, k]) * SHARES
             for i in range(3):
@@ -60,13 +75,16 @@ def _add(impulse, nodes, weights, change, scale, p):  # type: ignore[no-untyped-
         impulse[nodes[p, 0], i] -= rest
 
 
-@njit(f"void({_I2}, {_V2}, {_V2}, int32[::1], {_N2}, {_V2}, {_V2}, float64[::1], float64, float64, int64)", cache=True)
-def resume(impulse, push, kept, pair, nodes, weights, normals, friction, ratio, scale, n):  # type: ignore[no-untyped-def]
-    """Pairs with friction begin with ``ratio`` times what they have ``kept`` (candidates, 4), along and across the
-    normal as it is now; others, and edges, from nothing.
+@njit(
+    f"void({_I2}, {_V2}, {_V2}, int32[::1], {_N2}, {_V2}, {_V2}, float64[::1], float64, float64, int32[::1])",
+    cache=True,
+)
+def resume(impulse, push, kept, pair, nodes, weights, normals, friction, ratio, scale, some):  # type: ignore[no-untyped-def]
+    """Pairs with friction, of ``some`` meetings, begin with ``ratio`` times what they have ``kept`` (candidates, 4),
+    along and across the normal as it is now; others, and edges, from nothing.
     """
     change = np.empty(3)
-    for p in range(n):
+    for p in some:
         if friction[p] == 0.0 or pair[p] < 0:
             continue
         along = 0.0
@@ -80,17 +98,17 @@ def resume(impulse, push, kept, pair, nodes, weights, normals, friction, ratio, 
 
 
 @njit(
-    f"void({_I2}, {_V2}, {_V2}, {_N2}, {_V2}, {_V2}, float64[::1], float64[::1], {_V2}, float64, int64)",
+    f"void({_I2}, {_V2}, {_V2}, {_N2}, {_V2}, {_V2}, float64[::1], float64[::1], {_V2}, float64, int32[::1])",
     cache=True,
     error_model="numpy",
 )
-def sweep(impulse, push, v, nodes, weights, normals, wanted, friction, diagonal, scale, n):  # type: ignore[no-untyped-def]
-    """Adds the corrections of ``n`` meetings to ``impulse`` (nodes, 3), in quanta of 1 / ``scale`` N s.
+def sweep(impulse, push, v, nodes, weights, normals, wanted, friction, diagonal, scale, some):  # type: ignore[no-untyped-def]
+    """Adds the corrections of ``some`` meetings to ``impulse`` (nodes, 3), in quanta of 1 / ``scale`` N s.
 
     ``push`` (room, 4) holds each meeting's sum over the sweeps so far: along the normal, and the friction vector, N s.
     """
     rate, change = np.empty(3), np.empty(3)
-    for p in range(n):
+    for p in some:
         speed = 0.0
         for i in range(3):
             rate[i] = 0.0

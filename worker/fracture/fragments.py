@@ -14,6 +14,7 @@ to them in a second pass: sums about the origin would lose the digits of r^2 / e
 import csv
 import io
 import os
+from itertools import repeat
 from pathlib import Path
 
 import numpy as np
@@ -286,15 +287,18 @@ def genealogy(before: tuple[Ints, Ints], after: tuple[Ints, Ints], comm: Comm) -
 
 
 def write(folder: Path, index: int, t: float, parts: list[str], rows: "np.ndarray") -> str:
-    """Writes the table of frame ``index`` and returns its path relative to the run's folder; whole or not at all."""
+    """Writes the table of frame ``index`` and returns its path relative to the run's folder; whole or not at all.
+
+    Numbers read back to the same bits.
+    """
     path = tables.path(folder, index)
     path.parent.mkdir(exist_ok=True)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(tables.header())
-    for row in rows.tolist():
-        label, part, *values = row
-        writer.writerow([repr(t), label, parts[part], *(text for value in values for text in _written(value))])
+    label, part, *values = rows.dtype.names or ()
+    columns = [column for name in values for column in rows[name].reshape(len(rows), -1).T.tolist()]
+    writer.writerows(zip(repeat(t), rows[label].tolist(), [parts[p] for p in rows[part]], *columns, strict=False))
     beside = path.with_suffix(".part")
     with beside.open("w", encoding="utf-8") as file:
         file.write(text.getvalue())
@@ -302,8 +306,3 @@ def write(folder: Path, index: int, t: float, parts: list[str], rows: "np.ndarra
         os.fsync(file.fileno())
     beside.rename(path)
     return str(path.relative_to(folder))
-
-
-def _written(value: "float | int | np.ndarray") -> list[str]:
-    """Numbers, so that they read back to the same bits."""
-    return [repr(v) for v in value.tolist()] if isinstance(value, np.ndarray) else [repr(value)]
