@@ -146,16 +146,21 @@ class Fracture:
         self._longest = max(self._longest, self._clock.stable)
         near, far = self.loaded()
         passed: list[tuple[Ints, Floats]] = []
-        broken: list[Breaking] = []
-        for body, loaded, (remote, at) in zip(self._bodies, near, far, strict=True):
-            within, across = self._beyond(body, loaded, passed), self._beyond(body, remote, passed)
+        found = [
+            (self._beyond(body, loaded, passed), self._beyond(body, remote, passed))
+            for body, loaded, (remote, _) in zip(self._bodies, near, far, strict=True)
+        ]
+        ids = np.concatenate([np.zeros(0, np.int64), *(ids for ids, _ in passed)])
+        order = np.argsort(ids)
+        self._since = ids[order], np.concatenate([np.zeros(0), *(since for _, since in passed)])[order]
+        if not int(self._comm.sum(np.array([sum(len(a) + len(b) for a, b in found)]))[0]):
+            return
+        broken = []
+        for body, loaded, (remote, at), (within, across) in zip(self._bodies, near, far, found, strict=True):
             first, mass = self._far.first[at[across]], self._far.mass[at[across]]
             broken.append(_breaking(body, loaded.take(within), remote.take(across), first, mass))
         if self._one_by_one:
             broken = self._strongest(broken)
-        ids = np.concatenate([np.zeros(0, np.int64), *(ids for ids, _ in passed)])
-        order = np.argsort(ids)
-        self._since = ids[order], np.concatenate([np.zeros(0), *(since for _, since in passed)])[order]
         total = int(self._comm.sum(np.array([sum(int(b.first.sum()) for b in broken)]))[0])
         if total:
             self.broken += total
