@@ -44,16 +44,23 @@ class Trigger:
     """Of the last cut, s; at first of what takes as long."""
     step: int = 0
     """Of the last cut."""
-    lost: float = 0.0
-    """To imbalance since then, beyond what cannot be helped, s."""
+    work: Sequence[float] = ()
+    """Of each rank since then, s: what ranks lose to each other in turn no cut would mend."""
+    steps: int = 0
+    """Since then, over which that was."""
     helpless: float = 0.0
-    """Smallest loss of a step since the last cut, s: what another cut is not expected to mend."""
+    """Smallest loss of a step since then, in the mean so far, s: what another cut is not expected to mend."""
 
     def look(self, loads: Sequence[float], steps: int) -> None:
         """Takes the ``loads`` of all ranks, s a step, over some steps."""
-        now = lost(loads)
-        self.helpless = min(self.helpless, now)
-        self.lost += (now - self.helpless) * steps
+        self.work = [before + steps * load for before, load in zip(self.work or [0.0] * len(loads), loads, strict=True)]
+        self.steps += steps
+        self.helpless = min(self.helpless, lost(self.work) / self.steps)
+
+    @property
+    def lost(self) -> float:
+        """To imbalance since the last cut, beyond what cannot be helped, s."""
+        return lost(self.work) - self.helpless * self.steps if self.work else 0.0
 
     def cause(self, step: int, grown: bool) -> str | None:
         """Why to cut before ``step``, if so; ``grown``: whether a rank has more outside nodes than it may."""
@@ -68,4 +75,4 @@ class Trigger:
 
     def settle(self, step: int, cost: float) -> None:
         """Begins to count anew after a cut before ``step`` that took ``cost``, s."""
-        self.step, self.cost, self.lost, self.helpless = step, cost, 0.0, math.inf
+        self.step, self.cost, self.work, self.steps, self.helpless = step, cost, (), 0, math.inf

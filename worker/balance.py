@@ -57,13 +57,13 @@ class Balance:
     """Set at the last cut."""
     spent: float = 0.0
     """Wall time of all cuts, s."""
-    saved: float = 0.0
-    """By all cuts so far, s: what steps would have taken with the imbalance from before each, less what they took."""
     events: int = 0
     _guard: Guard | None = None
     _latest: Window | None = None
     _before: float | None = None
     """The imbalance before the last cut."""
+    _saved: float = 0.0
+    """By the cuts before the last one, s."""
 
     @classmethod
     def of(cls, sim: Simulation) -> Self:
@@ -79,9 +79,15 @@ class Balance:
     def look(self, window: Window) -> None:
         """Takes the work of all ranks since the last look."""
         self._latest = window
-        if self._before is not None:
-            self.saved += (self._before - window.imbalance) * float(np.mean(window.loads)) * window.steps
         self.trigger.look(window.loads, window.steps)
+
+    @property
+    def saved(self) -> float:
+        """By all cuts so far, s: what the work would have taken with the imbalance before each, less what it took."""
+        work = self.trigger.work
+        if self._before is None or not work:
+            return self._saved
+        return self._saved + self._before * float(np.mean(work)) - max(work)
 
     def grown(self, sim: Simulation) -> bool:
         """Whether this rank has more outside nodes than it may."""
@@ -105,17 +111,17 @@ class Balance:
         tets, nodes = np.sum(self.comm.share(arrived.moved), axis=0)
         predicted = self.comm.share(float(sum(table["weight"].sum() for table in arrived.parcel.tets.values())))
         cost = self.comm.broadcast(time.monotonic() - began)
-        self._settle(now, before, cost)
+        self._settle(now, cost)
         told = {
             "before": {name: [s / max(before.steps, 1) for s in before.work[name]] for name in WORK} if before else {},
             "predicted": predicted, "tets": int(tets), "nodes": int(nodes), "cost": cost, "saved": self.saved,
         }  # fmt: skip
         return now, told
 
-    def _settle(self, sim: Simulation, before: Window | None, cost: float) -> None:
+    def _settle(self, sim: Simulation, cost: float) -> None:
         """Begins to count anew after a cut."""
-        self.events, self.spent = self.events + 1, self.spent + cost
-        self._before, self._latest = before.imbalance if before is not None else None, None
+        self.events, self.spent, self._saved = self.events + 1, self.spent + cost, self.saved
+        self._before, self._latest = balancing.imbalance(self.trigger.work) if self.trigger.work else None, None
         self.trigger.settle(sim.clock.step, cost)
         self._meter = Meter.of(sim, self.slope)
         self._guard = Guard(self.case.balance.alpha, sim.contact.outside if sim.contact is not None else 0)

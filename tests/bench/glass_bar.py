@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
-from conoid.cases import fragments, layout
+from conoid.cases import fragments, layout, messages
 from conoid.cases.outcome import Outcome, from_json
 
 from .table import Cell, table
@@ -66,6 +66,8 @@ class Bar:
     size: str
     outcome: Outcome
     course: list[Moment]
+    work: list[tuple[float, int, float]]
+    """Between reports: time at the end, s, steps, and CPU seconds of all ranks without waiting."""
 
 
 def measure(sizes: Sequence[str], ranks: int = 2) -> Iterator[Bar]:
@@ -88,7 +90,15 @@ def read(size: str, folder: Path) -> Bar:
         start = _glass(file)[0][:, 2]
     outcome = from_json((folder / layout.OUTCOME).read_bytes())
     moments = [moment(folder, index, frame, start) for index, frame in enumerate(frames)]
-    return Bar(size, outcome, moments)
+    return Bar(size, outcome, moments, _work(folder))
+
+
+def _work(folder: Path) -> list[tuple[float, int, float]]:
+    told = [messages.from_json(line) for line in (folder / layout.JOURNAL).read_bytes().splitlines()]
+    return [
+        (load.t, load.steps, sum(sum(phase) for phase in load.phases.values()) - sum(load.waiting))
+        for load in told if isinstance(load, messages.Load)
+    ]  # fmt: skip
 
 
 def _glass(file: h5py.File) -> tuple[Floats, Floats, Floats]:
@@ -130,7 +140,7 @@ def report(bars: Sequence[Bar]) -> str:
     """A line a run, and the course of the finest."""
     head = ["size", "tets", "nodes at first", "nodes", "ratio", "front stops at, mm", "its speed to 50 mm, mm/us",
             "rim, m/s", "pieces", "dust, of the mass", "residual", "wall s", "CPU s", "M upd/s"]  # fmt: skip
-    return f"{table(head, [_row(bar) for bar in bars])}\n\n{bars[-1].size}:\n\n{course(bars[-1].course)}"
+    return f"{table(head, [_row(bar) for bar in bars])}\n\n{bars[-1].size}:\n\n{course(bars[-1])}"
 
 
 def waves(folder: Path) -> str:
@@ -165,19 +175,22 @@ def arrested(moments: Sequence[Moment]) -> float:
     return max((m.front for m in moments if m.time < LENGTH / SOUND), default=0.0)
 
 
-def course(moments: Sequence[Moment]) -> str:
-    """Some moments as a table."""
-    head = ["t, us", "front, mm", "speed, mm/us", "rim radius", "rim, m/s", "glass nodes", "pieces", "dust", "largest"]
-    chosen = [moments[0]]
-    for each in moments[1:]:
+def course(bar: Bar) -> str:
+    """Some moments as a table; M upd/s: updates of a tet in a CPU second of work since the moment before."""
+    head = ["t, us", "front, mm", "speed, mm/us", "rim radius", "rim, m/s", "glass nodes", "pieces", "dust", "largest",
+            "M upd/s"]  # fmt: skip
+    chosen = [bar.course[0]]
+    for each in bar.course[1:]:
         if each.time >= chosen[-1].time + 0.999 * _EVERY:
             chosen.append(each)
     rows: list[list[Cell]] = []
     for before, m in pairwise(chosen):
         speed = 1e-3 * (m.front - before.front) / (m.time - before.time)
+        spent = [(steps, cpu) for time, steps, cpu in bar.work if before.time < time <= m.time]
+        steps, cpu = (sum(column) for column in zip(*spent, strict=True))
         rows.append([
             1e6 * m.time, 1e3 * m.front, speed, m.swelling, m.outward, m.nodes, m.pieces.fragments, m.pieces.dust,
-            m.pieces.largest_share,
+            m.pieces.largest_share, 1e-6 * bar.outcome.elements * steps / cpu,
         ])  # fmt: skip
     return table(head, rows)
 

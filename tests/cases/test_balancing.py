@@ -27,16 +27,26 @@ def test_measured_cuts_when_more_is_lost_than_a_cut_costs() -> None:
 
 
 def test_measured_does_not_count_what_a_cut_has_not_mended() -> None:
-    """After a cut that leaves 1 s a step lost, 3 s a step count for 2, until less has been seen to be possible."""
+    """After a cut that leaves 1 s a step lost, 3 s a step count for 2."""
     trigger = Trigger(Balance(policy="measured"), 10.0)
     trigger.settle(100, 4.0)
     trigger.look(ODD, 50)
-    assert trigger.cause(150, False) is None
+    assert (trigger.lost, trigger.cause(150, False)) == (0.0, None)
     trigger.look([5.0, -1.0], 2)
-    assert trigger.cause(152, False) is None, "2 steps of 2 s do not exceed 4 s"
-    trigger.look([2.5, 1.5], 4)
-    trigger.look(ODD, 1)
-    assert trigger.cause(157, False) is not None, "4 s, and 0.5 s beyond the new least"
+    assert (trigger.lost, trigger.cause(152, False)) == (4.0, None), "2 steps of 2 s do not exceed 4 s"
+    trigger.look([5.0, -1.0], 1)
+    assert trigger.cause(153, False) is not None
+
+
+def test_measured_does_not_count_what_ranks_lose_in_turn() -> None:
+    """First one has more, then the other: no cut would help."""
+    trigger = Trigger(Balance(policy="measured"), 10.0)
+    for step in range(0, 1000, 10):
+        trigger.look(ODD if step % 20 else ODD[::-1], 10)
+        assert trigger.cause(step + 10, False) is None
+    trigger.look(ODD, 11)
+    assert trigger.lost == 11.0
+    assert trigger.cause(1011, False) is not None
 
 
 def test_every_cuts_at_multiples_and_not_where_it_has_just_cut() -> None:
