@@ -61,8 +61,8 @@ class Ledger:
         momentum = 0.5 * nodes.mass[:, None] * (before + nodes.v)
         loss, external = self._boundary_work()
         columns = np.column_stack([kinetic, loss, external, momentum])[nodes.owned]
-        node_sums = exact_sums(self._comm, np.ascontiguousarray(columns))
-        work, viscous, plastic = exact_sums(self._comm, self._element_work())
+        sums = exact_sums(self._comm, np.ascontiguousarray(columns), self._element_work())
+        node_sums, (work, viscous, plastic) = sums[:6], sums[6:]
         gone_work, gone_viscous, gone_plastic, gone_kinetic, gone_momentum = self._gone()
         self.momentum = node_sums[3:6] + gone_momentum
         self.lost = float(node_sums[1]) / self.initial if self.initial > 0.0 else 0.0

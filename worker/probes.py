@@ -28,7 +28,9 @@ from .state import (
     WORK_VISCOUS,
     Block,
     Floats,
+    Ints,
     Model,
+    Tets,
 )
 
 _NORMAL = {"stress_xx": S_XX, "stress_yy": S_YY, "stress_zz": S_ZZ}
@@ -38,31 +40,37 @@ _FORCE = {"contact_force_x": 0, "contact_force_y": 1, "contact_force_z": 2}
 _VELOCITY = {"velocity_x": 0, "velocity_y": 1, "velocity_z": 2}
 
 
-def tet_volumes(block: Block, x: Floats) -> Floats:
-    """(n,) present volumes of the tets of a block, m^3."""
-    origin = x[block.tets[:, 0]]
-    e1, e2, e3 = (x[block.tets[:, k]] - origin for k in (1, 2, 3))
+def tet_volumes(tets: Tets, x: Floats) -> Floats:
+    """(n,) present volumes of tets (n, 4), m^3."""
+    origin = x[tets[:, 0]]
+    e1, e2, e3 = (x[tets[:, k]] - origin for k in (1, 2, 3))
     volumes: Floats = np.einsum("ij,ij->i", e1, np.cross(e2, e3)) / 6.0
     return volumes
 
 
-def field(block: Block, name: str, model: Model) -> Floats:
-    """(n,) a field of ``cases.schema.ProbeField`` over the tets of a block; stress includes the viscous part."""
+def field(block: Block, name: str, model: Model, places: Ints) -> Floats:
+    """(n,) a field of ``cases.schema.ProbeField`` over the tets at ``places`` (n,) of a block; stress includes the
+    viscous part.
+    """
+
+    def row(row: int) -> Floats:
+        return block.at(row, places)
+
     if name in _NORMAL:
-        return block.row(_NORMAL[name]) - block.row(PRESSURE) - block.row(VISCOUS)
+        return row(_NORMAL[name]) - row(PRESSURE) - row(VISCOUS)
     if name == "temperature" and not block.has(TEMPERATURE):
-        return np.full(block.n, block.temperature)
+        return np.full(len(places), block.temperature)
     if name in _ROWS:
-        return block.row(_ROWS[name]) if block.has(_ROWS[name]) else np.zeros(block.n)
+        return row(_ROWS[name]) if block.has(_ROWS[name]) else np.zeros(len(places))
     if name in _VELOCITY:
-        return np.asarray(model.nodes.v[block.tets, _VELOCITY[name]].mean(axis=1))
+        return np.asarray(model.nodes.v[block.tets[places], _VELOCITY[name]].mean(axis=1))
     if name == "pressure":
-        return block.row(PRESSURE) + block.row(VISCOUS)
+        return row(PRESSURE) + row(VISCOUS)
     if name == "mises":
-        return von_mises(np.array([block.row(row) for row in range(S_XX, S_XY + 1)]))
+        return von_mises(np.array([row(component) for component in range(S_XX, S_XY + 1)]))
     if name == "density":
-        return block.row(MASS) / tet_volumes(block, model.nodes.x)
-    return (block.row(WORK) + block.row(WORK_VISCOUS)) / block.row(MASS)
+        return row(MASS) / tet_volumes(block.tets[places], model.nodes.x)
+    return (row(WORK) + row(WORK_VISCOUS)) / row(MASS)
 
 
 class Probes:
@@ -82,6 +90,8 @@ class Probes:
             for probe in case.probes
         ]
         """Global ids of the tets that each probe has in each block."""
+        self._places: dict[tuple[int, int], tuple[int, Ints]] = {}
+        """Where these stand, by probe and block, and how many tets the block had then."""
 
     def require_tets(self, case: Case) -> None:
         """Raises InputError, on every rank alike, when a probe holds no tet."""
@@ -104,12 +114,14 @@ class Probes:
         if not self.names:
             return np.zeros(0)
         forces = self._forces()
+        means = [k for k, name in enumerate(self._fields) if name not in _FORCE]
+        sums = iter(exact_sums(self._comm, *(self._sums(k) for k in means)).reshape(-1, 2))
         values = []
-        for name, part, chosen in zip(self._fields, self._parts, self._chosen, strict=True):
+        for name, part in zip(self._fields, self._parts, strict=True):
             if name in _FORCE:
                 values.append(float(forces[part, _FORCE[name]]))
             else:
-                total, mass = exact_sums(self._comm, self._sums(name, chosen))
+                total, mass = next(sums)
                 values.append(float(total / mass) if mass > 0.0 else math.nan)
         return np.array(values)
 
@@ -122,14 +134,24 @@ class Probes:
         self._pushed, self._since = pushed, self._clock.t
         return np.asarray(forces)
 
-    def _sums(self, name: str, chosen: list["np.ndarray"]) -> Floats:
+    def _sums(self, probe: int) -> Floats:
+        """(n, 2) field times mass, and mass, of the tets of a probe."""
         columns = [np.zeros((0, 2))]
-        for block, ids in zip(self._model.blocks, chosen, strict=True):
-            inside = np.flatnonzero(np.isin(block.id, ids)) if len(ids) else ids
-            if len(inside):
-                mass = block.row(MASS)[inside]
-                columns.append(np.column_stack([field(block, name, self._model)[inside] * mass, mass]))
+        for b, block in enumerate(self._model.blocks):
+            places = self._inside(probe, b)
+            if len(places):
+                mass = block.at(MASS, places)
+                columns.append(np.column_stack([field(block, self._fields[probe], self._model, places) * mass, mass]))
         return np.concatenate(columns)
+
+    def _inside(self, probe: int, b: int) -> Ints:
+        """Places of the tets of a probe in a block, found anew when tets have left."""
+        block, ids = self._model.blocks[b], self._chosen[probe][b]
+        n, places = self._places.get((probe, b), (-1, np.zeros(0, np.int64)))
+        if n != block.n:
+            places = np.flatnonzero(np.isin(block.id, ids)) if len(ids) else places[:0]
+            self._places[probe, b] = block.n, places
+        return places
 
 
 def _inside(probe: Probe, block: Block, model: Model, centres: Floats) -> "np.ndarray":

@@ -100,10 +100,8 @@ def _mean_speed(sim: Simulation, spec: Reference) -> float:
 
 def _largest(sim: Simulation, spec: Reference) -> float:
     names = _STRESSES if spec.quantity == "stress_max" else (spec.quantity.removesuffix("_max"),)
-    values = [
-        float(np.abs(field(b, name, sim.model)).max(initial=0.0)) for b in _blocks(sim, spec.part) for name in names
-    ]
-    return _maximum(sim.comm, values)
+    fields = (field(b, name, sim.model, np.arange(b.n)) for b in _blocks(sim, spec.part) for name in names)
+    return _maximum(sim.comm, [float(np.abs(values).max(initial=0.0)) for values in fields])
 
 
 _LINES = (0.1, 0.3, 0.5)

@@ -205,6 +205,10 @@ class Block:
         """(n,) copy of one row of the state."""
         return np.ascontiguousarray(self.state[:, row, :]).reshape(-1)[: self.n]
 
+    def at(self, row: int, places: "np.ndarray") -> Floats:
+        """(k,) copy of one row of the state at ``places`` (k,)."""
+        return np.asarray(self.state[places // CHUNK, row, places % CHUNK])
+
     def has(self, row: int) -> bool:
         """Whether the block carries that row."""
         return row < int(self.state.shape[1])

@@ -24,7 +24,7 @@ from ..migration.parcel import Parcel
 from ..parallel.comm import Comm
 from ..parallel.fixed_point import exact_sums
 from ..parallel.ownership import Neighbour, complete
-from ..state import CHUNK, MASS, Block, Flags, Floats, Indices, Ints, Model
+from ..state import MASS, Flags, Floats, Indices, Ints, Model
 from ..topology import Split
 from . import bodies, nodal
 from .bodies import Body, Far, Loaded
@@ -348,10 +348,6 @@ def _warnings(part: str, spec: Spec, tough: Toughness, size: float, step: float)
     return told
 
 
-def _masses(block: Block, places: "np.ndarray") -> Floats:
-    return np.asarray(block.state[places // CHUNK, MASS, places % CHUNK])
-
-
 def _breaking(body: Body, near: Loaded, far: Loaded, first: Flags, mass: Floats) -> Breaking:
     """Facets that break: those within this rank, and ``far`` ones, with whether their ``first`` side is here and the
     ``mass`` of the tet on the other rank.
@@ -371,7 +367,7 @@ def _breaking(body: Body, near: Loaded, far: Loaded, first: Flags, mass: Floats)
     return Breaking(
         body=body, tets=np.sort(ids, axis=1).astype(np.int64), nodes=corners, sides=sides,
         first=np.concatenate([np.ones(n, bool), first]), traction=np.concatenate([near.traction, far.traction]),
-        mass=np.minimum(_masses(block, places), np.concatenate([_masses(block, there), mass])),
+        mass=np.minimum(block.at(MASS, places), np.concatenate([block.at(MASS, there), mass])),
     )  # fmt: skip
 
 

@@ -87,14 +87,18 @@ class Tally:
         return np.asarray(np.array(whole) / self.scale)
 
 
-def exact_sums(comm: Comm, columns: Floats) -> Floats:
-    """(k,) sums of the columns of ``columns`` (n, k) over all ranks: the same bits for any order and partition.
+def exact_sums(comm: Comm, *tables: Floats) -> Floats:
+    """(k,) sums of the columns of ``tables`` (n, .) over all ranks: the same bits for any order and partition.
 
     Each value is split into two integer limbs of a common quantum, 2^-60 of the column's largest magnitude; the
     result is off by at most n times that quantum.
     """
-    k = columns.shape[1]
-    largest = comm.maximum(_largest(columns))
+    if not tables:
+        return np.zeros(0)
+    largest = comm.maximum(np.concatenate([_largest(table) for table in tables]))
     exponent = np.frexp(largest)[1]
-    total: Ints = comm.sum(_limbs(columns, np.ldexp(1.0, 30 - exponent)))
-    return np.array([math.ldexp(int(total[j]) * 2**30 + int(total[k + j]), int(exponent[j]) - 60) for j in range(k)])
+    scales = np.split(np.ldexp(1.0, 30 - exponent), np.cumsum([table.shape[1] for table in tables])[:-1])
+    limbs = [_limbs(table, scale).reshape(2, -1) for table, scale in zip(tables, scales, strict=True)]
+    high, low = comm.sum(np.concatenate(limbs, axis=1))
+    whole = zip(high, low, exponent, strict=True)
+    return np.array([math.ldexp(int(a) * 2**30 + int(b), int(e) - 60) for a, b, e in whole])
