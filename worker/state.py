@@ -59,9 +59,11 @@ INTACT, BROKEN, WIDE = range(3)
 def extended(array: "np.ndarray", rows: "np.ndarray") -> "np.ndarray":
     """``array`` with ``rows`` behind it: in the room that its buffer has left, or in a new one half as large again."""
     n, m = len(array), len(array) + len(rows)
+    if n == m:
+        return array
     room = array.base
     fits = isinstance(room, np.ndarray) and room.shape[1:] == array.shape[1:] and room.dtype == array.dtype
-    if room is None or not fits or room.ctypes.data != array.ctypes.data or len(room) < m:
+    if room is None or not fits or len(room) < m or not np.may_share_memory(room[:1], array[:1]):
         room = np.empty((m + m // 2, *array.shape[1:]), array.dtype)
         room[:n] = array
     room[n:m] = rows

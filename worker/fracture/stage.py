@@ -302,9 +302,18 @@ class Fracture:
             self._scatter(change, some, now, facets.pull[moved], 1)
             for facets in fresh:
                 self._scatter(change, some, facets.nodes, facets.pull, 1)
-        holders = [Neighbour(o.rank, np.flatnonzero(np.isin(some, o.nodes)).astype(np.int32)) for o in self._neighbours]
-        complete(self._comm, holders, change, _TAG)
+        complete(self._comm, self._among(some), change, _TAG)
         nodes.force[some] += change
+
+    def _among(self, some: Ints) -> list[Neighbour]:
+        """Who shares which of ``some`` nodes, by their places in it; who shares none is left out."""
+        flags, found = np.zeros(self._model.nodes.n, bool), []
+        for other in self._neighbours:
+            flags[other.nodes] = True
+            if (shared := flags[some]).any():
+                found.append(Neighbour(other.rank, np.flatnonzero(shared).astype(np.int32)))
+            flags[other.nodes] = False
+        return found
 
     def _scatter(self, change: Ints, some: Ints, nodes: Indices, pull: Floats, sign: int) -> None:
         """Adds the forces on facets ``nodes`` (m, 6) to those nodes that are among ``some``; on others they cancel."""
