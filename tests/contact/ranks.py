@@ -4,7 +4,6 @@ A rank that fails wakes all others, so that a test ends with the first error ins
 """
 
 import threading
-from collections import defaultdict
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from queue import SimpleQueue
@@ -29,7 +28,13 @@ class World:
         self.size = size
         self.meeting = threading.Barrier(size, timeout=_PATIENCE)
         self.table: list[Any] = [None] * size
-        self.mail: defaultdict[tuple[int, int, int], SimpleQueue[Ints]] = defaultdict(SimpleQueue)
+        self._mail: dict[tuple[int, int, int], SimpleQueue[Ints]] = {}
+        self._lock = threading.Lock()
+
+    def box(self, source: int, target: int, tag: int) -> SimpleQueue[Ints]:
+        """Where messages lie; the same for both, whoever asks first."""
+        with self._lock:
+            return self._mail.setdefault((source, target, tag), SimpleQueue())
 
 
 class ThreadComm:
@@ -109,8 +114,8 @@ class Mail:
         self, world: World, comm: ThreadComm, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: int
     ) -> None:
         self._sent, rank = comm.sent, comm.rank
-        self._sends = [(world.mail[rank, target, tag], buffer) for target, buffer in sends]
-        self._receives = [(world.mail[source, rank, tag], buffer) for source, buffer in receives]
+        self._sends = [(world.box(rank, target, tag), buffer) for target, buffer in sends]
+        self._receives = [(world.box(source, rank, tag), buffer) for source, buffer in receives]
 
     def begin(self) -> None:
         self._sent.message(len(self._sends), sum(buffer.nbytes for _, buffer in self._sends))
