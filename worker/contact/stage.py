@@ -38,7 +38,7 @@ _KINEMATIC = 2.0
 """One over the share of a tet's altitude that anything may pass in a step."""
 
 
-Rows = tuple[Indices, Indices]
+Parted = tuple[Indices, Indices]
 """Which meetings have nodes that another rank shares, and which have none."""
 
 
@@ -305,7 +305,7 @@ class Contact(Boundary):
         if held.give_back(state.v, self._parts, now.local, now.held, crowd.v, now.total, state.part, state.owned):
             self.last_push = t
 
-    def _resume(self, now: Scene, rows: Rows) -> None:
+    def _resume(self, now: Scene, rows: Parted) -> None:
         """Begins with what the same pairs were pushed with in the step before."""
         room, mean_dt = now.room, self._clock.mean_dt
         ratio = mean_dt / self._mean_dt if self._mean_dt > 0.0 else 0.0
@@ -314,7 +314,7 @@ class Contact(Boundary):
         resume = now.impulse, now.push, now.kept, room.pair, *room_of, room.friction, ratio, self._scale
         self._give(now, rows, sweeps.resume, *resume)
 
-    def _give(self, now: Scene, rows: Rows, sweep: Callable[..., None], *of: Any) -> None:
+    def _give(self, now: Scene, rows: Parted, sweep: Callable[..., None], *of: Any) -> None:
         """Completes the impulses of a sweep and turns them into velocities; meetings of nodes that no other rank shares
         are swept while those of the others travel.
         """
@@ -343,7 +343,7 @@ class Contact(Boundary):
         self._apart |= bool(apart)
         return int(n)
 
-    def _weigh(self, now: Scene, n: int, rows: Rows) -> None:
+    def _weigh(self, now: Scene, n: int, rows: Parted) -> None:
         room, (border, inner) = now.room, rows
         now.shares[:] = 0
         sweeps.add_shares(now.shares, room.nodes, room.weights, room.normals, border)
