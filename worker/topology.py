@@ -1,6 +1,7 @@
 """What separating nodes tell everybody who keeps something by node."""
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -32,6 +33,13 @@ class Split:
     """(r,) of the tet."""
     block: Indices
     """(r,) index of the block."""
+
+    @classmethod
+    def elsewhere(cls, first: int) -> Self:
+        """One of which a rank that has ``first`` nodes gets no copy."""
+        words, places = np.zeros(0, np.int64), np.zeros(0, np.int32)
+        copies = Copies(words, words, places, np.zeros(0, bool), np.zeros(0))
+        return cls(copies, first, words, places, places, places, places)
 
     def followed(self, nodes: Indices, ids: Ints, tets: Ints) -> Indices:
         """What local ``nodes`` (n, k) of tets of global ids ``tets`` (n,) have become; ``ids``: of the local nodes."""

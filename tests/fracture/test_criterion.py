@@ -99,7 +99,7 @@ def test_what_passes_is_hot_on_a_side_at_least(weight: float) -> None:
 
 
 def loaded_sim(sim: Simulation) -> Simulation:
-    """Random stresses, by the id of the tet; every face hot."""
+    """Random stresses, by the id of the tet; every face hot, and none too strong."""
     step.prepare(sim)
     for b in sim.model.blocks:
         for row in (*range(S_XX, S_XY + 1), PRESSURE, VISCOUS):
@@ -107,7 +107,7 @@ def loaded_sim(sim: Simulation) -> Simulation:
             flat = np.zeros(b.state.shape[0] * CHUNK)
             flat[: b.n] = values
             b.state[:, row, :] = flat.reshape(-1, CHUNK)
-        b.hot[:] = 15
+        b.hot[:], b.weakest[:] = 15, 0.0
     return sim
 
 
@@ -171,6 +171,29 @@ def test_tractions_are_those_of_numpy_and_the_same_on_any_number_of_ranks(source
         parts = on(ranks, case, [mesh], lambda sim: tractions(loaded_sim(sim)))
         assert sum(map(len, parts)) == len(found)
         assert {key: value for part in parts for key, value in part.items()} == found
+
+
+def test_facets_that_reach_the_weakest_face_of_neither_tet_are_left_out() -> None:
+    """Across ranks the tet here is asked alone."""
+    mesh, case = block((3, 3, 2), 1e-3, seed=2), case_of(shear_weight=0.7, friction=0.4)
+
+    def weakened(sim: Simulation) -> Simulation:
+        for b in loaded_sim(sim).model.blocks:
+            b.weakest[:] = 5e7 + 1e8 * np.cos(b.id) ** 2
+        return sim
+
+    sim = weakened(build(case, [mesh]))
+    (b,) = sim.model.blocks
+    found, every = tractions(sim), tractions(loaded_sim(build(case, [mesh])))
+    weakest = np.zeros(len(b.id))
+    weakest[b.id] = b.weakest
+    across = {int(4 * i + k): int(b.across[e, k]) // 4 for e, i in enumerate(b.id) for k in range(4)}
+    bounds = {key: (weakest[key // 4], weakest[across[key]]) for key in every}
+    assert found == {key: value for key, value in every.items() if value[3] >= max(bounds[key])}
+    assert len(every) / 20 < len(found) < len(every) / 2
+    for part in on(3, case, [mesh], lambda sim: tractions(weakened(sim))):
+        assert {key: every[key] for key in part} == part
+        assert all(part[key][3] >= bounds[key][0] for key in part)
 
 
 def test_the_effective_traction_is_that_of_camacho_and_ortiz() -> None:

@@ -97,13 +97,13 @@ def areas(tets: Tets, places: "np.ndarray", faces: "np.ndarray", x: Floats) -> F
 
 
 def look(body: Body, x: Floats) -> Loaded:
-    """The facets within this rank that have a hot face."""
+    """The facets within this rank that may pass."""
     block = body.block
     hot = np.flatnonzero(block.hot)
-    sides, traction = np.empty((4 * len(hot), 2), np.int32), np.empty((4 * len(hot), 4))
+    sides, traction = np.empty((4 * len(hot) + 1, 2), np.int32), np.empty((4 * len(hot) + 1, 4))
     n = criterion.look(
         sides, traction, hot, block.hot, block.bond, block.across, body.beside, block.id, block.tets,
-        block.state.reshape(-1), x, block.state.shape[1], block.shear_weight, body.spec.friction,
+        block.state.reshape(-1), x, block.weakest, block.state.shape[1], block.shear_weight, body.spec.friction,
     )  # fmt: skip
     return Loaded(sides[:n, 0].copy(), sides[:n, 1].copy(), traction[:n].copy())
 
@@ -133,8 +133,7 @@ class Far:
             masses.append(theirs[at[met], 1][order])
             ranks.append((rank, len(chosen)))
         table = np.concatenate(pieces)
-        self.body: Ints = table[:, 4]
-        """(m,) which body."""
+        self._of_body: list[Ints] = [np.flatnonzero(table[:, 4] == b) for b in range(len(bodies))]
         self.sides: Indices = np.column_stack([table[:, 3], table[:, 0] % 4]).astype(np.int32)
         """(m, 2) place and face of this rank's tet."""
         self.first: Flags = table[:, 0] < table[:, 1]
@@ -152,32 +151,26 @@ class Far:
         )
 
     def look(self, x: Floats) -> list[tuple[Loaded, Ints]]:
-        """For every body its facets that are intact, and which of this table's they are; neighbours take part."""
-        parts = []
-        for b, body in enumerate(self._bodies):
-            at = np.flatnonzero(self.body == b)
-            sides = self.sides[at]
-            at = at[body.block.bond[sides[:, 0], sides[:, 1]] == INTACT]
-            own = np.zeros((len(at), 3))
+        """For every body its facets that may pass, and which of this table's they are; neighbours take part."""
+        for body, chosen in zip(self._bodies, self._of_body, strict=True):
+            block = body.block
             criterion.own_tractions(
-                own, self.sides[at], self.first[at], body.block.tets, body.block.state.reshape(-1), x,
-                body.block.state.shape[1],
+                self._own, chosen, self.sides, self.first, block.bond, block.tets, block.state.reshape(-1), x,
+                block.state.shape[1],
             )  # fmt: skip
-            self._own[at] = own
-            parts.append((body, at))
         self._exchange.begin()
         self._exchange.finish()
-        return [(self._meet(body, at, x), at) for body, at in parts]
+        return [self._meet(body, chosen, x) for body, chosen in zip(self._bodies, self._of_body, strict=True)]
 
-    def _meet(self, body: Body, at: Ints, x: Floats) -> Loaded:
-        traction = np.zeros((len(at), 4))
-        traction[:, :3] = self._own[at]
-        sides = self.sides[at]
-        criterion.meet(
-            traction, self._theirs[at], sides, self.first[at], body.block.tets, x, body.block.shear_weight,
-            body.spec.friction,
+    def _meet(self, body: Body, chosen: Ints, x: Floats) -> tuple[Loaded, Ints]:
+        block, traction, at = body.block, np.empty((len(chosen) + 1, 4)), np.empty(len(chosen) + 1, np.int64)
+        n = criterion.meet(
+            at, traction, chosen, self._own, self._theirs, self.sides, self.first, block.bond, block.tets, x,
+            block.weakest, block.shear_weight, body.spec.friction,
         )  # fmt: skip
-        return Loaded(sides[:, 0].copy(), sides[:, 1].copy(), traction)
+        at = at[:n]
+        sides = self.sides[at]
+        return Loaded(sides[:, 0].copy(), sides[:, 1].copy(), traction[:n]), at
 
     def free(self) -> None:
         """Gives the messages back to MPI."""

@@ -3,7 +3,8 @@
 A facet breaks by sqrt(<t_n>^2 + w t_s^2), with the Macaulay bracket that the paper's eq. (1) lacks, and under pressure
 by sqrt(w) <t_s - mu |t_n|> (Camacho and Ortiz 1996). Both are bounded by the first form, which is convex: the mean of
 two tractions passes only where one of them does. So the pass over the elements marks each tet's own faces that pass,
-and only facets with such a face are looked at.
+and only facets with such a face are looked at. Of those, only the ones whose mean traction reaches the weakest face of
+the tets on either side can pass, and only they are told: strengths are computed for few.
 """
 
 import numpy as np
@@ -63,11 +64,12 @@ def effective(t, normal, weight, friction):  # type: ignore[no-untyped-def]
 
 @njit(
     "int64(int32[:, ::1], float64[:, ::1], int64[::1], uint8[::1], uint8[:, ::1], int32[:, ::1], int32[:, ::1], "
-    "int64[::1], uint32[:, ::1], float64[::1], float64[:, ::1], int64, float64, float64)",
+    "int64[::1], uint32[:, ::1], float64[::1], float64[:, ::1], float64[::1], int64, float64, float64)",
     cache=True,
 )
-def look(out, tractions, chosen, hot, bond, across, beside, ids, tets, state, x, rows, weight, friction):  # type: ignore[no-untyped-def]
-    """Tractions on the intact facets within this rank that have a hot face, of the tets at ``chosen``.
+def look(out, tractions, chosen, hot, bond, across, beside, ids, tets, state, x, weakest, rows, weight, friction):  # type: ignore[no-untyped-def]
+    """Tractions on the intact facets within this rank that have a hot face, of the tets at ``chosen``, and reach what
+    is ``weakest`` (tets,), Pa, on either side.
 
     Fills ``out`` (m, 2), place and face on the side of the smaller tet id, and ``tractions`` (m, 4), the vector on that
     side's outward normal and the effective traction, Pa; returns how many there are.
@@ -91,38 +93,52 @@ def look(out, tractions, chosen, hot, bond, across, beside, ids, tets, state, x,
                 tractions[n, i] = one[i]
             out[n, 0], out[n, 1] = a, face
             tractions[n, 3] = effective(one, normal, weight, friction)
-            n += 1
+            n += tractions[n, 3] >= max(weakest[a], weakest[b])
     return n
 
 
 @njit(
-    "void(float64[:, ::1], int32[:, ::1], boolean[::1], uint32[:, ::1], float64[::1], float64[:, ::1], int64)",
+    "void(float64[:, ::1], int64[::1], int32[:, ::1], boolean[::1], uint8[:, ::1], uint32[:, ::1], float64[::1], "
+    "float64[:, ::1], int64)",
     cache=True,
 )
-def own_tractions(tractions, sides, first, tets, state, x, rows):  # type: ignore[no-untyped-def]
-    """``tractions`` (m, 3), Pa, of this rank's tets on facets shared with another rank, on the outward normal of the
-    side of the smaller tet id. ``sides`` (m, 2): place and face; ``first`` (m,): whether that side is this one.
+def own_tractions(tractions, chosen, sides, first, bond, tets, state, x, rows):  # type: ignore[no-untyped-def]
+    """``tractions`` (m, 3), Pa, of this rank's tets on the intact ones of the ``chosen`` facets, which it shares with
+    another rank, on the outward normal of the side of the smaller tet id. ``sides`` (m, 2): place and face; ``first``
+    (m,): whether that side is this one.
     """
     normal = np.empty(3)
-    for m in range(len(sides)):
-        outward(normal, x, tets[sides[m, 0]], sides[m, 1])
-        if not first[m]:
-            normal *= -1.0
-        traction(tractions[m], state, rows, sides[m, 0], normal)
+    for m in chosen:
+        if bond[sides[m, 0], sides[m, 1]] == INTACT:
+            outward(normal, x, tets[sides[m, 0]], sides[m, 1])
+            if not first[m]:
+                normal *= -1.0
+            traction(tractions[m], state, rows, sides[m, 0], normal)
 
 
 @njit(
-    "void(float64[:, ::1], float64[:, ::1], int32[:, ::1], boolean[::1], uint32[:, ::1], float64[:, ::1], float64, "
-    "float64)",
+    "int64(int64[::1], float64[:, ::1], int64[::1], float64[:, ::1], float64[:, ::1], int32[:, ::1], boolean[::1], "
+    "uint8[:, ::1], uint32[:, ::1], float64[:, ::1], float64[::1], float64, float64)",
     cache=True,
 )
-def meet(tractions, theirs, sides, first, tets, x, weight, friction):  # type: ignore[no-untyped-def]
-    """``tractions`` (m, 4): means of this rank's and ``theirs`` (m, 3), and the effective tractions, Pa."""
+def meet(out, tractions, chosen, own, theirs, sides, first, bond, tets, x, weakest, weight, friction):  # type: ignore[no-untyped-def]
+    """Means of this rank's ``own`` (m, 3) tractions and ``theirs``, with the effective ones, Pa, on those of the
+    ``chosen`` facets that are intact and where they reach what is ``weakest`` (tets,) on this side.
+
+    Fills ``out``, which of the m they are, and ``tractions`` (., 4); returns how many there are.
+    """
+    n = 0
     normal = np.empty(3)
-    for m in range(len(sides)):
-        outward(normal, x, tets[sides[m, 0]], sides[m, 1])
+    for m in chosen:
+        e = sides[m, 0]
+        if bond[e, sides[m, 1]] != INTACT:
+            continue
+        outward(normal, x, tets[e], sides[m, 1])
         if not first[m]:
             normal *= -1.0
         for i in range(3):
-            tractions[m, i] = 0.5 * (tractions[m, i] + theirs[m, i])
-        tractions[m, 3] = effective(tractions[m, :3], normal, weight, friction)
+            tractions[n, i] = 0.5 * (own[m, i] + theirs[m, i])
+        tractions[n, 3] = effective(tractions[n, :3], normal, weight, friction)
+        out[n] = m
+        n += tractions[n, 3] >= weakest[e]
+    return n

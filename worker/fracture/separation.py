@@ -14,7 +14,7 @@ from ..mesh.faces import FACES
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
 from ..state import BROKEN, Copies, Flags, Indices, Ints, Model, extended
-from ..topology import Split, keys
+from ..topology import KEY, Split, keys
 from . import stars
 from .stars import Stars
 
@@ -50,10 +50,13 @@ class Separation:
         rows, label, places, own = self._cut(touched)
         kept = label[np.searchsorted(rows[:, stars.NODE], rows[:, stars.NODE])]
         leaving = label != kept
-        mine = np.unique(np.column_stack([rows[leaving, stars.NODE], label[leaving]]), axis=0)
+        mine = np.column_stack(np.divmod(np.unique(keys(rows[leaving, stars.NODE], label[leaving])), KEY))
         every = self._number(mine)
         if not len(every):
             return None
+        if not len(mine):
+            self._model.nodes_global += len(every)
+            return Split.elsewhere(self._model.nodes.n)
         return self._separate(rows, label, places, own, leaving, mine, every)
 
     def _touched(self, broken: dict[int, Broken]) -> Ints:
@@ -66,9 +69,14 @@ class Separation:
         nodes, mine = self._model.nodes, np.unique(np.concatenate(found))
         if self._comm.size == 1:
             return mine
-        flags = np.zeros(nodes.n, bool)
-        flags[mine] = True
-        told = self._comm.swap({o.rank: nodes.id[o.nodes[flags[o.nodes]]] for o in self._neighbours})
+        sends = {}
+        if len(mine):
+            flags = np.zeros(nodes.n, bool)
+            flags[mine] = True
+            sends = {o.rank: nodes.id[o.nodes[flags[o.nodes]]] for o in self._neighbours}
+        told = self._comm.swap(sends)
+        if not told:
+            return mine
         return np.unique(np.concatenate([mine, *(np.searchsorted(nodes.id, ids) for ids in told.values())]))
 
     def _cut(self, touched: Ints) -> tuple[Ints, Ints, Ints, Ints]:
@@ -76,6 +84,9 @@ class Separation:
         tets of this rank, and which of these a row is, -1 for a row of another rank.
         """
         nodes = self._model.nodes
+        if not len(touched):
+            none = np.zeros(0, np.int64)
+            return self._with_others(np.zeros((0, stars.COLUMNS), np.int64)), none, np.zeros((0, 3), np.int64), none
         block_of = self._block_of[nodes.part[touched]]
         tables, where = [np.zeros((0, stars.COLUMNS), np.int64)], [np.zeros((0, 3), np.int64)]
         for b, star in self.stars.items():
@@ -103,13 +114,16 @@ class Separation:
         """The rows of this rank's tets and those of the others' round shared nodes."""
         if self._comm.size == 1:
             return mine
-        nodes = self._model.nodes
-        local, flags, sends = np.searchsorted(nodes.id, mine[:, stars.NODE]), np.zeros(nodes.n, bool), {}
-        for other in self._neighbours:
-            flags[other.nodes] = True
-            sends[other.rank] = mine[flags[local]]
-            flags[other.nodes] = False
+        nodes, sends = self._model.nodes, {}
+        if len(mine):
+            local, flags = np.searchsorted(nodes.id, mine[:, stars.NODE]), np.zeros(nodes.n, bool)
+            for other in self._neighbours:
+                flags[other.nodes] = True
+                sends[other.rank] = mine[flags[local]]
+                flags[other.nodes] = False
         told = self._comm.swap(sends)
+        if not told:
+            return mine
         return np.concatenate([mine, *(words.reshape(-1, stars.COLUMNS) for words in told.values())])
 
     def _number(self, mine: Ints) -> Ints:
@@ -118,7 +132,7 @@ class Separation:
             return mine
         nodes = self._model.nodes
         owned = nodes.owned[np.searchsorted(nodes.id, mine[:, 0])]
-        every = np.concatenate(self._comm.share(mine[owned]))
+        every = self._comm.join(mine[owned]).reshape(-1, 2)
         return every[np.lexsort((every[:, 1], every[:, 0]))]
 
     def _separate(

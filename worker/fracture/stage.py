@@ -147,23 +147,30 @@ class Fracture:
         near, far = self.loaded()
         passed: list[tuple[Ints, Floats]] = []
         found = [
-            (self._beyond(body, loaded, passed), self._beyond(body, remote, passed))
+            self._beyond(body, loaded, remote, passed)
             for body, loaded, (remote, _) in zip(self._bodies, near, far, strict=True)
         ]
         ids = np.concatenate([np.zeros(0, np.int64), *(ids for ids, _ in passed)])
         order = np.argsort(ids)
         self._since = ids[order], np.concatenate([np.zeros(0), *(since for _, since in passed)])[order]
-        if not int(self._comm.sum(np.array([sum(len(a) + len(b) for a, b in found)]))[0]):
+        firsts = [self._far.first[at[across]] for (_, at), (_, across) in zip(far, found, strict=True)]
+        sides = sum(len(within) + len(across) for within, across in found)
+        facets = sum(len(within) + int(first.sum()) for (within, _), first in zip(found, firsts, strict=True))
+        sides, facets = self._comm.sum(np.array([sides, facets]))
+        if not sides:
             return
         broken = []
-        for body, loaded, (remote, at), (within, across) in zip(self._bodies, near, far, found, strict=True):
-            first, mass = self._far.first[at[across]], self._far.mass[at[across]]
-            broken.append(_breaking(body, loaded.take(within), remote.take(across), first, mass))
+        for body, loaded, (remote, at), (within, across), first in zip(
+            self._bodies, near, far, found, firsts, strict=True
+        ):
+            if len(within) or len(across):
+                mass = self._far.mass[at[across]]
+                broken.append(_breaking(body, loaded.take(within), remote.take(across), first, mass))
         if self._one_by_one:
             broken = self._strongest(broken)
-        total = int(self._comm.sum(np.array([sum(int(b.first.sum()) for b in broken)]))[0])
-        if total:
-            self.broken += total
+            facets = self._comm.sum(np.array([sum(int(b.first.sum()) for b in broken)]))[0]
+        if facets:
+            self.broken += int(facets)
             self._break(broken)
 
     def keep(self, parcel: Parcel) -> None:
@@ -189,8 +196,8 @@ class Fracture:
             self.cohesion.resume(parcel, self._model.nodes)
 
     def loaded(self) -> tuple[list[Loaded], list[tuple[Loaded, Ints]]]:
-        """Of every body the facets within this rank that have a hot face, and those shared with another, with their
-        places among all such; all ranks take part.
+        """Of every body the facets within this rank that may pass, and those shared with another, with their places
+        among all such; all ranks take part.
         """
         nodes = self._model.nodes
         near = [bodies.look(body, nodes.x) for body in self._bodies]
@@ -217,13 +224,17 @@ class Fracture:
         """Gives the messages back to MPI."""
         self._far.free()
 
-    def _beyond(self, body: Body, loaded: Loaded, passed: list[tuple[Ints, Floats]]) -> "np.ndarray":
+    def _beyond(
+        self, body: Body, near: Loaded, far: Loaded, passed: list[tuple[Ints, Floats]]
+    ) -> tuple["np.ndarray", "np.ndarray"]:
         """Which facets break; notes those beyond their strength with their clocks in ``passed``."""
+        if not len(near.places) and not len(far.places):
+            return far.places, far.places
         block = body.block
-        ids = bodies.facet_ids(block, loaded.places, loaded.faces)
-        size = bodies.areas(block.tets, loaded.places, loaded.faces, self._model.nodes.x0)
-        strength = body.tough.strengths(ids, size)
-        effective = loaded.traction[:, 3]
+        places, faces = np.concatenate([near.places, far.places]), np.concatenate([near.faces, far.faces])
+        ids = bodies.facet_ids(block, places, faces)
+        strength = body.tough.strengths(ids, bodies.areas(block.tets, places, faces, self._model.nodes.x0))
+        effective = np.concatenate([near.traction[:, 3], far.traction[:, 3]])
         since, now = np.full(len(ids), self._clock.t), self._clock.t
         known, times = self._since
         if len(known):
@@ -232,7 +243,7 @@ class Fracture:
         over = effective >= strength
         breaks = over & (effective >= body.tough.required(strength, now - since))
         passed.append((ids[over], since[over]))
-        return np.flatnonzero(breaks)
+        return np.flatnonzero(breaks[: len(near.places)]), np.flatnonzero(breaks[len(near.places) :])
 
     def _strongest(self, broken: list[Breaking]) -> list[Breaking]:
         """Those that are loaded most strongly round all of their nodes, where the part asks for that."""
@@ -250,7 +261,7 @@ class Fracture:
     def _break(self, broken: list[Breaking]) -> None:
         split = self._separation.break_facets({b.body.index: b.broken for b in broken})
         fresh = [self._insert(b.take(b.first), split) for b in broken if b.body.spec.model == "cohesive"]
-        if split is not None:
+        if split is not None and split.copies.n:
             self._tell_everybody(split)
             self._hand_over(split, fresh)
         for facets in fresh:

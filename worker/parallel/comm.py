@@ -79,6 +79,9 @@ class Comm(Protocol):
     def swap(self, sends: dict[int, Ints]) -> dict[int, Ints]:
         """What each rank has for this one, flat, by ascending rank, its own included; nothing is sent for no key."""
 
+    def join(self, words: Ints) -> Ints:
+        """The words of all ranks, flat, one rank's after the other's, on every rank."""
+
     def share(self, item: Any) -> list[Any]:
         """The items of all ranks, in order, on every rank."""
 
@@ -146,6 +149,9 @@ class SerialComm:
 
     def swap(self, sends: dict[int, Ints]) -> dict[int, Ints]:
         return {rank: words.reshape(-1) for rank, words in sends.items()}
+
+    def join(self, words: Ints) -> Ints:
+        return words.reshape(-1)
 
     def share(self, item: Any) -> list[Any]:
         return [item]
@@ -223,20 +229,34 @@ class MpiComm:
         return _MpiExchange(self, self._mpi.Prequest, requests, (len(sends), size))
 
     def swap(self, sends: dict[int, Ints]) -> dict[int, Ints]:
-        mine = {rank: np.ascontiguousarray(words).reshape(-1) for rank, words in sends.items()}
-        counts = np.array([len(mine[rank]) if rank in mine else 0 for rank in range(self.size)], np.int64)
+        mine = {rank: np.ascontiguousarray(words).reshape(-1) for rank, words in sends.items() if words.size}
+        counts = np.zeros(self.size, np.int64)
+        for rank, words in mine.items():
+            counts[rank] = len(words)
+            if rank != self.rank:
+                self.sent.message(1, words.nbytes)
         theirs = np.empty_like(counts)
         self.sent.collective(counts.nbytes)
         with self.waiting():
             self._world.Alltoall(counts, theirs)
-        received = {int(rank): np.empty(theirs[rank], np.int64) for rank in np.flatnonzero(theirs)}
-        requests = [self._world.Irecv(buffer, rank, _SWAP_TAG) for rank, buffer in received.items()]
-        requests += [self._world.Isend(words, rank, _SWAP_TAG) for rank, words in mine.items() if len(words)]
-        others = np.delete(counts, self.rank)
-        self.sent.message(int(np.count_nonzero(others)), 8 * int(others.sum()))
-        with self.waiting():
-            self._mpi.Request.Waitall(requests)
+        received = {rank: np.empty(count, np.int64) for rank, count in enumerate(theirs.tolist()) if count}
+        if received or mine:
+            requests = [self._world.Irecv(buffer, rank, _SWAP_TAG) for rank, buffer in received.items()]
+            requests += [self._world.Isend(words, rank, _SWAP_TAG) for rank, words in mine.items()]
+            with self.waiting():
+                self._mpi.Request.Waitall(requests)
         return received
+
+    def join(self, words: Ints) -> Ints:
+        counts = np.empty(self.size, np.int64)
+        self.sent.collective(8 + words.nbytes, 2)
+        with self.waiting():
+            self._world.Allgather(np.array([words.size]), counts)
+        every = np.empty(counts.sum(), np.int64)
+        if len(every):
+            with self.waiting():
+                self._world.Allgatherv(np.ascontiguousarray(words), (every, counts))
+        return every
 
     def share(self, item: Any) -> list[Any]:
         self.sent.collective(number=2)
