@@ -102,7 +102,7 @@ class Balance:
 
     def move(self, sim: Simulation) -> tuple[Simulation, dict[str, Any]]:
         """Cuts by the costs and moves what has to; the new simulation and what to tell. All ranks take part."""
-        began, before = time.monotonic(), self._latest
+        began, before, cpu = time.monotonic(), self._latest, time.thread_time() - self.comm.waited
         parcel = simulation.keep(sim)
         self.weigh(sim, parcel)
         arrived = route(parcel, self.case.run.cut_scale, self.comm)
@@ -111,44 +111,49 @@ class Balance:
         tets, nodes = np.sum(self.comm.share(arrived.moved), axis=0)
         predicted = self.comm.share(float(sum(table["weight"].sum() for table in arrived.parcel.tets.values())))
         cost = self.comm.broadcast(time.monotonic() - began)
-        self._settle(now, cost)
+        work = float(self.comm.maximum(np.array([time.thread_time() - self.comm.waited - cpu]))[0])
+        self._settle(now, cost, work)
         told = {
             "before": {name: [s / max(before.steps, 1) for s in before.work[name]] for name in WORK} if before else {},
             "predicted": predicted, "tets": int(tets), "nodes": int(nodes), "cost": cost, "saved": self.saved,
         }  # fmt: skip
         return now, told
 
-    def _settle(self, sim: Simulation, cost: float) -> None:
-        """Begins to count anew after a cut."""
+    def _settle(self, sim: Simulation, cost: float, work: float) -> None:
+        """Begins to count anew after a cut that took ``cost`` on the clock, and ``work`` of the slowest rank, s."""
         self.events, self.spent, self._saved = self.events + 1, self.spent + cost, self.saved
         self._before, self._latest = balancing.imbalance(self.trigger.work) if self.trigger.work else None, None
-        self.trigger.settle(sim.clock.step, cost)
+        self.trigger.settle(sim.clock.step, work)
         self._meter = Meter.of(sim, self.slope)
         self._guard = Guard(self.case.balance.alpha, sim.contact.outside if sim.contact is not None else 0)
 
     def weigh(self, sim: Simulation, parcel: Parcel) -> None:
-        """Fills the ``weight`` of every tet of a parcel, s a step; all ranks take part."""
+        """Fills the ``weight`` of every tet of a parcel, s a step, by what ranks do at the same time: its own, and of
+        what is done round it the search and the rest. All ranks take part.
+        """
         if self.case.balance.weights == "tets":
             return
-        effort = sim.contact.effort() if sim.contact is not None else np.zeros(sim.model.nodes.n)
+        effort = sim.contact.effort() if sim.contact is not None else np.zeros((sim.model.nodes.n, 2))
         if self.case.balance.weights == "outside":
-            effort = (effort > 0.0).astype(float)
-            per_tet, per_effort = np.zeros(len(sim.model.parts)), 1.0
-        else:
-            costs = self._meter.costs(sim, float(effort.sum()))
-            per_tet, per_effort = costs.tet, costs.candidate
-        nodes = _with_their_first_tets(parcel, effort)
+            nodes = _with_their_first_tets(parcel, np.any(effort, axis=1)[:, None])
+            for part, table in parcel.tets.items():
+                table["weight"][:, 0] = _LEAST + nodes[part][:, 0]
+            return
+        costs = self._meter.costs(sim, float(effort.sum()))
+        around = _with_their_first_tets(parcel, costs.candidate * effort)
         for part, table in parcel.tets.items():
-            table["weight"] = _LEAST + per_tet[part] + per_effort * nodes[part]
+            own = np.full(len(around[part]), _LEAST + costs.tet[part])
+            table["weight"] = np.column_stack([own, around[part]])
 
 
-def _with_their_first_tets(parcel: Parcel, effort: Floats) -> dict[int, Floats]:
-    """By part (n,): the ``effort`` (nodes,) of all nodes whose tet of smallest id here it is."""
+def _with_their_first_tets(parcel: Parcel, effort: "np.ndarray") -> dict[int, Floats]:
+    """By part (n, k): the ``effort`` (nodes, k) of all nodes whose tet of smallest id here it is."""
     ids, first = parcel.nodes["id"], np.full(len(effort), np.iinfo(np.int64).max)
     corners: dict[int, Ints] = {part: np.searchsorted(ids, t["corners"]) for part, t in parcel.tets.items()}
     for part, table in parcel.tets.items():
         np.minimum.at(first, corners[part], table["id"][:, None])
-    return {
-        part: np.where(first[corners[part]] == table["id"][:, None], effort[corners[part]], 0.0).sum(axis=1)
-        for part, table in parcel.tets.items()
-    }
+    found = {}
+    for part, table in parcel.tets.items():
+        mine = first[corners[part]] == table["id"][:, None]
+        found[part] = np.column_stack([np.where(mine, each[corners[part]], 0.0).sum(axis=1) for each in effort.T])
+    return found

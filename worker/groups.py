@@ -51,7 +51,7 @@ class Groups:
         for block in model.blocks:
             counts[:, block.part] = np.bincount(block.group, minlength=n)
         if sim.contact is not None:
-            counts[:, -2] = np.bincount(model.nodes.group, sim.contact.effort(), n)
+            counts[:, -2] = np.bincount(model.nodes.group, sim.contact.effort().sum(axis=1), n)
             counts[:, -1] = np.bincount(model.nodes.group, sim.contact.on_surface, n)
         costs = self._meter.costs(sim, float(counts[:, -2].sum()))
         counts = sim.comm.sum(counts)

@@ -93,3 +93,56 @@ def test_other_points_lie_with_those_round_them() -> None:
     owner, cuts = decompose.bisect(points, np.arange(4000), np.ones(4000), 7, SerialComm())
     near = points + 1e-12
     assert (decompose.place(cuts, near) == owner).mean() > 0.99
+
+
+def test_directions_are_unit_normals_that_differ() -> None:
+    assert decompose.DIRECTIONS[:3].tolist() == np.eye(3).tolist()
+    along = np.abs(decompose.DIRECTIONS @ decompose.DIRECTIONS.T)
+    assert along.diagonal() == pytest.approx(1.0)
+    assert (along - np.eye(49)).max() < 0.98
+
+
+def nosed(n: int, tip: float) -> tuple[Floats, Floats]:
+    """A bar along z, every point of which costs 1 in the first phase, and 3 in the second below ``tip`` times x."""
+    points = np.random.default_rng(12).uniform(size=(n, 3)) * [1.0, 1.0, 3.0]
+    return points, np.column_stack([np.ones(n), 3.0 * (points[:, 2] < 1.0 + tip * (points[:, 0] - 0.5))])
+
+
+@pytest.mark.parametrize("parts", [2, 3, 4])
+def test_every_phase_is_shared_evenly(parts: int) -> None:
+    """Where one phase lies at one end, as contact does, a cut across the axis gives one part all of it."""
+    points, weights = nosed(20_000, 0.5)
+    owner, _ = decompose.bisect(points, np.arange(len(points)), weights, parts, SerialComm())
+    shares = np.array([np.bincount(owner, w, parts) for w in weights.T])
+    assert shares.sum(axis=0) == pytest.approx(weights.sum() / parts, rel=0.01)
+    worst = (shares.max(axis=1)).sum() * parts / weights.sum() - 1.0
+    plain, _ = decompose.bisect(points, np.arange(len(points)), weights.sum(axis=1), parts, SerialComm())
+    across = np.array([np.bincount(plain, w, parts) for w in weights.T])
+    assert worst < 0.3 * (across.max(axis=1).sum() * parts / weights.sum() - 1.0)
+
+
+def test_one_phase_alone_is_cut_across_the_longest_side() -> None:
+    points = cloud(4000, 6)
+    plain = bisect(points, np.ones(4000), 5)
+    assert (bisect(points, np.tile([1.0, 0.0], (4000, 1)), 5) == plain).all()
+
+
+def test_of_cuts_as_even_the_smaller_one_is_made() -> None:
+    """Both phases are the same everywhere: nothing is gained by a cut aslant."""
+    points = cloud(20_000, 13)
+    _, cuts = decompose.bisect(points, np.arange(len(points)), np.ones((20_000, 2)), 2, SerialComm())
+    assert [cut.direction for cut in cuts] == [0]
+
+
+def test_even_phases_do_not_depend_on_who_holds_the_points() -> None:
+    points, weights = nosed(2000, 0.3)
+    ids, holder = np.arange(2000), np.random.default_rng(14).integers(0, 3, 2000)
+    one, cuts = decompose.bisect(points, ids, weights, 7, SerialComm())
+
+    def share(comm: ThreadComm) -> tuple[Indices, list[decompose.Cut]]:
+        mine = holder == comm.rank
+        return decompose.bisect(points[mine], ids[mine], weights[mine], 7, comm)
+
+    for rank, (owner, same) in enumerate(on_ranks(3, share)):
+        assert owner.tolist() == one[holder == rank].tolist()
+        assert same == cuts

@@ -48,11 +48,6 @@ class Cracks:
         """No facet."""
         return cls(np.zeros((0, 2), np.int64), np.zeros((0, 6), np.int32), np.zeros((0, 2, 3), np.int32))
 
-    @property
-    def active(self) -> Flags:
-        """(m,) which have nodes that have separated, and the first side here: this rank computes them."""
-        return np.asarray(_active(self.nodes, self.sides))
-
     def add(self, tets: Ints, nodes: Indices, sides: Indices) -> None:
         """Takes up facets with their three ``nodes`` (m, 3)."""
         self.tets, self.sides = extended(self.tets, tets), extended(self.sides, sides)
@@ -125,15 +120,17 @@ class News:
     """Parents and copies."""
 
 
-def news(split: Split, scene: Scene, here: Crowd, comm: Comm) -> News:
-    """All ranks take part. ``here``: every node of this rank, by local index. Of nodes that it does not hold, a rank
-    hears from the one that sends it their state.
+def news(split: Split, scene: Scene, here: Crowd, comm: Comm) -> News | None:
+    """None where there is none; all ranks take part. ``here``: every node of this rank, by local index. Of nodes that
+    it does not hold, a rank hears from the one that sends it their state.
     """
+    if not split.copies.n and not (heard := comm.swap({})):
+        return None
     parents, copies = split.copies.parents, split.first + np.arange(split.copies.n)
     table = np.column_stack([split.key, here.id[split.node]])
     family = np.column_stack([here.id[parents], here.id[copies]])
     rows = here.take(np.unique(np.concatenate([parents, copies])))
-    if comm.size > 1:
+    if split.copies.n:
         told, flags = {}, np.zeros(here.n, bool)
         for other in scene.copies.sends:
             flags[other.nodes] = True
@@ -147,7 +144,9 @@ def news(split: Split, scene: Scene, here: Crowd, comm: Comm) -> News:
                 told[other.rank] = np.concatenate([
                     lengths, round_it.reshape(-1), family[for_it].reshape(-1), packed.reshape(-1)
                 ])  # fmt: skip
-        for words in comm.swap(told).values():
+        heard = comm.swap(told)
+    if heard:
+        for words in heard.values():
             ends = 2 + 2 * np.cumsum(words[:2])
             table = np.concatenate([table, words[2 : ends[0]].reshape(-1, 2)])
             family = np.concatenate([family, words[ends[0] : ends[1]].reshape(-1, 2)])
@@ -205,16 +204,17 @@ class Follower:
     def cracks(self, cracks: Cracks) -> None:
         """The places of the cracks that this rank computes, and room for all that may meet."""
         scene = self._scene
-        nodes = cracks.nodes[cracks.active]
-        absent = scene.place < 0
-        some = np.zeros(self._nodes.n, bool)
-        some[nodes[touching(nodes, absent)]] = True
-        self._add(self._here.take(np.flatnonzero(some & absent)))
-        scene.cracks = np.empty_like(nodes)
-        _place(scene.cracks, scene.pushes, nodes, scene.place)
-        room = len(scene.node_face) + len(scene.edge_edge) + 3 * len(nodes)
+        while True:
+            places, absent = np.empty(cracks.nodes.shape, np.int32), np.empty(cracks.nodes.size, np.int32)
+            n, lacking = _places(places, absent, scene.pushes, cracks.nodes, cracks.sides, scene.place)
+            if not lacking:
+                break
+            self._add(self._here.take(np.unique(absent[:lacking])))
+        scene.cracks = places[:n]
+        room = len(scene.node_face) + len(scene.edge_edge) + 3 * n
         if room > len(scene.push):
-            scene.room = Meetings.room(2 * room)
+            met, scene.room = scene.room.nodes[: scene.met], Meetings.room(2 * room)
+            scene.room.nodes[: scene.met] = met
             scene.diagonal, scene.push = np.empty((2 * room, 2)), np.empty((2 * room, 4))
 
     def settle(self, neighbours: list[Neighbour], comm: Comm) -> None:
@@ -341,24 +341,32 @@ def _heirs(some: Neighbour, family: Indices, n: int) -> Neighbour:
     return Neighbour(some.rank, extended(some.nodes, family[_flagged(some.nodes, n)[family[:, 0]], 1]))
 
 
-@njit("boolean[::1](int32[:, ::1], int32[:, :, ::1])", cache=True)
-def _active(nodes, sides):  # type: ignore[no-untyped-def]
-    """Cracks.active."""
-    out = np.empty(len(nodes), np.bool_)
-    for c in range(len(nodes)):
-        apart = nodes[c, 0] != nodes[c, 3] or nodes[c, 1] != nodes[c, 4] or nodes[c, 2] != nodes[c, 5]
-        out[c] = apart and sides[c, 0, 1] >= 0
-    return out
+@njit(
+    "UniTuple(int64, 2)(int32[:, ::1], int32[::1], boolean[::1], int32[:, ::1], int32[:, :, ::1], int32[::1])",
+    cache=True,
+)
+def _places(out, absent, pushes, nodes, sides, place):  # type: ignore[no-untyped-def]
+    """The places, in ``out`` (m, 6), of the ``nodes`` (m, 6) of the cracks that have nodes that have separated, and the
+    first side here: this rank computes them. Nodes that have separated may be pushed.
 
-
-@njit("void(int32[:, ::1], boolean[::1], int32[:, ::1], int32[::1])", cache=True)
-def _place(out, pushes, nodes, place):  # type: ignore[no-untyped-def]
-    """The places of the ``nodes`` (m, 6) of cracks; those that have separated may be pushed."""
+    Returns how many cracks and how many nodes that have no place; these are in ``absent``.
+    """
+    n, lacking = 0, 0
     for c in range(len(nodes)):
+        if sides[c, 0, 1] < 0:
+            continue
+        if nodes[c, 0] == nodes[c, 3] and nodes[c, 1] == nodes[c, 4] and nodes[c, 2] == nodes[c, 5]:
+            continue
         for k in range(6):
-            out[c, k] = place[nodes[c, k]]
-            if nodes[c, k] != nodes[c, (k + 3) % 6]:
-                pushes[out[c, k]] = True
+            at = place[nodes[c, k]]
+            out[n, k] = at
+            if at < 0:
+                absent[lacking] = nodes[c, k]
+                lacking += 1
+            elif nodes[c, k] != nodes[c, (k + 3) % 6]:
+                pushes[at] = True
+        n += 1
+    return n, lacking
 
 
 @njit("int64[::1](int32[:, ::1], boolean[::1])", cache=True)

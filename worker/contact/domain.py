@@ -7,11 +7,13 @@ occupied cell is an outside cell already, and the paper's test of a cell's neigh
 """
 
 import numpy as np
+from numba import njit
 
 from ..parallel.comm import Comm
-from ..state import Flags, Floats, Ints
-from .buckets import grid
+from ..state import Flags, Floats
 from .search import Boxes
+
+_NONE = np.zeros(0, np.int64)
 
 
 def choose(kind: str, askers: Boxes, things: list[Boxes], edge: float, comm: Comm) -> dict[int, list[Flags]]:
@@ -19,7 +21,8 @@ def choose(kind: str, askers: Boxes, things: list[Boxes], edge: float, comm: Com
 
     ``askers`` are the boxes of this rank's nodes and edges; ``edge`` that of a cell, m, equal on all ranks.
     """
-    hulls = comm.share((askers.hull, np.minimum.reduce([t.hull for t in things])))
+    mine = np.concatenate([askers.hull, np.minimum.reduce([t.hull for t in things])])
+    hulls = comm.join(mine.view(np.int64)).view(np.float64).reshape(comm.size, 2, 6)
     near = {
         rank: [t.touching(asker) for t in things] for rank, (asker, _) in enumerate(hulls) if rank != comm.rank
     }  # fmt: skip
@@ -34,37 +37,66 @@ def _in_cells(
     """Keeps what touches a cell that the other rank has named."""
     asked = {rank: askers.touching(offers[rank]) for rank in near}
     cells = comm.swap({
-        rank: np.unique(_codes(_cells(askers.take(a), edge)[1]))
-        for rank, a in asked.items() if a.any()
+        rank: np.unique(_cells(askers.low, askers.high, some, edge)) for rank, some in asked.items() if some.any()
     })  # fmt: skip
-    kept = {}
-    for rank, flags in near.items():
-        named = cells.get(rank, np.zeros(0, np.int64))
-        kept[rank] = [_named(f, t, named, edge) for f, t in zip(flags, things, strict=True)]
-    return kept
+    return {
+        rank: [_named(flag, thing.low, thing.high, cells.get(rank, _NONE), edge)
+               for flag, thing in zip(flags, things, strict=True)]
+        for rank, flags in near.items()
+    }  # fmt: skip
 
 
-def _named(flags: Flags, things: Boxes, cells: Ints, edge: float) -> Flags:
-    """Which of the flagged ``things`` touch one of ``cells``, codes in ascending order."""
-    result = np.zeros(len(flags), bool)
-    if len(cells):
-        who, mine = _cells(things.take(flags), edge)
-        codes = _codes(mine)
-        hit = cells[np.minimum(np.searchsorted(cells, codes), len(cells) - 1)] == codes
-        result[np.flatnonzero(flags)[who[hit]]] = True
-    return result
+@njit("int64(float64, float64)", cache=True)
+def _cell(x, edge):  # type: ignore[no-untyped-def]
+    """Index along an axis of the cell that a coordinate lies in."""
+    return np.int64(np.floor(x / edge))
 
 
-def _codes(cells: Ints) -> Ints:
-    """Cells (n, 3) as one number each. Two have the same only if they are 2^20 cells apart: then a thing is sent that
-    is not needed.
+@njit("int64(int64, int64, int64)", cache=True)
+def _code(ix, iy, iz):  # type: ignore[no-untyped-def]
+    """A cell as one number. Two have the same only if they are 2^20 cells apart: then a thing is sent that is not
+    needed.
     """
-    return np.asarray((cells[:, 0] << 42) + (cells[:, 1] << 21) + cells[:, 2])
+    return (ix << 42) + (iy << 21) + iz
 
 
-def _cells(boxes: Boxes, edge: float) -> tuple[Ints, Ints]:
-    """Index of the box and the cell (3,) for every cell that every box touches."""
-    first = np.floor(boxes.low / edge).astype(np.int64)
-    counts = np.floor(boxes.high / edge).astype(np.int64) - first + 1
-    who, index = grid(counts)
-    return who, first[who] + index
+@njit("int64[::1](float64[:, ::1], float64[:, ::1], boolean[::1], float64)", cache=True)
+def _cells(low, high, some, edge):  # type: ignore[no-untyped-def]
+    """The code of every cell that each of ``some`` boxes touches; one box after the other, so many stand twice."""
+    many, before = 0, 0
+    for j in range(len(low)):
+        if some[j]:
+            cells = 1
+            for i in range(3):
+                cells *= _cell(high[j, i], edge) - _cell(low[j, i], edge) + 1
+            many += cells
+    codes, n = np.empty(many, np.int64), 0
+    for j in range(len(low)):
+        if not some[j]:
+            continue
+        for ix in range(_cell(low[j, 0], edge), _cell(high[j, 0], edge) + 1):
+            for iy in range(_cell(low[j, 1], edge), _cell(high[j, 1], edge) + 1):
+                for iz in range(_cell(low[j, 2], edge), _cell(high[j, 2], edge) + 1):
+                    code = _code(ix, iy, iz)
+                    if n == 0 or code != before:
+                        codes[n], before = code, code
+                        n += 1
+    return codes[:n].copy()
+
+
+@njit("boolean[::1](boolean[::1], float64[:, ::1], float64[:, ::1], int64[::1], float64)", cache=True)
+def _named(flags, low, high, cells, edge):  # type: ignore[no-untyped-def]
+    """Which of the flagged boxes touch one of ``cells``, codes in ascending order."""
+    kept = np.zeros(len(flags), np.bool_)
+    if len(cells) == 0:
+        return kept
+    for j in range(len(flags)):
+        if not flags[j]:
+            continue
+        for ix in range(_cell(low[j, 0], edge), _cell(high[j, 0], edge) + 1):
+            for iy in range(_cell(low[j, 1], edge), _cell(high[j, 1], edge) + 1):
+                first = _code(ix, iy, _cell(low[j, 2], edge))
+                at = np.searchsorted(cells, first)
+                if at < len(cells) and cells[at] <= _code(ix, iy, _cell(high[j, 2], edge)):
+                    kept[j] = True
+    return kept

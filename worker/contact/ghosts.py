@@ -102,40 +102,44 @@ class Copies:
     def __init__(self, sends: list[Neighbour], receives: list[Neighbour], comm: Comm, tag: int) -> None:
         """``sends``: local nodes, ``receives``: places in the crowd."""
         self.sends, self.receives = sends, receives
-        self._out = [np.empty((len(some.nodes), 9)) for some in sends]
-        self._in = [np.empty((len(some.nodes), 9)) for some in receives]
-        self._exchange = comm.exchange(
-            [(some.rank, buffer.view(np.int64)) for some, buffer in zip(sends, self._out, strict=True)],
-            [(some.rank, buffer.view(np.int64)) for some, buffer in zip(receives, self._in, strict=True)],
-            tag,
-        )
+        self._from, self._to = (_joined([some.nodes for some in each]) for each in (sends, receives))
+        self._out, self._in = np.empty((len(self._from), 9)), np.empty((len(self._to), 9))
+        self._exchange = comm.exchange(_slices(self._out, sends), _slices(self._in, receives), tag)
 
     @property
     def bytes_sent(self) -> int:
         """Bytes this rank sends in one exchange."""
-        return sum(buffer.nbytes for buffer in self._out)
+        return self._out.nbytes
 
     def note(self, nodes: Nodes) -> None:
         """Keeps v(n-1/2) for the others."""
-        for some, buffer in zip(self.sends, self._out, strict=True):
-            buffer[:, 6:] = nodes.v[some.nodes]
+        self._out[:, 6:] = nodes.v[self._from]
 
     def begin(self, nodes: Nodes) -> None:
         """Sends positions and velocities."""
-        for some, buffer in zip(self.sends, self._out, strict=True):
-            buffer[:, :3], buffer[:, 3:6] = nodes.x[some.nodes], nodes.v[some.nodes]
+        self._out[:, :3], self._out[:, 3:6] = nodes.x[self._from], nodes.v[self._from]
         self._exchange.begin()
 
     def finish(self, x: Floats, v: Floats, before: Floats) -> None:
         """Fills the copies' rows of ``x``, of ``v`` and of v(n-1/2), (crowd, 3) each."""
         self._exchange.finish()
-        for some, buffer in zip(self.receives, self._in, strict=True):
-            at = some.nodes
-            x[at], v[at], before[at] = buffer[:, :3], buffer[:, 3:6], buffer[:, 6:]
+        at, got = self._to, self._in
+        x[at], v[at], before[at] = got[:, :3], got[:, 3:6], got[:, 6:]
 
     def free(self) -> None:
         """Gives the messages back to MPI."""
         self._exchange.free()
+
+
+def _joined(some: list[Indices]) -> Indices:
+    return np.concatenate([np.zeros(0, np.int32), *some])
+
+
+def _slices(buffer: Floats, others: list[Neighbour]) -> list[tuple[int, Ints]]:
+    """The words of each rank in turn."""
+    ends = np.cumsum([len(other.nodes) for other in others])
+    words = buffer.view(np.int64)
+    return [(other.rank, words[end - len(other.nodes) : end]) for other, end in zip(others, ends, strict=True)]
 
 
 def copies(crowd: Crowd, nodes: Nodes, comm: Comm, tag: int) -> Copies:

@@ -88,6 +88,8 @@ class Rest:
         self._dt, self._t = 0.0, 0.0
         self.fresh = True
         """Whether no step has been made since the search."""
+        self.looked: tuple[Indices, Indices] = (np.zeros(0, np.int32), np.zeros(0, np.int32))
+        """Which candidates were awake in the last step."""
 
     def add(self, x: Floats, v: Floats) -> None:
         """Takes up more nodes, as they are, (n, 3) each."""
@@ -120,7 +122,8 @@ class Rest:
             edges.path, edges.reach, self.edges, self.edges, end,
         )  # fmt: skip
         self.faces[:], self.edges[:] = False, False
-        return self._node_face.some[:first], self._edge_edge.some[:second]
+        self.looked = self._node_face.some[:first], self._edge_edge.some[:second]
+        return self.looked
 
     def settle(
         self, pairs: Indices, edges: Indices, node_face: Indices, edge_edge: Indices, faces: Indices, size: Floats,

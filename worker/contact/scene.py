@@ -8,7 +8,7 @@ from numba import njit
 
 from ..migration.parcel import Parcel, take
 from ..parallel.comm import Comm
-from ..parallel.ownership import Neighbour, SharedSum
+from ..parallel.ownership import Neighbour, SharedSum, same
 from ..state import Flags, Floats, Indices, Ints, Nodes
 from . import domain, ghosts, search, sift
 from .ghosts import Copies
@@ -120,6 +120,8 @@ class Scene:
     rest: Rest
     cracks: Indices
     """(m, 6) places of the nodes on either side of open cracks (contact/cracks.py)."""
+    met: int = 0
+    """Meetings of the last step, the first rows of the room."""
     company: list[Neighbour] = field(init=False)
     """Other ranks, and the places of the nodes that either pushes or holds and any rank pushes."""
     shared_shares: SharedSum = field(init=False)
@@ -134,7 +136,9 @@ class Scene:
         self._sum(company, comm)
 
     def extend(self, company: list[Neighbour], sends: list[Neighbour], receives: list[Neighbour], comm: Comm) -> None:
-        """The messages with more nodes, of which this rank knows as the others do."""
+        """The messages with more nodes, of which this rank knows as the others do; what has not grown stays."""
+        if same([*self.company, *self.copies.sends, *self.copies.receives], [*company, *sends, *receives]):
+            return
         self.free()
         self.copies = Copies(sends, receives, comm, _COPY_TAG)
         self._sum(company, comm)

@@ -55,7 +55,18 @@ class Boxes:
 
     def touching(self, hull: Floats) -> Flags:
         """(n,) which boxes touch a hull."""
-        return np.asarray(((self.low <= -hull[3:]) & (self.high >= hull[:3])).all(axis=1))
+        return np.asarray(_in_hull(self.low, self.high, hull))
+
+
+@njit("boolean[::1](float64[:, ::1], float64[:, ::1], float64[::1])", cache=True)
+def _in_hull(low, high, hull):  # type: ignore[no-untyped-def]
+    inside = np.empty(len(low), np.bool_)
+    for j in range(len(low)):
+        touch = True
+        for i in range(3):
+            touch &= low[j, i] <= -hull[3 + i] and high[j, i] >= hull[i]
+        inside[j] = touch
+    return inside
 
 
 def swept(things: Things, x: Floats, v: Floats, horizon: float) -> Boxes:

@@ -32,8 +32,10 @@ from .scene import Rules, Scene
 
 _SHORTEST = 10.0
 """Steps of free flight that a search looks ahead at least; at most twice what the last search was good for."""
-_SURFACE = 2.0
-"""Candidates that cost as much as the search for those of a node."""
+_SURFACE, _AWAKE, _MEETING = 12.0, 3.0, 8.0
+"""Candidates (found, and resting) that cost as much as a node of the surface, as a candidate that is looked at, as a
+meeting; measured on the shattering bar and on the eroding rod (docs/balance.md).
+"""
 _KINEMATIC = 2.0
 """One over the share of a tet's altitude that anything may pass in a step."""
 
@@ -150,14 +152,20 @@ class Contact(Boundary):
         return self._surface.flags & self._model.nodes.owned
 
     def effort(self) -> Floats:
-        """(nodes,) what contact does here for each node, in candidates."""
-        effort = _SURFACE * (self._surface.flags & self._model.nodes.owned)
-        if self._scene is not None:
-            local = self._scene.crowd.local
-            firsts = self._scene.edges[self._scene.edge_edge[:, 0], 0]
-            at = local[np.concatenate([self._scene.node_face[:, 0], firsts, self._scene.cracks[:, :3].reshape(-1)])]
-            effort += np.bincount(at[at >= 0], minlength=len(effort))
-        return np.asarray(effort)
+        """(nodes, 2) what contact does here for each node, in candidates: to search, and to push in every step."""
+        n = self._model.nodes.n
+        search, push = _SURFACE * (self._surface.flags & self._model.nodes.owned), np.zeros(n)
+        if (now := self._scene) is not None:
+            slaves, firsts = now.node_face[:, 0], now.edges[now.edge_edge[:, 0], 0]
+            pairs, edges = now.rest.looked
+            for effort, weight, places in (
+                (search, 1.0, np.concatenate([slaves, firsts])),
+                (push, _AWAKE, np.concatenate([slaves[pairs], firsts[edges], now.cracks[:, :3].reshape(-1)])),
+                (push, _MEETING, now.room.nodes[: now.met, 0]),
+            ):
+                at = now.crowd.local[places]
+                effort += weight * np.bincount(at[at >= 0], minlength=n)
+        return np.column_stack([search, push])
 
     def impulses(self) -> Floats:
         """(parts, 3) what contact has given each part so far, N s; all ranks take part."""
@@ -181,15 +189,19 @@ class Contact(Boundary):
         """Follows nodes as they separate; all ranks take part."""
         with self._timers.phase("contact"):
             state = self._model.nodes
-            self._cracks.follow(split, state.id)
             self._stale = True
+            if split.copies.n:
+                self._cracks.follow(split, state.id)
             if self._scene is None:
                 return
-            self._flight.grow(split.copies.parents)
-            self._flight.mobility = self._mobility
+            if split.copies.n:
+                self._flight.grow(split.copies.parents)
+                self._flight.mobility = self._mobility
             here = self._flight.here(state)
-            follower = Follower(self._scene, here, state)
             heard = news(split, self._scene, here, self._comm)
+            if heard is None:
+                return
+            follower = Follower(self._scene, here, state)
             follower.follow(heard, self._cracks, self._neighbours)
             if self._comm.size > 1:
                 follower.share(heard, self._neighbours, self._comm)
@@ -284,7 +296,7 @@ class Contact(Boundary):
         now.copies.begin(state)
         held.take(crowd.x, crowd.v, now.held, state.x, state.v, now.local)
         now.copies.finish(crowd.x, crowd.v, now.before)
-        n = self._meet(now, dt)
+        n = now.met = self._meet(now, dt)
         rows = sweeps.parted(room.nodes, now.shared, n)
         self._weigh(now, n, rows)
         room_of = (room.nodes, room.weights, room.normals)

@@ -95,7 +95,7 @@ class Elements:
 
     def grow(self, copies: Copies) -> None:
         """Takes up copies of nodes; they are shared already."""
-        if self._neighbours:
+        if not self.shared_forces.serves(self._neighbours):
             self.free()
             self._connect()
 

@@ -30,7 +30,7 @@ def _keep_block(block: Block, ids: Ints) -> Table:
     state = block.state.transpose(0, 2, 1).reshape(-1, block.state.shape[1])[: block.n]
     some = {name: getattr(block, name) for name in _OF_TETS if len(getattr(block, name))}
     known = {"id": block.id, "corners": ids[block.tets], "group": block.group}
-    return {**known, "state": state, "weight": np.ones(block.n), **some}
+    return {**known, "state": state, "weight": np.tile([1.0, 0.0, 0.0], (block.n, 1)), **some}
 
 
 def resume(case: Case, arrived: Arrived, comm: Comm) -> Model:

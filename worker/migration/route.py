@@ -56,7 +56,8 @@ class Arrived:
 
 
 def route(parcel: Parcel, scale: tuple[float, float, float], comm: Comm) -> Arrived:
-    """Cuts all tets by their ``weight`` and moves everything to where it belongs; all ranks take part.
+    """Cuts all tets by their ``weight`` (n, 3), see Balance.weigh, and moves everything to where it belongs; all ranks
+    take part.
 
     ``scale`` multiplies positions before the cut.
     """
@@ -81,7 +82,7 @@ def route(parcel: Parcel, scale: tuple[float, float, float], comm: Comm) -> Arri
 
 def _cut(parcel: Parcel, scale: Floats, comm: Comm) -> tuple[dict[int, Indices], list[Cut]]:
     """The rank of every tet, by part."""
-    nodes, points, ids, weights = parcel.nodes, [np.zeros((0, 3))], [np.zeros(0, np.int64)], [np.zeros(0)]
+    nodes, points, ids, weights = parcel.nodes, [np.zeros((0, 3))], [np.zeros(0, np.int64)], [np.zeros((0, 3))]
     for table in parcel.tets.values():
         corners = np.searchsorted(nodes["id"], table["corners"])
         points.append(nodes["x"][corners].mean(axis=1) * scale)

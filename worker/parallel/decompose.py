@@ -1,30 +1,58 @@
-"""Recursive coordinate bisection: which rank computes which tet. Berger and Bokhari 1987.
+"""Recursive bisection: which rank computes which tet. Berger and Bokhari 1987, with cuts that halve every phase.
 
 No rank sees the points of another: a cut is found digit by digit from sums of weights over all ranks.
+
+Ranks wait for each other within a step, after contact and after the elements, so that half of the sum is not enough:
+one with all of the contact and another with all of the tets have equal loads and halve nothing. In three dimensions
+there is a plane that halves any three measures at once (the ham sandwich theorem). So where a point has several
+weights, one for each phase, planes of many directions are tried, each where it halves the sum, and the one stands that
+leaves the phases most nearly even.
 """
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
+from numba import njit
 
 from ..state import Flags, Floats, Indices, Ints
 from .comm import Comm
 
 _LEVELS = 2.0**31 - 1.0
-"""Places along an axis that are told apart; points in one place are told apart by their ids."""
+"""Places along a normal that are told apart; points in one place are told apart by their ids."""
 _ID_BITS = 32
 _DIGIT = 8
 _FINEST = 2.0**30
 """Quanta of the largest weight: sums of four billion of them are exact."""
+_BINS = 128
+"""Slices in which the weights along a direction are told apart when directions are compared."""
+_SHORT = 0.2
+"""Of the longest: no cut is made across a direction in which a box is shorter (as ``run.cut_scale`` has it)."""
+_SURFACE = 0.05
+"""Share of the time that a cut through twice as much as need be is taken to cost."""
+_THICK = 2
+"""Slices on either side of a cut that tell through how much it goes."""
+
+
+def _directions() -> Floats:
+    """(49, 3) unit normals: the axes first, then all whose components are as 0, 1 and 2, but for their sense."""
+    found = [v for v in product(range(-2, 3), repeat=3) if v > (0, 0, 0) and np.gcd.reduce(v) == 1]
+    found.sort(key=lambda v: (sum(map(abs, v)), [-c for c in v]))
+    return np.asarray(np.array(found) / np.linalg.norm(found, axis=1)[:, None])
+
+
+DIRECTIONS = _directions()
+_AXES = 3
 
 
 @dataclass
 class Cut:
-    """The ranks ``first`` .. ``first + parts - 1`` in two: what lies below ``key`` along an axis, and the rest."""
+    """The ranks ``first`` .. ``first + parts - 1`` in two: what lies below ``key`` along a normal, and the rest."""
 
     first: int
     parts: int
-    axis: int
+    direction: int
+    """Of DIRECTIONS."""
     low: float
     high: float
     key: int
@@ -35,27 +63,32 @@ class Cut:
         return self.parts // 2
 
     def keys(self, points: Floats, ids: Ints) -> Ints:
-        """(n,) places of points (n, 3) along the axis, then their ``ids`` (n,)."""
-        extent = self.high - self.low
-        share = (points[:, self.axis] - self.low) / (extent if extent > 0.0 else 1.0)
+        """(n,) places of points (n, 3) along the normal, then their ``ids`` (n,)."""
+        (x, y, z), extent = DIRECTIONS[self.direction], self.high - self.low
+        along = points[:, 0] * x + points[:, 1] * y + points[:, 2] * z  # the same bits in whatever company
+        share = (along - self.low) / (extent if extent > 0.0 else 1.0)
         return np.asarray((np.clip(share, 0.0, 1.0) * _LEVELS).astype(np.int64) << _ID_BITS | ids)
 
 
 def bisect(
     points: Floats, ids: Ints, weights: Floats, parts: int, comm: Comm
 ) -> tuple[Indices, list[Cut]]:  # fmt: skip
-    """(n,) part of each of this rank's points (n, 3), and the cuts: boxes cut across their longest axis so that the
-    ``weights`` (n,) are equal; all ranks take part.
+    """(n,) part of each of this rank's points (n, 3), and the cuts: boxes cut so that the sums of ``weights``, (n,) or
+    (n, phases), are equal; all ranks take part. With one phase they are cut across their longest axis.
 
     Points in one place are told apart by their ``ids`` (n,), below 2^32, so the parts do not depend on how the points
     are spread over the ranks. A number of parts that is no power of two is split as floor : ceiling.
     """
     owner, cuts = np.zeros(len(points), np.int32), []
-    largest = float(comm.maximum(np.array([weights.max(initial=0.0)]))[0])
-    quanta = np.maximum(np.rint(weights * (_FINEST / largest if largest > 0.0 else 1.0)), 1.0).astype(np.int64)
+    phases = weights if weights.ndim == 2 else weights[:, None]
+    each = comm.maximum(phases.max(axis=0, initial=0.0))
+    largest = float(each.max())
+    quanta = np.rint(phases * (_FINEST / largest if largest > 0.0 else 1.0)).astype(np.int64)
+    tried = len(DIRECTIONS) if np.count_nonzero(each) > 1 else _AXES
+    quanta[:, 0] = np.maximum(quanta[:, 0], 1)
     groups = [(0, parts)]
     while groups := [(first, size) for first, size in groups if size > 1]:
-        now = _level(points, ids, quanta, owner, groups, comm)
+        now = _level(points, ids, quanta, owner, groups, tried, comm)
         for cut in now:
             inside = np.flatnonzero(owner == cut.first)
             owner[inside[cut.keys(points[inside], ids[inside]) >= cut.key]] += cut.left
@@ -74,23 +107,89 @@ def place(cuts: list[Cut], points: Floats) -> Indices:
 
 
 def _level(
-    points: Floats, ids: Ints, quanta: Ints, owner: Indices, groups: list[tuple[int, int]], comm: Comm
+    points: Floats, ids: Ints, quanta: Ints, owner: Indices, groups: list[tuple[int, int]], tried: int, comm: Comm
 ) -> list[Cut]:  # fmt: skip
-    """A cut for each of the ``groups`` (first, parts), of the points that belong to ``first`` so far."""
+    """A cut for each of the ``groups`` (first, parts), of the points that belong to ``first`` so far, across one of the
+    first ``tried`` directions.
+    """
     members = [np.flatnonzero(owner == first) for first, _ in groups]
-    reach = np.full((len(groups), 6), -np.inf)
+    reach = np.full((len(groups), 2, tried), -np.inf)
     for g, chosen in enumerate(members):
-        if len(chosen):
-            reach[g] = np.concatenate([points[chosen].max(axis=0), -points[chosen].min(axis=0)])
+        _reach(reach[g], points, chosen, DIRECTIONS[:tried])
     reach = np.where(np.isinf(found := comm.maximum(reach)), 0.0, found)
-    axes = np.argmax(reach[:, :3] + reach[:, 3:], axis=1)
+    if tried > _AXES:
+        across = _most_even(points, quanta, members, groups, reach, comm)
+    else:
+        across = np.argmax(reach.sum(axis=1), axis=1)
     cuts = [
-        Cut(first, parts, int(axis), float(-r[3 + axis]), float(r[axis]), 0)
-        for (first, parts), axis, r in zip(groups, axes, reach, strict=True)
+        Cut(first, parts, int(k), float(-r[1, k]), float(r[0, k]), 0)
+        for (first, parts), k, r in zip(groups, across, reach, strict=True)
     ]
     keys = [cut.keys(points[chosen], ids[chosen]) for cut, chosen in zip(cuts, members, strict=True)]
-    _search(cuts, keys, [quanta[chosen] for chosen in members], comm)
+    _search(cuts, keys, [quanta[chosen].sum(axis=1) for chosen in members], comm)
     return cuts
+
+
+def _most_even(
+    points: Floats, quanta: Ints, members: list[Ints], groups: list[tuple[int, int]], reach: Floats, comm: Comm
+) -> Ints:  # fmt: skip
+    """(groups,) the direction across which a cut that divides the sum leaves the phases most nearly even, where cuts
+    that go through more have to be better by more; ``reach`` (groups, 2, directions) of the boxes.
+    """
+    extent = reach.sum(axis=1)
+    sums = np.zeros((len(groups), len(DIRECTIONS), _BINS, quanta.shape[1]), np.int64)
+    scale = _BINS / np.where(extent > 0.0, extent, 1.0)
+    for g, chosen in enumerate(members):
+        _slice(sums[g], points, quanta, chosen, DIRECTIONS, -reach[g, 1], scale[g])
+    sums = np.asarray(comm.sum(sums), np.float64)
+    across = np.empty(len(groups), np.int64)
+    for g, (_, parts) in enumerate(groups):
+        loss, through = np.array([_unevenness(slices, parts) for slices in sums[g]]).T
+        long = extent[g] >= _SHORT * extent[g].max()
+        through *= scale[g]
+        least = through[long].min()
+        if least > 0.0:
+            loss += _SURFACE * (through / least - 1.0)
+        across[g] = np.argmin(np.where(long, loss, np.inf))
+    return across
+
+
+def _unevenness(slices: Floats, parts: int) -> tuple[float, float]:
+    """What a cut that divides the sum of ``slices`` (bins, phases) for ``parts`` ranks loses, as a share of the whole,
+    when ranks wait for each other after each phase; and the mean of the slices round it.
+    """
+    left, upto = parts // 2, np.cumsum(slices, axis=0)
+    total, both = upto[-1], upto.sum(axis=1)
+    wanted = both[-1] * left / parts
+    k = min(int(np.searchsorted(both, wanted)), len(slices) - 1)
+    inside = both[k] - both[k - 1] if k else both[k]
+    below = upto[k] - (both[k] - wanted) / (inside if inside > 0.0 else 1.0) * slices[k]
+    slower = np.maximum(below / left, (total - below) / (parts - left)).sum()
+    loss = slower * parts / both[-1] - 1.0 if both[-1] > 0.0 else 0.0
+    return float(loss), float(slices[max(k - _THICK, 0) : k + _THICK + 1].sum()) / (2 * _THICK + 1)
+
+
+@njit("void(float64[:, ::1], float64[:, ::1], int64[::1], float64[:, ::1])", cache=True)
+def _reach(reach, points, chosen, directions):  # type: ignore[no-untyped-def]
+    """Raises ``reach`` (2, directions) to the highest place of the ``chosen`` points, and minus the lowest one."""
+    for a in chosen:
+        for k in range(len(directions)):
+            along = points[a, 0] * directions[k, 0] + points[a, 1] * directions[k, 1] + points[a, 2] * directions[k, 2]
+            reach[0, k], reach[1, k] = max(reach[0, k], along), max(reach[1, k], -along)
+
+
+@njit(
+    "void(int64[:, :, ::1], float64[:, ::1], int64[:, ::1], int64[::1], float64[:, ::1], float64[::1], float64[::1])",
+    cache=True,
+)
+def _slice(sums, points, quanta, chosen, directions, low, scale):  # type: ignore[no-untyped-def]
+    """Adds the ``quanta`` (n, phases) of the ``chosen`` points to their slice of each direction."""
+    for a in chosen:
+        for k in range(len(directions)):
+            along = points[a, 0] * directions[k, 0] + points[a, 1] * directions[k, 1] + points[a, 2] * directions[k, 2]
+            b = min(max(np.int64((along - low[k]) * scale[k]), 0), sums.shape[1] - 1)
+            for p in range(quanta.shape[1]):
+                sums[k, b, p] += quanta[a, p]
 
 
 def _search(cuts: list[Cut], keys: list[Ints], quanta: list[Ints], comm: Comm) -> None:

@@ -21,6 +21,11 @@ class Neighbour:
     nodes: Indices
 
 
+def same(some: list[Neighbour], others: list[Neighbour]) -> bool:
+    """Whether two lists name the same arrays: nothing has grown."""
+    return len(some) == len(others) and all(a.nodes is b.nodes for a, b in zip(some, others, strict=True))
+
+
 @njit("void(int64[:, ::1], int32[::1], int64[:, ::1])", cache=True)
 def _pack(buffer, nodes, sums):  # type: ignore[no-untyped-def]
     for i in range(len(nodes)):
@@ -48,29 +53,32 @@ class SharedSum:
 
     def __init__(self, comm: Comm, neighbours: list[Neighbour], columns: int, tag: int) -> None:
         self._nodes = [n.nodes for n in neighbours]
-        self._out = [np.zeros((len(n.nodes), columns), np.int64) for n in neighbours]
-        self._in = [np.zeros_like(buffer) for buffer in self._out]
-        ranks = [n.rank for n in neighbours]
+        self._every = np.concatenate([np.zeros(0, np.int32), *self._nodes])
+        self._out, self._in = (np.zeros((len(self._every), columns), np.int64) for _ in range(2))
+        ends, ranks = np.cumsum([len(nodes) for nodes in self._nodes])[:-1], [n.rank for n in neighbours]
+        sends, receives = (np.split(buffer, ends) if ranks else [] for buffer in (self._out, self._in))
         self._exchange = comm.exchange(
-            list(zip(ranks, self._out, strict=True)), list(zip(ranks, self._in, strict=True)), tag
+            list(zip(ranks, sends, strict=True)), list(zip(ranks, receives, strict=True)), tag
         )
 
     @property
     def bytes_sent(self) -> int:
         """Bytes this rank sends in one exchange."""
-        return sum(buffer.nbytes for buffer in self._out)
+        return self._out.nbytes
+
+    def serves(self, neighbours: list[Neighbour]) -> bool:
+        """Whether these neighbours share what they did when it was made."""
+        return all(one.nodes is nodes for one, nodes in zip(neighbours, self._nodes, strict=True))
 
     def begin(self, sums: Ints) -> None:
         """Sends the local sums of the shared nodes; the tets of shared nodes must all have been summed."""
-        for buffer, nodes in zip(self._out, self._nodes, strict=True):
-            _pack(buffer, nodes, sums)
+        _pack(self._out, self._every, sums)
         self._exchange.begin()
 
     def finish(self, sums: Ints) -> None:
         """Adds what the neighbours sent: the sums of the shared nodes are complete."""
         self._exchange.finish()
-        for buffer, nodes in zip(self._in, self._nodes, strict=True):
-            _add(sums, nodes, buffer)
+        _add(sums, self._every, self._in)
 
     def free(self) -> None:
         """Gives the messages back to MPI."""
