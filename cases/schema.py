@@ -251,8 +251,9 @@ class Run(Model):
     end_time: Annotated[Time, Positive]
     ranks: Annotated[Count, Field(ge=1, le=4096)] = 1
     cut_scale: tuple[Scale, Scale, Scale] = (1.0, 1.0, 1.0)
-    """Positions are multiplied by this before the mesh is cut for the ranks, each time across its longest axis. Small
-    along the way of an impact, every rank gets a share of where it happens. The answer does not depend on it."""
+    """Positions are multiplied by this before the mesh is cut for the ranks: no cut is made across a direction that is
+    short then. Small along the way of an impact, every rank gets a share of where it happens. The answer does not
+    depend on it."""
     frames: Annotated[Count, Field(ge=0, le=100_000)] = 20
     """Number of frames, evenly spaced to the end; the initial state is frame 0 (0: none are written)."""
     samples: Annotated[Count, Field(ge=1, le=1_000_000)] = 500
