@@ -30,6 +30,8 @@ _SHORT = 0.2
 """Of the longest: no cut is made across a direction in which a box is shorter (as ``run.cut_scale`` has it)."""
 _SURFACE = 0.05
 """Share of the time that a cut through twice as much as need be is taken to cost."""
+_TOGETHER = 8
+"""Boxes whose slices are summed over the ranks at once, so that their memory does not grow with the ranks."""
 _THICK = 2
 """Slices on either side of a cut that tell through how much it goes."""
 
@@ -136,15 +138,15 @@ def _most_even(
     """(groups,) the direction across which a cut that divides the sum leaves the phases most nearly even, where cuts
     that go through more have to be better by more; ``reach`` (groups, 2, directions) of the boxes.
     """
-    extent = reach.sum(axis=1)
-    sums = np.zeros((len(groups), len(DIRECTIONS), _BINS, quanta.shape[1]), np.int64)
+    extent, across = reach.sum(axis=1), np.empty(len(groups), np.int64)
     scale = _BINS / np.where(extent > 0.0, extent, 1.0)
-    for g, chosen in enumerate(members):
-        _slice(sums[g], points, quanta, chosen, DIRECTIONS, -reach[g, 1], scale[g])
-    sums = np.asarray(comm.sum(sums), np.float64)
-    across = np.empty(len(groups), np.int64)
     for g, (_, parts) in enumerate(groups):
-        loss, through = np.array([_unevenness(slices, parts) for slices in sums[g]]).T
+        if g % _TOGETHER == 0:
+            sums = np.zeros((_TOGETHER, len(DIRECTIONS), _BINS, quanta.shape[1]), np.int64)
+            for k, chosen in enumerate(members[g : g + _TOGETHER], g):
+                _slice(sums[k - g], points, quanta, chosen, DIRECTIONS, -reach[k, 1], scale[k])
+            every = np.asarray(comm.sum(sums), np.float64)
+        loss, through = np.array([_unevenness(slices, parts) for slices in every[g % _TOGETHER]]).T
         long = extent[g] >= _SHORT * extent[g].max()
         through *= scale[g]
         least = through[long].min()
