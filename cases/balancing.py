@@ -51,6 +51,9 @@ class Trigger:
     helpless: float = 0.0
     """Smallest loss of a step since then, in the mean so far, s: what another cut is not expected to mend."""
 
+    fruitless: int = 0
+    """Cuts in a row that saved less than they cost: each doubles what has to be lost before the next."""
+
     def look(self, loads: Sequence[float], steps: int) -> None:
         """Takes the ``loads`` of all ranks, s a step, over some steps."""
         self.work = [before + steps * load for before, load in zip(self.work or [0.0] * len(loads), loads, strict=True)]
@@ -71,8 +74,11 @@ class Trigger:
             return f"every {spec.every} steps" if step % spec.every == 0 else None
         if spec.policy == "outside":
             return f"a rank has {spec.alpha:g} times its outside nodes" if grown else None
-        return "time lost exceeds the cost" if self.lost > self.cost else None
+        return "time lost exceeds the cost" if self.lost > self.cost * 2**self.fruitless else None
 
-    def settle(self, step: int, cost: float) -> None:
-        """Begins to count anew after a cut before ``step`` that took ``cost``, s."""
+    def settle(self, step: int, cost: float, paid: bool = True) -> None:
+        """Begins to count anew after a cut before ``step`` that took ``cost``, s; ``paid``: whether the one before
+        has saved what it cost.
+        """
+        self.fruitless = 0 if paid else self.fruitless + 1
         self.step, self.cost, self.work, self.steps, self.helpless = step, cost, (), 0, math.inf

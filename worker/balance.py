@@ -121,9 +121,10 @@ class Balance:
 
     def _settle(self, sim: Simulation, cost: float, work: float) -> None:
         """Begins to count anew after a cut that took ``cost`` on the clock, and ``work`` of the slowest rank, s."""
+        paid = self._before is None or self.saved - self._saved >= self.trigger.cost
         self.events, self.spent, self._saved = self.events + 1, self.spent + cost, self.saved
         self._before, self._latest = balancing.imbalance(self.trigger.work) if self.trigger.work else None, None
-        self.trigger.settle(sim.clock.step, work)
+        self.trigger.settle(sim.clock.step, work, paid)
         self._meter = Meter.of(sim, self.slope)
         self._guard = Guard(self.case.balance.alpha, sim.contact.outside if sim.contact is not None else 0)
 

@@ -74,3 +74,17 @@ def test_a_rank_has_grown_beyond_alpha_times_what_it_had(outside: int, grown: bo
 def test_a_rank_that_has_not_been_cut_remembers_its_first_count() -> None:
     guard = Guard(1.5)
     assert [guard.grown(n) for n in (10, 15, 16)] == [False, False, True]
+
+
+def test_cuts_that_do_not_pay_become_rare() -> None:
+    """Each in a row doubles what has to be lost; one that pays makes it the cost of a cut again."""
+    trigger = Trigger(Balance(), 1.0)
+    waited = []
+    for paid in (False, False, False, True):
+        trigger.settle(trigger.step + trigger.steps, 1.0, paid)
+        trigger.look([1.0, 1.0], 1)
+        while trigger.cause(trigger.step + trigger.steps, False) is None:
+            trigger.look([1.5, 0.5], 1)
+        waited.append(trigger.steps)
+    assert waited[3] < waited[0] < waited[1] < waited[2]
+    assert [w - 1 for w in waited[:2]] == pytest.approx([4, 8], abs=1.5)
