@@ -50,7 +50,6 @@ class Trigger:
     """Since then, over which that was."""
     helpless: float = 0.0
     """Smallest loss of a step since then, in the mean so far, s: what another cut is not expected to mend."""
-
     fruitless: int = 0
     """Cuts in a row that saved less than they cost: each doubles what has to be lost before the next."""
 

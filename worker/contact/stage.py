@@ -34,7 +34,7 @@ _SHORTEST = 10.0
 """Steps of free flight that a search looks ahead at least; at most twice what the last search was good for."""
 _SURFACE, _AWAKE, _MEETING = 12.0, 3.0, 8.0
 """Candidates (found, and resting) that cost as much as a node of the surface, as a candidate that is looked at, as a
-meeting; measured on the shattering bar and on the eroding rod (docs/balance.md).
+meeting; fitted to the CPU times of the shattering bar and of the eroding rod on two ranks.
 """
 _KINEMATIC = 2.0
 """One over the share of a tet's altitude that anything may pass in a step."""

@@ -16,6 +16,10 @@ from ..state import CHUNK, INTACT, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ
 _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _P = PRESSURE * CHUNK
+_NEAR = 1.0 - 1e-12
+"""Of the weakest strength: a facet's own is computed anew with other nodes once they have separated, and may round
+otherwise; both of its sides must tell it all the same.
+"""
 
 
 @njit("void(float64[::1], float64[::1], int64, int64, float64[::1])", cache=True)
@@ -93,7 +97,7 @@ def look(out, tractions, chosen, hot, bond, across, beside, ids, tets, state, x,
                 tractions[n, i] = one[i]
             out[n, 0], out[n, 1] = a, face
             tractions[n, 3] = effective(one, normal, weight, friction)
-            n += tractions[n, 3] >= max(weakest[a], weakest[b])
+            n += tractions[n, 3] >= _NEAR * max(weakest[a], weakest[b])
     return n
 
 
@@ -140,5 +144,5 @@ def meet(out, tractions, chosen, own, theirs, sides, first, bond, tets, x, weake
             tractions[n, i] = 0.5 * (own[m, i] + theirs[m, i])
         tractions[n, 3] = effective(tractions[n, :3], normal, weight, friction)
         out[n] = m
-        n += tractions[n, 3] >= weakest[e]
+        n += tractions[n, 3] >= _NEAR * weakest[e]
     return n
