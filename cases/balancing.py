@@ -1,6 +1,5 @@
 """When to cut a mesh anew for its ranks: the rules by which a run decides, and its replay under another policy."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -48,8 +47,6 @@ class Trigger:
     """Of each rank since then, s: what ranks lose to each other in turn no cut would mend."""
     steps: int = 0
     """Since then, over which that was."""
-    helpless: float = 0.0
-    """Smallest loss of a step since then, in the mean so far, s: what another cut is not expected to mend."""
     fruitless: int = 0
     """Cuts in a row that saved less than they cost: each doubles what has to be lost before the next."""
 
@@ -57,12 +54,11 @@ class Trigger:
         """Takes the ``loads`` of all ranks, s a step, over some steps."""
         self.work = [before + steps * load for before, load in zip(self.work or [0.0] * len(loads), loads, strict=True)]
         self.steps += steps
-        self.helpless = min(self.helpless, lost(self.work) / self.steps)
 
     @property
     def lost(self) -> float:
-        """To imbalance since the last cut, beyond what cannot be helped, s."""
-        return lost(self.work) - self.helpless * self.steps if self.work else 0.0
+        """To imbalance since the last cut, s."""
+        return lost(self.work) if self.work else 0.0
 
     def cause(self, step: int, grown: bool) -> str | None:
         """Why to cut before ``step``, if so; ``grown``: whether a rank has more outside nodes than it may."""
@@ -80,4 +76,4 @@ class Trigger:
         has saved what it cost.
         """
         self.fruitless = 0 if paid else self.fruitless + 1
-        self.step, self.cost, self.work, self.steps, self.helpless = step, cost, (), 0, math.inf
+        self.step, self.cost, self.work, self.steps = step, cost, (), 0

@@ -54,11 +54,10 @@ class Groups:
             counts[:, -2] = np.bincount(model.nodes.group, sim.contact.effort().sum(axis=1), n)
             counts[:, -1] = np.bincount(model.nodes.group, sim.contact.on_surface, n)
         costs = self._meter.costs(sim, float(counts[:, -2].sum()))
-        counts = sim.comm.sum(counts)
         load = counts[:, :-2] @ costs.tet + costs.candidate * counts[:, -2]
+        load, outside = sim.comm.sum(np.stack([np.rint(1e9 * load).astype(np.int64), counts[:, -1]]))
         told: dict[str, Any] = {
-            "load": np.rint(1e9 * load).astype(np.int64).tolist(), "outside": counts[:, -1].tolist(),
-            "rank": round(1e9 * costs.rank),
+            "load": load.tolist(), "outside": outside.tolist(), "rank": round(1e9 * costs.rank),
         }  # fmt: skip
         if self._first:
             told |= {"load": [0] * n, "rank": 0, "cost": self._cost}

@@ -14,6 +14,8 @@ _KEPT = 0.99
 """Of what earlier looks have said of the slope, with each further one."""
 _LEAST = 0.02
 """Of the mean cost of a candidate: what one costs at least."""
+_FARTHEST = 4.0
+"""Times the mean, or one over it: what candidates of one rank cost at most, and at least."""
 
 
 @dataclass
@@ -47,6 +49,7 @@ class Costs:
     tet: Floats
     """(parts,) of a tet."""
     candidate: float
+    """Of one of this rank: candidates differ, and what they have cost in a place is the best guess for it."""
     rank: float
     """Of a rank, whatever it has to do."""
     around: Floats
@@ -79,10 +82,17 @@ class Meter:
         mine = np.concatenate([(_on_parts(sim) - self.on_parts) / steps, tets, around])
         ranks = np.array(sim.comm.share(mine))
         (on_tets, tets), on_nodes = ranks[:, :-3].sum(axis=0).reshape(2, -1), float(ranks[:, -3].sum())
-        effort, surrounded = ranks[:, -2:].sum(axis=0)
-        candidate = self.slope.of(float(surrounded / max(effort, 1.0)))
+        had, took = ranks[:, -2:].T
+        candidate = self._candidates(had, took)
+        rank = float(took.sum() - candidate @ had) / len(ranks)
         per_tet = on_tets / np.maximum(tets, 1.0) + on_nodes / max(float(tets.sum()), 1.0)
-        return Costs(per_tet, candidate, float(surrounded - candidate * effort) / len(ranks), ranks[:, -2:])
+        return Costs(per_tet, float(candidate[sim.comm.rank]), rank, ranks[:, -2:])
+
+    def _candidates(self, effort: Floats, seconds: Floats) -> Floats:
+        """(ranks,) cost of a candidate of each, by what ranks had and took (ranks,)."""
+        mean = self.slope.of(float(seconds.sum() / max(effort.sum(), 1.0)))
+        rank = float(seconds.sum() - mean * effort.sum()) / len(effort)
+        return np.asarray(np.clip((seconds - rank) / np.maximum(effort, 1.0), mean / _FARTHEST, mean * _FARTHEST))
 
 
 def _on_parts(sim: Simulation) -> Floats:

@@ -16,7 +16,7 @@ def test_what_is_lost_and_the_imbalance() -> None:
 
 
 def test_measured_cuts_when_more_is_lost_than_a_cut_costs() -> None:
-    """At first nothing is taken to be helpless: 1 s a step is lost, a cut costs 10 s."""
+    """1 s a step is lost, a cut costs 10 s."""
     trigger = Trigger(Balance(policy="measured"), 10.0)
     trigger.look(ODD, 10)
     assert trigger.cause(10, False) is None, "10 s do not exceed 10 s"
@@ -26,16 +26,16 @@ def test_measured_cuts_when_more_is_lost_than_a_cut_costs() -> None:
     assert trigger.cause(16, False) == "time lost exceeds the cost"
 
 
-def test_measured_does_not_count_what_a_cut_has_not_mended() -> None:
-    """After a cut that leaves 1 s a step lost, 3 s a step count for 2."""
+def test_measured_begins_to_count_anew_after_a_cut() -> None:
+    """What was lost before it is past, and what the cut has left counts like everything: the next may mend it."""
     trigger = Trigger(Balance(policy="measured"), 10.0)
-    trigger.settle(100, 4.0)
     trigger.look(ODD, 50)
-    assert (trigger.lost, trigger.cause(150, False)) == (0.0, None)
-    trigger.look([5.0, -1.0], 2)
-    assert (trigger.lost, trigger.cause(152, False)) == (4.0, None), "2 steps of 2 s do not exceed 4 s"
-    trigger.look([5.0, -1.0], 1)
-    assert trigger.cause(153, False) is not None
+    trigger.settle(50, 4.0)
+    assert (trigger.lost, trigger.cause(51, False)) == (0.0, None)
+    trigger.look(ODD, 4)
+    assert (trigger.lost, trigger.cause(54, False)) == (4.0, None), "4 s do not exceed 4 s"
+    trigger.look(ODD, 1)
+    assert trigger.cause(55, False) is not None
 
 
 def test_measured_does_not_count_what_ranks_lose_in_turn() -> None:

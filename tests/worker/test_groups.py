@@ -162,3 +162,14 @@ def test_the_slope_is_that_between_ranks() -> None:
     falling = Slope()
     falling.add(np.array([1.0, 2.0]), np.array([2.0, 1.0]))
     assert falling.of(2.0) == pytest.approx(0.04)
+
+
+def test_candidates_cost_what_they_have_cost_where_they_are() -> None:
+    """Of 10 s on each of two ranks 2 s are the rank's; one has four times the candidates of the other."""
+    slope = Slope()
+    slope.add(np.array([1.0, 3.0]), np.array([6.0, 14.0]))
+    meter = Meter(slope, 0, {}, np.zeros(1))
+    assert meter._candidates(np.array([4.0, 1.0]), np.array([10.0, 10.0])) == pytest.approx([2.0, 8.0])
+    assert meter._candidates(np.array([4.0, 4.0]), np.array([10.0, 10.0])) == pytest.approx([2.0, 2.0])
+    few = meter._candidates(np.array([100.0, 0.0]), np.array([10.0, 10.0]))
+    assert few == pytest.approx([0.08, 0.64]), "who has next to none learns nothing from what it took"

@@ -146,7 +146,7 @@ def _most_even(
             for k, chosen in enumerate(members[g : g + _TOGETHER], g):
                 _slice(sums[k - g], points, quanta, chosen, DIRECTIONS, -reach[k, 1], scale[k])
             every = np.asarray(comm.sum(sums), np.float64)
-        loss, through = np.array([_unevenness(slices, parts) for slices in every[g % _TOGETHER]]).T
+        loss, through = _unevenness(every[g % _TOGETHER], parts)
         long = extent[g] >= _SHORT * extent[g].max()
         through *= scale[g]
         least = through[long].min()
@@ -156,19 +156,24 @@ def _most_even(
     return across
 
 
-def _unevenness(slices: Floats, parts: int) -> tuple[float, float]:
-    """What a cut that divides the sum of ``slices`` (bins, phases) for ``parts`` ranks loses, as a share of the whole,
-    when ranks wait for each other after each phase; and the mean of the slices round it.
+def _unevenness(slices: Floats, parts: int) -> tuple[Floats, Floats]:
+    """What a cut that divides the sum of ``slices`` (directions, bins, phases) for ``parts`` ranks loses, as a share of
+    the whole, when ranks wait for each other after each phase; and the mean of the slices round it; (directions,) each.
     """
-    left, upto = parts // 2, np.cumsum(slices, axis=0)
-    total, both = upto[-1], upto.sum(axis=1)
-    wanted = both[-1] * left / parts
-    k = min(int(np.searchsorted(both, wanted)), len(slices) - 1)
-    inside = both[k] - both[k - 1] if k else both[k]
-    below = upto[k] - (both[k] - wanted) / (inside if inside > 0.0 else 1.0) * slices[k]
-    slower = np.maximum(below / left, (total - below) / (parts - left)).sum()
-    loss = slower * parts / both[-1] - 1.0 if both[-1] > 0.0 else 0.0
-    return float(loss), float(slices[max(k - _THICK, 0) : k + _THICK + 1].sum()) / (2 * _THICK + 1)
+    every, bins = np.arange(len(slices)), slices.shape[1]
+    left, upto = parts // 2, np.cumsum(slices, axis=1)
+    total, both = upto[:, -1], upto.sum(axis=2)
+    wanted = both[:, -1] * left / parts
+    k = np.minimum((both < wanted[:, None]).sum(axis=1), bins - 1)
+    inside = slices[every, k].sum(axis=1)
+    beyond = (both[every, k] - wanted) / np.where(inside > 0.0, inside, 1.0)
+    below = upto[every, k] - beyond[:, None] * slices[every, k]
+    slower = np.maximum(below / left, (total - below) / (parts - left)).sum(axis=1)
+    whole = both[:, -1]
+    loss = np.where(whole > 0.0, slower * parts / np.where(whole > 0.0, whole, 1.0) - 1.0, 0.0)
+    first, last = np.maximum(k - _THICK, 0), np.minimum(k + _THICK, bins - 1)
+    through = both[every, last] - both[every, first] + slices[every, first].sum(axis=1)
+    return loss, through / (2 * _THICK + 1)
 
 
 @njit("void(float64[:, ::1], float64[:, ::1], int64[::1], float64[:, ::1])", cache=True)
@@ -186,12 +191,14 @@ def _reach(reach, points, chosen, directions):  # type: ignore[no-untyped-def]
 )
 def _slice(sums, points, quanta, chosen, directions, low, scale):  # type: ignore[no-untyped-def]
     """Adds the ``quanta`` (n, phases) of the ``chosen`` points to their slice of each direction."""
-    for a in chosen:
-        for k in range(len(directions)):
-            along = points[a, 0] * directions[k, 0] + points[a, 1] * directions[k, 1] + points[a, 2] * directions[k, 2]
-            b = min(max(np.int64((along - low[k]) * scale[k]), 0), sums.shape[1] - 1)
+    for k in range(len(directions)):
+        x, y, z = directions[k, 0] * scale[k], directions[k, 1] * scale[k], directions[k, 2] * scale[k]
+        start, slices = low[k] * scale[k], sums[k]
+        for a in chosen:
+            along = points[a, 0] * x + points[a, 1] * y + points[a, 2] * z - start
+            b = min(max(np.int64(along), 0), slices.shape[0] - 1)
             for p in range(quanta.shape[1]):
-                sums[k, b, p] += quanta[a, p]
+                slices[b, p] += quanta[a, p]
 
 
 def _search(cuts: list[Cut], keys: list[Ints], quanta: list[Ints], comm: Comm) -> None:
