@@ -7,6 +7,10 @@ from .schema import Balance
 
 WORK = ("elements", "nodes", "contact", "fracture")
 """Phases of a step that ranks share; the others wait or write."""
+MOVED = ("elements", "nodes", "contact")
+"""Those whose work goes where tets go. Fracture is many small things on every rank that has a facet to break, however
+many break there.
+"""
 
 
 def lost(loads: Sequence[float]) -> float:

@@ -1,8 +1,8 @@
 """Load balance: what tets cost, when it pays to cut anew, and what came of it.
 
-Costs are CPU seconds of this run: of a tet of each part by the passes over it, of nodes, and of contact and fracture by
-the candidates that a node has. Every rank hears of the work of all, so that all decide alike. The answer of the run
-knows nothing of it.
+Costs are CPU seconds of this run: of a tet of each part by the passes over it, of nodes, and of contact by the
+candidates that a node has. Every rank hears of the work of all, so that all decide alike. The answer of the run knows
+nothing of it.
 """
 
 import time
@@ -12,16 +12,17 @@ from typing import Any, Self
 import numpy as np
 
 from conoid.cases import balancing
-from conoid.cases.balancing import WORK, Guard, Trigger
+from conoid.cases.balancing import MOVED, WORK, Guard, Trigger
 from conoid.cases.schema import Case
 
 from . import simulation
-from .meter import Meter, Slope
+from .meter import Meter
 from .migration.parcel import Parcel
 from .migration.route import route
 from .parallel.comm import Comm
 from .simulation import Simulation
 from .state import Floats, Ints
+from .timers import worked
 
 _LEAST = 1e-9
 """s: what a tet costs at least, so that every rank gets some before anything has been measured."""
@@ -35,15 +36,14 @@ class Window:
     work: dict[str, list[float]]
     """By phase, one number a rank."""
 
-    @property
-    def loads(self) -> list[float]:
-        """(ranks,) s a step."""
-        return [float(load) / max(self.steps, 1) for load in np.sum([self.work[name] for name in WORK], axis=0)]
+    def loads(self, phases: tuple[str, ...]) -> list[float]:
+        """(ranks,) s a step, in some phases."""
+        return [float(load) / max(self.steps, 1) for load in np.sum([self.work[name] for name in phases], axis=0)]
 
     @property
     def imbalance(self) -> float:
         """Largest load over the mean."""
-        return balancing.imbalance(self.loads)
+        return balancing.imbalance(self.loads(WORK))
 
 
 @dataclass
@@ -69,17 +69,12 @@ class Balance:
     def of(cls, sim: Simulation) -> Self:
         """For a run that begins or goes on."""
         trigger = Trigger(sim.case.balance, sim.assembled, sim.clock.step)
-        return cls(sim.case, sim.comm, trigger, Meter.of(sim, Slope()))
-
-    @property
-    def slope(self) -> Slope:
-        """What is known of the cost of a candidate."""
-        return self._meter.slope
+        return cls(sim.case, sim.comm, trigger, Meter.of(sim))
 
     def look(self, window: Window) -> None:
-        """Takes the work of all ranks since the last look."""
+        """Takes the work of all ranks since the last look. What no cut moves is no reason for one."""
         self._latest = window
-        self.trigger.look(window.loads, window.steps)
+        self.trigger.look(window.loads(MOVED), window.steps)
 
     @property
     def saved(self) -> float:
@@ -102,7 +97,7 @@ class Balance:
 
     def move(self, sim: Simulation) -> tuple[Simulation, dict[str, Any]]:
         """Cuts by the costs and moves what has to; the new simulation and what to tell. All ranks take part."""
-        began, before, cpu = time.monotonic(), self._latest, time.thread_time() - self.comm.waited
+        began, before, cpu = time.monotonic(), self._latest, worked(self.comm)
         parcel = simulation.keep(sim)
         self.weigh(sim, parcel)
         arrived = route(parcel, self.case.run.cut_scale, self.comm)
@@ -111,7 +106,7 @@ class Balance:
         tets, nodes = np.sum(self.comm.share(arrived.moved), axis=0)
         predicted = self.comm.share(float(sum(table["weight"].sum() for table in arrived.parcel.tets.values())))
         cost = self.comm.broadcast(time.monotonic() - began)
-        work = float(self.comm.maximum(np.array([time.thread_time() - self.comm.waited - cpu]))[0])
+        work = float(self.comm.maximum(np.array([worked(self.comm) - cpu]))[0])
         self._settle(now, cost, work)
         told = {
             "before": {name: [s / max(before.steps, 1) for s in before.work[name]] for name in WORK} if before else {},
@@ -125,7 +120,7 @@ class Balance:
         self.events, self.spent, self._saved = self.events + 1, self.spent + cost, self.saved
         self._before, self._latest = balancing.imbalance(self.trigger.work) if self.trigger.work else None, None
         self.trigger.settle(sim.clock.step, work, paid)
-        self._meter = Meter.of(sim, self.slope)
+        self._meter = Meter.of(sim)
         self._guard = Guard(self.case.balance.alpha, sim.contact.outside if sim.contact is not None else 0)
 
     def weigh(self, sim: Simulation, parcel: Parcel) -> None:

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from .meter import Meter, Slope
+from .meter import Meter
 from .simulation import Simulation
+from .timers import worked
 
 _TIMES = 200
 """Records of a run, at most, unless it is slow: then one each ``_PATIENCE``."""
@@ -24,10 +25,10 @@ _SHARE = 1.0 / 400.0
 class Groups:
     """Keeps the record of the groups of a run."""
 
-    def __init__(self, sim: Simulation, cost: float, slope: Slope) -> None:
-        """``cost``: of a cut as it is expected, s; ``slope`` learns from every record."""
+    def __init__(self, sim: Simulation, cost: float) -> None:
+        """``cost``: of a cut as it is expected, s."""
         self._cost = cost
-        self._meter = Meter.of(sim, slope)
+        self._meter = Meter.of(sim)
         self._t = sim.clock.t
         self._told = time.monotonic()
         self._took = 0.0
@@ -36,7 +37,7 @@ class Groups:
 
     def moved(self, sim: Simulation) -> None:
         """Tets have moved: what the blocks have counted begins anew."""
-        self._meter = Meter.of(sim, self._meter.slope)
+        self._meter = Meter.of(sim)
 
     def due(self, t: float, now: float) -> bool:
         """Whether another record is due at time ``t`` and wall time ``now``; asked on rank 0 alone."""
@@ -45,7 +46,7 @@ class Groups:
 
     def record(self, sim: Simulation) -> dict[str, Any]:
         """What to tell; all ranks take part."""
-        began, model = _worked(sim), sim.model
+        began, model = worked(sim.comm), sim.model
         n, end = len(model.groups), sim.case.run.end_time
         counts = np.zeros((n, len(model.parts) + 2), np.int64)
         for block in model.blocks:
@@ -62,16 +63,9 @@ class Groups:
         if self._first:
             told |= {"load": [0] * n, "rank": 0, "cost": self._cost}
             told |= {"centres": model.groups[:, :3].tolist(), "tets": model.groups[:, 3].astype(np.int64).tolist()}
-        else:
-            self._meter.slope.add(*costs.around.T)
         self.moved(sim)
         self._first = False
         self._t = end / _TIMES * (int(sim.clock.t * _TIMES / end) + 1)
         self._told = time.monotonic()
-        self._took = _worked(sim) - began
+        self._took = worked(sim.comm) - began
         return told
-
-
-def _worked(sim: Simulation) -> float:
-    """CPU time of this rank without its waiting, s."""
-    return time.thread_time() - sim.comm.waited

@@ -96,7 +96,7 @@ class Loop:
         self._logged = -math.inf
         self._counted = (0, 0, 0)
         self.balance = balance
-        self._groups = Groups(sim, balance.trigger.cost, balance.slope)
+        self._groups = Groups(sim, balance.trigger.cost)
 
     def run(self) -> None:
         """Steps until the end time, or until a reason to stop. Raises PhysicsError."""

@@ -1,7 +1,6 @@
 """What a case needs, built once: the model, its pressure form, its boundaries, its accounts. The step uses it."""
 
 import math
-import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -28,7 +27,7 @@ from .parallel.comm import Comm
 from .parallel.ownership import Neighbour
 from .probes import Probes
 from .state import MASS, Floats, Ints, Model
-from .timers import Timers
+from .timers import Timers, worked
 
 _SMALLEST_STRAIN = 1e-12
 """Forces of a smaller strain than this need no finer quantum."""
@@ -120,7 +119,7 @@ class Simulation:
     """Of the fragments."""
     neighbours: list[Neighbour]
     assembled: float
-    """Wall time that it took to make the stages, s."""
+    """CPU time that it took to make the stages on the slowest rank, s."""
     floor: float
     """Forces below this, N, do not refine the force quantum."""
     vote: Vote = field(default_factory=Vote)
@@ -193,7 +192,7 @@ def _assemble(
     timers: Timers,
 ) -> Simulation:  # fmt: skip
     """The stages that the case needs, round a model and its boundaries; ``node_volume`` (nodes,): at the start, m^3."""
-    began, run, numerics = time.monotonic(), case.run, case.numerics
+    began, run, numerics = worked(comm), case.run, case.numerics
     clock = Clock(run.end_time, numerics.dt_safety, numerics.dt_growth, run.frames)
     extremes = _extremes(model, comm)
     contact, erosion = None, None
@@ -214,7 +213,7 @@ def _assemble(
         fracture=fracture, clock=clock, ledger=Ledger(model, scene, contact, erosion, fracture, comm, clock),
         probes=probes, timers=timers, record=Record(model, fracture, comm) if fracture is not None else None,
         neighbours=neighbours, floor=_force_floor(model, comm),
-        assembled=float(comm.maximum(np.array([time.monotonic() - began]))[0]),
+        assembled=float(comm.maximum(np.array([worked(comm) - began]))[0]),
     )  # fmt: skip
 
 

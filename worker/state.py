@@ -70,6 +70,13 @@ def extended(array: "np.ndarray", rows: "np.ndarray") -> "np.ndarray":
     return room[:m]
 
 
+def among(known: Ints, wanted: Ints) -> Flags:
+    """(n,) which of ``wanted`` are in the ascending ``known``."""
+    if not len(known):
+        return np.zeros(len(wanted), bool)
+    return np.asarray(known[np.minimum(np.searchsorted(known, wanted), len(known) - 1)] == wanted)
+
+
 @dataclass
 class Nodes:
     """Nodal arrays of one rank; ``n`` nodes, in the order of their global ids."""

@@ -64,7 +64,7 @@ def test_pieces_are_those_of_scipy(seed: int) -> None:
     rows[:, stars.BEHIND :] = behind[4 * tet[:, None] + FACES[corner]]
     rows = np.ascontiguousarray(rows[np.lexsort((rows[:, stars.TET], rows[:, stars.NODE]))])
     many = 0
-    label = stars.pieces(rows)
+    label, leaves = stars.pieces(rows)
     for node in range(len(mesh.points)):
         star = np.flatnonzero(rows[:, stars.NODE] == node)
         ids = rows[star, stars.TET]
@@ -74,6 +74,7 @@ def test_pieces_are_those_of_scipy(seed: int) -> None:
         count, component = connected_components(graph, directed=False)
         expected = [ids[component == component[i]].min() for i in range(len(ids))]
         assert label[star].tolist() == expected
+        assert leaves[star].tolist() == [piece != ids.min() for piece in expected]
         many += count > 1
     assert many > 3
 

@@ -10,7 +10,7 @@ from conoid.cases.balancing import WORK
 from conoid.worker import domain, step
 from conoid.worker.balance import Balance
 from conoid.worker.groups import Groups
-from conoid.worker.meter import Costs, Meter, Slope
+from conoid.worker.meter import Costs, Meter, _candidates
 from conoid.worker.simulation import Simulation
 
 from ..contact.bodies import meeting_of, moved
@@ -62,7 +62,7 @@ BRITTLE = materials.Material(
     brittle=materials.Brittle(strength=50e6, energy=20.0, scatter=materials.Scatter(modulus=5.0)),
 )  # fmt: skip
 MESHES = [block((4, 4, 4), MM, seed=3), moved(block((5, 5, 3), MM, seed=4), (-0.5 * MM, -0.5 * MM, 4.01 * MM))]
-TETS = Costs(np.array([1e-9, 1e-6]), 0.0, 0.0, np.ones((1, 2)))
+TETS = Costs(np.array([1e-9, 1e-6]), 0.0, 0.0)
 """1 ns for a tet of the first body, 1 us for one of the second."""
 
 
@@ -77,7 +77,7 @@ def breaking() -> schema.Case:
 def course(sim: Simulation) -> tuple[list[dict[str, Any]], Simulation]:
     """Records of a run in which nodes separate, tets leave twice, and all is cut anew between."""
     balance = Balance.of(sim)
-    groups = Groups(sim, 1.5, balance.slope)
+    groups = Groups(sim, 1.5)
     step.prepare(sim)
     told = [groups.record(sim)]
     for moment in range(40):
@@ -109,7 +109,7 @@ def test_groups_are_told_alike_on_any_number_of_ranks(monkeypatch: pytest.Monkey
 
 def test_a_record_is_due_at_times_of_the_run_and_costs_little_of_it() -> None:
     sim = build(breaking().model_copy(update={"run": schema.Run(end_time=1.0)}), MESHES)
-    groups = Groups(sim, 0.0, Slope())
+    groups = Groups(sim, 0.0)
     began = groups._told
     assert groups.due(0.0, began + 0.25)
     groups._t, groups._took = 0.005, 1e-4
@@ -122,13 +122,12 @@ def test_a_record_is_due_at_times_of_the_run_and_costs_little_of_it() -> None:
 
 
 def test_costs_add_up_to_the_work_of_all_ranks() -> None:
-    """Whatever the slope says, groups and ranks have all of what was measured."""
+    """Groups and ranks have all of what was measured."""
     case = breaking()
 
     def measured(sim: Simulation) -> tuple[float, float]:
-        slope = Slope(0.3, 1.0)
         step.prepare(sim)
-        groups = Groups(sim, 0.0, slope)
+        groups = Groups(sim, 0.0)
         groups.record(sim)
         then = sum(sim.timers.seconds[name] for name in WORK[1:]) + sum(b.seconds for b in sim.model.blocks)
         for _ in range(5):
@@ -142,34 +141,9 @@ def test_costs_add_up_to_the_work_of_all_ranks() -> None:
         assert results[0][0] == pytest.approx(sum(work for _, work in results), abs=256e-9)
 
 
-def test_the_slope_is_that_between_ranks() -> None:
-    """Of 40 s each rank takes 30 s whatever it has, and the mean one 10 s for its candidates; how many all of them have
-    together changes nothing, nor how long it takes."""
-    slope = Slope()
-    assert slope.of(2.0) == 2.0, "nothing is known yet"
-    for effort in (np.array([10.0, 30.0]), np.array([100.0, 20.0, 60.0])):
-        slope.add(effort, 30.0 + 10.0 * effort / effort.mean())
-        slope.add(effort, 3.0 + 1.0 * effort / effort.mean())
-    assert slope.of(2.0) == pytest.approx(0.5)
-    slope.add(np.zeros(2), np.ones(2))
-    assert slope.of(2.0) == pytest.approx(0.5), "without candidates nothing is learnt"
-    steep = Slope()
-    steep.add(np.array([1.0, 2.0]), np.array([1.0, 9.0]))
-    assert steep.of(2.0) == 2.0, "no more than all work there is"
-    alike = Slope()
-    alike.add(np.array([7.0, 7.0]), np.array([1.0, 2.0]))
-    assert alike.of(2.0) == 2.0
-    falling = Slope()
-    falling.add(np.array([1.0, 2.0]), np.array([2.0, 1.0]))
-    assert falling.of(2.0) == pytest.approx(0.04)
-
-
 def test_candidates_cost_what_they_have_cost_where_they_are() -> None:
-    """Of 10 s on each of two ranks 2 s are the rank's; one has four times the candidates of the other."""
-    slope = Slope()
-    slope.add(np.array([1.0, 3.0]), np.array([6.0, 14.0]))
-    meter = Meter(slope, 0, {}, np.zeros(1))
-    assert meter._candidates(np.array([4.0, 1.0]), np.array([10.0, 10.0])) == pytest.approx([2.0, 8.0])
-    assert meter._candidates(np.array([4.0, 4.0]), np.array([10.0, 10.0])) == pytest.approx([2.0, 2.0])
-    few = meter._candidates(np.array([100.0, 0.0]), np.array([10.0, 10.0]))
-    assert few == pytest.approx([0.08, 0.64]), "who has next to none learns nothing from what it took"
+    """Within a factor of four of the mean: who has next to none learns nothing from what it took."""
+    assert _candidates(np.array([4.0, 1.0]), np.array([10.0, 10.0])) == pytest.approx([2.5, 10.0])
+    assert _candidates(np.array([4.0, 4.0]), np.array([8.0, 12.0])) == pytest.approx([2.0, 3.0])
+    assert _candidates(np.array([100.0, 0.0]), np.array([10.0, 10.0])) == pytest.approx([0.1, 0.8])
+    assert _candidates(np.zeros(2), np.zeros(2)) == pytest.approx([0.0, 0.0])

@@ -5,7 +5,7 @@ two nodes and, of each of the two faces that meet there, the third one. Rows tra
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -20,11 +20,11 @@ class Rows:
     @property
     def n(self) -> int:
         """Number of rows."""
-        return len(self.columns()[0])
+        return len(next(iter(vars(self).values())))
 
     def columns(self) -> list["np.ndarray"]:
         """The columns, in the order of their names here."""
-        return [getattr(self, column.name) for column in fields(self)]
+        return list(vars(self).values())
 
     def take(self, chosen: "np.ndarray") -> Self:
         """Some of the rows."""

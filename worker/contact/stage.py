@@ -26,15 +26,16 @@ from ..timers import Timers
 from ..topology import Split
 from . import held, meetings, pairing, scene, surface, sweeps
 from .course import courses
-from .cracks import Cracks, Follower, across, news
+from .cracks import Cracks, across
 from .flight import Flight
+from .follower import Follower, news
 from .scene import Rules, Scene
 
 _SHORTEST = 10.0
 """Steps of free flight that a search looks ahead at least; at most twice what the last search was good for."""
-_SURFACE, _AWAKE, _MEETING = 12.0, 3.0, 8.0
+_SURFACE, _AWAKE, _MEETING = 6.0, 3.0, 5.0
 """Candidates (found, and resting) that cost as much as a node of the surface, as a candidate that is looked at, as a
-meeting; fitted to the CPU times of the shattering bar and of the eroding rod on two ranks.
+meeting; fitted to the CPU times of the shattering bar on 16 ranks and of the eroding rod on eight.
 """
 _KINEMATIC = 2.0
 """One over the share of a tet's altitude that anything may pass in a step."""
@@ -187,24 +188,23 @@ class Contact(Boundary):
 
     def separate(self, split: Split) -> None:
         """Follows nodes as they separate; all ranks take part."""
-        with self._timers.phase("contact"):
-            state = self._model.nodes
-            self._stale = True
-            if split.copies.n:
-                self._cracks.follow(split, state.id)
-            if self._scene is None:
-                return
-            if split.copies.n:
-                self._flight.grow(split.copies.parents)
-                self._flight.mobility = self._mobility
-            here = self._flight.here(state)
-            heard = news(split, self._scene, here, self._comm)
-            if heard is None:
-                return
-            follower = Follower(self._scene, here, state)
-            follower.follow(heard, self._cracks, self._neighbours)
-            if self._comm.size > 1:
-                follower.share(heard, self._neighbours, self._comm)
+        state = self._model.nodes
+        self._stale = True
+        if split.copies.n:
+            self._cracks.follow(split, state.id)
+        if self._scene is None:
+            return
+        if split.copies.n:
+            self._flight.grow(split.copies.parents)
+            self._flight.mobility = self._mobility
+        here = self._flight.here(state)
+        heard = news(split, self._scene, here, self._comm)
+        if heard is None:
+            return
+        follower = Follower(self._scene, here, state)
+        follower.follow(heard, self._cracks, self._neighbours)
+        if self._comm.size > 1:
+            follower.share(heard, self._neighbours, self._comm)
 
     def _expose(self, state: Nodes) -> None:
         """The surface anew, with the cracks that are wide; all ranks take part."""

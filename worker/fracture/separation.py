@@ -47,9 +47,8 @@ class Separation:
         All ranks take part. Connectivity, masses, shared nodes and bonds are changed; forces are left to the caller.
         """
         touched = self._touched(broken)
-        rows, label, places, own = self._cut(touched)
-        kept = label[np.searchsorted(rows[:, stars.NODE], rows[:, stars.NODE])]
-        leaving = label != kept
+        rows, places = self._stars(touched)
+        label, leaving = stars.pieces(rows)
         mine = np.column_stack(np.divmod(np.unique(keys(rows[leaving, stars.NODE], label[leaving])), KEY))
         every = self._number(mine)
         if not len(every):
@@ -57,7 +56,7 @@ class Separation:
         if not len(mine):
             self._model.nodes_global += len(every)
             return Split.elsewhere(self._model.nodes.n)
-        return self._separate(rows, label, places, own, leaving, mine, every)
+        return self._separate(touched, rows, places, label, leaving, mine, every)
 
     def _touched(self, broken: dict[int, Broken]) -> Ints:
         """Local nodes of the facets that break on any rank, ascending; marks the bonds."""
@@ -79,36 +78,30 @@ class Separation:
             return mine
         return np.unique(np.concatenate([mine, *(np.searchsorted(nodes.id, ids) for ids in told.values())]))
 
-    def _cut(self, touched: Ints) -> tuple[Ints, Ints, Ints, Ints]:
-        """Rows of the whole stars of the touched nodes, sorted, and their labels; place, corner and block of the
-        tets of this rank, and which of these a row is, -1 for a row of another rank.
+    def _stars(self, touched: Ints) -> tuple[Ints, Ints]:
+        """Rows of the whole stars of the touched nodes, sorted; and place, corner and block of their tets, -1 for those
+        of another rank.
         """
         nodes = self._model.nodes
-        if not len(touched):
-            none = np.zeros(0, np.int64)
-            return self._with_others(np.zeros((0, stars.COLUMNS), np.int64)), none, np.zeros((0, 3), np.int64), none
-        block_of = self._block_of[nodes.part[touched]]
         tables, where = [np.zeros((0, stars.COLUMNS), np.int64)], [np.zeros((0, 3), np.int64)]
-        for b, star in self.stars.items():
-            block, chosen = self._model.blocks[b], touched[block_of == b]
-            count = int(star.count[chosen].sum())
-            table, place = np.empty((count, stars.COLUMNS), np.int64), np.empty((count, 3), np.int64)
-            place[:, 2] = b
-            found = np.empty((count, 2), np.int64)
-            stars.describe(
-                table, found, chosen, star.first, star.count, star.pool, block.tets, block.id, nodes.id,
-                block.state.reshape(-1).view(np.int64), block.across, block.bond, block.state.shape[1], self._comm.rank,
-            )  # fmt: skip
-            place[:, :2] = found
-            tables.append(table)
-            where.append(place)
-        mine, places = np.concatenate(tables), np.concatenate(where)
-        own = np.arange(len(mine))
+        if len(touched):
+            block_of = self._block_of[nodes.part[touched]]
+            for b, star in self.stars.items():
+                block, chosen = self._model.blocks[b], touched[block_of == b]
+                count = int(star.count[chosen].sum())
+                table, place = np.empty((count, stars.COLUMNS), np.int64), np.full((count, 3), b)
+                stars.describe(
+                    table, place, chosen, star.first, star.count, star.pool, block.tets, block.id, nodes.id,
+                    block.state.reshape(-1).view(np.int64), block.across, block.bond, block.state.shape[1],
+                    self._comm.rank,
+                )  # fmt: skip
+                tables.append(table)
+                where.append(place)
+        mine = np.concatenate(tables)
         rows = self._with_others(mine)
-        own = np.concatenate([own, np.full(len(rows) - len(mine), -1)])
-        order = np.lexsort((rows[:, stars.TET], rows[:, stars.NODE]))
-        rows = np.ascontiguousarray(rows[order])
-        return rows, stars.pieces(rows), places, own[order]
+        places = np.concatenate([*where, np.full((len(rows) - len(mine), 3), -1)])
+        order = np.argsort(keys(rows[:, stars.NODE], rows[:, stars.TET]))
+        return rows[order], places[order]
 
     def _with_others(self, mine: Ints) -> Ints:
         """The rows of this rank's tets and those of the others' round shared nodes."""
@@ -136,7 +129,7 @@ class Separation:
         return every[np.lexsort((every[:, 1], every[:, 0]))]
 
     def _separate(
-        self, rows: Ints, label: Ints, places: Ints, own: Ints, leaving: Flags, mine: Ints, every: Ints
+        self, touched: Ints, rows: Ints, places: Ints, label: Ints, leaving: Flags, mine: Ints, every: Ints
     ) -> Split:
         model, nodes = self._model, self._model.nodes
         at = np.searchsorted(keys(*every.T), keys(*mine.T))
@@ -152,13 +145,15 @@ class Separation:
         nodes.grow(copies)
         model.nodes_global += len(every)
         self._share(copies, first)
-        ours = own[leaving]
-        here = places[np.maximum(ours, 0)] if len(places) else np.zeros((len(ours), 3), np.int64)
-        place, corner, block = np.where(ours >= 0, here[:, 0], -1), here[:, 1], here[:, 2]
-        node = (first + piece).astype(np.int32)
-        self._retie(rows, label, places, own, place, corner, block, node)
+        node = first + piece
+        became = np.full(len(rows), -1)
+        became[leaving] = node
+        for b, star in self.stars.items():
+            here = np.where((places[:, 2] == b)[:, None], places[:, :2], -1)
+            star.retie(model.blocks[b].tets, touched, rows, here, became, nodes.n)
         key = keys(gone[:, stars.NODE], gone[:, stars.TET])
-        return Split(copies, first, key, node, *(n.astype(np.int32) for n in (place, corner, block)))
+        place, corner, block = places[leaving].T.astype(np.int32)
+        return Split(copies, first, key, node.astype(np.int32), place, corner, block)
 
     def _share(self, copies: Copies, first: int) -> None:
         """Whoever holds a node holds its copies."""
@@ -168,36 +163,3 @@ class Separation:
             new = first + np.flatnonzero(shared[copies.parents])
             shared[other.nodes] = False
             other.nodes = extended(other.nodes, new.astype(np.int32))
-
-    def _retie(
-        self, rows: Ints, label: Ints, places: Ints, own: Ints, place: Ints, corner: Ints, block: Ints, node: Indices
-    ) -> None:
-        """Gives tets their new nodes, and every node its star."""
-        here = place >= 0
-        for b, star in self.stars.items():
-            star.grow(self._model.nodes.n - len(star.count))
-            chosen = here & (block == b)
-            self._model.blocks[b].tets[place[chosen], corner[chosen]] = node[chosen]
-        ours = own >= 0
-        index = own[ours]
-        for b, star in self.stars.items():
-            inside = places[index, 2] == b
-            at = places[index[inside]]
-            block_tets = self._model.blocks[b].tets
-            after = block_tets[at[:, 0], at[:, 1]].astype(np.int64)
-            before = np.searchsorted(self._model.nodes.id, rows[ours][inside, stars.NODE])
-            order = np.lexsort((after, before))
-            before, after, tets = before[order], after[order], at[order, 0]
-            _restock(star.pool, star.first, star.count, before, after, tets)
-
-
-def _restock(pool: Indices, first: Indices, count: Indices, before: Ints, after: Ints, tets: Ints) -> None:
-    """Writes the stars of nodes ``before`` and of their copies ``after`` anew, in the stretch of the pool they have."""
-    starts = np.flatnonzero(np.r_[True, before[1:] != before[:-1]]) if len(before) else np.zeros(0, np.int64)
-    rank = np.arange(len(before)) - np.repeat(starts, np.diff(np.r_[starts, len(before)]))
-    at = first[before] + rank
-    pool[at] = tets
-    count[before] = 0
-    change = np.flatnonzero(np.r_[True, after[1:] != after[:-1]]) if len(after) else starts
-    first[after[change]] = at[change]
-    count[after[change]] = np.diff(np.r_[change, len(after)])

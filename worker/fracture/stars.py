@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from ..mesh.faces import FACES
-from ..state import CHUNK, INTACT, Indices, Tets, extended
+from ..state import CHUNK, INTACT, Indices, Ints, Tets, extended
 from ..state import MASS as MASS_ROW
 
 NODE, TET, RANK, MASS, BEHIND = 0, 1, 2, 3, 4
@@ -39,6 +39,16 @@ class Stars:
         """Takes up new nodes, which have no tets yet."""
         none = np.zeros(copies, np.int32)
         self.first, self.count = extended(self.first, none), extended(self.count, none)
+
+    def retie(self, tets: Tets, nodes: Ints, rows: Ints, places: Ints, became: Ints, new: int) -> None:
+        """Gives tets (n, 4) of this block the nodes that theirs have become, and every node its star.
+
+        ``rows`` (r, COLUMNS) of the whole stars of the local ``nodes`` (k,), sorted; ``places`` (r, 2), place and
+        corner of tets of this block, -1 for other rows; ``became`` (r,) the copy, local, -1 where the node stays
+        itself; ``new`` how many nodes there are with the copies.
+        """
+        self.grow(new - len(self.count))
+        _retie(self.pool, self.first, self.count, tets, nodes, rows, places, became)
 
 
 @njit(
@@ -89,11 +99,13 @@ def _root(parent, i):  # type: ignore[no-untyped-def]
     return i
 
 
-@njit("int64[::1](int64[:, ::1])", cache=True)
+@njit("Tuple((int64[::1], boolean[::1]))(int64[:, ::1])", cache=True)
 def pieces(rows):  # type: ignore[no-untyped-def]
-    """(r,) the smallest tet id of the piece that each row belongs to; ``rows`` sorted by node, then by tet."""
+    """(r,) the smallest tet id of the piece that each row belongs to, and whether the piece leaves its node; ``rows``
+    sorted by node, then by tet.
+    """
     n = len(rows)
-    parent = np.arange(n)
+    parent, label, leaves = np.arange(n), np.empty(n, np.int64), np.empty(n, np.bool_)
     begin = 0
     while begin < n:
         end = begin
@@ -101,15 +113,47 @@ def pieces(rows):  # type: ignore[no-untyped-def]
             end += 1
         for i in range(begin, end):
             for m in range(BEHIND, COLUMNS):
-                if rows[i, m] < 0:
+                if rows[i, m] <= rows[i, TET]:  # none, or one that has seen this one behind it
                     continue
-                j = _row_of(rows, begin, end, rows[i, m])
+                j = _row_of(rows, i + 1, end, rows[i, m])
                 if j < 0:
                     continue
                 one, two = _root(parent, i), _root(parent, j)
                 parent[max(one, two)] = min(one, two)
+        for i in range(begin, end):
+            root = _root(parent, i)
+            label[i], leaves[i] = rows[root, TET], root != begin
         begin = end
-    label = np.empty(n, np.int64)
-    for i in range(n):
-        label[i] = rows[_root(parent, i), TET]
-    return label
+    return label, leaves
+
+
+@njit(
+    "void(int32[::1], int32[::1], int32[::1], uint32[:, ::1], int64[::1], int64[:, ::1], int64[:, ::1], int64[::1])",
+    cache=True,
+)
+def _retie(pool, first, count, tets, nodes, rows, places, became):  # type: ignore[no-untyped-def]
+    """See Stars.retie. A node's stretch of the pool: its own tets, then those of each copy, by ascending id."""
+    begin, n, k = 0, len(rows), 0
+    while begin < n:
+        end = begin
+        while end < n and rows[end, NODE] == rows[begin, NODE]:
+            end += 1
+        at, node = first[nodes[k]], -1
+        while True:
+            following = -1
+            start = at
+            for r in range(begin, end):
+                if became[r] > node and (following < 0 or became[r] < following):
+                    following = became[r]
+                if places[r, 0] >= 0 and became[r] == node:
+                    pool[at] = places[r, 0]
+                    at += 1
+                    if node >= 0:
+                        tets[places[r, 0], places[r, 1]] = node
+            a = nodes[k] if node < 0 else node
+            if node < 0 or at > start:
+                first[a], count[a] = start, at - start
+            if following < 0:
+                break
+            node = following
+        begin, k = end, k + 1

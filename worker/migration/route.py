@@ -11,7 +11,7 @@ import numpy as np
 from ..parallel.comm import Comm
 from ..parallel.decompose import Cut, bisect, place
 from ..parallel.ownership import Neighbour
-from ..state import Flags, Floats, Indices, Ints
+from ..state import Flags, Floats, Indices, Ints, among
 from .parcel import Parcel, Table, joined, length, once, take
 
 _NOBODY = np.iinfo(np.int64).max
@@ -100,24 +100,17 @@ def _share(parcel: Parcel, targets: dict[int, Indices], cuts: list[Cut], rank: i
     rows, needed = {}, [np.zeros(0, np.int64), *(table["corners"].reshape(-1) for table in tets.values())]
     for name, table in parcel.rows.items():
         if "tet" in table:
-            rows[name] = take(table, _among(there, table["tet"]))
+            rows[name] = take(table, among(there, table["tet"]))
         elif "at" in table:
             rows[name] = take(table, place(cuts, table["at"] * scale) == rank)
         if name in rows and "with" in table:
             needed.append(rows[name]["with"].reshape(-1))
     wanted = np.unique(np.concatenate(needed))
-    chosen = _among(wanted, parcel.nodes["id"])
+    chosen = among(wanted, parcel.nodes["id"])
     for name, table in parcel.rows.items():
         if "of" in table:
-            rows[name] = take(table, _among(wanted, table["of"]))
+            rows[name] = take(table, among(wanted, table["of"]))
     return Parcel(nodes=take(parcel.nodes, chosen), tets=tets, rows=rows)
-
-
-def _among(known: Ints, wanted: Ints) -> Flags:
-    """(n,) which of ``wanted`` are in the ascending ``known``."""
-    if not len(known):
-        return np.zeros(len(wanted), bool)
-    return np.asarray(known[np.minimum(np.searchsorted(known, wanted), len(known) - 1)] == wanted)
 
 
 def _settle(whole: Parcel, comm: Comm) -> tuple[Directory, list[Neighbour], Indices]:
@@ -176,7 +169,7 @@ def _to_owners(parcel: Parcel, whole: Parcel, directory: Directory) -> None:
 def _named(book: Table, name: str, rows: dict[str, Table]) -> Table:
     """What the rows of some tables refer to by ``name``."""
     used = [table[name].reshape(-1) for table in rows.values() if name in table]
-    return take(book, _among(np.unique(np.concatenate([np.zeros(0, np.int64), *used])), book["id"]))
+    return take(book, among(np.unique(np.concatenate([np.zeros(0, np.int64), *used])), book["id"]))
 
 
 def _name_owners(table: Table, directory: Directory) -> None:

@@ -91,9 +91,6 @@ def bisect(
     groups = [(0, parts)]
     while groups := [(first, size) for first, size in groups if size > 1]:
         now = _level(points, ids, quanta, owner, groups, tried, comm)
-        for cut in now:
-            inside = np.flatnonzero(owner == cut.first)
-            owner[inside[cut.keys(points[inside], ids[inside]) >= cut.key]] += cut.left
         cuts += now
         groups = [g for c in now for g in ((c.first, c.left), (c.first + c.left, c.parts - c.left))]
     return owner, cuts
@@ -111,8 +108,8 @@ def place(cuts: list[Cut], points: Floats) -> Indices:
 def _level(
     points: Floats, ids: Ints, quanta: Ints, owner: Indices, groups: list[tuple[int, int]], tried: int, comm: Comm
 ) -> list[Cut]:  # fmt: skip
-    """A cut for each of the ``groups`` (first, parts), of the points that belong to ``first`` so far, across one of the
-    first ``tried`` directions.
+    """Cuts each of the ``groups`` (first, parts), the points whose ``owner`` is ``first`` so far, across one of the
+    first ``tried`` directions; what lies beyond a cut gets the first owner of the other side.
     """
     members = [np.flatnonzero(owner == first) for first, _ in groups]
     reach = np.full((len(groups), 2, tried), -np.inf)
@@ -129,6 +126,8 @@ def _level(
     ]
     keys = [cut.keys(points[chosen], ids[chosen]) for cut, chosen in zip(cuts, members, strict=True)]
     _search(cuts, keys, [quanta[chosen].sum(axis=1) for chosen in members], comm)
+    for cut, chosen, key in zip(cuts, members, keys, strict=True):
+        owner[chosen[key >= cut.key]] += cut.left
     return cuts
 
 

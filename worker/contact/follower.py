@@ -1,0 +1,307 @@
+"""A scene that follows nodes as they separate, until the next search.
+
+What the last search has found stays good while nodes separate: faces take up the copies of their corners, and a copy
+has the candidates of the node that it was part of, with the rank that computes that one's.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from ..parallel.comm import Comm
+from ..parallel.ownership import Neighbour
+from ..state import Flags, Indices, Ints, Nodes, among, extended
+from ..topology import Split, keys
+from . import ghosts
+from .cracks import Cracks, touching
+from .meetings import Meetings
+from .records import Crowd
+from .scene import Scene
+
+
+@dataclass
+class News:
+    """What a rank knows of a split: round every node that it holds or has a copy of."""
+
+    key: Ints
+    """(r,) ids of a node and of a tet as one number, ascending."""
+    became: Ints
+    """(r,) id of the copy that the node of that tet has become."""
+    parent: Ints
+    """(c,) ids of the parents of all copies, ascending."""
+    copy: Ints
+    """(c,) ids of the copies."""
+    rows: Crowd
+    """Parents and copies."""
+
+
+def news(split: Split, scene: Scene, here: Crowd, comm: Comm) -> News | None:
+    """None where there is none; all ranks take part. ``here``: every node of this rank, by local index. Of nodes that
+    it does not hold, a rank hears from the one that sends it their state.
+    """
+    if not split.copies.n and not (heard := comm.swap({})):
+        return None
+    parents, copies = split.copies.parents, split.first + np.arange(split.copies.n)
+    table = np.column_stack([split.key, here.id[split.node]])
+    family = np.column_stack([here.id[parents], here.id[copies]])
+    rows = here.take(np.unique(np.concatenate([parents, copies])))
+    if split.copies.n:
+        told, flags = {}, np.zeros(here.n, bool)
+        for other in scene.copies.sends:
+            flags[other.nodes] = True
+            for_it = flags[parents]
+            flags[other.nodes] = False
+            if for_it.any():
+                some = np.unique(np.concatenate([parents[for_it], copies[for_it]]))
+                round_it = table[for_it[split.node - split.first]]
+                packed = ghosts.pack_crowd(here.take(some))
+                lengths = np.array([len(round_it), int(for_it.sum())])
+                told[other.rank] = np.concatenate([
+                    lengths, round_it.reshape(-1), family[for_it].reshape(-1), packed.reshape(-1)
+                ])  # fmt: skip
+        heard = comm.swap(told)
+    if heard:
+        for words in heard.values():
+            ends = 2 + 2 * np.cumsum(words[:2])
+            table = np.concatenate([table, words[2 : ends[0]].reshape(-1, 2)])
+            family = np.concatenate([family, words[ends[0] : ends[1]].reshape(-1, 2)])
+            rows = Crowd.joined([rows, ghosts.unpack_crowd(words[ends[1] :])])
+        table, family = table[np.argsort(table[:, 0])], family[np.lexsort((family[:, 1], family[:, 0]))]
+    return News(table[:, 0].copy(), table[:, 1].copy(), family[:, 0].copy(), family[:, 1].copy(), rows)
+
+
+class Follower:
+    """Brings one scene up to date with a split."""
+
+    def __init__(self, scene: Scene, here: Crowd, nodes: Nodes) -> None:
+        """``here``: every node of this rank, by local index."""
+        self._scene, self._here = scene, here
+        self._nodes = nodes
+        if len(scene.place) < nodes.n:
+            scene.place = extended(scene.place, np.full(nodes.n - len(scene.place), -1, np.int32))
+        self._sort()
+
+    def places(self, ids: Ints) -> Indices:
+        """Where ids stand in the crowd, in their shape, -1 where they do not."""
+        far, far_ids = self._far
+        found = _located(ids.ravel(), self._nodes.id, self._scene.place, far_ids, far)
+        return np.asarray(found.reshape(ids.shape))
+
+    def _sort(self) -> None:
+        """Places and ids, ascending, of the nodes of the crowd that this rank does not hold."""
+        crowd = self._scene.crowd
+        far = np.flatnonzero(crowd.local < 0)
+        far = far[np.argsort(crowd.id[far])]
+        self._far = far, crowd.id[far]
+
+    def follow(self, heard: News, cracks: Cracks, neighbours: list[Neighbour]) -> None:
+        """Faces, edges and candidates after the split, and the places of the cracks."""
+        scene = self._scene
+        have = self.places(heard.parent) >= 0
+        for other in neighbours:
+            have |= _flagged(other.nodes, self._nodes.n)[self._nodes.places(heard.parent)]
+        families = np.sort(np.concatenate([heard.parent[have], heard.copy[have]]))
+        self._add(heard.rows.take(among(families, heard.rows.id)))
+        at = self.places(heard.rows.id)
+        scene.crowd.mobility[at[at >= 0]] = heard.rows.mobility[at >= 0]
+        parents = np.zeros(scene.crowd.n, bool)
+        at = self.places(heard.parent)
+        parents[at[at >= 0]] = True
+        self._faces(heard, parents)
+        self._edges(heard, parents)
+        self._candidates(heard, parents)
+        self.cracks(cracks)
+
+    def cracks(self, cracks: Cracks) -> None:
+        """The places of the cracks that this rank computes, and room for all that may meet."""
+        scene = self._scene
+        while True:
+            places, absent = np.empty(cracks.nodes.shape, np.int32), np.empty(cracks.nodes.size, np.int32)
+            n, lacking = _places(places, absent, scene.pushes, cracks.nodes, cracks.sides, scene.place)
+            if not lacking:
+                break
+            self._add(self._here.take(np.unique(absent[:lacking])))
+        scene.cracks = places[:n]
+        room = len(scene.node_face) + len(scene.edge_edge) + 3 * n
+        if room > len(scene.push):
+            met, scene.room = scene.room.nodes[: scene.met], Meetings.room(2 * room)
+            scene.room.nodes[: scene.met] = met
+            scene.diagonal, scene.push = np.empty((2 * room, 2)), np.empty((2 * room, 4))
+
+    def settle(self, neighbours: list[Neighbour], comm: Comm) -> None:
+        """Asks all ranks who shares which node; all take part."""
+        scene, nodes = self._scene, self._nodes
+        if comm.size == 1:
+            scene.connect([], nodes, comm)
+            return
+        used = np.sort(scene.crowd.id[scene.pushes])
+        owners = scene.crowd.owner[self.places(used)]
+        shared = ghosts.members(used, owners, neighbours, nodes, comm)
+        self._hold(np.unique(np.concatenate([used[:0], *shared.values()])))
+        scene.connect([Neighbour(rank, self.places(ids)) for rank, ids in sorted(shared.items())], nodes, comm)
+
+    def share(self, heard: News, neighbours: list[Neighbour], comm: Comm) -> None:
+        """Follows who shares which node. Nobody has to be asked: who shares a node shares its copies, since they are
+        held, pushed and sent by the same ranks as it; and a node that separates is shared by all that hold it, since it
+        may be pushed across the crack.
+        """
+        scene = self._scene
+        order = np.argsort(heard.copy)
+        family = np.column_stack([heard.parent, heard.copy])[order]
+        local, at = self._nodes.places(family), self.places(family)
+        company, none = {some.rank: some for some in scene.company}, np.zeros(0, np.int32)
+        for other in neighbours:
+            shared = _flagged(other.nodes, self._nodes.n)[local[:, 0]]
+            some = company.get(other.rank, Neighbour(other.rank, none))
+            fresh = shared & ~_flagged(some.nodes, scene.crowd.n)[at[:, 0]]
+            if fresh.any():
+                parents = self.places(np.unique(family[fresh, 0]))
+                company[other.rank] = Neighbour(other.rank, extended(some.nodes, parents))
+        scene.extend(
+            [_heirs(some, at, scene.crowd.n) for _, some in sorted(company.items())],
+            [_heirs(some, local, self._nodes.n) for some in scene.copies.sends],
+            [_heirs(some, at, scene.crowd.n) for some in scene.copies.receives], comm,
+        )  # fmt: skip
+
+    def _hold(self, ids: Ints) -> None:
+        """Adds those of this rank's nodes that the crowd lacks."""
+        here = self._here.id
+        at = np.minimum(np.searchsorted(here, ids), len(here) - 1)
+        self._add(self._here.take(at[here[at] == ids]))
+
+    def _add(self, rows: Crowd) -> None:
+        scene = self._scene
+        rows = rows.take(self.places(rows.id) < 0)
+        if not rows.n:
+            return
+        first, n = scene.crowd.n, rows.n
+        scene.crowd = Crowd(*(extended(a, b) for a, b in zip(scene.crowd.columns(), rows.columns(), strict=True)))
+        held = np.flatnonzero(rows.local >= 0).astype(np.int32)
+        scene.held = extended(scene.held, first + held)
+        scene.local = extended(scene.local, rows.local[held])
+        scene.place[rows.local[held]] = first + held
+        for name, width in (("shares", 4), ("impulse", 3), ("total", 3)):
+            setattr(scene, name, extended(getattr(scene, name), np.zeros((n, width), np.int64)))
+        scene.normals = extended(scene.normals, np.zeros((n, 9)))
+        scene.before = extended(scene.before, rows.v)
+        scene.pushes, scene.shared = (extended(some, np.zeros(n, bool)) for some in (scene.pushes, scene.shared))
+        scene.rest.add(rows.x, rows.course)
+        if (rows.local < 0).any():
+            self._sort()
+
+    def _followed(self, heard: News, places: Indices, tets: Ints) -> Indices:
+        """What nodes at ``places`` (n, k) of tets (n,) have become."""
+        if not len(heard.key):
+            return places
+        wanted = keys(self._scene.crowd.id[places], tets[:, None])
+        at = np.minimum(np.searchsorted(heard.key, wanted), len(heard.key) - 1)
+        now = heard.key[at] == wanted
+        out = places.copy()
+        out[now] = self.places(heard.became[at[now]])
+        return out
+
+    def _faces(self, heard: News, parents: Flags) -> None:
+        scene = self._scene
+        rows = touching(scene.faces, parents)
+        now = self._followed(heard, scene.faces[rows], scene.face_id[rows] // 4)
+        scene.faces[rows], scene.rest.faces[rows] = now, True
+        scene.pushes[now[:, :3]] = True
+
+    def _edges(self, heard: News, parents: Flags) -> None:
+        """An edge goes when its two faces have separated there."""
+        scene = self._scene
+        rows = touching(scene.edges, parents)
+        nodes, sides = scene.edges[rows], scene.edge_sides[rows] // 4
+        one = self._followed(heard, nodes[:, [0, 1, 2]], sides[:, 0])
+        two = self._followed(heard, nodes[:, [0, 1, 3]], sides[:, 1])
+        now = np.column_stack([one, two[:, 2]]).astype(np.int32)
+        gone = (one[:, :2] != two[:, :2]).any(axis=1)
+        now[gone] = now[gone][:, [0, 0, 0, 0]]
+        scene.edges[rows], scene.rest.edges[rows] = now, True
+        scene.pushes[now[:, :2]] = True
+
+    def _candidates(self, heard: News, parents: Flags) -> None:
+        """A copy has the candidates of its parent, and looks where that one does."""
+        scene = self._scene
+        rows = np.flatnonzero(parents[scene.node_face[:, 0]])
+        ids = scene.crowd.id[scene.node_face[rows, 0]]
+        begin, end = np.searchsorted(heard.parent, ids), np.searchsorted(heard.parent, ids, side="right")
+        many = end - begin
+        which = np.repeat(np.arange(len(rows)), many)
+        copy = heard.copy[np.repeat(begin - np.cumsum(many) + many, many) + np.arange(many.sum())]
+        slave, face = self.places(copy), scene.node_face[rows[which], 1]
+        scene.normals[slave] = scene.normals[scene.node_face[rows[which], 0]]
+        order = np.argsort(keys(slave.astype(np.int64), face.astype(np.int64)))
+        slave, face = slave[order], face[order]
+        scene.node_face = extended(scene.node_face, np.column_stack([slave, face]).astype(np.int32))
+        scene.keys = extended(scene.keys, np.column_stack([copy[order], scene.face_id[face]]))
+        scene.kept = extended(scene.kept, np.zeros((len(face), 4)))
+        scene.rest.add_candidates(len(face))
+        scene.pushes[slave] = True
+
+
+def _flagged(some: Indices, n: int) -> Flags:
+    """(n + 1,) which of n are among ``some``; the last stands for what is not there, -1."""
+    flags = np.zeros(n + 1, bool)
+    flags[some] = True
+    return flags
+
+
+def _heirs(some: Neighbour, family: Indices, n: int) -> Neighbour:
+    """Nodes shared with a rank, and behind them their copies: ``family`` (c, 2) parents and copies, out of ``n``."""
+    return Neighbour(some.rank, extended(some.nodes, family[_flagged(some.nodes, n)[family[:, 0]], 1]))
+
+
+@njit("int64(int64[::1], int64)", cache=True)
+def _at(ids, wanted):  # type: ignore[no-untyped-def]
+    """Where ``wanted`` stands in ascending ``ids``, -1 where it does not."""
+    begin, end = 0, len(ids)
+    while begin < end:
+        middle = (begin + end) // 2
+        if ids[middle] < wanted:
+            begin = middle + 1
+        else:
+            end = middle
+    return begin if begin < len(ids) and ids[begin] == wanted else -1
+
+
+@njit("int32[::1](int64[::1], int64[::1], int32[::1], int64[::1], int64[::1])", cache=True)
+def _located(wanted, ids, place, far_ids, far):  # type: ignore[no-untyped-def]
+    """(n,) the ``place`` of those that are among the ``ids`` of this rank, ``far`` of the others, -1 for no place."""
+    found = np.empty(len(wanted), np.int32)
+    for i in range(len(wanted)):
+        at = _at(ids, wanted[i])
+        found[i] = place[at] if at >= 0 else -1
+        if found[i] < 0:
+            at = _at(far_ids, wanted[i])
+            found[i] = far[at] if at >= 0 else -1
+    return found
+
+
+@njit(
+    "UniTuple(int64, 2)(int32[:, ::1], int32[::1], boolean[::1], int32[:, ::1], int32[:, :, ::1], int32[::1])",
+    cache=True,
+)
+def _places(out, absent, pushes, nodes, sides, place):  # type: ignore[no-untyped-def]
+    """The places, in ``out`` (m, 6), of the ``nodes`` (m, 6) of the cracks that have nodes that have separated, and the
+    first side here: this rank computes them. Nodes that have separated may be pushed.
+
+    Returns how many cracks and how many nodes that have no place; these are in ``absent``.
+    """
+    n, lacking = 0, 0
+    for c in range(len(nodes)):
+        if sides[c, 0, 1] < 0:
+            continue
+        if nodes[c, 0] == nodes[c, 3] and nodes[c, 1] == nodes[c, 4] and nodes[c, 2] == nodes[c, 5]:
+            continue
+        for k in range(6):
+            at = place[nodes[c, k]]
+            out[n, k] = at
+            if at < 0:
+                absent[lacking] = nodes[c, k]
+                lacking += 1
+            elif nodes[c, k] != nodes[c, (k + 3) % 6]:
+                pushes[at] = True
+        n += 1
+    return n, lacking
