@@ -55,7 +55,10 @@ class Groups:
             counts[:, -2] = np.bincount(model.nodes.group, sim.contact.effort().sum(axis=1), n)
             counts[:, -1] = np.bincount(model.nodes.group, sim.contact.on_surface, n)
         costs = self._meter.costs(sim, float(counts[:, -2].sum()))
+        tets = counts[:, :-2].sum(axis=1)
+        places = counts[:, -2] if counts[:, -2].any() else tets
         load = counts[:, :-2] @ costs.tet + costs.candidate * counts[:, -2]
+        load += costs.fracture / max(places.sum(), 1) * places
         load, outside = sim.comm.sum(np.stack([np.rint(1e9 * load).astype(np.int64), counts[:, -1]]))
         told: dict[str, Any] = {
             "load": load.tolist(), "outside": outside.tolist(), "rank": round(1e9 * costs.rank),

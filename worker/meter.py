@@ -22,8 +22,10 @@ class Costs:
     """(parts,) of a tet."""
     candidate: float
     """Of one of this rank: candidates differ, and what they have cost in a place is the best guess for it."""
+    fracture: float
+    """Of all fracture on this rank."""
     rank: float
-    """Of a rank, whatever it has to do."""
+    """What is left, of each rank."""
 
 
 @dataclass
@@ -50,12 +52,12 @@ class Meter:
         around = [spent["nodes"], spent["fracture"], effort, spent["contact"]]
         mine = np.concatenate([(_on_parts(sim) - self.on_parts) / steps, tets, around])
         ranks = np.array(sim.comm.share(mine))
-        (on_tets, tets), (on_nodes, fracture) = ranks[:, :-4].sum(axis=0).reshape(2, -1), ranks[:, -4:-2].sum(axis=0)
+        (on_tets, tets), on_nodes = ranks[:, :-4].sum(axis=0).reshape(2, -1), float(ranks[:, -4].sum())
         had, took = ranks[:, -2:].T
         candidate = _candidates(had, took)
-        rank = float(took.sum() + fracture - candidate @ had) / len(ranks)
+        rank = float(took.sum() - candidate @ had) / len(ranks)
         per_tet = on_tets / np.maximum(tets, 1.0) + on_nodes / max(tets.sum(), 1.0)
-        return Costs(per_tet, float(candidate[sim.comm.rank]), rank)
+        return Costs(per_tet, float(candidate[sim.comm.rank]), spent["fracture"], rank)
 
 
 def _candidates(had: Floats, took: Floats) -> Floats:

@@ -62,7 +62,7 @@ BRITTLE = materials.Material(
     brittle=materials.Brittle(strength=50e6, energy=20.0, scatter=materials.Scatter(modulus=5.0)),
 )  # fmt: skip
 MESHES = [block((4, 4, 4), MM, seed=3), moved(block((5, 5, 3), MM, seed=4), (-0.5 * MM, -0.5 * MM, 4.01 * MM))]
-TETS = Costs(np.array([1e-9, 1e-6]), 0.0, 0.0)
+TETS = Costs(np.array([1e-9, 1e-6]), 0.0, 0.0, 0.0)
 """1 ns for a tet of the first body, 1 us for one of the second."""
 
 
