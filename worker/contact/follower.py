@@ -166,9 +166,8 @@ class Follower:
 
     def _hold(self, ids: Ints) -> None:
         """Adds those of this rank's nodes that the crowd lacks."""
-        here = self._here.id
-        at = np.minimum(np.searchsorted(here, ids), len(here) - 1)
-        self._add(self._here.take(at[here[at] == ids]))
+        local = self._nodes.places(ids)
+        self._add(self._here.take(local[local >= 0]))
 
     def _add(self, rows: Crowd) -> None:
         scene = self._scene
@@ -253,29 +252,18 @@ def _heirs(some: Neighbour, family: Indices, n: int) -> Neighbour:
     return Neighbour(some.rank, extended(some.nodes, family[_flagged(some.nodes, n)[family[:, 0]], 1]))
 
 
-@njit("int64(int64[::1], int64)", cache=True)
-def _at(ids, wanted):  # type: ignore[no-untyped-def]
-    """Where ``wanted`` stands in ascending ``ids``, -1 where it does not."""
-    begin, end = 0, len(ids)
-    while begin < end:
-        middle = (begin + end) // 2
-        if ids[middle] < wanted:
-            begin = middle + 1
-        else:
-            end = middle
-    return begin if begin < len(ids) and ids[begin] == wanted else -1
-
-
 @njit("int32[::1](int64[::1], int64[::1], int32[::1], int64[::1], int64[::1])", cache=True)
 def _located(wanted, ids, place, far_ids, far):  # type: ignore[no-untyped-def]
     """(n,) the ``place`` of those that are among the ``ids`` of this rank, ``far`` of the others, -1 for no place."""
     found = np.empty(len(wanted), np.int32)
     for i in range(len(wanted)):
-        at = _at(ids, wanted[i])
-        found[i] = place[at] if at >= 0 else -1
-        if found[i] < 0:
-            at = _at(far_ids, wanted[i])
-            found[i] = far[at] if at >= 0 else -1
+        found[i] = -1
+        at = np.searchsorted(ids, wanted[i])
+        if at < len(ids) and ids[at] == wanted[i]:
+            found[i] = place[at]
+        at = np.searchsorted(far_ids, wanted[i])
+        if at < len(far_ids) and far_ids[at] == wanted[i]:
+            found[i] = far[at]
     return found
 
 
