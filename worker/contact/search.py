@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from ..state import Flags, Floats, Indices, Ints
+from ..state import Flags, Floats, Indices, Ints, extended
 from . import buckets
 from .buckets import bucket_of, first_at
 
@@ -171,16 +171,16 @@ def _of_a_level(
     who = who[bucketed.order].astype(np.int32)
     boxes = np.hstack([small.low, -small.high])[who]
     out = np.empty((4 * len(who) + 1024, 2), np.int32)
+    n = asked = 0
     while True:
-        mark = np.full(len(small_corners), -1, np.int32)
-        n = _walk(
-            out, mark, small_corners, large_corners, boxes, large.low, large.high, half, part, allowed,
+        n, asked = _walk(
+            out, n, asked, small_corners, large_corners, boxes, large.low, large.high, half, part, allowed,
             bucketed.codes, bucketed.rows, who, bucketed.origin, bucketed.inverse, bucketed.shape, small_rank,
             large_rank,
         )  # fmt: skip
-        if n <= len(out):
+        if asked == len(large_corners):
             return out[:n]
-        out = np.empty((n, 2), np.int32)
+        out = extended(out, np.empty_like(out))
 
 
 def _samples(low: Floats, high: Floats, edge: float) -> tuple[Floats, "np.ndarray", Floats]:
@@ -202,14 +202,15 @@ def _meet(small, large, i, j):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    "int64(int32[:, ::1], int32[::1], int32[:, ::1], int32[:, ::1], float64[:, ::1], "
+    "UniTuple(int64, 2)(int32[:, ::1], int64, int64, int32[:, ::1], int32[:, ::1], float64[:, ::1], "
     "float64[:, ::1], float64[:, ::1], float64[::1], int32[::1], boolean[:, ::1], int64[::1], int64[::1], "
     "int32[::1], float64[::1], float64, int64[::1], int64[::1], int64[::1])",
     cache=True,
 )
 def _walk(  # type: ignore[no-untyped-def]
     out,
-    mark,
+    n,
+    asked,
     small,
     large,
     boxes,
@@ -229,11 +230,12 @@ def _walk(  # type: ignore[no-untyped-def]
 ):
     """Each large thing asks the buckets that its box touches, or all points where these are fewer than its rows.
 
-    ``boxes`` (m, 6): of the thing that each sorted point belongs to, lowest corner and minus the highest. Returns how
-    many pairs there are, stored or not.
+    ``boxes`` (m, 6): of the thing that each sorted point belongs to, lowest corner and minus the highest. ``n`` pairs
+    are in ``out`` and ``asked`` large things have asked already; returns both anew, when all have or the room is full.
     """
-    n = 0
-    for j in range(len(large)):
+    mark = np.full(len(small), -1, np.int32)
+    for j in range(asked, len(large)):
+        before = n
         ix0 = bucket_of(box_low[j, 0] - half[0], origin[0], inverse, shape[0])
         ix1 = bucket_of(box_high[j, 0] + half[0], origin[0], inverse, shape[0])
         iy0 = bucket_of(box_low[j, 1] - half[1], origin[1], inverse, shape[1])
@@ -262,7 +264,8 @@ def _walk(  # type: ignore[no-untyped-def]
                         continue
                     if not allowed[part[small[i, 0]], part[large[j, 0]]] or _meet(small, large, i, j):
                         continue
-                    if n < len(out):
-                        out[n, 0], out[n, 1] = i, j
+                    if n == len(out):
+                        return before, j
+                    out[n, 0], out[n, 1] = i, j
                     n += 1
-    return n
+    return n, len(large)
