@@ -49,10 +49,10 @@ class Meter:
         for block in sim.model.blocks:
             tets[block.part] = block.n
         spent = {name: (sim.timers.seconds[name] - self.seconds[name]) / steps for name in WORK}
-        around = [spent["nodes"], spent["fracture"], effort, spent["contact"]]
+        around = [spent["nodes"], effort, spent["contact"]]
         mine = np.concatenate([(_on_parts(sim) - self.on_parts) / steps, tets, around])
         ranks = np.array(sim.comm.share(mine))
-        (on_tets, tets), on_nodes = ranks[:, :-4].sum(axis=0).reshape(2, -1), float(ranks[:, -4].sum())
+        (on_tets, tets), on_nodes = ranks[:, :-3].sum(axis=0).reshape(2, -1), float(ranks[:, -3].sum())
         had, took = ranks[:, -2:].T
         candidate = _candidates(had, took)
         rank = float(took.sum() - candidate @ had) / len(ranks)

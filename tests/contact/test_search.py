@@ -142,6 +142,14 @@ def test_candidates_are_the_boxes_that_touch() -> None:
         assert (found == touch).all()
 
 
+def test_each_pair_is_found_once_where_all_meet_all() -> None:
+    """Ten times as many pairs as there is room for at first: a walk is broken off and goes on."""
+    n = 120
+    cloud = Cloud(5, n)
+    huge = Things(cloud.faces.corners, np.full(n, 1e5))
+    assert as_matrix(cloud.find(cloud.nodes, huge, allowed=np.ones((3, 3), bool)), n, n).all()
+
+
 def test_things_with_a_node_in_common_are_no_candidates() -> None:
     cloud = Cloud(3)
     nodes = Things(np.arange(len(cloud.x), dtype=np.int32)[:, None], np.full(len(cloud.x), 10.0))

@@ -261,6 +261,8 @@ def _located(wanted, ids, place, far_ids, far):  # type: ignore[no-untyped-def]
         at = np.searchsorted(ids, wanted[i])
         if at < len(ids) and ids[at] == wanted[i]:
             found[i] = place[at]
+        if found[i] >= 0:
+            continue
         at = np.searchsorted(far_ids, wanted[i])
         if at < len(far_ids) and far_ids[at] == wanted[i]:
             found[i] = far[at]

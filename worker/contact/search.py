@@ -208,26 +208,9 @@ def _meet(small, large, i, j):  # type: ignore[no-untyped-def]
     cache=True,
 )
 def _walk(  # type: ignore[no-untyped-def]
-    out,
-    n,
-    asked,
-    small,
-    large,
-    boxes,
-    box_low,
-    box_high,
-    half,
-    part,
-    allowed,
-    codes,
-    rows,
-    who,
-    origin,
-    inverse,
-    shape,
-    small_rank,
-    large_rank,
-):
+    out, n, asked, small, large, boxes, box_low, box_high, half, part, allowed, codes, rows, who, origin, inverse,
+    shape, small_rank, large_rank,
+):  # fmt: skip
     """Each large thing asks the buckets that its box touches, or all points where these are fewer than its rows.
 
     ``boxes`` (m, 6): of the thing that each sorted point belongs to, lowest corner and minus the highest. ``n`` pairs
