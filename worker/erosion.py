@@ -25,6 +25,7 @@ from .parallel.fixed_point import Tally
 from .parallel.ownership import Neighbour, complete
 from .state import (
     CHUNK,
+    LAID_BARE,
     PRESSURE,
     S_XX,
     S_XY,
@@ -214,7 +215,7 @@ class Erosion(Boundary):
         for block in self._model.blocks:
             beside = np.flatnonzero(np.isin(block.id, every[:, 1:] // 4))
             rows = block.across[beside]
-            rows[np.isin(rows // 4, every[:, 0])] = -1
+            rows[np.isin(rows // 4, every[:, 0])] = LAID_BARE
             block.across[beside] = rows
         return every[:, 0]
 

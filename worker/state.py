@@ -54,6 +54,8 @@ TEMPERATURE = 18
 
 INTACT, BROKEN, WIDE = range(3)
 """Bond of a face to the one behind it: whole; broken; broken and so far apart that it is part of the surface."""
+LAID_BARE = -2
+"""``Block.across`` of a face that erosion has exposed; -1 for one that was exposed at the start."""
 
 
 def extended(array: "np.ndarray", rows: "np.ndarray") -> "np.ndarray":
@@ -186,8 +188,8 @@ class Block:
     temperature: float = 293.15
     """Initial temperature, K; it stays where no material of the block heats up."""
     across: Indices = field(default_factory=lambda: np.zeros((0, 4), np.int32))
-    """(n, 4) what was behind each face at the start, 4 * global tet id + local face, -1 for an exposed face; (0, 4) in
-    scenes without contact and fracture."""
+    """(n, 4) what was behind each face at the start, 4 * global tet id + local face; -1 for an exposed face, LAID_BARE
+    for one that erosion has exposed; (0, 4) in scenes without contact and fracture."""
     bond: Bits = field(default_factory=lambda: np.zeros((0, 4), np.uint8))
     """(n, 4) INTACT, BROKEN or WIDE; (0, 4) where the part does not fracture."""
     weakest: Floats = field(default_factory=lambda: np.zeros(0))

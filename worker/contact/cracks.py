@@ -3,9 +3,9 @@
 The two sides of a facet that has broken lie on each other, and no search is needed to know that they meet: from the
 moment of separation the nodes across, which were one, push each other apart along the normal of their facet, from a gap
 of exactly zero. That holds as long as they are near. What else could reach the faces of a crack has to enter it, so
-they are no part of the surface until they are apart by a share of a facet's size: then a search is due, after which
-they, their nodes and edges are surface like all other. However finely a body shatters, what has not moved costs no
-search.
+they are no part of the surface until they are apart by a share of a facet's size. In the step in which they are, they
+open: they, their nodes and edges are surface like all other from the next step on. A search takes them up before, so
+that opening calls for none. However finely a body shatters, what has not moved costs no search.
 """
 
 from dataclasses import dataclass
@@ -14,36 +14,50 @@ import numpy as np
 from numba import njit
 
 from ..migration.parcel import Table
-from ..state import WIDE, Block, Floats, Indices, Ints, Nodes, extended
-from ..topology import Split, keys
+from ..state import WIDE, Block, Flags, Floats, Indices, Ints, Nodes, among, extended
+from ..topology import Split
 from .meetings import DEEP_SELF, NEAR, needed
 
-_APART = 0.3
-"""Of the typical size of a face: two sides that have moved so far apart call for a search."""
 _WIDE = 0.1
-"""Of it: those that a search makes surface, so that it serves many."""
+"""Of the typical size of a face: two sides that have moved so far apart are surface from then on."""
+_FORESEEN = 0.3
+"""Of that width: a search takes up the sides of a crack as wide as this, so that it need not be called when they open."""
 
 
 @dataclass
 class Cracks:
     """Facets that have broken and are not surface yet, with a side on this rank."""
 
-    tets: Ints
-    """(m, 2) global ids, the smaller first."""
+    faces: Ints
+    """(m, 2) global ids of the sides, that of the smaller tet first."""
     nodes: Indices
     """(m, 6) local nodes of the first side, counter-clockwise seen from outside of it, and those across."""
     sides: Indices
     """(m, 2, 3) block, place and face of either side, -1 for one of another rank."""
+    foreseen: Flags
+    """(m,) whether the last search has taken up the sides."""
 
     @classmethod
     def none(cls) -> "Cracks":
         """No facet."""
-        return cls(np.zeros((0, 2), np.int64), np.zeros((0, 6), np.int32), np.zeros((0, 2, 3), np.int32))
+        faces, sides = np.zeros((0, 2), np.int64), np.zeros((0, 2, 3), np.int32)
+        return cls(faces, np.zeros((0, 6), np.int32), sides, np.zeros(0, bool))
 
-    def add(self, tets: Ints, nodes: Indices, sides: Indices) -> None:
-        """Takes up facets with their three ``nodes`` (m, 3)."""
-        self.tets, self.sides = extended(self.tets, tets), extended(self.sides, sides)
+    @property
+    def tets(self) -> Ints:
+        """(m, 2) global ids of the tets."""
+        return self.faces // 4
+
+    def add(self, tets: Ints, nodes: Indices, sides: Indices, blocks: list[Block]) -> None:
+        """Takes up facets of ``tets`` (m, 2) with their three ``nodes`` (m, 3)."""
+        faces = 4 * tets + sides[:, :, 2]
+        for b, block in enumerate(blocks):
+            for k in (0, 1):
+                mine = (sides[:, k, 0] == b) & (sides[:, k, 1] >= 0)
+                faces[mine, 1 - k] = block.across[sides[mine, k, 1], sides[mine, k, 2]]
+        self.faces, self.sides = extended(self.faces, faces), extended(self.sides, sides)
         self.nodes = extended(self.nodes, np.concatenate([nodes, nodes], axis=1))
+        self.foreseen = extended(self.foreseen, np.zeros(len(faces), bool))
 
     def follow(self, split: Split, ids: Ints) -> None:
         """Takes up the copies of a split; ``ids``: of the local nodes."""
@@ -52,48 +66,44 @@ class Cracks:
         rows = touching(self.nodes, parents)
         self.nodes[rows] = split.followed_sides(self.nodes[rows], ids, self.tets[rows])
 
-    def keep(self, blocks: list[Block], ids: Ints) -> Table:
+    def keep(self, ids: Ints) -> Table:
         """The facets as a table; ``ids``: of the local nodes."""
-        one, two = (self._seen_from(blocks, k) for k in (0, 1))
-        faces = np.where(one >= 0, one, two[:, ::-1])
-        rows = np.concatenate([np.flatnonzero(self.sides[:, k, 1] >= 0) for k in (0, 1)])
-        tet = np.concatenate([self.tets[self.sides[:, k, 1] >= 0, k] for k in (0, 1)])
+        rows, k = np.nonzero(self.sides[:, :, 1] >= 0)
         return {
-            "tet": tet, "key": keys(*self.tets[rows].T), "tets": self.tets[rows], "faces": faces[rows],
+            "tet": self.tets[rows, k], "key": self.faces[rows, 0], "faces": self.faces[rows],
             "with": ids[self.nodes[rows]],
         }  # fmt: skip
-
-    def _seen_from(self, blocks: list[Block], k: int) -> Ints:
-        """(m, 2) local faces of side ``k`` and of the other, as side ``k`` knows them; -1 where it is elsewhere."""
-        found = np.full((len(self.tets), 2), -1, np.int64)
-        for b, block in enumerate(blocks):
-            here = np.flatnonzero((self.sides[:, k, 0] == b) & (self.sides[:, k, 1] >= 0))
-            place, face = self.sides[here, k, 1], self.sides[here, k, 2]
-            found[here] = np.column_stack([face, block.across[place, face] % 4])
-        return found
 
     @classmethod
     def resume(cls, table: Table, blocks: list[Block], nodes: Nodes) -> "Cracks":
         """Facets from a table."""
-        sides = np.full((len(table["tets"]), 2, 3), -1, np.int32)
+        faces = table["faces"]
+        sides = np.full((len(faces), 2, 3), -1, np.int32)
         for b, block in enumerate(blocks):
             order = np.argsort(block.id)
-            at = order[np.minimum(np.searchsorted(block.id[order], table["tets"]), block.n - 1)]
-            rows, k = np.nonzero(block.id[at] == table["tets"])
-            sides[rows, k] = np.column_stack([np.full(len(rows), b), at[rows, k], table["faces"][rows, k]])
-        return cls(table["tets"], nodes.places(table["with"]), sides)
+            at = order[np.minimum(np.searchsorted(block.id[order], faces // 4), block.n - 1)]
+            rows, k = np.nonzero(block.id[at] == faces // 4)
+            sides[rows, k] = np.column_stack([np.full(len(rows), b), at[rows, k], faces[rows, k] % 4])
+        return cls(faces, nodes.places(table["with"]), sides, np.zeros(len(faces), bool))
 
-    def release(self, blocks: list[Block], x: Floats, size: float) -> int:
-        """Makes surface of what is wide at the positions ``x`` (nodes, 3); returns how many facets."""
+    def foresee(self, x: Floats, size: float) -> Indices:
+        """(k, 3) block, place and face of the sides here of cracks that may open soon, at the positions ``x`` (nodes,
+        3); ``size``: the typical one of a face, m.
+        """
         apart = x[self.nodes[:, 3:]] - x[self.nodes[:, :3]]
-        wide = ((apart * apart).sum(axis=2) > (_WIDE * size) ** 2).any(axis=1)
-        sides = self.sides[wide].reshape(-1, 3)
+        self.foreseen = ((apart * apart).sum(axis=2) >= (_FORESEEN * _WIDE * size) ** 2).any(axis=1)
+        sides = self.sides[self.foreseen].reshape(-1, 3)
+        return sides[sides[:, 1] >= 0]
+
+    def open(self, faces: Ints, blocks: list[Block]) -> None:
+        """Makes surface of the cracks whose first sides are among ``faces``, ascending, and forgets them."""
+        chosen = among(faces, self.faces[:, 0])
+        sides = self.sides[chosen].reshape(-1, 3)
         for b, block in enumerate(blocks):
             mine = sides[(sides[:, 0] == b) & (sides[:, 1] >= 0)]
-            if len(mine):
-                block.bond[mine[:, 1], mine[:, 2]] = WIDE
-        self.tets, self.nodes, self.sides = self.tets[~wide], self.nodes[~wide], self.sides[~wide]
-        return int(wide.sum())
+            block.bond[mine[:, 1], mine[:, 2]] = WIDE
+        for name, column in vars(self).items():
+            setattr(self, name, column[~chosen])
 
 
 @njit("int64[::1](int32[:, ::1], boolean[::1])", cache=True)
@@ -112,18 +122,20 @@ def touching(table, flags):  # type: ignore[no-untyped-def]
 
 @njit(
     "UniTuple(int64, 2)(int32[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], int32[::1], "
-    "int64, int32[:, ::1], float64, float64[:, ::1], float64[:, ::1], int32[::1], float64[:, ::1], float64)",
+    "int64, int64[::1], int32[:, ::1], float64, float64[:, ::1], float64[:, ::1], int32[::1], float64[:, ::1], float64)",
     cache=True,
     error_model="numpy",
 )
-def across(nodes, weights, normals, wanted, friction, pair, n, cracks, typical, x, v, part, mu, dt):  # type: ignore[no-untyped-def]
+def across(  # type: ignore[no-untyped-def]
+    nodes, weights, normals, wanted, friction, pair, n, opening, cracks, typical, x, v, part, mu, dt
+):  # fmt: skip
     """Nodes across ``cracks`` (m, 6) that close on each other, from row ``n`` on (meetings.node_face).
 
-    ``typical``: size of a face, m. Returns the new number of rows, and 1 when two sides have moved so far apart that a
-    search is due, else 0.
+    ``typical``: size of a face, m. Returns the new number of rows, and how many of the cracks have become so wide that
+    they open; ``opening`` (m,) says which.
     """
     e, f, m = np.empty(3), np.empty(3), np.empty(3)
-    far = 0
+    wide = 0
     for c in range(len(cracks)):
         for i in range(3):
             start = x[cracks[c, 0], i] + x[cracks[c, 3], i]
@@ -137,18 +149,18 @@ def across(nodes, weights, normals, wanted, friction, pair, n, cracks, typical, 
         size = np.sqrt(np.sqrt(square))
         for i in range(3):
             m[i] /= np.sqrt(square)
+        most = 0.0
         for k in range(3):
             p, q = cracks[c, k], cracks[c, 3 + k]
             if p == q:
                 continue
             gap0, speed, apart = 0.0, 0.0, 0.0
             for i in range(3):
-                opening = x[q, i] - x[p, i]
-                gap0 += m[i] * opening
+                width = x[q, i] - x[p, i]
+                gap0 += m[i] * width
                 speed += m[i] * (v[q, i] - v[p, i])
-                apart += opening * opening
-            if apart > (_APART * typical) ** 2:
-                far = 1
+                apart += width * width
+            most = max(most, apart)
             gap1 = gap0 + dt * speed
             if not (gap1 <= NEAR * size and gap0 >= -DEEP_SELF * size and mu[part[p], part[q]] >= 0.0):
                 continue
@@ -159,4 +171,7 @@ def across(nodes, weights, normals, wanted, friction, pair, n, cracks, typical, 
             wanted[n] = speed + needed(gap0, gap1, speed, dt)
             friction[n], pair[n] = mu[part[p], part[q]], -1
             n += 1
-    return n, far
+        if most >= (_WIDE * typical) ** 2:
+            opening[wide] = c
+            wide += 1
+    return n, wide

@@ -15,7 +15,7 @@ from ..state import Flags, Indices, Ints, Nodes, among, extended
 from ..topology import Split, keys
 from . import ghosts
 from .cracks import Cracks, touching
-from .meetings import Meetings
+from .meetings import Meetings, chain
 from .records import Crowd
 from .scene import Scene
 
@@ -71,6 +71,18 @@ def news(split: Split, scene: Scene, here: Crowd, comm: Comm) -> News | None:
     return News(table[:, 0].copy(), table[:, 1].copy(), family[:, 0].copy(), family[:, 1].copy(), rows)
 
 
+@dataclass
+class Family:
+    """Nodes that separate, and what comes out of them."""
+
+    first: Indices
+    """(crowd,) row of ``member`` where the copies of a node begin, -1 for one that has none."""
+    member: Indices
+    """(c, 2) place of each copy, and whether it is its parent's last."""
+    most: int
+    """Largest number of copies of a node."""
+
+
 class Follower:
     """Brings one scene up to date with a split."""
 
@@ -108,21 +120,36 @@ class Follower:
         parents = np.zeros(scene.crowd.n, bool)
         at = self.places(heard.parent)
         parents[at[at >= 0]] = True
-        self._faces(heard, parents)
-        self._edges(heard, parents)
         self._candidates(heard, parents)
+        family = self._family(heard)
+        self._faces(heard, parents, family)
+        self._edges(heard, parents, family)
         self.cracks(cracks)
+
+    def _family(self, heard: News) -> "Family":
+        """The copies of every node of the crowd."""
+        parent, copy = self.places(heard.parent), self.places(heard.copy)
+        both = (parent >= 0) & (copy >= 0)
+        parent, copy = parent[both], copy[both]
+        first = np.full(self._scene.crowd.n, -1, np.int32)
+        begin = np.flatnonzero(np.r_[True, parent[1:] != parent[:-1]]) if len(parent) else np.zeros(0, np.int64)
+        count = np.diff(np.r_[begin, len(parent)])
+        first[parent[begin]] = begin
+        last = np.zeros(len(parent), bool)
+        last[begin + count - 1] = True
+        return Family(first, np.column_stack([copy, last]).astype(np.int32), int(count.max(initial=0)))
 
     def cracks(self, cracks: Cracks) -> None:
         """The places of the cracks that this rank computes, and room for all that may meet."""
         scene = self._scene
         while True:
             places, absent = np.empty(cracks.nodes.shape, np.int32), np.empty(cracks.nodes.size, np.int32)
-            n, lacking = _places(places, absent, scene.pushes, cracks.nodes, cracks.sides, scene.place)
+            rows = np.empty(len(cracks.nodes), np.int64)
+            n, lacking = _places(places, rows, absent, scene.pushes, cracks.nodes, cracks.sides, scene.place)
             if not lacking:
                 break
             self._add(self._here.take(np.unique(absent[:lacking])))
-        scene.cracks = places[:n]
+        scene.cracks, scene.crack_rows = places[:n], rows[:n]
         room = len(scene.node_face) + len(scene.edge_edge) + 3 * n
         if room > len(scene.push):
             met, scene.room = scene.room.nodes[: scene.met], Meetings.room(2 * room)
@@ -184,7 +211,10 @@ class Follower:
             setattr(scene, name, extended(getattr(scene, name), np.zeros((n, width), np.int64)))
         scene.normals = extended(scene.normals, np.zeros((n, 9)))
         scene.before = extended(scene.before, rows.v)
-        scene.pushes, scene.shared = (extended(some, np.zeros(n, bool)) for some in (scene.pushes, scene.shared))
+        for name in ("pushes", "shared", "slave", "on_surface"):
+            setattr(scene, name, extended(getattr(scene, name), np.zeros(n, bool)))
+        scene.first = extended(scene.first, np.full(n, -1, np.int32))
+        scene.deepest, scene.holder = np.empty(scene.crowd.n), np.empty(scene.crowd.n, np.int32)
         scene.rest.add(rows.x, rows.course)
         if (rows.local < 0).any():
             self._sort()
@@ -200,43 +230,70 @@ class Follower:
         out[now] = self.places(heard.became[at[now]])
         return out
 
-    def _faces(self, heard: News, parents: Flags) -> None:
+    def _faces(self, heard: News, parents: Flags, family: Family) -> None:
+        """Faces take up the copies of their corners; a node meets those that have just left it, too."""
         scene = self._scene
         rows = touching(scene.faces, parents)
-        now = self._followed(heard, scene.faces[rows], scene.face_id[rows] // 4)
+        old = scene.faces[rows]
+        now = self._followed(heard, old, scene.face_id[rows] // 4)
         scene.faces[rows], scene.rest.faces[rows] = now, True
         scene.pushes[now[:, :3]] = True
+        pairs = np.empty((3 * len(rows) * (1 + family.most), 2), np.int32)
+        n = _apart_from_faces(pairs, rows, old, now, family.first, family.member, scene.slave, self._meets(old[:, 0]))
+        self._add_pairs(pairs[:n])
 
-    def _edges(self, heard: News, parents: Flags) -> None:
-        """An edge goes when its two faces have separated there."""
+    def _edges(self, heard: News, parents: Flags, family: Family) -> None:
+        """An edge goes when its two faces have separated there; it meets those that have left its ends."""
         scene = self._scene
         rows = touching(scene.edges, parents)
-        nodes, sides = scene.edges[rows], scene.edge_sides[rows] // 4
-        one = self._followed(heard, nodes[:, [0, 1, 2]], sides[:, 0])
-        two = self._followed(heard, nodes[:, [0, 1, 3]], sides[:, 1])
+        nodes, sides = scene.edges[rows], scene.edge_sides[rows]
+        one = self._followed(heard, nodes[:, [0, 1, 2]], sides[:, 0] // 4)
+        two = self._followed(heard, nodes[:, [0, 1, 3]], sides[:, 1] // 4)
         now = np.column_stack([one, two[:, 2]]).astype(np.int32)
         gone = (one[:, :2] != two[:, :2]).any(axis=1)
         now[gone] = now[gone][:, [0, 0, 0, 0]]
         scene.edges[rows], scene.rest.edges[rows] = now, True
         scene.pushes[now[:, :2]] = True
+        order = np.lexsort((sides[:, 1], sides[:, 0]))
+        order = order[~gone[order] & self._meets(nodes[order, 0])]
+        ends = nodes[order, :2]
+        at = np.argsort(ends.reshape(-1), kind="stable")
+        at = at[family.first[ends.reshape(-1)[at]] >= 0]
+        found = _apart_from_edges(at, ends, now[order], scene.edge_own[rows[order]])
+        pairs = rows[order][found].astype(np.int32)
+        scene.edge_edge = extended(scene.edge_edge, pairs)
+        scene.rest.add_edges(len(pairs))
+
+    def _meets(self, places: Indices) -> Flags:
+        """(n,) whether the parts of nodes at ``places`` meet themselves."""
+        return np.asarray(self._scene.meets_itself[self._scene.crowd.part[places]])
 
     def _candidates(self, heard: News, parents: Flags) -> None:
-        """A copy has the candidates of its parent, and looks where that one does."""
+        """A copy has the candidates and the normals of its parent."""
         scene = self._scene
+        family = np.column_stack([self.places(heard.parent), self.places(heard.copy)])
+        parent, copies = family[(family >= 0).all(axis=1)].T
+        for name in ("normals", "slave", "on_surface"):
+            column = getattr(scene, name)
+            column[copies] = column[parent]
         rows = np.flatnonzero(parents[scene.node_face[:, 0]])
         ids = scene.crowd.id[scene.node_face[rows, 0]]
         begin, end = np.searchsorted(heard.parent, ids), np.searchsorted(heard.parent, ids, side="right")
         many = end - begin
         which = np.repeat(np.arange(len(rows)), many)
         copy = heard.copy[np.repeat(begin - np.cumsum(many) + many, many) + np.arange(many.sum())]
-        slave, face = self.places(copy), scene.node_face[rows[which], 1]
-        scene.normals[slave] = scene.normals[scene.node_face[rows[which], 0]]
-        order = np.argsort(keys(slave.astype(np.int64), face.astype(np.int64)))
-        slave, face = slave[order], face[order]
-        scene.node_face = extended(scene.node_face, np.column_stack([slave, face]).astype(np.int32))
-        scene.keys = extended(scene.keys, np.column_stack([copy[order], scene.face_id[face]]))
-        scene.kept = extended(scene.kept, np.zeros((len(face), 4)))
-        scene.rest.add_candidates(len(face))
+        self._add_pairs(np.column_stack([self.places(copy), scene.node_face[rows[which], 1]]))
+
+    def _add_pairs(self, pairs: Indices) -> None:
+        """More candidates of nodes and faces."""
+        scene, n = self._scene, len(self._scene.node_face)
+        slave, face = pairs.T
+        scene.node_face = extended(scene.node_face, pairs.astype(np.int32))
+        scene.next = extended(scene.next, np.empty(len(pairs), np.int32))
+        chain(scene.first, scene.next, scene.node_face, n)
+        scene.keys = extended(scene.keys, np.column_stack([scene.crowd.id[slave], scene.face_id[face]]))
+        scene.kept = extended(scene.kept, np.zeros((len(pairs), 4)))
+        scene.rest.add_candidates(len(pairs))
         scene.pushes[slave] = True
 
 
@@ -270,12 +327,13 @@ def _located(wanted, ids, place, far_ids, far):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    "UniTuple(int64, 2)(int32[:, ::1], int32[::1], boolean[::1], int32[:, ::1], int32[:, :, ::1], int32[::1])",
+    "UniTuple(int64, 2)(int32[:, ::1], int64[::1], int32[::1], boolean[::1], int32[:, ::1], int32[:, :, ::1], "
+    "int32[::1])",
     cache=True,
 )
-def _places(out, absent, pushes, nodes, sides, place):  # type: ignore[no-untyped-def]
-    """The places, in ``out`` (m, 6), of the ``nodes`` (m, 6) of the cracks that have nodes that have separated, and the
-    first side here: this rank computes them. Nodes that have separated may be pushed.
+def _places(out, rows, absent, pushes, nodes, sides, place):  # type: ignore[no-untyped-def]
+    """The places, in ``out`` (m, 6), of the ``nodes`` (m, 6) of the cracks, ``rows``, that have nodes that have
+    separated, and the first side here: this rank computes them. Nodes that have separated may be pushed.
 
     Returns how many cracks and how many nodes that have no place; these are in ``absent``.
     """
@@ -293,5 +351,68 @@ def _places(out, absent, pushes, nodes, sides, place):  # type: ignore[no-untype
                 lacking += 1
             elif nodes[c, k] != nodes[c, (k + 3) % 6]:
                 pushes[at] = True
+        rows[n] = c
         n += 1
     return n, lacking
+
+
+@njit(
+    "int64(int32[:, ::1], int64[::1], int32[:, ::1], int32[:, ::1], int32[::1], int32[:, ::1], boolean[::1], "
+    "boolean[::1])",
+    cache=True,
+)
+def _apart_from_faces(pairs, rows, old, now, first, member, slave, meets):  # type: ignore[no-untyped-def]
+    """Pairs of nodes and faces, of ``rows``, that had a corner in common before the split, and have none now.
+
+    ``old`` and ``now`` (r, 4): their corners; ``first`` and ``member``: Family; returns how many there are.
+    """
+    n = 0
+    for r in range(len(rows)):
+        for k in range(3):
+            node = old[r, k]
+            if first[node] < 0 or not slave[node] or not meets[r]:
+                continue
+            at, end = first[node], False
+            while True:
+                if node != now[r, 0] and node != now[r, 1] and node != now[r, 2]:
+                    pairs[n, 0], pairs[n, 1] = node, rows[r]
+                    n += 1
+                if end:
+                    break
+                node, end = member[at, 0], member[at, 1] != 0
+                at += 1
+    return n
+
+
+@njit("int64[:, ::1](int64[::1], int32[:, ::1], int32[:, ::1], boolean[::1])", cache=True)
+def _apart_from_edges(order, old, now, own):  # type: ignore[no-untyped-def]
+    """(p, 2) pairs of edges that had an end in common before the split and have none now, the one of smaller faces first,
+    where that is this rank's own.
+
+    ``old`` and ``now`` (e, 2 and 4): their nodes; ``order``: of the ends, flat, by node.
+    """
+    ends, many = old.reshape(-1), 0
+    for write in range(2):
+        if write:
+            pairs = np.empty((many, 2), np.int64)
+        many, i = 0, 0
+        while i < len(order):
+            j = i
+            while j < len(order) and ends[order[j]] == ends[order[i]]:
+                j += 1
+            for a in range(i, j):
+                for b in range(i, j):
+                    one, two = order[a] // 2, order[b] // 2
+                    if one >= two or not own[one]:
+                        continue
+                    common = False
+                    for k in range(2):
+                        common |= now[one, k] == now[two, 0] or now[one, k] == now[two, 1]
+                    both = old[one, 0] == old[two, 0] and old[one, 1] == old[two, 1]
+                    if common or (both and ends[order[i]] != old[one, 0]):
+                        continue
+                    if write:
+                        pairs[many, 0], pairs[many, 1] = one, two
+                    many += 1
+            i = j
+    return pairs

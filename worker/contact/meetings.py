@@ -112,23 +112,36 @@ def off(x, s, a, b):  # type: ignore[no-untyped-def]
     return np.sqrt(square)
 
 
-@njit(f"boolean({_V2}, int64, {_N2}, {_N2}, float64[::1], int32[::1], float64)", cache=True, error_model="numpy")
-def _outside(x, p, pairs, faces, size, part, depth):  # type: ignore[no-untyped-def]
+@njit("void(int32[::1], int32[::1], int32[:, ::1], int64)", cache=True)
+def chain(first, following, pairs, begin):  # type: ignore[no-untyped-def]
+    """Hangs the pairs of node and face from row ``begin`` on into the chains of their nodes: ``first`` (nodes,), and
+    ``following`` (p,) the pair after each, -1 for none.
+    """
+    for p in range(begin, len(pairs)):
+        following[p], first[pairs[p, 0]] = first[pairs[p, 0]], p
+
+
+@njit(
+    f"boolean({_V2}, int64, {_N2}, {_N2}, float64[::1], boolean[::1], int32[::1], int32[::1], int32[::1], float64)",
+    cache=True,
+    error_model="numpy",
+)
+def _outside(x, p, pairs, faces, size, exposed, first, following, part, depth):  # type: ignore[no-untyped-def]
     """Whether the node of pair ``p``, ``depth`` below its face, is nearer to the front of another face of that part.
 
     Then it is beside an acute edge and not in the body: the nearest face decides on which side a node is. Only faces
     within the share of their size that every list of candidates has are asked.
     """
     b, m, s = np.empty(3), np.empty(3), pairs[p, 0]
-    q = p
-    while q > 0 and pairs[q - 1, 0] == s:
-        q -= 1
-    while q < len(pairs) and pairs[q, 0] == s:
+    q = first[s]
+    while q >= 0:
         f = pairs[q, 1]
-        q += 1
+        q = following[q]
         i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
+        if not exposed[f] or part[i] != part[faces[pairs[p, 1], 0]]:
+            continue
         away = height(m, x, s, i, j, k)
-        if part[i] != part[faces[pairs[p, 1], 0]] or not away > 0.0:
+        if not away > 0.0:
             continue
         if not foot(b, x, x, s, i, j, k, 0.0):
             away = min(off(x, s, i, j), off(x, s, j, k), off(x, s, k, i))
@@ -167,24 +180,33 @@ def _looks_at(out, s, m):  # type: ignore[no-untyped-def]
     return mean <= FACING and least <= -FACING
 
 
-@njit(f"int64({_OUT}, int64, {_N2}, float64[::1], {_V2}, {_IN})", cache=True, error_model="numpy")
-def node_face(nodes, weights, normals, wanted, friction, pair, n, faces, size, out, pairs, some, x, v, part, mu, dt):  # type: ignore[no-untyped-def]
+@njit(
+    f"int64({_OUT}, int64, {_N2}, float64[::1], int64[::1], boolean[::1], {_V2}, boolean[::1], int32[::1], int32[::1], "
+    f"float64[::1], int32[::1], {_IN})",
+    cache=True,
+    error_model="numpy",
+)
+def node_face(  # type: ignore[no-untyped-def]
+    nodes, weights, normals, wanted, friction, pair, n, faces, size, ids, exposed, out, on_surface, first, following,
+    deepest, holder, pairs, some, x, v, part, mu, dt,
+):  # fmt: skip
     """Nodes that pass a face, from row ``n`` on; returns the new number of rows.
 
     ``out`` (nodes, 9): means of n and of n n (xx, yy, zz, yz, zx, xy) of the outward normals of a node's faces. A node
     meets a face that it looks at: the rim of a bar not the side of another one of the same width, the surface under a
     block that slides not its front, which stands across. Zero for a node without faces, which meets any.
 
-    ``pairs`` (p, 2): node and face, sorted by node, then by the id of the face; ``faces`` (f, 4), the node opposite
-    last; ``some`` of the pairs, ascending, are looked at; ``mu`` (parts, parts).
+    ``pairs`` (p, 2): node and face, in chains by ``first`` and ``following`` (``chain``); ``faces`` (f, 4), the node
+    opposite last, with their ``ids``; ``some`` of the pairs are looked at, those of faces that are ``exposed`` and of
+    nodes ``on_surface``; ``deepest`` and ``holder`` (nodes,) are room to work in; ``mu`` (parts, parts).
     """
     b, m = np.empty(3), np.empty(3)
     ahead = x + dt * v
-    nearest, row, before = 0.0, -1, -1
+    holder[:] = -1
     for p in some:
         s, f = pairs[p, 0], pairs[p, 1]
-        if s != before:
-            row, before = -1, s
+        if not exposed[f] or not on_surface[s]:
+            continue
         i, j, k, d = faces[f, 0], faces[f, 1], faces[f, 2], faces[f, 3]
         height(m, ahead, s, i, j, k)
         gap1 = 0.0
@@ -210,12 +232,15 @@ def node_face(nodes, weights, normals, wanted, friction, pair, n, faces, size, o
             continue
         at = n
         if gap0 < -_TOUCHING * size[f]:
-            if row >= 0 and gap0 <= nearest:
-                continue
-            if _outside(x, p, pairs, faces, size, part, -gap0):
+            row = holder[s]
+            if row >= 0:
+                same = gap0 == deepest[s] and ids[f] < ids[pairs[pair[row], 1]]
+                if not (gap0 > deepest[s] or same):
+                    continue
+            if _outside(x, p, pairs, faces, size, exposed, first, following, part, -gap0):
                 continue
             at = row if row >= 0 else n
-            nearest, row = gap0, at
+            deepest[s], holder[s] = gap0, at
         n += at == n
         nodes[at, 0], nodes[at, 1], nodes[at, 2], nodes[at, 3] = s, i, j, k
         weights[at, 0] = 1.0
@@ -289,11 +314,14 @@ def _volume(u, w, r):  # type: ignore[no-untyped-def]
     return (u[1] * w[2] - u[2] * w[1]) * r[0] + (u[2] * w[0] - u[0] * w[2]) * r[1] + (u[0] * w[1] - u[1] * w[0]) * r[2]
 
 
-@njit(f"int64({_OUT}, int64, {_N2}, float64[::1], {_IN})", cache=True, error_model="numpy")
-def edge_edge(nodes, weights, normals, wanted, friction, pair, n, edges, size, pairs, some, x, v, part, mu, dt):  # type: ignore[no-untyped-def]
+@njit(f"int64({_OUT}, int64, {_N2}, float64[::1], boolean[:, ::1], {_IN})", cache=True, error_model="numpy")
+def edge_edge(  # type: ignore[no-untyped-def]
+    nodes, weights, normals, wanted, friction, pair, n, edges, size, exposed, pairs, some, x, v, part, mu, dt,
+):  # fmt: skip
     """Edges that pass an edge, from row ``n`` on; returns the new number of rows. They meet where they cross.
 
-    ``pairs`` (p, 2): two edges, of which ``some`` are looked at; ``edges`` (e, 4): records.Edges.
+    ``pairs`` (p, 2): two edges, of which ``some`` are looked at; ``edges`` (e, 4): records.Edges, which meet others when
+    both of their faces are ``exposed`` (e, 2).
     """
     u, w, r, m = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     u0, w0, r0 = np.empty(3), np.empty(3), np.empty(3)
@@ -301,6 +329,8 @@ def edge_edge(nodes, weights, normals, wanted, friction, pair, n, edges, size, p
     ahead = x + dt * v
     for p in some:
         one, two = pairs[p, 0], pairs[p, 1]
+        if not (exposed[one, 0] and exposed[one, 1] and exposed[two, 0] and exposed[two, 1]):
+            continue
         a, b, c, d = edges[one, 0], edges[one, 1], edges[two, 0], edges[two, 1]
         for k in range(3):
             u0[k], w0[k], r0[k] = x[b, k] - x[a, k], x[d, k] - x[c, k], x[c, k] - x[a, k]

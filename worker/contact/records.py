@@ -10,7 +10,7 @@ from typing import Self
 
 import numpy as np
 
-from ..state import Floats, Indices, Ints
+from ..state import Flags, Floats, Indices, Ints
 
 
 @dataclass
@@ -38,7 +38,7 @@ class Rows:
 
 @dataclass
 class Faces(Rows):
-    """Exposed faces."""
+    """Exposed faces, and sides of cracks that may open before the next search."""
 
     id: Ints
     """(n,) 4 * global tet id + local face."""
@@ -46,11 +46,15 @@ class Faces(Rows):
     """(n, 4) global ids."""
     size: Floats
     """(n,) square root of twice the initial area, m."""
+    exposed: Flags
+    """(n,) False for a side of a crack that has not opened yet."""
 
 
 @dataclass
 class Edges(Rows):
-    """Sharp edges; a row (a, b, c, d): edge ab between face abc and face bad, a < b."""
+    """Sharp edges; a row (a, b, c, d): edge ab between face abc and face bad, a < b. Where more than two faces meet in
+    an edge, every two of them that may enclose a body make a row.
+    """
 
     nodes: Ints
     """(n, 4) global ids."""
@@ -58,6 +62,8 @@ class Edges(Rows):
     """(n, 2) ids of the faces abc and bad."""
     size: Floats
     """(n,) initial length, m."""
+    exposed: Flags
+    """(n, 2) whether either face is exposed; the edge meets others when both are."""
 
 
 @dataclass

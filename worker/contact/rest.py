@@ -101,6 +101,10 @@ class Rest:
         """Takes up more candidates of nodes and faces."""
         self._node_face.grow(n)
 
+    def add_edges(self, n: int) -> None:
+        """Takes up more candidates of edges and edges."""
+        self._edge_edge.grow(n)
+
     def move(self, x: Floats, v: Floats, faces: Indices, edges: Indices, dt: float) -> None:
         """A step ``dt`` from the positions ``x`` on, with velocities ``v`` before contact."""
         self._t, self.fresh = self._t + self._dt, False

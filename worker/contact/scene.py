@@ -6,11 +6,10 @@ from functools import cached_property
 import numpy as np
 from numba import njit
 
-from ..migration.parcel import Parcel, take
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum, same
-from ..state import Flags, Floats, Indices, Ints, Nodes
-from . import domain, ghosts, search, sift
+from ..state import Flags, Floats, Indices, Ints, Nodes, among
+from . import domain, ghosts, meetings, search, sift
 from .ghosts import Copies
 from .meetings import DEEP, DEEP_SELF, Meetings
 from .records import Crowd, Edges, Faces, merged
@@ -18,8 +17,6 @@ from .rest import Rest
 from .search import Boxes, Things
 
 _COPY_TAG, _SHARE_TAG, _PUSH_TAG = 11, 12, 13
-_FACE_BITS = 30
-"""The id of a face stays below 2^30 where edges are kept by those of their two faces."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +28,8 @@ class Rules:
     """(parts, parts) which parts meet."""
     cell: float
     """Edge of a cell of the contact domain, m."""
+    breaking: Flags
+    """(parts,) whose nodes separate: what a copy may meet must be known before."""
 
 
 @dataclass
@@ -43,7 +42,7 @@ class Sides:
     crowd: Crowd
     """Every node of the faces and edges, and every node of the surface that is held here."""
     slaves: Ints
-    """Ids of the owned nodes of the surface."""
+    """Ids of the owned nodes of the surface, and of cracks that may open."""
     skin: float
     """m."""
 
@@ -86,11 +85,26 @@ class Scene:
     """(f, 4) places."""
     face_id: Ints
     face_size: Floats
+    face_exposed: Flags
+    """(f,) only exposed faces are met."""
     edges: Indices
     """(e, 4) places."""
     edge_sides: Ints
     """(e, 2) ids of their faces."""
     edge_size: Floats
+    edge_exposed: Flags
+    """(e, 2) whether either face is; only edges between exposed faces are met."""
+    edge_own: Flags
+    """(e,) whose face of smaller id is of this rank."""
+    meets_itself: Flags
+    """(parts,) whose surface meets itself."""
+    slave: Flags
+    """(crowd,) the nodes whose meetings with faces this rank computes."""
+    on_surface: Flags
+    """(crowd,) of nodes that are held here: only those on the surface meet faces."""
+    first: Indices
+    """(crowd,) the first candidate of each node with a face, -1 for none; ``next`` (p,) the one after each."""
+    next: Indices
     node_face: Indices
     """(p, 2) place of a node, index of a face."""
     edge_edge: Indices
@@ -108,7 +122,11 @@ class Scene:
     total: Ints
     """(crowd, 3) impulses of the last step, quanta."""
     normals: Floats
-    """(crowd, 9) what the faces of the nodes look at, as they did at the search; see meetings.node_face."""
+    """(crowd, 9) mean normals of the nodes; see meetings.node_face."""
+    deepest: Floats
+    """(crowd,) room for the height of a node over the face that holds it, m."""
+    holder: Indices
+    """(crowd,) room for the meeting with that face."""
     before: Floats
     """(crowd, 3) v(n-1/2)."""
     place: Indices
@@ -119,7 +137,9 @@ class Scene:
     """(crowd,) which nodes are in company with any rank."""
     rest: Rest
     cracks: Indices
-    """(m, 6) places of the nodes on either side of open cracks (contact/cracks.py)."""
+    """(m, 6) places of the nodes on either side of cracks whose nodes have separated (contact/cracks.py)."""
+    crack_rows: Ints
+    """(m,) which cracks these are."""
     met: int = 0
     """Meetings of the last step, the first rows of the room."""
     company: list[Neighbour] = field(init=False)
@@ -156,14 +176,14 @@ class Scene:
         crowd = self.crowd
         return float(_approach(crowd.x, crowd.v, self.faces, self.node_face))
 
-    def remember(self, old: "Scene", nodes: Nodes, comm: Comm) -> None:
-        """Takes over what candidates of another search have kept; all ranks take part.
+    def remember(self, keys: Ints, kept: Floats, nodes: Nodes, comm: Comm) -> None:
+        """Takes over what candidates of another search, with their ``keys``, have ``kept``; all ranks take part.
 
         The pairs of a copy were with the rank of its parent's, and are with its own from now on.
         """
-        rows = np.column_stack([old.keys, old.kept.view(np.int64)])
+        rows = np.column_stack([keys, kept.view(np.int64)])
         if comm.size > 1:
-            owner = nodes.owner[nodes.places(old.keys[:, 0])]
+            owner = nodes.owner[nodes.places(keys[:, 0])]
             told = comm.swap({int(rank): rows[owner == rank] for rank in np.unique(owner)})
             rows = np.concatenate([rows[:0], *(words.reshape(-1, 6) for words in told.values())])
         kind = [("node", np.int64), ("face", np.int64)]
@@ -171,21 +191,10 @@ class Scene:
         _, here, there = np.intersect1d(mine, theirs, assume_unique=True, return_indices=True)
         self.kept[here] = np.ascontiguousarray(rows[there, 2:]).view(np.float64)
 
-    def keep(self, parcel: Parcel, rubs: bool) -> None:
-        """Adds its candidates to a parcel, nodes and faces, edges and edges; with ``rubs`` what they have kept."""
-        ids, (slave, face) = self.crowd.id, self.node_face.T
-        parcel.rows["contact.pairs"] = {"node": ids[slave], "face": self.face_id[face]}
-        if rubs:
-            parcel.rows["contact.pairs"]["kept"] = self.kept
-        edge = self.edge_sides[:, 0] << _FACE_BITS | self.edge_sides[:, 1]
-        first = self.edges[self.edge_edge[:, 0], 0]
-        parcel.rows["contact.sharp"] = {"node": ids[first], "edge": edge[self.edge_edge]}
-        slaves = np.unique(slave)
-        parcel.books |= {
-            "node": {"id": ids[slaves], "normals": self.normals[slaves]},
-            "face": {"id": self.face_id, "ends": ids[self.faces], "size": self.face_size},
-            "edge": {"id": edge, "ends": ids[self.edges], "sides": self.edge_sides, "size": self.edge_size},
-        }
+    def expose(self, faces: Ints) -> None:
+        """Faces of these ids, ascending, become surface."""
+        self.face_exposed |= among(faces, self.face_id)
+        self.edge_exposed |= among(faces, self.edge_sides.reshape(-1)).reshape(-1, 2)
 
     def free(self) -> None:
         """Gives its messages back to MPI."""
@@ -224,7 +233,7 @@ def build(sides: Sides, rules: Rules, horizon: float, drift: Floats, nodes: Node
     seen, sent = _with_ghosts(sides, rules, horizon, drift, comm) if comm.size > 1 else (sides, 0)
     node_face = _node_face(seen, rules, horizon, drift)
     edge_edge = _edge_edge(seen, sides.edges.n, rules, horizon, drift)
-    return compact(seen, node_face, edge_edge, sent, nodes)
+    return compact(seen, sides.edges.n, node_face, edge_edge, sent, rules, nodes)
 
 
 def _with_ghosts(sides: Sides, rules: Rules, horizon: float, drift: Floats, comm: Comm) -> tuple[Sides, int]:
@@ -279,9 +288,9 @@ def _sorted(one: "np.ndarray", two: "np.ndarray", n: int) -> Indices:
 
 
 def _edge_edge(seen: Sides, own: int, rules: Rules, horizon: float, drift: Floats) -> Indices:
-    """(q, 2) indices of edges; the rank of the edge of smaller ids has the pair."""
+    """(q, 2) indices of edges, that of the smaller faces first; its rank has the pair."""
     crowd, edges, things = seen.crowd, seen.edges, seen.edge_things
-    rank, order = np.empty(edges.n, np.int64), np.lexsort((edges.nodes[:, 1], edges.nodes[:, 0]))
+    rank, order = np.empty(edges.n, np.int64), np.lexsort((*edges.nodes[:, 1::-1].T, *edges.sides[:, ::-1].T))
     rank[order] = np.arange(edges.n)
     mine = Things(things.corners[:own], things.reach[:own])
     pairs = search.find(mine, things, crowd.x, crowd.course - drift, crowd.part, rules.allowed, horizon, rank)
@@ -289,14 +298,29 @@ def _edge_edge(seen: Sides, own: int, rules: Rules, horizon: float, drift: Float
     return order[_sorted(rank[pairs[:, 0]], rank[pairs[:, 1]], edges.n)].astype(np.int32)
 
 
-def compact(seen: Sides, node_face: Indices, edge_edge: Indices, sent: int, nodes: Nodes) -> Scene:
-    """Keeps the nodes, faces and edges of candidates only."""
+def compact(
+    seen: Sides, own: int, node_face: Indices, edge_edge: Indices, sent: int, rules: Rules, nodes: Nodes
+) -> Scene:
+    """Keeps the nodes, faces and edges of candidates, and those of parts that break, which copies may meet; the first
+    ``own`` edges are this rank's.
+    """
     crowd = seen.crowd
-    which_faces, face_at = _used(seen.faces.n, node_face[:, 1])
-    which_edges, edge_at = _used(seen.edges.n, edge_edge)
+    apart = rules.breaking[crowd.part]
+    which_faces, face_at = _used(seen.faces.n, node_face[:, 1], np.flatnonzero(apart[seen.face_places[:, 0]]))
+    which_edges, edge_at = _used(seen.edges.n, edge_edge, np.flatnonzero(apart[seen.edge_places[:, 0]]))
     faces, edges = seen.faces.take(which_faces), seen.edges.take(which_edges)
     corners, ends, slaves = seen.face_places[which_faces], seen.edge_places[which_edges], node_face[:, 0]
-    pushed, _ = _used(crowd.n, slaves, corners[:, :3], ends[:, :2])
+    slave = np.zeros(crowd.n, bool)
+    slave[seen.nodes.corners[:, 0]] = True
+    mine = which_edges < own
+    beside = apart[corners[:, 0]] & slave[corners[:, :3]].any(axis=1)
+    touching = np.zeros(crowd.n, bool)
+    touching[ends[mine, :2]] = True
+    near = apart[ends[:, 0]] & touching[ends[:, :2]].any(axis=1)
+    pushed, _ = _used(
+        crowd.n, slaves, seen.face_places[node_face[:, 1], :3], seen.edge_places[edge_edge, :2], corners[beside, :3],
+        ends[near, :2],
+    )  # fmt: skip
     needed, now = _used(crowd.n, slaves, corners, ends)
     keys = np.column_stack([crowd.id[slaves], seen.faces.id[node_face[:, 1]]])
     crowd, pushes = crowd.take(needed), np.zeros(len(needed), bool)
@@ -307,42 +331,23 @@ def compact(seen: Sides, node_face: Indices, edge_edge: Indices, sent: int, node
     held = np.flatnonzero(crowd.local >= 0).astype(np.int32)
     place = np.full(nodes.n, -1, np.int32)
     place[crowd.local[held]] = held
+    pairs = np.column_stack([now[slaves], face_at[node_face[:, 1]]])
+    first, following = np.full(crowd.n, -1, np.int32), np.empty(len(pairs), np.int32)
+    meetings.chain(first, following, pairs, 0)
     return Scene(
         crowd=crowd, held=held, local=crowd.local[held], faces=now[corners], face_id=faces.id,
-        face_size=faces.size, edges=now[ends], edge_sides=edges.sides, edge_size=edges.size,
-        node_face=np.column_stack([now[slaves], face_at[node_face[:, 1]]]), edge_edge=edge_at[edge_edge],
+        face_size=faces.size, face_exposed=faces.exposed, edges=now[ends], edge_sides=edges.sides,
+        edge_size=edges.size, edge_exposed=edges.exposed, edge_own=mine, meets_itself=rules.allowed.diagonal().copy(), slave=slave[needed],
+        on_surface=np.zeros(crowd.n, bool), first=first, next=following,
+        node_face=pairs, edge_edge=edge_at[edge_edge],
         keys=keys, kept=np.zeros((len(keys), 4)), faces_sent=sent,
         room=Meetings.room(room), diagonal=np.empty((room, 2)), push=np.empty((room, 4)),
         shares=shares, impulse=impulse, place=place, pushes=pushes, shared=np.zeros(crowd.n, bool),
-        cracks=np.zeros((0, 6), np.int32),
+        cracks=np.zeros((0, 6), np.int32), crack_rows=np.zeros(0, np.int64),
         rest=Rest(crowd.x, crowd.course, len(which_faces), len(which_edges), len(node_face), len(edge_edge)),
         total=np.zeros((crowd.n, 3), np.int64), normals=np.zeros((crowd.n, 9)), before=np.zeros((crowd.n, 3)),
+        deepest=np.empty(crowd.n), holder=np.empty(crowd.n, np.int32),
     )  # fmt: skip
-
-
-def resume(parcel: Parcel, here: Crowd, skin: float, nodes: Nodes, comm: Comm) -> Scene:
-    """The scene of candidates that others have kept; all ranks take part. ``here``: every node of this rank."""
-    pairs, sharp, face, edge = (
-        parcel.rows["contact.pairs"], parcel.rows["contact.sharp"], parcel.books["face"], parcel.books["edge"]
-    )  # fmt: skip
-    pairs = take(pairs, np.lexsort((pairs["face"], pairs["node"])))
-    faces = Faces(face["id"], face["ends"], face["size"])
-    edges = Edges(edge["ends"], edge["sides"], edge["size"])
-    ids, at = np.unique(np.concatenate([t["ends"].reshape(-1) for t in (face, edge)]), return_index=True)
-    owners = np.concatenate([t["owners"].reshape(-1) for t in (face, edge)])[at]
-    absent = nodes.places(ids) < 0
-    far = ghosts.fetch(ids[absent], owners[absent].astype(np.int32), here, comm)
-    seen = Sides(faces, edges, merged([here, far]), ids[:0], skin)
-    which = np.searchsorted(face["id"], pairs["face"])
-    node_face = np.column_stack([seen.crowd.places(pairs["node"]), which]).astype(np.int32)
-    found = compact(seen, node_face, np.searchsorted(edge["id"], sharp["edge"]).astype(np.int32), 0, nodes)
-    if "kept" in pairs:
-        found.kept[:] = pairs["kept"]
-    slaves = parcel.books["node"]
-    place = found.crowd.places(slaves["id"])
-    known = found.crowd.id[np.minimum(place, found.crowd.n - 1)] == slaves["id"]
-    found.normals[place[known]] = slaves["normals"][known]
-    return found
 
 
 def _used(n: int, *some: Indices) -> tuple["np.ndarray", Indices]:

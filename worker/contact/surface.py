@@ -6,10 +6,9 @@ import numpy as np
 
 from ..mesh.faces import FACES
 from ..mesh.faces import normals as face_normals
-from ..migration.parcel import Table
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, complete
-from ..state import Flags, Indices, Ints, Model, Nodes
+from ..state import LAID_BARE, Flags, Indices, Ints, Model
 from .records import Edges, Faces
 
 SHARP = np.cos(np.radians(25.0))
@@ -27,69 +26,61 @@ class Surface:
     """Whose face of smaller id is of this rank's tets."""
     flags: Flags
     """(nodes,) which nodes of this rank are on the surface, by a face of any rank; or were, and have lost it."""
+    waiting: Flags
+    """(nodes,) which nodes of this rank are on a crack that may open, by a face of any rank."""
     far: Ints
     """(k,) ids of nodes of ``edges`` that this rank does not hold."""
     far_owner: Indices
     """(k,) their owners."""
 
 
-def build(model: Model, planes: Flags, neighbours: list[Neighbour], comm: Comm, edges: bool) -> Surface:
+def build(
+    model: Model, planes: Flags, neighbours: list[Neighbour], comm: Comm, edges: bool, cracks: Indices
+) -> Surface:
     """The surface; all ranks take part.
 
     ``planes`` (nodes, 3) says which nodes lie on a symmetry plane across an axis: faces in such a plane are no surface.
+    ``cracks`` (m, 3): block, place and face of the sides here of cracks that may open before the next search. Faces that
+    erosion has laid bare meet nodes; their edges meet no edges, for they would be as many as the faces, and all sharp.
     """
-    local, ids = _faces(model, planes)
-    flags = _flags(local, model.nodes.n, neighbours, comm)
-    sharp = _sharp(model, local, ids, neighbours, comm) if edges else _none()
-    return Surface(_table(model, local, ids), sharp[0], flags, *sharp[1:])
+    local, ids, exposed, bare = _faces(model, planes, cracks)
+    flags = _flags(local[exposed], model.nodes.n, neighbours, comm)
+    waiting = _flags(local[~exposed], model.nodes.n, neighbours, comm)
+    sharp = _none()
+    if edges:
+        sharp = _sharp(model, local[~bare], ids[~bare], exposed[~bare], neighbours, comm)
+    return Surface(_table(model, local, ids, exposed), sharp[0], flags, waiting, *sharp[1:])
 
 
-def uncovered(
-    old: Surface, gone: Ints, loose: Flags, removed: Flags, model: Model, planes: Flags,
-    neighbours: list[Neighbour], comm: Comm,
-) -> Surface:  # fmt: skip
-    """The surface after tets have left the blocks; all ranks take part.
-
-    ``gone``: ids of theirs, of this rank and its neighbours; ``loose`` (nodes,) nodes without tets that fly on,
-    ``removed`` those that have left. An edge goes with either of its faces. Of what is laid bare, nodes meet faces; its
-    edges meet no edges: they would be as many as its faces, and all of them sharp.
-    """
-    local, ids = _faces(model, planes)
-    flags = (old.flags | loose | _flags(local, model.nodes.n, neighbours, comm)) & ~removed
-    kept = ~np.asarray(np.isin(old.edges.sides // 4, gone).any(axis=1))
-    return Surface(_table(model, local, ids), old.edges.take(kept), flags, old.far, old.far_owner)
-
-
-def with_edges(found: Surface, edges: Table, nodes: Nodes) -> Surface:
-    """The surface with the edges of a table, ``owners`` of their nodes included."""
-    ends, owners = edges["ends"].reshape(-1), edges["owners"].reshape(-1)
-    elsewhere = nodes.places(ends) < 0
-    far, first = np.unique(ends[elsewhere], return_index=True)
-    return Surface(
-        found.faces, Edges(edges["ends"], edges["sides"], edges["size"]), found.flags, far,
-        owners[elsewhere][first].astype(np.int32),
-    )  # fmt: skip
-
-
-def _table(model: Model, local: "np.ndarray", ids: Ints) -> Faces:
+def _table(model: Model, local: "np.ndarray", ids: Ints, exposed: Flags) -> Faces:
     nodes = model.nodes
-    faces = Faces(ids, nodes.id[local], np.sqrt(np.linalg.norm(face_normals(nodes.x0, local), axis=1)))
-    return faces.take(np.argsort(ids))
+    size = np.sqrt(np.linalg.norm(face_normals(nodes.x0, local), axis=1))
+    return Faces(ids, nodes.id[local], size, exposed).take(np.argsort(ids))
 
 
-def _faces(model: Model, planes: Flags) -> tuple["np.ndarray", Ints]:
-    """(f, 4) local nodes of the exposed faces, the opposite one last, and their ids."""
-    rows, ids = [np.zeros((0, 4), np.int64)], [np.zeros(0, np.int64)]
-    for block in model.blocks:
-        tet, face = np.nonzero(block.exposed())
+def _faces(model: Model, planes: Flags, cracks: Indices) -> tuple["np.ndarray", Ints, Flags, Flags]:
+    """(f, 4) local nodes of the exposed faces and of the ``cracks``, the opposite one last; their ids; which are
+    exposed; and which erosion has laid bare.
+    """
+    rows, ids, exposed, bare = [np.zeros((0, 4), np.int64)], [np.zeros(0, np.int64)], [], []
+    for b, block in enumerate(model.blocks):
+        shown = block.exposed()
+        closed = cracks[cracks[:, 0] == b]
+        seen = shown.copy()
+        seen[closed[:, 1], closed[:, 2]] = True
+        tet, face = np.nonzero(seen)
         corners = block.tets.astype(np.int64)[tet]
         around = corners[np.arange(len(tet))[:, None], FACES[face]]
         rows.append(np.column_stack([around, corners[np.arange(len(tet)), face]]))
         ids.append(4 * block.id[tet] + face)
+        exposed.append(shown[tet, face])
+        bare.append(block.across[tet, face] == LAID_BARE)
     local: np.ndarray = np.concatenate(rows)
-    number = np.concatenate(ids)
     mirrored = planes[local[:, :3]].all(axis=1).any(axis=1)
-    return local[~mirrored], number[~mirrored]
+    none = np.zeros(0, bool)
+    columns = np.concatenate(ids), np.concatenate([none, *exposed]), np.concatenate([none, *bare])
+    number, shown, laid = (column[~mirrored] for column in columns)
+    return local[~mirrored], number, shown, laid
 
 
 def _flags(faces: "np.ndarray", n: int, neighbours: list[Neighbour], comm: Comm) -> Flags:
@@ -101,16 +92,20 @@ def _flags(faces: "np.ndarray", n: int, neighbours: list[Neighbour], comm: Comm)
 
 def _none() -> tuple[Edges, Ints, Indices]:
     none = np.zeros((0, 4), np.int64)
-    return Edges(none, none[:, :2], np.zeros(0)), np.zeros(0, np.int64), np.zeros(0, np.int32)
+    edges = Edges(none, none[:, :2], np.zeros(0), np.zeros((0, 2), bool))
+    return edges, np.zeros(0, np.int64), np.zeros(0, np.int32)
 
 
-_LOW, _HIGH, _THIRD, _OWNER, _FACE, _TURNED, _LENGTH, _NORMAL = 0, 1, 2, 3, 4, 5, 6, 7
+_LOW, _HIGH, _THIRD, _OWNER, _FACE, _TURNED, _EXPOSED, _LENGTH, _NORMAL = 0, 1, 2, 3, 4, 5, 6, 7, 8
 """Columns of a half edge, an edge as one face sees it: its nodes, the third node of the face and its owner, the face,
-whether the face runs from high to low, initial length, m, and the unit normal of the face; floats as their bits."""
+whether the face runs from high to low, whether it is exposed, initial length, m, and the unit normal of the face; floats
+as their bits."""
+_HALF, _ROW = 11, 11
+"""Columns of a half edge, and of an edge (``_paired``)."""
 
 
 def _sharp(
-    model: Model, faces: "np.ndarray", ids: Ints, neighbours: list[Neighbour], comm: Comm
+    model: Model, faces: "np.ndarray", ids: Ints, exposed: Flags, neighbours: list[Neighbour], comm: Comm
 ) -> tuple[Edges, Ints, Indices]:
     """Sharp edges, and the nodes of theirs that are not held here, with their owners.
 
@@ -118,29 +113,29 @@ def _sharp(
     face of smaller id has the edge.
     """
     nodes = model.nodes
-    halves, ends = _halves(model, faces, ids)
+    halves, ends = _halves(model, faces, ids, exposed)
     shared = np.zeros(nodes.n, bool)
     shared[np.concatenate([np.zeros(0, np.int32), *(other.nodes for other in neighbours)])] = True
     common = shared[ends[:, 0]] & shared[ends[:, 1]]
     here, home = _paired(halves[~common]), nodes.owner[ends[:, 0]]
     found = comm.swap({int(rank): halves[common & (home == rank)] for rank in np.unique(home[common])})
-    gathered = np.concatenate([halves[:0], *(f.reshape(-1, 10) for f in found.values())])
-    sender = np.concatenate([np.zeros(0, np.int64), *(np.full(len(f) // 10, r) for r, f in found.items())])
+    gathered = np.concatenate([halves[:0], *(f.reshape(-1, _HALF) for f in found.values())])
+    sender = np.concatenate([np.zeros(0, np.int64), *(np.full(len(f) // _HALF, r) for r, f in found.items())])
     met = _paired(gathered)
     order = np.argsort(gathered[:, _FACE])
     target = sender[order[np.searchsorted(gathered[order, _FACE], met[:, 6:8].min(axis=1))]]
     back = comm.swap({int(rank): met[target == rank] for rank in np.unique(target)})
-    rows = np.concatenate([here, *(f.reshape(-1, 9) for f in back.values())])
-    rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
+    rows = np.concatenate([here, *(f.reshape(-1, _ROW) for f in back.values())])
+    rows = rows[np.lexsort((rows[:, 7], rows[:, 6], rows[:, 1], rows[:, 0]))]
     ends, owners = rows[:, 2:4].reshape(-1), rows[:, 4:6].reshape(-1)
     far, first = np.unique(ends[~np.isin(ends, nodes.id)], return_index=True)
     owner = owners[~np.isin(ends, nodes.id)][first]
-    edges = Edges(rows[:, :4].copy(), rows[:, 6:8].copy(), rows[:, 8].copy().view(np.float64))
+    edges = Edges(rows[:, :4].copy(), rows[:, 6:8].copy(), rows[:, 8].copy().view(np.float64), rows[:, 9:] > 0)
     return edges, far, owner.astype(np.int32)
 
 
-def _halves(model: Model, faces: "np.ndarray", ids: Ints) -> tuple[Ints, Ints]:
-    """(3 f, 10) half edges of the faces, and (3 f, 2) the local nodes of each."""
+def _halves(model: Model, faces: "np.ndarray", ids: Ints, exposed: Flags) -> tuple[Ints, Ints]:
+    """(3 f, 11) half edges of the faces, and (3 f, 2) the local nodes of each."""
     nodes = model.nodes
     normals = face_normals(nodes.x0, faces)
     normals /= np.linalg.norm(normals, axis=1)[:, None]
@@ -152,28 +147,32 @@ def _halves(model: Model, faces: "np.ndarray", ids: Ints) -> tuple[Ints, Ints]:
         ends.append(np.column_stack([low, high]))
         length = np.linalg.norm(nodes.x0[b] - nodes.x0[a], axis=1)
         floats = np.column_stack([length, normals]).view(np.int64)
-        parts.append(np.column_stack([nodes.id[low], nodes.id[high], nodes.id[c], nodes.owner[c], ids, turned, floats]))
+        known = nodes.id[low], nodes.id[high], nodes.id[c], nodes.owner[c], ids, turned, exposed
+        parts.append(np.column_stack([*known, floats]))
     return np.concatenate(parts), np.concatenate(ends)
 
 
 def _paired(halves: Ints) -> Ints:
-    """Rows (a, b, c, d, owner of c, owner of d, face abc, face bad, length) of sharp edges of two faces."""
-    order = np.lexsort((halves[:, _FACE], halves[:, _HIGH], halves[:, _LOW]))
-    low, high = halves[order, _LOW], halves[order, _HIGH]
-    same = (low[1:] == low[:-1]) & (high[1:] == high[:-1])
-    first = np.flatnonzero(same & ~np.r_[False, same[:-1]] & ~np.r_[same[1:], False]) if len(same) else np.zeros(0, int)
-    one, two = halves[order[first]], halves[order[first + 1]]
+    """Rows (a, b, c, d, owner of c, owner of d, face abc, face bad, length, whether either face is exposed) of sharp
+    edges of every two faces that run against each other there, but for the two sides of one facet.
+    """
+    halves = halves[np.lexsort((halves[:, _FACE], halves[:, _HIGH], halves[:, _LOW]))]
+    found, apart = [np.zeros((0, _ROW), np.int64)], 1
+    while True:
+        same = (halves[apart:, [_LOW, _HIGH]] == halves[: len(halves) - apart, [_LOW, _HIGH]]).all(axis=1)
+        first = np.flatnonzero(same)
+        if not len(first):
+            return np.concatenate(found)
+        found.append(_edges_of(halves[first], halves[first + apart]))
+        apart += 1
+
+
+def _edges_of(one: Ints, two: Ints) -> Ints:
+    """See ``_paired``; ``one`` and ``two`` (n, 11): half edges of the same edge, that of the smaller face first."""
     cosine = (one[:, _NORMAL:].copy().view(np.float64) * two[:, _NORMAL:].copy().view(np.float64)).sum(axis=1)
-    kept = (cosine < SHARP) & (one[:, _TURNED] != two[:, _TURNED])
+    kept = (cosine < SHARP) & (one[:, _TURNED] != two[:, _TURNED]) & (one[:, _THIRD] != two[:, _THIRD])
     one, two = one[kept], two[kept]
-    ahead = (one[:, _TURNED] == 0)[:, None]
-    ends = np.where(
-        ahead, np.column_stack([one[:, _THIRD], two[:, _THIRD]]), np.column_stack([two[:, _THIRD], one[:, _THIRD]])
-    )
-    owners = np.where(
-        ahead, np.column_stack([one[:, _OWNER], two[:, _OWNER]]), np.column_stack([two[:, _OWNER], one[:, _OWNER]])
-    )
-    sides = np.where(
-        ahead, np.column_stack([one[:, _FACE], two[:, _FACE]]), np.column_stack([two[:, _FACE], one[:, _FACE]])
-    )
-    return np.column_stack([one[:, :2], ends, owners, sides, one[:, _LENGTH]])
+    turned = (one[:, _TURNED] != 0)[:, None]
+    columns = [np.column_stack([one[:, k], two[:, k]]) for k in (_THIRD, _OWNER, _FACE, _EXPOSED)]
+    ends, owners, sides, exposed = (np.where(turned, pair[:, ::-1], pair) for pair in columns)
+    return np.column_stack([one[:, :2], ends, owners, sides, one[:, _LENGTH], exposed])

@@ -1,0 +1,89 @@
+"""Mean normals of the nodes of the surface: which faces a node may meet (meetings.node_face).
+
+They are taken anew at every ``EVERY``-th step and when erosion has changed the surface; a face that a crack exposes in
+between adds its share to its nodes. So they depend on the steps alone, not on when candidates were searched.
+"""
+
+import numpy as np
+from numba import njit
+
+from ..mesh.faces import FACES
+from ..parallel.comm import Comm
+from ..parallel.ownership import Neighbour, complete
+from ..state import WIDE, Flags, Floats, Indices, Ints, Model
+from .sweeps import SHARES
+
+EVERY = 16
+"""Steps. A fragment that turns at 1e5 rad/s (100 m/s over 1 mm) turns by 3 degrees meanwhile."""
+_NORMAL_TAG = 14
+_NOTHING = 1e-300
+"""m^2: keeps a face of no area from a division by zero."""
+
+
+def moments(model: Model, planes: Flags, size: float, neighbours: list[Neighbour], comm: Comm) -> Ints:
+    """(nodes, 9) sums over the exposed faces of all ranks at each node: area times n, and times n n (xx, yy, zz, yz,
+    zx, xy), in quanta of ``size``^2 / SHARES m^2; all ranks take part. ``planes`` (nodes, 3): see surface.build.
+    """
+    sums = np.zeros((model.nodes.n, 9), np.int64)
+    for block in model.blocks:
+        _add_exposed(sums, model.nodes.x, block.tets, block.across, block.bond, planes, SHARES / size**2)
+    complete(comm, neighbours, sums, _NORMAL_TAG)
+    return sums
+
+
+def means(sums: Ints) -> Floats:
+    """(n, 9) means by area of n and n n; zero where there is no face."""
+    area = sums[:, 3:6].sum(axis=1)
+    return np.asarray(sums / np.where(area > 0, area, 1)[:, None])
+
+
+def shares(x: Floats, faces: Indices, size: float) -> Ints:
+    """(f, 9) what each of the ``faces`` (f, 3) adds to the ``moments`` of its nodes."""
+    out = np.empty((len(faces), 9), np.int64)
+    for f in range(len(faces)):
+        _share(out[f], x, *faces[f], SHARES / size**2)
+    return out
+
+
+@njit("void(int64[::1], float64[:, ::1], int64, int64, int64, float64)", cache=True, error_model="numpy")
+def _share(out, x, a, b, c, scale):  # type: ignore[no-untyped-def]
+    ex, ey, ez = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
+    fx, fy, fz = x[c, 0] - x[a, 0], x[c, 1] - x[a, 1], x[c, 2] - x[a, 2]
+    nx, ny, nz = ey * fz - ez * fy, ez * fx - ex * fz, ex * fy - ey * fx
+    size = max(np.sqrt(nx * nx + ny * ny + nz * nz), _NOTHING)
+    moments = nx, ny, nz, nx * nx / size, ny * ny / size, nz * nz / size, ny * nz / size, nz * nx / size, nx * ny / size
+    for i in range(9):
+        out[i] = np.int64(np.rint(moments[i] * scale))
+
+
+@njit(
+    "void(int64[:, ::1], float64[:, ::1], uint32[:, ::1], int32[:, ::1], uint8[:, ::1], boolean[:, ::1], float64)",
+    cache=True,
+)
+def _add_exposed(sums, x, tets, across, bond, planes, scale):  # type: ignore[no-untyped-def]
+    share = np.empty(9, np.int64)
+    for e in range(len(tets)):
+        for k in range(4):
+            if across[e, k] >= 0 and not (len(bond) > 0 and bond[e, k] == WIDE):
+                continue
+            a, b, c = tets[e, FACES[k, 0]], tets[e, FACES[k, 1]], tets[e, FACES[k, 2]]
+            mirrored = False
+            for i in range(3):
+                mirrored |= planes[a, i] and planes[b, i] and planes[c, i]
+            if mirrored:
+                continue
+            _share(share, x, a, b, c, scale)
+            for i in range(9):
+                sums[a, i] += share[i]
+                sums[b, i] += share[i]
+                sums[c, i] += share[i]
+
+
+@njit("void(int64[:, ::1], int64[:, ::1], int32[:, ::1])", cache=True)
+def add(sums, some, faces):  # type: ignore[no-untyped-def]
+    """Adds ``some`` shares (f, 9) to the sums of the nodes of ``faces`` (f, 3); -1 for nodes that are not here."""
+    for f in range(len(faces)):
+        for m in range(3):
+            if faces[f, m] >= 0:
+                for i in range(9):
+                    sums[faces[f, m], i] += some[f, i]
