@@ -206,10 +206,11 @@ class Erosion(Boundary):
         self._leaving, self.removed = np.flatnonzero(leaving), self.removed | leaving
         self._before = state.v[self._leaving]
         if self._contact is not None:
-            self._contact.uncover(self._lay_bare(np.concatenate(gone)), alone & ~self.removed, self.removed)
+            self._lay_bare(np.concatenate(gone))
+            self._contact.uncover(alone & ~self.removed, self.removed)
 
-    def _lay_bare(self, gone: Ints) -> Ints:
-        """Exposes the faces behind tets ``gone`` (k, 5: id, faces across); ids of these and the neighbours'."""
+    def _lay_bare(self, gone: Ints) -> None:
+        """Exposes the faces behind tets ``gone`` (k, 5: id, faces across) of this rank and its neighbours."""
         told = self._comm.swap({other.rank: gone for other in self._neighbours})
         every = np.concatenate([gone, *(words.reshape(-1, 5) for words in told.values())])
         for block in self._model.blocks:
@@ -217,7 +218,6 @@ class Erosion(Boundary):
             rows = block.across[beside]
             rows[np.isin(rows // 4, every[:, 0])] = LAID_BARE
             block.across[beside] = rows
-        return every[:, 0]
 
     def _completed(self, tets: list[Ints]) -> Ints:
         """(nodes,) how many of these tets of all ranks have each node; all ranks take part."""

@@ -84,6 +84,10 @@ class Fields:
     """Rank 0 wants the loads of all ranks."""
     groups = Flag()
     """Rank 0 wants the loads of groups besides."""
+    approach = Real()
+    """Largest one-over-step in which a node passes half of a tet that it meets, 1/s."""
+    opening = Flag()
+    """A crack has become so wide that its sides are surface from now on."""
     search = Flag()
     """The surface of a rank has used up the last search for contact."""
     worn = Number()

@@ -58,7 +58,8 @@ def second_half(sim: Simulation) -> None:
         move(nodes.x, nodes.v, clock.dt)  # 5: x(n+1) = x(n) + dt v(n+1/2)
         clock.advance()
         if sim.contact is not None:
-            sim.reduction.own.search = sim.contact.spent(nodes)
+            own = sim.reduction.own
+            own.search, own.approach, own.opening = sim.contact.spent(nodes), sim.contact.approach, sim.contact.opening
     _elements(sim, clock.dt)  # 6 to 8
     if sim.fracture is not None:
         with sim.timers.phase("fracture"):
@@ -82,7 +83,7 @@ def _elements(sim: Simulation, dt: float) -> None:
     if not (math.isfinite(reduction.limit) and math.isfinite(reduction.force)):
         raise PhysicsError(f"{_when(sim)}: {sim.limiting_tet()} turned inside out, or its stress is not a number")
     if sim.contact is not None:
-        sim.contact.due |= reduction.search
+        sim.contact.agree(reduction.search, reduction.approach, reduction.opening)
     if sim.erosion is not None:
         sim.erosion.decide(reduction.worn)
     if fixed_point.outgrown(reduction.force, sim.scale):

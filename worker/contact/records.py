@@ -52,8 +52,8 @@ class Faces(Rows):
 
 @dataclass
 class Edges(Rows):
-    """Sharp edges; a row (a, b, c, d): edge ab between face abc and face bad, a < b. Where more than two faces meet in
-    an edge, every two of them that may enclose a body make a row.
+    """Sharp edges; a row (a, b, c, d): edge ab between face abc and face bad, that of the smaller id first. Where
+    more than two faces meet in an edge, every two of them that may enclose a body make a row.
     """
 
     nodes: Ints

@@ -58,18 +58,21 @@ class Waiting:
     """(p,) m; minus infinity when it is not known, NaN for a pair that is too close to rest until the next search."""
     speed: Floats
     """(p,) U, m/s."""
+    turned: Flags
+    """(p,) whether a pair rests because its node does not face the face, by the mean normals of the node."""
     some: Indices
     """(p,) room for those that are awake."""
 
     @classmethod
     def of(cls, n: int) -> "Waiting":
         """All awake."""
-        return cls(np.full(n, -np.inf), np.zeros(n), np.empty(n, np.int32))
+        return cls(np.full(n, -np.inf), np.zeros(n), np.zeros(n, bool), np.empty(n, np.int32))
 
     def grow(self, n: int) -> None:
         """Takes up more pairs, awake."""
         self.until = extended(self.until, np.full(n, -np.inf))
-        self.speed, self.some = extended(self.speed, np.zeros(n)), np.empty(len(self.until), np.int32)
+        self.speed, self.turned = extended(self.speed, np.zeros(n)), extended(self.turned, np.zeros(n, bool))
+        self.some = np.empty(len(self.until), np.int32)
 
 
 class Rest:
@@ -84,7 +87,8 @@ class Rest:
         """(f,) which have new corners."""
         self.edges: Flags = np.zeros(edges, bool)
         """(e,) the same."""
-        self._none: Flags = np.zeros(len(x), bool)
+        self.nodes: Flags = np.zeros(len(x), bool)
+        """(crowd,) whose mean normals have changed."""
         self._dt, self._t = 0.0, 0.0
         self.fresh = True
         """Whether no step has been made since the search."""
@@ -95,7 +99,7 @@ class Rest:
         """Takes up more nodes, as they are, (n, 3) each."""
         self._x, self._v = extended(self._x, x), extended(self._v, v)
         self._nodes.grow(len(x))
-        self._none = np.zeros(len(self._x), bool)
+        self.nodes = extended(self.nodes, np.zeros(len(x), bool))
 
     def add_candidates(self, n: int) -> None:
         """Takes up more candidates of nodes and faces."""
@@ -104,6 +108,10 @@ class Rest:
     def add_edges(self, n: int) -> None:
         """Takes up more candidates of edges and edges."""
         self._edge_edge.grow(n)
+
+    def turn(self) -> None:
+        """All mean normals have changed."""
+        self._node_face.until[self._node_face.turned] = -np.inf
 
     def move(self, x: Floats, v: Floats, faces: Indices, edges: Indices, dt: float) -> None:
         """A step ``dt`` from the positions ``x`` on, with velocities ``v`` before contact."""
@@ -119,13 +127,13 @@ class Rest:
         nodes, faces, edges = self._nodes, self._faces, self._edges
         first = _awake(
             self._node_face.some, node_face, self._node_face.until, self._node_face.speed, nodes.path, nodes.reach,
-            faces.path, faces.reach, self._none, self.faces, end,
+            faces.path, faces.reach, self.nodes, self.faces, end,
         )  # fmt: skip
         second = _awake(
             self._edge_edge.some, edge_edge, self._edge_edge.until, self._edge_edge.speed, edges.path, edges.reach,
             edges.path, edges.reach, self.edges, self.edges, end,
         )  # fmt: skip
-        self.faces[:], self.edges[:] = False, False
+        self.nodes[:], self.faces[:], self.edges[:] = False, False, False
         self.looked = self._node_face.some[:first], self._edge_edge.some[:second]
         return self.looked
 
@@ -139,7 +147,7 @@ class Rest:
         """
         end, wait, trail, nodes = self._t + self._dt, self._node_face, self._faces, self._nodes
         _settle_nodes(
-            wait.until, wait.speed, pairs, node_face, faces, size, normals, x, self._v, part, nodes.path, nodes.reach,
+            wait.until, wait.speed, wait.turned, pairs, node_face, faces, size, normals, x, self._v, part, nodes.path, nodes.reach,
             trail.path, trail.reach, end,
         )  # fmt: skip
         wait, trail = self._edge_edge, self._edges
@@ -211,11 +219,12 @@ def _bent(out, x, s, i, j, k, m):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    f"void({_V1}, {_V1}, {_N1}, {_N2}, {_N2}, {_V1}, {_V2}, {_V2}, {_V2}, {_N1}, {_V1}, {_V1}, {_V1}, {_V1}, float64)",
+    f"void({_V1}, {_V1}, boolean[::1], {_N1}, {_N2}, {_N2}, {_V1}, {_V2}, {_V2}, {_V2}, {_N1}, {_V1}, {_V1}, {_V1}, "
+    f"{_V1}, float64)",
     cache=True,
     error_model="numpy",
 )
-def _settle_nodes(until, speed, some, pairs, faces, size, out, x, v_then, part, path1, reach1, path2, reach2, end):  # type: ignore[no-untyped-def]
+def _settle_nodes(until, speed, turned, some, pairs, faces, size, out, x, v_then, part, path1, reach1, path2, reach2, end):  # type: ignore[no-untyped-def]
     b, m = np.empty(3), np.empty(3)
     for p in some:
         if np.isnan(until[p]):
@@ -228,7 +237,8 @@ def _settle_nodes(until, speed, some, pairs, faces, size, out, x, v_then, part, 
         speed[p] = max(_between(v_then, s, i), _between(v_then, s, j), _between(v_then, s, k))
         deep = _ROUND + max(DEEP_SELF if part[s] == part[i] else DEEP, NEAR)
         slack = apart - deep * size[f]
-        if not slack > 0.0:
+        turned[p] = not slack > 0.0
+        if turned[p]:
             slack = _bent(out, x, s, i, j, k, m)
             speed[p] = max(_between(v_then, i, j), _between(v_then, i, k))
         until[p] = slack + path1[s] - reach1[s] + path2[f] - reach2[f] + speed[p] * end if slack > 0.0 else np.nan

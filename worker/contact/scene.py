@@ -171,11 +171,6 @@ class Scene:
         self.shared_shares = SharedSum(comm, company, 4, _SHARE_TAG)
         self.shared_impulse = SharedSum(comm, company, 3, _PUSH_TAG)
 
-    def approach(self) -> float:
-        """Largest relative speed of a candidate node over the altitude of its candidate face's tet, 1/s."""
-        crowd = self.crowd
-        return float(_approach(crowd.x, crowd.v, self.faces, self.node_face))
-
     def remember(self, keys: Ints, kept: Floats, nodes: Nodes, comm: Comm) -> None:
         """Takes over what candidates of another search, with their ``keys``, have ``kept``; all ranks take part.
 
@@ -203,12 +198,19 @@ class Scene:
         self.shared_impulse.free()
 
 
-@njit("float64(float64[:, ::1], float64[:, ::1], int32[:, ::1], int32[:, ::1])", cache=True, error_model="numpy")
-def _approach(x, v, faces, pairs):  # type: ignore[no-untyped-def]
-    """``faces`` (f, 4), the node opposite last; ``pairs`` (p, 2) node and face."""
+@njit(
+    "float64(float64[:, ::1], float64[:, ::1], int32[:, ::1], int32[:, ::1], int32[::1])",
+    cache=True,
+    error_model="numpy",
+)
+def approach(x, v, faces, pairs, some):  # type: ignore[no-untyped-def]
+    """Largest relative speed of a node over the altitude of its face's tet, 1/s, of ``some`` of the ``pairs`` (p, 2).
+
+    ``faces`` (f, 4), the node opposite last.
+    """
     e, f, r = np.empty(3), np.empty(3), np.empty(3)
     most = 0.0
-    for p in range(len(pairs)):
+    for p in some:
         s, face = pairs[p, 0], pairs[p, 1]
         a, b, c, d = faces[face, 0], faces[face, 1], faces[face, 2], faces[face, 3]
         fastest = 0.0

@@ -24,10 +24,10 @@ from ..parallel.ownership import Neighbour
 from ..state import Flags, Floats, Indices, Ints, Model, Nodes, extended
 from ..timers import Timers
 from ..topology import Split
-from . import held, meetings, pairing, scene, surface, sweeps
+from . import held, meetings, normals, pairing, scene, surface, sweeps
 from .course import courses
 from .cracks import Cracks, across
-from .flight import Flight
+from .flight import Flight, typical
 from .follower import Follower, news
 from .scene import Rules, Scene
 
@@ -39,7 +39,9 @@ meeting; fitted to the CPU times of the shattering bar on 16 ranks and of the er
 """
 _KINEMATIC = 2.0
 """One over the share of a tet's altitude that anything may pass in a step."""
-
+_WORDS = 27
+"""Of the row of a crack that opens (Contact._opened)."""
+_NO_SIDES = np.zeros((0, 3), np.int32)
 
 Parted = tuple[Indices, Indices]
 """Which meetings have nodes that another rank shares, and which have none."""
@@ -59,11 +61,16 @@ class Contact(Boundary):
         self._model, self._neighbours, self._comm = model, neighbours, comm
         self._clock, self._timers = clock, timers
         self._mobility, self._planes = _mobility(model.nodes, bounds)
-        self._edges = case.contact.edges
-        self._surface = surface.build(model, self._planes, neighbours, comm, self._edges)
+        self._edges, self._skin = case.contact.edges, case.contact.skin
+        self._cracks, self._size = Cracks.none(), 0.0
+        self._surface = self._build(np.zeros(model.nodes.n, bool))
         self._mu = pairing.friction(case)
-        self._flight = Flight(self._surface, model.nodes, self._mobility, case.contact.skin, neighbours, comm)
-        self._rules = Rules(case.contact.domain, ~np.isnan(self._mu), 2.0 * self._flight.size)
+        self._size = typical(self._surface.faces.size, comm)
+        """Of the faces of all ranks at the start, m."""
+        self._flight = Flight(self._surface, model.nodes, self._mobility, self._skin, self._size, comm)
+        breaking = np.array([part.fracture is not None for part in case.parts])
+        self._rules = Rules(case.contact.domain, ~np.isnan(self._mu), 2.0 * self._size, breaking)
+        self._moments = np.zeros((model.nodes.n, 9), np.int64)
         largest, fastest = extremes
         self._scale = fixed_point.scale_for(largest * fastest)
         self._friction = fixed_point.Tally(np.array([largest * fastest * fastest]))
@@ -72,60 +79,58 @@ class Contact(Boundary):
         self.due = True
         """Whether the next step begins with a search."""
         self.limit = 0.0
-        """One over the step in which no node passes more than half of a tet that it may meet, 1/s."""
+        """One over the step in which no node passes more than half of a tet that it meets, 1/s; as all ranks have agreed."""
+        self.approach = 0.0
+        """The same of the last step of this rank."""
         self._changed = False
         """Whether the surface is another one than that of the last search."""
-        self._fractures = case.fractures
         self._stale = False
         """Whether nodes have separated since the surface was made."""
-        self._cracks = Cracks.none()
-        self._apart = False
-        """Whether some crack is wide enough for a search."""
+        self._fractures = case.fractures
+        self._opening: Indices = np.zeros(0, np.int32)
+        """Cracks of the scene that have become wide in the last step."""
+        self._total: Ints = np.zeros((0, 3), np.int64)
+        """(nodes, 3) impulses of the last step, quanta, of a run that goes on here; (0, 3) once they are booked."""
         self.searches = 0
         self._last = -math.inf
         """Step of the last search."""
         self._rubs = bool(np.nanmax(self._mu, initial=0.0) > 0.0)
         self._mean_dt = 0.0
         """Of the last step with a scene, s."""
+        self._kept: tuple[Ints, Floats] = np.zeros((0, 2), np.int64), np.zeros((0, 4))
+        """Candidates with friction, and what they have kept, that the next search takes over from elsewhere."""
 
     def keep(self, parcel: Parcel, name: str) -> None:
+        """All but what was found of candidates: a search finds it again."""
         super().keep(parcel, name)
-        parcel.known["contact"] = (
-            self._scale, self._friction.scale, self.due, self.limit, self._stale, self.searches, self._last,
-            self._mean_dt, self._scene is not None,
-        )  # fmt: skip
+        parcel.known["contact"] = self._scale, self._friction.scale, self.limit, self.searches, self._mean_dt, self._size
         parcel.sums["contact.parts"], parcel.sums["contact.friction"] = self._parts, self._friction.words
-        self._flight.keep(parcel)
-        edges = self._surface.edges if not self._stale else self._surface.edges.take(np.zeros(0, np.int64))
-        parcel.rows["contact.edges"] = {
-            "tet": edges.sides.min(axis=1, initial=np.iinfo(np.int64).max) // 4, "ends": edges.nodes,
-            "sides": edges.sides, "size": edges.size,
-        }  # fmt: skip
-        parcel.rows["contact.cracks"] = self._cracks.keep(self._model.blocks, parcel.nodes["id"])
+        parcel.rows["contact.cracks"] = self._cracks.keep(parcel.nodes["id"])
+        parcel.nodes["contact.flags"], parcel.nodes["contact.moments"] = self._surface.flags, self._moments
         total = np.zeros((self._model.nodes.n, 3), np.int64)
-        if self._scene is not None:
-            total[self._scene.local] = self._scene.total[self._scene.held]
-            self._scene.keep(parcel, self._rubs)
+        keys, kept = self._kept
+        if (now := self._scene) is not None:
+            total[now.local] = now.total[now.held]
+            some = now.kept.any(axis=1)
+            keys, kept = now.keys[some], now.kept[some]
         parcel.nodes["contact.total"] = total
+        parcel.rows["contact.kept"] = {"node": keys[:, 0], "face": keys[:, 1], "kept": kept}
 
     def resume(self, parcel: Parcel, name: str, dt: float) -> None:
         super().resume(parcel, name, dt)
-        (
-            self._scale, self._friction.scale, self.due, self.limit, self._stale, self.searches, self._last,
-            self._mean_dt, searched,
-        ) = parcel.known["contact"]  # fmt: skip
+        self._scale, self._friction.scale, self.limit, self.searches, self._mean_dt, self._size = (
+            parcel.known["contact"]
+        )
         self._parts, self._friction.words = parcel.sums["contact.parts"], parcel.sums["contact.friction"]
+        self._surface.flags, self._moments = parcel.nodes["contact.flags"], parcel.nodes["contact.moments"]
         state = self._model.nodes
-        self._surface.flags = parcel.nodes["flight.flags"]
-        self._surface = surface.with_edges(self._surface, parcel.rows["contact.edges"], state)
-        self._flight.resume(self._surface, state, self._mobility, parcel)
-        self._rules = replace(self._rules, cell=2.0 * self._flight.size)
+        self._flight = Flight(self._surface, state, self._mobility, self._skin, self._size, self._comm)
+        self._rules = replace(self._rules, cell=2.0 * self._size)
         self._cracks = Cracks.resume(parcel.rows["contact.cracks"], self._model.blocks, state)
-        if searched:
-            here = self._flight.here(state)
-            self._scene = scene.resume(parcel, here, self._flight.sides.skin, state, self._comm)
-            self._connect(self._scene, state)
-            self._scene.total[self._scene.held] = parcel.nodes["contact.total"][self._scene.local]
+        kept = parcel.rows["contact.kept"]
+        self._kept = np.column_stack([kept["node"], kept["face"]]), kept["kept"]
+        self._total = parcel.nodes["contact.total"]
+        self._stale = self._fractures
 
     def require_faces(self) -> None:
         """Raises InputError, on every rank alike, when a part that may meet has no face to meet with."""
@@ -172,31 +177,100 @@ class Contact(Boundary):
         """(parts, 3) what contact has given each part so far, N s; all ranks take part."""
         return np.asarray(self._comm.sum(self._parts) / self._scale)
 
-    def uncover(self, gone: Ints, loose: Flags, removed: Flags) -> None:
-        """The surface after tets have left; see surface.uncovered. All ranks take part."""
+    def _build(self, flags: Flags) -> surface.Surface:
+        """The surface, with sides of cracks that may open; nodes that have been on it, ``flags`` (n,), still are. All
+        ranks take part.
+        """
+        sides = self._cracks.foresee(self._model.nodes.x, self._size) if len(self._cracks.faces) else _NO_SIDES
+        found = surface.build(self._model, self._planes, self._neighbours, self._comm, self._edges, sides)
+        found.flags[: len(flags)] |= flags
+        return found
+
+    def uncover(self, loose: Flags, removed: Flags) -> None:
+        """The surface after tets have left; ``loose`` (nodes,): nodes without tets that fly on, ``removed``: those that
+        have left. All ranks take part.
+        """
         with self._timers.phase("contact"):
-            self._surface = surface.uncovered(
-                self._surface, gone, loose, removed, self._model, self._planes, self._neighbours, self._comm
-            )
+            self._surface = self._build(self._surface.flags | loose)
+            self._surface.flags &= ~removed
+            self._look_round()
             self.due = self._changed = True
+            self._stale = False
 
     def crack(self, tets: Ints, nodes: Indices, sides: Indices) -> None:
         """Takes up broken facets that have a side here, with the local ``nodes`` (m, 3) that the sides have in common;
         see ``Cracks`` for ``tets`` and ``sides``.
         """
-        self._cracks.add(tets, nodes, sides)
+        self._cracks.add(tets, nodes, sides, self._model.blocks)
+
+    def agree(self, search: bool, approach: float, opening: bool) -> None:
+        """Takes what all ranks have found in the step; all ranks take part."""
+        self.due |= search
+        self.limit = approach
+        if opening:
+            self.open_cracks()
+
+    @property
+    def opening(self) -> bool:
+        """Whether a crack has become so wide in the last step that it opens."""
+        return len(self._opening) > 0
+
+    def open_cracks(self) -> None:
+        """Makes surface of the cracks that have become wide; all ranks take part."""
+        with self._timers.phase("contact"):
+            told = self._comm.join(self._opened()).reshape(-1, _WORDS)
+            self._opening = self._opening[:0]
+            nodes, sides = self._model.nodes, told[:, 3:9].reshape(-1, 3)
+            local = nodes.places(sides)
+            normals.add(self._moments, told[:, 9:].reshape(-1, 9), local)
+            local = np.unique(local[local >= 0])
+            self._surface.flags[local] = True
+            faces = np.sort(told[:, 1:3].reshape(-1))
+            self._cracks.open(faces, self._model.blocks)
+            self.due |= bool((told[:, 0] == 0).any())
+            self._stale = True
+            if self._scene is not None:
+                self._scene.expose(faces)
+                self._scene.rest.nodes[self._face(self._scene, local)] = True
+                Follower(self._scene, self._flight.here(nodes), nodes).cracks(self._cracks)
+
+    def _opened(self) -> Ints:
+        """(k, 27) cracks that open here: whether the last search has taken them up; ids of both sides; of the nodes of
+        either, outward; and what each side adds to the moments of its nodes.
+        """
+        if self._scene is None or not self.opening:
+            return np.zeros((0, _WORDS), np.int64)
+        nodes, rows = self._model.nodes, self._scene.crack_rows[self._opening]
+        sides = self._cracks.nodes[rows][:, [0, 1, 2, 3, 5, 4]]
+        shares = normals.shares(nodes.x, sides.reshape(-1, 3), self._size).reshape(-1, 18)
+        return np.column_stack([self._cracks.foreseen[rows], self._cracks.faces[rows], nodes.id[sides], shares])
+
+    def _face(self, now: Scene, local: "np.ndarray") -> "np.ndarray":
+        """Gives the scene the mean normals of some nodes of this rank, and whether they are on the surface; returns
+        their places.
+        """
+        place = now.place[local]
+        local, place = local[place >= 0], place[place >= 0]
+        now.normals[place] = normals.means(self._moments[local])
+        now.on_surface[place] = self._surface.flags[local]
+        return place
+
+    def _look_round(self) -> None:
+        """Mean normals of all nodes anew; all ranks take part."""
+        self._moments = normals.moments(self._model, self._planes, self._size, self._neighbours, self._comm)
 
     def separate(self, split: Split) -> None:
         """Follows nodes as they separate; all ranks take part."""
         state = self._model.nodes
         self._stale = True
         if split.copies.n:
+            parents = split.copies.parents
             self._cracks.follow(split, state.id)
+            self._flight.grow(parents)
+            self._flight.mobility = self._mobility
+            self._moments = extended(self._moments, self._moments[parents])
         if self._scene is None:
             return
-        if split.copies.n:
-            self._flight.grow(split.copies.parents)
-            self._flight.mobility = self._mobility
         here = self._flight.here(state)
         heard = news(split, self._scene, here, self._comm)
         if heard is None:
@@ -206,15 +280,10 @@ class Contact(Boundary):
         if self._comm.size > 1:
             follower.share(heard, self._neighbours, self._comm)
 
-    def _expose(self, state: Nodes) -> None:
-        """The surface anew, with the cracks that are wide; all ranks take part."""
-        released = self._cracks.release(self._model.blocks, state.x, self._flight.size)
-        if not int(self._comm.sum(np.array([released]))[0]) and not self._stale:
-            return
-        old = self._surface.flags
-        self._surface = surface.build(self._model, self._planes, self._neighbours, self._comm, self._edges)
-        self._surface.flags[: len(old)] |= old
-        self._stale, self._changed = False, True
+    def _expose(self) -> None:
+        """The surface anew, with the cracks that may open; all ranks take part."""
+        if self._stale or len(self._cracks.faces):
+            self._surface, self._stale, self._changed = self._build(self._surface.flags), False, True
 
     def _inherit(self, at: Ints, copies: Indices) -> None:
         super()._inherit(at, copies)
@@ -230,8 +299,16 @@ class Contact(Boundary):
                 self._look(self._scene, state)
                 self._book(self._scene)
                 self._scene.total[:] = 0
-            if (self.due or self._scene is None) and self._clock.dt > 0.0:
-                self._search(state)
+            elif len(self._total):
+                self._book_resumed(state)
+            if self._clock.dt > 0.0:
+                if self._clock.step % normals.EVERY == 0:
+                    self._look_round()
+                    if self._scene is not None:
+                        self._face(self._scene, self._scene.local)
+                        self._scene.rest.turn()
+                if self.due or self._scene is None:
+                    self._search(state)
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
         if dt > 0.0 and self._scene is not None:
@@ -252,8 +329,9 @@ class Contact(Boundary):
         clock, flight, old = self._clock, self._flight, self._scene
         if old is not None:
             old.free()
+            self._kept = old.keys, old.kept
         if self._fractures:
-            self._expose(state)
+            self._expose()
         flight.begin(state, self._courses(state), clock.t)
         if self._changed:
             flight.follow(self._surface, state, self._mobility)
@@ -262,15 +340,14 @@ class Contact(Boundary):
             flight.refresh(state)
         steps, drift = flight.foresight(clock.dt)
         horizon = max(min(steps, 2.0 * (clock.step - self._last)), _SHORTEST) * clock.dt
-        self._scene = scene.build(flight.sides, self._rules, horizon, drift, state, self._comm)
-        self.limit = _KINEMATIC * float(self._comm.maximum(np.array([self._scene.approach()]))[0])
-        self._connect(self._scene, state)
-        if old is not None and self._rubs:
-            self._scene.remember(old, state, self._comm)
-        self._look(self._scene, state)
-        self._scene.normals[self._scene.held] = flight.normals(state)[self._scene.local]
+        now = self._scene = scene.build(flight.sides, self._rules, horizon, drift, state, self._comm)
+        self._connect(now, state)
+        if self._rubs:
+            now.remember(*self._kept, state, self._comm)
+        self._look(now, state)
+        self._face(now, now.local)
         flight.until = clock.t + horizon
-        self.due, self._apart, self._last = False, False, clock.step
+        self.due, self._last = False, clock.step
         self.searches += 1
 
     def _courses(self, state: Nodes) -> Floats:
@@ -289,7 +366,7 @@ class Contact(Boundary):
     def spent(self, state: Nodes) -> bool:
         """Whether a node of the surface will leave, in a step more, what the last search has allowed for."""
         with self._timers.phase("contact"):
-            return self._apart or self._flight.spent(state, self._clock.t, self._clock.dt)
+            return self._flight.spent(state, self._clock.t, self._clock.dt)
 
     def _push(self, now: Scene, state: Nodes, dt: float, t: float) -> None:
         crowd, room = now.crowd, now.room
@@ -348,11 +425,16 @@ class Contact(Boundary):
             rest.settle(pairs, edges, now.node_face, now.edge_edge, *surfaces, crowd.x, crowd.part)
         rest.move(crowd.x, crowd.v, now.faces, now.edges, dt)
         pairs, edges = rest.awake(now.node_face, now.edge_edge)
-        n = meetings.node_face(*out, 0, now.faces, now.face_size, now.normals, now.node_face, pairs, *found)
-        n = meetings.edge_edge(*out, n, now.edges, now.edge_size, now.edge_edge, edges, *found)
+        n = meetings.node_face(
+            *out, 0, now.faces, now.face_size, now.face_id, now.face_exposed, now.normals, now.on_surface, now.first,
+            now.next, now.deepest, now.holder, now.node_face, pairs, *found,
+        )  # fmt: skip
+        self.approach = _KINEMATIC * scene.approach(crowd.x, crowd.v, now.faces, now.node_face, room.pair[:n])
+        n = meetings.edge_edge(*out, n, now.edges, now.edge_size, now.edge_exposed, now.edge_edge, edges, *found)
         rest.settle(pairs, edges, now.node_face, now.edge_edge, *surfaces, crowd.x + dt * crowd.v, crowd.part)
-        n, apart = across(*out, n, now.cracks, self._flight.size, *found)
-        self._apart |= bool(apart)
+        opening = np.empty(len(now.cracks), np.int64)
+        n, wide = across(*out, n, opening, now.cracks, self._size, *found)
+        self._opening = opening[:wide]
         return int(n)
 
     def _weigh(self, now: Scene, n: int, rows: Parted) -> None:
@@ -363,6 +445,14 @@ class Contact(Boundary):
         sweeps.add_shares(now.shares, room.nodes, room.weights, room.normals, inner)
         now.shared_shares.finish(now.shares)
         sweeps.mobilities(now.diagonal, room.nodes, room.weights, room.normals, now.shares, now.crowd.mobility, n)
+
+    def _book_resumed(self, state: Nodes) -> None:
+        """The second half of the work of impulses from before a run went on here."""
+        local = np.flatnonzero(self._total.any(axis=1)).astype(np.int32)
+        held.book(
+            self.contact_loss, self.external_work, local, local, state.v, self._total, self._mobility, self._scale
+        )  # fmt: skip
+        self._total = self._total[:0]
 
     def _book(self, now: Scene) -> None:
         """Half of the work of the last impulses, with the velocities in ``before``."""

@@ -123,10 +123,10 @@ def _sharp(
     sender = np.concatenate([np.zeros(0, np.int64), *(np.full(len(f) // _HALF, r) for r, f in found.items())])
     met = _paired(gathered)
     order = np.argsort(gathered[:, _FACE])
-    target = sender[order[np.searchsorted(gathered[order, _FACE], met[:, 6:8].min(axis=1))]]
+    target = sender[order[np.searchsorted(gathered[order, _FACE], met[:, 6])]]
     back = comm.swap({int(rank): met[target == rank] for rank in np.unique(target)})
     rows = np.concatenate([here, *(f.reshape(-1, _ROW) for f in back.values())])
-    rows = rows[np.lexsort((rows[:, 7], rows[:, 6], rows[:, 1], rows[:, 0]))]
+    rows = rows[np.lexsort((rows[:, 1], rows[:, 0], rows[:, 7], rows[:, 6]))]
     ends, owners = rows[:, 2:4].reshape(-1), rows[:, 4:6].reshape(-1)
     far, first = np.unique(ends[~np.isin(ends, nodes.id)], return_index=True)
     owner = owners[~np.isin(ends, nodes.id)][first]
@@ -172,7 +172,7 @@ def _edges_of(one: Ints, two: Ints) -> Ints:
     cosine = (one[:, _NORMAL:].copy().view(np.float64) * two[:, _NORMAL:].copy().view(np.float64)).sum(axis=1)
     kept = (cosine < SHARP) & (one[:, _TURNED] != two[:, _TURNED]) & (one[:, _THIRD] != two[:, _THIRD])
     one, two = one[kept], two[kept]
-    turned = (one[:, _TURNED] != 0)[:, None]
-    columns = [np.column_stack([one[:, k], two[:, k]]) for k in (_THIRD, _OWNER, _FACE, _EXPOSED)]
-    ends, owners, sides, exposed = (np.where(turned, pair[:, ::-1], pair) for pair in columns)
-    return np.column_stack([one[:, :2], ends, owners, sides, one[:, _LENGTH], exposed])
+    ends = np.where((one[:, _TURNED] != 0)[:, None], one[:, [_HIGH, _LOW]], one[:, [_LOW, _HIGH]])
+    others = (np.column_stack([one[:, k], two[:, k]]) for k in (_THIRD, _OWNER, _FACE))
+    exposed = np.column_stack([one[:, _EXPOSED], two[:, _EXPOSED]])
+    return np.column_stack([ends, *others, one[:, _LENGTH], exposed])
