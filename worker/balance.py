@@ -93,7 +93,7 @@ class Balance:
 
     def cause(self, sim: Simulation) -> str | None:
         """Why to cut now, if so; the same on all ranks."""
-        return self.trigger.cause(sim.clock.step, sim.vote.grown) if self.comm.size > 1 else None
+        return self.trigger.cause(sim.clock.step, sim.reduction.grown) if self.comm.size > 1 else None
 
     def move(self, sim: Simulation) -> tuple[Simulation, dict[str, Any]]:
         """Cuts by the costs and moves what has to; the new simulation and what to tell. All ranks take part."""

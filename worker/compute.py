@@ -83,7 +83,7 @@ def _resumed(case: Case, folder: Path, comm: Comm) -> tuple[Simulation, Start]:
     place, manifest = found
     parcel = checkpoint.read(place, manifest, comm)
     sim = simulation.resume(case, route(parcel, case.run.cut_scale, comm), comm, Timers(comm))
-    sim.vote.begin_again()
+    sim.reduction.begin_again()
     log.info("goes on from %s, step %d, t %.6g s", place.name, sim.clock.step, sim.clock.t)
     return sim, replace(Start(**parcel.known["start"]), resumed=True)
 

@@ -24,7 +24,7 @@ from .simulation import Simulation
 from .state import Floats
 
 CANCELLED, WALL_TIME, MAX_STEPS = 1, 2, 3
-"""Reasons to stop early, in the vote of the ranks: the largest wins."""
+"""Reasons to stop early, in the reduction of the step: the largest wins."""
 STOPS = {
     CANCELLED: (State.CANCELLED, Cause.CANCELLED, "stopped by a signal"),
     WALL_TIME: (State.TIMED_OUT, Cause.WALLTIME, "run.max_wall_time is used up"),
@@ -106,15 +106,15 @@ class Loop:
             step.prepare(self.sim)
         self._record()
         while True:
-            if self.sim.vote.report:
+            if self.sim.reduction.report:
                 self._report()
             self._move()
             self._checkpoint()
             self._propose()
             sim = self.sim
             self._first_half()
-            if sim.clock.done or sim.vote.stop:
-                self.stopped = 0 if sim.clock.done else sim.vote.stop
+            if sim.clock.done or sim.reduction.stop:
+                self.stopped = 0 if sim.clock.done else sim.reduction.stop
                 if self.stopped:
                     self._tell(messages.Status, state=State.STOPPING, message=STOPS[self.stopped][2])
                 self._report()
@@ -124,7 +124,7 @@ class Loop:
 
     def _first_half(self) -> None:
         sim, clock = self.sim, self.sim.clock
-        ending = clock.done or bool(sim.vote.stop)
+        ending = clock.done or bool(sim.reduction.stop)
         sampling = ending or clock.t >= self._sample * sim.case.run.end_time / sim.case.run.samples
         before = sim.model.nodes.v.copy() if sampling else None
         step.first_half(sim)
@@ -145,8 +145,8 @@ class Loop:
 
     def _checkpoint(self) -> None:
         """The complete state to disk, when that is due."""
-        sim, stop = self.sim, self.sim.vote.stop
-        if not sim.vote.checkpoint and stop not in _KEPT:
+        sim, stop = self.sim, self.sim.reduction.stop
+        if not sim.reduction.checkpoint and stop not in _KEPT:
             return
         began, clock = time.monotonic(), sim.clock
         with sim.timers.phase("output"):
@@ -167,21 +167,21 @@ class Loop:
         return (self._folder / layout.CHECKPOINT_REQUEST).exists()
 
     def _propose(self) -> None:
-        """This rank's words for the next vote."""
-        sim, now = self.sim, time.monotonic()
+        """What this rank gives to the next reduction."""
+        sim, own, now = self.sim, self.sim.reduction.own, time.monotonic()
         limit = sim.case.run.max_wall_time
         stop = CANCELLED if self._signals.raised else 0
         if limit is not None and now - self._began > limit:
             stop = WALL_TIME
         if sim.clock.step + 1 >= sim.case.run.max_steps:
             stop = MAX_STEPS
-        sim.vote.words[2] = stop
-        reporting = sim.comm.rank == 0 and now - self._reported > _REPORT_EVERY
-        sim.vote.words[3] = reporting + (reporting and self._groups.due(sim.clock.t, now))
-        sim.vote.words[7] = self.balance.grown(sim)
+        own.stop = stop
+        own.report = sim.comm.rank == 0 and now - self._reported > _REPORT_EVERY
+        own.groups = own.report and self._groups.due(sim.clock.t, now)
+        own.grown = self.balance.grown(sim)
         every = sim.case.run.checkpoint_every
-        sim.vote.words[8] = sim.comm.rank == 0 and (
-            (every is not None and now - self._kept > every) or (bool(sim.vote.words[3]) and self._asked())
+        own.checkpoint = sim.comm.rank == 0 and (
+            (every is not None and now - self._kept > every) or (own.report and self._asked())
         )
 
     def _look(self, before: Floats) -> None:
@@ -228,7 +228,7 @@ class Loop:
         window = Window(clock.step - self._reported_step, work)
         self._reported_step = clock.step
         self.balance.look(window)
-        if sim.vote.groups or clock.done or sim.vote.stop:
+        if sim.reduction.groups or clock.done or sim.reduction.stop:
             self._record()
         if self._journal is None:
             return

@@ -1,4 +1,4 @@
-"""A request to stop from outside: SIGTERM, SIGUSR1 or SIGINT raise a flag, and the vote of the next step carries it."""
+"""A request to stop from outside: SIGTERM, SIGUSR1 or SIGINT raise a flag; the next step's reduction carries it."""
 
 import signal
 

@@ -26,76 +26,12 @@ from .parallel import fixed_point
 from .parallel.comm import Comm
 from .parallel.ownership import Neighbour
 from .probes import Probes
-from .state import MASS, Floats, Ints, Model
+from .reduction import StepReduction
+from .state import MASS, Floats, Model
 from .timers import Timers, worked
 
 _SMALLEST_STRAIN = 1e-12
 """Forces of a smaller strain than this need no finer quantum."""
-
-
-@dataclass
-class Vote:
-    """What the ranks agree on in a step: a maximum over int64 words. Bits of non-negative floats order like floats."""
-
-    words: Ints = field(default_factory=lambda: np.zeros(9, np.int64))
-    """0: one over the stable step; 1: largest force (both as bits); 2: reason to stop; 3: rank 0 wants a
-    report, 2: with groups; 4: a search for contact is due; 5: tets are worn out; 6: faces may break; 7: a rank has more
-    outside nodes than it may; 8: a checkpoint is asked for."""
-    result: Ints = field(default_factory=lambda: np.zeros(9, np.int64))
-
-    @property
-    def limit(self) -> float:
-        """Largest one-over-stable-step of all tets, 1/s; NaN when some tet is inverted or not a number."""
-        return fixed_point.float_of(int(self.result[0]))
-
-    @property
-    def force(self) -> float:
-        """Largest contribution to a nodal force, N."""
-        return fixed_point.float_of(int(self.result[1]))
-
-    @property
-    def stop(self) -> int:
-        """Reason to stop, 0 for none (see worker/loop.py)."""
-        return int(self.result[2])
-
-    @property
-    def report(self) -> bool:
-        """Whether rank 0 wants the loads of all ranks."""
-        return bool(self.result[3])
-
-    @property
-    def groups(self) -> bool:
-        """Whether rank 0 wants the loads of groups besides."""
-        return int(self.result[3]) > 1
-
-    @property
-    def search(self) -> bool:
-        """Whether some rank's surface has used up the last search for contact."""
-        return bool(self.result[4])
-
-    @property
-    def hot(self) -> bool:
-        """Whether some tet's face has passed the strength by the tet's own stress."""
-        return bool(self.result[6])
-
-    def begin_again(self) -> None:
-        """Forgets what was to be done besides the next step."""
-        self.result[[2, 3, 7, 8]] = 0
-
-    @property
-    def grown(self) -> bool:
-        """Whether some rank has more outside nodes than it may."""
-        return bool(self.result[7])
-
-    @property
-    def checkpoint(self) -> bool:
-        """Whether a checkpoint is asked for."""
-        return bool(self.result[8])
-
-    @property
-    def worn(self) -> int:
-        """What was found of worn-out tets (elements/wear.py)."""
-        return int(self.result[5])
 
 
 @dataclass
@@ -122,7 +58,7 @@ class Simulation:
     """CPU time that it took to make the stages on the slowest rank, s."""
     floor: float
     """Forces below this, N, do not refine the force quantum."""
-    vote: Vote = field(default_factory=Vote)
+    reduction: StepReduction = field(default_factory=StepReduction)
 
     @property
     def scale(self) -> float:
@@ -136,21 +72,21 @@ class Simulation:
     @property
     def limit(self) -> float:
         """Largest one-over-stable-step of tets and contact, 1/s."""
-        return max(self.vote.limit, self.contact.limit) if self.contact is not None else self.vote.limit
+        return max(self.reduction.limit, self.contact.limit) if self.contact is not None else self.reduction.limit
 
     def limiting_tet(self) -> str:
         """The tet that holds the time step down, of smallest id when several do; all ranks take part."""
-        mine = int(self.elements.peaks[0]) == int(self.vote.result[0])
-        first = -int(self.comm.maximum(np.array([-float(self.elements.peaks[1]) if mine else -np.inf]))[0])
+        mine = self.elements.limit_bits == StepReduction.limit.word(self.reduction)
+        first = -int(self.comm.maximum(np.array([-float(self.elements.limiting) if mine else -np.inf]))[0])
         part = int(np.searchsorted(self.model.part_starts, first, side="right")) - 1
         return f"tet {first} of {self.model.parts[part]}"
 
     def limiter(self) -> str:
         """Which tet holds the time step down, and why; all ranks take part."""
         stable = self.clock.stable
-        if self.limit > self.vote.limit:
+        if self.limit > self.reduction.limit:
             return "contact: speed of approach"
-        why = "stability" if stable * self.vote.limit >= 0.999 * self.case.numerics.dt_safety else "growth"
+        why = "stability" if stable * self.reduction.limit >= 0.999 * self.case.numerics.dt_safety else "growth"
         if self.clock.dt < 0.9 * stable:
             why = "output time"
         return f"{why}: {self.limiting_tet()}"
@@ -172,7 +108,7 @@ class Simulation:
 
     def next_scale(self) -> float:
         """The scale for the next sum of forces."""
-        return fixed_point.scale_for(max(self.vote.force, self.floor))
+        return fixed_point.scale_for(max(self.reduction.force, self.floor))
 
 
 def build(case: Case, folder: Path, comm: Comm) -> Simulation:
@@ -222,7 +158,7 @@ def keep(sim: Simulation) -> Parcel:
     parcel = model_of.keep(sim.model)
     pushes = sim.comm.maximum(np.array([bound.last_push for bound in sim.boundaries]))
     parcel.known |= {
-        "vote": sim.vote.result.copy(), "clock": sim.clock.keep(), "ledger": sim.ledger.keep(),
+        "reduction": sim.reduction.words.copy(), "clock": sim.clock.keep(), "ledger": sim.ledger.keep(),
         "probes": sim.probes.keep(), "floor": sim.floor, "last_push": pushes.tolist(),
     }  # fmt: skip
     for index, bound in enumerate(sim.boundaries):
@@ -241,7 +177,7 @@ def resume(case: Case, arrived: Arrived, comm: Comm, timers: Timers) -> Simulati
     model = model_of.resume(case, arrived, comm)
     scene = conditions.build(case, model, conditions.loads(parcel))
     sim = _assemble(case, model, arrived.neighbours, scene, np.ones(model.nodes.n), comm, timers)
-    sim.vote.result[:] = known["vote"]
+    sim.reduction.words[:] = known["reduction"]
     sim.clock.resume(known["clock"])
     sim.ledger.resume(known["ledger"])
     sim.probes.resume(known["probes"])

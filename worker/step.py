@@ -12,7 +12,7 @@ and at once f(n+1) from it, so a step begins with forces that are already at han
  5  positions                                              x(n) -> x(n+1)
  6  velocity gradient at x(n+1/2), stress, pressure        stress(n) -> stress(n+1)
  7  internal forces, limits of the next step               f(n+1)
- 8  complete shared nodes and the vote                     the exchange of the step
+ 8  complete shared nodes, step reduction                  the exchange of the step
  9  facets that pass break, nodes separate                 topology(n+1), f(n+1)
 ==  =====================================================  ==========================
 
@@ -32,7 +32,7 @@ def prepare(sim: Simulation) -> None:
     """Forces and limits of the initial state: a pass over the elements in no time at all."""
     _elements(sim, 0.0)
     if sim.erosion is not None:
-        sim.erosion.begin(sim.vote.limit)
+        sim.erosion.begin(sim.reduction.limit)
 
 
 def first_half(sim: Simulation) -> None:
@@ -58,11 +58,11 @@ def second_half(sim: Simulation) -> None:
         move(nodes.x, nodes.v, clock.dt)  # 5: x(n+1) = x(n) + dt v(n+1/2)
         clock.advance()
         if sim.contact is not None:
-            sim.vote.words[4] = sim.contact.spent(nodes)
+            sim.reduction.own.search = sim.contact.spent(nodes)
     _elements(sim, clock.dt)  # 6 to 8
     if sim.fracture is not None:
         with sim.timers.phase("fracture"):
-            if sim.vote.hot:
+            if sim.reduction.hot:
                 sim.fracture.advance()  # 9: facets break, nodes separate, f(n+1) goes with them
             else:
                 sim.fracture.rest()
@@ -70,23 +70,23 @@ def second_half(sim: Simulation) -> None:
 
 def _elements(sim: Simulation, dt: float) -> None:
     """6 to 8; repeats the sum of forces in a coarser quantum when they have outgrown the present one."""
-    elements, vote = sim.elements, sim.vote
+    elements, reduction, own = sim.elements, sim.reduction, sim.reduction.own
     sim.scale = sim.next_scale()
     with sim.timers.phase("elements"):
         elements.advance(dt, sim.scale)
     with sim.timers.phase("exchange"):
-        vote.words[0], vote.words[1], vote.words[5:7] = elements.peaks[0], elements.peaks[2], elements.peaks[3:5]
-        pending = sim.comm.begin_maximum(vote.words, vote.result)
+        own.limit, own.force, own.worn, own.hot = elements.limit, elements.force, elements.worn, elements.hot
+        pending = reduction.begin(sim.comm)
         elements.finish()
         pending.finish()
-    if not (math.isfinite(vote.limit) and math.isfinite(vote.force)):
+    if not (math.isfinite(reduction.limit) and math.isfinite(reduction.force)):
         raise PhysicsError(f"{_when(sim)}: {sim.limiting_tet()} turned inside out, or its stress is not a number")
     if sim.contact is not None:
-        sim.contact.due |= vote.search
+        sim.contact.due |= reduction.search
     if sim.erosion is not None:
-        sim.erosion.decide(vote.worn)
-    if fixed_point.outgrown(vote.force, sim.scale):
-        sim.scale = fixed_point.scale_for(vote.force)
+        sim.erosion.decide(reduction.worn)
+    if fixed_point.outgrown(reduction.force, sim.scale):
+        sim.scale = fixed_point.scale_for(reduction.force)
         with sim.timers.phase("elements"):
             elements.again(sim.scale)
         with sim.timers.phase("exchange"):

@@ -65,7 +65,7 @@ class Ride:
     def stretch(self, strain: float) -> None:
         """Sets the body in motion: ``strain`` a step along z, minus half of it across."""
         nodes = self.sim.model.nodes
-        rate = strain * self.sim.vote.limit / self.sim.case.numerics.dt_safety
+        rate = strain * self.sim.reduction.limit / self.sim.case.numerics.dt_safety
         nodes.v[:] = (nodes.x - nodes.x.mean(axis=0)) * rate * np.array([-0.5, -0.5, 1.0])
 
     def steps(self, count: int) -> float:

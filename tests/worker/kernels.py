@@ -113,7 +113,7 @@ class Patch:
         self._used = self.scale or self.sim.next_scale()
         self.elements.advance(dt, self._used)
         self.elements.finish()
-        largest = fixed_point.float_of(int(self.elements.peaks[2]))
+        largest = self.elements.force
         if fixed_point.outgrown(largest, self._used):
             self._used = fixed_point.scale_for(largest)
             self.elements.again(self._used)
@@ -173,7 +173,7 @@ class Patch:
     @property
     def limit(self) -> float:
         """The largest one-over-stable-step of the last pass, 1/s."""
-        return fixed_point.float_of(int(self.elements.peaks[0]))
+        return self.elements.limit
 
 
 def drive(material: materials.Material, L: Floats, dt: float, steps: int, **keys: Any) -> Patch:

@@ -166,7 +166,7 @@ def test_a_tet_that_turns_inside_out_books_no_work_that_it_has_not_done(far: flo
     nodes = sim.model.nodes
     node = np.argmin(np.abs(nodes.x0 - 0.9 * MM).sum(axis=1))
     step.prepare(sim)
-    nodes.v[node] = far * MM * sim.vote.limit / 0.9 * np.array([1.0, 0.2, 0.0])
+    nodes.v[node] = far * MM * sim.reduction.limit / 0.9 * np.array([1.0, 0.2, 0.0])
     sim.ledger.initial = float((0.5 * nodes.mass * (nodes.v**2).sum(axis=1)).sum())
     tick(sim)
     volumes = tet_volumes(sim.model.blocks[0].tets, nodes.x)

@@ -125,7 +125,7 @@ def test_a_part_lives_as_its_case_says() -> None:
     sim = build(meeting_of([{"erosion": spec}, {}]), [block((2, 2, 2), MM), small])
     step.prepare(sim)
     assert not len(sim.model.blocks[1].worn)
-    assert sim.model.blocks[0].life.tolist() == [1.5, 0.3, 4.0, sim.vote.limit / 0.1]
+    assert sim.model.blocks[0].life.tolist() == [1.5, 0.3, 4.0, sim.reduction.limit / 0.1]
     assert wear.life(schema.Erosion())[wear.STRAIN] == np.inf
 
 

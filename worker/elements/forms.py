@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from ..migration.parcel import Parcel
+from ..parallel import fixed_point
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum
 from ..state import CHUNK, Block, Copies, Floats, Ints, Model, extended
@@ -37,8 +38,8 @@ class Elements:
     def __init__(self, model: Model, comm: Comm, neighbours: list[Neighbour], timers: Timers) -> None:
         self.model = model
         self._timers = timers
-        self.peaks: Ints = np.zeros(5, np.int64)
-        """See elements/sweep.py."""
+        self.peaks: Ints = np.zeros(sweep.PEAKS, np.int64)
+        """(PEAKS,) see elements/sweep.py."""
         self._w = _aligned(tet4.SCRATCH)
         self._wi = np.zeros(9 * CHUNK, np.int64)
         self._bits = self._w.view(np.int64)
@@ -48,6 +49,36 @@ class Elements:
         """What pulls besides the tets."""
         self.pressure = np.zeros(1)
         """(nodes,) nodal pressure, Pa; kept by the ``split`` form only."""
+
+    @property
+    def limit_bits(self) -> int:
+        """Bits of the largest one-over-stable-step of this rank's tets."""
+        return int(self.peaks[sweep.LARGEST_LIMIT])
+
+    @property
+    def limit(self) -> float:
+        """The largest one-over-stable-step of this rank's tets, 1/s; NaN when a tet is inverted or not a number."""
+        return fixed_point.float_of(self.limit_bits)
+
+    @property
+    def limiting(self) -> int:
+        """Smallest global id of the tets of this rank that have the limit."""
+        return int(self.peaks[sweep.LIMITING_TET])
+
+    @property
+    def force(self) -> float:
+        """Largest contribution to a nodal force of this rank, N."""
+        return fixed_point.float_of(int(self.peaks[sweep.LARGEST_FORCE]))
+
+    @property
+    def worn(self) -> int:
+        """What has been found of worn-out tets (elements/wear.py)."""
+        return int(self.peaks[sweep.WORN])
+
+    @property
+    def hot(self) -> bool:
+        """Whether some face passes the strength by its tet's own stress."""
+        return bool(self.peaks[sweep.HOT])
 
     @property
     def bytes_sent(self) -> int:
@@ -62,11 +93,11 @@ class Elements:
 
     def again(self, scale: float) -> None:
         """The forces of the present stress in a coarser quantum."""
-        limit = self.peaks[:2].copy()
-        self.peaks[2] = 0
+        limit = self.peaks[[sweep.LARGEST_LIMIT, sweep.LIMITING_TET]]
+        self.peaks[sweep.LARGEST_FORCE] = 0
         self._begin(scale, again=True)
         self._both_regions(lambda block, begin, end: self._again(block, begin, end, scale), self._send)
-        self.peaks[:2] = limit
+        self.peaks[[sweep.LARGEST_LIMIT, sweep.LIMITING_TET]] = limit
 
     def _begin(self, scale: float, again: bool = False) -> None:
         """Forces other than those of tets."""
@@ -75,7 +106,8 @@ class Elements:
         if self.cohesion is not None:
             if not again:
                 self.cohesion.open(nodes.x)
-            self.peaks[2] = max(int(self.peaks[2]), self.cohesion.scatter(nodes.force, scale))
+            largest = self.cohesion.scatter(nodes.force, scale)
+            self.peaks[sweep.LARGEST_FORCE] = max(int(self.peaks[sweep.LARGEST_FORCE]), largest)
 
     def forces_of(self, block: Block, places: Ints, scale: float) -> Ints:
         """(k, 4, 3) forces of the present stress of some tets on their nodes, in quanta of 1 / ``scale`` N."""
@@ -101,13 +133,13 @@ class Elements:
 
     def keep(self, parcel: Parcel) -> None:
         """Adds what the elements must remember besides their state to a parcel; all ranks take part."""
-        limit = int(self._comm.maximum(self.peaks[:1].view(np.float64))[:1].view(np.int64)[0])
-        mine = -float(self.peaks[1]) if int(self.peaks[0]) == limit else -np.inf
+        limit = fixed_point.bits_of(float(self._comm.maximum(np.array([self.limit]))[0]))
+        mine = -float(self.limiting) if self.limit_bits == limit else -np.inf
         parcel.known["peaks"] = limit, -int(self._comm.maximum(np.array([mine]))[0])
 
     def resume(self, parcel: Parcel) -> None:
         """Takes it back."""
-        self.peaks[:2] = parcel.known["peaks"]
+        self.peaks[[sweep.LARGEST_LIMIT, sweep.LIMITING_TET]] = parcel.known["peaks"]
 
     def finish(self) -> None:
         """Returns when the forces of shared nodes are complete."""

@@ -6,9 +6,7 @@ viscosity, forces). ``forces_again`` repeats only the sum of forces, in a coarse
 the pressure, the plastic return comes after the equation of state, and with it, in two passes, the whole deviatoric
 stress: then the second pass makes the velocity gradient again.
 
-``peaks`` collects, as bits of float64: 0 the largest one-over-stable-step, 2 the largest force; 1 is the smallest
-global id of the tets that set the first, 3 whether tets are worn out (wear.py), 4 whether faces are hot
-(fracture/criterion.py).
+``peaks`` collects what the step needs of all tets of a rank; ``LARGEST_LIMIT`` and the names beside it are its places.
 """
 
 from numba import njit
@@ -27,6 +25,10 @@ from . import tet4
 from .hot import mark_hot
 from .wear import mark_worn
 
+LARGEST_LIMIT, LIMITING_TET, LARGEST_FORCE, WORN, HOT = range(5)
+"""Places in ``peaks``: bits of the largest one-over-stable-step, 1/s; smallest global id of the tets that have it; bits
+of the largest force, N; what is found of worn-out tets (wear.py); whether faces are hot (hot.py)."""
+PEAKS = 5
 _LIMIT = tet4.LIMIT
 _NO_TET = 2**62
 _F1, _F2, _I1, _I2, _T2 = "float64[::1]", "float64[:, ::1]", "int64[::1]", "int64[:, ::1]", "uint32[:, ::1]"
@@ -88,16 +90,16 @@ def pressure_and_limit(strength, eos, w, s, params, n, dt):  # type: ignore[no-u
 @njit(f"void({_I1}, {_I1}, {_I1}, int64, int64)", cache=True)
 def note_peaks(peaks, bits, ids, n, force):  # type: ignore[no-untyped-def]
     """Raises the peaks by a chunk of tets with these global ids, whose largest force has the bits ``force``."""
-    peaks[2] = max(peaks[2], force)
+    peaks[LARGEST_FORCE] = max(peaks[LARGEST_FORCE], force)
     limit = 0
     for i in range(n):
         limit = max(limit, bits[_LIMIT + i] & tet4.MAGNITUDE)
-    if limit > peaks[0]:
-        peaks[0], peaks[1] = limit, _NO_TET
-    if limit == peaks[0]:
+    if limit > peaks[LARGEST_LIMIT]:
+        peaks[LARGEST_LIMIT], peaks[LIMITING_TET] = limit, _NO_TET
+    if limit == peaks[LARGEST_LIMIT]:
         for i in range(n):
             if bits[_LIMIT + i] & tet4.MAGNITUDE == limit:
-                peaks[1] = min(peaks[1], ids[i])
+                peaks[LIMITING_TET] = min(peaks[LIMITING_TET], ids[i])
 
 
 @njit(
@@ -161,10 +163,11 @@ def standard_pass(  # type: ignore[no-untyped-def]
         pressure_and_limit(strength, eos, w, s, params, n, dt)
         return_at_pressure(strength, w, s, params, n, dt)
         if len(worn) > 0:
-            peaks[3] = max(peaks[3], mark_worn(worn[c * CHUNK : c * CHUNK + n], w, s, params, life, rows, n))
+            found = mark_worn(worn[c * CHUNK : c * CHUNK + n], w, s, params, life, rows, n)
+            peaks[WORN] = max(peaks[WORN], found)
         if len(hot) > 0:
             at = c * CHUNK
-            peaks[4] |= mark_hot(hot[at : at + n], w, s, weakest[at : at + n], shear, n)
+            peaks[HOT] |= mark_hot(hot[at : at + n], w, s, weakest[at : at + n], shear, n)
         largest = tet4.internal_forces(wi, w, s, n, scale)
         tet4.scatter_forces(force, wi, t, n)
         note_peaks(peaks, bits, ids[c * CHUNK : c * CHUNK + n], n, largest)
@@ -250,10 +253,11 @@ def force_pass(  # type: ignore[no-untyped-def]
         pressure_and_limit(strength, eos, w, s, params, n, dt)
         return_at_pressure(strength, w, s, params, n, dt)
         if len(worn) > 0:
-            peaks[3] = max(peaks[3], mark_worn(worn[c * CHUNK : c * CHUNK + n], w, s, params, life, rows, n))
+            found = mark_worn(worn[c * CHUNK : c * CHUNK + n], w, s, params, life, rows, n)
+            peaks[WORN] = max(peaks[WORN], found)
         if len(hot) > 0:
             at = c * CHUNK
-            peaks[4] |= mark_hot(hot[at : at + n], w, s, weakest[at : at + n], shear, n)
+            peaks[HOT] |= mark_hot(hot[at : at + n], w, s, weakest[at : at + n], shear, n)
         sum_forces(force, pressure, gradient, split, t, s, w, wi, bits, peaks, ids[c * CHUNK : c * CHUNK + n], n, scale)
 
 

@@ -25,6 +25,11 @@ def float_of(bits: int) -> float:
     return float(np.int64(bits).view(np.float64))
 
 
+def bits_of(value: float) -> int:
+    """The bits of a float64."""
+    return int(np.float64(value).view(np.int64))
+
+
 def scale_for(largest: float) -> float:
     """Quanta per newton for contributions up to ``largest``, N, with room to grow."""
     return math.ldexp(1.0, CONTRIBUTION_BITS - HEADROOM_BITS - math.frexp(largest)[1])

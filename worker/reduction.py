@@ -1,0 +1,117 @@
+"""The reduction of the step: the one maximum over all ranks by which they agree on what the next step does.
+
+A field is one int64 word. No other file knows where a field is and how it is encoded: as an integer, as a flag (0 or
+1), or as the bits of a non-negative float64. Such bits have the order of the floats, and a NaN is larger than any
+number, so that the maximum over int64 words is right for every field.
+"""
+
+from typing import Generic, Self, TypeVar, overload
+
+import numpy as np
+
+from .parallel import fixed_point
+from .parallel.comm import Comm, Pending
+from .state import Ints
+
+Value = TypeVar("Value", int, bool, float)
+
+
+class _Field(Generic[Value]):
+    """A word of a record; the places follow the order of the definitions."""
+
+    def __set_name__(self, owner: "type[Fields]", name: str) -> None:
+        self.place = owner.size
+        owner.size += 1
+
+    @overload
+    def __get__(self, record: None, owner: "type[Fields]") -> Self: ...
+    @overload
+    def __get__(self, record: "Fields", owner: "type[Fields]") -> Value: ...
+    def __get__(self, record: "Fields | None", owner: "type[Fields]") -> Self | Value:
+        return self if record is None else self._decoded(int(record.words[self.place]))
+
+    def __set__(self, record: "Fields", value: Value) -> None:
+        record.words[self.place] = self._encoded(value)
+
+    def word(self, record: "Fields") -> int:
+        """The field of a record as it is encoded."""
+        return int(record.words[self.place])
+
+    def _decoded(self, word: int) -> Value:
+        raise NotImplementedError
+
+    def _encoded(self, value: Value) -> int:
+        return int(value)
+
+
+class Number(_Field[int]):
+    """An integer."""
+
+    def _decoded(self, word: int) -> int:
+        return word
+
+
+class Flag(_Field[bool]):
+    """True where it is true on any rank."""
+
+    def _decoded(self, word: int) -> bool:
+        return bool(word)
+
+
+class Real(_Field[float]):
+    """A float64 that is not negative, or NaN without sign; by its bits."""
+
+    def _decoded(self, word: int) -> float:
+        return fixed_point.float_of(word)
+
+    def _encoded(self, value: float) -> int:
+        return fixed_point.bits_of(value)
+
+
+class Fields:
+    """The fields of the reduction."""
+
+    size = 0
+    """Number of fields."""
+
+    limit = Real()
+    """Largest one-over-stable-step of all tets, 1/s; NaN when some tet is inverted or not a number."""
+    force = Real()
+    """Largest contribution to a nodal force, N."""
+    stop = Number()
+    """Reason to stop, 0 for none (worker/loop.py): the largest wins."""
+    report = Flag()
+    """Rank 0 wants the loads of all ranks."""
+    groups = Flag()
+    """Rank 0 wants the loads of groups besides."""
+    search = Flag()
+    """The surface of a rank has used up the last search for contact."""
+    worn = Number()
+    """What a rank has found of worn-out tets (elements/wear.py)."""
+    hot = Flag()
+    """A face of a tet has passed the strength by the tet's own stress (elements/hot.py)."""
+    grown = Flag()
+    """A rank has more surface nodes than the balance allows it."""
+    checkpoint = Flag()
+    """A checkpoint is asked for."""
+
+    def __init__(self) -> None:
+        self.words: Ints = np.zeros(self.size, np.int64)
+        """(fields,) what the ranks exchange."""
+
+
+class StepReduction(Fields):
+    """What all ranks have agreed on in the last reduction; ``own`` is what this rank gives to the next one."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.own = Fields()
+
+    def begin(self, comm: Comm) -> Pending:
+        """Starts the reduction; the fields are those of all ranks once it is finished. All ranks take part."""
+        return comm.begin_maximum(self.own.words, self.words)
+
+    def begin_again(self) -> None:
+        """Clears what was asked for once: a run that goes on from a checkpoint does not stop or report again."""
+        self.stop = 0
+        self.report = self.groups = self.grown = self.checkpoint = False
