@@ -23,6 +23,7 @@ from .migration.parcel import Parcel
 from .parallel.comm import Comm
 from .parallel.fixed_point import Tally
 from .parallel.ownership import Neighbour, complete
+from .parallel.tags import Tag
 from .state import (
     CHUNK,
     PRESSURE,
@@ -47,7 +48,6 @@ from .topology import Split
 
 GATHERED = 10
 """Steps in which worn tets are gathered."""
-_TAG = 15
 
 
 class Mirrors(RigidWalls):
@@ -222,7 +222,7 @@ class Erosion(Boundary):
         """(nodes,) how many of these tets of all ranks have each node; all ranks take part."""
         corners = np.concatenate([np.zeros(0, np.int64), *(rows.reshape(-1) for rows in tets)])
         counts = np.bincount(corners, minlength=self._model.nodes.n)[:, None].astype(np.int64)
-        complete(self._comm, self._neighbours, counts, _TAG)
+        complete(self._comm, self._neighbours, counts, Tag.TETS_AT_NODE)
         return counts[:, 0]
 
     def _book_last_work(self, state: Nodes) -> None:

@@ -18,6 +18,7 @@ from conoid.worker.mesh.model import TetMesh
 from conoid.worker.parallel.comm import Comm
 from conoid.worker.parallel.fixed_point import exact_sums
 from conoid.worker.parallel.ownership import complete
+from conoid.worker.parallel.tags import Tag
 from conoid.worker.simulation import Simulation
 from conoid.worker.state import BROKEN, INTACT, MASS, Floats, Ints, Model
 
@@ -330,7 +331,7 @@ def test_forces_are_those_of_the_tets_after_every_event(model: str, form: str) -
                 np.add.at(forces, part.tets, sim.elements.forces_of(part, np.arange(part.n), nodes.scale))
             if sim.fracture.cohesion is not None:
                 sim.fracture.cohesion.scatter(forces, nodes.scale)
-            complete(sim.comm, sim.fracture._neighbours, forces, 99)
+            complete(sim.comm, sim.fracture._neighbours, forces, Tag.FORCE)
             assert (forces == nodes.force).all()
             assert len(sim.elements.pressure) == (nodes.n if sim.elements.split else 1)
         size = float(np.abs(exact_sums(sim.comm, np.abs(nodes.mass[:, None] * nodes.v)[nodes.owned])).max())

@@ -7,13 +7,13 @@ from ..migration.parcel import Parcel
 from ..parallel.comm import Comm
 from ..parallel.fixed_point import exact_sums
 from ..parallel.ownership import Neighbour, complete
+from ..parallel.tags import Tag
 from ..state import Floats, Indices, Ints, Nodes, extended
 from . import ghosts, sweeps
 from .records import Crowd, merged
 from .scene import Sides
 from .surface import Surface
 
-_NORMAL_TAG = 14
 _LOOKS = np.array([10.0, 20.0, 40.0, 80.0, 160.0, 300.0])
 """Steps of free flight that a search may look ahead."""
 _SWEPT = 8.0
@@ -107,7 +107,7 @@ class Flight:
         """
         sums = np.zeros((nodes.n, 9), np.int64)
         _add_normals(sums, nodes.x, self._face_nodes, sweeps.SHARES / self.size**2)
-        complete(self._comm, self._neighbours, sums, _NORMAL_TAG)
+        complete(self._comm, self._neighbours, sums, Tag.NORMAL)
         area = sums[:, 3:6].sum(axis=1)
         return np.asarray(sums / np.where(area > 0, area, 1)[:, None])
 

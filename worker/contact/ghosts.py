@@ -6,6 +6,7 @@ import numpy as np
 
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
+from ..parallel.tags import Tag
 from ..state import Floats, Indices, Ints, Nodes
 from .records import Crowd, Edges, Faces
 
@@ -99,7 +100,7 @@ def _company(table: Ints, rank: int) -> Ints:
 class Copies:
     """Positions and velocities of nodes, before and after the kick, sent in every step by a rank that holds them."""
 
-    def __init__(self, sends: list[Neighbour], receives: list[Neighbour], comm: Comm, tag: int) -> None:
+    def __init__(self, sends: list[Neighbour], receives: list[Neighbour], comm: Comm, tag: Tag) -> None:
         """``sends``: local nodes, ``receives``: places in the crowd."""
         self.sends, self.receives = sends, receives
         self._from, self._to = (_joined([some.nodes for some in each]) for each in (sends, receives))
@@ -142,7 +143,7 @@ def _slices(buffer: Floats, others: list[Neighbour]) -> list[tuple[int, Ints]]:
     return [(other.rank, words[end - len(other.nodes) : end]) for other, end in zip(others, ends, strict=True)]
 
 
-def copies(crowd: Crowd, nodes: Nodes, comm: Comm, tag: int) -> Copies:
+def copies(crowd: Crowd, nodes: Nodes, comm: Comm, tag: Tag) -> Copies:
     """The standing order for the state of the nodes of ``crowd`` that are not held here, with their owners; all ranks
     take part.
     """

@@ -9,6 +9,7 @@ from numba import njit
 from ..migration.parcel import Parcel, take
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum, same
+from ..parallel.tags import Tag
 from ..state import Flags, Floats, Indices, Ints, Nodes
 from . import domain, ghosts, search, sift
 from .ghosts import Copies
@@ -17,7 +18,6 @@ from .records import Crowd, Edges, Faces, merged
 from .rest import Rest
 from .search import Boxes, Things
 
-_COPY_TAG, _SHARE_TAG, _PUSH_TAG = 11, 12, 13
 _FACE_BITS = 30
 """The id of a face stays below 2^30 where edges are kept by those of their two faces."""
 
@@ -132,7 +132,7 @@ class Scene:
         """Sets up the messages: sums over the nodes of the company, copies of what is not held here; all ranks take
         part.
         """
-        self.copies = ghosts.copies(self.crowd, nodes, comm, _COPY_TAG)
+        self.copies = ghosts.copies(self.crowd, nodes, comm, Tag.GHOST)
         self._sum(company, comm)
 
     def extend(self, company: list[Neighbour], sends: list[Neighbour], receives: list[Neighbour], comm: Comm) -> None:
@@ -140,7 +140,7 @@ class Scene:
         if same([*self.company, *self.copies.sends, *self.copies.receives], [*company, *sends, *receives]):
             return
         self.free()
-        self.copies = Copies(sends, receives, comm, _COPY_TAG)
+        self.copies = Copies(sends, receives, comm, Tag.GHOST)
         self._sum(company, comm)
 
     def _sum(self, company: list[Neighbour], comm: Comm) -> None:
@@ -148,8 +148,8 @@ class Scene:
         self.shared = np.zeros(self.crowd.n, bool)
         for some in company:
             self.shared[some.nodes] = True
-        self.shared_shares = SharedSum(comm, company, 4, _SHARE_TAG)
-        self.shared_impulse = SharedSum(comm, company, 3, _PUSH_TAG)
+        self.shared_shares = SharedSum(comm, company, 4, Tag.CONTACT_SHARE)
+        self.shared_impulse = SharedSum(comm, company, 3, Tag.CONTACT_IMPULSE)
 
     def approach(self) -> float:
         """Largest relative speed of a candidate node over the altitude of its candidate face's tet, 1/s."""

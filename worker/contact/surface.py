@@ -9,12 +9,12 @@ from ..mesh.faces import normals as face_normals
 from ..migration.parcel import Table
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, complete
+from ..parallel.tags import Tag
 from ..state import Flags, Indices, Ints, Model, Nodes
 from .records import Edges, Faces
 
 SHARP = np.cos(np.radians(25.0))
 """Edges between faces whose initial normals differ by more than this can meet other edges."""
-_FLAG_TAG = 10
 
 
 @dataclass
@@ -95,7 +95,7 @@ def _faces(model: Model, planes: Flags) -> tuple["np.ndarray", Ints]:
 def _flags(faces: "np.ndarray", n: int, neighbours: list[Neighbour], comm: Comm) -> Flags:
     counts = np.zeros((n, 1), np.int64)
     counts[faces[:, :3]] = 1
-    complete(comm, neighbours, counts, _FLAG_TAG)
+    complete(comm, neighbours, counts, Tag.SURFACE)
     return np.asarray(counts[:, 0] > 0)
 
 

@@ -24,6 +24,7 @@ from ..migration.parcel import Parcel
 from ..parallel.comm import Comm
 from ..parallel.fixed_point import exact_sums
 from ..parallel.ownership import Neighbour, complete
+from ..parallel.tags import Tag
 from ..state import MASS, Flags, Floats, Indices, Ints, Model
 from ..topology import Split
 from . import bodies, nodal
@@ -33,7 +34,6 @@ from .order import strongest
 from .separation import Broken, Separation
 from .strength import Toughness, toughness
 
-_TAG = 16
 _LEAST = 0.05
 """Of the square of the highest frequency that a step resolves: what cohesive facets may use at least."""
 _SHARES = 24.0
@@ -313,7 +313,7 @@ class Fracture:
             self._scatter(change, some, now, facets.pull[moved], 1)
             for facets in fresh:
                 self._scatter(change, some, facets.nodes, facets.pull, 1)
-        complete(self._comm, self._among(some), change, _TAG)
+        complete(self._comm, self._among(some), change, Tag.SEPARATED_FORCE)
         nodes.force[some] += change
 
     def _among(self, some: Ints) -> list[Neighbour]:
