@@ -10,9 +10,9 @@ import pytest
 
 from conoid.cases import schema
 from conoid.worker import digest, domain, simulation, state, step
-from conoid.worker.erosion import Mirrors
 from conoid.worker.mesh.faces import across, boundary_faces
 from conoid.worker.mesh.model import TetMesh
+from conoid.worker.mirrors import Mirrors
 from conoid.worker.probes import tet_volumes
 from conoid.worker.simulation import Simulation
 
