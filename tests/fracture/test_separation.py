@@ -25,7 +25,8 @@ from conoid.worker.state import BROKEN, INTACT, MASS, Floats, Ints, Model
 from ..contact.bodies import meeting_of, pieces_of
 from ..contact.ranks import on_ranks
 from ..worker.meshes import block, positive
-from ..worker.test_erosion import on
+from ..worker.simulations import on
+from .facets import corners_of, inner, plane
 
 BRITTLE = materials.Material(
     density=2500.0, elastic=materials.Elastic(young=70e9, poisson=0.2),
@@ -33,18 +34,6 @@ BRITTLE = materials.Material(
 )  # fmt: skip
 RANKS = (1, 2, 3, 5)
 STEPS = 40
-
-
-def inner(mesh: TetMesh) -> Ints:
-    """(m, 2) both sides of every facet, 4 * tet + face, the smaller first."""
-    behind = across(mesh.tets).reshape(-1).astype(np.int64)
-    one = np.flatnonzero(behind > np.arange(len(behind)))
-    return np.column_stack([one, behind[one]])
-
-
-def corners_of(mesh: TetMesh, facets: Ints) -> Ints:
-    """(m, 3) nodes of facets."""
-    return np.asarray(mesh.tets[facets[:, 0, None] // 4, FACES[facets[:, 0] % 4]].astype(np.int64))
 
 
 # Pieces
@@ -232,12 +221,6 @@ def test_mass_and_momentum_stay(ranks: int) -> None:
     assert found.mass == pytest.approx(np.bincount(found.tets.reshape(-1), quarters), rel=1e-14)
     assert found.mass.min() > 0.0
     assert len(found.mass) > 2 * len(before.mass)
-
-
-def plane(mesh: TetMesh, height: float) -> Ints:
-    """Facets whose nodes all start at this height."""
-    facets = inner(mesh)
-    return np.asarray(facets[(mesh.points[corners_of(mesh, facets), 2] == height).all(axis=1)])
 
 
 @pytest.mark.parametrize("ranks", RANKS)
