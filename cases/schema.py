@@ -4,7 +4,7 @@
 their meshes are in ``cases/bodies.py``, materials in ``cases/materials.py``.
 """
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BeforeValidator, Field
 
@@ -312,6 +312,9 @@ class Reference(Model):
     until: Time | None = None
 
 
+Kind = TypeVar("Kind", Symmetry, Wall, Prescribed, Rotation, Gravity, Traction)
+
+
 class Case(Model):
     """A whole case."""
 
@@ -328,6 +331,10 @@ class Case(Model):
     run: Run
     balance: Balance = Balance()
     reference: tuple[Reference, ...] = ()
+
+    def boundaries_of(self, kind: type[Kind]) -> list[tuple[int, Kind]]:
+        """The boundaries of one kind, each with its place in ``boundaries``."""
+        return [(index, spec) for index, spec in enumerate(self.boundaries) if isinstance(spec, kind)]
 
     @property
     def erodes(self) -> bool:

@@ -22,6 +22,7 @@ ONE_MODULE = {"mpi4py": "worker", "gmsh": "worker", "pyvista": "client"}
 """Libraries that one module of one house imports, and no other."""
 HEAVY = WORKER_ONLY | {"pyvista", "vtk", "vtkmodules"}
 """What the contract, the client and the server run without; pictures alone need pyvista."""
+TESTS = sorted((ROOT / "tests").rglob("*.py"))
 SOURCES = sorted(path for house in HOUSES for path in (ROOT / house).rglob("*.py"))
 
 
@@ -67,6 +68,24 @@ def test_relative_imports_stay_at_home(path: Path) -> None:
     for node in ast.walk(tree(path)):
         if isinstance(node, ast.ImportFrom):
             assert node.level <= depth, f"{name_of(path)}:{node.lineno}: this relative import leaves the house"
+
+
+@pytest.mark.parametrize("path", TESTS, ids=name_of)
+def test_helpers_of_tests_are_modules_of_their_own(path: Path) -> None:
+    """What two tests need is in neither, and not in a conftest, which holds fixtures."""
+    for node in ast.walk(tree(path)):
+        if isinstance(node, ast.ImportFrom):
+            names = [*(node.module or "").split("."), *(alias.name for alias in node.names if node.level)]
+            for name in names:
+                assert not name.startswith("test_"), f"{name_of(path)}:{node.lineno}: {name} is a test"
+                assert name != "conftest", f"{name_of(path)}:{node.lineno}: fixtures need no import"
+
+
+def test_tests_mirror_the_houses() -> None:
+    folders = {path.name for path in (ROOT / "tests").iterdir() if path.is_dir() and path.name != "__pycache__"}
+    inside = {path.name for path in (ROOT / "worker").iterdir() if path.is_dir()}
+    assert set(HOUSES) <= folders
+    assert folders - set(HOUSES) - inside == {"verification", "bench"}
 
 
 def test_the_contract_is_light() -> None:

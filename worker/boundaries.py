@@ -5,20 +5,28 @@ after: at time n only the first has been spent (the kinetic energy of the ledger
 second is booked when ``note`` is called before the next kick.
 """
 
+from abc import ABC, abstractmethod
+
 import numpy as np
 from numba import njit
 
 from .migration.parcel import Parcel, length
-from .state import Flags, Floats, Indices, Ints, Load, Nodes, extended
+from .state import Bits, Flags, Floats, Indices, Ints, Load, Nodes, extended
 from .topology import Split
 
+FREE, PRESCRIBED, MIRRORED = range(3)
+"""What a boundary does to a velocity component: it may change it by forces and impulses only; it sets it; it sets it to
+zero because the node lies on a plane of symmetry across that axis."""
 _SWEEPS = 4
 _KEPT = ("contact_loss", "external_work", "_impulse")
 """What every boundary remembers of its nodes."""
 
 
-class Boundary:
+class Boundary(ABC):
     """What the time step asks of a boundary."""
+
+    after_contact = False
+    """Whether it acts after contact: nothing may undo what it corrects."""
 
     def __init__(self, nodes: Indices) -> None:
         self.nodes = nodes
@@ -34,15 +42,19 @@ class Boundary:
         self._impulse = np.zeros((len(nodes), 3))
         """(n, 3) of the last step, N s."""
 
-    def start(self, state: Nodes) -> None:
+    @abstractmethod
+    def held_components(self) -> Bits:
+        """(n, 3) FREE, PRESCRIBED or MIRRORED. What is not FREE has no mobility in contact."""
+
+    def start(self, state: Nodes) -> None:  # noqa: B027 (forces agree with any velocity)
         """Makes the initial velocities agree with the boundary."""
 
-    def note(self, state: Nodes) -> None:
+    def note(self, state: Nodes) -> None:  # noqa: B027 (a symmetry plane does no work)
         """Before the kick: keeps v(n-1/2), and books the second half of the last impulses' work."""
 
+    @abstractmethod
     def apply(self, state: Nodes, dt: float, t: float) -> None:
         """Corrects v(n+1/2) at time ``t``, s; ``dt`` is the step ahead, s."""
-        raise NotImplementedError
 
     def grow(self, split: Split, ids: Ints) -> None:
         """Takes up the copies of its nodes; ``ids``: of the local nodes.
@@ -83,13 +95,18 @@ class SymmetryPlane(Boundary):
 
     def __init__(self, nodes: Indices, axis: int) -> None:
         super().__init__(nodes)
-        self.axis = axis
+        self._axis = axis
+
+    def held_components(self) -> Bits:
+        held = _free(self.nodes)
+        held[:, self._axis] = MIRRORED
+        return held
 
     def start(self, state: Nodes) -> None:
-        _hold(state.v, self.nodes, self.axis)
+        _hold(state.v, self.nodes, self._axis)
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
-        _hold(state.v, self.nodes, self.axis)
+        _hold(state.v, self.nodes, self._axis)
 
 
 class RigidWalls(Boundary):
@@ -99,12 +116,17 @@ class RigidWalls(Boundary):
     to each in turn, a few times.
     """
 
+    after_contact = True
+
     def __init__(self, nodes: Indices, points: Floats, normals: Floats, held: Flags) -> None:
         super().__init__(nodes)
         self._points = points
         self._normals = normals / np.linalg.norm(normals, axis=1)[:, None]
         self._held = held
         self._pushed = False
+
+    def held_components(self) -> Bits:
+        return _free(self.nodes)
 
     def depths(self, state: Nodes) -> Floats:
         """(w,) how deep the deepest node starts behind each wall, m."""
@@ -159,6 +181,9 @@ class Gravity(Driver):
         self._acceleration = acceleration
         self._last_dt = 0.0
 
+    def held_components(self) -> Bits:
+        return _free(self.nodes)
+
     def resume(self, parcel: Parcel, name: str, dt: float) -> None:
         super().resume(parcel, name, dt)
         self._last_dt = dt
@@ -183,6 +208,9 @@ class Traction(Driver):
         self.force = self._summed()
         """(n, 3) N."""
         self._last_dt = 0.0
+
+    def held_components(self) -> Bits:
+        return _free(self.nodes)
 
     def keep(self, parcel: Parcel, name: str) -> None:
         super().keep(parcel, name)
@@ -224,10 +252,8 @@ class PrescribedVelocity(Driver):
         super().__init__(nodes)
         self._velocity = np.broadcast_to(velocity, (len(nodes), 3))
 
-    @property
-    def held(self) -> Flags:
-        """(n, 3) which components are prescribed."""
-        return ~np.isnan(self._velocity)
+    def held_components(self) -> Bits:
+        return np.where(np.isnan(self._velocity), FREE, PRESCRIBED).astype(np.uint8)
 
     def _inherit(self, at: Ints, copies: Indices) -> None:
         super()._inherit(at, copies)
@@ -264,6 +290,10 @@ class PrescribedRotation(PrescribedVelocity):
         across = np.cross(axis, r)
         chord: Floats = (np.sin(angle) * across + (1.0 - np.cos(angle)) * np.cross(axis, across)) / dt
         return chord
+
+
+def _free(nodes: Indices) -> Bits:
+    return np.full((len(nodes), 3), FREE, np.uint8)
 
 
 @njit("void(float64[:, ::1], int32[::1], int64)", cache=True)

@@ -5,6 +5,8 @@ import numpy as np
 from conoid.cases import schema
 
 from .boundaries import (
+    MIRRORED,
+    PRESCRIBED,
     Boundary,
     Gravity,
     PrescribedRotation,
@@ -36,15 +38,14 @@ def build(case: schema.Case, model: Model, loads: list[Load]) -> list[Boundary]:
     """
     nodes = model.nodes
     held = [_held_by(spec, model) for spec in case.boundaries]
-    pairs = list(zip(case.boundaries, held, strict=True))
     boundaries: list[Boundary] = [
-        Gravity(_indices(h), np.array(spec.acceleration)) for spec, h in pairs if isinstance(spec, schema.Gravity)
+        Gravity(_indices(held[i]), np.array(spec.acceleration)) for i, spec in case.boundaries_of(schema.Gravity)
     ]
     boundaries += [Traction(nodes.places(load.nodes), load) for load in loads]
     boundaries += [
-        SymmetryPlane(_indices(h), _AXES[spec.axis]) for spec, h in pairs if isinstance(spec, schema.Symmetry)
+        SymmetryPlane(_indices(held[i]), _AXES[spec.axis]) for i, spec in case.boundaries_of(schema.Symmetry)
     ]
-    for spec, h in pairs:
+    for spec, h in zip(case.boundaries, held, strict=True):
         if isinstance(spec, schema.Prescribed):
             velocity = np.array([np.nan if c is None else c for c in (spec.x, spec.y, spec.z)])
             boundaries.append(PrescribedVelocity(_indices(h), velocity))
@@ -53,8 +54,7 @@ def build(case: schema.Case, model: Model, loads: list[Load]) -> list[Boundary]:
             boundaries.append(PrescribedRotation(_indices(h), centre, rate))
     moved = np.zeros(nodes.n, bool)
     for boundary in boundaries:
-        if isinstance(boundary, PrescribedVelocity):
-            moved[boundary.nodes] = True
+        moved[boundary.nodes] |= (boundary.held_components() == PRESCRIBED).any(axis=1)
     return [*boundaries, *_walls(case, [h & ~moved for h in held])]
 
 
@@ -90,7 +90,7 @@ def _held_by(spec: schema.Boundary, model: Model) -> Flags:
 
 
 def _walls(case: schema.Case, held: list[Flags]) -> list[Boundary]:
-    found = [(spec, h) for spec, h in zip(case.boundaries, held, strict=True) if isinstance(spec, schema.Wall)]
+    found = [(spec, held[index]) for index, spec in case.boundaries_of(schema.Wall)]
     if not found:
         return []
     touched = np.any([h for _, h in found], axis=0)
@@ -100,7 +100,7 @@ def _walls(case: schema.Case, held: list[Flags]) -> list[Boundary]:
 
 
 def _refuse_overlaps(case: schema.Case, model: Model, boundaries: list[Boundary], comm: Comm) -> None:
-    indices = [i for i, spec in enumerate(case.boundaries) if isinstance(spec, schema.Wall)]
+    indices = [index for index, _ in case.boundaries_of(schema.Wall)]
     for walls in boundaries:
         if isinstance(walls, RigidWalls):
             for index, depth in zip(indices, comm.maximum(walls.depths(model.nodes)), strict=True):
@@ -113,8 +113,7 @@ def _refuse_conflicts(boundaries: list[Boundary], nodes: Nodes, comm: Comm) -> N
     before = nodes.v.copy()
     for boundary in boundaries:
         boundary.start(nodes)
-    planes = [b for b in boundaries if isinstance(b, SymmetryPlane)]
-    speeds = [float(np.abs(nodes.v[b.nodes, b.axis]).max(initial=0.0)) for b in planes]
+    speeds = [float(np.abs(nodes.v[b.nodes][b.held_components() == MIRRORED]).max(initial=0.0)) for b in boundaries]
     nodes.v[:] = before
     fastest = comm.maximum(np.array([max(speeds, default=0.0)]))[0]
     if fastest > 0.0:

@@ -191,7 +191,7 @@ def _loads(case: schema.Case, x: Floats, part: Indices, tets: Indices) -> list[L
 
     Raises InputError for one that acts on no face.
     """
-    found = [(i, spec) for i, spec in enumerate(case.boundaries) if isinstance(spec, schema.Traction)]
+    found = case.boundaries_of(schema.Traction)
     loads = []
     tet, face = np.nonzero(across(tets) < 0) if found else (np.zeros(0, np.int64), np.zeros(0, np.int64))
     faces = tets[tet[:, None], FACES[face]]

@@ -6,15 +6,11 @@ last force acts through one more kick: the second half of that work is booked a 
 have only strained enough are gathered for a few steps, because every removal calls for a new search.
 """
 
-from typing import Self
-
 import numpy as np
 
-from conoid.cases.schema import Case, Symmetry
+from conoid.cases.schema import Case
 
-from .boundaries import Boundary, PrescribedVelocity, RigidWalls
 from .clock import Clock
-from .conditions import ON_PLANE
 from .contact.stage import Contact
 from .elements.wear import BROKEN, FREQUENCY, SOUND
 from .mesh.faces import FACES
@@ -23,6 +19,7 @@ from .migration.parcel import Parcel
 from .parallel.comm import Comm
 from .parallel.fixed_point import Tally
 from .parallel.ownership import Neighbour, complete
+from .parallel.tags import Tag
 from .state import (
     CHUNK,
     LAID_BARE,
@@ -48,50 +45,16 @@ from .topology import Split
 
 GATHERED = 10
 """Steps in which worn tets are gathered."""
-_TAG = 15
 
 
-class Mirrors(RigidWalls):
-    """Symmetry planes as they are for nodes that have lost their tets: walls, where they meet their mirror images."""
-
-    @classmethod
-    def of(cls, case: Case, model: Model, bounds: list[Boundary]) -> Self:
-        """A wall for either side of every plane, and the nodes of eroding parts that start on that side of it.
-
-        Nodes of prescribed motion are left alone.
-        """
-        nodes = model.nodes
-        wears = np.array([part.erosion is not None for part in case.parts])[nodes.part]
-        for bound in bounds:
-            if isinstance(bound, PrescribedVelocity):
-                wears[bound.nodes] = False
-        points, normals, held = np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((nodes.n, 0), bool)
-        for spec in case.boundaries:
-            if not isinstance(spec, Symmetry):
-                continue
-            there = np.array([part.name in spec.parts or not spec.parts for part in case.parts])[nodes.part]
-            axis = np.eye(3)["xyz".index(spec.axis)]
-            height = nodes.x0 @ axis - spec.at
-            off = wears & there & (np.abs(height) > ON_PLANE * max(model.size, abs(spec.at)))
-            points = np.vstack([points, spec.at * axis, spec.at * axis])
-            normals = np.vstack([normals, axis, -axis])
-            held = np.column_stack([held, off & (height > 0.0), off & (height < 0.0)])
-        some = held.any(axis=1)
-        return cls(np.flatnonzero(some).astype(np.int32), points, normals, np.ascontiguousarray(held[some]))
-
-    def apply(self, state: Nodes, dt: float, t: float) -> None:
-        super().apply(state, dt, self.last_push)
-
-
-class Erosion(Boundary):
-    """The erosion of a case on one rank. It stands before contact among the boundaries."""
+class Erosion:
+    """The erosion of a case on one rank."""
 
     def __init__(
         self, case: Case, model: Model, neighbours: list[Neighbour], contact: Contact | None, comm: Comm,
         clock: Clock, extremes: tuple[float, float],
     ) -> None:  # fmt: skip
         """``extremes``: largest nodal mass, kg, and speed, m/s, of the scene."""
-        super().__init__(np.zeros(0, np.int32))
         self._model, self._neighbours, self._contact = model, neighbours, contact
         self._comm, self._clock = comm, clock
         self._specs = [part.erosion for part in case.parts]
@@ -101,7 +64,8 @@ class Erosion(Boundary):
         """(nodes,) which have left; they stand still where they were."""
         self._tets_at = self._completed([block.tets.astype(np.int64) for block in model.blocks])
         self._last: list[tuple[Ints, Floats]] = []
-        self._leaving = np.zeros(0, np.int64)
+        self._leaving, self._before = np.zeros(0, np.int64), np.zeros((0, 3))
+        """Nodes that leave in this step, and their v(n-1/2), m/s."""
         mass, speed = extremes
         energy, momentum = mass * speed * speed, mass * speed
         self._work = Tally(np.full(3, energy))
@@ -120,12 +84,14 @@ class Erosion(Boundary):
                 block.life[FREQUENCY] = limit / spec.time_step
 
     def grow(self, split: Split, ids: Ints) -> None:
+        """Takes up the copies of nodes."""
         parents = split.copies.parents
         self.removed = extended(self.removed, self.removed[parents])
         self._leaves = extended(self._leaves, self._leaves[parents])
         self._tets_at = extended(self._tets_at, np.ones(len(parents), np.int64))
 
-    def keep(self, parcel: Parcel, name: str) -> None:
+    def keep(self, parcel: Parcel) -> None:
+        """Adds what it must remember to a parcel."""
         nodes, ids = self._model.nodes, parcel.nodes["id"]
         parcel.known["erosion"] = self._limit, self.due, self._work.scale, self._nodal.scale
         for key, words in (("work", self._work.words), ("nodal", self._nodal.words), ("half", self._half)):
@@ -137,7 +103,8 @@ class Erosion(Boundary):
         forces = np.concatenate([np.zeros((0, 4, 3)), *(forces for _, forces in self._last)])
         parcel.rows["erosion.last"] = {"at": nodes.x[tets].mean(axis=1), "with": ids[tets], "force": forces}
 
-    def resume(self, parcel: Parcel, name: str, dt: float) -> None:
+    def resume(self, parcel: Parcel) -> None:
+        """Takes it back."""
         limit, self.due, self._work.scale, self._nodal.scale = parcel.known["erosion"]
         self.begin(limit)
         self._work.words, self._nodal.words, self._half = (
@@ -166,15 +133,20 @@ class Erosion(Boundary):
         return int(self._comm.sum(np.array([(nodes.owned & (self._tets_at == 0) & ~self.removed).sum()]))[0])
 
     def note(self, state: Nodes) -> None:
+        """Before the kick: books the second half of what the last removal has begun."""
         self._book_last_work(state)
         self._nodal.words += self._half
         self._half[:] = 0
+
+    def remove(self, state: Nodes) -> None:
+        """Takes the marked tets out, when that is due; all ranks take part."""
         self._leaving = np.zeros(0, np.int64)
         if self.due:
             self._remove(state)
             self.due = False
 
-    def apply(self, state: Nodes, dt: float, t: float) -> None:
+    def stop_removed(self, state: Nodes) -> None:
+        """After the kick: books the nodes that leave in this step; all that have left stand still."""
         leaving = self._leaving
         if len(leaving):
             owned = leaving[state.owned[leaving]]
@@ -223,7 +195,7 @@ class Erosion(Boundary):
         """(nodes,) how many of these tets of all ranks have each node; all ranks take part."""
         corners = np.concatenate([np.zeros(0, np.int64), *(rows.reshape(-1) for rows in tets)])
         counts = np.bincount(corners, minlength=self._model.nodes.n)[:, None].astype(np.int64)
-        complete(self._comm, self._neighbours, counts, _TAG)
+        complete(self._comm, self._neighbours, counts, Tag.TETS_AT_NODE)
         return counts[:, 0]
 
     def _book_last_work(self, state: Nodes) -> None:

@@ -58,7 +58,7 @@ def _measured(sim: Simulation, spec: Reference, folder: Path, thick: float) -> f
     if quantity == "worst_residual":
         return sim.ledger.worst
     if quantity == "contact_time":
-        return _maximum(sim.comm, [b.last_push for b in sim.boundaries])
+        return _maximum(sim.comm, [each.last_push for each in sim.pushing])
     if quantity == "contact_loss":
         return sim.ledger.lost
     if quantity == "speed_mean":

@@ -10,18 +10,19 @@ from conoid.cases.library import material as find_material
 from conoid.cases.schema import Case
 
 from . import conditions, domain
-from .boundaries import Boundary, RigidWalls
+from .boundaries import Boundary
 from .clock import Clock
 from .contact.stage import Contact
 from .elements.forms import AveragedElements, Elements
 from .energy import Ledger
-from .erosion import Erosion, Mirrors
+from .erosion import Erosion
 from .fracture.record import Record
 from .fracture.stage import Fracture
 from .materials.models import BULK, DENSITY, SHEAR, moduli
 from .migration import model as model_of
 from .migration.parcel import Parcel
 from .migration.route import Arrived
+from .mirrors import Mirrors
 from .parallel import fixed_point
 from .parallel.comm import Comm
 from .parallel.ownership import Neighbour
@@ -29,6 +30,7 @@ from .probes import Probes
 from .reduction import StepReduction
 from .state import MASS, Floats, Model
 from .timers import Timers, worked
+from .topology import KeptByNode
 
 _SMALLEST_STRAIN = 1e-12
 """Forces of a smaller strain than this need no finer quantum."""
@@ -43,7 +45,7 @@ class Simulation:
     model: Model
     elements: Elements
     boundaries: list[Boundary]
-    """In the order in which they act; erosion and contact are among them."""
+    """In the order in which they act."""
     contact: Contact | None
     erosion: Erosion | None
     fracture: Fracture | None
@@ -73,6 +75,11 @@ class Simulation:
     def limit(self) -> float:
         """Largest one-over-stable-step of tets and contact, 1/s."""
         return max(self.reduction.limit, self.contact.limit) if self.contact is not None else self.reduction.limit
+
+    @property
+    def pushing(self) -> list[Boundary | Contact]:
+        """All that has a ``last_push``."""
+        return [*self.boundaries, *([self.contact] if self.contact is not None else [])]
 
     def limiting_tet(self) -> str:
         """The tet that holds the time step down, of smallest id when several do; all ranks take part."""
@@ -137,13 +144,12 @@ def _assemble(
     if case.erodes:
         erosion = Erosion(case, model, neighbours, contact, comm, clock, extremes)
         scene.append(Mirrors.of(case, model, scene))
-    walls = sum(not isinstance(bound, RigidWalls) for bound in scene)
-    scene[walls:walls] = [bound for bound in (erosion, contact) if bound is not None]
     probes = Probes(case, model, contact, clock, comm)
     elements = _elements(case, model, neighbours, node_volume, comm, timers)
     fracture = None
     if case.fractures:
-        fracture = Fracture(case, model, neighbours, elements, scene, contact, comm, clock)
+        by_node: list[KeptByNode] = [*scene, *(stage for stage in (erosion, contact) if stage is not None)]
+        fracture = Fracture(case, model, neighbours, elements, by_node, contact, comm, clock)
     return Simulation(
         case=case, comm=comm, model=model, elements=elements, boundaries=scene, contact=contact, erosion=erosion,
         fracture=fracture, clock=clock, ledger=Ledger(model, scene, contact, erosion, fracture, comm, clock),
@@ -156,13 +162,17 @@ def _assemble(
 def keep(sim: Simulation) -> Parcel:
     """All that this rank must remember between two steps; all ranks take part."""
     parcel = model_of.keep(sim.model)
-    pushes = sim.comm.maximum(np.array([bound.last_push for bound in sim.boundaries]))
+    pushes = sim.comm.maximum(np.array([each.last_push for each in sim.pushing]))
     parcel.known |= {
         "reduction": sim.reduction.words.copy(), "clock": sim.clock.keep(), "ledger": sim.ledger.keep(),
         "probes": sim.probes.keep(), "floor": sim.floor, "last_push": pushes.tolist(),
     }  # fmt: skip
     for index, bound in enumerate(sim.boundaries):
         bound.keep(parcel, f"boundary{index}")
+    if sim.erosion is not None:
+        sim.erosion.keep(parcel)
+    if sim.contact is not None:
+        sim.contact.keep(parcel)
     sim.elements.keep(parcel)
     if sim.fracture is not None:
         sim.fracture.keep(parcel)
@@ -182,9 +192,14 @@ def resume(case: Case, arrived: Arrived, comm: Comm, timers: Timers) -> Simulati
     sim.ledger.resume(known["ledger"])
     sim.probes.resume(known["probes"])
     sim.floor = known["floor"]
-    for index, (bound, last_push) in enumerate(zip(sim.boundaries, known["last_push"], strict=True)):
+    for each, last_push in zip(sim.pushing, known["last_push"], strict=True):
+        each.last_push = last_push
+    for index, bound in enumerate(sim.boundaries):
         bound.resume(parcel, f"boundary{index}", sim.clock.dt)
-        bound.last_push = last_push
+    if sim.erosion is not None:
+        sim.erosion.resume(parcel)
+    if sim.contact is not None:
+        sim.contact.resume(parcel)
     sim.elements.resume(parcel)
     if sim.fracture is not None:
         sim.fracture.resume(parcel)

@@ -5,19 +5,25 @@ and at once f(n+1) from it, so a step begins with forces that are already at han
 
 ==  =====================================================  ==========================
  1  choose dt                                              from the limits at n
- 2  velocities                                             v(n-1/2) -> v*(n+1/2)
- 3  boundaries: gravity, symmetry, prescribed motion,     v*(n+1/2) -> v(n+1/2)
-    contact, walls
- 4  whoever looks at time n: ledger, probes, frames        x(n), stress(n)
- 5  positions                                              x(n) -> x(n+1)
- 6  velocity gradient at x(n+1/2), stress, pressure        stress(n) -> stress(n+1)
- 7  internal forces, limits of the next step               f(n+1)
- 8  complete shared nodes, step reduction                  the exchange of the step
- 9  facets that pass break, nodes separate                 topology(n+1), f(n+1)
+ 2  second half of the work of the last impulses           v(n-1/2)
+ 3  erosion: worn tets leave the body                      topology(n)
+ 4  contact: search, when it is due                        candidate pairs
+ 5  velocities                                             v(n-1/2) -> v*(n+1/2)
+ 6  gravity, tractions, symmetry, prescribed motion        v*(n+1/2)
+ 7  erosion: removed nodes stop                            v*(n+1/2)
+ 8  contact: impulses of active contacts                   v*(n+1/2)
+ 9  walls                                                  v*(n+1/2) -> v(n+1/2)
+10  output at time n: ledger, probes, frames               x(n), stress(n)
+11  positions                                              x(n) -> x(n+1)
+12  velocity gradient at x(n+1/2), stress, pressure        stress(n) -> stress(n+1)
+13  internal forces, limits of the next step               f(n+1)
+14  complete shared nodes, step reduction                  the exchange of the step
+15  facets that pass break, nodes separate                 topology(n+1), f(n+1)
 ==  =====================================================  ==========================
 
-6 and 7 are one pass over each chunk of tets (two with an averaged pressure, with the exchange of the nodal volumes
-between them); 8 is started after the border tets and finished after the interior ones.
+What erosion uncovers takes part in the search of the same step. 12 and 13 are one pass over each chunk of tets (two
+with an averaged pressure, with the exchange of the nodal volumes between them); 14 is started after the border tets
+and finished after the interior ones.
 """
 
 import math
@@ -36,7 +42,7 @@ def prepare(sim: Simulation) -> None:
 
 
 def first_half(sim: Simulation) -> None:
-    """1 to 3: from f(n) to v(n+1/2)."""
+    """1 to 9: from f(n) to v(n+1/2)."""
     nodes, clock = sim.model.nodes, sim.clock
     with sim.timers.phase("nodes"):
         mean_dt = clock.choose(sim.limit)  # 1: dt between n and n+1
@@ -44,33 +50,58 @@ def first_half(sim: Simulation) -> None:
             raise PhysicsError(
                 f"{_when(sim)}: {sim.limiting_tet()} is crushed; the stable step is {clock.stable:.3g} s"
             )
-        for boundary in sim.boundaries:  # worn-out tets leave here, before contact looks at the surface
-            boundary.note(nodes)
-        kick(nodes.v, nodes.force, nodes.mass, mean_dt / sim.scale)  # 2: v*(n+1/2) = v(n-1/2) + dt f(n) / m
-        for boundary in sim.boundaries:  # 3: v(n+1/2)
-            boundary.apply(nodes, clock.dt, clock.t)
+        _before_kick(sim)  # 2 to 4
+        kick(nodes.v, nodes.force, nodes.mass, mean_dt / sim.scale)  # 5: v*(n+1/2) = v(n-1/2) + dt f(n) / m
+        _after_kick(sim)  # 6 to 9: v(n+1/2)
+
+
+def _before_kick(sim: Simulation) -> None:
+    """2 to 4, with v(n-1/2)."""
+    nodes, erosion, contact = sim.model.nodes, sim.erosion, sim.contact
+    for stage in (*sim.boundaries, erosion, contact):
+        if stage is not None:
+            stage.note(nodes)  # 2: half of the impulse times v(n-1/2)
+    if erosion is not None:
+        erosion.remove(nodes)  # 3: what the tets covered is surface now
+    if contact is not None:
+        contact.search_if_due(nodes)  # 4: candidate pairs of the surface as it is now
+
+
+def _after_kick(sim: Simulation) -> None:
+    """6 to 9: from v*(n+1/2) to v(n+1/2)."""
+    nodes, dt, t = sim.model.nodes, sim.clock.dt, sim.clock.t
+    for boundary in sim.boundaries:
+        if not boundary.after_contact:
+            boundary.apply(nodes, dt, t)  # 6
+    if sim.erosion is not None:
+        sim.erosion.stop_removed(nodes)  # 7
+    if sim.contact is not None:
+        sim.contact.solve(nodes, dt, t)  # 8
+    for boundary in sim.boundaries:
+        if boundary.after_contact:
+            boundary.apply(nodes, dt, t)  # 9
 
 
 def second_half(sim: Simulation) -> None:
-    """5 to 9: from v(n+1/2) to f(n+1)."""
+    """11 to 15: from v(n+1/2) to f(n+1)."""
     nodes, clock = sim.model.nodes, sim.clock
     with sim.timers.phase("nodes"):
-        move(nodes.x, nodes.v, clock.dt)  # 5: x(n+1) = x(n) + dt v(n+1/2)
+        move(nodes.x, nodes.v, clock.dt)  # 11: x(n+1) = x(n) + dt v(n+1/2)
         clock.advance()
         if sim.contact is not None:
             own = sim.reduction.own
             own.search, own.approach, own.opening = sim.contact.spent(nodes), sim.contact.approach, sim.contact.opening
-    _elements(sim, clock.dt)  # 6 to 8
+    _elements(sim, clock.dt)  # 12 to 14
     if sim.fracture is not None:
         with sim.timers.phase("fracture"):
             if sim.reduction.hot:
-                sim.fracture.advance()  # 9: facets break, nodes separate, f(n+1) goes with them
+                sim.fracture.advance()  # 15: facets break, nodes separate, f(n+1) goes with them
             else:
                 sim.fracture.rest()
 
 
 def _elements(sim: Simulation, dt: float) -> None:
-    """6 to 8; repeats the sum of forces in a coarser quantum when they have outgrown the present one."""
+    """12 to 14; repeats the sum of forces in a coarser quantum when they have outgrown the present one."""
     elements, reduction, own = sim.elements, sim.reduction, sim.reduction.own
     sim.scale = sim.next_scale()
     with sim.timers.phase("elements"):

@@ -1,7 +1,7 @@
 """What separating nodes tell everybody who keeps something by node."""
 
 from dataclasses import dataclass
-from typing import Self
+from typing import Protocol, Self
 
 import numpy as np
 
@@ -14,6 +14,13 @@ KEY = 2**31
 def keys(nodes: Ints, tets: Ints) -> Ints:
     """(n,) ids of a node and of a tet as one number that orders like them."""
     return np.asarray(nodes * KEY + tets)
+
+
+class KeptByNode(Protocol):
+    """What has arrays by node and follows nodes as they separate."""
+
+    def grow(self, split: "Split", ids: Ints) -> None:
+        """Takes up the copies of a split; ``ids``: of the local nodes."""
 
 
 @dataclass

@@ -18,7 +18,7 @@ from conoid.client.cli import app
 from conoid.client.local import LocalServer
 
 from .bodies import write_run
-from .conftest import FAKE_WORKER, case_file
+from .fakes import FAKE_WORKER, case_file
 
 CONOID = [sys.executable, "-m", "conoid.client.cli"]
 

@@ -10,7 +10,7 @@ from conoid.client.local import LocalServer
 from conoid.client.session import Session
 from conoid.client.stream import SseLink, ZenohLink
 
-from .conftest import case_file
+from .fakes import case_file
 
 
 @pytest.fixture

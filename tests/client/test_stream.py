@@ -15,7 +15,7 @@ from conoid.client.session import Router
 from conoid.client.stream import SseLink, StreamError, ZenohLink, follow
 
 from . import stories
-from .conftest import OWNER, Broker, free_port
+from .fakes import OWNER, Broker, free_port
 
 PREFIX = keys.run_prefix(OWNER, stories.RUN)
 

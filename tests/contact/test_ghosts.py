@@ -10,6 +10,7 @@ from conoid.worker.contact import ghosts
 from conoid.worker.contact.records import Crowd, Edges, Faces, merged
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.parallel.ownership import Neighbour
+from conoid.worker.parallel.tags import Tag
 from conoid.worker.state import Model
 
 from ..worker.meshes import block
@@ -138,7 +139,7 @@ def test_copies_follow_their_owners_whenever_they_are_refreshed(ranks: int) -> N
         crowd = every.take(np.sort(random.choice(every.n, 30, replace=False)))
         held = np.isin(crowd.id, nodes.id)
         crowd.local = np.where(held, np.searchsorted(nodes.id, crowd.id), -1).astype(np.int32)
-        order = ghosts.copies(crowd, nodes, comm, 99)
+        order = ghosts.copies(crowd, nodes, comm, Tag.GHOST)
         for turn in range(3):
             nodes.x[:] = 1000.0 * turn + nodes.id[:, None]
             nodes.v[:] = -nodes.x

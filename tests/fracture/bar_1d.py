@@ -193,3 +193,8 @@ def law(opening: Floats, without: Floats, largest: Floats, left: Floats, a: floa
     ahead = np.maximum(without, 0.0) * left
     implicit = np.minimum(left, np.divide(ahead, largest + a * left, out=np.zeros_like(left), where=left > 0.0))
     return np.where(left * a > 2.0 * largest, implicit, explicit)
+
+
+def published(x: float) -> float:
+    """Mean size in s_0 at x times rate_0: the fit of Zhou, Molinari and Ramesh (2006)."""
+    return float(4.5 / (1.0 + 4.5 * x ** (2.0 / 3.0)))

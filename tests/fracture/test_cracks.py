@@ -17,8 +17,8 @@ from conoid.worker.state import Flags, Floats, Ints
 from ..contact.bodies import meeting_of, moved
 from ..worker.kernels import build
 from ..worker.meshes import block
-from ..worker.test_erosion import on
-from .test_separation import plane
+from ..worker.simulations import on
+from .facets import plane
 
 MM = 1e-3
 SOFT = materials.Material(

@@ -21,7 +21,7 @@ from ..contact.bodies import meeting_of
 from ..worker.formulas import at_nodes
 from ..worker.kernels import build
 from ..worker.meshes import REGULAR, block
-from ..worker.test_erosion import on
+from ..worker.simulations import on
 
 GLASS = materials.Material(
     density=2500.0, elastic=materials.Elastic(young=72e9, poisson=0.22),

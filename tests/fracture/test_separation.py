@@ -18,13 +18,15 @@ from conoid.worker.mesh.model import TetMesh
 from conoid.worker.parallel.comm import Comm
 from conoid.worker.parallel.fixed_point import exact_sums
 from conoid.worker.parallel.ownership import complete
+from conoid.worker.parallel.tags import Tag
 from conoid.worker.simulation import Simulation
 from conoid.worker.state import BROKEN, INTACT, MASS, Floats, Ints, Model
 
 from ..contact.bodies import meeting_of, pieces_of
 from ..contact.ranks import on_ranks
 from ..worker.meshes import block, positive
-from ..worker.test_erosion import on
+from ..worker.simulations import on
+from .facets import corners_of, inner, plane
 
 BRITTLE = materials.Material(
     density=2500.0, elastic=materials.Elastic(young=70e9, poisson=0.2),
@@ -32,18 +34,6 @@ BRITTLE = materials.Material(
 )  # fmt: skip
 RANKS = (1, 2, 3, 5)
 STEPS = 40
-
-
-def inner(mesh: TetMesh) -> Ints:
-    """(m, 2) both sides of every facet, 4 * tet + face, the smaller first."""
-    behind = across(mesh.tets).reshape(-1).astype(np.int64)
-    one = np.flatnonzero(behind > np.arange(len(behind)))
-    return np.column_stack([one, behind[one]])
-
-
-def corners_of(mesh: TetMesh, facets: Ints) -> Ints:
-    """(m, 3) nodes of facets."""
-    return np.asarray(mesh.tets[facets[:, 0, None] // 4, FACES[facets[:, 0] % 4]].astype(np.int64))
 
 
 # Pieces
@@ -233,12 +223,6 @@ def test_mass_and_momentum_stay(ranks: int) -> None:
     assert len(found.mass) > 2 * len(before.mass)
 
 
-def plane(mesh: TetMesh, height: float) -> Ints:
-    """Facets whose nodes all start at this height."""
-    facets = inner(mesh)
-    return np.asarray(facets[(mesh.points[corners_of(mesh, facets), 2] == height).all(axis=1)])
-
-
 @pytest.mark.parametrize("ranks", RANKS)
 def test_a_facet_inside_separates_nothing(ranks: int) -> None:
     mesh = block((3, 3, 3), shake=0.0)
@@ -330,7 +314,7 @@ def test_forces_are_those_of_the_tets_after_every_event(model: str, form: str) -
                 np.add.at(forces, part.tets, sim.elements.forces_of(part, np.arange(part.n), nodes.scale))
             if sim.fracture.cohesion is not None:
                 sim.fracture.cohesion.scatter(forces, nodes.scale)
-            complete(sim.comm, sim.fracture._neighbours, forces, 99)
+            complete(sim.comm, sim.fracture._neighbours, forces, Tag.FORCE)
             assert (forces == nodes.force).all()
             assert len(sim.elements.pressure) == (nodes.n if sim.elements.split else 1)
         size = float(np.abs(exact_sums(sim.comm, np.abs(nodes.mass[:, None] * nodes.v)[nodes.owned])).max())

@@ -4,15 +4,10 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from .bar_1d import Bar, Run, law
+from .bar_1d import Bar, Run, law, published
 
 ENOUGH = 20.0
 """t_0: from here to 25 t_0 fewer than 1 % of all cracks were added in any of the bars below."""
-
-
-def published(x: float) -> float:
-    """Mean size in s_0 at x times rate_0: the fit of Zhou, Molinari and Ramesh (2006)."""
-    return float(4.5 / (1.0 + 4.5 * x ** (2.0 / 3.0)))
 
 
 def stretched(bar: Bar, x: float, end: float) -> Run:

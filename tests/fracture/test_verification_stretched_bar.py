@@ -15,8 +15,7 @@ from conoid.worker.fracture import fragments
 from conoid.worker.parallel.comm import SerialComm
 
 from ..worker.kernels import run
-from .bar_1d import Bar
-from .test_stretched_bar_1d import published
+from .bar_1d import Bar, published
 
 SCENE = """
 name = "bar"

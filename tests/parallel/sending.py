@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from conoid.worker.parallel.comm import Comm, connect
+from conoid.worker.parallel.tags import Tag
 
 
 def talk(comm: Comm) -> list[tuple[str, dict[str, int]]]:
@@ -16,7 +17,7 @@ def talk(comm: Comm) -> list[tuple[str, dict[str, int]]]:
     words, result = np.zeros(9, np.int64), np.zeros(9, np.int64)
 
     def exchange() -> None:
-        standing = comm.exchange([(right, out)], [(left, into)], 1)
+        standing = comm.exchange([(right, out)], [(left, into)], Tag.FORCE)
         for _ in range(4):
             standing.begin()
             standing.finish()

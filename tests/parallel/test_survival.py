@@ -16,7 +16,7 @@ from conoid.cases.outcome import Outcome
 from conoid.cases.outcome import from_json as outcome_from_json
 
 from .launching import command, ended, processes, started, together, wait_until_gone
-from .test_fracture import SCENES, arguments
+from .scenes import SCENES, arguments
 
 STOPPING = Path(__file__).with_name("stopping.py")
 STEPS = 54

@@ -10,6 +10,7 @@ from conoid.worker.domain import Piece, Whole
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.parallel.ownership import SharedSum
+from conoid.worker.parallel.tags import Tag
 from conoid.worker.state import CHUNK, Ints
 
 from .kernels import pieces_of, whole_of
@@ -133,7 +134,7 @@ def test_shared_sums_are_those_of_one_rank(ranks: int) -> None:
     for rank, piece in enumerate(pieces):
         own = np.zeros((len(piece.node_ids), 3), np.int64)
         sums.append(own)
-        shared.append(SharedSum(box.of(rank), piece.neighbours, 3, 1))
+        shared.append(SharedSum(box.of(rank), piece.neighbours, 3, Tag.FORCE))
     for _ in range(2):
         for piece, own, exchange in zip(pieces, sums, shared, strict=True):
             own[:] = 0

@@ -1,25 +1,23 @@
 """Erosion: accounts that close whatever leaves, a surface that follows, particles, parts and ranks without tets."""
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any, TypeVar
-from unittest.mock import patch
 
 import numpy as np
 import pytest
 
 from conoid.cases import schema
-from conoid.worker import digest, domain, simulation, state, step
-from conoid.worker.erosion import Mirrors
+from conoid.worker import digest, state, step
 from conoid.worker.mesh.faces import across, boundary_faces
 from conoid.worker.mesh.model import TetMesh
+from conoid.worker.mirrors import Mirrors
 from conoid.worker.probes import tet_volumes
 from conoid.worker.simulation import Simulation
 
 from ..contact.bodies import meeting_of, moved
-from ..contact.ranks import on_ranks
 from .kernels import COPPER, FORMS, STEEL, Form, build, run
 from .meshes import Floats, block, positive
+from .simulations import on, tick, wear_out
 
 T = TypeVar("T")
 Ints = state.Ints
@@ -35,33 +33,6 @@ def alone(
     """A copper body that wears, by itself and without contact."""
     case = meeting_of([{"erosion": erosion, "velocity": velocity}], material=COPPER, **keys)
     return build(case.model_copy(update={"contact": None}), [mesh])
-
-
-def wear_out(sim: Simulation, gone: "np.ndarray") -> None:
-    """The tets of these ids are to leave in the next step."""
-    assert sim.erosion is not None
-    for part in sim.model.blocks:
-        if len(part.worn):
-            part.worn[np.isin(part.id, gone)] = True
-    sim.erosion.due = True
-
-
-def tick(sim: Simulation, gone: "np.ndarray | None" = None) -> float:
-    """A step that begins with the loss of these tets; its residual."""
-    if gone is not None:
-        wear_out(sim, gone)
-    before = sim.model.nodes.v.copy()
-    step.first_half(sim)
-    residual = sim.ledger.close(before).residual
-    step.second_half(sim)
-    return residual
-
-
-def on(ranks: int, case: schema.Case, meshes: Sequence[TetMesh], work: Callable[[Simulation], T]) -> list[T]:
-    """What ``work`` makes of the simulation of each rank."""
-    ready = iter(meshes)
-    with patch.object(domain, "build_mesh", lambda *_, **__: next(ready)):
-        return on_ranks(ranks, lambda comm: work(simulation.build(case, Path(), comm)))
 
 
 # Accounts

@@ -16,7 +16,7 @@ from conoid.worker.simulation import Simulation
 from ..contact.bodies import meeting_of, moved
 from .kernels import build, whole_of
 from .meshes import block
-from .test_erosion import on, tick
+from .simulations import on, tick
 
 MM = 1e-3
 MESH = block((7, 4, 4), 1e-3, seed=3)

@@ -11,9 +11,9 @@ from numba import njit
 
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, complete
+from ..parallel.tags import Tag
 from ..state import Block, Floats, Nodes
 
-_COURSE_TAG = 19
 _QUANTA = 2.0**16
 """A m/s: room for 1e14 m/s."""
 _THIN = 1e-9
@@ -26,7 +26,7 @@ def courses(blocks: list[Block], nodes: Nodes, neighbours: list[Neighbour], comm
     for block in blocks:
         if len(block.bond):
             _add_rigid(sums, block.tets, nodes.x, nodes.v, _QUANTA)
-    complete(comm, neighbours, sums, _COURSE_TAG)
+    complete(comm, neighbours, sums, Tag.COURSE)
     tets = sums[:, 3:]
     return np.asarray(np.where(tets > 0, sums[:, :3] / (_QUANTA * np.maximum(tets, 1)), nodes.v))
 

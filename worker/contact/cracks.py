@@ -21,7 +21,7 @@ from .meetings import DEEP_SELF, NEAR, needed
 _WIDE = 0.1
 """Of the typical size of a face: two sides that have moved so far apart are surface from then on."""
 _FORESEEN = 0.3
-"""Of that width: a search takes up the sides of a crack as wide as this, so that it need not be called when they open."""
+"""Of that width: a search takes up the sides of a crack as wide as this, so that none is called when they open."""
 
 
 @dataclass
@@ -121,8 +121,8 @@ def touching(table, flags):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    "UniTuple(int64, 2)(int32[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], int32[::1], "
-    "int64, int64[::1], int32[:, ::1], float64, float64[:, ::1], float64[:, ::1], int32[::1], float64[:, ::1], float64)",
+    "UniTuple(int64, 2)(int32[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], int32[::1], int64, "
+    "int64[::1], int32[:, ::1], float64, float64[:, ::1], float64[:, ::1], int32[::1], float64[:, ::1], float64)",
     cache=True,
     error_model="numpy",
 )

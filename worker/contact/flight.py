@@ -22,9 +22,7 @@ _SPENT = 0.4
 class Flight:
     """The surface of one rank in motion."""
 
-    def __init__(
-        self, found: Surface, nodes: Nodes, mobility: Floats, skin: float, size: float, comm: Comm
-    ) -> None:
+    def __init__(self, found: Surface, nodes: Nodes, mobility: Floats, skin: float, size: float, comm: Comm) -> None:
         """``mobility`` (nodes, 3): see records.Crowd; ``skin``: of ``size``, the typical one of a face, m."""
         self._comm, self._size, self._skin = comm, size, skin * size
         self.until = 0.0

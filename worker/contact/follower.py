@@ -386,8 +386,8 @@ def _apart_from_faces(pairs, rows, old, now, first, member, slave, meets):  # ty
 
 @njit("int64[:, ::1](int64[::1], int32[:, ::1], int32[:, ::1], boolean[::1])", cache=True)
 def _apart_from_edges(order, old, now, own):  # type: ignore[no-untyped-def]
-    """(p, 2) pairs of edges that had an end in common before the split and have none now, the one of smaller faces first,
-    where that is this rank's own.
+    """(p, 2) pairs of edges that had an end in common before the split and have none now, where the one of smaller
+    faces, the first, is this rank's own.
 
     ``old`` and ``now`` (e, 2 and 4): their nodes; ``order``: of the ends, flat, by node.
     """

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
+from ..parallel.tags import Tag
 from ..state import Floats, Indices, Ints, Nodes
 from .records import Crowd, Edges, Faces
 
@@ -28,7 +29,8 @@ def unpack(words: Ints) -> tuple[Faces, Edges, Crowd]:
     ends = np.cumsum([2, f, 4 * f, f, f, 4 * e, 2 * e, e, 2 * e])
     pieces = [words[a:b] for a, b in pairwise(ends)]
     faces = Faces(pieces[0], pieces[1].reshape(f, 4), pieces[2].view(np.float64), pieces[3] > 0)
-    edges = Edges(pieces[4].reshape(e, 4), pieces[5].reshape(e, 2), pieces[6].view(np.float64), pieces[7].reshape(e, 2) > 0)
+    sides, size, exposed = pieces[5].reshape(e, 2), pieces[6].view(np.float64), pieces[7].reshape(e, 2) > 0
+    edges = Edges(pieces[4].reshape(e, 4), sides, size, exposed)
     return faces, edges, unpack_crowd(words[ends[-1] :])
 
 
@@ -100,7 +102,7 @@ def _company(table: Ints, rank: int) -> Ints:
 class Copies:
     """Positions and velocities of nodes, before and after the kick, sent in every step by a rank that holds them."""
 
-    def __init__(self, sends: list[Neighbour], receives: list[Neighbour], comm: Comm, tag: int) -> None:
+    def __init__(self, sends: list[Neighbour], receives: list[Neighbour], comm: Comm, tag: Tag) -> None:
         """``sends``: local nodes, ``receives``: places in the crowd."""
         self.sends, self.receives = sends, receives
         self._from, self._to = (_joined([some.nodes for some in each]) for each in (sends, receives))
@@ -143,7 +145,7 @@ def _slices(buffer: Floats, others: list[Neighbour]) -> list[tuple[int, Ints]]:
     return [(other.rank, words[end - len(other.nodes) : end]) for other, end in zip(others, ends, strict=True)]
 
 
-def copies(crowd: Crowd, nodes: Nodes, comm: Comm, tag: int) -> Copies:
+def copies(crowd: Crowd, nodes: Nodes, comm: Comm, tag: Tag) -> Copies:
     """The standing order for the state of the nodes of ``crowd`` that are not held here, with their owners; all ranks
     take part.
     """

@@ -320,8 +320,8 @@ def edge_edge(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """Edges that pass an edge, from row ``n`` on; returns the new number of rows. They meet where they cross.
 
-    ``pairs`` (p, 2): two edges, of which ``some`` are looked at; ``edges`` (e, 4): records.Edges, which meet others when
-    both of their faces are ``exposed`` (e, 2).
+    ``pairs`` (p, 2): two edges, of which ``some`` are looked at; ``edges`` (e, 4): records.Edges, which meet others
+    when both of their faces are ``exposed`` (e, 2).
     """
     u, w, r, m = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     u0, w0, r0 = np.empty(3), np.empty(3), np.empty(3)

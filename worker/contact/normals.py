@@ -10,12 +10,12 @@ from numba import njit
 from ..mesh.faces import FACES
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, complete
+from ..parallel.tags import Tag
 from ..state import WIDE, Flags, Floats, Indices, Ints, Model
 from .sweeps import SHARES
 
 EVERY = 16
 """Steps. A fragment that turns at 1e5 rad/s (100 m/s over 1 mm) turns by 3 degrees meanwhile."""
-_NORMAL_TAG = 14
 _NOTHING = 1e-300
 """m^2: keeps a face of no area from a division by zero."""
 
@@ -27,7 +27,7 @@ def moments(model: Model, planes: Flags, size: float, neighbours: list[Neighbour
     sums = np.zeros((model.nodes.n, 9), np.int64)
     for block in model.blocks:
         _add_exposed(sums, model.nodes.x, block.tets, block.across, block.bond, planes, SHARES / size**2)
-    complete(comm, neighbours, sums, _NORMAL_TAG)
+    complete(comm, neighbours, sums, Tag.NORMAL)
     return sums
 
 

@@ -147,8 +147,8 @@ class Rest:
         """
         end, wait, trail, nodes = self._t + self._dt, self._node_face, self._faces, self._nodes
         _settle_nodes(
-            wait.until, wait.speed, wait.turned, pairs, node_face, faces, size, normals, x, self._v, part, nodes.path, nodes.reach,
-            trail.path, trail.reach, end,
+            wait.until, wait.speed, wait.turned, pairs, node_face, faces, size, normals, x, self._v, part, nodes.path,
+            nodes.reach, trail.path, trail.reach, end,
         )  # fmt: skip
         wait, trail = self._edge_edge, self._edges
         _settle_edges(
@@ -224,7 +224,9 @@ def _bent(out, x, s, i, j, k, m):  # type: ignore[no-untyped-def]
     cache=True,
     error_model="numpy",
 )
-def _settle_nodes(until, speed, turned, some, pairs, faces, size, out, x, v_then, part, path1, reach1, path2, reach2, end):  # type: ignore[no-untyped-def]
+def _settle_nodes(
+    until, speed, turned, some, pairs, faces, size, out, x, v_then, part, path1, reach1, path2, reach2, end
+):  # type: ignore[no-untyped-def]
     b, m = np.empty(3), np.empty(3)
     for p in some:
         if np.isnan(until[p]):

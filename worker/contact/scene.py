@@ -8,6 +8,7 @@ from numba import njit
 
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum, same
+from ..parallel.tags import Tag
 from ..state import Flags, Floats, Indices, Ints, Nodes, among
 from . import domain, ghosts, meetings, search, sift
 from .ghosts import Copies
@@ -15,8 +16,6 @@ from .meetings import DEEP, DEEP_SELF, Meetings
 from .records import Crowd, Edges, Faces, merged
 from .rest import Rest
 from .search import Boxes, Things
-
-_COPY_TAG, _SHARE_TAG, _PUSH_TAG = 11, 12, 13
 
 
 @dataclass(frozen=True)
@@ -152,7 +151,7 @@ class Scene:
         """Sets up the messages: sums over the nodes of the company, copies of what is not held here; all ranks take
         part.
         """
-        self.copies = ghosts.copies(self.crowd, nodes, comm, _COPY_TAG)
+        self.copies = ghosts.copies(self.crowd, nodes, comm, Tag.GHOST)
         self._sum(company, comm)
 
     def extend(self, company: list[Neighbour], sends: list[Neighbour], receives: list[Neighbour], comm: Comm) -> None:
@@ -160,7 +159,7 @@ class Scene:
         if same([*self.company, *self.copies.sends, *self.copies.receives], [*company, *sends, *receives]):
             return
         self.free()
-        self.copies = Copies(sends, receives, comm, _COPY_TAG)
+        self.copies = Copies(sends, receives, comm, Tag.GHOST)
         self._sum(company, comm)
 
     def _sum(self, company: list[Neighbour], comm: Comm) -> None:
@@ -168,8 +167,8 @@ class Scene:
         self.shared = np.zeros(self.crowd.n, bool)
         for some in company:
             self.shared[some.nodes] = True
-        self.shared_shares = SharedSum(comm, company, 4, _SHARE_TAG)
-        self.shared_impulse = SharedSum(comm, company, 3, _PUSH_TAG)
+        self.shared_shares = SharedSum(comm, company, 4, Tag.CONTACT_SHARE)
+        self.shared_impulse = SharedSum(comm, company, 3, Tag.CONTACT_IMPULSE)
 
     def remember(self, keys: Ints, kept: Floats, nodes: Nodes, comm: Comm) -> None:
         """Takes over what candidates of another search, with their ``keys``, have ``kept``; all ranks take part.
@@ -339,7 +338,8 @@ def compact(
     return Scene(
         crowd=crowd, held=held, local=crowd.local[held], faces=now[corners], face_id=faces.id,
         face_size=faces.size, face_exposed=faces.exposed, edges=now[ends], edge_sides=edges.sides,
-        edge_size=edges.size, edge_exposed=edges.exposed, edge_own=mine, meets_itself=rules.allowed.diagonal().copy(), slave=slave[needed],
+        edge_size=edges.size, edge_exposed=edges.exposed, edge_own=mine,
+        meets_itself=rules.allowed.diagonal().copy(), slave=slave[needed],
         on_surface=np.zeros(crowd.n, bool), first=first, next=following,
         node_face=pairs, edge_edge=edge_at[edge_edge],
         keys=keys, kept=np.zeros((len(keys), 4)), faces_sent=sent,

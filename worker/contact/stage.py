@@ -14,7 +14,7 @@ import numpy as np
 
 from conoid.cases.schema import Case
 
-from ..boundaries import Boundary, PrescribedVelocity, SymmetryPlane
+from ..boundaries import FREE, MIRRORED, Boundary
 from ..clock import Clock
 from ..errors import InputError
 from ..migration.parcel import Parcel
@@ -47,7 +47,7 @@ Parted = tuple[Indices, Indices]
 """Which meetings have nodes that another rank shares, and which have none."""
 
 
-class Contact(Boundary):
+class Contact:
     """The contact of a case on one rank."""
 
     def __init__(
@@ -55,7 +55,12 @@ class Contact(Boundary):
         comm: Comm, clock: Clock, timers: Timers, extremes: tuple[float, float],
     ) -> None:  # fmt: skip
         """``extremes``: largest nodal mass, kg, and speed, m/s, of the scene."""
-        super().__init__(np.arange(model.nodes.n, dtype=np.int32))
+        self.contact_loss = np.zeros(model.nodes.n)
+        """(nodes,) energy lost by impact and friction, J."""
+        self.external_work = np.zeros(model.nodes.n)
+        """(nodes,) work that what holds nodes does against contact, J."""
+        self.last_push = 0.0
+        """Last time at which nodes of this rank were pushed, s."""
         assert case.contact is not None
         self._sweeps = case.contact.sweeps
         self._model, self._neighbours, self._comm = model, neighbours, comm
@@ -79,7 +84,7 @@ class Contact(Boundary):
         self.due = True
         """Whether the next step begins with a search."""
         self.limit = 0.0
-        """One over the step in which no node passes more than half of a tet that it meets, 1/s; as all ranks have agreed."""
+        """One over the step in which no node of any rank passes more than half of a tet that it meets, 1/s."""
         self.approach = 0.0
         """The same of the last step of this rank."""
         self._changed = False
@@ -100,10 +105,13 @@ class Contact(Boundary):
         self._kept: tuple[Ints, Floats] = np.zeros((0, 2), np.int64), np.zeros((0, 4))
         """Candidates with friction, and what they have kept, that the next search takes over from elsewhere."""
 
-    def keep(self, parcel: Parcel, name: str) -> None:
-        """All but what was found of candidates: a search finds it again."""
-        super().keep(parcel, name)
-        parcel.known["contact"] = self._scale, self._friction.scale, self.limit, self.searches, self._mean_dt, self._size
+    def keep(self, parcel: Parcel) -> None:
+        """Adds all but what was found of candidates: a search finds it again."""
+        parcel.nodes["contact.contact_loss"] = self.contact_loss
+        parcel.nodes["contact.external_work"] = self.external_work
+        parcel.known["contact"] = (
+            self._scale, self._friction.scale, self.limit, self.searches, self._mean_dt, self._size
+        )  # fmt: skip
         parcel.sums["contact.parts"], parcel.sums["contact.friction"] = self._parts, self._friction.words
         parcel.rows["contact.cracks"] = self._cracks.keep(parcel.nodes["id"])
         parcel.nodes["contact.flags"], parcel.nodes["contact.moments"] = self._surface.flags, self._moments
@@ -116,13 +124,16 @@ class Contact(Boundary):
         parcel.nodes["contact.total"] = total
         parcel.rows["contact.kept"] = {"node": keys[:, 0], "face": keys[:, 1], "kept": kept}
 
-    def resume(self, parcel: Parcel, name: str, dt: float) -> None:
-        super().resume(parcel, name, dt)
-        self._scale, self._friction.scale, self.limit, self.searches, self._mean_dt, self._size = (
-            parcel.known["contact"]
-        )
+    def resume(self, parcel: Parcel) -> None:
+        """Takes it back; all ranks take part."""
+        self.contact_loss = np.array(parcel.nodes["contact.contact_loss"])
+        self.external_work = np.array(parcel.nodes["contact.external_work"])
+        self._scale, self._friction.scale, self.limit, self.searches, self._mean_dt, self._size = parcel.known[
+            "contact"
+        ]
         self._parts, self._friction.words = parcel.sums["contact.parts"], parcel.sums["contact.friction"]
-        self._surface.flags, self._moments = parcel.nodes["contact.flags"], parcel.nodes["contact.moments"]
+        self._surface.flags = np.array(parcel.nodes["contact.flags"])
+        self._moments = np.array(parcel.nodes["contact.moments"])
         state = self._model.nodes
         self._flight = Flight(self._surface, state, self._mobility, self._skin, self._size, self._comm)
         self._rules = replace(self._rules, cell=2.0 * self._size)
@@ -285,32 +296,42 @@ class Contact(Boundary):
         if self._stale or len(self._cracks.faces):
             self._surface, self._stale, self._changed = self._build(self._surface.flags), False, True
 
-    def _inherit(self, at: Ints, copies: Indices) -> None:
-        super()._inherit(at, copies)
-        self._mobility = extended(self._mobility, self._mobility[at])
-        self._planes = extended(self._planes, self._planes[at])
-        for some in (at, copies):
+    def grow(self, split: Split, ids: Ints) -> None:
+        """Takes up the copies of nodes; what has been booked stays with their parents."""
+        parents, none = split.copies.parents, np.zeros(split.copies.n)
+        self.contact_loss = extended(self.contact_loss, none)
+        self.external_work = extended(self.external_work, none)
+        self._mobility = extended(self._mobility, self._mobility[parents])
+        self._planes = extended(self._planes, self._planes[parents])
+        for some in (parents, split.first + np.arange(split.copies.n)):
             free = self._mobility[some] > 0.0
             self._mobility[some] = np.where(free, 1.0 / self._model.nodes.mass[some, None], 0.0)
 
     def note(self, state: Nodes) -> None:
-        with self._timers.phase("contact"):
-            if self._scene is not None:
+        """Before the kick: keeps v(n-1/2), and books the second half of the last impulses' work."""
+        if self._scene is not None:
+            with self._timers.phase("contact"):
                 self._look(self._scene, state)
                 self._book(self._scene)
                 self._scene.total[:] = 0
-            elif len(self._total):
-                self._book_resumed(state)
-            if self._clock.dt > 0.0:
-                if self._clock.step % normals.EVERY == 0:
-                    self._look_round()
-                    if self._scene is not None:
-                        self._face(self._scene, self._scene.local)
-                        self._scene.rest.turn()
-                if self.due or self._scene is None:
-                    self._search(state)
+        elif len(self._total):
+            self._book_resumed(state)
 
-    def apply(self, state: Nodes, dt: float, t: float) -> None:
+    def search_if_due(self, state: Nodes) -> None:
+        """Finds the candidate pairs of the next steps, when that is due; all ranks take part."""
+        if not self._clock.dt > 0.0:
+            return
+        with self._timers.phase("contact"):
+            if self._clock.step % normals.EVERY == 0:
+                self._look_round()
+                if self._scene is not None:
+                    self._face(self._scene, self._scene.local)
+                    self._scene.rest.turn()
+            if self.due or self._scene is None:
+                self._search(state)
+
+    def solve(self, state: Nodes, dt: float, t: float) -> None:
+        """After the kick: the impulses of active contacts correct v(n+1/2) at time ``t``, s; all ranks take part."""
         if dt > 0.0 and self._scene is not None:
             with self._timers.phase("contact"):
                 self._push(self._scene, state, dt, t)
@@ -471,11 +492,7 @@ def _mobility(nodes: Nodes, bounds: list[Boundary]) -> tuple[Floats, Flags]:
     mobility = np.repeat(1.0 / nodes.mass[:, None], 3, axis=1)
     planes = np.zeros((nodes.n, 3), bool)
     for bound in bounds:
-        if isinstance(bound, SymmetryPlane):
-            planes[bound.nodes, bound.axis] = True
-        elif isinstance(bound, PrescribedVelocity):
-            rows = mobility[bound.nodes]
-            rows[bound.held] = 0.0
-            mobility[bound.nodes] = rows
-    mobility[planes] = 0.0
+        components = bound.held_components()
+        mobility[bound.nodes] = np.where(components == FREE, mobility[bound.nodes], 0.0)
+        planes[bound.nodes] |= components == MIRRORED
     return mobility, planes

@@ -8,12 +8,12 @@ from ..mesh.faces import FACES
 from ..mesh.faces import normals as face_normals
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, complete
+from ..parallel.tags import Tag
 from ..state import LAID_BARE, Flags, Indices, Ints, Model
 from .records import Edges, Faces
 
 SHARP = np.cos(np.radians(25.0))
 """Edges between faces whose initial normals differ by more than this can meet other edges."""
-_FLAG_TAG = 10
 
 
 @dataclass
@@ -40,8 +40,8 @@ def build(
     """The surface; all ranks take part.
 
     ``planes`` (nodes, 3) says which nodes lie on a symmetry plane across an axis: faces in such a plane are no surface.
-    ``cracks`` (m, 3): block, place and face of the sides here of cracks that may open before the next search. Faces that
-    erosion has laid bare meet nodes; their edges meet no edges, for they would be as many as the faces, and all sharp.
+    ``cracks`` (m, 3): block, place and face of the sides here of cracks that may open before the next search. Faces
+    that erosion has laid bare meet nodes; their edges meet no edges: they would be as many as the faces, and all sharp.
     """
     local, ids, exposed, bare = _faces(model, planes, cracks)
     flags = _flags(local[exposed], model.nodes.n, neighbours, comm)
@@ -86,7 +86,7 @@ def _faces(model: Model, planes: Flags, cracks: Indices) -> tuple["np.ndarray", 
 def _flags(faces: "np.ndarray", n: int, neighbours: list[Neighbour], comm: Comm) -> Flags:
     counts = np.zeros((n, 1), np.int64)
     counts[faces[:, :3]] = 1
-    complete(comm, neighbours, counts, _FLAG_TAG)
+    complete(comm, neighbours, counts, Tag.SURFACE)
     return np.asarray(counts[:, 0] > 0)
 
 
@@ -98,8 +98,8 @@ def _none() -> tuple[Edges, Ints, Indices]:
 
 _LOW, _HIGH, _THIRD, _OWNER, _FACE, _TURNED, _EXPOSED, _LENGTH, _NORMAL = 0, 1, 2, 3, 4, 5, 6, 7, 8
 """Columns of a half edge, an edge as one face sees it: its nodes, the third node of the face and its owner, the face,
-whether the face runs from high to low, whether it is exposed, initial length, m, and the unit normal of the face; floats
-as their bits."""
+whether the face runs from high to low, whether it is exposed, initial length, m, and the unit normal of the face;
+floats as their bits."""
 _HALF, _ROW = 11, 11
 """Columns of a half edge, and of an edge (``_paired``)."""
 

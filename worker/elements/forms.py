@@ -13,11 +13,10 @@ from ..migration.parcel import Parcel
 from ..parallel import fixed_point
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum
+from ..parallel.tags import Tag
 from ..state import CHUNK, Block, Copies, Floats, Ints, Model, extended
 from ..timers import Timers
 from . import pressure, sweep, tet4
-
-_FORCE_TAG, _VOLUME_TAG = 1, 2
 
 
 class Bridges(Protocol):
@@ -154,7 +153,7 @@ class Elements:
         return [self.shared_forces]
 
     def _connect(self) -> None:
-        self.shared_forces = SharedSum(self._comm, self._neighbours, 3, _FORCE_TAG)
+        self.shared_forces = SharedSum(self._comm, self._neighbours, 3, Tag.FORCE)
 
     def _send(self) -> None:
         self.shared_forces.begin(self.model.nodes.force)
@@ -219,9 +218,9 @@ class AveragedElements(Elements):
 
     def _connect(self) -> None:
         super()._connect()
-        self.shared_volumes = SharedSum(self._comm, self._neighbours, 2, _VOLUME_TAG)
+        self.shared_volumes = SharedSum(self._comm, self._neighbours, 2, Tag.VOLUME)
         if self.split:
-            self.shared_gradients = SharedSum(self._comm, self._neighbours, 3, _FORCE_TAG + 2)
+            self.shared_gradients = SharedSum(self._comm, self._neighbours, 3, Tag.GRADIENT)
 
     def grow(self, copies: Copies) -> None:
         super().grow(copies)

@@ -10,11 +10,11 @@ from ..mesh.faces import FACES
 from ..mesh.faces import areas as face_areas
 from ..parallel.comm import Comm, Exchange
 from ..parallel.ownership import Neighbour
+from ..parallel.tags import Tag
 from ..state import INTACT, MASS, Block, Flags, Floats, Indices, Ints, Tets
 from . import criterion
 from .strength import Toughness
 
-_FAR_TAG = 17
 _BATCH = 10_000
 """Tets that are made ready together, so that it takes no memory to speak of."""
 ELSEWHERE = -2
@@ -147,7 +147,7 @@ class Far:
         self._exchange: Exchange = comm.exchange(
             [(rank, self._own[cut].view(np.int64)) for rank, cut in cuts],
             [(rank, self._theirs[cut].view(np.int64)) for rank, cut in cuts],
-            _FAR_TAG,
+            Tag.TRACTION,
         )
 
     def look(self, x: Floats) -> list[tuple[Loaded, Ints]]:

@@ -11,12 +11,12 @@ from numba import njit
 from ..mesh.faces import FACES
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, complete
+from ..parallel.tags import Tag
 from ..state import CHUNK, MASS, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, Flags, Floats, Nodes
 from .bodies import Body, Loaded
 from .criterion import effective, outward
 from .stars import Stars
 
-_TAG = 18
 _QUANTA = 2.0**30
 """Quanta to the strength, and to the mass of the heaviest tet."""
 _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
@@ -49,7 +49,7 @@ def stresses(
             sums, some, star.first, star.count, star.pool, block.state.reshape(-1), block.state.shape[1],
             _QUANTA / strength[k], _QUANTA / heaviest[k],
         )  # fmt: skip
-    complete(comm, neighbours, sums, _TAG)
+    complete(comm, neighbours, sums, Tag.NODAL_STRESS)
     return np.asarray(sums[:, :6] / np.maximum(sums[:, 6:], 1) * strength[nodes.part][:, None])
 
 

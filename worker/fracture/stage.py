@@ -15,7 +15,6 @@ from conoid.cases.library import material as find_material
 from conoid.cases.schema import Case
 from conoid.cases.schema import Fracture as Spec
 
-from ..boundaries import Boundary
 from ..clock import Clock
 from ..contact.stage import Contact
 from ..elements.forms import Elements
@@ -24,8 +23,9 @@ from ..migration.parcel import Parcel
 from ..parallel.comm import Comm
 from ..parallel.fixed_point import exact_sums
 from ..parallel.ownership import Neighbour, complete
+from ..parallel.tags import Tag
 from ..state import MASS, Flags, Floats, Indices, Ints, Model
-from ..topology import Split
+from ..topology import KeptByNode, Split
 from . import bodies, nodal
 from .bodies import Body, Far, Loaded
 from .cohesive import Cohesion, Facets, inserted
@@ -33,7 +33,6 @@ from .order import strongest
 from .separation import Broken, Separation
 from .strength import Toughness, toughness
 
-_TAG = 16
 _LEAST = 0.05
 """Of the square of the highest frequency that a step resolves: what cohesive facets may use at least."""
 _SHARES = 24.0
@@ -99,12 +98,12 @@ class Fracture:
     """The fracture of a case on one rank."""
 
     def __init__(
-        self, case: Case, model: Model, neighbours: list[Neighbour], elements: Elements, boundaries: list[Boundary],
+        self, case: Case, model: Model, neighbours: list[Neighbour], elements: Elements, by_node: list[KeptByNode],
         contact: Contact | None, comm: Comm, clock: Clock,
     ) -> None:  # fmt: skip
-        """All ranks take part."""
+        """``by_node``: besides the elements, what has arrays by node. All ranks take part."""
         self._model, self._neighbours, self._elements = model, neighbours, elements
-        self._boundaries, self._contact = boundaries, contact
+        self._by_node, self._contact = by_node, contact
         self._comm, self._clock = comm, clock
         specs = [part.fracture for part in case.parts if part.fracture is not None]
         self._smooth = any(spec.traction == "nodes" for spec in specs)
@@ -288,8 +287,8 @@ class Fracture:
 
     def _tell_everybody(self, split: Split) -> None:
         self._elements.grow(split.copies)
-        for boundary in self._boundaries:
-            boundary.grow(split, self._model.nodes.id)
+        for each in self._by_node:
+            each.grow(split, self._model.nodes.id)
 
     def _hand_over(self, split: Split, fresh: list[Facets]) -> None:
         """Forces of the present, of the tets and cohesive facets of copies, from their parents to them."""
@@ -313,7 +312,7 @@ class Fracture:
             self._scatter(change, some, now, facets.pull[moved], 1)
             for facets in fresh:
                 self._scatter(change, some, facets.nodes, facets.pull, 1)
-        complete(self._comm, self._among(some), change, _TAG)
+        complete(self._comm, self._among(some), change, Tag.SEPARATED_FORCE)
         nodes.force[some] += change
 
     def _among(self, some: Ints) -> list[Neighbour]:

@@ -15,8 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..state import Ints
-
-_SWAP_TAG = 90
+from .tags import Tag
 
 
 @dataclass
@@ -73,7 +72,7 @@ class Comm(Protocol):
     def maximum(self, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Element-wise maximum over all ranks."""
 
-    def exchange(self, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: int) -> "Exchange":
+    def exchange(self, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: Tag) -> "Exchange":
         """A repeatable exchange of fixed buffers with other ranks."""
 
     def swap(self, sends: dict[int, Ints]) -> dict[int, Ints]:
@@ -142,7 +141,7 @@ class SerialComm:
     def maximum(self, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         return values.copy()
 
-    def exchange(self, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: int) -> Exchange:
+    def exchange(self, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: Tag) -> Exchange:
         if sends or receives:
             raise ValueError("one rank has nobody to exchange with")
         return _Done()
@@ -222,7 +221,7 @@ class MpiComm:
             self._world.Allreduce(values, result, self._mpi.MAX)
         return result
 
-    def exchange(self, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: int) -> Exchange:
+    def exchange(self, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: Tag) -> Exchange:
         requests = [self._world.Recv_init(buffer, source, tag) for source, buffer in receives]
         requests += [self._world.Send_init(buffer, target, tag) for target, buffer in sends]
         size = sum(buffer.nbytes for _, buffer in sends)
@@ -241,8 +240,8 @@ class MpiComm:
             self._world.Alltoall(counts, theirs)
         received = {rank: np.empty(count, np.int64) for rank, count in enumerate(theirs.tolist()) if count}
         if received or mine:
-            requests = [self._world.Irecv(buffer, rank, _SWAP_TAG) for rank, buffer in received.items()]
-            requests += [self._world.Isend(words, rank, _SWAP_TAG) for rank, words in mine.items()]
+            requests = [self._world.Irecv(buffer, rank, Tag.SWAP) for rank, buffer in received.items()]
+            requests += [self._world.Isend(words, rank, Tag.SWAP) for rank, words in mine.items()]
             with self.waiting():
                 self._mpi.Request.Waitall(requests)
         return received
@@ -274,9 +273,9 @@ class MpiComm:
             if self.rank == 0:
                 assert items is not None
                 for target in range(1, self.size):
-                    self._world.send(items[target], target)
+                    self._world.send(items[target], target, Tag.SCATTER)
                 return items[0]
-            return self._world.recv(source=0)
+            return self._world.recv(source=0, tag=Tag.SCATTER)
 
     def broadcast(self, item: Any) -> Any:
         self.sent.collective(number=2)

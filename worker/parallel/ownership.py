@@ -11,6 +11,7 @@ from numba import njit
 
 from ..state import Indices, Ints
 from .comm import Comm
+from .tags import Tag
 
 
 @dataclass
@@ -40,7 +41,7 @@ def _add(sums, nodes, buffer):  # type: ignore[no-untyped-def]
             sums[nodes[i], k] += buffer[i, k]
 
 
-def complete(comm: Comm, neighbours: list[Neighbour], sums: Ints, tag: int) -> None:
+def complete(comm: Comm, neighbours: list[Neighbour], sums: Ints, tag: Tag) -> None:
     """Completes nodal sums (nodes, columns) once; all ranks take part."""
     shared = SharedSum(comm, neighbours, sums.shape[1], tag)
     shared.begin(sums)
@@ -51,7 +52,7 @@ def complete(comm: Comm, neighbours: list[Neighbour], sums: Ints, tag: int) -> N
 class SharedSum:
     """Completes nodal sums, (nodes, ``columns``) int64, again and again."""
 
-    def __init__(self, comm: Comm, neighbours: list[Neighbour], columns: int, tag: int) -> None:
+    def __init__(self, comm: Comm, neighbours: list[Neighbour], columns: int, tag: Tag) -> None:
         self._nodes = [n.nodes for n in neighbours]
         self._every = np.concatenate([np.zeros(0, np.int32), *self._nodes])
         self._out, self._in = (np.zeros((len(self._every), columns), np.int64) for _ in range(2))

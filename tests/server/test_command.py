@@ -18,7 +18,7 @@ from conoid.server.settings import Settings, SettingsError, loopback, usable_cor
 from conoid.server.store import Store, StoreError
 from conoid.server.tokens import check_token
 
-from .conftest import MakeProcess
+from .running import MakeProcess
 
 Said = Callable[..., tuple[int, str, str]]
 

@@ -15,7 +15,7 @@ from conoid.cases.messages import from_msgpack
 from conoid.server.store import Token
 from conoid.server.telemetry import Telemetry, TelemetryError
 
-from .conftest import PATIENCE, MakeProcess
+from .running import PATIENCE, MakeProcess
 
 ANN, BOB = (Token(f"t{name}", name, "", frozenset({"read"}), 0.0) for name in ("ann", "bob"))
 

@@ -14,7 +14,7 @@ import pytest
 from conoid.cases.run import State
 from conoid.server.folder import Submission, create, new_id
 
-from .conftest import PATIENCE, TOML, MakeProcess, Process, User, case_text, processes
+from .running import PATIENCE, TOML, MakeProcess, Process, User, case_text, processes
 
 SLOTS = 12
 

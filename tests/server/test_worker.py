@@ -15,7 +15,7 @@ import zenoh
 from conoid.cases.messages import from_msgpack
 from conoid.cases.run import State
 
-from .conftest import PATIENCE, Process, User
+from .running import PATIENCE, Process, User
 
 COLD = 240.0
 """s for a run whose kernels must be compiled first."""

@@ -1,4 +1,4 @@
-"""Servers to test: one in this process, one of its own, both with a worker that computes nothing."""
+"""Servers in this process and in one of their own, and those who use them; the workers compute nothing."""
 
 import json
 import os
@@ -13,13 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import httpx2
-import pytest
-from starlette.testclient import TestClient
 
 from conoid.cases.run import State
-from conoid.server.app import build_app, opened
 from conoid.server.service import Service
-from conoid.server.settings import Caps, Settings
 from conoid.server.store import Store
 from conoid.server.tokens import create_token
 
@@ -107,32 +103,6 @@ class Running:
     nobody: User
 
 
-@pytest.fixture
-def settings(tmp_path: Path) -> Settings:
-    return Settings(
-        runs=tmp_path / "runs", port=0, zenoh_port=None, slots=2, worker=FAKE, grace=0.5, caps=Caps(free_disk=0)
-    )
-
-
-@pytest.fixture
-def server(settings: Settings) -> Iterator[Running]:
-    with opened(settings) as service, TestClient(build_app(service), base_url="http://127.0.0.1") as client:
-        users = []
-        for name in ("ann", "bob"):
-            token = create_token(service.store, name, frozenset({"read", "submit", "metrics"}))
-            users.append(User(_like(client, token), name, settings.runs))
-        yield Running(service, users[0], users[1], User(client, "nobody", settings.runs))
-        service.supervisor.end_all()
-        assert not service.supervisor._watches, "a worker outlived its test"
-
-
-def _like(client: TestClient, token: str) -> TestClient:
-    """A client of the same server, inside the same event loop, with a token."""
-    other = TestClient(client.app, base_url="http://127.0.0.1", headers={"Authorization": f"Bearer {token}"})
-    other.portal = client.portal
-    return other
-
-
 @dataclass
 class Process:
     """A server of its own process on a folder, and what it needs to be started again."""
@@ -197,12 +167,6 @@ def processes(folder: Path) -> Iterator[MakeProcess]:
     yield make
     for one in made:
         one.close()
-
-
-@pytest.fixture
-def process(tmp_path: Path) -> Iterator[MakeProcess]:
-    with processes(tmp_path) as make:
-        yield make
 
 
 def _end_workers(folder: Path) -> None:

@@ -6,7 +6,7 @@ from typing import Any
 import httpx2
 import pytest
 
-from .conftest import TOML, Process, User, case_text, processes
+from .running import TOML, Process, User, case_text, processes
 
 BEFORE, AFTER = case_text().split("[parts.mesh]")
 MESH = f"""{BEFORE}[parts.mesh]

@@ -11,7 +11,7 @@ from conoid.cases import layout
 from conoid.cases.run import State
 from conoid.server.launch.local import LocalLauncher
 
-from .conftest import PATIENCE, Running, case_text
+from .running import PATIENCE, Running, case_text
 
 
 def test_a_run_succeeds(server: Running) -> None:

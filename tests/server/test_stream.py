@@ -13,7 +13,7 @@ import pytest
 
 from conoid.cases.run import State
 
-from .conftest import PATIENCE, MakeProcess, User, processes
+from .running import PATIENCE, MakeProcess, User, processes
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from conoid.server.limits import BODY
 from conoid.server.settings import Caps, Settings
 from conoid.server.tokens import check_token, create_token
 
-from .conftest import TOML, Running, case_text
+from .running import TOML, Running, case_text
 
 OPEN = {"/healthz", "/readyz"}
 ROUTES = [

@@ -12,7 +12,7 @@ from starlette.types import Message
 
 from conoid.server.download import respond
 
-from .conftest import PATIENCE, Running
+from .running import PATIENCE, Running
 
 OUTSIDE = [
     "../server.secret",

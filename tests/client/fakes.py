@@ -1,0 +1,58 @@
+"""A Zenoh router with a publisher inside it, and a case for a worker that computes nothing."""
+
+import json
+import socket
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import zenoh
+
+from conoid.cases import keys
+from conoid.cases.messages import AnyMessage, to_msgpack
+from conoid.client.session import Router
+
+OWNER = "ann"
+
+
+@dataclass
+class Broker:
+    """A router with one user, and a publisher inside it."""
+
+    session: zenoh.Session
+    router: Router
+
+    def publish(self, message: AnyMessage) -> None:
+        """Sends a message as a worker does."""
+        key = keys.message_key(keys.run_prefix(OWNER, message.run), message.channel)
+        self.session.put(key, to_msgpack(message))
+
+
+def free_port() -> int:
+    """A port on the loopback address that nobody listens on."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+FAKE_WORKER = f"{sys.executable} {Path(__file__).with_name('fake_worker.py')}"
+
+
+def case_file(folder: Path, ranks: int = 1, **plan: Any) -> Path:
+    """A small case; ``plan`` is for the fake worker."""
+    path = folder / "bar.toml"
+    path.write_text(f"""
+name = "bar"
+title = "A steel bar"
+description = '{json.dumps(plan)}'
+[[parts]]
+name = "rod"
+material = "steel_42crmo4"
+mesh = {{ shape = "box", low = [0, 0, 0], high = [1e-3, 1e-3, 4e-3], element_size = 5e-4, generator = "structured" }}
+[run]
+end_time = "1 us"
+ranks = {ranks}
+""")
+    return path

@@ -1,0 +1,35 @@
+"""The scene that breaks, and its variants."""
+
+from pathlib import Path
+
+CASE = Path(__file__).with_name("breaking.toml")
+"""A cohesive plate of stone, held at one edge, and a brittle block that hits it and the wall below; a metal rod erodes
+on top. Gravity, a symmetry plane, friction, scatter of strength with and without area."""
+SCENES = {
+    "nodal": [],
+    "standard": ["numerics.pressure=standard"],
+    "split": ["numerics.pressure=split"],
+    "smooth": ["contact.friction=0.0"],
+    "instant": ["parts[0].fracture.model=instant", "parts[0].fracture.delay=0"],
+    "cohesive": ["parts[1].fracture.model=cohesive", "parts[1].fracture.delay=0"],
+    "box": ["contact.domain=box"],
+    "ordered": ["parts[0].fracture.order=local_maximum", "parts[1].fracture.order=local_maximum"],
+    "no_edges": ["contact.edges=false"],
+    "nodes": ["parts[0].fracture.traction=nodes", "parts[1].fracture.traction=nodes"],
+    "traction": [],
+}
+TRACTION = """
+[[boundaries]]
+kind = "traction"
+parts = ["plate"]
+low = ["-1 mm", "2.9 mm", "-1 mm"]
+high = ["9 mm", "3.1 mm", "9 mm"]
+stress = ["20 MPa", "150 MPa", "0 Pa"]
+"""
+
+
+def arguments(name: str, root: Path, folder: Path) -> list[str]:
+    """The worker's; the case of the scene lies in ``root``."""
+    case = root / f"{name}.toml"
+    case.write_text(CASE.read_text(encoding="utf-8") + (TRACTION if name == "traction" else ""), encoding="utf-8")
+    return [str(case), *(word for change in SCENES[name] for word in ("--set", change)), "--out", str(folder / name)]

@@ -1,0 +1,45 @@
+"""Servers to test: one in this process, one of its own, both with a worker that computes nothing."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from starlette.testclient import TestClient
+
+from conoid.server.app import build_app, opened
+from conoid.server.settings import Caps, Settings
+from conoid.server.tokens import create_token
+
+from .running import FAKE, MakeProcess, Running, User, processes
+
+
+@pytest.fixture
+def settings(tmp_path: Path) -> Settings:
+    return Settings(
+        runs=tmp_path / "runs", port=0, zenoh_port=None, slots=2, worker=FAKE, grace=0.5, caps=Caps(free_disk=0)
+    )
+
+
+@pytest.fixture
+def server(settings: Settings) -> Iterator[Running]:
+    with opened(settings) as service, TestClient(build_app(service), base_url="http://127.0.0.1") as client:
+        users = []
+        for name in ("ann", "bob"):
+            token = create_token(service.store, name, frozenset({"read", "submit", "metrics"}))
+            users.append(User(_like(client, token), name, settings.runs))
+        yield Running(service, users[0], users[1], User(client, "nobody", settings.runs))
+        service.supervisor.end_all()
+        assert not service.supervisor._watches, "a worker outlived its test"
+
+
+def _like(client: TestClient, token: str) -> TestClient:
+    """A client of the same server, inside the same event loop, with a token."""
+    other = TestClient(client.app, base_url="http://127.0.0.1", headers={"Authorization": f"Bearer {token}"})
+    other.portal = client.portal
+    return other
+
+
+@pytest.fixture
+def process(tmp_path: Path) -> Iterator[MakeProcess]:
+    with processes(tmp_path) as make:
+        yield make

@@ -1,0 +1,44 @@
+"""Simulations on several ranks of this process, and steps of theirs that begin with a removal."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TypeVar
+from unittest.mock import patch
+
+import numpy as np
+
+from conoid.cases import schema
+from conoid.worker import domain, simulation, step
+from conoid.worker.mesh.model import TetMesh
+from conoid.worker.simulation import Simulation
+
+from ..contact.ranks import on_ranks
+
+T = TypeVar("T")
+
+
+def wear_out(sim: Simulation, gone: "np.ndarray") -> None:
+    """The tets of these ids are to leave in the next step."""
+    assert sim.erosion is not None
+    for part in sim.model.blocks:
+        if len(part.worn):
+            part.worn[np.isin(part.id, gone)] = True
+    sim.erosion.due = True
+
+
+def tick(sim: Simulation, gone: "np.ndarray | None" = None) -> float:
+    """A step that begins with the loss of these tets; its residual."""
+    if gone is not None:
+        wear_out(sim, gone)
+    before = sim.model.nodes.v.copy()
+    step.first_half(sim)
+    residual = sim.ledger.close(before).residual
+    step.second_half(sim)
+    return residual
+
+
+def on(ranks: int, case: schema.Case, meshes: Sequence[TetMesh], work: Callable[[Simulation], T]) -> list[T]:
+    """What ``work`` makes of the simulation of each rank."""
+    ready = iter(meshes)
+    with patch.object(domain, "build_mesh", lambda *_, **__: next(ready)):
+        return on_ranks(ranks, lambda comm: work(simulation.build(case, Path(), comm)))

@@ -1,0 +1,94 @@
+"""A boundary says itself which velocities it holds: contact, erosion and the start of a run ask no type."""
+
+import ast
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import conoid.worker
+from conoid.worker.boundaries import (
+    FREE,
+    MIRRORED,
+    PRESCRIBED,
+    Boundary,
+    Driver,
+    Gravity,
+    PrescribedRotation,
+    PrescribedVelocity,
+    RigidWalls,
+    SymmetryPlane,
+)
+from conoid.worker.contact.stage import _mobility
+from conoid.worker.mirrors import Mirrors
+from conoid.worker.state import Bits, Floats, Nodes
+
+HOUSE = Path(str(conoid.worker.__file__)).parent
+SOME = np.array([1, 3], np.int32)
+POINT, NORMAL = np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]])
+
+
+def nodes(n: int) -> Nodes:
+    x: Floats = np.zeros((n, 3))
+    part = np.zeros(n, np.int32)
+    owned, force = np.ones(n, bool), np.zeros((n, 3), np.int64)
+    return Nodes(np.arange(n), part, part, owned, x, x.copy(), x.copy(), np.full(n, 2.0), force)
+
+
+class Piston(Driver):
+    """A kind of boundary that the code has never seen: it sets the velocity along y."""
+
+    def held_components(self) -> Bits:
+        held = np.full((len(self.nodes), 3), FREE, np.uint8)
+        held[:, 1] = PRESCRIBED
+        return held
+
+    def apply(self, state: Nodes, dt: float, t: float) -> None:
+        state.v[self.nodes, 1] = 1.0
+
+
+def test_a_boundary_that_does_not_answer_cannot_be_made() -> None:
+    class Silent(Driver):
+        def apply(self, state: Nodes, dt: float, t: float) -> None:
+            pass
+
+    with pytest.raises(TypeError, match="held_components"):
+        Silent(SOME)  # type: ignore[abstract]
+
+
+@pytest.mark.parametrize(
+    ("bound", "held"),
+    [
+        (Gravity(SOME, np.ones(3)), (FREE, FREE, FREE)),
+        (RigidWalls(SOME, POINT, NORMAL, np.ones((2, 1), bool)), (FREE, FREE, FREE)),
+        (Mirrors(SOME, POINT, NORMAL, np.ones((2, 1), bool)), (FREE, FREE, FREE)),
+        (SymmetryPlane(SOME, 2), (FREE, FREE, MIRRORED)),
+        (PrescribedVelocity(SOME, np.array([np.nan, 0.0, 3.0])), (FREE, PRESCRIBED, PRESCRIBED)),
+        (PrescribedRotation(SOME, np.zeros(3), np.ones(3)), (PRESCRIBED, PRESCRIBED, PRESCRIBED)),
+        (Piston(SOME), (FREE, PRESCRIBED, FREE)),
+    ],
+    ids=lambda value: type(value).__name__ if isinstance(value, Boundary) else "",
+)
+def test_what_is_held_has_no_mobility_in_contact(bound: Boundary, held: tuple[int, int, int]) -> None:
+    assert bound.held_components().tolist() == [list(held)] * 2
+    mobility, planes = _mobility(nodes(5), [bound])
+    expected = np.full((5, 3), 0.5)
+    expected[np.ix_(SOME, np.flatnonzero(np.array(held) != FREE))] = 0.0
+    assert np.array_equal(mobility, expected)
+    assert np.flatnonzero(planes.any(axis=1)).tolist() == (SOME.tolist() if MIRRORED in held else [])
+
+
+def test_boundaries_hold_together() -> None:
+    mobility, planes = _mobility(nodes(5), [SymmetryPlane(SOME, 0), Piston(np.array([3], np.int32))])
+    assert mobility[[1, 3]].tolist() == [[0.0, 0.5, 0.5], [0.0, 0.0, 0.5]]
+    assert planes[3].tolist() == [True, False, False]
+
+
+@pytest.mark.parametrize("name", ["simulation.py", "domain.py", "erosion.py", "mirrors.py", "step.py", "contact"])
+def test_nobody_asks_for_the_type_of_a_boundary(name: str) -> None:
+    place = HOUSE / name
+    for path in sorted(place.rglob("*.py")) if place.is_dir() else [place]:
+        asked = [
+            n.lineno for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.Name) and n.id == "isinstance"
+        ]
+        assert not asked, f"{path.name}: {asked}"

@@ -1,0 +1,40 @@
+"""The tags of all messages between two ranks. Two exchanges that may be under way at once never share one."""
+
+from enum import IntEnum, unique
+
+
+@unique
+class Tag(IntEnum):
+    """What a message carries."""
+
+    SCATTER = 0
+    """An item from rank 0 for one rank (parallel/comm.py)."""
+    FORCE = 1
+    """Sums of nodal forces, in every step (elements/forms.py)."""
+    VOLUME = 2
+    """Sums of nodal volumes, in every step of the averaged pressure forms (elements/forms.py)."""
+    GRADIENT = 3
+    """Sums of nodal pressure gradients, in every step of the ``split`` form (elements/forms.py)."""
+    SURFACE = 10
+    """Which nodes are on the surface, when it is built (contact/surface.py)."""
+    GHOST = 11
+    """Positions and velocities of the nodes of ghost faces, in every step with contact (contact/ghosts.py)."""
+    CONTACT_SHARE = 12
+    """Sums of the shares of active contacts in the nodes they push, in every step with contact (contact/stage.py)."""
+    CONTACT_IMPULSE = 13
+    """Sums of the impulses of a sweep, in every sweep (contact/stage.py)."""
+    NORMAL = 14
+    """Sums of the face normals at nodes, in every search (contact/flight.py)."""
+    TETS_AT_NODE = 15
+    """How many tets a node has, at the start and in every removal (erosion.py)."""
+    SEPARATED_FORCE = 16
+    """Changes of the forces on nodes that separate, in a break (fracture/stage.py)."""
+    TRACTION = 17
+    """Stress on the other side of facets between two ranks, in every step that asks for tractions
+    (fracture/bodies.py)."""
+    NODAL_STRESS = 18
+    """Sums of stress and mass at nodes, for the ``nodal`` criterion (fracture/nodal.py)."""
+    COURSE = 19
+    """Sums of the rigid motions of the tets at nodes, in every search of a body that fractures (contact/course.py)."""
+    SWAP = 90
+    """Words of which the receiver learns the number first (parallel/comm.py)."""
