@@ -55,10 +55,13 @@ def node_face(
     """
     own = np.where(np.isin(np.arange(len(x)), faces), 0, 1) if part is None else part
     room, n = Meetings.room(len(pairs)), len(x)
+    first, following = np.full(n, -1, np.int32), np.empty(len(pairs), np.int32)
+    kernels.chain(first, following, pairs, 0)
     found = kernels.node_face(
         room.nodes, room.weights, room.normals, room.wanted, room.friction, room.pair, 0, faces, face_sizes(x, faces),
-        np.zeros((n, 9)) if out is None else moments(out), pairs, _all(pairs), x, v, own.astype(np.int32),
-        np.zeros((9, 9)) if mu is None else mu, dt,
+        np.arange(len(faces)), np.ones(len(faces), bool), np.zeros((n, 9)) if out is None else moments(out),
+        np.ones(n, bool), first, following, np.empty(n), np.empty(n, np.int32), pairs, _all(pairs), x, v,
+        own.astype(np.int32), np.zeros((9, 9)) if mu is None else mu, dt,
     )  # fmt: skip
     return _filled(room, found)
 
@@ -68,7 +71,8 @@ def edge_edge(x: Floats, v: Floats, edges: Indices, pairs: Indices, dt: float, m
     room = Meetings.room(len(pairs))
     found = kernels.edge_edge(
         room.nodes, room.weights, room.normals, room.wanted, room.friction, room.pair, 0, edges, edge_sizes(x, edges),
-        pairs, _all(pairs), x, v, np.zeros(len(x), np.int32), np.zeros((9, 9)) if mu is None else mu, dt,
+        np.ones((len(edges), 2), bool), pairs, _all(pairs), x, v, np.zeros(len(x), np.int32),
+        np.zeros((9, 9)) if mu is None else mu, dt,
     )  # fmt: skip
     return _filled(room, found)
 

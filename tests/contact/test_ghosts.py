@@ -11,7 +11,7 @@ from conoid.worker.contact.records import Crowd, Edges, Faces, merged
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.parallel.ownership import Neighbour
 from conoid.worker.parallel.tags import Tag
-from conoid.worker.state import Model
+from conoid.worker.state import Flags, Model
 
 from ..worker.meshes import block
 from .bodies import crowd_of, meeting_of, moved, pieces_of
@@ -40,13 +40,20 @@ def same(one: Crowd, two: Crowd) -> bool:
 @pytest.mark.parametrize(("f", "e", "n"), [(7, 5, 11), (0, 5, 3), (7, 0, 3), (0, 0, 3), (0, 0, 0)])
 def test_what_is_packed_comes_out_bit_by_bit(f: int, e: int, n: int) -> None:
     random = np.random.default_rng(1)
-    faces = Faces(random.integers(0, 2**50, f), random.integers(0, 2**40, (f, 4)), random.normal(size=f))
-    edges = Edges(random.integers(0, 2**40, (e, 4)), random.integers(0, 2**40, (e, 2)), random.normal(size=e))
+
+    def flags(*shape: int) -> Flags:
+        return np.asarray(random.integers(0, 2, shape) > 0)
+
+    faces = Faces(random.integers(0, 2**50, f), random.integers(0, 2**40, (f, 4)), random.normal(size=f), flags(f))
+    ends, sides = random.integers(0, 2**40, (e, 4)), random.integers(0, 2**40, (e, 2))
+    edges = Edges(ends, sides, random.normal(size=e), flags(e, 2))
     crowd = random_crowd(random, n)
     got_faces, got_edges, got_crowd = ghosts.unpack(ghosts.pack(faces, edges, crowd))
     assert (got_faces.id == faces.id).all()
     assert (got_faces.nodes == faces.nodes).all()
     assert (got_faces.size == faces.size).all()
+    assert (got_faces.exposed == faces.exposed).all()
+    assert (got_edges.exposed == edges.exposed).all()
     assert (got_edges.nodes == edges.nodes).all()
     assert (got_edges.size == edges.size).all()
     assert same(got_crowd, crowd)

@@ -19,11 +19,12 @@ from conoid.cases.schema import Case
 from conoid.worker import simulation, step
 from conoid.worker.contact import domain, meetings, search
 from conoid.worker.contact.meetings import Meetings
+from conoid.worker.contact.normals import means
 from conoid.worker.contact.scene import Scene
 from conoid.worker.contact.search import Things
 from conoid.worker.parallel.comm import Comm, SerialComm
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import Ints, Nodes
+from conoid.worker.state import Ints
 
 from ..contact.bodies import Flags, Indices
 from ..contact.ranks import on_ranks
@@ -91,12 +92,6 @@ class Brute(Found):
     def __init__(self, sim: Simulation) -> None:
         super().__init__(sim)
         self.all = dict[int, Met]()
-        self._search, self.contact._search = self.contact._search, self.search  # type: ignore[method-assign]
-
-    def search(self, state: Nodes) -> None:
-        """Keeps the normals of the nodes, which are those of the last search."""
-        self._search(state)
-        self._out = self.contact._flight.normals(state)
 
     def meet(self, now: Scene, dt: float) -> int:
         if self.sim.clock.step % EVERY == 0:
@@ -110,27 +105,32 @@ class Brute(Found):
 
     def _nodes(self, dt: float) -> Met:
         sides, state, met = self.contact._flight.sides, self._state(dt), Met()
-        faces, out = sides.face_places, self._out[sides.crowd.local]
+        faces, local = sides.face_places, sides.crowd.local
+        out, on_surface = means(self.contact._moments[local]), self.contact._surface.flags[local]
         for pairs in self._pairs(sides.nodes.corners, faces[:, :3]):
             places, room = sides.nodes.corners[pairs[:, 0]], Meetings.room(len(pairs))
             by_place = np.column_stack([places, pairs[:, 1:]])
             rows = (room.nodes, room.weights, room.normals, room.wanted, room.friction, room.pair)
+            first, following = np.full(len(local), -1, np.int32), np.empty(len(pairs), np.int32)
+            meetings.chain(first, following, by_place, 0)
             n = meetings.node_face(
-                *rows, 0, faces, sides.faces.size, out, by_place, np.arange(len(pairs), dtype=np.int32), *state
-            )
+                *rows, 0, faces, sides.faces.size, sides.faces.id, sides.faces.exposed, out, on_surface, first,
+                following, np.empty(len(local)), np.empty(len(local), np.int32), by_place,
+                np.arange(len(pairs), dtype=np.int32), *state,
+            )  # fmt: skip
             met += written(room, n, sides.crowd.id)
         return met
 
     def _edges(self, dt: float) -> Met:
         sides, state, met = self.contact._flight.sides, self._state(dt), Met()
-        edges = sides.edges.take(np.lexsort((sides.edges.nodes[:, 1], sides.edges.nodes[:, 0])))
+        edges = sides.edges.take(np.lexsort((sides.edges.sides[:, 1], sides.edges.sides[:, 0])))
         places = sides.crowd.places(edges.nodes)
         for every in self._pairs(places[:, :2], places[:, :2]):
             pairs = every[every[:, 0] < every[:, 1]]
             room = Meetings.room(len(pairs))
             rows = (room.nodes, room.weights, room.normals, room.wanted, room.friction, room.pair)
             some = np.arange(len(pairs), dtype=np.int32)
-            n = meetings.edge_edge(*rows, 0, places, edges.size, pairs, some, *state)
+            n = meetings.edge_edge(*rows, 0, places, edges.size, edges.exposed, pairs, some, *state)
             met += written(room, n, sides.crowd.id)
         return met
 

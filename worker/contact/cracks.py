@@ -121,8 +121,9 @@ def touching(table, flags):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    "UniTuple(int64, 2)(int32[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], int32[::1], int64, "
-    "int64[::1], int32[:, ::1], float64, float64[:, ::1], float64[:, ::1], int32[::1], float64[:, ::1], float64)",
+    "UniTuple(int64, 2)(int32[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], int32[::1], "
+    "int64, int64[::1], int32[:, ::1], float64, float64[:, ::1], float64[:, ::1], int32[::1], "
+    "float64[:, ::1], float64)",
     cache=True,
     error_model="numpy",
 )

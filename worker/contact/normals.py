@@ -41,7 +41,8 @@ def shares(x: Floats, faces: Indices, size: float) -> Ints:
     """(f, 9) what each of the ``faces`` (f, 3) adds to the ``moments`` of its nodes."""
     out = np.empty((len(faces), 9), np.int64)
     for f in range(len(faces)):
-        _share(out[f], x, *faces[f], SHARES / size**2)
+        a, b, c = faces[f]
+        _share(out[f], x, a, b, c, SHARES / size**2)
     return out
 
 

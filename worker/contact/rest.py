@@ -224,9 +224,9 @@ def _bent(out, x, s, i, j, k, m):  # type: ignore[no-untyped-def]
     cache=True,
     error_model="numpy",
 )
-def _settle_nodes(
-    until, speed, turned, some, pairs, faces, size, out, x, v_then, part, path1, reach1, path2, reach2, end
-):  # type: ignore[no-untyped-def]
+def _settle_nodes(  # type: ignore[no-untyped-def]
+    until, speed, turned, some, pairs, faces, size, out, x, v_then, part, path1, reach1, path2, reach2, end,
+):  # fmt: skip
     b, m = np.empty(3), np.empty(3)
     for p in some:
         if np.isnan(until[p]):

@@ -352,7 +352,7 @@ def compact(
     )  # fmt: skip
 
 
-def _used(n: int, *some: Indices) -> tuple["np.ndarray", Indices]:
+def _used(n: int, *some: "np.ndarray") -> tuple["np.ndarray", Indices]:
     """Which of ``n`` things are among ``some``, ascending, and (n,) where each of these stands among them."""
     flags = np.zeros(n, bool)
     for each in some:

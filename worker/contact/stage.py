@@ -92,7 +92,7 @@ class Contact:
         self._stale = False
         """Whether nodes have separated since the surface was made."""
         self._fractures = case.fractures
-        self._opening: Indices = np.zeros(0, np.int32)
+        self._opening: Ints = np.zeros(0, np.int64)
         """Cracks of the scene that have become wide in the last step."""
         self._total: Ints = np.zeros((0, 3), np.int64)
         """(nodes, 3) impulses of the last step, quanta, of a run that goes on here; (0, 3) once they are booked."""
@@ -264,7 +264,7 @@ class Contact:
         local, place = local[place >= 0], place[place >= 0]
         now.normals[place] = normals.means(self._moments[local])
         now.on_surface[place] = self._surface.flags[local]
-        return place
+        return np.asarray(place)
 
     def _look_round(self) -> None:
         """Mean normals of all nodes anew; all ranks take part."""
