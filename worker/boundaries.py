@@ -20,6 +20,9 @@ _KEPT = ("contact_loss", "external_work", "_impulse")
 class Boundary:
     """What the time step asks of a boundary."""
 
+    mirrors = False
+    """Whether its nodes lie on one plane in which the body is mirrored: exposed faces in that plane are no surface."""
+
     def __init__(self, nodes: Indices) -> None:
         self.nodes = nodes
         self.contact_loss = np.zeros(len(nodes))
@@ -80,6 +83,8 @@ class Boundary:
 
 class SymmetryPlane(Boundary):
     """Nodes that start on a plane across an axis have no velocity along it."""
+
+    mirrors = True
 
     def __init__(self, nodes: Indices, axis: int) -> None:
         super().__init__(nodes)

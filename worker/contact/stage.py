@@ -58,7 +58,7 @@ class Contact(Boundary):
         self._sweeps = case.contact.sweeps
         self._model, self._neighbours, self._comm = model, neighbours, comm
         self._clock, self._timers = clock, timers
-        self._mobility, self._planes = _mobility(model.nodes, bounds)
+        self._mobility, self._planes = _mobility(model.nodes, bounds), _planes(model.nodes.n, bounds)
         self._edges = case.contact.edges
         self._surface = surface.build(model, self._planes, neighbours, comm, self._edges)
         self._mu = pairing.friction(case)
@@ -376,16 +376,23 @@ def _all(rows: Indices) -> Indices:
     return np.arange(len(rows), dtype=np.int32)
 
 
-def _mobility(nodes: Nodes, bounds: list[Boundary]) -> tuple[Floats, Flags]:
-    """(nodes, 3) one over the mass, zero where a velocity is held; and which nodes lie on a symmetry plane."""
+def _mobility(nodes: Nodes, bounds: list[Boundary]) -> Floats:
+    """(nodes, 3) one over the mass, zero where a velocity is held."""
     mobility = np.repeat(1.0 / nodes.mass[:, None], 3, axis=1)
-    planes = np.zeros((nodes.n, 3), bool)
     for bound in bounds:
         if isinstance(bound, SymmetryPlane):
-            planes[bound.nodes, bound.axis] = True
+            mobility[bound.nodes, bound.axis] = 0.0
         elif isinstance(bound, PrescribedVelocity):
             rows = mobility[bound.nodes]
             rows[bound.held] = 0.0
             mobility[bound.nodes] = rows
-    mobility[planes] = 0.0
-    return mobility, planes
+    return mobility
+
+
+def _planes(n: int, bounds: list[Boundary]) -> Flags:
+    """(nodes, planes) which of ``n`` nodes lie on which symmetry plane; two planes across one axis are two columns."""
+    mirrors = [bound for bound in bounds if bound.mirrors]
+    planes = np.zeros((n, len(mirrors)), bool)
+    for k, bound in enumerate(mirrors):
+        planes[bound.nodes, k] = True
+    return planes

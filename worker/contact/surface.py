@@ -36,7 +36,8 @@ class Surface:
 def build(model: Model, planes: Flags, neighbours: list[Neighbour], comm: Comm, edges: bool) -> Surface:
     """The surface; all ranks take part.
 
-    ``planes`` (nodes, 3) says which nodes lie on a symmetry plane across an axis: faces in such a plane are no surface.
+    ``planes`` (nodes, planes) says which nodes lie on which symmetry plane. A face with all three nodes on the same
+    plane is no surface; a face of a body one tet thick, with nodes on two parallel planes, is part of it.
     """
     local, ids = _faces(model, planes)
     flags = _flags(local, model.nodes.n, neighbours, comm)
