@@ -295,8 +295,9 @@ class Reference(Model):
     ``stress_max`` (largest |stress component|, Pa) over a part. ``speed_mean``: mass-mean velocity of a part along
     ``axis``, m/s. ``probe_*``: of a history column between ``since`` and ``until``. ``contact_time``: last time at
     which a wall or another body pushes, s. ``contact_loss``: energy lost by contact over the initial energy.
-    ``penetration``: how much of the thickness of all other parts along ``axis`` a part has opened round the axis
-    through the origin, m. Nodes without tets do not count for ``extent`` and ``radius``.
+    ``penetration``: how much of the thickness of all other parts along ``axis`` lies in front of the end of the hole
+    that a part has made in them round the axis through the origin, m; cavities ahead of the hole do not count. Nodes
+    without tets do not count for ``extent`` and ``radius``.
     ``worst_residual``: of the energy ledger.
     """
 

@@ -27,6 +27,8 @@ class Boundary(ABC):
 
     after_contact = False
     """Whether it acts after contact: nothing may undo what it corrects."""
+    mirrors = False
+    """Whether its nodes lie on one plane in which the body is mirrored: exposed faces in that plane are no surface."""
 
     def __init__(self, nodes: Indices) -> None:
         self.nodes = nodes
@@ -92,6 +94,8 @@ class Boundary(ABC):
 
 class SymmetryPlane(Boundary):
     """Nodes that start on a plane across an axis have no velocity along it."""
+
+    mirrors = True
 
     def __init__(self, nodes: Indices, axis: int) -> None:
         super().__init__(nodes)

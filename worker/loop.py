@@ -44,7 +44,7 @@ class Start:
 
     elements: int
     nodes: int
-    thick: list[float]
+    thick: list[list[list[float]]]
     """See reference.thicknesses."""
     sample: int = 0
     """Lines of the history that have been due."""

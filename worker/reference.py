@@ -11,25 +11,31 @@ from conoid.cases.outcome import Check
 from conoid.cases.quantities import unit_of
 from conoid.cases.schema import Reference
 
+from . import penetration
 from .parallel.comm import Comm
 from .parallel.fixed_point import exact_sums
 from .probes import field
 from .simulation import Simulation
-from .state import Block, Floats, Tets
+from .state import Block, Floats
 
 _AXES = {"x": 0, "y": 1, "z": 2}
 _STRESSES = ("stress_xx", "stress_yy", "stress_zz", "stress_yz", "stress_zx", "stress_xy")
 
 
-def thicknesses(sim: Simulation) -> list[float]:
-    """For every reference that asks for a penetration: what there is to be pierced, m; zero for the others.
+def thicknesses(sim: Simulation) -> list[list[list[float]]]:
+    """For every reference that asks for a penetration: what there is to be pierced, m, by line and part; nothing for
+    the others.
 
     All ranks take part, all get the same answer.
     """
-    return [_thickness(sim, spec) if spec.quantity == "penetration" else 0.0 for spec in sim.case.reference]
+    parts = len(sim.model.parts)
+    return [
+        penetration.thickness(_passed(sim, spec)[0], parts).tolist() if spec.quantity == "penetration" else []
+        for spec in sim.case.reference
+    ]
 
 
-def measure(sim: Simulation, folder: Path, thick: list[float]) -> list[Check]:
+def measure(sim: Simulation, folder: Path, thick: list[list[list[float]]]) -> list[Check]:
     """Every reference of the case, measured; ``thick`` as ``thicknesses`` gave it at the start.
 
     All ranks take part, all get the same answer.
@@ -50,7 +56,7 @@ def _name(spec: Reference) -> str:
     return " ".join(word for word in (spec.quantity, spec.part, spec.probe, spec.axis) if word)
 
 
-def _measured(sim: Simulation, spec: Reference, folder: Path, thick: float) -> float:
+def _measured(sim: Simulation, spec: Reference, folder: Path, thick: list[list[float]]) -> float:
     quantity = spec.quantity
     if quantity.startswith("probe_"):
         value = _probe(folder, spec) if sim.comm.rank == 0 else 0.0
@@ -66,7 +72,8 @@ def _measured(sim: Simulation, spec: Reference, folder: Path, thick: float) -> f
     if quantity in ("extent", "radius"):
         return _size(sim, spec)
     if quantity == "penetration":
-        return thick - _thickness(sim, spec)
+        rows, radius = _passed(sim, spec)
+        return penetration.depth(rows, np.array(thick), radius)
     return _largest(sim, spec)
 
 
@@ -104,50 +111,26 @@ def _largest(sim: Simulation, spec: Reference) -> float:
     return _maximum(sim.comm, [float(np.abs(values).max(initial=0.0)) for values in fields])
 
 
-_LINES = (0.1, 0.3, 0.5)
-"""Distances from the axis, of the radius of the part, at which the thickness that is left is measured."""
+def _passed(sim: Simulation, spec: Reference) -> tuple[Floats, float]:
+    """What lines along the axis pass of the other parts now (penetration.passed), and the radius of the part, m.
 
-
-def _thickness(sim: Simulation, spec: Reference) -> float:
-    """The mean of what lines along the axis pass of the other parts, m.
-
-    The lines lie between the two directions across the axis, where every sector of a body is modelled.
+    The part comes from below: else the axis is turned round. All ranks take part, all get the same rows.
     """
     nodes, axis = sim.model.nodes, _AXES[spec.axis or "z"]
-    own = np.delete(nodes.x0[nodes.part == sim.model.parts.index(spec.part or "")], axis, axis=1)
-    radius = _maximum(sim.comm, np.hypot(*own.T))
-    at = [float(share * radius / np.sqrt(2.0)) for share in _LINES]
+    mine = nodes.part == sim.model.parts.index(spec.part or "")
+    radius = _maximum(sim.comm, np.hypot(*np.delete(nodes.x0[mine], axis, axis=1).T))
     others = [block for block in sim.model.blocks if sim.model.parts[block.part] != spec.part]
-    chords = [np.column_stack([chord_lengths(nodes.x, block.tets, axis, (c, c)) for c in at]) for block in others]
-    return float(exact_sums(sim.comm, np.concatenate([np.zeros((0, len(_LINES))), *chords])).mean())
+    rows = [penetration.passed(nodes.x, b.tets, np.full(b.n, b.part), axis, radius) for b in others]
+    gathered = sim.comm.gather(np.concatenate([np.zeros((0, 4)), *rows]))
+    found: Floats = sim.comm.broadcast(np.concatenate(gathered) if gathered is not None else None)
+    found = found[np.lexsort(found.T[::-1])]
+    if _middle(sim.comm, nodes.x0[mine, axis]) > _middle(sim.comm, nodes.x0[~mine, axis]):
+        found = np.column_stack([found[:, :2], -found[:, 3], -found[:, 2]])
+    return found, radius
 
 
-def chord_lengths(x: Floats, tets: Tets, axis: int, at: tuple[float, float]) -> Floats:
-    """(n,) length of a line along ``axis`` inside each tet, m; ``at``: where it passes the two directions across.
-
-    The line is moved aside by some 1e-6 of its distance from the axis: in a face it would belong to two tets.
-    """
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    aside = 1e-6 * max(map(abs, at))
-    at = (at[0] + aside, at[1] + 0.618 * aside)
-    low, high = (f(f(x[tets[:, 0]], x[tets[:, 1]]), f(x[tets[:, 2]], x[tets[:, 3]])) for f in (np.minimum, np.maximum))
-    met = np.flatnonzero(
-        (low[:, i] <= at[0]) & (high[:, i] >= at[0]) & (low[:, j] <= at[1]) & (high[:, j] >= at[1])
-    )  # fmt: skip
-    corners = x[tets[met]]
-    point = np.zeros(3)
-    point[i], point[j] = at
-    inverse = np.linalg.inv(corners[:, 1:] - corners[:, :1])
-    start = np.einsum("pi,pij->pj", point - corners[:, 0], inverse)
-    start = np.column_stack([1.0 - start.sum(axis=1), start])
-    slope = np.column_stack([-inverse[:, axis].sum(axis=1), inverse[:, axis]])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        crossing = -start / slope
-    enters = np.where(slope > 0.0, crossing, np.where((slope == 0.0) & (start < 0.0), np.inf, -np.inf)).max(axis=1)
-    leaves = np.where(slope < 0.0, crossing, np.inf).min(axis=1)
-    lengths = np.zeros(len(tets))
-    lengths[met] = np.maximum(leaves - enters, 0.0)
-    return lengths
+def _middle(comm: Comm, x: Floats) -> float:
+    return _maximum(comm, x) - _maximum(comm, -x)
 
 
 def _probe(folder: Path, spec: Reference) -> float:

@@ -20,8 +20,8 @@ import numpy.typing as npt
 from conoid.cases import layout, load
 from conoid.cases.library import library
 from conoid.cases.outcome import Outcome, from_json
+from conoid.worker import penetration
 from conoid.worker.mesh.faces import boundary_faces
-from conoid.worker.reference import chord_lengths
 
 from .table import Cell, table
 
@@ -32,8 +32,8 @@ LENGTH = 75.0
 BANDS = {"1057 m/s": (0.60, 0.80), "1301 m/s": (0.85, 1.05), "1566.4 m/s": (1.00, 1.20)}
 """P/L of a tungsten rod in mild steel by Alekseevskii's and Tate's theory, with a rod strength of 1.5 to 2 GPa and a
 target resistance of 3 to 3.5 GPa that are assumed, not derived from the constants of the case."""
-_RADIUS, _THICKNESS = 3.5e-3, 0.132
-"""Of the rod, and of the plates together, m."""
+_RADIUS, _THICKNESS = 3.5e-3, 22e-3
+"""Of the rod, and of a plate, m."""
 _CRATER = (6.0, 40.0)
 """Depths between which the diameter of the crater is measured, mm."""
 
@@ -167,15 +167,16 @@ def moment(frame: Path) -> Moment:
         grid = file["VTKHDF"]
         points, part, t = grid["Points"][:], grid["CellData/part"][:], float(grid["FieldData/time"][0])
         tets, velocity = grid["Connectivity"][:].reshape(-1, 4), grid["PointData/velocity"][:]
-    plates = tets[part > 0].astype(np.uint32)
-    lines = [share * _RADIUS / 2**0.5 for share in (0.1, 0.3, 0.5)]
-    left = float(np.mean([chord_lengths(points, plates, 2, (c, c)).sum() for c in lines]))
+    plates = part > 0
+    rows = penetration.passed(points, tets[plates].astype(np.uint32), part[plates], 2, _RADIUS)
+    thick = np.full((len(penetration.MEASURED), len(PARTS)), _THICKNESS) * (np.arange(len(PARTS)) > 0)
+    depth = penetration.depth(rows, thick, _RADIUS)
     rod = np.unique(tets[part == 0])
     if not len(rod):
-        return Moment(t, _THICKNESS - left, *3 * [float("nan")])
+        return Moment(t, depth, *3 * [float("nan")])
     z = points[rod, 2]
     speed = velocity[rod[z < z.min() + 8e-3], 2].mean()
-    return Moment(t, _THICKNESS - left, float(z.min()), float(z.max()), float(speed))
+    return Moment(t, depth, float(z.min()), float(z.max()), float(speed))
 
 
 def course(moments: Sequence[Moment]) -> str:

@@ -58,8 +58,8 @@ def pieces_of(case: schema.Case, meshes: Sequence[TetMesh], ranks: int = 1) -> l
 def surface_of(
     piece: domain.Piece, model: Model, comm: Comm | None = None, planes: Flags | None = None, edges: bool = True
 ) -> Surface:
-    """The surface of a rank's piece; ``planes`` (nodes, 3): nodes on symmetry planes."""
-    on_planes = np.zeros((model.nodes.n, 3), bool) if planes is None else planes
+    """The surface of a rank's piece; ``planes`` (nodes, planes): which nodes are on which symmetry plane."""
+    on_planes = np.zeros((model.nodes.n, 0), bool) if planes is None else planes
     return surface.build(model, on_planes, piece.neighbours, comm or SerialComm(), edges, np.zeros((0, 3), np.int32))
 
 

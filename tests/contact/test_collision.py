@@ -231,13 +231,51 @@ def test_crossed_edges_bounce_and_pass_where_edges_are_off() -> None:
     assert crossed(edges=False) == pytest.approx(-10.0, abs=1e-6)
 
 
-def test_a_part_whose_faces_all_lie_on_symmetry_planes_is_named() -> None:
+SLABS = [block((3, 2, 1), SIZE, seed=1), moved(block((2, 3, 1), SIZE, seed=2), (3.01 * SIZE, -0.4 * SIZE, 0.0))]
+"""Two plates one tet thick, whose ends face each other along x."""
+THIN = tuple({"kind": "symmetry", "axis": "z", "at": at} for at in (0.0, SIZE))
+"""Plane strain: every node of the plates is on one of the two planes."""
+
+
+@pytest.mark.parametrize("ranks", [1, 3])
+def test_bodies_one_tet_thick_between_two_symmetry_planes_do_not_pass_each_other(ranks: int) -> None:
+    """At 20 m/s each they meet after 0.25 us; 8 us later they would overlap by 0.3 mm."""
+    case = meeting_of([{"velocity": (20.0, 0.0, 0.0)}, {"velocity": (-20.0, 0.0, 0.0)}], end=8e-6, boundaries=THIN)
+
+    def ended(sim: Simulation) -> tuple[float, float, str | None]:
+        run(sim)
+        nodes = sim.model.nodes
+        right, left = nodes.x[nodes.part == 0, 0], -nodes.x[nodes.part == 1, 0]
+        ends = np.array([right.max(initial=-1.0), left.max(initial=-1.0)])
+        overlap = float(sim.comm.maximum(ends).sum())
+        return overlap, float(np.abs(nodes.v[:, 2]).max(initial=0.0)), digest(sim.model, sim.comm, [])
+
+    overlap, across, answer = on_threads(ranks, case, ended, SLABS)[0]
+    assert overlap < 1e-3 * SIZE
+    assert across == 0.0
+    assert answer == ended(build(case, SLABS))[-1]
+
+
+def test_only_a_face_in_one_symmetry_plane_is_no_surface() -> None:
+    """A plate one tet thick has its sides, two faces a cell; a plate between planes across two axes its ends."""
+    walls = (*THIN, *({"kind": "symmetry", "axis": "y", "at": at, "parts": ("body0",)} for at in (0.0, 2.0 * SIZE)))
+    case = meeting_of([{}, {}], end=END, boundaries=walls)
+    sim = build(case, SLABS)
+    assert sim.contact is not None
+    faces = sim.contact._surface.faces.nodes[:, :3]
+    of = np.bincount(sim.model.nodes.part[faces[:, 0]])
+    assert of.tolist() == [2 * 2 * 2, 2 * 2 * (2 + 3)]
+
+
+@pytest.mark.parametrize(("parts", "named"), [(("body1",), "body1"), ((), "body0")])
+def test_a_part_whose_faces_all_lie_on_symmetry_planes_is_named(parts: tuple[str, ...], named: str) -> None:
+    """Also where no part has a face at all."""
     cube = block((2, 2, 2), SIZE, shake=0.0)
     planes = tuple(
-        schema.Symmetry(kind="symmetry", axis=axis, at=at, parts=("body1",))
+        schema.Symmetry(kind="symmetry", axis=axis, at=at, parts=parts)
         for axis in ("x", "y", "z")
         for at in (0.0, 2.0 * SIZE)
     )
     case = meeting_of([{}, {}], end=END).model_copy(update={"boundaries": planes})
-    with pytest.raises(InputError, match=r"part 'body1' has no exposed face.*leave it out of contact.parts"):
-        build(case, [moved(cube, (0.0, 0.0, 2.5 * SIZE)), cube])
+    with pytest.raises(InputError, match=rf"part '{named}' has no exposed face.*leave it out of contact.parts"):
+        build(case, [moved(cube, (0.0, 0.0, 2.5 * SIZE)) if parts else cube, cube])

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from conoid.worker.contact.records import Edges
 from conoid.worker.contact.surface import Surface
 from conoid.worker.mesh.faces import FACES, across
 from conoid.worker.mesh.model import TetMesh
@@ -53,6 +54,11 @@ def cubes(corners: list[tuple[int, int, int]]) -> TetMesh:
     tets = np.concatenate([unit.tets + i * len(unit.points) for i in range(len(corners))])
     kept, place = np.unique(points, axis=0, return_inverse=True)
     return TetMesh(kept, positive(kept, place.reshape(-1)[tets]))
+
+
+def table(edges: Edges) -> "np.ndarray":
+    """(n, 7) words: ids of the two faces, nodes, and the bits of the length."""
+    return np.column_stack([edges.sides, edges.nodes, edges.size.view(np.int64)])
 
 
 def normals(x: Floats, a: "np.ndarray", b: "np.ndarray", c: "np.ndarray") -> Floats:
@@ -121,7 +127,7 @@ def test_sharp_edges_of_a_box_are_its_twelve_edges() -> None:
 def test_the_two_faces_of_an_edge_look_outward_too() -> None:
     found, model = whole(shuffled(block(CELLS, SIZE), 5))
     x, (a, b, c, d) = model.nodes.x0, found.edges.nodes.T
-    assert (a < b).all()
+    assert (found.edges.sides[:, 0] < found.edges.sides[:, 1]).all()
     for normal in (normals(x, a, b, c), normals(x, b, a, d)):
         assert (((x[a] - 0.5 * BOX) * normal).sum(axis=1) > 0.0).all()
     named = {tuple(sorted(row[:3])) for row in found.faces.nodes.tolist()}
@@ -166,10 +172,8 @@ def test_ranks_together_have_the_surface_that_one_has(ranks: int) -> None:
     found = on_ranks(ranks, lambda comm: surface_of(*pieces[comm.rank], comm))
     faces = np.concatenate([s.faces.nodes for s in found])[np.argsort(np.concatenate([s.faces.id for s in found]))]
     assert (faces == one.faces.nodes).all()
-    edges = np.concatenate([np.column_stack([s.edges.nodes, s.edges.size.view(np.int64)]) for s in found])
-    assert (
-        edges[np.lexsort(edges.T[1::-1])] == np.column_stack([one.edges.nodes, one.edges.size.view(np.int64)])
-    ).all()
+    edges = np.concatenate([table(s.edges) for s in found])
+    assert (edges[np.lexsort(edges.T[1::-1])] == table(one.edges)).all()
     flagged = set(model.nodes.id[one.flags].tolist())
     for s, (_, part) in zip(found, pieces, strict=True):
         assert set(part.nodes.id[s.flags].tolist()) == flagged & set(part.nodes.id.tolist())
@@ -206,3 +210,12 @@ def test_an_edge_with_four_faces_is_treated_alike_on_any_number_of_ranks(ranks: 
     assert Counter(row for s in found for row in map(tuple, s.edges.nodes.tolist())) == Counter(
         map(tuple, one.edges.nodes.tolist())
     )
+
+
+def test_where_four_faces_meet_every_two_that_run_against_each_other_make_an_edge() -> None:
+    """The two cubes' own edges, and the two gaps between them, which are not convex unless they are closed."""
+    found, model = whole(cubes(CUBES[2]))
+    x = model.nodes.x0[found.edges.nodes[:, :2]]
+    common = (x[..., :2] == 1.0).all(axis=(1, 2))
+    assert common.sum() == 4
+    assert len(np.unique(found.edges.sides[common])) == 4

@@ -1,4 +1,4 @@
-"""Wear: which tets leave, that all else stays as it was; sums of a whole run, and what lines pass of the tets left."""
+"""Wear: which tets leave, that all else stays as it was, and sums of a whole run."""
 
 from fractions import Fraction
 from functools import partial
@@ -11,7 +11,6 @@ from conoid.worker import state, step
 from conoid.worker.elements import tet4, wear
 from conoid.worker.parallel.comm import Comm, SerialComm
 from conoid.worker.parallel.fixed_point import Tally
-from conoid.worker.reference import chord_lengths
 from conoid.worker.state import CHUNK, Block
 
 from ..contact.bodies import meeting_of, moved
@@ -198,30 +197,3 @@ def test_a_tally_of_nothing_is_zero() -> None:
     tally = Tally(np.array([1.0, 2.0]))
     tally.add(np.zeros((0, 2)))
     assert tally.total(SerialComm()).tolist() == [0.0, 0.0]
-
-
-# What lines pass
-
-
-LONG = np.array([3.0, 4.0, 5.0]) * MM
-
-
-@pytest.mark.parametrize("axis", range(3))
-def test_a_line_through_a_box_is_as_long_as_the_box(axis: int) -> None:
-    mesh = block((3, 4, 5), MM)
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    for share in np.random.default_rng(axis).uniform(0.0, 1.0, (50, 2)):
-        at = (float(share[0] * LONG[i]), float(share[1] * LONG[j]))
-        passed = chord_lengths(mesh.points, mesh.tets.astype(np.uint32), axis, at)
-        assert passed.sum() == pytest.approx(LONG[axis], rel=1e-12)
-        assert (passed >= 0.0).all()
-    for at in ((-1e-6, 1e-3), (1e-3, LONG[j] + 1e-6), (LONG[i] + 1e-6, 1e-3)):
-        assert not chord_lengths(mesh.points, mesh.tets.astype(np.uint32), axis, at).any()
-
-
-@pytest.mark.parametrize("shares", [(0.1, 0.1), (0.3, 0.3), (1.0 / 3.0, 0.5), (2.0 / 3.0, 0.5)])
-def test_a_line_in_the_faces_or_edges_of_tets_is_counted_once(shares: tuple[float, float]) -> None:
-    """The diagonals of the cubes of a structured mesh lie in the plane of a penetration's lines."""
-    mesh = block((3, 3, 5), MM, shake=0.0)
-    passed = chord_lengths(mesh.points, mesh.tets.astype(np.uint32), 2, (3 * MM * shares[0], 3 * MM * shares[1]))
-    assert passed.sum() == pytest.approx(5 * MM, rel=1e-9)

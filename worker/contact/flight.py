@@ -115,6 +115,6 @@ def _strayed(x, v, x_then, v_then, flags, dt, ahead):  # type: ignore[no-untyped
 
 
 def typical(sizes: Floats, comm: Comm) -> float:
-    """Harmonic mean of the sizes of all faces, m: near the small ones where a mesh is graded."""
+    """Harmonic mean of the sizes of all faces, m: near the small ones where a mesh is graded; 0 without faces."""
     total, count = exact_sums(comm, np.column_stack([1.0 / sizes, np.ones(len(sizes))]))
-    return float(count / total)
+    return float(count / total) if count > 0.0 else 0.0

@@ -22,7 +22,7 @@ _NOTHING = 1e-300
 
 def moments(model: Model, planes: Flags, size: float, neighbours: list[Neighbour], comm: Comm) -> Ints:
     """(nodes, 9) sums over the exposed faces of all ranks at each node: area times n, and times n n (xx, yy, zz, yz,
-    zx, xy), in quanta of ``size``^2 / SHARES m^2; all ranks take part. ``planes`` (nodes, 3): see surface.build.
+    zx, xy), in quanta of ``size``^2 / SHARES m^2; all ranks take part. ``planes``: see surface.build.
     """
     sums = np.zeros((model.nodes.n, 9), np.int64)
     for block in model.blocks:
@@ -69,7 +69,7 @@ def _add_exposed(sums, x, tets, across, bond, planes, scale):  # type: ignore[no
                 continue
             a, b, c = tets[e, FACES[k, 0]], tets[e, FACES[k, 1]], tets[e, FACES[k, 2]]
             mirrored = False
-            for i in range(3):
+            for i in range(planes.shape[1]):
                 mirrored |= planes[a, i] and planes[b, i] and planes[c, i]
             if mirrored:
                 continue

@@ -14,7 +14,7 @@ import numpy as np
 
 from conoid.cases.schema import Case
 
-from ..boundaries import FREE, MIRRORED, Boundary
+from ..boundaries import FREE, Boundary
 from ..clock import Clock
 from ..errors import InputError
 from ..migration.parcel import Parcel
@@ -65,7 +65,7 @@ class Contact:
         self._sweeps = case.contact.sweeps
         self._model, self._neighbours, self._comm = model, neighbours, comm
         self._clock, self._timers = clock, timers
-        self._mobility, self._planes = _mobility(model.nodes, bounds)
+        self._mobility, self._planes = _mobility(model.nodes, bounds), _planes(model.nodes.n, bounds)
         self._edges, self._skin = case.contact.edges, case.contact.skin
         self._cracks, self._size = Cracks.none(), 0.0
         self._surface = self._build(np.zeros(model.nodes.n, bool))
@@ -487,12 +487,18 @@ def _all(rows: Indices) -> Indices:
     return np.arange(len(rows), dtype=np.int32)
 
 
-def _mobility(nodes: Nodes, bounds: list[Boundary]) -> tuple[Floats, Flags]:
-    """(nodes, 3) one over the mass, zero where a velocity is held; and which nodes lie on a symmetry plane."""
+def _mobility(nodes: Nodes, bounds: list[Boundary]) -> Floats:
+    """(nodes, 3) one over the mass, zero where a velocity is held."""
     mobility = np.repeat(1.0 / nodes.mass[:, None], 3, axis=1)
-    planes = np.zeros((nodes.n, 3), bool)
     for bound in bounds:
-        components = bound.held_components()
-        mobility[bound.nodes] = np.where(components == FREE, mobility[bound.nodes], 0.0)
-        planes[bound.nodes] |= components == MIRRORED
-    return mobility, planes
+        mobility[bound.nodes] = np.where(bound.held_components() == FREE, mobility[bound.nodes], 0.0)
+    return mobility
+
+
+def _planes(n: int, bounds: list[Boundary]) -> Flags:
+    """(nodes, planes) which of ``n`` nodes lie on which symmetry plane; two planes across one axis are two columns."""
+    mirrors = [bound for bound in bounds if bound.mirrors]
+    planes = np.zeros((n, len(mirrors)), bool)
+    for k, bound in enumerate(mirrors):
+        planes[bound.nodes, k] = True
+    return planes

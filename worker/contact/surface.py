@@ -39,9 +39,10 @@ def build(
 ) -> Surface:
     """The surface; all ranks take part.
 
-    ``planes`` (nodes, 3) says which nodes lie on a symmetry plane across an axis: faces in such a plane are no surface.
-    ``cracks`` (m, 3): block, place and face of the sides here of cracks that may open before the next search. Faces
-    that erosion has laid bare meet nodes; their edges meet no edges: they would be as many as the faces, and all sharp.
+        ``planes`` (nodes, planes) says which nodes lie on which symmetry plane. A face with all three nodes on the same
+    plane is no surface; a face of a body one tet thick, with nodes on two parallel planes, is part of it. ``cracks``
+    (m, 3): block, place and face of the sides here of cracks that may open before the next search. Faces that erosion
+    has laid bare meet nodes; their edges meet no edges: they would be as many as the faces, and all sharp.
     """
     local, ids, exposed, bare = _faces(model, planes, cracks)
     flags = _flags(local[exposed], model.nodes.n, neighbours, comm)
