@@ -89,8 +89,8 @@ class Contact:
         """The same of the last step of this rank."""
         self._changed = False
         """Whether the surface is another one than that of the last search."""
-        self._stale = False
-        """Whether nodes have separated since the surface was made."""
+        self._separated = False
+        """Whether nodes of any rank have separated: cracks may be open."""
         self._fractures = case.fractures
         self._opening: Ints = np.zeros(0, np.int64)
         """Cracks of the scene that have become wide in the last step."""
@@ -141,7 +141,7 @@ class Contact:
         kept = parcel.rows["contact.kept"]
         self._kept = np.column_stack([kept["node"], kept["face"]]), kept["kept"]
         self._total = parcel.nodes["contact.total"]
-        self._stale = self._fractures
+        self._separated = self._fractures
 
     def require_faces(self) -> None:
         """Raises InputError, on every rank alike, when a part that may meet has no face to meet with."""
@@ -206,7 +206,6 @@ class Contact:
             self._surface.flags &= ~removed
             self._look_round()
             self.due = self._changed = True
-            self._stale = False
 
     def crack(self, tets: Ints, nodes: Indices, sides: Indices) -> None:
         """Takes up broken facets that have a side here, with the local ``nodes`` (m, 3) that the sides have in common;
@@ -239,7 +238,6 @@ class Contact:
             faces = np.sort(told[:, 1:3].reshape(-1))
             self._cracks.open(faces, self._model.blocks)
             self.due |= bool((told[:, 0] == 0).any())
-            self._stale = True
             if self._scene is not None:
                 self._scene.expose(faces)
                 self._scene.rest.nodes[self._face(self._scene, local)] = True
@@ -272,8 +270,7 @@ class Contact:
 
     def separate(self, split: Split) -> None:
         """Follows nodes as they separate; all ranks take part."""
-        state = self._model.nodes
-        self._stale = True
+        state, self._separated = self._model.nodes, True
         if split.copies.n:
             parents = split.copies.parents
             self._cracks.follow(split, state.id)
@@ -293,8 +290,8 @@ class Contact:
 
     def _expose(self) -> None:
         """The surface anew, with the cracks that may open; all ranks take part."""
-        if self._stale or len(self._cracks.faces):
-            self._surface, self._stale, self._changed = self._build(self._surface.flags), False, True
+        if self._separated:
+            self._surface, self._changed = self._build(self._surface.flags), True
 
     def grow(self, split: Split, ids: Ints) -> None:
         """Takes up the copies of nodes; what has been booked stays with their parents."""
