@@ -90,6 +90,7 @@ class Solver:
         n, nodes = met.n, len(v)
         self.push, self.diagonal = np.zeros((n, 4)), np.empty((n, 2))
         self.impulse, self.total = np.zeros((nodes, 3), np.int64), np.zeros((nodes, 3), np.int64)
+        self.settled, self.moved = np.zeros(n, bool), np.zeros(nodes, bool)
         self.every = np.arange(n, dtype=np.int32)
         shares = np.zeros((nodes, 4), np.int64)
         sweeps.add_shares(shares, met.nodes, met.weights, met.normals, self.every)
@@ -100,11 +101,11 @@ class Solver:
         met = self.met
         for _ in range(times):
             sweeps.sweep(
-                self.impulse, self.push, self.v, met.nodes, met.weights, met.normals, met.wanted, met.friction,
-                self.diagonal, self.scale, self.every,
+                self.impulse, self.push, self.settled, self.moved, self.v, met.nodes, met.weights, met.normals,
+                met.wanted, met.friction, self.diagonal, self.scale, self.every,
             )  # fmt: skip
             assert (self.impulse.sum(axis=0) == 0).all()
-            sweeps.give(self.v, self.total, self.impulse, self.mobility, self.scale)
+            sweeps.give(self.v, self.total, self.moved, self.impulse, self.mobility, self.scale)
         return self.v
 
     def resume(self, kept: Floats, ratio: float = 1.0) -> None:
@@ -113,7 +114,7 @@ class Solver:
         rows = (met.nodes, met.weights, met.normals, met.friction)
         sweeps.resume(self.impulse, self.push, kept, met.pair, *rows, ratio, self.scale, self.every)
         assert (self.impulse.sum(axis=0) == 0).all()
-        sweeps.give(self.v, self.total, self.impulse, self.mobility, self.scale)
+        sweeps.give(self.v, self.total, self.moved, self.impulse, self.mobility, self.scale)
 
     def heat(self, v_old: Floats, joule: float = 2.0**40) -> float:
         """Work of friction, J, of the meetings that were pushed from the velocities ``v_old``."""

@@ -61,7 +61,9 @@ def test_who_rests_does_not_meet(seed: int, violence: float) -> None:
         assert np.array_equal(alone.nodes[: alone.n], every.nodes[: every.n])
         met += found.n + every.n
         looked += len(some) + len(few)
-        rest.settle(some, few, nodes, ridges, faces, size, edges, length, moments(outward), x + dt * v, part)
+        planes, known = np.empty((len(faces), 3)), np.zeros(len(faces), bool)
+        of = (nodes, ridges, faces, size, edges, length, moments(outward), planes, known)
+        rest.settle(some, few, *of, x + dt * v, part)
         x = x + dt * v
     assert met > 20
     assert looked < 40 * (len(nodes) + len(ridges)) * (0.1 if violence < 0.1 else 0.5)
@@ -77,7 +79,8 @@ def test_a_pair_whose_face_has_new_corners_is_looked_at() -> None:
         rest.move(x, np.zeros_like(x), faces, edges, 1.0)
         some, few = rest.awake(pairs, none)
         assert len(some) == fresh
-        rest.settle(some, few, pairs, none, faces, sizes, edges, np.zeros(0), np.zeros((5, 9)), x, part)
+        of = (pairs, none, faces, sizes, edges, np.zeros(0), np.zeros((5, 9)), np.empty((1, 3)), np.zeros(1, bool))
+        rest.settle(some, few, *of, x, part)
         rest.faces[0] = not fresh
 
 

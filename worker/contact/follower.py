@@ -211,7 +211,7 @@ class Follower:
             setattr(scene, name, extended(getattr(scene, name), np.zeros((n, width), np.int64)))
         scene.normals = extended(scene.normals, np.zeros((n, 9)))
         scene.before = extended(scene.before, rows.v)
-        for name in ("pushes", "shared", "slave", "on_surface"):
+        for name in ("pushes", "shared", "slave", "on_surface", "moved"):
             setattr(scene, name, extended(getattr(scene, name), np.zeros(n, bool)))
         scene.first = extended(scene.first, np.full(n, -1, np.int32))
         scene.deepest, scene.holder = np.empty(scene.crowd.n), np.empty(scene.crowd.n, np.int32)

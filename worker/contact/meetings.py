@@ -182,13 +182,13 @@ def _looks_at(out, s, m):  # type: ignore[no-untyped-def]
 
 @njit(
     f"int64({_OUT}, int64, {_N2}, float64[::1], int64[::1], boolean[::1], {_V2}, boolean[::1], int32[::1], int32[::1], "
-    f"float64[::1], int32[::1], {_IN})",
+    f"float64[::1], int32[::1], {_V2}, boolean[::1], {_IN})",
     cache=True,
     error_model="numpy",
 )
 def node_face(  # type: ignore[no-untyped-def]
     nodes, weights, normals, wanted, friction, pair, n, faces, size, ids, exposed, out, on_surface, first, following,
-    deepest, holder, pairs, some, x, v, part, mu, dt,
+    deepest, holder, planes, known, pairs, some, x, v, part, mu, dt,
 ):  # fmt: skip
     """Nodes that pass a face, from row ``n`` on; returns the new number of rows.
 
@@ -198,7 +198,8 @@ def node_face(  # type: ignore[no-untyped-def]
 
     ``pairs`` (p, 2): node and face, in chains by ``first`` and ``following`` (``chain``); ``faces`` (f, 4), the node
     opposite last, with their ``ids``; ``some`` of the pairs are looked at, those of faces that are ``exposed`` and of
-    nodes ``on_surface``; ``deepest`` and ``holder`` (nodes,) are room to work in; ``mu`` (parts, parts).
+    nodes ``on_surface``; ``deepest`` and ``holder`` (nodes,) are room to work in; ``mu`` (parts, parts). ``planes`` (f, 3)
+    get the normals of the faces at the end of the step, of those that are asked for: ``known`` (f,).
     """
     b, m = np.empty(3), np.empty(3)
     ahead = x + dt * v
@@ -208,9 +209,12 @@ def node_face(  # type: ignore[no-untyped-def]
         if not exposed[f] or not on_surface[s]:
             continue
         i, j, k, d = faces[f, 0], faces[f, 1], faces[f, 2], faces[f, 3]
-        height(m, ahead, s, i, j, k)
+        if not known[f]:
+            height(planes[f], ahead, s, i, j, k)
+            known[f] = True
         gap1 = 0.0
         for a in range(3):
+            m[a] = planes[f, a]
             gap1 += m[a] * (ahead[s, a] - ahead[i, a])
         if not gap1 <= NEAR * size[f]:
             continue

@@ -57,7 +57,7 @@ class Waiting:
     until: Floats
     """(p,) m; minus infinity when it is not known, NaN for a pair that is too close to rest until the next search."""
     speed: Floats
-    """(p,) U, m/s."""
+    """(p,) U, m/s; NaN when it is not known."""
     turned: Flags
     """(p,) whether a pair rests because its node does not face the face, by the mean normals of the node."""
     some: Indices
@@ -66,12 +66,12 @@ class Waiting:
     @classmethod
     def of(cls, n: int) -> "Waiting":
         """All awake."""
-        return cls(np.full(n, -np.inf), np.zeros(n), np.zeros(n, bool), np.empty(n, np.int32))
+        return cls(np.full(n, -np.inf), np.full(n, np.nan), np.zeros(n, bool), np.empty(n, np.int32))
 
     def grow(self, n: int) -> None:
         """Takes up more pairs, awake."""
         self.until = extended(self.until, np.full(n, -np.inf))
-        self.speed, self.turned = extended(self.speed, np.zeros(n)), extended(self.turned, np.zeros(n, bool))
+        self.speed, self.turned = extended(self.speed, np.full(n, np.nan)), extended(self.turned, np.zeros(n, bool))
         self.some = np.empty(len(self.until), np.int32)
 
 
@@ -139,16 +139,17 @@ class Rest:
 
     def settle(
         self, pairs: Indices, edges: Indices, node_face: Indices, edge_edge: Indices, faces: Indices, size: Floats,
-        sides: Indices, length: Floats, normals: Floats, x: Floats, part: Indices,
+        sides: Indices, length: Floats, normals: Floats, planes: Floats, known: Flags, x: Floats, part: Indices,
     ) -> None:  # fmt: skip
         """Lets candidates, ``pairs`` and ``edges``, rest; ``x`` (crowd, 3) at the end of the step.
 
-        ``size`` of the ``faces``, ``length`` of the edges ``sides``, ``normals`` of the nodes: meetings.py.
+        ``size`` of the ``faces``, ``length`` of the edges ``sides``, ``normals`` of the nodes, ``planes`` and ``known``:
+        meetings.py.
         """
         end, wait, trail, nodes = self._t + self._dt, self._node_face, self._faces, self._nodes
         _settle_nodes(
-            wait.until, wait.speed, wait.turned, pairs, node_face, faces, size, normals, x, self._v, part, nodes.path,
-            nodes.reach, trail.path, trail.reach, end,
+            wait.until, wait.speed, wait.turned, pairs, node_face, faces, size, normals, planes, known, x, self._v,
+            part, nodes.path, nodes.reach, trail.path, trail.reach, end,
         )  # fmt: skip
         wait, trail = self._edge_edge, self._edges
         _settle_edges(
@@ -189,7 +190,7 @@ def _awake(some, pairs, until, speed, path1, reach1, path2, reach2, fresh1, fres
     for p in range(len(pairs)):
         one, two = pairs[p, 0], pairs[p, 1]
         if fresh1[one] or fresh2[two]:
-            until[p] = -np.inf
+            until[p], speed[p] = -np.inf, np.nan
         if not until[p] > path1[one] + reach1[one] + path2[two] + reach2[two] + speed[p] * end:
             some[n] = p
             n += 1
@@ -219,13 +220,14 @@ def _bent(out, x, s, i, j, k, m):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    f"void({_V1}, {_V1}, boolean[::1], {_N1}, {_N2}, {_N2}, {_V1}, {_V2}, {_V2}, {_V2}, {_N1}, {_V1}, {_V1}, {_V1}, "
-    f"{_V1}, float64)",
+    f"void({_V1}, {_V1}, boolean[::1], {_N1}, {_N2}, {_N2}, {_V1}, {_V2}, {_V2}, boolean[::1], {_V2}, {_V2}, {_N1}, "
+    f"{_V1}, {_V1}, {_V1}, {_V1}, float64)",
     cache=True,
     error_model="numpy",
 )
 def _settle_nodes(  # type: ignore[no-untyped-def]
-    until, speed, turned, some, pairs, faces, size, out, x, v_then, part, path1, reach1, path2, reach2, end,
+    until, speed, turned, some, pairs, faces, size, out, planes, known, x, v_then, part, path1, reach1, path2,
+    reach2, end,
 ):  # fmt: skip
     b, m = np.empty(3), np.empty(3)
     for p in some:
@@ -233,10 +235,18 @@ def _settle_nodes(  # type: ignore[no-untyped-def]
             continue
         s, f = pairs[p, 0], pairs[p, 1]
         i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
-        apart = abs(height(m, x, s, i, j, k))
+        if not known[f]:
+            height(planes[f], x, s, i, j, k)
+            known[f] = True
+        apart = 0.0
+        for a in range(3):
+            m[a] = planes[f, a]
+            apart += m[a] * (x[s, a] - x[i, a])
+        apart = abs(apart)
         if not foot(b, x, x, s, i, j, k, 0.0):
             apart = min(off(x, s, i, j), off(x, s, j, k), off(x, s, k, i))
-        speed[p] = max(_between(v_then, s, i), _between(v_then, s, j), _between(v_then, s, k))
+        if np.isnan(speed[p]) or turned[p]:
+            speed[p] = max(_between(v_then, s, i), _between(v_then, s, j), _between(v_then, s, k))
         deep = _ROUND + max(DEEP_SELF if part[s] == part[i] else DEEP, NEAR)
         slack = apart - deep * size[f]
         turned[p] = not slack > 0.0
@@ -275,8 +285,9 @@ def _settle_edges(until, speed, some, pairs, edges, length, x, v_then, path, rea
         if a == b or c == d:  # an edge that has gone
             until[p] = np.inf
             continue
-        speed[p] = max(
-            max(_between(v_then, a, c), _between(v_then, a, d)), max(_between(v_then, b, c), _between(v_then, b, d))
-        )
+        if np.isnan(speed[p]):
+            speed[p] = max(
+                max(_between(v_then, a, c), _between(v_then, a, d)), max(_between(v_then, b, c), _between(v_then, b, d))
+            )
         slack = _segments(x, a, b, c, d) - (_ROUND + DEEP_SELF) * max(length[one], length[two])
         until[p] = slack + path[one] - reach[one] + path[two] - reach[two] + speed[p] * end if slack > 0.0 else np.nan

@@ -139,6 +139,8 @@ class Scene:
     """(m, 6) places of the nodes on either side of cracks whose nodes have separated (contact/cracks.py)."""
     crack_rows: Ints
     """(m,) which cracks these are."""
+    moved: Flags
+    """(crowd,) whose velocity the last sweep has changed."""
     met: int = 0
     """Meetings of the last step, the first rows of the room."""
     company: list[Neighbour] = field(init=False)
@@ -348,7 +350,7 @@ def compact(
         cracks=np.zeros((0, 6), np.int32), crack_rows=np.zeros(0, np.int64),
         rest=Rest(crowd.x, crowd.course, len(which_faces), len(which_edges), len(node_face), len(edge_edge)),
         total=np.zeros((crowd.n, 3), np.int64), normals=np.zeros((crowd.n, 9)), before=np.zeros((crowd.n, 3)),
-        deepest=np.empty(crowd.n), holder=np.empty(crowd.n, np.int32),
+        deepest=np.empty(crowd.n), holder=np.empty(crowd.n, np.int32), moved=np.zeros(crowd.n, bool),
     )  # fmt: skip
 
 

@@ -399,9 +399,16 @@ class Contact:
         if self._rubs:
             slip = sweeps.rates(now.before, room.nodes, room.weights, n)
             self._resume(now, rows)
-        sweep = now.impulse, now.push, crowd.v, *room_of, room.wanted, room.friction, now.diagonal, self._scale
-        for _ in range(self._sweeps):
-            self._give(now, rows, sweeps.sweep, *sweep)
+        settled = np.zeros(n, bool)
+        sweep = (
+            now.impulse, now.push, settled, now.moved, crowd.v, *room_of, room.wanted, room.friction, now.diagonal,
+            self._scale,
+        )  # fmt: skip
+        if self._comm.size == 1:
+            sweeps.sweep_all(*sweep, rows[1], now.total, crowd.mobility, self._sweeps)
+        else:
+            for _ in range(self._sweeps):
+                self._give(now, rows, sweeps.sweep, *sweep)
         if self._rubs:
             now.kept[:] = 0.0
             faces = room.pair[:n] >= 0
@@ -430,7 +437,7 @@ class Contact:
         now.shared_impulse.begin(now.impulse)
         sweep(*of, inner)
         now.shared_impulse.finish(now.impulse)
-        sweeps.give(now.crowd.v, now.total, now.impulse, now.crowd.mobility, self._scale)
+        sweeps.give(now.crowd.v, now.total, now.moved, now.impulse, now.crowd.mobility, self._scale)
 
     def _meet(self, now: Scene, dt: float) -> int:
         crowd, room = now.crowd, now.room
@@ -440,16 +447,19 @@ class Contact:
         surfaces = now.faces, now.face_size, now.edges, now.edge_size, now.normals
         if rest.fresh:
             pairs, edges = _all(now.node_face), _all(now.edge_edge)
-            rest.settle(pairs, edges, now.node_face, now.edge_edge, *surfaces, crowd.x, crowd.part)
+            planes, known = np.empty((len(now.faces), 3)), np.zeros(len(now.faces), bool)
+            rest.settle(pairs, edges, now.node_face, now.edge_edge, *surfaces, planes, known, crowd.x, crowd.part)
         rest.move(crowd.x, crowd.v, now.faces, now.edges, dt)
         pairs, edges = rest.awake(now.node_face, now.edge_edge)
+        planes, known = np.empty((len(now.faces), 3)), np.zeros(len(now.faces), bool)
         n = meetings.node_face(
             *out, 0, now.faces, now.face_size, now.face_id, now.face_exposed, now.normals, now.on_surface, now.first,
-            now.next, now.deepest, now.holder, now.node_face, pairs, *found,
+            now.next, now.deepest, now.holder, planes, known, now.node_face, pairs, *found,
         )  # fmt: skip
         self.approach = _KINEMATIC * scene.approach(crowd.x, crowd.v, now.faces, now.node_face, room.pair[:n])
         n = meetings.edge_edge(*out, n, now.edges, now.edge_size, now.edge_exposed, now.edge_edge, edges, *found)
-        rest.settle(pairs, edges, now.node_face, now.edge_edge, *surfaces, crowd.x + dt * crowd.v, crowd.part)
+        ahead = crowd.x + dt * crowd.v
+        rest.settle(pairs, edges, now.node_face, now.edge_edge, *surfaces, planes, known, ahead, crowd.part)
         opening = np.empty(len(now.cracks), np.int64)
         n, wide = across(*out, n, opening, now.cracks, self._size, *found)
         self._opening = opening[:wide]

@@ -98,17 +98,26 @@ def resume(impulse, push, kept, pair, nodes, weights, normals, friction, ratio, 
 
 
 @njit(
-    f"void({_I2}, {_V2}, {_V2}, {_N2}, {_V2}, {_V2}, float64[::1], float64[::1], {_V2}, float64, int32[::1])",
+    f"void({_I2}, {_V2}, boolean[::1], boolean[::1], {_V2}, {_N2}, {_V2}, {_V2}, float64[::1], float64[::1], {_V2}, "
+    "float64, int32[::1])",
     cache=True,
     error_model="numpy",
 )
-def sweep(impulse, push, v, nodes, weights, normals, wanted, friction, diagonal, scale, some):  # type: ignore[no-untyped-def]
+def sweep(  # type: ignore[no-untyped-def]
+    impulse, push, settled, moved, v, nodes, weights, normals, wanted, friction, diagonal, scale, some,
+):  # fmt: skip
     """Adds the corrections of ``some`` meetings to ``impulse`` (nodes, 3), in quanta of 1 / ``scale`` N s.
 
     ``push`` (room, 4) holds each meeting's sum over the sweeps so far: along the normal, and the friction vector, N s.
+    A meeting that has changed nothing in its last sweep, ``settled`` (room,), would change nothing while none of its
+    nodes has ``moved`` (nodes,) since: it is passed over, without a change of any bit.
     """
     rate, change = np.empty(3), np.empty(3)
     for p in some:
+        if settled[p]:
+            a, b, c, d = nodes[p, 0], nodes[p, 1], nodes[p, 2], nodes[p, 3]
+            if not (moved[a] or moved[b] or moved[c] or moved[d]):
+                continue
         speed = 0.0
         for i in range(3):
             rate[i] = 0.0
@@ -117,7 +126,8 @@ def sweep(impulse, push, v, nodes, weights, normals, wanted, friction, diagonal,
             speed += normals[p, i] * rate[i]
         old = push[p, 0]
         push[p, 0] = max(0.0, old + (wanted[p] - speed) / diagonal[p, 0])
-        if push[p, 0] == old and (old == 0.0 or friction[p] == 0.0):
+        settled[p] = push[p, 0] == old and (old == 0.0 or friction[p] == 0.0)
+        if settled[p]:
             continue
         for i in range(3):
             change[i] = (push[p, 0] - old) * normals[p, i]
@@ -134,16 +144,37 @@ def sweep(impulse, push, v, nodes, weights, normals, wanted, friction, diagonal,
         _add(impulse, nodes, weights, change, scale, p)
 
 
-@njit(f"void({_V2}, {_I2}, {_I2}, {_V2}, float64)", cache=True)
-def give(v, total, impulse, mobility, scale):  # type: ignore[no-untyped-def]
-    """Turns the completed impulses (nodes, 3) of a sweep into velocities, adds them to ``total`` and clears them."""
+@njit(f"void({_V2}, {_I2}, boolean[::1], {_I2}, {_V2}, float64)", cache=True)
+def give(v, total, moved, impulse, mobility, scale):  # type: ignore[no-untyped-def]
+    """Turns the completed impulses (nodes, 3) of a sweep into velocities, adds them to ``total`` and clears them; notes
+    which nodes have ``moved`` (nodes,).
+    """
     for a in range(len(v)):
+        moved[a] = False
         for i in range(3):
             j = impulse[a, i]
             if j != 0:
+                moved[a] = True
                 v[a, i] += j * (mobility[a, i] / scale)
                 total[a, i] += j
                 impulse[a, i] = 0
+
+
+@njit(
+    f"void({_I2}, {_V2}, boolean[::1], boolean[::1], {_V2}, {_N2}, {_V2}, {_V2}, float64[::1], float64[::1], {_V2}, "
+    f"float64, int32[::1], {_I2}, {_V2}, int64)",
+    cache=True,
+)
+def sweep_all(  # type: ignore[no-untyped-def]
+    impulse, push, settled, moved, v, nodes, weights, normals, wanted, friction, diagonal, scale, some, total,
+    mobility, many,
+):  # fmt: skip
+    """``many`` sweeps (``sweep``, ``give``) of meetings of which no other rank shares a node."""
+    for _ in range(many):
+        sweep(
+            impulse, push, settled, moved, v, nodes, weights, normals, wanted, friction, diagonal, scale, some
+        )  # fmt: skip
+        give(v, total, moved, impulse, mobility, scale)
 
 
 @njit(f"{_V2}({_V2}, {_N2}, {_V2}, int64)", cache=True)
