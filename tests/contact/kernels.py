@@ -60,7 +60,8 @@ def node_face(
     found = kernels.node_face(
         room.nodes, room.weights, room.normals, room.wanted, room.friction, room.pair, 0, faces, face_sizes(x, faces),
         np.arange(len(faces)), np.ones(len(faces), bool), np.zeros((n, 9)) if out is None else moments(out),
-        np.ones(n, bool), first, following, np.empty(n), np.empty(n, np.int32), pairs, _all(pairs), x, v,
+        np.ones(n, bool), first, following, np.empty(n), np.empty(n, np.int32), np.empty((len(faces), 3)),
+        np.zeros(len(faces), bool), pairs, _all(pairs), x, v,
         own.astype(np.int32), np.zeros((9, 9)) if mu is None else mu, dt,
     )  # fmt: skip
     return _filled(room, found)

@@ -115,7 +115,8 @@ class Brute(Found):
             meetings.chain(first, following, by_place, 0)
             n = meetings.node_face(
                 *rows, 0, faces, sides.faces.size, sides.faces.id, sides.faces.exposed, out, on_surface, first,
-                following, np.empty(len(local)), np.empty(len(local), np.int32), by_place,
+                following, np.empty(len(local)), np.empty(len(local), np.int32), np.empty((len(faces), 3)),
+                np.zeros(len(faces), bool), by_place,
                 np.arange(len(pairs), dtype=np.int32), *state,
             )  # fmt: skip
             met += written(room, n, sides.crowd.id)

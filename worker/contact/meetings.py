@@ -198,8 +198,8 @@ def node_face(  # type: ignore[no-untyped-def]
 
     ``pairs`` (p, 2): node and face, in chains by ``first`` and ``following`` (``chain``); ``faces`` (f, 4), the node
     opposite last, with their ``ids``; ``some`` of the pairs are looked at, those of faces that are ``exposed`` and of
-    nodes ``on_surface``; ``deepest`` and ``holder`` (nodes,) are room to work in; ``mu`` (parts, parts). ``planes`` (f, 3)
-    get the normals of the faces at the end of the step, of those that are asked for: ``known`` (f,).
+    nodes ``on_surface``; ``deepest`` and ``holder`` (nodes,) are room to work in; ``mu`` (parts, parts). ``planes``
+    (f, 3) get the normals of the faces at the end of the step, of those that are asked for: ``known`` (f,).
     """
     b, m = np.empty(3), np.empty(3)
     ahead = x + dt * v

@@ -143,8 +143,8 @@ class Rest:
     ) -> None:  # fmt: skip
         """Lets candidates, ``pairs`` and ``edges``, rest; ``x`` (crowd, 3) at the end of the step.
 
-        ``size`` of the ``faces``, ``length`` of the edges ``sides``, ``normals`` of the nodes, ``planes`` and ``known``:
-        meetings.py.
+        ``size`` of the ``faces``, ``length`` of the edges ``sides``, ``normals`` of the nodes, ``planes`` and
+        ``known``: meetings.py.
         """
         end, wait, trail, nodes = self._t + self._dt, self._node_face, self._faces, self._nodes
         _settle_nodes(

@@ -1,0 +1,74 @@
+"""No answer depends on when a search happens, nor on what it takes up besides what meets."""
+
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from conoid.cases.load import apply_overrides, parse_case, read_data
+from conoid.worker import simulation, step
+from conoid.worker.contact import cracks, flight
+from conoid.worker.digest import digest
+from conoid.worker.parallel.comm import Comm, SerialComm
+
+from .ranks import on_ranks
+
+SCENES = Path(__file__).parents[1] / "parallel"
+STEPS = {"breaking": 54, "eroding": 100, "meeting": 120}
+
+
+def ran(name: str, comm: Comm, every: int = 0, *changes: str) -> tuple[str | None, int]:
+    """Digest and number of searches of a scene; ``every``: a search at least each so many steps."""
+    case = parse_case(apply_overrides(read_data(SCENES / f"{name}.toml"), ["run.frames=0", *changes]))
+    sim = simulation.build(case, Path(), comm)
+    assert sim.contact is not None
+    step.prepare(sim)
+    for number in range(STEPS[name]):
+        sim.contact.due |= every > 0 and number % every == 0
+        step.first_half(sim)
+        step.second_half(sim)
+    found = digest(sim.model, comm, []), sim.contact.searches
+    sim.free()
+    return found
+
+
+@cache
+def alone(name: str) -> tuple[str | None, int]:
+    """One rank, as it comes."""
+    return ran(name, SerialComm())
+
+
+@pytest.mark.parametrize("name", STEPS)
+@pytest.mark.parametrize("skin", [0.05, 0.15, 0.39, 0.401, 0.8])
+def test_no_answer_depends_on_the_skin(name: str, skin: float) -> None:
+    assert ran(name, SerialComm(), 0, f"contact.skin={skin}")[0] == alone(name)[0]
+
+
+@pytest.mark.parametrize("name", STEPS)
+def test_no_answer_depends_on_how_often_is_searched(name: str) -> None:
+    one, searches = alone(name)
+    for every in (1, 7):
+        other, more = ran(name, SerialComm(), every)
+        assert other == one
+        assert more > searches
+
+
+@pytest.mark.parametrize("foreseen", [0.0, 0.9])
+def test_no_answer_depends_on_which_cracks_a_search_foresees(monkeypatch: pytest.MonkeyPatch, foreseen: float) -> None:
+    one = alone("breaking")[0]
+    monkeypatch.setattr(cracks, "_FORESEEN", foreseen)
+    assert ran("breaking", SerialComm())[0] == one
+
+
+@pytest.mark.parametrize("name", STEPS)
+def test_no_answer_depends_on_the_horizon(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    one = alone(name)[0]
+    monkeypatch.setattr(flight, "_LOOKS", flight._LOOKS[:1])
+    assert ran(name, SerialComm())[0] == one
+
+
+@pytest.mark.parametrize(("ranks", "changes"), [(2, ("contact.skin=0.15",)), (3, ("contact.domain=box",))])
+def test_nor_on_either_on_several_ranks(ranks: int, changes: tuple[str, ...]) -> None:
+    """Every rank searches when one of them must; what it is sent depends on the skin and the contact domain."""
+    one = alone("breaking")[0]
+    assert on_ranks(ranks, lambda comm: ran("breaking", comm, 5, *changes))[0][0] == one
