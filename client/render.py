@@ -12,7 +12,7 @@ import numpy as np
 import pyvista as pv
 
 from .errors import ViewError
-from .view import FIELDS, Drawn, Field, Mirror, Picture, Wall
+from .pictures import FIELDS, Drawn, Field, Mirror, Picture, Wall
 
 _INK, _PAPER, _HAZE = "#1d2733", "#ffffff", "#dfe6ee"
 _NAMED = ("classes", "fragments")

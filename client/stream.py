@@ -10,7 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Generator, Iterator
 from contextlib import suppress
-from typing import Protocol, TypeVar, cast
+from typing import TypeVar, cast
 
 import msgspec
 import zenoh
@@ -20,8 +20,9 @@ from conoid.cases.messages import AnyMessage, Status, from_msgpack
 from conoid.cases.run import State
 
 from .errors import ClientError, UnreachableError
+from .http import Router
+from .link import Link
 from .order import InOrder, Refill
-from .session import Router
 
 T = TypeVar("T")
 
@@ -34,18 +35,6 @@ _PATIENCE = 60.0
 
 class StreamError(ClientError):
     """Zenoh cannot be used: no router, or it refuses the user."""
-
-
-class Link(Protocol):
-    """Messages as they arrive, perhaps with gaps and repeats."""
-
-    name: str
-
-    def get(self, timeout: float) -> AnyMessage | None:
-        """The next message; None after ``timeout`` s without one."""
-
-    def close(self) -> None:
-        """Lets go; a second call does nothing."""
 
 
 class Mailbox:

@@ -88,6 +88,27 @@ def test_tests_mirror_the_houses() -> None:
     assert folders - set(HOUSES) - inside == {"verification", "bench"}
 
 
+def relatives(path: Path) -> set[Path]:
+    """Files of its house that a file imports, anywhere in it."""
+    found: set[Path] = set()
+    for node in ast.walk(tree(path)):
+        if isinstance(node, ast.ImportFrom) and node.level:
+            base = path.parents[node.level - 1].joinpath(*(node.module or "").split(".") if node.module else ())
+            names = [base.joinpath(alias.name) for alias in node.names]
+            found |= {place.with_suffix(".py") for place in (base, *names)}
+    return found & set(SOURCES)
+
+
+@pytest.mark.parametrize("house", HOUSES)
+def test_no_imports_go_in_a_circle(house: str) -> None:
+    """Imports inside functions count, and those for types alone."""
+    left = {path: relatives(path) for path in SOURCES if name_of(path).startswith(f"{house}/")}
+    while free := [path for path, needed in left.items() if not needed & left.keys()]:
+        for path in free:
+            del left[path]
+    assert not left, f"circles among {sorted(map(name_of, left))}"
+
+
 def test_the_contract_is_light() -> None:
     for path in SOURCES:
         if path.relative_to(ROOT).parts[0] == "cases":
