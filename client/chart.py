@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from .study import Study
 
 _WIDTH, _HEIGHT, _LEFT, _TOP, _SIDE = 424, 464, 56, 36, 320
+"""Pixels: the picture, and the square of the axes inside it with room for numbers and legend. Chosen."""
 _BLUE, _RED, _GREY = "#1b6ca8", "#c8553d", "#999999"
 
 

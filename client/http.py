@@ -20,8 +20,11 @@ from .journal import from_line
 T = TypeVar("T")
 
 _TIMEOUT = httpx2.Timeout(30.0, connect=5.0)
+"""s: an answer may take a while when a disk is slow, a connection may not. Chosen."""
 _STREAM_TIMEOUT = httpx2.Timeout(60.0, connect=5.0)
+"""s of silence on a stream: four times the 15 s after which the server sends a comment (server/stream.py)."""
 _TRIES = 3
+"""Times a request is sent that may be repeated, 0.3 and 0.6 s apart. Chosen: a lost connection is back by then."""
 
 
 class Router(msgspec.Struct, kw_only=True, frozen=True):

@@ -17,6 +17,7 @@ import msgspec
 from .errors import ClientError, ViewError
 
 _SECONDS = 180.0
+"""s that a picture may take. Chosen: without a graphics card a large frame takes long."""
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,7 @@ _CLASSES = [
     "#bab0ac",
 ]
 _FROM = (1.0, -1.55, 0.62)
+"""Direction from the body to the camera where nothing else decides: from the front, the right and above. Chosen."""
 _BAR = {
     "vertical": True, "position_x": 0.885, "position_y": 0.17, "width": 0.045, "height": 0.62,
     "color": _INK, "font_family": "arial", "fmt": " %.4g",

@@ -26,6 +26,7 @@ from .live import Live
 from .result import Result
 
 _WAIT = 20.0
+"""s of a single request that waits for the end of a run: below the 30 s after which a request is given up (http.py)."""
 
 
 class RunInfo(msgspec.Struct, kw_only=True, frozen=True):

@@ -27,10 +27,15 @@ from .order import InOrder, Refill
 T = TypeVar("T")
 
 _CAPACITY = 4096
+"""Messages that wait to be read. Chosen: minutes of a run, which sends some ten a second."""
 _OPEN_SECONDS = 5.0
+"""s that a router may take to answer before SSE is used. Chosen."""
 _CLOSE_SECONDS = 2.0
+"""s that a subscription may take to close. Chosen: nothing is lost when it does not."""
 _SILENCE = 3.0
+"""s without a message after which the journal is read. Chosen: a run reports four times a second."""
 _PATIENCE = 60.0
+"""s that a server may be away while a run is followed. Chosen: time for a restart."""
 
 
 class StreamError(ClientError):

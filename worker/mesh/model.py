@@ -30,7 +30,8 @@ REGULAR_STEP = 6**-0.5
 """Step length of the regular tet with edge 1: half its altitude."""
 
 _FLAT = 1e-9
-"""A tet whose volume is below this share of (root of the sum of its squared face areas)^(3/2) has none."""
+"""A tet whose volume is below this share of (root of the sum of its squared face areas)^(3/2) has none. Chosen: a
+regular tet has 0.15, rounding of its nodes 1e-16."""
 
 
 @dataclass(frozen=True, eq=False)

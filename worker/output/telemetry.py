@@ -15,8 +15,12 @@ import zenoh
 from conoid.cases import keys, messages
 
 _RING = 1024
+"""Messages that wait for the network. Chosen: more than a minute of a run, which sends some ten a
+second."""
 _RETRY = 2.0
+"""s between two attempts to reach a router. Chosen."""
 _LINGER = 1.0
+"""s that the last messages get to leave. Chosen: the journal has them."""
 
 
 class Telemetry:
