@@ -130,6 +130,14 @@ def test_a_numeric_constant_says_where_it_comes_from(path: Path) -> None:
             assert told, f"{name_of(path)}:{node.lineno}: {ast.unparse(node)}"
 
 
+def test_the_table_of_the_step_is_the_same_in_code_and_document() -> None:
+    row = re.compile(r"^ ?(\d+)  (\S.*?)  +(\S.*)$", re.MULTILINE)
+    code, document = ((ROOT / name).read_text(encoding="utf-8") for name in ("worker/step.py", "ARCHITECTURE.md"))
+    lines = [found[:2] for found in row.findall(code)]
+    assert [int(number) for number, _ in lines] == list(range(1, len(lines) + 1))
+    assert lines == [found[:2] for found in row.findall(document)]
+
+
 def test_the_contract_is_light() -> None:
     for path in SOURCES:
         if path.relative_to(ROOT).parts[0] == "cases":
