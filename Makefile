@@ -10,19 +10,26 @@ BIN := .venv/bin
 READY := .venv/.ready
 HOUSES := cases client server worker
 
-.PHONY: demo test lint bench drill clean
+.PHONY: demo test lint style types check bench drill clean
 .DEFAULT_GOAL := test
 
 demo: $(READY)
 	$(BIN)/conoid run glass_steel_demo --ranks 2 --view demo.png --check
 
-test: lint
-	$(BIN)/pytest -q -m "not slow"
+test: style
+	@$(MAKE) --no-print-directory --jobs 2 types check
 
-lint: $(READY)
+lint: style types
+
+style: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+
+types: $(READY)
 	$(BIN)/mypy
+
+check: $(READY)
+	$(BIN)/pytest -q -m "not slow"
 
 bench: $(READY)
 	$(BIN)/python -m tests.bench

@@ -30,6 +30,8 @@ NEEDED: dict[str, frozenset[str]] = {
 """The keys that each reference quantity needs; the others of part, probe and axis are refused."""
 
 _ROUNDING = 1e-9
+"""Of a length or a time: two numbers that agree to this were meant to be equal. Chosen far above the rounding of
+units (1e-16) and far below any tolerance of a drawing."""
 
 
 def check(case: Case) -> list[Problem]:

@@ -100,13 +100,6 @@ def fits(values: Sequence[float]) -> list[Fit]:
     ]
 
 
-def cumulative(masses: Sequence[float]) -> list[tuple[float, int]]:
-    """N(m): every distinct mass, ascending, and how many have at least that."""
-    ascending = sorted(masses)
-    n = len(ascending)
-    return [(m, n - k) for k, m in enumerate(ascending) if k == 0 or m != ascending[k - 1]]
-
-
 @dataclass(frozen=True)
 class Summary:
     """What a table says as a whole; dust is in the masses, not in the laws."""

@@ -9,6 +9,7 @@ from typing import ClassVar
 import msgspec
 
 VERSION = 1
+"""Of the format of messages; a reader of another one may refuse them."""
 
 
 class Message(msgspec.Struct, tag_field="type", tag=str.lower, kw_only=True, frozen=True):

@@ -14,7 +14,9 @@ Location = tuple[int | str, ...]
 
 _DISCRIMINATORS = ("shape", "kind", "model")
 _LONGEST = 80
+"""Characters of a value that are shown: a line of a terminal. Chosen."""
 _MOST = 100
+"""Problems that are told at once: more than anybody mends at once. Chosen."""
 
 
 @dataclass(frozen=True)

@@ -45,10 +45,8 @@ class Cause(StrEnum):
     ENERGY = "energy"
     MEMORY = "memory"
     WALLTIME = "walltime"
-    PREEMPTED = "preempted"
     NODE = "node"
     LAUNCH = "launch"
-    STORAGE = "storage"
     CANCELLED = "cancelled"
     SERVICE = "service"
 

@@ -20,6 +20,7 @@ Dimension = tuple[int, int, int, int]
 _LENGTH, _MASS, _TIME, _TEMPERATURE = (1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)
 _FORCE, _STRESS, _ENERGY, _POWER = (1, 1, -2, 0), (-1, 1, -2, 0), (2, 1, -2, 0), (2, 1, -3, 0)
 _NONE, _FREQUENCY = (0, 0, 0, 0), (0, 0, -1, 0)
+"""Dimensions by their exponents of m, kg, s, K."""
 
 UNITS: dict[str, tuple[float, Dimension]] = {
     "1": (1.0, (0, 0, 0, 0)),
@@ -50,6 +51,8 @@ KINDS: dict[Dimension, str] = {
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*")
 _FACTOR = re.compile(r"\s*([*/·]?)\s*([A-Za-zµ%]+|1)(?:\^([+-]?\d))?")
 _LONGEST = 80
+"""Characters of a quantity that are read: longer than any number with its unit. Chosen, so that a text that is no
+quantity costs no time."""
 
 
 def parse_unit(text: str) -> tuple[float, Dimension]:

@@ -1,4 +1,4 @@
-"""Speed-up against ranks, drawn as SVG: projected, as measured where there are cores enough, and the paper's."""
+"""Speed-up against ranks, drawn as SVG: projected, as measured where there are cores enough, and as others measured."""
 
 import math
 from collections.abc import Mapping
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from .study import Study
 
 _WIDTH, _HEIGHT, _LEFT, _TOP, _SIDE = 424, 464, 56, 36, 320
+"""Pixels: the picture, and the square of the axes inside it with room for numbers and legend. Chosen."""
 _BLUE, _RED, _GREY = "#1b6ca8", "#c8553d", "#999999"
 
 
@@ -44,14 +45,14 @@ class _Frame:
         return "\n".join(f'<text x="{x + right:.1f}" y="{y + down:.1f}">{value:.2f}</text>' for x, y, value in places)
 
 
-def speed_up(study: Study) -> str:
-    """The figure; both axes are logarithmic."""
+def speed_up(study: Study, others: Mapping[int, float] | None = None, source: str = "") -> str:
+    """The figure; both axes are logarithmic. ``others``: the speed-ups that ``source`` measured, by ranks."""
     projected = {run.ranks: study.speed_up(run) for run in study.runs}
     worst = {run.ranks: study.runs[0].time / run.worst for run in study.runs}
     measured = {run.ranks: study.runs[0].wall / run.wall for run in study.runs if run.ranks <= study.cores}
     values = (*worst.values(), *measured.values())
-    paper = study.paper.speed_up if study.paper else {}
-    most = max(1, math.ceil(math.log2(max(*projected, *paper, 2))))
+    others = others or {}
+    most = max(1, math.ceil(math.log2(max(*projected, *others, 2))))
     frame = _Frame(min(0, math.floor(math.log2(min(values)))), most)
     return "\n".join([
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {_HEIGHT}" font-family="sans-serif" '
@@ -60,11 +61,11 @@ def speed_up(study: Study) -> str:
         frame.line({1: 1.0, 2**most: 2.0**most}, _GREY, "4 4"), frame.line(projected, _BLUE),
         frame.line(worst, _BLUE, "2 3"),
         frame.marks(projected, _BLUE, _BLUE), frame.marks(measured, _BLUE, "white"),
-        frame.marks(paper, _RED, _RED), frame.labels(paper, 8, 4),
+        frame.marks(others, _RED, _RED), frame.labels(others, 8, 4),
         frame.labels({ranks: value for ranks, value in projected.items() if ranks > 1}, -10, -10),
         _legend(0, "projected, a core a rank; dots: at worst", _BLUE, _BLUE),
         _legend(1, "wall time, this machine", _BLUE, "white"),
-        *([_legend(2, f"measured, Moon, Kim and Lee, {study.paper.figure}", _RED, _RED)] if study.paper else []),
+        *([_legend(2, f"measured, {source}", _RED, _RED)] if others else []),
         f'<text x="{_LEFT}" y="20" font-size="14">{study.case}: speed-up</text>',
         f'<text x="{_LEFT + _SIDE / 2}" y="{_TOP + _SIDE + 36}" text-anchor="middle">ranks</text>', "</svg>", "",
     ])  # fmt: skip

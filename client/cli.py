@@ -19,10 +19,11 @@ from .errors import ClientError, ServiceError
 from .live import Live, exit_code
 from .once import run_once
 from .options import CaseArgument, Json, Overrides, Token, Url, complain, find, show, show_json
+from .pictures import FIELDS
 from .run import Run
 from .session import connect
 from .submission import case_of, locate
-from .view import FIELDS, view
+from .view import view
 from .watch import watch
 
 

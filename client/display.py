@@ -28,7 +28,9 @@ _PHASE_STYLE = {
 }
 _LEVEL_STYLE = {"warning": "yellow", "error": "red"}
 _MOST_RANKS = 12
+"""Ranks with a bar of their own in the panel. Chosen: more do not fit a terminal beside the rest."""
 _BAR = 36
+"""Characters of a full bar. Chosen for a terminal of 80 columns."""
 
 
 def panel(live: Live, log_lines: int = 6) -> RenderableType:

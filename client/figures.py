@@ -4,6 +4,7 @@ import math
 from datetime import datetime
 
 _PREFIXES = ((1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+"""SI."""
 
 
 def si(value: float, unit: str, digits: int = 3) -> str:

@@ -9,6 +9,7 @@ from conoid.cases.run import Cause, ExitCode, State
 
 PHASE_GROUPS = ("compute", "contact", "exchange", "output", "wait")
 _LOG_TAIL = 200
+"""Lines of the log that are kept for display: some screens full. Chosen."""
 
 
 @dataclass

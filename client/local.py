@@ -19,7 +19,9 @@ ADDRESS_FILE = "server.json"
 LOG_FILE = "server.log"
 OWNER = "local"
 _START_SECONDS = 60.0
+"""s that a server may take to start. Chosen: it takes one or two, and many times that on a busy machine."""
 _STOP_SECONDS = 15.0
+"""s that it may take to stop before it is killed: ``GRACE`` for its workers, and five for itself."""
 GRACE = 10.0
 """s that a cancelled worker gets before it is killed."""
 

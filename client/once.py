@@ -15,10 +15,11 @@ from . import tables
 from .errors import ClientError
 from .live import Live, exit_code
 from .local import GRACE, LocalServer
+from .pictures import FIELDS, Drawn
 from .result import Result
 from .run import Run, RunInfo
 from .submission import data_of
-from .view import FIELDS, Drawn, view
+from .view import view
 from .watch import show, tell
 
 _LAST_WORDS = 30.0

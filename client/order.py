@@ -9,6 +9,8 @@ Refill = Callable[[int], list[AnyMessage]]
 """The messages of the journal after a number, in order."""
 
 _TRIES = 3
+"""Times the journal is read for a message that is missing before it is given up. Chosen: the journal is written before
+the sample is sent, so the first reading finds it but on a file system that lags behind."""
 
 
 class InOrder:

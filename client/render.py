@@ -12,7 +12,7 @@ import numpy as np
 import pyvista as pv
 
 from .errors import ViewError
-from .view import FIELDS, Drawn, Field, Mirror, Picture, Wall
+from .pictures import FIELDS, Drawn, Field, Mirror, Picture, Wall
 
 _INK, _PAPER, _HAZE = "#1d2733", "#ffffff", "#dfe6ee"
 _NAMED = ("classes", "fragments")
@@ -31,6 +31,7 @@ _CLASSES = [
     "#bab0ac",
 ]
 _FROM = (1.0, -1.55, 0.62)
+"""Direction from the body to the camera where nothing else decides: from the front, the right and above. Chosen."""
 _BAR = {
     "vertical": True, "position_x": 0.885, "position_y": 0.17, "width": 0.045, "height": 0.62,
     "color": _INK, "font_family": "arial", "fmt": " %.4g",

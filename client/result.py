@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 import msgspec
 
@@ -19,9 +19,7 @@ from conoid.cases.outcome import Outcome
 
 from .errors import ClientError, UnfinishedError
 from .journal import from_line
-
-if TYPE_CHECKING:
-    from .view import Drawn
+from .pictures import Drawn, Mirror, Scene, Wall, draw
 
 Column: TypeAlias = "array[float] | list[str]"
 """Numbers as a double array; text, such as the limiter of dt, as a list."""
@@ -140,11 +138,35 @@ class Result:
             raise UnfinishedError(f"{self.folder.name} has not written {wanted}; it has {len(self.frames)}")
         return self.folder.path(found[0].name)
 
-    def view(self, field: str = "mises", out: Path | str | None = None, **options: Any) -> "Drawn":
-        """Draws a frame as a PNG; takes the options of ``conoid.client.view.view``. Raises ViewError."""
-        from .view import view
+    def view(self, field: str = "mises", out: Path | str | None = None, *, frame: int = -1, **options: Any) -> Drawn:
+        """Draws a frame as a PNG; takes the options of ``conoid.client.pictures.draw``. Raises ViewError."""
+        return draw(self.frame(frame), self.scene(frame), self.folder.name, field, out, **options)
 
-        return view(self, field, out, **options)
+    def scene(self, frame: int = -1) -> Scene:
+        """What a picture of a frame takes from the case; nothing when there is no case to read."""
+        try:
+            case = self.case
+        except (UnfinishedError, ValueError):
+            return Scene()
+        boundaries: list[dict[str, Any]] = case.get("boundaries", [])
+        title = case.get("title") or case.get("name") or ""
+        time = self._time(frame)
+        return Scene(
+            mirrors=tuple(
+                Mirror("xyz".index(one["axis"]), float(one.get("at", 0.0)))
+                for one in boundaries
+                if one["kind"] == "symmetry" and not one.get("parts")
+            ),
+            walls=tuple(Wall(tuple(one["point"]), tuple(one["normal"])) for one in boundaries if one["kind"] == "wall"),
+            parts=tuple(part["name"] for part in case.get("parts", [])),
+            title=f"{title}   t = {1e6 * time:.4g} µs" if time is not None else str(title),
+        )
+
+    def _time(self, frame: int) -> float | None:
+        """Of a frame, s; None when it is not listed."""
+        if frame == -1:
+            return self.frames[-1].time
+        return next((one.time for one in self.frames if one.index == frame), None)
 
     def _frame_times(self) -> dict[str, float]:
         try:

@@ -8,7 +8,7 @@ from collections.abc import Generator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import quote
 
 import msgspec
@@ -19,15 +19,14 @@ from conoid.cases.outcome import Outcome
 from conoid.cases.run import State
 
 from .errors import ClientError, ServiceError, UnfinishedError
+from .http import Http
 from .journal import from_line
+from .link import Link
 from .live import Live
 from .result import Result
 
-if TYPE_CHECKING:
-    from .session import Session
-    from .stream import Link
-
 _WAIT = 20.0
+"""s of a single request that waits for the end of a run: below the 30 s after which a request is given up (http.py)."""
 
 
 class RunInfo(msgspec.Struct, kw_only=True, frozen=True):
@@ -87,7 +86,7 @@ class EventPage(msgspec.Struct, kw_only=True, frozen=True):
 class Run:
     """A run on a server. Nothing is asked before a method is called."""
 
-    session: "Session"
+    session: Http
     id: str
 
     # State ------------------------------------------------------------------------------------------------------------
@@ -132,18 +131,18 @@ class Run:
             after, more = page.last, page.more
         return found
 
-    def messages(self, after: int = 0, link: "Link | None" = None) -> Generator[AnyMessage]:
+    def messages(self, after: int = 0, link: Link | None = None) -> Generator[AnyMessage]:
         """Every message after ``after``, once and in order: what was said, then what is said, to the run's end.
 
         Over Zenoh where it can be reached, else over SSE; ``link`` chooses.
         """
-        from .stream import follow
+        from .stream import follow  # zenoh is loaded when it is needed
 
         return follow(link or self.link(), self.events, lambda: self.status().state.final, after)
 
-    def link(self) -> "Link":
+    def link(self) -> Link:
         """A subscription to the run: over Zenoh where it can be reached, else over SSE."""
-        from .stream import SseLink, StreamError, ZenohLink
+        from .stream import SseLink, StreamError, ZenohLink  # zenoh is loaded when it is needed
 
         me = self.session.me()
         if me.zenoh is not None:
@@ -153,7 +152,7 @@ class Run:
 
     def watch(self, live: bool | None = None) -> Live:
         """Shows the run in the terminal until it ends. ``live`` chooses the panel or plain lines; None: as it fits."""
-        from .watch import watch
+        from .watch import watch  # rich is loaded when it is needed
 
         return watch(self, live)
 

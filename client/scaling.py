@@ -18,6 +18,7 @@ from .projection import Network, Projection, read
 from .submission import case_of, locate
 
 CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+"""That this process may use."""
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _ENVIRONMENT = {**dict.fromkeys(_THREADS, "1"), "HYDRA_LAUNCHER": "fork", "HYDRA_IFACE": "lo"}
 

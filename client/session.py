@@ -1,48 +1,17 @@
-"""A server over HTTP: requests, refusals as one clear line, and the words of the API."""
+"""A server and the words of its API."""
 
-import base64
-import hashlib
-import json
-import time
 import uuid
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from pathlib import Path
-from typing import Any, Self, TypeVar
+from collections.abc import Iterable, Sequence
+from typing import Any
 
-import httpx2
 import msgspec
 
 from conoid.cases.load import CaseError, Problem
-from conoid.cases.messages import AnyMessage
 
 from .config import target
-from .errors import ServiceError, UnreachableError
-from .journal import from_line
+from .http import Http
 from .run import Run, RunInfo
 from .submission import CaseSource, body_of
-
-T = TypeVar("T")
-
-_TIMEOUT = httpx2.Timeout(30.0, connect=5.0)
-_STREAM_TIMEOUT = httpx2.Timeout(60.0, connect=5.0)
-_TRIES = 3
-
-
-class Router(msgspec.Struct, kw_only=True, frozen=True):
-    """Where the Zenoh router is, and the user and password to show it (neither: it asks for none)."""
-
-    endpoint: str
-    user: str | None = None
-    password: str | None = None
-
-
-class Me(msgspec.Struct, kw_only=True, frozen=True):
-    """Who the server takes us for, what the token allows, and how to subscribe over Zenoh (None: not possible)."""
-
-    owner: str
-    scopes: list[str] = []
-    zenoh: Router | None = None
 
 
 class Verdict(msgspec.Struct, kw_only=True, frozen=True):
@@ -60,32 +29,8 @@ class Page(msgspec.Struct, kw_only=True, frozen=True):
     next: str | None = None
 
 
-class Session:
+class Session(Http):
     """A server, and the right to ask it. Use it as a context manager, or close it."""
-
-    def __init__(self, url: str, token: str | None = None, transport: httpx2.BaseTransport | None = None) -> None:
-        """Connects at the first request. ``transport`` replaces the network, for a server in the same process."""
-        headers = {"Authorization": f"Bearer {token}"} if token else {}
-        self.url = url.rstrip("/")
-        self._http = httpx2.Client(base_url=self.url, headers=headers, timeout=_TIMEOUT, transport=transport)
-
-    def __enter__(self) -> Self:
-        """Itself."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Closes the connections."""
-        self.close()
-
-    def close(self) -> None:
-        """Closes the connections."""
-        self._http.close()
-
-    # The words of the API ---------------------------------------------------------------------------------------------
-
-    def me(self) -> Me:
-        """Who we are to the server."""
-        return self.get(Me, "/v1/me")
 
     def validate(self, case: CaseSource, overrides: Iterable[str] = ()) -> dict[str, Any]:
         """The server's estimate of a case. Raises CaseError with every problem at once."""
@@ -119,94 +64,8 @@ class Session:
             query["cursor"] = page.next
         return found
 
-    # Requests ---------------------------------------------------------------------------------------------------------
-
-    def get(self, kind: type[T], path: str, **query: str | float) -> T:
-        """The answer at ``path``. Raises ServiceError, UnreachableError."""
-        return self._decoded(kind, self._request("GET", path, params=query))
-
-    def post(self, kind: type[T], path: str, body: bytes = b"", content: str = "", key: str | None = None) -> T:
-        """The answer to a POST. It is tried again, when the network fails, only with an idempotency key."""
-        headers = {"Content-Type": content} if content else {}
-        if key is not None:
-            headers["Idempotency-Key"] = key
-        response = self._request("POST", path, content=body, headers=headers, repeat=key is not None)
-        return self._decoded(kind, response)
-
-    def download(self, path: str, target: Path) -> None:
-        """Writes the body at ``path`` to a file that appears whole, with the server's sha256, or not at all."""
-        target.parent.mkdir(parents=True, exist_ok=True)
-        beside = target.with_name(f".{target.name}.part")
-        try:
-            with self._opened("GET", path) as response, beside.open("wb") as file:
-                digest = hashlib.sha256()
-                for chunk in response.iter_bytes():
-                    digest.update(chunk)
-                    file.write(chunk)
-            told = response.headers.get("Repr-Digest")
-            if told is not None and told != f"sha-256=:{base64.b64encode(digest.digest()).decode()}:":
-                raise UnreachableError(f"{path} arrived damaged: its sha256 is not the one that the server told")
-            beside.replace(target)
-        finally:
-            beside.unlink(missing_ok=True)
-
-    def stream(self, path: str, after: int = 0) -> Iterator[AnyMessage]:
-        """The messages of an SSE stream after a number, as they come; it ends when the server ends it."""
-        headers = {"Accept": "text/event-stream", "Last-Event-ID": str(after)}
-        with self._opened("GET", path, headers=headers, timeout=_STREAM_TIMEOUT) as response:
-            for event in httpx2.EventSource(response) if response.status_code == 200 else ():
-                if event.data:
-                    yield from_line(event.data)
-
-    def _request(self, method: str, path: str, repeat: bool = False, **options: Any) -> httpx2.Response:
-        """The answer, already read; a GET, and what says ``repeat``, is tried again when the network fails."""
-        tries = _TRIES if repeat or method == "GET" else 1
-        for attempt in range(tries):
-            try:
-                with self._opened(method, path, **options) as response:
-                    response.read()
-                return response
-            except UnreachableError:
-                if attempt == tries - 1:
-                    raise
-                time.sleep(0.3 * 2**attempt)
-        raise AssertionError("unreachable")
-
-    @contextmanager
-    def _opened(self, method: str, path: str, **options: Any) -> Iterator[httpx2.Response]:
-        """The answer as a stream. Raises ServiceError for a refusal, UnreachableError for a broken connection."""
-        try:
-            with self._http.stream(method, path, **options) as response:
-                if response.status_code >= 300:
-                    raise ServiceError(response.status_code, _problem(response))
-                yield response
-        except httpx2.InvalidURL as error:
-            raise UnreachableError(f"url = {self.url!r}: {error}") from None
-        except httpx2.TransportError as error:
-            raise UnreachableError(f"no answer from {self.url}: {_reason(error)}") from None
-
-    def _decoded(self, kind: type[T], response: httpx2.Response) -> T:
-        try:
-            return msgspec.json.decode(response.content, type=kind)
-        except msgspec.MsgspecError as error:
-            raise UnreachableError(f"the answer of {self.url} cannot be read: {error}") from None
-
 
 def connect(url: str | None = None, token: str | None = None) -> Session:
     """A session with the server of the arguments, of CONOID_URL and CONOID_TOKEN, or of the configuration file."""
     chosen = target(url, token)
     return Session(chosen.url, chosen.token)
-
-
-def _problem(response: httpx2.Response) -> Mapping[str, Any]:
-    try:
-        body = json.loads(response.read())
-    except ValueError:
-        body = None
-    return body if isinstance(body, dict) else {"title": f"the server answered {response.status_code}"}
-
-
-def _reason(error: Exception) -> str:
-    if isinstance(error, httpx2.ConnectError):
-        return "is it running there? (conoid serve)"
-    return " ".join(str(error).split()) or type(error).__name__

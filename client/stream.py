@@ -10,7 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Generator, Iterator
 from contextlib import suppress
-from typing import Protocol, TypeVar, cast
+from typing import TypeVar, cast
 
 import msgspec
 import zenoh
@@ -20,32 +20,26 @@ from conoid.cases.messages import AnyMessage, Status, from_msgpack
 from conoid.cases.run import State
 
 from .errors import ClientError, UnreachableError
+from .http import Router
+from .link import Link
 from .order import InOrder, Refill
-from .session import Router
 
 T = TypeVar("T")
 
 _CAPACITY = 4096
+"""Messages that wait to be read. Chosen: minutes of a run, which sends some ten a second."""
 _OPEN_SECONDS = 5.0
+"""s that a router may take to answer before SSE is used. Chosen."""
 _CLOSE_SECONDS = 2.0
+"""s that a subscription may take to close. Chosen: nothing is lost when it does not."""
 _SILENCE = 3.0
+"""s without a message after which the journal is read. Chosen: a run reports four times a second."""
 _PATIENCE = 60.0
+"""s that a server may be away while a run is followed. Chosen: time for a restart."""
 
 
 class StreamError(ClientError):
     """Zenoh cannot be used: no router, or it refuses the user."""
-
-
-class Link(Protocol):
-    """Messages as they arrive, perhaps with gaps and repeats."""
-
-    name: str
-
-    def get(self, timeout: float) -> AnyMessage | None:
-        """The next message; None after ``timeout`` s without one."""
-
-    def close(self) -> None:
-        """Lets go; a second call does nothing."""
 
 
 class Mailbox:

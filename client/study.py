@@ -10,23 +10,6 @@ from .projection import Network, Projection
 
 
 @dataclass(frozen=True)
-class Published:
-    """What Moon, Kim and Lee have measured of a case."""
-
-    figure: str
-    speed_up: dict[int, float]
-    """By processors, as far as their text has it in numbers."""
-    rebalances: str
-
-
-PAPER = {
-    "long_rod": Published("fig. 14", {32: 23.79}, "no rebalances"),
-    "glass_steel_bar": Published("fig. 19", {16: 0.77 * 16, 32: 18.74}, "18 rebalances on 16"),
-}
-"""By case; the 58 % that the text has for fig. 19 on 32 processors are the 18.74 of its conclusion."""
-
-
-@dataclass(frozen=True)
 class Study:
     """Runs of a case by their ranks; the first is on one."""
 
@@ -41,11 +24,6 @@ class Study:
     def equal(self) -> bool:
         """Whether all runs have the same answer."""
         return len({run.digest for run in self.runs}) == 1
-
-    @property
-    def paper(self) -> Published | None:
-        """What is published of the case."""
-        return PAPER.get(self.case)
 
     def speed_up(self, run: Projection) -> float:
         """Projected."""
@@ -74,6 +52,14 @@ def to_json(study: Study) -> bytes:
     return msgspec.json.format(msgspec.json.encode(data), indent=2)
 
 
+def from_json(data: bytes) -> Study:
+    """What ``to_json`` wrote."""
+    document = msgspec.json.decode(data)
+    network = msgspec.convert(document["network"], Network)
+    runs = msgspec.convert(document["runs"], tuple[Projection, ...])
+    return Study(document["case"], document["changes"], document["cores"], network, runs)
+
+
 def to_markdown(study: Study) -> str:
     """The tables, with what they mean."""
     network, crowded = study.network, [str(run.ranks) for run in study.runs if run.ranks > study.cores]
@@ -84,7 +70,6 @@ def to_markdown(study: Study) -> str:
         "other after every phase.",
         f"Ranks took turns on the cores, with MPIR_CVAR_ENABLE_HEAVY_YIELD=1: {', '.join(crowded)}." if crowded else "",
         _speeds(study),
-        _published(study.paper) if study.paper else "",
         "Projected time of a rank beyond that of one rank over the number of ranks, s: more work + imbalance, and the "
         "share in all of it.",
         _losses(study),
@@ -93,11 +78,6 @@ def to_markdown(study: Study) -> str:
         f"Digests: equal, {study.runs[0].digest[:16]}." if study.equal else "Digests: NOT EQUAL.",
     ]
     return "\n\n".join(filter(None, parts)) + "\n"
-
-
-def _published(paper: Published) -> str:
-    values = (f"{value:.2f} on {ranks} ({100 * value / ranks:.1f} %)" for ranks, value in paper.speed_up.items())
-    return f"Moon, Kim and Lee, {paper.figure}, measured a speed-up of {', '.join(values)}, with {paper.rebalances}."
 
 
 def _speeds(study: Study) -> str:
@@ -116,7 +96,7 @@ def _speeds(study: Study) -> str:
         ]
         for run in study.runs
     ]  # fmt: skip
-    return _table(head, rows)
+    return table(head, rows)
 
 
 def _losses(study: Study) -> str:
@@ -129,7 +109,7 @@ def _losses(study: Study) -> str:
         for name in (tables[0] if tables else ())
         if any(sum(table[name]) for table in tables)
     ]
-    return _table(["phase", "one rank s", *(f"{run.ranks} ranks" for run in runs)], rows)
+    return table(["phase", "one rank s", *(f"{run.ranks} ranks" for run in runs)], rows)
 
 
 def _loss(more: float, imbalance: float, whole: float) -> str:
@@ -146,14 +126,14 @@ def _traffic(study: Study) -> str:
         ]
         for run in study.runs[1:]
     ]  # fmt: skip
-    return _table(head, rows)
+    return table(head, rows)
 
 
 def _seconds(value: float) -> str:
     return f"{value:.0f}" if abs(value) >= 100 else f"{value:.2f}"
 
 
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Markdown with aligned columns, the first to the left."""
     widths = [max(len(line[i]) for line in (head, *rows)) for i in range(len(head))]
     rule = ["-" * widths[0], *("-" * (width - 1) + ":" for width in widths[1:])]

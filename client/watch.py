@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from rich.console import Console
 from rich.live import Live as Screen
@@ -11,16 +11,37 @@ from conoid.cases.messages import AnyMessage, Log, Progress, Status
 
 from .display import line, panel
 from .figures import clock
+from .link import Link
 from .live import Live
-
-if TYPE_CHECKING:
-    from .run import Run
 
 LINE_EVERY = 2.0
 """s between two plain lines of progress; changes of state and warnings are told at once."""
 
 
-def watch(run: "Run", live: bool | None = None, console: Console | None = None) -> Live:
+class Titled(Protocol):
+    """What has a title."""
+
+    @property
+    def title(self) -> str:
+        """For people."""
+
+
+class Watched(Protocol):
+    """A run that can be followed."""
+
+    id: str
+
+    def status(self) -> Titled:
+        """What the server knows of it now."""
+
+    def link(self) -> Link:
+        """A subscription to its messages."""
+
+    def messages(self, *, link: Link) -> Iterable[AnyMessage]:
+        """All of them, once and in order."""
+
+
+def watch(run: Watched, live: bool | None = None, console: Console | None = None) -> Live:
     """Follows ``run`` to its end. ``live``: the panel (True), plain lines (False), what the terminal can (None)."""
     out = console or Console()
     known = Live(run.id, title=run.status().title)

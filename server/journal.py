@@ -10,6 +10,7 @@ import msgspec
 from conoid.cases.messages import Status, to_json
 
 _CHUNK = 1 << 18
+"""Bytes of a journal that are read at once: some hundred lines. Chosen."""
 
 
 class _Head(msgspec.Struct):

@@ -132,6 +132,7 @@ Action = Journal | WriteOutcome | Launch | Adopt | Stop | Kill
 Next = tuple[Run, tuple[Action, ...]]
 
 _SIGKILL = 9
+"""Its number on every POSIX system; the state machine imports nothing of the system."""
 
 
 def advance(run: Run, event: Event, now: float) -> Next:

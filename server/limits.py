@@ -18,6 +18,7 @@ from .settings import Caps, Settings
 BODY = 1 << 20
 """Bytes of the largest body."""
 _BODY_TIMEOUT = 30.0
+"""s for a whole body: 1 MiB at 35 kB/s. Chosen."""
 
 
 async def read_body(request: Request) -> bytes:

@@ -47,6 +47,7 @@ _TIDY = 5.0
 _AGAIN = 1.0
 """s after which an action that failed (a full disk, a locked database) is tried again."""
 _ANSWER = 10.0
+"""s that the thread of the supervisor may take to answer. Chosen: it looks fifty times a second."""
 
 
 @dataclass(frozen=True)

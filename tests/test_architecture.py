@@ -88,6 +88,56 @@ def test_tests_mirror_the_houses() -> None:
     assert folders - set(HOUSES) - inside == {"verification", "bench"}
 
 
+def relatives(path: Path) -> set[Path]:
+    """Files of its house that a file imports, anywhere in it."""
+    found: set[Path] = set()
+    for node in ast.walk(tree(path)):
+        if isinstance(node, ast.ImportFrom) and node.level:
+            base = path.parents[node.level - 1].joinpath(*(node.module or "").split(".") if node.module else ())
+            names = [base.joinpath(alias.name) for alias in node.names]
+            found |= {place.with_suffix(".py") for place in (base, *names)}
+    return found & set(SOURCES)
+
+
+@pytest.mark.parametrize("house", HOUSES)
+def test_no_imports_go_in_a_circle(house: str) -> None:
+    """Imports inside functions count, and those for types alone."""
+    left = {path: relatives(path) for path in SOURCES if name_of(path).startswith(f"{house}/")}
+    while free := [path for path, needed in left.items() if not needed & left.keys()]:
+        for path in free:
+            del left[path]
+    assert not left, f"circles among {sorted(map(name_of, left))}"
+
+
+def is_a_choice(value: ast.expr) -> bool:
+    """Whether a number stands there that could have been another one: no layout, numbering or ratio of integers."""
+    words = {node.id for node in ast.walk(value) if isinstance(node, ast.Name)}
+    numbers = [n.value for n in ast.walk(value) if isinstance(n, ast.Constant) and isinstance(n.value, int | float)]
+    ratio = all(isinstance(node, ast.BinOp | ast.Div | ast.Constant | ast.Tuple | ast.Load) for node in ast.walk(value))
+    return any(numbers) and not words & {"CHUNK", "range"} and not (ratio and "/" in ast.unparse(value))
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=name_of)
+def test_a_numeric_constant_says_where_it_comes_from(path: Path) -> None:
+    """In a docstring below it or its group: its source, its measurement, or that it was chosen."""
+    told, line = False, 0
+    for node in reversed(tree(path).body):
+        told = isinstance(node, ast.Expr) or (told and (isinstance(node, ast.Assign) and node.end_lineno == line - 1))
+        line = node.lineno
+        if not isinstance(node, ast.Assign) or not is_a_choice(node.value) or isinstance(node.value, ast.Dict):
+            continue
+        if all(name.isupper() for name in ast.unparse(node.targets[0]).strip("()").replace("_", "").split(", ")):
+            assert told, f"{name_of(path)}:{node.lineno}: {ast.unparse(node)}"
+
+
+def test_the_table_of_the_step_is_the_same_in_code_and_document() -> None:
+    row = re.compile(r"^ ?(\d+)  (\S.*?)  +(\S.*)$", re.MULTILINE)
+    code, document = ((ROOT / name).read_text(encoding="utf-8") for name in ("worker/step.py", "ARCHITECTURE.md"))
+    lines = [found[:2] for found in row.findall(code)]
+    assert [int(number) for number, _ in lines] == list(range(1, len(lines) + 1))
+    assert lines == [found[:2] for found in row.findall(document)]
+
+
 def test_the_contract_is_light() -> None:
     for path in SOURCES:
         if path.relative_to(ROOT).parts[0] == "cases":

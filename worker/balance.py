@@ -25,7 +25,8 @@ from .state import Floats, Ints
 from .timers import worked
 
 _LEAST = 1e-9
-"""s: what a tet costs at least, so that every rank gets some before anything has been measured."""
+"""s: what a tet costs at least, so that every rank gets some before anything has been
+measured. Chosen far below what any tet takes."""
 
 
 @dataclass

@@ -44,7 +44,7 @@ from .state import (
 from .topology import Split
 
 GATHERED = 10
-"""Steps in which worn tets are gathered."""
+"""Steps in which worn tets are gathered. Chosen: every removal calls for a search."""
 
 
 class Erosion:

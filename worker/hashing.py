@@ -10,6 +10,7 @@ import numpy.typing as npt
 from .state import Floats
 
 _GOLDEN = 0x9E3779B97F4A7C15
+"""2^64 over the golden ratio, odd (splitmix64.c)."""
 
 
 def splitmix64(numbers: npt.NDArray[np.integer], seed: int) -> npt.NDArray[np.uint64]:

@@ -33,7 +33,9 @@ STOPS = {
 _KEPT = (CANCELLED, WALL_TIME)
 """Reasons after which the run can go on from a checkpoint."""
 _REPORT_EVERY = 0.25
+"""s of wall time between two reports: four a second look alive. Chosen."""
 _LOG_EVERY = 10.0
+"""s of wall time between two lines of the log. Chosen."""
 
 log = logging.getLogger("conoid.worker")
 

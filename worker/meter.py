@@ -11,7 +11,8 @@ from .simulation import Simulation
 from .state import Floats
 
 _FARTHEST = 4.0
-"""Times the mean, or one over it: what candidates of one rank cost at most, and at least."""
+"""Times the mean, or one over it: what candidates of one rank cost at most, and at least. Chosen: a rank
+with few candidates measures mostly noise."""
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ from .timers import Timers, worked
 from .topology import KeptByNode
 
 _SMALLEST_STRAIN = 1e-12
-"""Forces of a smaller strain than this need no finer quantum."""
+"""Forces of a smaller strain than this need no finer quantum. Chosen: its stress in steel is 0.2 Pa."""
 
 
 @dataclass

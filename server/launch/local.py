@@ -22,7 +22,10 @@ _NOT_FOR_WORKERS = ("CONOID_DATABASE", "CONOID_TOKEN")
 _CROWDED = 4
 """Ranks a core from which MPICH's waiting ranks had better sleep than spin."""
 _LAST_WORDS, _LOG_TAIL = 300, 1 << 14
+"""Characters of a launcher's last line that are told; bytes at the end of its log in which that line is looked for.
+Chosen."""
 _HOUR = 3600.0
+"""s after which shared memory that no process maps is taken for left over: no launch takes that long to map it."""
 
 
 class LocalLauncher:

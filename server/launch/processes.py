@@ -12,6 +12,7 @@ process group does not hold a run together; this does, helpers that a rank start
 
 _PROC = Path("/proc")
 _AFTER_NAME_STATE, _AFTER_NAME_PARENT, _AFTER_NAME_START = 0, 1, 19
+"""Places of state, parent and start time among the fields of /proc/PID/stat behind the name (proc(5))."""
 
 
 def boot() -> str:

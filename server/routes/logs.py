@@ -18,6 +18,7 @@ from .runs import OwnedRun
 
 router = APIRouter()
 _CHUNK = 1 << 16
+"""Bytes of a log that are sent at once. Chosen."""
 _LOOK = 0.25
 """s between two looks at a log that is being followed."""
 Rank = Annotated[str, PathParameter(pattern=r"^(\d{1,5}|launcher)$", description="a rank, or 'launcher'")]

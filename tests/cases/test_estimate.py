@@ -15,9 +15,9 @@ from conoid.cases.geometry import Generated, surface, volume
 from conoid.cases.load import parse_case, read_case, shipped
 from conoid.cases.mesh_size import graded_size, mesh_size
 from conoid.worker.mesh.build import build
-from conoid.worker.mesh.model import quality
 from conoid.worker.mesh.structured import structured
 
+from ..mesh.quality import quality
 from .scenes import rod
 
 UNIT: Any = TypeAdapter(Mesh)

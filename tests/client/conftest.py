@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 import zenoh
 
+from conoid.client.http import Router
 from conoid.client.local import LocalServer
-from conoid.client.session import Router
 
 from .fakes import FAKE_WORKER, Broker, free_port
 

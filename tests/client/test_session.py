@@ -30,7 +30,7 @@ def problem(status: int, **body: Any) -> Answer:
 
 @pytest.fixture(autouse=True)
 def _no_pauses(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("conoid.client.session.time.sleep", lambda _: None)
+    monkeypatch.setattr("conoid.client.http.time.sleep", lambda _: None)
 
 
 def test_a_refusal_is_its_detail_and_hint() -> None:

@@ -11,7 +11,8 @@ from conoid.cases import keys
 from conoid.cases.messages import AnyMessage
 from conoid.client import stream
 from conoid.client.errors import UnreachableError
-from conoid.client.session import Router
+from conoid.client.http import Router
+from conoid.client.link import Link
 from conoid.client.stream import SseLink, StreamError, ZenohLink, follow
 
 from . import stories
@@ -38,7 +39,7 @@ def _short_silence(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def reading(
-    link: stream.Link, journal: Journal, ended: Callable[[], bool] = lambda: False
+    link: Link, journal: Journal, ended: Callable[[], bool] = lambda: False
 ) -> tuple[list[int], threading.Thread]:
     """Follows in a thread; the list fills with the numbers that it told."""
     told: list[int] = []

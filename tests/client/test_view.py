@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from conoid.client import view as views
+from conoid.client import pictures
 from conoid.client.errors import ViewError
-from conoid.client.view import FIELDS, Mirror, Scene, explain, mirrors, view
+from conoid.client.pictures import FIELDS, Mirror, Scene, explain, mirrors
+from conoid.client.view import view
 
 from .bodies import write_frame, write_run
 
@@ -122,14 +123,14 @@ def test_a_missing_library_names_its_package() -> None:
 def test_a_renderer_that_hangs_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "sitecustomize.py").write_text("import time; time.sleep(60)")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    monkeypatch.setattr(views, "_SECONDS", 0.5)
+    monkeypatch.setattr(pictures, "_SECONDS", 0.5)
     write_frame(tmp_path / "f.vtkhdf")
     with pytest.raises(ViewError, match="did not finish"):
         view(tmp_path / "f.vtkhdf", "mises", tmp_path / "p.png")
 
 
 def test_fields_can_be_listed_without_vtk() -> None:
-    code = "import sys; sys.modules['pyvista'] = None; from conoid.client.view import FIELDS; print(*FIELDS)"
+    code = "import sys; sys.modules['pyvista'] = None; from conoid.client.pictures import FIELDS; print(*FIELDS)"
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, env=dict(os.environ), check=True
     )

@@ -396,6 +396,5 @@ def test_a_summary_keeps_dust_apart() -> None:
     assert (found.dust_share, found.largest_share) == (0.075, 0.5)
     assert found.sizes == tables.fits([5.0, 1.0, 3.0])
     assert found.masses == tables.fits([5.0, 1.0, 3.25])
-    assert tables.cumulative([2.0, 1.0, 2.0, 5.0]) == [(1.0, 4), (2.0, 3), (5.0, 1)]
     empty = tables.summary([], [], [])
     assert (empty.fragments, empty.dust, empty.largest_share, empty.sizes) == (0, 0, 0.0, [])

@@ -12,8 +12,10 @@ from conoid.cases.mesh_size import mesh_size
 from conoid.worker.hashing import uniform
 from conoid.worker.mesh.faces import areas, boundary_faces, face_counts, normals
 from conoid.worker.mesh.loose import rotations
-from conoid.worker.mesh.model import REGULAR_STEP, Floats, TetMesh, check, quality
+from conoid.worker.mesh.model import REGULAR_STEP, Floats, TetMesh, check
 from conoid.worker.mesh.structured import structured
+
+from .quality import quality
 
 
 def shards(**more: object) -> Shards:

@@ -1,7 +1,9 @@
 """Every shipped case, run whole by the worker's command line, reproduces each number that it carries."""
 
+import json
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -15,23 +17,37 @@ HEAVY = {
     "long_rod", "taylor_42crmo4", "taylor_copper", "taylor_copper_split",
 }  # fmt: skip
 """Half a minute and more."""
+MANY = Path(__file__).parents[1] / "parallel" / "many.py"
 NAMES = [pytest.param(name, marks=[pytest.mark.slow] * (name in HEAVY)) for name in sorted(load.shipped())]
 
 
-def outcome(name: str, folder: Path) -> Outcome:
-    words = [sys.executable, "-m", "conoid.worker", name, "--out", str(folder)]
-    done = subprocess.run(words, capture_output=True, text=True, timeout=600)
-    assert done.returncode == 0, done.stderr
-    return from_json((folder / layout.OUTCOME).read_bytes())
+Outcomes = Callable[[str], Outcome]
+
+
+@pytest.fixture(scope="module")
+def outcomes(tmp_path_factory: pytest.TempPathFactory) -> Outcomes:
+    """The outcome of a case; the light ones are run one after the other in one process, which pays the start once."""
+    root = tmp_path_factory.mktemp("shipped")
+
+    def outcome(name: str) -> Outcome:
+        if not (root / name).exists():
+            alike = [name] if name in HEAVY else [each for each in sorted(load.shipped()) if each not in HEAVY]
+            (root / "runs.json").write_text(json.dumps([[each, "--out", str(root / each)] for each in alike]))
+            words = [sys.executable, str(MANY), str(root / "runs.json")]
+            (root / "said").write_text(subprocess.run(words, capture_output=True, text=True, timeout=600).stderr)
+        assert (root / name / layout.OUTCOME).exists(), (root / "said").read_text()
+        return from_json((root / name / layout.OUTCOME).read_bytes())
+
+    return outcome
 
 
 @pytest.mark.timeout(660)
 @pytest.mark.parametrize("name", NAMES)
-def test_a_shipped_case_reproduces_its_references(name: str, tmp_path: Path) -> None:
+def test_a_shipped_case_reproduces_its_references(name: str, outcomes: Outcomes) -> None:
     """The books close to 1 %, those of elastic bodies to 0.1 %."""
     case = load.read_case(load.shipped_path(name))
-    end = outcome(name, tmp_path / "run")
-    assert end.state == "succeeded"
+    end = outcomes(name)
+    assert end.state == "succeeded", end.message
     assert end.time == case.run.end_time
     assert len(end.reference) == len(case.reference)
     assert [check for check in end.reference if not check.passed] == []

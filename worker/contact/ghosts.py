@@ -11,6 +11,7 @@ from ..state import Floats, Indices, Ints, Nodes
 from .records import Crowd, Edges, Faces
 
 _CROWD_WORDS = 15
+"""Words of a node in a message (``pack``)."""
 
 
 def pack(faces: Faces, edges: Edges, crowd: Crowd) -> Ints:

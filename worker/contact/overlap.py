@@ -15,6 +15,7 @@ _INSIDE = 1e-9
 _ROUNDING = 1e-6
 """Of the size of a face: depths below this are none."""
 _TRIES = 30
+"""Times overlapping bodies are moved apart before that is given up. Chosen."""
 
 
 @dataclass(frozen=True)

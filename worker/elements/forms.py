@@ -79,11 +79,6 @@ class Elements:
         """Whether some face passes the strength by its tet's own stress."""
         return bool(self.peaks[sweep.HOT])
 
-    @property
-    def bytes_sent(self) -> int:
-        """Bytes this rank sends in a step."""
-        return sum(shared.bytes_sent for shared in self._exchanges())
-
     def advance(self, dt: float, scale: float) -> None:
         """Stress and forces at n+1; the completion of the shared forces is under way when it returns."""
         self.peaks[:] = 0

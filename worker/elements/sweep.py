@@ -29,8 +29,10 @@ LARGEST_LIMIT, LIMITING_TET, LARGEST_FORCE, WORN, HOT = range(5)
 """Places in ``peaks``: bits of the largest one-over-stable-step, 1/s; smallest global id of the tets that have it; bits
 of the largest force, N; what is found of worn-out tets (wear.py); whether faces are hot (hot.py)."""
 PEAKS = 5
+"""Number of these places."""
 _LIMIT = tet4.LIMIT
 _NO_TET = 2**62
+"""Larger than any global id of a tet."""
 _F1, _F2, _I1, _I2, _T2 = "float64[::1]", "float64[:, ::1]", "int64[::1]", "int64[:, ::1]", "uint32[:, ::1]"
 _B1 = "boolean[::1]"
 

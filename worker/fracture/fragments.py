@@ -30,6 +30,7 @@ _PART = 1 << 62
 _NODE_BITS = 40
 """A node's global id stays below 2^40."""
 _LIMB = 2.0**30
+"""As in parallel/fixed_point.py."""
 _FLAT = 1e-10
 """Share of the largest principal moment below which an axis is taken to have no inertia."""
 

@@ -17,6 +17,7 @@ NODE, TET, RANK, MASS, BEHIND = 0, 1, 2, 3, 4
 """Columns of a row, one a node and tet of its star: global ids of the node and the tet, rank of the tet, bits of its
 mass, kg; and for the three faces that contain the node the id of the tet behind an intact one, -1 for others."""
 COLUMNS = 7
+"""Number of columns: the last three are those of BEHIND."""
 
 
 class Stars:

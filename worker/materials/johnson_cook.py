@@ -15,6 +15,7 @@ from .plastic import equivalent_stress, scale_deviator
 _STRAIN, _WORK, _YIELD, _FLOW = PLASTIC_STRAIN * CHUNK, WORK_PLASTIC * CHUNK, YIELD * CHUNK, FLOW * CHUNK
 _TEMPERATURE, _MASS = TEMPERATURE * CHUNK, MASS * CHUNK
 _MOST = 60
+"""Newton steps at most: halving alone, from a bracket, has reached the last bit of a float64 by then (52 bits)."""
 _CLOSE = 1e-4
 """A Newton step below this share of the strain increment leaves an error of its square: below 1e-8 of the stress."""
 

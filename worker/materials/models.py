@@ -29,6 +29,7 @@ MC_SINE, MC_COHESION, MC_CAP, MC_FAILURE = 8, 9, 12, 13
 MC_RESIDUAL = 2
 """How far behind MC_SINE and MC_COHESION those of failed material stand."""
 SIZE = 17
+"""Length of the vector."""
 
 
 def strength_of(material: Material) -> int:

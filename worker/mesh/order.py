@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from .model import Floats, TetMesh
 
 _BITS = 21
+"""A direction: three of them fill 63 bits."""
 _SPREAD = [
     (32, 0x1F00000000FFFF),
     (16, 0x1F0000FF0000FF),
@@ -17,6 +18,7 @@ _SPREAD = [
     (4, 0x10C30C30C30C30C3),
     (2, 0x1249249249249249),
 ]
+"""Shifts and masks that put two zero bits behind each of 21 bits, by moving halves of the blocks apart."""
 
 
 def morton_codes(points: Floats, low: Floats, edge: float) -> NDArray[np.uint64]:

@@ -27,6 +27,7 @@ from ..parallel.comm import Comm
 from .parcel import Parcel, Table, take
 
 FORMAT = 2
+"""Of the files; 2 has the step reduction and contact under names of their own. Others are not read."""
 _KEPT = 2
 """Checkpoints that stay; the older ones go."""
 _MANIFEST = "manifest.json"

@@ -27,6 +27,7 @@ from ..state import (
 )
 
 _TETRA = 10
+"""VTK_TETRA, the type of a cell (vtkCellType.h)."""
 _PACKING = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
 
 

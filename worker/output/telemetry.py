@@ -1,7 +1,7 @@
 """Messages on Zenoh, from a thread of their own behind a bounded ring: the solver never waits for the network.
 
-``put`` reports no loss and may stall its caller, so it runs here; when the ring is full the oldest message is dropped
-and counted, and a reader who sees the gap in ``seq`` refills it from the journal. Without a router the thread tries
+``put`` reports no loss and may stall its caller, so it runs here; when the ring is full the oldest message is dropped,
+and a reader who sees the gap in ``seq`` refills it from the journal. Without a router the thread tries
 again now and then; the run does not mind.
 """
 
@@ -15,15 +15,18 @@ import zenoh
 from conoid.cases import keys, messages
 
 _RING = 1024
+"""Messages that wait for the network. Chosen: more than a minute of a run, which sends some ten a
+second."""
 _RETRY = 2.0
+"""s between two attempts to reach a router. Chosen."""
 _LINGER = 1.0
+"""s that the last messages get to leave. Chosen: the journal has them."""
 
 
 class Telemetry:
-    """Publishes what it is told. ``dropped`` counts the messages that found the ring full."""
+    """Publishes what it is told."""
 
     def __init__(self, endpoint: str, prefix: str) -> None:
-        self.dropped = 0
         self._endpoint = endpoint
         self._prefix = prefix
         self._ring: deque[messages.AnyMessage] = deque()
@@ -37,7 +40,6 @@ class Telemetry:
         with self._wake:
             if len(self._ring) == _RING:
                 self._ring.popleft()
-                self.dropped += 1
             self._ring.append(message)
             self._wake.notify()
 

@@ -21,7 +21,9 @@ from .comm import Comm
 _LEVELS = 2.0**31 - 1.0
 """Places along a normal that are told apart; points in one place are told apart by their ids."""
 _ID_BITS = 32
+"""Below the place in a sorting key of 63 bits, 31 for the place: ids are below 2^32."""
 _DIGIT = 8
+"""Bits of a sorting key that one sum over the ranks settles: 256 counts a box, and eight sums in all. Chosen."""
 _FINEST = 2.0**30
 """Quanta of the largest weight: sums of four billion of them are exact."""
 _BINS = 128
@@ -45,6 +47,7 @@ def _directions() -> Floats:
 
 DIRECTIONS = _directions()
 _AXES = 3
+"""The first directions: x, y and z."""
 
 
 @dataclass

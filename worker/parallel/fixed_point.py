@@ -18,6 +18,7 @@ CONTRIBUTION_BITS = 52
 HEADROOM_BITS = 6
 """The next step may grow 64-fold before its sum has to be repeated."""
 _LIMB = 2.0**30
+"""Quanta of the low limb in one of the high: 60 bits in two limbs, each of which sums 2^32 values in an int64."""
 
 
 def float_of(bits: int) -> float:

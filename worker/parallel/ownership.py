@@ -62,11 +62,6 @@ class SharedSum:
             list(zip(ranks, sends, strict=True)), list(zip(ranks, receives, strict=True)), tag
         )
 
-    @property
-    def bytes_sent(self) -> int:
-        """Bytes this rank sends in one exchange."""
-        return self._out.nbytes
-
     def serves(self, neighbours: list[Neighbour]) -> bool:
         """Whether these neighbours share what they did when it was made."""
         return all(one.nodes is nodes for one, nodes in zip(neighbours, self._nodes, strict=True))

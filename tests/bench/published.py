@@ -1,0 +1,62 @@
+"""The speed-ups that Moon, Kim and Lee measured, beside those of ``conoid bench scale --out FOLDER``.
+
+``python -m tests.bench.published FOLDER`` prints them as a table and draws FOLDER/published.svg.
+"""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from conoid.client import chart
+from conoid.client.study import Study, from_json, table
+
+
+@dataclass(frozen=True)
+class Published:
+    """What Moon, Kim and Lee have measured of a case."""
+
+    figure: str
+    speed_up: dict[int, float]
+    """By processors, as far as their text has it in numbers."""
+    rebalances: str
+
+    @property
+    def source(self) -> str:
+        """Where it stands."""
+        return f"Moon, Kim and Lee, {self.figure}"
+
+
+PAPER = {
+    "long_rod": Published("fig. 14", {32: 23.79}, "no rebalances"),
+    "glass_steel_bar": Published("fig. 19", {16: 0.77 * 16, 32: 18.74}, "18 rebalances on 16"),
+}
+"""By case; the 58 % that the text has for fig. 19 on 32 processors are the 18.74 of its conclusion."""
+
+
+def compared(study: Study) -> str:
+    """The published speed-ups beside the projected ones, as Markdown. Raises KeyError for a case that has none."""
+    paper, projected = PAPER[study.case], {run.ranks: study.speed_up(run) for run in study.runs}
+    rows = []
+    for ranks in sorted({*paper.speed_up, *projected} - {1}):
+        cells = [f"{each[ranks]:.2f}" if ranks in each else "-" for each in (paper.speed_up, projected)]
+        shares = [f"{100 * each[ranks] / ranks:.1f}" if ranks in each else "-" for each in (paper.speed_up, projected)]
+        rows.append([str(ranks), *cells, *shares])
+    head = ("ranks", "measured there", "projected here", "efficiency there %", "efficiency here %")
+    return f"`{study.case}`: {paper.source}, with {paper.rebalances}\n\n{table(head, rows)}\n"
+
+
+def drawn(study: Study) -> str:
+    """The chart of the study, as SVG, with the published points where there are any."""
+    paper = PAPER.get(study.case)
+    return chart.speed_up(study, paper.speed_up, paper.source) if paper else chart.speed_up(study)
+
+
+def main(folder: Path) -> None:
+    """Compares the study that lies in ``folder``."""
+    study = from_json((folder / "scale.json").read_bytes())
+    print(compared(study), end="")
+    (folder / "published.svg").write_text(drawn(study), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -1,0 +1,48 @@
+"""A small study of one and two ranks, with numbers that can be summed by hand."""
+
+from typing import Any
+
+from conoid.cases.messages import AnyMessage, Counts, Load
+from conoid.cases.outcome import Outcome
+from conoid.client.projection import Network, Projection, project
+from conoid.client.study import Study
+
+SLOW = Network(latency=1e-3, bandwidth=1e6)
+"""A millisecond a message and a microsecond a byte."""
+
+
+def load(**fields: Any) -> Load:
+    return Load(run="r", imbalance=1.0, **fields)
+
+
+def counts(shared: int) -> Counts:
+    return Counts(run="r", elements=9, nodes=9, shared=shared, fragments=1, elements_per_rank=[])
+
+
+def two_ranks(digest: str = "abc") -> Projection:
+    journal: list[AnyMessage] = [
+        counts(10),
+        load(
+            phases={"elements": [1.0, 2.0], "exchange": [0.5, 0.25], "contact": [0.5, 0.0]}, waiting=[0.5, 0.0],
+            steps=3, messages=[2, 4], bytes=[8000, 0], collectives=[3, 3], collective_bytes=[1000, 3000],
+        ),
+        counts(20),
+        load(
+            phases={"elements": [2.0, 1.0], "exchange": [0.0, 0.0], "contact": [1.0, 0.0]}, waiting=[0.0, 0.0],
+            steps=1, messages=[1, 1], bytes=[0, 3000], collectives=[1, 1], collective_bytes=[0, 0],
+        ),
+    ]  # fmt: skip
+    outcome = Outcome(state="succeeded", ranks=2, steps=4, elapsed=8.0, setup=1.0, rebalances=1, digest=digest)
+    return project(journal, outcome, SLOW)
+
+
+def one_rank() -> Projection:
+    alone = load(
+        phases={"elements": [5.0], "exchange": [0.0], "contact": [2.0]}, waiting=[0.0], steps=4, messages=[0],
+        bytes=[0], collectives=[0], collective_bytes=[0],
+    )  # fmt: skip
+    return project([counts(0), alone], Outcome(state="succeeded", steps=4, elapsed=9.0, digest="abc"), SLOW)
+
+
+def study(*runs: Projection, case: str = "long_rod") -> Study:
+    return Study(case, ["run.samples=7"], 2, SLOW, runs)
