@@ -6,8 +6,8 @@ second is booked when ``note`` is called before the next kick.
 """
 
 import numpy as np
-from numba import njit
 
+from .jit import njit
 from .migration.parcel import Parcel, length
 from .state import Flags, Floats, Indices, Ints, Load, Nodes, extended
 from .topology import Split

@@ -11,8 +11,7 @@ global id of the tets that set the first, 3 whether tets are worn out (wear.py),
 (fracture/criterion.py).
 """
 
-from numba import njit
-
+from ..jit import njit
 from ..materials import models
 from ..materials.elastic import deviatoric_work, predict
 from ..materials.equation_of_state import linear, mie_gruneisen
