@@ -11,8 +11,8 @@ search.
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from ..jit import njit
 from ..migration.parcel import Table
 from ..state import WIDE, Block, Floats, Indices, Ints, Nodes, extended
 from ..topology import Split, keys

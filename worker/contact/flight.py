@@ -1,8 +1,8 @@
 """The surface between two searches: where it is, which way it looks, and whether it still flies as it did."""
 
 import numpy as np
-from numba import njit
 
+from ..jit import njit
 from ..migration.parcel import Parcel
 from ..parallel.comm import Comm
 from ..parallel.fixed_point import exact_sums
