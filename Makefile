@@ -4,11 +4,18 @@
 # make drill  the long tests: studies and failures that take minutes
 #
 # Each target first brings .venv to the versions of requirements.lock, when that file or pyproject.toml has changed.
+# Kernels are compiled while pip installs what they do not need. Nothing takes 10 s without a word.
 
 PYTHON ?= $(firstword $(foreach name,python3.11 python3.12 python3.13 python3,$(shell command -v $(name))))
 BIN := .venv/bin
 READY := .venv/.ready
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 HOUSES := cases client server worker
+
+# $(call told,words,command) runs a command and says every 5 s how long it has taken so far.
+told = @echo "$(1)"; began=$$(date +%s); \
+	while sleep 5 >/dev/null 2>&1; do echo "$(1): $$(($$(date +%s) - began)) s"; done & clock=$$!; \
+	trap "kill $$clock" EXIT; $(2)
 
 .PHONY: demo test lint style types check bench drill clean
 .DEFAULT_GOAL := test
@@ -39,9 +46,11 @@ drill: $(READY)
 
 $(READY): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Conoid needs Python 3.11 or newer; make PYTHON=/path/to/python")'
-	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile -r requirements.lock
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	$(call told,making .venv,$(PYTHON) -m venv .venv)
+	$(call told,installing what the worker needs,$(PIP) -c requirements.lock setuptools \
+		&& $(PIP) -c requirements.lock --no-build-isolation -e ".[worker]")
+	$(call told,installing the rest,$(BIN)/python -m conoid.worker.compile & kernels=$$!; \
+		$(PIP) -r requirements.lock || { kill $$kernels; exit 1; }; wait $$kernels)
 	@mkdir -p build/types/conoid
 	@for house in $(HOUSES); do ln -sfn ../../../$$house build/types/conoid/$$house; done
 	@touch $(READY)

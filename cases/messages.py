@@ -27,7 +27,7 @@ class Message(msgspec.Struct, tag_field="type", tag=str.lower, kw_only=True, fro
 
 
 class Status(Message, frozen=True):
-    """The run has changed its state."""
+    """The run has changed its state, or ``message`` says what it does in it."""
 
     channel: ClassVar[str] = "state"
     state: str

@@ -64,8 +64,9 @@ class Live:
                 self.finished = message
 
     def _status(self, message: Status) -> None:
-        self.state = State(message.state)
-        self.cause, self.message, self.changed = message.cause, message.message, message.wall
+        if message.state != self.state or not self.changed:
+            self.changed = message.wall
+        self.state, self.cause, self.message = State(message.state), message.cause, message.message
         if self.state is State.RUNNING and self.began is None:
             self.began = message.wall
 

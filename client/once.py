@@ -1,6 +1,7 @@
 """``conoid run``: one case, from start to picture, on this machine."""
 
 import signal
+from contextlib import ExitStack
 from pathlib import Path
 
 import msgspec
@@ -11,7 +12,7 @@ from conoid.cases.outcome import Outcome
 from conoid.cases.run import ExitCode
 from conoid.cases.schema import Case
 
-from . import tables
+from . import silence, tables
 from .errors import ClientError
 from .live import Live, exit_code
 from .local import GRACE, LocalServer
@@ -47,15 +48,19 @@ def run_once(
     checked = parse_case(data)
     out = Console(quiet=as_json, highlight=False)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    with LocalServer(runs, checked.run.ranks) as server:
-        run = server.session.submit(data)
+    server = LocalServer(runs, checked.run.ranks)
+    with ExitStack() as up:
+        with silence.broken(out.print, lambda: "the server is starting"):
+            up.enter_context(server)
+            run = server.session.submit(data)
         info = _follow(run, checked, out, plain)
     result = Result.open(server.runs / run.id)
     drawn = None
     if info.outcome is not None:
         _report(result, info.outcome, out)
         if picture is not None and result.frames:
-            drawn = view(result, field or _telling_field(checked), picture)
+            with silence.broken(out.print, lambda: f"drawing {picture}"):
+                drawn = view(result, field or _telling_field(checked), picture)
             out.print(f"picture    {drawn.out}", soft_wrap=True)
     if as_json:
         print(_document(run.id, result, info, drawn))

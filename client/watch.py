@@ -9,8 +9,9 @@ from rich.live import Live as Screen
 
 from conoid.cases.messages import AnyMessage, Log, Progress, Status
 
+from . import silence
 from .display import line, panel
-from .figures import clock
+from .figures import clock, duration
 from .link import Link
 from .live import Live
 
@@ -63,15 +64,23 @@ def show(messages: Iterable[AnyMessage], known: Live, out: Console) -> Live:
 
 
 def tell(messages: Iterable[AnyMessage], known: Live, write: Callable[[str], None]) -> Live:
-    """One plain line an update, at most one of progress every ``LINE_EVERY`` s."""
+    """One plain line an update, at most one of progress every ``LINE_EVERY`` s; silence is broken."""
     told = 0.0
-    for message in messages:
-        known.take(message)
-        if isinstance(message, Log):
-            if message.level in {"warning", "error"}:
-                write(f"{clock(message.wall)}  {known.run}  {message.level}: {message.text}")
-        elif isinstance(message, Status) or (isinstance(message, Progress) and time.monotonic() - told >= LINE_EVERY):
-            if isinstance(message, Progress):
-                told = time.monotonic()
-            write(line(known))
+    with silence.broken(write, lambda: _waiting(known)) as say:
+        for message in messages:
+            known.take(message)
+            if isinstance(message, Log):
+                if message.level in {"warning", "error"}:
+                    say(f"{clock(message.wall)}  {known.run}  {message.level}: {message.text}")
+            elif isinstance(message, Status) or (
+                isinstance(message, Progress) and time.monotonic() - told >= LINE_EVERY
+            ):
+                if isinstance(message, Progress):
+                    told = time.monotonic()
+                say(line(known))
     return known
+
+
+def _waiting(known: Live) -> str:
+    lasting = f", for {duration(time.time() - known.changed)}" if known.changed else ""
+    return f"{clock(time.time())}  {known.run}  still {known.state.value}{lasting}"

@@ -127,7 +127,7 @@ def run(folder: Path) -> Run:
 def _after(told: Run, status: Status) -> Run:
     state, cause = State(status.state), Cause(status.cause) if status.cause else None
     after = replace(told, state=state, cause=cause, message=status.message)
-    if state in {State.QUEUED, State.STARTING}:
+    if state in {State.QUEUED, State.STARTING} and state is not told.state:
         return replace(after, started=status.wall if state is State.STARTING else 0.0)
     return replace(after, finished=status.wall) if state.final else after
 

@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[1]
 HOUSES = ("cases", "client", "server", "worker")
 CONTRACT = {"pydantic", "pydantic_core", "msgspec"}
 WORKER_ONLY = {"numba", "mpi4py", "gmsh"}
-ONE_MODULE = {"mpi4py": "worker", "gmsh": "worker", "pyvista": "client"}
+ONE_MODULE = {"mpi4py": "worker", "gmsh": "worker", "pyvista": "client", "numba": "worker"}
 """Libraries that one module of one house imports, and no other."""
 HEAVY = WORKER_ONLY | {"pyvista", "vtk", "vtkmodules"}
 """What the contract, the client and the server run without; pictures alone need pyvista."""

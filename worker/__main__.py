@@ -2,10 +2,7 @@
 
 import sys
 
-from . import kernels
-
 if __name__ == "__main__":
-    kernels.use_cache()
     from .main import main
     from .parallel.comm import leave
 

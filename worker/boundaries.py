@@ -8,8 +8,8 @@ second is booked when ``note`` is called before the next kick.
 from abc import ABC, abstractmethod
 
 import numpy as np
-from numba import njit
 
+from .jit import njit
 from .migration.parcel import Parcel, length
 from .state import Bits, Flags, Floats, Indices, Ints, Load, Nodes, extended
 from .topology import Split

@@ -17,6 +17,7 @@ from conoid.cases.schema import Case
 from . import digest, reference, simulation
 from .balance import Balance
 from .errors import InputError, PhysicsError
+from .jit import cpu_time
 from .loop import STOPS, Loop, Start
 from .migration import checkpoint
 from .migration.route import route
@@ -51,13 +52,13 @@ def compute(
     setup = time.monotonic() - began
     _announce(sim, journal, setup)
     loop = Loop(sim, folder, journal, history, signals, Balance.of(sim), start)
-    cpu = time.thread_time()
+    cpu = cpu_time()
     failure = None
     try:
         loop.run()
     except PhysicsError as error:
         failure = error
-    cpu = time.thread_time() - cpu
+    cpu = cpu_time() - cpu
     loop.sim.free()
     if comm.rank == 0 and failure is None and not loop.stopped:
         checkpoint.forget(folder)

@@ -3,6 +3,7 @@
 ::
 
     ConoidError                      exit 1   anything the worker raises on purpose
+    ├── CompileError             exit 1   kernels cannot be compiled
     ├── InputError (ValueError)      exit 2   the case, or a file it names, is wrong
     │   └── MeshError                exit 2   the mesh cannot be made, read or used
     └── PhysicsError                 exit 3   the run itself failed: diverged
@@ -21,6 +22,10 @@ class ConoidError(Exception):
 
     exit_code: ClassVar[int] = ExitCode.CRASHED
     cause: ClassVar[Cause] = Cause.SERVICE
+
+
+class CompileError(ConoidError):
+    """Kernels cannot be compiled."""
 
 
 class InputError(ConoidError, ValueError):

@@ -7,6 +7,7 @@ import sys
 import time
 import traceback
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from conoid.cases import layout, load, messages
 from conoid.cases import outcome as outcomes
@@ -15,11 +16,15 @@ from conoid.cases.problems import CaseError
 from conoid.cases.run import Cause, ExitCode, State
 from conoid.cases.schema import Case
 
-from .errors import ConoidError
+from . import compile as ahead
+from . import kernels
+from .errors import CompileError, ConoidError
 from .output.journal import Journal
-from .output.telemetry import Telemetry
 from .parallel.comm import Comm, connect
 from .signals import Signals
+
+if TYPE_CHECKING:
+    from .output.telemetry import Telemetry
 
 log = logging.getLogger("conoid.worker")
 
@@ -40,7 +45,7 @@ def main(arguments: list[str]) -> int:
     _prepare_folder(options.out, comm)
     telemetry = journal = None
     if comm.rank == 0:
-        telemetry = Telemetry(options.telemetry, options.prefix) if options.telemetry else None
+        telemetry = _telemetry(options)
         journal = Journal(options.out, options.run or options.out.resolve().name, telemetry)
     try:
         outcome, code = _outcome(options, comm, journal, signals, began)
@@ -51,6 +56,15 @@ def main(arguments: list[str]) -> int:
         _close(outcome, options.out, journal, telemetry)
     comm.barrier()
     return code
+
+
+def _telemetry(options: argparse.Namespace) -> "Telemetry | None":
+    """Zenoh is for the one rank that publishes."""
+    if not options.telemetry:
+        return None
+    from .output.telemetry import Telemetry
+
+    return Telemetry(options.telemetry, options.prefix)
 
 
 def _outcome(
@@ -127,16 +141,39 @@ def _prepare_folder(folder: Path, comm: Comm) -> None:
 def _compute(
     case: Case, options: argparse.Namespace, comm: Comm, journal: Journal | None, signals: Signals, began: float
 ) -> Outcome:
-    if comm.rank == 0:
-        from . import compute
-    comm.barrier()
-    if comm.rank != 0:
-        from . import compute
+    ready_kernels(comm, journal)
+    from . import compute
+
     meshes = Path(options.case).resolve().parent
     return compute.compute(case, meshes, options.out, comm, journal, signals, began, options.restart)
 
 
-def _close(outcome: Outcome, folder: Path, journal: Journal, telemetry: Telemetry | None) -> None:
+def ready_kernels(comm: Comm, journal: Journal | None) -> None:
+    """Every rank uses the same kernels: rank 0 hashes the sources and compiles what is missing, the others sleep.
+
+    Must come before numba is imported. Raises CompileError on all ranks alike.
+    """
+    failure: CompileError | None = None
+    if comm.rank == 0:
+        try:
+            ahead.compile_all(kernels.cache_folder(), lambda done, total: _say(journal, ahead.words(done, total)))
+        except CompileError as error:
+            failure = error
+    comm.await_all()
+    sources, failure = comm.broadcast((kernels.source_hash(), failure) if comm.rank == 0 else None)
+    if failure is not None:
+        raise failure
+    kernels.use_cache(sources)
+
+
+def _say(journal: Journal | None, what: str) -> None:
+    """Tells what the start is at."""
+    log.info(what)
+    if journal is not None:
+        journal.write(messages.Status, state=State.STARTING, message=what)
+
+
+def _close(outcome: Outcome, folder: Path, journal: Journal, telemetry: "Telemetry | None") -> None:
     """The outcome first, then the last message: whoever hears of the end finds it on disk."""
     _write_outcome(folder, outcome)
     journal.write(

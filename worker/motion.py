@@ -1,6 +1,6 @@
 """Nodes: forces to velocities, velocities to positions. Increments are added, positions never recomputed."""
 
-from numba import njit
+from .jit import njit
 
 
 @njit("void(float64[:, ::1], int64[:, ::1], float64[::1], float64)", cache=True, error_model="numpy")

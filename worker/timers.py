@@ -1,13 +1,13 @@
 """CPU seconds per phase of the step, by the clock of this thread.
 
 MPI polls while it waits: what a phase spends in calls that wait for other ranks counts as ``exchange``, whichever phase
-it is in; the other phases are work.
+it is in; the other phases are work. Kernels are loaded at their first call: that counts in no phase.
 """
 
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from .jit import cpu_time
 from .parallel.comm import Comm
 
 PHASES = ("elements", "exchange", "nodes", "contact", "fracture", "output", "balance", "rest")
@@ -15,8 +15,8 @@ PHASES = ("elements", "exchange", "nodes", "contact", "fracture", "output", "bal
 
 
 def worked(comm: Comm) -> float:
-    """CPU time of this thread so far, but for its waiting, s."""
-    return time.thread_time() - comm.waited
+    """CPU time of this thread so far, but for its waiting and for the loading of kernels, s."""
+    return cpu_time() - comm.waited
 
 
 class Timers:
@@ -33,18 +33,18 @@ class Timers:
 
     def begin(self) -> None:
         """Counts ``rest`` from here on."""
-        self._asked = time.thread_time()
+        self._asked = cpu_time()
 
     @contextmanager
     def phase(self, name: str) -> Iterator[None]:
         """Adds the CPU time of the block to a phase; a phase within it takes its own time out."""
-        start, outside = time.thread_time(), self._inner
+        start, outside = cpu_time(), self._inner
         waited = self._comm.waited - self._booked
         self._inner = 0.0
         try:
             yield
         finally:
-            spent = time.thread_time() - start
+            spent = cpu_time() - start
             idle = self._comm.waited - self._booked - waited
             self._booked += idle
             self.seconds[name] += spent - self._inner - idle
@@ -53,7 +53,7 @@ class Timers:
 
     def since_last(self) -> tuple[dict[str, float], float]:
         """Seconds per phase since the last call, and how many of ``exchange`` were waiting; asked between phases."""
-        spent = time.thread_time() - self._asked
+        spent = cpu_time() - self._asked
         self.begin()
         self.seconds["rest"] += spent - (sum(self.seconds.values()) - sum(self._reported.values()))
         delta = {name: self.seconds[name] - self._reported[name] for name in PHASES}

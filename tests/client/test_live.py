@@ -1,12 +1,15 @@
 """The picture that follows from the messages, and how it looks in a terminal."""
 
 import io
+import threading
+from collections.abc import Iterator
 
 import pytest
 from rich.console import Console
 
+from conoid.cases.messages import AnyMessage
 from conoid.cases.run import State
-from conoid.client import display
+from conoid.client import display, silence
 from conoid.client.live import Live, exit_code, grouped
 from conoid.client.watch import show, tell
 
@@ -107,6 +110,35 @@ def test_plain_lines_tell_states_and_warnings_at_once_and_progress_now_and_then(
         "accepted", "queued", "starting", "running", "running", "warning:", "succeeded",
     ]  # fmt: skip
     assert "25.0 %" in lines[4], "the first progress is told, the others come within two seconds"
+
+
+def test_what_a_start_is_at_is_told_and_changes_no_state() -> None:
+    lines: list[str] = []
+    words = [stories.status(4 + n, "starting", message=f"compiling kernels: {n} of 3") for n in range(4)]
+    live = tell([stories.status(3, "starting"), *words], Live(stories.RUN), lines.append)
+    assert [line.partition("starting")[2].strip() for line in lines] == ["", *(word.message for word in words)]
+    assert live.changed == stories.START + 3
+
+
+def test_a_silent_run_is_heard_of(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(silence, "LONGEST", 0.05)
+    lines: list[str] = []
+    heard = threading.Event()
+
+    def write(text: str) -> None:
+        lines.append(text)
+        if "still" in text:
+            heard.set()
+
+    def story() -> Iterator[AnyMessage]:
+        yield stories.status(1, "starting")
+        assert heard.wait(30.0)
+        yield stories.status(2, "running")
+
+    tell(story(), Live(stories.RUN), write)
+    assert lines[0].endswith("starting")
+    assert "still starting, for " in lines[1]
+    assert lines[-1].endswith("running")
 
 
 def test_a_failure_tells_its_cause() -> None:

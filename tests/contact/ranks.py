@@ -101,6 +101,9 @@ class ThreadComm:
     def broadcast(self, item: Any) -> Any:
         return self.share(item)[0]
 
+    def await_all(self) -> None:
+        self.barrier()
+
     def barrier(self) -> None:
         self._world.meeting.wait()
 

@@ -7,11 +7,8 @@ import json
 import sys
 from pathlib import Path
 
-from conoid.worker import kernels
+from conoid.worker.main import main
 
 if __name__ == "__main__":
-    kernels.use_cache()
-    from conoid.worker.main import main
-
     codes = [main(arguments) for arguments in json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))]
     sys.exit(max(codes))

@@ -3,7 +3,7 @@
 import math
 from pathlib import Path
 
-from conoid.cases import layout
+from conoid.cases import layout, messages
 from conoid.cases.outcome import Check, Outcome, to_json
 from conoid.cases.run import State
 from conoid.server import folder
@@ -35,6 +35,16 @@ def test_a_new_folder_tells_its_run(tmp_path: Path) -> None:
     told = folder.run(made)
     assert (told.id, told.owner, told.state, told.submitted) == (run, "ann", State.ACCEPTED, now)
     assert (folder.outcome(made), folder.outcome_error(made), folder.process(made)) == (None, "", None)
+
+
+def test_what_a_worker_says_of_its_start_does_not_begin_the_run_anew(tmp_path: Path) -> None:
+    run, now = folder.new_id()
+    made = folder.create(tmp_path, submission(run, now), b"case", b"resolved")
+    with (made / layout.JOURNAL).open("ab") as journal:
+        for seq, (state, wall) in enumerate([("queued", 1.0), ("starting", 2.0), ("starting", 60.0)], 2):
+            journal.write(messages.to_json(messages.Status(run=run, seq=seq, wall=now + wall, state=state)) + b"\n")
+    told = folder.run(made)
+    assert (told.state, told.started) == (State.STARTING, now + 2.0)
 
 
 def test_a_scan_finds_runs_only_and_removes_what_was_never_promised(tmp_path: Path) -> None:

@@ -8,8 +8,8 @@ number of points, however far they fly.
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from ..jit import njit
 from ..state import Floats, Ints
 
 _MOST = 2.0**20

@@ -7,8 +7,8 @@ the angular momentum of its tets.
 """
 
 import numpy as np
-from numba import njit
 
+from ..jit import njit
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, complete
 from ..parallel.tags import Tag

@@ -11,8 +11,8 @@ that opening calls for none. However finely a body shatters, what has not moved 
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from ..jit import njit
 from ..migration.parcel import Table
 from ..state import WIDE, Block, Flags, Floats, Indices, Ints, Nodes, among, extended
 from ..topology import Split

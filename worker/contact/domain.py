@@ -7,8 +7,8 @@ occupied cell is an outside cell already, and the paper's test of a cell's neigh
 """
 
 import numpy as np
-from numba import njit
 
+from ..jit import njit
 from ..parallel.comm import Comm
 from ..state import Flags, Floats
 from .search import Boxes

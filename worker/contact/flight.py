@@ -1,8 +1,8 @@
 """The surface between two searches: where it is, and whether it still flies as it did."""
 
 import numpy as np
-from numba import njit
 
+from ..jit import njit
 from ..parallel.comm import Comm
 from ..parallel.fixed_point import exact_sums
 from ..state import Floats, Indices, Ints, Nodes, extended

@@ -7,8 +7,8 @@ has the candidates of the node that it was part of, with the rank that computes 
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from ..jit import njit
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
 from ..state import Flags, Indices, Ints, Nodes, among, extended

@@ -3,7 +3,7 @@
 ``held`` (h,) places in the crowd and ``local`` (h,) indices on the rank of the same nodes.
 """
 
-from numba import njit
+from ..jit import njit
 
 
 @njit("void(float64[:, ::1], float64[:, ::1], int32[::1], int32[::1])", cache=True)

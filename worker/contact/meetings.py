@@ -9,8 +9,8 @@ one where the node passes the plane of the face, so that a node that slides from
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from ..jit import njit
 from ..state import Floats, Indices
 
 NEAR = 0.02

@@ -5,8 +5,8 @@ between adds its share to its nodes. So they depend on the steps alone, not on w
 """
 
 import numpy as np
-from numba import njit
 
+from ..jit import njit
 from ..mesh.faces import FACES
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, complete

@@ -16,8 +16,8 @@ area A changes by less than D (|e| + |f| + D) / A while no two of its corners ha
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from ..jit import njit
 from ..state import Flags, Floats, Indices, extended
 from .meetings import DEEP, DEEP_SELF, FACING, NEAR, facing, foot, height, off
 

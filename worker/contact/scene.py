@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 
+from ..jit import njit
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum, same
 from ..parallel.tags import Tag

@@ -8,8 +8,8 @@ skin; so a body in free flight spends no skin, however fast it is. The list may 
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from ..jit import njit
 from ..state import Flags, Floats, Indices, Ints, extended
 from . import buckets
 from .buckets import bucket_of, first_at

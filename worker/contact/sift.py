@@ -8,8 +8,8 @@ the time, by the skin and the depth to which a meeting looks.
 """
 
 import numpy as np
-from numba import njit
 
+from ..jit import njit
 from ..state import Floats, Indices
 from .meetings import DEEP, DEEP_SELF, cross, dot
 from .records import Crowd

@@ -10,7 +10,8 @@ step before, so that what sticks does not creep, however few the sweeps are.
 """
 
 import numpy as np
-from numba import njit
+
+from ..jit import njit
 
 SHARES = float(2**30)
 """Quanta per unit of weight."""

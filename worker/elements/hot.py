@@ -1,7 +1,6 @@
 """Which faces a tet would break by its own stress: the cheap test before the criterion (fracture/criterion.py)."""
 
-from numba import njit
-
+from ..jit import njit
 from ..state import CHUNK, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ
 from .tet4 import EDGE
 

@@ -12,8 +12,8 @@ whatever the size of the tets: one fixed scale, QUANTA, serves every scene.
 """
 
 import numpy as np
-from numba import njit
 
+from ..jit import njit
 from ..state import CHUNK, MASS, VOLUME_FLUX, Floats, Ints
 from .tet4 import CHANGE, DILATATION, EDGE, NODAL, SEEN, VOLUME, VOLUME_MID, largest_of, quanta
 

@@ -9,8 +9,7 @@ stress: then the second pass makes the velocity gradient again.
 ``peaks`` collects what the step needs of all tets of a rank; ``LARGEST_LIMIT`` and the names beside it are its places.
 """
 
-from numba import njit
-
+from ..jit import njit
 from ..materials import models
 from ..materials.elastic import deviatoric_work, predict
 from ..materials.equation_of_state import linear, mie_gruneisen

@@ -15,8 +15,8 @@ the chunk. Loops over a chunk use no function that could round differently in a 
 """
 
 import numpy as np
-from numba import njit
 
+from ..jit import njit
 from ..state import (
     CHUNK,
     MASS,

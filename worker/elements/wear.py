@@ -8,10 +8,10 @@ can wait for others (worker/erosion.py).
 import math
 
 import numpy as np
-from numba import njit
 
 from conoid.cases.schema import Erosion
 
+from ..jit import njit
 from ..materials.models import DENSITY
 from ..state import CHUNK, MASS, PLASTIC_STRAIN, S_XX, VISCOUS, WORK, WORK_PLASTIC, WORK_VISCOUS, Floats
 from .tet4 import LIMIT, VOLUME

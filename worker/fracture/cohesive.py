@@ -23,9 +23,9 @@ A facet whose nodes have not separated holds by itself: its pairs are one node, 
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numba import njit
 
 from ..elements.tet4 import largest_of, quanta
+from ..jit import njit
 from ..migration.parcel import Parcel
 from ..parallel.comm import Comm
 from ..parallel.fixed_point import Tally, exact_sums

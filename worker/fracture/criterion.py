@@ -8,8 +8,8 @@ the tets on either side can pass, and only they are told: strengths are computed
 """
 
 import numpy as np
-from numba import njit
 
+from ..jit import njit
 from ..mesh.faces import FACES
 from ..state import CHUNK, INTACT, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ
 

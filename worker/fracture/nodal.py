@@ -6,8 +6,8 @@ such facets are looked at (elements/hot.py).
 """
 
 import numpy as np
-from numba import njit
 
+from ..jit import njit
 from ..mesh.faces import FACES
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, complete

@@ -7,8 +7,8 @@ facet inside a body separates nothing; a closed sheet of them round a node does.
 """
 
 import numpy as np
-from numba import njit
 
+from ..jit import njit
 from ..mesh.faces import FACES
 from ..state import CHUNK, INTACT, Indices, Ints, Tets, extended
 from ..state import MASS as MASS_ROW

@@ -1,8 +1,7 @@
 """Hypoelastic deviatoric stress with the exact rotation update: the trial stress of materials with a strength."""
 
-from numba import njit
-
 from ..elements.tet4 import D_XX, D_XY, D_YY, D_YZ, D_ZX, D_ZZ, DILATATION, SPIN, VOLUME_MID
+from ..jit import njit
 from ..state import CHUNK, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, WORK
 
 _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK

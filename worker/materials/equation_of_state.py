@@ -4,9 +4,8 @@ Both take the volume strain of the step that the pressure sees (the tet's own, o
 SEEN of the scratch, and the tet's own change of volume from CHANGE, so that the work is what the nodal forces do.
 """
 
-from numba import njit
-
 from ..elements.tet4 import CHANGE, MODULUS, SEEN
+from ..jit import njit
 from ..state import CHUNK, MASS, PRESSURE, VOLUME_RATIO, WORK, WORK_VISCOUS
 from .models import BULK, C0, DENSITY, GAMMA, SHEAR, SLOPE
 

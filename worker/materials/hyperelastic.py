@@ -5,9 +5,9 @@ order in strain is Hencky's, G (ln V : ln V). Derived in docs/numerics.md.
 """
 
 import numpy as np
-from numba import njit
 
 from ..elements.tet4 import EDGE, MODULUS, RATE, REFERENCE, SEEN, TRIAL, VOLUME
+from ..jit import njit
 from ..state import CHUNK, DISTORTION, MASS, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, WORK
 from .models import DENSITY, SHEAR
 

@@ -5,9 +5,8 @@ sigma = (A + B e^n) (1 + C ln max(rate / rate_0, 1)) (1 - T*^m). Johnson and Coo
 
 import math
 
-from numba import njit
-
 from ..elements.tet4 import TRIAL, VOLUME_MID
+from ..jit import njit
 from ..state import CHUNK, FLOW, MASS, PLASTIC_STRAIN, TEMPERATURE, WORK_PLASTIC, YIELD
 from .models import JC_A, JC_B, JC_C, JC_HEAT, JC_M, JC_MELT, JC_N, JC_RATE, JC_T0, SHEAR
 from .plastic import equivalent_stress, scale_deviator

@@ -5,9 +5,9 @@ Derived in docs/numerics.md. The steps of the return are inlined by force: as ca
 """
 
 import numpy as np
-from numba import njit
 
 from ..elements.tet4 import D_XX, D_XY, D_YY, D_YZ, D_ZX, D_ZZ, TRIAL, VOLUME_MID
+from ..jit import njit
 from ..state import CHUNK, PLASTIC_STRAIN, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, WORK_PLASTIC
 from .models import MC_CAP, MC_COHESION, MC_FAILURE, MC_RESIDUAL, MC_SINE, SHEAR
 from .plastic import equivalent_stress

@@ -1,9 +1,9 @@
 """J2 plasticity with linear isotropic hardening: radial return in closed form."""
 
 import numpy as np
-from numba import njit
 
 from ..elements.tet4 import TRIAL, VOLUME_MID
+from ..jit import njit
 from ..state import (
     CHUNK,
     PLASTIC_STRAIN,

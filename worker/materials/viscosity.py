@@ -1,9 +1,9 @@
 """Bulk viscosity, and what it takes from the stable step."""
 
 import numpy as np
-from numba import njit
 
 from ..elements.tet4 import AREAS, CHANGE, LENGTH_FACTOR, LIMIT, MODULUS, VOLUME
+from ..jit import njit
 from ..state import CHUNK, MASS, VISCOUS, WORK_VISCOUS
 
 _Q, _MASS, _WORK = VISCOUS * CHUNK, MASS * CHUNK, WORK_VISCOUS * CHUNK

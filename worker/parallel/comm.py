@@ -17,6 +17,9 @@ import numpy.typing as npt
 from ..state import Ints
 from .tags import Tag
 
+_NAP = 0.01
+"""s between two looks of a rank that leaves its core to others; a hundredth of what the start of a rank takes."""
+
 
 @dataclass
 class Sent:
@@ -96,6 +99,9 @@ class Comm(Protocol):
     def barrier(self) -> None:
         """Returns when every rank has come here."""
 
+    def await_all(self) -> None:
+        """As ``barrier``; the wait may be long, and leaves the core to others."""
+
 
 class Exchange(Protocol):
     """A set of messages with fixed partners and buffers, sent again and again."""
@@ -166,6 +172,9 @@ class SerialComm:
         return item
 
     def barrier(self) -> None:
+        pass
+
+    def await_all(self) -> None:
         pass
 
 
@@ -286,6 +295,13 @@ class MpiComm:
         self.sent.collective()
         with self.waiting():
             self._world.Barrier()
+
+    def await_all(self) -> None:
+        self.sent.collective()
+        arrived = self._world.Ibarrier()
+        with self.waiting():
+            while not arrived.Test():
+                time.sleep(_NAP)
 
 
 class _MpiPending:

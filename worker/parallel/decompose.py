@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numba import njit
 
+from ..jit import njit
 from ..state import Flags, Floats, Indices, Ints
 from .comm import Comm
 

@@ -8,8 +8,8 @@ repeated in a coarser quantum. A contribution has 52 bits; node 0 of a tet may g
 import math
 
 import numpy as np
-from numba import njit
 
+from ..jit import njit
 from ..state import Floats, Ints
 from .comm import Comm
 

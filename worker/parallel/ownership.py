@@ -7,8 +7,8 @@ does not care for the order, so every holder of a node ends with the same bits a
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from ..jit import njit
 from ..state import Indices, Ints
 from .comm import Comm
 from .tags import Tag

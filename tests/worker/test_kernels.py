@@ -1,0 +1,232 @@
+"""Kernels: what names their cache folder, when they are loaded, and how they are compiled ahead."""
+
+import fcntl
+import importlib
+import os
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from conoid.worker import compile as ahead
+from conoid.worker import jit, kernels, main
+from conoid.worker.errors import CompileError
+from conoid.worker.parallel.comm import SerialComm
+
+BELOW = """
+from conoid.worker.jit import njit
+
+from .numbers import FACTOR
+
+
+@njit("float64(float64)")
+def scaled(x):
+    return FACTOR * x
+"""
+ABOVE = """
+from conoid.worker.jit import njit
+
+from .below import scaled
+
+
+@njit("void(float64[::1])")
+def scale(values):
+    for i in range(len(values)):
+        values[i] = scaled(values[i])
+
+
+@njit("float64(float64[::1])")
+def total(values):
+    return values.sum()
+"""
+
+
+@pytest.fixture
+def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A package ``tiny`` that child processes can import: three kernels in two modules."""
+    root = tmp_path / "tiny"
+    root.mkdir()
+    files = {"above": ABOVE, "below": BELOW, "numbers": "FACTOR = 2.0\n", "beside": "from .above import scale\n"}
+    for name, text in files.items():
+        (root / f"{name}.py").write_text(text)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    return root
+
+
+# The hash -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("edited", "another"), [("above", True), ("numbers", True), ("beside", False)])
+def test_an_edited_source_of_a_kernel_names_another_folder(tree: Path, edited: str, another: bool) -> None:
+    before = kernels.source_hash(tree)
+    with (tree / f"{edited}.py").open("a") as file:
+        file.write("# edited\n")
+    kernels.source_hash.cache_clear()
+    assert (kernels.source_hash(tree) != before) == another
+    assert (kernels.cache_folder(kernels.source_hash(tree)) != kernels.cache_folder(before)) == another
+
+
+def test_ranks_but_the_first_hash_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Second(SerialComm):
+        rank = 1
+
+        def broadcast(self, item: Any) -> Any:
+            assert item is None
+            return "0" * 64, None
+
+    def refuse(*_: object) -> str:
+        raise AssertionError("rank 1 hashes")
+
+    monkeypatch.setenv(kernels.VARIABLE, "")
+    monkeypatch.setattr(kernels, "source_hash", refuse)
+    main.ready_kernels(Second(), None)
+    assert os.environ[kernels.VARIABLE] == str(kernels.cache_folder("0" * 64))
+
+
+# The loading ----------------------------------------------------------------------------------------------------------
+
+
+@jit.njit("float64(float64[::1], int64)", cache=False)
+def _inner(values, i):  # type: ignore[no-untyped-def]
+    return values[i] + 1.0
+
+
+@jit.njit("float64(float64[::1], int64)", cache=False)
+def _outer(values, i):  # type: ignore[no-untyped-def]
+    return 2.0 * _inner(values, i)
+
+
+def test_a_kernel_is_loaded_at_its_first_call_with_what_it_calls() -> None:
+    begin = time.thread_time(), jit.cpu_time()
+    assert not _outer.overloads
+    assert not _inner.overloads
+    assert _outer(np.ones(3), 1) == 4.0
+    assert len(_outer.overloads) == len(_inner.overloads) == 1
+    spent, worked = time.thread_time() - begin[0], jit.cpu_time() - begin[1]
+    assert worked < 0.5 * spent, "what the loading took is no work"
+
+
+def test_threads_may_call_a_kernel_first_together() -> None:
+    @jit.njit("float64(float64[::1])", cache=False)
+    def first(values):  # type: ignore[no-untyped-def]
+        return values.sum()
+
+    with ThreadPoolExecutor(4) as threads:
+        assert list(threads.map(first, [np.ones(3)] * 8)) == [3.0] * 8
+    assert len(first.overloads) == 1
+
+
+@pytest.mark.parametrize("values", [np.ones(3, np.float32), np.ones((3, 3)), np.ones(6)[::2]])
+@pytest.mark.parametrize("loaded", [False, True])
+def test_a_kernel_takes_no_other_arguments_not_even_at_its_first_call(values: Any, loaded: bool) -> None:
+    @jit.njit("float64(float64[::1])", cache=False)
+    def first(values):  # type: ignore[no-untyped-def]
+        return values[0]
+
+    if loaded:
+        first.load()
+    with pytest.raises(TypeError, match="No matching definition"):
+        first(values)
+    assert len(first.overloads) == 1
+
+
+# Compiled ahead -------------------------------------------------------------------------------------------------------
+
+
+def compiled(folder: Path) -> set[str]:
+    return {path.name.split("-")[0] for path in folder.rglob("*.nbc")}
+
+
+def test_all_kernels_are_compiled_and_the_progress_is_told(tree: Path, tmp_path: Path) -> None:
+    told: list[tuple[int, int]] = []
+    folder = tmp_path / "cache"
+    assert ahead.compile_all(folder, lambda *numbers: told.append(numbers), tree, "tiny")
+    assert compiled(folder) == {"below.scaled", "above.scale", "above.total"}
+    assert (told[0], told[-1]) == ((0, 3), (3, 3))
+    assert told == sorted(told)
+    assert not ahead.compile_all(folder, lambda *numbers: told.append(numbers), tree, "tiny"), "all are there"
+
+
+def test_every_kernel_of_the_worker_is_counted() -> None:
+    files = kernels.kernel_files(kernels.ROOT)
+    for path in files:
+        importlib.import_module(ahead._module(path, kernels.ROOT, "conoid.worker"))
+    mine = [kernel for kernel in jit.DECLARED if kernel.py_func.__module__.startswith("conoid.worker.")]
+    assert sum(path.read_text(encoding="utf-8").count(kernels.DECLARATION) for path in files) == len(mine)
+
+
+def test_a_module_comes_after_those_that_it_imports() -> None:
+    order = ahead._order(set(kernels.kernel_files(kernels.ROOT)))
+    done: set[Path] = set()
+    while ready := [path for path, needs in order.items() if needs <= done and path not in done]:
+        done |= set(ready)
+    assert done == set(order)
+    assert kernels.ROOT / "elements" / "tet4.py" in order[kernels.ROOT / "elements" / "sweep.py"]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "reason"),
+    [
+        ('@njit("void(float64)")\ndef broken(x):\n    missing(x)\n', "missing"),
+        ("import os, signal\nos.kill(os.getpid(), signal.SIGKILL)\n", "the process ended with code -9"),
+        ("raise SystemExit(3)\n", "the process ended with code 3"),
+    ],
+)
+def test_a_child_that_fails_ends_in_one_line(tree: Path, tmp_path: Path, wrong: str, reason: str) -> None:
+    with (tree / "above.py").open("a") as file:
+        file.write("\n\n" + wrong)
+    with pytest.raises(CompileError, match=r"^kernels of tiny\.above cannot be compiled: ") as caught:
+        ahead.compile_all(tmp_path / "cache", lambda *_: None, tree, "tiny")
+    assert reason in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert not (tmp_path / "cache" / ahead.COMPLETE).exists()
+
+
+def test_a_child_that_hangs_is_not_waited_for(tree: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tree / "below.py").write_text(BELOW + "\nimport time\ntime.sleep(1000)\n")
+    monkeypatch.setattr(ahead, "_PATIENCE", 1.0)
+    with pytest.raises(CompileError, match=r"tiny\.below.*not compiled after 1 s"):
+        ahead.compile_all(tmp_path / "cache", lambda *_: None, tree, "tiny")
+
+
+def test_a_folder_that_cannot_be_written_is_named(tree: Path, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(CompileError, match=r"kernels cannot be kept in .*file.*set CONOID_CACHE_DIR"):
+        ahead.compile_all(tmp_path / "file" / "cache", lambda *_: None, tree, "tiny")
+
+
+def test_a_second_program_waits_for_the_first(tree: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "cache"
+    folder.mkdir()
+    told: list[tuple[int, int]] = []
+    with (folder / ahead._LOCK).open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        second = threading.Thread(
+            target=ahead.compile_all, args=(folder, lambda *numbers: told.append(numbers), tree, "tiny")
+        )
+        second.start()
+        time.sleep(1.0)
+        assert not compiled(folder)
+        assert told == [(0, 3)]
+        (folder / ahead.COMPLETE).touch()
+    second.join(60.0)
+    assert not second.is_alive()
+    assert not compiled(folder), "the first has compiled them"
+
+
+def test_the_worker_tells_what_it_waits_for(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def compile_all(folder: Path, tell: ahead.Tell) -> bool:
+        tell(31, 112)
+        raise CompileError("kernels of x cannot be compiled: y")
+
+    monkeypatch.setattr(ahead, "compile_all", compile_all)
+    monkeypatch.chdir(tmp_path)
+    code = main.main(["taylor_copper", "--out", str(tmp_path / "run")])
+    assert code == 1
+    journal = (tmp_path / "run" / "journal.jsonl").read_text()
+    assert '"state":"starting","cause":null,"message":"compiling kernels: 31 of 112"' in journal
+    assert "kernels of x cannot be compiled: y" in (tmp_path / "run" / "outcome.json").read_text()

@@ -1,0 +1,104 @@
+"""Kernels: functions that numba compiles for the signature that they are declared with, at their first call.
+
+``numba.njit`` compiles a function with a signature where it is declared, or loads it from the cache: every rank would
+load every kernel of the worker at its start, whatever its scene. ``njit`` of this module, the one that knows numba,
+does the same at the first call, from Python or from another kernel.
+"""
+
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.registry import CPUDispatcher, cpu_target
+
+_BLAS = "scipy.linalg"
+DECLARED: list["Kernel"] = []
+"""Every kernel of the modules that are imported."""
+
+
+class Kernel(CPUDispatcher):
+    """A compiled function with one signature."""
+
+    signature = ""
+    """As it is declared, in numba's notation."""
+
+    def load(self) -> None:
+        """Compiles the kernel, or loads it from the cache, and what it calls; once, whatever thread asks."""
+        with global_compiler_lock:
+            if self.overloads:
+                return
+            with _loading:
+                super().compile(self.signature)
+            self.disable_compile()
+
+    def compile(self, sig: Any) -> Any:
+        """As numba asks for it when another kernel calls this one: for the declared signature, whatever ``sig`` is."""
+        self.load()
+        (compiled,) = self.overloads.values()
+        return compiled.entry_point  # type: ignore[attr-defined]
+
+    def _compile_for_args(self, *args: Any, **kws: Any) -> "Kernel":
+        """As numba asks for it at the first call from Python. Loaded, it is called again, and checks its arguments."""
+        self.load()
+        return self
+
+
+def njit(signature: str, *, cache: bool = True, **options: Any) -> Callable[[Callable[..., Any]], Kernel]:
+    """Declares a kernel of that signature; ``options`` are numba's own."""
+
+    def declare(function: Callable[..., Any]) -> Kernel:
+        kernel = Kernel(function, targetoptions={"nopython": True, "boundscheck": None, **options})
+        kernel.signature = signature
+        if cache:
+            kernel.enable_caching()
+        DECLARED.append(kernel)
+        return kernel
+
+    return declare
+
+
+class _Loading:
+    """CPU seconds of this thread in loading kernels; a kernel that another one loads is within its time."""
+
+    def __init__(self) -> None:
+        self.spent = 0.0
+        self._depth = 0
+
+    def __enter__(self) -> None:
+        if not self._depth:
+            self._began = time.thread_time()
+        self._depth += 1
+
+    def __exit__(self, *_: object) -> None:
+        self._depth -= 1
+        if not self._depth:
+            self.spent += time.thread_time() - self._began
+
+
+_loading = _Loading()
+
+
+def _begin() -> None:
+    """Loads numba's own implementations, which the first kernel needs, without the BLAS of scipy, which none does.
+
+    Where scipy is installed numba would import all of its linear algebra for that.
+    """
+    absent = _BLAS not in sys.modules
+    if absent:
+        sys.modules[_BLAS] = None  # type: ignore[assignment]
+    try:
+        cpu_target.typing_context.refresh()
+        cpu_target.target_context.refresh()
+    finally:
+        if absent:
+            del sys.modules[_BLAS]
+
+
+_begin()
+
+
+def cpu_time() -> float:
+    """CPU time of this thread so far without the loading of kernels, s: what the work itself costs, in any step."""
+    return time.thread_time() - _loading.spent
