@@ -237,7 +237,7 @@ def test_a_killed_client_leaves_no_server(alone: Path) -> None:
 
 
 def test_watch_can_be_left(user: Path) -> None:
-    run = submitted(user, steps=200, pace=0.02)
+    run = submitted(user, steps=5000, pace=0.02)
     child = subprocess.Popen([*CONOID, "watch", run], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert child.stdout is not None
     child.stdout.readline()

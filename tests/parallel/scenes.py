@@ -18,6 +18,8 @@ SCENES = {
     "nodes": ["parts[0].fracture.traction=nodes", "parts[1].fracture.traction=nodes"],
     "traction": [],
 }
+FAST = "nodal"
+"""The scene that is compared in seconds, on two ranks."""
 TRACTION = """
 [[boundaries]]
 kind = "traction"

@@ -17,28 +17,10 @@ from conoid.worker.simulation import Simulation
 from conoid.worker.topology import Split
 
 from ..contact.ranks import on_ranks
-from .launching import together
-from .scenes import CASE, SCENES, arguments
+from .scenes import CASE, FAST, SCENES
 
 RANKS = (2, 3, 4, 7)
-FAST = "nodal"
-"""The scene that is compared in seconds, on two ranks."""
 Answers = Callable[[int, str], Path]
-
-
-@pytest.fixture(scope="module")
-def answers(tmp_path_factory: pytest.TempPathFactory) -> Answers:
-    """The folder of a run by the number of ranks and the scene; done at the first call, together with its like."""
-    root = tmp_path_factory.mktemp("breaking")
-
-    def folder(ranks: int, name: str) -> Path:
-        place = root / str(ranks)
-        if not (place / name).exists():
-            alike = [name] if name == FAST else [n for n in SCENES if n != FAST]
-            together(ranks, place, [arguments(n, root, place) for n in alike])
-        return place / name
-
-    return folder
 
 
 def outcome(folder: Path) -> Outcome:
@@ -52,8 +34,8 @@ def marks(name: str, ranks: int = 1) -> list[pytest.MarkDecorator]:
 @pytest.mark.parametrize(
     ("name", "ranks"), [pytest.param(name, n, marks=marks(name, n)) for n in RANKS for name in SCENES]
 )
-def test_what_breaks_is_the_same_on_any_number_of_ranks(name: str, ranks: int, answers: Answers) -> None:
-    one, many = answers(1, name), answers(ranks, name)
+def test_what_breaks_is_the_same_on_any_number_of_ranks(name: str, ranks: int, breaking: Answers) -> None:
+    one, many = breaking(1, name), breaking(ranks, name)
     first, other = outcome(one), outcome(many)
     assert (first.state, other.state) == ("succeeded", "succeeded")
     assert (first.ranks, other.ranks) == (1, ranks)
@@ -64,8 +46,8 @@ def test_what_breaks_is_the_same_on_any_number_of_ranks(name: str, ranks: int, a
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=marks(name)) for name in SCENES])
-def test_the_scenes_break_thoroughly(name: str, answers: Answers) -> None:
-    end = outcome(answers(1, name))
+def test_the_scenes_break_thoroughly(name: str, breaking: Answers) -> None:
+    end = outcome(breaking(1, name))
     assert end.steps >= 30
     assert end.fragments is not None
     assert end.fragments > 50

@@ -44,22 +44,21 @@ def test_a_run_tells_its_groups_alike_on_any_number_of_ranks(run: Callable[[int]
     assert (one[-1].step, one[-1].outside) == (two[-1].step, two[-1].outside)
 
 
-def test_a_run_begins_and_ends_with_its_groups(run: Callable[[int], Path]) -> None:
-    told = groups(run(2))
+def test_a_run_begins_and_ends_with_its_groups(moving: Path) -> None:
+    told = groups(moving)
     assert [bool(m.centres) for m in told] == [True] + [False] * (len(told) - 1)
     assert (told[0].step, told[0].load) == (0, [0] * 256)
-    assert min(told[-1].load) > 0
+    assert all(map(any, zip(*(m.load for m in told), strict=True))), "each has cost something; some erode to the end"
     assert sum(told[-1].outside) > sum(told[0].outside), "something has broken"
 
 
-def test_the_replay_of_a_run_knows_its_cuts(run: Callable[[int], Path]) -> None:
-    folder = run(2)
-    command = [sys.executable, "-m", "conoid.client.cli", "replay-balance", str(folder), "--json"]
+def test_the_replay_of_a_run_knows_its_cuts(moving: Path) -> None:
+    command = [sys.executable, "-m", "conoid.client.cli", "replay-balance", str(moving), "--json"]
     told = json.loads(subprocess.run(command, check=True, capture_output=True, text=True, timeout=60).stdout)
     happened, replayed = told["run"], told["policies"][0]
-    assert (happened["policy"], happened["ranks"]) == ("every:8", 2)
-    assert happened["cuts"] == replayed["cuts"] == list(range(8, groups(folder)[-1].step, 8))
+    assert (happened["policy"], happened["ranks"]) == ("every:5", 3)
+    assert happened["cuts"] == replayed["cuts"] == list(range(5, groups(moving)[-1].step, 5))
     assert len(replayed["cuts"]) > 1
     assert replayed["cost"] == pytest.approx(happened["cost"])
     assert 0.0 < replayed["lost"] < replayed["work"]
-    assert [p["policy"] for p in told["policies"]] == ["every:8", "measured", "outside 1.2", "never"]
+    assert [p["policy"] for p in told["policies"]] == ["every:5", "measured", "outside 1.2", "never"]

@@ -1,0 +1,42 @@
+"""Runs of the scene that breaks which several modules compare: each is done once in a session, when first asked for."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from conoid.cases import layout
+
+from .launching import together
+from .scenes import FAST, SCENES, arguments
+
+
+@pytest.fixture(scope="session")
+def breaking(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int, str], Path]:
+    """The folder of an uninterrupted run by the number of ranks and the scene; done together with its like.
+
+    On more than one rank it is asked for a checkpoint by a file before it begins.
+    """
+    root = tmp_path_factory.mktemp("breaking")
+
+    def folder(ranks: int, name: str) -> Path:
+        place = root / str(ranks)
+        if not (place / name).exists():
+            alike = [name] if name == FAST else [n for n in SCENES if n != FAST]
+            if ranks > 1:
+                for each in alike:
+                    (place / each).mkdir(parents=True)
+                    (place / each / layout.CHECKPOINT_REQUEST).touch()
+            together(ranks, place, [arguments(n, root, place) for n in alike])
+        return place / name
+
+    return folder
+
+
+@pytest.fixture(scope="session")
+def moving(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a run of the scene on three ranks, among which it is cut anew every five steps."""
+    root = tmp_path_factory.mktemp("moving")
+    words = [word for change in ("balance.policy=every", "balance.every=5") for word in ("--set", change)]
+    together(3, root, [[*arguments(FAST, root, root), *words]])
+    return root / FAST
