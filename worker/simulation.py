@@ -39,7 +39,7 @@ class Vote:
 
     words: Ints = field(default_factory=lambda: np.zeros(9, np.int64))
     """0: one over the stable step; 1: largest force (both as bits); 2: reason to stop; 3: rank 0 wants a
-    report, 2: with groups; 4: a search for contact is due; 5: tets are worn out; 6: faces may break; 7: a rank has more
+    report, 2: with groups; 4: a search for contact is due; 5: tets are worn out; 6: facets break; 7: a rank has more
     outside nodes than it may; 8: a checkpoint is asked for."""
     result: Ints = field(default_factory=lambda: np.zeros(9, np.int64))
 
@@ -74,9 +74,9 @@ class Vote:
         return bool(self.result[4])
 
     @property
-    def hot(self) -> bool:
-        """Whether some tet's face has passed the strength by the tet's own stress."""
-        return bool(self.result[6])
+    def breaking(self) -> int:
+        """Whether faces are overstressed, and whether facets break (fracture/stage.py)."""
+        return int(self.result[6])
 
     def begin_again(self) -> None:
         """Forgets what was to be done besides the next step."""

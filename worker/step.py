@@ -17,12 +17,14 @@ and at once f(n+1) from it, so a step begins with forces that are already at han
 ==  =====================================================  ==========================
 
 6 and 7 are one pass over each chunk of tets (two with an averaged pressure, with the exchange of the nodal volumes
-between them); 8 is started after the border tets and finished after the interior ones.
+between them); 8 is started after the border tets and finished after the interior ones. Which facets pass is found
+before the vote, which says whether any rank has some.
 """
 
 import math
 
 from .errors import PhysicsError
+from .fracture.stage import Fracture
 from .motion import kick, move
 from .parallel import fixed_point
 from .simulation import Simulation
@@ -30,7 +32,7 @@ from .simulation import Simulation
 
 def prepare(sim: Simulation) -> None:
     """Forces and limits of the initial state: a pass over the elements in no time at all."""
-    _elements(sim, 0.0)
+    _elements(sim, 0.0, None)
     if sim.erosion is not None:
         sim.erosion.begin(sim.vote.limit)
 
@@ -59,23 +61,27 @@ def second_half(sim: Simulation) -> None:
         clock.advance()
         if sim.contact is not None:
             sim.vote.words[4] = sim.contact.spent(nodes)
-    _elements(sim, clock.dt)  # 6 to 8
+    _elements(sim, clock.dt, sim.fracture)  # 6 to 8
     if sim.fracture is not None:
         with sim.timers.phase("fracture"):
-            if sim.vote.hot:
-                sim.fracture.advance()  # 9: facets break, nodes separate, f(n+1) goes with them
-            else:
-                sim.fracture.rest()
+            sim.fracture.advance(sim.vote.breaking)  # 9: facets break, nodes separate, f(n+1) goes with them
 
 
-def _elements(sim: Simulation, dt: float) -> None:
-    """6 to 8; repeats the sum of forces in a coarser quantum when they have outgrown the present one."""
+def _elements(sim: Simulation, dt: float, fracture: Fracture | None) -> None:
+    """6 to 8, and which facets break; repeats the sum of forces in a coarser quantum when they have outgrown the
+    present one.
+    """
     elements, vote = sim.elements, sim.vote
     sim.scale = sim.next_scale()
     with sim.timers.phase("elements"):
         elements.advance(dt, sim.scale)
+    breaking = int(elements.peaks[4])
+    if fracture is not None:
+        with sim.timers.phase("fracture"):
+            breaking = fracture.find(bool(vote.breaking))
     with sim.timers.phase("exchange"):
-        vote.words[0], vote.words[1], vote.words[5:7] = elements.peaks[0], elements.peaks[2], elements.peaks[3:5]
+        vote.words[0], vote.words[1] = elements.peaks[0], elements.peaks[2]
+        vote.words[5], vote.words[6] = elements.peaks[3], breaking
         pending = sim.comm.begin_maximum(vote.words, vote.result)
         elements.finish()
         pending.finish()
