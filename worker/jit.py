@@ -10,8 +10,11 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from numba import types
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher, cpu_target
+
+__all__ = ["DECLARED", "Kernel", "njit", "types"]
 
 _BLAS = "scipy.linalg"
 DECLARED: list["Kernel"] = []
@@ -21,8 +24,8 @@ DECLARED: list["Kernel"] = []
 class Kernel(CPUDispatcher):
     """A compiled function with one signature."""
 
-    signature = ""
-    """As it is declared, in numba's notation."""
+    signature: Any = ""
+    """As it is declared: in numba's notation, or made of its ``types``."""
 
     def load(self) -> None:
         """Compiles the kernel, or loads it from the cache, and what it calls; once, whatever thread asks."""
@@ -45,7 +48,7 @@ class Kernel(CPUDispatcher):
         return self
 
 
-def njit(signature: str, *, cache: bool = True, **options: Any) -> Callable[[Callable[..., Any]], Kernel]:
+def njit(signature: Any, *, cache: bool = True, **options: Any) -> Callable[[Callable[..., Any]], Kernel]:
     """Declares a kernel of that signature; ``options`` are numba's own."""
 
     def declare(function: Callable[..., Any]) -> Kernel:

@@ -92,8 +92,8 @@ class Fields:
     """The surface of a rank has used up the last search for contact."""
     worn = Number()
     """What a rank has found of worn-out tets (elements/wear.py)."""
-    hot = Flag()
-    """A face of a tet has passed the strength by the tet's own stress (elements/hot.py)."""
+    breaking = Number()
+    """What a rank has found of facets that break (fracture/stage.py)."""
     grown = Flag()
     """A rank has more surface nodes than the balance allows it."""
     checkpoint = Flag()

@@ -23,12 +23,14 @@ and at once f(n+1) from it, so a step begins with forces that are already at han
 
 What erosion uncovers takes part in the search of the same step. 12 and 13 are one pass over each chunk of tets (two
 with an averaged pressure, with the exchange of the nodal volumes between them); 14 is started after the border tets
-and finished after the interior ones.
+and finished after the interior ones. Which facets pass the criterion is found before the reduction, which says whether
+any rank has some; which cracks open is found in 8, and they open after the reduction.
 """
 
 import math
 
 from .errors import PhysicsError
+from .fracture.stage import NOTHING, OVERSTRESSED, Fracture
 from .motion import kick, move
 from .parallel import fixed_point
 from .simulation import Simulation
@@ -36,7 +38,7 @@ from .simulation import Simulation
 
 def prepare(sim: Simulation) -> None:
     """Forces and limits of the initial state: a pass over the elements in no time at all."""
-    _elements(sim, 0.0)
+    _elements(sim, 0.0, None)
     if sim.erosion is not None:
         sim.erosion.begin(sim.reduction.limit)
 
@@ -91,23 +93,26 @@ def second_half(sim: Simulation) -> None:
         if sim.contact is not None:
             own = sim.reduction.own
             own.search, own.approach, own.opening = sim.contact.spent(nodes), sim.contact.approach, sim.contact.opening
-    _elements(sim, clock.dt)  # 12 to 14
+    _elements(sim, clock.dt, sim.fracture)  # 12 to 14
     if sim.fracture is not None:
         with sim.timers.phase("fracture"):
-            if sim.reduction.hot:
-                sim.fracture.advance()  # 15: facets break, nodes separate, f(n+1) goes with them
-            else:
-                sim.fracture.rest()
+            sim.fracture.advance(sim.reduction.breaking)  # 15: facets break, nodes separate, f(n+1) goes with them
 
 
-def _elements(sim: Simulation, dt: float) -> None:
-    """12 to 14; repeats the sum of forces in a coarser quantum when they have outgrown the present one."""
+def _elements(sim: Simulation, dt: float, fracture: Fracture | None) -> None:
+    """12 to 14, and which facets break; repeats the sum of forces in a coarser quantum when they have outgrown the
+    present one.
+    """
     elements, reduction, own = sim.elements, sim.reduction, sim.reduction.own
     sim.scale = sim.next_scale()
     with sim.timers.phase("elements"):
         elements.advance(dt, sim.scale)
+    own.breaking = OVERSTRESSED if elements.hot else NOTHING
+    if fracture is not None:
+        with sim.timers.phase("fracture"):
+            own.breaking = fracture.find(reduction.breaking > NOTHING)
     with sim.timers.phase("exchange"):
-        own.limit, own.force, own.worn, own.hot = elements.limit, elements.force, elements.worn, elements.hot
+        own.limit, own.force, own.worn = elements.limit, elements.force, elements.worn
         pending = reduction.begin(sim.comm)
         elements.finish()
         pending.finish()

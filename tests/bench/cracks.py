@@ -20,7 +20,7 @@ from conoid.cases.materials import Material
 from conoid.cases.messages import Energy
 from conoid.cases.schema import Case
 from conoid.worker import domain, simulation, step
-from conoid.worker.fracture import fragments
+from conoid.worker.fracture import connectivity
 from conoid.worker.materials.models import DENSITY
 from conoid.worker.mesh import build
 from conoid.worker.mesh.faces import FACES, areas
@@ -417,7 +417,7 @@ def _fragments(sim: Simulation, cube: float) -> int:
     """Those of a tenth of ``cube``, m^3, and more."""
     assert sim.fracture is not None
     assert sim.fracture.cohesion is not None
-    (labels,) = fragments.labels(sim.model, sim.fracture.cohesion.facets.tets, sim.comm)
+    (labels,) = connectivity.labels(sim.model, sim.fracture.cohesion.facets.tets, sim.comm)
     (block,) = sim.model.blocks
     _, of = np.unique(labels, return_inverse=True)
     return int((np.bincount(of, block.row(MASS)) > 0.1 * cube * block.params[DENSITY]).sum())

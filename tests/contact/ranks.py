@@ -17,6 +17,7 @@ from conoid.worker.parallel.comm import Sent
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
 T = TypeVar("T")
+_TRADE_TAG = 91
 _PATIENCE = 60.0
 """s; a rank that waits longer for another than this has been forgotten by it."""
 
@@ -80,6 +81,14 @@ class ThreadComm:
         self.sent.message(len(others), sum(others))
         rows = self._table(mine)
         return {rank: row[self.rank].copy() for rank, row in enumerate(rows) if len(row.get(self.rank, ()))}
+
+    def trade(self, sends: dict[int, Ints]) -> dict[int, Ints]:
+        for rank, words in sends.items():
+            assert words.dtype == np.int64
+            assert rank != self.rank
+            self._world.box(self.rank, rank, _TRADE_TAG).put(words.reshape(-1).copy())
+        self.sent.message(len(sends), sum(words.nbytes for words in sends.values()))
+        return {rank: self._world.box(rank, self.rank, _TRADE_TAG).get(timeout=_PATIENCE) for rank in sends}
 
     def join(self, words: Ints) -> Ints:
         assert words.dtype == np.int64

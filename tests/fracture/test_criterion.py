@@ -10,9 +10,10 @@ from scipy import stats
 from conoid.cases import materials, schema
 from conoid.worker import state, step
 from conoid.worker.elements import hot, tet4
-from conoid.worker.fracture import bodies, criterion
-from conoid.worker.fracture.bodies import Loaded
-from conoid.worker.fracture.strength import Toughness, toughness
+from conoid.worker.fracture import criterion
+from conoid.worker.fracture.facets import facet_ids
+from conoid.worker.fracture.strength import Toughness, exponent, toughness
+from conoid.worker.fracture.strength import required as required_traction
 from conoid.worker.mesh.faces import FACES
 from conoid.worker.simulation import Simulation
 from conoid.worker.state import CHUNK, MASS, PRESSURE, S_XX, S_XY, VISCOUS, Floats, Ints
@@ -107,7 +108,10 @@ def loaded_sim(sim: Simulation) -> Simulation:
             flat = np.zeros(b.state.shape[0] * CHUNK)
             flat[: b.n] = values
             b.state[:, row, :] = flat.reshape(-1, CHUNK)
-        b.hot[:], b.weakest[:] = 15, 0.0
+        b.hot[:] = 15
+    assert sim.fracture is not None
+    for body in sim.fracture.initiation.bodies:
+        body.facets.strength[:] = 0.0
     return sim
 
 
@@ -115,15 +119,12 @@ def tractions(sim: Simulation) -> dict[int, list[float]]:
     """Of the facets of which this rank has the side of smaller id, by that side: the traction and the effective one."""
     assert sim.fracture is not None
     found: dict[int, list[float]] = {}
-
-    def take(block: state.Block, loaded: Loaded, chosen: "np.ndarray") -> None:
-        ids = bodies.facet_ids(block, loaded.places, loaded.faces)
-        found.update(zip(ids[chosen].tolist(), loaded.traction[chosen].tolist(), strict=True))
-
-    inside, shared = sim.fracture.loaded()
-    for body, near, (remote, at) in zip(sim.fracture._bodies, inside, shared, strict=True):
-        take(body.block, near, np.ones(len(near.places), bool))
-        take(body.block, remote, sim.fracture._far.first[at])
+    initiation = sim.fracture.initiation
+    for body, some in initiation.candidates():
+        first = some.shared < 0
+        first[~first] = initiation.interface.facets.first[some.shared[~first]]
+        ids = facet_ids(body.block, some.place, some.face)
+        found.update(zip(ids[first].tolist(), some.traction[first].tolist(), strict=True))
     return found
 
 
@@ -137,7 +138,7 @@ def test_tractions_are_those_of_numpy_and_the_same_on_any_number_of_ranks(source
     """The mean of both sides, or of the three nodes by volume, without the viscous part, on the outward normal of the
     tet of smaller id, once a facet.
     """
-    mesh, case = block((3, 3, 2), 1e-3, seed=2), case_of(shear_weight=0.7, friction=0.4, traction=source)
+    mesh, case = block((3, 3, 2), 1e-3, seed=2), case_of(delay=0.0, shear_weight=0.7, friction=0.4, traction=source)
     sim = loaded_sim(build(case, [mesh]))
     found = tractions(sim)
     (b,) = sim.model.blocks
@@ -173,27 +174,24 @@ def test_tractions_are_those_of_numpy_and_the_same_on_any_number_of_ranks(source
         assert {key: value for part in parts for key, value in part.items()} == found
 
 
-def test_facets_that_reach_the_weakest_face_of_neither_tet_are_left_out() -> None:
-    """Across ranks the tet here is asked alone."""
-    mesh, case = block((3, 3, 2), 1e-3, seed=2), case_of(shear_weight=0.7, friction=0.4)
+def test_facets_below_their_strength_are_no_candidates() -> None:
+    """On any number of ranks."""
+    mesh, case = block((3, 3, 2), 1e-3, seed=2), case_of(delay=0.0, shear_weight=0.7, friction=0.4)
 
-    def weakened(sim: Simulation) -> Simulation:
-        for b in loaded_sim(sim).model.blocks:
-            b.weakest[:] = 5e7 + 1e8 * np.cos(b.id) ** 2
+    def strengthened(sim: Simulation) -> Simulation:
+        assert loaded_sim(sim).fracture is not None
+        for body in sim.fracture.initiation.bodies if sim.fracture is not None else []:
+            faces = np.broadcast_to(np.arange(4), (body.block.n, 4))
+            ids = facet_ids(body.block, np.arange(body.block.n)[:, None], faces)
+            body.facets.strength[:] = 5e7 + 1e8 * np.cos(ids) ** 2
         return sim
 
-    sim = weakened(build(case, [mesh]))
-    (b,) = sim.model.blocks
-    found, every = tractions(sim), tractions(loaded_sim(build(case, [mesh])))
-    weakest = np.zeros(len(b.id))
-    weakest[b.id] = b.weakest
-    across = {int(4 * i + k): int(b.across[e, k]) // 4 for e, i in enumerate(b.id) for k in range(4)}
-    bounds = {key: (weakest[key // 4], weakest[across[key]]) for key in every}
-    assert found == {key: value for key, value in every.items() if value[3] >= max(bounds[key])}
+    found, every = (tractions(each(build(case, [mesh]))) for each in (strengthened, loaded_sim))
+    assert found == {key: value for key, value in every.items() if value[3] >= 5e7 + 1e8 * np.cos(key) ** 2}
     assert len(every) / 20 < len(found) < len(every) / 2
-    for part in on(3, case, [mesh], lambda sim: tractions(weakened(sim))):
-        assert {key: every[key] for key in part} == part
-        assert all(part[key][3] >= bounds[key][0] for key in part)
+    for ranks in (2, 3, 5):
+        parts = on(ranks, case, [mesh], lambda sim: tractions(strengthened(sim)))
+        assert {key: value for part in parts for key, value in part.items()} == found
 
 
 def test_the_effective_traction_is_that_of_camacho_and_ortiz() -> None:
@@ -254,12 +252,11 @@ def test_strengths_do_not_know_of_order_or_ranks() -> None:
     def strengths(sim: Simulation) -> dict[int, float]:
         assert sim.fracture is not None
         found: dict[int, float] = {}
-        for body in sim.fracture._bodies:
+        for body in sim.fracture.initiation.bodies:
             b = body.block
             place, face = np.nonzero(b.across >= 0)
-            ids = bodies.facet_ids(b, place, face)
-            size = bodies.areas(b.tets, place, face, sim.model.nodes.x0)
-            values = body.tough.strengths(ids, size).tolist()
+            ids = facet_ids(b, place, face)
+            values = body.facets.strength[place, face].tolist()
             for key, value in zip(ids.tolist(), values, strict=True):
                 assert found.setdefault(key, value) == value
             every = np.full((b.n, 4), np.inf)
@@ -277,6 +274,12 @@ def test_strengths_do_not_know_of_order_or_ranks() -> None:
 # The delay
 
 
+def required(made: Toughness, strength: Floats, since: Floats) -> Floats:
+    """(n,) traction, Pa, that breaks facets by the times ``since`` after they first passed their strength."""
+    grown = np.expm1([exponent(s, t, made.delay) for s, t in zip(strength, since, strict=True)])
+    return np.array([required_traction(s, g) for s, g in zip(strength, grown, strict=True)])
+
+
 @pytest.mark.parametrize("factor", [0.5, 1.0])
 def test_the_delay_is_that_of_the_paper(factor: float) -> None:
     """Eq. (3), strength * e^(t / t_c) / (e^(t / t_c) - 1) with t_c = factor * density * c * energy / strength^2."""
@@ -288,9 +291,9 @@ def test_the_delay_is_that_of_the_paper(factor: float) -> None:
     t_c = factor * 2500.0 * c * 20.0 / strength**2
     for share in (0.01, 0.3, 1.0, 5.0):
         grown = np.exp(share)
-        assert made.required(strength, share * t_c) == pytest.approx(strength * grown / (grown - 1.0), rel=1e-12)
-    assert np.isposinf(made.required(strength, np.zeros(3))).all()
-    assert made.required(strength, 100.0 * t_c) == pytest.approx(strength, rel=1e-12)
+        assert required(made, strength, share * t_c) == pytest.approx(strength * grown / (grown - 1.0), rel=1e-12)
+    assert np.isposinf(required(made, strength, np.zeros(3))).all()
+    assert required(made, strength, 100.0 * t_c) == pytest.approx(strength, rel=1e-12)
 
 
 def test_the_delay_comes_from_the_work_on_two_half_spaces() -> None:
@@ -301,7 +304,7 @@ def test_the_delay_comes_from_the_work_on_two_half_spaces() -> None:
     strength, energy = 60e6, 20.0
     critical = 2.0 * energy / strength
     for t in (5e-9, 2e-8, 2e-7):
-        s = float(made.required(np.array([strength]), np.array([t]))[0])
+        s = float(required(made, np.array([strength]), np.array([t]))[0])
         rate = 2.0 * strength / (impedance * critical)
         opening = 2.0 * (s - strength) / impedance * math.expm1(rate * t) / rate
         assert opening == pytest.approx(critical, rel=1e-9)
@@ -309,4 +312,4 @@ def test_the_delay_comes_from_the_work_on_two_half_spaces() -> None:
 
 def test_without_delay_the_strength_is_enough() -> None:
     made = toughness(GLASS, schema.Fracture(delay=0.0), 1e-3)
-    assert made.required(np.array([1.0, 2.0]), np.zeros(2)).tolist() == [1.0, 2.0]
+    assert required(made, np.array([1.0, 2.0]), np.zeros(2)).tolist() == [1.0, 2.0]

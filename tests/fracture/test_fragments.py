@@ -13,7 +13,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from conoid.cases import fragments as tables
-from conoid.worker.fracture import fragments
+from conoid.worker.fracture import connectivity, fragments
 from conoid.worker.mesh.faces import FACES, across
 from conoid.worker.parallel.comm import Comm, SerialComm
 from conoid.worker.state import MASS, Block, Model, Nodes, chunked
@@ -114,7 +114,7 @@ def owners(b: Body, ranks: int, seed: int) -> Ints:
 
 def labels_of(b: Body, owner: Ints, comm: Comm) -> tuple[Model, list[Ints]]:
     model, held = b.rank(owner, comm.rank)
-    return model, fragments.labels(model, held, comm)
+    return model, connectivity.labels(model, held, comm)
 
 
 def table_of(b: Body, ranks: int = 1, seed: int = 0) -> "np.ndarray":
@@ -174,10 +174,10 @@ def test_chains_are_found_in_any_order_of_their_numbers() -> None:
     comb = np.concatenate([np.arange(n // 2), np.arange(n // 2, n)[::-1]]).reshape(2, -1).T.reshape(-1)
     for names in (random.permutation(n), np.arange(n), comb, comb[::-1]):
         path = np.column_stack([names[:-1], names[1:]])
-        assert (fragments.components(n, path) == 0).all()
-        assert len(np.unique(fragments.components(n, np.delete(path, [100, 2000], axis=0)))) == 3
+        assert (connectivity.components(n, path) == 0).all()
+        assert len(np.unique(connectivity.components(n, np.delete(path, [100, 2000], axis=0)))) == 3
     star = np.column_stack([np.full(n - 1, n - 1), np.arange(n - 1)])
-    assert (fragments.components(n, star) == 0).all()
+    assert (connectivity.components(n, star) == 0).all()
 
 
 def test_the_table_is_that_of_plain_sums() -> None:

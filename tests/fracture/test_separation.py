@@ -12,13 +12,12 @@ from scipy.sparse.csgraph import connected_components
 from conoid.cases import materials, schema
 from conoid.worker import step
 from conoid.worker.fracture import stars
-from conoid.worker.fracture.separation import Broken, Separation
+from conoid.worker.fracture.facets import mesh_of
+from conoid.worker.fracture.separation import Separation
 from conoid.worker.mesh.faces import FACES, across
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.parallel.comm import Comm
 from conoid.worker.parallel.fixed_point import exact_sums
-from conoid.worker.parallel.ownership import complete
-from conoid.worker.parallel.tags import Tag
 from conoid.worker.simulation import Simulation
 from conoid.worker.state import BROKEN, INTACT, MASS, Floats, Ints, Model
 
@@ -53,8 +52,15 @@ def test_pieces_are_those_of_scipy(seed: int) -> None:
     rows[:, stars.NODE], rows[:, stars.TET] = mesh.tets[tet, corner], tet
     rows[:, stars.BEHIND :] = behind[4 * tet[:, None] + FACES[corner]]
     rows = np.ascontiguousarray(rows[np.lexsort((rows[:, stars.TET], rows[:, stars.NODE]))])
+    quarters = random.uniform(1.0, 2.0, len(rows))
+    rows[:, stars.MASS], rows[:, stars.RANK] = quarters.view(np.int64), rows[:, stars.TET] % 7
     many = 0
-    label, leaves = stars.pieces(rows)
+    of, labels, nodes, ranks, mass = stars.pieces(rows)
+    assert mass == pytest.approx([0.25 * quarters[of == k].sum() for k in range(len(mass))])
+    assert (np.unique(rows[:, stars.NODE])[nodes] == labels[:, 0]).all()
+    assert (ranks == labels[:, 1] % 7).all()
+    smallest = np.searchsorted(rows[:, stars.NODE], rows[:, stars.NODE])
+    label, leaves = np.where(of < 0, rows[smallest, stars.TET], labels[of, 1]), of >= 0
     for node in range(len(mesh.points)):
         star = np.flatnonzero(rows[:, stars.NODE] == node)
         ids = rows[star, stars.TET]
@@ -131,13 +137,14 @@ def arranged(model: Model) -> None:
 
 
 def break_on(model: Model, separation: Separation, facets: Ints) -> None:
-    broken = {}
+    sides, before = np.full((*facets.shape, 3), -1, np.int32), separation.broken
     for b, part in enumerate(model.blocks):
-        here = np.isin(facets.reshape(-1) // 4, part.id)
+        here = np.isin(facets // 4, part.id)
         order = np.argsort(part.id)
-        places = order[np.searchsorted(part.id[order], facets.reshape(-1)[here] // 4)]
-        broken[b] = Broken(places.astype(np.int32), (facets.reshape(-1)[here] % 4).astype(np.int32))
-    split = separation.break_facets(broken)
+        places = order[np.searchsorted(part.id[order], facets[here] // 4)]
+        sides[here] = np.column_stack([np.full(len(places), b), places, facets[here] % 4])
+    split = separation.break_facets([sides], int((sides[:, 0, 1] >= 0).sum()))
+    assert separation.broken == before + len(facets)
     nodes = model.nodes
     assert (np.diff(nodes.id) > 0).all()
     assert all(
@@ -153,7 +160,8 @@ def cracked(mesh: TetMesh, events: Sequence[Ints], ranks: int) -> Cracked:
     def work(comm: Comm) -> tuple[Model, list[Ints]]:
         piece, model = pieces[comm.rank]
         arranged(model)
-        separation = Separation(model, piece.neighbours, comm)
+        meshes = {b: mesh_of(block) for b, block in enumerate(model.blocks)}
+        separation = Separation(model, piece.neighbours, meshes, comm)
         for facets in events:
             break_on(model, separation, facets)
         return model, [model.nodes.id[other.nodes] for other in piece.neighbours]
@@ -276,6 +284,27 @@ def test_hinges_are_let_go(ranks: int) -> None:
     assert (found.tets[3] == mesh.tets[3]).sum() == 3
 
 
+def test_a_rank_without_touched_nodes_sends_nothing_but_its_presence() -> None:
+    """A facet breaks at one end of a bar: the rank at the other end gives no word to the list of new nodes, and sends
+    an empty message to each rank beside it.
+    """
+    mesh, ranks = block((2, 2, 12), shake=0.0), 3
+    pieces, facets = pieces_of(case_of(), [mesh], ranks), plane(mesh, 1.0)
+
+    def work(comm: Comm) -> tuple[float, int, dict[str, int]]:
+        piece, model = pieces[comm.rank]
+        arranged(model)
+        meshes = {b: mesh_of(block) for b, block in enumerate(model.blocks)}
+        separation = Separation(model, piece.neighbours, meshes, comm)
+        comm.sent.since_last()
+        break_on(model, separation, facets)
+        return float(model.nodes.x0[:, 2].min()), len(piece.neighbours), comm.sent.since_last()
+
+    low, beside, sent = max(on_ranks(ranks, work), key=lambda found: found[0])
+    assert low > 2.0
+    assert sent == {"messages": beside, "bytes": 0, "collectives": 2, "collective_bytes": 8}
+
+
 # In the time step
 
 
@@ -284,6 +313,36 @@ def pulled(**fracture: object) -> schema.Case:
     part = {"stretch": schema.Stretch(rate=(0.0, 0.0, 3e4), centre=(0.0, 0.0, 2e-3)), "jitter": 3.0,
             "fracture": schema.Fracture(**fracture)}  # type: ignore[arg-type]  # fmt: skip
     return meeting_of([part], material=BRITTLE, end=1.0)
+
+
+@pytest.mark.parametrize("model", ["instant", "cohesive"])
+@pytest.mark.parametrize("form", ["standard", "split"])
+def test_a_step_in_which_nothing_breaks_costs_no_collective_of_its_own(model: str, form: str) -> None:
+    """Faces are overstressed and their clocks run, but the reduction of the step says that nothing breaks."""
+    mesh = block((2, 2, 4), 1e-3, seed=5)
+    case = pulled(model=model, delay=1e3)
+    case = case.model_copy(update={"contact": None})
+    case = case.model_copy(update={"numerics": case.numerics.model_copy(update={"pressure": form})})
+
+    def work(sim: Simulation) -> tuple[list[int], int]:
+        assert sim.fracture is not None
+        step.prepare(sim)
+        agreed, counts = list[int](), list[int]()
+        for _ in range(STEPS):
+            step.first_half(sim)
+            sim.comm.sent.since_last()
+            step.second_half(sim)
+            agreed.append(sim.reduction.breaking)
+            counts.append(sim.comm.sent.since_last()["collectives"])
+        quiet = [
+            count for before, now, count in zip(agreed, agreed[1:], counts[1:], strict=False) if before == now == 1
+        ]
+        return quiet, sim.fracture.broken
+
+    for quiet, broken in on(3, case, [mesh], work):
+        assert broken == 0
+        assert len(quiet) > 10
+        assert set(quiet) == {1}
 
 
 @pytest.mark.parametrize("model", ["instant", "cohesive"])
@@ -309,13 +368,10 @@ def test_forces_are_those_of_the_tets_after_every_event(model: str, form: str) -
             if sim.model.nodes_global == grown:
                 continue
             grown = sim.model.nodes_global
-            forces = np.zeros_like(nodes.force)
-            for part in sim.model.blocks:
-                np.add.at(forces, part.tets, sim.elements.forces_of(part, np.arange(part.n), nodes.scale))
-            if sim.fracture.cohesion is not None:
-                sim.fracture.cohesion.scatter(forces, nodes.scale)
-            complete(sim.comm, sim.fracture._neighbours, forces, Tag.FORCE)
-            assert (forces == nodes.force).all()
+            handed = nodes.force.copy()
+            sim.elements.again(nodes.scale)
+            sim.elements.finish()
+            assert (handed == nodes.force).all()
             assert len(sim.elements.pressure) == (nodes.n if sim.elements.split else 1)
         size = float(np.abs(exact_sums(sim.comm, np.abs(nodes.mass[:, None] * nodes.v)[nodes.owned])).max())
         assert np.abs(momentum(sim) - before).max() < 1e-13 * size

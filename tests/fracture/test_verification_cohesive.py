@@ -11,7 +11,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from conoid.worker.fracture.cohesive import Cohesion, Facets, inserted, sizes
+from conoid.worker.fracture.cohesive import Cohesion, Facets, sizes
+from conoid.worker.fracture.insertion import inserted
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.state import Nodes
 

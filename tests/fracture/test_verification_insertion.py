@@ -78,11 +78,11 @@ def test_a_cohesive_facet_that_breaks_leaves_the_acceleration_as_it_is() -> None
     cohesion, advance = fracture.cohesion, fracture.advance
     jumps, alone = list[float](), list[float]()
 
-    def watched() -> None:
+    def watched(agreed: int) -> None:
         nodes, broken = sim.model.nodes, fracture.broken
         before = nodes.force / (nodes.scale * nodes.mass[:, None])
         x = nodes.x.copy()
-        advance()
+        advance(agreed)
         if fracture.broken == broken:
             return
         after = nodes.force / (nodes.scale * nodes.mass[:, None])

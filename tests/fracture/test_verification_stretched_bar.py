@@ -11,7 +11,7 @@ import pytest
 
 from conoid.cases import load
 from conoid.worker import simulation
-from conoid.worker.fracture import fragments
+from conoid.worker.fracture import connectivity
 from conoid.worker.parallel.comm import SerialComm
 
 from ..worker.kernels import run
@@ -51,7 +51,7 @@ def sizes(x: float, length: float, layers: int, end: float, seed: int) -> float:
     sim = run(simulation.build(load.parse_toml(text), Path(), SerialComm()))
     assert sim.fracture is not None
     assert sim.fracture.cohesion is not None
-    found = fragments.labels(sim.model, sim.fracture.cohesion.facets.tets, sim.comm)
+    found = connectivity.labels(sim.model, sim.fracture.cohesion.facets.tets, sim.comm)
     _, tets = np.unique(np.concatenate(found), return_counts=True)
     return length / float(np.count_nonzero(tets >= 10))
 

@@ -19,11 +19,13 @@ RANKS = 3
 KNOWN = {
     "exchange": (4, 4 * 5 * 3 * 8, 0, 0),
     "swap": (1, 7 * 8, 1, RANKS * 8),
+    "trade": (2, 3 * 8, 0, 0),
     "sum": (0, 0, 1, 72),
     "maximum": (0, 0, 1, 16),
     "begin_maximum": (0, 0, 1, 72),
 }
-"""Messages, their bytes, collectives and what a rank gives to them; nothing is sent to itself, nor an empty message."""
+"""Messages, their bytes, collectives and what a rank gives to them; nothing is sent to itself; an empty message
+is sent by ``trade`` alone."""
 OBJECTS = {"share": (0, 0, 2, len(pickle.dumps(bytes(1000), pickle.HIGHEST_PROTOCOL))), "barrier": (0, 0, 1, 0)}
 
 

@@ -103,22 +103,6 @@ class Elements:
             largest = self.cohesion.scatter(nodes.force, scale)
             self.peaks[sweep.LARGEST_FORCE] = max(int(self.peaks[sweep.LARGEST_FORCE]), largest)
 
-    def forces_of(self, block: Block, places: Ints, scale: float) -> Ints:
-        """(k, 4, 3) forces of the present stress of some tets on their nodes, in quanta of 1 / ``scale`` N."""
-        forces = np.empty((len(places), 4, 3), np.int64)
-        state = np.zeros((block.state.shape[1], CHUNK))
-        for start in range(0, len(places), CHUNK):
-            chosen = places[start : start + CHUNK]
-            n = len(chosen)
-            state[:, :n] = block.state[chosen // CHUNK, :, chosen % CHUNK].T
-            tets, flat = np.ascontiguousarray(block.tets[chosen]), state.reshape(-1)
-            tet4.gather(self._w[tet4.EDGE :], self.model.nodes.x, tets, n)
-            tet4.end_gradients(self._w, n)
-            tet4.internal_forces(self._wi, self._w, flat, n, scale)
-            forces[start : start + n, 1:] = self._wi.reshape(3, 3, CHUNK)[:, :, :n].transpose(2, 0, 1)
-        forces[:, 0] = -forces[:, 1:].sum(axis=1)
-        return forces
-
     def grow(self, copies: Copies) -> None:
         """Takes up copies of nodes; they are shared already."""
         if not self.shared_forces.serves(self._neighbours):

@@ -30,6 +30,7 @@ from ..migration.parcel import Parcel
 from ..parallel.comm import Comm
 from ..parallel.fixed_point import Tally, exact_sums
 from ..state import Floats, Indices, Ints, Nodes, extended
+from ..topology import Split
 
 _F2, _F3 = "float64[:, ::1]", "float64[:, :, ::1]"
 
@@ -87,6 +88,15 @@ class Cohesion:
         """Takes up facets that have just broken."""
         for column, mine, rows in zip(fields(Facets), self.facets.columns(), new.columns(), strict=True):
             setattr(self.facets, column.name, extended(mine, rows))
+
+    def follow(self, split: Split, ids: Ints) -> Ints:
+        """Takes up the copies of a split; ``ids``: of the local nodes. Returns the rows of facets that hang on a parent
+        or a copy.
+        """
+        f = self.facets
+        moved: Ints = _touching(f.nodes, split.copies.parents, len(ids))
+        f.nodes[moved] = split.followed_sides(f.nodes[moved], ids, f.tets[moved])
+        return moved
 
     def open(self, x: Floats) -> None:
         """Openings, tractions and work at the positions ``x`` (nodes, 3); what has failed is let go."""
@@ -216,33 +226,27 @@ def _scatter(force, nodes, pull, scale):  # type: ignore[no-untyped-def]
     return peak
 
 
-def inserted(
-    nodes: Nodes, before: Indices, after: Indices, tets: Ints, traction: Floats, effective: Floats, energy: Floats,
-    weight: Floats, stiffness: Floats, area: Floats,
-) -> Facets:  # fmt: skip
-    """New facets at the present positions.
+@njit(f"void(int64[:, ::1], int64, int32[:, ::1], {_F3}, float64)", cache=True)
+def scatter_copies(change, first, nodes, pull, scale):  # type: ignore[no-untyped-def]
+    """Adds the forces ``pull`` on facets ``nodes`` (m, 6), in quanta, to the rows of nodes from ``first`` on."""
+    for m in range(len(nodes)):
+        for k in range(6):
+            if nodes[m, k] >= first:
+                for i in range(3):
+                    force = np.int64(np.rint(pull[m, k % 3, i] * scale))
+                    change[nodes[m, k] - first, i] += force if k < 3 else -force
 
-    ``before`` and ``after`` (m, 6): nodes of the first side and across, before and after they have separated;
-    ``traction`` (m, 3) on the outward normal of the first side and its ``effective`` size (m,), Pa; ``weight`` of
-    shear; ``stiffness`` (m,) that the time step allows, Pa/m.
-    """
-    frame = frames(nodes.x, before)
-    along = np.einsum("mci,mi->mc", frame, traction)
-    along[:, 0] = np.maximum(along[:, 0], 0.0)
-    shear = 1.0 / weight
-    # T = strength / e (<d_n> n + b^2 d_t) is the traction where d_n = e t_n / strength, d_t = e t_t / (b^2 strength);
-    # under pressure the effective traction counts the shear that friction leaves.
-    e = np.maximum(1.0, shear) * effective / stiffness
-    pressed = along[:, 0] == 0.0
-    across = np.hypot(along[:, 1], along[:, 2])
-    held = np.where(pressed, effective * np.sqrt(shear) / np.where(across > 0.0, across, 1.0), 1.0)
-    offset = (e / effective)[:, None] * along
-    offset[:, 1:] *= (held / shear)[:, None]
-    m = len(area)
-    size = np.repeat(sizes(offset, shear)[:, None], 3, axis=1)
-    carried = along * np.stack([np.ones(m), held, held], axis=1)
-    force = (area / 3.0)[:, None] * np.einsum("mci,mc->mi", frame, carried)
-    return Facets(
-        tets, after, effective, 2.0 * energy / effective, area, shear, offset, size.copy(), size,
-        np.zeros((m, 3, 3)), np.repeat(force[:, None, :], 3, axis=1), np.zeros(m),
-    )  # fmt: skip
+
+@njit("int64[::1](int32[:, ::1], int64[::1], int64)", cache=True)
+def _touching(table, some, n):  # type: ignore[no-untyped-def]
+    """Rows of ``table`` (m, 6) with one of ``some`` of the ``n`` nodes."""
+    flags, rows, found = np.zeros(n, np.bool_), np.empty(len(table), np.int64), 0
+    for a in some:
+        flags[a] = True
+    for i in range(len(table)):
+        for k in range(table.shape[1]):
+            if flags[table[i, k]]:
+                rows[found] = i
+                found += 1
+                break
+    return rows[:found].copy()

@@ -2,30 +2,30 @@
 
 A facet breaks by sqrt(<t_n>^2 + w t_s^2), with the Macaulay bracket that the paper's eq. (1) lacks, and under pressure
 by sqrt(w) <t_s - mu |t_n|> (Camacho and Ortiz 1996). Both are bounded by the first form, which is convex: the mean of
-two tractions passes only where one of them does. So the pass over the elements marks each tet's own faces that pass,
-and only facets with such a face are looked at. Of those, only the ones whose mean traction reaches the weakest face of
-the tets on either side can pass, and only they are told: strengths are computed for few.
+two tractions passes only where one of them does. So the pass over the elements marks each tet's own overstressed faces
+(elements/hot.py), and only their facets are looked at: those whose mean traction reaches their strength are candidates.
 """
 
 import numpy as np
 
-from ..jit import njit
+from ..jit import njit, types
 from ..mesh.faces import FACES
 from ..state import CHUNK, INTACT, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ
+from .records import CANDIDATES, INTERFACE, LAW, MESH, POINTS, TABLE
+from .strength import exponent, required
 
 _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _P = PRESSURE * CHUNK
-_NEAR = 1.0 - 1e-12
-"""Of the weakest strength: a facet's own is computed anew with other nodes once they have separated, and may round
-otherwise; both of its sides must tell it all the same.
-"""
+_FAR = 1.0 + 1e-9
+"""More than the rounding of expm1 here and in numpy, whose bits decide."""
+_I1, _F1 = types.int64[::1], types.float64[::1]
 
 
-@njit("void(float64[::1], float64[::1], int64, int64, float64[::1])", cache=True)
-def traction(t, state, rows, e, normal):  # type: ignore[no-untyped-def]
+@njit(types.void(_F1, MESH, types.int64, _F1), cache=True)
+def traction(t, mesh, e, normal):  # type: ignore[no-untyped-def]
     """``t`` (3,): stress of tet ``e`` without the viscous part times ``normal``, Pa."""
-    at = (e // CHUNK) * rows * CHUNK + e % CHUNK
+    state, at = mesh.state, (e // CHUNK) * mesh.columns * CHUNK + e % CHUNK
     p = state[at + _P]
     xx, yy, zz = state[at + _SXX] - p, state[at + _SYY] - p, state[at + _SZZ] - p
     yz, zx, xy = state[at + _SYZ], state[at + _SZX], state[at + _SXY]
@@ -35,7 +35,7 @@ def traction(t, state, rows, e, normal):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64[::1], float64[:, ::1], uint32[::1], int64)", cache=True, error_model="numpy")
 def outward(normal, x, tet, face):  # type: ignore[no-untyped-def]
-    """Unit normal of a face of a tet, out of it, from the present positions; returns the area, m^2.
+    """Unit normal of a face of a tet, out of it, at the positions ``x``; returns the area, m^2.
 
     Computed in the order of the nodes' ids, so that the two sides have the same bits with opposite signs.
     """
@@ -56,6 +56,15 @@ def outward(normal, x, tet, face):  # type: ignore[no-untyped-def]
     return 0.5 * length
 
 
+@njit(types.float64[::1](types.uint32[:, ::1], _I1, _I1, POINTS), cache=True, error_model="numpy")
+def areas(tets, places, faces, x):  # type: ignore[no-untyped-def]
+    """(m,) areas of faces, m^2: the same bits from either side."""
+    out, normal = np.empty(len(places)), np.empty(3)
+    for m in range(len(places)):
+        out[m] = outward(normal, x, tets[places[m]], faces[m])
+    return out
+
+
 @njit("float64(float64[::1], float64[::1], float64, float64)", cache=True)
 def effective(t, normal, weight, friction):  # type: ignore[no-untyped-def]
     """The effective traction, Pa, of a traction ``t`` on a facet."""
@@ -66,83 +75,127 @@ def effective(t, normal, weight, friction):  # type: ignore[no-untyped-def]
     return np.sqrt(weight) * max(np.sqrt(across) + friction * along, 0.0)
 
 
-@njit(
-    "int64(int32[:, ::1], float64[:, ::1], int64[::1], uint8[::1], uint8[:, ::1], int32[:, ::1], int32[:, ::1], "
-    "int64[::1], uint32[:, ::1], float64[::1], float64[:, ::1], float64[::1], int64, float64, float64)",
-    cache=True,
-)
-def look(out, tractions, chosen, hot, bond, across, beside, ids, tets, state, x, weakest, rows, weight, friction):  # type: ignore[no-untyped-def]
-    """Tractions on the intact facets within this rank that have a hot face, of the tets at ``chosen``, and reach what
-    is ``weakest`` (tets,), Pa, on either side.
-
-    Fills ``out`` (m, 2), place and face on the side of the smaller tet id, and ``tractions`` (m, 4), the vector on that
-    side's outward normal and the effective traction, Pa; returns how many there are.
+@njit(types.int64(CANDIDATES, types.int64, types.int64, types.uint8[::1], MESH, TABLE, POINTS, LAW), cache=True)
+def _of_tet(out, n, e, hot, mesh, table, x, law):  # type: ignore[no-untyped-def]
+    """Adds the candidates among the facets of tet ``e`` to the ``n`` of ``out``, as long as there is room; returns the
+    new number.
     """
-    n = 0
     normal, one, two = np.empty(3), np.empty(3), np.empty(3)
-    for e in chosen:
-        for k in range(4):
-            if not (hot[e] >> k) & 1 or bond[e, k] != INTACT or beside[e, k] < 0:
-                continue
-            other, far = beside[e, k], across[e, k] % 4
-            first = ids[e] < ids[other]
-            if not first and (hot[other] >> far) & 1:
-                continue
-            a, b, face = (e, other, k) if first else (other, e, far)
-            outward(normal, x, tets[a], face)
-            traction(one, state, rows, a, normal)
-            traction(two, state, rows, b, normal)
-            for i in range(3):
-                one[i] = 0.5 * (one[i] + two[i])
-                tractions[n, i] = one[i]
-            out[n, 0], out[n, 1] = a, face
-            tractions[n, 3] = effective(one, normal, weight, friction)
-            n += tractions[n, 3] >= _NEAR * max(weakest[a], weakest[b])
-    return n
-
-
-@njit(
-    "void(float64[:, ::1], int64[::1], int32[:, ::1], boolean[::1], uint8[:, ::1], uint32[:, ::1], float64[::1], "
-    "float64[:, ::1], int64)",
-    cache=True,
-)
-def own_tractions(tractions, chosen, sides, first, bond, tets, state, x, rows):  # type: ignore[no-untyped-def]
-    """``tractions`` (m, 3), Pa, of this rank's tets on the intact ones of the ``chosen`` facets, which it shares with
-    another rank, on the outward normal of the side of the smaller tet id. ``sides`` (m, 2): place and face; ``first``
-    (m,): whether that side is this one.
-    """
-    normal = np.empty(3)
-    for m in chosen:
-        if bond[sides[m, 0], sides[m, 1]] == INTACT:
-            outward(normal, x, tets[sides[m, 0]], sides[m, 1])
-            if not first[m]:
-                normal *= -1.0
-            traction(tractions[m], state, rows, sides[m, 0], normal)
-
-
-@njit(
-    "int64(int64[::1], float64[:, ::1], int64[::1], float64[:, ::1], float64[:, ::1], int32[:, ::1], boolean[::1], "
-    "uint8[:, ::1], uint32[:, ::1], float64[:, ::1], float64[::1], float64, float64)",
-    cache=True,
-)
-def meet(out, tractions, chosen, own, theirs, sides, first, bond, tets, x, weakest, weight, friction):  # type: ignore[no-untyped-def]
-    """Means of this rank's ``own`` (m, 3) tractions and ``theirs``, with the effective ones, Pa, on those of the
-    ``chosen`` facets that are intact and where they reach what is ``weakest`` (tets,) on this side.
-
-    Fills ``out``, which of the m they are, and ``tractions`` (., 4); returns how many there are.
-    """
-    n = 0
-    normal = np.empty(3)
-    for m in chosen:
-        e = sides[m, 0]
-        if bond[e, sides[m, 1]] != INTACT:
+    for k in range(4):
+        if not (hot[e] & mesh.intact[e]) >> k & 1:
             continue
-        outward(normal, x, tets[e], sides[m, 1])
-        if not first[m]:
-            normal *= -1.0
+        other, far = mesh.beside[e, k], mesh.across[e, k] % 4
+        first = mesh.id[e] < mesh.id[other]
+        if not first and (hot[other] >> far) & 1:
+            continue
+        a, b, face = (e, other, k) if first else (other, e, far)
+        outward(normal, x, mesh.tets[a], face)
+        traction(one, mesh, a, normal)
+        traction(two, mesh, b, normal)
         for i in range(3):
-            tractions[n, i] = 0.5 * (own[m, i] + theirs[m, i])
-        tractions[n, 3] = effective(tractions[n, :3], normal, weight, friction)
-        out[n] = m
-        n += tractions[n, 3] >= _NEAR * weakest[e]
+            one[i] = 0.5 * (one[i] + two[i])
+        size = effective(one, normal, law.weight, law.friction)
+        if size >= table.strength[a, face]:
+            if n < len(out.place):
+                out.place[n], out.face[n], out.shared[n] = a, face, -1
+                out.traction[n, 0], out.traction[n, 1], out.traction[n, 2] = one[0], one[1], one[2]
+                out.traction[n, 3] = size
+            n += 1
     return n
+
+
+@njit(types.int64(CANDIDATES, types.uint8[::1], MESH, TABLE, POINTS, LAW), cache=True)
+def within(out, hot, mesh, table, x, law):  # type: ignore[no-untyped-def]
+    """Fills ``out`` with the candidates within this rank; returns how many there are, be there room for them or not.
+
+    ``hot`` (tets,): bit k for an overstressed face k, read by eights; ``x``: present positions.
+    """
+    n, words = 0, len(hot) // 8
+    one, two = hot[: 8 * words].view(np.uint64), mesh.intact[: 8 * words].view(np.uint64)
+    for w in range(words + 1):
+        if w == words or one[w] & two[w]:
+            for e in range(8 * w, min(8 * w + 8, len(hot))):
+                if hot[e] & mesh.intact[e]:
+                    n = _of_tet(out, n, e, hot, mesh, table, x, law)
+    return n
+
+
+@njit(types.void(INTERFACE, _I1, MESH, POINTS), cache=True)
+def own_tractions(shared, chosen, mesh, x):  # type: ignore[no-untyped-def]
+    """Tractions of this rank's tets on the intact ones of the ``chosen`` shared facets, those of one body."""
+    normal = np.empty(3)
+    for m in chosen:
+        e, face = shared.sides[m, 0], shared.sides[m, 1]
+        if mesh.bond[e, face] == INTACT:
+            outward(normal, x, mesh.tets[e], face)
+            if not shared.first[m]:
+                normal *= -1.0
+            traction(shared.own[m], mesh, e, normal)
+
+
+@njit(types.int64(CANDIDATES, types.int64, INTERFACE, _I1, MESH, TABLE, POINTS, LAW), cache=True)
+def across(out, n, shared, chosen, mesh, table, x, law):  # type: ignore[no-untyped-def]
+    """Adds the candidates among the ``chosen`` shared facets, those of one body, to the ``n`` of ``out``, by the mean
+    of both ranks' tractions. Returns the new number.
+    """
+    normal, mean, bound = np.empty(3), np.empty(3), max(1.0, law.weight) * (1.0 + 1e-9)
+    for m in chosen:
+        e, face = shared.sides[m, 0], shared.sides[m, 1]
+        square, strength = 0.0, table.strength[e, face]
+        for i in range(3):
+            mean[i] = 0.5 * (shared.own[m, i] + shared.theirs[m, i])
+            square += mean[i] * mean[i]
+        if mesh.bond[e, face] != INTACT or bound * square < strength * strength:
+            continue
+        outward(normal, x, mesh.tets[e], face)
+        if not shared.first[m]:
+            normal *= -1.0
+        size = effective(mean, normal, law.weight, law.friction)
+        if size >= strength:
+            out.place[n], out.face[n], out.shared[n] = e, face, m
+            out.traction[n, 0], out.traction[n, 1], out.traction[n, 2] = mean[0], mean[1], mean[2]
+            out.traction[n, 3] = size
+            n += 1
+    return n
+
+
+@njit(types.int64(CANDIDATES, types.int64, TABLE, LAW, types.int64, types.float64), cache=True, error_model="numpy")
+def clock(found, n, table, law, step, t):  # type: ignore[no-untyped-def]
+    """Sets the clocks and exponents of the ``n`` candidates, and moves those to the front that may break by the delayed
+    criterion; returns their number.
+
+    The clock of an overstressed facet goes on if the last step, of number ``step`` - 1, had started or kept it, else
+    starts at the time ``t``. With nodal tractions some candidates are not overstressed.
+    """
+    m = 0
+    for i in range(n):
+        place, face = found.place[i], found.face[i]
+        strength = table.strength[place, face]
+        if found.traction[i, 3] >= strength:
+            if table.seen[place, face] != step - 1:
+                table.since[place, face] = t
+            table.seen[place, face] = step
+            power = exponent(strength, t - table.since[place, face], law.delay)
+            if found.traction[i, 3] * _FAR >= required(strength, np.expm1(power)):
+                found.place[m], found.face[m], found.shared[m] = place, face, found.shared[i]
+                found.traction[m] = found.traction[i]
+                found.exponent[m] = power
+                m += 1
+    return m
+
+
+@njit(
+    types.int64(
+        CANDIDATES, types.uint8[::1], INTERFACE, _I1, MESH, TABLE, POINTS, LAW, types.int64, types.float64
+    ),
+    cache=True,
+)  # fmt: skip
+def search(out, hot, shared, chosen, mesh, table, x, law, step, t):  # type: ignore[no-untyped-def]
+    """The candidates of a body that may break by their clocks in the step of this number, 0: all candidates. Returns
+    how many they are, or the room that they need at most where there is too little.
+    """
+    n = within(out, hot, mesh, table, x, law)
+    if n + len(chosen) <= len(out.place):
+        n = across(out, n, shared, chosen, mesh, table, x, law)
+        return clock(out, n, table, law, step, t) if step > 0 else n
+    return n + len(chosen)

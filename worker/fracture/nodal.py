@@ -2,19 +2,20 @@
 
 Each node has the mean stress of the tets that hang on it, weighted with their initial volumes; sums of integers, so
 that both sides of a facet, on whichever ranks, find the same traction. A facet must pass by its two tets as well: only
-such facets are looked at (elements/hot.py).
+such facets are candidates (criterion.py).
 """
 
 import numpy as np
 
-from ..jit import njit
+from ..jit import njit, types
 from ..mesh.faces import FACES
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, complete
 from ..parallel.tags import Tag
 from ..state import CHUNK, MASS, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, Flags, Floats, Nodes
-from .bodies import Body, Loaded
 from .criterion import effective, outward
+from .facets import Body
+from .records import CANDIDATES, INTERFACE, MESH, POINTS, Candidates, InterfaceFacets
 from .stars import Stars
 
 _QUANTA = 2.0**30
@@ -42,24 +43,27 @@ def stresses(
     for other in neighbours:
         wanted[other.nodes] = True
     for body, star in bodies:
-        block, k = body.block, body.block.part
+        k = body.block.part
         strength[k] = body.tough.strength
         some = np.flatnonzero(wanted & (nodes.part == k))
         _add(
-            sums, some, star.first, star.count, star.pool, block.state.reshape(-1), block.state.shape[1],
-            _QUANTA / strength[k], _QUANTA / heaviest[k],
+            sums, some, star.first, star.count, star.pool, body.mesh, _QUANTA / strength[k], _QUANTA / heaviest[k]
         )  # fmt: skip
     complete(comm, neighbours, sums, Tag.NODAL_STRESS)
     return np.asarray(sums[:, :6] / np.maximum(sums[:, 6:], 1) * strength[nodes.part][:, None])
 
 
 @njit(
-    "void(int64[:, ::1], int64[::1], int32[::1], int32[::1], int32[::1], float64[::1], int64, float64, float64)",
+    types.void(
+        types.int64[:, ::1], types.int64[::1], types.int32[::1], types.int32[::1], types.int32[::1], MESH,
+        types.float64, types.float64,
+    ),
     cache=True,
     error_model="numpy",
-)
-def _add(sums, nodes, first, count, pool, state, rows, of_stress, of_mass):  # type: ignore[no-untyped-def]
+)  # fmt: skip
+def _add(sums, nodes, first, count, pool, mesh, of_stress, of_mass):  # type: ignore[no-untyped-def]
     """Adds the stresses of the stars of ``nodes`` times their masses, and the masses, to ``sums``."""
+    state, rows = mesh.state, mesh.columns
     for a in nodes:
         for e in pool[first[a] : first[a] + count[a]]:
             at = (e // CHUNK) * rows * CHUNK + e % CHUNK
@@ -74,32 +78,23 @@ def _add(sums, nodes, first, count, pool, state, rows, of_stress, of_mass):  # t
             sums[a, 6] += np.int64(weight)
 
 
-def replace(loaded: Loaded, first: Flags, body: Body, stress: Floats, x: Floats) -> None:
-    """The tractions of facets of ``body`` from the ``stress`` (nodes, 6) of their nodes, made as
-    small as the effective one of the two tets where they pass it. ``first`` (m,): whether the places are on the side of
-    the smaller tet id.
+def replace(found: Candidates, shared: InterfaceFacets, body: Body, stress: Floats, x: Floats) -> None:
+    """The tractions of candidates of ``body`` from the ``stress`` (nodes, 6) of their nodes, made as small as the
+    effective one of the two tets where they pass it; at the positions ``x`` (nodes, 3).
     """
-    block = body.block
-    _tractions(
-        loaded.traction, loaded.places, loaded.faces, first, block.tets, stress, x, block.shear_weight,
-        body.spec.friction,
-    )  # fmt: skip
+    _replace(found, shared, body.mesh, stress, x, body.block.shear_weight, body.spec.friction)
 
 
-@njit(
-    "void(float64[:, ::1], int32[::1], int32[::1], boolean[::1], uint32[:, ::1], float64[:, ::1], float64[:, ::1], "
-    "float64, float64)",
-    cache=True,
-)
-def _tractions(out, places, faces, first, tets, stress, x, weight, friction):  # type: ignore[no-untyped-def]
-    normal = np.empty(3)
-    for m in range(len(places)):
-        tet = tets[places[m]]
-        outward(normal, x, tet, faces[m])
-        if not first[m]:
+@njit(types.void(CANDIDATES, INTERFACE, MESH, POINTS, POINTS, types.float64, types.float64), cache=True)
+def _replace(found, shared, mesh, stress, x, weight, friction):  # type: ignore[no-untyped-def]
+    normal, out = np.empty(3), found.traction
+    for m in range(len(found.place)):
+        tet, face, row = mesh.tets[found.place[m]], found.face[m], found.shared[m]
+        outward(normal, x, tet, face)
+        if row >= 0 and not shared.first[row]:
             normal *= -1.0
         out[m, :3] = 0.0
-        for a in np.sort(tet[FACES[faces[m]]]):
+        for a in np.sort(tet[FACES[face]]):
             s = stress[a]
             out[m, 0] += s[0] * normal[0] + s[5] * normal[1] + s[4] * normal[2]
             out[m, 1] += s[5] * normal[0] + s[1] * normal[1] + s[3] * normal[2]

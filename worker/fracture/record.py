@@ -10,7 +10,7 @@ from conoid.cases import fragments as tables
 from ..migration.parcel import Parcel, length
 from ..parallel.comm import Comm
 from ..state import Ints, Model
-from . import fragments
+from . import connectivity, fragments
 from .stage import Fracture
 
 
@@ -45,7 +45,7 @@ class Record:
         """Finds the fragments as they are."""
         cohesion = self._fracture.cohesion
         held = cohesion.facets.tets if cohesion is not None else np.zeros((0, 2), np.int64)
-        self.labels = fragments.labels(self._model, held, self._comm)
+        self.labels = connectivity.labels(self._model, held, self._comm)
         self.count = len(np.unique(np.concatenate(self._comm.share(np.unique(_flat(self.labels))))))
 
     def write(self, folder: Path, index: int, t: float) -> None:

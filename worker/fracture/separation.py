@@ -1,165 +1,194 @@
 """Node separation: what breaks in a step becomes copies of nodes, numbered alike on any number of ranks.
 
-Every rank that holds a node holds all its copies, too: the nodal sums that it completes with the others then reach both
-sides of a facet, whichever rank computes them. Each holder learns the whole star of a touched node from the others and
-cuts it by itself. The new ids follow from a list of all pieces of all ranks, sorted by the id of the node and the
-smallest tet of the piece (the paper's eqs 17 and 18 count per rank, so that ids would depend on the ranks).
-"""
+Every rank that holds a node holds all its copies, too: the nodal sums that it completes with the others then reach
+both sides of a facet, whichever rank computes them. Each holder receives the rest of the star of a touched node from
+the others and cuts it by itself. The new ids follow from a list of all pieces of all ranks, sorted by the id of the
+node and the smallest tet of the piece (the paper's eqs 17 and 18 count per rank: ids would depend on the ranks).
 
-from dataclasses import dataclass
+Ranks that share touched nodes exchange what they have of them; a rank without such nodes only takes part in that list.
+"""
 
 import numpy as np
 
+from ..jit import njit, types
 from ..mesh.faces import FACES
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
-from ..state import BROKEN, Copies, Flags, Indices, Ints, Model, extended
+from ..state import BROKEN, Copies, Indices, Ints, Model, extended
 from ..topology import KEY, Split, keys
 from . import stars
+from .records import MESH, Mesh, several
 from .stars import Stars
 
+_I1, _I2, _N1 = types.int64[::1], types.int64[:, ::1], types.int32[::1]
 
-@dataclass
-class Broken:
-    """Facets of one block that break, as this rank's tets have them."""
-
-    places: Indices
-    """(m,) of tets; both sides when both are here."""
-    faces: Indices
-    """(m,) local faces."""
+_NO_NODES, _NO_ROWS = np.zeros(0, np.int64), np.zeros((0, stars.COLUMNS), np.int64)
+_NO_PIECES = stars.pieces(_NO_ROWS)
 
 
 class Separation:
     """The topology of the parts that fracture, on one rank."""
 
-    def __init__(self, model: Model, neighbours: list[Neighbour], comm: Comm) -> None:
+    def __init__(self, model: Model, neighbours: list[Neighbour], meshes: dict[int, Mesh], comm: Comm) -> None:
+        """``meshes``: of the parts that fracture, by index of the block."""
         self._model, self._neighbours, self._comm = model, neighbours, comm
-        n = model.nodes.n
-        self.stars = {b: Stars(block.tets, n) for b, block in enumerate(model.blocks) if len(block.bond)}
+        self.stars = {b: Stars(mesh.tets, model.nodes.n) for b, mesh in meshes.items()}
         """By index of the block."""
-        self._block_of = np.full(len(model.parts), -1, np.int32)
-        for b, block in enumerate(model.blocks):
-            self._block_of[block.part] = b
+        self._meshes = meshes
+        self.broken = 0
+        """Facets of all ranks that have broken."""
 
-    def break_facets(self, broken: dict[int, Broken]) -> Split | None:
-        """Breaks facets, by index of their block, and separates nodes; None where no node of any rank does.
+    def break_facets(self, broken: list[Indices], count: int) -> Split | None:
+        """Breaks facets and separates nodes; None where no node of any rank does.
 
-        All ranks take part. Connectivity, masses, shared nodes and bonds are changed; forces are left to the caller.
+        ``broken``: tables (m, 2, 3) of block, place and face of either side, -1 for one of another rank; ``count``:
+        facets of which this rank has the first side. All ranks take part. Connectivity, masses, shared nodes and bonds
+        are changed; forces are left to the caller.
         """
-        touched = self._touched(broken)
+        model, touched = self._model, self._touched(broken)
         rows, places = self._stars(touched)
-        label, leaving = stars.pieces(rows)
-        mine = np.column_stack(np.divmod(np.unique(keys(rows[leaving, stars.NODE], label[leaving])), KEY))
-        every = self._number(mine)
+        of, mine, node, owner, mass = stars.pieces(rows) if len(touched) else _NO_PIECES
+        every, new = self._number(mine, count), model.nodes.n
         if not len(every):
             return None
+        first, model.nodes_global = model.nodes_global, model.nodes_global + len(every)
         if not len(mine):
-            self._model.nodes_global += len(every)
-            return Split.elsewhere(self._model.nodes.n)
-        return self._separate(touched, rows, places, label, leaving, mine, every)
+            return Split.elsewhere(new)
+        ids = first + _positions(every, mine)
+        copies = Copies(touched[node], ids, owner, owner == self._comm.rank, mass)
+        model.nodes.grow(copies)
+        self._share(copies, new)
+        for b, star in self.stars.items():
+            star.grow(copies.n)
+            star.retie(self._meshes[b].tets, touched, rows, places, of, new, b)
+        return Split(copies, new, *_leaving(rows, places, of, new))
 
-    def _touched(self, broken: dict[int, Broken]) -> Ints:
+    def _touched(self, broken: list[Indices]) -> Ints:
         """Local nodes of the facets that break on any rank, ascending; marks the bonds."""
-        found = [np.zeros(0, np.int64)]
-        for b, facets in broken.items():
-            block = self._model.blocks[b]
-            block.bond[facets.places, facets.faces] = BROKEN
-            found.append(block.tets[facets.places[:, None], FACES[facets.faces]].reshape(-1).astype(np.int64))
-        nodes, mine = self._model.nodes, np.unique(np.concatenate(found))
-        if self._comm.size == 1:
+        ids = self._model.nodes.id
+        found = [_broken(mesh, b, sides) for sides in broken for b, mesh in self._meshes.items()]
+        mine: Ints = _NO_NODES if not found else found[0] if len(found) == 1 else distinct(np.concatenate(found))
+        if not self._neighbours:
             return mine
-        sends = {}
-        if len(mine):
-            flags = np.zeros(nodes.n, bool)
-            flags[mine] = True
-            sends = {o.rank: nodes.id[o.nodes[flags[o.nodes]]] for o in self._neighbours}
-        told = self._comm.swap(sends)
-        if not told:
-            return mine
-        return np.unique(np.concatenate([mine, *(np.searchsorted(nodes.id, ids) for ids in told.values())]))
+        shared = {o.rank: common(mine, o.nodes) if len(mine) else mine for o in self._neighbours}
+        told = self._comm.trade({rank: ids[mine[at]] if len(at) else at for rank, at in shared.items()})
+        some = [np.searchsorted(ids, theirs) for theirs in told.values() if len(theirs)]
+        every: Ints = distinct(np.concatenate([mine, *some])) if some else mine
+        return every
 
     def _stars(self, touched: Ints) -> tuple[Ints, Ints]:
-        """Rows of the whole stars of the touched nodes, sorted; and place, corner and block of their tets, -1 for those
-        of another rank.
+        """Rows of the whole stars of the touched nodes, by node and tet, and their places."""
+        if not len(touched):
+            return _NO_ROWS, _NO_ROWS
+        ids, rank = self._model.nodes.id, self._comm.rank
+        found = [
+            stars.describe(touched, star.first, star.count, star.pool, ids, self._meshes[b], b, rank)
+            for b, star in self.stars.items()
+        ]
+        told = self._told(touched, found) if self._neighbours else []
+        if len(found) == 1 and not told:
+            return found[0][0], found[0][1]
+        rows = np.concatenate([*(rows for rows, _, _ in found), *told])
+        return stars.ordered(rows, np.concatenate([places for _, places, _ in found]))
+
+    def _told(self, touched: Ints, found: list[tuple[Ints, Ints, Ints]]) -> list[Ints]:
+        """The rows of others round touched nodes that this rank shares with them; they get those ``found`` here."""
+        shared = {other.rank: common(touched, other.nodes) for other in self._neighbours}
+        sends = {
+            rank: np.concatenate([_stretches(rows, begin[at], begin[at + 1]) for rows, _, begin in found])
+            for rank, at in shared.items() if len(at)
+        }  # fmt: skip
+        return [words.reshape(-1, stars.COLUMNS) for words in self._comm.trade(sends).values() if len(words)]
+
+    def _number(self, mine: Ints, count: int) -> Ints:
+        """(k, 2) node and label of every piece of all ranks that gets a copy, in the order of the new ids; counts the
+        facets of all ranks.
         """
-        nodes = self._model.nodes
-        tables, where = [np.zeros((0, stars.COLUMNS), np.int64)], [np.zeros((0, 3), np.int64)]
-        if len(touched):
-            block_of = self._block_of[nodes.part[touched]]
-            for b, star in self.stars.items():
-                block, chosen = self._model.blocks[b], touched[block_of == b]
-                count = int(star.count[chosen].sum())
-                table, place = np.empty((count, stars.COLUMNS), np.int64), np.full((count, 3), b)
-                stars.describe(
-                    table, place, chosen, star.first, star.count, star.pool, block.tets, block.id, nodes.id,
-                    block.state.reshape(-1).view(np.int64), block.across, block.bond, block.state.shape[1],
-                    self._comm.rank,
-                )  # fmt: skip
-                tables.append(table)
-                where.append(place)
-        mine = np.concatenate(tables)
-        rows = self._with_others(mine)
-        places = np.concatenate([*where, np.full((len(rows) - len(mine), 3), -1)])
-        order = np.argsort(keys(rows[:, stars.NODE], rows[:, stars.TET]))
-        return rows[order], places[order]
-
-    def _with_others(self, mine: Ints) -> Ints:
-        """The rows of this rank's tets and those of the others' round shared nodes."""
         if self._comm.size == 1:
+            self.broken += count
             return mine
-        nodes, sends = self._model.nodes, {}
+        words = mine
         if len(mine):
-            local, flags = np.searchsorted(nodes.id, mine[:, stars.NODE]), np.zeros(nodes.n, bool)
-            for other in self._neighbours:
-                flags[other.nodes] = True
-                sends[other.rank] = mine[flags[local]]
-                flags[other.nodes] = False
-        told = self._comm.swap(sends)
-        if not told:
-            return mine
-        return np.concatenate([mine, *(words.reshape(-1, stars.COLUMNS) for words in told.values())])
-
-    def _number(self, mine: Ints) -> Ints:
-        """(k, 2) node and label of every piece of all ranks that gets a copy, in the order of the new ids."""
-        if self._comm.size == 1:
-            return mine
-        nodes = self._model.nodes
-        owned = nodes.owned[np.searchsorted(nodes.id, mine[:, 0])]
-        every = self._comm.join(mine[owned]).reshape(-1, 2)
-        return every[np.lexsort((every[:, 1], every[:, 0]))]
-
-    def _separate(
-        self, touched: Ints, rows: Ints, places: Ints, label: Ints, leaving: Flags, mine: Ints, every: Ints
-    ) -> Split:
-        model, nodes = self._model, self._model.nodes
-        at = np.searchsorted(keys(*every.T), keys(*mine.T))
-        gone = rows[leaving]
-        piece = np.searchsorted(keys(*mine.T), keys(gone[:, stars.NODE], label[leaving]))
-        quarters = 0.25 * np.ascontiguousarray(gone[:, stars.MASS]).view(np.float64)
-        masses = np.bincount(piece, quarters, len(mine)).astype(np.float64)
-        smallest = gone[:, stars.TET] == label[leaving]
-        owner = np.zeros(len(mine), np.int32)
-        owner[piece[smallest]] = gone[smallest, stars.RANK]
-        parents, first = np.searchsorted(nodes.id, mine[:, 0]), nodes.n
-        copies = Copies(parents, model.nodes_global + at, owner, owner == self._comm.rank, masses)
-        nodes.grow(copies)
-        model.nodes_global += len(every)
-        self._share(copies, first)
-        node = first + piece
-        became = np.full(len(rows), -1)
-        became[leaving] = node
-        for b, star in self.stars.items():
-            here = np.where((places[:, 2] == b)[:, None], places[:, :2], -1)
-            star.retie(model.blocks[b].tets, touched, rows, here, became, nodes.n)
-        key = keys(gone[:, stars.NODE], gone[:, stars.TET])
-        place, corner, block = places[leaving].T.astype(np.int32)
-        return Split(copies, first, key, node.astype(np.int32), place, corner, block)
+            words = mine[self._model.nodes.owned[np.searchsorted(self._model.nodes.id, mine[:, 0])]]
+        if count:
+            words = np.concatenate([[[-1, count]], words])
+        every = self._comm.join(words).reshape(-1, 2)
+        counts = every[:, 0] < 0
+        self.broken += int(every[counts, 1].sum())
+        every = every[~counts]
+        return every[np.lexsort((every[:, 1], every[:, 0]))] if len(mine) else every
 
     def _share(self, copies: Copies, first: int) -> None:
         """Whoever holds a node holds its copies."""
-        shared = np.zeros(self._model.nodes.n, bool)
         for other in self._neighbours:
-            shared[other.nodes] = True
-            new = first + np.flatnonzero(shared[copies.parents])
-            shared[other.nodes] = False
+            new = first + common(copies.parents, other.nodes)
             other.nodes = extended(other.nodes, new.astype(np.int32))
+
+
+def _positions(every: Ints, mine: Ints) -> Ints:
+    """(k,) where the rows of ``mine`` (k, 2) stand among those of ``every``, both sorted."""
+    return np.arange(len(mine)) if len(every) == len(mine) else np.searchsorted(keys(*every.T), keys(*mine.T))
+
+
+@njit(types.int64[::1](_I1), cache=True)
+def distinct(values):  # type: ignore[no-untyped-def]
+    """The values, ascending, each once."""
+    out, n = np.sort(values), 0
+    for value in out:
+        if n == 0 or value != out[n - 1]:
+            out[n] = value
+            n += 1
+    return out[:n].copy()
+
+
+@njit(types.int64[::1](MESH, types.int64, types.int32[:, :, ::1]), cache=True)
+def _broken(mesh, block, sides):  # type: ignore[no-untyped-def]
+    """Marks the bonds of those ``sides`` (m, 2, 3) that are of this ``block``; returns their nodes, each once."""
+    nodes, n = np.empty(6 * len(sides), np.int64), 0
+    for m in range(len(sides)):
+        for s in range(2):
+            if sides[m, s, 0] == block:
+                e, face = sides[m, s, 1], sides[m, s, 2]
+                mesh.bond[e, face] = BROKEN
+                mesh.intact[e] &= ~(1 << face)
+                for k in range(3):
+                    nodes[n] = mesh.tets[e, FACES[face, k]]
+                    n += 1
+    return distinct(nodes[:n])
+
+
+@njit(types.int64[::1](_I1, types.int32[::1]), cache=True)
+def common(some, others):  # type: ignore[no-untyped-def]
+    """Places in ``some`` of values that are among the ascending ``others``."""
+    out, n = np.empty(len(some), np.int64), 0
+    for i in range(len(some)):
+        at = np.searchsorted(others, some[i])
+        if at < len(others) and others[at] == some[i]:
+            out[n] = i
+            n += 1
+    return out[:n].copy()
+
+
+@njit(types.int64[:, ::1](_I2, _I1, _I1), cache=True)
+def _stretches(rows, begin, end):  # type: ignore[no-untyped-def]
+    """Rows from each of ``begin`` (k,) to each of ``end``, one stretch after the other."""
+    out, n = np.empty(((end - begin).sum(), rows.shape[1]), np.int64), 0
+    for i in range(len(begin)):
+        out[n : n + end[i] - begin[i]] = rows[begin[i] : end[i]]
+        n += end[i] - begin[i]
+    return out
+
+
+@njit(several(_I1, _N1, _N1, _N1, _N1)(_I2, _I2, _I1, types.int64), cache=True)
+def _leaving(rows, places, of, new):  # type: ignore[no-untyped-def]
+    """Of the rows whose node becomes a copy: ids of node and tet as one number, the copy, place, corner and block."""
+    m = (of >= 0).sum()
+    key, found, n = np.empty(m, np.int64), np.empty((4, m), np.int32), 0
+    for r in range(len(rows)):
+        if of[r] >= 0:
+            key[n] = rows[r, stars.NODE] * KEY + rows[r, stars.TET]
+            found[0, n] = new + of[r]
+            for k in range(3):
+                found[1 + k, n] = places[r, k]
+            n += 1
+    return key, found[0], found[1], found[2], found[3]

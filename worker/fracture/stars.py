@@ -8,16 +8,20 @@ facet inside a body separates nothing; a closed sheet of them round a node does.
 
 import numpy as np
 
-from ..jit import njit
+from ..jit import njit, types
 from ..mesh.faces import FACES
 from ..state import CHUNK, INTACT, Indices, Ints, Tets, extended
 from ..state import MASS as MASS_ROW
+from ..topology import keys
+from .records import MESH, several
 
 NODE, TET, RANK, MASS, BEHIND = 0, 1, 2, 3, 4
 """Columns of a row, one a node and tet of its star: global ids of the node and the tet, rank of the tet, bits of its
 mass, kg; and for the three faces that contain the node the id of the tet behind an intact one, -1 for others."""
 COLUMNS = 7
-"""Number of columns: the last three are those of BEHIND."""
+PLACE, CORNER, BLOCK = 0, 1, 2
+"""Columns of the place of a row's tet, all -1 for one of another rank: in its block, of the node, of the block."""
+_I1, _I2, _N1 = types.int64[::1], types.int64[:, ::1], types.int32[::1]
 
 
 class Stars:
@@ -41,42 +45,56 @@ class Stars:
         none = np.zeros(copies, np.int32)
         self.first, self.count = extended(self.first, none), extended(self.count, none)
 
-    def retie(self, tets: Tets, nodes: Ints, rows: Ints, places: Ints, became: Ints, new: int) -> None:
+    def retie(self, tets: Tets, nodes: Ints, rows: Ints, places: Ints, of: Ints, new: int, block: int) -> None:
         """Gives tets (n, 4) of this block the nodes that theirs have become, and every node its star.
 
-        ``rows`` (r, COLUMNS) of the whole stars of the local ``nodes`` (k,), sorted; ``places`` (r, 2), place and
-        corner of tets of this block, -1 for other rows; ``became`` (r,) the copy, local, -1 where the node stays
-        itself; ``new`` how many nodes there are with the copies.
+        ``rows`` (r, COLUMNS) of the whole stars of the local ``nodes`` (k,), sorted, and their ``places`` (r, 3);
+        ``of`` (r,) the piece, -1 where the node stays itself: piece 0 has the local node ``new``; ``block``: index of
+        this one.
         """
-        self.grow(new - len(self.count))
-        _retie(self.pool, self.first, self.count, tets, nodes, rows, places, became)
+        _retie(self.pool, self.first, self.count, tets, nodes, rows, places, of, new, block)
 
 
-@njit(
-    "void(int64[:, ::1], int64[:, ::1], int64[::1], int32[::1], int32[::1], int32[::1], uint32[:, ::1], int64[::1], "
-    "int64[::1], int64[::1], int32[:, ::1], uint8[:, ::1], int64, int64)",
-    cache=True,
-)
-def describe(rows, places, nodes, first, count, pool, tets, ids, node_ids, state, across, bond, columns, rank):  # type: ignore[no-untyped-def]
-    """Fills ``rows`` (r, COLUMNS) and ``places`` (r, 2), place and corner of the tet, for the stars of ``nodes``.
-
-    ``state``: that of the block, flat, with ``columns`` rows a chunk.
+@njit(several(_I2, _I2, _I1)(_I1, _N1, _N1, _N1, _I1, MESH, types.int64, types.int64), cache=True)
+def describe(nodes, first, count, pool, ids, mesh, block, rank):  # type: ignore[no-untyped-def]
+    """Rows (r, COLUMNS) and places (r, 3) of the stars of ascending local ``nodes`` (k,) in one block, by node and tet,
+    and (k + 1,) where the rows of each begin; ``ids``: of all local nodes.
     """
-    r = 0
-    for a in nodes:
-        for s in range(first[a], first[a] + count[a]):
-            e = pool[s]
+    begin = np.zeros(len(nodes) + 1, np.int64)
+    for i in range(len(nodes)):
+        begin[i + 1] = begin[i] + count[nodes[i]]
+    rows, places = np.empty((begin[-1], COLUMNS), np.int64), np.empty((begin[-1], 3), np.int64)
+    bits = mesh.state.view(np.int64)
+    for i in range(len(nodes)):
+        a = nodes[i]
+        star = pool[first[a] : first[a] + count[a]].copy()
+        for s in range(1, len(star)):  # by insertion: a star has some twenty tets
+            e, r = star[s], s
+            while r > 0 and mesh.id[star[r - 1]] > mesh.id[e]:
+                star[r] = star[r - 1]
+                r -= 1
+            star[r] = e
+        r = begin[i]
+        for e in star:
             corner = 0
-            while tets[e, corner] != a:
+            while mesh.tets[e, corner] != a:
                 corner += 1
-            places[r, 0], places[r, 1] = e, corner
-            rows[r, NODE], rows[r, TET], rows[r, RANK] = node_ids[a], ids[e], rank
-            rows[r, MASS] = state[(e // CHUNK * columns + MASS_ROW) * CHUNK + e % CHUNK]
+            places[r, PLACE], places[r, CORNER], places[r, BLOCK] = e, corner, block
+            rows[r, NODE], rows[r, TET], rows[r, RANK] = ids[a], mesh.id[e], rank
+            rows[r, MASS] = bits[(e // CHUNK * mesh.columns + MASS_ROW) * CHUNK + e % CHUNK]
             for m in range(3):
                 k = FACES[corner, m]
-                held = across[e, k] >= 0 and bond[e, k] == INTACT
-                rows[r, BEHIND + m] = across[e, k] // 4 if held else -1
+                held = mesh.across[e, k] >= 0 and mesh.bond[e, k] == INTACT
+                rows[r, BEHIND + m] = mesh.across[e, k] // 4 if held else -1
             r += 1
+    return rows, places, begin
+
+
+def ordered(rows: Ints, places: Ints) -> tuple[Ints, Ints]:
+    """Rows by node and tet; ``places`` (p, 3) of the first p of them, -1 for the others."""
+    order = np.argsort(keys(rows[:, NODE], rows[:, TET]))
+    every = np.concatenate([places, np.full((len(rows) - len(places), 3), -1)])
+    return rows[order], every[order]
 
 
 @njit("int64(int64[:, ::1], int64, int64, int64)", cache=True)
@@ -100,14 +118,19 @@ def _root(parent, i):  # type: ignore[no-untyped-def]
     return i
 
 
-@njit("Tuple((int64[::1], boolean[::1]))(int64[:, ::1])", cache=True)
+@njit(several(_I1, _I2, _I1, _N1, types.float64[::1])(_I2), cache=True)
 def pieces(rows):  # type: ignore[no-untyped-def]
-    """(r,) the smallest tet id of the piece that each row belongs to, and whether the piece leaves its node; ``rows``
-    sorted by node, then by tet.
+    """The pieces that leave their nodes, by node and smallest tet; ``rows`` by node and tet.
+
+    Returns (r,) the piece of each row, -1 in the piece with the smallest tet of its node, which stays; and of each
+    piece the ids of the node and of the smallest tet, the place of the node among those of ``rows``, the rank of that
+    tet, and a quarter of the mass of the tets, kg.
     """
-    n = len(rows)
-    parent, label, leaves = np.arange(n), np.empty(n, np.int64), np.empty(n, np.bool_)
-    begin = 0
+    n, i_node = len(rows), 0
+    parent, of, first, mass = np.arange(n), np.full(n, -1), np.empty(n, np.int64), np.zeros(n)
+    node = np.empty(n, np.int64)
+    quarters = rows[:, MASS].copy().view(np.float64)
+    begin, k = 0, 0
     while begin < n:
         end = begin
         while end < n and rows[end, NODE] == rows[begin, NODE]:
@@ -121,40 +144,45 @@ def pieces(rows):  # type: ignore[no-untyped-def]
                     continue
                 one, two = _root(parent, i), _root(parent, j)
                 parent[max(one, two)] = min(one, two)
-        for i in range(begin, end):
+        for i in range(begin + 1, end):
             root = _root(parent, i)
-            label[i], leaves[i] = rows[root, TET], root != begin
-        begin = end
-    return label, leaves
+            if root == begin:
+                continue
+            if root == i:
+                of[i], first[k], node[k] = k, i, i_node
+                k += 1
+            of[i] = of[root]
+            mass[of[i]] += 0.25 * quarters[i]
+        begin, i_node = end, i_node + 1
+    labels, ranks = np.empty((k, 2), np.int64), np.empty(k, np.int32)
+    for p in range(k):
+        labels[p, 0], labels[p, 1], ranks[p] = rows[first[p], NODE], rows[first[p], TET], rows[first[p], RANK]
+    return of, labels, node[:k].copy(), ranks, mass[:k].copy()
 
 
-@njit(
-    "void(int32[::1], int32[::1], int32[::1], uint32[:, ::1], int64[::1], int64[:, ::1], int64[:, ::1], int64[::1])",
-    cache=True,
-)
-def _retie(pool, first, count, tets, nodes, rows, places, became):  # type: ignore[no-untyped-def]
+@njit(types.void(_N1, _N1, _N1, types.uint32[:, ::1], _I1, _I2, _I2, _I1, types.int64, types.int64), cache=True)
+def _retie(pool, first, count, tets, nodes, rows, places, of, new, block):  # type: ignore[no-untyped-def]
     """See Stars.retie. A node's stretch of the pool: its own tets, then those of each copy, by ascending id."""
     begin, n, k = 0, len(rows), 0
     while begin < n:
         end = begin
         while end < n and rows[end, NODE] == rows[begin, NODE]:
             end += 1
-        at, node = first[nodes[k]], -1
+        at, piece = first[nodes[k]], -1
         while True:
-            following = -1
-            start = at
+            following, start = -1, at
             for r in range(begin, end):
-                if became[r] > node and (following < 0 or became[r] < following):
-                    following = became[r]
-                if places[r, 0] >= 0 and became[r] == node:
-                    pool[at] = places[r, 0]
+                if of[r] > piece and (following < 0 or of[r] < following):
+                    following = of[r]
+                if places[r, BLOCK] == block and of[r] == piece:
+                    pool[at] = places[r, PLACE]
                     at += 1
-                    if node >= 0:
-                        tets[places[r, 0], places[r, 1]] = node
-            a = nodes[k] if node < 0 else node
-            if node < 0 or at > start:
+                    if piece >= 0:
+                        tets[places[r, PLACE], places[r, CORNER]] = new + piece
+            a = nodes[k] if piece < 0 else new + piece
+            if piece < 0 or at > start:
                 first[a], count[a] = start, at - start
             if following < 0:
                 break
-            node = following
+            piece = following
         begin, k = end, k + 1

@@ -14,6 +14,7 @@ from conoid.cases.materials import Brittle, Material, Scatter
 from conoid.cases.schema import Fracture
 
 from ..hashing import uniform
+from ..jit import njit
 from ..state import Floats, Ints
 
 
@@ -52,12 +53,17 @@ class Toughness:
             chance = chance * (scatter.area / area)
         return np.asarray(scatter.minimum + (self.strength - scatter.minimum) * chance ** (1.0 / scatter.modulus))
 
-    def required(self, strength: Floats, since: Floats) -> Floats:
-        """(n,) traction, Pa, that breaks facets by the time ``since``, s, after they first passed their strength."""
-        if self.delay == 0.0:
-            return strength
-        with np.errstate(divide="ignore"):
-            return np.asarray(strength / -np.expm1(-since * strength * strength / self.delay))
+
+@njit("float64(float64, float64, float64)", cache=True, error_model="numpy")
+def exponent(strength, since, delay):  # type: ignore[no-untyped-def]
+    """- t / t_c of a facet, t ``since`` it first passed its strength, s; minus infinity without delay."""
+    return -since * strength * strength / delay if delay > 0.0 else -np.inf
+
+
+@njit("float64(float64, float64)", cache=True, error_model="numpy")
+def required(strength, grown):  # type: ignore[no-untyped-def]
+    """Traction, Pa, that breaks a facet; ``grown``: e^(-t / t_c) - 1, from numpy's expm1."""
+    return strength / -grown if grown < 0.0 else np.inf
 
 
 def toughness(material: Material, spec: Fracture, size: float) -> Toughness:

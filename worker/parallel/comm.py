@@ -81,6 +81,11 @@ class Comm(Protocol):
     def swap(self, sends: dict[int, Ints]) -> dict[int, Ints]:
         """What each rank has for this one, flat, by ascending rank, its own included; nothing is sent for no key."""
 
+    def trade(self, sends: dict[int, Ints]) -> dict[int, Ints]:
+        """What each of some ranks has for this one, flat, in the order of ``sends``: these ranks, and only they, name
+        this one in a call of their own. Of any length; what is for nobody is sent empty.
+        """
+
     def join(self, words: Ints) -> Ints:
         """The words of all ranks, flat, one rank's after the other's, on every rank."""
 
@@ -154,6 +159,11 @@ class SerialComm:
 
     def swap(self, sends: dict[int, Ints]) -> dict[int, Ints]:
         return {rank: words.reshape(-1) for rank, words in sends.items()}
+
+    def trade(self, sends: dict[int, Ints]) -> dict[int, Ints]:
+        if sends:
+            raise ValueError("one rank has nobody to trade with")
+        return {}
 
     def join(self, words: Ints) -> Ints:
         return words.reshape(-1)
@@ -255,14 +265,26 @@ class MpiComm:
                 self._mpi.Request.Waitall(requests)
         return received
 
+    def trade(self, sends: dict[int, Ints]) -> dict[int, Ints]:
+        mine = {rank: np.ascontiguousarray(words) for rank, words in sends.items()}
+        requests = [self._world.Isend(words, rank, Tag.TRADE) for rank, words in mine.items()]
+        self.sent.message(len(mine), sum(words.nbytes for words in mine.values()))
+        theirs, status = {}, self._mpi.Status()
+        with self.waiting():
+            for rank in mine:
+                message = self._world.Mprobe(rank, Tag.TRADE, status)
+                theirs[rank] = np.empty(status.Get_count(self._mpi.INT64_T), np.int64)
+                message.Recv(theirs[rank])
+            self._mpi.Request.Waitall(requests)
+        return theirs
+
     def join(self, words: Ints) -> Ints:
         counts = np.empty(self.size, np.int64)
         self.sent.collective(8 + words.nbytes, 2)
         with self.waiting():
             self._world.Allgather(np.array([words.size]), counts)
-        every = np.empty(counts.sum(), np.int64)
-        if len(every):
-            with self.waiting():
+            every = np.empty(counts.sum(), np.int64)
+            if len(every):
                 self._world.Allgatherv(np.ascontiguousarray(words), (every, counts))
         return every
 

@@ -38,3 +38,5 @@ class Tag(IntEnum):
     """Sums of the rigid motions of the tets at nodes, in every search of a body that fractures (contact/course.py)."""
     SWAP = 90
     """Words of which the receiver learns the number first (parallel/comm.py)."""
+    TRADE = 91
+    """Words for some ranks, from those who know of it (parallel/comm.py)."""

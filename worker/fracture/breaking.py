@@ -1,0 +1,87 @@
+"""The facets of one body that break in a step."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..jit import njit, types
+from ..mesh.faces import FACES
+from ..state import CHUNK, MASS, Flags, Floats, Ints
+from .facets import Body
+from .records import BREAKING, CANDIDATES, INTERFACE, MESH, TABLE, BreakingFacets, Candidates, InterfaceFacets
+from .strength import required
+
+
+@dataclass
+class Breaking:
+    """The facets of one body that break in a step."""
+
+    body: Body
+    facets: BreakingFacets
+
+    @property
+    def rows(self) -> Ints:
+        """(m, 2) place and face of each in the table of the body."""
+        one, two = self.facets.sides[:, 0, 1:], self.facets.sides[:, 1, 1:]
+        return np.where(one[:, :1] >= 0, one, two).astype(np.int64)
+
+    @property
+    def load(self) -> Floats:
+        """(m,) effective traction over strength."""
+        place, face = self.rows.T
+        return np.asarray(self.facets.traction[:, 3] / self.body.facets.strength[place, face])
+
+    def take(self, chosen: Flags) -> "Breaking":
+        """Some of the facets."""
+        return Breaking(self.body, self.facets.take(chosen))
+
+
+def gathered(body: Body, found: Candidates, shared: InterfaceFacets) -> Breaking | None:
+    """Those of the candidates that reach what the delayed criterion requires; None for none."""
+    facets: BreakingFacets = _gather(found, np.expm1(found.exponent), shared, body.mesh, body.facets, body.index)
+    return Breaking(body, facets) if len(facets.mass) else None
+
+
+@njit(types.float64(MESH, types.int64), cache=True)
+def _mass(mesh, e):  # type: ignore[no-untyped-def]
+    return mesh.state[(e // CHUNK * mesh.columns + MASS) * CHUNK + e % CHUNK]
+
+
+@njit(types.void(BREAKING, types.int64, types.int64, CANDIDATES, INTERFACE, MESH, types.int64), cache=True)
+def _fill(out, m, i, found, shared, mesh, block):  # type: ignore[no-untyped-def]
+    """Row ``m`` from candidate ``i``."""
+    place, face, row = found.place[i], found.face[i], found.shared[i]
+    behind, mass = mesh.across[place, face], _mass(mesh, place)
+    first = row < 0 or shared.first[row]
+    here = 0 if first else 1
+    out.sides[m, here, 0], out.sides[m, here, 1], out.sides[m, here, 2] = block, place, face
+    if row < 0:
+        there = mesh.beside[place, face]
+        out.sides[m, 1, 0], out.sides[m, 1, 1], out.sides[m, 1, 2] = block, there, behind % 4
+        out.mass[m] = min(mass, _mass(mesh, there))
+    else:
+        out.mass[m] = min(mass, shared.mass[row])
+    out.tets[m, here], out.tets[m, 1 - here] = mesh.id[place], behind // 4
+    a, b, c = mesh.tets[place, FACES[face, 0]], mesh.tets[place, FACES[face, 1]], mesh.tets[place, FACES[face, 2]]
+    out.nodes[m, 0], out.nodes[m, 1], out.nodes[m, 2] = a, b if first else c, c if first else b
+    out.first[m] = first
+    for k in range(4):
+        out.traction[m, k] = found.traction[i, k]
+
+
+@njit(BREAKING(CANDIDATES, types.float64[::1], INTERFACE, MESH, TABLE, types.int64), cache=True)
+def _gather(found, grown, shared, mesh, table, block):  # type: ignore[no-untyped-def]
+    """See ``gathered``; ``block``: index of the body's."""
+    chosen, n = np.empty(len(grown), np.int64), 0
+    for i in range(len(grown)):
+        strength = table.strength[found.place[i], found.face[i]]
+        if found.traction[i, 3] >= required(strength, grown[i]):
+            chosen[n] = i
+            n += 1
+    out = BreakingFacets(
+        np.empty((n, 2), np.int64), np.empty((n, 3), np.int32), np.full((n, 2, 3), -1, np.int32),
+        np.empty(n, np.bool_), np.empty((n, 4)), np.empty(n),
+    )  # fmt: skip
+    for m in range(n):
+        _fill(out, m, chosen[m], found, shared, mesh, block)
+    return out

@@ -1,0 +1,114 @@
+"""The facets of the parts that fracture, as one rank has them: a table over the faces of each body's tets."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from conoid.cases.schema import Fracture as Spec
+
+from ..migration.parcel import Table
+from ..state import INTACT, Block, Floats, Indices, Ints, among
+from ..topology import Split
+from . import criterion
+from .records import FacetTable, Law, Mesh
+from .strength import Toughness
+
+_BATCH = 10_000
+"""Tets that are made ready together, so that it takes no memory to speak of."""
+ELSEWHERE = -2
+"""Place of a tet that another rank has; -1 where there is none."""
+
+
+@dataclass
+class Body:
+    """A block that fractures."""
+
+    index: int
+    """Of the block among those of the rank."""
+    block: Block
+    spec: Spec
+    tough: Toughness
+    mesh: Mesh
+    facets: FacetTable
+    law: Law
+
+    def set_strengths(self, places: Ints, x0: Floats) -> None:
+        """Of all facets of the tets at ``places`` (k,), Pa; infinite on the surface. ``x0`` (nodes, 3): initial
+        positions.
+        """
+        here, face = np.nonzero(self.block.across[places] >= 0)
+        place = places[here]
+        area = criterion.areas(self.mesh.tets, place, np.ascontiguousarray(face), x0)
+        self.facets.strength[places] = np.inf
+        self.facets.strength[place, face] = self.tough.strengths(facet_ids(self.block, place, face), area)
+
+    def follow(self, split: Split, x0: Floats) -> None:
+        """Computes strengths anew that depend on areas, where nodes have become copies: the order of the nodes decides
+        on the last bit of an area, and a body that comes from a checkpoint knows the present nodes only.
+        """
+        scatter = self.tough.scatter
+        if scatter is not None and scatter.area is not None:
+            self.set_strengths(np.unique(split.place[split.block == self.index]).astype(np.int64), x0)
+
+
+def arm(index: int, block: Block, spec: Spec, tough: Toughness, x0: Floats) -> Body:
+    """Makes a block ready to fracture, or to go on; ``x0`` (nodes, 3): initial positions."""
+    block.shear_weight = spec.shear_weight if spec.shear_weight is not None else float(spec.model == "cohesive")
+    begins = not len(block.bond)
+    if begins:
+        block.bond = np.full((block.n, 4), INTACT, np.uint8)
+        block.hot = np.zeros(block.n, np.uint8)
+    table = FacetTable(np.empty((block.n, 4)), np.zeros((block.n, 4)), np.zeros((block.n, 4), np.int64))
+    law = Law(block.shear_weight, spec.friction, tough.delay)
+    body = Body(index, block, spec, tough, mesh_of(block), table, law)
+    for start in range(0, block.n, _BATCH):
+        body.set_strengths(np.arange(start, min(start + _BATCH, block.n)), x0)
+    if begins:
+        block.weakest = table.strength.min(axis=1)
+    return body
+
+
+def mesh_of(block: Block) -> Mesh:
+    """The tets of a block that has bonds, as kernels take them."""
+    beside, state = _beside(block), block.state.reshape(-1)
+    intact = np.packbits((block.bond == INTACT) & (beside >= 0), axis=1, bitorder="little")[:, 0].copy()
+    return Mesh(block.tets, block.id, block.across, beside, block.bond, intact, state, block.state.shape[1])
+
+
+def _beside(block: Block) -> Indices:
+    order = np.argsort(block.id)
+    known, beside = block.id[order], np.empty((block.n, 4), np.int32)
+    for start in range(0, block.n, _BATCH):
+        some = slice(start, start + _BATCH)
+        behind = block.across[some] // 4
+        at = order[np.minimum(np.searchsorted(known, behind), block.n - 1)]
+        beside[some] = np.where(block.across[some] >= 0, np.where(block.id[at] == behind, at, ELSEWHERE), -1)
+    return beside
+
+
+def facet_ids(block: Block, places: "np.ndarray", faces: "np.ndarray") -> Ints:
+    """(m,) ids of facets: 4 * id + local face of the tet of smaller id."""
+    return np.asarray(np.minimum(4 * block.id[places] + faces, block.across[places, faces]))
+
+
+def clocks(body: Body, step: int) -> Table:
+    """The clocks that go on after the step of number ``step``: a row a tet that is here, with the id of the facet."""
+    place, face = np.nonzero(body.facets.seen == step)
+    since, key, block = body.facets.since[place, face], facet_ids(body.block, place, face), body.block
+    other, near = block.across[place, face] // 4, body.mesh.beside[place, face] >= 0
+    return {
+        "tet": np.concatenate([block.id[place], other[near].astype(np.int64)]),
+        "key": np.concatenate([key, key[near]]), "since": np.concatenate([since, since[near]]),
+    }  # fmt: skip
+
+
+def wind(body: Body, table: Table, step: int) -> None:
+    """Sets the clocks as the step of number ``step`` left them; ``table``: of all bodies."""
+    order = np.argsort(body.block.id)
+    known = body.block.id[order]
+    mine = among(known, table["tet"])
+    facet, tet = table["key"][mine], table["tet"][mine]
+    first = among(known, facet // 4)
+    place = order[np.searchsorted(known, np.where(first, facet // 4, tet))]
+    face = np.where(first, facet % 4, np.argmax(body.block.across[place] == facet[:, None], axis=1))
+    body.facets.since[place, face], body.facets.seen[place, face] = table["since"][mine], step

@@ -1,0 +1,124 @@
+"""The forces of the present that tets and cohesive facets have given to a node go over to its copies, in integers."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..elements.tet4 import EDGE, SCRATCH, end_gradients, gather, internal_forces
+from ..jit import njit, types
+from ..parallel.comm import Comm
+from ..parallel.ownership import Neighbour
+from ..state import CHUNK, VISCOUS, Floats, Ints, Model, Tets
+from ..topology import Split
+from .cohesive import Cohesion, Facets, scatter_copies
+from .records import MESH, POINTS, Mesh, record
+from .separation import common
+
+_ROWS = VISCOUS + 1
+"""Rows of the state that forces need."""
+_I1, _I2, _N1 = types.int64[::1], types.int64[:, ::1], types.int32[::1]
+
+
+class Room(NamedTuple):
+    """Scratch for a chunk of tets (tet4.py)."""
+
+    w: Floats
+    """(SCRATCH,)."""
+    forces: Ints
+    """(9 * CHUNK,) on nodes 1, 2, 3."""
+    state: Floats
+    """(_ROWS * CHUNK,)."""
+    tets: Tets
+    """(CHUNK, 4) local nodes."""
+
+
+_ROOM = record(Room, types.float64[::1], _I1, types.float64[::1], types.uint32[:, ::1])
+
+
+class Handover:
+    """Hands forces over on one rank."""
+
+    def __init__(self, model: Model, meshes: dict[int, Mesh], neighbours: list[Neighbour], comm: Comm) -> None:
+        """``meshes``: of the parts that fracture, by index of the block."""
+        self._model, self._meshes, self._neighbours, self._comm = model, meshes, neighbours, comm
+        self._room = Room(
+            np.zeros(SCRATCH), np.zeros(9 * CHUNK, np.int64), np.zeros(_ROWS * CHUNK), np.zeros((CHUNK, 4), np.uint32)
+        )
+
+    def hand_over(self, split: Split, cohesion: Cohesion | None, fresh: list[Facets]) -> None:
+        """From parents to their copies; ``fresh``: cohesive facets that begin to pull. Ranks that share copies take
+        part. What copies get, their parents lose: both sides of a facet hang on nodes that were one.
+        """
+        nodes, copies = self._model.nodes, split.copies
+        change = np.zeros((copies.n, 3), np.int64)
+        for b, mesh in self._meshes.items():
+            _of_tets(
+                change, split.node, split.place, split.corner, split.block, b, split.first, mesh, nodes.x, self._room,
+                nodes.scale,
+            )  # fmt: skip
+        if cohesion is not None:
+            moved = cohesion.follow(split, nodes.id)
+            scatter_copies(change, split.first, cohesion.facets.nodes[moved], cohesion.facets.pull[moved], nodes.scale)
+            for new in fresh:
+                scatter_copies(change, split.first, new.nodes, new.pull, nodes.scale)
+        self._complete(change, copies.parents)
+        _apply(nodes.force, change, copies.parents, split.first)
+
+    def _complete(self, change: Ints, parents: Ints) -> None:
+        """Adds the other ranks' changes to those of shared copies."""
+        shared = {o.rank: at for o in self._neighbours if len(at := common(parents, o.nodes))}
+        if shared:
+            told = self._comm.trade({rank: change[at] for rank, at in shared.items()})
+            for rank, at in shared.items():
+                change[at] += told[rank].reshape(-1, 3)
+
+
+@njit(types.void(_I2, _I2, _I1, types.int64), cache=True)
+def _apply(force, change, parents, first):  # type: ignore[no-untyped-def]
+    """Adds ``change`` (copies, 3) to the forces of copies and takes it from their ``parents``."""
+    for c in range(len(parents)):
+        for k in range(3):
+            force[first + c, k] += change[c, k]
+            force[parents[c], k] -= change[c, k]
+
+
+@njit(types.void(_ROOM, _N1, _I1, types.int64, MESH, POINTS, types.float64), cache=True, error_model="numpy")
+def _forces(room, place, chosen, n, mesh, x, scale):  # type: ignore[no-untyped-def]
+    """Forces of the present stress of the tets of ``n`` rows, on their nodes 1, 2, 3 (tet4.py), in ``room.forces``."""
+    for i in range(n):
+        e = place[chosen[i]]
+        at = e // CHUNK * mesh.columns * CHUNK + e % CHUNK
+        for k in range(4):
+            room.tets[i, k] = mesh.tets[e, k]
+        for row in range(_ROWS):
+            room.state[row * CHUNK + i] = mesh.state[at + row * CHUNK]
+    gather(room.w[EDGE:], x, room.tets, n)
+    end_gradients(room.w, n)
+    internal_forces(room.forces, room.w, room.state, n, scale)
+
+
+@njit(
+    types.void(_I2, _N1, _N1, _N1, _N1, types.int64, types.int64, MESH, POINTS, _ROOM, types.float64),
+    cache=True,
+    error_model="numpy",
+)
+def _of_tets(change, node, place, corner, blocks, block, first, mesh, x, room, scale):  # type: ignore[no-untyped-def]
+    """Adds the forces of the tets of one ``block`` whose ``node`` (r,) is now a copy to those of the copies; ``first``:
+    local index of the first copy.
+    """
+    chosen, n = np.empty(CHUNK, np.int64), 0
+    for r in range(len(node)):
+        if blocks[r] == block:
+            chosen[n] = r
+            n += 1
+        if n == CHUNK or (n and r == len(node) - 1):
+            _forces(room, place, chosen, n, mesh, x, scale)
+            for i in range(n):
+                to, c = node[chosen[i]] - first, 3 * (corner[chosen[i]] - 1)
+                for k in range(3):
+                    if c >= 0:
+                        change[to, k] += room.forces[(c + k) * CHUNK + i]
+                    else:
+                        for m in range(3):
+                            change[to, k] -= room.forces[(3 * m + k) * CHUNK + i]
+            n = 0

@@ -1,0 +1,122 @@
+"""Which facets break in a step: candidates by their tractions, the delayed criterion, and the order of breaking."""
+
+import numpy as np
+
+from ..clock import Clock
+from ..migration.parcel import Parcel
+from ..parallel.comm import Comm
+from ..parallel.ownership import Neighbour
+from ..state import MASS, Flags, Model
+from ..topology import Split
+from . import criterion, facets, nodal
+from .breaking import Breaking, gathered
+from .facets import Body
+from .interface import Interface
+from .order import strongest
+from .records import Candidates
+from .stars import Stars
+
+
+class Initiation:
+    """Finds the facets that break on one rank, and keeps the clocks of the delayed criterion."""
+
+    def __init__(
+        self, model: Model, bodies: list[Body], stars: dict[int, Stars], neighbours: list[Neighbour], comm: Comm,
+        clock: Clock,
+    ) -> None:  # fmt: skip
+        """``stars``: by index of the block. All ranks take part."""
+        self._model, self._neighbours, self._comm, self._clock = model, neighbours, comm, clock
+        self.bodies = bodies
+        self._stars = stars
+        self.interface = Interface(bodies, neighbours, comm)
+        heaviest = np.zeros(len(model.parts))
+        for body in bodies:
+            heaviest[body.block.part] = body.block.row(MASS).max(initial=0.0)
+        self._heaviest = comm.maximum(heaviest)
+        """(parts,) mass of the heaviest tet of all ranks, kg; 0 where a part does not fracture."""
+        self._rooms = [Candidates.of(1 + len(rows)) for rows in self.interface.of_body]
+        """Of each body; what a step finds lies there until the next."""
+        self._step = 1
+        """Number of the step; those of the clocks begin with 1."""
+
+    def begin_step(self) -> None:
+        """The clock of a facet that is not overstressed in this step stops."""
+        self._step += 1
+
+    def breaking(self) -> list[Breaking]:
+        """The facets that break by the present stress, body by body; neighbours take part, and with nodal tractions all
+        ranks.
+        """
+        every = [gathered(body, some, self.interface.facets) for body, some in self.candidates()]
+        return [some for some in every if some is not None]
+
+    def candidates(self) -> list[tuple[Body, Candidates]]:
+        """The bodies of which facets may break, with these; the same ranks take part. Once a step: clocks go on."""
+        self.interface.exchange(self.bodies, self._model.nodes.x)
+        found = [(body, self._candidates(k, body)) for k, body in enumerate(self.bodies)]
+        if any(body.spec.traction == "nodes" for body in self.bodies):
+            found = self._smoothed(found)
+        return [(body, some) for body, some in found if len(some.place)]
+
+    def strongest(self, broken: list[Breaking]) -> list[Breaking]:
+        """Those with the largest traction over strength at all of their nodes, where the part asks for that; all ranks
+        take part.
+        """
+        waiting = [b for b in broken if b.body.spec.order == "local_maximum"]
+        none = np.zeros(0, np.int64)
+        chosen = strongest(
+            np.concatenate([none, *(facets.facet_ids(b.body.block, *b.rows.T) for b in waiting)]),
+            np.concatenate([np.zeros(0), *(b.load for b in waiting)]),
+            np.concatenate([np.zeros((0, 3), np.int32), *(b.facets.nodes for b in waiting)]),
+            self._model.nodes.id, self._neighbours, self._comm,
+        )  # fmt: skip
+        ends: list[Flags] = np.split(chosen, np.cumsum([len(b.facets.first) for b in waiting]))
+        left = iter(ends)
+        return [b.take(next(left)) if b.body.spec.order == "local_maximum" else b for b in broken]
+
+    def follow(self, split: Split) -> None:
+        """Takes up the copies of a split."""
+        for body in self.bodies:
+            body.follow(split, self._model.nodes.x0)
+
+    def keep(self, parcel: Parcel) -> None:
+        """Adds the clocks to a parcel."""
+        tables = [facets.clocks(body, self._step) for body in self.bodies]
+        none = {"tet": np.zeros(0, np.int64), "key": np.zeros(0, np.int64), "since": np.zeros(0)}
+        every = {name: np.concatenate([column, *(table[name] for table in tables)]) for name, column in none.items()}
+        parcel.rows["fracture.since"] = every
+
+    def resume(self, parcel: Parcel) -> None:
+        """Takes them back."""
+        for body in self.bodies:
+            facets.wind(body, parcel.rows["fracture.since"], self._step)
+
+    def free(self) -> None:
+        """Gives the messages back to MPI."""
+        self.interface.free()
+
+    def _candidates(self, k: int, body: Body) -> Candidates:
+        """With their clocks; those of a body with nodal tractions are clocked by these."""
+        room, rows = self._rooms[k], self.interface.of_body[k]
+        step = self._step if body.spec.traction == "tets" else 0
+        where = body.block.hot, self.interface.facets, rows, body.mesh, body.facets, self._model.nodes.x, body.law
+        n = criterion.search(room, *where, step, self._clock.t)
+        if n > len(room.place):
+            room = self._rooms[k] = Candidates.of(2 * n)
+            n = criterion.search(room, *where, step, self._clock.t)
+        return room.first(n)
+
+    def _smoothed(self, found: list[tuple[Body, Candidates]]) -> list[tuple[Body, Candidates]]:
+        """With tractions from nodal stress where the part asks for that; all ranks take part."""
+        nodes, some = self._model.nodes, [pair for pair in found if pair[0].spec.traction == "nodes"]
+        wanted = np.zeros(nodes.n, bool)
+        for body, each in some:
+            wanted[body.block.tets[each.place[each.shared < 0]]] = True
+        chosen = [(body, self._stars[body.index]) for body, _ in some]
+        stress = nodal.stresses(chosen, wanted, nodes, self._heaviest, self._neighbours, self._comm)
+        left = {}
+        for body, each in some:
+            nodal.replace(each, self.interface.facets, body, stress, nodes.x)
+            n = criterion.clock(each, len(each.place), body.facets, body.law, self._step, self._clock.t)
+            left[body.index] = each.first(n)
+        return [(body, left.get(body.index, each)) for body, each in found]

@@ -1,0 +1,70 @@
+"""Cohesive facets as they are inserted: the traction that broke them, and the stiffness that the time step allows."""
+
+import numpy as np
+
+from ..state import Floats, Indices, Ints, Nodes
+from ..topology import Split
+from . import criterion
+from .breaking import Breaking
+from .cohesive import Facets, frames, sizes
+
+_LEAST = 0.05
+"""Of the square of the highest frequency that a step resolves: what cohesive facets may use at least."""
+_SHARES = 24.0
+"""A node has a quarter of its tet's mass, up to three of whose faces open there, between two nodes that move."""
+
+
+class Insertion:
+    """Makes cohesive facets of one rank."""
+
+    def __init__(self, safety: float) -> None:
+        """``safety``: of the time step."""
+        self._unused = max(1.0 - safety**2, _LEAST)
+        self.longest = 0.0
+        """Longest stable step so far in which a face was overstressed, s."""
+
+    def facets(self, b: Breaking, nodes: Nodes, split: Split | None) -> Facets:
+        """Those that break and whose first side is here, at the present positions."""
+        f, block = b.facets, b.body.block
+        before = np.concatenate([f.nodes, f.nodes], axis=1)
+        after = before if split is None else split.followed_sides(before, nodes.id, f.tets)
+        places, faces = f.sides[:, 0, 1:].astype(np.int64).T.copy()
+        size = criterion.areas(b.body.mesh.tets, places, faces, nodes.x)
+        frequency = 4.0 * self._unused / self.longest**2
+        m, stiffness = len(size), 3.0 * f.mass / _SHARES * frequency / size
+        return inserted(
+            nodes, before, after, f.tets, f.traction[:, :3], f.traction[:, 3],
+            np.full(m, b.body.tough.energy), np.full(m, block.shear_weight), stiffness, size,
+        )  # fmt: skip
+
+
+def inserted(
+    nodes: Nodes, before: Indices, after: Indices, tets: Ints, traction: Floats, effective: Floats, energy: Floats,
+    weight: Floats, stiffness: Floats, area: Floats,
+) -> Facets:  # fmt: skip
+    """New facets at the present positions.
+
+    ``before`` and ``after`` (m, 6): nodes of the first side and across, before and after they have separated;
+    ``traction`` (m, 3) on the outward normal of the first side and its ``effective`` size (m,), Pa; ``weight`` of
+    shear; ``stiffness`` (m,) that the time step allows, Pa/m.
+    """
+    frame = frames(nodes.x, before)
+    along = np.einsum("mci,mi->mc", frame, traction)
+    along[:, 0] = np.maximum(along[:, 0], 0.0)
+    shear = 1.0 / weight
+    # T = strength / e (<d_n> n + b^2 d_t) is the traction where d_n = e t_n / strength, d_t = e t_t / (b^2 strength);
+    # under pressure the effective traction counts the shear that friction leaves.
+    e = np.maximum(1.0, shear) * effective / stiffness
+    pressed = along[:, 0] == 0.0
+    across = np.hypot(along[:, 1], along[:, 2])
+    held = np.where(pressed, effective * np.sqrt(shear) / np.where(across > 0.0, across, 1.0), 1.0)
+    offset = (e / effective)[:, None] * along
+    offset[:, 1:] *= (held / shear)[:, None]
+    m = len(area)
+    size = np.repeat(sizes(offset, shear)[:, None], 3, axis=1)
+    carried = along * np.stack([np.ones(m), held, held], axis=1)
+    force = (area / 3.0)[:, None] * np.einsum("mci,mc->mi", frame, carried)
+    return Facets(
+        tets, after, effective, 2.0 * energy / effective, area, shear, offset, size.copy(), size,
+        np.zeros((m, 3, 3)), np.repeat(force[:, None, :], 3, axis=1), np.zeros(m),
+    )  # fmt: skip

@@ -1,0 +1,67 @@
+"""Facets whose two tets are on different ranks: both ranks find the same mean of the tractions of either side."""
+
+import numpy as np
+
+from ..parallel.comm import Comm, Exchange
+from ..parallel.ownership import Neighbour
+from ..parallel.tags import Tag
+from ..state import MASS, Floats, Ints
+from . import criterion
+from .facets import ELSEWHERE, Body
+from .records import InterfaceFacets
+
+
+class Interface:
+    """The facets that this rank shares with others, and the exchange of their tractions."""
+
+    def __init__(self, bodies: list[Body], neighbours: list[Neighbour], comm: Comm) -> None:
+        """All ranks take part."""
+        mine = np.concatenate([np.zeros((0, 5), np.int64), *(_rows(b, body) for b, body in enumerate(bodies))])
+        told = comm.swap({other.rank: mine[:, [0, 2]] for other in neighbours}) if comm.size > 1 else {}
+        met = {rank: _met(mine, words.reshape(-1, 2)) for rank, words in told.items()}
+        table = np.concatenate([np.zeros((0, 6), np.int64), *met.values()])
+        m = len(table)
+        self.facets = InterfaceFacets(
+            np.column_stack([table[:, 3], table[:, 0] % 4]).astype(np.int32), table[:, 0] < table[:, 1],
+            np.ascontiguousarray(table[:, 5]).view(np.float64), np.zeros((m, 3)), np.zeros((m, 3)),
+        )  # fmt: skip
+        self.of_body: list[Ints] = [np.flatnonzero(table[:, 4] == b) for b in range(len(bodies))]
+        """For each body the rows of its facets."""
+        ends = np.cumsum([0, *map(len, met.values())])
+        cuts = [(rank, slice(a, b)) for rank, a, b in zip(met, ends[:-1], ends[1:], strict=True) if b > a]
+        self._exchange: Exchange = comm.exchange(
+            [(rank, self.facets.own[cut].view(np.int64)) for rank, cut in cuts],
+            [(rank, self.facets.theirs[cut].view(np.int64)) for rank, cut in cuts],
+            Tag.TRACTION,
+        )
+
+    def exchange(self, bodies: list[Body], x: Floats) -> None:
+        """Completes the tractions of both sides at the positions ``x`` (nodes, 3); neighbours take part."""
+        if not len(self.facets.mass):
+            return
+        for body, rows in zip(bodies, self.of_body, strict=True):
+            if len(rows):
+                criterion.own_tractions(self.facets, rows, body.mesh, x)
+        self._exchange.begin()
+        self._exchange.finish()
+
+    def free(self) -> None:
+        """Gives the messages back to MPI."""
+        self._exchange.free()
+
+
+def _rows(index: int, body: Body) -> Ints:
+    """(k, 5) own side, other side (4 * tet + face), bits of the mass, place and body of facets with a tet elsewhere."""
+    place, face = np.nonzero(body.mesh.beside == ELSEWHERE)
+    block = body.block
+    own, mass = 4 * block.id[place] + face, block.row(MASS)[place].view(np.int64)
+    return np.column_stack([own, block.across[place, face], mass, place, np.full(len(place), index)])
+
+
+def _met(mine: Ints, theirs: Ints) -> Ints:
+    """(m, 6) those of ``mine`` that a rank which told ``theirs`` (k, 2) has, too, by id, with the bits of its mass."""
+    theirs = theirs[np.argsort(theirs[:, 0])]
+    at = np.minimum(np.searchsorted(theirs[:, 0], mine[:, 1]), max(len(theirs) - 1, 0))
+    met = theirs[at, 0] == mine[:, 1] if len(theirs) else np.zeros(len(mine), bool)
+    rows = np.column_stack([mine[met], theirs[at[met], 1]])
+    return np.asarray(rows[np.argsort(rows[:, :2].min(axis=1))])

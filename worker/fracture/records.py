@@ -1,0 +1,139 @@
+"""What kernels of fracture take: records of arrays, and their numba types, which signatures name."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..jit import types
+from ..state import Bits, Flags, Floats, Indices, Ints, Tets
+
+
+class Mesh(NamedTuple):
+    """The tets of a body."""
+
+    tets: Tets
+    """(n, 4) local nodes."""
+    id: Ints
+    """(n,) global ids."""
+    across: Indices
+    """(n, 4) what was behind each face at the start, 4 * global tet id + local face, -1 for an exposed face."""
+    beside: Indices
+    """(n, 4) place of the tet behind each face, -1 where there is none, -2 where another rank has it."""
+    bond: Bits
+    """(n, 4) INTACT, BROKEN or WIDE."""
+    intact: Bits
+    """(n,) bit k: facet k is intact, and both of its tets are here."""
+    state: Floats
+    """All of the block, flat."""
+    columns: int
+    """Rows of the state in a chunk."""
+
+
+class FacetTable(NamedTuple):
+    """The facets of a body: a row each, by place and local face of the tet of smaller id, or of the one here."""
+
+    strength: Floats
+    """(n, 4) Pa, on either side; infinite on the surface."""
+    since: Floats
+    """(n, 4) when the clock of the delayed criterion started, s."""
+    seen: Ints
+    """(n, 4) number of the last step in which the facet was overstressed: in the next step its clock goes on."""
+
+
+class InterfaceFacets(NamedTuple):
+    """Facets whose other tet is on another rank, by rank and id of the facet."""
+
+    sides: Indices
+    """(m, 2) place and face of this rank's tet."""
+    first: Flags
+    """(m,) whether this rank has the tet of smaller id."""
+    mass: Floats
+    """(m,) of the other rank's tet, kg."""
+    own: Floats
+    """(m, 3) traction of this rank's tet on the outward normal of the tet of smaller id, Pa."""
+    theirs: Floats
+    """(m, 3) that of the other rank's tet."""
+
+
+class Law(NamedTuple):
+    """The criterion of a body."""
+
+    weight: float
+    """Of shear."""
+    friction: float
+    """Internal."""
+    delay: float
+    """t_c times the square of the strength, Pa^2 s."""
+
+
+class Candidates(NamedTuple):
+    """Intact facets whose traction reaches their strength in a step: those within the rank first, then shared ones."""
+
+    place: Ints
+    """(m,) of the tet of smaller id; of this rank's on a shared facet."""
+    face: Ints
+    """(m,)."""
+    shared: Ints
+    """(m,) row of a shared facet, -1 for one within the rank."""
+    traction: Floats
+    """(m, 4) on the outward normal of the tet of smaller id, and the effective one, Pa."""
+    exponent: Floats
+    """(m,) of the delayed criterion: minus the time since the clock started, over t_c."""
+
+    @classmethod
+    def of(cls, m: int) -> "Candidates":
+        """Room for as many."""
+        places = np.empty((3, m), np.int64)
+        return cls(places[0], places[1], places[2], np.empty((m, 4)), np.empty(m))
+
+    def first(self, n: int) -> "Candidates":
+        """The first ``n``."""
+        return Candidates(self.place[:n], self.face[:n], self.shared[:n], self.traction[:n], self.exponent[:n])
+
+
+class BreakingFacets(NamedTuple):
+    """Facets that break."""
+
+    tets: Ints
+    """(m, 2) global ids of the tets of either side, the smaller first."""
+    nodes: Indices
+    """(m, 3) local nodes, counter-clockwise seen from outside of the first side."""
+    sides: Indices
+    """(m, 2, 3) block, place and face of either side, -1 for one of another rank."""
+    first: Flags
+    """(m,) whether the first side is here."""
+    traction: Floats
+    """(m, 4) on the outward normal of the first side, and the effective one, Pa."""
+    mass: Floats
+    """(m,) of the lighter tet, kg."""
+
+    def take(self, chosen: Flags) -> "BreakingFacets":
+        """Some of them."""
+        return BreakingFacets(
+            self.tets[chosen], self.nodes[chosen], self.sides[chosen], self.first[chosen], self.traction[chosen],
+            self.mass[chosen],
+        )  # fmt: skip
+
+
+def several(*kinds: Any) -> Any:
+    """The type of a tuple."""
+    return types.Tuple(kinds)  # type: ignore[no-untyped-call]
+
+
+def record(name: type, *kinds: Any) -> Any:
+    """The type of a named tuple."""
+    if len(set(kinds)) == 1:
+        return types.NamedUniTuple(kinds[0], len(kinds), name)  # type: ignore[no-untyped-call]
+    return types.NamedTuple(kinds, name)  # type: ignore[no-untyped-call]
+
+
+_I1, _I2, _N2, _N3 = types.int64[::1], types.int64[:, ::1], types.int32[:, ::1], types.int32[:, :, ::1]
+_F1, _F2, _B1 = types.float64[::1], types.float64[:, ::1], types.boolean[::1]
+POINTS = _F2
+"""Of positions; the others are those of the records."""
+MESH = record(Mesh, types.uint32[:, ::1], _I1, _N2, _N2, types.uint8[:, ::1], types.uint8[::1], _F1, types.int64)
+TABLE = record(FacetTable, _F2, _F2, _I2)
+INTERFACE = record(InterfaceFacets, _N2, _B1, _F1, _F2, _F2)
+LAW = record(Law, types.float64, types.float64, types.float64)
+CANDIDATES = record(Candidates, _I1, _I1, _I1, _F2, _F1)
+BREAKING = record(BreakingFacets, _I2, _N2, _N3, _B1, _F2, _F1)

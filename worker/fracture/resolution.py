@@ -1,0 +1,53 @@
+"""Whether the mesh resolves what the fracture of a part needs: its cohesive zone, and its opening in time."""
+
+import logging
+
+import numpy as np
+
+from conoid.cases.schema import Fracture as Spec
+
+from ..parallel.comm import Comm
+from ..parallel.fixed_point import exact_sums
+from ..state import MASS, Model
+from .strength import Toughness
+
+_RESOLVED = 1.0 / 3.0
+"""Elements to a cohesive zone, at most, for its energy to be that of the law."""
+_STEP = 6.0**-0.5
+"""Stable step of a regular tet times the speed of sound, over its edge."""
+_REGULAR = (6.0 * 2.0**0.5) ** (1.0 / 3.0)
+"""Edge of a regular tet over the cube root of its volume."""
+
+log = logging.getLogger("conoid.worker")
+
+
+def mean_tet(model: Model, part: int, density: float, comm: Comm) -> tuple[float, float]:
+    """Mean volume of the tets of a part, m^3, and the edge of a regular tet of that volume, m; all ranks take part."""
+    masses = np.concatenate([np.zeros(0), *(block.row(MASS) for block in model.blocks if block.part == part)])
+    mass, count = exact_sums(comm, np.column_stack([masses, np.ones(len(masses))]))
+    volume = float(mass / count) / density
+    return volume, _REGULAR * volume ** (1.0 / 3.0)
+
+
+def warnings(part: str, spec: Spec, tough: Toughness, size: float, safety: float) -> list[str]:
+    """What to know of a part with tets of edge ``size``, m, before it runs; ``safety``: of the time step."""
+    step = safety * _STEP * size / tough.speed
+    ratio, told = size / tough.zone, []
+    log.info(
+        "%s breaks at %.4g MPa with %.4g J/m^2: cohesive zone %.3g mm, elements %.3g mm, %.3g to 1",
+        part, tough.strength * 1e-6, tough.energy, tough.zone * 1e3, size * 1e3, ratio,
+    )  # fmt: skip
+    if ratio > _RESOLVED:
+        told.append(
+            f"{part}: elements of {size * 1e3:.3g} mm in a cohesive zone of {tough.zone * 1e3:.3g} mm, "
+            f"{ratio:.3g} to 1, resolved below {_RESOLVED:.2g}: the mesh decides on the energy of fracture; "
+            "fracture.resolve = 'strength' keeps it and lowers the strength"
+        )
+    opening = tough.strength * step / tough.impedance
+    if spec.model == "cohesive" and opening > tough.critical:
+        told.append(
+            f"{part}: a facet opens by {opening * 1e6:.3g} um in a step of {step * 1e9:.3g} ns, and by "
+            f"{tough.critical * 1e6:.3g} um altogether: no law can be followed; use fracture.model = 'instant', "
+            f"fracture.resolve = 'strength', or numerics.dt_safety {opening / tough.critical:.0f} times smaller"
+        )
+    return told
