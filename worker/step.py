@@ -5,7 +5,7 @@ and at once f(n+1) from it, so a step begins with forces that are already at han
 
 ==  =====================================================  ==========================
  1  choose dt                                              from the limits at n
- 2  velocities                                             v(n-1/2) -> v*(n+1/2)
+ 2  velocities; cohesive facets let go before              v(n-1/2) -> v*(n+1/2)
  3  boundaries: gravity, symmetry, prescribed motion,     v*(n+1/2) -> v(n+1/2)
     contact, walls
  4  whoever looks at time n: ledger, probes, frames        x(n), stress(n)
@@ -46,6 +46,8 @@ def first_half(sim: Simulation) -> None:
             )
         for boundary in sim.boundaries:  # worn-out tets leave here, before contact looks at the surface
             boundary.note(nodes)
+        if sim.fracture is not None:
+            sim.fracture.let_go()  # f(n): less where cohesive facets would give what nobody has paid
         kick(nodes.v, nodes.force, nodes.mass, mean_dt / sim.scale)  # 2: v*(n+1/2) = v(n-1/2) + dt f(n) / m
         for boundary in sim.boundaries:  # 3: v(n+1/2)
             boundary.apply(nodes, clock.dt, clock.t)

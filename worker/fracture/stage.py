@@ -30,6 +30,7 @@ from . import bodies, nodal
 from .bodies import Body, Far, Loaded
 from .cohesive import Cohesion, Facets, inserted
 from .order import strongest
+from .release import Release
 from .separation import Broken, Separation
 from .strength import Toughness, toughness
 
@@ -140,6 +141,7 @@ class Fracture:
         self.cohesion: Cohesion | None = None
         if any(spec.model == "cohesive" for spec in specs):
             self.cohesion = elements.cohesion = Cohesion(work)
+            self._release = Release(self.cohesion, model.nodes, neighbours, comm)
 
     def advance(self) -> None:
         """Breaks what the stress of the present has overcome; all ranks take part."""
@@ -220,9 +222,18 @@ class Fracture:
         """Nothing is beyond its strength: no clock runs."""
         self._since = np.zeros(0, np.int64), np.zeros(0)
 
+    def let_go(self) -> None:
+        """Before the forces of the present act: cohesive facets give up what they would not be paid for; all ranks
+        take part.
+        """
+        if self.cohesion is not None and self.broken:
+            self._release.apply(self._clock)
+
     def free(self) -> None:
         """Gives the messages back to MPI."""
         self._far.free()
+        if self.cohesion is not None:
+            self._release.free()
 
     def _beyond(
         self, body: Body, near: Loaded, far: Loaded, passed: list[tuple[Ints, Floats]]
