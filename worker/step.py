@@ -8,7 +8,7 @@ and at once f(n+1) from it, so a step begins with forces that are already at han
  2  second half of the work of the last impulses           v(n-1/2)
  3  erosion: worn tets leave the body                      topology(n)
  4  contact: search, when it is due                        candidate pairs
- 5  velocities                                             v(n-1/2) -> v*(n+1/2)
+ 5  cohesive facets let go; velocities                     f(n); v(n-1/2) -> v*(n+1/2)
  6  gravity, tractions, symmetry, prescribed motion        v*(n+1/2)
  7  erosion: removed nodes stop                            v*(n+1/2)
  8  contact: impulses of active contacts                   v*(n+1/2)
@@ -53,7 +53,9 @@ def first_half(sim: Simulation) -> None:
                 f"{_when(sim)}: {sim.limiting_tet()} is crushed; the stable step is {clock.stable:.3g} s"
             )
         _before_kick(sim)  # 2 to 4
-        kick(nodes.v, nodes.force, nodes.mass, mean_dt / sim.scale)  # 5: v*(n+1/2) = v(n-1/2) + dt f(n) / m
+        if sim.fracture is not None:
+            sim.fracture.let_go()  # 5: f(n), less where cohesive facets would give what nobody has paid
+        kick(nodes.v, nodes.force, nodes.mass, mean_dt / sim.scale)  # v*(n+1/2) = v(n-1/2) + dt f(n) / m
         _after_kick(sim)  # 6 to 9: v(n+1/2)
 
 

@@ -9,7 +9,6 @@ import pytest
 from conoid.cases import load
 from conoid.cases.messages import Energy
 from conoid.worker import simulation
-from conoid.worker.fracture.cohesive import sizes
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.simulation import Simulation
 
@@ -75,7 +74,7 @@ def test_the_traction_follows_the_law_in_every_step() -> None:
         f = sim.fracture.cohesion.facets
         if not len(f.work):
             return
-        x, e = sim.model.nodes.x, float(sizes(f.offset, f.shear)[0])
+        x, knee = sim.model.nodes.x, f.knee[0]
         one, two = x[f.nodes[0, :3]], x[f.nodes[0, 3:]]
         middle = 0.5 * (one + two)
         first = middle[1] - middle[0]
@@ -85,8 +84,8 @@ def test_the_traction_follows_the_law_in_every_step() -> None:
         opening = f.offset[0] + (two - one) @ axes.T
         opening[:, 0] = np.maximum(opening[:, 0], 0.0)
         size = np.linalg.norm(opening, axis=1)
-        top = np.maximum(np.maximum(top, e), size)
-        traction = np.maximum(f.strength[0] * (1.0 - (top - e) / f.critical[0]), 0.0) * size / top
+        top = np.maximum(np.maximum(top, knee), size)
+        traction = np.maximum(f.strength[0] * (1.0 - (top - knee) / f.critical[0]), 0.0) * size / top
         force = np.linalg.norm(f.pull[0], axis=1)
         worst = max(worst, float(np.abs(3.0 * force / f.area[0] - traction).max()))
         seen += 1
@@ -109,7 +108,7 @@ def breathing(end: str) -> tuple[int, float, float]:
         f, x = sim.fracture.cohesion.facets, sim.model.nodes.x
         if len(f.work):
             gap = (x[f.nodes[0, 3:]] - x[f.nodes[0, :3]]).mean(axis=0)
-            closed.append(float(np.linalg.norm(gap)) < 1e-5 * float(f.critical[0]))
+            closed.append(float(np.linalg.norm(gap)) < 1e-5 * float(f.critical[0, 0]))
 
     run(sim, look)
     return int(np.sum(np.diff(np.array(closed, int)) == 1)), max(totals) / totals[0] - 1.0, sim.ledger.worst

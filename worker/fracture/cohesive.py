@@ -17,6 +17,12 @@ the traction at insertion back in size and direction, keeps the area under the c
 strength / e; e is the smallest that leaves the time step as it is. Each facet has three points, its pairs of nodes, so
 that no way of opening is without stiffness. Under pressure only d_t counts: the rest is for contact.
 
+The spring comes taut into the world, with an energy of strength e / 2 that nobody has paid: it is lent, and D = e is as
+far as the way back may lead. A pair that would go further back lets go, of as much of its traction as keeps it from
+that, or of all: its offset is shortened, and from then on its traction begins where it stands. Its stiffness stays,
+and the strength and critical opening become what leaves the area under the law, from there on, at what is left of the
+energy (law.py; when, in release.py).
+
 A facet whose nodes have not separated holds by itself: its pairs are one node, on which its tractions cancel.
 """
 
@@ -24,15 +30,12 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from ..elements.tet4 import largest_of, quanta
-from ..jit import njit
 from ..migration.parcel import Parcel
 from ..parallel.comm import Comm
 from ..parallel.fixed_point import Tally, exact_sums
 from ..state import Floats, Indices, Ints, Nodes, extended
 from ..topology import Split
-
-_F2, _F3 = "float64[:, ::1]", "float64[:, :, ::1]"
+from . import law
 
 
 @dataclass
@@ -43,28 +46,43 @@ class Facets:
     """(m, 2) global ids of the tets of either side."""
     nodes: Indices
     """(m, 6) local nodes of the first side, counter-clockwise seen from outside of it, and those across."""
-    strength: Floats
-    critical: Floats
+    energy: Floats
+    """(m,) J/m^2."""
     area: Floats
     """(m,) at insertion."""
     shear: Floats
     """(m,) b^2."""
+    strength: Floats
+    """(m, 3) of each pair, as all below: where the traction begins to fall."""
+    critical: Floats
+    """(m, 3) from there to where nothing is left."""
+    knee: Floats
+    """(m, 3) size of the opening at which the traction begins to fall."""
+    lent: Floats
+    """(m, 3) that down to which it gives back what it has taken: e, less or 0 once it has let go."""
     offset: Floats
-    """(m, 3) along the normal, along the first edge, and across both."""
+    """(m, 3, 3) along the normal, along the first edge, and across both."""
     top: Floats
-    """(m, 3) largest size of the opening so far, offset included, at each pair."""
+    """(m, 3) largest size of the opening so far, offset included, and the knee at least."""
     size: Floats
     """(m, 3) the present one."""
     opening: Floats
-    """(m, 3, 3) present opening of each pair."""
+    """(m, 3, 3) how far the nodes are apart."""
     pull: Floats
     """(m, 3, 3) force on the node of the first side, N."""
     work: Floats
-    """(m,) done on the facet so far, J."""
+    """(m, 3) done on the pair so far, J."""
+    foreseen: Floats
+    """(m, 3, 3) velocity of opening, m/s, that the forces of the last step would have led to by themselves."""
 
     def columns(self) -> list["np.ndarray"]:
         """The columns, in the order of their names here."""
         return [getattr(self, column.name) for column in fields(self)]
+
+    @property
+    def pairs(self) -> law.Pairs:
+        """What kernels take."""
+        return law.Pairs(*(getattr(self, name) for name in law.Pairs._fields))
 
 
 _COLUMNS = [column.name for column in fields(Facets) if column.name != "nodes"]
@@ -73,7 +91,7 @@ _COLUMNS = [column.name for column in fields(Facets) if column.name != "nodes"]
 def _none() -> Facets:
     one, three, nine = np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3, 3))
     tets, nodes = np.zeros((0, 2), np.int64), np.zeros((0, 6), np.int32)
-    return Facets(tets, nodes, one, one, one, one, three, three, three, nine, nine, one)
+    return Facets(tets, nodes, one, one, one, three, three, three, three, nine, three, three, nine, nine, three, nine)
 
 
 class Cohesion:
@@ -94,7 +112,7 @@ class Cohesion:
         or a copy.
         """
         f = self.facets
-        moved: Ints = _touching(f.nodes, split.copies.parents, len(ids))
+        moved: Ints = law.touching(f.nodes, split.copies.parents, len(ids))
         f.nodes[moved] = split.followed_sides(f.nodes[moved], ids, f.tets[moved])
         return moved
 
@@ -103,14 +121,20 @@ class Cohesion:
         f = self.facets
         if not len(f.work):
             return
-        failed = _open(
-            x, f.nodes, f.strength, f.critical, f.area, f.shear, f.offset, f.top, f.size, f.opening, f.pull, f.work
-        )
-        if failed:
-            e = sizes(f.offset, f.shear)
-            kept = ~((f.top - e[:, None] >= f.critical[:, None]).all(axis=1))
-            self._gone.add(f.work[~kept][:, None])
+        if law.open_facets(f.pairs, x):
+            kept = ~(f.top - f.knee >= np.maximum(f.critical, np.finfo(float).tiny)).all(axis=1)
+            self._gone.add(f.work[~kept].sum(axis=1)[:, None])
             self.facets = Facets(*(column[kept] for column in f.columns()))
+
+    def let_go(self, change: Ints, nodes: Nodes, steps: Floats, whole: bool) -> None:
+        """Lowers tractions that would give what nobody has paid in the step ahead, and adds what that changes of the
+        nodal forces to ``change`` (nodes, 3); see law.let_go.
+        """
+        law.let_go(change, self.facets.pairs, nodes.x, nodes.v, nodes.force, nodes.mass, steps, nodes.scale, whole)
+
+    def foresee(self, nodes: Nodes, mean_dt: float) -> None:
+        """Notes how pairs will open in the step ahead if nothing but forces acts."""
+        law.foresee(self.facets.pairs, nodes.v, nodes.force, nodes.mass, mean_dt / nodes.scale)
 
     def keep(self, parcel: Parcel) -> None:
         """Adds the facets to a parcel."""
@@ -127,19 +151,16 @@ class Cohesion:
 
     def scatter(self, force: Ints, scale: float) -> int:
         """Adds the forces in quanta of 1 / ``scale`` N to the nodal sums; returns the bits of the largest."""
-        return int(_scatter(force, self.facets.nodes, self.facets.pull, scale))
+        return int(law.scatter(force, self.facets.nodes, self.facets.pull, scale))
 
     def energies(self, comm: Comm) -> tuple[float, float]:
-        """Energy, J, that is lost for good, and that the closing of facets would give back; all ranks take part.
-
-        Facets that are pressed together beyond where they began have given back more than that: the second is negative.
-        """
+        """Energy, J, that is lost for good, and that the closing of facets would give back; all ranks take part."""
         f = self.facets
-        e = sizes(f.offset, f.shear)
-        stiffness = f.strength[:, None] * np.maximum(1.0 - (f.top - e[:, None]) / f.critical[:, None], 0.0) / f.top
-        stored = 0.5 * stiffness * (f.size**2 - (e * e)[:, None])
-        back = (f.area / 3.0) * stored.sum(axis=1)
-        work, reversible = exact_sums(comm, np.column_stack([f.work, back]))
+        beyond = np.maximum(f.top - f.knee, 0.0)
+        share = np.divide(beyond, f.critical, out=(beyond > 0.0).astype(float), where=f.critical > 0.0)
+        stiffness = f.strength * np.maximum(1.0 - share, 0.0) / f.top
+        back = (f.area / 6.0) * (stiffness * (f.size**2 - f.lent**2)).sum(axis=1)
+        work, reversible = exact_sums(comm, np.column_stack([f.work.sum(axis=1), back]))
         return float(work + self._gone.total(comm)[0] - reversible), float(reversible)
 
 
@@ -152,101 +173,21 @@ def frames(x: Floats, nodes: Indices) -> Floats:
     """(m, 3, 3) unit normal, first edge and the third direction, as rows, of facets ``nodes`` (m, 6)."""
     out = np.empty((len(nodes), 3, 3))
     for m in range(len(nodes)):
-        _frame(out[m], x, nodes[m])
+        law.turn(out[m], x, nodes[m])
     return out
 
 
-@njit(f"void({_F2}, {_F2}, int32[::1])", cache=True, error_model="numpy")
-def _frame(frame, x, nodes):  # type: ignore[no-untyped-def]
-    """Normal, first edge, and n x e, of the triangle in the middle between the two sides."""
-    for i in range(3):
-        a = x[nodes[0], i] + x[nodes[3], i]
-        frame[1, i] = x[nodes[1], i] + x[nodes[4], i] - a
-        frame[2, i] = x[nodes[2], i] + x[nodes[5], i] - a
-    length, across = 0.0, 0.0
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        frame[0, i] = frame[1, j] * frame[2, k] - frame[1, k] * frame[2, j]
-        length += frame[1, i] * frame[1, i]
-        across += frame[0, i] * frame[0, i]
-    for i in range(3):
-        frame[0, i] /= np.sqrt(across)
-        frame[1, i] /= np.sqrt(length)
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        frame[2, i] = frame[0, j] * frame[1, k] - frame[0, k] * frame[1, j]
-
-
-@njit(
-    f"boolean({_F2}, int32[:, ::1], float64[::1], float64[::1], float64[::1], float64[::1], {_F2}, {_F2}, {_F2}, "
-    f"{_F3}, {_F3}, float64[::1])",
-    cache=True,
-    error_model="numpy",
-)
-def _open(x, nodes, strength, critical, area, shear, offset, top, size, opening, pull, work):  # type: ignore[no-untyped-def]
-    """Returns whether some facet has failed at all three pairs. The work is that of the mean of old and new force."""
-    frame, d, force = np.empty((3, 3)), np.empty(3), np.empty(3)
-    failed = False
-    for m in range(len(nodes)):
-        _frame(frame, x, nodes[m])
-        b2 = shear[m]
-        e = np.sqrt(offset[m, 0] ** 2 + b2 * (offset[m, 1] ** 2 + offset[m, 2] ** 2))
-        left = False
-        for p in range(3):
-            for c in range(3):
-                d[c] = offset[m, c]
-                for i in range(3):
-                    d[c] += frame[c, i] * (x[nodes[m, 3 + p], i] - x[nodes[m, p], i])
-            d[0] = max(d[0], 0.0)
-            size[m, p] = np.sqrt(d[0] * d[0] + b2 * (d[1] * d[1] + d[2] * d[2]))
-            top[m, p] = max(top[m, p], size[m, p])
-            share = max(1.0 - (top[m, p] - e) / critical[m], 0.0)
-            left |= share > 0.0
-            stiffness = area[m] / 3.0 * strength[m] * share / top[m, p]
-            for i in range(3):
-                force[i] = stiffness * (frame[0, i] * d[0] + b2 * (frame[1, i] * d[1] + frame[2, i] * d[2]))
-                now = x[nodes[m, 3 + p], i] - x[nodes[m, p], i]
-                work[m] += 0.5 * (pull[m, p, i] + force[i]) * (now - opening[m, p, i])
-                opening[m, p, i], pull[m, p, i] = now, force[i]
-        failed |= not left
-    return failed
-
-
-@njit(f"int64(int64[:, ::1], int32[:, ::1], {_F3}, float64)", cache=True)
-def _scatter(force, nodes, pull, scale):  # type: ignore[no-untyped-def]
-    peak = 0
-    for m in range(len(nodes)):
-        for p in range(3):
-            fx, fy, fz = pull[m, p, 0], pull[m, p, 1], pull[m, p, 2]
-            peak = max(peak, largest_of(fx, fy, fz))
-            f = quanta(fx, fy, fz, scale)
-            for i in range(3):
-                force[nodes[m, p], i] += f[i]
-                force[nodes[m, 3 + p], i] -= f[i]
-    return peak
-
-
-@njit(f"void(int64[:, ::1], int64, int32[:, ::1], {_F3}, float64)", cache=True)
-def scatter_copies(change, first, nodes, pull, scale):  # type: ignore[no-untyped-def]
-    """Adds the forces ``pull`` on facets ``nodes`` (m, 6), in quanta, to the rows of nodes from ``first`` on."""
-    for m in range(len(nodes)):
-        for k in range(6):
-            if nodes[m, k] >= first:
-                for i in range(3):
-                    force = np.int64(np.rint(pull[m, k % 3, i] * scale))
-                    change[nodes[m, k] - first, i] += force if k < 3 else -force
-
-
-@njit("int64[::1](int32[:, ::1], int64[::1], int64)", cache=True)
-def _touching(table, some, n):  # type: ignore[no-untyped-def]
-    """Rows of ``table`` (m, 6) with one of ``some`` of the ``n`` nodes."""
-    flags, rows, found = np.zeros(n, np.bool_), np.empty(len(table), np.int64), 0
-    for a in some:
-        flags[a] = True
-    for i in range(len(table)):
-        for k in range(table.shape[1]):
-            if flags[table[i, k]]:
-                rows[found] = i
-                found += 1
-                break
-    return rows[:found].copy()
+def fresh(
+    tets: Ints, nodes: Indices, strength: Floats, energy: Floats, area: Floats, shear: Floats, offset: Floats,
+    force: Floats,
+) -> Facets:  # fmt: skip
+    """Facets whose three pairs are alike: ``offset`` and ``force`` are (m, 3), the others (m,) as in ``Facets``."""
+    e, strength, critical = sizes(offset, shear), strength[:, None], (2.0 * energy / strength)[:, None]
+    thrice, offset, force = np.ones((1, 3)), offset[:, None, :], force[:, None, :]
+    zero = np.zeros((len(area), 3, 3))
+    size = e[:, None] * thrice
+    return Facets(
+        tets, nodes, energy, area, shear, strength * thrice, critical * thrice, size, size.copy(),
+        np.repeat(offset, 3, axis=1), size.copy(), size.copy(), zero, np.repeat(force, 3, axis=1), zero[:, :, 0].copy(),
+        zero.copy(),
+    )  # fmt: skip

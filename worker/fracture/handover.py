@@ -10,7 +10,8 @@ from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
 from ..state import CHUNK, VISCOUS, Floats, Ints, Model, Tets
 from ..topology import Split
-from .cohesive import Cohesion, Facets, scatter_copies
+from .cohesive import Cohesion, Facets
+from .law import scatter_copies
 from .records import MESH, POINTS, Mesh, record
 from .separation import common
 

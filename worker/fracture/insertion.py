@@ -6,7 +6,7 @@ from ..state import Floats, Indices, Ints, Nodes
 from ..topology import Split
 from . import criterion
 from .breaking import Breaking
-from .cohesive import Facets, frames, sizes
+from .cohesive import Facets, frames, fresh
 
 _LEAST = 0.05
 """Of the square of the highest frequency that a step resolves: what cohesive facets may use at least."""
@@ -60,11 +60,6 @@ def inserted(
     held = np.where(pressed, effective * np.sqrt(shear) / np.where(across > 0.0, across, 1.0), 1.0)
     offset = (e / effective)[:, None] * along
     offset[:, 1:] *= (held / shear)[:, None]
-    m = len(area)
-    size = np.repeat(sizes(offset, shear)[:, None], 3, axis=1)
-    carried = along * np.stack([np.ones(m), held, held], axis=1)
+    carried = along * np.stack([np.ones(len(area)), held, held], axis=1)
     force = (area / 3.0)[:, None] * np.einsum("mci,mc->mi", frame, carried)
-    return Facets(
-        tets, after, effective, 2.0 * energy / effective, area, shear, offset, size.copy(), size,
-        np.zeros((m, 3, 3)), np.repeat(force[:, None, :], 3, axis=1), np.zeros(m),
-    )  # fmt: skip
+    return fresh(tets, after, effective, energy, area, shear, offset, force)

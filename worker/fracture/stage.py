@@ -28,6 +28,7 @@ from .facets import Body
 from .handover import Handover
 from .initiation import Initiation
 from .insertion import Insertion
+from .release import Release
 from .separation import Separation
 from .strength import toughness
 
@@ -61,11 +62,19 @@ class Fracture:
         self.cohesion: Cohesion | None = None
         if any(spec.model == "cohesive" for spec in specs):
             self.cohesion = elements.cohesion = Cohesion(work)
+            self._release = Release(self.cohesion, model.nodes, neighbours, comm)
 
     @property
     def broken(self) -> int:
         """Facets of all ranks that have broken."""
         return self.separation.broken
+
+    def let_go(self) -> None:
+        """Before the forces of the present act: cohesive facets give up what they would not be paid for; all ranks
+        take part.
+        """
+        if self.cohesion is not None and self.broken:
+            self._release.apply(self._clock)
 
     def find(self, expected: bool) -> int:
         """What this rank has to say in the reduction of the step; ``expected``: some face of all ranks was overstressed
@@ -107,6 +116,8 @@ class Fracture:
     def free(self) -> None:
         """Gives the messages back to MPI."""
         self.initiation.free()
+        if self.cohesion is not None:
+            self._release.free()
 
     def _armed(self, case: Case, comm: Comm) -> tuple[list[Body], float]:
         """The bodies, and the order of magnitude of the work on a facet, J."""

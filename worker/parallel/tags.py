@@ -36,6 +36,9 @@ class Tag(IntEnum):
     """Sums of stress and mass at nodes, for the ``nodal`` criterion (fracture/nodal.py)."""
     COURSE = 19
     """Sums of the rigid motions of the tets at nodes, in every search of a body that fractures (contact/course.py)."""
+    RELEASE = 20
+    """Changes of the forces of cohesive facets that let go, in every step once facets have broken
+    (fracture/release.py)."""
     SWAP = 90
     """Words of which the receiver learns the number first (parallel/comm.py)."""
     TRADE = 91

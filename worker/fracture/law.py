@@ -1,0 +1,237 @@
+r"""Kernels of the law of cohesive facets; cohesive.py has the law.
+
+A pair is one of three of a facet: a node of its first side and the one across. T = k d of a pair has the stiffness
+k = T(top) / top, and k (D^2 - lent^2) / 2 is what it would give back. Where D falls below ``lent`` it would give what
+nobody has paid, so its offset is shortened first, to nothing if need be: with the share q of d that is kept
+
+    d -> q d,   lent^2 -> lent^2 - (1 - q^2) D^2,   k as it is,
+
+what could be given back is the same, or nothing. What is left of the energy lies under the law from ``lent`` on:
+
+    left = k (knee^2 - lent^2) / 2 + k knee critical / 2,   knee = top, or less where critical would be below 0.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..elements.tet4 import largest_of, quanta
+from ..jit import njit, types
+from ..state import Floats, Indices
+
+_SLACK = 1e-6
+"""Of the energy of a facet: what a pair may give unpaid. Above rounding, far below what anybody sees."""
+_EXHAUSTED = 1e-6
+"""Of the energy of a facet: what is left at least to one that lets go."""
+
+
+class Pairs(NamedTuple):
+    """Columns of cohesive facets, see there."""
+
+    nodes: Indices
+    energy: Floats
+    area: Floats
+    shear: Floats
+    strength: Floats
+    critical: Floats
+    knee: Floats
+    lent: Floats
+    top: Floats
+    size: Floats
+    work: Floats
+    offset: Floats
+    opening: Floats
+    pull: Floats
+    foreseen: Floats
+
+
+_F1, _F2, _F3 = types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1]
+_PAIRS = types.NamedTuple([types.int32[:, ::1], *[_F1] * 3, *[_F2] * 7, *[_F3] * 4], Pairs)  # type: ignore[no-untyped-call]
+_I, _F, _I2 = types.int64, types.float64, types.int64[:, ::1]
+
+
+@njit(types.void(_F2, _F2, types.int32[::1]), cache=True, error_model="numpy")
+def turn(frame, x, nodes):  # type: ignore[no-untyped-def]
+    """Normal, first edge, and n x e, of the triangle in the middle between the two sides."""
+    for i in range(3):
+        a = x[nodes[0], i] + x[nodes[3], i]
+        frame[1, i] = x[nodes[1], i] + x[nodes[4], i] - a
+        frame[2, i] = x[nodes[2], i] + x[nodes[5], i] - a
+    length, across = 0.0, 0.0
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        frame[0, i] = frame[1, j] * frame[2, k] - frame[1, k] * frame[2, j]
+        length += frame[1, i] * frame[1, i]
+        across += frame[0, i] * frame[0, i]
+    for i in range(3):
+        frame[0, i] /= np.sqrt(across)
+        frame[1, i] /= np.sqrt(length)
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        frame[2, i] = frame[0, j] * frame[1, k] - frame[0, k] * frame[1, j]
+
+
+@njit(_F(_PAIRS, _I, _I), cache=True, error_model="numpy")
+def _share(f, m, p):  # type: ignore[no-untyped-def]
+    """Of the strength, that is left."""
+    beyond = f.top[m, p] - f.knee[m, p]
+    return 1.0 if beyond <= 0.0 else max(1.0 - beyond / f.critical[m, p], 0.0)
+
+
+@njit(_F(_F1, _F2, _F1, _F1, _F), cache=True, error_model="numpy")
+def _opened(d, frame, apart, offset, shear):  # type: ignore[no-untyped-def]
+    """Size of the opening ``d``, which it fills in, of nodes that are ``apart`` (3,)."""
+    for c in range(3):
+        d[c] = offset[c] + frame[c, 0] * apart[0] + frame[c, 1] * apart[1] + frame[c, 2] * apart[2]
+    d[0] = max(d[0], 0.0)
+    return np.sqrt(d[0] * d[0] + shear * (d[1] * d[1] + d[2] * d[2]))
+
+
+@njit(types.void(_PAIRS, _I, _I, _F2, _F1, _F), cache=True, error_model="numpy")
+def _shorten(f, m, p, frame, d, kept):  # type: ignore[no-untyped-def]
+    """Keeps a share of the present opening ``d``: the offset goes along."""
+    k = f.strength[m, p] * _share(f, m, p) / f.top[m, p]
+    for c in range(3):
+        along = 0.0
+        for i in range(3):
+            along += frame[c, i] * f.opening[m, p, i]
+        d[c] *= kept
+        f.offset[m, p, c] = d[c] - along
+    lent = f.lent[m, p] ** 2 - (1.0 - kept * kept) * f.size[m, p] ** 2
+    f.size[m, p] *= kept
+    f.lent[m, p] = np.sqrt(max(lent, 0.0)) if kept > 0.0 else 0.0
+    lent = f.lent[m, p] ** 2
+    left = max(f.energy[m] - 3.0 * f.work[m, p] / f.area[m], _EXHAUSTED * f.energy[m])
+    left = 2.0 / k * left + f.size[m, p] ** 2 - lent  # in squares of the opening, as the triangles below
+    knee = min(f.top[m, p], np.sqrt(lent + left))
+    f.strength[m, p] = k * knee
+    f.critical[m, p] = max(left - (knee * knee - lent), 0.0) / knee
+    f.knee[m, p] = f.top[m, p] = knee
+
+
+@njit(types.boolean(_PAIRS, _F2), cache=True, error_model="numpy")
+def open_facets(f, x):  # type: ignore[no-untyped-def]
+    """Returns whether some facet has failed at all three pairs. The work is that of the mean of old and new force."""
+    frame, d, moved = np.empty((3, 3)), np.empty(3), np.empty(3)
+    failed = False
+    for m in range(len(f.nodes)):
+        turn(frame, x, f.nodes[m])
+        third, holds = f.area[m] / 3.0, False
+        for p in range(3):
+            for i in range(3):
+                now = x[f.nodes[m, 3 + p], i] - x[f.nodes[m, p], i]
+                moved[i] = now - f.opening[m, p, i]
+                f.work[m, p] += 0.5 * f.pull[m, p, i] * moved[i]
+                f.opening[m, p, i] = now
+            f.size[m, p] = _opened(d, frame, f.opening[m, p], f.offset[m, p], f.shear[m])
+            f.top[m, p] = max(f.top[m, p], f.size[m, p])
+            share = _share(f, m, p)
+            if share > 0.0 and f.size[m, p] < f.lent[m, p] - _SLACK * f.energy[m] / f.strength[m, p]:
+                _shorten(f, m, p, frame, d, 0.0)
+                share = 1.0
+            holds |= share > 0.0
+            stiffness = third * f.strength[m, p] * share / f.top[m, p]
+            for i in range(3):
+                across = frame[1, i] * d[1] + frame[2, i] * d[2]
+                f.pull[m, p, i] = stiffness * (frame[0, i] * d[0] + f.shear[m] * across)
+                f.work[m, p] += 0.5 * f.pull[m, p, i] * moved[i]
+        failed |= not holds
+    return failed
+
+
+@njit(types.void(_F1, _PAIRS, _I, _I, _F2, _I2, _F1, _F), cache=True, error_model="numpy")
+def _foresee(ahead, f, m, p, v, force, mass, quantum):  # type: ignore[no-untyped-def]
+    """Velocity at n+1/2 with which a pair will open, by the forces of the present alone."""
+    a, b = f.nodes[m, p], f.nodes[m, 3 + p]
+    for i in range(3):
+        ahead[i] = v[b, i] - v[a, i] + quantum * (force[b, i] / mass[b] - force[a, i] / mass[a])
+
+
+@njit(types.void(_I2, _PAIRS, _F2, _F2, _I2, _F1, _F1, _F, types.boolean), cache=True, error_model="numpy")
+def let_go(change, f, x, v, force, mass, steps, scale, whole):  # type: ignore[no-untyped-def]
+    """Shortens the offsets of pairs that would give what nobody has paid in the step ahead, by what keeps each from it
+    or wholly, and adds what that changes of the nodal forces to ``change`` (nodes, 3), quanta.
+
+    ``steps``: dt behind, their mean, dt ahead, s. What is not a force of the present, contact above all, is taken to
+    change the velocities as in the step before.
+    """
+    frame, d, ahead, apart, pull = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    for m in range(len(f.nodes)):
+        turn(frame, x, f.nodes[m])
+        for p in range(3):
+            a, b, share = f.nodes[m, p], f.nodes[m, 3 + p], _share(f, m, p)
+            if f.lent[m, p] == 0.0 or a == b or share == 0.0:
+                continue
+            _foresee(ahead, f, m, p, v, force, mass, steps[1] / scale)
+            for i in range(3):
+                pushed = v[b, i] - v[a, i] - f.foreseen[m, p, i]
+                apart[i] = f.opening[m, p, i] + steps[2] * (ahead[i] + pushed)
+                pull[i] = f.pull[m, p, i]
+            short = f.lent[m, p] - _opened(d, frame, apart, f.offset[m, p], f.shear[m])
+            if short <= _SLACK * f.energy[m] / f.strength[m, p]:
+                continue
+            # A force less by dF along the traction opens the pair by dt^2 dF (1 / m_a + 1 / m_b) more, and its size by
+            # that times |T| / (k D).
+            size = _opened(d, frame, f.opening[m, p], f.offset[m, p], f.shear[m])
+            strength = np.sqrt(pull[0] ** 2 + pull[1] ** 2 + pull[2] ** 2)
+            slope = 3.0 * strength / (f.area[m] * f.strength[m, p] * share / f.top[m, p] * size)
+            gain = slope * strength * steps[1] * steps[2] * (1.0 / mass[a] + 1.0 / mass[b])
+            kept = 0.0 if whole else max(1.0 - short / gain, 0.0)
+            old = quanta(pull[0], pull[1], pull[2], scale)
+            new = quanta(kept * pull[0], kept * pull[1], kept * pull[2], scale)
+            for i in range(3):
+                change[a, i] += new[i] - old[i]
+                change[b, i] -= new[i] - old[i]
+                f.pull[m, p, i] = kept * pull[i]
+                f.work[m, p] -= 0.5 * (1.0 - kept) * pull[i] * (v[b, i] - v[a, i]) * steps[0]
+            _shorten(f, m, p, frame, d, kept)
+
+
+@njit(types.void(_PAIRS, _F2, _I2, _F1, _F), cache=True, error_model="numpy")
+def foresee(f, v, force, mass, quantum):  # type: ignore[no-untyped-def]
+    """Notes with which velocities pairs would open by the forces of the present alone; ``quantum``: as ``kick``."""
+    for m in range(len(f.nodes)):
+        for p in range(3):
+            if f.lent[m, p] > 0.0:
+                _foresee(f.foreseen[m, p], f, m, p, v, force, mass, quantum)
+
+
+@njit(_I(_I2, types.int32[:, ::1], _F3, _F), cache=True)
+def scatter(force, nodes, pull, scale):  # type: ignore[no-untyped-def]
+    """Adds the forces in quanta of 1 / ``scale`` N to the nodal sums; returns the bits of the largest."""
+    peak = 0
+    for m in range(len(nodes)):
+        for p in range(3):
+            fx, fy, fz = pull[m, p, 0], pull[m, p, 1], pull[m, p, 2]
+            peak = max(peak, largest_of(fx, fy, fz))
+            f = quanta(fx, fy, fz, scale)
+            for i in range(3):
+                force[nodes[m, p], i] += f[i]
+                force[nodes[m, 3 + p], i] -= f[i]
+    return peak
+
+
+@njit("void(int64[:, ::1], int64, int32[:, ::1], float64[:, :, ::1], float64)", cache=True)
+def scatter_copies(change, first, nodes, pull, scale):  # type: ignore[no-untyped-def]
+    """Adds the forces ``pull`` on facets ``nodes`` (m, 6), in quanta, to the rows of nodes from ``first`` on."""
+    for m in range(len(nodes)):
+        for k in range(6):
+            if nodes[m, k] >= first:
+                for i in range(3):
+                    force = np.int64(np.rint(pull[m, k % 3, i] * scale))
+                    change[nodes[m, k] - first, i] += force if k < 3 else -force
+
+
+@njit("int64[::1](int32[:, ::1], int64[::1], int64)", cache=True)
+def touching(table, some, n):  # type: ignore[no-untyped-def]
+    """Rows of ``table`` (m, 6) with one of ``some`` of the ``n`` nodes."""
+    flags, rows, found = np.zeros(n, np.bool_), np.empty(len(table), np.int64), 0
+    for a in some:
+        flags[a] = True
+    for i in range(len(table)):
+        for k in range(table.shape[1]):
+            if flags[table[i, k]]:
+                rows[found] = i
+                found += 1
+                break
+    return rows[:found].copy()
