@@ -58,7 +58,7 @@ def node_face(
     found = kernels.node_face(
         room.nodes, room.weights, room.normals, room.wanted, room.friction, room.pair, 0, faces, face_sizes(x, faces),
         np.zeros((n, 9)) if out is None else moments(out), pairs, _all(pairs), x, v, own.astype(np.int32),
-        np.zeros((9, 9)) if mu is None else mu, dt,
+        np.zeros((9, 9)) if mu is None else mu, kernels.PUSH_OUT, dt,
     )  # fmt: skip
     return _filled(room, found)
 
@@ -68,7 +68,8 @@ def edge_edge(x: Floats, v: Floats, edges: Indices, pairs: Indices, dt: float, m
     room = Meetings.room(len(pairs))
     found = kernels.edge_edge(
         room.nodes, room.weights, room.normals, room.wanted, room.friction, room.pair, 0, edges, edge_sizes(x, edges),
-        pairs, _all(pairs), x, v, np.zeros(len(x), np.int32), np.zeros((9, 9)) if mu is None else mu, dt,
+        pairs, _all(pairs), x, v, np.zeros(len(x), np.int32), np.zeros((9, 9)) if mu is None else mu, kernels.PUSH_OUT,
+        dt,
     )  # fmt: skip
     return _filled(room, found)
 

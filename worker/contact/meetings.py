@@ -23,9 +23,9 @@ _TOUCHING = 1e-3
 """Of the size of a face: deeper than this, a node is held by the nearest face only."""
 _MARGIN = 1e-3
 """Of the area coordinates: how far outside of a face its point may lie."""
-_PUSH_OUT = 0.1
-"""Largest share of a penetration that is taken back in a step, and of the speed of closing that is given back for it:
-less than an elastic impact returns, so that it makes no energy."""
+PUSH_OUT = 0.1
+"""Largest share of a penetration that is taken back in a step, and of the speed of closing that is given back for it;
+nothing while contact has no energy to give back (``account.Account``)."""
 FACING = 0.1
 """A node looks at a face when the cosines of the face's normal and those of its own faces have a mean below this, and
 their mean less their deviation comes below minus this."""
@@ -60,7 +60,7 @@ class Meetings:
 
 _V2, _N2 = "float64[:, ::1]", "int32[:, ::1]"
 _OUT = f"{_N2}, {_V2}, {_V2}, float64[::1], float64[::1], int32[::1]"
-_IN = f"{_N2}, int32[::1], {_V2}, {_V2}, int32[::1], {_V2}, float64"
+_IN = f"{_N2}, int32[::1], {_V2}, {_V2}, int32[::1], {_V2}, float64, float64"
 
 
 @njit(f"float64(float64[::1], {_V2}, int64, int64, int64, int64)", cache=True, error_model="numpy")
@@ -137,10 +137,12 @@ def _outside(x, p, pairs, faces, size, part, depth):  # type: ignore[no-untyped-
     return False
 
 
-@njit("float64(float64, float64, float64, float64)", cache=True)
-def needed(gap0, gap1, speed, dt):  # type: ignore[no-untyped-def]
-    """By how much the normal speed must rise, m/s: not to pass, and when that has happened already, not deeper."""
-    back = _PUSH_OUT * min(max(-gap0, 0.0) / dt, max(-speed, 0.0))
+@njit("float64(float64, float64, float64, float64, float64)", cache=True)
+def needed(gap0, gap1, speed, give, dt):  # type: ignore[no-untyped-def]
+    """By how much the normal speed must rise, m/s: not to pass, and when that has happened already, not deeper; a
+    share ``give`` of the penetration is taken back (PUSH_OUT).
+    """
+    back = give * min(max(-gap0, 0.0) / dt, max(-speed, 0.0))
     return (min(gap0, 0.0) - gap1) / dt + back
 
 
@@ -168,7 +170,9 @@ def _looks_at(out, s, m):  # type: ignore[no-untyped-def]
 
 
 @njit(f"int64({_OUT}, int64, {_N2}, float64[::1], {_V2}, {_IN})", cache=True, error_model="numpy")
-def node_face(nodes, weights, normals, wanted, friction, pair, n, faces, size, out, pairs, some, x, v, part, mu, dt):  # type: ignore[no-untyped-def]
+def node_face(  # type: ignore[no-untyped-def]
+    nodes, weights, normals, wanted, friction, pair, n, faces, size, out, pairs, some, x, v, part, mu, give, dt
+):
     """Nodes that pass a face, from row ``n`` on; returns the new number of rows.
 
     ``out`` (nodes, 9): means of n and of n n (xx, yy, zz, yz, zx, xy) of the outward normals of a node's faces. A node
@@ -224,7 +228,7 @@ def node_face(nodes, weights, normals, wanted, friction, pair, n, faces, size, o
             weights[at, a + 1] = -b[a]
             normals[at, a] = m[a]
             speed += m[a] * (v[s, a] - (b[0] * v[i, a] + b[1] * v[j, a] + b[2] * v[k, a]))
-        wanted[at] = speed + needed(gap0, gap1, speed, dt)
+        wanted[at] = speed + needed(gap0, gap1, speed, give, dt)
         friction[at], pair[at] = mu[part[s], part[i]], p
     return n
 
@@ -290,7 +294,7 @@ def _volume(u, w, r):  # type: ignore[no-untyped-def]
 
 
 @njit(f"int64({_OUT}, int64, {_N2}, float64[::1], {_IN})", cache=True, error_model="numpy")
-def edge_edge(nodes, weights, normals, wanted, friction, pair, n, edges, size, pairs, some, x, v, part, mu, dt):  # type: ignore[no-untyped-def]
+def edge_edge(nodes, weights, normals, wanted, friction, pair, n, edges, size, pairs, some, x, v, part, mu, give, dt):  # type: ignore[no-untyped-def]
     """Edges that pass an edge, from row ``n`` on; returns the new number of rows. They meet where they cross.
 
     ``pairs`` (p, 2): two edges, of which ``some`` are looked at; ``edges`` (e, 4): records.Edges.
@@ -346,7 +350,7 @@ def edge_edge(nodes, weights, normals, wanted, friction, pair, n, edges, size, p
         for k in range(3):
             normals[n, k] = m[k]
             speed += m[k] * ((1.0 - t) * v[c, k] + t * v[d, k] - (1.0 - s) * v[a, k] - s * v[b, k])
-        wanted[n] = speed + needed(gap0, gap1, speed, dt)
+        wanted[n] = speed + needed(gap0, gap1, speed, give, dt)
         friction[n], pair[n] = mu[part[a], part[c]], -1
         n += 1
     return n

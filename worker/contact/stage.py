@@ -25,6 +25,7 @@ from ..state import Flags, Floats, Indices, Ints, Model, Nodes, extended
 from ..timers import Timers
 from ..topology import Split
 from . import held, meetings, pairing, scene, surface, sweeps
+from .account import Account
 from .course import courses
 from .cracks import Cracks, across
 from .flight import Flight
@@ -67,6 +68,9 @@ class Contact(Boundary):
         largest, fastest = extremes
         self._scale = fixed_point.scale_for(largest * fastest)
         self._friction = fixed_point.Tally(np.array([largest * fastest * fastest]))
+        self._account = Account(largest * fastest * fastest)
+        self._give_back = 0.0
+        """Of penetrations, taken back in this step (meetings.PUSH_OUT)."""
         self._parts = np.zeros((len(case.parts), 3), np.int64)
         self._scene: Scene | None = None
         self.due = True
@@ -92,9 +96,10 @@ class Contact(Boundary):
         super().keep(parcel, name)
         parcel.known["contact"] = (
             self._scale, self._friction.scale, self.due, self.limit, self._stale, self.searches, self._last,
-            self._mean_dt, self._scene is not None,
+            self._mean_dt, self._scene is not None, self._account.known(),
         )  # fmt: skip
         parcel.sums["contact.parts"], parcel.sums["contact.friction"] = self._parts, self._friction.words
+        parcel.sums["contact.account"] = self._account.words
         self._flight.keep(parcel)
         edges = self._surface.edges if not self._stale else self._surface.edges.take(np.zeros(0, np.int64))
         parcel.rows["contact.edges"] = {
@@ -112,9 +117,10 @@ class Contact(Boundary):
         super().resume(parcel, name, dt)
         (
             self._scale, self._friction.scale, self.due, self.limit, self._stale, self.searches, self._last,
-            self._mean_dt, searched,
+            self._mean_dt, searched, account,
         ) = parcel.known["contact"]  # fmt: skip
         self._parts, self._friction.words = parcel.sums["contact.parts"], parcel.sums["contact.friction"]
+        self._account.resume(parcel.sums["contact.account"], account)
         state = self._model.nodes
         self._surface.flags = parcel.nodes["flight.flags"]
         self._surface = surface.with_edges(self._surface, parcel.rows["contact.edges"], state)
@@ -296,6 +302,7 @@ class Contact(Boundary):
         now.copies.begin(state)
         held.take(crowd.x, crowd.v, now.held, state.x, state.v, now.local)
         now.copies.finish(crowd.x, crowd.v, now.before)
+        self._give_back = meetings.PUSH_OUT if self._account.settle(self._comm) else 0.0
         n = now.met = self._meet(now, dt)
         rows = sweeps.parted(room.nodes, now.shared, n)
         self._weigh(now, n, rows)
@@ -313,6 +320,8 @@ class Contact(Boundary):
             now.kept[room.pair[:n][faces]] = now.push[:n][faces]
             heat = self._friction
             sweeps.heat(heat.words.reshape(-1), now.push, slip, crowd.v, *room_of, room.friction, heat.scale[0], n)
+        account = self._account
+        sweeps.cost(account.words, now.push, now.before, crowd.v, *room_of, account.scale, n)
         self._book(now)
         if held.give_back(state.v, self._parts, now.local, now.held, crowd.v, now.total, state.part, state.owned):
             self.last_push = t
@@ -340,7 +349,7 @@ class Contact(Boundary):
     def _meet(self, now: Scene, dt: float) -> int:
         crowd, room = now.crowd, now.room
         out = (room.nodes, room.weights, room.normals, room.wanted, room.friction, room.pair)
-        found = (crowd.x, crowd.v, crowd.part, self._mu, dt)
+        found = (crowd.x, crowd.v, crowd.part, self._mu, self._give_back, dt)
         rest = now.rest
         surfaces = now.faces, now.face_size, now.edges, now.edge_size, now.normals
         if rest.fresh:
