@@ -62,7 +62,7 @@ def node_face(
         np.arange(len(faces)), np.ones(len(faces), bool), np.zeros((n, 9)) if out is None else moments(out),
         np.ones(n, bool), first, following, np.empty(n), np.empty(n, np.int32), np.empty((len(faces), 3)),
         np.zeros(len(faces), bool), pairs, _all(pairs), x, v,
-        own.astype(np.int32), np.zeros((9, 9)) if mu is None else mu, dt,
+        own.astype(np.int32), np.zeros((9, 9)) if mu is None else mu, kernels.PUSH_OUT, dt,
     )  # fmt: skip
     return _filled(room, found)
 
@@ -73,7 +73,7 @@ def edge_edge(x: Floats, v: Floats, edges: Indices, pairs: Indices, dt: float, m
     found = kernels.edge_edge(
         room.nodes, room.weights, room.normals, room.wanted, room.friction, room.pair, 0, edges, edge_sizes(x, edges),
         np.ones((len(edges), 2), bool), pairs, _all(pairs), x, v, np.zeros(len(x), np.int32),
-        np.zeros((9, 9)) if mu is None else mu, dt,
+        np.zeros((9, 9)) if mu is None else mu, kernels.PUSH_OUT, dt,
     )  # fmt: skip
     return _filled(room, found)
 

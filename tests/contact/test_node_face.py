@@ -47,7 +47,7 @@ class Expected:
         self.weights = np.array([1.0, *-(np.maximum(b, 0.0) / np.maximum(b, 0.0).sum())])
         speed = float(self.normal @ (self.weights @ v[[s, *three]]))
         depth = max(-self.gap0, 0.0)
-        back = meetings._PUSH_OUT * min(depth / dt, max(-speed, 0.0))
+        back = meetings.PUSH_OUT * min(depth / dt, max(-speed, 0.0))
         self.wanted = speed - (depth + self.gap1) / dt + back
         self.deep = self.gap0 < -meetings._TOUCHING * size
 

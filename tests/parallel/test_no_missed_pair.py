@@ -101,7 +101,7 @@ class Brute(Found):
     def _state(self, dt: float) -> tuple[Any, ...]:
         sides, nodes = self.contact._flight.sides, self.sim.model.nodes
         local = sides.crowd.local
-        return nodes.x[local], nodes.v[local], sides.crowd.part, self.contact._mu, dt
+        return nodes.x[local], nodes.v[local], sides.crowd.part, self.contact._mu, self.contact._give_back, dt
 
     def _nodes(self, dt: float) -> Met:
         sides, state, met = self.contact._flight.sides, self._state(dt), Met()

@@ -125,12 +125,12 @@ def touching(table, flags):  # type: ignore[no-untyped-def]
 @njit(
     "UniTuple(int64, 2)(int32[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], int32[::1], "
     "int64, int64[::1], int32[:, ::1], float64, float64[:, ::1], float64[:, ::1], int32[::1], "
-    "float64[:, ::1], float64)",
+    "float64[:, ::1], float64, float64)",
     cache=True,
     error_model="numpy",
 )
 def across(  # type: ignore[no-untyped-def]
-    nodes, weights, normals, wanted, friction, pair, n, opening, cracks, typical, x, v, part, mu, dt
+    nodes, weights, normals, wanted, friction, pair, n, opening, cracks, typical, x, v, part, mu, give, dt
 ):  # fmt: skip
     """Nodes across ``cracks`` (m, 6) that close on each other, from row ``n`` on (meetings.node_face).
 
@@ -171,7 +171,7 @@ def across(  # type: ignore[no-untyped-def]
             weights[n, 0], weights[n, 1], weights[n, 2], weights[n, 3] = 1.0, -1.0, 0.0, 0.0
             for i in range(3):
                 normals[n, i] = m[i]
-            wanted[n] = speed + needed(gap0, gap1, speed, dt)
+            wanted[n] = speed + needed(gap0, gap1, speed, give, dt)
             friction[n], pair[n] = mu[part[p], part[q]], -1
             n += 1
         if most >= (_WIDE * typical) ** 2:

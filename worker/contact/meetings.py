@@ -23,9 +23,9 @@ _TOUCHING = 1e-3
 """Of the size of a face: deeper than this, a node is held by the nearest face only."""
 _MARGIN = 1e-3
 """Of the area coordinates: how far outside of a face its point may lie."""
-_PUSH_OUT = 0.1
-"""Largest share of a penetration that is taken back in a step, and of the speed of closing that is given back for it:
-less than an elastic impact returns, so that it makes no energy."""
+PUSH_OUT = 0.1
+"""Largest share of a penetration that is taken back in a step, and of the speed of closing that is given back for it;
+nothing while contact has no energy to give back (``account.Account``)."""
 FACING = 0.1
 """A node looks at a face when the cosines of the face's normal and those of its own faces have a mean below this, and
 their mean less their deviation comes below minus this."""
@@ -60,7 +60,7 @@ class Meetings:
 
 _V2, _N2 = "float64[:, ::1]", "int32[:, ::1]"
 _OUT = f"{_N2}, {_V2}, {_V2}, float64[::1], float64[::1], int32[::1]"
-_IN = f"{_N2}, int32[::1], {_V2}, {_V2}, int32[::1], {_V2}, float64"
+_IN = f"{_N2}, int32[::1], {_V2}, {_V2}, int32[::1], {_V2}, float64, float64"
 
 
 @njit(f"float64(float64[::1], {_V2}, int64, int64, int64, int64)", cache=True, error_model="numpy")
@@ -150,10 +150,12 @@ def _outside(x, p, pairs, faces, size, exposed, first, following, part, depth): 
     return False
 
 
-@njit("float64(float64, float64, float64, float64)", cache=True)
-def needed(gap0, gap1, speed, dt):  # type: ignore[no-untyped-def]
-    """By how much the normal speed must rise, m/s: not to pass, and when that has happened already, not deeper."""
-    back = _PUSH_OUT * min(max(-gap0, 0.0) / dt, max(-speed, 0.0))
+@njit("float64(float64, float64, float64, float64, float64)", cache=True)
+def needed(gap0, gap1, speed, give, dt):  # type: ignore[no-untyped-def]
+    """By how much the normal speed must rise, m/s: not to pass, and when that has happened already, not deeper; a
+    share ``give`` of the penetration is taken back (PUSH_OUT).
+    """
+    back = give * min(max(-gap0, 0.0) / dt, max(-speed, 0.0))
     return (min(gap0, 0.0) - gap1) / dt + back
 
 
@@ -188,7 +190,7 @@ def _looks_at(out, s, m):  # type: ignore[no-untyped-def]
 )
 def node_face(  # type: ignore[no-untyped-def]
     nodes, weights, normals, wanted, friction, pair, n, faces, size, ids, exposed, out, on_surface, first, following,
-    deepest, holder, planes, known, pairs, some, x, v, part, mu, dt,
+    deepest, holder, planes, known, pairs, some, x, v, part, mu, give, dt,
 ):  # fmt: skip
     """Nodes that pass a face, from row ``n`` on; returns the new number of rows.
 
@@ -253,7 +255,7 @@ def node_face(  # type: ignore[no-untyped-def]
             weights[at, a + 1] = -b[a]
             normals[at, a] = m[a]
             speed += m[a] * (v[s, a] - (b[0] * v[i, a] + b[1] * v[j, a] + b[2] * v[k, a]))
-        wanted[at] = speed + needed(gap0, gap1, speed, dt)
+        wanted[at] = speed + needed(gap0, gap1, speed, give, dt)
         friction[at], pair[at] = mu[part[s], part[i]], p
     return n
 
@@ -320,7 +322,7 @@ def _volume(u, w, r):  # type: ignore[no-untyped-def]
 
 @njit(f"int64({_OUT}, int64, {_N2}, float64[::1], boolean[:, ::1], {_IN})", cache=True, error_model="numpy")
 def edge_edge(  # type: ignore[no-untyped-def]
-    nodes, weights, normals, wanted, friction, pair, n, edges, size, exposed, pairs, some, x, v, part, mu, dt,
+    nodes, weights, normals, wanted, friction, pair, n, edges, size, exposed, pairs, some, x, v, part, mu, give, dt,
 ):  # fmt: skip
     """Edges that pass an edge, from row ``n`` on; returns the new number of rows. They meet where they cross.
 
@@ -380,7 +382,7 @@ def edge_edge(  # type: ignore[no-untyped-def]
         for k in range(3):
             normals[n, k] = m[k]
             speed += m[k] * ((1.0 - t) * v[c, k] + t * v[d, k] - (1.0 - s) * v[a, k] - s * v[b, k])
-        wanted[n] = speed + needed(gap0, gap1, speed, dt)
+        wanted[n] = speed + needed(gap0, gap1, speed, give, dt)
         friction[n], pair[n] = mu[part[a], part[c]], -1
         n += 1
     return n

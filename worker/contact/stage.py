@@ -25,6 +25,7 @@ from ..state import Flags, Floats, Indices, Ints, Model, Nodes, extended
 from ..timers import Timers
 from ..topology import Split
 from . import held, meetings, normals, pairing, scene, surface, sweeps
+from .account import Account
 from .course import courses
 from .cracks import Cracks, across
 from .flight import Flight, typical
@@ -79,6 +80,9 @@ class Contact:
         largest, fastest = extremes
         self._scale = fixed_point.scale_for(largest * fastest)
         self._friction = fixed_point.Tally(np.array([largest * fastest * fastest]))
+        self._account = Account(largest * fastest * fastest)
+        self._give_back = 0.0
+        """Of penetrations, taken back in this step (meetings.PUSH_OUT)."""
         self._parts = np.zeros((len(case.parts), 3), np.int64)
         self._scene: Scene | None = None
         self.due = True
@@ -110,9 +114,11 @@ class Contact:
         parcel.nodes["contact.contact_loss"] = self.contact_loss
         parcel.nodes["contact.external_work"] = self.external_work
         parcel.known["contact"] = (
-            self._scale, self._friction.scale, self.limit, self.searches, self._mean_dt, self._size
+            self._scale, self._friction.scale, self.limit, self.searches, self._mean_dt, self._size,
+            self._account.known(),
         )  # fmt: skip
         parcel.sums["contact.parts"], parcel.sums["contact.friction"] = self._parts, self._friction.words
+        parcel.sums["contact.account"] = self._account.words
         parcel.rows["contact.cracks"] = self._cracks.keep(parcel.nodes["id"])
         parcel.nodes["contact.flags"], parcel.nodes["contact.moments"] = self._surface.flags, self._moments
         total = np.zeros((self._model.nodes.n, 3), np.int64)
@@ -128,9 +134,10 @@ class Contact:
         """Takes it back; all ranks take part."""
         self.contact_loss = np.array(parcel.nodes["contact.contact_loss"])
         self.external_work = np.array(parcel.nodes["contact.external_work"])
-        self._scale, self._friction.scale, self.limit, self.searches, self._mean_dt, self._size = parcel.known[
-            "contact"
-        ]
+        (
+            self._scale, self._friction.scale, self.limit, self.searches, self._mean_dt, self._size, account,
+        ) = parcel.known["contact"]  # fmt: skip
+        self._account.resume(parcel.sums["contact.account"], account)
         self._parts, self._friction.words = parcel.sums["contact.parts"], parcel.sums["contact.friction"]
         self._surface.flags = np.array(parcel.nodes["contact.flags"])
         self._moments = np.array(parcel.nodes["contact.moments"])
@@ -391,6 +398,7 @@ class Contact:
         now.copies.begin(state)
         held.take(crowd.x, crowd.v, now.held, state.x, state.v, now.local)
         now.copies.finish(crowd.x, crowd.v, now.before)
+        self._give_back = meetings.PUSH_OUT if self._account.settle(self._comm) else 0.0
         n = now.met = self._meet(now, dt)
         rows = sweeps.parted(room.nodes, now.shared, n)
         self._weigh(now, n, rows)
@@ -415,6 +423,8 @@ class Contact:
             now.kept[room.pair[:n][faces]] = now.push[:n][faces]
             heat = self._friction
             sweeps.heat(heat.words.reshape(-1), now.push, slip, crowd.v, *room_of, room.friction, heat.scale[0], n)
+        account = self._account
+        sweeps.cost(account.words, now.push, now.before, crowd.v, *room_of, account.scale, n)
         self._book(now)
         if held.give_back(state.v, self._parts, now.local, now.held, crowd.v, now.total, state.part, state.owned):
             self.last_push = t
@@ -442,7 +452,7 @@ class Contact:
     def _meet(self, now: Scene, dt: float) -> int:
         crowd, room = now.crowd, now.room
         out = (room.nodes, room.weights, room.normals, room.wanted, room.friction, room.pair)
-        found = (crowd.x, crowd.v, crowd.part, self._mu, dt)
+        found = (crowd.x, crowd.v, crowd.part, self._mu, self._give_back, dt)
         rest = now.rest
         surfaces = now.faces, now.face_size, now.edges, now.edge_size, now.normals
         if rest.fresh:

@@ -203,3 +203,28 @@ def heat(words, push, slip, v, nodes, weights, normals, friction, joule, n):  # 
             high = np.rint(work * joule)
             words[0] += np.int64(high)
             words[1] += np.int64(np.rint((work * joule - high) * 2.0**30))
+
+
+@njit(f"void({_I2}, {_V2}, {_V2}, {_V2}, {_N2}, {_V2}, {_V2}, float64, int64)", cache=True)
+def cost(words, push, before, v, nodes, weights, normals, joule, n):  # type: ignore[no-untyped-def]
+    """Adds what the impulses along the normals take from the bodies, and what they have given back by the middle of
+    their work, to two limbs (rows of ``words``) of quanta of 1 / ``joule`` J.
+
+    An impulse J between the speeds u(n-1/2), of ``before``, and u(n+1/2) takes -J (u(n-1/2) + u(n+1/2)) / 2; the ledger
+    at time n has the first half of that.
+    """
+    value = np.empty(2)
+    for p in range(n):
+        if push[p, 0] > 0.0:
+            early, late = 0.0, 0.0
+            for k in range(4):
+                for i in range(3):
+                    share = weights[p, k] * normals[p, i]
+                    early += share * before[nodes[p, k], i]
+                    late += share * v[nodes[p, k], i]
+            value[0] = -0.5 * push[p, 0] * (early + late)
+            value[1] = 0.5 * push[p, 0] * early
+            for m in range(2):
+                high = np.rint(value[m] * joule)
+                words[0, m] += np.int64(high)
+                words[1, m] += np.int64(np.rint((value[m] * joule - high) * 2.0**30))

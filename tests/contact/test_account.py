@@ -1,0 +1,82 @@
+"""Contact gives back no more energy than it has taken, whatever the step."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from conoid.cases.load import apply_overrides, parse_case, read_data, shipped_path
+from conoid.worker import simulation
+from conoid.worker.contact import sweeps
+from conoid.worker.contact.account import Account
+from conoid.worker.parallel.comm import Comm, SerialComm
+from conoid.worker.simulation import Simulation
+
+from ..worker.kernels import Floats, run
+from .ranks import on_ranks
+
+SPHERES = (
+    "run.frames=0", "run.end_time=27e-6", "parts[0].mesh.element_size=0.2e-3", "parts[1].mesh.element_size=0.2e-3"
+)  # fmt: skip
+"""Hertz's spheres, elastic and without viscosity, on a coarse mesh, to where they turn round."""
+
+
+@pytest.mark.parametrize("safety", [1.0, 0.9, 0.5])
+def test_spheres_that_meet_get_no_energy_from_contact(safety: float) -> None:
+    """Nodes sank in under a small force and were pushed out under a large one: 9e-4 of the energy came from nothing."""
+    data = apply_overrides(read_data(shipped_path("hertz_spheres")), [*SPHERES, f"numerics.dt_safety={safety}"])
+    sim, lines = simulation.build(parse_case(data), Path(), SerialComm()), list[float]()
+
+    def watch(sim: Simulation, before: Floats) -> None:
+        if sim.clock.step % 5 == 0:
+            lines.append(sim.ledger.close(before).contact / sim.ledger.initial)
+
+    run(sim, watch)
+    assert sim.ledger.worst < 1e-3
+    assert min(lines) > -1e-12
+    assert 0.0 < lines[-1] < 5e-3
+
+
+def test_the_cost_of_an_impulse_is_the_work_between_two_half_steps() -> None:
+    """Nodes of 1 and 3 kg and two without a weight; the second meeting is not pushed."""
+    before, v = np.zeros((4, 3)), np.zeros((4, 3))
+    before[:2, 0], v[:2, 0] = (2.0, -1.0), (-1.0, 0.0)
+    nodes, weights = np.array([[0, 1, 2, 3], [1, 0, 2, 3]], np.int32), np.array([[1.0, -1.0, 0.0, 0.0]] * 2)
+    normals, push = np.array([[-1.0, 0.0, 0.0]] * 2), np.array([[3.0, 0.0, 0.0, 0.0], [0.0] * 4])
+    account = Account(1.0)
+    sweeps.cost(account.words, push, before, v, nodes, weights, normals, account.scale, 2)
+    account.settle(SerialComm())
+    _, taken, early, _ = account.known()
+    kinetic = 0.5 * np.array([1.0, 3.0, 0.0, 0.0]) @ (before[:, 0] ** 2 - v[:, 0] ** 2)
+    assert taken == pytest.approx(kinetic, rel=1e-12)
+    assert early == pytest.approx(-0.5 * 3.0 * 3.0, rel=1e-12)
+
+
+def booked(account: Account, taken: float, early: float = 0.0) -> None:
+    """A step in which contact has taken so much, J."""
+    account.words[0] += np.rint(np.array([taken, early]) * account.scale).astype(np.int64)
+
+
+def test_what_has_not_been_taken_is_not_given_back() -> None:
+    """Only while there is twice the most that a step has given back so far."""
+    account, comm = Account(1.0), SerialComm()
+    assert account.settle(comm)
+    for taken, early, may in (
+        (0.25, 0.0, True), (-0.0625, 0.0, True), (-0.09375, 0.0, False), (0.125, 0.0, True), (0.0, 0.125, False),
+    ):  # fmt: skip
+        booked(account, taken, early)
+        assert account.settle(comm) == may
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_all_ranks_decide_alike_and_a_run_that_goes_on_as_before(ranks: int) -> None:
+    def decide(comm: Comm) -> tuple[bool, bool, float]:
+        account = Account(1.0)
+        booked(account, 1.0 if comm.rank == 0 else -0.03125)
+        first = account.settle(comm)
+        other = Account(7.0)
+        other.resume(account.words, account.known())
+        booked(other, -0.03125)
+        return first, other.settle(comm), other.known()[1]
+
+    assert on_ranks(ranks, decide) == [(True, True, 1.0 - 0.03125 * (2 * ranks - 1))] * ranks
