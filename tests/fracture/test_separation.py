@@ -21,7 +21,7 @@ from conoid.worker.parallel.fixed_point import exact_sums
 from conoid.worker.simulation import Simulation
 from conoid.worker.state import BROKEN, INTACT, MASS, Floats, Ints, Model
 
-from ..contact.bodies import meeting_of, pieces_of
+from ..contact.bodies import meeting_of, moved, pieces_of
 from ..contact.ranks import on_ranks
 from ..worker.meshes import block, positive
 from ..worker.simulations import on
@@ -381,3 +381,26 @@ def test_forces_are_those_of_the_tets_after_every_event(model: str, form: str) -
     assert runs[0][0][0] > 1.5 * len(mesh.points)
     assert runs[0][0][1] > 100
     assert all(one == runs[0][0] for found in runs for one in found)
+
+
+def test_ranks_without_a_part_of_nodal_tractions_take_part_in_them() -> None:
+    """Two bars side by side, one with nodal tractions: of five ranks some hold the other one only."""
+    motion = {"stretch": schema.Stretch(rate=(0.0, 0.0, 3e4), centre=(0.0, 0.0, 2e-3)), "jitter": 3.0}
+    specs = [schema.Fracture(delay=0.2, traction=traction) for traction in ("nodes", "tets")]
+    case = meeting_of([{**motion, "fracture": spec} for spec in specs], material=BRITTLE, end=1.0)
+    case = case.model_copy(update={"contact": None})
+    meshes = [block((2, 2, 4), 1e-3, seed=5), moved(block((2, 2, 4), 1e-3, seed=6), (1e-2, 0.0, 0.0))]
+
+    def work(sim: Simulation) -> tuple[int, int, int]:
+        assert sim.fracture is not None
+        step.prepare(sim)
+        for _ in range(STEPS):
+            step.first_half(sim)
+            step.second_half(sim)
+        return sim.model.nodes_global, sim.fracture.broken, len({b.part for b in sim.model.blocks})
+
+    (one,) = on(1, case, meshes, work)
+    many = on(5, case, meshes, work)
+    assert one[1] > 100
+    assert {found[:2] for found in many} == {one[:2]}
+    assert min(parts for *_, parts in many) == 1

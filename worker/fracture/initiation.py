@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from conoid.cases.schema import Fracture
+
 from ..clock import Clock
 from ..migration.parcel import Parcel
 from ..parallel.comm import Comm
@@ -21,12 +23,15 @@ class Initiation:
     """Finds the facets that break on one rank, and keeps the clocks of the delayed criterion."""
 
     def __init__(
-        self, model: Model, bodies: list[Body], stars: dict[int, Stars], neighbours: list[Neighbour], comm: Comm,
-        clock: Clock,
+        self, model: Model, bodies: list[Body], specs: list[Fracture], stars: dict[int, Stars],
+        neighbours: list[Neighbour], comm: Comm, clock: Clock,
     ) -> None:  # fmt: skip
-        """``stars``: by index of the block. All ranks take part."""
+        """``specs``: of all parts that fracture, here or not; ``stars``: by index of the block. All ranks take part."""
         self._model, self._neighbours, self._comm, self._clock = model, neighbours, comm, clock
         self.bodies = bodies
+        self.smooth = any(spec.traction == "nodes" for spec in specs)
+        """Whether some part wants nodal tractions."""
+        self.one_by_one = any(spec.order == "local_maximum" for spec in specs)
         self._stars = stars
         self.interface = Interface(bodies, neighbours, comm)
         heaviest = np.zeros(len(model.parts))
@@ -54,7 +59,7 @@ class Initiation:
         """The bodies of which facets may break, with these; the same ranks take part. Once a step: clocks go on."""
         self.interface.exchange(self.bodies, self._model.nodes.x)
         found = [(body, self._candidates(k, body)) for k, body in enumerate(self.bodies)]
-        if any(body.spec.traction == "nodes" for body in self.bodies):
+        if self.smooth:
             found = self._smoothed(found)
         return [(body, some) for body, some in found if len(some.place)]
 

@@ -51,12 +51,10 @@ class Fracture:
         bodies, work = self._armed(case, comm)
         meshes = {body.index: body.mesh for body in bodies}
         self.separation = Separation(model, neighbours, meshes, comm)
-        self.initiation = Initiation(model, bodies, self.separation.stars, neighbours, comm, clock)
+        specs = [part.fracture for part in case.parts if part.fracture is not None]
+        self.initiation = Initiation(model, bodies, specs, self.separation.stars, neighbours, comm, clock)
         self._handover = Handover(model, meshes, neighbours, comm)
         self._insertion = Insertion(case.numerics.dt_safety)
-        specs = [part.fracture for part in case.parts if part.fracture is not None]
-        self._late = any(spec.traction == "nodes" for spec in specs)
-        self._one_by_one = any(spec.order == "local_maximum" for spec in specs)
         self._found: list[Breaking] | None = None
         """What breaks in this step; None before that is known."""
         self.cohesion: Cohesion | None = None
@@ -83,7 +81,7 @@ class Fracture:
         self.initiation.begin_step()
         hot = bool(self._elements.hot)
         self._found = None
-        if self._late or not expected:
+        if self.initiation.smooth or not expected:
             return BREAKS if hot else NOTHING
         self._found = self.initiation.breaking()
         return BREAKS if self._found else OVERSTRESSED if hot else NOTHING
@@ -97,7 +95,7 @@ class Fracture:
         if agreed < BREAKS:
             return
         found = self.initiation.breaking() if self._found is None else self._found
-        self._break(self.initiation.strongest(found) if self._one_by_one else found)
+        self._break(self.initiation.strongest(found) if self.initiation.one_by_one else found)
 
     def keep(self, parcel: Parcel) -> None:
         """Adds what fracture must remember to a parcel."""

@@ -126,7 +126,6 @@ def _nothing_of(parcel: Parcel) -> Parcel:
     return Parcel(
         {}, {name: np.zeros_like(words) for name, words in parcel.sums.items()}, take(parcel.nodes, none), {},
         {name: take(table, none) for name, table in parcel.rows.items()},
-        {name: take(table, none) for name, table in parcel.books.items()},
     )  # fmt: skip
 
 
@@ -139,8 +138,6 @@ def _write_parcel(path: Path, parcel: Parcel) -> None:
             _write_table(file, f"tets/{part}", table)
         for name, table in parcel.rows.items():
             _write_table(file, f"rows/{name}", table)
-        for name, table in parcel.books.items():
-            _write_table(file, f"books/{name}", table)
     with path.open("rb") as handle:
         os.fsync(handle.fileno())
 
@@ -155,8 +152,7 @@ def _read_parcel(path: Path) -> Parcel:
         sums = {name: words[()] for name, words in file.get("sums", {}).items()}
         tets = {int(part): _columns(table) for part, table in file.get("tets", {}).items()}
         rows = {name: _columns(table) for name, table in file.get("rows", {}).items()}
-        books = {name: _columns(table) for name, table in file.get("books", {}).items()}
-        return Parcel({}, sums, _columns(file["nodes"]), tets, rows, books)
+        return Parcel({}, sums, _columns(file["nodes"]), tets, rows)
 
 
 def _columns(group: "h5py.Group") -> Table:

@@ -56,13 +56,9 @@ class Parcel:
     where they are, ``at`` (k, 3). Nodes ``with`` them (k, m), -1 for none, come along, ``key`` (k,) tells copies of a
     row apart from other rows."""
 
-    books: dict[str, Table] = field(default_factory=dict)
-    """What many rows refer to, a row each with its ``id``: a column of the same name in a table of ``rows`` holds ids,
-    and what they stand for comes along with tables that go to the owners of nodes."""
-
     def packed(self) -> Ints:
         """One flat message."""
-        data = pickle.dumps((self.known, self.sums, self.nodes, self.tets, self.rows, self.books), protocol=5)
+        data = pickle.dumps((self.known, self.sums, self.nodes, self.tets, self.rows), protocol=5)
         words = np.zeros(1 + -(-len(data) // 8), np.int64)
         words[0] = len(data)
         words[1:].view(np.uint8)[: len(data)] = np.frombuffer(data, np.uint8)
@@ -80,12 +76,10 @@ class Parcel:
         parts = sorted({part for p in parcels for part in p.tets})
         names = sorted({name for p in parcels for name in p.rows})
         rows = {name: joined([p.rows.get(name, {}) for p in parcels]) for name in names}
-        books = {name: joined([p.books[name] for p in parcels if p.books]) for name in parcels[0].books}
         return cls(
             parcels[0].known,
             {name: np.sum([p.sums[name] for p in parcels], axis=0) for name in parcels[0].sums},
             once(nodes, nodes["id"]) if nodes else {},
             {part: joined([p.tets.get(part, {}) for p in parcels]) for part in parts},
             rows,
-            {name: once(book, book["id"]) for name, book in books.items()},
         )

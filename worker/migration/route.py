@@ -12,7 +12,7 @@ from ..parallel.comm import Comm
 from ..parallel.decompose import Cut, bisect, place
 from ..parallel.ownership import Neighbour
 from ..state import Flags, Floats, Indices, Ints, among
-from .parcel import Parcel, Table, joined, length, once, take
+from .parcel import Parcel, joined, length, once, take
 
 _NOBODY = np.iinfo(np.int64).max
 """Stands for the smallest tet of a rank that has none at a node."""
@@ -72,8 +72,6 @@ def route(parcel: Parcel, scale: tuple[float, float, float], comm: Comm) -> Arri
     moved = (sum(length(t) for p in others for t in p.tets.values()), length(whole.nodes) - length(mine.nodes))
     directory, neighbours, owner = _settle(whole, comm)
     _to_owners(parcel, whole, directory)
-    for name in sorted(parcel.rows):
-        _name_owners(whole.rows[name], directory)
     border = np.zeros(length(whole.nodes), bool)
     for other in neighbours:
         border[other.nodes] = True
@@ -150,30 +148,12 @@ def _company(every: Ints, group: Ints, owners: Ints, rank: int) -> Ints:
 
 
 def _to_owners(parcel: Parcel, whole: Parcel, directory: Directory) -> None:
-    """Moves the tables that go to the owners of their nodes, and what they refer to."""
+    """Moves the tables that go to the owners of their nodes."""
     comm, names = directory.comm, sorted(name for name, table in parcel.rows.items() if "node" in table)
     owners = {name: directory.owners(parcel.rows[name]["node"]) for name in names}
     sends = {}
     for rank in range(comm.size):
-        rows = {name: take(parcel.rows[name], owners[name] == rank) for name in names}
-        sends[rank] = Parcel(rows=rows, books={name: _named(book, name, rows) for name, book in parcel.books.items()})
+        sends[rank] = Parcel(rows={name: take(parcel.rows[name], owners[name] == rank) for name in names})
     told = [Parcel.unpacked(words) for words in comm.swap({r: p.packed() for r, p in sends.items()}).values()]
     for name in names:
         whole.rows[name] = joined([p.rows[name] for p in told])
-    for name in sorted(parcel.books):
-        book = joined([p.books[name] for p in told])
-        whole.books[name] = once(book, book["id"])
-        _name_owners(whole.books[name], directory)
-
-
-def _named(book: Table, name: str, rows: dict[str, Table]) -> Table:
-    """What the rows of some tables refer to by ``name``."""
-    used = [table[name].reshape(-1) for table in rows.values() if name in table]
-    return take(book, among(np.unique(np.concatenate([np.zeros(0, np.int64), *used])), book["id"]))
-
-
-def _name_owners(table: Table, directory: Directory) -> None:
-    """Adds ``owners`` of the nodes ``ends`` (k, m) of a table that has such."""
-    if "ends" in table:
-        ids, back = np.unique(table["ends"], return_inverse=True)
-        table["owners"] = directory.owners(ids)[back].reshape(table["ends"].shape)

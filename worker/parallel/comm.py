@@ -3,6 +3,7 @@
 Everything that decides is a maximum over int64 words, or a sum of integers: no order of ranks can change a bit of it.
 """
 
+import os
 import pickle
 import sys
 import time
@@ -272,7 +273,8 @@ class MpiComm:
         theirs, status = {}, self._mpi.Status()
         with self.waiting():
             for rank in mine:
-                message = self._world.Mprobe(rank, Tag.TRADE, status)
+                while (message := self._world.Improbe(rank, Tag.TRADE, status)) is None:
+                    os.sched_yield()  # Mprobe keeps the core that the other rank may need
                 theirs[rank] = np.empty(status.Get_count(self._mpi.INT64_T), np.int64)
                 message.Recv(theirs[rank])
             self._mpi.Request.Waitall(requests)
