@@ -237,7 +237,6 @@ class Follower:
         old = scene.faces[rows]
         now = self._followed(heard, old, scene.face_id[rows] // 4)
         scene.faces[rows], scene.rest.faces[rows] = now, True
-        scene.pushes[now[:, :3]] = True
         pairs = np.empty((3 * len(rows) * (1 + family.most), 2), np.int32)
         n = _apart_from_faces(pairs, rows, old, now, family.first, family.member, scene.slave, self._meets(old[:, 0]))
         self._add_pairs(pairs[:n])
@@ -253,7 +252,6 @@ class Follower:
         gone = (one[:, :2] != two[:, :2]).any(axis=1)
         now[gone] = now[gone][:, [0, 0, 0, 0]]
         scene.edges[rows], scene.rest.edges[rows] = now, True
-        scene.pushes[now[:, :2]] = True
         order = np.lexsort((sides[:, 1], sides[:, 0]))
         order = order[~gone[order] & self._meets(nodes[order, 0])]
         ends = nodes[order, :2]
@@ -269,11 +267,11 @@ class Follower:
         return np.asarray(self._scene.meets_itself[self._scene.crowd.part[places]])
 
     def _candidates(self, heard: News, parents: Flags) -> None:
-        """A copy has the candidates and the normals of its parent."""
+        """A copy has the candidates and the normals of its parent, and is pushed by the ranks that push that one."""
         scene = self._scene
         family = np.column_stack([self.places(heard.parent), self.places(heard.copy)])
         parent, copies = family[(family >= 0).all(axis=1)].T
-        for name in ("normals", "slave", "on_surface"):
+        for name in ("normals", "slave", "on_surface", "pushes"):
             column = getattr(scene, name)
             column[copies] = column[parent]
         rows = np.flatnonzero(parents[scene.node_face[:, 0]])
@@ -294,7 +292,6 @@ class Follower:
         scene.keys = extended(scene.keys, np.column_stack([scene.crowd.id[slave], scene.face_id[face]]))
         scene.kept = extended(scene.kept, np.zeros((len(pairs), 4)))
         scene.rest.add_candidates(len(pairs))
-        scene.pushes[slave] = True
 
 
 def _flagged(some: Indices, n: int) -> Flags:
