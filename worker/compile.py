@@ -36,6 +36,7 @@ _MOST_WORDS = 500
 _PATIENCE = 900.0
 """s that a module may take: the largest takes ten on an idle core."""
 _LOCK, _LOOK = "lock", 0.3
+"""The file that whoever compiles holds, and s between two looks at it: a tenth of WORD_EVERY."""
 
 
 def compile_all(folder: Path, tell: Tell, root: Path = kernels.ROOT, package: str = "conoid.worker") -> bool:

@@ -10,7 +10,7 @@ from conoid.worker.parallel.tags import Tag
 
 HOUSE = Path(str(conoid.worker.__file__)).parent
 SOURCES = sorted(path for path in HOUSE.rglob("*.py") if path.name != "tags.py")
-AT = {"send": 2, "Isend": 2, "Send_init": 2, "recv": 2, "Irecv": 2, "Recv_init": 2}
+AT = {"send": 2, "Isend": 2, "Send_init": 2, "recv": 2, "Irecv": 2, "Recv_init": 2, "Improbe": 1}
 """Calls of mpi4py that take a tag, and at which place."""
 
 

@@ -43,6 +43,7 @@ _KINEMATIC = 2.0
 _WORDS = 27
 """Of the row of a crack that opens (Contact._opened)."""
 _NO_SIDES = np.zeros((0, 3), np.int32)
+"""Of cracks that may open: none (block, place, face)."""
 
 Parted = tuple[Indices, Indices]
 """Which meetings have nodes that another rank shares, and which have none."""

@@ -273,7 +273,7 @@ class MpiComm:
         theirs, status = {}, self._mpi.Status()
         with self.waiting():
             for rank in mine:
-                while (message := self._world.Improbe(rank, Tag.TRADE, status)) is None:
+                while (message := self._world.Improbe(rank, Tag.TRADE, status=status)) is None:
                     os.sched_yield()  # Mprobe keeps the core that the other rank may need
                 theirs[rank] = np.empty(status.Get_count(self._mpi.INT64_T), np.int64)
                 message.Recv(theirs[rank])
