@@ -110,11 +110,6 @@ class Copies:
         self._out, self._in = np.empty((len(self._from), 9)), np.empty((len(self._to), 9))
         self._exchange = comm.exchange(_slices(self._out, sends), _slices(self._in, receives), tag)
 
-    @property
-    def bytes_sent(self) -> int:
-        """Bytes this rank sends in one exchange."""
-        return self._out.nbytes
-
     def note(self, nodes: Nodes) -> None:
         """Keeps v(n-1/2) for the others."""
         self._out[:, 6:] = nodes.v[self._from]

@@ -122,7 +122,7 @@ class Contact:
         parcel.sums["contact.account"] = self._account.words
         parcel.rows["contact.cracks"] = self._cracks.keep(parcel.nodes["id"])
         parcel.nodes["contact.flags"], parcel.nodes["contact.moments"] = self._surface.flags, self._moments
-        total = np.zeros((self._model.nodes.n, 3), np.int64)
+        total = np.array(self._total) if len(self._total) else np.zeros((self._model.nodes.n, 3), np.int64)
         keys, kept = self._kept
         if (now := self._scene) is not None:
             total[now.local] = now.total[now.held]

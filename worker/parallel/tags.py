@@ -24,7 +24,7 @@ class Tag(IntEnum):
     CONTACT_IMPULSE = 13
     """Sums of the impulses of a sweep, in every sweep (contact/stage.py)."""
     NORMAL = 14
-    """Sums of the face normals at nodes, in every search (contact/flight.py)."""
+    """Sums of the face normals at nodes, in every sixteenth step and after erosion (contact/normals.py)."""
     TETS_AT_NODE = 15
     """How many tets a node has, at the start and in every removal (erosion.py)."""
     SEPARATED_FORCE = 16
