@@ -1,60 +1,68 @@
 """Bucket sort with position codes (Oldenburg and Nilsson 1994): what lies near a box, without a grid in memory.
 
-A point's code is ix + nx (iy + ny iz) of the bucket that it lies in (the paper's eq. 10). Sorted codes turn the search
-in space into a search in a list: a box asks for the buckets of its rows, each a range of codes. Memory follows the
-number of points, however far they fly.
+The code of a cell is ix + nx (iy + ny iz) (the paper's eq. 10). Every box is entered under the codes of the cells that
+it touches, and the entries are sorted by a hash of their codes: a box asks for the codes of its own cells, each a short
+range of entries. Memory follows the number of boxes, however far they fly.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from ..jit import njit
-from ..state import Floats, Ints
+from ..jit import njit, types
+from ..state import Floats, Indices, Ints
 
 _MOST = 2.0**20
-"""Buckets along an axis: codes of three stay far below 2^63."""
-_ROWS = 4
-"""Rows of buckets to a point, at most, that are worth a table."""
+"""Cells along an axis: codes of three stay far below 2^63."""
+_WIDE = 512
+"""Cells of a box that is not entered: everybody asks it."""
+_LEAST_BITS = 6
+"""Of the hash."""
 
 
-@dataclass
-class Buckets:
-    """Sorted points; ``order`` (m,) says which point each code belongs to."""
+class Table(NamedTuple):
+    """Boxes by the cells that they touch."""
 
     origin: Floats
     inverse: float
-    """One over the edge of a bucket, 1/m."""
+    """One over the edge of a cell, 1/m."""
     shape: Ints
-    """(3,) buckets along each axis."""
-    codes: Ints
-    order: Ints
-    rows: Ints
-    """Where each row of buckets along the first axis begins in ``codes``, and the end; empty if too many have none."""
+    """(3,) cells along each axis."""
+    bits: int
+    """Of the hash."""
+    start: Ints
+    """(2^bits + 1,) where the entries of each hash begin, and the end."""
+    thing: Indices
+    """(m,) which box an entry is of."""
+    code: Ints
+    """(m,) and under which code."""
+    wide: Indices
+    """(w,) boxes that touch too many cells."""
 
 
-def sort(points: Floats, edge: float) -> Buckets:
-    """Sorts points (m, 3) into buckets of edge ``edge``, m, or larger where the space is too wide for it."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    edge = max(edge, float((high - low).max()) / _MOST)
-    shape = np.floor((high - low) / edge).astype(np.int64) + 1
-    codes = position_codes(points, low, 1.0 / edge, shape)
-    order = np.argsort(codes, kind="stable")
-    codes, rows = codes[order], int(shape[1] * shape[2])
-    starts = np.arange(rows + 1 if rows <= _ROWS * len(codes) else 0) * shape[0]
-    return Buckets(low, 1.0 / edge, shape, codes, order, np.searchsorted(codes, starts))
+TABLE = types.NamedTuple(
+    (
+        types.float64[::1], types.float64, types.int64[::1], types.int64, types.int64[::1], types.int32[::1],
+        types.int64[::1], types.int32[::1],
+    ), Table
+)  # type: ignore[no-untyped-call]  # fmt: skip
 
 
-def grid(counts: Ints) -> tuple[Ints, Ints]:
-    """Every cell of n boxes of ``counts`` (n, 3) cells: the index of its box, and its own (3,) from zero."""
-    total = counts.prod(axis=1)
-    who = np.repeat(np.arange(len(total)), total)
-    number = np.arange(len(who)) - np.repeat(np.cumsum(total) - total, total)
-    index = np.empty((len(who), 3), np.int64)
-    for axis in range(3):
-        index[:, axis] = number % counts[who, axis]
-        number = number // counts[who, axis]
-    return who, index
+def sort(low: Floats, high: Floats, some: Indices, edge: float) -> Table:
+    """Enters ``some`` of the boxes ``low``, ``high`` (n, 3) into cells of edge ``edge``, m, or larger where the space is
+    too wide for it.
+    """
+    least, most = low[some].min(axis=0), high[some].max(axis=0)
+    edge = max(edge, float((most - least).max()) / _MOST)
+    shape = np.floor((most - least) / edge).astype(np.int64) + 1
+    count, wide = _count(low, high, some, least, 1.0 / edge, shape)
+    bits = max(_LEAST_BITS, int(count).bit_length())
+    table = Table(
+        least, 1.0 / edge, shape, bits, np.zeros(2**bits + 1, np.int64), np.empty(count, np.int32),
+        np.empty(count, np.int64), wide,
+    )  # fmt: skip
+    _enter(table, low, high, some)
+    return table
 
 
 @njit("int64(float64, float64, float64, int64)", cache=True)
@@ -63,28 +71,62 @@ def bucket_of(x, origin, inverse, n):  # type: ignore[no-untyped-def]
     return np.int64(min(max(np.floor((x - origin) * inverse), 0.0), n - 1.0))
 
 
-@njit("int64[::1](float64[:, ::1], float64[::1], float64, int64[::1])", cache=True)
-def position_codes(points, origin, inverse, shape):  # type: ignore[no-untyped-def]
-    """(m,) code of each point (m, 3)."""
-    codes = np.empty(len(points), np.int64)
-    for i in range(len(points)):
-        ix = bucket_of(points[i, 0], origin[0], inverse, shape[0])
-        iy = bucket_of(points[i, 1], origin[1], inverse, shape[1])
-        iz = bucket_of(points[i, 2], origin[2], inverse, shape[2])
-        codes[i] = ix + shape[0] * (iy + shape[1] * iz)
-    return codes
+@njit("int64(int64, int64)", cache=True)
+def bucket_at(code, bits):  # type: ignore[no-untyped-def]
+    """Hash of a code: the upper ``bits`` of its product with 2^64 over the golden ratio (Knuth 1998, 6.4)."""
+    return np.int64((np.uint64(code) * np.uint64(0x9E3779B97F4A7C15)) >> np.uint64(64 - bits))
 
 
-@njit("int64(int64[::1], int64[::1], int64, int64)", cache=True)
-def first_at(codes, rows, row, code):  # type: ignore[no-untyped-def]
-    """Index of the first of the sorted codes that is not below ``code``, which lies in ``row``."""
-    low, high = 0, len(codes)
-    if len(rows) > 0:
-        low, high = rows[row], rows[row + 1]
-    while low < high:
-        middle = (low + high) // 2
-        if codes[middle] < code:
-            low = middle + 1
+@njit("int64(int64[:, ::1], float64[:, ::1], float64[:, ::1], int64, float64[::1], float64, int64[::1])", cache=True)
+def _cells(span, low, high, j, origin, inverse, shape):  # type: ignore[no-untyped-def]
+    """How many cells box j touches, from ``span[0]`` to ``span[1]`` (2, 3)."""
+    cells = 1
+    for i in range(3):
+        span[0, i] = bucket_of(low[j, i], origin[i], inverse, shape[i])
+        span[1, i] = bucket_of(high[j, i], origin[i], inverse, shape[i])
+        cells *= span[1, i] - span[0, i] + 1
+    return cells
+
+
+@njit(
+    types.Tuple((types.int64, types.int32[::1]))(  # type: ignore[no-untyped-call]
+        types.float64[:, ::1], types.float64[:, ::1], types.int32[::1], types.float64[::1], types.float64,
+        types.int64[::1],
+    ),
+    cache=True,
+)  # fmt: skip
+def _count(low, high, some, origin, inverse, shape):  # type: ignore[no-untyped-def]
+    """How many entries there will be, and the boxes that get none."""
+    span, wide, n, total = np.empty((2, 3), np.int64), np.empty(len(some), np.int32), 0, 0
+    for j in some:
+        cells = _cells(span, low, high, j, origin, inverse, shape)
+        if cells > _WIDE:
+            wide[n] = j
+            n += 1
         else:
-            high = middle
-    return low
+            total += cells
+    return total, wide[:n].copy()
+
+
+@njit(types.void(TABLE, types.float64[:, ::1], types.float64[:, ::1], types.int32[::1]), cache=True)
+def _enter(table, low, high, some):  # type: ignore[no-untyped-def]
+    """Fills the entries by counting: once to see where each hash begins, once to put them there."""
+    start, shape, bits = table.start, table.shape, table.bits
+    span = np.empty((2, 3), np.int64)
+    for write in range(2):
+        for j in some:
+            if _cells(span, low, high, j, table.origin, table.inverse, shape) > _WIDE:
+                continue
+            for z in range(span[0, 2], span[1, 2] + 1):
+                for y in range(span[0, 1], span[1, 1] + 1):
+                    for x in range(span[0, 0], span[1, 0] + 1):
+                        code = x + shape[0] * (y + shape[1] * z)
+                        bucket = bucket_at(code, bits)
+                        if write:
+                            start[bucket] -= 1
+                            table.thing[start[bucket]], table.code[start[bucket]] = j, code
+                        else:
+                            start[bucket] += 1
+        if not write:
+            for bucket in range(len(start) - 1):
+                start[bucket + 1] += start[bucket]

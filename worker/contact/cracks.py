@@ -12,18 +12,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..jit import njit
+from ..jit import njit, types
 from ..migration.parcel import Table
 from ..state import WIDE, Block, Flags, Floats, Indices, Ints, Nodes, among, extended
 from ..topology import Split
-from .meetings import DEEP_SELF, NEAR, needed
+from .active_set import ACTIVE_SET, DEEP_SELF, NEAR, STEP, needed
 
 _WIDE = 0.2
 """Of the typical size of a face: two sides that have moved so far apart are surface from then on. At 0.1, 33 of 38
 searches in the first 500 steps of the glass bar are called by cracks that open within a search; at 0.2, 2 of 32.
 """
 _FORESEEN = 0.1
-"""Of that width: a search takes up the sides of a crack as wide as this, so that none is called when they open."""
+"""Of that width: the faces of a crack as wide as this are searched, so that they have their pairs when it opens."""
 
 
 @dataclass
@@ -37,7 +37,7 @@ class Cracks:
     sides: Indices
     """(m, 2, 3) block, place and face of either side, -1 for one of another rank."""
     foreseen: Flags
-    """(m,) whether the last search has taken up the sides."""
+    """(m,) whether the scene of the last search has the sides."""
 
     @classmethod
     def none(cls) -> "Cracks":
@@ -88,13 +88,10 @@ class Cracks:
             sides[rows, k] = np.column_stack([np.full(len(rows), b), at[rows, k], faces[rows, k] % 4])
         return cls(faces, nodes.places(table["with"]), sides, np.zeros(len(faces), bool))
 
-    def foresee(self, x: Floats, size: float) -> Indices:
-        """(k, 3) block, place and face of the sides here of cracks that may open soon, at the positions ``x`` (nodes,
-        3); ``size``: the typical one of a face, m.
-        """
-        apart = x[self.nodes[:, 3:]] - x[self.nodes[:, :3]]
-        self.foreseen = ((apart * apart).sum(axis=2) >= (_FORESEEN * _WIDE * size) ** 2).any(axis=1)
-        sides = self.sides[self.foreseen].reshape(-1, 3)
+    def foresee(self) -> Indices:
+        """(k, 3) block, place and face of all sides here, which a scene takes up."""
+        self.foreseen[:] = True
+        sides = self.sides.reshape(-1, 3)
         return sides[sides[:, 1] >= 0]
 
     def open(self, faces: Ints, blocks: list[Block]) -> None:
@@ -122,22 +119,40 @@ def touching(table, flags):  # type: ignore[no-untyped-def]
     return rows[:n].copy()
 
 
+@njit("int64[::1](int32[:, ::1], float64[:, ::1], float64)", cache=True)
+def widening(cracks, x, typical):  # type: ignore[no-untyped-def]
+    """Rows of ``cracks`` (m, 6), slots, that are so wide at the positions ``x`` (slots, 3) that their faces have to be
+    searched; ``typical``: size of a face, m.
+    """
+    rows, n = np.empty(len(cracks), np.int64), 0
+    for c in range(len(cracks)):
+        most = 0.0
+        for k in range(3):
+            p, q, apart = cracks[c, k], cracks[c, 3 + k], 0.0
+            for i in range(3):
+                apart += (x[q, i] - x[p, i]) ** 2
+            most = max(most, apart)
+        if most >= (_FORESEEN * _WIDE * typical) ** 2:
+            rows[n] = c
+            n += 1
+    return rows[:n].copy()
+
+
 @njit(
-    "UniTuple(int64, 2)(int32[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], int32[::1], "
-    "int64, int64[::1], int32[:, ::1], float64, float64[:, ::1], float64[:, ::1], int32[::1], "
-    "float64[:, ::1], float64, float64)",
+    types.UniTuple(types.int64, 2)(  # type: ignore[no-untyped-call]
+        ACTIVE_SET, types.int64, types.int64[::1], types.int32[:, ::1], types.float64, STEP
+    ),
     cache=True,
     error_model="numpy",
 )
-def across(  # type: ignore[no-untyped-def]
-    nodes, weights, normals, wanted, friction, pair, n, opening, cracks, typical, x, v, part, mu, give, dt
-):  # fmt: skip
-    """Nodes across ``cracks`` (m, 6) that close on each other, from row ``n`` on (meetings.node_face).
+def across(out, n, opening, cracks, typical, step):  # type: ignore[no-untyped-def]
+    """Nodes across ``cracks`` (m, 6) that close on each other, from row ``n`` of ``out`` on.
 
     ``typical``: size of a face, m. Returns the new number of rows, and how many of the cracks have become so wide that
     they open; ``opening`` (m,) says which.
     """
     e, f, m = np.empty(3), np.empty(3), np.empty(3)
+    x, v, part, mu, dt = step.x, step.v, step.part, step.mu, step.dt
     wide = 0
     for c in range(len(cracks)):
         for i in range(3):
@@ -167,12 +182,12 @@ def across(  # type: ignore[no-untyped-def]
             gap1 = gap0 + dt * speed
             if not (gap1 <= NEAR * size and gap0 >= -DEEP_SELF * size and mu[part[p], part[q]] >= 0.0):
                 continue
-            nodes[n, 0], nodes[n, 1], nodes[n, 2], nodes[n, 3] = q, p, p, p
-            weights[n, 0], weights[n, 1], weights[n, 2], weights[n, 3] = 1.0, -1.0, 0.0, 0.0
+            out.nodes[n, 0], out.nodes[n, 1], out.nodes[n, 2], out.nodes[n, 3] = q, p, p, p
+            out.weights[n, 0], out.weights[n, 1], out.weights[n, 2], out.weights[n, 3] = 1.0, -1.0, 0.0, 0.0
             for i in range(3):
-                normals[n, i] = m[i]
-            wanted[n] = speed + needed(gap0, gap1, speed, give, dt)
-            friction[n], pair[n] = mu[part[p], part[q]], -1
+                out.normals[n, i] = m[i]
+            out.wanted[n] = speed + needed(gap0, gap1, speed, step.give, dt)
+            out.friction[n], out.pair[n] = mu[part[p], part[q]], -1
             n += 1
         if most >= (_WIDE * typical) ** 2:
             opening[wide] = c

@@ -8,7 +8,7 @@ from ..parallel.fixed_point import exact_sums
 from ..state import Floats, Indices, Ints, Nodes, extended
 from . import ghosts
 from .records import Crowd, merged
-from .scene import Sides
+from .scene import HALO, Sides
 from .surface import Surface
 
 _LOOKS = np.array([10.0, 20.0, 40.0, 80.0, 160.0, 300.0])
@@ -16,15 +16,15 @@ _LOOKS = np.array([10.0, 20.0, 40.0, 80.0, 160.0, 300.0])
 _SWEPT = 8.0
 """How many cells a node may sweep in the mean: two along each axis."""
 _SPENT = 0.4
-"""Of the skin: a node that strays further than this from its path calls for a new search."""
+"""Of the halo: a node that strays further than this from its path calls for a search of all ranks."""
 
 
 class Flight:
     """The surface of one rank in motion."""
 
-    def __init__(self, found: Surface, nodes: Nodes, mobility: Floats, skin: float, size: float, comm: Comm) -> None:
-        """``mobility`` (nodes, 3): see records.Crowd; ``skin``: of ``size``, the typical one of a face, m."""
-        self._comm, self._size, self._skin = comm, size, skin * size
+    def __init__(self, found: Surface, nodes: Nodes, mobility: Floats, size: float, comm: Comm) -> None:
+        """``mobility`` (nodes, 3): see records.Crowd; ``size``: the typical one of a face, m."""
+        self._comm, self._size = comm, size
         self.until = 0.0
         """Time to which the last search is good if nothing strays, s."""
         self.begin(nodes, nodes.v, 0.0)
@@ -42,11 +42,15 @@ class Flight:
         self._x, self._course, self._t = nodes.x.copy(), course.copy(), t
 
     def spent(self, nodes: Nodes, t: float, dt: float) -> bool:
-        """Whether the flight is over, or a node strays by ``_SPENT`` of the skin, a step ``dt`` after ``t``."""
+        """Whether the flight is over, or a node strays so far, a step ``dt`` after ``t``, that another rank may not
+        know of it.
+        """
         if t + dt > self.until:
             return True
+        if self._comm.size == 1:
+            return False
         far = _strayed(nodes.x, nodes.v, self._x, self._course, self._watched, dt, t + dt - self._t)
-        return bool(far > (_SPENT * self._skin) ** 2)
+        return bool(far > (_SPENT * HALO * self._size) ** 2)
 
     def grow(self, parents: Ints) -> None:
         """Takes up copies of nodes: they fly as their parents do."""
@@ -67,7 +71,7 @@ class Flight:
         used[local] = True
         far = ghosts.fetch(found.far, found.far_owner, here, self._comm)
         slaves = nodes.id[self._watched & nodes.owned]
-        return Sides(found.faces, found.edges, merged([here.take(used), far]), slaves, self._skin)
+        return Sides(found.faces, found.edges, merged([here.take(used), far]), slaves)
 
     def refresh(self, nodes: Nodes) -> None:
         """Positions and velocities of the surface as they are."""

@@ -15,7 +15,6 @@ from ..state import Flags, Indices, Ints, Nodes, among, extended
 from ..topology import Split, keys
 from . import ghosts
 from .cracks import Cracks, touching
-from .meetings import Meetings, chain
 from .records import Crowd
 from .scene import Scene
 
@@ -150,11 +149,6 @@ class Follower:
                 break
             self._add(self._here.take(np.unique(absent[:lacking])))
         scene.cracks, scene.crack_rows = places[:n], rows[:n]
-        room = len(scene.node_face) + len(scene.edge_edge) + 3 * n
-        if room > len(scene.push):
-            met, scene.room = scene.room.nodes[: scene.met], Meetings.room(2 * room)
-            scene.room.nodes[: scene.met] = met
-            scene.diagonal, scene.push = np.empty((2 * room, 2)), np.empty((2 * room, 4))
 
     def settle(self, neighbours: list[Neighbour], comm: Comm) -> None:
         """Asks all ranks who shares which node; all take part."""
@@ -211,11 +205,12 @@ class Follower:
             setattr(scene, name, extended(getattr(scene, name), np.zeros((n, width), np.int64)))
         scene.normals = extended(scene.normals, np.zeros((n, 9)))
         scene.before = extended(scene.before, rows.v)
-        for name in ("pushes", "shared", "slave", "on_surface", "moved"):
+        for name in (
+            "pushes", "shared", "slave", "on_surface", "moved", "node_live", "node_new", "node_fresh", "tracked",
+        ):  # fmt: skip
             setattr(scene, name, extended(getattr(scene, name), np.zeros(n, bool)))
         scene.first = extended(scene.first, np.full(n, -1, np.int32))
-        scene.deepest, scene.holder = np.empty(scene.crowd.n), np.empty(scene.crowd.n, np.int32)
-        scene.rest.add(rows.x, rows.course)
+        scene.tracks.add(rows.x, rows.course)
         if (rows.local < 0).any():
             self._sort()
 
@@ -236,9 +231,10 @@ class Follower:
         rows = touching(scene.faces, parents)
         old = scene.faces[rows]
         now = self._followed(heard, old, scene.face_id[rows] // 4)
-        scene.faces[rows], scene.rest.faces[rows] = now, True
+        scene.faces[rows], scene.face_fresh[rows] = now, True
         pairs = np.empty((3 * len(rows) * (1 + family.most), 2), np.int32)
-        n = _apart_from_faces(pairs, rows, old, now, family.first, family.member, scene.slave, self._meets(old[:, 0]))
+        searched = scene.face_live[rows] & self._meets(old[:, 0])
+        n = _apart_from_faces(pairs, rows, old, now, family.first, family.member, scene.node_live, searched)
         self._add_pairs(pairs[:n])
 
     def _edges(self, heard: News, parents: Flags, family: Family) -> None:
@@ -251,47 +247,42 @@ class Follower:
         now = np.column_stack([one, two[:, 2]]).astype(np.int32)
         gone = (one[:, :2] != two[:, :2]).any(axis=1)
         now[gone] = now[gone][:, [0, 0, 0, 0]]
-        scene.edges[rows], scene.rest.edges[rows] = now, True
+        scene.edges[rows], scene.edge_fresh[rows] = now, True
         order = np.lexsort((sides[:, 1], sides[:, 0]))
-        order = order[~gone[order] & self._meets(nodes[order, 0])]
+        order = order[(scene.edge_live[rows] & ~gone)[order] & self._meets(nodes[order, 0])]
         ends = nodes[order, :2]
         at = np.argsort(ends.reshape(-1), kind="stable")
         at = at[family.first[ends.reshape(-1)[at]] >= 0]
         found = _apart_from_edges(at, ends, now[order], scene.edge_own[rows[order]])
-        pairs = rows[order][found].astype(np.int32)
-        scene.edge_edge = extended(scene.edge_edge, pairs)
-        scene.rest.add_edges(len(pairs))
+        scene.edge_edge.add(rows[order][found].astype(np.int32))
 
     def _meets(self, places: Indices) -> Flags:
         """(n,) whether the parts of nodes at ``places`` meet themselves."""
-        return np.asarray(self._scene.meets_itself[self._scene.crowd.part[places]])
+        return np.asarray(self._scene.rules.allowed.diagonal()[self._scene.crowd.part[places]])
 
     def _candidates(self, heard: News, parents: Flags) -> None:
         """A copy has the candidates and the normals of its parent, and is pushed by the ranks that push that one."""
         scene = self._scene
         family = np.column_stack([self.places(heard.parent), self.places(heard.copy)])
         parent, copies = family[(family >= 0).all(axis=1)].T
-        for name in ("normals", "slave", "on_surface", "pushes"):
+        for name in ("normals", "slave", "on_surface", "pushes", "node_live", "node_new", "tracked"):
             column = getattr(scene, name)
             column[copies] = column[parent]
-        rows = np.flatnonzero(parents[scene.node_face[:, 0]])
-        ids = scene.crowd.id[scene.node_face[rows, 0]]
+        scene.tracks.inherit(copies, parent)
+        pairs = scene.node_face.rows
+        rows = np.flatnonzero(parents[pairs[:, 0]])
+        ids = scene.crowd.id[pairs[rows, 0]]
         begin, end = np.searchsorted(heard.parent, ids), np.searchsorted(heard.parent, ids, side="right")
         many = end - begin
         which = np.repeat(np.arange(len(rows)), many)
         copy = heard.copy[np.repeat(begin - np.cumsum(many) + many, many) + np.arange(many.sum())]
-        self._add_pairs(np.column_stack([self.places(copy), scene.node_face[rows[which], 1]]))
+        self._add_pairs(np.column_stack([self.places(copy), pairs[rows[which], 1]]))
 
     def _add_pairs(self, pairs: Indices) -> None:
         """More candidates of nodes and faces."""
         scene, n = self._scene, len(self._scene.node_face)
-        slave, face = pairs.T
-        scene.node_face = extended(scene.node_face, pairs.astype(np.int32))
-        scene.next = extended(scene.next, np.empty(len(pairs), np.int32))
-        chain(scene.first, scene.next, scene.node_face, n)
-        scene.keys = extended(scene.keys, np.column_stack([scene.crowd.id[slave], scene.face_id[face]]))
-        scene.kept = extended(scene.kept, np.zeros((len(pairs), 4)))
-        scene.rest.add_candidates(len(pairs))
+        scene.node_face.add(pairs.astype(np.int32))
+        scene.node_face.hang(scene.first, n)
 
 
 def _flagged(some: Indices, n: int) -> Flags:

@@ -7,7 +7,7 @@ import numpy as np
 from ..mesh.faces import normals as face_normals
 from ..state import Flags, Floats, Indices
 from . import search
-from .meetings import FACING
+from .node_face import FACING
 from .search import Things
 
 _INSIDE = 1e-9

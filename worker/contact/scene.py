@@ -1,4 +1,4 @@
-"""A search: who may meet until the next one, the ghosts that are needed for it, and the room to work in."""
+"""A scene: the surface near this rank, the candidate pairs on it, and the room to work in."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -10,12 +10,18 @@ from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum, same
 from ..parallel.tags import Tag
 from ..state import Flags, Floats, Indices, Ints, Nodes, among
-from . import domain, ghosts, meetings, search, sift
+from . import domain, ghosts, search
+from .active_set import DEEP, DEEP_SELF, ActiveSet, EdgeTable, FaceTable, SlotTable
 from .ghosts import Copies
-from .meetings import DEEP, DEEP_SELF, Meetings
+from .pairs import PairTable
 from .records import Crowd, Edges, Faces, merged
-from .rest import Rest
 from .search import Boxes, Things
+from .tracks import Tracks
+
+
+HALO = 1.0
+"""Of the typical size of a face: two slots of different ranks that leave their lines by half of this, each, may meet
+unseen; a search of all ranks comes before."""
 
 
 @dataclass(frozen=True)
@@ -27,8 +33,12 @@ class Rules:
     """(parts, parts) which parts meet."""
     cell: float
     """Edge of a cell of the contact domain, m."""
-    breaking: Flags
-    """(parts,) whose nodes separate: what a copy may meet must be known before."""
+    skin: float
+    """Two slots that leave their lines by half of this, each, may meet without being candidates, m."""
+    halo: float
+    """The same of slots of different ranks, m."""
+    rubs: bool
+    """Whether there is friction anywhere."""
 
 
 @dataclass
@@ -42,112 +52,109 @@ class Sides:
     """Every node of the faces and edges, and every node of the surface that is held here."""
     slaves: Ints
     """Ids of the owned nodes of the surface, and of cracks that may open."""
-    skin: float
-    """m."""
-
-    @cached_property
-    def nodes(self) -> Things:
-        """The slaves, to be searched."""
-        return Things(self.crowd.places(self.slaves[:, None]), np.full(len(self.slaves), 0.5 * self.skin))
 
     @cached_property
     def face_places(self) -> Indices:
         """(f, 4)."""
         return self.crowd.places(self.faces.nodes)
 
-    def face_things(self, deep: float) -> Things:
-        """The faces, to be searched by nodes; ``deep``: of their size, how far below."""
-        return Things(np.ascontiguousarray(self.face_places[:, :3]), 0.5 * self.skin + deep * self.faces.size)
-
     @cached_property
     def edge_places(self) -> Indices:
         """(e, 4)."""
         return self.crowd.places(self.edges.nodes)
 
-    @cached_property
-    def edge_things(self) -> Things:
-        """The edges, to be searched."""
-        places = np.ascontiguousarray(self.edge_places[:, :2])
-        return Things(places, 0.5 * self.skin + 0.5 * DEEP_SELF * self.edges.size)
+    def boxes(self, horizon: float, drift: Floats, margin: float) -> list[Boxes]:
+        """Of the slaves, the faces and the edges, with ``margin``, m, on all sides."""
+        x, course = self.crowd.x, self.crowd.course - drift
+        slaves = Things(self.crowd.places(self.slaves[:, None]), np.full(len(self.slaves), margin))
+        faces = Things(np.ascontiguousarray(self.face_places[:, :3]), margin + DEEP * self.faces.size)
+        edges = Things(np.ascontiguousarray(self.edge_places[:, :2]), margin + 0.5 * DEEP_SELF * self.edges.size)
+        return [search.swept(things, x, course, horizon) for things in (slaves, faces, edges)]
 
 
 @dataclass
 class Scene:
-    """What a search left."""
+    """What a search of all ranks left, and what has been found since."""
 
     crowd: Crowd
     held: Indices
-    """(h,) places of the nodes that this rank holds."""
+    """(h,) slots of the nodes that this rank holds."""
     local: Indices
     """(h,) their indices on this rank."""
     faces: Indices
-    """(f, 4) places."""
+    """(f, 4) slots."""
     face_id: Ints
+    """(f,) ascending."""
     face_size: Floats
     face_exposed: Flags
     """(f,) only exposed faces are met."""
     edges: Indices
-    """(e, 4) places."""
+    """(e, 4) slots."""
     edge_sides: Ints
     """(e, 2) ids of their faces."""
+    edge_faces: Indices
+    """(e, 2) rows of these, -1 for a face that is not here."""
     edge_size: Floats
     edge_exposed: Flags
     """(e, 2) whether either face is; only edges between exposed faces are met."""
     edge_own: Flags
     """(e,) whose face of smaller id is of this rank."""
-    meets_itself: Flags
-    """(parts,) whose surface meets itself."""
+    edge_rank: Ints
+    """(e,) of two edges, that of lower rank has the pair."""
+    rules: Rules
     slave: Flags
-    """(crowd,) the nodes whose meetings with faces this rank computes."""
-    on_surface: Flags
-    """(crowd,) of nodes that are held here: only those on the surface meet faces."""
-    first: Indices
-    """(crowd,) the first candidate of each node with a face, -1 for none; ``next`` (p,) the one after each."""
-    next: Indices
-    node_face: Indices
-    """(p, 2) place of a node, index of a face."""
-    edge_edge: Indices
-    """(q, 2) indices of edges."""
-    keys: Ints
-    """(p, 2) ids of the node and of the face of each candidate, ascending."""
-    kept: Floats
-    """(p, 4) its ``push`` of the last step, zero where it did not meet."""
+    """(slots,) the nodes whose contacts with faces this rank computes."""
+    tracks: Tracks
+    drift: Floats
+    """(3,) mean velocity, m/s."""
+    until: float
+    """What is searched is searched for until then, s after the search."""
     faces_sent: int
-    room: Meetings
-    diagonal: Floats
-    push: Floats
-    shares: Ints
-    impulse: Ints
-    total: Ints
-    """(crowd, 3) impulses of the last step, quanta."""
-    normals: Floats
-    """(crowd, 9) mean normals of the nodes; see meetings.node_face."""
-    deepest: Floats
-    """(crowd,) room for the height of a node over the face that holds it, m."""
-    holder: Indices
-    """(crowd,) room for the meeting with that face."""
-    before: Floats
-    """(crowd, 3) v(n-1/2)."""
     place: Indices
-    """(nodes,) place of each node of this rank, -1 for those that are not in the crowd."""
+    """(nodes,) slot of each node of this rank, -1 for those that have none."""
     pushes: Flags
-    """(crowd,) which nodes a meeting of this rank may push."""
-    shared: Flags
-    """(crowd,) which nodes are in company with any rank."""
-    rest: Rest
+    """(slots,) which nodes a contact of this rank may push."""
     cracks: Indices
-    """(m, 6) places of the nodes on either side of cracks whose nodes have separated (contact/cracks.py)."""
+    """(m, 6) slots of the nodes on either side of cracks whose nodes have separated (contact/cracks.py)."""
     crack_rows: Ints
     """(m,) which cracks these are."""
-    moved: Flags
-    """(crowd,) whose velocity the last sweep has changed."""
+    node_face: PairTable = field(default_factory=PairTable)
+    """Of a slot and a face."""
+    edge_edge: PairTable = field(default_factory=PairTable)
     met: int = 0
-    """Meetings of the last step, the first rows of the room."""
+    """Active contacts of the last step, the first rows of the room."""
     company: list[Neighbour] = field(init=False)
-    """Other ranks, and the places of the nodes that either pushes or holds and any rank pushes."""
+    """Other ranks, and the slots that either pushes or holds and any rank pushes."""
     shared_shares: SharedSum = field(init=False)
     shared_impulse: SharedSum = field(init=False)
     copies: Copies = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Everything is at rest, and nothing is searched yet."""
+        n, f, e = self.crowd.n, len(self.faces), len(self.edges)
+        self.face_live, self.edge_live, self.node_live = np.zeros(f, bool), np.zeros(e, bool), np.zeros(n, bool)
+        """What is searched: what is exposed, and what may be soon; of the nodes, slaves."""
+        self.face_new, self.edge_new, self.node_new = np.zeros(f, bool), np.zeros(e, bool), np.zeros(n, bool)
+        """What has to be registered."""
+        self.face_fresh, self.edge_fresh, self.node_fresh = np.zeros(f, bool), np.zeros(e, bool), np.zeros(n, bool)
+        """Whose pairs have to be tested: new corners, newly exposed, other mean normals."""
+        self.tracked = np.zeros(n, bool)
+        """(slots,) of what is searched."""
+        self.on_surface = np.zeros(n, bool)
+        """(slots,) of nodes that are held here: only those on the surface meet faces."""
+        self.first = np.full(n, -1, np.int32)
+        """(slots,) the first pair with a face, -1 for none."""
+        self.shares, self.impulse = np.zeros((n, 4), np.int64), np.zeros((n, 3), np.int64)
+        self.total = np.zeros((n, 3), np.int64)
+        """(slots, 3) impulses of the last step, quanta."""
+        self.normals = np.zeros((n, 9))
+        """(slots, 9) mean normals; see active_set.SlotTable."""
+        self.before = np.zeros((n, 3))
+        """(slots, 3) v(n-1/2)."""
+        self.shared, self.moved = np.zeros(n, bool), np.zeros(n, bool)
+        """(slots,) which are in company with any rank; whose velocity the last sweep has changed."""
+        self.room = ActiveSet.room(0)
+        self.diagonal, self.push = np.empty((0, 2)), np.empty((0, 4))
 
     def connect(self, company: list[Neighbour], nodes: Nodes, comm: Comm) -> None:
         """Sets up the messages: sums over the nodes of the company, copies of what is not held here; all ranks take
@@ -172,8 +179,24 @@ class Scene:
         self.shared_shares = SharedSum(comm, company, 4, Tag.CONTACT_SHARE)
         self.shared_impulse = SharedSum(comm, company, 3, Tag.CONTACT_IMPULSE)
 
+    def reserve(self) -> None:
+        """Room for every contact that may become active; the rows of the last step stay."""
+        n = len(self.node_face) + len(self.edge_edge) + 3 * len(self.cracks)
+        if n > len(self.push):
+            met, self.room = self.room.nodes[: self.met], ActiveSet.room(2 * n)
+            self.room.nodes[: self.met] = met
+            self.diagonal, self.push = np.empty((2 * n, 2)), np.empty((2 * n, 4))
+
+    @property
+    def kept(self) -> tuple[Ints, Floats]:
+        """(k, 2) ids of node and face of the pairs that were pushed in the last step, and (k, 4) what they have kept."""
+        table = self.node_face
+        some = np.flatnonzero(table.kept.any(axis=1))
+        node, face = table.rows[some].T
+        return np.column_stack([self.crowd.id[node], self.face_id[face]]), table.kept[some]
+
     def remember(self, keys: Ints, kept: Floats, nodes: Nodes, comm: Comm) -> None:
-        """Takes over what candidates of another search, with their ``keys``, have ``kept``; all ranks take part.
+        """Takes over what pairs of another search, with their ``keys``, have ``kept``; all ranks take part.
 
         The pairs of a copy were with the rank of its parent's, and are with its own from now on.
         """
@@ -182,15 +205,81 @@ class Scene:
             owner = nodes.owner[nodes.places(keys[:, 0])]
             told = comm.swap({int(rank): rows[owner == rank] for rank in np.unique(owner)})
             rows = np.concatenate([rows[:0], *(words.reshape(-1, 6) for words in told.values())])
+        if not len(rows):
+            return
+        node, face = self.node_face.rows.T
+        every = np.column_stack([self.crowd.id[node], self.face_id[face]])
         kind = [("node", np.int64), ("face", np.int64)]
-        mine, theirs = (np.ascontiguousarray(keys).view(kind).reshape(-1) for keys in (self.keys, rows[:, :2]))
+        mine, theirs = (np.ascontiguousarray(keys).view(kind).reshape(-1) for keys in (every, rows[:, :2]))
         _, here, there = np.intersect1d(mine, theirs, assume_unique=True, return_indices=True)
-        self.kept[here] = np.ascontiguousarray(rows[there, 2:]).view(np.float64)
+        self.node_face.kept[here] = np.ascontiguousarray(rows[there, 2:]).view(np.float64)
+
+    def rows_of(self, faces: Ints) -> Indices:
+        """(k,) rows of those of the ``faces``, ids, that are here."""
+        rows = rows_of(self.face_id, faces)
+        return rows[rows >= 0]
 
     def expose(self, faces: Ints) -> None:
-        """Faces of these ids, ascending, become surface."""
-        self.face_exposed |= among(faces, self.face_id)
-        self.edge_exposed |= among(faces, self.edge_sides.reshape(-1)).reshape(-1, 2)
+        """Faces of these ids become surface."""
+        rows = self.rows_of(faces)
+        self.face_exposed[rows] = self.face_fresh[rows] = True
+        far = (self.edge_faces < 0).any(axis=1)
+        if far.any():
+            self.edge_exposed[far] |= among(np.sort(faces), self.edge_sides[far].reshape(-1)).reshape(-1, 2)
+        _expose(self.edge_exposed, self.edge_fresh, self.edge_faces, self.face_exposed)
+        self.enliven(rows)
+
+    def enliven(self, rows: Indices) -> None:
+        """Faces, with their nodes and edges, are searched from now on."""
+        self.face_new[rows] |= ~self.face_live[rows]
+        self.face_live[rows] = True
+        corners = np.unique(self.faces[rows, :3])
+        corners = corners[self.slave[corners] & ~self.node_live[corners]]
+        self.node_live[corners] = self.node_new[corners] = True
+
+    def settle_live(self) -> Flags:
+        """Which nodes and edges are searched, and which slots belong to what is searched; (slots,) those that did not
+        before, which nobody has watched.
+        """
+        before = self.tracked.copy()
+        nodes = self.slave & self.on_surface & ~self.node_live
+        self.node_live |= nodes
+        self.node_new |= nodes
+        _enliven(self.edge_live, self.edge_new, self.edges, self.edge_faces, self.edge_exposed, self.face_live)
+        self.tracked[:] = self.node_live
+        self.tracked[self.faces[self.face_live, :3]] = True
+        self.tracked[self.edges[self.edge_live, :2]] = True
+        return self.tracked & ~before
+
+    @property
+    def pending(self) -> bool:
+        """Whether anything has to be registered."""
+        return bool(self.face_new.any() or self.node_new.any())
+
+    def chain(self) -> None:
+        """The chains of the pairs of each node, anew."""
+        self.first[:] = -1
+        self.node_face.hang(self.first, 0)
+
+    def slot_table(self) -> SlotTable:
+        """The slots as kernels take them."""
+        n, tracks = self.crowd.n, self.tracks
+        return SlotTable(
+            self.normals, self.on_surface, self.first, tracks.left, tracks.course, self.node_fresh, np.empty(n),
+            np.empty(n, np.int32),
+        )  # fmt: skip
+
+    def face_table(self) -> FaceTable:
+        """The faces."""
+        f = len(self.faces)
+        return FaceTable(
+            self.faces, self.face_size, self.face_id, self.face_exposed, self.tracks.faces, self.face_fresh,
+            np.empty((f, 3)), np.zeros(f, bool),
+        )  # fmt: skip
+
+    def edge_table(self) -> EdgeTable:
+        """The edges."""
+        return EdgeTable(self.edges, self.edge_size, self.edge_exposed, self.tracks.edges, self.edge_fresh)
 
     def free(self) -> None:
         """Gives its messages back to MPI."""
@@ -199,54 +288,68 @@ class Scene:
         self.shared_impulse.free()
 
 
-@njit(
-    "float64(float64[:, ::1], float64[:, ::1], int32[:, ::1], int32[:, ::1], int32[::1])",
-    cache=True,
-    error_model="numpy",
-)
-def approach(x, v, faces, pairs, some):  # type: ignore[no-untyped-def]
-    """Largest relative speed of a node over the altitude of its face's tet, 1/s, of ``some`` of the ``pairs`` (p, 2).
+@njit("void(boolean[:, ::1], boolean[::1], int32[:, ::1], boolean[::1])", cache=True)
+def _expose(exposed, fresh, faces, shown):  # type: ignore[no-untyped-def]
+    """Edges whose ``faces`` (e, 2) are ``shown`` (f,)."""
+    for e in range(len(exposed)):
+        for k in range(2):
+            if faces[e, k] >= 0 and shown[faces[e, k]] and not exposed[e, k]:
+                exposed[e, k], fresh[e] = True, True
 
-    ``faces`` (f, 4), the node opposite last.
-    """
-    e, f, r = np.empty(3), np.empty(3), np.empty(3)
-    most = 0.0
-    for p in some:
-        s, face = pairs[p, 0], pairs[p, 1]
-        a, b, c, d = faces[face, 0], faces[face, 1], faces[face, 2], faces[face, 3]
-        fastest = 0.0
-        for m in range(3):
-            speed = 0.0
-            for i in range(3):
-                speed += (v[s, i] - v[faces[face, m], i]) ** 2
-            fastest = max(fastest, speed)
-        for i in range(3):
-            e[i], f[i], r[i] = x[b, i] - x[a, i], x[c, i] - x[a, i], x[d, i] - x[a, i]
-        nx, ny, nz = e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]
-        square = (nx * r[0] + ny * r[1] + nz * r[2]) ** 2 / (nx * nx + ny * ny + nz * nz)
-        most = max(most, fastest / square)
-    return np.sqrt(most)
+
+@njit(
+    "void(boolean[::1], boolean[::1], int32[:, ::1], int32[:, ::1], boolean[:, ::1], boolean[::1])", cache=True
+)
+def _enliven(live, new, edges, faces, exposed, searched):  # type: ignore[no-untyped-def]
+    """Edges both of whose ``faces`` (e, 2) are ``searched`` (f,), or exposed where they are not here."""
+    for e in range(len(live)):
+        both = edges[e, 0] != edges[e, 1]
+        for k in range(2):
+            both &= searched[faces[e, k]] if faces[e, k] >= 0 else exposed[e, k]
+        new[e] |= both and not live[e]
+        live[e] = both
 
 
 def build(sides: Sides, rules: Rules, horizon: float, drift: Floats, nodes: Nodes, comm: Comm) -> Scene:
-    """Searches what flies on for ``horizon``, s; all ranks take part and know of the same ``drift`` (3,), m/s.
+    """The scene of ``sides``, which flies on for ``horizon``, s, without pairs; all ranks take part and know of the same
+    ``drift`` (3,), m/s.
 
     Who shares which node is settled by a Follower.
     """
     seen, sent = _with_ghosts(sides, rules, horizon, drift, comm) if comm.size > 1 else (sides, 0)
-    node_face = _node_face(seen, rules, horizon, drift)
-    edge_edge = _edge_edge(seen, sides.edges.n, rules, horizon, drift)
-    return compact(seen, sides.edges.n, node_face, edge_edge, sent, rules, nodes)
+    crowd, faces, edges = seen.crowd, seen.faces, seen.edges
+    crowd.local = nodes.places(crowd.id)
+    held = np.flatnonzero(crowd.local >= 0).astype(np.int32)
+    place = np.full(nodes.n, -1, np.int32)
+    place[crowd.local[held]] = held
+    slave, pushes = np.zeros(crowd.n, bool), np.zeros(crowd.n, bool)
+    slave[crowd.places(sides.slaves)] = True
+    pushes[seen.face_places[:, :3]] = pushes[seen.edge_places[:, :2]] = True
+    order = np.lexsort((*edges.nodes[:, 1::-1].T, *edges.sides[:, ::-1].T))
+    rank = np.empty(edges.n, np.int64)
+    rank[order] = np.arange(edges.n)
+    return Scene(
+        crowd=crowd, held=held, local=crowd.local[held], faces=seen.face_places, face_id=faces.id, face_size=faces.size,
+        face_exposed=faces.exposed.copy(), edges=seen.edge_places, edge_sides=edges.sides,
+        edge_faces=rows_of(faces.id, edges.sides), edge_size=edges.size, edge_exposed=edges.exposed.copy(),
+        edge_own=np.arange(edges.n) < sides.edges.n, edge_rank=rank, rules=rules, slave=slave,
+        tracks=Tracks(crowd.x, crowd.course, faces.n, edges.n), drift=drift, until=horizon, faces_sent=sent, place=place,
+        pushes=pushes | slave, cracks=np.zeros((0, 6), np.int32), crack_rows=np.zeros(0, np.int64),
+    )  # fmt: skip
+
+
+def rows_of(ids: Ints, wanted: Ints) -> Indices:
+    """Where ``wanted`` stand among the ascending ``ids``, in their shape; -1 where they do not."""
+    if not len(ids):
+        return np.full(wanted.shape, -1, np.int32)
+    at = np.minimum(np.searchsorted(ids, wanted), len(ids) - 1)
+    return np.where(ids[at] == wanted, at, -1).astype(np.int32)
 
 
 def _with_ghosts(sides: Sides, rules: Rules, horizon: float, drift: Floats, comm: Comm) -> tuple[Sides, int]:
     """The sides with what other ranks' surfaces have near this one's, own edges first. And the faces sent."""
     crowd = sides.crowd
-
-    def boxes(things: Things) -> Boxes:
-        return search.swept(things, crowd.x, crowd.course - drift, horizon)
-
-    nodes, faces, edges = boxes(sides.nodes), boxes(sides.face_things(DEEP)), boxes(sides.edge_things)
+    nodes, faces, edges = sides.boxes(horizon, drift, 0.5 * rules.halo)
     askers = Boxes(np.concatenate([nodes.low, edges.low]), np.concatenate([nodes.high, edges.high]))
     chosen = domain.choose(rules.domain, askers, [faces, edges], rules.cell, comm)
     parcels = {rank: (sides.faces.take(flags[0]), sides.edges.take(flags[1])) for rank, flags in chosen.items()}
@@ -265,98 +368,4 @@ def _joined(sides: Sides, others: list[tuple[Faces, Edges, Crowd]]) -> Sides:
     faces = Faces.joined([sides.faces, *(faces for faces, _, _ in others)])
     edges = Edges.joined([sides.edges, *(edges for _, edges, _ in others)])
     crowd = merged([sides.crowd, *(crowd for _, _, crowd in others)])
-    return Sides(faces.take(np.argsort(faces.id)), edges, crowd, sides.slaves, sides.skin)
-
-
-def _node_face(seen: Sides, rules: Rules, horizon: float, drift: Floats) -> Indices:
-    """(p, 2) place of a node and index of a face, sorted by node, then by face."""
-    crowd, slaves, v = seen.crowd, seen.nodes, seen.crowd.course - drift
-    own = np.eye(len(rules.allowed), dtype=bool)
-    found = [
-        search.find(slaves, seen.face_things(deep), crowd.x, v, crowd.part, rules.allowed & which, horizon, None)
-        for deep, which in ((DEEP_SELF, own), (DEEP, ~own))
-        if (rules.allowed & which).any()
-    ]
-    pairs = np.concatenate([np.zeros((0, 2), np.int32), *found])
-    pairs = np.column_stack([slaves.corners[pairs[:, 0], 0], pairs[:, 1]])
-    pairs = sift.faces(pairs, seen.face_places, seen.faces.size, crowd, seen.skin, horizon)
-    return _sorted(pairs[:, 0], pairs[:, 1], seen.faces.n)
-
-
-def _sorted(one: "np.ndarray", two: "np.ndarray", n: int) -> Indices:
-    """Rows of ``one`` and ``two``, which is less than ``n``, in their order; no row stands twice."""
-    words = one.astype(np.int64) * n + two
-    words.sort()
-    return np.column_stack(np.divmod(words, max(n, 1))).astype(np.int32)
-
-
-def _edge_edge(seen: Sides, own: int, rules: Rules, horizon: float, drift: Floats) -> Indices:
-    """(q, 2) indices of edges, that of the smaller faces first; its rank has the pair."""
-    crowd, edges, things = seen.crowd, seen.edges, seen.edge_things
-    rank, order = np.empty(edges.n, np.int64), np.lexsort((*edges.nodes[:, 1::-1].T, *edges.sides[:, ::-1].T))
-    rank[order] = np.arange(edges.n)
-    mine = Things(things.corners[:own], things.reach[:own])
-    pairs = search.find(mine, things, crowd.x, crowd.course - drift, crowd.part, rules.allowed, horizon, rank)
-    pairs = sift.edges(pairs, seen.edge_places, edges.size, crowd, seen.skin, horizon)
-    return order[_sorted(rank[pairs[:, 0]], rank[pairs[:, 1]], edges.n)].astype(np.int32)
-
-
-def compact(
-    seen: Sides, own: int, node_face: Indices, edge_edge: Indices, sent: int, rules: Rules, nodes: Nodes
-) -> Scene:
-    """Keeps the nodes, faces and edges of candidates, and those of parts that break, which copies may meet; the first
-    ``own`` edges are this rank's.
-    """
-    crowd = seen.crowd
-    apart = rules.breaking[crowd.part]
-    which_faces, face_at = _used(seen.faces.n, node_face[:, 1], np.flatnonzero(apart[seen.face_places[:, 0]]))
-    which_edges, edge_at = _used(seen.edges.n, edge_edge, np.flatnonzero(apart[seen.edge_places[:, 0]]))
-    faces, edges = seen.faces.take(which_faces), seen.edges.take(which_edges)
-    corners, ends, slaves = seen.face_places[which_faces], seen.edge_places[which_edges], node_face[:, 0]
-    slave = np.zeros(crowd.n, bool)
-    slave[seen.nodes.corners[:, 0]] = True
-    mine = which_edges < own
-    beside = apart[corners[:, 0]] & slave[corners[:, :3]].any(axis=1)
-    touching = np.zeros(crowd.n, bool)
-    touching[ends[mine, :2]] = True
-    near = apart[ends[:, 0]] & touching[ends[:, :2]].any(axis=1)
-    pushed, _ = _used(
-        crowd.n, slaves, seen.face_places[node_face[:, 1], :3], seen.edge_places[edge_edge, :2], corners[beside, :3],
-        ends[near, :2],
-    )  # fmt: skip
-    needed, now = _used(crowd.n, slaves, corners, ends)
-    keys = np.column_stack([crowd.id[slaves], seen.faces.id[node_face[:, 1]]])
-    crowd, pushes = crowd.take(needed), np.zeros(len(needed), bool)
-    pushes[now[pushed]] = True
-    crowd.local = nodes.places(crowd.id)
-    room = len(node_face) + len(edge_edge)
-    shares, impulse = np.zeros((crowd.n, 4), np.int64), np.zeros((crowd.n, 3), np.int64)
-    held = np.flatnonzero(crowd.local >= 0).astype(np.int32)
-    place = np.full(nodes.n, -1, np.int32)
-    place[crowd.local[held]] = held
-    pairs = np.column_stack([now[slaves], face_at[node_face[:, 1]]])
-    first, following = np.full(crowd.n, -1, np.int32), np.empty(len(pairs), np.int32)
-    meetings.chain(first, following, pairs, 0)
-    return Scene(
-        crowd=crowd, held=held, local=crowd.local[held], faces=now[corners], face_id=faces.id,
-        face_size=faces.size, face_exposed=faces.exposed, edges=now[ends], edge_sides=edges.sides,
-        edge_size=edges.size, edge_exposed=edges.exposed, edge_own=mine,
-        meets_itself=rules.allowed.diagonal().copy(), slave=slave[needed],
-        on_surface=np.zeros(crowd.n, bool), first=first, next=following,
-        node_face=pairs, edge_edge=edge_at[edge_edge],
-        keys=keys, kept=np.zeros((len(keys), 4)), faces_sent=sent,
-        room=Meetings.room(room), diagonal=np.empty((room, 2)), push=np.empty((room, 4)),
-        shares=shares, impulse=impulse, place=place, pushes=pushes, shared=np.zeros(crowd.n, bool),
-        cracks=np.zeros((0, 6), np.int32), crack_rows=np.zeros(0, np.int64),
-        rest=Rest(crowd.x, crowd.course, len(which_faces), len(which_edges), len(node_face), len(edge_edge)),
-        total=np.zeros((crowd.n, 3), np.int64), normals=np.zeros((crowd.n, 9)), before=np.zeros((crowd.n, 3)),
-        deepest=np.empty(crowd.n), holder=np.empty(crowd.n, np.int32), moved=np.zeros(crowd.n, bool),
-    )  # fmt: skip
-
-
-def _used(n: int, *some: "np.ndarray") -> tuple["np.ndarray", Indices]:
-    """Which of ``n`` things are among ``some``, ascending, and (n,) where each of these stands among them."""
-    flags = np.zeros(n, bool)
-    for each in some:
-        flags[each] = True
-    return np.flatnonzero(flags), (np.cumsum(flags) - 1).astype(np.int32)
+    return Sides(faces.take(np.argsort(faces.id)), edges, crowd, sides.slaves)

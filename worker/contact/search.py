@@ -6,18 +6,14 @@ skin; so a body in free flight spends no skin, however fast it is. The list may 
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from ..jit import njit
+from ..jit import njit, types
 from ..state import Flags, Floats, Indices, Ints, extended
 from . import buckets
-from .buckets import bucket_of, first_at
-
-_SAMPLE, _BUCKET = 1.5, 0.5
-"""Largest distance of the points of a small thing, and edge of a bucket, of the median extent of the large things."""
-_FILLED = 4.0
-"""Points along an axis that a small thing may have."""
+from .buckets import TABLE, bucket_at, bucket_of
 
 
 @dataclass
@@ -111,15 +107,16 @@ def find(
         return np.zeros((0, 2), np.int32)
     order = np.zeros(0, np.int64) if rank is None else rank
     pairs = _pairs(
-        small_boxes.take(few), large_boxes.take(many), small.corners[few], large.corners[many], part, allowed,
-        order[:0] if rank is None else order[few], order[:0] if rank is None else order[many],
+        Sought(small_boxes.low, small_boxes.high, small.corners, few, order),
+        Sought(large_boxes.low, large_boxes.high, large.corners, many, order), part, allowed,
     )  # fmt: skip
-    return np.column_stack([few[pairs[:, 0]], many[pairs[:, 1]]]).astype(np.int32)
+    return pairs
 
 
-def _near(boxes: Boxes, part: Indices, others: Boxes, their_part: Indices, allowed: Flags) -> "np.ndarray":
+def _near(boxes: Boxes, part: Indices, others: Boxes, their_part: Indices, allowed: Flags) -> Indices:
     """Indices of the boxes that touch the hull of a part that theirs may meet."""
-    return np.flatnonzero(_touching(boxes.low, boxes.high, part, others.low, others.high, their_part, allowed))
+    near = _touching(boxes.low, boxes.high, part, others.low, others.high, their_part, allowed)
+    return np.flatnonzero(near).astype(np.int32)
 
 
 @njit(
@@ -143,52 +140,35 @@ def _touching(low, high, part, their_low, their_high, their_part, allowed):  # t
     return near
 
 
-def _pairs(
-    small: Boxes, large: Boxes, small_corners: Indices, large_corners: Indices, part: Indices, allowed: Flags,
-    small_rank: Ints, large_rank: Ints,
-) -> Indices:  # fmt: skip
-    """Small things of like size together, in buckets twice as large for each level: none has more than a few points."""
-    edge = _SAMPLE * float(np.median(large.extent))
-    extent = small.extent
-    level = np.maximum(np.ceil(np.log2(np.maximum(extent / (_FILLED * edge), 1.0))), 0.0).astype(np.int64)
-    found = []
-    for each in np.unique(level):
-        chosen = np.flatnonzero(level == each)
-        pairs = _of_a_level(
-            small.take(chosen), large, small_corners[chosen], large_corners, part, allowed,
-            small_rank[chosen] if len(small_rank) else small_rank, large_rank, edge * 2.0**each,
-        )  # fmt: skip
-        found.append(np.column_stack([chosen[pairs[:, 0]], pairs[:, 1]]))
-    return np.concatenate(found).astype(np.int32)
-
-
-def _of_a_level(
-    small: Boxes, large: Boxes, small_corners: Indices, large_corners: Indices, part: Indices, allowed: Flags,
-    small_rank: Ints, large_rank: Ints, edge: float,
-) -> Indices:  # fmt: skip
-    points, who, half = _samples(small.low, small.high, edge)
-    bucketed = buckets.sort(points, _BUCKET / _SAMPLE * edge)
-    who = who[bucketed.order].astype(np.int32)
-    boxes = np.hstack([small.low, -small.high])[who]
-    out = np.empty((4 * len(who) + 1024, 2), np.int32)
+def _pairs(small: "Sought", large: "Sought", part: Indices, allowed: Flags) -> Indices:
+    edge = max(float(np.median((things.high - things.low)[things.some].max(axis=1))) for things in (small, large))
+    table = buckets.sort(small.low, small.high, small.some, edge)
+    out = np.empty((4 * (len(small.some) + len(large.some)) + 1024, 2), np.int32)
     n = asked = 0
     while True:
-        n, asked = _walk(
-            out, n, asked, small_corners, large_corners, boxes, large.low, large.high, half, part, allowed,
-            bucketed.codes, bucketed.rows, who, bucketed.origin, bucketed.inverse, bucketed.shape, small_rank,
-            large_rank,
-        )  # fmt: skip
-        if asked == len(large_corners):
+        n, asked = _ask(out, n, asked, table, small, large, part, allowed)
+        if asked == len(large.some):
             return out[:n]
         out = extended(out, np.empty_like(out))
 
 
-def _samples(low: Floats, high: Floats, edge: float) -> tuple[Floats, "np.ndarray", Floats]:
-    """Points that fill the boxes (n, 3) so densely that none of a box is further than ``half`` from one of its own."""
-    counts = np.maximum(np.ceil((high - low) / edge), 1.0).astype(np.int64)
-    who, index = buckets.grid(counts)
-    points = low[who] + (index + 0.5) * ((high - low) / counts)[who]
-    return points, who, (0.5 * ((high - low) / counts)).max(axis=0)
+class Sought(NamedTuple):
+    """Things that are searched."""
+
+    low: Floats
+    """(n, 3) of their boxes."""
+    high: Floats
+    corners: Indices
+    """(n, k) slots."""
+    some: Indices
+    """(m,) which of them."""
+    rank: Ints
+    """(n,) of two things that are found, the small one has the lower rank; (0,): no matter."""
+
+
+SOUGHT = types.NamedTuple(
+    (types.float64[:, ::1], types.float64[:, ::1], types.int32[:, ::1], types.int32[::1], types.int64[::1]), Sought
+)  # type: ignore[no-untyped-call]
 
 
 @njit("boolean(int32[:, ::1], int32[:, ::1], int64, int64)", cache=True)
@@ -202,53 +182,69 @@ def _meet(small, large, i, j):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    "UniTuple(int64, 2)(int32[:, ::1], int64, int64, int32[:, ::1], int32[:, ::1], float64[:, ::1], "
-    "float64[:, ::1], float64[:, ::1], float64[::1], int32[::1], boolean[:, ::1], int64[::1], int64[::1], "
-    "int32[::1], float64[::1], float64, int64[::1], int64[::1], int64[::1])",
+    types.UniTuple(types.int64, 2)(  # type: ignore[no-untyped-call]
+        types.int32[:, ::1], types.int64, types.int64, TABLE, SOUGHT, SOUGHT, types.int32[::1], types.boolean[:, ::1]
+    ),
     cache=True,
 )
-def _walk(  # type: ignore[no-untyped-def]
-    out, n, asked, small, large, boxes, box_low, box_high, half, part, allowed, codes, rows, who, origin, inverse,
-    shape, small_rank, large_rank,
-):  # fmt: skip
-    """Each large thing asks the buckets that its box touches, or all points where these are fewer than its rows.
-
-    ``boxes`` (m, 6): of the thing that each sorted point belongs to, lowest corner and minus the highest. ``n`` pairs
-    are in ``out`` and ``asked`` large things have asked already; returns both anew, when all have or the room is full.
+def _ask(out, n, asked, table, small, large, part, allowed):  # type: ignore[no-untyped-def]
+    """Each large thing asks the buckets that its box touches; a pair is found in the bucket where the boxes begin to
+    overlap, and so once. ``n`` pairs are in ``out`` and ``asked`` large things have asked already; returns both anew,
+    when all have or the room is full.
     """
-    mark = np.full(len(small), -1, np.int32)
-    for j in range(asked, len(large)):
-        before = n
-        ix0 = bucket_of(box_low[j, 0] - half[0], origin[0], inverse, shape[0])
-        ix1 = bucket_of(box_high[j, 0] + half[0], origin[0], inverse, shape[0])
-        iy0 = bucket_of(box_low[j, 1] - half[1], origin[1], inverse, shape[1])
-        iy1 = bucket_of(box_high[j, 1] + half[1], origin[1], inverse, shape[1])
-        iz0 = bucket_of(box_low[j, 2] - half[2], origin[2], inverse, shape[2])
-        iz1 = bucket_of(box_high[j, 2] + half[2], origin[2], inverse, shape[2])
-        every = (iy1 - iy0 + 1) * (iz1 - iz0 + 1) > len(codes)
-        if every:
-            iy1, iz1 = iy0, iz0
-        for iz in range(iz0, iz1 + 1):
-            for iy in range(iy0, iy1 + 1):
-                row = shape[0] * (iy + shape[1] * iz)
-                at = 0 if every else first_at(codes, rows, iy + shape[1] * iz, row + ix0)
-                while at < len(codes) and (every or codes[at] <= row + ix1):
-                    p = at
-                    at += 1
-                    if boxes[p, 0] > box_high[j, 0] or boxes[p, 1] > box_high[j, 1] or boxes[p, 2] > box_high[j, 2]:
-                        continue
-                    if -boxes[p, 3] < box_low[j, 0] or -boxes[p, 4] < box_low[j, 1] or -boxes[p, 5] < box_low[j, 2]:
-                        continue
-                    i = who[p]
-                    if mark[i] == j:
-                        continue
-                    mark[i] = j
-                    if len(small_rank) > 0 and small_rank[i] >= large_rank[j]:
-                        continue
-                    if not allowed[part[small[i, 0]], part[large[j, 0]]] or _meet(small, large, i, j):
-                        continue
-                    if n == len(out):
-                        return before, j
-                    out[n, 0], out[n, 1] = i, j
-                    n += 1
-    return n, len(large)
+    few_low, few_high, box_low, box_high = small.low, small.high, large.low, large.high
+    few, many, rank, order = small.corners, large.corners, small.rank, large.rank
+    start, things, codes, wide = table.start, table.thing, table.code, table.wide
+    origin, inverse, shape, bits = table.origin, table.inverse, table.shape, table.bits
+    every = small.some
+    first, last = np.empty(3, np.int64), np.empty(3, np.int64)
+    for at in range(asked, len(large.some)):
+        j, before = large.some[at], n
+        cells = 1
+        for i in range(3):
+            first[i] = bucket_of(box_low[j, i], origin[i], inverse, shape[i])
+            last[i] = bucket_of(box_high[j, i], origin[i], inverse, shape[i])
+            cells *= last[i] - first[i] + 1
+        alone = cells > len(every)
+        if alone:
+            last[:] = first
+        for z in range(first[2], last[2] + 1):
+            for y in range(first[1], last[1] + 1):
+                for x in range(first[0], last[0] + 1):
+                    code = x + shape[0] * (y + shape[1] * z)
+                    begin, end = np.int64(0), np.int64(0)
+                    if not alone:
+                        bucket = bucket_at(code, bits)
+                        begin, end = np.int64(start[bucket]), np.int64(start[bucket + 1])
+                    apart = end - begin
+                    if x == first[0] and y == first[1] and z == first[2]:
+                        end += len(every) if alone else len(wide)
+                    for p in range(begin, end):
+                        if p - begin < apart:
+                            if codes[p] != code:
+                                continue
+                            i = things[p]
+                        else:
+                            i = every[p - begin] if alone else wide[p - begin - apart]
+                        if few_low[i, 0] > box_high[j, 0] or few_low[i, 1] > box_high[j, 1]:
+                            continue
+                        if few_low[i, 2] > box_high[j, 2] or few_high[i, 0] < box_low[j, 0]:
+                            continue
+                        if few_high[i, 1] < box_low[j, 1] or few_high[i, 2] < box_low[j, 2]:
+                            continue
+                        if p - begin < apart:
+                            if bucket_of(max(few_low[i, 0], box_low[j, 0]), origin[0], inverse, shape[0]) != x:
+                                continue
+                            if bucket_of(max(few_low[i, 1], box_low[j, 1]), origin[1], inverse, shape[1]) != y:
+                                continue
+                            if bucket_of(max(few_low[i, 2], box_low[j, 2]), origin[2], inverse, shape[2]) != z:
+                                continue
+                        if len(rank) > 0 and rank[i] >= order[j]:
+                            continue
+                        if not allowed[part[few[i, 0]], part[many[j, 0]]] or _meet(few, many, i, j):
+                            continue
+                        if n == len(out):
+                            return before, at
+                        out[n, 0], out[n, 1] = i, j
+                        n += 1
+    return n, len(large.some)

@@ -10,24 +10,27 @@ the time, by the skin and the depth to which a meeting looks.
 import numpy as np
 
 from ..jit import njit
-from ..state import Floats, Indices
-from .meetings import DEEP, DEEP_SELF, cross, dot
-from .records import Crowd
+from ..state import Flags, Floats, Indices
+from .active_set import DEEP, DEEP_SELF
+from .geometry import cross, dot
 
 _V2, _N2 = "float64[:, ::1]", "int32[:, ::1]"
 _STEEPEST = 0.05
 """Sine of the angle below which edges are not sifted."""
 
 
-def faces(pairs: Indices, places: Indices, size: Floats, crowd: Crowd, skin: float, horizon: float) -> Indices:
-    """Of ``pairs`` (p, 2), place of a node and index of a face, those that may meet; ``places`` (f, 4)."""
-    kept = _near_faces(pairs, places, size, crowd.x, crowd.course, crowd.part, skin, horizon)
-    return np.asarray(pairs[kept])
+def faces(
+    pairs: Indices, places: Indices, size: Floats, x: Floats, v: Floats, part: Indices, skin: float, horizon: float
+) -> Flags:  # fmt: skip
+    """(p,) which of ``pairs`` (p, 2), slot and face, may meet; ``places`` (f, 4); ``x``, ``v`` (slots, 3): lines."""
+    return np.asarray(_near_faces(pairs, places, size, x, v, part, skin, horizon))
 
 
-def edges(pairs: Indices, places: Indices, size: Floats, crowd: Crowd, skin: float, horizon: float) -> Indices:
-    """Of ``pairs`` (p, 2), indices of two edges, those that may meet; ``places`` (e, 4)."""
-    return np.asarray(pairs[_near_edges(pairs, places, size, crowd.x, crowd.course, skin, horizon)])
+def edges(
+    pairs: Indices, places: Indices, size: Floats, x: Floats, v: Floats, skin: float, horizon: float
+) -> Flags:  # fmt: skip
+    """(p,) which of ``pairs`` (p, 2), two edges, may meet; ``places`` (e, 4); ``x``, ``v`` (slots, 3): lines."""
+    return np.asarray(_near_edges(pairs, places, size, x, v, skin, horizon))
 
 
 @njit("float64(float64[::1])", cache=True)

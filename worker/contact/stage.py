@@ -7,7 +7,6 @@ everybody ends with the same velocity, to the bit.
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,13 +23,16 @@ from ..parallel.ownership import Neighbour
 from ..state import Flags, Floats, Indices, Ints, Model, Nodes, extended
 from ..timers import Timers
 from ..topology import Split
-from . import held, meetings, normals, pairing, scene, surface, sweeps
+from . import held, normals, pairing, registration, scene, surface, sweeps
 from .account import Account
+from .active_set import PUSH_OUT, Step
 from .course import courses
-from .cracks import Cracks, across
+from .cracks import Cracks, across, widening
+from .edge_edge import edge_edge
 from .flight import Flight, typical
 from .follower import Follower, news
-from .scene import Rules, Scene
+from .node_face import approach, node_face
+from .scene import HALO, Rules, Scene
 
 _SHORTEST = 10.0
 """Steps of free flight that a search looks ahead at least; at most twice what the last search was good for."""
@@ -40,6 +42,8 @@ meeting; fitted to the CPU times of the shattering bar on 16 ranks and of the er
 """
 _KINEMATIC = 2.0
 """One over the share of a tet's altitude that anything may pass in a step."""
+_FORESIGHT = 8
+"""Steps between two looks at how wide the cracks are."""
 _WORDS = 27
 """Of the row of a crack that opens (Contact._opened)."""
 _NO_SIDES = np.zeros((0, 3), np.int32)
@@ -68,22 +72,21 @@ class Contact:
         self._model, self._neighbours, self._comm = model, neighbours, comm
         self._clock, self._timers = clock, timers
         self._mobility, self._planes = _mobility(model.nodes, bounds), _planes(model.nodes.n, bounds)
-        self._edges, self._skin = case.contact.edges, case.contact.skin
+        self._edges = case.contact.edges
         self._cracks, self._size = Cracks.none(), 0.0
         self._surface = self._build(np.zeros(model.nodes.n, bool))
         self._mu = pairing.friction(case)
         self._size = typical(self._surface.faces.size, comm)
         """Of the faces of all ranks at the start, m."""
-        self._flight = Flight(self._surface, model.nodes, self._mobility, self._skin, self._size, comm)
-        breaking = np.array([part.fracture is not None for part in case.parts])
-        self._rules = Rules(case.contact.domain, ~np.isnan(self._mu), 2.0 * self._size, breaking)
+        self._flight = Flight(self._surface, model.nodes, self._mobility, self._size, comm)
+        self._skin, self._domain = case.contact.skin, case.contact.domain
         self._moments = np.zeros((model.nodes.n, 9), np.int64)
         largest, fastest = extremes
         self._scale = fixed_point.scale_for(largest * fastest)
         self._friction = fixed_point.Tally(np.array([largest * fastest * fastest]))
         self._account = Account(largest * fastest * fastest)
         self._give_back = 0.0
-        """Of penetrations, taken back in this step (meetings.PUSH_OUT)."""
+        """Of penetrations, taken back in this step (active_set.PUSH_OUT)."""
         self._parts = np.zeros((len(case.parts), 3), np.int64)
         self._scene: Scene | None = None
         self.due = True
@@ -126,8 +129,7 @@ class Contact:
         keys, kept = self._kept
         if (now := self._scene) is not None:
             total[now.local] = now.total[now.held]
-            some = now.kept.any(axis=1)
-            keys, kept = now.keys[some], now.kept[some]
+            keys, kept = now.kept
         parcel.nodes["contact.total"] = total
         parcel.rows["contact.kept"] = {"node": keys[:, 0], "face": keys[:, 1], "kept": kept}
 
@@ -143,8 +145,7 @@ class Contact:
         self._surface.flags = np.array(parcel.nodes["contact.flags"])
         self._moments = np.array(parcel.nodes["contact.moments"])
         state = self._model.nodes
-        self._flight = Flight(self._surface, state, self._mobility, self._skin, self._size, self._comm)
-        self._rules = replace(self._rules, cell=2.0 * self._size)
+        self._flight = Flight(self._surface, state, self._mobility, self._size, self._comm)
         self._cracks = Cracks.resume(parcel.rows["contact.cracks"], self._model.blocks, state)
         kept = parcel.rows["contact.kept"]
         self._kept = np.column_stack([kept["node"], kept["face"]]), kept["kept"]
@@ -181,8 +182,8 @@ class Contact:
         n = self._model.nodes.n
         search, push = _SURFACE * (self._surface.flags & self._model.nodes.owned), np.zeros(n)
         if (now := self._scene) is not None:
-            slaves, firsts = now.node_face[:, 0], now.edges[now.edge_edge[:, 0], 0]
-            pairs, edges = now.rest.looked
+            slaves, firsts = now.node_face.rows[:, 0], now.edges[now.edge_edge.rows[:, 0], 0]
+            pairs, edges = now.node_face.tested, now.edge_edge.tested
             for effort, weight, places in (
                 (search, 1.0, np.concatenate([slaves, firsts])),
                 (push, _AWAKE, np.concatenate([slaves[pairs], firsts[edges], now.cracks[:, :3].reshape(-1)])),
@@ -200,7 +201,7 @@ class Contact:
         """The surface, with sides of cracks that may open; nodes that have been on it, ``flags`` (n,), still are. All
         ranks take part.
         """
-        sides = self._cracks.foresee(self._model.nodes.x, self._size) if len(self._cracks.faces) else _NO_SIDES
+        sides = self._cracks.foresee() if len(self._cracks.faces) else _NO_SIDES
         found = surface.build(self._model, self._planes, self._neighbours, self._comm, self._edges, sides)
         found.flags[: len(flags)] |= flags
         return found
@@ -213,6 +214,8 @@ class Contact:
             self._surface = self._build(self._surface.flags | loose)
             self._surface.flags &= ~removed
             self._look_round()
+            if self._scene is not None:
+                self._scene.node_face.turn()
             self.due = self._changed = True
 
     def crack(self, tets: Ints, nodes: Indices, sides: Indices) -> None:
@@ -248,7 +251,7 @@ class Contact:
             self.due |= bool((told[:, 0] == 0).any())
             if self._scene is not None:
                 self._scene.expose(faces)
-                self._scene.rest.nodes[self._face(self._scene, local)] = True
+                self._scene.node_fresh[self._face(self._scene, local)] = True
                 Follower(self._scene, self._flight.here(nodes), nodes).cracks(self._cracks)
 
     def _opened(self) -> Ints:
@@ -331,7 +334,7 @@ class Contact:
                 self._look_round()
                 if self._scene is not None:
                     self._face(self._scene, self._scene.local)
-                    self._scene.rest.turn()
+                    self._scene.node_face.turn()
             if self.due or self._scene is None:
                 self._search(state)
 
@@ -353,9 +356,11 @@ class Contact:
     def _search(self, state: Nodes) -> None:
         """Looks for candidates; all ranks take part."""
         clock, flight, old = self._clock, self._flight, self._scene
+        whole = old is None or clock.t + clock.dt > flight.until
+        print("GLOBAL", clock.step, clock.step - self._last, "whole" if whole else "", flush=True)
         if old is not None:
             old.free()
-            self._kept = old.keys, old.kept
+            self._kept = old.kept
         if self._fractures:
             self._expose()
         flight.begin(state, self._courses(state), clock.t)
@@ -365,15 +370,24 @@ class Contact:
         else:
             flight.refresh(state)
         steps, drift = flight.foresight(clock.dt)
-        horizon = max(min(steps, 2.0 * (clock.step - self._last)), _SHORTEST) * clock.dt
-        now = self._scene = scene.build(flight.sides, self._rules, horizon, drift, state, self._comm)
+        if whole:
+            horizon = max(min(steps, 2.0 * (clock.step - self._last)), _SHORTEST) * clock.dt
+            flight.until, self._last = clock.t + horizon, clock.step
+        rules = Rules(
+            self._domain, ~np.isnan(self._mu), 2.0 * self._size, self._skin * self._size, HALO * self._size, self._rubs
+        )
+        now = self._scene = scene.build(flight.sides, rules, flight.until - clock.t, drift, state, self._comm)
+        if not whole:
+            registration.carry(now, old)
         self._connect(now, state)
-        if self._rubs:
-            now.remember(*self._kept, state, self._comm)
         self._look(now, state)
         self._face(now, now.local)
-        flight.until = clock.t + horizon
-        self.due, self._last = False, clock.step
+        now.enliven(np.flatnonzero(now.face_exposed).astype(np.int32))
+        self._foresee(now)
+        registration.news(now)
+        if self._rubs:
+            now.remember(*self._kept, state, self._comm)
+        self.due = False
         self.searches += 1
 
     def _courses(self, state: Nodes) -> Floats:
@@ -395,12 +409,13 @@ class Contact:
             return self._flight.spent(state, self._clock.t, self._clock.dt)
 
     def _push(self, now: Scene, state: Nodes, dt: float, t: float) -> None:
-        crowd, room = now.crowd, now.room
+        crowd = now.crowd
         now.copies.begin(state)
         held.take(crowd.x, crowd.v, now.held, state.x, state.v, now.local)
         now.copies.finish(crowd.x, crowd.v, now.before)
-        self._give_back = meetings.PUSH_OUT if self._account.settle(self._comm) else 0.0
+        self._give_back = PUSH_OUT if self._account.settle(self._comm) else 0.0
         n = now.met = self._meet(now, dt)
+        room = now.room
         rows = sweeps.parted(room.nodes, now.shared, n)
         self._weigh(now, n, rows)
         room_of = (room.nodes, room.weights, room.normals)
@@ -419,9 +434,10 @@ class Contact:
             for _ in range(self._sweeps):
                 self._give(now, rows, sweeps.sweep, *sweep)
         if self._rubs:
-            now.kept[:] = 0.0
+            kept = now.node_face.kept
+            kept[:] = 0.0
             faces = room.pair[:n] >= 0
-            now.kept[room.pair[:n][faces]] = now.push[:n][faces]
+            kept[room.pair[:n][faces]] = now.push[:n][faces]
             heat = self._friction
             sweeps.heat(heat.words.reshape(-1), now.push, slip, crowd.v, *room_of, room.friction, heat.scale[0], n)
         account = self._account
@@ -436,7 +452,7 @@ class Contact:
         ratio = mean_dt / self._mean_dt if self._mean_dt > 0.0 else 0.0
         self._mean_dt = mean_dt
         room_of = (room.nodes, room.weights, room.normals)
-        resume = now.impulse, now.push, now.kept, room.pair, *room_of, room.friction, ratio, self._scale
+        resume = now.impulse, now.push, now.node_face.kept, room.pair, *room_of, room.friction, ratio, self._scale
         self._give(now, rows, sweeps.resume, *resume)
 
     def _give(self, now: Scene, rows: Parted, sweep: Callable[..., None], *of: Any) -> None:
@@ -451,30 +467,34 @@ class Contact:
         sweeps.give(now.crowd.v, now.total, now.moved, now.impulse, now.crowd.mobility, self._scale)
 
     def _meet(self, now: Scene, dt: float) -> int:
-        crowd, room = now.crowd, now.room
-        out = (room.nodes, room.weights, room.normals, room.wanted, room.friction, room.pair)
-        found = (crowd.x, crowd.v, crowd.part, self._mu, self._give_back, dt)
-        rest = now.rest
-        surfaces = now.faces, now.face_size, now.edges, now.edge_size, now.normals
-        if rest.fresh:
-            pairs, edges = _all(now.node_face), _all(now.edge_edge)
-            planes, known = np.empty((len(now.faces), 3)), np.zeros(len(now.faces), bool)
-            rest.settle(pairs, edges, now.node_face, now.edge_edge, *surfaces, planes, known, crowd.x, crowd.part)
-        rest.move(crowd.x, crowd.v, now.faces, now.edges, dt)
-        pairs, edges = rest.awake(now.node_face, now.edge_edge)
-        planes, known = np.empty((len(now.faces), 3)), np.zeros(len(now.faces), bool)
-        n = meetings.node_face(
-            *out, 0, now.faces, now.face_size, now.face_id, now.face_exposed, now.normals, now.on_surface, now.first,
-            now.next, now.deepest, now.holder, planes, known, now.node_face, pairs, *found,
-        )  # fmt: skip
-        self.approach = _KINEMATIC * scene.approach(crowd.x, crowd.v, now.faces, now.node_face, room.pair[:n])
-        n = meetings.edge_edge(*out, n, now.edges, now.edge_size, now.edge_exposed, now.edge_edge, edges, *found)
-        ahead = crowd.x + dt * crowd.v
-        rest.settle(pairs, edges, now.node_face, now.edge_edge, *surfaces, planes, known, ahead, crowd.part)
+        """The active contacts of the step; returns how many."""
+        crowd, tracks, pairs, edges = now.crowd, now.tracks, now.node_face, now.edge_edge
+        strayed = tracks.advance(crowd.x, crowd.v, now.faces, now.edges, dt, now.tracked)
+        if self._clock.step % _FORESIGHT == 0:
+            self._foresee(now)
+        if strayed > 0.5 * now.rules.skin or now.pending:
+            registration.renew(now, crowd.x, crowd.v, dt, strayed)
+        now.reserve()
+        step = Step(crowd.x, crowd.v, crowd.x + dt * crowd.v, crowd.part, self._mu, self._give_back, dt)
+        faces, table = now.face_table(), pairs.arrays()
+        n, tested = node_face(now.room, 0, table, now.slot_table(), faces, step, tracks.end)
+        pairs.tested = table.active[:tested]
+        self.approach = _KINEMATIC * approach(now.room, n, table, faces, step)
+        table = edges.arrays()
+        n, tested = edge_edge(now.room, n, table, now.edge_table(), step, tracks.course, tracks.end)
+        edges.tested = table.active[:tested]
+        now.face_fresh[:], now.edge_fresh[:], now.node_fresh[:] = False, False, False
         opening = np.empty(len(now.cracks), np.int64)
-        n, wide = across(*out, n, opening, now.cracks, self._size, *found)
+        n, wide = across(now.room, n, opening, now.cracks, self._size, step)
         self._opening = opening[:wide]
         return int(n)
+
+    def _foresee(self, now: Scene) -> None:
+        """The faces of cracks that may open soon are searched."""
+        if len(now.cracks):
+            rows = now.crack_rows[widening(now.cracks, now.crowd.x, self._size)]
+            sides = now.rows_of(self._cracks.faces[rows].reshape(-1))
+            now.enliven(sides[~now.face_live[sides]])
 
     def _weigh(self, now: Scene, n: int, rows: Parted) -> None:
         room, (border, inner) = now.room, rows
@@ -499,10 +519,6 @@ class Contact:
             self.contact_loss, self.external_work, now.local, now.held, now.before, now.total, now.crowd.mobility,
             self._scale,
         )  # fmt: skip
-
-
-def _all(rows: Indices) -> Indices:
-    return np.arange(len(rows), dtype=np.int32)
 
 
 def _mobility(nodes: Nodes, bounds: list[Boundary]) -> Floats:

@@ -1,0 +1,164 @@
+"""What the narrow phase takes, and what it makes: one row an active contact, of four nodes, their weights and a normal.
+
+The gap is that of the end of the step as it would come without contact, positive outside; it is a linear function of
+the velocities, dt n . sum(w_k v_k) plus a constant, with the weights w of ``weights``: 1 for the node and minus the
+area coordinates of the point of the face (the defence node, Zhong 1993), or the two ends of two edges.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..jit import njit, types
+from ..state import Flags, Floats, Indices, Ints
+
+NEAR = 0.02
+"""Of the size of a face: a gap that is watched although it does not close by itself."""
+DEEP = 0.25
+"""Of the size of a face: deepest penetration that is still taken for one, not for the back of a thin body."""
+DEEP_SELF = 0.05
+"""The same on one part, whose nodes lie behind its own faces anyway."""
+PUSH_OUT = 0.1
+"""Largest share of a penetration that is taken back in a step, and of the speed of closing that is given back for it;
+nothing while contact has no energy to give back (``account.Account``)."""
+
+
+class ActiveSet(NamedTuple):
+    """Room for active contacts."""
+
+    nodes: Indices
+    """(room, 4) slots."""
+    weights: Floats
+    """(room, 4)."""
+    normals: Floats
+    """(room, 3) unit, out of the face or out of the first edge's body."""
+    wanted: Floats
+    """(room,) n . sum(w_k v_k) must not be below this, m/s."""
+    friction: Floats
+    """(room,) Coulomb's coefficient."""
+    pair: Indices
+    """(room,) which candidate pair of a node and a face it was; -1 for edges and cracks."""
+
+    @classmethod
+    def room(cls, n: int) -> "ActiveSet":
+        """Room for ``n`` active contacts."""
+        rows, numbers = np.empty((n, 4), np.int32), np.empty(n, np.int32)
+        return cls(rows, np.empty((n, 4)), np.empty((n, 3)), np.empty(n), np.empty(n), numbers)
+
+
+class Step(NamedTuple):
+    """The slots in the step ahead."""
+
+    x: Floats
+    """(slots, 3) positions at its beginning, m."""
+    v: Floats
+    """(slots, 3) velocities without contact, m/s."""
+    ahead: Floats
+    """(slots, 3) positions at its end without contact, m."""
+    part: Indices
+    """(slots,)."""
+    mu: Floats
+    """(parts, parts) Coulomb's coefficient, NaN where two parts do not meet."""
+    give: float
+    """Of a penetration, taken back in the step (PUSH_OUT)."""
+    dt: float
+    """s."""
+
+
+class Pairs(NamedTuple):
+    """Candidate pairs of one kind, and how long each may be left alone (pairs.py)."""
+
+    rows: Indices
+    """(p, 2) a node's slot and a face, or two edges."""
+    until: Floats
+    """(p,) m; minus infinity when it is not known, NaN for a pair that is too close to be deactivated."""
+    speed: Floats
+    """(p,) relative speed of the reference motions, m/s; NaN when it is not known."""
+    turned: Flags
+    """(p,) whether a pair is deactivated because its node does not face the face, by the mean normals of the node."""
+    next: Indices
+    """(p,) of pairs of nodes and faces: the next pair of the same node, -1 for none; (0,) of edges."""
+    active: Indices
+    """(p,) room for the numbers of those that the narrow phase has tested."""
+
+
+class SlotTable(NamedTuple):
+    """The slots, as nodes that meet faces."""
+
+    normals: Floats
+    """(slots, 9) means of n and of n n (xx, yy, zz, yz, zx, xy) of the normals of a node's faces; zero without faces."""
+    on_surface: Flags
+    """(slots,) only these meet faces."""
+    first: Indices
+    """(slots,) the first pair with a face, -1 for none."""
+    left: Floats
+    """(slots,) how far each has left its reference motion, m."""
+    course: Floats
+    """(slots, 3) velocities of the reference motions, m/s."""
+    fresh: Flags
+    """(slots,) whose mean normals have changed."""
+    deepest: Floats
+    """(slots,) room for the height of a node over the face that holds it, m."""
+    holder: Indices
+    """(slots,) room for the contact with that face."""
+
+
+class FaceTable(NamedTuple):
+    """The faces."""
+
+    corners: Indices
+    """(f, 4) slots, counter-clockwise seen from outside, the node opposite last."""
+    size: Floats
+    """(f,) square root of twice the initial area, m."""
+    id: Ints
+    exposed: Flags
+    """(f,) only exposed faces are met."""
+    left: Floats
+    """(f,) the largest of its corners, m."""
+    fresh: Flags
+    """(f,) with new corners, or exposed since the last step."""
+    normal: Floats
+    """(f, 3) unit normal at the end of the step, where it is ``known``."""
+    known: Flags
+    """(f,)."""
+
+
+class EdgeTable(NamedTuple):
+    """The sharp edges."""
+
+    corners: Indices
+    """(e, 4) slots: records.Edges."""
+    size: Floats
+    """(e,) initial length, m."""
+    exposed: Flags
+    """(e, 2) whether either face is; only edges between exposed faces are met."""
+    left: Floats
+    """(e,) the larger of its ends, m."""
+    fresh: Flags
+    """(e,) with new corners, or exposed since the last step."""
+
+
+def record(name: type, *kinds: Any) -> Any:
+    """The numba type of a named tuple of arrays."""
+    return types.NamedTuple(kinds, name)  # type: ignore[no-untyped-call]
+
+
+_N1, _N2, _I1, _B1, _B2 = (
+    types.int32[::1], types.int32[:, ::1], types.int64[::1], types.boolean[::1], types.boolean[:, ::1],
+)  # fmt: skip
+_F1, _F2 = types.float64[::1], types.float64[:, ::1]
+ACTIVE_SET = record(ActiveSet, _N2, _F2, _F2, _F1, _F1, _N1)
+STEP = record(Step, _F2, _F2, _F2, _N1, _F2, types.float64, types.float64)
+PAIRS = record(Pairs, _N2, _F1, _F1, _B1, _N1, _N1)
+SLOTS = record(SlotTable, _F2, _B1, _N1, _F1, _F2, _B1, _F1, _N1)
+FACES = record(FaceTable, _N2, _F1, _I1, _B1, _F1, _B1, _F2, _B1)
+EDGES = record(EdgeTable, _N2, _F1, _B2, _F1, _B1)
+
+
+@njit("float64(float64, float64, float64, float64, float64)", cache=True)
+def needed(gap0, gap1, speed, give, dt):  # type: ignore[no-untyped-def]
+    """By how much the normal speed must rise, m/s: not to pass, and when that has happened already, not deeper; a
+    share ``give`` of the penetration is taken back (PUSH_OUT).
+    """
+    back = give * min(max(-gap0, 0.0) / dt, max(-speed, 0.0))
+    return (min(gap0, 0.0) - gap1) / dt + back

@@ -1,0 +1,221 @@
+"""Narrow phase of nodes and faces: who passes whom in the step ahead, and who need not be tested for a while.
+
+The point of the face is the one where the node passes its plane, so that a node that slides from facet to facet is
+handed over.
+"""
+
+import numpy as np
+
+from ..jit import njit, types
+from .active_set import ACTIVE_SET, DEEP, DEEP_SELF, FACES, NEAR, PAIRS, SLOTS, STEP, needed
+from .geometry import between, foot, height, off
+
+_TOUCHING = 1e-3
+"""Of the size of a face: deeper than this, a node is held by the nearest face only."""
+FACING = 0.1
+"""A node faces a face when the cosines of the face's normal and those of its own faces have a mean below this, and
+their mean less their deviation comes below minus this."""
+_ROUND = 0.01
+"""Of the size of a face: added to the distance at which a pair may meet."""
+_BEND = 0.1
+"""Largest motion of two corners of a face against each other, of the face's two sides, that is allowed for."""
+
+_V2, _N2 = "float64[:, ::1]", "int32[:, ::1]"
+_PAIR = types.Tuple((types.int64, types.int64))  # type: ignore[no-untyped-call]
+
+
+@njit("void(int32[::1], int32[::1], int32[:, ::1], int64)", cache=True)
+def chain(first, following, pairs, begin):  # type: ignore[no-untyped-def]
+    """Hangs the pairs of node and face from row ``begin`` on into the chains of their nodes: ``first`` (slots,), and
+    ``following`` (p,) the pair after each, -1 for none.
+    """
+    for p in range(begin, len(pairs)):
+        following[p], first[pairs[p, 0]] = first[pairs[p, 0]], p
+
+
+@njit(types.boolean(PAIRS, SLOTS, FACES, STEP, types.int64, types.float64), cache=True, error_model="numpy")
+def _outside(pairs, slots, faces, step, p, depth):  # type: ignore[no-untyped-def]
+    """Whether the node of pair ``p``, ``depth`` below its face, is nearer to the front of another face of that part.
+
+    Then it is beside an acute edge and not in the body: the nearest face decides on which side a node is. Only faces
+    within the share of their size that every list of candidates has are asked.
+    """
+    b, m, s, x, part = np.empty(3), np.empty(3), pairs.rows[p, 0], step.x, step.part
+    q = slots.first[s]
+    while q >= 0:
+        f = pairs.rows[q, 1]
+        q = pairs.next[q]
+        i, j, k = faces.corners[f, 0], faces.corners[f, 1], faces.corners[f, 2]
+        if not faces.exposed[f] or part[i] != part[faces.corners[pairs.rows[p, 1], 0]]:
+            continue
+        away = height(m, x, s, i, j, k)
+        if not away > 0.0:
+            continue
+        if not foot(b, x, x, s, i, j, k, 0.0):
+            away = min(off(x, s, i, j), off(x, s, j, k), off(x, s, k, i))
+        if away < min(depth, (DEEP_SELF if part[s] == part[i] else DEEP) * faces.size[f]):
+            return True
+    return False
+
+
+@njit("UniTuple(float64, 2)(float64[:, ::1], int64, float64[::1])", cache=True)
+def facing(normals, s, m):  # type: ignore[no-untyped-def]
+    """Mean, and mean less deviation, of the cosines of m and the normals of the faces of node s; -1 for one without
+    faces, which faces any.
+    """
+    mean, square, length = 0.0, 0.0, 0.0
+    for a in range(3):
+        b, c = (a + 1) % 3, (a + 2) % 3
+        mean += normals[s, a] * m[a]
+        length += normals[s, a] * normals[s, a]
+        square += normals[s, 3 + a] * m[a] * m[a] + 2.0 * normals[s, 6 + a] * m[b] * m[c]
+    if length == 0.0:
+        return -1.0, -1.0
+    return mean, mean - np.sqrt(max(square - mean * mean, 0.0))
+
+
+@njit(f"boolean(float64[::1], {_V2}, {_V2}, {_N2}, int64, int64, float64, float64, float64)", cache=True,
+      error_model="numpy")  # fmt: skip
+def _passes(b, x, ahead, corners, s, f, gap0, gap1, most):  # type: ignore[no-untyped-def]
+    """Whether node s, at height ``gap0`` over face f and ``gap1`` at the end of the step, passes it, no deeper than
+    ``most``; ``b`` (3,): where, in area coordinates.
+    """
+    i, j, k, d = corners[f, 0], corners[f, 1], corners[f, 2], corners[f, 3]
+    if not gap0 >= -most:
+        return False
+    if gap0 < 0.0:
+        altitude = 0.0
+        for a in range(3):
+            altitude -= b[a] * (x[d, a] - x[i, a])
+        if gap0 < -0.5 * altitude:
+            return False
+    tau = 0.0
+    if gap0 > 0.0:
+        tau = 1.0 if gap1 >= 0.0 else gap0 / (gap0 - gap1)
+    return foot(b, x, ahead, s, i, j, k, tau)
+
+
+@njit(f"float64({_V2}, {_V2}, int64, int64, int64, int64, float64[::1])", cache=True, error_model="numpy")
+def _bent(normals, x, s, i, j, k, m):  # type: ignore[no-untyped-def]
+    """Half of the D, m, that a face of normal m has to spare before node s faces it; none, or less, when it does.
+
+    The normal of a face of sides e, f and area A changes by less than D (|e| + |f| + D) / A while no two of its corners
+    have moved by D against each other.
+    """
+    mean, least = facing(normals, s, m)
+    turn = max(mean - FACING, 0.5 * (least + FACING))
+    ee, ff, ef = 0.0, 0.0, 0.0
+    for a in range(3):
+        e, f = x[j, a] - x[i, a], x[k, a] - x[i, a]
+        ee, ff, ef = ee + e * e, ff + f * f, ef + e * f
+    sides = np.sqrt(ee) + np.sqrt(ff)
+    return 0.5 * min(0.5 * turn * np.sqrt(ee * ff - ef * ef) / ((1.0 + _BEND) * sides), _BEND * sides)
+
+
+@njit(f"float64({_V2}, {_N2}, int64, int64, float64, float64[::1])", cache=True, error_model="numpy")
+def _distance(x, corners, s, f, gap, b):  # type: ignore[no-untyped-def]
+    """Of node s, at height ``gap``, from face f, m; ``b`` (3,): room."""
+    i, j, k = corners[f, 0], corners[f, 1], corners[f, 2]
+    if foot(b, x, x, s, i, j, k, 0.0):
+        return abs(gap)
+    return min(off(x, s, i, j), off(x, s, j, k), off(x, s, k, i))
+
+
+@njit(_PAIR(ACTIVE_SET, types.int64, PAIRS, SLOTS, FACES, STEP, types.float64), cache=True, error_model="numpy")
+def node_face(out, n, pairs, slots, faces, step, end):  # type: ignore[no-untyped-def]
+    """Nodes that pass a face, from row ``n`` on; returns the new number of rows, and how many pairs were tested.
+
+    A node meets a face that it faces: the rim of a bar not the side of another one of the same width, the surface under
+    a block that slides not its front, which stands across. ``end``: of the step, s after the search.
+    """
+    rows, until, speed, turned, active = pairs.rows, pairs.until, pairs.speed, pairs.turned, pairs.active
+    corners, size, exposed, left, fresh = faces.corners, faces.size, faces.exposed, faces.left, faces.fresh
+    planes, known, holder, deepest = faces.normal, faces.known, slots.holder, slots.deepest
+    normals, on_surface, strayed, other, course = slots.normals, slots.on_surface, slots.left, slots.fresh, slots.course
+    nodes, weights, out_normals, wanted, pair = out.nodes, out.weights, out.normals, out.wanted, out.pair
+    x, v, ahead, part = step.x, step.v, step.ahead, step.part
+    b, m = np.empty(3), np.empty(3)
+    holder[:] = -1
+    tested = 0
+    for p in range(len(rows)):
+        s, f = rows[p, 0], rows[p, 1]
+        if other[s] or fresh[f]:
+            until[p], speed[p] = -np.inf, np.nan
+        if until[p] > strayed[s] + left[f] + speed[p] * end:
+            continue
+        if not exposed[f] or not on_surface[s]:
+            until[p], speed[p] = np.inf, 0.0
+            continue
+        active[tested] = p
+        tested += 1
+        i, j, k = corners[f, 0], corners[f, 1], corners[f, 2]
+        if not known[f]:
+            height(planes[f], ahead, s, i, j, k)
+            known[f] = True
+        gap1 = 0.0
+        for a in range(3):
+            m[a] = planes[f, a]
+            gap1 += m[a] * (ahead[s, a] - ahead[i, a])
+        reach = DEEP_SELF if part[s] == part[i] else DEEP
+        if not np.isnan(until[p]):  # left alone while it cannot meet
+            if np.isnan(speed[p]) or turned[p]:
+                speed[p] = max(between(course, s, i), between(course, s, j), between(course, s, k))
+            slack = _distance(ahead, corners, s, f, gap1, b) - (_ROUND + max(reach, NEAR)) * size[f]
+            turned[p] = not slack > 0.0
+            if turned[p]:
+                slack = _bent(normals, ahead, s, i, j, k, m)
+                speed[p] = max(between(course, i, j), between(course, i, k))
+            until[p] = slack - strayed[s] - left[f] + speed[p] * end if slack > 0.0 else np.nan
+        if not gap1 <= NEAR * size[f]:
+            continue
+        mean, least = facing(normals, s, m)
+        if not (mean <= FACING and least <= -FACING):
+            continue
+        gap0 = height(b, x, s, i, j, k)
+        if not _passes(b, x, ahead, corners, s, f, gap0, gap1, reach * size[f]):
+            continue
+        at = n
+        if gap0 < -_TOUCHING * size[f]:
+            row = holder[s]
+            if row >= 0:
+                same = gap0 == deepest[s] and faces.id[f] < faces.id[rows[pair[row], 1]]
+                if not (gap0 > deepest[s] or same):
+                    continue
+            if _outside(pairs, slots, faces, step, p, -gap0):
+                continue
+            at = row if row >= 0 else n
+            deepest[s], holder[s] = gap0, at
+        n += at == n
+        nodes[at, 0], nodes[at, 1], nodes[at, 2], nodes[at, 3] = s, i, j, k
+        weights[at, 0] = 1.0
+        rate = 0.0
+        for a in range(3):
+            weights[at, a + 1] = -b[a]
+            out_normals[at, a] = m[a]
+            rate += m[a] * (v[s, a] - (b[0] * v[i, a] + b[1] * v[j, a] + b[2] * v[k, a]))
+        wanted[at] = rate + needed(gap0, gap1, rate, step.give, step.dt)
+        out.friction[at], pair[at] = step.mu[part[s], part[i]], p
+    return n, tested
+
+
+@njit(types.float64(ACTIVE_SET, types.int64, PAIRS, FACES, STEP), cache=True, error_model="numpy")
+def approach(out, n, pairs, faces, step):  # type: ignore[no-untyped-def]
+    """Largest relative speed of a node over the altitude of its face's tet, 1/s, of the first ``n`` active contacts."""
+    e, f, r = np.empty(3), np.empty(3), np.empty(3)
+    x, v, most = step.x, step.v, 0.0
+    for row in range(n):
+        s, face = pairs.rows[out.pair[row], 0], pairs.rows[out.pair[row], 1]
+        corners = faces.corners[face]
+        a, b, c, d = corners[0], corners[1], corners[2], corners[3]
+        fastest = 0.0
+        for m in range(3):
+            speed = 0.0
+            for i in range(3):
+                speed += (v[s, i] - v[corners[m], i]) ** 2
+            fastest = max(fastest, speed)
+        for i in range(3):
+            e[i], f[i], r[i] = x[b, i] - x[a, i], x[c, i] - x[a, i], x[d, i] - x[a, i]
+        nx, ny, nz = e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]
+        square = (nx * r[0] + ny * r[1] + nz * r[2]) ** 2 / (nx * nx + ny * ny + nz * nz)
+        most = max(most, fastest / square)
+    return np.sqrt(most)

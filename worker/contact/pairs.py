@@ -1,0 +1,100 @@
+"""Tables of candidate pairs, and when a pair need not be tested.
+
+A list of candidates serves many steps, and in most of them most of its pairs are far apart. Every slot has a reference
+motion, on a straight line; ``left`` is how far the slot has left it in the step ahead, the larger of the distances at
+its beginning and its end without contact. When a pair is tested and is ``slack`` further apart than it could meet at,
+it is left alone as long as
+
+    slack > U t + left_1 + left_2, now, + left_1 + left_2, when it was tested,
+
+with U the relative speed of the two reference motions and t the time since; of a face or an edge, ``left`` is that of
+its farthest corner. So a pair keeps one number and its U. It is exact: a pair that is left alone would not have met. No
+bit of the answer depends on it, and ranks need not agree.
+
+A pair whose node does not face the face is left alone until the face may have turned to it (node_face.py).
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..jit import njit
+from ..state import Flags, Floats, Indices, extended
+from .active_set import Pairs
+from .node_face import chain
+
+
+@dataclass
+class PairTable:
+    """A growing table of candidate pairs; see active_set.Pairs."""
+
+    rows: Indices = field(default_factory=lambda: np.zeros((0, 2), np.int32))
+    until: Floats = field(default_factory=lambda: np.zeros(0))
+    speed: Floats = field(default_factory=lambda: np.zeros(0))
+    turned: Flags = field(default_factory=lambda: np.zeros(0, bool))
+    kept: Floats = field(default_factory=lambda: np.zeros((0, 4)))
+    """(p, 4) the pair's impulse of the last step, zero where it was not active: along the normal, and across, N s."""
+    next: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
+    tested: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
+    """Pairs that the narrow phase of the last step has tested."""
+
+    def __len__(self) -> int:
+        """Number of pairs."""
+        return len(self.rows)
+
+    def add(self, rows: Indices) -> None:
+        """Takes up more pairs, to be tested in the next step."""
+        n = len(rows)
+        self.rows = extended(self.rows, rows)
+        self.until = extended(self.until, np.full(n, -np.inf))
+        self.speed = extended(self.speed, np.full(n, np.nan))
+        self.turned = extended(self.turned, np.zeros(n, bool))
+        self.kept = extended(self.kept, np.zeros((n, 4)))
+        self.next = extended(self.next, np.full(n, -1, np.int32))
+
+    def hang(self, first: Indices, begin: int) -> None:
+        """Hangs the pairs from row ``begin`` on into the chains of their nodes, ``first`` (slots,)."""
+        chain(first, self.next, self.rows, begin)
+
+    def drop(self, one: Flags, two: Flags) -> None:
+        """Takes out the pairs whose first thing is among ``one`` or whose second thing is among ``two``."""
+        n = _drop(self.rows, self.until, self.speed, self.turned, self.kept, one, two)
+        for name in ("rows", "until", "speed", "turned", "kept", "next"):
+            setattr(self, name, getattr(self, name)[:n])
+        self.tested = self.tested[:0]
+
+    def carried(self, one: Indices, two: Indices) -> "PairTable":
+        """The pairs whose things have new numbers ``one`` and ``two``, -1 for those that have gone."""
+        rows = np.column_stack([one[self.rows[:, 0]], two[self.rows[:, 1]]])
+        some = np.flatnonzero((rows >= 0).all(axis=1))
+        return PairTable(
+            rows[some], self.until[some], self.speed[some], self.turned[some], self.kept[some],
+            np.empty(len(some), np.int32),
+        )  # fmt: skip
+
+    def turn(self) -> None:
+        """All mean normals have changed; and a pair that was too close may be far by now."""
+        self.until[self.turned | np.isnan(self.until)] = -np.inf
+
+    def arrays(self) -> Pairs:
+        """As kernels take it."""
+        return Pairs(self.rows, self.until, self.speed, self.turned, self.next, np.empty(len(self.rows), np.int32))
+
+
+@njit(
+    "int64(int32[:, ::1], float64[::1], float64[::1], boolean[::1], float64[:, ::1], boolean[::1], boolean[::1])",
+    cache=True,
+)
+def _drop(rows, until, speed, turned, kept, one, two):  # type: ignore[no-untyped-def]
+    n = 0
+    for p in range(len(rows)):
+        a, b = rows[p, 0], rows[p, 1]
+        if one[a] or two[b]:
+            continue
+        if n < p:
+            rows[n, 0], rows[n, 1] = a, b
+            until[n], speed[n], turned[n] = until[p], speed[p], turned[p]
+            for i in range(4):
+                kept[n, i] = kept[p, i]
+        n += 1
+    return n

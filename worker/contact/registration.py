@@ -1,0 +1,152 @@
+"""Candidate pairs of what has changed: found anew, each once, on this rank alone.
+
+The pairs of a changed node, face or edge are dropped, and found again among everything that is searched. What has
+changed is what has left its line (tracks.py) and what has come to the surface. A search from nothing is the same with
+everything changed. No bit of the answer depends on what is found beyond what meets.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..state import Flags, Floats, Indices, Ints
+from . import search, sift
+from .active_set import DEEP, DEEP_SELF
+from .scene import Scene, rows_of
+from .search import Things
+
+_PARTLY = 0.5
+"""Of the half skin by which one slot may leave its line: others that have left theirs as far get new ones with it."""
+
+
+@dataclass
+class _Flight:
+    """The lines of a scene from the beginning of the step on."""
+
+    x: Floats
+    """(slots, 3) m."""
+    course: Floats
+    """(slots, 3) less what all drift with, m/s."""
+    horizon: float
+    """s."""
+
+
+def news(scene: Scene) -> None:
+    """Registers what is new, before a step begins."""
+    scene.tracks.begin_anew(scene.settle_live(), scene.crowd.x)
+    _register(scene, scene.node_new & scene.node_live, scene.face_new & scene.face_live, scene.edge_new & scene.edge_live)
+
+
+def renew(scene: Scene, x: Floats, v: Floats, dt: float, strayed: float) -> None:
+    """Registers what is new, and gives new lines to what has left its own; ``strayed``: how far at most, m.
+
+    ``x``, ``v`` (slots, 3): as the step ``dt`` begins, v before contact.
+    """
+    off = scene.settle_live()
+    if strayed > 0.5 * scene.rules.skin:
+        off |= scene.tracked & (scene.tracks.left > 0.5 * _PARTLY * scene.rules.skin)
+        scene.node_new |= off
+        scene.face_new |= off[scene.faces[:, :3]].any(axis=1)
+        scene.edge_new |= off[scene.edges[:, :2]].any(axis=1)
+    scene.tracks.begin_anew(off, x)
+    scene.tracks.measure(x, v, dt, scene.faces, scene.edges)
+    _register(scene, scene.node_new & scene.node_live, scene.face_new & scene.face_live, scene.edge_new & scene.edge_live)
+
+
+def carry(now: Scene, old: Scene) -> None:
+    """What ``old`` knows of the surface stays good on the one of ``now``, which is not connected yet: lines, what is
+    searched and what has to be registered, and the pairs of what is still there.
+    """
+    slots, faces = rows_of(now.crowd.id, old.crowd.id), rows_of(now.face_id, old.face_id)
+    order = np.argsort(_names(now))
+    edges = rows_of(_names(now)[order], _names(old))
+    edges = np.where(edges >= 0, order[edges], -1).astype(np.int32) if len(order) else edges
+    now.tracks.take_over(slots, old.tracks)
+    now.tracked[slots[slots >= 0]] = old.tracked[slots >= 0]
+    now.until = old.until
+    for kind, rows in (("node", slots), ("face", faces), ("edge", edges)):
+        for name in ("live", "new", "fresh"):
+            getattr(now, f"{kind}_{name}")[rows[rows >= 0]] = getattr(old, f"{kind}_{name}")[rows >= 0]
+    now.node_face = old.node_face.carried(slots, faces)
+    now.edge_edge = old.edge_edge.carried(edges, edges)
+
+
+def _names(scene: Scene) -> Ints:
+    """(e,) the two faces of each edge as one number: two faces have one edge in common."""
+    return (scene.edge_sides[:, 0] << 32) + scene.edge_sides[:, 1]
+
+
+def _register(scene: Scene, nodes: Flags, faces: Flags, edges: Flags) -> None:
+    tracks, pairs = scene.tracks, scene.node_face
+    flight = _Flight(tracks.positions(), tracks.course - scene.drift, scene.until - tracks.t)
+    import time; t0=time.process_time()
+    some = np.flatnonzero(pairs.kept.any(axis=1)) if scene.rules.rubs else np.zeros(0, np.int64)
+    old, kept = pairs.rows[some], pairs.kept[some]
+    pairs.drop(nodes, faces)
+    scene.edge_edge.drop(edges, edges)
+    pairs.add(_node_face(scene, nodes, faces, flight))
+    scene.edge_edge.add(_edge_edge(scene, edges, flight))
+    _recall(pairs.rows, pairs.kept, old, kept, len(scene.faces))
+    scene.chain()
+    print("REG", "t", tracks.t, "changed", nodes.sum(), faces.sum(), edges.sum(), "live", scene.node_live.sum(), scene.face_live.sum(), scene.edge_live.sum(), "pairs", len(pairs), len(scene.edge_edge), "dropped", len(old)-0, "ms", round(1e3*(time.process_time()-t0),1), "until", scene.until, flush=True)
+    scene.node_new[:], scene.face_new[:], scene.edge_new[:] = False, False, False
+
+
+def _recall(rows: Indices, kept: Floats, old: Indices, was: Floats, faces: int) -> None:
+    """What pairs have ``kept`` stays with them when they are dropped and found again."""
+    if len(old):
+        one, two = (pairs[:, 0].astype(np.int64) * faces + pairs[:, 1] for pairs in (rows, old))
+        _, here, there = np.intersect1d(one, two, assume_unique=True, return_indices=True)
+        kept[here] = was[there]
+
+
+def _node_face(scene: Scene, nodes: Flags, faces: Flags, flight: _Flight) -> Indices:
+    """(p, 2) slot and face: changed nodes with all faces, changed faces with the other nodes."""
+    changed, others = np.flatnonzero(nodes), np.flatnonzero(scene.node_live & ~nodes)
+    one = _between(scene, changed, np.flatnonzero(scene.face_live), flight, False)
+    two = _between(scene, others, np.flatnonzero(faces), flight, True)
+    pairs = np.concatenate([one, two])
+    sifted = sift.faces(
+        pairs, scene.faces, scene.face_size, flight.x, flight.course, scene.crowd.part, scene.rules.skin, flight.horizon
+    )  # fmt: skip
+    return np.asarray(pairs[sifted])
+
+
+def _between(scene: Scene, slots: Indices, faces: Indices, flight: _Flight, few_faces: bool) -> Indices:
+    """(p, 2) slots and faces whose boxes touch."""
+    allowed, part, half = scene.rules.allowed, scene.crowd.part, 0.5 * scene.rules.skin
+    own = np.eye(len(allowed), dtype=bool)
+    nodes = Things(slots[:, None].astype(np.int32), np.full(len(slots), half))
+    found = [np.zeros((0, 2), np.int32)]
+    for deep, which in ((DEEP_SELF, own), (DEEP, ~own)):
+        if not (allowed & which).any():
+            continue
+        reach = half + deep * scene.face_size[faces]
+        sides = Things(np.ascontiguousarray(scene.faces[faces, :3]), reach)
+        things = (sides, nodes) if few_faces else (nodes, sides)
+        rows = search.find(*things, flight.x, flight.course, part, allowed & which, flight.horizon, None)
+        found.append(rows[:, ::-1] if few_faces else rows)
+    rows = np.concatenate(found)
+    return np.column_stack([slots[rows[:, 0]], faces[rows[:, 1]]]).astype(np.int32)
+
+
+def _edge_edge(scene: Scene, edges: Flags, flight: _Flight) -> Indices:
+    """(p, 2) edges of which one has changed, that of lower rank first; its rank has the pair."""
+    changed, every = np.flatnonzero(edges), np.flatnonzero(scene.edge_live)
+    few, many = (
+        Things(
+            np.ascontiguousarray(scene.edges[some, :2]),
+            0.5 * scene.rules.skin + 0.5 * DEEP_SELF * scene.edge_size[some],
+        )
+        for some in (changed, every)
+    )
+    allowed, rank = scene.rules.allowed, scene.edge_rank
+    rows = search.find(few, many, flight.x, flight.course, scene.crowd.part, allowed, flight.horizon, None)
+    one, two = changed[rows[:, 0]], every[rows[:, 1]]
+    first, second = np.where(rank[one] < rank[two], (one, two), (two, one))
+    once = (first == one) | ~edges[two]
+    pairs = np.column_stack([first, second])[once & scene.edge_own[first]].astype(np.int32)
+    sifted = sift.edges(
+        pairs, scene.edges, scene.edge_size, flight.x, flight.course, scene.rules.skin, flight.horizon
+    )  # fmt: skip
+    return np.asarray(pairs[sifted])
