@@ -70,7 +70,7 @@ def _faces(model: Model, planes: Flags, cracks: Indices) -> tuple[Indices, Ints,
     for block, kind, b, e in zip(model.blocks, kinds, begin, begin[1:], strict=False):
         _list(local[b:e], ids[b:e], kept[b:e], kind, block.tets, block.id)
     order = np.argsort(ids)
-    return local[order], ids[order], kept[order]
+    return local.take(order, axis=0), ids[order], kept[order]
 
 
 @njit("int64(uint8[:, ::1], uint32[:, ::1], int32[:, ::1], uint8[:, ::1], boolean[:, ::1])", cache=True)
