@@ -11,6 +11,7 @@ from ..parallel.ownership import Neighbour, SharedSum, same
 from ..parallel.tags import Tag
 from ..state import Flags, Floats, Indices, Ints, Nodes, among
 from . import domain, ghosts, meetings, search, sift
+from .cracks import named
 from .ghosts import Copies
 from .meetings import DEEP, DEEP_SELF, Meetings
 from .records import Crowd, Edges, Faces, merged
@@ -83,6 +84,7 @@ class Scene:
     faces: Indices
     """(f, 4) places."""
     face_id: Ints
+    """(f,) ascending."""
     face_size: Floats
     face_exposed: Flags
     """(f,) only exposed faces are met."""
@@ -136,9 +138,7 @@ class Scene:
     """(crowd,) which nodes are in company with any rank."""
     rest: Rest
     cracks: Indices
-    """(m, 6) places of the nodes on either side of cracks whose nodes have separated (contact/cracks.py)."""
-    crack_rows: Ints
-    """(m,) which cracks these are."""
+    """(m, 6) places of the nodes on either side of the cracks, -1 where they do not count (contact/cracks.py)."""
     moved: Flags
     """(crowd,) whose velocity the last sweep has changed."""
     met: int = 0
@@ -189,8 +189,8 @@ class Scene:
 
     def expose(self, faces: Ints) -> None:
         """Faces of these ids, ascending, become surface."""
-        self.face_exposed |= among(faces, self.face_id)
-        self.edge_exposed |= among(faces, self.edge_sides.reshape(-1)).reshape(-1, 2)
+        self.face_exposed[np.searchsorted(self.face_id, faces[among(self.face_id, faces)])] = True
+        self.edge_exposed.reshape(-1)[named(self.edge_sides.reshape(-1), faces)] = True
 
     def free(self) -> None:
         """Gives its messages back to MPI."""
@@ -347,7 +347,7 @@ def compact(
         keys=keys, kept=np.zeros((len(keys), 4)), faces_sent=sent,
         room=Meetings.room(room), diagonal=np.empty((room, 2)), push=np.empty((room, 4)),
         shares=shares, impulse=impulse, place=place, pushes=pushes, shared=np.zeros(crowd.n, bool),
-        cracks=np.zeros((0, 6), np.int32), crack_rows=np.zeros(0, np.int64),
+        cracks=np.zeros((0, 6), np.int32),
         rest=Rest(crowd.x, crowd.course, len(which_faces), len(which_edges), len(node_face), len(edge_edge)),
         total=np.zeros((crowd.n, 3), np.int64), normals=np.zeros((crowd.n, 9)), before=np.zeros((crowd.n, 3)),
         deepest=np.empty(crowd.n), holder=np.empty(crowd.n, np.int32), moved=np.zeros(crowd.n, bool),
