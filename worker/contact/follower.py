@@ -150,7 +150,10 @@ class Follower:
         for name in ("pushes", "shared", "slave", "on_surface", "moved"):
             setattr(scene, name, extended(getattr(scene, name), np.zeros(n, bool)))
         scene.first = extended(scene.first, np.full(n, -1, np.int32))
-        scene.deepest, scene.holder = np.empty(scene.crowd.n), np.empty(scene.crowd.n, np.int32)
+        scene.deepest, scene.holder = (
+            extended(scene.deepest, np.empty(n)),
+            extended(scene.holder, np.empty(n, np.int32)),
+        )
         scene.rest.add(rows.x, rows.course)
         if (rows.local < 0).any():
             self._sort()
