@@ -14,7 +14,7 @@ import numpy as np
 
 from ..jit import njit, types
 from ..migration.parcel import Table
-from ..state import WIDE, Block, Flags, Floats, Indices, Ints, Nodes, among, extended
+from ..state import WIDE, Block, Flags, Indices, Ints, Nodes, extended
 from ..topology import Split
 from .active_set import ACTIVE_SET, DEEP_SELF, NEAR, STEP, needed
 
@@ -38,17 +38,15 @@ class Cracks:
     """(m, 2, 3) block, place and face of either side, -1 for one of another rank."""
     foreseen: Flags
     """(m,) whether the scene of the last search has the sides."""
+    places: Indices
+    """(m, 6) of the nodes, in the scene; all -1 for a crack without nodes that have separated, and for one that another
+    rank computes, that of the first side."""
 
     @classmethod
     def none(cls) -> "Cracks":
         """No facet."""
         faces, sides = np.zeros((0, 2), np.int64), np.zeros((0, 2, 3), np.int32)
-        return cls(faces, np.zeros((0, 6), np.int32), sides, np.zeros(0, bool))
-
-    @property
-    def tets(self) -> Ints:
-        """(m, 2) global ids of the tets."""
-        return self.faces // 4
+        return cls(faces, np.zeros((0, 6), np.int32), sides, np.zeros(0, bool), np.zeros((0, 6), np.int32))
 
     def add(self, tets: Ints, nodes: Indices, sides: Indices, blocks: list[Block]) -> None:
         """Takes up facets of ``tets`` (m, 2) with their three ``nodes`` (m, 3)."""
@@ -60,33 +58,33 @@ class Cracks:
         self.faces, self.sides = extended(self.faces, faces), extended(self.sides, sides)
         self.nodes = extended(self.nodes, np.concatenate([nodes, nodes], axis=1))
         self.foreseen = extended(self.foreseen, np.zeros(len(faces), bool))
+        self.places = extended(self.places, np.full((len(faces), 6), -1, np.int32))
 
     def follow(self, split: Split, ids: Ints) -> None:
         """Takes up the copies of a split; ``ids``: of the local nodes."""
         parents = np.zeros(len(ids), bool)
         parents[split.copies.parents] = True
         rows = touching(self.nodes, parents)
-        self.nodes[rows] = split.followed_sides(self.nodes[rows], ids, self.tets[rows])
+        self.nodes[rows] = split.followed_sides(self.nodes[rows], ids, self.faces[rows] // 4)
 
     def keep(self, ids: Ints) -> Table:
         """The facets as a table; ``ids``: of the local nodes."""
         rows, k = np.nonzero(self.sides[:, :, 1] >= 0)
-        return {
-            "tet": self.tets[rows, k], "key": self.faces[rows, 0], "faces": self.faces[rows],
-            "with": ids[self.nodes[rows]],
-        }  # fmt: skip
+        faces = self.faces[rows]
+        return {"tet": self.faces[rows, k] // 4, "key": faces[:, 0], "faces": faces, "with": ids[self.nodes[rows]]}
 
     @classmethod
     def resume(cls, table: Table, blocks: list[Block], nodes: Nodes) -> "Cracks":
         """Facets from a table."""
-        faces = table["faces"]
+        faces = np.array(table["faces"])
         sides = np.full((len(faces), 2, 3), -1, np.int32)
         for b, block in enumerate(blocks):
             order = np.argsort(block.id)
             at = order[np.minimum(np.searchsorted(block.id[order], faces // 4), block.n - 1)]
             rows, k = np.nonzero(block.id[at] == faces // 4)
             sides[rows, k] = np.column_stack([np.full(len(rows), b), at[rows, k], faces[rows, k] % 4])
-        return cls(faces, nodes.places(table["with"]), sides, np.zeros(len(faces), bool))
+        nowhere = np.full((len(faces), 6), -1, np.int32)
+        return cls(faces, nodes.places(table["with"]), sides, np.zeros(len(faces), bool), nowhere)
 
     def foresee(self) -> Indices:
         """(k, 3) block, place and face of all sides here, which a scene takes up."""
@@ -95,14 +93,54 @@ class Cracks:
         return sides[sides[:, 1] >= 0]
 
     def open(self, faces: Ints, blocks: list[Block]) -> None:
-        """Makes surface of the cracks whose first sides are among ``faces``, ascending, and forgets them."""
-        chosen = among(faces, self.faces[:, 0])
-        sides = self.sides[chosen].reshape(-1, 3)
+        """Makes surface of the cracks whose first sides are among ``faces``, ascending, and forgets them: the last ones
+        move into the holes.
+        """
+        rows = named(self.faces[:, 0], faces)
+        sides = self.sides[rows].reshape(-1, 3)
         for b, block in enumerate(blocks):
             mine = sides[(sides[:, 0] == b) & (sides[:, 1] >= 0)]
             block.bond[mine[:, 1], mine[:, 2]] = WIDE
+        left = len(self.faces) - len(rows)
+        stays = np.ones(len(rows), bool)
+        stays[rows[rows >= left] - left] = False
+        holes, movers = rows[rows < left], left + np.flatnonzero(stays)
         for name, column in vars(self).items():
-            setattr(self, name, column[~chosen])
+            column[holes] = column[movers]
+            setattr(self, name, column[:left])
+
+
+@njit("int64[::1](int32[:, ::1], float64[:, ::1], float64)", cache=True)
+def widening(cracks, x, typical):  # type: ignore[no-untyped-def]
+    """Rows of ``cracks`` (m, 6), slots, that are so wide at the positions ``x`` (slots, 3) that their faces have to be
+    searched; ``typical``: size of a face, m.
+    """
+    rows, n = np.empty(len(cracks), np.int64), 0
+    for c in range(len(cracks)):
+        if cracks[c, 0] < 0:
+            continue
+        most = 0.0
+        for k in range(3):
+            p, q, apart = cracks[c, k], cracks[c, 3 + k], 0.0
+            for i in range(3):
+                apart += (x[q, i] - x[p, i]) ** 2
+            most = max(most, apart)
+        if most >= (_FORESEEN * _WIDE * typical) ** 2:
+            rows[n] = c
+            n += 1
+    return rows[:n].copy()
+
+
+@njit("int64[::1](int64[:], int64[::1])", cache=True)
+def named(ids, wanted):  # type: ignore[no-untyped-def]
+    """Which of ``ids`` are among the ascending ``wanted``."""
+    rows, n = np.empty(len(ids), np.int64), 0
+    for i in range(len(ids)):
+        at = np.searchsorted(wanted, ids[i])
+        if at < len(wanted) and wanted[at] == ids[i]:
+            rows[n] = i
+            n += 1
+    return rows[:n].copy()
 
 
 @njit("int64[::1](int32[:, ::1], boolean[::1])", cache=True)
@@ -119,23 +157,18 @@ def touching(table, flags):  # type: ignore[no-untyped-def]
     return rows[:n].copy()
 
 
-@njit("int64[::1](int32[:, ::1], float64[:, ::1], float64)", cache=True)
-def widening(cracks, x, typical):  # type: ignore[no-untyped-def]
-    """Rows of ``cracks`` (m, 6), slots, that are so wide at the positions ``x`` (slots, 3) that their faces have to be
-    searched; ``typical``: size of a face, m.
+@njit("int64[::1](int64[::1], int32[:, ::1], int32[:, :, ::1])", cache=True)
+def computed(rows, nodes, sides):  # type: ignore[no-untyped-def]
+    """Those of some ``rows`` of the cracks that have nodes that have separated, and the first side here: this rank
+    computes them.
     """
-    rows, n = np.empty(len(cracks), np.int64), 0
-    for c in range(len(cracks)):
-        most = 0.0
-        for k in range(3):
-            p, q, apart = cracks[c, k], cracks[c, 3 + k], 0.0
-            for i in range(3):
-                apart += (x[q, i] - x[p, i]) ** 2
-            most = max(most, apart)
-        if most >= (_FORESEEN * _WIDE * typical) ** 2:
-            rows[n] = c
+    some, n = np.empty(len(rows), np.int64), 0
+    for c in rows:
+        apart = nodes[c, 0] != nodes[c, 3] or nodes[c, 1] != nodes[c, 4] or nodes[c, 2] != nodes[c, 5]
+        if sides[c, 0, 1] >= 0 and apart:
+            some[n] = c
             n += 1
-    return rows[:n].copy()
+    return some[:n].copy()
 
 
 @njit(
@@ -146,7 +179,8 @@ def widening(cracks, x, typical):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def across(out, n, opening, cracks, typical, step):  # type: ignore[no-untyped-def]
-    """Nodes across ``cracks`` (m, 6) that close on each other, from row ``n`` of ``out`` on.
+    """Nodes across ``cracks`` (m, 6; -1 for those that do not count) that close on each other, from row ``n`` of ``out``
+    on.
 
     ``typical``: size of a face, m. Returns the new number of rows, and how many of the cracks have become so wide that
     they open; ``opening`` (m,) says which.
@@ -155,6 +189,8 @@ def across(out, n, opening, cracks, typical, step):  # type: ignore[no-untyped-d
     x, v, part, mu, dt = step.x, step.v, step.part, step.mu, step.dt
     wide = 0
     for c in range(len(cracks)):
+        if cracks[c, 0] < 0:
+            continue
         for i in range(3):
             start = x[cracks[c, 0], i] + x[cracks[c, 3], i]
             e[i] = 0.5 * (x[cracks[c, 1], i] + x[cracks[c, 4], i] - start)

@@ -34,7 +34,9 @@ class _Flight:
 def news(scene: Scene) -> None:
     """Registers what is new, before a step begins."""
     scene.tracks.begin_anew(scene.settle_live(), scene.crowd.x)
-    _register(scene, scene.node_new & scene.node_live, scene.face_new & scene.face_live, scene.edge_new & scene.edge_live)
+    _register(
+        scene, scene.node_new & scene.node_live, scene.face_new & scene.face_live, scene.edge_new & scene.edge_live
+    )
 
 
 def renew(scene: Scene, x: Floats, v: Floats, dt: float, strayed: float) -> None:
@@ -50,7 +52,9 @@ def renew(scene: Scene, x: Floats, v: Floats, dt: float, strayed: float) -> None
         scene.edge_new |= off[scene.edges[:, :2]].any(axis=1)
     scene.tracks.begin_anew(off, x)
     scene.tracks.measure(x, v, dt, scene.faces, scene.edges)
-    _register(scene, scene.node_new & scene.node_live, scene.face_new & scene.face_live, scene.edge_new & scene.edge_live)
+    _register(
+        scene, scene.node_new & scene.node_live, scene.face_new & scene.face_live, scene.edge_new & scene.edge_live
+    )
 
 
 def carry(now: Scene, old: Scene) -> None:
@@ -79,7 +83,9 @@ def _names(scene: Scene) -> Ints:
 def _register(scene: Scene, nodes: Flags, faces: Flags, edges: Flags) -> None:
     tracks, pairs = scene.tracks, scene.node_face
     flight = _Flight(tracks.positions(), tracks.course - scene.drift, scene.until - tracks.t)
-    import time; t0=time.process_time()
+    import time
+
+    t0 = time.process_time()
     some = np.flatnonzero(pairs.kept.any(axis=1)) if scene.rules.rubs else np.zeros(0, np.int64)
     old, kept = pairs.rows[some], pairs.kept[some]
     pairs.drop(nodes, faces)
@@ -88,7 +94,29 @@ def _register(scene: Scene, nodes: Flags, faces: Flags, edges: Flags) -> None:
     scene.edge_edge.add(_edge_edge(scene, edges, flight))
     _recall(pairs.rows, pairs.kept, old, kept, len(scene.faces))
     scene.chain()
-    print("REG", "t", tracks.t, "changed", nodes.sum(), faces.sum(), edges.sum(), "live", scene.node_live.sum(), scene.face_live.sum(), scene.edge_live.sum(), "pairs", len(pairs), len(scene.edge_edge), "dropped", len(old)-0, "ms", round(1e3*(time.process_time()-t0),1), "until", scene.until, flush=True)
+    print(
+        "REG",
+        "t",
+        tracks.t,
+        "changed",
+        nodes.sum(),
+        faces.sum(),
+        edges.sum(),
+        "live",
+        scene.node_live.sum(),
+        scene.face_live.sum(),
+        scene.edge_live.sum(),
+        "pairs",
+        len(pairs),
+        len(scene.edge_edge),
+        "dropped",
+        len(old) - 0,
+        "ms",
+        round(1e3 * (time.process_time() - t0), 1),
+        "until",
+        scene.until,
+        flush=True,
+    )
     scene.node_new[:], scene.face_new[:], scene.edge_new[:] = False, False, False
 
 

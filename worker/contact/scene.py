@@ -18,7 +18,6 @@ from .records import Crowd, Edges, Faces, merged
 from .search import Boxes, Things
 from .tracks import Tracks
 
-
 HALO = 1.0
 """Of the typical size of a face: two slots of different ranks that leave their lines by half of this, each, may meet
 unseen; a search of all ranks comes before."""
@@ -115,9 +114,7 @@ class Scene:
     pushes: Flags
     """(slots,) which nodes a contact of this rank may push."""
     cracks: Indices
-    """(m, 6) slots of the nodes on either side of cracks whose nodes have separated (contact/cracks.py)."""
-    crack_rows: Ints
-    """(m,) which cracks these are."""
+    """(m, 6) slots of the nodes on either side of the cracks, -1 where they do not count (contact/cracks.py)."""
     node_face: PairTable = field(default_factory=PairTable)
     """Of a slot and a face."""
     edge_edge: PairTable = field(default_factory=PairTable)
@@ -297,9 +294,7 @@ def _expose(exposed, fresh, faces, shown):  # type: ignore[no-untyped-def]
                 exposed[e, k], fresh[e] = True, True
 
 
-@njit(
-    "void(boolean[::1], boolean[::1], int32[:, ::1], int32[:, ::1], boolean[:, ::1], boolean[::1])", cache=True
-)
+@njit("void(boolean[::1], boolean[::1], int32[:, ::1], int32[:, ::1], boolean[:, ::1], boolean[::1])", cache=True)
 def _enliven(live, new, edges, faces, exposed, searched):  # type: ignore[no-untyped-def]
     """Edges both of whose ``faces`` (e, 2) are ``searched`` (f,), or exposed where they are not here."""
     for e in range(len(live)):
@@ -334,7 +329,7 @@ def build(sides: Sides, rules: Rules, horizon: float, drift: Floats, nodes: Node
         edge_faces=rows_of(faces.id, edges.sides), edge_size=edges.size, edge_exposed=edges.exposed.copy(),
         edge_own=np.arange(edges.n) < sides.edges.n, edge_rank=rank, rules=rules, slave=slave,
         tracks=Tracks(crowd.x, crowd.course, faces.n, edges.n), drift=drift, until=horizon, faces_sent=sent, place=place,
-        pushes=pushes | slave, cracks=np.zeros((0, 6), np.int32), crack_rows=np.zeros(0, np.int64),
+        pushes=pushes | slave, cracks=np.zeros((0, 6), np.int32),
     )  # fmt: skip
 
 

@@ -30,7 +30,8 @@ from .course import courses
 from .cracks import Cracks, across, widening
 from .edge_edge import edge_edge
 from .flight import Flight, typical
-from .follower import Follower, news
+from .follower import Follower
+from .news import news
 from .node_face import approach, node_face
 from .scene import HALO, Rules, Scene
 
@@ -184,9 +185,10 @@ class Contact:
         if (now := self._scene) is not None:
             slaves, firsts = now.node_face.rows[:, 0], now.edges[now.edge_edge.rows[:, 0], 0]
             pairs, edges = now.node_face.tested, now.edge_edge.tested
+            cracks = now.cracks[now.cracks[:, 0] >= 0, :3]
             for effort, weight, places in (
                 (search, 1.0, np.concatenate([slaves, firsts])),
-                (push, _AWAKE, np.concatenate([slaves[pairs], firsts[edges], now.cracks[:, :3].reshape(-1)])),
+                (push, _AWAKE, np.concatenate([slaves[pairs], firsts[edges], cracks.reshape(-1)])),
                 (push, _MEETING, now.room.nodes[: now.met, 0]),
             ):
                 at = now.crowd.local[places]
@@ -252,7 +254,7 @@ class Contact:
             if self._scene is not None:
                 self._scene.expose(faces)
                 self._scene.node_fresh[self._face(self._scene, local)] = True
-                Follower(self._scene, self._flight.here(nodes), nodes).cracks(self._cracks)
+                self._scene.cracks = self._cracks.places
 
     def _opened(self) -> Ints:
         """(k, 27) cracks that open here: whether the last search has taken them up; ids of both sides; of the nodes of
@@ -260,7 +262,7 @@ class Contact:
         """
         if self._scene is None or not self.opening:
             return np.zeros((0, _WORDS), np.int64)
-        nodes, rows = self._model.nodes, self._scene.crack_rows[self._opening]
+        nodes, rows = self._model.nodes, self._opening
         sides = self._cracks.nodes[rows][:, [0, 1, 2, 3, 5, 4]]
         shares = normals.shares(nodes.x, sides.reshape(-1, 3), self._size).reshape(-1, 18)
         return np.column_stack([self._cracks.foreseen[rows], self._cracks.faces[rows], nodes.id[sides], shares])
@@ -492,7 +494,7 @@ class Contact:
     def _foresee(self, now: Scene) -> None:
         """The faces of cracks that may open soon are searched."""
         if len(now.cracks):
-            rows = now.crack_rows[widening(now.cracks, now.crowd.x, self._size)]
+            rows = widening(now.cracks, now.crowd.x, self._size)
             sides = now.rows_of(self._cracks.faces[rows].reshape(-1))
             now.enliven(sides[~now.face_live[sides]])
 

@@ -1,0 +1,62 @@
+"""Cracks and families: tables that change by what has happened, not by what there is."""
+
+import numpy as np
+import pytest
+
+from conoid.worker.contact.cracks import Cracks, computed
+from conoid.worker.contact.kin import Family, inherited
+from conoid.worker.contact.meetings import chain
+
+
+def cracks_of(n: int) -> Cracks:
+    """``n`` cracks whose columns all tell which one it is; no side is here."""
+    number = np.arange(n)
+    found = Cracks.none()
+    tets, nodes = np.column_stack([2 * number, 2 * number + 1]), np.repeat(number[:, None], 3, axis=1)
+    found.add(tets, nodes.astype(np.int32), np.full((n, 2, 3), -1, np.int32), [])
+    found.places[:] = number[:, None]
+    return found
+
+
+@pytest.mark.parametrize("opened", [[], [0], [6], [5, 6], [0, 3, 6], [0, 1, 2, 3, 4, 5, 6]])
+def test_cracks_that_open_leave_and_all_others_keep_their_columns(opened: list[int]) -> None:
+    cracks = cracks_of(7)
+    cracks.open(cracks.faces[opened, 0], [])
+    left = cracks.nodes[:, 0]
+    assert sorted(left) == [c for c in range(7) if c not in opened]
+    assert np.array_equal((cracks.faces + 1) // 4, np.column_stack([2 * left, 2 * left + 1]))
+    for column in (cracks.nodes, cracks.places):
+        assert np.array_equal(column, np.repeat(left[:, None], 6, axis=1))
+
+
+def test_a_crack_that_comes_after_others_have_opened_stands_behind_those_that_are_left() -> None:
+    cracks = cracks_of(4)
+    cracks.open(cracks.faces[[1], 0], [])
+    more = cracks_of(9)
+    cracks.add(more.faces[8:] // 4 + 1, more.nodes[8:, :3], np.full((1, 2, 3), -1, np.int32), [])
+    assert cracks.nodes[:, 0].tolist() == [0, 3, 2, 8]
+    assert cracks.places[3].tolist() == [-1] * 6
+
+
+def test_only_cracks_with_their_first_side_here_and_nodes_apart_are_computed() -> None:
+    nodes = np.array([[0, 1, 2, 0, 1, 2], [0, 1, 2, 0, 1, 3], [0, 1, 2, 4, 1, 2], [0, 1, 2, 0, 5, 2]], np.int32)
+    sides = np.zeros((4, 2, 3), np.int32)
+    sides[2, 0, 1] = -1
+    assert computed(np.arange(4), nodes, sides).tolist() == [1, 3]
+    assert computed(np.array([0, 1]), nodes, sides).tolist() == [1]
+
+
+def test_every_copy_has_the_candidates_of_its_parent() -> None:
+    pairs = np.array([[0, 7], [2, 8], [0, 9], [1, 7]], np.int32)
+    first, following = np.full(6, -1, np.int32), np.empty(len(pairs), np.int32)
+    chain(first, following, pairs, 0)
+    family = np.array([[0, 4], [0, 5], [3, 2]], np.int32)
+    assert sorted(inherited(family, first, following, pairs).tolist()) == [[4, 7], [4, 9], [5, 7], [5, 9]]
+
+
+def test_a_family_tells_where_the_copies_of_a_node_begin_and_end() -> None:
+    family = Family.of(np.array([[3, 6], [3, 7], [1, 8]], np.int32), 9)
+    assert family.first.tolist() == [-1, 2, -1, 0, -1, -1, -1, -1, -1]
+    assert family.member.tolist() == [[6, 0], [7, 1], [8, 1]]
+    assert family.most == 2
+    assert Family.of(np.zeros((0, 2), np.int32), 2).most == 0

@@ -1,0 +1,171 @@
+"""Sharp edges: where two faces of the surface meet at an angle, and can meet other edges.
+
+A half edge is an edge as one face sees it, (a, b) of the face abc. Every two half edges that run against each other
+between the same nodes make an edge, but those of the two sides of one facet.
+"""
+
+import numpy as np
+
+from ..jit import njit
+from ..parallel.comm import Comm
+from ..parallel.ownership import Neighbour
+from ..state import Flags, Floats, Indices, Ints, Model
+from .records import Edges, Faces
+
+SHARP = np.cos(np.radians(25.0))
+"""Edges between faces whose initial normals differ by more than this can meet other edges."""
+
+_A, _B, _C, _OWNER, _FACE, _EXPOSED, _LENGTH, _NORMAL = 0, 1, 2, 3, 4, 5, 6, 7
+"""Columns of a half edge that travels: its nodes and the third node of its face, the owner of that one, the face,
+whether that is exposed, initial length, m, and the unit normal of the face; floats as their bits."""
+_HALF, _ROW = 10, 11
+"""Columns of a half edge, and of an edge (``_matched``)."""
+
+
+def none() -> tuple[Edges, Ints, Indices]:
+    """No edge (``find``)."""
+    nothing = np.zeros((0, 4), np.int64)
+    edges = Edges(nothing, nothing[:, :2], np.zeros(0), np.zeros((0, 2), bool))
+    return edges, np.zeros(0, np.int64), np.zeros(0, np.int32)
+
+
+def find(
+    model: Model, faces: Faces, local: Indices, units: Floats, some: Flags, neighbours: list[Neighbour], comm: Comm
+) -> tuple[Edges, Ints, Indices]:
+    """Sharp edges by the ids of their faces, and ids of the nodes of theirs that are not held here, with their owners.
+
+    Of ``some`` (f,) of the faces, with the ``local`` nodes (f, 4) and unit normals (f, 3). Where other ranks may hold
+    faces of an edge, the owner of the lower node brings them together, and the rank of the face of smaller id has the
+    edge.
+    """
+    half = np.repeat(some[:, None], 3, axis=1)
+    away = half & _common(local, model.nodes.n, neighbours) if neighbours else np.zeros_like(half)
+    pairs = _pairs(local, half & ~away, units, model.nodes.n, SHARP)
+    n = len(pairs)
+    edges = Edges(np.empty((n, 4), np.int64), np.empty((n, 2), np.int64), np.empty(n), np.empty((n, 2), bool))
+    _fill(*edges.columns(), pairs, local, faces.nodes, faces.id, faces.exposed, model.nodes.x0)
+    if comm.size == 1:
+        return edges, *none()[1:]
+    rows = _elsewhere(model, faces, local, units, away, comm)
+    floats = np.ascontiguousarray(rows[:, 8]).view(np.float64)
+    edges = Edges.joined([edges, Edges(rows[:, :4], rows[:, 6:8], floats, rows[:, 9:] > 0)])
+    ends, owners = rows[:, 2:4].reshape(-1), rows[:, 4:6].reshape(-1)
+    absent = ~np.isin(ends, model.nodes.id)
+    far, first = np.unique(ends[absent], return_index=True)
+    return edges.take(np.lexsort((edges.sides[:, 1], edges.sides[:, 0]))), far, owners[absent][first].astype(np.int32)
+
+
+def _common(local: Indices, n: int, neighbours: list[Neighbour]) -> Flags:
+    """(f, 3) which half edges have two of the ``n`` nodes that other ranks hold, too."""
+    shared = np.zeros(n, bool)
+    for other in neighbours:
+        shared[other.nodes] = True
+    a, b = shared[local[:, :3]], shared[local[:, [1, 2, 0]]]
+    return np.asarray(a & b)
+
+
+def _elsewhere(model: Model, faces: Faces, local: Indices, units: Floats, away: Flags, comm: Comm) -> Ints:
+    """Rows (``_matched``) of this rank's edges among the half edges ``away`` (f, 3); all ranks take part."""
+    nodes, (f, k) = model.nodes, np.nonzero(away)
+    a, b, c = (local[f, (k + i) % 3] for i in range(3))
+    floats = np.column_stack([np.linalg.norm(nodes.x0[b] - nodes.x0[a], axis=1), units[f]]).view(np.int64)
+    known = nodes.id[a], nodes.id[b], nodes.id[c], nodes.owner[c], faces.id[f], faces.exposed[f]
+    halves, home = np.column_stack([*known, floats]), nodes.owner[np.minimum(a, b)]
+    found = comm.swap({int(rank): halves[home == rank] for rank in np.unique(home)})
+    gathered = np.concatenate([halves[:0], *(words.reshape(-1, _HALF) for words in found.values())])
+    sender = np.repeat(np.array(list(found), np.int64), [len(words) // _HALF for words in found.values()])
+    rows, target = _matched(gathered, sender)
+    back = comm.swap({int(rank): rows[target == rank] for rank in np.unique(target)})
+    return np.concatenate([rows[:0], *(words.reshape(-1, _ROW) for words in back.values())])
+
+
+def _matched(halves: Ints, sender: Ints) -> tuple[Ints, Ints]:
+    """Rows (a, b, c, d, owner of c, owner of d, face abc, face bad, length, whether either face is exposed) of the
+    sharp edges of ``halves``, and the sender of the first face of each.
+    """
+    order = np.argsort(halves[:, _FACE], kind="stable")
+    halves, sender = halves[order], sender[order]
+    ids, corners = np.unique(halves[:, : _C + 1], return_inverse=True)
+    half = np.zeros((len(halves), 3), bool)
+    half[:, 0] = True
+    units = np.ascontiguousarray(halves[:, _NORMAL:]).view(np.float64)
+    pairs = _pairs(corners.reshape(-1, 3).astype(np.int32), half, units, len(ids), SHARP)
+    one, two = halves[pairs[:, 0]], halves[pairs[:, 2]]
+    others = (np.column_stack([one[:, k], two[:, k]]) for k in (_C, _OWNER, _FACE))
+    exposed = np.column_stack([one[:, _EXPOSED], two[:, _EXPOSED]])
+    return np.column_stack([one[:, [_A, _B]], *others, one[:, _LENGTH], exposed]), sender[pairs[:, 0]]
+
+
+@njit("int32[:, ::1](int32[:, ::1], boolean[:, ::1], float64[:, ::1], int64, float64)", cache=True)
+def _pairs(corners, half, units, nodes, sharp):  # type: ignore[no-untyped-def]
+    """(p, 4) sharp edges: a face, which of its half edges, and the same of the other face; by face, then by face.
+
+    ``corners`` (f, 3 or more) of faces by ascending id, fewer than ``nodes``; ``half`` (f, 3): which of their half
+    edges, k from corner k to the next, count; ``sharp``: cosine of the least angle between their ``units``.
+    """
+    begin = _by_lower_node(corners, half, nodes)
+    at, higher, which = begin[:-1].copy(), np.empty(begin[nodes], np.int32), np.empty(begin[nodes], np.int32)
+    for f in range(len(corners)):
+        for k in range(3):
+            if half[f, k]:
+                a, b = corners[f, k], corners[f, (k + 1) % 3]
+                higher[at[min(a, b)]], which[at[min(a, b)]] = max(a, b), 3 * f + k
+                at[min(a, b)] += 1
+    found, n = np.empty((len(which) // 2 + 1, 4), np.int32), 0
+    at[:] = begin[:-1]
+    for f in range(len(corners)):
+        first = n
+        for k in range(3):
+            if not half[f, k]:
+                continue
+            a, b, c = corners[f, k], corners[f, (k + 1) % 3], corners[f, (k + 2) % 3]
+            low, high = min(a, b), max(a, b)
+            at[low] += 1
+            for i in range(at[low], begin[low + 1]):
+                if higher[i] != high:
+                    continue
+                g, m = which[i] // 3, which[i] % 3
+                cosine = units[f, 0] * units[g, 0] + units[f, 1] * units[g, 1] + units[f, 2] * units[g, 2]
+                if corners[g, m] == a or corners[g, (m + 2) % 3] == c or not cosine < sharp:
+                    continue
+                if n == len(found):
+                    found = np.concatenate((found, np.empty_like(found)))
+                j = n
+                while j > first and found[j - 1, 2] > g:
+                    found[j] = found[j - 1]
+                    j -= 1
+                found[j, 0], found[j, 1], found[j, 2], found[j, 3] = f, k, g, m
+                n += 1
+    return found[:n].copy()
+
+
+@njit("int64[::1](int32[:, ::1], boolean[:, ::1], int64)", cache=True)
+def _by_lower_node(corners, half, nodes):  # type: ignore[no-untyped-def]
+    """(nodes + 1,) where the half edges of each lower node begin."""
+    begin = np.zeros(nodes + 1, np.int64)
+    for f in range(len(corners)):
+        for k in range(3):
+            if half[f, k]:
+                begin[min(corners[f, k], corners[f, (k + 1) % 3]) + 1] += 1
+    for a in range(nodes):
+        begin[a + 1] += begin[a]
+    return begin
+
+
+@njit(
+    "void(int64[:, ::1], int64[:, ::1], float64[::1], boolean[:, ::1], int32[:, ::1], int32[:, ::1], int64[:, ::1], "
+    "int64[::1], boolean[::1], float64[:, ::1])",
+    cache=True,
+)
+def _fill(nodes, sides, size, exposed, pairs, local, face_nodes, face_id, face_exposed, x):  # type: ignore[no-untyped-def]
+    """The columns of the edges that are ``pairs``."""
+    for p in range(len(pairs)):
+        f, k, g, m = pairs[p, 0], pairs[p, 1], pairs[p, 2], pairs[p, 3]
+        for i in range(3):
+            nodes[p, i] = face_nodes[f, (k + i) % 3]
+        nodes[p, 3] = face_nodes[g, (m + 2) % 3]
+        sides[p, 0], sides[p, 1] = face_id[f], face_id[g]
+        exposed[p, 0], exposed[p, 1] = face_exposed[f], face_exposed[g]
+        a, b = local[f, k], local[f, (k + 1) % 3]
+        dx, dy, dz = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
+        size[p] = np.sqrt(dx * dx + dy * dy + dz * dz)
