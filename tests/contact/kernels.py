@@ -1,10 +1,18 @@
 """What the tests ask of the contact kernels, and how it is asked of them: a changed signature changes this file."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 
 from conoid.worker.contact import meetings as kernels
-from conoid.worker.contact import sweeps
 from conoid.worker.contact.meetings import Meetings
+from conoid.worker.contact.records import Crowd
+from conoid.worker.contact.solver import ActiveSet
+from conoid.worker.parallel.comm import SerialComm
+from conoid.worker.parallel.fixed_point import Tally
+from conoid.worker.parallel.ownership import SharedSum
+from conoid.worker.parallel.tags import Tag
 
 from ..worker.meshes import Floats
 from .bodies import Indices
@@ -84,42 +92,47 @@ def _all(pairs: Indices) -> Indices:
 
 
 class Solver:
-    """Sweeps over meetings of nodes with a mobility (nodes, 3), 1/kg; impulses in quanta of 1 / ``scale`` N s."""
+    """Sweeps over contacts of nodes with a mobility (nodes, 3), 1/kg; impulses in quanta of 1 / ``scale`` N s."""
 
-    def __init__(self, met: Meetings, v: Floats, mobility: Floats, scale: float = 2.0**40) -> None:
-        self.met, self.v, self.mobility, self.scale = met, v.copy(), mobility, scale
-        n, nodes = met.n, len(v)
-        self.push, self.diagonal = np.zeros((n, 4)), np.empty((n, 2))
-        self.impulse, self.total = np.zeros((nodes, 3), np.int64), np.zeros((nodes, 3), np.int64)
-        self.settled, self.moved = np.zeros(n, bool), np.zeros(nodes, bool)
-        self.every = np.arange(n, dtype=np.int32)
-        shares = np.zeros((nodes, 4), np.int64)
-        sweeps.add_shares(shares, met.nodes, met.weights, met.normals, self.every)
-        sweeps.mobilities(self.diagonal, met.nodes, met.weights, met.normals, shares, mobility, n)
+    def __init__(
+        self, met: Meetings, v: Floats, mobility: Floats, scale: float = 2.0**40, active: ActiveSet | None = None
+    ) -> None:
+        """``active``: of another step, to be used again."""
+        self.met, self.v, self.scale, n = met, v.copy(), scale, len(v)
+        self.total = np.zeros((n, 3), np.int64)
+        self.active, every, part = active or ActiveSet(scale), np.arange(n, dtype=np.int32), np.zeros(n, np.int32)
+        self._crowd = Crowd(np.arange(n), every, part, part, mobility, self.v, self.v, self.v)
+        self._nodes: Any = SimpleNamespace(v=self.v, part=part, owned=np.ones(n, bool))
+        self._impulse = np.zeros((n, 3), np.int64), SharedSum(SerialComm(), [], 3, Tag.CONTACT_IMPULSE)
+        self.active.begin(met, met.n, self._crowd, [])
+        self.active.weigh(np.zeros((n, 4), np.int64), SharedSum(SerialComm(), [], 4, Tag.CONTACT_SHARE))
+
+    @property
+    def push(self) -> Floats:
+        """(n, 4) impulses along the normal, and of friction, N s."""
+        push = np.zeros((self.met.n, 4))
+        rows, push_of = self.active.pushes()
+        push[rows] = push_of
+        return push
 
     def sweep(self, times: int = 1) -> Floats:
         """The velocities after some sweeps."""
-        met = self.met
         for _ in range(times):
-            sweeps.sweep(
-                self.impulse, self.push, self.settled, self.moved, self.v, met.nodes, met.weights, met.normals,
-                met.wanted, met.friction, self.diagonal, self.scale, self.every,
-            )  # fmt: skip
-            assert (self.impulse.sum(axis=0) == 0).all()
-            sweeps.give(self.v, self.total, self.moved, self.impulse, self.mobility, self.scale)
+            self.active.sweep(1, *self._impulse)
+            self._leave()
         return self.v
+
+    def _leave(self) -> None:
+        self.active.leave(self._crowd, self.total, self._nodes, np.zeros((1, 3), np.int64))
+        assert (self.total.sum(axis=0) == 0).all()
 
     def resume(self, kept: Floats, ratio: float = 1.0) -> None:
         """Begins with ``ratio`` times the pushes (candidates, 4) that were kept."""
-        met = self.met
-        rows = (met.nodes, met.weights, met.normals, met.friction)
-        sweeps.resume(self.impulse, self.push, kept, met.pair, *rows, ratio, self.scale, self.every)
-        assert (self.impulse.sum(axis=0) == 0).all()
-        sweeps.give(self.v, self.total, self.moved, self.impulse, self.mobility, self.scale)
+        self.active.resume(kept, ratio, *self._impulse)
+        self._leave()
 
-    def heat(self, v_old: Floats, joule: float = 2.0**40) -> float:
-        """Work of friction, J, of the meetings that were pushed from the velocities ``v_old``."""
-        met, words = self.met, np.zeros(2, np.int64)
-        slip = sweeps.rates(v_old, met.nodes, met.weights, met.n)
-        sweeps.heat(words, self.push, slip, self.v, met.nodes, met.weights, met.normals, met.friction, joule, met.n)
-        return float(words[0] + words[1] * 2.0**-30) / joule
+    def heat(self, v_old: Floats) -> float:
+        """Work of friction, J, of the contacts that were pushed from the velocities ``v_old``."""
+        friction = Tally(np.ones(1))
+        self.active.heat(friction, v_old)
+        return float(friction.total(SerialComm())[0])

@@ -7,8 +7,9 @@ import pytest
 
 from conoid.cases.load import apply_overrides, parse_case, read_data, shipped_path
 from conoid.worker import simulation
-from conoid.worker.contact import sweeps
+from conoid.worker.contact import booking
 from conoid.worker.contact.account import Account
+from conoid.worker.contact.active import PUSH, ActiveNodes, Loaded
 from conoid.worker.parallel.comm import Comm, SerialComm
 from conoid.worker.simulation import Simulation
 
@@ -38,13 +39,14 @@ def test_spheres_that_meet_get_no_energy_from_contact(safety: float) -> None:
 
 
 def test_the_cost_of_an_impulse_is_the_work_between_two_half_steps() -> None:
-    """Nodes of 1 and 3 kg and two without a weight; the second meeting is not pushed."""
+    """Nodes of 1 and 3 kg and two without a weight; the second contact is not pushed."""
     before, v = np.zeros((4, 3)), np.zeros((4, 3))
     before[:2, 0], v[:2, 0] = (2.0, -1.0), (-1.0, 0.0)
-    nodes, weights = np.array([[0, 1, 2, 3], [1, 0, 2, 3]], np.int32), np.array([[1.0, -1.0, 0.0, 0.0]] * 2)
-    normals, push = np.array([[-1.0, 0.0, 0.0]] * 2), np.array([[3.0, 0.0, 0.0, 0.0], [0.0] * 4])
-    account = Account(1.0)
-    sweeps.cost(account.words, push, before, v, nodes, weights, normals, account.scale, 2)
+    loaded, active, account = Loaded.of(2), ActiveNodes.of(4), Account(1.0)
+    loaded.normal[:, :3], loaded.normal[:, PUSH], loaded.many[0] = (-1.0, 0.0, 0.0), (3.0, 0.0), 2
+    loaded.tangent[:, :4], loaded.slots[:] = (1.0, -1.0, 0.0, 0.0), [[0, 1, 2, 3], [1, 0, 2, 3]]
+    active.moving[:, :3] = v
+    booking.cost(account.words, loaded, active, before, np.arange(4, dtype=np.int32), account.scale)
     account.settle(SerialComm())
     _, taken, early, _ = account.known()
     kinetic = 0.5 * np.array([1.0, 3.0, 0.0, 0.0]) @ (before[:, 0] ** 2 - v[:, 0] ** 2)

@@ -16,7 +16,7 @@ from ..jit import njit, types
 from ..migration.parcel import Table
 from ..state import WIDE, Block, Flags, Indices, Ints, Nodes, extended
 from ..topology import Split
-from .active_set import ACTIVE_SET, DEEP_SELF, NEAR, STEP, needed
+from .narrow_phase import CONTACT_ROWS, DEEP_SELF, NEAR, STEP, needed
 
 _WIDE = 0.2
 """Of the typical size of a face: two sides that have moved so far apart are surface from then on. At 0.1, 33 of 38
@@ -173,7 +173,7 @@ def computed(rows, nodes, sides):  # type: ignore[no-untyped-def]
 
 @njit(
     types.UniTuple(types.int64, 2)(  # type: ignore[no-untyped-call]
-        ACTIVE_SET, types.int64, types.int64[::1], types.int32[:, ::1], types.float64, STEP
+        CONTACT_ROWS, types.int64, types.int64[::1], types.int32[:, ::1], types.float64, STEP
     ),
     cache=True,
     error_model="numpy",

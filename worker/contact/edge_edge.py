@@ -6,8 +6,8 @@ Edges meet where they cross.
 import numpy as np
 
 from ..jit import njit, types
-from .active_set import ACTIVE_SET, DEEP_SELF, EDGES, NEAR, PAIRS, STEP, needed
 from .geometry import between, cross, dot, segments
+from .narrow_phase import CONTACT_ROWS, DEEP_SELF, EDGES, NEAR, PAIRS, STEP, needed
 
 _PARALLEL = 0.05
 """Sine of the angle below which edges are left to nodes and faces."""
@@ -66,7 +66,7 @@ def _volume(u, w, r):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    _PAIR(ACTIVE_SET, types.int64, PAIRS, EDGES, STEP, types.float64[:, ::1], types.float64),
+    _PAIR(CONTACT_ROWS, types.int64, PAIRS, EDGES, STEP, types.float64[:, ::1], types.float64),
     cache=True,
     error_model="numpy",
 )

@@ -142,7 +142,7 @@ class Follower:
         scene.normals = extended(scene.normals, np.zeros((n, 9)))
         scene.before = extended(scene.before, rows.v)
         for name in (
-            "pushes", "shared", "slave", "on_surface", "moved", "node_live", "node_new", "node_fresh", "tracked",
+            "pushes", "slave", "on_surface", "node_live", "node_new", "node_fresh", "tracked",
         ):  # fmt: skip
             setattr(scene, name, extended(getattr(scene, name), np.zeros(n, bool)))
         scene.first = extended(scene.first, np.full(n, -1, np.int32))

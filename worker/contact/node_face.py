@@ -7,8 +7,8 @@ handed over.
 import numpy as np
 
 from ..jit import njit, types
-from .active_set import ACTIVE_SET, DEEP, DEEP_SELF, FACES, NEAR, PAIRS, SLOTS, STEP, needed
 from .geometry import between, foot, height, off
+from .narrow_phase import CONTACT_ROWS, DEEP, DEEP_SELF, FACES, NEAR, PAIRS, SLOTS, STEP, needed
 
 _TOUCHING = 1e-3
 """Of the size of a face: deeper than this, a node is held by the nearest face only."""
@@ -121,7 +121,7 @@ def _distance(x, corners, s, f, gap, b):  # type: ignore[no-untyped-def]
     return min(off(x, s, i, j), off(x, s, j, k), off(x, s, k, i))
 
 
-@njit(_PAIR(ACTIVE_SET, types.int64, PAIRS, SLOTS, FACES, STEP, types.float64), cache=True, error_model="numpy")
+@njit(_PAIR(CONTACT_ROWS, types.int64, PAIRS, SLOTS, FACES, STEP, types.float64), cache=True, error_model="numpy")
 def node_face(out, n, pairs, slots, faces, step, end):  # type: ignore[no-untyped-def]
     """Nodes that pass a face, from row ``n`` on; returns the new number of rows, and how many pairs were tested.
 
@@ -198,7 +198,7 @@ def node_face(out, n, pairs, slots, faces, step, end):  # type: ignore[no-untype
     return n, tested
 
 
-@njit(types.float64(ACTIVE_SET, types.int64, PAIRS, FACES, STEP), cache=True, error_model="numpy")
+@njit(types.float64(CONTACT_ROWS, types.int64, PAIRS, FACES, STEP), cache=True, error_model="numpy")
 def approach(out, n, pairs, faces, step):  # type: ignore[no-untyped-def]
     """Largest relative speed of a node over the altitude of its face's tet, 1/s, of the first ``n`` active contacts."""
     e, f, r = np.empty(3), np.empty(3), np.empty(3)

@@ -20,13 +20,13 @@ import numpy as np
 
 from ..jit import njit
 from ..state import Flags, Floats, Indices, extended
-from .active_set import Pairs
+from .narrow_phase import Pairs
 from .node_face import chain
 
 
 @dataclass
 class PairTable:
-    """A growing table of candidate pairs; see active_set.Pairs."""
+    """A growing table of candidate pairs; see narrow_phase.Pairs."""
 
     rows: Indices = field(default_factory=lambda: np.zeros((0, 2), np.int32))
     until: Floats = field(default_factory=lambda: np.zeros(0))

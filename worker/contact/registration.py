@@ -11,7 +11,7 @@ import numpy as np
 
 from ..state import Flags, Floats, Indices, Ints
 from . import search, sift
-from .active_set import DEEP, DEEP_SELF
+from .narrow_phase import DEEP, DEEP_SELF
 from .scene import Scene, rows_of
 from .search import Things
 

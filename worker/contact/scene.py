@@ -11,8 +11,8 @@ from ..parallel.ownership import Neighbour, SharedSum, same
 from ..parallel.tags import Tag
 from ..state import Flags, Floats, Indices, Ints, Nodes, among
 from . import domain, ghosts, search
-from .active_set import DEEP, DEEP_SELF, ActiveSet, EdgeTable, FaceTable, SlotTable
 from .ghosts import Copies
+from .narrow_phase import DEEP, DEEP_SELF, ContactRows, EdgeTable, FaceTable, SlotTable
 from .pairs import PairTable
 from .records import Crowd, Edges, Faces, merged
 from .search import Boxes, Things
@@ -145,13 +145,10 @@ class Scene:
         self.total = np.zeros((n, 3), np.int64)
         """(slots, 3) impulses of the last step, quanta."""
         self.normals = np.zeros((n, 9))
-        """(slots, 9) mean normals; see active_set.SlotTable."""
+        """(slots, 9) mean normals; see narrow_phase.SlotTable."""
         self.before = np.zeros((n, 3))
         """(slots, 3) v(n-1/2)."""
-        self.shared, self.moved = np.zeros(n, bool), np.zeros(n, bool)
-        """(slots,) which are in company with any rank; whose velocity the last sweep has changed."""
-        self.room = ActiveSet.room(0)
-        self.diagonal, self.push = np.empty((0, 2)), np.empty((0, 4))
+        self.room = ContactRows.room(0)
 
     def connect(self, company: list[Neighbour], nodes: Nodes, comm: Comm) -> None:
         """Sets up the messages: sums over the nodes of the company, copies of what is not held here; all ranks take
@@ -170,19 +167,15 @@ class Scene:
 
     def _sum(self, company: list[Neighbour], comm: Comm) -> None:
         self.company = company
-        self.shared = np.zeros(self.crowd.n, bool)
-        for some in company:
-            self.shared[some.nodes] = True
         self.shared_shares = SharedSum(comm, company, 4, Tag.CONTACT_SHARE)
         self.shared_impulse = SharedSum(comm, company, 3, Tag.CONTACT_IMPULSE)
 
     def reserve(self) -> None:
         """Room for every contact that may become active; the rows of the last step stay."""
         n = len(self.node_face) + len(self.edge_edge) + 3 * len(self.cracks)
-        if n > len(self.push):
-            met, self.room = self.room.nodes[: self.met], ActiveSet.room(2 * n)
+        if n > len(self.room.nodes):
+            met, self.room = self.room.nodes[: self.met], ContactRows.room(2 * n)
             self.room.nodes[: self.met] = met
-            self.diagonal, self.push = np.empty((2 * n, 2)), np.empty((2 * n, 4))
 
     @property
     def kept(self) -> tuple[Ints, Floats]:

@@ -11,8 +11,8 @@ import numpy as np
 
 from ..jit import njit
 from ..state import Flags, Floats, Indices
-from .active_set import DEEP, DEEP_SELF
 from .geometry import cross, dot
+from .narrow_phase import DEEP, DEEP_SELF
 
 _V2, _N2 = "float64[:, ::1]", "int32[:, ::1]"
 _STEEPEST = 0.05

@@ -6,8 +6,6 @@ everybody ends with the same velocity, to the bit.
 """
 
 import math
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
@@ -23,17 +21,18 @@ from ..parallel.ownership import Neighbour
 from ..state import Flags, Floats, Indices, Ints, Model, Nodes, extended
 from ..timers import Timers
 from ..topology import Split
-from . import held, normals, pairing, registration, scene, surface, sweeps
+from . import booking, held, normals, pairing, registration, scene, surface
 from .account import Account
-from .active_set import PUSH_OUT, Step
 from .course import courses
 from .cracks import Cracks, across, widening
 from .edge_edge import edge_edge
 from .flight import Flight, typical
 from .follower import Follower
+from .narrow_phase import PUSH_OUT, Step
 from .news import news
 from .node_face import approach, node_face
 from .scene import HALO, Rules, Scene
+from .solver import ActiveSet
 
 _SHORTEST = 10.0
 """Steps of free flight that a search looks ahead at least; at most twice what the last search was good for."""
@@ -49,9 +48,6 @@ _WORDS = 27
 """Of the row of a crack that opens (Contact._opened)."""
 _NO_SIDES = np.zeros((0, 3), np.int32)
 """Of cracks that may open: none (block, place, face)."""
-
-Parted = tuple[Indices, Indices]
-"""Which meetings have nodes that another rank shares, and which have none."""
 
 
 class Contact:
@@ -86,8 +82,9 @@ class Contact:
         self._scale = fixed_point.scale_for(largest * fastest)
         self._friction = fixed_point.Tally(np.array([largest * fastest * fastest]))
         self._account = Account(largest * fastest * fastest)
+        self._active = ActiveSet(self._scale)
         self._give_back = 0.0
-        """Of penetrations, taken back in this step (active_set.PUSH_OUT)."""
+        """Of penetrations, taken back in this step (narrow_phase.PUSH_OUT)."""
         self._parts = np.zeros((len(case.parts), 3), np.int64)
         self._scene: Scene | None = None
         self.due = True
@@ -141,6 +138,7 @@ class Contact:
         (
             self._scale, self._friction.scale, self.limit, self.searches, self._mean_dt, self._size, account,
         ) = parcel.known["contact"]  # fmt: skip
+        self._active = ActiveSet(self._scale)
         self._account.resume(parcel.sums["contact.account"], account)
         self._parts, self._friction.words = parcel.sums["contact.parts"], parcel.sums["contact.friction"]
         self._surface.flags = np.array(parcel.nodes["contact.flags"])
@@ -417,56 +415,27 @@ class Contact:
         now.copies.finish(crowd.x, crowd.v, now.before)
         self._give_back = PUSH_OUT if self._account.settle(self._comm) else 0.0
         n = now.met = self._meet(now, dt)
-        room = now.room
-        rows = sweeps.parted(room.nodes, now.shared, n)
-        self._weigh(now, n, rows)
-        room_of = (room.nodes, room.weights, room.normals)
-        now.push[:n] = 0.0
+        active, impulse = self._active, (now.impulse, now.shared_impulse)
+        active.begin(now.room, n, crowd, now.company)
+        active.weigh(now.shares, now.shared_shares)
         if self._rubs:
-            slip = sweeps.rates(now.before, room.nodes, room.weights, n)
-            self._resume(now, rows)
-        settled = np.zeros(n, bool)
-        sweep = (
-            now.impulse, now.push, settled, now.moved, crowd.v, *room_of, room.wanted, room.friction, now.diagonal,
-            self._scale,
-        )  # fmt: skip
-        if self._comm.size == 1:
-            sweeps.sweep_all(*sweep, rows[1], now.total, crowd.mobility, self._sweeps)
-        else:
-            for _ in range(self._sweeps):
-                self._give(now, rows, sweeps.sweep, *sweep)
+            active.resume(now.node_face.kept, self._resume(), *impulse)
+        active.sweep(self._sweeps, *impulse)
         if self._rubs:
-            kept = now.node_face.kept
-            kept[:] = 0.0
-            faces = room.pair[:n] >= 0
-            kept[room.pair[:n][faces]] = now.push[:n][faces]
-            heat = self._friction
-            sweeps.heat(heat.words.reshape(-1), now.push, slip, crowd.v, *room_of, room.friction, heat.scale[0], n)
-        account = self._account
-        sweeps.cost(account.words, now.push, now.before, crowd.v, *room_of, account.scale, n)
-        self._book(now)
-        if held.give_back(state.v, self._parts, now.local, now.held, crowd.v, now.total, state.part, state.owned):
+            now.node_face.kept[:] = 0.0
+            active.store(now.node_face.kept)
+            active.heat(self._friction, now.before)
+        active.cost(self._account, now.before)
+        if active.leave(crowd, now.total, state, self._parts):
             self.last_push = t
+        self._book(now)
 
-    def _resume(self, now: Scene, rows: Parted) -> None:
-        """Begins with what the same pairs were pushed with in the step before."""
-        room, mean_dt = now.room, self._clock.mean_dt
+    def _resume(self) -> float:
+        """The step over the one before: what impulses of the same pairs are worth now."""
+        mean_dt = self._clock.mean_dt
         ratio = mean_dt / self._mean_dt if self._mean_dt > 0.0 else 0.0
         self._mean_dt = mean_dt
-        room_of = (room.nodes, room.weights, room.normals)
-        resume = now.impulse, now.push, now.node_face.kept, room.pair, *room_of, room.friction, ratio, self._scale
-        self._give(now, rows, sweeps.resume, *resume)
-
-    def _give(self, now: Scene, rows: Parted, sweep: Callable[..., None], *of: Any) -> None:
-        """Completes the impulses of a sweep and turns them into velocities; meetings of nodes that no other rank shares
-        are swept while those of the others travel.
-        """
-        border, inner = rows
-        sweep(*of, border)
-        now.shared_impulse.begin(now.impulse)
-        sweep(*of, inner)
-        now.shared_impulse.finish(now.impulse)
-        sweeps.give(now.crowd.v, now.total, now.moved, now.impulse, now.crowd.mobility, self._scale)
+        return ratio
 
     def _meet(self, now: Scene, dt: float) -> int:
         """The active contacts of the step; returns how many."""
@@ -498,28 +467,20 @@ class Contact:
             sides = now.rows_of(self._cracks.faces[rows].reshape(-1))
             now.enliven(sides[~now.face_live[sides]])
 
-    def _weigh(self, now: Scene, n: int, rows: Parted) -> None:
-        room, (border, inner) = now.room, rows
-        now.shares[:] = 0
-        sweeps.add_shares(now.shares, room.nodes, room.weights, room.normals, border)
-        now.shared_shares.begin(now.shares)
-        sweeps.add_shares(now.shares, room.nodes, room.weights, room.normals, inner)
-        now.shared_shares.finish(now.shares)
-        sweeps.mobilities(now.diagonal, room.nodes, room.weights, room.normals, now.shares, now.crowd.mobility, n)
-
     def _book_resumed(self, state: Nodes) -> None:
         """The second half of the work of impulses from before a run went on here."""
         local = np.flatnonzero(self._total.any(axis=1)).astype(np.int32)
-        held.book(
-            self.contact_loss, self.external_work, local, local, state.v, self._total, self._mobility, self._scale
+        index = np.arange(len(self._total), dtype=np.int32)
+        booking.book(
+            self.contact_loss, self.external_work, local, index, state.v, self._total, self._mobility, self._scale
         )  # fmt: skip
         self._total = self._total[:0]
 
     def _book(self, now: Scene) -> None:
         """Half of the work of the last impulses, with the velocities in ``before``."""
-        held.book(
-            self.contact_loss, self.external_work, now.local, now.held, now.before, now.total, now.crowd.mobility,
-            self._scale,
+        booking.book(
+            self.contact_loss, self.external_work, self._active.places, now.crowd.local, now.before, now.total,
+            now.crowd.mobility, self._scale,
         )  # fmt: skip
 
 

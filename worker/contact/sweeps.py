@@ -1,230 +1,255 @@
-"""Impulses that keep meetings from passing: projected Jacobi sweeps whose order does not matter.
+"""Impulses that keep active contacts from passing: projected Jacobi sweeps whose order does not matter.
 
-Every meeting asks for a normal velocity of at least ``wanted``. A sweep corrects each by its own want over a bound of
+Every contact asks for a normal velocity of at least ``wanted``. A sweep corrects each by its own want over a bound of
 the l1 norm of its row of the contact matrix (Baker, Falgout, Kolev and Yang 2011): the sum over its nodes k and axes i
-of |w_k| |n_i| S_ki / m_k, with S_ki the sum of |w| |n_i| over all meetings at the node. That is exact for one meeting
+of |w_k| |n_i| S_ki / m_k, with S_ki the sum of |w| |n_i| over all contacts at the node. That is exact for one contact
 alone and for any number along one normal, and never an overshoot however many share a node. Impulses never pull;
-friction is Coulomb's, on the sum over the sweeps. Impulses are integers: a meeting's add up to zero, and no order of
-meetings or ranks changes a bit. Where there is friction, a pair of a node and a face begins with its impulses of the
+friction is Coulomb's, on the sum over the sweeps. Impulses are integers: a contact's add up to zero, and no order of
+contacts or ranks changes a bit. Where there is friction, a pair of a node and a face begins with its impulses of the
 step before, so that what sticks does not creep, however few the sweeps are.
+
+A contact that has had no impulse in the step and closes no faster than it may is idle: it changes nothing until sweeps
+have moved its nodes by as much as it has left. The others are loaded: their data lie together, and only they are swept.
+
+Kernels call no kernel within a loop over contacts: records of arrays are counted as references at each call.
 """
 
 import numpy as np
 
-from ..jit import njit
+from ..jit import njit, types
+from .active import (
+    CONTACTS,
+    IMPULSE,
+    LOADED,
+    MOBILITY,
+    MU,
+    NODES,
+    PUSH,
+    PUSH_T,
+    ROW_NORM,
+    ROW_NORM_T,
+    TOTAL,
+    WANTED,
+    V,
+)  # fmt: skip
 
 SHARES = float(2**30)
 """Quanta per unit of weight."""
 _KEPT = 0.8
 """Share of the last push along the normal that a pair begins with: all of it would lag behind and make energy."""
+_ACROSS = (1.0, -1.0, 0.0, 0.0)
+"""Weights of the nodes on either side of a crack."""
+_ROUNDING = 2.0**-40
+"""Of the velocities: far more than what a contact's speed, a sum of twelve products, may be off by."""
 
-_V2, _N2, _I2 = "float64[:, ::1]", "int32[:, ::1]", "int64[:, ::1]"
-
-
-@njit(f"UniTuple(int32[::1], 2)({_N2}, boolean[::1], int64)", cache=True)
-def parted(nodes, shared, n):  # type: ignore[no-untyped-def]
-    """Which of ``n`` meetings have a node that is ``shared`` (nodes,) with another rank, and which have none."""
-    border, inner = np.empty(n, np.int32), np.empty(n, np.int32)
-    b, i = 0, 0
-    for p in range(n):
-        if shared[nodes[p, 0]] or shared[nodes[p, 1]] or shared[nodes[p, 2]] or shared[nodes[p, 3]]:
-            border[b] = p
-            b += 1
-        else:
-            inner[i] = p
-            i += 1
-    return border[:b], inner[:i]
+_ROWS, _F2, _F, _I = types.int32[::1], types.float64[:, ::1], types.float64, types.int64
 
 
-@njit(f"void({_I2}, {_N2}, {_V2}, {_V2}, int32[::1])", cache=True)
-def add_shares(shares, nodes, weights, normals, some):  # type: ignore[no-untyped-def]
-    """Adds |w| |n_i| and |w| of ``some`` of the meetings to ``shares`` (nodes, 4), in quanta."""
+@njit(types.void(NODES, CONTACTS, _ROWS), cache=True)
+def add_row_weights(active, contacts, some):  # type: ignore[no-untyped-def]
+    """Adds |w| |n_i| and |w| of ``some`` contacts to the row weights of their nodes, in quanta."""
+    sums, slots, weights, normals = active.row_weights, contacts.slots, contacts.weights, contacts.normals
     for p in some:
-        for k in range(4):
-            weight = abs(weights[p, k]) * SHARES
+        two = slots[p, 2] < 0
+        for k in range(2 if two else 4):
+            a, weight = slots[p, k], SHARES if two else abs(weights[p, k]) * SHARES
             for i in range(3):
-                shares[nodes[p, k], i] += np.int64(np.rint(weight * abs(normals[p, i])))
-            shares[nodes[p, k], 3] += np.int64(np.rint(weight))
+                sums[a, i] += np.int64(np.rint(weight * abs(normals[p, i])))
+            sums[a, 3] += np.int64(np.rint(weight))
 
 
-@njit(f"void({_V2}, {_N2}, {_V2}, {_V2}, {_I2}, {_V2}, int64)", cache=True, error_model="numpy")
-def mobilities(diagonal, nodes, weights, normals, shares, mobility, n):  # type: ignore[no-untyped-def]
-    """(room, 2) bounds of the l1 norms of the rows along the normal and across, 1/kg; infinite where nothing moves."""
-    for p in range(n):
+@njit(types.void(LOADED, CONTACTS, NODES, _I, _I), cache=True, error_model="numpy")
+def fill(loaded, contacts, active, first, end):  # type: ignore[no-untyped-def]
+    """The data of the loaded contacts from ``first`` to ``end``, whose rows are known; none has an impulse yet.
+
+    Row norms are bounds of l1 norms along the normal and across, 1/kg; infinite where nothing moves.
+    """
+    slots, weights, normals, fixed, sums = (
+        contacts.slots, contacts.weights, contacts.normals, active.fixed, active.row_weights,
+    )  # fmt: skip
+    normal, tangent = loaded.normal, loaded.tangent
+    for q in range(first, end):
+        p = loaded.row[q]
+        two = slots[p, 2] < 0
+        for k in range(4):
+            tangent[q, k], loaded.slots[q, k] = _ACROSS[k] if two else weights[p, k], slots[p, k]
+        for i in range(3):
+            normal[q, i], tangent[q, PUSH_T + i] = normals[p, i], 0.0
         along, across = 0.0, 0.0
-        for k in range(4):
-            a = nodes[p, k]
-            weight = abs(weights[p, k]) / SHARES
-            most = 0.0
+        for k in range(2 if two else 4):
+            s, weight, most = slots[p, k], abs(tangent[q, k]) / SHARES, 0.0
             for i in range(3):
-                along += weight * abs(normals[p, i]) * shares[a, i] * mobility[a, i]
-                most = max(most, mobility[a, i])
-            across += weight * shares[a, 3] * most
-        diagonal[p, 0] = along if along > 0.0 else np.inf
-        diagonal[p, 1] = across if across > 0.0 else np.inf
+                along += weight * abs(normal[q, i]) * sums[s, i] * fixed[s, MOBILITY + i]
+                most = max(most, fixed[s, MOBILITY + i])
+            across += weight * sums[s, 3] * most
+        normal[q, WANTED], normal[q, PUSH], normal[q, MU] = contacts.wanted[p], 0.0, contacts.friction[p]
+        normal[q, ROW_NORM] = along if along > 0.0 else np.inf
+        tangent[q, ROW_NORM_T] = across if across > 0.0 else np.inf
 
 
-@njit(f"void({_I2}, {_N2}, {_V2}, float64[::1], float64, int64)", cache=True)
-def _add(impulse, nodes, weights, change, scale, p):  # type: ignore[no-untyped-def]
-    """Gives ``change`` (3,), N s, of meeting p to its nodes; the shares add up to zero."""
-    for i in range(3):
-        rest = np.int64(0)
-        for k in range(1, 4):
-            part = np.int64(np.rint(weights[p, k] * change[i] * scale))
-            impulse[nodes[p, k], i] += part
-            rest += part
-        impulse[nodes[p, 0], i] -= rest
+@njit(types.void(LOADED, CONTACTS, NODES, _F), cache=True, error_model="numpy")
+def load(loaded, contacts, active, fastest):  # type: ignore[no-untyped-def]
+    """Takes those of the idle contacts among the loaded that close faster than they may.
 
-
-@njit(
-    f"void({_I2}, {_V2}, {_V2}, int32[::1], {_N2}, {_V2}, {_V2}, float64[::1], float64, float64, int32[::1])",
-    cache=True,
-)
-def resume(impulse, push, kept, pair, nodes, weights, normals, friction, ratio, scale, some):  # type: ignore[no-untyped-def]
-    """Pairs with friction, of ``some`` meetings, begin with ``ratio`` times what they have ``kept`` (candidates, 4),
-    along and across the normal as it is now; others, and edges, from nothing.
+    The speed of a contact changes by no more than the paths of its nodes times the largest of its weights; an idle one
+    is computed anew when they may have used up what it had left. ``fastest``: bound of the l1 norm of any velocity at
+    the beginning of the step, m/s.
     """
-    change = np.empty(3)
-    for p in some:
-        if friction[p] == 0.0 or pair[p] < 0:
-            continue
-        along = 0.0
-        for i in range(3):
-            along += kept[pair[p], 1 + i] * normals[p, i]
-        push[p, 0] = _KEPT * ratio * kept[pair[p], 0]
-        for i in range(3):
-            push[p, 1 + i] = ratio * (kept[pair[p], 1 + i] - along * normals[p, i])
-            change[i] = push[p, 0] * normals[p, i] + push[p, 1 + i]
-        _add(impulse, nodes, weights, change, scale, p)
+    slots, weights, normals, wanted = contacts.slots, contacts.weights, contacts.normals, contacts.wanted
+    moving, path, reach, idle, count = active.moving, active.path, contacts.reach, loaded.idle, loaded.many
+    n, m, row = count[0], 0, loaded.row
+    for q in range(count[1]):
+        p = idle[q]
+        a, b, c, d = slots[p, 0], slots[p, 1], slots[p, 2], slots[p, 3]
+        paths = path[a] + path[b] if c < 0 else path[a] + path[b] + path[c] + path[d]
+        asks = False
+        if paths >= reach[p]:
+            speed, most = 0.0, 1.0
+            for i in range(3):
+                if c < 0:
+                    rate = 0.0 + moving[a, V + i] - moving[b, V + i]
+                else:
+                    rate = 0.0 + weights[p, 0] * moving[a, V + i] + weights[p, 1] * moving[b, V + i]
+                    rate = rate + weights[p, 2] * moving[c, V + i] + weights[p, 3] * moving[d, V + i]
+                speed += normals[p, i] * rate
+            asks = wanted[p] > speed
+            if c >= 0:
+                for k in range(4):
+                    most = max(most, abs(weights[p, k]))
+            left = (speed - wanted[p]) / most
+            reach[p] = paths + left - _ROUNDING * (fastest + paths + left + abs(wanted[p]))
+        row[n], idle[m] = p, p
+        n += asks
+        m += not asks
+    fill(loaded, contacts, active, count[0], n)
+    count[0], count[1] = n, m
 
 
-@njit(
-    f"void({_I2}, {_V2}, boolean[::1], boolean[::1], {_V2}, {_N2}, {_V2}, {_V2}, float64[::1], float64[::1], {_V2}, "
-    "float64, int32[::1])",
-    cache=True,
-    error_model="numpy",
-)
-def sweep(  # type: ignore[no-untyped-def]
-    impulse, push, settled, moved, v, nodes, weights, normals, wanted, friction, diagonal, scale, some,
-):  # fmt: skip
-    """Adds the corrections of ``some`` meetings to ``impulse`` (nodes, 3), in quanta of 1 / ``scale`` N s.
-
-    ``push`` (room, 4) holds each meeting's sum over the sweeps so far: along the normal, and the friction vector, N s.
-    A meeting that has changed nothing in its last sweep, ``settled`` (room,), would change nothing while none of its
-    nodes has ``moved`` (nodes,) since: it is passed over, without a change of any bit.
+@njit(types.void(LOADED, CONTACTS, NODES, _F2), cache=True)
+def load_kept(loaded, contacts, active, kept):  # type: ignore[no-untyped-def]
+    """Takes those of the idle contacts among the loaded that have friction and whose pairs have ``kept``
+    (candidates, 4) an impulse of the step before.
     """
+    friction, pair, idle, count = contacts.friction, contacts.pair, loaded.idle, loaded.many
+    n, m = 0, 0
+    for q in range(count[1]):
+        p = idle[q]
+        if friction[p] > 0.0 and pair[p] >= 0 and kept[pair[p], 0] > 0.0:
+            loaded.row[n] = p
+            n += 1
+        else:
+            idle[m] = p
+            m += 1
+    fill(loaded, contacts, active, 0, n)
+    count[0], count[1] = n, m
+
+
+@njit(types.void(NODES, LOADED, _F2, _ROWS, _F, _F), cache=True)
+def resume(active, loaded, kept, pair, ratio, scale):  # type: ignore[no-untyped-def]
+    """The loaded contacts begin with ``ratio`` times what their pairs have ``kept`` (candidates, 4), along and across
+    the normal as it is now.
+    """
+    words, normal, tangent, slots, row = active.moving_words, loaded.normal, loaded.tangent, loaded.slots, loaded.row
+    for q in range(loaded.many[0]):
+        last, along = pair[row[q]], 0.0
+        for i in range(3):
+            along += kept[last, 1 + i] * normal[q, i]
+        normal[q, PUSH] = _KEPT * ratio * kept[last, 0]
+        for i in range(3):
+            tangent[q, PUSH_T + i] = ratio * (kept[last, 1 + i] - along * normal[q, i])
+            change = normal[q, PUSH] * normal[q, i] + tangent[q, PUSH_T + i]
+            rest = np.int64(0)
+            for k in range(1, 4):
+                part = np.int64(np.rint(tangent[q, k] * change * scale))
+                words[slots[q, k], IMPULSE + i] += part
+                rest += part
+            words[slots[q, 0], IMPULSE + i] -= rest
+
+
+@njit(types.void(NODES, LOADED, _F), cache=True, error_model="numpy")
+def sweep(active, loaded, scale):  # type: ignore[no-untyped-def]
+    """Adds the corrections of the loaded contacts to the impulses of their nodes; they add up to zero."""
+    values, words = active.moving, active.moving_words
+    normal, tangent, slots = loaded.normal, loaded.tangent, loaded.slots
     rate, change = np.empty(3), np.empty(3)
-    for p in some:
-        if settled[p]:
-            a, b, c, d = nodes[p, 0], nodes[p, 1], nodes[p, 2], nodes[p, 3]
-            if not (moved[a] or moved[b] or moved[c] or moved[d]):
-                continue
+    for q in range(loaded.many[0]):
+        a, b, c, d = slots[q, 0], slots[q, 1], slots[q, 2], slots[q, 3]
         speed = 0.0
         for i in range(3):
-            rate[i] = 0.0
-            for k in range(4):
-                rate[i] += weights[p, k] * v[nodes[p, k], i]
-            speed += normals[p, i] * rate[i]
-        old = push[p, 0]
-        push[p, 0] = max(0.0, old + (wanted[p] - speed) / diagonal[p, 0])
-        settled[p] = push[p, 0] == old and (old == 0.0 or friction[p] == 0.0)
-        if settled[p]:
+            if c < 0:
+                rate[i] = 0.0 + values[a, V + i] - values[b, V + i]
+            else:
+                rate[i] = 0.0 + tangent[q, 0] * values[a, V + i] + tangent[q, 1] * values[b, V + i]
+                rate[i] = rate[i] + tangent[q, 2] * values[c, V + i] + tangent[q, 3] * values[d, V + i]
+            speed += normal[q, i] * rate[i]
+        old, mu = normal[q, PUSH], normal[q, MU]
+        push = max(0.0, old + (normal[q, WANTED] - speed) / normal[q, ROW_NORM])
+        if push == old and (old == 0.0 or mu == 0.0):
             continue
+        normal[q, PUSH] = push
         for i in range(3):
-            change[i] = (push[p, 0] - old) * normals[p, i]
-        if friction[p] > 0.0:
+            change[i] = (push - old) * normal[q, i]
+        if mu > 0.0:
             size = 0.0
             for i in range(3):
-                rate[i] = push[p, 1 + i] - (rate[i] - speed * normals[p, i]) / diagonal[p, 1]
+                rate[i] = tangent[q, PUSH_T + i] - (rate[i] - speed * normal[q, i]) / tangent[q, ROW_NORM_T]
                 size += rate[i] * rate[i]
-            most = friction[p] * push[p, 0]
+            most = mu * push
             factor = most / np.sqrt(size) if size > most * most else 1.0
             for i in range(3):
-                change[i] += factor * rate[i] - push[p, 1 + i]
-                push[p, 1 + i] = factor * rate[i]
-        _add(impulse, nodes, weights, change, scale, p)
-
-
-@njit(f"void({_V2}, {_I2}, boolean[::1], {_I2}, {_V2}, float64)", cache=True)
-def give(v, total, moved, impulse, mobility, scale):  # type: ignore[no-untyped-def]
-    """Turns the completed impulses (nodes, 3) of a sweep into velocities, adds them to ``total`` and clears them; notes
-    which nodes have ``moved`` (nodes,).
-    """
-    for a in range(len(v)):
-        moved[a] = False
+                change[i] += factor * rate[i] - tangent[q, PUSH_T + i]
+                tangent[q, PUSH_T + i] = factor * rate[i]
         for i in range(3):
-            j = impulse[a, i]
-            if j != 0:
-                moved[a] = True
-                v[a, i] += j * (mobility[a, i] / scale)
-                total[a, i] += j
-                impulse[a, i] = 0
+            if c < 0:
+                rest = np.int64(np.rint(-change[i] * scale))
+            else:
+                rest = np.int64(np.rint(tangent[q, 1] * change[i] * scale))
+                part = np.int64(np.rint(tangent[q, 2] * change[i] * scale))
+                last = np.int64(np.rint(tangent[q, 3] * change[i] * scale))
+                words[c, IMPULSE + i] += part
+                words[d, IMPULSE + i] += last
+            words[b, IMPULSE + i] += rest
+            if c >= 0:
+                rest += part + last
+            words[a, IMPULSE + i] -= rest
 
 
-@njit(
-    f"void({_I2}, {_V2}, boolean[::1], boolean[::1], {_V2}, {_N2}, {_V2}, {_V2}, float64[::1], float64[::1], {_V2}, "
-    f"float64, int32[::1], {_I2}, {_V2}, int64)",
-    cache=True,
-)
-def sweep_all(  # type: ignore[no-untyped-def]
-    impulse, push, settled, moved, v, nodes, weights, normals, wanted, friction, diagonal, scale, some, total,
-    mobility, many,
-):  # fmt: skip
-    """``many`` sweeps (``sweep``, ``give``) of meetings of which no other rank shares a node."""
-    for _ in range(many):
-        sweep(
-            impulse, push, settled, moved, v, nodes, weights, normals, wanted, friction, diagonal, scale, some
-        )  # fmt: skip
-        give(v, total, moved, impulse, mobility, scale)
-
-
-@njit(f"{_V2}({_V2}, {_N2}, {_V2}, int64)", cache=True)
-def rates(v, nodes, weights, n):  # type: ignore[no-untyped-def]
-    """(n, 3) relative velocity at each meeting, m/s."""
-    out = np.zeros((n, 3))
-    for p in range(n):
-        for k in range(4):
-            for i in range(3):
-                out[p, i] += weights[p, k] * v[nodes[p, k], i]
-    return out
-
-
-@njit(f"void(int64[::1], {_V2}, {_V2}, {_V2}, {_N2}, {_V2}, {_V2}, float64[::1], float64, int64)", cache=True)
-def heat(words, push, slip, v, nodes, weights, normals, friction, joule, n):  # type: ignore[no-untyped-def]
-    """Adds the work of friction, mean sliding velocity times impulse, to two limbs of quanta of 1 / ``joule`` J."""
-    for p in range(n):
-        if friction[p] > 0.0 and push[p, 0] > 0.0:
-            work = 0.0
-            for i in range(3):
-                rate = slip[p, i]
-                for k in range(4):
-                    rate += weights[p, k] * v[nodes[p, k], i]
-                work -= 0.5 * push[p, 1 + i] * rate
-            high = np.rint(work * joule)
-            words[0] += np.int64(high)
-            words[1] += np.int64(np.rint((work * joule - high) * 2.0**30))
-
-
-@njit(f"void({_I2}, {_V2}, {_V2}, {_V2}, {_N2}, {_V2}, {_V2}, float64, int64)", cache=True)
-def cost(words, push, before, v, nodes, weights, normals, joule, n):  # type: ignore[no-untyped-def]
-    """Adds what the impulses along the normals take from the bodies, and what they have given back by the middle of
-    their work, to two limbs (rows of ``words``) of quanta of 1 / ``joule`` J.
-
-    An impulse J between the speeds u(n-1/2), of ``before``, and u(n+1/2) takes -J (u(n-1/2) + u(n+1/2)) / 2; the ledger
-    at time n has the first half of that.
+@njit(types.void(NODES, _I, _F), cache=True)
+def give(active, n, scale):  # type: ignore[no-untyped-def]
+    """Turns the completed impulses of a sweep at ``n`` slots into velocities, adds them to those of the step and clears
+    them.
     """
-    value = np.empty(2)
-    for p in range(n):
-        if push[p, 0] > 0.0:
-            early, late = 0.0, 0.0
-            for k in range(4):
-                for i in range(3):
-                    share = weights[p, k] * normals[p, i]
-                    early += share * before[nodes[p, k], i]
-                    late += share * v[nodes[p, k], i]
-            value[0] = -0.5 * push[p, 0] * (early + late)
-            value[1] = 0.5 * push[p, 0] * early
-            for m in range(2):
-                high = np.rint(value[m] * joule)
-                words[0, m] += np.int64(high)
-                words[1, m] += np.int64(np.rint((value[m] * joule - high) * 2.0**30))
+    v, words, mobility, total, path = (
+        active.moving, active.moving_words, active.fixed, active.fixed_words, active.path,
+    )  # fmt: skip
+    for s in range(n):
+        if words[s, IMPULSE] | words[s, IMPULSE + 1] | words[s, IMPULSE + 2]:
+            length = 0.0
+            for i in range(3):
+                j = words[s, IMPULSE + i]
+                change = j * (mobility[s, MOBILITY + i] / scale)
+                length += abs(change)
+                v[s, V + i] += change
+                total[s, TOTAL + i] += j
+                words[s, IMPULSE + i] = 0
+            path[s] += length
+
+
+@njit(types.void(NODES, LOADED, CONTACTS, _F, _I, _F, _I), cache=True)
+def sweep_all(active, loaded, contacts, fastest, n, scale, many):  # type: ignore[no-untyped-def]
+    """``many`` sweeps (``load``, ``sweep``, ``give``) of contacts of which no other rank shares a node."""
+    for _ in range(many):
+        load(loaded, contacts, active, fastest)
+        sweep(active, loaded, scale)
+        give(active, n, scale)
+
+
+@njit(types.void(_F2, LOADED, _ROWS), cache=True)
+def store(kept, loaded, pair):  # type: ignore[no-untyped-def]
+    """Stores the impulses of loaded contacts with their pairs, ``kept`` (candidates, 4)."""
+    for q in range(loaded.many[0]):
+        k = pair[loaded.row[q]]
+        if k >= 0:
+            kept[k, 0] = loaded.normal[q, PUSH]
+            for i in range(3):
+                kept[k, 1 + i] = loaded.tangent[q, PUSH_T + i]

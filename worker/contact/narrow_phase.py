@@ -23,7 +23,7 @@ PUSH_OUT = 0.1
 nothing while contact has no energy to give back (``account.Account``)."""
 
 
-class ActiveSet(NamedTuple):
+class ContactRows(NamedTuple):
     """Room for active contacts."""
 
     nodes: Indices
@@ -40,7 +40,7 @@ class ActiveSet(NamedTuple):
     """(room,) which candidate pair of a node and a face it was; -1 for edges and cracks."""
 
     @classmethod
-    def room(cls, n: int) -> "ActiveSet":
+    def room(cls, n: int) -> "ContactRows":
         """Room for ``n`` active contacts."""
         rows, numbers = np.empty((n, 4), np.int32), np.empty(n, np.int32)
         return cls(rows, np.empty((n, 4)), np.empty((n, 3)), np.empty(n), np.empty(n), numbers)
@@ -147,7 +147,7 @@ _N1, _N2, _I1, _B1, _B2 = (
     types.int32[::1], types.int32[:, ::1], types.int64[::1], types.boolean[::1], types.boolean[:, ::1],
 )  # fmt: skip
 _F1, _F2 = types.float64[::1], types.float64[:, ::1]
-ACTIVE_SET = record(ActiveSet, _N2, _F2, _F2, _F1, _F1, _N1)
+CONTACT_ROWS = record(ContactRows, _N2, _F2, _F2, _F1, _F1, _N1)
 STEP = record(Step, _F2, _F2, _F2, _N1, _F2, types.float64, types.float64)
 PAIRS = record(Pairs, _N2, _F1, _F1, _B1, _N1, _N1)
 SLOTS = record(SlotTable, _F2, _B1, _N1, _F1, _F2, _B1, _F1, _N1)

@@ -1,0 +1,146 @@
+"""The kernels of the impulse solver against plain Python that reads as the formula, to the last bit."""
+
+import numpy as np
+import pytest
+
+from conoid.worker.contact.meetings import Meetings
+
+from ..worker.meshes import Floats
+from .kernels import Solver
+
+NODES, CONTACTS, SWEEPS = 40, 60, 6
+_QUANTA, _SCALE = 2.0**30, 2.0**40
+
+
+def scene(seed: int) -> tuple[Meetings, Floats, Floats]:
+    """Nodes on faces, edges and cracks, most without friction and some held, in a cloud that hardly closes: half of the
+    contacts are idle at first, and some of them are woken by others.
+    """
+    random = np.random.default_rng(seed)
+    rows = np.array([random.choice(NODES, 4, replace=False) for _ in range(CONTACTS)], np.int32)
+    weights = np.column_stack([np.ones(CONTACTS), -random.dirichlet(np.ones(3), CONTACTS)])
+    crack = random.uniform(size=CONTACTS) < 0.5
+    rows[crack, 2:], weights[crack] = rows[crack, 1:2], (1.0, -1.0, 0.0, 0.0)
+    normals = random.normal(size=(CONTACTS, 3))
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    friction = np.where(random.uniform(size=CONTACTS) < 0.3, 0.3, 0.0)
+    pair = np.where(crack, -1, np.arange(CONTACTS)).astype(np.int32)
+    mobility = np.repeat(10.0 ** random.uniform(-1.0, 1.0, (NODES, 1)), 3, axis=1)
+    mobility[random.uniform(size=(NODES, 3)) < 0.05] = 0.0
+    wanted = -2.0 * random.uniform(size=CONTACTS)
+    return Meetings(rows, weights, normals, wanted, friction, pair, CONTACTS), random.normal(size=(NODES, 3)), mobility
+
+
+class Plain:
+    """Every contact in every sweep."""
+
+    def __init__(self, met: Meetings, v: Floats, mobility: Floats) -> None:
+        self.met, self.v, self.mobility = met, v.copy(), mobility
+        self.push, self.total = np.zeros((CONTACTS, 4)), np.zeros((NODES, 3), np.int64)
+        sums, sizes = np.zeros((NODES, 4), np.int64), np.column_stack([np.abs(met.normals), np.ones(CONTACTS)])
+        for p in range(CONTACTS):
+            for k in range(4):
+                quanta = abs(met.weights[p, k]) * _QUANTA
+                sums[met.nodes[p, k]] += np.rint(quanta * sizes[p]).astype(np.int64)
+        self.norms = np.array([self._norms(p, sums) for p in range(CONTACTS)])
+
+    def _norms(self, p: int, sums: "np.ndarray") -> tuple[float, float]:
+        """Row norms along the normal and across."""
+        met, along, across = self.met, 0.0, 0.0
+        for k in range(4):
+            a, weight = met.nodes[p, k], abs(met.weights[p, k]) / _QUANTA
+            for i in range(3):
+                along += weight * abs(met.normals[p, i]) * sums[a, i] * self.mobility[a, i]
+            across += weight * sums[a, 3] * self.mobility[a].max()
+        return along or np.inf, across or np.inf
+
+    def give(self, changes: Floats) -> None:
+        """Turns changes (contacts, 3) of the contacts' impulses into velocities."""
+        impulse, met = np.zeros((NODES, 3), np.int64), self.met
+        for p in range(CONTACTS):
+            parts = [np.rint(met.weights[p, k] * changes[p] * _SCALE).astype(np.int64) for k in (1, 2, 3)]
+            for k, part in enumerate(parts):
+                impulse[met.nodes[p, k + 1]] += part
+            impulse[met.nodes[p, 0]] -= sum(parts)
+        self.total += impulse
+        self.v = np.where(impulse != 0, self.v + impulse * (self.mobility / _SCALE), self.v)
+
+    def resume(self, kept: Floats, ratio: float) -> None:
+        """Begins with what pairs with friction have kept."""
+        met, changes = self.met, np.zeros((CONTACTS, 3))
+        for p in np.flatnonzero((met.friction > 0.0) & (met.pair >= 0)):
+            along = _dot(kept[met.pair[p], 1:], met.normals[p])
+            self.push[p, 0] = 0.8 * ratio * kept[met.pair[p], 0]
+            self.push[p, 1:] = ratio * (kept[met.pair[p], 1:] - along * met.normals[p])
+            changes[p] = self.push[p, 0] * met.normals[p] + self.push[p, 1:]
+        self.give(changes)
+
+    def sweep(self) -> None:
+        """One sweep."""
+        self.give(np.array([self.change(p) for p in range(CONTACTS)]))
+
+    def change(self, p: int) -> Floats:
+        """Corrects one contact."""
+        met, normal, old = self.met, self.met.normals[p], self.push[p].copy()
+        rate = np.zeros(3)
+        for k in range(4):
+            rate = rate + met.weights[p, k] * self.v[met.nodes[p, k]]
+        speed = _dot(normal, rate)
+        self.push[p, 0] = max(0.0, old[0] + (met.wanted[p] - speed) / self.norms[p, 0])
+        change = (self.push[p, 0] - old[0]) * normal
+        if met.friction[p] > 0.0:
+            aim = old[1:] - (rate - speed * normal) / self.norms[p, 1]
+            size, most = _dot(aim, aim), met.friction[p] * self.push[p, 0]
+            aim = (most / np.sqrt(size) if size > most * most else 1.0) * aim
+            change = change + (aim - old[1:])
+            self.push[p, 1:] = aim
+        return np.asarray(change)
+
+
+def _dot(a: Floats, b: Floats) -> float:
+    """In the order of the kernels."""
+    return float(0.0 + a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+@pytest.mark.parametrize("resumed", [False, True])
+@pytest.mark.parametrize("seed", range(12))
+def test_kernels_have_the_bits_of_the_formula(seed: int, resumed: bool) -> None:
+    """Idle contacts are passed over and cracks have two nodes: without a change of any bit."""
+    met, v, mobility = scene(seed)
+    plain, solver = Plain(met, v, mobility), Solver(met, v, mobility, _SCALE)
+    if resumed:
+        kept = np.abs(np.random.default_rng(seed + 100).normal(size=(CONTACTS, 4))) * [0.1, 0.01, 0.01, 0.01]
+        kept[::3] = 0.0
+        plain.resume(kept, 0.9)
+        solver.resume(kept, 0.9)
+    for _ in range(SWEEPS):
+        plain.sweep()
+        solver.sweep()
+        assert (solver.v == plain.v).all()
+        assert (solver.total == plain.total).all()
+        assert (solver.push == plain.push).all()
+
+
+def test_idle_contacts_are_passed_over_until_others_wake_them() -> None:
+    """The scenes of the test above have both."""
+    idle = np.array([[CONTACTS - len(rows) for rows in loaded(seed)] for seed in range(12)])
+    assert (idle[:, -1] > 0).all()
+    assert (idle[:, -1] < idle[:, 0]).any()
+
+
+def loaded(seed: int) -> list["np.ndarray"]:
+    """Which contacts have asked for an impulse, after every sweep."""
+    solver, rows = Solver(*scene(seed), _SCALE), []
+    for _ in range(SWEEPS):
+        solver.sweep()
+        rows.append(solver.active.pushes()[0])
+    return rows
+
+
+def test_slots_are_used_again() -> None:
+    """A second step with the same arrays, and other nodes, is as the first with its own."""
+    first, second = scene(1), scene(2)
+    alone, solver = Solver(*second, _SCALE), Solver(*first, _SCALE)
+    solver.sweep(SWEEPS)
+    again = Solver(*second, _SCALE, solver.active)
+    assert (again.sweep(SWEEPS) == alone.sweep(SWEEPS)).all()

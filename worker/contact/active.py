@@ -1,0 +1,102 @@
+"""Records of the impulse solver: active contacts, their nodes, and the contacts that carry an impulse.
+
+The nodes of the active set are numbered densely: a **slot** each. All that a sweep needs of a node lies in one cache
+line, floats and integers side by side.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..fracture.records import record
+from ..jit import types
+from ..state import Floats, Indices, Ints
+
+_LINE = 8
+"""Words of a cache line."""
+V, IMPULSE = 0, 3
+"""First word of a slot's velocity, m/s, and of its impulse of the sweep, quanta, in ``ActiveNodes.moving``."""
+MOBILITY, TOTAL = 0, 3
+"""First word of its mobility, 1/kg, and of its impulse of the step, quanta, in ``ActiveNodes.fixed``."""
+WANTED, ROW_NORM, PUSH, MU = 3, 4, 5, 6
+"""Of ``Loaded.normal``, behind the unit normal."""
+ROW_NORM_T, PUSH_T = 4, 5
+"""Of ``Loaded.tangent``, behind the weights."""
+
+
+class ActiveContacts(NamedTuple):
+    """What the narrow phase has found, in its order; see narrow_phase.ContactRows."""
+
+    slots: Indices
+    """(room, 4) of the nodes; the third is -1 in the row of a crack (cracks.across): two nodes, weights 1 and -1."""
+    weights: Floats
+    """(room, 4)."""
+    normals: Floats
+    """(room, 3)."""
+    wanted: Floats
+    """(room,) target normal velocity, m/s."""
+    friction: Floats
+    """(room,) Coulomb's coefficient."""
+    pair: Indices
+    """(room,) candidate pair of a node and a face, -1 for others."""
+    reach: Floats
+    """(room,) the sum of the paths of its nodes up to which an idle contact stays idle, m/s."""
+
+
+class ActiveNodes(NamedTuple):
+    """The slots; floats and integers of a line are the same memory."""
+
+    moving: Floats
+    """(slots, 8) what a sweep reads and adds to, a cache line each."""
+    moving_words: Ints
+    fixed: Floats
+    """(slots, 8) what turns it into velocities."""
+    fixed_words: Ints
+    row_weights: Ints
+    """(slots, 4) sums of |w| |n_i| and of |w| over the contacts of all ranks, in quanta."""
+    path: Floats
+    """(slots,) sum of the l1 norms of the changes of velocity in the step, m/s."""
+
+    @classmethod
+    def of(cls, n: int) -> "ActiveNodes":
+        """Room for as many slots, from the beginning of a cache line on."""
+        room = np.empty(2 * n * _LINE + _LINE, np.int64)
+        first = -(room.ctypes.data // room.itemsize) % _LINE
+        moving, fixed = room[first : first + 2 * n * _LINE].reshape(2, n, _LINE)
+        sums, path = np.empty((n, 4), np.int64), np.empty(n)
+        return cls(moving.view(np.float64), moving, fixed.view(np.float64), fixed, sums, path)
+
+
+class Loaded(NamedTuple):
+    """Contacts that have asked for an impulse in the step, and those that are idle."""
+
+    normal: Floats
+    """(room, 8) unit normal, target velocity, row norm along it, 1/kg, impulse along it, N s, Coulomb's coefficient."""
+    tangent: Floats
+    """(room, 8) weights, row norm across, 1/kg, impulse of friction (3), N s."""
+    slots: Indices
+    """(room, 4) as of ActiveContacts."""
+    row: Indices
+    """(room,) which active contact."""
+    idle: Indices
+    """(room,) which active contacts have not asked for an impulse yet."""
+    many: Ints
+    """(2,) how many are loaded, how many idle."""
+
+    def part(self, first: int, end: int, idle: Indices) -> "Loaded":
+        """Room from ``first`` to ``end`` for as many contacts, the first of those in ``idle``; none is loaded."""
+        some, count = slice(first, end), np.array([0, end - first], np.int64)
+        return Loaded(self.normal[some], self.tangent[some], self.slots[some], self.row[some], idle, count)
+
+    @classmethod
+    def of(cls, room: int) -> "Loaded":
+        """Room for as many."""
+        lines, numbers = np.empty((2, room, 8)), np.empty((2, room), np.int32)
+        return cls(lines[0], lines[1], np.empty((room, 4), np.int32), numbers[0], numbers[1], np.zeros(2, np.int64))
+
+
+_I2, _N1, _N2 = types.int64[:, ::1], types.int32[::1], types.int32[:, ::1]
+_F1, _F2 = types.float64[::1], types.float64[:, ::1]
+CONTACTS = record(ActiveContacts, _N2, _F2, _F2, _F1, _F1, _N1, _F1)
+NODES = record(ActiveNodes, _F2, _I2, _F2, _I2, _I2, _F1)
+LOADED = record(Loaded, _F2, _F2, _N2, _N1, _N1, types.int64[::1])

@@ -1,0 +1,69 @@
+"""What the impulses of a step cost, and whom: work along the normals, heat of friction, work of what holds nodes."""
+
+import numpy as np
+
+from ..jit import njit, types
+from .active import LOADED, MU, NODES, PUSH, PUSH_T, V
+
+_I1, _I2, _N1 = types.int64[::1], types.int64[:, ::1], types.int32[::1]
+_F1, _F2, _F = types.float64[::1], types.float64[:, ::1], types.float64
+
+
+@njit(types.void(_I2, LOADED, NODES, _F2, _N1, _F), cache=True)
+def cost(words, loaded, active, before, places, joule):  # type: ignore[no-untyped-def]
+    """Adds what the impulses along the normals take from the bodies, and what they have given back by the middle of
+    their work, to two limbs (rows of ``words``) of quanta of 1 / ``joule`` J.
+
+    An impulse J between the speeds u(n-1/2), of ``before`` (crowd, 3) at the ``places`` of the slots, and u(n+1/2)
+    takes -J (u(n-1/2) + u(n+1/2)) / 2; the ledger at time n has the first half of that.
+    """
+    values, normal, tangent, slots = active.moving, loaded.normal, loaded.tangent, loaded.slots
+    value = np.empty(2)
+    for q in range(loaded.many[0]):
+        push = normal[q, PUSH]
+        if push > 0.0:
+            early, late = 0.0, 0.0
+            for k in range(2 if slots[q, 2] < 0 else 4):
+                s = slots[q, k]
+                for i in range(3):
+                    share = tangent[q, k] * normal[q, i]
+                    early += share * before[places[s], i]
+                    late += share * values[s, V + i]
+            value[0] = -0.5 * push * (early + late)
+            value[1] = 0.5 * push * early
+            for m in range(2):
+                high = np.rint(value[m] * joule)
+                words[0, m] += np.int64(high)
+                words[1, m] += np.int64(np.rint((value[m] * joule - high) * 2.0**30))
+
+
+@njit(types.void(_I1, LOADED, NODES, _F2, _N1, _F), cache=True)
+def heat(words, loaded, active, before, places, joule):  # type: ignore[no-untyped-def]
+    """Adds the work of friction, mean sliding velocity times impulse, to two limbs of quanta of 1 / ``joule`` J."""
+    values, normal, tangent, slots = active.moving, loaded.normal, loaded.tangent, loaded.slots
+    for q in range(loaded.many[0]):
+        if normal[q, MU] > 0.0 and normal[q, PUSH] > 0.0:
+            work, many = 0.0, 2 if slots[q, 2] < 0 else 4
+            for i in range(3):
+                rate = 0.0
+                for k in range(many):
+                    rate += tangent[q, k] * before[places[slots[q, k]], i]
+                for k in range(many):
+                    rate += tangent[q, k] * values[slots[q, k], V + i]
+                work -= 0.5 * tangent[q, PUSH_T + i] * rate
+            high = np.rint(work * joule)
+            words[0] += np.int64(high)
+            words[1] += np.int64(np.rint((work * joule - high) * 2.0**30))
+
+
+@njit(types.void(_F1, _F1, _N1, _N1, _F2, _I2, _F2, _F), cache=True)
+def book(loss, external, places, index, before, total, mobility, scale):  # type: ignore[no-untyped-def]
+    """Half of the impulse times velocity: lost by contact; where a velocity is held, taken in from outside."""
+    for a in places:
+        h = index[a]
+        if h >= 0:
+            for i in range(3):
+                work = 0.5 * before[a, i] * (total[a, i] / scale)
+                loss[h] -= work
+                if mobility[a, i] == 0.0:
+                    external[h] -= work

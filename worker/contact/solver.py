@@ -1,0 +1,145 @@
+"""The impulses of a step: from the active contacts that the narrow phase has found to the velocities v(n+1/2)."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..parallel.fixed_point import Tally
+from ..parallel.ownership import Neighbour, SharedSum
+from ..state import Floats, Indices, Ints, Nodes
+from . import booking, held, sweeps
+from .account import Account
+from .active import IMPULSE, PUSH, PUSH_T, ActiveContacts, ActiveNodes, Loaded
+from .narrow_phase import ContactRows
+from .records import Crowd
+
+_ROW_WEIGHTS = 4
+"""Columns of ``ActiveNodes.row_weights``."""
+
+
+class ActiveSet:
+    """The active contacts of a rank in a step, and the slots of their nodes; the first slots are of shared nodes."""
+
+    def __init__(self, scale: float) -> None:
+        """``scale``: quanta per N s, a power of two."""
+        self._scale = scale
+        self.places: Indices = np.zeros(0, np.int32)
+        """(slots,) where the nodes of the last step stand in the crowd."""
+        self._slot: Indices = np.zeros(0, np.int32)
+        """(crowd,) slot of each node, -1 for none; within a step only."""
+        self._room = _Room(0, 0)
+        self._company: list[Neighbour] | None = None
+        self._shared: Indices = np.zeros(0, np.int32)
+        """Places of the nodes that another rank pushes or holds; some stand there several times."""
+
+    def begin(self, found: ContactRows, n: int, crowd: Crowd, company: list[Neighbour]) -> None:
+        """Takes up the first ``n`` contacts that were ``found``, and the nodes shared with the ``company``."""
+        if company is not self._company:
+            self._company, self._shared = company, np.concatenate([self._shared[:0], *(some.nodes for some in company)])
+        if len(self._slot) != crowd.n:
+            self._slot = np.full(crowd.n, -1, np.int32)
+        if len(found.nodes) > self._room.contacts or crowd.n > self._room.nodes:
+            self._room = _Room(len(found.nodes), crowd.n)
+        room, slot = self._room, self._slot
+        self._first = held.number_shared(room.places, slot, self._shared)
+        self._n, border = held.number(
+            room.slots, room.reach, room.places, slot, room.rows, found.nodes, n, self._first
+        )  # fmt: skip
+        self.places = room.places[: self._n]
+        self._fastest = held.load(room.active, self.places, crowd.v, crowd.mobility)
+        self._contacts = ActiveContacts(
+            room.slots, found.weights, found.normals, found.wanted, found.friction, found.pair, room.reach
+        )  # fmt: skip
+        self._parts = room.loaded.part(0, border, room.rows[0]), room.loaded.part(border, n, room.rows[1])
+
+    def weigh(self, sums: Ints, shared: SharedSum) -> None:
+        """Row weights, completed over the ranks; ``sums`` (crowd, 4): room, all zero."""
+        active = self._room.active
+
+        def add(part: Loaded) -> None:
+            sweeps.add_row_weights(active, self._contacts, part.idle[: part.many[1]])
+
+        self._complete(add, active.row_weights, (0, _ROW_WEIGHTS), sums, shared)
+
+    def resume(self, kept: Floats, ratio: float, sums: Ints, shared: SharedSum) -> None:
+        """Begins with ``ratio`` times what pairs with friction have ``kept`` (candidates, 4) of the step before."""
+        active, contacts = self._room.active, self._contacts
+
+        def begin(part: Loaded) -> None:
+            sweeps.load_kept(part, contacts, active, kept)
+            sweeps.resume(active, part, kept, contacts.pair, ratio, self._scale)
+
+        self._complete(begin, active.moving_words, (IMPULSE, 3), sums, shared)
+        sweeps.give(active, self._n, self._scale)
+
+    def sweep(self, many: int, sums: Ints, shared: SharedSum) -> None:
+        """``many`` sweeps; ``sums`` (crowd, 3): room, all zero."""
+        active, contacts, scale = self._room.active, self._contacts, self._scale
+        if not self._first:
+            sweeps.sweep_all(active, self._parts[1], contacts, self._fastest, self._n, scale, many)
+            return
+
+        def correct(part: Loaded) -> None:
+            sweeps.load(part, contacts, active, self._fastest)
+            sweeps.sweep(active, part, scale)
+
+        for _ in range(many):
+            self._complete(correct, active.moving_words, (IMPULSE, 3), sums, shared)
+            sweeps.give(active, self._n, scale)
+
+    def _complete(
+        self, work: Callable[[Loaded], None], words: Ints, columns: tuple[int, int], sums: Ints, shared: SharedSum
+    ) -> None:
+        """Does the work of all contacts, and completes these (first, number of) columns of the words of shared nodes;
+        contacts without shared nodes are worked on while the sums of the others travel.
+        """
+        border, inner = self._parts
+        work(border)
+        held.to_crowd(sums, self.places, words, *columns, self._first)
+        shared.begin(sums)
+        work(inner)
+        shared.finish(sums)
+        held.from_crowd(sums, self.places, words, *columns, self._first)
+
+    def cost(self, account: Account, before: Floats) -> None:
+        """Books what the impulses take from the bodies; ``before`` (crowd, 3): v(n-1/2)."""
+        for part in self._parts:
+            booking.cost(account.words, part, self._room.active, before, self.places, account.scale)
+
+    def heat(self, friction: Tally, before: Floats) -> None:
+        """Books the work of friction."""
+        words = friction.words.reshape(-1)
+        for part in self._parts:
+            booking.heat(words, part, self._room.active, before, self.places, float(friction.scale[0]))
+
+    def store(self, kept: Floats) -> None:
+        """Stores the impulses with their pairs, ``kept`` (candidates, 4), all zero."""
+        for part in self._parts:
+            sweeps.store(kept, part, self._contacts.pair)
+
+    def leave(self, crowd: Crowd, total: Ints, state: Nodes, parts: Ints) -> bool:
+        """Gives velocities to the nodes that are held here, and impulses to ``total`` (crowd, 3) and to the sums of the
+        ``parts`` (parts, 3); whether any was pushed.
+        """
+        some = crowd.local, state.part, state.owned
+        return bool(held.leave(state.v, parts, total, self._slot, self._room.active, self.places, *some))
+
+    def pushes(self) -> tuple[Indices, Floats]:
+        """Which contacts have asked for an impulse in the step, and (k, 4) their impulses along the normal, and of
+        friction, N s.
+        """
+        some = [(part, int(part.many[0])) for part in self._parts]
+        pushes = [np.column_stack([p.normal[:k, PUSH], p.tangent[:k, PUSH_T:]]) for p, k in some]
+        return np.concatenate([p.row[:k] for p, k in some]), np.concatenate(pushes)
+
+
+class _Room:
+    """Arrays for as many contacts, and nodes of the crowd."""
+
+    def __init__(self, contacts: int, nodes: int) -> None:
+        self.contacts, self.nodes = contacts, nodes
+        self.slots = np.empty((contacts, 4), np.int32)
+        self.reach = np.empty(contacts)
+        self.rows = np.empty((2, contacts), np.int32)
+        self.places = np.empty(nodes, np.int32)
+        self.active, self.loaded = ActiveNodes.of(nodes), Loaded.of(contacts)
