@@ -22,7 +22,7 @@ _WIDE = 0.2
 """Of the typical size of a face: two sides that have moved so far apart are surface from then on. At 0.1, 33 of 38
 searches in the first 500 steps of the glass bar are called by cracks that open within a search; at 0.2, 2 of 32.
 """
-_FORESEEN = 0.1
+_FORESEEN = 0.5
 """Of that width: the faces of a crack as wide as this are searched, so that they have their pairs when it opens."""
 
 

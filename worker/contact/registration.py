@@ -27,8 +27,14 @@ class _Flight:
     """(slots, 3) m."""
     course: Floats
     """(slots, 3) less what all drift with, m/s."""
+    part: Indices
+    """(slots,)."""
     horizon: float
     """s."""
+
+    def find(self, small: Things, large: Things, allowed: Flags, rank: Ints | None) -> Indices:
+        """search.find of what is on these lines."""
+        return search.find(small, large, self.x, self.course, self.part, allowed, self.horizon, rank)
 
 
 def news(scene: Scene) -> None:
@@ -82,7 +88,7 @@ def _names(scene: Scene) -> Ints:
 
 def _register(scene: Scene, nodes: Flags, faces: Flags, edges: Flags) -> None:
     tracks, pairs = scene.tracks, scene.node_face
-    flight = _Flight(tracks.positions(), tracks.course - scene.drift, scene.until - tracks.t)
+    flight = _Flight(tracks.positions(), tracks.course - scene.drift, scene.crowd.part, scene.until - tracks.t)
     import time
 
     t0 = time.process_time()
@@ -130,51 +136,39 @@ def _recall(rows: Indices, kept: Floats, old: Indices, was: Floats, faces: int) 
 
 def _node_face(scene: Scene, nodes: Flags, faces: Flags, flight: _Flight) -> Indices:
     """(p, 2) slot and face: changed nodes with all faces, changed faces with the other nodes."""
-    changed, others = np.flatnonzero(nodes), np.flatnonzero(scene.node_live & ~nodes)
-    one = _between(scene, changed, np.flatnonzero(scene.face_live), flight, False)
-    two = _between(scene, others, np.flatnonzero(faces), flight, True)
-    pairs = np.concatenate([one, two])
-    sifted = sift.faces(
-        pairs, scene.faces, scene.face_size, flight.x, flight.course, scene.crowd.part, scene.rules.skin, flight.horizon
-    )  # fmt: skip
-    return np.asarray(pairs[sifted])
-
-
-def _between(scene: Scene, slots: Indices, faces: Indices, flight: _Flight, few_faces: bool) -> Indices:
-    """(p, 2) slots and faces whose boxes touch."""
-    allowed, part, half = scene.rules.allowed, scene.crowd.part, 0.5 * scene.rules.skin
-    own = np.eye(len(allowed), dtype=bool)
-    nodes = Things(slots[:, None].astype(np.int32), np.full(len(slots), half))
+    half, size = 0.5 * scene.rules.skin, scene.face_size
+    every = np.arange(scene.crowd.n, dtype=np.int32)[:, None], np.full(scene.crowd.n, half)
+    changed, others = (Things(*every, _rows(some)) for some in (nodes, scene.node_live & ~nodes))
+    corners, own = np.ascontiguousarray(scene.faces[:, :3]), np.eye(len(scene.rules.allowed), dtype=bool)
     found = [np.zeros((0, 2), np.int32)]
     for deep, which in ((DEEP_SELF, own), (DEEP, ~own)):
-        if not (allowed & which).any():
-            continue
-        reach = half + deep * scene.face_size[faces]
-        sides = Things(np.ascontiguousarray(scene.faces[faces, :3]), reach)
-        things = (sides, nodes) if few_faces else (nodes, sides)
-        rows = search.find(*things, flight.x, flight.course, part, allowed & which, flight.horizon, None)
-        found.append(rows[:, ::-1] if few_faces else rows)
-    rows = np.concatenate(found)
-    return np.column_stack([slots[rows[:, 0]], faces[rows[:, 1]]]).astype(np.int32)
+        if (allowed := scene.rules.allowed & which).any():
+            of = corners, half + deep * size
+            found.append(flight.find(changed, Things(*of, _rows(scene.face_live)), allowed, None))
+            found.append(flight.find(Things(*of, _rows(faces)), others, allowed, None)[:, ::-1])
+    pairs = np.concatenate(found)
+    sifted = sift.faces(
+        pairs, scene.faces, size, flight.x, flight.course, flight.part, scene.rules.skin, flight.horizon
+    )  # fmt: skip
+    return np.asarray(pairs[sifted])
 
 
 def _edge_edge(scene: Scene, edges: Flags, flight: _Flight) -> Indices:
     """(p, 2) edges of which one has changed, that of lower rank first; its rank has the pair."""
-    changed, every = np.flatnonzero(edges), np.flatnonzero(scene.edge_live)
-    few, many = (
-        Things(
-            np.ascontiguousarray(scene.edges[some, :2]),
-            0.5 * scene.rules.skin + 0.5 * DEEP_SELF * scene.edge_size[some],
-        )
-        for some in (changed, every)
-    )
+    of = np.ascontiguousarray(scene.edges[:, :2]), 0.5 * scene.rules.skin + 0.5 * DEEP_SELF * scene.edge_size
     allowed, rank = scene.rules.allowed, scene.edge_rank
-    rows = search.find(few, many, flight.x, flight.course, scene.crowd.part, allowed, flight.horizon, None)
-    one, two = changed[rows[:, 0]], every[rows[:, 1]]
-    first, second = np.where(rank[one] < rank[two], (one, two), (two, one))
-    once = (first == one) | ~edges[two]
-    pairs = np.column_stack([first, second])[once & scene.edge_own[first]].astype(np.int32)
+    changed, others = (Things(*of, _rows(some)) for some in (edges, scene.edge_live & ~edges))
+    one, two = flight.find(changed, changed, allowed, rank), flight.find(changed, others, allowed, None)
+    turned = rank[two[:, 0]] > rank[two[:, 1]]
+    two[turned] = two[turned, ::-1]
+    pairs = np.concatenate([one, two])
+    if not scene.edge_own.all():
+        pairs = pairs[scene.edge_own[pairs[:, 0]]]
     sifted = sift.edges(
         pairs, scene.edges, scene.edge_size, flight.x, flight.course, scene.rules.skin, flight.horizon
     )  # fmt: skip
     return np.asarray(pairs[sifted])
+
+
+def _rows(flags: Flags) -> Indices:
+    return np.flatnonzero(flags).astype(np.int32)

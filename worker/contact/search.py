@@ -15,6 +15,10 @@ from ..state import Flags, Floats, Indices, Ints, extended
 from . import buckets
 from .buckets import TABLE, bucket_at, bucket_of
 
+_FEW, _SAMPLE = 8, 256
+"""How many large things to a small one are worth larger cells; how many boxes are measured for the size of cells."""
+_NO_RANK = np.zeros(0, np.int64)
+
 
 @dataclass
 class Things:
@@ -24,6 +28,13 @@ class Things:
     """(n, k) places of nodes."""
     reach: Floats
     """(n,) how far from its corners' hull a thing must be seen, m."""
+    some: Indices | None = None
+    """(m,) which of them are searched; all when it is missing."""
+
+    @property
+    def searched(self) -> Indices:
+        """(m,) which are."""
+        return np.arange(len(self.corners), dtype=np.int32) if self.some is None else self.some
 
 
 @dataclass
@@ -68,16 +79,17 @@ def _in_hull(low, high, hull):  # type: ignore[no-untyped-def]
 def swept(things: Things, x: Floats, v: Floats, horizon: float) -> Boxes:
     """The boxes that things fly through, reach included; ``x`` and ``v`` are (nodes, 3)."""
     boxes = Boxes(np.empty((len(things.corners), 3)), np.empty((len(things.corners), 3)))
-    _sweep_out(boxes.low, boxes.high, things.corners, things.reach, x, v, horizon)
+    _sweep_out(boxes.low, boxes.high, things.corners, things.reach, things.searched, x, v, horizon)
     return boxes
 
 
 @njit(
-    "void(float64[:, ::1], float64[:, ::1], int32[:, ::1], float64[::1], float64[:, ::1], float64[:, ::1], float64)",
+    "void(float64[:, ::1], float64[:, ::1], int32[:, ::1], float64[::1], int32[::1], float64[:, ::1], "
+    "float64[:, ::1], float64)",
     cache=True,
 )
-def _sweep_out(low, high, corners, reach, x, v, horizon):  # type: ignore[no-untyped-def]
-    for j in range(len(corners)):
+def _sweep_out(low, high, corners, reach, some, x, v, horizon):  # type: ignore[no-untyped-def]
+    for j in some:
         for i in range(3):
             least, most = np.inf, -np.inf
             for k in range(corners.shape[1]):
@@ -97,51 +109,38 @@ def find(
     ``allowed`` (parts, parts) says which parts meet. Things with a corner in common are no candidates. ``rank``
     (large,): the small things are the first of the large ones, and only the one of lower rank finds a pair.
     """
-    if not len(small.corners) or not len(large.corners):
+    if not len(small.searched) or not len(large.searched):
         return np.zeros((0, 2), np.int32)
-    small_boxes, large_boxes = swept(small, x, v, horizon), swept(large, x, v, horizon)
-    small_part, large_part = part[small.corners[:, 0]], part[large.corners[:, 0]]
-    few = _near(small_boxes, small_part, large_boxes, large_part, allowed)
-    many = _near(large_boxes, large_part, small_boxes, small_part, allowed)
+    of = small, swept(small, x, v, horizon), large, swept(large, x, v, horizon), part, allowed
+    few, many = _near(*of), _near(of[2], of[3], *of[:2], part, allowed.T.copy())
     if not len(few) or not len(many):
         return np.zeros((0, 2), np.int32)
     order = np.zeros(0, np.int64) if rank is None else rank
-    pairs = _pairs(
-        Sought(small_boxes.low, small_boxes.high, small.corners, few, order),
-        Sought(large_boxes.low, large_boxes.high, large.corners, many, order), part, allowed,
+    return _pairs(
+        Sought(of[1].low, of[1].high, small.corners, few, order),
+        Sought(of[3].low, of[3].high, large.corners, many, order), part, allowed,
     )  # fmt: skip
-    return pairs
 
 
-def _near(boxes: Boxes, part: Indices, others: Boxes, their_part: Indices, allowed: Flags) -> Indices:
-    """Indices of the boxes that touch the hull of a part that theirs may meet."""
-    near = _touching(boxes.low, boxes.high, part, others.low, others.high, their_part, allowed)
-    return np.flatnonzero(near).astype(np.int32)
+def _near(
+    things: Things, boxes: Boxes, others: Things, their_boxes: Boxes, part: Indices, allowed: Flags
+) -> Indices:  # fmt: skip
+    """Which of the things touch, by their boxes, the hull of a part of the others that theirs may meet."""
+    mine = Sought(boxes.low, boxes.high, things.corners, things.searched, _NO_RANK)
+    theirs = Sought(their_boxes.low, their_boxes.high, others.corners, others.searched, _NO_RANK)
+    return np.asarray(_touching(mine, theirs, part, allowed))
 
 
-@njit(
-    "boolean[::1](float64[:, ::1], float64[:, ::1], int32[::1], float64[:, ::1], float64[:, ::1], int32[::1], "
-    "boolean[:, ::1])",
-    cache=True,
-)
-def _touching(low, high, part, their_low, their_high, their_part, allowed):  # type: ignore[no-untyped-def]
-    least, most = np.full((len(allowed), 3), np.inf), np.full((len(allowed), 3), -np.inf)
-    for j in range(len(their_low)):
-        q = their_part[j]
-        for i in range(3):
-            least[q, i], most[q, i] = min(least[q, i], their_low[j, i]), max(most[q, i], their_high[j, i])
-    near = np.zeros(len(low), np.bool_)
-    for j in range(len(low)):
-        for q in range(len(allowed)):
-            touch = allowed[part[j], q]
-            for i in range(3):
-                touch &= low[j, i] <= most[q, i] and high[j, i] >= least[q, i]
-            near[j] |= touch
-    return near
+def _extent(things: "Sought") -> float:
+    """The median of the longest sides of boxes, of a sample of them, m."""
+    some = things.some[:: max(len(things.some) // _SAMPLE, 1)]
+    return float(np.median((things.high[some] - things.low[some]).max(axis=1)))
 
 
 def _pairs(small: "Sought", large: "Sought", part: Indices, allowed: Flags) -> Indices:
-    edge = max(float(np.median((things.high - things.low)[things.some].max(axis=1))) for things in (small, large))
+    edge = max(_extent(small), _extent(large))
+    if _FEW * len(small.some) < len(large.some):
+        edge *= 2.0
     table = buckets.sort(small.low, small.high, small.some, edge)
     out = np.empty((4 * (len(small.some) + len(large.some)) + 1024, 2), np.int32)
     n = asked = 0
@@ -179,6 +178,27 @@ def _meet(small, large, i, j):  # type: ignore[no-untyped-def]
             if small[i, a] == large[j, b]:
                 return True
     return False
+
+
+@njit(types.int32[::1](SOUGHT, SOUGHT, types.int32[::1], types.boolean[:, ::1]), cache=True)
+def _touching(things, others, part, allowed):  # type: ignore[no-untyped-def]
+    least, most = np.full((len(allowed), 3), np.inf), np.full((len(allowed), 3), -np.inf)
+    for j in others.some:
+        q = part[others.corners[j, 0]]
+        for i in range(3):
+            least[q, i], most[q, i] = min(least[q, i], others.low[j, i]), max(most[q, i], others.high[j, i])
+    near, n = np.empty(len(things.some), np.int32), 0
+    for j in things.some:
+        touching = False
+        for q in range(len(allowed)):
+            touch = allowed[part[things.corners[j, 0]], q]
+            for i in range(3):
+                touch &= things.low[j, i] <= most[q, i] and things.high[j, i] >= least[q, i]
+            touching |= touch
+        if touching:
+            near[n] = j
+            n += 1
+    return near[:n].copy()
 
 
 @njit(
