@@ -48,12 +48,12 @@ def _outside(pairs, slots, faces, step, p, depth):  # type: ignore[no-untyped-de
         i, j, k = faces.corners[f, 0], faces.corners[f, 1], faces.corners[f, 2]
         if not faces.exposed[f] or part[i] != part[faces.corners[pairs.rows[p, 1], 0]]:
             continue
-        away = height(m, x, s, i, j, k)
-        if not away > 0.0:
+        away, near = height(m, x, s, i, j, k), min(depth, (DEEP_SELF if part[s] == part[i] else DEEP) * faces.size[f])
+        if not 0.0 < away < near:
             continue
         if not foot(b, x, x, s, i, j, k, 0.0):
             away = min(off(x, s, i, j), off(x, s, j, k), off(x, s, k, i))
-        if away < min(depth, (DEEP_SELF if part[s] == part[i] else DEEP) * faces.size[f]):
+        if away < near:
             return True
     return False
 

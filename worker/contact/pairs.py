@@ -72,9 +72,10 @@ class PairTable:
             np.empty(len(some), np.int32),
         )  # fmt: skip
 
-    def turn(self) -> None:
-        """All mean normals have changed; and a pair that was too close may be far by now."""
-        self.until[self.turned | np.isnan(self.until)] = -np.inf
+    def wake(self) -> None:
+        """Every pair has to be tested: short lines and mean normals are others."""
+        some = ~np.isposinf(self.until)
+        self.until[some], self.speed[some] = -np.inf, np.nan
 
     def arrays(self) -> Pairs:
         """As kernels take it."""

@@ -45,19 +45,19 @@ def news(scene: Scene) -> None:
     )
 
 
-def renew(scene: Scene, x: Floats, v: Floats, dt: float, strayed: float) -> None:
+def renew(scene: Scene, x: Floats, v: Floats, strayed: float) -> None:
     """Registers what is new, and gives new lines to what has left its own; ``strayed``: how far at most, m.
 
-    ``x``, ``v`` (slots, 3): as the step ``dt`` begins, v before contact.
+    ``x``, ``v`` (slots, 3): as the step begins, v before contact.
     """
     off = scene.settle_live()
     if strayed > 0.5 * scene.rules.skin:
-        off |= scene.tracked & (scene.tracks.left > 0.5 * _PARTLY * scene.rules.skin)
+        off |= scene.tracked & (scene.tracks.searched.left > 0.5 * _PARTLY * scene.rules.skin)
         scene.node_new |= off
         scene.face_new |= off[scene.faces[:, :3]].any(axis=1)
         scene.edge_new |= off[scene.edges[:, :2]].any(axis=1)
     scene.tracks.begin_anew(off, x)
-    scene.tracks.measure(x, v, dt, scene.faces, scene.edges)
+    scene.tracks.measure(x, v, scene.faces, scene.edges)
     _register(
         scene, scene.node_new & scene.node_live, scene.face_new & scene.face_live, scene.edge_new & scene.edge_live
     )
@@ -88,7 +88,7 @@ def _names(scene: Scene) -> Ints:
 
 def _register(scene: Scene, nodes: Flags, faces: Flags, edges: Flags) -> None:
     tracks, pairs = scene.tracks, scene.node_face
-    flight = _Flight(tracks.positions(), tracks.course - scene.drift, scene.crowd.part, scene.until - tracks.t)
+    flight = _Flight(tracks.positions(), tracks.searched.course - scene.drift, scene.crowd.part, scene.until - tracks.t)
     import time
 
     t0 = time.process_time()

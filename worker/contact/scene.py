@@ -255,7 +255,7 @@ class Scene:
         """The slots as kernels take them."""
         n, tracks = self.crowd.n, self.tracks
         return SlotTable(
-            self.normals, self.on_surface, self.first, tracks.left, tracks.course, self.node_fresh, np.empty(n),
+            self.normals, self.on_surface, self.first, tracks.short.left, tracks.short.course, self.node_fresh, np.empty(n),
             np.empty(n, np.int32),
         )  # fmt: skip
 

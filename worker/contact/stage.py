@@ -215,7 +215,7 @@ class Contact:
             self._surface.flags &= ~removed
             self._look_round()
             if self._scene is not None:
-                self._scene.node_face.turn()
+                self._scene.node_face.wake()
             self.due = self._changed = True
 
     def crack(self, tets: Ints, nodes: Indices, sides: Indices) -> None:
@@ -334,7 +334,6 @@ class Contact:
                 self._look_round()
                 if self._scene is not None:
                     self._face(self._scene, self._scene.local)
-                    self._scene.node_face.turn()
             if self.due or self._scene is None:
                 self._search(state)
 
@@ -440,11 +439,17 @@ class Contact:
     def _meet(self, now: Scene, dt: float) -> int:
         """The active contacts of the step; returns how many."""
         crowd, tracks, pairs, edges = now.crowd, now.tracks, now.node_face, now.edge_edge
-        strayed = tracks.advance(crowd.x, crowd.v, now.faces, now.edges, dt, now.tracked)
+        tracks.advance(dt)
+        if self._clock.step % normals.EVERY == 0:
+            tracks.shorten(crowd.x)
+            pairs.wake()
+            edges.wake()
+        tracks.measure(crowd.x, crowd.v, now.faces, now.edges)
+        strayed = float(tracks.searched.left[now.tracked].max(initial=0.0))
         if self._clock.step % _FORESIGHT == 0:
             self._foresee(now)
         if strayed > 0.5 * now.rules.skin or now.pending:
-            registration.renew(now, crowd.x, crowd.v, dt, strayed)
+            registration.renew(now, crowd.x, crowd.v, strayed)
         now.reserve()
         step = Step(crowd.x, crowd.v, crowd.x + dt * crowd.v, crowd.part, self._mu, self._give_back, dt)
         faces, table = now.face_table(), pairs.arrays()
@@ -452,7 +457,7 @@ class Contact:
         pairs.tested = table.active[:tested]
         self.approach = _KINEMATIC * approach(now.room, n, table, faces, step)
         table = edges.arrays()
-        n, tested = edge_edge(now.room, n, table, now.edge_table(), step, tracks.course, tracks.end)
+        n, tested = edge_edge(now.room, n, table, now.edge_table(), step, tracks.short.course, tracks.end)
         edges.tested = table.active[:tested]
         now.face_fresh[:], now.edge_fresh[:], now.node_fresh[:] = False, False, False
         opening = np.empty(len(now.cracks), np.int64)

@@ -1,30 +1,71 @@
-"""Reference motions: how slots are taken to move after a search, and how far they have left that.
+"""Reference motions: how slots are taken to move, and how far they have left that.
 
 A search takes every slot to go on along a straight line. What it leaves out would meet only if slots left these lines
 by half the skin. A slot that does so gets another line, from where it is, with the mean velocity that it has had on the
 old one, and it is searched for anew (registration.py).
+
+How long a pair may be left alone is measured from other lines, which are drawn anew every few steps for all: with the
+mean velocities of these steps they are much closer to the slots, and nobody has to be searched for (pairs.py).
 """
 
 import numpy as np
 
 from ..jit import njit
-from ..state import Flags, Floats, Indices, extended
+from ..state import Floats, Indices, extended
 
 _V1, _V2, _N2 = "float64[::1]", "float64[:, ::1]", "int32[:, ::1]"
+
+
+class Lines:
+    """A straight line for every slot."""
+
+    def __init__(self, x: Floats, course: Floats) -> None:
+        """``x``, ``course`` (slots, 3): positions, m, and velocities, m/s, at time 0."""
+        self.x, self.course = x.copy(), course.copy()
+        self.since = np.zeros(len(x))
+        """(slots,) when each line began, s."""
+        self.left = np.zeros(len(x))
+        """(slots,) how far each slot leaves its line in the step ahead, the larger of beginning and end, m."""
+
+    def add(self, x: Floats, course: Floats, t: float) -> None:
+        """Takes up more slots, as they are at time ``t``, (n, 3) each."""
+        n = len(x)
+        self.x, self.course = extended(self.x, x - t * course), extended(self.course, course)
+        self.since, self.left = extended(self.since, np.full(n, t)), extended(self.left, np.zeros(n))
+
+    def inherit(self, heirs: Indices, parents: Indices) -> None:
+        """The copies of slots are on the lines of their parents."""
+        for column in (self.x, self.course, self.since, self.left):
+            column[heirs] = column[parents]
+
+    def take_over(self, slots: Indices, old: "Lines", t: float) -> None:
+        """At time ``t``: the lines of ``old``, whose slots have the new numbers ``slots``, -1 for those that have gone."""
+        self.x -= t * self.course
+        self.since[:] = t
+        there, here = np.flatnonzero(slots >= 0), slots[slots >= 0]
+        for name in ("x", "course", "since"):
+            getattr(self, name)[here] = getattr(old, name)[there]
+
+    def measure(self, x: Floats, v: Floats, t: float, dt: float) -> None:
+        """How far the slots leave their lines in a step ``dt`` from ``t`` on: positions ``x`` and velocities ``v``
+        before contact, (slots, 3) each.
+        """
+        _leave(self.left, self.x, self.course, x, v, t, dt)
+
+    def begin_anew(self, some: "np.ndarray", x: Floats, t: float) -> None:
+        """New lines for ``some`` (slots,), from ``x`` (slots, 3) at time ``t`` on."""
+        _begin_anew(some, self.x, self.course, self.since, x, t)
 
 
 class Tracks:
     """The reference motions of the slots of a scene."""
 
     def __init__(self, x: Floats, course: Floats, faces: int, edges: int) -> None:
-        """``x``, ``course`` (slots, 3): positions, m, and velocities, m/s, of the lines at the time of the search."""
-        self.x, self.course = x.copy(), course.copy()
-        self.since = np.zeros(len(x))
-        """(slots,) when each line began, s after the search."""
-        self.left = np.zeros(len(x))
-        """(slots,) how far each slot leaves its line in the step ahead, m."""
+        """``x``, ``course`` (slots, 3): positions, m, and velocities, m/s, at the time of the search."""
+        self.searched, self.short = Lines(x, course), Lines(x, course)
+        """Along which slots have been searched, and from which pairs are measured."""
         self.faces, self.edges = np.zeros(faces), np.zeros(edges)
-        """(f,) and (e,) the largest of their corners, m."""
+        """(f,) and (e,) the largest of what their corners leave the short lines, m."""
         self.t = 0.0
         """Of the step's beginning, s after the search."""
         self.end = 0.0
@@ -32,45 +73,43 @@ class Tracks:
 
     def add(self, x: Floats, course: Floats) -> None:
         """Takes up more slots, as they are, (n, 3) each."""
-        n = len(x)
-        self.x, self.course = extended(self.x, x - self.end * course), extended(self.course, course)
-        self.since, self.left = extended(self.since, np.full(n, self.end)), extended(self.left, np.zeros(n))
+        self.searched.add(x, course, self.end)
+        self.short.add(x, course, self.end)
 
     def inherit(self, heirs: Indices, parents: Indices) -> None:
-        """The copies of slots are on the lines of their parents."""
-        for column in (self.x, self.course, self.since, self.left):
-            column[heirs] = column[parents]
+        """The copies of slots move as their parents do."""
+        self.searched.inherit(heirs, parents)
+        self.short.inherit(heirs, parents)
 
     def take_over(self, slots: Indices, old: "Tracks") -> None:
         """The lines of ``old``, whose slots have the new numbers ``slots``, -1 for those that have gone."""
         self.t = self.end = old.end
-        self.x -= self.t * self.course
-        self.since[:] = self.t
-        there, here = np.flatnonzero(slots >= 0), slots[slots >= 0]
-        for name in ("x", "course", "since"):
-            getattr(self, name)[here] = getattr(old, name)[there]
+        self.searched.take_over(slots, old.searched, self.t)
+        self.short.take_over(slots, old.short, self.t)
 
-    def advance(self, x: Floats, v: Floats, faces: Indices, edges: Indices, dt: float, live: Flags) -> float:
-        """A step ``dt`` from the positions ``x`` on with the velocities ``v`` before contact, (slots, 3) each; returns
-        how far one of the ``live`` slots leaves its line, m.
-        """
+    def advance(self, dt: float) -> None:
+        """A step ``dt`` begins."""
         self.t, self.end = self.end, self.end + dt
-        self.measure(x, v, dt, faces, edges)
-        return float(self.left[live].max(initial=0.0))
 
-    def measure(self, x: Floats, v: Floats, dt: float, faces: Indices, edges: Indices) -> None:
-        """How far everything leaves its line in the step: see ``advance``."""
-        _leave(self.left, self.x, self.course, x, v, self.t, dt)
-        _largest(self.faces, faces, 3, self.left)
-        _largest(self.edges, edges, 2, self.left)
+    def measure(self, x: Floats, v: Floats, faces: Indices, edges: Indices) -> None:
+        """How far everything leaves its lines in the step: see Lines."""
+        dt = self.end - self.t
+        self.searched.measure(x, v, self.t, dt)
+        self.short.measure(x, v, self.t, dt)
+        _largest(self.faces, faces, 3, self.short.left)
+        _largest(self.edges, edges, 2, self.short.left)
 
-    def begin_anew(self, some: Flags, x: Floats) -> None:
-        """New lines for ``some`` (slots,), from ``x`` (slots, 3) on."""
-        _begin_anew(some, self.x, self.course, self.since, x, self.t)
+    def begin_anew(self, some: "np.ndarray", x: Floats) -> None:
+        """New lines to search along for ``some`` (slots,), from ``x`` (slots, 3) on."""
+        self.searched.begin_anew(some, x, self.t)
+
+    def shorten(self, x: Floats) -> None:
+        """New short lines for all, from ``x`` (slots, 3) on."""
+        self.short.begin_anew(np.ones(len(x), bool), x, self.t)
 
     def positions(self) -> Floats:
-        """(slots, 3) on the lines at the beginning of the step, m."""
-        return np.asarray(self.x + self.t * self.course)
+        """(slots, 3) on the lines that are searched, at the beginning of the step, m."""
+        return np.asarray(self.searched.x + self.t * self.searched.course)
 
 
 @njit(f"void({_V1}, {_V2}, {_V2}, {_V2}, {_V2}, float64, float64)", cache=True)
