@@ -65,7 +65,8 @@ def renew(scene: Scene, x: Floats, v: Floats, strayed: float) -> None:
 
 def carry(now: Scene, old: Scene) -> None:
     """What ``old`` knows of the surface stays good on the one of ``now``, which is not connected yet: lines, what is
-    searched and what has to be registered, and the pairs of what is still there.
+    searched and what has to be registered, and the pairs of what is still there. The pairs of a copy were with the rank
+    of its parent, and are with that of its own owner from now on.
     """
     slots, faces = rows_of(now.crowd.id, old.crowd.id), rows_of(now.face_id, old.face_id)
     order = np.argsort(_names(now))
@@ -77,7 +78,9 @@ def carry(now: Scene, old: Scene) -> None:
     for kind, rows in (("node", slots), ("face", faces), ("edge", edges)):
         for name in ("live", "new", "fresh"):
             getattr(now, f"{kind}_{name}")[rows[rows >= 0]] = getattr(old, f"{kind}_{name}")[rows >= 0]
-    now.node_face = old.node_face.carried(slots, faces)
+    now.node_live &= now.slave
+    mine = np.where(now.slave[slots], slots, -1).astype(np.int32)
+    now.node_face = old.node_face.carried(mine, faces)
     now.edge_edge = old.edge_edge.carried(edges, edges)
 
 
