@@ -4,7 +4,7 @@ A box round a face or an edge is much larger than what it encloses. Here the hei
 the face's plane, and the distance of two edges are followed through the free flight until the next search, at its
 beginning, middle and end. Each is nearly a parabola in time: what it may do between two of these moments is an eighth
 of its second difference, twice of which is allowed for. A pair goes only when one and the same measure excludes it all
-the time, by the skin and the depth to which a meeting looks.
+the time, by the skin and the depth to which a meeting looks; so one that nothing excludes at the beginning stays.
 """
 
 import numpy as np
@@ -58,6 +58,7 @@ def _near_faces(pairs, faces, size, x, v, part, skin, horizon):  # type: ignore[
     for p in range(len(pairs)):
         s, face = pairs[p, 0], pairs[p, 1]
         i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
+        far = skin + (DEEP_SELF if part[s] == part[i] else DEEP) * size[face]
         for m in range(3):
             t = 0.5 * m * horizon
             for a in range(3):
@@ -77,14 +78,16 @@ def _near_faces(pairs, faces, size, x, v, part, skin, horizon):  # type: ignore[
                 r[a] -= e[a]
             cross(side, n, g)
             off[2, m] = -dot(side, r) / (length * np.sqrt(dot(g, g)))
-        far = skin + (DEEP_SELF if part[s] == part[i] else DEEP) * size[face]
-        kept[p] = not (
-            _least(height) > far
-            or _most(height) < -far
-            or _least(off[0]) > far
-            or _least(off[1]) > far
-            or _least(off[2]) > far
-        )
+            if m == 0 and abs(height[0]) <= far and max(off[0, 0], off[1, 0], off[2, 0]) <= far:
+                break
+        else:
+            kept[p] = not (
+                _least(height) > far
+                or _most(height) < -far
+                or _least(off[0]) > far
+                or _least(off[1]) > far
+                or _least(off[2]) > far
+            )
     return kept
 
 
@@ -97,6 +100,7 @@ def _near_edges(pairs, edges, size, x, v, skin, horizon):  # type: ignore[no-unt
         one, two = pairs[p, 0], pairs[p, 1]
         a, b, c, d = edges[one, 0], edges[one, 1], edges[two, 0], edges[two, 1]
         flat, long, wide = 1.0, 0.0, 0.0
+        far = skin + DEEP_SELF * min(size[one], size[two])
         for m in range(3):
             t = 0.5 * m * horizon
             for i in range(3):
@@ -110,15 +114,19 @@ def _near_edges(pairs, edges, size, x, v, skin, horizon):  # type: ignore[no-unt
             apart[m] = dot(n, r) / np.sqrt(area)
             along[m], across[m] = (ww * ur - uw * wr) / area, (uw * ur - uu * wr) / area
             long, wide = max(long, 1.0 / (sine * np.sqrt(uu))), max(wide, 1.0 / (sine * np.sqrt(ww)))
-        if not flat > _STEEPEST:
-            continue
-        far = skin + DEEP_SELF * min(size[one], size[two])
-        kept[p] = not (
-            _least(apart) > far
-            or _most(apart) < -far
-            or _least(along) > 1.0 + skin * long
-            or _most(along) < -skin * long
-            or _least(across) > 1.0 + skin * wide
-            or _most(across) < -skin * wide
-        )
+            if not flat > _STEEPEST:
+                break
+            if m == 0 and abs(apart[0]) <= far:
+                beside = max(-along[0], along[0] - 1.0) > skin * long or max(-across[0], across[0] - 1.0) > skin * wide
+                if not beside:
+                    break
+        else:
+            kept[p] = not (
+                _least(apart) > far
+                or _most(apart) < -far
+                or _least(along) > 1.0 + skin * long
+                or _most(along) < -skin * long
+                or _least(across) > 1.0 + skin * wide
+                or _most(across) < -skin * wide
+            )
     return kept
