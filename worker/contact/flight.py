@@ -5,7 +5,7 @@ import numpy as np
 from ..jit import njit
 from ..parallel.comm import Comm
 from ..parallel.fixed_point import exact_sums
-from ..state import Floats, Indices, Ints, Nodes, extended
+from ..state import Floats, Indices, Ints, Nodes, extended, located
 from . import ghosts
 from .records import Crowd, merged
 from .scene import HALO, Sides
@@ -34,7 +34,7 @@ class Flight:
         """Takes a new surface; all ranks take part."""
         self._found, self.mobility = found, mobility
         self._watched = found.flags | found.waiting
-        self.sides = self._whole(nodes, np.searchsorted(nodes.id, found.faces.nodes).astype(np.int32))
+        self.sides = self._whole(nodes, located(nodes.id, found.faces.nodes))
         """What this rank has of the surface."""
 
     def begin(self, nodes: Nodes, course: Floats, t: float) -> None:

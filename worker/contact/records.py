@@ -10,7 +10,7 @@ from typing import Self
 
 import numpy as np
 
-from ..state import Flags, Floats, Indices, Ints
+from ..state import Flags, Floats, Indices, Ints, located
 
 
 @dataclass
@@ -89,7 +89,7 @@ class Crowd(Rows):
 
     def places(self, ids: Ints) -> Indices:
         """Where these global ids stand, in the shape of ``ids``; all must be here."""
-        return np.searchsorted(self.id, ids).astype(np.int32)
+        return located(self.id, ids)
 
 
 def merged(crowds: list[Crowd]) -> Crowd:

@@ -313,9 +313,9 @@ def build(sides: Sides, rules: Rules, horizon: float, drift: Floats, nodes: Node
     slave, pushes = np.zeros(crowd.n, bool), np.zeros(crowd.n, bool)
     slave[crowd.places(sides.slaves)] = True
     pushes[seen.face_places[:, :3]] = pushes[seen.edge_places[:, :2]] = True
-    order = np.lexsort((*edges.nodes[:, 1::-1].T, *edges.sides[:, ::-1].T))
-    rank = np.empty(edges.n, np.int64)
-    rank[order] = np.arange(edges.n)
+    rank = np.arange(edges.n)
+    if edges.n > sides.edges.n:
+        rank[np.lexsort((edges.sides[:, 1], edges.sides[:, 0]))] = np.arange(edges.n)
     return Scene(
         crowd=crowd, held=held, local=crowd.local[held], faces=seen.face_places, face_id=faces.id, face_size=faces.size,
         face_exposed=faces.exposed.copy(), edges=seen.edge_places, edge_sides=edges.sides,
