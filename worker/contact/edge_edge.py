@@ -13,11 +13,11 @@ _PARALLEL = 0.05
 """Sine of the angle below which edges are left to nodes and faces."""
 _ROUND = 0.01
 """Of the length of an edge: added to the distance at which a pair may meet."""
-_V2, _N2 = "float64[:, ::1]", "int32[:, ::1]"
+_X2, _V2, _N2 = "float64[:, :]", "float64[:, ::1]", "int32[:, ::1]"
 _PAIR = types.Tuple((types.int64, types.int64))  # type: ignore[no-untyped-call]
 
 
-@njit(f"float64({_V2}, float64[::1], {_V2}, {_V2}, {_N2}, int64, float64)", cache=True, error_model="numpy")
+@njit(f"float64({_V2}, float64[::1], {_X2}, {_V2}, {_N2}, int64, float64)", cache=True, error_model="numpy")
 def _sides(turned, u, x, v, edges, e, h):  # type: ignore[no-untyped-def]
     """Rows of ``turned``: u times the normals of the two faces of edge e, along u, after a time ``h``.
 
@@ -46,7 +46,7 @@ def _points_out(turned, sense, n, sign):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    f"float64(float64[::1], {_V2}, {_V2}, int64, int64, int64, int64, float64, float64, float64)",
+    f"float64(float64[::1], {_X2}, {_V2}, int64, int64, int64, int64, float64, float64, float64)",
     cache=True,
     error_model="numpy",
 )

@@ -4,7 +4,7 @@ import numpy as np
 
 from ..jit import njit
 
-_V2 = "float64[:, ::1]"
+_V2 = "float64[:, :]"
 MARGIN = 1e-3
 """Of the area coordinates: how far outside of a face the foot of a node may lie."""
 

@@ -21,6 +21,8 @@ DEEP_SELF = 0.05
 PUSH_OUT = 0.1
 """Largest share of a penetration that is taken back in a step, and of the speed of closing that is given back for it;
 nothing while contact has no energy to give back (``account.Account``)."""
+_LINE = 8
+"""Words of a cache line."""
 
 
 class ContactRows(NamedTuple):
@@ -50,7 +52,7 @@ class Step(NamedTuple):
     """The slots in the step ahead."""
 
     x: Floats
-    """(slots, 3) positions at its beginning, m."""
+    """(slots, 3) positions at its beginning, m; with those ``ahead`` in one cache line a slot."""
     v: Floats
     """(slots, 3) velocities without contact, m/s."""
     ahead: Floats
@@ -63,6 +65,16 @@ class Step(NamedTuple):
     """Of a penetration, taken back in the step (PUSH_OUT)."""
     dt: float
     """s."""
+
+
+    @classmethod
+    def of(cls, x: Floats, v: Floats, part: Indices, mu: Floats, give: float, dt: float) -> "Step":
+        """A step ``dt`` from ``x`` on."""
+        room = np.empty(len(x) * _LINE + _LINE)
+        first = -(room.ctypes.data // room.itemsize) % _LINE
+        places = room[first : first + len(x) * _LINE].reshape(len(x), _LINE)
+        _place(places, x, v, dt)
+        return cls(places[:, :3], v, places[:, 3:6], part, mu, give, dt)
 
 
 class Pairs(NamedTuple):
@@ -148,7 +160,7 @@ _N1, _N2, _I1, _B1, _B2 = (
 )  # fmt: skip
 _F1, _F2 = types.float64[::1], types.float64[:, ::1]
 CONTACT_ROWS = record(ContactRows, _N2, _F2, _F2, _F1, _F1, _N1)
-STEP = record(Step, _F2, _F2, _F2, _N1, _F2, types.float64, types.float64)
+STEP = record(Step, types.float64[:, :], _F2, types.float64[:, :], _N1, _F2, types.float64, types.float64)
 PAIRS = record(Pairs, _N2, _F1, _F1, _B1, _N1, _N1)
 SLOTS = record(SlotTable, _F2, _B1, _N1, _F1, _F2, _B1, _F1, _N1)
 FACES = record(FaceTable, _N2, _F1, _I1, _B1, _F1, _B1, _F2, _B1)
@@ -162,3 +174,11 @@ def needed(gap0, gap1, speed, give, dt):  # type: ignore[no-untyped-def]
     """
     back = give * min(max(-gap0, 0.0) / dt, max(-speed, 0.0))
     return (min(gap0, 0.0) - gap1) / dt + back
+
+
+@njit("void(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64)", cache=True)
+def _place(places, x, v, dt):  # type: ignore[no-untyped-def]
+    """Positions now and after ``dt``, side by side."""
+    for a in range(len(x)):
+        for i in range(3):
+            places[a, i], places[a, 3 + i] = x[a, i], x[a, i] + dt * v[a, i]

@@ -20,7 +20,7 @@ _ROUND = 0.01
 _BEND = 0.1
 """Largest motion of two corners of a face against each other, of the face's two sides, that is allowed for."""
 
-_V2, _N2 = "float64[:, ::1]", "int32[:, ::1]"
+_X2, _V2, _N2 = "float64[:, :]", "float64[:, ::1]", "int32[:, ::1]"
 _PAIR = types.Tuple((types.int64, types.int64))  # type: ignore[no-untyped-call]
 
 
@@ -74,7 +74,7 @@ def facing(normals, s, m):  # type: ignore[no-untyped-def]
     return mean, mean - np.sqrt(max(square - mean * mean, 0.0))
 
 
-@njit(f"boolean(float64[::1], {_V2}, {_V2}, {_N2}, int64, int64, float64, float64, float64)", cache=True,
+@njit(f"boolean(float64[::1], {_X2}, {_X2}, {_N2}, int64, int64, float64, float64, float64)", cache=True,
       error_model="numpy")  # fmt: skip
 def _passes(b, x, ahead, corners, s, f, gap0, gap1, most):  # type: ignore[no-untyped-def]
     """Whether node s, at height ``gap0`` over face f and ``gap1`` at the end of the step, passes it, no deeper than
@@ -95,7 +95,7 @@ def _passes(b, x, ahead, corners, s, f, gap0, gap1, most):  # type: ignore[no-un
     return foot(b, x, ahead, s, i, j, k, tau)
 
 
-@njit(f"float64({_V2}, {_V2}, int64, int64, int64, int64, float64[::1])", cache=True, error_model="numpy")
+@njit(f"float64({_V2}, {_X2}, int64, int64, int64, int64, float64[::1])", cache=True, error_model="numpy")
 def _bent(normals, x, s, i, j, k, m):  # type: ignore[no-untyped-def]
     """Half of the D, m, that a face of normal m has to spare before node s faces it; none, or less, when it does.
 
@@ -112,7 +112,7 @@ def _bent(normals, x, s, i, j, k, m):  # type: ignore[no-untyped-def]
     return 0.5 * min(0.5 * turn * np.sqrt(ee * ff - ef * ef) / ((1.0 + _BEND) * sides), _BEND * sides)
 
 
-@njit(f"float64({_V2}, {_N2}, int64, int64, float64, float64[::1])", cache=True, error_model="numpy")
+@njit(f"float64({_X2}, {_N2}, int64, int64, float64, float64[::1])", cache=True, error_model="numpy")
 def _distance(x, corners, s, f, gap, b):  # type: ignore[no-untyped-def]
     """Of node s, at height ``gap``, from face f, m; ``b`` (3,): room."""
     i, j, k = corners[f, 0], corners[f, 1], corners[f, 2]

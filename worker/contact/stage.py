@@ -451,7 +451,7 @@ class Contact:
         if strayed > 0.5 * now.rules.skin or now.pending:
             registration.renew(now, crowd.x, crowd.v, strayed)
         now.reserve()
-        step = Step(crowd.x, crowd.v, crowd.x + dt * crowd.v, crowd.part, self._mu, self._give_back, dt)
+        step = Step.of(crowd.x, crowd.v, crowd.part, self._mu, self._give_back, dt)
         faces, table = now.face_table(), pairs.arrays()
         n, tested = node_face(now.room, 0, table, now.slot_table(), faces, step, tracks.end)
         pairs.tested = table.active[:tested]
