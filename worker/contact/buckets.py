@@ -16,6 +16,8 @@ _MOST = 2.0**20
 """Cells along an axis: codes of three stay far below 2^63."""
 _WIDE = 512
 """Cells of a box that is not entered: everybody asks it."""
+_CURVE_BITS = 12
+"""Of a coordinate on the curve."""
 _LEAST_BITS = 6
 """Of the hash."""
 
@@ -69,6 +71,26 @@ def sort(low: Floats, high: Floats, some: Indices, edge: float) -> Table:
 def bucket_of(x, origin, inverse, n):  # type: ignore[no-untyped-def]
     """Index of a coordinate along an axis, clamped to 0 ... n - 1."""
     return np.int64(min(max(np.floor((x - origin) * inverse), 0.0), n - 1.0))
+
+
+def curve(x: Floats, edge: float) -> Ints:
+    """(n,) place of each point (n, 3) on a curve that fills space (Morton 1966), by cells of ``edge``, m: what lies near
+    each other on it lies near each other.
+    """
+    if not len(x):
+        return np.zeros(0, np.int64)
+    return np.asarray(_interleaved(x, x.min(axis=0), 1.0 / edge))
+
+
+@njit("int64[::1](float64[:, ::1], float64[::1], float64)", cache=True)
+def _interleaved(x, origin, inverse):  # type: ignore[no-untyped-def]
+    codes = np.zeros(len(x), np.int64)
+    for a in range(len(x)):
+        for i in range(3):
+            cell = bucket_of(x[a, i], origin[i], inverse, 1 << _CURVE_BITS)
+            for bit in range(_CURVE_BITS):
+                codes[a] |= ((cell >> bit) & 1) << (3 * bit + i)
+    return codes
 
 
 @njit("int64(int64, int64)", cache=True)

@@ -13,6 +13,8 @@ _PARALLEL = 0.05
 """Sine of the angle below which edges are left to nodes and faces."""
 _ROUND = 0.01
 """Of the length of an edge: added to the distance at which a pair may meet."""
+_WORTH = 0.02
+"""The same: a pair with less to spare is tested in every step, which costs less than to measure it."""
 _X2, _V2, _N2 = "float64[:, :]", "float64[:, ::1]", "int32[:, ::1]"
 _PAIR = types.Tuple((types.int64, types.int64))  # type: ignore[no-untyped-call]
 
@@ -102,7 +104,7 @@ def edge_edge(out, n, pairs, edges, step, course, end):  # type: ignore[no-untyp
                 near, far = max(between(course, a, c), between(course, a, d)), between(course, b, c)
                 speed[p] = max(near, far, between(course, b, d))
             slack = segments(ahead, a, b, c, d) - (_ROUND + DEEP_SELF) * max(size[one], size[two])
-            until[p] = slack - left[one] - left[two] + speed[p] * end if slack > 0.0 else np.nan
+            until[p] = slack - left[one] - left[two] + speed[p] * end if slack > _WORTH * size[one] else np.nan
         for k in range(3):
             u0[k], w0[k], r0[k] = x[b, k] - x[a, k], x[d, k] - x[c, k], x[c, k] - x[a, k]
             u[k], w[k], r[k] = ahead[b, k] - ahead[a, k], ahead[d, k] - ahead[c, k], ahead[c, k] - ahead[a, k]

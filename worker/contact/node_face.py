@@ -17,6 +17,8 @@ FACING = 0.1
 their mean less their deviation comes below minus this."""
 _ROUND = 0.01
 """Of the size of a face: added to the distance at which a pair may meet."""
+_WORTH = 0.02
+"""Of the size of a face: a pair with less to spare is tested in every step, which costs less than to measure it."""
 _BEND = 0.1
 """Largest motion of two corners of a face against each other, of the face's two sides, that is allowed for."""
 
@@ -161,11 +163,11 @@ def node_face(out, n, pairs, slots, faces, step, end):  # type: ignore[no-untype
             if np.isnan(speed[p]) or turned[p]:
                 speed[p] = max(between(course, s, i), between(course, s, j), between(course, s, k))
             slack = _distance(ahead, corners, s, f, gap1, b) - (_ROUND + max(reach, NEAR)) * size[f]
-            turned[p] = not slack > 0.0
+            turned[p] = not slack > _WORTH * size[f]
             if turned[p]:
                 slack = _bent(normals, ahead, s, i, j, k, m)
                 speed[p] = max(between(course, i, j), between(course, i, k))
-            until[p] = slack - strayed[s] - left[f] + speed[p] * end if slack > 0.0 else np.nan
+            until[p] = slack - strayed[s] - left[f] + speed[p] * end if slack > _WORTH * size[f] else np.nan
         if not gap1 <= NEAR * size[f]:
             continue
         mean, least = facing(normals, s, m)

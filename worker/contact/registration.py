@@ -68,10 +68,8 @@ def carry(now: Scene, old: Scene) -> None:
     searched and what has to be registered, and the pairs of what is still there. The pairs of a copy were with the rank
     of its parent, and are with that of its own owner from now on.
     """
-    slots, faces = rows_of(now.crowd.id, old.crowd.id), rows_of(now.face_id, old.face_id)
-    order = np.argsort(_names(now))
-    edges = rows_of(_names(now)[order], _names(old))
-    edges = np.where(edges >= 0, order[edges], -1).astype(np.int32) if len(order) else edges
+    slots, faces = _numbers(now.crowd.id, old.crowd.id), _numbers(now.face_id, old.face_id)
+    edges = _numbers(_names(now), _names(old))
     now.tracks.take_over(slots, old.tracks)
     now.tracked[slots[slots >= 0]] = old.tracked[slots >= 0]
     now.until = old.until
@@ -82,6 +80,13 @@ def carry(now: Scene, old: Scene) -> None:
     mine = np.where(now.slave[slots], slots, -1).astype(np.int32)
     now.node_face = old.node_face.carried(mine, faces)
     now.edge_edge = old.edge_edge.carried(edges, edges)
+
+
+def _numbers(now: Ints, old: Ints) -> Indices:
+    """Where the names ``old`` stand among ``now``, -1 where they do not."""
+    order = np.argsort(now, kind="stable")
+    at = rows_of(now[order], old)
+    return np.where(at >= 0, order[at], -1).astype(np.int32) if len(order) else at
 
 
 def _names(scene: Scene) -> Ints:

@@ -10,7 +10,7 @@ from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum, same
 from ..parallel.tags import Tag
 from ..state import Flags, Floats, Indices, Ints, Nodes, among
-from . import domain, ghosts, search
+from . import buckets, domain, ghosts, search
 from .ghosts import Copies
 from .narrow_phase import DEEP, DEEP_SELF, ContactRows, EdgeTable, FaceTable, SlotTable
 from .pairs import PairTable
@@ -135,6 +135,8 @@ class Scene:
         """What has to be registered."""
         self.face_fresh, self.edge_fresh, self.node_fresh = np.zeros(f, bool), np.zeros(e, bool), np.zeros(n, bool)
         """Whose pairs have to be tested: new corners, newly exposed, other mean normals."""
+        self.edge_far = np.flatnonzero((self.edge_faces < 0).any(axis=1))
+        """Edges with a face that is not here."""
         self.tracked = np.zeros(n, bool)
         """(slots,) of what is searched."""
         self.on_surface = np.zeros(n, bool)
@@ -213,8 +215,7 @@ class Scene:
         """Faces of these ids become surface."""
         rows = self.rows_of(faces)
         self.face_exposed[rows] = self.face_fresh[rows] = True
-        far = (self.edge_faces < 0).any(axis=1)
-        if far.any():
+        if len(far := self.edge_far):
             self.edge_exposed[far] |= among(np.sort(faces), self.edge_sides[far].reshape(-1)).reshape(-1, 2)
         _expose(self.edge_exposed, self.edge_fresh, self.edge_faces, self.face_exposed)
         self.enliven(rows)
@@ -305,20 +306,24 @@ def build(sides: Sides, rules: Rules, horizon: float, drift: Floats, nodes: Node
     Who shares which node is settled by a Follower.
     """
     seen, sent = _with_ghosts(sides, rules, horizon, drift, comm) if comm.size > 1 else (sides, 0)
-    crowd, faces, edges = seen.crowd, seen.faces, seen.edges
+    order = np.argsort(buckets.curve(seen.crowd.x, rules.cell))
+    crowd, faces, edges = seen.crowd.take(order), seen.faces, seen.edges
+    slot = np.empty(crowd.n, np.int32)
+    slot[order] = np.arange(crowd.n)
+    corners, ends = slot[seen.face_places], slot[seen.edge_places]
     crowd.local = nodes.places(crowd.id)
     held = np.flatnonzero(crowd.local >= 0).astype(np.int32)
     place = np.full(nodes.n, -1, np.int32)
     place[crowd.local[held]] = held
     slave, pushes = np.zeros(crowd.n, bool), np.zeros(crowd.n, bool)
-    slave[crowd.places(sides.slaves)] = True
-    pushes[seen.face_places[:, :3]] = pushes[seen.edge_places[:, :2]] = True
+    slave[slot[seen.crowd.places(sides.slaves)]] = True
+    pushes[corners[:, :3]] = pushes[ends[:, :2]] = True
     rank = np.arange(edges.n)
     if edges.n > sides.edges.n:
         rank[np.lexsort((edges.sides[:, 1], edges.sides[:, 0]))] = np.arange(edges.n)
     return Scene(
-        crowd=crowd, held=held, local=crowd.local[held], faces=seen.face_places, face_id=faces.id, face_size=faces.size,
-        face_exposed=faces.exposed.copy(), edges=seen.edge_places, edge_sides=edges.sides,
+        crowd=crowd, held=held, local=crowd.local[held], faces=corners, face_id=faces.id, face_size=faces.size,
+        face_exposed=faces.exposed.copy(), edges=ends, edge_sides=edges.sides,
         edge_faces=rows_of(faces.id, edges.sides), edge_size=edges.size, edge_exposed=edges.exposed.copy(),
         edge_own=np.arange(edges.n) < sides.edges.n, edge_rank=rank, rules=rules, slave=slave,
         tracks=Tracks(crowd.x, crowd.course, faces.n, edges.n), drift=drift, until=horizon, faces_sent=sent, place=place,
