@@ -77,7 +77,7 @@ def _parts(case: Case) -> Iterator[Problem]:
             yield problem(("parts", i, "temperature"), part.temperature, message)
         yield from check_mesh(part.mesh, ("parts", i, "mesh"))
         if law is None and part.erosion is not None and part.erosion.plastic_strain is not None:
-            message = f"{part.material} has no strength, so it never strains plastically; remove the key"
+            message = f"{part.material} is elastic (no table strength) and never strains plastically; remove the key"
             yield problem(("parts", i, "erosion", "plastic_strain"), part.erosion.plastic_strain, message)
         yield from _fracture(part, known[part.material], ("parts", i, "fracture"))
         if part.turn is not None and not isinstance(part.mesh, MeshFile) and part.mesh.sector != "full":
@@ -91,7 +91,7 @@ def _fracture(part: Part, made: Material, location: Location) -> Iterator[Proble
     if spec is None:
         return
     if made.brittle is None:
-        message = f"{part.material} has no strength and fracture energy; give it a table brittle with strength, energy"
+        message = f"{part.material} cannot break: it has no table brittle with a tensile strength and a fracture energy"
         yield problem(location, ..., message)
     elif made.brittle.scatter is not None and made.brittle.scatter.minimum >= made.brittle.strength:
         message = f"must be below the strength, {made.brittle.strength:g} Pa"

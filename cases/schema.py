@@ -245,11 +245,15 @@ class Numerics(Model):
 Scale = Annotated[Ratio, Field(gt=0)]
 
 
+MOST_RANKS = 4096
+"""Of a run. Chosen: far beyond what has been run."""
+
+
 class Run(Model):
     """How long, on how many ranks, and what is written."""
 
     end_time: Annotated[Time, Positive]
-    ranks: Annotated[Count, Field(ge=1, le=4096)] = 1
+    ranks: Annotated[Count, Field(ge=1, le=MOST_RANKS)] = 1
     cut_scale: tuple[Scale, Scale, Scale] = (1.0, 1.0, 1.0)
     """Positions are multiplied by this before the mesh is cut for the ranks: no cut is made across a direction that is
     short then. Small along the way of an impact, every rank gets a share of where it happens. The answer does not
@@ -262,7 +266,7 @@ class Run(Model):
     max_wall_time: Annotated[Time, Positive] | None = None
     """Counted from the first step."""
     checkpoint_every: Annotated[Annotated[Time, Positive] | None, BeforeValidator(_off)] = 600.0
-    """Wall time between checkpoints; one is also written when a run is stopped by a signal or by ``max_wall_time``.
+    """Wall time between checkpoints; one is also written when a run is stopped on request or by ``max_wall_time``.
     ``"none"``: then alone."""
     residual_limit: Annotated[Ratio, Positive] = 0.05
     """The run fails with cause ``energy`` when the energy residual passes this."""

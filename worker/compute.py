@@ -14,7 +14,7 @@ from conoid.cases.outcome import Outcome
 from conoid.cases.run import State
 from conoid.cases.schema import Case
 
-from . import digest, reference, simulation
+from . import digest, domain, reference, simulation
 from .balance import Balance
 from .errors import InputError, PhysicsError
 from .jit import cpu_time
@@ -43,7 +43,7 @@ def compute(
     if restart:
         sim, start = _resumed(case, folder, comm)
     else:
-        sim = simulation.build(case, meshes, comm)
+        sim = simulation.build(case, meshes, comm, journal.starting if journal is not None else domain.quiet)
         start = Start(sim.model.elements_global, sim.model.nodes_global, reference.thicknesses(sim))
     if comm.rank == 0:
         rewind.rewind(folder, sim.clock.step, sim.clock.frame)
