@@ -10,8 +10,8 @@ from pydantic import BeforeValidator, Field
 
 from .bodies import Mesh
 from .materials import Material
-from .tables import Axis, Count, Direction, Model, Name, Point, Positive, Velocity
-from .units import Acceleration, AngularSpeed, Length, Rate, Ratio, Speed, Stress, Temperature, Time
+from .tables import Axis, Count, Direction, Model, Name, Point, Positive, Switch, Velocity
+from .units import Acceleration, Angle, AngularSpeed, Length, Rate, Ratio, Speed, Stress, Temperature, Time, Written
 
 
 def _off(value: Any) -> Any:
@@ -22,23 +22,29 @@ class Spin(Model):
     """Rigid rotation about a line through ``centre``; ``rate`` is the rotation vector, rad/s."""
 
     centre: Point
+    """A point of the line that the body turns about."""
     rate: tuple[AngularSpeed, AngularSpeed, AngularSpeed]
+    """Rotation vector: its direction is the axis, right-handed, its length the rate."""
 
 
 class Stretch(Model):
     """Uniform stretching: ``rate`` times the distance from ``centre`` is the velocity along each of x, y, z; 1/s."""
 
     centre: Point = (0.0, 0.0, 0.0)
+    """The point that stays where it is."""
     rate: tuple[Rate, Rate, Rate]
+    """Along each of x, y, z: positive stretches, negative shortens."""
 
 
 class Turn(Model):
     """A body is turned about the line along ``axis`` through ``centre`` before anything else, right-handed."""
 
     axis: Axis
-    angle: Ratio
-    """rad; ``"45 deg"``."""
+    """Direction of the line."""
+    angle: Angle
+    """Right-handed: ``"45 deg"``."""
     centre: Point = (0.0, 0.0, 0.0)
+    """A point of the line."""
 
 
 class Erosion(Model):
@@ -81,45 +87,64 @@ class Fracture(Model):
     resolve: Literal["none", "strength"] = "none"
     """``strength`` lowers the strength until ``resolution`` elements fit in the cohesive zone, with the same energy."""
     resolution: Annotated[Ratio, Positive] = 3.0
+    """Elements that shall fit in the cohesive zone, with ``resolve = "strength"``."""
 
 
 class Part(Model):
     """A body: where it is, what it is made of, how it moves at the start."""
 
     name: Name
+    """For messages, results and the keys that name parts; each part has its own."""
     material: Name
     """A name from ``[materials]`` of the case or from the library."""
     mesh: Mesh
+    """The body, where it lies and how fine it is; ``shape`` says which kind."""
     turn: Turn | None = None
-    """Only whole bodies can be turned, no sectors."""
+    """How the body is turned out of the axes.
+    Only whole bodies can be turned, no sectors."""
     velocity: Velocity = (0.0, 0.0, 0.0)
+    """Of the whole body at the start, along x, y, z."""
     spin: Spin | None = None
+    """A rotation at the start, besides ``velocity``."""
     stretch: Stretch | None = None
+    """A stretching at the start, besides ``velocity``."""
     jitter: Annotated[Speed, Field(ge=0)] = 0.0
     """Each node starts with a random velocity besides, each component between minus and plus this: the same in every
     run."""
     temperature: Annotated[Temperature, Field(ge=0)] = 293.15
+    """At the start; of meaning for Johnson-Cook's law."""
     erosion: Erosion | None = None
+    """With this table the part's own tets leave where they are worn out; without it none of its tets ever does."""
     fracture: Fracture | None = None
+    """With this table the part breaks; its material must be ``brittle``."""
 
 
 class Symmetry(Model):
     """Nodes that start on the plane ``axis = at`` stay on it; no friction. All parts when ``parts`` is empty."""
 
     kind: Literal["symmetry"]
+    """The kind of boundary."""
     axis: Axis
+    """The normal of the plane."""
     at: Length = 0.0
+    """Where the plane cuts the axis."""
     parts: tuple[Name, ...] = ()
+    """Parts that it holds; all when empty."""
 
 
 class Wall(Model):
     """A rigid, fixed, frictionless half-space: nodes cannot go to the side that ``normal`` points away from."""
 
     kind: Literal["wall"]
+    """The kind of boundary."""
     name: Name = "wall"
+    """For messages; each wall has its own."""
     point: Point
+    """Any point of the wall's surface."""
     normal: Direction
+    """Points out of the wall, to the side where bodies are; its length does not count."""
     parts: tuple[Name, ...] = ()
+    """Parts that it stops; all when empty."""
 
 
 class Prescribed(Model):
@@ -129,28 +154,41 @@ class Prescribed(Model):
     """
 
     kind: Literal["velocity"]
+    """The kind of boundary."""
     parts: tuple[Name, ...] = ()
+    """Parts that it moves; all when empty."""
     low: Point | None = None
+    """Lowest corner of the box; with ``high``."""
     high: Point | None = None
+    """Highest corner of the box; with ``low``."""
     x: Speed | None = None
+    """Velocity along x; without it the nodes are free along x."""
     y: Speed | None = None
+    """Velocity along y; without it the nodes are free along y."""
     z: Speed | None = None
+    """Velocity along z; without it the nodes are free along z."""
 
 
 class Rotation(Model):
     """All nodes of the parts turn rigidly, exactly, at the given spin."""
 
     kind: Literal["rotation"]
+    """The kind of boundary."""
     parts: tuple[Name, ...] = ()
+    """Parts that turn; all when empty."""
     spin: Spin
+    """The line that they turn about, and how fast."""
 
 
 class Gravity(Model):
     """A constant acceleration of all nodes of the parts, of all parts when ``parts`` is empty."""
 
     kind: Literal["gravity"]
+    """The kind of boundary."""
     acceleration: tuple[Acceleration, Acceleration, Acceleration]
+    """Along x, y, z; not zero."""
     parts: tuple[Name, ...] = ()
+    """Parts that it acts on; all when empty."""
 
 
 class Traction(Model):
@@ -158,10 +196,15 @@ class Traction(Model):
     of the parts when absent): constant from the first moment on, and turning with nothing."""
 
     kind: Literal["traction"]
+    """The kind of boundary."""
     stress: tuple[Stress, Stress, Stress]
+    """Force per area along x, y, z; not zero."""
     parts: tuple[Name, ...] = ()
+    """Parts that it acts on; all when empty."""
     low: Point | None = None
+    """Lowest corner of the box; with ``high``."""
     high: Point | None = None
+    """Highest corner of the box; with ``low``."""
 
 
 Boundary = Annotated[Symmetry | Wall | Prescribed | Rotation | Gravity | Traction, Field(discriminator="kind")]
@@ -171,7 +214,9 @@ class ContactPair(Model):
     """Two parts whose friction differs from that of the others."""
 
     parts: tuple[Name, Name]
+    """The names of the two."""
     friction: Annotated[Ratio, Field(ge=0)]
+    """Coulomb's coefficient between them."""
 
 
 class Contact(Model):
@@ -184,10 +229,13 @@ class Contact(Model):
     friction: Annotated[Ratio, Field(ge=0)] = 0.0
     """Coulomb's coefficient."""
     pairs: tuple[ContactPair, ...] = ()
+    """Pairs of parts with a friction of their own."""
     edges: bool = True
     """Whether sharp edges meet edges."""
     overlap: Literal["refuse", "push"] = "refuse"
-    """What becomes of bodies that overlap at the start: an error, or they are moved apart without a stress."""
+    """What becomes of bodies that overlap at the start: ``refuse`` ends with an error, ``push`` moves them apart
+    without a stress. A body overlaps another where a node of its surface lies inside the other, deeper than a millionth
+    of the size of a face: bodies that touch do not. Parts that do not meet each other may overlap."""
     sweeps: Annotated[Count, Field(ge=1, le=1000)] = 5
     """Jacobi sweeps over the meetings of a step."""
     skin: Annotated[Ratio, Positive] = 0.4
@@ -212,10 +260,15 @@ class Probe(Model):
     """
 
     name: Name
+    """Of the column, and for references."""
     part: Name
+    """Whose tets are measured."""
     field: ProbeField
+    """What is measured."""
     low: Point | None = None
+    """Lowest corner of the box; with ``high``."""
     high: Point | None = None
+    """Highest corner of the box; with ``low``."""
 
 
 class Viscosity(Model):
@@ -225,7 +278,9 @@ class Viscosity(Model):
     """
 
     linear: Annotated[Ratio, Field(ge=0)] = 0.06
+    """Coefficient of the linear term: damps ringing behind a front."""
     quadratic: Annotated[Ratio, Field(ge=0)] = 1.5
+    """Coefficient of the quadratic term: spreads a shock over some tets."""
 
 
 class Numerics(Model):
@@ -234,7 +289,7 @@ class Numerics(Model):
     pressure: Literal["standard", "nodal", "split"] = "nodal"
     """``standard``: pressure from each tet (locks in plastic flow). ``nodal``: averaged nodal pressure. ``split``: the
     operator split, stabilised by pressure-gradient projection."""
-    viscosity: Annotated[Viscosity | None, BeforeValidator(_off)] = Viscosity()
+    viscosity: Annotated[Viscosity | None, BeforeValidator(_off), Switch()] = Viscosity()
     """``viscosity = "none"`` switches it off."""
     dt_safety: Annotated[Ratio, Field(gt=0, le=1)] = 0.9
     """Share of the rigorous element bound 1 / (c sqrt(sum |grad N|^2))."""
@@ -253,7 +308,9 @@ class Run(Model):
     """How long, on how many ranks, and what is written."""
 
     end_time: Annotated[Time, Positive]
+    """Simulated time at which the run ends; it begins at 0."""
     ranks: Annotated[Count, Field(ge=1, le=MOST_RANKS)] = 1
+    """MPI processes that share the work. The answer does not depend on it."""
     cut_scale: tuple[Scale, Scale, Scale] = (1.0, 1.0, 1.0)
     """Positions are multiplied by this before the mesh is cut for the ranks: no cut is made across a direction that is
     short then. Small along the way of an impact, every rank gets a share of where it happens. The answer does not
@@ -263,9 +320,11 @@ class Run(Model):
     samples: Annotated[Count, Field(ge=1, le=1_000_000)] = 500
     """Number of lines of history.csv, evenly spaced."""
     max_steps: Annotated[Count, Field(ge=1)] = 100_000_000
+    """The run fails when it needs more."""
     max_wall_time: Annotated[Time, Positive] | None = None
-    """Counted from the first step."""
-    checkpoint_every: Annotated[Annotated[Time, Positive] | None, BeforeValidator(_off)] = 600.0
+    """The run stops, with a checkpoint, when it has taken longer.
+    Counted from the first step."""
+    checkpoint_every: Annotated[Annotated[Time, Positive] | None, BeforeValidator(_off), Switch()] = 600.0
     """Wall time between checkpoints; one is also written when a run is stopped on request or by ``max_wall_time``.
     ``"none"``: then alone."""
     residual_limit: Annotated[Ratio, Positive] = 0.05
@@ -280,7 +339,9 @@ class Balance(Model):
     rank has more than ``alpha`` times the outside nodes that it had at the last cut (Moon, Kim and Lee's trigger).
     ``every``: each so many steps."""
     alpha: Annotated[Ratio, Field(gt=1)] = 1.2
+    """Of ``policy = "outside"``: growth that a rank may have before it is cut anew."""
     every: Annotated[Count, Field(ge=1)] = 1000
+    """Of ``policy = "every"``: steps between two cuts."""
     weights: Literal["measured", "outside", "tets"] = "measured"
     """What is divided evenly: CPU time as measured, outside nodes, or tets."""
 
@@ -306,15 +367,23 @@ class Reference(Model):
     """
 
     quantity: Quantity
-    value: float
-    tolerance: Annotated[float, Positive]
+    """What is measured of the run."""
+    value: Annotated[float, Written("the quantity's")]
+    """What it should be; its unit is that of the quantity."""
+    tolerance: Annotated[float, Written("the quantity's"), Positive]
     """Absolute, in SI as ``value``."""
     source: str
+    """Where the number comes from."""
     part: Name | None = None
+    """Of which part, for quantities of a part."""
     probe: Name | None = None
+    """Of which probe, for ``probe_mean``, ``probe_max`` and ``probe_min``."""
     axis: Axis | None = None
+    """Along or round which axis, for ``extent``, ``radius``, ``speed_mean`` and ``penetration``."""
     since: Time = 0.0
+    """Begin of the window of ``probe_*``."""
     until: Time | None = None
+    """End of the window of ``probe_*``; the end of the run when absent."""
 
 
 Kind = TypeVar("Kind", Symmetry, Wall, Prescribed, Rotation, Gravity, Traction)
@@ -324,18 +393,30 @@ class Case(Model):
     """A whole case."""
 
     name: Name
+    """Of the case and of its runs."""
     title: str = ""
+    """One line for people."""
     description: str = ""
+    """What the case shows, for people."""
     materials: dict[Name, Material] = Field(default_factory=dict)
+    """Materials of the case's own, each under its name; they win over those of the library."""
     parts: Annotated[tuple[Part, ...], Field(min_length=1, max_length=256)]
+    """The bodies, in TOML one ``[[parts]]`` each."""
     boundaries: tuple[Boundary, ...] = ()
-    contact: Annotated[Contact | None, BeforeValidator(_off)] = Contact()
-    """``contact = "none"`` lets bodies pass through each other. A single part meets only itself, if it may."""
+    """What holds or drives nodes, in TOML one ``[[boundaries]]`` each; ``kind`` says which."""
+    contact: Annotated[Contact | None, BeforeValidator(_off), Switch()] = Contact()
+    """How bodies meet; they do by default. ``contact = "none"`` lets them pass through each other. A single part meets
+    only itself, if it may."""
     probes: tuple[Probe, ...] = ()
+    """Columns of history.csv, in TOML one ``[[probes]]`` each."""
     numerics: Numerics = Numerics()
+    """Pressure form, viscosity, time step."""
     run: Run
+    """The end, the ranks, what is written, when to stop."""
     balance: Balance = Balance()
+    """When tets move to other ranks."""
     reference: tuple[Reference, ...] = ()
+    """Numbers that the run is compared with, in TOML one ``[[reference]]`` each."""
 
     def boundaries_of(self, kind: type[Kind]) -> list[tuple[int, Kind]]:
         """The boundaries of one kind, each with its place in ``boundaries``."""

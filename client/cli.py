@@ -2,6 +2,7 @@
 
 import os
 import sys
+from importlib import metadata
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,7 +15,7 @@ from conoid.cases.estimate import estimate
 from conoid.cases.load import CaseError
 from conoid.cases.run import ExitCode, State
 
-from . import benches, reports, tables
+from . import benches, reports, shelf, tables
 from .errors import ClientError, ServiceError
 from .live import Live, exit_code
 from .once import run_once
@@ -48,10 +49,26 @@ class Guarded(TyperGroup):
 
 
 app = typer.Typer(
-    cls=Guarded, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
+    cls=Guarded, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None,
     help="Impact simulations: submit them, watch them, look at them.",
 )  # fmt: skip
 app.add_typer(benches.bench, name="bench")
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"conoid {metadata.version('conoid')}")
+        raise typer.Exit
+
+
+@app.callback()
+def every(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and end.")
+    ] = False,
+) -> None:
+    """Impact simulations: submit them, watch them, look at them."""
+
 
 RunArgument = Annotated[str, typer.Argument(metavar="RUN", help="The id of a run, or 'last'.")]
 FieldOption = Annotated[str, typer.Option("--field", help=f"What to colour by: {', '.join(FIELDS)}.")]
@@ -274,6 +291,11 @@ def run_case(
     """Do it all here: start a server, submit, watch, check, draw, stop the server. Ctrl-C cancels the run."""
     chosen = [*(overrides or ()), *([f"run.ranks={ranks}"] if ranks is not None else [])]
     raise typer.Exit(run_once(case, chosen, out, picture, field, plain=plain, check=check, as_json=as_json))
+
+
+app.add_typer(shelf.cases, name="cases")
+app.command(short_help="Print the keys of a case, for editors or people.")(shelf.schema)
+app.command(short_help="List the material library, or one material.")(shelf.materials)
 
 
 def main() -> None:

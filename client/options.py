@@ -9,6 +9,8 @@ import msgspec
 import typer
 from rich.console import Console, RenderableType
 
+from conoid.cases.load import materials, shipped
+
 from .errors import ClientError
 from .result import Result
 from .run import Run
@@ -17,7 +19,36 @@ from .session import Session, connect
 Url = Annotated[str | None, typer.Option("--url", help="The server [CONOID_URL, or the configuration file].")]
 Token = Annotated[str | None, typer.Option("--token", help="Who asks [CONOID_TOKEN, or the configuration file].")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
-CaseArgument = Annotated[str, typer.Argument(metavar="CASE", help="A .toml or .json file, or a shipped case by name.")]
+
+
+def complete_cases(incomplete: str) -> list[str]:
+    """Names of shipped cases, for the shell."""
+    return [name for name in shipped() if name.startswith(incomplete)]
+
+
+def complete_materials(incomplete: str) -> list[str]:
+    """Names of the material library, for the shell."""
+    return [name for name in materials() if name.startswith(incomplete)]
+
+
+def _complete_files(incomplete: str) -> list[str]:
+    """Shipped cases, case files and folders, for the shell."""
+    folder, _, start = incomplete.rpartition("/")
+    try:
+        found = sorted(Path(folder or ("/" if incomplete.startswith("/") else ".")).iterdir())
+    except OSError:
+        found = []
+    near = [path for path in found if path.name.startswith(start) and not path.name.startswith(".")]
+    files = [path for path in near if path.suffix in (".toml", ".json") or path.is_dir()]
+    return [*complete_cases(incomplete), *(f"{path}/" if path.is_dir() else str(path) for path in files)]
+
+
+CaseArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="CASE", help="A .toml or .json file, or a shipped case by name.", autocompletion=_complete_files
+    ),
+]
 Overrides = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Change a key of the case, as run.end_time='20 us'."),

@@ -4,8 +4,10 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Response
 
+from conoid.cases import reference
 from conoid.cases.load import CaseError, read_case, shipped
 
+from .. import openapi
 from ..auth import Reader, Submitter
 from ..errors import entry, not_found
 from ..limits import figures
@@ -15,7 +17,7 @@ from .runs import Body
 router = APIRouter()
 
 
-@router.post("/v1/cases:validate")
+@router.post("/v1/cases:validate", openapi_extra=openapi.CASE_BODY)
 def validate(
     service: ServiceOf, identity: Submitter, body: Body, content_type: Annotated[str, Header()] = ""
 ) -> dict[str, Any]:
@@ -26,6 +28,12 @@ def validate(
         return {"valid": False, "problems": [entry(problem) for problem in error.problems]}
     case = reading.case.model_dump(mode="json")
     return {"valid": True, "problems": [], "estimate": figures(reading.estimate), "case": case}
+
+
+@router.get("/v1/case.schema.json")
+def schema() -> Response:
+    """The JSON schema of a case: the file that the first line of a shipped case names. Asks for no token."""
+    return Response(reference.schema_text(), media_type="application/schema+json")
 
 
 @router.get("/v1/cases")
