@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from .reference import Schema, definition, json_schema, variants
-from .units import KINDS, UNITS, parse_unit
+from .units import KINDS, QUANTITY, UNITS, parse_unit
 
 _TAGS = ("shape", "kind", "model")
 _HEAD = """# The keys of a case
@@ -161,7 +161,7 @@ def _scalar(schema: Schema) -> str:
 def _noun(unit: str) -> str:
     if unit == "":
         return "a number"
-    if "'" in unit:
+    if unit == QUANTITY:
         return f"a number, or text in {unit} unit"
     noun = "an angle" if unit == "rad" else KINDS[parse_unit(unit)[1]]
     return f"{noun}, {unit}"

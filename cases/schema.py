@@ -11,7 +11,20 @@ from pydantic import BeforeValidator, Field
 from .bodies import Mesh
 from .materials import Material
 from .tables import Axis, Count, Direction, Model, Name, Point, Positive, Switch, Velocity
-from .units import Acceleration, Angle, AngularSpeed, Length, Rate, Ratio, Speed, Stress, Temperature, Time, Written
+from .units import (
+    QUANTITY,
+    Acceleration,
+    Angle,
+    AngularSpeed,
+    Length,
+    Rate,
+    Ratio,
+    Speed,
+    Stress,
+    Temperature,
+    Time,
+    Written,
+)
 
 
 def _off(value: Any) -> Any:
@@ -234,8 +247,9 @@ class Contact(Model):
     """Whether sharp edges meet edges."""
     overlap: Literal["refuse", "push"] = "refuse"
     """What becomes of bodies that overlap at the start: ``refuse`` ends with an error, ``push`` moves them apart
-    without a stress. A body overlaps another where a node of its surface lies inside the other, deeper than a millionth
-    of the size of a face: bodies that touch do not. Parts that do not meet each other may overlap."""
+    without a stress. A body overlaps another where their primitives reach into each other, or where a node of its
+    surface lies inside the mesh of the other, deeper than a millionth of the size of a face: bodies that touch do not.
+    Parts that do not meet each other may overlap."""
     sweeps: Annotated[Count, Field(ge=1, le=1000)] = 5
     """Jacobi sweeps over the meetings of a step."""
     skin: Annotated[Ratio, Positive] = 0.4
@@ -368,9 +382,9 @@ class Reference(Model):
 
     quantity: Quantity
     """What is measured of the run."""
-    value: Annotated[float, Written("the quantity's")]
+    value: Annotated[float, Written(QUANTITY)]
     """What it should be; its unit is that of the quantity."""
-    tolerance: Annotated[float, Written("the quantity's"), Positive]
+    tolerance: Annotated[float, Written(QUANTITY), Positive]
     """Absolute, in SI as ``value``."""
     source: str
     """Where the number comes from."""

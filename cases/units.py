@@ -54,6 +54,8 @@ _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.
 NUMBER = r"^\s*[+-]?(\d+\.?\d*|\.\d+)"
 """How the text of a quantity begins, for the JSON schema."""
 _FACTOR = re.compile(r"\s*([*/·]?)\s*([A-Za-zµ%]+|1)(?:\^([+-]?\d))?")
+QUANTITY = "the quantity's"
+"""Stands for the unit of a number whose unit another key decides."""
 _LONGEST = 80
 """Characters of a quantity that are read: longer than any number with its unit. Chosen, so that a text that is no
 quantity costs no time."""

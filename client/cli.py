@@ -12,18 +12,19 @@ from typer.core import TyperGroup
 
 from conoid.cases import layout
 from conoid.cases.estimate import estimate
-from conoid.cases.load import CaseError
+from conoid.cases.load import CaseError, parse_case
+from conoid.cases.plausible import doubts
 from conoid.cases.run import ExitCode, State
 
 from . import benches, reports, shelf, tables
 from .errors import ClientError, ServiceError
 from .live import Live, exit_code
 from .once import run_once
-from .options import CaseArgument, Json, Overrides, Token, Url, complain, find, show, show_json
+from .options import CaseArgument, Json, Overrides, Token, Url, complain, find, show, show_json, warn, warn_of
 from .pictures import FIELDS
 from .run import Run
 from .session import connect
-from .submission import case_of, locate
+from .submission import data_of, locate
 from .view import view
 from .watch import watch
 
@@ -89,13 +90,21 @@ def serve(ctx: typer.Context) -> None:
 
 @app.command(short_help="Check a case and estimate what it needs.")
 def validate(case: CaseArgument, overrides: Overrides = None, as_json: Json = False) -> None:
-    """Check a case and estimate what it needs; no server is asked."""
-    checked = case_of(case, overrides or ())
+    """Check a case: what is wrong with it, what is odd, what its parts bring along and what it needs.
+
+    No server is asked. Warnings go to standard error and leave the exit code 0.
+    """
+    data = data_of(case, overrides or ())
+    checked = parse_case(data)
     expected = estimate(checked, locate(case).parent)
+    odd = doubts(data, checked, expected)
     if as_json:
-        show_json({"name": checked.name, "valid": True, "estimate": expected})
+        show_json({"name": checked.name, "valid": True, "warnings": odd, "estimate": expected})
         return
-    show(f"{checked.name}: valid")
+    warn(odd)
+    show(f"{checked.name}: valid{f', {len(odd)} warning' + 's' * (len(odd) > 1) if odd else ''}")
+    show(tables.parts_table(checked, expected))
+    show("")
     show(tables.estimate_table(expected))
 
 
@@ -109,6 +118,7 @@ def submit(
     as_json: Json = False,
 ) -> None:
     """Hand a case to the server; prints the run's id."""
+    warn_of(case, overrides or ())
     with connect(url, token) as session:
         run = session.submit(case, overrides or (), key)
         if as_json:
@@ -290,6 +300,7 @@ def run_case(
 ) -> None:
     """Do it all here: start a server, submit, watch, check, draw, stop the server. Ctrl-C cancels the run."""
     chosen = [*(overrides or ()), *([f"run.ranks={ranks}"] if ranks is not None else [])]
+    warn_of(case, chosen)
     raise typer.Exit(run_once(case, chosen, out, picture, field, plain=plain, check=check, as_json=as_json))
 
 

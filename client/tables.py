@@ -11,6 +11,7 @@ from conoid.cases.estimate import Estimate, estimate
 from conoid.cases.library import Constant
 from conoid.cases.materials import Material
 from conoid.cases.outcome import Check, Outcome
+from conoid.cases.placed import Bulk
 from conoid.cases.run import State
 from conoid.cases.schema import Case
 
@@ -86,6 +87,29 @@ def estimate_table(expected: Estimate) -> Table:
         "memory": _about(expected.memory_bytes, lambda value: si(value, "B")),
         "core time": _about(expected.core_seconds, duration),
     })  # fmt: skip
+
+
+def parts_table(case: Case, expected: Estimate) -> Table:
+    """What is modelled of each part, about: its size, and what it brings along at the start."""
+    right = ("tets", "mass", "extent", "momentum", "energy")
+    made = table("part", "material", *right, right=right, wide="material")
+    for part, size in zip(case.parts, expected.parts, strict=True):
+        tets = "–" if size.elements is None else count(size.elements)
+        made.add_row(part.name, part.material, tets, *(_brings(size.bulk) if size.bulk is not None else "–" * 4))
+    return made
+
+
+def _brings(bulk: Bulk) -> tuple[str, str, str, str]:
+    """Mass, extent, momentum and kinetic energy."""
+    mass = si(1e3 * bulk.mass, "g") if bulk.mass < 1.0 else f"{bulk.mass:.3g} kg"
+    momentum = math.hypot(*bulk.momentum)
+    return mass, _extent(bulk.extent), si(momentum, "N s"), si(bulk.energy, "J")
+
+
+def _extent(lengths: tuple[float, float, float]) -> str:
+    """``6 x 6 x 30 mm``."""
+    unit, scale = next(((u, s) for u, s in (("m", 1.0), ("mm", 1e3)) if max(lengths) * s >= 1.0), ("µm", 1e6))
+    return f"{' x '.join(f'{scale * length:.3g}' for length in lengths)} {unit}"
 
 
 def _about(value: float | None, shown: Callable[[float], str]) -> str:

@@ -104,9 +104,11 @@ def test_names_are_unique() -> None:
     found = [(p.key, p.message) for p in problems(*_as_overrides(data))]
     assert found == [
         ("parts[1].name", "parts[0] has this name; give each its own"),
+        ("parts[1].mesh", found[1][1]),
         ("boundaries[3].name", "an earlier wall has this name; give each its own"),
         ("probes[1].name", "probes[0] has this name; give each its own"),
     ]
+    assert "overlaps" in found[1][1]
 
 
 def _as_overrides(data: dict[str, object]) -> list[str]:

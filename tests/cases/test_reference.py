@@ -63,7 +63,7 @@ def test_every_table_has_a_text_and_its_keys_on_the_page() -> None:
             "`parts[].erosion`",
             "| `volume` | list of: a number, above 0 and below 1; a number, above 1 | `[0.1, 10]` |",
         ),
-        ("`contact`", "A body overlaps another where a node of its surface lies inside the other"),
+        ("`contact`", "A body overlaps another where their primitives reach into each other"),
         ("`numerics`", '| `viscosity` | table `numerics.viscosity` or `"none"` | its defaults |'),
         ('`boundaries[]` with `kind = "rotation"`', "| `spin` | table `parts[].spin` | required |"),
     ],

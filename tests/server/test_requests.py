@@ -430,3 +430,11 @@ def test_the_schema_that_a_shipped_case_names_is_served_beside_it(server: Runnin
     first = server.ann.http.get("/v1/cases/demo").text.splitlines()[0]
     assert first == "#:schema ../case.schema.json"
     assert server.ann.http.get("/v1/cases/../case.schema.json").json() == json_schema()
+
+
+def test_a_case_that_may_be_run_is_doubted_all_the_same(server: Running) -> None:
+    text = case_text(end_time="1 us").replace('"1 us"', "1e-6")
+    verdict = server.ann.http.post("/v1/cases:validate", content=text, headers=TOML).json()
+    assert verdict["valid"]
+    odd = {each["key"]: each["message"] for each in verdict["warnings"]}
+    assert odd["run.end_time"] == "no unit, taken for 1e-06 s"
