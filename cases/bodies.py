@@ -35,7 +35,8 @@ class Primitive(Model):
     element_size: Annotated[Length, Positive]
     """Edge of a tet, about; not above the smallest extent of the body."""
     generator: Literal["gmsh", "structured"] = "gmsh"
-    """``gmsh`` makes unstructured meshes; ``structured`` cuts the cells of a regular grid into tets."""
+    """``gmsh`` makes unstructured meshes; ``structured`` cuts the cells of a regular grid into tets, but
+    for spheres."""
     split: Literal[5, 6] = 6
     """Tets per hexahedron of the structured generator."""
     sector: Literal["full", "half", "quarter"] = "full"
@@ -166,7 +167,7 @@ class TwoTets(Loose):
     axis: Axis = "z"
     """Normal of the common face."""
     lean: Annotated[Angle, Field(ge=0, le=1.1)] = 0.0
-    """rad; ``"30 deg"``. The tets keep their altitude, and are regular when they do not lean."""
+    """``"30 deg"``: the tets keep their altitude, and are regular when they do not lean."""
 
 
 class Shards(Loose):

@@ -105,7 +105,7 @@ class _Page:
 
     def _value(self, schema: Schema) -> str:
         """What a key takes, in words."""
-        return " or ".join(dict.fromkeys(self._one(variant) for variant in variants(schema)))
+        return " or ".join(dict.fromkeys(self._one(variant) for variant in variants(schema))) or "nothing"
 
     def _one(self, schema: Schema) -> str:
         meant = definition(schema, self._whole)

@@ -1,7 +1,8 @@
 """What a case is. Frozen models, unknown keys forbidden, every quantity in SI once read.
 
 ``parse_case`` in ``cases/load.py`` is the way in: it reads TOML or JSON and reports every error at once. Bodies and
-their meshes are in ``cases/bodies.py``, materials in ``cases/materials.py``.
+their meshes are in ``cases/bodies.py``, how they move in ``motion``, materials in ``materials``, what holds them in
+``boundaries``, what is measured in ``measures``.
 """
 
 from typing import Annotated, Any, Literal, TypeVar
@@ -9,55 +10,22 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import BeforeValidator, Field
 
 from .bodies import Mesh
+from .boundaries import Boundary, Gravity, Prescribed, Rotation, Symmetry, Traction, Wall
 from .materials import Material
-from .tables import Axis, Count, Direction, Model, Name, Point, Positive, Switch, Velocity
-from .units import (
-    QUANTITY,
-    Acceleration,
-    Angle,
-    AngularSpeed,
-    Length,
-    Rate,
-    Ratio,
-    Speed,
-    Stress,
-    Temperature,
-    Time,
-    Written,
-)
+from .measures import Probe, Reference
+from .motion import Spin, Stretch, Turn
+from .tables import Count, Model, Name, Positive, Switch, Velocity
+from .units import Ratio, Speed, Temperature, Time
+
+__all__ = [
+    "MOST_RANKS", "Balance", "Boundary", "Case", "Contact", "ContactPair", "Erosion", "Fracture", "Gravity", "Numerics",
+    "Part", "Prescribed", "Probe", "Reference", "Rotation", "Run", "Spin", "Stretch", "Symmetry", "Traction", "Turn",
+    "Viscosity", "Wall",
+]  # fmt: skip
 
 
 def _off(value: Any) -> Any:
     return None if value == "none" else value
-
-
-class Spin(Model):
-    """Rigid rotation about a line through ``centre``; ``rate`` is the rotation vector, rad/s."""
-
-    centre: Point
-    """A point of the line that the body turns about."""
-    rate: tuple[AngularSpeed, AngularSpeed, AngularSpeed]
-    """Rotation vector: its direction is the axis, right-handed, its length the rate."""
-
-
-class Stretch(Model):
-    """Uniform stretching: ``rate`` times the distance from ``centre`` is the velocity along each of x, y, z; 1/s."""
-
-    centre: Point = (0.0, 0.0, 0.0)
-    """The point that stays where it is."""
-    rate: tuple[Rate, Rate, Rate]
-    """Along each of x, y, z: positive stretches, negative shortens."""
-
-
-class Turn(Model):
-    """A body is turned about the line along ``axis`` through ``centre`` before anything else, right-handed."""
-
-    axis: Axis
-    """Direction of the line."""
-    angle: Angle
-    """Right-handed: ``"45 deg"``."""
-    centre: Point = (0.0, 0.0, 0.0)
-    """A point of the line."""
 
 
 class Erosion(Model):
@@ -132,97 +100,6 @@ class Part(Model):
     """With this table the part breaks; its material must be ``brittle``."""
 
 
-class Symmetry(Model):
-    """Nodes that start on the plane ``axis = at`` stay on it; no friction. All parts when ``parts`` is empty."""
-
-    kind: Literal["symmetry"]
-    """The kind of boundary."""
-    axis: Axis
-    """The normal of the plane."""
-    at: Length = 0.0
-    """Where the plane cuts the axis."""
-    parts: tuple[Name, ...] = ()
-    """Parts that it holds; all when empty."""
-
-
-class Wall(Model):
-    """A rigid, fixed, frictionless half-space: nodes cannot go to the side that ``normal`` points away from."""
-
-    kind: Literal["wall"]
-    """The kind of boundary."""
-    name: Name = "wall"
-    """For messages; each wall has its own."""
-    point: Point
-    """Any point of the wall's surface."""
-    normal: Direction
-    """Points out of the wall, to the side where bodies are; its length does not count."""
-    parts: tuple[Name, ...] = ()
-    """Parts that it stops; all when empty."""
-
-
-class Prescribed(Model):
-    """Nodes that start inside the box ``low``..``high`` (all of the parts when absent) move with a given velocity.
-
-    Only the components that are given are prescribed.
-    """
-
-    kind: Literal["velocity"]
-    """The kind of boundary."""
-    parts: tuple[Name, ...] = ()
-    """Parts that it moves; all when empty."""
-    low: Point | None = None
-    """Lowest corner of the box; with ``high``."""
-    high: Point | None = None
-    """Highest corner of the box; with ``low``."""
-    x: Speed | None = None
-    """Velocity along x; without it the nodes are free along x."""
-    y: Speed | None = None
-    """Velocity along y; without it the nodes are free along y."""
-    z: Speed | None = None
-    """Velocity along z; without it the nodes are free along z."""
-
-
-class Rotation(Model):
-    """All nodes of the parts turn rigidly, exactly, at the given spin."""
-
-    kind: Literal["rotation"]
-    """The kind of boundary."""
-    parts: tuple[Name, ...] = ()
-    """Parts that turn; all when empty."""
-    spin: Spin
-    """The line that they turn about, and how fast."""
-
-
-class Gravity(Model):
-    """A constant acceleration of all nodes of the parts, of all parts when ``parts`` is empty."""
-
-    kind: Literal["gravity"]
-    """The kind of boundary."""
-    acceleration: tuple[Acceleration, Acceleration, Acceleration]
-    """Along x, y, z; not zero."""
-    parts: tuple[Name, ...] = ()
-    """Parts that it acts on; all when empty."""
-
-
-class Traction(Model):
-    """A force per initial area, Pa, on the exposed faces whose three nodes start inside the box ``low``..``high`` (all
-    of the parts when absent): constant from the first moment on, and turning with nothing."""
-
-    kind: Literal["traction"]
-    """The kind of boundary."""
-    stress: tuple[Stress, Stress, Stress]
-    """Force per area along x, y, z; not zero."""
-    parts: tuple[Name, ...] = ()
-    """Parts that it acts on; all when empty."""
-    low: Point | None = None
-    """Lowest corner of the box; with ``high``."""
-    high: Point | None = None
-    """Highest corner of the box; with ``low``."""
-
-
-Boundary = Annotated[Symmetry | Wall | Prescribed | Rotation | Gravity | Traction, Field(discriminator="kind")]
-
-
 class ContactPair(Model):
     """Two parts whose friction differs from that of the others."""
 
@@ -256,33 +133,6 @@ class Contact(Model):
     """Of the (harmonic) mean face size: how far a node may stray from free flight before the next search, twice."""
     domain: Literal["arbitrary", "box"] = "arbitrary"
     """How a rank finds the faces that others must see: by occupied cells, or by bounding boxes."""
-
-
-ProbeField = Literal[
-    "stress_xx", "stress_yy", "stress_zz", "stress_yz", "stress_zx", "stress_xy",
-    "pressure", "mises", "plastic_strain", "temperature", "density", "internal_energy",
-    "velocity_x", "velocity_y", "velocity_z", "contact_force_x", "contact_force_y", "contact_force_z",
-]  # fmt: skip
-
-
-class Probe(Model):
-    """A column of history.csv: the mean of a field over the tets of a part whose centre starts in a box.
-
-    Without ``low`` and ``high`` it is the whole part. ``internal_energy`` is per mass, J/kg; stresses are positive in
-    tension, pressure in compression. ``contact_force`` is what other bodies push the whole part with, N, as a mean
-    since the line before.
-    """
-
-    name: Name
-    """Of the column, and for references."""
-    part: Name
-    """Whose tets are measured."""
-    field: ProbeField
-    """What is measured."""
-    low: Point | None = None
-    """Lowest corner of the box; with ``high``."""
-    high: Point | None = None
-    """Highest corner of the box; with ``low``."""
 
 
 class Viscosity(Model):
@@ -358,46 +208,6 @@ class Balance(Model):
     """Of ``policy = "every"``: steps between two cuts."""
     weights: Literal["measured", "outside", "tets"] = "measured"
     """What is divided evenly: CPU time as measured, outside nodes, or tets."""
-
-
-Quantity = Literal[
-    "extent", "radius", "plastic_strain_max", "temperature_max", "speed_mean", "stress_max",
-    "probe_mean", "probe_max", "probe_min", "contact_time", "contact_loss", "penetration", "worst_residual",
-]  # fmt: skip
-
-
-class Reference(Model):
-    """A published or derived number that the finished run is compared with.
-
-    ``extent``: largest minus smallest coordinate of a part along ``axis``, m. ``radius``: largest distance of a
-    part's nodes from the line through the origin along ``axis``, m. ``plastic_strain_max``, ``temperature_max`` (K),
-    ``stress_max`` (largest |stress component|, Pa) over a part. ``speed_mean``: mass-mean velocity of a part along
-    ``axis``, m/s. ``probe_*``: of a history column between ``since`` and ``until``. ``contact_time``: last time at
-    which a wall or another body pushes, s. ``contact_loss``: energy lost by contact over the initial energy.
-    ``penetration``: how much of the thickness of all other parts along ``axis`` lies in front of the end of the hole
-    that a part has made in them round the axis through the origin, m; cavities ahead of the hole do not count. Nodes
-    without tets do not count for ``extent`` and ``radius``.
-    ``worst_residual``: of the energy ledger.
-    """
-
-    quantity: Quantity
-    """What is measured of the run."""
-    value: Annotated[float, Written(QUANTITY)]
-    """What it should be; its unit is that of the quantity."""
-    tolerance: Annotated[float, Written(QUANTITY), Positive]
-    """Absolute, in SI as ``value``."""
-    source: str
-    """Where the number comes from."""
-    part: Name | None = None
-    """Of which part, for quantities of a part."""
-    probe: Name | None = None
-    """Of which probe, for ``probe_mean``, ``probe_max`` and ``probe_min``."""
-    axis: Axis | None = None
-    """Along or round which axis, for ``extent``, ``radius``, ``speed_mean`` and ``penetration``."""
-    since: Time = 0.0
-    """Begin of the window of ``probe_*``."""
-    until: Time | None = None
-    """End of the window of ``probe_*``; the end of the run when absent."""
 
 
 Kind = TypeVar("Kind", Symmetry, Wall, Prescribed, Rotation, Gravity, Traction)

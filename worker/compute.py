@@ -40,10 +40,12 @@ def compute(
 
     With ``restart`` from the latest checkpoint that is there. Raises ConoidError.
     """
+    say = journal.starting if journal is not None else domain.quiet
     if restart:
+        say("reading the latest checkpoint")
         sim, start = _resumed(case, folder, comm)
     else:
-        sim = simulation.build(case, meshes, comm, journal.starting if journal is not None else domain.quiet)
+        sim = simulation.build(case, meshes, comm, say)
         start = Start(sim.model.elements_global, sim.model.nodes_global, reference.thicknesses(sim))
     if comm.rank == 0:
         rewind.rewind(folder, sim.clock.step, sim.clock.frame)

@@ -131,13 +131,14 @@ def test_a_silent_run_is_heard_of(monkeypatch: pytest.MonkeyPatch) -> None:
             heard.set()
 
     def story() -> Iterator[AnyMessage]:
-        yield stories.status(1, "starting")
+        yield stories.status(1, "starting", message="meshing tile, part 2 of 3")
         assert heard.wait(30.0)
         yield stories.status(2, "running")
 
     tell(story(), Live(stories.RUN), write)
-    assert lines[0].endswith("starting")
+    assert lines[0].endswith("starting  meshing tile, part 2 of 3")
     assert "still starting, for " in lines[1]
+    assert lines[1].endswith(": meshing tile, part 2 of 3")
     assert lines[-1].endswith("running")
 
 
