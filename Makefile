@@ -1,6 +1,7 @@
 # make demo   steel breaks glass: submitted over HTTP, run on 2 MPI ranks, watched live, checked, drawn (demo.png)
 # make test   linters, types and every test that takes seconds
 # make bench  speed, and speed against error, in 15 minutes: tables in build/bench (BENCH=quick: 2, BENCH=long: 60)
+# make reference  docs/case.md and the JSON schema, from the texts of the models in cases/
 # make drill  the long tests: studies and failures that take minutes
 #
 # Each target first brings .venv to the versions of requirements.lock, when that file or pyproject.toml has changed.
@@ -17,7 +18,7 @@ told = @echo "$(1)"; began=$$(date +%s); \
 	while sleep 5 >/dev/null 2>&1; do echo "$(1): $$(($$(date +%s) - began)) s"; done & clock=$$!; \
 	trap "kill $$clock" EXIT; $(2)
 
-.PHONY: demo test lint style types check bench drill clean
+.PHONY: demo test lint style types check bench reference drill clean
 .DEFAULT_GOAL := test
 
 demo: $(READY)
@@ -40,6 +41,10 @@ check: $(READY)
 
 bench: $(READY)
 	$(BIN)/python -m tests.bench
+
+reference: $(READY)
+	$(BIN)/conoid schema --out cases/case.schema.json
+	$(BIN)/conoid schema --page --out docs/case.md
 
 drill: $(READY)
 	$(BIN)/python -m pytest -q -m slow --timeout 3600 --ignore tests/bench tests

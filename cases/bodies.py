@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from .tables import Axis, Count, Model, Point, Positive
-from .units import Length, Ratio
+from .units import Angle, Length, Ratio
 
 Edge = Annotated[Count, Field(ge=1, le=1000)]
 
@@ -18,23 +18,32 @@ class Grading(Model):
     """
 
     origin: Point = (0.0, 0.0, 0.0)
+    """Where distances begin."""
     axis: Axis | None = None
+    """Distances are from the line along it through ``origin``; without it from the point."""
     near: Annotated[Length, Field(ge=0)]
+    """Up to this distance the size is ``element_size``; below ``far``."""
     far: Annotated[Length, Positive]
+    """From this distance on the size is ``far_size``."""
     far_size: Annotated[Length, Positive]
+    """Not below ``element_size``."""
 
 
 class Primitive(Model):
     """What all generated meshes share. ``structured`` is the regular generator kept for verification."""
 
     element_size: Annotated[Length, Positive]
+    """Edge of a tet, about; not above the smallest extent of the body."""
     generator: Literal["gmsh", "structured"] = "gmsh"
+    """``gmsh`` makes unstructured meshes; ``structured`` cuts the cells of a regular grid into tets, but
+    for spheres."""
     split: Literal[5, 6] = 6
     """Tets per hexahedron of the structured generator."""
     sector: Literal["full", "half", "quarter"] = "full"
     """Which part of the body is modelled: the positive side of its centre in the first, or both, of the two directions
     across ``axis`` (in cyclic order: x, y for z; y, z for x; z, x for y)."""
     grading: Grading | None = None
+    """Coarser tets away from a place, with ``generator = "gmsh"``."""
 
 
 class Slit(Model):
@@ -45,19 +54,28 @@ class Slit(Model):
     """
 
     axis: Axis
+    """The normal of the rectangle."""
     at: Length
+    """Where its plane cuts the axis: on a plane of nodes inside the body."""
     low: tuple[Length, Length]
+    """Lowest corner."""
     high: tuple[Length, Length]
+    """Highest corner."""
 
 
 class Box(Primitive):
     """A rectangular block between two corners. The sector is cut at the origin of the coordinates."""
 
     shape: Literal["box"]
+    """The kind of body."""
     low: Point
+    """Lowest corner."""
     high: Point
+    """Highest corner, above ``low`` in every direction."""
     axis: Axis = "z"
+    """The direction across which a sector is cut."""
     slit: Slit | None = None
+    """A crack that is there from the start, with ``generator = "structured"``."""
 
 
 class Plate(Primitive):
@@ -67,50 +85,75 @@ class Plate(Primitive):
     """
 
     shape: Literal["plate"]
+    """The kind of body."""
     base: Point = (0.0, 0.0, 0.0)
+    """Centre of the face at the low end of ``axis``: the plate lies between it and ``base`` plus ``thickness``."""
     axis: Axis = "z"
+    """Direction of the thickness."""
     width: Annotated[Length, Positive]
+    """Extent in the first direction across ``axis``, half of it to each side: x for z, y for x, z for y."""
     height: Annotated[Length, Positive]
+    """Extent in the second direction across ``axis``: y for z, z for x, x for y."""
     thickness: Annotated[Length, Positive]
+    """Extent along ``axis``."""
     slit: Slit | None = None
+    """A crack that is there from the start, with ``generator = "structured"``."""
 
 
 class Cylinder(Primitive):
     """A solid cylinder; ``base`` is the centre of its lower end face."""
 
     shape: Literal["cylinder"]
+    """The kind of body."""
     base: Point = (0.0, 0.0, 0.0)
+    """Centre of the end face at the low end of ``axis``: the cylinder lies between it and ``base`` plus ``length``."""
     axis: Axis = "z"
+    """Direction of the cylinder's axis."""
     radius: Annotated[Length, Positive]
+    """Of the cylinder."""
     length: Annotated[Length, Positive]
+    """Extent along ``axis``."""
 
 
 class Tube(Primitive):
     """A hollow cylinder."""
 
     shape: Literal["tube"]
+    """The kind of body."""
     base: Point = (0.0, 0.0, 0.0)
+    """Centre of the end face at the low end of ``axis``: the tube lies between it and ``base`` plus ``length``."""
     axis: Axis = "z"
+    """Direction of the tube's axis."""
     inner_radius: Annotated[Length, Positive]
+    """Of the hole; below ``radius``."""
     radius: Annotated[Length, Positive]
+    """Of the outside."""
     length: Annotated[Length, Positive]
+    """Extent along ``axis``."""
 
 
 class Sphere(Primitive):
     """A ball."""
 
     shape: Literal["sphere"]
+    """The kind of body."""
     centre: Point = (0.0, 0.0, 0.0)
+    """Of the ball."""
     axis: Axis = "z"
+    """The direction across which a sector is cut."""
     radius: Annotated[Length, Positive]
+    """Of the ball."""
 
 
 class Loose(Primitive):
     """Tets of edge ``element_size``, put one by one: there are no sectors, and one generator."""
 
     generator: Literal["structured"] = "structured"
+    """Of no meaning here."""
     sector: Literal["full"] = "full"
+    """There are none here."""
     grading: None = None
+    """There is none here."""
 
 
 class TwoTets(Loose):
@@ -118,10 +161,13 @@ class TwoTets(Loose):
     in the first direction across ``axis``. The line through their free corners and the centre leans that way, too."""
 
     shape: Literal["two_tets"]
+    """The kind of body."""
     centre: Point = (0.0, 0.0, 0.0)
+    """Of the common face."""
     axis: Axis = "z"
-    lean: Annotated[Ratio, Field(ge=0, le=1.1)] = 0.0
-    """rad; ``"30 deg"``. The tets keep their altitude, and are regular when they do not lean."""
+    """Normal of the common face."""
+    lean: Annotated[Angle, Field(ge=0, le=1.1)] = 0.0
+    """``"30 deg"``: the tets keep their altitude, and are regular when they do not lean."""
 
 
 class Shards(Loose):
@@ -129,13 +175,17 @@ class Shards(Loose):
     cube of its own and turned at random."""
 
     shape: Literal["shards"]
+    """The kind of body."""
     base: Point = (0.0, 0.0, 0.0)
+    """Corner with the lowest coordinates."""
     count: tuple[Edge, Edge, Edge]
+    """Tets along x, y, z."""
     gap: Annotated[Length, Field(ge=0)] = 0.0
     """Smallest distance of neighbours, however they are turned."""
     perturbation: Annotated[Ratio, Field(ge=0, le=0.15)] = 0.0
     """How far each coordinate of a node is moved at most, at random, of the edge."""
     seed: Annotated[Count, Field(ge=0, lt=2**63)] = 0
+    """Another one turns and moves the tets otherwise."""
 
     @property
     def axis(self) -> Axis:
@@ -147,11 +197,15 @@ class MeshFile(Model):
     """A mesh made elsewhere: gmsh .msh 4.1 or 2.2, or Abaqus .inp. ``unit`` is the length unit of its coordinates."""
 
     shape: Literal["file"]
+    """The kind of body."""
     path: str
+    """Of the file; a relative one begins in the folder of the case. A server reads none."""
     unit: Annotated[Length, Positive]
+    """Length of 1 in the file: ``"1 mm"``."""
     group: str | None = None
     """Physical group or element set; all tets when absent."""
     sha256: str | None = None
+    """Of the file; another one is refused. Not checked when absent."""
 
 
 Mesh = Annotated[Box | Plate | Cylinder | Tube | Sphere | TwoTets | Shards | MeshFile, Field(discriminator="shape")]

@@ -1,16 +1,20 @@
 """What the models cannot check one by one: names that must exist, sizes that must fit, planes that must be there."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import chain
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
 
 from .bodies import MeshFile
 from .geometry import AXES, bounds, centre, cut_directions, lowest_along, whole_bounds
 from .library import library
 from .materials import JohnsonCook, Material, MohrCoulomb
 from .mesh_checks import check_mesh
+from .overlap import overlaps
 from .problems import Location, Problem, choices, dotted, nearest, problem
-from .schema import Case, Gravity, Part, Prescribed, Reference, Symmetry, Traction, Wall
+from .schema import Case, Contact, Gravity, Part, Prescribed, Reference, Symmetry, Traction, Wall
 
 NEEDED: dict[str, frozenset[str]] = {
     "extent": frozenset({"part", "axis"}),
@@ -34,12 +38,45 @@ _ROUNDING = 1e-9
 units (1e-16) and far below any tolerance of a drawing."""
 
 
+Read = TypeVar("Read", bound=BaseModel)
+
+
 def check(case: Case) -> list[Problem]:
     """Every cross-field problem of a case, in the order of its keys."""
     checks: tuple[Callable[[Case], Iterable[Problem]], ...] = (
-        _materials, _parts, _sectors, _boundaries, _walls, _contact, _probes, _references,
+        _materials, _parts, _overlaps, _sectors, _boundaries, _walls, _contact, _probes, _references,
     )  # fmt: skip
     return list(chain.from_iterable(found(case) for found in checks))
+
+
+def check_parts(data: Mapping[str, Any]) -> Iterator[Problem]:
+    """What can be said of the parts of a case whose other keys are wrong: materials, sizes, overlap."""
+    listed, own = data.get("parts"), data.get("materials")
+    known = {*library(), *(own if isinstance(own, Mapping) else ())}
+    parts: list[tuple[int, Part]] = []
+    for i, entry in enumerate(listed if isinstance(listed, list | tuple) else ()):
+        name = entry.get("material") if isinstance(entry, Mapping) else None
+        if isinstance(name, str) and name not in known:
+            yield problem(("parts", i, "material"), name, f"unknown material; {nearest(name, sorted(known))}")
+        part = _read(Part, entry)
+        found = list(check_mesh(part.mesh, ("parts", i, "mesh"))) if part is not None else []
+        yield from found
+        if part is not None and not found:
+            parts.append((i, part))
+    spec = data.get("contact")
+    yield from overlaps(parts, None if spec == "none" else _read(Contact, spec) or Contact())
+
+
+def _read(model: type[Read], value: object) -> Read | None:
+    try:
+        return model.model_validate(value)
+    except ValidationError:
+        return None
+
+
+def _overlaps(case: Case) -> Iterator[Problem]:
+    sound = ((i, part) for i, part in enumerate(case.parts) if not any(check_mesh(part.mesh, ())))
+    yield from overlaps(sound, case.contact)
 
 
 def _materials(case: Case) -> Iterator[Problem]:
@@ -77,7 +114,7 @@ def _parts(case: Case) -> Iterator[Problem]:
             yield problem(("parts", i, "temperature"), part.temperature, message)
         yield from check_mesh(part.mesh, ("parts", i, "mesh"))
         if law is None and part.erosion is not None and part.erosion.plastic_strain is not None:
-            message = f"{part.material} has no strength, so it never strains plastically; remove the key"
+            message = f"{part.material} is elastic (no table strength) and never strains plastically; remove the key"
             yield problem(("parts", i, "erosion", "plastic_strain"), part.erosion.plastic_strain, message)
         yield from _fracture(part, known[part.material], ("parts", i, "fracture"))
         if part.turn is not None and not isinstance(part.mesh, MeshFile) and part.mesh.sector != "full":
@@ -91,7 +128,7 @@ def _fracture(part: Part, made: Material, location: Location) -> Iterator[Proble
     if spec is None:
         return
     if made.brittle is None:
-        message = f"{part.material} has no strength and fracture energy; give it a table brittle with strength, energy"
+        message = f"{part.material} cannot break: it has no table brittle with a tensile strength and a fracture energy"
         yield problem(location, ..., message)
     elif made.brittle.scatter is not None and made.brittle.scatter.minimum >= made.brittle.strength:
         message = f"must be below the strength, {made.brittle.strength:g} Pa"

@@ -14,6 +14,7 @@ from .geometry import AXES, bounds
 from .library import material
 from .materials import JohnsonCook, Material, MohrCoulomb
 from .mesh_size import MeshSize, mesh_size, surface_faces
+from .placed import Bulk, bulk
 from .schema import Case, Part, Rotation, Symmetry, Wall
 
 NANOSECONDS = {
@@ -49,6 +50,7 @@ class PartEstimate:
     nodes: int | None
     dt: float | None
     """The time step its smallest tet allows at the start, s."""
+    bulk: Bulk | None = None
 
 
 @dataclass(frozen=True)
@@ -100,8 +102,20 @@ def _size(part: Part, folder: Path) -> MeshSize | int | None:
 def _part(case: Case, part: Part, size: MeshSize | int | None) -> PartEstimate:
     if not isinstance(size, MeshSize):
         return PartEstimate(part.name, size, None, None)
-    slowest = wave_speed(material(case, part.material)) * _viscous_factor(case)
-    return PartEstimate(part.name, size.elements, size.nodes, case.numerics.dt_safety * size.step_length / slowest)
+    made = material(case, part.material)
+    slowest = wave_speed(made) * _viscous_factor(case)
+    brings = None if isinstance(part.mesh, MeshFile) else bulk(_driven(case, part), part.mesh, made.density)
+    return PartEstimate(
+        part.name, size.elements, size.nodes, case.numerics.dt_safety * size.step_length / slowest, brings
+    )
+
+
+def _driven(case: Case, part: Part) -> Part:
+    """A part as it moves where a boundary turns it."""
+    for _, boundary in case.boundaries_of(Rotation):
+        if not boundary.parts or part.name in boundary.parts:
+            return part.model_copy(update={"velocity": (0.0, 0.0, 0.0), "spin": boundary.spin, "stretch": None})
+    return part
 
 
 def _viscous_factor(case: Case) -> float:

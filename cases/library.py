@@ -1,6 +1,8 @@
 """The material library: ``materials.toml``, every constant with its confidence and source."""
 
 import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -30,7 +32,30 @@ def sources() -> dict[str, str]:
 
 def provenance(name: str) -> dict[str, tuple[str, str]]:
     """``{"elastic.young": ("read", "uintah"), ...}``: confidence and source key of each constant of a material."""
-    return dict(_provenance(_tables()[name], ""))
+    return {key: (confidence, source) for key, (_, confidence, source) in _entries(_tables()[name], "")}
+
+
+@dataclass(frozen=True)
+class Constant:
+    """One number of the library as it is written there, such as ``7850 kg/m^3``."""
+
+    key: str
+    value: str
+    confidence: Confidence
+    source: str
+    """A key of the sources."""
+    cited: str
+    """What it stands for."""
+
+
+def constants(name: str) -> list[Constant]:
+    """Every constant of a material of the library. Raises CaseError with the nearest names."""
+    if name not in library():
+        raise CaseError([problem(("material",), name, f"unknown material; {nearest(name, sorted(library()))}")])
+    return [
+        Constant(key, str(value), confidence, source, sources()[source])
+        for key, (value, confidence, source) in _entries(_tables()[name], "")
+    ]
 
 
 def material(case: Case, name: str) -> Material:
@@ -57,11 +82,10 @@ def _value(entry: Any) -> Any:
     return entry[0] if isinstance(entry, list) else entry
 
 
-def _provenance(table: dict[str, Any], prefix: str) -> list[tuple[str, tuple[str, str]]]:
-    found: list[tuple[str, tuple[str, str]]] = []
+def _entries(table: dict[str, Any], prefix: str) -> Iterator[tuple[str, list[Any]]]:
+    """Dotted keys, and value, confidence and source key of each constant in a table."""
     for key, entry in table.items():
         if isinstance(entry, dict):
-            found += _provenance(entry, f"{prefix}{key}.")
+            yield from _entries(entry, f"{prefix}{key}.")
         elif isinstance(entry, list):
-            found.append((f"{prefix}{key}", (entry[1], entry[2])))
-    return found
+            yield f"{prefix}{key}", entry

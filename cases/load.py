@@ -11,7 +11,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from .checks import check
+from .checks import check, check_parts
 from .library import library, material
 from .problems import CaseError, Problem, from_pydantic, nearest, problem, shown
 from .quantities import read_references
@@ -35,7 +35,9 @@ def parse_case(data: Mapping[str, Any]) -> Case:
     try:
         case = Case.model_validate(read)
     except ValidationError as error:
-        raise CaseError([*problems, *from_pydantic(error, data)]) from None
+        problems += from_pydantic(error, data)
+        told = {each.key for each in problems}
+        raise CaseError([*problems, *(each for each in check_parts(read) if each.key not in told)]) from None
     problems += check(case)
     if problems:
         raise CaseError(problems)

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field
 
 from .tables import Count, Model, Positive
-from .units import Area, Density, FractureEnergy, Rate, Ratio, SpecificHeat, Speed, Stress, Temperature
+from .units import Angle, Area, Density, FractureEnergy, Rate, Ratio, SpecificHeat, Speed, Stress, Temperature
 
 
 def _acute(angle: float) -> float:
@@ -19,15 +19,20 @@ class Elastic(Model):
     """Isotropic elasticity: Young's modulus, Pa, and Poisson's ratio."""
 
     young: Annotated[Stress, Positive]
+    """Young's modulus."""
     poisson: Annotated[Ratio, Field(gt=-1, lt=0.5)]
+    """Poisson's ratio."""
 
 
 class LinearHardening(Model):
     """J2 plasticity: yield stress ``yield + hardening * plastic strain``, Pa."""
 
     model: Literal["linear_hardening"]
+    """The law."""
     yield_stress: Annotated[Stress, Positive]
+    """Flow stress before any plastic strain."""
     hardening: Annotated[Stress, Field(ge=0)] = 0.0
+    """Rise of the flow stress with the plastic strain."""
 
 
 class JohnsonCook(Model):
@@ -37,15 +42,25 @@ class JohnsonCook(Model):
     """
 
     model: Literal["johnson_cook"]
+    """The law."""
     A: Annotated[Stress, Positive]
+    """Flow stress before any plastic strain."""
     B: Annotated[Stress, Field(ge=0)]
+    """Hardening."""
     n: Annotated[Ratio, Field(gt=0, le=1)]
+    """Exponent of the hardening."""
     C: Annotated[Ratio, Field(ge=0)]
+    """Rate dependence."""
     m: Annotated[Ratio, Positive]
+    """Exponent of the thermal softening."""
     reference_rate: Annotated[Rate, Positive] = 1.0
+    """Rate of plastic strain at which A, B and n were measured."""
     reference_temperature: Annotated[Temperature, Field(ge=0)] = 293.15
+    """Temperature below which nothing softens."""
     melt_temperature: Annotated[Temperature, Positive]
+    """Temperature at which nothing is left of the strength; above the reference."""
     specific_heat: Annotated[SpecificHeat, Positive]
+    """Heat that warms the material."""
     taylor_quinney: Annotated[Ratio, Field(ge=0, le=1)] = 0.9
     """Share of the plastic work that becomes heat."""
 
@@ -58,17 +73,19 @@ class MohrCoulomb(Model):
     """
 
     model: Literal["mohr_coulomb"]
+    """The law."""
     cohesion: Annotated[Stress, Positive]
-    friction_angle: Annotated[Ratio, AfterValidator(_acute)]
-    """``"55 deg"``."""
+    """Shear strength without pressure."""
+    friction_angle: Annotated[Angle, AfterValidator(_acute)]
+    """How fast strength grows with pressure: ``"55 deg"``, at least 0 and below 90 deg."""
     strength_cap: Annotated[Stress, Positive] | None = None
     """Largest s1 - s3, however high the pressure; none by default."""
     failure_strain: Annotated[Ratio, Positive] | None = None
     """Effective plastic strain beyond which the residual values hold; without it material never fails."""
     residual_cohesion: Annotated[Stress, Field(ge=0)] | None = None
-    """0 by default."""
-    residual_friction_angle: Annotated[Ratio, AfterValidator(_acute)] | None = None
-    """30 deg by default, or the friction angle if that is smaller."""
+    """Cohesion after failure; 0 by default."""
+    residual_friction_angle: Annotated[Angle, AfterValidator(_acute)] | None = None
+    """Friction angle after failure; 30 deg by default, or the friction angle if that is smaller."""
 
 
 Strength = Annotated[LinearHardening | JohnsonCook | MohrCoulomb, Field(discriminator="model")]
@@ -78,9 +95,13 @@ class MieGruneisen(Model):
     """Mie-Grueneisen equation of state on the Hugoniot U_s = c0 + S u_p."""
 
     model: Literal["mie_gruneisen"]
+    """The equation."""
     c0: Annotated[Speed, Positive]
+    """Bulk speed of sound."""
     S: Annotated[Ratio, Field(ge=0)]
+    """Slope of the Hugoniot."""
     gamma0: Annotated[Ratio, Field(ge=0)]
+    """Grüneisen's coefficient."""
 
 
 class Scatter(Model):
@@ -89,18 +110,24 @@ class Scatter(Model):
     """
 
     modulus: Annotated[Ratio, Positive]
+    """Weibull's modulus: a larger one scatters less."""
     area: Annotated[Area, Positive] | None = None
     """Of the specimens that ``strength`` was measured with; without it every facet counts alike, whatever its area."""
     minimum: Annotated[Stress, Field(ge=0)] = 0.0
+    """Strength that every facet has."""
     seed: Annotated[Count, Field(ge=0)] = 0
+    """Another one gives other facets the weak places."""
 
 
 class Brittle(Model):
     """What breaks facets between tets: tensile strength, Pa, and fracture energy G_c, J/m^2, of the crack."""
 
     strength: Annotated[Stress, Positive]
+    """Tensile strength: the traction at which a facet breaks."""
     energy: Annotated[FractureEnergy, Positive]
+    """Fracture energy G_c of the crack, per area of the crack."""
     scatter: Scatter | None = None
+    """Scatter of the strength from facet to facet; none by default."""
 
 
 class Material(Model):
@@ -108,8 +135,14 @@ class Material(Model):
     brittle (none: a part of it cannot fracture)."""
 
     density: Annotated[Density, Positive]
+    """At the start."""
     elastic: Elastic
+    """Young's modulus and Poisson's ratio."""
     strength: Strength | None = None
+    """Where it stops being elastic; without it it never does. ``model`` says which law."""
     eos: MieGruneisen | None = None
+    """Pressure of compression and heat; without it linear, from the elasticity."""
     brittle: Brittle | None = None
+    """What breaks facets; without it a part of this material cannot fracture."""
     description: str = ""
+    """For people, with the sources of the constants."""

@@ -26,6 +26,11 @@ def unit_of(quantity: str, field: str | None = None) -> str:
     return FIELD_UNITS[field or ""] if quantity.startswith("probe_") else QUANTITY_UNITS[quantity]
 
 
+def unit_of_reference(data: Mapping[str, Any], location: Location) -> str:
+    """The unit of ``value`` or ``tolerance`` of a reference of a valid case, at ``("reference", 0, "value")``."""
+    return _unit(data["reference"][location[1]], data)
+
+
 def read_references(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[Problem]]:
     """``data`` with values and tolerances such as ``"21.47 mm"`` turned into SI, and what could not be read.
 

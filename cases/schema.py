@@ -1,7 +1,8 @@
 """What a case is. Frozen models, unknown keys forbidden, every quantity in SI once read.
 
 ``parse_case`` in ``cases/load.py`` is the way in: it reads TOML or JSON and reports every error at once. Bodies and
-their meshes are in ``cases/bodies.py``, materials in ``cases/materials.py``.
+their meshes are in ``cases/bodies.py``, how they move in ``motion``, materials in ``materials``, what holds them in
+``boundaries``, what is measured in ``measures``.
 """
 
 from typing import Annotated, Any, Literal, TypeVar
@@ -9,36 +10,22 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import BeforeValidator, Field
 
 from .bodies import Mesh
+from .boundaries import Boundary, Gravity, Prescribed, Rotation, Symmetry, Traction, Wall
 from .materials import Material
-from .tables import Axis, Count, Direction, Model, Name, Point, Positive, Velocity
-from .units import Acceleration, AngularSpeed, Length, Rate, Ratio, Speed, Stress, Temperature, Time
+from .measures import Probe, Reference
+from .motion import Spin, Stretch, Turn
+from .tables import Count, Model, Name, Positive, Switch, Velocity
+from .units import Ratio, Speed, Temperature, Time
+
+__all__ = [
+    "MOST_RANKS", "Balance", "Boundary", "Case", "Contact", "ContactPair", "Erosion", "Fracture", "Gravity", "Numerics",
+    "Part", "Prescribed", "Probe", "Reference", "Rotation", "Run", "Spin", "Stretch", "Symmetry", "Traction", "Turn",
+    "Viscosity", "Wall",
+]  # fmt: skip
 
 
 def _off(value: Any) -> Any:
     return None if value == "none" else value
-
-
-class Spin(Model):
-    """Rigid rotation about a line through ``centre``; ``rate`` is the rotation vector, rad/s."""
-
-    centre: Point
-    rate: tuple[AngularSpeed, AngularSpeed, AngularSpeed]
-
-
-class Stretch(Model):
-    """Uniform stretching: ``rate`` times the distance from ``centre`` is the velocity along each of x, y, z; 1/s."""
-
-    centre: Point = (0.0, 0.0, 0.0)
-    rate: tuple[Rate, Rate, Rate]
-
-
-class Turn(Model):
-    """A body is turned about the line along ``axis`` through ``centre`` before anything else, right-handed."""
-
-    axis: Axis
-    angle: Ratio
-    """rad; ``"45 deg"``."""
-    centre: Point = (0.0, 0.0, 0.0)
 
 
 class Erosion(Model):
@@ -81,97 +68,45 @@ class Fracture(Model):
     resolve: Literal["none", "strength"] = "none"
     """``strength`` lowers the strength until ``resolution`` elements fit in the cohesive zone, with the same energy."""
     resolution: Annotated[Ratio, Positive] = 3.0
+    """Elements that shall fit in the cohesive zone, with ``resolve = "strength"``."""
 
 
 class Part(Model):
     """A body: where it is, what it is made of, how it moves at the start."""
 
     name: Name
+    """For messages, results and the keys that name parts; each part has its own."""
     material: Name
     """A name from ``[materials]`` of the case or from the library."""
     mesh: Mesh
+    """The body, where it lies and how fine it is; ``shape`` says which kind."""
     turn: Turn | None = None
-    """Only whole bodies can be turned, no sectors."""
+    """How the body is turned out of the axes.
+    Only whole bodies can be turned, no sectors."""
     velocity: Velocity = (0.0, 0.0, 0.0)
+    """Of the whole body at the start, along x, y, z."""
     spin: Spin | None = None
+    """A rotation at the start, besides ``velocity``."""
     stretch: Stretch | None = None
+    """A stretching at the start, besides ``velocity``."""
     jitter: Annotated[Speed, Field(ge=0)] = 0.0
     """Each node starts with a random velocity besides, each component between minus and plus this: the same in every
     run."""
     temperature: Annotated[Temperature, Field(ge=0)] = 293.15
+    """At the start; of meaning for Johnson-Cook's law."""
     erosion: Erosion | None = None
+    """With this table the part's own tets leave where they are worn out; without it none of its tets ever does."""
     fracture: Fracture | None = None
-
-
-class Symmetry(Model):
-    """Nodes that start on the plane ``axis = at`` stay on it; no friction. All parts when ``parts`` is empty."""
-
-    kind: Literal["symmetry"]
-    axis: Axis
-    at: Length = 0.0
-    parts: tuple[Name, ...] = ()
-
-
-class Wall(Model):
-    """A rigid, fixed, frictionless half-space: nodes cannot go to the side that ``normal`` points away from."""
-
-    kind: Literal["wall"]
-    name: Name = "wall"
-    point: Point
-    normal: Direction
-    parts: tuple[Name, ...] = ()
-
-
-class Prescribed(Model):
-    """Nodes that start inside the box ``low``..``high`` (all of the parts when absent) move with a given velocity.
-
-    Only the components that are given are prescribed.
-    """
-
-    kind: Literal["velocity"]
-    parts: tuple[Name, ...] = ()
-    low: Point | None = None
-    high: Point | None = None
-    x: Speed | None = None
-    y: Speed | None = None
-    z: Speed | None = None
-
-
-class Rotation(Model):
-    """All nodes of the parts turn rigidly, exactly, at the given spin."""
-
-    kind: Literal["rotation"]
-    parts: tuple[Name, ...] = ()
-    spin: Spin
-
-
-class Gravity(Model):
-    """A constant acceleration of all nodes of the parts, of all parts when ``parts`` is empty."""
-
-    kind: Literal["gravity"]
-    acceleration: tuple[Acceleration, Acceleration, Acceleration]
-    parts: tuple[Name, ...] = ()
-
-
-class Traction(Model):
-    """A force per initial area, Pa, on the exposed faces whose three nodes start inside the box ``low``..``high`` (all
-    of the parts when absent): constant from the first moment on, and turning with nothing."""
-
-    kind: Literal["traction"]
-    stress: tuple[Stress, Stress, Stress]
-    parts: tuple[Name, ...] = ()
-    low: Point | None = None
-    high: Point | None = None
-
-
-Boundary = Annotated[Symmetry | Wall | Prescribed | Rotation | Gravity | Traction, Field(discriminator="kind")]
+    """With this table the part breaks; its material must be ``brittle``."""
 
 
 class ContactPair(Model):
     """Two parts whose friction differs from that of the others."""
 
     parts: tuple[Name, Name]
+    """The names of the two."""
     friction: Annotated[Ratio, Field(ge=0)]
+    """Coulomb's coefficient between them."""
 
 
 class Contact(Model):
@@ -184,38 +119,20 @@ class Contact(Model):
     friction: Annotated[Ratio, Field(ge=0)] = 0.0
     """Coulomb's coefficient."""
     pairs: tuple[ContactPair, ...] = ()
+    """Pairs of parts with a friction of their own."""
     edges: bool = True
     """Whether sharp edges meet edges."""
     overlap: Literal["refuse", "push"] = "refuse"
-    """What becomes of bodies that overlap at the start: an error, or they are moved apart without a stress."""
+    """What becomes of bodies that overlap at the start: ``refuse`` ends with an error, ``push`` moves them apart
+    without a stress. A body overlaps another where their primitives reach into each other, or where a node of its
+    surface lies inside the mesh of the other, deeper than a millionth of the size of a face: bodies that touch do not.
+    Parts that do not meet each other may overlap."""
     sweeps: Annotated[Count, Field(ge=1, le=1000)] = 5
     """Jacobi sweeps over the meetings of a step."""
-    skin: Annotated[Ratio, Positive] = 0.4
-    """Of the (harmonic) mean face size: how far a node may stray from free flight before the next search, twice."""
+    skin: Annotated[Ratio, Positive] = 0.3
+    """Of the (harmonic) mean face size: twice how far a node may leave its free flight before it is searched anew."""
     domain: Literal["arbitrary", "box"] = "arbitrary"
     """How a rank finds the faces that others must see: by occupied cells, or by bounding boxes."""
-
-
-ProbeField = Literal[
-    "stress_xx", "stress_yy", "stress_zz", "stress_yz", "stress_zx", "stress_xy",
-    "pressure", "mises", "plastic_strain", "temperature", "density", "internal_energy",
-    "velocity_x", "velocity_y", "velocity_z", "contact_force_x", "contact_force_y", "contact_force_z",
-]  # fmt: skip
-
-
-class Probe(Model):
-    """A column of history.csv: the mean of a field over the tets of a part whose centre starts in a box.
-
-    Without ``low`` and ``high`` it is the whole part. ``internal_energy`` is per mass, J/kg; stresses are positive in
-    tension, pressure in compression. ``contact_force`` is what other bodies push the whole part with, N, as a mean
-    since the line before.
-    """
-
-    name: Name
-    part: Name
-    field: ProbeField
-    low: Point | None = None
-    high: Point | None = None
 
 
 class Viscosity(Model):
@@ -225,7 +142,9 @@ class Viscosity(Model):
     """
 
     linear: Annotated[Ratio, Field(ge=0)] = 0.06
+    """Coefficient of the linear term: damps ringing behind a front."""
     quadratic: Annotated[Ratio, Field(ge=0)] = 1.5
+    """Coefficient of the quadratic term: spreads a shock over some tets."""
 
 
 class Numerics(Model):
@@ -234,7 +153,7 @@ class Numerics(Model):
     pressure: Literal["standard", "nodal", "split"] = "nodal"
     """``standard``: pressure from each tet (locks in plastic flow). ``nodal``: averaged nodal pressure. ``split``: the
     operator split, stabilised by pressure-gradient projection."""
-    viscosity: Annotated[Viscosity | None, BeforeValidator(_off)] = Viscosity()
+    viscosity: Annotated[Viscosity | None, BeforeValidator(_off), Switch()] = Viscosity()
     """``viscosity = "none"`` switches it off."""
     dt_safety: Annotated[Ratio, Field(gt=0, le=1)] = 0.9
     """Share of the rigorous element bound 1 / (c sqrt(sum |grad N|^2))."""
@@ -245,11 +164,17 @@ class Numerics(Model):
 Scale = Annotated[Ratio, Field(gt=0)]
 
 
+MOST_RANKS = 4096
+"""Of a run. Chosen: far beyond what has been run."""
+
+
 class Run(Model):
     """How long, on how many ranks, and what is written."""
 
     end_time: Annotated[Time, Positive]
-    ranks: Annotated[Count, Field(ge=1, le=4096)] = 1
+    """Simulated time at which the run ends; it begins at 0."""
+    ranks: Annotated[Count, Field(ge=1, le=MOST_RANKS)] = 1
+    """MPI processes that share the work. The answer does not depend on it."""
     cut_scale: tuple[Scale, Scale, Scale] = (1.0, 1.0, 1.0)
     """Positions are multiplied by this before the mesh is cut for the ranks: no cut is made across a direction that is
     short then. Small along the way of an impact, every rank gets a share of where it happens. The answer does not
@@ -259,10 +184,12 @@ class Run(Model):
     samples: Annotated[Count, Field(ge=1, le=1_000_000)] = 500
     """Number of lines of history.csv, evenly spaced."""
     max_steps: Annotated[Count, Field(ge=1)] = 100_000_000
+    """The run fails when it needs more."""
     max_wall_time: Annotated[Time, Positive] | None = None
-    """Counted from the first step."""
-    checkpoint_every: Annotated[Annotated[Time, Positive] | None, BeforeValidator(_off)] = 600.0
-    """Wall time between checkpoints; one is also written when a run is stopped by a signal or by ``max_wall_time``.
+    """The run stops, with a checkpoint, when it has taken longer.
+    Counted from the first step."""
+    checkpoint_every: Annotated[Annotated[Time, Positive] | None, BeforeValidator(_off), Switch()] = 600.0
+    """Wall time between checkpoints; one is also written when a run is stopped on request or by ``max_wall_time``.
     ``"none"``: then alone."""
     residual_limit: Annotated[Ratio, Positive] = 0.05
     """The run fails with cause ``energy`` when the energy residual passes this."""
@@ -276,41 +203,11 @@ class Balance(Model):
     rank has more than ``alpha`` times the outside nodes that it had at the last cut (Moon, Kim and Lee's trigger).
     ``every``: each so many steps."""
     alpha: Annotated[Ratio, Field(gt=1)] = 1.2
+    """Of ``policy = "outside"``: growth that a rank may have before it is cut anew."""
     every: Annotated[Count, Field(ge=1)] = 1000
+    """Of ``policy = "every"``: steps between two cuts."""
     weights: Literal["measured", "outside", "tets"] = "measured"
     """What is divided evenly: CPU time as measured, outside nodes, or tets."""
-
-
-Quantity = Literal[
-    "extent", "radius", "plastic_strain_max", "temperature_max", "speed_mean", "stress_max",
-    "probe_mean", "probe_max", "probe_min", "contact_time", "contact_loss", "penetration", "worst_residual",
-]  # fmt: skip
-
-
-class Reference(Model):
-    """A published or derived number that the finished run is compared with.
-
-    ``extent``: largest minus smallest coordinate of a part along ``axis``, m. ``radius``: largest distance of a
-    part's nodes from the line through the origin along ``axis``, m. ``plastic_strain_max``, ``temperature_max`` (K),
-    ``stress_max`` (largest |stress component|, Pa) over a part. ``speed_mean``: mass-mean velocity of a part along
-    ``axis``, m/s. ``probe_*``: of a history column between ``since`` and ``until``. ``contact_time``: last time at
-    which a wall or another body pushes, s. ``contact_loss``: energy lost by contact over the initial energy.
-    ``penetration``: how much of the thickness of all other parts along ``axis`` lies in front of the end of the hole
-    that a part has made in them round the axis through the origin, m; cavities ahead of the hole do not count. Nodes
-    without tets do not count for ``extent`` and ``radius``.
-    ``worst_residual``: of the energy ledger.
-    """
-
-    quantity: Quantity
-    value: float
-    tolerance: Annotated[float, Positive]
-    """Absolute, in SI as ``value``."""
-    source: str
-    part: Name | None = None
-    probe: Name | None = None
-    axis: Axis | None = None
-    since: Time = 0.0
-    until: Time | None = None
 
 
 Kind = TypeVar("Kind", Symmetry, Wall, Prescribed, Rotation, Gravity, Traction)
@@ -320,18 +217,30 @@ class Case(Model):
     """A whole case."""
 
     name: Name
+    """Of the case and of its runs."""
     title: str = ""
+    """One line for people."""
     description: str = ""
+    """What the case shows, for people."""
     materials: dict[Name, Material] = Field(default_factory=dict)
+    """Materials of the case's own, each under its name; they win over those of the library."""
     parts: Annotated[tuple[Part, ...], Field(min_length=1, max_length=256)]
+    """The bodies, in TOML one ``[[parts]]`` each."""
     boundaries: tuple[Boundary, ...] = ()
-    contact: Annotated[Contact | None, BeforeValidator(_off)] = Contact()
-    """``contact = "none"`` lets bodies pass through each other. A single part meets only itself, if it may."""
+    """What holds or drives nodes, in TOML one ``[[boundaries]]`` each; ``kind`` says which."""
+    contact: Annotated[Contact | None, BeforeValidator(_off), Switch()] = Contact()
+    """How bodies meet; they do by default. ``contact = "none"`` lets them pass through each other. A single part meets
+    only itself, if it may."""
     probes: tuple[Probe, ...] = ()
+    """Columns of history.csv, in TOML one ``[[probes]]`` each."""
     numerics: Numerics = Numerics()
+    """Pressure form, viscosity, time step."""
     run: Run
+    """The end, the ranks, what is written, when to stop."""
     balance: Balance = Balance()
+    """When tets move to other ranks."""
     reference: tuple[Reference, ...] = ()
+    """Numbers that the run is compared with, in TOML one ``[[reference]]`` each."""
 
     def boundaries_of(self, kind: type[Kind]) -> list[tuple[int, Kind]]:
         """The boundaries of one kind, each with its place in ``boundaries``."""

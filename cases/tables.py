@@ -2,7 +2,8 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, GetJsonSchemaHandler
+from pydantic_core import CoreSchema
 
 from .units import Length, Speed
 
@@ -27,7 +28,16 @@ Count = Annotated[int, BeforeValidator(_no_truth)]
 Direction = Annotated[tuple[float, float, float], BeforeValidator(_floats)]
 
 
+class Switch:
+    """In the JSON schema of a key: ``"none"`` is allowed as well."""
+
+    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """What pydantic asks an annotation for."""
+        schema = handler(core)
+        return {**schema, "anyOf": [*schema["anyOf"], {"const": "none"}]}
+
+
 class Model(BaseModel):
     """Base of everything in a case."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True)

@@ -10,9 +10,11 @@ A bare number is taken as SI. Errors name the text, what was wrong and what woul
 
 import math
 import re
+from dataclasses import dataclass
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, WithJsonSchema
+from pydantic import BeforeValidator, GetJsonSchemaHandler
+from pydantic_core import CoreSchema
 
 Dimension = tuple[int, int, int, int]
 """Exponents of metre, kilogram, second, kelvin."""
@@ -49,7 +51,11 @@ KINDS: dict[Dimension, str] = {
 """What a quantity of a dimension is called."""
 
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*")
+NUMBER = r"^\s*[+-]?(\d+\.?\d*|\.\d+)"
+"""How the text of a quantity begins, for the JSON schema."""
 _FACTOR = re.compile(r"\s*([*/·]?)\s*([A-Za-zµ%]+|1)(?:\^([+-]?\d))?")
+QUANTITY = "the quantity's"
+"""Stands for the unit of a number whose unit another key decides."""
 _LONGEST = 80
 """Characters of a quantity that are read: longer than any number with its unit. Chosen, so that a text that is no
 quantity costs no time."""
@@ -106,7 +112,7 @@ def _read_text(text: str, unit: str) -> float:
 
 def kind_of(unit: str) -> str:
     """``a length, in a unit such as 'm'``: what a quantity in ``unit`` is, for an error message."""
-    kind = KINDS.get(parse_unit(unit)[1], "a quantity")
+    kind = "an angle" if unit == "rad" else KINDS.get(parse_unit(unit)[1], "a quantity")
     return f"{kind}, in a unit such as {unit!r}" if unit else kind
 
 
@@ -117,20 +123,28 @@ def _reader(unit: str) -> BeforeValidator:
     return BeforeValidator(read)
 
 
-def _schema(unit: str) -> WithJsonSchema:
-    return WithJsonSchema({"type": ["number", "string"], "unit": unit, "examples": [f"1 {unit}".strip()]})
+@dataclass(frozen=True)
+class Written:
+    """In the JSON schema: a number, or text with a unit; ``unit`` is the SI unit that a bare number is taken in."""
+
+    unit: str
+
+    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """What pydantic asks an annotation for."""
+        return {**handler(core), "type": ["number", "string"], "unit": self.unit}
 
 
-Length = Annotated[float, _reader("m"), _schema("m")]
-Time = Annotated[float, _reader("s"), _schema("s")]
-Speed = Annotated[float, _reader("m/s"), _schema("m/s")]
-Acceleration = Annotated[float, _reader("m/s^2"), _schema("m/s^2")]
-Rate = Annotated[float, _reader("1/s"), _schema("1/s")]
-AngularSpeed = Annotated[float, _reader("rad/s"), _schema("rad/s")]
-Temperature = Annotated[float, _reader("K"), _schema("K")]
-Density = Annotated[float, _reader("kg/m^3"), _schema("kg/m^3")]
-Stress = Annotated[float, _reader("Pa"), _schema("Pa")]
-Area = Annotated[float, _reader("m^2"), _schema("m^2")]
-FractureEnergy = Annotated[float, _reader("J/m^2"), _schema("J/m^2")]
-SpecificHeat = Annotated[float, _reader("J/kg/K"), _schema("J/kg/K")]
-Ratio = Annotated[float, _reader(""), _schema("")]
+Length = Annotated[float, _reader("m"), Written("m")]
+Time = Annotated[float, _reader("s"), Written("s")]
+Speed = Annotated[float, _reader("m/s"), Written("m/s")]
+Acceleration = Annotated[float, _reader("m/s^2"), Written("m/s^2")]
+Rate = Annotated[float, _reader("1/s"), Written("1/s")]
+AngularSpeed = Annotated[float, _reader("rad/s"), Written("rad/s")]
+Temperature = Annotated[float, _reader("K"), Written("K")]
+Density = Annotated[float, _reader("kg/m^3"), Written("kg/m^3")]
+Stress = Annotated[float, _reader("Pa"), Written("Pa")]
+Area = Annotated[float, _reader("m^2"), Written("m^2")]
+FractureEnergy = Annotated[float, _reader("J/m^2"), Written("J/m^2")]
+SpecificHeat = Annotated[float, _reader("J/kg/K"), Written("J/kg/K")]
+Angle = Annotated[float, _reader("rad"), Written("rad")]
+Ratio = Annotated[float, _reader(""), Written("")]

@@ -1,12 +1,15 @@
 """Commands that measure."""
 
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from conoid.cases.problems import shown
 from conoid.cases.run import ExitCode
+from conoid.cases.schema import MOST_RANKS
 from conoid.cases.units import parse_quantity
 
 from . import chart, study
@@ -37,11 +40,8 @@ def bench_scale(
 
     Ends with 1 when they do not.
     """
-    try:
-        numbers = [int(word) for word in ranks.split(",")]
-        network = Network(parse_quantity(latency, "s"), bandwidth(width))
-    except ValueError as error:
-        raise ClientError(str(error)) from None
+    numbers = _numbers(ranks)
+    network = Network(_read("--latency", latency, _time), _read("--bandwidth", width, bandwidth))
     with tempfile.TemporaryDirectory() as passing:
         runs = []
         for run in scale(case, overrides or (), numbers, out or Path(passing), network):
@@ -54,3 +54,24 @@ def bench_scale(
         (out / "scale.svg").write_text(chart.speed_up(done), encoding="utf-8")
     typer.echo(study.to_markdown(done), nl=False)
     raise typer.Exit(ExitCode.SUCCEEDED if done.equal else ExitCode.CRASHED)
+
+
+def _numbers(text: str) -> list[int]:
+    """Numbers of ranks such as ``1,2,4``. Raises ClientError."""
+    words = [word.strip() for word in text.split(",")]
+    if not all(word.isascii() and word.isdigit() and 1 <= int(word[:9]) <= MOST_RANKS for word in words):
+        message = f"allowed: whole numbers from 1 to {MOST_RANKS} with commas between them, such as 1,2,4"
+        raise ClientError(f"--ranks = {shown(text)}: {message}")
+    return [int(word) for word in words]
+
+
+def _read(option: str, text: str, reading: Callable[[str], float]) -> float:
+    """What an option says. Raises ClientError that names it."""
+    try:
+        return reading(text)
+    except ValueError as error:
+        raise ClientError(f"{option} = {shown(text)}: {str(error).removeprefix(f'{text!r} ')}") from None
+
+
+def _time(text: str) -> float:
+    return parse_quantity(text, "s")

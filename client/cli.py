@@ -2,6 +2,7 @@
 
 import os
 import sys
+from importlib import metadata
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,18 +12,19 @@ from typer.core import TyperGroup
 
 from conoid.cases import layout
 from conoid.cases.estimate import estimate
-from conoid.cases.load import CaseError
+from conoid.cases.load import CaseError, parse_case
+from conoid.cases.plausible import doubts
 from conoid.cases.run import ExitCode, State
 
-from . import benches, reports, tables
+from . import benches, reports, shelf, tables
 from .errors import ClientError, ServiceError
 from .live import Live, exit_code
 from .once import run_once
-from .options import CaseArgument, Json, Overrides, Token, Url, complain, find, show, show_json
+from .options import CaseArgument, Json, Overrides, Token, Url, complain, find, show, show_json, warn, warn_of
 from .pictures import FIELDS
 from .run import Run
 from .session import connect
-from .submission import case_of, locate
+from .submission import data_of, locate
 from .view import view
 from .watch import watch
 
@@ -48,10 +50,26 @@ class Guarded(TyperGroup):
 
 
 app = typer.Typer(
-    cls=Guarded, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None,
+    cls=Guarded, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None,
     help="Impact simulations: submit them, watch them, look at them.",
 )  # fmt: skip
 app.add_typer(benches.bench, name="bench")
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"conoid {metadata.version('conoid')}")
+        raise typer.Exit
+
+
+@app.callback()
+def every(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and end.")
+    ] = False,
+) -> None:
+    """Impact simulations: submit them, watch them, look at them."""
+
 
 RunArgument = Annotated[str, typer.Argument(metavar="RUN", help="The id of a run, or 'last'.")]
 FieldOption = Annotated[str, typer.Option("--field", help=f"What to colour by: {', '.join(FIELDS)}.")]
@@ -72,13 +90,21 @@ def serve(ctx: typer.Context) -> None:
 
 @app.command(short_help="Check a case and estimate what it needs.")
 def validate(case: CaseArgument, overrides: Overrides = None, as_json: Json = False) -> None:
-    """Check a case and estimate what it needs; no server is asked."""
-    checked = case_of(case, overrides or ())
+    """Check a case: what is wrong with it, what is odd, what its parts bring along and what it needs.
+
+    No server is asked. Warnings go to standard error and leave the exit code 0.
+    """
+    data = data_of(case, overrides or ())
+    checked = parse_case(data)
     expected = estimate(checked, locate(case).parent)
+    odd = doubts(data, checked, expected)
     if as_json:
-        show_json({"name": checked.name, "valid": True, "estimate": expected})
+        show_json({"name": checked.name, "valid": True, "warnings": odd, "estimate": expected})
         return
-    show(f"{checked.name}: valid")
+    warn(odd)
+    show(f"{checked.name}: valid{f', {len(odd)} warning' + 's' * (len(odd) > 1) if odd else ''}")
+    show(tables.parts_table(checked, expected))
+    show("")
     show(tables.estimate_table(expected))
 
 
@@ -92,6 +118,7 @@ def submit(
     as_json: Json = False,
 ) -> None:
     """Hand a case to the server; prints the run's id."""
+    warn_of(case, overrides or ())
     with connect(url, token) as session:
         run = session.submit(case, overrides or (), key)
         if as_json:
@@ -273,7 +300,13 @@ def run_case(
 ) -> None:
     """Do it all here: start a server, submit, watch, check, draw, stop the server. Ctrl-C cancels the run."""
     chosen = [*(overrides or ()), *([f"run.ranks={ranks}"] if ranks is not None else [])]
+    warn_of(case, chosen)
     raise typer.Exit(run_once(case, chosen, out, picture, field, plain=plain, check=check, as_json=as_json))
+
+
+app.add_typer(shelf.cases, name="cases")
+app.command(short_help="Print the keys of a case, for editors or people.")(shelf.schema)
+app.command(short_help="List the material library, or one material.")(shelf.materials)
 
 
 def main() -> None:

@@ -98,7 +98,7 @@ def _number_rows(live: Live) -> list[list[str]]:
         rows.append(["elements", count(elements), "nodes", count(nodes), "speed", speed])
     if counts is not None:
         shared = f"{count(counts.shared)} nodes"
-        rows.append(["shared", shared, "bodies", count(counts.fragments), "frames", str(live.frames)])
+        rows.append(["shared", shared, "fragments", count(counts.fragments), "frames", str(live.frames)])
         if counts.particles:
             rows.append(["particles", f"{count(counts.particles)} nodes", "", "", "", ""])
     return rows

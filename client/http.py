@@ -23,6 +23,8 @@ _TIMEOUT = httpx2.Timeout(30.0, connect=5.0)
 """s: an answer may take a while when a disk is slow, a connection may not. Chosen."""
 _STREAM_TIMEOUT = httpx2.Timeout(60.0, connect=5.0)
 """s of silence on a stream: four times the 15 s after which the server sends a comment (server/stream.py)."""
+UNAUTHORIZED = 401
+"""HTTP's status of a request without a valid token."""
 _TRIES = 3
 """Times a request is sent that may be repeated, 0.3 and 0.6 s apart. Chosen: a lost connection is back by then."""
 
@@ -50,6 +52,7 @@ class Http:
         """Connects at the first request. ``transport`` replaces the network, for a server in the same process."""
         headers = {"Authorization": f"Bearer {token}"} if token else {}
         self.url = url.rstrip("/")
+        self._has_token = bool(token)
         self._http = httpx2.Client(base_url=self.url, headers=headers, timeout=_TIMEOUT, transport=transport)
 
     def __enter__(self) -> Self:
@@ -125,12 +128,25 @@ class Http:
         try:
             with self._http.stream(method, path, **options) as response:
                 if response.status_code >= 300:
-                    raise ServiceError(response.status_code, _problem(response))
+                    raise ServiceError(response.status_code, self._refusal(response))
                 yield response
         except httpx2.InvalidURL as error:
             raise UnreachableError(f"url = {self.url!r}: {error}") from None
         except httpx2.TransportError as error:
             raise UnreachableError(f"no answer from {self.url}: {_reason(error)}") from None
+
+    def _refusal(self, response: httpx2.Response) -> Mapping[str, Any]:
+        """What the server said; where it misses a token, which way one is given to this client."""
+        told = _problem(response)
+        if response.status_code != UNAUTHORIZED:
+            return told
+        if self._has_token:
+            hint = "the one of --token, CONOID_TOKEN or the configuration file is not known there, or was revoked"
+        else:
+            hint = (
+                "none was sent: set CONOID_TOKEN, or give --token; the operator makes one with conoid serve token add"
+            )
+        return {**told, "hint": hint}
 
     def _decoded(self, kind: type[T], response: httpx2.Response) -> T:
         try:

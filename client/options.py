@@ -1,7 +1,7 @@
 """What the commands have in common: options, how a run is found, how things are printed."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,15 +9,53 @@ import msgspec
 import typer
 from rich.console import Console, RenderableType
 
+from conoid.cases.estimate import estimate
+from conoid.cases.load import CaseError, materials, parse_case, shipped
+from conoid.cases.plausible import doubts
+from conoid.cases.problems import Problem
+
 from .errors import ClientError
 from .result import Result
 from .run import Run
 from .session import Session, connect
+from .submission import data_of, locate
+
+_MOST_WARNINGS = 12
+"""Lines of warnings that are printed. Chosen: half a screen."""
 
 Url = Annotated[str | None, typer.Option("--url", help="The server [CONOID_URL, or the configuration file].")]
 Token = Annotated[str | None, typer.Option("--token", help="Who asks [CONOID_TOKEN, or the configuration file].")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
-CaseArgument = Annotated[str, typer.Argument(metavar="CASE", help="A .toml or .json file, or a shipped case by name.")]
+
+
+def complete_cases(incomplete: str) -> list[str]:
+    """Names of shipped cases, for the shell."""
+    return [name for name in shipped() if name.startswith(incomplete)]
+
+
+def complete_materials(incomplete: str) -> list[str]:
+    """Names of the material library, for the shell."""
+    return [name for name in materials() if name.startswith(incomplete)]
+
+
+def _complete_files(incomplete: str) -> list[str]:
+    """Shipped cases, case files and folders, for the shell."""
+    folder, _, start = incomplete.rpartition("/")
+    try:
+        found = sorted(Path(folder or ("/" if incomplete.startswith("/") else ".")).iterdir())
+    except OSError:
+        found = []
+    near = [path for path in found if path.name.startswith(start) and not path.name.startswith(".")]
+    files = [path for path in near if path.suffix in (".toml", ".json") or path.is_dir()]
+    return [*complete_cases(incomplete), *(f"{path}/" if path.is_dir() else str(path) for path in files)]
+
+
+CaseArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="CASE", help="A .toml or .json file, or a shipped case by name.", autocompletion=_complete_files
+    ),
+]
 Overrides = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Change a key of the case, as run.end_time='20 us'."),
@@ -29,6 +67,21 @@ def complain(*lines: str) -> None:
     """Tells people what is wrong, a line each."""
     for line in lines:
         typer.echo(f"conoid: {line}", err=True)
+
+
+def warn(odd: Sequence[Problem]) -> None:
+    """Tells people what is odd, a line each, and how many more there are."""
+    complain(*(f"warning: {each}" for each in odd[:_MOST_WARNINGS]))
+    if len(odd) > _MOST_WARNINGS:
+        complain(f"warning: and {len(odd) - _MOST_WARNINGS} more; conoid validate --json has all")
+
+
+def warn_of(case: str, overrides: Iterable[str]) -> None:
+    """Tells what is odd with a case that is about to run; what is wrong with it is told by who runs it."""
+    with suppress(CaseError, ArithmeticError):
+        data = data_of(case, overrides)
+        checked = parse_case(data)
+        warn(doubts(data, checked, estimate(checked, locate(case).parent)))
 
 
 def show(thing: RenderableType) -> None:

@@ -7,9 +7,13 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from conoid.cases.estimate import Estimate
+from conoid.cases.estimate import Estimate, estimate
+from conoid.cases.library import Constant
+from conoid.cases.materials import Material
 from conoid.cases.outcome import Check, Outcome
+from conoid.cases.placed import Bulk
 from conoid.cases.run import State
+from conoid.cases.schema import Case
 
 from .display import STATE_STYLE
 from .figures import count, day, duration, number, si
@@ -17,17 +21,15 @@ from .replay import Account
 from .run import RunInfo
 
 
-def table(*columns: str, right: Sequence[str] = ()) -> Table:
-    """An open table with these columns; those named in ``right`` are numbers."""
+def table(*columns: str, right: Sequence[str] = (), wide: str = "case") -> Table:
+    """An open table with these columns; those named in ``right`` are numbers, ``wide`` is wrapped where need be."""
     made = Table(box=box.SIMPLE_HEAD, header_style="bold", pad_edge=False, show_edge=False, padding=(0, 1, 0, 0))
     for column in columns:
-        made.add_column(
-            column, justify="right" if column in right else "left", overflow="fold", no_wrap=column != "case"
-        )
+        made.add_column(column, justify="right" if column in right else "left", overflow="fold", no_wrap=column != wide)
     return made
 
 
-def pairs(entries: Mapping[str, str | Text]) -> Table:
+def pairs(entries: Mapping[str, str] | Mapping[str, str | Text]) -> Table:
     """Names and values in two columns; entries without a value are left out."""
     grid = Table.grid(padding=(0, 2))
     grid.add_column(style="bright_black", no_wrap=True)
@@ -87,8 +89,62 @@ def estimate_table(expected: Estimate) -> Table:
     })  # fmt: skip
 
 
+def parts_table(case: Case, expected: Estimate) -> Table:
+    """What is modelled of each part, about: its size, and what it brings along at the start."""
+    right = ("tets", "mass", "extent", "momentum", "energy")
+    made = table("part", "material", *right, right=right, wide="material")
+    for part, size in zip(case.parts, expected.parts, strict=True):
+        tets = "–" if size.elements is None else count(size.elements)
+        made.add_row(part.name, part.material, tets, *(_brings(size.bulk) if size.bulk is not None else "–" * 4))
+    return made
+
+
+def _brings(bulk: Bulk) -> tuple[str, str, str, str]:
+    """Mass, extent, momentum and kinetic energy."""
+    mass = si(1e3 * bulk.mass, "g") if bulk.mass < 1.0 else f"{bulk.mass:.3g} kg"
+    momentum = math.hypot(*bulk.momentum)
+    return mass, _extent(bulk.extent), si(momentum, "N s"), si(bulk.energy, "J")
+
+
+def _extent(lengths: tuple[float, float, float]) -> str:
+    """``6 x 6 x 30 mm``."""
+    unit, scale = next(((u, s) for u, s in (("m", 1.0), ("mm", 1e3)) if max(lengths) * s >= 1.0), ("µm", 1e6))
+    return f"{' x '.join(f'{scale * length:.3g}' for length in lengths)} {unit}"
+
+
 def _about(value: float | None, shown: Callable[[float], str]) -> str:
     return "–" if value is None else f"about {shown(value)}"
+
+
+def cases_table(cases: Mapping[str, Case]) -> Table:
+    """One line a shipped case, with the CPU time that it takes, about."""
+    made = table("case", "title", "tets", "core time", right=("tets", "core time"), wide="title")
+    for name, case in cases.items():
+        expected = estimate(case)
+        tets, core = expected.elements, expected.core_seconds
+        made.add_row(name, case.title, "–" if tets is None else count(tets), "–" if core is None else duration(core))
+    return made
+
+
+def materials_table(materials: Mapping[str, Material]) -> Table:
+    """One line a material of the library."""
+    made = table("material", "kg/m^3", "what it is", right=("kg/m^3",), wide="what it is")
+    for name, each in sorted(materials.items()):
+        made.add_row(name, number(each.density), each.description)
+    return made
+
+
+def constants_table(constants: Sequence[Constant]) -> Table:
+    """One line a constant: how sure it is, and the key of its source."""
+    made = table("key", "value", "known", "source", right=("value",))
+    for each in constants:
+        made.add_row(each.key, each.value, each.confidence, each.source)
+    return made
+
+
+def sources_table(constants: Sequence[Constant]) -> Table:
+    """What the keys of the sources stand for."""
+    return pairs({each.source: each.cited for each in constants})
 
 
 def outcome_table(outcome: Outcome) -> Table:

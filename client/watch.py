@@ -83,4 +83,5 @@ def tell(messages: Iterable[AnyMessage], known: Live, write: Callable[[str], Non
 
 def _waiting(known: Live) -> str:
     lasting = f", for {duration(time.time() - known.changed)}" if known.changed else ""
-    return f"{clock(time.time())}  {known.run}  still {known.state.value}{lasting}"
+    at = f": {known.message}" if known.message else ""
+    return f"{clock(time.time())}  {known.run}  still {known.state.value}{lasting}{at}"

@@ -9,7 +9,7 @@ from fastapi.staticfiles import StaticFiles
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from . import errors
+from . import errors, openapi
 from .bell import Bell
 from .launch.local import LocalLauncher
 from .routes import cases, events, files, health, logs, me, runs
@@ -75,6 +75,7 @@ def build_app(service: Service) -> FastAPI:
     )
     app.state.service = service
     errors.install(app)
+    openapi.install(app)
     app.add_middleware(_SafeHeaders)
     for router in ROUTERS:
         app.include_router(router)

@@ -195,7 +195,8 @@ def _exited(run: Run, event: WorkerExited, now: float) -> Next:
     told = event.outcome if event.outcome is not None and _readable(event.outcome) else None
     outcome = told or _without_outcome(run, event)
     if run.stopping_for is Cause.WALLTIME and outcome.state == State.CANCELLED:
-        outcome = msgspec.structs.replace(outcome, state=State.TIMED_OUT, cause=Cause.WALLTIME)
+        message = "its wall time is used up"
+        outcome = msgspec.structs.replace(outcome, state=State.TIMED_OUT, cause=Cause.WALLTIME, message=message)
     return _end(run, now, outcome, written=outcome is event.outcome)
 
 

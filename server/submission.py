@@ -9,7 +9,7 @@ from typing import Any
 from sqlalchemy.exc import SQLAlchemyError
 
 from conoid.cases.estimate import Estimate, estimate
-from conoid.cases.load import CaseError, Problem, parse_json, parse_toml, resolved_json
+from conoid.cases.load import CaseError, Problem, json_data, parse_case, resolved_json, toml_data
 from conoid.cases.schema import Case
 
 from . import folder, limits
@@ -31,6 +31,8 @@ class Reading:
 
     case: Case
     estimate: Estimate
+    data: dict[str, Any]
+    """The case as it was written."""
 
 
 class Desk:
@@ -44,7 +46,8 @@ class Desk:
     def read(self, body: bytes, content_type: str) -> Reading:
         """The case in ``body``. Raises CaseError with every problem, ServiceError 415."""
         text = _text(body)
-        case = parse_json(text) if _file_name(content_type) == "case.json" else parse_toml(text)
+        data = json_data(text) if _file_name(content_type) == "case.json" else toml_data(text)
+        case = parse_case(data)
         if problems := limits.check(case, self._settings):
             raise CaseError(problems)
         try:
@@ -53,7 +56,7 @@ class Desk:
             raise CaseError([Problem("parts", "", "the elements are too many or too small to be counted")]) from None
         if problems := limits.check_size(expected, self._settings.caps):
             raise CaseError(problems)
-        return Reading(case, expected)
+        return Reading(case, expected, data)
 
     def submit(self, owner: str, body: bytes, content_type: str, key: str | None) -> dict[str, Any]:
         """Accepts a run and returns its receipt: the same one for the same key and body.

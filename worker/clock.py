@@ -68,6 +68,11 @@ class Clock:
         return self.mean_dt
 
     @property
+    def told(self) -> float:
+        """The step for people, s: the one ahead, and the one behind when none is ahead any more."""
+        return self.dt if self.dt > 0.0 else self.last_dt
+
+    @property
     def collapsed(self) -> bool:
         """Whether the stable step has fallen so far below the first that the run would not end."""
         return self._stable < COLLAPSE * self._first

@@ -14,7 +14,7 @@ from conoid.cases.outcome import Outcome
 from conoid.cases.run import State
 from conoid.cases.schema import Case
 
-from . import digest, reference, simulation
+from . import digest, domain, reference, simulation
 from .balance import Balance
 from .errors import InputError, PhysicsError
 from .jit import cpu_time
@@ -40,10 +40,12 @@ def compute(
 
     With ``restart`` from the latest checkpoint that is there. Raises ConoidError.
     """
+    say = journal.starting if journal is not None else domain.quiet
     if restart:
+        say("reading the latest checkpoint")
         sim, start = _resumed(case, folder, comm)
     else:
-        sim = simulation.build(case, meshes, comm)
+        sim = simulation.build(case, meshes, comm, say)
         start = Start(sim.model.elements_global, sim.model.nodes_global, reference.thicknesses(sim))
     if comm.rank == 0:
         rewind.rewind(folder, sim.clock.step, sim.clock.frame)

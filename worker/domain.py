@@ -5,7 +5,9 @@ of the parts and, within a part, the order of the mesh: they do not know how man
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -44,6 +46,8 @@ from .state import (
 
 GROUPS = 256
 """Parts of the mesh whose loads are told (worker/groups.py)."""
+Say = Callable[[str], None]
+"""Tells what the start is at."""
 _JITTER = 0x6A697474
 """Seed of the random velocities of the start."""
 
@@ -100,12 +104,17 @@ class Piece:
     """Largest coordinate of the whole, m."""
 
 
-def assemble(case: schema.Case, folder: Path) -> Whole:
+def quiet(what: str) -> None:
+    """Nobody hears what the start is at."""
+
+
+def assemble(case: schema.Case, folder: Path, say: Say = quiet) -> Whole:
     """Builds the meshes of all parts; ``folder`` is where relative mesh paths start. Raises MeshError."""
     points, tets, node_part, tet_part, density = [], [], [], [], []
     offset = 0
     for index, part in enumerate(case.parts):
-        mesh = build_mesh(part.mesh, folder, key=f"parts[{index}].mesh")
+        meshing = f"meshing {part.name}, part {index + 1} of {len(case.parts)}"
+        mesh = build_mesh(part.mesh, folder, key=f"parts[{index}].mesh", made=partial(say, meshing))
         points.append(mesh.points if part.turn is None else _turned(mesh.points, part.turn))
         tets.append(mesh.tets.astype(np.int64) + offset)
         node_part.append(np.full(len(mesh.points), index, np.int32))
@@ -272,13 +281,18 @@ def _piece(
     )  # fmt: skip
 
 
-def build(case: schema.Case, folder: Path, comm: Comm) -> tuple[Model, Piece]:
-    """This rank's model. Raises MeshError on every rank when rank 0 cannot build a mesh."""
+def build(case: schema.Case, folder: Path, comm: Comm, say: Say = quiet) -> tuple[Model, Piece]:
+    """This rank's model; rank 0 calls ``say`` with what it is at.
+
+    Raises MeshError on every rank when rank 0 cannot build a mesh.
+    """
     pieces: list[Piece] | None = None
     failure: Exception | None = None
     if comm.rank == 0:
         try:
-            pieces = cut(assemble(case, folder), comm.size, case.run.cut_scale)
+            whole = assemble(case, folder, say)
+            say(f"cutting {len(whole.tets)} tets for {comm.size} rank{'s' if comm.size > 1 else ''}")
+            pieces = cut(whole, comm.size, case.run.cut_scale)
         except Exception as error:
             failure = error
     failure = comm.broadcast(failure)

@@ -26,7 +26,7 @@ from .state import Floats
 CANCELLED, WALL_TIME, MAX_STEPS = 1, 2, 3
 """Reasons to stop early, in the reduction of the step: the largest wins."""
 STOPS = {
-    CANCELLED: (State.CANCELLED, Cause.CANCELLED, "stopped by a signal"),
+    CANCELLED: (State.CANCELLED, Cause.CANCELLED, "stopped on request"),
     WALL_TIME: (State.TIMED_OUT, Cause.WALLTIME, "run.max_wall_time is used up"),
     MAX_STEPS: (State.FAILED, Cause.DIVERGED, "run.max_steps is used up before run.end_time"),
 }
@@ -195,7 +195,7 @@ class Loop:
         limiter = sim.limiter()
         if self._history is not None:
             extra = [*sim.ledger.momentum, *probes]
-            self._history.write(clock.step, clock.t, clock.dt, limiter, self.energy, extra)
+            self._history.write(clock.step, clock.t, clock.told, limiter, self.energy, extra)
         if not self.energy.residual <= sim.case.run.residual_limit:
             raise EnergyError(
                 f"the energy residual {self.energy.residual:.3g} passed run.residual_limit "
@@ -237,12 +237,12 @@ class Loop:
         now = time.monotonic()
         if now - self._logged > _LOG_EVERY:
             self._logged = now
-            log.info("step %d, t %.4g s, dt %.3g s, %s", clock.step, clock.t, clock.dt, limiter)
+            log.info("step %d, t %.4g s, dt %.3g s, %s", clock.step, clock.t, clock.told, limiter)
         elapsed = now - self._reported
         self._pace.add(clock.t, now)
         if self.energy is not None:
             self._tell(
-                messages.Progress, end_time=sim.case.run.end_time, dt=clock.dt, limiter=limiter,
+                messages.Progress, end_time=sim.case.run.end_time, dt=clock.told, limiter=limiter,
                 eta=self._pace.left(sim.case.run.end_time - clock.t), energy=self.energy,
                 updates_per_second=(self.updates - self._reported_updates) / elapsed,
             )  # fmt: skip

@@ -170,7 +170,7 @@ def _say(journal: Journal | None, what: str) -> None:
     """Tells what the start is at."""
     log.info(what)
     if journal is not None:
-        journal.write(messages.Status, state=State.STARTING, message=what)
+        journal.starting(what)
 
 
 def _close(outcome: Outcome, folder: Path, journal: Journal, telemetry: "Telemetry | None") -> None:

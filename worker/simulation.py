@@ -94,7 +94,7 @@ class Simulation:
         if self.limit > self.reduction.limit:
             return "contact: speed of approach"
         why = "stability" if stable * self.reduction.limit >= 0.999 * self.case.numerics.dt_safety else "growth"
-        if self.clock.dt < 0.9 * stable:
+        if self.clock.told < 0.9 * stable:
             why = "output time"
         return f"{why}: {self.limiting_tet()}"
 
@@ -118,9 +118,13 @@ class Simulation:
         return fixed_point.scale_for(max(self.reduction.force, self.floor))
 
 
-def build(case: Case, folder: Path, comm: Comm) -> Simulation:
-    """Meshes, cuts and distributes the case. Raises InputError on every rank alike."""
-    model, piece = domain.build(case, folder, comm)
+def build(case: Case, folder: Path, comm: Comm, say: domain.Say = domain.quiet) -> Simulation:
+    """Meshes, cuts and distributes the case; rank 0 calls ``say`` with what it is at.
+
+    Raises InputError on every rank alike.
+    """
+    model, piece = domain.build(case, folder, comm, say)
+    say("setting up the first step")
     scene = conditions.build(case, model, piece.loads)
     conditions.start(case, model, scene, comm)
     sim = _assemble(case, model, piece.neighbours, scene, piece.node_volume, comm, Timers(comm))

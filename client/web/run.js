@@ -197,7 +197,7 @@ export class RunPage {
       entry("elements", count(counts?.elements ?? started?.elements)),
       entry("nodes", count(counts?.nodes ?? started?.nodes)),
       entry("shared nodes", count(counts?.shared)),
-      entry("bodies", count(counts?.fragments)),
+      entry("fragments", count(counts?.fragments)),
       counts?.particles ? entry("particles", count(counts.particles)) : "");
   }
 

@@ -4,8 +4,11 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Response
 
+from conoid.cases import reference
 from conoid.cases.load import CaseError, read_case, shipped
+from conoid.cases.plausible import doubts
 
+from .. import openapi
 from ..auth import Reader, Submitter
 from ..errors import entry, not_found
 from ..limits import figures
@@ -15,17 +18,24 @@ from .runs import Body
 router = APIRouter()
 
 
-@router.post("/v1/cases:validate")
+@router.post("/v1/cases:validate", openapi_extra=openapi.CASE_BODY)
 def validate(
     service: ServiceOf, identity: Submitter, body: Body, content_type: Annotated[str, Header()] = ""
 ) -> dict[str, Any]:
-    """Whether the case could be submitted: every problem at once, or the estimate and the case with all defaults."""
+    """Whether the case could be submitted: every problem at once, or warnings, estimate, the case with all defaults."""
     try:
         reading = service.desk.read(body, content_type)
     except CaseError as error:
         return {"valid": False, "problems": [entry(problem) for problem in error.problems]}
     case = reading.case.model_dump(mode="json")
-    return {"valid": True, "problems": [], "estimate": figures(reading.estimate), "case": case}
+    odd = [entry(doubt) for doubt in doubts(reading.data, reading.case, reading.estimate)]
+    return {"valid": True, "problems": [], "warnings": odd, "estimate": figures(reading.estimate), "case": case}
+
+
+@router.get("/v1/case.schema.json")
+def schema() -> Response:
+    """The JSON schema of a case: the file that the first line of a shipped case names. Asks for no token."""
+    return Response(reference.schema_text(), media_type="application/schema+json")
 
 
 @router.get("/v1/cases")

@@ -10,7 +10,7 @@ from starlette.concurrency import run_in_threadpool
 from conoid.cases import layout
 from conoid.cases.run import State
 
-from .. import view
+from .. import openapi, view
 from ..auth import Identity, Reader, Submitter
 from ..errors import ServiceError, not_found
 from ..lifecycle import Run
@@ -23,7 +23,7 @@ MAX_WAIT = 60.0
 """s that ``?wait=`` may ask for."""
 
 
-@router.post("/v1/runs", status_code=202)
+@router.post("/v1/runs", status_code=202, openapi_extra=openapi.CASE_BODY)
 def submit(
     service: ServiceOf,
     identity: Submitter,

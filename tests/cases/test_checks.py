@@ -78,7 +78,7 @@ def test_the_rod_is_sound() -> None:
         (["contact={friction=-0.1}"], "contact.friction", "greater than or equal to 0"),
         (["contact={domain='sphere'}"], "contact.domain", "'arbitrary' or 'box'"),
         (["parts[0].material=steel_42crmo4", "parts[0].temperature=2000"], "parts[0].temperature", "melts"),
-        (["parts[0].erosion={plastic_strain=1}"], "parts[0].erosion.plastic_strain", "steel has no strength"),
+        (["parts[0].erosion={plastic_strain=1}"], "parts[0].erosion.plastic_strain", "steel is elastic"),
         (["parts[0].erosion={plastic_strain=0}"], "parts[0].erosion.plastic_strain", "greater than 0"),
         (["parts[0].erosion={volume=[0, 2]}"], "parts[0].erosion.volume[0]", "greater than 0"),
         (["parts[0].erosion={volume=[2, 3]}"], "parts[0].erosion.volume[0]", "less than 1"),
@@ -104,9 +104,11 @@ def test_names_are_unique() -> None:
     found = [(p.key, p.message) for p in problems(*_as_overrides(data))]
     assert found == [
         ("parts[1].name", "parts[0] has this name; give each its own"),
+        ("parts[1].mesh", found[1][1]),
         ("boundaries[3].name", "an earlier wall has this name; give each its own"),
         ("probes[1].name", "probes[0] has this name; give each its own"),
     ]
+    assert "overlaps" in found[1][1]
 
 
 def _as_overrides(data: dict[str, object]) -> list[str]:

@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner, Result
 
+from conoid.cases.load import read_case, resolved_json, shipped_path
 from conoid.client.cli import app
 from conoid.client.local import LocalServer
 
@@ -64,6 +65,42 @@ def test_validate_tells_every_error_and_ends_with_2(quiet_home: Path) -> None:
     said = result.stderr.splitlines()
     assert said[0].startswith("conoid: run.ranks = 'many': ")
     assert said[1:] == ["conoid: run.end_tim: unknown key; did you mean 'end_time'?"]
+
+
+def test_validate_tells_what_parts_bring_along(quiet_home: Path) -> None:
+    shown = conoid("validate", "demo").stdout
+    line = next(line for line in shown.splitlines() if line.startswith("rod"))
+    assert " ".join(line.split()) == "rod steel_42crmo4 25 920 4.08 g 3.2 x 6.4 x 32.4 mm 1.17 N s 168 J"
+    for word in ("steps", "memory", "core time"):
+        assert word in shown
+    (rod,) = read(conoid("validate", "demo", "--json"))["estimate"]["parts"]
+    assert rod["bulk"]["energy"] == pytest.approx(168.1, rel=1e-3)
+
+
+def test_validate_warns_of_a_bare_number_and_what_it_comes_to(quiet_home: Path) -> None:
+    result = conoid("validate", "demo", "--set", "run.end_time=80")
+    assert result.exit_code == 0
+    assert result.stdout.startswith("demo: valid, 3 warnings\n")
+    assert result.stderr.splitlines()[0] == "conoid: warning: run.end_time = 80: no unit, taken for 80 s"
+    assert "hours of core time" in result.stderr
+    warnings = read(conoid("validate", "demo", "--set", "run.end_time=80", "--json"))["warnings"]
+    assert warnings[0] == {"key": "run.end_time", "value": "80", "message": "no unit, taken for 80 s"}
+    assert conoid("validate", "demo").stderr == ""
+
+
+def test_warnings_of_a_case_in_si_do_not_fill_the_screen(quiet_home: Path) -> None:
+    (quiet_home / "si.json").write_bytes(resolved_json(read_case(shipped_path("long_rod"))))
+    said = conoid("validate", "si.json").stderr.splitlines()
+    assert len(said) == 13
+    assert said[-1].endswith(" more; conoid validate --json has all")
+
+
+def test_a_case_that_is_about_to_run_is_doubted_too(user: Path) -> None:
+    path = case_file(user, steps=1)
+    path.write_text(path.read_text().replace('end_time = "1 us"', "end_time = 1e-6"))
+    result = conoid("submit", path)
+    assert result.exit_code == 0
+    assert "conoid: warning: run.end_time = 1e-06: no unit, taken for 1e-06 s" in result.stderr.splitlines()
 
 
 @pytest.mark.parametrize("words", [("ls",), ("submit", "demo"), ("watch", "last"), ("show", "x"), ("cancel", "x")])

@@ -80,7 +80,7 @@ def test_the_panel_shows_everything_that_is_watched() -> None:
     for shown in (
         "A bar", "running", "50.0 %", "40.0 µs of 80.0 µs", "8.10 ns", "tet 7 (bar): sound speed", "30 s",
         "9.70 M updates/s", "rank 0", "65 % busy", "35 % busy", "imbalance 1.20", "kinetic", "6.00 J", "2.0e-04",
-        "the foot has folded", "310 nodes",
+        "the foot has folded", "310 nodes", "fragments",
     ):  # fmt: skip
         assert shown in text, shown
     assert "elastic" not in text, "terms that are zero are left out"
@@ -131,13 +131,14 @@ def test_a_silent_run_is_heard_of(monkeypatch: pytest.MonkeyPatch) -> None:
             heard.set()
 
     def story() -> Iterator[AnyMessage]:
-        yield stories.status(1, "starting")
+        yield stories.status(1, "starting", message="meshing tile, part 2 of 3")
         assert heard.wait(30.0)
         yield stories.status(2, "running")
 
     tell(story(), Live(stories.RUN), write)
-    assert lines[0].endswith("starting")
+    assert lines[0].endswith("starting  meshing tile, part 2 of 3")
     assert "still starting, for " in lines[1]
+    assert lines[1].endswith(": meshing tile, part 2 of 3")
     assert lines[-1].endswith("running")
 
 

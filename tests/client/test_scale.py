@@ -118,6 +118,16 @@ def test_what_cannot_be_read_is_one_line(option: str, value: str) -> None:
     result = conoid("demo", option, value)
     assert result.exit_code == 1
     assert len(result.stderr.splitlines()) == 1
+    assert result.stderr.startswith(f"conoid: {option} = '{value}': ")
+
+
+@pytest.mark.parametrize("ranks", ["two", "0", "-1", "1,,2", "1 2", "2.5", "4097", "9" * 5000, "²", ""])
+def test_numbers_of_ranks_that_cannot_be(ranks: str) -> None:
+    result = conoid("demo", "--ranks", ranks)
+    assert result.exit_code == 1
+    said = "allowed: whole numbers from 1 to 4096 with commas between them, such as 1,2,4\n"
+    assert result.stderr.endswith(said)
+    assert len(result.stderr) < 200
 
 
 def test_a_folder_with_something_else_is_left_alone(tmp_path: Path) -> None:

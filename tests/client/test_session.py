@@ -34,11 +34,23 @@ def _no_pauses(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_refusal_is_its_detail_and_hint() -> None:
-    session = served(problem(401, detail="this needs a valid token", hint="ask the operator"))
+    session = served(problem(403, detail="the token lacks the scope 'submit'", hint="ask the operator"))
     with pytest.raises(ServiceError) as caught:
         session.me()
-    assert str(caught.value) == "this needs a valid token (ask the operator)"
-    assert (caught.value.status, caught.value.exit_code, caught.value.retryable) == (401, 1, False)
+    assert str(caught.value) == "the token lacks the scope 'submit' (ask the operator)"
+    assert (caught.value.status, caught.value.exit_code, caught.value.retryable) == (403, 1, False)
+
+
+@pytest.mark.parametrize(
+    ("token", "said"),
+    [(None, "none was sent: set CONOID_TOKEN"), ("conoid_1_old", "the one of --token, CONOID_TOKEN or the")],
+)
+def test_a_token_that_is_missing_or_wrong_names_where_it_comes_from(token: str | None, said: str) -> None:
+    answer = problem(401, detail="this needs a valid token", hint="send the header 'Authorization: Bearer <token>'")
+    with pytest.raises(ServiceError) as caught:
+        served(answer, token).me()
+    assert str(caught.value).startswith(f"this needs a valid token ({said}")
+    assert "header" not in str(caught.value)
 
 
 def test_a_refused_case_tells_every_error() -> None:

@@ -35,6 +35,7 @@ def test_a_signal_to_the_launcher_cancels_the_run(number: signal.Signals, tmp_pa
     assert launcher.returncode == 4
     assert outcome(folder).state == "cancelled"
     assert outcome(folder).cause == "cancelled"
+    assert outcome(folder).message == "stopped on request"
     assert outcome(folder).steps > 0
     assert outcome(folder).digest
     said = journal(folder)

@@ -1,6 +1,7 @@
 """What the server refuses, and how it says so; who may see what."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +9,7 @@ import pytest
 from fastapi.routing import APIRoute
 from starlette.testclient import TestClient
 
+from conoid.cases.reference import json_schema
 from conoid.server.app import ROUTERS, build_app, opened
 from conoid.server.limits import BODY
 from conoid.server.settings import Caps, Settings
@@ -15,7 +17,8 @@ from conoid.server.tokens import check_token, create_token
 
 from .running import TOML, Running, case_text
 
-OPEN = {"/healthz", "/readyz"}
+HEALTH = {"/healthz", "/readyz"}
+OPEN = {*HEALTH, "/v1/case.schema.json"}
 ROUTES = [
     (method, route.path)
     for router in ROUTERS
@@ -59,7 +62,7 @@ def test_the_list_of_routes_is_the_one_that_is_served(server: Running) -> None:
     assert len(ROUTES) >= 15
 
 
-@pytest.mark.parametrize("path", sorted(OPEN))
+@pytest.mark.parametrize("path", sorted(HEALTH))
 def test_health_needs_none(server: Running, path: str) -> None:
     assert server.nobody.http.get(path).json()["status"] == "ok"
 
@@ -406,3 +409,32 @@ def test_the_page(tmp_path: Path) -> None:
         assert client.get("/../server.secret").status_code == 404
         refusal(client.get("/nothing.js"), 404, "not_found")
         refusal(client.get("/v1/runs"), 401, "unauthorized")
+
+
+def test_openapi_has_the_schema_of_a_case(server: Running) -> None:
+    told = server.ann.http.get("/openapi.json").json()
+    schemas = told["components"]["schemas"]
+    assert schemas["Case"]["properties"]["parts"]["items"] == {"$ref": "#/components/schemas/Part"}
+    assert schemas["Part"]["properties"]["material"]["description"]
+    for path in ("/v1/runs", "/v1/cases:validate"):
+        content = told["paths"][path]["post"]["requestBody"]["content"]
+        assert set(content) == {"application/toml", "application/json"}
+        assert content["application/json"]["schema"] == {"$ref": "#/components/schemas/Case"}
+    text = json.dumps(told)
+    assert "#/$defs/" not in text
+    for name in set(re.findall(r'"#/components/schemas/(\w+)"', text)):
+        assert name in schemas
+
+
+def test_the_schema_that_a_shipped_case_names_is_served_beside_it(server: Running) -> None:
+    first = server.ann.http.get("/v1/cases/demo").text.splitlines()[0]
+    assert first == "#:schema ../case.schema.json"
+    assert server.ann.http.get("/v1/cases/../case.schema.json").json() == json_schema()
+
+
+def test_a_case_that_may_be_run_is_doubted_all_the_same(server: Running) -> None:
+    text = case_text(end_time="1 us").replace('"1 us"', "1e-6")
+    verdict = server.ann.http.post("/v1/cases:validate", content=text, headers=TOML).json()
+    assert verdict["valid"]
+    odd = {each["key"]: each["message"] for each in verdict["warnings"]}
+    assert odd["run.end_time"] == "no unit, taken for 1e-06 s"

@@ -86,3 +86,10 @@ def test_time_is_compensated_over_a_million_steps() -> None:
     assert clock.step == 1_000_000
     assert abs(clock.t - exact) <= 2.0 * math.ulp(exact)
     assert abs(plain - exact) > 10.0 * math.ulp(exact)
+
+
+def test_the_step_that_people_read_is_never_zero_at_the_end() -> None:
+    clock = Clock(1e-6, 0.9, 1.05, 2)
+    steps = [dt for _, dt, _ in steps_of(clock, [3e7])]
+    assert (clock.dt, clock.told) == (0.0, steps[-2])
+    assert steps[-2] > 0.0

@@ -1,10 +1,12 @@
 """The cut of the mesh: every tet once, every shared node known to all its holders and owned once; complete sums."""
 
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from conoid.cases.load import parse_toml
 from conoid.worker import domain
 from conoid.worker.domain import Piece, Whole
 from conoid.worker.mesh.model import TetMesh
@@ -15,6 +17,19 @@ from conoid.worker.state import CHUNK, Ints
 
 from .kernels import pieces_of, whole_of
 from .meshes import block, free_tets
+
+TWO_BOXES = """
+name = "boxes"
+run = { end_time = "1 us" }
+[[parts]]
+name = "left"
+material = "steel"
+mesh = { shape = "box", low = [0, 0, 0], high = [1e-3, 2e-3, 2e-3], element_size = 5e-4, generator = "structured" }
+[[parts]]
+name = "right"
+material = "steel"
+mesh = { shape = "box", low = [2e-3, 0, 0], high = [4e-3, 2e-3, 1e-3], element_size = 5e-4, generator = "structured" }
+"""
 
 RANKS = [1, 2, 3, 4, 5, 7, 16]
 MESH = block((7, 4, 4), 1e-3, seed=3)
@@ -153,3 +168,15 @@ def test_tets_without_common_nodes_need_no_neighbours() -> None:
         assert not piece.neighbours
         assert piece.owned.all()
         assert not piece.border.any()
+
+
+def test_the_start_says_what_it_is_at(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Meshes that are kept are read without a word."""
+    monkeypatch.setenv("CONOID_CACHE_DIR", str(tmp_path))
+    case = parse_toml(TWO_BOXES)
+    heard: list[list[str]] = []
+    for _ in range(2):
+        heard.append([])
+        domain.build(case, tmp_path, SerialComm(), heard[-1].append)
+    assert heard[0] == ["meshing left, part 1 of 2", "meshing right, part 2 of 2", "cutting 384 tets for 1 rank"]
+    assert heard[1] == heard[0][-1:]

@@ -51,8 +51,8 @@ TABLE = types.NamedTuple(
 
 
 def sort(low: Floats, high: Floats, some: Indices, edge: float) -> Table:
-    """Enters ``some`` of the boxes ``low``, ``high`` (n, 3) into cells of edge ``edge``, m, or larger where the space is
-    too wide for it.
+    """Enters ``some`` of the boxes ``low``, ``high`` (n, 3) into cells of edge ``edge``, m, or larger where the space
+    is too wide for it.
     """
     least, most = low[some].min(axis=0), high[some].max(axis=0)
     edge = max(edge, float((most - least).max()) / _MOST)
@@ -74,8 +74,8 @@ def bucket_of(x, origin, inverse, n):  # type: ignore[no-untyped-def]
 
 
 def curve(x: Floats, edge: float) -> Ints:
-    """(n,) place of each point (n, 3) on a curve that fills space (Morton 1966), by cells of ``edge``, m: what lies near
-    each other on it lies near each other.
+    """(n,) place of each point (n, 3) on a curve that fills space (Morton 1966), by cells of ``edge``, m: neighbours on
+    it are neighbours in space.
     """
     if not len(x):
         return np.zeros(0, np.int64)

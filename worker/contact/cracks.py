@@ -179,8 +179,8 @@ def computed(rows, nodes, sides):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def across(out, n, opening, cracks, typical, step):  # type: ignore[no-untyped-def]
-    """Nodes across ``cracks`` (m, 6; -1 for those that do not count) that close on each other, from row ``n`` of ``out``
-    on.
+    """Nodes across ``cracks`` (m, 6; -1 for those that do not count) that close on each other, from row ``n`` of
+    ``out`` on.
 
     ``typical``: size of a face, m. Returns the new number of rows, and how many of the cracks have become so wide that
     they open; ``opening`` (m,) says which.

@@ -66,7 +66,6 @@ class Step(NamedTuple):
     dt: float
     """s."""
 
-
     @classmethod
     def of(cls, x: Floats, v: Floats, part: Indices, mu: Floats, give: float, dt: float) -> "Step":
         """A step ``dt`` from ``x`` on."""
@@ -98,7 +97,7 @@ class SlotTable(NamedTuple):
     """The slots, as nodes that meet faces."""
 
     normals: Floats
-    """(slots, 9) means of n and of n n (xx, yy, zz, yz, zx, xy) of the normals of a node's faces; zero without faces."""
+    """(slots, 9) means of n and of n n (xx, yy, zz, yz, zx, xy) of the normals of a node's faces; zero without."""
     on_surface: Flags
     """(slots,) only these meet faces."""
     first: Indices

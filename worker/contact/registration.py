@@ -97,9 +97,6 @@ def _names(scene: Scene) -> Ints:
 def _register(scene: Scene, nodes: Flags, faces: Flags, edges: Flags) -> None:
     tracks, pairs = scene.tracks, scene.node_face
     flight = _Flight(tracks.positions(), tracks.searched.course - scene.drift, scene.crowd.part, scene.until - tracks.t)
-    import time
-
-    t0 = time.process_time()
     some = np.flatnonzero(pairs.kept.any(axis=1)) if scene.rules.rubs else np.zeros(0, np.int64)
     old, kept = pairs.rows[some], pairs.kept[some]
     pairs.drop(nodes, faces)
@@ -108,29 +105,6 @@ def _register(scene: Scene, nodes: Flags, faces: Flags, edges: Flags) -> None:
     scene.edge_edge.add(_edge_edge(scene, edges, flight))
     _recall(pairs.rows, pairs.kept, old, kept, len(scene.faces))
     scene.chain()
-    print(
-        "REG",
-        "t",
-        tracks.t,
-        "changed",
-        nodes.sum(),
-        faces.sum(),
-        edges.sum(),
-        "live",
-        scene.node_live.sum(),
-        scene.face_live.sum(),
-        scene.edge_live.sum(),
-        "pairs",
-        len(pairs),
-        len(scene.edge_edge),
-        "dropped",
-        len(old) - 0,
-        "ms",
-        round(1e3 * (time.process_time() - t0), 1),
-        "until",
-        scene.until,
-        flush=True,
-    )
     scene.node_new[:], scene.face_new[:], scene.edge_new[:] = False, False, False
 
 

@@ -181,7 +181,7 @@ class Scene:
 
     @property
     def kept(self) -> tuple[Ints, Floats]:
-        """(k, 2) ids of node and face of the pairs that were pushed in the last step, and (k, 4) what they have kept."""
+        """(k, 2) ids of node and face of the pairs with impulses in the last step, and (k, 4) what they have kept."""
         table = self.node_face
         some = np.flatnonzero(table.kept.any(axis=1))
         node, face = table.rows[some].T
@@ -256,8 +256,8 @@ class Scene:
         """The slots as kernels take them."""
         n, tracks = self.crowd.n, self.tracks
         return SlotTable(
-            self.normals, self.on_surface, self.first, tracks.short.left, tracks.short.course, self.node_fresh, np.empty(n),
-            np.empty(n, np.int32),
+            self.normals, self.on_surface, self.first, tracks.short.left, tracks.short.course, self.node_fresh,
+            np.empty(n), np.empty(n, np.int32),
         )  # fmt: skip
 
     def face_table(self) -> FaceTable:
@@ -300,8 +300,8 @@ def _enliven(live, new, edges, faces, exposed, searched):  # type: ignore[no-unt
 
 
 def build(sides: Sides, rules: Rules, horizon: float, drift: Floats, nodes: Nodes, comm: Comm) -> Scene:
-    """The scene of ``sides``, which flies on for ``horizon``, s, without pairs; all ranks take part and know of the same
-    ``drift`` (3,), m/s.
+    """The scene of ``sides``, which flies on for ``horizon``, s, without pairs; all ranks take part and know of the
+    same ``drift`` (3,), m/s.
 
     Who shares which node is settled by a Follower.
     """
@@ -326,8 +326,8 @@ def build(sides: Sides, rules: Rules, horizon: float, drift: Floats, nodes: Node
         face_exposed=faces.exposed.copy(), edges=ends, edge_sides=edges.sides,
         edge_faces=rows_of(faces.id, edges.sides), edge_size=edges.size, edge_exposed=edges.exposed.copy(),
         edge_own=np.arange(edges.n) < sides.edges.n, edge_rank=rank, rules=rules, slave=slave,
-        tracks=Tracks(crowd.x, crowd.course, faces.n, edges.n), drift=drift, until=horizon, faces_sent=sent, place=place,
-        pushes=pushes | slave, cracks=np.zeros((0, 6), np.int32),
+        tracks=Tracks(crowd.x, crowd.course, faces.n, edges.n), drift=drift, until=horizon, faces_sent=sent,
+        place=place, pushes=pushes | slave, cracks=np.zeros((0, 6), np.int32),
     )  # fmt: skip
 
 

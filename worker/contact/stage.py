@@ -24,13 +24,12 @@ from ..topology import Split
 from . import booking, held, normals, pairing, registration, scene, surface
 from .account import Account
 from .course import courses
-from .cracks import Cracks, across, widening
-from .edge_edge import edge_edge
+from .cracks import Cracks, widening
+from .detection import detect
 from .flight import Flight, typical
 from .follower import Follower
-from .narrow_phase import PUSH_OUT, Step
+from .narrow_phase import PUSH_OUT
 from .news import news
-from .node_face import approach, node_face
 from .scene import HALO, Rules, Scene
 from .solver import ActiveSet
 
@@ -40,8 +39,6 @@ _SURFACE, _AWAKE, _MEETING = 6.0, 3.0, 5.0
 """Candidates (found, and resting) that cost as much as a node of the surface, as a candidate that is looked at, as a
 meeting; fitted to the CPU times of the shattering bar on 16 ranks and of the eroding rod on eight.
 """
-_KINEMATIC = 2.0
-"""One over the share of a tet's altitude that anything may pass in a step."""
 _FORESIGHT = 8
 """Steps between two looks at how wide the cracks are."""
 _WORDS = 27
@@ -354,29 +351,15 @@ class Contact:
 
     def _search(self, state: Nodes) -> None:
         """Looks for candidates; all ranks take part."""
-        clock, flight, old = self._clock, self._flight, self._scene
-        whole = old is None or clock.t + clock.dt > flight.until
-        print("GLOBAL", clock.step, clock.step - self._last, "whole" if whole else "", flush=True)
+        flight, old = self._flight, self._scene
         if old is not None:
             old.free()
             self._kept = old.kept
         if self._fractures:
             self._expose()
-        flight.begin(state, self._courses(state), clock.t)
-        if self._changed:
-            flight.follow(self._surface, state, self._mobility)
-            self._changed = False
-        else:
-            flight.refresh(state)
-        steps, drift = flight.foresight(clock.dt)
-        if whole:
-            horizon = max(min(steps, 2.0 * (clock.step - self._last)), _SHORTEST) * clock.dt
-            flight.until, self._last = clock.t + horizon, clock.step
-        rules = Rules(
-            self._domain, ~np.isnan(self._mu), 2.0 * self._size, self._skin * self._size, HALO * self._size, self._rubs
-        )
-        now = self._scene = scene.build(flight.sides, rules, flight.until - clock.t, drift, state, self._comm)
-        if not whole:
+        goes_on = old is not None and self._clock.t + self._clock.dt <= flight.until
+        now = self._scene = self._laid_out(state, goes_on)
+        if old is not None and goes_on:
             registration.carry(now, old)
         self._connect(now, state)
         self._look(now, state)
@@ -388,6 +371,24 @@ class Contact:
             now.remember(*self._kept, state, self._comm)
         self.due = False
         self.searches += 1
+
+    def _laid_out(self, state: Nodes, goes_on: bool) -> Scene:
+        """The surface as it is, without pairs: for what is left of the last search from nothing, if it ``goes_on``; all
+        ranks take part.
+        """
+        clock, flight, size = self._clock, self._flight, self._size
+        flight.begin(state, self._courses(state), clock.t)
+        if self._changed:
+            flight.follow(self._surface, state, self._mobility)
+            self._changed = False
+        else:
+            flight.refresh(state)
+        steps, drift = flight.foresight(clock.dt)
+        if not goes_on:
+            horizon = max(min(steps, 2.0 * (clock.step - self._last)), _SHORTEST) * clock.dt
+            flight.until, self._last = clock.t + horizon, clock.step
+        rules = Rules(self._domain, ~np.isnan(self._mu), 2.0 * size, self._skin * size, HALO * size, self._rubs)
+        return scene.build(flight.sides, rules, flight.until - clock.t, drift, state, self._comm)
 
     def _courses(self, state: Nodes) -> Floats:
         """(nodes, 3) how the nodes fly on; all ranks take part."""
@@ -438,32 +439,12 @@ class Contact:
 
     def _meet(self, now: Scene, dt: float) -> int:
         """The active contacts of the step; returns how many."""
-        crowd, tracks, pairs, edges = now.crowd, now.tracks, now.node_face, now.edge_edge
-        tracks.advance(dt)
-        if self._clock.step % normals.EVERY == 0:
-            tracks.shorten(crowd.x)
-            pairs.wake()
-            edges.wake()
-        tracks.measure(crowd.x, crowd.v, now.faces, now.edges)
-        strayed = float(tracks.searched.left[now.tracked].max(initial=0.0))
-        if self._clock.step % _FORESIGHT == 0:
+        step = self._clock.step
+        if step % _FORESIGHT == 0:
             self._foresee(now)
-        if strayed > 0.5 * now.rules.skin or now.pending:
-            registration.renew(now, crowd.x, crowd.v, strayed)
-        now.reserve()
-        step = Step.of(crowd.x, crowd.v, crowd.part, self._mu, self._give_back, dt)
-        faces, table = now.face_table(), pairs.arrays()
-        n, tested = node_face(now.room, 0, table, now.slot_table(), faces, step, tracks.end)
-        pairs.tested = table.active[:tested]
-        self.approach = _KINEMATIC * approach(now.room, n, table, faces, step)
-        table = edges.arrays()
-        n, tested = edge_edge(now.room, n, table, now.edge_table(), step, tracks.short.course, tracks.end)
-        edges.tested = table.active[:tested]
-        now.face_fresh[:], now.edge_fresh[:], now.node_fresh[:] = False, False, False
-        opening = np.empty(len(now.cracks), np.int64)
-        n, wide = across(now.room, n, opening, now.cracks, self._size, step)
-        self._opening = opening[:wide]
-        return int(n)
+        found = detect(now, self._mu, self._give_back, dt, self._size, step % normals.EVERY == 0)
+        self.approach, self._opening = found.approach, found.opening
+        return found.contacts
 
     def _foresee(self, now: Scene) -> None:
         """The faces of cracks that may open soon are searched."""

@@ -39,7 +39,7 @@ class Lines:
             column[heirs] = column[parents]
 
     def take_over(self, slots: Indices, old: "Lines", t: float) -> None:
-        """At time ``t``: the lines of ``old``, whose slots have the new numbers ``slots``, -1 for those that have gone."""
+        """At time ``t``: the lines of ``old``, whose slots have the new numbers ``slots``, -1 for none any more."""
         self.x -= t * self.course
         self.since[:] = t
         there, here = np.flatnonzero(slots >= 0), slots[slots >= 0]

@@ -6,7 +6,7 @@ import importlib.metadata
 import importlib.util
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 
@@ -23,8 +23,10 @@ _CACHE_BYTES = 4 * 2**30
 """When the cache is larger than this, the meshes that were not used for longest go."""
 
 
-def build(mesh: Mesh, folder: Path, key: str = "mesh", limits: Limits | None = None) -> TetMesh:
-    """The tets of ``mesh``: checked, in Morton order, the same bits every time.
+def build(
+    mesh: Mesh, folder: Path, key: str = "mesh", limits: Limits | None = None, made: Callable[[], None] = lambda: None
+) -> TetMesh:
+    """The tets of ``mesh``: checked, in Morton order, the same bits every time; ``made`` is called before one is made.
 
     ``folder`` is where a relative path of a mesh file starts, ``key`` where the mesh stands in its case, for messages.
     What needs gmsh, and every file, is handled by a child process within ``limits``. Raises MeshError.
@@ -36,6 +38,7 @@ def build(mesh: Mesh, folder: Path, key: str = "mesh", limits: Limits | None = N
     cached = cache_folder()
     found = load(cached / name)
     if found is None:
+        made()
         return _make_and_keep(mesh, source, cached / name, key, limits or Limits())
     with contextlib.suppress(OSError):
         os.utime(cached / name)

@@ -9,6 +9,7 @@ from typing import Any, Protocol, TypeVar
 import msgspec
 
 from conoid.cases import layout, messages
+from conoid.cases.run import State
 
 M = TypeVar("M", bound=messages.Message)
 
@@ -46,6 +47,10 @@ class Journal:
         if self._listener is not None:
             self._listener.tell(message)  # type: ignore[arg-type]
         return message
+
+    def starting(self, what: str) -> None:
+        """Says what the start is at."""
+        self.write(messages.Status, state=State.STARTING, message=what)
 
     def close(self) -> None:
         """Closes the file; the journal is complete."""

@@ -1,0 +1,65 @@
+"""Whether bodies that fly at the start meet anything before the end: a place in other units makes them miss it."""
+
+import math
+from collections.abc import Iterator
+
+from .bodies import MeshFile
+from .geometry import Vector, lowest_along
+from .placed import Placed
+from .problems import Problem, problem
+from .schema import Case, Part, Symmetry, Wall
+
+Bounds = tuple[Vector, Vector]
+
+
+def strangers(case: Case) -> Iterator[Problem]:
+    """A warning for each part that flies, and meets nothing before ``run.end_time`` although there is something.
+
+    Nothing is said of a case with mesh files, with bodies that turn or stretch, or where more than walls and planes of
+    symmetry acts on nodes.
+    """
+    others = [boundary for boundary in case.boundaries if not isinstance(boundary, Wall | Symmetry)]
+    walls = [boundary for boundary in case.boundaries if isinstance(boundary, Wall)]
+    boxes = [_box(part) for part in case.parts]
+    if others or case.contact is None or None in boxes or len(case.parts) + len(walls) < 2:
+        return
+    known = [box for box in boxes if box is not None]
+    for i, part in enumerate(case.parts):
+        times = [_meeting(known[i], known[j], part, each) for j, each in enumerate(case.parts) if j != i]
+        soonest = min([*times, *(_arrival(part, wall) for wall in walls)])
+        if any(part.velocity) and soonest > case.run.end_time:
+            when = "nothing at all" if soonest == math.inf else f"nothing before {soonest:.3g} s"
+            message = f"{part.name!r} meets {when}; the run ends at {case.run.end_time:.3g} s"
+            yield problem(("parts", i, "velocity"), ..., message)
+
+
+def _box(part: Part) -> Bounds | None:
+    if isinstance(part.mesh, MeshFile) or part.spin is not None or part.stretch is not None or part.jitter > 0.0:
+        return None
+    return Placed(part.mesh, part.turn).bounds()
+
+
+def _meeting(box: Bounds, other: Bounds, part: Part, met: Part) -> float:
+    """When the boxes round two bodies touch that fly on, s; infinity when they never do."""
+    begin, end = 0.0, math.inf
+    for low, high, a, b, v, w in zip(*box, *other, part.velocity, met.velocity, strict=True):
+        speed = v - w
+        if speed == 0.0:
+            enter, leave = (0.0, math.inf) if a <= high and low <= b else (math.inf, math.inf)
+        else:
+            enter, leave = sorted(((a - high) / speed, (b - low) / speed))
+        begin, end = max(begin, enter), min(end, leave)
+    return begin if begin <= end else math.inf
+
+
+def _arrival(part: Part, wall: Wall) -> float:
+    """When a body that flies on reaches a wall, s; infinity when it never does."""
+    if wall.parts and part.name not in wall.parts:
+        return math.inf
+    length = math.hypot(*wall.normal)
+    normal = (wall.normal[0] / length, wall.normal[1] / length, wall.normal[2] / length)
+    closing = -sum(n * v for n, v in zip(normal, part.velocity, strict=True))
+    if closing <= 0.0 or isinstance(part.mesh, MeshFile):
+        return math.inf
+    level = sum(n * x for n, x in zip(normal, wall.point, strict=True))
+    return 0.0 if part.turn is not None else max(0.0, (lowest_along(part.mesh, normal) - level) / closing)

@@ -1,0 +1,100 @@
+"""What holds or drives nodes: symmetry planes, walls, prescribed motion, gravity, tractions."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from .motion import Spin
+from .tables import Axis, Direction, Model, Name, Point
+from .units import Acceleration, Length, Speed, Stress
+
+
+class Symmetry(Model):
+    """Nodes that start on the plane ``axis = at`` stay on it; no friction. All parts when ``parts`` is empty."""
+
+    kind: Literal["symmetry"]
+    """The kind of boundary."""
+    axis: Axis
+    """The normal of the plane."""
+    at: Length = 0.0
+    """Where the plane cuts the axis."""
+    parts: tuple[Name, ...] = ()
+    """Parts that it holds; all when empty."""
+
+
+class Wall(Model):
+    """A rigid, fixed, frictionless half-space: nodes cannot go to the side that ``normal`` points away from."""
+
+    kind: Literal["wall"]
+    """The kind of boundary."""
+    name: Name = "wall"
+    """For messages; each wall has its own."""
+    point: Point
+    """Any point of the wall's surface."""
+    normal: Direction
+    """Points out of the wall, to the side where bodies are; its length does not count."""
+    parts: tuple[Name, ...] = ()
+    """Parts that it stops; all when empty."""
+
+
+class Prescribed(Model):
+    """Nodes that start inside the box ``low``..``high`` (all of the parts when absent) move with a given velocity.
+
+    Only the components that are given are prescribed.
+    """
+
+    kind: Literal["velocity"]
+    """The kind of boundary."""
+    parts: tuple[Name, ...] = ()
+    """Parts that it moves; all when empty."""
+    low: Point | None = None
+    """Lowest corner of the box; with ``high``."""
+    high: Point | None = None
+    """Highest corner of the box; with ``low``."""
+    x: Speed | None = None
+    """Velocity along x; without it the nodes are free along x."""
+    y: Speed | None = None
+    """Velocity along y; without it the nodes are free along y."""
+    z: Speed | None = None
+    """Velocity along z; without it the nodes are free along z."""
+
+
+class Rotation(Model):
+    """All nodes of the parts turn rigidly, exactly, at the given spin."""
+
+    kind: Literal["rotation"]
+    """The kind of boundary."""
+    parts: tuple[Name, ...] = ()
+    """Parts that turn; all when empty."""
+    spin: Spin
+    """The line that they turn about, and how fast."""
+
+
+class Gravity(Model):
+    """A constant acceleration of all nodes of the parts, of all parts when ``parts`` is empty."""
+
+    kind: Literal["gravity"]
+    """The kind of boundary."""
+    acceleration: tuple[Acceleration, Acceleration, Acceleration]
+    """Along x, y, z; not zero."""
+    parts: tuple[Name, ...] = ()
+    """Parts that it acts on; all when empty."""
+
+
+class Traction(Model):
+    """A force per initial area, Pa, on the exposed faces whose three nodes start inside the box ``low``..``high`` (all
+    of the parts when absent): constant from the first moment on, and turning with nothing."""
+
+    kind: Literal["traction"]
+    """The kind of boundary."""
+    stress: tuple[Stress, Stress, Stress]
+    """Force per area along x, y, z; not zero."""
+    parts: tuple[Name, ...] = ()
+    """Parts that it acts on; all when empty."""
+    low: Point | None = None
+    """Lowest corner of the box; with ``high``."""
+    high: Point | None = None
+    """Highest corner of the box; with ``low``."""
+
+
+Boundary = Annotated[Symmetry | Wall | Prescribed | Rotation | Gravity | Traction, Field(discriminator="kind")]

@@ -1,0 +1,66 @@
+"""Primitives that overlap before anything is meshed."""
+
+from collections.abc import Iterable, Iterator
+from itertools import combinations, islice
+
+from .bodies import Cylinder, Loose, MeshFile, Sphere, Tube
+from .geometry import Generated, Vector
+from .placed import Placed, lattice
+from .problems import Problem, problem
+from .schema import Contact, Part
+
+_POINTS = 12
+"""Points a direction at which two bodies are looked at, in the box that both reach into. Chosen: thinner slices than a
+twelfth of that box are left to the worker, which looks at the nodes."""
+_PAIRS = 32
+"""Pairs of bodies that are looked at. Chosen: a second at most; the worker looks at all."""
+_TOUCH = 1e-9
+"""Of the size of a body: what reaches no further into another touches it. Far above rounding, far below any gap."""
+
+
+def overlaps(parts: Iterable[tuple[int, Part]], contact: Contact | None) -> Iterator[Problem]:
+    """A problem for each of the numbered ``parts`` that overlaps an earlier one which it meets.
+
+    Curved bodies count as far as no facet of their mesh can cut them off; loose tets and mesh files do not count.
+    """
+    if contact is None or contact.overlap != "refuse":
+        return
+    solid = [
+        (i, part, body, body.bounds())
+        for i, part in parts
+        if not isinstance(part.mesh, MeshFile | Loose) and (not contact.parts or part.name in contact.parts)
+        for body in [Placed(_core(part.mesh), part.turn)]
+    ]
+    near = ((a, b, box) for a, b in combinations(solid, 2) if (box := _common(a[3], b[3])) is not None)
+    for (i, first, one, _), (j, second, other, _), box in islice(near, _PAIRS):
+        depth = _depth(one, other, *box)
+        if depth > 0.0:
+            way = "move them apart, or set contact.overlap = 'push'"
+            message = f"{second.name!r} overlaps parts[{i}], {first.name!r}, by about {depth:.2g} m; {way}"
+            yield problem(("parts", j, "mesh"), ..., message)
+
+
+def _core(mesh: Generated) -> Generated:
+    """A body without what facets of the size of its elements may cut off its curved surface: h^2 / 8 R."""
+    if not isinstance(mesh, Cylinder | Tube | Sphere):
+        return mesh
+    left = max(0.5 * mesh.radius, mesh.radius - mesh.element_size**2 / (8.0 * mesh.radius))
+    return mesh.model_copy(update={"radius": left})
+
+
+def _common(one: tuple[Vector, Vector], other: tuple[Vector, Vector]) -> tuple[Vector, Vector] | None:
+    """The box that two bodies with these corners reach into."""
+    (low, high), (low2, high2) = one, other
+    (a, b, c), (d, e, f) = map(max, low, low2), map(min, high, high2)
+    size = max(y - x for x, y in zip(low + low2, high + high2, strict=True))
+    return ((a, b, c), (d, e, f)) if min(d - a, e - b, f - c) > _TOUCH * size else None
+
+
+def _depth(one: Placed, other: Placed, low: Vector, high: Vector) -> float:
+    """The thinnest extent, m, of what both hold of a box; 0 when that is nothing."""
+    both = [point for point in lattice(low, high, _POINTS) if one.holds(point) and other.holds(point)]
+    if not both:
+        return 0.0
+    cells = [(b - a) / _POINTS for a, b in zip(low, high, strict=True)]
+    spans = (max(each) - min(each) for each in zip(*both, strict=True))
+    return min((span + cell for span, cell in zip(spans, cells, strict=True)), default=0.0)

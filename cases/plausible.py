@@ -1,0 +1,165 @@
+"""What a valid case makes a reader doubt: bare numbers where a unit was expected, and what a slip of units makes.
+
+Warnings, never errors: each says what a value was taken for, or what is odd about it.
+"""
+
+from collections.abc import Iterator, Mapping
+from functools import cache
+from itertools import chain
+from typing import Any
+
+from .approach import strangers
+from .estimate import Estimate, wave_speed
+from .library import material
+from .materials import JohnsonCook, LinearHardening, Material
+from .problems import Location, Problem, problem
+from .quantities import unit_of_reference
+from .reference import Schema, definition, json_schema, variants
+from .schema import Case
+from .units import QUANTITY
+
+DAY = 86_400.0
+"""Core seconds. Chosen: who wants more than a day knows it."""
+LIKELY: dict[str, tuple[float, float, str]] = {
+    "density": (10.0, 23_000.0, "kg/m^3: foams have 10, osmium has 22,590"),
+    "wave speed": (20.0, 20_000.0, "m/s: soft rubber has 30, diamond has 18,000"),
+    "yield stress over Young's modulus": (1e-6, 0.1, "crystals shear off at a tenth"),
+    "tensile strength over Young's modulus": (1e-7, 0.1, "atoms let go at a tenth"),
+    "specific heat": (50.0, 15_000.0, "J/kg/K: tungsten has 134, hydrogen 14,300"),
+    "fracture energy": (1e-2, 1e6, "J/m^2: glass has 8, tough steel 100,000"),
+    "temperature": (100.0, 6_000.0, "K: 20 degrees Celsius are 293 K"),
+    "extent": (1e-6, 100.0, "m"),
+}
+"""Between what a quantity of any solid lies, and the ends as people know them (handbooks)."""
+_UNLIKE = 1000.0
+"""Between the largest and the smallest part. Chosen: millimetres taken for metres."""
+
+
+def doubts(data: Mapping[str, Any], case: Case, expected: Estimate) -> list[Problem]:
+    """Every warning: ``data`` is the case as it was written, ``expected`` its estimate."""
+    return [
+        *bare_numbers(data),
+        *_effort(case, expected),
+        *_materials(case),
+        *_bodies(case, expected),
+        *strangers(case),
+    ]
+
+
+# Bare numbers ---------------------------------------------------------------------------------------------------------
+
+
+def bare_numbers(data: Mapping[str, Any]) -> list[Problem]:
+    """Numbers other than 0 where a unit was expected: one line a key, which says what they were taken for."""
+    whole = _schema()
+    return list(_bare((), data, whole, whole, data))
+
+
+@cache
+def _schema() -> Schema:
+    return json_schema()
+
+
+def _bare(location: Location, value: Any, schema: Schema, whole: Schema, data: Mapping[str, Any]) -> Iterator[Problem]:
+    for meant in (definition(variant, whole) for variant in variants(schema)):
+        if "properties" in meant and isinstance(value, Mapping) and _is(meant, value):
+            inner = ((key, value[key], each) for key, each in meant["properties"].items() if key in value)
+        elif "patternProperties" in meant and isinstance(value, Mapping):
+            inner = ((key, each, next(iter(meant["patternProperties"].values()))) for key, each in value.items())
+        elif "items" in meant and isinstance(value, list | tuple):
+            inner = ((i, each, meant["items"]) for i, each in enumerate(value))
+        else:
+            yield from _taken(location, value, meant, data)
+            continue
+        yield from chain.from_iterable(_bare((*location, key), each, to, whole, data) for key, each, to in inner)
+
+
+def _is(schema: Schema, value: Mapping[str, Any]) -> bool:
+    """Whether a table is of the kind that a schema describes."""
+    consts = {key: each["const"] for key, each in schema["properties"].items() if "const" in each}
+    return all(value.get(key) == const for key, const in consts.items())
+
+
+def _taken(location: Location, value: Any, schema: Schema, data: Mapping[str, Any]) -> Iterator[Problem]:
+    listed = isinstance(value, list | tuple)
+    values, schemas = (value, schema.get("prefixItems", ())) if listed else ([value], [schema])
+    unit = next((each["unit"] for each in schemas if each.get("unit")), "")
+    if unit == QUANTITY:
+        unit = unit_of_reference(data, location)
+    if unit and any(isinstance(each, int | float) and not isinstance(each, bool) and each != 0 for each in values):
+        shown = f"[{', '.join(map(str, values))}]" if listed else f"{value:g}"
+        yield Problem(
+            problem(location, ..., "").key, shown, f"no unit, taken for {unit if listed else f'{shown} {unit}'}"
+        )
+
+
+# What is odd ----------------------------------------------------------------------------------------------------------
+
+
+def _effort(case: Case, expected: Estimate) -> Iterator[Problem]:
+    end, where = case.run.end_time, ("run", "end_time")
+    if expected.dt is not None and end < expected.dt:
+        yield problem(where, f"{end:g} s", f"is shorter than the first time step, {expected.dt:.3g} s")
+    if expected.steps is None or expected.core_seconds is None:
+        return
+    if expected.steps >= case.run.max_steps:
+        yield problem(("run", "max_steps"), case.run.max_steps, f"will be used up before run.end_time, {end:g} s")
+    if expected.core_seconds > DAY:
+        hours = expected.core_seconds / 3600.0
+        yield problem(where, f"{end:g} s", f"takes about {expected.steps:.2g} steps and {hours:.3g} hours of core time")
+
+
+def _materials(case: Case) -> Iterator[Problem]:
+    for name, made in case.materials.items():
+        for key, what, value in _constants(made):
+            yield from _unlikely(("materials", name, *key), what, value)
+
+
+def _constants(made: Material) -> Iterator[tuple[Location, str, float]]:
+    yield ("density",), "density", made.density
+    yield ("elastic", "young"), "wave speed", wave_speed(made)
+    if isinstance(made.strength, LinearHardening):
+        yield (
+            ("strength", "yield_stress"),
+            "yield stress over Young's modulus",
+            made.strength.yield_stress / made.elastic.young,
+        )
+    if isinstance(made.strength, JohnsonCook):
+        yield ("strength", "A"), "yield stress over Young's modulus", made.strength.A / made.elastic.young
+        yield ("strength", "specific_heat"), "specific heat", made.strength.specific_heat
+        yield ("strength", "melt_temperature"), "temperature", made.strength.melt_temperature
+    if made.brittle is not None:
+        yield (
+            ("brittle", "strength"),
+            "tensile strength over Young's modulus",
+            made.brittle.strength / made.elastic.young,
+        )
+        yield ("brittle", "energy"), "fracture energy", made.brittle.energy
+
+
+def _unlikely(location: Location, what: str, value: float) -> Iterator[Problem]:
+    low, high, known = LIKELY[what]
+    if not low <= value <= high:
+        end = f"below {low:g}" if value < low else f"above {high:g}"
+        yield problem(location, ..., f"a {what} of {value:.3g} is {end} ({known})".replace("a extent", "an extent"))
+
+
+def _bodies(case: Case, expected: Estimate) -> Iterator[Problem]:
+    sizes: dict[int, float] = {}
+    for i, (part, size) in enumerate(zip(case.parts, expected.parts, strict=True)):
+        yield from _unlikely(("parts", i, "temperature"), "temperature", part.temperature)
+        if size.bulk is None:
+            continue
+        sizes[i] = max(size.bulk.extent)
+        yield from _unlikely(("parts", i, "mesh"), "extent", sizes[i])
+        wave = wave_speed(material(case, part.material))
+        if size.bulk.speed > wave:
+            than = f"faster than waves in {part.material}, {wave:.3g} m/s"
+            message = f"{part.name!r} moves at {size.bulk.speed:.3g} m/s, {than}"
+            yield problem(("parts", i, "velocity"), ..., message)
+    if sizes and max(sizes.values()) > _UNLIKE * min(sizes.values()):
+        large, small = (pick(sizes, key=lambda i: sizes[i]) for pick in (max, min))
+        names = f"{case.parts[large].name!r} is {sizes[large] / sizes[small]:.0f} times as large as"
+        yield problem(
+            ("parts", small, "mesh"), ..., f"{names} {case.parts[small].name!r}, which has {sizes[small]:.3g} m"
+        )

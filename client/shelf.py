@@ -1,0 +1,91 @@
+"""What comes with Conoid: the keys of a case, the shipped cases, the material library."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from conoid.cases import library, load, reference
+from conoid.cases.page import page
+
+from . import tables
+from .errors import ClientError
+from .options import Json, complete_cases, complete_materials, show, show_json
+
+cases = typer.Typer(invoke_without_command=True, help="The shipped cases: list them, copy one.")
+OutOption = Annotated[Path | None, typer.Option("--out", help="Write to this file.")]
+
+
+def schema(
+    as_page: Annotated[bool, typer.Option("--page", help="As a page for people (docs/case.md), in Markdown.")] = False,
+    out: OutOption = None,
+) -> None:
+    """Print the keys of a case: as JSON schema, for editors, or as a page with unit, range, default and meaning."""
+    text = page() if as_page else reference.schema_text()
+    if out is None:
+        typer.echo(text, nl=False)
+    else:
+        _write(out, text)
+
+
+def materials(
+    name: Annotated[
+        str | None, typer.Argument(metavar="[NAME]", help="One of them.", autocompletion=complete_materials)
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """List the material library, or every constant of one material with its source."""
+    if name is None:
+        known = library.library()
+        if as_json:
+            show_json(sorted(known))
+        else:
+            show(tables.materials_table(known))
+        return
+    found = library.constants(name)
+    if as_json:
+        show_json(found)
+        return
+    show(f"{name}: {library.library()[name].description}")
+    show(tables.constants_table(found))
+    show("")
+    show(tables.sources_table(found))
+
+
+@cases.callback()
+def list_cases(ctx: typer.Context, as_json: Json = False) -> None:
+    """List the shipped cases: name, title and what each costs."""
+    if ctx.invoked_subcommand is not None:
+        return
+    known = {name: load.read_case(path) for name, path in load.shipped().items()}
+    if as_json:
+        show_json(
+            [{"name": name, "title": case.title, "description": case.description} for name, case in known.items()]
+        )
+    else:
+        show(tables.cases_table(known))
+
+
+@cases.command(name="copy")
+def copy_case(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="A shipped case.", autocompletion=complete_cases)],
+    out: OutOption = None,
+) -> None:
+    """Copy a shipped case here, to change it, with the schema beside it by which editors complete its keys."""
+    text = load.shipped_path(name).read_text(encoding="utf-8")
+    target = out or Path(f"{name}.toml")
+    if target.suffix != ".toml":
+        raise ClientError(f"--out = {str(target)!r}: the name of a case file ends in .toml")
+    if target.exists():
+        raise ClientError(f"{target} is there already; name another file with --out")
+    _write(target, text.replace(f"{reference.LINE} ../{reference.FILE}", f"{reference.LINE} ./{reference.FILE}", 1))
+    typer.echo(str(target))
+    _write(target.with_name(reference.FILE), reference.schema_text())
+    typer.echo(str(target.with_name(reference.FILE)))
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ClientError(f"{path}: cannot be written: {error.strerror}") from None

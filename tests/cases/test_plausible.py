@@ -1,0 +1,203 @@
+"""What a slip of units makes is told: bare numbers, odd constants, speeds, sizes, places; shipped cases are sound."""
+
+import math
+from typing import Any
+
+import pytest
+
+from conoid.cases.estimate import estimate
+from conoid.cases.library import library
+from conoid.cases.load import parse_case, read_case, read_data, resolved_json, shipped, toml_data
+from conoid.cases.placed import velocity
+from conoid.cases.plausible import bare_numbers, doubts
+from conoid.cases.schema import Case
+
+from .scenes import rod
+
+TARGET = """
+name = "target"
+run.end_time = "10 us"
+[[parts]]
+name = "ball"
+material = "steel"
+velocity = ["0 m/s", "0 m/s", "-500 m/s"]
+mesh = { shape = "sphere", radius = "2 mm", centre = [0, 0, "3 mm"], element_size = "1 mm" }
+[[parts]]
+name = "plate"
+material = "steel"
+[parts.mesh]
+shape = "plate"
+base = [0, 0, "-5 mm"]
+width = "20 mm"
+height = "20 mm"
+thickness = "5 mm"
+element_size = "1 mm"
+"""
+
+
+def told(data: dict[str, Any]) -> dict[str, str]:
+    """The warnings, by key."""
+    case = parse_case(data)
+    odd = doubts(data, case, estimate(case))
+    assert len({each.key for each in odd}) == len(odd)
+    return {each.key: f"{each.value}: {each.message}" for each in odd}
+
+
+def target(**changes: Any) -> dict[str, Any]:
+    """The ball and the plate; ``plate__mesh`` and the like are merged in."""
+    data = toml_data(TARGET)
+    for key, value in changes.items():
+        part, _, table = key.partition("__")
+        found = data["parts"][0 if part == "ball" else 1] if part in ("ball", "plate") else data[part]
+        (found[table] if table == "mesh" else found).update(value)
+    return data
+
+
+@pytest.mark.parametrize("name", sorted(shipped()))
+def test_a_shipped_case_raises_no_doubt(name: str) -> None:
+    path = shipped()[name]
+    case = read_case(path)
+    assert doubts(read_data(path), case, estimate(case)) == []
+
+
+@pytest.mark.parametrize("name", sorted(library()))
+def test_a_material_of_the_library_raises_no_doubt(name: str) -> None:
+    made = library()[name].model_dump(mode="json", exclude_none=True)
+    data = {**rod("parts[0].material=own"), "materials": {"own": made}}
+    assert [key for key in told(data) if "taken for" not in told(data)[key]] == []
+
+
+@pytest.mark.parametrize(
+    ("override", "key", "message"),
+    [
+        ("run.end_time=80", "run.end_time", "80: no unit, taken for 80 s"),
+        ("parts[0].velocity=[0, 0, -210]", "parts[0].velocity", "[0, 0, -210]: no unit, taken for m/s"),
+        ("parts[0].mesh.radius=0.003", "parts[0].mesh.radius", "0.003: no unit, taken for 0.003 m"),
+        ("parts[0].turn={axis='z', angle=45}", "parts[0].turn.angle", "45: no unit, taken for 45 rad"),
+        ("boundaries[0].point=[0, 0, -1]", "boundaries[0].point", "[0, 0, -1]: no unit, taken for m"),
+        ("reference[0].value=0.03", "reference[0].value", "0.03: no unit, taken for 0.03 m"),
+        ("run.checkpoint_every=60", "run.checkpoint_every", "60: no unit, taken for 60 s"),
+        (
+            "materials.own={density=7850, elastic={young='1 GPa', poisson=0.3}}",
+            "materials.own.density",
+            "7850: no unit",
+        ),
+        ("parts[0].temperature=300", "parts[0].temperature", "300: no unit, taken for 300 K"),
+    ],
+)
+def test_a_bare_number_says_what_it_was_taken_for(override: str, key: str, message: str) -> None:
+    changes = [override, "parts[0].mesh.sector=full"] if "turn" in override else [override]
+    found = {each.key: f"{each.value}: {each.message}" for each in bare_numbers(rod(*changes))}
+    assert list(found) == [key]
+    assert found[key].startswith(message)
+
+
+@pytest.mark.parametrize(
+    "override",
+    [
+        "run.end_time=80 us", "parts[0].velocity=[0, 0, 0]", "run.ranks=2", "numerics.dt_safety=0.5", "contact=none",
+        "boundaries[0].normal=[0, 0, 5]", "boundaries[2].at=0", "contact={friction=0.3}",
+    ],
+)  # fmt: skip
+def test_zero_and_what_has_no_unit_may_be_bare(override: str) -> None:
+    assert bare_numbers(rod(override)) == []
+
+
+def test_a_case_in_si_is_told_once_a_key() -> None:
+    case = parse_case(rod())
+    found = [each.key for each in bare_numbers(Case.model_validate_json(resolved_json(case)).model_dump(mode="json"))]
+    assert len(found) == len(set(found))
+    assert "materials.steel.elastic.young" in found
+    assert "parts[0].mesh.radius" in found
+
+
+def test_a_sound_scene_raises_no_doubt() -> None:
+    assert told(target()) == {}
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "message"),
+    [
+        ({"run": {"end_time": "80 s"}}, "run.max_steps", "will be used up before run.end_time, 80 s"),
+        ({"run": {"end_time": "8 s", "max_steps": 10**9}}, "run.end_time", "hours of core time"),
+        ({"run": {"end_time": "10 ns"}}, "run.end_time", "is shorter than the first time step"),
+        ({"ball": {"velocity": [0, 0, "-500 km/s"]}}, "parts[0].velocity", "faster than waves in steel, 5.86e+03 m/s"),
+        ({"ball": {"temperature": "20 K"}}, "parts[0].temperature", "a temperature of 20 is below 100"),
+        ({"ball__mesh": {"centre": [0, 0, "3 m"]}}, "parts[0].velocity", "'ball' meets nothing before 0.006 s"),
+        ({"ball": {"velocity": [0, 0, "500 m/s"]}}, "parts[0].velocity", "'ball' meets nothing at all; the run"),
+        ({"plate__mesh": {"width": "20 km", "height": "20 km", "element_size": "5 mm"}}, "parts[1].mesh",
+         "an extent of 2e+04 is above 100"),
+        ({"plate__mesh": {"width": "20 m", "height": "20 m", "element_size": "5 mm"}}, "parts[0].mesh",
+         "'plate' is 5000 times as large as 'ball', which has 0.004 m"),
+    ],
+)  # fmt: skip
+def test_what_is_odd(changes: dict[str, Any], key: str, message: str) -> None:
+    found = told(target(**changes))
+    assert message in found[key], found
+
+
+@pytest.mark.parametrize(
+    ("material", "key", "message"),
+    [
+        ({"density": "7.85 kg/m^3"}, "density", "a density of 7.85 is below 10"),
+        ({"elastic": {"young": "200 MPa", "poisson": 0.3}, "brittle": {"strength": "100 MPa", "energy": "8 J/m^2"}},
+         "brittle.strength", "a tensile strength over Young's modulus of 0.5 is above 0.1"),
+        ({"elastic": {"young": "200 Pa", "poisson": 0.3}}, "elastic.young", "a wave speed of 0.185 is below 20"),
+        ({"strength": {"model": "linear_hardening", "yield_stress": "400 GPa"}}, "strength.yield_stress",
+         "a yield stress over Young's modulus of 2 is above 0.1"),
+        ({"brittle": {"strength": "100 MPa", "energy": "8 MJ/m^2"}}, "brittle.energy", "a fracture energy of 8e+06 is"),
+    ],
+)  # fmt: skip
+def test_constants_of_no_solid(material: dict[str, Any], key: str, message: str) -> None:
+    steel = {"density": "7850 kg/m^3", "elastic": {"young": "200 GPa", "poisson": 0.3}}
+    found = told({**target(ball={"material": "own"}), "materials": {"own": steel | material}})
+    assert message in found[f"materials.own.{key}"], found
+
+
+def test_what_a_part_brings_along() -> None:
+    ball, plate = estimate(parse_case(target())).parts
+    assert ball.bulk is not None
+    assert plate.bulk is not None
+    mass = 7850.0 * 4.0 / 3.0 * math.pi * 2e-3**3
+    assert ball.bulk.mass == pytest.approx(mass)
+    assert ball.bulk.extent == pytest.approx((4e-3, 4e-3, 4e-3))
+    assert ball.bulk.momentum == pytest.approx((0.0, 0.0, -500.0 * mass))
+    assert ball.bulk.energy == pytest.approx(0.5 * mass * 500.0**2)
+    assert (plate.bulk.momentum, plate.bulk.energy) == ((0.0, 0.0, 0.0), 0.0)
+
+
+def test_a_body_that_spins_stretches_and_is_turned() -> None:
+    """A bar of 2 x 4 x 20 mm turned from z to x: energy I w^2 / 2 with I = m (b^2 + c^2) / 12, m k^2 a^2 / 24."""
+    bar = {
+        "shape": "box",
+        "low": ["-1 mm", "-2 mm", "-10 mm"],
+        "high": ["1 mm", "2 mm", "10 mm"],
+        "element_size": "1 mm",
+    }
+    part: dict[str, Any] = {"name": "bar", "material": "steel", "mesh": bar, "turn": {"axis": "y", "angle": "90 deg"}}
+    data = {"name": "bar", "run": {"end_time": "1 us"}, "parts": [part]}
+    mass = 7850.0 * 2e-3 * 4e-3 * 20e-3
+    part["spin"] = {"centre": [0, 0, 0], "rate": [0, 0, "1000 rad/s"]}
+    (spun,) = estimate(parse_case(data)).parts
+    assert spun.bulk is not None
+    assert spun.bulk.extent == pytest.approx((20e-3, 4e-3, 2e-3))
+    assert spun.bulk.energy == pytest.approx(0.5 * mass * (20e-3**2 + 4e-3**2) / 12.0 * 1e6, rel=5e-3)
+    assert spun.bulk.momentum == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
+    del part["spin"]
+    part["stretch"] = {"rate": ["100 1/s", 0, 0]}
+    (stretched,) = estimate(parse_case(data)).parts
+    assert stretched.bulk is not None
+    assert stretched.bulk.energy == pytest.approx(mass * 1e4 * 20e-3**2 / 24.0, rel=5e-3)
+
+
+def test_a_boundary_that_turns_a_part_gives_it_its_energy() -> None:
+    case = read_case(shipped()["spinning_cube"])
+    (cube,) = estimate(case).parts
+    assert cube.bulk is not None
+    assert cube.bulk.energy > 0.0
+
+
+def test_velocity_is_that_of_the_worker() -> None:
+    case = parse_case(rod("parts[0].spin={centre=[0, 0, 0], rate=[1, 2, 3]}", "parts[0].stretch={rate=[4, 5, 6]}"))
+    x, y, z = velocity(case.parts[0], (0.1, 0.2, 0.3))
+    assert (x, y, z) == pytest.approx((2 * 0.3 - 3 * 0.2 + 0.4, 3 * 0.1 - 1 * 0.3 + 1.0, -10.0 + 0.2 - 2 * 0.1 + 1.8))
