@@ -13,10 +13,8 @@ def _along(p: Floats, a: Floats, b: Floats) -> Floats:
     return np.asarray(np.linalg.norm(p - a - share[..., None] * along, axis=-1))
 
 
-def point_triangle(points: Floats, triangles: Floats) -> Floats:
-    """(n, m) distances of points (n, 3) from triangles (m, 3, 3): above the triangle its height, else to its rim."""
-    p = points[:, None, :]
-    a, b, c = (triangles[None, :, k] for k in range(3))
+def above(p: Floats, a: Floats, b: Floats, c: Floats) -> Floats:
+    """Distance of points from triangles abc, all of one shape (..., 3): above the triangle its height, else to its rim."""
     rim = np.minimum(np.minimum(_along(p, a, b), _along(p, b, c)), _along(p, c, a))
     normal = np.cross(b - a, c - a)
     normal /= np.maximum(np.linalg.norm(normal, axis=-1), 1e-300)[..., None]
@@ -27,10 +25,10 @@ def point_triangle(points: Floats, triangles: Floats) -> Floats:
     return np.where(inside, height, rim)
 
 
-def segment_segment(segments: Floats) -> Floats:
-    """(n, n) distances between segments (n, 2, 3), none parallel: at an end of one, or along the common normal."""
-    a, b = segments[:, None, 0], segments[:, None, 1]
-    c, d = segments[None, :, 0], segments[None, :, 1]
+def across(a: Floats, b: Floats, c: Floats, d: Floats) -> Floats:
+    """Distance of segments ab and cd, none parallel, all of one shape (..., 3): at an end of one, or along the common
+    normal.
+    """
     ends = np.minimum(np.minimum(_along(a, c, d), _along(b, c, d)), np.minimum(_along(c, a, b), _along(d, a, b)))
     u, w, r = b - a, d - c, c - a
     normal = np.cross(u, w)
@@ -39,3 +37,16 @@ def segment_segment(segments: Floats) -> Floats:
     t = (np.cross(r, u) * normal).sum(axis=-1) / area
     crossed = (np.minimum(s, t) >= 0.0) & (np.maximum(s, t) <= 1.0)
     return np.where(crossed, np.abs((r * normal).sum(axis=-1)) / np.sqrt(area), ends)
+
+
+def point_triangle(points: Floats, triangles: Floats) -> Floats:
+    """(n, m) distances of points (n, 3) from triangles (m, 3, 3)."""
+    a, b, c = (triangles[None, :, k] for k in range(3))
+    return above(points[:, None, :], a, b, c)
+
+
+def segment_segment(segments: Floats) -> Floats:
+    """(n, n) distances between segments (n, 2, 3), none parallel."""
+    a, b = segments[:, None, 0], segments[:, None, 1]
+    c, d = segments[None, :, 0], segments[None, :, 1]
+    return across(a, b, c, d)

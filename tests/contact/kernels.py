@@ -5,8 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from conoid.worker.contact import meetings as kernels
-from conoid.worker.contact.meetings import Meetings
+from conoid.worker.contact import edge_edge as edge_kernels
+from conoid.worker.contact import node_face as face_kernels
+from conoid.worker.contact.narrow_phase import PUSH_OUT, ContactRows, EdgeTable, FaceTable, SlotTable, Step
+from conoid.worker.contact.pairs import PairTable
 from conoid.worker.contact.records import Crowd
 from conoid.worker.contact.solver import ActiveSet
 from conoid.worker.parallel.comm import SerialComm
@@ -34,16 +36,14 @@ def edge_sizes(x: Floats, edges: Indices) -> Floats:
     return np.asarray(np.linalg.norm(x[edges[:, 1]] - x[edges[:, 0]], axis=1))
 
 
-def taken(met: Meetings, rows: "np.ndarray") -> Meetings:
-    """Some of the meetings, in this order."""
-    return Meetings(
-        met.nodes[rows], met.weights[rows], met.normals[rows], met.wanted[rows], met.friction[rows], met.pair[rows],
-        len(rows),
-    )  # fmt: skip
+def many(met: ContactRows) -> int:
+    """How many active contacts there are."""
+    return len(met.nodes)
 
 
-def _filled(room: Meetings, n: int) -> Meetings:
-    return taken(room, np.arange(n))
+def taken(met: ContactRows, rows: "np.ndarray") -> ContactRows:
+    """Some of the active contacts, in this order."""
+    return ContactRows(*(column[rows] for column in met))
 
 
 def moments(out: Floats) -> Floats:
@@ -53,49 +53,71 @@ def moments(out: Floats) -> Floats:
     return np.ascontiguousarray(np.column_stack([out.mean(axis=1), *pairs]))
 
 
+def step_of(x: Floats, v: Floats, part: "np.ndarray", dt: float, mu: Floats | None = None) -> Step:
+    """The step ahead of slots at ``x`` with velocities ``v``; no friction unless ``mu`` (parts, parts) says so."""
+    friction = np.zeros((9, 9)) if mu is None else mu
+    return Step(x, v, x + dt * v, part.astype(np.int32), friction, PUSH_OUT, dt)
+
+
+def slot_table(first: Indices, normals: Floats, left: Floats, course: Floats) -> SlotTable:
+    """Slots that are all on the surface; see narrow_phase.SlotTable."""
+    n = len(first)
+    return SlotTable(
+        normals, np.ones(n, bool), first, left, course, np.zeros(n, bool), np.empty(n), np.empty(n, np.int32)
+    )  # fmt: skip
+
+
+def face_table(corners: Indices, size: Floats, left: Floats) -> FaceTable:
+    """Exposed faces, by ascending id."""
+    n, none = len(corners), np.zeros(len(corners), bool)
+    return FaceTable(corners, size, np.arange(n), ~none, left, none.copy(), np.empty((n, 3)), none.copy())
+
+
+def edge_table(corners: Indices, size: Floats, left: Floats) -> EdgeTable:
+    """Edges between exposed faces."""
+    n = len(corners)
+    return EdgeTable(corners, size, np.ones((n, 2), bool), left, np.zeros(n, bool))
+
+
+def pair_table(pairs: Indices) -> PairTable:
+    """Pairs none of which has been tested."""
+    table = PairTable()
+    table.add(np.asarray(pairs, np.int32))
+    return table
+
+
 def node_face(
     x: Floats, v: Floats, faces: Indices, pairs: Indices, dt: float, part: "np.ndarray | None" = None,
     mu: Floats | None = None, out: Floats | None = None,
-) -> Meetings:  # fmt: skip
+) -> ContactRows:  # fmt: skip
     """The nodes that pass a face; the slaves are of another part unless ``part`` says something else.
 
     ``out`` (n, faces, 3): unit normals of a node's faces, all of one area, zero for a node without faces.
     """
     own = np.where(np.isin(np.arange(len(x)), faces), 0, 1) if part is None else part
-    room, n = Meetings.room(len(pairs)), len(x)
-    first, following = np.full(n, -1, np.int32), np.empty(len(pairs), np.int32)
-    kernels.chain(first, following, pairs, 0)
-    found = kernels.node_face(
-        room.nodes, room.weights, room.normals, room.wanted, room.friction, room.pair, 0, faces, face_sizes(x, faces),
-        np.arange(len(faces)), np.ones(len(faces), bool), np.zeros((n, 9)) if out is None else moments(out),
-        np.ones(n, bool), first, following, np.empty(n), np.empty(n, np.int32), np.empty((len(faces), 3)),
-        np.zeros(len(faces), bool), pairs, _all(pairs), x, v,
-        own.astype(np.int32), np.zeros((9, 9)) if mu is None else mu, kernels.PUSH_OUT, dt,
-    )  # fmt: skip
-    return _filled(room, found)
+    room, table, first = ContactRows.room(len(pairs)), pair_table(pairs), np.full(len(x), -1, np.int32)
+    table.hang(first, 0)
+    slots = slot_table(first, np.zeros((len(x), 9)) if out is None else moments(out), np.zeros(len(x)), np.zeros_like(x))
+    of = face_table(faces, face_sizes(x, faces), np.zeros(len(faces)))
+    found, tested = face_kernels.node_face(room, 0, table.arrays(), slots, of, step_of(x, v, own, dt, mu), 0.0)
+    assert tested == len(pairs)
+    return taken(room, np.arange(found))
 
 
-def edge_edge(x: Floats, v: Floats, edges: Indices, pairs: Indices, dt: float, mu: Floats | None = None) -> Meetings:
+def edge_edge(x: Floats, v: Floats, edges: Indices, pairs: Indices, dt: float, mu: Floats | None = None) -> ContactRows:
     """The edges that pass an edge."""
-    room = Meetings.room(len(pairs))
-    found = kernels.edge_edge(
-        room.nodes, room.weights, room.normals, room.wanted, room.friction, room.pair, 0, edges, edge_sizes(x, edges),
-        np.ones((len(edges), 2), bool), pairs, _all(pairs), x, v, np.zeros(len(x), np.int32),
-        np.zeros((9, 9)) if mu is None else mu, kernels.PUSH_OUT, dt,
-    )  # fmt: skip
-    return _filled(room, found)
-
-
-def _all(pairs: Indices) -> Indices:
-    """Places of all pairs."""
-    return np.arange(len(pairs), dtype=np.int32)
+    room, table = ContactRows.room(len(pairs)), pair_table(pairs)
+    of, step = edge_table(edges, edge_sizes(x, edges), np.zeros(len(edges))), step_of(x, v, np.zeros(len(x)), dt, mu)
+    found, tested = edge_kernels.edge_edge(room, 0, table.arrays(), of, step, np.zeros_like(x), 0.0)
+    assert tested == len(pairs)
+    return taken(room, np.arange(found))
 
 
 class Solver:
     """Sweeps over contacts of nodes with a mobility (nodes, 3), 1/kg; impulses in quanta of 1 / ``scale`` N s."""
 
     def __init__(
-        self, met: Meetings, v: Floats, mobility: Floats, scale: float = 2.0**40, active: ActiveSet | None = None
+        self, met: ContactRows, v: Floats, mobility: Floats, scale: float = 2.0**40, active: ActiveSet | None = None
     ) -> None:
         """``active``: of another step, to be used again."""
         self.met, self.v, self.scale, n = met, v.copy(), scale, len(v)
@@ -104,13 +126,13 @@ class Solver:
         self._crowd = Crowd(np.arange(n), every, part, part, mobility, self.v, self.v, self.v)
         self._nodes: Any = SimpleNamespace(v=self.v, part=part, owned=np.ones(n, bool))
         self._impulse = np.zeros((n, 3), np.int64), SharedSum(SerialComm(), [], 3, Tag.CONTACT_IMPULSE)
-        self.active.begin(met, met.n, self._crowd, [])
+        self.active.begin(met, many(met), self._crowd, [])
         self.active.weigh(np.zeros((n, 4), np.int64), SharedSum(SerialComm(), [], 4, Tag.CONTACT_SHARE))
 
     @property
     def push(self) -> Floats:
         """(n, 4) impulses along the normal, and of friction, N s."""
-        push = np.zeros((self.met.n, 4))
+        push = np.zeros((many(self.met), 4))
         rows, push_of = self.active.pushes()
         push[rows] = push_of
         return push

@@ -5,7 +5,7 @@ import pytest
 
 from conoid.worker.contact.cracks import Cracks, computed
 from conoid.worker.contact.kin import Family, inherited
-from conoid.worker.contact.meetings import chain
+from conoid.worker.contact.node_face import chain
 
 
 def cracks_of(n: int) -> Cracks:

@@ -103,8 +103,8 @@ def faces_sent(kind: str, drift: float, ranks: int = 3) -> int:
         crowd = crowd_of(nodes.x, nodes.v, nodes.part)
         crowd.id, crowd.owner = nodes.id, nodes.owner
         slaves = nodes.id[found.flags & nodes.owned]
-        sides = Sides(found.faces, found.edges, crowd.take(used), slaves, 2e-4)
-        rules = Rules(kind, ~np.eye(2, dtype=bool), 2e-3, np.zeros(2, bool))
+        sides = Sides(found.faces, found.edges, crowd.take(used), slaves)
+        rules = Rules(kind, ~np.eye(2, dtype=bool), 2e-3, 1e-4, 4e-4, False)
         return scene.build(sides, rules, 5e-6, np.full(3, drift), nodes, comm).faces_sent
 
     return sum(on_ranks(ranks, work))

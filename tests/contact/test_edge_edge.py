@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from conoid.worker.contact.meetings import DEEP_SELF, NEAR, Meetings
+from conoid.worker.contact.narrow_phase import DEEP_SELF, NEAR, ContactRows
 
 from ..worker.meshes import Floats
 from .bodies import Indices, rotation
-from .kernels import edge_edge, every_pair, node_face
+from .kernels import edge_edge, every_pair, many, node_face
 
 ONE = np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, -1.0], [0.0, -1.0, -1.0]])
 """An edge along x on the back of a body: its two ends, the third nodes of its two faces."""
@@ -24,7 +24,7 @@ def turned(angle: float, width: float = 1.0) -> Floats:
 def meets(
     gap: float = 0.1, speed: float = -0.2, angle: float = np.pi / 2, shift: tuple[float, float] = (0.0, 0.0),
     one: Floats = ONE, width: float = 1.0, tilt: float = 0.0,
-) -> Meetings:  # fmt: skip
+) -> ContactRows:  # fmt: skip
     """Two edges ``gap`` apart, the upper one moving at ``speed`` for a step of 1 s; ``tilt`` turns the lower body."""
     lower = one @ rotation((1, 0, 0), tilt).T
     x = np.concatenate([lower, turned(angle, width) + np.array([*shift, gap])])
@@ -36,7 +36,7 @@ def meets(
 @pytest.mark.parametrize("shift", [(0.0, 0.0), (0.3, -0.2)])
 def test_crossed_edges_that_pass_are_met_between_their_faces(angle: float, shift: tuple[float, float]) -> None:
     met = meets(angle=angle, shift=shift)
-    assert met.n == 1
+    assert many(met) == 1
     assert met.normals[0] == pytest.approx([0.0, 0.0, 1.0], abs=1e-12)
     x = np.concatenate([ONE, turned(angle) + np.array([*shift, 0.1])])
     rate = met.weights[0] @ x[met.nodes[0]]
@@ -50,7 +50,7 @@ def test_the_order_of_the_two_edges_turns_the_normal_only() -> None:
     x = np.concatenate([ONE, turned(0.7) + np.array([0.2, 0.1, 0.1])])
     v = np.concatenate([np.zeros((4, 3)), np.tile([0.0, 0.0, -0.2], (4, 1))])
     two = edge_edge(x, v, EDGES, PAIR[:, ::-1].copy(), 1.0)
-    assert two.n == 1
+    assert many(two) == 1
     assert two.nodes[0].tolist() == one.nodes[0, [2, 3, 0, 1]].tolist()
     assert two.normals == pytest.approx(-one.normals, abs=1e-14)
     assert two.weights[0] == pytest.approx(-one.weights[0, [2, 3, 0, 1]], abs=1e-14)
@@ -59,15 +59,15 @@ def test_the_order_of_the_two_edges_turns_the_normal_only() -> None:
 
 def test_parallel_edges_are_left_to_nodes_and_faces() -> None:
     for angle in (0.0, 0.04, np.pi, np.pi - 0.04):
-        assert meets(angle=angle).n == 0
-    assert meets(angle=0.06).n == 1
+        assert many(meets(angle=angle)) == 0
+    assert many(meets(angle=0.06)) == 1
 
 
 def test_edges_that_cross_beyond_an_end_do_not_meet() -> None:
     for shift in ((1.1, 0.0), (-1.1, 0.0), (0.0, 1.1), (0.0, -1.1)):
-        assert meets(shift=shift).n == 0
+        assert many(meets(shift=shift)) == 0
     for shift in ((0.9, 0.0), (0.0, -0.9)):
-        assert meets(shift=shift).n == 1
+        assert many(meets(shift=shift)) == 1
 
 
 def test_edges_meet_where_they_cross_not_where_they_end_the_step() -> None:
@@ -76,20 +76,20 @@ def test_edges_meet_where_they_cross_not_where_they_end_the_step() -> None:
     for sideways, found in ((0.9, 1), (1.1, 0), (-1.0, 1)):
         v = np.concatenate([np.zeros((4, 3)), np.tile([sideways, 0.0, -0.2], (4, 1))])
         met = edge_edge(x, v, EDGES, PAIR, 1.0)
-        assert met.n == found
+        assert many(met) == found
         if found:
             at = -(met.weights[0, 2:, None] * x[met.nodes[0, 2:]]).sum(axis=0)
             assert at == pytest.approx([0.5 + 0.5 * sideways, 0.0, 0.0], abs=1e-12)
 
 
 def test_a_concave_edge_meets_nothing() -> None:
-    assert meets(one=ONE * [1.0, 1.0, -1.0] @ np.diag([1.0, -1.0, 1.0])).n == 0
+    assert many(meets(one=ONE * [1.0, 1.0, -1.0] @ np.diag([1.0, -1.0, 1.0]))) == 0
 
 
 @pytest.mark.parametrize(("tilt", "found"), [(0.0, 1), (0.7, 1), (0.85, 0), (-0.7, 1), (-0.85, 0), (np.pi, 0)])
 def test_an_edge_meets_only_what_comes_between_its_faces(tilt: float, found: int) -> None:
     """The faces of the lower edge fall by 45 degrees: turned by more, one of them looks up, and nodes meet it."""
-    assert meets(tilt=tilt).n == found
+    assert many(meets(tilt=tilt)) == found
 
 
 @pytest.mark.parametrize(
@@ -101,7 +101,7 @@ def test_an_edge_meets_only_what_comes_between_its_faces(tilt: float, found: int
 )  # fmt: skip
 def test_edges_meet_when_they_pass_or_are_near_and_not_too_deep(gap: float, speed: float, found: int) -> None:
     """Both edges are 2 m long."""
-    assert meets(gap=gap, speed=speed).n == found
+    assert many(meets(gap=gap, speed=speed)) == found
 
 
 def test_what_is_wanted_ends_the_step_with_edges_that_touch() -> None:
@@ -173,8 +173,8 @@ def meet(x: Floats, step: Floats) -> tuple[int, int]:
     """Nodes that meet faces, edges that meet edges, when the second tet moves by ``step``."""
     v = np.concatenate([np.zeros((4, 3)), np.tile(step, (4, 1))])
     pairs = [every_pair(TETS[i], 4) + np.array([0, 4 * (1 - i)], np.int32) for i in (0, 1)]
-    nodes = sum(node_face(x, v, FACES, p, 1.0, np.repeat([0, 1], 4)).n for p in pairs)
-    return nodes, edge_edge(x, v, RIDGES, every_pair(np.arange(6), 6) + np.array([0, 6], np.int32), 1.0).n
+    nodes = sum(many(node_face(x, v, FACES, p, 1.0, np.repeat([0, 1], 4))) for p in pairs)
+    return nodes, many(edge_edge(x, v, RIDGES, every_pair(np.arange(6), 6) + np.array([0, 6], np.int32), 1.0))
 
 
 def lowest_altitude(x: Floats) -> float:

@@ -3,14 +3,16 @@
 import numpy as np
 import pytest
 
-from conoid.worker.contact import meetings, search
-from conoid.worker.contact.meetings import DEEP, DEEP_SELF, NEAR, Meetings
+from conoid.worker.contact import search
+from conoid.worker.contact.geometry import MARGIN
+from conoid.worker.contact.narrow_phase import DEEP, DEEP_SELF, NEAR, PUSH_OUT, ContactRows
+from conoid.worker.contact.node_face import _TOUCHING
 from conoid.worker.contact.search import Things
 
 from ..worker.meshes import Floats, block
 from .bodies import Indices, crowd_of, meeting_of, pieces_of, sheet, surface_of
 from .distances import point_triangle
-from .kernels import every_pair, face_sizes, node_face
+from .kernels import every_pair, face_sizes, many, node_face
 
 TRIANGLE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.2, 0.2, -1.0]])
 FACE = np.array([[0, 1, 2, 3]], np.int32)
@@ -43,13 +45,13 @@ class Expected:
         share = 0.0 if self.gap0 <= 0.0 else min(self.gap0 / (self.gap0 - self.gap1), 1.0) if self.gap1 < 0.0 else 1.0
         at = x + share * dt * v
         b = foot(at[s], at[three])
-        self.meets = self.gap1 <= NEAR * size and self.gap0 >= -deep and b.min() >= -meetings._MARGIN
+        self.meets = self.gap1 <= NEAR * size and self.gap0 >= -deep and b.min() >= -MARGIN
         self.weights = np.array([1.0, *-(np.maximum(b, 0.0) / np.maximum(b, 0.0).sum())])
         speed = float(self.normal @ (self.weights @ v[[s, *three]]))
         depth = max(-self.gap0, 0.0)
-        back = meetings.PUSH_OUT * min(depth / dt, max(-speed, 0.0))
+        back = PUSH_OUT * min(depth / dt, max(-speed, 0.0))
         self.wanted = speed - (depth + self.gap1) / dt + back
-        self.deep = self.gap0 < -meetings._TOUCHING * size
+        self.deep = self.gap0 < -_TOUCHING * size
 
 
 def random_scene(seed: int, nodes: int = 40, faces: int = 12) -> tuple[Floats, Floats, Indices, "np.ndarray"]:
@@ -100,7 +102,7 @@ def test_meetings_are_those_of_the_formulas(dt: float) -> None:
         assert (got.friction == 1.0 + part[got.nodes[:, 0]]).all()
         assert np.abs(got.weights.sum(axis=1)).max() < 1e-14
         assert np.linalg.norm(got.normals, axis=1) == pytest.approx(1.0, abs=1e-14)
-        count += got.n
+        count += many(got)
     assert count > 150
 
 
@@ -111,13 +113,13 @@ def test_what_is_wanted_ends_the_step_on_the_face_or_takes_back_a_tenth_of_the_d
     v[4] = 0.5, -0.2, -7.0
     dt = 0.1
     met = node_face(x, v, FACE, every_pair(np.array([4]), 1), dt)
-    assert met.n == 1
+    assert many(met) == 1
     rate = met.weights[0] @ v[met.nodes[0]] @ met.normals[0]
     v[4] += (met.wanted[0] - rate) * met.normals[0]
     assert height((x + dt * v)[4], (x + dt * v)[:3])[0] == pytest.approx(0.9 * min(gap, 0.0), abs=1e-14)
 
 
-def met_from(start: Floats, speed: Floats, dt: float = 1.0, own: bool = False, below: float = -1.0) -> Meetings:
+def met_from(start: Floats, speed: Floats, dt: float = 1.0, own: bool = False, below: float = -1.0) -> ContactRows:
     """Meetings of one node with the triangle, whose tet reaches down to ``below``."""
     x = np.concatenate([TRIANGLE, start[None]])
     x[3, 2] = below
@@ -135,12 +137,12 @@ def met_from(start: Floats, speed: Floats, dt: float = 1.0, own: bool = False, b
 )  # fmt: skip
 def test_a_node_deeper_than_the_limit_is_not_met(gap: float, own: bool, below: float, meets: bool) -> None:
     """A quarter of the face's size; a twentieth on one part; half the height of the tet behind it."""
-    assert (met_from(np.array([0.3, 0.3, gap]), np.zeros(3), own=own, below=below).n == 1) == meets
+    assert (many(met_from(np.array([0.3, 0.3, gap]), np.zeros(3), own=own, below=below)) == 1) == meets
 
 
 @pytest.mark.parametrize(("gap", "meets"), [(0.99 * NEAR, True), (1.01 * NEAR, False)])
 def test_a_node_that_stays_near_is_watched(gap: float, meets: bool) -> None:
-    assert (met_from(np.array([0.3, 0.3, gap]), np.zeros(3)).n == 1) == meets
+    assert (many(met_from(np.array([0.3, 0.3, gap]), np.zeros(3))) == 1) == meets
 
 
 @pytest.mark.parametrize(
@@ -159,7 +161,7 @@ def test_a_node_meets_what_its_faces_look_at(faces: list[tuple[float, ...]], mee
     x, v = np.concatenate([TRIANGLE, [[0.3, 0.3, -0.01]]]), np.zeros((5, 3))
     out = np.zeros((5, len(faces), 3))
     out[4] = faces
-    assert (node_face(x, v, FACE, every_pair(np.array([4]), 1), 1.0, out=out).n == 1) == meets
+    assert (many(node_face(x, v, FACE, every_pair(np.array([4]), 1), 1.0, out=out)) == 1) == meets
 
 
 def test_a_node_beside_an_acute_edge_is_not_inside() -> None:
@@ -167,10 +169,10 @@ def test_a_node_beside_an_acute_edge_is_not_inside() -> None:
     x = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.2, 0.9, -0.7], [0.45, 0.0, -0.1]])
     faces = np.array([[0, 1, 2, 3], [0, 3, 1, 2], [1, 3, 2, 0], [0, 2, 3, 1]], np.int32)
     x[4, 1] = 0.02
-    assert node_face(x, np.zeros_like(x), faces[:1], every_pair(np.array([4]), 1), 1.0).n == 1
-    assert node_face(x, np.zeros_like(x), faces, every_pair(np.array([4]), 4), 1.0).n == 0
+    assert many(node_face(x, np.zeros_like(x), faces[:1], every_pair(np.array([4]), 1), 1.0)) == 1
+    assert many(node_face(x, np.zeros_like(x), faces, every_pair(np.array([4]), 4), 1.0)) == 0
     x[4, 1] = 0.25
-    assert node_face(x, np.zeros_like(x), faces, every_pair(np.array([4]), 4), 1.0).n == 1
+    assert many(node_face(x, np.zeros_like(x), faces, every_pair(np.array([4]), 4), 1.0)) == 1
 
 
 def test_a_deep_node_is_held_by_the_nearest_face_and_a_touching_one_by_all() -> None:
@@ -181,7 +183,7 @@ def test_a_deep_node_is_held_by_the_nearest_face_and_a_touching_one_by_all() -> 
         x = np.concatenate([model.nodes.x, 1.0 - depth[None]])
         met = node_face(x, np.zeros_like(x), faces, every_pair(np.array([8]), len(faces)), 1.0)
         assert len(np.unique(met.normals.round(9), axis=0)) == count
-        assert met.n == 1 or count > 1
+        assert many(met) == 1 or count > 1
         assert (met.normals == [0.0, 1.0, 0.0]).all(axis=1).any()
 
 
@@ -263,5 +265,5 @@ def test_no_fast_node_passes_a_closed_surface_unmet(seed: int) -> None:
     hits = passes & (b.min(axis=2) > 0.0)
     assert 1000 < hits.any(axis=1).sum() < n
     assert not (hits & ~found).any()
-    beside = passes & (b.min(axis=2) < -1.01 * meetings._MARGIN)
+    beside = passes & (b.min(axis=2) < -1.01 * MARGIN)
     assert not (beside & found).any()

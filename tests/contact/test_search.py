@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from conoid.worker.contact import buckets, search
+from conoid.worker.contact.buckets import Table
 from conoid.worker.contact.search import Things
 
 from ..worker.meshes import Floats
@@ -229,23 +230,51 @@ def test_memory_does_not_follow_a_huge_thing(size: float) -> None:
     assert peak < 4e6
 
 
-@pytest.mark.parametrize(
-    ("spread", "table"), [((1.0, 1.0, 0.5), True), ((1e9, 1.0, 0.5), True), ((1.0, 1e3, 1e3), False)]
-)
-def test_position_codes_find_every_point_of_a_bucket(spread: tuple[float, ...], table: bool) -> None:
-    """Each row of buckets is one range of the sorted codes, with a table of rows and without."""
+def cells_of(table: Table, low: Floats, high: Floats) -> set[int]:
+    """Codes of all cells that a box touches."""
+    first, last = (
+        np.clip(np.floor((corner - table.origin) * table.inverse), 0, table.shape - 1).astype(np.int64)
+        for corner in (low, high)
+    )
+    x, y, z = np.meshgrid(*(np.arange(a, b + 1) for a, b in zip(first, last, strict=True)), indexing="ij")
+    return set((x + table.shape[0] * (y + table.shape[1] * z)).reshape(-1).tolist())
+
+
+@pytest.mark.parametrize("spread", [(1.0, 1.0, 0.5), (1e9, 1.0, 0.5), (1.0, 1e3, 1e3), (1e15, 1e15, 1e15)])
+@pytest.mark.parametrize("edge", [1e-3, 0.1, 10.0])
+def test_position_codes_have_every_box_once_in_each_cell_that_it_touches(
+    spread: tuple[float, ...], edge: float
+) -> None:
+    """And the entries of a hash lie side by side. Every third box is not entered at all, some are wide, one is a
+    point.
+    """
     random = np.random.default_rng(2)
-    points = random.uniform(0.0, 1.0, (500, 3)) * np.array(spread)
-    sorted_points = buckets.sort(points, 0.1)
-    assert (np.diff(sorted_points.codes) >= 0).all()
-    assert sorted(sorted_points.order.tolist()) == list(range(500))
-    index = np.floor((points - points.min(axis=0)) * sorted_points.inverse).astype(int)
-    index = np.minimum(index, sorted_points.shape - 1)
-    code = index[:, 0] + sorted_points.shape[0] * (index[:, 1] + sorted_points.shape[1] * index[:, 2])
-    assert (code[sorted_points.order] == sorted_points.codes).all()
-    assert (len(sorted_points.rows) > 0) == table
-    for wanted in code[:50]:
-        row = wanted // sorted_points.shape[0]
-        first = buckets.first_at(sorted_points.codes, sorted_points.rows, row, wanted)
-        last = buckets.first_at(sorted_points.codes, sorted_points.rows, row, wanted + 1)
-        assert set(sorted_points.order[first:last].tolist()) == set(np.flatnonzero(code == wanted).tolist())
+    low = random.uniform(0.0, 1.0, (400, 3)) * np.array(spread)
+    high = low + edge * random.uniform(0.0, 3.0, (400, 3)) * (1.0 + 10.0 * (random.uniform(size=(400, 1)) < 0.1))
+    low[0] = high[0]
+    some = np.flatnonzero(np.arange(400) % 3 < 2).astype(np.int32)
+    table = buckets.sort(low, high, some, edge)
+    assert 1.0 / table.inverse >= edge * (1.0 - 1e-12)
+    assert (table.shape <= 2**20 + 1).all()
+    touched = {int(j): cells_of(table, low[j], high[j]) for j in some}
+    wide = [j for j, cells in touched.items() if len(cells) > buckets._WIDE]
+    assert sorted(table.wide.tolist()) == wide
+    found: dict[int, list[int]] = {j: [] for j in touched}
+    for bucket in range(2**table.bits):
+        for entry in range(table.start[bucket], table.start[bucket + 1]):
+            assert buckets.bucket_at(table.code[entry], table.bits) == bucket
+            found[int(table.thing[entry])].append(int(table.code[entry]))
+    assert table.start[0] == 0
+    assert table.start[-1] == len(table.thing) == sum(map(len, found.values()))
+    for j, cells in touched.items():
+        assert sorted(found[j]) == ([] if j in wide else sorted(cells))
+    assert bool(wide) == (max(spread) < 1e9)
+
+
+def test_a_hash_holds_few_codes() -> None:
+    """Of the cells of a full cube, of a layer and of a line: the most entries that a walk passes over at a code."""
+    for shape in ((16, 16, 16), (64, 64, 1), (4096, 1, 1), (1, 1, 4096)):
+        low = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1).reshape(-1, 3) + 0.25
+        table = buckets.sort(low, low + 0.5, np.arange(len(low), dtype=np.int32), 1.0)
+        assert len(table.thing) == len(low)
+        assert np.diff(table.start).max() <= 16

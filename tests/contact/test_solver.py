@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conoid.worker.contact.meetings import Meetings
+from conoid.worker.contact.narrow_phase import ContactRows
 
 from ..worker.meshes import Floats
 from .kernels import Solver
@@ -12,7 +12,7 @@ NODES, CONTACTS, SWEEPS = 40, 60, 6
 _QUANTA, _SCALE = 2.0**30, 2.0**40
 
 
-def scene(seed: int) -> tuple[Meetings, Floats, Floats]:
+def scene(seed: int) -> tuple[ContactRows, Floats, Floats]:
     """Nodes on faces, edges and cracks, most without friction and some held, in a cloud that hardly closes: half of the
     contacts are idle at first, and some of them are woken by others.
     """
@@ -28,13 +28,13 @@ def scene(seed: int) -> tuple[Meetings, Floats, Floats]:
     mobility = np.repeat(10.0 ** random.uniform(-1.0, 1.0, (NODES, 1)), 3, axis=1)
     mobility[random.uniform(size=(NODES, 3)) < 0.05] = 0.0
     wanted = -2.0 * random.uniform(size=CONTACTS)
-    return Meetings(rows, weights, normals, wanted, friction, pair, CONTACTS), random.normal(size=(NODES, 3)), mobility
+    return ContactRows(rows, weights, normals, wanted, friction, pair), random.normal(size=(NODES, 3)), mobility
 
 
 class Plain:
     """Every contact in every sweep."""
 
-    def __init__(self, met: Meetings, v: Floats, mobility: Floats) -> None:
+    def __init__(self, met: ContactRows, v: Floats, mobility: Floats) -> None:
         self.met, self.v, self.mobility = met, v.copy(), mobility
         self.push, self.total = np.zeros((CONTACTS, 4)), np.zeros((NODES, 3), np.int64)
         sums, sizes = np.zeros((NODES, 4), np.int64), np.column_stack([np.abs(met.normals), np.ones(CONTACTS)])

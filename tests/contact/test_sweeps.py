@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from conoid.worker.contact.meetings import Meetings
+from conoid.worker.contact.narrow_phase import ContactRows
 
 from ..worker.meshes import Floats
 from .bodies import rotation
-from .kernels import Solver, taken
+from .kernels import Solver, many, taken
 
 SEEDS = range(40)
 
@@ -19,7 +19,7 @@ def unit(random: np.random.Generator, n: int) -> Floats:
 
 def network(
     seed: int, meetings: int = 30, nodes: int = 25, friction: float = 0.0, wanted: float = 0.0, one_normal: bool = False
-) -> tuple[Meetings, Floats, Floats]:
+) -> tuple[ContactRows, Floats, Floats]:
     """Random meetings that share nodes, of nodes with faces and of edges; velocities, and masses of 1000:1."""
     random = np.random.default_rng(seed)
     rows = np.array([random.choice(nodes, 4, replace=False) for _ in range(meetings)], np.int32).reshape(-1, 4)
@@ -31,7 +31,7 @@ def network(
     want, mu = -wanted * random.uniform(size=meetings), np.full(meetings, friction)
     mobility = np.repeat(10.0 ** random.uniform(-1.5, 1.5, (nodes, 1)), 3, axis=1)
     pair = np.arange(meetings, dtype=np.int32)
-    return Meetings(rows, weights, normals, want, mu, pair, meetings), 10.0 * random.normal(size=(nodes, 3)), mobility
+    return ContactRows(rows, weights, normals, want, mu, pair), 10.0 * random.normal(size=(nodes, 3)), mobility
 
 
 def energy(v: Floats, mobility: Floats) -> float:
@@ -40,39 +40,39 @@ def energy(v: Floats, mobility: Floats) -> float:
     return float(0.5 * (mass * v * v).sum())
 
 
-def rates(met: Meetings, v: Floats) -> Floats:
+def rates(met: ContactRows, v: Floats) -> Floats:
     """(n, 3) relative velocity at each meeting."""
     return np.asarray(np.einsum("pk,pki->pi", met.weights, v[met.nodes]))
 
 
-def speeds(met: Meetings, v: Floats) -> Floats:
+def speeds(met: ContactRows, v: Floats) -> Floats:
     """(n,) along the normals."""
     return np.asarray((rates(met, v) * met.normals).sum(axis=1))
 
 
-def rows_of(met: Meetings, nodes: int) -> Floats:
+def rows_of(met: ContactRows, nodes: int) -> Floats:
     """(n, 3 nodes) the matrix that takes velocities to normal speeds."""
-    rows = np.zeros((met.n, nodes, 3))
-    for p in range(met.n):
+    rows = np.zeros((many(met), nodes, 3))
+    for p in range(many(met)):
         rows[p, met.nodes[p]] += met.weights[p][:, None] * met.normals[p]
-    return rows.reshape(met.n, -1)
+    return rows.reshape(many(met), -1)
 
 
-def dense(met: Meetings, v: Floats, mobility: Floats) -> Floats:
+def dense(met: ContactRows, v: Floats, mobility: Floats) -> Floats:
     """Velocities of the exact solution of the frictionless problem, by projected Gauss-Seidel."""
     J, inverse = rows_of(met, len(v)), mobility.reshape(-1)
     A, rest = J * inverse @ J.T, J @ v.reshape(-1) - met.wanted
-    push = np.zeros(met.n)
+    push = np.zeros(many(met))
     for _ in range(20_000):
         before = push.copy()
-        for p in range(met.n):
+        for p in range(many(met)):
             push[p] = max(0.0, push[p] - (A[p] @ push + rest[p]) / A[p, p])
         if np.abs(push - before).max() <= 1e-14 * push.max():
             break
     return np.asarray(v + (inverse * (push @ J)).reshape(-1, 3))
 
 
-def alone(seed: int, friction: float = 0.0) -> tuple[Meetings, Floats, Floats]:
+def alone(seed: int, friction: float = 0.0) -> tuple[ContactRows, Floats, Floats]:
     """One meeting of a random network, turned so that it must push."""
     met, v, mobility = network(seed, 1, 4, friction)
     v *= np.sign(-speeds(met, v)[0])
@@ -100,7 +100,7 @@ def test_impulses_add_up_to_exactly_nothing_and_act_along_the_normals(seed: int)
     assert np.abs(solver.total).max() > 2**36
     assert (solver.total.sum(axis=0) == 0).all()
     pushes = (rows_of(met, len(v)).T @ solver.push[:, 0]).reshape(-1, 3)
-    assert np.abs(pushes - solver.total / solver.scale).max() < 4.0 * 7 * met.n / solver.scale
+    assert np.abs(pushes - solver.total / solver.scale).max() < 4.0 * 7 * many(met) / solver.scale
     assert np.abs(v + mobility * pushes - solver.v).max() < 1e-9 * np.abs(v).max()
 
 
@@ -164,7 +164,7 @@ def test_kinetic_energy_never_rises_with_friction(friction: float, held: float, 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_order_of_meetings_changes_no_bit(seed: int, friction: float) -> None:
     met, v, mobility = network(seed, friction=friction)
-    order = np.random.default_rng(seed).permutation(met.n)
+    order = np.random.default_rng(seed).permutation(many(met))
     other = taken(met, order)
     one, two = Solver(met, v, mobility), Solver(other, v, mobility)
     assert one.sweep(9).tobytes() == two.sweep(9).tobytes()
