@@ -18,13 +18,11 @@ from conoid.worker.parallel.comm import SerialComm
 from ..worker.meshes import Floats
 from .bodies import Flags, Indices
 from .kernels import edge_sizes, edge_table, face_sizes, face_table, moments, pair_table, slot_table, step_of, taken
+from .shards import CORNERS, EDGES, FACES
 
 SHARDS, STEPS = 60, 40
 SHORT = 8
 """Steps between two sets of short lines."""
-CORNERS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-FACES = np.array([[0, 2, 1, 3], [0, 1, 3, 2], [1, 2, 3, 0], [0, 3, 2, 1]])
-EDGES = np.array([[0, 1, 2, 3], [0, 2, 3, 1], [0, 3, 1, 2], [1, 2, 0, 3], [1, 3, 2, 0], [2, 3, 0, 1]])
 
 
 def apart(one: Indices, two: Indices) -> Indices:

@@ -23,7 +23,7 @@ from ..worker.meshes import Floats
 from .bodies import Flags, Indices, crowd_of, rotation
 from .distances import point_triangle, segment_segment
 from .kernels import edge_sizes, face_sizes
-from .test_pairs import CORNERS, EDGES, FACES
+from .shards import CORNERS, EDGES, FACES
 
 SHARDS, STEPS, SKIN = 50, 40, 0.2
 SEEDS = range(4)
@@ -48,7 +48,7 @@ class World:
         self.size, self.length = face_sizes(self.x, self.faces), edge_sizes(self.x, self.edges)
         self.here = self.draw.uniform(size=SHARDS) < 0.8
         self.shown = self.draw.uniform(size=SHARDS) < 0.6
-        self.registered, self.carried, self.near = 0, 0, np.zeros(2, int)
+        self.registered, self.carried, self.opened, self.near = 0, 0, 0, np.zeros(2, int)
         self.scene = self.search(None)
 
     def search(self, old: Scene | None) -> Scene:
@@ -80,8 +80,8 @@ class World:
 
     def knock(self) -> None:
         """Some shards get another velocity, some nodes by themselves."""
-        shards, nodes = self.draw.uniform(size=(SHARDS, 1)) < 0.1, self.draw.uniform(size=(len(self.v), 1)) < 0.05
-        self.v = self.v + np.repeat(self.draw.normal(0.0, 0.6, (SHARDS, 3)) * shards, 4, axis=0)
+        shards, nodes = self.draw.uniform(size=(SHARDS, 1)) < 0.2, self.draw.uniform(size=(len(self.v), 1)) < 0.05
+        self.v = self.v + np.repeat(self.draw.normal(0.0, 0.35, (SHARDS, 3)) * shards, 4, axis=0)
         self.v = self.v + self.draw.normal(0.0, 0.02, self.v.shape) * nodes
 
     def some(self, flags: Flags, share: float) -> "np.ndarray":
@@ -96,6 +96,7 @@ class World:
         """Some hidden shards become surface, foreseen or not."""
         shards = self.some(self.here & ~self.shown, 0.1)
         self.shown[shards] = True
+        self.opened += len(shards)
         self.scene.expose(self.rows(shards, 4))
         self.scene.on_surface[:] = np.repeat(self.shown, 4)[self.scene.crowd.id]
 
@@ -118,11 +119,11 @@ class World:
 
     def step(self, number: int) -> None:
         """Whatever may happen before a step, and the step."""
-        dt = float(self.draw.uniform(0.02, 0.05))
+        dt = float(self.draw.uniform(0.02, 0.04))
         self.knock()
         if self.scene.tracks.end + dt > self.scene.until:
             self.scene = self.search(None)
-        elif number % 9 == 8:
+        elif number % 5 == 4:
             self.another_surface()
         if number % 4 == 3:
             self.foresee()
@@ -209,7 +210,7 @@ def test_what_has_changed_is_registered_whatever_happens(seed: int) -> None:
     world = flown(seed)
     assert world.registered > 10
     assert world.carried > 3
-    assert 0 < (~world.shown & world.here).sum() < 0.4 * SHARDS
+    assert world.opened > 3
     assert (world.near > 500).all()
 
 
@@ -266,7 +267,7 @@ def test_pairs_that_are_found_again_keep_their_impulses(seed: int) -> None:
         after = named(world.scene)
         both = before.keys() & after.keys()
         if world.scene is now or world.carried > carried:
-            assert len(both) > 0.5 * len(before)
+            assert len(both) > 0.2 * len(before)
             assert all((before[pair] == after[pair]).all() for pair in both)
         assert not any(after[pair].any() for pair in after.keys() - both)
 
@@ -276,3 +277,19 @@ def named(now: Scene) -> dict[tuple[int, int], Floats]:
     node, face = now.node_face.rows.T
     names = zip(now.crowd.id[node].tolist(), now.face_id[face].tolist(), strict=True)
     return dict(zip(names, now.node_face.kept.copy(), strict=True))
+
+
+@pytest.mark.xfail(strict=True, reason="a new line has the mean velocity of the old one, whatever the slot does now")
+def test_a_slot_that_is_knocked_beyond_the_skin_in_one_step_finds_what_it_passes() -> None:
+    """A shard at rest flies off so fast, after a while, that a step takes it through a face that was out of reach."""
+    world = World(0)
+    world.here[:], world.shown[:] = False, False
+    world.here[:2], world.shown[:2], world.v[:] = True, True, 0.0
+    world.x[4:8] = world.x[:4] + np.array([0.0, 0.0, 1.5])
+    world.scene = world.search(None)
+    for _ in range(5):
+        world.begin(0.02)
+    assert not len(world.scene.node_face)
+    world.v[4:8, 2] = -30.0
+    world.begin(0.02)
+    assert len(world.scene.node_face)
