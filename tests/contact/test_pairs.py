@@ -289,7 +289,11 @@ def random_table(seed: int) -> PairTable:
     draw = np.random.default_rng(seed)
     rows = draw.permutation(np.stack(np.meshgrid(np.arange(20), np.arange(15)), axis=-1).reshape(-1, 2))[:200]
     table = pair_table(rows)
-    table.until[:], table.speed[:], table.kept[:] = draw.normal(size=200), draw.normal(size=200), draw.normal(size=(200, 4))
+    table.until[:], table.speed[:], table.kept[:] = (
+        draw.normal(size=200),
+        draw.normal(size=200),
+        draw.normal(size=(200, 4)),
+    )
     table.turned[:] = draw.uniform(size=200) < 0.5
     return table
 

@@ -104,6 +104,7 @@ class World:
         """Some shards leave, others come, and hidden ones are uncovered; what is known of the rest is carried over."""
         gone, come, bare = self.some(self.here, 0.1), self.some(~self.here, 0.3), self.some(~self.shown, 0.2)
         self.here[gone], self.here[come], self.shown[bare] = False, True, True
+        self.opened += len(bare)
         self.scene = self.search(self.scene)
 
     def begin(self, dt: float) -> None:
@@ -162,7 +163,9 @@ def near_faces(now: Scene) -> Flags:
     deep = np.where(part[:, None] == part[corners[:, 0]][None], DEEP_SELF, DEEP) * now.face_size
     spent = left[:, None] + left[corners].max(axis=1)[None]
     near = point_triangle(x, x[corners]) < 0.5 * (SKIN + deep - spent)
-    return np.asarray(near & allowed(now, nodes, corners) & now.node_live[:, None] & now.face_live & ~common(nodes, corners))
+    return np.asarray(
+        near & allowed(now, nodes, corners) & now.node_live[:, None] & now.face_live & ~common(nodes, corners)
+    )
 
 
 def near_edges(now: Scene) -> Flags:
