@@ -1,4 +1,4 @@
-"""A pair that is left alone would not have met: random flights, knocks, turns and cracks, against testing every pair."""
+"""A pair that is left alone would not have met: random flights, knocks and cracks, against testing every pair."""
 
 from pathlib import Path
 
@@ -25,7 +25,7 @@ SHORT = 8
 """Steps between two sets of short lines."""
 
 
-def apart(one: Indices, two: Indices) -> Indices:
+def apart(one: "np.ndarray", two: "np.ndarray") -> Indices:
     """(p, 2) all rows of ``one`` with all of ``two`` that are of another shard."""
     pairs = np.stack(np.meshgrid(np.arange(len(one)), np.arange(len(two)), indexing="ij"), axis=-1).reshape(-1, 2)
     return np.asarray(pairs[one[pairs[:, 0]] != two[pairs[:, 1]]], np.int32)
@@ -137,9 +137,9 @@ class Shards:
         """Some corners separate: a copy goes off with half of the faces and edges; one edge goes altogether."""
         n = len(self.x)
         some = self.draw.choice(n, 3, replace=False)
-        copies = np.arange(n, n + 3)
+        copies = np.arange(n, n + 3, dtype=np.int32)
         self.tracks.add(self.x[some], self.v[some])
-        self.tracks.inherit(copies, some)
+        self.tracks.inherit(copies, some.astype(np.int32))
         self.v = np.concatenate([self.v, self.v[some] + self.violence * self.draw.normal(size=(3, 3))])
         for name in ("x", "shard", "normals", "on_surface"):
             setattr(self, name, np.concatenate([getattr(self, name), getattr(self, name)[some]]))
@@ -177,13 +177,14 @@ class Shards:
 
 def equal(one: list[ContactRows], two: list[ContactRows]) -> bool:
     """Contacts with all their columns, to the bit, in the same order."""
-    pairs = [pair for a, b in zip(one, two, strict=True) for pair in zip(a, b, strict=True)]
+    columns = ContactRows._fields
+    pairs = [(getattr(a, name), getattr(b, name)) for a, b in zip(one, two, strict=True) for name in columns]
     return all(np.array_equal(a, b) for a, b in pairs)
 
 
 def flown(seed: int, violence: float, blind: bool = False) -> tuple[int, int, float, float]:
-    """Steps whose contacts differ from those of all pairs, contacts, and shares of the pairs: those that were tested, and
-    those that were although nothing had changed; ``blind``: as if nothing ever left its line.
+    """Steps whose contacts differ from those of all pairs, contacts, and shares of the pairs: those tested, and
+    those tested although nothing had changed; ``blind``: as if nothing ever left its line.
     """
     shards = Shards(seed, violence)
     some, every = (Tables(*shards.pairs(), every=flag) for flag in (False, True))

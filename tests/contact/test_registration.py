@@ -1,4 +1,4 @@
-"""Registration of what has changed: no pair is missed or found twice, whatever the order of strays, cracks and surfaces.
+"""Registration of what has changed: no pair is missed or found twice, in any order of strays, cracks and surfaces.
 
 Shards fly about and are knocked. Some are hidden, as the sides of cracks are; what they leave their lines by is not
 watched until they are searched. All pairs of what is searched are measured in every step. Shards hardly turn: what
@@ -38,7 +38,7 @@ class World:
 
     def __init__(self, seed: int) -> None:
         self.draw, first, shard = np.random.default_rng(seed), 4 * np.arange(SHARDS), np.arange(SHARDS)
-        turned = CORNERS @ np.array([rotation(self.draw.normal(size=3), 3.0) for _ in shard])
+        turned = CORNERS @ np.array([rotation(self.draw.normal(size=3).tolist(), 3.0) for _ in shard])
         self.x = (self.draw.uniform(-2.2, 2.2, (SHARDS, 1, 3)) + turned).reshape(-1, 3)
         self.v = np.repeat(self.draw.normal(0.0, 0.4, (SHARDS, 3)), 4, axis=0)
         self.part = np.repeat(shard % 3, 4).astype(np.int32)
@@ -179,8 +179,8 @@ def near_edges(now: Scene) -> Flags:
 
 
 def check(now: Scene) -> Ints:
-    """No pair is missed, none is there twice or between things that have a corner in common, or is not searched; and all
-    that is searched is near its lines. Returns how many pairs of either kind are near.
+    """No pair is missed, none is there twice or has a corner in common, or is of what is not searched; and all that
+    is searched is near its lines. Returns how many pairs of either kind are near.
     """
     corners, ends = now.faces[:, :3], now.edges[:, :2]
     nodes = np.arange(now.crowd.n, dtype=np.int32)[:, None]
@@ -209,7 +209,7 @@ def flown(seed: int) -> World:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_what_has_changed_is_registered_whatever_happens(seed: int) -> None:
-    """Strays, cracks that are foreseen, faces that are exposed, surfaces that take over pairs, searches from nothing."""
+    """Strays, foreseen cracks, exposed faces, surfaces that take over pairs, searches from nothing."""
     world = flown(seed)
     assert world.registered > 10
     assert world.carried > 3

@@ -13,7 +13,7 @@ TIMES = np.linspace(0.0, HORIZON, 41)
 
 
 def flights(seed: int, many: int, turn: float) -> tuple[Floats, Floats]:
-    """(pairs, 2, many, 3) positions and velocities of two things of ``many`` corners about 1 m long: each flies by about
+    """(pairs, 2, many, 3) positions and velocities of two things of ``many`` corners about 1 m long: each flies about
     its length and turns by about ``turn``, rad.
     """
     draw = np.random.default_rng(seed)
