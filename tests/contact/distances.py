@@ -14,7 +14,7 @@ def _along(p: Floats, a: Floats, b: Floats) -> Floats:
 
 
 def above(p: Floats, a: Floats, b: Floats, c: Floats) -> Floats:
-    """Distance of points from triangles abc, all of one shape (..., 3): above the triangle its height, else to its rim."""
+    """Distance of points from triangles abc, of one shape (..., 3): above one its height, else to its rim."""
     rim = np.minimum(np.minimum(_along(p, a, b), _along(p, b, c)), _along(p, c, a))
     normal = np.cross(b - a, c - a)
     normal /= np.maximum(np.linalg.norm(normal, axis=-1), 1e-300)[..., None]

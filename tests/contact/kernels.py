@@ -56,7 +56,7 @@ def moments(out: Floats) -> Floats:
 def step_of(x: Floats, v: Floats, part: "np.ndarray", dt: float, mu: Floats | None = None) -> Step:
     """The step ahead of slots at ``x`` with velocities ``v``; no friction unless ``mu`` (parts, parts) says so."""
     friction = np.zeros((9, 9)) if mu is None else mu
-    return Step(x, v, x + dt * v, part.astype(np.int32), friction, PUSH_OUT, dt)
+    return Step.of(x, v, part.astype(np.int32), friction, PUSH_OUT, dt)
 
 
 def slot_table(first: Indices, normals: Floats, left: Floats, course: Floats) -> SlotTable:
@@ -97,7 +97,9 @@ def node_face(
     own = np.where(np.isin(np.arange(len(x)), faces), 0, 1) if part is None else part
     room, table, first = ContactRows.room(len(pairs)), pair_table(pairs), np.full(len(x), -1, np.int32)
     table.hang(first, 0)
-    slots = slot_table(first, np.zeros((len(x), 9)) if out is None else moments(out), np.zeros(len(x)), np.zeros_like(x))
+    slots = slot_table(
+        first, np.zeros((len(x), 9)) if out is None else moments(out), np.zeros(len(x)), np.zeros_like(x)
+    )
     of = face_table(faces, face_sizes(x, faces), np.zeros(len(faces)))
     found, tested = face_kernels.node_face(room, 0, table.arrays(), slots, of, step_of(x, v, own, dt, mu), 0.0)
     assert tested == len(pairs)

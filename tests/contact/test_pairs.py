@@ -1,4 +1,4 @@
-"""A pair that is left alone would not have met: random flights, knocks, turns and cracks, against testing every pair."""
+"""A pair that is left alone would not have met: random flights, knocks and cracks, against testing every pair."""
 
 from pathlib import Path
 
@@ -18,16 +18,14 @@ from conoid.worker.parallel.comm import SerialComm
 from ..worker.meshes import Floats
 from .bodies import Flags, Indices
 from .kernels import edge_sizes, edge_table, face_sizes, face_table, moments, pair_table, slot_table, step_of, taken
+from .shards import CORNERS, EDGES, FACES
 
 SHARDS, STEPS = 60, 40
 SHORT = 8
 """Steps between two sets of short lines."""
-CORNERS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-FACES = np.array([[0, 2, 1, 3], [0, 1, 3, 2], [1, 2, 3, 0], [0, 3, 2, 1]])
-EDGES = np.array([[0, 1, 2, 3], [0, 2, 3, 1], [0, 3, 1, 2], [1, 2, 0, 3], [1, 3, 2, 0], [2, 3, 0, 1]])
 
 
-def apart(one: Indices, two: Indices) -> Indices:
+def apart(one: "np.ndarray", two: "np.ndarray") -> Indices:
     """(p, 2) all rows of ``one`` with all of ``two`` that are of another shard."""
     pairs = np.stack(np.meshgrid(np.arange(len(one)), np.arange(len(two)), indexing="ij"), axis=-1).reshape(-1, 2)
     return np.asarray(pairs[one[pairs[:, 0]] != two[pairs[:, 1]]], np.int32)
@@ -139,9 +137,9 @@ class Shards:
         """Some corners separate: a copy goes off with half of the faces and edges; one edge goes altogether."""
         n = len(self.x)
         some = self.draw.choice(n, 3, replace=False)
-        copies = np.arange(n, n + 3)
+        copies = np.arange(n, n + 3, dtype=np.int32)
         self.tracks.add(self.x[some], self.v[some])
-        self.tracks.inherit(copies, some)
+        self.tracks.inherit(copies, some.astype(np.int32))
         self.v = np.concatenate([self.v, self.v[some] + self.violence * self.draw.normal(size=(3, 3))])
         for name in ("x", "shard", "normals", "on_surface"):
             setattr(self, name, np.concatenate([getattr(self, name), getattr(self, name)[some]]))
@@ -179,13 +177,14 @@ class Shards:
 
 def equal(one: list[ContactRows], two: list[ContactRows]) -> bool:
     """Contacts with all their columns, to the bit, in the same order."""
-    pairs = [pair for a, b in zip(one, two, strict=True) for pair in zip(a, b, strict=True)]
+    columns = ContactRows._fields
+    pairs = [(getattr(a, name), getattr(b, name)) for a, b in zip(one, two, strict=True) for name in columns]
     return all(np.array_equal(a, b) for a, b in pairs)
 
 
 def flown(seed: int, violence: float, blind: bool = False) -> tuple[int, int, float, float]:
-    """Steps whose contacts differ from those of all pairs, contacts, and shares of the pairs: those that were tested, and
-    those that were although nothing had changed; ``blind``: as if nothing ever left its line.
+    """Steps whose contacts differ from those of all pairs, contacts, and shares of the pairs: those tested, and
+    those tested although nothing had changed; ``blind``: as if nothing ever left its line.
     """
     shards = Shards(seed, violence)
     some, every = (Tables(*shards.pairs(), every=flag) for flag in (False, True))
@@ -291,7 +290,11 @@ def random_table(seed: int) -> PairTable:
     draw = np.random.default_rng(seed)
     rows = draw.permutation(np.stack(np.meshgrid(np.arange(20), np.arange(15)), axis=-1).reshape(-1, 2))[:200]
     table = pair_table(rows)
-    table.until[:], table.speed[:], table.kept[:] = draw.normal(size=200), draw.normal(size=200), draw.normal(size=(200, 4))
+    table.until[:], table.speed[:], table.kept[:] = (
+        draw.normal(size=200),
+        draw.normal(size=200),
+        draw.normal(size=(200, 4)),
+    )
     table.turned[:] = draw.uniform(size=200) < 0.5
     return table
 

@@ -1,4 +1,4 @@
-"""Registration of what has changed: no pair is missed or found twice, whatever the order of strays, cracks and surfaces.
+"""Registration of what has changed: no pair is missed or found twice, in any order of strays, cracks and surfaces.
 
 Shards fly about and are knocked. Some are hidden, as the sides of cracks are; what they leave their lines by is not
 watched until they are searched. All pairs of what is searched are measured in every step. Shards hardly turn: what
@@ -23,7 +23,7 @@ from ..worker.meshes import Floats
 from .bodies import Flags, Indices, crowd_of, rotation
 from .distances import point_triangle, segment_segment
 from .kernels import edge_sizes, face_sizes
-from .test_pairs import CORNERS, EDGES, FACES
+from .shards import CORNERS, EDGES, FACES
 
 SHARDS, STEPS, SKIN = 50, 40, 0.2
 SEEDS = range(4)
@@ -38,7 +38,7 @@ class World:
 
     def __init__(self, seed: int) -> None:
         self.draw, first, shard = np.random.default_rng(seed), 4 * np.arange(SHARDS), np.arange(SHARDS)
-        turned = CORNERS @ np.array([rotation(self.draw.normal(size=3), 3.0) for _ in shard])
+        turned = CORNERS @ np.array([rotation(self.draw.normal(size=3).tolist(), 3.0) for _ in shard])
         self.x = (self.draw.uniform(-2.2, 2.2, (SHARDS, 1, 3)) + turned).reshape(-1, 3)
         self.v = np.repeat(self.draw.normal(0.0, 0.4, (SHARDS, 3)), 4, axis=0)
         self.part = np.repeat(shard % 3, 4).astype(np.int32)
@@ -48,7 +48,7 @@ class World:
         self.size, self.length = face_sizes(self.x, self.faces), edge_sizes(self.x, self.edges)
         self.here = self.draw.uniform(size=SHARDS) < 0.8
         self.shown = self.draw.uniform(size=SHARDS) < 0.6
-        self.registered, self.carried, self.near = 0, 0, np.zeros(2, int)
+        self.registered, self.carried, self.opened, self.near = 0, 0, 0, np.zeros(2, int)
         self.scene = self.search(None)
 
     def search(self, old: Scene | None) -> Scene:
@@ -80,8 +80,8 @@ class World:
 
     def knock(self) -> None:
         """Some shards get another velocity, some nodes by themselves."""
-        shards, nodes = self.draw.uniform(size=(SHARDS, 1)) < 0.1, self.draw.uniform(size=(len(self.v), 1)) < 0.05
-        self.v = self.v + np.repeat(self.draw.normal(0.0, 0.6, (SHARDS, 3)) * shards, 4, axis=0)
+        shards, nodes = self.draw.uniform(size=(SHARDS, 1)) < 0.2, self.draw.uniform(size=(len(self.v), 1)) < 0.05
+        self.v = self.v + np.repeat(self.draw.normal(0.0, 0.35, (SHARDS, 3)) * shards, 4, axis=0)
         self.v = self.v + self.draw.normal(0.0, 0.02, self.v.shape) * nodes
 
     def some(self, flags: Flags, share: float) -> "np.ndarray":
@@ -96,6 +96,7 @@ class World:
         """Some hidden shards become surface, foreseen or not."""
         shards = self.some(self.here & ~self.shown, 0.1)
         self.shown[shards] = True
+        self.opened += len(shards)
         self.scene.expose(self.rows(shards, 4))
         self.scene.on_surface[:] = np.repeat(self.shown, 4)[self.scene.crowd.id]
 
@@ -103,6 +104,7 @@ class World:
         """Some shards leave, others come, and hidden ones are uncovered; what is known of the rest is carried over."""
         gone, come, bare = self.some(self.here, 0.1), self.some(~self.here, 0.3), self.some(~self.shown, 0.2)
         self.here[gone], self.here[come], self.shown[bare] = False, True, True
+        self.opened += len(bare)
         self.scene = self.search(self.scene)
 
     def begin(self, dt: float) -> None:
@@ -118,11 +120,11 @@ class World:
 
     def step(self, number: int) -> None:
         """Whatever may happen before a step, and the step."""
-        dt = float(self.draw.uniform(0.02, 0.05))
+        dt = float(self.draw.uniform(0.02, 0.04))
         self.knock()
         if self.scene.tracks.end + dt > self.scene.until:
             self.scene = self.search(None)
-        elif number % 9 == 8:
+        elif number % 5 == 4:
             self.another_surface()
         if number % 4 == 3:
             self.foresee()
@@ -161,7 +163,9 @@ def near_faces(now: Scene) -> Flags:
     deep = np.where(part[:, None] == part[corners[:, 0]][None], DEEP_SELF, DEEP) * now.face_size
     spent = left[:, None] + left[corners].max(axis=1)[None]
     near = point_triangle(x, x[corners]) < 0.5 * (SKIN + deep - spent)
-    return np.asarray(near & allowed(now, nodes, corners) & now.node_live[:, None] & now.face_live & ~common(nodes, corners))
+    return np.asarray(
+        near & allowed(now, nodes, corners) & now.node_live[:, None] & now.face_live & ~common(nodes, corners)
+    )
 
 
 def near_edges(now: Scene) -> Flags:
@@ -175,8 +179,8 @@ def near_edges(now: Scene) -> Flags:
 
 
 def check(now: Scene) -> Ints:
-    """No pair is missed, none is there twice or between things that have a corner in common, or is not searched; and all
-    that is searched is near its lines. Returns how many pairs of either kind are near.
+    """No pair is missed, none is there twice or has a corner in common, or is of what is not searched; and all that
+    is searched is near its lines. Returns how many pairs of either kind are near.
     """
     corners, ends = now.faces[:, :3], now.edges[:, :2]
     nodes = np.arange(now.crowd.n, dtype=np.int32)[:, None]
@@ -205,11 +209,11 @@ def flown(seed: int) -> World:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_what_has_changed_is_registered_whatever_happens(seed: int) -> None:
-    """Strays, cracks that are foreseen, faces that are exposed, surfaces that take over pairs, searches from nothing."""
+    """Strays, foreseen cracks, exposed faces, surfaces that take over pairs, searches from nothing."""
     world = flown(seed)
     assert world.registered > 10
     assert world.carried > 3
-    assert 0 < (~world.shown & world.here).sum() < 0.4 * SHARDS
+    assert world.opened > 3
     assert (world.near > 500).all()
 
 
@@ -266,7 +270,7 @@ def test_pairs_that_are_found_again_keep_their_impulses(seed: int) -> None:
         after = named(world.scene)
         both = before.keys() & after.keys()
         if world.scene is now or world.carried > carried:
-            assert len(both) > 0.5 * len(before)
+            assert len(both) > 0.2 * len(before)
             assert all((before[pair] == after[pair]).all() for pair in both)
         assert not any(after[pair].any() for pair in after.keys() - both)
 
@@ -276,3 +280,18 @@ def named(now: Scene) -> dict[tuple[int, int], Floats]:
     node, face = now.node_face.rows.T
     names = zip(now.crowd.id[node].tolist(), now.face_id[face].tolist(), strict=True)
     return dict(zip(names, now.node_face.kept.copy(), strict=True))
+
+
+def test_a_slot_that_is_knocked_beyond_the_skin_in_one_step_finds_what_it_passes() -> None:
+    """A shard at rest flies off so fast, after a while, that a step takes it through a face that was out of reach."""
+    world = World(0)
+    world.here[:], world.shown[:] = False, False
+    world.here[:2], world.shown[:2], world.v[:] = True, True, 0.0
+    world.x[4:8] = world.x[:4] + np.array([0.0, 0.0, 1.5])
+    world.scene = world.search(None)
+    for _ in range(5):
+        world.begin(0.02)
+    assert not len(world.scene.node_face)
+    world.v[4:8, 2] = -30.0
+    world.begin(0.02)
+    assert len(world.scene.node_face)

@@ -249,8 +249,10 @@ def test_position_codes_have_every_box_once_in_each_cell_that_it_touches(
     point.
     """
     random = np.random.default_rng(2)
-    low = random.uniform(0.0, 1.0, (400, 3)) * np.array(spread)
-    high = low + edge * random.uniform(0.0, 3.0, (400, 3)) * (1.0 + 10.0 * (random.uniform(size=(400, 1)) < 0.1))
+    low: Floats = random.uniform(0.0, 1.0, (400, 3)) * np.array(spread)
+    high: Floats = low + edge * random.uniform(0.0, 3.0, (400, 3)) * (
+        1.0 + 10.0 * (random.uniform(size=(400, 1)) < 0.1)
+    )
     low[0] = high[0]
     some = np.flatnonzero(np.arange(400) % 3 < 2).astype(np.int32)
     table = buckets.sort(low, high, some, edge)
@@ -274,7 +276,7 @@ def test_position_codes_have_every_box_once_in_each_cell_that_it_touches(
 def test_a_hash_holds_few_codes() -> None:
     """Of the cells of a full cube, of a layer and of a line: the most entries that a walk passes over at a code."""
     for shape in ((16, 16, 16), (64, 64, 1), (4096, 1, 1), (1, 1, 4096)):
-        low = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1).reshape(-1, 3) + 0.25
+        low: Floats = np.ascontiguousarray(np.argwhere(np.ones(shape)) + 0.25)
         table = buckets.sort(low, low + 0.5, np.arange(len(low), dtype=np.int32), 1.0)
         assert len(table.thing) == len(low)
         assert np.diff(table.start).max() <= 16

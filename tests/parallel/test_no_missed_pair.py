@@ -17,9 +17,12 @@ import pytest
 from conoid.cases.load import apply_overrides, parse_case, read_data, shipped
 from conoid.cases.schema import Case
 from conoid.worker import simulation, step
-from conoid.worker.contact import domain, meetings, search
-from conoid.worker.contact.meetings import Meetings
+from conoid.worker.contact import domain, search
+from conoid.worker.contact.edge_edge import edge_edge
+from conoid.worker.contact.narrow_phase import ContactRows, Step
+from conoid.worker.contact.node_face import node_face
 from conoid.worker.contact.normals import means
+from conoid.worker.contact.pairs import PairTable
 from conoid.worker.contact.scene import Scene
 from conoid.worker.contact.search import Things
 from conoid.worker.parallel.comm import Comm, SerialComm
@@ -27,6 +30,7 @@ from conoid.worker.simulation import Simulation
 from conoid.worker.state import Ints
 
 from ..contact.bodies import Flags, Indices
+from ..contact.kernels import edge_table, face_table, slot_table
 from ..contact.ranks import on_ranks
 from ..worker.meshes import Floats
 
@@ -57,7 +61,7 @@ NAMES = [*OURS, *(name for name, case in CASES.items() if case.in_contact and no
 """Where nothing separates: the surface of all pairs is that of the last search, which knows of no copies."""
 
 
-def written(room: Meetings, n: int, ids: "np.ndarray") -> Met:
+def written(room: ContactRows, n: int, ids: "np.ndarray") -> Met:
     """The first ``n`` meetings, by the global ids of their nodes."""
     columns = ids[room.nodes[:n]], room.weights[:n], room.normals[:n], room.wanted[:n, None]
     return Counter(tuple(np.ascontiguousarray(row).tobytes() for row in rows) for rows in zip(*columns, strict=True))
@@ -98,40 +102,37 @@ class Brute(Found):
             self.all[self.sim.clock.step] = self._nodes(dt) + self._edges(dt)
         return super().meet(now, dt)
 
-    def _state(self, dt: float) -> tuple[Any, ...]:
+    def _step(self, dt: float) -> Step:
         sides, nodes = self.contact._flight.sides, self.sim.model.nodes
-        local = sides.crowd.local
-        return nodes.x[local], nodes.v[local], sides.crowd.part, self.contact._mu, self.contact._give_back, dt
+        x, v = (state[sides.crowd.local] for state in (nodes.x, nodes.v))
+        return Step.of(x, v, sides.crowd.part, self.contact._mu, self.contact._give_back, dt)
 
     def _nodes(self, dt: float) -> Met:
-        sides, state, met = self.contact._flight.sides, self._state(dt), Met()
-        faces, local = sides.face_places, sides.crowd.local
-        out, on_surface = means(self.contact._moments[local]), self.contact._surface.flags[local]
-        for pairs in self._pairs(sides.nodes.corners, faces[:, :3]):
-            places, room = sides.nodes.corners[pairs[:, 0]], Meetings.room(len(pairs))
-            by_place = np.column_stack([places, pairs[:, 1:]])
-            rows = (room.nodes, room.weights, room.normals, room.wanted, room.friction, room.pair)
-            first, following = np.full(len(local), -1, np.int32), np.empty(len(pairs), np.int32)
-            meetings.chain(first, following, by_place, 0)
-            n = meetings.node_face(
-                *rows, 0, faces, sides.faces.size, sides.faces.id, sides.faces.exposed, out, on_surface, first,
-                following, np.empty(len(local)), np.empty(len(local), np.int32), np.empty((len(faces), 3)),
-                np.zeros(len(faces), bool), by_place,
-                np.arange(len(pairs), dtype=np.int32), *state,
-            )  # fmt: skip
+        sides, step, met = self.contact._flight.sides, self._step(dt), Met()
+        faces, local, slaves = sides.face_places, sides.crowd.local, sides.crowd.places(sides.slaves)
+        normals, on_surface = means(self.contact._moments[local]), self.contact._surface.flags[local]
+        none, still = np.zeros(len(local)), np.zeros((len(local), 3))
+        for pairs in self._pairs(slaves[:, None], faces[:, :3]):
+            room, table, first = ContactRows.room(len(pairs)), PairTable(), np.full(len(local), -1, np.int32)
+            table.add(np.column_stack([slaves[pairs[:, 0]], pairs[:, 1]]).astype(np.int32))
+            table.hang(first, 0)
+            slots = slot_table(first, normals, none, still)._replace(on_surface=on_surface)
+            of = face_table(faces, sides.faces.size, np.zeros(len(faces)))
+            of = of._replace(id=sides.faces.id, exposed=sides.faces.exposed)
+            n, _ = node_face(room, 0, table.arrays(), slots, of, step, 0.0)
             met += written(room, n, sides.crowd.id)
         return met
 
     def _edges(self, dt: float) -> Met:
-        sides, state, met = self.contact._flight.sides, self._state(dt), Met()
+        sides, step, met = self.contact._flight.sides, self._step(dt), Met()
         edges = sides.edges.take(np.lexsort((sides.edges.sides[:, 1], sides.edges.sides[:, 0])))
         places = sides.crowd.places(edges.nodes)
+        of = edge_table(places, edges.size, np.zeros(len(places)))._replace(exposed=edges.exposed)
         for every in self._pairs(places[:, :2], places[:, :2]):
-            pairs = every[every[:, 0] < every[:, 1]]
-            room = Meetings.room(len(pairs))
-            rows = (room.nodes, room.weights, room.normals, room.wanted, room.friction, room.pair)
-            some = np.arange(len(pairs), dtype=np.int32)
-            n = meetings.edge_edge(*rows, 0, places, edges.size, edges.exposed, pairs, some, *state)
+            pairs, table = every[every[:, 0] < every[:, 1]], PairTable()
+            room = ContactRows.room(len(pairs))
+            table.add(pairs)
+            n, _ = edge_edge(room, 0, table.arrays(), of, step, np.zeros_like(step.x), 0.0)
             met += written(room, n, sides.crowd.id)
         return met
 
@@ -195,7 +196,14 @@ def test_a_search_without_foresight_is_found_out() -> None:
     case, find = case_of("fast_fragment", "contact.skin=0.1"), search.find
 
     def blind(
-        small: Things, large: Things, x: Floats, v: Floats, part: Indices, allowed: Flags, horizon: float, rank: Ints
+        small: Things,
+        large: Things,
+        x: Floats,
+        v: Floats,
+        part: Indices,
+        allowed: Flags,
+        horizon: float,
+        rank: Ints | None,
     ) -> Indices:
         return find(small, large, x, v, part, allowed, 0.0, rank)
 
@@ -209,7 +217,7 @@ def test_a_search_without_skin_is_found_out() -> None:
     case, find = case_of("hertz_spheres"), search.find
 
     def bare(small: Things, large: Things, *rest: Any) -> Indices:
-        one, other = (Things(each.corners, np.zeros_like(each.reach)) for each in (small, large))
+        one, other = (Things(each.corners, np.zeros_like(each.reach), each.some) for each in (small, large))
         return find(one, other, *rest)
 
     with patch.object(search, "find", bare):

@@ -58,6 +58,10 @@ def renew(scene: Scene, x: Floats, v: Floats, strayed: float) -> None:
         scene.edge_new |= off[scene.edges[:, :2]].any(axis=1)
     scene.tracks.begin_anew(off, x)
     scene.tracks.measure(x, v, scene.faces, scene.edges)
+    knocked = off & (scene.tracks.searched.left > 0.5 * scene.rules.skin)
+    if knocked.any():
+        scene.tracks.aim(knocked, x, v)
+        scene.tracks.measure(x, v, scene.faces, scene.edges)
     _register(
         scene, scene.node_new & scene.node_live, scene.face_new & scene.face_live, scene.edge_new & scene.edge_live
     )
@@ -77,8 +81,9 @@ def carry(now: Scene, old: Scene) -> None:
         for name in ("live", "new", "fresh"):
             getattr(now, f"{kind}_{name}")[rows[rows >= 0]] = getattr(old, f"{kind}_{name}")[rows >= 0]
     now.node_live &= now.slave
-    mine = np.where(now.slave[slots], slots, -1).astype(np.int32)
-    now.node_face = old.node_face.carried(mine, faces)
+    here = np.flatnonzero(slots >= 0)
+    slots[here[~now.slave[slots[here]]]] = -1
+    now.node_face = old.node_face.carried(slots, faces)
     now.edge_edge = old.edge_edge.carried(edges, edges)
 
 

@@ -1,8 +1,8 @@
 """Candidates sifted: of the pairs whose boxes touch, those that come near each other indeed.
 
-A box round a face or an edge is much larger than what it encloses. Here the height of a node over a face, its place in
-the face's plane, and the distance of two edges are followed through the free flight until the next search, at its
-beginning, middle and end. Each is nearly a parabola in time: what it may do between two of these moments is an eighth
+A box round a face or an edge is much larger than what it encloses. Two edges go when one direction separates them all
+the time. The height of a node over a face and its place in the face's plane are followed through the free flight until
+the next search, at its beginning, middle and end. Each is nearly a parabola in time: what it may do between two of these moments is an eighth
 of its second difference, twice of which is allowed for. A pair goes only when one and the same measure excludes it all
 the time, by the skin and the depth to which a meeting looks; so one that nothing excludes at the beginning stays.
 """
@@ -15,8 +15,6 @@ from .geometry import cross, dot
 from .narrow_phase import DEEP, DEEP_SELF
 
 _V2, _N2 = "float64[:, ::1]", "int32[:, ::1]"
-_STEEPEST = 0.05
-"""Sine of the angle below which edges are not sifted."""
 
 
 def faces(
@@ -91,42 +89,64 @@ def _near_faces(pairs, faces, size, x, v, part, skin, horizon):  # type: ignore[
     return kept
 
 
+@njit(f"void({_V2}, {_V2}, {_V2}, int32[::1], float64)", cache=True)
+def _ends(out, x, v, ends, t):  # type: ignore[no-untyped-def]
+    """Rows of ``out`` (4, 3): where the four ends are at time t."""
+    for k in range(4):
+        for i in range(3):
+            out[k, i] = x[ends[k], i] + t * v[ends[k], i]
+
+
+@njit(f"float64(float64[::1], {_V2})", cache=True, error_model="numpy")
+def _nearest(out, ends):  # type: ignore[no-untyped-def]
+    """``out`` (3,): from the point of a segment that is nearest to another one to the nearest point of that; its length,
+    m. ``ends`` (4, 3); Ericson (2005), 5.1.9.
+    """
+    uu, uw, ww, ur, wr = 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(3):
+        u, w, r = ends[1, i] - ends[0, i], ends[3, i] - ends[2, i], ends[2, i] - ends[0, i]
+        uu, uw, ww, ur, wr = uu + u * u, uw + u * w, ww + w * w, ur + u * r, wr + w * r
+    area = uu * ww - uw * uw
+    s = min(max((ww * ur - uw * wr) / area, 0.0), 1.0) if area > 0.0 else 0.0
+    t = (uw * s - wr) / ww
+    if not 0.0 <= t <= 1.0:
+        t = 0.0 if t < 0.0 else 1.0
+        s = min(max((ur + t * uw) / uu, 0.0), 1.0)
+    square = 0.0
+    for i in range(3):
+        out[i] = ends[2, i] + t * (ends[3, i] - ends[2, i]) - ends[0, i] - s * (ends[1, i] - ends[0, i])
+        square += out[i] * out[i]
+    return np.sqrt(square)
+
+
+@njit(f"boolean({_V2}, {_V2}, int32[::1], float64, float64, float64)", cache=True)
+def _separated(x, v, ends, begin, end, far):  # type: ignore[no-untyped-def]
+    """Whether two segments stay further apart than ``far`` from time ``begin`` to ``end``, along the direction in which
+    they are nearest in between: on straight lines their distance along a fixed direction is least at either end.
+    """
+    at, axis = np.empty((4, 3)), np.empty(3)
+    _ends(at, x, v, ends, 0.5 * (begin + end))
+    length = _nearest(axis, at)
+    for k in range(2):
+        _ends(at, x, v, ends, end if k else begin)
+        one, two = max(dot(axis, at[0]), dot(axis, at[1])), min(dot(axis, at[2]), dot(axis, at[3]))
+        if not two - one > far * length:
+            return False
+    return True
+
+
 @njit(f"boolean[::1]({_N2}, {_N2}, float64[::1], {_V2}, {_V2}, float64, float64)", cache=True, error_model="numpy")
 def _near_edges(pairs, edges, size, x, v, skin, horizon):  # type: ignore[no-untyped-def]
     kept = np.ones(len(pairs), np.bool_)
-    u, w, r, n = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    apart, along, across = np.empty(3), np.empty(3), np.empty(3)
+    ends, at, axis, half = np.empty(4, np.int32), np.empty((4, 3)), np.empty(3), 0.5 * horizon
     for p in range(len(pairs)):
         one, two = pairs[p, 0], pairs[p, 1]
-        a, b, c, d = edges[one, 0], edges[one, 1], edges[two, 0], edges[two, 1]
-        flat, long, wide = 1.0, 0.0, 0.0
+        ends[0], ends[1], ends[2], ends[3] = edges[one, 0], edges[one, 1], edges[two, 0], edges[two, 1]
         far = skin + DEEP_SELF * min(size[one], size[two])
-        for m in range(3):
-            t = 0.5 * m * horizon
-            for i in range(3):
-                x0 = x[a, i] + t * v[a, i]
-                z0 = x[c, i] + t * v[c, i]
-                u[i], w[i], r[i] = x[b, i] + t * v[b, i] - x0, x[d, i] + t * v[d, i] - z0, z0 - x0
-            cross(n, u, w)
-            uu, uw, ww, ur, wr, area = dot(u, u), dot(u, w), dot(w, w), dot(u, r), dot(w, r), dot(n, n)
-            sine = np.sqrt(area / (uu * ww))
-            flat = min(flat, sine)
-            apart[m] = dot(n, r) / np.sqrt(area)
-            along[m], across[m] = (ww * ur - uw * wr) / area, (uw * ur - uu * wr) / area
-            long, wide = max(long, 1.0 / (sine * np.sqrt(uu))), max(wide, 1.0 / (sine * np.sqrt(ww)))
-            if not flat > _STEEPEST:
-                break
-            if m == 0 and abs(apart[0]) <= far:
-                beside = max(-along[0], along[0] - 1.0) > skin * long or max(-across[0], across[0] - 1.0) > skin * wide
-                if not beside:
-                    break
-        else:
+        _ends(at, x, v, ends, 0.0)
+        if _nearest(axis, at) > far:
             kept[p] = not (
-                _least(apart) > far
-                or _most(apart) < -far
-                or _least(along) > 1.0 + skin * long
-                or _most(along) < -skin * long
-                or _least(across) > 1.0 + skin * wide
-                or _most(across) < -skin * wide
+                _separated(x, v, ends, 0.0, horizon, far)
+                or (_separated(x, v, ends, 0.0, half, far) and _separated(x, v, ends, half, horizon, far))
             )
     return kept

@@ -103,6 +103,11 @@ class Tracks:
         """New lines to search along for ``some`` (slots,), from ``x`` (slots, 3) on."""
         self.searched.begin_anew(some, x, self.t)
 
+    def aim(self, some: "np.ndarray", x: Floats, v: Floats) -> None:
+        """Lines to search along for ``some`` (slots,) that have been knocked: from ``x`` on with their velocities ``v``."""
+        lines = self.searched
+        lines.course[some], lines.x[some], lines.since[some] = v[some], (x - self.t * v)[some], self.t
+
     def shorten(self, x: Floats) -> None:
         """New short lines for all, from ``x`` (slots, 3) on."""
         self.short.begin_anew(np.ones(len(x), bool), x, self.t)

@@ -1,0 +1,9 @@
+"""One tet of 1 m, the shard of which the tests of candidate pairs make clouds."""
+
+import numpy as np
+
+CORNERS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+FACES = np.array([[0, 2, 1, 3], [0, 1, 3, 2], [1, 2, 3, 0], [0, 3, 2, 1]])
+"""(4, 4) counter-clockwise seen from outside, the node opposite last."""
+EDGES = np.array([[0, 1, 2, 3], [0, 2, 3, 1], [0, 3, 1, 2], [1, 2, 0, 3], [1, 3, 2, 0], [2, 3, 0, 1]])
+"""(6, 4) ends, and the third nodes of the two faces."""
