@@ -45,7 +45,7 @@ def _measured(name: str, steps: int, world: comm.Comm) -> dict[str, Any]:
     looked: list[int] = []
     searching, sent, seconds = 0.0, {"bytes": 0, "messages": 0}, sim.timers.seconds
     begin = seconds["contact"]
-    with patch.object(scene, "_node_face", _noted(scene._node_face, looked)):
+    with patch.object(scene, "build", _noted(scene.build, looked)):
         for _ in range(steps):
             world.sent.since_last()
             before, known = seconds["contact"], len(looked)
@@ -65,9 +65,10 @@ def _measured(name: str, steps: int, world: comm.Comm) -> dict[str, Any]:
 def _noted(function: Any, looked: list[int]) -> Any:
     """``function`` that notes how many faces a search looks at."""
 
-    def noted(seen: scene.Sides, *others: Any) -> Any:
-        looked.append(seen.faces.n)
-        return function(seen, *others)
+    def noted(*of: Any) -> Any:
+        found = function(*of)
+        looked.append(len(found.faces))
+        return found
 
     return noted
 

@@ -36,7 +36,7 @@ class Family:
 @njit("int32[:, ::1](int32[:, ::1], int32[::1], int32[::1], int32[:, ::1])", cache=True)
 def inherited(family, first, following, pairs):  # type: ignore[no-untyped-def]
     """(p, 2) candidates, node and face, of the copies of a ``family`` (c, 2), places of parents and copies: those of
-    their parents. ``first`` (nodes,), ``following`` and ``pairs``: see meetings.chain.
+    their parents. ``first`` (nodes,), ``following`` and ``pairs``: see node_face.chain.
     """
     n = 0
     for write in range(2):

@@ -1,4 +1,4 @@
-"""Mean normals of the nodes of the surface: which faces a node may meet (meetings.node_face).
+"""Mean normals of the nodes of the surface: which faces a node may meet (node_face.facing).
 
 They are taken anew at every ``EVERY``-th step and when erosion has changed the surface; a face that a crack exposes in
 between adds its share to its nodes. So they depend on the steps alone, not on when candidates were searched.

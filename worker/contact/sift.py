@@ -1,10 +1,11 @@
 """Candidates sifted: of the pairs whose boxes touch, those that come near each other indeed.
 
 A box round a face or an edge is much larger than what it encloses. Two edges go when one direction separates them all
-the time. The height of a node over a face and its place in the face's plane are followed through the free flight until
-the next search, at its beginning, middle and end. Each is nearly a parabola in time: what it may do between two of these moments is an eighth
-of its second difference, twice of which is allowed for. A pair goes only when one and the same measure excludes it all
-the time, by the skin and the depth to which a meeting looks; so one that nothing excludes at the beginning stays.
+the time. The height of a node over a face and its place in the face's plane are followed through the free flight, at
+its beginning, middle and end. Each is nearly a parabola in time: what it may do between two of these moments is an
+eighth of its second difference, twice of which is allowed for. A pair goes only when one and the same measure excludes
+it all the time, by the skin and the depth at which contacts are active; so one that nothing excludes at the beginning
+stays.
 """
 
 import numpy as np
@@ -99,8 +100,8 @@ def _ends(out, x, v, ends, t):  # type: ignore[no-untyped-def]
 
 @njit(f"float64(float64[::1], {_V2})", cache=True, error_model="numpy")
 def _nearest(out, ends):  # type: ignore[no-untyped-def]
-    """``out`` (3,): from the point of a segment that is nearest to another one to the nearest point of that; its length,
-    m. ``ends`` (4, 3); Ericson (2005), 5.1.9.
+    """``out`` (3,): from the point of a segment that is nearest to another one to the nearest point of that; its
+    length, m. ``ends`` (4, 3); Ericson (2005), 5.1.9.
     """
     uu, uw, ww, ur, wr = 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(3):

@@ -104,7 +104,7 @@ class Tracks:
         self.searched.begin_anew(some, x, self.t)
 
     def aim(self, some: "np.ndarray", x: Floats, v: Floats) -> None:
-        """Lines to search along for ``some`` (slots,) that have been knocked: from ``x`` on with their velocities ``v``."""
+        """Lines to search along for ``some`` (slots,) that have been knocked: from ``x`` on, with velocities ``v``."""
         lines = self.searched
         lines.course[some], lines.x[some], lines.since[some] = v[some], (x - self.t * v)[some], self.t
 
