@@ -17,7 +17,7 @@ kernels.use_cache()
 
 from conoid.cases import load  # noqa: E402
 from conoid.worker import simulation, step  # noqa: E402
-from conoid.worker.contact import scene  # noqa: E402
+from conoid.worker.contact import layout  # noqa: E402
 from conoid.worker.parallel import comm  # noqa: E402
 
 from .long_rod import COARSE  # noqa: E402
@@ -45,7 +45,7 @@ def _measured(name: str, steps: int, world: comm.Comm) -> dict[str, Any]:
     looked: list[int] = []
     searching, sent, seconds = 0.0, {"bytes": 0, "messages": 0}, sim.timers.seconds
     begin = seconds["contact"]
-    with patch.object(scene, "build", _noted(scene.build, looked)):
+    with patch.object(layout, "build", _noted(layout.build, looked)):
         for _ in range(steps):
             world.sent.since_last()
             before, known = seconds["contact"], len(looked)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from conoid.worker.contact import domain, scene
-from conoid.worker.contact.scene import Rules, Sides
+from conoid.worker.contact import domain, layout
 from conoid.worker.contact.search import Boxes
+from conoid.worker.contact.sides import Rules, Sides
 
 from ..worker.meshes import block
 from .bodies import Flags, crowd_of, meeting_of, moved, pieces_of, rotation, surface_of
@@ -105,7 +105,7 @@ def faces_sent(kind: str, drift: float, ranks: int = 3) -> int:
         slaves = nodes.id[found.flags & nodes.owned]
         sides = Sides(found.faces, found.edges, crowd.take(used), slaves)
         rules = Rules(kind, ~np.eye(2, dtype=bool), 2e-3, 1e-4, 4e-4, False)
-        return scene.build(sides, rules, 5e-6, np.full(3, drift), nodes, comm).faces_sent
+        return layout.build(sides, rules, 5e-6, np.full(3, drift), nodes, comm).faces_sent
 
     return sum(on_ranks(ranks, work))
 

@@ -12,10 +12,11 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from conoid.worker.contact import registration, scene
+from conoid.worker.contact import layout, registration
 from conoid.worker.contact.narrow_phase import DEEP, DEEP_SELF
 from conoid.worker.contact.records import Edges, Faces
-from conoid.worker.contact.scene import Rules, Scene, Sides
+from conoid.worker.contact.scene import Scene
+from conoid.worker.contact.sides import Rules, Sides
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.state import Ints
 
@@ -63,7 +64,7 @@ class World:
         )  # fmt: skip
         all_nodes: Any = SimpleNamespace(n=4 * SHARDS, places=lambda ids: ids.astype(np.int32))
         rules, drift = Rules("arbitrary", ALLOWED, 2.0, SKIN, 1.0, True), self.v[nodes].mean(axis=0)
-        now = scene.build(sides, rules, 1.5, drift, all_nodes, SerialComm())
+        now = layout.build(sides, rules, 1.5, drift, all_nodes, SerialComm())
         if old is not None:
             registration.carry(now, old)
             self.carried += 1

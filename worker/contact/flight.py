@@ -8,7 +8,7 @@ from ..parallel.fixed_point import exact_sums
 from ..state import Floats, Indices, Ints, Nodes, extended, located
 from . import ghosts
 from .records import Crowd, merged
-from .scene import HALO, Sides
+from .sides import HALO, Sides
 from .surface import Surface
 
 _LOOKS = np.array([10.0, 20.0, 40.0, 80.0])

@@ -1,7 +1,6 @@
 """A scene: the surface near this rank, the candidate pairs on it, and the room to work in."""
 
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 
@@ -10,65 +9,13 @@ from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum, same
 from ..parallel.tags import Tag
 from ..state import Flags, Floats, Indices, Ints, Nodes, among
-from . import buckets, domain, ghosts, search
+from . import ghosts
 from .ghosts import Copies
-from .narrow_phase import DEEP, DEEP_SELF, ContactRows, EdgeTable, FaceTable, SlotTable
+from .narrow_phase import ContactRows, EdgeTable, FaceTable, SlotTable
 from .pairs import PairTable
-from .records import Crowd, Edges, Faces, merged
-from .search import Boxes, Things
+from .records import Crowd
+from .sides import Rules
 from .tracks import Tracks
-
-HALO = 1.0
-"""Of the typical size of a face: two slots of different ranks that leave their lines by half of this, each, may meet
-unseen; a search of all ranks comes before."""
-
-
-@dataclass(frozen=True)
-class Rules:
-    """How to search; equal on all ranks."""
-
-    domain: str
-    allowed: Flags
-    """(parts, parts) which parts meet."""
-    cell: float
-    """Edge of a cell of the contact domain, m."""
-    skin: float
-    """Two slots that leave their lines by half of this, each, may meet without being candidates, m."""
-    halo: float
-    """The same of slots of different ranks, m."""
-    rubs: bool
-    """Whether there is friction anywhere."""
-
-
-@dataclass
-class Sides:
-    """A share of the surface, with its nodes."""
-
-    faces: Faces
-    """By ascending id."""
-    edges: Edges
-    crowd: Crowd
-    """Every node of the faces and edges, and every node of the surface that is held here."""
-    slaves: Ints
-    """Ids of the owned nodes of the surface, and of cracks that may open."""
-
-    @cached_property
-    def face_places(self) -> Indices:
-        """(f, 4)."""
-        return self.crowd.places(self.faces.nodes)
-
-    @cached_property
-    def edge_places(self) -> Indices:
-        """(e, 4)."""
-        return self.crowd.places(self.edges.nodes)
-
-    def boxes(self, horizon: float, drift: Floats, margin: float) -> list[Boxes]:
-        """Of the slaves, the faces and the edges, with ``margin``, m, on all sides."""
-        x, course = self.crowd.x, self.crowd.course - drift
-        slaves = Things(self.crowd.places(self.slaves[:, None]), np.full(len(self.slaves), margin))
-        faces = Things(np.ascontiguousarray(self.face_places[:, :3]), margin + DEEP * self.faces.size)
-        edges = Things(np.ascontiguousarray(self.edge_places[:, :2]), margin + 0.5 * DEEP_SELF * self.edges.size)
-        return [search.swept(things, x, course, horizon) for things in (slaves, faces, edges)]
 
 
 @dataclass
@@ -299,66 +246,9 @@ def _enliven(live, new, edges, faces, exposed, searched):  # type: ignore[no-unt
         live[e] = both
 
 
-def build(sides: Sides, rules: Rules, horizon: float, drift: Floats, nodes: Nodes, comm: Comm) -> Scene:
-    """The scene of ``sides``, which flies on for ``horizon``, s, without pairs; all ranks take part and know of the
-    same ``drift`` (3,), m/s.
-
-    Who shares which node is settled by a Follower.
-    """
-    seen, sent = _with_ghosts(sides, rules, horizon, drift, comm) if comm.size > 1 else (sides, 0)
-    order = np.argsort(buckets.curve(seen.crowd.x, rules.cell))
-    crowd, faces, edges = seen.crowd.take(order), seen.faces, seen.edges
-    slot = np.empty(crowd.n, np.int32)
-    slot[order] = np.arange(crowd.n)
-    corners, ends = slot[seen.face_places], slot[seen.edge_places]
-    crowd.local = nodes.places(crowd.id)
-    held = np.flatnonzero(crowd.local >= 0).astype(np.int32)
-    place = np.full(nodes.n, -1, np.int32)
-    place[crowd.local[held]] = held
-    slave, pushes = np.zeros(crowd.n, bool), np.zeros(crowd.n, bool)
-    slave[slot[seen.crowd.places(sides.slaves)]] = True
-    pushes[corners[:, :3]] = pushes[ends[:, :2]] = True
-    rank = np.arange(edges.n)
-    if edges.n > sides.edges.n:
-        rank[np.lexsort((edges.sides[:, 1], edges.sides[:, 0]))] = np.arange(edges.n)
-    return Scene(
-        crowd=crowd, held=held, local=crowd.local[held], faces=corners, face_id=faces.id, face_size=faces.size,
-        face_exposed=faces.exposed.copy(), edges=ends, edge_sides=edges.sides,
-        edge_faces=rows_of(faces.id, edges.sides), edge_size=edges.size, edge_exposed=edges.exposed.copy(),
-        edge_own=np.arange(edges.n) < sides.edges.n, edge_rank=rank, rules=rules, slave=slave,
-        tracks=Tracks(crowd.x, crowd.course, faces.n, edges.n), drift=drift, until=horizon, faces_sent=sent,
-        place=place, pushes=pushes | slave, cracks=np.zeros((0, 6), np.int32),
-    )  # fmt: skip
-
-
 def rows_of(ids: Ints, wanted: Ints) -> Indices:
     """Where ``wanted`` stand among the ascending ``ids``, in their shape; -1 where they do not."""
     if not len(ids):
         return np.full(wanted.shape, -1, np.int32)
     at = np.minimum(np.searchsorted(ids, wanted), len(ids) - 1)
     return np.where(ids[at] == wanted, at, -1).astype(np.int32)
-
-
-def _with_ghosts(sides: Sides, rules: Rules, horizon: float, drift: Floats, comm: Comm) -> tuple[Sides, int]:
-    """The sides with what other ranks' surfaces have near this one's, own edges first. And the faces sent."""
-    crowd = sides.crowd
-    nodes, faces, edges = sides.boxes(horizon, drift, 0.5 * rules.halo)
-    askers = Boxes(np.concatenate([nodes.low, edges.low]), np.concatenate([nodes.high, edges.high]))
-    chosen = domain.choose(rules.domain, askers, [faces, edges], rules.cell, comm)
-    parcels = {rank: (sides.faces.take(flags[0]), sides.edges.take(flags[1])) for rank, flags in chosen.items()}
-    got = comm.swap({rank: ghosts.pack(f, e, _nodes_of(f, e, crowd)) for rank, (f, e) in parcels.items()})
-    others = [ghosts.unpack(words) for words in got.values()]
-    sent = sum(f.n for f, _ in parcels.values())
-    return _joined(sides, others), sent
-
-
-def _nodes_of(faces: Faces, edges: Edges, crowd: Crowd) -> Crowd:
-    ids = np.unique(np.concatenate([faces.nodes.reshape(-1), edges.nodes.reshape(-1)]))
-    return crowd.take(crowd.places(ids))
-
-
-def _joined(sides: Sides, others: list[tuple[Faces, Edges, Crowd]]) -> Sides:
-    faces = Faces.joined([sides.faces, *(faces for faces, _, _ in others)])
-    edges = Edges.joined([sides.edges, *(edges for _, edges, _ in others)])
-    crowd = merged([sides.crowd, *(crowd for _, _, crowd in others)])
-    return Sides(faces.take(np.argsort(faces.id)), edges, crowd, sides.slaves)

@@ -21,7 +21,7 @@ from ..parallel.ownership import Neighbour
 from ..state import Flags, Floats, Indices, Ints, Model, Nodes, extended
 from ..timers import Timers
 from ..topology import Split
-from . import booking, held, normals, pairing, registration, scene, surface
+from . import booking, held, layout, normals, pairing, registration, surface
 from .account import Account
 from .course import courses
 from .cracks import Cracks, widening
@@ -30,7 +30,8 @@ from .flight import Flight, typical
 from .follower import Follower
 from .narrow_phase import PUSH_OUT
 from .news import news
-from .scene import HALO, Rules, Scene
+from .scene import Scene
+from .sides import HALO, Rules
 from .solver import ActiveSet
 
 _SHORTEST = 10.0
@@ -388,7 +389,7 @@ class Contact:
             horizon = max(min(steps, 2.0 * (clock.step - self._last)), _SHORTEST) * clock.dt
             flight.until, self._last = clock.t + horizon, clock.step
         rules = Rules(self._domain, ~np.isnan(self._mu), 2.0 * size, self._skin * size, HALO * size, self._rubs)
-        return scene.build(flight.sides, rules, flight.until - clock.t, drift, state, self._comm)
+        return layout.build(flight.sides, rules, flight.until - clock.t, drift, state, self._comm)
 
     def _courses(self, state: Nodes) -> Floats:
         """(nodes, 3) how the nodes fly on; all ranks take part."""

@@ -1,0 +1,42 @@
+"""The surface laid out as a scene: slots, faces and edges, without pairs."""
+
+import numpy as np
+
+from ..parallel.comm import Comm
+from ..state import Floats, Nodes
+from . import buckets
+from .scene import Scene, rows_of
+from .sides import Rules, Sides, with_ghosts
+from .tracks import Tracks
+
+
+def build(sides: Sides, rules: Rules, horizon: float, drift: Floats, nodes: Nodes, comm: Comm) -> Scene:
+    """The scene of ``sides``, which flies on for ``horizon``, s, without pairs; all ranks take part and know of the
+    same ``drift`` (3,), m/s.
+
+    Who shares which node is settled by a Follower.
+    """
+    seen, sent = with_ghosts(sides, rules, horizon, drift, comm) if comm.size > 1 else (sides, 0)
+    order = np.argsort(buckets.curve(seen.crowd.x, rules.cell))
+    crowd, faces, edges = seen.crowd.take(order), seen.faces, seen.edges
+    slot = np.empty(crowd.n, np.int32)
+    slot[order] = np.arange(crowd.n)
+    corners, ends = slot[seen.face_places], slot[seen.edge_places]
+    crowd.local = nodes.places(crowd.id)
+    held = np.flatnonzero(crowd.local >= 0).astype(np.int32)
+    place = np.full(nodes.n, -1, np.int32)
+    place[crowd.local[held]] = held
+    slave, pushes = np.zeros(crowd.n, bool), np.zeros(crowd.n, bool)
+    slave[slot[seen.crowd.places(sides.slaves)]] = True
+    pushes[corners[:, :3]] = pushes[ends[:, :2]] = True
+    rank = np.arange(edges.n)
+    if edges.n > sides.edges.n:
+        rank[np.lexsort((edges.sides[:, 1], edges.sides[:, 0]))] = np.arange(edges.n)
+    return Scene(
+        crowd=crowd, held=held, local=crowd.local[held], faces=corners, face_id=faces.id, face_size=faces.size,
+        face_exposed=faces.exposed.copy(), edges=ends, edge_sides=edges.sides,
+        edge_faces=rows_of(faces.id, edges.sides), edge_size=edges.size, edge_exposed=edges.exposed.copy(),
+        edge_own=np.arange(edges.n) < sides.edges.n, edge_rank=rank, rules=rules, slave=slave,
+        tracks=Tracks(crowd.x, crowd.course, faces.n, edges.n), drift=drift, until=horizon, faces_sent=sent,
+        place=place, pushes=pushes | slave, cracks=np.zeros((0, 6), np.int32),
+    )  # fmt: skip
