@@ -11,7 +11,7 @@ from .records import Crowd, merged
 from .sides import HALO, Sides
 from .surface import Surface
 
-_LOOKS = np.array([10.0, 20.0, 40.0, 80.0])
+_LOOKS = np.array([10.0, 20.0, 40.0, 80.0, 160.0, 300.0])
 """Steps of free flight that a search may look ahead."""
 _SWEPT = 8.0
 """How many cells a node may sweep in the mean: two along each axis."""

@@ -23,6 +23,8 @@ PUSH_OUT = 0.1
 nothing while contact has no energy to give back (``account.Account``)."""
 _LINE = 8
 """Words of a cache line."""
+_FEWEST = 2
+"""Rows of a table that is more than one line: numba takes a part of a single one for an array of its own."""
 
 
 class ContactRows(NamedTuple):
@@ -69,9 +71,10 @@ class Step(NamedTuple):
     @classmethod
     def of(cls, x: Floats, v: Floats, part: Indices, mu: Floats, give: float, dt: float) -> "Step":
         """A step ``dt`` from ``x`` on."""
-        room = np.empty(len(x) * _LINE + _LINE)
+        n = max(len(x), _FEWEST)
+        room = np.empty(n * _LINE + _LINE)
         first = -(room.ctypes.data // room.itemsize) % _LINE
-        places = room[first : first + len(x) * _LINE].reshape(len(x), _LINE)
+        places = room[first : first + n * _LINE].reshape(n, _LINE)
         _place(places, x, v, dt)
         return cls(places[:, :3], v, places[:, 3:6], part, mu, give, dt)
 
