@@ -36,6 +36,10 @@ from .solver import ActiveSet
 
 _SHORTEST = 10.0
 """Steps of free flight that a search looks ahead at least; at most twice what the last search was good for."""
+_LONGEST = 80.0
+"""The same at most where bodies break: with 300 steps the pairs between fragments cost a quarter more than the searches
+that they save (docs/bench.md, the bar to 40 us).
+"""
 _SURFACE, _LISTED, _TESTED, _ACTIVE = 9.0, 0.1, 3.0, 4.0
 """What a step costs for a node of the surface (searches and registrations, shared out), for a pair that is listed, for
 one that is tested, as a crack is, and for an active contact: 450, 3, 150 and 200 ns by the profile of the shattering
@@ -386,7 +390,8 @@ class Contact:
             flight.refresh(state)
         steps, drift = flight.foresight(clock.dt)
         if not goes_on:
-            horizon = max(min(steps, 2.0 * (clock.step - self._last)), _SHORTEST) * clock.dt
+            longest = _LONGEST if self._fractures else steps
+            horizon = max(min(steps, longest, 2.0 * (clock.step - self._last)), _SHORTEST) * clock.dt
             flight.until, self._last = clock.t + horizon, clock.step
         rules = Rules(self._domain, ~np.isnan(self._mu), 2.0 * size, self._skin * size, HALO * size, self._rubs)
         return layout.build(flight.sides, rules, flight.until - clock.t, drift, state, self._comm)
