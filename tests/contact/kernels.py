@@ -97,9 +97,7 @@ def node_face(
     own = np.where(np.isin(np.arange(len(x)), faces), 0, 1) if part is None else part
     room, table, first = ContactRows.room(len(pairs)), pair_table(pairs), np.full(len(x), -1, np.int32)
     table.hang(first, 0)
-    slots = slot_table(
-        first, np.zeros((len(x), 9)) if out is None else moments(out), np.zeros(len(x)), np.zeros_like(x)
-    )
+    slots = slot_table(first, np.zeros((len(x), 9)) if out is None else moments(out), np.zeros(len(x)), v.copy())
     of = face_table(faces, face_sizes(x, faces), np.zeros(len(faces)))
     found, tested = face_kernels.node_face(room, 0, table.arrays(), slots, of, step_of(x, v, own, dt, mu), 0.0)
     assert tested == len(pairs)

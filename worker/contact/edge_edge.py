@@ -6,7 +6,7 @@ Edges meet where they cross.
 import numpy as np
 
 from ..jit import njit, types
-from .geometry import between, cross, dot, segments
+from .geometry import VECTOR, at, beyond, cross, distance, dot, minus, segments
 from .narrow_phase import CONTACT_ROWS, DEEP_SELF, EDGES, NEAR, PAIRS, STEP, needed
 
 _PARALLEL = 0.05
@@ -16,39 +16,34 @@ _ROUND = 0.01
 _WORTH = 0.02
 """The same: a pair with less to spare is tested in every step, which costs less than to measure it."""
 _X2, _V2, _N2 = "float64[:, :]", "float64[:, ::1]", "int32[:, ::1]"
+_SECTOR = f"Tuple((float64, {VECTOR}, {VECTOR}))"
 _PAIR = types.Tuple((types.int64, types.int64))  # type: ignore[no-untyped-call]
 
 
-@njit(f"float64({_V2}, float64[::1], {_X2}, {_V2}, {_N2}, int64, float64)", cache=True, error_model="numpy")
-def _sides(turned, u, x, v, edges, e, h):  # type: ignore[no-untyped-def]
-    """Rows of ``turned``: u times the normals of the two faces of edge e, along u, after a time ``h``.
-
-    Returns the sense in which the first normal turns to the second one, 0 where the edge is not convex.
+@njit(f"{_SECTOR}({VECTOR}, {_X2}, {_V2}, {_N2}, int64, float64)", cache=True, error_model="numpy")
+def _sector(u, x, v, edges, e, h):  # type: ignore[no-untyped-def]
+    """u times the normals of the two faces of edge e, along u, after a time ``h``; and before them the sense in which
+    the first normal turns to the second one, 0 where the edge is not convex.
     """
     a, c, d = edges[e, 0], edges[e, 2], edges[e, 3]
-    for k in range(3):
-        turned[2, k] = x[c, k] - x[a, k] + h * (v[c, k] - v[a, k])
-        turned[3, k] = x[d, k] - x[a, k] + h * (v[d, k] - v[a, k])
-    cross(turned[0], u, turned[2])
-    cross(turned[1], turned[3], u)
-    if not dot(turned[0], turned[3]) < 0.0:
-        return 0.0
-    cross(turned[2], turned[0], turned[1])
-    sense = np.sign(dot(turned[2], u))
-    cross(turned[2], u, turned[0])
-    cross(turned[3], u, turned[1])
-    return sense
+    to, fro = minus(at(x, c), at(x, a)), minus(at(x, d), at(x, a))
+    to, fro = beyond(to, h, minus(at(v, c), at(v, a))), beyond(fro, h, minus(at(v, d), at(v, a)))
+    one, two = cross(u, to), cross(fro, u)
+    if not dot(one, fro) < 0.0:
+        return 0.0, one, two
+    return np.sign(dot(cross(one, two), u)), cross(u, one), cross(u, two)
 
 
-@njit(f"boolean({_V2}, float64, float64[::1], float64)", cache=True)
-def _points_out(turned, sense, n, sign):  # type: ignore[no-untyped-def]
-    """Whether ``sign`` n, square to a convex edge, points out between the normals of its two faces (``_sides``)."""
+@njit(f"boolean({_SECTOR}, {VECTOR}, float64)", cache=True)
+def _points_out(sector, n, sign):  # type: ignore[no-untyped-def]
+    """Whether ``sign`` n, square to a convex edge, points out between the normals of its two faces (``_sector``)."""
+    sense, one, two = sector
     along = sense * sign
-    return sense != 0.0 and along * dot(turned[2], n) >= 0.0 and along * dot(turned[3], n) <= 0.0
+    return sense != 0.0 and along * dot(one, n) >= 0.0 and along * dot(two, n) <= 0.0
 
 
 @njit(
-    f"float64(float64[::1], {_X2}, {_V2}, int64, int64, int64, int64, float64, float64, float64)",
+    f"float64({VECTOR}, {_X2}, {_V2}, int64, int64, int64, int64, float64, float64, float64)",
     cache=True,
     error_model="numpy",
 )
@@ -61,10 +56,17 @@ def _apart(m, x, v, a, b, c, d, s, t, h):  # type: ignore[no-untyped-def]
     return gap
 
 
-@njit("float64(float64[::1], float64[::1], float64[::1])", cache=True)
+@njit(f"float64({VECTOR}, {VECTOR}, {VECTOR})", cache=True)
 def _volume(u, w, r):  # type: ignore[no-untyped-def]
     """u x w . r: six times the volume, m^3, between two edges; it changes sign when their lines cross."""
-    return (u[1] * w[2] - u[2] * w[1]) * r[0] + (u[2] * w[0] - u[0] * w[2]) * r[1] + (u[0] * w[1] - u[1] * w[0]) * r[2]
+    return dot(cross(u, w), r)
+
+
+@njit(f"float64({_V2}, int64, int64, int64, int64)", cache=True)
+def _fastest(course, a, b, c, d):  # type: ignore[no-untyped-def]
+    """Largest relative speed of an end of ab and one of cd, m/s."""
+    p, q, r, s = at(course, a), at(course, b), at(course, c), at(course, d)
+    return max(distance(p, r), distance(p, s), distance(q, r), distance(q, s))
 
 
 @njit(
@@ -82,9 +84,6 @@ def edge_edge(out, n, pairs, edges, step, course, end):  # type: ignore[no-untyp
     corners, size, exposed, left, fresh = edges.corners, edges.size, edges.exposed, edges.left, edges.fresh
     nodes, weights, normals, wanted = out.nodes, out.weights, out.normals, out.wanted
     x, v, ahead, dt = step.x, step.v, step.ahead, step.dt
-    u, w, r, m = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    u0, w0, r0 = np.empty(3), np.empty(3), np.empty(3)
-    turned = np.empty((4, 3))
     tested = 0
     for p in range(len(rows)):
         one, two = rows[p, 0], rows[p, 1]
@@ -101,20 +100,19 @@ def edge_edge(out, n, pairs, edges, step, course, end):  # type: ignore[no-untyp
         tested += 1
         if not np.isnan(until[p]):  # left alone while it cannot meet
             if np.isnan(speed[p]):
-                near, far = max(between(course, a, c), between(course, a, d)), between(course, b, c)
-                speed[p] = max(near, far, between(course, b, d))
-            slack = segments(ahead, a, b, c, d) - (_ROUND + DEEP_SELF) * max(size[one], size[two])
+                speed[p] = _fastest(course, a, b, c, d)
+            slack = segments(at(ahead, a), at(ahead, b), at(ahead, c), at(ahead, d))
+            slack -= (_ROUND + DEEP_SELF) * max(size[one], size[two])
             until[p] = slack - left[one] - left[two] + speed[p] * end if slack > _WORTH * size[one] else np.nan
-        for k in range(3):
-            u0[k], w0[k], r0[k] = x[b, k] - x[a, k], x[d, k] - x[c, k], x[c, k] - x[a, k]
-            u[k], w[k], r[k] = ahead[b, k] - ahead[a, k], ahead[d, k] - ahead[c, k], ahead[c, k] - ahead[a, k]
+        u0, w0, r0 = minus(at(x, b), at(x, a)), minus(at(x, d), at(x, c)), minus(at(x, c), at(x, a))
+        u, w = minus(at(ahead, b), at(ahead, a)), minus(at(ahead, d), at(ahead, c))
+        r = minus(at(ahead, c), at(ahead, a))
         before, after = _volume(u0, w0, r0), _volume(u, w, r)
         share = 1.0
         if before * after < 0.0:
             share = before / (before - after)
-            for k in range(3):
-                u[k], w[k] = u0[k] + share * (u[k] - u0[k]), w0[k] + share * (w[k] - w0[k])
-                r[k] = r0[k] + share * (r[k] - r0[k])
+            u, w = beyond(u0, share, minus(u, u0)), beyond(w0, share, minus(w, w0))
+            r = beyond(r0, share, minus(r, r0))
         uu, uw, ww, ur, wr = dot(u, u), dot(u, w), dot(w, w), dot(u, r), dot(w, r)
         area = uu * ww - uw * uw
         if not area > _PARALLEL * _PARALLEL * uu * ww:
@@ -122,32 +120,28 @@ def edge_edge(out, n, pairs, edges, step, course, end):  # type: ignore[no-untyp
         s, t = (ww * ur - uw * wr) / area, (uw * ur - uu * wr) / area
         if not (min(s, t) >= 0.0 and max(s, t) <= 1.0):
             continue
-        h = share * dt
-        cross(m, u, w)
-        for k in range(3):
-            m[k] /= np.sqrt(area)
+        h, m, length = share * dt, cross(u, w), np.sqrt(area)
+        m = m[0] / length, m[1] / length, m[2] / length
         gap0, gap1 = _apart(m, x, v, a, b, c, d, s, t, 0.0), _apart(m, x, v, a, b, c, d, s, t, dt)
         near, deep = NEAR * min(size[one], size[two]), DEEP_SELF * min(size[one], size[two])
         if (gap1 > near or gap0 < -deep) and (-gap1 > near or -gap0 < -deep):
             continue
-        sense, sign = _sides(turned, u, x, v, corners, one, h), 1.0
-        if not _points_out(turned, sense, m, 1.0):
+        sector, sign = _sector(u, x, v, corners, one, h), 1.0
+        if not _points_out(sector, m, 1.0):
             sign = -1.0
-            if not _points_out(turned, sense, m, -1.0):
+            if not _points_out(sector, m, -1.0):
                 continue
         gap0, gap1 = sign * gap0, sign * gap1
         if gap1 > near or gap0 < -deep:
             continue
-        sense = _sides(turned, w, x, v, corners, two, h)
-        if not _points_out(turned, sense, m, -sign):
+        if not _points_out(_sector(w, x, v, corners, two, h), m, -sign):
             continue
         nodes[n, 0], nodes[n, 1], nodes[n, 2], nodes[n, 3] = c, d, a, b
         weights[n, 0], weights[n, 1], weights[n, 2], weights[n, 3] = 1.0 - t, t, s - 1.0, -s
         rate = 0.0
         for k in range(3):
-            m[k] *= sign
-            normals[n, k] = m[k]
-            rate += m[k] * ((1.0 - t) * v[c, k] + t * v[d, k] - (1.0 - s) * v[a, k] - s * v[b, k])
+            normals[n, k] = sign * m[k]
+            rate += normals[n, k] * ((1.0 - t) * v[c, k] + t * v[d, k] - (1.0 - s) * v[a, k] - s * v[b, k])
         wanted[n] = rate + needed(gap0, gap1, rate, step.give, dt)
         out.friction[n], out.pair[n] = step.mu[step.part[a], step.part[c]], -1
         n += 1

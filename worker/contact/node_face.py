@@ -7,7 +7,7 @@ handed over.
 import numpy as np
 
 from ..jit import njit, types
-from .geometry import between, foot, height, off
+from .geometry import VECTOR, at, beyond, distance, dot, foot, height, minus, off
 from .narrow_phase import CONTACT_ROWS, DEEP, DEEP_SELF, FACES, NEAR, PAIRS, SLOTS, STEP, needed
 
 _TOUCHING = 1e-3
@@ -23,7 +23,7 @@ _BEND = 0.1
 """Largest motion of two corners of a face against each other, of the face's two sides, that is allowed for."""
 
 _X2, _V2, _N2 = "float64[:, :]", "float64[:, ::1]", "int32[:, ::1]"
-_PAIR = types.Tuple((types.int64, types.int64))  # type: ignore[no-untyped-call]
+_PAIR, _F = types.Tuple((types.int64, types.int64)), types.float64  # type: ignore[no-untyped-call]
 
 
 @njit("void(int32[::1], int32[::1], int32[:, ::1], int64)", cache=True)
@@ -35,32 +35,7 @@ def chain(first, following, pairs, begin):  # type: ignore[no-untyped-def]
         following[p], first[pairs[p, 0]] = first[pairs[p, 0]], p
 
 
-@njit(types.boolean(PAIRS, SLOTS, FACES, STEP, types.int64, types.float64), cache=True, error_model="numpy")
-def _outside(pairs, slots, faces, step, p, depth):  # type: ignore[no-untyped-def]
-    """Whether the node of pair ``p``, ``depth`` below its face, is nearer to the front of another face of that part.
-
-    Then it is beside an acute edge and not in the body: the nearest face decides on which side a node is. Only faces
-    within the share of their size that every list of candidates has are asked.
-    """
-    b, m, s, x, part = np.empty(3), np.empty(3), pairs.rows[p, 0], step.x, step.part
-    q = slots.first[s]
-    while q >= 0:
-        f = pairs.rows[q, 1]
-        q = pairs.next[q]
-        i, j, k = faces.corners[f, 0], faces.corners[f, 1], faces.corners[f, 2]
-        if not faces.exposed[f] or part[i] != part[faces.corners[pairs.rows[p, 1], 0]]:
-            continue
-        away, near = height(m, x, s, i, j, k), min(depth, (DEEP_SELF if part[s] == part[i] else DEEP) * faces.size[f])
-        if not 0.0 < away < near:
-            continue
-        if not foot(b, x, x, s, i, j, k, 0.0):
-            away = min(off(x, s, i, j), off(x, s, j, k), off(x, s, k, i))
-        if away < near:
-            return True
-    return False
-
-
-@njit("UniTuple(float64, 2)(float64[:, ::1], int64, float64[::1])", cache=True)
+@njit(f"UniTuple(float64, 2)({_V2}, int64, {VECTOR})", cache=True)
 def facing(normals, s, m):  # type: ignore[no-untyped-def]
     """Mean, and mean less deviation, of the cosines of m and the normals of the faces of node s; -1 for one without
     faces, which faces any.
@@ -76,51 +51,93 @@ def facing(normals, s, m):  # type: ignore[no-untyped-def]
     return mean, mean - np.sqrt(max(square - mean * mean, 0.0))
 
 
-@njit(f"boolean(float64[::1], {_X2}, {_X2}, {_N2}, int64, int64, float64, float64, float64)", cache=True,
-      error_model="numpy")  # fmt: skip
-def _passes(b, x, ahead, corners, s, f, gap0, gap1, most):  # type: ignore[no-untyped-def]
-    """Whether node s, at height ``gap0`` over face f and ``gap1`` at the end of the step, passes it, no deeper than
-    ``most``; ``b`` (3,): where, in area coordinates.
-    """
-    i, j, k, d = corners[f, 0], corners[f, 1], corners[f, 2], corners[f, 3]
-    if not gap0 >= -most:
-        return False
-    if gap0 < 0.0:
-        altitude = 0.0
-        for a in range(3):
-            altitude -= b[a] * (x[d, a] - x[i, a])
-        if gap0 < -0.5 * altitude:
-            return False
-    tau = 0.0
-    if gap0 > 0.0:
-        tau = 1.0 if gap1 >= 0.0 else gap0 / (gap0 - gap1)
-    return foot(b, x, ahead, s, i, j, k, tau)
+@njit(f"float64({_X2}, int64, int64, int64, int64)", cache=True, error_model="numpy")
+def _distance(x, s, i, j, k):  # type: ignore[no-untyped-def]
+    """Of node s from the face i, j, k, m."""
+    p, o, a, b = at(x, s), at(x, i), at(x, j), at(x, k)
+    on, _ = foot(minus(p, o), minus(a, o), minus(b, o))
+    if on:
+        above, _ = height(p, o, a, b)
+        return abs(above)
+    return min(off(p, o, a), off(p, a, b), off(p, b, o))
 
 
-@njit(f"float64({_V2}, {_X2}, int64, int64, int64, int64, float64[::1])", cache=True, error_model="numpy")
-def _bent(normals, x, s, i, j, k, m):  # type: ignore[no-untyped-def]
-    """Half of the D, m, that a face of normal m has to spare before node s faces it; none, or less, when it does.
+@njit(f"float64(float64, float64, {_X2}, int64, int64, int64)", cache=True, error_model="numpy")
+def _bent(mean, least, x, i, j, k):  # type: ignore[no-untyped-def]
+    """Half of the D, m, that a face has to spare before a node faces it (``facing``); none, or less, when it does.
 
     The normal of a face of sides e, f and area A changes by less than D (|e| + |f| + D) / A while no two of its corners
     have moved by D against each other.
     """
-    mean, least = facing(normals, s, m)
     turn = max(mean - FACING, 0.5 * (least + FACING))
-    ee, ff, ef = 0.0, 0.0, 0.0
-    for a in range(3):
-        e, f = x[j, a] - x[i, a], x[k, a] - x[i, a]
-        ee, ff, ef = ee + e * e, ff + f * f, ef + e * f
+    e, f = minus(at(x, j), at(x, i)), minus(at(x, k), at(x, i))
+    ee, ff, ef = dot(e, e), dot(f, f), dot(e, f)
     sides = np.sqrt(ee) + np.sqrt(ff)
     return 0.5 * min(0.5 * turn * np.sqrt(ee * ff - ef * ef) / ((1.0 + _BEND) * sides), _BEND * sides)
 
 
-@njit(f"float64({_X2}, {_N2}, int64, int64, float64, float64[::1])", cache=True, error_model="numpy")
-def _distance(x, corners, s, f, gap, b):  # type: ignore[no-untyped-def]
-    """Of node s, at height ``gap``, from face f, m; ``b`` (3,): room."""
-    i, j, k = corners[f, 0], corners[f, 1], corners[f, 2]
-    if foot(b, x, x, s, i, j, k, 0.0):
-        return abs(gap)
-    return min(off(x, s, i, j), off(x, s, j, k), off(x, s, k, i))
+@njit(
+    f"Tuple((boolean, {VECTOR}))({_X2}, {_X2}, {_N2}, int64, int64, {VECTOR}, float64, float64, float64)",
+    cache=True,
+    error_model="numpy",
+)
+def _passes(x, ahead, corners, s, f, m, gap0, gap1, most):  # type: ignore[no-untyped-def]
+    """Whether node s, at height ``gap0`` over face f of normal ``m`` and ``gap1`` at the end of the step, passes it, no
+    deeper than ``most``; and where, in area coordinates.
+    """
+    i, j, k, d = corners[f, 0], corners[f, 1], corners[f, 2], corners[f, 3]
+    deep = not gap0 >= -most
+    if gap0 < 0.0:
+        altitude = -dot(m, minus(at(x, d), at(x, i)))
+        deep |= gap0 < -0.5 * altitude
+    if deep:
+        return False, m
+    tau = 0.0
+    if gap0 > 0.0:
+        tau = 1.0 if gap1 >= 0.0 else gap0 / (gap0 - gap1)
+    o, then = at(x, i), at(ahead, i)
+    r, e, f = minus(at(x, s), o), minus(at(x, j), o), minus(at(x, k), o)
+    return foot(
+        beyond(r, tau, minus(minus(at(ahead, s), then), r)),
+        beyond(e, tau, minus(minus(at(ahead, j), then), e)),
+        beyond(f, tau, minus(minus(at(ahead, k), then), f)),
+    )
+
+
+@njit(
+    types.boolean(PAIRS, types.int32[::1], FACES, types.float64[:, :], types.int32[::1], types.int64, _F, _F, _F),
+    cache=True,
+    error_model="numpy",
+)
+def _outside(pairs, first, faces, x, part, p, depth, strayed, end):  # type: ignore[no-untyped-def]
+    """Whether the node of pair ``p``, ``depth`` below its face, is nearer to the front of another face of that part.
+
+    Then it is beside an acute edge and not in the body: the nearest face decides on which side a node is. Only faces
+    within the share of their size that every list of candidates has are asked, and of these none that its pair is left
+    alone for: it is further away. ``strayed``: how far the node leaves its line, infinite when pairs are not known;
+    ``end``: of the step, with the length of the step once more, for a pair may just have been measured at its end.
+    """
+    rows, until, speed, turned, following = pairs.rows, pairs.until, pairs.speed, pairs.turned, pairs.next
+    exposed, corners, size, left, fresh = faces.exposed, faces.corners, faces.size, faces.left, faces.fresh
+    s, body = rows[p, 0], part[corners[rows[p, 1], 0]]
+    point, reach = at(x, s), DEEP_SELF if part[s] == body else DEEP
+    q = first[s]
+    while q >= 0:
+        f, far = rows[q, 1], until[q] > strayed + left[rows[q, 1]] + speed[q] * end and not turned[q]
+        q = following[q]
+        i, j, k = corners[f, 0], corners[f, 1], corners[f, 2]
+        if (far and not fresh[f]) or not exposed[f] or part[i] != body:
+            continue
+        o, a, b = at(x, i), at(x, j), at(x, k)
+        near, (away, _) = min(depth, reach * size[f]), height(point, o, a, b)
+        if not 0.0 < away < near:
+            continue
+        on, _ = foot(minus(point, o), minus(a, o), minus(b, o))
+        if not on:
+            away = min(off(point, o, a), off(point, a, b), off(point, b, o))
+        if away < near:
+            return True
+    return False
 
 
 @njit(_PAIR(CONTACT_ROWS, types.int64, PAIRS, SLOTS, FACES, STEP, types.float64), cache=True, error_model="numpy")
@@ -136,7 +153,7 @@ def node_face(out, n, pairs, slots, faces, step, end):  # type: ignore[no-untype
     normals, on_surface, strayed, other, course = slots.normals, slots.on_surface, slots.left, slots.fresh, slots.course
     nodes, weights, out_normals, wanted, pair = out.nodes, out.weights, out.normals, out.wanted, out.pair
     x, v, ahead, part = step.x, step.v, step.ahead, step.part
-    b, m = np.empty(3), np.empty(3)
+    first = slots.first
     holder[:] = -1
     tested = 0
     for p in range(len(rows)):
@@ -152,51 +169,53 @@ def node_face(out, n, pairs, slots, faces, step, end):  # type: ignore[no-untype
         tested += 1
         i, j, k = corners[f, 0], corners[f, 1], corners[f, 2]
         if not known[f]:
-            height(planes[f], ahead, s, i, j, k)
+            _, m = height(at(ahead, s), at(ahead, i), at(ahead, j), at(ahead, k))
+            planes[f, 0], planes[f, 1], planes[f, 2] = m
             known[f] = True
-        gap1 = 0.0
-        for a in range(3):
-            m[a] = planes[f, a]
-            gap1 += m[a] * (ahead[s, a] - ahead[i, a])
+        m = at(planes, f)
+        gap1 = dot(m, minus(at(ahead, s), at(ahead, i)))
         reach = DEEP_SELF if part[s] == part[i] else DEEP
         if not np.isnan(until[p]):  # left alone while it cannot meet
+            a, b, c = at(course, i), at(course, j), at(course, k)
             if np.isnan(speed[p]) or turned[p]:
-                speed[p] = max(between(course, s, i), between(course, s, j), between(course, s, k))
-            slack = _distance(ahead, corners, s, f, gap1, b) - (_ROUND + max(reach, NEAR)) * size[f]
+                speed[p] = max(distance(at(course, s), a), distance(at(course, s), b), distance(at(course, s), c))
+            slack = _distance(ahead, s, i, j, k) - (_ROUND + max(reach, NEAR)) * size[f]
             turned[p] = not slack > _WORTH * size[f]
             if turned[p]:
-                slack = _bent(normals, ahead, s, i, j, k, m)
-                speed[p] = max(between(course, i, j), between(course, i, k))
+                mean, least = facing(normals, s, m)
+                slack = _bent(mean, least, ahead, i, j, k)
+                speed[p] = max(distance(a, b), distance(a, c))
             until[p] = slack - strayed[s] - left[f] + speed[p] * end if slack > _WORTH * size[f] else np.nan
         if not gap1 <= NEAR * size[f]:
             continue
         mean, least = facing(normals, s, m)
         if not (mean <= FACING and least <= -FACING):
             continue
-        gap0 = height(b, x, s, i, j, k)
-        if not _passes(b, x, ahead, corners, s, f, gap0, gap1, reach * size[f]):
+        gap0, now = height(at(x, s), at(x, i), at(x, j), at(x, k))
+        passes, b = _passes(x, ahead, corners, s, f, now, gap0, gap1, reach * size[f])
+        if not passes:
             continue
-        at = n
+        row = n
         if gap0 < -_TOUCHING * size[f]:
             row = holder[s]
             if row >= 0:
                 same = gap0 == deepest[s] and faces.id[f] < faces.id[rows[pair[row], 1]]
                 if not (gap0 > deepest[s] or same):
                     continue
-            if _outside(pairs, slots, faces, step, p, -gap0):
+            leaves = np.inf if other[s] else strayed[s]
+            if _outside(pairs, first, faces, x, part, p, -gap0, leaves, end + step.dt):
                 continue
-            at = row if row >= 0 else n
-            deepest[s], holder[s] = gap0, at
-        n += at == n
-        nodes[at, 0], nodes[at, 1], nodes[at, 2], nodes[at, 3] = s, i, j, k
-        weights[at, 0] = 1.0
+            row = row if row >= 0 else n
+            deepest[s], holder[s] = gap0, row
+        n += row == n
+        nodes[row, 0], nodes[row, 1], nodes[row, 2], nodes[row, 3] = s, i, j, k
+        weights[row, 0], weights[row, 1], weights[row, 2], weights[row, 3] = 1.0, -b[0], -b[1], -b[2]
         rate = 0.0
         for a in range(3):
-            weights[at, a + 1] = -b[a]
-            out_normals[at, a] = m[a]
+            out_normals[row, a] = m[a]
             rate += m[a] * (v[s, a] - (b[0] * v[i, a] + b[1] * v[j, a] + b[2] * v[k, a]))
-        wanted[at] = rate + needed(gap0, gap1, rate, step.give, step.dt)
-        out.friction[at], pair[at] = step.mu[part[s], part[i]], p
+        wanted[row] = rate + needed(gap0, gap1, rate, step.give, step.dt)
+        out.friction[row], pair[row] = step.mu[part[s], part[i]], p
     return n, tested
 
 

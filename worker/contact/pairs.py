@@ -64,13 +64,13 @@ class PairTable:
         self.tested = self.tested[:0]
 
     def carried(self, one: Indices, two: Indices) -> "PairTable":
-        """The pairs whose things have new numbers ``one`` and ``two``, -1 for those that have gone."""
-        rows = np.column_stack([one[self.rows[:, 0]], two[self.rows[:, 1]]])
-        some = np.flatnonzero((rows >= 0).all(axis=1))
+        """The pairs whose things have new numbers ``one`` and ``two``, -1 for those that have gone; in the order of the
+        first things, so that what a kernel takes for one pair is at hand for the next.
+        """
+        some, rows = _renumbered(self.rows, one, two, int(one.max(initial=-1)) + 1)
         return PairTable(
-            rows[some], self.until[some], self.speed[some], self.turned[some], self.kept[some],
-            np.empty(len(some), np.int32),
-        )  # fmt: skip
+            rows, self.until[some], self.speed[some], self.turned[some], self.kept[some], np.empty(len(some), np.int32)
+        )
 
     def wake(self) -> None:
         """Every pair has to be tested: short lines and mean normals are others."""
@@ -80,6 +80,27 @@ class PairTable:
     def arrays(self) -> Pairs:
         """As kernels take it."""
         return Pairs(self.rows, self.until, self.speed, self.turned, self.next, np.empty(len(self.rows), np.int32))
+
+
+@njit("Tuple((int64[::1], int32[:, ::1]))(int32[:, ::1], int32[::1], int32[::1], int64)", cache=True)
+def _renumbered(pairs, one, two, n):  # type: ignore[no-untyped-def]
+    """Which ``pairs`` (p, 2) both ``one`` and ``two`` have numbers for, by ascending number of the first thing, which
+    is less than ``n``; and their numbers.
+    """
+    begin = np.zeros(n + 1, np.int64)
+    for p in range(len(pairs)):
+        if one[pairs[p, 0]] >= 0 and two[pairs[p, 1]] >= 0:
+            begin[one[pairs[p, 0]] + 1] += 1
+    for a in range(n):
+        begin[a + 1] += begin[a]
+    some, rows = np.empty(begin[n], np.int64), np.empty((begin[n], 2), np.int32)
+    for p in range(len(pairs)):
+        a, b = one[pairs[p, 0]], two[pairs[p, 1]]
+        if a >= 0 and b >= 0:
+            at = begin[a]
+            begin[a] += 1
+            some[at], rows[at, 0], rows[at, 1] = p, a, b
+    return some, rows
 
 
 @njit(

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..jit import njit
 from ..state import Flags, Floats, Indices
-from .geometry import cross, dot
+from .geometry import VECTOR, at, beyond, cross, dot, minus, nearest
 from .narrow_phase import DEEP, DEEP_SELF
 
 _V2, _N2 = "float64[:, ::1]", "int32[:, ::1]"
@@ -32,16 +32,29 @@ def edges(
     return np.asarray(_near_edges(pairs, places, size, x, v, skin, horizon))
 
 
-@njit("float64(float64[::1])", cache=True)
-def _least(f):  # type: ignore[no-untyped-def]
-    """Lower bound of what is f (3,) at beginning, middle and end."""
-    return min(f[0], f[1], f[2]) - 0.25 * abs(f[0] - 2.0 * f[1] + f[2])
+@njit("float64(float64, float64, float64)", cache=True)
+def _least(f, g, h):  # type: ignore[no-untyped-def]
+    """Lower bound of what is f, g and h at beginning, middle and end."""
+    return min(f, g, h) - 0.25 * abs(f - 2.0 * g + h)
 
 
-@njit("float64(float64[::1])", cache=True)
-def _most(f):  # type: ignore[no-untyped-def]
-    """Upper bound."""
-    return max(f[0], f[1], f[2]) + 0.25 * abs(f[0] - 2.0 * f[1] + f[2])
+@njit(f"{VECTOR}({_V2}, {_V2}, int64, float64)", cache=True)
+def _then(x, v, s, t):  # type: ignore[no-untyped-def]
+    """Where slot s is at time t."""
+    return beyond(at(x, s), t, at(v, s))
+
+
+@njit(f"Tuple((float64, {VECTOR}))({VECTOR}, {VECTOR}, {VECTOR}, {VECTOR})", cache=True, error_model="numpy")
+def _over(s, i, j, k):  # type: ignore[no-untyped-def]
+    """Height of the point s over the face i, j, k, and how far it is outside of each of the sides, m."""
+    e, f, r = minus(j, i), minus(k, i), minus(s, i)
+    g, q = minus(f, e), minus(r, e)
+    n = cross(e, f)
+    length = np.sqrt(dot(n, n))
+    one = -dot(cross(n, e), r) / (length * np.sqrt(dot(e, e)))
+    two = -dot(cross(f, n), r) / (length * np.sqrt(dot(f, f)))
+    three = -dot(cross(n, g), q) / (length * np.sqrt(dot(g, g)))
+    return dot(n, r) / length, (one, two, three)
 
 
 @njit(
@@ -50,104 +63,56 @@ def _most(f):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def _near_faces(pairs, faces, size, x, v, part, skin, horizon):  # type: ignore[no-untyped-def]
-    kept = np.ones(len(pairs), np.bool_)
-    e, f, g, r = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    n, side = np.empty(3), np.empty(3)
-    height, off = np.empty(3), np.empty((3, 3))
+    kept, half = np.ones(len(pairs), np.bool_), 0.5 * horizon
     for p in range(len(pairs)):
         s, face = pairs[p, 0], pairs[p, 1]
         i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
         far = skin + (DEEP_SELF if part[s] == part[i] else DEEP) * size[face]
+        h0, o0 = _over(at(x, s), at(x, i), at(x, j), at(x, k))
+        if abs(h0) <= far and max(o0[0], o0[1], o0[2]) <= far:
+            continue
+        h1, o1 = _over(_then(x, v, s, half), _then(x, v, i, half), _then(x, v, j, half), _then(x, v, k, half))
+        h2, o2 = _over(
+            _then(x, v, s, horizon), _then(x, v, i, horizon), _then(x, v, j, horizon), _then(x, v, k, horizon)
+        )  # fmt: skip
+        apart = _least(h0, h1, h2) > far or _least(-h0, -h1, -h2) > far
         for m in range(3):
-            t = 0.5 * m * horizon
-            for a in range(3):
-                x0 = x[i, a] + t * v[i, a]
-                e[a] = x[j, a] + t * v[j, a] - x0
-                f[a] = x[k, a] + t * v[k, a] - x0
-                r[a] = x[s, a] + t * v[s, a] - x0
-                g[a] = f[a] - e[a]
-            cross(n, e, f)
-            length = np.sqrt(dot(n, n))
-            height[m] = dot(n, r) / length
-            cross(side, n, e)
-            off[0, m] = -dot(side, r) / (length * np.sqrt(dot(e, e)))
-            cross(side, f, n)
-            off[1, m] = -dot(side, r) / (length * np.sqrt(dot(f, f)))
-            for a in range(3):
-                r[a] -= e[a]
-            cross(side, n, g)
-            off[2, m] = -dot(side, r) / (length * np.sqrt(dot(g, g)))
-            if m == 0 and abs(height[0]) <= far and max(off[0, 0], off[1, 0], off[2, 0]) <= far:
-                break
-        else:
-            kept[p] = not (
-                _least(height) > far
-                or _most(height) < -far
-                or _least(off[0]) > far
-                or _least(off[1]) > far
-                or _least(off[2]) > far
-            )
+            apart |= _least(o0[m], o1[m], o2[m]) > far
+        kept[p] = not apart
     return kept
 
 
-@njit(f"void({_V2}, {_V2}, {_V2}, int32[::1], float64)", cache=True)
-def _ends(out, x, v, ends, t):  # type: ignore[no-untyped-def]
-    """Rows of ``out`` (4, 3): where the four ends are at time t."""
-    for k in range(4):
-        for i in range(3):
-            out[k, i] = x[ends[k], i] + t * v[ends[k], i]
+@njit(f"boolean({VECTOR}, {VECTOR}, {VECTOR}, {VECTOR}, {VECTOR}, float64)", cache=True)
+def _beyond(axis, a, b, c, d, far):  # type: ignore[no-untyped-def]
+    """Whether the segment cd lies further beyond ab than ``far``, along ``axis``."""
+    one, two = max(dot(axis, a), dot(axis, b)), min(dot(axis, c), dot(axis, d))
+    return two - one > far * np.sqrt(dot(axis, axis))
 
 
-@njit(f"float64(float64[::1], {_V2})", cache=True, error_model="numpy")
-def _nearest(out, ends):  # type: ignore[no-untyped-def]
-    """``out`` (3,): from the point of a segment that is nearest to another one to the nearest point of that; its
-    length, m. ``ends`` (4, 3); Ericson (2005), 5.1.9.
+@njit(f"boolean({_V2}, {_V2}, int64, int64, int64, int64, float64, float64, float64)", cache=True)
+def _separated(x, v, a, b, c, d, begin, end, far):  # type: ignore[no-untyped-def]
+    """Whether the segments ab and cd stay further apart than ``far`` from time ``begin`` to ``end``, along the
+    direction in which they are nearest in between: on straight lines their distance along a fixed direction is least at
+    either end.
     """
-    uu, uw, ww, ur, wr = 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(3):
-        u, w, r = ends[1, i] - ends[0, i], ends[3, i] - ends[2, i], ends[2, i] - ends[0, i]
-        uu, uw, ww, ur, wr = uu + u * u, uw + u * w, ww + w * w, ur + u * r, wr + w * r
-    area = uu * ww - uw * uw
-    s = min(max((ww * ur - uw * wr) / area, 0.0), 1.0) if area > 0.0 else 0.0
-    t = (uw * s - wr) / ww
-    if not 0.0 <= t <= 1.0:
-        t = 0.0 if t < 0.0 else 1.0
-        s = min(max((ur + t * uw) / uu, 0.0), 1.0)
-    square = 0.0
-    for i in range(3):
-        out[i] = ends[2, i] + t * (ends[3, i] - ends[2, i]) - ends[0, i] - s * (ends[1, i] - ends[0, i])
-        square += out[i] * out[i]
-    return np.sqrt(square)
-
-
-@njit(f"boolean({_V2}, {_V2}, int32[::1], float64, float64, float64)", cache=True)
-def _separated(x, v, ends, begin, end, far):  # type: ignore[no-untyped-def]
-    """Whether two segments stay further apart than ``far`` from time ``begin`` to ``end``, along the direction in which
-    they are nearest in between: on straight lines their distance along a fixed direction is least at either end.
-    """
-    at, axis = np.empty((4, 3)), np.empty(3)
-    _ends(at, x, v, ends, 0.5 * (begin + end))
-    length = _nearest(axis, at)
-    for k in range(2):
-        _ends(at, x, v, ends, end if k else begin)
-        one, two = max(dot(axis, at[0]), dot(axis, at[1])), min(dot(axis, at[2]), dot(axis, at[3]))
-        if not two - one > far * length:
-            return False
-    return True
+    half = 0.5 * (begin + end)
+    axis = nearest(_then(x, v, a, half), _then(x, v, b, half), _then(x, v, c, half), _then(x, v, d, half))
+    return _beyond(
+        axis, _then(x, v, a, begin), _then(x, v, b, begin), _then(x, v, c, begin), _then(x, v, d, begin), far
+    ) and _beyond(axis, _then(x, v, a, end), _then(x, v, b, end), _then(x, v, c, end), _then(x, v, d, end), far)
 
 
 @njit(f"boolean[::1]({_N2}, {_N2}, float64[::1], {_V2}, {_V2}, float64, float64)", cache=True, error_model="numpy")
 def _near_edges(pairs, edges, size, x, v, skin, horizon):  # type: ignore[no-untyped-def]
-    kept = np.ones(len(pairs), np.bool_)
-    ends, at, axis, half = np.empty(4, np.int32), np.empty((4, 3)), np.empty(3), 0.5 * horizon
+    kept, half = np.ones(len(pairs), np.bool_), 0.5 * horizon
     for p in range(len(pairs)):
         one, two = pairs[p, 0], pairs[p, 1]
-        ends[0], ends[1], ends[2], ends[3] = edges[one, 0], edges[one, 1], edges[two, 0], edges[two, 1]
+        a, b, c, d = edges[one, 0], edges[one, 1], edges[two, 0], edges[two, 1]
         far = skin + DEEP_SELF * min(size[one], size[two])
-        _ends(at, x, v, ends, 0.0)
-        if _nearest(axis, at) > far:
+        r = nearest(at(x, a), at(x, b), at(x, c), at(x, d))
+        if dot(r, r) > far * far:
             kept[p] = not (
-                _separated(x, v, ends, 0.0, horizon, far)
-                or (_separated(x, v, ends, 0.0, half, far) and _separated(x, v, ends, half, horizon, far))
+                _separated(x, v, a, b, c, d, 0.0, horizon, far)
+                or (_separated(x, v, a, b, c, d, 0.0, half, far) and _separated(x, v, a, b, c, d, half, horizon, far))
             )
     return kept
