@@ -98,13 +98,13 @@ class Ledger:
     def _boundary_work(self) -> tuple[Floats, Floats]:
         """(nodes,) energy lost by impacts, and work from outside, J."""
         n, contact = self._model.nodes.n, self._contact
-        loss = np.zeros(n) if contact is None else contact.contact_loss.copy()
+        loss = np.zeros(n) if contact is None else contact.books.contact_loss.copy()
         external = np.zeros(n)
         for boundary in self._boundaries:
             np.add.at(loss, boundary.nodes, boundary.contact_loss)
             np.add.at(external, boundary.nodes, boundary.external_work)
         if contact is not None:
-            external += contact.external_work
+            external += contact.books.external_work
         return loss, external
 
     def _element_work(self) -> Floats:

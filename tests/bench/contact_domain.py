@@ -51,8 +51,8 @@ def _measured(name: str, steps: int, world: comm.Comm) -> dict[str, Any]:
             before, known = seconds["contact"], len(looked)
             step.first_half(sim)
             if len(looked) > known:
-                assert sim.contact._scene is not None
-                course.append((1e6 * sim.clock.t, looked[-1], sim.contact._scene.faces_sent))
+                assert sim.contact.searches.scene is not None
+                course.append((1e6 * sim.clock.t, looked[-1], sim.contact.searches.scene.faces_sent))
                 searching += seconds["contact"] - before
             fresh = world.sent.since_last()
             sent = {kind: number + fresh[kind] for kind, number in sent.items()}

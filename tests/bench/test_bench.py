@@ -141,7 +141,7 @@ def test_an_armed_box_looks_for_cracks_and_for_contact_and_has_neither() -> None
     fracture, contact = ride.sim.fracture, ride.sim.contact
     assert fracture is not None
     assert contact is not None
-    assert (fracture.broken, contact.searches) == (0, 1)
+    assert (fracture.broken, contact.searches.many) == (0, 1)
     ride.stretch(1e-3)
     ride.steps(20)
     assert fracture.broken > 0, "it is armed"

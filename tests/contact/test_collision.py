@@ -43,7 +43,7 @@ def case_of(**contact: Any) -> schema.Case:
 def state_of(sim: Simulation) -> tuple[str | None, int]:
     """The digest, and how often there was a search."""
     assert sim.contact is not None
-    return digest(sim.model, sim.comm, []), sim.contact.searches
+    return digest(sim.model, sim.comm, []), sim.contact.searches.many
 
 
 def answer(case: schema.Case, watch: Watch | None = None) -> tuple[str | None, int]:
@@ -130,7 +130,7 @@ def test_a_search_in_every_step_finds_no_more_than_one_now_and_then() -> None:
 
     def search(sim: Simulation, before: Floats) -> None:
         assert sim.contact is not None
-        sim.contact.due = sim.clock.t + 1.5 * sim.clock.dt < END
+        sim.contact.searches.due = sim.clock.t + 1.5 * sim.clock.dt < END
 
     often, seldom = answer(case_of(friction=0.3), search), answer(case_of(friction=0.3))
     assert often[0] == seldom[0]
@@ -140,7 +140,7 @@ def test_a_search_in_every_step_finds_no_more_than_one_now_and_then() -> None:
 def test_a_search_that_is_due_in_the_end_does_no_harm() -> None:
     def search(sim: Simulation, before: Floats) -> None:
         assert sim.contact is not None
-        sim.contact.due = sim.clock.t + 1.5 * sim.clock.dt > END
+        sim.contact.searches.due = sim.clock.t + 1.5 * sim.clock.dt > END
 
     assert answer(case_of(), search)[0] == answer(case_of())[0]
 
@@ -263,7 +263,7 @@ def test_only_a_face_in_one_symmetry_plane_is_no_surface() -> None:
     case = meeting_of([{}, {}], end=END, boundaries=walls)
     sim = build(case, SLABS)
     assert sim.contact is not None
-    faces = sim.contact._surface.faces.nodes[:, :3]
+    faces = sim.contact.exterior.surface.faces.nodes[:, :3]
     of = np.bincount(sim.model.nodes.part[faces[:, 0]])
     assert of.tolist() == [2 * 2 * 2, 2 * 2 * (2 + 3)]
 

@@ -24,10 +24,10 @@ def ran(name: str, comm: Comm, every: int = 0, *changes: str) -> tuple[str | Non
     assert sim.contact is not None
     step.prepare(sim)
     for number in range(STEPS[name]):
-        sim.contact.due |= every > 0 and number % every == 0
+        sim.contact.searches.due |= every > 0 and number % every == 0
         step.first_half(sim)
         step.second_half(sim)
-    found = digest(sim.model, comm, []), sim.contact.searches
+    found = digest(sim.model, comm, []), sim.contact.searches.many
     sim.free()
     return found
 

@@ -104,7 +104,7 @@ def test_nothing_is_pushed_out(searched: bool) -> None:
     sim = cracked()
     assert sim.contact is not None
     assert (gaps(sim) == 0.0).all()
-    sim.contact.due = searched
+    sim.contact.searches.due = searched
     ticks(sim, 5)
     assert (gaps(sim) == 0.0).all()
     assert not sim.model.nodes.v.any()
@@ -119,7 +119,7 @@ def test_sides_that_close_stop(searched: bool) -> None:
     nodes, above = sim.model.nodes, sides(sim)
     nodes.v[:, 2] = np.where(above, -3.0, 1.0)
     momentum = float((nodes.mass * nodes.v[:, 2]).sum())
-    sim.contact.due = searched
+    sim.contact.searches.due = searched
     depth = []
     ticks(sim, 40, lambda: depth.append(float(gaps(sim).min())))
     assert min(depth) > -1e-6 * MM
@@ -179,11 +179,11 @@ def test_cracks_close_alike_on_any_number_of_ranks(friction: float) -> None:
         spread = np.array([nodes.id * 0.37 % 1.0, nodes.id * 0.61 % 1.0]).T
         nodes.v[:, :2] += spread
         for n in range(40):
-            sim.contact.due |= n in (10, 11, 25)
+            sim.contact.searches.due |= n in (10, 11, 25)
             step.first_half(sim)
             step.second_half(sim)
         moments = np.concatenate([nodes.x, nodes.v], axis=1) * (1.0 + nodes.id[:, None])
-        return exact_sums(sim.comm, moments[nodes.owned]).tolist(), sim.contact.searches
+        return exact_sums(sim.comm, moments[nodes.owned]).tolist(), sim.contact.searches.many
 
     runs = [on(ranks, case_of(friction=friction), [mesh_of()], work) for ranks in (1, 2, 3)]
     assert runs[0][0][1] > 3
@@ -196,11 +196,11 @@ def test_an_open_crack_carries_nothing_and_is_surface_after_a_search() -> None:
     assert sim.contact is not None
     nodes, above = sim.model.nodes, sides(sim)
     nodes.v[:, 2] = np.where(above, 200.0, 0.0)
-    searches = sim.contact.searches
+    searches = sim.contact.searches.many
     ticks(sim, 60)
     assert gaps(sim).min() > 0.3 * MM
     assert (nodes.v[above, 2] == 200.0).all()
     assert not nodes.v[~above].any()
-    assert sim.contact.searches > searches
+    assert sim.contact.searches.many > searches
     faces = sum(int(b.exposed().sum()) for b in sim.model.blocks)
     assert faces == 2 * (2 * 9 + 4 * 3 * 4 + 18)

@@ -119,7 +119,7 @@ def test_facets_that_open_evenly_do_not_touch() -> None:
         while sim.clock.t < end:
             step.first_half(sim)
             assert sim.contact is not None
-            pushed = max(pushed, float(np.abs(sim.contact.contact_loss).max()), sim.contact.last_push)
+            pushed = max(pushed, float(np.abs(sim.contact.books.contact_loss).max()), sim.contact.last_push)
             step.second_half(sim)
 
     step.prepare(sim)

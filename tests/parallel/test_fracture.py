@@ -63,7 +63,7 @@ def shared(sim: Simulation) -> dict[str, Any]:
     it sums with it, sends to it and receives from it.
     """
     assert sim.contact is not None
-    now, nodes = sim.contact._scene, sim.model.nodes
+    now, nodes = sim.contact.searches.scene, sim.model.nodes
     assert now is not None
     ids = now.crowd.id
     return {
@@ -88,7 +88,7 @@ def test_all_ranks_know_who_shares_what_separates() -> None:
 
         def watched(split: Split) -> None:
             separate(split)
-            if sim.contact is not None and sim.contact._scene is not None:
+            if sim.contact is not None and sim.contact.searches.scene is not None:
                 seen.append(comm.share(shared(sim)))
 
         sim.contact.separate = watched  # type: ignore[method-assign]

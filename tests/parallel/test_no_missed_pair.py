@@ -75,10 +75,9 @@ class Found:
         self.sim, self.contact, self.at = sim, sim.contact, dict[int, Met]()
         self._meet, self.contact._meet = self.contact._meet, self.meet  # type: ignore[method-assign]
 
-    def meet(self, now: Scene, dt: float) -> int:
-        n = self._meet(now, dt)
-        self.at[self.sim.clock.step] = written(now.room, n, now.crowd.id)
-        return n
+    def meet(self, now: Scene, give: float, dt: float) -> None:
+        self._meet(now, give, dt)
+        self.at[self.sim.clock.step] = written(now.room, now.met, now.crowd.id)
 
     def run(self) -> dict[int, Met]:
         """Of some steps, each with the meetings that this rank computed; boundaries and forces act as ever."""
@@ -97,34 +96,35 @@ class Brute(Found):
         super().__init__(sim)
         self.all = dict[int, Met]()
 
-    def meet(self, now: Scene, dt: float) -> int:
+    def meet(self, now: Scene, give: float, dt: float) -> None:
         if self.sim.clock.step % EVERY == 0:
-            self.all[self.sim.clock.step] = self._nodes(dt) + self._edges(dt)
-        return super().meet(now, dt)
+            step = self._step(give, dt)
+            self.all[self.sim.clock.step] = self._nodes(step) + self._edges(step)
+        super().meet(now, give, dt)
 
-    def _step(self, dt: float) -> Step:
-        sides, nodes = self.contact._flight.sides, self.sim.model.nodes
+    def _step(self, give: float, dt: float) -> Step:
+        sides, nodes = self.contact.exterior.flight.sides, self.sim.model.nodes
         x, v = (state[sides.crowd.local] for state in (nodes.x, nodes.v))
-        return Step.of(x, v, sides.crowd.part, self.contact._mu, self.contact._give_back, dt)
+        return Step.of(x, v, sides.crowd.part, self.contact.searches.mu, give, dt)
 
-    def _nodes(self, dt: float) -> Met:
-        sides, step, met = self.contact._flight.sides, self._step(dt), Met()
+    def _nodes(self, step: Step) -> Met:
+        sides, met = self.contact.exterior.flight.sides, Met()
         faces, local, slaves = sides.face_places, sides.crowd.local, sides.crowd.places(sides.slaves)
-        normals, on_surface = means(self.contact._moments[local]), self.contact._surface.flags[local]
-        none, still = np.zeros(len(local)), np.zeros((len(local), 3))
+        normals, on_surface = means(self.contact.exterior._moments[local]), self.contact.exterior.surface.flags[local]
+        none = np.zeros(len(local))
         for pairs in self._pairs(slaves[:, None], faces[:, :3]):
             room, table, first = ContactRows.room(len(pairs)), PairTable(), np.full(len(local), -1, np.int32)
             table.add(np.column_stack([slaves[pairs[:, 0]], pairs[:, 1]]).astype(np.int32))
             table.hang(first, 0)
-            slots = slot_table(first, normals, none, still)._replace(on_surface=on_surface)
+            slots = slot_table(first, normals, none, step.v)._replace(on_surface=on_surface)
             of = face_table(faces, sides.faces.size, np.zeros(len(faces)))
             of = of._replace(id=sides.faces.id, exposed=sides.faces.exposed)
             n, _ = node_face(room, 0, table.arrays(), slots, of, step, 0.0)
             met += written(room, n, sides.crowd.id)
         return met
 
-    def _edges(self, dt: float) -> Met:
-        sides, step, met = self.contact._flight.sides, self._step(dt), Met()
+    def _edges(self, step: Step) -> Met:
+        sides, met = self.contact.exterior.flight.sides, Met()
         edges = sides.edges.take(np.lexsort((sides.edges.sides[:, 1], sides.edges.sides[:, 0])))
         places = sides.crowd.places(edges.nodes)
         of = edge_table(places, edges.size, np.zeros(len(places)))._replace(exposed=edges.exposed)
@@ -138,7 +138,7 @@ class Brute(Found):
 
     def _pairs(self, small: Indices, large: Indices) -> Iterator[Indices]:
         """(p, 2) all small things with all large ones that their part meets and that have no corner in common."""
-        part, allowed = self.contact._flight.sides.crowd.part, ~np.isnan(self.contact._mu)
+        part, allowed = self.contact.exterior.flight.sides.crowd.part, ~np.isnan(self.contact.searches.mu)
         for begin in range(0, len(small), max(_MOST // max(len(large), 1), 1)):
             some = small[begin : begin + max(_MOST // max(len(large), 1), 1)]
             meet = allowed[part[some[:, 0]][:, None], part[large[:, 0]][None, :]]
@@ -175,7 +175,7 @@ def test_every_pair_that_meets_is_found_once_on_any_number_of_ranks(name: str) -
     case = case_of(name)
     whole = brute(case)
     assert sum(map(bool, whole.all.values())) > len(whole.all) // 3
-    assert case.erodes or whole.contact.searches < STEPS // 3
+    assert case.erodes or whole.contact.searches.many < STEPS // 3
     for number, met in whole.all.items():
         assert set(met.values()) <= {1}
         assert whole.at[number] == met

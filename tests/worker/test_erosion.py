@@ -188,7 +188,7 @@ def test_the_surface_follows_what_is_left(ranks: int) -> None:
         for gone in rounds:
             tick(sim, gone)
             assert sim.contact is not None
-            surface, nodes = sim.contact._surface, sim.model.nodes
+            surface, nodes = sim.contact.exterior.surface, sim.model.nodes
             found.append((surface.faces.nodes[:, :3], nodes.id[surface.flags], surface.edges.nodes))
         sim.free()
         return found
@@ -223,7 +223,7 @@ def test_a_node_that_loses_all_its_tets_at_once_meets_others() -> None:
     assert sim.contact is not None
     particles = ~nodes_of_tets(sim)
     assert particles[inner]
-    assert sim.contact._surface.flags[particles].all()
+    assert sim.contact.exterior.surface.flags[particles].all()
 
 
 def test_what_is_laid_bare_meets_in_the_same_step() -> None:
@@ -240,16 +240,16 @@ def test_what_is_laid_bare_meets_in_the_same_step() -> None:
     assert len(bare) == 3
 
     def candidates() -> set[tuple[int, ...]]:
-        now = sim.contact._scene if sim.contact is not None else None
+        now = sim.contact.searches.scene if sim.contact is not None else None
         assert now is not None
         return {tuple(sorted(row)) for row in now.crowd.id[now.faces[:, :3]].tolist()}
 
     wanted = {tuple(sorted(int(n) for n in np.delete(meshes[0].tets[face // 4], face % 4))) for face in bare}
     assert not wanted & candidates()
     wear_out(sim, np.array([worn]))
-    searches = sim.contact.searches
+    searches = sim.contact.searches.many
     step.first_half(sim)
-    assert sim.contact.searches == searches + 1
+    assert sim.contact.searches.many == searches + 1
     assert wanted <= candidates()
 
 

@@ -19,7 +19,7 @@ from conoid.worker.boundaries import (
     RigidWalls,
     SymmetryPlane,
 )
-from conoid.worker.contact.stage import _mobility, _planes
+from conoid.worker.contact.exterior import mobilities, symmetry_planes
 from conoid.worker.mirrors import Mirrors
 from conoid.worker.state import Bits, Floats, Nodes
 
@@ -71,7 +71,7 @@ def test_a_boundary_that_does_not_answer_cannot_be_made() -> None:
 )
 def test_what_is_held_has_no_mobility_in_contact(bound: Boundary, held: tuple[int, int, int]) -> None:
     assert bound.held_components().tolist() == [list(held)] * 2
-    mobility, planes = _mobility(nodes(5), [bound]), _planes(5, [bound])
+    mobility, planes = mobilities(nodes(5), [bound]), symmetry_planes(5, [bound])
     expected = np.full((5, 3), 0.5)
     expected[np.ix_(SOME, np.flatnonzero(np.array(held) != FREE))] = 0.0
     assert np.array_equal(mobility, expected)
@@ -80,7 +80,7 @@ def test_what_is_held_has_no_mobility_in_contact(bound: Boundary, held: tuple[in
 
 def test_boundaries_hold_together() -> None:
     bounds = [SymmetryPlane(SOME, 0), Piston(np.array([3], np.int32))]
-    mobility, planes = _mobility(nodes(5), bounds), _planes(5, bounds)
+    mobility, planes = mobilities(nodes(5), bounds), symmetry_planes(5, bounds)
     assert mobility[[1, 3]].tolist() == [[0.0, 0.5, 0.5], [0.0, 0.0, 0.5]]
     assert planes[3].tolist() == [True]
 

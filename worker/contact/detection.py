@@ -27,6 +27,11 @@ class Detected:
     opening: Ints
     """Rows of the cracks that have become so wide that they open."""
 
+    @classmethod
+    def nothing(cls) -> "Detected":
+        """Before the first step."""
+        return cls(0, 0.0, np.zeros(0, np.int64))
+
 
 def detect(now: Scene, mu: Floats, give: float, dt: float, size: float, redraw: bool) -> Detected:
     """The active contacts of the step ahead, ``dt``, s, of the positions and velocities of the scene's nodes.

@@ -27,12 +27,13 @@ class Flight:
         self._comm, self._size = comm, size
         self.until = 0.0
         """Time to which the last search is good if nothing strays, s."""
+        self.mobility = mobility
         self.begin(nodes, nodes.v, 0.0)
-        self.follow(found, nodes, mobility)
+        self.follow(found, nodes)
 
-    def follow(self, found: Surface, nodes: Nodes, mobility: Floats) -> None:
+    def follow(self, found: Surface, nodes: Nodes) -> None:
         """Takes a new surface; all ranks take part."""
-        self._found, self.mobility = found, mobility
+        self._found = found
         self._watched = found.flags | found.waiting
         self.sides = self._whole(nodes, located(nodes.id, found.faces.nodes))
         """What this rank has of the surface."""

@@ -9,7 +9,7 @@ from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum, same
 from ..parallel.tags import Tag
 from ..state import Flags, Floats, Indices, Ints, Nodes, among
-from . import ghosts
+from . import ghosts, held
 from .ghosts import Copies
 from .narrow_phase import ContactRows, EdgeTable, FaceTable, SlotTable
 from .pairs import PairTable
@@ -118,6 +118,11 @@ class Scene:
         self.company = company
         self.shared_shares = SharedSum(comm, company, 4, Tag.CONTACT_SHARE)
         self.shared_impulse = SharedSum(comm, company, 3, Tag.CONTACT_IMPULSE)
+
+    def look(self, nodes: Nodes) -> None:
+        """Takes v(n-1/2), before the kick."""
+        held.gather(self.before, nodes.v, self.held, self.local)
+        self.copies.note(nodes)
 
     def reserve(self) -> None:
         """Room for every contact that may become active; the rows of the last step stay."""

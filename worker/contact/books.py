@@ -1,0 +1,80 @@
+"""What contact has done to the nodes and parts of a rank: energies and impulses, booked as they come."""
+
+import numpy as np
+
+from ..migration.parcel import Parcel
+from ..parallel import fixed_point
+from ..parallel.comm import Comm
+from ..state import Floats, Indices, Ints, Nodes, extended
+from . import booking
+from .account import Account
+from .scene import Scene
+
+
+class Books:
+    """One half of the work of an impulse is booked in the step that gives it, the other in the next one."""
+
+    def __init__(self, nodes: int, parts: int, extremes: tuple[float, float]) -> None:
+        """``extremes``: largest nodal mass, kg, and speed, m/s, of the scene."""
+        self.contact_loss = np.zeros(nodes)
+        """(nodes,) energy lost by impact and friction, J."""
+        self.external_work = np.zeros(nodes)
+        """(nodes,) work that what holds nodes does against contact, J."""
+        mass, speed = extremes
+        self.scale = fixed_point.scale_for(mass * speed)
+        """Quanta per N s."""
+        self.friction = fixed_point.Tally(np.array([mass * speed * speed]))
+        self.account = Account(mass * speed * speed)
+        self.parts = np.zeros((parts, 3), np.int64)
+        """(parts, 3) impulses so far, quanta."""
+        self.open: Ints = np.zeros((0, 3), np.int64)
+        """(nodes, 3) impulses of the last step, quanta, of a run that goes on here; (0, 3) once they are booked."""
+
+    def keep(self, parcel: Parcel, scene: Scene | None) -> None:
+        """Adds everything; the impulses of the last step are with the ``scene``, if there is one."""
+        parcel.nodes["contact.contact_loss"] = self.contact_loss
+        parcel.nodes["contact.external_work"] = self.external_work
+        parcel.sums["contact.parts"], parcel.sums["contact.friction"] = self.parts, self.friction.words
+        parcel.sums["contact.account"] = self.account.words
+        total = np.array(self.open) if len(self.open) else np.zeros((len(self.contact_loss), 3), np.int64)
+        if scene is not None:
+            total[scene.local] = scene.total[scene.held]
+        parcel.nodes["contact.total"] = total
+
+    def resume(self, parcel: Parcel, known: tuple[float, float, float, float]) -> None:
+        """Takes it back; ``known``: of the account."""
+        self.contact_loss = np.array(parcel.nodes["contact.contact_loss"])
+        self.external_work = np.array(parcel.nodes["contact.external_work"])
+        self.account.resume(parcel.sums["contact.account"], known)
+        self.parts, self.friction.words = parcel.sums["contact.parts"], parcel.sums["contact.friction"]
+        self.open = parcel.nodes["contact.total"]
+
+    def grow(self, copies: int) -> None:
+        """Takes up copies of nodes; what has been booked stays with their parents."""
+        self.contact_loss = extended(self.contact_loss, np.zeros(copies))
+        self.external_work = extended(self.external_work, np.zeros(copies))
+
+    def friction_work(self, comm: Comm) -> float:
+        """Heat of friction so far of the contacts of all ranks, J; all ranks take part."""
+        return float(self.friction.total(comm)[0])
+
+    def impulses(self, comm: Comm) -> Floats:
+        """(parts, 3) what contact has given each part so far, N s; all ranks take part."""
+        return np.asarray(comm.sum(self.parts) / self.scale)
+
+    def book(self, scene: Scene, places: Indices) -> None:
+        """Half of the work of the last impulses, at the ``places`` of the scene, with the velocities in ``before``."""
+        booking.book(
+            self.contact_loss, self.external_work, places, scene.crowd.local, scene.before, scene.total,
+            scene.crowd.mobility, self.scale,
+        )  # fmt: skip
+
+    def book_resumed(self, nodes: Nodes, mobility: Floats) -> None:
+        """The second half of the work of impulses from before a run went on here; ``mobility`` (nodes, 3), 1/kg."""
+        if len(self.open):
+            some = np.flatnonzero(self.open.any(axis=1)).astype(np.int32)
+            every = np.arange(len(self.open), dtype=np.int32)
+            booking.book(
+                self.contact_loss, self.external_work, some, every, nodes.v, self.open, mobility, self.scale
+            )  # fmt: skip
+            self.open = self.open[:0]

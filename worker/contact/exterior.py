@@ -1,0 +1,187 @@
+"""The surface of a rank, its cracks, and the mean normals of its nodes: kept by what happens to them."""
+
+import numpy as np
+
+from ..boundaries import FREE, Boundary
+from ..errors import InputError
+from ..migration.parcel import Parcel
+from ..parallel.comm import Comm
+from ..parallel.ownership import Neighbour
+from ..state import Flags, Floats, Indices, Ints, Model, Nodes, extended
+from ..topology import Split
+from . import normals, surface
+from .cracks import Cracks
+from .flight import Flight, typical
+from .scene import Scene
+
+_WORDS = 27
+"""Of the row of a crack that opens (Exterior.widened)."""
+_NO_SIDES = np.zeros((0, 3), np.int32)
+"""Of cracks that may open: none (block, place, face)."""
+
+
+class Exterior:
+    """What of a rank's bodies may meet others."""
+
+    def __init__(
+        self, model: Model, neighbours: list[Neighbour], bounds: list[Boundary], edges: bool, comm: Comm
+    ) -> None:
+        """``edges``: whether sharp edges meet each other; all ranks take part."""
+        self._model, self._neighbours, self._comm, self._edges = model, neighbours, comm, edges
+        self._planes = symmetry_planes(model.nodes.n, bounds)
+        self.cracks = Cracks.none()
+        self.surface = self._build(np.zeros(model.nodes.n, bool))
+        self.size = typical(self.surface.faces.size, comm)
+        """Of the faces of all ranks at the start, m."""
+        self.flight = Flight(self.surface, model.nodes, mobilities(model.nodes, bounds), self.size, comm)
+        self._moments = np.zeros((model.nodes.n, 9), np.int64)
+        self._changed = False
+        """Whether the surface is another one than that of the last search."""
+        self._separated = False
+        """Whether nodes of any rank have separated: cracks may be open."""
+
+    def keep(self, parcel: Parcel) -> None:
+        """Adds cracks, nodes of the surface and moments of normals."""
+        parcel.rows["contact.cracks"] = self.cracks.keep(parcel.nodes["id"])
+        parcel.nodes["contact.flags"], parcel.nodes["contact.moments"] = self.surface.flags, self._moments
+
+    def resume(self, parcel: Parcel, size: float, separated: bool) -> None:
+        """Takes them back; all ranks take part."""
+        self.size, self._separated = size, separated
+        self.surface.flags = np.array(parcel.nodes["contact.flags"])
+        self._moments = np.array(parcel.nodes["contact.moments"])
+        nodes = self._model.nodes
+        self.flight = Flight(self.surface, nodes, self.flight.mobility, size, self._comm)
+        self.cracks = Cracks.resume(parcel.rows["contact.cracks"], self._model.blocks, nodes)
+
+    def require_faces(self, allowed: Flags) -> None:
+        """Raises InputError, on every rank alike, when a part that may meet any, ``allowed`` (parts, parts), has no
+        face to meet with.
+        """
+        model = self._model
+        first = np.searchsorted(model.nodes.id, self.surface.faces.nodes[:, 0])
+        counts = self._comm.sum(np.bincount(model.nodes.part[first], minlength=len(model.parts)).astype(np.int64))
+        for index in np.flatnonzero((counts == 0) & allowed.any(axis=1)):
+            raise InputError(
+                f"contact: part {model.parts[index]!r} has no exposed face, all lie on symmetry planes; "
+                "leave it out of contact.parts"
+            )
+
+    @property
+    def owned(self) -> Flags:
+        """(nodes,) nodes of the surface that this rank owns."""
+        return self.surface.flags & self._model.nodes.owned
+
+    def _build(self, flags: Flags) -> surface.Surface:
+        """The surface, with sides of cracks that may open; nodes that have been on it, ``flags`` (n,), still are. All
+        ranks take part.
+        """
+        sides = self.cracks.foresee() if len(self.cracks.faces) else _NO_SIDES
+        found = surface.build(self._model, self._planes, self._neighbours, self._comm, self._edges, sides)
+        found.flags[: len(flags)] |= flags
+        return found
+
+    def uncover(self, loose: Flags, removed: Flags) -> None:
+        """The surface after tets have left; ``loose`` (nodes,): nodes without tets that fly on, ``removed``: those that
+        have left. All ranks take part.
+        """
+        self.surface, self._changed = self._build(self.surface.flags | loose), True
+        self.surface.flags &= ~removed
+        self.turn()
+
+    def crack(self, tets: Ints, nodes: Indices, sides: Indices) -> None:
+        """Takes up broken facets; see ``Cracks.add``."""
+        self.cracks.add(tets, nodes, sides, self._model.blocks)
+
+    def take_up_cracks(self) -> None:
+        """The surface anew, with the cracks that may open; all ranks take part."""
+        if self._separated:
+            self.surface, self._changed = self._build(self.surface.flags), True
+
+    def turn(self) -> None:
+        """Mean normals of all nodes anew; all ranks take part."""
+        self._moments = normals.moments(self._model, self._planes, self.size, self._neighbours, self._comm)
+
+    def show(self, scene: Scene, local: "np.ndarray") -> "np.ndarray":
+        """Gives the scene the mean normals of some nodes of this rank, and whether they are on the surface; returns
+        their places.
+        """
+        place = scene.place[local]
+        local, place = local[place >= 0], place[place >= 0]
+        scene.normals[place] = normals.means(self._moments[local])
+        scene.on_surface[place] = self.surface.flags[local]
+        return np.asarray(place)
+
+    def refresh(self, course: Floats, t: float) -> None:
+        """The flight from time ``t`` on, with the velocities ``course`` (nodes, 3), of the surface as it is; all ranks
+        take part.
+        """
+        nodes = self._model.nodes
+        self.flight.begin(nodes, course, t)
+        if self._changed:
+            self.flight.follow(self.surface, nodes)
+            self._changed = False
+        else:
+            self.flight.refresh(nodes)
+
+    def widened(self, rows: Ints) -> Ints:
+        """(k, 27) of the cracks ``rows`` (k,): whether the last search has taken them up; ids of both sides; of the
+        nodes of either, outward; and what each side adds to the moments of its nodes.
+        """
+        if not len(rows):
+            return np.zeros((0, _WORDS), np.int64)
+        nodes, cracks = self._model.nodes, self.cracks
+        sides = cracks.nodes[rows][:, [0, 1, 2, 3, 5, 4]]
+        shares = normals.shares(nodes.x, sides.reshape(-1, 3), self.size).reshape(-1, 18)
+        return np.column_stack([cracks.foreseen[rows], cracks.faces[rows], nodes.id[sides], shares])
+
+    def open(self, told: Ints, scene: Scene | None) -> bool:
+        """Makes surface of the cracks (``widened``) that ranks have told each other of; whether the scene lacks any."""
+        told = told.reshape(-1, _WORDS)
+        nodes, sides = self._model.nodes, told[:, 3:9].reshape(-1, 3)
+        local = nodes.places(sides)
+        normals.add(self._moments, told[:, 9:].reshape(-1, 9), local)
+        local = np.unique(local[local >= 0])
+        self.surface.flags[local] = True
+        faces = np.sort(told[:, 1:3].reshape(-1))
+        self.cracks.open(faces, self._model.blocks)
+        if scene is not None:
+            scene.expose(faces)
+            scene.node_fresh[self.show(scene, local)] = True
+            scene.cracks = self.cracks.places
+        return bool((told[:, 0] == 0).any())
+
+    def separate(self, split: Split) -> None:
+        """Follows nodes as they separate on any rank."""
+        self._separated = True
+        if split.copies.n:
+            parents = split.copies.parents
+            self.cracks.follow(split, self._model.nodes.id)
+            self.flight.grow(parents)
+            self._moments = extended(self._moments, self._moments[parents])
+
+    def grow(self, split: Split) -> None:
+        """Takes up the copies of nodes."""
+        parents, flight = split.copies.parents, self.flight
+        self._planes = extended(self._planes, self._planes[parents])
+        flight.mobility = extended(flight.mobility, flight.mobility[parents])
+        for some in (parents, split.first + np.arange(split.copies.n)):
+            free = flight.mobility[some] > 0.0
+            flight.mobility[some] = np.where(free, 1.0 / self._model.nodes.mass[some, None], 0.0)
+
+
+def mobilities(nodes: Nodes, bounds: list[Boundary]) -> Floats:
+    """(nodes, 3) one over the mass, 1/kg, zero where a velocity is held."""
+    mobility = np.repeat(1.0 / nodes.mass[:, None], 3, axis=1)
+    for bound in bounds:
+        mobility[bound.nodes] = np.where(bound.held_components() == FREE, mobility[bound.nodes], 0.0)
+    return mobility
+
+
+def symmetry_planes(n: int, bounds: list[Boundary]) -> Flags:
+    """(nodes, planes) which of ``n`` nodes lie on which symmetry plane; two planes across one axis are two columns."""
+    mirrors = [bound for bound in bounds if bound.mirrors]
+    planes = np.zeros((n, len(mirrors)), bool)
+    for k, bound in enumerate(mirrors):
+        planes[bound.nodes, k] = True
+    return planes

@@ -1,0 +1,160 @@
+"""Searches of all ranks: when one is due, how far ahead it looks, and the scene that it leaves."""
+
+import math
+
+import numpy as np
+
+from conoid.cases.schema import Case
+
+from ..clock import Clock
+from ..migration.parcel import Parcel
+from ..parallel.comm import Comm
+from ..parallel.ownership import Neighbour
+from ..state import Floats, Ints, Model, Nodes
+from ..topology import Split
+from . import layout, normals, pairing, registration
+from .course import courses
+from .cracks import widening
+from .exterior import Exterior
+from .follower import Follower
+from .news import news
+from .scene import Scene
+from .sides import HALO, Rules
+
+_SHORTEST = 10.0
+"""Steps of free flight that a search looks ahead at least; at most twice what the last search was good for."""
+_LONGEST = 80.0
+"""The same at most where bodies break: with 300 steps the pairs between fragments cost a quarter more than the searches
+that they save (docs/bench.md, the bar to 40 us).
+"""
+
+
+class Searches:
+    """The scene of a rank, and the searches that renew it."""
+
+    def __init__(
+        self, case: Case, model: Model, neighbours: list[Neighbour], exterior: Exterior, comm: Comm, clock: Clock
+    ) -> None:
+        """Nothing is searched yet."""
+        assert case.contact is not None
+        self._model, self._neighbours, self._exterior = model, neighbours, exterior
+        self._comm, self._clock = comm, clock
+        self._domain, self._skin = case.contact.domain, case.contact.skin
+        self.mu = pairing.friction(case)
+        """(parts, parts) Coulomb's coefficient, NaN where two parts do not meet."""
+        self.rubs = bool(np.nanmax(self.mu, initial=0.0) > 0.0)
+        """Whether there is friction anywhere."""
+        self._fractures = case.fractures
+        self.scene: Scene | None = None
+        self.due = True
+        """Whether the next step begins with a search."""
+        self.many = 0
+        """Searches so far."""
+        self._last = -math.inf
+        """Step of the last one from nothing."""
+        self._kept: tuple[Ints, Floats] = np.zeros((0, 2), np.int64), np.zeros((0, 4))
+        """Candidates with friction, and what they have kept, that the next search takes over from elsewhere."""
+
+    @property
+    def rules(self) -> Rules:
+        """How to search."""
+        size = self._exterior.size
+        return Rules(self._domain, ~np.isnan(self.mu), 2.0 * size, self._skin * size, HALO * size, self.rubs)
+
+    def keep(self, parcel: Parcel) -> None:
+        """Adds what pairs have kept: the candidates themselves a search finds again."""
+        keys, kept = self._kept if self.scene is None else self.scene.kept
+        parcel.rows["contact.kept"] = {"node": keys[:, 0], "face": keys[:, 1], "kept": kept}
+
+    def resume(self, parcel: Parcel) -> None:
+        """Takes it back."""
+        kept = parcel.rows["contact.kept"]
+        self._kept = np.column_stack([kept["node"], kept["face"]]), kept["kept"]
+
+    def spent(self, nodes: Nodes) -> bool:
+        """Whether a node of the surface will leave, in a step more, what the last search has allowed for."""
+        return self._exterior.flight.spent(nodes, self._clock.t, self._clock.dt)
+
+    def begin(self, nodes: Nodes) -> None:
+        """Before a step: mean normals when it is their turn, a search when it is due; all ranks take part."""
+        if self._clock.step % normals.EVERY == 0:
+            self._exterior.turn()
+            if self.scene is not None:
+                self._exterior.show(self.scene, self.scene.local)
+        if self.due or self.scene is None:
+            self._search(nodes)
+
+    def _search(self, nodes: Nodes) -> None:
+        """The scene anew; all ranks take part."""
+        flight, old, exterior = self._exterior.flight, self.scene, self._exterior
+        if old is not None:
+            old.free()
+            self._kept = old.kept
+        if self._fractures:
+            exterior.take_up_cracks()
+        goes_on = old is not None and self._clock.t + self._clock.dt <= flight.until
+        now = self.scene = self._laid_out(nodes, goes_on)
+        if old is not None and goes_on:
+            registration.carry(now, old)
+        self._connect(now, nodes)
+        now.look(nodes)
+        exterior.show(now, now.local)
+        now.enliven(np.flatnonzero(now.face_exposed).astype(np.int32))
+        self.foresee()
+        registration.news(now)
+        if self.rubs:
+            now.remember(*self._kept, nodes, self._comm)
+        self.due = False
+        self.many += 1
+
+    def _laid_out(self, nodes: Nodes, goes_on: bool) -> Scene:
+        """The surface as it is, without pairs: for what is left of the last search from nothing, if it ``goes_on``; all
+        ranks take part.
+        """
+        clock, flight = self._clock, self._exterior.flight
+        self._exterior.refresh(self._courses(nodes), clock.t)
+        steps, drift = flight.foresight(clock.dt)
+        if not goes_on:
+            longest = _LONGEST if self._fractures else steps
+            horizon = max(min(steps, longest, 2.0 * (clock.step - self._last)), _SHORTEST) * clock.dt
+            flight.until, self._last = clock.t + horizon, clock.step
+        return layout.build(flight.sides, self.rules, flight.until - clock.t, drift, nodes, self._comm)
+
+    def _courses(self, nodes: Nodes) -> Floats:
+        """(nodes, 3) how the nodes fly on; all ranks take part."""
+        if not self._fractures:
+            return nodes.v
+        return courses(self._model.blocks, nodes, self._neighbours, self._comm)
+
+    def _connect(self, found: Scene, nodes: Nodes) -> None:
+        """Takes the cracks up into a new scene, and settles who shares what of it; all ranks take part."""
+        follower = Follower(found, self._exterior.flight.here(nodes), nodes)
+        if self._fractures:
+            follower.cracks(self._exterior.cracks)
+        follower.settle(self._neighbours, self._comm)
+
+    def foresee(self) -> None:
+        """The faces of cracks that may open soon are searched."""
+        now = self.scene
+        if now is not None and len(now.cracks):
+            rows = widening(now.cracks, now.crowd.x, self._exterior.size)
+            sides = now.rows_of(self._exterior.cracks.faces[rows].reshape(-1))
+            now.enliven(sides[~now.face_live[sides]])
+
+    def separate(self, split: Split) -> None:
+        """Follows nodes as they separate; all ranks take part."""
+        if self.scene is None:
+            return
+        nodes, here = self._model.nodes, self._exterior.flight.here(self._model.nodes)
+        heard = news(split, self.scene, here, self._comm)
+        if heard is None:
+            return
+        follower = Follower(self.scene, here, nodes)
+        follower.follow(heard, self._exterior.cracks, self._neighbours)
+        if self._comm.size > 1:
+            follower.share(heard, self._neighbours, self._comm)
+
+    def free(self) -> None:
+        """Gives the messages back to MPI."""
+        if self.scene is not None:
+            self.scene.free()
