@@ -7,14 +7,13 @@ import numpy as np
 
 from conoid.worker.contact import edge_edge as edge_kernels
 from conoid.worker.contact import node_face as face_kernels
+from conoid.worker.contact.company import Company
 from conoid.worker.contact.narrow_phase import PUSH_OUT, ContactRows, EdgeTable, FaceTable, SlotTable, Step
 from conoid.worker.contact.pairs import PairTable
 from conoid.worker.contact.records import Crowd
 from conoid.worker.contact.solver import ActiveSet
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.parallel.fixed_point import Tally
-from conoid.worker.parallel.ownership import SharedSum
-from conoid.worker.parallel.tags import Tag
 
 from ..worker.meshes import Floats
 from .bodies import Indices
@@ -125,9 +124,8 @@ class Solver:
         self.active, every, part = active or ActiveSet(scale), np.arange(n, dtype=np.int32), np.zeros(n, np.int32)
         self._crowd = Crowd(np.arange(n), every, part, part, mobility, self.v, self.v, self.v)
         self._nodes: Any = SimpleNamespace(v=self.v, part=part, owned=np.ones(n, bool))
-        self._impulse = np.zeros((n, 3), np.int64), SharedSum(SerialComm(), [], 3, Tag.CONTACT_IMPULSE)
-        self.active.begin(met, many(met), self._crowd, [])
-        self.active.weigh(np.zeros((n, 4), np.int64), SharedSum(SerialComm(), [], 4, Tag.CONTACT_SHARE))
+        self.active.begin(met, many(met), self._crowd, Company([], SerialComm()).agree(met.nodes, every))
+        self.active.weigh()
 
     @property
     def push(self) -> Floats:
@@ -140,7 +138,7 @@ class Solver:
     def sweep(self, times: int = 1) -> Floats:
         """The velocities after some sweeps."""
         for _ in range(times):
-            self.active.sweep(1, *self._impulse)
+            self.active.sweep(1)
             self._leave()
         return self.v
 
@@ -150,7 +148,7 @@ class Solver:
 
     def resume(self, kept: Floats, ratio: float = 1.0) -> None:
         """Begins with ``ratio`` times the pushes (candidates, 4) that were kept."""
-        self.active.resume(kept, ratio, *self._impulse)
+        self.active.resume(kept, ratio)
         self._leave()
 
     def heat(self, v_old: Floats) -> float:

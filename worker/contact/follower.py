@@ -107,7 +107,7 @@ class Follower:
         order = np.argsort(heard.copy)
         family = np.column_stack([heard.parent, heard.copy])[order]
         local, at = self._nodes.places(family), self.places(family)
-        company, none = {some.rank: some for some in scene.company}, np.zeros(0, np.int32)
+        company, none = {some.rank: some for some in scene.company.neighbours}, np.zeros(0, np.int32)
         for other in neighbours:
             shared = _flagged(other.nodes, self._nodes.n)[local[:, 0]]
             some = company.get(other.rank, Neighbour(other.rank, none))
@@ -137,8 +137,7 @@ class Follower:
         scene.held = extended(scene.held, first + held)
         scene.local = extended(scene.local, rows.local[held])
         scene.place[rows.local[held]] = first + held
-        for name, width in (("shares", 4), ("impulse", 3), ("total", 3)):
-            setattr(scene, name, extended(getattr(scene, name), np.zeros((n, width), np.int64)))
+        scene.total = extended(scene.total, np.zeros((n, 3), np.int64))
         scene.normals = extended(scene.normals, np.zeros((n, 9)))
         scene.before = extended(scene.before, rows.v)
         for name in (

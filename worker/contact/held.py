@@ -97,23 +97,6 @@ def load(active, places, v, mobility):  # type: ignore[no-untyped-def]
     return fastest
 
 
-@njit(types.void(_I2, _N1, _I2, _I, _I, _I), cache=True)
-def to_crowd(sums, places, words, first, columns, n):  # type: ignore[no-untyped-def]
-    """Sums of the first ``n`` slots, ``columns`` words from the ``first``, to their places in the crowd."""
-    for s in range(n):
-        for i in range(columns):
-            sums[places[s], i] = words[s, first + i]
-
-
-@njit(types.void(_I2, _N1, _I2, _I, _I, _I), cache=True)
-def from_crowd(sums, places, words, first, columns, n):  # type: ignore[no-untyped-def]
-    """The same way back; the crowd's are cleared."""
-    for s in range(n):
-        for i in range(columns):
-            words[s, first + i] = sums[places[s], i]
-            sums[places[s], i] = 0
-
-
 @njit(types.boolean(_F2, _I2, _I2, _N1, NODES, _N1, _N1, _N1, _B1), cache=True)
 def leave(node_v, parts, total, slot, active, places, index, part, owned):  # type: ignore[no-untyped-def]
     """Velocities to the nodes that this rank holds, impulses of the step to ``total`` (crowd, 3), and those of owned

@@ -6,10 +6,11 @@ import numpy as np
 
 from ..jit import njit
 from ..parallel.comm import Comm
-from ..parallel.ownership import Neighbour, SharedSum, same
+from ..parallel.ownership import Neighbour, same
 from ..parallel.tags import Tag
 from ..state import Flags, Floats, Indices, Ints, Nodes, among
 from . import ghosts, held
+from .company import Company
 from .ghosts import Copies
 from .narrow_phase import ContactRows, EdgeTable, FaceTable, SlotTable
 from .pairs import PairTable
@@ -67,10 +68,7 @@ class Scene:
     edge_edge: PairTable = field(default_factory=PairTable)
     met: int = 0
     """Active contacts of the last step, the first rows of the room."""
-    company: list[Neighbour] = field(init=False)
-    """Other ranks, and the slots that either pushes or holds and any rank pushes."""
-    shared_shares: SharedSum = field(init=False)
-    shared_impulse: SharedSum = field(init=False)
+    company: Company = field(init=False)
     copies: Copies = field(init=False)
 
     def __post_init__(self) -> None:
@@ -90,7 +88,6 @@ class Scene:
         """(slots,) of nodes that are held here: only those on the surface meet faces."""
         self.first = np.full(n, -1, np.int32)
         """(slots,) the first pair with a face, -1 for none."""
-        self.shares, self.impulse = np.zeros((n, 4), np.int64), np.zeros((n, 3), np.int64)
         self.total = np.zeros((n, 3), np.int64)
         """(slots, 3) impulses of the last step, quanta."""
         self.normals = np.zeros((n, 9))
@@ -104,20 +101,15 @@ class Scene:
         part.
         """
         self.copies = ghosts.copies(self.crowd, nodes, comm, Tag.GHOST)
-        self._sum(company, comm)
+        self.company = Company(company, comm)
 
     def extend(self, company: list[Neighbour], sends: list[Neighbour], receives: list[Neighbour], comm: Comm) -> None:
         """The messages with more nodes, of which this rank knows as the others do; what has not grown stays."""
-        if same([*self.company, *self.copies.sends, *self.copies.receives], [*company, *sends, *receives]):
+        if same([*self.company.neighbours, *self.copies.sends, *self.copies.receives], [*company, *sends, *receives]):
             return
         self.free()
         self.copies = Copies(sends, receives, comm, Tag.GHOST)
-        self._sum(company, comm)
-
-    def _sum(self, company: list[Neighbour], comm: Comm) -> None:
-        self.company = company
-        self.shared_shares = SharedSum(comm, company, 4, Tag.CONTACT_SHARE)
-        self.shared_impulse = SharedSum(comm, company, 3, Tag.CONTACT_IMPULSE)
+        self.company = Company(company, comm)
 
     def look(self, nodes: Nodes) -> None:
         """Takes v(n-1/2), before the kick."""
@@ -227,8 +219,7 @@ class Scene:
     def free(self) -> None:
         """Gives its messages back to MPI."""
         self.copies.free()
-        self.shared_shares.free()
-        self.shared_impulse.free()
+        self.company.free()
 
 
 @njit("void(boolean[:, ::1], boolean[::1], int32[:, ::1], boolean[::1])", cache=True)

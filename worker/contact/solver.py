@@ -5,11 +5,11 @@ from collections.abc import Callable
 import numpy as np
 
 from ..parallel.fixed_point import Tally
-from ..parallel.ownership import Neighbour, SharedSum
 from ..state import Floats, Indices, Ints, Nodes
 from . import booking, held, sweeps
 from .account import Account
 from .active import IMPULSE, PUSH, PUSH_T, ActiveContacts, ActiveNodes, Loaded
+from .company import ActiveSum
 from .narrow_phase import ContactRows
 from .records import Crowd
 
@@ -28,40 +28,37 @@ class ActiveSet:
         self._slot: Indices = np.zeros(0, np.int32)
         """(crowd,) slot of each node, -1 for none; within a step only."""
         self._room = _Room(0, 0)
-        self._company: list[Neighbour] | None = None
-        self._shared: Indices = np.zeros(0, np.int32)
-        """Places of the nodes that another rank pushes or holds; some stand there several times."""
 
-    def begin(self, found: ContactRows, n: int, crowd: Crowd, company: list[Neighbour]) -> None:
-        """Takes up the first ``n`` contacts that were ``found``, and the nodes shared with the ``company``."""
-        if company is not self._company:
-            self._company, self._shared = company, np.concatenate([self._shared[:0], *(some.nodes for some in company)])
+    def begin(self, found: ContactRows, n: int, crowd: Crowd, shared: ActiveSum) -> None:
+        """Takes up the first ``n`` contacts that were ``found``, and the nodes whose sums are ``shared``."""
+        self._sum = shared
         if len(self._slot) != crowd.n:
             self._slot = np.full(crowd.n, -1, np.int32)
         if len(found.nodes) > self._room.contacts or crowd.n > self._room.nodes:
             self._room = _Room(len(found.nodes), crowd.n)
         room, slot = self._room, self._slot
-        self._first = held.number_shared(room.places, slot, self._shared)
+        self._first = held.number_shared(room.places, slot, shared.shared)
         self._n, border = held.number(
             room.slots, room.reach, room.places, slot, room.rows, found.nodes, n, self._first
         )  # fmt: skip
         self.places = room.places[: self._n]
+        shared.number(slot)
         self._fastest = held.load(room.active, self.places, crowd.v, crowd.mobility)
         self._contacts = ActiveContacts(
             room.slots, found.weights, found.normals, found.wanted, found.friction, found.pair, room.reach
         )  # fmt: skip
         self._parts = room.loaded.part(0, border, room.rows[0]), room.loaded.part(border, n, room.rows[1])
 
-    def weigh(self, sums: Ints, shared: SharedSum) -> None:
-        """Row weights, completed over the ranks; ``sums`` (crowd, 4): room, all zero."""
+    def weigh(self) -> None:
+        """Row weights, completed over the ranks."""
         active = self._room.active
 
         def add(part: Loaded) -> None:
             sweeps.add_row_weights(active, self._contacts, part.idle[: part.many[1]])
 
-        self._complete(add, active.row_weights, (0, _ROW_WEIGHTS), sums, shared)
+        self._complete(add, active.row_weights, 0, _ROW_WEIGHTS)
 
-    def resume(self, kept: Floats, ratio: float, sums: Ints, shared: SharedSum) -> None:
+    def resume(self, kept: Floats, ratio: float) -> None:
         """Begins with ``ratio`` times what pairs with friction have ``kept`` (candidates, 4) of the step before."""
         active, contacts = self._room.active, self._contacts
 
@@ -69,11 +66,11 @@ class ActiveSet:
             sweeps.load_kept(part, contacts, active, kept)
             sweeps.resume(active, part, kept, contacts.pair, ratio, self._scale)
 
-        self._complete(begin, active.moving_words, (IMPULSE, 3), sums, shared)
+        self._complete(begin, active.moving_words, IMPULSE, 3)
         sweeps.give(active, self._n, self._scale)
 
-    def sweep(self, many: int, sums: Ints, shared: SharedSum) -> None:
-        """``many`` sweeps; ``sums`` (crowd, 3): room, all zero."""
+    def sweep(self, many: int) -> None:
+        """``many`` sweeps."""
         active, contacts, scale = self._room.active, self._contacts, self._scale
         if not self._first:
             sweeps.sweep_all(active, self._parts[1], contacts, self._fastest, self._n, scale, many)
@@ -84,22 +81,18 @@ class ActiveSet:
             sweeps.sweep(active, part, scale)
 
         for _ in range(many):
-            self._complete(correct, active.moving_words, (IMPULSE, 3), sums, shared)
+            self._complete(correct, active.moving_words, IMPULSE, 3)
             sweeps.give(active, self._n, scale)
 
-    def _complete(
-        self, work: Callable[[Loaded], None], words: Ints, columns: tuple[int, int], sums: Ints, shared: SharedSum
-    ) -> None:
-        """Does the work of all contacts, and completes these (first, number of) columns of the words of shared nodes;
-        contacts without shared nodes are worked on while the sums of the others travel.
+    def _complete(self, work: Callable[[Loaded], None], words: Ints, first: int, columns: int) -> None:
+        """Does the work of all contacts, and completes these columns of the ``words`` of shared nodes; contacts without
+        shared nodes are worked on while the sums of the others travel.
         """
         border, inner = self._parts
         work(border)
-        held.to_crowd(sums, self.places, words, *columns, self._first)
-        shared.begin(sums)
+        self._sum.begin(words, first, columns)
         work(inner)
-        shared.finish(sums)
-        held.from_crowd(sums, self.places, words, *columns, self._first)
+        self._sum.finish(words, first, columns)
 
     def cost(self, account: Account, before: Floats) -> None:
         """Books what the impulses take from the bodies; ``before`` (crowd, 3): v(n-1/2)."""

@@ -203,12 +203,12 @@ class Contact:
         held.take(crowd.x, crowd.v, now.held, state.x, state.v, now.local)
         now.copies.finish(crowd.x, crowd.v, now.before)
         self._meet(now, PUSH_OUT if books.account.settle(self._comm) else 0.0, dt)
-        impulse = now.impulse, now.shared_impulse
-        active.begin(now.room, now.met, crowd, now.company)
-        active.weigh(now.shares, now.shared_shares)
+        shared = now.company.agree(now.room.nodes[: now.met], crowd.local)
+        active.begin(now.room, now.met, crowd, shared)
+        active.weigh()
         if self.searches.rubs:
-            active.resume(now.node_face.kept, self._resume(), *impulse)
-        active.sweep(self._sweeps, *impulse)
+            active.resume(now.node_face.kept, self._resume())
+        active.sweep(self._sweeps)
         if self.searches.rubs:
             now.node_face.kept[:] = 0.0
             active.store(now.node_face.kept)
@@ -216,6 +216,7 @@ class Contact:
         active.cost(books.account, now.before)
         if active.leave(crowd, now.total, state, books.parts):
             self.last_push = t
+        shared.free()
         books.book(now, active.places)
 
     def _resume(self) -> float:

@@ -19,10 +19,10 @@ class Tag(IntEnum):
     """Which nodes are on the surface, when it is built (contact/surface.py)."""
     GHOST = 11
     """Positions and velocities of the nodes of ghost faces, in every step with contact (contact/ghosts.py)."""
-    CONTACT_SHARE = 12
-    """Sums of the shares of active contacts in the nodes they push, in every step with contact (contact/stage.py)."""
-    CONTACT_IMPULSE = 13
-    """Sums of the impulses of a sweep, in every sweep (contact/stage.py)."""
+    CONTACT_FLAGS = 12
+    """Which shared nodes are pushed, in every step with contact (contact/company.py)."""
+    CONTACT = 13
+    """Sums of the row weights and of the impulses of a sweep at nodes that are pushed (contact/company.py)."""
     NORMAL = 14
     """Sums of the face normals at nodes, in every sixteenth step and after erosion (contact/normals.py)."""
     TETS_AT_NODE = 15
