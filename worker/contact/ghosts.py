@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from ..jit import njit
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
 from ..parallel.tags import Tag
@@ -112,22 +113,36 @@ class Copies:
 
     def note(self, nodes: Nodes) -> None:
         """Keeps v(n-1/2) for the others."""
-        self._out[:, 6:] = nodes.v[self._from]
+        _pack(self._out, 6, nodes.v, self._from)
 
     def begin(self, nodes: Nodes) -> None:
         """Sends positions and velocities."""
-        self._out[:, :3], self._out[:, 3:6] = nodes.x[self._from], nodes.v[self._from]
+        _pack(self._out, 0, nodes.x, self._from)
+        _pack(self._out, 3, nodes.v, self._from)
         self._exchange.begin()
 
     def finish(self, x: Floats, v: Floats, before: Floats) -> None:
         """Fills the copies' rows of ``x``, of ``v`` and of v(n-1/2), (crowd, 3) each."""
         self._exchange.finish()
-        at, got = self._to, self._in
-        x[at], v[at], before[at] = got[:, :3], got[:, 3:6], got[:, 6:]
+        _unpack(x, v, before, self._to, self._in)
 
     def free(self) -> None:
         """Gives the messages back to MPI."""
         self._exchange.free()
+
+
+@njit("void(float64[:, ::1], int64, float64[:, ::1], int32[::1])", cache=True)
+def _pack(out, first, values, rows):  # type: ignore[no-untyped-def]
+    for r in range(len(rows)):
+        for i in range(3):
+            out[r, first + i] = values[rows[r], i]
+
+
+@njit("void(float64[:, ::1], float64[:, ::1], float64[:, ::1], int32[::1], float64[:, ::1])", cache=True)
+def _unpack(x, v, before, rows, got):  # type: ignore[no-untyped-def]
+    for r in range(len(rows)):
+        for i in range(3):
+            x[rows[r], i], v[rows[r], i], before[rows[r], i] = got[r, i], got[r, 3 + i], got[r, 6 + i]
 
 
 def _joined(some: list[Indices]) -> Indices:
