@@ -9,6 +9,7 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
+from .growing import Rooms
 from .jit import njit
 from .migration.parcel import Parcel, length
 from .state import Bits, Flags, Floats, Indices, Ints, Load, Nodes, extended
@@ -45,6 +46,7 @@ class Boundary(ABC):
         """(n, 3) v(n-1/2), m/s."""
         self._impulse = np.zeros((len(nodes), 3))
         """(n, 3) of the last step, N s."""
+        self._rooms = Rooms("nodes", *_KEPT, "_before")
 
     @abstractmethod
     def held_components(self) -> Bits:
@@ -65,10 +67,12 @@ class Boundary(ABC):
 
         What has been booked, and the impulse of the last step, stay with the parent.
         """
-        parents, first = split.copies.parents, split.first
-        at = np.minimum(np.searchsorted(self.nodes, parents), max(len(self.nodes) - 1, 0))
-        held = self.nodes[at] == parents if len(self.nodes) else np.zeros(len(parents), bool)
-        self._inherit(at[held], (first + np.flatnonzero(held)).astype(np.int32))
+        parents, n = split.copies.parents, len(self.nodes)
+        rooms = self._rooms.of(self, len(parents))
+        at = _inherit(*rooms, n, parents, split.first)
+        if len(at):
+            self._rooms.take(self, n + len(at))
+            self._inherit(at)
 
     def keep(self, parcel: Parcel, name: str) -> None:
         """Adds what the boundary must remember to a parcel, under its ``name``."""
@@ -84,14 +88,8 @@ class Boundary(ABC):
             setattr(self, key, parcel.nodes[f"{name}.{key}"][self.nodes])
         self._before = np.zeros((len(self.nodes), 3))
 
-    def _inherit(self, at: Ints, copies: Indices) -> None:
-        """Takes up ``copies`` of the nodes at the places ``at``."""
-        none = np.zeros((len(at), 3))
-        self.nodes = extended(self.nodes, copies)
-        self.contact_loss = extended(self.contact_loss, none[:, 0])
-        self.external_work = extended(self.external_work, none[:, 0])
-        self._impulse = extended(self._impulse, none)
-        self._before = extended(self._before, self._before[at])
+    def _inherit(self, at: Ints) -> None:  # noqa: B027 (a boundary of its own may keep more by node)
+        """Takes up copies of the nodes at the places ``at``; they stand behind all nodes."""
 
 
 class SymmetryPlane(Boundary):
@@ -142,8 +140,7 @@ class RigidWalls(Boundary):
             depths[k] = behind.max(initial=-np.inf)
         return depths
 
-    def _inherit(self, at: Ints, copies: Indices) -> None:
-        super()._inherit(at, copies)
+    def _inherit(self, at: Ints) -> None:
         self._held = extended(self._held, self._held[at])
 
     def resume(self, parcel: Parcel, name: str, dt: float) -> None:
@@ -261,9 +258,8 @@ class PrescribedVelocity(Driver):
     def held_components(self) -> Bits:
         return np.where(np.isnan(self._velocity), FREE, PRESCRIBED).astype(np.uint8)
 
-    def _inherit(self, at: Ints, copies: Indices) -> None:
-        super()._inherit(at, copies)
-        self._velocity = np.concatenate([self._velocity, self._velocity[at]])
+    def _inherit(self, at: Ints) -> None:
+        self._velocity = extended(self._velocity, self._velocity[at])
 
     def _target(self, state: Nodes, dt: float) -> Floats:
         free = state.v[self.nodes]
@@ -300,6 +296,27 @@ class PrescribedRotation(PrescribedVelocity):
 
 def _free(nodes: Indices) -> Bits:
     return np.full((len(nodes), 3), FREE, np.uint8)
+
+
+@njit(
+    "int64[::1](int32[::1], float64[::1], float64[::1], float64[:, ::1], float64[:, ::1], int64, int64[::1], int64)",
+    cache=True,
+)
+def _inherit(nodes, loss, work, impulse, before, n, parents, first):  # type: ignore[no-untyped-def]
+    """Rows from ``n`` on of the rooms of a boundary's columns, for the copies of its nodes: ``first`` is the local
+    index of the first copy, ``parents`` (copies,) are ascending. Returns the places of their parents among the ``n``.
+    """
+    at, k = np.empty(len(parents), np.int64), 0
+    for c in range(len(parents)):
+        p = np.searchsorted(nodes[:n], parents[c])
+        if p == n or nodes[p] != parents[c]:
+            continue
+        nodes[n + k], loss[n + k], work[n + k] = first + c, 0.0, 0.0
+        for i in range(3):
+            impulse[n + k, i], before[n + k, i] = 0.0, before[p, i]
+        at[k] = p
+        k += 1
+    return at[:k].copy()
 
 
 @njit("void(float64[:, ::1], int32[::1], int64)", cache=True)

@@ -10,6 +10,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from .growing import Rooms, inherit
+
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Indices = npt.NDArray[np.int32]
@@ -118,6 +120,8 @@ class Nodes:
     """Quanta per newton of ``force`` as it stands."""
     group: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
     """(n,) see Model.groups; copies stay in that of their parents. (0,) where nobody asks."""
+    _inherited: Rooms = field(default_factory=lambda: Rooms("part", "x0", "x", "v", "mass", "force"), init=False)
+    _given: Rooms = field(default_factory=lambda: Rooms("id", "owner", "owned"), init=False)
 
     @property
     def n(self) -> int:
@@ -131,13 +135,15 @@ class Nodes:
 
     def grow(self, copies: "Copies") -> None:
         """Takes up copies of nodes: they begin as their parents are, whose mass is their own less the copies'."""
-        for name in ("part", "x0", "x", "v", *(("group",) if len(self.group) else ())):
-            values = getattr(self, name)
-            setattr(self, name, extended(values, values[copies.parents]))
-        self.id, self.mass = extended(self.id, copies.id), extended(self.mass, copies.mass)
-        self.owner, self.owned = extended(self.owner, copies.owner), extended(self.owned, copies.owned)
-        self.force = extended(self.force, np.zeros((len(copies.id), 3), np.int64))
-        np.subtract.at(self.mass, copies.parents, copies.mass)
+        n, m = self.n, self.n + copies.n
+        inherited = self._inherited.of(self, copies.n)
+        inherit(*inherited, copies.parents, copies.mass, n)
+        for room, column in zip(self._given.of(self, copies.n), (copies.id, copies.owner, copies.owned), strict=True):
+            room[n:m] = column
+        if len(self.group):
+            self.group = extended(self.group, self.group[copies.parents])
+        self._inherited.take(self, m)
+        self._given.take(self, m)
 
 
 @dataclass

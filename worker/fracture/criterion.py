@@ -19,18 +19,27 @@ _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _P = PRESSURE * CHUNK
 _FAR = 1.0 + 1e-9
 """More than the rounding of expm1 here and in numpy, whose bits decide."""
+_TOGETHER = 64
+"""Facets whose stresses are read together."""
 _I1, _F1 = types.int64[::1], types.float64[::1]
 
 
-@njit(types.void(_F1, MESH, types.int64, _F1), cache=True)
-def traction(t, mesh, e, normal):  # type: ignore[no-untyped-def]
-    """``t`` (3,): stress of tet ``e`` without the viscous part times ``normal``, Pa."""
+@njit(types.void(_F1, MESH, types.int64), cache=True)
+def _stress(s, mesh, e):  # type: ignore[no-untyped-def]
+    """``s`` (6,): stress xx, yy, zz, yz, zx, xy of tet ``e`` without the viscous part, Pa."""
     state, at = mesh.state, (e // CHUNK) * mesh.columns * CHUNK + e % CHUNK
     p = state[at + _P]
-    xx, yy, zz = state[at + _SXX] - p, state[at + _SYY] - p, state[at + _SZZ] - p
-    yz, zx, xy = state[at + _SYZ], state[at + _SZX], state[at + _SXY]
+    s[0], s[1], s[2] = state[at + _SXX] - p, state[at + _SYY] - p, state[at + _SZZ] - p
+    s[3], s[4], s[5] = state[at + _SYZ], state[at + _SZX], state[at + _SXY]
+
+
+@njit("void(float64[::1], float64[::1], float64[::1])", cache=True)
+def _traction(t, s, normal):  # type: ignore[no-untyped-def]
+    """``t`` (3,): stress ``s`` (6,) times ``normal``, Pa."""
     nx, ny, nz = normal[0], normal[1], normal[2]
-    t[0], t[1], t[2] = xx * nx + xy * ny + zx * nz, xy * nx + yy * ny + yz * nz, zx * nx + yz * ny + zz * nz
+    t[0] = s[0] * nx + s[5] * ny + s[4] * nz
+    t[1] = s[5] * nx + s[1] * ny + s[3] * nz
+    t[2] = s[4] * nx + s[3] * ny + s[2] * nz
 
 
 @njit("float64(float64[::1], float64[:, ::1], uint32[::1], int64)", cache=True, error_model="numpy")
@@ -75,12 +84,11 @@ def effective(t, normal, weight, friction):  # type: ignore[no-untyped-def]
     return np.sqrt(weight) * max(np.sqrt(across) + friction * along, 0.0)
 
 
-@njit(types.int64(CANDIDATES, types.int64, types.int64, types.uint8[::1], MESH, TABLE, POINTS, LAW), cache=True)
-def _of_tet(out, n, e, hot, mesh, table, x, law):  # type: ignore[no-untyped-def]
-    """Adds the candidates among the facets of tet ``e`` to the ``n`` of ``out``, as long as there is room; returns the
-    new number.
+@njit(types.int64(CANDIDATES, types.int64, types.int64, types.uint8[::1], MESH), cache=True)
+def _of_tet(out, n, e, hot, mesh):  # type: ignore[no-untyped-def]
+    """Adds the overstressed facets of tet ``e`` to the ``n`` of ``out``, each by the first of its sides that is
+    overstressed, as long as there is room; returns the new number.
     """
-    normal, one, two = np.empty(3), np.empty(3), np.empty(3)
     for k in range(4):
         if not (hot[e] & mesh.intact[e]) >> k & 1:
             continue
@@ -88,27 +96,16 @@ def _of_tet(out, n, e, hot, mesh, table, x, law):  # type: ignore[no-untyped-def
         first = mesh.id[e] < mesh.id[other]
         if not first and (hot[other] >> far) & 1:
             continue
-        a, b, face = (e, other, k) if first else (other, e, far)
-        outward(normal, x, mesh.tets[a], face)
-        traction(one, mesh, a, normal)
-        traction(two, mesh, b, normal)
-        for i in range(3):
-            one[i] = 0.5 * (one[i] + two[i])
-        size = effective(one, normal, law.weight, law.friction)
-        if size >= table.strength[a, face]:
-            if n < len(out.place):
-                out.place[n], out.face[n], out.shared[n] = a, face, -1
-                out.traction[n, 0], out.traction[n, 1], out.traction[n, 2] = one[0], one[1], one[2]
-                out.traction[n, 3] = size
-            n += 1
+        if n < len(out.place):
+            out.place[n], out.face[n], out.shared[n] = (e, k, -1) if first else (other, far, -1)
+        n += 1
     return n
 
 
-@njit(types.int64(CANDIDATES, types.uint8[::1], MESH, TABLE, POINTS, LAW), cache=True)
-def within(out, hot, mesh, table, x, law):  # type: ignore[no-untyped-def]
-    """Fills ``out`` with the candidates within this rank; returns how many there are, be there room for them or not.
-
-    ``hot`` (tets,): bit k for an overstressed face k, read by eights; ``x``: present positions.
+@njit(types.int64(CANDIDATES, types.uint8[::1], MESH), cache=True)
+def _overstressed(out, hot, mesh):  # type: ignore[no-untyped-def]
+    """Fills ``out`` with the overstressed facets within this rank; returns how many there are, be there room for them
+    or not. ``hot`` (tets,): bit k for an overstressed face k, read by eights.
     """
     n, words = 0, len(hot) // 8
     one, two = hot[: 8 * words].view(np.uint64), mesh.intact[: 8 * words].view(np.uint64)
@@ -116,21 +113,55 @@ def within(out, hot, mesh, table, x, law):  # type: ignore[no-untyped-def]
         if w == words or one[w] & two[w]:
             for e in range(8 * w, min(8 * w + 8, len(hot))):
                 if hot[e] & mesh.intact[e]:
-                    n = _of_tet(out, n, e, hot, mesh, table, x, law)
+                    n = _of_tet(out, n, e, hot, mesh)
     return n
+
+
+@njit(types.int64(CANDIDATES, types.int64, MESH, TABLE, POINTS, LAW), cache=True)
+def within(out, n, mesh, table, x, law):  # type: ignore[no-untyped-def]
+    """Moves the candidates among the ``n`` facets of ``out`` to the front; returns their number. The stresses of some
+    facets are read together: the memory then answers to many at a time.
+    """
+    normal, one, two, m = np.empty(3), np.empty(3), np.empty(3), 0
+    near, far = np.empty((_TOGETHER, 6)), np.empty((_TOGETHER, 6))
+    for begin in range(0, n, _TOGETHER):
+        some = min(_TOGETHER, n - begin)
+        for i in range(some):
+            a, face = out.place[begin + i], out.face[begin + i]
+            _stress(near[i], mesh, a)
+            _stress(far[i], mesh, mesh.beside[a, face])
+        for i in range(some):
+            a, face = out.place[begin + i], out.face[begin + i]
+            outward(normal, x, mesh.tets[a], face)
+            _traction(one, near[i], normal)
+            _traction(two, far[i], normal)
+            for k in range(3):
+                one[k] = 0.5 * (one[k] + two[k])
+            size = effective(one, normal, law.weight, law.friction)
+            if size >= table.strength[a, face]:
+                out.place[m], out.face[m], out.shared[m] = a, face, -1
+                out.traction[m, 0], out.traction[m, 1], out.traction[m, 2], out.traction[m, 3] = (
+                    one[0],
+                    one[1],
+                    one[2],
+                    size,
+                )
+                m += 1
+    return m
 
 
 @njit(types.void(INTERFACE, _I1, MESH, POINTS), cache=True)
 def own_tractions(shared, chosen, mesh, x):  # type: ignore[no-untyped-def]
     """Tractions of this rank's tets on the intact ones of the ``chosen`` shared facets, those of one body."""
-    normal = np.empty(3)
+    normal, stress = np.empty(3), np.empty(6)
     for m in chosen:
         e, face = shared.sides[m, 0], shared.sides[m, 1]
         if mesh.bond[e, face] == INTACT:
             outward(normal, x, mesh.tets[e], face)
             if not shared.first[m]:
                 normal *= -1.0
-            traction(shared.own[m], mesh, e, normal)
+            _stress(stress, mesh, e)
+            _traction(shared.own[m], stress, normal)
 
 
 @njit(types.int64(CANDIDATES, types.int64, INTERFACE, _I1, MESH, TABLE, POINTS, LAW), cache=True)
@@ -194,8 +225,9 @@ def search(out, hot, shared, chosen, mesh, table, x, law, step, t):  # type: ign
     """The candidates of a body that may break by their clocks in the step of this number, 0: all candidates. Returns
     how many they are, or the room that they need at most where there is too little.
     """
-    n = within(out, hot, mesh, table, x, law)
+    n = _overstressed(out, hot, mesh)
     if n + len(chosen) <= len(out.place):
+        n = within(out, n, mesh, table, x, law)
         n = across(out, n, shared, chosen, mesh, table, x, law)
         return clock(out, n, table, law, step, t) if step > 0 else n
     return n + len(chosen)

@@ -8,9 +8,10 @@ facet inside a body separates nothing; a closed sheet of them round a node does.
 
 import numpy as np
 
+from ..growing import Rooms
 from ..jit import njit, types
 from ..mesh.faces import FACES
-from ..state import CHUNK, INTACT, Indices, Ints, Tets, extended
+from ..state import CHUNK, INTACT, Indices, Ints, Tets
 from ..state import MASS as MASS_ROW
 from ..topology import keys
 from .records import MESH, several
@@ -39,11 +40,14 @@ class Stars:
         """(nodes,)."""
         self.first: Indices = (np.cumsum(self.count) - self.count).astype(np.int32)
         """(nodes,) where the node's tets begin in the pool."""
+        self._rooms = Rooms("first", "count")
 
     def grow(self, copies: int) -> None:
         """Takes up new nodes, which have no tets yet."""
-        none = np.zeros(copies, np.int32)
-        self.first, self.count = extended(self.first, none), extended(self.count, none)
+        n = len(self.first)
+        for room in self._rooms.of(self, copies):
+            room[n : n + copies] = 0
+        self._rooms.take(self, n + copies)
 
     def retie(self, tets: Tets, nodes: Ints, rows: Ints, places: Ints, of: Ints, new: int, block: int) -> None:
         """Gives tets (n, 4) of this block the nodes that theirs have become, and every node its star.
@@ -97,25 +101,34 @@ def ordered(rows: Ints, places: Ints) -> tuple[Ints, Ints]:
     return rows[order], every[order]
 
 
-@njit("int64(int64[:, ::1], int64, int64, int64)", cache=True)
-def _row_of(rows, begin, end, tet):  # type: ignore[no-untyped-def]
-    """The row of a tet among those of a star, which are sorted; -1 where it is not."""
-    last = end
-    while begin < end:
-        middle = (begin + end) // 2
-        if rows[middle, TET] < tet:
-            begin = middle + 1
-        else:
-            end = middle
-    return begin if begin < last and rows[begin, TET] == tet else -1
-
-
 @njit("int64(int64[::1], int64)", cache=True)
 def _root(parent, i):  # type: ignore[no-untyped-def]
     while parent[i] != i:
         parent[i] = parent[parent[i]]
         i = parent[i]
     return i
+
+
+@njit("boolean(int64[::1], int64[:, ::1], int64[::1], int64, int64)", cache=True)
+def _join(parent, rows, tets, begin, end):  # type: ignore[no-untyped-def]
+    """Joins the rows of one star that hold together, each with its smallest as root; whether they are one piece."""
+    apart = end - begin - 1
+    for i in range(begin, end):
+        for m in range(BEHIND, COLUMNS):
+            behind, j = rows[i, m], i + 1
+            if behind <= tets[i]:  # none, or one that has seen this one behind it
+                continue
+            while j < end and tets[j] < behind:
+                j += 1
+            if j == end or tets[j] != behind:
+                continue
+            one, two = _root(parent, i), _root(parent, j)
+            if one != two:
+                parent[max(one, two)] = min(one, two)
+                apart -= 1
+        if not apart:
+            return True
+    return False
 
 
 @njit(several(_I1, _I2, _I1, _N1, types.float64[::1])(_I2), cache=True)
@@ -129,22 +142,14 @@ def pieces(rows):  # type: ignore[no-untyped-def]
     n, i_node = len(rows), 0
     parent, of, first, mass = np.arange(n), np.full(n, -1), np.empty(n, np.int64), np.zeros(n)
     node = np.empty(n, np.int64)
-    quarters = rows[:, MASS].copy().view(np.float64)
+    tets, quarters = rows[:, TET].copy(), rows[:, MASS].copy().view(np.float64)
     begin, k = 0, 0
     while begin < n:
         end = begin
         while end < n and rows[end, NODE] == rows[begin, NODE]:
             end += 1
-        for i in range(begin, end):
-            for m in range(BEHIND, COLUMNS):
-                if rows[i, m] <= rows[i, TET]:  # none, or one that has seen this one behind it
-                    continue
-                j = _row_of(rows, i + 1, end, rows[i, m])
-                if j < 0:
-                    continue
-                one, two = _root(parent, i), _root(parent, j)
-                parent[max(one, two)] = min(one, two)
-        for i in range(begin + 1, end):
+        whole = _join(parent, rows, tets, begin, end)
+        for i in range(end if whole else begin + 1, end):
             root = _root(parent, i)
             if root == begin:
                 continue
