@@ -99,17 +99,27 @@ class Fields:
     checkpoint = Flag()
     """A checkpoint is asked for."""
 
-    def __init__(self) -> None:
-        self.words: Ints = np.zeros(self.size, np.int64)
-        """(fields,) what the ranks exchange."""
+    def __init__(self, ranks: int = 1) -> None:
+        self.words: Ints = np.zeros(self.size + ranks, np.int64)
+        """(fields + ranks,) what the ranks exchange."""
+        self.touched: Ints = self.words[self.size :]
+        """(ranks,) whom the facets that break concern (fracture/separation.py): a word for each rank."""
 
 
 class StepReduction(Fields):
     """What all ranks have agreed on in the last reduction; ``own`` is what this rank gives to the next one."""
 
-    def __init__(self) -> None:
-        super().__init__()
-        self.own = Fields()
+    def __init__(self, ranks: int = 1) -> None:
+        super().__init__(ranks)
+        self.own = Fields(ranks)
+
+    def keep(self) -> Ints:
+        """(fields,) what a run that goes on must know, on any number of ranks."""
+        return self.words[: self.size].copy()
+
+    def resume(self, words: Ints) -> None:
+        """Takes it back."""
+        self.words[: self.size] = words
 
     def begin(self, comm: Comm) -> Pending:
         """Starts the reduction; the fields are those of all ranks once it is finished. All ranks take part."""

@@ -1,7 +1,7 @@
 """What a case needs, built once: the model, its pressure form, its boundaries, its accounts. The step uses it."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -60,7 +60,7 @@ class Simulation:
     """CPU time that it took to make the stages on the slowest rank, s."""
     floor: float
     """Forces below this, N, do not refine the force quantum."""
-    reduction: StepReduction = field(default_factory=StepReduction)
+    reduction: StepReduction
 
     @property
     def scale(self) -> float:
@@ -158,7 +158,7 @@ def _assemble(
         case=case, comm=comm, model=model, elements=elements, boundaries=scene, contact=contact, erosion=erosion,
         fracture=fracture, clock=clock, ledger=Ledger(model, scene, contact, erosion, fracture, comm, clock),
         probes=probes, timers=timers, record=Record(model, fracture, comm) if fracture is not None else None,
-        neighbours=neighbours, floor=_force_floor(model, comm),
+        neighbours=neighbours, floor=_force_floor(model, comm), reduction=StepReduction(comm.size),
         assembled=float(comm.maximum(np.array([worked(comm) - began]))[0]),
     )  # fmt: skip
 
@@ -168,7 +168,7 @@ def keep(sim: Simulation) -> Parcel:
     parcel = model_of.keep(sim.model)
     pushes = sim.comm.maximum(np.array([each.last_push for each in sim.pushing]))
     parcel.known |= {
-        "reduction": sim.reduction.words.copy(), "clock": sim.clock.keep(), "ledger": sim.ledger.keep(),
+        "reduction": sim.reduction.keep(), "clock": sim.clock.keep(), "ledger": sim.ledger.keep(),
         "probes": sim.probes.keep(), "floor": sim.floor, "last_push": pushes.tolist(),
     }  # fmt: skip
     for index, bound in enumerate(sim.boundaries):
@@ -191,7 +191,7 @@ def resume(case: Case, arrived: Arrived, comm: Comm, timers: Timers) -> Simulati
     model = model_of.resume(case, arrived, comm)
     scene = conditions.build(case, model, conditions.loads(parcel))
     sim = _assemble(case, model, arrived.neighbours, scene, np.ones(model.nodes.n), comm, timers)
-    sim.reduction.words[:] = known["reduction"]
+    sim.reduction.resume(known["reduction"])
     sim.clock.resume(known["clock"])
     sim.ledger.resume(known["ledger"])
     sim.probes.resume(known["probes"])

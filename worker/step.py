@@ -23,8 +23,8 @@ and at once f(n+1) from it, so a step begins with forces that are already at han
 
 What erosion uncovers takes part in the search of the same step. 12 and 13 are one pass over each chunk of tets (two
 with an averaged pressure, with the exchange of the nodal volumes between them); 14 is started after the border tets
-and finished after the interior ones. Which facets pass the criterion is found before the reduction, which says whether
-any rank has some; which cracks open is found in 8, and they open after the reduction.
+and finished after the interior ones, before the criterion. Which facets pass the criterion is found before the reduction, which says whether
+any rank has some and whom they concern; which cracks open is found in 8, and they open after the reduction.
 """
 
 import math
@@ -98,7 +98,8 @@ def second_half(sim: Simulation) -> None:
     _elements(sim, clock.dt, sim.fracture)  # 12 to 14
     if sim.fracture is not None:
         with sim.timers.phase("fracture"):
-            sim.fracture.advance(sim.reduction.breaking)  # 15: facets break, nodes separate, f(n+1) goes with them
+            # 15: facets break, nodes separate, f(n+1) goes with them
+            sim.fracture.advance(sim.reduction.breaking, sim.reduction.touched)
 
 
 def _elements(sim: Simulation, dt: float, fracture: Fracture | None) -> None:
@@ -111,12 +112,15 @@ def _elements(sim: Simulation, dt: float, fracture: Fracture | None) -> None:
         elements.advance(dt, sim.scale)
     own.breaking = OVERSTRESSED if elements.hot else NOTHING
     if fracture is not None:
+        with sim.timers.phase("exchange"):
+            elements.finish()
         with sim.timers.phase("fracture"):
-            own.breaking = fracture.find(reduction.breaking > NOTHING)
+            own.breaking = fracture.find(own.touched)
     with sim.timers.phase("exchange"):
         own.limit, own.force, own.worn = elements.limit, elements.force, elements.worn
         pending = reduction.begin(sim.comm)
-        elements.finish()
+        if fracture is None:
+            elements.finish()
         pending.finish()
     if not (math.isfinite(reduction.limit) and math.isfinite(reduction.force)):
         raise PhysicsError(f"{_when(sim)}: {sim.limiting_tet()} turned inside out, or its stress is not a number")

@@ -112,6 +112,8 @@ def loaded_sim(sim: Simulation) -> Simulation:
     assert sim.fracture is not None
     for body in sim.fracture.initiation.bodies:
         body.facets.strength[:] = 0.0
+    interface = sim.fracture.initiation.interface
+    interface.hear(interface.words(hot=True))
     return sim
 
 

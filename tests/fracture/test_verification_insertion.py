@@ -12,7 +12,7 @@ from conoid.worker import simulation, step
 from conoid.worker.mesh.faces import FACES
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import CHUNK, PRESSURE
+from conoid.worker.state import CHUNK, PRESSURE, Ints
 
 from ..worker import formulas
 from ..worker.kernels import run
@@ -78,11 +78,11 @@ def test_a_cohesive_facet_that_breaks_leaves_the_acceleration_as_it_is() -> None
     cohesion, advance = fracture.cohesion, fracture.advance
     jumps, alone = list[float](), list[float]()
 
-    def watched(agreed: int) -> None:
+    def watched(agreed: int, touched: Ints) -> None:
         nodes, broken = sim.model.nodes, fracture.broken
         before = nodes.force / (nodes.scale * nodes.mass[:, None])
         x = nodes.x.copy()
-        advance(agreed)
+        advance(agreed, touched)
         if fracture.broken == broken:
             return
         after = nodes.force / (nodes.scale * nodes.mass[:, None])

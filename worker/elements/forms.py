@@ -29,6 +29,18 @@ class Bridges(Protocol):
         """Adds the forces in quanta of 1 / ``scale`` N; returns the bits of the largest."""
 
 
+class Herald(Protocol):
+    """Has a word for each neighbour that goes with the forces of shared nodes."""
+
+    def words(self, hot: bool) -> Ints:
+        """(neighbours,) to send, once the tets of shared nodes are done; ``hot``: some face of theirs is
+        overstressed.
+        """
+
+    def hear(self, words: Ints) -> None:
+        """Takes those of the neighbours."""
+
+
 class Elements:
     """The elements of one rank in the ``standard`` pressure form; the averaged forms extend it."""
 
@@ -43,6 +55,7 @@ class Elements:
         self._wi = np.zeros(9 * CHUNK, np.int64)
         self._bits = self._w.view(np.int64)
         self._comm, self._neighbours = comm, neighbours
+        self._herald: Herald | None = None
         self._connect()
         self.cohesion: Bridges | None = None
         """What pulls besides the tets."""
@@ -119,9 +132,17 @@ class Elements:
         """Takes it back."""
         self.peaks[[sweep.LARGEST_LIMIT, sweep.LIMITING_TET]] = parcel.known["peaks"]
 
+    def employ(self, herald: Herald) -> None:
+        """From now on a word for each neighbour goes with the forces; neighbours take part."""
+        self.free()
+        self._herald = herald
+        self._connect()
+
     def finish(self) -> None:
         """Returns when the forces of shared nodes are complete."""
         self.shared_forces.finish(self.model.nodes.force)
+        if self._herald is not None:
+            self._herald.hear(self.shared_forces.heard)
 
     def free(self) -> None:
         """Gives the messages of the exchanges back to MPI."""
@@ -132,10 +153,12 @@ class Elements:
         return [self.shared_forces]
 
     def _connect(self) -> None:
-        self.shared_forces = SharedSum(self._comm, self._neighbours, 3, Tag.FORCE)
+        headed = self._herald is not None
+        self.shared_forces = SharedSum(self._comm, self._neighbours, 3, Tag.FORCE, headed=headed)
 
     def _send(self) -> None:
-        self.shared_forces.begin(self.model.nodes.force)
+        words = None if self._herald is None else self._herald.words(self.hot)
+        self.shared_forces.begin(self.model.nodes.force, words)
 
     def _both_regions(self, work: Callable[[Block, int, int], None], send: Callable[[], None]) -> None:
         self._over_blocks(lambda block: work(block, 0, block.border_chunks))

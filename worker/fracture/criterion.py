@@ -150,13 +150,26 @@ def within(out, n, mesh, table, x, law):  # type: ignore[no-untyped-def]
     return m
 
 
+@njit(types.void(INTERFACE, _I1, MESH, types.uint8[::1]), cache=True)
+def mark_shared(shared, chosen, mesh, hot):  # type: ignore[no-untyped-def]
+    """Marks the neighbours with which this rank shares an intact facet of the ``chosen`` ones, those of one body, that
+    is overstressed on this side; ``hot`` (tets,) as in ``search``.
+    """
+    for m in chosen:
+        e, face = shared.sides[m, 0], shared.sides[m, 1]
+        if hot[e] >> face & 1 and mesh.bond[e, face] == INTACT:
+            shared.hot[shared.of[m]] = 1
+
+
 @njit(types.void(INTERFACE, _I1, MESH, POINTS), cache=True)
 def own_tractions(shared, chosen, mesh, x):  # type: ignore[no-untyped-def]
-    """Tractions of this rank's tets on the intact ones of the ``chosen`` shared facets, those of one body."""
+    """Tractions of this rank's tets on the intact ones of the ``chosen`` shared facets, those of one body, where some
+    are overstressed.
+    """
     normal, stress = np.empty(3), np.empty(6)
     for m in chosen:
         e, face = shared.sides[m, 0], shared.sides[m, 1]
-        if mesh.bond[e, face] == INTACT:
+        if mesh.bond[e, face] == INTACT and shared.hot[shared.of[m]]:
             outward(normal, x, mesh.tets[e], face)
             if not shared.first[m]:
                 normal *= -1.0
@@ -171,6 +184,8 @@ def across(out, n, shared, chosen, mesh, table, x, law):  # type: ignore[no-unty
     """
     normal, mean, bound = np.empty(3), np.empty(3), max(1.0, law.weight) * (1.0 + 1e-9)
     for m in chosen:
+        if not shared.hot[shared.of[m]]:
+            continue
         e, face = shared.sides[m, 0], shared.sides[m, 1]
         square, strength = 0.0, table.strength[e, face]
         for i in range(3):

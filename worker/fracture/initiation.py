@@ -48,16 +48,18 @@ class Initiation:
         """The clock of a facet that is not overstressed in this step stops."""
         self._step += 1
 
-    def breaking(self) -> list[Breaking]:
+    def breaking(self, hot: bool) -> list[Breaking]:
         """The facets that break by the present stress, body by body; neighbours take part, and with nodal tractions all
-        ranks.
+        ranks. ``hot``: some face of this rank is overstressed.
         """
+        if not (hot or self.interface.hot or self.smooth):
+            return []
         every = [gathered(body, some, self.interface.facets) for body, some in self.candidates()]
         return [some for some in every if some is not None]
 
     def candidates(self) -> list[tuple[Body, Candidates]]:
         """The bodies of which facets may break, with these; the same ranks take part. Once a step: clocks go on."""
-        self.interface.exchange(self.bodies, self._model.nodes.x)
+        self.interface.exchange(self._model.nodes.x)
         found = [(body, self._candidates(k, body)) for k, body in enumerate(self.bodies)]
         if self.smooth:
             found = self._smoothed(found)

@@ -1,4 +1,8 @@
-"""Facets whose two tets are on different ranks: both ranks find the same mean of the tractions of either side."""
+"""Facets whose two tets are on different ranks: both ranks find the same mean of the tractions of either side.
+
+A facet breaks only where one of its tets would break it alone, so two ranks exchange tractions only in steps in which
+such a facet is among those they share. Whether there is one they tell each other with the forces of shared nodes.
+"""
 
 import numpy as np
 
@@ -21,33 +25,60 @@ class Interface:
         met = {rank: _met(mine, words.reshape(-1, 2)) for rank, words in told.items()}
         table = np.concatenate([np.zeros((0, 6), np.int64), *met.values()])
         m = len(table)
+        places = {other.rank: k for k, other in enumerate(neighbours)}
+        of = np.repeat(np.array([places[rank] for rank in met], np.int64), [len(rows) for rows in met.values()])
         self.facets = InterfaceFacets(
             np.column_stack([table[:, 3], table[:, 0] % 4]).astype(np.int32), table[:, 0] < table[:, 1],
             np.ascontiguousarray(table[:, 5]).view(np.float64), np.zeros((m, 3)), np.zeros((m, 3)),
+            of, np.zeros(len(neighbours), np.int64),
         )  # fmt: skip
+        self._bodies = bodies
         self.of_body: list[Ints] = [np.flatnonzero(table[:, 4] == b) for b in range(len(bodies))]
         """For each body the rows of its facets."""
         ends = np.cumsum([0, *map(len, met.values())])
-        cuts = [(rank, slice(a, b)) for rank, a, b in zip(met, ends[:-1], ends[1:], strict=True) if b > a]
-        self._exchange: Exchange = comm.exchange(
-            [(rank, self.facets.own[cut].view(np.int64)) for rank, cut in cuts],
-            [(rank, self.facets.theirs[cut].view(np.int64)) for rank, cut in cuts],
-            Tag.TRACTION,
-        )
+        own, theirs = self.facets.own.view(np.int64), self.facets.theirs.view(np.int64)
+        self._exchanges: dict[int, Exchange] = {
+            places[rank]: comm.exchange([(rank, own[a:b])], [(rank, theirs[a:b])], Tag.TRACTION)
+            for rank, a, b in zip(met, ends[:-1], ends[1:], strict=True) if b > a
+        }  # fmt: skip
+        """By the place of the neighbour."""
+        self.hot = False
+        """Whether some shared facet is overstressed on either side."""
 
-    def exchange(self, bodies: list[Body], x: Floats) -> None:
-        """Completes the tractions of both sides at the positions ``x`` (nodes, 3); neighbours take part."""
-        if not len(self.facets.mass):
+    def words(self, hot: bool) -> Ints:
+        """(neighbours,) 1 for those with which this rank shares a facet that is overstressed on its side; ``hot``: a
+        tet of a shared node has an overstressed face.
+        """
+        self.facets.hot[:] = 0
+        for body, rows in zip(self._bodies, self.of_body, strict=True):
+            if hot and len(rows):
+                criterion.mark_shared(self.facets, rows, body.mesh, body.block.hot)
+        return self.facets.hot
+
+    def hear(self, words: Ints) -> None:
+        """Takes what the neighbours have told."""
+        np.maximum(self.facets.hot, words, out=self.facets.hot)
+        self.hot = bool(self.facets.hot.any())
+
+    def exchange(self, x: Floats) -> None:
+        """Completes the tractions of both sides at the positions ``x`` (nodes, 3), where some facet is overstressed;
+        neighbours take part.
+        """
+        if not self.hot:
             return
-        for body, rows in zip(bodies, self.of_body, strict=True):
+        for body, rows in zip(self._bodies, self.of_body, strict=True):
             if len(rows):
                 criterion.own_tractions(self.facets, rows, body.mesh, x)
-        self._exchange.begin()
-        self._exchange.finish()
+        asked = [exchange for k, exchange in self._exchanges.items() if self.facets.hot[k]]
+        for exchange in asked:
+            exchange.begin()
+        for exchange in asked:
+            exchange.finish()
 
     def free(self) -> None:
         """Gives the messages back to MPI."""
-        self._exchange.free()
+        for exchange in self._exchanges.values():
+            exchange.free()
 
 
 def _rows(index: int, body: Body) -> Ints:

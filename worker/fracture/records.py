@@ -53,6 +53,10 @@ class InterfaceFacets(NamedTuple):
     """(m, 3) traction of this rank's tet on the outward normal of the tet of smaller id, Pa."""
     theirs: Floats
     """(m, 3) that of the other rank's tet."""
+    of: Ints
+    """(m,) index of the other rank among the neighbours."""
+    hot: Ints
+    """(neighbours,) 1 where some facet shared with that rank is overstressed on either side, else 0."""
 
 
 class Law(NamedTuple):
@@ -133,7 +137,7 @@ POINTS = _F2
 """Of positions; the others are those of the records."""
 MESH = record(Mesh, types.uint32[:, ::1], _I1, _N2, _N2, types.uint8[:, ::1], types.uint8[::1], _F1, types.int64)
 TABLE = record(FacetTable, _F2, _F2, _I2)
-INTERFACE = record(InterfaceFacets, _N2, _B1, _F1, _F2, _F2)
+INTERFACE = record(InterfaceFacets, _N2, _B1, _F1, _F2, _F2, _I1, _I1)
 LAW = record(Law, types.float64, types.float64, types.float64)
 CANDIDATES = record(Candidates, _I1, _I1, _I1, _F2, _F1)
 BREAKING = record(BreakingFacets, _I2, _N2, _N3, _B1, _F2, _F1)

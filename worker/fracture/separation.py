@@ -6,6 +6,7 @@ the others and cuts it by itself. The new ids follow from a list of all pieces o
 node and the smallest tet of the piece (the paper's eqs 17 and 18 count per rank: ids would depend on the ranks).
 
 Ranks that share touched nodes exchange what they have of them; a rank without such nodes only takes part in that list.
+Which ranks have some is known before, from the reduction of the step.
 """
 
 import numpy as np
@@ -22,8 +23,7 @@ from .stars import Stars
 
 _I1, _I2, _N1 = types.int64[::1], types.int64[:, ::1], types.int32[::1]
 
-_NO_NODES, _NO_ROWS = np.zeros(0, np.int64), np.zeros((0, stars.COLUMNS), np.int64)
-_NO_PIECES = stars.pieces(_NO_ROWS)
+_NO_NODES = np.zeros(0, np.int64)
 
 
 class Separation:
@@ -37,18 +37,42 @@ class Separation:
         self._meshes = meshes
         self.broken = 0
         """Facets of all ranks that have broken."""
+        self._mine = _NO_NODES
+        """Local nodes, ascending, of the facets that break in this step."""
 
-    def break_facets(self, broken: list[Indices], count: int) -> Split | None:
-        """Breaks facets and separates nodes; None where no node of any rank does.
+    def survey(self, broken: list[Indices], count: int, touched: Ints) -> None:
+        """Breaks the bonds of facets, and notes in ``touched`` (ranks,) who has a node of them: 1, and for this rank
+        the ``count`` of those whose first side is here besides.
 
-        ``broken``: tables (m, 2, 3) of block, place and face of either side, -1 for one of another rank; ``count``:
-        facets of which this rank has the first side. All ranks take part. Connectivity, masses, shared nodes and bonds
-        are changed; forces are left to the caller.
+        ``broken``: tables (m, 2, 3) of block, place and face of either side, -1 for one of another rank.
         """
-        model, touched = self._model, self._touched(broken)
+        found = [_broken(mesh, b, sides) for sides in broken for b, mesh in self._meshes.items()]
+        mine = found[0] if len(found) == 1 else distinct(np.concatenate([_NO_NODES, *found]))
+        self._mine = mine
+        if len(mine):
+            touched[self._comm.rank] = 1 + count
+        for other in self._neighbours:
+            if meet(mine, other.nodes):
+                touched[other.rank] = 1
+
+    def separate(self, touched: Ints) -> Split | None:
+        """Separates the nodes of what breaks; None where no node of any rank does.
+
+        ``touched``: the maximum of those of all ranks. All ranks take part. Connectivity, masses and shared nodes are
+        changed; forces are left to the caller.
+        """
+        self.broken += int(touched.sum() - np.count_nonzero(touched))
+        if touched[self._comm.rank]:
+            return self._separated(self._touched(touched))
+        some = len(self._comm.join(_NO_NODES)) // 2
+        self._model.nodes_global += some
+        return Split.elsewhere(self._model.nodes.n) if some else None
+
+    def _separated(self, touched: Ints) -> Split | None:
+        model = self._model
         rows, places = self._stars(touched)
-        of, mine, node, owner, mass = stars.pieces(rows) if len(touched) else _NO_PIECES
-        every, new = self._number(mine, count), model.nodes.n
+        of, mine, node, owner, mass = stars.pieces(rows)
+        every, new = self._number(mine), model.nodes.n
         if not len(every):
             return None
         first, model.nodes_global = model.nodes_global, model.nodes_global + len(every)
@@ -63,23 +87,19 @@ class Separation:
             star.retie(self._meshes[b].tets, touched, rows, places, of, new, b)
         return Split(copies, new, *_leaving(rows, places, of, new))
 
-    def _touched(self, broken: list[Indices]) -> Ints:
-        """Local nodes of the facets that break on any rank, ascending; marks the bonds."""
-        ids = self._model.nodes.id
-        found = [_broken(mesh, b, sides) for sides in broken for b, mesh in self._meshes.items()]
-        mine: Ints = _NO_NODES if not found else found[0] if len(found) == 1 else distinct(np.concatenate(found))
-        if not self._neighbours:
+    def _touched(self, touched: Ints) -> Ints:
+        """Local nodes of the facets that break on any rank, ascending."""
+        ids, mine, self._mine = self._model.nodes.id, self._mine, _NO_NODES
+        company = [other for other in self._neighbours if touched[other.rank]]
+        if not company:
             return mine
-        shared = {o.rank: common(mine, o.nodes) if len(mine) else mine for o in self._neighbours}
-        told = self._comm.trade({rank: ids[mine[at]] if len(at) else at for rank, at in shared.items()})
+        told = self._comm.trade({o.rank: ids[mine[common(mine, o.nodes)]] for o in company})
         some = [np.searchsorted(ids, theirs) for theirs in told.values() if len(theirs)]
         every: Ints = distinct(np.concatenate([mine, *some])) if some else mine
         return every
 
     def _stars(self, touched: Ints) -> tuple[Ints, Ints]:
         """Rows of the whole stars of the touched nodes, by node and tet, and their places."""
-        if not len(touched):
-            return _NO_ROWS, _NO_ROWS
         ids, rank = self._model.nodes.id, self._comm.rank
         found = [
             stars.describe(touched, star.first, star.count, star.pool, ids, self._meshes[b], b, rank)
@@ -100,22 +120,14 @@ class Separation:
         }  # fmt: skip
         return [words.reshape(-1, stars.COLUMNS) for words in self._comm.trade(sends).values() if len(words)]
 
-    def _number(self, mine: Ints, count: int) -> Ints:
-        """(k, 2) node and label of every piece of all ranks that gets a copy, in the order of the new ids; counts the
-        facets of all ranks.
-        """
+    def _number(self, mine: Ints) -> Ints:
+        """(k, 2) node and label of every piece of all ranks that gets a copy, in the order of the new ids."""
         if self._comm.size == 1:
-            self.broken += count
             return mine
         words = mine
         if len(mine):
             words = mine[self._model.nodes.owned[np.searchsorted(self._model.nodes.id, mine[:, 0])]]
-        if count:
-            words = np.concatenate([[[-1, count]], words])
         every = self._comm.join(words).reshape(-1, 2)
-        counts = every[:, 0] < 0
-        self.broken += int(every[counts, 1].sum())
-        every = every[~counts]
         return every[np.lexsort((every[:, 1], every[:, 0]))] if len(mine) else every
 
     def _share(self, copies: Copies, first: int) -> None:
@@ -167,6 +179,16 @@ def common(some, others):  # type: ignore[no-untyped-def]
             out[n] = i
             n += 1
     return out[:n].copy()
+
+
+@njit(types.boolean(_I1, types.int32[::1]), cache=True)
+def meet(some, others):  # type: ignore[no-untyped-def]
+    """Whether one of ``some`` is among the ascending ``others``."""
+    for value in some:
+        at = np.searchsorted(others, value)
+        if at < len(others) and others[at] == value:
+            return True
+    return False
 
 
 @njit(types.int64[:, ::1](_I2, _I1, _I1), cache=True)

@@ -5,10 +5,12 @@ apart become copies; the forces that the tets of a copy have given to its parent
 table by node takes up the copies. In ``cohesive`` parts a facet keeps its traction when it breaks and gives it up with
 the opening.
 
-Whether anything breaks rides in the reduction of the step: ``find`` comes before it, ``advance`` after it. Where no
-face of any rank was overstressed in the step before, tractions of shared facets are exchanged only when the reduction
-says that some are now.
+What breaks, and which ranks it concerns, rides in the reduction of the step: ``find`` comes before it, ``advance``
+after it. A rank near which nothing is overstressed finds that out from the words of its neighbours; one that has no
+node of what breaks takes part in the list of new nodes only.
 """
+
+import numpy as np
 
 from conoid.cases.library import material as find_material
 from conoid.cases.schema import Case
@@ -19,7 +21,7 @@ from ..elements.forms import Elements
 from ..migration.parcel import Parcel
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
-from ..state import Model
+from ..state import Ints, Model
 from ..topology import KeptByNode, Split
 from . import facets, resolution
 from .breaking import Breaking
@@ -45,7 +47,7 @@ class Fracture:
     ) -> None:  # fmt: skip
         """``by_node``: besides the elements, what has arrays by node. All ranks take part."""
         self._model, self._elements, self._by_node, self._contact = model, elements, by_node, contact
-        self._clock = clock
+        self._clock, self._comm = clock, comm
         self.warnings: list[str] = []
         """What the user should know of the mesh."""
         bodies, work = self._armed(case, comm)
@@ -55,6 +57,8 @@ class Fracture:
         self.initiation = Initiation(model, bodies, specs, self.separation.stars, neighbours, comm, clock)
         self._handover = Handover(model, meshes, neighbours, comm)
         self._insertion = Insertion(case.numerics.dt_safety)
+        if neighbours:
+            elements.employ(self.initiation.interface)
         self._found: list[Breaking] | None = None
         """What breaks in this step; None before that is known."""
         self.cohesion: Cohesion | None = None
@@ -74,28 +78,41 @@ class Fracture:
         if self.cohesion is not None and self.broken:
             self._release.apply(self._clock)
 
-    def find(self, expected: bool) -> int:
-        """What this rank has to say in the reduction of the step; ``expected``: some face of all ranks was overstressed
-        in the step before. Neighbours take part if so.
+    def find(self, touched: Ints) -> int:
+        """What this rank has to say in the reduction of the step: with nodal tractions whether something may break,
+        else whether something does, and in ``touched`` (ranks,) whom that concerns. Neighbours take part.
         """
         self.initiation.begin_step()
-        hot = bool(self._elements.hot)
-        self._found = None
-        if self.initiation.smooth or not expected:
+        hot, self._found, touched[:] = self._elements.hot, None, 0
+        if self.initiation.smooth:
             return BREAKS if hot else NOTHING
-        self._found = self.initiation.breaking()
-        return BREAKS if self._found else OVERSTRESSED if hot else NOTHING
+        self._found = self.initiation.breaking(hot)
+        if not self._found:
+            return OVERSTRESSED if hot else NOTHING
+        if not self.initiation.one_by_one:
+            self._survey(self._found, touched)
+        return BREAKS
 
-    def advance(self, agreed: int) -> None:
-        """Breaks what the stress of the present has overcome; ``agreed``: the maximum of what the ranks had to say. All
-        ranks take part.
+    def advance(self, agreed: int, touched: Ints) -> None:
+        """Breaks what the stress of the present has overcome; ``agreed``, ``touched``: the maximum of what the ranks
+        had to say. All ranks take part.
         """
         if agreed >= OVERSTRESSED:
             self._insertion.longest = max(self._insertion.longest, self._clock.stable)
         if agreed < BREAKS:
             return
-        found = self.initiation.breaking() if self._found is None else self._found
-        self._break(self.initiation.strongest(found) if self.initiation.one_by_one else found)
+        found = self.initiation.breaking(self._elements.hot) if self._found is None else self._found
+        if self.initiation.one_by_one:
+            found = self.initiation.strongest(found)
+        if self.initiation.one_by_one or self.initiation.smooth:
+            own = np.zeros_like(touched)
+            self._survey(found, own)
+            self._comm.begin_maximum(own, touched).finish()
+        self._break(found, touched)
+
+    def _survey(self, found: list[Breaking], touched: Ints) -> None:
+        count = sum(int(b.facets.first.sum()) for b in found)
+        self.separation.survey([b.facets.sides for b in found], count, touched)
 
     def keep(self, parcel: Parcel) -> None:
         """Adds what fracture must remember to a parcel."""
@@ -132,9 +149,8 @@ class Fracture:
             bodies += [facets.arm(i, block, part.fracture, tough, model.nodes.x0) for i, block in here]
         return bodies, work
 
-    def _break(self, broken: list[Breaking]) -> None:
-        count = sum(int(b.facets.first.sum()) for b in broken)
-        split = self.separation.break_facets([b.facets.sides for b in broken], count)
+    def _break(self, broken: list[Breaking], touched: Ints) -> None:
+        split = self.separation.separate(touched)
         cohesive = [b.take(b.facets.first) for b in broken if b.body.spec.model == "cohesive"]
         fresh = [self._insertion.facets(b, self._model.nodes, split) for b in cohesive]
         if split is not None and split.copies.n:

@@ -30,14 +30,14 @@ def same(some: list[Neighbour], others: list[Neighbour]) -> bool:
 @njit("void(int64[:, ::1], int32[::1], int64[:, ::1])", cache=True)
 def _pack(buffer, nodes, sums):  # type: ignore[no-untyped-def]
     for i in range(len(nodes)):
-        for k in range(sums.shape[1]):
+        for k in range(sums.shape[1] if nodes[i] >= 0 else 0):
             buffer[i, k] = sums[nodes[i], k]
 
 
 @njit("void(int64[:, ::1], int32[::1], int64[:, ::1])", cache=True)
 def _add(sums, nodes, buffer):  # type: ignore[no-untyped-def]
     for i in range(len(nodes)):
-        for k in range(sums.shape[1]):
+        for k in range(sums.shape[1] if nodes[i] >= 0 else 0):
             sums[nodes[i], k] += buffer[i, k]
 
 
@@ -52,12 +52,18 @@ def complete(comm: Comm, neighbours: list[Neighbour], sums: Ints, tag: Tag) -> N
 class SharedSum:
     """Completes nodal sums, (nodes, ``columns``) int64, again and again."""
 
-    def __init__(self, comm: Comm, neighbours: list[Neighbour], columns: int, tag: Tag) -> None:
+    def __init__(
+        self, comm: Comm, neighbours: list[Neighbour], columns: int, tag: Tag, *, headed: bool = False
+    ) -> None:  # fmt: skip
+        """``headed``: a word for each neighbour goes along."""
         self._nodes = [n.nodes for n in neighbours]
-        self._every = np.concatenate([np.zeros(0, np.int32), *self._nodes])
+        head = np.full(int(headed), -1, np.int32)
+        self._every = np.concatenate([head[:0], *(part for nodes in self._nodes for part in (nodes, head))])
         self._out, self._in = (np.zeros((len(self._every), columns), np.int64) for _ in range(2))
-        ends, ranks = np.cumsum([len(nodes) for nodes in self._nodes])[:-1], [n.rank for n in neighbours]
-        sends, receives = (np.split(buffer, ends) if ranks else [] for buffer in (self._out, self._in))
+        ranks = [n.rank for n in neighbours]
+        ends = np.cumsum([len(nodes) + len(head) for nodes in self._nodes], dtype=np.int64)
+        sends, receives = (np.split(buffer, ends[:-1]) if ranks else [] for buffer in (self._out, self._in))
+        self._heads = ends - 1
         self._exchange = comm.exchange(
             list(zip(ranks, sends, strict=True)), list(zip(ranks, receives, strict=True)), tag
         )
@@ -66,8 +72,17 @@ class SharedSum:
         """Whether these neighbours share what they did when it was made."""
         return all(one.nodes is nodes for one, nodes in zip(neighbours, self._nodes, strict=True))
 
-    def begin(self, sums: Ints) -> None:
-        """Sends the local sums of the shared nodes; the tets of shared nodes must all have been summed."""
+    @property
+    def heard(self) -> Ints:
+        """(neighbours,) the word that came along from each."""
+        return np.asarray(self._in[self._heads, 0])
+
+    def begin(self, sums: Ints, words: Ints | None = None) -> None:
+        """Sends the local sums of the shared nodes; the tets of shared nodes must all have been summed. ``words``
+        (neighbours,) go along.
+        """
+        if words is not None:
+            self._out[self._heads, 0] = words
         _pack(self._out, self._every, sums)
         self._exchange.begin()
 
