@@ -15,9 +15,12 @@ from .clock import Clock
 from .contact.stage import Contact
 from .erosion import Erosion
 from .fracture.stage import Fracture
+from .jit import njit
 from .parallel.comm import Comm
-from .parallel.fixed_point import exact_sums
-from .state import WORK, WORK_PLASTIC, WORK_VISCOUS, Floats, Model
+from .parallel.fixed_point import Table, add_limbs, exact_sums, exact_totals
+from .state import CHUNK, WORK, WORK_PLASTIC, WORK_VISCOUS, Block, Floats, Ints, Model
+
+_WORKS = (WORK, WORK_VISCOUS, WORK_PLASTIC)
 
 
 class Ledger:
@@ -57,11 +60,9 @@ class Ledger:
         """The ledger at time n; ``before`` is v(n-1/2), the model holds v(n+1/2)."""
         nodes = self._model.nodes
         uneven = 0.5 * (self._clock.last_dt - self._clock.mean_dt) / nodes.scale
-        kinetic = 0.5 * nodes.mass * (before * nodes.v).sum(axis=1) + uneven * (before * nodes.force).sum(axis=1)
-        momentum = 0.5 * nodes.mass[:, None] * (before + nodes.v)
         loss, external = self._boundary_work()
-        columns = np.column_stack([kinetic, loss, external, momentum])[nodes.owned]
-        sums = exact_sums(self._comm, np.ascontiguousarray(columns), self._element_work())
+        columns = _of_nodes(before, nodes.v, nodes.force, nodes.mass, loss, external, nodes.owned, uneven)
+        sums = exact_totals(self._comm, Table(columns), ElementWork(self._model.blocks))
         node_sums, (work, viscous, plastic) = sums[:6], sums[6:]
         gone_work, gone_viscous, gone_plastic, gone_kinetic, gone_momentum = self._gone()
         self.momentum = node_sums[3:6] + gone_momentum
@@ -107,9 +108,66 @@ class Ledger:
             external += contact.books.external_work
         return loss, external
 
-    def _element_work(self) -> Floats:
-        columns = [np.zeros((0, 3))]
-        for block in self._model.blocks:
-            plastic = block.row(WORK_PLASTIC) if block.has(WORK_PLASTIC) else np.zeros(block.n)
-            columns.append(np.column_stack([block.row(WORK), block.row(WORK_VISCOUS), plastic]))
-        return np.concatenate(columns)
+
+class ElementWork:
+    """Three columns over all tets: work of the stress, of the bulk viscosity, and plastic work, J; read where they
+    are.
+    """
+
+    def __init__(self, blocks: list[Block]) -> None:
+        self._blocks = blocks
+
+    def largest(self) -> Floats:
+        largest = np.zeros(3)
+        for block in self._blocks:
+            _largest_work(largest, block.state, block.n)
+        return largest
+
+    def limbs(self, scale: Floats) -> Ints:
+        words = np.zeros(6, np.int64)
+        for block in self._blocks:
+            _add_work(words, block.state, block.n, scale)
+        return words
+
+
+@njit("void(float64[::1], float64[:, :, ::1], int64)", cache=True)
+def _largest_work(largest, state, n):  # type: ignore[no-untyped-def]
+    for j in range(3):
+        row = _WORKS[j]
+        if row >= state.shape[1]:
+            continue
+        for c in range(state.shape[0]):
+            for i in range(min(CHUNK, n - c * CHUNK)):
+                largest[j] = max(largest[j], abs(state[c, row, i]))
+
+
+@njit("void(int64[::1], float64[:, :, ::1], int64, float64[::1])", cache=True)
+def _add_work(words, state, n, scale):  # type: ignore[no-untyped-def]
+    for j in range(3):
+        row = _WORKS[j]
+        if row >= state.shape[1]:
+            continue
+        for c in range(state.shape[0]):
+            for i in range(min(CHUNK, n - c * CHUNK)):
+                add_limbs(words, j, state[c, row, i], scale[j])
+
+
+@njit(
+    "float64[:, ::1](float64[:, ::1], float64[:, ::1], int64[:, ::1], float64[::1], float64[::1], float64[::1], "
+    "boolean[::1], float64)",
+    cache=True,
+)
+def _of_nodes(before, v, force, mass, loss, external, owned, uneven):  # type: ignore[no-untyped-def]
+    """(owned nodes, 6) kinetic energy, J, energy lost by impacts and work from outside, J, and momentum, kg m/s."""
+    out, m = np.empty((len(owned), 6)), 0
+    for a in range(len(owned)):
+        if not owned[a]:
+            continue
+        squares, work = 0.0, 0.0
+        for i in range(3):
+            squares += before[a, i] * v[a, i]
+            work += before[a, i] * force[a, i]
+            out[m, 3 + i] = 0.5 * mass[a] * (before[a, i] + v[a, i])
+        out[m, 0], out[m, 1], out[m, 2] = 0.5 * mass[a] * squares + uneven * work, loss[a], external[a]
+        m += 1
+    return out[:m]

@@ -6,6 +6,7 @@ repeated in a coarser quantum. A contribution has 52 bits; node 0 of a tet may g
 """
 
 import math
+from typing import Protocol
 
 import numpy as np
 
@@ -51,17 +52,22 @@ def _largest(columns):  # type: ignore[no-untyped-def]
     return largest
 
 
+@njit("void(int64[::1], int64, float64, float64)", cache=True)
+def add_limbs(words, j, value, scale):  # type: ignore[no-untyped-def]
+    """Adds a ``value`` of column ``j`` to the sums of the high and of the low limbs, ``words`` (2k,)."""
+    scaled = value * scale
+    high = np.rint(scaled)
+    words[j] += np.int64(high)
+    words[len(words) // 2 + j] += np.int64(np.rint((scaled - high) * _LIMB))
+
+
 @njit("int64[::1](float64[:, ::1], float64[::1])", cache=True)
 def _limbs(columns, scale):  # type: ignore[no-untyped-def]
     """(2k,) sums of the high and of the low limbs of each column."""
-    k = columns.shape[1]
-    words = np.zeros(2 * k, np.int64)
+    words = np.zeros(2 * columns.shape[1], np.int64)
     for i in range(columns.shape[0]):
-        for j in range(k):
-            scaled = columns[i, j] * scale[j]
-            high = np.rint(scaled)
-            words[j] += np.int64(high)
-            words[k + j] += np.int64(np.rint((scaled - high) * _LIMB))
+        for j in range(columns.shape[1]):
+            add_limbs(words, j, columns[i, j], scale[j])
     return words
 
 
@@ -93,18 +99,47 @@ class Tally:
         return np.asarray(np.array(whole) / self.scale)
 
 
+class Columns(Protocol):
+    """Columns of values that are somewhere, not necessarily side by side."""
+
+    def largest(self) -> Floats:
+        """(k,) largest magnitude of each column."""
+
+    def limbs(self, scale: Floats) -> Ints:
+        """(2k,) sums of the high limbs of each column, in quanta of one over ``scale`` (k,), and of the low ones."""
+
+
+class Table:
+    """The columns of an array."""
+
+    def __init__(self, values: Floats) -> None:
+        self._values = values
+
+    def largest(self) -> Floats:
+        return np.asarray(_largest(self._values))
+
+    def limbs(self, scale: Floats) -> Ints:
+        return np.asarray(_limbs(self._values, scale))
+
+
 def exact_sums(comm: Comm, *tables: Floats) -> Floats:
-    """(k,) sums of the columns of ``tables`` (n, .) over all ranks: the same bits for any order and partition.
+    """(k,) sums of the columns of ``tables`` (n, .) over all ranks, see ``exact_totals``."""
+    return exact_totals(comm, *map(Table, tables))
+
+
+def exact_totals(comm: Comm, *tables: Columns) -> Floats:
+    """(k,) sums of the columns of ``tables`` over all ranks: the same bits for any order and partition.
 
     Each value is split into two integer limbs of a common quantum, 2^-60 of the column's largest magnitude; the
     result is off by at most n times that quantum.
     """
     if not tables:
         return np.zeros(0)
-    largest = comm.maximum(np.concatenate([_largest(table) for table in tables]))
+    mine = [table.largest() for table in tables]
+    largest = comm.maximum(np.concatenate(mine))
     exponent = np.frexp(largest)[1]
-    scales = np.split(np.ldexp(1.0, 30 - exponent), np.cumsum([table.shape[1] for table in tables])[:-1])
-    limbs = [_limbs(table, scale).reshape(2, -1) for table, scale in zip(tables, scales, strict=True)]
+    scales = np.split(np.ldexp(1.0, 30 - exponent), np.cumsum([len(each) for each in mine])[:-1])
+    limbs = [table.limbs(scale).reshape(2, -1) for table, scale in zip(tables, scales, strict=True)]
     high, low = comm.sum(np.concatenate(limbs, axis=1))
     whole = zip(high, low, exponent, strict=True)
     return np.array([math.ldexp(int(a) * 2**30 + int(b), int(e) - 60) for a, b, e in whole])
