@@ -2,7 +2,8 @@
 
 A field is one int64 word. No other file knows where a field is and how it is encoded: as an integer, as a flag (0 or
 1), or as the bits of a non-negative float64. Such bits have the order of the floats, and a NaN is larger than any
-number, so that the maximum over int64 words is right for every field.
+number, so that the maximum over int64 words is right for every field. Behind the fields there
+are words for every rank: of what it alone gives there, the others give less, so that the maximum tells it to all.
 """
 
 from typing import Generic, Self, TypeVar, overload
@@ -13,6 +14,8 @@ from .parallel import fixed_point
 from .parallel.comm import Comm, Pending
 from .state import Ints
 
+_COSTS = 4
+"""Words of a rank about what contact takes."""
 Value = TypeVar("Value", int, bool, float)
 
 
@@ -100,18 +103,23 @@ class Fields:
     """A checkpoint is asked for."""
 
     def __init__(self, ranks: int = 1) -> None:
-        self.words: Ints = np.zeros(self.size + ranks, np.int64)
-        """(fields + ranks,) what the ranks exchange."""
-        self.touched: Ints = self.words[self.size :]
-        """(ranks,) whom the facets that break concern (fracture/separation.py): a word for each rank."""
+        """A word or some for each of the ``ranks`` stand behind the fields."""
+        self.words: Ints = np.zeros(self.size + (1 + _COSTS) * ranks, np.int64)
+        """What the ranks exchange."""
+        self.touched: Ints = self.words[self.size :][:ranks]
+        """(ranks,) whom the facets that break concern (fracture/separation.py)."""
+        self.costs: Ints = self.words[self.size + ranks :].reshape(ranks, _COSTS)
+        """(ranks, 4) what contact has taken from the bodies on each rank (contact/account.py)."""
 
 
 class StepReduction(Fields):
     """What all ranks have agreed on in the last reduction; ``own`` is what this rank gives to the next one."""
 
-    def __init__(self, ranks: int = 1) -> None:
+    def __init__(self, ranks: int = 1, rank: int = 0) -> None:
+        """On this ``rank`` of so many."""
         super().__init__(ranks)
         self.own = Fields(ranks)
+        self.own.costs[np.arange(ranks) != rank] = np.iinfo(np.int64).min
 
     def keep(self) -> Ints:
         """(fields,) what a run that goes on must know, on any number of ranks."""

@@ -47,7 +47,7 @@ def test_the_cost_of_an_impulse_is_the_work_between_two_half_steps() -> None:
     loaded.tangent[:, :4], loaded.slots[:] = (1.0, -1.0, 0.0, 0.0), [[0, 1, 2, 3], [1, 0, 2, 3]]
     active.moving[:, :3] = v
     booking.cost(account.words, loaded, active, before, np.arange(4, dtype=np.int32), account.scale)
-    account.settle(SerialComm())
+    account.settle(account.words)
     _, taken, early, _ = account.known()
     kinetic = 0.5 * np.array([1.0, 3.0, 0.0, 0.0]) @ (before[:, 0] ** 2 - v[:, 0] ** 2)
     assert taken == pytest.approx(kinetic, rel=1e-12)
@@ -61,13 +61,13 @@ def booked(account: Account, taken: float, early: float = 0.0) -> None:
 
 def test_what_has_not_been_taken_is_not_given_back() -> None:
     """Only while there is twice the most that a step has given back so far."""
-    account, comm = Account(1.0), SerialComm()
-    assert account.settle(comm)
+    account = Account(1.0)
+    assert account.settle(account.words)
     for taken, early, may in (
         (0.25, 0.0, True), (-0.0625, 0.0, True), (-0.09375, 0.0, False), (0.125, 0.0, True), (0.0, 0.125, False),
     ):  # fmt: skip
         booked(account, taken, early)
-        assert account.settle(comm) == may
+        assert account.settle(account.words) == may
 
 
 @pytest.mark.parametrize("ranks", [2, 3])
@@ -75,10 +75,10 @@ def test_all_ranks_decide_alike_and_a_run_that_goes_on_as_before(ranks: int) -> 
     def decide(comm: Comm) -> tuple[bool, bool, float]:
         account = Account(1.0)
         booked(account, 1.0 if comm.rank == 0 else -0.03125)
-        first = account.settle(comm)
+        first = account.settle(comm.sum(account.words))
         other = Account(7.0)
         other.resume(account.words, account.known())
         booked(other, -0.03125)
-        return first, other.settle(comm), other.known()[1]
+        return first, other.settle(comm.sum(other.words)), other.known()[1]
 
     assert on_ranks(ranks, decide) == [(True, True, 1.0 - 0.03125 * (2 * ranks - 1))] * ranks

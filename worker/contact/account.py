@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from ..parallel.comm import Comm
 from ..parallel.fixed_point import Tally
 from ..state import Ints
 
@@ -28,12 +27,13 @@ class Account:
         """Quanta of the high limb per joule."""
         return float(self._tally.scale[0])
 
-    def settle(self, comm: Comm) -> bool:
-        """Whether contact may take penetrations back in the step ahead; all ranks take part.
+    def settle(self, words: Ints) -> bool:
+        """Whether contact may take penetrations back in the step ahead; ``words`` (2, 2): the sum of those of all
+        ranks.
 
         It may while it has taken from the bodies what two steps can give back, each as much as any step so far.
         """
-        taken, early = (float(v) for v in self._tally.total(comm))
+        taken, early = (float(v) for v in self._tally.valued(words))
         self._most = max(self._most, self._taken - taken, early - self._early)
         self._taken, self._early = taken, early
         return taken >= _AHEAD * self._most

@@ -48,6 +48,8 @@ class Contact:
         self.exterior = Exterior(model, neighbours, bounds, case.contact.edges, comm)
         self.searches = Searches(case, model, neighbours, self.exterior, comm, clock)
         self.books = Books(model.nodes.n, len(case.parts), extremes)
+        self._costs = self.books.account.words
+        """What contact has taken on all ranks, when they last agreed (account.py)."""
         self._active = ActiveSet(self.books.scale)
         self.found = Detected.nothing()
         """What the last step has found here."""
@@ -77,6 +79,7 @@ class Contact:
         ) = parcel.known["contact"]  # fmt: skip
         self._active = ActiveSet(books.scale)
         books.resume(parcel, account)
+        self._costs = self._comm.sum(books.account.words)
         self.exterior.resume(parcel, size, self._fractures)
         self.searches.resume(parcel)
 
@@ -135,8 +138,14 @@ class Contact:
         """
         self.exterior.crack(tets, nodes, sides)
 
-    def agree(self, search: bool, approach: float, opening: bool) -> None:
-        """Takes what all ranks have found in the step; all ranks take part."""
+    @property
+    def costs(self) -> Ints:
+        """(4,) words of this rank of what contact has taken from the bodies so far."""
+        return self.books.account.words.reshape(-1)
+
+    def agree(self, search: bool, approach: float, opening: bool, costs: Ints) -> None:
+        """Takes what all ranks have found in the step; ``costs``: the sum of theirs. All ranks take part."""
+        self._costs = costs.reshape(2, 2)
         self.searches.due |= search
         self.limit = approach
         if opening:
@@ -202,7 +211,7 @@ class Contact:
         now.copies.begin(state)
         held.take(crowd.x, crowd.v, now.held, state.x, state.v, now.local)
         now.copies.finish(crowd.x, crowd.v, now.before)
-        self._meet(now, PUSH_OUT if books.account.settle(self._comm) else 0.0, dt)
+        self._meet(now, PUSH_OUT if books.account.settle(self._costs) else 0.0, dt)
         shared = now.company.agree(now.room.nodes[: now.met], crowd.local)
         active.begin(now.room, now.met, crowd, shared)
         active.weigh()

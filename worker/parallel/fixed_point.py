@@ -94,7 +94,11 @@ class Tally:
 
     def total(self, comm: Comm) -> Floats:
         """(k,) sums over all ranks; all ranks take part."""
-        high, low = comm.sum(self.words)
+        return self.valued(comm.sum(self.words))
+
+    def valued(self, words: Ints) -> Floats:
+        """(k,) what ``words`` (2, k) of all ranks together are."""
+        high, low = words
         whole = [math.ldexp(int(a) * 2**30 + int(b), -30) for a, b in zip(high, low, strict=True)]
         return np.asarray(np.array(whole) / self.scale)
 
