@@ -4,6 +4,6 @@ import sys
 
 if __name__ == "__main__":
     from .main import main
-    from .parallel.comm import leave
+    from .parallel.mpi import leave
 
     leave(main(sys.argv[1:]))

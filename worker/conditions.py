@@ -4,17 +4,8 @@ import numpy as np
 
 from conoid.cases import schema
 
-from .boundaries import (
-    MIRRORED,
-    PRESCRIBED,
-    Boundary,
-    Gravity,
-    PrescribedRotation,
-    PrescribedVelocity,
-    RigidWalls,
-    SymmetryPlane,
-    Traction,
-)
+from .boundaries import MIRRORED, PRESCRIBED, Boundary, RigidWalls, SymmetryPlane
+from .drivers import Gravity, PrescribedRotation, PrescribedVelocity, Traction
 from .errors import InputError
 from .migration.parcel import Parcel
 from .parallel.comm import Comm

@@ -20,7 +20,8 @@ from . import compile as ahead
 from . import kernels
 from .errors import CompileError, ConoidError
 from .output.journal import Journal
-from .parallel.comm import Comm, connect
+from .parallel.comm import Comm
+from .parallel.mpi import connect
 from .signals import Signals
 
 if TYPE_CHECKING:

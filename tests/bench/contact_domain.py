@@ -18,14 +18,15 @@ kernels.use_cache()
 from conoid.cases import load  # noqa: E402
 from conoid.worker import simulation, step  # noqa: E402
 from conoid.worker.contact import layout  # noqa: E402
-from conoid.worker.parallel import comm  # noqa: E402
+from conoid.worker.parallel.comm import Comm  # noqa: E402
+from conoid.worker.parallel.mpi import connect, leave  # noqa: E402
 
 from .long_rod import COARSE  # noqa: E402
 
 
 def main(steps: int, names: Sequence[str]) -> None:
     """Prints the numbers of every rank, for every domain in turn a list of runs, on rank 0."""
-    world = comm.connect()
+    world = connect()
     found: dict[str, list[Any]] = {name: [] for name in names}
     for name in (*names, *reversed(names)):
         found[name].append(world.gather(_measured(name, steps, world)))
@@ -33,7 +34,7 @@ def main(steps: int, names: Sequence[str]) -> None:
         print(json.dumps(found))
 
 
-def _measured(name: str, steps: int, world: comm.Comm) -> dict[str, Any]:
+def _measured(name: str, steps: int, world: Comm) -> dict[str, Any]:
     """Of one rank: at each search t in us, faces looked at and sent; CPU s, bytes and messages of contact."""
     data = load.apply_overrides(
         load.read_data(load.shipped_path("long_rod")), [*COARSE, "run.frames=0", f'contact.domain="{name}"']
@@ -75,4 +76,4 @@ def _noted(function: Any, looked: list[int]) -> Any:
 
 if __name__ == "__main__":
     main(int(sys.argv[1]), sys.argv[2:])
-    comm.leave(0)
+    leave(0)

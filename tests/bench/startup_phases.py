@@ -57,7 +57,7 @@ def main(launched: float, case: str) -> None:
     stamps = Stamps(launched)
     from conoid.cases import load
     from conoid.worker import main as worker
-    from conoid.worker.parallel.comm import connect
+    from conoid.worker.parallel.mpi import connect
 
     scene = load.read_case(load.shipped_path(case))
     stamps.stamp("interpreter and contract")

@@ -9,7 +9,7 @@ if __name__ == "__main__":
     kernels.use_cache()
     from conoid.worker import step
     from conoid.worker.main import main
-    from conoid.worker.parallel.comm import connect
+    from conoid.worker.parallel.mpi import connect
     from conoid.worker.simulation import Simulation
 
     whole, calls = step.second_half, itertools.count(1)

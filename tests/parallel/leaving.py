@@ -2,7 +2,7 @@
 
 import sys
 
-from conoid.worker.parallel.comm import connect, leave
+from conoid.worker.parallel.mpi import connect, leave
 
 if __name__ == "__main__":
     connect().share(0)

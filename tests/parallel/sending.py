@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from conoid.worker.parallel.comm import Comm, connect
+from conoid.worker.parallel.comm import Comm
+from conoid.worker.parallel.mpi import connect
 from conoid.worker.parallel.tags import Tag
 
 

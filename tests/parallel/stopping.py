@@ -8,7 +8,7 @@ if __name__ == "__main__":
     kernels.use_cache()
     from conoid.worker.loop import Loop
     from conoid.worker.main import main
-    from conoid.worker.parallel.comm import leave
+    from conoid.worker.parallel.mpi import leave
 
     last, propose = int(sys.argv[1]), Loop._propose
 

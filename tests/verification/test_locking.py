@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from conoid.cases import materials
-from conoid.worker.boundaries import PrescribedVelocity
+from conoid.worker.drivers import PrescribedVelocity
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.simulation import Simulation
 from conoid.worker.state import Indices, Nodes

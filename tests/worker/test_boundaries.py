@@ -8,7 +8,7 @@ import pytest
 
 from conoid.cases import materials
 from conoid.worker import domain, step
-from conoid.worker.boundaries import Traction
+from conoid.worker.drivers import Traction
 from conoid.worker.errors import InputError
 from conoid.worker.mesh.faces import boundary_faces
 from conoid.worker.simulation import Simulation

@@ -7,19 +7,9 @@ import numpy as np
 import pytest
 
 import conoid.worker
-from conoid.worker.boundaries import (
-    FREE,
-    MIRRORED,
-    PRESCRIBED,
-    Boundary,
-    Driver,
-    Gravity,
-    PrescribedRotation,
-    PrescribedVelocity,
-    RigidWalls,
-    SymmetryPlane,
-)
+from conoid.worker.boundaries import FREE, MIRRORED, PRESCRIBED, Boundary, RigidWalls, SymmetryPlane
 from conoid.worker.contact.exterior import mobilities, symmetry_planes
+from conoid.worker.drivers import Driver, Gravity, PrescribedRotation, PrescribedVelocity
 from conoid.worker.mirrors import Mirrors
 from conoid.worker.state import Bits, Floats, Nodes
 

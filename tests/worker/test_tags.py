@@ -43,7 +43,7 @@ def test_no_tag_is_made_elsewhere(path: Path) -> None:
 def test_mpi_is_given_tags_of_the_registry_only() -> None:
     """The calls of mpi4py have no types, so mypy does not see their tags."""
     calls = set[str]()
-    for node in ast.walk(ast.parse((HOUSE / "parallel" / "comm.py").read_text(encoding="utf-8"))):
+    for node in ast.walk(ast.parse((HOUSE / "parallel" / "mpi.py").read_text(encoding="utf-8"))):
         if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in AT):
             continue
         named = {word.arg: word.value for word in node.keywords}

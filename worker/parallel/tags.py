@@ -8,7 +8,7 @@ class Tag(IntEnum):
     """What a message carries."""
 
     SCATTER = 0
-    """An item from rank 0 for one rank (parallel/comm.py)."""
+    """An item from rank 0 for one rank (parallel/mpi.py)."""
     FORCE = 1
     """Sums of nodal forces, in every step (elements/forms.py)."""
     VOLUME = 2
@@ -40,6 +40,6 @@ class Tag(IntEnum):
     """Changes of the forces of cohesive facets that let go, in every step once facets have broken
     (fracture/release.py)."""
     SWAP = 90
-    """Words of which the receiver learns the number first (parallel/comm.py)."""
+    """Words of which the receiver learns the number first (parallel/mpi.py)."""
     TRADE = 91
-    """Words for some ranks, from those who know of it (parallel/comm.py)."""
+    """Words for some ranks, from those who know of it (parallel/mpi.py)."""

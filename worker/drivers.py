@@ -1,0 +1,137 @@
+"""Boundaries that do work from outside: gravity, tractions, prescribed motion."""
+
+import numpy as np
+
+from .boundaries import FREE, KEPT, PRESCRIBED, Boundary, free
+from .migration.parcel import Parcel
+from .state import Bits, Floats, Indices, Ints, Load, Nodes, extended
+from .topology import Split
+
+
+class Driver(Boundary):
+    """A boundary whose impulses are work from outside."""
+
+    def note(self, state: Nodes) -> None:
+        self._before = state.v[self.nodes]
+        self._book()
+
+    def _book(self) -> None:
+        self.external_work += 0.5 * (self._impulse * self._before).sum(axis=1)
+
+
+class Gravity(Driver):
+    """A constant ``acceleration`` (3,), m/s^2, over the mean step of the kick: free fall is exact at n and at n+1/2."""
+
+    def __init__(self, nodes: Indices, acceleration: Floats) -> None:
+        super().__init__(nodes)
+        self._acceleration = acceleration
+        self._last_dt = 0.0
+
+    def held_components(self) -> Bits:
+        return free(self.nodes)
+
+    def resume(self, parcel: Parcel, name: str, dt: float) -> None:
+        super().resume(parcel, name, dt)
+        self._last_dt = dt
+
+    def apply(self, state: Nodes, dt: float, t: float) -> None:
+        gained = 0.5 * (self._last_dt + dt) * self._acceleration
+        self._last_dt = dt
+        self._impulse = state.mass[self.nodes, None] * gained
+        state.v[self.nodes] += gained
+        self._book()
+
+
+class Traction(Driver):
+    """Constant forces on corners of tets, over the mean step of the kick.
+
+    ``load`` is on all ``corners`` (m,) that are local nodes.
+    """
+
+    def __init__(self, corners: Indices, load: Load) -> None:
+        super().__init__(np.unique(corners))
+        self._corners, self._load = corners, load
+        self.force = self._summed()
+        """(n, 3) N."""
+        self._last_dt = 0.0
+
+    def held_components(self) -> Bits:
+        return free(self.nodes)
+
+    def keep(self, parcel: Parcel, name: str) -> None:
+        super().keep(parcel, name)
+        load, ids = self._load, parcel.nodes["id"]
+        parcel.rows[f"{name}.load"] = {
+            "of": ids[self._corners], "key": load.place, "tets": load.tets, "force": load.force
+        }  # fmt: skip
+
+    def resume(self, parcel: Parcel, name: str, dt: float) -> None:
+        booked = [(parcel.nodes[f"{name}.{key}"] != 0.0).reshape(len(parcel.nodes["id"]), -1) for key in KEPT]
+        used = np.asarray(np.concatenate(booked, axis=1).any(axis=1))
+        used[self._corners] = True
+        self.nodes = np.flatnonzero(used).astype(np.int32)
+        super().resume(parcel, name, dt)
+        self.force = self._summed()
+        self._last_dt = dt
+
+    def grow(self, split: Split, ids: Ints) -> None:
+        super().grow(split, ids)
+        self._corners = split.followed(self._corners[:, None], ids, self._load.tets)[:, 0]
+        self.force = self._summed()
+
+    def _summed(self) -> Floats:
+        force = np.zeros((len(self.nodes), 3))
+        np.add.at(force, np.searchsorted(self.nodes, self._corners), self._load.force)
+        return force
+
+    def apply(self, state: Nodes, dt: float, t: float) -> None:
+        self._impulse = 0.5 * (self._last_dt + dt) * self.force
+        self._last_dt = dt
+        state.v[self.nodes] += self._impulse / state.mass[self.nodes, None]
+        self._book()
+
+
+class PrescribedVelocity(Driver):
+    """Nodes whose velocity has given components; NaN leaves a component free."""
+
+    def __init__(self, nodes: Indices, velocity: Floats) -> None:
+        super().__init__(nodes)
+        self._velocity = np.broadcast_to(velocity, (len(nodes), 3))
+
+    def held_components(self) -> Bits:
+        return np.where(np.isnan(self._velocity), FREE, PRESCRIBED).astype(np.uint8)
+
+    def _inherit(self, at: Ints) -> None:
+        self._velocity = extended(self._velocity, self._velocity[at])
+
+    def _target(self, state: Nodes, dt: float) -> Floats:
+        free = state.v[self.nodes]
+        return np.where(np.isnan(self._velocity), free, self._velocity)
+
+    def start(self, state: Nodes) -> None:
+        state.v[self.nodes] = self._target(state, 0.0)
+
+    def apply(self, state: Nodes, dt: float, t: float) -> None:
+        new = self._target(state, dt)
+        self._impulse = state.mass[self.nodes, None] * (new - state.v[self.nodes])
+        state.v[self.nodes] = new
+        self._book()
+
+
+class PrescribedRotation(PrescribedVelocity):
+    """Nodes that turn rigidly: each step is the chord of the exact rotation."""
+
+    def __init__(self, nodes: Indices, centre: Floats, rate: Floats) -> None:
+        super().__init__(nodes, np.zeros(3))
+        self._centre = centre
+        self._rate = rate
+
+    def _target(self, state: Nodes, dt: float) -> Floats:
+        r = state.x[self.nodes] - self._centre
+        speed = float(np.linalg.norm(self._rate))
+        if dt == 0.0 or speed == 0.0:
+            return np.cross(self._rate, r)
+        axis, angle = self._rate / speed, speed * dt
+        across = np.cross(axis, r)
+        chord: Floats = (np.sin(angle) * across + (1.0 - np.cos(angle)) * np.cross(axis, across)) / dt
+        return chord

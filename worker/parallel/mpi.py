@@ -1,0 +1,207 @@
+"""The one module that knows MPI: the ranks of its world, and how a process leaves it."""
+
+import os
+import pickle
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, NoReturn
+
+import numpy as np
+import numpy.typing as npt
+
+from ..state import Ints
+from .comm import Comm, Exchange, Pending, Sent, SerialComm
+from .tags import Tag
+
+_NAP = 0.01
+"""s between two looks of a rank that leaves its core to others; a hundredth of what the start of a rank takes."""
+
+
+class MpiComm:
+    """All ranks of MPI's world."""
+
+    def __init__(self) -> None:
+        from mpi4py import MPI
+
+        self._mpi = MPI
+        self._world = MPI.COMM_WORLD
+        self.rank: int = self._world.Get_rank()
+        self.size: int = self._world.Get_size()
+        self.waited = 0.0
+        self.sent = Sent()
+        MPI.pickle.__init__(self._pickled, self._unpickled)  # type: ignore[misc]
+
+    @contextmanager
+    def waiting(self, sign: int = 1) -> Iterator[None]:
+        """Counts the CPU time of the block as waiting; -1: takes it out again."""
+        start = time.thread_time()
+        try:
+            yield
+        finally:
+            self.waited += sign * (time.thread_time() - start)
+
+    def _pickled(self, item: Any, protocol: int | None = None) -> bytes:
+        """Within a call that waits, this is work."""
+        with self.waiting(-1):
+            data = pickle.dumps(item, protocol)
+        self.sent.collective_bytes += len(data)
+        return data
+
+    def _unpickled(self, data: Any) -> Any:
+        with self.waiting(-1):
+            return pickle.loads(data)
+
+    def begin_maximum(self, words: Ints, result: Ints) -> Pending:
+        self.sent.collective(words.nbytes)
+        return _MpiPending(self, self._world.Iallreduce(words, result, self._mpi.MAX))
+
+    def sum(self, words: Ints) -> Ints:
+        result = np.empty_like(words)
+        self.sent.collective(words.nbytes)
+        with self.waiting():
+            self._world.Allreduce(words, result, self._mpi.SUM)
+        return result
+
+    def maximum(self, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        result = np.empty_like(values)
+        self.sent.collective(values.nbytes)
+        with self.waiting():
+            self._world.Allreduce(values, result, self._mpi.MAX)
+        return result
+
+    def exchange(self, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: Tag) -> Exchange:
+        requests = [self._world.Recv_init(buffer, source, tag) for source, buffer in receives]
+        requests += [self._world.Send_init(buffer, target, tag) for target, buffer in sends]
+        size = sum(buffer.nbytes for _, buffer in sends)
+        return _MpiExchange(self, self._mpi.Prequest, requests, (len(sends), size))
+
+    def swap(self, sends: dict[int, Ints]) -> dict[int, Ints]:
+        mine = {rank: np.ascontiguousarray(words).reshape(-1) for rank, words in sends.items() if words.size}
+        counts = np.zeros(self.size, np.int64)
+        for rank, words in mine.items():
+            counts[rank] = len(words)
+            if rank != self.rank:
+                self.sent.message(1, words.nbytes)
+        theirs = np.empty_like(counts)
+        self.sent.collective(counts.nbytes)
+        with self.waiting():
+            self._world.Alltoall(counts, theirs)
+        received = {rank: np.empty(count, np.int64) for rank, count in enumerate(theirs.tolist()) if count}
+        if received or mine:
+            requests = [self._world.Irecv(buffer, rank, Tag.SWAP) for rank, buffer in received.items()]
+            requests += [self._world.Isend(words, rank, Tag.SWAP) for rank, words in mine.items()]
+            with self.waiting():
+                self._mpi.Request.Waitall(requests)
+        return received
+
+    def trade(self, sends: dict[int, Ints]) -> dict[int, Ints]:
+        mine = {rank: np.ascontiguousarray(words) for rank, words in sends.items()}
+        requests = [self._world.Isend(words, rank, Tag.TRADE) for rank, words in mine.items()]
+        self.sent.message(len(mine), sum(words.nbytes for words in mine.values()))
+        theirs, status = {}, self._mpi.Status()
+        with self.waiting():
+            for rank in mine:
+                while (message := self._world.Improbe(rank, Tag.TRADE, status=status)) is None:
+                    os.sched_yield()  # Mprobe keeps the core that the other rank may need
+                theirs[rank] = np.empty(status.Get_count(self._mpi.INT64_T), np.int64)
+                message.Recv(theirs[rank])
+            self._mpi.Request.Waitall(requests)
+        return theirs
+
+    def join(self, words: Ints) -> Ints:
+        counts = np.empty(self.size, np.int64)
+        self.sent.collective(8 + words.nbytes, 2)
+        with self.waiting():
+            self._world.Allgather(np.array([words.size]), counts)
+            every = np.empty(counts.sum(), np.int64)
+            if len(every):
+                self._world.Allgatherv(np.ascontiguousarray(words), (every, counts))
+        return every
+
+    def share(self, item: Any) -> list[Any]:
+        self.sent.collective(number=2)
+        with self.waiting():
+            return self._world.allgather(item)
+
+    def gather(self, item: Any) -> list[Any] | None:
+        self.sent.collective(number=2)
+        with self.waiting():
+            return self._world.gather(item)
+
+    def scatter(self, items: list[Any] | None) -> Any:
+        self.sent.collective()
+        with self.waiting():
+            if self.rank == 0:
+                assert items is not None
+                for target in range(1, self.size):
+                    self._world.send(items[target], target, Tag.SCATTER)
+                return items[0]
+            return self._world.recv(source=0, tag=Tag.SCATTER)
+
+    def broadcast(self, item: Any) -> Any:
+        self.sent.collective(number=2)
+        with self.waiting():
+            return self._world.bcast(item)
+
+    def barrier(self) -> None:
+        self.sent.collective()
+        with self.waiting():
+            self._world.Barrier()
+
+    def await_all(self) -> None:
+        self.sent.collective()
+        arrived = self._world.Ibarrier()
+        with self.waiting():
+            while not arrived.Test():
+                time.sleep(_NAP)
+
+
+class _MpiPending:
+    def __init__(self, comm: MpiComm, request: Any) -> None:
+        self._comm = comm
+        self._request = request
+
+    def finish(self) -> None:
+        with self._comm.waiting():
+            self._request.Wait()
+
+
+class _MpiExchange:
+    def __init__(self, comm: MpiComm, kind: Any, requests: list[Any], sends: tuple[int, int]) -> None:
+        """``sends``: number of messages, and their bytes."""
+        self._comm = comm
+        self._kind = kind
+        self._requests = requests
+        self._sends = sends
+
+    def begin(self) -> None:
+        self._comm.sent.message(*self._sends)
+        self._kind.Startall(self._requests)
+
+    def finish(self) -> None:
+        with self._comm.waiting():
+            self._kind.Waitall(self._requests)
+
+    def free(self) -> None:
+        for request in self._requests:
+            request.Free()
+
+
+def leave(code: int) -> NoReturn:
+    """Ends this rank with an exit code after all of them have come to their end; no rank is aborted.
+
+    The process must end in good order (no ``os._exit``): MPICH takes its leave of the launcher only then, and where a
+    rank has not taken leave the launcher kills the others.
+    """
+    from mpi4py import MPI
+
+    MPI.Finalize()
+    sys.exit(code)
+
+
+def connect() -> Comm:
+    """MPI's world when it has more than one rank, else the serial twin."""
+    world = MpiComm()
+    return world if world.size > 1 else SerialComm()
