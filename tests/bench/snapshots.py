@@ -13,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -29,8 +29,8 @@ _MARKS = "marks"
 _ROOT = Path(__file__).parents[2]
 
 
-def measure(options: argparse.Namespace, folder: Path) -> Pairs:
-    """The pairs of a run."""
+def measure(options: argparse.Namespace, folder: Path) -> tuple[Pairs, float]:
+    """The pairs of a run, and the share of the CPU time that the solver spends in the calls for snapshots."""
     with ExitStack() as stack:
         _, endpoint = stack.enter_context(router.started())
         for frozen in [False] * bool(options.readers) + [True] * options.frozen:
@@ -50,11 +50,14 @@ def measure(options: argparse.Namespace, folder: Path) -> Pairs:
         command = [mpiexec, "-n", str(options.ranks), *mine, *words, "--set", "reference=[]"]
         subprocess.run(command, cwd=_ROOT, check=False)
     marks = [json.loads((folder / f"{_MARKS}.{rank}").read_text()) for rank in range(options.ranks)]
-    return Pairs("snapshots", _blocks(marks, options.pairs, options.steps))
+    blocks = _blocks(marks, options.pairs, options.steps)
+    told = [k for k, block in enumerate(blocks) if block.told]
+    within = sum(rank[k + 1][3] - rank[k][3] for rank in marks for k in told)
+    return Pairs("snapshots", blocks), within / (options.steps * sum(blocks[k].cpu for k in told))
 
 
 def _blocks(marks: list[list[list[float]]], pairs: int, steps: int) -> list[Block]:
-    """From the marks of each rank at the borders of the blocks: worked, beside, wall."""
+    """From the marks of each rank at the borders of the blocks: worked, beside, wall, within the calls."""
     blocks = []
     for k, told in zip(range(min(map(len, marks)) - 1), switch.turns(pairs), strict=False):
         spent = [[(b - a) / steps for a, b in zip(rank[k], rank[k + 1], strict=True)] for rank in marks]
@@ -103,21 +106,35 @@ def _work(steps: int, arguments: list[str]) -> int:
         begin(comm, journal)
         from conoid.worker.snapshots.stage import Snapshots
 
-        look, due, marks, turns = Snapshots.look, Snapshots.due, [], switch.turns(1000)
+        marks: list[list[float]] = []
+        turns, within = switch.turns(1000), [0.0]
+
+        def timed(work: Callable[..., Any]) -> Callable[..., Any]:
+            def call(*words: Any, **named: Any) -> Any:
+                start = time.thread_time()
+                try:
+                    return work(*words, **named)
+                finally:
+                    within[0] += time.thread_time() - start
+
+            return call
+
+        look, due = timed(Snapshots.look), timed(Snapshots.due)
 
         def marked(self: Any, sim: Any, *, due: bool, ending: bool) -> None:
             if sim.clock.step and sim.clock.step % steps == 0:
                 mine = worked(sim.comm)
-                marks.append([mine, time.process_time() - time.thread_time(), time.perf_counter()])
+                marks.append([mine, time.process_time() - time.thread_time(), time.perf_counter(), within[0]])
                 place = Path(arguments[arguments.index("--out") + 1])
                 (place / f"{_MARKS}.{sim.comm.rank}").write_text(json.dumps(marks))
             look(self, sim, due=due, ending=ending)
 
         def switched(self: Any, clock: Any, now: float, *, look: bool) -> bool:
             k = clock.step // steps - 1
-            return k >= 0 and turns[min(k, len(turns) - 1)] and due(self, clock, now, look=look)
+            return bool(k >= 0 and turns[min(k, len(turns) - 1)] and due(self, clock, now, look=look))
 
         Snapshots.look, Snapshots.due = marked, switched  # type: ignore[method-assign]
+        Snapshots.tell = timed(Snapshots.tell)  # type: ignore[method-assign]
 
     main.ready_kernels = ready
     return main.main(arguments)
@@ -136,7 +153,7 @@ def main() -> None:
     parser.add_argument("--frozen", action="store_true")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="conoid-bench-") as out:
-        pairs, folder = measure(options, Path(out)), Path(out)
+        (pairs, share), folder = measure(options, Path(out)), Path(out)
         made = len(list((folder / layout.SNAPSHOTS).glob("*.snap")))
         ended = from_json((folder / layout.OUTCOME).read_bytes())
     for what in ("cpu", "wall"):
@@ -145,6 +162,7 @@ def main() -> None:
         print(
             f"{what}: {with_:.3f} ms a step with, {without:.3f} without, ratio {middle:.4f} ({low:.4f} to {high:.4f})"
         )
+    print(f"in the calls for snapshots: {100 * share:.3f} % of the CPU time of the blocks with them")
     print(
         f"{made} snapshots in {ended.elapsed:.0f} s on {os.cpu_count()} cores, {ended.steps} steps, {ended.digest[:16]}"
     )
