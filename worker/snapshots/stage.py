@@ -30,7 +30,7 @@ class Snapshots:
 
     def __init__(self, sim: Simulation, folder: Path, journal: Journal | None) -> None:
         """All ranks take part; numbers go on from those in the journal."""
-        self._folder, self._journal, self._case = folder, journal, sim.case
+        self._folder, self._journal, self._case, self._comm = folder, journal, sim.case, sim.comm
         self._n: int = sim.comm.broadcast(journal.snapshots if journal is not None else 0)
         self._courier = Courier(folder, sim.comm.rank)
         self._next = self._place(sim.clock) + 1
@@ -81,9 +81,10 @@ class Snapshots:
             self._journal.write(messages.Snapshot, **told)
 
     def close(self) -> None:
-        """Waits for the last, and tells of it; on every rank."""
+        """Waits for the last, and tells of it; all ranks take part, and leave their cores to it."""
         self._courier.close()
         self.tell()
+        self._comm.await_all()
 
     def _place(self, clock: Clock) -> int:
         """How many evenly spaced times have come."""
