@@ -101,6 +101,8 @@ class Fields:
     """A rank has more surface nodes than the balance allows it."""
     checkpoint = Flag()
     """A checkpoint is asked for."""
+    snapshot = Flag()
+    """A snapshot of the fragments is due."""
 
     def __init__(self, ranks: int = 1) -> None:
         """A word or some for each of the ``ranks`` stand behind the fields."""
@@ -136,4 +138,4 @@ class StepReduction(Fields):
     def begin_again(self) -> None:
         """Clears what was asked for once: a run that goes on from a checkpoint does not stop or report again."""
         self.stop = 0
-        self.report = self.groups = self.grown = self.checkpoint = False
+        self.report = self.groups = self.grown = self.checkpoint = self.snapshot = False
