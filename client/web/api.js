@@ -29,6 +29,18 @@ async function send(path, { method = "GET", headers = {}, signal, cache = "no-st
 // Snapshots never change, and the server says so: the browser keeps them.
 export const binary = async (path, options) => (await send(path, { ...options, cache: "default" })).arrayBuffer();
 
+const TAIL = 65536; // Bytes of a log that are shown.
+
+// The end of the log of a rank, or of "launcher".
+export async function tail(run, rank) {
+  try {
+    return await (await send(`v1/runs/${encodeURIComponent(run)}/logs/${rank}`, { headers: { Range: `bytes=-${TAIL}` } })).text();
+  } catch (error) {
+    if (error instanceof Problem && error.status === 416) return ""; // An empty file.
+    throw error;
+  }
+}
+
 export const call = async (path, options) => (await send(path, options)).json();
 
 // The messages of a run after the number `after`, as they come, until the server ends the stream.

@@ -5,7 +5,7 @@ export const GROUPS = ["compute", "contact", "exchange", "waiting", "output", "d
 export const TERMS = [["kinetic", "kinetic"], ["elastic", "elastic"], ["plastic", "plastic"], ["viscous", "viscous"], ["contact", "contact-work"], ["friction", "friction"], ["eroded", "eroded"], ["fracture", "fracture"], ["cohesive", "cohesive"]];
 
 const MOST_POINTS = 2000;
-const MOST_LINES = 500; // Of the log, a rank.
+const MOST_LINES = 500;
 const OWN = new Set(["contact", "exchange", "output"]); // Phases with a group of their own; the others are computing.
 
 export class Live {
@@ -17,7 +17,7 @@ export class Live {
     this.sizes = []; // { t, nodes, facets, fragments }
     this.balances = []; // the messages
     this.snapshots = []; // { n, t, fragments, … }
-    this.logs = new Map(); // rank: [messages]
+    this.log = []; // messages for people
   }
 
   take(message) {
@@ -65,11 +65,8 @@ export class Live {
   }
 
   on_log(message) {
-    const rank = message.rank ?? 0;
-    if (!this.logs.has(rank)) this.logs.set(rank, []);
-    const lines = this.logs.get(rank);
-    lines.push(message);
-    if (lines.length > MOST_LINES) lines.shift();
+    this.log.push(message);
+    if (this.log.length > MOST_LINES) this.log.shift();
   }
 
   on_finished(message) { this.finished = message; }
@@ -113,7 +110,7 @@ export function grouped({ phases = {}, waiting = [] }, interval) {
   return Object.fromEntries(GROUPS.filter((name) => sums[name]).map((name) => [name, sums[name]]));
 }
 
-function totals(groups) {
+export function totals(groups) {
   const lists = Object.values(groups);
   return (lists[0] ?? []).map((_, rank) => lists.reduce((sum, seconds) => sum + seconds[rank], 0));
 }

@@ -1,5 +1,6 @@
 // The parts of a run's page that are no charts: bars of the ranks, balance events, the log by rank, reference numbers.
 
+import { tail } from "./api.js";
 import { clock, h, legend, si, words } from "./figures.js";
 import { GROUPS } from "./live.js";
 
@@ -69,45 +70,58 @@ function bars(title, values) {
       h("div.stack", {}, h("i", { style: { width: `${(100 * value) / most}%`, background: "var(--compute)" } })), h("span.busy", {}, si(value))])));
 }
 
-// Lines of one rank, or of all, by tabs that arrow keys move between.
+// Messages for people as they come, and the log file of each rank, by tabs that arrow keys move between.
 export class Logs {
   constructor(live) {
-    Object.assign(this, { live, rank: null, logged: "" });
+    Object.assign(this, { live, tab: "messages", ranks: 0, logged: "" });
     this.tabs = h("div.tabs", { role: "tablist", "aria-label": "log of", onkeydown: (event) => this.key(event) });
     this.lines = h("pre.log", { id: "log-lines", tabindex: 0, role: "tabpanel", "aria-label": "log" });
     this.element = h("section.card.half", {}, h("div.card-head", {}, h("h2", {}, "Log"), this.tabs), this.lines);
   }
 
-  choose(rank) {
-    this.rank = rank;
-    this.draw();
+  get names() { return ["messages", ...Array.from({ length: this.ranks }, (_, rank) => String(rank)), "launcher"]; }
+
+  async choose(tab) {
+    this.tab = tab;
+    this.head();
     this.tabs.querySelector("[aria-selected=true]")?.focus();
+    this.logged = "";
+    if (tab === "messages") return this.draw();
+    const told = await tail(this.live.run, tab).catch((error) => error.message);
+    if (this.tab !== tab) return;
+    this.lines.replaceChildren(told || h("span.hint", {}, "nothing yet"));
+    this.lines.scrollTop = this.lines.scrollHeight;
   }
 
   key(event) {
-    const ranks = [null, ...this.live.logs.keys()];
     const move = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
-    if (move) this.choose(ranks.at((ranks.indexOf(this.rank) + move) % ranks.length));
+    if (move) this.choose(this.names.at((this.names.indexOf(this.tab) + move) % this.names.length));
   }
 
-  draw() {
-    const { logs } = this.live;
-    const lines = this.rank === null ? [...logs.values()].flat().sort((a, b) => a.seq - b.seq) : logs.get(this.rank) ?? [];
-    const state = `${this.rank} ${logs.size} ${lines.at(-1)?.seq}`;
-    if (this.logged === state) return;
+  head() {
+    this.tabs.replaceChildren(...this.names.map((name) => h("button.tab", { type: "button", role: "tab", "aria-controls": "log-lines",
+      "aria-selected": String(name === this.tab), tabindex: name === this.tab ? 0 : -1, onclick: () => this.choose(name) },
+    Number.isNaN(Number(name)) ? name : `rank ${name}`)));
+  }
+
+  draw(ranks) {
+    if (ranks !== undefined && ranks !== this.ranks) {
+      this.ranks = ranks;
+      this.head();
+    }
+    const { log } = this.live;
+    const state = `${this.tab} ${log.length} ${log.at(-1)?.seq}`;
+    if (this.tab !== "messages" || this.logged === state) return;
     this.logged = state;
-    const tab = (rank) => h("button.tab", { type: "button", role: "tab", "aria-controls": "log-lines", "aria-selected": String(rank === this.rank),
-      tabindex: rank === this.rank ? 0 : -1, onclick: () => this.choose(rank) }, rank === null ? "all" : `rank ${rank}`);
-    this.tabs.replaceChildren(tab(null), ...[...logs.keys()].sort((a, b) => a - b).map(tab));
     const atEnd = this.lines.scrollTop + this.lines.clientHeight >= this.lines.scrollHeight - 8;
-    this.lines.replaceChildren(...(lines.length ? lines.map((entry) =>
-      h(`div.${entry.level}`, {}, h("time", {}, clock(entry.wall)), `  [${entry.rank ?? 0}] ${entry.text}`)) : [h("span.hint", {}, "nothing yet")]));
+    this.lines.replaceChildren(...(log.length ? log.map((entry) =>
+      h(`div.${entry.level}`, {}, h("time", {}, clock(entry.wall)), `  [${entry.rank ?? 0}] ${entry.text}`)) : [h("span.hint", {}, "none since the page was opened")]));
     if (atEnd) this.lines.scrollTop = this.lines.scrollHeight;
   }
 }
 
 export function checksTable(checks) {
-  const exact = (value, unit) => `${Number(value?.toPrecision(5))} ${unit ?? ""}`.trim();
+  const exact = (value, unit) => si(value, unit, 4);
   return [h("div.card-head", {}, h("h2", {}, "Against the reference")), h("div.scroll", { tabindex: 0 }, h("table.checks", {},
     h("thead", {}, h("tr", {}, ["quantity", "computed", "expected", "tolerance", "result", "source"].map((name) => h("th", { scope: "col" }, words(name))))),
     h("tbody", {}, checks.map((check) => h("tr", {},

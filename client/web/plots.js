@@ -8,12 +8,15 @@ import { sizes } from "./snapshot.js";
 const TALL = 250;
 const MOST_COLUMNS = 240; // Of the heat map; more are less than a pixel wide on a phone.
 const COUNTED = [["nodes", "compute"], ["facets", "exchange"], ["fragments", "fracture"]];
+const CURVE = 60; // Points of a fitted law.
+const LEAST = 0.8; // Fragments, where the axis of their number begins.
+const FLOOR = 1e-10; // Residuals below it are rounding.
 const RESIDUAL = 1e-2; // Above it a run's energy does not close.
 
 // { name: { title, chart, note } }; `onBalance` gets the place of a balance event in live.balances.
 export function plots(live, onBalance) {
   const made = {
-    sizes: [new Chart(TALL, "number of fragments of a mass and more", () => ofSizes(made.snapshot), { alone: true }), "Fragment sizes"],
+    sizes: [new Chart(TALL, "number of fragments of a size and more", () => ofSizes(made.snapshot), { alone: true }), "Fragment sizes"],
     counts: [new Chart(TALL, "counts over time", () => ofCounts(live)), "Counts"],
     energy: [new Chart(TALL, "energy over time, without the kinetic", () => ofEnergy(live)), "Energy without the kinetic"],
     residual: [new Chart(TALL, "energy residual over time", () => ofResidual(live)), "Energy residual"],
@@ -40,7 +43,7 @@ function ofEnergy(live) {
 
 function ofResidual(live) {
   if (live.ledger.length < 2) return null;
-  const data = live.ledger.map(({ t, energy }) => [t, Math.max(1e-18, energy.residual)]);
+  const data = live.ledger.map(({ t, energy }) => [t, Math.max(FLOOR, energy.residual)]);
   return option(live, axis("", { type: "log", axisLabel: { formatter: (value) => value.toExponential(0) } }),
     [{ ...series({ name: "residual", colour: "accent", data }), tooltip: { valueFormatter: (value) => Number(value).toExponential(1) }, markLine: limit(RESIDUAL) }]);
 }
@@ -80,22 +83,22 @@ function ofStep(live) {
 
 function ofContact(live) {
   if (!live.loads.length) return null;
-  return option(live, axis("", { min: 0, max: 1, axisLabel: { formatter: (value) => `${Math.round(100 * value)} %` } }),
+  return option(live, axis("", { min: 0, max: 1, interval: 0.25, axisLabel: { formatter: (value) => `${Math.round(100 * value)} %` } }),
     [{ ...series({ name: "contact", colour: "contact", data: live.loads.map(({ t, contact }) => [t, contact]) }), tooltip: { valueFormatter: (value) => percent(value) } }]);
 }
 
-// N(m) over m, both logarithmic, with the power law through it.
+// N(size) over the size, both logarithmic, with the law that fits best.
 function ofSizes(snapshot) {
   if (!snapshot) return null;
-  const { points, fit } = sizes(snapshot);
+  const { points, best } = sizes(snapshot);
   if (points.length < 2) return null;
-  const list = [{ ...series({ name: "fragments of this mass and more", colour: "compute", data: points }), type: "scatter", symbolSize: 4 }];
-  if (fit) {
-    const last = points.at(-1)[0];
-    const law = [fit.low, last].map((mass) => [mass, Math.max(1e-3, fit.number * (mass / fit.low) ** -fit.exponent)]);
-    list.push({ ...series({ name: `power law, exponent ${fit.exponent.toFixed(2)}`, colour: "bad", data: law }), lineStyle: { type: "dashed" } });
+  const list = [{ ...series({ name: "fragments as long and longer", colour: "compute", data: points }), type: "scatter", symbolSize: 4 }];
+  if (best) {
+    const [low, high] = [points[0][0], points.at(-1)[0]];
+    const curve = Array.from({ length: CURVE }, (_, i) => low * (high / low) ** (i / (CURVE - 1))).map((size) => [size, points.length * best.longer(size)]);
+    const told = best.law === "power" ? `exponent ${best.parameter.toFixed(2)}` : si(best.parameter, "m");
+    list.push({ ...series({ name: `${best.law} law, ${told}`, colour: "bad", data: curve.filter(([, number]) => number >= LEAST) }), lineStyle: { type: "dashed" } });
   }
-  const grams = { type: "log", axisLabel: { formatter: (kilograms) => si(1000 * kilograms, "g", 1) } };
-  return { xAxis: axis("", { ...grams, splitLine: { show: false } }), yAxis: axis("", { type: "log", min: 0.8 }), series: list,
-    tooltip: { trigger: "item", formatter: ({ value }) => `${value[1]} of ${si(1000 * value[0], "g")} and more` } };
+  return { xAxis: axis("m", { type: "log", splitLine: { show: false } }), yAxis: axis("", { type: "log", min: LEAST }), series: list,
+    tooltip: { trigger: "item", formatter: ({ value }) => `${Math.round(value[1])} of ${si(value[0], "m")} and more` } };
 }

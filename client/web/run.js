@@ -3,7 +3,7 @@
 import { Problem, call, messages } from "./api.js";
 import { Body } from "./body.js";
 import { count, duration, h, meter, percent, pill, si } from "./figures.js";
-import { fill } from "./history.js";
+import { fill, readPlan } from "./history.js";
 import { FINAL, Live } from "./live.js";
 import { Balances, Logs, Ranks, checksTable } from "./panels.js";
 import { card, plots } from "./plots.js";
@@ -60,7 +60,7 @@ export class RunPage {
     let filled = false;
     while (!this.abort.signal.aborted) {
       try {
-        if (!filled) await fill(live, this.abort.signal);
+        if (!filled) await fill(live, this.info, await readPlan(live.run, this.abort.signal), this.abort.signal);
         filled = true;
         this.later();
         if (FINAL.has(live.state)) break;
@@ -145,7 +145,7 @@ export class RunPage {
     this.drawHead();
     this.ranks.draw(live);
     this.balances.draw();
-    this.logs.draw();
+    this.logs.draw(this.info.ranks ?? 0);
     this.body.update(live.snapshots);
     this.drawChecks();
     this.drawNotes();

@@ -6,6 +6,7 @@ const START = 16;
 const TYPES = {
   uint8: Uint8Array, uint16: Uint16Array, uint32: Uint32Array, int64: BigInt64Array, float32: Float32Array, float64: Float64Array,
 };
+const DUST = 10; // Tets, as in conoid.cases.fragments.
 const MOST_ROWS = 65536; // A vertex names its row in 16 bits.
 
 // { header, arrays: { name: typed array, flat } }, without a copy. Throws Error for what is no snapshot.
@@ -60,15 +61,27 @@ export function fragment({ arrays }, row) {
 // The row of a fragment in another snapshot of the run; -1 where it does not exist.
 export const rowOf = ({ arrays }, id) => arrays.fragment_id.indexOf(id);
 
-// N(m), the number of fragments of mass m and more, from the lightest on, and the power law through dust-free ones.
+// N(size): how many fragments are as long as a size and longer, from the shortest on, and the law that fits them best.
+// Dust has no shape of its own: fragments of fewer than DUST tets are left out, as in the tables of the run.
 export function sizes({ arrays }) {
-  const masses = [...arrays.fragment_mass].filter((mass, row) => mass > 0 && arrays.fragment_id[row] >= 0n).sort((a, b) => a - b);
-  return { points: masses.map((mass, i) => [mass, masses.length - i]), fit: powerLaw(masses) };
+  const whole = [...arrays.fragment_size].filter((size, row) => size > 0 && arrays.fragment_id[row] >= 0n && arrays.fragment_tets[row] >= DUST);
+  const sorted = whole.sort((a, b) => a - b);
+  const found = laws(sorted);
+  const best = found.reduce((one, other) => (other.likelihood > (one?.likelihood ?? -Infinity) ? other : one), null);
+  return { points: sorted.map((size, i) => [size, sorted.length - i]), dust: arrays.fragment_id.length - sorted.length, best };
 }
 
-// Exponent of N(m) ~ m^-k by maximum likelihood (Hill 1975) of masses from the lightest on; null for fewer than two.
-export function powerLaw(masses) {
-  const low = masses[0];
-  const sum = masses.reduce((total, mass) => total + Math.log(mass / low), 0);
-  return masses.length > 1 && sum > 0 ? { exponent: masses.length / sum, low, number: masses.length } : null;
+// Rayleigh, exponential and power law by maximum likelihood of sizes from the shortest on (conoid.cases.fragments.fits):
+// each with its parameter, the sum of ln(density), and the share of fragments that are longer than a size.
+export function laws(values) {
+  const [n, low, high] = [values.length, values[0], values.at(-1)];
+  if (n < 2 || !(low > 0) || low === high) return [];
+  const sum = (of) => values.reduce((total, x) => total + of(x), 0);
+  const [mean, mode, above] = [sum((x) => x) / n, Math.sqrt(sum((x) => x * x) / (2 * n)), sum((x) => Math.log(x / low))];
+  const exponent = 1 + n / above;
+  return [
+    { law: "rayleigh", parameter: mode, likelihood: sum(Math.log) - 2 * n * Math.log(mode) - n, longer: (x) => Math.exp(-(x * x) / (2 * mode * mode)) },
+    { law: "exponential", parameter: mean, likelihood: -n * Math.log(mean) - n, longer: (x) => Math.exp(-x / mean) },
+    { law: "power", parameter: exponent, likelihood: n * Math.log((exponent - 1) / low) - exponent * above, longer: (x) => (x / low) ** (1 - exponent) },
+  ];
 }
