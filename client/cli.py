@@ -218,6 +218,17 @@ def checkpoint(run: RunArgument, url: Url = None, token: Token = None, as_json: 
 
 
 @app.command()
+def snapshot(run: RunArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
+    """Ask a run for a snapshot of its fragments; watch tells when it is there."""
+    with connect(url, token) as session:
+        info = find(session, run).take_snapshot()
+    if as_json:
+        show_json(info)
+    else:
+        typer.echo(f"{info.id} asked for a snapshot")
+
+
+@app.command()
 def get(
     run: RunArgument,
     names: Annotated[

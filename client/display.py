@@ -9,7 +9,7 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from conoid.cases.messages import Energy, Log
+from conoid.cases.messages import Energy, Log, Snapshot
 from conoid.cases.run import State
 
 from .figures import clock, count, duration, si
@@ -101,6 +101,8 @@ def _number_rows(live: Live) -> list[list[str]]:
         rows.append(["shared", shared, "fragments", count(counts.fragments), "frames", str(live.frames)])
         if counts.particles:
             rows.append(["particles", f"{count(counts.particles)} nodes", "", "", "", ""])
+    if live.snapshot is not None:
+        rows.append(["seen", seen(live.snapshot), "", "", "", ""])
     return rows
 
 
@@ -169,6 +171,11 @@ def _log_line(entry: Log) -> Text:
     text = Text(overflow="ellipsis", no_wrap=True)
     text.append(f"{clock(entry.wall)} ", style="bright_black")
     return text.append(f"[{entry.rank}] {entry.text}", style=_LEVEL_STYLE.get(entry.level, "default"))
+
+
+def seen(snapshot: Snapshot) -> str:
+    """A snapshot of the fragments in some words."""
+    return f"snapshot {snapshot.n} at t {si(snapshot.t, 's')}: {count(snapshot.fragments)} fragments"
 
 
 def line(live: Live) -> str:

@@ -83,6 +83,10 @@ class Http:
         response = self._request("POST", path, content=body, headers=headers, repeat=key is not None)
         return self._decoded(kind, response)
 
+    def fetch(self, path: str) -> bytes:
+        """The body at ``path``. Raises ServiceError, UnreachableError."""
+        return self._request("GET", path).content
+
     def download(self, path: str, target: Path) -> None:
         """Writes the body at ``path`` to a file that appears whole, with the server's sha256, or not at all."""
         target.parent.mkdir(parents=True, exist_ok=True)

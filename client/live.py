@@ -4,7 +4,7 @@ import time
 from collections import deque
 from dataclasses import dataclass, field
 
-from conoid.cases.messages import AnyMessage, Counts, Finished, Frame, Load, Log, Progress, Started, Status
+from conoid.cases.messages import AnyMessage, Counts, Finished, Frame, Load, Log, Progress, Snapshot, Started, Status
 from conoid.cases.run import Cause, ExitCode, State
 
 PHASE_GROUPS = ("compute", "contact", "exchange", "output", "wait")
@@ -40,6 +40,8 @@ class Live:
     counts: Counts | None = None
     finished: Finished | None = None
     frames: int = 0
+    snapshot: Snapshot | None = None
+    """The newest."""
     log: deque[Log] = field(default_factory=lambda: deque(maxlen=_LOG_TAIL))
 
     def take(self, message: AnyMessage) -> None:
@@ -58,6 +60,8 @@ class Live:
                 self.counts = message
             case Frame():
                 self.frames += 1
+            case Snapshot():
+                self.snapshot = message
             case Log():
                 self.log.append(message)
             case Finished():

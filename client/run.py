@@ -15,6 +15,7 @@ import msgspec
 
 from conoid.cases import keys, outcome
 from conoid.cases.messages import AnyMessage, Progress
+from conoid.cases.messages import Snapshot as Told
 from conoid.cases.outcome import Outcome
 from conoid.cases.run import State
 
@@ -24,6 +25,7 @@ from .journal import from_line
 from .link import Link
 from .live import Live
 from .result import Result
+from .snapshots import Snapshot
 
 _WAIT = 20.0
 """s of a single request that waits for the end of a run: below the 30 s after which a request is given up (http.py)."""
@@ -82,6 +84,12 @@ class EventPage(msgspec.Struct, kw_only=True, frozen=True):
     more: bool
 
 
+class SnapshotPage(msgspec.Struct, kw_only=True, frozen=True):
+    """The snapshots of a run."""
+
+    snapshots: list[Told]
+
+
 @dataclass
 class Run:
     """A run on a server. Nothing is asked before a method is called."""
@@ -119,6 +127,10 @@ class Run:
         """Asks it for a checkpoint; a ``Checkpoint`` message tells of it when it is on disk."""
         return self.session.post(RunInfo, f"{self.path}:checkpoint")
 
+    def take_snapshot(self) -> RunInfo:
+        """Asks it for a snapshot of the fragments; a ``Snapshot`` message tells of it when it is on disk."""
+        return self.session.post(RunInfo, f"{self.path}:snapshot")
+
     # Messages ---------------------------------------------------------------------------------------------------------
 
     def events(self, after: int = 0) -> list[AnyMessage]:
@@ -155,6 +167,37 @@ class Run:
         from .watch import watch  # rich is loaded when it is needed
 
         return watch(self, live)
+
+    def history(self, points: int = 1000) -> dict[str, Any]:
+        """Its course so far in at most so many reports: ``series``, ``ranks``, ``balance``, ``snapshots``, ``last``."""
+        return self.session.get(dict[str, Any], f"{self.path}/history", points=points)
+
+    # Snapshots --------------------------------------------------------------------------------------------------------
+
+    def snapshots(self) -> list[Told]:
+        """What its journal tells of the snapshots of its fragments that there are."""
+        return self.session.get(SnapshotPage, f"{self.path}/snapshots").snapshots
+
+    def snapshot(self, n: int = -1) -> Snapshot:
+        """Snapshot ``n``; the newest for -1. Raises UnfinishedError when there is none."""
+        number = n if n >= 0 else max((told.n for told in self.snapshots()), default=0)
+        try:
+            return Snapshot(self.session.fetch(f"{self.path}/snapshots/{number}"))
+        except ServiceError as error:
+            if error.status == 404:
+                raise UnfinishedError(f"run {self.id} has no snapshot {number}") from None
+            raise
+
+    def fragments(self, after: int = 0, link: Link | None = None) -> Generator[Snapshot]:
+        """Every snapshot whose message comes after message ``after``, as they are made, to the run's end.
+
+        Over Zenoh they come with their messages; one that does not is fetched from the server.
+        """
+        chosen = link or self.link()
+        for message in self.messages(after, chosen):
+            if isinstance(message, Told):
+                data = getattr(chosen, "blobs", {}).get(message.sha256)
+                yield Snapshot(data) if data else self.snapshot(message.n)
 
     # Files ------------------------------------------------------------------------------------------------------------
 

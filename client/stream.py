@@ -4,6 +4,7 @@ The only module of the client that knows Zenoh. A late joiner subscribes first, 
 stream: nothing is missed and nothing told twice.
 """
 
+import hashlib
 import json
 import queue
 import threading
@@ -16,7 +17,7 @@ import msgspec
 import zenoh
 
 from conoid.cases import keys
-from conoid.cases.messages import AnyMessage, Status, from_msgpack
+from conoid.cases.messages import AnyMessage, Snapshot, Status, fragments_from_msgpack, from_msgpack
 from conoid.cases.run import State
 
 from .errors import ClientError, UnreachableError
@@ -28,6 +29,8 @@ T = TypeVar("T")
 
 _CAPACITY = 4096
 """Messages that wait to be read. Chosen: minutes of a run, which sends some ten a second."""
+_BLOBS = 4
+"""Snapshots of fragments that are kept until they are asked for. Chosen: who reads is seconds behind at most."""
 _OPEN_SECONDS = 5.0
 """s that a router may take to answer before SSE is used. Chosen."""
 _CLOSE_SECONDS = 2.0
@@ -73,12 +76,26 @@ class ZenohLink:
     def __init__(self, router: Router, prefix: str) -> None:
         """Opens a session and subscribes. Raises StreamError when that does not succeed within seconds."""
         self._mailbox = Mailbox()
+        self.blobs: dict[str, bytes] = {}
+        """The newest snapshots of the fragments that have come, by their sha256."""
         self._session = _within(_OPEN_SECONDS, lambda: zenoh.open(_config(router)))
         self._subscriber = self._session.declare_subscriber(keys.everything(prefix), self._receive)
 
     def _receive(self, sample: zenoh.Sample) -> None:
         with suppress(msgspec.MsgspecError):
-            self._mailbox.put(from_msgpack(sample.payload.to_bytes()))
+            payload = sample.payload.to_bytes()
+            message = from_msgpack(payload)
+            if isinstance(message, Snapshot):
+                self._keep(message, payload)
+            self._mailbox.put(message)
+
+    def _keep(self, message: Snapshot, payload: bytes) -> None:
+        """Its bytes, where they have come with it and are whole."""
+        with suppress(msgspec.MsgspecError):
+            data = fragments_from_msgpack(payload).blob
+            if hashlib.sha256(data).hexdigest() == message.sha256:
+                kept = list(self.blobs.items())[1 - _BLOBS :]
+                self.blobs = dict([*kept, (message.sha256, data)])
 
     def get(self, timeout: float) -> AnyMessage | None:
         """The next message; None after ``timeout`` s without one."""

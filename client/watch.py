@@ -7,10 +7,10 @@ from typing import Protocol
 from rich.console import Console
 from rich.live import Live as Screen
 
-from conoid.cases.messages import AnyMessage, Log, Progress, Status
+from conoid.cases.messages import AnyMessage, Log, Progress, Snapshot, Status
 
 from . import silence
-from .display import line, panel
+from .display import line, panel, seen
 from .figures import clock, duration
 from .link import Link
 from .live import Live
@@ -69,7 +69,9 @@ def tell(messages: Iterable[AnyMessage], known: Live, write: Callable[[str], Non
     with silence.broken(write, lambda: _waiting(known)) as say:
         for message in messages:
             known.take(message)
-            if isinstance(message, Log):
+            if isinstance(message, Snapshot):
+                say(f"{clock(message.wall)}  {known.run}  {seen(message)}")
+            elif isinstance(message, Log):
                 if message.level in {"warning", "error"}:
                     say(f"{clock(message.wall)}  {known.run}  {message.level}: {message.text}")
             elif isinstance(message, Status) or (

@@ -10,8 +10,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from . import errors, openapi, page
 from .bell import Bell
+from .history import Histories
 from .launch.local import LocalLauncher
-from .routes import cases, events, files, health, logs, me, runs
+from .routes import cases, events, files, health, history, logs, me, runs, snapshots
 from .service import Service
 from .settings import Settings
 from .store import Store
@@ -19,7 +20,17 @@ from .submission import Desk
 from .supervisor import Supervisor
 from .telemetry import Telemetry
 
-ROUTERS = (cases.router, runs.router, events.router, logs.router, files.router, me.router, health.router)
+ROUTERS = (
+    cases.router,
+    runs.router,
+    events.router,
+    history.router,
+    snapshots.router,
+    logs.router,
+    files.router,
+    me.router,
+    health.router,
+)
 _SAFE_HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",
@@ -52,7 +63,7 @@ def opened(settings: Settings) -> Iterator[Service]:
         stack.callback(supervisor.close)
         if settings.end_runs:
             stack.callback(supervisor.end_all)
-        yield Service(settings, store, bell, telemetry, supervisor, Desk(settings, store, supervisor))
+        yield Service(settings, store, bell, telemetry, supervisor, Desk(settings, store, supervisor), Histories())
 
 
 def build_app(service: Service) -> FastAPI:

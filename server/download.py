@@ -99,7 +99,7 @@ def respond(request: Request, folder: Path, relative: str) -> Response:
             "X-Content-Type-Options": "nosniff",
             "Content-Type": _TYPES.get(Path(relative).suffix, "application/octet-stream"),
         }
-        if etag in _tags(request.headers.get("if-none-match", "")):
+        if etag in tags(request.headers.get("if-none-match", "")):
             file.close()
             return Response(status_code=304, headers=headers)
         begin, end, status = _part(request, size, etag)
@@ -115,7 +115,8 @@ def respond(request: Request, folder: Path, relative: str) -> Response:
         raise
 
 
-def _tags(text: str) -> set[str]:
+def tags(text: str) -> set[str]:
+    """The ETags of a header."""
     return {tag.strip() for tag in text.split(",")}
 
 

@@ -55,9 +55,14 @@ class Tail:
             if lines:
                 return lines
 
-    def _chunk(self) -> bytes:
+    def block(self, size: int) -> bytes:
+        """The next complete lines as they stand, about ``size`` bytes of them; empty when there are none now."""
+        chunk = self._chunk(size)
+        self._offset += len(chunk)
+        return chunk
+
+    def _chunk(self, size: int = _CHUNK) -> bytes:
         """The next complete lines. A line longer than the chunk size is read whole."""
-        size = _CHUNK
         try:
             with open(self._path, "rb", buffering=0) as file:
                 while True:
@@ -94,6 +99,12 @@ def _line(raw: bytes) -> Line | None:
     except msgspec.MsgspecError:
         return None
     return Line(head.seq, head.type, raw)
+
+
+def seq_of(raw: bytes) -> int:
+    """The number of a line; 0 for what is none."""
+    line = _line(raw)
+    return line.seq if line is not None else 0
 
 
 def lines(path: Path, after: int = 0) -> Iterator[Line]:

@@ -6,6 +6,7 @@ from typing import Annotated
 from fastapi import Depends, Request
 
 from .bell import Bell
+from .history import Histories
 from .settings import Settings
 from .store import Store
 from .submission import Desk
@@ -23,6 +24,7 @@ class Service:
     telemetry: Telemetry | None
     supervisor: Supervisor
     desk: Desk
+    histories: Histories
 
 
 def _service(request: Request) -> Service:

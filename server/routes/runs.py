@@ -1,4 +1,4 @@
-"""Runs: submit, list, look at, cancel, ask for a checkpoint."""
+"""Runs: submit, list, look at, cancel, ask for a checkpoint or a snapshot."""
 
 import time
 from typing import Annotated, Any
@@ -118,11 +118,22 @@ def cancel(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
 @router.post("/v1/runs/{run_id}:checkpoint", status_code=202)
 def checkpoint(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
     """Asks the worker for a checkpoint; the journal tells of it when it is on disk. Asking again changes nothing."""
-    run = find(service, identity, run_id)
+    return _ask(service, find(service, identity, run_id), layout.CHECKPOINT_REQUEST, "keeps one")
+
+
+@router.post("/v1/runs/{run_id}:snapshot", status_code=202)
+def snapshot(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
+    """Asks the worker for a snapshot of the fragments; the journal tells of it when it is on disk, with the cause
+    "asked for". Asking again before then changes nothing."""
+    return _ask(service, find(service, identity, run_id), layout.SNAPSHOT_REQUEST, "makes one")
+
+
+def _ask(service: Service, run: Run, request: str, words: str) -> Response:
+    """Leaves a request where the worker looks for it. Raises ServiceError 409, 503."""
     if run.state is not State.RUNNING:
-        raise ServiceError(409, "not_running", f"run {run.id} is {run.state.value}; a run that is running keeps one")
+        raise ServiceError(409, "not_running", f"run {run.id} is {run.state.value}; a run that is running {words}")
     try:
-        (service.settings.runs / run.id / layout.CHECKPOINT_REQUEST).touch()
+        (service.settings.runs / run.id / request).touch()
     except OSError as error:
         detail = f"the request could not be recorded: {error.strerror}"
         raise ServiceError(503, "unavailable", detail, retryable=True) from error

@@ -96,7 +96,7 @@ def progress(step: int) -> messages.Progress:
 def test_the_switch_finds_what_telling_costs(cost: float) -> None:
     """Blocks of ten steps and 5 ms; a message that costs the solver 1 ms is a fifth, whoever of a pair is first."""
     slow, end, ready = Mock(), switch.End(), Mock()
-    slow.tell = lambda message: spin(cost)
+    slow.tell = lambda message, blob: spin(cost)
     listener = switch.Switch(slow, switch.turns(20), ready, end)
     step = 0
     while not end.raised:

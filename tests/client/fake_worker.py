@@ -1,21 +1,23 @@
 """A worker that computes nothing: it tells the story of a short run, in its journal and over Zenoh, and leaves files.
 
 What it does stands in the case's ``description`` as JSON: ``steps``, ``pace`` (s a step), ``lose`` (every so many-th
-message is not sent over Zenoh), ``fail`` (a cause).
+message is not sent over Zenoh), ``fail`` (a cause), ``snapshots`` (one in each of the first steps).
 """
 
 import argparse
+import hashlib
 import json
 import os
 import signal
 import sys
 import time
+from array import array
 from pathlib import Path
 from typing import Any
 
 import zenoh
 
-from conoid.cases import keys, layout, messages, outcome
+from conoid.cases import keys, layout, messages, outcome, snapshot
 from conoid.cases.load import read_data
 
 stop = False
@@ -28,6 +30,7 @@ class Voice:
         self.run, self.prefix, self.lose = options.run, options.prefix, lose
         self.journal = options.out / layout.JOURNAL
         self.seq = messages.from_json(self.journal.read_bytes().splitlines()[-1]).seq
+        self.blob = b""
         self.session = open_zenoh(options.telemetry) if options.telemetry else None
 
     def say(self, kind: type[messages.Message], **values: Any) -> None:
@@ -36,7 +39,34 @@ class Voice:
         with self.journal.open("ab") as file:
             file.write(messages.to_json(message) + b"\n")
         if self.session is not None and not (self.lose and self.seq % self.lose == 0):
-            self.session.put(keys.message_key(self.prefix, message.channel), messages.to_msgpack(message))
+            sent = messages.with_blob(message, self.blob) if isinstance(message, messages.Snapshot) else message
+            self.session.put(keys.message_key(self.prefix, message.channel), messages.to_msgpack(sent))
+
+    def show(self, n: int, folder: Path) -> None:
+        """Leaves a snapshot of one triangle and tells of it."""
+        self.blob = triangle(n)
+        path = layout.snapshot(folder, n)
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(self.blob)
+        self.say(
+            messages.Snapshot, n=n, path=str(path.relative_to(folder)), bytes=len(self.blob), triangles=1, fragments=1,
+            sha256=hashlib.sha256(self.blob).hexdigest(), step=n, t=0.1 * n,
+        )  # fmt: skip
+
+
+def triangle(n: int) -> bytes:
+    """A snapshot of one fragment."""
+    header = snapshot.Header(
+        n=n, step=n, t=0.1 * n, box=((0.0, 0.0, 0.0), (1.0, 2.0, 0.0)), ranks=1, parts=["rod"], tets=5,
+        surface_triangles=1, fragments_total=1, fragments_listed=1,
+        fields={"speed": snapshot.Field(unit="m/s", low=0.0, high=51.0)},
+    )  # fmt: skip
+    return snapshot.pack(header, {
+        "positions": snapshot.Column("uint16", (3, 3), array("H", [0, 0, 0, 65535, 0, 0, 0, 65535, 0]).tobytes()),
+        "triangles": snapshot.Column("uint32", (1, 3), array("I", [0, 1, 2]).tobytes()),
+        "field:speed": snapshot.Column("uint8", (1,), b"\5"),
+        "fragment_mass": snapshot.Column("float64", (1,), array("d", [0.5]).tobytes()),
+    })  # fmt: skip
 
 
 def open_zenoh(endpoint: str) -> zenoh.Session:
@@ -74,6 +104,8 @@ def main() -> int:
             break
         time.sleep(plan.get("pace", 0.0))
         tell_step(voice, step, steps)
+        if step <= plan.get("snapshots", 0):
+            voice.show(step - 1, options.out)
     state, cause = (
         ("cancelled", "cancelled") if stop else ("failed", plan["fail"]) if "fail" in plan else ("succeeded", None)
     )

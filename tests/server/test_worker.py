@@ -12,7 +12,8 @@ from typing import Any
 import pytest
 import zenoh
 
-from conoid.cases.messages import from_msgpack
+from conoid.cases import snapshot
+from conoid.cases.messages import fragments_from_msgpack, from_msgpack
 from conoid.cases.run import State
 
 from .running import PATIENCE, Process, User
@@ -76,10 +77,13 @@ def test_from_http_to_a_result_live(ann: User) -> None:
     }.items():
         config.insert_json5(key, json.dumps(value))
     heard: list[Any] = []
+    blobs: dict[str, bytes] = {}
     over = threading.Event()
 
     def hear(sample: zenoh.Sample) -> None:
         heard.append(from_msgpack(sample.payload.to_bytes()))
+        if str(sample.key_expr).endswith("/fragments"):
+            blobs[heard[-1].sha256] = fragments_from_msgpack(sample.payload.to_bytes()).blob
         if getattr(heard[-1], "state", "") == "succeeded" and type(heard[-1]).__name__ == "Status":
             over.set()
 
@@ -104,6 +108,20 @@ def test_from_http_to_a_result_live(ann: User) -> None:
         answer = ann.http.get(f"/v1/runs/{run}/files/{name}")
         digest = base64.b64encode(hashlib.sha256(answer.content).digest()).decode()
         assert answer.headers["repr-digest"] == f"sha-256=:{digest}:"
+
+    listed = ann.http.get(f"/v1/runs/{run}/snapshots").json()["snapshots"]
+    assert listed == [event for event in events if event["type"] == "snapshot"]
+    assert [listed[0]["cause"], listed[-1]["cause"]] == ["start", "end"]
+    for one in listed:
+        answer = ann.http.get(f"/v1/runs/{run}/snapshots/{one['n']}")
+        assert hashlib.sha256(answer.content).hexdigest() == one["sha256"] == answer.headers["etag"].strip('"')
+        assert blobs.get(one["sha256"], answer.content) == answer.content
+        assert snapshot.header_of(answer.content).fragments_total == one["fragments"] == 1
+    assert listed[-1]["sha256"] in blobs
+    course = ann.http.get(f"/v1/runs/{run}/history").json()
+    assert course["last"] == len(events)
+    assert course["snapshots"] == listed
+    assert course["series"]["step"][-1] == seen["outcome"]["steps"]
 
 
 def test_cancel(ann: User) -> None:

@@ -38,6 +38,11 @@ class Courier:
         self.under_way = 0
         """Tasks without an answer."""
 
+    @property
+    def packer(self) -> int | None:
+        """Number of the process that makes the snapshots, once there is one."""
+        return None if self._packer is None else self._packer.pid
+
     def send(self, task: dict[str, Any], given: Share) -> None:
         """A share for the snapshot ``task["n"]``."""
         if self._thread is None:
@@ -51,10 +56,16 @@ class Courier:
         if self._thread is not None:
             self._tasks.put(None)
             self._thread.join(_FAREWELL)
+        self._end()
+
+    def _end(self) -> None:
+        """Ends the packer; another is started for the next task."""
         if self._packer is not None:
             with contextlib.suppress(OSError):
                 self._packer.kill()
-            self._packer.communicate()
+            with contextlib.suppress(OSError):
+                self._packer.communicate()
+        self._packer = None
 
     def _work(self) -> None:
         while (task := self._tasks.get()) is not None:
@@ -69,13 +80,18 @@ class Courier:
 
     def _ask(self, task: dict[str, Any]) -> None:
         """Has the packer make a snapshot. Raises OSError, ValueError."""
-        if self._packer is None or self._packer.poll() is not None:
+        if self._packer is None:
             self._packer = _started(self._folder)
         assert self._packer.stdin is not None
         assert self._packer.stdout is not None
-        self._packer.stdin.write(json.dumps(task) + "\n")
-        self._packer.stdin.flush()
-        answer = json.loads(self._packer.stdout.readline())
+        try:
+            self._packer.stdin.write(json.dumps(task) + "\n")
+            self._packer.stdin.flush()
+            answer = json.loads(self._packer.stdout.readline() or '{"error": "its process has ended"}')
+        except OSError:
+            answer = {"error": "its process has ended"}
+        if "n" not in answer:
+            self._end()
         data = b"" if "error" in answer else (self._folder / answer["path"]).read_bytes()
         self.answers.append(({**task, **answer}, data))
 

@@ -37,7 +37,7 @@ def main(folder: Path) -> None:
         births = births or Births(folder, task["end"], task["frames"])
         try:
             answer = _made(folder, task, births)
-        except (OSError, ValueError) as error:
+        except Exception as error:  # of one snapshot; the next may be made
             answer = {"error": f"{type(error).__name__}: {error}"}
         print(json.dumps({"n": task["n"], **answer}), flush=True)
 

@@ -1,0 +1,140 @@
+"""What a run has said so far, thinned, so that a run of a million events opens at once.
+
+The journal is read once, and from then on what is new of it. Most lines are only looked at in their first letters; of
+the reports a few thousand are kept as they stand, every so many of them, and more and more of them are passed over as
+the run goes on. The rare events (cuts, snapshots, states) are all kept.
+"""
+
+import threading
+from collections import OrderedDict
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import msgspec
+
+from conoid.cases.messages import Snapshot, Status
+from conoid.cases.run import State
+
+from .journal import Tail, seq_of
+
+_SAMPLES = 4096
+"""Reports of a run that are kept, at most. Chosen: some times what a chart has pixels."""
+_BYTES = 16 << 20
+"""Of the reports of a run, at most. Chosen: room for all of them up to some hundred ranks."""
+_CUTS = 10_000
+"""Balance events that are kept, the newest. Chosen."""
+_RUNS = 16
+"""Runs whose history is kept, those last asked for. Chosen."""
+_BLOCK = 4 << 20
+"""Bytes of the journal that are read at once. Chosen."""
+_TYPE = slice(9, 13)
+"""Of a line: the first letters of its type, behind ``{"type":"``."""
+
+_snapshot = msgspec.json.Decoder(Snapshot)
+_status = msgspec.json.Decoder(Status)
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A report: lines of the journal as they stood when it came, b"" for what had not come yet."""
+
+    progress: bytes
+    load: bytes
+    counts: bytes
+    snapshot: bytes
+
+    @property
+    def size(self) -> int:
+        """Bytes, but for what samples share."""
+        return len(self.progress) + len(self.load)
+
+
+@dataclass
+class History:
+    """The history of a run as far as its journal has been read."""
+
+    path: Path
+    last: int = 0
+    """Number of the last event."""
+    wall: float = 0.0
+    """Unix time of the last status, s."""
+    began: float | None = None
+    """Unix time at which the worker began to run, s."""
+    state: State = State.ACCEPTED
+    samples: list[Sample] = field(default_factory=list)
+    newest: Sample | None = None
+    cuts: list[bytes] = field(default_factory=list)
+    snapshots: dict[int, bytes] = field(default_factory=dict)
+    """Lines by the numbers of the snapshots."""
+
+    def __post_init__(self) -> None:
+        self.lock = threading.Lock()
+        self._tail = Tail(self.path)
+        self._progress = self._counts = self._snapshot = b""
+        self._every, self._reports, self._size = 1, 0, 0
+
+    def catch_up(self) -> None:
+        """Reads what is new; under the lock."""
+        while block := self._tail.block(_BLOCK):
+            lines = block.split(b"\n")
+            for line in lines:
+                kind = line[_TYPE]
+                if kind == b"prog":
+                    self._progress = line
+                elif kind == b"load":
+                    self._load(line)
+                elif kind == b"coun":
+                    self._counts = line
+                elif kind in _RARE:
+                    self._rare(kind, line)
+            self.last = next((seq for line in reversed(lines) if (seq := seq_of(line))), self.last)
+
+    def _load(self, line: bytes) -> None:
+        self._reports += 1
+        self.newest = Sample(self._progress, line, self._counts, self._snapshot)
+        if self._reports % self._every:
+            return
+        self.samples.append(self.newest)
+        self._size += self.newest.size
+        if len(self.samples) > _SAMPLES or self._size > _BYTES:
+            self.samples = self.samples[1::2]
+            self._every *= 2
+            self._size = sum(sample.size for sample in self.samples)
+
+    def _rare(self, kind: bytes, line: bytes) -> None:
+        try:
+            if kind == b"stat":
+                self._state(_status.decode(line))
+            elif kind == b"snap":
+                self.snapshots[_snapshot.decode(line).n] = self._snapshot = line
+            elif msgspec.json.decode(line, type=msgspec.Raw):
+                self.cuts.append(line)
+                del self.cuts[:-_CUTS]
+        except (msgspec.MsgspecError, ValueError):
+            return
+
+    def _state(self, status: Status) -> None:
+        self.state, self.wall = State(status.state), status.wall
+        if self.state is State.RUNNING and self.began is None:
+            self.began = status.wall
+
+
+_RARE = frozenset({b"stat", b"snap", b"bala"})
+
+
+class Histories:
+    """The histories that were asked for last; from any thread."""
+
+    def __init__(self) -> None:
+        """None yet."""
+        self._lock = threading.Lock()
+        self._known: OrderedDict[Path, History] = OrderedDict()
+
+    def of(self, path: Path) -> History:
+        """That of the journal at ``path``; its holder takes its lock, and lets it catch up."""
+        with self._lock:
+            found = self._known.setdefault(path, History(path))
+            self._known.move_to_end(path)
+            if len(self._known) > _RUNS:
+                self._known.popitem(last=False)
+            return found

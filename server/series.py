@@ -1,0 +1,121 @@
+"""A history as it is sent: columns over the reports, thinned to as many as were asked for."""
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import msgspec
+
+from conoid.cases.messages import Counts, Energy, Load, Progress, Snapshot
+
+from .history import History, Sample
+
+_NUMBERS = 100_000
+"""Of ranks, phases and times together that are sent, at most. Chosen: a megabyte."""
+_progress = msgspec.json.Decoder(Progress)
+_load = msgspec.json.Decoder(Load)
+_counts = msgspec.json.Decoder(Counts)
+_snapshot = msgspec.json.Decoder(Snapshot)
+
+
+def body(history: History, points: int) -> bytes:
+    """The whole answer; under the lock of the history."""
+    reports = [_read(sample) for sample in _spread(_kept(history), points)]
+    loads = [report.load for report in reports]
+    final = history.state.final
+    return msgspec.json.encode({
+        "last": history.last,
+        "state": history.state,
+        "elapsed": 0.0 if history.began is None else (history.wall if final else time.time()) - history.began,
+        "series": _columns(reports, history.began or 0.0),
+        "ranks": _ranks(_spread(loads, _NUMBERS // max(1, sum(map(len, loads[-1].phases.values()))) if loads else 1)),
+        "balance": [msgspec.Raw(line) for line in history.cuts],
+        "snapshots": listed(history),
+    })  # fmt: skip
+
+
+def listed(history: History) -> list[msgspec.Raw]:
+    """The snapshots, as the journal tells of them."""
+    return [msgspec.Raw(history.snapshots[n]) for n in sorted(history.snapshots)]
+
+
+class _Report(msgspec.Struct, frozen=True):
+    load: Load
+    progress: Progress | None
+    counts: Counts | None
+    snapshot: Snapshot | None
+
+    @property
+    def fragments(self) -> int | None:
+        """By whatever was told last."""
+        told = [message for message in (self.counts, self.snapshot) if message is not None]
+        return max(told, key=lambda message: message.seq).fragments if told else None
+
+
+def _read(sample: Sample) -> _Report:
+    return _Report(
+        _load.decode(sample.load),
+        _progress.decode(sample.progress) if sample.progress else None,
+        _counts.decode(sample.counts) if sample.counts else None,
+        _snapshot.decode(sample.snapshot) if sample.snapshot else None,
+    )
+
+
+def _kept(history: History) -> list[Sample]:
+    """What is kept, and the newest."""
+    newest = history.newest
+    if newest is None or (history.samples and history.samples[-1] is newest):
+        return history.samples
+    return [*history.samples, newest]
+
+
+def _spread(items: Sequence[Any], most: int) -> list[Any]:
+    """At most so many of them, at even distances, the last always."""
+    n, most = len(items), max(1, most)
+    return list(items) if n <= most else [items[(k + 1) * n // most - 1] for k in range(most)]
+
+
+def _columns(reports: list[_Report], began: float) -> dict[str, list[Any]]:
+    """By name; a run that has gone on from a checkpoint has told some times twice, and the later word counts."""
+    reports = _once(reports)
+    columns: dict[str, list[Any]] = {
+        "t": [r.load.t for r in reports],
+        "step": [r.load.step for r in reports],
+        "elapsed": [r.load.wall - began for r in reports],
+        "imbalance": [r.load.imbalance for r in reports],
+        "fragments": [r.fragments for r in reports],
+    }
+    for name in ("elements", "nodes", "shared", "facets", "particles"):
+        columns[name] = [getattr(r.counts, name, None) for r in reports]
+    for name in ("dt", "limiter", "updates_per_second"):
+        columns[name] = [getattr(r.progress, name, None) for r in reports]
+    for name in Energy.__struct_fields__:
+        columns[name] = [getattr(r.progress.energy, name) if r.progress is not None else None for r in reports]
+    shares = [_shares(r.load) for r in reports]
+    for name in {name: None for share in shares for name in share}:
+        columns[f"share_{name}"] = [share.get(name) for share in shares]
+    return columns
+
+
+def _once(reports: list[_Report]) -> list[_Report]:
+    kept: list[_Report] = []
+    for report in reversed(reports):
+        if not kept or report.load.step < kept[-1].load.step:
+            kept.append(report)
+    return kept[::-1]
+
+
+def _shares(load: Load) -> dict[str, float]:
+    """Of the CPU time of all ranks, by phase."""
+    total = sum(map(sum, load.phases.values()))
+    return {name: sum(seconds) / total if total > 0.0 else 0.0 for name, seconds in load.phases.items()}
+
+
+def _ranks(loads: list[Load]) -> dict[str, Any]:
+    """CPU seconds of each rank and phase over the steps of a report, and of ``exchange`` the waiting."""
+    names = {name: None for load in loads for name in load.phases}
+    return {
+        "t": [load.t for load in loads], "steps": [load.steps for load in loads],
+        **{name: [load.phases.get(name, []) for load in loads] for name in names},
+        "waiting": [load.waiting for load in loads],
+    }  # fmt: skip

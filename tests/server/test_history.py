@@ -1,0 +1,224 @@
+"""The history of a run and its snapshots over HTTP."""
+
+import hashlib
+import time
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from conoid.cases import layout, messages
+from conoid.cases.run import State
+from conoid.server import history
+from conoid.server.history import History
+
+from .running import Running
+
+ENERGY = {
+    "kinetic": 3.0,
+    "elastic": 2.0,
+    "plastic": 1.0,
+    "viscous": 0.0,
+    "contact": 0.0,
+    "external": 0.0,
+    "initial": 6.0,
+}
+
+
+def told(reports: int, ranks: int = 2, every: int = 100) -> Iterator[messages.AnyMessage]:
+    """What a run says that has so many reports, and now and then a cut and a snapshot."""
+    yield messages.Status(run="r", wall=1000.0, state=State.ACCEPTED)
+    yield messages.Status(run="r", wall=1010.0, state=State.RUNNING)
+    for k in range(reports):
+        at: dict[str, Any] = {"run": "r", "step": 10 * k, "t": 1e-9 * k, "wall": 1010.0 + 0.25 * k}
+        if k % 3 == 0:
+            yield messages.Counts(
+                **at, elements=100, nodes=50 + k, shared=4, fragments=1 + k, elements_per_rank=[50, 50], facets=2 * k
+            )
+        yield messages.Progress(
+            **at, end_time=1.0, dt=1e-9 + 1e-15 * k, limiter="stability: tet 1 of rod", eta=1.0,
+            energy=messages.Energy(**ENERGY, residual=1e-6 * k), updates_per_second=1e6,
+        )  # fmt: skip
+        phases = {"elements": [3.0] * ranks, "contact": [1.0] * ranks}
+        yield messages.Load(**at, phases=phases, imbalance=1.0 + 1e-3 * k, steps=10, waiting=[0.1] * ranks)
+        if k % every == every - 1:
+            yield messages.Balance(
+                **at, cause="time lost", before=phases, predicted=[2.0] * ranks, tets=5, nodes=3, cost=0.1, saved=0.2
+            )
+            yield snapshot(k // every, f"{k}", **at)
+
+
+def snapshot(n: int, text: str, **at: Any) -> messages.Snapshot:
+    data = text.encode()
+    return messages.Snapshot(
+        **at, n=n, path=f"snapshots/{n:06d}.snap", bytes=len(data), triangles=4, fragments=7 + n,
+        sha256=hashlib.sha256(data).hexdigest(), cause="run.snapshots",
+    )  # fmt: skip
+
+
+def write(folder: Path, told: Iterator[messages.AnyMessage], after: int = 0) -> int:
+    """Appends to a journal, and puts snapshots in their places; the last number."""
+    with (folder / layout.JOURNAL).open("ab" if after else "wb") as file:
+        for message in told:
+            after += 1
+            line = messages.to_json(message).replace(b'"seq":0', b'"seq":%d' % after)
+            file.write(line + b"\n")
+    return after
+
+
+def shown(server: Running, run: str, **query: int) -> dict[str, Any]:
+    answer = server.ann.http.get(f"/v1/runs/{run}/history", params=query)
+    assert answer.status_code == 200, answer.text
+    found: dict[str, Any] = answer.json()
+    return found
+
+
+@pytest.fixture
+def run(server: Running) -> str:
+    """A run that has ended, whose journal a test may write anew."""
+    made = server.ann.submit(steps=1)
+    server.ann.wait_for(made)
+    return made
+
+
+def test_short_runs_are_told_whole(server: Running, run: str) -> None:
+    last = write(server.ann.runs / run, told(200))
+    found = shown(server, run)
+    series = found["series"]
+    assert found["last"] == last
+    assert found["state"] == "running"
+    assert series["step"] == [10 * k for k in range(200)]
+    assert series["t"] == [1e-9 * k for k in range(200)]
+    assert series["elapsed"] == [0.25 * k for k in range(200)]
+    assert series["imbalance"] == [1.0 + 1e-3 * k for k in range(200)]
+    assert series["nodes"] == [50 + k // 3 * 3 for k in range(200)]
+    assert series["facets"] == [2 * (k // 3 * 3) for k in range(200)]
+    assert series["fragments"][99:103] == [100, 7, 7, 103]
+    assert series["residual"] == [1e-6 * k for k in range(200)]
+    assert series["kinetic"] == [3.0] * 200
+    assert series["share_elements"] == [0.75] * 200
+    assert found["ranks"]["contact"] == [[1.0, 1.0]] * 200
+    assert [event["cause"] for event in found["balance"]] == ["time lost"] * 2
+    assert [event["n"] for event in found["snapshots"]] == [0, 1]
+
+
+def test_long_runs_are_thinned_evenly_and_end_with_the_newest(server: Running, run: str) -> None:
+    write(server.ann.runs / run, told(20_000))
+    found = shown(server, run, points=500)
+    steps = found["series"]["step"]
+    assert len(steps) == 500
+    assert steps[-1] == 199_990
+    gaps = [b - a for a, b in pairwise(steps)]
+    assert max(gaps) <= 3 * 200_000 / 500
+    assert steps == sorted(set(steps))
+    assert len(found["snapshots"]) == len(found["balance"]) == 200
+
+
+def test_what_comes_later_is_read_on_from_where_it_stood(server: Running, run: str) -> None:
+    folder = server.ann.runs / run
+    last = write(folder, told(50))
+    assert shown(server, run)["last"] == last
+    status = messages.Status(run="r", wall=2000.0, state=State.SUCCEEDED)
+    with (folder / layout.JOURNAL).open("ab") as file:
+        line = messages.to_json(messages.Status(run="r", seq=last + 1, wall=2000.0, state=status.state))
+        file.write(line)
+        file.flush()
+        assert shown(server, run)["last"] == last
+        file.write(b"\n")
+    found = shown(server, run)
+    assert (found["last"], found["state"], found["elapsed"]) == (last + 1, "succeeded", 990.0)
+
+
+def test_the_course_of_a_run_that_went_on_is_told_once(server: Running, run: str) -> None:
+    folder = server.ann.runs / run
+    last = write(folder, told(50))
+    write(folder, (message for message in told(80) if message.step >= 300), last)
+    steps = shown(server, run)["series"]["step"]
+    assert steps == [10 * k for k in range(80)]
+
+
+def test_memory_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write(tmp_path, told(3000, ranks=200))
+    monkeypatch.setattr(history, "_BYTES", 500_000)
+    found = History(tmp_path / layout.JOURNAL)
+    found.catch_up()
+    assert 10 < len(found.samples) < 200
+    assert sum(sample.size for sample in found.samples) <= 500_000
+    assert found.newest is not None
+
+
+def test_garbage_in_the_journal_does_no_harm(server: Running, run: str) -> None:
+    folder = server.ann.runs / run
+    write(folder, told(20))
+    with (folder / layout.JOURNAL).open("ab") as file:
+        file.write(b'{"type":"balance","run":"half\n{"type":"snapshot"}\n{"type":"status","state":"odd"}\n\xff\n\n')
+    found = shown(server, run)
+    assert (len(found["series"]["t"]), found["balance"], found["snapshots"]) == (20, [], [])
+
+
+def test_a_run_without_reports_has_a_history(server: Running, run: str) -> None:
+    found = shown(server, run)
+    assert found["state"] == "succeeded"
+    assert found["series"]["t"] == found["balance"] == found["snapshots"] == []
+
+
+# Snapshots ------------------------------------------------------------------------------------------------------------
+
+
+def test_snapshots_are_listed_and_fetched_once(server: Running, run: str) -> None:
+    folder = server.ann.runs / run
+    write(folder, told(200))
+    (folder / layout.SNAPSHOTS).mkdir()
+    layout.snapshot(folder, 0).write_bytes(b"99")
+    place = f"/v1/runs/{run}/snapshots"
+    answer = server.ann.http.get(place)
+    listed = answer.json()["snapshots"]
+    assert [one["n"] for one in listed] == [0, 1]
+    assert server.ann.http.get(place, headers={"If-None-Match": answer.headers["ETag"]}).status_code == 304
+    got = server.ann.http.get(f"{place}/0")
+    assert got.content == b"99"
+    assert got.headers["content-type"] == "application/octet-stream"
+    assert got.headers["etag"] == f'"{listed[0]["sha256"]}"'
+    assert "immutable" in got.headers["cache-control"]
+    again = server.ann.http.get(f"{place}/0", headers={"If-None-Match": got.headers["etag"]})
+    assert (again.status_code, again.content) == (304, b"")
+    assert server.ann.http.get(f"{place}/0", headers={"If-None-Match": '"other"'}).status_code == 200
+
+
+def test_a_snapshot_that_the_journal_does_not_tell_of_is_not_there(server: Running, run: str) -> None:
+    folder = server.ann.runs / run
+    write(folder, told(150))
+    (folder / layout.SNAPSHOTS).mkdir()
+    layout.snapshot(folder, 7).write_bytes(b"never told")
+    layout.snapshot(folder, 1).with_suffix(".part").write_bytes(b"half")
+    place = f"/v1/runs/{run}/snapshots"
+    assert [one["n"] for one in server.ann.http.get(place).json()["snapshots"]] == [0]
+    assert server.ann.http.get(f"{place}/7").status_code == 404
+    assert server.ann.http.get(f"{place}/0").status_code == 404
+
+
+def test_one_is_asked_for_while_it_runs(server: Running, tmp_path: Path) -> None:
+    first = server.ann.submit(ranks=2, wait=str(tmp_path / "go"))
+    server.ann.wait_for(first, State.RUNNING)
+    assert server.ann.http.post(f"/v1/runs/{first}:snapshot").status_code == 202
+    assert (server.ann.runs / first / layout.SNAPSHOT_REQUEST).exists()
+    assert server.bob.http.post(f"/v1/runs/{first}:snapshot").status_code == 404
+    (tmp_path / "go").touch()
+    assert server.ann.wait_for(first)["state"] == "succeeded"
+    refused = server.ann.http.post(f"/v1/runs/{first}:snapshot")
+    assert (refused.status_code, refused.json()["code"]) == (409, "not_running")
+
+
+@pytest.mark.slow
+def test_a_million_events_open_in_two_seconds(server: Running, run: str) -> None:
+    last = write(server.ann.runs / run, told(430_000))
+    assert last >= 10**6
+    began = time.monotonic()
+    found = shown(server, run)
+    first = time.monotonic() - began
+    assert found["last"] == last
+    assert shown(server, run)["last"] == last
+    assert first <= 2.0
+    assert time.monotonic() - began - first <= 0.5

@@ -1,0 +1,107 @@
+"""What a rank gives away becomes a snapshot in a process of its own; nothing that happens there holds up the solver."""
+
+import hashlib
+import os
+import signal
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from conoid.cases import layout, messages, snapshot
+from conoid.worker.output.telemetry import Telemetry
+from conoid.worker.snapshots import share
+from conoid.worker.snapshots.courier import Courier
+
+from .shattered import PARTS, shattered
+
+PATIENCE = 60.0
+
+
+def task(n: int, ranks: int = 1) -> dict[str, Any]:
+    return {
+        "n": n, "step": 10 * n, "t": 1e-6 * n, "ranks": ranks, "parts": PARTS, "end": 1.0, "frames": 0, "cause": "end",
+        "dropped": 0,
+    }  # fmt: skip
+
+
+@pytest.fixture
+def courier(tmp_path: Path) -> Iterator[Courier]:
+    (tmp_path / layout.SNAPSHOTS).mkdir()
+    made = Courier(tmp_path, 0)
+    yield made
+    made.close()
+
+
+def answer(courier: Courier) -> tuple[dict[str, Any], bytes]:
+    limit = time.monotonic() + PATIENCE
+    while not courier.answers:
+        assert time.monotonic() < limit
+        time.sleep(0.01)
+    return courier.answers.popleft()
+
+
+def test_shares_of_two_ranks_become_one_snapshot(courier: Courier, tmp_path: Path) -> None:
+    mine, theirs = shattered(3, 4).shares(2)
+    share.write(layout.share(tmp_path, 5, 1), theirs)
+    courier.send(task(5, ranks=2), mine)
+    told, data = answer(courier)
+    assert (told["n"], told["step"], told["cause"]) == (5, 50, "end")
+    assert hashlib.sha256(data).hexdigest() == told["sha256"]
+    assert snapshot.header_of(data).fragments_total == told["fragments"]
+    assert [path.name for path in (tmp_path / layout.SNAPSHOTS).iterdir()] == ["000005.snap"]
+
+
+def test_a_share_that_cannot_be_read_costs_one_snapshot(courier: Courier, tmp_path: Path) -> None:
+    (mine,) = shattered(2, 2).shares(1)
+    layout.share(tmp_path, 0, 1).write_bytes(b"[]\nhalf")
+    courier.send(task(0, ranks=2), mine)
+    assert "error" in answer(courier)[0]
+    assert not list((tmp_path / layout.SNAPSHOTS).iterdir())
+    courier.send(task(1), mine)
+    assert answer(courier)[0]["bytes"] > 0
+
+
+def test_a_packer_that_dies_costs_one_snapshot(courier: Courier) -> None:
+    (mine,) = shattered(2, 2).shares(1)
+    courier.send(task(0), mine)
+    answer(courier)
+    assert courier.packer is not None
+    os.kill(courier.packer, signal.SIGKILL)
+    courier.send(task(1), mine)
+    courier.send(task(2), mine)
+    told = [answer(courier)[0] for _ in range(2)]
+    assert "error" not in told[1]
+
+
+def test_a_packer_that_hangs_holds_nobody_up(courier: Courier) -> None:
+    (mine,) = shattered(2, 2).shares(1)
+    courier.send(task(0), mine)
+    answer(courier)
+    assert courier.packer is not None
+    os.kill(courier.packer, signal.SIGSTOP)
+    began = time.monotonic()
+    courier.send(task(1), mine)
+    assert time.monotonic() - began < 0.1
+    assert courier.under_way == 2
+    os.kill(courier.packer, signal.SIGCONT)
+    assert answer(courier)[0]["n"] == 1
+
+
+def test_what_waits_for_the_network_is_bounded_and_counted() -> None:
+    """Nobody listens at the endpoint."""
+    telemetry = Telemetry("tcp/127.0.0.1:1", "conoid/v1/ann/run")
+    began = time.monotonic()
+    for n in range(5):
+        told = messages.Snapshot(
+            run="run", seq=n, n=n, path="p", bytes=4, triangles=1, fragments=1, sha256="0" * 64
+        )  # fmt: skip
+        telemetry.tell(told, b"blob")
+    for n in range(1100):
+        telemetry.tell(messages.Log(run="run", seq=n, level="info", text="x"))
+    assert time.monotonic() - began < 1.0
+    assert telemetry.bare == 3
+    assert telemetry.dropped == 1105 - 1024
+    telemetry.close()
