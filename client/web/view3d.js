@@ -18,6 +18,7 @@ export class View3d {
     this.camera = new THREE.PerspectiveCamera(35, 1, 1e-3, 10);
     this.controls = new OrbitControls(this.camera, this.canvas);
     this.controls.addEventListener("change", () => this.later());
+    this.controls.addEventListener("start", () => { this.moved = true; });
     this.target = new THREE.WebGLRenderTarget(1, 1);
     this.material = new THREE.RawShaderMaterial({
       glslVersion: THREE.GLSL3, vertexShader: VERTEX, fragmentShader: FRAGMENT, side: THREE.DoubleSide, uniforms: this.uniforms(),
@@ -144,6 +145,7 @@ export class View3d {
     const { Spherical, Vector3, Quaternion } = this.three;
     const moves = { ArrowLeft: [-TURN, 0, 1], ArrowRight: [TURN, 0, 1], ArrowUp: [0, -TURN, 1], ArrowDown: [0, TURN, 1], "+": [0, 0, 0.9], "-": [0, 0, 1.1] };
     if (!moves[key]) return false;
+    this.moved = true;
     const [about, over, nearer] = moves[key];
     const level = new Quaternion().setFromUnitVectors(this.camera.up, new Vector3(0, 1, 0));
     const away = this.camera.position.clone().sub(this.controls.target).applyQuaternion(level);
@@ -161,6 +163,7 @@ export class View3d {
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
+    if (this.snapshot && !this.moved) this.aim(); // The canvas was not on the page when the first snapshot came.
     this.draw();
   }
 
