@@ -121,7 +121,7 @@ export class Logs {
 }
 
 export function checksTable(checks) {
-  const exact = (value, unit) => si(value, unit, 4);
+  const exact = (value, unit) => (unit ? si(value, unit, 4) : String(Number(value?.toPrecision(4))));
   return [h("div.card-head", {}, h("h2", {}, "Against the reference")), h("div.scroll", { tabindex: 0 }, h("table.checks", {},
     h("thead", {}, h("tr", {}, ["quantity", "computed", "expected", "tolerance", "result", "source"].map((name) => h("th", { scope: "col" }, words(name))))),
     h("tbody", {}, checks.map((check) => h("tr", {},
