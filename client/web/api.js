@@ -19,11 +19,26 @@ export class Problem extends Error {
 
 const address = (path) => new URL(path, document.baseURI);
 
-async function send(path, { method = "GET", headers = {}, signal } = {}) {
+async function send(path, { method = "GET", headers = {}, signal, cache = "no-store" } = {}) {
   const shown = token.get() ? { Authorization: `Bearer ${token.get()}` } : {};
-  const response = await fetch(address(path), { method, headers: { ...shown, ...headers }, signal, cache: "no-store" });
+  const response = await fetch(address(path), { method, headers: { ...shown, ...headers }, signal, cache });
   if (!response.ok) throw new Problem(response.status, await response.json().catch(() => null));
   return response;
+}
+
+// Snapshots never change, and the server says so: the browser keeps them.
+export const binary = async (path, options) => (await send(path, { ...options, cache: "default" })).arrayBuffer();
+
+const TAIL = 65536; // Bytes of a log that are shown.
+
+// The end of the log of a rank, or of "launcher".
+export async function tail(run, rank) {
+  try {
+    return await (await send(`v1/runs/${encodeURIComponent(run)}/logs/${rank}`, { headers: { Range: `bytes=-${TAIL}` } })).text();
+  } catch (error) {
+    if (error instanceof Problem && error.status === 416) return ""; // An empty file.
+    throw error;
+  }
 }
 
 export const call = async (path, options) => (await send(path, options)).json();

@@ -59,7 +59,7 @@ export const pill = (state) => h(`span.pill.${state}`, {}, words(state));
 export function meter(state, share) {
   const width = `${(100 * Math.min(1, Math.max(0, share))).toFixed(2)}%`;
   const value = Math.round(100 * share);
-  return h(`div.meter.${state}`, { role: "progressbar", "aria-valuenow": value, "aria-valuemin": 0, "aria-valuemax": 100 },
+  return h(`div.meter.${state}`, { role: "progressbar", "aria-label": "progress", "aria-valuenow": value, "aria-valuemin": 0, "aria-valuemax": 100 },
     h("i", { style: { width } }));
 }
 

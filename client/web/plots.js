@@ -1,0 +1,104 @@
+// What each chart of a run shows: the record of the run (live.js) as series.
+
+import { Chart, axis, heat, limit, pins, series, time } from "./charts.js";
+import { h, percent, si } from "./figures.js";
+import { TERMS } from "./live.js";
+import { sizes } from "./snapshot.js";
+
+const TALL = 250;
+const MOST_COLUMNS = 240; // Of the heat map; more are less than a pixel wide on a phone.
+const COUNTED = [["nodes", "compute"], ["facets", "exchange"], ["fragments", "fracture"]];
+const CURVE = 60; // Points of a fitted law.
+const LEAST = 0.8; // Fragments, where the axis of their number begins.
+const FLOOR = 1e-10; // Residuals below it are rounding.
+const RESIDUAL = 1e-2; // Above it a run's energy does not close.
+
+// { name: { title, chart, note } }; `onBalance` gets the place of a balance event in live.balances.
+export function plots(live, onBalance) {
+  const made = {
+    sizes: [new Chart(TALL, "number of fragments of a size and more", () => ofSizes(made.snapshot), { alone: true }), "Fragment sizes"],
+    counts: [new Chart(TALL, "counts over time", () => ofCounts(live)), "Counts"],
+    energy: [new Chart(TALL, "energy over time, without the kinetic", () => ofEnergy(live)), "Energy without the kinetic"],
+    residual: [new Chart(TALL, "energy residual over time", () => ofResidual(live)), "Energy residual"],
+    imbalance: [new Chart(TALL, "load imbalance over time", () => ofImbalance(live),
+      { onClick: ({ seriesName, dataIndex }) => seriesName === "balance" && onBalance(dataIndex) }), "Load imbalance, slowest over mean"],
+    heat: [new Chart(TALL, "work of each rank over time", () => ofHeat(live), { alone: true }), "Work by rank and time"],
+    dt: [new Chart(TALL, "time step over time", () => ofStep(live)), "Time step"],
+    contact: [new Chart(TALL, "share of contact over time", () => ofContact(live)), "Share of contact in the CPU time"],
+  };
+  return made;
+}
+
+export const card = (title, note, ...content) => h("section.card.half", {}, h("div.card-head", {}, h("h2", {}, title), note), ...content);
+
+const end = ({ progress, ledger }) => (progress?.end_time ?? ledger.at(-1)?.t ?? 1);
+const option = (live, y, list) => ({ xAxis: time(end(live)), yAxis: y, series: list });
+
+function ofEnergy(live) {
+  if (live.ledger.length < 2) return null;
+  const there = TERMS.filter(([name]) => name !== "kinetic" && live.ledger.some(({ energy }) => energy[name]));
+  return option(live, axis("J"), there.map(([name, tone]) =>
+    series({ name, colour: tone, unit: "J", stack: "energy", data: live.ledger.map(({ t, energy }) => [t, Math.max(0, energy[name])]) })));
+}
+
+function ofResidual(live) {
+  if (live.ledger.length < 2) return null;
+  const data = live.ledger.map(({ t, energy }) => [t, Math.max(FLOOR, energy.residual)]);
+  return option(live, axis("", { type: "log", axisLabel: { formatter: (value) => value.toExponential(0) } }),
+    [{ ...series({ name: "residual", colour: "accent", data }), tooltip: { valueFormatter: (value) => Number(value).toExponential(1) }, markLine: limit(RESIDUAL) }]);
+}
+
+function ofCounts(live) {
+  const all = live.sizes;
+  if (!all.length) return null;
+  const there = COUNTED.filter(([name]) => all.some((point) => point[name] > 0));
+  return option(live, axis("", { type: "log" }), there.map(([name, tone]) =>
+    ({ ...series({ name, colour: tone, data: all.map((point) => [point.t, point[name] > 0 ? point[name] : null]) }), showSymbol: all.length < 3 })));
+}
+
+function ofImbalance(live) {
+  const { loads, balances } = live;
+  if (!loads.length) return null;
+  const at = (t) => loads.findLast((point) => point.t <= t)?.imbalance ?? loads[0].imbalance;
+  return option(live, axis("", { min: 1 }), [
+    { ...series({ name: "imbalance", colour: "exchange", data: loads.map(({ t, imbalance }) => [t, imbalance]) }), tooltip: { valueFormatter: (value) => Number(value).toFixed(3) } },
+    pins("balance", balances.map(({ t }) => [t, at(t)])),
+  ]);
+}
+
+function ofHeat(live) {
+  const ranks = live.loads.at(-1)?.shares.length ?? 0;
+  if (live.loads.length < 2) return null;
+  const every = Math.ceil(live.loads.length / MOST_COLUMNS);
+  const shown = live.loads.filter((_, i) => i % every === 0 && live.loads[i].shares.length === ranks);
+  return heat(ranks, shown.map(({ t }) => t), shown.flatMap(({ shares }, at) => shares.map((share, rank) => [at, rank, Number(share.toFixed(3))])));
+}
+
+function ofStep(live) {
+  if (live.ledger.length < 2) return null;
+  const data = live.ledger.filter(({ dt }) => dt > 0).map(({ t, dt, limiter }) => ({ value: [t, dt], limiter }));
+  const told = { trigger: "axis", formatter: ([{ data: { value, limiter } }]) => `${si(value[0], "s")}\ndt ${si(value[1], "s")}\n${limiter ?? ""}`.trim() };
+  return { ...option(live, axis("s", { scale: true }), [{ ...series({ name: "dt", colour: "elastic", unit: "s", data }), sampling: undefined }]), tooltip: { ...told } };
+}
+
+function ofContact(live) {
+  if (!live.loads.length) return null;
+  return option(live, axis("", { min: 0, max: 1, interval: 0.25, axisLabel: { formatter: (value) => `${Math.round(100 * value)} %` } }),
+    [{ ...series({ name: "contact", colour: "contact", data: live.loads.map(({ t, contact }) => [t, contact]) }), tooltip: { valueFormatter: (value) => percent(value) } }]);
+}
+
+// N(size) over the size, both logarithmic, with the law that fits best.
+function ofSizes(snapshot) {
+  if (!snapshot) return null;
+  const { points, best } = sizes(snapshot);
+  if (points.length < 2) return null;
+  const list = [{ ...series({ name: "fragments as long and longer", colour: "compute", data: points }), type: "scatter", symbolSize: 4 }];
+  if (best) {
+    const [low, high] = [points[0][0], points.at(-1)[0]];
+    const curve = Array.from({ length: CURVE }, (_, i) => low * (high / low) ** (i / (CURVE - 1))).map((size) => [size, points.length * best.longer(size)]);
+    const told = best.law === "power" ? `exponent ${best.parameter.toFixed(2)}` : si(best.parameter, "m");
+    list.push({ ...series({ name: `${best.law} law, ${told}`, colour: "bad", data: curve.filter(([, number]) => number >= LEAST) }), lineStyle: { type: "dashed" } });
+  }
+  return { xAxis: axis("m", { type: "log", splitLine: { show: false } }), yAxis: axis("", { type: "log", min: LEAST }), series: list,
+    tooltip: { trigger: "item", formatter: ({ value }) => `${Math.round(value[1])} of ${si(value[0], "m")} and more` } };
+}
