@@ -4,7 +4,7 @@ import csv
 import io
 import json
 from array import array
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -138,19 +138,44 @@ class Result:
             raise UnfinishedError(f"{self.folder.name} has not written {wanted}; it has {len(self.frames)}")
         return self.folder.path(found[0].name)
 
-    def view(self, field: str = "mises", out: Path | str | None = None, *, frame: int = -1, **options: Any) -> Drawn:
-        """Draws a frame as a PNG; takes the options of ``conoid.client.pictures.draw``. Raises ViewError."""
-        return draw(self.frame(frame), self.scene(frame), self.folder.name, field, out, **options)
+    def view(
+        self,
+        field: str = "mises",
+        out: Path | str | None = None,
+        *,
+        frame: int | Sequence[int] | None = None,
+        time: float | Sequence[float] | None = None,
+        **options: Any,
+    ) -> Drawn:
+        """Draws frames: as a PNG, side by side where there are several, or as a GIF where ``out`` ends in ``.gif``.
 
-    def scene(self, frame: int = -1) -> Scene:
-        """What a picture of a frame takes from the case; nothing when there is no case to read."""
+        ``frame`` has their numbers, ``time`` times in s, of each the nearest frame. Without both it is the last one,
+        of a GIF every one. ``options`` are the fields of ``conoid.client.pictures.Look``. Raises ViewError.
+        """
+        every = Path(out or "").suffix.lower() == ".gif"
+        chosen = self._chosen(_listed(frame), _listed(time), every)
+        return draw([self.frame(one) for one in chosen], self.scene(), self.folder.name, field, out, **options)
+
+    def _chosen(self, frames: Sequence[int], times: Sequence[float], every: bool) -> list[int]:
+        """Numbers of frames, in the order in which they were asked for."""
+        if not frames and not times:
+            return [one.index for one in self.frames] if every else [-1]
+        return [*frames, *(self.nearest(time) for time in times)]
+
+    def nearest(self, time: float) -> int:
+        """The number of the frame that is nearest to ``time``, s. Raises UnfinishedError where no time is known."""
+        known = [(abs(one.time - time), one.index) for one in self.frames if one.time is not None]
+        if not known:
+            raise UnfinishedError(f"{self.folder.name} has no frame whose time is known")
+        return min(known)[1]
+
+    def scene(self) -> Scene:
+        """What a picture takes from the case; nothing when there is no case to read."""
         try:
             case = self.case
         except (UnfinishedError, ValueError):
             return Scene()
         boundaries: list[dict[str, Any]] = case.get("boundaries", [])
-        title = case.get("title") or case.get("name") or ""
-        time = self._time(frame)
         return Scene(
             mirrors=tuple(
                 Mirror("xyz".index(one["axis"]), float(one.get("at", 0.0)))
@@ -159,14 +184,8 @@ class Result:
             ),
             walls=tuple(Wall(tuple(one["point"]), tuple(one["normal"])) for one in boundaries if one["kind"] == "wall"),
             parts=tuple(part["name"] for part in case.get("parts", [])),
-            title=f"{title}   t = {1e6 * time:.4g} µs" if time is not None else str(title),
+            title=str(case.get("title") or case.get("name") or ""),
         )
-
-    def _time(self, frame: int) -> float | None:
-        """Of a frame, s; None when it is not listed."""
-        if frame == -1:
-            return self.frames[-1].time
-        return next((one.time for one in self.frames if one.index == frame), None)
 
     def _frame_times(self) -> dict[str, float]:
         try:
@@ -174,6 +193,12 @@ class Result:
             return {entry["name"]: float(entry["time"]) for entry in json.loads(text)["files"]}
         except (UnfinishedError, ValueError, KeyError):
             return {}
+
+
+def _listed(value: float | Sequence[Any] | None) -> Sequence[Any]:
+    if value is None:
+        return ()
+    return value if isinstance(value, Sequence) else (value,)
 
 
 def read_columns(text: str) -> dict[str, Column]:

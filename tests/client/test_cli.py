@@ -120,6 +120,13 @@ def test_view_draws_a_folder(quiet_home: Path) -> None:
     assert (quiet_home / "p.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_view_takes_times_with_their_units(quiet_home: Path) -> None:
+    folder = write_run(quiet_home / "bar")
+    words = ("view", folder, "--camera", "-x", "--size", 200, 150, "--json", "--out", "p.png", "--time")
+    assert read(conoid(*words, "79 us"))["times"] == [80e-6]
+    assert conoid(*words, "79").stderr == "conoid: time = '79': write it with its unit, such as '60 us'\n"
+
+
 def test_view_says_what_it_knows(quiet_home: Path) -> None:
     result = conoid("view", write_run(quiet_home / "bar"), "--field", "misses")
     assert result.exit_code == 1
