@@ -42,6 +42,8 @@ class Field:
 FIELDS = {
     "mises": Field("von Mises stress", "MPa", 1e-6, "viridis"),
     "pressure": Field("pressure", "MPa", 1e-6, "RdBu_r", "centred"),
+    "principal_stress": Field("largest principal stress", "MPa", 1e-6, "RdBu_r", "centred"),
+    "damage": Field("damage", "", 1.0, ("#d9dfe6", "#f7d889", "#f49a3d", "#d4432c", "#7c0f34")),
     "plastic_strain": Field("plastic strain", "", 1.0, ("#d9dfe6", "#f7d889", "#f49a3d", "#d4432c", "#7c0f34")),
     "temperature": Field("temperature", "K", 1.0, "plasma"),
     "speed": Field("speed", "m/s", 1.0, "cividis"),

@@ -13,7 +13,7 @@ from typing import Any, Protocol, TypeAlias
 
 import msgspec
 
-from conoid.cases import layout, outcome
+from conoid.cases import history, layout, outcome
 from conoid.cases.messages import AnyMessage
 from conoid.cases.outcome import Outcome
 
@@ -202,9 +202,9 @@ def _listed(value: float | Sequence[Any] | None) -> Sequence[Any]:
 
 
 def read_columns(text: str) -> dict[str, Column]:
-    """The columns of CSV text with a header line; a column that is not all numbers stays text."""
+    """The columns of CSV text with a header line, by names without units; one that is not all numbers stays text."""
     rows = csv.reader(io.StringIO(text))
-    names = next(rows, [])
+    names = [history.split(name)[0] for name in next(rows, [])]
     columns: list[list[str]] = [list(column) for column in zip(*_whole(rows, len(names)), strict=True)]
     return {name: _column(column) for name, column in zip(names, columns or [[] for _ in names], strict=True)}
 
