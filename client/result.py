@@ -1,28 +1,26 @@
 """What a run leaves, read when it is asked for: the outcome, the time history, the frames, the resolved case."""
 
-import csv
-import io
 import json
-from array import array
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol, TypeAlias
+from typing import Any, Protocol
 
 import msgspec
 
-from conoid.cases import history, layout, outcome
+from conoid.cases import fragments, layout, outcome
 from conoid.cases.messages import AnyMessage
 from conoid.cases.outcome import Outcome
 
+from .columns import Columns, joined, read_columns
 from .errors import ClientError, UnfinishedError
 from .journal import from_line
 from .pictures import Drawn, Mirror, Scene, Wall, draw
 
-Column: TypeAlias = "array[float] | list[str]"
-"""Numbers as a double array; text, such as the limiter of dt, as a list."""
+_TABLE = re.compile(rf"{fragments.FOLDER}/fragments_(\d+)\.csv")
 
 
 class Folder(Protocol):
@@ -106,9 +104,34 @@ class Result:
         return data
 
     @cached_property
-    def history(self) -> dict[str, Column]:
-        """The columns of history.csv, in its order: step, t (s), dt (s), the energies (J), the probes."""
+    def history(self) -> Columns:
+        """The columns of history.csv, in its order: step, t (s), dt (s), the energies (J), the probes.
+
+        ``history.frame()`` is a pandas.DataFrame.
+        """
         return read_columns(self.folder.path(layout.HISTORY).read_text(encoding="utf-8"))
+
+    @cached_property
+    def fragment_tables(self) -> list[int]:
+        """The numbers of the frames of which there is a table of fragments."""
+        return sorted(int(found[1]) for name in self.folder.names() if (found := _TABLE.fullmatch(name)))
+
+    def fragments_of(self, index: int = -1) -> Columns:
+        """The fragments of a frame by its number, -1 is the last one; columns are those of ``cases/fragments.py``.
+
+        Raises UnfinishedError where there is no table of them.
+        """
+        known = self.fragment_tables
+        if not known or (index != -1 and index not in known):
+            wanted = "any frame" if index == -1 else f"frame {index}"
+            raise UnfinishedError(f"{self.folder.name} has no fragments of {wanted}; it has tables of {len(known)}")
+        name = f"{fragments.FOLDER}/{fragments.path(Path(), known[-1] if index == -1 else index).name}"
+        return read_columns(self.folder.path(name).read_text(encoding="utf-8"))
+
+    @cached_property
+    def fragments(self) -> Columns:
+        """The fragments of every frame, one below the other; ``fragments.frame()`` is a pandas.DataFrame."""
+        return joined((index, self.fragments_of(index)) for index in self.fragment_tables)
 
     @cached_property
     def messages(self) -> list[AnyMessage]:
@@ -199,23 +222,3 @@ def _listed(value: float | Sequence[Any] | None) -> Sequence[Any]:
     if value is None:
         return ()
     return value if isinstance(value, Sequence) else (value,)
-
-
-def read_columns(text: str) -> dict[str, Column]:
-    """The columns of CSV text with a header line, by names without units; one that is not all numbers stays text."""
-    rows = csv.reader(io.StringIO(text))
-    names = [history.split(name)[0] for name in next(rows, [])]
-    columns: list[list[str]] = [list(column) for column in zip(*_whole(rows, len(names)), strict=True)]
-    return {name: _column(column) for name, column in zip(names, columns or [[] for _ in names], strict=True)}
-
-
-def _whole(rows: Iterator[list[str]], length: int) -> Iterator[list[str]]:
-    """The rows that have every column: the last line of a file that is being written may be cut."""
-    return (row for row in rows if len(row) == length)
-
-
-def _column(column: list[str]) -> Column:
-    try:
-        return array("d", map(float, column))
-    except ValueError:
-        return column

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from conoid.client.columns import read_columns
 from conoid.client.errors import ClientError, UnfinishedError
-from conoid.client.result import Result, read_columns
+from conoid.client.result import Result
 
 from .bodies import write_run
 
