@@ -243,6 +243,7 @@ app.command(name="view", short_help="Draw frames, off screen.")(viewing.view_fra
 app.command(name="replay-balance", short_help="The loads of a run under another balance policy.")(
     reports.replay_balance
 )
+app.command(short_help="Write a run as one HTML file.")(reports.report)
 app.command(short_help="Tell in what two runs differ.")(reports.compare)
 app.add_typer(reports.figures, name="figures")
 

@@ -10,8 +10,10 @@ from conoid.cases.schema import Balance
 
 from . import compare as comparing
 from . import replay, tables
+from . import report as reporting
 from .errors import ViewError
 from .options import Json, SourceArgument, Token, Url, opened, show, show_json
+from .pictures import require_field
 
 figures = typer.Typer(no_args_is_help=True, help="Charts from what a run has told.")
 
@@ -67,6 +69,24 @@ def history_figure(
     curves = drawing("curves")
     with opened(source, url, token) as result:
         typer.echo(curves.save(curves.columns(result.history, column or ()), out))
+
+
+def report(
+    source: SourceArgument,
+    out: Annotated[Path | None, typer.Option("--out", help="The HTML file; named after the run if not given.")] = None,
+    field: Annotated[
+        list[str] | None, typer.Option("--field", help="A field to draw; may be repeated. Default: what tells most.")
+    ] = None,
+    pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="Draw frames.")] = True,
+    url: Url = None,
+    token: Token = None,
+) -> None:
+    """Write a run as one HTML file that needs no server and no network."""
+    with opened(source, url, token) as result:
+        for each in field or ():
+            require_field(each)
+        target = out or Path(f"{result.folder.name}.html")
+        typer.echo(reporting.write(result, target, field if pictures else ()))
 
 
 def compare(
