@@ -55,7 +55,7 @@ $(READY): requirements.lock pyproject.toml
 	$(call told,installing what the worker needs,$(PIP) -c requirements.lock setuptools \
 		&& $(PIP) -c requirements.lock --no-build-isolation -e ".[worker]")
 	$(call told,installing the rest,$(BIN)/python -m conoid.worker.compile & kernels=$$!; \
-		$(PIP) -r requirements.lock || { kill $$kernels; exit 1; }; wait $$kernels)
+		$(PIP) --no-deps -r requirements.lock || { kill $$kernels; exit 1; }; wait $$kernels)
 	@mkdir -p build/types/conoid
 	@for house in $(HOUSES); do ln -sfn ../../../$$house build/types/conoid/$$house; done
 	@touch $(READY)

@@ -8,6 +8,7 @@
       journal.jsonl          every event, one JSON line each, with seq: the truth
       history.csv            time history: clock, ledger, probes; history.parquet at the end, where pyarrow is there
       frames/000012.vtkhdf   one file a frame      frames/frames.vtkhdf.series  for ParaView
+      snapshots/000012.snap  surface and table of the fragments (cases/snapshot.py); snapshot.request asks for one
       checkpoints/000001200/ complete state, by global ids; checkpoint.request asks for one
       log/rank-0.log         one a rank            log/launcher.log
       outcome.json           written last
@@ -22,10 +23,12 @@ HISTORY_PARQUET = "history.parquet"
 OUTCOME = "outcome.json"
 FRAMES = "frames"
 FRAME_SERIES = "frames.vtkhdf.series"
-SNAPSHOTS = "snapshots"
 CHECKPOINTS = "checkpoints"
 CHECKPOINT_REQUEST = "checkpoint.request"
 """Whoever makes this file asks the worker for a checkpoint; the worker takes it away."""
+SNAPSHOTS = "snapshots"
+SNAPSHOT_REQUEST = "snapshot.request"
+"""Whoever makes this file asks the worker for a snapshot; the worker takes it away."""
 LOGS = "log"
 LAUNCHER_LOG = "launcher.log"
 SUBMISSION = "submission.json"
@@ -41,6 +44,16 @@ def frame(folder: Path, index: int) -> Path:
 def checkpoint(folder: Path, step: int) -> Path:
     """Path of the checkpoint before ``step`` in the run folder ``folder``."""
     return folder / CHECKPOINTS / f"{step:09d}"
+
+
+def snapshot(folder: Path, n: int) -> Path:
+    """Path of snapshot ``n`` in the run folder ``folder``."""
+    return folder / SNAPSHOTS / f"{n:06d}.snap"
+
+
+def share(folder: Path, n: int, rank: int) -> Path:
+    """What ``rank`` gives for snapshot ``n``; it is there until the snapshot is made."""
+    return folder / SNAPSHOTS / f".{n:06d}.{rank}"
 
 
 def rank_log(folder: Path, rank: int) -> Path:

@@ -117,6 +117,8 @@ class Counts(Message, frozen=True):
     fragments: int
     elements_per_rank: list[int]
     particles: int = 0
+    facets: int = 0
+    """That have broken."""
 
 
 class Balance(Message, frozen=True):
@@ -174,6 +176,33 @@ class Frame(Message, frozen=True):
     path: str
 
 
+class Snapshot(Message, frozen=True):
+    """A snapshot of the fragments (cases/snapshot.py) is in the run's folder. ``step`` and ``t`` are its own."""
+
+    channel: ClassVar[str] = "fragments"
+    n: int
+    path: str
+    """Relative to the run's folder."""
+    bytes: int
+    triangles: int
+    fragments: int
+    sha256: str
+    cause: str = ""
+    """``run.snapshots``, ``asked for``, ``start`` or ``end``."""
+    dropped: int = 0
+    """That were due since the one before and were not made."""
+    smallest: int = 0
+    """Where ``sizes`` begins."""
+    sizes: list[int] = []
+    """How many fragments are as long as 2^((smallest + i) / 2) m, and shorter than the next."""
+
+
+class Fragments(Snapshot, tag="snapshot", kw_only=True, frozen=True):
+    """The same on Zenoh, with the snapshot itself."""
+
+    blob: bytes
+
+
 class Log(Message, frozen=True):
     """A line for people."""
 
@@ -192,11 +221,14 @@ class Finished(Message, frozen=True):
     elapsed: float
 
 
-AnyMessage = Status | Started | Progress | Load | Balance | Groups | Checkpoint | Counts | Frame | Log | Finished
+AnyMessage = (
+    Status | Started | Progress | Load | Balance | Groups | Checkpoint | Counts | Frame | Snapshot | Log | Finished
+)
 
 _to_json, _to_msgpack = msgspec.json.Encoder(), msgspec.msgpack.Encoder()
 _from_json: msgspec.json.Decoder[AnyMessage] = msgspec.json.Decoder(AnyMessage)
 _from_msgpack: msgspec.msgpack.Decoder[AnyMessage] = msgspec.msgpack.Decoder(AnyMessage)
+_fragments = msgspec.msgpack.Decoder(Fragments)
 
 
 def to_json(message: AnyMessage) -> bytes:
@@ -204,9 +236,19 @@ def to_json(message: AnyMessage) -> bytes:
     return _to_json.encode(message)
 
 
-def to_msgpack(message: AnyMessage) -> bytes:
+def to_msgpack(message: AnyMessage | Fragments) -> bytes:
     """The payload of a Zenoh sample."""
     return _to_msgpack.encode(message)
+
+
+def with_blob(message: Snapshot, blob: bytes) -> Fragments:
+    """The message of a snapshot with its bytes."""
+    return Fragments(**msgspec.structs.asdict(message), blob=blob)
+
+
+def without_blob(message: Fragments) -> Snapshot:
+    """The message alone."""
+    return Snapshot(**{name: getattr(message, name) for name in Snapshot.__struct_fields__})
 
 
 def from_json(line: bytes | str) -> AnyMessage:
@@ -217,3 +259,8 @@ def from_json(line: bytes | str) -> AnyMessage:
 def from_msgpack(payload: bytes) -> AnyMessage:
     """Raises as ``from_json`` does."""
     return _from_msgpack.decode(payload)
+
+
+def fragments_from_msgpack(payload: bytes) -> Fragments:
+    """A sample of the class ``fragments``. Raises as ``from_json`` does."""
+    return _fragments.decode(payload)

@@ -183,6 +183,10 @@ class Run(Model):
     """Number of frames, evenly spaced to the end; the initial state is frame 0 (0: none are written)."""
     samples: Annotated[Count, Field(ge=1, le=1_000_000)] = 500
     """Number of lines of history.csv, evenly spaced."""
+    snapshots: Annotated[Count, Field(ge=0, le=100_000)] = 100
+    """Number of snapshots of the surface of the fragments, for looking on: evenly spaced to the end, and one of the
+    initial state (0: none but those asked for). At most one a second of wall time, and fewer where they would take more
+    than 1/200 of it; the first and the last are always made."""
     max_steps: Annotated[Count, Field(ge=1)] = 100_000_000
     """The run fails when it needs more."""
     max_wall_time: Annotated[Time, Positive] | None = None

@@ -38,9 +38,9 @@ def energy(told: Columns) -> Figure:
     """The whole ledger; its terms without the kinetic one and what came in; the residual."""
     figure, (left, middle, right) = _panels(3)
     t = _micro(told)
-    for name, colour in (("kinetic", "#4c78a8"), ("initial", _INK), ("external", "#9d755d")):
-        if name != "external" or any(told.numbers(name)):
-            left.plot(t, told.numbers(name), color=colour, label=name, linewidth=1.4)
+    left.plot(t, told.numbers("kinetic"), color="#4c78a8", label="kinetic", linewidth=1.4)
+    came = [a + b for a, b in zip(told.numbers("initial"), told.numbers("external"), strict=True)]
+    left.plot(t, came, color=_INK, label="initial + external", linewidth=1.4)
     there = ("kinetic", *(name for name in _LEDGER if name in told))
     total = [math.fsum(values) for values in zip(*(told.numbers(name) for name in there), strict=True)]
     left.plot(t, total, color="#e45756", label="sum of all terms", linewidth=1.0, linestyle="--")

@@ -42,6 +42,18 @@ const body = new Body("report", () => {});
 document.getElementById("replay").append(body.element);
 body.update(JSON.parse(document.getElementById("snapshots").textContent));
 """
+_STYLE = """
+#replay { --soft: #5a6775; --accent: #1f6feb; --line: #d9e0e7 }
+#replay [hidden], #replay h2 { display: none }
+.card-head .note, .field, .scale, .legend { color: var(--soft); font-size: 13.5px }
+.view3d { height: min(60vh, 500px); border: 1px solid var(--line); overflow: hidden; margin: .4rem 0 }
+.view3d canvas { display: block; width: 100%; height: 100%; touch-action: none }
+.scrub, .controls, .legend { display: flex; flex-wrap: wrap; align-items: center; gap: .4rem 1rem; margin: .5rem 0 }
+.scrub input { flex: 1 } .field, .scale, .legend span { display: inline-flex; align-items: center; gap: .5rem }
+.scale > i { width: 7.5rem; height: .6rem } .legend i { width: .6rem; height: .6rem }
+.row { display: grid; gap: .5rem 1.2rem; grid-template-columns: repeat(auto-fill, minmax(9rem, 1fr)) }
+.row dt { color: var(--soft); font-size: 12.5px } .row dd { margin: 0; font-weight: 600 }
+"""
 
 
 def html(result: Result) -> str:
@@ -60,10 +72,9 @@ def html(result: Result) -> str:
         blob = result.folder.path(name).read_bytes()
         entries.append({"n": int(Path(name).stem), "bytes": len(blob)})
         embedded.append(_script("application/octet-stream", _base64(blob), f"snapshot-{int(Path(name).stem)}"))
-    style = (_WEB / "style.css").read_text(encoding="utf-8")
     addresses = {name: f"data:text/javascript;base64,{_base64(code)}" for name, code in imports.items()}
     return "".join([
-        f"<template id=style><style>{style}</style></template><div id=replay></div>", *embedded,
+        f"<style>{_STYLE}</style><div id=replay></div>", *embedded,
         _script("application/json", _json(entries), "snapshots"),
         _script("importmap", _json({"imports": addresses})), _script("module", _START),
     ])  # fmt: skip

@@ -5,11 +5,10 @@ from collections.abc import AsyncIterator, Iterator
 from contextlib import ExitStack, asynccontextmanager, contextmanager
 
 from fastapi import FastAPI
-from fastapi.staticfiles import StaticFiles
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from . import errors, openapi
+from . import errors, openapi, page
 from .bell import Bell
 from .launch.local import LocalLauncher
 from .routes import cases, events, files, health, logs, me, runs
@@ -25,7 +24,7 @@ _SAFE_HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",
     "Content-Security-Policy": (
-        "default-src 'self'; script-src 'self' 'unsafe-inline'; style-src 'self' 'unsafe-inline'; "
+        "default-src 'self'; script-src 'self'; style-src 'self' 'unsafe-inline'; "
         "img-src 'self' data: blob:; worker-src 'self' blob:; frame-ancestors 'none'; base-uri 'none'; "
         "form-action 'none'"
     ),
@@ -79,8 +78,9 @@ def build_app(service: Service) -> FastAPI:
     app.add_middleware(_SafeHeaders)
     for router in ROUTERS:
         app.include_router(router)
+    app.state.page_problem = None
     if service.settings.web is not None:
-        app.mount("/", StaticFiles(directory=service.settings.web, html=True), name="page")
+        app.state.page_problem = page.install(app, service.settings.web, auth=service.settings.auth)
     return app
 
 

@@ -50,9 +50,10 @@ class _Server(uvicorn.Server):
 
     def __init__(self, service: Service) -> None:
         self._service = service
+        self._app = build_app(service)
         super().__init__(
             uvicorn.Config(
-                build_app(service),
+                self._app,
                 log_level="warning",
                 access_log=False,
                 server_header=False,
@@ -64,15 +65,15 @@ class _Server(uvicorn.Server):
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)
         if sockets and self.started:
-            announce(self._service, sockets[0])
+            announce(self._service, sockets[0], self._app.state.page_problem)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         self._service.bell.close()
         await super().shutdown(sockets)
 
 
-def announce(service: Service, listener: socket.socket) -> None:
-    """Writes server.json and prints one line."""
+def announce(service: Service, listener: socket.socket, page_problem: str | None) -> None:
+    """Writes server.json, prints one line, and with a page the address to open; None: there is no page."""
     host, port = listener.getsockname()[:2]
     url = f"http://{f'[{host}]' if ':' in host else host}:{port}"
     endpoint = service.telemetry.local_endpoint if service.telemetry else None
@@ -82,6 +83,10 @@ def announce(service: Service, listener: socket.socket) -> None:
     print(
         f"conoid.server: {url}  zenoh {endpoint or 'off'}  {slots} slots  runs in {service.settings.runs}", flush=True
     )
+    if page_problem:
+        print(f"conoid.server: the page is without charts and 3-D: {page_problem}", flush=True)
+    if page_problem is not None:
+        print(f"open {url}", flush=True)
 
 
 def _leave(_signal: int, _frame: FrameType | None) -> None:

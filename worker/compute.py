@@ -68,7 +68,9 @@ def compute(
         checkpoint.forget(folder)
     if history is not None:
         history.close()
-    return _sum_up(loop, folder, failure, start, cpu, setup, time.monotonic() - began)
+    outcome = _sum_up(loop, folder, failure, start, cpu, setup, time.monotonic() - began)
+    loop.snapshots.close()
+    return outcome
 
 
 def _resumed(case: Case, folder: Path, comm: Comm) -> tuple[Simulation, Start]:

@@ -22,6 +22,7 @@ from .output.history import History
 from .output.journal import Journal
 from .signals import Signals
 from .simulation import Simulation
+from .snapshots.stage import Snapshots
 from .state import Floats
 
 CANCELLED, WALL_TIME, MAX_STEPS = 1, 2, 3
@@ -100,6 +101,7 @@ class Loop:
         self._counted = (0, 0, 0)
         self.balance = balance
         self._groups = Groups(sim, balance.trigger.cost)
+        self.snapshots = Snapshots(sim, folder, journal)
 
     def run(self) -> None:
         """Steps until the end time, or until a reason to stop. Raises PhysicsError."""
@@ -136,6 +138,8 @@ class Loop:
                 self._look(before)
             if clock.frame_due:
                 self._write_frame()
+            self.snapshots.look(sim, due=sim.reduction.snapshot, ending=ending)
+        self.snapshots.tell()
 
     def _move(self) -> None:
         """Tets to other ranks, when that is due and a step is left."""
@@ -182,6 +186,9 @@ class Loop:
         own.report = sim.comm.rank == 0 and now - self._reported > _REPORT_EVERY
         own.groups = own.report and self._groups.due(sim.clock.t, now)
         own.grown = self.balance.grown(sim)
+        own.snapshot = (
+            sim.comm.rank == 0 and not sim.reduction.snapshot and self.snapshots.due(sim.clock, now, look=own.report)
+        )
         every = sim.case.run.checkpoint_every
         own.checkpoint = sim.comm.rank == 0 and (
             (every is not None and now - self._kept > every) or (own.report and self._asked())
@@ -268,6 +275,7 @@ class Loop:
             messages.Counts, elements=model.elements_global, nodes=model.nodes_global, shared=shared,
             fragments=sim.record.count if sim.record is not None else len(model.parts), elements_per_rank=held or [],
             particles=sim.erosion.particles if sim.erosion is not None else 0,
+            facets=sim.fracture.broken if sim.fracture is not None else 0,
         )  # fmt: skip
 
     def _tell(self, kind: type[messages.Message], **fields: Any) -> None:

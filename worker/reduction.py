@@ -98,6 +98,8 @@ class Fields:
     """A rank has more surface nodes than the balance allows it."""
     checkpoint = Flag()
     """A checkpoint is asked for."""
+    snapshot = Flag()
+    """A snapshot of the fragments is due."""
 
     def __init__(self) -> None:
         self.words: Ints = np.zeros(self.size, np.int64)
@@ -118,4 +120,4 @@ class StepReduction(Fields):
     def begin_again(self) -> None:
         """Clears what was asked for once: a run that goes on from a checkpoint does not stop or report again."""
         self.stop = 0
-        self.report = self.groups = self.grown = self.checkpoint = False
+        self.report = self.groups = self.grown = self.checkpoint = self.snapshot = False

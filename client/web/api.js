@@ -19,12 +19,15 @@ export class Problem extends Error {
 
 const address = (path) => new URL(path, document.baseURI);
 
-async function send(path, { method = "GET", headers = {}, signal } = {}) {
+async function send(path, { method = "GET", headers = {}, signal, cache = "no-store" } = {}) {
   const shown = token.get() ? { Authorization: `Bearer ${token.get()}` } : {};
-  const response = await fetch(address(path), { method, headers: { ...shown, ...headers }, signal, cache: "no-store" });
+  const response = await fetch(address(path), { method, headers: { ...shown, ...headers }, signal, cache });
   if (!response.ok) throw new Problem(response.status, await response.json().catch(() => null));
   return response;
 }
+
+// Snapshots never change, and the server says so: the browser keeps them.
+export const binary = async (path, options) => (await send(path, { ...options, cache: "default" })).arrayBuffer();
 
 export const call = async (path, options) => (await send(path, options)).json();
 

@@ -2,6 +2,7 @@
 
 import { Problem, call, token } from "./api.js";
 import { duration, h, meter, moment, pill } from "./figures.js";
+import { offer } from "./libraries.js";
 import { FINAL } from "./live.js";
 import { RunPage } from "./run.js";
 
@@ -104,8 +105,11 @@ function route() {
   show(run ? new RunPage(decodeURIComponent(run)) : new RunsPage());
 }
 
+// A server with tokens is not asked before there is one.
 async function start() {
   try {
+    const { auth } = await offer();
+    if (auth && !token.get()) return signIn();
     const me = await call("v1/me");
     who.textContent = me.owner;
     leave.hidden = !token.get();

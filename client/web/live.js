@@ -1,24 +1,30 @@
-// What is known of a run from its messages: messages in, one record out; nothing is drawn here.
+// What is known of a run: the history first, then its messages; one record out, nothing is drawn here.
 
 export const FINAL = new Set(["succeeded", "failed", "cancelled", "timed_out", "lost"]);
-export const PHASES = ["compute", "contact", "exchange", "output", "wait"];
+export const GROUPS = ["compute", "contact", "exchange", "waiting", "output", "descheduled"];
 export const TERMS = [["kinetic", "kinetic"], ["elastic", "elastic"], ["plastic", "plastic"], ["viscous", "viscous"], ["contact", "contact-work"], ["friction", "friction"], ["eroded", "eroded"], ["fracture", "fracture"], ["cohesive", "cohesive"]];
 
-const MOST_POINTS = 1200;
-const MOST_LINES = 500;
+const MOST_POINTS = 2000;
+const MOST_LINES = 500; // Of the log, a rank.
+const OWN = new Set(["contact", "exchange", "output"]); // Phases with a group of their own; the others are computing.
 
 export class Live {
   constructor(run) {
-    Object.assign(this, { run, seq: 0, state: "accepted", cause: null, message: "", began: null, wall: 0, frames: 0 });
-    Object.assign(this, { started: null, progress: null, load: null, counts: null, finished: null, log: [] });
-    this.ledger = []; // { t, wall, energy }
-    this.loads = []; // { wall, imbalance, busy: [share a rank] }
+    Object.assign(this, { run, seq: 0, state: "accepted", cause: null, message: "", began: null, wall: 0, heard: 0 });
+    Object.assign(this, { started: null, progress: null, load: null, counts: null, finished: null, loaded: 0 });
+    this.ledger = []; // { t, dt, limiter, energy }
+    this.loads = []; // { t, imbalance, contact: share, shares: [of the busiest, a rank] }
+    this.sizes = []; // { t, nodes, facets, fragments }
+    this.balances = []; // the messages
+    this.snapshots = []; // { n, t, fragments, … }
+    this.logs = new Map(); // rank: [messages]
   }
 
   take(message) {
     if (message.seq <= this.seq) return false;
     this.seq = message.seq;
     this.wall = message.wall;
+    this.heard = Date.now() / 1000;
     this[`on_${message.type}`]?.(message);
     return true;
   }
@@ -35,26 +41,35 @@ export class Live {
 
   on_progress(message) {
     this.progress = message;
-    keep(this.ledger, { t: message.t, energy: message.energy });
+    const { t, dt, limiter, energy } = message;
+    keep(this.ledger, { t, dt, limiter, energy });
   }
 
   on_load(message) {
-    const groups = grouped(message.phases, this.loaded ? message.wall - this.loaded : 0);
-    const totals = rankTotals(groups);
-    const lost = (rank) => (groups.exchange?.[rank] ?? 0) + (groups.wait?.[rank] ?? 0);
-    const busy = totals.map((total, rank) => (total > 0 ? 1 - lost(rank) / total : 0));
+    const groups = grouped(message, this.loaded ? message.wall - this.loaded : 0);
     this.loaded = message.wall;
-    this.load = { ...message, groups, totals, busy };
-    keep(this.loads, { t: message.t, imbalance: message.imbalance, busy });
+    this.load = { ...message, groups, totals: totals(groups) };
+    keep(this.loads, { t: message.t, imbalance: message.imbalance, ...compared(groups) });
   }
 
-  on_counts(message) { this.counts = message; }
+  on_counts(message) {
+    this.counts = message;
+    const { t, nodes, facets, fragments } = message;
+    keep(this.sizes, { t, nodes, facets, fragments });
+  }
 
-  on_frame() { this.frames += 1; }
+  on_balance(message) { this.balances.push(message); }
+
+  on_snapshot(message) {
+    if (!this.snapshots.some(({ n }) => n === message.n)) this.snapshots.push(message);
+  }
 
   on_log(message) {
-    this.log.push(message);
-    if (this.log.length > MOST_LINES) this.log.shift();
+    const rank = message.rank ?? 0;
+    if (!this.logs.has(rank)) this.logs.set(rank, []);
+    const lines = this.logs.get(rank);
+    lines.push(message);
+    if (lines.length > MOST_LINES) lines.shift();
   }
 
   on_finished(message) { this.finished = message; }
@@ -64,10 +79,14 @@ export class Live {
     return this.progress ? Math.min(1, Math.max(0, this.progress.t / this.progress.end_time)) : 0;
   }
 
+  // Wall time since the first step of the run's first start, s.
   get elapsed() {
     if (this.began === null) return undefined;
     return (FINAL.has(this.state) ? this.wall : Date.now() / 1000) - this.began;
   }
+
+  // How old the newest message is, s, by this machine's clock.
+  get age() { return this.heard ? Date.now() / 1000 - this.heard : undefined; }
 }
 
 // A series that grows too long loses every second point of its older half.
@@ -78,18 +97,33 @@ function keep(series, point) {
   series.splice(0, half, ...series.slice(0, half).filter((_, i) => i % 2 === 0));
 }
 
-// Phases of the worker summed into PHASES. Where it does not time its waits, what is left of the interval is the wait.
-function grouped(phases, interval) {
+// CPU seconds of each rank by GROUPS. Waiting for other ranks costs CPU time and is measured; what is left of the wall
+// time is neither: the machine has not run the rank, or the rank slept.
+export function grouped({ phases = {}, waiting = [] }, interval) {
   const sums = {};
-  for (const [name, seconds] of Object.entries(phases ?? {})) {
-    const group = PHASES.includes(name) ? name : "compute";
+  for (const [name, seconds] of Object.entries(phases)) {
+    const group = OWN.has(name) ? name : "compute";
     sums[group] = seconds.map((value, rank) => value + (sums[group]?.[rank] ?? 0));
   }
-  if (!sums.wait && interval > 0) sums.wait = rankTotals(sums).map((total) => Math.max(0, interval - total));
-  return Object.fromEntries(PHASES.filter((name) => sums[name]).map((name) => [name, sums[name]]));
+  if (sums.exchange && waiting.length) {
+    sums.waiting = waiting.map((value, rank) => Math.min(value, sums.exchange[rank]));
+    sums.exchange = sums.exchange.map((value, rank) => value - sums.waiting[rank]);
+  }
+  if (interval > 0) sums.descheduled = totals(sums).map((total) => Math.max(0, interval - total));
+  return Object.fromEntries(GROUPS.filter((name) => sums[name]).map((name) => [name, sums[name]]));
 }
 
-function rankTotals(groups) {
+function totals(groups) {
   const lists = Object.values(groups);
   return (lists[0] ?? []).map((_, rank) => lists.reduce((sum, seconds) => sum + seconds[rank], 0));
+}
+
+const sum = (values = []) => values.reduce((total, value) => total + value, 0);
+
+// The work of each rank over that of the busiest one, and the share of contact in the CPU time.
+export function compared(groups) {
+  const work = totals(Object.fromEntries(["compute", "contact", "output"].filter((name) => groups[name]).map((name) => [name, groups[name]])));
+  const most = Math.max(...work, 1e-300);
+  const all = sum(Object.entries(groups).filter(([name]) => name !== "descheduled").flatMap(([, seconds]) => seconds));
+  return { shares: work.map((value) => value / most), contact: all > 0 ? sum(groups.contact) / all : 0 };
 }

@@ -78,12 +78,12 @@ class Switch:
         self._told = True
         self._mark = (0.0, 0.0, 0.0, 0)
 
-    def tell(self, message: messages.AnyMessage) -> None:
+    def tell(self, message: messages.AnyMessage, blob: bytes = b"") -> None:
         """Takes a message from the solver."""
         if isinstance(message, messages.Progress):
             self._next_block(message.step)
         if self._told:
-            self._telemetry.tell(message)
+            self._telemetry.tell(message, blob)
 
     def _next_block(self, step: int) -> None:
         if self._warm:

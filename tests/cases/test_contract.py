@@ -33,6 +33,10 @@ EXAMPLES: list[messages.AnyMessage] = [
     ),
     messages.Counts(run="r", seq=5, elements=6, nodes=8, shared=4, fragments=1, elements_per_rank=[3, 3]),
     messages.Frame(run="r", seq=6, index=12, path="frames/000012.vtkhdf"),
+    messages.Snapshot(
+        run="r", seq=12, step=200, t=1e-6, n=3, path="snapshots/000003.snap", bytes=1024, triangles=12, fragments=2,
+        sha256="0" * 64, cause="asked for", dropped=1, smallest=-14, sizes=[1, 0, 1],
+    ),
     messages.Log(run="r", seq=7, level="warning", text="a rank waits", rank=1),
     messages.Finished(run="r", seq=8, state=State.SUCCEEDED, digest="0" * 64, steps=7, elapsed=1.5),
 ]  # fmt: skip
@@ -52,6 +56,15 @@ def test_messages_travel_unchanged(message: messages.AnyMessage) -> None:
     assert plain["type"] == type(message).__name__.lower()
     assert plain["v"] == messages.VERSION
     assert message.channel in keys.CLASSES
+
+
+def test_a_snapshot_travels_with_its_bytes_and_is_read_without() -> None:
+    told = next(example for example in EXAMPLES if isinstance(example, messages.Snapshot))
+    payload = messages.to_msgpack(messages.with_blob(told, b"CONOSNAP"))
+    assert messages.from_msgpack(payload) == told
+    both = messages.fragments_from_msgpack(payload)
+    assert both.blob == b"CONOSNAP"
+    assert messages.without_blob(both) == told
 
 
 def test_a_reader_ignores_fields_of_later_versions() -> None:

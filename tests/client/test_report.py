@@ -9,10 +9,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from conoid.client import report
+from conoid.client import replay3d, report
 from conoid.client.cli import app
 from conoid.client.errors import UnfinishedError
 from conoid.client.result import Result
+from conoid.server import page
 
 from .bodies import write_fragments, write_history, write_run
 
@@ -110,3 +111,55 @@ def test_the_command_names_the_file_after_the_run(folder: Path, quiet_home: Path
     assert "Pictures" not in read(quiet_home / "bar.html").text
     wrong = CliRunner().invoke(app, ["report", str(folder), "--field", "x"])
     assert "field = 'x': allowed: mises" in wrong.stderr
+
+
+# The replay -----------------------------------------------------------------------------------------------------------
+
+
+def with_snapshots(folder: Path, n: int) -> Result:
+    (folder / "snapshots").mkdir()
+    for index in range(n):
+        (folder / "snapshots" / f"{index:06d}.snap").write_bytes(b"CONOSNAP" + bytes([index]))
+    return Result.open(folder)
+
+
+def modules(html: str) -> dict[str, str]:
+    """The embedded modules by the names by which they are imported."""
+    found = re.search(r'<script type="importmap">(.*?)</script>', html)
+    assert found is not None
+    imports: dict[str, str] = json.loads(found[1])["imports"]
+    return {name: base64.b64decode(address.partition(",")[2]).decode() for name, address in imports.items()}
+
+
+def test_a_replay_has_every_module_that_it_imports(folder: Path, tmp_path: Path) -> None:
+    html = report.write(with_snapshots(folder, 3), tmp_path / "bar.html", []).read_text()
+    embedded = modules(html)
+    assert "conoid/view3d.js" in embedded
+    for name, code in embedded.items():
+        if name != "conoid/three":
+            for used in re.findall(r"""(?:from|import)\s*\(?\s*["']([^"']+)["']""", code):
+                assert used in embedded, f"{name} imports {used}"
+    assert [int(n) for n in re.findall(r"id=snapshot-(\d+)", html)] == [0, 1, 2]
+    assert base64.b64encode(b"CONOSNAP\x02").decode() in html
+
+
+def test_of_many_snapshots_some_are_embedded_evenly(folder: Path) -> None:
+    html = replay3d.html(with_snapshots(folder, 100))
+    shown = [int(n) for n in re.findall(r"id=snapshot-(\d+)", html)]
+    assert len(shown) == replay3d.MOST
+    assert (shown[0], shown[-1]) == (0, 99)
+
+
+def test_without_snapshots_there_is_no_replay_and_without_three_a_line(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert replay3d.html(Result.open(folder)) == ""
+    monkeypatch.setattr(replay3d, "PACKAGE", "not-there")
+    assert replay3d.html(with_snapshots(folder, 1)) == (
+        "<p class=pale>no replay in 3-D: not-there 3.18.0 is not installed: pip install --no-deps not-there==3.18.0</p>"
+    )
+
+
+def test_the_replay_draws_with_what_the_page_draws_with() -> None:
+    assert (replay3d.PACKAGE, replay3d.VERSION) == (page.PACKAGE, page.VERSION)
+    assert page.TESTED["three/index.js"] == replay3d.THREE

@@ -26,12 +26,12 @@ from ..errors import InputError
 from ..parallel.comm import Comm
 from .parcel import Parcel, Table, take
 
-FORMAT = 2
-"""Of the files; 2 has the step reduction and contact under names of their own. Others are not read."""
+FORMAT = 3
+"""Of the files; 3 has a word for snapshots in the step reduction. Others are not read."""
 _KEPT = 2
 """Checkpoints that stay; the older ones go."""
 _MANIFEST = "manifest.json"
-_FREE = ("ranks", "cut_scale", "max_steps", "max_wall_time", "checkpoint_every", "residual_limit")
+_FREE = ("ranks", "cut_scale", "max_steps", "max_wall_time", "checkpoint_every", "residual_limit", "snapshots")
 """Keys of ``run`` that may change when a run goes on."""
 _PIECE = 1 << 24
 """Bytes that are hashed at once."""

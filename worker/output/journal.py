@@ -17,8 +17,8 @@ M = TypeVar("M", bound=messages.Message)
 class Listener(Protocol):
     """Who is told of a message once it is in the journal."""
 
-    def tell(self, message: messages.AnyMessage) -> None:
-        """Takes the message without waiting for anybody."""
+    def tell(self, message: messages.AnyMessage, blob: bytes = b"") -> None:
+        """Takes the message without waiting for anybody; ``blob``: the bytes that it tells of, where there are any."""
 
 
 class Journal:
@@ -29,23 +29,27 @@ class Journal:
         self._run = run
         self.frames: set[int] = set()
         """Indices of the frames that it tells of."""
+        self.snapshots = 0
+        """One more than the largest number of a snapshot that it tells of."""
         self._seq = 0
         for message in _written(path):
             self._seq = message.seq
             if isinstance(message, messages.Frame):
                 self.frames.add(message.index)
+            elif isinstance(message, messages.Snapshot):
+                self.snapshots = max(self.snapshots, message.n + 1)
         self._file = path.open("ab", buffering=0)
         if path.stat().st_size and not path.read_bytes().endswith(b"\n"):
             self._file.write(b"\n")
         self._listener = listener
 
-    def write(self, kind: type[M], step: int = 0, t: float = 0.0, **fields: Any) -> M:
-        """Writes one message and passes it on."""
+    def write(self, kind: type[M], step: int = 0, t: float = 0.0, blob: bytes = b"", **fields: Any) -> M:
+        """Writes one message and passes it on, with the ``blob`` that it tells of."""
         self._seq += 1
         message = kind(run=self._run, seq=self._seq, wall=time.time(), step=step, t=t, **fields)
         self._file.write(msgspec.json.encode(message) + b"\n")
         if self._listener is not None:
-            self._listener.tell(message)  # type: ignore[arg-type]
+            self._listener.tell(message, blob)  # type: ignore[arg-type]
         return message
 
     def starting(self, what: str) -> None:

@@ -1,11 +1,15 @@
 """Messages on Zenoh, from a thread of their own behind a bounded ring: the solver never waits for the network.
 
+A snapshot goes out with its bytes; when some wait already, the oldest of them goes without, and whoever wants it
+fetches it over HTTP.
+
 ``put`` reports no loss and may stall its caller, so it runs here; when the ring is full the oldest message is dropped,
 and a reader who sees the gap in ``seq`` refills it from the journal. Without a router the thread tries
 again now and then; the run does not mind.
 """
 
 import json
+import logging
 import os
 import threading
 from collections import deque
@@ -17,10 +21,14 @@ from conoid.cases import keys, messages
 _RING = 1024
 """Messages that wait for the network. Chosen: more than a minute of a run, which sends some ten a
 second."""
+_BLOBS = 2
+"""Snapshots that wait for the network with their bytes, a megabyte each. Chosen: one that is sent, and the newest."""
 _RETRY = 2.0
 """s between two attempts to reach a router. Chosen."""
 _LINGER = 1.0
 """s that the last messages get to leave. Chosen: the journal has them."""
+
+log = logging.getLogger("conoid.worker")
 
 
 class Telemetry:
@@ -29,19 +37,32 @@ class Telemetry:
     def __init__(self, endpoint: str, prefix: str) -> None:
         self._endpoint = endpoint
         self._prefix = prefix
-        self._ring: deque[messages.AnyMessage] = deque()
+        self._ring: deque[messages.AnyMessage | messages.Fragments] = deque()
+        self.dropped = self.bare = 0
+        """Messages that were not sent, and snapshots that were sent without their bytes."""
         self._wake = threading.Condition()
         self._closing = False
         self._thread = threading.Thread(target=self._work, name="telemetry", daemon=True)
         self._thread.start()
 
-    def tell(self, message: messages.AnyMessage) -> None:
-        """Queues a message; O(1), never waits for the network."""
+    def tell(self, message: messages.AnyMessage, blob: bytes = b"") -> None:
+        """Queues a message, a snapshot with its bytes; never waits for the network."""
+        whole = isinstance(message, messages.Snapshot) and blob
         with self._wake:
             if len(self._ring) == _RING:
                 self._ring.popleft()
-            self._ring.append(message)
+                self.dropped += 1
+            self._ring.append(messages.with_blob(message, blob) if whole else message)  # type: ignore[arg-type]
+            if whole:
+                self._thin_out()
             self._wake.notify()
+
+    def _thin_out(self) -> None:
+        """Takes the bytes of all snapshots that wait but the newest."""
+        waiting = [i for i, message in enumerate(self._ring) if isinstance(message, messages.Fragments)]
+        for i in waiting[:-_BLOBS]:
+            self._ring[i] = messages.without_blob(self._ring[i])  # type: ignore[arg-type]
+            self.bare += 1
 
     def close(self) -> None:
         """Gives the thread a moment to send what is left; it dies with the process if the network hangs."""
@@ -49,6 +70,8 @@ class Telemetry:
             self._closing = True
             self._wake.notify()
         self._thread.join(_LINGER)
+        if self.dropped or self.bare:
+            log.warning("Zenoh: %d messages not sent, %d snapshots sent without their bytes", self.dropped, self.bare)
 
     def _work(self) -> None:
         session = None
@@ -76,7 +99,7 @@ class Telemetry:
         with self._wake:
             return self._closing or self._wake.wait_for(lambda: self._closing, seconds)
 
-    def _next(self) -> messages.AnyMessage | None:
+    def _next(self) -> messages.AnyMessage | messages.Fragments | None:
         with self._wake:
             self._wake.wait_for(lambda: self._ring or self._closing)
             return self._ring.popleft() if self._ring else None

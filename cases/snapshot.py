@@ -1,0 +1,134 @@
+"""A snapshot of the fragments of a run as one block of bytes: in the run's folder, over Zenoh and over HTTP the same.
+
+::
+
+    bytes  0 to  7    CONOSNAP
+           8 to 11    version, uint32
+          12 to 15    H, the length of the header, uint32
+          16 to 16+H  the header, JSON, filled up with spaces
+          from there  the arrays, each at a multiple of 8, where the header says; little-endian
+
+Vertices belong to one fragment each, so that fragments can be drawn apart. ``docs/snapshots.md`` has the arrays.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import msgspec
+
+MAGIC = b"CONOSNAP"
+VERSION = 1
+"""Of the layout; a reader of another one refuses it."""
+TYPES = {"uint8": "B", "uint16": "H", "uint32": "I", "int64": "q", "float32": "f", "float64": "d"}
+"""Types of arrays, and their letters in Python's ``struct``."""
+REST = -1
+"""``fragment_id`` of the last row, where it is the sum of all fragments that have no row of their own."""
+FIELD = "field:"
+"""What the names of the arrays of fields begin with."""
+_START = 16
+"""Bytes before the header."""
+_FAR = 1 << 40
+"""An offset with more digits than any: its header is the longest."""
+
+
+class Field(msgspec.Struct, kw_only=True, frozen=True):
+    """A field of triangles in 8 bits: 0 is ``low``, 255 is ``high``."""
+
+    unit: str
+    low: float
+    high: float
+
+
+class Array(msgspec.Struct, kw_only=True, frozen=True):
+    """An array; ``offset`` counts from the beginning of the blob."""
+
+    dtype: str
+    shape: list[int]
+    offset: int
+
+
+class Header(msgspec.Struct, kw_only=True, frozen=True):
+    """What a snapshot says before its arrays. ``t`` in s, ``box`` in m."""
+
+    n: int
+    step: int
+    t: float
+    box: tuple[tuple[float, float, float], tuple[float, float, float]]
+    """Low and high corner: 0 and 65535 of ``positions``."""
+    ranks: int
+    parts: list[str]
+    tets: int
+    """Of the whole model."""
+    surface_triangles: int
+    """Before some were merged or left out."""
+    fragments_total: int
+    fragments_listed: int
+    """Rows of the table but the last, where that is the rest."""
+    fields: dict[str, Field]
+    arrays: dict[str, Array] = {}
+
+
+@dataclass(frozen=True)
+class Column:
+    """An array to be written: a type of ``TYPES``, its shape, its bytes in C order."""
+
+    dtype: str
+    shape: tuple[int, ...]
+    data: bytes | memoryview
+
+
+_decoder = msgspec.json.Decoder(Header)
+
+
+def pack(header: Header, columns: Mapping[str, Column]) -> bytes:
+    """The blob; ``header.arrays`` is filled in here."""
+    places = {name: Array(dtype=c.dtype, shape=list(c.shape), offset=_FAR) for name, c in columns.items()}
+    room = _rounded(len(_told(header, places)))
+    blob, size = [], _START + room
+    for name, column in columns.items():
+        data = bytes(column.data)
+        places[name] = msgspec.structs.replace(places[name], offset=size)
+        blob.append(data.ljust(_rounded(len(data)), b"\0"))
+        size += len(blob[-1])
+    text = _told(header, places).ljust(room)
+    return b"".join([MAGIC, VERSION.to_bytes(4, "little"), room.to_bytes(4, "little"), text, *blob])
+
+
+def header_of(blob: bytes | memoryview) -> Header:
+    """The header of a blob. Raises ValueError for what is no snapshot, or not whole."""
+    data = memoryview(blob)
+    if bytes(data[:8]) != MAGIC:
+        raise ValueError("not a snapshot: it does not begin with CONOSNAP")
+    version, room = (int.from_bytes(data[at : at + 4], "little") for at in (8, 12))
+    if version != VERSION:
+        raise ValueError(f"a snapshot of version {version}; known: {VERSION}")
+    try:
+        header = _decoder.decode(data[_START : _START + room])
+    except msgspec.MsgspecError as error:
+        raise ValueError(f"the header of the snapshot cannot be read: {error}") from None
+    for name, array in header.arrays.items():
+        if array.dtype not in TYPES or array.offset % 8 or array.offset + size_of(array) > len(data):
+            raise ValueError(f"the snapshot has no whole array {name!r}")
+    return header
+
+
+def view(blob: bytes | memoryview, array: Array) -> memoryview:
+    """One array of a blob, flat, without a copy; for machines that are little-endian themselves."""
+    flat: memoryview = memoryview(blob)[array.offset : array.offset + size_of(array)]
+    return flat.cast(TYPES[array.dtype])  # type: ignore[call-overload, no-any-return]
+
+
+def size_of(array: Array) -> int:
+    """Bytes of an array."""
+    items = 1
+    for length in array.shape:
+        items *= length
+    return items * int("".join(digit for digit in array.dtype if digit.isdigit())) // 8
+
+
+def _told(header: Header, places: dict[str, Array]) -> bytes:
+    return msgspec.json.encode(msgspec.structs.replace(header, arrays=places))
+
+
+def _rounded(size: int) -> int:
+    return -(-size // 8) * 8

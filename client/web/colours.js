@@ -1,0 +1,35 @@
+// Colours of the view: one for each of many, and a scale from low to high that grey prints and the colour blind keep apart.
+
+const NAMED = ["#3b7dd8", "#e07b39", "#2aa198", "#c2334a", "#8e6bd1", "#7f9f2f", "#d05a8c", "#5c6977", "#e0a32e", "#4fae7b"];
+// Of the viridis scale (van der Walt and Smith 2015, CC0), at equal distances.
+const SCALE = ["#440154", "#482878", "#3e4989", "#31688e", "#26828e", "#1f9e89", "#35b779", "#6ece58", "#b5de2b", "#fde725"];
+
+const bytes = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
+
+// Of the number of a rank or a part.
+export const named = (number) => NAMED[number % NAMED.length];
+export const SCALE_CSS = `linear-gradient(90deg, ${SCALE.join(", ")})`;
+
+// 256 colours as RGBA bytes: of numbers from 0 on, or of a scale.
+export function map(scale) {
+  const out = new Uint8Array(4 * 256);
+  for (let i = 0; i < 256; i += 1) out.set([...(scale ? between(i / 255) : bytes(named(i))), 255], 4 * i);
+  return out;
+}
+
+function between(share) {
+  const at = share * (SCALE.length - 1);
+  const [a, b] = [SCALE[Math.floor(at)], SCALE[Math.ceil(at)]].map(bytes);
+  return a.map((low, i) => Math.round(low + (b[i] - low) * (at % 1)));
+}
+
+// A colour that a fragment keeps from snapshot to snapshot, from its id alone; large ones are not always grey.
+export function ofFragment(id) {
+  if (id < 0n) return [140, 146, 152];
+  const turn = Number((BigInt.asUintN(64, (id + 1n) * 0x9e3779b97f4a7c15n)) >> 40n) / 2 ** 24;
+  const light = 0.5 + 0.16 * (Number((id * 2654435761n) & 255n) / 255 - 0.5);
+  return [0, 8, 4].map((n) => {
+    const k = (n + turn * 12) % 12;
+    return Math.round(255 * (light - 0.26 * Math.max(-1, Math.min(k - 3, 9 - k, 1))));
+  });
+}

@@ -1,0 +1,74 @@
+// A snapshot of the fragments: from bytes (docs/snapshots.md) to what the view draws and the tables show.
+
+const MAGIC = "CONOSNAP";
+const VERSION = 1;
+const START = 16;
+const TYPES = {
+  uint8: Uint8Array, uint16: Uint16Array, uint32: Uint32Array, int64: BigInt64Array, float32: Float32Array, float64: Float64Array,
+};
+const MOST_ROWS = 65536; // A vertex names its row in 16 bits.
+
+// { header, arrays: { name: typed array, flat } }, without a copy. Throws Error for what is no snapshot.
+export function decode(buffer) {
+  const bytes = new DataView(buffer);
+  if (buffer.byteLength < START || new TextDecoder().decode(new Uint8Array(buffer, 0, 8)) !== MAGIC) throw new Error("not a snapshot");
+  if (bytes.getUint32(8, true) !== VERSION) throw new Error(`a snapshot of version ${bytes.getUint32(8, true)}; known: ${VERSION}`);
+  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, START, bytes.getUint32(12, true))));
+  const arrays = {};
+  for (const [name, { dtype, shape, offset }] of Object.entries(header.arrays)) {
+    arrays[name] = new TYPES[dtype](buffer, offset, shape.reduce((size, length) => size * length, 1));
+  }
+  if (arrays.fragment_id.length > MOST_ROWS) throw new Error(`${arrays.fragment_id.length} rows of fragments; most: ${MOST_ROWS}`);
+  return { header, arrays };
+}
+
+// One corner after the other, so that neighbours need not agree on anything: x, y, z and the row of the fragment.
+export function corners({ positions, triangles, vertex_fragment: rows }) {
+  const out = new Uint16Array(4 * triangles.length);
+  for (let i = 0, o = 0; i < triangles.length; i += 1) {
+    const vertex = triangles[i];
+    out[o++] = positions[3 * vertex];
+    out[o++] = positions[3 * vertex + 1];
+    out[o++] = positions[3 * vertex + 2];
+    out[o++] = rows[vertex];
+  }
+  return out;
+}
+
+// What triangles are coloured by: "fragment", "rank", "part" and the fields of this case.
+export const colourings = ({ header }) => ["fragment", "rank", "part", ...Object.keys(header.fields)];
+
+// One byte a corner: the rank and the part by number, a field between its low and its high.
+export function cornerValues({ arrays }, by) {
+  const name = { rank: "triangle_rank", part: "triangle_part" }[by] ?? `field:${by}`;
+  const values = arrays[name];
+  const out = new Uint8Array(arrays.triangles.length);
+  if (by === "fragment" || !values) return out;
+  for (let i = 0; i < values.length; i += 1) out.fill(values[i], 3 * i, 3 * i + 3);
+  return out;
+}
+
+// One row of the table of fragments, in SI; `rest` when it stands for all that have no row of their own.
+export function fragment({ arrays }, row) {
+  const vector = (name) => [0, 1, 2].map((axis) => arrays[name][3 * row + axis]);
+  return {
+    row, id: arrays.fragment_id[row], rest: arrays.fragment_id[row] < 0n, mass: arrays.fragment_mass[row], size: arrays.fragment_size[row],
+    centre: vector("fragment_centre"), velocity: vector("fragment_velocity"), tets: arrays.fragment_tets[row], birth: arrays.fragment_birth[row],
+  };
+}
+
+// The row of a fragment in another snapshot of the run; -1 where it does not exist.
+export const rowOf = ({ arrays }, id) => arrays.fragment_id.indexOf(id);
+
+// N(m), the number of fragments of mass m and more, from the lightest on, and the power law through dust-free ones.
+export function sizes({ arrays }) {
+  const masses = [...arrays.fragment_mass].filter((mass, row) => mass > 0 && arrays.fragment_id[row] >= 0n).sort((a, b) => a - b);
+  return { points: masses.map((mass, i) => [mass, masses.length - i]), fit: powerLaw(masses) };
+}
+
+// Exponent of N(m) ~ m^-k by maximum likelihood (Hill 1975) of masses from the lightest on; null for fewer than two.
+export function powerLaw(masses) {
+  const low = masses[0];
+  const sum = masses.reduce((total, mass) => total + Math.log(mass / low), 0);
+  return masses.length > 1 && sum > 0 ? { exponent: masses.length / sum, low, number: masses.length } : null;
+}

@@ -1,0 +1,87 @@
+"""The side thread of a rank: takes shares to disk, and on rank 0 has the packer make snapshots of them."""
+
+import contextlib
+import json
+import logging
+import os
+import queue
+import subprocess
+import sys
+import threading
+from collections import deque
+from pathlib import Path
+from typing import Any
+
+from conoid.cases import layout
+
+from . import share
+from .share import Share
+
+_FAREWELL = 30.0
+"""s that the last snapshots may take after the last step. Chosen: a hundred times what one of 150,000 tets takes."""
+_SECRETS = ("CONOID_ZENOH_USER", "CONOID_ZENOH_PASSWORD")
+
+log = logging.getLogger("conoid.worker")
+
+
+class Courier:
+    """Takes what the solver gives away; the solver never waits for it."""
+
+    def __init__(self, folder: Path, rank: int) -> None:
+        self._folder, self._rank = folder, rank
+        self._tasks: queue.SimpleQueue[tuple[dict[str, Any], Share] | None] = queue.SimpleQueue()
+        self._packer: subprocess.Popen[str] | None = None
+        self._thread: threading.Thread | None = None
+        self.answers: deque[tuple[dict[str, Any], bytes]] = deque()
+        """On rank 0: of each task its answer with the task's own words, and the snapshot; or the answer alone, with an
+        ``error``."""
+        self.under_way = 0
+        """Tasks without an answer."""
+
+    def send(self, task: dict[str, Any], given: Share) -> None:
+        """A share for the snapshot ``task["n"]``."""
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._work, name="snapshots", daemon=True)
+            self._thread.start()
+        self.under_way += 1
+        self._tasks.put((task, given))
+
+    def close(self) -> None:
+        """Returns when all that was sent is done, or after a while."""
+        if self._thread is not None:
+            self._tasks.put(None)
+            self._thread.join(_FAREWELL)
+        if self._packer is not None:
+            with contextlib.suppress(OSError):
+                self._packer.kill()
+            self._packer.communicate()
+
+    def _work(self) -> None:
+        while (task := self._tasks.get()) is not None:
+            try:
+                share.write(layout.share(self._folder, task[0]["n"], self._rank), task[1])
+                if self._rank == 0:
+                    self._ask(task[0])
+            except (OSError, ValueError) as error:
+                log.warning("snapshot %d: %s", task[0]["n"], error)
+                if self._rank == 0:
+                    self.answers.append(({**task[0], "error": str(error)}, b""))
+
+    def _ask(self, task: dict[str, Any]) -> None:
+        """Has the packer make a snapshot. Raises OSError, ValueError."""
+        if self._packer is None or self._packer.poll() is not None:
+            self._packer = _started(self._folder)
+        assert self._packer.stdin is not None
+        assert self._packer.stdout is not None
+        self._packer.stdin.write(json.dumps(task) + "\n")
+        self._packer.stdin.flush()
+        answer = json.loads(self._packer.stdout.readline())
+        data = b"" if "error" in answer else (self._folder / answer["path"]).read_bytes()
+        self.answers.append(({**task, **answer}, data))
+
+
+def _started(folder: Path) -> "subprocess.Popen[str]":
+    environment = {name: value for name, value in os.environ.items() if name not in _SECRETS}
+    environment["OMP_NUM_THREADS"] = environment["OPENBLAS_NUM_THREADS"] = "1"
+    words = [sys.executable, "-m", "conoid.worker.snapshots.packer", str(folder.resolve())]
+    return subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment)

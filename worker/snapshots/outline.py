@@ -1,0 +1,68 @@
+"""The outline of fragments: the triangles that can be seen of them, also when they are drawn apart."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..fracture.connectivity import places
+from ..mesh.faces import FACES, across
+from ..state import WIDE, Block, Floats, Ints, Model
+
+
+@dataclass
+class Outline:
+    """Triangles over vertices of one fragment each."""
+
+    points: Floats
+    """(v, 3) m."""
+    fragment: Ints
+    """(v,) number of the vertex's fragment."""
+    triangles: Ints
+    """(m, 3) vertices, anticlockwise seen from outside."""
+    tet: Ints
+    """(m,) place of the triangle's tet in the model."""
+    faces: Ints
+    """(m, 3) places of the nodes that the triangle had at first."""
+
+    def chosen(self, rows: Ints) -> "Outline":
+        """The same with these triangles alone, and the vertices that they have."""
+        used, corners = np.unique(self.triangles[rows], return_inverse=True)
+        triangles = corners.reshape(-1, 3)
+        return Outline(self.points[used], self.fragment[used], triangles, self.tet[rows], self.faces[rows])
+
+
+def find(model: Model, fragment: Ints) -> Outline:
+    """The outline of a whole model; ``fragment`` (tets,) is the number of the fragment of each tet.
+
+    It has the faces without a tet behind them, those between two fragments, and the sides of open cracks; a crack
+    within a fragment that is closed is not seen.
+    """
+    ids = np.concatenate([np.zeros(0, np.int64), *(block.id for block in model.blocks)])
+    order = np.argsort(ids)
+    tets, faces, first = [np.zeros(0, np.int64)], [np.zeros((0, 3), np.int64)], 0
+    for block in model.blocks:
+        tet, face = np.nonzero(_seen(block, ids[order], fragment[order], fragment[first : first + block.n]))
+        tets.append(tet + first)
+        faces.append(block.tets[tet[:, None], FACES[face]].astype(np.int64))
+        first += block.n
+    return _over_vertices(model.nodes.x, fragment, np.concatenate(tets), np.concatenate(faces))
+
+
+def _seen(block: Block, known: Ints, fragments: Ints, own: Ints) -> "np.ndarray":
+    """(n, 4) which faces of a block are part of the outline; ``fragments`` are those of the ``known`` tets."""
+    if not len(block.across):
+        return np.asarray(across(block.tets.astype(np.int32)) < 0)
+    seen = block.across < 0
+    if len(block.bond):
+        seen |= block.bond == WIDE
+        tet, face = np.nonzero((block.bond > 0) & ~seen)
+        behind = places(known, block.across[tet, face].astype(np.int64) // 4)
+        seen[tet, face] = (behind < 0) | (fragments[behind] != own[tet])
+    return seen
+
+
+def _over_vertices(x: Floats, fragment: Ints, tet: Ints, faces: Ints) -> Outline:
+    words = fragment[tet][:, None] * np.int64(max(len(x), 1)) + faces
+    vertices, corners = np.unique(words, return_inverse=True)
+    of, node = np.divmod(vertices, max(len(x), 1))
+    return Outline(x[node], of, corners.reshape(-1, 3), tet, faces)

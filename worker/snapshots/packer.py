@@ -1,0 +1,84 @@
+"""The process that makes snapshots of what the ranks give away: ``python -m conoid.worker.snapshots.packer FOLDER``.
+
+A thread of the solver's process would take the interpreter from it again and again; this one takes what the machine has
+left. One task a line on stdin, one answer a line on stdout; it ends with its stdin. A snapshot is written beside its
+place, flushed to disk and renamed.
+"""
+
+import hashlib
+import json
+import os
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from conoid.cases import layout
+
+from . import blob, share
+from .births import Births
+
+_NICE = 10
+"""A process that computes has nine times the right to a core. Chosen: what is left over is enough."""
+_PATIENCE = 60.0
+"""s that the share of a rank may take to appear. Chosen: many times what a slow disk takes."""
+_LOOK = 0.005
+"""s between two looks for a share. Chosen."""
+
+
+def main(folder: Path) -> None:
+    """Makes one snapshot after the other."""
+    os.nice(_NICE)
+    births: Births | None = None
+    for line in sys.stdin:
+        task = json.loads(line)
+        births = births or Births(folder, task["end"], task["frames"])
+        try:
+            answer = _made(folder, task, births)
+        except (OSError, ValueError) as error:
+            answer = {"error": f"{type(error).__name__}: {error}"}
+        print(json.dumps({"n": task["n"], **answer}), flush=True)
+
+
+def _made(folder: Path, task: dict[str, Any], births: Births) -> dict[str, Any]:
+    """What the journal tells of a snapshot that is now in its place. Raises OSError, ValueError."""
+    paths = [layout.share(folder, task["n"], rank) for rank in range(task["ranks"])]
+    try:
+        whole = share.joined([_awaited(path) for path in paths], task["parts"])
+    finally:
+        for path in paths:
+            path.unlink(missing_ok=True)
+    first = np.array([block.id.min() for block in whole.model.blocks], np.int64)
+    told = {name: task[name] for name in ("n", "step", "t", "ranks")}
+    made = blob.made(whole, told, lambda labels: births.at(task["t"], labels, first), blob.Budget())
+    place = layout.snapshot(folder, task["n"])
+    _write(place, made.data)
+    return {
+        "path": str(place.relative_to(folder)), "bytes": len(made.data), "triangles": made.triangles,
+        "fragments": made.fragments, "sha256": hashlib.sha256(made.data).hexdigest(), "smallest": made.smallest,
+        "sizes": made.sizes,
+    }  # fmt: skip
+
+
+def _awaited(path: Path) -> share.Share:
+    limit = time.monotonic() + _PATIENCE
+    while not path.exists():
+        if time.monotonic() > limit:
+            raise TimeoutError(f"{path.name} has not come within {_PATIENCE:g} s")
+        time.sleep(_LOOK)
+    return share.read(path)
+
+
+def _write(place: Path, data: bytes) -> None:
+    beside = place.with_suffix(".part")
+    with beside.open("wb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+    beside.rename(place)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

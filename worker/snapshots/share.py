@@ -1,0 +1,119 @@
+"""What a rank gives away for a snapshot: a copy of what fragments and their surface follow from, and nothing else.
+
+A share is a file that only the packer of the same run reads: names in one line, then the arrays.
+"""
+
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..state import MASS, PLASTIC_STRAIN, TEMPERATURE, Block, Floats, Ints, Model, Nodes, located
+
+ROWS = {"plastic_strain": PLASTIC_STRAIN, "temperature": TEMPERATURE}
+"""Rows of the state of tets that become fields, where a block has them."""
+Share = dict[str, "np.ndarray"]
+"""Arrays by name; those of block k begin with ``k.``."""
+
+
+def copied(model: Model, held: Ints) -> Share:
+    """A rank's share. ``held`` (m, 2): ids of tets that a cohesive facet still joins."""
+    nodes = model.nodes
+    share = {"nodes": nodes.id.copy(), "x": nodes.x.copy(), "v": nodes.v.copy(), "held": held.copy()}
+    for k, block in enumerate(model.blocks):
+        share[f"{k}.part"] = np.array([block.part])
+        share[f"{k}.mass"] = block.row(MASS)
+        for name in ("id", "tets", "across", "bond"):
+            share[f"{k}.{name}"] = getattr(block, name).copy()
+        for name, row in ROWS.items():
+            if block.has(row):
+                share[f"{k}.{name}"] = block.row(row)
+    return share
+
+
+def write(path: Path, share: Share) -> None:
+    """Writes a share; it appears whole or not at all."""
+    beside = path.with_name(path.name + ".part")
+    with beside.open("wb") as file:
+        file.write(json.dumps(list(share)).encode() + b"\n")
+        for values in share.values():
+            np.save(file, np.ascontiguousarray(values), allow_pickle=False)
+    os.rename(beside, path)
+
+
+def read(path: Path) -> Share:
+    """Reads it back. Raises OSError, ValueError."""
+    with path.open("rb") as file:
+        names = json.loads(file.readline())
+        return {name: np.load(file, allow_pickle=False) for name in names}
+
+
+@dataclass
+class Whole:
+    """The model of all ranks, in the order of global ids, as one rank would have it."""
+
+    model: Model
+    """Blocks by part, with ids, tets, faces and bonds alone."""
+    held: Ints
+    """(m, 2) see ``copied``."""
+    mass: Floats
+    """(tets,) kg, in the order of the blocks."""
+    rank: "np.ndarray"
+    """(tets,) uint16."""
+    rows: dict[str, Floats]
+    """(tets,) each of ``ROWS`` that some block has; 0 where it has not."""
+
+
+def joined(shares: Sequence[Share], parts: list[str]) -> Whole:
+    """The shares of all ranks, rank 0 first, as one model. A node comes from the first rank that has it."""
+    ids, first = np.unique(np.concatenate([share["nodes"] for share in shares]), return_index=True)
+    x, v = (np.concatenate([share[name] for share in shares])[first] for name in ("x", "v"))
+    n = len(ids)
+    nodes = Nodes(
+        ids, np.zeros(n, np.int32), np.zeros(n, np.int32), np.ones(n, bool), x, x, v, np.zeros(n),
+        np.zeros((n, 3), np.int64),
+    )  # fmt: skip
+    gathered = [_block(shares, part, ids) for part in range(len(parts))]
+    blocks = [block for block, _ in gathered if block.n]
+    columns = {name: np.concatenate([column[name] for _, column in gathered]) for name in ("mass", "rank", *ROWS)}
+    some = {name.partition(".")[2] for share in shares for name in share}
+    held = np.concatenate([share["held"] for share in shares])
+    total = sum(block.n for block in blocks)
+    rows = {name: columns[name] for name in ROWS if name in some}
+    return Whole(Model(nodes, blocks, parts, total, n), held, columns["mass"], columns["rank"], rows)
+
+
+def _block(shares: Sequence[Share], part: int, ids: Ints) -> tuple[Block, dict[str, "np.ndarray"]]:
+    """The tets of a part, by id, and their columns."""
+    found = [
+        (rank, {name.partition(".")[2]: share[name] for name in share if name.startswith(f"{k}.")}, share["nodes"])
+        for rank, share in enumerate(shares)
+        for k in range(_blocks(share))
+        if share[f"{k}.part"][0] == part
+    ]
+    tet = np.concatenate([np.zeros(0, np.int64), *(block["id"] for _, block, _ in found)])
+    order = np.argsort(tet)
+
+    def column(name: str, empty: "np.ndarray") -> "np.ndarray":
+        values = [block.get(name, np.zeros(len(block["id"]))) for _, block, _ in found]
+        joint = np.concatenate(values) if values else empty
+        return joint[order] if len(joint) else joint
+
+    nowhere = np.zeros((0, 4), np.int32)
+    corners = [located(ids, nodes)[block["tets"]] for _, block, nodes in found]
+    tets = (np.concatenate(corners)[order] if corners else nowhere).astype(np.uint32)
+    columns = {name: column(name, np.zeros(0)) for name in ("mass", *ROWS)}
+    ranks = np.concatenate([np.zeros(0, np.uint16), *(np.full(len(b["id"]), rank, np.uint16) for rank, b, _ in found)])
+    bond = column("bond", nowhere.astype(np.uint8))
+    made = Block(
+        part, len(tet), tets, tet[order], np.zeros((0, 0, 0)), 0, 0, np.zeros(0),
+        across=column("across", nowhere), bond=bond,
+    )  # fmt: skip
+    return made, {**columns, "rank": ranks[order]}
+
+
+def _blocks(share: Share) -> int:
+    return sum(name.endswith(".part") for name in share)

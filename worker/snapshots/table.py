@@ -1,0 +1,97 @@
+"""The table of fragments in a snapshot: the heaviest first, and the rest in one row."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from conoid.cases.snapshot import REST
+
+from ..fracture import fragments
+from ..parallel.comm import SerialComm
+from ..state import Floats, Ints
+from .share import Whole
+
+MOST_ROWS = 2048
+"""Fragments with a row of their own. Chosen: a tenth of the bytes of a snapshot, and more than anybody picks."""
+
+
+@dataclass
+class Table:
+    """All fragments of a model, by ascending label; as ``fragments.table`` has them, to the bit."""
+
+    label: Ints
+    """(g,)."""
+    of: Ints
+    """(tets,) number of the fragment of each tet."""
+    tets: Ints
+    """(g,)."""
+    mass: Floats
+    """(g,) kg."""
+    centre: Floats
+    """(g, 3) m."""
+    velocity: Floats
+    """(g, 3) m/s."""
+    size: Floats
+    """(g,) longest side of the box round it, m."""
+
+
+def measured(whole: Whole, labels: list[Ints]) -> Table:
+    """The fragments; ``labels``: for each block of each tet."""
+    groups = fragments.Groups(np.concatenate([np.zeros(0, np.int64), *labels]), SerialComm())
+    nodes, n = whole.model.nodes, len(whole.mass)
+    corners = np.concatenate([np.zeros((0, 4), np.int64), *(b.tets for b in whole.model.blocks)]).astype(np.int64).T
+    quarter, moment, momentum = whole.mass / 4.0, np.zeros((n, 3)), np.zeros((n, 3))
+    reach = np.full((n, 6), -np.inf)
+    for corner in corners:
+        moment += quarter[:, None] * nodes.x[corner]
+        momentum += quarter[:, None] * nodes.v[corner]
+        reach = np.maximum(reach, np.column_stack([nodes.x[corner], -nodes.x[corner]]))
+    sums = groups.sums(np.column_stack([whole.mass, moment, momentum]))
+    size = (box := groups.largest(reach))[:, :3] + box[:, 3:]
+    tets = groups.count(np.ones((n, 1), np.int64))[:, 0]
+    return Table(
+        groups.label, groups.of, tets, sums[:, 0], sums[:, 1:4] / sums[:, :1], sums[:, 4:7] / sums[:, :1],
+        size.max(axis=1, initial=0.0),
+    )  # fmt: skip
+
+
+def columns(table: Table, birth: Floats) -> tuple[dict[str, "np.ndarray"], Ints]:
+    """The arrays of a snapshot, and (g,) the row of each fragment. ``birth`` (g,): s."""
+    order = np.argsort(-table.mass, kind="stable")
+    listed, rest = order[:MOST_ROWS], order[MOST_ROWS:]
+    row = np.empty(len(order), np.int64)
+    row[order] = np.minimum(np.arange(len(order)), MOST_ROWS)
+    made: dict[str, np.ndarray] = {
+        "fragment_id": table.label[listed], "fragment_mass": table.mass[listed],
+        "fragment_size": table.size[listed].astype(np.float32),
+        "fragment_centre": table.centre[listed].astype(np.float32),
+        "fragment_velocity": table.velocity[listed].astype(np.float32),
+        "fragment_tets": table.tets[listed].astype(np.uint32), "fragment_birth": birth[listed].astype(np.float32),
+    }  # fmt: skip
+    if len(rest):
+        last = _rest(table, rest)
+        made = {name: np.concatenate([values, last[name].astype(values.dtype)]) for name, values in made.items()}
+    return made, row
+
+
+def _rest(table: Table, rest: Ints) -> dict[str, "np.ndarray"]:
+    """One row for the fragments ``rest``: sums and means; neither a size nor a birth."""
+    mass = table.mass[rest]
+    total = mass.sum()
+    return {
+        "fragment_id": np.array([REST]), "fragment_mass": np.array([total]), "fragment_size": np.zeros(1),
+        "fragment_centre": (mass[:, None] * table.centre[rest]).sum(axis=0)[None] / total,
+        "fragment_velocity": (mass[:, None] * table.velocity[rest]).sum(axis=0)[None] / total,
+        "fragment_tets": table.tets[rest].sum()[None], "fragment_birth": np.zeros(1),
+    }  # fmt: skip
+
+
+def sizes(table: Table) -> tuple[int, list[int]]:
+    """How many fragments there are of each size: a first number k and counts, the i-th of those from 2^((k+i)/2) m on,
+    up to the next. None without an extent is counted.
+    """
+    steps = np.floor(2.0 * np.log2(table.size[table.size > 0.0])).astype(np.int64)
+    if not len(steps):
+        return 0, []
+    first = int(steps.min())
+    return first, np.bincount(steps - first).tolist()
