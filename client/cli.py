@@ -17,10 +17,24 @@ from conoid.cases.plausible import doubts
 from conoid.cases.run import ExitCode, State
 
 from . import benches, reports, shelf, tables, viewing
-from .errors import ClientError, ServiceError
+from .errors import ClientError
 from .live import Live, exit_code
 from .once import run_once
-from .options import CaseArgument, Json, Overrides, Token, Url, complain, find, show, show_json, warn, warn_of
+from .options import (
+    CaseArgument,
+    Json,
+    Labels,
+    Overrides,
+    Token,
+    Url,
+    complain,
+    find,
+    labels_of,
+    show,
+    show_json,
+    warn,
+    warn_of,
+)
 from .pictures import FIELDS
 from .run import Run
 from .session import connect
@@ -38,9 +52,6 @@ class Guarded(TyperGroup):
         except CaseError as error:
             complain(*(str(problem) for problem in error.problems))
             raise typer.Exit(ExitCode.BAD_INPUT) from None
-        except ServiceError as error:
-            complain(*(error.problems or [str(error)]))
-            raise typer.Exit(error.exit_code) from None
         except ClientError as error:
             complain(str(error))
             raise typer.Exit(error.exit_code) from None
@@ -111,6 +122,7 @@ def submit(
     case: CaseArgument,
     overrides: Overrides = None,
     key: Annotated[str | None, typer.Option("--key", help="Idempotency key: the same one makes no second run.")] = None,
+    label: Labels = None,
     url: Url = None,
     token: Token = None,
     as_json: Json = False,
@@ -118,7 +130,7 @@ def submit(
     """Hand a case to the server; prints the run's id."""
     warn_of(case, overrides or ())
     with connect(url, token) as session:
-        run = session.submit(case, overrides or (), key)
+        run = session.submit(case, overrides or (), key, labels_of(label))
         if as_json:
             show_json(run.status())
         else:
@@ -129,13 +141,14 @@ def submit(
 def list_runs(
     state: Annotated[list[State] | None, typer.Option("--state", help="Only runs in this state.")] = None,
     limit: Annotated[int, typer.Option("--limit", min=1, help="At most so many.")] = 20,
+    label: Labels = None,
     url: Url = None,
     token: Token = None,
     as_json: Json = False,
 ) -> None:
     """List runs, newest first."""
     with connect(url, token) as session:
-        runs = session.runs([one.value for one in state or ()], limit)
+        runs = session.runs([one.value for one in state or ()], limit, labels_of(label))
     if as_json:
         show_json(runs)
     elif runs:

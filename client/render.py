@@ -75,6 +75,11 @@ def _shot(path: str, picture: Picture) -> Shot:
     return Shot(_surface(mesh, picture), time)
 
 
+def read_mesh(path: Path) -> Any:
+    """The whole mesh of a frame as a pyvista.UnstructuredGrid."""
+    return _read(str(path))[0]
+
+
 def _read(path: str) -> tuple[Any, float | None]:
     """The whole mesh of a frame, its pieces merged, and the frame's time."""
     mesh = pv.read(path)

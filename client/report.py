@@ -1,20 +1,18 @@
 """``conoid report``: a run as one HTML file that needs no server, no network and nothing beside it."""
 
-import base64
 import json
 import tempfile
 from collections.abc import Callable, Sequence
 from html import escape
-from importlib import metadata
 from pathlib import Path
 
 from conoid.cases.messages import Balance, Load, Log
 from conoid.cases.outcome import Outcome
 
-from . import replay3d
+from . import html, replay3d
 from .compare import summary
 from .errors import ClientError, UnfinishedError, ViewError
-from .figures import count, duration, number, si
+from .figures import count, si
 from .result import Result
 
 _SHOTS = 3
@@ -41,7 +39,9 @@ def write(result: Result, out: Path, fields: Sequence[str] | None = None) -> Pat
     case = result.case
     title = str(case.get("title") or case.get("name"))
     parts = [
-        _head(result, title), _section("Case", _case(case)), _section("References", _references(result)),
+        html.head(result.folder.name, title, _outcome(result)),
+        _section("Case", _case(case)),
+        _section("References", html.references(_outcome(result))),
         _section("Pictures", _pictures(result, fields)), _section("Replay", replay3d.html(result)),
         _section("Energy", _energy(result)), _section("Fragments", _fragments(result)),
         _section("Time step", _curve(result, "steps", "Length of the time step over time")),
@@ -65,45 +65,11 @@ def _section(title: str, body: str) -> str:
     return f"<section><h2>{escape(title)}</h2>{body}</section>" if body else ""
 
 
-def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int] = ()) -> str:
-    """A table of text, which is escaped; ``numbers`` are the columns that stand right."""
-
-    def cells(row: Sequence[str], tag: str) -> str:
-        return "".join(f"<{tag}{' class=n' * (i in numbers)}>{escape(each)}</{tag}>" for i, each in enumerate(row))
-
-    top = f"<thead><tr>{cells(head, 'th')}</tr></thead>" if any(head) else ""
-    lines = "".join(f"<tr>{cells(row, 'td')}</tr>" for row in rows)
-    return f"<div class=wide><table>{top}<tbody>{lines}</tbody></table></div>"
-
-
-def image(data: bytes, kind: str, alt: str) -> str:
-    """A picture in the page itself."""
-    return f'<img alt="{escape(alt)}" src="data:image/{kind};base64,{base64.b64encode(data).decode()}">'
-
-
 def _outcome(result: Result) -> Outcome | None:
     try:
         return result.outcome
     except UnfinishedError:
         return None
-
-
-def _head(result: Result, title: str) -> str:
-    ended, release = _outcome(result), f"Conoid {metadata.version('conoid')}"
-    if ended is None:
-        state, rows = "<span class=bad>not ended</span>", [["run", result.folder.name], ["written by", release]]
-    else:
-        good = "good" if ended.state == "succeeded" else "bad"
-        state = f"<span class={good}>{escape(ended.state)}</span> {escape(ended.message)}"
-        rows = [
-            ["run", result.folder.name], ["simulated", f"{si(ended.time, 's')} in {count(ended.steps)} steps"],
-            ["took", f"{duration(ended.elapsed)} on {ended.ranks} rank{'s' * (ended.ranks != 1)}"],
-            ["tets", f"{count(ended.elements)}, of which {count(ended.eroded)} eroded"],
-            ["nodes", f"{count(ended.nodes_initial)} at first, {count(ended.nodes)} at the end"],
-            ["fragments", f"{count(ended.fragments)}; {count(ended.broken)} facets broken"],
-            ["energy", f"worst residual {ended.worst_residual:.1e}"], ["digest", ended.digest], ["written by", release],
-        ]  # fmt: skip
-    return f"<header><h1>{escape(title)}</h1><p>{state}</p>{table(['', ''], rows)}</header>"
 
 
 def _case(case: dict[str, object]) -> str:
@@ -119,26 +85,7 @@ def _case(case: dict[str, object]) -> str:
             f"{1e3 * size:g} mm" if isinstance(size, float) else "", f"{speed} m/s" if speed else "", breaks,
         ])  # fmt: skip
     told = f"<p>{escape(str(case.get('description', '')))}</p>" if case.get("description") else ""
-    return told + table(["part", "material", "shape", "element size", "velocity", "breaks"], rows)
-
-
-def _references(result: Result) -> str:
-    ended = _outcome(result)
-    if ended is None or not ended.reference:
-        return ""
-    rows = []
-    for check in ended.reference:
-        verdict = "<span class=good>pass</span>" if check.passed else "<span class=bad>FAIL</span>"
-        values = (
-            f"{number(check.value)} {check.unit}",
-            f"{number(check.expected)} {check.unit}",
-            f"± {number(check.tolerance)}",
-        )
-        cells = "".join(f"<td class=n>{escape(each)}</td>" for each in values)
-        rows.append(f"<tr><td>{escape(check.name)}</td>{cells}<td>{verdict}</td><td>{escape(check.source)}</td></tr>")
-    head = "".join(f"<th class=n>{each}</th>" for each in ("value", "expected", "tolerance"))
-    head = f"<th>reference</th>{head}<th></th><th>source</th>"
-    return f"<div class=wide><table><thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>"
+    return told + html.table(["part", "material", "shape", "element size", "velocity", "breaks"], rows)
 
 
 def telling(result: Result) -> list[str]:
@@ -162,7 +109,7 @@ def _pictures(result: Result, fields: Sequence[str] | None) -> str:
             try:
                 out = Path(folder) / f"{field}.png"
                 result.view(field, out, frame=chosen, size=(1400, 800), mirror="auto")
-                drawn.append(image(out.read_bytes(), "png", f"{field} at {len(chosen)} times"))
+                drawn.append(html.image(out.read_bytes(), "png", f"{field} at {len(chosen)} times"))
             except ViewError as error:
                 drawn.append(f"<p class=pale>{escape(field)}: {escape(str(error))}</p>")
     return "".join(drawn)
@@ -178,7 +125,7 @@ def _svg(draw: Callable[[Path], object], alt: str) -> str:
             return ""
         except ModuleNotFoundError as error:
             return f"<p class=pale>charts need the extra 'view' of conoid: {escape(str(error))}</p>"
-        return image(out.read_bytes(), "svg+xml", alt)
+        return html.image(out.read_bytes(), "svg+xml", alt)
 
 
 def _curve(result: Result, name: str, alt: str) -> str:
@@ -196,7 +143,7 @@ def _energy(result: Result) -> str:
     if ended is not None and ended.energy is not None:
         terms = ((name, getattr(ended.energy, name)) for name in ended.energy.__struct_fields__ if name != "residual")
         rows = [[name, si(value, "J")] for name, value in terms if value]
-    at_the_end = table(["energy at the end", ""], rows, [1]) if rows else ""
+    at_the_end = html.table(["energy at the end", ""], rows, [1]) if rows else ""
     return _curve(result, "energy", "The energy ledger over time") + at_the_end
 
 
@@ -218,7 +165,7 @@ def _fragments(result: Result) -> str:
         *([f"masses, {fit.law} law", f"{fit.parameter:.4g}, ln L {fit.log_likelihood:.5g}"] for fit in said.masses),
         *([f"extents, {fit.law} law", f"{fit.parameter:.4g}, ln L {fit.log_likelihood:.5g}"] for fit in said.sizes),
     ]
-    return _svg(draw, "Number of fragments over time and by mass") + table(["", ""], rows)
+    return _svg(draw, "Number of fragments over time and by mass") + html.table(["", ""], rows)
 
 
 def _balance(result: Result) -> str:
@@ -240,7 +187,7 @@ def _balance(result: Result) -> str:
     ]
     told = f"<p>{len(cuts)} cuts{f', the first {_CUTS} of them:' if len(cuts) > _CUTS else ''}</p>"
     if cuts:
-        told += table(["time", "step", "cause", "tets moved", "cost", "saved by those before"], rows, [1, 3, 4, 5])
+        told += html.table(["time", "step", "cause", "tets moved", "cost", "saved by those before"], rows, [1, 3, 4, 5])
     if cuts and ended is not None:
         told += f"<p>They cost {si(ended.balancing_cost, 's')} and saved {si(ended.balancing_saved, 's')}.</p>"
     return _svg(draw, "Outside nodes of each rank, and CPU time by phase") + told

@@ -15,8 +15,9 @@ from conoid.cases import fragments, layout, outcome
 from conoid.cases.messages import AnyMessage
 from conoid.cases.outcome import Outcome
 
+from . import html
 from .columns import Columns, joined, read_columns
-from .errors import ClientError, UnfinishedError
+from .errors import ClientError, NotFoundError, UnfinishedError, ViewError
 from .journal import from_line
 from .pictures import Drawn, Mirror, Scene, Wall, draw
 
@@ -78,15 +79,34 @@ class Result:
 
     @classmethod
     def open(cls, path: Path | str) -> "Result":
-        """The result in a run's folder on this machine. Raises ClientError when there is no such folder."""
+        """The result in a run's folder on this machine. Raises NotFoundError when there is no such folder."""
         root = Path(path)
         if not root.is_dir():
-            raise ClientError(f"{root}: there is no such folder")
+            raise NotFoundError(f"{root}: there is no such folder")
         return cls(LocalFolder(root))
 
     def __repr__(self) -> str:
         """Names the run."""
         return f"<result of {self.folder.name}>"
+
+    def _repr_html_(self) -> str:
+        """How the run ended and its references, for notebooks."""
+        try:
+            name, ended = str(self.case.get("title") or self.case.get("name")), self.outcome
+        except UnfinishedError:
+            return html.head(self.folder.name, self.folder.name, None)
+        return html.head(self.folder.name, name, ended) + html.references(ended)
+
+    def mesh(self, time: float | None = None) -> Any:
+        """The frame nearest to ``time``, s, as a pyvista.UnstructuredGrid with all its fields; None: the last one.
+
+        Raises UnfinishedError, ViewError where pyvista is missing.
+        """
+        try:
+            from .render import read_mesh  # pyvista is loaded when it is needed
+        except ModuleNotFoundError as error:
+            raise ViewError(f"meshes need the extra 'view': pip install 'conoid[view]' ({error})") from None
+        return read_mesh(self.frame(-1 if time is None else self.nearest(time)))
 
     @cached_property
     def outcome(self) -> Outcome:
