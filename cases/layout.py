@@ -6,7 +6,7 @@
       case.toml | case.json  as submitted          case.resolved.json  every default filled in, SI
       submission.json        who submitted it, when, with which key        worker.json  the process that runs it
       journal.jsonl          every event, one JSON line each, with seq: the truth
-      history.csv            time history: clock, ledger, probes
+      history.csv            time history: clock, ledger, probes; history.parquet at the end, where pyarrow is there
       frames/000012.vtkhdf   one file a frame      frames/frames.vtkhdf.series  for ParaView
       snapshots/000012.snap  surface and table of the fragments (cases/snapshot.py); snapshot.request asks for one
       checkpoints/000001200/ complete state, by global ids; checkpoint.request asks for one
@@ -19,6 +19,7 @@ from pathlib import Path
 RESOLVED_CASE = "case.resolved.json"
 JOURNAL = "journal.jsonl"
 HISTORY = "history.csv"
+HISTORY_PARQUET = "history.parquet"
 OUTCOME = "outcome.json"
 FRAMES = "frames"
 FRAME_SERIES = "frames.vtkhdf.series"

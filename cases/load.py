@@ -4,7 +4,7 @@ import copy
 import json
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -125,25 +125,44 @@ def _at_line(number: int, text: str, message: str) -> Problem:
     return Problem(f"line {number}", shown(written) if written else "", message)
 
 
-def apply_overrides(data: Mapping[str, Any], overrides: Iterable[str]) -> dict[str, Any]:
+Overrides = Iterable[str] | Mapping[str, Any]
+"""Assignments such as ``run.ranks=2``, or values by key: ``{"run.ranks": 2}``, ``{"run": {"ranks": 2}}``."""
+
+
+def apply_overrides(data: Mapping[str, Any], overrides: Overrides) -> dict[str, Any]:
     """A copy of ``data`` with assignments such as ``run.ranks=2`` or ``parts[0].mesh.element_size=0.5 mm``.
 
-    The value is read as TOML where it is TOML and as text otherwise. Tables that are missing on the way are made;
-    list items must exist. Raises CaseError with every assignment that cannot be made.
+    The value of an assignment is read as TOML where it is TOML and as text otherwise; one by key is taken as it is, a
+    mapping key by key. Tables that are missing on the way are made; list items must exist. Raises CaseError with every
+    assignment that cannot be made.
     """
     changed: dict[str, Any] = copy.deepcopy(dict(data))
     problems: list[Problem] = []
-    for override in overrides:
-        key, equals, text = override.partition("=")
+    for key, told, value in _assignments(overrides):
         try:
-            if not equals or not _KEY.fullmatch(key.strip()):
+            if value is ... or not _KEY.fullmatch(key):
                 raise ValueError("write an assignment such as run.ranks=2 or parts[0].velocity[2]='-200 m/s'")
-            _assign(changed, _items(key.strip()), _toml_value(text.strip()))
+            _assign(changed, _items(key), value)
         except ValueError as error:
-            problems.append(Problem(key.strip(), shown(text.strip()) if equals else "", str(error)))
+            problems.append(Problem(key, told, str(error)))
     if problems:
         raise CaseError(problems)
     return changed
+
+
+def _assignments(overrides: Overrides, path: str = "") -> Iterator[tuple[str, str, Any]]:
+    """Key, value as it is shown, and value; Ellipsis where none is written."""
+    if isinstance(overrides, Mapping):
+        for name, value in overrides.items():
+            key = f"{path}.{name}" if path else str(name)
+            if isinstance(value, Mapping) and value:
+                yield from _assignments(value, key)
+            else:
+                yield key, shown(value), copy.deepcopy(value)
+        return
+    for override in overrides:
+        key, equals, text = override.partition("=")
+        yield key.strip(), shown(text.strip()) if equals else "", _toml_value(text.strip()) if equals else ...
 
 
 def _items(key: str) -> list[int | str]:

@@ -33,7 +33,11 @@ class Problem:
         return f"{head}: {self.message}" if head else self.message
 
 
-class CaseError(ValueError):
+class ConoidError(Exception):
+    """Base of what a user of Conoid catches."""
+
+
+class CaseError(ConoidError, ValueError):
     """A case cannot be used; ``problems`` says everything that is wrong, its text one line each."""
 
     def __init__(self, problems: Iterable[Problem]) -> None:

@@ -4,12 +4,14 @@ The same words as on the command line: a session validates, submits and lists; a
 and gives its result; a result is viewed.
 """
 
-from .errors import ClientError, ServiceError, UnfinishedError, UnreachableError, ViewError
+from conoid.cases.problems import CaseError, ConoidError
+
+from .errors import ClientError, NotFoundError, ServiceError, UnfinishedError, UnreachableError, ViewError
 from .result import Result
 from .run import Run, RunInfo
 from .session import Session, connect
 
 __all__ = [
-    "ClientError", "Result", "Run", "RunInfo", "ServiceError", "Session", "UnfinishedError", "UnreachableError",
-    "ViewError", "connect",
+    "CaseError", "ClientError", "ConoidError", "NotFoundError", "Result", "Run", "RunInfo", "ServiceError", "Session",
+    "UnfinishedError", "UnreachableError", "ViewError", "connect",
 ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Charts from a run's journal. The only module of the client that imports matplotlib; nothing else imports it early."""
+"""Charts from a run's journal. Nothing imports matplotlib early: this module and ``curves`` alone."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -16,16 +16,29 @@ from conoid.cases.load import CaseError, parse_case
 from conoid.cases.plausible import doubts
 from conoid.cases.run import ExitCode, State
 
-from . import benches, reports, shelf, tables
-from .errors import ClientError, ServiceError
+from . import benches, reports, shelf, tables, viewing
+from .errors import ClientError
 from .live import Live, exit_code
 from .once import run_once
-from .options import CaseArgument, Json, Overrides, Token, Url, complain, find, show, show_json, warn, warn_of
+from .options import (
+    CaseArgument,
+    Json,
+    Labels,
+    Overrides,
+    Token,
+    Url,
+    complain,
+    find,
+    labels_of,
+    show,
+    show_json,
+    warn,
+    warn_of,
+)
 from .pictures import FIELDS
 from .run import Run
 from .session import connect
 from .submission import data_of, locate
-from .view import view
 from .watch import watch
 
 
@@ -39,9 +52,6 @@ class Guarded(TyperGroup):
         except CaseError as error:
             complain(*(str(problem) for problem in error.problems))
             raise typer.Exit(ExitCode.BAD_INPUT) from None
-        except ServiceError as error:
-            complain(*(error.problems or [str(error)]))
-            raise typer.Exit(error.exit_code) from None
         except ClientError as error:
             complain(str(error))
             raise typer.Exit(error.exit_code) from None
@@ -72,7 +82,6 @@ def every(
 
 
 RunArgument = Annotated[str, typer.Argument(metavar="RUN", help="The id of a run, or 'last'.")]
-FieldOption = Annotated[str, typer.Option("--field", help=f"What to colour by: {', '.join(FIELDS)}.")]
 
 
 @app.command(
@@ -113,6 +122,7 @@ def submit(
     case: CaseArgument,
     overrides: Overrides = None,
     key: Annotated[str | None, typer.Option("--key", help="Idempotency key: the same one makes no second run.")] = None,
+    label: Labels = None,
     url: Url = None,
     token: Token = None,
     as_json: Json = False,
@@ -120,7 +130,7 @@ def submit(
     """Hand a case to the server; prints the run's id."""
     warn_of(case, overrides or ())
     with connect(url, token) as session:
-        run = session.submit(case, overrides or (), key)
+        run = session.submit(case, overrides or (), key, labels_of(label))
         if as_json:
             show_json(run.status())
         else:
@@ -131,13 +141,14 @@ def submit(
 def list_runs(
     state: Annotated[list[State] | None, typer.Option("--state", help="Only runs in this state.")] = None,
     limit: Annotated[int, typer.Option("--limit", min=1, help="At most so many.")] = 20,
+    label: Labels = None,
     url: Url = None,
     token: Token = None,
     as_json: Json = False,
 ) -> None:
     """List runs, newest first."""
     with connect(url, token) as session:
-        runs = session.runs([one.value for one in state or ()], limit)
+        runs = session.runs([one.value for one in state or ()], limit, labels_of(label))
     if as_json:
         show_json(runs)
     elif runs:
@@ -252,46 +263,12 @@ def get(
             typer.echo(str(found.download(target, name)))
 
 
-@app.command(name="view")
-def view_frame(
-    source: Annotated[str, typer.Argument(metavar="SOURCE", help="A run's id, its folder, or a frame file.")],
-    field: FieldOption = "mises",
-    out: Annotated[
-        Path | None, typer.Option("--out", help="The PNG; named after the run and the field if not given.")
-    ] = None,
-    frame: Annotated[int, typer.Option("--frame", help="Number of the frame; -1 is the last one.")] = -1,
-    mirror: Annotated[
-        str, typer.Option("--mirror", help="Complete a half or quarter model: auto, or planes such as x,y=0.002 (m).")
-    ] = "none",
-    limits: Annotated[tuple[float, float] | None, typer.Option("--range", help="Ends of the colour bar.")] = None,
-    size: Annotated[tuple[int, int], typer.Option("--size", min=64, max=16384, help="Width and height.")] = (
-        1600,
-        1200,
-    ),
-    raw: Annotated[bool, typer.Option("--raw", help="Values of every tet instead of means at the nodes.")] = False,
-    edges: Annotated[bool, typer.Option("--edges", help="Draw the edges of the mesh.")] = False,
-    url: Url = None,
-    token: Token = None,
-    as_json: Json = False,
-) -> None:
-    """Draw a frame as a PNG, off screen."""
-    options: dict[str, Any] = {
-        "out": out, "frame": frame, "mirror": mirror, "size": size, "limits": limits, "raw": raw, "edges": edges,
-    }  # fmt: skip
-    if Path(source).exists() or Path(source).suffix:
-        drawn = view(source, field, **options)
-    else:
-        with connect(url, token) as session:
-            drawn = view(find(session, source).result(), field, **options)
-    if as_json:
-        show_json(drawn)
-    else:
-        typer.echo(drawn.out)
-
-
+app.command(name="view", short_help="Draw frames, off screen.")(viewing.view_frames)
 app.command(name="replay-balance", short_help="The loads of a run under another balance policy.")(
     reports.replay_balance
 )
+app.command(short_help="Write a run as one HTML file.")(reports.report)
+app.command(short_help="Tell in what two runs differ.")(reports.compare)
 app.add_typer(reports.figures, name="figures")
 
 

@@ -2,18 +2,23 @@
 
 ::
 
-    ClientError
-    ├── ServiceError     the server refused: the fields of an RFC 9457 problem
-    ├── UnreachableError no server answered
-    ├── UnfinishedError  a result was asked of a run that has none yet
-    └── ViewError        no picture could be made
+    ConoidError
+    ├── CaseError            the case is wrong, whoever has found it: every error at once (cases/problems.py)
+    └── ClientError
+        ├── ServiceError     the server refused: the fields of an RFC 9457 problem
+        ├── UnreachableError no server answered
+        ├── NotFoundError    there is no such run, file or folder, here or on the server (then a ServiceError, too)
+        ├── UnfinishedError  a result was asked of a run that has none yet
+        └── ViewError        no picture could be made
 """
 
 from collections.abc import Mapping
 from typing import Any
 
+from conoid.cases.problems import CaseError, ConoidError, Problem
 
-class ClientError(Exception):
+
+class ClientError(ConoidError):
     """Its text is one line for people; ``exit_code`` is what the command line ends with."""
 
     exit_code = 1
@@ -38,10 +43,13 @@ class ServiceError(ClientError):
         """True when the same request may succeed later."""
         return bool(self.problem.get("retryable", self.status in {429, 502, 503, 504}))
 
-    @property
-    def problems(self) -> list[str]:
-        """Every error of a case that was refused, one line each; empty for other refusals."""
-        return [_entry(entry) for entry in self.problem.get("errors") or [] if isinstance(entry, Mapping)]
+
+class NotFoundError(ClientError):
+    """There is no such run, file or folder."""
+
+
+class MissingError(ServiceError, NotFoundError):
+    """The server has no such run or file."""
 
 
 class UnreachableError(ClientError):
@@ -62,7 +70,11 @@ def _line(status: int, problem: Mapping[str, Any]) -> str:
     return f"{said} ({hint})" if hint and hint not in said else said
 
 
-def _entry(entry: Mapping[str, Any]) -> str:
-    key, value, message = (str(entry.get(name) or "") for name in ("key", "value", "message"))
-    head = " = ".join(text for text in (key, value) if text)
-    return f"{head}: {message}" if head else message
+def refusal(status: int, problem: Mapping[str, Any]) -> ConoidError:
+    """What a refusal of the server is raised as: what is raised where the same is found on this machine."""
+    entries = [entry for entry in problem.get("errors") or [] if isinstance(entry, Mapping)]
+    if status == 422 and entries:
+        return CaseError(
+            Problem(*(str(entry.get(name) or "") for name in ("key", "value", "message"))) for entry in entries
+        )
+    return (MissingError if status == 404 else ServiceError)(status, problem)

@@ -14,7 +14,7 @@ import msgspec
 
 from conoid.cases.messages import AnyMessage
 
-from .errors import ServiceError, UnreachableError
+from .errors import UnreachableError, refusal
 from .journal import from_line
 
 T = TypeVar("T")
@@ -132,7 +132,7 @@ class Http:
         try:
             with self._http.stream(method, path, **options) as response:
                 if response.status_code >= 300:
-                    raise ServiceError(response.status_code, self._refusal(response))
+                    raise refusal(response.status_code, self._refusal(response))
                 yield response
         except httpx2.InvalidURL as error:
             raise UnreachableError(f"url = {self.url!r}: {error}") from None

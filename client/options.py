@@ -60,7 +60,20 @@ Overrides = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Change a key of the case, as run.end_time='20 us'."),
 ]
+Labels = Annotated[
+    list[str] | None,
+    typer.Option("--label", metavar="NAME=VALUE", help="By which runs are found again; may be repeated."),
+]
 SourceArgument = Annotated[str, typer.Argument(metavar="RUN", help="The id of a run, 'last', or its folder.")]
+
+
+def labels_of(words: Iterable[str] | None) -> dict[str, str]:
+    """Of ``NAME=VALUE``. Raises ClientError."""
+    pairs = [word.partition("=") for word in words or ()]
+    for name, equals, _ in pairs:
+        if not (name and equals):
+            raise ClientError(f"label = {name!r}: write NAME=VALUE")
+    return {name: value for name, _, value in pairs}
 
 
 def complain(*lines: str) -> None:

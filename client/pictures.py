@@ -1,5 +1,7 @@
 """Pictures of frames. This module asks for them; ``render`` draws them, in a process of its own.
 
+A ``Picture`` is one drawing of one frame, of several side by side, or of several one after the other (a GIF).
+
 VTK ends the process with a segmentation fault where it finds no way to draw off screen. In a child that becomes a
 clear message.
 """
@@ -8,16 +10,18 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Sequence
 from ctypes.util import find_library
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
 from .errors import ClientError, ViewError
 
 _SECONDS = 180.0
-"""s that a picture may take. Chosen: without a graphics card a large frame takes long."""
+"""s that a frame may take to be drawn. Chosen: without a graphics card a large one takes long."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,8 @@ class Field:
 FIELDS = {
     "mises": Field("von Mises stress", "MPa", 1e-6, "viridis"),
     "pressure": Field("pressure", "MPa", 1e-6, "RdBu_r", "centred"),
+    "principal_stress": Field("largest principal stress", "MPa", 1e-6, "RdBu_r", "centred"),
+    "damage": Field("damage", "", 1.0, ("#d9dfe6", "#f7d889", "#f49a3d", "#d4432c", "#7c0f34")),
     "plastic_strain": Field("plastic strain", "", 1.0, ("#d9dfe6", "#f7d889", "#f49a3d", "#d4432c", "#7c0f34")),
     "temperature": Field("temperature", "K", 1.0, "plasma"),
     "speed": Field("speed", "m/s", 1.0, "cividis"),
@@ -62,27 +68,57 @@ class Wall(msgspec.Struct, frozen=True):
     normal: tuple[float, float, float]
 
 
-class Picture(msgspec.Struct, kw_only=True, frozen=True):
-    """Everything that ``render`` needs for one PNG. ``limits`` are the ends of the colour bar, in the field's unit."""
+class Look(msgspec.Struct, kw_only=True, frozen=True):
+    """What a caller of ``view`` may choose."""
 
-    frame: str
-    out: str
-    field: str
-    mirrors: list[Mirror] = []
-    cuts: list[Mirror] = []
-    """Planes of symmetry that are not mirrored: the camera looks at the section."""
-    walls: list[Wall] = []
-    parts: list[str] = []
-    title: str = ""
+    mirror: str = "none"
+    """``none``, ``auto`` (the planes of symmetry of the case), or planes such as ``x`` or ``x,y=0.002`` (m)."""
+    section: str = ""
+    """Planes, written as in ``mirror``: what lies between a plane and the camera is cut away."""
+    camera: str = ""
+    """From where the body is seen: an axis such as ``-x``, or a direction such as ``1,-1.5,0.6``; empty: as it fits."""
+    up: str = ""
+    """What points upwards in the picture, written as in ``camera``; z, or y where the camera looks along z."""
+    zoom: float = 1.0
+    """1: the body fills the picture."""
     size: tuple[int, int] = (1600, 1200)
     limits: tuple[float, float] | None = None
+    """Ends of the colour bar, in the field's unit; if not given, they come from ``percentiles``."""
+    percentiles: tuple[float, float] = (0.5, 99.5)
+    """Which values of the drawn surface are at the ends of the colour bar: a few extreme tets do not set it."""
     raw: bool = False
     """Values of each tet instead of means at the nodes."""
     edges: bool = False
+    scale: bool = True
+    """A bar of a round length beside the body."""
+    transparent: bool = False
+    """The ground of the picture is left out."""
+    rate: float = 8.0
+    """Frames a second of a GIF."""
+
+
+class Picture(msgspec.Struct, kw_only=True, frozen=True):
+    """Everything that ``render`` needs for one file; all frames have the camera and the colours in common."""
+
+    frames: list[str]
+    out: str
+    field: str
+    look: Look
+    camera: tuple[float, float, float] | None = None
+    up: tuple[float, float, float] | None = None
+    mirrors: list[Mirror] = []
+    sections: list[Mirror] = []
+    cuts: list[Mirror] = []
+    """Planes of symmetry that are not mirrored: the camera looks at them."""
+    walls: list[Wall] = []
+    parts: list[str] = []
+    title: str = ""
 
 
 class Drawn(msgspec.Struct, kw_only=True, frozen=True):
-    """What a picture shows: its file, the extremes of the field over the drawn surface, the number of faces."""
+    """What a picture shows: its file, the extremes of the field over the drawn surfaces, the number of faces, the ends
+    of the colour bar (none where colours are names), the times of its frames in s.
+    """
 
     out: str
     field: str
@@ -90,6 +126,8 @@ class Drawn(msgspec.Struct, kw_only=True, frozen=True):
     low: float
     high: float
     faces: int
+    limits: tuple[float, float] | None = None
+    times: list[float | None] = []
 
 
 @dataclass(frozen=True)
@@ -103,32 +141,42 @@ class Scene:
 
 
 def draw(
-    frame: Path,
-    scene: Scene,
-    name: str,
-    field: str,
-    out: Path | str | None = None,
-    *,
-    mirror: str = "none",
-    size: tuple[int, int] = (1600, 1200),
-    limits: tuple[float, float] | None = None,
-    raw: bool = False,
-    edges: bool = False,
+    frames: Sequence[Path], scene: Scene, name: str, field: str, out: Path | str | None = None, **options: Any
 ) -> Drawn:
-    """Draws a frame file as a PNG. Raises ViewError.
+    """Draws frame files: as a PNG, side by side where there are several, or one after the other as a GIF.
 
-    ``mirror`` is ``none``, ``auto`` (the planes of symmetry of the scene), or planes such as ``x`` or ``x,y=0.002``
-    (m). ``out`` is by default named after ``name`` and the field, in the present folder.
+    ``options`` are the fields of ``Look``. ``out`` is by default named after ``name`` and the field, in the present
+    folder. Raises ViewError.
     """
     require_field(field)
-    planes = mirrors(mirror, scene)
-    cuts = [plane for plane in scene.mirrors if plane not in planes]
+    try:
+        look = Look(**options)
+    except TypeError as error:
+        raise ViewError(f"{error}; allowed: {', '.join(Look.__struct_fields__)}") from None
     target = Path(out or f"{name}-{field}.png").resolve()
+    _check(look, target)
+    planes, sections = mirrors(look.mirror, scene), mirrors(look.section, scene, "section")
+    if {plane.axis for plane in planes} & {plane.axis for plane in sections}:
+        raise ViewError(f"section = {look.section!r}: across an axis that is mirrored; leave one of the two out")
     picture = Picture(
-        frame=str(frame), out=str(target), field=field, mirrors=list(planes), cuts=cuts, walls=list(scene.walls),
-        parts=list(scene.parts), title=scene.title, size=size, limits=limits, raw=raw, edges=edges,
+        frames=[str(frame) for frame in frames], out=str(target), field=field, look=look,
+        camera=direction(look.camera, "camera"), up=direction(look.up, "up"),
+        mirrors=list(planes), sections=list(sections), cuts=[plane for plane in scene.mirrors if plane not in planes],
+        walls=list(scene.walls), parts=list(scene.parts), title=scene.title,
     )  # fmt: skip
     return render(picture)
+
+
+def _check(look: Look, target: Path) -> None:
+    low, high = look.percentiles
+    if not 0.0 <= low < high <= 100.0:
+        raise ViewError(f"percentiles = {low:g}, {high:g}: two numbers from 0 to 100, the smaller one first")
+    if look.limits is not None and not look.limits[0] < look.limits[1]:
+        raise ViewError(f"limits = {look.limits[0]:g}, {look.limits[1]:g}: the smaller one first")
+    if not (look.zoom > 0.0 and look.rate > 0.0):
+        raise ViewError(f"zoom = {look.zoom:g}, rate = {look.rate:g}: both above 0")
+    if target.suffix.lower() not in {".png", ".gif"}:
+        raise ViewError(f"{target.name}: the name of a picture ends in .png or .gif")
 
 
 def require_field(name: str) -> None:
@@ -137,30 +185,48 @@ def require_field(name: str) -> None:
         raise ViewError(f"field = {name!r}: allowed: {', '.join(FIELDS)}")
 
 
-_PLANE = re.compile(r"\s*([xyz])\s*(?:=\s*([+-]?[0-9.]+(?:[eE][+-]?\d+)?))?\s*")
+_NUMBER = r"[+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?\d+)?"
+_PLANE = re.compile(rf"\s*([xyz])\s*(?:=\s*({_NUMBER}))?\s*")
+_AXIS = re.compile(r"\s*([+-]?)([xyz])\s*")
+_DIRECTION = re.compile(rf"\s*({_NUMBER})\s*,\s*({_NUMBER})\s*,\s*({_NUMBER})\s*")
 
 
-def mirrors(text: str, scene: Scene) -> tuple[Mirror, ...]:
+def mirrors(text: str, scene: Scene, option: str = "mirror") -> tuple[Mirror, ...]:
     """The planes of an option such as ``auto``, ``none`` or ``x,y=0.002``. Raises ViewError."""
     if text in {"none", ""}:
         return ()
-    if text == "auto":
+    if text == "auto" and option == "mirror":
         return scene.mirrors
     planes = [_PLANE.fullmatch(plane) for plane in text.split(",")]
     if None in planes:
-        raise ViewError(f"mirror = {text!r}: write auto, none, or planes such as x or x,y=0.002 (in m)")
+        auto = "auto, none, or " if option == "mirror" else ""
+        raise ViewError(f"{option} = {text!r}: write {auto}planes such as x or x,y=0.002 (in m)")
     return tuple(Mirror("xyz".index(plane[1]), float(plane[2] or 0.0)) for plane in planes if plane is not None)
+
+
+def direction(text: str, option: str) -> tuple[float, float, float] | None:
+    """``-x`` or ``1,-1.5,0.6`` as a vector; None for an empty text. Raises ViewError."""
+    if not text:
+        return None
+    if axis := _AXIS.fullmatch(text):
+        sign = -1.0 if axis[1] == "-" else 1.0
+        return sign * (axis[2] == "x"), sign * (axis[2] == "y"), sign * (axis[2] == "z")
+    found = _DIRECTION.fullmatch(text)
+    if found is None or not any(float(each) for each in found.groups()):
+        raise ViewError(f"{option} = {text!r}: write an axis such as -x, or a direction such as 1,-1.5,0.6")
+    return float(found[1]), float(found[2]), float(found[3])
 
 
 def render(picture: Picture) -> Drawn:
     """Draws in a child process. Raises ViewError that names what is missing."""
     command = [sys.executable, "-m", "conoid.client.render"]
+    seconds = _SECONDS * max(1, len(picture.frames))
     try:
         done = subprocess.run(
-            command, input=msgspec.json.encode(picture), capture_output=True, timeout=_SECONDS, env=_environment()
+            command, input=msgspec.json.encode(picture), capture_output=True, timeout=seconds, env=_environment()
         )
     except subprocess.TimeoutExpired:
-        raise ViewError(f"the renderer did not finish within {_SECONDS:.0f} s") from None
+        raise ViewError(f"the renderer did not finish within {seconds:.0f} s") from None
     if done.returncode == 0:
         return msgspec.json.decode(done.stdout.splitlines()[-1], type=Drawn)
     raise explain(done.returncode, done.stderr.decode(errors="replace"))

@@ -1,88 +1,109 @@
-"""Draws one frame as a PNG: ``python -m conoid.client.render`` reads a Picture as JSON and prints a Drawn.
+"""Draws frames as one file: ``python -m conoid.client.render`` reads a Picture as JSON and prints a Drawn.
 
-The only module that imports pyvista. It runs in a child process of ``view``.
+The only module that imports pyvista. It runs in a child process of ``view``. ``sheet`` divides the picture, ``camera``
+has where the camera stands, ``scales`` the colours.
 """
 
 import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import msgspec
 import numpy as np
 import pyvista as pv
+from PIL import Image
 
+from . import camera, scales, sheet
+from .camera import Camera
 from .errors import ViewError
 from .pictures import FIELDS, Drawn, Field, Mirror, Picture, Wall
+from .sheet import Sheet
 
-_INK, _PAPER, _HAZE = "#1d2733", "#ffffff", "#dfe6ee"
-_NAMED = ("classes", "fragments")
-"""Kinds of fields whose values are names."""
-_WHOLE = "#c9d3dc"
-_CLASSES = [
-    "#4c78a8",
-    "#f58518",
-    "#54a24b",
-    "#e45756",
-    "#72b7b2",
-    "#b279a2",
-    "#eeca3b",
-    "#9d755d",
-    "#ff9da6",
-    "#bab0ac",
-]
-_FROM = (1.0, -1.55, 0.62)
-"""Direction from the body to the camera where nothing else decides: from the front, the right and above. Chosen."""
+_INK, _PAPER = "#1d2733", "#ffffff"
 _BAR = {
-    "vertical": True, "position_x": 0.885, "position_y": 0.17, "width": 0.045, "height": 0.62,
+    "vertical": True, "position_x": 0.05, "position_y": 0.2, "width": 0.30, "height": 0.6, "title": "",
     "color": _INK, "font_family": "arial", "fmt": " %.4g",
 }  # fmt: skip
 
+Scale: TypeAlias = tuple[float, float, int] | None
+"""Ends of the colour bar and its labels; None where colours are names."""
+
+
+@dataclass(frozen=True)
+class Shot:
+    """The drawn surface of one frame, with the field as ``shown``, and its time in s."""
+
+    surface: Any
+    time: float | None
+
 
 def draw(picture: Picture) -> Drawn:
-    """Writes ``picture.out``. Raises ViewError where the frame cannot be drawn."""
+    """Writes ``picture.out``. Raises ViewError where a frame cannot be drawn."""
     field = FIELDS[picture.field]
-    surface = _surface(_read(picture.frame), picture)
-    values = np.asarray(surface["shown"])
-    plotter: Any = pv.Plotter(off_screen=True, window_size=list(picture.size), lighting="none")
-    _add_lights(plotter)
-    plotter.set_background(_HAZE, top=_PAPER)
-    _add_body(plotter, surface, field, picture)
-    _place_camera(plotter, surface, _view_from(surface, picture))
-    for wall in picture.walls:
-        _add_wall(plotter, surface, wall)
-    if picture.title:
-        plotter.add_text(
-            picture.title, position=(0.03, 0.93), viewport=True, font_size=_points(15, picture), color=_INK
-        )
-    plotter.add_axes(color=_INK, line_width=3, viewport=(0.0, 0.0, 0.16, 0.16))
-    plotter.enable_anti_aliasing("ssaa")
+    shots = [_shot(path, picture) for path in picture.frames]
+    values = [np.asarray(shot.surface["shown"]) for shot in shots]
+    scale = None if field.kind in scales.NAMED else scales.ends(values, field, picture.look)
     Path(picture.out).parent.mkdir(parents=True, exist_ok=True)
-    plotter.screenshot(picture.out)
-    plotter.close()
+    write = _animation if picture.out.lower().endswith(".gif") else _still
+    write(shots, picture, scale)
     return Drawn(
-        out=picture.out, field=picture.field, unit=field.unit, faces=int(surface.n_cells),
-        low=float(values.min()), high=float(values.max()),
+        out=picture.out, field=picture.field, unit=field.unit, faces=sum(int(shot.surface.n_cells) for shot in shots),
+        low=float(min(each.min() for each in values)), high=float(max(each.max() for each in values)),
+        limits=scale[:2] if scale else None, times=[shot.time for shot in shots],
     )  # fmt: skip
 
 
-def _read(path: str) -> Any:
-    """The whole mesh of a frame, its pieces merged."""
+def _still(shots: Sequence[Shot], picture: Picture, scale: Scale) -> None:
+    """All shots side by side, as a PNG."""
+    Image.fromarray(_image(shots, picture, scale, shots)).save(picture.out)
+
+
+def _animation(shots: Sequence[Shot], picture: Picture, scale: Scale) -> None:
+    """One shot after the other, as a GIF that begins again."""
+    first, *others = (Image.fromarray(_image([shot], picture, scale, shots)) for shot in shots)
+    pause = round(1000.0 / picture.look.rate)
+    first.save(picture.out, save_all=True, append_images=others, duration=pause, loop=0, disposal=2)
+
+
+# The surface --------------------------------------------------------------------------------------------------------
+
+
+def _shot(path: str, picture: Picture) -> Shot:
+    mesh, time = _read(path)
+    return Shot(_surface(mesh, picture), time)
+
+
+def read_mesh(path: Path) -> Any:
+    """The whole mesh of a frame as a pyvista.UnstructuredGrid."""
+    return _read(str(path))[0]
+
+
+def _read(path: str) -> tuple[Any, float | None]:
+    """The whole mesh of a frame, its pieces merged, and the frame's time."""
     mesh = pv.read(path)
+    data = mesh.field_data
     if isinstance(mesh, pv.PartitionedDataSet | pv.MultiBlock):
-        mesh = pv.merge([piece for piece in mesh if piece is not None and piece.n_cells], merge_points=False)
+        pieces = [piece for piece in mesh if piece is not None and piece.n_cells]
+        data = pieces[0].field_data if pieces and "time" not in data else data
+        mesh = pv.merge(pieces, merge_points=False)
     if mesh.n_cells == 0:
         raise ViewError(f"{path}: this frame has no elements")
-    return mesh
+    return mesh, float(np.ravel(data["time"])[0]) if "time" in data else None
 
 
 def _surface(mesh: Any, picture: Picture) -> Any:
-    """The outer faces with the field as ``shown``, reflected in every mirror."""
+    """The outer faces with the field as ``shown``, cut open at the sections, reflected in every mirror."""
     field = FIELDS[picture.field]
-    cells = picture.raw or field.kind in _NAMED
-    mesh = _with_field(mesh, picture.field, cells)
+    length = float(mesh.length)
+    mesh = _with_field(mesh, picture.field, picture.look.raw or field.kind in scales.NAMED)
+    towards = camera.direction(picture, np.asarray(mesh.center))
+    for plane in picture.sections:
+        mesh = _cut(mesh, plane, float(towards[plane.axis]))
     surface = mesh.extract_surface(algorithm="dataset_surface")
     for mirror in picture.mirrors:
-        surface = _reflected(surface, mirror, float(mesh.length))
+        surface = _reflected(surface, mirror, length)
     return surface
 
 
@@ -96,13 +117,23 @@ def _with_field(mesh: Any, name: str, cells: bool) -> Any:
         return bare.point_data_to_cell_data() if cells else bare
     _require(mesh.cell_data, name)
     values = np.asarray(mesh.cell_data[name])
-    bare.cell_data["shown"] = values if FIELDS[name].kind in _NAMED else values * factor
+    bare.cell_data["shown"] = values if FIELDS[name].kind in scales.NAMED else values * factor
     return bare if cells else bare.cell_data_to_point_data()
 
 
 def _require(data: Any, name: str) -> None:
     if name not in data:
         raise ViewError(f"this frame has no field {name!r}; it has: {', '.join(data.keys()) or 'none'}")
+
+
+def _cut(mesh: Any, plane: Mirror, side: float) -> Any:
+    """Without what lies between the plane and the camera, which is on this side of it."""
+    normal, origin = np.zeros(3), np.zeros(3)
+    normal[plane.axis], origin[plane.axis] = (1.0 if side >= 0.0 else -1.0), plane.at
+    left = mesh.clip(normal=normal, origin=origin)
+    if left.n_cells == 0:
+        raise ViewError(f"section = {'xyz'[plane.axis]}={plane.at:g}: nothing of the body lies behind it")
+    return left
 
 
 def _reflected(surface: Any, mirror: Mirror, length: float) -> Any:
@@ -117,123 +148,130 @@ def _reflected(surface: Any, mirror: Mirror, length: float) -> Any:
     return joined.extract_surface(algorithm="dataset_surface")
 
 
-def _points(size: float, picture: Picture) -> int:
-    """A font size that is ``size`` in a picture of 1200 lines."""
-    return max(6, round(size * picture.size[1] / 1200))
+# The picture --------------------------------------------------------------------------------------------------------
 
 
-def _add_lights(plotter: Any) -> None:
-    """A key light from the upper left and a weaker fill from the right, both held to the camera."""
-    for position, intensity in (((-0.7, 0.9, 1.6), 0.66), ((1.3, 0.2, 1.0), 0.34)):
-        light = pv.Light(position=position, intensity=intensity, light_type="camera light")
-        plotter.add_light(light)
+def _image(shots: Sequence[Shot], picture: Picture, scale: Scale, every: Sequence[Shot]) -> Any:
+    """Pixels of the panels of ``shots``; the camera sees the bodies of ``every`` shot."""
+    field, title = FIELDS[picture.field], sheet.title(picture, [shot.time for shot in shots])
+    points = [np.asarray(shot.surface.points, float) for shot in every]
+    laid = sheet.lay(points, len(shots), picture, bool(title), field.kind != "fragments")
+    plotter = _plotter(laid, picture)
+    drawn: Any = None
+    for place, shot in enumerate(shots):
+        plotter.subplot(*laid.panel(place))
+        drawn = _add_body(plotter, shot.surface, field, picture, scale)
+        _set_camera(plotter, laid.eye)
+        _add_marks(plotter, laid, place, [shot.time for shot in shots], picture)
+    if title:
+        _add_title(plotter, title, picture)
+    if laid.side:
+        plotter.subplot(*laid.beside)
+        _add_side(plotter, picture, scale, drawn, [shot.surface["shown"] for shot in every])
+    return _pixels(plotter, picture.look.transparent)
 
 
-def _add_body(plotter: Any, surface: Any, field: Field, picture: Picture) -> None:
-    look = {
-        "scalars": "shown", "smooth_shading": not picture.raw, "split_sharp_edges": not picture.raw,
-        "feature_angle": 35.0, "ambient": 0.38, "diffuse": 0.85, "specular": 0.10, "specular_power": 20.0,
-        "show_edges": picture.edges, "edge_color": _INK, "edge_opacity": 0.25,
-    }  # fmt: skip
-    if field.kind in _NAMED:
-        add = _add_classes if field.kind == "classes" else _add_fragments
-        add(plotter, surface, look, picture)
-        return
-    low, high, labels = _scale(np.asarray(surface["shown"]), field, picture.limits)
-    bar = {
-        **_BAR, "title": f"{field.label}\n{field.unit}\n" if field.unit else f"{field.label}\n", "n_labels": labels,
-        "title_font_size": _points(30, picture), "label_font_size": _points(26, picture),
-    }  # fmt: skip
-    colours = field.colours if isinstance(field.colours, str) else _blend(field.colours)
-    plotter.add_mesh(surface, cmap=colours, clim=(low, high), scalar_bar_args=bar, **look)
-
-
-def _blend(colours: tuple[str, ...]) -> list[str]:
-    """256 colours from the first to the last."""
-    corners = np.array([pv.Color(colour).float_rgb for colour in colours])
-    places = np.linspace(0, len(colours) - 1, 256)
-    channels = [np.interp(places, range(len(colours)), corners[:, i]) for i in range(3)]
-    return [pv.Color(colour).hex_rgb for colour in np.stack(channels, axis=1)]
-
-
-def _scale(values: Any, field: Field, limits: tuple[float, float] | None) -> tuple[float, float, int]:
-    """The ends of the colour bar, at round numbers around the values, and the number of labels."""
-    if limits is not None:
-        return (*limits, 6)
-    low, high = float(np.nanmin(values)), float(np.nanmax(values))
-    if field.kind == "centred":
-        low, high = -max(abs(low), abs(high)), max(abs(low), abs(high))
-    elif 0 < low < 0.1 * high:
-        low = 0.0
-    span = max(high - low, 1e-9 * max(abs(low), abs(high)), 1e-30)
-    power = 10.0 ** np.floor(np.log10(span / 4))
-    step = next(factor * power for factor in (1, 2, 2.5, 5, 10) if span / (factor * power) <= 6)
-    first, last = np.floor(low / step + 1e-9), np.ceil(high / step - 1e-9)
-    last = max(last, first + 1)
-    return float(first * step), float(last * step), int(last - first) + 1
-
-
-def _add_classes(plotter: Any, surface: Any, look: dict[str, Any], picture: Picture) -> None:
-    """One colour a part or rank, with a legend."""
-    classes = np.asarray(surface["shown"]).astype(int)
-    present = np.unique(classes)
-    surface.cell_data["colours"] = np.array([pv.Color(_CLASSES[i % len(_CLASSES)]).int_rgb for i in classes], np.uint8)
-    plotter.add_mesh(surface, **{**look, "scalars": "colours", "rgb": True})
-    names = picture.parts if picture.field == "part" else []
-    entries = [
-        [names[i] if i < len(names) else f"{picture.field} {i}", _CLASSES[i % len(_CLASSES)]] for i in present[:16]
-    ]
-    plotter.add_legend(
-        entries,
-        face="rectangle",
-        bcolor=None,
-        border=False,
-        loc="upper right",
-        size=(0.13, 0.032 * len(entries) + 0.01),
+def _plotter(laid: Sheet, picture: Picture) -> Any:
+    rows, columns = laid.weights()
+    grid: dict[str, Any] = {"shape": (len(rows), len(columns)), "row_weights": rows, "col_weights": columns}
+    grid |= {"groups": laid.groups()} if laid.groups() else {}
+    plotter: Any = pv.Plotter(
+        off_screen=True, window_size=list(picture.look.size), lighting="none", border=False, **grid
     )
+    plotter.set_background(_PAPER, all_renderers=True)
+    plotter.enable_anti_aliasing("ssaa", all_renderers=True)
+    return plotter
 
 
-def _add_fragments(plotter: Any, surface: Any, look: dict[str, Any], picture: Picture) -> None:
-    """One colour a fragment, from its name; what is largest to the eye is grey."""
-    _, which, faces = np.unique(np.asarray(surface["shown"]).astype(np.int64), return_inverse=True, return_counts=True)
-    palette = np.array([pv.Color(colour).int_rgb for colour in _CLASSES], np.uint8)
-    colours = palette[np.random.default_rng(0).integers(len(palette), size=len(faces))]
-    colours[np.argmax(faces)] = pv.Color(_WHOLE).int_rgb
-    surface.cell_data["colours"] = colours[which.reshape(-1)]
-    plotter.add_mesh(surface, **{**look, "scalars": "colours", "rgb": True, "smooth_shading": False})
+def _pixels(plotter: Any, transparent: bool) -> Any:
+    pixels = plotter.screenshot(None, return_img=True, transparent_background=transparent)
+    plotter.close()
+    return np.asarray(pixels)
 
 
-def _view_from(surface: Any, picture: Picture) -> Any:
-    """The direction to the camera: the front right from above, or where the sections of a cut model can be seen."""
-    sides = {cut.axis: 1.0 if cut.at > surface.center[cut.axis] else -1.0 for cut in picture.cuts if cut.axis < 2}
-    if not sides:
-        return np.array(_FROM)
-    direction = np.array([sides.get(0, 0.8), sides.get(1, -0.8), _FROM[2]])
-    if len(sides) == 1:
-        direction[list(sides)] *= 1.55
-    return direction
+def _add_body(plotter: Any, surface: Any, field: Field, picture: Picture, scale: Scale) -> Any:
+    """The body with its lights: a key light from the upper left, a weaker one from the right, held to the camera."""
+    for position, intensity in (((-0.7, 0.9, 1.6), 0.66), ((1.3, 0.2, 1.0), 0.34)):
+        plotter.add_light(pv.Light(position=position, intensity=intensity, light_type="camera light"), only_active=True)
+    raw = picture.look.raw
+    look = {
+        "scalars": "shown", "smooth_shading": not raw, "split_sharp_edges": not raw, "feature_angle": 35.0,
+        "ambient": 0.38, "diffuse": 0.85, "specular": 0.10, "specular_power": 20.0, "show_scalar_bar": False,
+        "show_edges": picture.look.edges, "edge_color": _INK, "edge_opacity": 0.25,
+    }  # fmt: skip
+    if scale is None:
+        paint = scales.class_colours if field.kind == "classes" else scales.fragment_colours
+        surface.cell_data["colours"] = paint(surface["shown"])
+        flat = {"smooth_shading": False} if field.kind == "fragments" else {}
+        drawn = plotter.add_mesh(surface, **{**look, "scalars": "colours", "rgb": True, **flat})
+    else:
+        colours = field.colours if isinstance(field.colours, str) else scales.blend(field.colours)
+        drawn = plotter.add_mesh(surface, cmap=colours, clim=scale[:2], **look)
+    for wall in picture.walls:
+        _add_wall(plotter, surface, wall)
+    return drawn
 
 
-def _place_camera(plotter: Any, surface: Any, direction: Any) -> None:
-    """As near as the body fits in the picture, left of the colour bar."""
-    centre, length = np.asarray(surface.center), float(surface.length) or 1.0
-    plotter.camera.focal_point = centre
-    plotter.camera.position = centre + direction / np.linalg.norm(direction) * 3.0 * length
-    plotter.camera.up = (0.0, 0.0, 1.0)
-    plotter.camera.view_angle = 24.0
-    plotter.reset_camera(bounds=surface.bounds)
-    plotter.camera.zoom(_fill(plotter, surface))
-    plotter.camera.SetWindowCenter(0.07, 0.0)
+def _set_camera(plotter: Any, eye: Camera) -> None:
+    """Parallel, far enough that everything lies before it."""
+    far = 100.0 * eye.half
+    plotter.camera.focal_point = eye.centre
+    plotter.camera.position = eye.centre + far * eye.towards
+    plotter.camera.up = eye.above
+    plotter.camera.enable_parallel_projection()
+    plotter.camera.parallel_scale = eye.half
+    plotter.renderer.ResetCameraClippingRange()
+    plotter.camera_set = True
 
 
-def _fill(plotter: Any, surface: Any) -> float:
-    """How much nearer the camera may come until the body touches the margins."""
-    camera, (width, height) = plotter.camera, plotter.window_size
-    matrix = camera.GetCompositeProjectionTransformMatrix(width / height, -1.0, 1.0)
-    project = pv.array_from_vtkmatrix(matrix)
-    points = np.c_[np.asarray(surface.points), np.ones(surface.n_points)] @ project.T
-    seen = np.abs(points[:, :2] / points[:, 3:])
-    return float(0.80 / max(seen[:, 0].max(), seen[:, 1].max() / 1.02, 1e-6))
+def _add_marks(plotter: Any, laid: Sheet, place: int, times: Sequence[float | None], picture: Picture) -> None:
+    """Time of a panel among several; the axes at the lower left, at the lower right the bar of a round length."""
+    size, last = sheet.font(14, picture.look.size[1]), len(times) - 1
+    if last:
+        top = 1.0 - 40.0 / laid.height
+        plotter.add_text(sheet.when(times[place]), position=(0.03, top), viewport=True, font_size=size, color=_INK)
+    if place == last - last % laid.columns:
+        share = min(0.16 * picture.look.size[1] / laid.height, 0.3)
+        plotter.add_axes(color=_INK, line_width=3, viewport=(0.0, 0.0, share / max(laid.aspect, 1.0), share))
+    if place == last and picture.look.scale:
+        _add_scale(plotter, laid, size)
+
+
+def _add_scale(plotter: Any, laid: Sheet, size: int) -> None:
+    """A line of a round length at the lower right, nearer than the body."""
+    eye, aspect = laid.eye, laid.aspect
+    length, text = camera.scale_bar(eye, aspect)
+    corner = 0.95 * aspect * eye.half * eye.right - 0.95 * eye.half * eye.above
+    end = eye.centre + corner + 50.0 * eye.half * eye.towards
+    line = pv.Line(end - length * eye.right, end)
+    plotter.add_mesh(line, color=_INK, line_width=max(2, size // 3), lighting=False, reset_camera=False)
+    plotter.renderer.ResetCameraClippingRange()
+    start = 0.5 + 0.5 * (0.95 - length / (aspect * eye.half))
+    plotter.add_text(text, position=(start, 0.035), viewport=True, font_size=size, color=_INK)
+
+
+def _add_title(plotter: Any, title: str, picture: Picture) -> None:
+    plotter.subplot(0, 0)
+    width, height = picture.look.size
+    size = min(sheet.font(15, height), max(6, round(1.05 * width / len(title))))
+    plotter.add_text(title, position=(0.02, 0.3), viewport=True, font_size=size, color=_INK)
+
+
+def _add_side(plotter: Any, picture: Picture, scale: Scale, drawn: Any, values: Sequence[Any]) -> None:
+    """The colour bar with the extremes of the values, or the legend."""
+    height, field = picture.look.size[1], FIELDS[picture.field]
+    if scale is None:
+        names = sheet.legend(values, picture)
+        size = (0.85, 0.035 * len(names) + 0.01)
+        plotter.add_legend(names, face="rectangle", bcolor=None, border=False, loc="upper left", size=size)
+        return
+    plotter.add_scalar_bar(**_BAR, n_labels=scale[2], label_font_size=sheet.font(26, height), mapper=drawn.mapper)
+    name = f"{field.label}\n{field.unit}" if field.unit else field.label
+    plotter.add_text(name, position=(0.02, 0.85), viewport=True, font_size=sheet.font(13, height), color=_INK)
+    low, high = min(float(np.min(each)) for each in values), max(float(np.max(each)) for each in values)
+    if low < scale[0] or high > scale[1]:
+        text = f"values from {low:.4g}\nto {high:.4g}"
+        plotter.add_text(text, position=(0.02, 0.11), viewport=True, font_size=sheet.font(9, height), color=_INK)
 
 
 def _add_wall(plotter: Any, surface: Any, wall: Wall) -> None:

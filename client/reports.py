@@ -1,31 +1,125 @@
-"""Commands that tell and draw what a run has said of itself."""
+"""Commands that tell and draw what a run has said of itself, and what two runs have."""
 
+import importlib
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from conoid.cases.schema import Balance
 
+from . import compare as comparing
 from . import replay, tables
+from . import report as reporting
 from .errors import ViewError
 from .options import Json, SourceArgument, Token, Url, opened, show, show_json
+from .pictures import require_field
 
 figures = typer.Typer(no_args_is_help=True, help="Charts from what a run has told.")
 
 
-@figures.command(name="balance")
-def balance_figure(
+OutArgument = Annotated[Path, typer.Argument(metavar="OUT.png", help="The PNG, or SVG, or PDF.")]
+
+
+def drawing(module: str) -> Any:
+    """``charts`` or ``curves``, which need matplotlib. Raises ViewError where it is missing."""
+    try:
+        return importlib.import_module(f".{module}", __package__)
+    except ModuleNotFoundError as error:
+        raise ViewError(f"charts need the extra 'view' of conoid: {error}") from None
+
+
+@figures.command(name="energy")
+def energy_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: Token = None) -> None:
+    """Draw the energy ledger over time, also without its kinetic term, and the residual."""
+    curves = drawing("curves")
+    with opened(source, url, token) as result:
+        typer.echo(curves.save(curves.energy(result.history), out))
+
+
+@figures.command(name="dt")
+def dt_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: Token = None) -> None:
+    """Draw the length of the time step, and what holds it down."""
+    curves = drawing("curves")
+    with opened(source, url, token) as result:
+        typer.echo(curves.save(curves.steps(result.history), out))
+
+
+@figures.command(name="fragments")
+def fragments_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: Token = None) -> None:
+    """Draw how many fragments there are over time, and how many of which mass in the end."""
+    curves = drawing("curves")
+    with opened(source, url, token) as result:
+        tables_of = [result.fragments_of(index) for index in result.fragment_tables]
+        typer.echo(curves.save(curves.fragments(tables_of), out))
+
+
+@figures.command(name="history")
+def history_figure(
     source: SourceArgument,
-    out: Annotated[Path, typer.Argument(metavar="OUT.png", help="The PNG.")],
+    out: OutArgument,
+    column: Annotated[
+        list[str] | None,
+        typer.Option("--column", help="A column of history.csv; may be repeated. Default: probes."),
+    ] = None,
     url: Url = None,
     token: Token = None,
 ) -> None:
+    """Draw columns of history.csv over time, those of one unit in one panel."""
+    curves = drawing("curves")
+    with opened(source, url, token) as result:
+        typer.echo(curves.save(curves.columns(result.history, column or ()), out))
+
+
+def report(
+    source: SourceArgument,
+    out: Annotated[Path | None, typer.Option("--out", help="The HTML file; named after the run if not given.")] = None,
+    field: Annotated[
+        list[str] | None, typer.Option("--field", help="A field to draw; may be repeated. Default: what tells most.")
+    ] = None,
+    pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="Draw frames.")] = True,
+    url: Url = None,
+    token: Token = None,
+) -> None:
+    """Write a run as one HTML file that needs no server and no network."""
+    with opened(source, url, token) as result:
+        for each in field or ():
+            require_field(each)
+        target = out or Path(f"{result.folder.name}.html")
+        typer.echo(reporting.write(result, target, field if pictures else ()))
+
+
+def compare(
+    a: SourceArgument,
+    b: Annotated[str, typer.Argument(metavar="OTHER", help="Another run, likewise.")],
+    out: Annotated[Path | None, typer.Option("--out", help="Draw both histories and fragment masses here.")] = None,
+    column: Annotated[
+        list[str] | None,
+        typer.Option("--column", help="A column of history.csv to draw; may be repeated. Default: energies, probes."),
+    ] = None,
+    url: Url = None,
+    token: Token = None,
+    as_json: Json = False,
+) -> None:
+    """Tell in what two runs differ: keys, final values, fragments; draw their histories over each other."""
+    with opened(a, url, token) as first, opened(b, url, token) as second:
+        found = comparing.compare(first, second)
+        if out is not None:
+            curves = drawing("curves")
+            curves.save(curves.comparison(comparing.material(first, second, column or ())), out)
+    if as_json:
+        show_json(found)
+        return
+    for each in tables.comparison_tables(found):
+        show(each)
+    if out is not None:
+        typer.echo(out)
+
+
+@figures.command(name="balance")
+def balance_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: Token = None) -> None:
     """Draw the outside nodes of each rank with the cuts, and where the CPU time went."""
-    try:
-        from . import charts
-    except ModuleNotFoundError as error:
-        raise ViewError(f"charts need the extra 'view' of conoid: {error}") from None
+    charts = drawing("charts")
     with opened(source, url, token) as result:
         name = str(result.case["name"])
         charts.balance(charts.course(result.messages), f"{name}, {result.folder.name}", name, out)

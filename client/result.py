@@ -1,28 +1,27 @@
 """What a run leaves, read when it is asked for: the outcome, the time history, the frames, the resolved case."""
 
-import csv
-import io
 import json
-from array import array
-from collections.abc import Iterator
+import re
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol, TypeAlias
+from typing import Any, Protocol
 
 import msgspec
 
-from conoid.cases import layout, outcome
+from conoid.cases import fragments, layout, outcome
 from conoid.cases.messages import AnyMessage
 from conoid.cases.outcome import Outcome
 
-from .errors import ClientError, UnfinishedError
+from . import html
+from .columns import Columns, joined, read_columns
+from .errors import ClientError, NotFoundError, UnfinishedError, ViewError
 from .journal import from_line
 from .pictures import Drawn, Mirror, Scene, Wall, draw
 
-Column: TypeAlias = "array[float] | list[str]"
-"""Numbers as a double array; text, such as the limiter of dt, as a list."""
+_TABLE = re.compile(rf"{fragments.FOLDER}/fragments_(\d+)\.csv")
 
 
 class Folder(Protocol):
@@ -80,15 +79,34 @@ class Result:
 
     @classmethod
     def open(cls, path: Path | str) -> "Result":
-        """The result in a run's folder on this machine. Raises ClientError when there is no such folder."""
+        """The result in a run's folder on this machine. Raises NotFoundError when there is no such folder."""
         root = Path(path)
         if not root.is_dir():
-            raise ClientError(f"{root}: there is no such folder")
+            raise NotFoundError(f"{root}: there is no such folder")
         return cls(LocalFolder(root))
 
     def __repr__(self) -> str:
         """Names the run."""
         return f"<result of {self.folder.name}>"
+
+    def _repr_html_(self) -> str:
+        """How the run ended and its references, for notebooks."""
+        try:
+            name, ended = str(self.case.get("title") or self.case.get("name")), self.outcome
+        except UnfinishedError:
+            return html.head(self.folder.name, self.folder.name, None)
+        return html.head(self.folder.name, name, ended) + html.references(ended)
+
+    def mesh(self, time: float | None = None) -> Any:
+        """The frame nearest to ``time``, s, as a pyvista.UnstructuredGrid with all its fields; None: the last one.
+
+        Raises UnfinishedError, ViewError where pyvista is missing.
+        """
+        try:
+            from .render import read_mesh  # pyvista is loaded when it is needed
+        except ModuleNotFoundError as error:
+            raise ViewError(f"meshes need the extra 'view': pip install 'conoid[view]' ({error})") from None
+        return read_mesh(self.frame(-1 if time is None else self.nearest(time)))
 
     @cached_property
     def outcome(self) -> Outcome:
@@ -106,9 +124,34 @@ class Result:
         return data
 
     @cached_property
-    def history(self) -> dict[str, Column]:
-        """The columns of history.csv, in its order: step, t (s), dt (s), the energies (J), the probes."""
+    def history(self) -> Columns:
+        """The columns of history.csv, in its order: step, t (s), dt (s), the energies (J), the probes.
+
+        ``history.frame()`` is a pandas.DataFrame.
+        """
         return read_columns(self.folder.path(layout.HISTORY).read_text(encoding="utf-8"))
+
+    @cached_property
+    def fragment_tables(self) -> list[int]:
+        """The numbers of the frames of which there is a table of fragments."""
+        return sorted(int(found[1]) for name in self.folder.names() if (found := _TABLE.fullmatch(name)))
+
+    def fragments_of(self, index: int = -1) -> Columns:
+        """The fragments of a frame by its number, -1 is the last one; columns are those of ``cases/fragments.py``.
+
+        Raises UnfinishedError where there is no table of them.
+        """
+        known = self.fragment_tables
+        if not known or (index != -1 and index not in known):
+            wanted = "any frame" if index == -1 else f"frame {index}"
+            raise UnfinishedError(f"{self.folder.name} has no fragments of {wanted}; it has tables of {len(known)}")
+        name = f"{fragments.FOLDER}/{fragments.path(Path(), known[-1] if index == -1 else index).name}"
+        return read_columns(self.folder.path(name).read_text(encoding="utf-8"))
+
+    @cached_property
+    def fragments(self) -> Columns:
+        """The fragments of every frame, one below the other; ``fragments.frame()`` is a pandas.DataFrame."""
+        return joined((index, self.fragments_of(index)) for index in self.fragment_tables)
 
     @cached_property
     def messages(self) -> list[AnyMessage]:
@@ -138,19 +181,44 @@ class Result:
             raise UnfinishedError(f"{self.folder.name} has not written {wanted}; it has {len(self.frames)}")
         return self.folder.path(found[0].name)
 
-    def view(self, field: str = "mises", out: Path | str | None = None, *, frame: int = -1, **options: Any) -> Drawn:
-        """Draws a frame as a PNG; takes the options of ``conoid.client.pictures.draw``. Raises ViewError."""
-        return draw(self.frame(frame), self.scene(frame), self.folder.name, field, out, **options)
+    def view(
+        self,
+        field: str = "mises",
+        out: Path | str | None = None,
+        *,
+        frame: int | Sequence[int] | None = None,
+        time: float | Sequence[float] | None = None,
+        **options: Any,
+    ) -> Drawn:
+        """Draws frames: as a PNG, side by side where there are several, or as a GIF where ``out`` ends in ``.gif``.
 
-    def scene(self, frame: int = -1) -> Scene:
-        """What a picture of a frame takes from the case; nothing when there is no case to read."""
+        ``frame`` has their numbers, ``time`` times in s, of each the nearest frame. Without both it is the last one,
+        of a GIF every one. ``options`` are the fields of ``conoid.client.pictures.Look``. Raises ViewError.
+        """
+        every = Path(out or "").suffix.lower() == ".gif"
+        chosen = self._chosen(_listed(frame), _listed(time), every)
+        return draw([self.frame(one) for one in chosen], self.scene(), self.folder.name, field, out, **options)
+
+    def _chosen(self, frames: Sequence[int], times: Sequence[float], every: bool) -> list[int]:
+        """Numbers of frames, in the order in which they were asked for."""
+        if not frames and not times:
+            return [one.index for one in self.frames] if every else [-1]
+        return [*frames, *(self.nearest(time) for time in times)]
+
+    def nearest(self, time: float) -> int:
+        """The number of the frame that is nearest to ``time``, s. Raises UnfinishedError where no time is known."""
+        known = [(abs(one.time - time), one.index) for one in self.frames if one.time is not None]
+        if not known:
+            raise UnfinishedError(f"{self.folder.name} has no frame whose time is known")
+        return min(known)[1]
+
+    def scene(self) -> Scene:
+        """What a picture takes from the case; nothing when there is no case to read."""
         try:
             case = self.case
         except (UnfinishedError, ValueError):
             return Scene()
         boundaries: list[dict[str, Any]] = case.get("boundaries", [])
-        title = case.get("title") or case.get("name") or ""
-        time = self._time(frame)
         return Scene(
             mirrors=tuple(
                 Mirror("xyz".index(one["axis"]), float(one.get("at", 0.0)))
@@ -159,14 +227,8 @@ class Result:
             ),
             walls=tuple(Wall(tuple(one["point"]), tuple(one["normal"])) for one in boundaries if one["kind"] == "wall"),
             parts=tuple(part["name"] for part in case.get("parts", [])),
-            title=f"{title}   t = {1e6 * time:.4g} µs" if time is not None else str(title),
+            title=str(case.get("title") or case.get("name") or ""),
         )
-
-    def _time(self, frame: int) -> float | None:
-        """Of a frame, s; None when it is not listed."""
-        if frame == -1:
-            return self.frames[-1].time
-        return next((one.time for one in self.frames if one.index == frame), None)
 
     def _frame_times(self) -> dict[str, float]:
         try:
@@ -176,21 +238,7 @@ class Result:
             return {}
 
 
-def read_columns(text: str) -> dict[str, Column]:
-    """The columns of CSV text with a header line; a column that is not all numbers stays text."""
-    rows = csv.reader(io.StringIO(text))
-    names = next(rows, [])
-    columns: list[list[str]] = [list(column) for column in zip(*_whole(rows, len(names)), strict=True)]
-    return {name: _column(column) for name, column in zip(names, columns or [[] for _ in names], strict=True)}
-
-
-def _whole(rows: Iterator[list[str]], length: int) -> Iterator[list[str]]:
-    """The rows that have every column: the last line of a file that is being written may be cut."""
-    return (row for row in rows if len(row) == length)
-
-
-def _column(column: list[str]) -> Column:
-    try:
-        return array("d", map(float, column))
-    except ValueError:
-        return column
+def _listed(value: float | Sequence[Any] | None) -> Sequence[Any]:
+    if value is None:
+        return ()
+    return value if isinstance(value, Sequence) else (value,)

@@ -7,6 +7,7 @@ import weakref
 from collections.abc import Generator
 from contextlib import suppress
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path, PurePosixPath
 from typing import Any
 from urllib.parse import quote
@@ -19,7 +20,7 @@ from conoid.cases.messages import Snapshot as Told
 from conoid.cases.outcome import Outcome
 from conoid.cases.run import State
 
-from .errors import ClientError, ServiceError, UnfinishedError
+from .errors import ClientError, NotFoundError, UnfinishedError
 from .http import Http
 from .journal import from_line
 from .link import Link
@@ -46,11 +47,25 @@ class RunInfo(msgspec.Struct, kw_only=True, frozen=True):
     """What a queued run waits for."""
     started: float | None = None
     finished: float | None = None
+    labels: dict[str, str] = {}
     title: str = ""
     """This and what follows is told of one run, not in a list."""
     estimate: dict[str, Any] = {}
     progress: Progress | None = None
     outcome_json: msgspec.Raw = msgspec.field(name="outcome", default=msgspec.Raw(b"null"))
+
+    def _repr_html_(self) -> str:
+        """For notebooks."""
+        labels = ", ".join(f"{name}={value}" for name, value in self.labels.items())
+        rows = {
+            "run": self.id,
+            "case": self.title or self.name,
+            "state": self.state.value,
+            "why": self.message,
+            "labels": labels,
+        }
+        lines = (f"<tr><th>{name}</th><td>{escape(text)}</td></tr>" for name, text in rows.items() if text)
+        return f"<table>{''.join(lines)}</table>"
 
     @property
     def outcome(self) -> Outcome | None:
@@ -96,6 +111,10 @@ class Run:
 
     session: Http
     id: str
+
+    def _repr_html_(self) -> str:
+        """Its status, for notebooks."""
+        return self.status()._repr_html_()
 
     # State ------------------------------------------------------------------------------------------------------------
 
@@ -216,10 +235,8 @@ class Run:
     def _fetch(self, name: str, target: Path) -> None:
         try:
             self.session.download(f"{self.path}/files/{quoted(name, safe='/')}", target)
-        except ServiceError as error:
-            if error.status == 404:
-                raise UnfinishedError(f"run {self.id} has no {name}") from None
-            raise
+        except NotFoundError:
+            raise UnfinishedError(f"run {self.id} has no {name}") from None
 
     def result(self) -> Result:
         """What it has written: fetched when it is asked for, kept until the result is gone."""

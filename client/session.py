@@ -1,12 +1,13 @@
 """A server and the words of its API."""
 
 import uuid
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
+from urllib.parse import urlencode
 
 import msgspec
 
-from conoid.cases.load import CaseError, Problem
+from conoid.cases.load import CaseError, Overrides, Problem
 
 from .config import target
 from .http import Http
@@ -32,7 +33,7 @@ class Page(msgspec.Struct, kw_only=True, frozen=True):
 class Session(Http):
     """A server, and the right to ask it. Use it as a context manager, or close it."""
 
-    def validate(self, case: CaseSource, overrides: Iterable[str] = ()) -> dict[str, Any]:
+    def validate(self, case: CaseSource, overrides: Overrides = ()) -> dict[str, Any]:
         """The server's estimate of a case. Raises CaseError with every problem at once."""
         kind, body = body_of(case, overrides)
         answer = self.post(Verdict, "/v1/cases:validate", body, kind)
@@ -40,29 +41,42 @@ class Session(Http):
             raise CaseError(Problem(one["key"], one["value"], one["message"]) for one in answer.problems)
         return answer.estimate
 
-    def submit(self, case: CaseSource, overrides: Iterable[str] = (), key: str | None = None) -> Run:
-        """Hands a case in: a file, the name of a shipped case, or plain data; ``run.ranks=2`` overrides a key.
+    def submit(
+        self,
+        case: CaseSource,
+        overrides: Overrides = (),
+        key: str | None = None,
+        labels: Mapping[str, str] | None = None,
+    ) -> Run:
+        """Hands a case in: a file, the name of a shipped case, or plain data.
 
-        ``key`` is the Idempotency-Key; one is made up when it is None, so that a retry never makes a second run.
+        ``overrides`` change keys: ``["run.ranks=2"]``, ``{"run.ranks": 2}``. ``key`` is the Idempotency-Key; one is
+        made up when it is None, so that a retry never makes a second run. ``labels`` are words of your own by which
+        runs are found again. Raises CaseError, ServiceError, UnreachableError.
         """
         kind, body = body_of(case, overrides)
-        return Run(self, self.post(RunInfo, "/v1/runs", body, kind, key or str(uuid.uuid4())).id)
+        words = [("label", f"{name}={value}") for name, value in (labels or {}).items()]
+        path = f"/v1/runs?{urlencode(words)}" if words else "/v1/runs"
+        return Run(self, self.post(RunInfo, path, body, kind, key or str(uuid.uuid4())).id)
 
     def run(self, run_id: str) -> Run:
         """A handle of a run; the server is not asked yet."""
         return Run(self, run_id)
 
-    def runs(self, states: Sequence[str] = (), limit: int = 50) -> list[RunInfo]:
-        """Our runs, newest first, at most ``limit``."""
+    def runs(
+        self, states: Sequence[str] = (), limit: int = 50, labels: Mapping[str, str] | None = None
+    ) -> list[RunInfo]:
+        """Our runs, newest first, at most ``limit``; with ``labels``, those that have all of them."""
+        wanted = dict(labels or {}).items()
         found: list[RunInfo] = []
         query = {"state": ",".join(states)} if states else {}
         while len(found) < limit:
-            page = self.get(Page, "/v1/runs", limit=min(100, limit - len(found)), **query)
-            found += page.runs
+            page = self.get(Page, "/v1/runs", limit=100 if wanted else min(100, limit - len(found)), **query)
+            found += [run for run in page.runs if wanted <= run.labels.items()]
             if page.next is None:
                 break
             query["cursor"] = page.next
-        return found
+        return found[:limit]
 
 
 def connect(url: str | None = None, token: str | None = None) -> Session:

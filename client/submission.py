@@ -1,11 +1,11 @@
 """A case as the user names it: a file, the name of a shipped case, or plain data; sent as it is written."""
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from conoid.cases.load import CaseError, apply_overrides, parse_case, read_data, shipped, shipped_path
+from conoid.cases.load import CaseError, Overrides, apply_overrides, parse_case, read_data, shipped, shipped_path
 from conoid.cases.problems import Problem, nearest, shown
 from conoid.cases.schema import Case
 
@@ -24,7 +24,7 @@ def locate(source: str | Path) -> Path:
     raise CaseError([Problem("case", shown(str(source)), f"neither a .toml or .json file nor a shipped case; {hint}")])
 
 
-def data_of(source: CaseSource, overrides: Iterable[str] = ()) -> dict[str, Any]:
+def data_of(source: CaseSource, overrides: Overrides = ()) -> dict[str, Any]:
     """The plain data of a case with the overrides made, not checked yet. Raises CaseError."""
     if isinstance(source, Case):
         data = source.model_dump(mode="json", exclude_unset=True)
@@ -35,17 +35,17 @@ def data_of(source: CaseSource, overrides: Iterable[str] = ()) -> dict[str, Any]
     return apply_overrides(data, overrides)
 
 
-def case_of(source: CaseSource, overrides: Iterable[str] = ()) -> Case:
+def case_of(source: CaseSource, overrides: Overrides = ()) -> Case:
     """The checked case. Raises CaseError with every error."""
     return parse_case(data_of(source, overrides))
 
 
-def body_of(source: CaseSource, overrides: Iterable[str] = ()) -> tuple[str, bytes]:
+def body_of(source: CaseSource, overrides: Overrides = ()) -> tuple[str, bytes]:
     """Content type and body to send: a file as it is written, anything else as JSON. The server checks it.
 
     Raises CaseError when there is no such file, or an override cannot be made.
     """
-    changes = list(overrides)
+    changes = overrides if isinstance(overrides, Mapping) else list(overrides)
     if isinstance(source, str | Path) and not changes:
         path = locate(source)
         try:

@@ -15,6 +15,7 @@ from conoid.cases.placed import Bulk
 from conoid.cases.run import State
 from conoid.cases.schema import Case
 
+from .compare import Comparison
 from .display import STATE_STYLE
 from .figures import count, day, duration, number, si
 from .replay import Account
@@ -187,3 +188,22 @@ def checks_table(checks: Sequence[Check]) -> Table:
         value, expected = (f"{number(each)} {check.unit}".strip() for each in (check.value, check.expected))
         made.add_row(check.name, value, expected, f"± {number(check.tolerance)}", verdict)
     return made
+
+
+def comparison_tables(found: Comparison) -> list[Table | str]:
+    """What differs between two runs, what their ends are, and what is said of their fragments."""
+    a, b = found.names
+    same = "the same answer, to the bit" if found.same_answer else "different answers"
+    keys = table("key", a, b, wide="key")
+    for each in found.keys:
+        keys.add_row(each.key, *("–" if value is None else str(value) for value in (each.a, each.b)))
+    parts: list[Table | str] = [f"{a} and {b}: {same}", "", keys if found.keys else "no key of the case differs"]
+    for title, values in (("at the end", found.ends), ("fragments", found.sizes)):
+        if values:
+            made = table(title, "unit", a, b, "difference", "%", right=(a, b, "difference", "%"), wide=title)
+            for one in values:
+                share = f"{100 * one.relative:+.2f}" if one.difference else ""
+                change = number(one.difference) if one.difference else "same"
+                made.add_row(one.name, one.unit, number(one.a), number(one.b), change, share)
+            parts += ["", made]
+    return parts

@@ -1,5 +1,6 @@
-"""``view``: a picture of a frame, by whatever names it."""
+"""``view``: a picture of frames, by whatever names them."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,20 +10,27 @@ from .result import Result
 
 
 def view(
-    source: Result | Path | str, field: str = "mises", out: Path | str | None = None, *, frame: int = -1, **options: Any
+    source: Result | Path | str,
+    field: str = "mises",
+    out: Path | str | None = None,
+    *,
+    frame: int | Sequence[int] | None = None,
+    time: float | Sequence[float] | None = None,
+    **options: Any,
 ) -> Drawn:
-    """Draws one frame of a result, of a run's folder, or a frame file, as a PNG. Raises ViewError.
+    """Draws frames of a result, of a run's folder, or a frame file: a PNG, or a GIF. Raises ViewError.
 
-    ``options`` are those of ``conoid.client.pictures.draw``.
+    Which frames, and by which numbers or times, is as ``Result.view`` has it; ``options`` are the fields of
+    ``conoid.client.pictures.Look``.
     """
     require_field(field)
     if isinstance(source, Result):
-        return source.view(field, out, frame=frame, **options)
+        return source.view(field, out, frame=frame, time=time, **options)
     path = Path(source)
     if path.is_dir():
-        return Result.open(path).view(field, out, frame=frame, **options)
+        return Result.open(path).view(field, out, frame=frame, time=time, **options)
     if not path.is_file():
         raise ViewError(f"{path}: there is no such run, folder or frame")
     if path.suffix not in {".vtkhdf", ".vtu"}:
         raise ViewError(f"{path}: a frame file ends in .vtkhdf")
-    return draw(path, Scene(), path.resolve().stem, field, out, **options)
+    return draw([path], Scene(), path.resolve().stem, field, out, **options)

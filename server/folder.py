@@ -42,6 +42,8 @@ class Submission(msgspec.Struct, kw_only=True, frozen=True):
     wall_time: float | None
     """s after which the run is stopped."""
     estimate: dict[str, int | float]
+    labels: dict[str, str] = {}
+    """Words of the submitter."""
 
 
 class Process(msgspec.Struct, kw_only=True, frozen=True):

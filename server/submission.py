@@ -3,6 +3,7 @@
 import hashlib
 import re
 import threading
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,6 +23,9 @@ from .supervisor import Supervisor
 
 KINDS = {"application/toml": "case.toml", "application/json": "case.json"}
 """Content types of a case, and the names under which they are kept."""
+_LABEL = re.compile(r"([A-Za-z0-9._-]{1,63})=([^\x00-\x1f\x7f]{0,200})")
+_MOST_LABELS = 16
+"""Labels of a run. Chosen."""
 _KEY = re.compile(r"[\x21-\x7e]{1,255}")
 
 
@@ -58,7 +62,9 @@ class Desk:
             raise CaseError(problems)
         return Reading(case, expected, data)
 
-    def submit(self, owner: str, body: bytes, content_type: str, key: str | None) -> dict[str, Any]:
+    def submit(
+        self, owner: str, body: bytes, content_type: str, key: str | None, labels: Mapping[str, str] | None = None
+    ) -> dict[str, Any]:
         """Accepts a run and returns its receipt: the same one for the same key and body.
 
         Raises ServiceError. The case and the first line of the journal are on disk when this returns.
@@ -76,7 +82,9 @@ class Desk:
         except CaseError as error:
             raise invalid_case(error.problems) from None
         with self._lock:
-            return self._earlier(owner, key, digest) or self._accept(owner, body, content_type, key, digest, reading)
+            return self._earlier(owner, key, digest) or self._accept(
+                owner, body, content_type, key, digest, reading, labels or {}
+            )
 
     def _earlier(self, owner: str, key: str | None, digest: str) -> dict[str, Any] | None:
         run_id = self._store.run_of_key(owner, key) if key is not None else None
@@ -92,8 +100,9 @@ class Desk:
         return receipt(made)
 
     def _accept(
-        self, owner: str, body: bytes, content_type: str, key: str | None, digest: str, reading: Reading
-    ) -> dict[str, Any]:
+        self, owner: str, body: bytes, content_type: str, key: str | None, digest: str, reading: Reading,
+        labels: Mapping[str, str],
+    ) -> dict[str, Any]:  # fmt: skip
         caps, case = self._settings.caps, reading.case
         limits.check_room(self._settings.runs, self._store.open_runs(owner), caps)
         run_id, now = folder.new_id()
@@ -101,6 +110,7 @@ class Desk:
             id=run_id, owner=owner, name=case.name, title=case.title, ranks=case.run.ranks, submitted=now,
             case_file=_file_name(content_type), body_sha256=digest, idempotency_key=key,
             wall_time=limits.wall_time(case, caps), estimate=limits.figures(reading.estimate),
+            labels=dict(labels),
         )  # fmt: skip
         run = Run(run_id, owner, case.name, case.run.ranks, now)
         try:
@@ -112,6 +122,16 @@ class Desk:
             raise ServiceError(507, "storage", detail, retryable=True) from error
         self._supervisor.admit(run)
         return receipt(made)
+
+
+def labels_of(words: Sequence[str]) -> dict[str, str]:
+    """The labels of ``NAME=VALUE``. Raises ServiceError 400."""
+    found = [_LABEL.fullmatch(word) for word in words]
+    if None in found or len(words) > _MOST_LABELS:
+        wrong = next((word for word, read in zip(words, found, strict=True) if read is None), f"{len(words)} of them")
+        hint = f"at most {_MOST_LABELS}: a name of letters, digits, '.', '_' or '-', '=', and up to 200 characters"
+        raise ServiceError(400, "bad_parameter", f"label = {wrong[:80]!r}: not a label", pointer="label", hint=hint)
+    return {read[1]: read[2] for read in found if read is not None}
 
 
 def receipt(made: Submission) -> dict[str, Any]:

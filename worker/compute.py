@@ -11,6 +11,7 @@ import numpy as np
 
 from conoid.cases import messages
 from conoid.cases.outcome import Outcome
+from conoid.cases.quantities import FIELD_UNITS
 from conoid.cases.run import State
 from conoid.cases.schema import Case
 
@@ -50,7 +51,8 @@ def compute(
     if comm.rank == 0:
         rewind.rewind(folder, sim.clock.step, sim.clock.frame)
         checkpoint.forget(folder, sim.clock.step)
-    history = History(folder, sim.probes.names) if comm.rank == 0 else None
+    probes = {probe.name: FIELD_UNITS[probe.field] for probe in case.probes}
+    history = History(folder, probes) if comm.rank == 0 else None
     setup = time.monotonic() - began
     _announce(sim, journal, setup)
     loop = Loop(sim, folder, journal, history, signals, Balance.of(sim), start)

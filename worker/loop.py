@@ -17,6 +17,7 @@ from .errors import EnergyError
 from .groups import Groups
 from .migration import checkpoint
 from .output import frames
+from .output.damage import damage
 from .output.history import History
 from .output.journal import Journal
 from .signals import Signals
@@ -212,12 +213,14 @@ class Loop:
     def _write_frame(self) -> None:
         sim, clock = self.sim, self.sim.clock
         index = clock.frame
-        if self.sim.record is None:
-            path = frames.write(self._folder, index, clock.t, sim.model, sim.comm)
+        cohesion = sim.fracture.cohesion if sim.fracture is not None else None
+        damaged = damage(sim.case, sim.model, cohesion, sim.comm)
+        if sim.record is None:
+            path = frames.write(self._folder, index, clock.t, sim.model, sim.comm, damage=damaged)
         else:
-            self.sim.record.look()
-            path = frames.write(self._folder, index, clock.t, sim.model, sim.comm, self.sim.record.labels)
-            self.sim.record.write(self._folder, index, clock.t)
+            sim.record.look()
+            path = frames.write(self._folder, index, clock.t, sim.model, sim.comm, sim.record.labels, damaged)
+            sim.record.write(self._folder, index, clock.t)
         clock.frame += 1
         if path is not None and self._journal is not None and index not in self._journal.frames:
             self._journal.frames.add(index)

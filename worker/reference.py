@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from conoid.cases import layout
+from conoid.cases import history, layout
 from conoid.cases.outcome import Check
 from conoid.cases.quantities import unit_of
 from conoid.cases.schema import Reference
@@ -135,7 +135,10 @@ def _middle(comm: Comm, x: Floats) -> float:
 
 def _probe(folder: Path, spec: Reference) -> float:
     with (folder / layout.HISTORY).open(newline="", encoding="utf-8") as file:
-        rows = [(float(row["t"]), float(row[spec.probe or ""])) for row in csv.DictReader(file)]
+        head, *lines = csv.reader(file)
+    names = [history.split(text)[0] for text in head]
+    t_at, probe_at = names.index("t"), names.index(spec.probe or "")
+    rows = [(float(line[t_at]), float(line[probe_at])) for line in lines]
     until = np.inf if spec.until is None else spec.until
     inside = [(t, value) for t, value in rows if spec.since <= t <= until]
     if not inside:

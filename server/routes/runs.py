@@ -16,6 +16,7 @@ from ..errors import ServiceError, not_found
 from ..lifecycle import Run
 from ..limits import read_body
 from ..service import Service, ServiceOf
+from ..submission import labels_of
 
 router = APIRouter()
 Body = Annotated[bytes, Depends(read_body)]
@@ -30,9 +31,11 @@ def submit(
     body: Body,
     content_type: Annotated[str, Header()] = "",
     idempotency_key: Annotated[str | None, Header()] = None,
+    label: Annotated[list[str] | None, Query(description="NAME=VALUE, by which the run is found again")] = None,
 ) -> Response:
     """Takes a case as TOML or JSON. The same Idempotency-Key and body give the same run and the same answer."""
-    receipt = service.desk.submit(identity.owner, body, content_type, idempotency_key)
+    labels = labels_of(label or ())
+    receipt = service.desk.submit(identity.owner, body, content_type, idempotency_key, labels)
     return JSONResponse(receipt, 202, {"Location": receipt["url"]})
 
 

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
-from conoid.cases import fragments, layout, messages
+from conoid.cases import fragments, history, layout, messages
 from conoid.cases.outcome import Outcome, from_json
 
 from .table import Cell, table
@@ -146,9 +146,8 @@ def report(bars: Sequence[Bar]) -> str:
 def waves(folder: Path) -> str:
     """What passes the probes before the release comes back from the far end: peaks, and means behind the front."""
     with (folder / layout.HISTORY).open(encoding="utf-8") as file:
-        lines = [
-            {name: float(text) for name, text in line.items() if name != "limiter"} for line in csv.DictReader(file)
-        ]
+        named = [{history.split(name)[0]: text for name, text in line.items()} for line in csv.DictReader(file)]
+    lines = [{name: float(text) for name, text in line.items() if name != "limiter"} for line in named]
     rows: list[list[Cell]] = []
     for place in (20, 40, 80, 120):
         arrival, back = 1e-3 * place / SOUND, (2.0 * LENGTH - 1e-3 * place) / SOUND

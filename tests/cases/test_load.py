@@ -241,3 +241,12 @@ def test_shipped_cases_are_found_by_name() -> None:
 def test_a_message_never_shows_a_long_value() -> None:
     found = problems("parts[0].material=" + "x" * 5000, "title=[" + "1," * 5000 + "]")
     assert all(len(str(problem)) < 400 for problem in found)
+
+
+def test_overrides_by_key_are_those_that_are_written() -> None:
+    data = {"run": {"end_time": 1.0}, "parts": [{"velocity": [0, 0, 1]}]}
+    written = apply_overrides(data, ["run.ranks=2", "run.end_time='80 us'", "parts[0].velocity[2]=-200"])
+    assert apply_overrides(data, {"run.ranks": 2, "run.end_time": "80 us", "parts[0].velocity[2]": -200}) == written
+    assert apply_overrides(data, {"run": {"ranks": 2, "end_time": "80 us"}, "parts[0].velocity[2]": -200}) == written
+    with pytest.raises(CaseError, match=r"parts\[3\]\.name = 'x'"):
+        apply_overrides(data, {"parts[3].name": "x"})

@@ -8,6 +8,8 @@ from typing import Any
 import h5py
 import numpy as np
 
+from conoid.cases import fragments, history
+
 RADIUS, LENGTH = 3.2e-3, 32.4e-3
 
 
@@ -57,6 +59,32 @@ def write_frame(path: Path, t: float = 80e-6, leave_out: tuple[str, ...] = ()) -
         root["FieldData/time"] = np.array([t])
 
 
+def write_fragments(folder: Path, index: int, masses: list[float], t: float = 80e-6) -> None:
+    """A table of fragments of these masses, kg; each has ten tets a gram."""
+    path = fragments.path(folder, index)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    rows = []
+    for label, mass in enumerate(masses):
+        row = dict.fromkeys(fragments.COLUMNS, "0.0")
+        row |= {"t": repr(t), "label": str(label), "part": "rod", "tets": str(round(1e4 * mass)), "nodes": "4"}
+        row |= {"mass": repr(mass), "extent": repr(mass ** (1 / 3))}
+        rows.append(",".join(row[name] for name in fragments.COLUMNS))
+    path.write_text("\n".join([",".join(fragments.header()), *rows]) + "\n")
+
+
+LINE = dict.fromkeys(history.COLUMNS, "0.0") | {"limiter": "stability: tet 3 of rod"}
+
+
+def write_history(folder: Path, **columns: list[float]) -> None:
+    """A history with these columns, the others 0; units as a worker writes them, those of other columns m/s."""
+    names = {**history.COLUMNS, **{name: "m/s" for name in columns if name not in history.COLUMNS}}
+    lines = [",".join(history.header(names))]
+    for row in zip(*columns.values(), strict=True):
+        line = LINE | dict(zip(columns, map(repr, row), strict=True))
+        lines.append(",".join(line[name] for name in names))
+    (folder / "history.csv").write_text("\n".join(lines) + "\n")
+
+
 def write_run(folder: Path) -> Path:
     """A finished run: outcome, history, resolved case, two frames and their series."""
     times = {"000000.vtkhdf": 0.0, "000007.vtkhdf": 80e-6}
@@ -65,7 +93,7 @@ def write_run(folder: Path) -> Path:
     files = [{"name": name, "time": t} for name, t in times.items()]
     (folder / "frames" / "frames.vtkhdf.series").write_text(json.dumps({"file-series-version": "1.0", "files": files}))
     (folder / "history.csv").write_text(
-        "step,t,dt,limiter,kinetic\n0,0.0,8e-09,tet 1,12.5\n10,8e-08,7.5e-09,tet 9,12.25\n"
+        "step,t [s],dt [s],limiter,kinetic [J]\n0,0.0,8e-09,tet 1,12.5\n10,8e-08,7.5e-09,tet 9,12.25\n"
     )
     boundaries: list[dict[str, Any]] = [{"kind": "symmetry", "axis": axis, "at": 0.0, "parts": []} for axis in "xy"]
     boundaries.append({"kind": "wall", "name": "wall", "point": [0, 0, 0], "normal": [0, 0, 1], "parts": []})

@@ -134,7 +134,7 @@ def leave(folder: Path, state: str, cause: str | None, steps: int) -> None:
         state=state, cause=cause, message=f"the {cause} of the tale" if cause else "", steps=steps, time=1.0, ranks=2,
         digest="d" * 64, elements=5, nodes=8, reference=[check, missed],
     )  # fmt: skip
-    (folder / layout.HISTORY).write_text("step,t\n1,0.5\n2,1.0\n")
+    (folder / layout.HISTORY).write_text("step,t [s]\n1,0.5\n2,1.0\n")
     (folder / layout.OUTCOME).write_bytes(outcome.to_json(ended))
 
 

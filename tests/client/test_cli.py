@@ -110,6 +110,11 @@ def test_no_server_is_one_line(words: tuple[str, ...], quiet_home: Path) -> None
     assert result.stderr == "conoid: no answer from http://127.0.0.1:1: is it running there? (conoid serve)\n"
 
 
+def test_a_label_is_a_name_and_a_value(quiet_home: Path) -> None:
+    result = conoid("ls", "--label", "batch", "--url", "http://127.0.0.1:1")
+    assert (result.exit_code, result.stderr) == (1, "conoid: label = 'batch': write NAME=VALUE\n")
+
+
 def test_view_draws_a_folder(quiet_home: Path) -> None:
     folder = write_run(quiet_home / "bar")
     result = conoid(
@@ -120,10 +125,17 @@ def test_view_draws_a_folder(quiet_home: Path) -> None:
     assert (quiet_home / "p.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_view_takes_times_with_their_units(quiet_home: Path) -> None:
+    folder = write_run(quiet_home / "bar")
+    words = ("view", folder, "--camera", "-x", "--size", 200, 150, "--json", "--out", "p.png", "--time")
+    assert read(conoid(*words, "79 us"))["times"] == [80e-6]
+    assert conoid(*words, "79").stderr == "conoid: time = '79': write it with its unit, such as '60 us'\n"
+
+
 def test_view_says_what_it_knows(quiet_home: Path) -> None:
     result = conoid("view", write_run(quiet_home / "bar"), "--field", "misses")
     assert result.exit_code == 1
-    assert result.stderr.startswith("conoid: field = 'misses': allowed: mises, pressure, plastic_strain, temperature")
+    assert result.stderr.startswith("conoid: field = 'misses': allowed: mises, pressure, principal_stress, damage")
 
 
 # With a server --------------------------------------------------------------------------------------------------------

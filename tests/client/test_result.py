@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from conoid.client.columns import read_columns
 from conoid.client.errors import ClientError, UnfinishedError
-from conoid.client.result import Result, read_columns
+from conoid.client.result import Result
 
 from .bodies import write_run
 
@@ -68,3 +69,16 @@ def test_nothing_is_read_before_it_is_asked_for_and_then_kept(folder: Path) -> N
     assert result.history["step"] == array("d", [5.0])
     (folder / "history.csv").unlink()
     assert result.history["step"] == array("d", [5.0])
+
+
+def test_a_mesh_is_that_of_the_nearest_frame(folder: Path) -> None:
+    result = Result.open(folder)
+    late, early = result.mesh(70e-6), result.mesh(1e-6)
+    assert (late.field_data["time"][0], early.field_data["time"][0]) == (80e-6, 0.0)
+    assert "mises" in result.mesh().cell_data
+
+
+def test_a_result_shows_itself_in_notebooks(folder: Path) -> None:
+    html = Result.open(folder)._repr_html_()
+    for said in ("A steel bar", "succeeded", "extent of rod", "pass"):
+        assert said in html

@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from conoid.cases.problems import CaseError
 from conoid.cases.run import State
-from conoid.client.errors import ServiceError, UnfinishedError
+from conoid.client.errors import NotFoundError, ServiceError, UnfinishedError
 from conoid.client.local import LocalServer
 from conoid.client.session import Session
 from conoid.client.stream import SseLink, ZenohLink
@@ -109,12 +110,26 @@ def test_runs_are_listed_newest_first(session: Session, tmp_path: Path) -> None:
 
 
 def test_the_server_says_what_is_wrong(session: Session, tmp_path: Path) -> None:
-    with pytest.raises(ServiceError) as caught:
+    with pytest.raises(CaseError) as caught:
         session.submit(case_file(tmp_path, ranks=64), ["run.end_tim=1"])
-    assert caught.value.problems == ["run.end_tim: unknown key; did you mean 'end_time'?"]
-    with pytest.raises(ServiceError, match=r"run\.ranks"):
+    assert list(map(str, caught.value.problems)) == ["run.end_tim: unknown key; did you mean 'end_time'?"]
+    with pytest.raises(CaseError, match=r"run\.ranks"):
         session.submit(case_file(tmp_path, ranks=64))
-    with pytest.raises(ServiceError, match="there is none"):
+    with pytest.raises(NotFoundError, match="there is none"):
         session.run("nothing").status()
     with Session(session.url, "conoid_0_guess") as stranger, pytest.raises(ServiceError, match="valid token"):
         stranger.runs()
+
+
+def test_runs_are_found_by_their_labels(session: Session, tmp_path: Path) -> None:
+    made = [
+        session.submit(case_file(tmp_path), {"run": {"end_time": "2 us"}}, labels={"batch": "7", "speed": f"{k} m/s"})
+        for k in range(2)
+    ]
+    session.submit(case_file(tmp_path))
+    assert made[0].wait(20).labels == {"batch": "7", "speed": "0 m/s"}
+    assert [run.id for run in session.runs(labels={"batch": "7"})] == [made[1].id, made[0].id]
+    assert [run.id for run in session.runs(labels={"batch": "7", "speed": "1 m/s"})] == [made[1].id]
+    assert "batch=7" in made[0]._repr_html_()
+    with pytest.raises(ServiceError, match="label = 'a b=1': not a label"):
+        session.submit(case_file(tmp_path), labels={"a b": "1"})

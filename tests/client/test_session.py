@@ -10,8 +10,10 @@ import httpx2
 import pytest
 
 from conoid.cases.load import CaseError
+from conoid.cases.problems import ConoidError
 from conoid.client.config import DEFAULT_URL, target
-from conoid.client.errors import ClientError, ServiceError, UnreachableError
+from conoid.client.errors import ClientError, NotFoundError, ServiceError, UnreachableError
+from conoid.client.result import Result
 from conoid.client.run import inside
 from conoid.client.session import Session
 from conoid.client.submission import body_of
@@ -59,10 +61,19 @@ def test_a_refused_case_tells_every_error() -> None:
         {"key": "parts[0].mesh", "value": "", "message": "this key is missing"},
     ]
     session = served(problem(422, detail="run.ranks = 9: this server has 2 slots (and 1 more)", errors=errors))
-    with pytest.raises(ServiceError) as caught:
+    with pytest.raises(CaseError) as caught:
         session.submit({"name": "bar"})
-    assert caught.value.problems == ["run.ranks = 9: this server has 2 slots", "parts[0].mesh: this key is missing"]
-    assert caught.value.exit_code == 2
+    told = list(map(str, caught.value.problems))
+    assert told == ["run.ranks = 9: this server has 2 slots", "parts[0].mesh: this key is missing"]
+
+
+def test_what_is_not_there_is_the_same_error_here_and_on_a_server(tmp_path: Path) -> None:
+    with pytest.raises(NotFoundError):
+        Result.open(tmp_path / "nothing")
+    with pytest.raises(NotFoundError, match="there is none") as caught:
+        served(problem(404, detail="run 'x': there is none")).run("x").status()
+    assert isinstance(caught.value, ServiceError)
+    assert all(issubclass(each, ConoidError) for each in (CaseError, NotFoundError, ServiceError, UnreachableError))
 
 
 def test_an_answer_that_is_no_problem_json_is_still_one_line() -> None:

@@ -4,14 +4,17 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 from matplotlib.image import imread
+from PIL import Image
 
-from conoid.client import pictures
+from conoid.client import camera, pictures, scales
 from conoid.client.errors import ViewError
-from conoid.client.pictures import FIELDS, Mirror, Scene, explain, mirrors
+from conoid.client.pictures import FIELDS, Look, Mirror, Picture, Scene, direction, explain, mirrors
 from conoid.client.view import view
 
 from .bodies import write_frame, write_run
@@ -135,3 +138,118 @@ def test_fields_can_be_listed_without_vtk() -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, env=dict(os.environ), check=True
     )
     assert done.stdout.split() == list(FIELDS)
+
+
+# What the caller may choose -------------------------------------------------------------------------------------------
+
+
+def test_frames_know_their_times_and_stand_side_by_side(folder: Path, tmp_path: Path) -> None:
+    drawn = view(folder, "mises", tmp_path / "two.png", size=SIZE, time=[0.0, 75e-6])
+    assert drawn.times == [0.0, 80e-6], "of each time the nearest frame"
+    one = view(folder, "mises", tmp_path / "one.png", size=SIZE, frame=0)
+    assert drawn.faces == 2 * one.faces
+    pixels = imread(tmp_path / "two.png")[:, :, :3]
+    coloured = (pixels.max(axis=2) - pixels.min(axis=2) > 0.25)[:, : int(0.8 * SIZE[0])].any(axis=0)
+    bodies = np.count_nonzero(np.diff(coloured.astype(int)) == 1)
+    assert bodies >= 2
+
+
+def test_a_gif_has_every_frame(folder: Path, tmp_path: Path) -> None:
+    drawn = view(folder, "mises", tmp_path / "all.gif", size=SIZE, rate=4.0)
+    assert drawn.times == [0.0, 80e-6]
+    with Image.open(tmp_path / "all.gif") as gif:
+        assert (gif.size, getattr(gif, "n_frames", 0), gif.info["duration"]) == (SIZE, 2, 250)
+
+
+def test_a_transparent_ground_is_left_out(folder: Path, tmp_path: Path) -> None:
+    view(folder, "mises", tmp_path / "t.png", size=SIZE, transparent=True, scale=False)
+    alpha = imread(tmp_path / "t.png")[:, :, 3]
+    assert alpha[0, -1] == 0.0
+    assert alpha.max() == 1.0
+    assert 0.05 < np.mean(alpha > 0.5) < 0.8
+
+
+def test_a_section_cuts_away_what_lies_before_it(folder: Path, tmp_path: Path) -> None:
+    whole = view(folder, "temperature", tmp_path / "a.png", size=SIZE)
+    below = view(folder, "temperature", tmp_path / "b.png", size=SIZE, camera="-z", section="z=0.02")
+    above = view(folder, "temperature", tmp_path / "c.png", size=SIZE, camera="z", section="z=0.02")
+    assert below.high < 400.0 < whole.high, "the hot foot lies between the plane and the camera"
+    assert above.high == pytest.approx(whole.high)
+    with pytest.raises(ViewError, match="nothing of the body lies behind"):
+        view(folder, "temperature", tmp_path / "d.png", size=SIZE, camera="z", section="z=-1")
+    with pytest.raises(ViewError, match="across an axis that is mirrored"):
+        view(folder, "temperature", tmp_path / "d.png", size=SIZE, mirror="x", section="x")
+
+
+def test_one_extreme_tet_does_not_set_the_colours(tmp_path: Path) -> None:
+    write_frame(tmp_path / "f.vtkhdf")
+    calm = view(tmp_path / "f.vtkhdf", "mises", tmp_path / "a.png", size=SIZE, raw=True)
+    with h5py.File(tmp_path / "f.vtkhdf", "r+") as file:
+        file["VTKHDF/CellData/mises"][0] = 1e12
+    wild = view(tmp_path / "f.vtkhdf", "mises", tmp_path / "b.png", size=SIZE, raw=True)
+    assert wild.high == pytest.approx(1e6)
+    assert wild.limits == calm.limits
+    every = view(tmp_path / "f.vtkhdf", "mises", tmp_path / "c.png", size=SIZE, raw=True, percentiles=(0, 100))
+    assert every.limits is not None
+    assert every.limits[1] >= 1e6
+
+
+def seen(**options: Any) -> Picture:
+    return Picture(frames=[], out="", field="mises", look=Look(), **options)
+
+
+def test_the_bar_of_a_length_is_as_long_as_it_says(folder: Path, tmp_path: Path) -> None:
+    """The body is 32.4 mm long, 0.82 of that in the last frame: its pixels and those of the bar have one scale."""
+    size = (600, 800)
+    drawn = view(folder, "temperature", tmp_path / "s.png", size=size, camera="x", raw=True)
+    assert drawn.times == [80e-6]
+    pixels = imread(tmp_path / "s.png")[:, :, :3]
+    panel = pixels[: int(0.93 * size[1]), : int(0.85 * size[0])]
+    body = np.flatnonzero((panel.max(axis=2) - panel.min(axis=2) > 0.25)[:, int(0.25 * size[0]) :].any(axis=1))
+    dark = pixels[int(0.95 * size[1]) :].max(axis=2) < 0.4
+    bar = int(np.count_nonzero(dark, axis=1).max())
+    height = 32.4e-3 * 0.82
+    assert (bar / len(body)) * height == pytest.approx(5e-3, rel=0.03)
+
+
+def test_a_scale_has_a_round_length() -> None:
+    points = [np.array([[0.0, 0.0, 0.0], [0.0, 0.01, 0.3]])]
+    eye = camera.place(points, seen(camera=(1.0, 0.0, 0.0), up=(0.0, 1.0, 0.0)), 2.0)
+    length, text = camera.scale_bar(eye, 2.0)
+    assert length == pytest.approx(0.1)
+    assert text == "100 mm"
+    assert np.abs(eye.right) == pytest.approx([0.0, 0.0, 1.0])
+    assert [camera.round_length(x) for x in (0.99, 1.0, 4.9, 7.0)] == pytest.approx([0.5, 1.0, 2.0, 5.0])
+
+
+def test_panels_are_laid_so_that_bodies_are_large() -> None:
+    assert camera.panels(3, (10.0, 1.0), (1600.0, 900.0)) == 1
+    assert camera.panels(3, (1.0, 10.0), (1600.0, 900.0)) == 3
+    assert camera.panels(4, (1.0, 1.0), (1000.0, 1000.0)) == 2
+
+
+def test_a_fragment_keeps_its_colour_from_frame_to_frame() -> None:
+    early = scales.fragment_colours([0, 0, 0, 7, 9])
+    late = scales.fragment_colours([0, 0, 0, 9, 11])
+    assert (early[4] == late[3]).all()
+    assert tuple(early[0]) == scales.rgb(scales.WHOLE)
+
+
+def test_cameras_are_read() -> None:
+    assert direction("", "camera") is None
+    assert direction("-x", "camera") == (-1.0, 0.0, 0.0)
+    assert direction("1, -1.5,.6", "camera") == (1.0, -1.5, 0.6)
+    for wrong in ("q", "0,0,0", "1,2"):
+        with pytest.raises(ViewError, match="write an axis such as -x"):
+            direction(wrong, "camera")
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [({"percentiles": (50, 50)}, "the smaller one first"), ({"limits": (2, 1)}, "limits = 2, 1"),
+     ({"zoom": 0}, "above 0"), ({"out": "x.jpg"}, r"ends in \.png or \.gif"),
+     ({"colour": "red"}, "allowed: mirror, section")],
+)  # fmt: skip
+def test_a_wrong_choice_is_one_line(options: dict[str, Any], said: str, folder: Path) -> None:
+    with pytest.raises(ViewError, match=said):
+        view(folder, "mises", **options)

@@ -6,6 +6,7 @@ from itertools import permutations
 from pathlib import Path
 from typing import Any
 
+import h5py
 import pytest
 
 from conoid.cases import layout
@@ -43,6 +44,15 @@ def test_what_breaks_is_the_same_on_any_number_of_ranks(name: str, ranks: int, b
     assert (other.steps, other.energy, other.eroded) == (first.steps, first.energy, first.eroded)
     assert other.fragments == first.fragments
     assert (many / layout.HISTORY).read_bytes() == (one / layout.HISTORY).read_bytes()
+    fields = frame_fields(one)
+    assert {"damage", "principal_stress", "stress"} <= fields.keys()
+    assert fields == frame_fields(many)
+
+
+def frame_fields(folder: Path) -> dict[str, bytes]:
+    """The fields of the tets in the last frame, but for their rank."""
+    with h5py.File(sorted((folder / layout.FRAMES).glob("*.vtkhdf"))[-1]) as file:
+        return {name: values[...].tobytes() for name, values in file["VTKHDF/CellData"].items() if name != "rank"}
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=marks(name)) for name in SCENES])

@@ -38,8 +38,27 @@ def von_mises(deviator: Floats) -> Floats:
     return mises
 
 
-def _cells(block: Block, rank: int, fragment: Ints | None) -> dict[str, Any]:
+UNITS = {
+    "velocity": "m/s", "displacement": "m", "pressure": "Pa", "mises": "Pa", "stress": "Pa", "principal_stress": "Pa",
+    "temperature": "K", "plastic_strain": "1", "damage": "1",
+}  # fmt: skip
+"""Of each field, an attribute ``unit`` of its data set; names and numbers have none."""
+_ORDER = [0, 1, 2, 5, 3, 4]
+"""Of the components of a stress as VTK has them, xx, yy, zz, xy, yz, zx, in ours (CONVENTIONS.md)."""
+
+
+def principal(stress: Floats) -> Floats:
+    """(n,) largest principal values of stresses (n, 6) in the order of VTK."""
+    xx, yy, zz, xy, yz, zx = stress.T
+    matrices = np.stack([xx, xy, zx, xy, yy, yz, zx, yz, zz], axis=1).reshape(-1, 3, 3)
+    values: Floats = np.linalg.eigvalsh(np.where(np.isfinite(matrices), matrices, 0.0))[:, 2]
+    return values
+
+
+def _cells(block: Block, rank: int, fragment: Ints | None, damage: Floats | None) -> dict[str, Any]:
     deviator = np.array([block.row(row) for row in range(S_XX, S_XY + 1)])
+    stress = deviator[_ORDER].T.copy()
+    stress[:, :3] -= block.row(PRESSURE)[:, None]
     strain = block.row(PLASTIC_STRAIN) if block.has(PLASTIC_STRAIN) else np.zeros(block.n)
     temperature = block.row(TEMPERATURE) if block.has(TEMPERATURE) else np.full(block.n, block.temperature)
     cells = {
@@ -48,15 +67,22 @@ def _cells(block: Block, rank: int, fragment: Ints | None) -> dict[str, Any]:
         "tet": block.id,
         "pressure": block.row(PRESSURE).astype(np.float32),
         "mises": von_mises(deviator).astype(np.float32),
+        "stress": stress.astype(np.float32),
+        "principal_stress": principal(stress).astype(np.float32),
         "plastic_strain": strain.astype(np.float32),
         "temperature": temperature.astype(np.float32),
     }
+    cells |= {} if damage is None else {"damage": damage.astype(np.float32)}
     return cells if fragment is None else {**cells, "fragment": fragment}
 
 
-def _snapshot(model: Model, rank: int, labels: list[Ints] | None) -> dict[str, Any]:
+def _share(model: Model, rank: int, labels: list[Ints] | None, damage: list[Floats] | None) -> dict[str, Any]:
+    """What this rank gives to a frame."""
     nodes = model.nodes
-    cells = [_cells(block, rank, labels[b] if labels else None) for b, block in enumerate(model.blocks)]
+    cells = [
+        _cells(block, rank, labels[b] if labels else None, damage[b] if damage is not None else None)
+        for b, block in enumerate(model.blocks)
+    ]
     return {
         "ids": nodes.id,
         "points": nodes.x,
@@ -67,12 +93,15 @@ def _snapshot(model: Model, rank: int, labels: list[Ints] | None) -> dict[str, A
     }
 
 
-def write(folder: Path, index: int, t: float, model: Model, comm: Comm, labels: list[Ints] | None = None) -> str | None:
+def write(
+    folder: Path, index: int, t: float, model: Model, comm: Comm, labels: list[Ints] | None = None,
+    damage: list[Floats] | None = None,
+) -> str | None:  # fmt: skip
     """Writes frame ``index``; on rank 0 returns its path relative to the run's folder, elsewhere None.
 
-    ``labels``: for each block the fragment of each tet, where there are any.
+    ``labels``: for each block the fragment of each tet, where there are any; ``damage``: its damage, likewise.
     """
-    pieces = comm.gather(_snapshot(model, comm.rank, labels))
+    pieces = comm.gather(_share(model, comm.rank, labels, damage))
     if pieces is None:
         return None
     path = layout.frame(folder, index)
@@ -80,7 +109,9 @@ def write(folder: Path, index: int, t: float, model: Model, comm: Comm, labels: 
     beside = path.with_suffix(".part")
     with h5py.File(beside, "w") as file:
         _write_grid(file, pieces, model.nodes_global)
+        file.attrs["time"], file.attrs["time_unit"] = t, "s"
         file["VTKHDF/FieldData/time"] = np.array([t])
+        file["VTKHDF/FieldData/time"].attrs["unit"] = "s"
     with beside.open("rb") as handle:
         os.fsync(handle.fileno())
     beside.rename(path)
@@ -99,14 +130,23 @@ def _write_grid(file: "h5py.File", pieces: list[dict[str, Any]], total: int) -> 
     n = len(tets)
     root["NumberOfPoints"], root["NumberOfCells"] = np.array([total]), np.array([n])
     root["NumberOfConnectivityIds"] = np.array([4 * n])
-    root.create_dataset("Points", data=point_data.pop("points"), **_PACKING)
+    root.create_dataset("Points", data=point_data.pop("points"), **_PACKING).attrs["unit"] = "m"
     root.create_dataset("Connectivity", data=tets.reshape(-1), **_PACKING)
     root.create_dataset("Offsets", data=np.arange(0, 4 * n + 1, 4), **_PACKING)
     root.create_dataset("Types", data=np.full(n, _TETRA, np.uint8), **_PACKING)
     for name, values in point_data.items():
-        root.create_dataset(f"PointData/{name}", data=values, **_PACKING)
+        _add(root, f"PointData/{name}", values)
     for name, values in cells.items():
-        root.create_dataset(f"CellData/{name}", data=values[order], **_PACKING)
+        _add(root, f"CellData/{name}", values[order])
+
+
+def _add(root: "h5py.Group", path: str, values: "np.ndarray") -> None:
+    """A field with its unit, and of a stress its components."""
+    name, stored = path.partition("/")[2], root.create_dataset(path, data=values, **_PACKING)
+    if name in UNITS:
+        stored.attrs["unit"] = UNITS[name]
+    if name == "stress":
+        stored.attrs["components"] = "xx yy zz xy yz zx"
 
 
 def _by_id(pieces: list[dict[str, Any]], name: str, total: int) -> "np.ndarray":

@@ -14,7 +14,8 @@ def rewind(folder: Path, step: int, frame: int) -> None:
     """
     _keep_below(folder / layout.HISTORY, step)
     _keep_below(fragments.genealogy(folder), frame)
-    (folder / layout.OUTCOME).unlink(missing_ok=True)
+    for last in (layout.OUTCOME, layout.HISTORY_PARQUET):
+        (folder / last).unlink(missing_ok=True)
 
 
 def _keep_below(path: Path, limit: int) -> None:

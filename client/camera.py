@@ -1,0 +1,107 @@
+"""Where the camera of a picture stands, how the panels are laid out, and what is a round length; numpy only.
+
+The projection is parallel, so that lengths across the view are the same everywhere and a bar of a length is true.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from .pictures import Picture
+
+Array: TypeAlias = "np.ndarray[Any, np.dtype[np.float64]]"
+
+FROM = (1.0, -1.55, 0.62)
+"""Direction from the body to the camera where nothing else decides: from the front, the right and above. Chosen."""
+_ASIDE = 1.55
+"""How much more the camera looks at a plane of symmetry than at the other sides. Chosen."""
+_FILL = 0.84
+"""Share of a panel that the body takes up. Chosen."""
+_SCALE = 0.28
+"""Largest share of a panel's width that the bar of a length takes up. Chosen."""
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A parallel view: unit vectors to the camera, to the right and upwards; ``half`` is half the height that a panel
+    shows, m.
+    """
+
+    centre: Array
+    towards: Array
+    right: Array
+    above: Array
+    half: float
+
+
+def direction(picture: Picture, centre: Array) -> Array:
+    """To the camera: as it was asked for, else the front right from above, or where planes of symmetry can be seen."""
+    if picture.camera is not None:
+        return np.array(picture.camera)
+    sides = {cut.axis: 1.0 if cut.at > centre[cut.axis] else -1.0 for cut in picture.cuts if cut.axis < 2}
+    if not sides:
+        return np.array(FROM)
+    towards = np.array([sides.get(0, 0.8), sides.get(1, -0.8), FROM[2]])
+    if len(sides) == 1:
+        towards[list(sides)] *= _ASIDE
+    return towards
+
+
+def axes(towards: Array, up: Sequence[float] | None) -> tuple[Array, Array, Array]:
+    """Unit vectors to the camera, to the right and upwards; ``up`` is z, or y where the camera looks along z."""
+    towards = towards / np.linalg.norm(towards)
+    for above in (np.array(up, float) if up is not None else np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0]),
+                  np.array([1.0, 0.0, 0.0])):  # fmt: skip
+        right = np.cross(above, towards)
+        if np.linalg.norm(right) > 1e-6 * np.linalg.norm(above):
+            right /= np.linalg.norm(right)
+            return towards, right, np.cross(towards, right)
+    raise AssertionError("of y and x one is not along the view")
+
+
+def reach(points: Sequence[Array], right: Array, above: Array) -> tuple[float, float, Array]:
+    """Width and height of the smallest box round all points as they are seen, and its centre in space."""
+    seen = [np.stack([each @ right, each @ above]) for each in points if len(each)]
+    low = np.min([each.min(axis=1) for each in seen], axis=0)
+    high = np.max([each.max(axis=1) for each in seen], axis=0)
+    middle = np.mean([each.mean(axis=0) for each in points if len(each)], axis=0)
+    across, along = 0.5 * (low + high)
+    centre = middle + (across - middle @ right) * right + (along - middle @ above) * above
+    return float(high[0] - low[0]), float(high[1] - low[1]), centre
+
+
+def panels(n: int, body: tuple[float, float], room: tuple[float, float]) -> int:
+    """Into how many columns ``n`` panels are laid so that a body of this width and height is drawn largest."""
+    width, height = body
+
+    def largest(columns: int) -> float:
+        rows = math.ceil(n / columns)
+        return min(room[0] / columns / max(width, 1e-30), room[1] / rows / max(height, 1e-30))
+
+    return max(range(1, n + 1), key=lambda columns: (largest(columns), -columns))
+
+
+def place(points: Sequence[Array], picture: Picture, aspect: float) -> Camera:
+    """A camera that sees all points in a panel whose width over height is ``aspect``."""
+    bounds = np.array([[each.min(axis=0), each.max(axis=0)] for each in points if len(each)])
+    middle = 0.5 * (bounds[:, 0].min(axis=0) + bounds[:, 1].max(axis=0))
+    towards, right, above = axes(direction(picture, middle), picture.up)
+    width, height, centre = reach(points, right, above)
+    half = 0.5 * max(height, width / aspect, 1e-30) / _FILL / picture.look.zoom
+    return Camera(centre, towards, right, above, half)
+
+
+def round_length(most: float) -> float:
+    """The largest of 1, 2, 5, 10 ... that is at most ``most``."""
+    power = 10.0 ** math.floor(math.log10(most))
+    return next(factor * power for factor in (5.0, 2.0, 1.0) if factor * power <= most * (1.0 + 1e-9))
+
+
+def scale_bar(camera: Camera, aspect: float) -> tuple[float, str]:
+    """A round length in m that fits below the body, and how it is written."""
+    length = round_length(_SCALE * 2.0 * camera.half * aspect)
+    unit, factor = next(((u, f) for u, f in (("m", 1.0), ("mm", 1e3)) if length * f >= 0.9999), ("µm", 1e6))
+    return length, f"{length * factor:.3g} {unit}"

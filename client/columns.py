@@ -1,0 +1,97 @@
+"""Tables as columns: what can be had without any package, and as a data frame where pandas is there."""
+
+import csv
+import io
+from array import array
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from html import escape
+from typing import Any, TypeAlias
+
+from conoid.cases import fragments, history
+
+from .errors import ClientError
+from .figures import number
+
+Column: TypeAlias = "array[float] | list[str]"
+"""Numbers as a double array; text, such as the limiter of dt, as a list."""
+_SHOWN = 5
+"""Lines of a table that are shown of its head and of its end. Chosen."""
+
+
+class Columns(dict[str, Column]):
+    """Columns by name, all of one length, in the order of the file; ``units`` has the unit of each, or ''."""
+
+    def __init__(self, columns: Mapping[str, Column], units: Mapping[str, str]) -> None:
+        """Keeps the columns as they are."""
+        super().__init__(columns)
+        self.units = dict(units)
+
+    @property
+    def rows(self) -> int:
+        """Number of lines."""
+        return len(next(iter(self.values()), ()))
+
+    def numbers(self, name: str) -> Sequence[float]:
+        """A column of numbers. Raises ClientError for one that is not there, or is text."""
+        column = self.get(name)
+        if not isinstance(column, array):
+            known = ", ".join(each for each, values in self.items() if isinstance(values, array))
+            raise ClientError(f"column = {name!r}: columns of numbers are: {known}")
+        return column
+
+    def frame(self) -> Any:
+        """As a pandas.DataFrame; its ``attrs["units"]`` has the units. Raises ClientError without pandas."""
+        try:
+            import pandas
+        except ModuleNotFoundError:
+            raise ClientError("data frames need pandas: pip install 'conoid[tables]'") from None
+        made = pandas.DataFrame({name: list(column) for name, column in self.items()})
+        made.attrs["units"] = dict(self.units)
+        return made
+
+    def _repr_html_(self) -> str:
+        """Head and end, for notebooks."""
+        head = "".join(f"<th>{escape(title)}</th>" for title in history.header({n: self.units[n] for n in self}))
+        rows = list(range(self.rows))
+        chosen = rows if len(rows) <= 2 * _SHOWN else [*rows[:_SHOWN], *rows[-_SHOWN:]]
+        lines = "".join(
+            f"<tr>{''.join(f'<td>{escape(_text(c[row]))}</td>' for c in self.values())}</tr>" for row in chosen
+        )
+        return f"<table><thead><tr>{head}</tr></thead><tbody>{lines}</tbody></table><p>{len(rows)} lines</p>"
+
+
+def _text(value: float | str) -> str:
+    return value if isinstance(value, str) else number(value)
+
+
+def read_columns(text: str) -> Columns:
+    """The columns of CSV text with a header line, by names without units; one that is not all numbers stays text."""
+    rows = csv.reader(io.StringIO(text))
+    named = [history.split(name) for name in next(rows, [])]
+    columns: list[list[str]] = [list(column) for column in zip(*_whole(rows, len(named)), strict=True)]
+    values = [_column(column) for column in columns or [[] for _ in named]]
+    return Columns({name: column for (name, _), column in zip(named, values, strict=True)}, dict(named))
+
+
+def _whole(rows: Iterator[list[str]], length: int) -> Iterator[list[str]]:
+    """The rows that have every column: the last line of a file that is being written may be cut."""
+    return (row for row in rows if len(row) == length)
+
+
+def _column(column: list[str]) -> Column:
+    try:
+        return array("d", map(float, column))
+    except ValueError:
+        return column
+
+
+def joined(tables: Iterable[tuple[int, Columns]]) -> Columns:
+    """Fragment tables one below the other, with the number of each table's frame as the column ``frame``."""
+    names = list(fragments.COLUMNS)
+    found: dict[str, list[Any]] = {name: [] for name in ("frame", *names)}
+    for index, table in tables:
+        found["frame"] += [float(index)] * table.rows
+        for name in names:
+            found[name] += table[name]
+    columns: dict[str, Column] = {n: v if n == "part" else array("d", v) for n, v in found.items()}
+    return Columns(columns, {"frame": "", **fragments.COLUMNS})

@@ -1,0 +1,64 @@
+"""Pieces of HTML that reports and notebooks show."""
+
+import base64
+from collections.abc import Sequence
+from html import escape
+from importlib import metadata
+
+from conoid.cases.outcome import Outcome
+
+from .figures import count, duration, number, si
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int] = ()) -> str:
+    """A table of text, which is escaped; ``numbers`` are the columns that stand right."""
+
+    def cells(row: Sequence[str], tag: str) -> str:
+        return "".join(f"<{tag}{' class=n' * (i in numbers)}>{escape(each)}</{tag}>" for i, each in enumerate(row))
+
+    top = f"<thead><tr>{cells(head, 'th')}</tr></thead>" if any(head) else ""
+    lines = "".join(f"<tr>{cells(row, 'td')}</tr>" for row in rows)
+    return f"<div class=wide><table>{top}<tbody>{lines}</tbody></table></div>"
+
+
+def image(data: bytes, kind: str, alt: str) -> str:
+    """A picture in the page itself."""
+    return f'<img alt="{escape(alt)}" src="data:image/{kind};base64,{base64.b64encode(data).decode()}">'
+
+
+def head(name: str, title: str, ended: Outcome | None) -> str:
+    """Title, state and numbers of a run; ``ended`` is None before its end."""
+    release = f"Conoid {metadata.version('conoid')}"
+    if ended is None:
+        state, rows = "<span class=bad>not ended</span>", [["run", name], ["written by", release]]
+    else:
+        good = "good" if ended.state == "succeeded" else "bad"
+        state = f"<span class={good}>{escape(ended.state)}</span> {escape(ended.message)}"
+        rows = [
+            ["run", name], ["simulated", f"{si(ended.time, 's')} in {count(ended.steps)} steps"],
+            ["took", f"{duration(ended.elapsed)} on {ended.ranks} rank{'s' * (ended.ranks != 1)}"],
+            ["tets", f"{count(ended.elements)}, of which {count(ended.eroded)} eroded"],
+            ["nodes", f"{count(ended.nodes_initial)} at first, {count(ended.nodes)} at the end"],
+            ["fragments", f"{count(ended.fragments)}; {count(ended.broken)} facets broken"],
+            ["energy", f"worst residual {ended.worst_residual:.1e}"], ["digest", ended.digest], ["written by", release],
+        ]  # fmt: skip
+    return f"<header><h1>{escape(title)}</h1><p>{state}</p>{table(['', ''], rows)}</header>"
+
+
+def references(ended: Outcome | None) -> str:
+    """The references of a run with pass or fail; nothing where there are none."""
+    if ended is None or not ended.reference:
+        return ""
+    rows = []
+    for check in ended.reference:
+        verdict = "<span class=good>pass</span>" if check.passed else "<span class=bad>FAIL</span>"
+        values = (
+            f"{number(check.value)} {check.unit}",
+            f"{number(check.expected)} {check.unit}",
+            f"± {number(check.tolerance)}",
+        )
+        cells = "".join(f"<td class=n>{escape(each)}</td>" for each in values)
+        rows.append(f"<tr><td>{escape(check.name)}</td>{cells}<td>{verdict}</td><td>{escape(check.source)}</td></tr>")
+    head = "".join(f"<th class=n>{each}</th>" for each in ("value", "expected", "tolerance"))
+    head = f"<th>reference</th>{head}<th></th><th>source</th>"
+    return f"<div class=wide><table><thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>"

@@ -1,0 +1,84 @@
+"""The command ``view``: frames as a picture."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from conoid.cases.units import parse_quantity
+
+from .errors import ViewError
+from .options import Json, Token, Url, find, show_json
+from .pictures import FIELDS
+from .session import connect
+from .view import view
+
+
+def view_frames(
+    source: Annotated[str, typer.Argument(metavar="SOURCE", help="A run's id, its folder, or a frame file.")],
+    field: Annotated[str, typer.Option("--field", help=f"What to colour by: {', '.join(FIELDS)}.")] = "mises",
+    out: Annotated[
+        Path | None, typer.Option("--out", help="The PNG, or GIF; a PNG named after run and field if not given.")
+    ] = None,
+    frame: Annotated[
+        list[int] | None,
+        typer.Option("--frame", help="Number of a frame, -1 is the last one; repeated: several side by side."),
+    ] = None,
+    time: Annotated[
+        list[str] | None, typer.Option("--time", help="The frame nearest to a time such as '60 us'; may be repeated.")
+    ] = None,
+    mirror: Annotated[
+        str, typer.Option("--mirror", help="Complete a half or quarter model: auto, or planes such as x,y=0.002 (m).")
+    ] = "none",
+    section: Annotated[
+        str, typer.Option("--section", help="Cut away what lies before planes such as x,y=0.002 (m).")
+    ] = "",
+    camera: Annotated[
+        str, typer.Option("--camera", help="Seen from an axis such as -x, or a direction such as 1,-1.5,0.6.")
+    ] = "",
+    up: Annotated[str, typer.Option("--up", help="What points upwards: an axis such as -y, or a direction.")] = "",
+    zoom: Annotated[float, typer.Option("--zoom", help="1: the body fills the picture.")] = 1.0,
+    limits: Annotated[tuple[float, float] | None, typer.Option("--range", help="Ends of the colour bar.")] = None,
+    percentiles: Annotated[
+        tuple[float, float],
+        typer.Option("--percentiles", help="Values at the ends of the colour bar where --range is not given."),
+    ] = (0.5, 99.5),
+    size: Annotated[tuple[int, int], typer.Option("--size", min=64, max=16384, help="Width and height.")] = (
+        1600,
+        1200,
+    ),
+    raw: Annotated[bool, typer.Option("--raw", help="Values of every tet instead of means at the nodes.")] = False,
+    edges: Annotated[bool, typer.Option("--edges", help="Draw the edges of the mesh.")] = False,
+    scale: Annotated[bool, typer.Option("--scale/--no-scale", help="Draw a bar of a round length.")] = True,
+    transparent: Annotated[bool, typer.Option("--transparent", help="Leave out the ground of the picture.")] = False,
+    rate: Annotated[float, typer.Option("--rate", help="Frames a second of a GIF.")] = 8.0,
+    url: Url = None,
+    token: Token = None,
+    as_json: Json = False,
+) -> None:
+    """Draw frames off screen: as a PNG, side by side where there are several, or as a GIF (--out x.gif: all frames)."""
+    options: dict[str, Any] = {
+        "out": out, "frame": frame, "time": [_seconds(each) for each in time or ()], "mirror": mirror,
+        "section": section, "camera": camera, "up": up, "zoom": zoom, "limits": limits, "percentiles": percentiles,
+        "size": size, "raw": raw, "edges": edges, "scale": scale, "transparent": transparent, "rate": rate,
+    }  # fmt: skip
+    if Path(source).exists() or Path(source).suffix:
+        drawn = view(source, field, **options)
+    else:
+        with connect(url, token) as session:
+            drawn = view(find(session, source).result(), field, **options)
+    if as_json:
+        show_json(drawn)
+    else:
+        typer.echo(drawn.out)
+
+
+def _seconds(text: str) -> float:
+    """Of ``60 us``; a number without a unit is refused, as it would be taken for seconds."""
+    try:
+        if text.strip()[-1:].isalpha():
+            return parse_quantity(text, "s")
+        reason = "write it with its unit, such as '60 us'"
+    except ValueError as error:
+        reason = str(error)
+    raise ViewError(f"time = {text!r}: {reason}")

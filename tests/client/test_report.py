@@ -1,0 +1,165 @@
+"""A run as one HTML file: what it says, and that it needs nothing else."""
+
+import base64
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from conoid.client import replay3d, report
+from conoid.client.cli import app
+from conoid.client.errors import UnfinishedError
+from conoid.client.result import Result
+from conoid.server import page
+
+from .bodies import write_fragments, write_history, write_run
+
+
+class Reader(HTMLParser):
+    """Addresses that a page asks for, its text, and whether every element is closed."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.addresses: list[str] = []
+        self.text = ""
+        self.open: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag not in {"img", "meta"}:
+            self.open.append(tag)
+        self.addresses += [value or "" for name, value in attrs if name in {"src", "href", "action", "data", "poster"}]
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+def read(path: Path) -> Reader:
+    reader = Reader()
+    reader.feed(path.read_text(encoding="utf-8"))
+    reader.close()
+    assert not reader.open
+    return reader
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    made = write_run(tmp_path / "bar")
+    write_history(made, t=[0.0, 4e-5, 8e-5], dt=[1e-8] * 3, kinetic=[5.0, 4.0, 3.0], push=[0.0, 1.0, 2.0])
+    write_fragments(made, 7, [1.0, 2.0, 1e-4])
+    (made / "journal.jsonl").write_text("")
+    return made
+
+
+def test_a_report_is_one_file_that_asks_for_nothing(folder: Path, tmp_path: Path) -> None:
+    out = report.write(Result.open(folder), tmp_path / "bar.html", ["temperature"])
+    page = read(out)
+    assert page.addresses
+    assert all(address.startswith("data:image/") for address in page.addresses)
+    assert not re.search(r"url\(|@import|<link|fetch\(", out.read_text())
+    pictures = [address for address in page.addresses if address.startswith("data:image/png")]
+    assert base64.b64decode(pictures[0].partition(",")[2]).startswith(b"\x89PNG")
+
+
+def test_it_says_how_the_run_ended_and_whether_it_is_right(folder: Path, tmp_path: Path) -> None:
+    outcome = json.loads((folder / "outcome.json").read_text())
+    outcome["reference"] += [{**outcome["reference"][0], "name": "width of rod", "pass": False}]
+    (folder / "outcome.json").write_text(json.dumps(outcome))
+    text = read(report.write(Result.open(folder), tmp_path / "bar.html", [])).text
+    for said in ("A steel bar", "succeeded", "d" * 64, "extent of rod", "Fragments", "of ten tets or more"):
+        assert said in text
+    html = (tmp_path / "bar.html").read_text()
+    assert html.count("<span class=good>pass</span>") == html.count("<span class=bad>FAIL</span>") == 1
+
+
+def test_nothing_that_a_case_says_becomes_markup(folder: Path, tmp_path: Path) -> None:
+    case = json.loads((folder / "case.resolved.json").read_text())
+    case |= {"title": "<script>alert(1)</script>", "description": "<b>&"}
+    (folder / "case.resolved.json").write_text(json.dumps(case))
+    html = report.write(Result.open(folder), tmp_path / "bar.html", []).read_text()
+    assert "<script>alert" not in html
+    assert "&lt;script&gt;alert(1)" in html
+    assert "<b>&" not in html
+
+
+def test_a_run_that_has_not_ended_has_a_report_of_what_is_there(folder: Path, tmp_path: Path) -> None:
+    for name in ("outcome.json", "history.csv"):
+        (folder / name).unlink()
+    text = read(report.write(Result.open(folder), tmp_path / "bar.html", [])).text
+    assert "not ended" in text
+    assert "References" not in text
+    assert "Energy" not in text
+    (folder / "case.resolved.json").unlink()
+    with pytest.raises(UnfinishedError):
+        report.write(Result.open(folder), tmp_path / "bar.html", [])
+
+
+def test_a_field_that_cannot_be_drawn_is_a_line(folder: Path, tmp_path: Path) -> None:
+    text = read(report.write(Result.open(folder), tmp_path / "bar.html", ["fragment"])).text
+    assert "fragment: this frame has no field 'fragment'" in text
+
+
+def test_the_command_names_the_file_after_the_run(folder: Path, quiet_home: Path) -> None:
+    done = CliRunner().invoke(app, ["report", str(folder), "--no-pictures"])
+    assert done.exit_code == 0, done.output
+    assert done.stdout == "bar.html\n"
+    assert "Pictures" not in read(quiet_home / "bar.html").text
+    wrong = CliRunner().invoke(app, ["report", str(folder), "--field", "x"])
+    assert "field = 'x': allowed: mises" in wrong.stderr
+
+
+# The replay -----------------------------------------------------------------------------------------------------------
+
+
+def with_snapshots(folder: Path, n: int) -> Result:
+    (folder / "snapshots").mkdir()
+    for index in range(n):
+        (folder / "snapshots" / f"{index:06d}.snap").write_bytes(b"CONOSNAP" + bytes([index]))
+    return Result.open(folder)
+
+
+def modules(html: str) -> dict[str, str]:
+    """The embedded modules by the names by which they are imported."""
+    found = re.search(r'<script type="importmap">(.*?)</script>', html)
+    assert found is not None
+    imports: dict[str, str] = json.loads(found[1])["imports"]
+    return {name: base64.b64decode(address.partition(",")[2]).decode() for name, address in imports.items()}
+
+
+def test_a_replay_has_every_module_that_it_imports(folder: Path, tmp_path: Path) -> None:
+    html = report.write(with_snapshots(folder, 3), tmp_path / "bar.html", []).read_text()
+    embedded = modules(html)
+    assert "conoid/view3d.js" in embedded
+    for name, code in embedded.items():
+        if name != "conoid/three":
+            for used in re.findall(r"""(?:from|import)\s*\(?\s*["']([^"']+)["']""", code):
+                assert used in embedded, f"{name} imports {used}"
+    assert [int(n) for n in re.findall(r"id=snapshot-(\d+)", html)] == [0, 1, 2]
+    assert base64.b64encode(b"CONOSNAP\x02").decode() in html
+
+
+def test_of_many_snapshots_some_are_embedded_evenly(folder: Path) -> None:
+    html = replay3d.html(with_snapshots(folder, 100))
+    shown = [int(n) for n in re.findall(r"id=snapshot-(\d+)", html)]
+    assert len(shown) == replay3d.MOST
+    assert (shown[0], shown[-1]) == (0, 99)
+
+
+def test_without_snapshots_there_is_no_replay_and_without_three_a_line(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert replay3d.html(Result.open(folder)) == ""
+    monkeypatch.setattr(replay3d, "PACKAGE", "not-there")
+    assert replay3d.html(with_snapshots(folder, 1)) == (
+        "<p class=pale>no replay in 3-D: not-there 3.18.0 is not installed: pip install --no-deps not-there==3.18.0</p>"
+    )
+
+
+def test_the_replay_draws_with_what_the_page_draws_with() -> None:
+    assert (replay3d.PACKAGE, replay3d.VERSION) == (page.PACKAGE, page.VERSION)
+    assert page.TESTED["three/index.js"] == replay3d.THREE

@@ -1,0 +1,66 @@
+"""Frames and histories as files: fields, units, times."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet
+import pytest
+
+from conoid.cases import history, layout
+from conoid.cases.messages import Energy
+from conoid.worker.fracture.cohesive import Facets
+from conoid.worker.output.damage import spent_energy
+from conoid.worker.output.frames import principal
+from conoid.worker.output.history import History
+from conoid.worker.output.rewind import rewind
+
+ENERGY = Energy(
+    kinetic=2.0, elastic=1.0, plastic=0.0, viscous=0.0, contact=0.0, external=0.0, initial=3.0, residual=0.0
+)
+
+
+def write_history(folder: Path) -> None:
+    table = History(folder, {"push": "N", "load": ""})
+    table.write(1, 1e-7, 1e-7, "tet 1", ENERGY, [0.0, 0.0, 1.5, 7.0, 0.1])
+    table.write(2, 2e-7, 1e-7, "tet, 2", ENERGY, [0.0, 0.0, 1.5, 8.0, 0.2])
+    table.close()
+
+
+def test_a_history_has_its_units_in_the_header(tmp_path: Path) -> None:
+    write_history(tmp_path)
+    with (tmp_path / layout.HISTORY).open(encoding="utf-8") as file:
+        head, *lines = csv.reader(file)
+    assert head[:5] == ["step", "t [s]", "dt [s]", "limiter", "kinetic [J]"]
+    assert head[-3:] == ["momentum_z [kg m/s]", "push [N]", "load"]
+    assert all(len(line) == len(head) for line in lines)
+    assert [history.split(text) for text in head[-2:]] == [("push", "N"), ("load", "")]
+
+
+def test_parquet_has_the_same_numbers_and_the_units(tmp_path: Path) -> None:
+    write_history(tmp_path)
+    table = pyarrow.parquet.read_table(tmp_path / layout.HISTORY_PARQUET)
+    assert table.column("t").to_pylist() == [1e-7, 2e-7]
+    assert table.column("limiter").to_pylist() == ["tet 1", "tet, 2"]
+    assert table.schema.field("push").metadata == {b"unit": b"N"}
+    rewind(tmp_path, 2, 0)
+    assert not (tmp_path / layout.HISTORY_PARQUET).exists(), "a run that goes on has no end yet"
+
+
+def test_principal_stresses() -> None:
+    """Of pure shear in yz, of compression along x with a tension along z, and of a pressure."""
+    stresses = np.array([[0, 0, 0, 0, 5.0, 0], [-3.0, 0, 2.0, 0, 0, 0], [-1.0, -1.0, -1.0, 0, 0, 0]])
+    assert principal(stresses) == pytest.approx([5.0, 2.0, -1.0])
+
+
+def test_a_facet_is_damaged_by_the_energy_that_it_has_spent() -> None:
+    """Whole; opened to half of the critical opening (a quarter of the area is left); at its end."""
+    m, strength, critical, knee = 3, 2.0, 6.0, 1.0
+    three, nine = np.zeros((m, 3)), np.zeros((m, 3, 3))
+    tops = np.repeat([[knee], [knee + 0.5 * critical], [knee + critical]], 3, axis=1)
+    facets = Facets(
+        tets=np.zeros((m, 2), np.int64), nodes=np.zeros((m, 6), np.int32), energy=np.full(m, 0.5 * strength * critical),
+        area=np.ones(m), shear=np.ones(m), strength=three + strength, critical=three + critical, knee=three + knee,
+        lent=three, offset=nine, top=tops, size=three, opening=nine, pull=nine, work=three, foreseen=nine,
+    )  # fmt: skip
+    assert spent_energy(facets) == pytest.approx([0.0, 0.75, 1.0])

@@ -1,0 +1,66 @@
+"""How far each tet is damaged, for frames: 0 whole, 1 done for.
+
+The larger one of two: of the most damaged of its cohesive facets, the share of the fracture energy that is spent (1
+where a facet has let go); of the plastic strain at which it erodes, the share that it has.
+"""
+
+import numpy as np
+
+from conoid.cases.schema import Case
+
+from ..fracture.cohesive import Cohesion, Facets
+from ..parallel.comm import Comm
+from ..state import PLASTIC_STRAIN, Block, Floats, Ints, Model
+
+
+def damage(case: Case, model: Model, cohesion: Cohesion | None, comm: Comm) -> list[Floats] | None:
+    """For each block (n,) the damage of its tets; None where no part can be damaged so. All ranks take part."""
+    cohesive = {i for i, part in enumerate(case.parts) if part.fracture and part.fracture.model == "cohesive"}
+    limits = {i: p.erosion.plastic_strain for i, p in enumerate(case.parts) if p.erosion and p.erosion.plastic_strain}
+    if not cohesive and not limits:
+        return None
+    held, spent = _facets(cohesion, comm) if cohesion is not None else (np.zeros((0, 2), np.int64), np.zeros(0))
+    found = []
+    for block in model.blocks:
+        values = _strained(block, limits.get(block.part))
+        found.append(np.maximum(values, _broken(block, held, spent)) if block.part in cohesive else values)
+    return found
+
+
+def spent_energy(f: Facets) -> Floats:
+    """(m,) share of the fracture energy that each facet has dissipated: 1 - (area left under the law) / energy.
+
+    The area that is left under the law of a pair is strength share^2 critical / 2, share being what is left of the
+    traction (fracture/cohesive.py); a facet has three pairs.
+    """
+    beyond = np.maximum(f.top - f.knee, 0.0)
+    fallen = np.divide(beyond, f.critical, out=(beyond > 0.0).astype(float), where=f.critical > 0.0)
+    left = 0.5 * f.strength * f.critical * np.maximum(1.0 - fallen, 0.0) ** 2
+    return np.asarray(np.clip(1.0 - left.mean(axis=1) / f.energy, 0.0, 1.0))
+
+
+def _facets(cohesion: Cohesion, comm: Comm) -> tuple[Ints, Floats]:
+    """Tets on either side (m, 2) of the facets of all ranks that still hold, and the shares that are spent."""
+    shares = comm.share((cohesion.facets.tets, spent_energy(cohesion.facets)))
+    return np.concatenate([tets for tets, _ in shares]), np.concatenate([spent for _, spent in shares])
+
+
+def _strained(block: Block, limit: float | None) -> Floats:
+    if limit is None or not block.has(PLASTIC_STRAIN):
+        return np.zeros(block.n)
+    return np.asarray(np.minimum(block.row(PLASTIC_STRAIN) / limit, 1.0))
+
+
+def _broken(block: Block, held: Ints, spent: Floats) -> Floats:
+    """The most damaged facet of each tet: one that is broken and no longer held has let go."""
+    order = np.argsort(block.id)
+    values, holding = np.zeros(block.n), np.zeros(block.n, np.int64)
+    for side in (0, 1):
+        at = np.minimum(np.searchsorted(block.id[order], held[:, side]), max(block.n - 1, 0))
+        mine = block.id[order][at] == held[:, side] if block.n else np.zeros(len(held), bool)
+        rows = order[at[mine]] if block.n else at[mine]
+        np.maximum.at(values, rows, spent[mine])
+        np.add.at(holding, rows, 1)
+    apart = ((block.bond != 0) & (block.across >= 0)).sum(axis=1)
+    values[apart > holding] = 1.0
+    return values
