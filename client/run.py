@@ -202,10 +202,8 @@ class Run:
         number = n if n >= 0 else max((told.n for told in self.snapshots()), default=0)
         try:
             return Snapshot(self.session.fetch(f"{self.path}/snapshots/{number}"))
-        except ServiceError as error:
-            if error.status == 404:
-                raise UnfinishedError(f"run {self.id} has no snapshot {number}") from None
-            raise
+        except NotFoundError:
+            raise UnfinishedError(f"run {self.id} has no snapshot {number}") from None
 
     def fragments(self, after: int = 0, link: Link | None = None) -> Generator[Snapshot]:
         """Every snapshot whose message comes after message ``after``, as they are made, to the run's end.
