@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conoid.cases import fragments, layout, snapshot
+from conoid.cases import fragments, history, layout, snapshot
 from conoid.cases.messages import Snapshot, from_json
 from conoid.cases.outcome import from_json as outcome_from_json
 
@@ -75,7 +75,7 @@ def test_the_last_snapshot_says_what_the_tables_say(ranks: int, breaking: Callab
         int(row["label"]): row for row in fragments.read(sorted((folder / "fragments").glob("fragments_*.csv"))[-1])
     }
     with (folder / layout.HISTORY).open(newline="") as file:
-        last = list(csv.DictReader(file))[-1]
+        last = {history.split(name)[0]: text for name, text in list(csv.DictReader(file))[-1].items()}
     outcome = outcome_from_json((folder / layout.OUTCOME).read_bytes())
     assert (header.step, header.t) == (int(last["step"]), float(last["t"]))
     assert header.fragments_total == len(rows) == outcome.fragments == len(got["fragment_id"]) > 10

@@ -93,7 +93,7 @@ def test_fields_are_right_to_half_a_level() -> None:
     body = shattered(3, 4)
     data = made(body).data
     header, got = snapshot.header_of(data), arrays(data)
-    assert set(header.fields) == {"speed", "plastic_strain", "damage"}
+    assert set(header.fields) == {"speed", "plastic_strain", "broken_faces"}
     field = header.fields["plastic_strain"]
     levels = field.low + got["field:plastic_strain"] / 255.0 * (field.high - field.low)
     second = got["triangle_part"] == 1

@@ -19,8 +19,8 @@ _VERTEX, _TRIANGLE = 6 + 4, 12 + 2 + 1
 """Bytes of a vertex, and of a triangle without its fields."""
 _HEADER = 200
 """Bytes that an array takes in the header and in filling up, at most."""
-UNITS = {"speed": "m/s", "damage": "", "plastic_strain": "", "temperature": "K"}
-"""Fields, and their units. ``damage`` is the share of a tet's faces that have broken."""
+UNITS = {"speed": "m/s", "broken_faces": "", "plastic_strain": "", "temperature": "K"}
+"""Fields, and their units. ``broken_faces`` is the share of a tet's faces that have broken."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def _fields(whole: Whole) -> dict[str, Floats]:
     values = dict(whole.rows)
     if any(len(block.bond) for block in whole.model.blocks):
         shares = [(b.bond > 0).mean(axis=1) if len(b.bond) else np.zeros(b.n) for b in whole.model.blocks]
-        values["damage"] = np.concatenate(shares)
+        values["broken_faces"] = np.concatenate(shares)
     return values
 
 
