@@ -68,10 +68,10 @@ class World:
         if old is not None:
             registration.carry(now, old)
             self.carried += 1
-        now.on_surface[:] = np.repeat(self.shown, 4)[nodes]
-        now.enliven(np.flatnonzero(now.face_exposed).astype(np.int32))
+        now.slots.on_surface[:] = np.repeat(self.shown, 4)[nodes]
+        now.enliven(np.flatnonzero(now.faces.exposed).astype(np.int32))
         registration.news(now)
-        now.tracks.measure(now.crowd.x, now.crowd.v, now.faces, now.edges)
+        now.tracks.measure(now.crowd.x, now.crowd.v, now.faces.corners, now.edges.corners)
         return now
 
     @staticmethod
@@ -99,7 +99,7 @@ class World:
         self.shown[shards] = True
         self.opened += len(shards)
         self.scene.expose(self.rows(shards, 4))
-        self.scene.on_surface[:] = np.repeat(self.shown, 4)[self.scene.crowd.id]
+        self.scene.slots.on_surface[:] = np.repeat(self.shown, 4)[self.scene.crowd.id]
 
     def another_surface(self) -> None:
         """Some shards leave, others come, and hidden ones are uncovered; what is known of the rest is carried over."""
@@ -113,8 +113,8 @@ class World:
         now, of = self.scene, self.scene.crowd
         of.x[:], of.v[:] = self.x[of.id], self.v[of.id]
         now.tracks.advance(dt)
-        now.tracks.measure(of.x, of.v, now.faces, now.edges)
-        strayed = float(now.tracks.searched.left[now.tracked].max(initial=0.0))
+        now.tracks.measure(of.x, of.v, now.faces.corners, now.edges.corners)
+        strayed = float(now.tracks.searched.left[now.slots.tracked].max(initial=0.0))
         if strayed > 0.5 * SKIN or now.pending:
             registration.renew(now, of.x, of.v, strayed)
             self.registered += 1
@@ -160,22 +160,22 @@ def allowed(now: Scene, one: Indices, two: Indices) -> Flags:
 def near_faces(now: Scene) -> Flags:
     """(slots, faces) searched, and nearer than half of what the skin and the depth have left; of parts that meet."""
     x, left, part = now.crowd.x, now.tracks.searched.left, now.crowd.part
-    corners, nodes = now.faces[:, :3], np.arange(now.crowd.n, dtype=np.int32)[:, None]
-    deep = np.where(part[:, None] == part[corners[:, 0]][None], DEEP_SELF, DEEP) * now.face_size
+    corners, nodes = now.faces.corners[:, :3], np.arange(now.crowd.n, dtype=np.int32)[:, None]
+    deep = np.where(part[:, None] == part[corners[:, 0]][None], DEEP_SELF, DEEP) * now.faces.size
     spent = left[:, None] + left[corners].max(axis=1)[None]
     near = point_triangle(x, x[corners]) < 0.5 * (SKIN + deep - spent)
     return np.asarray(
-        near & allowed(now, nodes, corners) & now.node_live[:, None] & now.face_live & ~common(nodes, corners)
+        near & allowed(now, nodes, corners) & now.slots.live[:, None] & now.faces.live & ~common(nodes, corners)
     )
 
 
 def near_edges(now: Scene) -> Flags:
     """(edges, edges) the same of two edges, that of lower rank first."""
-    ends, size, rank = now.edges[:, :2], now.edge_size, now.edge_rank
+    ends, size, rank = now.edges.corners[:, :2], now.edges.size, now.edges.rank
     left = now.tracks.searched.left[ends].max(axis=1)
     deep = DEEP_SELF * np.minimum(size[:, None], size[None])
     near = segment_segment(now.crowd.x[ends]) < 0.5 * (SKIN + deep - left[:, None] - left[None])
-    live = now.edge_live[:, None] & now.edge_live & (rank[:, None] < rank[None])
+    live = now.edges.live[:, None] & now.edges.live & (rank[:, None] < rank[None])
     return np.asarray(near & live & allowed(now, ends, ends) & ~common(ends, ends))
 
 
@@ -183,7 +183,7 @@ def check(now: Scene) -> Ints:
     """No pair is missed, none is there twice or has a corner in common, or is of what is not searched; and all that
     is searched is near its lines. Returns how many pairs of either kind are near.
     """
-    corners, ends = now.faces[:, :3], now.edges[:, :2]
+    corners, ends = now.faces.corners[:, :3], now.edges.corners[:, :2]
     nodes = np.arange(now.crowd.n, dtype=np.int32)[:, None]
     pairs = matrix(now.node_face.rows, now.crowd.n, len(corners))
     ridges = matrix(now.edge_edge.rows, len(ends), len(ends))
@@ -193,10 +193,10 @@ def check(now: Scene) -> Ints:
     for found, one, two in ((pairs, nodes, corners), (ridges, ends, ends)):
         assert not (found & common(one, two)).any()
         assert not (found & ~allowed(now, one, two)).any()
-    assert not (pairs & ~(now.node_live[:, None] & now.face_live)).any()
-    assert not (ridges & ~(now.edge_live[:, None] & now.edge_live)).any()
-    assert (now.edge_rank[now.edge_edge.rows[:, 0]] < now.edge_rank[now.edge_edge.rows[:, 1]]).all()
-    assert (now.tracks.searched.left[now.tracked] <= 0.5 * SKIN).all()
+    assert not (pairs & ~(now.slots.live[:, None] & now.faces.live)).any()
+    assert not (ridges & ~(now.edges.live[:, None] & now.edges.live)).any()
+    assert (now.edges.rank[now.edge_edge.rows[:, 0]] < now.edges.rank[now.edge_edge.rows[:, 1]]).all()
+    assert (now.tracks.searched.left[now.slots.tracked] <= 0.5 * SKIN).all()
     return np.array([near.sum(), close.sum()])
 
 
@@ -253,7 +253,7 @@ def test_a_surface_has_to_take_over_who_is_watched() -> None:
 
     def forgetful(now: Scene, old: Scene) -> None:
         carry(now, old)
-        now.tracked[:] = False
+        now.slots.tracked[:] = False
 
     with patch.object(registration, "carry", forgetful):
         assert fails()
@@ -279,7 +279,7 @@ def test_pairs_that_are_found_again_keep_their_impulses(seed: int) -> None:
 def named(now: Scene) -> dict[tuple[int, int], Floats]:
     """What each pair of a node and a face, ids, has kept."""
     node, face = now.node_face.rows.T
-    names = zip(now.crowd.id[node].tolist(), now.face_id[face].tolist(), strict=True)
+    names = zip(now.crowd.id[node].tolist(), now.faces.id[face].tolist(), strict=True)
     return dict(zip(names, now.node_face.kept.copy(), strict=True))
 
 

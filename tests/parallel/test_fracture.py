@@ -77,7 +77,7 @@ def shared(sim: Simulation) -> dict[str, Any]:
     assert now is not None
     ids = now.crowd.id
     return {
-        "holds": set(nodes.id.tolist()), "pushes": set(ids[now.pushes].tolist()),
+        "holds": set(nodes.id.tolist()), "pushes": set(ids[now.slots.pushes].tolist()),
         "lacks": sorted(ids[now.crowd.local < 0].tolist()),
         "sums": {some.rank: ids[some.nodes].tolist() for some in now.company.neighbours},
         "sends": {some.rank: nodes.id[some.nodes].tolist() for some in now.copies.sends},

@@ -38,7 +38,7 @@ class Books:
         parcel.sums["contact.account"] = self.account.words
         total = np.array(self.open) if len(self.open) else np.zeros((len(self.contact_loss), 3), np.int64)
         if scene is not None:
-            total[scene.local] = scene.total[scene.held]
+            total[scene.local] = scene.slots.total[scene.held]
         parcel.nodes["contact.total"] = total
 
     def resume(self, parcel: Parcel, known: tuple[float, float, float, float]) -> None:
@@ -65,7 +65,7 @@ class Books:
     def book(self, scene: Scene, places: Indices) -> None:
         """Half of the work of the last impulses, at the ``places`` of the scene, with the velocities in ``before``."""
         booking.book(
-            self.contact_loss, self.external_work, places, scene.crowd.local, scene.before, scene.total,
+            self.contact_loss, self.external_work, places, scene.crowd.local, scene.slots.before, scene.slots.total,
             scene.crowd.mobility, self.scale,
         )  # fmt: skip
 

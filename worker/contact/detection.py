@@ -45,8 +45,8 @@ def detect(now: Scene, mu: Floats, give: float, dt: float, size: float, redraw: 
         tracks.shorten(crowd.x)
         now.node_face.wake()
         now.edge_edge.wake()
-    tracks.measure(crowd.x, crowd.v, now.faces, now.edges)
-    strayed = float(tracks.searched.left[now.tracked].max(initial=0.0))
+    tracks.measure(crowd.x, crowd.v, now.faces.corners, now.edges.corners)
+    strayed = float(tracks.searched.left[now.slots.tracked].max(initial=0.0))
     if strayed > 0.5 * now.rules.skin or now.pending:
         registration.renew(now, crowd.x, crowd.v, strayed)
     now.reserve()
@@ -62,7 +62,7 @@ def _test(now: Scene, step: Step, size: float) -> Detected:
     pairs = now.edge_edge.arrays()
     n, tested = edge_edge(now.room, n, pairs, now.edge_table(), step, tracks.short.course, tracks.end)
     now.edge_edge.tested = pairs.active[:tested]
-    now.face_fresh[:], now.edge_fresh[:], now.node_fresh[:] = False, False, False
+    now.faces.fresh[:], now.edges.fresh[:], now.slots.fresh[:] = False, False, False
     opening = np.empty(len(now.cracks), np.int64)
     n, wide = across(now.room, n, opening, now.cracks, size, step)
     return Detected(int(n), limit, opening[:wide])

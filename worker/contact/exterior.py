@@ -108,8 +108,8 @@ class Exterior:
         """
         place = scene.place[local]
         local, place = local[place >= 0], place[place >= 0]
-        scene.normals[place] = normals.means(self._moments[local])
-        scene.on_surface[place] = self.surface.flags[local]
+        scene.slots.normals[place] = normals.means(self._moments[local])
+        scene.slots.on_surface[place] = self.surface.flags[local]
         return np.asarray(place)
 
     def refresh(self, course: Floats, t: float) -> None:
@@ -147,7 +147,7 @@ class Exterior:
         self.cracks.open(faces, self._model.blocks)
         if scene is not None:
             scene.expose(faces)
-            scene.node_fresh[self.show(scene, local)] = True
+            scene.slots.fresh[self.show(scene, local)] = True
             scene.cracks = self.cracks.places
         return bool((told[:, 0] == 0).any())
 

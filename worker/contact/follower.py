@@ -83,7 +83,7 @@ class Follower:
         """Places some of the cracks, whose nodes that have separated may be pushed."""
         scene, nodes = self._scene, cracks.nodes[rows]
         places = cracks.places[rows] = scene.place[nodes]
-        scene.pushes[places[nodes != nodes[:, [3, 4, 5, 0, 1, 2]]]] = True
+        scene.slots.pushes[places[nodes != nodes[:, [3, 4, 5, 0, 1, 2]]]] = True
         scene.cracks = cracks.places
 
     def settle(self, neighbours: list[Neighbour], comm: Comm) -> None:
@@ -92,7 +92,7 @@ class Follower:
         if comm.size == 1:
             scene.connect([], nodes, comm)
             return
-        used = np.sort(scene.crowd.id[scene.pushes])
+        used = np.sort(scene.crowd.id[scene.slots.pushes])
         owners = scene.crowd.owner[self.places(used)]
         shared = ghosts.members(used, owners, neighbours, nodes, comm)
         self._hold(np.unique(np.concatenate([used[:0], *shared.values()])))
@@ -131,20 +131,13 @@ class Follower:
         rows = rows.take(self.places(rows.id) < 0)
         if not rows.n:
             return
-        first, n = scene.crowd.n, rows.n
+        first = scene.crowd.n
         scene.crowd = Crowd(*(extended(a, b) for a, b in zip(scene.crowd.columns(), rows.columns(), strict=True)))
         held = np.flatnonzero(rows.local >= 0).astype(np.int32)
         scene.held = extended(scene.held, first + held)
         scene.local = extended(scene.local, rows.local[held])
         scene.place[rows.local[held]] = first + held
-        scene.total = extended(scene.total, np.zeros((n, 3), np.int64))
-        scene.normals = extended(scene.normals, np.zeros((n, 9)))
-        scene.before = extended(scene.before, rows.v)
-        for name in (
-            "pushes", "slave", "on_surface", "node_live", "node_new", "node_fresh", "tracked",
-        ):  # fmt: skip
-            setattr(scene, name, extended(getattr(scene, name), np.zeros(n, bool)))
-        scene.first = extended(scene.first, np.full(n, -1, np.int32))
+        scene.slots.add(rows)
         scene.tracks.add(rows.x, rows.course)
         if (rows.local < 0).any():
             self._sort()
@@ -163,32 +156,32 @@ class Follower:
     def _faces(self, heard: News, parents: Flags, family: Family) -> None:
         """Faces take up the copies of their corners; a node meets those that have just left it, too."""
         scene = self._scene
-        rows = touching(scene.faces, parents)
-        old = scene.faces[rows]
-        now = self._followed(heard, old, scene.face_id[rows] // 4)
-        scene.faces[rows], scene.face_fresh[rows] = now, True
+        rows = touching(scene.faces.corners, parents)
+        old = scene.faces.corners[rows]
+        now = self._followed(heard, old, scene.faces.id[rows] // 4)
+        scene.faces.corners[rows], scene.faces.fresh[rows] = now, True
         pairs = np.empty((3 * len(rows) * (1 + family.most), 2), np.int32)
-        searched = scene.face_live[rows] & self._meets(old[:, 0])
-        n = apart_from_faces(pairs, rows, old, now, family.first, family.member, scene.node_live, searched)
+        searched = scene.faces.live[rows] & self._meets(old[:, 0])
+        n = apart_from_faces(pairs, rows, old, now, family.first, family.member, scene.slots.live, searched)
         self._add_pairs(pairs[:n])
 
     def _edges(self, heard: News, parents: Flags, family: Family) -> None:
         """An edge goes when its two faces have separated there; it meets those that have left its ends."""
         scene = self._scene
-        rows = touching(scene.edges, parents)
-        nodes, sides = scene.edges[rows], scene.edge_sides[rows]
+        rows = touching(scene.edges.corners, parents)
+        nodes, sides = scene.edges.corners[rows], scene.edges.sides[rows]
         one = self._followed(heard, nodes[:, [0, 1, 2]], sides[:, 0] // 4)
         two = self._followed(heard, nodes[:, [0, 1, 3]], sides[:, 1] // 4)
         now = np.column_stack([one, two[:, 2]]).astype(np.int32)
         gone = (one[:, :2] != two[:, :2]).any(axis=1)
         now[gone] = now[gone][:, [0, 0, 0, 0]]
-        scene.edges[rows], scene.edge_fresh[rows] = now, True
+        scene.edges.corners[rows], scene.edges.fresh[rows] = now, True
         order = np.lexsort((sides[:, 1], sides[:, 0]))
-        order = order[(scene.edge_live[rows] & ~gone)[order] & self._meets(nodes[order, 0])]
+        order = order[(scene.edges.live[rows] & ~gone)[order] & self._meets(nodes[order, 0])]
         ends = nodes[order, :2]
         at = np.argsort(ends.reshape(-1), kind="stable")
         at = at[family.first[ends.reshape(-1)[at]] >= 0]
-        found = apart_from_edges(at, ends, now[order], scene.edge_own[rows[order]])
+        found = apart_from_edges(at, ends, now[order], scene.edges.own[rows[order]])
         scene.edge_edge.add(rows[order][found].astype(np.int32))
 
     def _meets(self, places: Indices) -> Flags:
@@ -198,17 +191,15 @@ class Follower:
     def _candidates(self, family: Family) -> None:
         """A copy has the candidates and the normals of its parent, and is pushed by the ranks that push that one."""
         scene, (parent, copy) = self._scene, family.pairs.T
-        for name in ("normals", "slave", "on_surface", "pushes", "node_live", "node_new", "tracked"):
-            column = getattr(scene, name)
-            column[copy] = column[parent]
+        scene.slots.inherit(copy, parent)
         scene.tracks.inherit(copy, parent)
-        self._add_pairs(inherited(family.pairs, scene.first, scene.node_face.next, scene.node_face.rows))
+        self._add_pairs(inherited(family.pairs, scene.slots.first, scene.node_face.next, scene.node_face.rows))
 
     def _add_pairs(self, pairs: Indices) -> None:
         """More candidates of nodes and faces."""
         scene, n = self._scene, len(self._scene.node_face)
         scene.node_face.add(pairs.astype(np.int32))
-        scene.node_face.hang(scene.first, n)
+        scene.node_face.hang(scene.slots.first, n)
 
 
 def _flagged(some: Indices, n: int) -> Flags:

@@ -5,6 +5,7 @@ import numpy as np
 from ..parallel.comm import Comm
 from ..state import Floats, Nodes
 from . import buckets
+from .columns import SceneEdges, SceneFaces, SceneSlots
 from .scene import Scene, rows_of
 from .sides import Rules, Sides, with_ghosts
 from .tracks import Tracks
@@ -32,11 +33,13 @@ def build(sides: Sides, rules: Rules, horizon: float, drift: Floats, nodes: Node
     rank = np.arange(edges.n)
     if edges.n > sides.edges.n:
         rank[np.lexsort((edges.sides[:, 1], edges.sides[:, 0]))] = np.arange(edges.n)
+    own = np.arange(edges.n) < sides.edges.n
     return Scene(
-        crowd=crowd, held=held, local=crowd.local[held], faces=corners, face_id=faces.id, face_size=faces.size,
-        face_exposed=faces.exposed.copy(), edges=ends, edge_sides=edges.sides,
-        edge_faces=rows_of(faces.id, edges.sides), edge_size=edges.size, edge_exposed=edges.exposed.copy(),
-        edge_own=np.arange(edges.n) < sides.edges.n, edge_rank=rank, rules=rules, slave=slave,
-        tracks=Tracks(crowd.x, crowd.course, faces.n, edges.n), drift=drift, until=horizon, faces_sent=sent,
-        place=place, pushes=pushes | slave, cracks=np.zeros((0, 6), np.int32),
+        crowd=crowd, held=held, local=crowd.local[held], slots=SceneSlots.at_rest(slave, pushes | slave),
+        faces=SceneFaces.at_rest(corners, faces.id, faces.size, faces.exposed.copy()),
+        edges=SceneEdges.at_rest(
+            ends, edges.sides, rows_of(faces.id, edges.sides), edges.size, edges.exposed.copy(), own, rank
+        ),
+        rules=rules, tracks=Tracks(crowd.x, crowd.course, faces.n, edges.n), drift=drift, until=horizon,
+        faces_sent=sent, place=place, cracks=np.zeros((0, 6), np.int32),
     )  # fmt: skip

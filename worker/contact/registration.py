@@ -40,9 +40,7 @@ class _Flight:
 def news(scene: Scene) -> None:
     """Registers what is new, before a step begins."""
     scene.tracks.begin_anew(scene.settle_live(), scene.crowd.x)
-    _register(
-        scene, scene.node_new & scene.node_live, scene.face_new & scene.face_live, scene.edge_new & scene.edge_live
-    )
+    _register(scene)
 
 
 def renew(scene: Scene, x: Floats, v: Floats, strayed: float) -> None:
@@ -52,19 +50,17 @@ def renew(scene: Scene, x: Floats, v: Floats, strayed: float) -> None:
     """
     off = scene.settle_live()
     if strayed > 0.5 * scene.rules.skin:
-        off |= scene.tracked & (scene.tracks.searched.left > 0.5 * _PARTLY * scene.rules.skin)
-        scene.node_new |= off
-        scene.face_new |= off[scene.faces[:, :3]].any(axis=1)
-        scene.edge_new |= off[scene.edges[:, :2]].any(axis=1)
+        off |= scene.slots.tracked & (scene.tracks.searched.left > 0.5 * _PARTLY * scene.rules.skin)
+        scene.slots.new |= off
+        scene.faces.new |= off[scene.faces.corners[:, :3]].any(axis=1)
+        scene.edges.new |= off[scene.edges.corners[:, :2]].any(axis=1)
     scene.tracks.begin_anew(off, x)
-    scene.tracks.measure(x, v, scene.faces, scene.edges)
+    scene.tracks.measure(x, v, scene.faces.corners, scene.edges.corners)
     knocked = off & (scene.tracks.searched.left > 0.5 * scene.rules.skin)
     if knocked.any():
         scene.tracks.aim(knocked, x, v)
-        scene.tracks.measure(x, v, scene.faces, scene.edges)
-    _register(
-        scene, scene.node_new & scene.node_live, scene.face_new & scene.face_live, scene.edge_new & scene.edge_live
-    )
+        scene.tracks.measure(x, v, scene.faces.corners, scene.edges.corners)
+    _register(scene)
 
 
 def carry(now: Scene, old: Scene) -> None:
@@ -72,17 +68,21 @@ def carry(now: Scene, old: Scene) -> None:
     searched and what has to be registered, and the pairs of what is still there. The pairs of a copy were with the rank
     of its parent, and are with that of its own owner from now on.
     """
-    slots, faces = _numbers(now.crowd.id, old.crowd.id), _numbers(now.face_id, old.face_id)
-    edges = _numbers(_names(now), _names(old))
+    slots, faces = _numbers(now.crowd.id, old.crowd.id), _numbers(now.faces.id, old.faces.id)
+    edges = _numbers(now.edges.names, old.edges.names)
     now.tracks.take_over(slots, old.tracks)
-    now.tracked[slots[slots >= 0]] = old.tracked[slots >= 0]
+    now.slots.tracked[slots[slots >= 0]] = old.slots.tracked[slots >= 0]
     now.until = old.until
-    for kind, rows in (("node", slots), ("face", faces), ("edge", edges)):
+    for mine, theirs, rows in (
+        (now.slots, old.slots, slots),
+        (now.faces, old.faces, faces),
+        (now.edges, old.edges, edges),
+    ):
         for name in ("live", "new", "fresh"):
-            getattr(now, f"{kind}_{name}")[rows[rows >= 0]] = getattr(old, f"{kind}_{name}")[rows >= 0]
-    now.node_live &= now.slave
+            getattr(mine, name)[rows[rows >= 0]] = getattr(theirs, name)[rows >= 0]
+    now.slots.live &= now.slots.slave
     here = np.flatnonzero(slots >= 0)
-    slots[here[~now.slave[slots[here]]]] = -1
+    slots[here[~now.slots.slave[slots[here]]]] = -1
     now.node_face = old.node_face.carried(slots, faces)
     now.edge_edge = old.edge_edge.carried(edges, edges)
 
@@ -94,13 +94,9 @@ def _numbers(now: Ints, old: Ints) -> Indices:
     return np.where(at >= 0, order[at], -1).astype(np.int32) if len(order) else at
 
 
-def _names(scene: Scene) -> Ints:
-    """(e,) the two faces of each edge as one number: two faces have one edge in common."""
-    return (scene.edge_sides[:, 0] << 32) + scene.edge_sides[:, 1]
-
-
-def _register(scene: Scene, nodes: Flags, faces: Flags, edges: Flags) -> None:
+def _register(scene: Scene) -> None:
     tracks, pairs = scene.tracks, scene.node_face
+    nodes, faces, edges = (some.new & some.live for some in (scene.slots, scene.faces, scene.edges))
     flight = _Flight(tracks.positions(), tracks.searched.course - scene.drift, scene.crowd.part, scene.until - tracks.t)
     some = np.flatnonzero(pairs.kept.any(axis=1)) if scene.rules.rubs else np.zeros(0, np.int64)
     old, kept = pairs.rows[some], pairs.kept[some]
@@ -108,9 +104,9 @@ def _register(scene: Scene, nodes: Flags, faces: Flags, edges: Flags) -> None:
     scene.edge_edge.drop(edges, edges)
     pairs.add(_node_face(scene, nodes, faces, flight))
     scene.edge_edge.add(_edge_edge(scene, edges, flight))
-    _recall(pairs.rows, pairs.kept, old, kept, len(scene.faces))
+    _recall(pairs.rows, pairs.kept, old, kept, len(scene.faces.corners))
     scene.chain()
-    scene.node_new[:], scene.face_new[:], scene.edge_new[:] = False, False, False
+    scene.slots.new[:], scene.faces.new[:], scene.edges.new[:] = False, False, False
 
 
 def _recall(rows: Indices, kept: Floats, old: Indices, was: Floats, faces: int) -> None:
@@ -123,36 +119,36 @@ def _recall(rows: Indices, kept: Floats, old: Indices, was: Floats, faces: int) 
 
 def _node_face(scene: Scene, nodes: Flags, faces: Flags, flight: _Flight) -> Indices:
     """(p, 2) slot and face: changed nodes with all faces, changed faces with the other nodes."""
-    half, size = 0.5 * scene.rules.skin, scene.face_size
+    half, size = 0.5 * scene.rules.skin, scene.faces.size
     every = np.arange(scene.crowd.n, dtype=np.int32)[:, None], np.full(scene.crowd.n, half)
-    changed, others = (Things(*every, _rows(some)) for some in (nodes, scene.node_live & ~nodes))
-    corners, own = np.ascontiguousarray(scene.faces[:, :3]), np.eye(len(scene.rules.allowed), dtype=bool)
+    changed, others = (Things(*every, _rows(some)) for some in (nodes, scene.slots.live & ~nodes))
+    corners, own = np.ascontiguousarray(scene.faces.corners[:, :3]), np.eye(len(scene.rules.allowed), dtype=bool)
     found = [np.zeros((0, 2), np.int32)]
     for deep, which in ((DEEP_SELF, own), (DEEP, ~own)):
         if (allowed := scene.rules.allowed & which).any():
             of = corners, half + deep * size
-            found.append(flight.find(changed, Things(*of, _rows(scene.face_live)), allowed, None))
+            found.append(flight.find(changed, Things(*of, _rows(scene.faces.live)), allowed, None))
             found.append(flight.find(Things(*of, _rows(faces)), others, allowed, None)[:, ::-1])
     pairs = np.concatenate(found)
     sifted = sift.faces(
-        pairs, scene.faces, size, flight.x, flight.course, flight.part, scene.rules.skin, flight.horizon
+        pairs, scene.faces.corners, size, flight.x, flight.course, flight.part, scene.rules.skin, flight.horizon
     )  # fmt: skip
     return np.asarray(pairs[sifted])
 
 
 def _edge_edge(scene: Scene, edges: Flags, flight: _Flight) -> Indices:
     """(p, 2) edges of which one has changed, that of lower rank first; its rank has the pair."""
-    of = np.ascontiguousarray(scene.edges[:, :2]), 0.5 * scene.rules.skin + 0.5 * DEEP_SELF * scene.edge_size
-    allowed, rank = scene.rules.allowed, scene.edge_rank
-    changed, others = (Things(*of, _rows(some)) for some in (edges, scene.edge_live & ~edges))
+    of = np.ascontiguousarray(scene.edges.corners[:, :2]), 0.5 * scene.rules.skin + 0.5 * DEEP_SELF * scene.edges.size
+    allowed, rank = scene.rules.allowed, scene.edges.rank
+    changed, others = (Things(*of, _rows(some)) for some in (edges, scene.edges.live & ~edges))
     one, two = flight.find(changed, changed, allowed, rank), flight.find(changed, others, allowed, None)
     turned = rank[two[:, 0]] > rank[two[:, 1]]
     two[turned] = two[turned, ::-1]
     pairs = np.concatenate([one, two])
-    if not scene.edge_own.all():
-        pairs = pairs[scene.edge_own[pairs[:, 0]]]
+    if not scene.edges.own.all():
+        pairs = pairs[scene.edges.own[pairs[:, 0]]]
     sifted = sift.edges(
-        pairs, scene.edges, scene.edge_size, flight.x, flight.course, scene.rules.skin, flight.horizon
+        pairs, scene.edges.corners, scene.edges.size, flight.x, flight.course, scene.rules.skin, flight.horizon
     )  # fmt: skip
     return np.asarray(pairs[sifted])
 

@@ -10,6 +10,7 @@ from ..parallel.ownership import Neighbour, same
 from ..parallel.tags import Tag
 from ..state import Flags, Floats, Indices, Ints, Nodes, among
 from . import ghosts, held
+from .columns import SceneEdges, SceneFaces, SceneSlots
 from .company import Company
 from .ghosts import Copies
 from .narrow_phase import ContactRows, EdgeTable, FaceTable, SlotTable
@@ -28,29 +29,10 @@ class Scene:
     """(h,) slots of the nodes that this rank holds."""
     local: Indices
     """(h,) their indices on this rank."""
-    faces: Indices
-    """(f, 4) slots."""
-    face_id: Ints
-    """(f,) ascending."""
-    face_size: Floats
-    face_exposed: Flags
-    """(f,) only exposed faces are met."""
-    edges: Indices
-    """(e, 4) slots."""
-    edge_sides: Ints
-    """(e, 2) ids of their faces."""
-    edge_faces: Indices
-    """(e, 2) rows of these, -1 for a face that is not here."""
-    edge_size: Floats
-    edge_exposed: Flags
-    """(e, 2) whether either face is; only edges between exposed faces are met."""
-    edge_own: Flags
-    """(e,) whose face of smaller id is of this rank."""
-    edge_rank: Ints
-    """(e,) of two edges, that of lower rank has the pair."""
+    slots: SceneSlots
+    faces: SceneFaces
+    edges: SceneEdges
     rules: Rules
-    slave: Flags
-    """(slots,) the nodes whose contacts with faces this rank computes."""
     tracks: Tracks
     drift: Floats
     """(3,) mean velocity, m/s."""
@@ -59,8 +41,6 @@ class Scene:
     faces_sent: int
     place: Indices
     """(nodes,) slot of each node of this rank, -1 for those that have none."""
-    pushes: Flags
-    """(slots,) which nodes a contact of this rank may push."""
     cracks: Indices
     """(m, 6) slots of the nodes on either side of the cracks, -1 where they do not count (contact/cracks.py)."""
     node_face: PairTable = field(default_factory=PairTable)
@@ -68,33 +48,9 @@ class Scene:
     edge_edge: PairTable = field(default_factory=PairTable)
     met: int = 0
     """Active contacts of the last step, the first rows of the room."""
+    room: ContactRows = field(default_factory=lambda: ContactRows.room(0))
     company: Company = field(init=False)
     copies: Copies = field(init=False)
-
-    def __post_init__(self) -> None:
-        """Everything is at rest, and nothing is searched yet."""
-        n, f, e = self.crowd.n, len(self.faces), len(self.edges)
-        self.face_live, self.edge_live, self.node_live = np.zeros(f, bool), np.zeros(e, bool), np.zeros(n, bool)
-        """What is searched: what is exposed, and what may be soon; of the nodes, slaves."""
-        self.face_new, self.edge_new, self.node_new = np.zeros(f, bool), np.zeros(e, bool), np.zeros(n, bool)
-        """What has to be registered."""
-        self.face_fresh, self.edge_fresh, self.node_fresh = np.zeros(f, bool), np.zeros(e, bool), np.zeros(n, bool)
-        """Whose pairs have to be tested: new corners, newly exposed, other mean normals."""
-        self.edge_far = np.flatnonzero((self.edge_faces < 0).any(axis=1))
-        """Edges with a face that is not here."""
-        self.tracked = np.zeros(n, bool)
-        """(slots,) of what is searched."""
-        self.on_surface = np.zeros(n, bool)
-        """(slots,) of nodes that are held here: only those on the surface meet faces."""
-        self.first = np.full(n, -1, np.int32)
-        """(slots,) the first pair with a face, -1 for none."""
-        self.total = np.zeros((n, 3), np.int64)
-        """(slots, 3) impulses of the last step, quanta."""
-        self.normals = np.zeros((n, 9))
-        """(slots, 9) mean normals; see narrow_phase.SlotTable."""
-        self.before = np.zeros((n, 3))
-        """(slots, 3) v(n-1/2)."""
-        self.room = ContactRows.room(0)
 
     def connect(self, company: list[Neighbour], nodes: Nodes, comm: Comm) -> None:
         """Sets up the messages: sums over the nodes of the company, copies of what is not held here; all ranks take
@@ -113,7 +69,7 @@ class Scene:
 
     def look(self, nodes: Nodes) -> None:
         """Takes v(n-1/2), before the kick."""
-        held.gather(self.before, nodes.v, self.held, self.local)
+        held.gather(self.slots.before, nodes.v, self.held, self.local)
         self.copies.note(nodes)
 
     def reserve(self) -> None:
@@ -129,7 +85,7 @@ class Scene:
         table = self.node_face
         some = np.flatnonzero(table.kept.any(axis=1))
         node, face = table.rows[some].T
-        return np.column_stack([self.crowd.id[node], self.face_id[face]]), table.kept[some]
+        return np.column_stack([self.crowd.id[node], self.faces.id[face]]), table.kept[some]
 
     def remember(self, keys: Ints, kept: Floats, nodes: Nodes, comm: Comm) -> None:
         """Takes over what pairs of another search, with their ``keys``, have ``kept``; all ranks take part.
@@ -144,7 +100,7 @@ class Scene:
         if not len(rows):
             return
         node, face = self.node_face.rows.T
-        every = np.column_stack([self.crowd.id[node], self.face_id[face]])
+        every = np.column_stack([self.crowd.id[node], self.faces.id[face]])
         kind = [("node", np.int64), ("face", np.int64)]
         mine, theirs = (np.ascontiguousarray(keys).view(kind).reshape(-1) for keys in (every, rows[:, :2]))
         _, here, there = np.intersect1d(mine, theirs, assume_unique=True, return_indices=True)
@@ -152,69 +108,70 @@ class Scene:
 
     def rows_of(self, faces: Ints) -> Indices:
         """(k,) rows of those of the ``faces``, ids, that are here."""
-        rows = rows_of(self.face_id, faces)
+        rows = rows_of(self.faces.id, faces)
         return rows[rows >= 0]
 
     def expose(self, faces: Ints) -> None:
         """Faces of these ids become surface."""
         rows = self.rows_of(faces)
-        self.face_exposed[rows] = self.face_fresh[rows] = True
-        if len(far := self.edge_far):
-            self.edge_exposed[far] |= among(np.sort(faces), self.edge_sides[far].reshape(-1)).reshape(-1, 2)
-        _expose(self.edge_exposed, self.edge_fresh, self.edge_faces, self.face_exposed)
+        self.faces.exposed[rows] = self.faces.fresh[rows] = True
+        if len(far := self.edges.far):
+            self.edges.exposed[far] |= among(np.sort(faces), self.edges.sides[far].reshape(-1)).reshape(-1, 2)
+        _expose(self.edges.exposed, self.edges.fresh, self.edges.faces, self.faces.exposed)
         self.enliven(rows)
 
     def enliven(self, rows: Indices) -> None:
         """Faces, with their nodes and edges, are searched from now on."""
-        self.face_new[rows] |= ~self.face_live[rows]
-        self.face_live[rows] = True
-        corners = np.unique(self.faces[rows, :3])
-        corners = corners[self.slave[corners] & ~self.node_live[corners]]
-        self.node_live[corners] = self.node_new[corners] = True
+        self.faces.new[rows] |= ~self.faces.live[rows]
+        self.faces.live[rows] = True
+        corners = np.unique(self.faces.corners[rows, :3])
+        corners = corners[self.slots.slave[corners] & ~self.slots.live[corners]]
+        self.slots.live[corners] = self.slots.new[corners] = True
 
     def settle_live(self) -> Flags:
         """Which nodes and edges are searched, and which slots belong to what is searched; (slots,) those that did not
         before, which nobody has watched.
         """
-        before = self.tracked.copy()
-        nodes = self.slave & self.on_surface & ~self.node_live
-        self.node_live |= nodes
-        self.node_new |= nodes
-        _enliven(self.edge_live, self.edge_new, self.edges, self.edge_faces, self.edge_exposed, self.face_live)
-        self.tracked[:] = self.node_live
-        self.tracked[self.faces[self.face_live, :3]] = True
-        self.tracked[self.edges[self.edge_live, :2]] = True
-        return self.tracked & ~before
+        before = self.slots.tracked.copy()
+        nodes = self.slots.slave & self.slots.on_surface & ~self.slots.live
+        self.slots.live |= nodes
+        self.slots.new |= nodes
+        edges = self.edges
+        _enliven(edges.live, edges.new, edges.corners, edges.faces, edges.exposed, self.faces.live)
+        self.slots.tracked[:] = self.slots.live
+        self.slots.tracked[self.faces.corners[self.faces.live, :3]] = True
+        self.slots.tracked[self.edges.corners[self.edges.live, :2]] = True
+        return self.slots.tracked & ~before
 
     @property
     def pending(self) -> bool:
         """Whether anything has to be registered."""
-        return bool(self.face_new.any() or self.node_new.any())
+        return bool(self.faces.new.any() or self.slots.new.any())
 
     def chain(self) -> None:
         """The chains of the pairs of each node, anew."""
-        self.first[:] = -1
-        self.node_face.hang(self.first, 0)
+        self.slots.first[:] = -1
+        self.node_face.hang(self.slots.first, 0)
 
     def slot_table(self) -> SlotTable:
         """The slots as kernels take them."""
-        n, tracks = self.crowd.n, self.tracks
+        n, slots, lines = self.crowd.n, self.slots, self.tracks.short
         return SlotTable(
-            self.normals, self.on_surface, self.first, tracks.short.left, tracks.short.course, self.node_fresh,
-            np.empty(n), np.empty(n, np.int32),
+            slots.normals, slots.on_surface, slots.first, lines.left, lines.course, slots.fresh, np.empty(n),
+            np.empty(n, np.int32),
         )  # fmt: skip
 
     def face_table(self) -> FaceTable:
         """The faces."""
-        f = len(self.faces)
+        faces, n = self.faces, len(self.faces.corners)
         return FaceTable(
-            self.faces, self.face_size, self.face_id, self.face_exposed, self.tracks.faces, self.face_fresh,
-            np.empty((f, 3)), np.zeros(f, bool),
+            faces.corners, faces.size, faces.id, faces.exposed, self.tracks.faces, faces.fresh, np.empty((n, 3)),
+            np.zeros(n, bool),
         )  # fmt: skip
 
     def edge_table(self) -> EdgeTable:
         """The edges."""
-        return EdgeTable(self.edges, self.edge_size, self.edge_exposed, self.tracks.edges, self.edge_fresh)
+        return EdgeTable(self.edges.corners, self.edges.size, self.edges.exposed, self.tracks.edges, self.edges.fresh)
 
     def free(self) -> None:
         """Gives its messages back to MPI."""

@@ -99,7 +99,7 @@ class Searches:
         self._connect(now, nodes)
         now.look(nodes)
         exterior.show(now, now.local)
-        now.enliven(np.flatnonzero(now.face_exposed).astype(np.int32))
+        now.enliven(np.flatnonzero(now.faces.exposed).astype(np.int32))
         self.foresee()
         registration.news(now)
         if self.rubs:
@@ -139,7 +139,7 @@ class Searches:
         if now is not None and len(now.cracks):
             rows = widening(now.cracks, now.crowd.x, self._exterior.size)
             sides = now.rows_of(self._exterior.cracks.faces[rows].reshape(-1))
-            now.enliven(sides[~now.face_live[sides]])
+            now.enliven(sides[~now.faces.live[sides]])
 
     def separate(self, split: Split) -> None:
         """Follows nodes as they separate; all ranks take part."""

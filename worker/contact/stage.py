@@ -102,7 +102,7 @@ class Contact:
         n = len(self.on_surface)
         search, push = _SURFACE * self.on_surface, np.zeros(n)
         if (now := self.searches.scene) is not None:
-            nodes, firsts = now.node_face.rows[:, 0], now.edges[now.edge_edge.rows[:, 0], 0]
+            nodes, firsts = now.node_face.rows[:, 0], now.edges.corners[now.edge_edge.rows[:, 0], 0]
             cracks = now.cracks[now.cracks[:, 0] >= 0, 0]
             tested = np.concatenate([nodes[now.node_face.tested], firsts[now.edge_edge.tested], cracks])
             for effort, weight, slots in (
@@ -187,7 +187,7 @@ class Contact:
         with self._timers.phase("contact"):
             now.look(state)
             self.books.book(now, self._active.places)
-            now.total[:] = 0
+            now.slots.total[:] = 0
 
     def search_if_due(self, state: Nodes) -> None:
         """Finds the candidate pairs of the next steps, when that is due; all ranks take part."""
@@ -210,7 +210,7 @@ class Contact:
         crowd, books, active = now.crowd, self.books, self._active
         now.copies.begin(state)
         held.take(crowd.x, crowd.v, now.held, state.x, state.v, now.local)
-        now.copies.finish(crowd.x, crowd.v, now.before)
+        now.copies.finish(crowd.x, crowd.v, now.slots.before)
         self._meet(now, PUSH_OUT if books.account.settle(self._costs) else 0.0, dt)
         shared = now.company.agree(now.room.nodes[: now.met], crowd.local)
         active.begin(now.room, now.met, crowd, shared)
@@ -221,9 +221,9 @@ class Contact:
         if self.searches.rubs:
             now.node_face.kept[:] = 0.0
             active.store(now.node_face.kept)
-            active.heat(books.friction, now.before)
-        active.cost(books.account, now.before)
-        if active.leave(crowd, now.total, state, books.parts):
+            active.heat(books.friction, now.slots.before)
+        active.cost(books.account, now.slots.before)
+        if active.leave(crowd, now.slots.total, state, books.parts):
             self.last_push = t
         shared.free()
         books.book(now, active.places)
