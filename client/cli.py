@@ -36,7 +36,7 @@ from .options import (
     warn_of,
 )
 from .pictures import FIELDS
-from .run import Run
+from .run import Run, RunInfo
 from .session import connect
 from .submission import data_of, locate
 from .watch import watch
@@ -206,15 +206,19 @@ def _print_messages(run: Run) -> int:
     return exit_code(known.state, known.cause)
 
 
+def _tell(info: RunInfo, text: str, as_json: bool) -> None:
+    if as_json:
+        show_json(info)
+    else:
+        typer.echo(text)
+
+
 @app.command()
 def cancel(run: RunArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
     """Stop a run at its next step."""
     with connect(url, token) as session:
         info = find(session, run).cancel()
-    if as_json:
-        show_json(info)
-    else:
-        typer.echo(f"{info.id} {info.state.value}")
+    _tell(info, f"{info.id} {info.state.value}", as_json)
 
 
 @app.command()
@@ -222,10 +226,7 @@ def checkpoint(run: RunArgument, url: Url = None, token: Token = None, as_json: 
     """Ask a run for a checkpoint, from which it can go on if it is lost."""
     with connect(url, token) as session:
         info = find(session, run).checkpoint()
-    if as_json:
-        show_json(info)
-    else:
-        typer.echo(f"{info.id} asked for a checkpoint")
+    _tell(info, f"{info.id} asked for a checkpoint", as_json)
 
 
 @app.command()
@@ -233,10 +234,7 @@ def snapshot(run: RunArgument, url: Url = None, token: Token = None, as_json: Js
     """Ask a run for a snapshot of its fragments; watch tells when it is there."""
     with connect(url, token) as session:
         info = find(session, run).take_snapshot()
-    if as_json:
-        show_json(info)
-    else:
-        typer.echo(f"{info.id} asked for a snapshot")
+    _tell(info, f"{info.id} asked for a snapshot", as_json)
 
 
 @app.command()
