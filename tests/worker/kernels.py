@@ -74,13 +74,13 @@ def scene(material: materials.Material = STEEL, form: Form = "standard", end: fl
 def build(case: schema.Case, meshes: Iterable[TetMesh], comm: Comm | None = None) -> Simulation:
     """The simulation of a case whose parts have these meshes."""
     ready = iter(meshes)
-    with patch.object(domain, "build_mesh", lambda *_, **__: next(ready)):
+    with patch.object(assembly, "build_mesh", lambda *_, **__: next(ready)):
         return simulation.build(case, Path(), comm or SerialComm())
 
 
 def whole_of(mesh: TetMesh, case: schema.Case | None = None) -> assembly.Whole:
     """The whole mesh as rank 0 has it before the cut."""
-    with patch.object(domain, "build_mesh", lambda *_, **__: mesh):
+    with patch.object(assembly, "build_mesh", lambda *_, **__: mesh):
         return assembly.assemble(case or scene(), Path())
 
 
