@@ -15,7 +15,8 @@ from conoid.cases.quantities import FIELD_UNITS
 from conoid.cases.run import State
 from conoid.cases.schema import Case
 
-from . import digest, domain, reference, simulation
+from . import digest, reference, simulation
+from .assembly import quiet
 from .balance import Balance
 from .errors import InputError, PhysicsError
 from .jit import cpu_time
@@ -41,7 +42,7 @@ def compute(
 
     With ``restart`` from the latest checkpoint that is there. Raises ConoidError.
     """
-    say = journal.starting if journal is not None else domain.quiet
+    say = journal.starting if journal is not None else quiet
     if restart:
         say("reading the latest checkpoint")
         sim, start = _resumed(case, folder, comm)
