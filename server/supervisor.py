@@ -9,35 +9,18 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
 
-import msgspec
 from sqlalchemy.exc import SQLAlchemyError
 
-from conoid.cases import layout
-from conoid.cases.messages import Progress, Status
+from conoid.cases.messages import Progress
 from conoid.cases.run import State
 
-from . import folder, journal, recovery
-from .launch import Job, Launcher, LaunchError, Worker
-from .lifecycle import (
-    Action,
-    Admitted,
-    Adopt,
-    CancelAsked,
-    Event,
-    Granted,
-    Journal,
-    Kill,
-    Launch,
-    LaunchFailed,
-    Run,
-    Stop,
-    WriteOutcome,
-    advance,
-)
+from . import folder, recovery, waiting
+from .launch import Launcher, LaunchError
+from .lifecycle import Admitted, CancelAsked, Event, Granted, LaunchFailed, Run, advance
+from .perform import Performer
 from .settings import Settings
 from .store import Store
 from .telemetry import Telemetry, TelemetryError
-from .watch import Watch
 
 _log = logging.getLogger("conoid.server")
 _LOOK = 0.02
@@ -72,8 +55,8 @@ class Supervisor:
         self._telemetry, self._ring = telemetry, ring
         self._inbox: queue.SimpleQueue[_Cancel | None] = queue.SimpleQueue()
         self._open: dict[str, Run] = {}
-        self._watches: dict[str, Watch] = {}
-        self._found: dict[str, Worker] = {}
+        self._hands = Performer(settings, launcher, telemetry)
+        self._watches = self._hands.watches
         self._hold: dict[str, float] = {}
         self._unsaved: set[str] = set()
         self._left: set[Path] = set()
@@ -139,18 +122,10 @@ class Supervisor:
 
     def reason(self, run_id: str) -> str:
         """What a queued run waits for; empty for any other."""
-        waiting = self._in_state(State.QUEUED)
-        place = next((place for place, run in enumerate(waiting) if run.id == run_id), None)
-        if place is None:
-            return ""
-        if place:
-            return f"waiting for {place} earlier run{'s' if place > 1 else ''}"
-        free = max(0, self._settings.slots - self.slots_used())
-        return f"waiting for {waiting[0].ranks} of {self._settings.slots} slots; {free} free"
+        return waiting.reason(run_id, tuple(self._open.values()), self.slots_used(), self._settings.slots)
 
     def _in_state(self, state: State) -> list[Run]:
-        """The open runs in ``state``, first come first."""
-        return sorted((run for run in tuple(self._open.values()) if run.state is state), key=lambda run: run.id)
+        return waiting.in_state(tuple(self._open.values()), state)
 
     # The supervisor's own thread --------------------------------------------------------------------------------------
 
@@ -215,7 +190,7 @@ class Supervisor:
         after, actions = advance(before, event, now)
         try:
             for action in actions:
-                self._perform(after, action, now)
+                self._hands.perform(after, action, now)
         except LaunchError as error:
             self._settle(after)
             return self._apply(run_id, LaunchFailed(str(error)))
@@ -251,45 +226,6 @@ class Supervisor:
             return True
         self._hold.pop(run_id, None)
         return False
-
-    def _perform(self, run: Run, action: Action, now: float) -> None:
-        path = self._settings.runs / run.id
-        match action:
-            case Journal(state, cause, message):
-                self._tell(run, Status(run=run.id, wall=now, state=state, cause=cause, message=message))
-            case WriteOutcome(outcome):
-                folder.write_outcome(path, outcome)
-            case Launch():
-                self._watches[run.id] = self._launch(run, path)
-            case Adopt():
-                self._watches[run.id] = self._watch(run, path, self._found.pop(run.id))
-                if run.state is State.STOPPING:
-                    self._watches[run.id].stop(self._settings.grace)
-            case Stop():
-                self._watches[run.id].stop(self._settings.grace)
-            case Kill():
-                self._watches[run.id].worker.kill()
-
-    def _tell(self, run: Run, status: Status) -> None:
-        written = journal.append(self._settings.runs / run.id / layout.JOURNAL, status)
-        if self._telemetry is not None:
-            self._telemetry.publish(run.owner, written)
-
-    def _launch(self, run: Run, path: Path) -> Watch:
-        access = None if self._telemetry is None else self._telemetry.worker(run.owner, run.id)
-        try:
-            (path / layout.OUTCOME).unlink(missing_ok=True)
-            case = path / folder.submission(path).case_file
-            worker = self._launcher.start(Job(run.id, run.ranks, case, path, access))
-            return self._watch(run, path, worker)
-        except (OSError, msgspec.MsgspecError) as error:
-            raise LaunchError(str(error)) from error
-
-    def _watch(self, run: Run, path: Path, worker: Worker) -> Watch:
-        """The worker itself ends at ``run.max_wall_time``; the server steps in a grace later."""
-        allowed = folder.submission(path).wall_time
-        deadline = None if allowed is None else run.started + allowed + self._settings.grace
-        return Watch(path, worker, deadline)
 
     # Housekeeping -----------------------------------------------------------------------------------------------------
 
@@ -333,6 +269,6 @@ class Supervisor:
         if left.run.state.final:
             return None
         if left.worker is not None:
-            self._found[left.run.id] = left.worker
+            self._hands.found[left.run.id] = left.worker
         self._open[left.run.id] = left.run
         return self._apply(left.run.id, left.found)

@@ -150,7 +150,7 @@ def test_an_outcome_that_cannot_be_read_is_kept(server: Running) -> None:
 
 def test_a_launcher_that_does_not_exist(server: Running) -> None:
     absent = replace(server.service.settings, mpiexec="/no/such/mpiexec")
-    server.service.supervisor._launcher = LocalLauncher(absent)
+    server.service.supervisor._hands._launcher = LocalLauncher(absent)
     run = server.ann.submit()
     ended = server.ann.wait_for(run)
     assert (ended["state"], ended["cause"]) == ("failed", "launch")
