@@ -11,6 +11,7 @@
       snapshots/000012.snap  surface and table of the fragments (cases/snapshot.py); snapshot.request asks for one
       checkpoints/000001200/ complete state, by global ids; checkpoint.request asks for one
       log/rank-0.log         one a rank            log/launcher.log
+      stop.request           why it was asked to stop
       outcome.json           written last
 """
 
@@ -34,6 +35,8 @@ LAUNCHER_LOG = "launcher.log"
 SUBMISSION = "submission.json"
 """Written by the server only, as is ``worker.json``: a run without a server has neither."""
 WORKER = "worker.json"
+STOP = "stop.request"
+"""Written by the server when a stop is asked for: the cause, as a word."""
 
 
 def frame(folder: Path, index: int) -> Path:

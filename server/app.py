@@ -12,6 +12,7 @@ from . import errors, openapi, page
 from .bell import Bell
 from .history import Histories
 from .launch.local import LocalLauncher
+from .readiness import Readiness
 from .routes import cases, events, files, health, history, logs, me, runs, snapshots
 from .service import Service
 from .settings import Settings
@@ -48,7 +49,7 @@ def opened(settings: Settings) -> Iterator[Service]:
 
     Raises StoreError, TelemetryError, OSError.
     """
-    settings.runs.mkdir(parents=True, exist_ok=True)
+    settings.runs.mkdir(0o700, parents=True, exist_ok=True)
     with ExitStack() as stack:
         store = Store(settings.database_url)
         stack.callback(store.close)
@@ -63,7 +64,8 @@ def opened(settings: Settings) -> Iterator[Service]:
         stack.callback(supervisor.close)
         if settings.end_runs:
             stack.callback(supervisor.end_all)
-        yield Service(settings, store, bell, telemetry, supervisor, Desk(settings, store, supervisor), Histories())
+        desk, readiness = Desk(settings, store, supervisor), Readiness(settings, store)
+        yield Service(settings, store, bell, telemetry, supervisor, desk, Histories(), readiness)
 
 
 def build_app(service: Service) -> FastAPI:

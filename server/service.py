@@ -7,6 +7,7 @@ from fastapi import Depends, Request
 
 from .bell import Bell
 from .history import Histories
+from .readiness import Readiness
 from .settings import Settings
 from .store import Store
 from .submission import Desk
@@ -25,6 +26,7 @@ class Service:
     supervisor: Supervisor
     desk: Desk
     histories: Histories
+    readiness: Readiness
 
 
 def _service(request: Request) -> Service:

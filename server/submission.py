@@ -14,9 +14,9 @@ from conoid.cases.load import CaseError, Problem, json_data, parse_case, resolve
 from conoid.cases.schema import Case
 
 from . import folder, limits
-from .errors import ServiceError, invalid_case
+from .errors import ServiceError, database_away, invalid_case
+from .events import Run
 from .folder import Submission
-from .lifecycle import Run
 from .settings import Settings
 from .store import Store
 from .supervisor import Supervisor
@@ -116,10 +116,12 @@ class Desk:
         try:
             folder.create(self._settings.runs, made, body, resolved_json(case))
             self._store.add(run, key)
-        except (OSError, SQLAlchemyError) as error:
+        except OSError as error:
             folder.discard(self._settings.runs, run_id)
-            detail = f"the run cannot be kept: {error}".splitlines()[0]
-            raise ServiceError(507, "storage", detail, retryable=True) from error
+            raise ServiceError(507, "storage", f"the run cannot be kept: {error.strerror}", retryable=True) from error
+        except SQLAlchemyError as error:
+            folder.discard(self._settings.runs, run_id)
+            raise database_away(error) from error
         self._supervisor.admit(run)
         return receipt(made)
 

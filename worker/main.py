@@ -19,9 +19,10 @@ from conoid.cases.schema import Case
 from . import compile as ahead
 from . import kernels
 from .errors import CompileError, ConoidError
+from .output import storage
 from .output.journal import Journal
 from .parallel.comm import Comm
-from .parallel.mpi import connect
+from .parallel.mpi import abort, connect
 from .signals import Signals
 
 if TYPE_CHECKING:
@@ -43,16 +44,23 @@ def main(arguments: list[str]) -> int:
     options = _parse(arguments)
     signals = Signals()
     comm = connect()
+    try:
+        return _run(options, comm, signals, began)
+    except BaseException as error:
+        log.error("rank %d stops the job\n%s", comm.rank, traceback.format_exc())
+        if storage.failed(error):
+            print(f"a file of the run cannot be written: {error}", file=sys.stderr, flush=True)
+            abort(ExitCode.STORAGE)
+        raise
+
+
+def _run(options: argparse.Namespace, comm: Comm, signals: Signals, began: float) -> int:
     _prepare_folder(options.out, comm)
     telemetry = journal = None
     if comm.rank == 0:
         telemetry = _telemetry(options)
         journal = Journal(options.out, options.run or options.out.resolve().name, telemetry)
-    try:
-        outcome, code = _outcome(options, comm, journal, signals, began)
-    except BaseException:
-        log.error("rank %d stops the job\n%s", comm.rank, traceback.format_exc())
-        raise
+    outcome, code = _outcome(options, comm, journal, signals, began)
     if journal is not None:
         _close(outcome, options.out, journal, telemetry)
     comm.barrier()

@@ -1,17 +1,15 @@
 """For those who watch the server itself."""
 
-import os
 import time
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Response
 from fastapi.responses import JSONResponse
-from sqlalchemy.exc import SQLAlchemyError
 
 from conoid.cases.run import State
 
 from ..auth import Identity, requires
-from ..service import Service, ServiceOf
+from ..service import ServiceOf
 
 router = APIRouter()
 
@@ -25,21 +23,9 @@ def alive() -> dict[str, str]:
 @router.get("/readyz")
 def ready(service: ServiceOf) -> Response:
     """Runs can be taken and looked after: 200, or 503 with what is wrong."""
-    checks = {
-        "supervisor": service.supervisor.alive,
-        "database": _database(service),
-        "runs": os.access(service.settings.runs, os.W_OK),
-    }
+    checks = {"supervisor": service.supervisor.alive, **service.readiness.checks()}
     body: dict[str, Any] = {"status": "ok" if all(checks.values()) else "unavailable", "checks": checks}
     return JSONResponse(body, 200 if all(checks.values()) else 503)
-
-
-def _database(service: Service) -> bool:
-    try:
-        service.store.token("")
-    except SQLAlchemyError:
-        return False
-    return True
 
 
 @router.get("/metrics")

@@ -13,7 +13,7 @@ from conoid.cases.run import State
 from .. import openapi, view
 from ..auth import Identity, Reader, Submitter
 from ..errors import ServiceError, not_found
-from ..lifecycle import Run
+from ..events import Run
 from ..limits import read_body
 from ..service import Service, ServiceOf
 from ..submission import labels_of
@@ -51,7 +51,8 @@ def page(
     before = None if cursor is None else view.from_cursor(cursor)
     runs = service.store.page(identity.owner, _states(state), before, limit + 1)
     following = view.to_cursor(runs[limit - 1]) if len(runs) > limit else None
-    return {"runs": [view.brief(service, run) for run in runs[:limit]], "next": following}
+    now = (service.supervisor.current(run.id) or run for run in runs[:limit])
+    return {"runs": [view.brief(service, run) for run in now], "next": following}
 
 
 def _states(text: str | None) -> list[State]:
@@ -71,10 +72,12 @@ OwnedRun = Annotated[Run, Depends(owned_run)]
 
 
 def find(service: Service, identity: Identity, run_id: str) -> Run:
-    """The run as it is now. Raises ServiceError 404."""
+    """The run as it is now. Raises ServiceError 404, and 410 when it has ended and its folder is gone."""
     run = service.supervisor.current(run_id) or service.store.get(run_id)
     if run is None or run.owner != identity.owner:
         raise not_found(f"run {run_id[:40]!r}")
+    if run.state.final and not (service.settings.runs / run.id).is_dir():
+        raise ServiceError(410, "gone", f"run {run.id}: its folder has been removed; it ended as {run.state.value}")
     return run
 
 

@@ -150,7 +150,7 @@ def test_an_outcome_that_cannot_be_read_is_kept(server: Running) -> None:
 
 def test_a_launcher_that_does_not_exist(server: Running) -> None:
     absent = replace(server.service.settings, mpiexec="/no/such/mpiexec")
-    server.service.supervisor._launcher = LocalLauncher(absent)
+    server.service.supervisor._hands._launcher = LocalLauncher(absent)
     run = server.ann.submit()
     ended = server.ann.wait_for(run)
     assert (ended["state"], ended["cause"]) == ("failed", "launch")
@@ -206,7 +206,7 @@ def test_wait_with_a_known_etag_answers_when_anything_changes(server: Running, t
 
 
 def test_a_full_disk_delays_and_loses_nothing(server: Running, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    from conoid.server import journal, supervisor
+    from conoid.server import holds, journal
 
     run = server.ann.submit(wait=str(tmp_path / "go"))
     server.ann.wait_for(run, State.RUNNING)
@@ -217,7 +217,7 @@ def test_a_full_disk_delays_and_loses_nothing(server: Running, monkeypatch: pyte
             raise OSError(28, "No space left on device")
         return real(*arguments)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(supervisor, "_AGAIN", 0.05)
+    monkeypatch.setattr(holds, "_AGAIN", 0.05)
     monkeypatch.setattr(journal, "append", append)
     (tmp_path / "go").touch()
     assert server.ann.wait_for(run)["state"] == "succeeded"

@@ -47,7 +47,9 @@ class Journal:
         """Writes one message and passes it on, with the ``blob`` that it tells of."""
         self._seq += 1
         message = kind(run=self._run, seq=self._seq, wall=time.time(), step=step, t=t, **fields)
-        self._file.write(msgspec.json.encode(message) + b"\n")
+        line = msgspec.json.encode(message) + b"\n"
+        while line:
+            line = line[self._file.write(line) :]
         if self._listener is not None:
             self._listener.tell(message, blob)  # type: ignore[arg-type]
         return message

@@ -201,6 +201,14 @@ def leave(code: int) -> NoReturn:
     sys.exit(code)
 
 
+def abort(code: int) -> NoReturn:
+    """Ends all ranks of the run now, whatever they are at, with an exit code."""
+    from mpi4py import MPI
+
+    MPI.COMM_WORLD.Abort(code)
+    raise SystemExit(code)
+
+
 def connect() -> Comm:
     """MPI's world when it has more than one rank, else the serial twin."""
     world = MpiComm()
