@@ -14,7 +14,7 @@ from conoid.cases.load import CaseError, parse_case
 from conoid.cases.plausible import doubts
 from conoid.cases.run import ExitCode
 
-from . import benches, commands, reports, shelf, tables, viewing
+from . import benches, commands, converging, reports, shelf, tables, viewing
 from .errors import ClientError
 from .once import run_once
 from .options import (
@@ -118,6 +118,7 @@ app.command(name="replay-balance", short_help="The loads of a run under another 
 app.command(short_help="Write a run as one HTML file.")(reports.report)
 app.command(short_help="Tell in what two runs differ.")(reports.compare)
 app.add_typer(reports.figures, name="figures")
+app.command(short_help="Speed against error: meshes, orders, limits, advice.")(converging.converge)
 
 
 @app.command(name="run", short_help="Do it all on this machine: run, watch, check, draw.")
