@@ -11,7 +11,7 @@ from .bodies import MeshFile
 from .boundary_checks import ROUNDING, check_boundaries, check_walls, ordered
 from .geometry import AXES, bounds, centre, cut_directions, whole_bounds
 from .library import library
-from .materials import JohnsonCook, Material, MohrCoulomb
+from .materials import Material
 from .mesh_checks import check_mesh
 from .overlap import overlaps
 from .problems import Location, Problem, choices, dotted, nearest, problem
@@ -77,23 +77,9 @@ def _overlaps(case: Case) -> Iterator[Problem]:
 
 def _materials(case: Case) -> Iterator[Problem]:
     for name, made in case.materials.items():
-        law = made.strength
-        if isinstance(law, JohnsonCook) and law.melt_temperature <= law.reference_temperature:
-            location = ("materials", name, "strength", "melt_temperature")
-            yield problem(location, law.melt_temperature, f"must be above {law.reference_temperature} K, the reference")
-        if isinstance(law, MohrCoulomb):
-            yield from _residual(law, ("materials", name, "strength"))
-
-
-def _residual(law: MohrCoulomb, location: Location) -> Iterator[Problem]:
-    for key in ("cohesion", "friction_angle"):
-        value, intact = getattr(law, f"residual_{key}"), getattr(law, key)
-        here = (*location, f"residual_{key}")
-        if value is not None and law.failure_strain is None:
-            yield problem(here, value, "needs failure_strain, beyond which it holds")
-        elif value is not None and value > intact:
-            unit = "Pa" if key == "cohesion" else "rad"
-            yield problem(here, value, f"must not be above {intact:g} {unit}, the {key} of what has not failed")
+        if made.strength is not None:
+            for key, value, message in made.strength.problems():
+                yield problem(("materials", name, "strength", key), value, message)
 
 
 def _parts(case: Case) -> Iterator[Problem]:
@@ -105,8 +91,8 @@ def _parts(case: Case) -> Iterator[Problem]:
             yield problem(("parts", i, "material"), part.material, message)
             continue
         law = known[part.material].strength
-        if isinstance(law, JohnsonCook) and part.temperature >= law.melt_temperature:
-            message = f"must be below {law.melt_temperature} K, where {part.material} melts"
+        if law is not None and part.temperature >= law.melting:
+            message = f"must be below {law.melting} K, where {part.material} melts"
             yield problem(("parts", i, "temperature"), part.temperature, message)
         yield from check_mesh(part.mesh, ("parts", i, "mesh"))
         if law is None and part.erosion is not None and part.erosion.plastic_strain is not None:

@@ -22,11 +22,7 @@ from .parallel.decompose import bisect
 from .parallel.ownership import Neighbour
 from .state import (
     CHUNK,
-    FLOW,
     MASS,
-    TEMPERATURE,
-    VOLUME_RATIO,
-    YIELD,
     Block,
     Flags,
     Floats,
@@ -180,13 +176,7 @@ def _block(case: schema.Case, piece: Piece, index: int) -> Block:
     rows = models.rows_of(material, case.numerics.pressure)
     state = np.zeros((-(-len(chosen) // CHUNK), rows, CHUNK))
     state[:, MASS, :] = chunked(piece.tet_volume[chosen] * material.density)
-    initial = {
-        VOLUME_RATIO: 1.0,
-        YIELD: models.initial_yield(material, part.temperature),
-        FLOW: models.initial_yield(material, part.temperature),
-        TEMPERATURE: part.temperature,
-    }
-    for row, value in initial.items():
+    for row, value in models.beginning(material, part.temperature).items():
         if row < rows:
             state[:, row, :] = value
     across = piece.across[chosen] if len(piece.across) else piece.across

@@ -19,7 +19,8 @@ from .energy import Ledger
 from .erosion import Erosion
 from .fracture.record import Record
 from .fracture.stage import Fracture
-from .materials.models import BULK, DENSITY, SHEAR, moduli
+from .materials.law import BULK, DENSITY, SHEAR
+from .materials.models import moduli
 from .migration import model as model_of
 from .migration.parcel import Parcel
 from .migration.route import Arrived

@@ -21,7 +21,7 @@ from conoid.cases.messages import Energy
 from conoid.cases.schema import Case
 from conoid.worker import assembly, simulation, step
 from conoid.worker.fracture import connectivity
-from conoid.worker.materials.models import DENSITY
+from conoid.worker.materials.law import DENSITY
 from conoid.worker.mesh import build
 from conoid.worker.mesh.faces import FACES, areas
 from conoid.worker.mesh.model import TetMesh, check, step_lengths

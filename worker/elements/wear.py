@@ -12,7 +12,7 @@ import numpy as np
 from conoid.cases.schema import Erosion
 
 from ..jit import njit
-from ..materials.models import DENSITY
+from ..materials.law import DENSITY
 from ..state import CHUNK, MASS, PLASTIC_STRAIN, S_XX, VISCOUS, WORK, WORK_PLASTIC, WORK_VISCOUS, Floats
 from .tet4 import LIMIT, VOLUME
 

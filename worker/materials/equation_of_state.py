@@ -4,11 +4,14 @@ Both take the volume strain of the step that the pressure sees (the tet's own, o
 SEEN of the scratch, and the tet's own change of volume from CHANGE, so that the work is what the nodal forces do.
 """
 
+from conoid.cases.materials import MieGruneisen
+
 from ..elements.tet4 import CHANGE, MODULUS, SEEN
 from ..jit import njit
 from ..state import CHUNK, MASS, PRESSURE, VOLUME_RATIO, WORK, WORK_VISCOUS
-from .models import BULK, C0, DENSITY, GAMMA, SHEAR, SLOPE
+from .law import BULK, DENSITY, EQUATION, SHEAR, Equation
 
+_C0, _SLOPE, _GAMMA = range(EQUATION, EQUATION + 3)
 _P, _MASS, _WORK, _RATIO = PRESSURE * CHUNK, MASS * CHUNK, WORK * CHUNK, VOLUME_RATIO * CHUNK
 _WORK_VISCOUS = WORK_VISCOUS * CHUNK
 
@@ -33,8 +36,8 @@ def mie_gruneisen(w, s, params, n):  # type: ignore[no-untyped-def]
     of the step is linear in the new pressure and solved in closed form. The factor 1 - gamma chi / 2 applies to
     compression only.
     """
-    density, shear, gamma, slope = params[DENSITY], params[SHEAR], params[GAMMA], params[SLOPE]
-    stiffness = density * params[C0] * params[C0]
+    density, shear, gamma, slope = params[DENSITY], params[SHEAR], params[_GAMMA], params[_SLOPE]
+    stiffness = density * params[_C0] * params[_C0]
     for i in range(n):
         half = 0.5 * w[SEEN + i]
         ratio = s[_RATIO + i] * (1.0 + half) / (1.0 - half)
@@ -52,3 +55,13 @@ def mie_gruneisen(w, s, params, n):  # type: ignore[no-untyped-def]
         s[_RATIO + i] = ratio
         s[_WORK + i] -= 0.5 * (old + new) * change
         w[MODULUS + i] = ratio * (tangent + gamma * new) + 4.0 / 3.0 * shear
+
+
+def _gruneisen(eos: MieGruneisen) -> tuple[float, ...]:
+    return eos.c0, eos.S, eos.gamma0
+
+
+ELASTIC = Equation("", 0, lambda _: (), linear)
+"""The pressure of the elasticity."""
+GRUNEISEN = Equation("mie_gruneisen", VOLUME_RATIO + 1, _gruneisen, mie_gruneisen)
+"""Compression and heat."""
