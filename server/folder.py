@@ -44,6 +44,8 @@ class Submission(msgspec.Struct, kw_only=True, frozen=True):
     estimate: dict[str, int | float]
     labels: dict[str, str] = {}
     """Words of the submitter."""
+    profile: str = ""
+    """Of the batch system; empty where there is none."""
 
 
 class Process(msgspec.Struct, kw_only=True, frozen=True):

@@ -37,7 +37,21 @@ class Admitted:
 
 @dataclass(frozen=True)
 class Granted:
-    """Enough slots are free."""
+    """Enough slots are free. ``batch``: it goes on waiting, in the queue of a batch system."""
+
+    batch: bool = False
+
+
+@dataclass(frozen=True)
+class WorkerStarts:
+    """A batch system has given the worker its cores, at the Unix time ``at``."""
+
+    at: float
+
+
+@dataclass(frozen=True)
+class WorkerWaits:
+    """A batch system has taken the cores away; the worker goes on from its checkpoint when it gets some again."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +68,9 @@ class WorkerRuns:
 
 @dataclass(frozen=True)
 class CancelAsked:
-    """Its owner wants it to stop."""
+    """Its owner wants it to stop. ``handed``: a worker lives, or a batch system has the run."""
+
+    handed: bool = False
 
 
 @dataclass(frozen=True)
@@ -76,6 +92,8 @@ class WorkerExited:
     out_of_memory: bool = False
     traces: str = ""
     """What it left for people in place of an outcome."""
+    reading: tuple[State, Cause, str] | None = None
+    """What a batch system says of an end without an outcome."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +105,10 @@ class Found:
     rebooted: bool = False
 
 
-Event = Admitted | Granted | LaunchFailed | WorkerRuns | CancelAsked | WallTimeOver | GraceOver | WorkerExited | Found
+Event = (
+    Admitted | Granted | LaunchFailed | WorkerStarts | WorkerWaits | WorkerRuns | CancelAsked | WallTimeOver | GraceOver
+    | WorkerExited | Found
+)  # fmt: skip
 
 # Actions --------------------------------------------------------------------------------------------------------------
 
@@ -146,20 +167,26 @@ def advance(run: Run, event: Event, now: float) -> Next:
     match event:
         case Admitted() if run.state is State.ACCEPTED:
             return _enter(run, State.QUEUED)
+        case Granted(batch=True) if run.state is State.QUEUED:
+            return run, (Launch(),)
         case Granted() if run.state is State.QUEUED:
             started, actions = _enter(replace(run, started=now), State.STARTING)
             return started, (*actions, Launch())
-        case LaunchFailed(message) if run.state is State.STARTING:
+        case LaunchFailed(message) if run.state in {State.QUEUED, State.STARTING}:
             return _end(run, now, Outcome(state=State.FAILED, cause=Cause.LAUNCH, message=message, ranks=run.ranks))
-        case WorkerRuns() if run.state is State.STARTING:
-            return replace(run, state=State.RUNNING), ()
-        case CancelAsked():
-            return _cancel(run, now)
+        case WorkerStarts(at) if run.state is State.QUEUED:
+            return replace(run, state=State.STARTING, started=at, message=""), ()
+        case WorkerWaits() if run.state in {State.STARTING, State.RUNNING}:
+            return replace(run, state=State.QUEUED, started=0.0), ()
+        case WorkerRuns() if run.state in {State.QUEUED, State.STARTING}:
+            return replace(run, state=State.RUNNING, started=run.started or now), ()
+        case CancelAsked(handed):
+            return _cancel(run, now, handed)
         case WallTimeOver() if run.state in {State.STARTING, State.RUNNING}:
             return _stop(run, Cause.WALLTIME)
         case GraceOver() if run.state is State.STOPPING:
             return run, (Kill(),)
-        case WorkerExited() if run.state in {State.STARTING, State.RUNNING, State.STOPPING}:
+        case WorkerExited() if run.state is not State.ACCEPTED:
             return _exited(run, event, now)
         case Found():
             return _found(run, event, now)
@@ -179,8 +206,8 @@ def _end(run: Run, now: float, outcome: Outcome, *, written: bool = False) -> Ne
     return ended, (*write, Journal(state, cause, outcome.message))
 
 
-def _cancel(run: Run, now: float) -> Next:
-    if run.state in {State.ACCEPTED, State.QUEUED}:
+def _cancel(run: Run, now: float, handed: bool) -> Next:
+    if run.state is State.ACCEPTED or (run.state is State.QUEUED and not handed):
         message = "cancelled before it started"
         return _end(run, now, Outcome(state=State.CANCELLED, cause=Cause.CANCELLED, message=message, ranks=run.ranks))
     return (run, ()) if run.state is State.STOPPING else _stop(run, Cause.CANCELLED)
@@ -216,6 +243,8 @@ def _reading_of(run: Run, event: WorkerExited) -> tuple[State, Cause, str]:
     killed = event.code in {-_SIGKILL, _SIGKILL, 128 + _SIGKILL}
     if run.stopping_for is not None:
         return State.CANCELLED, Cause.CANCELLED, "stopped on request, without results"
+    if event.reading is not None:
+        return event.reading
     if killed and event.out_of_memory:
         return State.FAILED, Cause.MEMORY, "the machine ran out of memory and ended the worker"
     if killed:
@@ -224,7 +253,7 @@ def _reading_of(run: Run, event: WorkerExited) -> tuple[State, Cause, str]:
         return State.FAILED, Cause.INPUT, "the worker refused the case"
     if event.code == ExitCode.PHYSICS:
         return State.FAILED, Cause.DIVERGED, "the computation failed"
-    if run.state is State.STARTING:
+    if run.state in {State.QUEUED, State.STARTING}:
         return State.FAILED, Cause.LAUNCH, f"the worker ended with code {event.code} before its first step"
     return State.FAILED, Cause.SERVICE, f"the worker ended with code {event.code} and left no readable outcome"
 
@@ -232,10 +261,10 @@ def _reading_of(run: Run, event: WorkerExited) -> tuple[State, Cause, str]:
 def _found(run: Run, event: Found, now: float) -> Next:
     if run.state is State.ACCEPTED:
         return _enter(run, State.QUEUED)
-    if run.state is State.QUEUED:
-        return run, ()
     if event.worker == "alive":
         return run, (Adopt(),)
+    if run.state is State.QUEUED:
+        return run, ()
     if event.outcome is not None and _readable(event.outcome):
         return _exited(run, WorkerExited(None, event.outcome), now)
     if event.worker == "none" and run.state is State.STARTING:

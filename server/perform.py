@@ -55,14 +55,18 @@ class Performer:
         access = None if self._telemetry is None else self._telemetry.worker(run.owner, run.id)
         try:
             (path / layout.OUTCOME).unlink(missing_ok=True)
-            case = path / folder.submission(path).case_file
-            worker = self._launcher.start(Job(run.id, run.ranks, case, path, access))
+            made = folder.submission(path)
+            case = path / made.case_file
+            job = Job(run.id, run.ranks, case, path, access, made.profile, made.wall_time)
+            worker = self._launcher.start(job)
             return self._watch(run, path, worker)
         except (OSError, msgspec.MsgspecError) as error:
             raise LaunchError(str(error)) from error
 
     def _watch(self, run: Run, path: Path, worker: Worker) -> Watch:
-        """The worker itself ends at ``run.max_wall_time``; the server steps in a grace later."""
-        allowed = folder.submission(path).wall_time
+        """The worker itself ends at ``run.max_wall_time``; the server steps in a grace later, a batch system at the
+        limit of the job.
+        """
+        allowed = None if self._launcher.queues else folder.submission(path).wall_time
         deadline = None if allowed is None else run.started + allowed + self._settings.grace
         return Watch(path, worker, deadline)

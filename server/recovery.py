@@ -10,6 +10,8 @@ from . import folder
 from .launch import Launcher, Worker
 from .lifecycle import Found, Run
 
+_STOPPABLE = {State.QUEUED, State.STARTING, State.RUNNING}
+
 
 @dataclass(frozen=True)
 class Left:
@@ -27,7 +29,7 @@ def look(path: Path, known: Run | None, launcher: Launcher) -> Left:
     Raises OSError, and ValueError when the folder's files are not what they should be.
     """
     run = folder.run(path)
-    if known is not None and known.stopping_for is not None and run.state in {State.STARTING, State.RUNNING}:
+    if known is not None and known.stopping_for is not None and run.state in _STOPPABLE:
         run = replace(run, state=State.STOPPING, stopping_for=known.stopping_for)
     trace = launcher.find(run.id, path)
     fate: Literal["none", "alive", "gone"] = "gone" if trace.launched else "none"

@@ -12,12 +12,14 @@ from conoid.cases.messages import Progress, Status
 from conoid.cases.run import State
 
 from . import folder, journal
-from .launch import Worker
-from .lifecycle import Event, GraceOver, WallTimeOver, WorkerExited, WorkerRuns
+from .launch import Phase, Worker
+from .lifecycle import Event, GraceOver, WallTimeOver, WorkerExited, WorkerRuns, WorkerStarts, WorkerWaits
 
 _FAREWELL = 10.0
 """s that a worker may take to leave after it has said that it finished; its launcher may hang when a helper of it was
 killed from outside."""
+_PATIENCE = 1.0
+"""s between two looks at a worker that waits for its cores in a queue, of which there may be a thousand. Chosen."""
 
 _progress = msgspec.json.Decoder(Progress)
 _status = msgspec.json.Decoder(Status)
@@ -31,18 +33,25 @@ class Watch:
         self.worker, self._folder = worker, run_folder
         self._tail = journal.Tail(run_folder / layout.JOURNAL)
         self._deadline, self._kill_at, self._runs = deadline, float("inf"), False
+        self._phase: Phase = "unknown"
+        self._next = 0.0
         self.progress: Progress | None = None
         self.news = False
         """True when the last look found new lines in the journal."""
 
     def look(self, now: float) -> Iterator[Event]:
         """What has happened since the last look; ``now`` in Unix s. Raises OSError."""
+        if self._phase == self.worker.phase() == "waits" and now < self._next:
+            return
+        self._next = now + _PATIENCE
         exit_ = self.worker.exited()
+        yield from self._turn()
         if self._read(now):
             yield WorkerRuns()
         if exit_ is not None:
             told = folder.outcome(self._folder)
-            yield WorkerExited(exit_.code, told, exit_.out_of_memory, self._traces(exit_.last_words))
+            traces = self._traces(exit_.last_words)
+            yield WorkerExited(exit_.code, told, exit_.out_of_memory, traces, exit_.reading)
         elif now >= self._kill_at:
             self._kill_at = now + 1.0
             self.worker.kill()
@@ -50,6 +59,15 @@ class Watch:
         elif self._deadline is not None and now >= self._deadline:
             self._deadline = None
             yield WallTimeOver()
+
+    def _turn(self) -> Iterator[Event]:
+        """Whether the worker has got its cores, or has to wait for them again."""
+        phase, before = self.worker.phase(), self._phase
+        self._phase = phase
+        if phase == "waits":
+            self._runs = False
+        if phase != before and phase != "unknown":
+            yield WorkerWaits() if phase == "waits" else WorkerStarts(self.worker.began())
 
     def stop(self, grace: float) -> None:
         """Asks the worker to stop, and sets the time at which it is killed."""
@@ -69,6 +87,7 @@ class Watch:
                 if line.type == "progress":
                     with suppress(msgspec.MsgspecError):
                         self.progress = _progress.decode(line.raw)
+                    runs |= self._phase != "waits"
                 elif line.type == "status":
                     runs |= _status.decode(line.raw).state == State.RUNNING
                 elif line.type == "finished":
