@@ -10,8 +10,8 @@
       frames/000012.vtkhdf   one file a frame      frames/frames.vtkhdf.series  for ParaView
       snapshots/000012.snap  surface and table of the fragments (cases/snapshot.py); snapshot.request asks for one
       checkpoints/000001200/ complete state, by global ids; checkpoint.request asks for one
+      job.json, job.sh       the job of a batch system that runs it (cases/batch.py); stop.request ends it for good
       log/rank-0.log         one a rank            log/launcher.log
-      stop.request           why it was asked to stop
       outcome.json           written last
 """
 
@@ -35,8 +35,18 @@ LAUNCHER_LOG = "launcher.log"
 SUBMISSION = "submission.json"
 """Written by the server only, as is ``worker.json``: a run without a server has neither."""
 WORKER = "worker.json"
-STOP = "stop.request"
-"""Written by the server when a stop is asked for: the cause, as a word."""
+JOB = "job.json"
+"""Written by who hands the run to a batch system: the server, or the command line."""
+JOB_SCRIPT = "job.sh"
+ACCESS = ".telemetry.json"
+"""Hidden, for its owner alone: where the ranks of a job publish, and as whom."""
+STOP_REQUEST = "stop.request"
+"""Whoever makes this file asks the run to stop for good; it stays. The server writes the cause into it, as a word.
+A stop without it is an interruption to a job."""
+INTERRUPTED = "interrupted.json"
+"""The outcome so far of a run that was interrupted and is to go on."""
+LOCK = ".lock"
+"""Held by rank 0 while it writes into the folder."""
 
 
 def frame(folder: Path, index: int) -> Path:
@@ -62,3 +72,8 @@ def share(folder: Path, n: int, rank: int) -> Path:
 def rank_log(folder: Path, rank: int) -> Path:
     """Path of the log of ``rank`` in the run folder ``folder``."""
     return folder / LOGS / f"rank-{rank}.log"
+
+
+def claim(folder: Path, job_name: str) -> Path:
+    """Made by the first job of that name that starts; holds its number. A second one ends."""
+    return folder / f".claim-{job_name}"

@@ -27,13 +27,13 @@ FINAL = frozenset({State.SUCCEEDED, State.FAILED, State.CANCELLED, State.TIMED_O
 
 FOLLOWERS: dict[State, frozenset[State]] = {
     State.ACCEPTED: frozenset({State.QUEUED, State.CANCELLED, State.FAILED, State.LOST}),
-    State.QUEUED: frozenset({State.STARTING, State.CANCELLED, State.FAILED, State.LOST}),
+    State.QUEUED: frozenset({State.STARTING, State.RUNNING, State.STOPPING, *FINAL}),
     State.STARTING: frozenset({State.QUEUED, State.RUNNING, State.STOPPING, *FINAL}),
-    State.RUNNING: frozenset({State.STOPPING, *FINAL}),
+    State.RUNNING: frozenset({State.QUEUED, State.STARTING, State.STOPPING, *FINAL}),
     State.STOPPING: FINAL,
     **dict.fromkeys(FINAL, frozenset()),
 }
-"""Which states may follow a state; a final one has none."""
+"""Which states may follow a state; a final one has none. A job of a batch system that is interrupted waits again."""
 
 
 class Cause(StrEnum):

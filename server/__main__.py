@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from .settings import Caps, Settings, StartError, command
+from .settings import Caps, Settings, StartError, command, site_of
 from .store import Store
 from .tokens import SCOPES, TokenError, create_token
 
@@ -38,7 +38,9 @@ def _parser() -> argparse.ArgumentParser:
     add("--port", type=int, default=8750, help="0: any free port (default 8750)")
     add("--zenoh-port", type=int, default=7447, help="port of the Zenoh router; 0: any free port (default 7447)")
     add("--no-zenoh", action="store_true", help="no Zenoh router; clients watch over SSE")
-    add("--slots", type=int, help="ranks that may run at a time (default: the cores of this machine)")
+    add("--slots", type=int, help="ranks that may run at a time (default: the cores of this machine, or the site's)")
+    site = os.environ.get("CONOID_SITE")
+    add("--site", type=Path, default=site, help="the site's settings file: Slurm and its profiles [CONOID_SITE]")
     add("--no-auth", action="store_true", help="no tokens; only on a loopback address")
     add("--web", type=Path, help="folder of the live page, served at /")
     add("--mpiexec", default=os.environ.get("CONOID_MPIEXEC", ""), help="the site's own launcher [CONOID_MPIEXEC]")
@@ -86,7 +88,11 @@ def _token_commands(parser: argparse.ArgumentParser) -> None:
 
 def _settings(options: argparse.Namespace) -> Settings:
     given = {name: value for name, _, _ in _CAPS if (value := getattr(options, f"max_{name}")) is not None}
+    site = site_of(options.site)
     chosen = {"slots": options.slots} if options.slots is not None else {}
+    if site.launcher == "slurm" and site.slurm is not None:
+        chosen.setdefault("slots", site.slurm.slots)
+        given.setdefault("memory", None)
     if options.worker:
         chosen["worker"] = command(options.worker)
     return Settings(
@@ -101,6 +107,7 @@ def _settings(options: argparse.Namespace) -> Settings:
         grace=options.grace,
         end_runs=options.end_runs,
         caps=Caps(**given),
+        site=site,
         **chosen,
     )
 

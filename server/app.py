@@ -11,7 +11,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from . import errors, openapi, page
 from .bell import Bell
 from .history import Histories
+from .launch import Launcher
 from .launch.local import LocalLauncher
+from .launch.slurm import SlurmLauncher
 from .readiness import Readiness
 from .routes import cases, events, files, health, history, logs, me, runs, snapshots
 from .service import Service
@@ -59,13 +61,19 @@ def opened(settings: Settings) -> Iterator[Service]:
             telemetry = Telemetry(settings.runs, settings.host, settings.zenoh_port, tokens)
             stack.callback(telemetry.close)
         bell = Bell()
-        supervisor = Supervisor(settings, store, LocalLauncher(settings), telemetry, bell.ring)
+        supervisor = Supervisor(settings, store, launcher_of(settings), telemetry, bell.ring)
         supervisor.start()
         stack.callback(supervisor.close)
         if settings.end_runs:
             stack.callback(supervisor.end_all)
         desk, readiness = Desk(settings, store, supervisor), Readiness(settings, store)
         yield Service(settings, store, bell, telemetry, supervisor, desk, Histories(), readiness)
+
+
+def launcher_of(settings: Settings) -> Launcher:
+    """What the site's settings file names."""
+    site = settings.site
+    return SlurmLauncher(settings, site.slurm) if site.launcher == "slurm" and site.slurm else LocalLauncher(settings)
 
 
 def build_app(service: Service) -> FastAPI:

@@ -35,7 +35,21 @@ class Admitted:
 
 @dataclass(frozen=True)
 class Granted:
-    """Enough slots are free."""
+    """Enough slots are free. ``batch``: it goes on waiting, in the queue of a batch system."""
+
+    batch: bool = False
+
+
+@dataclass(frozen=True)
+class WorkerStarts:
+    """A batch system has given the worker its cores, at the Unix time ``at``."""
+
+    at: float
+
+
+@dataclass(frozen=True)
+class WorkerWaits:
+    """A batch system has taken the cores away; the worker goes on from its checkpoint when it gets some again."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +82,9 @@ class WorkerRuns:
 
 @dataclass(frozen=True)
 class CancelAsked:
-    """Its owner wants it to stop."""
+    """Its owner wants it to stop. ``handed``: a worker lives, or a batch system has the run."""
+
+    handed: bool = False
 
 
 @dataclass(frozen=True)
@@ -92,6 +108,8 @@ class WorkerExited:
     """Its disk is full, or it complained of it."""
     traces: str = ""
     """What it left for people in place of an outcome."""
+    reading: tuple[State, Cause, str] | None = None
+    """What a batch system says of an end without an outcome."""
 
 
 @dataclass(frozen=True)
@@ -112,6 +130,8 @@ Event = (
     | LaunchFailed
     | LaunchPutOff
     | Broken
+    | WorkerStarts
+    | WorkerWaits
     | WorkerRuns
     | CancelAsked
     | WallTimeOver

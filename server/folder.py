@@ -47,6 +47,8 @@ class Submission(msgspec.Struct, kw_only=True, frozen=True):
     estimate: dict[str, int | float]
     labels: dict[str, str] = {}
     """Words of the submitter."""
+    profile: str = ""
+    """Of the batch system; empty where there is none."""
 
 
 class Process(msgspec.Struct, kw_only=True, frozen=True):
@@ -182,13 +184,13 @@ def write_outcome(folder: Path, ended: Outcome) -> None:
 
 def write_stop(folder: Path, why: Cause) -> None:
     """Records that a stop was asked for. Raises OSError."""
-    durable.write(folder / layout.STOP, why.value.encode())
+    durable.write(folder / layout.STOP_REQUEST, why.value.encode())
 
 
 def stop_asked(folder: Path) -> Cause | None:
     """Why a stop was asked for; None when none was."""
     try:
-        return Cause((folder / layout.STOP).read_text())
+        return Cause((folder / layout.STOP_REQUEST).read_text())
     except (OSError, ValueError):
         return None
 

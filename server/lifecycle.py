@@ -27,6 +27,8 @@ from .events import (
     WallTimeOver,
     WorkerExited,
     WorkerRuns,
+    WorkerStarts,
+    WorkerWaits,
     WriteOutcome,
 )
 
@@ -47,26 +49,32 @@ def advance(run: Run, event: Event, now: float) -> Next:
     match event:
         case Admitted() if run.state is State.ACCEPTED:
             return _enter(run, State.QUEUED)
+        case Granted(batch=True) if run.state is State.QUEUED:
+            return run, (Launch(),)
         case Granted() if run.state is State.QUEUED:
             started, actions = _enter(replace(run, started=now), State.STARTING)
             return started, (*actions, Launch())
         case LaunchFailed() | LaunchPutOff() if run.state is State.STOPPING:
             return _exited(run, WorkerExited(None, None), now)
-        case LaunchFailed(message, cause) if run.state is State.STARTING:
+        case LaunchFailed(message, cause) if run.state in {State.QUEUED, State.STARTING}:
             return _end(run, now, Outcome(state=State.FAILED, cause=cause, message=message, ranks=run.ranks))
         case LaunchPutOff(message) if run.state is State.STARTING:
             return _enter(replace(run, started=0.0), State.QUEUED, message)
         case Broken():
             return _broken(run, event, now)
-        case WorkerRuns() if run.state is State.STARTING:
-            return replace(run, state=State.RUNNING), ()
-        case CancelAsked():
-            return _cancel(run, now)
+        case WorkerStarts(at) if run.state is State.QUEUED:
+            return replace(run, state=State.STARTING, started=at, message=""), ()
+        case WorkerWaits() if run.state in {State.STARTING, State.RUNNING}:
+            return replace(run, state=State.QUEUED, started=0.0), ()
+        case WorkerRuns() if run.state in {State.QUEUED, State.STARTING}:
+            return replace(run, state=State.RUNNING, started=run.started or now), ()
+        case CancelAsked(handed):
+            return _cancel(run, now, handed)
         case WallTimeOver() if run.state in {State.STARTING, State.RUNNING}:
             return _stop(run, Cause.WALLTIME)
         case GraceOver() if run.state is State.STOPPING:
             return run, (Kill(),)
-        case WorkerExited() if run.state in {State.STARTING, State.RUNNING, State.STOPPING}:
+        case WorkerExited() if run.state is not State.ACCEPTED:
             return _exited(run, event, now)
         case Found():
             return _found(run, event, now)
@@ -93,8 +101,8 @@ def _broken(run: Run, event: Broken, now: float) -> Next:
     return ended, (Kill(), *actions) if event.writable else (Kill(),)
 
 
-def _cancel(run: Run, now: float) -> Next:
-    if run.state in {State.ACCEPTED, State.QUEUED}:
+def _cancel(run: Run, now: float, handed: bool) -> Next:
+    if run.state is State.ACCEPTED or (run.state is State.QUEUED and not handed):
         message = "cancelled before it started"
         return _end(run, now, Outcome(state=State.CANCELLED, cause=Cause.CANCELLED, message=message, ranks=run.ranks))
     return (run, ()) if run.state is State.STOPPING else _stop(run, Cause.CANCELLED)
@@ -108,13 +116,17 @@ def _stop(run: Run, why: Cause) -> Next:
 def _exited(run: Run, event: WorkerExited, now: float) -> Next:
     told = event.outcome if event.outcome is not None and _readable(event.outcome) else None
     outcome = told or _without_outcome(run, event)
-    if outcome.state == State.CANCELLED and run.stopping_for is not Cause.CANCELLED:
-        outcome = _renamed(run, outcome)
+    asked = run.stopping_for is Cause.CANCELLED or (event.reading is not None and event.reading[1] is Cause.CANCELLED)
+    if outcome.state == State.CANCELLED and not asked:
+        outcome = _renamed(run, event, outcome)
     return _end(run, now, outcome, written=outcome is event.outcome)
 
 
-def _renamed(run: Run, outcome: Outcome) -> Outcome:
+def _renamed(run: Run, event: WorkerExited, outcome: Outcome) -> Outcome:
     """A worker knows that it was stopped, not by whom: what nobody asked for is no cancellation."""
+    if event.reading is not None:
+        state, cause, message = event.reading
+        return msgspec.structs.replace(outcome, state=state, cause=cause, message=message)
     if run.stopping_for is Cause.WALLTIME:
         state, message = State.TIMED_OUT, "its wall time is used up"
         return msgspec.structs.replace(outcome, state=state, cause=Cause.WALLTIME, message=message)
@@ -138,6 +150,8 @@ def _reading_of(run: Run, event: WorkerExited) -> tuple[State, Cause, str]:
     killed = event.code in {-_SIGKILL, _SIGKILL, 128 + _SIGKILL}
     if run.stopping_for is not None:
         return State.CANCELLED, Cause.CANCELLED, "stopped on request, without results"
+    if event.reading is not None:
+        return event.reading
     if killed and event.out_of_memory:
         return State.FAILED, Cause.MEMORY, "the machine ran out of memory and ended the worker"
     if killed:
@@ -150,7 +164,7 @@ def _reading_of(run: Run, event: WorkerExited) -> tuple[State, Cause, str]:
         return State.FAILED, Cause.PREEMPTED, "the worker was ended from outside"
     if event.code == ExitCode.PHYSICS:
         return State.FAILED, Cause.DIVERGED, "the computation failed"
-    if run.state is State.STARTING:
+    if run.state in {State.QUEUED, State.STARTING}:
         return State.FAILED, Cause.LAUNCH, f"the worker ended with code {event.code} before its first step"
     return State.FAILED, Cause.SERVICE, f"the worker ended with code {event.code} and left no readable outcome"
 
@@ -158,10 +172,10 @@ def _reading_of(run: Run, event: WorkerExited) -> tuple[State, Cause, str]:
 def _found(run: Run, event: Found, now: float) -> Next:
     if run.state is State.ACCEPTED:
         return _enter(run, State.QUEUED)
-    if run.state is State.QUEUED:
-        return run, ()
     if event.worker == "alive":
         return run, (Adopt(),)
+    if run.state is State.QUEUED:
+        return run, ()
     if event.outcome is not None and _readable(event.outcome):
         return _exited(run, WorkerExited(None, event.outcome), now)
     if event.worker == "none" and run.state is State.STARTING:

@@ -71,7 +71,7 @@ class Performer:
         try:
             folder.write_stop(path, why)
         except OSError as error:
-            _log.warning("run %s: %s cannot be written: %s", run_id, layout.STOP, error.strerror)
+            _log.warning("run %s: %s cannot be written: %s", run_id, layout.STOP_REQUEST, error.strerror)
         if run_id in self.watches:
             self.watches[run_id].stop(self._settings.grace)
 
@@ -93,16 +93,21 @@ class Performer:
         access = None if self._telemetry is None else self._telemetry.worker(run.owner, run.id)
         try:
             made = folder.submission(path)
-            for left in (layout.OUTCOME, layout.STOP):
+            for left in (layout.OUTCOME, layout.STOP_REQUEST):
                 (path / left).unlink(missing_ok=True)
-            worker = self._launcher.start(Job(run.id, run.ranks, path / made.case_file, path, access))
+            case = path / made.case_file
+            worker = self._launcher.start(Job(run.id, run.ranks, case, path, access, made.profile, made.wall_time))
         except (OSError, msgspec.MsgspecError) as error:
             raise LaunchError(str(error)) from error
         return self._watch(path, worker, made.wall_time)
 
     def _watch(self, path: Path, worker: Worker, allowed: float | None) -> Watch:
-        """The worker itself ends at ``run.max_wall_time``; the server steps in a grace later."""
-        left = None if allowed is None else allowed + self._settings.grace - folder.runs_for(path)
+        """The worker itself ends at ``run.max_wall_time``; the server steps in a grace later, a batch system at the
+        limit of the job.
+        """
+        left = (
+            None if allowed is None or self._launcher.queues else allowed + self._settings.grace - folder.runs_for(path)
+        )
         return Watch(path, worker, left)
 
 

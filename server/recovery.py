@@ -14,6 +14,8 @@ from .events import Found, Run
 from .folder import Submission
 from .launch import Launcher, Trace, Worker
 
+_STOPPABLE = {State.QUEUED, State.STARTING, State.RUNNING}
+
 
 @dataclass(frozen=True)
 class Left:
@@ -36,7 +38,7 @@ def look(path: Path, known: Run | None, launcher: Launcher) -> Left:
     accepted = folder.first(made) if made is not None else _as_accepted(known)
     told = journal.statuses(path / layout.JOURNAL)
     trace = launcher.find(accepted.id, path)
-    run = _mended(folder.replay(accepted, told), bool(told), known, path, trace)
+    run = _mended(folder.replay(accepted, told), bool(told), known, path, trace, launcher.queues)
     code, full = farewell.exit_code(path), farewell.disk_failed(path)
     found = Found(_fate(path, trace), folder.outcome(path), trace.rebooted, code, full)
     return Left(_stopping(run, known, path), made.idempotency_key if made else None, found, trace.worker)
@@ -61,12 +63,14 @@ def _fate(path: Path, trace: Trace) -> Literal["none", "alive", "gone"]:
     return "gone" if trace.launched or (path / layout.WORKER).exists() else "none"
 
 
-def _mended(run: Run, journal_there: bool, known: Run | None, path: Path, trace: Trace) -> Run:
-    """A run whose journal is gone, or says less than the machine: what has been launched is never launched twice."""
+def _mended(run: Run, journal_there: bool, known: Run | None, path: Path, trace: Trace, queues: bool) -> Run:
+    """A run whose journal is gone, or says less than the machine: what has been launched is never launched twice. One
+    that a batch system ``queues`` may still wait for its cores.
+    """
     if not journal_there and known is not None:
         run = replace(known, message="") if known.state is not State.STOPPING else replace(run, state=State.STARTING)
     launched = trace.worker is not None or (not journal_there and _launched(path, trace))
-    if launched and run.state in {State.ACCEPTED, State.QUEUED}:
+    if launched and not queues and run.state in {State.ACCEPTED, State.QUEUED}:
         return replace(run, state=State.STARTING)
     return run
 
@@ -77,6 +81,6 @@ def _launched(path: Path, trace: Trace) -> bool:
 
 def _stopping(run: Run, known: Run | None, path: Path) -> Run:
     why = folder.stop_asked(path) or (known.stopping_for if known is not None else None)
-    if why is None or run.state not in {State.STARTING, State.RUNNING}:
+    if why is None or run.state not in _STOPPABLE:
         return run
     return replace(run, state=State.STOPPING, stopping_for=why)

@@ -7,6 +7,8 @@ import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from conoid.cases.batch import Site, SiteError, read_site
+
 WORKER = (sys.executable, "-m", "mpi4py", "-m", "conoid.worker")
 """The worker's command after ``mpiexec -n N``; ``-m mpi4py`` makes one rank's exception end all ranks."""
 
@@ -71,6 +73,8 @@ class Settings:
     end_runs: bool = False
     """Cancel all runs when the server stops; otherwise workers go on, and the next server adopts them."""
     caps: Caps = field(default_factory=Caps)
+    site: Site = field(default_factory=Site)
+    """Who starts the runs, and which profiles of a batch system there are."""
 
     def __post_init__(self) -> None:
         if not self.auth and not loopback(self.host):
@@ -99,6 +103,14 @@ def loopback(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return False
+
+
+def site_of(path: Path | None) -> Site:
+    """The settings file of a site; without one, runs are started on this machine. Raises SettingsError."""
+    try:
+        return Site() if path is None else read_site(path)
+    except SiteError as error:
+        raise SettingsError(f"--site {error}") from None
 
 
 def command(text: str) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from typing import Any
 
 from sqlalchemy.exc import SQLAlchemyError
 
+from conoid.cases.batch import profile_of
 from conoid.cases.estimate import Estimate, estimate
 from conoid.cases.load import CaseError, Problem, json_data, parse_case, resolved_json, toml_data
 from conoid.cases.schema import Case
@@ -63,8 +64,9 @@ class Desk:
         return Reading(case, expected, data)
 
     def submit(
-        self, owner: str, body: bytes, content_type: str, key: str | None, labels: Mapping[str, str] | None = None
-    ) -> dict[str, Any]:
+        self, owner: str, body: bytes, content_type: str, key: str | None, labels: Mapping[str, str] | None = None,
+        profile: str = "",
+    ) -> dict[str, Any]:  # fmt: skip
         """Accepts a run and returns its receipt: the same one for the same key and body.
 
         Raises ServiceError. The case and the first line of the journal are on disk when this returns.
@@ -74,6 +76,7 @@ class Desk:
                 400, "bad_key", f"Idempotency-Key {key[:80]!r}: 1 to 255 visible ASCII characters",
                 pointer="Idempotency-Key",
             )  # fmt: skip
+        profile = self._profile(profile)
         digest = hashlib.sha256(_file_name(content_type).encode() + b"\0" + body).hexdigest()
         if earlier := self._earlier(owner, key, digest):
             return earlier
@@ -83,8 +86,20 @@ class Desk:
             raise invalid_case(error.problems) from None
         with self._lock:
             return self._earlier(owner, key, digest) or self._accept(
-                owner, body, content_type, key, digest, reading, labels or {}
+                owner, body, content_type, key, digest, reading, labels or {}, profile
             )
+
+    def _profile(self, name: str) -> str:
+        """The profile that is meant; empty where there is no batch system. Raises ServiceError 400."""
+        site = self._settings.site
+        try:
+            if site.launcher == "slurm" and site.slurm is not None:
+                return profile_of(site.slurm, name)[0]
+            if name:
+                raise ValueError(f"profile = {name[:40]!r}: this server starts runs itself; there are no profiles")
+        except ValueError as error:
+            raise ServiceError(400, "bad_parameter", str(error), pointer="profile") from None
+        return ""
 
     def _earlier(self, owner: str, key: str | None, digest: str) -> dict[str, Any] | None:
         run_id = self._store.run_of_key(owner, key) if key is not None else None
@@ -101,7 +116,7 @@ class Desk:
 
     def _accept(
         self, owner: str, body: bytes, content_type: str, key: str | None, digest: str, reading: Reading,
-        labels: Mapping[str, str],
+        labels: Mapping[str, str], profile: str,
     ) -> dict[str, Any]:  # fmt: skip
         caps, case = self._settings.caps, reading.case
         limits.check_room(self._settings.runs, self._store.open_runs(owner), caps)
@@ -110,7 +125,7 @@ class Desk:
             id=run_id, owner=owner, name=case.name, title=case.title, ranks=case.run.ranks, submitted=now,
             case_file=_file_name(content_type), body_sha256=digest, idempotency_key=key,
             wall_time=limits.wall_time(case, caps), estimate=limits.figures(reading.estimate),
-            labels=dict(labels),
+            labels=dict(labels), profile=profile,
         )  # fmt: skip
         run = Run(run_id, owner, case.name, case.run.ranks, now)
         try:

@@ -61,6 +61,7 @@ class Supervisor:
         self._open: dict[str, Run] = {}
         self._hands = Performer(settings, launcher, telemetry)
         self._watches = self._hands.watches
+        self._batch = launcher.queues
         self._holds = Holds()
         self._index = Index(store)
         self._left: dict[Path, str] = {}
@@ -125,9 +126,12 @@ class Supervisor:
         return sum(run.ranks for run_id in tuple(self._watches) if (run := self._open.get(run_id)))
 
     def reason(self, run_id: str) -> str:
-        """What a queued run waits for; empty for any other."""
+        """What a queued run waits for, and what a batch system has to say of any; else empty."""
         if why := self._holds.why(run_id):
             return f"tried again soon: {why}"
+        watch = self._watches.get(run_id)
+        if watch is not None and (note := watch.worker.note()):
+            return note
         return waiting.reason(run_id, tuple(self._open.values()), self.slots_used(), self._settings.slots)
 
     def _in_state(self, state: State) -> list[Run]:
@@ -168,7 +172,7 @@ class Supervisor:
         except queue.Empty:
             return
         if asked is not None:
-            failed = self._apply(asked.run, CancelAsked())
+            failed = self._apply(asked.run, CancelAsked(handed=asked.run in self._watches))
             asked.done.set_exception(failed) if failed else asked.done.set_result(None)
 
     def _attend(self, run_id: str) -> None:
@@ -185,18 +189,19 @@ class Supervisor:
 
     def _grant(self) -> None:
         """Starts the first of the queue while it fits: a large run is not overtaken by small ones for ever. One that
-        cannot be started now holds nobody up; nothing is announced that could not be written."""
+        cannot be started now holds nobody up; nothing is announced that could not be written.
+        """
         for run in self._in_state(State.QUEUED):
-            if self._holds.held(run.id):
+            if run.id in self._watches or self._holds.held(run.id):
                 continue
             if self.slots_used() + run.ranks > self._settings.slots:
                 return
             try:
                 self._hands.probe(run.id)
             except OSError as error:
-                self._fail(run, Granted(), error)
+                self._fail(run, Granted(self._batch), error)
             else:
-                self._apply(run.id, Granted())
+                self._apply(run.id, Granted(self._batch))
 
     def _apply(self, run_id: str, event: Event) -> Exception | None:
         """One step of a run; what kept it from being made, if anything.

@@ -69,7 +69,7 @@ def brief(service: Service, run: Run) -> dict[str, Any]:
         "state": run.state,
         "cause": run.cause,
         "message": run.message,
-        "reason": service.supervisor.reason(run.id) if run.state is State.QUEUED else "",
+        "reason": service.supervisor.reason(run.id),
         "ranks": run.ranks,
         "submitted": run.submitted,
         "started": run.started or None,

@@ -12,12 +12,14 @@ from conoid.cases.messages import Progress, Status
 from conoid.cases.run import State
 
 from . import farewell, folder, journal
-from .events import Event, GraceOver, WallTimeOver, WorkerExited, WorkerRuns
-from .launch import Worker
+from .events import Event, GraceOver, WallTimeOver, WorkerExited, WorkerRuns, WorkerStarts, WorkerWaits
+from .launch import Phase, Worker
 
 _FAREWELL = 10.0
 """s that a worker may take to leave after it has said that it finished; its launcher may hang when a helper of it was
 killed from outside."""
+_PATIENCE = 1.0
+"""s between two looks at a worker that waits for its cores in a queue, of which there may be a thousand. Chosen."""
 
 _progress = msgspec.json.Decoder(Progress)
 _status = msgspec.json.Decoder(Status)
@@ -32,20 +34,28 @@ class Watch:
         self._tail = journal.Tail(run_folder / layout.JOURNAL)
         self._deadline = None if left is None else time.monotonic() + left
         self._kill_at, self._runs = float("inf"), False
+        self._phase: Phase = "unknown"
+        self._next = 0.0
         self.progress: Progress | None = None
         self.news = False
         """True when the last look found new lines in the journal."""
 
     def look(self) -> Iterator[Event]:
         """What has happened since the last look. Raises OSError."""
-        now, exit_ = time.monotonic(), self.worker.exited()
+        now = time.monotonic()
+        if self._phase == self.worker.phase() == "waits" and now < self._next:
+            return
+        self._next = now + _PATIENCE
+        exit_ = self.worker.exited()
+        yield from self._turn()
         if self._read(now):
             yield WorkerRuns()
         if exit_ is not None:
             told = folder.outcome(self._folder)
             code = farewell.exit_code(self._folder) if exit_.code is None else exit_.code
             full = told is None and farewell.disk_failed(self._folder)
-            yield WorkerExited(code, told, exit_.out_of_memory, full, self._traces(exit_.last_words))
+            traces = self._traces(exit_.last_words)
+            yield WorkerExited(code, told, exit_.out_of_memory, full, traces, exit_.reading)
         elif now >= self._kill_at:
             self._kill_at = now + 1.0
             self.worker.kill()
@@ -53,6 +63,15 @@ class Watch:
         elif self._deadline is not None and now >= self._deadline:
             self._deadline = None
             yield WallTimeOver()
+
+    def _turn(self) -> Iterator[Event]:
+        """Whether the worker has got its cores, or has to wait for them again."""
+        phase, before = self.worker.phase(), self._phase
+        self._phase = phase
+        if phase == "waits":
+            self._runs = False
+        if phase != before and phase != "unknown":
+            yield WorkerWaits() if phase == "waits" else WorkerStarts(self.worker.began())
 
     def stop(self, grace: float) -> None:
         """Asks the worker to stop, and sets the time at which it is killed."""
@@ -72,6 +91,7 @@ class Watch:
                 if line.type == "progress":
                     with suppress(msgspec.MsgspecError):
                         self.progress = _progress.decode(line.raw)
+                    runs |= self._phase != "waits"
                 elif line.type == "status":
                     with suppress(msgspec.MsgspecError):
                         runs |= _status.decode(line.raw).state == State.RUNNING

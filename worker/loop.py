@@ -86,6 +86,7 @@ class Loop:
         self.sim = sim
         self.energy: Energy | None = None
         self.stopped = 0
+        self._told = False
         self._folder = folder
         self._journal = journal
         self._history = history
@@ -177,13 +178,14 @@ class Loop:
         """What this rank gives to the next reduction."""
         sim, own, now = self.sim, self.sim.reduction.own, time.monotonic()
         limit = sim.case.run.max_wall_time
-        stop = CANCELLED if self._signals.raised else 0
+        own.report = sim.comm.rank == 0 and now - self._reported > _REPORT_EVERY
+        self._told |= sim.comm.rank == 0 and own.report and (self._folder / layout.STOP_REQUEST).exists()
+        stop = CANCELLED if self._signals.raised or self._told else 0
         if limit is not None and now - self._began > limit:
             stop = WALL_TIME
         if sim.clock.step + 1 >= sim.case.run.max_steps:
             stop = MAX_STEPS
         own.stop = stop
-        own.report = sim.comm.rank == 0 and now - self._reported > _REPORT_EVERY
         own.groups = own.report and self._groups.due(sim.clock.t, now)
         own.grown = self.balance.grown(sim)
         own.snapshot = (

@@ -7,9 +7,9 @@ import sys
 import time
 import traceback
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from conoid.cases import layout, load, messages
+from conoid.cases import layout, load, messages, whole
 from conoid.cases import outcome as outcomes
 from conoid.cases.outcome import Outcome
 from conoid.cases.problems import CaseError
@@ -19,6 +19,7 @@ from conoid.cases.schema import Case
 from . import compile as ahead
 from . import kernels
 from .errors import CompileError, ConoidError
+from .lock import hold
 from .output import storage
 from .output.journal import Journal
 from .parallel.comm import Comm
@@ -29,6 +30,10 @@ if TYPE_CHECKING:
     from .output.telemetry import Telemetry
 
 log = logging.getLogger("conoid.worker")
+
+_WRONG_SIZE = (
+    "MPI has started {} rank(s) where {} were asked for: mpiexec or srun (--mpi=pmi2) does not fit the MPI in use"
+)
 
 _CODES = {
     State.SUCCEEDED: ExitCode.SUCCEEDED,
@@ -55,14 +60,20 @@ def main(arguments: list[str]) -> int:
 
 
 def _run(options: argparse.Namespace, comm: Comm, signals: Signals, began: float) -> int:
-    _prepare_folder(options.out, comm)
+    if options.ranks is not None and comm.size != options.ranks:
+        print(_WRONG_SIZE.format(comm.size, options.ranks), file=sys.stderr)
+        return ExitCode.CRASHED
+    lock = _prepare_folder(options.out, comm)
+    if not lock:
+        print(f"{options.out}: another worker writes into this folder", file=sys.stderr)
+        return ExitCode.CRASHED
     telemetry = journal = None
     if comm.rank == 0:
         telemetry = _telemetry(options)
         journal = Journal(options.out, options.run or options.out.resolve().name, telemetry)
     outcome, code = _outcome(options, comm, journal, signals, began)
     if journal is not None:
-        _close(outcome, options.out, journal, telemetry)
+        _close(outcome, options, journal, telemetry)
     comm.barrier()
     return code
 
@@ -105,6 +116,11 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("--restart", action="store_true", help="go on from the latest checkpoint in the run folder")
     parser.add_argument("--run", help="the run's id; the folder's name when absent")
     parser.add_argument("--telemetry", metavar="ENDPOINT", help="a Zenoh router, such as tcp/127.0.0.1:7447")
+    parser.add_argument("--ranks", type=int, help="end at once when MPI has started another number of ranks")
+    parser.add_argument(
+        "--interruptible", action="store_true",
+        help=f"a stop that {layout.STOP_REQUEST} does not ask for leaves a checkpoint and no outcome: the run goes on",
+    )  # fmt: skip
     parser.add_argument("--prefix", help="key prefix of the run, conoid/v1/<owner>/<run>")
     options = parser.parse_args(arguments)
     if (options.telemetry is None) != (options.prefix is None):
@@ -136,15 +152,20 @@ def _read(options: argparse.Namespace, ranks: int) -> Case:
     return load.parse_case(load.apply_overrides(load.read_data(path), overrides))
 
 
-def _prepare_folder(folder: Path, comm: Comm) -> None:
+def _prepare_folder(folder: Path, comm: Comm) -> Any:
+    """What holds the folder's lock while it lives on rank 0, True elsewhere; None when another worker has it."""
+    held: Any = True
     if comm.rank == 0:
         (folder / layout.LOGS).mkdir(parents=True, exist_ok=True)
-    comm.barrier()
+        held = hold(folder)
+    if not comm.broadcast(held is not None):
+        return None
     logging.basicConfig(
         filename=layout.rank_log(folder, comm.rank), level=logging.INFO,
         format="%(asctime)s %(levelname)s %(message)s", force=True,
     )  # fmt: skip
     log.info("rank %d of %d, process %d", comm.rank, comm.size, os.getpid())
+    return held
 
 
 def _compute(
@@ -182,25 +203,22 @@ def _say(journal: Journal | None, what: str) -> None:
         journal.starting(what)
 
 
-def _close(outcome: Outcome, folder: Path, journal: Journal, telemetry: "Telemetry | None") -> None:
-    """The outcome first, then the last message: whoever hears of the end finds it on disk."""
-    _write_outcome(folder, outcome)
-    journal.write(
-        messages.Finished, outcome.steps, outcome.time, state=outcome.state, digest=outcome.digest,
-        steps=outcome.steps, elapsed=outcome.elapsed,
-    )  # fmt: skip
+def _close(outcome: Outcome, options: argparse.Namespace, journal: Journal, telemetry: "Telemetry | None") -> None:
+    """The outcome first, then the last message: whoever hears of the end finds it on disk.
+
+    An interrupted run has not ended: worker/job.py finds out what has interrupted it.
+    """
+    interrupted = options.interruptible and outcome.state == State.CANCELLED
+    if interrupted and not (options.out / layout.STOP_REQUEST).exists():
+        whole.write(options.out / layout.INTERRUPTED, outcomes.to_json(outcome))
+    else:
+        whole.write(options.out / layout.OUTCOME, outcomes.to_json(outcome))
+        journal.write(
+            messages.Finished, outcome.steps, outcome.time, state=outcome.state, digest=outcome.digest,
+            steps=outcome.steps, elapsed=outcome.elapsed,
+        )  # fmt: skip
     journal.close()
     if telemetry is not None:
         telemetry.close()
     if outcome.message:
         print(outcome.message, file=sys.stderr)
-
-
-def _write_outcome(folder: Path, outcome: Outcome) -> None:
-    """Written beside, flushed to disk, renamed: it is there whole or not at all."""
-    beside = folder / (layout.OUTCOME + ".part")
-    with beside.open("wb") as file:
-        file.write(outcomes.to_json(outcome))
-        file.flush()
-        os.fsync(file.fileno())
-    beside.rename(folder / layout.OUTCOME)

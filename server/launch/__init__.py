@@ -2,7 +2,14 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Literal, Protocol
+
+from conoid.cases.run import Cause, State
+
+Phase = Literal["unknown", "waits", "runs"]
+"""Of a worker: whether it waits for cores or has them. A batch system that cannot be reached says nothing new."""
+Reading = tuple[State, Cause, str]
+"""What an end means that the worker has left no outcome of: state, cause, message."""
 
 
 class LaunchError(Exception):
@@ -28,6 +35,10 @@ class Job:
     case: Path
     folder: Path
     telemetry: Access | None
+    profile: str = ""
+    """Of the batch system; empty: the site's default."""
+    wall_time: float | None = None
+    """s that the run may take from its start."""
 
 
 @dataclass(frozen=True)
@@ -37,10 +48,21 @@ class Exit:
     code: int | None
     out_of_memory: bool
     last_words: str
+    reading: Reading | None = None
+    """Where somebody knows better than the code tells: a batch system."""
 
 
 class Worker(Protocol):
-    """A worker that was started: all its ranks, as one."""
+    """A worker that was started, or handed to a batch system: all its ranks, as one. No method waits."""
+
+    def phase(self) -> Phase:
+        """What is known of it by now."""
+
+    def began(self) -> float:
+        """The Unix time at which it got its cores, s; 0 when it has none."""
+
+    def note(self) -> str:
+        """What people should know of it beyond its state: why it waits, who does not answer; empty for nothing."""
 
     def exited(self) -> Exit | None:
         """None while any of its processes lives."""
@@ -64,6 +86,9 @@ class Trace:
 
 class Launcher(Protocol):
     """A way to run workers."""
+
+    queues: bool
+    """True when workers wait for cores in a queue that is not the server's."""
 
     def start(self, job: Job) -> Worker:
         """Starts the ranks and records them in the run's folder. Raises LaunchError."""

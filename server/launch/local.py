@@ -15,7 +15,7 @@ from conoid.cases import layout
 from .. import folder as run_folder
 from ..folder import Process
 from ..settings import Settings, command, usable_cores
-from . import Exit, Job, LaunchError, Trace, Worker, processes
+from . import Exit, Job, LaunchError, Phase, Trace, Worker, processes
 
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _NOT_FOR_WORKERS = ("CONOID_DATABASE", "CONOID_TOKEN")
@@ -32,6 +32,8 @@ _HOUR = 3600.0
 
 class LocalLauncher:
     """Starts ``mpiexec -n N <worker> CASE --out DIR ...``."""
+
+    queues = False
 
     def __init__(self, settings: Settings) -> None:
         """Takes the two commands from ``settings``."""
@@ -103,7 +105,7 @@ def environment(base: Mapping[str, str], job: Job) -> dict[str, str]:
 
 
 def _arguments(job: Job) -> list[str]:
-    arguments = [str(job.case), "--out", str(job.folder), "--run", job.run]
+    arguments = [str(job.case), "--out", str(job.folder), "--run", job.run, "--ranks", str(job.ranks)]
     if any((job.folder / layout.CHECKPOINTS).glob("*[0-9]")):
         arguments.append("--restart")
     if job.telemetry is not None:
@@ -129,6 +131,18 @@ class LocalWorker:
         if self._child is not None:
             return self._child.poll() is None
         return processes.start_time(self.process.pid) == self.process.started
+
+    def phase(self) -> Phase:
+        """Its cores are there from the start."""
+        return "runs"
+
+    def began(self) -> float:
+        """When it was launched, Unix s."""
+        return self.process.launched
+
+    def note(self) -> str:
+        """There is nothing to add."""
+        return ""
 
     def exited(self) -> Exit | None:
         """None while ``mpiexec`` lives. Ranks that it left behind are killed, so that nobody writes any more."""

@@ -32,10 +32,11 @@ def submit(
     content_type: Annotated[str, Header()] = "",
     idempotency_key: Annotated[str | None, Header()] = None,
     label: Annotated[list[str] | None, Query(description="NAME=VALUE, by which the run is found again")] = None,
+    profile: Annotated[str, Query(description="of the site's batch system; the site's default when empty")] = "",
 ) -> Response:
     """Takes a case as TOML or JSON. The same Idempotency-Key and body give the same run and the same answer."""
     labels = labels_of(label or ())
-    receipt = service.desk.submit(identity.owner, body, content_type, idempotency_key, labels)
+    receipt = service.desk.submit(identity.owner, body, content_type, idempotency_key, labels, profile)
     return JSONResponse(receipt, 202, {"Location": receipt["url"]})
 
 

@@ -90,6 +90,9 @@ def main() -> int:
     parser.add_argument("--run")
     parser.add_argument("--telemetry")
     parser.add_argument("--prefix")
+    parser.add_argument("--ranks")
+    parser.add_argument("--set")
+    parser.add_argument("--interruptible", action="store_true")
     options = parser.parse_args()
     if os.environ.get("PMI_RANK", "0") != "0":
         return 0

@@ -26,6 +26,9 @@ def main() -> int:
     parser.add_argument("--run")
     parser.add_argument("--telemetry")
     parser.add_argument("--prefix")
+    parser.add_argument("--ranks")
+    parser.add_argument("--set")
+    parser.add_argument("--interruptible", action="store_true")
     options = parser.parse_args()
     rank = int(os.environ.get("PMI_RANK", "0"))
     (options.out / layout.LOGS / f"rank-{rank}.log").write_text(f"rank {rank} says hello\n")
@@ -36,7 +39,8 @@ def run(options: argparse.Namespace) -> int:
     text = options.case.read_text()
     case = tomllib.loads(text) if options.case.suffix == ".toml" else json.loads(text)
     plan = json.loads(case.get("description") or "{}")
-    signal.signal(signal.SIGTERM, signal.SIG_IGN if plan.get("end") == "deaf" else ask_to_stop)
+    for number in (signal.SIGTERM, signal.SIGUSR1):
+        signal.signal(number, signal.SIG_IGN if plan.get("end") == "deaf" else ask_to_stop)
     (options.out / "environment.json").write_text(json.dumps(dict(os.environ)))
     journal = options.out / layout.JOURNAL
     seq = messages.from_json(journal.read_bytes().splitlines()[-1]).seq

@@ -18,7 +18,7 @@ from conoid.cases.messages import Status
 from conoid.server import folder, journal
 from conoid.server.events import Run
 from conoid.server.folder import Process, Submission
-from conoid.server.launch import Exit, Job, LaunchError, Trace, Worker
+from conoid.server.launch import Exit, Job, LaunchError, Phase, Trace, Worker
 from conoid.server.settings import Settings
 from conoid.server.store import Store
 from conoid.server.supervisor import Supervisor
@@ -119,6 +119,18 @@ class Puppet:
     stopped: bool = False
     looks: int = 0
 
+    def phase(self) -> Phase:
+        """It has its cores from the start."""
+        return "runs"
+
+    def began(self) -> float:
+        """Nobody asks."""
+        return 0.0
+
+    def note(self) -> str:
+        """There is nothing to add."""
+        return ""
+
     def exited(self) -> Exit | None:
         """Runs at the second look, ends at the fourth, or when it is asked to stop."""
         plan, _current.plan = _current.plan, None
@@ -156,6 +168,7 @@ class Puppets:
     ends: str = "succeeded"
     refuses: bool = False
     made: list[Puppet] = field(default_factory=list)
+    queues: bool = False
 
     def start(self, job: Job) -> Worker:
         """Like a real launcher: starts, then records."""

@@ -24,6 +24,8 @@ from conoid.server.events import (
     WallTimeOver,
     WorkerExited,
     WorkerRuns,
+    WorkerStarts,
+    WorkerWaits,
     WriteOutcome,
 )
 from conoid.server.lifecycle import advance
@@ -34,14 +36,19 @@ STOPPED = Outcome(state="cancelled", cause="cancelled")
 EVENTS: list[Event] = [
     Admitted(),
     Granted(),
+    Granted(batch=True),
     LaunchFailed("no mpiexec"),
+    WorkerStarts(4.0),
+    WorkerWaits(),
     WorkerRuns(),
     CancelAsked(),
+    CancelAsked(handed=True),
     WallTimeOver(),
     GraceOver(),
     WorkerExited(0, DONE),
     WorkerExited(4, STOPPED),
     WorkerExited(1, None),
+    WorkerExited(None, None, reading=(State.TIMED_OUT, Cause.WALLTIME, "job 7 has reached its time limit")),
     WorkerExited(0, Outcome(state="running")),
     Found("none"),
     Found("alive"),
@@ -78,6 +85,31 @@ def test_the_straight_way() -> None:
     run, actions = advance(run, WorkerExited(0, DONE), 4.0)
     assert (run.state, run.cause, run.finished) == (State.SUCCEEDED, None, 4.0)
     assert actions == (Journal(State.SUCCEEDED),)
+
+
+def test_the_way_through_a_batch_system() -> None:
+    """The job's own writes the journal; wall time counts from its start, and it may wait more than once."""
+    run, actions = advance(replace(RUN, state=State.QUEUED), Granted(batch=True), 2.0)
+    assert (run.state, run.started, actions) == (State.QUEUED, 0.0, (Launch(),))
+    run, actions = advance(run, WorkerStarts(50.0), 51.0)
+    assert (run.state, run.started, actions) == (State.STARTING, 50.0, ())
+    run, actions = advance(run, WorkerRuns(), 52.0)
+    assert (run.state, run.started, actions) == (State.RUNNING, 50.0, ())
+    run, actions = advance(run, WorkerWaits(), 60.0)
+    assert (run.state, run.started, actions) == (State.QUEUED, 0.0, ())
+    run, actions = advance(run, CancelAsked(handed=True), 70.0)
+    assert (run.state, actions) == (State.STOPPING, (Stop(Cause.CANCELLED),))
+    run, actions = advance(run, WorkerExited(None, None), 71.0)
+    assert (run.state, run.cause) == (State.CANCELLED, Cause.CANCELLED)
+
+
+@pytest.mark.parametrize("before", [State.QUEUED, State.STARTING, State.RUNNING])
+def test_a_batch_system_says_what_the_folder_does_not(before: State) -> None:
+    reading = (State.TIMED_OUT, Cause.WALLTIME, "job 7 has reached its time limit")
+    run, _ = advance(replace(RUN, state=before), WorkerExited(15, None, reading=reading), 5.0)
+    assert (run.state, run.cause, run.message) == reading
+    run, _ = advance(replace(RUN, state=before), WorkerExited(15, DONE, reading=reading), 5.0)
+    assert run.state is State.SUCCEEDED
 
 
 def test_cancel_before_the_start_needs_no_worker() -> None:
@@ -142,6 +174,7 @@ def test_an_end_without_outcome_is_never_a_success(
     [
         (State.ACCEPTED, Found("none"), State.QUEUED, None, Journal(State.QUEUED)),
         (State.QUEUED, Found("none"), State.QUEUED, None, None),
+        (State.QUEUED, Found("alive"), State.QUEUED, None, Adopt()),
         (State.STARTING, Found("none"), State.QUEUED, None, Journal),
         (State.STARTING, Found("alive"), State.STARTING, None, Adopt()),
         (State.RUNNING, Found("alive"), State.RUNNING, None, Adopt()),

@@ -1,0 +1,212 @@
+"""A run as a job of a batch system: the site's profiles, the record in the run's folder, the script, sbatch's words.
+
+A site's settings file::
+
+    launcher = "slurm"                # who starts runs of the server: "local" (default) or "slurm"
+    [slurm]
+    default = "standard"              # the profile of those who name none
+    router = "tcp/login1:7447"        # the server's Zenoh router as compute nodes reach it
+    [slurm.profiles.standard]
+    partition = "compute"
+    time = "12 h"
+    modules = ["gcc/13"]
+
+Users name a profile and add nothing to it: what a job runs is in ``job.json``, and the script only reads it.
+"""
+
+import re
+import secrets
+import shlex
+import tomllib
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+
+from . import layout
+from .units import parse_quantity
+
+
+class SiteError(Exception):
+    """The settings file cannot be used; the text is one line."""
+
+
+class Profile(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """One way of asking the batch system for cores."""
+
+    partition: str = ""
+    account: str = ""
+    qos: str = ""
+    time: str = ""
+    """The time limit of a job, such as ``12 h``; empty: the partition's."""
+    modules: list[str] = []
+    """That ``module load`` gets."""
+    mpi: Literal["mpiexec", "srun"] = "mpiexec"
+    """What starts the ranks inside the job."""
+    mpiexec: str = ""
+    """A site's own; empty: the one that Conoid finds."""
+    lines: list[str] = []
+    """Of the script, before the run: what the site's MPI or file system needs."""
+    options: list[str] = []
+    """Further words for sbatch."""
+    notice: str = "120 s"
+    """How long before the time limit a run is told to keep its state. Chosen: some checkpoints of the largest runs."""
+
+
+class Slurm(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """A site's Slurm."""
+
+    profiles: dict[str, Profile]
+    default: str = ""
+    """The profile of those who name none; empty: the first."""
+    bin: str = ""
+    """Folder of sbatch, squeue, scancel, scontrol; empty: they are in PATH."""
+    router: str = ""
+    """The server's Zenoh router as compute nodes reach it; empty: the address of this machine alone."""
+    poll: float = 2.0
+    """s between two looks at the queue: one squeue for all runs. Chosen."""
+    slots: int = 100_000
+    """Ranks that the server hands over at a time, pending ones included. Chosen: Slurm has the limits."""
+
+
+class Site(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """What a site decides about how runs are started."""
+
+    launcher: Literal["local", "slurm"] = "local"
+    slurm: Slurm | None = None
+
+
+class Job(msgspec.Struct, kw_only=True, frozen=True):
+    """job.json: what a job of the batch system runs. It is on disk before the batch system hears of it."""
+
+    run: str
+    name: str
+    """Of the job; no other job has it, so that a job is found whose number nobody could note."""
+    attempt: int
+    ranks: int
+    profile: str
+    command: list[str]
+    """Starts the ranks, without ``--restart``."""
+    submitted: float
+    """Unix s."""
+    notice: float
+    """s before the time limit at which the run is told."""
+    job: str = ""
+    """The number that the batch system gave; empty until it is known."""
+    accounting: dict[str, str] = {}
+    """What the batch system tells of a job that has ended."""
+
+
+class Access(msgspec.Struct, kw_only=True, frozen=True):
+    """Where the ranks of a job publish, and as whom; in a hidden file that only its owner may read."""
+
+    endpoint: str
+    prefix: str
+    user: str = ""
+    password: str = ""
+
+
+_job, _access = msgspec.json.Decoder(Job), msgspec.json.Decoder(Access)
+_TEMPLATE = """#!/bin/bash
+# One attempt of a run, written by Conoid: $1 is the run's folder, $2 the name of the job. The rest is in job.json.
+{lines}exec {python} -m conoid.worker.job "$1" "$2"
+"""
+
+
+def read_site(path: Path) -> Site:
+    """The settings file of a site. Raises SiteError."""
+    try:
+        site = msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), Site)
+        if site.slurm is not None:
+            _check(site.slurm)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise SiteError(f"{path}: {reason}") from None
+    if site.launcher == "slurm" and site.slurm is None:
+        raise SiteError(f'{path}: launcher = "slurm" needs a table [slurm]')
+    return site
+
+
+def _check(slurm: Slurm) -> None:
+    if not slurm.profiles:
+        raise ValueError("slurm.profiles: at least one is needed")
+    profile_of(slurm, "")
+    for name, profile in slurm.profiles.items():
+        if not re.fullmatch(r"[A-Za-z0-9_-]{1,32}", name):
+            raise ValueError(f"slurm.profiles.{name}: allowed: 1 to 32 letters, digits, '_' and '-'")
+        for text in (profile.time, profile.notice):
+            _seconds(text)
+
+
+def profile_of(slurm: Slurm, name: str) -> tuple[str, Profile]:
+    """The profile of that name, or the default one. Raises ValueError with those that there are."""
+    chosen = name or slurm.default or next(iter(slurm.profiles))
+    if chosen not in slurm.profiles:
+        raise ValueError(f"profile = {chosen[:40]!r}: allowed: {', '.join(slurm.profiles)}")
+    return chosen, slurm.profiles[chosen]
+
+
+def _seconds(text: str) -> float:
+    return parse_quantity(text, "s") if text else 0.0
+
+
+def new_job(
+    run: str, ranks: int, profile: tuple[str, Profile], command: list[str], now: float, attempt: int = 1
+) -> Job:
+    """The record of an attempt that nobody has handed over yet."""
+    word = re.sub(r"[^A-Za-z0-9_.-]", "_", run)[:60]
+    return Job(
+        run=run, name=f"conoid-{word}-{attempt}-{secrets.token_hex(4)}", attempt=attempt, ranks=ranks,
+        profile=profile[0], command=command, submitted=now, notice=_seconds(profile[1].notice),
+    )  # fmt: skip
+
+
+def script(profile: Profile, python: str) -> str:
+    """The batch script: the site's lines, then the run. Nothing in it depends on the run or on its owner."""
+    modules = [f"module load {shlex.quote(module)}" for module in profile.modules]
+    lines = "".join(f"{line}\n" for line in [*modules, *profile.lines])
+    return _TEMPLATE.format(lines=lines, python=shlex.quote(python))
+
+
+def sbatch_words(job: Job, profile: Profile, folder: Path) -> list[str]:
+    """The arguments of sbatch. TERM reaches the script alone ``notice`` before the limit; the script's program tells
+    the ranks.
+    """
+    log = folder / layout.LOGS / layout.LAUNCHER_LOG
+    words = [
+        "--parsable", f"--job-name={job.name}", f"--ntasks={job.ranks}", f"--chdir={folder}", f"--output={log}",
+        "--open-mode=append", "--requeue", "--export=ALL", f"--signal=B:TERM@{job.notice:.0f}",
+    ]  # fmt: skip
+    named = (("partition", profile.partition), ("account", profile.account), ("qos", profile.qos))
+    words += [f"--{option}={value}" for option, value in named if value]
+    if profile.time:
+        words.append(f"--time={max(1, round(_seconds(profile.time) / 60.0))}")
+    return [*words, *profile.options, str(folder / layout.JOB_SCRIPT), str(folder), job.name]
+
+
+def starter(profile: Profile, ranks: int, mpiexec: list[str]) -> list[str]:
+    """What starts ``ranks`` ranks inside a job, before the worker's command. PMI2 is what the wheel of MPICH speaks."""
+    if profile.mpi == "srun":
+        return ["srun", "--mpi=pmi2", f"--ntasks={ranks}"]
+    return [*(shlex.split(profile.mpiexec) or mpiexec), "-n", str(ranks)]
+
+
+def read_job(folder: Path) -> Job | None:
+    """The record in a run's folder; None when there is none. Raises OSError, msgspec.MsgspecError."""
+    try:
+        return _job.decode((folder / layout.JOB).read_bytes())
+    except FileNotFoundError:
+        return None
+
+
+def read_access(folder: Path) -> Access | None:
+    """Where the ranks publish; None: nowhere. Raises OSError, msgspec.MsgspecError."""
+    try:
+        return _access.decode((folder / layout.ACCESS).read_bytes())
+    except FileNotFoundError:
+        return None
+
+
+def to_json(record: Job | Access) -> bytes:
+    """As it stands in the folder."""
+    return msgspec.json.format(msgspec.json.encode(record), indent=2)

@@ -1,0 +1,204 @@
+"""A run that was handed to Slurm. Its number is its identity; its folder says how it ends, Slurm how it waits."""
+
+import time
+from pathlib import Path
+
+import msgspec
+
+from conoid.cases import batch, layout, slurm, whole
+from conoid.cases.batch import Job
+from conoid.cases.run import Cause, State
+from conoid.cases.slurm import Entry
+
+from . import Exit, Phase, Reading
+
+_LAG = 5.0
+"""s after the end of a job in which its last files may still come over a network file system. Chosen."""
+_LATE = 10.0
+"""s after which an outcome of a run that nobody writes to is its end, whatever Slurm says or does not say. Chosen."""
+_MOST = 20
+"""Jobs that are handed over for one run, one after the other, because the one before was lost. Chosen."""
+_READINGS: dict[str, Reading] = {
+    "CANCELLED": (State.CANCELLED, Cause.CANCELLED, "was cancelled"),
+    "TIMEOUT": (State.TIMED_OUT, Cause.WALLTIME, "has reached its time limit"),
+    "DEADLINE": (State.TIMED_OUT, Cause.WALLTIME, "has missed its deadline"),
+    "OUT_OF_MEMORY": (State.FAILED, Cause.MEMORY, "has used more memory than it has"),
+    "BOOT_FAIL": (State.LOST, Cause.NODE, "has lost its node"),
+    "NODE_FAIL": (State.LOST, Cause.NODE, "has lost its node"),
+    "REVOKED": (State.LOST, Cause.NODE, "was revoked"),
+}
+
+
+class SlurmWorker:
+    """Its first methods may be called from any thread and wait for nothing; ``turn`` belongs to the launcher's."""
+
+    def __init__(self, folder: Path, job: Job, site: batch.Slurm) -> None:
+        """``job`` may be one that an earlier server has handed over, or was about to."""
+        self._folder, self._job, self._site = folder, job, site
+        self._entry: Entry | None = None
+        self._exit: Exit | None = None
+        self._stop, self._kill, self._told = (folder / layout.STOP_REQUEST).exists(), False, ""
+        self._missing, self._ended, self._away = 0, 0.0, 0.0
+
+    @property
+    def name(self) -> str:
+        """Of the job; no other has it."""
+        return self._job.name
+
+    # From any thread --------------------------------------------------------------------------------------------------
+
+    def phase(self) -> Phase:
+        """By the last list that Slurm has given."""
+        entry = self._entry
+        if entry is None:
+            return "unknown" if self._job.job else "waits"
+        return "waits" if entry.state in slurm.PENDING else "runs"
+
+    def began(self) -> float:
+        """When its job started the last time, Unix s."""
+        entry = self._entry
+        return entry.start if entry is not None and entry.state not in slurm.PENDING else 0.0
+
+    def note(self) -> str:
+        """Why it waits, or since when nobody knows."""
+        entry, number = self._entry, self._job.job
+        if self._away:
+            last = f"; job {number} was {entry.state.lower()} then" if entry else ""
+            return f"unknown: Slurm has not answered for {time.monotonic() - self._away:.0f} s{last}"
+        if entry is None:
+            return f"Slurm is asked about job {number}" if number else "is being handed to Slurm"
+        return f"Slurm job {number} is pending: {entry.reason}" if entry.state in slurm.PENDING else ""
+
+    def exited(self) -> Exit | None:
+        """None while its job is in the queue or has cores. An outcome in a folder that nobody writes to is an end even
+        when Slurm does not answer.
+        """
+        return self._exit or (Exit(None, False, "") if self._complete() else None)
+
+    def _complete(self) -> bool:
+        try:
+            age = time.time() - (self._folder / layout.OUTCOME).stat().st_mtime
+            return (bool(self._away) or age > _LATE) and not slurm.held(self._folder)
+        except OSError:
+            return False
+
+    def stop(self) -> None:
+        """A file asks the run, wherever it is; Slurm ends a job that waits and tells one that runs. Raises OSError."""
+        (self._folder / layout.STOP_REQUEST).touch()
+        self._stop = True
+
+    def kill(self) -> None:
+        """Its job is ended by force."""
+        self._stop = self._kill = True
+
+    # The launcher's thread --------------------------------------------------------------------------------------------
+
+    @property
+    def over(self) -> bool:
+        """True when nothing is left to do with Slurm."""
+        return self._exit is not None
+
+    def silent(self) -> None:
+        """Slurm does not answer. What was known stays."""
+        self._away = self._away or time.monotonic()
+
+    def turn(self, entries: list[Entry]) -> None:
+        """What is due now; ``entries``: the jobs of this name that Slurm knows. Raises SlurmError, OSError."""
+        self._away = 0.0
+        if not self._job.job:
+            self._hand_over()
+            return
+        entry = self._chosen(entries)
+        if entry is None:
+            self._look_for_it()
+            return
+        self._missing, self._entry = 0, entry
+        if entry.state in slurm.FINAL:
+            self._end(entry)
+        elif self._kill:
+            slurm.kill(self._site.bin, entry.job)
+        elif self._stop and self._told != entry.state:
+            slurm.notify(self._site.bin, entry.job)
+            self._told = entry.state
+
+    def _hand_over(self) -> None:
+        if self._stop:
+            known = slurm.jobs(self._site.bin, self._job.name)
+            if known:
+                self._note(job=known[0].job)
+            else:
+                self._exit = Exit(None, False, "")
+            return
+        profile = batch.profile_of(self._site, self._job.profile)[1]
+        try:
+            self._note(job=slurm.submit(self._site.bin, self._folder, self._job, profile))
+        except slurm.RefusedError as error:
+            self._exit = Exit(None, False, "", (State.FAILED, Cause.LAUNCH, f"Slurm refuses the job: {error}"))
+
+    def _note(self, **changes: object) -> None:
+        """The record, on disk before anything follows from it."""
+        job = msgspec.structs.replace(self._job, **changes)
+        whole.write(self._folder / layout.JOB, batch.to_json(job))
+        self._job = job
+
+    def _chosen(self, entries: list[Entry]) -> Entry | None:
+        """The job that has begun, else the first; a second one, which only a crash of the controller can make, ends."""
+        begun = slurm.begun(self._folder, self._job) if len(entries) > 1 else ""
+        ordered = sorted(entries, key=lambda entry: (entry.job != begun, entry.state in slurm.FINAL, entry.job))
+        for extra in ordered[1:]:
+            if extra.state not in slurm.FINAL:
+                slurm.cancel(self._site.bin, extra.job)
+        if ordered and ordered[0].job != self._job.job:
+            self._note(job=ordered[0].job)
+        return ordered[0] if ordered else None
+
+    def _look_for_it(self) -> None:
+        """Slurm knows no job of this name: two lists in a row say so before anything is done."""
+        self._missing += 1
+        if self._missing < 2 or slurm.held(self._folder):
+            return
+        if (self._folder / layout.OUTCOME).exists():
+            self._exit = Exit(None, False, "")
+        elif slurm.begun(self._folder, self._job):
+            self._again("Slurm has forgotten the job")
+        else:
+            self._missing = 0
+            self._note(job="")
+
+    def _end(self, entry: Entry) -> None:
+        """Its job is over; the folder says what that means."""
+        self._ended = self._ended or time.monotonic()
+        there = (self._folder / layout.OUTCOME).exists()
+        begun = bool(slurm.begun(self._folder, self._job))
+        if not there and begun and (slurm.held(self._folder) or time.monotonic() - self._ended < _LAG):
+            return
+        self._note(accounting=slurm.accounting(self._site.bin, entry.job))
+        left = (self._folder / layout.INTERRUPTED).exists() and entry.state != "CANCELLED"
+        if not there and (left or entry.state in {"PREEMPTED", "NODE_FAIL", "BOOT_FAIL"}):
+            self._again(f"job {entry.job} ended as {entry.state}")
+        else:
+            self._exit = Exit(self._code(), False, "", self._reading(entry))
+
+    def _again(self, why: str) -> None:
+        """Another job goes on from the checkpoint that is there, unless somebody has asked for the end."""
+        if self._stop or self._job.attempt >= _MOST:
+            self._exit = Exit(None, False, "", (State.LOST, Cause.NODE, f"{why}, attempt {self._job.attempt}"))
+            return
+        profile = batch.profile_of(self._site, self._job.profile)
+        job, attempt = self._job, self._job.attempt + 1
+        fresh = batch.new_job(job.run, job.ranks, profile, job.command, time.time(), attempt)
+        whole.write(self._folder / layout.JOB, batch.to_json(fresh))
+        self._job, self._entry, self._ended, self._missing, self._told = fresh, None, 0.0, 0, ""
+
+    def _code(self) -> int | None:
+        """Of the job's script; minus the signal that has ended it; None when nobody knows."""
+        code, _, number = self._job.accounting.get("ExitCode", "").partition(":")
+        if not code.isdigit() or not number.isdigit():
+            return None
+        return -int(number) if int(number) else int(code)
+
+    def _reading(self, entry: Entry) -> Reading | None:
+        if entry.state not in _READINGS:
+            return None
+        state, cause, message = _READINGS[entry.state]
+        return state, cause, f"Slurm job {entry.job} {message}"

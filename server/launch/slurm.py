@@ -1,0 +1,117 @@
+"""Workers as jobs of Slurm. Its commands run in a thread of their own: a controller that is away stops nobody."""
+
+import logging
+import sys
+import threading
+import time
+from pathlib import Path
+
+import msgspec
+
+from conoid.cases import batch, layout, slurm, whole
+from conoid.cases.slurm import Entry
+
+from ..settings import Settings
+from . import Job, LaunchError, Trace
+from .handed import SlurmWorker
+from .local import find_mpiexec
+
+_log = logging.getLogger("conoid.server")
+
+
+class SlurmLauncher:
+    """The intent is on disk when ``start`` returns; the thread makes one job of it, however often it has to try."""
+
+    queues = True
+
+    def __init__(self, settings: Settings, site: batch.Slurm) -> None:
+        """The thread starts with the first run."""
+        self._mpiexec, self._worker, self._site = settings.mpiexec, settings.worker, site
+        self._workers: dict[str, SlurmWorker] = {}
+        self._lock, self._thread = threading.Lock(), threading.Thread(target=self._work, name="slurm", daemon=True)
+
+    def start(self, job: Job) -> SlurmWorker:
+        """Writes down what is to be handed over. Raises LaunchError."""
+        try:
+            profile = batch.profile_of(self._site, job.profile)
+            command = [*batch.starter(profile[1], job.ranks, [*find_mpiexec(self._mpiexec)]), *self._words(job)]
+            record = batch.new_job(job.run, job.ranks, profile, command, time.time())
+            if job.telemetry is not None:
+                self._write_access(job)
+            whole.write(job.folder / layout.JOB_SCRIPT, batch.script(profile[1], sys.executable).encode(), 0o755)
+            whole.write(job.folder / layout.JOB, batch.to_json(record))
+        except (OSError, ValueError) as error:
+            raise LaunchError(f"the job cannot be written down: {error}") from None
+        return self._take(job.run, SlurmWorker(job.folder, record, self._site))
+
+    def find(self, run: str, folder: Path) -> Trace:
+        """By its record: what that says is handed over, or was about to be. Raises OSError, ValueError."""
+        try:
+            record = batch.read_job(folder)
+        except msgspec.MsgspecError as error:
+            raise ValueError(f"{layout.JOB}: {error}") from None
+        if record is None:
+            return Trace(None, False, False)
+        return Trace(self._take(run, SlurmWorker(folder, record, self._site)), True, False)
+
+    def tidy(self) -> None:
+        """Nodes are Slurm's to clean."""
+
+    def _words(self, job: Job) -> list[str]:
+        words = [*self._worker, str(job.case), "--out", str(job.folder), "--run", job.run, "--ranks", str(job.ranks)]
+        if job.wall_time is not None:
+            words += ["--set", f"run.max_wall_time={job.wall_time!r}"]
+        return [*words, "--interruptible"]
+
+    def _write_access(self, job: Job) -> None:
+        assert job.telemetry is not None
+        told = job.telemetry
+        access = batch.Access(
+            endpoint=self._site.router or told.endpoint, prefix=told.prefix, user=told.user, password=told.password
+        )
+        whole.write(job.folder / layout.ACCESS, batch.to_json(access), 0o600)
+
+    def _take(self, run: str, worker: SlurmWorker) -> SlurmWorker:
+        with self._lock:
+            self._workers[run] = worker
+            if not self._thread.is_alive():
+                self._thread.start()
+        return worker
+
+    # The thread -------------------------------------------------------------------------------------------------------
+
+    def _work(self) -> None:
+        while True:
+            try:
+                self._round()
+            except Exception:
+                _log.exception("Slurm is asked again in %g s", self._site.poll)
+            time.sleep(self._site.poll)
+
+    def _round(self) -> None:
+        """One list for all runs, then what is due with each."""
+        with self._lock:
+            self._workers = {run: worker for run, worker in self._workers.items() if not worker.over}
+            workers = list(self._workers.items())
+        if not workers:
+            return
+        try:
+            found: dict[str, list[Entry]] = {}
+            for entry in slurm.jobs(self._site.bin):
+                found.setdefault(entry.name, []).append(entry)
+        except slurm.SlurmError as error:
+            _log.warning("Slurm does not answer: %s", error)
+            for _, worker in workers:
+                worker.silent()
+            return
+        for run, worker in workers:
+            self._attend(run, worker, found.get(worker.name, []))
+
+    def _attend(self, run: str, worker: SlurmWorker, entries: list[Entry]) -> None:
+        try:
+            worker.turn(entries)
+        except slurm.SlurmError as error:
+            _log.warning("run %s: Slurm does not answer: %s", run, error)
+            worker.silent()
+        except (OSError, ValueError) as error:
+            _log.error("run %s: %s", run, error)

@@ -1,0 +1,326 @@
+"""Runs as jobs of a real Slurm, which the tests start. Its faults are made with the real thing."""
+
+import json
+import os
+import shlex
+import signal
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from conoid.cases import layout
+from conoid.cases.run import State
+from conoid.server.settings import WORKER
+
+from ..parallel.launching import command, ended
+from . import real_slurm
+from .real_slurm import Cluster
+from .running import TOML, Process, User, case_text, processes
+
+pytestmark = pytest.mark.skipif(bool(real_slurm.missing()), reason=real_slurm.missing() or "Slurm is there")
+
+SITE = """
+launcher = "slurm"
+[slurm]
+poll = 0.3
+[slurm.profiles.standard]
+partition = "low"
+lines = ["export HYDRA_IFACE=lo"]
+[slurm.profiles.pmi2]
+partition = "low"
+mpi = "srun"
+[slurm.profiles.wrong]
+partition = "nowhere"
+[slurm.profiles.brief]
+partition = "low"
+time = "2 min"
+notice = "60 s"
+"""
+BREAKING = Path(__file__).parents[1] / "parallel" / "breaking.toml"
+DIGEST = "b418fe2db96b3ef1"
+"""Of that case, on any number of ranks."""
+LONG = "12 us"
+"""Until which the same case takes some ten seconds: long enough to be interrupted."""
+
+
+@dataclass
+class Site:
+    """A cluster, a server that hands its runs over to it, and one who uses it."""
+
+    cluster: Cluster
+    server: Process
+    ann: User
+
+    def submit(self, text: str, profile: str = "standard") -> str:
+        """The id of a new run."""
+        answer = self.ann.http.post("/v1/runs", params={"profile": profile}, content=text, headers=TOML)
+        assert answer.status_code == 202, answer.text
+        return str(answer.json()["id"])
+
+    def ended(self, run: str, seconds: float = 60.0) -> dict[str, Any]:
+        """The run once it has ended."""
+        return self.reached(run, seconds, *(state for state in State if state.final))
+
+    def reached(self, run: str, seconds: float, *states: State) -> dict[str, Any]:
+        """The run once it is in one of these states."""
+        deadline = time.monotonic() + seconds
+        while (seen := self.ann.show(run))["state"] not in states:
+            assert time.monotonic() < deadline, f"{seen['state']} ({seen['reason']}), not {states}: {self.tail(run)}"
+            time.sleep(0.1)
+        return seen
+
+    def tail(self, run: str) -> str:
+        """The end of the launcher's log."""
+        log = self.server.runs / run / layout.LOGS / layout.LAUNCHER_LOG
+        return log.read_text()[-2000:] if log.exists() else "no log"
+
+    def jobs(self, run: str) -> list[tuple[str, str]]:
+        """Number and state of every job that was made for the run."""
+        return self.cluster.jobs(f"conoid-{run}-")
+
+    def again(self, number: signal.Signals = signal.SIGKILL) -> None:
+        """Ends the server and starts the next one."""
+        self.server.end(number)
+        self.ann = self.server.user(self.server.start()["url"])
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
+    with real_slurm.running(tmp_path_factory.mktemp("slurm")) as up:
+        yield up
+
+
+@pytest.fixture
+def site(cluster: Cluster, tmp_path: Path) -> Iterator[Site]:
+    (tmp_path / "site.toml").write_text(SITE)
+    with processes(tmp_path) as make:
+        server = make("--site", str(tmp_path / "site.toml"), "--slots", "1000", "--no-zenoh", "--grace", "5")
+        yield Site(cluster, server, server.user(server.start()["url"]))
+
+
+@pytest.fixture
+def solver(cluster: Cluster, tmp_path: Path) -> Iterator[Site]:
+    """The same with the real worker."""
+    (tmp_path / "site.toml").write_text(SITE)
+    with processes(tmp_path) as make:
+        server = make("--site", str(tmp_path / "site.toml"), "--slots", "1000", "--worker", shlex.join(WORKER))
+        yield Site(cluster, server, server.user(server.start()["url"]))
+
+
+def test_a_run_waits_with_a_reason_runs_and_is_cancelled(site: Site, tmp_path: Path) -> None:
+    large = site.submit(case_text(ranks=2 * real_slurm.CORES))
+    long = site.submit(case_text(steps=100_000, pace=0.02))
+    assert site.reached(long, 30.0, State.RUNNING)["started"] > 0
+    waiting = site.ann.show(large)
+    assert waiting["state"] == "queued"
+    assert "is pending" in waiting["reason"]
+    for run in (large, long):
+        site.ann.http.post(f"/v1/runs/{run}:cancel")
+        ended = site.ended(run)
+        assert (ended["state"], ended["cause"]) == ("cancelled", "cancelled")
+    assert [state for _, state in site.jobs(large)] == ["CANCELLED"]
+    assert site.ann.states(long)[-1] == "cancelled"
+    record = json.loads((site.server.runs / long / layout.JOB).read_text())
+    assert record["accounting"]["NodeList"] == site.cluster.host
+
+
+def test_a_job_that_slurm_refuses_fails_at_once_with_its_words(site: Site) -> None:
+    ended = site.ended(site.submit(case_text(), "wrong"))
+    assert (ended["state"], ended["cause"]) == ("failed", "launch")
+    assert "Invalid partition name" in ended["message"]
+
+
+def test_scancel_by_hand_is_a_cancel(site: Site) -> None:
+    run = site.submit(case_text(steps=100_000, pace=0.02))
+    site.reached(run, 30.0, State.RUNNING)
+    site.cluster.command("scancel", site.jobs(run)[0][0])
+    ended = site.ended(run)
+    assert (ended["state"], ended["cause"]) == ("cancelled", "cancelled")
+
+
+def test_a_server_that_dies_finds_its_jobs_again(site: Site, tmp_path: Path) -> None:
+    large = site.submit(case_text(ranks=2 * real_slurm.CORES))
+    runs = [site.submit(case_text(wait=str(tmp_path / "go"))) for _ in range(3)]
+    site.reached(runs[0], 30.0, State.RUNNING)
+    site.again()
+    (tmp_path / "go").touch()
+    for run in runs:
+        assert site.ended(run)["state"] == "succeeded"
+        assert len(site.jobs(run)) == 1
+        assert site.ann.states(run).count("running") == 1
+    site.ann.http.post(f"/v1/runs/{large}:cancel")
+    assert site.ended(large)["state"] == "cancelled"
+
+
+def test_a_controller_that_is_away_is_no_state_of_a_run(site: Site, tmp_path: Path) -> None:
+    run = site.submit(case_text(wait=str(tmp_path / "go")))
+    site.reached(run, 30.0, State.RUNNING)
+    site.cluster.kill()
+    try:
+        deadline = time.monotonic() + 60.0
+        while "unknown" not in (seen := site.ann.show(run))["reason"]:
+            assert time.monotonic() < deadline
+            time.sleep(0.2)
+        assert seen["state"] == "running"
+        (tmp_path / "go").touch()
+        assert site.ended(run)["state"] == "succeeded", "the folder has the end, whoever answers"
+    finally:
+        site.cluster.start()
+        site.cluster.await_node()
+
+
+def test_nobody_adds_words_to_a_profile(site: Site) -> None:
+    for name in ("standard --wrap=id", "../standard", "other"):
+        answer = site.ann.http.post("/v1/runs", params={"profile": name}, content=case_text(), headers=TOML)
+        assert answer.status_code == 400
+        assert "standard, pmi2" in answer.json()["detail"]
+
+
+# The drill ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_twelve_runs_at_a_time(site: Site) -> None:
+    runs = [site.submit(case_text(steps=20, pace=0.05)) for _ in range(12)]
+    for run in runs:
+        assert site.ended(run, 120.0)["state"] == "succeeded"
+        assert len(site.jobs(run)) == 1
+
+
+@pytest.mark.slow
+def test_a_controller_killed_while_jobs_are_handed_over_makes_one_of_each(site: Site) -> None:
+    """Twenty times: the controller dies at another moment round sbatch, and comes back."""
+    runs = []
+    for number in range(20):
+        runs.append(site.submit(case_text(steps=2)))
+        time.sleep(0.05 * number)
+        site.cluster.kill()
+        time.sleep(0.3)
+        site.cluster.start()
+    site.cluster.await_node()
+    attempts = []
+    for run in runs:
+        ended = site.ended(run, 240.0)
+        assert ended["state"] == "succeeded", (ended, site.tail(run))
+        states = site.ann.states(run)
+        assert states.count("running") == 1, states
+        live = [state for _, state in site.jobs(run) if state not in {"CANCELLED"}]
+        attempts.append(len(live))
+    print("jobs of each run:", attempts)
+    assert set(attempts) == {1}
+
+
+@pytest.mark.slow
+def test_a_server_killed_while_it_hands_jobs_over_makes_one_of_each(site: Site) -> None:
+    runs = []
+    for number in range(10):
+        runs.append(site.submit(case_text(steps=2)))
+        time.sleep(0.06 * number)
+        site.again()
+    for run in runs:
+        assert site.ended(run, 120.0)["state"] == "succeeded"
+        assert len(site.jobs(run)) == 1
+
+
+@pytest.mark.slow
+def test_a_controller_that_hangs_makes_no_second_job(site: Site) -> None:
+    runs = []
+    for _ in range(2):
+        site.cluster.pause(signal.SIGSTOP)
+        runs.append(site.submit(case_text(steps=2)))
+        time.sleep(35.0)
+        site.cluster.pause(signal.SIGCONT)
+        assert site.ended(runs[-1], 120.0)["state"] == "succeeded"
+        assert len([job for job in site.jobs(runs[-1]) if job[1] == "COMPLETED"]) == 1
+        assert site.ann.states(runs[-1]).count("running") == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("profile", ["standard", "pmi2"])
+def test_two_ranks_by_both_launchers(solver: Site, profile: str) -> None:
+    run = solver.submit(with_ranks(2), profile)
+    ended = solver.ended(run, 300.0)
+    assert ended["state"] == "succeeded", (ended["message"], solver.tail(run))
+    assert (ended["outcome"]["ranks"], ended["outcome"]["digest"][:16]) == (2, DIGEST)
+
+
+@pytest.fixture(scope="module")
+def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The digest of the long case on one rank, without Slurm."""
+    place = tmp_path_factory.mktemp("alone")
+    (place / "case.toml").write_text(with_ranks(1, LONG))
+    ended(command(1, str(place / "case.toml"), "--out", str(place / "out")))
+    digest: str = json.loads((place / "out" / layout.OUTCOME).read_text())["digest"]
+    assert digest
+    return digest
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("profile", ["standard", "pmi2"])
+def test_a_preempted_run_goes_on_to_the_same_digest(solver: Site, profile: str, uninterrupted: str) -> None:
+    run = solver.submit(with_ranks(2, LONG), profile)
+    await_progress(solver, run)
+    solver.cluster.command("sbatch", "-p", "high", "-n", str(real_slurm.CORES), "-o", "/dev/null", "--wrap", "sleep 5")
+    seen = solver.reached(run, 60.0, State.QUEUED)
+    assert "is pending" in seen["reason"] or seen["reason"] == ""
+    job = solver.jobs(run)[0][0]
+    solver.cluster.command("scontrol", "update", f"jobid={job}", "StartTime=now")
+    last = solver.ended(run, 400.0)
+    assert (last["state"], last["outcome"]["digest"]) == ("succeeded", uninterrupted), solver.tail(run)
+    assert len(solver.jobs(run)) == 1
+    states = solver.ann.states(run)
+    assert states.count("running") == 2
+    assert "cancelled" not in states
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_a_run_that_reaches_the_time_limit_goes_on_to_the_same_digest(solver: Site, uninterrupted: str) -> None:
+    """Its ranks are held up until Slurm has told the job that its time is nearly over."""
+    run = solver.submit(with_ranks(2, LONG), "brief")
+    await_progress(solver, run)
+    stopped = processes_of(run)
+    for pid in stopped:
+        os.kill(pid, signal.SIGSTOP)
+    time.sleep(70.0)
+    for pid in stopped:
+        os.kill(pid, signal.SIGCONT)
+    solver.reached(run, 60.0, State.QUEUED)
+    solver.cluster.command("scontrol", "update", f"jobid={solver.jobs(run)[0][0]}", "StartTime=now")
+    last = solver.ended(run, 400.0)
+    assert (last["state"], last["outcome"]["digest"]) == ("succeeded", uninterrupted), solver.tail(run)
+    assert solver.ann.states(run).count("running") == 2
+
+
+def with_ranks(ranks: int, end_time: str = "1.5 us") -> str:
+    """The breaking case with so many ranks, to another end."""
+    text = BREAKING.read_text()
+    assert '[run]\nend_time = "1.5 us"\n' in text
+    return text.replace('[run]\nend_time = "1.5 us"\n', f'[run]\nranks = {ranks}\nend_time = "{end_time}"\n')
+
+
+def await_progress(solver: Site, run: str) -> None:
+    """Returns when the run has taken some steps."""
+    solver.reached(run, 300.0, State.RUNNING)
+    deadline = time.monotonic() + 100.0
+    while not (solver.ann.show(run)["progress"] or {}).get("step"):
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def processes_of(run: str) -> list[int]:
+    """The ranks of a run."""
+    found = []
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            try:
+                words = (entry / "cmdline").read_bytes().split(b"\0")
+            except OSError:
+                continue
+            if b"mpi4py" in words and run.encode() in words and words[0].endswith(b"python"):
+                found.append(int(entry.name))
+    return found
