@@ -14,7 +14,7 @@ from conoid.cases.load import CaseError, parse_case
 from conoid.cases.plausible import doubts
 from conoid.cases.run import ExitCode
 
-from . import benches, commands, converging, reports, shelf, tables, viewing
+from . import benches, commands, converging, hard, reports, shelf, tables, viewing
 from .errors import ClientError
 from .once import run_once
 from .options import (
@@ -119,6 +119,7 @@ app.command(short_help="Write a run as one HTML file.")(reports.report)
 app.command(short_help="Tell in what two runs differ.")(reports.compare)
 app.add_typer(reports.figures, name="figures")
 app.command(short_help="Speed against error: meshes, orders, limits, advice.")(converging.converge)
+app.command(short_help="Run the suite of hard cases.")(hard.hard)
 
 
 @app.command(name="run", short_help="Do it all on this machine: run, watch, check, draw.")

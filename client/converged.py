@@ -15,6 +15,7 @@ from .richardson import Trend
 from .scatter import runs_needed
 from .study import table
 from .trade import Target
+from .variants import Variant
 
 _ENOUGH = 0.05
 """Difference of means, relative, for which the table of ensembles tells the runs that it needs. Chosen."""
@@ -26,6 +27,8 @@ class Book:
 
     case: str
     changes: Sequence[str]
+    own: Variant
+    """That of the case."""
     own_size: float
     """The smallest element size of the case, m."""
     members: int
@@ -42,7 +45,7 @@ class Book:
 
     def goals(self) -> dict[str, tuple[Number, Target]]:
         """By quantity, where any variant converges, references first."""
-        found = {each.name: (each, trade.target(self.series, each)) for each in self.numbers}
+        found = {each.name: (each, trade.target(self.series, each, self.own)) for each in self.numbers}
         return {name: (each, goal) for name, (each, goal) in found.items() if goal is not None}
 
     def leading(self, wanted: str | None = None) -> str | None:
@@ -107,7 +110,7 @@ def _values(book: Book, series: Series) -> str:
     for each in book.numbers:
         found = series.limits[each.name]
         shown = [number(m.samples[each.name].mean) if each.name in m.samples else "-" for m in meshes]
-        order = "-" if math.isnan(found.order) else f"{found.order:.2f}"
+        order = "-" if math.isnan(found.order) else f"{found.order:.1f}"
         limit = number(found.value) if found.trend is Trend.CONVERGES else "-"
         share = f"{100.0 * found.uncertainty / each.scale:.2g}" if each.scale and not each.of_nothing else "-"
         expected = "-" if each.expected is None else f"{number(each.expected)} +- {number(each.tolerance)}"
@@ -162,8 +165,10 @@ def _worth(book: Book, name: str) -> str:
     ]  # fmt: skip
     said = (
         f"From the limit {number(goal.value)} {each.unit} of {goal.variant}, itself uncertain by "
-        f"{100.0 * goal.uncertainty:.2g} %."
+        f"{100.0 * goal.uncertainty:.2g} %, by way of each variant's own: errors that cancel by chance do not count."
     )
+    others = [str(variant) for variant in trade.elsewhere(book.series, each, goal)]
+    said += f" Another limit, further away than both are uncertain, has: {'; '.join(others)}." if others else ""
     return f"{said}\n\n{table(('variant', 'element size', 'CPU s', 'error %', 'Pareto'), rows)}"
 
 

@@ -127,8 +127,8 @@ def _limit(name: str, meshes: Sequence[Mesh], floor: float) -> Limit:
     there = [mesh for mesh in meshes if name in mesh.samples]
     samples = [mesh.samples[name] for mesh in there]
     found = limit([mesh.size for mesh in there], [sample.mean for sample in samples], floor)
-    if found.trend in (Trend.SETTLED, Trend.UNKNOWN) or not any(sample.error for sample in samples):
+    if found.trend is Trend.UNKNOWN or not any(sample.error for sample in samples):
         return found
-    if not any(differ(samples[0], other) for other in samples[1:]):
+    if found.trend is not Trend.SETTLED and not any(differ(samples[0], other) for other in samples[1:]):
         return Limit(Trend.SCATTERS, samples[0].mean, 2.0 * samples[0].error)
     return replace(found, uncertainty=found.uncertainty + 2.0 * samples[0].error)

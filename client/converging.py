@@ -23,7 +23,7 @@ from .reports import drawing
 from .scaling import CORES
 from .session import Session, connect
 from .submission import data_of
-from .variants import FORMS, SEEDS, STEPS, Plan, chaotic, sizes
+from .variants import FORMS, SEEDS, STEPS, Plan, Variant, chaotic, sizes
 
 _ENSEMBLE = 5
 """Members of a point of a scene that breaks. Chosen: a deviation from five is good to a third."""
@@ -88,8 +88,9 @@ def _told(each: Done) -> str:
 def _book(case: Case, changes: Sequence[str], plan: Plan, accuracy: float, done: Sequence[Done]) -> Book:
     first = next((each for each in done if not each.problem), None)
     own = min(value for key, value in sizes(case, 1.0).items() if key.endswith("element_size"))
+    variant = Variant(case.numerics.pressure, case.numerics.dt_safety)
     return Book(
-        case.name, changes, own, plan.members, plan.vary, accuracy / 100.0, done, series(done),
+        case.name, changes, variant, own, plan.members, plan.vary, accuracy / 100.0, done, series(done),
         first.numbers if first else (),
     )  # fmt: skip
 

@@ -10,10 +10,13 @@ from .quantities import Number
 from .richardson import FORMAL, Trend
 from .variants import Variant
 
+_VAGUE = 0.3
+"""Relative uncertainty of a limit above which no error is measured from it. Chosen."""
+
 
 @dataclass(frozen=True)
 class Worth:
-    """A variant on a mesh: what it costs, CPU s, and how far its value is from the limit, relative."""
+    """A variant on a mesh: what it costs, CPU s, and its error, relative."""
 
     variant: Variant
     mesh: Mesh
@@ -31,29 +34,56 @@ class Target:
     variant: Variant
 
 
-def target(all_series: Sequence[Series], number: Number) -> Target | None:
-    """The limit with the smallest uncertainty among those that converge or have settled; None where none does."""
-    found = [
-        (each.limits[number.name], each.variant)
-        for each in all_series
-        if each.limits[number.name].trend in (Trend.CONVERGES, Trend.SETTLED)
-    ]
+def target(all_series: Sequence[Series], number: Number, own: Variant | None = None) -> Target | None:
+    """The limit of ``own``, the variant of the case, if it converges; else the least uncertain one of all variants.
+
+    A form that locks can converge to another limit, and look the more certain: it is not preferred. None where nothing
+    converges.
+    """
+    found = [(each.limits[number.name], each.variant) for each in all_series if _sure(each, number)]
     if not found:
         return None
-    best, variant = min(found, key=lambda pair: pair[0].uncertainty)
+    best, variant = min(found, key=lambda pair: (pair[1] != own, pair[0].uncertainty))
     scale = max(number.scale, abs(best.value))
-    return Target(best.value, best.uncertainty / scale, scale, variant) if scale > 0.0 else None
+    known = scale > 0.0 and best.uncertainty <= _VAGUE * scale
+    return Target(best.value, best.uncertainty / scale, scale, variant) if known else None
+
+
+def _sure(series: Series, number: Number) -> bool:
+    return series.limits[number.name].trend in (Trend.CONVERGES, Trend.SETTLED)
+
+
+def elsewhere(all_series: Sequence[Series], number: Number, goal: Target) -> list[Variant]:
+    """Variants whose limit is further from that of the target than both are uncertain."""
+    return [
+        each.variant
+        for each in all_series
+        if _sure(each, number)
+        and abs(each.limits[number.name].value - goal.value)
+        > each.limits[number.name].uncertainty + goal.uncertainty * goal.scale
+    ]
 
 
 def worths(all_series: Sequence[Series], number: Number, goal: Target) -> list[Worth]:
     """Every point that has the quantity, the cheapest first."""
     found = [
-        Worth(each.variant, mesh, mesh.cpu, abs(mesh.samples[number.name].mean - goal.value) / goal.scale)
+        Worth(each.variant, mesh, mesh.cpu, _error(mesh.samples[number.name].mean, each, number, goal) / goal.scale)
         for each in all_series
         for mesh in each.meshes
         if number.name in mesh.samples
     ]
     return sorted(found, key=lambda worth: (worth.cost, worth.error))
+
+
+def _error(value: float, series: Series, number: Number, goal: Target) -> float:
+    """The way to the variant's own limit and on to the target: errors that cancel by chance are no accuracy.
+
+    Where the variant has no limit, its uncertainty takes the place of the first.
+    """
+    own = series.limits[number.name]
+    if _sure(series, number):
+        return abs(value - own.value) + abs(own.value - goal.value)
+    return abs(value - goal.value) + (0.0 if math.isnan(own.uncertainty) else own.uncertainty)
 
 
 def front(points: Sequence[Worth]) -> list[Worth]:
