@@ -12,6 +12,7 @@ from . import errors, openapi, page
 from .bell import Bell
 from .history import Histories
 from .launch.local import LocalLauncher
+from .reader import Turns
 from .readiness import Readiness
 from .routes import cases, events, files, health, history, logs, me, runs, snapshots
 from .service import Service
@@ -65,7 +66,7 @@ def opened(settings: Settings) -> Iterator[Service]:
         if settings.end_runs:
             stack.callback(supervisor.end_all)
         desk, readiness = Desk(settings, store, supervisor), Readiness(settings, store)
-        yield Service(settings, store, bell, telemetry, supervisor, desk, Histories(), readiness)
+        yield Service(settings, store, bell, telemetry, supervisor, desk, Histories(), readiness, Turns())
 
 
 def build_app(service: Service) -> FastAPI:

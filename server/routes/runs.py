@@ -25,7 +25,7 @@ MAX_WAIT = 60.0
 
 
 @router.post("/v1/runs", status_code=202, openapi_extra=openapi.CASE_BODY)
-def submit(
+async def submit(
     service: ServiceOf,
     identity: Submitter,
     body: Body,
@@ -35,7 +35,10 @@ def submit(
 ) -> Response:
     """Takes a case as TOML or JSON. The same Idempotency-Key and body give the same run and the same answer."""
     labels = labels_of(label or ())
-    receipt = service.desk.submit(identity.owner, body, content_type, idempotency_key, labels)
+    async with service.turns.turn(identity.owner):
+        receipt = await run_in_threadpool(
+            service.desk.submit, identity.owner, body, content_type, idempotency_key, labels
+        )
     return JSONResponse(receipt, 202, {"Location": receipt["url"]})
 
 
