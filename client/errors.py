@@ -56,6 +56,11 @@ class UnreachableError(ClientError):
     """No server answered at the address, or the answer broke off."""
 
 
+def passes(error: ClientError) -> bool:
+    """Whether the same request may succeed soon: nobody answered, or who answered says so."""
+    return isinstance(error, UnreachableError) or (isinstance(error, ServiceError) and error.retryable)
+
+
 class UnfinishedError(ClientError):
     """The run has not written what was asked for yet."""
 

@@ -14,6 +14,7 @@ from .history import Histories
 from .launch import Launcher
 from .launch.local import LocalLauncher
 from .launch.slurm import SlurmLauncher
+from .reader import Turns
 from .readiness import Readiness
 from .routes import cases, events, files, health, history, logs, me, runs, snapshots
 from .service import Service
@@ -67,7 +68,7 @@ def opened(settings: Settings) -> Iterator[Service]:
         if settings.end_runs:
             stack.callback(supervisor.end_all)
         desk, readiness = Desk(settings, store, supervisor), Readiness(settings, store)
-        yield Service(settings, store, bell, telemetry, supervisor, desk, Histories(), readiness)
+        yield Service(settings, store, bell, telemetry, supervisor, desk, Histories(), readiness, Turns())
 
 
 def launcher_of(settings: Settings) -> Launcher:

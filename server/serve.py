@@ -12,7 +12,7 @@ from types import FrameType
 
 import uvicorn
 
-from . import durable
+from . import connections, durable, quiet
 from .app import build_app, opened
 from .service import Service
 from .settings import Settings, StartError
@@ -33,6 +33,7 @@ def serve(settings: Settings) -> None:
     Raises ServeError, and what ``opened`` raises.
     """
     os.umask(0o077)
+    quiet.install()
     settings.runs.mkdir(parents=True, exist_ok=True)
     with _only_one(settings.runs), _listening(settings) as listener:
         (settings.runs / ADDRESS_FILE).unlink(missing_ok=True)
@@ -58,11 +59,13 @@ class _Server(uvicorn.Server):
         super().__init__(
             uvicorn.Config(
                 self._app,
+                log_config=None,
                 log_level="warning",
                 access_log=False,
                 server_header=False,
                 timeout_keep_alive=30,
                 timeout_graceful_shutdown=_FAREWELL,
+                **connections.options(),
             )
         )
 

@@ -7,6 +7,7 @@ from fastapi import Depends, Request
 
 from .bell import Bell
 from .history import Histories
+from .reader import Turns
 from .readiness import Readiness
 from .settings import Settings
 from .store import Store
@@ -27,6 +28,7 @@ class Service:
     desk: Desk
     histories: Histories
     readiness: Readiness
+    turns: Turns
 
 
 def _service(request: Request) -> Service:

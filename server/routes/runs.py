@@ -11,7 +11,7 @@ from conoid.cases import layout
 from conoid.cases.run import State
 
 from .. import openapi, view
-from ..auth import Identity, Reader, Submitter
+from ..auth import Identity, Pass, Reader, Submitter, unauthorized
 from ..errors import ServiceError, not_found
 from ..events import Run
 from ..limits import read_body
@@ -25,7 +25,7 @@ MAX_WAIT = 60.0
 
 
 @router.post("/v1/runs", status_code=202, openapi_extra=openapi.CASE_BODY)
-def submit(
+async def submit(
     service: ServiceOf,
     identity: Submitter,
     body: Body,
@@ -36,7 +36,10 @@ def submit(
 ) -> Response:
     """Takes a case as TOML or JSON. The same Idempotency-Key and body give the same run and the same answer."""
     labels = labels_of(label or ())
-    receipt = service.desk.submit(identity.owner, body, content_type, idempotency_key, labels, profile)
+    async with service.turns.turn(identity.owner):
+        receipt = await run_in_threadpool(
+            service.desk.submit, identity.owner, body, content_type, idempotency_key, labels, profile
+        )
     return JSONResponse(receipt, 202, {"Location": receipt["url"]})
 
 
@@ -94,15 +97,17 @@ async def show(
     anything has; at most so many seconds later. A run that has ended is answered at once."""
     known = request.headers.get("if-none-match")
     first = await run_in_threadpool(view.snapshot, service, run)
-    latest, deadline = first, time.monotonic() + wait
+    latest, deadline, may = first, time.monotonic() + wait, Pass(service, identity)
     with service.bell.listen(run.id) as listener:
         while not (latest.state.final or service.bell.closed):
             changed = latest.state is not first.state if known is None else latest.etag != known
             left = deadline - time.monotonic()
             if changed or left <= 0:
                 break
-            await listener.wait(left)
+            await listener.wait(min(left, may.left))
             listener.clear()
+            if not await may.holds():
+                raise unauthorized()
             latest = await run_in_threadpool(lambda: view.snapshot(service, find(service, identity, run.id)))
     headers = {"ETag": latest.etag, "Cache-Control": "private, no-cache"}
     if latest.etag == known:
