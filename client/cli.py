@@ -17,7 +17,9 @@ from conoid.cases.plausible import doubts
 from conoid.cases.run import ExitCode, State
 
 from . import benches, reports, shelf, tables, viewing
+from .batch import batch_run, cancel_folder, slurm_of
 from .errors import ClientError
+from .following import FolderRun
 from .live import Live, exit_code
 from .once import run_once
 from .options import (
@@ -25,6 +27,7 @@ from .options import (
     Json,
     Labels,
     Overrides,
+    SourceArgument,
     Token,
     Url,
     complain,
@@ -123,6 +126,7 @@ def submit(
     overrides: Overrides = None,
     key: Annotated[str | None, typer.Option("--key", help="Idempotency key: the same one makes no second run.")] = None,
     label: Labels = None,
+    profile: Annotated[str, typer.Option("--profile", help="Of the site's batch system; its default.")] = "",
     url: Url = None,
     token: Token = None,
     as_json: Json = False,
@@ -130,7 +134,7 @@ def submit(
     """Hand a case to the server; prints the run's id."""
     warn_of(case, overrides or ())
     with connect(url, token) as session:
-        run = session.submit(case, overrides or (), key, labels_of(label))
+        run = session.submit(case, overrides or (), key, labels_of(label), profile)
         if as_json:
             show_json(run.status())
         else:
@@ -176,25 +180,32 @@ def show_run(run: RunArgument, url: Url = None, token: Token = None, as_json: Js
 
 @app.command(name="watch", short_help="Follow a run until it ends.")
 def watch_run(
-    run: RunArgument,
+    run: SourceArgument,
     plain: Annotated[bool, typer.Option("--plain", help="Lines instead of the panel.")] = False,
     url: Url = None,
     token: Token = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print every message as one line of JSON.")] = False,
 ) -> None:
     """Follow a run until it ends: 0 succeeded, 1 failed, 2 bad input, 4 cancelled. Ctrl-C leaves it running."""
+    if Path(run).is_dir():
+        known = watch(FolderRun(Path(run), slurm_of(None).bin), False if plain else None)
+    else:
+        known = _watched(run, plain, url, token, as_json)
+    if known.message or known.cause:
+        complain(f"{known.run} {known.state.value}: {known.message or known.cause}")
+    raise typer.Exit(exit_code(known.state, known.cause))
+
+
+def _watched(run: str, plain: bool, url: str | None, token: str | None, as_json: bool) -> Live:
     with connect(url, token) as session:
         found = find(session, run)
         if as_json:
             raise typer.Exit(_print_messages(found))
         try:
-            known = watch(found, False if plain else None)
+            return watch(found, False if plain else None)
         except KeyboardInterrupt:
             complain(f"the run goes on; conoid watch {found.id} shows it again")
             raise
-    if known.message or known.cause:
-        complain(f"{known.run} {known.state.value}: {known.message or known.cause}")
-    raise typer.Exit(exit_code(known.state, known.cause))
 
 
 def _print_messages(run: Run) -> int:
@@ -215,7 +226,10 @@ def _tell(info: RunInfo, text: str, as_json: bool) -> None:
 
 @app.command()
 def cancel(run: RunArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
-    """Stop a run at its next step."""
+    """Stop a run at its next step; of a run without a server, name the folder."""
+    if Path(run).is_dir():
+        typer.echo(cancel_folder(Path(run)))
+        return
     with connect(url, token) as session:
         info = find(session, run).cancel()
     _tell(info, f"{info.id} {info.state.value}", as_json)
@@ -261,6 +275,7 @@ def get(
             typer.echo(str(found.download(target, name)))
 
 
+app.command(name="batch", short_help="Hand a case to Slurm, without a server.")(batch_run)
 app.command(name="view", short_help="Draw frames, off screen.")(viewing.view_frames)
 app.command(name="replay-balance", short_help="The loads of a run under another balance policy.")(
     reports.replay_balance
