@@ -81,7 +81,9 @@ def hand_over(
         chosen = batch.profile_of(site, profile)
         job = _known(folder, site) if folder.exists() else None
         if job is None:
-            job = _prepared(folder, _with_paths(data, locate(case).parent), resolved_json(checked), ranks, chosen)
+            job = _prepared(
+                folder, _with_paths(data, locate(case).parent), resolved_json(checked), ranks, chosen, site.bin
+            )
         number = slurm.submit(site.bin, folder, job, batch.profile_of(site, job.profile)[1])
         noted = batch.Job(**{**{name: getattr(job, name) for name in job.__struct_fields__}, "job": number})
         whole.write(folder / layout.JOB, batch.to_json(noted))
@@ -108,13 +110,13 @@ def _known(folder: Path, site: Slurm) -> Job | None:
         return job
     (folder / layout.STOP_REQUEST).unlink(missing_ok=True)
     profile = batch.profile_of(site, job.profile)
-    fresh = batch.new_job(job.run, job.ranks, profile, job.command, time.time(), job.attempt + 1)
+    fresh = batch.new_job(job.run, job.ranks, profile, job.command, time.time(), job.attempt + 1, site.bin)
     whole.write(folder / layout.JOB, batch.to_json(fresh))
     return fresh
 
 
 def _prepared(
-    folder: Path, data: dict[str, Any], resolved: bytes, ranks: int, profile: tuple[str, batch.Profile]
+    folder: Path, data: dict[str, Any], resolved: bytes, ranks: int, profile: tuple[str, batch.Profile], place: str
 ) -> Job:  # fmt: skip
     """The run's folder, complete on disk before Slurm hears of it."""
     (folder / layout.LOGS).mkdir(parents=True, exist_ok=True)
@@ -124,7 +126,7 @@ def _prepared(
     worker = [sys.executable, "-m", "mpi4py", "-m", "conoid.worker", str(case), "--out", str(folder)]
     command = [*batch.starter(profile[1], ranks, [_mpiexec()]), *worker]
     command += ["--run", folder.name, "--ranks", str(ranks), "--interruptible"]
-    job = batch.new_job(folder.name, ranks, profile, command, time.time())
+    job = batch.new_job(folder.name, ranks, profile, command, time.time(), place=place)
     told = messages.Status(run=folder.name, seq=1, wall=time.time(), state=State.QUEUED, message="handed to Slurm")
     (folder / layout.JOURNAL).write_bytes(messages.to_json(told) + b"\n")
     whole.write(folder / layout.JOB_SCRIPT, batch.script(profile[1], sys.executable).encode(), 0o755)
