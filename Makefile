@@ -2,7 +2,7 @@
 # make test   linters, types and every test that takes seconds
 # make bench  speed, and speed against error, in 15 minutes: tables in build/bench (BENCH=quick: 2, BENCH=long: 60)
 # make reference  docs/case.md and the JSON schema, from the texts of the models in cases/
-# make drill  the long tests: studies and failures that take minutes
+# make drill  the long tests: studies and failures that take minutes; root on Debian gets Slurm for those of a cluster
 #
 # Each target first brings .venv to the versions of requirements.lock, when that file or pyproject.toml has changed.
 # Kernels are compiled while pip installs what they do not need. Nothing takes 10 s without a word.
@@ -47,6 +47,8 @@ reference: $(READY)
 	$(BIN)/conoid schema --page --out docs/case.md
 
 drill: $(READY)
+	@if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null && ! command -v slurmctld >/dev/null; then \
+		apt-get install -y --no-install-recommends slurm-wlm munge || echo "without Slurm: its tests are skipped"; fi
 	$(BIN)/python -m pytest -q -m slow --timeout 3600 --ignore tests/bench tests
 
 $(READY): requirements.lock pyproject.toml

@@ -63,6 +63,13 @@ class Slurm(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
     """Folder of sbatch, squeue, scancel, scontrol; empty: they are in PATH."""
     router: str = ""
     """The server's Zenoh router as compute nodes reach it; empty: the address of this machine alone."""
+    listen: str = ""
+    """Where the router listens for compute nodes besides, such as ``tls/0.0.0.0:7448``."""
+    certificate: str = ""
+    key: str = ""
+    """Of the router; needed where it listens with TLS."""
+    authority: str = ""
+    """The certificate by which the nodes know the router: a file that they see."""
     poll: float = 2.0
     """s between two looks at the queue: one squeue for all runs. Chosen."""
     slots: int = 100_000
@@ -91,6 +98,8 @@ class Job(msgspec.Struct, kw_only=True, frozen=True):
     """Unix s."""
     notice: float
     """s before the time limit at which the run is told."""
+    bin: str = ""
+    """Folder of Slurm's commands; empty: they are in PATH."""
     job: str = ""
     """The number that the batch system gave; empty until it is known."""
     accounting: dict[str, str] = {}
@@ -104,6 +113,8 @@ class Access(msgspec.Struct, kw_only=True, frozen=True):
     prefix: str
     user: str = ""
     password: str = ""
+    authority: str = ""
+    """Of the router's certificate, where it speaks TLS."""
 
 
 _job, _access = msgspec.json.Decoder(Job), msgspec.json.Decoder(Access)
@@ -131,6 +142,8 @@ def _check(slurm: Slurm) -> None:
     if not slurm.profiles:
         raise ValueError("slurm.profiles: at least one is needed")
     profile_of(slurm, "")
+    if slurm.listen.startswith("tls/") and not (slurm.certificate and slurm.key and slurm.authority):
+        raise ValueError("slurm.listen: tls/ needs slurm.certificate, slurm.key and slurm.authority")
     for name, profile in slurm.profiles.items():
         if not re.fullmatch(r"[A-Za-z0-9_-]{1,32}", name):
             raise ValueError(f"slurm.profiles.{name}: allowed: 1 to 32 letters, digits, '_' and '-'")
@@ -151,13 +164,20 @@ def _seconds(text: str) -> float:
 
 
 def new_job(
-    run: str, ranks: int, profile: tuple[str, Profile], command: list[str], now: float, attempt: int = 1
+    run: str,
+    ranks: int,
+    profile: tuple[str, Profile],
+    command: list[str],
+    now: float,
+    attempt: int = 1,
+    place: str = "",
 ) -> Job:
     """The record of an attempt that nobody has handed over yet."""
     word = re.sub(r"[^A-Za-z0-9_.-]", "_", run)[:60]
     return Job(
         run=run, name=f"conoid-{word}-{attempt}-{secrets.token_hex(4)}", attempt=attempt, ranks=ranks,
         profile=profile[0], command=command, submitted=now, notice=_seconds(profile[1].notice),
+        bin=place,
     )  # fmt: skip
 
 

@@ -15,6 +15,7 @@ from conoid.cases.plausible import doubts
 from conoid.cases.run import ExitCode
 
 from . import benches, commands, converging, hard, reports, shelf, tables, viewing
+from .batch import batch_run
 from .errors import ClientError
 from .once import run_once
 from .options import (
@@ -111,6 +112,7 @@ app.command()(commands.cancel)
 app.command()(commands.checkpoint)
 app.command()(commands.snapshot)
 app.command()(commands.get)
+app.command(name="batch", short_help="Hand a case to Slurm, without a server.")(batch_run)
 app.command(name="view", short_help="Draw frames, off screen.")(viewing.view_frames)
 app.command(name="replay-balance", short_help="The loads of a run under another balance policy.")(
     reports.replay_balance

@@ -11,12 +11,15 @@ from conoid.cases import layout
 from conoid.cases.run import State
 
 from . import tables
+from .batch import cancel_folder, slurm_of
+from .following import FolderRun
 from .live import Live, exit_code
 from .options import (
     CaseArgument,
     Json,
     Labels,
     Overrides,
+    SourceArgument,
     Token,
     Url,
     complain,
@@ -38,6 +41,7 @@ def submit(
     overrides: Overrides = None,
     key: Annotated[str | None, typer.Option("--key", help="Idempotency key: the same one makes no second run.")] = None,
     label: Labels = None,
+    profile: Annotated[str, typer.Option("--profile", help="Of the site's batch system; its default.")] = "",
     url: Url = None,
     token: Token = None,
     as_json: Json = False,
@@ -45,7 +49,7 @@ def submit(
     """Hand a case to the server; prints the run's id."""
     warn_of(case, overrides or ())
     with connect(url, token) as session:
-        run = session.submit(case, overrides or (), key, labels_of(label))
+        run = session.submit(case, overrides or (), key, labels_of(label), profile)
         if as_json:
             show_json(run.status())
         else:
@@ -88,25 +92,32 @@ def show_run(run: RunArgument, url: Url = None, token: Token = None, as_json: Js
 
 
 def watch_run(
-    run: RunArgument,
+    run: SourceArgument,
     plain: Annotated[bool, typer.Option("--plain", help="Lines instead of the panel.")] = False,
     url: Url = None,
     token: Token = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print every message as one line of JSON.")] = False,
 ) -> None:
     """Follow a run until it ends: 0 succeeded, 1 failed, 2 bad input, 4 cancelled. Ctrl-C leaves it running."""
+    if Path(run).is_dir():
+        known = watch(FolderRun(Path(run), slurm_of(None).bin), False if plain else None)
+    else:
+        known = _watched(run, plain, url, token, as_json)
+    if known.message or known.cause:
+        complain(f"{known.run} {known.state.value}: {known.message or known.cause}")
+    raise typer.Exit(exit_code(known.state, known.cause))
+
+
+def _watched(run: str, plain: bool, url: str | None, token: str | None, as_json: bool) -> Live:
     with connect(url, token) as session:
         found = find(session, run)
         if as_json:
             raise typer.Exit(_print_messages(found))
         try:
-            known = watch(found, False if plain else None)
+            return watch(found, False if plain else None)
         except KeyboardInterrupt:
             complain(f"the run goes on; conoid watch {found.id} shows it again")
             raise
-    if known.message or known.cause:
-        complain(f"{known.run} {known.state.value}: {known.message or known.cause}")
-    raise typer.Exit(exit_code(known.state, known.cause))
 
 
 def _print_messages(run: Run) -> int:
@@ -126,7 +137,10 @@ def _tell(info: RunInfo, text: str, as_json: bool) -> None:
 
 
 def cancel(run: RunArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
-    """Stop a run at its next step."""
+    """Stop a run at its next step; of a run without a server, name the folder."""
+    if Path(run).is_dir():
+        typer.echo(cancel_folder(Path(run)))
+        return
     with connect(url, token) as session:
         info = find(session, run).cancel()
     _tell(info, f"{info.id} {info.state.value}", as_json)

@@ -59,7 +59,7 @@ def opened(settings: Settings) -> Iterator[Service]:
         telemetry = None
         if settings.zenoh_port is not None:
             tokens = store.tokens() if settings.auth else None
-            telemetry = Telemetry(settings.runs, settings.host, settings.zenoh_port, tokens)
+            telemetry = Telemetry(settings.runs, settings.host, settings.zenoh_port, tokens, settings.site.slurm)
             stack.callback(telemetry.close)
         bell = Bell()
         supervisor = Supervisor(settings, store, launcher_of(settings), telemetry, bell.ring)

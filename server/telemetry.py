@@ -20,6 +20,7 @@ from typing import Any
 import zenoh
 
 from conoid.cases import keys
+from conoid.cases.batch import Slurm
 from conoid.cases.messages import Status, to_msgpack
 
 from . import durable
@@ -51,9 +52,14 @@ class Reader:
 class Telemetry:
     """An open router session. Methods may be called from any thread."""
 
-    def __init__(self, runs: Path, host: str, port: int, tokens: Iterable[Token] | None) -> None:
-        """``tokens`` is None for a router without access control. Raises TelemetryError."""
-        self._runs, self._host = runs, host
+    def __init__(
+        self, runs: Path, host: str, port: int, tokens: Iterable[Token] | None, nodes: Slurm | None = None
+    ) -> None:
+        """``tokens`` is None for a router without access control; ``nodes``: where it listens for those of a cluster.
+
+        Raises TelemetryError.
+        """
+        self._runs, self._host, self._nodes = runs, host, nodes
         self.port = port or _free_port(host)
         self._secret = _read_secret(runs)
         self._lock = threading.Lock()
@@ -141,6 +147,11 @@ class Telemetry:
             "scouting/delay": 0,
             "transport/shared_memory/enabled": False,
         }
+        if self._nodes is not None and self._nodes.listen:
+            config["listen/endpoints"].append(self._nodes.listen)
+            if self._nodes.certificate:
+                config["transport/link/tls/listen_certificate"] = self._nodes.certificate
+                config["transport/link/tls/listen_private_key"] = self._nodes.key
         if self._tokens is not None:
             owners = {owner for _, owner in self._tokens}
             names = [*(token for token, _ in self._tokens), *map(_worker_user, owners)]

@@ -113,6 +113,8 @@ def environment(base: Mapping[str, str], job: Job, access: batch.Access | None) 
     env = {**base, **dict.fromkeys(_ONE_THREAD, "1"), "CONOID_RUN": job.run}
     if access is not None and access.user:
         env |= {"CONOID_ZENOH_USER": access.user, "CONOID_ZENOH_PASSWORD": access.password}
+    if access is not None and access.authority:
+        env["CONOID_ZENOH_AUTHORITY"] = access.authority
     return env
 
 
@@ -120,7 +122,7 @@ def _interrupted(folder: Path, job: Job, number: str, further: bool) -> int | No
     """Settles what the signal was; None when that is left to others. ``further``: there is a new checkpoint."""
     if (folder / layout.STOP_REQUEST).exists():
         return _cancelled(folder, job, "stopped on request")
-    verdict = judge(_details(number), int(os.environ.get("SLURM_RESTART_COUNT", "0")), job.notice, time.time())
+    verdict = judge(_details(job.bin, number), int(os.environ.get("SLURM_RESTART_COUNT", "0")), job.notice, time.time())
     if verdict == "cancelled":
         return _cancelled(folder, job, f"Slurm job {number} was cancelled")
     if verdict == "time limit" and not further:
@@ -130,7 +132,7 @@ def _interrupted(folder: Path, job: Job, number: str, further: bool) -> int | No
     if verdict == "unknown":
         return None
     _say(folder, job, State.QUEUED, f"{verdict}: job {number} waits for its turn again")
-    return _again(number) if verdict != "requeued" else 0
+    return _again(job.bin, number) if verdict != "requeued" else 0
 
 
 def judge(found: Mapping[str, str], restarts: int, notice: float, now: float) -> str:
@@ -160,19 +162,19 @@ def _seconds(text: str) -> float | None:
     return int(days or 0) * 86400.0 + sum(int(part) * 60.0**place for place, part in enumerate(reversed(parts)))
 
 
-def _details(number: str) -> dict[str, str]:
+def _details(place: str, number: str) -> dict[str, str]:
     deadline = time.monotonic() + _ASK_FOR
     while time.monotonic() < deadline:
         try:
-            return slurm.details("", number)
+            return slurm.details(place, number)
         except slurm.SlurmError:
             time.sleep(1.0)
     return {}
 
 
-def _again(number: str) -> int | None:
+def _again(place: str, number: str) -> int | None:
     try:
-        slurm.requeue("", number)
+        slurm.requeue(place, number)
     except slurm.SlurmError as error:
         print(f"job {number}: it cannot be put back: {error}", flush=True)
         return None

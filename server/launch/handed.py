@@ -38,7 +38,7 @@ class SlurmWorker:
         self._entry: Entry | None = None
         self._exit: Exit | None = None
         self._stop, self._kill, self._told = (folder / layout.STOP_REQUEST).exists(), False, ""
-        self._missing, self._ended, self._away = 0, 0.0, 0.0
+        self._missing, self._ended, self._away, self._why = 0, 0.0, 0.0, ""
 
     @property
     def name(self) -> str:
@@ -64,7 +64,7 @@ class SlurmWorker:
         entry, number = self._entry, self._job.job
         if self._away:
             last = f"; job {number} was {entry.state.lower()} then" if entry else ""
-            return f"unknown: Slurm has not answered for {time.monotonic() - self._away:.0f} s{last}"
+            return f"unknown: Slurm has not answered for {time.monotonic() - self._away:.0f} s ({self._why}){last}"
         if entry is None:
             return f"Slurm is asked about job {number}" if number else "is being handed to Slurm"
         return f"Slurm job {number} is pending: {entry.reason}" if entry.state in slurm.PENDING else ""
@@ -98,9 +98,9 @@ class SlurmWorker:
         """True when nothing is left to do with Slurm."""
         return self._exit is not None
 
-    def silent(self) -> None:
+    def silent(self, why: str) -> None:
         """Slurm does not answer. What was known stays."""
-        self._away = self._away or time.monotonic()
+        self._away, self._why = self._away or time.monotonic(), why
 
     def turn(self, entries: list[Entry]) -> None:
         """What is due now; ``entries``: the jobs of this name that Slurm knows. Raises SlurmError, OSError."""
@@ -186,7 +186,7 @@ class SlurmWorker:
             return
         profile = batch.profile_of(self._site, self._job.profile)
         job, attempt = self._job, self._job.attempt + 1
-        fresh = batch.new_job(job.run, job.ranks, profile, job.command, time.time(), attempt)
+        fresh = batch.new_job(job.run, job.ranks, profile, job.command, time.time(), attempt, job.bin)
         whole.write(self._folder / layout.JOB, batch.to_json(fresh))
         self._job, self._entry, self._ended, self._missing, self._told = fresh, None, 0.0, 0, ""
 

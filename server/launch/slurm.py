@@ -35,7 +35,7 @@ class SlurmLauncher:
         try:
             profile = batch.profile_of(self._site, job.profile)
             command = [*batch.starter(profile[1], job.ranks, [*find_mpiexec(self._mpiexec)]), *self._words(job)]
-            record = batch.new_job(job.run, job.ranks, profile, command, time.time())
+            record = batch.new_job(job.run, job.ranks, profile, command, time.time(), place=self._site.bin)
             if job.telemetry is not None:
                 self._write_access(job)
             whole.write(job.folder / layout.JOB_SCRIPT, batch.script(profile[1], sys.executable).encode(), 0o755)
@@ -67,8 +67,9 @@ class SlurmLauncher:
         assert job.telemetry is not None
         told = job.telemetry
         access = batch.Access(
-            endpoint=self._site.router or told.endpoint, prefix=told.prefix, user=told.user, password=told.password
-        )
+            endpoint=self._site.router or told.endpoint, prefix=told.prefix, user=told.user, password=told.password,
+            authority=self._site.authority,
+        )  # fmt: skip
         whole.write(job.folder / layout.ACCESS, batch.to_json(access), 0o600)
 
     def _take(self, run: str, worker: SlurmWorker) -> SlurmWorker:
@@ -102,16 +103,20 @@ class SlurmLauncher:
         except slurm.SlurmError as error:
             _log.warning("Slurm does not answer: %s", error)
             for _, worker in workers:
-                worker.silent()
+                worker.silent(str(error))
             return
         for run, worker in workers:
-            self._attend(run, worker, found.get(worker.name, []))
+            if not self._attend(run, worker, found.get(worker.name, [])):
+                return
 
-    def _attend(self, run: str, worker: SlurmWorker, entries: list[Entry]) -> None:
+    def _attend(self, run: str, worker: SlurmWorker, entries: list[Entry]) -> bool:
+        """False when Slurm has not answered, so that nobody else waits for it."""
         try:
             worker.turn(entries)
         except slurm.SlurmError as error:
             _log.warning("run %s: Slurm does not answer: %s", run, error)
-            worker.silent()
+            worker.silent(str(error))
+            return False
         except (OSError, ValueError) as error:
             _log.error("run %s: %s", run, error)
+        return True

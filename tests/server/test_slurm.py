@@ -13,7 +13,9 @@ from typing import Any
 import pytest
 
 from conoid.cases import layout
+from conoid.cases.messages import AnyMessage, Finished, Progress
 from conoid.cases.run import State
+from conoid.client import connect
 from conoid.server.settings import WORKER
 
 from ..parallel.launching import command, ended
@@ -107,7 +109,8 @@ def solver(cluster: Cluster, tmp_path: Path) -> Iterator[Site]:
     """The same with the real worker."""
     (tmp_path / "site.toml").write_text(SITE)
     with processes(tmp_path) as make:
-        server = make("--site", str(tmp_path / "site.toml"), "--slots", "1000", "--worker", shlex.join(WORKER))
+        options = ("--slots", "1000", "--zenoh-port", "0", "--worker", shlex.join(WORKER))
+        server = make("--site", str(tmp_path / "site.toml"), *options)
         yield Site(cluster, server, server.user(server.start()["url"]))
 
 
@@ -134,6 +137,7 @@ def test_a_job_that_slurm_refuses_fails_at_once_with_its_words(site: Site) -> No
     assert "Invalid partition name" in ended["message"]
 
 
+@pytest.mark.slow
 def test_scancel_by_hand_is_a_cancel(site: Site) -> None:
     run = site.submit(case_text(steps=100_000, pace=0.02))
     site.reached(run, 30.0, State.RUNNING)
@@ -142,6 +146,7 @@ def test_scancel_by_hand_is_a_cancel(site: Site) -> None:
     assert (ended["state"], ended["cause"]) == ("cancelled", "cancelled")
 
 
+@pytest.mark.slow
 def test_a_server_that_dies_finds_its_jobs_again(site: Site, tmp_path: Path) -> None:
     large = site.submit(case_text(ranks=2 * real_slurm.CORES))
     runs = [site.submit(case_text(wait=str(tmp_path / "go"))) for _ in range(3)]
@@ -156,6 +161,7 @@ def test_a_server_that_dies_finds_its_jobs_again(site: Site, tmp_path: Path) -> 
     assert site.ended(large)["state"] == "cancelled"
 
 
+@pytest.mark.slow
 def test_a_controller_that_is_away_is_no_state_of_a_run(site: Site, tmp_path: Path) -> None:
     run = site.submit(case_text(wait=str(tmp_path / "go")))
     site.reached(run, 30.0, State.RUNNING)
@@ -246,6 +252,33 @@ def test_two_ranks_by_both_launchers(solver: Site, profile: str) -> None:
     ended = solver.ended(run, 300.0)
     assert ended["state"] == "succeeded", (ended["message"], solver.tail(run))
     assert (ended["outcome"]["ranks"], ended["outcome"]["digest"][:16]) == (2, DIGEST)
+
+
+@pytest.mark.slow
+def test_a_run_is_watched_live_over_zenoh(solver: Site) -> None:
+    """Its rank 0 publishes with the credentials of a hidden file, for its owner alone."""
+    run = solver.submit(with_ranks(2, LONG), "pmi2")
+    token = str(solver.ann.http.headers["Authorization"]).removeprefix("Bearer ")
+    heard: list[AnyMessage] = []
+    with connect(str(solver.ann.http.base_url), token) as session:
+        link = session.run(run).link()
+        assert link.name == "Zenoh"
+        deadline = time.monotonic() + 200.0
+        while not any(isinstance(message, Finished) for message in heard):
+            assert time.monotonic() < deadline, solver.tail(run)
+            if (message := link.get(1.0)) is not None:
+                heard.append(message)
+        link.close()
+    assert sum(isinstance(message, Progress) for message in heard) > 5
+    numbers = [message.seq for message in heard]
+    assert numbers == list(range(numbers[0], numbers[-1] + 1)), "nothing was lost on the way"
+    assert solver.ended(run)["state"] == "succeeded"
+    folder = solver.server.runs / run
+    assert (folder / layout.ACCESS).stat().st_mode & 0o777 == 0o600
+    assert json.loads((folder / layout.ACCESS).read_text())["password"] not in (folder / layout.JOB).read_text()
+    listed = [entry["path"] for entry in solver.ann.http.get(f"/v1/runs/{run}/files").json()["files"]]
+    assert layout.JOB in listed
+    assert layout.ACCESS not in listed
 
 
 @pytest.fixture(scope="module")

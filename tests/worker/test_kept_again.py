@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
 import pytest
 
 from conoid.cases import schema
@@ -63,7 +62,7 @@ def course(comm: Comm, folder: Path, cases: Sequence[schema.Case], stops: Sequen
     sim, lines = simulation.build(cases[0], Path(), comm), list[Energy]()
     step.prepare(sim)
     for number in range(STEPS):
-        for k in np.flatnonzero(np.array(stops, int) == number):
+        for k in (k for k, stop in enumerate(stops) if stop == number):
             sim = kept_again(sim, cases[(k + 1) % len(cases)], folder)
         before = sim.model.nodes.v.copy()
         step.first_half(sim)

@@ -118,6 +118,8 @@ def _config(endpoint: str) -> zenoh.Config:
     if user := os.environ.get("CONOID_ZENOH_USER"):
         settings["transport/auth/usrpwd/user"] = user
         settings["transport/auth/usrpwd/password"] = os.environ.get("CONOID_ZENOH_PASSWORD", "")
+    if authority := os.environ.get("CONOID_ZENOH_AUTHORITY"):
+        settings["transport/link/tls/root_ca_certificate"] = authority
     for key, value in settings.items():
         config.insert_json5(key, json.dumps(value))
     return config

@@ -1,0 +1,164 @@
+"""``conoid batch``: a run as a job of Slurm, without a server. The folder is the same, and so is the result."""
+
+import json
+import os
+import shutil
+import sys
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from conoid.cases import batch, layout, messages, slurm, whole
+from conoid.cases.batch import Job, Slurm
+from conoid.cases.load import parse_case, resolved_json
+from conoid.cases.run import State
+
+from .errors import ClientError
+from .options import CaseArgument, Json, Overrides, show_json, warn_of
+from .submission import data_of, locate
+
+_PLACES = ("~/.config/conoid/site.toml", "/etc/conoid/site.toml")
+
+
+@dataclass(frozen=True)
+class Handed:
+    """What was handed over."""
+
+    folder: Path
+    job: str
+    profile: str
+    attempt: int
+
+
+def batch_run(
+    case: CaseArgument,
+    ranks: Annotated[int, typer.Option("--ranks", min=1, help="MPI ranks.")],
+    profile: Annotated[
+        str, typer.Option("--slurm", metavar="PROFILE", help="A profile of the site; its default.")
+    ] = "",
+    out: Annotated[Path | None, typer.Option("--out", help="The run's folder; runs/<name> when not given.")] = None,
+    overrides: Overrides = None,
+    site: Annotated[
+        Path | None, typer.Option("--site", help="The site's settings file [CONOID_SITE, or where the site has it].")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Hand a case to Slurm, without a server; prints the job's number. conoid watch FOLDER follows it.
+
+    The same command again makes no second job: it tells the one that there is, or goes on with a run that was lost.
+    """
+    warn_of(case, overrides or ())
+    handed = hand_over(case, ranks, overrides or (), out, profile, slurm_of(site))
+    if as_json:
+        show_json({"folder": str(handed.folder), "job": handed.job, "attempt": handed.attempt})
+    else:
+        typer.echo(f"job {handed.job}  profile {handed.profile}  folder {handed.folder}")
+
+
+def slurm_of(site: Path | None) -> Slurm:
+    """The site's Slurm; without a settings file one profile that leaves everything to Slurm. Raises ClientError."""
+    named = site or (Path(os.environ["CONOID_SITE"]) if os.environ.get("CONOID_SITE") else None)
+    found = named or next((path for place in _PLACES if (path := Path(place).expanduser()).is_file()), None)
+    try:
+        settings = batch.read_site(found).slurm if found is not None else None
+    except batch.SiteError as error:
+        raise ClientError(str(error)) from None
+    return settings or Slurm(profiles={"default": batch.Profile()})
+
+
+def hand_over(
+    case: str, ranks: int, overrides: Iterable[str], out: Path | None, profile: str, site: Slurm
+) -> Handed:  # fmt: skip
+    """One job for the run in a folder, whatever happened before. Raises CaseError, ClientError."""
+    data = data_of(case, [*overrides, f"run.ranks={ranks}"])
+    checked = parse_case(data)
+    folder = (out or Path("runs") / checked.name).resolve()
+    try:
+        chosen = batch.profile_of(site, profile)
+        job = _known(folder, site) if folder.exists() else None
+        if job is None:
+            job = _prepared(
+                folder, _with_paths(data, locate(case).parent), resolved_json(checked), ranks, chosen, site.bin
+            )
+        number = slurm.submit(site.bin, folder, job, batch.profile_of(site, job.profile)[1])
+        noted = batch.Job(**{**{name: getattr(job, name) for name in job.__struct_fields__}, "job": number})
+        whole.write(folder / layout.JOB, batch.to_json(noted))
+    except slurm.AwayError as error:
+        raise ClientError(f"{error}; nobody knows whether there is a job: the same command again finds out") from None
+    except (slurm.SlurmError, ValueError) as error:
+        raise ClientError(str(error)) from None
+    except OSError as error:
+        raise ClientError(f"{error.filename or folder}: {error.strerror}") from None
+    return Handed(folder, number, job.profile, job.attempt)
+
+
+def _known(folder: Path, site: Slurm) -> Job | None:
+    """The record of a folder that was handed over before: of its job, or of a next one when that is lost."""
+    job = batch.read_job(folder)
+    if job is None:
+        if any(folder.iterdir()):
+            raise ClientError(f"{folder}: not empty, and no run of Slurm; --out names another folder")
+        return None
+    if (folder / layout.OUTCOME).exists():
+        raise ClientError(f"{folder}: this run has ended; --out names another folder")
+    known = slurm.jobs(site.bin, job.name)
+    if not job.job or any(entry.state not in slurm.FINAL for entry in known) or slurm.held(folder):
+        return job
+    (folder / layout.STOP_REQUEST).unlink(missing_ok=True)
+    profile = batch.profile_of(site, job.profile)
+    fresh = batch.new_job(job.run, job.ranks, profile, job.command, time.time(), job.attempt + 1, site.bin)
+    whole.write(folder / layout.JOB, batch.to_json(fresh))
+    return fresh
+
+
+def _prepared(
+    folder: Path, data: dict[str, Any], resolved: bytes, ranks: int, profile: tuple[str, batch.Profile], place: str
+) -> Job:  # fmt: skip
+    """The run's folder, complete on disk before Slurm hears of it."""
+    (folder / layout.LOGS).mkdir(parents=True, exist_ok=True)
+    case = folder / "case.json"
+    case.write_text(json.dumps(data, indent=2, default=str), encoding="utf-8")
+    (folder / layout.RESOLVED_CASE).write_bytes(resolved)
+    worker = [sys.executable, "-m", "mpi4py", "-m", "conoid.worker", str(case), "--out", str(folder)]
+    command = [*batch.starter(profile[1], ranks, [_mpiexec()]), *worker]
+    command += ["--run", folder.name, "--ranks", str(ranks), "--interruptible"]
+    job = batch.new_job(folder.name, ranks, profile, command, time.time(), place=place)
+    told = messages.Status(run=folder.name, seq=1, wall=time.time(), state=State.QUEUED, message="handed to Slurm")
+    (folder / layout.JOURNAL).write_bytes(messages.to_json(told) + b"\n")
+    whole.write(folder / layout.JOB_SCRIPT, batch.script(profile[1], sys.executable).encode(), 0o755)
+    whole.write(folder / layout.JOB, batch.to_json(job))
+    return job
+
+
+def _with_paths(data: dict[str, Any], base: Path) -> dict[str, Any]:
+    """Mesh files by their full path: the case is copied into the run's folder."""
+    for part in data.get("parts", []):
+        mesh = part.get("mesh", {})
+        if isinstance(mesh.get("path"), str):
+            mesh["path"] = str((base / mesh["path"]).resolve())
+    return data
+
+
+def _mpiexec() -> str:
+    beside = Path(sys.executable).with_name("mpiexec")
+    found = str(beside) if beside.is_file() else shutil.which("mpiexec")
+    if found is None:
+        raise ClientError("no mpiexec: install conoid[mpich], or name the site's own in the profile")
+    return found
+
+
+def cancel_folder(folder: Path) -> str:
+    """Asks the run in a folder to stop for good, and Slurm to end its job when that waits; one line that says so."""
+    (folder / layout.STOP_REQUEST).touch()
+    job = batch.read_job(folder)
+    if job is None or not job.job:
+        return f"{folder} is asked to stop"
+    try:
+        slurm.notify(slurm_of(None).bin, job.job)
+    except slurm.SlurmError as error:
+        return f"{folder} is asked to stop; Slurm does not answer: {error}"
+    return f"{folder} is asked to stop, job {job.job}"

@@ -1,0 +1,121 @@
+"""``conoid watch FOLDER``: follows a run by the journal in its folder, without a server; asks Slurm why it waits."""
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from conoid.cases import batch, layout, slurm
+from conoid.cases.messages import AnyMessage, Finished, Status
+from conoid.cases.outcome import from_json
+from conoid.cases.run import Cause, State
+
+from .journal import from_line
+from .link import Link
+
+_PAUSE = 0.5
+"""s between two looks at the journal. Chosen: a run reports four times a second."""
+_ASK_EVERY = 10.0
+"""s of silence after which Slurm is asked. Chosen: a few hundred watchers are one request in 30 ms."""
+
+
+@dataclass(frozen=True)
+class Titled:
+    """What ``watch`` shows above all."""
+
+    title: str
+
+
+class _File:
+    name = "journal"
+
+    def get(self, timeout: float) -> AnyMessage | None:
+        """Nothing comes by itself."""
+        return None
+
+    def close(self) -> None:
+        """There is nothing to let go."""
+
+
+class FolderRun:
+    """A run in a folder, as ``watch`` wants one."""
+
+    def __init__(self, folder: Path, place: str = "") -> None:
+        """``place``: the folder of Slurm's commands; empty: they are in PATH."""
+        self.folder, self._place = folder.resolve(), place
+        self.id = self.folder.name
+        self._asked, self._told = time.monotonic(), ""
+
+    def status(self) -> Titled:
+        """The title of its case, when that is there already."""
+        try:
+            case = msgspec.json.decode((self.folder / layout.RESOLVED_CASE).read_bytes())
+        except (OSError, msgspec.MsgspecError):
+            return Titled("")
+        return Titled(str(case.get("title") or case.get("name", "")))
+
+    def link(self) -> Link:
+        """The journal itself."""
+        return _File()
+
+    def messages(
+        self, *, link: Link | None = None, pause: Callable[[float], None] = time.sleep
+    ) -> Iterator[AnyMessage]:
+        """Every line once and in order, then how the run has ended."""
+        offset, last = 0, None
+        while True:
+            raw, offset = self._read(offset)
+            for line in raw:
+                last = from_line(line)
+                yield last
+                if isinstance(last, Status) and State(last.state).final:
+                    return
+            if isinstance(last, Finished) and (end := self._outcome()) is not None:
+                yield end
+                return
+            if not raw:
+                yield from self._ask()
+                pause(_PAUSE)
+            else:
+                self._asked = time.monotonic()
+
+    def _read(self, offset: int) -> tuple[list[bytes], int]:
+        """The complete lines from ``offset`` on, and where the next one begins."""
+        try:
+            with (self.folder / layout.JOURNAL).open("rb") as file:
+                file.seek(offset)
+                data = file.read()
+        except FileNotFoundError:
+            return [], offset
+        whole = data[: data.rfind(b"\n") + 1]
+        return whole.splitlines(), offset + len(whole)
+
+    def _outcome(self) -> Status | None:
+        try:
+            end = from_json((self.folder / layout.OUTCOME).read_bytes())
+        except (OSError, msgspec.MsgspecError):
+            return None
+        return self._said(end.state, end.message, end.cause)
+
+    def _said(self, state: str, message: str, cause: str | None = None) -> Status:
+        return Status(run=self.id, wall=time.time(), state=state, cause=cause, message=message)
+
+    def _ask(self) -> Iterator[AnyMessage]:
+        """What Slurm says of a job that is silent; only what is new."""
+        job = batch.read_job(self.folder) if time.monotonic() - self._asked > _ASK_EVERY else None
+        if job is None:
+            return
+        self._asked = time.monotonic()
+        try:
+            entries = slurm.jobs(self._place, job.name)
+        except slurm.SlurmError:
+            return
+        for entry in entries[:1]:
+            if entry.state in slurm.PENDING and entry.reason != self._told:
+                self._told = entry.reason
+                yield self._said(State.QUEUED, f"Slurm job {entry.job} is pending: {entry.reason}")
+            elif entry.state in slurm.FINAL and not slurm.held(self.folder):
+                message = f"Slurm job {entry.job} ended as {entry.state} and left no outcome"
+                yield self._outcome() or self._said(State.LOST, message, Cause.NODE)

@@ -1,0 +1,127 @@
+"""A run as a job of Slurm without a server: the commands of docs/cluster.md, followed."""
+
+import json
+import re
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from conoid.cases import batch, layout
+from conoid.cases.run import State
+from conoid.client.cli import app
+from conoid.client.following import FolderRun
+
+from . import real_slurm
+from .real_slurm import Cluster
+
+ROOT = Path(__file__).parents[2]
+SITE = """
+[slurm.profiles.standard]
+partition = "low"
+lines = ["export HYDRA_IFACE=lo"]
+"""
+needs_slurm = pytest.mark.skipif(bool(real_slurm.missing()), reason=real_slurm.missing() or "Slurm is there")
+
+
+def conoid(*words: object) -> Result:
+    return CliRunner().invoke(app, [str(word) for word in words])
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
+    with real_slurm.running(tmp_path_factory.mktemp("slurm")) as up:
+        yield up
+
+
+@pytest.fixture
+def place(cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "site.toml").write_text(SITE)
+    monkeypatch.setenv("CONOID_SITE", str(tmp_path / "site.toml"))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@needs_slurm
+def test_a_run_without_a_server_is_handed_over_once_and_followed_to_its_end(place: Path, cluster: Cluster) -> None:
+    handed = conoid("batch", "two_tets", "--ranks", 1)
+    assert handed.exit_code == 0, handed.output
+    again = conoid("batch", "two_tets", "--ranks", 1, "--json")
+    folder = place / "runs" / "two_tets"
+    watched = conoid("watch", "--plain", folder)
+    assert watched.exit_code == 0, watched.output + (folder / "log/launcher.log").read_text()
+    assert "succeeded" in watched.output
+    if again.exit_code == 0:
+        assert json.loads(again.stdout)["job"] in handed.stdout
+    assert len(cluster.jobs("conoid-two_tets-")) == 1
+    assert json.loads((folder / layout.OUTCOME).read_text())["state"] == "succeeded"
+    assert "has ended" in conoid("batch", "two_tets", "--ranks", 1).output
+
+
+@needs_slurm
+def test_a_job_that_waits_is_cancelled_by_its_folder(place: Path, cluster: Cluster) -> None:
+    handed = conoid("batch", "two_tets", "--ranks", 2 * real_slurm.CORES, "--out", "large")
+    assert handed.exit_code == 0, handed.output
+    assert "is asked to stop" in conoid("cancel", "large").stdout
+    deadline = time.monotonic() + 20.0
+    while cluster.jobs("conoid-large-")[0][1] != "CANCELLED":
+        assert time.monotonic() < deadline
+        time.sleep(0.2)
+
+
+def test_a_profile_that_is_not_there_is_told_with_those_that_are(tmp_path: Path) -> None:
+    (tmp_path / "site.toml").write_text(SITE)
+    told = conoid("batch", "two_tets", "--ranks", 1, "--slurm", "fast", "--site", tmp_path / "site.toml")
+    assert told.exit_code == 1
+    assert "profile = 'fast': allowed: standard" in told.output
+
+
+@pytest.mark.parametrize(
+    ("text", "wrong"),
+    [
+        ("launcher = 'pbs'", "launcher"),
+        ("launcher = 'slurm'", "needs a table"),
+        ("[slurm.profiles.'a b']", "allowed"),
+        ("[slurm.profiles.a]\ntime = '3 kg'", "dimension"),
+        ("[slurm.profiles.a]\npartitoin = 'x'", "partitoin"),
+        ("[slurm]\ndefault = 'b'\n[slurm.profiles.a]", "allowed: a"),
+    ],
+)
+def test_a_settings_file_that_is_wrong_is_refused_with_one_line(tmp_path: Path, text: str, wrong: str) -> None:
+    (tmp_path / "site.toml").write_text(text)
+    with pytest.raises(batch.SiteError, match=re.escape(wrong)) as told:
+        batch.read_site(tmp_path / "site.toml")
+    assert "\n" not in str(told.value)
+
+
+def test_the_shipped_profile_and_script_belong_together() -> None:
+    site = batch.read_site(ROOT / "deploy" / "site.toml")
+    assert site.slurm is not None
+    name, profile = batch.profile_of(site.slurm, "")
+    assert batch.script(profile, "/opt/conoid/bin/python") == (ROOT / "deploy" / "job.sh").read_text()
+    job = batch.new_job("run", 8, (name, profile), ["mpiexec"], 0.0)
+    words = batch.sbatch_words(job, profile, Path("/runs/run"))
+    assert {"--partition=compute", "--account=physics", "--time=720", "--ntasks=8", "--requeue"} <= set(words)
+    assert words[-3:] == ["/runs/run/job.sh", "/runs/run", job.name]
+
+
+def test_what_a_run_is_called_is_no_word_for_a_shell(tmp_path: Path) -> None:
+    job = batch.new_job("x;id $(id) `id`", 1, ("a", batch.Profile()), [], 0.0)
+    assert re.fullmatch(r"conoid-[A-Za-z0-9_.-]+", job.name)
+
+
+def test_following_ends_where_the_outcome_is(tmp_path: Path) -> None:
+    lines = [
+        '{"type":"status","run":"a","seq":1,"state":"queued"}',
+        '{"type":"status","run":"a","seq":2,"state":"running"}',
+    ]
+    lines.append('{"type":"finished","run":"a","seq":3,"state":"cancelled","digest":"","steps":3,"elapsed":1.0}')
+    (tmp_path / layout.JOURNAL).write_text("\n".join(lines) + '\n{"type":"half')
+    (tmp_path / layout.OUTCOME).write_text(
+        '{"state": "cancelled", "cause": "cancelled", "message": "stopped on request"}'
+    )
+    told = list(FolderRun(tmp_path).messages())
+    assert [message.seq for message in told] == [1, 2, 3, 0]
+    assert getattr(told[-1], "state", "") == State.CANCELLED

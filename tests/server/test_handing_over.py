@@ -1,0 +1,214 @@
+"""What decides about jobs, without Slurm: replies that are lost, second jobs, what a signal has meant, the lock."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from conoid.cases import batch, layout, slurm
+from conoid.cases.batch import Job, Profile, Slurm
+from conoid.cases.run import Cause, State
+from conoid.cases.slurm import Entry
+from conoid.server.launch.handed import SlurmWorker
+from conoid.worker import job as attempt
+from conoid.worker.lock import hold
+
+JOB = batch.new_job("run", 2, ("a", Profile()), ["true"], 0.0)
+SBATCH = """#!/bin/bash
+for word in "$@"; do case "$word" in --job-name=*) name="${{word#--job-name=}}";; esac; done
+cd {place}; echo called >> calls
+{body}
+"""
+SQUEUE = """#!/bin/bash
+cd {place}; [ -e away ] && {{ echo "slurm_load_jobs error: Unable to contact slurm controller" >&2; exit 1; }}
+cat queue 2>/dev/null; exit 0
+"""
+ACCEPT = 'echo "$((100 + $(wc -l < calls)))|PENDING|N/A|$name|Resources" >> queue'
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Path:
+    """Folders for the commands and for the run."""
+    (tmp_path / "bin").mkdir()
+    (tmp_path / "run" / layout.LOGS).mkdir(parents=True)
+    return tmp_path
+
+
+def commands(place: Path, body: str) -> str:
+    """An sbatch that does ``body``, and a squeue that tells what it has queued."""
+    for name, text in (("sbatch", SBATCH), ("squeue", SQUEUE), ("scancel", "#!/bin/bash\necho $@ >> {place}/ended\n")):
+        path = place / "bin" / name
+        path.write_text(text.format(place=place, body=body))
+        path.chmod(0o755)
+    return str(place / "bin")
+
+
+def calls(place: Path) -> int:
+    path = place / "calls"
+    return len(path.read_text().splitlines()) if path.exists() else 0
+
+
+def test_a_job_whose_number_was_lost_on_the_way_is_not_handed_over_again(place: Path) -> None:
+    found = commands(place, f"{ACCEPT}; echo 'sbatch: error: Socket timed out on send/recv operation' >&2; exit 1")
+    with pytest.raises(slurm.AwayError):
+        slurm.submit(found, place / "run", JOB, Profile())
+    assert slurm.submit(found, place / "run", JOB, Profile()) == "101"
+    assert calls(place) == 1
+
+
+def test_nobody_hands_over_while_the_queue_cannot_be_read(place: Path) -> None:
+    found = commands(place, f"{ACCEPT}; echo 101")
+    (place / "away").touch()
+    with pytest.raises(slurm.AwayError):
+        slurm.submit(found, place / "run", JOB, Profile())
+    assert calls(place) == 0
+
+
+def test_an_sbatch_that_outlives_its_server_keeps_the_next_from_a_second(place: Path) -> None:
+    found = commands(place, f"sleep 2; {ACCEPT}; echo 101")
+    code = (
+        "from pathlib import Path; from conoid.cases import batch, slurm\n"
+        f"job = batch.new_job('run', 2, ('a', batch.Profile()), ['true'], 0.0)\n"
+        f"slurm.submit({found!r}, Path({str(place / 'run')!r}), job, batch.Profile())"
+    )
+    server = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.DEVNULL)
+    while not calls(place):
+        assert server.poll() is None
+    server.kill()
+    server.wait(10)
+    with pytest.raises(slurm.AwayError, match="under way"):
+        slurm.submit(found, place / "run", JOB, Profile())
+    assert calls(place) == 1
+
+
+@pytest.mark.parametrize(
+    ("said", "kind"),
+    [
+        ("sbatch: error: Batch job submission failed: Invalid partition name specified", slurm.RefusedError),
+        (
+            "sbatch: error: Batch job submission failed: Requested node configuration is not available",
+            slurm.RefusedError,
+        ),
+        (
+            "sbatch: error: Batch job submission failed: Unable to contact slurm controller (connect failure)",
+            slurm.AwayError,
+        ),
+        ("slurm_load_jobs error: Zero Bytes were transmitted or received", slurm.AwayError),
+        ("sbatch: error: If munged is up, restart with --num-threads=10", slurm.AwayError),
+    ],
+)
+def test_a_refusal_is_told_from_silence(place: Path, said: str, kind: type[Exception]) -> None:
+    found = commands(place, f"echo '{said}' >&2; exit 1")
+    with pytest.raises(kind):
+        slurm.call(found, ["sbatch"])
+
+
+def test_of_two_jobs_the_one_that_has_begun_stays(place: Path) -> None:
+    found = commands(place, "exit 1")
+    layout.claim(place / "run", JOB.name).write_text("8")
+    worker = SlurmWorker(place / "run", JOB, Slurm(profiles={"a": Profile()}, bin=found))
+    entries = [Entry("7", "PENDING", 0.0, JOB.name, "Resources"), Entry("8", "RUNNING", 5.0, JOB.name, "None")]
+    worker._note(job="7")
+    worker.turn(entries)
+    assert (place / "ended").read_text() == "7\n"
+    assert (worker.phase(), worker.began()) == ("runs", 5.0)
+    told = batch.read_job(place / "run")
+    assert told is not None
+    assert told.job == "8"
+
+
+@pytest.mark.parametrize(
+    ("state", "reading"),
+    [
+        ("CANCELLED", (State.CANCELLED, Cause.CANCELLED)),
+        ("TIMEOUT", (State.TIMED_OUT, Cause.WALLTIME)),
+        ("OUT_OF_MEMORY", (State.FAILED, Cause.MEMORY)),
+        ("REVOKED", (State.LOST, Cause.NODE)),
+    ],
+)
+def test_an_end_without_outcome_is_read_from_slurm(place: Path, state: str, reading: tuple[State, Cause]) -> None:
+    worker = SlurmWorker(place / "run", JOB, Slurm(profiles={"a": Profile()}, bin=commands(place, "exit 1")))
+    worker._note(job="7")
+    worker.turn([Entry("7", state, 5.0, JOB.name, "None")])
+    ended = worker.exited()
+    assert ended is not None
+    assert ended.reading is not None
+    assert ended.reading[:2] == reading
+
+
+@pytest.mark.parametrize("state", ["PREEMPTED", "NODE_FAIL", "FAILED"])
+def test_a_job_that_was_interrupted_gets_a_next_one(place: Path, state: str) -> None:
+    worker = SlurmWorker(place / "run", JOB, Slurm(profiles={"a": Profile()}, bin=commands(place, "exit 1")))
+    worker._note(job="7")
+    (place / "run" / layout.INTERRUPTED).write_text("{}")
+    worker.turn([Entry("7", state, 5.0, JOB.name, "None")])
+    assert (worker.exited(), worker.phase()) == (None, "waits")
+    told = batch.read_job(place / "run")
+    assert told is not None
+    assert (told.attempt, told.job) == (2, "")
+    assert told.name != JOB.name
+    worker.stop()
+    worker.turn([])
+    assert worker.exited() is not None, "nothing is handed over once somebody has asked for the end"
+    assert calls(place) == 0
+
+
+RUNNING = {"JobState": "RUNNING", "Restarts": "0", "StartTime": "1000", "TimeLimit": "01:00:00", "PreemptTime": "None"}
+
+
+@pytest.mark.parametrize(
+    ("changes", "now", "verdict"),
+    [
+        ({}, 1100.0, "cancelled"),
+        ({}, 4450.0, "time limit"),
+        ({"JobState": "COMPLETING"}, 1100.0, "cancelled"),
+        ({"JobState": "COMPLETING"}, 4600.0, "unknown"),
+        ({"PreemptTime": "1090"}, 1100.0, "preempted"),
+        ({"PreemptTime": "1090", "JobState": "COMPLETING"}, 1100.0, "unknown"),
+        ({"JobState": "COMPLETING", "Restarts": "1"}, 1100.0, "requeued"),
+        ({"TimeLimit": "UNLIMITED"}, 9e9, "cancelled"),
+        ({"TimeLimit": "1-00:00:00"}, 4450.0, "cancelled"),
+    ],
+)
+def test_what_a_signal_has_meant(changes: dict[str, str], now: float, verdict: str) -> None:
+    assert attempt.judge({**RUNNING, **changes}, 0, 120.0, now) == verdict
+    assert attempt.judge({}, 0, 120.0, now) == "unknown"
+
+
+def test_the_first_job_of_a_name_has_the_run_and_may_come_back(tmp_path: Path) -> None:
+    assert attempt.claim(tmp_path, JOB, "7")
+    assert not attempt.claim(tmp_path, JOB, "8")
+    assert attempt.claim(tmp_path, JOB, "7")
+    assert slurm.begun(tmp_path, JOB) == "7"
+
+
+def test_a_job_that_starts_after_the_stop_runs_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    record = Job(**{**{name: getattr(JOB, name) for name in JOB.__struct_fields__}, "command": ["false"]})
+    (tmp_path / layout.JOB).write_bytes(batch.to_json(record))
+    (tmp_path / layout.STOP_REQUEST).touch()
+    monkeypatch.setattr(attempt.Told, "listen", lambda self: None)
+    assert attempt.main([str(tmp_path), JOB.name]) == 0
+    assert '"state": "cancelled"' in (tmp_path / layout.OUTCOME).read_text()
+
+
+def test_one_worker_writes_into_a_folder(tmp_path: Path) -> None:
+    assert not slurm.held(tmp_path)
+    first = hold(tmp_path)
+    assert first is not None
+    assert slurm.held(tmp_path)
+    assert hold(tmp_path, 0.3) is None
+    first.close()
+    assert not slurm.held(tmp_path)
+    second = hold(tmp_path, 0.3)
+    assert second is not None
+    second.close()
+
+
+def test_a_world_of_the_wrong_size_is_told(tmp_path: Path) -> None:
+    """As srun without --mpi=pmi2 makes them: every process is a world of one."""
+    words = [sys.executable, "-m", "conoid.worker", "two_tets", "--out", str(tmp_path / "out"), "--ranks", "2"]
+    ended = subprocess.run(words, capture_output=True, text=True, timeout=120, check=False)
+    assert ended.returncode == 1
+    assert "MPI has started 1 rank(s) where 2 were asked for" in ended.stderr
+    assert not (tmp_path / "out").exists()
