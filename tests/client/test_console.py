@@ -18,7 +18,7 @@ def test_what_a_terminal_would_obey_is_replaced(evil: str) -> None:
     console = PlainConsole(file=out, force_terminal=True, color_system="truecolor", width=80)
     table = Table(title=evil)
     table.add_column(evil)
-    table.add_row(Text(evil, style="bold"))
+    table.add_row(Text(f"a {evil} b", style="bold"))
     for thing in (evil, Text(evil), Panel(evil, title=Text(evil)), table):
         console.print(thing, markup=False)
     said = out.getvalue()
