@@ -46,8 +46,8 @@ def snapshot(service: Service, run: Run) -> Snapshot:
     return Snapshot(run.state, msgspec.json.encode(body))
 
 
-def _labels(service: Service, run: Run) -> dict[str, str]:
-    """None where the folder of the run has been removed."""
+def labels(service: Service, run: Run) -> dict[str, str]:
+    """Those it was submitted with; none where the folder of the run has been removed."""
     try:
         return folder.submission(service.settings.runs / run.id).labels
     except (OSError, ValueError):
@@ -68,7 +68,7 @@ def brief(service: Service, run: Run) -> dict[str, Any]:
         "submitted": run.submitted,
         "started": run.started or None,
         "finished": run.finished or None,
-        "labels": _labels(service, run),
+        "labels": labels(service, run),
         "url": f"/v1/runs/{run.id}",
     }
 
