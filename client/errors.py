@@ -4,6 +4,7 @@
 
     ConoidError
     ├── CaseError            the case is wrong, whoever has found it: every error at once (cases/problems.py)
+    ├── …                    what a worker raises that is called from Python (worker/errors.py)
     └── ClientError
         ├── ServiceError     the server refused: the fields of an RFC 9457 problem
         ├── UnreachableError no server answered

@@ -70,12 +70,13 @@ class Session(Http):
         self, states: Sequence[str] = (), limit: int = 50, labels: Mapping[str, str] | None = None
     ) -> list[RunInfo]:
         """Our runs, newest first, at most ``limit``; with ``labels``, those that have all of them."""
-        wanted = dict(labels or {}).items()
         found: list[RunInfo] = []
-        query = {"state": ",".join(states)} if states else {}
+        query: dict[str, str | list[str]] = {"state": ",".join(states)} if states else {}
+        if labels:
+            query["label"] = [f"{name}={value}" for name, value in labels.items()]
         while len(found) < limit:
-            page = self.get(Page, "/v1/runs", limit=100 if wanted else min(100, limit - len(found)), **query)
-            found += [run for run in page.runs if wanted <= run.labels.items()]
+            page = self.get(Page, "/v1/runs", limit=min(100, limit - len(found)), **query)
+            found += page.runs
             if page.next is None:
                 break
             query["cursor"] = page.next

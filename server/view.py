@@ -55,7 +55,8 @@ def _submission(path: Path) -> folder.Submission | None:
         return None
 
 
-def _labels(service: Service, run: Run) -> dict[str, str]:
+def labels(service: Service, run: Run) -> dict[str, str]:
+    """Those it was submitted with; none where the folder of the run has been removed or damaged."""
     made = _submission(service.settings.runs / run.id)
     return made.labels if made else {}
 
@@ -74,7 +75,7 @@ def brief(service: Service, run: Run) -> dict[str, Any]:
         "submitted": run.submitted,
         "started": run.started or None,
         "finished": run.finished or None,
-        "labels": _labels(service, run),
+        "labels": labels(service, run),
         "url": f"/v1/runs/{run.id}",
     }
 

@@ -1,6 +1,8 @@
 """Runs: submit, list, look at, cancel, ask for a checkpoint or a snapshot."""
 
 import time
+from collections.abc import Iterator
+from itertools import islice
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Header, Query, Request, Response
@@ -50,13 +52,25 @@ def page(
     state: Annotated[str | None, Query(description="one or more states, with commas between")] = None,
     cursor: str | None = None,
     limit: Annotated[int, Query(ge=1, le=500)] = 50,
+    label: Annotated[list[str] | None, Query(description="NAME=VALUE; runs that have all of them")] = None,
 ) -> dict[str, Any]:
     """Own runs, newest first; ``next`` is the cursor of the following page, null on the last."""
     before = None if cursor is None else view.from_cursor(cursor)
-    runs = service.store.page(identity.owner, _states(state), before, limit + 1)
+    pages = _pages(service, identity.owner, _states(state), before, limit + 1)
+    wanted = labels_of(label or ()).items()
+    runs = list(islice((run for run in pages if not wanted or wanted <= view.labels(service, run).items()), limit + 1))
     following = view.to_cursor(runs[limit - 1]) if len(runs) > limit else None
     now = (service.supervisor.current(run.id) or run for run in runs[:limit])
     return {"runs": [view.brief(service, run) for run in now], "next": following}
+
+
+def _pages(service: Service, owner: str, states: list[State], before: str | None, size: int) -> Iterator[Run]:
+    """The runs of an owner, newest first, so many at a time from the store."""
+    while some := service.store.page(owner, states, before, size):
+        yield from some
+        if len(some) < size:
+            return
+        before = some[-1].id
 
 
 def _states(text: str | None) -> list[State]:

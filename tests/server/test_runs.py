@@ -4,6 +4,7 @@ import json
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -11,7 +12,7 @@ from conoid.cases import layout
 from conoid.cases.run import State
 from conoid.server.launch.local import LocalLauncher
 
-from .running import PATIENCE, Running, case_text
+from .running import PATIENCE, TOML, Running, case_text
 
 
 def test_a_run_succeeds(server: Running) -> None:
@@ -223,3 +224,26 @@ def test_a_full_disk_delays_and_loses_nothing(server: Running, monkeypatch: pyte
     assert server.ann.wait_for(run)["state"] == "succeeded"
     assert not full
     assert server.ann.states(run)[-1] == "succeeded"
+
+
+def test_runs_are_found_by_their_labels(server: Running) -> None:
+    words = [["batch=1", "of=me"], ["batch=2"], ["batch=1"], []]
+    runs = []
+    for labels in words:
+        answer = server.ann.http.post("/v1/runs", params={"label": labels}, content=case_text(steps=1), headers=TOML)
+        runs.append(answer.json()["id"])
+
+    def found(limit: int, *labels: str, **more: str) -> dict[str, Any]:
+        answer: dict[str, Any] = server.ann.http.get(
+            "/v1/runs", params={"label": list(labels), "limit": limit, **more}
+        ).json()
+        return answer
+
+    first = found(1, "batch=1")
+    assert [run["id"] for run in first["runs"]] == [runs[2]]
+    second = found(1, "batch=1", cursor=first["next"])
+    assert ([run["id"] for run in second["runs"]], second["next"]) == ([runs[0]], None)
+    assert [run["id"] for run in found(9, "batch=1", "of=me")["runs"]] == [runs[0]]
+    assert found(9, "batch=3")["runs"] == []
+    assert {run["id"] for run in found(9)["runs"]} >= set(runs)
+    assert server.ann.http.get("/v1/runs", params={"label": "batch"}).status_code == 400
