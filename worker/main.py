@@ -168,14 +168,14 @@ def ready_kernels(comm: Comm, journal: Journal | None) -> None:
 
 
 def _say(journal: Journal | None, what: str) -> None:
-    """Tells what the start is at."""
+    """Reports what the start is doing."""
     log.info(what)
     if journal is not None:
         journal.starting(what)
 
 
 def _close(outcome: Outcome, folder: Path, journal: Journal, telemetry: "Telemetry | None") -> None:
-    """The outcome first, then the last message: whoever hears of the end finds it on disk."""
+    """The outcome first, then the last message: whoever receives the last message finds it on disk."""
     _write_outcome(folder, outcome)
     journal.write(
         messages.Finished, outcome.steps, outcome.time, state=outcome.state, digest=outcome.digest,

@@ -63,7 +63,7 @@ def course(comm: Comm, folder: Path, cases: Sequence[schema.Case], stops: Sequen
     sim, lines = simulation.build(cases[0], Path(), comm), list[Energy]()
     step.prepare(sim)
     for number in range(STEPS):
-        for k in np.flatnonzero(np.array(stops, int) == number):
+        for k in np.flatnonzero(np.array(stops, int) == number).tolist():
             sim = kept_again(sim, cases[(k + 1) % len(cases)], folder)
         before = sim.model.nodes.v.copy()
         step.first_half(sim)
