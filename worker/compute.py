@@ -1,4 +1,4 @@
-"""From a case to an outcome, with the kernels loaded: build, step, look, sum up."""
+"""From a case to an outcome, with the kernels loaded: build, advance, run the outputs, sum up."""
 
 import logging
 import resource
@@ -97,7 +97,7 @@ def _resumed(case: Case, folder: Path, comm: Comm) -> tuple[Simulation, Start]:
 
 
 def _announce(sim: Simulation, journal: Journal | None, setup: float) -> None:
-    """Tells how large the model is and how it is spread; all ranks take part."""
+    """Reports how large the model is and how it is spread; all ranks take part."""
     model, nodes = sim.model, sim.model.nodes
     sizes = np.zeros(len(model.parts), np.int64)
     for block in model.blocks:

@@ -197,14 +197,14 @@ def ready_kernels(comm: Comm, journal: Journal | None) -> None:
 
 
 def _say(journal: Journal | None, what: str) -> None:
-    """Tells what the start is at."""
+    """Reports what the start is doing."""
     log.info(what)
     if journal is not None:
         journal.starting(what)
 
 
 def _close(outcome: Outcome, options: argparse.Namespace, journal: Journal, telemetry: "Telemetry | None") -> None:
-    """The outcome first, then the last message: whoever hears of the end finds it on disk.
+    """The outcome first, then the last message: whoever receives the last message finds it on disk.
 
     An interrupted run has not ended: worker/job.py finds out what has interrupted it.
     """
