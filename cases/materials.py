@@ -79,6 +79,9 @@ class Material(Model):
     """Where it stops being elastic; without it it never does. ``model`` says which law."""
     eos: MieGruneisen | None = None
     """Pressure of compression and heat; without it linear, from the elasticity."""
+    spall: Annotated[Stress, Positive] | None = None
+    """Tension cut-off: no pressure is below minus this. Beyond it pores open, which take up the work, and they close
+    without resistance before anything is compressed again; without it tension of the pressure has no limit."""
     brittle: Brittle | None = None
     """What breaks facets; without it a part of this material cannot fracture."""
     description: str = ""

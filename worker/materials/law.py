@@ -10,9 +10,10 @@ from typing import Any
 
 from ..state import Floats
 
-DENSITY, BULK, SHEAR, Q_LINEAR, Q_QUADRATIC, ORDER = range(6)
-"""Places in a block's constants: what every material has. ORDER says when its law acts."""
-EQUATION, FIRST, SIZE = 6, 10, 40
+DENSITY, BULK, SHEAR, Q_LINEAR, Q_QUADRATIC, ORDER, SPALL = range(7)
+"""Places in a block's constants: what every material has. ORDER says when its law acts; SPALL is infinite where the
+material names none."""
+EQUATION, FIRST, SIZE = 7, 12, 40
 """Where the constants of the equation of state and of the law begin, and how many there is room for."""
 FROM_SHAPE, BEFORE_PRESSURE, AFTER_PRESSURE = range(3)
 """When a law acts: it makes the deviatoric stress from the undeformed shape; it returns the trial stress, before the

@@ -4,6 +4,8 @@
 adds a law adds its line to LAWS and its branch below; tests/worker/test_laws.py finds one that lacks its branch.
 """
 
+import math
+
 import numpy as np
 
 from conoid.cases.materials import Material
@@ -13,7 +15,7 @@ from .. import state
 from ..jit import njit
 from ..state import Floats
 from . import equation_of_state, hyperelastic, johnson_cook, mohr_coulomb, plastic
-from .law import BULK, DENSITY, EQUATION, FIRST, ORDER, Q_LINEAR, Q_QUADRATIC, SHEAR, SIZE, Equation, Law, placed
+from .law import BULK, DENSITY, EQUATION, FIRST, ORDER, Q_LINEAR, Q_QUADRATIC, SHEAR, SIZE, SPALL, Equation, Law, placed
 
 LAWS = (hyperelastic.LAW, plastic.LAW, johnson_cook.LAW, mohr_coulomb.LAW)
 EQUATIONS = (equation_of_state.ELASTIC, equation_of_state.GRUNEISEN)
@@ -74,6 +76,7 @@ def parameters(material: Material, viscosity: Viscosity | None) -> Floats:
     """(SIZE,) constants of a material, SI; ``viscosity`` None switches the bulk viscosity off."""
     law, params = law_of(material), np.zeros(SIZE)
     params[DENSITY], params[ORDER] = material.density, law.order
+    params[SPALL] = math.inf if material.spall is None else material.spall
     params[BULK], params[SHEAR] = moduli(material)
     if viscosity is not None:
         params[Q_LINEAR], params[Q_QUADRATIC] = viscosity.linear, viscosity.quadratic
@@ -85,7 +88,8 @@ def parameters(material: Material, viscosity: Viscosity | None) -> Floats:
 def rows_of(material: Material, pressure: str) -> int:
     """How many rows of state an element of this material needs (worker/state.py)."""
     averaged = 0 if pressure == "standard" else state.VOLUME_FLUX + 1
-    return max(law_of(material).rows, equation_of(material).rows, averaged)
+    porous = 0 if material.spall is None else state.PORES + 1
+    return max(law_of(material).rows, equation_of(material).rows, averaged, porous)
 
 
 def beginning(material: Material, temperature: float) -> dict[int, float]:
