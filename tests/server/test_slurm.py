@@ -184,6 +184,10 @@ def test_nobody_adds_words_to_a_profile(site: Site) -> None:
         answer = site.ann.http.post("/v1/runs", params={"profile": name}, content=case_text(), headers=TOML)
         assert answer.status_code == 400
         assert "standard, pmi2" in answer.json()["detail"]
+    named = case_text(extra='profile = "other"')
+    assert site.ann.http.post("/v1/runs", content=named, headers=TOML).status_code == 400
+    run = site.submit(case_text(extra='profile = "wrong"'), "")
+    assert "Invalid partition name" in site.ended(run)["message"], "the case has chosen"
 
 
 # The drill ------------------------------------------------------------------------------------------------------------

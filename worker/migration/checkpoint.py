@@ -31,7 +31,9 @@ FORMAT = 3
 _KEPT = 2
 """Checkpoints that stay; the older ones go."""
 _MANIFEST = "manifest.json"
-_FREE = ("ranks", "cut_scale", "max_steps", "max_wall_time", "checkpoint_every", "residual_limit", "snapshots")
+_FREE = (
+    "ranks", "profile", "cut_scale", "max_steps", "max_wall_time", "checkpoint_every", "residual_limit", "snapshots",
+)  # fmt: skip
 """Keys of ``run`` that may change when a run goes on."""
 _PIECE = 1 << 24
 """Bytes that are hashed at once."""
