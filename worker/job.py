@@ -131,7 +131,8 @@ def _interrupted(folder: Path, job: Job, number: str, further: bool) -> int | No
         return ExitCode.INTERRUPTED
     if verdict == "unknown":
         return None
-    _say(folder, job, State.QUEUED, f"{verdict}: job {number} waits for its turn again")
+    why = "the time limit is near" if verdict == "time limit" else "preempted"
+    _say(folder, job, State.QUEUED, f"{why}; job {number} waits again and goes on from its checkpoint")
     return _again(job.bin, number) if verdict != "requeued" else 0
 
 

@@ -330,7 +330,8 @@ def test_a_run_that_reaches_the_time_limit_goes_on_to_the_same_digest(solver: Si
     solver.cluster.command("scontrol", "update", f"jobid={solver.jobs(run)[0][0]}", "StartTime=now")
     last = solver.ended(run, 400.0)
     assert (last["state"], last["outcome"]["digest"]) == ("succeeded", uninterrupted), solver.tail(run)
-    assert solver.ann.states(run).count("running") == 2
+    assert solver.ann.states(run).count("running") >= 2
+    assert len(solver.jobs(run)) == 1
 
 
 def with_ranks(ranks: int, end_time: str = "1.5 us") -> str:
