@@ -65,6 +65,9 @@ def main(arguments: list[str]) -> int:
     if job is None or job.name != name or not claim(folder, job, number):
         print(f"job {number}: another job has this run", flush=True)
         return 0
+    if (folder / layout.OUTCOME).exists():
+        print(f"job {number}: this run has ended; the controller has forgotten that it was started", flush=True)
+        return 0
     if (folder / layout.STOP_REQUEST).exists():
         end(folder, job, Outcome(state=State.CANCELLED, cause=Cause.CANCELLED, message="cancelled before it started"))
         return 0
