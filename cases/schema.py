@@ -177,6 +177,8 @@ class Run(Model):
     """Simulated time at which the run ends; it begins at 0."""
     ranks: Annotated[Count, Field(ge=1, le=MOST_RANKS)] = 1
     """MPI processes that share the work. The answer does not depend on it."""
+    profile: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{0,32}$")] = ""
+    """Where a batch system runs it: a profile of the site (docs/cluster.md). The submitter's choice comes before it."""
     cut_scale: tuple[Scale, Scale, Scale] = (1.0, 1.0, 1.0)
     """Positions are multiplied by this before the mesh is cut for the ranks: no cut is made across a direction that is
     short then. Small along the way of an impact, every rank gets a share of where it happens. The answer does not

@@ -78,7 +78,7 @@ def hand_over(
     checked = parse_case(data)
     folder = (out or Path("runs") / checked.name).resolve()
     try:
-        chosen = batch.profile_of(site, profile)
+        chosen = batch.profile_of(site, profile or checked.run.profile)
         job = _known(folder, site) if folder.exists() else None
         if job is None:
             job = _prepared(

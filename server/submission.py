@@ -55,7 +55,7 @@ class Desk:
                 400, "bad_key", f"Idempotency-Key {key[:80]!r}: 1 to 255 visible ASCII characters",
                 pointer="Idempotency-Key",
             )  # fmt: skip
-        profile = self._profile(profile)
+        self._profile(profile, named=True)
         digest = hashlib.sha256(_file_name(content_type).encode() + b"\0" + body).hexdigest()
         if earlier := self._earlier(owner, key, digest):
             return earlier
@@ -65,16 +65,26 @@ class Desk:
             raise invalid_case(error.problems) from None
         with self._lock:
             return self._earlier(owner, key, digest) or self._accept(
-                owner, body, content_type, key, digest, reading, labels or {}, profile
+                owner,
+                body,
+                content_type,
+                key,
+                digest,
+                reading,
+                labels or {},
+                self._profile(profile or reading.case.run.profile),
             )
 
-    def _profile(self, name: str) -> str:
-        """The profile that is meant; empty where there is no batch system. Raises ServiceError 400."""
+    def _profile(self, name: str, *, named: bool = False) -> str:
+        """The profile that is meant; empty where there is no batch system. ``named``: in the request, not in the case.
+
+        Raises ServiceError 400.
+        """
         site = self._settings.site
         try:
             if site.launcher == "slurm" and site.slurm is not None:
                 return profile_of(site.slurm, name)[0]
-            if name:
+            if name and named:
                 raise ValueError(f"profile = {name[:40]!r}: this server starts runs itself; there are no profiles")
         except ValueError as error:
             raise ServiceError(400, "bad_parameter", str(error), pointer="profile") from None

@@ -65,6 +65,9 @@ def main(arguments: list[str]) -> int:
     if job is None or job.name != name or not claim(folder, job, number):
         print(f"job {number}: another job has this run", flush=True)
         return 0
+    if (folder / layout.OUTCOME).exists():
+        print(f"job {number}: this run has ended; the controller has forgotten that it was started", flush=True)
+        return 0
     if (folder / layout.STOP_REQUEST).exists():
         end(folder, job, Outcome(state=State.CANCELLED, cause=Cause.CANCELLED, message="cancelled before it started"))
         return 0
@@ -131,7 +134,8 @@ def _interrupted(folder: Path, job: Job, number: str, further: bool) -> int | No
         return ExitCode.INTERRUPTED
     if verdict == "unknown":
         return None
-    _say(folder, job, State.QUEUED, f"{verdict}: job {number} waits for its turn again")
+    why = "the time limit is near" if verdict == "time limit" else "preempted"
+    _say(folder, job, State.QUEUED, f"{why}; job {number} waits again and goes on from its checkpoint")
     return _again(job.bin, number) if verdict != "requeued" else 0
 
 

@@ -103,7 +103,10 @@ class SlurmWorker:
         self._away, self._why = self._away or time.monotonic(), why
 
     def turn(self, entries: list[Entry]) -> None:
-        """What is due now; ``entries``: the jobs of this name that Slurm knows. Raises SlurmError, OSError."""
+        """What is due now; ``entries``: the jobs of this name that Slurm knows. Raises SlurmError, OSError.
+
+        A controller that has crashed may have forgotten that it has started a job, which then waits in vain.
+        """
         self._away = 0.0
         if not self._job.job:
             self._hand_over()
@@ -115,6 +118,9 @@ class SlurmWorker:
         self._missing, self._entry = 0, entry
         if entry.state in slurm.FINAL:
             self._end(entry)
+        elif entry.state in slurm.PENDING and (self._folder / layout.OUTCOME).exists():
+            slurm.cancel(self._site.bin, entry.job)
+            self._exit = Exit(None, False, "")
         elif self._kill:
             slurm.kill(self._site.bin, entry.job)
         elif self._stop and self._told != entry.state:

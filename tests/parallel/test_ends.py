@@ -45,6 +45,37 @@ def test_a_signal_to_the_launcher_cancels_the_run(number: signal.Signals, tmp_pa
     assert not wait_until_gone(processes(folder))
 
 
+def test_a_file_in_the_folder_cancels_the_run_and_a_second_worker_keeps_out(tmp_path: Path) -> None:
+    """As a batch system runs it: there a signal alone is an interruption."""
+    folder = tmp_path / "run"
+    words = command(2, "free_spin", "--out", str(folder), *LONG, "--interruptible")
+    with started(words) as launcher:
+        wait_for(folder / layout.JOURNAL, '"progress"', launcher)
+        second = ended(words)
+        assert second.returncode == 1
+        assert "another worker writes into this folder" in second.stderr
+        (folder / layout.STOP_REQUEST).touch()
+        launcher.communicate(timeout=30.0)
+    assert launcher.returncode == 4
+    assert (outcome(folder).state, outcome(folder).cause) == ("cancelled", "cancelled")
+    said = journal(folder)
+    assert isinstance(said[-1], messages.Finished)
+    assert [message.seq for message in said] == list(range(1, len(said) + 1))
+
+
+def test_an_interrupted_run_has_a_checkpoint_and_no_outcome(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    with started(command(2, "free_spin", "--out", str(folder), *LONG, "--interruptible")) as launcher:
+        wait_for(folder / layout.JOURNAL, '"progress"', launcher)
+        launcher.send_signal(signal.SIGUSR1)
+        launcher.communicate(timeout=30.0)
+    assert launcher.returncode == 4
+    assert not (folder / layout.OUTCOME).exists()
+    assert from_json((folder / layout.INTERRUPTED).read_bytes()).steps > 0
+    assert list((folder / layout.CHECKPOINTS).glob("*[0-9]"))
+    assert not any(isinstance(message, messages.Finished) for message in journal(folder))
+
+
 def test_a_rank_that_raises_ends_the_job(tmp_path: Path) -> None:
     """Its log names the rank and holds the traceback; the others do not wait for it."""
     folder, program = tmp_path / "run", Path(__file__).with_name("broken.py")

@@ -118,6 +118,20 @@ def test_of_two_jobs_the_one_that_has_begun_stays(place: Path) -> None:
     assert told.job == "8"
 
 
+def test_a_job_that_waits_though_its_run_has_ended_is_taken_out(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A controller that crashed has put back what it had started, under the same number."""
+    run = place / "run"
+    worker = SlurmWorker(run, JOB, Slurm(profiles={"a": Profile()}, bin=commands(place, "exit 1")))
+    worker._note(job="7", command=["false"])
+    (run / layout.OUTCOME).write_text("{}")
+    monkeypatch.setattr(attempt.Told, "listen", lambda self: None)
+    monkeypatch.setenv("SLURM_JOB_ID", "7")
+    assert attempt.main([str(run), JOB.name]) == 0, "nothing is run again"
+    worker.turn([Entry("7", "PENDING", 0.0, JOB.name, "launch failed requeued held")])
+    assert (place / "ended").read_text() == "7\n"
+    assert worker.over
+
+
 @pytest.mark.parametrize(
     ("state", "reading"),
     [

@@ -32,9 +32,11 @@ _KEPT = 2
 """Checkpoints that stay; the older ones go."""
 _MANIFEST = "manifest.json"
 _FREE = {
-    "run": {"ranks", "cut_scale", "max_steps", "max_wall_time", "checkpoint_every", "residual_limit", "snapshots"},
+    "run": {
+        "ranks", "profile", "cut_scale", "max_steps", "max_wall_time", "checkpoint_every", "residual_limit", "snapshots",
+    },
     "contact": {"skin", "domain"},
-}
+}  # fmt: skip
 """Keys that may change when a run goes on: the answer does not depend on them."""
 _PIECE = 1 << 24
 """Bytes that are hashed at once."""
