@@ -12,6 +12,7 @@ from . import errors, openapi, page
 from .bell import Bell
 from .history import Histories
 from .launch.local import LocalLauncher
+from .metrics import Metrics, Timed
 from .reader import Turns
 from .readiness import Readiness
 from .routes import cases, events, files, health, history, logs, me, runs, snapshots
@@ -86,10 +87,12 @@ def build_app(service: Service) -> FastAPI:
         redoc_url=None,
         lifespan=lifespan,
     )
-    app.state.service = service
+    app.state.service, app.state.routers = service, ROUTERS
     errors.install(app)
     openapi.install(app)
+    app.state.metrics = Metrics(service)
     app.add_middleware(_SafeHeaders)
+    app.add_middleware(Timed, metrics=app.state.metrics)
     for router in ROUTERS:
         app.include_router(router)
     app.state.page_problem = None
