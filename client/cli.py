@@ -16,7 +16,7 @@ from conoid.cases.load import CaseError, parse_case
 from conoid.cases.plausible import doubts
 from conoid.cases.run import ExitCode, State
 
-from . import benches, reports, shelf, tables, viewing
+from . import benches, reports, shelf, sweeping, tables, viewing
 from .errors import ClientError
 from .live import Live, exit_code
 from .once import run_once
@@ -268,6 +268,9 @@ app.command(name="replay-balance", short_help="The loads of a run under another 
 app.command(short_help="Write a run as one HTML file.")(reports.report)
 app.command(short_help="Tell in what two runs differ.")(reports.compare)
 app.add_typer(reports.figures, name="figures")
+app.command(short_help="Run a case at many points.")(sweeping.sweep)
+app.command(name="sweep-table", short_help="Print a sweep as CSV.")(sweeping.sweep_table)
+app.command(name="sweep-cancel", short_help="Cancel the runs of a sweep.")(sweeping.sweep_cancel)
 
 
 @app.command(name="run", short_help="Do it all on this machine: run, watch, check, draw.")

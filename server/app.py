@@ -16,11 +16,13 @@ from .metrics import Metrics, Timed
 from .reader import Turns
 from .readiness import Readiness
 from .routes import cases, events, files, health, history, logs, me, runs, snapshots
+from .routes import sweeps as sweep_routes
 from .service import Service
 from .settings import Settings
 from .store import Store
 from .submission import Desk
 from .supervisor import Supervisor
+from .sweeps import Sweeps
 from .telemetry import Telemetry
 
 ROUTERS = (
@@ -29,6 +31,7 @@ ROUTERS = (
     events.router,
     history.router,
     snapshots.router,
+    sweep_routes.router,
     logs.router,
     files.router,
     me.router,
@@ -62,12 +65,15 @@ def opened(settings: Settings) -> Iterator[Service]:
             stack.callback(telemetry.close)
         bell = Bell()
         supervisor = Supervisor(settings, store, LocalLauncher(settings), telemetry, bell.ring)
+        desk = Desk(settings, store, supervisor)
+        sweeps = Sweeps(settings, desk)
+        supervisor.held_back = sweeps.held
         supervisor.start()
         stack.callback(supervisor.close)
         if settings.end_runs:
             stack.callback(supervisor.end_all)
-        desk, readiness = Desk(settings, store, supervisor), Readiness(settings, store)
-        yield Service(settings, store, bell, telemetry, supervisor, desk, Histories(), readiness, Turns())
+        readiness = Readiness(settings, store)
+        yield Service(settings, store, bell, telemetry, supervisor, desk, Histories(), readiness, Turns(), sweeps)
 
 
 def build_app(service: Service) -> FastAPI:

@@ -23,6 +23,13 @@ CASE_BODY: dict[str, Any] = {
 """For routes that take a case."""
 
 
+SWEEP_BODY: dict[str, Any] = {
+    "requestBody": {
+        "required": True,
+        "content": {"application/json": {"schema": {"$ref": "#/components/schemas/Wish"}}},
+    }
+}
+"""For the route that takes a sweep."""
 _JSON, _PROBLEM, _BYTES = "application/json", "application/problem+json", "application/octet-stream"
 _TEXT, _FILE = "text/plain", "*/*"
 ANSWERS: dict[tuple[str, str], dict[int, tuple[str, str]]] = {
@@ -44,6 +51,11 @@ ANSWERS: dict[tuple[str, str], dict[int, tuple[str, str]]] = {
     ("get", "/v1/runs/{run_id}/logs/{rank}"): {200: (_TEXT, ""), 206: (_TEXT, ""), 304: ("", "")},
     ("get", "/v1/runs/{run_id}/files"): {200: (_JSON, "Files")},
     ("get", "/v1/runs/{run_id}/files/{path}"): {200: (_FILE, ""), 206: (_FILE, ""), 304: ("", "")},
+    ("post", "/v1/sweeps"): {202: (_JSON, "Sweep")},
+    ("get", "/v1/sweeps"): {200: (_JSON, "SweepPage")},
+    ("get", "/v1/sweeps/{sweep_id}"): {200: (_JSON, "Sweep")},
+    ("get", "/v1/sweeps/{sweep_id}/table"): {200: ("text/csv", "")},
+    ("post", "/v1/sweeps/{sweep_id}:cancel"): {202: (_JSON, "Sweep")},
     ("get", "/v1/me"): {200: (_JSON, "Me")},
     ("get", "/healthz"): {200: (_JSON, "Health")},
     ("get", "/readyz"): {200: (_JSON, "Health"), 503: (_JSON, "Health")},

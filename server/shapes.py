@@ -147,6 +147,46 @@ class History(msgspec.Struct, kw_only=True):
     snapshots: list[dict[str, Any]]
 
 
+class Wish(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
+    """A sweep that is handed in: a case as plain data, the changes of each point by key, runs at a time."""
+
+    case: dict[str, Any]
+    points: list[dict[str, Any]]
+    at_once: int | None = None
+
+
+class SweepLine(msgspec.Struct, kw_only=True):
+    """A sweep in a list: how many of its runs are in each state."""
+
+    id: str
+    owner: str
+    name: str
+    submitted: float
+    at_once: int | None
+    total: int
+    states: dict[str, int]
+    url: str
+
+
+class SweepPage(msgspec.Struct, kw_only=True):
+    """Own sweeps, newest first."""
+
+    sweeps: list[SweepLine]
+
+
+class SweepPoint(msgspec.Struct, kw_only=True):
+    """What was changed at a point, and its run."""
+
+    values: dict[str, Any]
+    run: RunLine
+
+
+class Sweep(SweepLine, kw_only=True):
+    """A sweep with its points."""
+
+    points: list[SweepPoint]
+
+
 class ZenohAccess(msgspec.Struct, kw_only=True):
     """How to subscribe."""
 
@@ -181,5 +221,6 @@ class Health(msgspec.Struct, kw_only=True):
 
 
 ALL = (
-    Problem, Receipt, RunPage, RunStatus, Validation, Gallery, EventPage, Files, Snapshots, History, Me, Health,
+    Problem, Receipt, RunPage, RunStatus, Validation, Gallery, EventPage, Files, Snapshots, History, Me, Health, Wish,
+    SweepPage, Sweep,
 )  # fmt: skip
