@@ -14,7 +14,7 @@ from conoid.cases.load import CaseError, parse_case
 from conoid.cases.plausible import doubts
 from conoid.cases.run import ExitCode
 
-from . import benches, commands, converging, hard, reports, shelf, tables, viewing
+from . import benches, commands, converging, hard, reports, shelf, sweeping, tables, viewing
 from .batch import batch_run
 from .errors import ClientError
 from .once import run_once
@@ -122,6 +122,9 @@ app.command(short_help="Tell in what two runs differ.")(reports.compare)
 app.add_typer(reports.figures, name="figures")
 app.command(short_help="Speed against error: meshes, orders, limits, advice.")(converging.converge)
 app.command(short_help="Run the suite of hard cases.")(hard.hard)
+app.command(short_help="Run a case at many points.")(sweeping.sweep)
+app.command(name="sweep-table", short_help="Print a sweep as CSV.")(sweeping.sweep_table)
+app.command(name="sweep-cancel", short_help="Cancel the runs of a sweep.")(sweeping.sweep_cancel)
 
 
 @app.command(name="run", short_help="Do it all on this machine: run, watch, check, draw.")

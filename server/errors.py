@@ -17,6 +17,7 @@ from typing import Any
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, Response
+from fastapi.routing import APIRoute
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.exceptions import HTTPException
 
@@ -111,7 +112,18 @@ async def _http_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
     code = _CODES.get(error.status_code, "error")
     detail = f"{request.method} {request.url.path}: {error.detail}"
-    return ServiceError(error.status_code, code, detail, headers=error.headers).response()
+    headers = {"Allow": _allowed(request)} if error.status_code == 405 else error.headers
+    return ServiceError(error.status_code, code, detail, headers=headers).response()
+
+
+def _allowed(request: Request) -> str:
+    """The methods of all routes of the path: where several patterns match, the longest one is meant."""
+    found: dict[str, set[str]] = {}
+    for router in request.app.state.routers:
+        for route in router.routes:
+            if isinstance(route, APIRoute) and route.path_regex.match(request.url.path):
+                found.setdefault(route.path, set()).update(route.methods or ())
+    return ", ".join(sorted(found[max(found, key=len)])) if found else ""
 
 
 async def _parameter_error(_: Request, error: Exception) -> Response:

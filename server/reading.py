@@ -47,6 +47,8 @@ class Reading(msgspec.Struct, frozen=True, kw_only=True):
     name: str
     title: str
     ranks: int
+    profile: str
+    """Of a batch system, by the case; empty for the site's own."""
     wall_time: float | None
     estimate: dict[str, int | float]
     resolved: bytes
@@ -82,7 +84,7 @@ def _read(question: Question) -> Reading:
     case = parse_case(data)
     expected = _estimate(case, question.limits)
     return Reading(
-        name=case.name, title=case.title, ranks=case.run.ranks,
+        name=case.name, title=case.title, ranks=case.run.ranks, profile=case.run.profile,
         wall_time=limits.wall_time(case, question.limits), estimate=limits.figures(expected),
         resolved=resolved_json(case), case=case.model_dump_json().encode(), doubts=doubts(data, case, expected),
     )  # fmt: skip

@@ -13,6 +13,7 @@ from .settings import Settings
 from .store import Store
 from .submission import Desk
 from .supervisor import Supervisor
+from .sweeps import Sweeps
 from .telemetry import Telemetry
 
 
@@ -29,6 +30,7 @@ class Service:
     histories: Histories
     readiness: Readiness
     turns: Turns
+    sweeps: Sweeps
 
 
 def _service(request: Request) -> Service:

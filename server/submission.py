@@ -72,7 +72,7 @@ class Desk:
                 digest,
                 reading,
                 labels or {},
-                self._profile(profile or reading.case.run.profile),
+                self._profile(profile or reading.profile),
             )
 
     def _profile(self, name: str, *, named: bool = False) -> str:

@@ -4,7 +4,7 @@ import logging
 import queue
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
@@ -65,6 +65,7 @@ class Supervisor:
         self._holds = Holds()
         self._index = Index(store)
         self._left: dict[Path, str] = {}
+        self.held_back: Callable[[str, Iterable[str]], bool] = lambda run_id, active: False
         self._thread = threading.Thread(target=self._work, name="supervisor", daemon=True)
         self._leaving = False
         self._tidied = time.monotonic()
@@ -192,7 +193,8 @@ class Supervisor:
         cannot be started now holds nobody up; nothing is announced that could not be written.
         """
         for run in self._in_state(State.QUEUED):
-            if run.id in self._watches or self._holds.held(run.id):
+            held = self._holds.held(run.id) or self.held_back(run.id, self._watches)
+            if held or run.id in self._watches:
                 continue
             if self.slots_used() + run.ranks > self._settings.slots:
                 return

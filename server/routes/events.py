@@ -54,7 +54,7 @@ async def follow(
     service: ServiceOf,
     identity: Reader,
     after: After = 0,
-    last_event_id: Annotated[str | None, Header()] = None,
+    last_event_id: Annotated[str | None, Header(json_schema_extra={"pattern": "^[0-9]{1,18}$"})] = None,
     seconds: Seconds = None,
 ) -> Response:
     """Server-sent events: first those after ``Last-Event-ID`` (or ``after``), then the new ones until the run ends.

@@ -1,14 +1,13 @@
 """For those who watch the server itself."""
 
-import time
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, Response
+from fastapi import APIRouter, Depends, Request, Response
 from fastapi.responses import JSONResponse
-
-from conoid.cases.run import State
+from prometheus_client import CONTENT_TYPE_PLAIN_0_0_4
 
 from ..auth import Identity, requires
+from ..metrics import Metrics
 from ..service import ServiceOf
 
 router = APIRouter()
@@ -29,16 +28,7 @@ def ready(service: ServiceOf) -> Response:
 
 
 @router.get("/metrics")
-def metrics(service: ServiceOf, identity: Annotated[Identity, Depends(requires("metrics"))]) -> Response:
-    """Counts in the text form that Prometheus reads."""
-    counts = service.store.count_by_state()
-    lines = ["# HELP conoid_runs Runs by state.", "# TYPE conoid_runs gauge"]
-    lines += [f'conoid_runs{{state="{state}"}} {counts.get(state, 0)}' for state in State]
-    for name, kind, text, value in (
-        ("conoid_slots", "gauge", "Ranks that may run at a time.", service.settings.slots),
-        ("conoid_slots_used", "gauge", "Ranks that run now.", service.supervisor.slots_used()),
-        ("conoid_listeners", "gauge", "Open event streams and waiting requests.", service.bell.listening),
-        ("process_cpu_seconds_total", "counter", "CPU time of the server.", time.process_time()),
-    ):
-        lines += [f"# HELP {name} {text}", f"# TYPE {name} {kind}", f"{name} {value}"]
-    return Response("\n".join(lines) + "\n", media_type="text/plain; version=0.0.4; charset=utf-8")
+def metrics(request: Request, identity: Annotated[Identity, Depends(requires("metrics"))]) -> Response:
+    """Runs, slots, answers and their times in the text form that Prometheus reads."""
+    found: Metrics = request.app.state.metrics
+    return Response(found.text(), media_type=CONTENT_TYPE_PLAIN_0_0_4)

@@ -50,7 +50,7 @@ def page(
     service: ServiceOf,
     identity: Reader,
     state: Annotated[str | None, Query(description="one or more states, with commas between")] = None,
-    cursor: str | None = None,
+    cursor: Annotated[str | None, Query(json_schema_extra={"pattern": "^[A-Za-z0-9_-]{30}$"})] = None,
     limit: Annotated[int, Query(ge=1, le=500)] = 50,
     label: Annotated[list[str] | None, Query(description="NAME=VALUE; runs that have all of them")] = None,
 ) -> dict[str, Any]:

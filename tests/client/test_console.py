@@ -23,7 +23,7 @@ def test_what_a_terminal_would_obey_is_replaced(evil: str) -> None:
         console.print(thing, markup=False)
     said = out.getvalue()
     assert evil not in said
-    assert "\x1b[1m" in said, "its own colours stay"
+    assert "\x1b[" in said, "its own colours stay"
 
 
 def test_a_line_of_text_stays_as_it_is() -> None:

@@ -33,7 +33,8 @@ _KEPT = 2
 _MANIFEST = "manifest.json"
 _FREE = {
     "run": {
-        "ranks", "profile", "cut_scale", "max_steps", "max_wall_time", "checkpoint_every", "residual_limit", "snapshots",
+        "ranks", "profile", "cut_scale", "max_steps", "max_wall_time", "checkpoint_every", "residual_limit",
+        "snapshots",
     },
     "contact": {"skin", "domain"},
 }  # fmt: skip
