@@ -229,10 +229,13 @@ def test_every_package_is_shipped() -> None:
     assert listed == found == homes
 
 
-@pytest.mark.parametrize("path", [p for h in HOUSES for p in (ROOT / h).rglob("*") if p.is_file()], ids=name_of)
+FILES = [path for house in HOUSES for path in (ROOT / house).rglob("*") if path.is_file()]
+DATA = [path for path in FILES if path.suffix != ".py" and "__pycache__" not in path.parts]
+"""Files of packages that are no modules."""
+
+
+@pytest.mark.parametrize("path", DATA, ids=name_of)
 def test_every_file_of_a_package_is_shipped(path: Path) -> None:
-    if "__pycache__" in path.parts or path.suffix in {".py", ".pyc"}:
-        return
     tables = project()["tool"]["setuptools"]["package-data"]
     package = next(p for p in path.parents if (p / "__init__.py").exists())
     patterns = [*tables["*"], *tables.get(module_of(package / "__init__.py"), [])]
