@@ -83,6 +83,10 @@ class Http:
         response = self._request("POST", path, content=body, headers=headers, repeat=key is not None)
         return self._decoded(kind, response)
 
+    def delete(self, path: str) -> None:
+        """Removes what is at ``path``. Raises ServiceError, UnreachableError."""
+        self._request("DELETE", path)
+
     def fetch(self, path: str) -> bytes:
         """The body at ``path``. Raises ServiceError, UnreachableError."""
         return self._request("GET", path).content

@@ -158,6 +158,10 @@ class Run:
         """Asks it to stop; to ask twice does no harm."""
         return self.session.post(RunInfo, f"{self.path}:cancel")
 
+    def purge(self) -> None:
+        """Removes everything of it from the server, once it has ended. There is no way back."""
+        self.session.delete(self.path)
+
     def checkpoint(self) -> RunInfo:
         """Asks it for a checkpoint; a ``Checkpoint`` message tells of it when it is on disk."""
         return self.session.post(RunInfo, f"{self.path}:checkpoint")

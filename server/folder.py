@@ -24,7 +24,7 @@ from .events import Run
 
 _ID = re.compile(r"[0-9a-z]{22}")
 _LETTERS = "0123456789abcdefghjkmnpqrstvwxyz"
-_NEW = ".new-"
+_NEW, _GONE = ".new-", ".gone-"
 _TELLING = (layout.SUBMISSION, layout.JOURNAL, layout.WORKER)
 """One of these is left where a run has been, whatever was damaged."""
 _UNREADABLE = "outcome.unreadable.json"
@@ -119,10 +119,18 @@ def discard(runs: Path, run_id: str) -> None:
         shutil.rmtree(path, ignore_errors=True)
 
 
+def purge(runs: Path, run_id: str) -> None:
+    """Removes the folder of a run: at once for everybody, file by file after that. Raises OSError."""
+    beside = runs / f"{_GONE}{run_id}"
+    os.rename(runs / run_id, beside)
+    durable.sync_folder(runs)
+    shutil.rmtree(beside, ignore_errors=True)
+
+
 def scan(runs: Path) -> Iterator[Path]:
-    """The folders of all runs, oldest first; what a killed server left half made is removed."""
+    """The folders of all runs, oldest first; what a killed server left half made, or half removed, is removed."""
     for path in sorted(runs.iterdir()):
-        if path.name.startswith(_NEW):
+        if path.name.startswith((_NEW, _GONE)):
             shutil.rmtree(path, ignore_errors=True)
         elif is_id(path.name) and any((path / name).exists() for name in _TELLING):
             yield path

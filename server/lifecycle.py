@@ -182,7 +182,7 @@ def _found(run: Run, event: Found, now: float) -> Next:
         return _enter(replace(run, started=0.0), State.QUEUED, "the server was restarted before the launch")
     if run.stopping_for is not None:
         return _exited(run, WorkerExited(None, None), now)
-    if event.worker == "gone" and (event.code is not None or event.disk_failed):
+    if event.code is not None or event.disk_failed:
         return _exited(run, WorkerExited(event.code, None, disk_failed=event.disk_failed), now)
     if event.rebooted:
         lost = Outcome(state=State.LOST, cause=Cause.NODE, message="the machine was restarted", ranks=run.ranks)

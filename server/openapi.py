@@ -40,6 +40,7 @@ ANSWERS: dict[tuple[str, str], dict[int, tuple[str, str]]] = {
     ("post", "/v1/runs"): {202: (_JSON, "Receipt")},
     ("get", "/v1/runs"): {200: (_JSON, "RunPage")},
     ("get", "/v1/runs/{run_id}"): {200: (_JSON, "RunStatus"), 304: ("", "")},
+    ("delete", "/v1/runs/{run_id}"): {204: ("", "")},
     ("post", "/v1/runs/{run_id}:cancel"): {202: (_JSON, "RunStatus")},
     ("post", "/v1/runs/{run_id}:checkpoint"): {202: (_JSON, "RunStatus")},
     ("post", "/v1/runs/{run_id}:snapshot"): {202: (_JSON, "RunStatus")},
@@ -80,7 +81,7 @@ def refusals(method: str, path: str) -> set[int]:
         found |= {410}
     if method == "post" and "{" not in path:
         found |= {408, 413, 415, 422, 429, 507}
-    if path.endswith((":checkpoint", ":snapshot")):
+    if path.endswith((":checkpoint", ":snapshot")) or method == "delete":
         found |= {409}
     if path.endswith(("{path}", "{rank}")):
         found |= {416}

@@ -12,7 +12,7 @@ from starlette.concurrency import run_in_threadpool
 from conoid.cases import layout
 from conoid.cases.run import State
 
-from .. import openapi, view
+from .. import folder, openapi, view
 from ..auth import Identity, Pass, Reader, Submitter, unauthorized
 from ..errors import ServiceError, not_found
 from ..events import Run
@@ -127,6 +127,21 @@ async def show(
     if latest.etag == known:
         return Response(status_code=304, headers=headers)
     return Response(latest.body, 200, headers, "application/json")
+
+
+@router.delete("/v1/runs/{run_id}", status_code=204)
+def purge(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
+    """Removes everything of a run that has ended; from then on it is answered with 410. There is no way back."""
+    run = find(service, identity, run_id)
+    if not run.state.final or service.supervisor.current(run.id) is not None:
+        raise ServiceError(409, "not_ended", f"run {run.id} is {run.state.value}; a run that has ended can be removed")
+    try:
+        folder.purge(service.settings.runs, run.id)
+    except FileNotFoundError:
+        raise ServiceError(410, "gone", f"run {run.id}: its folder has been removed") from None
+    except OSError as error:
+        raise ServiceError(503, "unavailable", f"not removed: {error.strerror}", retryable=True) from error
+    return Response(status_code=204)
 
 
 @router.post("/v1/runs/{run_id}:cancel", status_code=202)

@@ -21,6 +21,8 @@ from conoid.server.tokens import create_token
 
 FAKE = (sys.executable, str(Path(__file__).with_name("fake_worker.py")))
 PATIENCE = 20.0
+START = 60.0
+"""s that a server may take to load on a machine that has much else to do."""
 TOML = {"Content-Type": "application/toml"}
 
 
@@ -118,7 +120,7 @@ class Process:
         address.unlink(missing_ok=True)
         command = [sys.executable, "-m", "conoid.server", "--runs", str(self.runs), "--port", "0", *self.arguments]
         self.child = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + START
         while not address.exists():
             assert self.child.poll() is None, "the server ended at its start"
             assert time.monotonic() < deadline

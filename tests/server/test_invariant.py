@@ -107,7 +107,7 @@ def test_no_fault_at_any_place_strands_a_run(house: Home, name: str, error: str,
         house.live(run, scenario, plan)
         told, fired = house.store.get(run.id), plan.fired
         assert told is not None
-        assert (told.state, told.cause) == (scenario.state, scenario.cause), f"place {place}"
+        assert (told.state, told.cause) == (scenario.state, scenario.cause), f"place {place}: {told.message}"
         assert folder.run(house.settings.runs / run.id).state is scenario.state, f"place {place}: the journal"
         ended = folder.outcome(house.settings.runs / run.id)
         assert ended is not None

@@ -247,3 +247,18 @@ def test_runs_are_found_by_their_labels(server: Running) -> None:
     assert found(9, "batch=3")["runs"] == []
     assert {run["id"] for run in found(9)["runs"]} >= set(runs)
     assert server.ann.http.get("/v1/runs", params={"label": "batch"}).status_code == 400
+
+
+def test_a_run_that_has_ended_can_be_removed(server: Running, tmp_path: Path) -> None:
+    run = server.ann.submit(wait=str(tmp_path / "go"))
+    server.ann.wait_for(run, State.RUNNING)
+    path = f"/v1/runs/{run}"
+    assert server.ann.http.delete(path).status_code == 409
+    (tmp_path / "go").touch()
+    server.ann.wait_for(run)
+    assert server.bob.http.delete(path).status_code == 404
+    assert server.ann.http.delete(path).status_code == 204
+    for answer in (server.ann.http.get(path), server.ann.http.delete(path), server.ann.http.get(f"{path}/files")):
+        assert (answer.status_code, answer.json()["code"]) == (410, "gone")
+    assert server.ann.http.get("/v1/runs").json()["runs"][0]["state"] == "succeeded"
+    assert list(server.service.settings.runs.glob("*" + run)) == []
