@@ -10,7 +10,7 @@ from . import folder
 from .launch import Launcher, Worker
 from .lifecycle import Found, Run
 
-_STOPPABLE = {State.QUEUED, State.STARTING, State.RUNNING}
+_STOPPABLE = {State.QUEUED, State.STARTING, State.RUNNING, State.STOPPING}
 
 
 @dataclass(frozen=True)
@@ -31,6 +31,8 @@ def look(path: Path, known: Run | None, launcher: Launcher) -> Left:
     run = folder.run(path)
     if known is not None and known.stopping_for is not None and run.state in _STOPPABLE:
         run = replace(run, state=State.STOPPING, stopping_for=known.stopping_for)
+    elif run.state is State.STOPPING and launcher.queues:
+        run = replace(run, state=State.RUNNING)  # its job was interrupted, and nobody has asked for its end
     trace = launcher.find(run.id, path)
     fate: Literal["none", "alive", "gone"] = "gone" if trace.launched else "none"
     if trace.worker is not None:
