@@ -8,13 +8,14 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from .bodies import MeshFile
-from .geometry import AXES, bounds, centre, cut_directions, lowest_along, whole_bounds
+from .boundary_checks import ROUNDING, check_boundaries, check_walls, ordered
+from .geometry import AXES, bounds, centre, cut_directions, whole_bounds
 from .library import library
-from .materials import JohnsonCook, Material, MohrCoulomb
+from .materials import Material
 from .mesh_checks import check_mesh
 from .overlap import overlaps
 from .problems import Location, Problem, choices, dotted, nearest, problem
-from .schema import Case, Contact, Gravity, Part, Prescribed, Reference, Symmetry, Traction, Wall
+from .schema import Case, Contact, Part, Reference, Symmetry, Wall
 
 NEEDED: dict[str, frozenset[str]] = {
     "extent": frozenset({"part", "axis"}),
@@ -33,18 +34,13 @@ NEEDED: dict[str, frozenset[str]] = {
 }
 """The keys that each reference quantity needs; the others of part, probe and axis are refused."""
 
-_ROUNDING = 1e-9
-"""Of a length or a time: two numbers that agree to this were meant to be equal. Chosen far above the rounding of
-units (1e-16) and far below any tolerance of a drawing."""
-
-
 Read = TypeVar("Read", bound=BaseModel)
 
 
 def check(case: Case) -> list[Problem]:
     """Every cross-field problem of a case, in the order of its keys."""
     checks: tuple[Callable[[Case], Iterable[Problem]], ...] = (
-        _materials, _parts, _overlaps, _sectors, _boundaries, _walls, _contact, _probes, _references,
+        _materials, _parts, _overlaps, _sectors, check_boundaries, check_walls, _contact, _probes, _references,
     )  # fmt: skip
     return list(chain.from_iterable(found(case) for found in checks))
 
@@ -81,23 +77,9 @@ def _overlaps(case: Case) -> Iterator[Problem]:
 
 def _materials(case: Case) -> Iterator[Problem]:
     for name, made in case.materials.items():
-        law = made.strength
-        if isinstance(law, JohnsonCook) and law.melt_temperature <= law.reference_temperature:
-            location = ("materials", name, "strength", "melt_temperature")
-            yield problem(location, law.melt_temperature, f"must be above {law.reference_temperature} K, the reference")
-        if isinstance(law, MohrCoulomb):
-            yield from _residual(law, ("materials", name, "strength"))
-
-
-def _residual(law: MohrCoulomb, location: Location) -> Iterator[Problem]:
-    for key in ("cohesion", "friction_angle"):
-        value, intact = getattr(law, f"residual_{key}"), getattr(law, key)
-        here = (*location, f"residual_{key}")
-        if value is not None and law.failure_strain is None:
-            yield problem(here, value, "needs failure_strain, beyond which it holds")
-        elif value is not None and value > intact:
-            unit = "Pa" if key == "cohesion" else "rad"
-            yield problem(here, value, f"must not be above {intact:g} {unit}, the {key} of what has not failed")
+        if made.strength is not None:
+            for key, value, message in made.strength.problems():
+                yield problem(("materials", name, "strength", key), value, message)
 
 
 def _parts(case: Case) -> Iterator[Problem]:
@@ -109,8 +91,8 @@ def _parts(case: Case) -> Iterator[Problem]:
             yield problem(("parts", i, "material"), part.material, message)
             continue
         law = known[part.material].strength
-        if isinstance(law, JohnsonCook) and part.temperature >= law.melt_temperature:
-            message = f"must be below {law.melt_temperature} K, where {part.material} melts"
+        if law is not None and part.temperature >= law.melting:
+            message = f"must be below {law.melting} K, where {part.material} melts"
             yield problem(("parts", i, "temperature"), part.temperature, message)
         yield from check_mesh(part.mesh, ("parts", i, "mesh"))
         if law is None and part.erosion is not None and part.erosion.plastic_strain is not None:
@@ -162,67 +144,6 @@ def _holds(boundary: object, part: Part, direction: int, at: float) -> bool:
     return math.isclose(boundary.at, at, abs_tol=1e-9) and (not boundary.parts or part.name in boundary.parts)
 
 
-def _boundaries(case: Case) -> Iterator[Problem]:
-    names = [part.name for part in case.parts]
-    for i, boundary in enumerate(case.boundaries):
-        for j, name in enumerate(boundary.parts):
-            if name not in names:
-                yield problem(("boundaries", i, "parts", j), name, f"no part of this name; {nearest(name, names)}")
-        if isinstance(boundary, Prescribed):
-            yield from _prescribed(boundary, ("boundaries", i))
-        elif isinstance(boundary, Gravity) and not any(boundary.acceleration):
-            yield problem(("boundaries", i, "acceleration"), "0, 0, 0", "must not be zero")
-        elif isinstance(boundary, Traction):
-            if not any(boundary.stress):
-                yield problem(("boundaries", i, "stress"), "0, 0, 0", "must not be zero")
-            yield from _box(boundary, ("boundaries", i))
-
-
-def _prescribed(boundary: Prescribed, location: Location) -> Iterator[Problem]:
-    if boundary.x is None and boundary.y is None and boundary.z is None:
-        yield problem(location, ..., "prescribes nothing; give one or more of x, y, z")
-    yield from _box(boundary, location)
-
-
-def _box(boundary: Prescribed | Traction, location: Location) -> Iterator[Problem]:
-    if (boundary.low is None) != (boundary.high is None):
-        yield problem(location, ..., "give both low and high, or neither for all of the parts")
-    elif boundary.low is not None and boundary.high is not None:
-        yield from _ordered(boundary.low, boundary.high, location)
-
-
-def _ordered(low: tuple[float, ...], high: tuple[float, ...], location: Location) -> Iterator[Problem]:
-    for d, (a, b) in enumerate(zip(low, high, strict=True)):
-        if a > b:
-            yield problem((*location, "high", d), b, f"must not be below low[{d}], {a}")
-
-
-def _walls(case: Case) -> Iterator[Problem]:
-    walls = [(i, boundary) for i, boundary in enumerate(case.boundaries) if isinstance(boundary, Wall)]
-    seen: set[str] = set()
-    for i, wall in walls:
-        if wall.name in seen:
-            yield problem(("boundaries", i, "name"), wall.name, "an earlier wall has this name; give each its own")
-        seen.add(wall.name)
-        length = math.hypot(*wall.normal)
-        if length == 0.0:
-            yield problem(("boundaries", i, "normal"), "0, 0, 0", "must not be zero")
-        else:
-            yield from _behind(case, i, wall, length)
-
-
-def _behind(case: Case, number: int, wall: Wall, length: float) -> Iterator[Problem]:
-    normal = (wall.normal[0] / length, wall.normal[1] / length, wall.normal[2] / length)
-    level = sum(n * x for n, x in zip(normal, wall.point, strict=True))
-    for part in case.parts:
-        if isinstance(part.mesh, MeshFile) or part.turn is not None or (wall.parts and part.name not in wall.parts):
-            continue
-        depth = level - lowest_along(part.mesh, normal)
-        if depth > _ROUNDING * max(1.0, abs(level)):
-            message = f"part {part.name!r} starts {depth:g} m behind this wall; move it, or turn the normal round"
-            yield problem(("boundaries", number), ..., message)
-
-
 def _contact(case: Case) -> Iterator[Problem]:
     contact, names = case.contact, [part.name for part in case.parts]
     if contact is None:
@@ -246,7 +167,7 @@ def _probes(case: Case) -> Iterator[Problem]:
         if (probe.low is None) != (probe.high is None):
             yield problem(("probes", i), ..., "low and high go together; give both, or none for the whole part")
         elif probe.low is not None and probe.high is not None:
-            yield from _ordered(probe.low, probe.high, ("probes", i))
+            yield from ordered(probe.low, probe.high, ("probes", i))
         if probe.part not in parts:
             yield problem(("probes", i, "part"), probe.part, f"no part of this name; {nearest(probe.part, parts)}")
             continue
@@ -297,7 +218,7 @@ def _window(case: Case, reference: Reference, location: Location) -> Iterator[Pr
     end = case.run.end_time
     if reference.since >= end:
         yield problem((*location, "since"), reference.since, f"must be below run.end_time, {end} s")
-    if reference.until is not None and not reference.since < reference.until <= end * (1 + _ROUNDING):
+    if reference.until is not None and not reference.since < reference.until <= end * (1 + ROUNDING):
         message = f"must be above since, {reference.since} s, and not above run.end_time, {end} s"
         yield problem((*location, "until"), reference.until, message)
 

@@ -12,16 +12,14 @@ from pathlib import Path
 from .bodies import MeshFile
 from .geometry import AXES, bounds
 from .library import material
-from .materials import JohnsonCook, Material, MohrCoulomb
+from .materials import Material
 from .mesh_size import MeshSize, mesh_size, surface_faces
 from .placed import Bulk, bulk
 from .schema import Case, Part, Rotation, Symmetry, Wall
 
-NANOSECONDS = {
-    "tet": 80.0, "nodal": 45.0, "split": 90.0, "eos": 15.0,
-    "linear_hardening": 30.0, "johnson_cook": 85.0, "mohr_coulomb": 60.0,
-}  # fmt: skip
-"""Core time per tet and step: what every tet takes, and what each feature adds. Measured at 10,000 to 750,000 tets."""
+NANOSECONDS = {"tet": 80.0, "nodal": 45.0, "split": 90.0, "eos": 15.0}
+"""Core time per tet and step: what every tet takes, and what each feature adds; laws say theirs (cases/laws). Measured
+at 10,000 to 750,000 tets."""
 FACE_NANOSECONDS = {"contact": 50.0, "erosion": 1400.0}
 """Core time per face of the surface and step; the second where parts erode, stay in touch and are searched often."""
 STEP_OVERHEAD = 0.3e-3
@@ -147,7 +145,7 @@ def shrinkage(case: Case, part: Part) -> float:
         return min(deepest, faster / (1.0 - min(speed / shock, 0.9)))
     if made.strength is None:
         return 1.0
-    return min(deepest, math.exp(min(4.0 * made.density * speed**2 / (2.0 * _flow_stress(made)), 10.0)))
+    return min(deepest, math.exp(min(4.0 * made.density * speed**2 / (2.0 * made.strength.flow_stress()), 10.0)))
 
 
 def impact_speed(case: Case, part: Part) -> float:
@@ -155,16 +153,6 @@ def impact_speed(case: Case, part: Part) -> float:
     met = [other.velocity for other in case.parts if other is not part]
     met += [(0.0, 0.0, 0.0) for boundary in case.boundaries if isinstance(boundary, Wall)]
     return max((math.dist(part.velocity, velocity) for velocity in met), default=0.0)
-
-
-def _flow_stress(made: Material) -> float:
-    law = made.strength
-    if isinstance(law, JohnsonCook):
-        return law.A + law.B * math.pow(0.1, law.n)
-    if isinstance(law, MohrCoulomb):
-        free = 2.0 * law.cohesion * math.cos(law.friction_angle) / (1.0 - math.sin(law.friction_angle))
-        return min(free, law.strength_cap or math.inf)
-    return law.yield_stress + 0.1 * law.hardening if law is not None else math.inf
 
 
 def _confined(case: Case, part: Part) -> bool:
@@ -217,7 +205,7 @@ def _contact(case: Case) -> float:
 def _nanoseconds(case: Case, part: Part) -> float:
     made = material(case, part.material)
     turned = any(isinstance(b, Rotation) and (not b.parts or part.name in b.parts) for b in case.boundaries)
-    law = NANOSECONDS[made.strength.model] if made.strength is not None and not turned else 0.0
+    law = made.strength.nanoseconds if made.strength is not None and not turned else 0.0
     state = NANOSECONDS["eos"] if made.eos is not None else 0.0
     return NANOSECONDS["tet"] + NANOSECONDS.get(case.numerics.pressure, 0.0) + law + state
 

@@ -1,6 +1,7 @@
 """Sizes of the mesh primitives, by formula: bounds, volume, thinnest extent, reach along a direction."""
 
 import math
+from collections.abc import Callable
 
 from .bodies import Box, Cylinder, Mesh, MeshFile, Plate, Primitive, Shards, Sphere, Tube, TwoTets
 from .tables import Axis
@@ -150,14 +151,19 @@ def holds(mesh: Generated, point: Vector) -> bool:
     low, high = bounds(mesh) or ((0.0,) * 3, (0.0,) * 3)
     if not all(a <= x <= b for a, x, b in zip(low, point, high, strict=True)):
         return False
+    return round_part(mesh)(point)
+
+
+def round_part(mesh: Generated) -> Callable[[Vector], bool]:
+    """Whether a point that lies inside the bounds of a body lies inside the body: to be asked of many points."""
     if isinstance(mesh, Box | Plate | TwoTets | Shards):
-        return True
-    from_centre = [x - c for x, c in zip(point, centre(mesh), strict=True)]
+        return lambda point: True
     if isinstance(mesh, Sphere):
-        return math.hypot(*from_centre) <= mesh.radius
+        return lambda point: math.dist(point, mesh.centre) <= mesh.radius
     i, j = across(mesh.axis)
-    inner = mesh.inner_radius if isinstance(mesh, Tube) else 0.0
-    return inner <= math.hypot(from_centre[i], from_centre[j]) <= mesh.radius
+    x, y = centre(mesh)[i], centre(mesh)[j]
+    inner, outer = mesh.inner_radius if isinstance(mesh, Tube) else 0.0, mesh.radius
+    return lambda point: inner <= math.hypot(point[i] - x, point[j] - y) <= outer
 
 
 def thinnest(mesh: Generated) -> float:

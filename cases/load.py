@@ -24,6 +24,9 @@ __all__ = [
 
 _KEY = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*(?:\[\d{1,6}\])*(?:\.[A-Za-z_][A-Za-z0-9_-]*(?:\[\d{1,6}\])*)*")
 _ITEM = re.compile(r"([A-Za-z_][A-Za-z0-9_-]*)|\[(\d+)\]")
+_DEEPEST = 32
+"""Words of a dotted key in TOML, whose cost grows with their square. Chosen: a case has 6."""
+_DEEP = re.compile(rf"""(?<![\w"'.-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{_DEEPEST}}}""", re.ASCII)
 _LINE = re.compile(r"\(at line (\d+), column \d+\)")
 
 
@@ -74,10 +77,14 @@ def read_data(path: Path) -> dict[str, Any]:
 
 def toml_data(text: str) -> dict[str, Any]:
     """The tables in TOML text. Raises CaseError that names the line."""
+    if _DEEP.search(text):
+        raise CaseError([Problem("", "", f"a key of more than {_DEEPEST} words with dots between")])
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise CaseError([_syntax(str(error), text)]) from None
+    except ValueError:
+        raise CaseError([Problem("", "", "broken TOML: a whole number has too many digits")]) from None
     except RecursionError:
         raise CaseError([Problem("", "", "this TOML is nested too deeply")]) from None
 
@@ -98,6 +105,10 @@ def json_data(text: str | bytes) -> dict[str, Any]:
         raise CaseError([Problem("", "", "broken JSON: a whole number has too many digits")]) from None
     if not isinstance(data, dict):
         raise CaseError([problem((), data, "a case is an object of keys")])
+    try:
+        json.dumps(data, ensure_ascii=False).encode()
+    except UnicodeEncodeError:
+        raise CaseError([Problem("", "", "this JSON has half of a character, a \\u escape alone")]) from None
     return data
 
 
@@ -108,8 +119,9 @@ class _RepeatedKeyError(ValueError):
 def _no_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     data = dict(pairs)
     if len(data) < len(pairs):
-        names = [name for name, _ in pairs]
-        raise _RepeatedKeyError(f"the key {next(name for name in names if names.count(name) > 1)!r} is given twice")
+        seen: set[str] = set()
+        twice = next(name for name, _ in pairs if name in seen or seen.add(name))  # type: ignore[func-returns-value]
+        raise _RepeatedKeyError(f"the key {shown(twice)} is given twice")
     return data
 
 

@@ -1,11 +1,24 @@
 """How many tets and nodes the generators will make of a primitive, and the step length of its worst tet."""
 
-import itertools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 from .bodies import Box, Cylinder, Grading, Plate, Shards, Sphere, Tube, TwoTets
-from .geometry import Generated, across, bounds, centre, cut_directions, holds, index, side_areas, surface, tets, volume
+from .geometry import (
+    Generated,
+    Vector,
+    across,
+    bounds,
+    centre,
+    cut_directions,
+    round_part,
+    side_areas,
+    surface,
+    tets,
+    volume,
+)
 
 TETS_PER_VOLUME, TETS_PER_SURFACE = 5.55, 1.42
 NODES_PER_VOLUME, NODES_PER_SURFACE = 0.87, 1.23
@@ -54,35 +67,37 @@ def surface_faces(mesh: Generated) -> int:
     return round(FACES_PER_SURFACE * surface(mesh) * _mean_powers(mesh)[1])
 
 
+@lru_cache(maxsize=4096)
 def _mean_powers(mesh: Generated) -> tuple[float, float]:
     """Means over the volume of 1 / h^3 and 1 / h^2 for the element size h, which grading makes vary."""
     if mesh.grading is None:
         return mesh.element_size**-3, mesh.element_size**-2
-    sizes = [graded_size(mesh, point) for point in _lattice(mesh)]
+    graded = size_at(mesh, mesh.grading)
+    sizes = [graded(point) for point in _lattice(mesh)]
     return math.fsum(h**-3 for h in sizes) / len(sizes), math.fsum(h**-2 for h in sizes) / len(sizes)
 
 
 def _lattice(mesh: Generated) -> list[tuple[float, float, float]]:
     low, high = bounds(mesh) or ((0.0,) * 3, (0.0,) * 3)
     lines = [[a + (b - a) * (i + 0.5) / _LATTICE for i in range(_LATTICE)] for a, b in zip(low, high, strict=True)]
-    inside = [(x, y, z) for x, y, z in itertools.product(*lines) if holds(mesh, (x, y, z))]
-    return inside or [centre(mesh)]
+    inside = round_part(mesh)
+    return [point for x in lines[0] for y in lines[1] for z in lines[2] if inside(point := (x, y, z))] or [centre(mesh)]
 
 
-def graded_size(mesh: Generated, point: tuple[float, float, float]) -> float:
+def graded_size(mesh: Generated, point: Vector) -> float:
     """The element size, m, that a primitive asks for at ``point``."""
-    grading = mesh.grading
-    if grading is None:
-        return mesh.element_size
-    share = (_distance(grading, point) - grading.near) / (grading.far - grading.near)
-    return mesh.element_size + (grading.far_size - mesh.element_size) * min(max(share, 0.0), 1.0)
+    return mesh.element_size if mesh.grading is None else size_at(mesh, mesh.grading)(point)
 
 
-def _distance(grading: Grading, point: tuple[float, float, float]) -> float:
-    offsets = [x - o for x, o in zip(point, grading.origin, strict=True)]
-    if grading.axis is not None:
-        offsets[index(grading.axis)] = 0.0
-    return math.hypot(*offsets)
+def size_at(mesh: Generated, grading: Grading) -> Callable[[Vector], float]:
+    """The element size, m, at a point of a primitive that is graded: to be asked of many points."""
+    size, near, more = mesh.element_size, grading.near, grading.far_size - mesh.element_size
+    width, origin = grading.far - grading.near, grading.origin
+    if grading.axis is None:
+        return lambda point: size + more * min(max((math.dist(point, origin) - near) / width, 0.0), 1.0)
+    i, j = across(grading.axis)
+    x, y = origin[i], origin[j]
+    return lambda point: size + more * min(max((math.hypot(point[i] - x, point[j] - y) - near) / width, 0.0), 1.0)
 
 
 def _structured(mesh: Box | Plate | Cylinder | Tube | TwoTets | Shards) -> MeshSize:

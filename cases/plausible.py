@@ -11,7 +11,7 @@ from typing import Any
 from .approach import strangers
 from .estimate import Estimate, wave_speed
 from .library import material
-from .materials import JohnsonCook, LinearHardening, Material
+from .materials import Material
 from .problems import Location, Problem, problem
 from .quantities import unit_of_reference
 from .reference import Schema, definition, json_schema, variants
@@ -118,16 +118,9 @@ def _materials(case: Case) -> Iterator[Problem]:
 def _constants(made: Material) -> Iterator[tuple[Location, str, float]]:
     yield ("density",), "density", made.density
     yield ("elastic", "young"), "wave speed", wave_speed(made)
-    if isinstance(made.strength, LinearHardening):
-        yield (
-            ("strength", "yield_stress"),
-            "yield stress over Young's modulus",
-            made.strength.yield_stress / made.elastic.young,
-        )
-    if isinstance(made.strength, JohnsonCook):
-        yield ("strength", "A"), "yield stress over Young's modulus", made.strength.A / made.elastic.young
-        yield ("strength", "specific_heat"), "specific heat", made.strength.specific_heat
-        yield ("strength", "melt_temperature"), "temperature", made.strength.melt_temperature
+    if made.strength is not None:
+        for key, what, value in made.strength.likely(made.elastic.young):
+            yield ("strength", key), what, value
     if made.brittle is not None:
         yield (
             ("brittle", "strength"),

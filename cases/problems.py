@@ -3,6 +3,7 @@
 import difflib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
@@ -79,14 +80,18 @@ def choices(names: Iterable[str]) -> str:
 def nearest(word: str, known: Iterable[str]) -> str:
     """``did you mean 'radius'?`` or the list of the known names, for the end of a message."""
     names = list(known)
-    close = difflib.get_close_matches(word, names, n=3, cutoff=0.6)
+    close = difflib.get_close_matches(word[:_LONGEST], names, n=3, cutoff=0.6)
     return f"did you mean {' or '.join(map(repr, close))}?" if close else f"known: {choices(names)}"
 
 
 def from_pydantic(error: ValidationError, data: Mapping[str, Any]) -> list[Problem]:
-    """Every error of ``error`` under the keys of ``data``, without pydantic's own words where ours are clearer."""
+    """The errors of ``error`` under the keys of ``data``, without pydantic's own words where ours are clearer.
+
+    At most a hundred, since looking for a similar name takes time.
+    """
     details = error.errors(include_url=False, include_context=True)
-    return [_translate(detail, data) for detail in details if not _follows_from_others(detail)]
+    own = (detail for detail in details if not _follows_from_others(detail))
+    return [_translate(detail, data) for detail in islice(own, _MOST)]
 
 
 def _follows_from_others(detail: ErrorDetails) -> bool:

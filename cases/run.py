@@ -26,7 +26,7 @@ class State(StrEnum):
 FINAL = frozenset({State.SUCCEEDED, State.FAILED, State.CANCELLED, State.TIMED_OUT, State.LOST})
 
 FOLLOWERS: dict[State, frozenset[State]] = {
-    State.ACCEPTED: frozenset({State.QUEUED, State.CANCELLED, State.FAILED}),
+    State.ACCEPTED: frozenset({State.QUEUED, State.CANCELLED, State.FAILED, State.LOST}),
     State.QUEUED: frozenset({State.STARTING, State.RUNNING, State.STOPPING, *FINAL}),
     State.STARTING: frozenset({State.QUEUED, State.RUNNING, State.STOPPING, *FINAL}),
     State.RUNNING: frozenset({State.QUEUED, State.STARTING, State.STOPPING, *FINAL}),
@@ -45,8 +45,10 @@ class Cause(StrEnum):
     ENERGY = "energy"
     MEMORY = "memory"
     WALLTIME = "walltime"
+    PREEMPTED = "preempted"
     NODE = "node"
     LAUNCH = "launch"
+    STORAGE = "storage"
     CANCELLED = "cancelled"
     SERVICE = "service"
 
@@ -59,3 +61,5 @@ class ExitCode:
     BAD_INPUT = 2
     PHYSICS = 3
     INTERRUPTED = 4
+    STORAGE = 5
+    """A file could not be written: the disk is full, or fails."""

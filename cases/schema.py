@@ -128,11 +128,13 @@ class Contact(Model):
     surface lies inside the mesh of the other, deeper than a millionth of the size of a face: bodies that touch do not.
     Parts that do not meet each other may overlap."""
     sweeps: Annotated[Count, Field(ge=1, le=1000)] = 5
-    """Jacobi sweeps over the meetings of a step."""
+    """Jacobi sweeps over the active contacts of a step."""
     skin: Annotated[Ratio, Positive] = 0.3
-    """Of the (harmonic) mean face size: twice how far a node may leave its free flight before it is searched anew."""
+    """Of the (harmonic) mean face size: twice how far a node may depart from its extrapolated motion before its
+    candidate pairs are searched again. Changes the cost, not the answer."""
     domain: Literal["arbitrary", "box"] = "arbitrary"
-    """How a rank finds the faces that others must see: by occupied cells, or by bounding boxes."""
+    """How a rank selects the faces that others receive as ghosts: by occupied cells, or by bounding boxes. Changes the
+    cost, not the answer."""
 
 
 class Viscosity(Model):

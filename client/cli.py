@@ -6,43 +6,30 @@ from importlib import metadata
 from pathlib import Path
 from typing import Annotated, Any
 
-import msgspec
 import typer
 from typer.core import TyperGroup
 
-from conoid.cases import layout
 from conoid.cases.estimate import estimate
 from conoid.cases.load import CaseError, parse_case
 from conoid.cases.plausible import doubts
-from conoid.cases.run import ExitCode, State
+from conoid.cases.run import ExitCode
 
-from . import benches, reports, shelf, tables, viewing
-from .batch import batch_run, cancel_folder, slurm_of
+from . import benches, commands, converging, hard, reports, shelf, sweeping, tables, viewing
+from .batch import batch_run
 from .errors import ClientError
-from .following import FolderRun
-from .live import Live, exit_code
 from .once import run_once
 from .options import (
     CaseArgument,
     Json,
-    Labels,
     Overrides,
-    SourceArgument,
-    Token,
-    Url,
     complain,
-    find,
-    labels_of,
     show,
     show_json,
     warn,
     warn_of,
 )
 from .pictures import FIELDS
-from .run import Run, RunInfo
-from .session import connect
 from .submission import data_of, locate
-from .watch import watch
 
 
 class Guarded(TyperGroup):
@@ -84,9 +71,6 @@ def every(
     """Impact simulations: submit them, watch them, look at them."""
 
 
-RunArgument = Annotated[str, typer.Argument(metavar="RUN", help="The id of a run, or 'last'.")]
-
-
 @app.command(
     context_settings={"allow_extra_args": True, "ignore_unknown_options": True}, add_help_option=False,
     short_help="Start the job server.",
@@ -120,161 +104,14 @@ def validate(case: CaseArgument, overrides: Overrides = None, as_json: Json = Fa
     show(tables.estimate_table(expected))
 
 
-@app.command(short_help="Hand a case to the server.")
-def submit(
-    case: CaseArgument,
-    overrides: Overrides = None,
-    key: Annotated[str | None, typer.Option("--key", help="Idempotency key: the same one makes no second run.")] = None,
-    label: Labels = None,
-    profile: Annotated[str, typer.Option("--profile", help="Of the site's batch system; its default.")] = "",
-    url: Url = None,
-    token: Token = None,
-    as_json: Json = False,
-) -> None:
-    """Hand a case to the server; prints the run's id."""
-    warn_of(case, overrides or ())
-    with connect(url, token) as session:
-        run = session.submit(case, overrides or (), key, labels_of(label), profile)
-        if as_json:
-            show_json(run.status())
-        else:
-            typer.echo(run.id)
-
-
-@app.command(name="ls")
-def list_runs(
-    state: Annotated[list[State] | None, typer.Option("--state", help="Only runs in this state.")] = None,
-    limit: Annotated[int, typer.Option("--limit", min=1, help="At most so many.")] = 20,
-    label: Labels = None,
-    url: Url = None,
-    token: Token = None,
-    as_json: Json = False,
-) -> None:
-    """List runs, newest first."""
-    with connect(url, token) as session:
-        runs = session.runs([one.value for one in state or ()], limit, labels_of(label))
-    if as_json:
-        show_json(runs)
-    elif runs:
-        show(tables.runs_table(runs))
-    else:
-        typer.echo("no runs")
-
-
-@app.command(name="show")
-def show_run(run: RunArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
-    """Show one run: where it is, or how it ended."""
-    with connect(url, token) as session:
-        info = find(session, run).status()
-    if as_json:
-        show_json(info)
-        return
-    show(tables.run_table(info))
-    if info.outcome is not None:
-        show("")
-        show(tables.outcome_table(info.outcome))
-        if info.outcome.reference:
-            show("")
-            show(tables.checks_table(info.outcome.reference))
-
-
-@app.command(name="watch", short_help="Follow a run until it ends.")
-def watch_run(
-    run: SourceArgument,
-    plain: Annotated[bool, typer.Option("--plain", help="Lines instead of the panel.")] = False,
-    url: Url = None,
-    token: Token = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print every message as one line of JSON.")] = False,
-) -> None:
-    """Follow a run until it ends: 0 succeeded, 1 failed, 2 bad input, 4 cancelled. Ctrl-C leaves it running."""
-    if Path(run).is_dir():
-        known = watch(FolderRun(Path(run), slurm_of(None).bin), False if plain else None)
-    else:
-        known = _watched(run, plain, url, token, as_json)
-    if known.message or known.cause:
-        complain(f"{known.run} {known.state.value}: {known.message or known.cause}")
-    raise typer.Exit(exit_code(known.state, known.cause))
-
-
-def _watched(run: str, plain: bool, url: str | None, token: str | None, as_json: bool) -> Live:
-    with connect(url, token) as session:
-        found = find(session, run)
-        if as_json:
-            raise typer.Exit(_print_messages(found))
-        try:
-            return watch(found, False if plain else None)
-        except KeyboardInterrupt:
-            complain(f"the run goes on; conoid watch {found.id} shows it again")
-            raise
-
-
-def _print_messages(run: Run) -> int:
-    known = Live(run.id)
-    for message in run.messages():
-        known.take(message)
-        typer.echo(msgspec.json.encode(message).decode())
-        sys.stdout.flush()
-    return exit_code(known.state, known.cause)
-
-
-def _tell(info: RunInfo, text: str, as_json: bool) -> None:
-    if as_json:
-        show_json(info)
-    else:
-        typer.echo(text)
-
-
-@app.command()
-def cancel(run: RunArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
-    """Stop a run at its next step; of a run without a server, name the folder."""
-    if Path(run).is_dir():
-        typer.echo(cancel_folder(Path(run)))
-        return
-    with connect(url, token) as session:
-        info = find(session, run).cancel()
-    _tell(info, f"{info.id} {info.state.value}", as_json)
-
-
-@app.command()
-def checkpoint(run: RunArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
-    """Ask a run for a checkpoint, from which it can go on if it is lost."""
-    with connect(url, token) as session:
-        info = find(session, run).checkpoint()
-    _tell(info, f"{info.id} asked for a checkpoint", as_json)
-
-
-@app.command()
-def snapshot(run: RunArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
-    """Ask a run for a snapshot of its fragments; watch tells when it is there."""
-    with connect(url, token) as session:
-        info = find(session, run).take_snapshot()
-    _tell(info, f"{info.id} asked for a snapshot", as_json)
-
-
-@app.command()
-def get(
-    run: RunArgument,
-    names: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="[FILE]...", help="Files to fetch; all when none, but for checkpoints."),
-    ] = None,
-    out: Annotated[Path | None, typer.Option("--out", help="Folder to copy into; the run's id when not given.")] = None,
-    url: Url = None,
-    token: Token = None,
-    as_json: Annotated[bool, typer.Option("--json", help="List the run's files as JSON; copies nothing.")] = False,
-) -> None:
-    """Copy a run's files here."""
-    with connect(url, token) as session:
-        found = find(session, run)
-        if as_json:
-            show_json(found.files())
-            return
-        target = out or Path(found.id)
-        every = (file.path for file in found.files())
-        for name in names or [path for path in every if not path.startswith(f"{layout.CHECKPOINTS}/")]:
-            typer.echo(str(found.download(target, name)))
-
-
+app.command(short_help="Hand a case to the server.")(commands.submit)
+app.command(name="ls")(commands.list_runs)
+app.command(name="show")(commands.show_run)
+app.command(name="watch", short_help="Follow a run until it ends.")(commands.watch_run)
+app.command()(commands.cancel)
+app.command()(commands.checkpoint)
+app.command()(commands.snapshot)
+app.command()(commands.get)
 app.command(name="batch", short_help="Hand a case to Slurm, without a server.")(batch_run)
 app.command(name="view", short_help="Draw frames, off screen.")(viewing.view_frames)
 app.command(name="replay-balance", short_help="The loads of a run under another balance policy.")(
@@ -283,6 +120,11 @@ app.command(name="replay-balance", short_help="The loads of a run under another 
 app.command(short_help="Write a run as one HTML file.")(reports.report)
 app.command(short_help="Tell in what two runs differ.")(reports.compare)
 app.add_typer(reports.figures, name="figures")
+app.command(short_help="Speed against error: meshes, orders, limits, advice.")(converging.converge)
+app.command(short_help="Run the suite of hard cases.")(hard.hard)
+app.command(short_help="Run a case at many points.")(sweeping.sweep)
+app.command(name="sweep-table", short_help="Print a sweep as CSV.")(sweeping.sweep_table)
+app.command(name="sweep-cancel", short_help="Cancel the runs of a sweep.")(sweeping.sweep_cancel)
 
 
 @app.command(name="run", short_help="Do it all on this machine: run, watch, check, draw.")

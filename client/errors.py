@@ -4,6 +4,7 @@
 
     ConoidError
     ├── CaseError            the case is wrong, whoever has found it: every error at once (cases/problems.py)
+    ├── …                    what a worker raises that is called from Python (worker/errors.py)
     └── ClientError
         ├── ServiceError     the server refused: the fields of an RFC 9457 problem
         ├── UnreachableError no server answered
@@ -54,6 +55,11 @@ class MissingError(ServiceError, NotFoundError):
 
 class UnreachableError(ClientError):
     """No server answered at the address, or the answer broke off."""
+
+
+def passes(error: ClientError) -> bool:
+    """Whether the same request may succeed soon: nobody answered, or who answered says so."""
+    return isinstance(error, UnreachableError) or (isinstance(error, ServiceError) and error.retryable)
 
 
 class UnfinishedError(ClientError):

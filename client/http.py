@@ -71,8 +71,8 @@ class Http:
         """Who we are to the server."""
         return self.get(Me, "/v1/me")
 
-    def get(self, kind: type[T], path: str, **query: str | float) -> T:
-        """The answer at ``path``. Raises ServiceError, UnreachableError."""
+    def get(self, kind: type[T], path: str, **query: str | float | list[str]) -> T:
+        """The answer at ``path``; a list gives its name several times. Raises ServiceError, UnreachableError."""
         return self._decoded(kind, self._request("GET", path, params=query))
 
     def post(self, kind: type[T], path: str, body: bytes = b"", content: str = "", key: str | None = None) -> T:

@@ -13,6 +13,7 @@ from conoid.cases.run import ExitCode
 from conoid.cases.schema import Case
 
 from . import silence, tables
+from .console import PlainConsole
 from .errors import ClientError
 from .live import Live, exit_code
 from .local import GRACE, LocalServer
@@ -46,7 +47,7 @@ def run_once(
         raise ClientError(f"field = {field!r}: allowed: {', '.join(FIELDS)}")
     data = data_of(case, overrides)
     checked = parse_case(data)
-    out = Console(quiet=as_json, highlight=False)
+    out = PlainConsole(quiet=as_json, highlight=False)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     server = LocalServer(runs, checked.run.ranks)
     with ExitStack() as up:

@@ -7,13 +7,14 @@ from typing import Annotated, Any
 
 import msgspec
 import typer
-from rich.console import Console, RenderableType
+from rich.console import RenderableType
 
 from conoid.cases.estimate import estimate
 from conoid.cases.load import CaseError, materials, parse_case, shipped
 from conoid.cases.plausible import doubts
 from conoid.cases.problems import Problem
 
+from .console import PlainConsole, plain
 from .errors import ClientError
 from .result import Result
 from .run import Run
@@ -79,7 +80,7 @@ def labels_of(words: Iterable[str] | None) -> dict[str, str]:
 def complain(*lines: str) -> None:
     """Tells people what is wrong, a line each."""
     for line in lines:
-        typer.echo(f"conoid: {line}", err=True)
+        typer.echo(f"conoid: {plain(line)}", err=True)
 
 
 def warn(odd: Sequence[Problem]) -> None:
@@ -99,7 +100,7 @@ def warn_of(case: str, overrides: Iterable[str]) -> None:
 
 def show(thing: RenderableType) -> None:
     """Prints for people."""
-    Console(highlight=False).print(thing)
+    PlainConsole(highlight=False).print(thing)
 
 
 def show_json(thing: Any) -> None:

@@ -1,5 +1,6 @@
 """A handle of a run on a server: status, wait, watch, cancel, events, files, download, result."""
 
+import math
 import shutil
 import tempfile
 import time
@@ -20,7 +21,7 @@ from conoid.cases.messages import Snapshot as Told
 from conoid.cases.outcome import Outcome
 from conoid.cases.run import State
 
-from .errors import ClientError, NotFoundError, UnfinishedError
+from .errors import ClientError, NotFoundError, ServiceError, UnfinishedError, UnreachableError, passes
 from .http import Http
 from .journal import from_line
 from .link import Link
@@ -30,6 +31,8 @@ from .snapshots import Snapshot
 
 _WAIT = 20.0
 """s of a single request that waits for the end of a run: below the 30 s after which a request is given up (http.py)."""
+_PATIENCE = 120.0
+"""s that a server may be away while the end of a run is waited for. Chosen: time for a restart, twice over."""
 
 
 class RunInfo(msgspec.Struct, kw_only=True, frozen=True):
@@ -128,14 +131,27 @@ class Run:
         return self.session.get(RunInfo, self.path)
 
     def wait(self, timeout: float | None = None) -> RunInfo:
-        """Returns when the run has ended. Raises TimeoutError after ``timeout`` s."""
-        deadline = None if timeout is None else time.monotonic() + timeout
+        """Returns when the run has ended. Raises TimeoutError after ``timeout`` s.
+
+        A server that is away, or too busy to answer, is waited for, two minutes long.
+        """
+        deadline = math.inf if timeout is None else time.monotonic() + timeout
+        heard = time.monotonic()
         while True:
-            left = _WAIT if deadline is None else deadline - time.monotonic()
-            info = self.session.get(RunInfo, self.path, wait=max(0.0, min(_WAIT, left)))
+            left = max(0.0, min(_WAIT, deadline - time.monotonic()))
+            try:
+                info = self.session.get(RunInfo, self.path, wait=left)
+            except (UnreachableError, ServiceError) as error:
+                if not passes(error) or time.monotonic() - heard > _PATIENCE:
+                    raise
+                if time.monotonic() >= deadline:
+                    raise TimeoutError(f"run {self.id}: {error}") from None
+                time.sleep(min(1.0, left))
+                continue
+            heard = time.monotonic()
             if info.state.final:
                 return info
-            if deadline is not None and time.monotonic() >= deadline:
+            if heard >= deadline:
                 raise TimeoutError(f"run {self.id} is still {info.state.value} after {timeout:g} s")
 
     def cancel(self) -> RunInfo:

@@ -10,9 +10,11 @@ import msgspec
 from conoid.cases.load import CaseError, Overrides, Problem
 
 from .config import target
+from .errors import ClientError
 from .http import Http
 from .run import Run, RunInfo
-from .submission import CaseSource, body_of
+from .submission import CaseSource, body_of, data_of
+from .sweep import Point, Sweep, SweepInfo, SweepPage
 
 
 class Verdict(msgspec.Struct, kw_only=True, frozen=True):
@@ -62,6 +64,31 @@ class Session(Http):
         path = f"/v1/runs?{urlencode(words)}" if words else "/v1/runs"
         return Run(self, self.post(RunInfo, path, body, kind, key or str(uuid.uuid4())).id)
 
+    def sweep(
+        self, case: CaseSource, points: Sequence[Point], at_once: int | None = None, key: str | None = None
+    ) -> Sweep:
+        """Hands a case in at many points, each a mapping of keys to values: all become runs, or none.
+
+        ``at_once`` of them run at a time; ``key`` as for ``submit``. Raises CaseError, ServiceError.
+        """
+        wish = {"case": data_of(case), "points": list(points), "at_once": at_once}
+        body = msgspec.json.encode(wish)
+        made = self.post(SweepInfo, "/v1/sweeps", body, "application/json", key or str(uuid.uuid4()))
+        return Sweep(self, made.id)
+
+    def sweeps(self) -> list[SweepInfo]:
+        """Our sweeps, newest first, without their points."""
+        return self.get(SweepPage, "/v1/sweeps").sweeps
+
+    def find_sweep(self, sweep_id: str) -> Sweep:
+        """A handle of a sweep by its id, or of the newest one for ``last``. Raises ClientError when there is none."""
+        if sweep_id != "last":
+            return Sweep(self, sweep_id)
+        newest = self.sweeps()
+        if not newest:
+            raise ClientError("there is no sweep yet")
+        return Sweep(self, newest[0].id)
+
     def run(self, run_id: str) -> Run:
         """A handle of a run; the server is not asked yet."""
         return Run(self, run_id)
@@ -70,12 +97,13 @@ class Session(Http):
         self, states: Sequence[str] = (), limit: int = 50, labels: Mapping[str, str] | None = None
     ) -> list[RunInfo]:
         """Our runs, newest first, at most ``limit``; with ``labels``, those that have all of them."""
-        wanted = dict(labels or {}).items()
         found: list[RunInfo] = []
-        query = {"state": ",".join(states)} if states else {}
+        query: dict[str, str | list[str]] = {"state": ",".join(states)} if states else {}
+        if labels:
+            query["label"] = [f"{name}={value}" for name, value in labels.items()]
         while len(found) < limit:
-            page = self.get(Page, "/v1/runs", limit=100 if wanted else min(100, limit - len(found)), **query)
-            found += [run for run in page.runs if wanted <= run.labels.items()]
+            page = self.get(Page, "/v1/runs", limit=min(100, limit - len(found)), **query)
+            found += page.runs
             if page.next is None:
                 break
             query["cursor"] = page.next

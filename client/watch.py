@@ -10,6 +10,7 @@ from rich.live import Live as Screen
 from conoid.cases.messages import AnyMessage, Log, Progress, Snapshot, Status
 
 from . import silence
+from .console import PlainConsole
 from .display import line, panel, seen
 from .figures import clock, duration
 from .link import Link
@@ -44,7 +45,7 @@ class Watched(Protocol):
 
 def watch(run: Watched, live: bool | None = None, console: Console | None = None) -> Live:
     """Follows ``run`` to its end. ``live``: the panel (True), plain lines (False), what the terminal can (None)."""
-    out = console or Console()
+    out = console or PlainConsole()
     known = Live(run.id, title=run.status().title)
     link = run.link()
     known.link = link.name

@@ -120,6 +120,7 @@ def _serve(options: argparse.Namespace) -> None:
 
 def _store(options: argparse.Namespace) -> Store:
     settings = _settings(options)
+    os.umask(0o077)
     settings.runs.mkdir(parents=True, exist_ok=True)
     return Store(settings.database_url)
 

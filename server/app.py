@@ -14,12 +14,17 @@ from .history import Histories
 from .launch import Launcher
 from .launch.local import LocalLauncher
 from .launch.slurm import SlurmLauncher
+from .metrics import Metrics, Timed
+from .reader import Turns
+from .readiness import Readiness
 from .routes import cases, events, files, health, history, logs, me, runs, snapshots
+from .routes import sweeps as sweep_routes
 from .service import Service
 from .settings import Settings
 from .store import Store
 from .submission import Desk
 from .supervisor import Supervisor
+from .sweeps import Sweeps
 from .telemetry import Telemetry
 
 ROUTERS = (
@@ -28,6 +33,7 @@ ROUTERS = (
     events.router,
     history.router,
     snapshots.router,
+    sweep_routes.router,
     logs.router,
     files.router,
     me.router,
@@ -50,7 +56,7 @@ def opened(settings: Settings) -> Iterator[Service]:
 
     Raises StoreError, TelemetryError, OSError.
     """
-    settings.runs.mkdir(parents=True, exist_ok=True)
+    settings.runs.mkdir(0o700, parents=True, exist_ok=True)
     with ExitStack() as stack:
         store = Store(settings.database_url)
         stack.callback(store.close)
@@ -61,11 +67,15 @@ def opened(settings: Settings) -> Iterator[Service]:
             stack.callback(telemetry.close)
         bell = Bell()
         supervisor = Supervisor(settings, store, launcher_of(settings), telemetry, bell.ring)
+        desk = Desk(settings, store, supervisor)
+        sweeps = Sweeps(settings, desk)
+        supervisor.held_back = sweeps.held
         supervisor.start()
         stack.callback(supervisor.close)
         if settings.end_runs:
             stack.callback(supervisor.end_all)
-        yield Service(settings, store, bell, telemetry, supervisor, Desk(settings, store, supervisor), Histories())
+        readiness = Readiness(settings, store)
+        yield Service(settings, store, bell, telemetry, supervisor, desk, Histories(), readiness, Turns(), sweeps)
 
 
 def launcher_of(settings: Settings) -> Launcher:
@@ -91,10 +101,12 @@ def build_app(service: Service) -> FastAPI:
         redoc_url=None,
         lifespan=lifespan,
     )
-    app.state.service = service
+    app.state.service, app.state.routers = service, ROUTERS
     errors.install(app)
     openapi.install(app)
+    app.state.metrics = Metrics(service)
     app.add_middleware(_SafeHeaders)
+    app.add_middleware(Timed, metrics=app.state.metrics)
     for router in ROUTERS:
         app.include_router(router)
     app.state.page_problem = None

@@ -1,10 +1,14 @@
 """Who asks, and what they may: dependencies that give the routes an identity, or refuse."""
 
+import math
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated
 
 from fastapi import Depends, Request
+from sqlalchemy.exc import SQLAlchemyError
+from starlette.concurrency import run_in_threadpool
 
 from .errors import ServiceError
 from .service import Service, ServiceOf
@@ -12,6 +16,8 @@ from .settings import loopback
 from .store import Token
 from .tokens import SCOPES, check_token
 
+RECHECK = 2.0
+"""s after which the token behind a long answer is looked at again. Chosen: who is revoked hears no more within 5 s."""
 LOCAL_OWNER = "local"
 """Owns all runs of a server without access control."""
 
@@ -37,11 +43,16 @@ def identify(request: Request, service: ServiceOf) -> Identity:
     scheme, _, text = request.headers.get("authorization", "").partition(" ")
     token = check_token(service.store, text.strip()) if scheme.lower() == "bearer" else None
     if token is None:
-        raise ServiceError(
-            401, "unauthorized", "this needs a valid token", headers={"WWW-Authenticate": "Bearer"},
-            hint="send the header 'Authorization: Bearer <token>'; the server's operator makes tokens",
-        )  # fmt: skip
+        raise unauthorized()
     return Identity(token.owner, token)
+
+
+def unauthorized() -> ServiceError:
+    """401."""
+    return ServiceError(
+        401, "unauthorized", "this needs a valid token", headers={"WWW-Authenticate": "Bearer"},
+        hint="send the header 'Authorization: Bearer <token>'; the server's operator makes tokens",
+    )  # fmt: skip
 
 
 def _same_machine_page(request: Request) -> None:
@@ -70,6 +81,33 @@ Reader = Annotated[Identity, Depends(requires("read"))]
 Submitter = Annotated[Identity, Depends(requires("submit"))]
 
 
-def still_valid(service: Service, identity: Identity) -> bool:
-    """False once the token behind a long answer has been revoked."""
-    return identity.token is None or service.store.token(identity.token.id) is not None
+class Pass:
+    """Lets a long answer go on while the token behind it is valid, and for ``seconds`` at most where some are given."""
+
+    def __init__(self, service: Service, identity: Identity, seconds: float | None = None) -> None:
+        self._service, self._identity = service, identity
+        self._looked = time.monotonic()
+        self._ends = math.inf if seconds is None else self._looked + seconds
+
+    @property
+    def left(self) -> float:
+        """s until somebody should look again."""
+        return max(0.0, min(RECHECK, self._ends - time.monotonic()))
+
+    async def holds(self) -> bool:
+        """False once the token has been revoked, or the time is over."""
+        now = time.monotonic()
+        if now >= self._ends:
+            return False
+        if now - self._looked < RECHECK:
+            return True
+        self._looked = now
+        return await run_in_threadpool(self._valid)
+
+    def _valid(self) -> bool:
+        """A database that cannot be asked now ends nobody's stream."""
+        token = self._identity.token
+        try:
+            return token is None or self._service.store.token(token.id) is not None
+        except SQLAlchemyError:
+            return True

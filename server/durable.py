@@ -3,8 +3,11 @@
 import os
 from pathlib import Path
 
+_PROBE = 1 << 16
+"""Bytes that are written to find out whether a folder takes any: more than a launch writes. Chosen."""
 
-def write(path: Path, content: bytes, mode: int = 0o644) -> None:
+
+def write(path: Path, content: bytes, mode: int = 0o600) -> None:
     """Puts ``content`` at ``path`` whole or not at all: a temporary name, fsync, rename, fsync of the folder."""
     beside = path.with_name(f".{path.name}.new")
     with open(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, mode), "wb") as file:
@@ -15,9 +18,19 @@ def write(path: Path, content: bytes, mode: int = 0o644) -> None:
     sync_folder(path.parent)
 
 
+def probe(folder: Path) -> None:
+    """Raises OSError when nothing can be written in ``folder`` now: it is gone, full, or no descriptor is left."""
+    path = folder / ".probe"
+    with open(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), "wb") as file:
+        file.write(bytes(_PROBE))
+        file.flush()
+        os.fsync(file.fileno())
+    path.unlink()
+
+
 def write_new(path: Path, content: bytes) -> None:
     """A file in a folder that nobody reads yet; the caller syncs the folder. Raises FileExistsError."""
-    with open(path, "xb") as file:
+    with open(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
         file.write(content)
         file.flush()
         os.fsync(file.fileno())

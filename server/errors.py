@@ -17,6 +17,8 @@ from typing import Any
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, Response
+from fastapi.routing import APIRoute
+from sqlalchemy.exc import SQLAlchemyError
 from starlette.exceptions import HTTPException
 
 from conoid.cases.problems import Problem
@@ -97,6 +99,7 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(ServiceError, _service_error)
     app.add_exception_handler(HTTPException, _http_error)
     app.add_exception_handler(RequestValidationError, _parameter_error)
+    app.add_exception_handler(SQLAlchemyError, _database)
     app.add_exception_handler(Exception, _crash)
 
 
@@ -109,7 +112,18 @@ async def _http_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
     code = _CODES.get(error.status_code, "error")
     detail = f"{request.method} {request.url.path}: {error.detail}"
-    return ServiceError(error.status_code, code, detail, headers=error.headers).response()
+    headers = {"Allow": _allowed(request)} if error.status_code == 405 else error.headers
+    return ServiceError(error.status_code, code, detail, headers=headers).response()
+
+
+def _allowed(request: Request) -> str:
+    """The methods of all routes of the path: where several patterns match, the longest one is meant."""
+    found: dict[str, set[str]] = {}
+    for router in request.app.state.routers:
+        for route in router.routes:
+            if isinstance(route, APIRoute) and route.path_regex.match(request.url.path):
+                found.setdefault(route.path, set()).update(route.methods or ())
+    return ", ".join(sorted(found[max(found, key=len)])) if found else ""
 
 
 async def _parameter_error(_: Request, error: Exception) -> Response:
@@ -118,6 +132,21 @@ async def _parameter_error(_: Request, error: Exception) -> Response:
     name = str(first["loc"][-1])
     detail = f"{name} = {str(first.get('input'))[:80]!r}: {first['msg']}"
     return ServiceError(400, "bad_parameter", detail, pointer=name).response()
+
+
+async def _database(request: Request, error: Exception) -> Response:
+    """Locked by another process, full, or away: never for good."""
+    _log.error("%s %s: the database cannot be used: %s", request.method, request.url.path, error)
+    return database_away(error).response()
+
+
+def database_away(error: Exception) -> ServiceError:
+    """507 where its disk is full, 503 for anything else."""
+    said = str(error).splitlines()[0]
+    if "disk is full" in said:
+        return ServiceError(507, "storage", "the disk of the server's database is full", retryable=True)
+    detail = "the server's database cannot be used now"
+    return ServiceError(503, "unavailable", detail, retryable=True, headers={"Retry-After": "5"})
 
 
 async def _crash(request: Request, error: Exception) -> Response:

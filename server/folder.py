@@ -5,8 +5,9 @@ import re
 import secrets
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from functools import reduce
 from pathlib import Path
 
 import msgspec
@@ -19,11 +20,13 @@ from conoid.cases.outcome import to_json as outcome_to_json
 from conoid.cases.run import Cause, State
 
 from . import durable, journal
-from .lifecycle import Run
+from .events import Run
 
 _ID = re.compile(r"[0-9a-z]{22}")
 _LETTERS = "0123456789abcdefghjkmnpqrstvwxyz"
 _NEW = ".new-"
+_TELLING = (layout.SUBMISSION, layout.JOURNAL, layout.WORKER)
+"""One of these is left where a run has been, whatever was damaged."""
 _UNREADABLE = "outcome.unreadable.json"
 
 
@@ -66,13 +69,23 @@ _last_stamp = 0
 
 
 def new_id() -> tuple[str, float]:
-    """An id of 22 letters and digits, and its Unix time in s. Ids sort by time; half of each is random.
+    """An id of 22 letters and digits, and the Unix time in s. Half of each id is random, and ids sort in the order in
+    which they are made, also where the clock is set back.
 
     Not for several threads at a time.
     """
     global _last_stamp
     _last_stamp = max(time.time_ns() // 1000, _last_stamp + 1)
-    return _letters(_last_stamp, 11) + _letters(secrets.randbits(55), 11), _last_stamp / 1e6
+    return _letters(_last_stamp, 11) + _letters(secrets.randbits(55), 11), time.time()
+
+
+def begin_after(run_id: str) -> None:
+    """Ids to come sort after this one, whatever the clock says."""
+    global _last_stamp
+    stamp = 0
+    for letter in run_id[:11]:
+        stamp = stamp << 5 | _LETTERS.index(letter)
+    _last_stamp = max(_last_stamp, stamp)
 
 
 def is_id(text: str) -> bool:
@@ -88,7 +101,8 @@ def create(runs: Path, submission: Submission, case: bytes, resolved: bytes) -> 
     """Makes the folder of an accepted run; it appears whole, and is on disk when this returns. Raises OSError."""
     beside, folder = runs / f"{_NEW}{submission.id}", runs / submission.id
     accepted = Status(run=submission.id, seq=1, wall=submission.submitted, state=State.ACCEPTED)
-    (beside / layout.LOGS).mkdir(parents=True)
+    beside.mkdir(0o700)
+    (beside / layout.LOGS).mkdir(0o700)
     durable.write_new(beside / submission.case_file, case)
     durable.write_new(beside / layout.RESOLVED_CASE, resolved)
     durable.write_new(beside / layout.SUBMISSION, msgspec.json.format(msgspec.json.encode(submission), indent=2))
@@ -109,8 +123,8 @@ def scan(runs: Path) -> Iterator[Path]:
     """The folders of all runs, oldest first; what a killed server left half made is removed."""
     for path in sorted(runs.iterdir()):
         if path.name.startswith(_NEW):
-            shutil.rmtree(path)
-        elif is_id(path.name) and (path / layout.SUBMISSION).is_file():
+            shutil.rmtree(path, ignore_errors=True)
+        elif is_id(path.name) and any((path / name).exists() for name in _TELLING):
             yield path
 
 
@@ -121,11 +135,17 @@ def submission(folder: Path) -> Submission:
 
 def run(folder: Path) -> Run:
     """The run as its folder tells it: the submission, and the Status lines of the journal."""
-    made = submission(folder)
-    told = Run(made.id, made.owner, made.name, made.ranks, made.submitted)
-    for status in journal.statuses(folder / layout.JOURNAL):
-        told = _after(told, status)
-    return told
+    return replay(first(submission(folder)), journal.statuses(folder / layout.JOURNAL))
+
+
+def first(made: Submission) -> Run:
+    """The run as it was accepted."""
+    return Run(made.id, made.owner, made.name, made.ranks, made.submitted)
+
+
+def replay(accepted: Run, told: Iterable[Status]) -> Run:
+    """The run as the Status lines of its journal tell it."""
+    return reduce(_after, told, accepted)
 
 
 def _after(told: Run, status: Status) -> Run:
@@ -162,6 +182,19 @@ def write_outcome(folder: Path, ended: Outcome) -> None:
     durable.write(folder / layout.OUTCOME, outcome_to_json(ended))
 
 
+def write_stop(folder: Path, why: Cause) -> None:
+    """Records that a stop was asked for. Raises OSError."""
+    durable.write(folder / layout.STOP_REQUEST, why.value.encode())
+
+
+def stop_asked(folder: Path) -> Cause | None:
+    """Why a stop was asked for; None when none was."""
+    try:
+        return Cause((folder / layout.STOP_REQUEST).read_text())
+    except (OSError, ValueError):
+        return None
+
+
 def process(folder: Path) -> Process | None:
     """The process that was started for the run; None when there was none."""
     try:
@@ -173,3 +206,11 @@ def process(folder: Path) -> Process | None:
 def write_process(folder: Path, started: Process) -> None:
     """Records the process. Raises OSError."""
     durable.write(folder / layout.WORKER, msgspec.json.encode(started))
+
+
+def runs_for(folder: Path) -> float:
+    """s since the recorded process was started, by the clock of the machine's start; 0 where there is no record."""
+    made = process(folder)
+    if made is None or not made.started:
+        return 0.0
+    return max(0.0, time.clock_gettime(time.CLOCK_BOOTTIME) - made.started / os.sysconf("SC_CLK_TCK"))

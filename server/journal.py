@@ -8,6 +8,7 @@ from pathlib import Path
 import msgspec
 
 from conoid.cases.messages import Status, to_json
+from conoid.cases.run import Cause, State
 
 _CHUNK = 1 << 18
 """Bytes of a journal that are read at once: some hundred lines. Chosen."""
@@ -115,21 +116,41 @@ def lines(path: Path, after: int = 0) -> Iterator[Line]:
 
 
 def statuses(path: Path) -> list[Status]:
-    """The Status messages of a journal, in order."""
-    return [_status.decode(line.raw) for line in lines(path) if line.type == "status"]
+    """The Status messages of a journal, in order; what is damaged is passed over."""
+    found = (_status_in(line.raw) for line in lines(path) if line.type == "status")
+    return [status for status in found if status is not None]
+
+
+def _status_in(raw: bytes) -> Status | None:
+    try:
+        status = _status.decode(raw)
+        State(status.state)
+        Cause(status.cause) if status.cause else None
+    except ValueError:
+        return None
+    return status
 
 
 def append(path: Path, status: Status) -> Status:
     """Appends ``status`` under the next number and returns it as written; on disk when this returns. Raises OSError.
 
-    A line that a killed worker left half written is no event: it is cut off first.
+    A line that a killed worker left half written is no event: it is cut off first; so is this one when it cannot be
+    written whole.
     """
-    with open(path, "a+b") as file:
+    with open(path, "a+b", opener=_private) as file:
         numbered = msgspec.structs.replace(status, seq=_mend(file.fileno()) + 1)
-        file.write(to_json(numbered) + b"\n")
-        file.flush()
-        os.fsync(file.fileno())
+        size = os.fstat(file.fileno()).st_size
+        try:
+            os.write(file.fileno(), to_json(numbered) + b"\n")
+            os.fsync(file.fileno())
+        except OSError:
+            os.ftruncate(file.fileno(), size)
+            raise
     return numbered
+
+
+def _private(path: str, flags: int) -> int:
+    return os.open(path, flags, 0o600)
 
 
 def _mend(descriptor: int) -> int:

@@ -1,159 +1,41 @@
 """The life of a run as a pure function: (run, event) -> (run, actions). No clock, no file, no process in here."""
 
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import replace
 
 import msgspec
 
 from conoid.cases.outcome import Outcome
 from conoid.cases.run import Cause, ExitCode, State
 
+from .events import (
+    Action,
+    Admitted,
+    Adopt,
+    Broken,
+    CancelAsked,
+    Event,
+    Found,
+    GraceOver,
+    Granted,
+    Journal,
+    Kill,
+    Launch,
+    LaunchFailed,
+    LaunchPutOff,
+    Run,
+    Stop,
+    WallTimeOver,
+    WorkerExited,
+    WorkerRuns,
+    WorkerStarts,
+    WorkerWaits,
+    WriteOutcome,
+)
 
-@dataclass(frozen=True)
-class Run:
-    """What the server knows of a run. Times are Unix s, 0 when they have not come yet."""
-
-    id: str
-    owner: str
-    name: str
-    ranks: int
-    submitted: float
-    state: State = State.ACCEPTED
-    cause: Cause | None = None
-    message: str = ""
-    started: float = 0.0
-    finished: float = 0.0
-    stopping_for: Cause | None = None
-    """Why a stop was asked for."""
-
-
-# Events ---------------------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Admitted:
-    """The run is on disk and may wait for its turn."""
-
-
-@dataclass(frozen=True)
-class Granted:
-    """Enough slots are free. ``batch``: it goes on waiting, in the queue of a batch system."""
-
-    batch: bool = False
-
-
-@dataclass(frozen=True)
-class WorkerStarts:
-    """A batch system has given the worker its cores, at the Unix time ``at``."""
-
-    at: float
-
-
-@dataclass(frozen=True)
-class WorkerWaits:
-    """A batch system has taken the cores away; the worker goes on from its checkpoint when it gets some again."""
-
-
-@dataclass(frozen=True)
-class LaunchFailed:
-    """The worker could not be started."""
-
-    message: str
-
-
-@dataclass(frozen=True)
-class WorkerRuns:
-    """The worker says that it runs."""
-
-
-@dataclass(frozen=True)
-class CancelAsked:
-    """Its owner wants it to stop. ``handed``: a worker lives, or a batch system has the run."""
-
-    handed: bool = False
-
-
-@dataclass(frozen=True)
-class WallTimeOver:
-    """It has run as long as it may."""
-
-
-@dataclass(frozen=True)
-class GraceOver:
-    """It was asked to stop and did not."""
-
-
-@dataclass(frozen=True)
-class WorkerExited:
-    """The worker has ended. ``code`` is None when nobody could collect it; negative: minus the signal."""
-
-    code: int | None
-    outcome: Outcome | None
-    out_of_memory: bool = False
-    traces: str = ""
-    """What it left for people in place of an outcome."""
-    reading: tuple[State, Cause, str] | None = None
-    """What a batch system says of an end without an outcome."""
-
-
-@dataclass(frozen=True)
-class Found:
-    """What a starting server sees of a run that an earlier one left open."""
-
-    worker: Literal["none", "alive", "gone"]
-    outcome: Outcome | None = None
-    rebooted: bool = False
-
-
-Event = (
-    Admitted | Granted | LaunchFailed | WorkerStarts | WorkerWaits | WorkerRuns | CancelAsked | WallTimeOver | GraceOver
-    | WorkerExited | Found
-)  # fmt: skip
-
-# Actions --------------------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Journal:
-    """Append a Status line to the journal and publish it. Only while no worker writes."""
-
-    state: State
-    cause: Cause | None = None
-    message: str = ""
-
-
-@dataclass(frozen=True)
-class WriteOutcome:
-    """Write outcome.json."""
-
-    outcome: Outcome
-
-
-@dataclass(frozen=True)
-class Launch:
-    """Start the worker."""
-
-
-@dataclass(frozen=True)
-class Adopt:
-    """Watch a worker that an earlier server started."""
-
-
-@dataclass(frozen=True)
-class Stop:
-    """Ask the worker to stop at its next step; kill it when it does not."""
-
-
-@dataclass(frozen=True)
-class Kill:
-    """End the worker's processes now."""
-
-
-Action = Journal | WriteOutcome | Launch | Adopt | Stop | Kill
 Next = tuple[Run, tuple[Action, ...]]
 
-_SIGKILL = 9
-"""Its number on every POSIX system; the state machine imports nothing of the system."""
+_SIGKILL, _SIGTERM = 9, 15
+"""Their numbers on every POSIX system; the state machine imports nothing of the system."""
 
 
 def advance(run: Run, event: Event, now: float) -> Next:
@@ -172,8 +54,14 @@ def advance(run: Run, event: Event, now: float) -> Next:
         case Granted() if run.state is State.QUEUED:
             started, actions = _enter(replace(run, started=now), State.STARTING)
             return started, (*actions, Launch())
-        case LaunchFailed(message) if run.state in {State.QUEUED, State.STARTING}:
-            return _end(run, now, Outcome(state=State.FAILED, cause=Cause.LAUNCH, message=message, ranks=run.ranks))
+        case LaunchFailed() | LaunchPutOff() if run.state is State.STOPPING:
+            return _exited(run, WorkerExited(None, None), now)
+        case LaunchFailed(message, cause) if run.state in {State.QUEUED, State.STARTING}:
+            return _end(run, now, Outcome(state=State.FAILED, cause=cause, message=message, ranks=run.ranks))
+        case LaunchPutOff(message) if run.state is State.STARTING:
+            return _enter(replace(run, started=0.0), State.QUEUED, message)
+        case Broken():
+            return _broken(run, event, now)
         case WorkerStarts(at) if run.state is State.QUEUED:
             return replace(run, state=State.STARTING, started=at, message=""), ()
         case WorkerWaits() if run.state in {State.STARTING, State.RUNNING}:
@@ -206,6 +94,13 @@ def _end(run: Run, now: float, outcome: Outcome, *, written: bool = False) -> Ne
     return ended, (*write, Journal(state, cause, outcome.message))
 
 
+def _broken(run: Run, event: Broken, now: float) -> Next:
+    """Nobody can say how it would have ended; what may still compute it ends first."""
+    outcome = Outcome(state=State.LOST, cause=Cause.STORAGE, message=event.message, ranks=run.ranks)
+    ended, actions = _end(run, now, outcome)
+    return ended, (Kill(), *actions) if event.writable else (Kill(),)
+
+
 def _cancel(run: Run, now: float, handed: bool) -> Next:
     if run.state is State.ACCEPTED or (run.state is State.QUEUED and not handed):
         message = "cancelled before it started"
@@ -215,16 +110,28 @@ def _cancel(run: Run, now: float, handed: bool) -> Next:
 
 def _stop(run: Run, why: Cause) -> Next:
     """No Journal: the worker is the journal's writer now."""
-    return replace(run, state=State.STOPPING, stopping_for=why), (Stop(),)
+    return replace(run, state=State.STOPPING, stopping_for=why), (Stop(why),)
 
 
 def _exited(run: Run, event: WorkerExited, now: float) -> Next:
     told = event.outcome if event.outcome is not None and _readable(event.outcome) else None
     outcome = told or _without_outcome(run, event)
-    if run.stopping_for is Cause.WALLTIME and outcome.state == State.CANCELLED:
-        message = "its wall time is used up"
-        outcome = msgspec.structs.replace(outcome, state=State.TIMED_OUT, cause=Cause.WALLTIME, message=message)
+    asked = run.stopping_for is Cause.CANCELLED or (event.reading is not None and event.reading[1] is Cause.CANCELLED)
+    if outcome.state == State.CANCELLED and not asked:
+        outcome = _renamed(run, event, outcome)
     return _end(run, now, outcome, written=outcome is event.outcome)
+
+
+def _renamed(run: Run, event: WorkerExited, outcome: Outcome) -> Outcome:
+    """A worker knows that it was stopped, not by whom: what nobody asked for is no cancellation."""
+    if event.reading is not None:
+        state, cause, message = event.reading
+        return msgspec.structs.replace(outcome, state=state, cause=cause, message=message)
+    if run.stopping_for is Cause.WALLTIME:
+        state, message = State.TIMED_OUT, "its wall time is used up"
+        return msgspec.structs.replace(outcome, state=state, cause=Cause.WALLTIME, message=message)
+    message = "the worker was asked to stop from outside, not by its owner"
+    return msgspec.structs.replace(outcome, state=State.FAILED, cause=Cause.PREEMPTED, message=message)
 
 
 def _readable(outcome: Outcome) -> bool:
@@ -251,6 +158,10 @@ def _reading_of(run: Run, event: WorkerExited) -> tuple[State, Cause, str]:
         return State.LOST, Cause.NODE, "the worker was killed from outside"
     if event.code == ExitCode.BAD_INPUT:
         return State.FAILED, Cause.INPUT, "the worker refused the case"
+    if event.code == ExitCode.STORAGE or event.disk_failed:
+        return State.FAILED, Cause.STORAGE, "the worker could not write its files"
+    if event.code in {-_SIGTERM, 128 + _SIGTERM}:
+        return State.FAILED, Cause.PREEMPTED, "the worker was ended from outside"
     if event.code == ExitCode.PHYSICS:
         return State.FAILED, Cause.DIVERGED, "the computation failed"
     if run.state in {State.QUEUED, State.STARTING}:
@@ -271,6 +182,8 @@ def _found(run: Run, event: Found, now: float) -> Next:
         return _enter(replace(run, started=0.0), State.QUEUED, "the server was restarted before the launch")
     if run.stopping_for is not None:
         return _exited(run, WorkerExited(None, None), now)
+    if event.worker == "gone" and (event.code is not None or event.disk_failed):
+        return _exited(run, WorkerExited(event.code, None, disk_failed=event.disk_failed), now)
     if event.rebooted:
         lost = Outcome(state=State.LOST, cause=Cause.NODE, message="the machine was restarted", ranks=run.ranks)
     else:

@@ -5,6 +5,7 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
+import msgspec
 from fastapi import Request
 
 from conoid.cases.bodies import MeshFile
@@ -19,6 +20,10 @@ BODY = 1 << 20
 """Bytes of the largest body."""
 _BODY_TIMEOUT = 30.0
 """s for a whole body: 1 MiB at 35 kB/s. Chosen."""
+
+
+_COUNTABLE = 1 << 53
+"""Where nothing is capped: what every reader of JSON can still count (IEEE 754)."""
 
 
 async def read_body(request: Request) -> bytes:
@@ -45,12 +50,29 @@ def _too_large(size: int) -> ServiceError:
     return ServiceError(413, "too_large", f"the body has {size} bytes or more; allowed: {BODY}")
 
 
-def check(case: Case, settings: Settings) -> list[Problem]:
+class Limits(msgspec.Struct, frozen=True):
+    """What a case may say and need here; None: no cap."""
+
+    slots: int
+    elements: int | None
+    steps: int | None
+    memory: int | None
+    core_seconds: float | None
+    wall_time: float | None
+
+
+def of(settings: Settings) -> Limits:
+    """The limits of a site."""
+    caps = settings.caps
+    return Limits(settings.slots, caps.elements, caps.steps, caps.memory, caps.core_seconds, caps.wall_time)
+
+
+def check(case: Case, limits: Limits) -> list[Problem]:
     """Everything that a valid case says and this server does not allow."""
-    return [*_ranks(case, settings), *_files(case), *_time(case, settings.caps)]
+    return [*_ranks(case, limits), *_files(case), *_time(case, limits)]
 
 
-def check_size(estimate: Estimate, caps: Caps) -> list[Problem]:
+def check_size(estimate: Estimate, caps: Limits) -> list[Problem]:
     """Everything that the case needs more of than this server allows; what is not known is no reason to refuse."""
     needs = (
         ("parts", "elements", estimate.elements, caps.elements),
@@ -59,13 +81,13 @@ def check_size(estimate: Estimate, caps: Caps) -> list[Problem]:
         ("run.end_time", "core-seconds", estimate.core_seconds, caps.core_seconds),
     )
     return [
-        Problem(key, "", f"the case needs about {value:.3g} {what}; this server allows {cap:.3g}")
+        Problem(key, "", f"the case needs about {value:.3g} {what}; this server allows {cap or _COUNTABLE:.3g}")
         for key, what, value, cap in needs
-        if cap is not None and value is not None and value > cap
+        if value is not None and value > (_COUNTABLE if cap is None else cap)
     ]
 
 
-def _ranks(case: Case, settings: Settings) -> Iterator[Problem]:
+def _ranks(case: Case, settings: Limits) -> Iterator[Problem]:
     if case.run.ranks > settings.slots:
         yield Problem(
             "run.ranks", str(case.run.ranks), f"this server has {settings.slots} slots; allowed: 1 to {settings.slots}"
@@ -79,7 +101,7 @@ def _files(case: Case) -> Iterator[Problem]:
             yield Problem(f"parts[{index}].mesh.path", repr(part.mesh.path), message)
 
 
-def _time(case: Case, caps: Caps) -> Iterator[Problem]:
+def _time(case: Case, caps: Limits) -> Iterator[Problem]:
     asked, cap = case.run.max_wall_time, caps.wall_time
     if asked is not None and cap is not None and asked > cap:
         yield Problem("run.max_wall_time", f"{asked:g} s", f"this server allows {cap:g} s")
@@ -98,7 +120,7 @@ def figures(estimate: Estimate) -> dict[str, int | float]:
     return {name: value for name, value in values.items() if value is not None}
 
 
-def wall_time(case: Case, caps: Caps) -> float | None:
+def wall_time(case: Case, caps: Limits) -> float | None:
     """Seconds after which the run is stopped; None: never."""
     asked = [limit for limit in (case.run.max_wall_time, caps.wall_time) if limit is not None]
     return min(asked) if asked else None

@@ -1,11 +1,14 @@
-"""What OpenAPI says of a case: FastAPI sees bytes in the body of a request, since the case is read here, not by it."""
+"""What OpenAPI says of the routes: the case in a body, which FastAPI sees as bytes, and each answer with its shape."""
 
 from functools import cache
 from typing import Any
 
+import msgspec
 from fastapi import FastAPI
 
 from conoid.cases import reference
+
+from . import shapes
 
 _CASE = "#/components/schemas/Case"
 CASE_BODY: dict[str, Any] = {
@@ -20,16 +23,102 @@ CASE_BODY: dict[str, Any] = {
 """For routes that take a case."""
 
 
+SWEEP_BODY: dict[str, Any] = {
+    "requestBody": {
+        "required": True,
+        "content": {"application/json": {"schema": {"$ref": "#/components/schemas/Wish"}}},
+    }
+}
+"""For the route that takes a sweep."""
+_JSON, _PROBLEM, _BYTES = "application/json", "application/problem+json", "application/octet-stream"
+_TEXT, _FILE = "text/plain", "*/*"
+ANSWERS: dict[tuple[str, str], dict[int, tuple[str, str]]] = {
+    ("post", "/v1/cases:validate"): {200: (_JSON, "Validation")},
+    ("get", "/v1/case.schema.json"): {200: ("application/schema+json", "")},
+    ("get", "/v1/cases"): {200: (_JSON, "Gallery")},
+    ("get", "/v1/cases/{name}"): {200: ("application/toml", "")},
+    ("post", "/v1/runs"): {202: (_JSON, "Receipt")},
+    ("get", "/v1/runs"): {200: (_JSON, "RunPage")},
+    ("get", "/v1/runs/{run_id}"): {200: (_JSON, "RunStatus"), 304: ("", "")},
+    ("post", "/v1/runs/{run_id}:cancel"): {202: (_JSON, "RunStatus")},
+    ("post", "/v1/runs/{run_id}:checkpoint"): {202: (_JSON, "RunStatus")},
+    ("post", "/v1/runs/{run_id}:snapshot"): {202: (_JSON, "RunStatus")},
+    ("get", "/v1/runs/{run_id}/events"): {200: (_JSON, "EventPage")},
+    ("get", "/v1/runs/{run_id}/stream"): {200: ("text/event-stream", ""), 204: ("", "")},
+    ("get", "/v1/runs/{run_id}/history"): {200: (_JSON, "History")},
+    ("get", "/v1/runs/{run_id}/snapshots"): {200: (_JSON, "Snapshots"), 304: ("", "")},
+    ("get", "/v1/runs/{run_id}/snapshots/{n}"): {200: (_BYTES, ""), 304: ("", "")},
+    ("get", "/v1/runs/{run_id}/logs/{rank}"): {200: (_TEXT, ""), 206: (_TEXT, ""), 304: ("", "")},
+    ("get", "/v1/runs/{run_id}/files"): {200: (_JSON, "Files")},
+    ("get", "/v1/runs/{run_id}/files/{path}"): {200: (_FILE, ""), 206: (_FILE, ""), 304: ("", "")},
+    ("post", "/v1/sweeps"): {202: (_JSON, "Sweep")},
+    ("get", "/v1/sweeps"): {200: (_JSON, "SweepPage")},
+    ("get", "/v1/sweeps/{sweep_id}"): {200: (_JSON, "Sweep")},
+    ("get", "/v1/sweeps/{sweep_id}/table"): {200: ("text/csv", "")},
+    ("post", "/v1/sweeps/{sweep_id}:cancel"): {202: (_JSON, "Sweep")},
+    ("get", "/v1/me"): {200: (_JSON, "Me")},
+    ("get", "/healthz"): {200: (_JSON, "Health")},
+    ("get", "/readyz"): {200: (_JSON, "Health"), 503: (_JSON, "Health")},
+    ("get", "/metrics"): {200: (_TEXT, "")},
+}
+"""What each route answers where nothing is wrong: media type, and the shape where it is JSON of ours."""
+_OPEN = {"/v1/case.schema.json", "/healthz", "/readyz"}
+_REFUSALS = {
+    400: "a parameter is wrong", 401: "no valid token", 403: "the token lacks the scope", 404: "there is none",
+    408: "the body did not arrive in time", 409: "not in this state", 410: "its folder has been removed",
+    413: "the body is too large", 415: "not a type of a case", 416: "no such range", 422: "the case is wrong",
+    429: "too many wait", 500: "the server failed", 503: "not now", 507: "the disk is full",
+}  # fmt: skip
+
+
+def refusals(method: str, path: str) -> set[int]:
+    """The statuses other than success that a route may answer with."""
+    found = {400, 500, 503} | (set() if path in _OPEN else {401, 403})
+    if "{" in path:
+        found |= {404}
+    if "{run_id}" in path:
+        found |= {410}
+    if method == "post" and "{" not in path:
+        found |= {408, 413, 415, 422, 429, 507}
+    if path.endswith((":checkpoint", ":snapshot")):
+        found |= {409}
+    if path.endswith(("{path}", "{rank}")):
+        found |= {416}
+    return found
+
+
 def install(app: FastAPI) -> None:
-    """Adds the schema of a case to what ``app`` says of itself."""
+    """Makes what ``app`` says of itself whole: the case, the shape of each answer, each status, the token."""
     own = app.openapi
 
     @cache
     def openapi() -> dict[str, Any]:
         made = own()
         case = reference.json_schema("#/components/schemas/{model}")
-        schemas = made.setdefault("components", {}).setdefault("schemas", {})
-        schemas |= {**case.pop("$defs"), "Case": case}
+        _, shapes_ = msgspec.json.schema_components(shapes.ALL, ref_template="#/components/schemas/{name}")
+        made["components"] = {
+            "schemas": {**case.pop("$defs"), "Case": case, **shapes_},
+            "securitySchemes": {"token": {"type": "http", "scheme": "bearer"}},
+        }
+        for path, operations in made["paths"].items():
+            for method, operation in operations.items():
+                _complete(operation, method, path)
         return made
 
     app.openapi = openapi  # type: ignore[method-assign]
+
+
+def _complete(operation: dict[str, Any], method: str, path: str) -> None:
+    operation["security"] = [] if path in _OPEN else [{"token": []}]
+    answers = ANSWERS[method, path]
+    operation["responses"] = {
+        **{str(status): _answer(_PROBLEM, "Problem", _REFUSALS[status]) for status in sorted(refusals(method, path))},
+        **{str(status): _answer(kind, shape, "") for status, (kind, shape) in answers.items()},
+    }
+
+
+def _answer(kind: str, shape: str, words: str) -> dict[str, Any]:
+    if not kind:
+        return {"description": "nothing new"}
+    schema = {"$ref": f"#/components/schemas/{shape}"} if shape else {}
+    return {"description": words or shape or kind, "content": {kind: {"schema": schema}}}

@@ -1,19 +1,25 @@
 """Does what ``lifecycle`` decides: writes the journal and the outcome, starts, adopts and ends workers."""
 
+import logging
+import os
+from contextlib import suppress
 from pathlib import Path
 
 import msgspec
 
 from conoid.cases import layout
 from conoid.cases.messages import Status
-from conoid.cases.run import State
+from conoid.cases.run import Cause, State
 
-from . import folder, journal
+from . import durable, folder, journal
+from .events import Action, Adopt, Journal, Kill, Launch, LaunchFailed, LaunchPutOff, Run, Stop, WriteOutcome
+from .holds import passing
 from .launch import Job, Launcher, LaunchError, Worker
-from .lifecycle import Action, Adopt, Journal, Kill, Launch, Run, Stop, WriteOutcome
 from .settings import Settings
 from .telemetry import Telemetry
 from .watch import Watch
+
+_log = logging.getLogger("conoid.server")
 
 
 class Performer:
@@ -22,6 +28,7 @@ class Performer:
     def __init__(self, settings: Settings, launcher: Launcher, telemetry: Telemetry | None) -> None:
         """Watches nobody yet."""
         self._settings, self._launcher, self._telemetry = settings, launcher, telemetry
+        self._root = os.stat(settings.runs).st_ino
         self.watches: dict[str, Watch] = {}
         """The workers that live, by run."""
         self.found: dict[str, Worker] = {}
@@ -38,13 +45,44 @@ class Performer:
             case Launch():
                 self.watches[run.id] = self._launch(run, path)
             case Adopt():
-                self.watches[run.id] = self._watch(run, path, self.found.pop(run.id))
+                self.watches[run.id] = self._watch(path, self.found[run.id], _allowed(path))
+                del self.found[run.id]
                 if run.state is State.STOPPING:
                     self.watches[run.id].stop(self._settings.grace)
-            case Stop():
-                self.watches[run.id].stop(self._settings.grace)
+            case Stop(why):
+                self._stop(run.id, path, why)
             case Kill():
-                self.watches[run.id].worker.kill()
+                self._kill(run.id, path)
+
+    def probe(self, run_id: str) -> None:
+        """Raises OSError when nothing could be written of the run now."""
+        durable.probe(self._settings.runs / run_id)
+
+    def gone(self, run_id: str) -> bool:
+        """Whether the run's folder is. False where the folder of all runs is another one: a disk is not mounted."""
+        try:
+            same = os.stat(self._settings.runs).st_ino == self._root
+            return same and not (self._settings.runs / run_id).is_dir()
+        except OSError:
+            return False
+
+    def _stop(self, run_id: str, path: Path, why: Cause) -> None:
+        """A disk that is full keeps nobody from stopping a run: the database remembers the request as well."""
+        try:
+            folder.write_stop(path, why)
+        except OSError as error:
+            _log.warning("run %s: %s cannot be written: %s", run_id, layout.STOP_REQUEST, error.strerror)
+        if run_id in self.watches:
+            self.watches[run_id].stop(self._settings.grace)
+
+    def _kill(self, run_id: str, path: Path) -> None:
+        watch = self.watches.get(run_id)
+        worker = watch.worker if watch is not None else self.found.pop(run_id, None)
+        if worker is None:
+            with suppress(OSError):
+                worker = self._launcher.find(run_id, path).worker
+        if worker is not None:
+            worker.kill()
 
     def _tell(self, run: Run, status: Status) -> None:
         written = journal.append(self._settings.runs / run.id / layout.JOURNAL, status)
@@ -54,19 +92,36 @@ class Performer:
     def _launch(self, run: Run, path: Path) -> Watch:
         access = None if self._telemetry is None else self._telemetry.worker(run.owner, run.id)
         try:
-            (path / layout.OUTCOME).unlink(missing_ok=True)
             made = folder.submission(path)
+            for left in (layout.OUTCOME, layout.STOP_REQUEST):
+                (path / left).unlink(missing_ok=True)
             case = path / made.case_file
-            job = Job(run.id, run.ranks, case, path, access, made.profile, made.wall_time)
-            worker = self._launcher.start(job)
-            return self._watch(run, path, worker)
+            worker = self._launcher.start(Job(run.id, run.ranks, case, path, access, made.profile, made.wall_time))
         except (OSError, msgspec.MsgspecError) as error:
             raise LaunchError(str(error)) from error
+        return self._watch(path, worker, made.wall_time)
 
-    def _watch(self, run: Run, path: Path, worker: Worker) -> Watch:
+    def _watch(self, path: Path, worker: Worker, allowed: float | None) -> Watch:
         """The worker itself ends at ``run.max_wall_time``; the server steps in a grace later, a batch system at the
         limit of the job.
         """
-        allowed = None if self._launcher.queues else folder.submission(path).wall_time
-        deadline = None if allowed is None else run.started + allowed + self._settings.grace
-        return Watch(path, worker, deadline)
+        left = (
+            None if allowed is None or self._launcher.queues else allowed + self._settings.grace - folder.runs_for(path)
+        )
+        return Watch(path, worker, left)
+
+
+def _allowed(path: Path) -> float | None:
+    """The wall time of a run whose submission can be read; a worker keeps to its own in any case."""
+    try:
+        return folder.submission(path).wall_time
+    except (OSError, msgspec.MsgspecError):
+        return None
+
+
+def of_launch(error: LaunchError) -> LaunchFailed | LaunchPutOff:
+    """Trouble that passes puts the launch off; a folder that does not say what to run is trouble of its disk."""
+    if passing(error):
+        return LaunchPutOff(f"the launch is tried again: {error}")
+    damaged = isinstance(error.__cause__, msgspec.MsgspecError)
+    return LaunchFailed(str(error), Cause.STORAGE if damaged else Cause.LAUNCH)

@@ -4,11 +4,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
+import msgspec
+
+from conoid.cases import layout
 from conoid.cases.run import State
 
-from . import folder
-from .launch import Launcher, Worker
-from .lifecycle import Found, Run
+from . import farewell, folder, journal
+from .events import Found, Run
+from .folder import Submission
+from .launch import Launcher, Trace, Worker
 
 _STOPPABLE = {State.QUEUED, State.STARTING, State.RUNNING, State.STOPPING}
 
@@ -24,18 +28,64 @@ class Left:
 
 
 def look(path: Path, known: Run | None, launcher: Launcher) -> Left:
-    """``known`` is the database's word on the run: only it remembers that a stop was asked for.
+    """``known`` is the database's word on the run, which fills in what a damaged folder does not tell any more.
 
-    Raises OSError, and ValueError when the folder's files are not what they should be.
+    Raises OSError, and ValueError when neither folder nor database say whose run it is.
     """
-    run = folder.run(path)
-    if known is not None and known.stopping_for is not None and run.state in _STOPPABLE:
-        run = replace(run, state=State.STOPPING, stopping_for=known.stopping_for)
-    elif run.state is State.STOPPING and launcher.queues:
-        run = replace(run, state=State.RUNNING)  # its job was interrupted, and nobody has asked for its end
-    trace = launcher.find(run.id, path)
-    fate: Literal["none", "alive", "gone"] = "gone" if trace.launched else "none"
+    made = _submission(path)
+    if made is None and known is None:
+        raise ValueError(f"{layout.SUBMISSION} cannot be read, and the database does not know the run")
+    accepted = folder.first(made) if made is not None else _as_accepted(known)
+    told = journal.statuses(path / layout.JOURNAL)
+    trace = launcher.find(accepted.id, path)
+    run = _mended(folder.replay(accepted, told), bool(told), known, path, trace, launcher.queues)
+    code, full = farewell.exit_code(path), farewell.disk_failed(path)
+    found = Found(_fate(path, trace), folder.outcome(path), trace.rebooted, code, full)
+    return Left(
+        _stopping(run, known, path, launcher.queues), made.idempotency_key if made else None, found, trace.worker
+    )
+
+
+def _submission(path: Path) -> Submission | None:
+    try:
+        return folder.submission(path)
+    except (FileNotFoundError, msgspec.MsgspecError):
+        return None
+
+
+def _as_accepted(known: Run | None) -> Run:
+    assert known is not None
+    return Run(known.id, known.owner, known.name, known.ranks, known.submitted)
+
+
+def _fate(path: Path, trace: Trace) -> Literal["none", "alive", "gone"]:
+    """A record that cannot be read is the record of a launch all the same."""
     if trace.worker is not None:
-        fate = "alive"
-    found = Found(fate, folder.outcome(path), trace.rebooted)
-    return Left(run, folder.submission(path).idempotency_key, found, trace.worker)
+        return "alive"
+    return "gone" if trace.launched or (path / layout.WORKER).exists() else "none"
+
+
+def _mended(run: Run, journal_there: bool, known: Run | None, path: Path, trace: Trace, queues: bool) -> Run:
+    """A run whose journal is gone, or says less than the machine: what has been launched is never launched twice. One
+    that a batch system ``queues`` may still wait for its cores.
+    """
+    if not journal_there and known is not None:
+        run = replace(known, message="") if known.state is not State.STOPPING else replace(run, state=State.STARTING)
+    launched = trace.worker is not None or (not journal_there and _launched(path, trace))
+    if launched and not queues and run.state in {State.ACCEPTED, State.QUEUED}:
+        return replace(run, state=State.STARTING)
+    return run
+
+
+def _launched(path: Path, trace: Trace) -> bool:
+    return trace.launched or (path / layout.WORKER).exists() or (path / layout.OUTCOME).exists()
+
+
+def _stopping(run: Run, known: Run | None, path: Path, queues: bool) -> Run:
+    """A job in a queue that says by itself that it stops was interrupted, and goes on, unless somebody has asked."""
+    why = folder.stop_asked(path) or (known.stopping_for if known is not None else None)
+    if why is None and queues and run.state is State.STOPPING:
+        return replace(run, state=State.RUNNING)
+    if why is None or run.state not in _STOPPABLE:
+        return run
+    return replace(run, state=State.STOPPING, stopping_for=why)

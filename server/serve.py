@@ -6,13 +6,13 @@ import os
 import signal
 import socket
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import FrameType
 
 import uvicorn
 
-from . import durable
+from . import connections, durable, quiet
 from .app import build_app, opened
 from .service import Service
 from .settings import Settings, StartError
@@ -28,7 +28,12 @@ class ServeError(StartError):
 
 
 def serve(settings: Settings) -> None:
-    """Runs the server until SIGTERM or SIGINT. Raises ServeError, and what ``opened`` raises."""
+    """Runs the server until SIGTERM or SIGINT. What it and its workers write is for their user alone.
+
+    Raises ServeError, and what ``opened`` raises.
+    """
+    os.umask(0o077)
+    quiet.install()
     settings.runs.mkdir(parents=True, exist_ok=True)
     with _only_one(settings.runs), _listening(settings) as listener:
         (settings.runs / ADDRESS_FILE).unlink(missing_ok=True)
@@ -54,11 +59,13 @@ class _Server(uvicorn.Server):
         super().__init__(
             uvicorn.Config(
                 self._app,
+                log_config=None,
                 log_level="warning",
                 access_log=False,
                 server_header=False,
                 timeout_keep_alive=30,
                 timeout_graceful_shutdown=_FAREWELL,
+                **connections.options(),
             )
         )
 
@@ -96,12 +103,21 @@ def _leave(_signal: int, _frame: FrameType | None) -> None:
 
 @contextmanager
 def _only_one(runs: Path) -> Iterator[None]:
-    """Two servers on one folder would start every run twice."""
-    with open(runs / _LOCK, "w") as lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise ServeError(f"--runs {runs}: another server uses this folder") from None
+    """Two servers on one folder would start every run twice. The folder itself is locked, which nobody deletes by the
+    way, and a file in it for file systems that lock files only."""
+    with ExitStack() as stack:
+        folder = os.open(runs, os.O_RDONLY | os.O_DIRECTORY)
+        stack.callback(os.close, folder)
+        file = os.open(runs / _LOCK, os.O_WRONLY | os.O_CREAT, 0o600)
+        stack.callback(os.close, file)
+        for descriptor in (folder, file):
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise ServeError(f"--runs {runs}: another server uses this folder") from None
+            except OSError:
+                if descriptor == file:
+                    raise ServeError(f"--runs {runs}: this file system has no locks") from None
         yield
 
 

@@ -7,10 +7,13 @@ from fastapi import Depends, Request
 
 from .bell import Bell
 from .history import Histories
+from .reader import Turns
+from .readiness import Readiness
 from .settings import Settings
 from .store import Store
 from .submission import Desk
 from .supervisor import Supervisor
+from .sweeps import Sweeps
 from .telemetry import Telemetry
 
 
@@ -25,6 +28,9 @@ class Service:
     supervisor: Supervisor
     desk: Desk
     histories: Histories
+    readiness: Readiness
+    turns: Turns
+    sweeps: Sweeps
 
 
 def _service(request: Request) -> Service:

@@ -3,7 +3,7 @@
 Runs and keys are an index over the runs' folders and can be rebuilt from them; tokens live here only.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
@@ -13,7 +13,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from conoid.cases.run import Cause, State
 
-from .lifecycle import Run
+from .events import Run
 from .settings import StartError
 
 _meta = sa.MetaData()
@@ -52,6 +52,9 @@ _tokens = sa.Table(
     sa.Column("created", sa.Float(53), nullable=False),
     sa.Column("revoked", sa.Boolean, nullable=False),
 )
+_BUSY = 2000
+"""ms that SQLite waits for another process to let go. Chosen: longer than any transaction of this server takes, shorter
+than what a caller waits for."""
 _OPEN = [state.value for state in State if not state.final]
 
 
@@ -86,6 +89,15 @@ class Store:
     def close(self) -> None:
         """Closes every connection."""
         self._engine.dispose()
+
+    def probe(self) -> None:
+        """Raises SQLAlchemyError when nothing can be written now."""
+        with self._engine.connect() as connection:
+            if self._engine.dialect.name == "sqlite":
+                connection.exec_driver_sql("begin immediate")
+            else:
+                connection.execute(sa.select(1))
+            connection.rollback()
 
     # Runs -------------------------------------------------------------------------------------------------------------
 
@@ -135,13 +147,10 @@ class Store:
         with self._engine.connect() as connection:
             return set(connection.execute(sa.select(_runs.c.id).where(_runs.c.state.not_in(_OPEN))).scalars())
 
-    def forget_all_but(self, known: Iterable[str]) -> None:
-        """Drops the runs whose folders are gone, and their keys."""
-        with self._engine.begin() as connection:
-            gone = set(connection.execute(sa.select(_runs.c.id)).scalars()) - set(known)
-            for run_id in gone:
-                connection.execute(sa.delete(_runs).where(_runs.c.id == run_id))
-                connection.execute(sa.delete(_keys).where(_keys.c.run == run_id))
+    def open_ids(self) -> set[str]:
+        """The ids of all runs that are not known to have ended."""
+        with self._engine.connect() as connection:
+            return set(connection.execute(sa.select(_runs.c.id).where(_runs.c.state.in_(_OPEN))).scalars())
 
     def count_by_state(self) -> Mapping[State, int]:
         """How many runs are in each state; no entry for none."""
@@ -204,5 +213,5 @@ def _engine(url: str) -> sa.Engine:
 
 def _tune(connection: Any, _record: object) -> None:
     """WAL lets readers go on while one writes."""
-    for pragma in ("journal_mode=wal", "busy_timeout=10000"):
+    for pragma in ("journal_mode=wal", f"busy_timeout={_BUSY}"):
         connection.execute(f"pragma {pragma}").close()

@@ -5,18 +5,19 @@ again, or reads slowly, gets each event exactly once and in order. The superviso
 and rings a bell when it has grown; every stream then reads on from where it stands. Zenoh is for native clients.
 """
 
+import time
 from collections.abc import AsyncIterator
 from pathlib import Path
 
 from starlette.concurrency import run_in_threadpool
 
-from .auth import Identity, still_valid
+from .auth import Pass
 from .journal import Line, Tail
 from .service import Service
 
 MEDIA_TYPE = "text/event-stream"
 KEEP_ALIVE = 15.0
-"""s of silence after which a comment is sent, so that proxies keep the connection; the token is looked at as well."""
+"""s of silence after which a comment is sent, so that proxies keep the connection."""
 HEADERS = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}
 
 
@@ -25,20 +26,20 @@ def event(line: Line) -> bytes:
     return b"id: %d\nevent: %s\ndata: %s\n\n" % (line.seq, line.type.encode(), line.raw)
 
 
-async def events(service: Service, identity: Identity, run_id: str, path: Path, after: int) -> AsyncIterator[bytes]:
-    """Every event with ``seq`` above ``after``, those to come as well; ends when the run has ended."""
-    tail = Tail(path, after)
+async def events(service: Service, may: Pass, run_id: str, path: Path, after: int) -> AsyncIterator[bytes]:
+    """Every event with ``seq`` above ``after``, those to come as well; ends when the run has ended, or ``may`` not."""
+    tail, silent = Tail(path, after), time.monotonic()
     with service.bell.listen(run_id) as listener:
         yield b"retry: 1000\n\n"
-        while not service.bell.closed:
+        while not service.bell.closed and await may.holds():
             listener.clear()
             over = not service.supervisor.is_open(run_id)
             lines = await run_in_threadpool(tail.read)
             if lines:
                 yield b"".join(map(event, lines))
+                silent = time.monotonic()
             elif over:
                 return
-            elif not await listener.wait(KEEP_ALIVE):
-                if not await run_in_threadpool(still_valid, service, identity):
-                    return
+            elif not await listener.wait(may.left) and time.monotonic() - silent >= KEEP_ALIVE:
                 yield b": still here\n\n"
+                silent = time.monotonic()

@@ -4,20 +4,18 @@ import hashlib
 import re
 import threading
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy.exc import SQLAlchemyError
 
 from conoid.cases.batch import profile_of
-from conoid.cases.estimate import Estimate, estimate
-from conoid.cases.load import CaseError, Problem, json_data, parse_case, resolved_json, toml_data
-from conoid.cases.schema import Case
+from conoid.cases.load import CaseError
 
 from . import folder, limits
-from .errors import ServiceError, invalid_case
+from .errors import ServiceError, database_away, invalid_case
 from .folder import Submission
-from .lifecycle import Run
+from .reader import the_reader
+from .reading import Question, Reading
 from .settings import Settings
 from .store import Store
 from .supervisor import Supervisor
@@ -30,38 +28,19 @@ _MOST_LABELS = 16
 _KEY = re.compile(r"[\x21-\x7e]{1,255}")
 
 
-@dataclass(frozen=True)
-class Reading:
-    """A case that can be run here."""
-
-    case: Case
-    estimate: Estimate
-    data: dict[str, Any]
-    """The case as it was written."""
-
-
 class Desk:
     """Where cases are handed in. Methods may be called from any thread."""
 
     def __init__(self, settings: Settings, store: Store, supervisor: Supervisor) -> None:
         """One desk a server: its lock is what makes two requests with one key one run."""
         self._settings, self._store, self._supervisor = settings, store, supervisor
+        self._reader, self._limits = the_reader(), limits.of(settings)
         self._lock = threading.Lock()
 
     def read(self, body: bytes, content_type: str) -> Reading:
-        """The case in ``body``. Raises CaseError with every problem, ServiceError 415."""
-        text = _text(body)
-        data = json_data(text) if _file_name(content_type) == "case.json" else toml_data(text)
-        case = parse_case(data)
-        if problems := limits.check(case, self._settings):
-            raise CaseError(problems)
-        try:
-            expected = estimate(case)
-        except ArithmeticError:
-            raise CaseError([Problem("parts", "", "the elements are too many or too small to be counted")]) from None
-        if problems := limits.check_size(expected, self._settings.caps):
-            raise CaseError(problems)
-        return Reading(case, expected, data)
+        """The case in ``body``. Raises CaseError with every problem, ServiceError 415, 422, 503."""
+        kind = _file_name(content_type)
+        return self._reader.read(Question(body=body, json=kind == "case.json", limits=self._limits))
 
     def submit(
         self, owner: str, body: bytes, content_type: str, key: str | None, labels: Mapping[str, str] | None = None,
@@ -93,7 +72,7 @@ class Desk:
                 digest,
                 reading,
                 labels or {},
-                self._profile(profile or reading.case.run.profile),
+                self._profile(profile or reading.profile),
             )
 
     def _profile(self, name: str, *, named: bool = False) -> str:
@@ -128,23 +107,24 @@ class Desk:
         self, owner: str, body: bytes, content_type: str, key: str | None, digest: str, reading: Reading,
         labels: Mapping[str, str], profile: str,
     ) -> dict[str, Any]:  # fmt: skip
-        caps, case = self._settings.caps, reading.case
+        caps = self._settings.caps
         limits.check_room(self._settings.runs, self._store.open_runs(owner), caps)
         run_id, now = folder.new_id()
         made = Submission(
-            id=run_id, owner=owner, name=case.name, title=case.title, ranks=case.run.ranks, submitted=now,
+            id=run_id, owner=owner, name=reading.name, title=reading.title, ranks=reading.ranks, submitted=now,
             case_file=_file_name(content_type), body_sha256=digest, idempotency_key=key,
-            wall_time=limits.wall_time(case, caps), estimate=limits.figures(reading.estimate),
-            labels=dict(labels), profile=profile,
+            wall_time=reading.wall_time, estimate=reading.estimate, labels=dict(labels), profile=profile,
         )  # fmt: skip
-        run = Run(run_id, owner, case.name, case.run.ranks, now)
+        run = folder.first(made)
         try:
-            folder.create(self._settings.runs, made, body, resolved_json(case))
+            folder.create(self._settings.runs, made, body, reading.resolved)
             self._store.add(run, key)
-        except (OSError, SQLAlchemyError) as error:
+        except OSError as error:
             folder.discard(self._settings.runs, run_id)
-            detail = f"the run cannot be kept: {error}".splitlines()[0]
-            raise ServiceError(507, "storage", detail, retryable=True) from error
+            raise ServiceError(507, "storage", f"the run cannot be kept: {error.strerror}", retryable=True) from error
+        except SQLAlchemyError as error:
+            folder.discard(self._settings.runs, run_id)
+            raise database_away(error) from error
         self._supervisor.admit(run)
         return receipt(made)
 
@@ -175,10 +155,3 @@ def _file_name(content_type: str) -> str:
             pointer="Content-Type",
         )  # fmt: skip
     return KINDS[kind]
-
-
-def _text(body: bytes) -> str:
-    try:
-        return body.decode()
-    except UnicodeDecodeError as error:
-        raise CaseError([Problem("", "", f"the body is not UTF-8 text (at byte {error.start})")]) from None

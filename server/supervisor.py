@@ -4,7 +4,7 @@ import logging
 import queue
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,9 +15,12 @@ from conoid.cases.messages import Progress
 from conoid.cases.run import State
 
 from . import folder, recovery, waiting
+from .events import ONCE, Admitted, Broken, CancelAsked, Event, Granted, LaunchPutOff, Run
+from .holds import Holds, words
+from .index import Index
 from .launch import Launcher, LaunchError
-from .lifecycle import Admitted, CancelAsked, Event, Granted, LaunchFailed, Run, advance
-from .perform import Performer
+from .lifecycle import advance
+from .perform import Performer, of_launch
 from .settings import Settings
 from .store import Store
 from .telemetry import Telemetry, TelemetryError
@@ -28,7 +31,8 @@ _LOOK = 0.02
 _TIDY = 5.0
 """s between two looks at the tokens."""
 _AGAIN = 1.0
-"""s after which an action that failed (a full disk, a locked database) is tried again."""
+"""s between two looks while something waits to be tried again."""
+_GONE = "the folder of the run has been removed"
 _ANSWER = 10.0
 """s that the thread of the supervisor may take to answer. Chosen: it looks fifty times a second."""
 
@@ -58,9 +62,10 @@ class Supervisor:
         self._hands = Performer(settings, launcher, telemetry)
         self._watches = self._hands.watches
         self._batch = launcher.queues
-        self._hold: dict[str, float] = {}
-        self._unsaved: set[str] = set()
-        self._left: set[Path] = set()
+        self._holds = Holds()
+        self._index = Index(store)
+        self._left: dict[Path, str] = {}
+        self.held_back: Callable[[str, Iterable[str]], bool] = lambda run_id, active: False
         self._thread = threading.Thread(target=self._work, name="supervisor", daemon=True)
         self._leaving = False
         self._tidied = time.monotonic()
@@ -123,6 +128,8 @@ class Supervisor:
 
     def reason(self, run_id: str) -> str:
         """What a queued run waits for, and what a batch system has to say of any; else empty."""
+        if why := self._holds.why(run_id):
+            return f"tried again soon: {why}"
         watch = self._watches.get(run_id)
         if watch is not None and (note := watch.worker.note()):
             return note
@@ -130,6 +137,11 @@ class Supervisor:
 
     def _in_state(self, state: State) -> list[Run]:
         return waiting.in_state(tuple(self._open.values()), state)
+
+    def stranded(self) -> list[str]:
+        """Open runs that have neither a watch nor a place in the queue nor a timer: none, at any time."""
+        looked_after = {*self._watches, *self._index.unsaved, *self._holds.timed()}
+        return waiting.stranded(tuple(self._open.values()), looked_after)
 
     # The supervisor's own thread --------------------------------------------------------------------------------------
 
@@ -145,8 +157,10 @@ class Supervisor:
         self._answer()
         for run_id in tuple(self._watches):
             self._attend(run_id)
+        for run_id, event in self._holds.due():
+            self._apply(run_id, event)
         for run in self._in_state(State.ACCEPTED):
-            if not self._held(run.id):
+            if not self._holds.held(run.id):
                 self._apply(run.id, Admitted())
         self._grant()
         if time.monotonic() - self._tidied > _TIDY:
@@ -155,7 +169,7 @@ class Supervisor:
     def _answer(self) -> None:
         """Takes what was asked; waits for it no longer than until the next look."""
         try:
-            asked = self._inbox.get(timeout=_LOOK if self._watches else _AGAIN if self._hold else _TIDY)
+            asked = self._inbox.get(timeout=_LOOK if self._watches else _AGAIN if self._holds else _TIDY)
         except queue.Empty:
             return
         if asked is not None:
@@ -164,30 +178,39 @@ class Supervisor:
 
     def _attend(self, run_id: str) -> None:
         watch = self._watches[run_id]
-        if self._held(run_id):
+        if self._holds.held(run_id):
             return
         try:
-            for event in watch.look(time.time()):
+            for event in watch.look():
                 self._apply(run_id, event)
-        except Exception as error:
-            self._put_off(run_id, error)
+        except OSError as error:
+            self._holds.put_off(run_id, error)
         if watch.news:
             self._ring(run_id)
 
     def _grant(self) -> None:
-        """Starts the first of the queue while it fits: a large run is not overtaken by small ones for ever."""
+        """Starts the first of the queue while it fits: a large run is not overtaken by small ones for ever. One that
+        cannot be started now holds nobody up; nothing is announced that could not be written.
+        """
         for run in self._in_state(State.QUEUED):
-            if run.id in self._watches:
+            held = self._holds.held(run.id) or self.held_back(run.id, self._watches)
+            if held or run.id in self._watches:
                 continue
-            if self.slots_used() + run.ranks > self._settings.slots or self._held(run.id):
+            if self.slots_used() + run.ranks > self._settings.slots:
                 return
-            self._apply(run.id, Granted(self._batch))
+            try:
+                self._hands.probe(run.id)
+            except OSError as error:
+                self._fail(run, Granted(self._batch), error)
+            else:
+                self._apply(run.id, Granted(self._batch))
 
     def _apply(self, run_id: str, event: Event) -> Exception | None:
         """One step of a run; what kept it from being made, if anything.
 
-        A step that fails (a full disk) changes nothing and comes up again by itself: a run in the queue gets its turn
-        again, a worker's end is seen again. What the first try did write is found, so that nothing is done twice.
+        A step that fails (a full disk) changes nothing and comes up again: a run in the queue gets its turn again, a
+        worker's end is seen again, and what nobody would say again waits among the holds. What the first try did
+        write is found, so that nothing is done twice.
         """
         before = self._open.get(run_id)
         if before is None:
@@ -199,39 +222,35 @@ class Supervisor:
                 self._hands.perform(after, action, now)
         except LaunchError as error:
             self._settle(after)
-            return self._apply(run_id, LaunchFailed(str(error)))
+            return self._apply(run_id, of_launch(error))
         except Exception as error:
-            return self._put_off(run_id, error)
+            return self._fail(before, event, error)
+        if isinstance(event, LaunchPutOff):
+            self._holds.rest(run_id, event.message)
+        else:
+            self._holds.done(run_id, event)
         if after != before:
             self._settle(after)
         return None
+
+    def _fail(self, run: Run, event: Event, error: Exception) -> Exception | None:
+        """A run whose folder is gone has ended; any other is tried again."""
+        if self._hands.gone(run.id) and not isinstance(event, Broken):
+            return self._apply(run.id, Broken(_GONE))
+        return self._holds.put_off(run.id, error, event if isinstance(event, ONCE) else None)
 
     def _settle(self, run: Run) -> None:
         """The step is made: memory first, then the database, then those who wait for news."""
         self._open[run.id] = run
         if run.state.final:
             self._watches.pop(run.id, None)
-        try:
-            self._store.save(run)
-        except SQLAlchemyError as error:
-            self._unsaved.add(run.id)
-            _log.error("run %s is not in the database yet: %s", run.id, error)
-        else:
-            self._unsaved.discard(run.id)
-            if run.state.final:
-                del self._open[run.id]
+            self._holds.forget(run.id)
+        self._save(run)
         self._ring(run.id)
 
-    def _put_off(self, run_id: str, error: Exception) -> Exception:
-        _log.error("run %s: tried again in %g s", run_id, _AGAIN, exc_info=error)
-        self._hold[run_id] = time.monotonic() + _AGAIN
-        return error
-
-    def _held(self, run_id: str) -> bool:
-        if self._hold.get(run_id, 0.0) > time.monotonic():
-            return True
-        self._hold.pop(run_id, None)
-        return False
+    def _save(self, run: Run) -> None:
+        if self._index.save(run) and run.state.final:
+            del self._open[run.id]
 
     # Housekeeping -----------------------------------------------------------------------------------------------------
 
@@ -240,8 +259,14 @@ class Supervisor:
         self._tidied = time.monotonic()
         for path in tuple(self._left):
             self._take_up_run(path)
-        for run_id in tuple(self._unsaved):
-            self._settle(self._open[run_id])
+        for run_id in tuple(self._index.unsaved):
+            self._save(self._open[run_id])
+        for run_id, run in tuple(self._open.items()):
+            if not run.state.final and self._hands.gone(run_id):
+                self._apply(run_id, Broken(_GONE))
+        for run_id in self.stranded():
+            _log.error("run %s was not looked after; it is taken up again", run_id)
+            self._take_up_run(self._settings.runs / run_id)
         if self._telemetry is not None:
             try:
                 self._telemetry.follow(self._store.tokens())
@@ -250,31 +275,32 @@ class Supervisor:
 
     def _take_up(self) -> None:
         """Makes memory and database agree with the runs' folders, and goes on with what an earlier server left."""
-        ended, known = self._store.ended(), []
+        ended, last = self._store.ended(), ""
         for path in folder.scan(self._settings.runs):
-            known.append(path.name)
-            if path.name in ended:
-                continue
-            self._take_up_run(path)
-        self._store.forget_all_but(known)
+            last = path.name
+            if path.name not in ended:
+                self._take_up_run(path)
+        if last:
+            folder.begin_after(last)
+        for run_id in self._store.open_ids() - self._open.keys():
+            run = self._store.get(run_id)
+            if run is not None and self._hands.gone(run_id):
+                self._open[run_id] = run
+                self._apply(run_id, Broken(_GONE))
 
     def _take_up_run(self, path: Path) -> None:
-        """What fails is logged and comes up again with the next tidying."""
-        self._left.discard(path)
+        """What fails is logged once and comes up again with the next tidying."""
+        told = self._left.pop(path, "")
         try:
-            failed = self._resume(path)
+            left = recovery.look(path, self._store.get(path.name), self._launcher)
+            self._index.add(left.run, left.key)
         except (OSError, ValueError, SQLAlchemyError) as error:
-            failed = error
-            _log.error("run %s cannot be taken up: %s", path.name, error)
-        if failed is not None:
-            self._left.add(path)
-
-    def _resume(self, path: Path) -> Exception | None:
-        left = recovery.look(path, self._store.get(path.name), self._launcher)
-        self._store.add(left.run, left.key)
-        if left.run.state.final:
-            return None
+            self._left[path] = words(error)
+            if told != words(error):
+                _log.error("run %s cannot be taken up: %s", path.name, words(error))
+            return
         if left.worker is not None:
             self._hands.found[left.run.id] = left.worker
-        self._open[left.run.id] = left.run
-        return self._apply(left.run.id, left.found)
+        if not left.run.state.final:
+            self._open[left.run.id] = left.run
+            self._apply(left.run.id, left.found)

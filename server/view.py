@@ -3,6 +3,7 @@
 import base64
 import hashlib
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -12,7 +13,7 @@ from conoid.cases.run import State
 
 from . import folder
 from .errors import ServiceError
-from .lifecycle import Run
+from .events import Run
 from .service import Service
 
 
@@ -32,26 +33,32 @@ class Snapshot:
 def snapshot(service: Service, run: Run) -> Snapshot:
     """Everything about a run: where it is, how far, and once it has ended the whole outcome."""
     path = service.settings.runs / run.id
-    made = folder.submission(path)
+    made = _submission(path)
     progress = service.supervisor.progress(run.id)
     ended: Outcome | None = folder.outcome(path) if run.state.final else None
     body = {
         **brief(service, run),
-        "title": made.title,
-        "case_file": made.case_file,
-        "estimate": made.estimate,
+        "title": made.title if made else "",
+        "case_file": made.case_file if made else "",
+        "estimate": made.estimate if made else {},
         "progress": progress,
         "outcome": ended,
     }
     return Snapshot(run.state, msgspec.json.encode(body))
 
 
-def _labels(service: Service, run: Run) -> dict[str, str]:
-    """None where the folder of the run has been removed."""
+def _submission(path: Path) -> folder.Submission | None:
+    """None where the file is gone or damaged: the state of the run is true all the same."""
     try:
-        return folder.submission(service.settings.runs / run.id).labels
-    except (OSError, ValueError):
-        return {}
+        return folder.submission(path)
+    except (OSError, msgspec.MsgspecError):
+        return None
+
+
+def labels(service: Service, run: Run) -> dict[str, str]:
+    """Those it was submitted with; none where the folder of the run has been removed or damaged."""
+    made = _submission(service.settings.runs / run.id)
+    return made.labels if made else {}
 
 
 def brief(service: Service, run: Run) -> dict[str, Any]:
@@ -68,7 +75,7 @@ def brief(service: Service, run: Run) -> dict[str, Any]:
         "submitted": run.submitted,
         "started": run.started or None,
         "finished": run.finished or None,
-        "labels": _labels(service, run),
+        "labels": labels(service, run),
         "url": f"/v1/runs/{run.id}",
     }
 

@@ -1,10 +1,10 @@
 """The queue: who waits, in which order, and for what. Pure functions over the runs that are open."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Set
 
 from conoid.cases.run import State
 
-from .lifecycle import Run
+from .events import Run
 
 
 def in_state(runs: Iterable[Run], state: State) -> list[Run]:
@@ -21,3 +21,9 @@ def reason(run_id: str, runs: Iterable[Run], used: int, slots: int) -> str:
     if place:
         return f"waiting for {place} earlier run{'s' if place > 1 else ''}"
     return f"waiting for {waiting[0].ranks} of {slots} slots; {max(0, slots - used)} free"
+
+
+def stranded(runs: Iterable[Run], looked_after: Set[str]) -> list[str]:
+    """The runs that neither wait for their turn nor are looked after otherwise."""
+    waits = {State.ACCEPTED, State.QUEUED}
+    return [run.id for run in runs if run.state not in waits and run.id not in looked_after]

@@ -11,9 +11,9 @@ from conoid.cases import layout
 from conoid.cases.messages import Progress, Status
 from conoid.cases.run import State
 
-from . import folder, journal
+from . import farewell, folder, journal
+from .events import Event, GraceOver, WallTimeOver, WorkerExited, WorkerRuns, WorkerStarts, WorkerWaits
 from .launch import Phase, Worker
-from .lifecycle import Event, GraceOver, WallTimeOver, WorkerExited, WorkerRuns, WorkerStarts, WorkerWaits
 
 _FAREWELL = 10.0
 """s that a worker may take to leave after it has said that it finished; its launcher may hang when a helper of it was
@@ -28,19 +28,21 @@ _status = msgspec.json.Decoder(Status)
 class Watch:
     """Looks at a worker a few dozen times a second; says what happened to it as events."""
 
-    def __init__(self, run_folder: Path, worker: Worker, deadline: float | None) -> None:
-        """``deadline`` is the Unix time at which the run has used up its wall time."""
+    def __init__(self, run_folder: Path, worker: Worker, left: float | None) -> None:
+        """``left`` is the wall time, s, that the run may still take. It is measured by a clock that nobody sets."""
         self.worker, self._folder = worker, run_folder
         self._tail = journal.Tail(run_folder / layout.JOURNAL)
-        self._deadline, self._kill_at, self._runs = deadline, float("inf"), False
+        self._deadline = None if left is None else time.monotonic() + left
+        self._kill_at, self._runs = float("inf"), False
         self._phase: Phase = "unknown"
         self._next = 0.0
         self.progress: Progress | None = None
         self.news = False
         """True when the last look found new lines in the journal."""
 
-    def look(self, now: float) -> Iterator[Event]:
-        """What has happened since the last look; ``now`` in Unix s. Raises OSError."""
+    def look(self) -> Iterator[Event]:
+        """What has happened since the last look. Raises OSError."""
+        now = time.monotonic()
         if self._phase == self.worker.phase() == "waits" and now < self._next:
             return
         self._next = now + _PATIENCE
@@ -50,8 +52,10 @@ class Watch:
             yield WorkerRuns()
         if exit_ is not None:
             told = folder.outcome(self._folder)
+            code = farewell.exit_code(self._folder) if exit_.code is None else exit_.code
+            full = told is None and farewell.disk_failed(self._folder)
             traces = self._traces(exit_.last_words)
-            yield WorkerExited(exit_.code, told, exit_.out_of_memory, traces, exit_.reading)
+            yield WorkerExited(code, told, exit_.out_of_memory, full, traces, exit_.reading)
         elif now >= self._kill_at:
             self._kill_at = now + 1.0
             self.worker.kill()
@@ -72,7 +76,7 @@ class Watch:
     def stop(self, grace: float) -> None:
         """Asks the worker to stop, and sets the time at which it is killed."""
         self.worker.stop()
-        self._kill_at = min(self._kill_at, time.time() + grace)
+        self._kill_at = min(self._kill_at, time.monotonic() + grace)
 
     def _traces(self, last_words: str) -> str:
         wrong = folder.outcome_error(self._folder)
@@ -89,7 +93,8 @@ class Watch:
                         self.progress = _progress.decode(line.raw)
                     runs |= self._phase != "waits"
                 elif line.type == "status":
-                    runs |= _status.decode(line.raw).state == State.RUNNING
+                    with suppress(msgspec.MsgspecError):
+                        runs |= _status.decode(line.raw).state == State.RUNNING
                 elif line.type == "finished":
                     self._kill_at = min(self._kill_at, now + _FAREWELL)
         fresh, self._runs = runs and not self._runs, self._runs or runs

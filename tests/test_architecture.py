@@ -132,6 +132,36 @@ def test_a_numeric_constant_says_where_it_comes_from(path: Path) -> None:
             assert told, f"{name_of(path)}:{node.lineno}: {ast.unparse(node)}"
 
 
+SMALL = ("worker/contact", "worker/fracture")
+"""Folders of the worker in which no file, class or function grows."""
+LONGEST_FILE, MOST_ATTRIBUTES, MOST_PARAMETERS = 300, 12, 12
+"""Chosen: a file that is read at one sitting, an object and a call that are taken in at a glance."""
+LARGE = {"worker/contact/scene.py: Scene": 19, "worker/contact/searches.py: Searches": 15,
+         "worker/contact/stage.py: Contact": 14}  # fmt: skip
+"""Classes that have more attributes than they should: these numbers may fall and not rise."""
+SMALL_SOURCES = [path for path in SOURCES if name_of(path).startswith(SMALL)]
+
+
+def attributes(cls: ast.ClassDef) -> set[str]:
+    """Fields that a class declares, and attributes that its methods set."""
+    declared = {n.target.id for n in cls.body if isinstance(n, ast.AnnAssign) and isinstance(n.target, ast.Name)}
+    stored = (n for n in ast.walk(cls) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store))
+    return declared | {n.attr for n in stored if isinstance(n.value, ast.Name) and n.value.id == "self"}
+
+
+@pytest.mark.parametrize("path", SMALL_SOURCES, ids=name_of)
+def test_files_classes_and_calls_of_contact_and_fracture_stay_small(path: Path) -> None:
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= LONGEST_FILE
+    for node in ast.walk(tree(path)):
+        if isinstance(node, ast.ClassDef):
+            name = f"{name_of(path)}: {node.name}"
+            assert len(attributes(node)) <= LARGE.get(name, MOST_ATTRIBUTES), f"{name}: {sorted(attributes(node))}"
+        elif isinstance(node, ast.FunctionDef):
+            given = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
+            named = [each for each in given if each.arg not in ("self", "cls")]
+            assert len(named) <= MOST_PARAMETERS, f"{name_of(path)}:{node.lineno}: {node.name}"
+
+
 def test_the_table_of_the_step_is_the_same_in_code_and_document() -> None:
     row = re.compile(r"^ ?(\d+)  (\S.*?)  +(\S.*)$", re.MULTILINE)
     code, document = ((ROOT / name).read_text(encoding="utf-8") for name in ("worker/step.py", "ARCHITECTURE.md"))

@@ -1,8 +1,8 @@
 """Load balance: what tets cost, when it pays to cut anew, and what came of it.
 
 Costs are CPU seconds of this run: of a tet of each part by the passes over it, of nodes, and of contact by the
-candidates that a node has. Every rank hears of the work of all, so that all decide alike. The answer of the run knows
-nothing of it.
+candidates that a node has. Every rank receives the work of all, so that all decide alike. The answer of the run
+does not depend on it.
 """
 
 import time

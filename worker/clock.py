@@ -30,7 +30,7 @@ class Clock:
         """Index of the next frame time to land on."""
 
     def keep(self) -> dict[str, float]:
-        """All that it knows."""
+        """Its whole state."""
         return dict(vars(self))
 
     def resume(self, known: dict[str, float]) -> None:

@@ -32,11 +32,11 @@ WORD_EVERY = 3.0
 _MOST = 4
 """Children at most: the longest chain of modules holds 27 % of the machine code."""
 _MOST_WORDS = 500
-"""Characters of numba's report: what is wrong stands at its beginning."""
+"""Characters of numba's report: what is wrong comes first."""
 _PATIENCE = 900.0
 """s that a module may take: the largest takes ten on an idle core."""
 _LOCK, _LOOK = "lock", 0.3
-"""The file that whoever compiles holds, and s between two looks at it: a tenth of WORD_EVERY."""
+"""The file that whoever compiles holds, and s between two checks of it: a tenth of WORD_EVERY."""
 
 
 def compile_all(folder: Path, tell: Tell, root: Path = kernels.ROOT, package: str = "conoid.worker") -> bool:
@@ -58,7 +58,7 @@ def compile_all(folder: Path, tell: Tell, root: Path = kernels.ROOT, package: st
 
 
 class _Saying:
-    """Tells how many kernels have come into the folder, at once and then every ``WORD_EVERY`` s."""
+    """Reports how many kernels have come into the folder, at once and then every ``WORD_EVERY`` s."""
 
     def __init__(self, tell: Tell, folder: Path, total: int) -> None:
         self._tell, self._folder, self._total = tell, folder, total
@@ -224,7 +224,7 @@ def words(done: int, total: int) -> str:
 
 
 def main() -> int:
-    """Compiles what is missing and tells how far it is; the exit code."""
+    """Compiles what is missing and reports the progress; the exit code."""
     try:
         fresh = compile_all(kernels.cache_folder(), lambda done, total: print(words(done, total), flush=True))
     except CompileError as error:

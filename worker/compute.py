@@ -1,4 +1,4 @@
-"""From a case to an outcome, with the kernels loaded: build, step, look, sum up."""
+"""From a case to an outcome, with the kernels loaded: build, advance, run the outputs, sum up."""
 
 import logging
 import resource
@@ -15,7 +15,8 @@ from conoid.cases.quantities import FIELD_UNITS
 from conoid.cases.run import State
 from conoid.cases.schema import Case
 
-from . import digest, domain, reference, simulation
+from . import digest, reference, simulation
+from .assembly import quiet
 from .balance import Balance
 from .errors import InputError, PhysicsError
 from .jit import cpu_time
@@ -41,7 +42,7 @@ def compute(
 
     With ``restart`` from the latest checkpoint that is there. Raises ConoidError.
     """
-    say = journal.starting if journal is not None else domain.quiet
+    say = journal.starting if journal is not None else quiet
     if restart:
         say("reading the latest checkpoint")
         sim, start = _resumed(case, folder, comm)
@@ -96,7 +97,7 @@ def _resumed(case: Case, folder: Path, comm: Comm) -> tuple[Simulation, Start]:
 
 
 def _announce(sim: Simulation, journal: Journal | None, setup: float) -> None:
-    """Tells how large the model is and how it is spread; all ranks take part."""
+    """Reports how large the model is and how it is spread; all ranks take part."""
     model, nodes = sim.model, sim.model.nodes
     sizes = np.zeros(len(model.parts), np.int64)
     for block in model.blocks:

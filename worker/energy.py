@@ -118,20 +118,21 @@ class ElementWork:
         self._blocks = blocks
 
     def largest(self) -> Floats:
-        largest = np.zeros(3)
-        for block in self._blocks:
-            _largest_work(largest, block.state, block.n)
-        return largest
+        return self._visited(np.zeros(0))[0]
 
     def limbs(self, scale: Floats) -> Ints:
-        words = np.zeros(6, np.int64)
+        return self._visited(scale)[1]
+
+    def _visited(self, scale: Floats) -> tuple[Floats, Ints]:
+        largest, words = np.zeros(3), np.zeros(6, np.int64)
         for block in self._blocks:
-            _add_work(words, block.state, block.n, scale)
-        return words
+            _visit_work(largest, words, block.state, block.n, scale)
+        return largest, words
 
 
-@njit("void(float64[::1], float64[:, :, ::1], int64)", cache=True)
-def _largest_work(largest, state, n):  # type: ignore[no-untyped-def]
+@njit("void(float64[::1], int64[::1], float64[:, :, ::1], int64, float64[::1])", cache=True)
+def _visit_work(largest, words, state, n, scale):  # type: ignore[no-untyped-def]
+    """Raises the ``largest`` (3,) magnitudes; adds to the limbs ``words`` (6,) where ``scale`` (3,) is given."""
     for j in range(3):
         row = _WORKS[j]
         if row >= state.shape[1]:
@@ -139,17 +140,8 @@ def _largest_work(largest, state, n):  # type: ignore[no-untyped-def]
         for c in range(state.shape[0]):
             for i in range(min(CHUNK, n - c * CHUNK)):
                 largest[j] = max(largest[j], abs(state[c, row, i]))
-
-
-@njit("void(int64[::1], float64[:, :, ::1], int64, float64[::1])", cache=True)
-def _add_work(words, state, n, scale):  # type: ignore[no-untyped-def]
-    for j in range(3):
-        row = _WORKS[j]
-        if row >= state.shape[1]:
-            continue
-        for c in range(state.shape[0]):
-            for i in range(min(CHUNK, n - c * CHUNK)):
-                add_limbs(words, j, state[c, row, i], scale[j])
+                if len(scale) > 0:
+                    add_limbs(words, j, state[c, row, i], scale[j])
 
 
 @njit(

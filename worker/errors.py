@@ -2,7 +2,7 @@
 
 ::
 
-    ConoidError                      exit 1   anything the worker raises on purpose
+    ConoidError                      exit 1   anything the worker raises on purpose; one of the client's tree, too
     ├── CompileError             exit 1   kernels cannot be compiled
     ├── InputError (ValueError)      exit 2   the case, or a file it names, is wrong
     │   └── MeshError                exit 2   the mesh cannot be made, read or used
@@ -14,11 +14,12 @@ The text of every one of them is a single line for the person who wrote the case
 
 from typing import ClassVar
 
+from conoid.cases import problems
 from conoid.cases.run import Cause, ExitCode
 
 
-class ConoidError(Exception):
-    """Base of the tree."""
+class ConoidError(problems.ConoidError):
+    """Base of the tree, and caught as what a user of Conoid catches (client/errors.py)."""
 
     exit_code: ClassVar[int] = ExitCode.CRASHED
     cause: ClassVar[Cause] = Cause.SERVICE

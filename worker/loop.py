@@ -44,7 +44,7 @@ log = logging.getLogger("conoid.worker")
 
 @dataclass(frozen=True)
 class Start:
-    """What is known when the first step begins, and what a run that goes on knows besides."""
+    """What is known when the first step begins, and what a resumed run has besides."""
 
     elements: int
     nodes: int
@@ -76,7 +76,7 @@ class Pace:
 
 
 class Loop:
-    """Runs a simulation to its end, and tells. ``journal`` and ``history`` exist on rank 0 only."""
+    """Advances a simulation to its end and runs the outputs that are due. ``journal`` and ``history``: on rank 0."""
 
     def __init__(
         self, sim: Simulation, folder: Path, journal: Journal | None, history: History | None, signals: Signals,

@@ -20,9 +20,10 @@ from . import compile as ahead
 from . import kernels
 from .errors import CompileError, ConoidError
 from .lock import hold
+from .output import storage
 from .output.journal import Journal
 from .parallel.comm import Comm
-from .parallel.mpi import connect
+from .parallel.mpi import abort, connect
 from .signals import Signals
 
 if TYPE_CHECKING:
@@ -48,6 +49,17 @@ def main(arguments: list[str]) -> int:
     options = _parse(arguments)
     signals = Signals()
     comm = connect()
+    try:
+        return _run(options, comm, signals, began)
+    except BaseException as error:
+        log.error("rank %d stops the job\n%s", comm.rank, traceback.format_exc())
+        if storage.failed(error):
+            print(f"a file of the run cannot be written: {error}", file=sys.stderr, flush=True)
+            abort(ExitCode.STORAGE)
+        raise
+
+
+def _run(options: argparse.Namespace, comm: Comm, signals: Signals, began: float) -> int:
     if options.ranks is not None and comm.size != options.ranks:
         print(_WRONG_SIZE.format(comm.size, options.ranks), file=sys.stderr)
         return ExitCode.CRASHED
@@ -59,11 +71,7 @@ def main(arguments: list[str]) -> int:
     if comm.rank == 0:
         telemetry = _telemetry(options)
         journal = Journal(options.out, options.run or options.out.resolve().name, telemetry)
-    try:
-        outcome, code = _outcome(options, comm, journal, signals, began)
-    except BaseException:
-        log.error("rank %d stops the job\n%s", comm.rank, traceback.format_exc())
-        raise
+    outcome, code = _outcome(options, comm, journal, signals, began)
     if journal is not None:
         _close(outcome, options, journal, telemetry)
     comm.barrier()
@@ -189,14 +197,14 @@ def ready_kernels(comm: Comm, journal: Journal | None) -> None:
 
 
 def _say(journal: Journal | None, what: str) -> None:
-    """Tells what the start is at."""
+    """Reports what the start is doing."""
     log.info(what)
     if journal is not None:
         journal.starting(what)
 
 
 def _close(outcome: Outcome, options: argparse.Namespace, journal: Journal, telemetry: "Telemetry | None") -> None:
-    """The outcome first, then the last message: whoever hears of the end finds it on disk.
+    """The outcome first, then the last message: whoever receives the last message finds it on disk.
 
     An interrupted run has not ended: worker/job.py finds out what has interrupted it.
     """

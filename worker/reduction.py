@@ -1,9 +1,9 @@
 """The reduction of the step: the one maximum over all ranks by which they agree on what the next step does.
 
-A field is one int64 word. No other file knows where a field is and how it is encoded: as an integer, as a flag (0 or
-1), or as the bits of a non-negative float64. Such bits have the order of the floats, and a NaN is larger than any
+A field is one int64 word. This file alone decides where a field is and how it is encoded: as an integer, as a flag (0
+or 1), or as the bits of a non-negative float64. Such bits have the order of the floats, and a NaN is larger than any
 number, so that the maximum over int64 words is right for every field. Behind the fields there
-are words for every rank: of what it alone gives there, the others give less, so that the maximum tells it to all.
+are words for every rank: the others give less there than the rank itself, so that the maximum is its own word.
 """
 
 from typing import Generic, Self, TypeVar, overload

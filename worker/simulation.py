@@ -10,6 +10,7 @@ from conoid.cases.library import material as find_material
 from conoid.cases.schema import Case
 
 from . import conditions, domain
+from .assembly import Say, quiet
 from .boundaries import Boundary
 from .clock import Clock
 from .contact.stage import Contact
@@ -18,7 +19,8 @@ from .energy import Ledger
 from .erosion import Erosion
 from .fracture.record import Record
 from .fracture.stage import Fracture
-from .materials.models import BULK, DENSITY, SHEAR, moduli
+from .materials.law import BULK, DENSITY, SHEAR
+from .materials.models import moduli
 from .migration import model as model_of
 from .migration.parcel import Parcel
 from .migration.route import Arrived
@@ -118,7 +120,7 @@ class Simulation:
         return fixed_point.scale_for(max(self.reduction.force, self.floor))
 
 
-def build(case: Case, folder: Path, comm: Comm, say: domain.Say = domain.quiet) -> Simulation:
+def build(case: Case, folder: Path, comm: Comm, say: Say = quiet) -> Simulation:
     """Meshes, cuts and distributes the case; rank 0 calls ``say`` with what it is at.
 
     Raises InputError on every rank alike.

@@ -52,6 +52,9 @@ FLOW = 17
 """Flow stress of the last plastic step, Pa (the next one's first guess)."""
 TEMPERATURE = 18
 """K."""
+PORES = 19
+"""Of the pores that a tension cut-off has opened: their volume over that of the solid matter; with a linear pressure
+the logarithm of one and that."""
 
 
 INTACT, BROKEN, WIDE = range(3)

@@ -1,4 +1,4 @@
-"""What separating nodes tell everybody who keeps something by node."""
+"""The topology change of one step: old node to new nodes, by tet; every array indexed by node is extended from it."""
 
 from dataclasses import dataclass
 from typing import Protocol, Self
@@ -17,7 +17,7 @@ def keys(nodes: Ints, tets: Ints) -> Ints:
 
 
 class KeptByNode(Protocol):
-    """What has arrays by node and follows nodes as they separate."""
+    """An object with arrays by node that is updated when nodes separate."""
 
     def grow(self, split: "Split", ids: Ints) -> None:
         """Takes up the copies of a split; ``ids``: of the local nodes."""
@@ -25,7 +25,7 @@ class KeptByNode(Protocol):
 
 @dataclass
 class Split:
-    """What separated in a step, as one rank sees it: round every node that it holds."""
+    """What separated in a step, on one rank: round every node that it holds."""
 
     copies: Copies
     first: int

@@ -24,6 +24,8 @@ _CROWDED = 4
 _LAST_WORDS, _LOG_TAIL = 300, 1 << 14
 """Characters of a launcher's last line that are told; bytes at the end of its log in which that line is looked for.
 Chosen."""
+_BURIAL = 1.0
+"""s for which a killed launcher is waited for, so that it leaves no zombie. Chosen: it takes milliseconds."""
 _HOUR = 3600.0
 """s after which shared memory that no process maps is taken for left over: no launch takes that long to map it."""
 
@@ -65,7 +67,8 @@ class LocalLauncher:
             if leader is None:
                 return Trace(None, False, False)
             process = _record(leader, processes.oom_kills())
-            run_folder.write_process(folder, process)
+            with suppress(OSError):
+                run_folder.write_process(folder, process)
         worker = LocalWorker(run, folder, process)
         rebooted = process.boot != processes.boot()
         return Trace(worker if not rebooted and worker.alive() else None, True, rebooted)
@@ -160,6 +163,9 @@ class LocalWorker:
             with suppress(ProcessLookupError):
                 os.killpg(self.process.pid, signal.SIGKILL)
         processes.end_run(self._run)
+        if self._child is not None:
+            with suppress(subprocess.TimeoutExpired):
+                self._child.wait(_BURIAL)
 
     def _last_words(self) -> str:
         """The last line that is not part of the launcher's own banner."""

@@ -1,17 +1,17 @@
 """Cases: the check before anything runs, and the gallery that comes with Conoid."""
 
+import json
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Response
+from starlette.concurrency import run_in_threadpool
 
 from conoid.cases import reference
 from conoid.cases.load import CaseError, read_case, shipped
-from conoid.cases.plausible import doubts
 
 from .. import openapi
 from ..auth import Reader, Submitter
 from ..errors import entry, not_found
-from ..limits import figures
 from ..service import ServiceOf
 from .runs import Body
 
@@ -19,17 +19,18 @@ router = APIRouter()
 
 
 @router.post("/v1/cases:validate", openapi_extra=openapi.CASE_BODY)
-def validate(
+async def validate(
     service: ServiceOf, identity: Submitter, body: Body, content_type: Annotated[str, Header()] = ""
 ) -> dict[str, Any]:
     """Whether the case could be submitted: every problem at once, or warnings, estimate, the case with all defaults."""
     try:
-        reading = service.desk.read(body, content_type)
+        async with service.turns.turn(identity.owner):
+            reading = await run_in_threadpool(service.desk.read, body, content_type)
     except CaseError as error:
         return {"valid": False, "problems": [entry(problem) for problem in error.problems]}
-    case = reading.case.model_dump(mode="json")
-    odd = [entry(doubt) for doubt in doubts(reading.data, reading.case, reading.estimate)]
-    return {"valid": True, "problems": [], "warnings": odd, "estimate": figures(reading.estimate), "case": case}
+    odd = [entry(doubt) for doubt in reading.doubts]
+    case = json.loads(reading.case)
+    return {"valid": True, "problems": [], "warnings": odd, "estimate": reading.estimate, "case": case}
 
 
 @router.get("/v1/case.schema.json")

@@ -9,13 +9,17 @@ from starlette.concurrency import run_in_threadpool
 from conoid.cases import layout
 
 from .. import journal, stream
-from ..auth import Reader
+from ..auth import Pass, Reader
 from ..errors import ServiceError
 from ..service import ServiceOf
 from .runs import OwnedRun
 
 router = APIRouter()
 After = Annotated[int, Query(ge=0, description="the seq of the last event that is known")]
+
+Seconds = Annotated[
+    float | None, Query(ge=0, le=86400, allow_inf_nan=False, description="s after which the answer ends; none: never")
+]
 
 
 @router.get("/v1/runs/{run_id}/events")
@@ -50,7 +54,8 @@ async def follow(
     service: ServiceOf,
     identity: Reader,
     after: After = 0,
-    last_event_id: Annotated[str | None, Header()] = None,
+    last_event_id: Annotated[str | None, Header(json_schema_extra={"pattern": "^[0-9]{1,18}$"})] = None,
+    seconds: Seconds = None,
 ) -> Response:
     """Server-sent events: first those after ``Last-Event-ID`` (or ``after``), then the new ones until the run ends.
 
@@ -66,5 +71,5 @@ async def follow(
         tail = journal.Tail(path, after)
         if not await run_in_threadpool(tail.read):
             return Response(status_code=204)
-    body = stream.events(service, identity, run.id, path, after)
+    body = stream.events(service, Pass(service, identity, seconds), run.id, path, after)
     return StreamingResponse(body, media_type=stream.MEDIA_TYPE, headers=stream.HEADERS)

@@ -1,17 +1,14 @@
 """For those who watch the server itself."""
 
-import os
-import time
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, Response
+from fastapi import APIRouter, Depends, Request, Response
 from fastapi.responses import JSONResponse
-from sqlalchemy.exc import SQLAlchemyError
-
-from conoid.cases.run import State
+from prometheus_client import CONTENT_TYPE_PLAIN_0_0_4
 
 from ..auth import Identity, requires
-from ..service import Service, ServiceOf
+from ..metrics import Metrics
+from ..service import ServiceOf
 
 router = APIRouter()
 
@@ -25,34 +22,13 @@ def alive() -> dict[str, str]:
 @router.get("/readyz")
 def ready(service: ServiceOf) -> Response:
     """Runs can be taken and looked after: 200, or 503 with what is wrong."""
-    checks = {
-        "supervisor": service.supervisor.alive,
-        "database": _database(service),
-        "runs": os.access(service.settings.runs, os.W_OK),
-    }
+    checks = {"supervisor": service.supervisor.alive, **service.readiness.checks()}
     body: dict[str, Any] = {"status": "ok" if all(checks.values()) else "unavailable", "checks": checks}
     return JSONResponse(body, 200 if all(checks.values()) else 503)
 
 
-def _database(service: Service) -> bool:
-    try:
-        service.store.token("")
-    except SQLAlchemyError:
-        return False
-    return True
-
-
 @router.get("/metrics")
-def metrics(service: ServiceOf, identity: Annotated[Identity, Depends(requires("metrics"))]) -> Response:
-    """Counts in the text form that Prometheus reads."""
-    counts = service.store.count_by_state()
-    lines = ["# HELP conoid_runs Runs by state.", "# TYPE conoid_runs gauge"]
-    lines += [f'conoid_runs{{state="{state}"}} {counts.get(state, 0)}' for state in State]
-    for name, kind, text, value in (
-        ("conoid_slots", "gauge", "Ranks that may run at a time.", service.settings.slots),
-        ("conoid_slots_used", "gauge", "Ranks that run now.", service.supervisor.slots_used()),
-        ("conoid_listeners", "gauge", "Open event streams and waiting requests.", service.bell.listening),
-        ("process_cpu_seconds_total", "counter", "CPU time of the server.", time.process_time()),
-    ):
-        lines += [f"# HELP {name} {text}", f"# TYPE {name} {kind}", f"{name} {value}"]
-    return Response("\n".join(lines) + "\n", media_type="text/plain; version=0.0.4; charset=utf-8")
+def metrics(request: Request, identity: Annotated[Identity, Depends(requires("metrics"))]) -> Response:
+    """Runs, slots, answers and their times in the text form that Prometheus reads."""
+    found: Metrics = request.app.state.metrics
+    return Response(found.text(), media_type=CONTENT_TYPE_PLAIN_0_0_4)

@@ -12,8 +12,10 @@ from starlette.concurrency import run_in_threadpool
 from conoid.cases import layout
 
 from .. import download
+from ..auth import Pass, Reader
 from ..errors import ServiceError
 from ..service import Service, ServiceOf
+from .events import Seconds
 from .runs import OwnedRun
 
 router = APIRouter()
@@ -26,7 +28,15 @@ Rank = Annotated[str, PathParameter(pattern=r"^(\d{1,5}|launcher)$", description
 
 @router.head("/v1/runs/{run_id}/logs/{rank}", include_in_schema=False)
 @router.get("/v1/runs/{run_id}/logs/{rank}")
-def log(request: Request, run: OwnedRun, service: ServiceOf, rank: Rank, follow: bool = False) -> Response:
+def log(
+    request: Request,
+    run: OwnedRun,
+    service: ServiceOf,
+    identity: Reader,
+    rank: Rank,
+    follow: bool = False,
+    seconds: Seconds = None,
+) -> Response:
     """The log of one rank, or of the launcher; Range as for files. ``follow`` goes on until the run has ended."""
     folder = service.settings.runs / run.id
     relative = f"{layout.LOGS}/{layout.LAUNCHER_LOG if rank == 'launcher' else f'rank-{rank}.log'}"
@@ -34,14 +44,15 @@ def log(request: Request, run: OwnedRun, service: ServiceOf, rank: Rank, follow:
         return download.respond(request, folder, relative)
     if rank != "launcher" and int(rank) >= run.ranks:
         raise ServiceError(404, "not_found", f"rank {rank}: the run has ranks 0 to {run.ranks - 1}")
-    return StreamingResponse(_follow(service, run.id, folder, relative), media_type="text/plain; charset=utf-8")
+    may = Pass(service, identity, seconds)
+    return StreamingResponse(_follow(service, may, run.id, folder, relative), media_type="text/plain; charset=utf-8")
 
 
-async def _follow(service: Service, run_id: str, folder: Path, relative: str) -> AsyncIterator[bytes]:
+async def _follow(service: Service, may: Pass, run_id: str, folder: Path, relative: str) -> AsyncIterator[bytes]:
     """The log's bytes as they come; it need not exist yet."""
     offset = 0
     with service.bell.listen(run_id) as listener:
-        while True:
+        while await may.holds():
             over = service.bell.closed or not service.supervisor.is_open(run_id)
             chunk = await run_in_threadpool(_read, folder, relative, offset)
             offset += len(chunk)

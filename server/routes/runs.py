@@ -1,6 +1,8 @@
 """Runs: submit, list, look at, cancel, ask for a checkpoint or a snapshot."""
 
 import time
+from collections.abc import Iterator
+from itertools import islice
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Header, Query, Request, Response
@@ -11,9 +13,9 @@ from conoid.cases import layout
 from conoid.cases.run import State
 
 from .. import openapi, view
-from ..auth import Identity, Reader, Submitter
+from ..auth import Identity, Pass, Reader, Submitter, unauthorized
 from ..errors import ServiceError, not_found
-from ..lifecycle import Run
+from ..events import Run
 from ..limits import read_body
 from ..service import Service, ServiceOf
 from ..submission import labels_of
@@ -25,7 +27,7 @@ MAX_WAIT = 60.0
 
 
 @router.post("/v1/runs", status_code=202, openapi_extra=openapi.CASE_BODY)
-def submit(
+async def submit(
     service: ServiceOf,
     identity: Submitter,
     body: Body,
@@ -36,7 +38,10 @@ def submit(
 ) -> Response:
     """Takes a case as TOML or JSON. The same Idempotency-Key and body give the same run and the same answer."""
     labels = labels_of(label or ())
-    receipt = service.desk.submit(identity.owner, body, content_type, idempotency_key, labels, profile)
+    async with service.turns.turn(identity.owner):
+        receipt = await run_in_threadpool(
+            service.desk.submit, identity.owner, body, content_type, idempotency_key, labels, profile
+        )
     return JSONResponse(receipt, 202, {"Location": receipt["url"]})
 
 
@@ -45,14 +50,27 @@ def page(
     service: ServiceOf,
     identity: Reader,
     state: Annotated[str | None, Query(description="one or more states, with commas between")] = None,
-    cursor: str | None = None,
+    cursor: Annotated[str | None, Query(json_schema_extra={"pattern": "^[A-Za-z0-9_-]{30}$"})] = None,
     limit: Annotated[int, Query(ge=1, le=500)] = 50,
+    label: Annotated[list[str] | None, Query(description="NAME=VALUE; runs that have all of them")] = None,
 ) -> dict[str, Any]:
     """Own runs, newest first; ``next`` is the cursor of the following page, null on the last."""
     before = None if cursor is None else view.from_cursor(cursor)
-    runs = service.store.page(identity.owner, _states(state), before, limit + 1)
+    pages = _pages(service, identity.owner, _states(state), before, limit + 1)
+    wanted = labels_of(label or ()).items()
+    runs = list(islice((run for run in pages if not wanted or wanted <= view.labels(service, run).items()), limit + 1))
     following = view.to_cursor(runs[limit - 1]) if len(runs) > limit else None
-    return {"runs": [view.brief(service, run) for run in runs[:limit]], "next": following}
+    now = (service.supervisor.current(run.id) or run for run in runs[:limit])
+    return {"runs": [view.brief(service, run) for run in now], "next": following}
+
+
+def _pages(service: Service, owner: str, states: list[State], before: str | None, size: int) -> Iterator[Run]:
+    """The runs of an owner, newest first, so many at a time from the store."""
+    while some := service.store.page(owner, states, before, size):
+        yield from some
+        if len(some) < size:
+            return
+        before = some[-1].id
 
 
 def _states(text: str | None) -> list[State]:
@@ -72,10 +90,12 @@ OwnedRun = Annotated[Run, Depends(owned_run)]
 
 
 def find(service: Service, identity: Identity, run_id: str) -> Run:
-    """The run as it is now. Raises ServiceError 404."""
+    """The run as it is now. Raises ServiceError 404, and 410 when it has ended and its folder is gone."""
     run = service.supervisor.current(run_id) or service.store.get(run_id)
     if run is None or run.owner != identity.owner:
         raise not_found(f"run {run_id[:40]!r}")
+    if run.state.final and not (service.settings.runs / run.id).is_dir():
+        raise ServiceError(410, "gone", f"run {run.id}: its folder has been removed; it ended as {run.state.value}")
     return run
 
 
@@ -91,15 +111,17 @@ async def show(
     anything has; at most so many seconds later. A run that has ended is answered at once."""
     known = request.headers.get("if-none-match")
     first = await run_in_threadpool(view.snapshot, service, run)
-    latest, deadline = first, time.monotonic() + wait
+    latest, deadline, may = first, time.monotonic() + wait, Pass(service, identity)
     with service.bell.listen(run.id) as listener:
         while not (latest.state.final or service.bell.closed):
             changed = latest.state is not first.state if known is None else latest.etag != known
             left = deadline - time.monotonic()
             if changed or left <= 0:
                 break
-            await listener.wait(left)
+            await listener.wait(min(left, may.left))
             listener.clear()
+            if not await may.holds():
+                raise unauthorized()
             latest = await run_in_threadpool(lambda: view.snapshot(service, find(service, identity, run.id)))
     headers = {"ETag": latest.etag, "Cache-Control": "private, no-cache"}
     if latest.etag == known:

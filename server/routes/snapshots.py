@@ -12,7 +12,7 @@ from conoid.cases.messages import Snapshot
 
 from .. import download, series
 from ..errors import not_found
-from ..lifecycle import Run
+from ..events import Run
 from ..service import Service, ServiceOf
 from .runs import OwnedRun
 

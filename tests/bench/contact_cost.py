@@ -80,7 +80,7 @@ STEPS = {8: 1500, 16: 400}
 """By ranks; the paper has 8."""
 DOMAINS = ("box", "arbitrary")
 PAPER = {
-    "faces that a search looks at": "1st: 7,284 / 5,467 = 1.33 (fig. 4)",
+    "faces of a search": "1st: 7,284 / 5,467 = 1.33 (fig. 4)",
     "faces sent, a search": "1st, 6th: > 2 (fig. 6)", "contact, CPU s": "> 2 (fig. 5)",
 }  # fmt: skip
 """Moon, Kim and Lee, box over arbitrary, of a long body into a steel block on 8 processors."""
@@ -105,7 +105,7 @@ def kinds(runs: Sequence[Run], steps: int) -> dict[str, list[float]]:
         return [statistics.fmean(map(number, same)) for same in zip(*runs, strict=True)]
 
     return {
-        "faces that a search looks at": mean(lambda rank: statistics.fmean(look[1] for look in rank["course"])),
+        "faces of a search": mean(lambda rank: statistics.fmean(look[1] for look in rank["course"])),
         "faces sent, a search": mean(lambda rank: statistics.fmean(look[2] for look in rank["course"])),
         "contact, CPU s": mean(lambda rank: rank["cpu"]),
         "of it steps with a search": mean(lambda rank: rank["searching"]),

@@ -18,6 +18,7 @@ kernels.use_cache()
 from conoid.cases import load  # noqa: E402
 from conoid.worker import simulation, step  # noqa: E402
 from conoid.worker.contact import layout  # noqa: E402
+from conoid.worker.contact.sides import Sides  # noqa: E402
 from conoid.worker.parallel.comm import Comm  # noqa: E402
 from conoid.worker.parallel.mpi import connect, leave  # noqa: E402
 
@@ -35,7 +36,7 @@ def main(steps: int, names: Sequence[str]) -> None:
 
 
 def _measured(name: str, steps: int, world: Comm) -> dict[str, Any]:
-    """Of one rank: at each search t in us, faces looked at and sent; CPU s, bytes and messages of contact."""
+    """Of one rank: at each search t in us, its faces and those of other ranks; CPU s, bytes and messages of contact."""
     data = load.apply_overrides(
         load.read_data(load.shipped_path("long_rod")), [*COARSE, "run.frames=0", f'contact.domain="{name}"']
     )
@@ -43,7 +44,7 @@ def _measured(name: str, steps: int, world: Comm) -> dict[str, Any]:
     step.prepare(sim)
     assert sim.contact is not None
     course: list[tuple[float, int, int]] = []
-    looked: list[int] = []
+    looked: list[tuple[int, int]] = []
     searching, sent, seconds = 0.0, {"bytes": 0, "messages": 0}, sim.timers.seconds
     begin = seconds["contact"]
     with patch.object(layout, "build", _noted(layout.build, looked)):
@@ -52,8 +53,7 @@ def _measured(name: str, steps: int, world: Comm) -> dict[str, Any]:
             before, known = seconds["contact"], len(looked)
             step.first_half(sim)
             if len(looked) > known:
-                assert sim.contact.searches.scene is not None
-                course.append((1e6 * sim.clock.t, looked[-1], sim.contact.searches.scene.faces_sent))
+                course.append((1e6 * sim.clock.t, *looked[-1]))
                 searching += seconds["contact"] - before
             fresh = world.sent.since_last()
             sent = {kind: number + fresh[kind] for kind, number in sent.items()}
@@ -63,12 +63,13 @@ def _measured(name: str, steps: int, world: Comm) -> dict[str, Any]:
     return {"course": course, "cpu": spent, "searching": searching, **sent}
 
 
-def _noted(function: Any, looked: list[int]) -> Any:
-    """``function`` that notes how many faces a search looks at."""
+def _noted(function: Any, looked: list[tuple[int, int]]) -> Any:
+    """``function`` that notes how many faces a search has, and how many of them come from other ranks."""
 
-    def noted(*of: Any) -> Any:
-        found = function(*of)
-        looked.append(len(found.faces))
+    def noted(sides: Sides, *rest: Any) -> Any:
+        found = function(sides, *rest)
+        every = len(found.faces.id)
+        looked.append((every, every - sides.faces.n))
         return found
 
     return noted

@@ -19,9 +19,9 @@ from conoid.cases.geometry import bounds
 from conoid.cases.materials import Material
 from conoid.cases.messages import Energy
 from conoid.cases.schema import Case
-from conoid.worker import domain, simulation, step
+from conoid.worker import assembly, simulation, step
 from conoid.worker.fracture import connectivity
-from conoid.worker.materials.models import DENSITY
+from conoid.worker.materials.law import DENSITY
 from conoid.worker.mesh import build
 from conoid.worker.mesh.faces import FACES, areas
 from conoid.worker.mesh.model import TetMesh, check, step_lengths
@@ -392,7 +392,7 @@ def watch(plan: Plan) -> Run:
     body = case.parts[0].mesh
     begin = body.slit.high[1] if isinstance(body, Box | Plate) and body.slit is not None else low[0]
     began = time.process_time()
-    with patch.object(domain, "build_mesh", lambda *_, **__: mesh):
+    with patch.object(assembly, "build_mesh", lambda *_, **__: mesh):
         sim = simulation.build(case, Path(), SerialComm())
     crack, due, every = Crack(plan.size, begin, high[0]), 0.0, min(_LOOK, case.run.end_time / 20)
     step.prepare(sim)

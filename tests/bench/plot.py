@@ -92,7 +92,7 @@ def domains(found: Mapping[str, Sequence[Ranks]], steps: int, path: Path) -> Non
     figure, (looked, cpu, course) = plt.subplots(1, 3, figsize=(14, 4), layout="constrained")
     for name, colour, shift in zip(DOMAINS, (_COLOURS["split"], _COLOURS["nodal"]), (-0.2, 0.2), strict=True):
         numbers = kinds(found[name], steps)
-        for ax, kind in ((looked, "faces that a search looks at"), (cpu, "contact, CPU s")):
+        for ax, kind in ((looked, "faces of a search"), (cpu, "contact, CPU s")):
             at = [k + 1 + shift for k in range(len(numbers[kind]))]
             ax.bar(at, numbers[kind], 0.4, color=colour, label=name)
             ax.set(xlabel="rank", ylabel=kind, xticks=range(1, len(at) + 1))

@@ -13,7 +13,7 @@ from unittest.mock import patch
 import numpy as np
 
 from conoid.cases import bodies, schema
-from conoid.worker import domain, simulation, state, step
+from conoid.worker import assembly, simulation, state, step
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.parallel.comm import SerialComm
 
@@ -52,7 +52,7 @@ class Ride:
         """``mesh``: of the only part, instead of the one that the case asks for."""
         ready: AbstractContextManager[object] = nullcontext()
         if mesh is not None:
-            ready = patch.object(domain, "build_mesh", lambda *_, **__: mesh)
+            ready = patch.object(assembly, "build_mesh", lambda *_, **__: mesh)
         with ready:
             self.sim = simulation.build(scene, Path(), SerialComm())
         step.prepare(self.sim)

@@ -65,11 +65,11 @@ def main(launched: float, case: str) -> None:
     stamps.stamp("MPI")
     worker.ready_kernels(comm, None)
     stamps.stamp("kernels hashed and compiled")
-    from conoid.worker import compute, domain, simulation, step
+    from conoid.worker import assembly, compute, domain, simulation, step
 
     assert compute
     stamps.stamp("numba")
-    domain.assemble = stamps.around(domain.assemble, "model", "meshes")
+    assembly.assemble = stamps.around(assembly.assemble, "model", "meshes")
     domain.cut = stamps.around(domain.cut, "meshes", "cut")
     sim = simulation.build(scene, Path(), comm)
     stamps.stamp("model")

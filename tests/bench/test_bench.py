@@ -159,6 +159,6 @@ def test_contact_domains_are_compared_rank_by_rank_over_both_runs() -> None:
     rows = [
         [cell.strip() for cell in line.split("|")[1:-1]] for line in contact_cost.domain_report(found, 8).splitlines()
     ]
-    assert rows[2][:7] == ["faces that a search looks at", *["80 / 40"] * 4, "2.00", "2.00"]
+    assert rows[2][:7] == ["faces of a search", *["80 / 40"] * 4, "2.00", "2.00"]
     assert rows[4] == ["contact, CPU s", "14 / 7", "24 / 12", "4 / 2", "24 / 12", "2.00", "2.00", "> 2 (fig. 5)"]
     assert rows[6][1:3] == ["40 / 20", "40 / 20"], "kB a step"

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from conoid.cases.load import CaseError, parse_case
-from conoid.worker import domain
+from conoid.worker import assembly
 from conoid.worker.errors import InputError
 
 BALL = {"shape": "sphere", "radius": 3e-3, "centre": [0, 0, 3e-3], "element_size": 1e-3}
@@ -112,7 +112,7 @@ def test_what_is_told_here_the_worker_refuses_as_well() -> None:
     assert pushed.contact is not None
     refused = pushed.model_copy(update={"contact": pushed.contact.model_copy(update={"overlap": "refuse"})})
     with pytest.raises(InputError, match="overlaps"):
-        domain.assemble(refused, Path())
+        assembly.assemble(refused, Path())
 
 
 def test_many_bodies_cost_little_time() -> None:

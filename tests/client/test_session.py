@@ -223,3 +223,10 @@ def test_a_wrong_configuration_names_the_file(quiet_home: Path, text: str, said:
 def test_an_address_needs_its_scheme(quiet_home: Path) -> None:
     with pytest.raises(ClientError, match="http://"):
         target("localhost:8750")
+
+
+def test_what_a_worker_raises_is_of_the_same_tree() -> None:
+    from conoid.worker import errors
+
+    with pytest.raises(ConoidError, match="slipped"):
+        raise errors.MeshError("the mesh has slipped")

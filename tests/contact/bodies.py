@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from conoid.cases import schema
-from conoid.worker import domain
+from conoid.worker import assembly, domain
 from conoid.worker.contact import surface
 from conoid.worker.contact.records import Crowd
 from conoid.worker.contact.surface import Surface
@@ -50,8 +50,8 @@ def meeting_of(motions: Sequence[dict[str, Any]], contact: dict[str, Any] | None
 def pieces_of(case: schema.Case, meshes: Sequence[TetMesh], ranks: int = 1) -> list[tuple[domain.Piece, Model]]:
     """What each rank holds of a scene whose parts have these meshes."""
     ready = iter(meshes)
-    with patch.object(domain, "build_mesh", lambda *_, **__: next(ready)):
-        whole = domain.assemble(case, Path())
+    with patch.object(assembly, "build_mesh", lambda *_, **__: next(ready)):
+        whole = assembly.assemble(case, Path())
     return [(piece, domain._model(case, piece)) for piece in domain.cut(whole, ranks)]
 
 

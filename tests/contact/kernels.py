@@ -121,7 +121,7 @@ class Solver:
         """``active``: of another step, to be used again."""
         self.met, self.v, self.scale, n = met, v.copy(), scale, len(v)
         self.total = np.zeros((n, 3), np.int64)
-        self.active, every, part = active or ActiveSet(scale), np.arange(n, dtype=np.int32), np.zeros(n, np.int32)
+        self.active, every, part = active or ActiveSet(scale, 1), np.arange(n, dtype=np.int32), np.zeros(n, np.int32)
         self._crowd = Crowd(np.arange(n), every, part, part, mobility, self.v, self.v, self.v)
         self._nodes: Any = SimpleNamespace(v=self.v, part=part, owned=np.ones(n, bool))
         self.active.begin(met, many(met), self._crowd, Company([], SerialComm()).agree(met.nodes, every))
@@ -138,7 +138,7 @@ class Solver:
     def sweep(self, times: int = 1) -> Floats:
         """The velocities after some sweeps."""
         for _ in range(times):
-            self.active.sweep(1)
+            self.active.sweep()
             self._leave()
         return self.v
 

@@ -11,7 +11,7 @@ import pytest
 
 from conoid.cases import schema
 from conoid.cases.messages import Energy
-from conoid.worker import domain, simulation
+from conoid.worker import assembly, simulation
 from conoid.worker.digest import digest
 from conoid.worker.errors import InputError
 from conoid.worker.mesh.model import TetMesh
@@ -160,7 +160,7 @@ def on_threads(ranks: int, case: schema.Case, work: Callable[[Simulation], Any],
         sim.free()
         return found
 
-    with patch.object(domain, "build_mesh", lambda *_, **__: next(ready)):
+    with patch.object(assembly, "build_mesh", lambda *_, **__: next(ready)):
         return on_ranks(ranks, one)
 
 

@@ -89,7 +89,7 @@ class Shards:
         self.on_surface = draw.uniform(size=len(self.x)) < 0.9
         outward = np.tile(CORNERS - CORNERS.mean(axis=0), (SHARDS, 1))
         self.normals = self.facing(outward)
-        self.tracks = Tracks(self.x, self.v, len(self.faces), len(self.edges))
+        self.tracks = Tracks(self.x, self.v, len(self.faces), len(self.edges), np.zeros(3), np.inf)
         self.settle()
 
     def settle(self) -> None:

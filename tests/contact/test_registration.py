@@ -123,7 +123,7 @@ class World:
         """Whatever may happen before a step, and the step."""
         dt = float(self.draw.uniform(0.02, 0.04))
         self.knock()
-        if self.scene.tracks.end + dt > self.scene.until:
+        if self.scene.tracks.end + dt > self.scene.tracks.until:
             self.scene = self.search(None)
         elif number % 5 == 4:
             self.another_surface()

@@ -11,7 +11,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from conoid.worker.fracture.cohesive import Cohesion, Facets
+from conoid.worker.fracture.cohesive import Cohesion
+from conoid.worker.fracture.columns import Facets
 from conoid.worker.fracture.insertion import inserted
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.state import Nodes
@@ -54,7 +55,7 @@ class Facet:
             stiffness * one, AREA * one,
         )  # fmt: skip
         self.x0, self.weight = x, weight
-        self.offset = float(new.lent[0, 0])
+        self.offset = float(new.softening.lent[0, 0])
         self.cohesion = Cohesion(ENERGY * AREA)
         self.cohesion.insert(new)
 
@@ -65,7 +66,7 @@ class Facet:
     @property
     def pull(self) -> Floats:
         """(3,) traction on the first side, Pa."""
-        return np.asarray(self.facets.pull[0].sum(axis=0) / AREA)
+        return np.asarray(self.facets.state.pull[0].sum(axis=0) / AREA)
 
     @property
     def work(self) -> float:
@@ -86,7 +87,7 @@ def tear(facet: Facet, way: Floats, steps: int = 4000, turned: bool = False) -> 
     for k in range(1, steps + 1):
         spin = rotation(k / steps) if turned else None
         facet.open(end * k / steps * way, spin)
-    assert not len(facet.facets.work)
+    assert not len(facet.facets.state.work)
 
 
 def rotation(angle: float) -> Floats:
@@ -160,13 +161,14 @@ def test_what_is_lost_never_comes_back() -> None:
     facet = Facet(STRENGTH * direction(0.7), weight=0.5)
     for _ in range(3000):
         change = random.normal(scale=0.004 * CRITICAL, size=3) + 2e-5 * CRITICAL * NORMAL
-        lent, drop = facet.facets.lent.copy(), 0.5 * np.abs(np.einsum("mpi,i->mp", facet.facets.pull, change))
+        drop = 0.5 * np.abs(np.einsum("mpi,i->mp", facet.facets.state.pull, change))
+        lent = facet.facets.softening.lent.copy()
         u, largest = u + change, max(largest, abs(float(change @ NORMAL)))
         facet.open(u)
         one, back = facet.cohesion.energies(SerialComm())
         assert back >= 0.0
-        gone = len(facet.facets.work) == 0
-        lost.append(one if gone else one + float(drop[(lent > 0.0) & (facet.facets.lent == 0.0)].sum()))
+        gone = len(facet.facets.state.work) == 0
+        lost.append(one if gone else one + float(drop[(lent > 0.0) & (facet.facets.softening.lent == 0.0)].sum()))
         if gone:
             break
         assert lost[-1] > lost[-2] - STIFFNESS * AREA * largest**2 / 8.0
@@ -204,8 +206,8 @@ def test_a_facet_that_has_let_go_takes_what_is_left_of_the_energy(
     facet = Facet(STRENGTH * way, stiffness=stiffness)
     for share in [*np.linspace(0.0, opened, 301), *np.linspace(opened, -1e-3, 301)]:
         facet.open(share * CRITICAL * way)
-    assert (facet.facets.lent == 0.0).all()
-    assert facet.facets.strength.max() <= STRENGTH
+    assert (facet.facets.softening.lent == 0.0).all()
+    assert facet.facets.softening.strength.max() <= STRENGTH
     tear(facet, way, steps=40000)
     assert facet.work == pytest.approx(ENERGY * AREA, rel=2e-3)
 
@@ -250,6 +252,6 @@ def test_one_pair_fails_after_the_other() -> None:
     for k in range(1, steps + 1):
         x[5] = facet.x0[5] + 1.5 * CRITICAL * k / steps * NORMAL
         facet.cohesion.open(x)
-    assert len(facet.facets.work) == 1
-    assert facet.facets.pull[0, 2] == pytest.approx(np.zeros(3))
+    assert len(facet.facets.state.work) == 1
+    assert facet.facets.state.pull[0, 2] == pytest.approx(np.zeros(3))
     assert facet.work == pytest.approx(ENERGY * AREA / 3.0, rel=2e-3)

@@ -91,11 +91,11 @@ def test_a_cohesive_facet_that_breaks_leaves_the_acceleration_as_it_is() -> None
         tets = sim.elements
         jumps.append(float(np.abs(after - before[parent]).max()))
         facets = cohesion.facets
-        held = facets.pull.copy()
-        facets.pull[:] = 0.0
+        held = facets.state.pull.copy()
+        facets.state.pull[:] = 0.0
         tets.again(nodes.scale)
         alone.append(float(np.abs(nodes.force / (nodes.scale * nodes.mass[:, None])).max()))
-        facets.pull[:] = held
+        facets.state.pull[:] = held
         tets.again(nodes.scale)
         assert copies > 0
 

@@ -49,8 +49,8 @@ def test_tearing_two_tets_takes_the_fracture_energy(lean: float) -> None:
         energies.append(sim.ledger.close(before))
         assert sim.fracture is not None
         assert sim.fracture.cohesion is not None
-        if len(sim.fracture.cohesion.facets.work):
-            area = float(sim.fracture.cohesion.facets.area[0])
+        if len(sim.fracture.cohesion.facets.tets):
+            area = float(sim.fracture.cohesion.facets.constants.area[0])
 
     run(sim, look)
     assert sim.fracture is not None
@@ -71,23 +71,23 @@ def test_the_traction_follows_the_law_in_every_step() -> None:
         nonlocal worst, seen, top
         assert sim.fracture is not None
         assert sim.fracture.cohesion is not None
-        f = sim.fracture.cohesion.facets
-        if not len(f.work):
+        f, law = sim.fracture.cohesion.facets, sim.fracture.cohesion.facets.softening
+        if not len(f.tets):
             return
-        x, knee = sim.model.nodes.x, f.knee[0]
+        x, knee = sim.model.nodes.x, law.knee[0]
         one, two = x[f.nodes[0, :3]], x[f.nodes[0, 3:]]
         middle = 0.5 * (one + two)
         first = middle[1] - middle[0]
         normal = np.cross(first, middle[2] - middle[0])
         axes = np.stack([normal, first, np.cross(normal, first)])
         axes /= np.linalg.norm(axes, axis=1)[:, None]
-        opening = f.offset[0] + (two - one) @ axes.T
+        opening = law.offset[0] + (two - one) @ axes.T
         opening[:, 0] = np.maximum(opening[:, 0], 0.0)
         size = np.linalg.norm(opening, axis=1)
         top = np.maximum(np.maximum(top, knee), size)
-        traction = np.maximum(f.strength[0] * (1.0 - (top - knee) / f.critical[0]), 0.0) * size / top
-        force = np.linalg.norm(f.pull[0], axis=1)
-        worst = max(worst, float(np.abs(3.0 * force / f.area[0] - traction).max()))
+        traction = np.maximum(law.strength[0] * (1.0 - (top - knee) / law.critical[0]), 0.0) * size / top
+        force = np.linalg.norm(f.state.pull[0], axis=1)
+        worst = max(worst, float(np.abs(3.0 * force / f.constants.area[0] - traction).max()))
         seen += 1
 
     run(sim, look)
@@ -106,9 +106,9 @@ def breathing(end: str) -> tuple[int, float, float]:
         assert sim.fracture is not None
         assert sim.fracture.cohesion is not None
         f, x = sim.fracture.cohesion.facets, sim.model.nodes.x
-        if len(f.work):
+        if len(f.tets):
             gap = (x[f.nodes[0, 3:]] - x[f.nodes[0, :3]]).mean(axis=0)
-            closed.append(float(np.linalg.norm(gap)) < 1e-5 * float(f.critical[0, 0]))
+            closed.append(float(np.linalg.norm(gap)) < 1e-5 * float(f.softening.critical[0, 0]))
 
     run(sim, look)
     return int(np.sum(np.diff(np.array(closed, int)) == 1)), max(totals) / totals[0] - 1.0, sim.ledger.worst

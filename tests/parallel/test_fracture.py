@@ -79,9 +79,9 @@ def shared(sim: Simulation) -> dict[str, Any]:
     return {
         "holds": set(nodes.id.tolist()), "pushes": set(ids[now.slots.pushes].tolist()),
         "lacks": sorted(ids[now.crowd.local < 0].tolist()),
-        "sums": {some.rank: ids[some.nodes].tolist() for some in now.company.neighbours},
-        "sends": {some.rank: nodes.id[some.nodes].tolist() for some in now.copies.sends},
-        "receives": {some.rank: ids[some.nodes].tolist() for some in now.copies.receives},
+        "sums": {some.rank: ids[some.nodes].tolist() for some in now.messages.company.neighbours},
+        "sends": {some.rank: nodes.id[some.nodes].tolist() for some in now.messages.copies.sends},
+        "receives": {some.rank: ids[some.nodes].tolist() for some in now.messages.copies.receives},
     }  # fmt: skip
 
 

@@ -77,7 +77,7 @@ class Found:
 
     def meet(self, now: Scene, give: float, dt: float) -> None:
         self._meet(now, give, dt)
-        self.at[self.sim.clock.step] = written(now.room, now.met, now.crowd.id)
+        self.at[self.sim.clock.step] = written(now.active.room, now.active.n, now.crowd.id)
 
     def run(self) -> dict[int, Met]:
         """Of some steps, each with the meetings that this rank computed; boundaries and forces act as ever."""

@@ -85,6 +85,9 @@ def end(how: str, options: argparse.Namespace, say: object, steps: int) -> int:
         raise RuntimeError("a tet has turned inside out")
     if how == "vanish":
         os._exit(0)
+    if how == "full":
+        print("OSError: [Errno 28] No space left on device", file=sys.stderr)
+        return ExitCode.CRASHED
     if how == "killed":
         os.kill(os.getpid(), signal.SIGKILL)
     if how == "torn":

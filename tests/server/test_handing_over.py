@@ -126,9 +126,10 @@ def test_of_two_jobs_the_one_that_has_begun_stays(place: Path) -> None:
 
 @pytest.mark.parametrize(("asked", "state"), [(None, State.RUNNING), (Cause.CANCELLED, State.STOPPING)])
 def test_a_restarted_server_ends_no_run_that_was_interrupted(
-    tmp_path: Path, asked: Cause | None, state: State
-) -> None:  # fmt: skip
+    tmp_path: Path, asked: Cause | None, state: State, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The worker has told that it stops; only the database knows that somebody wanted it."""
+    monkeypatch.setattr(SlurmLauncher, "_work", lambda launcher: None)
     run, now = new_id()
     made = Submission(
         id=run, owner="ann", name="bar", title="", ranks=2, submitted=now, case_file="case.toml", body_sha256="",

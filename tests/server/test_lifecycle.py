@@ -7,7 +7,7 @@ import pytest
 
 from conoid.cases.outcome import Outcome
 from conoid.cases.run import FOLLOWERS, Cause, State
-from conoid.server.lifecycle import (
+from conoid.server.events import (
     Admitted,
     Adopt,
     CancelAsked,
@@ -27,8 +27,8 @@ from conoid.server.lifecycle import (
     WorkerStarts,
     WorkerWaits,
     WriteOutcome,
-    advance,
 )
+from conoid.server.lifecycle import advance
 
 RUN = Run("a", "ann", "bar", 2, submitted=1.0)
 DONE = Outcome(state="succeeded", steps=7)
@@ -98,7 +98,7 @@ def test_the_way_through_a_batch_system() -> None:
     run, actions = advance(run, WorkerWaits(), 60.0)
     assert (run.state, run.started, actions) == (State.QUEUED, 0.0, ())
     run, actions = advance(run, CancelAsked(handed=True), 70.0)
-    assert (run.state, actions) == (State.STOPPING, (Stop(),))
+    assert (run.state, actions) == (State.STOPPING, (Stop(Cause.CANCELLED),))
     run, actions = advance(run, WorkerExited(None, None), 71.0)
     assert (run.state, run.cause) == (State.CANCELLED, Cause.CANCELLED)
 
@@ -121,7 +121,7 @@ def test_cancel_before_the_start_needs_no_worker() -> None:
 
 def test_cancel_stops_once_then_kills() -> None:
     run, actions = advance(replace(RUN, state=State.RUNNING), CancelAsked(), 2.0)
-    assert (run.state, actions) == (State.STOPPING, (Stop(),))
+    assert (run.state, actions) == (State.STOPPING, (Stop(Cause.CANCELLED),))
     assert advance(run, CancelAsked(), 3.0) == (run, ())
     assert advance(run, GraceOver(), 4.0) == (run, (Kill(),))
     run, actions = advance(run, WorkerExited(-9, None), 5.0)
@@ -137,7 +137,7 @@ def test_a_run_that_ends_well_while_it_is_stopped_has_succeeded() -> None:
 @pytest.mark.parametrize("outcome", [STOPPED, None])
 def test_wall_time(outcome: Outcome | None) -> None:
     run, actions = advance(replace(RUN, state=State.RUNNING), WallTimeOver(), 2.0)
-    assert (run.state, actions) == (State.STOPPING, (Stop(),))
+    assert (run.state, actions) == (State.STOPPING, (Stop(Cause.WALLTIME),))
     run, actions = advance(run, WorkerExited(4, outcome), 5.0)
     assert (run.state, run.cause) == (State.TIMED_OUT, Cause.WALLTIME)
     assert isinstance(actions[0], WriteOutcome)
@@ -162,7 +162,7 @@ def test_wall_time(outcome: Outcome | None) -> None:
 def test_an_end_without_outcome_is_never_a_success(
     code: int | None, starved: bool, before: State, state: State, cause: Cause
 ) -> None:
-    run, actions = advance(replace(RUN, state=before), WorkerExited(code, None, starved, "its last words"), 5.0)
+    run, actions = advance(replace(RUN, state=before), WorkerExited(code, None, starved, traces="its last words"), 5.0)
     assert (run.state, run.cause) == (state, cause)
     assert "its last words" in run.message
     assert isinstance(actions[0], WriteOutcome)

@@ -5,11 +5,13 @@ import re
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 from fastapi.routing import APIRoute
 from starlette.testclient import TestClient
 
 from conoid.cases.reference import json_schema
+from conoid.server import shapes
 from conoid.server.app import ROUTERS, build_app, opened
 from conoid.server.limits import BODY
 from conoid.server.settings import Caps, Settings
@@ -424,6 +426,26 @@ def test_openapi_has_the_schema_of_a_case(server: Running) -> None:
     assert "#/$defs/" not in text
     for name in set(re.findall(r'"#/components/schemas/(\w+)"', text)):
         assert name in schemas
+    _, ours = msgspec.json.schema_components(shapes.ALL)
+    assert not ours.keys() & json_schema()["$defs"].keys(), "two shapes of one name"
+
+
+@pytest.mark.parametrize(("path", "allowed"), [("/v1/runs", "GET, POST"), ("/v1/runs/x:cancel", "POST")])
+def test_a_wrong_method_is_told_the_right_ones(server: Running, path: str, allowed: str) -> None:
+    assert server.ann.http.delete(path).headers["allow"] == allowed
+
+
+def test_every_answer_of_openapi_has_a_shape(server: Running) -> None:
+    told = server.ann.http.get("/openapi.json").json()["paths"]
+    for path, operations in told.items():
+        for method, operation in operations.items():
+            secured = path not in OPEN
+            assert bool(operation["security"]) == secured, path
+            for status, answer in operation["responses"].items():
+                kinds = answer.get("content", {})
+                assert kinds or status in {"204", "304"}, f"{method} {path} {status}"
+                if int(status) >= 400 and path != "/readyz":
+                    assert "application/problem+json" in kinds, f"{method} {path} {status}"
 
 
 def test_the_schema_that_a_shipped_case_names_is_served_beside_it(server: Running) -> None:

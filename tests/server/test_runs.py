@@ -4,6 +4,7 @@ import json
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -11,7 +12,7 @@ from conoid.cases import layout
 from conoid.cases.run import State
 from conoid.server.launch.local import LocalLauncher
 
-from .running import PATIENCE, Running, case_text
+from .running import PATIENCE, TOML, Running, case_text
 
 
 def test_a_run_succeeds(server: Running) -> None:
@@ -206,7 +207,7 @@ def test_wait_with_a_known_etag_answers_when_anything_changes(server: Running, t
 
 
 def test_a_full_disk_delays_and_loses_nothing(server: Running, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    from conoid.server import journal, supervisor
+    from conoid.server import holds, journal
 
     run = server.ann.submit(wait=str(tmp_path / "go"))
     server.ann.wait_for(run, State.RUNNING)
@@ -217,9 +218,32 @@ def test_a_full_disk_delays_and_loses_nothing(server: Running, monkeypatch: pyte
             raise OSError(28, "No space left on device")
         return real(*arguments)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(supervisor, "_AGAIN", 0.05)
+    monkeypatch.setattr(holds, "_AGAIN", 0.05)
     monkeypatch.setattr(journal, "append", append)
     (tmp_path / "go").touch()
     assert server.ann.wait_for(run)["state"] == "succeeded"
     assert not full
     assert server.ann.states(run)[-1] == "succeeded"
+
+
+def test_runs_are_found_by_their_labels(server: Running) -> None:
+    words = [["batch=1", "of=me"], ["batch=2"], ["batch=1"], []]
+    runs = []
+    for labels in words:
+        answer = server.ann.http.post("/v1/runs", params={"label": labels}, content=case_text(steps=1), headers=TOML)
+        runs.append(answer.json()["id"])
+
+    def found(limit: int, *labels: str, **more: str) -> dict[str, Any]:
+        answer: dict[str, Any] = server.ann.http.get(
+            "/v1/runs", params={"label": list(labels), "limit": limit, **more}
+        ).json()
+        return answer
+
+    first = found(1, "batch=1")
+    assert [run["id"] for run in first["runs"]] == [runs[2]]
+    second = found(1, "batch=1", cursor=first["next"])
+    assert ([run["id"] for run in second["runs"]], second["next"]) == ([runs[0]], None)
+    assert [run["id"] for run in found(9, "batch=1", "of=me")["runs"]] == [runs[0]]
+    assert found(9, "batch=3")["runs"] == []
+    assert {run["id"] for run in found(9)["runs"]} >= set(runs)
+    assert server.ann.http.get("/v1/runs", params={"label": "batch"}).status_code == 400

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from conoid.cases import bodies, materials, schema
-from conoid.worker import domain, simulation, state, step
+from conoid.worker import assembly, domain, simulation, state, step
 from conoid.worker.boundaries import Boundary
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.parallel import fixed_point
@@ -74,14 +74,14 @@ def scene(material: materials.Material = STEEL, form: Form = "standard", end: fl
 def build(case: schema.Case, meshes: Iterable[TetMesh], comm: Comm | None = None) -> Simulation:
     """The simulation of a case whose parts have these meshes."""
     ready = iter(meshes)
-    with patch.object(domain, "build_mesh", lambda *_, **__: next(ready)):
+    with patch.object(assembly, "build_mesh", lambda *_, **__: next(ready)):
         return simulation.build(case, Path(), comm or SerialComm())
 
 
-def whole_of(mesh: TetMesh, case: schema.Case | None = None) -> domain.Whole:
+def whole_of(mesh: TetMesh, case: schema.Case | None = None) -> assembly.Whole:
     """The whole mesh as rank 0 has it before the cut."""
-    with patch.object(domain, "build_mesh", lambda *_, **__: mesh):
-        return domain.assemble(case or scene(), Path())
+    with patch.object(assembly, "build_mesh", lambda *_, **__: mesh):
+        return assembly.assemble(case or scene(), Path())
 
 
 def pieces_of(pieces: list[domain.Piece], case: schema.Case | None = None) -> list[tuple[domain.Piece, state.Model]]:

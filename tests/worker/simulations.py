@@ -8,7 +8,7 @@ from unittest.mock import patch
 import numpy as np
 
 from conoid.cases import schema
-from conoid.worker import domain, simulation, step
+from conoid.worker import assembly, simulation, step
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.simulation import Simulation
 
@@ -40,5 +40,5 @@ def tick(sim: Simulation, gone: "np.ndarray | None" = None) -> float:
 def on(ranks: int, case: schema.Case, meshes: Sequence[TetMesh], work: Callable[[Simulation], T]) -> list[T]:
     """What ``work`` makes of the simulation of each rank."""
     ready = iter(meshes)
-    with patch.object(domain, "build_mesh", lambda *_, **__: next(ready)):
+    with patch.object(assembly, "build_mesh", lambda *_, **__: next(ready)):
         return on_ranks(ranks, lambda comm: work(simulation.build(case, Path(), comm)))

@@ -8,7 +8,8 @@ import pytest
 
 from conoid.cases.load import parse_toml
 from conoid.worker import domain
-from conoid.worker.domain import Piece, Whole
+from conoid.worker.assembly import Whole
+from conoid.worker.domain import Piece
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.parallel.ownership import SharedSum

@@ -9,7 +9,7 @@ import pytest
 
 from conoid.cases import history, layout
 from conoid.cases.messages import Energy
-from conoid.worker.fracture.cohesive import Facets
+from conoid.worker.fracture.columns import FacetConstants, Facets, PairState, Softening
 from conoid.worker.output.damage import spent_energy
 from conoid.worker.output.frames import principal
 from conoid.worker.output.history import History
@@ -59,8 +59,9 @@ def test_a_facet_is_damaged_by_the_energy_that_it_has_spent() -> None:
     three, nine = np.zeros((m, 3)), np.zeros((m, 3, 3))
     tops = np.repeat([[knee], [knee + 0.5 * critical], [knee + critical]], 3, axis=1)
     facets = Facets(
-        tets=np.zeros((m, 2), np.int64), nodes=np.zeros((m, 6), np.int32), energy=np.full(m, 0.5 * strength * critical),
-        area=np.ones(m), shear=np.ones(m), strength=three + strength, critical=three + critical, knee=three + knee,
-        lent=three, offset=nine, top=tops, size=three, opening=nine, pull=nine, work=three, foreseen=nine,
+        np.zeros((m, 2), np.int64), np.zeros((m, 6), np.int32),
+        FacetConstants(np.full(m, 0.5 * strength * critical), np.ones(m), np.ones(m)),
+        Softening(three + strength, three + critical, three + knee, lent=three, offset=nine),
+        PairState(tops, size=three, opening=nine, pull=nine, work=three, foreseen=nine),
     )  # fmt: skip
     assert spent_energy(facets) == pytest.approx([0.0, 0.75, 1.0])

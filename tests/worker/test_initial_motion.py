@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conoid.worker import domain
+from conoid.worker import assembly, domain
 from conoid.worker.hashing import splitmix64, uniform
 
 from .kernels import scene, whole_of
@@ -60,5 +60,5 @@ def test_jitter_fills_its_range_and_adds_to_the_velocity() -> None:
 def test_jitter_does_not_know_of_ranks(ranks: int) -> None:
     whole = whole_of(MESH, scene(jitter=1.0))
     for piece in domain.cut(whole, ranks):
-        expected = 2.0 * uniform(3 * piece.node_ids[:, None] + np.arange(3), domain._JITTER) - 1.0
+        expected = 2.0 * uniform(3 * piece.node_ids[:, None] + np.arange(3), assembly._JITTER) - 1.0
         assert (piece.velocity == expected).all()

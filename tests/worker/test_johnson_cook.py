@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 from conoid.cases.materials import JohnsonCook
-from conoid.worker.materials.models import initial_yield
+from conoid.worker.materials.johnson_cook import initial_yield
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.state import FLOW, MASS, PLASTIC_STRAIN, TEMPERATURE, WORK_PLASTIC, YIELD
 
@@ -147,4 +147,4 @@ def test_no_flow_below_the_static_flow_stress() -> None:
 def test_initial_yield_is_the_flow_stress_at_no_strain() -> None:
     for temperature in (0.0, 293.15, 1000.0, 1813.15, 3000.0):
         expected = flow_stress(0.0, 0.0, temperature)
-        assert math.isclose(initial_yield(STEEL_42CRMO4, temperature), float(expected), rel_tol=1e-14, abs_tol=1e-6)
+        assert math.isclose(initial_yield(LAW, temperature), float(expected), rel_tol=1e-14, abs_tol=1e-6)

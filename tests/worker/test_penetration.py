@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from conoid.cases import schema
-from conoid.worker import domain, reference, simulation
+from conoid.worker import assembly, reference, simulation
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.penetration import LINES, MEASURED, bottoms, depth, spans, thickness
 from conoid.worker.simulation import Simulation
@@ -141,7 +141,7 @@ def test_a_state_without_the_tets_of_a_cavity_and_of_a_hole(way: float, ranks: i
         return before, reference._measured(sim, spec, Path(), thick[0])
 
     ready = iter(meshes)
-    with patch.object(domain, "build_mesh", lambda *_, **__: next(ready)):
+    with patch.object(assembly, "build_mesh", lambda *_, **__: next(ready)):
         found = on_ranks(ranks, lambda comm: measured(simulation.build(case, Path(), comm)))
     for before, after in found:
         assert before == 0.0

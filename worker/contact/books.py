@@ -25,6 +25,8 @@ class Books:
         """Quanta per N s."""
         self.friction = fixed_point.Tally(np.array([mass * speed * speed]))
         self.account = Account(mass * speed * speed)
+        self.agreed = self.account.words
+        """What contact has taken on all ranks, when they last agreed (account.py)."""
         self.parts = np.zeros((parts, 3), np.int64)
         """(parts, 3) impulses so far, quanta."""
         self.open: Ints = np.zeros((0, 3), np.int64)
@@ -38,7 +40,7 @@ class Books:
         parcel.sums["contact.account"] = self.account.words
         total = np.array(self.open) if len(self.open) else np.zeros((len(self.contact_loss), 3), np.int64)
         if scene is not None:
-            total[scene.local] = scene.slots.total[scene.held]
+            total[scene.own.local] = scene.slots.total[scene.own.slots]
         parcel.nodes["contact.total"] = total
 
     def resume(self, parcel: Parcel, known: tuple[float, float, float, float]) -> None:

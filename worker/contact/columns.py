@@ -9,6 +9,18 @@ from .records import Crowd
 
 
 @dataclass
+class OwnSlots:
+    """The slots of the nodes that this rank holds."""
+
+    slots: Indices
+    """(h,) which they are."""
+    local: Indices
+    """(h,) indices of their nodes on this rank."""
+    place: Indices
+    """(nodes,) slot of each node of this rank, -1 for those that have none."""
+
+
+@dataclass
 class SceneSlots:
     """The slots."""
 

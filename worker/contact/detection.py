@@ -56,13 +56,13 @@ def detect(now: Scene, mu: Floats, give: float, dt: float, size: float, redraw: 
 def _test(now: Scene, step: Step, size: float) -> Detected:
     """The narrow phase."""
     tracks, faces, pairs = now.tracks, now.face_table(), now.node_face.arrays()
-    n, tested = node_face(now.room, 0, pairs, now.slot_table(), faces, step, tracks.end)
+    n, tested = node_face(now.active.room, 0, pairs, now.slot_table(), faces, step, tracks.end)
     now.node_face.tested = pairs.active[:tested]
-    limit = _KINEMATIC * approach(now.room, n, pairs, faces, step)
+    limit = _KINEMATIC * approach(now.active.room, n, pairs, faces, step)
     pairs = now.edge_edge.arrays()
-    n, tested = edge_edge(now.room, n, pairs, now.edge_table(), step, tracks.short.course, tracks.end)
+    n, tested = edge_edge(now.active.room, n, pairs, now.edge_table(), step, tracks.short.course, tracks.end)
     now.edge_edge.tested = pairs.active[:tested]
     now.faces.fresh[:], now.edges.fresh[:], now.slots.fresh[:] = False, False, False
     opening = np.empty(len(now.cracks), np.int64)
-    n, wide = across(now.room, n, opening, now.cracks, size, step)
+    n, wide = across(now.active.room, n, opening, now.cracks, size, step)
     return Detected(int(n), limit, opening[:wide])

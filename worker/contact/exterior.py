@@ -106,7 +106,7 @@ class Exterior:
         """Gives the scene the mean normals of some nodes of this rank, and whether they are on the surface; returns
         their places.
         """
-        place = scene.place[local]
+        place = scene.own.place[local]
         local, place = local[place >= 0], place[place >= 0]
         scene.slots.normals[place] = normals.means(self._moments[local])
         scene.slots.on_surface[place] = self.surface.flags[local]

@@ -26,14 +26,14 @@ class Follower:
         """``here``: every node of this rank, by local index."""
         self._scene, self._here = scene, here
         self._nodes = nodes
-        if len(scene.place) < nodes.n:
-            scene.place = extended(scene.place, np.full(nodes.n - len(scene.place), -1, np.int32))
+        if len(scene.own.place) < nodes.n:
+            scene.own.place = extended(scene.own.place, np.full(nodes.n - len(scene.own.place), -1, np.int32))
         self._sort()
 
     def places(self, ids: Ints) -> Indices:
         """Where ids stand in the crowd, in their shape, -1 where they do not."""
         far, far_ids = self._far
-        found = _located(ids.ravel(), self._nodes.id, self._scene.place, far_ids, far)
+        found = _located(ids.ravel(), self._nodes.id, self._scene.own.place, far_ids, far)
         return np.asarray(found.reshape(ids.shape))
 
     def _sort(self) -> None:
@@ -77,12 +77,12 @@ class Follower:
     def _lacking(self, cracks: Cracks, rows: Ints) -> Indices:
         """Which nodes of some of the cracks, ascending, are not in the crowd yet."""
         nodes = cracks.nodes[rows]
-        return np.unique(nodes[self._scene.place[nodes] < 0])
+        return np.unique(nodes[self._scene.own.place[nodes] < 0])
 
     def _across(self, cracks: Cracks, rows: Ints) -> None:
         """Places some of the cracks, whose nodes that have separated may be pushed."""
         scene, nodes = self._scene, cracks.nodes[rows]
-        places = cracks.places[rows] = scene.place[nodes]
+        places = cracks.places[rows] = scene.own.place[nodes]
         scene.slots.pushes[places[nodes != nodes[:, [3, 4, 5, 0, 1, 2]]]] = True
         scene.cracks = cracks.places
 
@@ -107,7 +107,7 @@ class Follower:
         order = np.argsort(heard.copy)
         family = np.column_stack([heard.parent, heard.copy])[order]
         local, at = self._nodes.places(family), self.places(family)
-        company, none = {some.rank: some for some in scene.company.neighbours}, np.zeros(0, np.int32)
+        company, none = {some.rank: some for some in scene.messages.company.neighbours}, np.zeros(0, np.int32)
         for other in neighbours:
             shared = _flagged(other.nodes, self._nodes.n)[local[:, 0]]
             some = company.get(other.rank, Neighbour(other.rank, none))
@@ -117,8 +117,8 @@ class Follower:
                 company[other.rank] = Neighbour(other.rank, extended(some.nodes, parents))
         scene.extend(
             [_heirs(some, at, scene.crowd.n) for _, some in sorted(company.items())],
-            [_heirs(some, local, self._nodes.n) for some in scene.copies.sends],
-            [_heirs(some, at, scene.crowd.n) for some in scene.copies.receives], comm,
+            [_heirs(some, local, self._nodes.n) for some in scene.messages.copies.sends],
+            [_heirs(some, at, scene.crowd.n) for some in scene.messages.copies.receives], comm,
         )  # fmt: skip
 
     def _hold(self, ids: Ints) -> None:
@@ -134,9 +134,9 @@ class Follower:
         first = scene.crowd.n
         scene.crowd = Crowd(*(extended(a, b) for a, b in zip(scene.crowd.columns(), rows.columns(), strict=True)))
         held = np.flatnonzero(rows.local >= 0).astype(np.int32)
-        scene.held = extended(scene.held, first + held)
-        scene.local = extended(scene.local, rows.local[held])
-        scene.place[rows.local[held]] = first + held
+        scene.own.slots = extended(scene.own.slots, first + held)
+        scene.own.local = extended(scene.own.local, rows.local[held])
+        scene.own.place[rows.local[held]] = first + held
         scene.slots.add(rows)
         scene.tracks.add(rows.x, rows.course)
         if (rows.local < 0).any():

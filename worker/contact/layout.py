@@ -5,7 +5,7 @@ import numpy as np
 from ..parallel.comm import Comm
 from ..state import Floats, Nodes
 from . import buckets
-from .columns import SceneEdges, SceneFaces, SceneSlots
+from .columns import OwnSlots, SceneEdges, SceneFaces, SceneSlots
 from .scene import Scene, rows_of
 from .sides import Rules, Sides, with_ghosts
 from .tracks import Tracks
@@ -17,7 +17,7 @@ def build(sides: Sides, rules: Rules, horizon: float, drift: Floats, nodes: Node
 
     Who shares which node is settled by a Follower.
     """
-    seen, sent = with_ghosts(sides, rules, horizon, drift, comm) if comm.size > 1 else (sides, 0)
+    seen = with_ghosts(sides, rules, horizon, drift, comm) if comm.size > 1 else sides
     order = np.argsort(buckets.curve(seen.crowd.x, rules.cell))
     crowd, faces, edges = seen.crowd.take(order), seen.faces, seen.edges
     slot = np.empty(crowd.n, np.int32)
@@ -35,11 +35,11 @@ def build(sides: Sides, rules: Rules, horizon: float, drift: Floats, nodes: Node
         rank[np.lexsort((edges.sides[:, 1], edges.sides[:, 0]))] = np.arange(edges.n)
     own = np.arange(edges.n) < sides.edges.n
     return Scene(
-        crowd=crowd, held=held, local=crowd.local[held], slots=SceneSlots.at_rest(slave, pushes | slave),
+        crowd=crowd, own=OwnSlots(held, crowd.local[held], place), slots=SceneSlots.at_rest(slave, pushes | slave),
         faces=SceneFaces.at_rest(corners, faces.id, faces.size, faces.exposed.copy()),
         edges=SceneEdges.at_rest(
             ends, edges.sides, rows_of(faces.id, edges.sides), edges.size, edges.exposed.copy(), own, rank
         ),
-        rules=rules, tracks=Tracks(crowd.x, crowd.course, faces.n, edges.n), drift=drift, until=horizon,
-        faces_sent=sent, place=place, cracks=np.zeros((0, 6), np.int32),
+        rules=rules, tracks=Tracks(crowd.x, crowd.course, faces.n, edges.n, drift, horizon),
+        cracks=np.zeros((0, 6), np.int32),
     )  # fmt: skip

@@ -40,7 +40,7 @@ def news(split: Split, scene: Scene, here: Crowd, comm: Comm) -> News | None:
     rows = here.take(np.unique(np.concatenate([parents, copies])))
     if split.copies.n:
         told, flags = {}, np.zeros(here.n, bool)
-        for other in scene.copies.sends:
+        for other in scene.messages.copies.sends:
             flags[other.nodes] = True
             for_it = flags[parents]
             flags[other.nodes] = False

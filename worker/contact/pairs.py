@@ -63,6 +63,14 @@ class PairTable:
             setattr(self, name, getattr(self, name)[:n])
         self.tested = self.tested[:0]
 
+    def recall(self, rows: Indices, kept: Floats) -> None:
+        """Pairs that are among ``rows`` (k, 2) have what these have ``kept``, (k, 4)."""
+        if len(rows):
+            width = 1 + max(int(self.rows[:, 1].max(initial=0)), int(rows[:, 1].max()))
+            one, two = (pairs[:, 0].astype(np.int64) * width + pairs[:, 1] for pairs in (self.rows, rows))
+            _, here, there = np.intersect1d(one, two, assume_unique=True, return_indices=True)
+            self.kept[here] = kept[there]
+
     def carried(self, one: Indices, two: Indices) -> "PairTable":
         """The pairs whose things have new numbers ``one`` and ``two``, -1 for those that have gone; in the order of the
         first things, so that what a kernel takes for one pair is at hand for the next.

@@ -72,7 +72,7 @@ def carry(now: Scene, old: Scene) -> None:
     edges = _numbers(now.edges.names, old.edges.names)
     now.tracks.take_over(slots, old.tracks)
     now.slots.tracked[slots[slots >= 0]] = old.slots.tracked[slots >= 0]
-    now.until = old.until
+    now.tracks.until = old.tracks.until
     for mine, theirs, rows in (
         (now.slots, old.slots, slots),
         (now.faces, old.faces, faces),
@@ -97,24 +97,18 @@ def _numbers(now: Ints, old: Ints) -> Indices:
 def _register(scene: Scene) -> None:
     tracks, pairs = scene.tracks, scene.node_face
     nodes, faces, edges = (some.new & some.live for some in (scene.slots, scene.faces, scene.edges))
-    flight = _Flight(tracks.positions(), tracks.searched.course - scene.drift, scene.crowd.part, scene.until - tracks.t)
+    flight = _Flight(
+        tracks.positions(), tracks.searched.course - scene.tracks.drift, scene.crowd.part, scene.tracks.until - tracks.t
+    )
     some = np.flatnonzero(pairs.kept.any(axis=1)) if scene.rules.rubs else np.zeros(0, np.int64)
     old, kept = pairs.rows[some], pairs.kept[some]
     pairs.drop(nodes, faces)
     scene.edge_edge.drop(edges, edges)
     pairs.add(_node_face(scene, nodes, faces, flight))
     scene.edge_edge.add(_edge_edge(scene, edges, flight))
-    _recall(pairs.rows, pairs.kept, old, kept, len(scene.faces.corners))
+    pairs.recall(old, kept)
     scene.chain()
     scene.slots.new[:], scene.faces.new[:], scene.edges.new[:] = False, False, False
-
-
-def _recall(rows: Indices, kept: Floats, old: Indices, was: Floats, faces: int) -> None:
-    """What pairs have ``kept`` stays with them when they are dropped and found again."""
-    if len(old):
-        one, two = (pairs[:, 0].astype(np.int64) * faces + pairs[:, 1] for pairs in (rows, old))
-        _, here, there = np.intersect1d(one, two, assume_unique=True, return_indices=True)
-        kept[here] = was[there]
 
 
 def _node_face(scene: Scene, nodes: Flags, faces: Flags, flight: _Flight) -> Indices:

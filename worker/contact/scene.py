@@ -1,5 +1,6 @@
 """A scene: the surface near this rank, the candidate pairs on it, and the room to work in."""
 
+import itertools
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,7 +11,7 @@ from ..parallel.ownership import Neighbour, same
 from ..parallel.tags import Tag
 from ..state import Flags, Floats, Indices, Ints, Nodes, among
 from . import ghosts, held
-from .columns import SceneEdges, SceneFaces, SceneSlots
+from .columns import OwnSlots, SceneEdges, SceneFaces, SceneSlots
 from .company import Company
 from .ghosts import Copies
 from .narrow_phase import ContactRows, EdgeTable, FaceTable, SlotTable
@@ -21,63 +22,75 @@ from .tracks import Tracks
 
 
 @dataclass
+class ActiveRows:
+    """The active contacts of the last step: the first ``n`` rows of the ``room``."""
+
+    room: ContactRows = field(default_factory=lambda: ContactRows.room(0))
+    n: int = 0
+
+    def reserve(self, most: int) -> None:
+        """Room for ``most`` contacts; the rows of the last step stay."""
+        if most > len(self.room.nodes):
+            nodes, self.room = self.room.nodes[: self.n], ContactRows.room(2 * most)
+            self.room.nodes[: self.n] = nodes
+
+
+@dataclass
+class Messages:
+    """Between ranks, in every step."""
+
+    company: Company
+    """Sums over the nodes that several ranks push."""
+    copies: Copies
+    """Positions and velocities of what is not held here."""
+
+    def free(self) -> None:
+        """Gives them back to MPI."""
+        self.company.free()
+        self.copies.free()
+
+
+@dataclass
 class Scene:
     """What a search of all ranks left, and what has been found since."""
 
     crowd: Crowd
-    held: Indices
-    """(h,) slots of the nodes that this rank holds."""
-    local: Indices
-    """(h,) their indices on this rank."""
+    own: OwnSlots
     slots: SceneSlots
     faces: SceneFaces
     edges: SceneEdges
     rules: Rules
     tracks: Tracks
-    drift: Floats
-    """(3,) mean velocity, m/s."""
-    until: float
-    """What is searched is searched for until then, s after the search."""
-    faces_sent: int
-    place: Indices
-    """(nodes,) slot of each node of this rank, -1 for those that have none."""
     cracks: Indices
     """(m, 6) slots of the nodes on either side of the cracks, -1 where they do not count (contact/cracks.py)."""
     node_face: PairTable = field(default_factory=PairTable)
     """Of a slot and a face."""
     edge_edge: PairTable = field(default_factory=PairTable)
-    met: int = 0
-    """Active contacts of the last step, the first rows of the room."""
-    room: ContactRows = field(default_factory=lambda: ContactRows.room(0))
-    company: Company = field(init=False)
-    copies: Copies = field(init=False)
+    active: ActiveRows = field(default_factory=ActiveRows)
+    messages: Messages = field(init=False)
 
     def connect(self, company: list[Neighbour], nodes: Nodes, comm: Comm) -> None:
         """Sets up the messages: sums over the nodes of the company, copies of what is not held here; all ranks take
         part.
         """
-        self.copies = ghosts.copies(self.crowd, nodes, comm, Tag.GHOST)
-        self.company = Company(company, comm)
+        self.messages = Messages(Company(company, comm), ghosts.copies(self.crowd, nodes, comm, Tag.GHOST))
 
     def extend(self, company: list[Neighbour], sends: list[Neighbour], receives: list[Neighbour], comm: Comm) -> None:
         """The messages with more nodes, of which this rank knows as the others do; what has not grown stays."""
-        if same([*self.company.neighbours, *self.copies.sends, *self.copies.receives], [*company, *sends, *receives]):
+        had = self.messages.company.neighbours, self.messages.copies.sends, self.messages.copies.receives
+        if same([*itertools.chain(*had)], [*company, *sends, *receives]):
             return
         self.free()
-        self.copies = Copies(sends, receives, comm, Tag.GHOST)
-        self.company = Company(company, comm)
+        self.messages = Messages(Company(company, comm), Copies(sends, receives, comm, Tag.GHOST))
 
     def look(self, nodes: Nodes) -> None:
         """Takes v(n-1/2), before the kick."""
-        held.gather(self.slots.before, nodes.v, self.held, self.local)
-        self.copies.note(nodes)
+        held.gather(self.slots.before, nodes.v, self.own.slots, self.own.local)
+        self.messages.copies.note(nodes)
 
     def reserve(self) -> None:
         """Room for every contact that may become active; the rows of the last step stay."""
-        n = len(self.node_face) + len(self.edge_edge) + 3 * len(self.cracks)
-        if n > len(self.room.nodes):
-            met, self.room = self.room.nodes[: self.met], ContactRows.room(2 * n)
-            self.room.nodes[: self.met] = met
+        self.active.reserve(len(self.node_face) + len(self.edge_edge) + 3 * len(self.cracks))
 
     @property
     def kept(self) -> tuple[Ints, Floats]:
@@ -97,14 +110,11 @@ class Scene:
             owner = nodes.owner[nodes.places(keys[:, 0])]
             told = comm.swap({int(rank): rows[owner == rank] for rank in np.unique(owner)})
             rows = np.concatenate([rows[:0], *(words.reshape(-1, 6) for words in told.values())])
-        if not len(rows):
-            return
-        node, face = self.node_face.rows.T
-        every = np.column_stack([self.crowd.id[node], self.faces.id[face]])
-        kind = [("node", np.int64), ("face", np.int64)]
-        mine, theirs = (np.ascontiguousarray(keys).view(kind).reshape(-1) for keys in (every, rows[:, :2]))
-        _, here, there = np.intersect1d(mine, theirs, assume_unique=True, return_indices=True)
-        self.node_face.kept[here] = np.ascontiguousarray(rows[there, 2:]).view(np.float64)
+        node, face = self.own.place[nodes.places(rows[:, 0])], rows_of(self.faces.id, rows[:, 1])
+        here = (node >= 0) & (face >= 0)
+        self.node_face.recall(
+            np.column_stack([node, face])[here], np.ascontiguousarray(rows[here, 2:]).view(np.float64)
+        )
 
     def rows_of(self, faces: Ints) -> Indices:
         """(k,) rows of those of the ``faces``, ids, that are here."""
@@ -175,8 +185,7 @@ class Scene:
 
     def free(self) -> None:
         """Gives its messages back to MPI."""
-        self.copies.free()
-        self.company.free()
+        self.messages.free()
 
 
 @njit("void(boolean[:, ::1], boolean[::1], int32[:, ::1], boolean[::1])", cache=True)

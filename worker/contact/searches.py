@@ -1,6 +1,7 @@
 """Searches of all ranks: when one is due, how far ahead it looks, and the scene that it leaves."""
 
 import math
+from functools import cached_property
 
 import numpy as np
 
@@ -36,15 +37,10 @@ class Searches:
         self, case: Case, model: Model, neighbours: list[Neighbour], exterior: Exterior, comm: Comm, clock: Clock
     ) -> None:
         """Nothing is searched yet."""
-        assert case.contact is not None
-        self._model, self._neighbours, self._exterior = model, neighbours, exterior
+        self._case, self._model, self._neighbours, self._exterior = case, model, neighbours, exterior
         self._comm, self._clock = comm, clock
-        self._domain, self._skin = case.contact.domain, case.contact.skin
         self.mu = pairing.friction(case)
         """(parts, parts) Coulomb's coefficient, NaN where two parts do not meet."""
-        self.rubs = bool(np.nanmax(self.mu, initial=0.0) > 0.0)
-        """Whether there is friction anywhere."""
-        self._fractures = case.fractures
         self.scene: Scene | None = None
         self.due = True
         """Whether the next step begins with a search."""
@@ -55,11 +51,17 @@ class Searches:
         self._kept: tuple[Ints, Floats] = np.zeros((0, 2), np.int64), np.zeros((0, 4))
         """Candidates with friction, and what they have kept, that the next search takes over from elsewhere."""
 
+    @cached_property
+    def rubs(self) -> bool:
+        """Whether there is friction anywhere."""
+        return bool(np.nanmax(self.mu, initial=0.0) > 0.0)
+
     @property
     def rules(self) -> Rules:
         """How to search."""
-        size = self._exterior.size
-        return Rules(self._domain, ~np.isnan(self.mu), 2.0 * size, self._skin * size, HALO * size, self.rubs)
+        contact, size = self._case.contact, self._exterior.size
+        assert contact is not None
+        return Rules(contact.domain, ~np.isnan(self.mu), 2.0 * size, contact.skin * size, HALO * size, self.rubs)
 
     def keep(self, parcel: Parcel) -> None:
         """Adds what pairs have kept: the candidates themselves a search finds again."""
@@ -80,7 +82,7 @@ class Searches:
         if self._clock.step % normals.EVERY == 0:
             self._exterior.turn()
             if self.scene is not None:
-                self._exterior.show(self.scene, self.scene.local)
+                self._exterior.show(self.scene, self.scene.own.local)
         if self.due or self.scene is None:
             self._search(nodes)
 
@@ -90,7 +92,7 @@ class Searches:
         if old is not None:
             old.free()
             self._kept = old.kept
-        if self._fractures:
+        if self._case.fractures:
             exterior.take_up_cracks()
         goes_on = old is not None and self._clock.t + self._clock.dt <= flight.until
         now = self.scene = self._laid_out(nodes, goes_on)
@@ -98,7 +100,7 @@ class Searches:
             registration.carry(now, old)
         self._connect(now, nodes)
         now.look(nodes)
-        exterior.show(now, now.local)
+        exterior.show(now, now.own.local)
         now.enliven(np.flatnonzero(now.faces.exposed).astype(np.int32))
         self.foresee()
         registration.news(now)
@@ -115,21 +117,21 @@ class Searches:
         self._exterior.refresh(self._courses(nodes), clock.t)
         steps, drift = flight.foresight(clock.dt)
         if not goes_on:
-            longest = _LONGEST if self._fractures else steps
+            longest = _LONGEST if self._case.fractures else steps
             horizon = max(min(steps, longest, 2.0 * (clock.step - self._last)), _SHORTEST) * clock.dt
             flight.until, self._last = clock.t + horizon, clock.step
         return layout.build(flight.sides, self.rules, flight.until - clock.t, drift, nodes, self._comm)
 
     def _courses(self, nodes: Nodes) -> Floats:
         """(nodes, 3) how the nodes fly on; all ranks take part."""
-        if not self._fractures:
+        if not self._case.fractures:
             return nodes.v
         return courses(self._model.blocks, nodes, self._neighbours, self._comm)
 
     def _connect(self, found: Scene, nodes: Nodes) -> None:
         """Takes the cracks up into a new scene, and settles who shares what of it; all ranks take part."""
         follower = Follower(found, self._exterior.flight.here(nodes), nodes)
-        if self._fractures:
+        if self._case.fractures:
             follower.cracks(self._exterior.cracks)
         follower.settle(self._neighbours, self._comm)
 

@@ -65,8 +65,8 @@ class Sides:
         return [search.swept(things, x, course, horizon) for things in (slaves, faces, edges)]
 
 
-def with_ghosts(sides: Sides, rules: Rules, horizon: float, drift: Floats, comm: Comm) -> tuple[Sides, int]:
-    """The sides with what other ranks' surfaces have near this one's, own edges first. And the faces sent."""
+def with_ghosts(sides: Sides, rules: Rules, horizon: float, drift: Floats, comm: Comm) -> Sides:
+    """The sides with what other ranks' surfaces have near this one's, own edges first."""
     crowd = sides.crowd
     nodes, faces, edges = sides.boxes(horizon, drift, 0.5 * rules.halo)
     askers = Boxes(np.concatenate([nodes.low, edges.low]), np.concatenate([nodes.high, edges.high]))
@@ -74,8 +74,7 @@ def with_ghosts(sides: Sides, rules: Rules, horizon: float, drift: Floats, comm:
     parcels = {rank: (sides.faces.take(flags[0]), sides.edges.take(flags[1])) for rank, flags in chosen.items()}
     got = comm.swap({rank: ghosts.pack(f, e, _nodes_of(f, e, crowd)) for rank, (f, e) in parcels.items()})
     others = [ghosts.unpack(words) for words in got.values()]
-    sent = sum(f.n for f, _ in parcels.values())
-    return _joined(sides, others), sent
+    return _joined(sides, others)
 
 
 def _nodes_of(faces: Faces, edges: Edges, crowd: Crowd) -> Crowd:

@@ -20,9 +20,9 @@ _ROW_WEIGHTS = 4
 class ActiveSet:
     """The active contacts of a rank in a step, and the slots of their nodes; the first slots are of shared nodes."""
 
-    def __init__(self, scale: float) -> None:
-        """``scale``: quanta per N s, a power of two."""
-        self._scale = scale
+    def __init__(self, scale: float, sweeps: int) -> None:
+        """``scale``: quanta per N s, a power of two; ``sweeps``: of a step."""
+        self.scale, self._sweeps = scale, sweeps
         self.places: Indices = np.zeros(0, np.int32)
         """(slots,) where the nodes of the last step stand in the crowd."""
         self._slot: Indices = np.zeros(0, np.int32)
@@ -64,23 +64,23 @@ class ActiveSet:
 
         def begin(part: Loaded) -> None:
             sweeps.load_kept(part, contacts, active, kept)
-            sweeps.resume(active, part, kept, contacts.pair, ratio, self._scale)
+            sweeps.resume(active, part, kept, contacts.pair, ratio, self.scale)
 
         self._complete(begin, active.moving_words, IMPULSE, 3)
-        sweeps.give(active, self._n, self._scale)
+        sweeps.give(active, self._n, self.scale)
 
-    def sweep(self, many: int) -> None:
-        """``many`` sweeps."""
-        active, contacts, scale = self._room.active, self._contacts, self._scale
+    def sweep(self) -> None:
+        """All sweeps of the step."""
+        active, contacts, scale = self._room.active, self._contacts, self.scale
         if not self._first:
-            sweeps.sweep_all(active, self._parts[1], contacts, self._fastest, self._n, scale, many)
+            sweeps.sweep_all(active, self._parts[1], contacts, self._fastest, self._n, scale, self._sweeps)
             return
 
         def correct(part: Loaded) -> None:
             sweeps.load(part, contacts, active, self._fastest)
             sweeps.sweep(active, part, scale)
 
-        for _ in range(many):
+        for _ in range(self._sweeps):
             self._complete(correct, active.moving_words, IMPULSE, 3)
             sweeps.give(active, self._n, scale)
 

@@ -43,14 +43,11 @@ class Contact:
     ) -> None:  # fmt: skip
         """``extremes``: largest nodal mass, kg, and speed, m/s, of the scene."""
         assert case.contact is not None
-        self._fractures, self._sweeps = case.fractures, case.contact.sweeps
-        self._comm, self._clock, self._timers = comm, clock, timers
+        self._fractures, self._comm, self._clock, self._timers = case.fractures, comm, clock, timers
         self.exterior = Exterior(model, neighbours, bounds, case.contact.edges, comm)
         self.searches = Searches(case, model, neighbours, self.exterior, comm, clock)
         self.books = Books(model.nodes.n, len(case.parts), extremes)
-        self._costs = self.books.account.words
-        """What contact has taken on all ranks, when they last agreed (account.py)."""
-        self._active = ActiveSet(self.books.scale)
+        self._active = ActiveSet(self.books.scale, case.contact.sweeps)
         self.found = Detected.nothing()
         """What the last step has found here."""
         self.limit = 0.0
@@ -77,9 +74,9 @@ class Contact:
         (
             books.scale, books.friction.scale, self.limit, self.searches.many, self._mean_dt, size, account,
         ) = parcel.known["contact"]  # fmt: skip
-        self._active = ActiveSet(books.scale)
+        self._active.scale = books.scale
         books.resume(parcel, account)
-        self._costs = self._comm.sum(books.account.words)
+        books.agreed = self._comm.sum(books.account.words)
         self.exterior.resume(parcel, size, self._fractures)
         self.searches.resume(parcel)
 
@@ -108,7 +105,7 @@ class Contact:
             for effort, weight, slots in (
                 (search, _LISTED, np.concatenate([nodes, firsts])),
                 (push, _TESTED, tested),
-                (push, _ACTIVE, now.room.nodes[: now.met, 0]),
+                (push, _ACTIVE, now.active.room.nodes[: now.active.n, 0]),
             ):
                 at = now.crowd.local[slots]
                 effort += weight * np.bincount(at[at >= 0], minlength=n)
@@ -145,7 +142,7 @@ class Contact:
 
     def agree(self, search: bool, approach: float, opening: bool, costs: Ints) -> None:
         """Takes what all ranks have found in the step; ``costs``: the sum of theirs. All ranks take part."""
-        self._costs = costs.reshape(2, 2)
+        self.books.agreed = costs.reshape(2, 2)
         self.searches.due |= search
         self.limit = approach
         if opening:
@@ -208,16 +205,16 @@ class Contact:
 
     def _push(self, now: Scene, state: Nodes, dt: float, t: float) -> None:
         crowd, books, active = now.crowd, self.books, self._active
-        now.copies.begin(state)
-        held.take(crowd.x, crowd.v, now.held, state.x, state.v, now.local)
-        now.copies.finish(crowd.x, crowd.v, now.slots.before)
-        self._meet(now, PUSH_OUT if books.account.settle(self._costs) else 0.0, dt)
-        shared = now.company.agree(now.room.nodes[: now.met], crowd.local)
-        active.begin(now.room, now.met, crowd, shared)
+        now.messages.copies.begin(state)
+        held.take(crowd.x, crowd.v, now.own.slots, state.x, state.v, now.own.local)
+        now.messages.copies.finish(crowd.x, crowd.v, now.slots.before)
+        self._meet(now, PUSH_OUT if books.account.settle(books.agreed) else 0.0, dt)
+        shared = now.messages.company.agree(now.active.room.nodes[: now.active.n], crowd.local)
+        active.begin(now.active.room, now.active.n, crowd, shared)
         active.weigh()
         if self.searches.rubs:
             active.resume(now.node_face.kept, self._resume())
-        active.sweep(self._sweeps)
+        active.sweep()
         if self.searches.rubs:
             now.node_face.kept[:] = 0.0
             active.store(now.node_face.kept)
@@ -242,7 +239,7 @@ class Contact:
             self.searches.foresee()
         redraw = step % normals.EVERY == 0
         self.found = detect(now, self.searches.mu, give, dt, self.exterior.size, redraw)
-        now.met = self.found.contacts
+        now.active.n = self.found.contacts
 
     def free(self) -> None:
         """Gives the messages back to MPI."""

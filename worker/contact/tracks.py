@@ -60,8 +60,12 @@ class Lines:
 class Tracks:
     """The reference motions of the slots of a scene."""
 
-    def __init__(self, x: Floats, course: Floats, faces: int, edges: int) -> None:
+    def __init__(self, x: Floats, course: Floats, faces: int, edges: int, drift: Floats, until: float) -> None:
         """``x``, ``course`` (slots, 3): positions, m, and velocities, m/s, at the time of the search."""
+        self.drift = drift
+        """(3,) mean velocity, m/s."""
+        self.until = until
+        """What is searched is searched for until then, s after the search."""
         self.searched, self.short = Lines(x, course), Lines(x, course)
         """Along which slots have been searched, and from which pairs are measured."""
         self.faces, self.edges = np.zeros(faces), np.zeros(edges)

@@ -10,13 +10,10 @@ stress: then the second pass makes the velocity gradient again.
 """
 
 from ..jit import njit
-from ..materials import models
 from ..materials.elastic import deviatoric_work, predict
-from ..materials.equation_of_state import linear, mie_gruneisen
-from ..materials.hyperelastic import hyperelastic, stiffen
-from ..materials.johnson_cook import johnson_cook
-from ..materials.mohr_coulomb import mohr_coulomb
-from ..materials.plastic import linear_hardening
+from ..materials.hyperelastic import stiffen
+from ..materials.law import AFTER_PRESSURE, BEFORE_PRESSURE, FROM_SHAPE, ORDER, Q_LINEAR, Q_QUADRATIC, SHEAR
+from ..materials.models import press, strengthen
 from ..materials.viscosity import bulk_viscosity
 from ..state import CHUNK
 from . import pressure as averaged
@@ -36,10 +33,10 @@ _F1, _F2, _I1, _I2, _T2 = "float64[::1]", "float64[:, ::1]", "int64[::1]", "int6
 _B1 = "boolean[::1]"
 
 
-@njit(f"void(int64, {_F1}, {_F2}, {_T2}, int64, float64)", cache=True, error_model="numpy")
-def motion(strength, w, x0, t, n, dt):  # type: ignore[no-untyped-def]
+@njit(f"void({_F1}, {_F1}, {_F2}, {_T2}, int64, float64)", cache=True, error_model="numpy")
+def motion(params, w, x0, t, n, dt):  # type: ignore[no-untyped-def]
     """What the stress of a chunk is made from: rates of deformation, or dilatation and the undeformed shape."""
-    if strength == models.ELASTIC:
+    if params[ORDER] == FROM_SHAPE:
         tet4.dilatation(w, n, dt)
         tet4.gather(w[tet4.REFERENCE :], x0, t, n)
     else:
@@ -50,40 +47,34 @@ def motion(strength, w, x0, t, n, dt):  # type: ignore[no-untyped-def]
 def deviatoric_stress(strength, w, s, params, n, dt):  # type: ignore[no-untyped-def]
     """The deviatoric stress of a chunk, and its work: from the shape, or rotation, elastic trial and plastic return.
 
-    With Mohr-Coulomb only the trial: ``return_at_pressure`` does the rest.
+    With a law that acts after the pressure only the trial: ``return_at_pressure`` does the rest.
     """
-    if strength == models.ELASTIC:
-        hyperelastic(w, s, params, n)
+    if params[ORDER] == FROM_SHAPE:
+        strengthen(strength, w, s, params, n, dt)
         return
-    predict(w, s, n, params[models.SHEAR], dt)
-    if strength == models.LINEAR_HARDENING:
-        linear_hardening(w, s, params, n, dt)
-    elif strength == models.JOHNSON_COOK:
-        johnson_cook(w, s, params, n, dt)
-    if strength != models.MOHR_COULOMB:
+    predict(w, s, n, params[SHEAR], dt)
+    if params[ORDER] == BEFORE_PRESSURE:
+        strengthen(strength, w, s, params, n, dt)
         deviatoric_work(w, s, n, dt)
 
 
 @njit(f"void(int64, {_F1}, {_F1}, {_F1}, int64, float64)", cache=True, error_model="numpy")
 def return_at_pressure(strength, w, s, params, n, dt):  # type: ignore[no-untyped-def]
     """Plastic return of a chunk whose strength depends on the new pressure; books the work of the new deviator."""
-    if strength == models.MOHR_COULOMB:
-        mohr_coulomb(w, s, params, n, dt)
+    if params[ORDER] == AFTER_PRESSURE:
+        strengthen(strength, w, s, params, n, dt)
         deviatoric_work(w, s, n, dt)
 
 
-@njit(f"void(int64, int64, {_F1}, {_F1}, {_F1}, int64, float64)", cache=True, error_model="numpy")
-def pressure_and_limit(strength, eos, w, s, params, n, dt):  # type: ignore[no-untyped-def]
+@njit(f"void(int64, {_F1}, {_F1}, {_F1}, int64, float64)", cache=True, error_model="numpy")
+def pressure_and_limit(eos, w, s, params, n, dt):  # type: ignore[no-untyped-def]
     """Equation of state, bulk viscosity and stable step of a chunk."""
-    if eos == models.MIE_GRUNEISEN:
-        mie_gruneisen(w, s, params, n)
-    else:
-        linear(w, s, params, n)
-    if strength == models.ELASTIC:
+    press(eos, w, s, params, n)
+    if params[ORDER] == FROM_SHAPE:
         stiffen(w, s, params, n)
-    if params[models.Q_LINEAR] > 0.0 or params[models.Q_QUADRATIC] > 0.0:
+    if params[Q_LINEAR] > 0.0 or params[Q_QUADRATIC] > 0.0:
         frequency = 1.0 / dt if dt > 0.0 else 0.0
-        bulk_viscosity(w, s, n, params[models.Q_LINEAR], params[models.Q_QUADRATIC], frequency)
+        bulk_viscosity(w, s, n, params[Q_LINEAR], params[Q_QUADRATIC], frequency)
     else:
         tet4.step_limit(w, s, n)
 
@@ -157,11 +148,11 @@ def standard_pass(  # type: ignore[no-untyped-def]
         n = len(t)
         tet4.gather(w[tet4.EDGE :], x, t, n)
         tet4.gather(w[tet4.RATE :], v, t, n)
-        motion(strength, w, x0, t, n, dt)
+        motion(params, w, x0, t, n, dt)
         deviatoric_stress(strength, w, s, params, n, dt)
         tet4.end_gradients(w, n)
         averaged.own_strains(w, n, dt)
-        pressure_and_limit(strength, eos, w, s, params, n, dt)
+        pressure_and_limit(eos, w, s, params, n, dt)
         return_at_pressure(strength, w, s, params, n, dt)
         if len(worn) > 0:
             found = mark_worn(worn[c * CHUNK : c * CHUNK + n], w, s, params, life, rows, n)
@@ -190,8 +181,8 @@ def strain_pass(  # type: ignore[no-untyped-def]
         n = len(t)
         tet4.gather(w[tet4.EDGE :], x, t, n)
         tet4.gather(w[tet4.RATE :], v, t, n)
-        motion(strength, w, x0, t, n, dt)
-        if strength != models.MOHR_COULOMB:
+        motion(params, w, x0, t, n, dt)
+        if params[ORDER] != AFTER_PRESSURE:
             deviatoric_stress(strength, w, s, params, n, dt)
         averaged.keep_flux(w, s, n)
         if split:
@@ -244,14 +235,14 @@ def force_pass(  # type: ignore[no-untyped-def]
         s = state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
         n = len(t)
         tet4.gather(w[tet4.EDGE :], x, t, n)
-        if strength == models.MOHR_COULOMB:
+        if params[ORDER] == AFTER_PRESSURE:
             tet4.gather(w[tet4.RATE :], v, t, n)
             tet4.kinematics(w, n, dt)
             deviatoric_stress(strength, w, s, params, n, dt)
         tet4.end_gradients(w, n)
         averaged.gather_strains(w, strain, t, n)
         averaged.recall_flux(w, s, n, dt)
-        pressure_and_limit(strength, eos, w, s, params, n, dt)
+        pressure_and_limit(eos, w, s, params, n, dt)
         return_at_pressure(strength, w, s, params, n, dt)
         if len(worn) > 0:
             found = mark_worn(worn[c * CHUNK : c * CHUNK + n], w, s, params, life, rows, n)

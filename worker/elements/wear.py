@@ -12,8 +12,8 @@ import numpy as np
 from conoid.cases.schema import Erosion
 
 from ..jit import njit
-from ..materials.models import DENSITY
-from ..state import CHUNK, MASS, PLASTIC_STRAIN, S_XX, VISCOUS, WORK, WORK_PLASTIC, WORK_VISCOUS, Floats
+from ..materials.law import DENSITY
+from ..state import CHUNK, MASS, PLASTIC_STRAIN, S_XX, VISCOUS, WORK, WORK_VISCOUS, Floats
 from .tet4 import LIMIT, VOLUME
 
 STRAIN, LOW, HIGH, FREQUENCY = range(4)
@@ -35,21 +35,18 @@ def life(erosion: Erosion | None) -> Floats:
 
 @njit("boolean(float64[::1], int64)", cache=True, error_model="numpy")
 def _finite(s, i):  # type: ignore[no-untyped-def]
-    """Whether the whole stress of a tet is a number."""
-    total = 0.0
+    """Whether the stress of a tet, and its work, are numbers."""
+    total = abs(s[WORK * CHUNK + i]) + abs(s[WORK_VISCOUS * CHUNK + i])
     for row in range(S_XX, VISCOUS + 1):
         total += abs(s[row * CHUNK + i])
     return total < np.inf
 
 
-@njit("void(float64[::1], int64, int64)", cache=True, error_model="numpy")
-def _release(s, i, rows):  # type: ignore[no-untyped-def]
-    """Takes the stress of a tet, and of its work what is not a number."""
+@njit("void(float64[::1], int64)", cache=True, error_model="numpy")
+def _release(s, i):  # type: ignore[no-untyped-def]
+    """Takes the stress of a tet."""
     for row in range(S_XX, VISCOUS + 1):
         s[row * CHUNK + i] = 0.0
-    for row in (WORK, WORK_VISCOUS, WORK_PLASTIC):
-        if row < rows and not abs(s[row * CHUNK + i]) < np.inf:
-            s[row * CHUNK + i] = 0.0
 
 
 @njit(
@@ -60,18 +57,21 @@ def _release(s, i, rows):  # type: ignore[no-untyped-def]
 def mark_worn(worn, w, s, params, life, rows, n):  # type: ignore[no-untyped-def]
     """Marks the tets of a chunk that leave; one that leaves at once no longer limits the step. Returns what is found.
 
-    A tet that is inside out, or whose stress is not a number, is relieved of it before it acts on a node.
+    A tet that is inside out is relieved of its stress before it acts on a node. One whose stress is not a number does
+    not leave: its limit becomes NaN, which ends the run and names the tet.
     """
     found = SOUND
     for i in range(n):
         ratio = w[VOLUME + i] * params[DENSITY] / s[_MASS + i]
-        whole = w[VOLUME + i] > 0.0 and _finite(s, i)
-        if not (whole and life[LOW] <= ratio <= life[HIGH] and w[LIMIT + i] <= life[FREQUENCY]):
+        inside_out = w[VOLUME + i] <= 0.0
+        if not _finite(s, i) or not (inside_out or (w[VOLUME + i] > 0.0 and w[LIMIT + i] >= 0.0)):
+            w[LIMIT + i] = np.nan
+        elif inside_out or not (life[LOW] <= ratio <= life[HIGH] and w[LIMIT + i] <= life[FREQUENCY]):
             worn[i] = True
             w[LIMIT + i] = 0.0
             found = BROKEN
-            if not whole:
-                _release(s, i, rows)
+            if inside_out:
+                _release(s, i)
         elif rows > PLASTIC_STRAIN and s[_STRAIN + i] > life[STRAIN]:
             worn[i] = True
             found = max(found, TIRED)

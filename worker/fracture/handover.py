@@ -10,7 +10,8 @@ from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
 from ..state import CHUNK, VISCOUS, Floats, Ints, Model, Tets
 from ..topology import Split
-from .cohesive import Cohesion, Facets
+from .cohesive import Cohesion
+from .columns import Facets
 from .law import scatter_copies
 from .records import MESH, POINTS, Mesh, record
 from .separation import common
@@ -59,9 +60,10 @@ class Handover:
             )  # fmt: skip
         if cohesion is not None:
             moved = cohesion.follow(split, nodes.id)
-            scatter_copies(change, split.first, cohesion.facets.nodes[moved], cohesion.facets.pull[moved], nodes.scale)
+            held = cohesion.facets
+            scatter_copies(change, split.first, held.nodes[moved], held.state.pull[moved], nodes.scale)
             for new in fresh:
-                scatter_copies(change, split.first, new.nodes, new.pull, nodes.scale)
+                scatter_copies(change, split.first, new.nodes, new.state.pull, nodes.scale)
         self._complete(change, copies.parents)
         _apply(nodes.force, change, copies.parents, split.first)
 

@@ -6,7 +6,8 @@ from ..state import Floats, Indices, Ints, Nodes
 from ..topology import Split
 from . import criterion
 from .breaking import Breaking
-from .cohesive import Facets, frames, fresh
+from .cohesive import frames, fresh
+from .columns import Facets
 
 _LEAST = 0.05
 """Of the square of the highest frequency that a step resolves: what cohesive facets may use at least."""

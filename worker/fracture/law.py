@@ -11,13 +11,11 @@ what could be given back is the same, or nothing. What is left of the energy lie
     left = k (knee^2 - lent^2) / 2 + k knee critical / 2,   knee = top, or less where critical would be below 0.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from ..elements.tet4 import largest_of, quanta
 from ..jit import njit, types
-from ..state import Floats, Indices
+from .columns import FACETS
 
 _SLACK = 1e-6
 """Of the energy of a facet: what a pair may give unpaid. Above rounding, far below what anybody sees."""
@@ -25,28 +23,7 @@ _EXHAUSTED = 1e-6
 """Of the energy of a facet: what is left at least to one that lets go."""
 
 
-class Pairs(NamedTuple):
-    """Columns of cohesive facets, see there."""
-
-    nodes: Indices
-    energy: Floats
-    area: Floats
-    shear: Floats
-    strength: Floats
-    critical: Floats
-    knee: Floats
-    lent: Floats
-    top: Floats
-    size: Floats
-    work: Floats
-    offset: Floats
-    opening: Floats
-    pull: Floats
-    foreseen: Floats
-
-
 _F1, _F2, _F3 = types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1]
-_PAIRS = types.NamedTuple([types.int32[:, ::1], *[_F1] * 3, *[_F2] * 7, *[_F3] * 4], Pairs)  # type: ignore[no-untyped-call]
 _I, _F, _I2 = types.int64, types.float64, types.int64[:, ::1]
 
 
@@ -71,11 +48,12 @@ def turn(frame, x, nodes):  # type: ignore[no-untyped-def]
         frame[2, i] = frame[0, j] * frame[1, k] - frame[0, k] * frame[1, j]
 
 
-@njit(_F(_PAIRS, _I, _I), cache=True, error_model="numpy")
+@njit(_F(FACETS, _I, _I), cache=True, error_model="numpy")
 def _share(f, m, p):  # type: ignore[no-untyped-def]
     """Of the strength, that is left."""
-    beyond = f.top[m, p] - f.knee[m, p]
-    return 1.0 if beyond <= 0.0 else max(1.0 - beyond / f.critical[m, p], 0.0)
+    law, s = f.softening, f.state
+    beyond = s.top[m, p] - law.knee[m, p]
+    return 1.0 if beyond <= 0.0 else max(1.0 - beyond / law.critical[m, p], 0.0)
 
 
 @njit(_F(_F1, _F2, _F1, _F1, _F), cache=True, error_model="numpy")
@@ -87,59 +65,61 @@ def _opened(d, frame, apart, offset, shear):  # type: ignore[no-untyped-def]
     return np.sqrt(d[0] * d[0] + shear * (d[1] * d[1] + d[2] * d[2]))
 
 
-@njit(types.void(_PAIRS, _I, _I, _F2, _F1, _F), cache=True, error_model="numpy")
+@njit(types.void(FACETS, _I, _I, _F2, _F1, _F), cache=True, error_model="numpy")
 def _shorten(f, m, p, frame, d, kept):  # type: ignore[no-untyped-def]
     """Keeps a share of the present opening ``d``: the offset goes along."""
-    k = f.strength[m, p] * _share(f, m, p) / f.top[m, p]
+    law, s = f.softening, f.state
+    k = law.strength[m, p] * _share(f, m, p) / s.top[m, p]
     for c in range(3):
         along = 0.0
         for i in range(3):
-            along += frame[c, i] * f.opening[m, p, i]
+            along += frame[c, i] * s.opening[m, p, i]
         d[c] *= kept
-        f.offset[m, p, c] = d[c] - along
-    lent = f.lent[m, p] ** 2 - (1.0 - kept * kept) * f.size[m, p] ** 2
-    f.size[m, p] *= kept
-    f.lent[m, p] = np.sqrt(max(lent, 0.0)) if kept > 0.0 else 0.0
-    lent = f.lent[m, p] ** 2
-    left = max(f.energy[m] - 3.0 * f.work[m, p] / f.area[m], _EXHAUSTED * f.energy[m])
-    left = 2.0 / k * left + f.size[m, p] ** 2 - lent  # in squares of the opening, as the triangles below
-    knee = min(f.top[m, p], np.sqrt(lent + left))
-    f.strength[m, p] = k * knee
-    f.critical[m, p] = max(left - (knee * knee - lent), 0.0) / knee
-    f.knee[m, p] = f.top[m, p] = knee
+        law.offset[m, p, c] = d[c] - along
+    lent = law.lent[m, p] ** 2 - (1.0 - kept * kept) * s.size[m, p] ** 2
+    s.size[m, p] *= kept
+    law.lent[m, p] = np.sqrt(max(lent, 0.0)) if kept > 0.0 else 0.0
+    lent = law.lent[m, p] ** 2
+    left = max(f.constants.energy[m] - 3.0 * s.work[m, p] / f.constants.area[m], _EXHAUSTED * f.constants.energy[m])
+    left = 2.0 / k * left + s.size[m, p] ** 2 - lent  # in squares of the opening, as the triangles below
+    knee = min(s.top[m, p], np.sqrt(lent + left))
+    law.strength[m, p] = k * knee
+    law.critical[m, p] = max(left - (knee * knee - lent), 0.0) / knee
+    law.knee[m, p] = s.top[m, p] = knee
 
 
-@njit(types.boolean(_PAIRS, _F2), cache=True, error_model="numpy")
+@njit(types.boolean(FACETS, _F2), cache=True, error_model="numpy")
 def open_facets(f, x):  # type: ignore[no-untyped-def]
     """Returns whether some facet has failed at all three pairs. The work is that of the mean of old and new force."""
+    law, s = f.softening, f.state
     frame, d, moved = np.empty((3, 3)), np.empty(3), np.empty(3)
     failed = False
     for m in range(len(f.nodes)):
         turn(frame, x, f.nodes[m])
-        third, holds = f.area[m] / 3.0, False
+        third, holds = f.constants.area[m] / 3.0, False
         for p in range(3):
             for i in range(3):
                 now = x[f.nodes[m, 3 + p], i] - x[f.nodes[m, p], i]
-                moved[i] = now - f.opening[m, p, i]
-                f.work[m, p] += 0.5 * f.pull[m, p, i] * moved[i]
-                f.opening[m, p, i] = now
-            f.size[m, p] = _opened(d, frame, f.opening[m, p], f.offset[m, p], f.shear[m])
-            f.top[m, p] = max(f.top[m, p], f.size[m, p])
+                moved[i] = now - s.opening[m, p, i]
+                s.work[m, p] += 0.5 * s.pull[m, p, i] * moved[i]
+                s.opening[m, p, i] = now
+            s.size[m, p] = _opened(d, frame, s.opening[m, p], law.offset[m, p], f.constants.shear[m])
+            s.top[m, p] = max(s.top[m, p], s.size[m, p])
             share = _share(f, m, p)
-            if share > 0.0 and f.size[m, p] < f.lent[m, p] - _SLACK * f.energy[m] / f.strength[m, p]:
+            if share > 0.0 and s.size[m, p] < law.lent[m, p] - _SLACK * f.constants.energy[m] / law.strength[m, p]:
                 _shorten(f, m, p, frame, d, 0.0)
                 share = 1.0
             holds |= share > 0.0
-            stiffness = third * f.strength[m, p] * share / f.top[m, p]
+            stiffness = third * law.strength[m, p] * share / s.top[m, p]
             for i in range(3):
                 across = frame[1, i] * d[1] + frame[2, i] * d[2]
-                f.pull[m, p, i] = stiffness * (frame[0, i] * d[0] + f.shear[m] * across)
-                f.work[m, p] += 0.5 * f.pull[m, p, i] * moved[i]
+                s.pull[m, p, i] = stiffness * (frame[0, i] * d[0] + f.constants.shear[m] * across)
+                s.work[m, p] += 0.5 * s.pull[m, p, i] * moved[i]
         failed |= not holds
     return failed
 
 
-@njit(types.void(_F1, _PAIRS, _I, _I, _F2, _I2, _F1, _F), cache=True, error_model="numpy")
+@njit(types.void(_F1, FACETS, _I, _I, _F2, _I2, _F1, _F), cache=True, error_model="numpy")
 def _foresee(ahead, f, m, p, v, force, mass, quantum):  # type: ignore[no-untyped-def]
     """Velocity at n+1/2 with which a pair will open, by the forces of the present alone."""
     a, b = f.nodes[m, p], f.nodes[m, 3 + p]
@@ -147,7 +127,7 @@ def _foresee(ahead, f, m, p, v, force, mass, quantum):  # type: ignore[no-untype
         ahead[i] = v[b, i] - v[a, i] + quantum * (force[b, i] / mass[b] - force[a, i] / mass[a])
 
 
-@njit(types.void(_I2, _PAIRS, _F2, _F2, _I2, _F1, _F1, _F, types.boolean), cache=True, error_model="numpy")
+@njit(types.void(_I2, FACETS, _F2, _F2, _I2, _F1, _F1, _F, types.boolean), cache=True, error_model="numpy")
 def let_go(change, f, x, v, force, mass, steps, scale, whole):  # type: ignore[no-untyped-def]
     """Shortens the offsets of pairs that would give what nobody has paid in the step ahead, by what keeps each from it
     or wholly, and adds what that changes of the nodal forces to ``change`` (nodes, 3), quanta.
@@ -155,26 +135,27 @@ def let_go(change, f, x, v, force, mass, steps, scale, whole):  # type: ignore[n
     ``steps``: dt behind, their mean, dt ahead, s. What is not a force of the present, contact above all, is taken to
     change the velocities as in the step before.
     """
+    law, s = f.softening, f.state
     frame, d, ahead, apart, pull = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for m in range(len(f.nodes)):
         turn(frame, x, f.nodes[m])
         for p in range(3):
             a, b, share = f.nodes[m, p], f.nodes[m, 3 + p], _share(f, m, p)
-            if f.lent[m, p] == 0.0 or a == b or share == 0.0:
+            if law.lent[m, p] == 0.0 or a == b or share == 0.0:
                 continue
             _foresee(ahead, f, m, p, v, force, mass, steps[1] / scale)
             for i in range(3):
-                pushed = v[b, i] - v[a, i] - f.foreseen[m, p, i]
-                apart[i] = f.opening[m, p, i] + steps[2] * (ahead[i] + pushed)
-                pull[i] = f.pull[m, p, i]
-            short = f.lent[m, p] - _opened(d, frame, apart, f.offset[m, p], f.shear[m])
-            if short <= _SLACK * f.energy[m] / f.strength[m, p]:
+                pushed = v[b, i] - v[a, i] - s.foreseen[m, p, i]
+                apart[i] = s.opening[m, p, i] + steps[2] * (ahead[i] + pushed)
+                pull[i] = s.pull[m, p, i]
+            short = law.lent[m, p] - _opened(d, frame, apart, law.offset[m, p], f.constants.shear[m])
+            if short <= _SLACK * f.constants.energy[m] / law.strength[m, p]:
                 continue
             # A force less by dF along the traction opens the pair by dt^2 dF (1 / m_a + 1 / m_b) more, and its size by
             # that times |T| / (k D).
-            size = _opened(d, frame, f.opening[m, p], f.offset[m, p], f.shear[m])
+            size = _opened(d, frame, s.opening[m, p], law.offset[m, p], f.constants.shear[m])
             strength = np.sqrt(pull[0] ** 2 + pull[1] ** 2 + pull[2] ** 2)
-            slope = 3.0 * strength / (f.area[m] * f.strength[m, p] * share / f.top[m, p] * size)
+            slope = 3.0 * strength / (f.constants.area[m] * law.strength[m, p] * share / s.top[m, p] * size)
             gain = slope * strength * steps[1] * steps[2] * (1.0 / mass[a] + 1.0 / mass[b])
             kept = 0.0 if whole else max(1.0 - short / gain, 0.0)
             old = quanta(pull[0], pull[1], pull[2], scale)
@@ -182,18 +163,19 @@ def let_go(change, f, x, v, force, mass, steps, scale, whole):  # type: ignore[n
             for i in range(3):
                 change[a, i] += new[i] - old[i]
                 change[b, i] -= new[i] - old[i]
-                f.pull[m, p, i] = kept * pull[i]
-                f.work[m, p] -= 0.5 * (1.0 - kept) * pull[i] * (v[b, i] - v[a, i]) * steps[0]
+                s.pull[m, p, i] = kept * pull[i]
+                s.work[m, p] -= 0.5 * (1.0 - kept) * pull[i] * (v[b, i] - v[a, i]) * steps[0]
             _shorten(f, m, p, frame, d, kept)
 
 
-@njit(types.void(_PAIRS, _F2, _I2, _F1, _F), cache=True, error_model="numpy")
+@njit(types.void(FACETS, _F2, _I2, _F1, _F), cache=True, error_model="numpy")
 def foresee(f, v, force, mass, quantum):  # type: ignore[no-untyped-def]
     """Notes with which velocities pairs would open by the forces of the present alone; ``quantum``: as ``kick``."""
+    law, s = f.softening, f.state
     for m in range(len(f.nodes)):
         for p in range(3):
-            if f.lent[m, p] > 0.0:
-                _foresee(f.foreseen[m, p], f, m, p, v, force, mass, quantum)
+            if law.lent[m, p] > 0.0:
+                _foresee(s.foreseen[m, p], f, m, p, v, force, mass, quantum)
 
 
 @njit(_I(_I2, types.int32[:, ::1], _F3, _F), cache=True)

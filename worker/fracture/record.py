@@ -20,10 +20,10 @@ class Record:
     def __init__(self, model: Model, fracture: Fracture, comm: Comm) -> None:
         self._model, self._fracture, self._comm = model, fracture, comm
         self.labels: list[Ints] = []
-        """For each block (n,) the fragment of each tet at the last look."""
+        """For each block (n,) the fragment of each tet when they were last found."""
         self._before: tuple[Ints, Ints] | None = None
         self.count = 0
-        """Fragments at the last look."""
+        """Fragments when they were last found."""
 
     def keep(self, parcel: Parcel) -> None:
         """Adds the fragments of the last frame to a parcel."""

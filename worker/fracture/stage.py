@@ -22,7 +22,7 @@ from ..migration.parcel import Parcel
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
 from ..state import Ints, Model
-from ..topology import KeptByNode, Split
+from ..topology import KeptByNode
 from . import facets, resolution
 from .breaking import Breaking
 from .cohesive import Cohesion
@@ -33,6 +33,7 @@ from .insertion import Insertion
 from .release import Release
 from .separation import Separation
 from .strength import toughness
+from .update import TopologyUpdate
 
 NOTHING, OVERSTRESSED, BREAKS = range(3)
 """What the ranks agree on in a step by their maximum: no face is overstressed; some are; facets break, or may."""
@@ -46,8 +47,7 @@ class Fracture:
         contact: Contact | None, comm: Comm, clock: Clock,
     ) -> None:  # fmt: skip
         """``by_node``: besides the elements, what has arrays by node. All ranks take part."""
-        self._model, self._elements, self._by_node, self._contact = model, elements, by_node, contact
-        self._clock, self._comm = clock, comm
+        self._model, self._elements, self._clock, self._comm = model, elements, clock, comm
         self.warnings: list[str] = []
         """What the user should know of the mesh."""
         bodies, work = self._armed(case, comm)
@@ -55,7 +55,8 @@ class Fracture:
         self.separation = Separation(model, neighbours, meshes, comm)
         specs = [part.fracture for part in case.parts if part.fracture is not None]
         self.initiation = Initiation(model, bodies, specs, self.separation.stars, neighbours, comm, clock)
-        self._handover = Handover(model, meshes, neighbours, comm)
+        handover = Handover(model, meshes, neighbours, comm)
+        self._update = TopologyUpdate(model, elements, self.initiation, by_node, handover, contact)
         self._insertion = Insertion(case.numerics.dt_safety)
         if neighbours:
             elements.employ(self.initiation.interface)
@@ -153,20 +154,4 @@ class Fracture:
         split = self.separation.separate(touched)
         cohesive = [b.take(b.facets.first) for b in broken if b.body.spec.model == "cohesive"]
         fresh = [self._insertion.facets(b, self._model.nodes, split) for b in cohesive]
-        if split is not None and split.copies.n:
-            self._take_up(split)
-            self._handover.hand_over(split, self.cohesion, fresh)
-        for new in fresh:
-            assert self.cohesion is not None
-            self.cohesion.insert(new)
-        if self._contact is not None:
-            for b in broken:
-                self._contact.crack(b.facets.tets, b.facets.nodes, b.facets.sides)
-            if split is not None:
-                self._contact.separate(split)
-
-    def _take_up(self, split: Split) -> None:
-        self.initiation.follow(split)
-        self._elements.grow(split.copies)
-        for each in self._by_node:
-            each.grow(split, self._model.nodes.id)
+        self._update.apply(broken, split, fresh, self.cohesion)

@@ -4,13 +4,22 @@ Both take the volume strain of the step that the pressure sees (the tet's own, o
 SEEN of the scratch, and the tet's own change of volume from CHANGE, so that the work is what the nodal forces do.
 """
 
-from ..elements.tet4 import CHANGE, MODULUS, SEEN
-from ..jit import njit
-from ..state import CHUNK, MASS, PRESSURE, VOLUME_RATIO, WORK, WORK_VISCOUS
-from .models import BULK, C0, DENSITY, GAMMA, SHEAR, SLOPE
+import numpy as np
 
+from conoid.cases.materials import MieGruneisen
+
+from ..elements.tet4 import CHANGE, MODULUS, NODAL, SEEN, VOLUME
+from ..jit import njit
+from ..state import CHUNK, MASS, PORES, PRESSURE, VOLUME_RATIO, WORK, WORK_PLASTIC, WORK_VISCOUS
+from .law import BULK, DENSITY, EQUATION, SHEAR, SPALL, Equation
+
+_C0, _SLOPE, _GAMMA = range(EQUATION, EQUATION + 3)
 _P, _MASS, _WORK, _RATIO = PRESSURE * CHUNK, MASS * CHUNK, WORK * CHUNK, VOLUME_RATIO * CHUNK
-_WORK_VISCOUS = WORK_VISCOUS * CHUNK
+_WORK_VISCOUS, _WORK_PLASTIC, _PORES = WORK_VISCOUS * CHUNK, WORK_PLASTIC * CHUNK, PORES * CHUNK
+_OLD = NODAL
+"""Row of the scratch: the pressure before the step, Pa."""
+_LEAST = 0.05
+"""Of the bulk modulus at rest: what the wave speed has at least. Chosen: it makes steps shorter, never too long."""
 
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
@@ -23,6 +32,46 @@ def linear(w, s, params, n):  # type: ignore[no-untyped-def]
         s[_P + i] = new
         s[_WORK + i] -= 0.5 * (old + new) * w[CHANGE + i]
         w[MODULUS + i] = modulus
+    if params[SPALL] < np.inf:
+        _tear_linear(w, s, params, n)
+
+
+@njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
+def _tear_linear(w, s, params, n):  # type: ignore[no-untyped-def]
+    """Moves volume strain between matter and pores: no pressure is below minus the spall pressure, nor above zero while
+    there are pores. Opening takes the spall pressure times the volume, and keeps it.
+    """
+    bulk, spall = params[BULK], params[SPALL]
+    for i in range(n):
+        p, pores = s[_P + i], s[_PORES + i]
+        if p >= -spall and not (pores > 0.0 and p > 0.0):
+            continue
+        strain = max((-spall - p) / bulk if p < 0.0 else -p / bulk, -pores)
+        s[_P + i] = p + bulk * strain
+        s[_PORES + i] = pores + strain
+        s[_WORK + i] -= 0.5 * bulk * strain * w[CHANGE + i]
+        s[_WORK_PLASTIC + i] += spall * max(strain, 0.0) * w[VOLUME + i]
+
+
+@njit("UniTuple(float64, 2)(float64[::1], float64)", cache=True, error_model="numpy", forceinline=True)
+def _cold(params, ratio):  # type: ignore[no-untyped-def]
+    """The pressure without heat at a volume ratio, p_H (1 - gamma chi / 2), and its slope by chi less gamma p_H / 2."""
+    gamma, slope = params[_GAMMA], params[_SLOPE]
+    stiffness = params[DENSITY] * params[_C0] * params[_C0]
+    chi = 1.0 - ratio
+    squeezed = max(chi, 0.0)
+    d = 1.0 / (1.0 - slope * squeezed)
+    return (
+        stiffness * chi * d * d * (1.0 - 0.5 * gamma * squeezed),
+        stiffness * d * d * d * (1.0 + (slope - gamma) * squeezed),
+    )
+
+
+@njit("float64(float64[::1], float64, float64, float64)", cache=True, error_model="numpy", forceinline=True)
+def _modulus(params, ratio, tangent, pressure):  # type: ignore[no-untyped-def]
+    """rho c^2, Pa: of the bulk at least _LEAST of that at rest, since strong tension makes it negative; NaN stays."""
+    bulk, least = ratio * (tangent + params[_GAMMA] * pressure), _LEAST * params[BULK]
+    return (least if bulk < least else bulk) + 4.0 / 3.0 * params[SHEAR]
 
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
@@ -33,22 +82,55 @@ def mie_gruneisen(w, s, params, n):  # type: ignore[no-untyped-def]
     of the step is linear in the new pressure and solved in closed form. The factor 1 - gamma chi / 2 applies to
     compression only.
     """
-    density, shear, gamma, slope = params[DENSITY], params[SHEAR], params[GAMMA], params[SLOPE]
-    stiffness = density * params[C0] * params[C0]
+    heating = params[_GAMMA] * params[DENSITY]
     for i in range(n):
         half = 0.5 * w[SEEN + i]
         ratio = s[_RATIO + i] * (1.0 + half) / (1.0 - half)
-        chi = 1.0 - ratio
-        squeezed = max(chi, 0.0)
-        d = 1.0 / (1.0 - slope * squeezed)
-        cold = stiffness * chi * d * d * (1.0 - 0.5 * gamma * squeezed)
-        tangent = stiffness * d * d * d * (1.0 + (slope - gamma) * squeezed)
+        cold, tangent = _cold(params, ratio)
         change = w[CHANGE + i]
         mass, old = s[_MASS + i], s[_P + i]
-        coefficient = gamma * density / mass
+        coefficient = heating / mass
         known = cold + coefficient * (s[_WORK + i] + s[_WORK_VISCOUS + i] - 0.5 * old * change)
         new = known / (1.0 + 0.5 * coefficient * change)
+        w[_OLD + i] = old
         s[_P + i] = new
         s[_RATIO + i] = ratio
         s[_WORK + i] -= 0.5 * (old + new) * change
-        w[MODULUS + i] = ratio * (tangent + gamma * new) + 4.0 / 3.0 * shear
+        w[MODULUS + i] = _modulus(params, ratio, tangent, new)
+    if params[SPALL] < np.inf:
+        _tear(w, s, params, n)
+
+
+@njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
+def _tear(w, s, params, n):  # type: ignore[no-untyped-def]
+    """As ``_tear_linear``: at the cut-off, and at zero while pores close, the cold pressure is linear in the ratio of
+    the matter, which follows from the pressure; matter whose pores are gone has the pressure of its ratio.
+    """
+    spall, stiffness = params[SPALL], params[BULK]
+    for i in range(n):
+        p, pores = s[_P + i], s[_PORES + i]
+        if p >= -spall and not (pores > 0.0 and p > 0.0):
+            continue
+        old, change, heating = w[_OLD + i], w[CHANGE + i], params[_GAMMA] * params[DENSITY] / s[_MASS + i]
+        before = s[_WORK + i] + 0.5 * (old + p) * change
+        known = heating * (before + s[_WORK_VISCOUS + i] - 0.5 * old * change)
+        factor, whole = 1.0 + 0.5 * heating * change, (1.0 + pores) * s[_RATIO + i]
+        new = -spall if p < 0.0 else 0.0
+        ratio = 1.0 - (new * factor - known) / stiffness
+        if ratio > whole:
+            ratio = whole
+            new = (_cold(params, ratio)[0] + known) / factor
+        s[_P + i], s[_RATIO + i], s[_PORES + i] = new, ratio, whole / ratio - 1.0
+        s[_WORK + i] = before - 0.5 * (old + new) * change
+        s[_WORK_PLASTIC + i] += spall * max(1.0 - (1.0 + pores) * ratio / whole, 0.0) * w[VOLUME + i]
+        w[MODULUS + i] = _modulus(params, ratio, _cold(params, ratio)[1], new)
+
+
+def _gruneisen(eos: MieGruneisen) -> tuple[float, ...]:
+    return eos.c0, eos.S, eos.gamma0
+
+
+ELASTIC = Equation("", 0, lambda _: (), linear)
+"""The pressure of the elasticity."""
+GRUNEISEN = Equation("mie_gruneisen", VOLUME_RATIO + 1, _gruneisen, mie_gruneisen)
+"""Compression and heat."""

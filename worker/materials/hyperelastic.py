@@ -9,7 +9,7 @@ import numpy as np
 from ..elements.tet4 import EDGE, MODULUS, RATE, REFERENCE, SEEN, TRIAL, VOLUME
 from ..jit import njit
 from ..state import CHUNK, DISTORTION, MASS, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, WORK
-from .models import DENSITY, SHEAR
+from .law import DENSITY, FROM_SHAPE, SHEAR, Law
 
 _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
@@ -80,8 +80,8 @@ def _roots(w, n, shear):  # type: ignore[no-untyped-def]
         w[_HALF_SHEAR + i] = 0.5 * shear / np.sqrt(1.0 + more)
 
 
-@njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
-def hyperelastic(w, s, params, n):  # type: ignore[no-untyped-def]
+@njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
+def hyperelastic(w, s, params, n, dt):  # type: ignore[no-untyped-def]
     """The deviatoric stress G / 2J dev(b - b^-1) of a chunk, Pa; its work is the change of its potential.
 
     ``w`` holds the edges of the end of the step and, from REFERENCE on, those of the undeformed tets. All is made of B
@@ -126,3 +126,7 @@ def stiffen(w, s, params, n):  # type: ignore[no-untyped-def]
     for i in range(n):
         stiff = (of_mass * s[_MASS + i] + 2.0 * s[_DISTORTION + i]) / abs(w[VOLUME + i])
         w[MODULUS + i] += 4.0 * _THIRD * (stiff - shear)
+
+
+LAW = Law("", FROM_SHAPE, DISTORTION + 1, lambda _: (), lambda *_: {}, hyperelastic)
+"""Materials without a strength."""

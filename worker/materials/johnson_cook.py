@@ -5,12 +5,15 @@ sigma = (A + B e^n) (1 + C ln max(rate / rate_0, 1)) (1 - T*^m). Johnson and Coo
 
 import math
 
+from conoid.cases.laws.johnson_cook import JohnsonCook
+
 from ..elements.tet4 import TRIAL, VOLUME_MID
 from ..jit import njit
 from ..state import CHUNK, FLOW, MASS, PLASTIC_STRAIN, TEMPERATURE, WORK_PLASTIC, YIELD
-from .models import JC_A, JC_B, JC_C, JC_HEAT, JC_M, JC_MELT, JC_N, JC_RATE, JC_T0, SHEAR
+from .law import BEFORE_PRESSURE, FIRST, SHEAR, Law
 from .plastic import equivalent_stress, scale_deviator
 
+_A, _B, _N, _C, _M, _RATE, _T0, _MELT, _HEAT = range(FIRST, FIRST + 9)
 _STRAIN, _WORK, _YIELD, _FLOW = PLASTIC_STRAIN * CHUNK, WORK_PLASTIC * CHUNK, YIELD * CHUNK, FLOW * CHUNK
 _TEMPERATURE, _MASS = TEMPERATURE * CHUNK, MASS * CHUNK
 _MOST = 60
@@ -22,13 +25,13 @@ _CLOSE = 1e-4
 @njit("UniTuple(float64, 2)(float64[::1], float64)", cache=True, error_model="numpy")
 def softening(params, temperature):  # type: ignore[no-untyped-def]
     """1 - T*^m and its derivative by temperature, 1/K; 1 below the reference temperature, 0 from melting on."""
-    span = params[JC_MELT] - params[JC_T0]
-    homologous = (temperature - params[JC_T0]) / span
+    span = params[_MELT] - params[_T0]
+    homologous = (temperature - params[_T0]) / span
     if homologous <= 0.0:
         return 1.0, 0.0
     if homologous >= 1.0:
         return 0.0, 0.0
-    m = params[JC_M]
+    m = params[_M]
     power = homologous if m == 1.0 else homologous**m
     return 1.0 - power, -m * power / (homologous * span)
 
@@ -39,13 +42,13 @@ def flow_stress(params, strain, increment, dt, temperature):  # type: ignore[no-
 
     ``strain`` is the plastic strain at the end of the increment.
     """
-    power = params[JC_B] * strain ** params[JC_N] if strain > 0.0 else 0.0
-    hardening = params[JC_A] + power
-    slope = params[JC_N] * power / strain if strain > 0.0 else 0.0
-    relative = increment / (dt * params[JC_RATE])
+    power = params[_B] * strain ** params[_N] if strain > 0.0 else 0.0
+    hardening = params[_A] + power
+    slope = params[_N] * power / strain if strain > 0.0 else 0.0
+    relative = increment / (dt * params[_RATE])
     rate, rate_slope = 1.0, 0.0
     if relative > 1.0:
-        rate, rate_slope = 1.0 + params[JC_C] * math.log(relative), params[JC_C] / increment
+        rate, rate_slope = 1.0 + params[_C] * math.log(relative), params[_C] / increment
     heat, heat_slope = softening(params, temperature)
     return (
         hardening * rate * heat,
@@ -100,7 +103,7 @@ def johnson_cook(w, s, params, n, dt):  # type: ignore[no-untyped-def]
         if q <= s[_YIELD + i]:
             continue
         density = s[_MASS + i] / w[VOLUME_MID + i]
-        heat = params[JC_HEAT] / density
+        heat = params[_HEAT] / density
         guess = (q - s[_FLOW + i]) / shear3
         d, flow, static = plastic_increment(params, q, s[_STRAIN + i], s[_TEMPERATURE + i], dt, guess, heat)
         scale_deviator(s, i, flow / q)
@@ -109,3 +112,26 @@ def johnson_cook(w, s, params, n, dt):  # type: ignore[no-untyped-def]
         s[_TEMPERATURE + i] += heat * flow * d
         s[_YIELD + i] = static
         s[_FLOW + i] = flow
+
+
+def _constants(law: JohnsonCook) -> tuple[float, ...]:
+    heat = law.taylor_quinney / law.specific_heat
+    return (
+        law.A, law.B, law.n, law.C, law.m, law.reference_rate, law.reference_temperature, law.melt_temperature, heat
+    )  # fmt: skip
+
+
+def initial_yield(law: JohnsonCook, temperature: float) -> float:
+    """Flow stress at zero plastic strain and vanishing rate, Pa."""
+    span = law.melt_temperature - law.reference_temperature
+    homologous = min(max((temperature - law.reference_temperature) / span, 0.0), 1.0)
+    return float(law.A * (1.0 - homologous**law.m))
+
+
+def _begin(law: JohnsonCook, temperature: float) -> dict[int, float]:
+    strength = initial_yield(law, temperature)
+    return {YIELD: strength, FLOW: strength, TEMPERATURE: temperature}
+
+
+LAW = Law("johnson_cook", BEFORE_PRESSURE, TEMPERATURE + 1, _constants, _begin, johnson_cook)
+"""Strength with the heat of the plastic work; damage is not in it."""

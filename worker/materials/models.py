@@ -1,49 +1,66 @@
-"""Which constants a material carries into the kernels: one flat vector a block, at fixed places.
+"""The laws and the equations of state that there are, and the kernels that pick a block's.
 
-A strength model or an equation of state is a number here, a declaration of constants, and a function over a chunk of
-elements in a file of its own; the sweep picks the function once a chunk.
+``LAWS`` and ``EQUATIONS`` number them by their places; a block carries both numbers and one vector of constants. Who
+adds a law adds its line to LAWS and its branch below; tests/worker/test_laws.py finds one that lacks its branch.
 """
 
 import math
 
 import numpy as np
 
-from conoid.cases.materials import JohnsonCook, LinearHardening, Material, MieGruneisen, MohrCoulomb
+from conoid.cases.materials import Material
 from conoid.cases.schema import Viscosity
 
 from .. import state
+from ..jit import njit
 from ..state import Floats
+from . import equation_of_state, hyperelastic, johnson_cook, mohr_coulomb, plastic
+from .law import BULK, DENSITY, EQUATION, FIRST, ORDER, Q_LINEAR, Q_QUADRATIC, SHEAR, SIZE, SPALL, Equation, Law, placed
 
-# Strength models.
-ELASTIC, LINEAR_HARDENING, JOHNSON_COOK, MOHR_COULOMB = range(4)
+LAWS = (hyperelastic.LAW, plastic.LAW, johnson_cook.LAW, mohr_coulomb.LAW)
+EQUATIONS = (equation_of_state.ELASTIC, equation_of_state.GRUNEISEN)
 
-# Equations of state.
-LINEAR, MIE_GRUNEISEN = range(2)
 
-# Places in the vector.
-DENSITY, BULK, SHEAR, Q_LINEAR, Q_QUADRATIC = range(5)
-C0, SLOPE, GAMMA = range(5, 8)
-YIELD_0, HARDENING = range(8, 10)
-JC_A, JC_B, JC_N, JC_C, JC_M, JC_RATE, JC_T0, JC_MELT, JC_HEAT = range(8, 17)
-MC_SINE, MC_COHESION, MC_CAP, MC_FAILURE = 8, 9, 12, 13
-MC_RESIDUAL = 2
-"""How far behind MC_SINE and MC_COHESION those of failed material stand."""
-SIZE = 17
-"""Length of the vector."""
+@njit("void(int64, float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
+def strengthen(law, w, s, params, n, dt):  # type: ignore[no-untyped-def]
+    """The kernel of a law of LAWS: the deviatoric stress of a chunk, and what the law remembers."""
+    if law == 0:
+        hyperelastic.hyperelastic(w, s, params, n, dt)
+    elif law == 1:
+        plastic.linear_hardening(w, s, params, n, dt)
+    elif law == 2:
+        johnson_cook.johnson_cook(w, s, params, n, dt)
+    elif law == 3:
+        mohr_coulomb.mohr_coulomb(w, s, params, n, dt)
+
+
+@njit("void(int64, float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
+def press(equation, w, s, params, n):  # type: ignore[no-untyped-def]
+    """The kernel of an equation of EQUATIONS: the pressure of a chunk, its work, and the MODULUS."""
+    if equation == 0:
+        equation_of_state.linear(w, s, params, n)
+    elif equation == 1:
+        equation_of_state.mie_gruneisen(w, s, params, n)
 
 
 def strength_of(material: Material) -> int:
-    """The number of the material's strength model."""
-    if isinstance(material.strength, JohnsonCook):
-        return JOHNSON_COOK
-    if isinstance(material.strength, MohrCoulomb):
-        return MOHR_COULOMB
-    return LINEAR_HARDENING if isinstance(material.strength, LinearHardening) else ELASTIC
+    """The number of the material's law of strength."""
+    return [law.model for law in LAWS].index("" if material.strength is None else material.strength.model)
 
 
 def eos_of(material: Material) -> int:
     """The number of the material's equation of state."""
-    return MIE_GRUNEISEN if isinstance(material.eos, MieGruneisen) else LINEAR
+    return [equation.model for equation in EQUATIONS].index("" if material.eos is None else material.eos.model)
+
+
+def law_of(material: Material) -> Law:
+    """The material's law of strength."""
+    return LAWS[strength_of(material)]
+
+
+def equation_of(material: Material) -> Equation:
+    """The material's equation of state."""
+    return EQUATIONS[eos_of(material)]
 
 
 def moduli(material: Material) -> tuple[float, float]:
@@ -57,65 +74,25 @@ def moduli(material: Material) -> tuple[float, float]:
 
 def parameters(material: Material, viscosity: Viscosity | None) -> Floats:
     """(SIZE,) constants of a material, SI; ``viscosity`` None switches the bulk viscosity off."""
-    params = np.zeros(SIZE)
-    params[DENSITY] = material.density
+    law, params = law_of(material), np.zeros(SIZE)
+    params[DENSITY], params[ORDER] = material.density, law.order
+    params[SPALL] = math.inf if material.spall is None else material.spall
     params[BULK], params[SHEAR] = moduli(material)
     if viscosity is not None:
         params[Q_LINEAR], params[Q_QUADRATIC] = viscosity.linear, viscosity.quadratic
-    if material.eos is not None:
-        params[C0 : GAMMA + 1] = material.eos.c0, material.eos.S, material.eos.gamma0
-    strength = material.strength
-    if isinstance(strength, LinearHardening):
-        params[YIELD_0], params[HARDENING] = strength.yield_stress, strength.hardening
-    elif isinstance(strength, JohnsonCook):
-        heat = strength.taylor_quinney / strength.specific_heat
-        params[JC_A : JC_HEAT + 1] = (
-            strength.A, strength.B, strength.n, strength.C, strength.m, strength.reference_rate,
-            strength.reference_temperature, strength.melt_temperature, heat,
-        )  # fmt: skip
-    elif isinstance(strength, MohrCoulomb):
-        params[MC_SINE : MC_FAILURE + 1] = _mohr_coulomb(strength)
+    placed(params, EQUATION, equation_of(material).constants(material.eos), FIRST - EQUATION)
+    placed(params, FIRST, law.constants(material.strength), SIZE - FIRST)
     return params
-
-
-def _mohr_coulomb(strength: MohrCoulomb) -> tuple[float, ...]:
-    """The six constants from MC_SINE on; what is not given never happens."""
-    residual = strength.residual_friction_angle
-    angle = min(math.radians(30.0), strength.friction_angle) if residual is None else residual
-    return (
-        *_sine_and_cohesion(strength.cohesion, strength.friction_angle),
-        *_sine_and_cohesion(strength.residual_cohesion or 0.0, angle),
-        math.inf if strength.strength_cap is None else strength.strength_cap,
-        math.inf if strength.failure_strain is None else strength.failure_strain,
-    )
-
-
-def _sine_and_cohesion(cohesion: float, angle: float) -> tuple[float, float]:
-    """sin(phi) and 2 c cos(phi), Pa."""
-    return math.sin(angle), 2.0 * cohesion * math.cos(angle)
 
 
 def rows_of(material: Material, pressure: str) -> int:
     """How many rows of state an element of this material needs (worker/state.py)."""
-    strength, eos = strength_of(material), eos_of(material)
-    if strength == JOHNSON_COOK:
-        return state.TEMPERATURE + 1
-    if strength == MOHR_COULOMB:
-        return state.WORK_PLASTIC + 1
-    if strength == LINEAR_HARDENING:
-        return state.YIELD + 1
-    if eos == MIE_GRUNEISEN:
-        return state.VOLUME_RATIO + 1
-    return state.DISTORTION + 1 if pressure == "standard" else state.VOLUME_FLUX + 1
+    averaged = 0 if pressure == "standard" else state.VOLUME_FLUX + 1
+    porous = 0 if material.spall is None else state.PORES + 1
+    return max(law_of(material).rows, equation_of(material).rows, averaged, porous)
 
 
-def initial_yield(material: Material, temperature: float) -> float:
-    """Flow stress at zero plastic strain and vanishing rate, Pa."""
-    strength = material.strength
-    if isinstance(strength, LinearHardening):
-        return strength.yield_stress
-    if isinstance(strength, JohnsonCook):
-        span = strength.melt_temperature - strength.reference_temperature
-        homologous = min(max((temperature - strength.reference_temperature) / span, 0.0), 1.0)
-        return float(strength.A * (1.0 - homologous**strength.m))
-    return 0.0
+def beginning(material: Material, temperature: float) -> dict[int, float]:
+    """Rows of state that do not begin with zero, as far as a block has them."""
+    own = law_of(material).begin(material.strength, temperature)
+    return {state.VOLUME_RATIO: 1.0, state.TEMPERATURE: temperature, **own}

@@ -4,14 +4,21 @@ f = (s1 - s3) + (s1 + s3) sin(phi) - 2 c cos(phi) <= 0 with s1 >= s2 >= s3, tens
 Derived in docs/numerics.md. The steps of the return are inlined by force: as calls they take three times as long.
 """
 
+import math
+
 import numpy as np
+
+from conoid.cases.laws.mohr_coulomb import MohrCoulomb
 
 from ..elements.tet4 import D_XX, D_XY, D_YY, D_YZ, D_ZX, D_ZZ, TRIAL, VOLUME_MID
 from ..jit import njit
 from ..state import CHUNK, PLASTIC_STRAIN, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, WORK_PLASTIC
-from .models import MC_CAP, MC_COHESION, MC_FAILURE, MC_RESIDUAL, MC_SINE, SHEAR
+from .law import AFTER_PRESSURE, FIRST, SHEAR, Law
 from .plastic import equivalent_stress
 
+_SINE, _COHESION, _CAP, _FAILURE = FIRST, FIRST + 1, FIRST + 4, FIRST + 5
+_RESIDUAL = 2
+"""How far behind _SINE and _COHESION those of failed material stand."""
 _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _P, _STRAIN, _WORK = PRESSURE * CHUNK, PLASTIC_STRAIN * CHUNK, WORK_PLASTIC * CHUNK
@@ -115,11 +122,11 @@ def mohr_coulomb(w, s, params, n, dt):  # type: ignore[no-untyped-def]
     the elastic energy of the stress, also where the strength itself falls, by a release of pressure or by failure.
     """
     equivalent_stress(w, s, n)
-    shear2, cap = 2.0 * params[SHEAR], params[MC_CAP]
+    shear2, cap = 2.0 * params[SHEAR], params[_CAP]
     for i in range(n):
-        k = MC_RESIDUAL if s[_STRAIN + i] > params[MC_FAILURE] else 0
-        sine = params[MC_SINE + k]
-        strength = params[MC_COHESION + k] + 2.0 * sine * s[_P + i]
+        k = _RESIDUAL if s[_STRAIN + i] > params[_FAILURE] else 0
+        sine = params[_SINE + k]
+        strength = params[_COHESION + k] + 2.0 * sine * s[_P + i]
         q = w[TRIAL + i]
         most = _MISES * q
         if (most * np.sqrt(1.0 + sine * sine * _THIRD) <= strength and most <= cap) or q == 0.0:
@@ -145,3 +152,24 @@ def mohr_coulomb(w, s, params, n, dt):  # type: ignore[no-untyped-def]
         )
         s[_STRAIN + i] += q / shear2 * np.sqrt(_TWO_THIRDS * square)
         s[_WORK + i] += w[VOLUME_MID + i] * q * q / shear2 * max(work + 0.5 * (square - r * shear2 * dt * moved), 0.0)
+
+
+def _constants(law: MohrCoulomb) -> tuple[float, ...]:
+    """What is not given never happens."""
+    residual = law.residual_friction_angle
+    angle = min(math.radians(30.0), law.friction_angle) if residual is None else residual
+    return (
+        *_sine_and_cohesion(law.cohesion, law.friction_angle),
+        *_sine_and_cohesion(law.residual_cohesion or 0.0, angle),
+        math.inf if law.strength_cap is None else law.strength_cap,
+        math.inf if law.failure_strain is None else law.failure_strain,
+    )
+
+
+def _sine_and_cohesion(cohesion: float, angle: float) -> tuple[float, float]:
+    """sin(phi) and 2 c cos(phi), Pa."""
+    return math.sin(angle), 2.0 * cohesion * math.cos(angle)
+
+
+LAW = Law("mohr_coulomb", AFTER_PRESSURE, WORK_PLASTIC + 1, _constants, lambda *_: {}, mohr_coulomb)
+"""Beyond the apex nothing is left of the deviator; the pressure of tension stays, to be broken by facets."""

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from conoid.cases.laws.linear_hardening import LinearHardening
+
 from ..elements.tet4 import TRIAL, VOLUME_MID
 from ..jit import njit
 from ..state import (
@@ -16,8 +18,9 @@ from ..state import (
     WORK_PLASTIC,
     YIELD,
 )
-from .models import HARDENING, SHEAR
+from .law import BEFORE_PRESSURE, FIRST, SHEAR, Law
 
+_HARDENING = FIRST
 _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _STRAIN, _WORK, _YIELD = PLASTIC_STRAIN * CHUNK, WORK_PLASTIC * CHUNK, YIELD * CHUNK
@@ -47,7 +50,7 @@ def scale_deviator(s, i, factor):  # type: ignore[no-untyped-def]
 def linear_hardening(w, s, params, n, dt):  # type: ignore[no-untyped-def]
     """Returns the trial stress to the yield surface; strain increment (q - yield) / (3 G + H), exact for this law."""
     equivalent_stress(w, s, n)
-    shear3, hardening = 3.0 * params[SHEAR], params[HARDENING]
+    shear3, hardening = 3.0 * params[SHEAR], params[_HARDENING]
     for i in range(n):
         q, old = w[TRIAL + i], s[_YIELD + i]
         over = max(q - old, 0.0)
@@ -63,3 +66,13 @@ def linear_hardening(w, s, params, n, dt):  # type: ignore[no-untyped-def]
         s[_YIELD + i] = new
         s[_STRAIN + i] += increment
         s[_WORK + i] += new * increment * w[VOLUME_MID + i]
+
+
+def _begin(law: LinearHardening, _: float) -> dict[int, float]:
+    return {YIELD: law.yield_stress}
+
+
+LAW = Law(
+    "linear_hardening", BEFORE_PRESSURE, YIELD + 1, lambda law: (law.hardening,), _begin, linear_hardening
+)  # fmt: skip
+"""The strength is in the state."""

@@ -15,17 +15,23 @@ def bulk_viscosity(w, s, n, linear, quadratic, rate_of_change):  # type: ignore[
 
     von Neumann and Richtmyer 1950 (quadratic), Landshoff 1955 (linear). ``rate_of_change`` turns CHANGE into a volume
     flux, 1/s. With G = sqrt(sum |grad N|^2) and Q the tangent (linear c + 2 quadratic l |rate|) the largest stable
-    step is 1 / (G (G l Q + sqrt((G l Q)^2 + c^2))), derived in docs/numerics.md; l = LENGTH_FACTOR / G.
+    step is 1 / (G (G l Q + sqrt((G l Q)^2 + c^2))), derived in docs/numerics.md; l = LENGTH_FACTOR / G. A tet that is
+    inside out has no viscosity, and NaN as its limit.
     """
     for i in range(n):
-        volume, mass, change = w[VOLUME + i], s[_MASS + i], w[CHANGE + i]
+        mass, change = s[_MASS + i], w[CHANGE + i]
+        inside_out = w[VOLUME + i] <= 0.0
+        volume = 1.0 if inside_out else w[VOLUME + i]
         density = mass / volume
         area = np.sqrt(w[AREAS + i])
         c = np.sqrt(w[MODULUS + i] / density)
         gradient, length = area / volume, LENGTH_FACTOR * volume / area
-        rate = max(-change * rate_of_change / volume, 0.0)
+        rate = -change * rate_of_change / volume
+        rate = 0.0 if inside_out or rate < 0.0 else rate
         new = density * length * rate * (linear * c + quadratic * length * rate)
-        tangent = LENGTH_FACTOR * (linear * c + 2.0 * quadratic * length * rate) if rate > 0.0 else 0.0
+        tangent = LENGTH_FACTOR * (linear * c + 2.0 * quadratic * length * rate)
+        tangent = 0.0 if rate == 0.0 else tangent
         s[_WORK + i] -= 0.5 * (s[_Q + i] + new) * change
         s[_Q + i] = new
-        w[LIMIT + i] = gradient * (tangent + np.sqrt(tangent * tangent + c * c))
+        limit = gradient * (tangent + np.sqrt(tangent * tangent + c * c))
+        w[LIMIT + i] = np.nan if inside_out else limit

@@ -72,7 +72,7 @@ class _Body:
 
 @dataclass
 class _Instance:
-    """A part where it stands: ``body`` turned and moved as ``lines`` say."""
+    """A part in its place: ``body`` turned and moved as ``lines`` say."""
 
     name: str
     body: _Body

@@ -28,7 +28,7 @@ def build(
 ) -> TetMesh:
     """The tets of ``mesh``: checked, in Morton order, the same bits every time; ``made`` is called before one is made.
 
-    ``folder`` is where a relative path of a mesh file starts, ``key`` where the mesh stands in its case, for messages.
+    ``folder`` is where a relative path of a mesh file starts, ``key`` that of the mesh in its case, for messages.
     What needs gmsh, and every file, is handled by a child process within ``limits``. Raises MeshError.
     """
     source = _source(mesh, folder, key) if isinstance(mesh, MeshFile) else None

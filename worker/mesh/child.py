@@ -28,7 +28,7 @@ _PASSED_ON = ("HOME", "LANG", "LC_ALL", "LD_LIBRARY_PATH", "PATH", "PYTHONPATH",
 """The environment variables that the child gets."""
 
 _LOOK = 0.2
-"""Seconds between two looks at a child that is still at work."""
+"""Seconds between two checks of a child that is still at work."""
 
 _FULL = 0.97
 """A child with this share of its memory limit has no room left to say so."""

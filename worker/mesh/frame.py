@@ -41,7 +41,7 @@ def block(body: Generated) -> tuple[list[float], list[float]]:
 
 
 def refuse_impossible(body: Generated, key: str) -> None:
-    """MeshError for a body without volume or with more tets than anybody wants; ``key`` is where the mesh stands."""
+    """MeshError for a body without volume or with more tets than anybody wants; ``key``: of the mesh in its case."""
     whole = volume(body)
     if not whole > 0:
         raise MeshError(f"{key}: the {body.shape} has no volume; check its sizes")

@@ -31,10 +31,14 @@ FORMAT = 3
 _KEPT = 2
 """Checkpoints that stay; the older ones go."""
 _MANIFEST = "manifest.json"
-_FREE = (
-    "ranks", "profile", "cut_scale", "max_steps", "max_wall_time", "checkpoint_every", "residual_limit", "snapshots",
-)  # fmt: skip
-"""Keys of ``run`` that may change when a run goes on."""
+_FREE = {
+    "run": {
+        "ranks", "profile", "cut_scale", "max_steps", "max_wall_time", "checkpoint_every", "residual_limit",
+        "snapshots",
+    },
+    "contact": {"skin", "domain"},
+}  # fmt: skip
+"""Keys that may change when a run goes on: the answer does not depend on them."""
 _PIECE = 1 << 24
 """Bytes that are hashed at once."""
 
@@ -108,9 +112,13 @@ def require_same(case: Case, manifest: dict[str, Any]) -> None:
 
 
 def _answering(case: dict[str, Any]) -> dict[str, Any]:
-    """The keys of a case that its answer depends on, those of ``run`` one by one."""
-    run = {f"run.{key}": value for key, value in case["run"].items() if key not in _FREE}
-    return {key: value for key, value in case.items() if key not in ("run", "balance", "title", "description")} | run
+    """The keys of a case that its answer depends on, those of ``run`` and ``contact`` one by one."""
+    found = {key: value for key, value in case.items() if key not in ("balance", "title", "description")}
+    for table, free in _FREE.items():
+        if isinstance(keys := found.get(table), dict):
+            del found[table]
+            found |= {f"{table}.{key}": value for key, value in keys.items() if key not in free}
+    return found
 
 
 def read(place: Path, manifest: dict[str, Any], comm: Comm) -> Parcel:

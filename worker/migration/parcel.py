@@ -53,8 +53,8 @@ class Parcel:
     """By part, a row a tet: ``id`` (n,), ``corners`` (n, 4) global ids, and the rest."""
     rows: dict[str, Table] = field(default_factory=dict)
     """Tables of other things. They go where their ``tet`` (k,) goes, or to the owner of their ``node`` (k,), or to
-    where they are, ``at`` (k, 3). Nodes ``with`` them (k, m), -1 for none, come along, ``key`` (k,) tells copies of a
-    row apart from other rows."""
+    where they are, ``at`` (k, 3). Nodes ``with`` them (k, m), -1 for none, come along, rows of one
+    ``key`` (k,) are copies of each other."""
 
     def packed(self) -> Ints:
         """One flat message."""

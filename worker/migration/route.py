@@ -1,7 +1,7 @@
 """Where everything goes: a cut of all tets, parcels from rank to rank, and who holds and owns what afterwards.
 
 Tets take along the nodes that they need. Who shares a node with whom is settled by a directory: the rank that a node's
-id falls to hears of all who hold it and tells each of them of the others.
+id falls to receives the ranks that hold it and sends each of them the others.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from ..state import Flags, Floats, Indices, Ints, among
 from .parcel import Parcel, joined, length, once, take
 
 _NOBODY = np.iinfo(np.int64).max
-"""Stands for the smallest tet of a rank that has none at a node."""
+"""In place of the smallest tet of a rank that has none at a node."""
 
 
 @dataclass
@@ -92,7 +92,7 @@ def _cut(parcel: Parcel, scale: Floats, comm: Comm) -> tuple[dict[int, Indices],
 
 
 def _share(parcel: Parcel, targets: dict[int, Indices], cuts: list[Cut], rank: int, scale: Floats) -> Parcel:
-    """What goes to ``rank``, but for what goes to owners of nodes, whom nobody knows yet."""
+    """What goes to ``rank``, without what goes to owners of nodes, which are settled later."""
     tets = {part: take(table, targets[part] == rank) for part, table in parcel.tets.items()}
     there = np.sort(np.concatenate([np.zeros(0, np.int64), *(table["id"] for table in tets.values())]))
     rows, needed = {}, [np.zeros(0, np.int64), *(table["corners"].reshape(-1) for table in tets.values())]
@@ -126,7 +126,7 @@ def _settle(whole: Parcel, comm: Comm) -> tuple[Directory, list[Neighbour], Indi
     owners = every[first, 2]
     directory = Directory(comm, every[first, 0], owners.astype(np.int32))
     group = np.cumsum(first) - 1
-    back = {rank: _company(every, group, owners, rank) for rank in told}
+    back = {rank: _sharing(every, group, owners, rank) for rank in told}
     answers = comm.swap(back)
     shared = np.concatenate([np.zeros((0, 3), np.int64), *(w.reshape(-1, 3) for w in answers.values())])
     shared = shared[np.lexsort((shared[:, 0], shared[:, 1]))]
@@ -139,7 +139,7 @@ def _settle(whole: Parcel, comm: Comm) -> tuple[Directory, list[Neighbour], Indi
     return directory, neighbours, owner
 
 
-def _company(every: Ints, group: Ints, owners: Ints, rank: int) -> Ints:
+def _sharing(every: Ints, group: Ints, owners: Ints, rank: int) -> Ints:
     """(k, 3) node, other holder and owner, for the nodes that ``rank`` shares; ``group``: which node a row is of."""
     held = np.zeros(len(owners), bool)
     held[group[every[:, 2] == rank]] = True

@@ -8,7 +8,8 @@ import numpy as np
 
 from conoid.cases.schema import Case
 
-from ..fracture.cohesive import Cohesion, Facets
+from ..fracture.cohesive import Cohesion
+from ..fracture.columns import Facets
 from ..parallel.comm import Comm
 from ..state import PLASTIC_STRAIN, Block, Floats, Ints, Model
 
@@ -33,10 +34,10 @@ def spent_energy(f: Facets) -> Floats:
     The area that is left under the law of a pair is strength share^2 critical / 2, share being what is left of the
     traction (fracture/cohesive.py); a facet has three pairs.
     """
-    beyond = np.maximum(f.top - f.knee, 0.0)
-    fallen = np.divide(beyond, f.critical, out=(beyond > 0.0).astype(float), where=f.critical > 0.0)
-    left = 0.5 * f.strength * f.critical * np.maximum(1.0 - fallen, 0.0) ** 2
-    return np.asarray(np.clip(1.0 - left.mean(axis=1) / f.energy, 0.0, 1.0))
+    law, beyond = f.softening, np.maximum(f.state.top - f.softening.knee, 0.0)
+    fallen = np.divide(beyond, law.critical, out=(beyond > 0.0).astype(float), where=law.critical > 0.0)
+    left = 0.5 * law.strength * law.critical * np.maximum(1.0 - fallen, 0.0) ** 2
+    return np.asarray(np.clip(1.0 - left.mean(axis=1) / f.constants.energy, 0.0, 1.0))
 
 
 def _facets(cohesion: Cohesion, comm: Comm) -> tuple[Ints, Floats]:

@@ -40,19 +40,21 @@ def write_parquet(path: Path) -> Path | None:
     """A history as Parquet beside it, with the unit of each column in its metadata; None where pyarrow is missing."""
     try:
         import pyarrow
+        from pyarrow import csv as tables
         from pyarrow import parquet
     except ModuleNotFoundError:
         return None
     with path.open(newline="", encoding="utf-8") as file:
-        head, *rows = csv.reader(file)
-    kinds = {"step": (pyarrow.int64(), int), "limiter": (pyarrow.string(), str)}
-    fields, arrays = [], []
-    for at, (name, unit) in enumerate(map(history.split, head)):
-        kind, read = kinds.get(name, (pyarrow.float64(), float))
-        fields.append(pyarrow.field(name, kind, metadata={"unit": unit} if unit else None))
-        arrays.append(pyarrow.array([read(row[at]) for row in rows], kind))
+        head = next(csv.reader(file))
+    kinds = {"step": pyarrow.int64(), "limiter": pyarrow.string()}
+    columns = {entry: kinds.get(history.split(entry)[0], pyarrow.float64()) for entry in head}
+    read = tables.read_csv(path, convert_options=tables.ConvertOptions(column_types=columns, null_values=[]))
+    fields = [
+        pyarrow.field(name, columns[entry], metadata={"unit": unit} if unit else None)
+        for entry, (name, unit) in zip(head, map(history.split, head), strict=True)
+    ]
     target = path.with_name(layout.HISTORY_PARQUET)
     beside = target.with_suffix(".part")
-    parquet.write_table(pyarrow.Table.from_arrays(arrays, schema=pyarrow.schema(fields)), beside)
+    parquet.write_table(pyarrow.Table.from_arrays(read.columns, schema=pyarrow.schema(fields)), beside)
     beside.rename(target)
     return target

@@ -1,4 +1,4 @@
-"""journal.jsonl, the truth of a run: every message numbered, written and flushed before anybody else hears of it."""
+"""journal.jsonl, the truth of a run: every message numbered, written and flushed before anybody else receives it."""
 
 import contextlib
 import time
@@ -18,19 +18,19 @@ class Listener(Protocol):
     """Who is told of a message once it is in the journal."""
 
     def tell(self, message: messages.AnyMessage, blob: bytes = b"") -> None:
-        """Takes the message without waiting for anybody; ``blob``: the bytes that it tells of, where there are any."""
+        """Takes the message without waiting for anybody; ``blob``: the bytes of a snapshot, where there are any."""
 
 
 class Journal:
-    """Appends to the journal of a run folder, going on from the last number that stands there."""
+    """Appends to the journal of a run folder, going on from the last number in it."""
 
     def __init__(self, folder: Path, run: str, listener: Listener | None = None) -> None:
         path = folder / layout.JOURNAL
         self._run = run
         self.frames: set[int] = set()
-        """Indices of the frames that it tells of."""
+        """Indices of the frames that it lists."""
         self.snapshots = 0
-        """One more than the largest number of a snapshot that it tells of."""
+        """One more than the largest number of a snapshot that it lists."""
         self._seq = 0
         for message in _written(path):
             self._seq = message.seq
@@ -44,10 +44,12 @@ class Journal:
         self._listener = listener
 
     def write(self, kind: type[M], step: int = 0, t: float = 0.0, blob: bytes = b"", **fields: Any) -> M:
-        """Writes one message and passes it on, with the ``blob`` that it tells of."""
+        """Writes one message and passes it on, with the ``blob`` of a snapshot."""
         self._seq += 1
         message = kind(run=self._run, seq=self._seq, wall=time.time(), step=step, t=t, **fields)
-        self._file.write(msgspec.json.encode(message) + b"\n")
+        line = msgspec.json.encode(message) + b"\n"
+        while line:
+            line = line[self._file.write(line) :]
         if self._listener is not None:
             self._listener.tell(message, blob)  # type: ignore[arg-type]
         return message

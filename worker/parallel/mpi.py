@@ -1,4 +1,4 @@
-"""The one module that knows MPI: the ranks of its world, and how a process leaves it."""
+"""The one module that imports MPI: the ranks of its world, and how a process leaves it."""
 
 import os
 import pickle
@@ -16,7 +16,7 @@ from .comm import Comm, Exchange, Pending, Sent, SerialComm
 from .tags import Tag
 
 _NAP = 0.01
-"""s between two looks of a rank that leaves its core to others; a hundredth of what the start of a rank takes."""
+"""s between two checks of a rank that leaves its core to others; a hundredth of what the start of a rank takes."""
 
 
 class MpiComm:
@@ -199,6 +199,14 @@ def leave(code: int) -> NoReturn:
 
     MPI.Finalize()
     sys.exit(code)
+
+
+def abort(code: int) -> NoReturn:
+    """Ends all ranks of the run now, whatever they are at, with an exit code."""
+    from mpi4py import MPI
+
+    MPI.COMM_WORLD.Abort(code)
+    raise SystemExit(code)
 
 
 def connect() -> Comm:

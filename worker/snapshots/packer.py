@@ -25,7 +25,7 @@ _NICE = 10
 _PATIENCE = 60.0
 """s that the share of a rank may take to appear. Chosen: many times what a slow disk takes."""
 _LOOK = 0.005
-"""s between two looks for a share. Chosen."""
+"""s between two checks for a share. Chosen."""
 
 
 def main(folder: Path) -> None:
@@ -43,7 +43,7 @@ def main(folder: Path) -> None:
 
 
 def _made(folder: Path, task: dict[str, Any], births: Births) -> dict[str, Any]:
-    """What the journal tells of a snapshot that is now in its place. Raises OSError, ValueError."""
+    """What the journal has of a snapshot that is now in its place. Raises OSError, ValueError."""
     paths = [layout.share(folder, task["n"], rank) for rank in range(task["ranks"])]
     try:
         whole = share.joined([_awaited(path) for path in paths], task["parts"])

@@ -64,7 +64,7 @@ class Snapshots:
         self._took = self._taken - began
 
     def tell(self) -> None:
-        """Tells of those that have been made since the last call; on rank 0."""
+        """Reports those that have been made since the last call; on rank 0."""
         answers = self._courier.answers
         while answers:
             answer, data = answers.popleft()
@@ -81,7 +81,7 @@ class Snapshots:
             self._journal.write(messages.Snapshot, **told)
 
     def close(self) -> None:
-        """Waits for the last, and tells of it; all ranks take part, and leave their cores to it."""
+        """Waits for the last, and reports it; all ranks take part, and leave their cores to it."""
         self._courier.close()
         self.tell()
         self._comm.await_all()

@@ -1,0 +1,77 @@
+"""What the models cannot check of boundaries: parts that must exist, boxes that hold something, walls in front."""
+
+import math
+from collections.abc import Iterator
+
+from .bodies import MeshFile
+from .geometry import lowest_along
+from .problems import Location, Problem, nearest, problem
+from .schema import Case, Gravity, Prescribed, Traction, Wall
+
+ROUNDING = 1e-9
+"""Of a length or a time: two numbers that agree to this were meant to be equal. Chosen far above the rounding of
+units (1e-16) and far below any tolerance of a drawing."""
+
+
+def check_boundaries(case: Case) -> Iterator[Problem]:
+    """Problems of the boundaries of a case, in the order of their keys."""
+    names = [part.name for part in case.parts]
+    for i, boundary in enumerate(case.boundaries):
+        for j, name in enumerate(boundary.parts):
+            if name not in names:
+                yield problem(("boundaries", i, "parts", j), name, f"no part of this name; {nearest(name, names)}")
+        if isinstance(boundary, Prescribed):
+            yield from _prescribed(boundary, ("boundaries", i))
+        elif isinstance(boundary, Gravity) and not any(boundary.acceleration):
+            yield problem(("boundaries", i, "acceleration"), "0, 0, 0", "must not be zero")
+        elif isinstance(boundary, Traction):
+            if not any(boundary.stress):
+                yield problem(("boundaries", i, "stress"), "0, 0, 0", "must not be zero")
+            yield from _box(boundary, ("boundaries", i))
+
+
+def _prescribed(boundary: Prescribed, location: Location) -> Iterator[Problem]:
+    if boundary.x is None and boundary.y is None and boundary.z is None:
+        yield problem(location, ..., "prescribes nothing; give one or more of x, y, z")
+    yield from _box(boundary, location)
+
+
+def _box(boundary: Prescribed | Traction, location: Location) -> Iterator[Problem]:
+    if (boundary.low is None) != (boundary.high is None):
+        yield problem(location, ..., "give both low and high, or neither for all of the parts")
+    elif boundary.low is not None and boundary.high is not None:
+        yield from ordered(boundary.low, boundary.high, location)
+
+
+def ordered(low: tuple[float, ...], high: tuple[float, ...], location: Location) -> Iterator[Problem]:
+    """Corners of a box of which ``high`` is below ``low``."""
+    for d, (a, b) in enumerate(zip(low, high, strict=True)):
+        if a > b:
+            yield problem((*location, "high", d), b, f"must not be below low[{d}], {a}")
+
+
+def check_walls(case: Case) -> Iterator[Problem]:
+    """Walls of one name, without a normal, or in front of which a part does not start."""
+    walls = [(i, boundary) for i, boundary in enumerate(case.boundaries) if isinstance(boundary, Wall)]
+    seen: set[str] = set()
+    for i, wall in walls:
+        if wall.name in seen:
+            yield problem(("boundaries", i, "name"), wall.name, "an earlier wall has this name; give each its own")
+        seen.add(wall.name)
+        length = math.hypot(*wall.normal)
+        if length == 0.0:
+            yield problem(("boundaries", i, "normal"), "0, 0, 0", "must not be zero")
+        else:
+            yield from _behind(case, i, wall, length)
+
+
+def _behind(case: Case, number: int, wall: Wall, length: float) -> Iterator[Problem]:
+    normal = (wall.normal[0] / length, wall.normal[1] / length, wall.normal[2] / length)
+    level = sum(n * x for n, x in zip(normal, wall.point, strict=True))
+    for part in case.parts:
+        if isinstance(part.mesh, MeshFile) or part.turn is not None or (wall.parts and part.name not in wall.parts):
+            continue
+        depth = level - lowest_along(part.mesh, normal)
+        if depth > ROUNDING * max(1.0, abs(level)):
+            message = f"part {part.name!r} starts {depth:g} m behind this wall; move it, or turn the normal round"
+            yield problem(("boundaries", number), ..., message)

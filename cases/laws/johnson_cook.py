@@ -1,0 +1,60 @@
+"""Johnson-Cook plasticity: its constants, and what is known of it before anything runs."""
+
+import math
+from collections.abc import Iterator
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field
+
+from ..tables import Positive
+from ..units import Rate, Ratio, SpecificHeat, Stress, Temperature
+from .law import Law, Likely, Wrong
+
+
+class JohnsonCook(Law):
+    """Flow stress (A + B e^n)(1 + C ln max(rate/reference_rate, 1))(1 - T*^m), adiabatic heating.
+
+    T* = (T - reference_temperature) / (melt_temperature - reference_temperature), clamped to [0, 1].
+    """
+
+    model: Literal["johnson_cook"]
+    """The law."""
+    A: Annotated[Stress, Positive]
+    """Flow stress before any plastic strain."""
+    B: Annotated[Stress, Field(ge=0)]
+    """Hardening."""
+    n: Annotated[Ratio, Field(gt=0, le=1)]
+    """Exponent of the hardening."""
+    C: Annotated[Ratio, Field(ge=0)]
+    """Rate dependence."""
+    m: Annotated[Ratio, Positive]
+    """Exponent of the thermal softening."""
+    reference_rate: Annotated[Rate, Positive] = 1.0
+    """Rate of plastic strain at which A, B and n were measured."""
+    reference_temperature: Annotated[Temperature, Field(ge=0)] = 293.15
+    """Temperature below which nothing softens."""
+    melt_temperature: Annotated[Temperature, Positive]
+    """Temperature at which nothing is left of the strength; above the reference."""
+    specific_heat: Annotated[SpecificHeat, Positive]
+    """Heat that warms the material."""
+    taylor_quinney: Annotated[Ratio, Field(ge=0, le=1)] = 0.9
+    """Share of the plastic work that becomes heat."""
+
+    nanoseconds: ClassVar[float] = 85.0
+
+    @property
+    def melting(self) -> float:
+        return self.melt_temperature
+
+    def flow_stress(self) -> float:
+        return self.A + self.B * math.pow(0.1, self.n)
+
+    def problems(self) -> Iterator[Wrong]:
+        if self.melt_temperature <= self.reference_temperature:
+            message = f"must be above {self.reference_temperature} K, the reference"
+            yield "melt_temperature", self.melt_temperature, message
+
+    def likely(self, young: float) -> Iterator[Likely]:
+        yield "A", "yield stress over Young's modulus", self.A / young
+        yield "specific_heat", "specific heat", self.specific_heat
+        yield "melt_temperature", "temperature", self.melt_temperature

@@ -1,0 +1,72 @@
+"""The suite of hard cases: which there are, and whether a run of one ended well."""
+
+import math
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from .estimate import estimate
+from .load import shipped
+from .outcome import Outcome
+from .schema import Case
+
+_TABLE = Path(__file__).with_name("hard.toml")
+RESIDUAL, DRIFT = 0.01, 1e-9
+"""Largest energy residual, and drift of the momentum over the sum of |m v| of the parts, of a case that ended well.
+Chosen: gates of the catalogue are 1 % and 1e-10 of a single body; sums of impulses are rounded."""
+
+
+@dataclass(frozen=True)
+class Hard:
+    """One case of the suite."""
+
+    name: str
+    rows: tuple[str, ...]
+    case: str
+    """Of a shipped case, or of a file in cases/hard."""
+    changes: tuple[str, ...] = ()
+    limit: float = RESIDUAL
+    """Of the energy residual."""
+
+    @property
+    def path(self) -> Path:
+        """Of the case file."""
+        return shipped().get(self.case, _TABLE.parent / "hard" / f"{self.case}.toml")
+
+
+def suite() -> list[Hard]:
+    """Every case, in the order of the table."""
+    listed = tomllib.loads(_TABLE.read_text(encoding="utf-8"))["hard"]
+    return [
+        Hard(e["name"], tuple(e["rows"]), e["case"], tuple(e.get("set", ())), float(e.get("limit", RESIDUAL)))
+        for e in listed
+    ]
+
+
+def is_free(case: Case) -> bool:
+    """Whether nothing from outside pushes it, and no mass leaves, so that its momentum stays."""
+    removes = any(part.erosion is not None and part.erosion.nodes == "remove" for part in case.parts)
+    return not case.boundaries and not removes
+
+
+def drift(case: Case, momenta: Sequence[tuple[float, float, float]]) -> float:
+    """Largest change of the momentum of a free case, over the sum of sqrt(2 m E) of its parts; NaN for no motion."""
+    brought = [part.bulk for part in estimate(case).parts if part.bulk is not None]
+    scale = math.fsum(math.sqrt(2.0 * bulk.mass * bulk.energy) for bulk in brought)
+    if not momenta or scale == 0.0:
+        return math.nan
+    return max(math.dist(each, momenta[0]) for each in momenta) / scale
+
+
+def faults(hard: Hard, outcome: Outcome, drifted: float | None) -> list[str]:
+    """What is wrong with a run of it; nothing where it ended well."""
+    found = []
+    if outcome.state != "succeeded":
+        found.append(f"{outcome.state}: {outcome.message}")
+    if not outcome.worst_residual <= hard.limit:
+        found.append(f"energy residual {outcome.worst_residual:.2g} above {hard.limit:g}")
+    if drifted is not None and not drifted <= DRIFT:
+        found.append(f"momentum drift {drifted:.2g} above {DRIFT:g}")
+    return found + [f"{check.name} = {check.value:.6g}, expected {check.expected:.6g} +- {check.tolerance:.2g}"
+                    for check in outcome.reference if not check.passed]  # fmt: skip

@@ -1,0 +1,183 @@
+"""Commands on the runs of a server: hand one in, list, show and follow runs, ask something of one, fetch its files."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import typer
+
+from conoid.cases import layout
+from conoid.cases.run import State
+
+from . import tables
+from .batch import cancel_folder, slurm_of
+from .following import FolderRun
+from .live import Live, exit_code
+from .options import (
+    CaseArgument,
+    Json,
+    Labels,
+    Overrides,
+    SourceArgument,
+    Token,
+    Url,
+    complain,
+    find,
+    labels_of,
+    show,
+    show_json,
+    warn_of,
+)
+from .run import Run, RunInfo
+from .session import connect
+from .watch import watch
+
+RunArgument = Annotated[str, typer.Argument(metavar="RUN", help="The id of a run, or 'last'.")]
+
+
+def submit(
+    case: CaseArgument,
+    overrides: Overrides = None,
+    key: Annotated[str | None, typer.Option("--key", help="Idempotency key: the same one makes no second run.")] = None,
+    label: Labels = None,
+    profile: Annotated[str, typer.Option("--profile", help="Of the site's batch system; its default.")] = "",
+    url: Url = None,
+    token: Token = None,
+    as_json: Json = False,
+) -> None:
+    """Hand a case to the server; prints the run's id."""
+    warn_of(case, overrides or ())
+    with connect(url, token) as session:
+        run = session.submit(case, overrides or (), key, labels_of(label), profile)
+        if as_json:
+            show_json(run.status())
+        else:
+            typer.echo(run.id)
+
+
+def list_runs(
+    state: Annotated[list[State] | None, typer.Option("--state", help="Only runs in this state.")] = None,
+    limit: Annotated[int, typer.Option("--limit", min=1, help="At most so many.")] = 20,
+    label: Labels = None,
+    url: Url = None,
+    token: Token = None,
+    as_json: Json = False,
+) -> None:
+    """List runs, newest first."""
+    with connect(url, token) as session:
+        runs = session.runs([one.value for one in state or ()], limit, labels_of(label))
+    if as_json:
+        show_json(runs)
+    elif runs:
+        show(tables.runs_table(runs))
+    else:
+        typer.echo("no runs")
+
+
+def show_run(run: RunArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
+    """Show one run: where it is, or how it ended."""
+    with connect(url, token) as session:
+        info = find(session, run).status()
+    if as_json:
+        show_json(info)
+        return
+    show(tables.run_table(info))
+    if info.outcome is not None:
+        show("")
+        show(tables.outcome_table(info.outcome))
+        if info.outcome.reference:
+            show("")
+            show(tables.checks_table(info.outcome.reference))
+
+
+def watch_run(
+    run: SourceArgument,
+    plain: Annotated[bool, typer.Option("--plain", help="Lines instead of the panel.")] = False,
+    url: Url = None,
+    token: Token = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print every message as one line of JSON.")] = False,
+) -> None:
+    """Follow a run until it ends: 0 succeeded, 1 failed, 2 bad input, 4 cancelled. Ctrl-C leaves it running."""
+    if Path(run).is_dir():
+        known = watch(FolderRun(Path(run), slurm_of(None).bin), False if plain else None)
+    else:
+        known = _watched(run, plain, url, token, as_json)
+    if known.message or known.cause:
+        complain(f"{known.run} {known.state.value}: {known.message or known.cause}")
+    raise typer.Exit(exit_code(known.state, known.cause))
+
+
+def _watched(run: str, plain: bool, url: str | None, token: str | None, as_json: bool) -> Live:
+    with connect(url, token) as session:
+        found = find(session, run)
+        if as_json:
+            raise typer.Exit(_print_messages(found))
+        try:
+            return watch(found, False if plain else None)
+        except KeyboardInterrupt:
+            complain(f"the run goes on; conoid watch {found.id} shows it again")
+            raise
+
+
+def _print_messages(run: Run) -> int:
+    known = Live(run.id)
+    for message in run.messages():
+        known.take(message)
+        typer.echo(msgspec.json.encode(message).decode())
+        sys.stdout.flush()
+    return exit_code(known.state, known.cause)
+
+
+def _tell(info: RunInfo, text: str, as_json: bool) -> None:
+    if as_json:
+        show_json(info)
+    else:
+        typer.echo(text)
+
+
+def cancel(run: RunArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
+    """Stop a run at its next step; of a run without a server, name the folder."""
+    if Path(run).is_dir():
+        typer.echo(cancel_folder(Path(run)))
+        return
+    with connect(url, token) as session:
+        info = find(session, run).cancel()
+    _tell(info, f"{info.id} {info.state.value}", as_json)
+
+
+def checkpoint(run: RunArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
+    """Ask a run for a checkpoint, from which it can go on if it is lost."""
+    with connect(url, token) as session:
+        info = find(session, run).checkpoint()
+    _tell(info, f"{info.id} asked for a checkpoint", as_json)
+
+
+def snapshot(run: RunArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
+    """Ask a run for a snapshot of its fragments; watch tells when it is there."""
+    with connect(url, token) as session:
+        info = find(session, run).take_snapshot()
+    _tell(info, f"{info.id} asked for a snapshot", as_json)
+
+
+def get(
+    run: RunArgument,
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[FILE]...", help="Files to fetch; all when none, but for checkpoints."),
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Folder to copy into; the run's id when not given.")] = None,
+    url: Url = None,
+    token: Token = None,
+    as_json: Annotated[bool, typer.Option("--json", help="List the run's files as JSON; copies nothing.")] = False,
+) -> None:
+    """Copy a run's files here."""
+    with connect(url, token) as session:
+        found = find(session, run)
+        if as_json:
+            show_json(found.files())
+            return
+        target = out or Path(found.id)
+        every = (file.path for file in found.files())
+        for name in names or [path for path in every if not path.startswith(f"{layout.CHECKPOINTS}/")]:
+            typer.echo(str(found.download(target, name)))

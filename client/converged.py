@@ -1,0 +1,196 @@
+"""A study of convergence as text: values by mesh with their limits, error over cost, advice; and as JSON."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+
+from . import trade
+from .convergence import Done, Series
+from .figures import count, duration, number, si
+from .quantities import Number
+from .richardson import Trend
+from .scatter import runs_needed
+from .study import table
+from .trade import Target
+from .variants import Variant
+
+_ENOUGH = 0.05
+"""Difference of means, relative, for which the table of ensembles tells the runs that it needs. Chosen."""
+
+
+@dataclass(frozen=True)
+class Book:
+    """A whole study."""
+
+    case: str
+    changes: Sequence[str]
+    own: Variant
+    """That of the case."""
+    own_size: float
+    """The smallest element size of the case, m."""
+    members: int
+    vary: str
+    accuracy: float
+    done: Sequence[Done]
+    series: Sequence[Series]
+    numbers: Sequence[Number]
+
+    @property
+    def failed(self) -> list[Done]:
+        """Points that did not come to their end."""
+        return [each for each in self.done if each.problem]
+
+    def goals(self) -> dict[str, tuple[Number, Target]]:
+        """By quantity, where any variant converges, references first."""
+        found = {each.name: (each, trade.target(self.series, each, self.own)) for each in self.numbers}
+        return {name: (each, goal) for name, (each, goal) in found.items() if goal is not None}
+
+    def leading(self, wanted: str | None = None) -> str | None:
+        """The quantity of the advice: the wanted one, or the first that converges and has not settled on all meshes."""
+        goals = self.goals()
+        if wanted is not None:
+            return next((name for name in goals if wanted in name), None)
+        return next(iter(self.moving() or goals), None)
+
+    def moving(self) -> list[str]:
+        """Quantities that converge, and have not settled on all meshes; of those with a relative error."""
+        return [
+            name
+            for name, (each, _) in self.goals().items()
+            if not each.of_nothing and any(s.limits[name].trend is Trend.CONVERGES for s in self.series)
+        ]
+
+    def advice(self, wanted: str | None = None) -> str:
+        """One line."""
+        name = self.leading(wanted)
+        if name is None:
+            return "Nothing converges on these meshes: there is no error to weigh against the cost."
+        each, goal = self.goals()[name]
+        return trade.advice(self.series, each, goal, self.accuracy, self.own_size)
+
+
+def to_markdown(book: Book, wanted: str | None = None) -> str:
+    """The tables, with what they mean."""
+    name = book.leading(wanted)
+    parts = [
+        ", ".join(f"`{text}`" for text in (book.case, *book.changes)),
+        _ensembles(book),
+        *(text for each in book.series for text in (f"**{each.variant}**", _costs(book, each), _values(book, each))),
+        _unresolved(book),
+        _scatter(book) if book.members > 1 else "",
+        *([] if name is None else [f"Error over cost, {name}:", _worth(book, name)]),
+        "\n".join(f"- {each.point.variant}, sizes x {each.point.factor:g}: {each.problem}" for each in book.failed),
+        f"**Advice.** {book.advice(wanted)}",
+    ]
+    return "\n\n".join(filter(None, parts)) + "\n"
+
+
+def _ensembles(book: Book) -> str:
+    if book.members == 1:
+        return ""
+    how = "steps shorter by 0 and by 0.1 to 1 %" if book.vary == "steps" else "other seeds of the scatter of strength"
+    return f"Every point is an ensemble of {book.members} runs ({how}); values are means, costs those of one run."
+
+
+def _costs(book: Book, series: Series) -> str:
+    rows = [
+        [si(book.own_size * m.factor, "m"), f"{m.size:.3g}", count(m.tets), count(m.steps), _seconds(m.cpu)]
+        for m in series.meshes
+    ]
+    return table(("element size", "h / h of the case", "tets", "steps", "CPU s"), rows)
+
+
+def _values(book: Book, series: Series) -> str:
+    """Coarse to fine, and what follows."""
+    meshes = series.meshes[::-1]
+    rows = []
+    for each in book.numbers:
+        found = series.limits[each.name]
+        shown = [number(m.samples[each.name].mean) if each.name in m.samples else "-" for m in meshes]
+        order = "-" if math.isnan(found.order) else f"{found.order:.1f}"
+        limit = number(found.value) if found.trend is Trend.CONVERGES else "-"
+        share = f"{100.0 * found.uncertainty / each.scale:.2g}" if each.scale and not each.of_nothing else "-"
+        expected = "-" if each.expected is None else f"{number(each.expected)} +- {number(each.tolerance)}"
+        rows.append([
+            _titled(each), *shown, found.trend.value, order, limit, f"{found.uncertainty:.2g}", share, expected
+        ])  # fmt: skip
+    head = ["quantity", *(si(book.own_size * m.factor, "m") for m in meshes)]
+    return table([*head, "trend", "order", "limit", "U of the finest", "U %", "expected"], rows)
+
+
+def _titled(each: Number) -> str:
+    return f"{each.name}, {each.unit}" if each.unit else each.name
+
+
+def _unresolved(book: Book) -> str:
+    """What no variant resolves, by name, with what it does instead."""
+    lost: dict[Trend, list[str]] = {}
+    for each in book.numbers:
+        trends = [series.limits[each.name].trend for series in book.series]
+        if all(trend in (Trend.DIVERGES, Trend.OSCILLATES, Trend.SCATTERS) for trend in trends):
+            lost.setdefault(max(trends, key=trends.count), []).append(each.name)
+    return "\n\n".join(f"No limit, {trend.value}: {'; '.join(names)}." for trend, names in lost.items())
+
+
+def _scatter(book: Book) -> str:
+    """Deviations on the finest mesh of each variant, and what a difference needs."""
+    rows = []
+    for each in book.series:
+        mesh = each.meshes[0]
+        for one in book.numbers:
+            if one.name in mesh.samples and mesh.samples[one.name].mean:
+                sample = mesh.samples[one.name]
+                rows.append([
+                    str(each.variant), _titled(one), number(sample.mean), number(sample.deviation),
+                    f"{100.0 * sample.deviation / abs(sample.mean):.2g}",
+                    count(runs_needed(sample.deviation, _ENOUGH * abs(sample.mean))),
+                ])  # fmt: skip
+    head = ("variant, finest mesh", "quantity", "mean", "deviation", "%", f"runs a side to tell {100 * _ENOUGH:g} %")
+    return table(head, rows)
+
+
+def _worth(book: Book, name: str) -> str:
+    each, goal = book.goals()[name]
+    points = trade.worths(book.series, each, goal)
+    best = trade.front(points)
+    rows = [
+        [
+            str(p.variant), si(book.own_size * p.mesh.factor, "m"), _seconds(p.cost), f"{100.0 * p.error:.2g}",
+            "front" if p in best else "",
+        ]
+        for p in points
+    ]  # fmt: skip
+    said = (
+        f"From the limit {number(goal.value)} {each.unit} of {goal.variant}, itself uncertain by "
+        f"{100.0 * goal.uncertainty:.2g} %, by way of each variant's own: errors that cancel by chance do not count."
+    )
+    others = [str(variant) for variant in trade.elsewhere(book.series, each, goal)]
+    said += f" Another limit, further away than both are uncertain, has: {'; '.join(others)}." if others else ""
+    return f"{said}\n\n{table(('variant', 'element size', 'CPU s', 'error %', 'Pareto'), rows)}"
+
+
+def _seconds(value: float) -> str:
+    return duration(value) if value >= 9.95 else f"{value:.2g} s"
+
+
+def to_json(book: Book, wanted: str | None = None) -> bytes:
+    """All numbers."""
+    data: dict[str, Any] = {
+        "case": book.case, "changes": book.changes, "own_size": book.own_size, "members": book.members,
+        "vary": book.vary, "series": [_plain(each) for each in book.series], "advice": book.advice(wanted),
+        "failed": [{"variant": each.point.variant, "factor": each.point.factor, "problem": each.problem}
+                   for each in book.failed],
+    }  # fmt: skip
+    return msgspec.json.format(msgspec.json.encode(data), indent=2)
+
+
+def _plain(series: Series) -> dict[str, Any]:
+    meshes = [
+        {"factor": m.factor, "tets": m.tets, "size": m.size, "steps": m.steps, "cpu": m.cpu,
+         "values": {name: sample.values for name, sample in m.samples.items()}}
+        for m in series.meshes
+    ]  # fmt: skip
+    return {"variant": series.variant, "meshes": meshes, "limits": series.limits}

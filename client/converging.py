@@ -1,0 +1,125 @@
+"""The command ``conoid converge``: speed against error for any case."""
+
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from conoid.cases.load import parse_case
+from conoid.cases.problems import shown
+from conoid.cases.run import ExitCode
+from conoid.cases.schema import Case
+
+from . import converged
+from .converged import Book
+from .convergence import Done, run_all, series
+from .errors import ClientError
+from .local import LocalServer
+from .options import CaseArgument, Overrides, Token, Url, complain
+from .reports import drawing
+from .scaling import CORES
+from .session import Session, connect
+from .submission import data_of
+from .variants import FORMS, SEEDS, STEPS, Plan, Variant, chaotic, sizes
+
+_ENSEMBLE = 5
+"""Members of a point of a scene that breaks. Chosen: a deviation from five is good to a third."""
+
+
+def converge(
+    case: CaseArgument,
+    overrides: Overrides = None,
+    meshes: Annotated[str, typer.Option("--meshes", help="By which the element sizes are multiplied.")] = "2,1.414,1",
+    forms: Annotated[str, typer.Option("--forms", help="Pressure forms, as standard,nodal,split.")] = "",
+    safeties: Annotated[str, typer.Option("--dt-safety", help="Values of numerics.dt_safety.")] = "",
+    ensemble: Annotated[
+        int | None, typer.Option("--ensemble", min=1, help="Runs a point; 5 if something breaks, else 1.")
+    ] = None,
+    vary: Annotated[str, typer.Option("--vary", help="What differs in an ensemble: steps or seeds.")] = STEPS,
+    ranks: Annotated[int, typer.Option("--ranks", min=1, help="Of each run.")] = 1,
+    quantity: Annotated[str | None, typer.Option("--quantity", help="What the advice is about.")] = None,
+    accuracy: Annotated[float, typer.Option("--accuracy", min=1e-6, help="Wanted error, in per cent.")] = 1.0,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder for converge.md, .json, .png; runs there are not run again.")
+    ] = None,
+    on_server: Annotated[bool, typer.Option("--server", help="Run on the server instead of here.")] = False,
+    url: Url = None,
+    token: Token = None,
+) -> None:
+    """Speed against error for any case: orders, limits with their uncertainty, error over cost, one line of advice.
+
+    Ends with 1 when a run did not succeed.
+    """
+    data = data_of(case, overrides or ())
+    checked = parse_case(data)
+    members = ensemble or (_ENSEMBLE if chaotic(checked) else 1)
+    plan = Plan(_numbers("--meshes", meshes), _forms(forms), _numbers("--dt-safety", safeties), members,
+                _one_of("--vary", vary, (STEPS, SEEDS)), ranks)  # fmt: skip
+    done: list[Done] = []
+    many = len(plan.points(checked))
+    with tempfile.TemporaryDirectory() as passing, _session(out or Path(passing), ranks, on_server, url, token) as at:
+        for each in run_all(at, data, plan):
+            done.append(each)
+            complain(f"{len(done)} of {many}: {_told(each)}")
+    book = _book(checked, overrides or (), plan, accuracy, done)
+    _write(book, quantity, out)
+    raise typer.Exit(ExitCode.CRASHED if book.failed else ExitCode.SUCCEEDED)
+
+
+@contextmanager
+def _session(out: Path, ranks: int, on_server: bool, url: str | None, token: str | None) -> Iterator[Session]:
+    """The server that is named, or one of our own with a slot a core."""
+    if on_server or url is not None:
+        with connect(url, token) as session:
+            yield session
+        return
+    with LocalServer(out / "runs", max(ranks, CORES)) as server:
+        yield server.session
+
+
+def _told(each: Done) -> str:
+    where = f"{each.point.variant}, sizes x {each.point.factor:g}"
+    return f"{where}: {each.problem or f'{each.steps} steps, {each.cpu:.1f} s of CPU time'}"
+
+
+def _book(case: Case, changes: Sequence[str], plan: Plan, accuracy: float, done: Sequence[Done]) -> Book:
+    first = next((each for each in done if not each.problem), None)
+    own = min(value for key, value in sizes(case, 1.0).items() if key.endswith("element_size"))
+    variant = Variant(case.numerics.pressure, case.numerics.dt_safety)
+    return Book(
+        case.name, changes, variant, own, plan.members, plan.vary, accuracy / 100.0, done, series(done),
+        first.numbers if first else (),
+    )  # fmt: skip
+
+
+def _write(book: Book, quantity: str | None, out: Path | None) -> None:
+    text = converged.to_markdown(book, quantity)
+    if out is not None:
+        (out / "converge.md").write_text(text, encoding="utf-8")
+        (out / "converge.json").write_bytes(converged.to_json(book, quantity))
+        drawing("curves").save(drawing("pareto").figure(book), out / "converge.png")
+    typer.echo(text, nl=False)
+
+
+def _numbers(option: str, text: str) -> list[float]:
+    """Positive numbers with commas between them. Raises ClientError."""
+    try:
+        values = [float(word) for word in text.split(",") if word.strip()]
+    except ValueError:
+        values = [0.0]
+    if not all(0.0 < value < 1e6 for value in values) or (option == "--meshes" and not values):
+        raise ClientError(f"{option} = {shown(text)}: allowed: positive numbers with commas between them")
+    return sorted(set(values))
+
+
+def _forms(text: str) -> list[str]:
+    return [_one_of("--forms", word.strip(), FORMS) for word in text.split(",") if word.strip()]
+
+
+def _one_of(option: str, word: str, allowed: Sequence[str]) -> str:
+    if word not in allowed:
+        raise ClientError(f"{option} = {shown(word)}: allowed: {', '.join(allowed)}")
+    return word

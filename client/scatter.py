@@ -1,0 +1,80 @@
+"""Ensembles of a scene in which small causes have large effects: mean, deviation, and what a difference is worth."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from statistics import NormalDist, fmean, stdev
+
+CONFIDENCE, POWER = 0.95, 0.8
+"""Of a difference that is called one, and of finding one that is there. Chosen: the custom of experiments."""
+_NORMAL = NormalDist()
+
+
+@dataclass(frozen=True)
+class Sample:
+    """The values of one quantity over the members of an ensemble."""
+
+    values: tuple[float, ...]
+
+    @property
+    def mean(self) -> float:
+        """Of the members."""
+        return fmean(self.values)
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation of a member; 0 for a single one."""
+        return stdev(self.values) if len(self.values) > 1 else 0.0
+
+    @property
+    def error(self) -> float:
+        """Standard error of the mean."""
+        return self.deviation / math.sqrt(len(self.values))
+
+
+def perturbations(members: int, least: float = 1e-3, most: float = 1e-2) -> list[float]:
+    """By which share each member's steps are shorter: none for the first, then ``least`` to ``most``, evenly in log."""
+    last = max(members - 2, 1)
+    return [0.0, *(least * (most / least) ** (k / last) for k in range(members - 1))][:members]
+
+
+def runs_needed(deviation: float, difference: float, confidence: float = CONFIDENCE, power: float = POWER) -> int:
+    """Members that each of two ensembles needs to tell a difference of their means.
+
+    2 ((z_a + z_b) s / d)^2 + z_a^2 / 4, two-sided (Guenther, The American Statistician 35 (1981) 243).
+    """
+    if deviation == 0.0:
+        return 1
+    if difference == 0.0:
+        raise ValueError("no number of runs tells a difference of nothing")
+    a, b = _NORMAL.inv_cdf(0.5 + 0.5 * confidence), _NORMAL.inv_cdf(power)
+    return max(2, math.ceil(2.0 * ((a + b) * deviation / difference) ** 2 + 0.25 * a * a))
+
+
+def differ(a: Sample, b: Sample, confidence: float = CONFIDENCE) -> bool:
+    """Whether two means differ by more than chance: Welch's test; single values differ where they are not equal."""
+    variances = a.error**2, b.error**2
+    if sum(variances) == 0.0:
+        return a.mean != b.mean
+    below = sum(v * v / (len(s.values) - 1) for v, s in zip(variances, (a, b), strict=True) if v > 0.0)
+    free = sum(variances) ** 2 / below
+    return abs(a.mean - b.mean) > student(0.5 + 0.5 * confidence, free) * math.sqrt(sum(variances))
+
+
+def student(probability: float, free: float) -> float:
+    """Quantile of Student's t: exact up to two degrees of freedom, else Abramowitz and Stegun 26.7.5."""
+    if free < 2.0:
+        return math.tan(math.pi * (probability - 0.5))
+    if free < 3.0:
+        return (2.0 * probability - 1.0) / math.sqrt(2.0 * probability * (1.0 - probability))
+    z = _NORMAL.inv_cdf(probability)
+    g1 = (z**3 + z) / 4.0
+    g2 = (5.0 * z**5 + 16.0 * z**3 + 3.0 * z) / 96.0
+    g3 = (3.0 * z**7 + 19.0 * z**5 + 17.0 * z**3 - 15.0 * z) / 384.0
+    g4 = (79.0 * z**9 + 776.0 * z**7 + 1482.0 * z**5 - 1920.0 * z**3 - 945.0 * z) / 92160.0
+    return z + g1 / free + g2 / free**2 + g3 / free**3 + g4 / free**4
+
+
+def of_all(members: Sequence[Sequence[float]]) -> list[Sample]:
+    """One sample a quantity, of the values of each member."""
+    return [Sample(tuple(values)) for values in zip(*members, strict=True)]

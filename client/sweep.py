@@ -1,0 +1,147 @@
+"""Sweeps: one case at many points, on a server. The points from words, the handle, the table."""
+
+import csv
+import io
+import itertools
+import math
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from conoid.cases.load import CaseError, Problem, apply_overrides
+from conoid.cases.run import State
+
+from .http import Http
+from .run import Run, RunInfo, quoted
+
+Point = dict[str, Any]
+"""What is changed at a point, by key: ``{"parts[0].velocity[2]": "-200 m/s"}``."""
+
+
+class SweepPoint(msgspec.Struct, kw_only=True, frozen=True):
+    """What was changed at a point, and its run."""
+
+    values: Point
+    run: RunInfo
+
+
+class SweepInfo(msgspec.Struct, kw_only=True, frozen=True):
+    """What the server tells of a sweep; ``submitted`` in Unix s, ``states`` counts its runs."""
+
+    id: str
+    name: str
+    submitted: float
+    total: int
+    states: dict[str, int]
+    at_once: int | None = None
+    points: list[SweepPoint] = []
+
+    @property
+    def over(self) -> bool:
+        """True when every run has ended."""
+        return sum(n for state, n in self.states.items() if State(state).final) == self.total
+
+
+class SweepPage(msgspec.Struct, kw_only=True, frozen=True):
+    """Sweeps, newest first."""
+
+    sweeps: list[SweepInfo]
+
+
+@dataclass
+class Sweep:
+    """A sweep on a server. Nothing is asked before a method is called."""
+
+    session: Http
+    id: str
+
+    @property
+    def path(self) -> str:
+        """Its place in the REST interface."""
+        return f"/v1/sweeps/{quoted(self.id)}"
+
+    def status(self) -> SweepInfo:
+        """What the server knows of it now."""
+        return self.session.get(SweepInfo, self.path)
+
+    def runs(self) -> list[Run]:
+        """A handle of each of its runs, in the order of the points."""
+        return [Run(self.session, point.run.id) for point in self.status().points]
+
+    def wait(self, timeout: float | None = None) -> SweepInfo:
+        """Returns when all runs have ended. Raises TimeoutError after ``timeout`` s."""
+        deadline = math.inf if timeout is None else time.monotonic() + timeout
+        for run in self.runs():
+            run.wait(None if timeout is None else max(0.0, deadline - time.monotonic()))
+        return self.status()
+
+    def cancel(self) -> SweepInfo:
+        """Asks every run to stop; to ask twice does no harm."""
+        return self.session.post(SweepInfo, f"{self.path}:cancel")
+
+    def csv(self) -> str:
+        """A line a point: what was changed, the state of the run, its results."""
+        return self.session.fetch(f"{self.path}/table").decode()
+
+    def table(self) -> list[dict[str, str]]:
+        """The lines of the table by column; ``pandas.DataFrame`` takes them as they are."""
+        return list(csv.DictReader(io.StringIO(self.csv())))
+
+
+def points_of(words: Iterable[str], *, grid: bool = False) -> list[Point]:
+    """The points of ``key=a,b,c``: one after the other with all keys at once, or each with each for a ``grid``.
+
+    Raises CaseError.
+    """
+    axes = dict(_axis(word) for word in words)
+    if not axes:
+        raise CaseError([Problem("--set", "", "write at least one key with its values, such as run.ranks=1,2")])
+    if grid:
+        rows: Iterable[tuple[Any, ...]] = itertools.product(*axes.values())
+    else:
+        counts = {key: len(values) for key, values in axes.items()}
+        if len(set(counts.values())) > 1:
+            told = ", ".join(f"{key} has {n}" for key, n in counts.items())
+            raise CaseError([Problem("--set", "", f"as many values for each key, or --grid: {told}")])
+        rows = zip(*axes.values(), strict=True)
+    return [dict(zip(axes, row, strict=True)) for row in rows]
+
+
+def points_in(path: Path) -> list[Point]:
+    """The points in a CSV file: its first line has the keys. Raises CaseError, OSError."""
+    with path.open(newline="", encoding="utf-8") as file:
+        lines = list(csv.DictReader(file))
+    if not lines or any(None in line or None in line.values() for line in lines):
+        raise CaseError([Problem("--list", repr(str(path)), "a line of keys, then lines with a value for each")])
+    return [{key.strip(): value_of(text) for key, text in line.items()} for line in lines]
+
+
+def value_of(text: str) -> Any:
+    """A value as TOML has it, or as text."""
+    return apply_overrides({}, [f"value={text.strip()}"])["value"]
+
+
+def _axis(word: str) -> tuple[str, list[Any]]:
+    key, equals, text = word.partition("=")
+    values = [value_of(part) for part in _parts(text)]
+    if not equals or not values:
+        raise CaseError([Problem("--set", repr(word), "write a key and its values, such as run.ranks=1,2")])
+    return key.strip(), values
+
+
+def _parts(text: str) -> list[str]:
+    """What stands between the commas that are in no list and no quotes."""
+    parts, depth, quote = [""], 0, ""
+    for letter in text:
+        if quote or letter in "\"'":
+            quote = "" if letter == quote else quote or letter
+        depth += (letter in "[{") - (letter in "]}") if not quote else 0
+        if letter == "," and not depth and not quote:
+            parts.append("")
+        else:
+            parts[-1] += letter
+    return [part for part in parts if part.strip()]

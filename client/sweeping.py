@@ -1,0 +1,69 @@
+"""``conoid sweep``: hand in, look at, cancel, and the table."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .errors import ClientError
+from .options import CaseArgument, Json, Token, Url, show_json
+from .session import connect
+from .sweep import SweepInfo, points_in, points_of
+
+SweepArgument = Annotated[str, typer.Argument(metavar="SWEEP", help="Id of a sweep, or 'last'.")]
+Sets = Annotated[
+    list[str] | None, typer.Option("--set", metavar="KEY=A,B,C", help="Values of a key; may be given again.")
+]
+
+
+def sweep(
+    case: CaseArgument,
+    sets: Sets = None,
+    grid: Annotated[bool, typer.Option("--grid", help="Each value of a key with each of the others.")] = False,
+    listed: Annotated[
+        Path | None, typer.Option("--list", metavar="FILE", help="Points from a CSV file; its first line has the keys.")
+    ] = None,
+    at_once: Annotated[int | None, typer.Option("--at-once", min=1, help="Runs of it that run at a time.")] = None,
+    wait: Annotated[bool, typer.Option("--wait", help="Return when all runs have ended; 1 when one failed.")] = False,
+    url: Url = None,
+    token: Token = None,
+    as_json: Json = False,
+) -> None:
+    """Run a case at many points; prints the id of the sweep. sweep-table shows what came out."""
+    if (listed is None) == (not sets):
+        raise ClientError("give the points with --set KEY=A,B,C, or with --list FILE")
+    points = points_in(listed) if listed is not None else points_of(sets or (), grid=grid)
+    with connect(url, token) as session:
+        made = session.sweep(case, points, at_once=at_once)
+        info = made.wait() if wait else made.status()
+    if as_json:
+        show_json(info)
+    else:
+        typer.echo(info.id)
+    raise typer.Exit(int(wait and info.states != {"succeeded": info.total}))
+
+
+def sweep_table(
+    sweep: SweepArgument,
+    out: Annotated[Path | None, typer.Option("--out", help="CSV file to write; standard output if not given.")] = None,
+    url: Url = None,
+    token: Token = None,
+) -> None:
+    """Print a sweep as CSV: a line a point with its values, the state of its run and its results."""
+    with connect(url, token) as session:
+        text = session.find_sweep(sweep).csv()
+    if out is None:
+        typer.echo(text, nl=False)
+    else:
+        out.write_text(text, encoding="utf-8")
+        typer.echo(str(out))
+
+
+def sweep_cancel(sweep: SweepArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
+    """Cancel every run of a sweep that has not ended."""
+    with connect(url, token) as session:
+        info: SweepInfo = session.find_sweep(sweep).cancel()
+    if as_json:
+        show_json(info)
+    else:
+        typer.echo(f"{info.id} cancelling")

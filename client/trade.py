@@ -1,0 +1,135 @@
+"""Error over cost: how far each point is from the best limit, which points are worth their cost, and advice."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from .convergence import Mesh, Series
+from .figures import duration, si
+from .quantities import Number
+from .richardson import FORMAL, Trend
+from .variants import Variant
+
+_VAGUE = 0.3
+"""Relative uncertainty of a limit above which no error is measured from it. Chosen."""
+
+
+@dataclass(frozen=True)
+class Worth:
+    """A variant on a mesh: what it costs, CPU s, and its error, relative."""
+
+    variant: Variant
+    mesh: Mesh
+    cost: float
+    error: float
+
+
+@dataclass(frozen=True)
+class Target:
+    """The limit that errors are measured from, its own uncertainty (relative), and whose it is."""
+
+    value: float
+    uncertainty: float
+    scale: float
+    variant: Variant
+
+
+def target(all_series: Sequence[Series], number: Number, own: Variant | None = None) -> Target | None:
+    """The limit of ``own``, the variant of the case, if it converges; else the least uncertain one of all variants.
+
+    A form that locks can converge to another limit, and look the more certain: it is not preferred. None where nothing
+    converges.
+    """
+    found = [(each.limits[number.name], each.variant) for each in all_series if _sure(each, number)]
+    if not found:
+        return None
+    best, variant = min(found, key=lambda pair: (pair[1] != own, pair[0].uncertainty))
+    scale = max(number.scale, abs(best.value))
+    known = scale > 0.0 and best.uncertainty <= _VAGUE * scale
+    return Target(best.value, best.uncertainty / scale, scale, variant) if known else None
+
+
+def _sure(series: Series, number: Number) -> bool:
+    return series.limits[number.name].trend in (Trend.CONVERGES, Trend.SETTLED)
+
+
+def elsewhere(all_series: Sequence[Series], number: Number, goal: Target) -> list[Variant]:
+    """Variants whose limit is further from that of the target than both are uncertain."""
+    return [
+        each.variant
+        for each in all_series
+        if _sure(each, number)
+        and abs(each.limits[number.name].value - goal.value)
+        > each.limits[number.name].uncertainty + goal.uncertainty * goal.scale
+    ]
+
+
+def worths(all_series: Sequence[Series], number: Number, goal: Target) -> list[Worth]:
+    """Every point that has the quantity, the cheapest first."""
+    found = [
+        Worth(each.variant, mesh, mesh.cpu, _error(mesh.samples[number.name].mean, each, number, goal) / goal.scale)
+        for each in all_series
+        for mesh in each.meshes
+        if number.name in mesh.samples
+    ]
+    return sorted(found, key=lambda worth: (worth.cost, worth.error))
+
+
+def _error(value: float, series: Series, number: Number, goal: Target) -> float:
+    """The way to the variant's own limit and on to the target: errors that cancel by chance are no accuracy.
+
+    Where the variant has no limit, its uncertainty takes the place of the first.
+    """
+    own = series.limits[number.name]
+    if _sure(series, number):
+        return abs(value - own.value) + abs(own.value - goal.value)
+    return abs(value - goal.value) + (0.0 if math.isnan(own.uncertainty) else own.uncertainty)
+
+
+def front(points: Sequence[Worth]) -> list[Worth]:
+    """The Pareto front: no other point costs at most as much and has at most its error."""
+    kept: list[Worth] = []
+    for point in sorted(points, key=lambda worth: (worth.cost, worth.error)):
+        if not kept or point.error < kept[-1].error:
+            kept.append(point)
+    return kept
+
+
+def advice(all_series: Sequence[Series], number: Number, goal: Target, accuracy: float, own_size: float) -> str:
+    """One line: the cheapest point that is accurate enough, or the best one, and what half its size would buy.
+
+    ``accuracy`` is relative, ``own_size`` the smallest element size of the case, m.
+    """
+    line = front(worths(all_series, number, goal))
+    enough = [worth for worth in line if worth.error <= accuracy]
+    chosen = enough[0] if enough else line[-1]
+    name, size = chosen.variant.form, si(own_size * chosen.mesh.factor, "m")
+    said = f"{name} at {size}: {number.name} within {_percent(chosen.error)} for {duration(chosen.cost)} of CPU time"
+    order, growth = _order(all_series, number, chosen.variant), _growth(all_series, chosen.variant)
+    if math.isnan(order):
+        return f"{said}; no order was observed, so nothing is known of finer meshes"
+    halved, dearer = chosen.error * (1.0 - 0.5**order), chosen.cost * 2.0**growth
+    said += f"; halving the size buys {_percent(halved)} for {duration(dearer)}"
+    if enough:
+        return said
+    share = (accuracy / chosen.error) ** (1.0 / order)
+    wanted, cost = own_size * chosen.mesh.factor * share, chosen.cost * share**-growth
+    return f"{said}; {_percent(accuracy)} would need about {si(wanted, 'm')} and {duration(cost)}"
+
+
+def _order(all_series: Sequence[Series], number: Number, variant: Variant) -> float:
+    found = next(each for each in all_series if each.variant == variant).limits[number.name]
+    return min(found.order, FORMAL) if found.trend is Trend.CONVERGES else math.nan
+
+
+def _growth(all_series: Sequence[Series], variant: Variant) -> float:
+    """Exponent of the cost in 1 / size, from the finest and the coarsest mesh; 4, that of theory, from one mesh."""
+    meshes = next(each for each in all_series if each.variant == variant).meshes
+    fine, coarse = meshes[0], meshes[-1]
+    if fine.size >= coarse.size or not (fine.cpu > 0.0 and coarse.cpu > 0.0):
+        return 4.0
+    return math.log(fine.cpu / coarse.cpu) / math.log(coarse.size / fine.size)
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.2g} %"

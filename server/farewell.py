@@ -1,0 +1,39 @@
+"""What the log of a launcher says of the end of its ranks: for a server that is not the launcher's parent."""
+
+import errno
+import os
+import re
+import shutil
+from pathlib import Path
+
+from conoid.cases import layout
+
+_TAIL = 1 << 14
+"""Bytes at the end of the log in which the banner of the launcher is looked for. Chosen: a banner has 700."""
+_CODE = re.compile(rb"^=   EXIT CODE: (\d{1,3})$", re.MULTILINE)
+"""MPICH's banner; Hydra writes it when a rank ends before the others, with the signal's number for a rank killed."""
+
+
+def exit_code(folder: Path) -> int | None:
+    """The code of the rank that ended first, as the newest banner has it; None when there is none."""
+    found = _CODE.findall(_tail(folder))
+    return int(found[-1]) if found else None
+
+
+def disk_failed(folder: Path) -> bool:
+    """Whether a rank complained of a full disk, or could not because there is no room for a complaint."""
+    if os.strerror(errno.ENOSPC).encode() in _tail(folder):
+        return True
+    try:
+        return shutil.disk_usage(folder).free < _TAIL
+    except OSError:
+        return False
+
+
+def _tail(folder: Path) -> bytes:
+    try:
+        with open(folder / layout.LOGS / layout.LAUNCHER_LOG, "rb") as log:
+            log.seek(max(0, os.fstat(log.fileno()).st_size - _TAIL))
+            return log.read()
+    except OSError:
+        return b""

@@ -1,0 +1,47 @@
+"""The database as the supervisor uses it: an index over the runs' folders, which may lag behind them."""
+
+import logging
+import time
+
+from sqlalchemy.exc import SQLAlchemyError
+
+from .events import Run
+from .holds import words
+from .store import Store
+
+_log = logging.getLogger("conoid.server")
+_REST = 5.0
+"""s for which a database that failed is left alone, so that nobody waits for it a second time. Chosen."""
+
+
+class Index:
+    """Belongs to the supervisor's thread."""
+
+    def __init__(self, store: Store) -> None:
+        """Everything is saved."""
+        self._store, self._rests_until = store, 0.0
+        self.unsaved: set[str] = set()
+        """Runs that have changed since they were saved."""
+
+    def save(self, run: Run) -> bool:
+        """False when the run is not in the database yet, which is logged."""
+        self.unsaved.add(run.id)
+        if time.monotonic() < self._rests_until:
+            return False
+        try:
+            self._store.save(run)
+        except (SQLAlchemyError, OSError) as error:
+            self._rests_until = time.monotonic() + _REST
+            _log.error("run %s is not in the database yet: %s", run.id, words(error))
+            return False
+        self.unsaved.discard(run.id)
+        return True
+
+    def add(self, run: Run, key: str | None) -> None:
+        """What is known already stays when nothing can be written now. Raises SQLAlchemyError."""
+        try:
+            self._store.add(run, key)
+        except SQLAlchemyError:
+            if self._store.get(run.id) is None:
+                raise
+            self.unsaved.add(run.id)

@@ -1,0 +1,84 @@
+"""What Prometheus reads: runs, slots, streams, and the time that answers take."""
+
+import time
+from collections.abc import Callable, Iterable
+
+from prometheus_client import CollectorRegistry, Counter, Histogram, ProcessCollector, generate_latest
+from prometheus_client.core import GaugeMetricFamily, Metric
+from prometheus_client.registry import Collector
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from conoid.cases.run import State
+
+from .service import Service
+
+_BUCKETS = (0.005, 0.01, 0.025, 0.05, 0.1, 0.2, 0.5, 1.0, 5.0, 30.0)
+"""s: bounds of the histogram. Chosen round the 50 and 200 ms that an answer may take."""
+
+
+class Metrics:
+    """Of one server."""
+
+    def __init__(self, service: Service) -> None:
+        """Counts nothing yet."""
+        self.registry = CollectorRegistry()
+        ProcessCollector(registry=self.registry)
+        self.registry.register(_Runs(service))
+        labels = ("method", "route", "status")
+        self.answers = Counter("conoid_answers", "Answers by route and status.", labels, registry=self.registry)
+        self.seconds = Histogram(
+            "conoid_answer_seconds", "Time to the first byte of an answer.", ("method", "route"),
+            buckets=_BUCKETS, registry=self.registry,
+        )  # fmt: skip
+
+    def text(self) -> bytes:
+        """The text form of all."""
+        return generate_latest(self.registry)
+
+    def answered(self, scope: Scope, status: int, seconds: float) -> None:
+        """Counts an answer under the pattern of its route, so that there are as many series as routes."""
+        route = getattr(scope.get("route"), "path", "none")
+        self.answers.labels(scope["method"], route, str(status)).inc()
+        self.seconds.labels(scope["method"], route).observe(seconds)
+
+
+class _Runs(Collector):
+    """Read from the parts of the server when somebody asks."""
+
+    def __init__(self, service: Service) -> None:
+        self._service = service
+
+    def collect(self) -> Iterable[Metric]:
+        """The gauges."""
+        counts = self._service.store.count_by_state()
+        runs = GaugeMetricFamily("conoid_runs", "Runs by state.", labels=["state"])
+        for state in State:
+            runs.add_metric([state.value], counts.get(state, 0))
+        yield runs
+        supervisor = self._service.supervisor
+        told: tuple[tuple[str, str, Callable[[], float]], ...] = (
+            ("conoid_slots", "Ranks that may run at a time.", lambda: self._service.settings.slots),
+            ("conoid_slots_used", "Ranks that run now.", supervisor.slots_used),
+            ("conoid_listeners", "Open event streams and waiting requests.", lambda: self._service.bell.listening),
+            ("conoid_stranded", "Open runs that nobody looks after: 0.", lambda: len(supervisor.stranded())),
+        )
+        for name, text, value in told:
+            yield GaugeMetricFamily(name, text, value())
+
+
+class Timed:
+    """Middleware that counts every answer."""
+
+    def __init__(self, app: ASGIApp, metrics: Metrics) -> None:
+        self._app, self._metrics = app, metrics
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Passes on, and looks at the clock when the answer begins."""
+        began = time.perf_counter()
+
+        async def told(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                self._metrics.answered(scope, message["status"], time.perf_counter() - began)
+            await send(message)
+
+        await self._app(scope, receive, told if scope["type"] == "http" else send)

@@ -1,0 +1,160 @@
+"""``python -m conoid.server.reading SOCKET``: reads cases, each in a process of its own with limits.
+
+A body is somebody's text: what it costs to read is not known before. This program has everything loaded and forks for
+each case, so that one costs milliseconds, and a case that takes too long, or too much memory, ends its own process. It
+ends when its standard input does, with the server. One thread, since a fork copies only that.
+"""
+
+import os
+import resource
+import select
+import signal
+import socket
+import sys
+import traceback
+from typing import Any
+
+import msgspec
+
+from conoid.cases.estimate import Estimate, estimate
+from conoid.cases.load import CaseError, Problem, json_data, parse_case, resolved_json, toml_data
+from conoid.cases.plausible import doubts
+from conoid.cases.schema import Case
+
+from . import limits
+from .limits import Limits
+
+CPU, WALL, MEMORY = 5, 60, 1 << 30
+"""s of CPU time, s on the clock, and bytes of memory that a case may take to be read. Chosen: the largest shipped case
+takes 0.1 s and 100 MB; a machine may be busy."""
+_NICE = 5
+"""Steps of priority below the server, which goes on answering. Chosen."""
+_BACKLOG = 128
+"""Connections that wait. Chosen: more than are let in at a time."""
+
+
+class Question(msgspec.Struct, frozen=True, kw_only=True):
+    """A body, its kind, and what is allowed."""
+
+    body: bytes
+    json: bool
+    limits: Limits
+
+
+class Reading(msgspec.Struct, frozen=True, kw_only=True):
+    """A case that can be run here: what the server needs of it."""
+
+    name: str
+    title: str
+    ranks: int
+    profile: str
+    """Of a batch system, by the case; empty for the site's own."""
+    wall_time: float | None
+    estimate: dict[str, int | float]
+    resolved: bytes
+    """case.resolved.json"""
+    case: bytes
+    """The case with every default, as JSON."""
+    doubts: list[Problem]
+
+
+class Answer(msgspec.Struct, frozen=True, kw_only=True):
+    """A reading, or every problem; ``crash`` is the traceback of a mistake of this program."""
+
+    reading: Reading | None = None
+    problems: list[Problem] = []
+    crash: str = ""
+
+
+def read(question: Question) -> Answer:
+    """Reads, checks and estimates a case."""
+    try:
+        return Answer(reading=_read(question))
+    except CaseError as error:
+        return Answer(problems=list(error.problems))
+    except MemoryError:
+        raise
+    except Exception:
+        return Answer(crash=traceback.format_exc())
+
+
+def _read(question: Question) -> Reading:
+    text = _text(question.body)
+    data = json_data(text) if question.json else toml_data(text)
+    case = parse_case(data)
+    expected = _estimate(case, question.limits)
+    return Reading(
+        name=case.name, title=case.title, ranks=case.run.ranks, profile=case.run.profile,
+        wall_time=limits.wall_time(case, question.limits), estimate=limits.figures(expected),
+        resolved=resolved_json(case), case=case.model_dump_json().encode(), doubts=doubts(data, case, expected),
+    )  # fmt: skip
+
+
+def _estimate(case: Case, allowed: Limits) -> Estimate:
+    if problems := limits.check(case, allowed):
+        raise CaseError(problems)
+    try:
+        expected = estimate(case)
+    except (ArithmeticError, ValueError):
+        raise CaseError([Problem("parts", "", "the elements are too many or too small to be counted")]) from None
+    if problems := limits.check_size(expected, allowed):
+        raise CaseError(problems)
+    return expected
+
+
+def _text(body: bytes) -> str:
+    try:
+        return body.decode()
+    except UnicodeDecodeError as error:
+        raise CaseError([Problem("", "", f"the body is not UTF-8 text (at byte {error.start})")]) from None
+
+
+# The process ----------------------------------------------------------------------------------------------------------
+
+
+def main(path: str) -> int:
+    """Answers until standard input ends."""
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.nice(_NICE)
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(path)
+        listener.listen(_BACKLOG)
+        print("ready", flush=True)
+        while listener in select.select([listener, sys.stdin], [], [])[0]:
+            connection, _ = listener.accept()
+            with connection:
+                if os.fork() == 0:
+                    _child(connection)
+    return 0
+
+
+def _child(connection: socket.socket) -> None:
+    """One case; leaves without the ceremonies of an interpreter, which belong to the parent."""
+    code = 1
+    try:
+        _limit()
+        question = msgspec.msgpack.decode(_received(connection), type=Question)
+        connection.sendall(msgspec.msgpack.encode(read(question)))
+        code = 0
+    finally:
+        os._exit(code)
+
+
+def _limit() -> None:
+    resource.setrlimit(resource.RLIMIT_CPU, (CPU, CPU))
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    signal.alarm(WALL)
+
+
+def _received(connection: socket.socket) -> bytes:
+    chunks: list[Any] = []
+    while chunk := connection.recv(1 << 16):
+        chunks.append(chunk)
+    return b"".join(chunks)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))

@@ -1,0 +1,111 @@
+"""Sweeps: hand in, look at, cancel, and the table of what came out."""
+
+import csv
+import io
+from collections import Counter
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Header, Response
+from fastapi.responses import JSONResponse
+from starlette.concurrency import run_in_threadpool
+
+from conoid.cases.outcome import Outcome
+
+from .. import folder, openapi, view
+from ..auth import Identity, Reader, Submitter
+from ..errors import not_found
+from ..events import Run
+from ..limits import read_body
+from ..service import Service, ServiceOf
+from ..sweeps import Plan
+
+router = APIRouter()
+Body = Annotated[bytes, Depends(read_body)]
+
+
+@router.post("/v1/sweeps", status_code=202, openapi_extra=openapi.SWEEP_BODY)
+async def submit(
+    service: ServiceOf, identity: Submitter, body: Body, idempotency_key: Annotated[str | None, Header()] = None
+) -> Response:
+    """Takes a case and the points at which it is to be run; all runs are accepted, or none."""
+    async with service.turns.turn(identity.owner):
+        plan = await run_in_threadpool(service.sweeps.submit, identity.owner, body, idempotency_key)
+    return JSONResponse(_shown(service, plan), 202, {"Location": f"/v1/sweeps/{plan.id}"})
+
+
+@router.get("/v1/sweeps")
+def page(service: ServiceOf, identity: Reader) -> dict[str, Any]:
+    """Own sweeps, newest first."""
+    return {"sweeps": [_brief(service, plan) for plan in service.sweeps.of(identity.owner)]}
+
+
+@router.get("/v1/sweeps/{sweep_id}")
+def show(service: ServiceOf, identity: Reader, sweep_id: str) -> dict[str, Any]:
+    """The sweep: how many of its runs are in each state, and each point with its run."""
+    return _shown(service, _find(service, identity, sweep_id))
+
+
+@router.get("/v1/sweeps/{sweep_id}/table")
+def table(service: ServiceOf, identity: Reader, sweep_id: str) -> Response:
+    """A line a point as CSV: what was changed, the state of the run, and its results as far as it has any."""
+    plan = _find(service, identity, sweep_id)
+    lines = [_line(service, point, run) for point, run in zip(plan.points, _runs(service, plan), strict=False)]
+    out = io.StringIO()
+    columns = list(dict.fromkeys(name for line in lines for name in line))
+    writer = csv.DictWriter(out, columns, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(lines)
+    return Response(out.getvalue(), media_type="text/csv; charset=utf-8")
+
+
+@router.post("/v1/sweeps/{sweep_id}:cancel", status_code=202)
+def cancel(service: ServiceOf, identity: Submitter, sweep_id: str) -> dict[str, Any]:
+    """Cancels every run of the sweep that has not ended. Asking again changes nothing."""
+    plan = _find(service, identity, sweep_id)
+    for run_id in plan.runs:
+        if service.supervisor.is_open(run_id):
+            service.supervisor.cancel(run_id)
+    return _shown(service, plan)
+
+
+def _find(service: Service, identity: Identity, sweep_id: str) -> Plan:
+    plan = service.sweeps.get(sweep_id, identity.owner)
+    if plan is None:
+        raise not_found(f"sweep {sweep_id[:40]!r}")
+    return plan
+
+
+def _runs(service: Service, plan: Plan) -> list[Run]:
+    found = (service.supervisor.current(run_id) or service.store.get(run_id) for run_id in plan.runs)
+    return [run for run in found if run is not None]
+
+
+def _brief(service: Service, plan: Plan) -> dict[str, Any]:
+    states = Counter(run.state.value for run in _runs(service, plan))
+    return {
+        "id": plan.id, "owner": plan.owner, "name": plan.name, "submitted": plan.submitted, "at_once": plan.at_once,
+        "total": len(plan.points), "states": dict(states), "url": f"/v1/sweeps/{plan.id}",
+    }  # fmt: skip
+
+
+def _shown(service: Service, plan: Plan) -> dict[str, Any]:
+    runs = _runs(service, plan)
+    points = [{"values": point, "run": view.brief(service, run)} for point, run in zip(plan.points, runs, strict=False)]
+    return {**_brief(service, plan), "points": points}
+
+
+def _line(service: Service, point: dict[str, Any], run: Run) -> dict[str, Any]:
+    ended = folder.outcome(service.settings.runs / run.id) if run.state.final else None
+    values = {key: value if isinstance(value, int | float | str) else repr(value) for key, value in point.items()}
+    return {**values, "run": run.id, "state": run.state.value, "cause": run.cause or "", **_results(ended)}
+
+
+def _results(ended: Outcome | None) -> dict[str, Any]:
+    """The numbers of an outcome that stand alone, the terms of the energy, and the references."""
+    if ended is None:
+        return {}
+    names = ("steps", "time", "elapsed", "cpu", "elements", "nodes", "fragments", "broken", "eroded", "worst_residual")
+    energy = ended.energy
+    terms = {} if energy is None else {f"energy.{name}": getattr(energy, name) for name in energy.__struct_fields__}
+    checks = {f"reference.{check.name}": check.value for check in ended.reference}
+    return {**{name: getattr(ended, name) for name in names}, **terms, **checks, "digest": ended.digest}

@@ -1,0 +1,226 @@
+"""The shapes of the answers, for OpenAPI and for those who read it. The routes build what has these shapes."""
+
+from typing import Any
+
+import msgspec
+
+from conoid.cases.messages import Progress, Snapshot
+from conoid.cases.outcome import Outcome
+from conoid.cases.run import Cause, State
+
+
+class ProblemEntry(msgspec.Struct, kw_only=True):
+    """One of the things that are wrong with a case."""
+
+    key: str
+    value: str
+    message: str
+    pointer: str
+
+
+class Problem(msgspec.Struct, kw_only=True, omit_defaults=True):
+    """RFC 9457: why a request was refused; ``detail`` is one line for people, ``code`` a word for programs."""
+
+    type: str
+    title: str
+    status: int
+    detail: str
+    code: str
+    retryable: bool
+    pointer: str = ""
+    hint: str = ""
+    errors: list[ProblemEntry] = []
+
+
+class Receipt(msgspec.Struct, kw_only=True):
+    """What a submitter is told; estimate: elements, nodes, dt, steps, memory_bytes, core_seconds where known."""
+
+    id: str
+    owner: str
+    name: str
+    title: str
+    state: State
+    ranks: int
+    submitted: float
+    estimate: dict[str, float]
+    url: str
+
+
+class RunLine(msgspec.Struct, kw_only=True):
+    """A run in a list; times are Unix s, null before they have come."""
+
+    id: str
+    owner: str
+    name: str
+    state: State
+    cause: Cause | None
+    message: str
+    reason: str
+    ranks: int
+    submitted: float
+    started: float | None
+    finished: float | None
+    labels: dict[str, str]
+    url: str
+
+
+class RunStatus(RunLine, kw_only=True):
+    """A run, how far it is, and how it has ended."""
+
+    title: str
+    case_file: str
+    estimate: dict[str, float]
+    progress: Progress | None
+    outcome: Outcome | None
+
+
+class RunPage(msgspec.Struct, kw_only=True):
+    """Runs, newest first, and the cursor of the following page; null on the last."""
+
+    runs: list[RunLine]
+    next: str | None
+
+
+class Validation(msgspec.Struct, kw_only=True):
+    """Whether a case could be submitted; with warnings, estimate and every default where it could."""
+
+    valid: bool
+    problems: list[ProblemEntry]
+    warnings: list[ProblemEntry] = []
+    estimate: dict[str, float] = {}
+    case: dict[str, Any] = {}
+
+
+class GalleryEntry(msgspec.Struct, kw_only=True):
+    """A shipped case."""
+
+    name: str
+    title: str
+    description: str
+    url: str
+
+
+class Gallery(msgspec.Struct, kw_only=True):
+    """The shipped cases."""
+
+    cases: list[GalleryEntry]
+
+
+class EventPage(msgspec.Struct, kw_only=True):
+    """Lines of the journal, the number to go on from, and whether there are more already."""
+
+    events: list[dict[str, Any]]
+    last: int
+    more: bool
+
+
+class FileEntry(msgspec.Struct, kw_only=True):
+    """A file of a run; ``modified`` in Unix s."""
+
+    path: str
+    size: int
+    modified: float
+    url: str
+
+
+class Files(msgspec.Struct, kw_only=True):
+    """Every file of a run."""
+
+    files: list[FileEntry]
+
+
+class Snapshots(msgspec.Struct, kw_only=True):
+    """The snapshots that the journal tells of."""
+
+    snapshots: list[Snapshot]
+
+
+class History(msgspec.Struct, kw_only=True):
+    """The course of a run, thinned."""
+
+    last: int
+    state: str | None
+    elapsed: float
+    series: dict[str, Any]
+    ranks: dict[str, Any]
+    balance: list[dict[str, Any]]
+    snapshots: list[dict[str, Any]]
+
+
+class Wish(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
+    """A sweep that is handed in: a case as plain data, the changes of each point by key, runs at a time."""
+
+    case: dict[str, Any]
+    points: list[dict[str, Any]]
+    at_once: int | None = None
+
+
+class SweepLine(msgspec.Struct, kw_only=True):
+    """A sweep in a list: how many of its runs are in each state."""
+
+    id: str
+    owner: str
+    name: str
+    submitted: float
+    at_once: int | None
+    total: int
+    states: dict[str, int]
+    url: str
+
+
+class SweepPage(msgspec.Struct, kw_only=True):
+    """Own sweeps, newest first."""
+
+    sweeps: list[SweepLine]
+
+
+class SweepPoint(msgspec.Struct, kw_only=True):
+    """What was changed at a point, and its run."""
+
+    values: dict[str, Any]
+    run: RunLine
+
+
+class Sweep(SweepLine, kw_only=True):
+    """A sweep with its points."""
+
+    points: list[SweepPoint]
+
+
+class ZenohAccess(msgspec.Struct, kw_only=True):
+    """How to subscribe."""
+
+    endpoint: str
+    prefix: str
+    user: str | None
+    password: str | None
+
+
+class Slots(msgspec.Struct, kw_only=True):
+    """Ranks that may run at a time, and that run now."""
+
+    total: int
+    used: int
+
+
+class Me(msgspec.Struct, kw_only=True):
+    """Who asks, what the token allows, and what the server has."""
+
+    owner: str
+    scopes: list[str]
+    zenoh: ZenohAccess | None
+    slots: Slots
+    limits: dict[str, float | None]
+
+
+class Health(msgspec.Struct, kw_only=True):
+    """Whether the server, or each thing that it needs, works."""
+
+    status: str
+    checks: dict[str, bool] = {}
+
+
+ALL = (
+    Problem, Receipt, RunPage, RunStatus, Validation, Gallery, EventPage, Files, Snapshots, History, Me, Health, Wish,
+    SweepPage, Sweep,
+)  # fmt: skip

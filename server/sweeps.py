@@ -1,0 +1,165 @@
+"""Sweeps: one case at many points, each a run of its own. A plain file a sweep, ``<runs>/sweeps/<id>.json``.
+
+The file is there before the first run is; each run has an idempotency key made of the sweep's id and its place. So a
+request that broke off is completed by sending it again, and makes no run twice.
+"""
+
+import hashlib
+import json
+import threading
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import msgspec
+
+from conoid.cases.load import CaseError, Problem, apply_overrides, json_data
+
+from . import durable, folder
+from .errors import ServiceError, invalid_case
+from .settings import Settings
+from .submission import Desk
+
+FOLDER = "sweeps"
+_MOST_POINTS, _MOST_BYTES = 1000, 16 << 20
+"""Points of a sweep, and bytes of all its cases together. Chosen: what is expanded in a second."""
+_JSON = "application/json"
+
+
+class Plan(msgspec.Struct, kw_only=True, frozen=True):
+    """A sweep as it is kept; ``runs`` is empty until all of them are accepted. ``submitted`` in Unix s."""
+
+    id: str
+    owner: str
+    name: str
+    submitted: float
+    key: str | None
+    digest: str
+    at_once: int | None
+    """Runs of the sweep that run at a time; None: as many as there are slots."""
+    points: list[dict[str, Any]]
+    runs: list[str] = []
+
+
+class Wish(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """What is handed in: a case as plain data, the changes of each point, the limit."""
+
+    case: dict[str, Any]
+    points: list[dict[str, Any]]
+    at_once: int | None = None
+
+
+class Sweeps:
+    """May be used from any thread."""
+
+    def __init__(self, settings: Settings, desk: Desk) -> None:
+        """Reads what is there; a file that cannot be read is left alone."""
+        self._folder, self._desk = settings.runs / FOLDER, desk
+        self._lock = threading.Lock()
+        self._plans: dict[str, Plan] = {}
+        for path in sorted(self._folder.glob("*.json")):
+            try:
+                self._keep(msgspec.json.decode(path.read_bytes(), type=Plan))
+            except (OSError, msgspec.MsgspecError):
+                continue
+
+    def get(self, sweep_id: str, owner: str) -> Plan | None:
+        """The sweep, when it belongs to the owner."""
+        plan = self._plans.get(sweep_id)
+        return plan if plan is not None and plan.owner == owner else None
+
+    def of(self, owner: str) -> list[Plan]:
+        """The sweeps of an owner, newest first."""
+        return sorted((p for p in tuple(self._plans.values()) if p.owner == owner), key=lambda p: p.id, reverse=True)
+
+    def submit(self, owner: str, body: bytes, key: str | None) -> Plan:
+        """Accepts all runs of a sweep, or none. Raises ServiceError. The same key and body give the same sweep."""
+        digest = hashlib.sha256(body).hexdigest()
+        with self._lock:
+            plan = self._earlier(owner, key, digest)
+            if plan is not None and plan.runs:
+                return plan
+            bodies = self._bodies(body)
+            if plan is None:
+                plan = self._new(owner, body, key, digest)
+                self._write(plan)
+            return self._fill(plan, bodies)
+
+    def held(self, run_id: str, active: Iterable[str]) -> bool:
+        """Whether a run waits because as many of its sweep as may run at a time are in ``active``."""
+        for plan in tuple(self._plans.values()):
+            if plan.at_once is not None and run_id in plan.runs:
+                return len(set(plan.runs).intersection(active)) >= plan.at_once
+        return False
+
+    def _earlier(self, owner: str, key: str | None, digest: str) -> Plan | None:
+        found = [plan for plan in self.of(owner) if key is not None and plan.key == key]
+        if found and found[0].digest != digest:
+            detail = f"Idempotency-Key {key!r} was used for another sweep"
+            raise ServiceError(422, "key_reused", detail, pointer="Idempotency-Key", hint="use a new key")
+        return found[0] if found else None
+
+    def _bodies(self, body: bytes) -> list[bytes]:
+        """The case of each point, each of which can be run. Raises ServiceError with what is wrong."""
+        wish = _wish(body)
+        made = [_changed(wish.case, point, n) for n, point in enumerate(wish.points)]
+        if sum(map(len, made)) > _MOST_BYTES:
+            raise ServiceError(413, "too_large", f"the cases have more than {_MOST_BYTES} bytes together")
+        for n, text in enumerate(made):
+            try:
+                self._desk.read(text, _JSON)
+            except CaseError as error:
+                raise _at(n, error) from None
+        return made
+
+    def _new(self, owner: str, body: bytes, key: str | None, digest: str) -> Plan:
+        wish = _wish(body)
+        sweep_id, now = folder.new_id()
+        return Plan(
+            id=sweep_id, owner=owner, name=str(wish.case.get("name", "")), submitted=now, key=key, digest=digest,
+            at_once=wish.at_once, points=wish.points,
+        )  # fmt: skip
+
+    def _fill(self, plan: Plan, bodies: Sequence[bytes]) -> Plan:
+        for n, body in enumerate(bodies):
+            labels = {"sweep": plan.id, "point": str(n)}
+            receipt = self._desk.submit(plan.owner, body, _JSON, f"sweep-{plan.id}-{n}", labels)
+            plan = msgspec.structs.replace(plan, runs=[*plan.runs, receipt["id"]])
+            self._plans[plan.id] = plan
+        self._write(plan)
+        return plan
+
+    def _keep(self, plan: Plan) -> None:
+        self._plans[plan.id] = plan
+
+    def _write(self, plan: Plan) -> None:
+        try:
+            self._folder.mkdir(0o700, exist_ok=True)
+            durable.write(self._folder / f"{plan.id}.json", msgspec.json.encode(plan))
+        except OSError as error:
+            raise ServiceError(507, "storage", f"the sweep cannot be kept: {error.strerror}", retryable=True) from error
+        self._keep(plan)
+
+
+def _wish(body: bytes) -> Wish:
+    try:
+        wish = msgspec.convert(json_data(body), Wish)
+    except CaseError as error:
+        raise invalid_case(error.problems) from None
+    except msgspec.ValidationError as error:
+        raise ServiceError(422, "invalid_sweep", str(error), hint="case, points, at_once") from None
+    if not 1 <= len(wish.points) <= _MOST_POINTS:
+        raise ServiceError(422, "invalid_sweep", f"{len(wish.points)} points; allowed: 1 to {_MOST_POINTS}")
+    if wish.at_once is not None and wish.at_once < 1:
+        raise ServiceError(422, "invalid_sweep", f"at_once = {wish.at_once}: at least 1")
+    return wish
+
+
+def _changed(case: dict[str, Any], point: dict[str, Any], n: int) -> bytes:
+    try:
+        return json.dumps(apply_overrides(case, point)).encode()
+    except CaseError as error:
+        raise _at(n, error) from None
+
+
+def _at(n: int, error: CaseError) -> ServiceError:
+    return invalid_case([Problem(each.key, each.value, f"{each.message} (point {n})") for each in error.problems])

@@ -1,0 +1,59 @@
+"""Waiting for the end of a run outlasts a server that is away."""
+
+import time
+
+import httpx2
+import msgspec
+import pytest
+
+from conoid.cases.run import State
+from conoid.client.errors import ServiceError, UnreachableError
+from conoid.client.http import Http
+from conoid.client.run import Run, RunInfo
+
+
+class Away(httpx2.BaseTransport):
+    """A server that does not answer, or has no time, for so many requests, and then tells that the run has ended."""
+
+    def __init__(self, times: int, status: int | None) -> None:
+        self.left, self.status = times, status
+
+    def handle_request(self, request: httpx2.Request) -> httpx2.Response:
+        self.left -= 1
+        if self.left < 0:
+            ended = RunInfo(id="a", owner="ann", name="bar", state=State.SUCCEEDED, ranks=1, submitted=0.0)
+            return httpx2.Response(200, content=msgspec.json.encode(ended))
+        if self.status is None:
+            raise httpx2.ConnectError("refused")
+        return httpx2.Response(self.status, json={"detail": "not now", "retryable": self.status == 503})
+
+
+@pytest.fixture(autouse=True)
+def clock(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Time passes in sleep only."""
+    now = [1000.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(time, "sleep", lambda seconds: now.__setitem__(0, now[0] + seconds))
+
+
+@pytest.mark.parametrize("status", [None, 503])
+def test_a_server_may_be_away_for_a_minute(status: int | None) -> None:
+    away = Away(60, status)
+    assert Run(Http("http://x", transport=away), "a").wait().state is State.SUCCEEDED
+
+
+def test_a_server_that_stays_away_is_given_up() -> None:
+    began = time.monotonic()
+    with pytest.raises(UnreachableError):
+        Run(Http("http://x", transport=Away(10**6, None)), "a").wait()
+    assert 60.0 < time.monotonic() - began < 200.0
+
+
+def test_the_timeout_holds_while_the_server_is_away() -> None:
+    with pytest.raises(TimeoutError):
+        Run(Http("http://x", transport=Away(10**6, None)), "a").wait(timeout=5.0)
+
+
+def test_a_refusal_is_no_absence() -> None:
+    with pytest.raises(ServiceError):
+        Run(Http("http://x", transport=Away(1, 403)), "a").wait()

@@ -1,0 +1,130 @@
+"""Those who open connections and say nothing, log floods, and tokens that are revoked in the middle of an answer."""
+
+import logging
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+
+import httpx2
+import pytest
+
+from conoid.cases.run import State
+from conoid.server import auth, connections
+from conoid.server.app import opened
+from conoid.server.connections import Connection
+from conoid.server.quiet import Quiet
+from conoid.server.serve import _listening, _Server
+from conoid.server.settings import Settings
+from conoid.server.tokens import create_token
+
+from .running import PATIENCE, User
+
+HALF = b"GET /healthz HTTP/1.1\r\nHost: x\r\nX-Long: "
+
+
+@pytest.fixture
+def ann(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> Iterator[User]:
+    """One who talks to a server over real connections, of which 20 are let in at a time."""
+    monkeypatch.setattr(connections, "HEADER", 1.0)
+    monkeypatch.setattr(connections, "raise_limit", lambda: 20)
+    with opened(settings) as service, _listening(settings) as listener:
+        server = _Server(service)
+        thread = threading.Thread(target=server.run, args=([listener],))
+        thread.start()
+        token = create_token(service.store, "ann", frozenset({"read", "submit"}))
+        url = f"http://127.0.0.1:{listener.getsockname()[1]}"
+        headers = {"Authorization": f"Bearer {token}"}
+        with httpx2.Client(base_url=url, headers=headers, timeout=PATIENCE) as client:
+            yield User(client, token, settings.runs)
+        service.supervisor.end_all()
+        server.should_exit = True
+        thread.join(PATIENCE)
+
+
+def knock(user: User) -> socket.socket:
+    """Half a request."""
+    made = socket.create_connection((user.http.base_url.host, user.http.base_url.port))
+    made.sendall(HALF)
+    return made
+
+
+def test_half_requests_keep_nobody_out(ann: User) -> None:
+    crowd = [knock(ann) for _ in range(200)]
+    for _ in range(5):
+        with httpx2.Client(base_url=ann.http.base_url, timeout=5.0) as other:
+            assert other.get("/healthz").status_code == 200
+    assert len(Connection.idle) <= 21
+    for one in crowd:
+        one.close()
+
+
+def test_a_header_has_its_time(ann: User) -> None:
+    with knock(ann) as one:
+        one.settimeout(PATIENCE)
+        began = time.monotonic()
+        for _ in range(3):
+            one.sendall(b"x")
+            time.sleep(0.1)
+        with suppress(ConnectionResetError):
+            assert one.recv(1) == b""
+        assert time.monotonic() - began < 10.0
+
+
+def test_a_connection_is_used_again(ann: User) -> None:
+    for _ in range(3):
+        assert ann.http.get("/v1/me").status_code == 200
+    deadline = time.monotonic() + PATIENCE
+    while len(Connection.idle) != 1:
+        assert time.monotonic() < deadline, Connection.idle
+
+
+@pytest.mark.parametrize("path", ["stream", "logs/0?follow=true"])
+def test_who_is_revoked_hears_no_more(ann: User, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, path: str) -> None:
+    monkeypatch.setattr(auth, "RECHECK", 0.3)
+    run = ann.submit(wait=str(tmp_path / "go"), steps=10_000, pace=0.02)
+    ann.wait_for(run, State.RUNNING)
+    (tmp_path / "go").touch()
+    with ann.http.stream("GET", f"/v1/runs/{run}/{path}") as answer:
+        lines = answer.iter_raw()
+        next(lines)
+        revoke(ann)
+        began = time.monotonic()
+        for _ in lines:
+            assert time.monotonic() - began < 5.0, "the stream goes on"
+    assert time.monotonic() - began < 5.0
+
+
+def test_a_stream_ends_when_it_was_told_to(ann: User, tmp_path: Path) -> None:
+    run = ann.submit(wait=str(tmp_path / "go"))
+    ann.wait_for(run, State.RUNNING)
+    began = time.monotonic()
+    assert ann.http.get(f"/v1/runs/{run}/stream?seconds=0.3").status_code == 200
+    assert ann.http.get(f"/v1/runs/{run}/logs/0?follow=true&seconds=0.3").status_code == 200
+    assert time.monotonic() - began < 5.0
+
+
+def revoke(user: User) -> None:
+    """By the operator, in the database."""
+    from conoid.server.store import Store
+
+    store = Store(f"sqlite:///{user.runs / 'server.sqlite'}")
+    assert store.revoke(user.name.split("_")[1])
+    store.close()
+
+
+def test_a_flood_of_one_line_is_short_in_the_log(monkeypatch: pytest.MonkeyPatch) -> None:
+    quiet, now = Quiet(), [1000.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+
+    def say() -> logging.LogRecord | None:
+        record = logging.LogRecord("a", logging.ERROR, "file.py", 7, "run %s", ("x",), None)
+        return record if quiet.filter(record) else None
+
+    assert sum(say() is not None for _ in range(10_000)) == 20
+    now[0] += 61.0
+    last = say()
+    assert last is not None
+    assert last.getMessage() == "run x (and 9980 more like this)"

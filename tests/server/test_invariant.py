@@ -1,0 +1,117 @@
+"""Whatever fails, and wherever: every open run is watched, waits for its turn or has a timer, and ends in a true state.
+
+A supervisor without its thread is turned by hand; a fault strikes at each place at which it writes, one after the
+other, and at each place it is killed as well and another one takes over.
+"""
+
+import errno
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+
+import pytest
+
+from conoid.cases import layout
+from conoid.cases.run import State
+from conoid.server import folder, holds
+from conoid.server.events import CancelAsked, Run
+
+from .faulty import CrashError, House, Plan, faults, fsync, write
+
+TURNS = 400
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A life: how the worker ends, when the owner cancels it (after so many turns; -1: never), what must come out."""
+
+    ends: str
+    cancel: int
+    state: State
+    cause: str | None = None
+    refuses: bool = False
+
+
+SCENARIOS = {
+    "succeeds": Scenario("succeeded", -1, State.SUCCEEDED),
+    "cancelled in the queue": Scenario("never", 0, State.CANCELLED, "cancelled"),
+    "cancelled while it runs": Scenario("never", 6, State.CANCELLED, "cancelled"),
+    "killed from outside": Scenario("killed", -1, State.LOST, "node"),
+    "cannot be launched": Scenario("never", -1, State.FAILED, "launch", refuses=True),
+}
+ERRORS = {
+    "no space": (OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)), False),
+    "disk error": (OSError(errno.EIO, os.strerror(errno.EIO)), False),
+    "no descriptor": (OSError(errno.EMFILE, os.strerror(errno.EMFILE)), True),
+    "killed": (CrashError(), False),
+}
+
+QUICK = {
+    ("succeeds", "no space", 1),
+    ("succeeds", "killed", 1),
+    ("cancelled while it runs", "no descriptor", 1),
+    ("cannot be launched", "no space", 3),
+}
+
+
+class Home(House):
+    """One in which runs are lived."""
+
+    def live(self, run: Run, scenario: Scenario, plan: Plan) -> None:
+        """Turns until the run has ended; what must always hold is looked at after each turn."""
+        for turn in range(TURNS):
+            self.supervisor._inbox.put(None)
+            try:
+                with faults(plan):
+                    if turn >= scenario.cancel >= 0:
+                        self.supervisor._apply(run.id, CancelAsked())
+                    self.supervisor._turn()
+            except CrashError:
+                self.supervisor = self.begin()
+            assert self.supervisor.stranded() == []
+            assert sum(puppet.alive for puppet in self.puppets.made) <= 1
+            if self.supervisor.current(run.id) is None:
+                return
+        raise AssertionError(f"the run is still {self.supervisor.current(run.id)}")
+
+
+@pytest.fixture(scope="module")
+def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Home]:
+    made = Home(tmp_path_factory.mktemp("house") / "runs")
+    yield made
+    made.store.close()
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(holds, "_AGAIN", 0.0)
+    monkeypatch.setattr(os, "fsync", fsync)
+    monkeypatch.setattr(os, "write", write)
+
+
+@pytest.mark.parametrize(
+    ("name", "error", "times"),
+    [
+        pytest.param(*lives, marks=[] if lives in QUICK else pytest.mark.slow)
+        for lives in product(SCENARIOS, ERRORS, (1, 3))
+    ],
+)
+def test_no_fault_at_any_place_strands_a_run(house: Home, name: str, error: str, times: int) -> None:
+    scenario, (raised, reads) = SCENARIOS[name], ERRORS[error]
+    place, fired = 0, 1
+    while fired:
+        house.puppets.ends, house.puppets.refuses, house.puppets.made = scenario.ends, scenario.refuses, []
+        run = house.accept()
+        plan = Plan(house.settings.runs, place, raised, times, reads)
+        house.live(run, scenario, plan)
+        told, fired = house.store.get(run.id), plan.fired
+        assert told is not None
+        assert (told.state, told.cause) == (scenario.state, scenario.cause), f"place {place}"
+        assert folder.run(house.settings.runs / run.id).state is scenario.state, f"place {place}: the journal"
+        ended = folder.outcome(house.settings.runs / run.id)
+        assert ended is not None
+        assert ended.state == scenario.state, f"place {place}: {layout.OUTCOME}"
+        assert len(house.puppets.made) <= 2 + times, f"place {place}: too many launches"
+        place += 1
+    assert place > 5, "a life has more places than that"

@@ -1,0 +1,142 @@
+"""Sweeps: all runs or none, each once, as many at a time as was said, a table of what came out."""
+
+import csv
+import io
+import json
+import tomllib
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from conoid.cases.run import State
+from conoid.server import folder
+from conoid.server.submission import Desk
+from conoid.server.sweeps import Sweeps
+
+from .running import Running, User, case_text
+
+ENDS = [f"{n} us" for n in range(1, 5)]
+
+
+def wish(**extra: Any) -> bytes:
+    """A sweep over four ends."""
+    points = [{"run.end_time": end} for end in ENDS]
+    return json.dumps({"case": tomllib.loads(case_text()), "points": points, **extra}).encode()
+
+
+def handed_in(user: User, body: bytes, key: str | None = None, status: int = 202) -> dict[str, Any]:
+    """The answer to a sweep."""
+    headers = {"Content-Type": "application/json", **({"Idempotency-Key": key} if key else {})}
+    answer = user.http.post("/v1/sweeps", content=body, headers=headers)
+    assert answer.status_code == status, answer.text
+    found: dict[str, Any] = answer.json()
+    return found
+
+
+def test_a_sweep_ends_in_a_table(server: Running) -> None:
+    sweep = handed_in(server.ann, wish())
+    assert sweep["total"] == len(ENDS) == len(sweep["points"])
+    for point in sweep["points"]:
+        assert server.ann.wait_for(point["run"]["id"])["state"] == "succeeded"
+        assert point["run"]["labels"]["sweep"] == sweep["id"]
+    seen = server.ann.http.get(sweep["url"]).json()
+    assert seen["states"] == {"succeeded": len(ENDS)}
+    assert [point["values"]["run.end_time"] for point in seen["points"]] == ENDS
+    text = server.ann.http.get(f"{sweep['url']}/table").text
+    lines = list(csv.DictReader(io.StringIO(text)))
+    assert [line["run.end_time"] for line in lines] == ENDS
+    assert {(line["state"], line["steps"]) for line in lines} == {("succeeded", "3")}
+    assert [one["id"] for one in server.ann.http.get("/v1/sweeps").json()["sweeps"]] == [sweep["id"]]
+    assert server.bob.http.get(sweep["url"]).status_code == 404
+    assert server.bob.http.get("/v1/sweeps").json() == {"sweeps": []}
+
+
+def test_one_key_is_one_sweep(server: Running) -> None:
+    first, again = (handed_in(server.ann, wish(), "k") for _ in range(2))
+    assert first["id"] == again["id"]
+    assert [p["run"]["id"] for p in first["points"]] == [p["run"]["id"] for p in again["points"]]
+    assert handed_in(server.ann, wish(at_once=1), "k", 422)["code"] == "key_reused"
+    assert len(server.ann.http.get("/v1/runs").json()["runs"]) == len(ENDS)
+
+
+def test_a_sweep_that_broke_off_is_completed(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    real, left = Desk.submit, [2]
+
+    def breaks(self: Desk, *arguments: Any) -> dict[str, Any]:
+        left[0] -= 1
+        if left[0] < 0:
+            raise OSError("broken off")
+        return real(self, *arguments)
+
+    monkeypatch.setattr(Desk, "submit", breaks)
+    with pytest.raises(OSError, match="broken off"):
+        handed_in(server.ann, wish(), "k")
+    monkeypatch.undo()
+    server.service.sweeps.__init__(server.service.settings, server.service.desk)  # type: ignore[misc]
+    assert len(handed_in(server.ann, wish(), "k")["points"]) == len(ENDS)
+    assert len(server.ann.http.get("/v1/runs").json()["runs"]) == len(ENDS)
+
+
+def test_no_more_run_at_a_time_than_was_said(server: Running, tmp_path: Path) -> None:
+    case = tomllib.loads(case_text(wait=str(tmp_path / "go")))
+    body = json.dumps({"case": case, "points": [{"run.end_time": end} for end in ENDS], "at_once": 1}).encode()
+    sweep = handed_in(server.ann, body)
+    runs = [point["run"]["id"] for point in sweep["points"]]
+    server.ann.wait_for(runs[0], State.RUNNING)
+    other = server.bob.submit()
+    assert server.bob.wait_for(other)["state"] == "succeeded", "others are not held up"
+    assert [server.ann.show(run)["state"] for run in runs[1:]] == ["queued"] * 3
+    (tmp_path / "go").touch()
+    ended = [server.ann.wait_for(run) for run in runs]
+    for before, after in pairwise(ended):
+        assert before["finished"] <= after["started"]
+
+
+def test_a_sweep_is_cancelled_at_once(server: Running, tmp_path: Path) -> None:
+    case = tomllib.loads(case_text(wait=str(tmp_path / "go")))
+    body = json.dumps({"case": case, "points": [{"run.end_time": end} for end in ENDS]}).encode()
+    sweep = handed_in(server.ann, body)
+    assert server.ann.http.post(f"{sweep['url']}:cancel").status_code == 202
+    for point in sweep["points"]:
+        assert server.ann.wait_for(point["run"]["id"])["state"] == "cancelled"
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        (wish(points=[]), "1 to 1000"),
+        (wish(points=[{}] * 1001), "1 to 1000"),
+        (wish(at_once=0), "at_once"),
+        (wish(points=[{"run.end_time": "1 us"}, {"run.end_time": "1 kg"}]), "point 1"),
+        (wish(points=[{"run.end": "1 us"}]), "run.end"),
+        (wish(more=1), "more"),
+        (b"[]", "object"),
+        (b"{", "broken JSON"),
+    ],
+)
+def test_a_wrong_sweep_makes_no_run(server: Running, body: bytes, words: str) -> None:
+    assert words in handed_in(server.ann, body, status=422)["detail"]
+    assert server.ann.http.get("/v1/runs").json()["runs"] == []
+
+
+def test_a_damaged_file_harms_no_other_sweep(server: Running) -> None:
+    sweep = handed_in(server.ann, wish())
+    (server.service.settings.runs / "sweeps" / f"{folder.new_id()[0]}.json").write_text("{")
+    again = Sweeps(server.service.settings, server.service.desk)
+    assert [plan.id for plan in again.of("ann")] == [sweep["id"]]
+
+
+def test_the_same_from_python(server: Running) -> None:
+    from conoid.client.session import Session
+
+    with Session("http://127.0.0.1") as session:
+        session._http.close()
+        session._http = server.ann.http
+        made = session.sweep(tomllib.loads(case_text()), [{"run.end_time": end} for end in ENDS], at_once=2)
+        assert made.wait(60.0).over
+        assert [line["state"] for line in made.table()] == ["succeeded"] * len(ENDS)
+        assert session.find_sweep("last").id == made.id
+        assert [run.status().labels["point"] for run in made.runs()] == ["0", "1", "2", "3"]
+        assert made.cancel().states == {"succeeded": len(ENDS)}

@@ -1,0 +1,103 @@
+"""A run that is kept, resumed, kept again and resumed: every line of its ledger is that of the uninterrupted run.
+
+Between the two times it takes no step, or some; the schedule and the halo of its searches may differ after each.
+"""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from conoid.cases import schema
+from conoid.cases.load import apply_overrides, parse_case, read_data, resolved_json
+from conoid.cases.messages import Energy
+from conoid.worker import simulation, step
+from conoid.worker.digest import digest
+from conoid.worker.errors import InputError
+from conoid.worker.migration import checkpoint
+from conoid.worker.migration.route import route
+from conoid.worker.parallel.comm import Comm
+from conoid.worker.simulation import Simulation
+from conoid.worker.timers import Timers
+
+from ..contact.ranks import on_ranks
+
+BREAKING = Path(__file__).parents[1] / "parallel" / "breaking.toml"
+STEPS = 32
+"""Of the 54 of the scene; when they are over, contact has taken energy, facets have broken and cohesive ones pull."""
+OTHER = ("contact.skin=0.08", "contact.domain=box")
+
+
+class Course(NamedTuple):
+    """What a run has been."""
+
+    lines: list[Energy]
+    """Of the ledger, a step each."""
+    impulses: list[float]
+    """What contact has given each part, N s."""
+    digest: str | None
+    broken: int
+
+
+def case_of(*changes: str) -> schema.Case:
+    return parse_case(apply_overrides(read_data(BREAKING), ["balance.weights=tets", *changes]))
+
+
+def kept_again(sim: Simulation, case: schema.Case, folder: Path) -> Simulation:
+    """Goes on from a checkpoint, with another case where that is allowed."""
+    checkpoint.write(simulation.keep(sim), sim.case, folder, sim.clock.step, sim.clock.t, sim.comm)
+    sim.free()
+    place, manifest = checkpoint.latest(folder)
+    checkpoint.require_same(case, manifest)
+    arrived = route(checkpoint.read(place, manifest, sim.comm), (1.0, 1.0, 1.0), sim.comm)
+    resumed = simulation.resume(case, arrived, sim.comm, Timers(sim.comm))
+    resumed.reduction.begin_again()
+    return resumed
+
+
+def course(comm: Comm, folder: Path, cases: Sequence[schema.Case], stops: Sequence[int]) -> Course:
+    """Of a run on one rank that is kept and resumed before each of the ``stops``, with the next of the ``cases``."""
+    sim, lines = simulation.build(cases[0], Path(), comm), list[Energy]()
+    step.prepare(sim)
+    for number in range(STEPS):
+        for k in (k for k, stop in enumerate(stops) if stop == number):
+            sim = kept_again(sim, cases[(k + 1) % len(cases)], folder)
+        before = sim.model.nodes.v.copy()
+        step.first_half(sim)
+        lines.append(sim.ledger.close(before))
+        step.second_half(sim)
+    assert sim.contact is not None
+    assert sim.fracture is not None
+    broken = sim.fracture.broken
+    found = Course(lines, sim.contact.impulses().reshape(-1).tolist(), digest(sim.model, comm, []), broken)
+    sim.free()
+    return found
+
+
+@pytest.fixture(scope="module")
+def whole() -> Course:
+    (found,) = on_ranks(1, lambda comm: course(comm, Path(), [case_of()], []))
+    last = found.lines[-1]
+    assert min(last.contact, last.friction, last.cohesive, found.broken) > 0
+    return found
+
+
+@pytest.mark.parametrize("ranks", [1, 3])
+@pytest.mark.parametrize("stops", [(9, 9), (8, 20, 21)], ids=str)
+@pytest.mark.parametrize("changes", [(), OTHER], ids=["as it is", "other searches"])
+def test_what_is_kept_again_and_again_is_the_same_run(
+    changes: tuple[str, ...], stops: tuple[int, ...], ranks: int, whole: Course, tmp_path: Path
+) -> None:  # fmt: skip
+    cases = [case_of(), case_of(*changes)]
+    for found in on_ranks(ranks, lambda comm: course(comm, tmp_path, cases, stops)):
+        assert found == whole._replace(digest=found.digest)
+        assert found.digest in (whole.digest, None)
+
+
+def test_what_the_answer_depends_on_may_not_change() -> None:
+    manifest = {"case": json.loads(resolved_json(case_of()))}
+    checkpoint.require_same(case_of(*OTHER), manifest)
+    with pytest.raises(InputError, match=r"^contact\.friction: differs from the case of the checkpoint"):
+        checkpoint.require_same(case_of("contact.friction=0.3"), manifest)
