@@ -12,10 +12,10 @@ from conoid.cases.messages import Status
 from conoid.cases.run import Cause, State
 from conoid.cases.slurm import Entry
 from conoid.server import journal, recovery
+from conoid.server.events import Run
 from conoid.server.folder import Submission, create, new_id
 from conoid.server.launch.handed import SlurmWorker
 from conoid.server.launch.slurm import SlurmLauncher
-from conoid.server.lifecycle import Run
 from conoid.server.settings import Settings
 from conoid.worker import job as attempt
 from conoid.worker.lock import hold
