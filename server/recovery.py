@@ -14,7 +14,7 @@ from .events import Found, Run
 from .folder import Submission
 from .launch import Launcher, Trace, Worker
 
-_STOPPABLE = {State.QUEUED, State.STARTING, State.RUNNING}
+_STOPPABLE = {State.QUEUED, State.STARTING, State.RUNNING, State.STOPPING}
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,9 @@ def look(path: Path, known: Run | None, launcher: Launcher) -> Left:
     run = _mended(folder.replay(accepted, told), bool(told), known, path, trace, launcher.queues)
     code, full = farewell.exit_code(path), farewell.disk_failed(path)
     found = Found(_fate(path, trace), folder.outcome(path), trace.rebooted, code, full)
-    return Left(_stopping(run, known, path), made.idempotency_key if made else None, found, trace.worker)
+    return Left(
+        _stopping(run, known, path, launcher.queues), made.idempotency_key if made else None, found, trace.worker
+    )
 
 
 def _submission(path: Path) -> Submission | None:
@@ -79,8 +81,11 @@ def _launched(path: Path, trace: Trace) -> bool:
     return trace.launched or (path / layout.WORKER).exists() or (path / layout.OUTCOME).exists()
 
 
-def _stopping(run: Run, known: Run | None, path: Path) -> Run:
+def _stopping(run: Run, known: Run | None, path: Path, queues: bool) -> Run:
+    """A job in a queue that says by itself that it stops was interrupted, and goes on, unless somebody has asked."""
     why = folder.stop_asked(path) or (known.stopping_for if known is not None else None)
+    if why is None and queues and run.state is State.STOPPING:
+        return replace(run, state=State.RUNNING)
     if why is None or run.state not in _STOPPABLE:
         return run
     return replace(run, state=State.STOPPING, stopping_for=why)

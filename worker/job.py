@@ -133,6 +133,7 @@ def _interrupted(folder: Path, job: Job, number: str, further: bool) -> int | No
         end(folder, job, _so_far(folder, State.TIMED_OUT, Cause.WALLTIME, message))
         return ExitCode.INTERRUPTED
     if verdict == "unknown":
+        _say(folder, job, State.QUEUED, f"job {number} was interrupted; a next one goes on from its checkpoint")
         return None
     why = "the time limit is near" if verdict == "time limit" else "preempted"
     _say(folder, job, State.QUEUED, f"{why}; job {number} waits again and goes on from its checkpoint")

@@ -8,9 +8,15 @@ import pytest
 
 from conoid.cases import batch, layout, slurm
 from conoid.cases.batch import Job, Profile, Slurm
+from conoid.cases.messages import Status
 from conoid.cases.run import Cause, State
 from conoid.cases.slurm import Entry
+from conoid.server import journal, recovery
+from conoid.server.events import Run
+from conoid.server.folder import Submission, create, new_id
 from conoid.server.launch.handed import SlurmWorker
+from conoid.server.launch.slurm import SlurmLauncher
+from conoid.server.settings import Settings
 from conoid.worker import job as attempt
 from conoid.worker.lock import hold
 
@@ -116,6 +122,34 @@ def test_of_two_jobs_the_one_that_has_begun_stays(place: Path) -> None:
     told = batch.read_job(place / "run")
     assert told is not None
     assert told.job == "8"
+
+
+@pytest.mark.parametrize(("asked", "state"), [(None, State.RUNNING), (Cause.CANCELLED, State.STOPPING)])
+def test_a_restarted_server_ends_no_run_that_was_interrupted(
+    tmp_path: Path, asked: Cause | None, state: State, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The worker has told that it stops; only the database knows that somebody wanted it."""
+    monkeypatch.setattr(SlurmLauncher, "_work", lambda launcher: None)
+    run, now = new_id()
+    made = Submission(
+        id=run, owner="ann", name="bar", title="", ranks=2, submitted=now, case_file="case.toml", body_sha256="",
+        idempotency_key=None, wall_time=None, estimate={},
+    )  # fmt: skip
+    folder = create(tmp_path, made, b"", b"{}")
+    for told in (State.QUEUED, State.STARTING, State.RUNNING, State.STOPPING):
+        journal.append(folder / layout.JOURNAL, Status(run=run, wall=now, state=told))
+    (folder / layout.JOB).write_bytes(batch.to_json(JOB))
+    site = Slurm(profiles={"a": Profile()}, bin=commands_of(tmp_path))
+    known = Run(run, "ann", "bar", 2, now, state=State.RUNNING, stopping_for=asked)
+    left = recovery.look(folder, known, SlurmLauncher(Settings(runs=tmp_path), site))
+    assert (left.run.state, left.run.stopping_for, left.found.worker) == (state, asked, "alive")
+
+
+def commands_of(place: Path) -> str:
+    """A Slurm that does not answer."""
+    (place / "bin").mkdir()
+    (place / "away").touch()
+    return commands(place, "exit 1")
 
 
 def test_a_job_that_waits_though_its_run_has_ended_is_taken_out(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
