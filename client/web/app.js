@@ -1,9 +1,10 @@
-// Which page is shown: sign in, the list of runs, or one run.
+// Which page is shown: sign in, the list of runs, one run, or two of them.
 
 import { Problem, call, token } from "./api.js";
 import { duration, h, meter, moment, pill } from "./figures.js";
 import { offer } from "./libraries.js";
 import { FINAL } from "./live.js";
+import { PairPage } from "./pair.js";
 import { RunPage } from "./run.js";
 
 const page = document.getElementById("page");
@@ -45,9 +46,11 @@ class RunsPage {
   constructor() {
     this.body = h("tbody");
     this.note = h("p.hint", { hidden: "" });
-    const head = h("thead", {}, h("tr", {}, ["run", "state", "progress", "ranks", ""].map((name) => h("th", { scope: "col" }, name))));
+    const head = h("thead", {}, h("tr", {}, ["run", "state", "progress", "ranks", "submitted", "compare"].map((name) => h("th", { scope: "col" }, name))));
+    this.marked = []; // Ids of runs to be compared, the last two.
+    this.compare = h("button.quiet", { type: "button", disabled: "", onclick: () => { location.hash = `#/compare/${this.marked.map(encodeURIComponent).join("/")}`; } }, "Compare two");
     this.table = h("table.runs", {}, head, this.body);
-    this.element = h("div", {}, h("div.card-head", {}, h("h1", {}, "Runs")), h("div.card", {}, this.table, this.note));
+    this.element = h("div", {}, h("div.card-head", {}, h("h1", {}, "Runs"), h("span.note", {}, this.compare)), h("div.card", {}, this.table, this.note));
     document.title = "Conoid";
     this.read();
     this.timer = setInterval(() => document.hidden || this.read(), 3000);
@@ -77,32 +80,44 @@ class RunsPage {
     this.note.replaceChildren(...children);
   }
 
+  mark(id) {
+    this.marked = this.marked.includes(id) ? this.marked.filter((one) => one !== id) : [...this.marked, id].slice(-2);
+    this.compare.disabled = this.marked.length !== 2;
+    for (const box of this.body.querySelectorAll("[data-marks]")) box.checked = this.marked.includes(box.dataset.marks);
+  }
+
   draw(runs) {
-    this.body.replaceChildren(...runs.map(row));
+    const focused = document.activeElement?.dataset?.marks;
+    this.body.replaceChildren(...runs.map((run) => row(run, this.marked.includes(run.id), () => this.mark(run.id))));
+    if (focused) this.body.querySelector(`[data-marks="${CSS.escape(focused)}"]`)?.focus();
     this.table.hidden = !runs.length;
     if (runs.length) this.say();
     else this.say("No runs yet. Submit one: ", h("code", {}, "conoid submit taylor_copper"));
   }
 }
 
-function row(run) {
+function row(run, marked, mark) {
   const link = `#/runs/${encodeURIComponent(run.id)}`;
   const open = () => { location.hash = link; };
   const share = run.state === "succeeded" ? 1 : run.progress ? run.progress.t / run.progress.end_time : 0;
   const took = FINAL.has(run.state) && run.started ? ` · ${duration(run.finished - run.started)}` : "";
+  const box = h("input", { type: "checkbox", "data-marks": run.id, "aria-label": `compare ${run.name} ${run.id}`, checked: marked && "", onchange: mark });
   return h("tr", { onclick: open },
     h("td", {}, h("a.name", { href: link }, run.name), h("span.id", {}, run.id)),
     h("td", { title: run.message || run.reason }, pill(run.state)),
     h("td.bar", { style: { minWidth: "120px" } }, meter(run.state, share)),
     h("td.ranks-of", {}, String(run.ranks)),
-    h("td.right.when", {}, moment(run.submitted) + took));
+    h("td.right.when", {}, moment(run.submitted) + took),
+    h("td.mark", { onclick: (event) => event.stopPropagation() }, box));
 }
 
 // Where we are ---------------------------------------------------------------------------------------------------------
 
 function route() {
   const [, run] = /^#\/runs\/([^/]+)$/.exec(location.hash) ?? [];
-  show(run ? new RunPage(decodeURIComponent(run)) : new RunsPage());
+  const [, ...pair] = /^#\/compare\/([^/]+)\/([^/]+)$/.exec(location.hash) ?? [];
+  if (pair.length) show(new PairPage(pair.map(decodeURIComponent)));
+  else show(run ? new RunPage(decodeURIComponent(run)) : new RunsPage());
 }
 
 // A server with tokens is not asked before there is one.

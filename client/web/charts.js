@@ -5,6 +5,7 @@ import { echarts } from "./libraries.js";
 
 const GROUP = "run";
 const FONT = 12;
+const NEAR = "100px"; // Of the window: a chart farther off is not drawn, and is when it comes near.
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 
 // A chart of `height` px. `option()` gives what ECharts calls an option, or null while there is nothing to draw.
@@ -12,7 +13,9 @@ export class Chart {
   constructor(height, label, option, { alone = false, onClick } = {}) {
     this.element = h("div.plot", { tabindex: 0, role: "img", "aria-label": `${label}; arrow keys move the cursor`, style: { height: `${height}px` } },
       h("p.hint", {}, "waiting for the first numbers"));
-    Object.assign(this, { option, alone, onClick, at: 0 });
+    Object.assign(this, { option, alone, onClick, at: 0, seen: false });
+    this.eye = new IntersectionObserver((entries) => this.look(entries.at(-1).isIntersecting), { rootMargin: NEAR });
+    this.eye.observe(this.element);
     this.watch = new ResizeObserver(() => this.chart?.resize());
     this.watch.observe(this.element);
     this.dark = matchMedia("(prefers-color-scheme: dark)");
@@ -30,7 +33,14 @@ export class Chart {
     }
   }
 
+  look(seen) {
+    const stale = seen && !this.seen;
+    this.seen = seen;
+    if (stale) this.draw();
+  }
+
   draw() {
+    if (!this.seen) return;
     const option = this.kit && this.element.clientWidth ? this.option() : null;
     if (!option) return;
     this.chart ??= this.init();
@@ -59,6 +69,7 @@ export class Chart {
 
   close() {
     this.watch.disconnect();
+    this.eye.disconnect();
     this.dark.removeEventListener("change", this.redraw);
     this.chart?.dispose();
   }

@@ -9,7 +9,7 @@ const TALL = 250;
 const MOST_COLUMNS = 240; // Of the heat map; more are less than a pixel wide on a phone.
 const COUNTED = [["nodes", "compute"], ["facets", "exchange"], ["fragments", "fracture"]];
 const CURVE = 60; // Points of a fitted law.
-const LEAST = 0.8; // Fragments, where the axis of their number begins.
+const LEAST = 1; // Fragment, where the axis of their number begins.
 const FLOOR = 1e-10; // Residuals below it are rounding.
 const RESIDUAL = 1e-2; // Above it a run's energy does not close.
 
@@ -51,9 +51,10 @@ function ofResidual(live) {
 function ofCounts(live) {
   const all = live.sizes;
   if (!all.length) return null;
+  const now = { ...all.at(-1), t: Math.max(all.at(-1).t, live.loads.at(-1)?.t ?? 0) }; // Counts are told when they change.
   const there = COUNTED.filter(([name]) => all.some((point) => point[name] > 0));
   return option(live, axis("", { type: "log" }), there.map(([name, tone]) =>
-    ({ ...series({ name, colour: tone, data: all.map((point) => [point.t, point[name] > 0 ? point[name] : null]) }), showSymbol: all.length < 3 })));
+    ({ ...series({ name, colour: tone, data: [...all, now].map((point) => [point.t, point[name] > 0 ? point[name] : null]) }), showSymbol: all.length < 3 })));
 }
 
 function ofImbalance(live) {

@@ -149,12 +149,17 @@ export class RunPage {
     this.body.update(live.snapshots);
     this.drawChecks();
     this.drawNotes();
-    const now = performance.now();
-    if (now - this.plotted > CHARTS_EVERY && live.seq !== this.charted) {
-      [this.plotted, this.charted] = [now, live.seq];
-      for (const [name, [chart]] of Object.entries(this.charts).filter(([, value]) => Array.isArray(value))) if (name !== "sizes") chart.draw();
+    if (performance.now() - this.plotted > CHARTS_EVERY && live.seq !== this.charted) {
+      [this.plotted, this.charted] = [performance.now(), live.seq];
+      setTimeout(() => this.drawCharts());
     }
     document.title = `${percent(live.fraction)} ${this.info.name ?? live.run} · Conoid`;
+  }
+
+  // After the frame that has the news in the head and the bars.
+  drawCharts() {
+    const charts = Object.entries(this.charts).filter(([name, value]) => name !== "sizes" && Array.isArray(value));
+    if (!this.abort.signal.aborted) for (const [, [chart]] of charts) chart.draw();
   }
 
   drawNotes() {

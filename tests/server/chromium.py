@@ -1,0 +1,266 @@
+"""A Chromium without a window, driven over a pipe in the words of the DevTools protocol; pictures in software.
+
+https://chromedevtools.github.io/devtools-protocol has the methods that are called here.
+"""
+
+import base64
+import fcntl
+import json
+import os
+import queue
+import shutil
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Self
+
+PROGRAMS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+_OPTIONS = (
+    "--headless=new", "--remote-debugging-pipe", "--no-sandbox", "--no-first-run", "--disable-extensions",
+    "--disable-background-networking", "--disable-component-update", "--disable-dev-shm-usage", "--mute-audio",
+    "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist",
+)  # fmt: skip
+_ONTO_3_AND_4 = "import os, sys; r, w, *a = sys.argv[1:]; os.dup2(int(r), 3); os.dup2(int(w), 4); os.execvp(a[0], a)"
+"""The protocol's pipes have fixed numbers in the browser."""
+_PATIENCE = 60.0
+_NOTHING = (None, False, 0, "")
+"""What JavaScript takes for false; an element is an empty table here."""
+_BUTTON = {"button": "left", "clickCount": 1}
+KEYS = {"Enter": 13, "Escape": 27, "Tab": 9, " ": 32, "ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40}
+"""Keys that can be pressed, with their Windows numbers, which the protocol wants."""
+
+MEASURES = """
+window.seen = {frames: [], events: []};
+new PerformanceObserver((list) => list.getEntries().forEach(({ name, duration, startTime, detail }) => {
+  if (name === "conoid:frame") seen.frames.push([startTime, duration, detail.calls]);
+  if (name === "conoid:event") seen.events.push(duration);
+})).observe({ type: "measure" });
+"""
+"""Keeps what the page writes into the browser's timeline, in ``window.seen``."""
+
+
+def program() -> str | None:
+    """The browser on this machine, None where there is none."""
+    return next((found for name in PROGRAMS if (found := shutil.which(name))), None)
+
+
+class PageError(Exception):
+    """A script of the page has failed, or what was waited for has not come."""
+
+
+class Browser:
+    """A browser with an empty profile; a context manager."""
+
+    def __init__(self, folder: Path) -> None:
+        """``folder`` takes the profile."""
+        self._folder = folder
+        self._lock = threading.Lock()
+        self._answers: dict[int, queue.SimpleQueue[dict[str, Any]]] = {}
+        self._listeners: dict[str, Callable[[str, dict[str, Any]], None]] = {}
+        self._last = 0
+
+    def __enter__(self) -> Self:
+        """Starts it."""
+        ours, theirs = os.pipe(), os.pipe()
+        into, out_of = (fcntl.fcntl(fd, fcntl.F_DUPFD, 10) for fd in (ours[0], theirs[1]))
+        launch = [sys.executable, "-c", _ONTO_3_AND_4, str(into), str(out_of), program() or PROGRAMS[0]]
+        self._process = subprocess.Popen(
+            [*launch, *_OPTIONS, f"--user-data-dir={self._folder}"], pass_fds=(into, out_of),
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
+        )  # fmt: skip
+        for fd in (ours[0], theirs[1], into, out_of):
+            os.close(fd)
+        self._to, self._from = os.fdopen(ours[1], "wb", 0), os.fdopen(theirs[0], "rb")
+        threading.Thread(target=self._listen, daemon=True).start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Ends it."""
+        try:
+            self.call("Browser.close")
+            self._process.wait(10)
+        except (OSError, PageError, subprocess.TimeoutExpired):
+            self._process.kill()
+            self._process.wait()
+        self._to.close()
+
+    def page(self, width: int = 1280, height: int = 720, *, dark: bool = False, phone: bool = False) -> "Page":
+        """An empty page in a profile of its own."""
+        context = self.call("Target.createBrowserContext")["browserContextId"]
+        target = self.call("Target.createTarget", url="about:blank", browserContextId=context)["targetId"]
+        session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        page = Page(self, session, target)
+        self._listeners[session] = page.heard
+        page.open(width, height, dark=dark, phone=phone)
+        return page
+
+    def call(self, method: str, session: str = "", /, **params: Any) -> dict[str, Any]:
+        """A method of the protocol, and its answer. Raises PageError."""
+        answer: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
+        number = self.send(method, session, answer, **params)
+        try:
+            found = answer.get(timeout=_PATIENCE)
+        except queue.Empty:
+            raise PageError(f"{method}: no answer") from None
+        finally:
+            self._answers.pop(number, None)
+        if "error" in found:
+            raise PageError(f"{method}: {found['error']['message']}")
+        result: dict[str, Any] = found["result"]
+        return result
+
+    def send(
+        self, method: str, session: str, answer: "queue.SimpleQueue[dict[str, Any]] | None" = None, **params: Any
+    ) -> int:
+        """A method without waiting for its answer; its number."""
+        with self._lock:
+            self._last += 1
+            number = self._last
+            if answer is not None:
+                self._answers[number] = answer
+            told = {"id": number, "method": method, "params": params, **({"sessionId": session} if session else {})}
+            self._to.write(json.dumps(told).encode() + b"\0")
+        return number
+
+    def _listen(self) -> None:
+        rest = b""
+        while data := self._from.read1(1 << 20):
+            *whole, rest = (rest + data).split(b"\0")
+            for text in whole:
+                told = json.loads(text)
+                if told.get("id") in self._answers:
+                    self._answers[told["id"]].put(told)
+                elif "method" in told and (listener := self._listeners.get(told.get("sessionId", ""))):
+                    listener(told["method"], told["params"])
+        self._from.close()
+
+
+class Page:
+    """One page: what a person does with it, and what the browser says of it."""
+
+    def __init__(self, browser: Browser, session: str, target: str) -> None:
+        self._browser, self._session, self._target = browser, session, target
+        self.errors: list[str] = []
+        """What stands in the console as an error, scripts that have failed, and pages of the server that did."""
+        self.answers: list[tuple[int, str]] = []
+        """Status and address of everything that was asked of a server."""
+
+    def open(self, width: int, height: int, *, dark: bool, phone: bool) -> None:
+        """Sets the size and the theme, and begins to listen."""
+        for domain in ("Page", "Runtime", "Log", "Network"):
+            self.call(f"{domain}.enable")
+        self.size(width, height, phone=phone)
+        theme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
+        self.call("Emulation.setEmulatedMedia", features=[theme])
+        self.call("Page.addScriptToEvaluateOnNewDocument", source=MEASURES)
+
+    def size(self, width: int, height: int, *, phone: bool = False) -> None:
+        """The size of the window, px."""
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=phone)
+
+    def call(self, method: str, /, **params: Any) -> dict[str, Any]:
+        """A method of the protocol for this page. Raises PageError."""
+        return self._browser.call(method, self._session, **params)
+
+    def heard(self, method: str, told: dict[str, Any]) -> None:
+        """An event of this page; in the thread that listens."""
+        if method == "Runtime.consoleAPICalled" and told["type"] == "error":
+            self.errors.append(" ".join(str(one.get("value", one.get("description"))) for one in told["args"]))
+        elif method == "Runtime.exceptionThrown":
+            self.errors.append(_failure(told["exceptionDetails"]))
+        elif method == "Log.entryAdded" and told["entry"]["level"] == "error":
+            self.errors.append(f"{told['entry']['text']} {told['entry'].get('url', '')}")
+        elif method == "Network.responseReceived":
+            self.answers.append((told["response"]["status"], told["response"]["url"]))
+        elif method == "Page.javascriptDialogOpening":
+            self._browser.send("Page.handleJavaScriptDialog", self._session, accept=True)
+
+    def go(self, url: str) -> None:
+        """Opens an address."""
+        self.call("Page.navigate", url=url)
+        self.wait("document.readyState === 'complete'")
+
+    def evaluate(self, script: str) -> Any:
+        """The value of a JavaScript expression, of a promise what it promises. Raises PageError."""
+        found = self.call(
+            "Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True, userGesture=True
+        )
+        if "exceptionDetails" in found:
+            raise PageError(f"{script[:80]}: {_failure(found['exceptionDetails'])}")
+        return found["result"].get("value")
+
+    def wait(self, script: str, seconds: float = _PATIENCE) -> Any:
+        """The value of an expression once it is true. Raises PageError."""
+        until = time.monotonic() + seconds
+        while (value := self.evaluate(script)) in _NOTHING:
+            if time.monotonic() > until:
+                raise PageError(f"not in {seconds:g} s: {script}; the page says: {self.text()[:400]!r}")
+            time.sleep(0.05)
+        return value
+
+    def text(self, selector: str = "body") -> str:
+        """What is to be read below a selector, blank where there is nothing."""
+        return str(self.evaluate(f"document.querySelector({json.dumps(selector)})?.innerText ?? ''"))
+
+    def place(self, selector: str, right: float = 0.5, down: float = 0.5) -> tuple[float, float]:
+        """A place in an element, as shares of its size, scrolled into view; px in the window."""
+        box = self.wait(f"""(() => {{
+          const element = document.querySelector({json.dumps(selector)});
+          element?.scrollIntoView({{ block: "center", behavior: "instant" }});
+          const box = element?.getBoundingClientRect();
+          return box && box.width > 0 && [box.x, box.y, box.width, box.height];
+        }})()""")
+        return box[0] + right * box[2], box[1] + down * box[3]
+
+    def click(self, selector: str, right: float = 0.5, down: float = 0.5) -> None:
+        """A click with the pointer on an element."""
+        self.click_at(*self.place(selector, right, down))
+
+    def click_at(self, x: float, y: float) -> None:
+        """A click at a place of the window."""
+        self.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
+        self.call("Input.dispatchMouseEvent", type="mousePressed", x=x, y=y, **_BUTTON)
+        self.call("Input.dispatchMouseEvent", type="mouseReleased", x=x, y=y, **_BUTTON)
+
+    def press(self, key: str, modifiers: int = 0) -> None:
+        """A key, where the focus is; ``modifiers``: 1 Alt, 2 Ctrl, 8 Shift."""
+        text = {"Enter": "\r"}.get(key, key if len(key) == 1 else "")
+        known = {"key": key, "code": key, "windowsVirtualKeyCode": KEYS.get(key, ord(key[0])), "modifiers": modifiers}
+        self.call("Input.dispatchKeyEvent", type="keyDown", **known, **({"text": text} if text else {}))
+        self.call("Input.dispatchKeyEvent", type="keyUp", **known)
+
+    def write(self, selector: str, text: str) -> None:
+        """Text into a field."""
+        self.focus(selector)
+        self.call("Input.insertText", text=text)
+
+    def focus(self, selector: str) -> None:
+        """Puts the focus on an element."""
+        self.wait(f"document.querySelector({json.dumps(selector)})?.focus() === undefined")
+
+    def slide(self, selector: str, value: float | str) -> None:
+        """A slider or a list of choices to a value, as a person's hand leaves it."""
+        self.wait(f"!!document.querySelector({json.dumps(selector)})")
+        self.evaluate(f"""(() => {{
+          const element = document.querySelector({json.dumps(selector)});
+          element.value = {json.dumps(value)};
+          element.dispatchEvent(new Event("input", {{ bubbles: true }}));
+          element.dispatchEvent(new Event("change", {{ bubbles: true }}));
+        }})()""")
+
+    def draw(self, path: Path, *, whole: bool = False) -> None:
+        """A picture of the window, or of the whole page."""
+        found = self.call("Page.captureScreenshot", format="png", captureBeyondViewport=whole)
+        path.write_bytes(base64.b64decode(found["data"]))
+
+    def close(self) -> None:
+        """Closes the page."""
+        self._browser.call("Target.closeTarget", targetId=self._target)
+
+
+def _failure(details: dict[str, Any]) -> str:
+    exception = details.get("exception", {})
+    return str(exception.get("description") or exception.get("value") or details.get("text"))

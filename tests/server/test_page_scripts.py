@@ -1,0 +1,145 @@
+"""What the page computes without a browser, asked by node: snapshots, fits, groups of phases, keys that differ."""
+
+import base64
+import json
+import math
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from conoid.cases import fragments
+from conoid.client.snapshots import Snapshot
+from conoid.worker.snapshots import blob
+
+from ..snapshots.shattered import shattered
+
+HERE = Path(__file__)
+WEB = HERE.parents[2] / "client" / "web"
+NODE = shutil.which("node")
+pytestmark = pytest.mark.skipif(NODE is None, reason="no node on this machine")
+
+Ask = Callable[..., Any]
+
+
+@pytest.fixture(scope="module")
+def ask(tmp_path_factory: pytest.TempPathFactory) -> Ask:
+    """ask(module, expression, data): the value of an expression in ``page``, the module, and ``data``."""
+    web = tmp_path_factory.mktemp("web")
+    for path in WEB.glob("*.js"):
+        shutil.copy(path, web)
+    (web / "package.json").write_text('{"type": "module"}')
+
+    def asked(module: str, script: str, data: Any = None) -> Any:
+        told = json.dumps({"module": str(web / module), "script": script, "data": data})
+        command = [str(NODE), str(HERE.with_name("scripts.mjs"))]
+        done = subprocess.run(command, input=told, capture_output=True, text=True, timeout=60, check=False)
+        assert done.returncode == 0, done.stderr
+        return json.loads(done.stdout)
+
+    return asked
+
+
+@pytest.fixture(scope="module")
+def made() -> bytes:
+    told = {"n": 7, "step": 1200, "t": 2.5e-5, "ranks": 2}
+    return blob.made(shattered(5, 40).whole(2), told, lambda labels: np.asarray(1e-6 * labels), blob.Budget()).data
+
+
+def sent(data: bytes) -> dict[str, str]:
+    return {"base64": base64.b64encode(data).decode()}
+
+
+def test_a_snapshot_is_read_as_python_reads_it(ask: Ask, made: bytes) -> None:
+    found, known = ask("snapshot.js", "page.decode(data)", sent(made)), Snapshot(made)
+    assert found["header"]["step"] == 1200
+    assert set(found["arrays"]) == set(known.header.arrays)
+    for name, values in found["arrays"].items():
+        assert np.array_equal(values, known.array(name).ravel()), name
+
+
+@pytest.mark.parametrize(
+    ("harm", "words"),
+    [
+        (lambda data: b"NOTASNAP" + data[8:], "not a snapshot"),
+        (lambda data: data[:8] + b"\2" + data[9:], "of version 2"),
+        (lambda data: data[:-64], "length"),
+    ],
+)
+def test_what_is_no_snapshot_is_refused(ask: Ask, made: bytes, harm: Callable[[bytes], bytes], words: str) -> None:
+    script = "(() => { try { page.decode(data); } catch (error) { return error.message; } })()"
+    assert words in ask("snapshot.js", script, sent(harm(made)))
+
+
+def test_every_corner_has_its_place_its_fragment_and_its_value(ask: Ask, made: bytes) -> None:
+    known = Snapshot(made)
+    triangles = known.array("triangles").ravel()
+    corners = np.array(ask("snapshot.js", "page.corners(page.decode(data).arrays)", sent(made))).reshape(-1, 4)
+    assert np.array_equal(corners[:, :3], known.array("positions")[triangles])
+    assert np.array_equal(corners[:, 3], known.array("vertex_fragment")[triangles])
+    for by, name in (("rank", "triangle_rank"), ("part", "triangle_part"), ("speed", "field:speed")):
+        values = ask("snapshot.js", f"page.cornerValues(page.decode(data), '{by}')", sent(made))
+        assert np.array_equal(values, np.repeat(known.array(name), 3))
+
+
+def test_a_picked_fragment_is_its_row(ask: Ask, made: bytes) -> None:
+    table = Snapshot(made).fragments
+    row = len(table["id"]) // 2
+    found = ask("snapshot.js", f"page.fragment(page.decode(data), {row})", sent(made))
+    assert (found["id"], found["tets"], found["rest"]) == (table["id"][row], table["tets"][row], False)
+    assert (found["mass"], found["birth"]) == (table["mass"][row], pytest.approx(table["birth"][row]))
+    assert found["velocity"] == pytest.approx(table["velocity"][row])
+    place = f"page.rowOf(page.decode(data), {table['id'][row]}n)"
+    assert ask("snapshot.js", place, sent(made)) == row
+
+
+def test_sizes_and_laws_are_those_of_the_tables(ask: Ask, made: bytes) -> None:
+    table = Snapshot(made).fragments
+    whole = sorted(map(float, table["size"][table["tets"] >= fragments.DUST]))
+    found = ask("snapshot.js", "page.sizes(page.decode(data))", sent(made))
+    assert found["points"] == [[size, len(whole) - i] for i, size in enumerate(whole)]
+    laws = ask("snapshot.js", "page.laws(data)", whole)
+    for one, fit in zip(laws, fragments.fits(whole), strict=True):
+        assert one["law"] == fit.law
+        assert one["parameter"] == pytest.approx(fit.parameter)
+        assert math.isclose(one["likelihood"], fit.log_likelihood, rel_tol=1e-9)
+
+
+def test_waiting_is_told_from_not_being_run(ask: Ask) -> None:
+    load = {"phases": {"elements": [1.0, 0.5], "exchange": [0.5, 1.0]}, "waiting": [0.25, 0.875]}
+    assert ask("live.js", "page.grouped(data, 2)", load) == {
+        "compute": [1.0, 0.5], "exchange": [0.25, 0.125], "waiting": [0.25, 0.875], "descheduled": [0.5, 0.5],
+    }  # fmt: skip
+
+
+def test_a_long_series_is_thinned_and_keeps_its_ends(ask: Ask) -> None:
+    script = """(() => {
+      const live = new page.Live("r");
+      const tell = (seq, t) => live.take({ type: "counts", seq, wall: 1, t, nodes: seq, facets: 0, fragments: 1 });
+      for (let i = 1; i <= 9000; i += 1) tell(i, i);
+      tell(9000, -1);
+      return live.sizes.map(({ t }) => t);
+    })()"""
+    times = ask("live.js", script)
+    assert (times[0], times[-1]) == (1, 9000)
+    assert times == sorted(times)
+    assert 1000 <= len(times) <= 2000
+
+
+def test_keys_that_differ_are_told_by_their_place(ask: Ask) -> None:
+    one = {"name": "a", "parts": [{"name": "bar", "v": [0, 0, 1]}], "run": {"ranks": 1, "frames": None}}
+    other = {"name": "b", "parts": [{"name": "bar", "v": [0, 0, 2]}], "run": {"ranks": 1, "seed": None}, "new": True}
+    assert ask("pair.js", "page.differences(data[0], data[1])", [one, other]) == [
+        ["parts[0].v[2]", 1, 2], ["new", None, True],
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(2.2e9, "2.20 GPa"), (0, "0 Pa"), (-999.6, "-1.00 kPa"), (8.1e-9, "8.10 nPa"), (None, "–")]
+)
+def test_numbers_are_written_with_a_prefix(ask: Ask, value: float | None, text: str) -> None:
+    assert ask("figures.js", "page.si(data, 'Pa')", value) == text
