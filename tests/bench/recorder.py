@@ -51,8 +51,8 @@ class Recorder:
             if report.outcome == "failed":
                 entry["why"] = str(report.longrepr).strip().rsplit("\n", 1)[-1]
 
-    def pytest_sessionfinish(self) -> None:
-        """Writes the file."""
+    def pytest_runtest_logfinish(self) -> None:
+        """Writes the file after every test: a session that is cut short has told what it saw."""
         self.path.write_text(json.dumps(self.tests, indent=1), encoding="utf-8")
 
     def _entry(self, node: str) -> dict[str, Any]:
