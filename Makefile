@@ -1,6 +1,7 @@
 # make demo   steel breaks glass: submitted over HTTP, run on 2 MPI ranks, watched live, checked, drawn (demo.png)
 # make test   linters, types and every test that takes seconds
 # make bench  speed, and speed against error, in 15 minutes: tables in build/bench (BENCH=quick: 2, BENCH=long: 60)
+# make accuracy  docs/accuracy.md: every row of the verification catalogue as measured here (ACCURACY=quick: no studies)
 # make reference  docs/case.md and the JSON schema, from the texts of the models in cases/
 # make drill  the long tests: studies and failures that take minutes; root on Debian gets Slurm for those of a cluster
 #
@@ -18,7 +19,7 @@ told = @echo "$(1)"; began=$$(date +%s); \
 	while sleep 5 >/dev/null 2>&1; do echo "$(1): $$(($$(date +%s) - began)) s"; done & clock=$$!; \
 	trap "kill $$clock" EXIT; $(2)
 
-.PHONY: demo test lint style types check bench reference drill clean
+.PHONY: demo test lint style types check bench accuracy reference drill clean
 .DEFAULT_GOAL := test
 
 demo: $(READY)
@@ -41,6 +42,9 @@ check: $(READY)
 
 bench: $(READY)
 	$(BIN)/python -m tests.bench
+
+accuracy: $(READY)
+	$(BIN)/python -m tests.bench.book
 
 reference: $(READY)
 	$(BIN)/conoid schema --out cases/case.schema.json

@@ -145,12 +145,15 @@ def limit(sizes: Sequence[float], values: Sequence[float], floor: float = 0.0, f
 
 
 def _monotone(sizes: Sequence[float], values: Sequence[float], formal: float) -> Limit:
-    """Values that go one way. An order above the formal one is shown, and the formal one extrapolates."""
+    """Values that go one way. An order above the formal one is shown, and the formal one extrapolates.
+
+    Beyond twice the formal one the meshes are too coarse or too close to each other to tell: then with ``CAUTION``.
+    """
     free = fitted(sizes, values)
     if free.order < SLOWEST:
         return Limit(Trend.DIVERGES, values[0], CAUTION * (max(values) - min(values)), free.order)
     used = free if free.order <= formal else fitted(sizes, values, formal)
     beside = abs(used.value + used.slope * sizes[0] ** used.order - values[0])
     spread = used.deviation if len(values) > 3 or used is not free else 0.0
-    far = SAFETY * abs(used.value - values[0])
+    far = (SAFETY if free.order <= 2.0 * formal else CAUTION) * abs(used.value - values[0])
     return Limit(Trend.CONVERGES, used.value, far + spread + beside, free.order)

@@ -57,6 +57,12 @@ def test_an_order_above_the_formal_one_is_not_extrapolated_with() -> None:
     assert found.uncertainty > abs(values[0] - 3.0)
 
 
+def test_far_beyond_the_formal_order_less_is_believed() -> None:
+    sizes = [1.0, 2.0, 4.0]
+    near, far = (limit(sizes, made(sizes, order)) for order in (3.9, 4.1))
+    assert far.uncertainty > 2.0 * near.uncertainty
+
+
 @pytest.mark.parametrize(
     ("values", "trend"),
     [

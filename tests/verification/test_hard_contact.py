@@ -9,6 +9,7 @@ from scipy.spatial import ConvexHull
 
 from conoid.cases import materials
 from conoid.cases.load import apply_overrides, parse_case, read_data, shipped
+from conoid.cases.schema import Viscosity
 from conoid.worker import simulation, state, step
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.parallel.comm import SerialComm
@@ -331,6 +332,14 @@ def test_a_shock_of_few_elements_does_not_overshoot(name: str) -> None:
     assert profile[5:].max() < 1.05
     assert where(profile, 0.05) - where(profile, 0.95) <= 5.0
     assert profile[20:60].mean() == pytest.approx(1.0, rel=0.01)
+
+
+@pytest.mark.xfail(reason="the default viscosity, 0.06 and 1.5, leaves more than 5 % of overshoot")
+@pytest.mark.parametrize("name", ["shock_copper", "shock_tungsten"])
+def test_a_shock_does_not_overshoot_with_the_default_viscosity(name: str) -> None:
+    """Under 5 % of the jump, as above, with what a case has that says nothing."""
+    default = Viscosity()
+    assert shocked(name, {"linear": default.linear, "quadratic": default.quadratic})[5:].max() < 1.05
 
 
 @pytest.mark.parametrize("name", ["shock_copper", "shock_tungsten"])

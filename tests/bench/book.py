@@ -1,0 +1,131 @@
+"""``make accuracy``: writes docs/accuracy.md, every row of the catalogue with what was measured.
+
+``ACCURACY=quick`` leaves out studies of minutes, and says so in the book; a part can be named: shipped, tests, hard.
+What each part found is kept in build/accuracy; the book is written anew from all parts there are, and with ``write``
+nothing else is done.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import time
+import tomllib
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from conoid.cases.estimate import estimate
+from conoid.cases.load import CaseError, apply_overrides, parse_case, read_data, shipped
+from conoid.cases.schema import Case
+from conoid.cases.suite import suite
+from conoid.client import hard
+from conoid.client.errors import ClientError
+from conoid.client.local import LocalServer
+from conoid.client.run import Run
+from conoid.client.scaling import CORES
+from conoid.client.variants import sizes
+
+from . import machine, pages
+
+ROOT = Path(__file__).parents[2]
+OUT = ROOT / "build" / "accuracy"
+_QUIET = {"run.ranks": 1, "run.frames": 0, "run.snapshots": 0, "run.checkpoint_every": "none"}
+_COARSE = 2.0
+"""Of the element sizes, for the second, cheaper run of a case. Chosen."""
+_QUICK = 60.0
+"""Estimated CPU s of a case above which ``quick`` leaves it out. Chosen."""
+
+
+def catalogue() -> list[dict[str, Any]]:
+    """The rows, in their order."""
+    text = Path(__file__).with_name("catalogue.toml").read_text(encoding="utf-8")
+    return list(tomllib.loads(text)["row"])
+
+
+def shipped_cases(quick: bool) -> dict[str, Any]:
+    """Every shipped case that a row names, as it is and coarser: outcomes by name."""
+    plans = {name: row.get("coarse", ()) for row in catalogue() for name in row.get("cases", ())}
+    data = {f"{name}|{label}": made for name, coarse in plans.items() for label, made in _costs(name, coarse).items()}
+    cases = {key: parse_case(made) for key, made in data.items()}
+    left = [key for key, case in cases.items() if quick and _seconds(case) > _QUICK]
+    chosen = sorted((key for key in data if key not in left), key=lambda key: -_seconds(cases[key]))
+    with LocalServer(OUT / "runs", CORES) as server:
+        runs = {key: server.session.submit(data[key]) for key in chosen}
+        return {"left": left, "runs": {key: _told(key, run) for key, run in runs.items()}}
+
+
+def _costs(name: str, coarse: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """The case as it is, and coarser where it can be."""
+    data = apply_overrides(read_data(shipped()[name]), _QUIET)
+    found = {"as it is": data}
+    try:
+        changes = list(coarse) or sizes(parse_case(data), _COARSE)
+        made = apply_overrides(data, changes)
+        parse_case(made)
+        found["coarser"] = made
+    except (CaseError, ClientError):
+        pass
+    return found
+
+
+def _seconds(case: Case) -> float:
+    return estimate(case).core_seconds or 0.0
+
+
+def _told(key: str, run: Run) -> Any:
+    info = run.wait()
+    print(f"{key}: {info.state.value}", flush=True)
+    outcome = info.outcome
+    return msgspec.to_builtins(outcome) if outcome is not None else {"state": info.state.value, "message": info.message}
+
+
+def tests(quick: bool) -> dict[str, Any]:
+    """Every test that a row names, with what it has asserted."""
+    nodes = sorted({f"tests/{node}" for row in catalogue() for node in row.get("tests", ())})
+    command = [
+        sys.executable, "-m", "pytest", "-q", "-p", "tests.bench.recorder", "-o", "enable_assertion_pass_hook=true",
+        "--recorded", str(OUT / "recorded.json"), "--timeout", "3600", *(["-m", "not slow"] if quick else []), *nodes,
+    ]  # fmt: skip
+    environment = {**os.environ, "PYTHONPYCACHEPREFIX": str(OUT / "bytecode"), "PYTHONPATH": str(ROOT)}
+    subprocess.run(command, cwd=ROOT, env=environment, check=False)
+    return dict(json.loads((OUT / "recorded.json").read_text(encoding="utf-8")))
+
+
+def hard_cases(_: bool) -> list[Any]:
+    """The suite of hard cases."""
+    verdicts = []
+    with LocalServer(OUT / "runs", CORES) as server:
+        for verdict in hard.run_all(server.session, suite(), 1):
+            verdicts.append(msgspec.to_builtins(verdict))
+            print(f"{verdict.hard.name}: {'; '.join(verdict.faults) or 'ended well'}", flush=True)
+    return verdicts
+
+
+PARTS: dict[str, Callable[[bool], Any]] = {"shipped": shipped_cases, "tests": tests, "hard": hard_cases}
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Runs the named parts, or all, and writes the book."""
+    unknown = [name for name in arguments if name not in (*PARTS, "write")]
+    if unknown:
+        print(f"{' '.join(unknown)}: parts are {', '.join(PARTS)}; write writes what they have found")
+        return 2
+    quick = os.environ.get("ACCURACY") == "quick"
+    OUT.mkdir(parents=True, exist_ok=True)
+    for name in [each for each in arguments or PARTS if each in PARTS]:
+        began = time.monotonic()
+        found = PARTS[name](quick)
+        part = {"found": found, "wall": time.monotonic() - began, "quick": quick, "machine": machine.describe()}
+        (OUT / f"{name}.json").write_text(json.dumps(part, indent=1), encoding="utf-8")
+    parts = {name: json.loads((OUT / f"{name}.json").read_text()) for name in PARTS if (OUT / f"{name}.json").is_file()}
+    text, failed = pages.book(catalogue(), parts)
+    (ROOT / "docs" / "accuracy.md").write_text(text, encoding="utf-8")
+    print(f"docs/accuracy.md: {failed} rows fail")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
