@@ -40,7 +40,7 @@ class JohnsonCook(Law):
     taylor_quinney: Annotated[Ratio, Field(ge=0, le=1)] = 0.9
     """Share of the plastic work that becomes heat."""
 
-    nanoseconds: ClassVar[float] = 85.0
+    nanoseconds: ClassVar[float] = 40.0
 
     @property
     def melting(self) -> float:
