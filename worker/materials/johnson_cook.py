@@ -13,9 +13,11 @@ from ..elements.tet4 import NODAL, TRIAL, VOLUME_MID
 from ..jit import njit
 from ..state import (
     CHUNK,
+    DAMAGE,
     FLOW,
     MASS,
     PLASTIC_STRAIN,
+    PRESSURE,
     S_XX,
     S_XY,
     S_YY,
@@ -30,11 +32,11 @@ from .elementary import logarithms, powers
 from .law import BEFORE_PRESSURE, FIRST, SHEAR, Law
 from .plastic import equivalent_stress
 
-_A, _B, _N, _C, _M, _RATE, _T0, _MELT, _HEAT = range(FIRST, FIRST + 9)
+_A, _B, _N, _C, _M, _RATE, _T0, _MELT, _HEAT, _DAMAGED, _D1, _D2, _D3, _D4, _D5 = range(FIRST, FIRST + 15)
 _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _STRAIN, _WORK, _YIELD, _FLOW = PLASTIC_STRAIN * CHUNK, WORK_PLASTIC * CHUNK, YIELD * CHUNK, FLOW * CHUNK
-_TEMPERATURE, _MASS = TEMPERATURE * CHUNK, MASS * CHUNK
+_TEMPERATURE, _MASS, _P, _DAMAGE = TEMPERATURE * CHUNK, MASS * CHUNK, PRESSURE * CHUNK, DAMAGE * CHUNK
 # Rows of the scratch, of the tets that yield: places in the chunk; what is known; the bracket, the increment, whether
 # it is still sought; the flow stress without the rate; e, T* and the relative rate, then logarithms and powers.
 _PLACE, _Q, _KNOWN, _HOT, _WARM, _LOW, _HIGH, _D, _OPEN, _STATIC, _SUM, _FAST, _SOFT, _T = (
@@ -49,6 +51,12 @@ _PATIENT = 8
 Newton may jump to and fro across it."""
 _NARROW = 1e-12
 """A bracket that is narrower, relative to the largest increment, holds the answer."""
+_STEEPEST = 600.0
+"""Largest exponent of e in the fracture strain, either way: strains of 1e260 and of nothing."""
+_MOST_TENSE = 1.5
+"""Largest tension over the flow stress: beyond it the fracture strain of Johnson and Cook 1985 is not measured."""
+_LEAST_STRAIN = 1e-6
+"""Smallest fracture strain. Chosen: constants that make it negative break what yields at all."""
 _TINY = 1e-300
 """Instead of zero, of which there is no logarithm."""
 
@@ -154,6 +162,30 @@ def _return(w, s, params, m, n):  # type: ignore[no-untyped-def]
 
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
+def _wear(w, s, params, m, dt):  # type: ignore[no-untyped-def]
+    """Adds d over the fracture strain, (D1 + D2 e^(D3 t)) (1 + D4 ln rate) (1 + D5 T*), to the damage, at most 1.
+
+    t is the tension -p over the flow stress, at most _MOST_TENSE, with the pressure of the beginning of the step.
+    Johnson and Cook 1985.
+    """
+    fast, per_span = 1.0 / (dt * params[_RATE]), 1.0 / (params[_MELT] - params[_T0])
+    for j in range(m):
+        i = int(w[_PLACE + j])
+        tense = min(-s[_P + i] / max(s[_FLOW + i], _TINY), _MOST_TENSE)
+        w[_SOFT + j] = min(max(params[_D3] * tense, -_STEEPEST), _STEEPEST)
+        w[_FAST + j] = max(w[_D + j] * fast, 1.0)
+        w[_T + j] = min(max((s[_TEMPERATURE + i] - params[_T0]) * per_span, 0.0), 1.0)
+    powers(w, _SOFT, m, 1.0)
+    logarithms(w, _FAST, m)
+    for j in range(m):
+        i = int(w[_PLACE + j])
+        shape = (params[_D1] + params[_D2] * w[_SOFT + j]) * (1.0 + params[_D5] * w[_T + j])
+        fracture = max(shape * (1.0 + params[_D4] * w[_FAST + j]), _LEAST_STRAIN)
+        grown = s[_DAMAGE + i] + w[_D + j] / fracture
+        s[_DAMAGE + i] = 1.0 if grown > 1.0 else grown
+
+
+@njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def johnson_cook(w, s, params, n, dt):  # type: ignore[no-untyped-def]
     """Returns the trial stress of the tets beyond their rate-free flow stress; heats them by the plastic work."""
     equivalent_stress(w, s, n)
@@ -165,12 +197,15 @@ def johnson_cook(w, s, params, n, dt):  # type: ignore[no-untyped-def]
         if _newton(w, params, m, k >= _PATIENT and k % 2 == 1) == 0:
             break
     _return(w, s, params, m, n)
+    if params[_DAMAGED] > 0.0:
+        _wear(w, s, params, m, dt)
 
 
 def _constants(law: JohnsonCook) -> tuple[float, ...]:
     heat = law.taylor_quinney / law.specific_heat
     return (
-        law.A, law.B, law.n, law.C, law.m, law.reference_rate, law.reference_temperature, law.melt_temperature, heat
+        law.A, law.B, law.n, law.C, law.m, law.reference_rate, law.reference_temperature, law.melt_temperature, heat,
+        *((0.0,) if (of := law.damage) is None else (1.0, of.D1, of.D2, of.D3, of.D4, of.D5)),
     )  # fmt: skip
 
 
@@ -181,10 +216,14 @@ def initial_yield(law: JohnsonCook, temperature: float) -> float:
     return float(law.A * (1.0 - homologous**law.m))
 
 
+def _rows(law: JohnsonCook) -> int:
+    return (TEMPERATURE if law.damage is None else DAMAGE) + 1
+
+
 def _begin(law: JohnsonCook, temperature: float) -> dict[int, float]:
     strength = initial_yield(law, temperature)
     return {YIELD: strength, FLOW: strength, TEMPERATURE: temperature}
 
 
-LAW = Law("johnson_cook", BEFORE_PRESSURE, TEMPERATURE + 1, _constants, _begin, johnson_cook)
-"""Strength with the heat of the plastic work; damage is not in it."""
+LAW = Law("johnson_cook", BEFORE_PRESSURE, _rows, _constants, _begin, johnson_cook)
+"""Strength with the heat of the plastic work; damage takes no strength, erosion looks at it."""
