@@ -78,6 +78,9 @@ def _overlaps(case: Case) -> Iterator[Problem]:
 def _materials(case: Case) -> Iterator[Problem]:
     for name, made in case.materials.items():
         if made.strength is not None:
+            for key in ("eos", "spall"):
+                if made.strength.own_pressure and getattr(made, key) is not None:
+                    yield problem(("materials", name, key), ..., f"{made.strength.model} has its own; remove the key")
             for key, value, message in made.strength.problems():
                 yield problem(("materials", name, "strength", key), value, message)
 

@@ -4,15 +4,16 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from .laws.johnson_cook import JohnsonCook
+from .laws.johnson_cook import JohnsonCook, JohnsonCookDamage
+from .laws.johnson_holmquist import JohnsonHolmquist
 from .laws.linear_hardening import LinearHardening
 from .laws.mohr_coulomb import MohrCoulomb
 from .tables import Count, Model, Positive
 from .units import Area, Density, FractureEnergy, Ratio, Speed, Stress
 
 __all__ = [
-    "Brittle", "Elastic", "JohnsonCook", "LinearHardening", "Material", "MieGruneisen", "MohrCoulomb", "Scatter",
-    "Strength",
+    "Brittle", "Elastic", "JohnsonCook", "JohnsonCookDamage", "JohnsonHolmquist", "LinearHardening", "Material",
+    "MieGruneisen", "MohrCoulomb", "Scatter", "Strength",
 ]  # fmt: skip
 
 
@@ -25,7 +26,7 @@ class Elastic(Model):
     """Poisson's ratio."""
 
 
-Strength = Annotated[LinearHardening | JohnsonCook | MohrCoulomb, Field(discriminator="model")]
+Strength = Annotated[LinearHardening | JohnsonCook | MohrCoulomb | JohnsonHolmquist, Field(discriminator="model")]
 
 
 class MieGruneisen(Model):

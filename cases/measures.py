@@ -7,7 +7,7 @@ from .units import QUANTITY, Time, Written
 
 ProbeField = Literal[
     "stress_xx", "stress_yy", "stress_zz", "stress_yz", "stress_zx", "stress_xy",
-    "pressure", "mises", "plastic_strain", "temperature", "density", "internal_energy",
+    "pressure", "mises", "plastic_strain", "damage", "temperature", "density", "internal_energy",
     "velocity_x", "velocity_y", "velocity_z", "contact_force_x", "contact_force_y", "contact_force_z",
 ]  # fmt: skip
 

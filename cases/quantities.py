@@ -8,7 +8,7 @@ from .units import parse_quantity
 
 FIELD_UNITS: dict[str, str] = {
     "stress_xx": "Pa", "stress_yy": "Pa", "stress_zz": "Pa", "stress_yz": "Pa", "stress_zx": "Pa", "stress_xy": "Pa",
-    "pressure": "Pa", "mises": "Pa", "plastic_strain": "", "temperature": "K", "density": "kg/m^3",
+    "pressure": "Pa", "mises": "Pa", "plastic_strain": "", "damage": "", "temperature": "K", "density": "kg/m^3",
     "internal_energy": "J/kg", "velocity_x": "m/s", "velocity_y": "m/s", "velocity_z": "m/s",
     "contact_force_x": "N", "contact_force_y": "N", "contact_force_z": "N",
 }  # fmt: skip

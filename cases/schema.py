@@ -31,11 +31,13 @@ def _off(value: Any) -> Any:
 class Erosion(Model):
     """Tets that are worn out leave the body: what lay behind them is laid bare, and meets other bodies from then on.
 
-    A tet leaves when any of the three is passed. Its elastic energy is booked as eroded.
+    A tet leaves when any of these is passed. Its elastic energy is booked as eroded.
     """
 
     plastic_strain: Annotated[Ratio, Positive] | None = None
     """Largest effective plastic strain; none by default."""
+    damage: Annotated[Ratio, Field(gt=0, le=1)] | None = None
+    """Damage, of a law that counts it, at which a tet leaves: 1 for Johnson and Cook's; none by default."""
     volume: tuple[Annotated[Ratio, Field(gt=0, lt=1)], Annotated[Ratio, Field(gt=1)]] = (0.1, 10.0)
     """Smallest and largest volume, of the initial one."""
     time_step: Annotated[Ratio, Field(gt=0, lt=1)] = 0.02

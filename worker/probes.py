@@ -13,6 +13,7 @@ from .output.frames import von_mises
 from .parallel.comm import Comm
 from .parallel.fixed_point import exact_sums
 from .state import (
+    DAMAGE,
     MASS,
     PLASTIC_STRAIN,
     PRESSURE,
@@ -35,7 +36,7 @@ from .state import (
 
 _NORMAL = {"stress_xx": S_XX, "stress_yy": S_YY, "stress_zz": S_ZZ}
 _SHEAR = {"stress_yz": S_YZ, "stress_zx": S_ZX, "stress_xy": S_XY}
-_ROWS = {"plastic_strain": PLASTIC_STRAIN, "temperature": TEMPERATURE, **_SHEAR}
+_ROWS = {"plastic_strain": PLASTIC_STRAIN, "damage": DAMAGE, "temperature": TEMPERATURE, **_SHEAR}
 _FORCE = {"contact_force_x": 0, "contact_force_y": 1, "contact_force_z": 2}
 _VELOCITY = {"velocity_x": 0, "velocity_y": 1, "velocity_z": 2}
 

@@ -50,9 +50,13 @@ YIELD = 16
 """Flow stress at vanishing rate, Pa: below it no plastic flow."""
 FLOW = 17
 """Flow stress of the last plastic step, Pa (the next one's first guess)."""
+BULKING = 17
+"""The same row in Johnson-Holmquist's law: the pressure of its bulking, Pa."""
 TEMPERATURE = 18
 """K."""
-PORES = 19
+DAMAGE = 19
+"""0 whole, 1 done for (laws that count it)."""
+PORES = 20
 """Of the pores that a tension cut-off has opened: their volume over that of the solid matter; with a linear pressure
 the logarithm of one and that."""
 
@@ -222,7 +226,7 @@ class Block:
     """Of shear against normal traction."""
     worn: Flags = field(default_factory=lambda: np.zeros(0, bool))
     """(n,) tets that are about to leave; (0,) where the part does not erode."""
-    life: Floats = field(default_factory=lambda: np.zeros(4))
+    life: Floats = field(default_factory=lambda: np.zeros(5))
     """What a tet lives through (elements/wear.py)."""
     seconds: float = 0.0
     """CPU time of the passes over the block so far."""

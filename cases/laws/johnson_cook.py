@@ -6,9 +6,27 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from ..tables import Positive
+from ..tables import Model, Positive
 from ..units import Rate, Ratio, SpecificHeat, Stress, Temperature
 from .law import Law, Likely, Wrong
+
+
+class JohnsonCookDamage(Model):
+    """Damage: the sum of plastic strain over (D1 + D2 e^(D3 t)) (1 + D4 ln max(rate/reference_rate, 1)) (1 + D5 T*).
+
+    t is the mean stress over the flow stress. At ``erosion.damage`` a tet leaves. Johnson and Cook 1985.
+    """
+
+    D1: Ratio
+    """Fracture strain at high tension."""
+    D2: Ratio
+    """How much more it is without tension."""
+    D3: Ratio
+    """How fast that goes with the tension; negative where tension shortens the strain."""
+    D4: Ratio = 0.0
+    """Rate dependence."""
+    D5: Ratio = 0.0
+    """Dependence on the temperature."""
 
 
 class JohnsonCook(Law):
@@ -39,8 +57,10 @@ class JohnsonCook(Law):
     """Heat that warms the material."""
     taylor_quinney: Annotated[Ratio, Field(ge=0, le=1)] = 0.9
     """Share of the plastic work that becomes heat."""
+    damage: JohnsonCookDamage | None = None
+    """What counts as damage; none by default."""
 
-    nanoseconds: ClassVar[float] = 85.0
+    nanoseconds: ClassVar[float] = 40.0
 
     @property
     def melting(self) -> float:

@@ -20,8 +20,12 @@ Wrong = tuple[str, float, str]
 class Law(Model):
     """A law of strength; a subclass has a ``model`` that names it."""
 
+    model: str
+    """Its name."""
     nanoseconds: ClassVar[float]
     """Core time per tet and step that the law takes where it flows. Measured at 10,000 to 750,000 tets."""
+    own_pressure: ClassVar[bool] = False
+    """Whether the law has an equation of state, and a tension cut-off, of its own."""
 
     @property
     def melting(self) -> float:

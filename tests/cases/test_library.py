@@ -85,11 +85,11 @@ def test_the_derived_elastic_constants(name: str, bulk: float, shear: float) -> 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_constants_make_a_solid(name: str) -> None:
-    """Wave speeds of solids, and where there is an equation of state, a bulk modulus like that of the elasticity."""
+    """Wave speeds of solids (boron carbide: 14 km/s); an equation of state has about the elastic bulk modulus."""
     made: Material = library()[name]
     bulk = made.elastic.young / (3 * (1 - 2 * made.elastic.poisson))
     shear = made.elastic.young / (2 * (1 + made.elastic.poisson))
-    assert 3000 < math.sqrt((bulk + 4 / 3 * shear) / made.density) < 12000
+    assert 3000 < math.sqrt((bulk + 4 / 3 * shear) / made.density) < 15000
     if made.eos is not None:
         assert made.density * made.eos.c0**2 == pytest.approx(bulk, rel=0.4)
 

@@ -22,7 +22,7 @@ MM = 1e-3
 # Which tets leave
 
 
-LIFE = np.array([0.5, 0.2, 3.0, 2e6])
+LIFE = np.array([0.5, 0.2, 3.0, 2e6, 1.0])
 VOLUME, FREQUENCY = 1e-9, 1e6
 
 
@@ -135,7 +135,7 @@ def test_a_part_lives_as_its_case_says() -> None:
     sim = build(meeting_of([{"erosion": spec}, {}]), [block((2, 2, 2), MM), small])
     step.prepare(sim)
     assert not len(sim.model.blocks[1].worn)
-    assert sim.model.blocks[0].life.tolist() == [1.5, 0.3, 4.0, sim.reduction.limit / 0.1]
+    assert sim.model.blocks[0].life.tolist() == [1.5, 0.3, 4.0, sim.reduction.limit / 0.1, np.inf]
     assert wear.life(schema.Erosion())[wear.STRAIN] == np.inf
 
 

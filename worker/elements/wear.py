@@ -13,24 +13,25 @@ from conoid.cases.schema import Erosion
 
 from ..jit import njit
 from ..materials.law import DENSITY
-from ..state import CHUNK, MASS, PLASTIC_STRAIN, S_XX, VISCOUS, WORK, WORK_VISCOUS, Floats
+from ..state import CHUNK, DAMAGE, MASS, PLASTIC_STRAIN, S_XX, VISCOUS, WORK, WORK_VISCOUS, Floats
 from .tet4 import LIMIT, VOLUME
 
-STRAIN, LOW, HIGH, FREQUENCY = range(4)
+STRAIN, LOW, HIGH, FREQUENCY, DAMAGED = range(5)
 """Places in a block's ``life``: largest plastic strain, smallest and largest volume over the initial one, largest
-one-over-stable-step, 1/s."""
+one-over-stable-step, 1/s, damage."""
 SOUND, TIRED, BROKEN = range(3)
 """What is found: no tet that leaves; some that can wait; some that cannot."""
 
-_MASS, _STRAIN = MASS * CHUNK, PLASTIC_STRAIN * CHUNK
+_MASS, _STRAIN, _DAMAGE = MASS * CHUNK, PLASTIC_STRAIN * CHUNK, DAMAGE * CHUNK
 
 
 def life(erosion: Erosion | None) -> Floats:
-    """(4,) what a tet lives through; the frequency is known after the first step."""
+    """(5,) what a tet lives through; the frequency is known after the first step."""
     if erosion is None:
-        return np.full(4, math.inf)
+        return np.full(5, math.inf)
     strain = math.inf if erosion.plastic_strain is None else erosion.plastic_strain
-    return np.array([strain, *erosion.volume, math.inf])
+    damage = math.inf if erosion.damage is None else erosion.damage
+    return np.array([strain, *erosion.volume, math.inf, damage])
 
 
 @njit("boolean(float64[::1], int64)", cache=True, error_model="numpy")
@@ -72,7 +73,9 @@ def mark_worn(worn, w, s, params, life, rows, n):  # type: ignore[no-untyped-def
             found = BROKEN
             if inside_out:
                 _release(s, i)
-        elif rows > PLASTIC_STRAIN and s[_STRAIN + i] > life[STRAIN]:
-            worn[i] = True
-            found = max(found, TIRED)
+        else:
+            tired = rows > PLASTIC_STRAIN and s[_STRAIN + i] > life[STRAIN]
+            if tired or (rows > DAMAGE and s[_DAMAGE + i] >= life[DAMAGED]):
+                worn[i] = True
+                found = max(found, TIRED)
     return found

@@ -128,5 +128,5 @@ def stiffen(w, s, params, n):  # type: ignore[no-untyped-def]
         w[MODULUS + i] += 4.0 * _THIRD * (stiff - shear)
 
 
-LAW = Law("", FROM_SHAPE, DISTORTION + 1, lambda _: (), lambda *_: {}, hyperelastic)
+LAW = Law("", FROM_SHAPE, lambda _: DISTORTION + 1, lambda _: (), lambda *_: {}, hyperelastic)
 """Materials without a strength."""

@@ -1,123 +1,211 @@
 """Johnson-Cook flow stress, radial return with adiabatic heating.
 
 sigma = (A + B e^n) (1 + C ln max(rate / rate_0, 1)) (1 - T*^m). Johnson and Cook 1983.
-"""
 
-import math
+The tets of a chunk that yield are laid side by side in the scratch and solved for together, loop after loop, with
+logarithms and powers of our own. A tet that has converged keeps its answer while others go on: it does not depend on
+which tets share the chunk.
+"""
 
 from conoid.cases.laws.johnson_cook import JohnsonCook
 
-from ..elements.tet4 import TRIAL, VOLUME_MID
+from ..elements.tet4 import NODAL, TRIAL, VOLUME_MID
 from ..jit import njit
-from ..state import CHUNK, FLOW, MASS, PLASTIC_STRAIN, TEMPERATURE, WORK_PLASTIC, YIELD
+from ..state import (
+    CHUNK,
+    DAMAGE,
+    FLOW,
+    MASS,
+    PLASTIC_STRAIN,
+    PRESSURE,
+    S_XX,
+    S_XY,
+    S_YY,
+    S_YZ,
+    S_ZX,
+    S_ZZ,
+    TEMPERATURE,
+    WORK_PLASTIC,
+    YIELD,
+)
+from .elementary import logarithms, powers
 from .law import BEFORE_PRESSURE, FIRST, SHEAR, Law
-from .plastic import equivalent_stress, scale_deviator
+from .plastic import equivalent_stress
 
-_A, _B, _N, _C, _M, _RATE, _T0, _MELT, _HEAT = range(FIRST, FIRST + 9)
+_A, _B, _N, _C, _M, _RATE, _T0, _MELT, _HEAT, _DAMAGED, _D1, _D2, _D3, _D4, _D5 = range(FIRST, FIRST + 15)
+_SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
+_SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _STRAIN, _WORK, _YIELD, _FLOW = PLASTIC_STRAIN * CHUNK, WORK_PLASTIC * CHUNK, YIELD * CHUNK, FLOW * CHUNK
-_TEMPERATURE, _MASS = TEMPERATURE * CHUNK, MASS * CHUNK
+_TEMPERATURE, _MASS, _P, _DAMAGE = TEMPERATURE * CHUNK, MASS * CHUNK, PRESSURE * CHUNK, DAMAGE * CHUNK
+# Rows of the scratch, of the tets that yield: places in the chunk; what is known; the bracket, the increment, whether
+# it is still sought; the flow stress without the rate; e, T* and the relative rate, then logarithms and powers.
+_PLACE, _Q, _KNOWN, _HOT, _WARM, _LOW, _HIGH, _D, _OPEN, _STATIC, _SUM, _FAST, _SOFT, _T = (
+    NODAL + k * CHUNK for k in range(14)
+)
 _MOST = 60
 """Newton steps at most: halving alone, from a bracket, has reached the last bit of a float64 by then (52 bits)."""
 _CLOSE = 1e-4
 """A Newton step below this share of the strain increment leaves an error of its square: below 1e-8 of the stress."""
+_PATIENT = 8
+"""Steps after which every second one is a halving: where the rate begins to count the flow stress has a kink, and
+Newton may jump to and fro across it."""
+_NARROW = 1e-12
+"""A bracket that is narrower, relative to the largest increment, holds the answer."""
+_STEEPEST = 600.0
+"""Largest exponent of e in the fracture strain, either way: strains of 1e260 and of nothing."""
+_MOST_TENSE = 1.5
+"""Largest tension over the flow stress: beyond it the fracture strain of Johnson and Cook 1985 is not measured."""
+_LEAST_STRAIN = 1e-6
+"""Smallest fracture strain. Chosen: constants that make it negative break what yields at all."""
+_TINY = 1e-300
+"""Instead of zero, of which there is no logarithm."""
 
 
-@njit("UniTuple(float64, 2)(float64[::1], float64)", cache=True, error_model="numpy")
-def softening(params, temperature):  # type: ignore[no-untyped-def]
-    """1 - T*^m and its derivative by temperature, 1/K; 1 below the reference temperature, 0 from melting on."""
-    span = params[_MELT] - params[_T0]
-    homologous = (temperature - params[_T0]) / span
-    if homologous <= 0.0:
-        return 1.0, 0.0
-    if homologous >= 1.0:
-        return 0.0, 0.0
-    m = params[_M]
-    power = homologous if m == 1.0 else homologous**m
-    return 1.0 - power, -m * power / (homologous * span)
+@njit("int64(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
+def _gather(w, s, params, n):  # type: ignore[no-untyped-def]
+    """Lays the tets beyond their rate-free flow stress side by side; returns how many. The root is in [0, q / 3 G]."""
+    m, shear3 = 0, 3.0 * params[SHEAR]
+    for i in range(n):
+        q = w[TRIAL + i]
+        if q > s[_YIELD + i]:
+            w[_PLACE + m], w[_Q + m] = i, q
+            w[_KNOWN + m], w[_HOT + m] = s[_STRAIN + i], s[_TEMPERATURE + i]
+            w[_WARM + m] = w[VOLUME_MID + i] / s[_MASS + i]
+            w[_D + m] = s[_FLOW + i]
+            m += 1
+    for j in range(m):
+        high = w[_Q + j] / shear3
+        w[_WARM + j] *= params[_HEAT]
+        w[_D + j] = min(max((w[_Q + j] - w[_D + j]) / shear3, 1e-3 * high), high)
+        w[_LOW + j], w[_HIGH + j], w[_OPEN + j] = 0.0, high, 1.0
+    return m
 
 
-@njit("UniTuple(float64, 4)(float64[::1], float64, float64, float64, float64)", cache=True, error_model="numpy")
-def flow_stress(params, strain, increment, dt, temperature):  # type: ignore[no-untyped-def]
-    """Flow stress, Pa, its derivatives by the strain increment and by temperature, and the rate-free flow stress.
+@njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
+def _factors(w, params, m, dt):  # type: ignore[no-untyped-def]
+    """e^n, the logarithm of the relative rate, at least 0, and T*^m, at the present increments."""
+    shear3, fast, cold = 3.0 * params[SHEAR], 1.0 / (dt * params[_RATE]), params[_T0]
+    per_span = 1.0 / (params[_MELT] - params[_T0])
+    for j in range(m):
+        d = w[_D + j]
+        soft = (w[_HOT + j] + w[_WARM + j] * d * (w[_Q + j] - shear3 * d) - cold) * per_span
+        w[_SUM + j] = max(w[_KNOWN + j] + d, _TINY)
+        w[_FAST + j] = max(d * fast, 1.0)
+        w[_T + j] = soft
+        w[_SOFT + j] = min(max(soft, _TINY), 1.0)
+    logarithms(w, _SUM, m)
+    powers(w, _SUM, m, params[_N])
+    logarithms(w, _FAST, m)
+    if params[_M] != 1.0:
+        logarithms(w, _SOFT, m)
+        powers(w, _SOFT, m, params[_M])
 
-    ``strain`` is the plastic strain at the end of the increment.
+
+@njit("int64(float64[::1], float64[::1], int64, boolean)", cache=True, error_model="numpy")
+def _newton(w, params, m, halve):  # type: ignore[no-untyped-def]
+    """A step of Newton towards q - 3 G d = flow stress(d), or a halving; how many go on.
+
+    The left side falls and the right side rises with d until the metal softens, so the root stays bracketed. A step
+    that leaves the bracket is a halving, and all are with ``halve``.
     """
-    power = params[_B] * strain ** params[_N] if strain > 0.0 else 0.0
-    hardening = params[_A] + power
-    slope = params[_N] * power / strain if strain > 0.0 else 0.0
-    relative = increment / (dt * params[_RATE])
-    rate, rate_slope = 1.0, 0.0
-    if relative > 1.0:
-        rate, rate_slope = 1.0 + params[_C] * math.log(relative), params[_C] / increment
-    heat, heat_slope = softening(params, temperature)
-    return (
-        hardening * rate * heat,
-        (slope * rate + hardening * rate_slope) * heat,
-        hardening * rate * heat_slope,
-        hardening * heat,
-    )
+    shear3, going = 3.0 * params[SHEAR], 0
+    a, b, n, c, per_span = params[_A], params[_B], params[_N], params[_C], params[_M] / (params[_MELT] - params[_T0])
+    for j in range(m):
+        d, low, high, warm = w[_D + j], w[_LOW + j], w[_HIGH + j], w[_WARM + j]
+        stress, within = w[_Q + j] - shear3 * d, w[_T + j]
+        power = b * w[_SUM + j]
+        hardening, rate = a + power, 1.0 + c * w[_FAST + j]
+        soft = w[_SOFT + j] if within > 0.0 else 0.0
+        heat = 1.0 - soft
+        melting = (within > 0.0) & (within < 1.0)
+        by_heat = per_span * soft / (within if melting else 1.0)
+        by_heat = -by_heat if melting else 0.0
+        rising = c * hardening / d
+        rising = rising if w[_FAST + j] > 0.0 else 0.0
+        by_strain = (n * power / max(w[_KNOWN + j] + d, _TINY) * rate + rising) * heat
+        residual = stress - hardening * rate * heat
+        slope = -shear3 - by_strain - hardening * rate * by_heat * warm * (stress - shear3 * d)
+        low, high = (d if residual > 0.0 else low), (high if residual > 0.0 else d)
+        new = d - residual / slope
+        newton = (low <= new) & (new <= high) & (slope < 0.0) & (not halve)
+        new = new if newton else 0.5 * (low + high)
+        done = (newton & (abs(new - d) <= _CLOSE * new)) | (high - low <= _NARROW * high)
+        active = w[_OPEN + j] > 0.0
+        w[_STATIC + j] = hardening * heat if active else w[_STATIC + j]
+        w[_D + j] = new if active else d
+        w[_LOW + j], w[_HIGH + j] = low, high
+        left = 1.0 if active & (not done) else 0.0
+        w[_OPEN + j] = left
+        going += int(left)
+    return going
 
 
-@njit(
-    "UniTuple(float64, 3)(float64[::1], float64, float64, float64, float64, float64, float64)",
-    cache=True,
-    error_model="numpy",
-)
-def plastic_increment(params, q, strain, temperature, dt, guess, heat):  # type: ignore[no-untyped-def]
-    """Solves q - 3 G d = flow stress(d) for the plastic strain increment d in [0, q / 3G].
-
-    The left side falls and the right side rises with d until the metal softens, so the root is bracketed: Newton,
-    halving when it leaves the bracket. ``heat`` is K per J/m^3 of plastic work. Returns d, the flow stress there and
-    the rate-free flow stress.
-    """
+@njit("void(float64[::1], float64[::1], float64[::1], int64, int64)", cache=True, error_model="numpy")
+def _return(w, s, params, m, n):  # type: ignore[no-untyped-def]
+    """Scales the deviators to the flow stress and books strain, work, and heat."""
     shear3 = 3.0 * params[SHEAR]
-    low, high = 0.0, q / shear3
-    d = min(max(guess, 1e-3 * high), high)
-    for _ in range(_MOST):
-        stress = q - shear3 * d
-        flow, by_strain, by_heat, static = flow_stress(params, strain + d, d, dt, temperature + heat * d * stress)
-        residual = stress - flow
-        if residual > 0.0:
-            low = d
-        else:
-            high = d
-        slope = -shear3 - by_strain - by_heat * heat * (stress - shear3 * d)
-        step = -residual / slope if slope < 0.0 else 0.0
-        new = d + step
-        if not low <= new <= high or slope >= 0.0:
-            new = 0.5 * (low + high)
-            step = new - d
-        d = new
-        if abs(step) <= _CLOSE * d or high - low <= 1e-12 * high:
-            break
-    return d, max(q - shear3 * d, 0.0), static
+    for i in range(n):
+        w[TRIAL + i] = 1.0
+    for j in range(m):
+        i, q, d = int(w[_PLACE + j]), w[_Q + j], w[_D + j]
+        flow = max(q - shear3 * d, 0.0)
+        w[TRIAL + i] = flow / q
+        s[_STRAIN + i] += d
+        s[_WORK + i] += flow * d * w[VOLUME_MID + i]
+        s[_TEMPERATURE + i] += w[_WARM + j] * flow * d
+        s[_YIELD + i] = w[_STATIC + j]
+        s[_FLOW + i] = flow
+    for i in range(n):
+        factor = w[TRIAL + i]
+        s[_SXX + i], s[_SYY + i], s[_SZZ + i] = factor * s[_SXX + i], factor * s[_SYY + i], factor * s[_SZZ + i]
+        s[_SYZ + i], s[_SZX + i], s[_SXY + i] = factor * s[_SYZ + i], factor * s[_SZX + i], factor * s[_SXY + i]
+
+
+@njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
+def _wear(w, s, params, m, dt):  # type: ignore[no-untyped-def]
+    """Adds d over the fracture strain, (D1 + D2 e^(D3 t)) (1 + D4 ln rate) (1 + D5 T*), to the damage, at most 1.
+
+    t is the tension -p over the flow stress, at most _MOST_TENSE, with the pressure of the beginning of the step.
+    Johnson and Cook 1985.
+    """
+    fast, per_span = 1.0 / (dt * params[_RATE]), 1.0 / (params[_MELT] - params[_T0])
+    for j in range(m):
+        i = int(w[_PLACE + j])
+        tense = min(-s[_P + i] / max(s[_FLOW + i], _TINY), _MOST_TENSE)
+        w[_SOFT + j] = min(max(params[_D3] * tense, -_STEEPEST), _STEEPEST)
+        w[_FAST + j] = max(w[_D + j] * fast, 1.0)
+        w[_T + j] = min(max((s[_TEMPERATURE + i] - params[_T0]) * per_span, 0.0), 1.0)
+    powers(w, _SOFT, m, 1.0)
+    logarithms(w, _FAST, m)
+    for j in range(m):
+        i = int(w[_PLACE + j])
+        shape = (params[_D1] + params[_D2] * w[_SOFT + j]) * (1.0 + params[_D5] * w[_T + j])
+        fracture = max(shape * (1.0 + params[_D4] * w[_FAST + j]), _LEAST_STRAIN)
+        grown = s[_DAMAGE + i] + w[_D + j] / fracture
+        s[_DAMAGE + i] = 1.0 if grown > 1.0 else grown
 
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def johnson_cook(w, s, params, n, dt):  # type: ignore[no-untyped-def]
     """Returns the trial stress of the tets beyond their rate-free flow stress; heats them by the plastic work."""
     equivalent_stress(w, s, n)
-    shear3 = 3.0 * params[SHEAR]
-    for i in range(n):
-        q = w[TRIAL + i]
-        if q <= s[_YIELD + i]:
-            continue
-        density = s[_MASS + i] / w[VOLUME_MID + i]
-        heat = params[_HEAT] / density
-        guess = (q - s[_FLOW + i]) / shear3
-        d, flow, static = plastic_increment(params, q, s[_STRAIN + i], s[_TEMPERATURE + i], dt, guess, heat)
-        scale_deviator(s, i, flow / q)
-        s[_STRAIN + i] += d
-        s[_WORK + i] += flow * d * w[VOLUME_MID + i]
-        s[_TEMPERATURE + i] += heat * flow * d
-        s[_YIELD + i] = static
-        s[_FLOW + i] = flow
+    m = _gather(w, s, params, n)
+    if m == 0:
+        return
+    for k in range(_MOST):
+        _factors(w, params, m, dt)
+        if _newton(w, params, m, k >= _PATIENT and k % 2 == 1) == 0:
+            break
+    _return(w, s, params, m, n)
+    if params[_DAMAGED] > 0.0:
+        _wear(w, s, params, m, dt)
 
 
 def _constants(law: JohnsonCook) -> tuple[float, ...]:
     heat = law.taylor_quinney / law.specific_heat
     return (
-        law.A, law.B, law.n, law.C, law.m, law.reference_rate, law.reference_temperature, law.melt_temperature, heat
+        law.A, law.B, law.n, law.C, law.m, law.reference_rate, law.reference_temperature, law.melt_temperature, heat,
+        *((0.0,) if (of := law.damage) is None else (1.0, of.D1, of.D2, of.D3, of.D4, of.D5)),
     )  # fmt: skip
 
 
@@ -128,10 +216,14 @@ def initial_yield(law: JohnsonCook, temperature: float) -> float:
     return float(law.A * (1.0 - homologous**law.m))
 
 
+def _rows(law: JohnsonCook) -> int:
+    return (TEMPERATURE if law.damage is None else DAMAGE) + 1
+
+
 def _begin(law: JohnsonCook, temperature: float) -> dict[int, float]:
     strength = initial_yield(law, temperature)
     return {YIELD: strength, FLOW: strength, TEMPERATURE: temperature}
 
 
-LAW = Law("johnson_cook", BEFORE_PRESSURE, TEMPERATURE + 1, _constants, _begin, johnson_cook)
-"""Strength with the heat of the plastic work; damage is not in it."""
+LAW = Law("johnson_cook", BEFORE_PRESSURE, _rows, _constants, _begin, johnson_cook)
+"""Strength with the heat of the plastic work; damage takes no strength, erosion looks at it."""

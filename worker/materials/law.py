@@ -28,13 +28,15 @@ class Law:
     """Its name in a case; empty for the law of a material without a strength."""
     order: int
     """FROM_SHAPE, BEFORE_PRESSURE or AFTER_PRESSURE."""
-    rows: int
-    """How many rows of state a tet needs (worker/state.py)."""
+    rows: Callable[[Any], int]
+    """How many rows of state a tet needs (worker/state.py), from its table in the case."""
     constants: Callable[[Any], tuple[float, ...]]
-    """Its constants from its table in the case; they stand from FIRST on."""
+    """Its constants from its table; they stand from FIRST on."""
     begin: Callable[[Any, float], dict[int, float]]
     """Rows that do not begin with zero, from its table and the temperature, K."""
     kernel: Any
+    equation: str = ""
+    """Name of the equation of state that the law brings; else that of the material holds."""
 
 
 @dataclass(frozen=True)

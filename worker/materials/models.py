@@ -14,11 +14,11 @@ from conoid.cases.schema import Viscosity
 from .. import state
 from ..jit import njit
 from ..state import Floats
-from . import equation_of_state, hyperelastic, johnson_cook, mohr_coulomb, plastic
+from . import equation_of_state, hyperelastic, johnson_cook, johnson_holmquist, mohr_coulomb, plastic
 from .law import BULK, DENSITY, EQUATION, FIRST, ORDER, Q_LINEAR, Q_QUADRATIC, SHEAR, SIZE, SPALL, Equation, Law, placed
 
-LAWS = (hyperelastic.LAW, plastic.LAW, johnson_cook.LAW, mohr_coulomb.LAW)
-EQUATIONS = (equation_of_state.ELASTIC, equation_of_state.GRUNEISEN)
+LAWS = (hyperelastic.LAW, plastic.LAW, johnson_cook.LAW, mohr_coulomb.LAW, johnson_holmquist.LAW)
+EQUATIONS = (equation_of_state.ELASTIC, equation_of_state.GRUNEISEN, johnson_holmquist.PRESSURE_LAW)
 
 
 @njit("void(int64, float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
@@ -32,6 +32,8 @@ def strengthen(law, w, s, params, n, dt):  # type: ignore[no-untyped-def]
         johnson_cook.johnson_cook(w, s, params, n, dt)
     elif law == 3:
         mohr_coulomb.mohr_coulomb(w, s, params, n, dt)
+    elif law == 4:
+        johnson_holmquist.johnson_holmquist(w, s, params, n, dt)
 
 
 @njit("void(int64, float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
@@ -41,6 +43,8 @@ def press(equation, w, s, params, n):  # type: ignore[no-untyped-def]
         equation_of_state.linear(w, s, params, n)
     elif equation == 1:
         equation_of_state.mie_gruneisen(w, s, params, n)
+    elif equation == 2:
+        johnson_holmquist.crumbling(w, s, params, n)
 
 
 def strength_of(material: Material) -> int:
@@ -50,7 +54,8 @@ def strength_of(material: Material) -> int:
 
 def eos_of(material: Material) -> int:
     """The number of the material's equation of state."""
-    return [equation.model for equation in EQUATIONS].index("" if material.eos is None else material.eos.model)
+    name = law_of(material).equation or ("" if material.eos is None else material.eos.model)
+    return [equation.model for equation in EQUATIONS].index(name)
 
 
 def law_of(material: Material) -> Law:
@@ -89,7 +94,7 @@ def rows_of(material: Material, pressure: str) -> int:
     """How many rows of state an element of this material needs (worker/state.py)."""
     averaged = 0 if pressure == "standard" else state.VOLUME_FLUX + 1
     porous = 0 if material.spall is None else state.PORES + 1
-    return max(law_of(material).rows, equation_of(material).rows, averaged, porous)
+    return max(law_of(material).rows(material.strength), equation_of(material).rows, averaged, porous)
 
 
 def beginning(material: Material, temperature: float) -> dict[int, float]:

@@ -171,5 +171,5 @@ def _sine_and_cohesion(cohesion: float, angle: float) -> tuple[float, float]:
     return math.sin(angle), 2.0 * cohesion * math.cos(angle)
 
 
-LAW = Law("mohr_coulomb", AFTER_PRESSURE, WORK_PLASTIC + 1, _constants, lambda *_: {}, mohr_coulomb)
+LAW = Law("mohr_coulomb", AFTER_PRESSURE, lambda _: WORK_PLASTIC + 1, _constants, lambda *_: {}, mohr_coulomb)
 """Beyond the apex nothing is left of the deviator; the pressure of tension stays, to be broken by facets."""

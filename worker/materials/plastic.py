@@ -73,6 +73,6 @@ def _begin(law: LinearHardening, _: float) -> dict[int, float]:
 
 
 LAW = Law(
-    "linear_hardening", BEFORE_PRESSURE, YIELD + 1, lambda law: (law.hardening,), _begin, linear_hardening
+    "linear_hardening", BEFORE_PRESSURE, lambda _: YIELD + 1, lambda law: (law.hardening,), _begin, linear_hardening
 )  # fmt: skip
 """The strength is in the state."""

@@ -1,0 +1,57 @@
+"""Our logarithm and exponential: close to the true ones, alike in a vector lane and in a scalar."""
+
+import numpy as np
+import pytest
+
+from conoid.worker.materials import elementary
+from conoid.worker.state import CHUNK
+
+from .meshes import Floats
+
+REACHES = [(-690.0, 690.0), (-20.0, 5.0), (-1.0, 1.0), (-0.01, 0.01), (-1e-12, 1e-12)]
+
+
+def logarithms(x: Floats) -> Floats:
+    w = np.zeros(CHUNK)
+    w[: len(x)] = x
+    elementary.logarithms(w, 0, len(x))
+    return w[: len(x)]
+
+
+def powers(x: Floats) -> Floats:
+    w = np.zeros(CHUNK)
+    w[: len(x)] = x
+    elementary.powers(w, 0, len(x), 1.0)
+    return w[: len(x)]
+
+
+@pytest.mark.parametrize("reach", REACHES)
+def test_they_are_right_to_the_last_bits(reach: tuple[float, float]) -> None:
+    """In the 80 bits of a long double."""
+    random = np.random.default_rng(1)
+    for _ in range(100):
+        y = random.uniform(*reach, CHUNK)
+        true = np.exp(y.astype(np.longdouble))
+        assert float(np.abs((powers(y) - true) / true).max()) < 3e-16
+        x = true.astype(np.float64)
+        near = np.log(x.astype(np.longdouble))
+        assert float(np.abs(logarithms(x) - near).max()) <= 4e-16 * max(float(np.abs(near).max()), 1e-300)
+
+
+def test_every_lane_is_alike() -> None:
+    random = np.random.default_rng(2)
+    x = np.exp(random.uniform(-600.0, 600.0, CHUNK))
+    y = np.log(x)
+    together, raised = logarithms(x), powers(y)
+    alone = np.array([logarithms(x[k : k + 1])[0] for k in range(CHUNK)])
+    assert np.array_equal(together, alone)
+    assert np.array_equal(raised, np.array([powers(y[k : k + 1])[0] for k in range(CHUNK)]))
+    assert [elementary.log(v) for v in x[:50]] == together[:50].tolist()
+    assert [elementary.exp(v) for v in y[:50]] == raised[:50].tolist()
+
+
+def test_what_is_exact_stays_exact() -> None:
+    assert elementary.log(1.0) == 0.0
+    assert elementary.exp(0.0) == 1.0
+    assert elementary.log(2.0**-1000) == pytest.approx(-1000 * np.log(2.0), rel=1e-15)
+    assert powers(np.array([-1e9]))[0] == pytest.approx(np.exp(elementary.LEAST), rel=1e-12)

@@ -1,0 +1,74 @@
+"""log and exp of our own: the same bits on any processor, in loops over a chunk that the compiler turns into vectors.
+
+Only + - * /, and the bits of a float64 as an integer, which are alike in a vector lane and in a scalar; so no result
+depends on a C library. Derived in docs/numerics.md.
+"""
+
+import numpy as np
+
+from ..jit import njit
+from ..state import CHUNK
+
+_LN2_HIGH, _LN2_LOW = 0.693147180369123816490, 1.90821492927058770002e-10
+"""ln 2 in two parts: the first has 33 bits, so that its product with an exponent is exact; together they have 86."""
+_INVERSE_LN2 = 1.4426950408889634
+"""1 / ln 2."""
+_NEAREST = 6755399441055744.0
+"""1.5 times 2^52: where it is added to a smaller number, the nearest integer stands in the last bits of the sum."""
+_ROOT_HALF = 0x3FE6A09E667F3BCD
+"""Bits of sqrt(1/2): what lies above is divided by a power of two until it does not."""
+_WHOLE, _OFFSET, _BIASED = 0x4330000000000000, 4096, 4503599627374592.0
+"""Bits of 2^52; a number that makes exponents positive; and their sum, as a float64: integers become floats by it."""
+LEAST, MOST = -700.0, 700.0
+"""Arguments of ``exp``: its result is a normal number between them, 1e-304 to 1e304."""
+
+
+@njit("float64(float64)", cache=True, error_model="numpy", forceinline=True)
+def log(x):  # type: ignore[no-untyped-def]
+    """ln x of a positive normal number, within 4e-16 of it.
+
+    With x = 2^k f, f between sqrt(1/2) and sqrt(2), and s = (f - 1) / (f + 1) it is k ln 2 + 2 (s + s^3/3 + s^5/5 ...).
+    """
+    bits = np.float64(x).view(np.int64)
+    k = (bits - _ROOT_HALF) >> 52
+    f = np.int64(bits - (k << 52)).view(np.float64)
+    exponent = np.int64((k + _OFFSET) | _WHOLE).view(np.float64) - _BIASED
+    s = (f - 1.0) / (f + 1.0)
+    z = s * s
+    zz = z * z
+    tail = z * (
+        (1 / 3 + z * (1 / 5))
+        + zz * ((1 / 7 + z * (1 / 9)) + zz * ((1 / 11 + z * (1 / 13)) + zz * ((1 / 15 + z * (1 / 17)) + zz * (1 / 19))))
+    )
+    return exponent * _LN2_HIGH + (2.0 * s + (2.0 * s * tail + exponent * _LN2_LOW))
+
+
+@njit("float64(float64)", cache=True, error_model="numpy", forceinline=True)
+def exp(x):  # type: ignore[no-untyped-def]
+    """e^x for x from LEAST to MOST, within 3e-16 of it: 2^k e^r with r = x - k ln 2, and 13 terms of e^r."""
+    shifted = x * _INVERSE_LN2 + _NEAREST
+    k = shifted - _NEAREST
+    r = (x - k * _LN2_HIGH) - k * _LN2_LOW
+    r2 = r * r
+    r4 = r2 * r2
+    low = (1 / 2 + r * (1 / 6)) + r2 * (1 / 24 + r * (1 / 120))
+    middle = (1 / 720 + r * (1 / 5040)) + r2 * (1 / 40320 + r * (1 / 362880))
+    high = (1 / 3628800 + r * (1 / 39916800)) + r2 * (1 / 479001600 + r * (1 / 6227020800))
+    p = 1.0 + (r + r2 * (low + r4 * (middle + r4 * high)))
+    return np.int64(np.float64(p).view(np.int64) + (np.float64(shifted).view(np.int64) << 52)).view(np.float64)
+
+
+@njit("void(float64[::1], int64, int64)", cache=True, error_model="numpy")
+def logarithms(w, row, n):  # type: ignore[no-untyped-def]
+    """Replaces the ``n`` numbers from ``row`` on in the scratch by their logarithms."""
+    values = w[row : row + CHUNK]
+    for i in range(n):
+        values[i] = log(values[i])
+
+
+@njit("void(float64[::1], int64, int64, float64)", cache=True, error_model="numpy")
+def powers(w, row, n, exponent):  # type: ignore[no-untyped-def]
+    """Replaces the ``n`` numbers from ``row`` on, logarithms, by the powers of what they are the logarithms of."""
+    values = w[row : row + CHUNK]
+    for i in range(n):
+        values[i] = exp(max(exponent * values[i], LEAST))

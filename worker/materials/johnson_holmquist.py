@@ -1,0 +1,164 @@
+"""Johnson-Holmquist 2: strength of a brittle material by pressure, rate and damage; pressure with bulking; tension.
+
+Johnson and Holmquist 1994. The order of a step is in docs/numerics.md: the pressure of n+1, with the bulking and the
+damage of n; the strength there; the return; the damage and the bulking of n+1.
+"""
+
+import math
+
+import numpy as np
+
+from conoid.cases.laws.johnson_holmquist import JohnsonHolmquist
+
+from ..elements.tet4 import (
+    CHANGE,
+    D_XX,
+    D_XY,
+    D_YY,
+    D_YZ,
+    D_ZX,
+    D_ZZ,
+    DILATATION,
+    MODULUS,
+    NODAL,
+    SEEN,
+    TRIAL,
+    VOLUME_MID,
+)
+from ..jit import njit
+from ..state import (
+    BULKING,
+    CHUNK,
+    DAMAGE,
+    PLASTIC_STRAIN,
+    PRESSURE,
+    S_XX,
+    S_XY,
+    S_YY,
+    S_YZ,
+    S_ZX,
+    S_ZZ,
+    VOLUME_RATIO,
+    WORK,
+    WORK_PLASTIC,
+)
+from .elementary import logarithms, powers
+from .law import AFTER_PRESSURE, BULK, FIRST, SHEAR, Equation, Law
+from .plastic import equivalent_stress
+
+_STRENGTH, _PHEL, _T, _A, _N, _B, _M, _C, _RATE, _MOST, _D1, _D2, _K2, _K3, _BETA = range(FIRST, FIRST + 15)
+_SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
+_SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
+_P, _STRAIN, _PLASTIC, _WORK = PRESSURE * CHUNK, PLASTIC_STRAIN * CHUNK, WORK_PLASTIC * CHUNK, WORK * CHUNK
+_DAMAGE, _BULKING, _RATIO = DAMAGE * CHUNK, BULKING * CHUNK, VOLUME_RATIO * CHUNK
+# Rows of the scratch: (p* + T*)^N; (p* + T*)^D2; p*^M; the logarithm of the relative rate.
+_INTACT, _FRACTURE, _CRUMBLED, _FAST = (NODAL + k * CHUNK for k in range(4))
+_TINY = 1e-300
+"""Instead of zero, of which there is no logarithm."""
+_LEAST = 0.05
+"""Of the bulk modulus at rest: what the wave speed has at least. Chosen: it makes steps shorter, never too long."""
+_THIRD, _TWO_THIRDS = 1.0 / 3.0, 2.0 / 3.0
+
+
+@njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
+def crumbling(w, s, params, n):  # type: ignore[no-untyped-def]
+    """p = K m + K2 m^2 + K3 m^3 + bulking, m = V0/V - 1; in tension K m + bulking, and at least -T (1 - D)."""
+    bulk, second, third = params[BULK], params[_K2], params[_K3]
+    for i in range(n):
+        half = 0.5 * w[SEEN + i]
+        ratio = s[_RATIO + i] * (1.0 + half) / (1.0 - half)
+        m = 1.0 / ratio - 1.0
+        squeezed = max(m, 0.0)
+        free = bulk * m + squeezed * squeezed * (second + third * squeezed) + s[_BULKING + i]
+        least = -params[_T] * (1.0 - s[_DAMAGE + i])
+        new = least if free < least else free
+        stiff = (1.0 + m) * (bulk + squeezed * (2.0 * second + 3.0 * third * squeezed))
+        s[_WORK + i] -= 0.5 * (s[_P + i] + new) * w[CHANGE + i]
+        s[_P + i], s[_RATIO + i] = new, ratio
+        w[MODULUS + i] = (_LEAST * bulk if stiff < _LEAST * bulk else stiff) + 4.0 / 3.0 * params[SHEAR]
+
+
+@njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
+def _factors(w, s, params, n):  # type: ignore[no-untyped-def]
+    """Powers of the pressure, about zero where it has none; the logarithm of the squared relative rate, at least 0."""
+    per_pressure, tension = 1.0 / params[_PHEL], params[_T] / params[_PHEL]
+    per_rate = _TWO_THIRDS / (params[_RATE] * params[_RATE])
+    for i in range(n):
+        p = s[_P + i] * per_pressure
+        mean = w[DILATATION + i] * _THIRD
+        xx, yy, zz = w[D_XX + i] - mean, w[D_YY + i] - mean, w[D_ZZ + i] - mean
+        yz, zx, xy = w[D_YZ + i], w[D_ZX + i], w[D_XY + i]
+        square = per_rate * (xx * xx + yy * yy + zz * zz + 2.0 * (yz * yz + zx * zx + xy * xy))
+        w[_INTACT + i] = max(p + tension, _TINY)
+        w[_CRUMBLED + i] = max(p, _TINY)
+        w[_FAST + i] = max(square, 1.0)
+    logarithms(w, _INTACT, n)
+    for i in range(n):
+        w[_FRACTURE + i] = w[_INTACT + i]
+    powers(w, _INTACT, n, params[_N])
+    powers(w, _FRACTURE, n, params[_D2])
+    logarithms(w, _CRUMBLED, n)
+    powers(w, _CRUMBLED, n, params[_M])
+    logarithms(w, _FAST, n)
+
+
+@njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
+def johnson_holmquist(w, s, params, n, dt):  # type: ignore[no-untyped-def]
+    """Returns the trial deviators to the strength at the new pressure; damage and bulking; books the plastic work.
+
+    The strength is that of the damage at n: the return is a division. The plastic work is that of the mean of the
+    rotated old stress and the new one (as in mohr_coulomb.py), also where damage or pressure let the strength fall.
+    """
+    equivalent_stress(w, s, n)
+    _factors(w, s, params, n)
+    shear, bulk, hel = params[SHEAR], params[BULK], params[_STRENGTH]
+    tension = params[_T]
+    for i in range(n):
+        q, p, damage = w[TRIAL + i], s[_P + i], s[_DAMAGE + i]
+        rate = 1.0 + 0.5 * params[_C] * w[_FAST + i]
+        intact = hel * params[_A] * rate * w[_INTACT + i] if p > -tension else 0.0
+        crumbled = min(hel * params[_B] * rate * w[_CRUMBLED + i], hel * params[_MOST]) if p > 0.0 else 0.0
+        crumbled = min(crumbled, intact)
+        strength = intact - damage * (intact - crumbled)
+        if q <= strength:
+            continue
+        strain = (q - strength) / (3.0 * shear)
+        fracture = params[_D1] * w[_FRACTURE + i] if p > -tension else 0.0
+        grown = damage + strain / fracture if strain < (1.0 - damage) * fracture else 1.0
+        factor = strength / q
+        mean = w[DILATATION + i] * _THIRD
+        moved = (
+            s[_SXX + i] * (w[D_XX + i] - mean)
+            + s[_SYY + i] * (w[D_YY + i] - mean)
+            + s[_SZZ + i] * (w[D_ZZ + i] - mean)
+            + 2.0 * (s[_SYZ + i] * w[D_YZ + i] + s[_SZX + i] * w[D_ZX + i] + s[_SXY + i] * w[D_XY + i])
+        )
+        lost = (1.0 - factor) * ((1.0 + factor) * _TWO_THIRDS * q * q - 2.0 * shear * dt * moved) / (4.0 * shear)
+        for row in range(S_XX, S_XY + 1):
+            s[row * CHUNK + i] *= factor
+        s[_STRAIN + i] += strain
+        s[_PLASTIC + i] += w[VOLUME_MID + i] * max(lost, 0.0)
+        s[_DAMAGE + i] = grown
+        m = 1.0 / s[_RATIO + i] - 1.0
+        if m > 0.0:
+            after = intact - grown * (intact - crumbled)
+            free = (strength * strength - after * after) / (6.0 * shear)
+            whole = bulk * m + s[_BULKING + i]
+            s[_BULKING + i] = math.sqrt(whole * whole + 2.0 * params[_BETA] * bulk * free) - bulk * m
+
+
+def _constants(law: JohnsonHolmquist) -> tuple[float, ...]:
+    most = np.inf if law.largest_fractured is None else law.largest_fractured
+    return (
+        law.strength_hel, law.pressure_hel, law.tension, law.A, law.N, law.B, law.M, law.C, law.reference_rate, most,
+        law.D1, law.D2, law.K2, law.K3, law.beta,
+    )  # fmt: skip
+
+
+PRESSURE_LAW = Equation("johnson_holmquist", DAMAGE + 1, lambda _: (), crumbling)
+"""Its own pressure: it has the bulking, and its own tension cut-off."""
+LAW = Law(
+    "johnson_holmquist", AFTER_PRESSURE, lambda _: DAMAGE + 1, _constants, lambda *_: {}, johnson_holmquist,
+    PRESSURE_LAW.model,
+)  # fmt: skip
+"""Tension ends at T (1 - D): what has crumbled has none."""
