@@ -38,7 +38,9 @@ class Connection(H11Protocol):
         self.idle[self] = None
         self._set_timer()
         if len(self.connections) > self.most:
-            next(iter(self.idle)).transport.abort()
+            oldest = next(iter(self.idle))
+            del self.idle[oldest]  # at once: of a crowd that comes in one turn of the loop each makes room for one more
+            oldest.transport.abort()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Frees its place."""

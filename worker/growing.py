@@ -4,8 +4,6 @@ from typing import Any
 
 import numpy as np
 
-from .jit import njit
-
 
 class Rooms:
     """The rooms of some columns of a table. What has room for new rows is not copied when it grows."""
@@ -29,21 +27,3 @@ class Rooms:
         for name, room in self._rooms.items():
             assert room is not None
             setattr(table, name, room[:m])
-
-
-@njit(
-    "void(int32[::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], int64[:, ::1], int64[::1], "
-    "float64[::1], int64)",
-    cache=True,
-)
-def inherit(part, x0, x, v, mass, force, parents, masses, n):  # type: ignore[no-untyped-def]
-    """Rows from ``n`` on of rooms of nodal columns: copies of ``parents`` (k,), without force, that take ``masses``
-    (k,) of theirs, kg.
-    """
-    for c in range(len(parents)):
-        a = parents[c]
-        part[n + c] = part[a]
-        for i in range(3):
-            x0[n + c, i], x[n + c, i], v[n + c, i], force[n + c, i] = x0[a, i], x[a, i], v[a, i], 0
-        mass[n + c] = masses[c]
-        mass[a] -= masses[c]

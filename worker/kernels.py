@@ -10,6 +10,7 @@ import ast
 import hashlib
 import os
 import platform
+import sys
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -74,8 +75,12 @@ def _processor() -> str:
 
 
 def use_cache(sources: str | None = None) -> Path:
-    """Points numba to the folder, and returns it; must come before numba is imported."""
+    """Points numba to the folder, and returns it. Raises RuntimeError when numba has been imported before: it would
+    keep kernels beside their sources, and not see an edited callee.
+    """
     folder = cache_folder(sources)
+    if "numba" in sys.modules and os.environ.get(VARIABLE) != str(folder):
+        raise RuntimeError("numba was imported before its cache had a name")
     os.environ[VARIABLE] = str(folder)
     os.environ.setdefault("NUMBA_NUM_THREADS", "1")
     return folder

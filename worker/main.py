@@ -6,6 +6,7 @@ import os
 import sys
 import time
 import traceback
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -64,9 +65,14 @@ def _run(options: argparse.Namespace, comm: Comm, signals: Signals, began: float
         print(_WRONG_SIZE.format(comm.size, options.ranks), file=sys.stderr)
         return ExitCode.CRASHED
     lock = _prepare_folder(options.out, comm)
-    if not lock:
+    if lock is None:
         print(f"{options.out}: another worker writes into this folder", file=sys.stderr)
         return ExitCode.CRASHED
+    with lock:
+        return _worked(options, comm, signals, began)
+
+
+def _worked(options: argparse.Namespace, comm: Comm, signals: Signals, began: float) -> int:
     telemetry = journal = None
     if comm.rank == 0:
         telemetry = _telemetry(options)
@@ -152,9 +158,9 @@ def _read(options: argparse.Namespace, ranks: int) -> Case:
     return load.parse_case(load.apply_overrides(load.read_data(path), overrides))
 
 
-def _prepare_folder(folder: Path, comm: Comm) -> Any:
-    """What holds the folder's lock while it lives on rank 0, True elsewhere; None when another worker has it."""
-    held: Any = True
+def _prepare_folder(folder: Path, comm: Comm) -> AbstractContextManager[Any] | None:
+    """What holds the folder's lock until it is closed, on rank 0; None, on every rank, when another worker has it."""
+    held: AbstractContextManager[Any] | None = nullcontext()
     if comm.rank == 0:
         (folder / layout.LOGS).mkdir(parents=True, exist_ok=True)
         held = hold(folder)

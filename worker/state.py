@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from .growing import Rooms, inherit
+from .growing import Rooms
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -142,6 +142,8 @@ class Nodes:
 
     def grow(self, copies: "Copies") -> None:
         """Takes up copies of nodes: they begin as their parents are, whose mass is their own less the copies'."""
+        from .inheriting import inherit  # numba, which is not imported before its cache has a name (kernels.py)
+
         n, m = self.n, self.n + copies.n
         inherited = self._inherited.of(self, copies.n)
         inherit(*inherited, copies.parents, copies.mass, n)

@@ -3,6 +3,8 @@
 import fcntl
 import importlib
 import os
+import subprocess
+import sys
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -82,6 +84,7 @@ def test_ranks_but_the_first_hash_nothing(monkeypatch: pytest.MonkeyPatch) -> No
         raise AssertionError("rank 1 hashes")
 
     monkeypatch.setenv(kernels.VARIABLE, "")
+    monkeypatch.delitem(sys.modules, "numba")
     monkeypatch.setattr(kernels, "source_hash", refuse)
     main.ready_kernels(Second(), None)
     assert os.environ[kernels.VARIABLE] == str(kernels.cache_folder("0" * 64))
@@ -230,3 +233,13 @@ def test_the_worker_tells_what_it_waits_for(monkeypatch: pytest.MonkeyPatch, tmp
     journal = (tmp_path / "run" / "journal.jsonl").read_text()
     assert '"state":"starting","cause":null,"message":"compiling kernels: 31 of 112"' in journal
     assert "kernels of x cannot be compiled: y" in (tmp_path / "run" / "outcome.json").read_text()
+
+
+def test_numba_is_not_imported_before_its_cache_has_a_name() -> None:
+    """Else it keeps kernels beside their sources, where an edited callee goes unseen."""
+    text = "import sys, conoid.worker.main; assert 'numba' not in sys.modules"
+    subprocess.run([sys.executable, "-c", text], check=True)
+    text = "import numba; from conoid.worker import kernels; kernels.use_cache()"
+    clean = {key: value for key, value in os.environ.items() if key != kernels.VARIABLE}
+    told = subprocess.run([sys.executable, "-c", text], env=clean, capture_output=True, text=True, check=False)
+    assert "numba was imported before" in told.stderr
