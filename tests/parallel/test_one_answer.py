@@ -29,6 +29,8 @@ SHORT = {
     "free_spin": "10 us",
     "free_tets": "5 us",
     "glass_steel_bar": "1.5 us",
+    "glass_ball_cohesive": "2 us",
+    "glass_ball_jh2": "2 us",
     "glass_steel_demo": "4 us",
     "hertz_spheres": "0.2 us",
     "long_rod": "2 us",
