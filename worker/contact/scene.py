@@ -110,8 +110,9 @@ class Scene:
             owner = nodes.owner[nodes.places(keys[:, 0])]
             told = comm.swap({int(rank): rows[owner == rank] for rank in np.unique(owner)})
             rows = np.concatenate([rows[:0], *(words.reshape(-1, 6) for words in told.values())])
-        node, face = self.own.place[nodes.places(rows[:, 0])], rows_of(self.faces.id, rows[:, 1])
-        here = (node >= 0) & (face >= 0)
+        local, face = nodes.places(rows[:, 0]), rows_of(self.faces.id, rows[:, 1])
+        node = self.own.place[local]
+        here = (local >= 0) & (node >= 0) & (face >= 0)
         self.node_face.recall(
             np.column_stack([node, face])[here], np.ascontiguousarray(rows[here, 2:]).view(np.float64)
         )
