@@ -136,8 +136,19 @@ def scan(runs: Path) -> Iterator[Path]:
     for path in sorted(runs.iterdir()):
         if path.name.startswith((_NEW, _GONE)):
             shutil.rmtree(path, ignore_errors=True)
-        elif is_id(path.name) and any((path / name).exists() for name in _TELLING):
+        elif is_id(path.name) and any(there(path / name) for name in _TELLING):
             yield path
+
+
+def there(path: Path) -> bool:
+    """Whether there is such a file; also where that is nobody's business, since its folder is locked away."""
+    try:
+        path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    except PermissionError:
+        return True
+    return True
 
 
 def submission(folder: Path) -> Submission:

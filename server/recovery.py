@@ -8,6 +8,7 @@ import msgspec
 
 from conoid.cases import layout
 from conoid.cases.messages import Status
+from conoid.cases.outcome import Outcome
 from conoid.cases.run import State
 
 from . import farewell, folder, journal
@@ -41,7 +42,7 @@ def look(path: Path, known: Run | None, launcher: Launcher) -> Left:
     trace = launcher.find(accepted.id, path)
     run = _mended(folder.replay(accepted, told), bool(told), known, path, trace, launcher.queues)
     code, full = farewell.exit_code(path), farewell.disk_failed(path)
-    found = Found(_fate(path, trace), folder.outcome(path), trace.rebooted, code, full)
+    found = Found(_fate(path, trace), _outcome(path), trace.rebooted, code, full)
     return Left(
         _stopping(run, known, path, launcher.queues), made.idempotency_key if made else None, found, trace.worker
     )
@@ -51,6 +52,14 @@ def _submission(path: Path) -> Submission | None:
     try:
         return folder.submission(path)
     except (*folder.DAMAGED, msgspec.MsgspecError):
+        return None
+
+
+def _outcome(path: Path) -> Outcome | None:
+    """None where it is locked away, as everything beside it."""
+    try:
+        return folder.outcome(path)
+    except PermissionError:
         return None
 
 
@@ -71,7 +80,7 @@ def _fate(path: Path, trace: Trace) -> Literal["none", "alive", "gone"]:
     """A record that cannot be read is the record of a launch all the same."""
     if trace.worker is not None:
         return "alive"
-    return "gone" if trace.launched or (path / layout.WORKER).exists() else "none"
+    return "gone" if trace.launched or folder.there(path / layout.WORKER) else "none"
 
 
 def _mended(run: Run, journal_there: bool, known: Run | None, path: Path, trace: Trace, queues: bool) -> Run:
@@ -87,7 +96,7 @@ def _mended(run: Run, journal_there: bool, known: Run | None, path: Path, trace:
 
 
 def _launched(path: Path, trace: Trace) -> bool:
-    return trace.launched or (path / layout.WORKER).exists() or (path / layout.OUTCOME).exists()
+    return trace.launched or folder.there(path / layout.WORKER) or folder.there(path / layout.OUTCOME)
 
 
 def _stopping(run: Run, known: Run | None, path: Path, queues: bool) -> Run:

@@ -1,16 +1,19 @@
 """A Zenoh router in this process, and a server of its own process whose worker computes nothing."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 import zenoh
 
+from conoid.client import pictures
 from conoid.client.http import Router
 from conoid.client.local import LocalServer
+from conoid.client.pictures import Drawn, Picture
 
 from .fakes import FAKE_WORKER, Broker, free_port
+from .studio import studio
 
 
 @pytest.fixture(scope="module")
@@ -31,6 +34,19 @@ def broker(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Broker]:
     session = zenoh.open(config)
     yield Broker(session, Router(endpoint=f"tcp/127.0.0.1:{port}", user="ann", password="secret"))
     session.close()  # type: ignore[no-untyped-call]
+
+
+@pytest.fixture(scope="session")
+def one_child() -> Iterator[Callable[[Picture], Drawn]]:
+    """Starts when the first picture is drawn."""
+    with studio() as render:
+        yield render
+
+
+@pytest.fixture
+def warm(one_child: Callable[[Picture], Drawn], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures are drawn by one child, not each by its own."""
+    monkeypatch.setattr(pictures, "render", one_child)
 
 
 @pytest.fixture

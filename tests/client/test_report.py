@@ -56,6 +56,7 @@ def folder(tmp_path: Path) -> Path:
     return made
 
 
+@pytest.mark.usefixtures("warm")
 def test_a_report_is_one_file_that_asks_for_nothing(folder: Path, tmp_path: Path) -> None:
     out = report.write(Result.open(folder), tmp_path / "bar.html", ["temperature"])
     page = read(out)
@@ -99,6 +100,7 @@ def test_a_run_that_has_not_ended_has_a_report_of_what_is_there(folder: Path, tm
         report.write(Result.open(folder), tmp_path / "bar.html", [])
 
 
+@pytest.mark.usefixtures("warm")
 def test_a_field_that_cannot_be_drawn_is_a_line(folder: Path, tmp_path: Path) -> None:
     text = read(report.write(Result.open(folder), tmp_path / "bar.html", ["fragment"])).text
     assert "fragment: this frame has no field 'fragment'" in text

@@ -50,6 +50,7 @@ def test_a_picture_shows_the_body_whole_and_large(folder: Path, tmp_path: Path) 
     assert 500 < drawn.high < 293.15 + 300 * 1.9
 
 
+@pytest.mark.usefixtures("warm")
 def test_mirrors_double_the_model_and_hide_its_sections(folder: Path, tmp_path: Path) -> None:
     two = view(folder, "mises", tmp_path / "b.png", size=SIZE, mirror="x")
     four = view(folder, "mises", tmp_path / "c.png", size=SIZE, mirror="auto")
@@ -59,6 +60,7 @@ def test_mirrors_double_the_model_and_hide_its_sections(folder: Path, tmp_path: 
     assert four.faces == 4 * (2 * sides + 2 * ends)
 
 
+@pytest.mark.usefixtures("warm")
 @pytest.mark.parametrize("field", ["pressure", "speed", "part"])
 def test_every_kind_of_field_can_be_drawn(field: str, folder: Path, tmp_path: Path) -> None:
     drawn = view(folder / "frames" / "000007.vtkhdf", field, tmp_path / "p.png", size=SIZE, raw=field == "speed")
@@ -68,12 +70,14 @@ def test_every_kind_of_field_can_be_drawn(field: str, folder: Path, tmp_path: Pa
         assert (drawn.low, drawn.high) == pytest.approx((0.0, 190.0), abs=6.0)
 
 
+@pytest.mark.usefixtures("warm")
 def test_a_field_that_the_frame_lacks_is_named(tmp_path: Path) -> None:
     write_frame(tmp_path / "f.vtkhdf", leave_out=("mises",))
     with pytest.raises(ViewError, match="no field 'mises'; it has: part, plastic_strain, pressure"):
         view(tmp_path / "f.vtkhdf", "mises", tmp_path / "p.png")
 
 
+@pytest.mark.usefixtures("warm")
 def test_a_file_that_is_no_frame_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "f.vtkhdf").write_bytes(b"nothing")
     with pytest.raises(ViewError) as caught:
@@ -143,6 +147,7 @@ def test_fields_can_be_listed_without_vtk() -> None:
 # What the caller may choose -------------------------------------------------------------------------------------------
 
 
+@pytest.mark.usefixtures("warm")
 def test_frames_know_their_times_and_stand_side_by_side(folder: Path, tmp_path: Path) -> None:
     drawn = view(folder, "mises", tmp_path / "two.png", size=SIZE, time=[0.0, 75e-6])
     assert drawn.times == [0.0, 80e-6], "of each time the nearest frame"
@@ -154,6 +159,7 @@ def test_frames_know_their_times_and_stand_side_by_side(folder: Path, tmp_path: 
     assert bodies >= 2
 
 
+@pytest.mark.usefixtures("warm")
 def test_a_gif_has_every_frame(folder: Path, tmp_path: Path) -> None:
     drawn = view(folder, "mises", tmp_path / "all.gif", size=SIZE, rate=4.0)
     assert drawn.times == [0.0, 80e-6]
@@ -161,6 +167,7 @@ def test_a_gif_has_every_frame(folder: Path, tmp_path: Path) -> None:
         assert (gif.size, getattr(gif, "n_frames", 0), gif.info["duration"]) == (SIZE, 2, 250)
 
 
+@pytest.mark.usefixtures("warm")
 def test_a_transparent_ground_is_left_out(folder: Path, tmp_path: Path) -> None:
     view(folder, "mises", tmp_path / "t.png", size=SIZE, transparent=True, scale=False)
     alpha = imread(tmp_path / "t.png")[:, :, 3]
@@ -169,6 +176,7 @@ def test_a_transparent_ground_is_left_out(folder: Path, tmp_path: Path) -> None:
     assert 0.05 < np.mean(alpha > 0.5) < 0.8
 
 
+@pytest.mark.usefixtures("warm")
 def test_a_section_cuts_away_what_lies_before_it(folder: Path, tmp_path: Path) -> None:
     whole = view(folder, "temperature", tmp_path / "a.png", size=SIZE)
     below = view(folder, "temperature", tmp_path / "b.png", size=SIZE, camera="-z", section="z=0.02")
@@ -181,6 +189,7 @@ def test_a_section_cuts_away_what_lies_before_it(folder: Path, tmp_path: Path) -
         view(folder, "temperature", tmp_path / "d.png", size=SIZE, mirror="x", section="x")
 
 
+@pytest.mark.usefixtures("warm")
 def test_one_extreme_tet_does_not_set_the_colours(tmp_path: Path) -> None:
     write_frame(tmp_path / "f.vtkhdf")
     calm = view(tmp_path / "f.vtkhdf", "mises", tmp_path / "a.png", size=SIZE, raw=True)
@@ -198,6 +207,7 @@ def seen(**options: Any) -> Picture:
     return Picture(frames=[], out="", field="mises", look=Look(), **options)
 
 
+@pytest.mark.usefixtures("warm")
 def test_the_bar_of_a_length_is_as_long_as_it_says(folder: Path, tmp_path: Path) -> None:
     """The body is 32.4 mm long, 0.82 of that in the last frame: its pixels and those of the bar have one scale."""
     size = (600, 800)

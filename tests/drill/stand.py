@@ -209,7 +209,7 @@ class Stand:
         while (seen := self.state(run)).partition("/")[0] not in (states or FINAL):
             if time.monotonic() > deadline:
                 break
-            time.sleep(0.05)
+            time.sleep(0.1)
         return seen
 
     def entries(self, run: str) -> list[dict[str, Any]]:

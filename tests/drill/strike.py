@@ -81,7 +81,7 @@ def _settled(stand: Stand) -> None:
         told = stand.ask("GET", "/v1/runs?limit=50&state=accepted,starting,queued")[1]["runs"]
         if not [run for run in told if run["ranks"] == 1]:
             return
-        time.sleep(0.05)
+        time.sleep(0.1)
 
 
 def _after(life: Life) -> Truth:

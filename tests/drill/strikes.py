@@ -169,7 +169,9 @@ def clocks() -> Iterator[Strike]:
     ):  # fmt: skip
         yield Strike(f"the clock {name}", "clock", clock(words), right, "clock")
     for name, words in (("set forward by a day", "+1d"), ("set back by a day", "-1d")):
-        yield Strike(f"the clock {name} and the server killed", "clock", and_killed(clock(words)), right, "clock")
+        yield Strike(
+            f"the clock {name} and the server killed", "clock", and_killed(clock(words)), and_started(right), "clock"
+        )
 
 
 # Database -------------------------------------------------------------------------------------------------------------

@@ -1,5 +1,7 @@
 """Files of a run that somebody has damaged: its end is told, nothing is run that was not accepted, no answer fails."""
 
+import errno
+import os
 import shutil
 import time
 from pathlib import Path
@@ -11,7 +13,7 @@ from conoid.cases.run import State
 from conoid.server import farewell, folder, holds
 from conoid.server.events import Run
 
-from .faulty import House
+from .faulty import House, Plan, faults
 from .running import TOML, Running, case_text
 
 
@@ -143,4 +145,32 @@ def test_a_disk_that_was_full_at_the_end_is_remembered(tmp_path: Path, monkeypat
     list(watch.look())
     monkeypatch.setattr(farewell, "disk_failed", lambda _: False)
     assert turned(house, run).cause == "storage"
+    house.store.close()
+
+
+@pytest.mark.parametrize("state", [State.QUEUED, State.RUNNING])
+def test_a_folder_that_is_locked_away_keeps_no_server_from_its_start(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, state: State
+) -> None:
+    house = House(tmp_path / "runs")
+    house.puppets.ends = "never"
+    run = turned(house, house.accept(), State.RUNNING)
+    if state is State.QUEUED:
+        run = house.accept()
+        house.supervisor._turn()
+    path, lstat = house.settings.runs / run.id, Path.lstat
+    refusal = PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+    def refused(self: Path) -> os.stat_result:
+        if path in self.parents:
+            raise refusal
+        return lstat(self)
+
+    monkeypatch.setattr(Path, "lstat", refused)
+    for puppet in house.puppets.made:
+        puppet.alive = False
+    with faults(Plan(path, 0, refusal, times=10**9, reads=True)):
+        house.supervisor = house.begin()
+        ended = turned(house, run)
+    assert (ended.state, ended.cause) == (State.LOST, "storage")
     house.store.close()

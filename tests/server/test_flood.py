@@ -52,7 +52,7 @@ def knock(user: User) -> socket.socket:
 
 
 def test_half_requests_keep_nobody_out(ann: User) -> None:
-    crowd = [knock(ann) for _ in range(200)]
+    crowd = [knock(ann) for _ in range(400)]
     for _ in range(5):
         with httpx2.Client(base_url=ann.http.base_url, timeout=5.0) as other:
             assert other.get("/healthz").status_code == 200
