@@ -166,7 +166,11 @@ def test_a_folder_that_is_locked_away_keeps_no_server_from_its_start(
             raise refusal
         return lstat(self)
 
+    def not_renamed(source: Path, _: Path) -> None:
+        raise refusal
+
     monkeypatch.setattr(Path, "lstat", refused)
+    monkeypatch.setattr(os, "replace", not_renamed)
     for puppet in house.puppets.made:
         puppet.alive = False
     with faults(Plan(path, 0, refusal, times=10**9, reads=True)):
