@@ -1,6 +1,6 @@
 """A run as a job of a batch system: the site's profiles, the record in the run's folder, the script, sbatch's words.
 
-A site's settings file::
+A site's settings file (its other tables are those of ``policy``)::
 
     launcher = "slurm"                # who starts runs of the server: "local" (default) or "slurm"
     [slurm]
@@ -23,7 +23,7 @@ from typing import Literal
 
 import msgspec
 
-from . import layout
+from . import layout, policy
 from .units import parse_quantity
 
 
@@ -77,10 +77,14 @@ class Slurm(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
 
 
 class Site(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """What a site decides about how runs are started."""
+    """What a site decides: how runs are started, and by ``policy`` when, how large, and how long they are kept."""
 
     launcher: Literal["local", "slurm"] = "local"
     slurm: Slurm | None = None
+    queue: policy.Queue = policy.Queue()
+    quota: policy.Quota = policy.Quota()
+    caps: policy.RunCaps = policy.RunCaps()
+    retention: policy.Retention = policy.Retention()
 
 
 class Job(msgspec.Struct, kw_only=True, frozen=True):
@@ -130,6 +134,7 @@ def read_site(path: Path) -> Site:
         site = msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), Site)
         if site.slurm is not None:
             _check(site.slurm)
+        policy.check(site.queue, site.quota, site.caps, site.retention)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise SiteError(f"{path}: {reason}") from None

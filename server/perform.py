@@ -108,7 +108,7 @@ class Performer:
         left = (
             None if allowed is None or self._launcher.queues else allowed + self._settings.grace - folder.runs_for(path)
         )
-        return Watch(path, worker, left)
+        return Watch(path, worker, left, self._settings.caps.output_bytes)
 
 
 def _allowed(path: Path) -> float | None:
