@@ -18,6 +18,7 @@ import re
 import secrets
 import shlex
 import tomllib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Literal
 
@@ -104,10 +105,19 @@ class Job(msgspec.Struct, kw_only=True, frozen=True):
     """s before the time limit at which the run is told."""
     bin: str = ""
     """Folder of Slurm's commands; empty: they are in PATH."""
+    task: int | None = None
+    """Its place in an array, one job for several runs; None: a job of its own."""
+    array: str = ""
+    """The folder of the array."""
     job: str = ""
     """The number that the batch system gave; empty until it is known."""
     accounting: dict[str, str] = {}
     """What the batch system tells of a job that has ended."""
+
+    @property
+    def key(self) -> str:
+        """No other run has it."""
+        return key_of(self.name, self.task)
 
 
 class Access(msgspec.Struct, kw_only=True, frozen=True):
@@ -123,7 +133,7 @@ class Access(msgspec.Struct, kw_only=True, frozen=True):
 
 _job, _access = msgspec.json.Decoder(Job), msgspec.json.Decoder(Access)
 _TEMPLATE = """#!/bin/bash
-# One attempt of a run, written by Conoid: $1 is the run's folder, $2 the name of the job. The rest is in job.json.
+# One attempt of a run, written by Conoid: $1 is its folder or that of its array, $2 the job's name. See job.json there.
 {lines}exec {python} -m conoid.worker.job "$1" "$2"
 """
 
@@ -186,6 +196,11 @@ def new_job(
     )  # fmt: skip
 
 
+def key_of(name: str, task: int | None) -> str:
+    """Of a job of that name, or of one task of an array of that name."""
+    return name if task is None else f"{name}/{task}"
+
+
 def script(profile: Profile, python: str) -> str:
     """The batch script: the site's lines, then the run. Nothing in it depends on the run or on its owner."""
     modules = [f"module load {shlex.quote(module)}" for module in profile.modules]
@@ -197,7 +212,16 @@ def sbatch_words(job: Job, profile: Profile, folder: Path) -> list[str]:
     """The arguments of sbatch. TERM reaches the script alone ``notice`` before the limit; the script's program tells
     the ranks.
     """
-    log = folder / layout.LOGS / layout.LAUNCHER_LOG
+    return _words(job, profile, folder, folder / layout.LOGS / layout.LAUNCHER_LOG)
+
+
+def array_words(job: Job, profile: Profile, tasks: Iterable[int]) -> list[str]:
+    """The arguments of sbatch for some tasks of an array, of which ``job`` is one."""
+    folder = Path(job.array)
+    return [f"--array={','.join(map(str, tasks))}", *_words(job, profile, folder, folder / "%a.log")]
+
+
+def _words(job: Job, profile: Profile, folder: Path, log: Path) -> list[str]:
     words = [
         "--parsable", f"--job-name={job.name}", f"--ntasks={job.ranks}", f"--chdir={folder}", f"--output={log}",
         "--open-mode=append", "--requeue", "--export=ALL", f"--signal=B:TERM@{job.notice:.0f}",

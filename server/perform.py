@@ -96,7 +96,9 @@ class Performer:
             for left in (layout.OUTCOME, layout.STOP_REQUEST):
                 (path / left).unlink(missing_ok=True)
             case = path / made.case_file
-            worker = self._launcher.start(Job(run.id, run.ranks, case, path, access, made.profile, made.wall_time))
+            group = f"{made.owner}/{made.labels['sweep']}" if "sweep" in made.labels else ""
+            job = Job(run.id, run.ranks, case, path, access, made.profile, made.wall_time, group)
+            worker = self._launcher.start(job)
         except (OSError, msgspec.MsgspecError) as error:
             raise LaunchError(str(error)) from error
         return self._watch(path, worker, made.wall_time)
