@@ -284,9 +284,8 @@ class Supervisor:
     def _take_up(self) -> None:
         """Makes memory and database agree with the runs' folders, and goes on with what an earlier server left."""
         self._leavings.all()
-        for run_id in self._store.open_ids() - self._open.keys():
-            run = self._store.get(run_id)
-            if run is not None and self._hands.gone(run_id):
+        for run_id, run in self._store.open().items():
+            if run_id not in self._open and self._hands.gone(run_id):
                 self._open[run_id] = run
                 self._apply(run_id, Broken(_GONE))
 
