@@ -96,7 +96,9 @@ class Performer:
             for left in (layout.OUTCOME, layout.STOP_REQUEST):
                 (path / left).unlink(missing_ok=True)
             case = path / made.case_file
-            worker = self._launcher.start(Job(run.id, run.ranks, case, path, access, made.profile, made.wall_time))
+            group = f"{made.owner}/{made.labels['sweep']}" if "sweep" in made.labels else ""
+            job = Job(run.id, run.ranks, case, path, access, made.profile, made.wall_time, group)
+            worker = self._launcher.start(job)
         except (OSError, msgspec.MsgspecError) as error:
             raise LaunchError(str(error)) from error
         return self._watch(path, worker, made.wall_time)
@@ -108,7 +110,7 @@ class Performer:
         left = (
             None if allowed is None or self._launcher.queues else allowed + self._settings.grace - folder.runs_for(path)
         )
-        return Watch(path, worker, left)
+        return Watch(path, worker, left, self._settings.caps.output_bytes)
 
 
 def _allowed(path: Path) -> float | None:
