@@ -1,6 +1,6 @@
 """A run as a job of a batch system: the site's profiles, the record in the run's folder, the script, sbatch's words.
 
-A site's settings file::
+A site's settings file (its other tables are those of ``policy``)::
 
     launcher = "slurm"                # who starts runs of the server: "local" (default) or "slurm"
     [slurm]
@@ -18,12 +18,13 @@ import re
 import secrets
 import shlex
 import tomllib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Literal
 
 import msgspec
 
-from . import layout
+from . import layout, policy
 from .units import parse_quantity
 
 
@@ -77,10 +78,14 @@ class Slurm(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
 
 
 class Site(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """What a site decides about how runs are started."""
+    """What a site decides: how runs are started, and by ``policy`` when, how large, and how long they are kept."""
 
     launcher: Literal["local", "slurm"] = "local"
     slurm: Slurm | None = None
+    queue: policy.Queue = policy.Queue()
+    quota: policy.Quota = policy.Quota()
+    caps: policy.RunCaps = policy.RunCaps()
+    retention: policy.Retention = policy.Retention()
 
 
 class Job(msgspec.Struct, kw_only=True, frozen=True):
@@ -100,10 +105,19 @@ class Job(msgspec.Struct, kw_only=True, frozen=True):
     """s before the time limit at which the run is told."""
     bin: str = ""
     """Folder of Slurm's commands; empty: they are in PATH."""
+    task: int | None = None
+    """Its place in an array, one job for several runs; None: a job of its own."""
+    array: str = ""
+    """The folder of the array."""
     job: str = ""
     """The number that the batch system gave; empty until it is known."""
     accounting: dict[str, str] = {}
     """What the batch system tells of a job that has ended."""
+
+    @property
+    def key(self) -> str:
+        """No other run has it."""
+        return key_of(self.name, self.task)
 
 
 class Access(msgspec.Struct, kw_only=True, frozen=True):
@@ -119,7 +133,7 @@ class Access(msgspec.Struct, kw_only=True, frozen=True):
 
 _job, _access = msgspec.json.Decoder(Job), msgspec.json.Decoder(Access)
 _TEMPLATE = """#!/bin/bash
-# One attempt of a run, written by Conoid: $1 is the run's folder, $2 the name of the job. The rest is in job.json.
+# One attempt of a run, written by Conoid: $1 is its folder or that of its array, $2 the job's name. See job.json there.
 {lines}exec {python} -m conoid.worker.job "$1" "$2"
 """
 
@@ -130,6 +144,7 @@ def read_site(path: Path) -> Site:
         site = msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), Site)
         if site.slurm is not None:
             _check(site.slurm)
+        policy.check(site.queue, site.quota, site.caps, site.retention)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise SiteError(f"{path}: {reason}") from None
@@ -181,6 +196,11 @@ def new_job(
     )  # fmt: skip
 
 
+def key_of(name: str, task: int | None) -> str:
+    """Of a job of that name, or of one task of an array of that name."""
+    return name if task is None else f"{name}/{task}"
+
+
 def script(profile: Profile, python: str) -> str:
     """The batch script: the site's lines, then the run. Nothing in it depends on the run or on its owner."""
     modules = [f"module load {shlex.quote(module)}" for module in profile.modules]
@@ -192,7 +212,16 @@ def sbatch_words(job: Job, profile: Profile, folder: Path) -> list[str]:
     """The arguments of sbatch. TERM reaches the script alone ``notice`` before the limit; the script's program tells
     the ranks.
     """
-    log = folder / layout.LOGS / layout.LAUNCHER_LOG
+    return _words(job, profile, folder, folder / layout.LOGS / layout.LAUNCHER_LOG)
+
+
+def array_words(job: Job, profile: Profile, tasks: Iterable[int]) -> list[str]:
+    """The arguments of sbatch for some tasks of an array, of which ``job`` is one."""
+    folder = Path(job.array)
+    return [f"--array={','.join(map(str, tasks))}", *_words(job, profile, folder, folder / "%a.log")]
+
+
+def _words(job: Job, profile: Profile, folder: Path, log: Path) -> list[str]:
     words = [
         "--parsable", f"--job-name={job.name}", f"--ntasks={job.ranks}", f"--chdir={folder}", f"--output={log}",
         "--open-mode=append", "--requeue", "--export=ALL", f"--signal=B:TERM@{job.notice:.0f}",

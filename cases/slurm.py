@@ -56,6 +56,7 @@ class Entry(NamedTuple):
     start: float
     """Unix s; of a pending job an estimate, 0 when there is none."""
     name: str
+    """Of the job; of a task of an array with its place, as ``batch.key_of`` has it."""
     reason: str
 
 
@@ -89,10 +90,16 @@ def environment(base: Mapping[str, str]) -> dict[str, str]:
 
 def jobs(place: str, name: str = "") -> list[Entry]:
     """This user's jobs that Slurm remembers, of one name or all. Raises AwayError, RefusedError."""
-    words = ["squeue", "--noheader", "--states=all", f"--user={os.getuid()}", "--format=%i|%T|%S|%j|%r"]
+    words = ["squeue", "--noheader", "--array", "--states=all", f"--user={os.getuid()}", "--format=%i|%T|%S|%j|%r"]
     told = call(place, [*words, *([f"--name={name}"] if name else [])])
     rows = [line.strip().split("|", 4) for line in told.splitlines()]
-    return [Entry(row[0], row[1], _time(row[2]), row[3], row[4]) for row in rows if len(row) == 5]
+    return [Entry(row[0], row[1], _time(row[2]), _key(row[0], row[3]), row[4]) for row in rows if len(row) == 5]
+
+
+def _key(job: str, name: str) -> str:
+    """A task of an array has a number such as 123_4."""
+    task = job.partition("_")[2]
+    return batch.key_of(name, int(task) if task.isdigit() else None)
 
 
 def _time(text: str) -> float:
@@ -143,6 +150,25 @@ def submit(place: str, folder: Path, job: Job, profile: Profile) -> str:
                 return known[0].job
             raise
     return told.strip().partition(";")[0]
+
+
+def submit_array(place: str, records: Sequence[Job], profile: Profile) -> dict[int, str]:
+    """The number of the one job of each task of an array: of those that are there already, and of a new array for
+    the others. The lock is the array's. Raises AwayError, RefusedError, OSError.
+    """
+    with open(Path(records[0].array) / ".submit.lock", "a") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise AwayError("an earlier sbatch for this array is under way") from None
+        there = {entry.name: entry.job for entry in jobs(place, records[0].name)}
+        found = {job.task: there[job.key] for job in records if job.task is not None and job.key in there}
+        lacking = [job.task for job in records if job.task is not None and job.key not in there]
+        if lacking:
+            told = call(place, ["sbatch", *batch.array_words(records[0], profile, lacking)], lock.fileno())
+            number = told.strip().partition(";")[0]
+            found |= {task: f"{number}_{task}" for task in lacking}
+    return found
 
 
 def cancel(place: str, job: str) -> None:

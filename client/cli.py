@@ -124,6 +124,7 @@ app.command(short_help="Speed against error: meshes, orders, limits, advice.")(c
 app.command(short_help="Run the suite of hard cases.")(hard.hard)
 app.command(short_help="Run a case at many points.")(sweeping.sweep)
 app.command(name="sweep-table", short_help="Print a sweep as CSV.")(sweeping.sweep_table)
+app.command(name="sweep-plot", short_help="Draw the results of a sweep.")(sweeping.sweep_plot)
 app.command(name="sweep-cancel", short_help="Cancel the runs of a sweep.")(sweeping.sweep_cancel)
 
 

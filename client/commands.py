@@ -42,6 +42,7 @@ def submit(
     key: Annotated[str | None, typer.Option("--key", help="Idempotency key: the same one makes no second run.")] = None,
     label: Labels = None,
     profile: Annotated[str, typer.Option("--profile", help="Of the site's batch system; its default.")] = "",
+    priority: Annotated[int, typer.Option("--priority", help="Among your own runs: -100 to 100.")] = 0,
     url: Url = None,
     token: Token = None,
     as_json: Json = False,
@@ -49,7 +50,7 @@ def submit(
     """Hand a case to the server; prints the run's id."""
     warn_of(case, overrides or ())
     with connect(url, token) as session:
-        run = session.submit(case, overrides or (), key, labels_of(label), profile)
+        run = session.submit(case, overrides or (), key, labels_of(label), profile, priority)
         if as_json:
             show_json(run.status())
         else:

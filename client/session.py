@@ -50,17 +50,19 @@ class Session(Http):
         key: str | None = None,
         labels: Mapping[str, str] | None = None,
         profile: str = "",
+        priority: int = 0,
     ) -> Run:
         """Hands a case in: a file, the name of a shipped case, or plain data.
 
         ``overrides`` change keys: ``["run.ranks=2"]``, ``{"run.ranks": 2}``. ``key`` is the Idempotency-Key; one is
         made up when it is None, so that a retry never makes a second run. ``labels`` are words of your own by which
-        runs are found again, ``profile`` is one of the site's batch system. Raises CaseError, ServiceError,
-        UnreachableError.
+        runs are found again, ``profile`` is one of the site's batch system; of two of your runs the one with the
+        higher ``priority`` comes first. Raises CaseError, ServiceError, UnreachableError.
         """
         kind, body = body_of(case, overrides)
         words = [("label", f"{name}={value}") for name, value in (labels or {}).items()]
         words += [("profile", profile)] if profile else []
+        words += [("priority", str(priority))] if priority else []
         path = f"/v1/runs?{urlencode(words)}" if words else "/v1/runs"
         return Run(self, self.post(RunInfo, path, body, kind, key or str(uuid.uuid4())).id)
 

@@ -5,7 +5,7 @@ import io
 import itertools
 import math
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ import msgspec
 from conoid.cases.load import CaseError, Problem, apply_overrides
 from conoid.cases.run import State
 
+from .errors import ClientError
 from .http import Http
 from .run import Run, RunInfo, quoted
 
@@ -88,8 +89,27 @@ class Sweep:
         return self.session.fetch(f"{self.path}/table").decode()
 
     def table(self) -> list[dict[str, str]]:
-        """The lines of the table by column; ``pandas.DataFrame`` takes them as they are."""
+        """The lines of the table by column, as text."""
         return list(csv.DictReader(io.StringIO(self.csv())))
+
+    def frame(self) -> Any:
+        """The table as a pandas.DataFrame. Raises ClientError without pandas."""
+        try:
+            import pandas
+        except ImportError:
+            raise ClientError("data frames need pandas: pip install 'conoid[tables]'") from None
+        return pandas.read_csv(io.StringIO(self.csv()))
+
+    def plot(self, out: Path | str, columns: Sequence[str] = (), x: str | None = None) -> Path:
+        """Results over what was changed, as a picture: those ``columns``, or the telling ones of those that differ.
+
+        ``x`` is the key on the axis, the first that varies when it is None; the other keys make a curve each. Raises
+        ClientError.
+        """
+        from . import curves, swept
+
+        keys = list(dict.fromkeys(key for point in self.status().points for key in point.values))
+        return curves.save(swept.figure(self.table(), keys, x, columns), Path(out))
 
 
 def points_of(words: Iterable[str], *, grid: bool = False) -> list[Point]:

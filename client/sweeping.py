@@ -1,4 +1,4 @@
-"""``conoid sweep``: hand in, look at, cancel, and the table."""
+"""``conoid sweep``: hand in, look at, cancel, the table and the plot."""
 
 from pathlib import Path
 from typing import Annotated
@@ -29,7 +29,7 @@ def sweep(
     token: Token = None,
     as_json: Json = False,
 ) -> None:
-    """Run a case at many points; prints the id of the sweep. sweep-table shows what came out."""
+    """Run a case at many points; prints the id of the sweep. sweep-table and sweep-plot show what came out."""
     if (listed is None) == (not sets):
         raise ClientError("give the points with --set KEY=A,B,C, or with --list FILE")
     points = points_in(listed) if listed is not None else points_of(sets or (), grid=grid)
@@ -57,6 +57,23 @@ def sweep_table(
     else:
         out.write_text(text, encoding="utf-8")
         typer.echo(str(out))
+
+
+def sweep_plot(
+    sweep: SweepArgument,
+    out: Annotated[Path, typer.Option("--out", help="PNG file to write, or what its name ends in.")] = Path(
+        "sweep.png"
+    ),
+    columns: Annotated[
+        list[str] | None, typer.Option("--column", help="Of the table; may be given again. If none: what differs.")
+    ] = None,
+    x: Annotated[str | None, typer.Option("--x", metavar="KEY", help="On the axis; the first that varies.")] = None,
+    url: Url = None,
+    token: Token = None,
+) -> None:
+    """Draw the results of a sweep over what was changed: a panel a result, a curve a value of other keys."""
+    with connect(url, token) as session:
+        typer.echo(str(session.find_sweep(sweep).plot(out, columns or (), x)))
 
 
 def sweep_cancel(sweep: SweepArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:

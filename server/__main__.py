@@ -7,8 +7,9 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
-from .settings import Caps, Settings, StartError, command, site_of
+from .settings import Caps, Settings, StartError, capped, command, site_of
 from .store import Store
 from .tokens import SCOPES, TokenError, create_token
 
@@ -60,6 +61,7 @@ _CAPS: tuple[tuple[str, Callable[[str], float], str], ...] = (
     ("core_seconds", float, "largest expected cost of a case, s"),
     ("wall_time", float, "longest run, s"),
     ("queued", int, "open runs of one owner (default 1000)"),
+    ("output_bytes", int, "largest folder of a run, bytes"),
 )
 
 
@@ -87,8 +89,9 @@ def _token_commands(parser: argparse.ArgumentParser) -> None:
 
 
 def _settings(options: argparse.Namespace) -> Settings:
-    given = {name: value for name, _, _ in _CAPS if (value := getattr(options, f"max_{name}")) is not None}
     site = site_of(options.site)
+    told = {name: value for name, _, _ in _CAPS if (value := getattr(options, f"max_{name}")) is not None}
+    given: dict[str, Any] = {**capped(site), **told}
     chosen = {"slots": options.slots} if options.slots is not None else {}
     if site.launcher == "slurm" and site.slurm is not None:
         chosen.setdefault("slots", site.slurm.slots)

@@ -8,9 +8,11 @@ from fastapi import FastAPI
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from . import errors, openapi, page
+from . import errors, keeper, openapi, page
 from .bell import Bell
+from .farewells import Farewells
 from .history import Histories
+from .keeper import Keeper
 from .launch import Launcher
 from .launch.local import LocalLauncher
 from .launch.slurm import SlurmLauncher
@@ -66,6 +68,8 @@ def opened(settings: Settings) -> Iterator[Service]:
             telemetry = Telemetry(settings.runs, settings.host, settings.zenoh_port, tokens, settings.site.slurm)
             stack.callback(telemetry.close)
         bell = Bell()
+        lines = Farewells(settings.runs)
+        keeper.restore(store, lines)
         supervisor = Supervisor(settings, store, launcher_of(settings), telemetry, bell.ring)
         desk = Desk(settings, store, supervisor)
         sweeps = Sweeps(settings, desk)
@@ -74,8 +78,14 @@ def opened(settings: Settings) -> Iterator[Service]:
         stack.callback(supervisor.close)
         if settings.end_runs:
             stack.callback(supervisor.end_all)
-        readiness = Readiness(settings, store)
-        yield Service(settings, store, bell, telemetry, supervisor, desk, Histories(), readiness, Turns(), sweeps)
+        watchman = Keeper(settings, store, lines, lambda run_id: supervisor.current(run_id) is not None)
+        desk.kept = watchman.kept
+        watchman.start()
+        stack.callback(watchman.close)
+        readiness, histories, turns = Readiness(settings, store), Histories(), Turns()
+        yield Service(
+            settings, store, bell, telemetry, supervisor, desk, histories, readiness, turns, sweeps, watchman, lines
+        )
 
 
 def launcher_of(settings: Settings) -> Launcher:

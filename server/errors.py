@@ -44,8 +44,11 @@ class ServiceError(Exception):
         retryable: bool = False,
         errors: Sequence[Problem] = (),
         headers: Mapping[str, str] | None = None,
+        outcome: Mapping[str, Any] | None = None,
     ) -> None:
-        """``pointer`` is a JSON pointer into the body, or the name of a parameter or header."""
+        """``pointer`` is a JSON pointer into the body, or the name of a parameter or header; ``outcome`` is what is
+        kept of a run that has been removed.
+        """
         super().__init__(detail)
         self.status, self.headers = status, dict(headers or {})
         body: dict[str, Any] = {
@@ -62,6 +65,8 @@ class ServiceError(Exception):
             body["hint"] = hint
         if errors:
             body["errors"] = [entry(problem) for problem in errors]
+        if outcome is not None:
+            body["outcome"] = dict(outcome)
         self.body = body
 
     def response(self) -> Response:

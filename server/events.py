@@ -93,6 +93,11 @@ class WallTimeOver:
 
 
 @dataclass(frozen=True)
+class OutputOver:
+    """Its folder is larger than one may be."""
+
+
+@dataclass(frozen=True)
 class GraceOver:
     """It was asked to stop and did not."""
 
@@ -135,6 +140,7 @@ Event = (
     | WorkerRuns
     | CancelAsked
     | WallTimeOver
+    | OutputOver
     | GraceOver
     | WorkerExited
     | Found

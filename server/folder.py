@@ -7,6 +7,7 @@ import secrets
 import shutil
 import time
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from functools import reduce
 from pathlib import Path
@@ -28,6 +29,7 @@ _LETTERS = "0123456789abcdefghjkmnpqrstvwxyz"
 _NEW, _GONE = ".new-", ".gone-"
 _TELLING = (layout.SUBMISSION, layout.JOURNAL, layout.WORKER)
 """One of these is left where a run has been, whatever was damaged."""
+_PINNED, _YES, _NO = ".keep", "yes", "no"
 _UNREADABLE = "outcome.unreadable.json"
 DAMAGED = (FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError)
 """What the system says of a file that is gone, or is none any more, or not for this user."""
@@ -53,6 +55,8 @@ class Submission(msgspec.Struct, kw_only=True, frozen=True):
     """Words of the submitter."""
     profile: str = ""
     """Of the batch system; empty where there is none."""
+    priority: int = 0
+    """Among the runs of its owner."""
 
 
 class Process(msgspec.Struct, kw_only=True, frozen=True):
@@ -131,6 +135,34 @@ def purge(runs: Path, run_id: str) -> None:
     shutil.rmtree(beside, ignore_errors=True)
 
 
+def runs_in(runs: Path) -> list[Path]:
+    """The folders of all runs, oldest first."""
+    return sorted(path for path in runs.iterdir() if is_id(path.name))
+
+
+def pinned(folder: Path) -> bool:
+    """Whether the run is kept for good: by its label ``keep``, or by what was said last."""
+    if told := pin_told(folder):
+        return told == _YES
+    try:
+        return submission(folder).labels.get("keep", _NO) != _NO
+    except (OSError, msgspec.MsgspecError):
+        return False
+
+
+def pin_told(folder: Path) -> str:
+    """``yes`` or ``no`` as was said last; empty when nobody has said anything."""
+    try:
+        return (folder / _PINNED).read_text()
+    except OSError:
+        return ""
+
+
+def pin(folder: Path, keep: bool) -> None:
+    """Keeps a run for good, or no longer. Raises OSError."""
+    durable.write(folder / _PINNED, (_YES if keep else _NO).encode())
+
+
 def scan(runs: Path) -> Iterator[Path]:
     """The folders of all runs, oldest first; what a killed server left half made, or half removed, is removed."""
     for path in sorted(runs.iterdir()):
@@ -149,6 +181,16 @@ def there(path: Path) -> bool:
     except PermissionError:
         return True
     return True
+
+
+def size(folder: Path) -> int:
+    """Bytes of all files; one that goes away meanwhile has none."""
+    total = 0
+    for place, _, names in os.walk(folder):
+        for name in names:
+            with suppress(OSError):
+                total += os.lstat(os.path.join(place, name)).st_size
+    return total
 
 
 def submission(folder: Path) -> Submission:

@@ -99,6 +99,10 @@ class Holds:
         hold = self._holds.get(run_id)
         return hold is not None and hold.delay >= _LASTING
 
+    def damaged(self, run_id: str, error: Exception) -> bool:
+        """Whether the trouble is of the run's own files, and has lasted."""
+        return isinstance(error, OSError) and error.errno in DAMAGE and self.lasts(run_id)
+
     def forget(self, run_id: str) -> None:
         """The run has ended."""
         self._holds.pop(run_id, None)

@@ -22,6 +22,7 @@ from .events import (
     Launch,
     LaunchFailed,
     LaunchPutOff,
+    OutputOver,
     Run,
     Stop,
     WallTimeOver,
@@ -72,6 +73,8 @@ def advance(run: Run, event: Event, now: float) -> Next:
             return _cancel(run, now, handed)
         case WallTimeOver() if run.state in {State.STARTING, State.RUNNING}:
             return _stop(run, Cause.WALLTIME)
+        case OutputOver() if run.state in {State.STARTING, State.RUNNING}:
+            return _stop(run, Cause.STORAGE)
         case GraceOver() if run.state is State.STOPPING:
             return run, (Kill(),)
         case WorkerExited() if run.state is not State.ACCEPTED:
@@ -116,7 +119,8 @@ def _stop(run: Run, why: Cause) -> Next:
 def _exited(run: Run, event: WorkerExited, now: float) -> Next:
     told = event.outcome if event.outcome is not None and _readable(event.outcome) else None
     outcome = told or _without_outcome(run, event)
-    asked = run.stopping_for is Cause.CANCELLED or (event.reading is not None and event.reading[1] is Cause.CANCELLED)
+    said = event.reading[1] if event.reading is not None and run.stopping_for is None else None
+    asked = Cause.CANCELLED in {run.stopping_for, said}
     if outcome.state == State.CANCELLED and not asked:
         outcome = _renamed(run, event, outcome)
     return _end(run, now, outcome, written=outcome is event.outcome)
@@ -124,6 +128,9 @@ def _exited(run: Run, event: WorkerExited, now: float) -> Next:
 
 def _renamed(run: Run, event: WorkerExited, outcome: Outcome) -> Outcome:
     """A worker knows that it was stopped, not by whom: what nobody asked for is no cancellation."""
+    if run.stopping_for is Cause.STORAGE:
+        state, message = State.FAILED, "its output has passed what this server allows a run"
+        return msgspec.structs.replace(outcome, state=state, cause=Cause.STORAGE, message=message)
     if event.reading is not None:
         state, cause, message = event.reading
         return msgspec.structs.replace(outcome, state=state, cause=cause, message=message)

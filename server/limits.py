@@ -10,6 +10,7 @@ from fastapi import Request
 
 from conoid.cases.bodies import MeshFile
 from conoid.cases.estimate import Estimate
+from conoid.cases.policy import Quota
 from conoid.cases.problems import Problem
 from conoid.cases.schema import Case
 
@@ -122,15 +123,27 @@ def figures(estimate: Estimate) -> dict[str, int | float]:
 
 def wall_time(case: Case, caps: Limits) -> float | None:
     """Seconds after which the run is stopped; None: never."""
-    asked = [limit for limit in (case.run.max_wall_time, caps.wall_time) if limit is not None]
+    cost = None if caps.core_seconds is None else caps.core_seconds / case.run.ranks
+    asked = [limit for limit in (case.run.max_wall_time, caps.wall_time, cost) if limit is not None]
     return min(asked) if asked else None
+
+
+def _later(code: str, detail: str) -> ServiceError:
+    return ServiceError(429, code, detail, retryable=True, headers={"Retry-After": "60"})
+
+
+def check_output(kept: int, quota: Quota) -> None:
+    """Raises ServiceError 429 when the folders of the owner's runs, ``kept`` bytes, are as large as they may be."""
+    if quota.output_bytes is not None and kept >= quota.output_bytes:
+        detail = f"your runs have {kept} bytes on disk; this server allows {quota.output_bytes}: remove some"
+        raise _later("output_quota", detail)
 
 
 def check_room(runs: Path, open_runs: int, caps: Caps) -> None:
     """Raises ServiceError 429 when the owner has too many open runs, 507 when the disk is nearly full."""
     if open_runs >= caps.queued:
         detail = f"{open_runs} of your runs have not ended; this server allows {caps.queued}"
-        raise ServiceError(429, "queue_full", detail, retryable=True, headers={"Retry-After": "60"})
+        raise _later("queue_full", detail)
     free = shutil.disk_usage(runs).free
     if free < caps.free_disk:
         detail = f"{free} bytes are free on the server's disk; it keeps {caps.free_disk}"

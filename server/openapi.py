@@ -41,6 +41,8 @@ ANSWERS: dict[tuple[str, str], dict[int, tuple[str, str]]] = {
     ("get", "/v1/runs"): {200: (_JSON, "RunPage")},
     ("get", "/v1/runs/{run_id}"): {200: (_JSON, "RunStatus"), 304: ("", "")},
     ("delete", "/v1/runs/{run_id}"): {204: ("", "")},
+    ("post", "/v1/runs/{run_id}:keep"): {200: (_JSON, "RunStatus")},
+    ("post", "/v1/runs/{run_id}:release"): {200: (_JSON, "RunStatus")},
     ("post", "/v1/runs/{run_id}:cancel"): {202: (_JSON, "RunStatus")},
     ("post", "/v1/runs/{run_id}:checkpoint"): {202: (_JSON, "RunStatus")},
     ("post", "/v1/runs/{run_id}:snapshot"): {202: (_JSON, "RunStatus")},
@@ -83,6 +85,8 @@ def refusals(method: str, path: str) -> set[int]:
         found |= {408, 413, 415, 422, 429, 507}
     if path.endswith((":checkpoint", ":snapshot")) or method == "delete":
         found |= {409}
+    if path.endswith((":keep", ":release")):
+        found |= {507}
     if path.endswith(("{path}", "{rank}")):
         found |= {416}
     return found

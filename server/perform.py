@@ -113,7 +113,9 @@ class Performer:
             if not folder.is_as_accepted(path, made):
                 raise DamagedError(f"{made.case_file} is not what was accepted")
             case = path / made.case_file
-            worker = self._launcher.start(Job(run.id, run.ranks, case, path, access, made.profile, made.wall_time))
+            group = f"{made.owner}/{made.labels['sweep']}" if "sweep" in made.labels else ""
+            job = Job(run.id, run.ranks, case, path, access, made.profile, made.wall_time, group)
+            worker = self._launcher.start(job)
         except (OSError, msgspec.MsgspecError) as error:
             raise DamagedError(str(error)) from error
         return self._watch(path, worker, made.wall_time)
@@ -125,7 +127,7 @@ class Performer:
         left = (
             None if allowed is None or self._launcher.queues else allowed + self._settings.grace - folder.runs_for(path)
         )
-        return Watch(path, worker, left)
+        return Watch(path, worker, left, self._settings.caps.output_bytes)
 
 
 def _allowed(path: Path) -> float | None:

@@ -6,7 +6,9 @@ from typing import Annotated
 from fastapi import Depends, Request
 
 from .bell import Bell
+from .farewells import Farewells
 from .history import Histories
+from .keeper import Keeper
 from .reader import Turns
 from .readiness import Readiness
 from .settings import Settings
@@ -31,6 +33,8 @@ class Service:
     readiness: Readiness
     turns: Turns
     sweeps: Sweeps
+    keeper: Keeper
+    farewells: Farewells
 
 
 def _service(request: Request) -> Service:

@@ -44,6 +44,8 @@ class Caps:
     """s; a case that asks for less is stopped at its own ``run.max_wall_time``."""
     queued: int = 1000
     """Open runs of one owner."""
+    output_bytes: int | None = None
+    """Of a run's folder; a run that goes beyond is stopped."""
     free_disk: int = 1 << 30
     """Bytes that must be free under the runs' folder before a run is accepted."""
 
@@ -103,6 +105,12 @@ def loopback(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return False
+
+
+def capped(site: Site) -> dict[str, float]:
+    """The caps that a site's settings file names."""
+    named = {name: getattr(site.caps, name) for name in site.caps.__struct_fields__}
+    return {name: cap for name, cap in {**named, "queued": site.quota.queued}.items() if cap is not None}
 
 
 def site_of(path: Path | None) -> Site:

@@ -30,6 +30,8 @@ class Problem(msgspec.Struct, kw_only=True, omit_defaults=True):
     pointer: str = ""
     hint: str = ""
     errors: list[ProblemEntry] = []
+    outcome: dict[str, Any] = {}
+    """What is kept of a run that has been removed."""
 
 
 class Receipt(msgspec.Struct, kw_only=True):
@@ -211,6 +213,8 @@ class Me(msgspec.Struct, kw_only=True):
     zenoh: ZenohAccess | None
     slots: Slots
     limits: dict[str, float | None]
+    quota: dict[str, float | None]
+    used: dict[str, float]
 
 
 class Health(msgspec.Struct, kw_only=True):

@@ -15,6 +15,7 @@ from conoid.cases.run import Cause, State
 
 from .events import Run
 from .settings import StartError
+from .usage import Took
 
 _meta = sa.MetaData()
 _runs = sa.Table(
@@ -120,6 +121,11 @@ class Store:
         if connection.execute(sa.update(_runs).where(_runs.c.id == run.id).values(values)).rowcount == 0:
             connection.execute(sa.insert(_runs).values(values))
 
+    def all(self) -> list[Run]:
+        """Every run of every owner."""
+        with self._engine.connect() as connection:
+            return [_run(row) for row in connection.execute(sa.select(_runs)).mappings()]
+
     def get(self, run_id: str) -> Run | None:
         """The run, whoever owns it."""
         with self._engine.connect() as connection:
@@ -147,10 +153,18 @@ class Store:
         with self._engine.connect() as connection:
             return set(connection.execute(sa.select(_runs.c.id).where(_runs.c.state.not_in(_OPEN))).scalars())
 
-    def open_ids(self) -> set[str]:
-        """The ids of all runs that are not known to have ended."""
+    def open(self) -> dict[str, Run]:
+        """All runs that are not known to have ended, by id."""
+        query = sa.select(_runs).where(_runs.c.state.in_(_OPEN))
         with self._engine.connect() as connection:
-            return set(connection.execute(sa.select(_runs.c.id).where(_runs.c.state.in_(_OPEN))).scalars())
+            return {row["id"]: _run(row) for row in connection.execute(query).mappings()}
+
+    def taken(self) -> list[Took]:
+        """What every run that has ended took."""
+        query = sa.select(_runs.c.owner, _runs.c.ranks, _runs.c.started, _runs.c.finished)
+        ended = query.where(_runs.c.state.not_in(_OPEN), _runs.c.started > 0.0)
+        with self._engine.connect() as connection:
+            return [Took(*row) for row in connection.execute(ended)]
 
     def count_by_state(self) -> Mapping[State, int]:
         """How many runs are in each state; no entry for none."""

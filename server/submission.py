@@ -2,7 +2,8 @@
 
 import re
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import msgspec
@@ -28,6 +29,17 @@ _MOST_LABELS = 16
 _KEY = re.compile(r"[\x21-\x7e]{1,255}")
 
 
+@dataclass(frozen=True)
+class Wishes:
+    """What a submitter says of a run beside its case."""
+
+    labels: Mapping[str, str] = field(default_factory=dict)
+    profile: str = ""
+    """Of a batch system; empty: what the case names, or the site's default."""
+    priority: int = 0
+    """Among his own runs."""
+
+
 class Desk:
     """Where cases are handed in. Methods may be called from any thread."""
 
@@ -36,6 +48,8 @@ class Desk:
         self._settings, self._store, self._supervisor = settings, store, supervisor
         self._reader, self._limits = the_reader(), limits.of(settings)
         self._lock = threading.Lock()
+        self.kept: Callable[[str], int] = lambda owner: 0
+        """Bytes of the folders of an owner's runs."""
 
     def read(self, body: bytes, content_type: str) -> Reading:
         """The case in ``body``. Raises CaseError with every problem, ServiceError 415, 422, 503."""
@@ -43,8 +57,7 @@ class Desk:
         return self._reader.read(Question(body=body, json=kind == "case.json", limits=self._limits))
 
     def submit(
-        self, owner: str, body: bytes, content_type: str, key: str | None, labels: Mapping[str, str] | None = None,
-        profile: str = "",
+        self, owner: str, body: bytes, content_type: str, key: str | None, wishes: Wishes | None = None
     ) -> dict[str, Any]:  # fmt: skip
         """Accepts a run and returns its receipt: the same one for the same key and body.
 
@@ -55,7 +68,8 @@ class Desk:
                 400, "bad_key", f"Idempotency-Key {key[:80]!r}: 1 to 255 visible ASCII characters",
                 pointer="Idempotency-Key",
             )  # fmt: skip
-        self._profile(profile, named=True)
+        wishes = wishes or Wishes()
+        self._profile(wishes.profile, named=True)
         digest = folder.digest_of(_file_name(content_type), body)
         if earlier := self._earlier(owner, key, digest):
             return earlier
@@ -71,8 +85,7 @@ class Desk:
                 key,
                 digest,
                 reading,
-                labels or {},
-                self._profile(profile or reading.profile),
+                replace(wishes, profile=self._profile(wishes.profile or reading.profile)),
             )
 
     def _profile(self, name: str, *, named: bool = False) -> str:
@@ -106,15 +119,17 @@ class Desk:
 
     def _accept(
         self, owner: str, body: bytes, content_type: str, key: str | None, digest: str, reading: Reading,
-        labels: Mapping[str, str], profile: str,
+        wishes: Wishes,
     ) -> dict[str, Any]:  # fmt: skip
         caps = self._settings.caps
+        limits.check_output(self.kept(owner), self._settings.site.quota)
         limits.check_room(self._settings.runs, self._store.open_runs(owner), caps)
         run_id, now = folder.new_id()
         made = Submission(
             id=run_id, owner=owner, name=reading.name, title=reading.title, ranks=reading.ranks, submitted=now,
             case_file=_file_name(content_type), body_sha256=digest, idempotency_key=key,
-            wall_time=reading.wall_time, estimate=reading.estimate, labels=dict(labels), profile=profile,
+            wall_time=reading.wall_time, estimate=reading.estimate, labels=dict(wishes.labels),
+            profile=wishes.profile, priority=wishes.priority,
         )  # fmt: skip
         run = folder.first(made)
         try:

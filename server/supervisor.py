@@ -7,23 +7,26 @@ import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 from dataclasses import dataclass
-from pathlib import Path
 
 from sqlalchemy.exc import SQLAlchemyError
 
 from conoid.cases.messages import Progress
 from conoid.cases.run import State
 
-from . import folder, recovery, waiting
+from . import waiting
 from .events import ONCE, Admitted, Broken, CancelAsked, Event, Granted, LaunchPutOff, Run
-from .holds import DAMAGE, Holds, words
+from .holds import Holds, words
 from .index import Index
 from .launch import Launcher, LaunchError
+from .leavings import Leavings
 from .lifecycle import advance
 from .perform import Performer, of_launch
+from .recovery import Left
 from .settings import Settings
 from .store import Store
 from .telemetry import Telemetry, TelemetryError
+from .waiting import Need
+from .waitlist import Held, Waitlist
 
 _log = logging.getLogger("conoid.server")
 _LOOK = 0.02
@@ -65,8 +68,9 @@ class Supervisor:
         self._batch = launcher.queues
         self._holds = Holds()
         self._index = Index(store)
-        self._left: dict[Path, str] = {}
-        self.held_back: Callable[[str, Iterable[str]], bool] = lambda run_id, active: False
+        self._leavings = Leavings(settings.runs, store, self._index, launcher, self._found)
+        self._waitlist = Waitlist(settings, launcher.queues)
+        self.held_back: Callable[[Need, Iterable[Need]], str] = lambda need, active: ""
         self._thread = threading.Thread(target=self._work, name="supervisor", daemon=True)
         self._leaving = False
         self._tidied = time.monotonic()
@@ -77,6 +81,7 @@ class Supervisor:
         """Takes up what an earlier server left, then begins to work. Raises OSError, SQLAlchemyError."""
         self._launcher.tidy()
         self._take_up()
+        self._waitlist.usage.begin(self._store.taken())
         self._thread.start()
 
     def close(self) -> None:
@@ -101,6 +106,7 @@ class Supervisor:
     def admit(self, run: Run) -> None:
         """A new run, which is on disk and in the store."""
         self._open[run.id] = run
+        self._waitlist.changed()
         self._inbox.put(None)
 
     def cancel(self, run_id: str) -> None:
@@ -134,10 +140,15 @@ class Supervisor:
         watch = self._watches.get(run_id)
         if watch is not None and (note := watch.worker.note()):
             return note
-        return waiting.reason(run_id, tuple(self._open.values()), self.slots_used(), self._settings.slots)
+        return self._waitlist.why(run_id)
 
-    def _in_state(self, state: State) -> list[Run]:
-        return waiting.in_state(tuple(self._open.values()), state)
+    def running(self, owner: str) -> int:
+        """Runs of an owner that have cores, or were handed over."""
+        return sum(run.owner == owner for run_id in tuple(self._watches) if (run := self._open.get(run_id)))
+
+    def used(self, owner: str) -> float:
+        """Core-seconds of an owner that count in the queue."""
+        return self._waitlist.used(owner, tuple(self._open.values()))
 
     def stranded(self) -> list[str]:
         """Open runs that have neither a watch nor a place in the queue nor a timer: none, at any time."""
@@ -160,7 +171,7 @@ class Supervisor:
             self._attend(run_id)
         for run_id, event in self._holds.due():
             self._apply(run_id, event)
-        for run in self._in_state(State.ACCEPTED):
+        for run in waiting.in_state(tuple(self._open.values()), State.ACCEPTED):
             if not self._holds.held(run.id):
                 self._apply(run.id, Admitted())
         self._grant()
@@ -190,21 +201,17 @@ class Supervisor:
             self._ring(run_id)
 
     def _grant(self) -> None:
-        """Starts the first of the queue while it fits: a large run is not overtaken by small ones for ever. One that
-        cannot be started now holds nobody up; nothing is announced that could not be written.
+        """Starts those whose turn it is. One that cannot be started now holds nobody up; nothing is announced that
+        could not be written.
         """
-        for run in self._in_state(State.QUEUED):
-            held = self._holds.held(run.id) or self.held_back(run.id, self._watches)
-            if held or run.id in self._watches:
-                continue
-            if self.slots_used() + run.ranks > self._settings.slots:
-                return
+        held = Held(self._holds.held, self.held_back)
+        for run_id in self._waitlist.turn(tuple(self._open.values()), tuple(self._watches), held):
             try:
-                self._hands.probe(run.id)
+                self._hands.probe(run_id)
             except OSError as error:
-                self._fail(run, Granted(self._batch), error)
+                self._fail(self._open[run_id], Granted(self._batch), error)
             else:
-                self._apply(run.id, Granted(self._batch))
+                self._apply(run_id, Granted(self._batch))
 
     def _apply(self, run_id: str, event: Event) -> Exception | None:
         """One step of a run; what kept it from being made, if anything.
@@ -239,16 +246,14 @@ class Supervisor:
         if not isinstance(event, Broken):
             if self._hands.gone(run.id):
                 return self._apply(run.id, Broken(_GONE))
-            if self._damaged(run.id, error) and not self._hands.lives(run.id) and self._hands.beyond_use(run.id):
+            if self._holds.damaged(run.id, error) and not self._hands.lives(run.id) and self._hands.beyond_use(run.id):
                 return self._apply(run.id, Broken(f"{_DAMAGED}: {words(error)}"))
+        self._waitlist.changed()
         return self._holds.put_off(run.id, error, event if isinstance(event, ONCE) else None)
-
-    def _damaged(self, run_id: str, error: Exception) -> bool:
-        """Whether it is a matter of the run's own files, for some time."""
-        return isinstance(error, OSError) and error.errno in DAMAGE and self._holds.lasts(run_id)
 
     def _settle(self, run: Run) -> None:
         """The step is made: memory first, then the database, then those who wait for news."""
+        self._waitlist.settled(self._open.get(run.id), run)
         self._open[run.id] = run
         if run.state.final:
             self._watches.pop(run.id, None)
@@ -265,8 +270,7 @@ class Supervisor:
     def _tidy(self) -> None:
         """Does again what failed before, and lets the router know the tokens as they are."""
         self._tidied = time.monotonic()
-        for path in tuple(self._left):
-            self._take_up_run(path)
+        self._leavings.again()
         for run_id in tuple(self._index.unsaved):
             self._save(self._open[run_id])
         for run_id, run in tuple(self._open.items()):
@@ -274,7 +278,7 @@ class Supervisor:
                 self._apply(run_id, Broken(_GONE))
         for run_id in self.stranded():
             _log.error("run %s was not looked after; it is taken up again", run_id)
-            self._take_up_run(self._settings.runs / run_id)
+            self._leavings.take_up(self._settings.runs / run_id)
         if self._telemetry is not None:
             try:
                 self._telemetry.follow(self._store.tokens())
@@ -283,30 +287,14 @@ class Supervisor:
 
     def _take_up(self) -> None:
         """Makes memory and database agree with the runs' folders, and goes on with what an earlier server left."""
-        ended, last = self._store.ended(), ""
-        for path in folder.scan(self._settings.runs):
-            last = path.name
-            if path.name not in ended:
-                self._take_up_run(path)
-        if last:
-            folder.begin_after(last)
-        for run_id in self._store.open_ids() - self._open.keys():
-            run = self._store.get(run_id)
-            if run is not None and self._hands.gone(run_id):
+        self._leavings.all()
+        for run_id, run in self._store.open().items():
+            if run_id not in self._open and self._hands.gone(run_id):
                 self._open[run_id] = run
                 self._apply(run_id, Broken(_GONE))
 
-    def _take_up_run(self, path: Path) -> None:
-        """What fails is logged once and comes up again with the next tidying."""
-        told = self._left.pop(path, "")
-        try:
-            left = recovery.look(path, self._store.get(path.name), self._launcher)
-            self._index.add(left.run, left.key)
-        except (OSError, ValueError, SQLAlchemyError) as error:
-            self._left[path] = words(error)
-            if told != words(error):
-                _log.error("run %s cannot be taken up: %s", path.name, words(error))
-            return
+    def _found(self, left: Left) -> None:
+        """A run that an earlier server has left."""
         if left.worker is not None:
             self._hands.found[left.run.id] = left.worker
         if not left.run.state.final:

@@ -17,7 +17,8 @@ from conoid.cases.load import CaseError, Problem, apply_overrides, json_data
 from . import durable, folder
 from .errors import ServiceError, invalid_case
 from .settings import Settings
-from .submission import Desk
+from .submission import Desk, Wishes
+from .waiting import Need
 
 FOLDER = "sweeps"
 _MOST_POINTS, _MOST_BYTES = 1000, 16 << 20
@@ -56,6 +57,7 @@ class Sweeps:
         self._folder, self._desk = settings.runs / FOLDER, desk
         self._lock = threading.Lock()
         self._plans: dict[str, Plan] = {}
+        self._filling = ""
         for path in sorted(self._folder.glob("*.json")):
             try:
                 self._keep(msgspec.json.decode(path.read_bytes(), type=Plan))
@@ -82,14 +84,25 @@ class Sweeps:
             if plan is None:
                 plan = self._new(owner, body, key, digest)
                 self._write(plan)
-            return self._fill(plan, bodies)
+            self._filling = plan.id
+            try:
+                return self._fill(plan, bodies)
+            finally:
+                self._filling = ""
 
-    def held(self, run_id: str, active: Iterable[str]) -> bool:
-        """Whether a run waits because as many of its sweep as may run at a time are in ``active``."""
-        for plan in tuple(self._plans.values()):
-            if plan.at_once is not None and run_id in plan.runs:
-                return len(set(plan.runs).intersection(active)) >= plan.at_once
-        return False
+    def held(self, need: Need, active: Iterable[Need]) -> str:
+        """Why a run waits for its sweep: for all its runs to be there, or for those that are ``active``. The label of
+        a run says which sweep is meant.
+        """
+        plan = self.get(need.sweep, need.owner)
+        if plan is None:
+            return ""
+        if plan.id == self._filling:
+            return "its sweep is being handed in"
+        if plan.at_once is None:
+            return ""
+        own = sum(one.sweep == need.sweep and one.owner == need.owner for one in active)
+        return f"{own} runs of its sweep are running, as many as may at a time" if own >= plan.at_once else ""
 
     def _earlier(self, owner: str, key: str | None, digest: str) -> Plan | None:
         found = [plan for plan in self.of(owner) if key is not None and plan.key == key]
@@ -122,7 +135,7 @@ class Sweeps:
     def _fill(self, plan: Plan, bodies: Sequence[bytes]) -> Plan:
         for n, body in enumerate(bodies):
             labels = {"sweep": plan.id, "point": str(n)}
-            receipt = self._desk.submit(plan.owner, body, _JSON, f"sweep-{plan.id}-{n}", labels)
+            receipt = self._desk.submit(plan.owner, body, _JSON, f"sweep-{plan.id}-{n}", Wishes(labels))
             plan = msgspec.structs.replace(plan, runs=[*plan.runs, receipt["id"]])
             self._plans[plan.id] = plan
         self._write(plan)

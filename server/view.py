@@ -65,8 +65,12 @@ def outcome(path: Path) -> Outcome | None:
 
 def labels(service: Service, run: Run) -> dict[str, str]:
     """Those it was submitted with; none where the folder of the run has been removed or damaged."""
-    made = _submission(service.settings.runs / run.id)
-    return made.labels if made else {}
+    path = service.settings.runs / run.id
+    made = _submission(path)
+    if made is None:
+        return {}
+    told = folder.pin_told(path)
+    return {**made.labels, "keep": told} if told else made.labels
 
 
 def brief(service: Service, run: Run) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from conoid.cases.messages import Progress, Status
 from conoid.cases.run import State
 
 from . import farewell, folder, journal
-from .events import Event, GraceOver, WallTimeOver, WorkerExited, WorkerRuns, WorkerStarts, WorkerWaits
+from .events import Event, GraceOver, OutputOver, WallTimeOver, WorkerExited, WorkerRuns, WorkerStarts, WorkerWaits
 from .launch import Phase, Worker
 
 _FAREWELL = 10.0
@@ -20,6 +20,8 @@ _FAREWELL = 10.0
 killed from outside."""
 _PATIENCE = 1.0
 """s between two looks at a worker that waits for its cores in a queue, of which there may be a thousand. Chosen."""
+_WEIGHED = 5.0
+"""s between two looks at the size of a run's folder. Chosen: some hundred files take milliseconds."""
 
 _progress = msgspec.json.Decoder(Progress)
 _status = msgspec.json.Decoder(Status)
@@ -28,8 +30,11 @@ _status = msgspec.json.Decoder(Status)
 class Watch:
     """Looks at a worker a few dozen times a second; says what happened to it as events."""
 
-    def __init__(self, run_folder: Path, worker: Worker, left: float | None) -> None:
-        """``left`` is the wall time, s, that the run may still take. It is measured by a clock that nobody sets."""
+    def __init__(self, run_folder: Path, worker: Worker, left: float | None, most: int | None = None) -> None:
+        """``left`` is the wall time, s, that the run may still take. It is measured by a clock that nobody sets.
+        ``most``: bytes that its folder may have.
+        """
+        self._most, self._weigh_at = most, time.monotonic() + _WEIGHED
         self.worker, self._folder = worker, run_folder
         self._tail = journal.Tail(run_folder / layout.JOURNAL)
         self._deadline = None if left is None else time.monotonic() + left
@@ -65,6 +70,11 @@ class Watch:
         elif self._deadline is not None and now >= self._deadline:
             self._deadline = None
             yield WallTimeOver()
+        elif self._most is not None and now >= self._weigh_at:
+            self._weigh_at = now + _WEIGHED
+            if folder.size(self._folder) > self._most:
+                self._most = None
+                yield OutputOver()
 
     def _turn(self) -> Iterator[Event]:
         """Whether the worker has got its cores, or has to wait for them again."""

@@ -57,11 +57,10 @@ class Told:
 
 def main(arguments: list[str]) -> int:
     """The exit code of the job: that of the ranks; 0 when another job has the run, or when it waits again."""
-    folder, name = Path(arguments[0]), arguments[1]
     told = Told()
     told.listen()
+    folder, number, name = *_place(Path(arguments[0]), os.environ), arguments[1]
     job = batch.read_job(folder)
-    number = os.environ.get("SLURM_JOB_ID", str(os.getpid()))
     if job is None or job.name != name or not claim(folder, job, number):
         print(f"job {number}: another job has this run", flush=True)
         return 0
@@ -76,6 +75,21 @@ def main(arguments: list[str]) -> int:
     if (folder / layout.OUTCOME).exists() or not (told.raised or code == ExitCode.INTERRUPTED):
         return code
     return _interrupted(folder, job, number, latest(folder) > before) or code
+
+
+def _place(given: Path, env: Mapping[str, str]) -> tuple[Path, str]:
+    """The run's folder, and the number of the job as the queue has it. A task of an array finds its folder by its
+    place, and from then on writes into that folder's log. Raises OSError.
+    """
+    task = env.get("SLURM_ARRAY_TASK_ID", "")
+    if not task or not (given / layout.ARRAY).exists():
+        return given, env.get("SLURM_JOB_ID", str(os.getpid()))
+    folder = Path(msgspec.json.decode((given / layout.ARRAY).read_bytes(), type=list[str])[int(task)])
+    log = os.open(folder / layout.LOGS / layout.LAUNCHER_LOG, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
+    for stream in (1, 2):
+        os.dup2(log, stream)
+    os.close(log)
+    return folder, f"{env['SLURM_ARRAY_JOB_ID']}_{task}"
 
 
 def claim(folder: Path, job: Job, number: str) -> bool:

@@ -43,6 +43,8 @@ class Job:
     """Of the batch system; empty: the site's default."""
     wall_time: float | None = None
     """s that the run may take from its start."""
+    group: str = ""
+    """Runs that belong together, such as those of a sweep, and may be handed over as one; empty: it is alone."""
 
 
 @dataclass(frozen=True)

@@ -32,9 +32,13 @@ _READINGS: dict[str, Reading] = {
 class SlurmWorker:
     """Its first methods may be called from any thread and wait for nothing; ``turn`` belongs to the launcher's."""
 
-    def __init__(self, folder: Path, job: Job, site: batch.Slurm) -> None:
-        """``job`` may be one that an earlier server has handed over, or was about to."""
-        self._folder, self._job, self._site = folder, job, site
+    def __init__(self, folder: Path, job: Job, site: batch.Slurm, group: str = "") -> None:
+        """``job`` may be one that an earlier server has handed over, or was about to. ``group``: runs that are handed
+        over as one array where they start together; only of one that nobody has tried to hand over yet.
+        """
+        self.folder = self._folder = folder
+        self._job, self._site = job, site
+        self.group, self.since = group, time.monotonic()
         self._entry: Entry | None = None
         self._exit: Exit | None = None
         self._stop, self._kill, self._told = (folder / layout.STOP_REQUEST).exists(), False, ""
@@ -42,8 +46,23 @@ class SlurmWorker:
 
     @property
     def name(self) -> str:
-        """Of the job; no other has it."""
-        return self._job.name
+        """Of the job, and its place in an array; no other has it."""
+        return self._job.key
+
+    @property
+    def record(self) -> Job:
+        """As it stands in the folder."""
+        return self._job
+
+    @property
+    def fresh(self) -> bool:
+        """True while it may become a task of an array: nobody has tried to hand it over."""
+        return bool(self.group) and not self._job.job and not self._stop
+
+    @property
+    def waits_for_array(self) -> bool:
+        """True when it is to be handed over as a task of an array."""
+        return not self._job.job and self._job.task is not None and not self._stop and self._exit is None
 
     # From any thread --------------------------------------------------------------------------------------------------
 
@@ -108,6 +127,9 @@ class SlurmWorker:
         A controller that has crashed may have forgotten that it has started a job, which then waits in vain.
         """
         self._away = 0.0
+        if self.waits_for_array:
+            return
+        self.group = ""
         if not self._job.job:
             self._hand_over()
             return
@@ -129,20 +151,27 @@ class SlurmWorker:
 
     def _hand_over(self) -> None:
         if self._stop:
-            known = slurm.jobs(self._site.bin, self._job.name)
+            known = [entry for entry in slurm.jobs(self._site.bin, self._job.name) if entry.name == self._job.key]
             if known:
-                self._note(job=known[0].job)
+                self.write_down(job=known[0].job)
             else:
                 self._exit = Exit(None, False, "")
             return
         profile = batch.profile_of(self._site, self._job.profile)[1]
         try:
-            self._note(job=slurm.submit(self._site.bin, self._folder, self._job, profile))
+            self.write_down(job=slurm.submit(self._site.bin, self._folder, self._job, profile))
         except slurm.RefusedError as error:
             self._exit = Exit(None, False, "", (State.FAILED, Cause.LAUNCH, f"Slurm refuses the job: {error}"))
 
-    def _note(self, **changes: object) -> None:
-        """The record, on disk before anything follows from it."""
+    def leave_array(self) -> None:
+        """It is handed over alone, under a name of its own: the array was refused. Raises OSError."""
+        job, self.group = self._job, ""
+        profile = batch.profile_of(self._site, job.profile)
+        fresh = batch.new_job(job.run, job.ranks, profile, job.command, job.submitted, job.attempt, job.bin)
+        self.write_down(name=fresh.name, task=None, array="")
+
+    def write_down(self, **changes: object) -> None:
+        """The record, on disk before anything follows from it. Raises OSError."""
         job = msgspec.structs.replace(self._job, **changes)
         whole.write(self._folder / layout.JOB, batch.to_json(job))
         self._job = job
@@ -155,7 +184,7 @@ class SlurmWorker:
             if extra.state not in slurm.FINAL:
                 slurm.cancel(self._site.bin, extra.job)
         if ordered and ordered[0].job != self._job.job:
-            self._note(job=ordered[0].job)
+            self.write_down(job=ordered[0].job)
         return ordered[0] if ordered else None
 
     def _look_for_it(self) -> None:
@@ -169,7 +198,7 @@ class SlurmWorker:
             self._again("Slurm has forgotten the job")
         else:
             self._missing = 0
-            self._note(job="")
+            self.write_down(job="")
 
     def _end(self, entry: Entry) -> None:
         """Its job is over; the folder says what that means."""
@@ -178,7 +207,7 @@ class SlurmWorker:
         begun = bool(slurm.begun(self._folder, self._job))
         if not there and begun and (slurm.held(self._folder) or time.monotonic() - self._ended < _LAG):
             return
-        self._note(accounting=slurm.accounting(self._site.bin, entry.job))
+        self.write_down(accounting=slurm.accounting(self._site.bin, entry.job))
         left = (self._folder / layout.INTERRUPTED).exists() and entry.state != "CANCELLED"
         if not there and (left or entry.state in {"PREEMPTED", "NODE_FAIL", "BOOT_FAIL"}):
             self._again(f"job {entry.job} ended as {entry.state}")

@@ -27,6 +27,8 @@ _LAST_WORDS, _LOG_TAIL = 300, 1 << 14
 Chosen."""
 _BURIAL = 1.0
 """s for which a killed launcher is waited for, so that it leaves no zombie. Chosen: it takes milliseconds."""
+_FRESH = 1.0
+"""s for which a look at all processes holds. What is looked for was started by a server that is dead. Chosen."""
 _HOUR = 3600.0
 """s after which shared memory that no process maps is taken for left over: no launch takes that long to map it."""
 
@@ -39,6 +41,8 @@ class LocalLauncher:
     def __init__(self, settings: Settings) -> None:
         """Takes the two commands from ``settings``."""
         self._mpiexec, self._worker = settings.mpiexec, settings.worker
+        self._living: dict[str, set[int]] = {}
+        self._looked = -_FRESH
 
     def start(self, job: Job) -> Worker:
         """Starts the ranks; their terminal output goes to log/launcher.log. Raises LaunchError."""
@@ -64,7 +68,7 @@ class LocalLauncher:
         """By its record; for a server that was killed between the launch and the record, by its environment."""
         process = run_folder.process(folder)
         if process is None:
-            leader = processes.leader_of(run)
+            leader = processes.leader_of(self._members(run))
             if leader is None:
                 return Trace(None, False, False)
             process = _record(leader, processes.oom_kills())
@@ -73,6 +77,12 @@ class LocalLauncher:
         worker = LocalWorker(run, folder, process)
         rebooted = process.boot != processes.boot()
         return Trace(worker if not rebooted and worker.alive() else None, True, rebooted)
+
+    def _members(self, run: str) -> set[int]:
+        """The processes of a run; a thousand runs are found with one look at all processes."""
+        if time.monotonic() > self._looked + _FRESH:
+            self._living, self._looked = processes.of_all_runs(), time.monotonic()
+        return self._living.get(run, set())
 
     def tidy(self) -> None:
         """MPICH's ranks share memory through files that a kill leaves behind, 2 MB each time."""

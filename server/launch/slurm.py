@@ -13,6 +13,7 @@ from conoid.cases.slurm import Entry
 
 from ..settings import Settings
 from . import DamagedError, Job, LaunchError, Trace
+from .arrays import Arrays
 from .handed import SlurmWorker
 from .local import find_mpiexec
 
@@ -27,6 +28,7 @@ class SlurmLauncher:
     def __init__(self, settings: Settings, site: batch.Slurm) -> None:
         """The thread starts with the first run."""
         self._mpiexec, self._worker, self._site = settings.mpiexec, settings.worker, site
+        self._arrays = Arrays(settings.runs, site)
         self._workers: dict[str, SlurmWorker] = {}
         self._lock, self._thread = threading.Lock(), threading.Thread(target=self._work, name="slurm", daemon=True)
 
@@ -43,7 +45,7 @@ class SlurmLauncher:
         except (OSError, ValueError) as error:
             failed = DamagedError if isinstance(error, OSError) else LaunchError
             raise failed(f"the job cannot be written down: {error}") from None
-        return self._take(job.run, SlurmWorker(job.folder, record, self._site))
+        return self._take(job.run, SlurmWorker(job.folder, record, self._site, job.group))
 
     def find(self, run: str, folder: Path) -> Trace:
         """By its record: what that says is handed over, or was about to be. Raises OSError, ValueError."""
@@ -106,9 +108,18 @@ class SlurmLauncher:
             for _, worker in workers:
                 worker.silent(str(error))
             return
+        growing = self._hand_over_arrays([worker for _, worker in workers])
         for run, worker in workers:
-            if not self._attend(run, worker, found.get(worker.name, [])):
+            if worker.name not in growing and not self._attend(run, worker, found.get(worker.name, [])):
                 return
+
+    def _hand_over_arrays(self, workers: list[SlurmWorker]) -> set[str]:
+        """The names of those that are handed over later."""
+        try:
+            return self._arrays.hand_over(workers)
+        except (slurm.SlurmError, OSError) as error:
+            _log.warning("an array is handed over later: %s", error)
+            return {worker.name for worker in workers if worker.fresh or worker.waits_for_array}
 
     def _attend(self, run: str, worker: SlurmWorker, entries: list[Entry]) -> bool:
         """False when Slurm has not answered, so that nobody else waits for it."""

@@ -16,7 +16,7 @@ router = APIRouter()
 
 @router.get("/v1/me")
 def me(request: Request, service: ServiceOf, identity: Annotated[Identity, Depends(identify)]) -> dict[str, Any]:
-    """Name and scopes; how to subscribe over Zenoh (null: not possible); slots and caps."""
+    """Name and scopes; how to subscribe over Zenoh (null: not possible); slots, caps, quota and what is used of it."""
     caps = service.settings.caps
     return {
         "owner": identity.owner,
@@ -31,7 +31,26 @@ def me(request: Request, service: ServiceOf, identity: Annotated[Identity, Depen
             "memory_bytes": caps.memory,
             "core_seconds": caps.core_seconds,
             "wall_time": caps.wall_time,
+            "output_bytes": caps.output_bytes,
         },
+        "quota": _quota(service),
+        "used": _used(service, identity.owner),
+    }
+
+
+def _quota(service: Service) -> dict[str, float | None]:
+    """What one user may take; null: no limit."""
+    quota = service.settings.site.quota
+    named = {name: getattr(quota, name) for name in quota.__struct_fields__}
+    return {**named, "queued": service.settings.caps.queued}
+
+
+def _used(service: Service, owner: str) -> dict[str, float]:
+    return {
+        "queued": service.store.open_runs(owner),
+        "running": service.supervisor.running(owner),
+        "core_seconds": service.supervisor.used(owner),
+        "output_bytes": service.keeper.kept(owner),
     }
 
 

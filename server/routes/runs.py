@@ -5,11 +5,13 @@ from collections.abc import Iterator
 from itertools import islice
 from typing import Annotated, Any
 
+import msgspec
 from fastapi import APIRouter, Depends, Header, Query, Request, Response
 from fastapi.responses import JSONResponse
 from starlette.concurrency import run_in_threadpool
 
 from conoid.cases import layout
+from conoid.cases.policy import PRIORITY
 from conoid.cases.run import State
 
 from .. import folder, openapi, view
@@ -18,7 +20,7 @@ from ..errors import ServiceError, not_found
 from ..events import Run
 from ..limits import read_body
 from ..service import Service, ServiceOf
-from ..submission import labels_of
+from ..submission import Wishes, labels_of
 
 router = APIRouter()
 Body = Annotated[bytes, Depends(read_body)]
@@ -35,12 +37,13 @@ async def submit(
     idempotency_key: Annotated[str | None, Header()] = None,
     label: Annotated[list[str] | None, Query(description="NAME=VALUE, by which the run is found again")] = None,
     profile: Annotated[str, Query(description="of the site's batch system; the site's default when empty")] = "",
+    priority: Annotated[int, Query(ge=-PRIORITY, le=PRIORITY, description="among your own runs")] = 0,
 ) -> Response:
     """Takes a case as TOML or JSON. The same Idempotency-Key and body give the same run and the same answer."""
-    labels = labels_of(label or ())
+    wishes = Wishes(labels_of(label or ()), profile, priority)
     async with service.turns.turn(identity.owner):
         receipt = await run_in_threadpool(
-            service.desk.submit, identity.owner, body, content_type, idempotency_key, labels, profile
+            service.desk.submit, identity.owner, body, content_type, idempotency_key, wishes
         )
     return JSONResponse(receipt, 202, {"Location": receipt["url"]})
 
@@ -95,8 +98,18 @@ def find(service: Service, identity: Identity, run_id: str) -> Run:
     if run is None or run.owner != identity.owner:
         raise not_found(f"run {run_id[:40]!r}")
     if run.state.final and not (service.settings.runs / run.id).is_dir():
-        raise ServiceError(410, "gone", f"run {run.id}: its folder has been removed; it ended as {run.state.value}")
+        raise _gone(service, run)
     return run
+
+
+def _gone(service: Service, run: Run) -> ServiceError:
+    """410 with what is kept of the run."""
+    line = service.farewells.get(run.id)
+    why = f" ({line.why})" if line is not None else ""
+    return ServiceError(
+        410, "gone", f"run {run.id}: its folder has been removed{why}; it ended as {run.state.value}",
+        outcome=msgspec.to_builtins(line) if line is not None else None,
+    )  # fmt: skip
 
 
 @router.get("/v1/runs/{run_id}")
@@ -136,12 +149,32 @@ def purge(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
     if not run.state.final or service.supervisor.current(run.id) is not None:
         raise ServiceError(409, "not_ended", f"run {run.id} is {run.state.value}; a run that has ended can be removed")
     try:
-        folder.purge(service.settings.runs, run.id)
+        service.keeper.remove(run, f"by {identity.owner}")
     except FileNotFoundError:
-        raise ServiceError(410, "gone", f"run {run.id}: its folder has been removed") from None
+        raise _gone(service, run) from None
     except OSError as error:
         raise ServiceError(503, "unavailable", f"not removed: {error.strerror}", retryable=True) from error
     return Response(status_code=204)
+
+
+@router.post("/v1/runs/{run_id}:keep")
+def keep(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
+    """Keeps the run for good: no rule of the site removes it, only its owner does."""
+    return _pin(service, find(service, identity, run_id), True)
+
+
+@router.post("/v1/runs/{run_id}:release")
+def release(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
+    """The rules of the site may remove the run again, also one that was handed in with the label ``keep``."""
+    return _pin(service, find(service, identity, run_id), False)
+
+
+def _pin(service: Service, run: Run, keep: bool) -> Response:
+    try:
+        folder.pin(service.settings.runs / run.id, keep)
+    except OSError as error:
+        raise ServiceError(507, "storage", f"not recorded: {error.strerror}", retryable=True) from error
+    return Response(view.snapshot(service, run).body, media_type="application/json")
 
 
 @router.post("/v1/runs/{run_id}:cancel", status_code=202)

@@ -2,8 +2,11 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from conoid.client import swept
+from conoid.client.errors import ClientError
 from conoid.client.sweep import points_in, points_of
 
 
@@ -35,3 +38,35 @@ def test_points_from_a_file(tmp_path: Path) -> None:
     path.write_text("run.ranks,run.end_time\n1\n")
     with pytest.raises(ValueError, match="--list"):
         points_in(path)
+
+
+ROWS = [
+    {"v": f"{v} m/s", "run.ranks": str(ranks), "run": "r", "state": "succeeded", "cpu": str(v), "fragments": str(v * v),
+     "energy.plastic": str(v + ranks), "eroded": "0", "digest": ""}
+    for v in (100, 200, 300) for ranks in (1, 2)
+]  # fmt: skip
+
+
+def test_what_differs_is_drawn_over_what_was_changed() -> None:
+    made = swept.figure([*ROWS, {**ROWS[0], "fragments": "", "energy.plastic": ""}], ["v", "run.ranks"], None, [])
+    assert [axes.get_title() for axes in made.axes] == ["fragments", "energy.plastic"]
+    assert made.axes[0].get_xlabel() == "v, m/s"
+    assert [line.get_label() for line in made.axes[0].lines] == ["run.ranks 1", "run.ranks 2"]
+    assert [float(y) for y in np.asarray(made.axes[0].lines[0].get_ydata())] == [1e4, 4e4, 9e4]
+
+
+def test_words_on_the_axis_and_columns_by_name() -> None:
+    made = swept.figure([{**row, "v": f"law {row['v'][0]}"} for row in ROWS], ["v", "run.ranks"], "v", ["cpu"])
+    assert [axes.get_title() for axes in made.axes] == ["cpu"]
+    assert [label.get_text() for label in made.axes[0].get_xticklabels()] == ["law 1", "law 2", "law 3"]
+
+
+@pytest.mark.parametrize(("x", "columns", "words"), [("w", [], "x = 'w'"), (None, ["mass"], "'mass': the table has")])
+def test_a_plot_of_what_is_not_there_is_refused(x: str | None, columns: list[str], words: str) -> None:
+    with pytest.raises(ClientError, match=words):
+        swept.figure(ROWS, ["v", "run.ranks"], x, columns)
+
+
+def test_nothing_to_draw_is_told() -> None:
+    with pytest.raises(ClientError, match="no run of the sweep has ended"):
+        swept.figure([{**ROWS[0], "cpu": ""}], ["v"], None, [])

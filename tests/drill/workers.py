@@ -89,7 +89,8 @@ def _deal(stand: Stand, blow: Blow, run: str) -> None:
 
 
 def _processes(stand: Stand, run: str, whom: str) -> list[int]:
-    ranks, everybody, leader = stand.ranks(run), processes.of_run(run), processes.leader_of(run)
+    ranks, everybody = stand.ranks(run), processes.of_run(run)
+    leader = processes.leader_of(everybody)
     chosen: dict[str, Callable[[], list[int]]] = {
         "rank": lambda: ranks,
         "launcher": lambda: [leader] if leader else [],

@@ -1,7 +1,10 @@
 """What decides about jobs, without Slurm: replies that are lost, second jobs, what a signal has meant, the lock."""
 
+import json
+import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -14,6 +17,7 @@ from conoid.cases.slurm import Entry
 from conoid.server import journal, recovery
 from conoid.server.events import Run
 from conoid.server.folder import Submission, create, new_id
+from conoid.server.launch.arrays import Arrays
 from conoid.server.launch.handed import SlurmWorker
 from conoid.server.launch.slurm import SlurmLauncher
 from conoid.server.settings import Settings
@@ -115,7 +119,7 @@ def test_of_two_jobs_the_one_that_has_begun_stays(place: Path) -> None:
     layout.claim(place / "run", JOB.name).write_text("8")
     worker = SlurmWorker(place / "run", JOB, Slurm(profiles={"a": Profile()}, bin=found))
     entries = [Entry("7", "PENDING", 0.0, JOB.name, "Resources"), Entry("8", "RUNNING", 5.0, JOB.name, "None")]
-    worker._note(job="7")
+    worker.write_down(job="7")
     worker.turn(entries)
     assert (place / "ended").read_text() == "7\n"
     assert (worker.phase(), worker.began()) == ("runs", 5.0)
@@ -156,7 +160,7 @@ def test_a_job_that_waits_though_its_run_has_ended_is_taken_out(place: Path, mon
     """A controller that crashed has put back what it had started, under the same number."""
     run = place / "run"
     worker = SlurmWorker(run, JOB, Slurm(profiles={"a": Profile()}, bin=commands(place, "exit 1")))
-    worker._note(job="7", command=["false"])
+    worker.write_down(job="7", command=["false"])
     (run / layout.OUTCOME).write_text("{}")
     monkeypatch.setattr(attempt.Told, "listen", lambda self: None)
     monkeypatch.setenv("SLURM_JOB_ID", "7")
@@ -177,7 +181,7 @@ def test_a_job_that_waits_though_its_run_has_ended_is_taken_out(place: Path, mon
 )
 def test_an_end_without_outcome_is_read_from_slurm(place: Path, state: str, reading: tuple[State, Cause]) -> None:
     worker = SlurmWorker(place / "run", JOB, Slurm(profiles={"a": Profile()}, bin=commands(place, "exit 1")))
-    worker._note(job="7")
+    worker.write_down(job="7")
     worker.turn([Entry("7", state, 5.0, JOB.name, "None")])
     ended = worker.exited()
     assert ended is not None
@@ -188,7 +192,7 @@ def test_an_end_without_outcome_is_read_from_slurm(place: Path, state: str, read
 @pytest.mark.parametrize("state", ["PREEMPTED", "NODE_FAIL", "FAILED"])
 def test_a_job_that_was_interrupted_gets_a_next_one(place: Path, state: str) -> None:
     worker = SlurmWorker(place / "run", JOB, Slurm(profiles={"a": Profile()}, bin=commands(place, "exit 1")))
-    worker._note(job="7")
+    worker.write_down(job="7")
     (place / "run" / layout.INTERRUPTED).write_text("{}")
     worker.turn([Entry("7", state, 5.0, JOB.name, "None")])
     assert (worker.exited(), worker.phase()) == (None, "waits")
@@ -260,3 +264,77 @@ def test_a_world_of_the_wrong_size_is_told(tmp_path: Path) -> None:
     assert ended.returncode == 1
     assert "MPI has started 1 rank(s) where 2 were asked for" in ended.stderr
     assert not (tmp_path / "out").exists()
+
+
+ARRAY = """#!/bin/bash
+for word in "$@"; do case "$word" in
+--job-name=*) name="${{word#--job-name=}}";; --array=*) tasks="${{word#--array=}}";; esac; done
+cd {place}; echo "$tasks" >> arrays; {body}
+number=$((100 + $(wc -l < arrays)))
+for task in ${{tasks//,/ }}; do echo "${{number}}_$task|PENDING|N/A|$name|Resources" >> queue; done
+echo $number
+"""
+
+
+def group_of(place: Path, number: int, body: str = "") -> tuple[Arrays, list[SlurmWorker]]:
+    """Runs of one sweep that nobody has handed over yet, and an sbatch that does ``body`` first."""
+    bin_ = commands(place, "exit 1")
+    (place / "bin" / "sbatch").write_text(ARRAY.format(place=place, body=body))
+    site, made = Slurm(profiles={"a": Profile()}, bin=bin_), []
+    for n in range(number):
+        folder = place / f"run{n}"
+        folder.mkdir()
+        made.append(SlurmWorker(folder, batch.new_job(f"r{n}", 1, ("a", Profile()), ["true"], 0.0), site, "ann/s"))
+        made[-1].since = 0.0
+    return Arrays(place, site), made
+
+
+def numbers(workers: list[SlurmWorker]) -> list[str]:
+    return [worker.record.job for worker in workers]
+
+
+def test_what_starts_together_is_one_array(place: Path) -> None:
+    arrays, workers = group_of(place, 3)
+    workers[0].since = time.monotonic()
+    assert arrays.hand_over(workers) == {worker.name for worker in workers}, "it may still grow"
+    workers[0].since = 0.0
+    assert arrays.hand_over(workers) == set()
+    assert numbers(workers) == ["101_0", "101_1", "101_2"]
+    assert (place / "arrays").read_text() == "0,1,2\n"
+    told = [batch.read_job(worker.folder) for worker in workers]
+    assert [job.key for job in told if job] == [entry.name for entry in slurm.jobs(str(place / "bin"))]
+    arrays.hand_over(workers)
+    assert (place / "arrays").read_text() == "0,1,2\n"
+
+
+def test_an_array_whose_number_was_lost_is_not_handed_over_again(place: Path) -> None:
+    """Nor is it by the next server, which knows the records alone; a task that is not there is handed over."""
+    lost = 'echo "101_0|PENDING|N/A|$name|R" >> queue; echo "sbatch: error: Socket timed out" >&2; exit 1'
+    arrays, workers = group_of(place, 2, lost)
+    with pytest.raises(slurm.AwayError):
+        arrays.hand_over(workers)
+    records = [batch.read_job(worker.folder) for worker in workers]
+    again = [SlurmWorker(w.folder, job, w._site) for w, job in zip(workers, records, strict=True) if job]
+    (place / "bin" / "sbatch").write_text(ARRAY.format(place=place, body=""))
+    arrays.hand_over(again)
+    assert numbers(again) == ["101_0", "102_1"]
+    assert (place / "arrays").read_text() == "0,1\n1\n"
+
+
+def test_an_array_that_is_refused_goes_one_by_one(place: Path) -> None:
+    arrays, workers = group_of(place, 2, 'echo "sbatch: error: Invalid job array specification" >&2; exit 1')
+    arrays.hand_over(workers)
+    assert len({worker.name for worker in workers}) == 2
+    assert [worker.record.task for worker in workers] == [None, None]
+    assert arrays.hand_over(workers) == set()
+    assert (place / "arrays").read_text() == "0,1\n"
+
+
+def test_a_task_finds_its_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And runs nothing where another job has the run."""
+    (tmp_path / "run" / layout.LOGS).mkdir(parents=True)
+    (tmp_path / layout.ARRAY).write_text(json.dumps([str(tmp_path), str(tmp_path / "run")]))
+    monkeypatch.setattr(os, "dup2", lambda log, stream: None)
+    env = {"SLURM_ARRAY_TASK_ID": "1", "SLURM_ARRAY_JOB_ID": "7", "SLURM_JOB_ID": "9"}
+    assert attempt._place(tmp_path, env) == (tmp_path / "run", "7_1")
+    assert attempt._place(tmp_path / "run", env) == (tmp_path / "run", "9")

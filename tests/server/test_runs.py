@@ -112,7 +112,7 @@ def test_first_come_first_served_within_the_slots(server: Running, tmp_path: Pat
     seen = [server.ann.show(run) for run in runs]
     assert [one["state"] for one in seen] == ["running", "queued", "queued"]
     assert seen[1]["reason"] == "waiting for 2 of 2 slots; 1 free"
-    assert seen[2]["reason"] == "waiting for 1 earlier run"
+    assert seen[2]["reason"] == "waiting for 1 run before it"
     assert server.ann.http.get("/v1/me").json()["slots"] == {"total": 2, "used": 1}
     go.touch()
     ended = [server.ann.wait_for(run) for run in runs]

@@ -5,6 +5,7 @@ import os
 import shlex
 import signal
 import time
+import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import Any
 import pytest
 
 from conoid.cases import layout
+from conoid.cases.batch import Job, read_job
 from conoid.cases.messages import AnyMessage, Finished, Progress
 from conoid.cases.run import State
 from conoid.client import connect
@@ -47,7 +49,7 @@ time = "2 min"
 notice = "60 s"
 """
 BREAKING = Path(__file__).parents[1] / "parallel" / "breaking.toml"
-DIGEST = "6d7ee9dd8954341f"
+DIGEST = "81155664d40ef753"
 """Of that case, on any number of ranks."""
 LONG = "12 us"
 """Until which the same case takes some ten seconds: long enough to be interrupted."""
@@ -205,6 +207,59 @@ def test_twelve_runs_at_a_time(site: Site) -> None:
     for run in runs:
         assert site.ended(run, 120.0)["state"] == "succeeded"
         assert len(site.jobs(run)) == 1
+
+
+def sweep_of(site: Site, number: int, **plan: Any) -> list[str]:
+    """The runs of a new sweep, in the order of its points."""
+    points = [{"run.end_time": f"{1 + n} us"} for n in range(number)]
+    body = json.dumps({"case": tomllib.loads(case_text(**plan)), "points": points})
+    answer = site.ann.http.post("/v1/sweeps", content=body, headers={"Content-Type": "application/json"})
+    assert answer.status_code == 202, answer.text
+    return [point["run"]["id"] for point in answer.json()["points"]]
+
+
+def job_of(site: Site, run: str) -> Job:
+    """The record of a run, once Slurm has given it a number."""
+    deadline = time.monotonic() + 30.0
+    while (found := read_job(site.server.runs / run)) is None or not found.job:
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
+    return found
+
+
+@pytest.mark.slow
+def test_a_sweep_is_one_array_with_a_job_for_each_run(site: Site, tmp_path: Path) -> None:
+    """Twelve runs: one sbatch; one is cancelled, one put back by hand, the server killed in between."""
+    runs = sweep_of(site, 12, wait=str(tmp_path / "go"))
+    jobs = [job_of(site, run) for run in runs]
+    assert len({job.name for job in jobs}) == 1
+    assert len({job.job.partition("_")[0] for job in jobs}) == 1, "one number"
+    assert sorted(job.task for job in jobs if job.task is not None) == list(range(12))
+    site.reached(runs[0], 60.0, State.RUNNING)
+    site.ann.http.post(f"/v1/runs/{runs[11]}:cancel")
+    assert site.ended(runs[11])["state"] == "cancelled"
+    site.again()
+    (tmp_path / "go").touch()
+    for run in runs[:11]:
+        assert site.ended(run, 120.0)["state"] == "succeeded", site.tail(run)
+        assert site.ann.states(run).count("running") == 1
+    found = site.cluster.jobs(jobs[0].name)
+    assert sorted(state for _, state in found) == ["CANCELLED"] + ["COMPLETED"] * 11
+
+
+@pytest.mark.slow
+def test_a_controller_killed_while_arrays_are_handed_over_makes_one_job_a_run(site: Site) -> None:
+    runs = []
+    for number in range(4):
+        runs += sweep_of(site, 3, steps=2)
+        time.sleep(0.4 + 0.3 * number)
+        site.cluster.kill()
+        time.sleep(0.3)
+        site.cluster.start()
+    site.cluster.await_node()
+    for run in runs:
+        assert site.ended(run, 240.0)["state"] == "succeeded", site.tail(run)
+        assert site.ann.states(run).count("running") == 1, site.ann.states(run)
 
 
 @pytest.mark.slow

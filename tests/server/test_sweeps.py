@@ -128,7 +128,7 @@ def test_a_damaged_file_harms_no_other_sweep(server: Running) -> None:
     assert [plan.id for plan in again.of("ann")] == [sweep["id"]]
 
 
-def test_the_same_from_python(server: Running) -> None:
+def test_the_same_from_python(server: Running, tmp_path: Path) -> None:
     from conoid.client.session import Session
 
     with Session("http://127.0.0.1") as session:
@@ -137,6 +137,8 @@ def test_the_same_from_python(server: Running) -> None:
         made = session.sweep(tomllib.loads(case_text()), [{"run.end_time": end} for end in ENDS], at_once=2)
         assert made.wait(60.0).over
         assert [line["state"] for line in made.table()] == ["succeeded"] * len(ENDS)
+        assert list(made.frame()["steps"]) == [3] * len(ENDS)
+        assert made.plot(tmp_path / "sweep.png", ["steps"]).stat().st_size > 1000
         assert session.find_sweep("last").id == made.id
         assert [run.status().labels["point"] for run in made.runs()] == ["0", "1", "2", "3"]
         assert made.cancel().states == {"succeeded": len(ENDS)}

@@ -1,0 +1,137 @@
+"""What a site decides about its queue, about what its users and their runs may take, and about how long runs are kept.
+
+Tables of a site's settings file::
+
+    [queue]
+    half_life = "168 h"               # after which what a user has taken counts half
+    memory = 64_000_000_000           # bytes that all runs may need together
+    [queue.users.ann]
+    share = 2.0                       # of what there is, against 1 of everybody else
+    priority = 1                      # before everybody whose number is lower
+    [quota]                           # of each user
+    queued = 1000
+    running = 20
+    core_seconds = 1e6
+    output_bytes = 1_000_000_000_000
+    [caps]                            # of each run
+    core_seconds = 1e5
+    output_bytes = 100_000_000_000
+    [retention]                       # of runs that have ended
+    age = "2160 h"
+    bytes = 4_000_000_000_000
+"""
+
+import msgspec
+
+from .units import parse_quantity
+
+PRIORITY = 100
+"""Largest priority, and minus the smallest. Chosen."""
+
+
+class Share(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """What a site gives one user."""
+
+    share: float = 1.0
+    """How much of the machine, against those of other users."""
+    priority: int = 0
+    """Runs of users with a higher one come first."""
+
+
+class Queue(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """Whose turn it is."""
+
+    half_life: str = "168 h"
+    """After which what a user has taken counts half. Chosen: a week."""
+    memory: int | None = None
+    """Bytes that all runs may need together, by their estimates; not given: what the machine has."""
+    users: dict[str, Share] = {}
+
+    @property
+    def forgets(self) -> float:
+        """The half-life, s."""
+        return parse_quantity(self.half_life, "s")
+
+    def of(self, owner: str) -> Share:
+        """What the site gives this user."""
+        return self.users.get(owner, Share())
+
+
+class Quota(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """What one user may take; None: as much as there is."""
+
+    queued: int | None = None
+    """Runs that have not ended; beyond it the server takes no more."""
+    running: int | None = None
+    """Runs at a time; the others wait."""
+    core_seconds: float | None = None
+    """What was taken lately, each half-life counting half; beyond it runs wait."""
+    output_bytes: int | None = None
+    """Of all folders of the user's runs; beyond it the server takes no more."""
+
+
+class RunCaps(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """What one run may take; None: what the server has by itself."""
+
+    elements: int | None = None
+    steps: int | None = None
+    memory: int | None = None
+    core_seconds: float | None = None
+    """By its estimate when it is handed in, and by the clock while it runs."""
+    wall_time: float | None = None
+    """s"""
+    output_bytes: int | None = None
+    """Of its folder; a run that goes beyond is stopped, with its results so far."""
+
+
+class Retention(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """How long runs that have ended are kept; those with the label ``keep`` are kept for good."""
+
+    age: str = ""
+    """Since the end; empty: for ever."""
+    bytes: int | None = None
+    """Of all folders together; the oldest go first. None: no limit."""
+    every: str = "10 min"
+    """Between two looks. Chosen: reading the sizes of 10,000 folders takes seconds."""
+
+    @property
+    def oldest(self) -> float | None:
+        """The age, s."""
+        return parse_quantity(self.age, "s") if self.age else None
+
+    @property
+    def rest(self) -> float:
+        """s between two looks."""
+        return parse_quantity(self.every, "s")
+
+
+def check(queue: Queue, quota: Quota, caps: RunCaps, retention: Retention) -> None:
+    """Raises ValueError: the key, the value, what is allowed."""
+    for key, text in (("queue.half_life", queue.half_life), ("retention.every", retention.every)):
+        _time(key, text)
+    if retention.age:
+        _time("retention.age", retention.age)
+    for name, user in queue.users.items():
+        if not 0.0 < user.share <= 1e6:
+            raise ValueError(f"queue.users.{name}.share = {user.share:g}: above 0, at most 1e6")
+        if abs(user.priority) > PRIORITY:
+            raise ValueError(f"queue.users.{name}.priority = {user.priority}: -{PRIORITY} to {PRIORITY}")
+    _positive("queue", "memory", queue.memory)
+    _positive("retention", "bytes", retention.bytes)
+    for table, values in (("quota", quota), ("caps", caps)):
+        for name in values.__struct_fields__:
+            _positive(table, name, getattr(values, name))
+
+
+def _time(key: str, text: str) -> None:
+    try:
+        seconds = parse_quantity(text, "s")
+    except ValueError as error:
+        raise ValueError(f"{key}: {error}") from None
+    if seconds <= 0.0:
+        raise ValueError(f"{key} = {text!r}: above 0 s")
+
+
+def _positive(table: str, name: str, value: float | None) -> None:
+    if value is not None and not 0 < value < float("inf"):
+        raise ValueError(f"{table}.{name} = {value}: above 0")

@@ -1,0 +1,123 @@
+"""purged.jsonl: a line for every run whose folder has been removed, so that what came of it is not forgotten."""
+
+import os
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from conoid.cases.run import Cause, State
+
+from . import durable, folder
+from .events import Run
+
+FILE = "purged.jsonl"
+
+
+class Farewell(msgspec.Struct, kw_only=True, frozen=True):
+    """What is kept of a run; times are Unix s."""
+
+    id: str
+    owner: str
+    name: str
+    ranks: int
+    submitted: float
+    started: float
+    finished: float
+    state: str
+    cause: str | None
+    message: str
+    removed: float
+    why: str
+    """Who or what has removed it."""
+    steps: int = 0
+    time: float = 0.0
+    """Reached by the computation, s."""
+    digest: str = ""
+    bytes: int = 0
+
+    @property
+    def run(self) -> Run:
+        """As the database has it."""
+        cause = Cause(self.cause) if self.cause else None
+        return Run(
+            self.id, self.owner, self.name, self.ranks, self.submitted, State(self.state), cause, self.message,
+            self.started, self.finished,
+        )  # fmt: skip
+
+
+_farewell = msgspec.json.Decoder(Farewell)
+
+
+def of(run: Run, path: Path, why: str) -> Farewell:
+    """The line of a run that has ended, while its folder is there."""
+    ended = folder.outcome(path)
+    results: dict[str, Any] = (
+        {} if ended is None else {"steps": ended.steps, "time": ended.time, "digest": ended.digest}
+    )
+    return Farewell(
+        id=run.id, owner=run.owner, name=run.name, ranks=run.ranks, submitted=run.submitted, started=run.started,
+        finished=run.finished, state=run.state.value, cause=run.cause.value if run.cause else None,
+        message=run.message, removed=time.time(), why=why, bytes=folder.size(path), **results,
+    )  # fmt: skip
+
+
+class Farewells:
+    """May be used from any thread. Only where each line stands is kept in memory."""
+
+    def __init__(self, runs: Path) -> None:
+        """Reads the file once; what a killed server left half written is no line. Raises OSError."""
+        self._path, self._lock = runs / FILE, threading.Lock()
+        self._at: dict[str, int] = {}
+        self._end = 0
+        if self._path.exists():
+            with open(self._path, "rb") as file:
+                for raw in file:
+                    self._note(raw, self._end)
+                    self._end += len(raw)
+
+    def _note(self, raw: bytes, place: int) -> None:
+        with suppress(msgspec.MsgspecError):
+            self._at[_farewell.decode(raw).id] = place
+
+    def __iter__(self) -> Iterator[str]:
+        """The ids of all."""
+        return iter(tuple(self._at))
+
+    def add(self, line: Farewell) -> None:
+        """On disk when this returns; a second line of a run replaces the first. Raises OSError."""
+        with self._lock, open(self._path, "ab", opener=_private) as file:
+            end = os.fstat(file.fileno()).st_size
+            begin = b"" if not end or _last(self._path, end) == b"\n" else b"\n"
+            try:
+                file.write(begin + msgspec.json.encode(line) + b"\n")
+                file.flush()
+                os.fsync(file.fileno())
+            except OSError:
+                os.ftruncate(file.fileno(), end)
+                raise
+            self._at[line.id] = end + len(begin)
+        durable.sync_folder(self._path.parent)
+
+    def get(self, run_id: str) -> Farewell | None:
+        """The line of a run; None when there is none. Raises OSError."""
+        place = self._at.get(run_id)
+        if place is None:
+            return None
+        with open(self._path, "rb") as file:
+            file.seek(place)
+            return _farewell.decode(file.readline())
+
+
+def _last(path: Path, end: int) -> bytes:
+    with open(path, "rb") as file:
+        file.seek(end - 1)
+        return file.read(1)
+
+
+def _private(path: str, flags: int) -> int:
+    return os.open(path, flags, 0o600)

@@ -1,0 +1,87 @@
+"""Runs of a sweep that start together are one job array: one sbatch for all of them, and a job for each.
+
+A run's record has the name of the array and its own place in it before Slurm hears of either. So whoever finds the
+records, after whatever crash, looks for the tasks of that name, and hands over those that nobody knows.
+"""
+
+import logging
+import secrets
+import sys
+import time
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import msgspec
+
+from conoid.cases import batch, layout, slurm, whole
+
+from .handed import SlurmWorker
+
+_log = logging.getLogger("conoid.server")
+_SETTLES = 0.5
+"""s for which a group has not grown before it is handed over. Chosen: a sweep is written to disk run after run, some
+milliseconds each."""
+_MOST = 1000
+"""Tasks of an array. Slurm's MaxArraySize is 1001 where a site says nothing (slurm.conf(5))."""
+
+
+class Arrays:
+    """Belongs to the launcher's thread."""
+
+    def __init__(self, runs: Path, site: batch.Slurm) -> None:
+        """``runs``: the folder of all runs."""
+        self._place, self._site = runs / layout.ARRAYS, site
+
+    def hand_over(self, workers: Iterable[SlurmWorker]) -> set[str]:
+        """Hands over what starts together; the names of those that are to be left alone in this round.
+
+        Raises AwayError, OSError.
+        """
+        fresh: dict[tuple[object, ...], list[SlurmWorker]] = {}
+        known: dict[str, list[SlurmWorker]] = {}
+        for worker in workers:
+            job = worker.record
+            if worker.waits_for_array:
+                known.setdefault(job.name, []).append(worker)
+            elif worker.fresh:
+                fresh.setdefault((worker.group, job.profile, job.ranks), []).append(worker)
+        growing = {each.name for group in fresh.values() if not _settled(group) for each in group}
+        for group in fresh.values():
+            if _settled(group) and len(group) > 1:
+                members = group[:_MOST]
+                known[self._join(members)] = members
+        for members in known.values():
+            self._submit(members)
+        return growing
+
+    def _join(self, members: Sequence[SlurmWorker]) -> str:
+        """Writes the array down, then its name into the record of each run."""
+        word = "".join(letter if letter.isalnum() else "_" for letter in members[0].group)[:60]
+        name = f"conoid-{word}-{secrets.token_hex(4)}"
+        folder = self._place / name
+        folder.mkdir(0o700, parents=True)
+        profile = batch.profile_of(self._site, members[0].record.profile)[1]
+        folders = [str(worker.folder) for worker in members]
+        whole.write(folder / layout.ARRAY, msgspec.json.encode(folders))
+        whole.write(folder / layout.JOB_SCRIPT, batch.script(profile, sys.executable).encode(), 0o755)
+        for task, worker in enumerate(members):
+            worker.write_down(name=name, task=task, array=str(folder))
+        return name
+
+    def _submit(self, members: Sequence[SlurmWorker]) -> None:
+        records = [worker.record for worker in members]
+        profile = batch.profile_of(self._site, records[0].profile)[1]
+        try:
+            numbers = slurm.submit_array(self._site.bin, records, profile)
+        except slurm.RefusedError as error:
+            _log.warning("Slurm refuses the array %s, whose runs go one by one: %s", records[0].name, error)
+            for worker in members:
+                worker.leave_array()
+            return
+        for worker, record in zip(members, records, strict=True):
+            if record.task is not None:
+                worker.write_down(job=numbers[record.task])
+
+
+def _settled(group: Sequence[SlurmWorker]) -> bool:
+    return time.monotonic() > max(worker.since for worker in group) + _SETTLES

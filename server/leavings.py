@@ -1,0 +1,63 @@
+"""What an earlier server has left: every run's folder is looked at once, and again where that failed."""
+
+import logging
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from sqlalchemy.exc import SQLAlchemyError
+
+from . import folder, recovery
+from .events import Run
+from .holds import words
+from .index import Index
+from .launch import Launcher
+from .recovery import Left
+from .store import Store
+
+_log = logging.getLogger("conoid.server")
+
+
+class Leavings:
+    """Belongs to the supervisor's thread."""
+
+    def __init__(
+        self, runs: Path, store: Store, index: Index, launcher: Launcher, found: Callable[[Left], None]
+    ) -> None:
+        """``found`` takes each run that can be read, whether it has ended or not."""
+        self._runs, self._store, self._index, self._launcher, self._found = runs, store, index, launcher, found
+        self._failed: dict[Path, str] = {}
+
+    def all(self) -> None:
+        """Every run that is not known to have ended. Raises OSError, SQLAlchemyError."""
+        ended, known, last = self._store.ended(), self._store.open(), ""
+        for path in folder.scan(self._runs):
+            last = path.name
+            if path.name not in ended:
+                self._take_up(path, partial(known.get, path.name))
+        if last:
+            folder.begin_after(last)
+
+    def again(self) -> None:
+        """Those that could not be read."""
+        for path in tuple(self._failed):
+            self.take_up(path)
+
+    def take_up(self, path: Path) -> None:
+        """What fails is logged once and comes up again with the next tidying."""
+        self._take_up(path, lambda: self._store.get(path.name))
+
+    def _take_up(self, path: Path, known_of: Callable[[], Run | None]) -> None:
+        """The database is written only where it knows less than the folder: a thousand runs wait for no disk."""
+        told = self._failed.pop(path, "")
+        try:
+            known = known_of()
+            left = recovery.look(path, known, self._launcher)
+            if left.run != known:
+                self._index.add(left.run, left.key)
+        except (OSError, ValueError, SQLAlchemyError) as error:
+            self._failed[path] = words(error)
+            if told != words(error):
+                _log.error("run %s cannot be taken up: %s", path.name, words(error))
+            return
+        self._found(left)

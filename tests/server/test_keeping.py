@@ -1,0 +1,108 @@
+"""How long runs are kept: by age, by size, for good; what is told of one that has been removed."""
+
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+from conoid.cases.batch import Site
+from conoid.cases.policy import Retention
+from conoid.cases.run import State
+from conoid.server import keeper
+from conoid.server.farewells import FILE, Farewells
+from conoid.server.keeper import Keeper
+from conoid.server.store import Store
+
+from .running import TOML, Running, User, case_text
+
+
+def keeper_of(server: Running, **rules: Any) -> Keeper:
+    """One with rules of its own, looked with by hand."""
+    service = server.service
+    settings = replace(service.settings, site=Site(retention=Retention(**rules)))
+    return Keeper(settings, service.store, service.farewells, lambda run: service.supervisor.current(run) is not None)
+
+
+def ended(user: User, label: str = "") -> str:
+    """A run that is over, and forgotten by the supervisor."""
+    words = f"?label={label}" if label else ""
+    run = str(user.http.post(f"/v1/runs{words}", content=case_text(), headers=TOML).json()["id"])
+    assert user.wait_for(run)["state"] == "succeeded"
+    return run
+
+
+def test_old_runs_go_and_leave_a_line(server: Running, tmp_path: Path) -> None:
+    old, pinned = ended(server.ann), ended(server.ann, "keep=yes")
+    later = ended(server.ann)
+    assert server.ann.http.post(f"/v1/runs/{later}:keep").json()["labels"]["keep"] == "yes"
+    running = server.ann.submit(wait=str(tmp_path / "go"))
+    server.ann.wait_for(running, State.RUNNING)
+    looks = keeper_of(server, age="0.2 s")
+    time.sleep(0.3)
+    looks.look()
+    answer = server.ann.http.get(f"/v1/runs/{old}")
+    assert (answer.status_code, answer.json()["code"]) == (410, "gone")
+    assert "older than 0.2 s" in answer.json()["detail"]
+    kept = answer.json()["outcome"]
+    assert (kept["state"], kept["steps"], kept["owner"]) == ("succeeded", 3, "ann")
+    assert kept["bytes"] > 0
+    assert server.bob.http.get(f"/v1/runs/{old}").status_code == 404
+    for path in ("events", "files", "history", "stream", "logs/0"):
+        assert server.ann.http.get(f"/v1/runs/{old}/{path}").status_code == 410
+    assert [server.ann.show(run)["state"] for run in (pinned, later, running)] == ["succeeded", "succeeded", "running"]
+    server.ann.http.post(f"/v1/runs/{later}:release")
+    looks.look()
+    assert server.ann.http.get(f"/v1/runs/{later}").status_code == 410
+    (tmp_path / "go").touch()
+
+
+def test_the_oldest_go_until_the_rest_is_small_enough(server: Running) -> None:
+    runs = [ended(server.ann) for _ in range(3)]
+    for run in runs:
+        (server.ann.runs / run / "large").write_bytes(b"x" * 1_000_000)
+    looks = keeper_of(server, bytes=2_500_000)
+    looks.look()
+    assert [server.ann.http.get(f"/v1/runs/{run}").status_code for run in runs] == [410, 200, 200]
+    assert 2_000_000 < looks.kept("ann") < 2_500_000
+    assert "more than 2500000 bytes" in server.ann.http.get(f"/v1/runs/{runs[0]}").json()["detail"]
+
+
+def test_who_removes_a_run_is_told_too(server: Running) -> None:
+    run = ended(server.ann)
+    assert server.ann.http.delete(f"/v1/runs/{run}").status_code == 204
+    answer = server.ann.http.delete(f"/v1/runs/{run}")
+    assert (answer.status_code, answer.json()["outcome"]["why"]) == (410, "by ann")
+
+
+def test_lines_survive_a_lost_database_and_a_torn_end(server: Running, tmp_path: Path) -> None:
+    run, other = ended(server.ann), ended(server.ann)
+    server.ann.http.delete(f"/v1/runs/{run}")
+    path = server.ann.runs / FILE
+    path.write_bytes(path.read_bytes() + b'{"id": "to')
+    lines = Farewells(server.ann.runs)
+    told = server.service.store.get(other)
+    assert told is not None
+    lines.add(farewell(lines, run, other))
+    again = Farewells(server.ann.runs)
+    assert [again.get(one) is not None for one in (run, other, "nobody")] == [True, True, False]
+    fresh = Store(f"sqlite:///{tmp_path / 'fresh.sqlite'}")
+    keeper.restore(fresh, again)
+    found = fresh.get(run)
+    fresh.close()
+    assert found is not None
+    assert (found.owner, found.state) == ("ann", State.SUCCEEDED)
+
+
+def farewell(lines: Farewells, run: str, other: str) -> Any:
+    """The line of a run, for another one."""
+    line = lines.get(run)
+    assert line is not None
+    return msgspec.structs.replace(line, id=other)
+
+
+@pytest.mark.parametrize("verb", ["keep", "release"])
+def test_others_pin_nothing(server: Running, verb: str) -> None:
+    assert server.bob.http.post(f"/v1/runs/{ended(server.ann)}:{verb}").status_code == 404
