@@ -29,12 +29,20 @@ class Leavings:
         self._failed: dict[Path, str] = {}
 
     def all(self) -> None:
-        """Every run that is not known to have ended. Raises OSError, SQLAlchemyError."""
+        """Every run that is not known to have ended, also one whose folder somebody has emptied.
+
+        Raises OSError, SQLAlchemyError.
+        """
         ended, known, last = self._store.ended(), self._store.open(), ""
+        emptied = set(known)
         for path in folder.scan(self._runs):
             last = path.name
+            emptied.discard(path.name)
             if path.name not in ended:
                 self._take_up(path, partial(known.get, path.name))
+        for run_id in sorted(emptied):
+            if (self._runs / run_id).is_dir():
+                self._take_up(self._runs / run_id, partial(known.get, run_id))
         if last:
             folder.begin_after(last)
 

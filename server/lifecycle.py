@@ -171,6 +171,8 @@ def _reading_of(run: Run, event: WorkerExited) -> tuple[State, Cause, str]:
         return State.FAILED, Cause.PREEMPTED, "the worker was ended from outside"
     if event.code == ExitCode.PHYSICS:
         return State.FAILED, Cause.DIVERGED, "the computation failed"
+    if event.code is None:
+        return State.LOST, Cause.SERVICE, "the worker ended without an outcome, and its exit code is not known"
     if run.state in {State.QUEUED, State.STARTING}:
         return State.FAILED, Cause.LAUNCH, f"the worker ended with code {event.code} before its first step"
     return State.FAILED, Cause.SERVICE, f"the worker ended with code {event.code} and left no readable outcome"

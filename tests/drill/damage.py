@@ -92,7 +92,7 @@ class Damage:
     def _runs(self) -> frozenset[str]:
         """A worker that can write goes on: what it has read is in its memory."""
         if not self.name:
-            return STORAGE if self.way == "not permitted" else GONE | STORAGE
+            return {"not permitted": STORAGE, "emptied": STORAGE | SUCCEEDED}.get(self.way, GONE | STORAGE)
         return STORAGE if self.name == layout.JOURNAL and self.beyond_use else SUCCEEDED
 
     def _waits(self) -> frozenset[str]:
@@ -166,8 +166,7 @@ def _made(stand: Stand, one: Damage) -> str:
 
 def _judged(stand: Stand, some: Sequence[Damage], truths: Sequence[Truth]) -> Iterator[Row]:
     since, found = time.monotonic(), []
-    for truth in truths:
-        seen, seconds = judge.settle(stand, truth, since)
+    for truth, (seen, seconds) in zip(truths, judge.settled(stand, truths, since), strict=True):
         found.append((seen, seconds, judge.verdict(stand, truth, seen)))
         judge.reads(stand, truth.run)
     stand.again()

@@ -1,6 +1,7 @@
 """Whether what the server says of a run is true: by the book of the workers, the processes, and the run's folder."""
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from conoid.cases import layout
@@ -24,13 +25,24 @@ class Row:
     verdict: str
 
 
-def settle(stand: Stand, truth: Truth, since: float) -> tuple[str, float]:
-    """The state at which the run comes to rest, and how long after ``since`` that was."""
+def settled(stand: Stand, truths: Sequence[Truth], since: float) -> list[tuple[str, float]]:
+    """The state at which each run comes to rest, and how long after ``since`` that was seen."""
+    found: dict[str, tuple[str, float]] = {}
     while True:
-        seen, now = stand.state(truth.run), time.monotonic()
-        if seen in truth.states or seen.partition("/")[0] in FINAL or now > since + stand.patience:
-            return seen, now - since
+        late = time.monotonic() > since + stand.patience
+        for truth in truths:
+            if truth.run not in found:
+                seen = stand.state(truth.run)
+                if late or seen in truth.states or seen.partition("/")[0] in FINAL:
+                    found[truth.run] = seen, time.monotonic() - since
+        if len(found) == len({truth.run for truth in truths}):
+            return [found[truth.run] for truth in truths]
         time.sleep(0.1)
+
+
+def settle(stand: Stand, truth: Truth, since: float) -> tuple[str, float]:
+    """The same of one run."""
+    return settled(stand, [truth], since)[0]
 
 
 def verdict(stand: Stand, truth: Truth, seen: str) -> str:
@@ -72,7 +84,10 @@ def _orphans(stand: Stand, truth: Truth, seen: str) -> str:
 
 
 def _success(stand: Stand, truth: Truth, seen: str) -> str:
+    """By the book, or by the outcome that only a worker writes so: one may hang after it."""
     done = any(entry["what"] == "end" and entry["code"] == 0 for entry in stand.entries(truth.run))
+    if not done and (ended := folder.outcome(stand.runs / truth.run)) is not None:
+        done = ended.state == "succeeded" and bool(ended.digest)
     return "lie: no worker has succeeded" if seen == "succeeded" and not done else ""
 
 

@@ -43,8 +43,8 @@ def rows(stand: Stand, strike: Strike) -> Iterator[Row]:
     since = time.monotonic()
     truths = [_after(life) for life in lives]
     first = []
-    for situation, truth in zip(strike.lives, truths, strict=True):
-        seen, seconds = judge.settle(stand, truth, since)
+    ends = judge.settled(stand, truths, since)
+    for situation, truth, (seen, seconds) in zip(strike.lives, truths, ends, strict=True):
         wrong = judge.verdict(stand, truth, seen)
         first.append((situation.__name__.replace("_", " "), truth, seen, seconds, wrong))
     stand.again()

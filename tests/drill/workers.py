@@ -29,6 +29,8 @@ class Blow:
     sends: Sent | None = None
     plan: tuple[tuple[str, object], ...] = ()
     cancels: bool = False
+    goes: bool = False
+    """Whether it gets its sign afterwards: what is left of it can come to its end."""
 
 
 def blows() -> Iterator[Blow]:
@@ -38,7 +40,7 @@ def blows() -> Iterator[Blow]:
         yield Blow(f"{number.name} to rank 0", states, ("rank", number))
     yield Blow("SIGKILL to the launcher", NODE, ("launcher", signal.SIGKILL))
     yield Blow("SIGTERM to the launcher", PREEMPTED, ("launcher", signal.SIGTERM))
-    yield Blow("SIGKILL to the launcher's proxy", NODE | FAILED, ("proxy", signal.SIGKILL))
+    yield Blow("SIGKILL to the launcher's proxy", NODE | FAILED | SUCCEEDED, ("proxy", signal.SIGKILL), goes=True)
     yield Blow("SIGKILL to all processes of the run", NODE, ("all", signal.SIGKILL))
     yield Blow("SIGSTOP to all, then a cancel", CANCELLED, ("all", signal.SIGSTOP), cancels=True)
     yield Blow("SIGSTOP to rank 0, then a cancel", CANCELLED, ("rank", signal.SIGSTOP), cancels=True)
@@ -64,9 +66,8 @@ def rows(stand: Stand, adopted: bool) -> Iterator[Row]:
     for blow, run in zip(all_, runs, strict=True):
         _deal(stand, blow, run)
     found = []
-    for blow, run in zip(all_, runs, strict=True):
-        truth = Truth(run, blow.states | ({"lost/service"} if adopted and blow.states is FAILED else set()))
-        seen, seconds = judge.settle(stand, truth, since)
+    truths = [Truth(run, _states(blow, adopted)) for blow, run in zip(all_, runs, strict=True)]
+    for truth, (seen, seconds) in zip(truths, judge.settled(stand, truths, since), strict=True):
         found.append((truth, seen, seconds, judge.verdict(stand, truth, seen)))
     stand.again()
     whose = "adopted" if adopted else "own"
@@ -74,6 +75,12 @@ def rows(stand: Stand, adopted: bool) -> Iterator[Row]:
         later = stand.state(truth.run)
         wrong = f"lie: {later} after the next start" if wrong == TRUE and later != seen else wrong
         yield Row(f"{blow.name} ({whose})", "kill", seen, seconds, wrong)
+
+
+def _states(blow: Blow, adopted: bool) -> frozenset[str]:
+    """Of a worker that is not the server's child nobody may know the exit code: when its launcher is gone as well."""
+    silent = blow.states is FAILED or (blow.sends is not None and blow.sends[0] in {"launcher", "all"})
+    return blow.states | {"lost/service"} if adopted and silent else blow.states
 
 
 def _deal(stand: Stand, blow: Blow, run: str) -> None:
@@ -84,7 +91,7 @@ def _deal(stand: Stand, blow: Blow, run: str) -> None:
                 os.kill(pid, number)
     if blow.cancels:
         stand.cancel(run)
-    elif blow.sends is None:
+    elif blow.sends is None or blow.goes:
         stand.go(run)
 
 

@@ -178,3 +178,23 @@ def test_a_folder_that_is_locked_away_keeps_no_server_from_its_start(
         ended = turned(house, run)
     assert (ended.state, ended.cause) == (State.LOST, "storage")
     house.store.close()
+
+
+@pytest.mark.parametrize("state", [State.QUEUED, State.RUNNING])
+def test_a_run_whose_folder_was_emptied_is_taken_up_all_the_same(tmp_path: Path, state: State) -> None:
+    house = House(tmp_path / "runs")
+    house.puppets.ends = "never"
+    run = turned(house, house.accept(), State.RUNNING)
+    if state is State.QUEUED:
+        run = house.accept()
+        house.supervisor._turn()
+    path = house.settings.runs / run.id
+    shutil.rmtree(path)
+    path.mkdir()
+    for puppet in house.puppets.made:
+        puppet.alive = False
+    house.supervisor = house.begin()
+    ended = turned(house, run)
+    assert ended.state in {State.LOST, State.FAILED}
+    assert len(house.puppets.made) == 1
+    house.store.close()

@@ -156,7 +156,8 @@ def test_wall_time(outcome: Outcome | None) -> None:
         (9, True, State.RUNNING, State.FAILED, Cause.MEMORY),
         (137, True, State.RUNNING, State.FAILED, Cause.MEMORY),
         (-9, False, State.RUNNING, State.LOST, Cause.NODE),
-        (None, False, State.RUNNING, State.FAILED, Cause.SERVICE),
+        (None, False, State.RUNNING, State.LOST, Cause.SERVICE),
+        (None, False, State.STARTING, State.LOST, Cause.SERVICE),
     ],
 )
 def test_an_end_without_outcome_is_never_a_success(
