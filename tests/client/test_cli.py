@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -255,22 +256,31 @@ def test_run_does_it_all_and_leaves_no_process(alone: Path) -> None:
     assert json.loads(checked.stdout)["outcome"]["steps"] == 3
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_run_is_cancelled(alone: Path, number: signal.Signals) -> None:
-    runs = alone / "runs"
-    words = ["run", str(case_file(alone, steps=2000, pace=0.02)), "--out", str(runs)]
-    child = subprocess.Popen([*CONOID, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+def test_an_interrupted_run_is_cancelled(alone: Path) -> None:
+    """By SIGINT and by SIGTERM, both at once, each with a server of its own."""
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    folders = {number: alone / f"runs-{number.value}" for number in numbers}
+    case = str(case_file(alone, steps=2000, pace=0.02))
+    children = {
+        number: subprocess.Popen(
+            [*CONOID, "run", case, "--out", str(runs)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        for number, runs in folders.items()
+    }
     try:
-        wait_for(lambda: a_run_runs(runs))
-        child.send_signal(number)
-        printed, complained = child.communicate(timeout=60)
+        for number, child in children.items():
+            wait_for(partial(a_run_runs, folders[number]))
+            child.send_signal(number)
+        for number, child in children.items():
+            printed, complained = child.communicate(timeout=60)
+            assert child.returncode == 4, complained
+            assert "cancelling: the run stops at its next step" in printed
+            outcome = next(folders[number].glob("*/outcome.json"))
+            assert json.loads(outcome.read_bytes())["state"] == "cancelled"
+            assert processes_of(folders[number]) == []
     finally:
-        child.kill()
-    assert child.returncode == 4, complained
-    assert "cancelling: the run stops at its next step" in printed
-    outcome = next(runs.glob("*/outcome.json"))
-    assert json.loads(outcome.read_bytes())["state"] == "cancelled"
-    assert processes_of(runs) == []
+        for child in children.values():
+            child.kill()
 
 
 def test_a_killed_client_leaves_no_server(alone: Path) -> None:

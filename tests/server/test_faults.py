@@ -133,20 +133,21 @@ def test_who_was_stopped_by_nobody_known_was_not_cancelled(server: Running, tmp_
     assert (ended["outcome"]["state"], ended["outcome"]["cause"]) == ("failed", "preempted")
 
 
-@pytest.mark.parametrize("adopted", [False, True])
-def test_a_rank_that_is_killed_is_a_matter_of_the_node(process: MakeProcess, tmp_path: Path, adopted: bool) -> None:
-    server = process("--no-zenoh")
+def test_a_rank_that_is_killed_is_a_matter_of_the_node(process: MakeProcess, tmp_path: Path) -> None:
+    """For the server that has started it, and for the next one."""
+    server = process("--no-zenoh", "--slots", "4")
     ann = server.user(server.start()["url"])
-    run = ann.submit(ranks=2, wait=str(tmp_path / "go"))
-    ann.wait_for(run, State.RUNNING)
-    if adopted:
-        server.end(signal.SIGKILL)
-        ann = server.user(server.start()["url"])
-    pids = processes.of_run(run)
-    assert len(pids) >= 3
-    os.kill(pids[-1], signal.SIGKILL)
-    ended = ann.wait_for(run)
-    assert (ended["state"], ended["cause"]) == ("lost", "node"), ended["message"]
+    runs = [ann.submit(ranks=2, wait=str(tmp_path / "go")) for _ in range(2)]
+    for n, run in enumerate(runs):
+        ann.wait_for(run, State.RUNNING)
+        if n:
+            server.end(signal.SIGKILL)
+            ann = server.user(server.start()["url"])
+        pids = processes.of_run(run)
+        assert len(pids) >= 3
+        os.kill(pids[-1], signal.SIGKILL)
+        ended = ann.wait_for(run)
+        assert (ended["state"], ended["cause"]) == ("lost", "node"), ended["message"]
 
 
 # Clocks ---------------------------------------------------------------------------------------------------------------
