@@ -5,7 +5,7 @@ import re
 import secrets
 import shutil
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from functools import reduce
@@ -101,8 +101,12 @@ def _letters(number: int, length: int) -> str:
     return "".join(_LETTERS[number >> 5 * place & 31] for place in reversed(range(length)))
 
 
-def create(runs: Path, submission: Submission, case: bytes, resolved: bytes) -> Path:
-    """Makes the folder of an accepted run; it appears whole, and is on disk when this returns. Raises OSError."""
+def create(
+    runs: Path, submission: Submission, case: bytes, resolved: bytes, fill: Callable[[Path], None] | None = None
+) -> Path:
+    """Makes the folder of an accepted run, in which ``fill`` puts what else belongs there; it appears whole, and is on
+    disk when this returns. Raises OSError, and what ``fill`` raises.
+    """
     beside, folder = runs / f"{_NEW}{submission.id}", runs / submission.id
     accepted = Status(run=submission.id, seq=1, wall=submission.submitted, state=State.ACCEPTED)
     beside.mkdir(0o700)
@@ -111,6 +115,8 @@ def create(runs: Path, submission: Submission, case: bytes, resolved: bytes) -> 
     durable.write_new(beside / layout.RESOLVED_CASE, resolved)
     durable.write_new(beside / layout.SUBMISSION, msgspec.json.format(msgspec.json.encode(submission), indent=2))
     durable.write_new(beside / layout.JOURNAL, to_json(accepted) + b"\n")
+    if fill is not None:
+        fill(beside)
     durable.sync_folder(beside)
     os.rename(beside, folder)
     durable.sync_folder(runs)

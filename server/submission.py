@@ -5,6 +5,7 @@ import re
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 from sqlalchemy.exc import SQLAlchemyError
@@ -12,7 +13,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from conoid.cases.batch import profile_of
 from conoid.cases.load import CaseError
 
-from . import folder, limits
+from . import folder, limits, restarts
 from .errors import ServiceError, database_away, invalid_case
 from .folder import Submission
 from .reader import the_reader
@@ -38,6 +39,8 @@ class Wishes:
     """Of a batch system; empty: what the case names, or the site's default."""
     priority: int = 0
     """Among his own runs."""
+    restart: str = ""
+    """The run, his own, from whose newest checkpoint this one goes on."""
 
 
 class Desk:
@@ -70,7 +73,8 @@ class Desk:
             )  # fmt: skip
         wishes = wishes or Wishes()
         self._profile(wishes.profile, named=True)
-        digest = hashlib.sha256(_file_name(content_type).encode() + b"\0" + body).hexdigest()
+        said = f"{_file_name(content_type)}{wishes.restart}"
+        digest = hashlib.sha256(said.encode() + b"\0" + body).hexdigest()
         if earlier := self._earlier(owner, key, digest):
             return earlier
         try:
@@ -132,11 +136,16 @@ class Desk:
         )  # fmt: skip
         run = folder.first(made)
         try:
-            folder.create(self._settings.runs, made, body, reading.resolved)
+            runs = self._settings.runs
+            fill = partial(restarts.fill, runs / wishes.restart) if wishes.restart else None
+            folder.create(runs, made, body, reading.resolved, fill)
             self._store.add(run, key)
         except OSError as error:
             folder.discard(self._settings.runs, run_id)
             raise ServiceError(507, "storage", f"the run cannot be kept: {error.strerror}", retryable=True) from error
+        except ServiceError:
+            folder.discard(self._settings.runs, run_id)
+            raise
         except SQLAlchemyError as error:
             folder.discard(self._settings.runs, run_id)
             raise database_away(error) from error
