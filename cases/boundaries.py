@@ -6,7 +6,10 @@ from pydantic import Field
 
 from .motion import Spin
 from .tables import Axis, Direction, Model, Name, Point
-from .units import Acceleration, Length, Speed, Stress
+from .units import Acceleration, Length, Ratio, Speed, Stress, Time
+
+Course = tuple[tuple[Time, Ratio], ...]
+"""Times and factors, in this order."""
 
 
 class Symmetry(Model):
@@ -57,6 +60,9 @@ class Prescribed(Model):
     """Velocity along y; without it the nodes are free along y."""
     z: Speed | None = None
     """Velocity along z; without it the nodes are free along z."""
+    course: Course = ()
+    """Pairs of a time and a factor of the velocity: linear in between, constant before the first and after the last.
+    Without them the velocity is constant. ``[["0 us", 0], ["2 us", 1]]`` is a ramp."""
 
 
 class Rotation(Model):
@@ -83,12 +89,17 @@ class Gravity(Model):
 
 class Traction(Model):
     """A force per initial area, Pa, on the exposed faces whose three nodes start inside the box ``low``..``high`` (all
-    of the parts when absent): constant from the first moment on, and turning with nothing."""
+    of the parts when absent), turning with nothing. Either ``stress`` or ``pressure`` is given."""
 
     kind: Literal["traction"]
     """The kind of boundary."""
-    stress: tuple[Stress, Stress, Stress]
+    stress: tuple[Stress, Stress, Stress] | None = None
     """Force per area along x, y, z; not zero."""
+    pressure: Stress | None = None
+    """Force per area against the initial outward normal of each face; not zero."""
+    course: Course = ()
+    """Pairs of a time and a factor of the force: linear in between, constant before the first and after the last.
+    Without them the force is constant from the first moment on."""
     parts: tuple[Name, ...] = ()
     """Parts that it acts on; all when empty."""
     low: Point | None = None

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from itertools import pairwise
 
 from .bodies import MeshFile
 from .geometry import lowest_along
@@ -25,15 +26,33 @@ def check_boundaries(case: Case) -> Iterator[Problem]:
         elif isinstance(boundary, Gravity) and not any(boundary.acceleration):
             yield problem(("boundaries", i, "acceleration"), "0, 0, 0", "must not be zero")
         elif isinstance(boundary, Traction):
-            if not any(boundary.stress):
-                yield problem(("boundaries", i, "stress"), "0, 0, 0", "must not be zero")
-            yield from _box(boundary, ("boundaries", i))
+            yield from _traction(boundary, ("boundaries", i))
 
 
 def _prescribed(boundary: Prescribed, location: Location) -> Iterator[Problem]:
     if boundary.x is None and boundary.y is None and boundary.z is None:
         yield problem(location, ..., "prescribes nothing; give one or more of x, y, z")
     yield from _box(boundary, location)
+    yield from _course(boundary, location)
+
+
+def _traction(boundary: Traction, location: Location) -> Iterator[Problem]:
+    if (boundary.stress is None) == (boundary.pressure is None):
+        yield problem(location, ..., "give either stress or pressure")
+    elif boundary.stress is not None and not any(boundary.stress):
+        yield problem((*location, "stress"), "0, 0, 0", "must not be zero")
+    elif boundary.pressure == 0.0:
+        yield problem((*location, "pressure"), 0, "must not be zero")
+    yield from _box(boundary, location)
+    yield from _course(boundary, location)
+
+
+def _course(boundary: Prescribed | Traction, location: Location) -> Iterator[Problem]:
+    for k, ((before, _), (after, _)) in enumerate(pairwise(boundary.course)):
+        if not after > before:
+            yield problem(
+                (*location, "course", k + 1, 0), after, f"must be later than the time before it, {before:g} s"
+            )
 
 
 def _box(boundary: Prescribed | Traction, location: Location) -> Iterator[Problem]:

@@ -15,7 +15,7 @@ from .materials import Material
 from .mesh_checks import check_mesh
 from .overlap import overlaps
 from .problems import Location, Problem, choices, dotted, nearest, problem
-from .schema import Case, Contact, Part, Reference, Symmetry, Wall
+from .schema import Case, Contact, Part, Probe, Reference, Symmetry, Wall
 
 NEEDED: dict[str, frozenset[str]] = {
     "extent": frozenset({"part", "axis"}),
@@ -175,8 +175,10 @@ def _probes(case: Case) -> Iterator[Problem]:
             yield problem(("probes", i, "part"), probe.part, f"no part of this name; {nearest(probe.part, parts)}")
             continue
         body = bounds(parts[probe.part].mesh)
-        if probe.low is not None and probe.field.startswith("contact_force"):
-            yield problem(("probes", i), ..., "contact_force is that of the whole part; remove low and high")
+        if probe.low is not None and "_force_" in probe.field:
+            message = f"{probe.field[:-2]} is that of the whole part; remove low and high"
+            yield problem(("probes", i), ..., message)
+        yield from _wall_of(case, i, probe)
         turned = parts[probe.part].turn is not None
         if body is None or turned or probe.low is None or probe.high is None:
             continue
@@ -184,6 +186,18 @@ def _probes(case: Case) -> Iterator[Problem]:
             if probe.high[d] < a or probe.low[d] > b:
                 message = f"the box misses part {probe.part!r}, which lies between {a:g} and {b:g} m along {AXES[d]}"
                 yield problem(("probes", i), ..., message)
+
+
+def _wall_of(case: Case, number: int, probe: Probe) -> Iterator[Problem]:
+    """A force of a wall that is not there, or a wall where none is measured."""
+    names = [wall.name for _, wall in case.boundaries_of(Wall)]
+    if not probe.field.startswith("wall_force"):
+        if probe.wall is not None:
+            yield problem(("probes", number, "wall"), probe.wall, "is of wall_force alone; remove it")
+    elif not names:
+        yield problem(("probes", number, "field"), probe.field, "the case has no wall")
+    elif probe.wall is not None and probe.wall not in names:
+        yield problem(("probes", number, "wall"), probe.wall, f"no wall of this name; {nearest(probe.wall, names)}")
 
 
 def _references(case: Case) -> Iterator[Problem]:

@@ -9,6 +9,7 @@ ProbeField = Literal[
     "stress_xx", "stress_yy", "stress_zz", "stress_yz", "stress_zx", "stress_xy",
     "pressure", "mises", "plastic_strain", "damage", "temperature", "density", "internal_energy",
     "velocity_x", "velocity_y", "velocity_z", "contact_force_x", "contact_force_y", "contact_force_z",
+    "wall_force_x", "wall_force_y", "wall_force_z",
 ]  # fmt: skip
 
 
@@ -17,7 +18,7 @@ class Probe(Model):
 
     Without ``low`` and ``high`` it is the whole part. ``internal_energy`` is per mass, J/kg; stresses are positive in
     tension, pressure in compression. ``contact_force`` is what other bodies push the whole part with, N, as a mean
-    since the line before.
+    since the line before; ``wall_force`` what a wall, or all walls, push it with.
     """
 
     name: Name
@@ -26,6 +27,8 @@ class Probe(Model):
     """Whose tets are measured."""
     field: ProbeField
     """What is measured."""
+    wall: Name | None = None
+    """Of ``wall_force``: the name of the wall; all walls when absent."""
     low: Point | None = None
     """Lowest corner of the box; with ``high``."""
     high: Point | None = None

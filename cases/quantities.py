@@ -11,6 +11,7 @@ FIELD_UNITS: dict[str, str] = {
     "pressure": "Pa", "mises": "Pa", "plastic_strain": "", "damage": "", "temperature": "K", "density": "kg/m^3",
     "internal_energy": "J/kg", "velocity_x": "m/s", "velocity_y": "m/s", "velocity_z": "m/s",
     "contact_force_x": "N", "contact_force_y": "N", "contact_force_z": "N",
+    "wall_force_x": "N", "wall_force_y": "N", "wall_force_z": "N",
 }  # fmt: skip
 """Unit of every field that a probe reads."""
 

@@ -1,6 +1,5 @@
 """From a body to an accepted run: read, check, estimate, write to disk, and only then say yes."""
 
-import hashlib
 import re
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -8,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
+import msgspec
 from sqlalchemy.exc import SQLAlchemyError
 
 from conoid.cases.batch import profile_of
@@ -73,16 +73,15 @@ class Desk:
             )  # fmt: skip
         wishes = wishes or Wishes()
         self._profile(wishes.profile, named=True)
-        said = f"{_file_name(content_type)}{wishes.restart}"
-        digest = hashlib.sha256(said.encode() + b"\0" + body).hexdigest()
-        if earlier := self._earlier(owner, key, digest):
+        digest = folder.digest_of(_file_name(content_type), body)
+        if earlier := self._earlier(owner, key, digest, wishes.restart):
             return earlier
         try:
             reading = self.read(body, content_type)
         except CaseError as error:
             raise invalid_case(error.problems) from None
         with self._lock:
-            return self._earlier(owner, key, digest) or self._accept(
+            return self._earlier(owner, key, digest, wishes.restart) or self._accept(
                 owner,
                 body,
                 content_type,
@@ -107,15 +106,16 @@ class Desk:
             raise ServiceError(400, "bad_parameter", str(error), pointer="profile") from None
         return ""
 
-    def _earlier(self, owner: str, key: str | None, digest: str) -> dict[str, Any] | None:
+    def _earlier(self, owner: str, key: str | None, digest: str, restart: str) -> dict[str, Any] | None:
         run_id = self._store.run_of_key(owner, key) if key is not None else None
         if run_id is None:
             return None
         try:
             made = folder.submission(self._settings.runs / run_id)
-        except OSError:
-            raise ServiceError(410, "gone", f"the run of Idempotency-Key {key!r} has been removed") from None
-        if made.body_sha256 != digest:
+        except (*folder.DAMAGED, msgspec.MsgspecError):
+            detail = f"the run of Idempotency-Key {key!r} was {run_id}; its folder has been removed or damaged"
+            raise ServiceError(410, "gone", detail) from None
+        if made.body_sha256 != digest or restart not in {"", made.labels.get(restarts.LABEL)}:
             detail = f"Idempotency-Key {key!r} was used for another case"
             raise ServiceError(422, "key_reused", detail, pointer="Idempotency-Key", hint="use a new key for a new run")
         return receipt(made)

@@ -11,7 +11,7 @@ import msgspec
 from conoid.cases.outcome import Outcome
 from conoid.cases.run import State
 
-from . import folder
+from . import folder, pins
 from .errors import ServiceError
 from .events import Run
 from .service import Service
@@ -35,7 +35,7 @@ def snapshot(service: Service, run: Run) -> Snapshot:
     path = service.settings.runs / run.id
     made = _submission(path)
     progress = service.supervisor.progress(run.id)
-    ended: Outcome | None = folder.outcome(path) if run.state.final else None
+    ended = outcome(path) if run.state.final else None
     body = {
         **brief(service, run),
         "title": made.title if made else "",
@@ -55,13 +55,21 @@ def _submission(path: Path) -> folder.Submission | None:
         return None
 
 
+def outcome(path: Path) -> Outcome | None:
+    """None where the file is gone, damaged, or locked away."""
+    try:
+        return folder.outcome(path)
+    except OSError:
+        return None
+
+
 def labels(service: Service, run: Run) -> dict[str, str]:
     """Those it was submitted with; none where the folder of the run has been removed or damaged."""
     path = service.settings.runs / run.id
     made = _submission(path)
     if made is None:
         return {}
-    told = folder.pin_told(path)
+    told = pins.told(path)
     return {**made.labels, "keep": told} if told else made.labels
 
 

@@ -150,8 +150,11 @@ def _loads(case: schema.Case, x: Floats, part: Indices, tets: Indices) -> list[L
         loaded = faces[inside]
         if not len(loaded):
             raise InputError(f"boundaries[{index}]: acts on no face; check its box and its parts")
-        area = 0.5 * np.linalg.norm(normals(x, loaded), axis=1)
-        force = area[:, None] / 3.0 * np.array(spec.stress)
+        outward = 0.5 * normals(x, loaded)
+        if spec.stress is not None:
+            force = np.linalg.norm(outward, axis=1)[:, None] / 3.0 * np.array(spec.stress)
+        else:
+            force = -(spec.pressure or 0.0) / 3.0 * outward
         of, nodes = np.repeat(tet[inside], 3).astype(np.int64), loaded.reshape(-1).astype(np.int64)
         loads.append(Load(np.arange(len(of)), of, nodes, np.repeat(force, 3, axis=0)))
     return loads

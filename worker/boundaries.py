@@ -128,6 +128,8 @@ class RigidWalls(Boundary):
         self._normals = normals / np.linalg.norm(normals, axis=1)[:, None]
         self._held = held
         self._pushed = False
+        self.given = np.zeros((len(nodes), 3 * len(points)))
+        """(n, 3 walls) what each wall has given each node so far, N s."""
 
     def held_components(self) -> Bits:
         return free(self.nodes)
@@ -142,9 +144,17 @@ class RigidWalls(Boundary):
 
     def _inherit(self, at: Ints) -> None:
         self._held = extended(self._held, self._held[at])
+        self.given = extended(self.given, np.zeros((len(at), self.given.shape[1])))
+
+    def keep(self, parcel: Parcel, name: str) -> None:
+        super().keep(parcel, name)
+        column = np.zeros((length(parcel.nodes), self.given.shape[1]))
+        column[self.nodes] = self.given
+        parcel.nodes[f"{name}.given"] = column
 
     def resume(self, parcel: Parcel, name: str, dt: float) -> None:
         super().resume(parcel, name, dt)
+        self.given = parcel.nodes[f"{name}.given"][self.nodes]
         self._pushed = True
 
     def note(self, state: Nodes) -> None:
@@ -155,7 +165,16 @@ class RigidWalls(Boundary):
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
         self._pushed = dt > 0.0 and _push_out(
-            state.x, state.v, self._impulse, state.mass, self.nodes, self._points, self._normals, self._held, dt
+            state.x,
+            state.v,
+            self._impulse,
+            self.given,
+            state.mass,
+            self.nodes,
+            self._points,
+            self._normals,
+            self._held,
+            dt,
         )
         if self._pushed:
             self.last_push = t
@@ -198,13 +217,15 @@ def _hold(v, nodes, axis):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    "boolean(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], int32[::1], float64[:, ::1], "
-    "float64[:, ::1], boolean[:, ::1], float64)",
+    "boolean(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], int32[::1], "
+    "float64[:, ::1], float64[:, ::1], boolean[:, ::1], float64)",
     cache=True,
     error_model="numpy",
 )
-def _push_out(x, v, impulse, mass, nodes, points, normals, held, dt):  # type: ignore[no-untyped-def]
-    """Impulse form: the gap at the end of the step is never negative. Adds to ``impulse``; whether a wall pushed."""
+def _push_out(x, v, impulse, given, mass, nodes, points, normals, held, dt):  # type: ignore[no-untyped-def]
+    """Impulse form: the gap at the end of the step is never negative. Adds to ``impulse`` and to what each wall has
+    ``given``; whether a wall pushed.
+    """
     pushed = False
     for j in range(len(nodes)):
         a = nodes[j]
@@ -220,6 +241,7 @@ def _push_out(x, v, impulse, mass, nodes, points, normals, held, dt):  # type: i
                         change = -(gap / dt + speed) * normals[k, i]
                         v[a, i] += change
                         impulse[j, i] += mass[a] * change
+                        given[j, 3 * k + i] += mass[a] * change
                     moved = pushed = True
             if not moved or len(points) == 1:
                 break

@@ -5,7 +5,7 @@ import numpy as np
 from conoid.cases import schema
 
 from .boundaries import MIRRORED, PRESCRIBED, Boundary, RigidWalls, SymmetryPlane
-from .drivers import Gravity, PrescribedRotation, PrescribedVelocity, Traction
+from .drivers import Course, Gravity, PrescribedRotation, PrescribedVelocity, Traction
 from .errors import InputError
 from .migration.parcel import Parcel
 from .parallel.comm import Comm
@@ -33,14 +33,17 @@ def build(case: schema.Case, model: Model, loads: list[Load]) -> list[Boundary]:
     boundaries: list[Boundary] = [
         Gravity(_indices(held[i]), np.array(spec.acceleration)) for i, spec in case.boundaries_of(schema.Gravity)
     ]
-    boundaries += [Traction(nodes.places(load.nodes), load) for load in loads]
+    boundaries += [
+        Traction(nodes.places(load.nodes), load, Course(spec.course))
+        for (_, spec), load in zip(case.boundaries_of(schema.Traction), loads, strict=True)
+    ]
     boundaries += [
         SymmetryPlane(_indices(held[i]), _AXES[spec.axis]) for i, spec in case.boundaries_of(schema.Symmetry)
     ]
     for spec, h in zip(case.boundaries, held, strict=True):
         if isinstance(spec, schema.Prescribed):
             velocity = np.array([np.nan if c is None else c for c in (spec.x, spec.y, spec.z)])
-            boundaries.append(PrescribedVelocity(_indices(h), velocity))
+            boundaries.append(PrescribedVelocity(_indices(h), velocity, Course(spec.course)))
         elif isinstance(spec, schema.Rotation):
             centre, rate = np.array(spec.spin.centre), np.array(spec.spin.rate)
             boundaries.append(PrescribedRotation(_indices(h), centre, rate))

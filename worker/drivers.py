@@ -1,5 +1,7 @@
 """Boundaries that do work from outside: gravity, tractions, prescribed motion."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from .boundaries import FREE, KEPT, PRESCRIBED, Boundary, free
@@ -17,6 +19,24 @@ class Driver(Boundary):
 
     def _book(self) -> None:
         self.external_work += 0.5 * (self._impulse * self._before).sum(axis=1)
+
+
+class Course:
+    """A factor over time: linear between the given ``points`` (time, s, and factor), constant before and after; 1
+    without any.
+    """
+
+    def __init__(self, points: Sequence[tuple[float, float]] = ()) -> None:
+        self._times, self._factors = np.array(list(points) or [(0.0, 1.0)]).T
+
+    def mean(self, begin: float, end: float) -> float:
+        """Of the factor between two times, s, exactly; its value where they are one."""
+        within = self._times[(self._times > begin) & (self._times < end)]
+        times = np.array([begin, *within, end])
+        values = np.interp(times, self._times, self._factors)
+        if end <= begin or (values == values[0]).all():
+            return float(values[0])
+        return float((0.5 * np.diff(times) * (values[1:] + values[:-1])).sum() / (end - begin))
 
 
 class Gravity(Driver):
@@ -43,14 +63,14 @@ class Gravity(Driver):
 
 
 class Traction(Driver):
-    """Constant forces on corners of tets, over the mean step of the kick.
+    """Forces on corners of tets, times the mean factor of the ``course`` over the mean step of the kick.
 
     ``load`` is on all ``corners`` (m,) that are local nodes.
     """
 
-    def __init__(self, corners: Indices, load: Load) -> None:
+    def __init__(self, corners: Indices, load: Load, course: Course) -> None:
         super().__init__(np.unique(corners))
-        self._corners, self._load = corners, load
+        self._corners, self._load, self._course = corners, load, course
         self.force = self._summed()
         """(n, 3) N."""
         self._last_dt = 0.0
@@ -85,17 +105,22 @@ class Traction(Driver):
         return force
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
-        self._impulse = 0.5 * (self._last_dt + dt) * self.force
+        mean_dt = 0.5 * (self._last_dt + dt)
+        self._impulse = mean_dt * self._course.mean(t - 0.5 * self._last_dt, t + 0.5 * dt) * self.force
         self._last_dt = dt
         state.v[self.nodes] += self._impulse / state.mass[self.nodes, None]
         self._book()
 
 
 class PrescribedVelocity(Driver):
-    """Nodes whose velocity has given components; NaN leaves a component free."""
+    """Nodes whose velocity has given components, times the factor of the ``course``; NaN leaves a component free.
 
-    def __init__(self, nodes: Indices, velocity: Floats) -> None:
+    A step takes the mean factor over its length, so that positions at n are those of the course.
+    """
+
+    def __init__(self, nodes: Indices, velocity: Floats, course: Course) -> None:
         super().__init__(nodes)
+        self._course = course
         self._velocity = np.broadcast_to(velocity, (len(nodes), 3))
 
     def held_components(self) -> Bits:
@@ -104,15 +129,15 @@ class PrescribedVelocity(Driver):
     def _inherit(self, at: Ints) -> None:
         self._velocity = extended(self._velocity, self._velocity[at])
 
-    def _target(self, state: Nodes, dt: float) -> Floats:
+    def _target(self, state: Nodes, dt: float, t: float) -> Floats:
         free = state.v[self.nodes]
-        return np.where(np.isnan(self._velocity), free, self._velocity)
+        return np.where(np.isnan(self._velocity), free, self._course.mean(t, t + dt) * self._velocity)
 
     def start(self, state: Nodes) -> None:
-        state.v[self.nodes] = self._target(state, 0.0)
+        state.v[self.nodes] = self._target(state, 0.0, 0.0)
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
-        new = self._target(state, dt)
+        new = self._target(state, dt, t)
         self._impulse = state.mass[self.nodes, None] * (new - state.v[self.nodes])
         state.v[self.nodes] = new
         self._book()
@@ -122,11 +147,11 @@ class PrescribedRotation(PrescribedVelocity):
     """Nodes that turn rigidly: each step is the chord of the exact rotation."""
 
     def __init__(self, nodes: Indices, centre: Floats, rate: Floats) -> None:
-        super().__init__(nodes, np.zeros(3))
+        super().__init__(nodes, np.zeros(3), Course())
         self._centre = centre
         self._rate = rate
 
-    def _target(self, state: Nodes, dt: float) -> Floats:
+    def _target(self, state: Nodes, dt: float, t: float) -> Floats:
         r = state.x[self.nodes] - self._centre
         speed = float(np.linalg.norm(self._rate))
         if dt == 0.0 or speed == 0.0:

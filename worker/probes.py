@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 
-from conoid.cases.schema import Case, Probe
+from conoid.cases.schema import Case, Probe, Wall
 
+from .boundaries import RigidWalls
 from .clock import Clock
 from .contact.stage import Contact
 from .errors import InputError
@@ -38,6 +39,7 @@ _NORMAL = {"stress_xx": S_XX, "stress_yy": S_YY, "stress_zz": S_ZZ}
 _SHEAR = {"stress_yz": S_YZ, "stress_zx": S_ZX, "stress_xy": S_XY}
 _ROWS = {"plastic_strain": PLASTIC_STRAIN, "damage": DAMAGE, "temperature": TEMPERATURE, **_SHEAR}
 _FORCE = {"contact_force_x": 0, "contact_force_y": 1, "contact_force_z": 2}
+_WALL = {"wall_force_x": 0, "wall_force_y": 1, "wall_force_z": 2}
 _VELOCITY = {"velocity_x": 0, "velocity_y": 1, "velocity_z": 2}
 
 
@@ -77,12 +79,21 @@ def field(block: Block, name: str, model: Model, places: Ints) -> Floats:
 class Probes:
     """The probes of a case on this rank."""
 
-    def __init__(self, case: Case, model: Model, contact: Contact | None, clock: Clock, comm: Comm) -> None:
+    def __init__(
+        self, case: Case, model: Model, contact: Contact | None, walls: RigidWalls | None, clock: Clock, comm: Comm
+    ) -> None:
         self.names = [probe.name for probe in case.probes]
         self._fields = [probe.field for probe in case.probes]
         self._parts = [model.parts.index(probe.part) for probe in case.probes]
-        self._contact, self._clock = contact, clock
-        self._pushed, self._since = np.zeros((len(model.parts), 3)), 0.0
+        self._contact, self._walls, self._clock = contact, walls, clock
+        self._pushed, self._given = np.zeros((len(model.parts), 3)), np.zeros(len(case.probes))
+        self._since = 0.0
+        names = [wall.name for _, wall in case.boundaries_of(Wall)]
+        self._of_walls = [
+            [k for k, name in enumerate(names) if probe.wall in (None, name)] if probe.field in _WALL else []
+            for probe in case.probes
+        ]
+        """Which walls each probe is of."""
         self._model = model
         self._comm = comm
         centres = [model.nodes.x0[block.tets].mean(axis=1) for block in model.blocks] if case.probes else []
@@ -102,37 +113,58 @@ class Probes:
                 f"probes[{index}]: no tet of part {case.probes[index].part!r} has its centre between low and high"
             )
 
-    def keep(self) -> tuple[Floats, float]:
+    def keep(self) -> tuple[Floats, Floats, float]:
         """What they remember, equal on all ranks."""
-        return self._pushed, self._since
+        return self._pushed, self._given, self._since
 
-    def resume(self, known: tuple[Floats, float]) -> None:
+    def resume(self, known: tuple[Floats, Floats, float]) -> None:
         """Takes it back."""
-        self._pushed, self._since = known
+        self._pushed, self._given, self._since = known
 
     def measure(self) -> Floats:
         """(probes,) the present values, equal on any number of ranks; NaN when all tets of a probe have left."""
         if not self.names:
             return np.zeros(0)
-        forces = self._forces()
-        means = [k for k, name in enumerate(self._fields) if name not in _FORCE]
+        passed = self._clock.t - self._since
+        forces, walls = self._forces(passed), self._wall_forces(passed)
+        self._since = self._clock.t
+        means = [k for k, name in enumerate(self._fields) if name not in _FORCE and name not in _WALL]
         sums = iter(exact_sums(self._comm, *(self._sums(k) for k in means)).reshape(-1, 2))
         values = []
-        for name, part in zip(self._fields, self._parts, strict=True):
+        for k, (name, part) in enumerate(zip(self._fields, self._parts, strict=True)):
             if name in _FORCE:
                 values.append(float(forces[part, _FORCE[name]]))
+            elif name in _WALL:
+                values.append(float(walls[k]))
             else:
                 total, mass = next(sums)
                 values.append(float(total / mass) if mass > 0.0 else math.nan)
         return np.array(values)
 
-    def _forces(self) -> Floats:
-        """(parts, 3) mean force of contact on each part since the last call, N; zero when no time has passed."""
+    def _forces(self, passed: float) -> Floats:
+        """(parts, 3) mean force of contact on each part over the time ``passed``, s, since the last call, N; zero when
+        none has.
+        """
         if self._contact is None or not any(name in _FORCE for name in self._fields):
             return self._pushed
-        pushed, passed = self._contact.impulses(), self._clock.t - self._since
+        pushed = self._contact.impulses()
         forces = (pushed - self._pushed) / passed if passed > 0.0 else np.zeros_like(pushed)
-        self._pushed, self._since = pushed, self._clock.t
+        self._pushed = pushed
+        return np.asarray(forces)
+
+    def _wall_forces(self, passed: float) -> Floats:
+        """(probes,) the same of walls, zero for other probes; all ranks take part."""
+        nodes, walls = self._model.nodes, self._walls
+        if not any(name in _WALL for name in self._fields):
+            return self._given
+        columns = np.zeros((0 if walls is None else len(walls.nodes), len(self._fields)))
+        for k, name in enumerate(self._fields):
+            if walls is not None and name in _WALL:
+                mine = nodes.owned[walls.nodes] & (nodes.part[walls.nodes] == self._parts[k])
+                columns[:, k] = walls.given[:, [3 * w + _WALL[name] for w in self._of_walls[k]]].sum(axis=1) * mine
+        given = np.array([float(total) for total in exact_sums(self._comm, columns)])
+        forces = (given - self._given) / passed if passed > 0.0 else np.zeros_like(given)
+        self._given = given
         return np.asarray(forces)
 
     def _sums(self, probe: int) -> Floats:

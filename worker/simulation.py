@@ -11,7 +11,7 @@ from conoid.cases.schema import Case
 
 from . import conditions, domain
 from .assembly import Say, quiet
-from .boundaries import Boundary
+from .boundaries import Boundary, RigidWalls
 from .clock import Clock
 from .contact.stage import Contact
 from .elements.forms import AveragedElements, Elements
@@ -150,7 +150,8 @@ def _assemble(
     if case.erodes:
         erosion = Erosion(case, model, neighbours, contact, comm, clock, extremes)
         scene.append(Mirrors.of(case, model, scene))
-    probes = Probes(case, model, contact, clock, comm)
+    walls = next((bound for bound in scene if type(bound) is RigidWalls), None)
+    probes = Probes(case, model, contact, walls, clock, comm)
     elements = _elements(case, model, neighbours, node_volume, comm, timers)
     fracture = None
     if case.fractures:

@@ -96,6 +96,7 @@ def second_half(sim: Simulation) -> None:
         if sim.contact is not None:
             own = sim.reduction.own
             own.search, own.approach, own.opening = sim.contact.spent(nodes), sim.contact.approach, sim.contact.opening
+            own.short = sim.contact.short
             own.costs[sim.comm.rank] = sim.contact.costs
     _elements(sim, clock.dt, sim.fracture)  # 12 to 14
     if sim.fracture is not None:
@@ -127,7 +128,7 @@ def _elements(sim: Simulation, dt: float, fracture: Fracture | None) -> None:
     if not (math.isfinite(reduction.limit) and math.isfinite(reduction.force)):
         raise PhysicsError(f"{_when(sim)}: {sim.limiting_tet()} turned inside out, or its stress is not a number")
     if sim.contact is not None:
-        sim.contact.agree(reduction.search, reduction.approach, reduction.opening, reduction.costs.sum(axis=0))
+        sim.contact.agree(reduction)
     if sim.erosion is not None:
         sim.erosion.decide(reduction.worn)
     if fixed_point.outgrown(reduction.force, sim.scale):

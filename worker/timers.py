@@ -4,9 +4,6 @@ MPI polls while it waits: what a phase spends in calls that wait for other ranks
 it is in; the other phases are work. Kernels are loaded at their first call: that counts in no phase.
 """
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-
 from .jit import cpu_time
 from .parallel.comm import Comm
 
@@ -35,21 +32,23 @@ class Timers:
         """Counts ``rest`` from here on."""
         self._asked = cpu_time()
 
-    @contextmanager
-    def phase(self, name: str) -> Iterator[None]:
+    def phase(self, name: str) -> "_Phase":
         """Adds the CPU time of the block to a phase; a phase within it takes its own time out."""
-        start, outside = cpu_time(), self._inner
-        waited = self._comm.waited - self._booked
-        self._inner = 0.0
-        try:
-            yield
-        finally:
-            spent = cpu_time() - start
-            idle = self._comm.waited - self._booked - waited
-            self._booked += idle
-            self.seconds[name] += spent - self._inner - idle
-            self.seconds["exchange"] += idle
-            self._inner = outside + spent
+        return _Phase(self, name)
+
+    def enter(self) -> tuple[float, float, float]:
+        """CPU time and waiting so far, and the time of phases so far that lie within the one that goes on."""
+        outside, self._inner = self._inner, 0.0
+        return cpu_time(), self._comm.waited - self._booked, outside
+
+    def leave(self, name: str, start: float, waited: float, outside: float) -> None:
+        """The phase that has been entered ends."""
+        spent = cpu_time() - start
+        idle = self._comm.waited - self._booked - waited
+        self._booked += idle
+        self.seconds[name] += spent - self._inner - idle
+        self.seconds["exchange"] += idle
+        self._inner = outside + spent
 
     def since_last(self) -> tuple[dict[str, float], float]:
         """Seconds per phase since the last call, and how many of ``exchange`` were waiting; asked between phases."""
@@ -60,3 +59,18 @@ class Timers:
         waiting = self._booked - self._told
         self._reported, self._told = dict(self.seconds), self._booked
         return delta, waiting
+
+
+class _Phase:
+    """A block of the step; there are two dozen in every step, too many for generators."""
+
+    __slots__ = ("_entered", "_name", "_timers")
+
+    def __init__(self, timers: Timers, name: str) -> None:
+        self._timers, self._name = timers, name
+
+    def __enter__(self) -> None:
+        self._entered = self._timers.enter()
+
+    def __exit__(self, *_: object) -> None:
+        self._timers.leave(self._name, *self._entered)

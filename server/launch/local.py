@@ -9,13 +9,14 @@ import time
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
+from typing import BinaryIO
 
 from conoid.cases import layout
 
 from .. import folder as run_folder
 from ..folder import Process
 from ..settings import Settings, command, usable_cores
-from . import Exit, Job, LaunchError, Phase, Trace, Worker, processes
+from . import DamagedError, Exit, Job, LaunchError, Phase, Trace, Worker, processes
 
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _NOT_FOR_WORKERS = ("CONOID_DATABASE", "CONOID_TOKEN")
@@ -47,20 +48,20 @@ class LocalLauncher:
         """Starts the ranks; their terminal output goes to log/launcher.log. Raises LaunchError."""
         argv = [*find_mpiexec(self._mpiexec), "-n", str(job.ranks), *self._worker, *_arguments(job)]
         oom_kills = processes.oom_kills()
-        try:
-            with open(job.folder / layout.LOGS / layout.LAUNCHER_LOG, "ab") as log:
+        with _log_of(job.folder) as log:
+            try:
                 child = subprocess.Popen(
                     argv, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT, cwd=job.folder,
                     env=environment(os.environ, job), start_new_session=True,
                 )  # fmt: skip
-        except OSError as error:
-            raise LaunchError(f"{argv[0]} cannot be started: {error.strerror}") from None
+            except OSError as error:
+                raise LaunchError(f"{argv[0]} cannot be started: {error.strerror}") from None
         worker = LocalWorker(job.run, job.folder, _record(child.pid, oom_kills), child)
         try:
             run_folder.write_process(job.folder, worker.process)
         except OSError as error:
             worker.kill()
-            raise LaunchError(f"the worker cannot be recorded: {error.strerror}") from None
+            raise DamagedError(f"the worker cannot be recorded: {error.strerror}") from None
         return worker
 
     def find(self, run: str, folder: Path) -> Trace:
@@ -87,6 +88,15 @@ class LocalLauncher:
         """MPICH's ranks share memory through files that a kill leaves behind, 2 MB each time."""
         for path in processes.unused_shared_memory(Path("/dev/shm"), "mpich_shm_", _HOUR):
             path.unlink(missing_ok=True)
+
+
+def _log_of(folder: Path) -> BinaryIO:
+    """Where the ranks say what they have to say, in a folder that is made anew when it was removed."""
+    try:
+        (folder / layout.LOGS).mkdir(0o700, exist_ok=True)
+        return open(folder / layout.LOGS / layout.LAUNCHER_LOG, "ab")
+    except OSError as error:
+        raise DamagedError(f"{layout.LOGS} cannot be written: {error.strerror}") from None
 
 
 def find_mpiexec(chosen: str) -> tuple[str, ...]:

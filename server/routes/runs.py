@@ -16,7 +16,7 @@ from conoid.cases.load import CaseError
 from conoid.cases.policy import PRIORITY
 from conoid.cases.run import State
 
-from .. import folder, openapi, restarts, view
+from .. import folder, openapi, pins, restarts, view
 from ..auth import Identity, Pass, Reader, Submitter, unauthorized
 from ..errors import ServiceError, invalid_case, not_found
 from ..events import Run
@@ -175,7 +175,7 @@ def release(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
 
 def _pin(service: Service, run: Run, keep: bool) -> Response:
     try:
-        folder.pin(service.settings.runs / run.id, keep)
+        pins.pin(service.settings.runs / run.id, keep)
     except OSError as error:
         raise ServiceError(507, "storage", f"not recorded: {error.strerror}", retryable=True) from error
     return Response(view.snapshot(service, run).body, media_type="application/json")

@@ -61,9 +61,7 @@ def step_of(x: Floats, v: Floats, part: "np.ndarray", dt: float, mu: Floats | No
 def slot_table(first: Indices, normals: Floats, left: Floats, course: Floats) -> SlotTable:
     """Slots that are all on the surface; see narrow_phase.SlotTable."""
     n = len(first)
-    return SlotTable(
-        normals, np.ones(n, bool), first, left, course, np.zeros(n, bool), np.empty(n), np.empty(n, np.int32)
-    )  # fmt: skip
+    return SlotTable(normals, np.ones(n, bool), first, left, course, np.zeros(n, bool), np.empty(n, np.int32))
 
 
 def face_table(corners: Indices, size: Floats, left: Floats) -> FaceTable:
@@ -121,7 +119,7 @@ class Solver:
         """``active``: of another step, to be used again."""
         self.met, self.v, self.scale, n = met, v.copy(), scale, len(v)
         self.total = np.zeros((n, 3), np.int64)
-        self.active, every, part = active or ActiveSet(scale, 1), np.arange(n, dtype=np.int32), np.zeros(n, np.int32)
+        self.active, every, part = active or ActiveSet(scale), np.arange(n, dtype=np.int32), np.zeros(n, np.int32)
         self._crowd = Crowd(np.arange(n), every, part, part, mobility, self.v, self.v, self.v)
         self._nodes: Any = SimpleNamespace(v=self.v, part=part, owned=np.ones(n, bool))
         self.active.begin(met, many(met), self._crowd, Company([], SerialComm()).agree(met.nodes, every))
@@ -138,7 +136,7 @@ class Solver:
     def sweep(self, times: int = 1) -> Floats:
         """The velocities after some sweeps."""
         for _ in range(times):
-            self.active.sweep()
+            self.active.sweep(1)
             self._leave()
         return self.v
 

@@ -84,6 +84,17 @@ def expected(
     return rows
 
 
+def test_a_node_inside_of_two_parts_is_held_by_the_nearest_face_of_each() -> None:
+    """A corner of one body in two others: 0.05 and 0.1 below a face of the first, and 0.02 below one of the second."""
+    steep = np.array([[0, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0.2, 0.2]], float)
+    first, second = TRIANGLE + np.array([-0.3, -0.3, 0.05]), steep + np.array([0.02, -0.3, -0.3])
+    x = np.concatenate([first, first + np.array([0.0, 0.0, 0.05]), second, np.zeros((1, 3))])
+    part = np.array([0] * 8 + [1] * 4 + [2], np.int32)
+    faces = np.arange(12, dtype=np.int32).reshape(3, 4)
+    got = node_face(x, np.zeros_like(x), faces, every_pair(np.array([12]), 3), 1e-3, part, mu=np.zeros((3, 3)))
+    assert sorted(got.nodes.tolist()) == [[12, 0, 1, 2], [12, 8, 9, 10]]
+
+
 @pytest.mark.parametrize("dt", [1.0, 0.1, 1e-3])
 def test_meetings_are_those_of_the_formulas(dt: float) -> None:
     count = 0

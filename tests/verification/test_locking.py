@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from conoid.cases import materials
-from conoid.worker.drivers import PrescribedVelocity
+from conoid.worker.drivers import Course, PrescribedVelocity
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.simulation import Simulation
 from conoid.worker.state import Indices, Nodes
@@ -47,7 +47,7 @@ class Drive(PrescribedVelocity):
     """Moves nodes by ``travel`` (n, 3), m, NaN where free, smoothly within ``ramp`` s, and holds them there."""
 
     def __init__(self, nodes: Indices, travel: Floats, ramp: float) -> None:
-        super().__init__(nodes, np.where(np.isnan(travel), np.nan, 0.0))
+        super().__init__(nodes, np.where(np.isnan(travel), np.nan, 0.0), Course())
         self._travel, self._ramp = travel, ramp
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:

@@ -52,6 +52,34 @@ def test_no_node_ends_behind_the_wall(gap: float) -> None:
     assert min(lowest) < 1e-9
 
 
+@pytest.mark.parametrize("name", ["floor", None])
+def test_the_force_of_walls_is_what_changes_the_momentum(name: str | None) -> None:
+    """Force times time over all lines of the history, of one of two walls or of both."""
+    walls = [
+        {**wall(1e-5), "name": "floor"},
+        {"kind": "wall", "name": "x", "point": (-1e-5, 0, 0), "normal": (1, 0, 0)},
+    ]
+    probes = tuple({"name": a, "part": "body", "field": f"wall_force_{a}", "wall": name} for a in "xyz")
+    sim = build(scene(STEEL, end=1e-6, velocity=(-60.0, 90.0, -150.0), boundaries=tuple(walls), probes=probes), [MESH])
+    given, last, nodes = np.zeros(3), 0.0, sim.model.nodes
+    start = (nodes.mass[:, None] * nodes.v).sum(axis=0)
+
+    def look(sim: Simulation, _: Floats) -> None:
+        nonlocal last
+        if sim.clock.step % 7 == 0 or sim.clock.done:
+            given[:] += sim.probes.measure() * (sim.clock.t - last)
+            last = sim.clock.t
+
+    run(sim, look)
+    change = (nodes.mass[:, None] * nodes.v).sum(axis=0) - start
+    if name is None:
+        assert given == pytest.approx(change, rel=1e-9)
+    else:
+        across = np.cross(given, np.array(TILTED))
+        assert np.abs(across).max() < 1e-9 * np.linalg.norm(given)
+        assert 0.0 < np.linalg.norm(given) < 0.999 * np.linalg.norm(change)
+
+
 def test_the_wall_pushes_only() -> None:
     """Each impulse is along the normal and outward; where no node would pass, velocities keep every bit."""
     n = np.array(TILTED) / np.linalg.norm(TILTED)
@@ -289,6 +317,55 @@ def test_a_free_body_under_traction_is_accelerated_exactly() -> None:
     assert len(steps) > 10
     assert np.linalg.norm(a) * sim.clock.t > 5.0
     assert sim.ledger.worst < 1e-3
+
+
+RAMP = ((1e-6, 0.0), (2e-6, 1.0), (3e-6, -0.5))
+
+
+def ramped(t: float) -> tuple[float, float]:
+    """The factor of RAMP and its integral from 0 on, piece by piece."""
+    if t <= 1e-6:
+        return 0.0, 0.0
+    if t <= 2e-6:
+        return (t - 1e-6) / 1e-6, 0.5 * (t - 1e-6) ** 2 / 1e-6
+    return 1.0 - 1.5 * (t - 2e-6) / 1e-6, 0.5e-6 + (t - 2e-6) - 0.75 * (t - 2e-6) ** 2 / 1e-6
+
+
+@pytest.mark.parametrize("steps", ["even", "uneven"])
+def test_a_velocity_over_time_leads_nodes_along_its_integral(steps: str) -> None:
+    """Exactly at every n, with steps of any size; the ledger closes, but for what the change of steps costs."""
+    spec = {"kind": "velocity", "low": (0.0, 0.0, 2.9e-3), "high": (1.0, 1.0, 1.0), "z": 7.0, "course": RAMP}
+    sim = build(scene(STEEL, end=3e-6, boundaries=(spec,), dt_growth=2.0), [MESH])
+    nodes, rows = sim.model.nodes, MESH.points[:, 2] > 2.9e-3
+    assert (nodes.v[rows, 2] == 0.0).all()
+
+    def look(sim: Simulation, before: Floats) -> None:
+        moved = nodes.x[rows, 2] - MESH.points[rows, 2]
+        assert np.abs(moved - 7.0 * ramped(sim.clock.t)[1]).max() < 1e-17
+        sim.ledger.close(before)
+
+    run(sim, uneven(look) if steps == "uneven" else look)
+    assert sim.ledger.worst < (1e-3 if steps == "even" else 5e-3)
+
+
+def test_a_traction_over_time_gives_its_integral_as_impulse() -> None:
+    """Momentum at n+1/2 is force times the integral of the course, with steps of any size."""
+    sim = with_boundary({**PULL, **TOP, "course": RAMP}, end=3e-6, dt_growth=2.0)
+    nodes, force = sim.model.nodes, 9e-6 * np.array(PULL["stress"])
+
+    def look(sim: Simulation, _: Floats) -> None:
+        momentum = (nodes.mass[:, None] * nodes.v).sum(axis=0)
+        expected = force * ramped(sim.clock.t + 0.5 * sim.clock.dt)[1]
+        assert np.abs(momentum - expected).max() < 1e-10 * np.linalg.norm(force) * 1e-6
+
+    run(sim, uneven(look))
+
+
+def test_a_pressure_pushes_against_the_faces() -> None:
+    """On the whole surface it is no force in sum, and each node gets a third of its faces' against their normals."""
+    assert np.abs(pushed(with_boundary({"kind": "traction", "pressure": 1e8})).force.sum(axis=0)).max() < 1e-8
+    load = pushed(with_boundary({"kind": "traction", "pressure": 1e8, **TOP}))
+    assert load.force.sum(axis=0) == pytest.approx([0.0, 0.0, -900.0], abs=1e-9)
 
 
 def pulled(length: float, end: float, **keys: Any) -> Simulation:

@@ -9,7 +9,7 @@ import pytest
 import conoid.worker
 from conoid.worker.boundaries import FREE, MIRRORED, PRESCRIBED, Boundary, RigidWalls, SymmetryPlane
 from conoid.worker.contact.exterior import mobilities, symmetry_planes
-from conoid.worker.drivers import Driver, Gravity, PrescribedRotation, PrescribedVelocity
+from conoid.worker.drivers import Course, Driver, Gravity, PrescribedRotation, PrescribedVelocity
 from conoid.worker.mirrors import Mirrors
 from conoid.worker.state import Bits, Floats, Nodes
 
@@ -53,7 +53,7 @@ def test_a_boundary_that_does_not_answer_cannot_be_made() -> None:
         (RigidWalls(SOME, POINT, NORMAL, np.ones((2, 1), bool)), (FREE, FREE, FREE)),
         (Mirrors(SOME, POINT, NORMAL, np.ones((2, 1), bool)), (FREE, FREE, FREE)),
         (SymmetryPlane(SOME, 2), (FREE, FREE, MIRRORED)),
-        (PrescribedVelocity(SOME, np.array([np.nan, 0.0, 3.0])), (FREE, PRESCRIBED, PRESCRIBED)),
+        (PrescribedVelocity(SOME, np.array([np.nan, 0.0, 3.0]), Course()), (FREE, PRESCRIBED, PRESCRIBED)),
         (PrescribedRotation(SOME, np.zeros(3), np.ones(3)), (PRESCRIBED, PRESCRIBED, PRESCRIBED)),
         (Piston(SOME), (FREE, PRESCRIBED, FREE)),
     ],

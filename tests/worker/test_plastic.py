@@ -58,7 +58,8 @@ def test_linear_hardening_return() -> None:
     assert np.abs(patch.get(PLASTIC_STRAIN) - start - increment).max() < 1e-15 * 8
     assert np.abs(patch.get(YIELD) / flow - 1.0).max() < 1e-14
     assert np.abs(patch.deviator - stress).max() < 1e-12 * np.abs(stress).max()
-    assert np.abs(patch.get(WORK_PLASTIC) - volume * flow * increment).max() < 1e-12 * (volume * flow * increment).max()
+    plastic = volume * np.maximum(((turned + stress) * (trial - stress)).sum(axis=(1, 2)), 0.0) / (4.0 * SHEAR)
+    assert np.abs(patch.get(WORK_PLASTIC) - plastic).max() < 1e-12 * plastic.max()
     work = 0.5 * DT * volume * (formulas.power(turned, L) + formulas.power(stress, L))
     assert np.abs(patch.get(WORK) - work).max() < 1e-12 * np.abs(work).max()
 
@@ -75,12 +76,10 @@ def test_the_return_is_idempotent() -> None:
 
 
 def test_work_is_elastic_energy_plus_plastic_work() -> None:
-    """Along a proportional path the whole work is s : s / 4 G V plus the plastic work, to second order in the step."""
+    """Also where a step goes far beyond the yield stress, the work less the plastic work is V s : s / 4 G."""
     L = np.diag([1.0, -0.5, -0.5]) * 1e3
-    missing = []
-    for steps in (100, 200):
+    for steps in (20, 200):
         point = drive(COPPER, L, 1e-4 / steps, steps)
         volume = float(np.linalg.det(point.corners()[0, 1:] - point.corners()[0, 0])) / 6.0
         elastic = float((point.deviator**2).sum()) / (4.0 * SHEAR) * volume
-        missing.append(abs(float(point.get(WORK)[0] - point.get(WORK_PLASTIC)[0]) - elastic) / elastic)
-    assert missing[1] < 0.6 * missing[0] < 0.05
+        assert abs(float(point.get(WORK)[0] - point.get(WORK_PLASTIC)[0]) - elastic) / elastic < 1e-3

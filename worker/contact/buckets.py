@@ -50,20 +50,20 @@ TABLE = types.NamedTuple(
 )  # type: ignore[no-untyped-call]  # fmt: skip
 
 
-def sort(low: Floats, high: Floats, some: Indices, edge: float) -> Table:
-    """Enters ``some`` of the boxes ``low``, ``high`` (n, 3) into cells of edge ``edge``, m, or larger where the space
-    is too wide for it.
+def sort(low: Floats, high: Floats, edge: float) -> Table:
+    """Enters the boxes ``low``, ``high`` (n, 3) into cells of edge ``edge``, m, or larger where the space is too wide
+    for it.
     """
-    least, most = low[some].min(axis=0), high[some].max(axis=0)
+    least, most = low.min(axis=0), high.max(axis=0)
     edge = max(edge, float((most - least).max()) / _MOST)
     shape = np.floor((most - least) / edge).astype(np.int64) + 1
-    count, wide = _count(low, high, some, least, 1.0 / edge, shape)
+    count, wide = _count(low, high, least, 1.0 / edge, shape)
     bits = max(_LEAST_BITS, int(count).bit_length())
     table = Table(
         least, 1.0 / edge, shape, bits, np.zeros(2**bits + 1, np.int64), np.empty(count, np.int32),
         np.empty(count, np.int64), wide,
     )  # fmt: skip
-    _enter(table, low, high, some)
+    _enter(table, low, high)
     return table
 
 
@@ -112,15 +112,14 @@ def _cells(span, low, high, j, origin, inverse, shape):  # type: ignore[no-untyp
 
 @njit(
     types.Tuple((types.int64, types.int32[::1]))(  # type: ignore[no-untyped-call]
-        types.float64[:, ::1], types.float64[:, ::1], types.int32[::1], types.float64[::1], types.float64,
-        types.int64[::1],
+        types.float64[:, ::1], types.float64[:, ::1], types.float64[::1], types.float64, types.int64[::1]
     ),
     cache=True,
-)  # fmt: skip
-def _count(low, high, some, origin, inverse, shape):  # type: ignore[no-untyped-def]
+)
+def _count(low, high, origin, inverse, shape):  # type: ignore[no-untyped-def]
     """How many entries there will be, and the boxes that get none."""
-    span, wide, n, total = np.empty((2, 3), np.int64), np.empty(len(some), np.int32), 0, 0
-    for j in some:
+    span, wide, n, total = np.empty((2, 3), np.int64), np.empty(len(low), np.int32), 0, 0
+    for j in range(len(low)):
         cells = _cells(span, low, high, j, origin, inverse, shape)
         if cells > _WIDE:
             wide[n] = j
@@ -130,13 +129,13 @@ def _count(low, high, some, origin, inverse, shape):  # type: ignore[no-untyped-
     return total, wide[:n].copy()
 
 
-@njit(types.void(TABLE, types.float64[:, ::1], types.float64[:, ::1], types.int32[::1]), cache=True)
-def _enter(table, low, high, some):  # type: ignore[no-untyped-def]
+@njit(types.void(TABLE, types.float64[:, ::1], types.float64[:, ::1]), cache=True)
+def _enter(table, low, high):  # type: ignore[no-untyped-def]
     """Fills the entries by counting: once to see where each hash begins, once to put them there."""
     start, shape, bits = table.start, table.shape, table.bits
     span = np.empty((2, 3), np.int64)
     for write in range(2):
-        for j in some:
+        for j in range(len(low)):
             if _cells(span, low, high, j, table.origin, table.inverse, shape) > _WIDE:
                 continue
             for z in range(span[0, 2], span[1, 2] + 1):

@@ -111,10 +111,8 @@ class SlotTable(NamedTuple):
     """(slots, 3) velocities of the reference motions, m/s."""
     fresh: Flags
     """(slots,) whose mean normals have changed."""
-    deepest: Floats
-    """(slots,) room for the height of a node over the face that holds it, m."""
     holder: Indices
-    """(slots,) room for the contact with that face."""
+    """(slots,) room for the last contact that holds a node that is inside of a body."""
 
 
 class FaceTable(NamedTuple):
@@ -164,7 +162,7 @@ _F1, _F2 = types.float64[::1], types.float64[:, ::1]
 CONTACT_ROWS = record(ContactRows, _N2, _F2, _F2, _F1, _F1, _N1)
 STEP = record(Step, types.float64[:, :], _F2, types.float64[:, :], _N1, _F2, types.float64, types.float64)
 PAIRS = record(Pairs, _N2, _F1, _F1, _B1, _N1, _N1)
-SLOTS = record(SlotTable, _F2, _B1, _N1, _F1, _F2, _B1, _F1, _N1)
+SLOTS = record(SlotTable, _F2, _B1, _N1, _F1, _F2, _B1, _N1)
 FACES = record(FaceTable, _N2, _F1, _I1, _B1, _F1, _B1, _F2, _B1)
 EDGES = record(EdgeTable, _N2, _F1, _B2, _F1, _B1)
 

@@ -11,7 +11,7 @@ from .geometry import VECTOR, at, beyond, distance, dot, foot, height, minus, of
 from .narrow_phase import CONTACT_ROWS, DEEP, DEEP_SELF, FACES, NEAR, PAIRS, SLOTS, STEP, needed
 
 _TOUCHING = 1e-3
-"""Of the size of a face: deeper than this, a node is held by the nearest face only."""
+"""Of the size of a face: deeper than this, a node is held by the nearest face of that part only."""
 FACING = 0.1
 """A node faces a face when the cosines of the face's normal and those of its own faces have a mean below this, and
 their mean less their deviation comes below minus this."""
@@ -145,16 +145,18 @@ def node_face(out, n, pairs, slots, faces, step, end):  # type: ignore[no-untype
     """Nodes that pass a face, from row ``n`` on; returns the new number of rows, and how many pairs were tested.
 
     A node meets a face that it faces: the rim of a bar not the side of another one of the same width, the surface under
-    a block that slides not its front, which stands across. ``end``: of the step, s after the search.
+    a block that slides not its front, which stands across. One that is inside of several parts is held by the nearest
+    face of each. ``end``: of the step, s after the search.
     """
     rows, until, speed, turned, active = pairs.rows, pairs.until, pairs.speed, pairs.turned, pairs.active
     corners, size, exposed, left, fresh = faces.corners, faces.size, faces.exposed, faces.left, faces.fresh
-    planes, known, holder, deepest = faces.normal, faces.known, slots.holder, slots.deepest
+    planes, known, holder = faces.normal, faces.known, slots.holder
     normals, on_surface, strayed, other, course = slots.normals, slots.on_surface, slots.left, slots.fresh, slots.course
     nodes, weights, out_normals, wanted, pair = out.nodes, out.weights, out.normals, out.wanted, out.pair
     x, v, ahead, part = step.x, step.v, step.ahead, step.part
     first = slots.first
     holder[:] = -1
+    earlier, deepest = np.empty(len(rows), np.int32), np.empty(len(rows))
     tested = 0
     for p in range(len(rows)):
         s, f = rows[p, 0], rows[p, 1]
@@ -198,15 +200,18 @@ def node_face(out, n, pairs, slots, faces, step, end):  # type: ignore[no-untype
         row = n
         if gap0 < -_TOUCHING * size[f]:
             row = holder[s]
+            while row >= 0 and part[nodes[row, 1]] != part[i]:
+                row = earlier[row]
             if row >= 0:
-                same = gap0 == deepest[s] and faces.id[f] < faces.id[rows[pair[row], 1]]
-                if not (gap0 > deepest[s] or same):
+                same = gap0 == deepest[row] and faces.id[f] < faces.id[rows[pair[row], 1]]
+                if not (gap0 > deepest[row] or same):
                     continue
             leaves = np.inf if other[s] else strayed[s]
             if _outside(pairs, first, faces, x, part, p, -gap0, leaves, end + step.dt):
                 continue
-            row = row if row >= 0 else n
-            deepest[s], holder[s] = gap0, row
+            if row < 0:
+                row, earlier[n], holder[s] = n, holder[s], n
+            deepest[row] = gap0
         n += row == n
         nodes[row, 0], nodes[row, 1], nodes[row, 2], nodes[row, 3] = s, i, j, k
         weights[row, 0], weights[row, 1], weights[row, 2], weights[row, 3] = 1.0, -b[0], -b[1], -b[2]

@@ -168,7 +168,7 @@ class Scene:
         """The slots as kernels take them."""
         n, slots, lines = self.crowd.n, self.slots, self.tracks.short
         return SlotTable(
-            slots.normals, slots.on_surface, slots.first, lines.left, lines.course, slots.fresh, np.empty(n),
+            slots.normals, slots.on_surface, slots.first, lines.left, lines.course, slots.fresh,
             np.empty(n, np.int32),
         )  # fmt: skip
 

@@ -17,7 +17,6 @@ from .buckets import TABLE, bucket_at, bucket_of
 
 _FEW, _SAMPLE = 8, 256
 """How many large things to a small one are worth larger cells; how many boxes are measured for the size of cells."""
-_NO_RANK = np.zeros(0, np.int64)
 
 
 @dataclass
@@ -51,15 +50,6 @@ class Boxes:
             return np.full(6, np.inf)
         return np.concatenate([self.low.min(axis=0), -self.high.max(axis=0)])
 
-    @property
-    def extent(self) -> Floats:
-        """(n,) the longest side."""
-        return np.asarray(np.maximum.reduce((self.high - self.low).T.copy()))
-
-    def take(self, chosen: "np.ndarray") -> "Boxes":
-        """Some of the boxes."""
-        return Boxes(self.low[chosen], self.high[chosen])
-
     def touching(self, hull: Floats) -> Flags:
         """(n,) which boxes touch a hull."""
         return np.asarray(_in_hull(self.low, self.high, hull))
@@ -77,26 +67,50 @@ def _in_hull(low, high, hull):  # type: ignore[no-untyped-def]
 
 
 def swept(things: Things, x: Floats, v: Floats, horizon: float) -> Boxes:
-    """The boxes that things fly through, reach included; ``x`` and ``v`` are (nodes, 3)."""
-    boxes = Boxes(np.empty((len(things.corners), 3)), np.empty((len(things.corners), 3)))
-    _sweep_out(boxes.low, boxes.high, things.corners, things.reach, things.searched, x, v, horizon)
-    return boxes
+    """The boxes that the things that are searched fly through, reach included; ``x`` and ``v`` are (nodes, 3)."""
+    none = np.zeros(len(x), np.int32)
+    boxed = _boxed(things.corners, things.reach, things.searched, x, v, horizon, none, _ALLOWED, _EVERYWHERE)
+    return Boxes(boxed[0], boxed[1])
+
+
+_ALLOWED = np.ones((1, 1), bool)
+_EVERYWHERE = np.full((1, 2, 3), (((-np.inf,) * 3, (np.inf,) * 3)))
+"""A hull that everything touches."""
 
 
 @njit(
-    "void(float64[:, ::1], float64[:, ::1], int32[:, ::1], float64[::1], int32[::1], float64[:, ::1], "
-    "float64[:, ::1], float64)",
+    "Tuple((float64[:, ::1], float64[:, ::1], int32[::1], float64[:, :, ::1]))(int32[:, ::1], float64[::1], "
+    "int32[::1], float64[:, ::1], float64[:, ::1], float64, int32[::1], boolean[:, ::1], float64[:, :, ::1])",
     cache=True,
 )
-def _sweep_out(low, high, corners, reach, some, x, v, horizon):  # type: ignore[no-untyped-def]
+def _boxed(corners, reach, some, x, v, horizon, part, allowed, hull):  # type: ignore[no-untyped-def]
+    """Lowest and highest corner of the boxes of ``some`` of the things, of those that touch the ``hull`` (parts, 2, 3)
+    of a part that theirs meets; which they are; and the hull of theirs.
+    """
+    low, high, rows, n = np.empty((len(some), 3)), np.empty((len(some), 3)), np.empty(len(some), np.int32), 0
+    own = np.empty(hull.shape)
+    own[:, 0], own[:, 1] = np.inf, -np.inf
     for j in some:
+        mine = part[corners[j, 0]]
         for i in range(3):
             least, most = np.inf, -np.inf
             for k in range(corners.shape[1]):
                 now = x[corners[j, k], i]
                 then = now + horizon * v[corners[j, k], i]
                 least, most = min(least, now, then), max(most, now, then)
-            low[j, i], high[j, i] = least - reach[j], most + reach[j]
+            low[n, i], high[n, i] = least - reach[j], most + reach[j]
+        touching = False
+        for q in range(len(hull)):
+            touch = allowed[mine, q]
+            for i in range(3):
+                touch &= low[n, i] <= hull[q, 1, i] and high[n, i] >= hull[q, 0, i]
+            touching |= touch
+        if touching:
+            for i in range(3):
+                own[mine, 0, i], own[mine, 1, i] = min(own[mine, 0, i], low[n, i]), max(own[mine, 1, i], high[n, i])
+            rows[n] = j
+            n += 1
+    return low[:n], high[:n], rows[:n], own
 
 
 def find(
@@ -109,39 +123,43 @@ def find(
     ``allowed`` (parts, parts) says which parts meet. Things with a corner in common are no candidates. ``rank``
     (large,): the small things are the first of the large ones, and only the one of lower rank finds a pair.
     """
-    if not len(small.searched) or not len(large.searched):
-        return np.zeros((0, 2), np.int32)
-    of = small, swept(small, x, v, horizon), large, swept(large, x, v, horizon), part, allowed
-    few, many = _near(*of), _near(of[2], of[3], *of[:2], part, allowed.T.copy())
-    if not len(few) or not len(many):
-        return np.zeros((0, 2), np.int32)
     order = np.zeros(0, np.int64) if rank is None else rank
-    return _pairs(
-        Sought(of[1].low, of[1].high, small.corners, few, order),
-        Sought(of[3].low, of[3].high, large.corners, many, order), part, allowed,
-    )  # fmt: skip
+    first, second = (small, allowed), (large, allowed.T.copy())
+    if len(small.searched) > len(large.searched):
+        first, second = second, first
+    lines = x, v, horizon, part
+    hull = np.repeat(_EVERYWHERE, len(allowed), axis=0)
+    one = _touching(first, lines, hull, order)
+    two = _touching(second, lines, one[1], order)
+    if len(two[0].some) < len(second[0].searched):
+        one = _touching((Things(first[0].corners, first[0].reach, one[0].some), first[1]), lines, two[1], order)
+    few, many = (one[0], two[0]) if first[0] is small else (two[0], one[0])
+    if not len(few.some) or not len(many.some):
+        return np.zeros((0, 2), np.int32)
+    return _pairs(few, many, part, allowed)
 
 
-def _near(
-    things: Things, boxes: Boxes, others: Things, their_boxes: Boxes, part: Indices, allowed: Flags
-) -> Indices:  # fmt: skip
-    """Which of the things touch, by their boxes, the hull of a part of the others that theirs may meet."""
-    mine = Sought(boxes.low, boxes.high, things.corners, things.searched, _NO_RANK)
-    theirs = Sought(their_boxes.low, their_boxes.high, others.corners, others.searched, _NO_RANK)
-    return np.asarray(_touching(mine, theirs, part, allowed))
+def _touching(
+    of: tuple[Things, Flags], lines: tuple[Floats, Floats, float, Indices], hull: Floats, rank: Ints
+) -> "tuple[Sought, Floats]":  # fmt: skip
+    """Those of the things that touch the ``hull`` (parts, 2, 3) of a part that theirs meets, and their own."""
+    things, allowed = of
+    low, high, rows, own = _boxed(things.corners, things.reach, things.searched, *lines, allowed, hull)
+    return Sought(low, high, things.corners, rows, rank), own
 
 
 def _extent(things: "Sought") -> float:
     """The median of the longest sides of boxes, of a sample of them, m."""
-    some = things.some[:: max(len(things.some) // _SAMPLE, 1)]
-    return float(np.median((things.high[some] - things.low[some]).max(axis=1)))
+    step = max(len(things.some) // _SAMPLE, 1)
+    sides = (things.high[::step] - things.low[::step]).max(axis=1)
+    return float(np.partition(sides, len(sides) // 2)[len(sides) // 2])
 
 
 def _pairs(small: "Sought", large: "Sought", part: Indices, allowed: Flags) -> Indices:
     edge = max(_extent(small), _extent(large))
     if _FEW * len(small.some) < len(large.some):
         edge *= 2.0
-    table = buckets.sort(small.low, small.high, small.some, edge)
+    table = buckets.sort(small.low, small.high, edge)
     out = np.empty((4 * (len(small.some) + len(large.some)) + 1024, 2), np.int32)
     n = asked = 0
     while True:
@@ -155,10 +173,10 @@ class Sought(NamedTuple):
     """Things that are searched."""
 
     low: Floats
-    """(n, 3) of their boxes."""
+    """(m, 3) of their boxes."""
     high: Floats
     corners: Indices
-    """(n, k) slots."""
+    """(n, k) slots of all things."""
     some: Indices
     """(m,) which of them."""
     rank: Ints
@@ -180,27 +198,6 @@ def _meet(small, large, i, j):  # type: ignore[no-untyped-def]
     return False
 
 
-@njit(types.int32[::1](SOUGHT, SOUGHT, types.int32[::1], types.boolean[:, ::1]), cache=True)
-def _touching(things, others, part, allowed):  # type: ignore[no-untyped-def]
-    least, most = np.full((len(allowed), 3), np.inf), np.full((len(allowed), 3), -np.inf)
-    for j in others.some:
-        q = part[others.corners[j, 0]]
-        for i in range(3):
-            least[q, i], most[q, i] = min(least[q, i], others.low[j, i]), max(most[q, i], others.high[j, i])
-    near, n = np.empty(len(things.some), np.int32), 0
-    for j in things.some:
-        touching = False
-        for q in range(len(allowed)):
-            touch = allowed[part[things.corners[j, 0]], q]
-            for i in range(3):
-                touch &= things.low[j, i] <= most[q, i] and things.high[j, i] >= least[q, i]
-            touching |= touch
-        if touching:
-            near[n] = j
-            n += 1
-    return near[:n].copy()
-
-
 @njit(
     types.UniTuple(types.int64, 2)(  # type: ignore[no-untyped-call]
         types.int32[:, ::1], types.int64, types.int64, TABLE, SOUGHT, SOUGHT, types.int32[::1], types.boolean[:, ::1]
@@ -216,14 +213,13 @@ def _ask(out, n, asked, table, small, large, part, allowed):  # type: ignore[no-
     few, many, rank, order = small.corners, large.corners, small.rank, large.rank
     start, things, codes, wide = table.start, table.thing, table.code, table.wide
     origin, inverse, shape, bits = table.origin, table.inverse, table.shape, table.bits
-    every = small.some
+    every, others = small.some, large.some
     first, last = np.empty(3, np.int64), np.empty(3, np.int64)
-    for at in range(asked, len(large.some)):
-        j, before = large.some[at], n
-        cells = 1
+    for at in range(asked, len(others)):
+        before, cells = n, 1
         for i in range(3):
-            first[i] = bucket_of(box_low[j, i], origin[i], inverse, shape[i])
-            last[i] = bucket_of(box_high[j, i], origin[i], inverse, shape[i])
+            first[i] = bucket_of(box_low[at, i], origin[i], inverse, shape[i])
+            last[i] = bucket_of(box_high[at, i], origin[i], inverse, shape[i])
             cells *= last[i] - first[i] + 1
         alone = cells > len(every)
         if alone:
@@ -243,22 +239,23 @@ def _ask(out, n, asked, table, small, large, part, allowed):  # type: ignore[no-
                         if p - begin < apart:
                             if codes[p] != code:
                                 continue
-                            i = things[p]
+                            b = things[p]
                         else:
-                            i = every[p - begin] if alone else wide[p - begin - apart]
-                        if few_low[i, 0] > box_high[j, 0] or few_low[i, 1] > box_high[j, 1]:
+                            b = p - begin if alone else wide[p - begin - apart]
+                        if few_low[b, 0] > box_high[at, 0] or few_low[b, 1] > box_high[at, 1]:
                             continue
-                        if few_low[i, 2] > box_high[j, 2] or few_high[i, 0] < box_low[j, 0]:
+                        if few_low[b, 2] > box_high[at, 2] or few_high[b, 0] < box_low[at, 0]:
                             continue
-                        if few_high[i, 1] < box_low[j, 1] or few_high[i, 2] < box_low[j, 2]:
+                        if few_high[b, 1] < box_low[at, 1] or few_high[b, 2] < box_low[at, 2]:
                             continue
                         if p - begin < apart:
-                            if bucket_of(max(few_low[i, 0], box_low[j, 0]), origin[0], inverse, shape[0]) != x:
+                            if bucket_of(max(few_low[b, 0], box_low[at, 0]), origin[0], inverse, shape[0]) != x:
                                 continue
-                            if bucket_of(max(few_low[i, 1], box_low[j, 1]), origin[1], inverse, shape[1]) != y:
+                            if bucket_of(max(few_low[b, 1], box_low[at, 1]), origin[1], inverse, shape[1]) != y:
                                 continue
-                            if bucket_of(max(few_low[i, 2], box_low[j, 2]), origin[2], inverse, shape[2]) != z:
+                            if bucket_of(max(few_low[b, 2], box_low[at, 2]), origin[2], inverse, shape[2]) != z:
                                 continue
+                        i, j = every[b], others[at]
                         if len(rank) > 0 and rank[i] >= order[j]:
                             continue
                         if not allowed[part[few[i, 0]], part[many[j, 0]]] or _meet(few, many, i, j):
@@ -267,4 +264,4 @@ def _ask(out, n, asked, table, small, large, part, allowed):  # type: ignore[no-
                             return before, at
                         out[n, 0], out[n, 1] = i, j
                         n += 1
-    return n, len(large.some)
+    return n, len(others)

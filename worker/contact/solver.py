@@ -20,9 +20,9 @@ _ROW_WEIGHTS = 4
 class ActiveSet:
     """The active contacts of a rank in a step, and the slots of their nodes; the first slots are of shared nodes."""
 
-    def __init__(self, scale: float, sweeps: int) -> None:
-        """``scale``: quanta per N s, a power of two; ``sweeps``: of a step."""
-        self.scale, self._sweeps = scale, sweeps
+    def __init__(self, scale: float) -> None:
+        """``scale``: quanta per N s, a power of two."""
+        self.scale = scale
         self.places: Indices = np.zeros(0, np.int32)
         """(slots,) where the nodes of the last step stand in the crowd."""
         self._slot: Indices = np.zeros(0, np.int32)
@@ -69,18 +69,18 @@ class ActiveSet:
         self._complete(begin, active.moving_words, IMPULSE, 3)
         sweeps.give(active, self._n, self.scale)
 
-    def sweep(self) -> None:
-        """All sweeps of the step."""
+    def sweep(self, many: int) -> None:
+        """So many sweeps."""
         active, contacts, scale = self._room.active, self._contacts, self.scale
         if not self._first:
-            sweeps.sweep_all(active, self._parts[1], contacts, self._fastest, self._n, scale, self._sweeps)
+            sweeps.sweep_all(active, self._parts[1], contacts, self._fastest, self._n, scale, many)
             return
 
         def correct(part: Loaded) -> None:
             sweeps.load(part, contacts, active, self._fastest)
             sweeps.sweep(active, part, scale)
 
-        for _ in range(self._sweeps):
+        for _ in range(many):
             self._complete(correct, active.moving_words, IMPULSE, 3)
             sweeps.give(active, self._n, scale)
 
@@ -93,6 +93,10 @@ class ActiveSet:
         self._sum.begin(words, first, columns)
         work(inner)
         self._sum.finish(words, first, columns)
+
+    def short(self) -> float:
+        """By how much the contacts of this rank are at most slower than they must be after the last sweep, m/s."""
+        return max(float(sweeps.short(self._room.active, part)) for part in self._parts)
 
     def cost(self, account: Account, before: Floats) -> None:
         """Books what the impulses take from the bodies; ``before`` (crowd, 3): v(n-1/2)."""

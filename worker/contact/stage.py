@@ -14,12 +14,14 @@ from ..clock import Clock
 from ..migration.parcel import Parcel
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
+from ..reduction import StepReduction
 from ..state import Flags, Floats, Indices, Ints, Model, Nodes
 from ..timers import Timers
 from ..topology import Split
 from . import held, normals
 from .books import Books
 from .detection import Detected, detect
+from .effort import Effort
 from .exterior import Exterior
 from .narrow_phase import PUSH_OUT
 from .scene import Scene
@@ -47,11 +49,14 @@ class Contact:
         self.exterior = Exterior(model, neighbours, bounds, case.contact.edges, comm)
         self.searches = Searches(case, model, neighbours, self.exterior, comm, clock)
         self.books = Books(model.nodes.n, len(case.parts), extremes)
-        self._active = ActiveSet(self.books.scale, case.contact.sweeps)
+        self._active = ActiveSet(self.books.scale)
+        self._sweeps = Effort(case.contact.sweeps)
         self.found = Detected.nothing()
         """What the last step has found here."""
         self.limit = 0.0
         """One over the step in which no node of any rank passes more than half of a tet that it meets, 1/s."""
+        self.short = 0.0
+        """How much deeper than it may a contact of this rank is after the sweeps, of the typical size of a face."""
         self.last_push = 0.0
         """Last time at which nodes of this rank were pushed, s."""
         self._mean_dt = 0.0
@@ -62,7 +67,7 @@ class Contact:
         books = self.books
         parcel.known["contact"] = (
             books.scale, books.friction.scale, self.limit, self.searches.many, self._mean_dt, self.exterior.size,
-            books.account.known(),
+            books.account.known(), self._sweeps.sweeps,
         )  # fmt: skip
         self.books.keep(parcel, self.searches.scene)
         self.exterior.keep(parcel)
@@ -73,6 +78,7 @@ class Contact:
         books = self.books
         (
             books.scale, books.friction.scale, self.limit, self.searches.many, self._mean_dt, size, account,
+            self._sweeps.sweeps,
         ) = parcel.known["contact"]  # fmt: skip
         self._active.scale = books.scale
         books.resume(parcel, account)
@@ -140,12 +146,13 @@ class Contact:
         """(4,) words of this rank of what contact has taken from the bodies so far."""
         return self.books.account.words.reshape(-1)
 
-    def agree(self, search: bool, approach: float, opening: bool, costs: Ints) -> None:
-        """Takes what all ranks have found in the step; ``costs``: the sum of theirs. All ranks take part."""
-        self.books.agreed = costs.reshape(2, 2)
-        self.searches.due |= search
-        self.limit = approach
-        if opening:
+    def agree(self, all_ranks: StepReduction) -> None:
+        """Takes what all ranks have found in the step; all ranks take part."""
+        self.books.agreed = all_ranks.costs.sum(axis=0).reshape(2, 2)
+        self.searches.due |= all_ranks.search
+        self.limit = all_ranks.approach
+        self._sweeps.settle(all_ranks.short)
+        if all_ranks.opening:
             self.open_cracks()
 
     @property
@@ -214,7 +221,8 @@ class Contact:
         active.weigh()
         if self.searches.rubs:
             active.resume(now.node_face.kept, self._resume())
-        active.sweep()
+        active.sweep(self._sweeps.sweeps)
+        self.short = active.short() * dt / self.exterior.size
         if self.searches.rubs:
             now.node_face.kept[:] = 0.0
             active.store(now.node_face.kept)

@@ -9,7 +9,7 @@ which tets share the chunk.
 
 from conoid.cases.laws.johnson_cook import JohnsonCook
 
-from ..elements.tet4 import NODAL, TRIAL, VOLUME_MID
+from ..elements.tet4 import D_XX, D_XY, D_YY, D_YZ, D_ZX, D_ZZ, NODAL, TRIAL, VOLUME_MID
 from ..jit import njit
 from ..state import (
     CHUNK,
@@ -57,6 +57,7 @@ _MOST_TENSE = 1.5
 """Largest tension over the flow stress: beyond it the fracture strain of Johnson and Cook 1985 is not measured."""
 _LEAST_STRAIN = 1e-6
 """Smallest fracture strain. Chosen: constants that make it negative break what yields at all."""
+_TWO_THIRDS = 2.0 / 3.0
 _TINY = 1e-300
 """Instead of zero, of which there is no logarithm."""
 
@@ -140,18 +141,28 @@ def _newton(w, params, m, halve):  # type: ignore[no-untyped-def]
     return going
 
 
-@njit("void(float64[::1], float64[::1], float64[::1], int64, int64)", cache=True, error_model="numpy")
-def _return(w, s, params, m, n):  # type: ignore[no-untyped-def]
-    """Scales the deviators to the flow stress and books strain, work, and heat."""
-    shear3 = 3.0 * params[SHEAR]
+@njit("void(float64[::1], float64[::1], float64[::1], int64, int64, float64)", cache=True, error_model="numpy")
+def _return(w, s, params, m, n, dt):  # type: ignore[no-untyped-def]
+    """Scales the deviators to the flow stress and books strain, heat, and work: that of the mean of the rotated old
+    stress and the new one (as in mohr_coulomb.py), so that what is left is the elastic energy of the stress.
+    """
+    shear3, shear2 = 3.0 * params[SHEAR], 2.0 * params[SHEAR]
     for i in range(n):
         w[TRIAL + i] = 1.0
     for j in range(m):
         i, q, d = int(w[_PLACE + j]), w[_Q + j], w[_D + j]
         flow = max(q - shear3 * d, 0.0)
-        w[TRIAL + i] = flow / q
+        factor = flow / q
+        w[TRIAL + i] = factor
+        moved = (
+            s[_SXX + i] * w[D_XX + i]
+            + s[_SYY + i] * w[D_YY + i]
+            + s[_SZZ + i] * w[D_ZZ + i]
+            + 2.0 * (s[_SYZ + i] * w[D_YZ + i] + s[_SZX + i] * w[D_ZX + i] + s[_SXY + i] * w[D_XY + i])
+        )
+        twice = (1.0 + factor) * _TWO_THIRDS * q * q - shear2 * dt * moved
         s[_STRAIN + i] += d
-        s[_WORK + i] += flow * d * w[VOLUME_MID + i]
+        s[_WORK + i] += w[VOLUME_MID + i] * (1.0 - factor) * max(twice, 0.0) / (2.0 * shear2)
         s[_TEMPERATURE + i] += w[_WARM + j] * flow * d
         s[_YIELD + i] = w[_STATIC + j]
         s[_FLOW + i] = flow
@@ -196,7 +207,7 @@ def johnson_cook(w, s, params, n, dt):  # type: ignore[no-untyped-def]
         _factors(w, params, m, dt)
         if _newton(w, params, m, k >= _PATIENT and k % 2 == 1) == 0:
             break
-    _return(w, s, params, m, n)
+    _return(w, s, params, m, n, dt)
     if params[_DAMAGED] > 0.0:
         _wear(w, s, params, m, dt)
 

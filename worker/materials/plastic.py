@@ -4,7 +4,7 @@ import numpy as np
 
 from conoid.cases.laws.linear_hardening import LinearHardening
 
-from ..elements.tet4 import TRIAL, VOLUME_MID
+from ..elements.tet4 import D_XX, D_XY, D_YY, D_YZ, D_ZX, D_ZZ, TRIAL, VOLUME_MID
 from ..jit import njit
 from ..state import (
     CHUNK,
@@ -48,15 +48,24 @@ def scale_deviator(s, i, factor):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def linear_hardening(w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """Returns the trial stress to the yield surface; strain increment (q - yield) / (3 G + H), exact for this law."""
+    """Returns the trial stress to the yield surface; strain increment (q - yield) / (3 G + H), exact for this law. The
+    plastic work is that of the mean of the rotated old stress and the new one (as in mohr_coulomb.py).
+    """
     equivalent_stress(w, s, n)
-    shear3, hardening = 3.0 * params[SHEAR], params[_HARDENING]
+    shear3, shear2, hardening = 3.0 * params[SHEAR], 2.0 * params[SHEAR], params[_HARDENING]
     for i in range(n):
         q, old = w[TRIAL + i], s[_YIELD + i]
         over = max(q - old, 0.0)
         increment = over / (shear3 + hardening)
         new = old + hardening * increment
         factor = new / q if over > 0.0 else 1.0
+        moved = (
+            s[_SXX + i] * w[D_XX + i]
+            + s[_SYY + i] * w[D_YY + i]
+            + s[_SZZ + i] * w[D_ZZ + i]
+            + 2.0 * (s[_SYZ + i] * w[D_YZ + i] + s[_SZX + i] * w[D_ZX + i] + s[_SXY + i] * w[D_XY + i])
+        )
+        twice = (1.0 + factor) * 2.0 / 3.0 * q * q - shear2 * dt * moved
         s[_SXX + i] *= factor
         s[_SYY + i] *= factor
         s[_SZZ + i] *= factor
@@ -65,7 +74,7 @@ def linear_hardening(w, s, params, n, dt):  # type: ignore[no-untyped-def]
         s[_SXY + i] *= factor
         s[_YIELD + i] = new
         s[_STRAIN + i] += increment
-        s[_WORK + i] += new * increment * w[VOLUME_MID + i]
+        s[_WORK + i] += w[VOLUME_MID + i] * (1.0 - factor) * max(twice, 0.0) / (2.0 * shear2)
 
 
 def _begin(law: LinearHardening, _: float) -> dict[int, float]:

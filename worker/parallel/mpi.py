@@ -4,8 +4,6 @@ import os
 import pickle
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any, NoReturn
 
 import numpy as np
@@ -33,14 +31,9 @@ class MpiComm:
         self.sent = Sent()
         MPI.pickle.__init__(self._pickled, self._unpickled)  # type: ignore[misc]
 
-    @contextmanager
-    def waiting(self, sign: int = 1) -> Iterator[None]:
+    def waiting(self, sign: int = 1) -> "_Waiting":
         """Counts the CPU time of the block as waiting; -1: takes it out again."""
-        start = time.thread_time()
-        try:
-            yield
-        finally:
-            self.waited += sign * (time.thread_time() - start)
+        return _Waiting(self, sign)
 
     def _pickled(self, item: Any, protocol: int | None = None) -> bytes:
         """Within a call that waits, this is work."""
@@ -156,6 +149,21 @@ class MpiComm:
         with self.waiting():
             while not arrived.Test():
                 time.sleep(_NAP)
+
+
+class _Waiting:
+    """A block that waits; there are dozens in every step, too many for generators."""
+
+    __slots__ = ("_comm", "_sign", "_start")
+
+    def __init__(self, comm: MpiComm, sign: int) -> None:
+        self._comm, self._sign = comm, sign
+
+    def __enter__(self) -> None:
+        self._start = time.thread_time()
+
+    def __exit__(self, *_: object) -> None:
+        self._comm.waited += self._sign * (time.thread_time() - self._start)
 
 
 class _MpiPending:

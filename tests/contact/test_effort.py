@@ -1,0 +1,78 @@
+"""As many sweeps as are needed: a step that leaves contacts too deep calls for more in the next one."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from conoid.cases.load import apply_overrides, parse_case, read_data
+from conoid.worker import simulation, step
+from conoid.worker.contact.effort import TOLERANCE, Effort
+from conoid.worker.contact.narrow_phase import ContactRows
+from conoid.worker.parallel.comm import SerialComm
+from conoid.worker.state import Model
+
+from .kernels import Solver
+
+CASE = Path(__file__).parents[2] / "cases" / "hard" / "wedge_glass.toml"
+
+
+def column(n: int) -> ContactRows:
+    """``n`` nodes one behind the other along x, each in touch with the next one."""
+    nodes = np.column_stack([np.arange(1, n), np.arange(n - 1), np.arange(n - 1), np.arange(n - 1)]).astype(np.int32)
+    weights, normals = np.tile([1.0, -1.0, 0.0, 0.0], (n - 1, 1)), np.tile([1.0, 0.0, 0.0], (n - 1, 1))
+    none = np.full(n - 1, -1, np.int32)
+    return ContactRows(nodes, weights, normals, np.zeros(n - 1), np.zeros(n - 1), none)
+
+
+def test_what_sweeps_have_left_undone_is_told() -> None:
+    """The last of twelve nodes runs into the others, which five sweeps have not all reached."""
+    v = np.zeros((12, 3))
+    v[0, 0] = 100.0
+    solver = Solver(column(12), v, np.ones((12, 3)))
+    solver.sweep(5)
+    left = np.diff(solver.v[:, 0]).min()
+    assert solver.active.short() == pytest.approx(-left)
+    first = solver.active.short()
+    solver.sweep(200)
+    assert solver.active.short() < 0.05 * first
+
+
+def test_sweeps_follow_what_is_left() -> None:
+    effort, counts = Effort(5), []
+    for short in (0.5, 2.0, 2.0, 2.0, 0.5, 0.1, 0.1, 0.1):
+        effort.settle(short * TOLERANCE)
+        counts.append(effort.sweeps)
+    assert counts == [5, 10, 20, 20, 20, 10, 5, 5]
+
+
+def inside(model: Model, depth: float) -> int:
+    """How many nodes lie deeper than ``depth``, m, below every face of a tet of another part."""
+    x, part, count = model.nodes.x, model.nodes.part, 0
+    for block in model.blocks:
+        corners = x[block.tets]
+        inverse = np.linalg.inv(corners[:, 1:] - corners[:, :1])
+        shares = np.concatenate([-inverse.sum(axis=2, keepdims=True), inverse], axis=2)
+        altitudes = 1.0 / np.linalg.norm(shares, axis=1)
+        for node in np.flatnonzero(
+            (part != block.part) & ((x > corners.min((0, 1))) & (x < corners.max((0, 1)))).all(axis=1)
+        ):
+            share = np.einsum("ti,tij->tj", x[node] - corners[:, 0], shares)
+            share[:, 0] += 1.0
+            count += bool(((share * altitudes).min(axis=1) > depth).any())
+    return count
+
+
+def test_a_wedge_does_not_sink_into_the_glass_that_it_shatters() -> None:
+    """Five sweeps a step left twelve nodes inside of the other body by a hundredth of a face or more."""
+    case = parse_case(apply_overrides(read_data(CASE), ["run.frames=0"]))
+    sim = simulation.build(case, Path(), SerialComm())
+    step.prepare(sim)
+    assert sim.contact is not None
+    worst = 0
+    while not sim.clock.done:
+        step.first_half(sim)
+        step.second_half(sim)
+        if sim.clock.step % 20 == 0 and sim.contact is not None:
+            worst = max(worst, inside(sim.model, 0.01 * sim.contact.exterior.size))
+    assert worst <= 3
