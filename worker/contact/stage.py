@@ -24,6 +24,7 @@ from .detection import Detected, detect
 from .effort import Effort
 from .exterior import Exterior
 from .narrow_phase import PUSH_OUT
+from .restitution import rebound
 from .scene import Scene
 from .searches import Searches
 from .solver import ActiveSet
@@ -50,7 +51,7 @@ class Contact:
         self.searches = Searches(case, model, neighbours, self.exterior, comm, clock)
         self.books = Books(model.nodes.n, len(case.parts), extremes)
         self._active = ActiveSet(self.books.scale)
-        self._sweeps = Effort(case.contact.sweeps)
+        self._sweeps, self._restitution = Effort(case.contact.sweeps), case.contact.restitution
         self.found = Detected.nothing()
         """What the last step has found here."""
         self.limit = 0.0
@@ -248,6 +249,8 @@ class Contact:
         redraw = step % normals.EVERY == 0
         self.found = detect(now, self.searches.mu, give, dt, self.exterior.size, redraw)
         now.active.n = self.found.contacts
+        if self._restitution > 0.0:
+            rebound(now.active.room, now.active.n, now.crowd.v, now.slots.before, self._restitution)
 
     def free(self) -> None:
         """Gives the messages back to MPI."""

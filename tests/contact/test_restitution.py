@@ -1,0 +1,77 @@
+"""What comes back from an impact (Cirak and West 2005): energy and momentum, of one contact and of many."""
+
+import numpy as np
+import pytest
+
+from conoid.cases.messages import Energy
+from conoid.worker.contact.narrow_phase import ContactRows
+from conoid.worker.contact.restitution import rebound
+from conoid.worker.simulation import Simulation
+
+from ..worker.kernels import build, run
+from ..worker.meshes import Floats
+from .kernels import Solver, many
+from .test_collision import MESHES, answer, case_of, momenta, on_threads, state_of
+from .test_effort import column
+
+
+def energy(v: Floats, mobility: Floats) -> float:
+    return float((0.5 * v * v / mobility).sum())
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
+def test_a_node_parts_from_a_face_with_a_share_of_its_speed(share: float) -> None:
+    """Masses of 1, 2, 3 and 4; it loses (1 - e^2) of the energy of the approach, and momentum stays."""
+    nodes, weights = np.array([[0, 1, 2, 3]], np.int32), np.array([[1.0, -0.2, -0.3, -0.5]])
+    normals, wanted = np.array([[0.0, 0.6, 0.8]]), np.zeros(1)
+    met = ContactRows(nodes, weights, normals, wanted, np.zeros(1), np.full(1, -1, np.int32))
+    mobility = 1.0 / np.repeat(np.arange(1.0, 5.0)[:, None], 3, axis=1)
+    v = np.array([[1.0, -3.0, -5.0], [0.5, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 2.0]])
+    rebound(met, 1, v, v, share)
+    speed = float(normals[0] @ (weights[0] @ v))
+    after = Solver(met, v, mobility).sweep(1)
+    assert normals[0] @ (weights[0] @ after) == pytest.approx(-share * speed, abs=1e-7)
+    lost = 0.5 * (1.0 - share**2) * speed**2 / float((weights**2 * mobility[:, 0]).sum())
+    assert energy(v, mobility) - energy(after, mobility) == pytest.approx(lost, abs=1e-7)
+    assert ((after - v) / mobility).sum(axis=0) == pytest.approx(np.zeros(3), abs=1e-10)
+
+
+def test_contacts_that_share_nodes_take_nothing_together() -> None:
+    """A column that closes everywhere: all relative velocities turn round, and the energy stays."""
+    v = np.zeros((6, 3))
+    v[:, 0] = -np.array([0.0, 1.0, 3.0, 4.0, 4.5, 7.0])
+    mobility = np.repeat(np.array([1.0, 2.0, 0.5, 1.0, 3.0, 1.0])[:, None], 3, axis=1)
+    met = column(6)
+    rebound(met, many(met), v, v, 1.0)
+    after = Solver(met, v, mobility).sweep(3000)
+    assert np.diff(after[:, 0]) == pytest.approx(-np.diff(v[:, 0]), abs=1e-6)
+    assert energy(after, mobility) == pytest.approx(energy(v, mobility), rel=1e-6)
+
+
+def collided(share: float) -> tuple[Simulation, list[Energy], Floats]:
+    """Two blocks that do not match run into each other; ledgers and drift of the momentum."""
+    sim, lines = build(case_of(restitution=share), MESHES), []
+    start = np.concatenate(momenta(sim))
+    run(sim, lambda sim, before: lines.append(sim.ledger.close(before)))
+    return sim, lines, np.concatenate(momenta(sim)) - start
+
+
+def test_an_impact_of_bodies_from_which_all_comes_back_takes_nothing() -> None:
+    """Many nodes and edges at once; momentum stays, and the books close."""
+    taken = []
+    for share in (0.0, 0.5, 1.0):
+        sim, lines, drift = collided(share)
+        taken.append(lines[-1].contact / lines[0].initial)
+        assert sim.ledger.worst < 1e-3
+        assert np.abs(drift[:3]).max() < 1e-12
+    assert taken[0] > 0.01
+    assert taken[1] > 0.01
+    assert abs(taken[2]) < 1e-10
+
+
+def test_the_answer_with_restitution_is_the_same_on_three_ranks() -> None:
+    case = case_of(restitution=0.8)
+    alone = answer(case)[0]
+    assert alone is not None
+    found = on_threads(3, case, lambda sim: state_of(run(sim))[0], MESHES)
+    assert [digest for digest in found if digest is not None] == [alone]
