@@ -3,7 +3,8 @@
 # make bench  speed, and speed against error, in 15 minutes: tables in build/bench (BENCH=quick: 2, BENCH=long: 60)
 # make accuracy  docs/accuracy.md: every row of the verification catalogue as measured here (ACCURACY=quick: no studies)
 # make reference  docs/case.md and the JSON schema, from the texts of the models in cases/
-# make drill  the long tests: studies and failures that take minutes; root on Debian gets Slurm for those of a cluster
+# make drill  the long tests: faults by the hundred (table in build/drill; goes on where it was; DRILL="--shard 1/4"),
+#             then studies and failures that take minutes; root on Debian gets Slurm and libfaketime for them
 #
 # Each target first brings .venv to the versions of requirements.lock, when that file or pyproject.toml has changed.
 # Kernels are compiled while pip installs what they do not need. Nothing takes 10 s without a word.
@@ -51,8 +52,9 @@ reference: $(READY)
 	$(BIN)/conoid schema --page --out docs/case.md
 
 drill: $(READY)
-	@if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null && ! command -v slurmctld >/dev/null; then \
-		apt-get install -y --no-install-recommends slurm-wlm munge || echo "without Slurm: its tests are skipped"; fi
+	@if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null && ! command -v slurmctld faketime >/dev/null; then \
+		apt-get install -y --no-install-recommends slurm-wlm munge faketime || echo "without Slurm: its tests are skipped"; fi
+	$(BIN)/python -m tests.drill $(DRILL)
 	$(BIN)/python -m pytest -q -m slow --timeout 3600 --ignore tests/bench tests
 
 $(READY): requirements.lock pyproject.toml

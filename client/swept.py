@@ -16,7 +16,8 @@ _PANELS = 6
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 _FIRST = ("reference.", "fragments", "broken", "eroded", "energy.fracture", "energy.plastic", "energy.kinetic")
 """What is drawn rather than other columns."""
-_NEVER = frozenset({"elapsed", "cpu", "elements", "nodes", "worst_residual", "energy.residual", "energy.initial"})
+_NEVER = frozenset({"elapsed", "cpu", "elements", "nodes", "worst_residual", "reference.worst_residual",
+                    "energy.residual", "energy.initial"})  # fmt: skip
 """What is drawn only when it is asked for: it tells of the machine or of the mesh."""
 
 

@@ -23,6 +23,8 @@ from starlette.exceptions import HTTPException
 
 from conoid.cases.problems import Problem
 
+from .holds import DAMAGE
+
 MEDIA_TYPE = "application/problem+json"
 _log = logging.getLogger("conoid.server")
 _CODES = {400: "bad_request", 401: "unauthorized", 404: "not_found", 405: "method_not_allowed"}
@@ -105,6 +107,7 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(HTTPException, _http_error)
     app.add_exception_handler(RequestValidationError, _parameter_error)
     app.add_exception_handler(SQLAlchemyError, _database)
+    app.add_exception_handler(OSError, _storage)
     app.add_exception_handler(Exception, _crash)
 
 
@@ -137,6 +140,14 @@ async def _parameter_error(_: Request, error: Exception) -> Response:
     name = str(first["loc"][-1])
     detail = f"{name} = {str(first.get('input'))[:80]!r}: {first['msg']}"
     return ServiceError(400, "bad_parameter", detail, pointer=name).response()
+
+
+async def _storage(request: Request, error: Exception) -> Response:
+    """A file that cannot be read now, or was damaged."""
+    assert isinstance(error, OSError)
+    _log.error("%s %s: %s", request.method, request.url.path, error)
+    detail = f"a file of the run cannot be used: {error.strerror or error}"
+    return ServiceError(503, "unavailable", detail, retryable=error.errno not in DAMAGE).response()
 
 
 async def _database(request: Request, error: Exception) -> Response:

@@ -3,13 +3,16 @@
 import errno
 import os
 import re
-import shutil
 from pathlib import Path
 
 from conoid.cases import layout
 
 _TAIL = 1 << 14
 """Bytes at the end of the log in which the banner of the launcher is looked for. Chosen: a banner has 700."""
+_COMPLAINTS = [
+    os.strerror(number).encode()
+    for number in (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.ESTALE, errno.EFBIG)
+]
 _CODE = re.compile(rb"^=   EXIT CODE: (\d{1,3})$", re.MULTILINE)
 """MPICH's banner; Hydra writes it when a rank ends before the others, with the signal's number for a rank killed."""
 
@@ -21,13 +24,15 @@ def exit_code(folder: Path) -> int | None:
 
 
 def disk_failed(folder: Path) -> bool:
-    """Whether a rank complained of a full disk, or could not because there is no room for a complaint."""
-    if os.strerror(errno.ENOSPC).encode() in _tail(folder):
+    """Whether a rank complained of its disk, or could not because there is no room for a complaint."""
+    said = _tail(folder)
+    if any(words in said for words in _COMPLAINTS):
         return True
     try:
-        return shutil.disk_usage(folder).free < _TAIL
+        disk = os.statvfs(folder)
     except OSError:
         return False
+    return disk.f_bavail * disk.f_frsize < _TAIL or bool(disk.f_flag & os.ST_RDONLY)
 
 
 def _tail(folder: Path) -> bytes:

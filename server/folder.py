@@ -1,5 +1,6 @@
 """A run's folder as the server uses it: the submission, the outcome, the process record; all readable without it."""
 
+import hashlib
 import os
 import re
 import secrets
@@ -30,6 +31,9 @@ _TELLING = (layout.SUBMISSION, layout.JOURNAL, layout.WORKER)
 """One of these is left where a run has been, whatever was damaged."""
 _PINNED, _YES, _NO = ".keep", "yes", "no"
 _UNREADABLE = "outcome.unreadable.json"
+DAMAGED = (FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError)
+"""What the system says of a file that is gone, or is none any more, or not for this user."""
+_NO_FILE = (FileNotFoundError, IsADirectoryError, NotADirectoryError)
 
 
 class Submission(msgspec.Struct, kw_only=True, frozen=True):
@@ -210,7 +214,7 @@ def outcome(folder: Path) -> Outcome | None:
     """What outcome.json says; None when there is none, or none that can be read."""
     try:
         return outcome_from_json((folder / layout.OUTCOME).read_bytes())
-    except (FileNotFoundError, msgspec.MsgspecError, UnicodeDecodeError):
+    except (*_NO_FILE, msgspec.MsgspecError, UnicodeDecodeError):
         return None
 
 
@@ -220,6 +224,8 @@ def outcome_error(folder: Path) -> str:
         outcome_from_json((folder / layout.OUTCOME).read_bytes())
     except FileNotFoundError:
         return ""
+    except (IsADirectoryError, NotADirectoryError, PermissionError) as error:
+        return str(error.strerror)
     except (msgspec.MsgspecError, UnicodeDecodeError) as error:
         return str(error)
     return ""
@@ -228,8 +234,31 @@ def outcome_error(folder: Path) -> str:
 def write_outcome(folder: Path, ended: Outcome) -> None:
     """Writes outcome.json whole; one that nobody can read is kept beside it. Raises OSError."""
     if outcome_error(folder):
-        os.replace(folder / layout.OUTCOME, folder / _UNREADABLE)
+        put_away(folder / layout.OUTCOME, folder / _UNREADABLE)
     durable.write(folder / layout.OUTCOME, outcome_to_json(ended))
+
+
+def put_away(path: Path, kept: Path | None = None) -> None:
+    """Makes the name free, for a file that is to be written whole; what stands there is kept where that is named.
+
+    Raises OSError.
+    """
+    if kept is not None and not kept.exists():
+        os.replace(path, kept)
+    elif path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def is_as_accepted(folder: Path, made: Submission) -> bool:
+    """Whether the case is the one that was read and checked. Raises OSError."""
+    return made.body_sha256 in {"", digest_of(made.case_file, (folder / made.case_file).read_bytes())}
+
+
+def digest_of(case_file: str, body: bytes) -> str:
+    """Of a case as it was handed in, and of its kind."""
+    return hashlib.sha256(case_file.encode() + b"\0" + body).hexdigest()
 
 
 def write_stop(folder: Path, why: Cause) -> None:
@@ -249,7 +278,7 @@ def process(folder: Path) -> Process | None:
     """The process that was started for the run; None when there was none."""
     try:
         return _process.decode((folder / layout.WORKER).read_bytes())
-    except (FileNotFoundError, msgspec.MsgspecError):
+    except (*DAMAGED, msgspec.MsgspecError):
         return None
 
 

@@ -13,8 +13,13 @@ _AGAIN, _LONGEST = 1.0, 8.0
 _QUIET = 60.0
 """s for which the same trouble of the same run is not logged again. Chosen."""
 _PASSING = frozenset(
-    {errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.EAGAIN}
-)
+    {errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.ESTALE, errno.EMFILE, errno.ENFILE, errno.ENOMEM,
+     errno.EAGAIN}
+)  # fmt: skip
+_LASTING = 4.0
+"""s of delay from which trouble that is none of the machine lasts. Chosen: the fourth try, 7 s after the first."""
+DAMAGE = frozenset({errno.EISDIR, errno.ENOTDIR, errno.EACCES, errno.EPERM, errno.ELOOP})
+"""Trouble of one file, which does not pass by itself."""
 
 
 def passing(error: BaseException) -> bool:
@@ -88,6 +93,15 @@ class Holds:
         hold = self._holds.get(run_id)
         if hold is not None and hold.event in (None, event):
             del self._holds[run_id]
+
+    def lasts(self, run_id: str) -> bool:
+        """True when the run was tried again some times, in vain."""
+        hold = self._holds.get(run_id)
+        return hold is not None and hold.delay >= _LASTING
+
+    def damaged(self, run_id: str, error: Exception) -> bool:
+        """Whether the trouble is of the run's own files, and has lasted."""
+        return isinstance(error, OSError) and error.errno in DAMAGE and self.lasts(run_id)
 
     def forget(self, run_id: str) -> None:
         """The run has ended."""

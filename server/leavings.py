@@ -2,11 +2,13 @@
 
 import logging
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from sqlalchemy.exc import SQLAlchemyError
 
 from . import folder, recovery
+from .events import Run
 from .holds import words
 from .index import Index
 from .launch import Launcher
@@ -28,11 +30,11 @@ class Leavings:
 
     def all(self) -> None:
         """Every run that is not known to have ended. Raises OSError, SQLAlchemyError."""
-        ended, last = self._store.ended(), ""
+        ended, known, last = self._store.ended(), self._store.open(), ""
         for path in folder.scan(self._runs):
             last = path.name
             if path.name not in ended:
-                self.take_up(path)
+                self._take_up(path, partial(known.get, path.name))
         if last:
             folder.begin_after(last)
 
@@ -43,10 +45,16 @@ class Leavings:
 
     def take_up(self, path: Path) -> None:
         """What fails is logged once and comes up again with the next tidying."""
+        self._take_up(path, lambda: self._store.get(path.name))
+
+    def _take_up(self, path: Path, known_of: Callable[[], Run | None]) -> None:
+        """The database is written only where it knows less than the folder: a thousand runs wait for no disk."""
         told = self._failed.pop(path, "")
         try:
-            left = recovery.look(path, self._store.get(path.name), self._launcher)
-            self._index.add(left.run, left.key)
+            known = known_of()
+            left = recovery.look(path, known, self._launcher)
+            if left.run != known:
+                self._index.add(left.run, left.key)
         except (OSError, ValueError, SQLAlchemyError) as error:
             self._failed[path] = words(error)
             if told != words(error):

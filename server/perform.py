@@ -14,7 +14,7 @@ from conoid.cases.run import Cause, State
 from . import durable, folder, journal
 from .events import Action, Adopt, Journal, Kill, Launch, LaunchFailed, LaunchPutOff, Run, Stop, WriteOutcome
 from .holds import passing
-from .launch import Job, Launcher, LaunchError, Worker
+from .launch import DamagedError, Job, Launcher, LaunchError, Worker
 from .settings import Settings
 from .telemetry import Telemetry
 from .watch import Watch
@@ -66,6 +66,21 @@ class Performer:
         except OSError:
             return False
 
+    def lives(self, run_id: str) -> bool:
+        """Whether a worker of the run is known to live."""
+        watch = self.watches.get(run_id)
+        return watch is not None and watch.worker.exited() is None
+
+    def beyond_use(self, run_id: str) -> bool:
+        """Whether the run's folder alone is the trouble: the folder of all runs takes files."""
+        if self.gone(run_id):
+            return True
+        try:
+            durable.probe(self._settings.runs)
+        except OSError:
+            return False
+        return True
+
     def _stop(self, run_id: str, path: Path, why: Cause) -> None:
         """A disk that is full keeps nobody from stopping a run: the database remembers the request as well."""
         try:
@@ -94,13 +109,15 @@ class Performer:
         try:
             made = folder.submission(path)
             for left in (layout.OUTCOME, layout.STOP_REQUEST):
-                (path / left).unlink(missing_ok=True)
+                folder.put_away(path / left)
+            if not folder.is_as_accepted(path, made):
+                raise DamagedError(f"{made.case_file} is not what was accepted")
             case = path / made.case_file
             group = f"{made.owner}/{made.labels['sweep']}" if "sweep" in made.labels else ""
             job = Job(run.id, run.ranks, case, path, access, made.profile, made.wall_time, group)
             worker = self._launcher.start(job)
         except (OSError, msgspec.MsgspecError) as error:
-            raise LaunchError(str(error)) from error
+            raise DamagedError(str(error)) from error
         return self._watch(path, worker, made.wall_time)
 
     def _watch(self, path: Path, worker: Worker, allowed: float | None) -> Watch:
@@ -125,5 +142,4 @@ def of_launch(error: LaunchError) -> LaunchFailed | LaunchPutOff:
     """Trouble that passes puts the launch off; a folder that does not say what to run is trouble of its disk."""
     if passing(error):
         return LaunchPutOff(f"the launch is tried again: {error}")
-    damaged = isinstance(error.__cause__, msgspec.MsgspecError)
-    return LaunchFailed(str(error), Cause.STORAGE if damaged else Cause.LAUNCH)
+    return LaunchFailed(str(error), Cause.STORAGE if isinstance(error, DamagedError) else Cause.LAUNCH)

@@ -7,6 +7,7 @@ from typing import Literal
 import msgspec
 
 from conoid.cases import layout
+from conoid.cases.messages import Status
 from conoid.cases.run import State
 
 from . import farewell, folder, journal
@@ -36,7 +37,7 @@ def look(path: Path, known: Run | None, launcher: Launcher) -> Left:
     if made is None and known is None:
         raise ValueError(f"{layout.SUBMISSION} cannot be read, and the database does not know the run")
     accepted = folder.first(made) if made is not None else _as_accepted(known)
-    told = journal.statuses(path / layout.JOURNAL)
+    told = _told(path)
     trace = launcher.find(accepted.id, path)
     run = _mended(folder.replay(accepted, told), bool(told), known, path, trace, launcher.queues)
     code, full = farewell.exit_code(path), farewell.disk_failed(path)
@@ -49,8 +50,16 @@ def look(path: Path, known: Run | None, launcher: Launcher) -> Left:
 def _submission(path: Path) -> Submission | None:
     try:
         return folder.submission(path)
-    except (FileNotFoundError, msgspec.MsgspecError):
+    except (*folder.DAMAGED, msgspec.MsgspecError):
         return None
+
+
+def _told(path: Path) -> list[Status]:
+    """What the journal tells; nothing where it cannot be read."""
+    try:
+        return journal.statuses(path / layout.JOURNAL)
+    except folder.DAMAGED:
+        return []
 
 
 def _as_accepted(known: Run | None) -> Run:

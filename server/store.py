@@ -153,10 +153,11 @@ class Store:
         with self._engine.connect() as connection:
             return set(connection.execute(sa.select(_runs.c.id).where(_runs.c.state.not_in(_OPEN))).scalars())
 
-    def open_ids(self) -> set[str]:
-        """The ids of all runs that are not known to have ended."""
+    def open(self) -> dict[str, Run]:
+        """All runs that are not known to have ended, by id."""
+        query = sa.select(_runs).where(_runs.c.state.in_(_OPEN))
         with self._engine.connect() as connection:
-            return set(connection.execute(sa.select(_runs.c.id).where(_runs.c.state.in_(_OPEN))).scalars())
+            return {row["id"]: _run(row) for row in connection.execute(query).mappings()}
 
     def taken(self) -> list[Took]:
         """What every run that has ended took."""

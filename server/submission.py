@@ -1,12 +1,12 @@
 """From a body to an accepted run: read, check, estimate, write to disk, and only then say yes."""
 
-import hashlib
 import re
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import msgspec
 from sqlalchemy.exc import SQLAlchemyError
 
 from conoid.cases.batch import profile_of
@@ -70,7 +70,7 @@ class Desk:
             )  # fmt: skip
         wishes = wishes or Wishes()
         self._profile(wishes.profile, named=True)
-        digest = hashlib.sha256(_file_name(content_type).encode() + b"\0" + body).hexdigest()
+        digest = folder.digest_of(_file_name(content_type), body)
         if earlier := self._earlier(owner, key, digest):
             return earlier
         try:
@@ -109,8 +109,9 @@ class Desk:
             return None
         try:
             made = folder.submission(self._settings.runs / run_id)
-        except OSError:
-            raise ServiceError(410, "gone", f"the run of Idempotency-Key {key!r} has been removed") from None
+        except (*folder.DAMAGED, msgspec.MsgspecError):
+            detail = f"the run of Idempotency-Key {key!r} was {run_id}; its folder has been removed or damaged"
+            raise ServiceError(410, "gone", detail) from None
         if made.body_sha256 != digest:
             detail = f"Idempotency-Key {key!r} was used for another case"
             raise ServiceError(422, "key_reused", detail, pointer="Idempotency-Key", hint="use a new key for a new run")

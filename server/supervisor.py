@@ -15,7 +15,7 @@ from conoid.cases.run import State
 
 from . import waiting
 from .events import ONCE, Admitted, Broken, CancelAsked, Event, Granted, LaunchPutOff, Run
-from .holds import Holds
+from .holds import Holds, words
 from .index import Index
 from .launch import Launcher, LaunchError
 from .leavings import Leavings
@@ -36,6 +36,7 @@ _TIDY = 5.0
 _AGAIN = 1.0
 """s between two looks while something waits to be tried again."""
 _GONE = "the folder of the run has been removed"
+_DAMAGED = "the folder of the run cannot be used"
 _ANSWER = 10.0
 """s that the thread of the supervisor may take to answer. Chosen: it looks fifty times a second."""
 
@@ -195,7 +196,7 @@ class Supervisor:
             for event in watch.look():
                 self._apply(run_id, event)
         except OSError as error:
-            self._holds.put_off(run_id, error)
+            self._fail(self._open[run_id], None, error)
         if watch.news:
             self._ring(run_id)
 
@@ -240,10 +241,13 @@ class Supervisor:
             self._settle(after)
         return None
 
-    def _fail(self, run: Run, event: Event, error: Exception) -> Exception | None:
-        """A run whose folder is gone has ended; any other is tried again."""
-        if self._hands.gone(run.id) and not isinstance(event, Broken):
-            return self._apply(run.id, Broken(_GONE))
+    def _fail(self, run: Run, event: Event | None, error: Exception) -> Exception | None:
+        """A run whose folder is gone, or cannot be used while others can, has ended; any other is tried again."""
+        if not isinstance(event, Broken):
+            if self._hands.gone(run.id):
+                return self._apply(run.id, Broken(_GONE))
+            if self._holds.damaged(run.id, error) and not self._hands.lives(run.id) and self._hands.beyond_use(run.id):
+                return self._apply(run.id, Broken(f"{_DAMAGED}: {words(error)}"))
         self._waitlist.changed()
         return self._holds.put_off(run.id, error, event if isinstance(event, ONCE) else None)
 
@@ -284,9 +288,8 @@ class Supervisor:
     def _take_up(self) -> None:
         """Makes memory and database agree with the runs' folders, and goes on with what an earlier server left."""
         self._leavings.all()
-        for run_id in self._store.open_ids() - self._open.keys():
-            run = self._store.get(run_id)
-            if run is not None and self._hands.gone(run_id):
+        for run_id, run in self._store.open().items():
+            if run_id not in self._open and self._hands.gone(run_id):
                 self._open[run_id] = run
                 self._apply(run_id, Broken(_GONE))
 

@@ -35,7 +35,7 @@ def snapshot(service: Service, run: Run) -> Snapshot:
     path = service.settings.runs / run.id
     made = _submission(path)
     progress = service.supervisor.progress(run.id)
-    ended: Outcome | None = folder.outcome(path) if run.state.final else None
+    ended = outcome(path) if run.state.final else None
     body = {
         **brief(service, run),
         "title": made.title if made else "",
@@ -52,6 +52,14 @@ def _submission(path: Path) -> folder.Submission | None:
     try:
         return folder.submission(path)
     except (OSError, msgspec.MsgspecError):
+        return None
+
+
+def outcome(path: Path) -> Outcome | None:
+    """None where the file is gone, damaged, or locked away."""
+    try:
+        return folder.outcome(path)
+    except OSError:
         return None
 
 

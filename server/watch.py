@@ -40,13 +40,15 @@ class Watch:
         self._deadline = None if left is None else time.monotonic() + left
         self._kill_at, self._runs = float("inf"), False
         self._phase: Phase = "unknown"
-        self._next = 0.0
+        self._next, self._full = 0.0, False
         self.progress: Progress | None = None
         self.news = False
         """True when the last look found new lines in the journal."""
 
     def look(self) -> Iterator[Event]:
-        """What has happened since the last look. Raises OSError."""
+        """What has happened since the last look. A disk that was full when the worker ended was full, also when the
+        end can be told only later. Raises OSError.
+        """
         now = time.monotonic()
         if self._phase == self.worker.phase() == "waits" and now < self._next:
             return
@@ -58,9 +60,9 @@ class Watch:
         if exit_ is not None:
             told = folder.outcome(self._folder)
             code = farewell.exit_code(self._folder) if exit_.code is None else exit_.code
-            full = told is None and farewell.disk_failed(self._folder)
+            self._full = told is None and (self._full or farewell.disk_failed(self._folder))
             traces = self._traces(exit_.last_words)
-            yield WorkerExited(code, told, exit_.out_of_memory, full, traces, exit_.reading)
+            yield WorkerExited(code, told, exit_.out_of_memory, self._full, traces, exit_.reading)
         elif now >= self._kill_at:
             self._kill_at = now + 1.0
             self.worker.kill()

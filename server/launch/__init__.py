@@ -16,6 +16,10 @@ class LaunchError(Exception):
     """The worker could not be started; the text is one line."""
 
 
+class DamagedError(LaunchError):
+    """What is to be run, or where, is not there any more as it was accepted."""
+
+
 @dataclass(frozen=True)
 class Access:
     """Where a worker publishes, and as whom (no user: the router asks for none)."""

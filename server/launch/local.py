@@ -9,13 +9,14 @@ import time
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
+from typing import BinaryIO
 
 from conoid.cases import layout
 
 from .. import folder as run_folder
 from ..folder import Process
 from ..settings import Settings, command, usable_cores
-from . import Exit, Job, LaunchError, Phase, Trace, Worker, processes
+from . import DamagedError, Exit, Job, LaunchError, Phase, Trace, Worker, processes
 
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _NOT_FOR_WORKERS = ("CONOID_DATABASE", "CONOID_TOKEN")
@@ -26,6 +27,8 @@ _LAST_WORDS, _LOG_TAIL = 300, 1 << 14
 Chosen."""
 _BURIAL = 1.0
 """s for which a killed launcher is waited for, so that it leaves no zombie. Chosen: it takes milliseconds."""
+_FRESH = 1.0
+"""s for which a look at all processes holds. What is looked for was started by a server that is dead. Chosen."""
 _HOUR = 3600.0
 """s after which shared memory that no process maps is taken for left over: no launch takes that long to map it."""
 
@@ -38,32 +41,34 @@ class LocalLauncher:
     def __init__(self, settings: Settings) -> None:
         """Takes the two commands from ``settings``."""
         self._mpiexec, self._worker = settings.mpiexec, settings.worker
+        self._living: dict[str, set[int]] = {}
+        self._looked = -_FRESH
 
     def start(self, job: Job) -> Worker:
         """Starts the ranks; their terminal output goes to log/launcher.log. Raises LaunchError."""
         argv = [*find_mpiexec(self._mpiexec), "-n", str(job.ranks), *self._worker, *_arguments(job)]
         oom_kills = processes.oom_kills()
-        try:
-            with open(job.folder / layout.LOGS / layout.LAUNCHER_LOG, "ab") as log:
+        with _log_of(job.folder) as log:
+            try:
                 child = subprocess.Popen(
                     argv, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT, cwd=job.folder,
                     env=environment(os.environ, job), start_new_session=True,
                 )  # fmt: skip
-        except OSError as error:
-            raise LaunchError(f"{argv[0]} cannot be started: {error.strerror}") from None
+            except OSError as error:
+                raise LaunchError(f"{argv[0]} cannot be started: {error.strerror}") from None
         worker = LocalWorker(job.run, job.folder, _record(child.pid, oom_kills), child)
         try:
             run_folder.write_process(job.folder, worker.process)
         except OSError as error:
             worker.kill()
-            raise LaunchError(f"the worker cannot be recorded: {error.strerror}") from None
+            raise DamagedError(f"the worker cannot be recorded: {error.strerror}") from None
         return worker
 
     def find(self, run: str, folder: Path) -> Trace:
         """By its record; for a server that was killed between the launch and the record, by its environment."""
         process = run_folder.process(folder)
         if process is None:
-            leader = processes.leader_of(run)
+            leader = processes.leader_of(self._members(run))
             if leader is None:
                 return Trace(None, False, False)
             process = _record(leader, processes.oom_kills())
@@ -73,10 +78,25 @@ class LocalLauncher:
         rebooted = process.boot != processes.boot()
         return Trace(worker if not rebooted and worker.alive() else None, True, rebooted)
 
+    def _members(self, run: str) -> set[int]:
+        """The processes of a run; a thousand runs are found with one look at all processes."""
+        if time.monotonic() > self._looked + _FRESH:
+            self._living, self._looked = processes.of_all_runs(), time.monotonic()
+        return self._living.get(run, set())
+
     def tidy(self) -> None:
         """MPICH's ranks share memory through files that a kill leaves behind, 2 MB each time."""
         for path in processes.unused_shared_memory(Path("/dev/shm"), "mpich_shm_", _HOUR):
             path.unlink(missing_ok=True)
+
+
+def _log_of(folder: Path) -> BinaryIO:
+    """Where the ranks say what they have to say, in a folder that is made anew when it was removed."""
+    try:
+        (folder / layout.LOGS).mkdir(0o700, exist_ok=True)
+        return open(folder / layout.LOGS / layout.LAUNCHER_LOG, "ab")
+    except OSError as error:
+        raise DamagedError(f"{layout.LOGS} cannot be written: {error.strerror}") from None
 
 
 def find_mpiexec(chosen: str) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 import os
 import signal
 import time
+from collections.abc import Collection
 from contextlib import suppress
 from pathlib import Path
 
@@ -62,10 +63,22 @@ def of_run(run: str) -> list[int]:
     return sorted(found)
 
 
-def leader_of(run: str) -> int | None:
+def leader_of(members: Collection[int]) -> int | None:
     """The process of a run whose parent does not belong to it: the one that the server started."""
-    members = set(of_run(run))
     return next((pid for pid in sorted(members) if parent(pid) not in members), None)
+
+
+def of_all_runs() -> dict[str, set[int]]:
+    """The living processes of every run; those of this user only."""
+    found: dict[str, set[int]] = {}
+    marker = f"{RUN_VARIABLE}=".encode()
+    for entry in _PROC.iterdir():
+        if entry.name.isdigit():
+            with suppress(OSError):
+                for word in (entry / "environ").read_bytes().split(b"\0"):
+                    if word.startswith(marker):
+                        found.setdefault(os.fsdecode(word[len(marker) :]), set()).add(int(entry.name))
+    return found
 
 
 def end_run(run: str) -> int:

@@ -12,7 +12,7 @@ from conoid.cases import batch, layout, slurm, whole
 from conoid.cases.slurm import Entry
 
 from ..settings import Settings
-from . import Job, LaunchError, Trace
+from . import DamagedError, Job, LaunchError, Trace
 from .arrays import Arrays
 from .handed import SlurmWorker
 from .local import find_mpiexec
@@ -43,7 +43,8 @@ class SlurmLauncher:
             whole.write(job.folder / layout.JOB_SCRIPT, batch.script(profile[1], sys.executable).encode(), 0o755)
             whole.write(job.folder / layout.JOB, batch.to_json(record))
         except (OSError, ValueError) as error:
-            raise LaunchError(f"the job cannot be written down: {error}") from None
+            failed = DamagedError if isinstance(error, OSError) else LaunchError
+            raise failed(f"the job cannot be written down: {error}") from None
         return self._take(job.run, SlurmWorker(job.folder, record, self._site, job.group))
 
     def find(self, run: str, folder: Path) -> Trace:

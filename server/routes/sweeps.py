@@ -11,7 +11,7 @@ from starlette.concurrency import run_in_threadpool
 
 from conoid.cases.outcome import Outcome
 
-from .. import folder, openapi, view
+from .. import openapi, view
 from ..auth import Identity, Reader, Submitter
 from ..errors import not_found
 from ..events import Run
@@ -95,7 +95,7 @@ def _shown(service: Service, plan: Plan) -> dict[str, Any]:
 
 
 def _line(service: Service, point: dict[str, Any], run: Run) -> dict[str, Any]:
-    ended = folder.outcome(service.settings.runs / run.id) if run.state.final else None
+    ended = view.outcome(service.settings.runs / run.id) if run.state.final else None
     values = {key: value if isinstance(value, int | float | str) else repr(value) for key, value in point.items()}
     return {**values, "run": run.id, "state": run.state.value, "cause": run.cause or "", **_results(ended)}
 

@@ -68,6 +68,7 @@ def test_a_wedge_does_not_sink_into_the_glass_that_it_shatters() -> None:
     case = parse_case(apply_overrides(read_data(CASE), ["run.frames=0"]))
     sim = simulation.build(case, Path(), SerialComm())
     step.prepare(sim)
+    assert sim.contact is not None
     worst = 0
     while not sim.clock.done:
         step.first_half(sim)

@@ -166,9 +166,11 @@ def processes(folder: Path) -> Iterator[MakeProcess]:
         made.append(Process(folder / "runs", ("--worker", fake, "--slots", "2", "--grace", "0.5", *arguments)))
         return made[-1]
 
-    yield make
-    for one in made:
-        one.close()
+    try:
+        yield make
+    finally:
+        for one in made:
+            one.close()
 
 
 def _end_workers(folder: Path) -> None:

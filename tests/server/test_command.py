@@ -168,7 +168,7 @@ def test_all_processes_of_a_run_are_known_and_ended() -> None:
     leader = subprocess.Popen([sys.executable, "-c", code], env=env, start_new_session=True)
     while len(processes.of_run("a-run-of-this-test")) < 2:
         assert leader.poll() is None
-    assert processes.leader_of("a-run-of-this-test") == leader.pid
+    assert processes.leader_of(processes.of_all_runs()["a-run-of-this-test"]) == leader.pid
     assert processes.end_run("a-run-of-this-test") == 2
     assert leader.wait(10) == -signal.SIGKILL
     assert processes.start_time(leader.pid) is None

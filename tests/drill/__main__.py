@@ -1,0 +1,110 @@
+"""``python -m tests.drill``: every fault, one after the other; a table in build/drill.
+
+A drill that was interrupted goes on where it was: what was true in build/drill/faults.jsonl is not tried again unless
+``--fresh`` says so. ``--shard 2/4`` tries every fourth group from the second on, ``--only WORDS`` those whose names
+have the words, ``--list`` names them. The exit code is 0 when every state became true in time.
+"""
+
+import argparse
+import json
+import re
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+
+from . import damage, strike, strikes, workers
+from .grounds import Grounds, grounds
+from .judge import TRUE, Row
+from .table import write
+
+PLACE = Path("build/drill")
+Group = tuple[str, Callable[[Grounds], Iterator[Row]]]
+"""A kind of stand, and what is tried on it."""
+
+
+def groups() -> dict[str, Group]:
+    """What is tried together, by name."""
+    found: dict[str, Group] = {}
+    for one in strikes.everything():
+        found[one.name] = (one.stand, partial(_struck, one))
+    for name, (kind, deed) in damage.groups().items():
+        found[name] = (kind, partial(_on, kind, deed))
+    for adopted in (False, True):
+        name = f"workers struck, {'adopted' if adopted else 'own'}"
+        found[name] = ("wide", partial(_on, "wide", partial(workers.rows, adopted=adopted)))
+    return found
+
+
+def _struck(one: strike.Strike, made: Grounds) -> Iterator[Row]:
+    return strike.rows(made.stand(one.stand), one)
+
+
+def _on(kind: str, deed: Callable[..., Iterator[Row]], made: Grounds) -> Iterator[Row]:
+    return deed(made.stand(kind))
+
+
+def main() -> int:
+    options = _options()
+    chosen = {name: group for name, group in groups().items() if options.only in name}
+    names = list(chosen)[options.shard[0] - 1 :: options.shard[1]]
+    if options.list:
+        print(*names, sep="\n")
+        return 0
+    PLACE.mkdir(parents=True, exist_ok=True)
+    book = PLACE / "faults.jsonl"
+    if options.fresh:
+        book.unlink(missing_ok=True)
+    done = _done(book)
+    with tempfile.TemporaryDirectory(prefix="conoid-drill-") as place, grounds(Path(place)) as made:
+        for name in names:
+            if name not in done or any(row.verdict != TRUE for row in done[name]):
+                _try(name, chosen[name], made, book)
+    found = [(row, name) for name, rows in _done(book).items() for row in rows]
+    return write(PLACE / "faults.md", [row for row, _ in found])
+
+
+def _try(name: str, group: Group, made: Grounds, book: Path) -> None:
+    """One group; what goes wrong with the drill itself is a line of the table as well."""
+    began = time.monotonic()
+    if why := made.lacks(group[0]):
+        print(f"{name}: not tried: {why}", flush=True)
+        return
+    try:
+        found = list(group[1](made))
+    except Exception as error:
+        found = [Row(name, "drill", "", 0.0, f"the drill failed: {type(error).__name__} {str(error)[:300]}")]
+    if any(row.verdict != TRUE for row in found):
+        made.renew(group[0], PLACE / f"{re.sub('[^a-zA-Z0-9]+', '-', name)}.log")
+    with book.open("a") as file:
+        file.write(json.dumps({"name": name, "rows": [asdict(row) for row in found]}) + "\n")
+    wrong = [row for row in found if row.verdict != TRUE]
+    print(f"{name}: {len(found) - len(wrong)} of {len(found)} true, {time.monotonic() - began:.0f} s", flush=True)
+    for row in wrong:
+        print(f"    {row.fault}: {row.happened}: {row.verdict}", flush=True)
+
+
+def _done(book: Path) -> dict[str, list[Row]]:
+    lines = book.read_text().splitlines() if book.exists() else []
+    return {told["name"]: [Row(**row) for row in told["rows"]] for told in map(json.loads, lines)}
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser("python -m tests.drill", description="Faults, and whether states stay true.")
+    parser.add_argument("--shard", type=_shard, default=(1, 1), metavar="I/N", help="every N-th group, from I on")
+    parser.add_argument("--only", default="", metavar="WORDS", help="groups whose names have the words")
+    parser.add_argument("--fresh", action="store_true", help="forget what was tried before")
+    parser.add_argument("--list", action="store_true", help="name the groups and try nothing")
+    return parser.parse_args()
+
+
+def _shard(text: str) -> tuple[int, int]:
+    first, _, all_ = text.partition("/")
+    return int(first), int(all_)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,199 @@
+"""Faults that hit the files of one run: deleted, emptied, cut, garbled, replaced, locked away."""
+
+import os
+import shutil
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import product
+from pathlib import Path
+
+from conoid.cases import layout
+
+from . import judge
+from .judge import TRUE, Row
+from .situations import STORAGE, SUCCEEDED, Truth
+from .stand import Stand
+
+CASE = "case.toml"
+GONE = frozenset({"410"})
+LOST = frozenset({"lost/service", "lost/storage", "failed/storage", "failed/service"})
+ANY_FAILURE = STORAGE | {"failed/input"}
+
+
+def deleted(path: Path) -> None:
+    shutil.rmtree(path) if path.is_dir() else path.unlink()
+
+
+def emptied(path: Path) -> None:
+    """A folder: of what it has."""
+    if path.is_dir():
+        for inner in path.iterdir():
+            deleted(inner)
+    else:
+        os.truncate(path, 0)
+
+
+def halved(path: Path) -> None:
+    os.truncate(path, path.stat().st_size // 2)
+
+
+def garbled(path: Path) -> None:
+    path.write_bytes(b"\xff{\x00\n" * 20)
+
+
+def folder_in_place(path: Path) -> None:
+    path.unlink()
+    path.mkdir()
+
+
+def file_in_place(path: Path) -> None:
+    shutil.rmtree(path)
+    path.write_text("x")
+
+
+def locked_away(path: Path) -> None:
+    path.chmod(0o000)
+
+
+WAYS: dict[str, Callable[[Path], None]] = {
+    "deleted": deleted, "emptied": emptied, "cut to half": halved, "garbled": garbled,
+    "a folder in its place": folder_in_place, "a file in its place": file_in_place, "not permitted": locked_away,
+}  # fmt: skip
+OF_FILES = ("deleted", "emptied", "cut to half", "garbled", "a folder in its place", "not permitted")
+OF_FOLDERS = ("deleted", "emptied", "a file in its place", "not permitted")
+
+
+@dataclass(frozen=True)
+class Damage:
+    """``name`` in the folder of a run that is ``doing`` something; ``down``: while no server is there."""
+
+    name: str
+    way: str
+    doing: str
+    down: bool
+
+    @property
+    def title(self) -> str:
+        """In the table."""
+        when = "while no server was there" if self.down else "beneath the server"
+        return f"{self.name or 'the folder of the run'}: {self.way}, {when}: {self.doing}"
+
+    @property
+    def beyond_use(self) -> bool:
+        """Whether nobody can write there any more."""
+        return self.way in {"a folder in its place", "a file in its place", "not permitted"}
+
+    def states(self) -> frozenset[str]:
+        """What is true of the run afterwards."""
+        return {"runs": self._runs, "waits": self._waits, "has ended": self._ended}[self.doing]()
+
+    def _runs(self) -> frozenset[str]:
+        """A worker that can write goes on: what it has read is in its memory."""
+        if not self.name:
+            return STORAGE if self.way == "not permitted" else GONE | STORAGE
+        return STORAGE if self.name == layout.JOURNAL and self.beyond_use else SUCCEEDED
+
+    def _waits(self) -> frozenset[str]:
+        """A run whose case or submission is not what was accepted is not run."""
+        if not self.name:
+            return STORAGE if self.way == "not permitted" else GONE | STORAGE
+        if self.name in {CASE, layout.SUBMISSION}:
+            return STORAGE
+        return STORAGE if self.beyond_use and self.name in {layout.JOURNAL, layout.LOGS} else SUCCEEDED
+
+    def _ended(self) -> frozenset[str]:
+        """What has ended stays as it was told."""
+        return GONE | SUCCEEDED if not self.name and self.way != "not permitted" else SUCCEEDED
+
+    @property
+    def whole(self) -> bool:
+        """Whether journal and outcome can still tell the same."""
+        return bool(self.name) and self.name not in {layout.JOURNAL, layout.OUTCOME} and not self.beyond_use
+
+
+def damages() -> Iterator[Damage]:
+    """All of them: file by way by what the run is doing, with and without a server."""
+    files = {
+        "runs": (layout.SUBMISSION, layout.JOURNAL, layout.WORKER, CASE),
+        "waits": (layout.SUBMISSION, layout.JOURNAL, CASE),
+        "has ended": (layout.SUBMISSION, layout.JOURNAL, layout.OUTCOME),
+    }
+    for doing, names in files.items():
+        for name, way, down in product(names, OF_FILES, (False, True)):
+            yield Damage(name, way, doing, down)
+        for name, way, down in product(("", layout.LOGS), OF_FOLDERS, (False, True)):
+            if name or way != "a file in its place":
+                yield Damage(name, way, doing, down)
+
+
+def rows(stand: Stand, some: Sequence[Damage]) -> Iterator[Row]:
+    """Damages to as many runs at once; all of them with a server there, or all without."""
+    blockers = [stand.running(ranks=stand.slots - 1)] if some[0].doing == "waits" else []
+    made = [_made(stand, one) for one in some]
+    lives = blockers + [run for one, run in zip(some, made, strict=True) if one.doing == "runs"]
+    for run in lives:
+        stand.reached(run, "running")
+    stand.errors.clear()
+    if some[0].down:
+        stand.kill()
+    for one, run in zip(some, made, strict=True):
+        WAYS[one.way](stand.runs / run / one.name)
+    if some[0].down:
+        assert stand.start(), stand.said()
+    for run in made:
+        judge.reads(stand, run)
+    time.sleep(0.3)
+    for run in lives:
+        stand.go(run)
+    truths = [Truth(run, one.states(), launches=2, whole=one.whole) for one, run in zip(some, made, strict=True)]
+    yield from _judged(stand, some, truths)
+    for truth in truths:
+        if (stand.runs / truth.run).exists():
+            (stand.runs / truth.run).chmod(0o700)
+
+
+def _made(stand: Stand, one: Damage) -> str:
+    if one.doing == "runs":
+        return stand.running()
+    if one.doing == "waits":
+        return stand.submit(ranks=stand.large)
+    run = stand.submit()
+    stand.reached(run)
+    return run
+
+
+def _judged(stand: Stand, some: Sequence[Damage], truths: Sequence[Truth]) -> Iterator[Row]:
+    since, found = time.monotonic(), []
+    for truth in truths:
+        seen, seconds = judge.settle(stand, truth, since)
+        found.append((seen, seconds, judge.verdict(stand, truth, seen)))
+        judge.reads(stand, truth.run)
+    stand.again()
+    for one, truth, (seen, seconds, wrong) in zip(some, truths, found, strict=True):
+        later = judge.settle(stand, truth, time.monotonic())[0]
+        judge.reads(stand, truth.run)
+        errors = [error for error in stand.errors if truth.run in error]
+        if wrong == TRUE and later != seen:
+            wrong = f"lie: {later} after the next start, {seen} before"
+        yield Row(one.title, "damage", seen, seconds, errors[0] if wrong == TRUE and errors else wrong)
+
+
+def batches(some: Iterable[Damage], size: int) -> Iterator[list[Damage]]:
+    """Of one kind each: what the runs do, and whether a server is there."""
+    kinds: dict[tuple[str, bool], list[Damage]] = {}
+    for one in some:
+        kinds.setdefault((one.doing, one.down), []).append(one)
+    for same in kinds.values():
+        yield from (same[n : n + size] for n in range(0, len(same), size))
+
+
+def groups(size: int = 12) -> dict[str, tuple[str, Callable[[Stand], Iterator[Row]]]]:
+    """What is tried at once, by name, and on which kind of stand."""
+    made: dict[str, tuple[str, Callable[[Stand], Iterator[Row]]]] = {}
+    for n, batch in enumerate(batches(damages(), size)):
+        kind = "narrow" if batch[0].doing == "waits" else "wide"
+        when = "no server" if batch[0].down else "a server"
+        made[f"damage {n + 1}: {batch[0].doing}, {when}"] = (kind, partial(rows, some=batch))
+    return made

@@ -1,0 +1,102 @@
+"""The stands of the drill by kind, each made when it is first needed, all closed at the end."""
+
+import os
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from .stand import UNPRIVILEGED, Stand, can_drop
+
+DISK = "size=1100m,nr_inodes=4000"
+"""Of the file system of its own, in memory, that one of the stands has: little more than what a server keeps free."""
+FAKETIME = ("/usr/lib/*/faketime/libfaketimeMT.so.1", "/usr/local/lib/faketime/libfaketimeMT.so.1")
+
+
+class Grounds:
+    """Makes stands below a folder."""
+
+    def __init__(self, place: Path) -> None:
+        self._place = place
+        self._stands: dict[str, Stand] = {}
+        self._mounts: list[Path] = []
+        self._make: dict[str, Callable[[Path], Stand]] = {
+            "plain": Stand, "wide": lambda root: Stand(root, slots=40, before=UNPRIVILEGED),
+            "narrow": lambda root: Stand(root, slots=3, before=UNPRIVILEGED),
+            "unprivileged": lambda root: Stand(root, before=UNPRIVILEGED), "disk": self._on_a_disk, "clock": _clock,
+        }  # fmt: skip
+
+    def lacks(self, kind: str) -> str:
+        """Why there can be no such stand here; empty when there can."""
+        if kind in {"unprivileged", "wide", "narrow"} and not can_drop():
+            return "root without setpriv: permissions do not hold"
+        if kind == "disk" and os.geteuid() != 0:
+            return "only root can mount a small disk"
+        if kind == "clock" and not _libfaketime():
+            return "no libfaketime (apt-get install faketime; make drill does it)"
+        return ""
+
+    def stand(self, kind: str) -> Stand:
+        """With a server that answers."""
+        if kind not in self._stands:
+            root = self._place / kind
+            root.mkdir(parents=True)
+            self._stands[kind] = self._make[kind](root)
+        found = self._stands[kind]
+        if found.child is None or found.child.poll() is not None:
+            assert found.start(), f"the server of the stand {kind!r} does not start: {found.said()}"
+        return found
+
+    def renew(self, kind: str, log: Path | None = None) -> None:
+        """The next one starts from nothing; ``log``: where the log of the one before is kept."""
+        if kind in self._stands:
+            found = self._stands.pop(kind)
+            if log is not None:
+                shutil.copy(found.root / "server.log", log)
+            self._close(found)
+
+    def close(self) -> None:
+        """Ends all servers and their workers."""
+        for kind in tuple(self._stands):
+            self.renew(kind)
+
+    def _close(self, stand: Stand) -> None:
+        stand.close()
+        if stand.runs in self._mounts:
+            self._mounts.remove(stand.runs)
+            subprocess.run(["umount", "--lazy", str(stand.runs)], check=False)
+        for path in (stand.root, stand.runs, *stand.runs.glob("*")):
+            with suppress(OSError):
+                path.chmod(0o700)
+        shutil.rmtree(stand.root, ignore_errors=True)
+
+    def _on_a_disk(self, root: Path) -> Stand:
+        made = Stand(root)
+        made.runs.mkdir(mode=0o700)
+        subprocess.run(["mount", "-t", "tmpfs", "-o", f"{DISK},mode=0700", "conoid-drill", str(made.runs)], check=True)
+        self._mounts.append(made.runs)
+        return made
+
+
+def _clock(root: Path) -> Stand:
+    (root / "clock").write_text("+0")
+    return Stand(root, environment={
+        "LD_PRELOAD": _libfaketime(), "FAKETIME_TIMESTAMP_FILE": str(root / "clock"), "FAKETIME_NO_CACHE": "1",
+        "FAKETIME_DONT_FAKE_MONOTONIC": "1",
+    })  # fmt: skip
+
+
+def _libfaketime() -> str:
+    found = [path for pattern in FAKETIME for path in sorted(Path("/").glob(pattern[1:]))]
+    return str(found[0]) if found else ""
+
+
+@contextmanager
+def grounds(place: Path) -> Iterator[Grounds]:
+    """Closed at the end, whatever happens."""
+    made = Grounds(place)
+    try:
+        yield made
+    finally:
+        made.close()

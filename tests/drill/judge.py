@@ -1,0 +1,101 @@
+"""Whether what the server says of a run is true: by the book of the workers, the processes, and the run's folder."""
+
+import time
+from dataclasses import dataclass
+
+from conoid.cases import layout
+from conoid.server import folder, journal
+from conoid.server.launch import processes
+
+from .situations import Truth
+from .stand import FINAL, Stand
+
+TRUE = "true"
+
+
+@dataclass
+class Row:
+    """A line of the table."""
+
+    fault: str
+    family: str
+    happened: str
+    seconds: float
+    verdict: str
+
+
+def settle(stand: Stand, truth: Truth, since: float) -> tuple[str, float]:
+    """The state at which the run comes to rest, and how long after ``since`` that was."""
+    while True:
+        seen, now = stand.state(truth.run), time.monotonic()
+        if seen in truth.states or seen.partition("/")[0] in FINAL or now > since + stand.patience:
+            return seen, now - since
+        time.sleep(0.1)
+
+
+def verdict(stand: Stand, truth: Truth, seen: str) -> str:
+    """What is wrong, most severe first; ``TRUE`` for nothing."""
+    if truth.run == "none":
+        return "never accepted"
+    if "two runs" in truth.happened:
+        return "double: two runs of one key"
+    if seen in {"404", "0"}:
+        return f"acknowledged and lost: {seen}"
+    if seen not in truth.states:
+        kind = "lie" if seen.partition("/")[0] in FINAL else "stranded"
+        return f"{kind}: {seen}, not {' or '.join(sorted(truth.states))}"
+    found = [_doubles(stand, truth), _orphans(stand, truth, seen), _success(stand, truth, seen)]
+    if truth.whole:
+        found.append(_folder(stand, truth, seen))
+    return next(filter(None, found), TRUE)
+
+
+def _doubles(stand: Stand, truth: Truth) -> str:
+    entries = stand.entries(truth.run)
+    starts = [n for n, entry in enumerate(entries) if entry["what"] == "start"]
+    ends = [n for n, entry in enumerate(entries) if entry["what"] == "end" and entry["code"] == 0]
+    if any(entry["what"] == "double" for entry in entries):
+        return "double: two workers at a time"
+    if ends and starts and starts[-1] > ends[0]:
+        return "double: run again after its end"
+    return f"double: {len(starts)} launches" if len(starts) > truth.launches else ""
+
+
+def _orphans(stand: Stand, truth: Truth, seen: str) -> str:
+    """Ranks end within a moment of their launcher."""
+    deadline = time.monotonic() + 2.0
+    while seen.partition("/")[0] in FINAL and processes.of_run(truth.run):
+        if time.monotonic() > deadline:
+            return f"orphan: {len(processes.of_run(truth.run))} processes"
+        time.sleep(0.1)
+    return ""
+
+
+def _success(stand: Stand, truth: Truth, seen: str) -> str:
+    done = any(entry["what"] == "end" and entry["code"] == 0 for entry in stand.entries(truth.run))
+    return "lie: no worker has succeeded" if seen == "succeeded" and not done else ""
+
+
+def _folder(stand: Stand, truth: Truth, seen: str) -> str:
+    """Journal, outcome and list say the same as the answer."""
+    path, state = stand.runs / truth.run, seen.partition("/")[0]
+    told, ended = journal.statuses(path / layout.JOURNAL), folder.outcome(path)
+    if not told or told[-1].state != state:
+        return f"lie: the journal says {told[-1].state if told else 'nothing'}, not {state}"
+    if ended is None or ended.state != state:
+        return f"lie: the outcome says {ended.state if ended else 'nothing'}, not {state}"
+    listed = {run["id"]: run["state"] for run in stand.ask("GET", "/v1/runs?limit=500")[1]["runs"]}
+    return "" if listed.get(truth.run) == state else f"lie: the list says {listed.get(truth.run)}"
+
+
+def reads(stand: Stand, run: str) -> None:
+    """Everything that may be asked of a run; answers that are none are kept by the stand."""
+    for path in ("", "/events", "/history", "/files", "/logs/0", "/snapshots"):
+        stand.ask("GET", f"/v1/runs/{run}{path}")
+
+
+def stranded(stand: Stand) -> str:
+    """By the server's own account."""
+    told = str(stand.ask("GET", "/metrics")[1])
+    found = [line for line in told.splitlines() if line.startswith("conoid_stranded ")]
+    return "" if found and float(found[0].split()[1]) == 0.0 else f"stranded by its own account: {found}"

@@ -1,0 +1,88 @@
+"""A server whose disk fails on demand: ``python -m tests.drill.server ORDER ...`` runs ``conoid.server`` with the rest.
+
+While the file ORDER is there, what the server writes below its folder of runs fails as the file says, in JSON:
+``errno``; ``what``: "write" (files that are opened for writing, renamed, made, removed, written, flushed), "open" (all
+files, as without descriptors), "fsync" or "rename"; ``every``: one in so many fails.
+"""
+
+import errno
+import json
+import os
+import sys
+import time
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT
+CHANGES = {"os.rename", "os.mkdir", "os.remove", "os.truncate"}
+LOOK = 0.02
+"""s for which an order is kept in mind."""
+fsync, write = os.fsync, os.write
+
+
+class Order:
+    """What is to fail now."""
+
+    def __init__(self, path: Path, root: str) -> None:
+        self.path, self.root, self.looked, self.words = path, root, 0.0, {}  # type: tuple[Path, str, float, dict[str, Any]]
+        self.calls, self.busy = count(), False
+
+    def fail(self, kinds: set[str], path: object = None) -> None:
+        """Raises what is ordered for one of these kinds of work on ``path``."""
+        if self.busy or (path is not None and not self._mine(path)):
+            return
+        words = self._read()
+        if words and words["what"] in kinds and next(self.calls) % words["every"] == 0:
+            raise OSError(words["errno"], os.strerror(words["errno"]))
+
+    def _mine(self, path: object) -> bool:
+        return isinstance(path, str | bytes | os.PathLike) and os.fsdecode(path).startswith(self.root)
+
+    def _read(self) -> dict[str, Any]:
+        now = time.monotonic()
+        if now > self.looked + LOOK:
+            self.looked, self.busy = now, True
+            try:
+                self.words = json.loads(self.path.read_text())
+            except (OSError, ValueError):
+                self.words = {}
+            finally:
+                self.busy = False
+        return self.words
+
+
+def install(order: Order) -> None:
+    """Python tells its audit hooks of files before they are touched, and passes on what a hook raises."""
+
+    def audit(event: str, arguments: tuple[object, ...]) -> None:
+        if event == "open" and isinstance(arguments[2], int):
+            order.fail({"open", "write"} if arguments[2] & WRITES else {"open"}, arguments[0])
+        elif event in CHANGES:
+            order.fail({"write", "rename"} if event == "os.rename" else {"write"}, arguments[0])
+
+    def failing_fsync(descriptor: int) -> None:
+        order.fail({"write", "fsync"})
+        fsync(descriptor)
+
+    def failing_write(descriptor: int, data: bytes) -> int:
+        if descriptor > 2:
+            order.fail({"write"})
+        return write(descriptor, data)
+
+    sys.addaudithook(audit)
+    os.fsync, os.write = failing_fsync, failing_write  # type: ignore[assignment]
+
+
+def order(number: int, what: str = "write", every: int = 1) -> str:
+    """The text of an order."""
+    assert number in errno.errorcode
+    return json.dumps({"errno": number, "what": what, "every": every})
+
+
+if __name__ == "__main__":
+    from conoid.server.__main__ import main
+
+    place = Path(sys.argv[1])
+    install(Order(place, sys.argv[sys.argv.index("--runs") + 1]))
+    sys.exit(main(sys.argv[2:]))

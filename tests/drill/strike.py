@@ -1,0 +1,93 @@
+"""A fault that hits a whole server, while runs are in every situation."""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+from . import judge, situations
+from .judge import TRUE, Row
+from .situations import Life, Situation, Truth
+from .stand import Stand
+
+Deed = Callable[[Stand], None]
+
+
+@dataclass(frozen=True)
+class Strike:
+    """``deed`` makes the fault, ``lift`` ends it ``hold`` s later."""
+
+    name: str
+    family: str
+    deed: Deed
+    lift: Deed
+    stand: str = "plain"
+    """The kind of stand that it needs."""
+    unsaid: frozenset[str] = frozenset()
+    """What is true of a worker that could not write how it ended, where the fault hits what workers write as well."""
+    hold: float = 2.5
+    lives: Sequence[Situation] = situations.ALL
+
+
+def rows(stand: Stand, strike: Strike) -> Iterator[Row]:
+    """Brings runs into every situation, strikes, lifts, and says of each run whether its state became true; and
+    whether a server that is started then says the same.
+    """
+    lives = [life(stand, strike.unsaid) for life in strike.lives]
+    _begin(stand, lives)
+    stand.errors.clear()
+    strike.deed(stand)
+    for life in lives:
+        next(life)
+    time.sleep(strike.hold)
+    strike.lift(stand)
+    since = time.monotonic()
+    truths = [_after(life) for life in lives]
+    first = []
+    for situation, truth in zip(strike.lives, truths, strict=True):
+        seen, seconds = judge.settle(stand, truth, since)
+        wrong = judge.verdict(stand, truth, seen)
+        first.append((situation.__name__.replace("_", " "), truth, seen, seconds, wrong))
+    stand.again()
+    told = judge.stranded(stand)
+    for name, truth, seen, seconds, wrong in first:
+        later = judge.settle(stand, truth, time.monotonic())[0] if truth.run != "none" else seen
+        if wrong == TRUE and later != seen:
+            wrong = f"lie: {later} after the next start, {seen} before"
+        errors = [error for error in stand.errors if _concerns(error, truth, name)]
+        if wrong == TRUE and (errors or told):
+            wrong = errors[0] if errors else told
+        happened = "; ".join(filter(None, (truth.happened, seen)))
+        yield Row(f"{strike.name}: {name}", strike.family, happened, seconds, wrong)
+
+
+def _concerns(error: str, truth: Truth, name: str) -> bool:
+    """An answer that failed belongs to its run; one to a submission to the run that was submitted; others to all."""
+    if error.startswith("POST /v1/runs:"):
+        return "submitted" in name
+    return truth.run in error or "/v1/runs/" not in error
+
+
+def _begin(stand: Stand, lives: Sequence[Life]) -> None:
+    """Those that run are given the time to do so, before others want their places."""
+    for life in lives:
+        next(life)
+        if stand.slots < 100 or stand.profile:
+            _settled(stand)
+
+
+def _settled(stand: Stand) -> None:
+    deadline = time.monotonic() + stand.patience
+    while time.monotonic() < deadline:
+        told = stand.ask("GET", "/v1/runs?limit=50&state=accepted,starting,queued")[1]["runs"]
+        if not [run for run in told if run["ranks"] == 1]:
+            return
+        time.sleep(0.05)
+
+
+def _after(life: Life) -> Truth:
+    try:
+        next(life)
+    except StopIteration as end:
+        found: Truth = end.value
+        return found
+    raise AssertionError("a life has three parts")

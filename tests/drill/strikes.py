@@ -1,0 +1,360 @@
+"""The faults that hit a whole server: disks, clocks, descriptors, the database, the server's own processes."""
+
+import errno
+import os
+import resource
+import shutil
+import signal
+import sqlite3
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+
+from conoid.server.launch import processes
+
+from . import server
+from .situations import STORAGE
+from .stand import Stand
+from .strike import Deed, Strike
+
+DATABASE = "server.sqlite"
+
+
+def nothing(stand: Stand) -> None:
+    """It passes by itself."""
+
+
+# Disks ----------------------------------------------------------------------------------------------------------------
+
+
+def fails(number: int, what: str = "write", every: int = 1) -> Deed:
+    """What the server writes fails; what its workers write does not."""
+    return lambda stand: void(stand.order.write_text(server.order(number, what, every)))
+
+
+def void(_: object) -> None:
+    """For deeds."""
+
+
+def mend(stand: Stand) -> None:
+    """The server's disk is well again."""
+    stand.order.unlink(missing_ok=True)
+
+
+def and_killed(deed: Deed) -> Deed:
+    """The server is killed under the fault; one that is started meanwhile may refuse."""
+
+    def both(stand: Stand) -> None:
+        deed(stand)
+        stand.kill()
+        stand.start(10.0)
+
+    return both
+
+
+def and_started(lift: Deed) -> Deed:
+    """When the fault is over, whoever looks after the server starts it, if it is not there."""
+
+    def both(stand: Stand) -> None:
+        lift(stand)
+        if stand.child is None or stand.child.poll() is not None:
+            assert stand.start(), stand.said()
+
+    return both
+
+
+def filled(stand: Stand) -> None:
+    """Every byte of the disk is taken."""
+    with (stand.runs / "filler").open("wb", buffering=0) as file:
+        size = 0
+        for chunk in (1 << 24, 1 << 12):
+            with suppress(OSError):
+                while True:
+                    os.posix_fallocate(file.fileno(), size, chunk)
+                    size += chunk
+
+
+def emptied(stand: Stand) -> None:
+    for path in stand.runs.glob("filler*"):
+        path.unlink()
+
+
+def crowded(stand: Stand) -> None:
+    """No further file can be made."""
+    place = stand.runs / "filler-many"
+    place.mkdir()
+    with suppress(OSError):
+        for n in range(1 << 20):
+            (place / str(n)).touch()
+
+
+def thinned(stand: Stand) -> None:
+    shutil.rmtree(stand.runs / "filler-many")
+
+
+def mode(number: int) -> Deed:
+    """Of the folder of all runs."""
+    return lambda stand: stand.runs.chmod(number)
+
+
+def disks() -> Iterator[Strike]:
+    """Errors that the server alone has, then real disks, each with the server going on and killed."""
+    codes = ("ENOSPC", "EIO", "EROFS", "EDQUOT", "ESTALE", "EACCES", "ENOMEM")
+    for code in codes:
+        yield Strike(f"{code} at every write of the server", "storage", fails(getattr(errno, code)), mend)
+    yield Strike("EIO at every flush", "storage", fails(errno.EIO, "fsync"), mend)
+    yield Strike("ENOSPC at every renaming", "storage", fails(errno.ENOSPC, "rename"), mend)
+    yield Strike("EIO at every third write", "storage", fails(errno.EIO, every=3), mend)
+    for code in ("ENOSPC", "EIO"):
+        deed = and_killed(fails(getattr(errno, code)))
+        yield Strike(f"{code} and the server killed", "storage", deed, and_started(mend))
+    real: tuple[tuple[str, Deed, Deed, str], ...] = (
+        ("a full disk", filled, emptied, "disk"),
+        ("a disk without inodes", crowded, thinned, "disk"),
+        ("no permission for the runs", mode(0o000), mode(0o700), "unprivileged"),
+        ("no permission to write runs", mode(0o500), mode(0o700), "unprivileged"),
+    )
+    for name, deed, lift, stand in real:
+        yield Strike(name, "storage", deed, lift, stand, STORAGE)
+        killed = f"{name} and the server killed"
+        yield Strike(killed, "storage", and_killed(deed), and_started(lift), stand, STORAGE | {"lost/service"})
+
+
+# Descriptors ----------------------------------------------------------------------------------------------------------
+
+
+def few(left: int) -> Deed:
+    """The server may open so many files more."""
+
+    def deed(stand: Stand) -> None:
+        assert stand.child is not None
+        used = max(map(int, os.listdir(f"/proc/{stand.child.pid}/fd"))) + 1
+        _, hard = resource.prlimit(stand.child.pid, resource.RLIMIT_NOFILE)
+        resource.prlimit(stand.child.pid, resource.RLIMIT_NOFILE, (used + left, hard))
+
+    return deed
+
+
+def many(stand: Stand) -> None:
+    assert stand.child is not None
+    _, hard = resource.prlimit(stand.child.pid, resource.RLIMIT_NOFILE)
+    resource.prlimit(stand.child.pid, resource.RLIMIT_NOFILE, (hard, hard))
+
+
+def descriptors() -> Iterator[Strike]:
+    """None left, one left, and errors at every opening."""
+    yield Strike("no descriptor left", "descriptors", few(0), many)
+    yield Strike("one descriptor left", "descriptors", few(1), many)
+    yield Strike("EMFILE at every opening", "descriptors", fails(errno.EMFILE, "open"), mend)
+    yield Strike("ENFILE at every second opening", "descriptors", fails(errno.ENFILE, "open", 2), mend)
+
+
+# Clocks ---------------------------------------------------------------------------------------------------------------
+
+
+def clock(words: str) -> Deed:
+    """The real-time clock of the server, in the words of libfaketime. Workers have their own: there ``sleep`` fails."""
+    return lambda stand: void((stand.root / "clock").write_text(words))
+
+
+def clocks() -> Iterator[Strike]:
+    """Set forward and back, fast and slow; the clock that nobody sets goes on."""
+    right = clock("+0")
+    for name, words in (
+        ("set forward by a day", "+1d"), ("set back by a day", "-1d"), ("set forward by 10 s", "+10"),
+        ("set back by 10 s", "-10"), ("set back by ten years", "-10y"), ("a hundred times too fast", "+0 x100"),
+        ("ten times too slow", "+0 x0.1"),
+    ):  # fmt: skip
+        yield Strike(f"the clock {name}", "clock", clock(words), right, "clock")
+    for name, words in (("set forward by a day", "+1d"), ("set back by a day", "-1d")):
+        yield Strike(f"the clock {name} and the server killed", "clock", and_killed(clock(words)), right, "clock")
+
+
+# Database -------------------------------------------------------------------------------------------------------------
+
+
+def locked(stand: Stand) -> None:
+    """By another process that does not let go."""
+    other = sqlite3.connect(stand.runs / DATABASE, isolation_level=None, check_same_thread=False)
+    other.execute("begin immediate")
+    _locks[stand.root] = other
+
+
+def unlocked(stand: Stand) -> None:
+    other = _locks.pop(stand.root)
+    other.execute("rollback")
+    other.close()
+
+
+_locks: dict[Path, sqlite3.Connection] = {}
+
+
+def files(stand: Stand, suffix: str = "*") -> list[Path]:
+    """The database's."""
+    return list(stand.runs.glob(f"{DATABASE}{suffix}"))
+
+
+def stopped(stand: Stand) -> None:
+    """The server ends cleanly, so that its database is one file."""
+    stand.signal(signal.SIGTERM)
+    assert stand.child is not None
+    stand.child.wait(30)
+
+
+def down(deed: Callable[[Stand], None]) -> Deed:
+    """Done while no server is there."""
+
+    def both(stand: Stand) -> None:
+        stopped(stand)
+        deed(stand)
+        stand.start(15.0)
+
+    return both
+
+
+def deleted(stand: Stand) -> None:
+    for path in files(stand):
+        path.unlink()
+
+
+def saved(stand: Stand) -> None:
+    """A backup, from which an operator restores."""
+    for path in files(stand):
+        shutil.copy2(path, stand.root / path.name)
+
+
+def garbled(stand: Stand) -> None:
+    saved(stand)
+    for path in files(stand, ""):
+        path.write_bytes(os.urandom(path.stat().st_size))
+
+
+def half(stand: Stand) -> None:
+    saved(stand)
+    for path in files(stand, ""):
+        os.truncate(path, path.stat().st_size // 2)
+
+
+def emptied_database(stand: Stand) -> None:
+    for path in files(stand, ""):
+        os.truncate(path, 0)
+
+
+def folder_in_place(stand: Stand) -> None:
+    saved(stand)
+    for path in files(stand):
+        path.unlink()
+    (stand.runs / DATABASE).mkdir()
+
+
+def without_log(stand: Stand) -> None:
+    for path in files(stand, "-*"):
+        path.unlink()
+
+
+def read_only(stand: Stand) -> None:
+    for path in files(stand):
+        path.chmod(0o400)
+
+
+def writable(stand: Stand) -> None:
+    for path in files(stand):
+        path.chmod(0o600)
+
+
+def restored(stand: Stand) -> None:
+    """What an operator does about a server that does not start, or cannot use its database: the backup; else none."""
+    stand.kill()
+    path = stand.runs / DATABASE
+    if path.is_dir():
+        path.rmdir()
+    deleted(stand)
+    for kept in stand.root.glob(f"{DATABASE}*"):
+        shutil.move(kept, stand.runs / kept.name)
+    assert stand.start(), stand.said()
+    renewed(stand)
+
+
+def renewed(stand: Stand) -> None:
+    """Tokens that were lost are made again."""
+    if stand.child is None or stand.child.poll() is not None:
+        assert stand.start(), stand.said()
+    if stand.ask("GET", "/v1/me")[0] == 401:
+        stand.new_token()
+
+
+def restarted(stand: Stand) -> None:
+    """Whoever deletes a database starts the server anew."""
+    stand.again()
+    renewed(stand)
+
+
+def databases() -> Iterator[Strike]:
+    """Locked, gone, damaged, read-only."""
+    yield Strike("the database locked for 8 s", "database", locked, unlocked, hold=8.0)
+    yield Strike("the database deleted beneath the server", "database", deleted, restarted)
+    yield Strike("the database deleted while no server was there", "database", down(deleted), renewed)
+    yield Strike("the database overwritten beneath the server", "database", garbled, restored)
+    yield Strike("the database overwritten while no server was there", "database", down(garbled), restored)
+    yield Strike("half of the database lost while no server was there", "database", down(half), restored)
+    yield Strike("the database emptied beneath the server", "database", emptied_database, restarted)
+    yield Strike("the database emptied while no server was there", "database", down(emptied_database), renewed)
+    yield Strike("a folder in the place of the database", "database", down(folder_in_place), restored)
+    yield Strike("the database's log deleted beneath the server", "database", without_log, restarted)
+    yield Strike("a read-only database", "database", read_only, writable, "unprivileged")
+
+
+# The server's processes -----------------------------------------------------------------------------------------------
+
+
+def killed(stand: Stand) -> None:
+    stand.kill()
+
+
+def started(stand: Stand) -> None:
+    if stand.child is None or stand.child.poll() is not None:
+        assert stand.start(), stand.said()
+
+
+def killed_often(stand: Stand) -> None:
+    """Before each has looked round."""
+    for pause in (0.0, 0.05, 0.3):
+        stand.kill()
+        stand.start()
+        time.sleep(pause)
+
+
+def paused(stand: Stand) -> None:
+    stand.signal(signal.SIGSTOP)
+
+
+def goes_on(stand: Stand) -> None:
+    stand.signal(signal.SIGCONT)
+
+
+def reader_gets(stand: Stand, number: signal.Signals) -> None:
+    """The program that reads cases."""
+    assert stand.child is not None
+    for entry in Path("/proc").iterdir():
+        with suppress(OSError):
+            mine = entry.name.isdigit() and b"conoid.server.reading" in (entry / "cmdline").read_bytes()
+            if mine and processes.parent(int(entry.name)) == stand.child.pid:
+                os.kill(int(entry.name), number)
+
+
+def kills() -> Iterator[Strike]:
+    """Of the server and its helper."""
+    yield Strike("the server killed", "kill", killed, started)
+    yield Strike("the server killed three times", "kill", killed_often, started)
+    yield Strike("the server told to stop", "kill", stopped, started)
+    yield Strike("the server paused for 3 s", "kill", paused, goes_on, hold=3.0)
+    yield Strike("the reader of cases killed", "kill", partial(reader_gets, number=signal.SIGKILL), nothing)
+    stop, go = partial(reader_gets, number=signal.SIGSTOP), partial(reader_gets, number=signal.SIGCONT)
+    yield Strike("the reader of cases paused", "kill", stop, go)
+
+
+def everything() -> list[Strike]:
+    """All of them, in the order in which they are tried."""
+    return [*disks(), *descriptors(), *clocks(), *databases(), *kills()]

@@ -1,0 +1,32 @@
+"""The table of the drill."""
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from .judge import TRUE, Row
+
+WORDS = ("stranded", "lie", "orphan", "double", "acknowledged and lost")
+"""With which the verdict of a fault that went wrong begins; anything else is counted by itself."""
+
+
+def write(path: Path, rows: Sequence[Row]) -> int:
+    """Writes and prints; 0 when all are true."""
+    lines = [*summary(rows), "", "| fault | what happened | s to the truth | verdict |", "|---|---|---|---|"]
+    lines += [f"| {row.fault} | {row.happened} | {row.seconds:.1f} | {row.verdict} |" for row in rows]
+    path.write_text("\n".join(lines) + "\n")
+    print(*summary(rows), f"table: {path}", sep="\n")
+    return int(any(row.verdict != TRUE for row in rows))
+
+
+def summary(rows: Sequence[Row]) -> list[str]:
+    """Counts by family and by verdict."""
+    families = Counter(row.family for row in rows)
+    true = sum(row.verdict == TRUE for row in rows)
+    kinds = Counter(row.verdict.partition(":")[0] for row in rows if row.verdict != TRUE)
+    slowest = max((row.seconds for row in rows), default=0.0)
+    return [
+        f"{len(rows)} faults ({', '.join(f'{family} {n}' for family, n in sorted(families.items()))}): {true} true,",
+        f"{len(rows) - families['kill']} of them no kills; the slowest was true {slowest:.1f} s after its end;",
+        ", ".join(f"{kinds.pop(word, 0)} {word}" for word in WORDS) + "".join(f", {n} {k}" for k, n in kinds.items()),
+    ]
