@@ -3,16 +3,11 @@
 import numpy as np
 import pytest
 
-from conoid.cases.messages import Energy
 from conoid.worker.contact.narrow_phase import ContactRows
 from conoid.worker.contact.restitution import rebound
-from conoid.worker.simulation import Simulation
 
-from ..worker.kernels import build, run
 from ..worker.meshes import Floats
-from .kernels import Solver, many
-from .test_collision import MESHES, answer, case_of, momenta, on_threads, state_of
-from .test_effort import column
+from .kernels import Solver, column, many
 
 
 def energy(v: Floats, mobility: Floats) -> float:
@@ -46,32 +41,3 @@ def test_contacts_that_share_nodes_take_nothing_together() -> None:
     after = Solver(met, v, mobility).sweep(3000)
     assert np.diff(after[:, 0]) == pytest.approx(-np.diff(v[:, 0]), abs=1e-6)
     assert energy(after, mobility) == pytest.approx(energy(v, mobility), rel=1e-6)
-
-
-def collided(share: float) -> tuple[Simulation, list[Energy], Floats]:
-    """Two blocks that do not match run into each other; ledgers and drift of the momentum."""
-    sim, lines = build(case_of(restitution=share), MESHES), []
-    start = np.concatenate(momenta(sim))
-    run(sim, lambda sim, before: lines.append(sim.ledger.close(before)))
-    return sim, lines, np.concatenate(momenta(sim)) - start
-
-
-def test_an_impact_of_bodies_from_which_all_comes_back_takes_nothing() -> None:
-    """Many nodes and edges at once; momentum stays, and the books close."""
-    taken = []
-    for share in (0.0, 0.5, 1.0):
-        sim, lines, drift = collided(share)
-        taken.append(lines[-1].contact / lines[0].initial)
-        assert sim.ledger.worst < 1e-3
-        assert np.abs(drift[:3]).max() < 1e-12
-    assert taken[0] > 0.01
-    assert taken[1] > 0.01
-    assert abs(taken[2]) < 1e-10
-
-
-def test_the_answer_with_restitution_is_the_same_on_three_ranks() -> None:
-    case = case_of(restitution=0.8)
-    alone = answer(case)[0]
-    assert alone is not None
-    found = on_threads(3, case, lambda sim: state_of(run(sim))[0], MESHES)
-    assert [digest for digest in found if digest is not None] == [alone]

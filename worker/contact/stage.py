@@ -56,8 +56,6 @@ class Contact:
         """What the last step has found here."""
         self.limit = 0.0
         """One over the step in which no node of any rank passes more than half of a tet that it meets, 1/s."""
-        self.short = 0.0
-        """How much deeper than it may a contact of this rank is after the sweeps, of the typical size of a face."""
         self.last_push = 0.0
         """Last time at which nodes of this rank were pushed, s."""
         self._mean_dt = 0.0
@@ -162,6 +160,11 @@ class Contact:
         return self.found.approach
 
     @property
+    def short(self) -> float:
+        """How much deeper than it may a contact of this rank is after the sweeps, of the typical size of a face."""
+        return self._sweeps.left
+
+    @property
     def opening(self) -> bool:
         """Whether a crack has become so wide in the last step that it opens."""
         return len(self.found.opening) > 0
@@ -223,7 +226,7 @@ class Contact:
         if self.searches.rubs:
             active.resume(now.node_face.kept, self._resume())
         active.sweep(self._sweeps.sweeps)
-        self.short = active.short() * dt / self.exterior.size
+        self._sweeps.left = active.short() * dt / self.exterior.size
         if self.searches.rubs:
             now.node_face.kept[:] = 0.0
             active.store(now.node_face.kept)
