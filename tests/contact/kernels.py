@@ -142,10 +142,16 @@ class Solver:
         return push
 
     def sweep(self, times: int = 1) -> Floats:
-        """The velocities after some sweeps."""
+        """The velocities after some plain sweeps."""
         for _ in range(times):
             self.active.sweep(1)
             self._leave()
+        return self.v
+
+    def step(self, sweeps: int) -> Floats:
+        """The velocities after a step of so many sweeps, which have momentum."""
+        self.active.sweep(sweeps)
+        self._leave()
         return self.v
 
     def _leave(self) -> None:

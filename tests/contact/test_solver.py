@@ -37,6 +37,7 @@ class Plain:
     def __init__(self, met: ContactRows, v: Floats, mobility: Floats) -> None:
         self.met, self.v, self.mobility = met, v.copy(), mobility
         self.push, self.total = np.zeros((CONTACTS, 4)), np.zeros((NODES, 3), np.int64)
+        self.last = np.zeros(CONTACTS)
         sums, sizes = np.zeros((NODES, 4), np.int64), np.column_stack([np.abs(met.normals), np.ones(CONTACTS)])
         for p in range(CONTACTS):
             for k in range(4):
@@ -70,23 +71,25 @@ class Plain:
         met, changes = self.met, np.zeros((CONTACTS, 3))
         for p in np.flatnonzero((met.friction > 0.0) & (met.pair >= 0)):
             along = _dot(kept[met.pair[p], 1:], met.normals[p])
-            self.push[p, 0] = 0.8 * ratio * kept[met.pair[p], 0]
+            self.push[p, 0] = self.last[p] = 0.8 * ratio * kept[met.pair[p], 0]
             self.push[p, 1:] = ratio * (kept[met.pair[p], 1:] - along * met.normals[p])
             changes[p] = self.push[p, 0] * met.normals[p] + self.push[p, 1:]
         self.give(changes)
 
-    def sweep(self) -> None:
-        """One sweep."""
-        self.give(np.array([self.change(p) for p in range(CONTACTS)]))
+    def sweep(self, ahead: float = 0.0) -> None:
+        """One sweep, of whose changes along the normals as much again as ``ahead`` says is done at once."""
+        self.give(np.array([self.change(p, ahead) for p in range(CONTACTS)]))
 
-    def change(self, p: int) -> Floats:
+    def change(self, p: int, ahead: float) -> Floats:
         """Corrects one contact."""
         met, normal, old = self.met, self.met.normals[p], self.push[p].copy()
         rate = np.zeros(3)
         for k in range(4):
             rate = rate + met.weights[p, k] * self.v[met.nodes[p, k]]
         speed = _dot(normal, rate)
-        self.push[p, 0] = max(0.0, old[0] + (met.wanted[p] - speed) / self.norms[p, 0])
+        plain = max(0.0, old[0] + (met.wanted[p] - speed) / self.norms[p, 0])
+        self.push[p, 0] = max(0.0, plain + ahead * (plain - self.last[p]))
+        self.last[p] = plain
         change = (self.push[p, 0] - old[0]) * normal
         if met.friction[p] > 0.0:
             aim = old[1:] - (rate - speed * normal) / self.norms[p, 1]
@@ -118,6 +121,18 @@ def test_kernels_have_the_bits_of_the_formula(seed: int, resumed: bool) -> None:
         solver.sweep()
         assert (solver.v == plain.v).all()
         assert (solver.total == plain.total).all()
+        assert (solver.push == plain.push).all()
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_step_has_the_bits_of_sweeps_with_momentum(seed: int) -> None:
+    """Nesterov's k / (k + 3), and a last sweep without."""
+    met, v, mobility = scene(seed)
+    for many in (1, 2, 5, 20):
+        plain, solver = Plain(met, v, mobility), Solver(met, v, mobility, _SCALE)
+        for k in range(many):
+            plain.sweep(k / (k + 3.0) if k < many - 1 else 0.0)
+        assert (solver.step(many) == plain.v).all()
         assert (solver.push == plain.push).all()
 
 

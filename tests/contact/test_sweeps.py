@@ -160,6 +160,31 @@ def test_kinetic_energy_never_rises_with_friction(friction: float, held: float, 
     assert worst <= 1.0 + 1e-9
 
 
+@pytest.mark.parametrize("friction", [0.0, 0.1, 0.5, 2.0])
+def test_kinetic_energy_never_rises_in_a_step(friction: float) -> None:
+    """Whatever the number of its sweeps, which have momentum."""
+    worst = 0.0
+    for seed in range(40):
+        met, v, mobility = network(seed, friction=friction, wanted=5.0 if seed % 2 else 0.0)
+        mobility *= np.random.default_rng(seed).uniform(size=mobility.shape) > 0.1
+        v[mobility == 0.0] = 0.0
+        start = energy(v, mobility)
+        worst = max(worst, *(energy(Solver(met, v, mobility).step(many), mobility) / start for many in range(1, 26)))
+    assert worst <= 1.0 + 1e-9
+
+
+@pytest.mark.parametrize(("many", "plain"), [(10, 20), (20, 60)])
+def test_momentum_does_what_many_more_plain_sweeps_do(many: int, plain: int) -> None:
+    """Ten contacts at a node: what is left of the error, in the norm of the kinetic energy."""
+    left = np.zeros(2)
+    for seed in range(10):
+        met, v, mobility = network(seed, meetings=60)
+        exact, mass = dense(met, v, mobility), 1.0 / mobility
+        found = Solver(met, v, mobility).step(many), Solver(met, v, mobility).sweep(plain)
+        left += [float((mass * (one - exact) ** 2).sum()) for one in found]
+    assert left[0] < left[1]
+
+
 @pytest.mark.parametrize("friction", [0.0, 0.5])
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_order_of_meetings_changes_no_bit(seed: int, friction: float) -> None:

@@ -18,7 +18,7 @@ V, IMPULSE = 0, 3
 """First word of a slot's velocity, m/s, and of its impulse of the sweep, quanta, in ``ActiveNodes.moving``."""
 MOBILITY, TOTAL = 0, 3
 """First word of its mobility, 1/kg, and of its impulse of the step, quanta, in ``ActiveNodes.fixed``."""
-WANTED, ROW_NORM, PUSH, MU = 3, 4, 5, 6
+WANTED, ROW_NORM, PUSH, MU, LAST = 3, 4, 5, 6, 7
 """Of ``Loaded.normal``, behind the unit normal."""
 ROW_NORM_T, PUSH_T = 4, 5
 """Of ``Loaded.tangent``, behind the weights."""
@@ -71,7 +71,8 @@ class Loaded(NamedTuple):
     """Contacts that have asked for an impulse in the step, and those that are idle."""
 
     normal: Floats
-    """(room, 8) unit normal, target velocity, row norm along it, 1/kg, impulse along it, N s, Coulomb's coefficient."""
+    """(room, 8) unit normal, target velocity, row norm along it, 1/kg, impulse along it, N s, Coulomb's coefficient,
+    impulse before momentum took it ahead."""
     tangent: Floats
     """(room, 8) weights, row norm across, 1/kg, impulse of friction (3), N s."""
     slots: Indices

@@ -1,6 +1,7 @@
 """The impulses of a step: from the active contacts that the narrow phase has found to the velocities v(n+1/2)."""
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -76,12 +77,12 @@ class ActiveSet:
             sweeps.sweep_all(active, self._parts[1], contacts, self._fastest, self._n, scale, many)
             return
 
-        def correct(part: Loaded) -> None:
+        def correct(ahead: float, part: Loaded) -> None:
             sweeps.load(part, contacts, active, self._fastest)
-            sweeps.sweep(active, part, scale)
+            sweeps.sweep(active, part, ahead, scale)
 
-        for _ in range(many):
-            self._complete(correct, active.moving_words, IMPULSE, 3)
+        for k in range(many):
+            self._complete(partial(correct, sweeps.momentum(k, many)), active.moving_words, IMPULSE, 3)
             sweeps.give(active, self._n, scale)
 
     def _complete(self, work: Callable[[Loaded], None], words: Ints, first: int, columns: int) -> None:
