@@ -40,6 +40,7 @@ def stand(tmp_path: Path) -> Iterator[Stand]:
     made.close()
 
 
+@pytest.mark.timeout(900)
 def test_twenty_faults_leave_every_state_true(stand: Stand) -> None:
     struck = list(strike.rows(stand, DISK))
     stand.slots = 100
