@@ -122,6 +122,10 @@ class Contact(Model):
     """Coulomb's coefficient."""
     pairs: tuple[ContactPair, ...] = ()
     """Pairs of parts with a friction of their own."""
+    restitution: Annotated[Ratio, Field(ge=0, le=1)] = 0.0
+    """Share of the speed of approach with which nodes part from faces, and edges from edges, that they run into: at 0
+    an impact of nodes is perfectly plastic, which takes energy that falls with the size of the tets; at 1 it takes
+    none. Bodies rebound by their elasticity whatever it is."""
     edges: bool = True
     """Whether sharp edges meet edges."""
     overlap: Literal["refuse", "push"] = "refuse"

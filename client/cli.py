@@ -111,6 +111,7 @@ app.command(name="watch", short_help="Follow a run until it ends.")(commands.wat
 app.command()(commands.cancel)
 app.command()(commands.checkpoint)
 app.command()(commands.snapshot)
+app.command(short_help="Go on from a checkpoint of a run.")(commands.restart)
 app.command()(commands.get)
 app.command(name="batch", short_help="Hand a case to Slurm, without a server.")(batch_run)
 app.command(name="view", short_help="Draw frames, off screen.")(viewing.view_frames)

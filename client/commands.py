@@ -57,6 +57,22 @@ def submit(
             typer.echo(run.id)
 
 
+def restart(
+    run: RunArgument,
+    ranks: Annotated[int | None, typer.Option("--ranks", min=1, help="Another number of MPI ranks.")] = None,
+    url: Url = None,
+    token: Token = None,
+    as_json: Json = False,
+) -> None:
+    """Go on from the newest checkpoint of a run, as a new run with the same answer; prints its id."""
+    with connect(url, token) as session:
+        made = session.restart(find(session, run).id, ranks)
+        if as_json:
+            show_json(made.status())
+        else:
+            typer.echo(made.id)
+
+
 def list_runs(
     state: Annotated[list[State] | None, typer.Option("--state", help="Only runs in this state.")] = None,
     limit: Annotated[int, typer.Option("--limit", min=1, help="At most so many.")] = 20,

@@ -12,7 +12,7 @@ from conoid.cases.load import CaseError, Overrides, Problem
 from .config import target
 from .errors import ClientError
 from .http import Http
-from .run import Run, RunInfo
+from .run import Run, RunInfo, quoted
 from .submission import CaseSource, body_of, data_of
 from .sweep import Point, Sweep, SweepInfo, SweepPage
 
@@ -65,6 +65,18 @@ class Session(Http):
         words += [("priority", str(priority))] if priority else []
         path = f"/v1/runs?{urlencode(words)}" if words else "/v1/runs"
         return Run(self, self.post(RunInfo, path, body, kind, key or str(uuid.uuid4())).id)
+
+    def restart(
+        self, run: str, ranks: int | None = None, key: str | None = None, profile: str = "", priority: int = 0
+    ) -> Run:
+        """A new run of the same case that goes on from the newest checkpoint of ``run``, on so many ranks.
+
+        Its answer is that of a run that nothing has interrupted. Raises ServiceError when there is no checkpoint.
+        """
+        words: dict[str, str] = {"ranks": str(ranks)} if ranks is not None else {}
+        words |= {name: str(value) for name, value in (("profile", profile), ("priority", priority)) if value}
+        path = f"/v1/runs/{quoted(run)}:restart?{urlencode(words)}"
+        return Run(self, self.post(RunInfo, path, key=key or str(uuid.uuid4())).id)
 
     def sweep(
         self, case: CaseSource, points: Sequence[Point], at_once: int | None = None, key: str | None = None

@@ -6,7 +6,7 @@ import re
 import secrets
 import shutil
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from functools import reduce
@@ -29,7 +29,6 @@ _LETTERS = "0123456789abcdefghjkmnpqrstvwxyz"
 _NEW, _GONE = ".new-", ".gone-"
 _TELLING = (layout.SUBMISSION, layout.JOURNAL, layout.WORKER)
 """One of these is left where a run has been, whatever was damaged."""
-_PINNED, _YES, _NO = ".keep", "yes", "no"
 _UNREADABLE = "outcome.unreadable.json"
 DAMAGED = (FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError)
 """What the system says of a file that is gone, or is none any more, or not for this user."""
@@ -105,8 +104,12 @@ def _letters(number: int, length: int) -> str:
     return "".join(_LETTERS[number >> 5 * place & 31] for place in reversed(range(length)))
 
 
-def create(runs: Path, submission: Submission, case: bytes, resolved: bytes) -> Path:
-    """Makes the folder of an accepted run; it appears whole, and is on disk when this returns. Raises OSError."""
+def create(
+    runs: Path, submission: Submission, case: bytes, resolved: bytes, fill: Callable[[Path], None] | None = None
+) -> Path:
+    """Makes the folder of an accepted run, in which ``fill`` puts what else belongs there; it appears whole, and is on
+    disk when this returns. Raises OSError, and what ``fill`` raises.
+    """
     beside, folder = runs / f"{_NEW}{submission.id}", runs / submission.id
     accepted = Status(run=submission.id, seq=1, wall=submission.submitted, state=State.ACCEPTED)
     beside.mkdir(0o700)
@@ -115,6 +118,8 @@ def create(runs: Path, submission: Submission, case: bytes, resolved: bytes) -> 
     durable.write_new(beside / layout.RESOLVED_CASE, resolved)
     durable.write_new(beside / layout.SUBMISSION, msgspec.json.format(msgspec.json.encode(submission), indent=2))
     durable.write_new(beside / layout.JOURNAL, to_json(accepted) + b"\n")
+    if fill is not None:
+        fill(beside)
     durable.sync_folder(beside)
     os.rename(beside, folder)
     durable.sync_folder(runs)
@@ -138,29 +143,6 @@ def purge(runs: Path, run_id: str) -> None:
 def runs_in(runs: Path) -> list[Path]:
     """The folders of all runs, oldest first."""
     return sorted(path for path in runs.iterdir() if is_id(path.name))
-
-
-def pinned(folder: Path) -> bool:
-    """Whether the run is kept for good: by its label ``keep``, or by what was said last."""
-    if told := pin_told(folder):
-        return told == _YES
-    try:
-        return submission(folder).labels.get("keep", _NO) != _NO
-    except (OSError, msgspec.MsgspecError):
-        return False
-
-
-def pin_told(folder: Path) -> str:
-    """``yes`` or ``no`` as was said last; empty when nobody has said anything."""
-    try:
-        return (folder / _PINNED).read_text()
-    except OSError:
-        return ""
-
-
-def pin(folder: Path, keep: bool) -> None:
-    """Keeps a run for good, or no longer. Raises OSError."""
-    durable.write(folder / _PINNED, (_YES if keep else _NO).encode())
 
 
 def scan(runs: Path) -> Iterator[Path]:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from . import farewells, folder
+from . import farewells, folder, pins
 from .events import Run
 from .farewells import Farewells
 from .holds import words
@@ -80,7 +80,7 @@ class Keeper:
             large = most is not None and total > most
             if not run.state.final or not (old or large) or self._is_open(run.id):
                 continue
-            if folder.pinned(self._settings.runs / run.id):
+            if pins.pinned(self._settings.runs / run.id):
                 continue
             total -= self._sizes[run.id]
             yield run, f"older than {self._rules.age}" if old else f"all runs had more than {most} bytes"

@@ -44,6 +44,7 @@ ANSWERS: dict[tuple[str, str], dict[int, tuple[str, str]]] = {
     ("post", "/v1/runs/{run_id}:keep"): {200: (_JSON, "RunStatus")},
     ("post", "/v1/runs/{run_id}:release"): {200: (_JSON, "RunStatus")},
     ("post", "/v1/runs/{run_id}:cancel"): {202: (_JSON, "RunStatus")},
+    ("post", "/v1/runs/{run_id}:restart"): {202: (_JSON, "Receipt")},
     ("post", "/v1/runs/{run_id}:checkpoint"): {202: (_JSON, "RunStatus")},
     ("post", "/v1/runs/{run_id}:snapshot"): {202: (_JSON, "RunStatus")},
     ("get", "/v1/runs/{run_id}/events"): {200: (_JSON, "EventPage")},
@@ -85,6 +86,8 @@ def refusals(method: str, path: str) -> set[int]:
         found |= {408, 413, 415, 422, 429, 507}
     if path.endswith((":checkpoint", ":snapshot")) or method == "delete":
         found |= {409}
+    if path.endswith(":restart"):
+        found |= {409, 415, 422, 429, 507}
     if path.endswith((":keep", ":release")):
         found |= {507}
     if path.endswith(("{path}", "{rank}")):

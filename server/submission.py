@@ -4,6 +4,7 @@ import re
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import msgspec
@@ -12,7 +13,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from conoid.cases.batch import profile_of
 from conoid.cases.load import CaseError
 
-from . import folder, limits
+from . import folder, limits, restarts
 from .errors import ServiceError, database_away, invalid_case
 from .folder import Submission
 from .reader import the_reader
@@ -38,6 +39,8 @@ class Wishes:
     """Of a batch system; empty: what the case names, or the site's default."""
     priority: int = 0
     """Among his own runs."""
+    restart: str = ""
+    """The run, his own, from whose newest checkpoint this one goes on."""
 
 
 class Desk:
@@ -71,14 +74,14 @@ class Desk:
         wishes = wishes or Wishes()
         self._profile(wishes.profile, named=True)
         digest = folder.digest_of(_file_name(content_type), body)
-        if earlier := self._earlier(owner, key, digest):
+        if earlier := self._earlier(owner, key, digest, wishes.restart):
             return earlier
         try:
             reading = self.read(body, content_type)
         except CaseError as error:
             raise invalid_case(error.problems) from None
         with self._lock:
-            return self._earlier(owner, key, digest) or self._accept(
+            return self._earlier(owner, key, digest, wishes.restart) or self._accept(
                 owner,
                 body,
                 content_type,
@@ -103,7 +106,7 @@ class Desk:
             raise ServiceError(400, "bad_parameter", str(error), pointer="profile") from None
         return ""
 
-    def _earlier(self, owner: str, key: str | None, digest: str) -> dict[str, Any] | None:
+    def _earlier(self, owner: str, key: str | None, digest: str, restart: str) -> dict[str, Any] | None:
         run_id = self._store.run_of_key(owner, key) if key is not None else None
         if run_id is None:
             return None
@@ -112,7 +115,7 @@ class Desk:
         except (*folder.DAMAGED, msgspec.MsgspecError):
             detail = f"the run of Idempotency-Key {key!r} was {run_id}; its folder has been removed or damaged"
             raise ServiceError(410, "gone", detail) from None
-        if made.body_sha256 != digest:
+        if made.body_sha256 != digest or restart not in {"", made.labels.get(restarts.LABEL)}:
             detail = f"Idempotency-Key {key!r} was used for another case"
             raise ServiceError(422, "key_reused", detail, pointer="Idempotency-Key", hint="use a new key for a new run")
         return receipt(made)
@@ -133,11 +136,16 @@ class Desk:
         )  # fmt: skip
         run = folder.first(made)
         try:
-            folder.create(self._settings.runs, made, body, reading.resolved)
+            runs = self._settings.runs
+            fill = partial(restarts.fill, runs / wishes.restart) if wishes.restart else None
+            folder.create(runs, made, body, reading.resolved, fill)
             self._store.add(run, key)
         except OSError as error:
             folder.discard(self._settings.runs, run_id)
             raise ServiceError(507, "storage", f"the run cannot be kept: {error.strerror}", retryable=True) from error
+        except ServiceError:
+            folder.discard(self._settings.runs, run_id)
+            raise
         except SQLAlchemyError as error:
             folder.discard(self._settings.runs, run_id)
             raise database_away(error) from error

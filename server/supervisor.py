@@ -142,13 +142,10 @@ class Supervisor:
             return note
         return self._waitlist.why(run_id)
 
-    def running(self, owner: str) -> int:
-        """Runs of an owner that have cores, or were handed over."""
-        return sum(run.owner == owner for run_id in tuple(self._watches) if (run := self._open.get(run_id)))
-
-    def used(self, owner: str) -> float:
-        """Core-seconds of an owner that count in the queue."""
-        return self._waitlist.used(owner, tuple(self._open.values()))
+    def taken(self, owner: str) -> tuple[int, float]:
+        """Runs of an owner that have cores, or were handed over; his core-seconds that count in the queue."""
+        own = [run for run in tuple(self._open.values()) if run.owner == owner]
+        return sum(run.id in self._watches for run in own), self._waitlist.used(owner, own)
 
     def stranded(self) -> list[str]:
         """Open runs that have neither a watch nor a place in the queue nor a timer: none, at any time."""

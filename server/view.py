@@ -11,7 +11,7 @@ import msgspec
 from conoid.cases.outcome import Outcome
 from conoid.cases.run import State
 
-from . import folder
+from . import folder, pins
 from .errors import ServiceError
 from .events import Run
 from .service import Service
@@ -69,7 +69,7 @@ def labels(service: Service, run: Run) -> dict[str, str]:
     made = _submission(path)
     if made is None:
         return {}
-    told = folder.pin_told(path)
+    told = pins.told(path)
     return {**made.labels, "keep": told} if told else made.labels
 
 

@@ -46,10 +46,11 @@ def _quota(service: Service) -> dict[str, float | None]:
 
 
 def _used(service: Service, owner: str) -> dict[str, float]:
+    running, seconds = service.supervisor.taken(owner)
     return {
         "queued": service.store.open_runs(owner),
-        "running": service.supervisor.running(owner),
-        "core_seconds": service.supervisor.used(owner),
+        "running": running,
+        "core_seconds": seconds,
         "output_bytes": service.keeper.kept(owner),
     }
 

@@ -1,5 +1,6 @@
 """Runs: submit, list, look at, cancel, ask for a checkpoint or a snapshot."""
 
+import json
 import time
 from collections.abc import Iterator
 from itertools import islice
@@ -11,12 +12,13 @@ from fastapi.responses import JSONResponse
 from starlette.concurrency import run_in_threadpool
 
 from conoid.cases import layout
+from conoid.cases.load import CaseError
 from conoid.cases.policy import PRIORITY
 from conoid.cases.run import State
 
-from .. import folder, openapi, view
+from .. import folder, openapi, pins, restarts, view
 from ..auth import Identity, Pass, Reader, Submitter, unauthorized
-from ..errors import ServiceError, not_found
+from ..errors import ServiceError, invalid_case, not_found
 from ..events import Run
 from ..limits import read_body
 from ..service import Service, ServiceOf
@@ -24,6 +26,8 @@ from ..submission import Wishes, labels_of
 
 router = APIRouter()
 Body = Annotated[bytes, Depends(read_body)]
+_MOST_RANKS = 1_000_000
+"""That a number may be; the server has its own limit. Chosen."""
 MAX_WAIT = 60.0
 """s that ``?wait=`` may ask for."""
 
@@ -171,7 +175,7 @@ def release(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
 
 def _pin(service: Service, run: Run, keep: bool) -> Response:
     try:
-        folder.pin(service.settings.runs / run.id, keep)
+        pins.pin(service.settings.runs / run.id, keep)
     except OSError as error:
         raise ServiceError(507, "storage", f"not recorded: {error.strerror}", retryable=True) from error
     return Response(view.snapshot(service, run).body, media_type="application/json")
@@ -187,6 +191,37 @@ def cancel(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
         detail = f"the request could not be recorded: {str(error) or 'no answer in time'}".splitlines()[0]
         raise ServiceError(503, "unavailable", detail, retryable=True) from error
     return Response(view.snapshot(service, find(service, identity, run_id)).body, 202, media_type="application/json")
+
+
+@router.post("/v1/runs/{run_id}:restart", status_code=202)
+async def restart(
+    run_id: str,
+    service: ServiceOf,
+    identity: Submitter,
+    idempotency_key: Annotated[str | None, Header()] = None,
+    ranks: Annotated[int | None, Query(ge=1, le=_MOST_RANKS, description="those of the case if not given")] = None,
+    profile: Annotated[str, Query(description="of the site's batch system")] = "",
+    priority: Annotated[int, Query(ge=-PRIORITY, le=PRIORITY, description="among your own runs")] = 0,
+) -> Response:
+    """A new run of the same case that goes on from the newest checkpoint of this one, and ends with the same answer.
+    This one stays as it is."""
+    run = await run_in_threadpool(find, service, identity, run_id)
+    wishes = Wishes({restarts.LABEL: run.id}, profile, priority, run.id)
+    async with service.turns.turn(identity.owner):
+        receipt = await run_in_threadpool(_restarted, service, run, ranks, idempotency_key, wishes)
+    return JSONResponse(receipt, 202, {"Location": receipt["url"]})
+
+
+def _restarted(service: Service, run: Run, ranks: int | None, key: str | None, wishes: Wishes) -> dict[str, Any]:
+    path = service.settings.runs / run.id
+    try:
+        case = path / folder.submission(path).case_file
+        body = json.dumps(restarts.body(case, ranks)).encode()
+    except (OSError, msgspec.MsgspecError) as error:
+        raise ServiceError(409, "no_case", f"run {run.id}: its case cannot be read") from error
+    except CaseError as error:
+        raise invalid_case(error.problems) from None
+    return service.desk.submit(run.owner, body, "application/json", key, wishes)
 
 
 @router.post("/v1/runs/{run_id}:checkpoint", status_code=202)

@@ -110,6 +110,14 @@ def edge_edge(x: Floats, v: Floats, edges: Indices, pairs: Indices, dt: float, m
     return taken(room, np.arange(found))
 
 
+def column(n: int) -> ContactRows:
+    """``n`` nodes one behind the other along x, each in touch with the next one."""
+    nodes = np.column_stack([np.arange(1, n), np.arange(n - 1), np.arange(n - 1), np.arange(n - 1)]).astype(np.int32)
+    weights, normals = np.tile([1.0, -1.0, 0.0, 0.0], (n - 1, 1)), np.tile([1.0, 0.0, 0.0], (n - 1, 1))
+    none = np.full(n - 1, -1, np.int32)
+    return ContactRows(nodes, weights, normals, np.zeros(n - 1), np.zeros(n - 1), none)
+
+
 class Solver:
     """Sweeps over contacts of nodes with a mobility (nodes, 3), 1/kg; impulses in quanta of 1 / ``scale`` N s."""
 

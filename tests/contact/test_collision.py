@@ -280,3 +280,32 @@ def test_a_part_whose_faces_all_lie_on_symmetry_planes_is_named(parts: tuple[str
     case = meeting_of([{}, {}], end=END).model_copy(update={"boundaries": planes})
     with pytest.raises(InputError, match=rf"part '{named}' has no exposed face.*leave it out of contact.parts"):
         build(case, [moved(cube, (0.0, 0.0, 2.5 * SIZE)) if parts else cube, cube])
+
+
+def collided(share: float) -> tuple[Simulation, list[Energy], Floats]:
+    """Two blocks that do not match run into each other; ledgers and drift of the momentum."""
+    sim, lines = build(case_of(restitution=share), MESHES), []
+    start = np.concatenate(momenta(sim))
+    run(sim, lambda sim, before: lines.append(sim.ledger.close(before)))
+    return sim, lines, np.concatenate(momenta(sim)) - start
+
+
+def test_an_impact_of_bodies_from_which_all_comes_back_takes_nothing() -> None:
+    """Many nodes and edges at once; momentum stays, and the books close."""
+    taken = []
+    for share in (0.0, 0.5, 1.0):
+        sim, lines, drift = collided(share)
+        taken.append(lines[-1].contact / lines[0].initial)
+        assert sim.ledger.worst < 1e-3
+        assert np.abs(drift[:3]).max() < 1e-12
+    assert taken[0] > 0.01
+    assert taken[1] > 0.01
+    assert abs(taken[2]) < 1e-10
+
+
+def test_the_answer_with_restitution_is_the_same_on_three_ranks() -> None:
+    case = case_of(restitution=0.8)
+    alone = answer(case)[0]
+    assert alone is not None
+    found = on_threads(3, case, lambda sim: state_of(run(sim))[0], MESHES)
+    assert [digest for digest in found if digest is not None] == [alone]

@@ -8,21 +8,12 @@ import pytest
 from conoid.cases.load import apply_overrides, parse_case, read_data
 from conoid.worker import simulation, step
 from conoid.worker.contact.effort import TOLERANCE, Effort
-from conoid.worker.contact.narrow_phase import ContactRows
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.state import Model
 
-from .kernels import Solver
+from .kernels import Solver, column
 
 CASE = Path(__file__).parents[2] / "cases" / "hard" / "wedge_glass.toml"
-
-
-def column(n: int) -> ContactRows:
-    """``n`` nodes one behind the other along x, each in touch with the next one."""
-    nodes = np.column_stack([np.arange(1, n), np.arange(n - 1), np.arange(n - 1), np.arange(n - 1)]).astype(np.int32)
-    weights, normals = np.tile([1.0, -1.0, 0.0, 0.0], (n - 1, 1)), np.tile([1.0, 0.0, 0.0], (n - 1, 1))
-    none = np.full(n - 1, -1, np.int32)
-    return ContactRows(nodes, weights, normals, np.zeros(n - 1), np.zeros(n - 1), none)
 
 
 def test_what_sweeps_have_left_undone_is_told() -> None:

@@ -21,7 +21,7 @@ from conoid.server.tokens import create_token
 
 FAKE = (sys.executable, str(Path(__file__).with_name("fake_worker.py")))
 PATIENCE = 20.0
-START = 60.0
+START = 180.0
 """s that a server may take to load on a machine that has much else to do."""
 TOML = {"Content-Type": "application/toml"}
 

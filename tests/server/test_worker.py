@@ -134,3 +134,23 @@ def test_cancel(ann: User) -> None:
     assert (seen["state"], seen["cause"], seen["outcome"]["state"]) == ("cancelled", "cancelled", "cancelled")
     assert seen["outcome"]["steps"] > 0
     assert not Path(f"/proc/{json.loads((ann.runs / run / 'worker.json').read_text())['pid']}").exists()
+
+
+@pytest.mark.slow
+def test_a_run_that_was_cancelled_goes_on_as_a_new_one_to_the_same_digest(ann: User) -> None:
+    """On another number of ranks; what the first has written is there in the second."""
+    text = BAR.format(end_time="600 us")
+    whole = ended(ann, ann.submit(text))
+    run = ann.submit(text)
+    while not (ann.show(run)["progress"] or {}).get("step", 0) > 50:
+        ann.http.get(f"/v1/runs/{run}", params={"wait": 0.1})
+    ann.http.post(f"/v1/runs/{run}:cancel")
+    assert ended(ann, run)["state"] == "cancelled"
+    answer = ann.http.post(f"/v1/runs/{run}:restart", params={"ranks": 1})
+    assert answer.status_code == 202, answer.text
+    last = ended(ann, answer.json()["id"])
+    assert (last["state"], last["outcome"]["ranks"]) == ("succeeded", 1), last["message"]
+    assert last["outcome"]["digest"] == whole["outcome"]["digest"]
+    first, second = (ann.runs / one["id"] for one in (whole, last))
+    assert (first / "history.csv").read_text().count("\n") == (second / "history.csv").read_text().count("\n")
+    assert sorted(p.name for p in (first / "frames").iterdir()) == sorted(p.name for p in (second / "frames").iterdir())

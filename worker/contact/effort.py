@@ -15,6 +15,8 @@ class Effort:
     def __init__(self, least: int) -> None:
         """``least``: of any step."""
         self._least = self.sweeps = least
+        self.left = 0.0
+        """What the last step left on this rank, of the typical size of a face."""
 
     def settle(self, short: float) -> None:
         """After a step that left a contact of any rank ``short`` of where it must be, of the typical size of a face."""

@@ -24,6 +24,7 @@ from .detection import Detected, detect
 from .effort import Effort
 from .exterior import Exterior
 from .narrow_phase import PUSH_OUT
+from .restitution import rebound
 from .scene import Scene
 from .searches import Searches
 from .solver import ActiveSet
@@ -50,13 +51,11 @@ class Contact:
         self.searches = Searches(case, model, neighbours, self.exterior, comm, clock)
         self.books = Books(model.nodes.n, len(case.parts), extremes)
         self._active = ActiveSet(self.books.scale)
-        self._sweeps = Effort(case.contact.sweeps)
+        self._sweeps, self._restitution = Effort(case.contact.sweeps), case.contact.restitution
         self.found = Detected.nothing()
         """What the last step has found here."""
         self.limit = 0.0
         """One over the step in which no node of any rank passes more than half of a tet that it meets, 1/s."""
-        self.short = 0.0
-        """How much deeper than it may a contact of this rank is after the sweeps, of the typical size of a face."""
         self.last_push = 0.0
         """Last time at which nodes of this rank were pushed, s."""
         self._mean_dt = 0.0
@@ -161,6 +160,11 @@ class Contact:
         return self.found.approach
 
     @property
+    def short(self) -> float:
+        """How much deeper than it may a contact of this rank is after the sweeps, of the typical size of a face."""
+        return self._sweeps.left
+
+    @property
     def opening(self) -> bool:
         """Whether a crack has become so wide in the last step that it opens."""
         return len(self.found.opening) > 0
@@ -222,7 +226,7 @@ class Contact:
         if self.searches.rubs:
             active.resume(now.node_face.kept, self._resume())
         active.sweep(self._sweeps.sweeps)
-        self.short = active.short() * dt / self.exterior.size
+        self._sweeps.left = active.short() * dt / self.exterior.size
         if self.searches.rubs:
             now.node_face.kept[:] = 0.0
             active.store(now.node_face.kept)
@@ -248,6 +252,8 @@ class Contact:
         redraw = step % normals.EVERY == 0
         self.found = detect(now, self.searches.mu, give, dt, self.exterior.size, redraw)
         now.active.n = self.found.contacts
+        if self._restitution > 0.0:
+            rebound(now.active.room, now.active.n, now.crowd.v, now.slots.before, self._restitution)
 
     def free(self) -> None:
         """Gives the messages back to MPI."""

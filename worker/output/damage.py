@@ -21,7 +21,7 @@ def damage(case: Case, model: Model, cohesion: Cohesion | None, comm: Comm) -> l
     """For each block (n,) the damage of its tets; None where no part can be damaged so. All ranks take part."""
     cohesive = {i for i, part in enumerate(case.parts) if part.fracture and part.fracture.model == "cohesive"}
     limits = {i: p.erosion.plastic_strain for i, p in enumerate(case.parts) if p.erosion and p.erosion.plastic_strain}
-    counted = {i for i, part in enumerate(case.parts) if _counts(case, part.material)}
+    counted = counting(case)
     if not cohesive and not limits and not counted:
         return None
     held, spent = _facets(cohesion, comm) if cohesion is not None else (np.zeros((0, 2), np.int64), np.zeros(0))
@@ -31,6 +31,11 @@ def damage(case: Case, model: Model, cohesion: Cohesion | None, comm: Comm) -> l
         values = np.maximum(values, block.row(DAMAGE)) if block.part in counted else values
         found.append(np.maximum(values, _broken(block, held, spent)) if block.part in cohesive else values)
     return found
+
+
+def counting(case: Case) -> set[int]:
+    """The parts of a case whose material's law counts damage."""
+    return {i for i, part in enumerate(case.parts) if _counts(case, part.material)}
 
 
 def spent_energy(f: Facets) -> Floats:

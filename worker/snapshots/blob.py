@@ -19,7 +19,7 @@ _VERTEX, _TRIANGLE = 6 + 4, 12 + 2 + 1
 """Bytes of a vertex, and of a triangle without its fields."""
 _HEADER = 200
 """Bytes that an array takes in the header and in filling up, at most."""
-UNITS = {"speed": "m/s", "broken_faces": "", "plastic_strain": "", "temperature": "K"}
+UNITS = {"speed": "m/s", "broken_faces": "", "plastic_strain": "", "temperature": "K", "damage": ""}
 """Fields, and their units. ``broken_faces`` is the share of a tet's faces that have broken."""
 
 

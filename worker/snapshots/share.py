@@ -11,16 +11,18 @@ from pathlib import Path
 
 import numpy as np
 
-from ..state import MASS, PLASTIC_STRAIN, TEMPERATURE, Block, Floats, Ints, Model, Nodes, located
+from ..state import DAMAGE, MASS, PLASTIC_STRAIN, TEMPERATURE, Block, Floats, Ints, Model, Nodes, located
 
-ROWS = {"plastic_strain": PLASTIC_STRAIN, "temperature": TEMPERATURE}
+ROWS = {"plastic_strain": PLASTIC_STRAIN, "temperature": TEMPERATURE, "damage": DAMAGE}
 """Rows of the state of tets that become fields, where a block has them."""
 Share = dict[str, "np.ndarray"]
 """Arrays by name; those of block k begin with ``k.``."""
 
 
-def copied(model: Model, held: Ints) -> Share:
-    """A rank's share. ``held`` (m, 2): ids of tets that a cohesive facet still joins."""
+def copied(model: Model, held: Ints, counting: set[int]) -> Share:
+    """A rank's share. ``held`` (m, 2): ids of tets that a cohesive facet still joins; ``counting``: parts whose law
+    counts damage.
+    """
     nodes = model.nodes
     share = {"nodes": nodes.id.copy(), "x": nodes.x.copy(), "v": nodes.v.copy(), "held": held.copy()}
     for k, block in enumerate(model.blocks):
@@ -29,7 +31,7 @@ def copied(model: Model, held: Ints) -> Share:
         for name in ("id", "tets", "across", "bond"):
             share[f"{k}.{name}"] = getattr(block, name).copy()
         for name, row in ROWS.items():
-            if block.has(row):
+            if block.has(row) and (row != DAMAGE or block.part in counting):
                 share[f"{k}.{name}"] = block.row(row)
     return share
 

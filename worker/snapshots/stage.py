@@ -14,6 +14,7 @@ import numpy as np
 from conoid.cases import layout, messages
 
 from ..clock import Clock
+from ..output.damage import counting
 from ..output.journal import Journal
 from ..simulation import Simulation
 from .courier import Courier
@@ -37,6 +38,7 @@ class Snapshots:
         self._taken = self._took = 0.0
         self._dropped = 0
         self._asked_for = False
+        self._counting = counting(sim.case)
         if sim.comm.rank == 0:
             _clear(folder, self._n)
         sim.comm.barrier()
@@ -58,7 +60,7 @@ class Snapshots:
         began = time.monotonic()
         cohesion = sim.fracture.cohesion if sim.fracture is not None else None
         held = cohesion.facets.tets if cohesion is not None else np.zeros((0, 2), np.int64)
-        self._courier.send(self._task(sim, first=first, ending=ending), copied(sim.model, held))
+        self._courier.send(self._task(sim, first=first, ending=ending), copied(sim.model, held, self._counting))
         self._n += 1
         self._taken = time.monotonic()
         self._took = self._taken - began

@@ -1,0 +1,33 @@
+"""Which runs are kept for good: by the label ``keep``, or by what was said last, a hidden file in the run's folder."""
+
+from pathlib import Path
+
+import msgspec
+
+from . import durable
+from .folder import submission
+
+_PINNED, _YES, _NO = ".keep", "yes", "no"
+
+
+def pinned(folder: Path) -> bool:
+    """Whether the run is kept for good: by its label ``keep``, or by what was said last."""
+    if said := told(folder):
+        return said == _YES
+    try:
+        return submission(folder).labels.get("keep", _NO) != _NO
+    except (OSError, msgspec.MsgspecError):
+        return False
+
+
+def told(folder: Path) -> str:
+    """``yes`` or ``no`` as was said last; empty when nobody has said anything."""
+    try:
+        return (folder / _PINNED).read_text()
+    except OSError:
+        return ""
+
+
+def pin(folder: Path, keep: bool) -> None:
+    """Keeps a run for good, or no longer. Raises OSError."""
+    durable.write(folder / _PINNED, (_YES if keep else _NO).encode())

@@ -1,0 +1,48 @@
+"""A new run that goes on where another one has left a checkpoint: what it takes over of that run's folder."""
+
+import os
+import shutil
+from pathlib import Path
+
+from conoid.cases import fragments, layout
+from conoid.cases.load import apply_overrides, read_data
+
+from .errors import ServiceError
+
+LABEL = "restart"
+"""Of the new run: the id of the other one."""
+
+
+def latest(folder: Path) -> Path | None:
+    """The newest checkpoint of a run."""
+    found = (path for path in (folder / layout.CHECKPOINTS).glob("*") if path.name.isdigit())
+    return max(found, key=lambda path: int(path.name), default=None)
+
+
+def body(case: Path, ranks: int | None) -> dict[str, object]:
+    """The case of a run, on so many ranks. Raises CaseError."""
+    return apply_overrides(read_data(case), {} if ranks is None else {"run.ranks": ranks})
+
+
+def fill(source: Path, folder: Path) -> None:
+    """Gives the new run the newest checkpoint of ``source``, its frames and its history, which the worker cuts at the
+    checkpoint. Raises ServiceError 409, OSError.
+    """
+    checkpoint = latest(source)
+    if checkpoint is None:
+        detail = f"run {source.name} has no checkpoint; a run that has succeeded keeps none"
+        raise ServiceError(409, "no_checkpoint", detail)
+    shutil.copytree(checkpoint, folder / layout.CHECKPOINTS / checkpoint.name, copy_function=_link)
+    for name, copy in ((layout.FRAMES, _link), (fragments.FOLDER, shutil.copy2)):
+        if (source / name).is_dir():
+            shutil.copytree(source / name, folder / name, copy_function=copy)
+    if (source / layout.HISTORY).exists():
+        shutil.copy2(source / layout.HISTORY, folder / layout.HISTORY)
+
+
+def _link(source: str, target: str) -> None:
+    """A second name of the same file, which is only ever replaced as a whole; a copy of the list of frames."""
+    if source.endswith(layout.FRAME_SERIES):
+        shutil.copy2(source, target)
+    else:
+        os.link(source, target)

@@ -1,0 +1,43 @@
+"""What comes back from an impact (Cirak and West 2005): energy and momentum, of one contact and of many."""
+
+import numpy as np
+import pytest
+
+from conoid.worker.contact.narrow_phase import ContactRows
+from conoid.worker.contact.restitution import rebound
+
+from ..worker.meshes import Floats
+from .kernels import Solver, column, many
+
+
+def energy(v: Floats, mobility: Floats) -> float:
+    return float((0.5 * v * v / mobility).sum())
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
+def test_a_node_parts_from_a_face_with_a_share_of_its_speed(share: float) -> None:
+    """Masses of 1, 2, 3 and 4; it loses (1 - e^2) of the energy of the approach, and momentum stays."""
+    nodes, weights = np.array([[0, 1, 2, 3]], np.int32), np.array([[1.0, -0.2, -0.3, -0.5]])
+    normals, wanted = np.array([[0.0, 0.6, 0.8]]), np.zeros(1)
+    met = ContactRows(nodes, weights, normals, wanted, np.zeros(1), np.full(1, -1, np.int32))
+    mobility = 1.0 / np.repeat(np.arange(1.0, 5.0)[:, None], 3, axis=1)
+    v = np.array([[1.0, -3.0, -5.0], [0.5, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 2.0]])
+    rebound(met, 1, v, v, share)
+    speed = float(normals[0] @ (weights[0] @ v))
+    after = Solver(met, v, mobility).sweep(1)
+    assert normals[0] @ (weights[0] @ after) == pytest.approx(-share * speed, abs=1e-7)
+    lost = 0.5 * (1.0 - share**2) * speed**2 / float((weights**2 * mobility[:, 0]).sum())
+    assert energy(v, mobility) - energy(after, mobility) == pytest.approx(lost, abs=1e-7)
+    assert ((after - v) / mobility).sum(axis=0) == pytest.approx(np.zeros(3), abs=1e-10)
+
+
+def test_contacts_that_share_nodes_take_nothing_together() -> None:
+    """A column that closes everywhere: all relative velocities turn round, and the energy stays."""
+    v = np.zeros((6, 3))
+    v[:, 0] = -np.array([0.0, 1.0, 3.0, 4.0, 4.5, 7.0])
+    mobility = np.repeat(np.array([1.0, 2.0, 0.5, 1.0, 3.0, 1.0])[:, None], 3, axis=1)
+    met = column(6)
+    rebound(met, many(met), v, v, 1.0)
+    after = Solver(met, v, mobility).sweep(3000)
+    assert np.diff(after[:, 0]) == pytest.approx(-np.diff(v[:, 0]), abs=1e-6)
+    assert energy(after, mobility) == pytest.approx(energy(v, mobility), rel=1e-6)

@@ -1,0 +1,55 @@
+"""``:restart``: a new run goes on from a checkpoint of another one."""
+
+from pathlib import Path
+
+from conoid.cases import layout
+from conoid.cases.run import State
+
+from .running import Running
+
+
+def with_checkpoint(server: Running, run: str, step: int) -> Path:
+    """Puts what a worker would have left into the folder of a run."""
+    path = server.ann.runs / run
+    for place, name in (
+        (layout.checkpoint(path, step), "rank-0.h5"), (path / layout.FRAMES, "000000.vtkhdf"),
+        (path / layout.FRAMES, layout.FRAME_SERIES), (path / "fragments", "000000.csv"),
+    ):  # fmt: skip
+        place.mkdir(parents=True, exist_ok=True)
+        (place / name).write_text(name)
+    (path / layout.HISTORY).write_text("step\n1\n")
+    return path
+
+
+def test_a_new_run_takes_over_the_newest_checkpoint(server: Running, tmp_path: Path) -> None:
+    run = server.ann.submit(wait=str(tmp_path / "go"))
+    server.ann.wait_for(run, State.RUNNING)
+    with_checkpoint(server, run, 7)
+    source = with_checkpoint(server, run, 40)
+    server.ann.http.post(f"/v1/runs/{run}:cancel")
+    server.ann.wait_for(run)
+    (tmp_path / "go").touch()
+    made = [server.ann.http.post(f"/v1/runs/{run}:restart?ranks=2", headers={"Idempotency-Key": "k"}) for _ in range(2)]
+    assert [answer.status_code for answer in made] == [202, 202]
+    fresh = made[0].json()["id"]
+    assert fresh == made[1].json()["id"] != run
+    assert made[0].json()["ranks"] == 2
+    folder = server.ann.runs / fresh
+    assert [path.name for path in (folder / layout.CHECKPOINTS).iterdir()] == ["000000040"]
+    frame, history = folder / layout.FRAMES / "000000.vtkhdf", folder / layout.HISTORY
+    assert frame.stat().st_ino == (source / layout.FRAMES / "000000.vtkhdf").stat().st_ino, "it takes no room"
+    assert history.stat().st_ino != (source / layout.HISTORY).stat().st_ino, "this one is appended to"
+    assert server.ann.show(fresh)["labels"] == {"restart": run}
+    assert server.ann.wait_for(run)["state"] == "cancelled"
+
+
+def test_without_a_checkpoint_there_is_nothing_to_go_on_from(server: Running) -> None:
+    run = server.ann.submit()
+    server.ann.wait_for(run)
+    answer = server.ann.http.post(f"/v1/runs/{run}:restart")
+    assert (answer.status_code, answer.json()["code"]) == (409, "no_checkpoint")
+    assert len(server.ann.http.get("/v1/runs").json()["runs"]) == 1
+    assert not list(server.ann.runs.glob(".new-*"))
+    assert server.bob.http.post(f"/v1/runs/{run}:restart").status_code == 404
+    with_checkpoint(server, run, 3)
+    assert server.ann.http.post(f"/v1/runs/{run}:restart?ranks=3").status_code == 422, "there are 2 slots"

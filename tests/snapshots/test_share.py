@@ -1,0 +1,31 @@
+"""What a rank gives away: the rows that a material has."""
+
+import numpy as np
+
+from conoid.worker.snapshots.share import copied
+from conoid.worker.state import CHUNK, DAMAGE, Block, Model, Nodes
+
+
+def model_of(rows: int) -> Model:
+    """Two parts of a tet each, with so many rows of state; the damage of part k is (k + 1) / 4."""
+    n, x = 4, np.zeros((4, 3))
+    nodes = Nodes(
+        np.arange(n), np.zeros(n, np.int32), np.zeros(n, np.int32), np.ones(n, bool), x, x, x, np.ones(n),
+        np.zeros((n, 3), np.int64),
+    )  # fmt: skip
+    blocks = []
+    for k in range(2):
+        state = np.zeros((1, rows, CHUNK))
+        state[:, DAMAGE:] = 0.25 * (k + 1)
+        tets = np.arange(4, dtype=np.uint32)[None]
+        blocks.append(Block(part=k, n=1, tets=tets, id=np.array([k]), state=state, kind=0, eos=0, params=np.zeros(1)))
+    return Model(nodes, blocks, ["a", "b"], 2, n)
+
+
+def test_damage_is_given_away_of_parts_whose_law_counts_it() -> None:
+    """A part may have the row because of another one behind it, such as that of pores: that is no damage."""
+    held = np.zeros((0, 2), np.int64)
+    share = copied(model_of(DAMAGE + 2), held, {1})
+    assert "0.damage" not in share
+    assert share["1.damage"].tolist() == [0.5]
+    assert "1.damage" not in copied(model_of(DAMAGE), held, {1})
