@@ -9,11 +9,12 @@ const NEAR = "100px"; // Of the window: a chart farther off is not drawn, and is
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 
 // A chart of `height` px. `option()` gives what ECharts calls an option, or null while there is nothing to draw.
+// `onEnter` gets the place of the cursor in the first series when Enter is pressed.
 export class Chart {
-  constructor(height, label, option, { alone = false, onClick } = {}) {
-    this.element = h("div.plot", { tabindex: 0, role: "img", "aria-label": `${label}; arrow keys move the cursor`, style: { height: `${height}px` } },
+  constructor(height, label, option, { alone = false, onClick, onEnter } = {}) {
+    this.element = h("div.plot", { tabindex: 0, role: "img", "aria-label": `${label}; arrow keys move the cursor${onEnter ? ", Enter opens the nearest marker" : ""}`, style: { height: `${height}px` } },
       h("p.hint", {}, "waiting for the first numbers"));
-    Object.assign(this, { option, alone, onClick, at: 0, seen: false });
+    Object.assign(this, { option, alone, onClick, onEnter, at: 0, seen: false });
     this.eye = new IntersectionObserver((entries) => this.look(entries.at(-1).isIntersecting), { rootMargin: NEAR });
     this.eye.observe(this.element);
     this.watch = new ResizeObserver(() => this.chart?.resize());
@@ -60,6 +61,7 @@ export class Chart {
   }
 
   key(event) {
+    if (event.key === "Enter" && this.chart) this.onEnter?.(this.at);
     const move = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
     if (!move || !this.chart) return;
     event.preventDefault();

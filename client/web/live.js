@@ -60,7 +60,9 @@ export class Live {
 
   on_balance(message) { this.balances.push(message); }
 
+  // It counts the fragments too, and often later than the counts do.
   on_snapshot(message) {
+    if (this.counts) this.counts = { ...this.counts, fragments: message.fragments };
     if (!this.snapshots.some(({ n }) => n === message.n)) this.snapshots.push(message);
   }
 

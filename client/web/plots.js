@@ -21,7 +21,7 @@ export function plots(live, onBalance) {
     energy: [new Chart(TALL, "energy over time, without the kinetic", () => ofEnergy(live)), "Energy without the kinetic"],
     residual: [new Chart(TALL, "energy residual over time", () => ofResidual(live)), "Energy residual"],
     imbalance: [new Chart(TALL, "load imbalance over time", () => ofImbalance(live),
-      { onClick: ({ seriesName, dataIndex }) => seriesName === "balance" && onBalance(dataIndex) }), "Load imbalance, slowest over mean"],
+      { onClick: ({ seriesName, dataIndex }) => seriesName === "balance" && onBalance(dataIndex), onEnter: (at) => live.balances.length && onBalance(nearest(live, at)) }), "Load imbalance, slowest over mean"],
     heat: [new Chart(TALL, "work of each rank over time", () => ofHeat(live), { alone: true }), "Work by rank and time"],
     dt: [new Chart(TALL, "time step over time", () => ofStep(live)), "Time step"],
     contact: [new Chart(TALL, "share of contact over time", () => ofContact(live)), "Share of contact in the CPU time"],
@@ -65,6 +65,12 @@ function ofImbalance(live) {
     { ...series({ name: "imbalance", colour: "exchange", data: loads.map(({ t, imbalance }) => [t, imbalance]) }), tooltip: { valueFormatter: (value) => Number(value).toFixed(3) } },
     pins("balance", balances.map(({ t }) => [t, at(t)])),
   ]);
+}
+
+// The place of the cut that is nearest to a place in live.loads; the first of several.
+function nearest({ loads, balances }, at) {
+  const away = balances.map(({ t }) => Math.abs(t - loads[at].t));
+  return Math.max(0, away.indexOf(Math.min(...away)));
 }
 
 function ofHeat(live) {

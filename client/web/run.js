@@ -25,7 +25,7 @@ export class RunPage {
     this.abort.abort();
     clearInterval(this.timer);
     this.body.close();
-    for (const [chart] of Object.values(this.plots)) chart?.close?.();
+    for (const [chart] of Object.values(this.charts).filter(Array.isArray)) chart.close();
   }
 
   build() {
@@ -37,7 +37,6 @@ export class RunPage {
     this.balances = new Balances(live);
     this.logs = new Logs(live);
     this.charts = plots(live, (place) => this.balances.open(place));
-    this.plots = this.charts;
     this.body = new Body(live.run, (snapshot) => {
       this.charts.snapshot = snapshot;
       this.charts.sizes[0].draw();

@@ -1,71 +1,31 @@
-"""A person before the page, played in a real browser: signs in, watches the demo break, takes it apart, stops a run."""
+"""The page in a real browser: a person watches the demo break, takes it apart, stops a run, opens its report."""
 
 import csv
 import json
-import os
-import signal
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from statistics import median
 from typing import Any
 
-import httpx2
 import pytest
 
 from conoid.cases import history, layout
-from conoid.server.store import Store
-from conoid.server.tokens import create_token
+from conoid.client import report
+from conoid.client.result import Result
 
 from .chromium import Browser, Page, program
+from .visitor import SHOWN, Site, demo, facts, number, sign_in, violations
 
-pytestmark = [pytest.mark.slow, pytest.mark.skipif(program() is None, reason="no Chromium on this machine")]
-ROOT = Path(__file__).parents[2]
-WEB = ROOT / "client" / "web"
-DEMO_CASE = ROOT / "cases" / "shipped" / "glass_steel_demo.toml"
-SHOWN = "document.querySelector('section[data-shown]')?.dataset.shown"
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.timeout(3600),
+    pytest.mark.skipif(program() is None, reason="no Chromium on this machine"),
+]
 GRID, END_TIME = (64, 14), 60e-6
 """px of a chart left and right of its axes (charts.js); s of the demo."""
-DEMO = 900.0
+DEMO = 1800.0
 """s that the demo may take: it takes one minute on two free cores."""
-
-
-class Site:
-    """A server in a process of its own, with a token."""
-
-    def __init__(self, runs: Path) -> None:
-        """``runs`` is the folder of the runs."""
-        self.runs = runs
-        runs.mkdir()
-        store = Store(f"sqlite:///{runs / 'server.sqlite'}")
-        self.token = create_token(store, "ann", frozenset({"read", "submit"}))
-        store.close()
-        self.start()
-
-    def start(self, port: int = 0) -> None:
-        """Starts it; ``url`` is where."""
-        command = [sys.executable, "-m", "conoid.server", "--runs", str(self.runs), "--port", str(port)]
-        self.process = subprocess.Popen([*command, "--no-zenoh", "--web", str(WEB)], start_new_session=True)
-        address = self.runs / "server.json"
-        until = time.monotonic() + 60
-        while not (address.exists() and json.loads(address.read_text())["pid"] == self.process.pid):
-            assert time.monotonic() < until
-            time.sleep(0.1)
-        self.url = json.loads(address.read_text())["url"] + "/"
-
-    def submit(self, text: str) -> str:
-        """The id of a new run."""
-        headers = {"Authorization": f"Bearer {self.token}", "Content-Type": "application/toml"}
-        answer = httpx2.post(f"{self.url}v1/runs", content=text, headers=headers)
-        assert answer.status_code == 202, answer.text
-        return str(answer.json()["id"])
-
-    def kill(self) -> None:
-        """Kills the server; its workers go on."""
-        os.kill(self.process.pid, signal.SIGKILL)
-        self.process.wait()
 
 
 @pytest.fixture(scope="module")
@@ -80,34 +40,6 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     with Browser(tmp_path_factory.mktemp("profile")) as running:
         yield running
-
-
-def demo(**changes: str) -> str:
-    """The case of ``make demo``; with other values of some lines."""
-    text = DEMO_CASE.read_text()
-    for name, value in changes.items():
-        old = next(line for line in text.splitlines() if line.startswith(f"{name} = "))
-        text = text.replace(old, f"{name} = {value}")
-    return text
-
-
-def sign_in(page: Page, site: Site) -> None:
-    page.go(site.url)
-    page.wait("document.querySelector('form.sign-in')")
-    page.write("input[type=password]", site.token)
-    page.press("Enter")
-    page.wait("document.querySelector('.brand') && document.querySelector('table.runs')")
-
-
-def facts(page: Page, place: str = ".card .facts") -> dict[str, str]:
-    """Names and values of a list of facts."""
-    names = json.dumps(f"{place} dt")
-    script = f"[...document.querySelectorAll({names})].map((e) => [e.innerText, e.nextSibling.innerText])"
-    return dict(page.evaluate(script))
-
-
-def number(text: str) -> int:
-    return int(text.replace("\u202f", ""))
 
 
 @pytest.fixture(scope="module")
@@ -151,8 +83,8 @@ def test_what_is_shown_is_what_the_files_say(site: Site, watched: tuple[str, Pag
     run, page = watched
     folder = site.runs / run
     last = sorted((folder / "fragments").glob("fragments_*.csv"))[-1]
-    rows = {int(row["label"]): row for row in csv.DictReader(last.open())}
-    told = list(csv.reader((folder / layout.HISTORY).open()))
+    rows = {int(row["label"]): row for row in csv.DictReader(last.read_text().splitlines())}
+    told = list(csv.reader((folder / layout.HISTORY).read_text().splitlines()))
     line = dict(zip([history.split(name)[0] for name in told[0]], told[-1], strict=True))
     shown = facts(page)
     assert number(shown["fragments"]) == len(rows)
@@ -198,4 +130,104 @@ def test_the_body_is_cut_pulled_apart_picked_and_played(watched: tuple[str, Page
     assert {"fragment", "mass", "birth"} <= set(picked)
     frames = page.evaluate("seen.frames")
     assert max(calls for _, _, calls in frames) <= 2
+    assert page.errors == []
+
+
+def test_a_cut_opens_by_pointer_and_by_key_and_logs_by_rank(site: Site, watched: tuple[str, Page]) -> None:
+    page = watched[1]
+    cuts = "section[aria-label='balance events']"
+    assert page.text(f"{cuts} h2").startswith("Balance ")
+    assert {"time", "tets moved", "cost", "saved before"} <= set(facts(page, f"{cuts} .facts"))
+    assert "predicted" in page.text(cuts)
+    chart = "div.plot[aria-label^='load imbalance']"
+    page.place(chart)
+    page.wait(f'document.querySelector("{chart} canvas")')
+    page.focus(chart)
+    page.press("Enter")
+    page.wait(f'document.activeElement === document.querySelector("{cuts}")')
+    assert page.text(f"{cuts} h2").startswith("Balance 1 of")
+    assert click_on_last_cut(site, watched[0], page, chart)
+    for rank in ("rank 0", "rank 1", "launcher"):
+        page.press("Escape")
+        page.evaluate(f"[...document.querySelectorAll('.tab')].find((tab) => tab.innerText === '{rank}').click()")
+        page.wait(f"document.querySelector('.tab[aria-selected=true]').innerText === '{rank}'")
+    assert page.wait("document.querySelector('#log-lines').innerText.trim()")
+
+
+def click_on_last_cut(site: Site, run: str, page: Page, chart: str) -> bool:
+    """The pointer clicks its way down the chart at the time of the last cut, until its pin opens it."""
+    lines = map(json.loads, (site.runs / run / layout.JOURNAL).read_text().splitlines())
+    last = [line["t"] for line in lines if line["type"] == "balance"][-1]
+    page.evaluate("document.activeElement.blur()")
+    width = page.evaluate(f'document.querySelector("{chart}").clientWidth')
+    right = (GRID[0] + last / END_TIME * (width - sum(GRID))) / width
+    for tenth in range(40):
+        page.click(chart, right, 0.1 + 0.02 * tenth)
+        if page.evaluate("document.activeElement.ariaLabel === 'balance events'"):
+            return (
+                page.evaluate("/Balance ([0-9]+) of \\1$/.test(document.activeElement.querySelector('h2').innerText)")
+                is True
+            )
+    return False
+
+
+def test_buttons_the_age_of_numbers_and_two_runs(site: Site, watched: tuple[str, Page]) -> None:
+    done, page = watched
+    run = site.submit(demo(ranks="1", end_time='"2 ms"'))
+    page.go(f"{site.url}#/runs/{run}")
+    page.wait("document.querySelector('.pill.running') && document.querySelector('.ranks .stack')", DEMO)
+    for verb in ("Checkpoint", "Snapshot"):
+        page.evaluate(f"[...document.querySelectorAll('.side button')].find((b) => b.innerText === '{verb}').click()")
+        page.wait(f"document.querySelector('.told')?.innerText.includes('{verb.lower()} asked for')")
+    page.wait(f"Number({SHOWN}) > 0", DEMO)
+    assert page.errors == []
+    port = int(site.url.rsplit(":", 1)[1].strip("/"))
+    site.kill()
+    page.wait("/numbers .* old/.test(document.querySelector('.link').innerText)", 30)
+    site.start(port)
+    page.wait("document.querySelector('.link').innerText === 'live'", 60)
+    page.errors.clear()  # While the server was away the browser says so.
+    page.evaluate("document.querySelector('button.stop').click()")
+    page.wait("document.querySelector('.pill.cancelled')", 120)
+    page.go(f"{site.url}#/compare/{done}/{run}")
+    page.wait("document.querySelectorAll('table.checks').length === 2 && document.querySelector('canvas')")
+    assert "run.end_time\t0.00006\t0.002" in page.text("table.checks")
+    assert "heaviest fragment" in page.text()
+    assert page.errors == []
+
+
+@pytest.mark.parametrize(("dark", "phone"), [(False, False), (True, True)], ids=["light", "dark phone"])
+def test_everybody_can_use_it(site: Site, browser: Browser, watched: tuple[str, Page], dark: bool, phone: bool) -> None:
+    width, height = (390, 844) if phone else (1280, 720)
+    page = browser.page(width, height, dark=dark, phone=phone)
+    page.go(site.url)
+    page.wait("document.querySelector('form.sign-in')")
+    assert violations(page) == []
+    sign_in(page, site)
+    page.wait("document.querySelector('td a.name')")
+    assert violations(page) == []
+    page.go(f"{site.url}#/runs/{watched[0]}")
+    page.wait(f"document.querySelector('table.checks') && document.querySelector('.plot canvas') && {SHOWN}")
+    assert violations(page) == []
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    page.go(f"{site.url}#/")
+    page.wait("document.querySelector('td a.name')")
+    assert page.errors == []
+    page.close()
+
+
+def test_a_report_needs_no_server(site: Site, browser: Browser, watched: tuple[str, Page], tmp_path: Path) -> None:
+    site.kill()
+    out = tmp_path / "report.html"
+    report.write(Result.open(site.runs / watched[0]), out, [])
+    page = browser.page()
+    page.go(out.as_uri())
+    last = int(page.wait(SHOWN))
+    page.slide("input[aria-label=snapshot]", 0)
+    page.wait(f"{SHOWN} === '0'")
+    page.slide("input[aria-label=explode]", 1)
+    assert last > 3
+    assert "references" in page.text().lower()
+    assert violations(page) == []
+    assert not [url for _, url in page.answers if url.startswith("http")]
     assert page.errors == []

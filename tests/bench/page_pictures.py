@@ -1,0 +1,88 @@
+"""Pictures of the page: ``python -m tests.bench.page_pictures RUN``, where RUN is the folder of a run that has ended.
+
+docs/page.png is the body on its page. ``--all FOLDER`` makes others to be looked at: whole pages, light and dark, on a
+phone, with 16 ranks (a run that no solver has made), and the list of runs.
+"""
+
+import argparse
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from tests.server.chromium import Browser, Page
+from tests.server.visitor import SHOWN, Site, sign_in
+
+from .page_scene import lay, take
+
+OUT = Path(__file__).parents[2] / "docs" / "page.png"
+_OF_16 = "1k0aaaaaaaaaaaaaaaaaaa"
+_WINDOW, _PHONE = (1280, 720), (390, 844)
+_LOOKS = (("light", _WINDOW, False), ("dark", _WINDOW, True), ("phone", _PHONE, False), ("phone dark", _PHONE, True))
+_SETTLED = 2.0
+"""s after which nothing moves any more. Chosen."""
+
+
+def main(arguments: list[str]) -> None:
+    """Draws what is asked for."""
+    words = argparse.ArgumentParser(description=__doc__)
+    words.add_argument("run", type=Path)
+    words.add_argument("--out", type=Path, default=OUT)
+    words.add_argument("--all", type=Path)
+    options = words.parse_args(arguments)
+    with tempfile.TemporaryDirectory() as scratch:
+        site = Site(Path(scratch) / "runs")
+        site.kill()
+        take(options.run, site.runs)
+        if options.all:
+            lay(site.runs / _OF_16, options.run, 3000, 20_000, ranks=16)
+        try:
+            site.start()
+            with Browser(Path(scratch) / "profile") as browser:
+                _draw(browser, site, options.run.name, options.out)
+                if options.all:
+                    options.all.mkdir(exist_ok=True, parents=True)
+                    _draw_all(browser, site, options.run.name, options.all)
+        finally:
+            site.process.terminate()
+            site.process.wait(60)
+
+
+def _opened(page: Page, site: Site, run: str) -> Page:
+    sign_in(page, site)
+    page.go(f"{site.url}#/runs/{run}")
+    page.wait(SHOWN)
+    time.sleep(_SETTLED)
+    return page
+
+
+def _draw(browser: Browser, site: Site, run: str, out: Path) -> None:
+    """The body pulled apart a little, in a window that shows it with its controls."""
+    page = _opened(browser.page(1280, 900), site, run)
+    page.slide("input[aria-label=explode]", 0.06)
+    page.place("section[data-shown]")
+    time.sleep(_SETTLED)
+    page.draw(out)
+    page.close()
+
+
+def _draw_all(browser: Browser, site: Site, run: str, folder: Path) -> None:
+    for name, size, dark in _LOOKS:
+        page = _opened(browser.page(*size, dark=dark, phone=size == _PHONE), site, run)
+        page.draw(folder / f"{name}.png")
+        for at in range(
+            0, page.evaluate("document.body.scrollHeight"), size[1]
+        ):  # Charts are drawn when they are seen.
+            page.evaluate(f"scrollTo(0, {at})")
+            time.sleep(0.5)
+        page.evaluate("scrollTo(0, 0)")
+        page.draw(folder / f"{name} whole.png", whole=True)
+        page.go(f"{site.url}#/")
+        page.wait("document.querySelector('td a.name')")
+        page.draw(folder / f"{name} list.png")
+        page.close()
+    _opened(browser.page(*_WINDOW), site, _OF_16).draw(folder / "16 ranks.png", whole=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

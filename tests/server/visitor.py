@@ -1,0 +1,102 @@
+"""A person before the page: the server that is visited, and what is done and read there again and again."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import httpx2
+
+from conoid.server.store import Store
+from conoid.server.tokens import create_token
+
+from .chromium import Page
+
+ROOT = Path(__file__).parents[2]
+WEB = ROOT / "client" / "web"
+DEMO_CASE = ROOT / "cases" / "shipped" / "glass_steel_demo.toml"
+SHOWN = "document.querySelector('section[data-shown]')?.dataset.shown"
+CUTS = '\n[balance]\npolicy = "every"\nevery = 150\n'
+"""So that there are markers to open, however evenly the ranks are loaded."""
+SHOWN = "document.querySelector('section[data-shown]')?.dataset.shown"
+"""The number of the snapshot on the screen."""
+STANDARDS = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa"]
+
+
+class Site:
+    """A server in a process of its own, with a token."""
+
+    def __init__(self, runs: Path) -> None:
+        """``runs`` is the folder of the runs."""
+        self.runs = runs
+        runs.mkdir()
+        store = Store(f"sqlite:///{runs / 'server.sqlite'}")
+        self.token = create_token(store, "ann", frozenset({"read", "submit"}))
+        store.close()
+        self.start()
+
+    def start(self, port: int = 0) -> None:
+        """Starts it; ``url`` is where."""
+        command = [sys.executable, "-m", "conoid.server", "--runs", str(self.runs), "--port", str(port)]
+        self.process = subprocess.Popen([*command, "--no-zenoh", "--web", str(WEB)], start_new_session=True)
+        address = self.runs / "server.json"
+        until = time.monotonic() + 60
+        while not (address.exists() and json.loads(address.read_text())["pid"] == self.process.pid):
+            assert time.monotonic() < until
+            time.sleep(0.1)
+        self.url = json.loads(address.read_text())["url"] + "/"
+
+    def submit(self, text: str) -> str:
+        """The id of a new run."""
+        headers = {"Authorization": f"Bearer {self.token}", "Content-Type": "application/toml"}
+        answer = httpx2.post(f"{self.url}v1/runs", content=text, headers=headers, timeout=60)
+        assert answer.status_code == 202, answer.text
+        return str(answer.json()["id"])
+
+    def kill(self) -> None:
+        """Kills the server; its workers go on."""
+        os.kill(self.process.pid, signal.SIGKILL)
+        self.process.wait()
+
+
+def demo(**changes: str) -> str:
+    """The case of ``make demo``, cut anew now and then, with other values of some lines."""
+    text = DEMO_CASE.read_text()
+    for name, value in changes.items():
+        old = next(line for line in text.splitlines() if line.startswith(f"{name} = "))
+        text = text.replace(old, f"{name} = {value}")
+    return text + CUTS
+
+
+def sign_in(page: Page, site: Site) -> None:
+    page.go(site.url)
+    page.wait("document.querySelector('form.sign-in')")
+    page.write("input[type=password]", site.token)
+    page.press("Enter")
+    page.wait("document.querySelector('.brand') && document.querySelector('table.runs')")
+
+
+def facts(page: Page, place: str = ".card .facts") -> dict[str, str]:
+    """Names and values of a list of facts."""
+    names = json.dumps(f"{place} dt")
+    script = f"[...document.querySelectorAll({names})].map((e) => [e.innerText, e.nextSibling.innerText])"
+    return dict(page.evaluate(script))
+
+
+def number(text: str) -> int:
+    return int(text.replace("\u202f", ""))
+
+
+def violations(page: Page) -> list[str]:
+    """What axe-core finds against the levels A and AA: rule, number of places, the first of them."""
+    source = Path(str(metadata.distribution("axe-playwright-python").locate_file("axe_playwright_python/axe.min.js")))
+    page.evaluate(source.read_text(encoding="utf-8") + "; true")
+    told: list[dict[str, Any]] = page.evaluate(
+        f"axe.run({{ runOnly: {json.dumps(STANDARDS)} }}).then((told) => told.violations)"
+    )
+    return [f"{one['id']}: {len(one['nodes'])} places, {one['nodes'][0]['html'][:120]}" for one in told]
