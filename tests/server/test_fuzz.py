@@ -77,7 +77,7 @@ def test_no_request_fails_the_server_or_its_schema(ann: User, tmp_path: Path) ->
         "--max-examples", str(EXAMPLES), "--phases", "examples,coverage,fuzzing,stateful", "--continue-on-failure",
         "--seed", "1", "--request-timeout", "70", "--no-color",
     ]  # fmt: skip
-    done = subprocess.run(command, capture_output=True, text=True, timeout=3000, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=3000, check=False, cwd=tmp_path)
     summary = done.stdout.rpartition("= SUMMARY =")[2]
     print(summary)
     assert "Tested: " in summary, done.stderr + done.stdout[-2000:]
