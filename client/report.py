@@ -197,9 +197,9 @@ def _messages(result: Result) -> str:
     ended = _outcome(result)
     lines = [*(ended.warnings if ended is not None else [])]
     lines += [f"{message.level}: {message.text}" for message in result.messages if isinstance(message, Log)]
-    return f"<pre>{escape(chr(10).join(lines))}</pre>" if lines else ""
+    return f"<pre tabindex=0>{escape(chr(10).join(lines))}</pre>" if lines else ""
 
 
 def _keys(case: dict[str, object]) -> str:
     text = escape(json.dumps(case, indent=2, ensure_ascii=False))
-    return f"<details><summary>with every default filled in, in SI</summary><pre>{text}</pre></details>"
+    return f"<details><summary>with every default filled in, in SI</summary><pre tabindex=0>{text}</pre></details>"

@@ -31,14 +31,12 @@ export const binary = async (path, options) => (await send(path, { ...options, c
 
 const TAIL = 65536; // Bytes of a log that are shown.
 
-// The end of the log of a rank, or of "launcher".
+// The end of the log of a rank, or of "launcher". Of an empty file no part can be asked for.
 export async function tail(run, rank) {
-  try {
-    return await (await send(`v1/runs/${encodeURIComponent(run)}/logs/${rank}`, { headers: { Range: `bytes=-${TAIL}` } })).text();
-  } catch (error) {
-    if (error instanceof Problem && error.status === 416) return ""; // An empty file.
-    throw error;
-  }
+  const path = `v1/runs/${encodeURIComponent(run)}/logs/${rank}`;
+  const { headers } = await send(path, { method: "HEAD" });
+  if (headers.get("Content-Length") === "0") return "";
+  return (await send(path, { headers: { Range: `bytes=-${TAIL}` } })).text();
 }
 
 export const call = async (path, options) => (await send(path, options)).json();
