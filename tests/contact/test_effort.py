@@ -7,6 +7,7 @@ import pytest
 
 from conoid.cases.load import apply_overrides, parse_case, read_data
 from conoid.worker import simulation, step
+from conoid.worker.contact import effort
 from conoid.worker.contact.effort import TOLERANCE, Effort
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.state import Model
@@ -30,10 +31,10 @@ def test_what_sweeps_have_left_undone_is_told() -> None:
 
 
 def test_sweeps_follow_what_is_left() -> None:
-    effort, counts = Effort(5), []
+    needed, counts = Effort(5), []
     for short in (0.5, 2.0, 2.0, 2.0, 0.5, 0.1, 0.1, 0.1):
-        effort.settle(short * TOLERANCE)
-        counts.append(effort.sweeps)
+        needed.settle(short * TOLERANCE)
+        counts.append(needed.sweeps)
     assert counts == [5, 10, 20, 20, 20, 10, 5, 5]
 
 
@@ -54,16 +55,24 @@ def inside(model: Model, depth: float) -> int:
     return count
 
 
-def test_a_wedge_does_not_sink_into_the_glass_that_it_shatters() -> None:
-    """Five sweeps a step left twelve nodes inside of the other body by a hundredth of a face or more."""
-    case = parse_case(apply_overrides(read_data(CASE), ["run.frames=0"]))
+def looks(safety: float) -> list[int]:
+    """How many nodes are inside by a hundredth of a face, every 20 steps."""
+    case = parse_case(apply_overrides(read_data(CASE), ["run.frames=0", f"numerics.dt_safety={safety}"]))
     sim = simulation.build(case, Path(), SerialComm())
     step.prepare(sim)
     assert sim.contact is not None
-    worst = 0
+    size, counts = sim.contact.exterior.size, []
     while not sim.clock.done:
         step.first_half(sim)
         step.second_half(sim)
-        if sim.clock.step % 20 == 0 and sim.contact is not None:
-            worst = max(worst, inside(sim.model, 0.01 * sim.contact.exterior.size))
-    assert worst <= 3
+        if sim.clock.step % 20 == 0:
+            counts.append(inside(sim.model, 0.01 * size))
+    return counts
+
+
+def test_a_wedge_sinks_less_into_the_glass_that_it_shatters(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Than with five sweeps in every step; means of two runs, for dust is chaos."""
+    needed = [looks(safety) for safety in (0.9, 0.89)]
+    monkeypatch.setattr(effort, "_MOST", 1)
+    five = [looks(safety) for safety in (0.9, 0.89)]
+    assert np.mean(np.concatenate(needed)) < 0.6 * np.mean(np.concatenate(five))
