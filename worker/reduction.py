@@ -89,8 +89,6 @@ class Fields:
     """Rank 0 wants the loads of groups besides."""
     approach = Real()
     """Largest one-over-step in which a node passes half of a tet that it meets, 1/s."""
-    short = Real()
-    """How much deeper than it may a contact is after the sweeps of the step, of the typical size of a face."""
     opening = Flag()
     """A crack has become so wide that its sides are surface from now on."""
     search = Flag()

@@ -95,10 +95,6 @@ class ActiveSet:
         work(inner)
         self._sum.finish(words, first, columns)
 
-    def short(self) -> float:
-        """By how much the contacts of this rank are at most slower than they must be after the last sweep, m/s."""
-        return max(float(sweeps.short(self._room.active, part)) for part in self._parts)
-
     def cost(self, account: Account, before: Floats) -> None:
         """Books what the impulses take from the bodies; ``before`` (crowd, 3): v(n-1/2)."""
         for part in self._parts:

@@ -21,7 +21,6 @@ from ..topology import Split
 from . import held, normals
 from .books import Books
 from .detection import Detected, detect
-from .effort import Effort
 from .exterior import Exterior
 from .narrow_phase import PUSH_OUT
 from .restitution import rebound
@@ -51,7 +50,7 @@ class Contact:
         self.searches = Searches(case, model, neighbours, self.exterior, comm, clock)
         self.books = Books(model.nodes.n, len(case.parts), extremes)
         self._active = ActiveSet(self.books.scale)
-        self._sweeps, self._restitution = Effort(case.contact.sweeps), case.contact.restitution
+        self._sweeps, self._restitution = case.contact.sweeps, case.contact.restitution
         self.found = Detected.nothing()
         """What the last step has found here."""
         self.limit = 0.0
@@ -66,7 +65,7 @@ class Contact:
         books = self.books
         parcel.known["contact"] = (
             books.scale, books.friction.scale, self.limit, self.searches.many, self._mean_dt, self.exterior.size,
-            books.account.known(), self._sweeps.sweeps,
+            books.account.known(),
         )  # fmt: skip
         self.books.keep(parcel, self.searches.scene)
         self.exterior.keep(parcel)
@@ -77,7 +76,6 @@ class Contact:
         books = self.books
         (
             books.scale, books.friction.scale, self.limit, self.searches.many, self._mean_dt, size, account,
-            self._sweeps.sweeps,
         ) = parcel.known["contact"]  # fmt: skip
         self._active.scale = books.scale
         books.resume(parcel, account)
@@ -150,7 +148,6 @@ class Contact:
         self.books.agreed = all_ranks.costs.sum(axis=0).reshape(2, 2)
         self.searches.due |= all_ranks.search
         self.limit = all_ranks.approach
-        self._sweeps.settle(all_ranks.short)
         if all_ranks.opening:
             self.open_cracks()
 
@@ -158,11 +155,6 @@ class Contact:
     def approach(self) -> float:
         """One over the step in which no node of this rank's contacts passes more than half of a tet, 1/s."""
         return self.found.approach
-
-    @property
-    def short(self) -> float:
-        """How much deeper than it may a contact of this rank is after the sweeps, of the typical size of a face."""
-        return self._sweeps.left
 
     @property
     def opening(self) -> bool:
@@ -225,8 +217,7 @@ class Contact:
         active.weigh()
         if self.searches.rubs:
             active.resume(now.node_face.kept, self._resume())
-        active.sweep(self._sweeps.sweeps)
-        self._sweeps.left = active.short() * dt / self.exterior.size
+        active.sweep(self._sweeps)
         if self.searches.rubs:
             now.node_face.kept[:] = 0.0
             active.store(now.node_face.kept)

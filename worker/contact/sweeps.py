@@ -260,21 +260,6 @@ def sweep_all(active, loaded, contacts, fastest, n, scale, many):  # type: ignor
         give(active, n, scale)
 
 
-@njit(types.float64(NODES, LOADED), cache=True)
-def short(active, loaded):  # type: ignore[no-untyped-def]
-    """By how much the loaded contacts are at most slower than they must be, m/s; none is less than 0."""
-    values, normal, weights, slots, most = active.moving, loaded.normal, loaded.tangent, loaded.slots, 0.0
-    for q in range(loaded.many[0]):
-        speed = 0.0
-        for k in range(2 if slots[q, 2] < 0 else 4):
-            s = slots[q, k]
-            for i in range(3):
-                speed += weights[q, k] * normal[q, i] * values[s, V + i]
-        if normal[q, ROW_NORM] < np.inf:
-            most = max(most, normal[q, WANTED] - speed)
-    return most
-
-
 @njit(types.void(_F2, LOADED, _ROWS), cache=True)
 def store(kept, loaded, pair):  # type: ignore[no-untyped-def]
     """Stores the impulses of loaded contacts with their pairs, ``kept`` (candidates, 4)."""
