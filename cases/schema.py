@@ -134,8 +134,8 @@ class Contact(Model):
     surface lies inside the mesh of the other, deeper than a millionth of the size of a face: bodies that touch do not.
     Parts that do not meet each other may overlap."""
     sweeps: Annotated[Count, Field(ge=1, le=1000)] = 5
-    """Jacobi sweeps over the active contacts of a step, with momentum. More leave less penetration where bodies shatter,
-    and break them into more pieces; they cost more."""
+    """Jacobi sweeps over the active contacts of a step, with momentum. More leave less penetration where bodies
+    shatter, and break them into more pieces; they cost more."""
     skin: Annotated[Ratio, Positive] = 0.3
     """Of the (harmonic) mean face size: twice how far a node may depart from its extrapolated motion before its
     candidate pairs are searched again. Changes the cost, not the answer."""
