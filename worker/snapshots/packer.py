@@ -33,13 +33,13 @@ def main(folder: Path) -> None:
     os.nice(_NICE)
     births: Births | None = None
     for line in sys.stdin:
-        task = json.loads(line)
+        task, began = json.loads(line), time.process_time()
         births = births or Births(folder, task["end"], task["frames"])
         try:
             answer = _made(folder, task, births)
         except Exception as error:  # of one snapshot; the next may be made
             answer = {"error": f"{type(error).__name__}: {error}"}
-        print(json.dumps({"n": task["n"], **answer}), flush=True)
+        print(json.dumps({"n": task["n"], "cpu": time.process_time() - began, **answer}), flush=True)
 
 
 def _made(folder: Path, task: dict[str, Any], births: Births) -> dict[str, Any]:
