@@ -6,6 +6,8 @@ import pytest
 from conoid.worker.contact.cracks import Cracks, computed
 from conoid.worker.contact.kin import Family, inherited
 from conoid.worker.contact.node_face import chain
+from conoid.worker.migration.parcel import joined, once
+from conoid.worker.state import Nodes
 
 
 def cracks_of(n: int) -> Cracks:
@@ -36,6 +38,24 @@ def test_a_crack_that_comes_after_others_have_opened_stands_behind_those_that_ar
     cracks.add(more.faces[8:] // 4 + 1, more.nodes[8:, :3], np.full((1, 2, 3), -1, np.int32), [])
     assert cracks.nodes[:, 0].tolist() == [0, 3, 2, 8]
     assert cracks.places[3].tolist() == [-1] * 6
+
+
+def test_who_gets_both_sides_of_a_crack_has_the_nodes_in_the_order_of_the_first_side() -> None:
+    """Ranks that have had a side each begin with different nodes, and the last bit of a normal depends on that."""
+    ids, places, zeros = np.array([10, 11, 12]), np.zeros(3, np.int32), np.zeros((3, 3))
+    nodes = Nodes(ids, places, places, np.ones(3, bool), zeros, zeros, zeros, np.zeros(3), zeros.astype(np.int64))
+    had = []
+    for k, order in enumerate(([0, 1, 2], [1, 2, 0])):
+        sides = np.full((1, 2, 3), -1, np.int32)
+        sides[0, k] = 0
+        one = Cracks.none()
+        one.add(np.array([[5, 9]]), np.array([order], np.int32), sides, [])
+        one.sides, one.faces = sides, np.array([[20, 36]])
+        had.append(one.keep(ids))
+    for every in (had, had[::-1]):
+        table = joined(every)
+        cracks = Cracks.resume(once(table, table["key"]), [], nodes)
+        assert cracks.nodes.tolist() == [[0, 1, 2, 0, 1, 2]]
 
 
 def test_only_cracks_with_their_first_side_here_and_nodes_apart_are_computed() -> None:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..jit import njit, types
-from ..migration.parcel import Table
+from ..migration.parcel import Table, once
 from ..state import WIDE, Block, Flags, Indices, Ints, Nodes, extended
 from ..topology import Split
 from .narrow_phase import CONTACT_ROWS, DEEP_SELF, NEAR, STEP, needed
@@ -68,14 +68,18 @@ class Cracks:
         self.nodes[rows] = split.followed_sides(self.nodes[rows], ids, self.faces[rows] // 4)
 
     def keep(self, ids: Ints) -> Table:
-        """The facets as a table; ``ids``: of the local nodes."""
+        """The facets as a table, a row a side; ``ids``: of the local nodes."""
         rows, k = np.nonzero(self.sides[:, :, 1] >= 0)
         faces = self.faces[rows]
-        return {"tet": self.faces[rows, k] // 4, "key": faces[:, 0], "faces": faces, "with": ids[self.nodes[rows]]}
+        return {"tet": faces[range(len(rows)), k] // 4, "key": 2 * faces[:, 0] + k, "faces": faces,
+                "with": ids[self.nodes[rows]]}  # fmt: skip
 
     @classmethod
     def resume(cls, table: Table, blocks: list[Block], nodes: Nodes) -> "Cracks":
-        """Facets from a table."""
+        """Facets from a table by ascending key. The row of the first side is taken where it is there: a rank that has
+        had the second one alone may have begun with another node, and the last bit of a normal depends on that.
+        """
+        table = once(table, table["faces"][:, 0])
         faces = np.array(table["faces"])
         sides = np.full((len(faces), 2, 3), -1, np.int32)
         for b, block in enumerate(blocks):
