@@ -91,6 +91,8 @@ class Fields:
     """Largest one-over-step in which a node passes half of a tet that it meets, 1/s."""
     opening = Flag()
     """A crack has become so wide that its sides are surface from now on."""
+    stray = Flag()
+    """In the next step a slot will have strayed so far that it is registered anew."""
     search = Flag()
     """The surface of a rank has used up the last search for contact."""
     worn = Number()

@@ -96,6 +96,7 @@ def second_half(sim: Simulation) -> None:
         if sim.contact is not None:
             own = sim.reduction.own
             own.search, own.approach, own.opening = sim.contact.spent(nodes), sim.contact.approach, sim.contact.opening
+            own.stray = sim.contact.stray
             own.costs[sim.comm.rank] = sim.contact.costs
     _elements(sim, clock.dt, sim.fracture)  # 12 to 14
     if sim.fracture is not None:

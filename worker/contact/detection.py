@@ -14,6 +14,9 @@ from .scene import Scene
 
 _KINEMATIC = 2.0
 """One over the share of a tet's altitude that anything may pass in a step."""
+_JOIN = 0.6
+"""Of the distance at which a slot has to be registered anew: a rank whose slots have strayed so far does it when
+another one has to, so that ranks do not wait for one after the other. No bit of the answer depends on it."""
 
 
 @dataclass
@@ -26,18 +29,23 @@ class Detected:
     """One over the step in which no node passes more than half of a tet that it meets, 1/s."""
     opening: Ints
     """Rows of the cracks that have become so wide that they open."""
+    stray: bool
+    """Whether a slot will have strayed so far in the next step that it is registered anew."""
 
     @classmethod
     def nothing(cls) -> "Detected":
         """Before the first step."""
-        return cls(0, 0.0, np.zeros(0, np.int64))
+        return cls(0, 0.0, np.zeros(0, np.int64), False)
 
 
-def detect(now: Scene, mu: Floats, give: float, dt: float, size: float, redraw: bool) -> Detected:
+def detect(
+    now: Scene, mu: Floats, give: float, dt: float, size: float, redraw: bool, together: bool
+) -> Detected:  # fmt: skip
     """The active contacts of the step ahead, ``dt``, s, of the positions and velocities of the scene's nodes.
 
     ``mu`` (parts, parts): friction, NaN where two parts do not meet; ``give``: see narrow_phase.PUSH_OUT; ``size``: the
-    typical one of a face, m; ``redraw``: whether short lines are drawn anew (tracks.py).
+    typical one of a face, m; ``redraw``: whether short lines are drawn anew (tracks.py); ``together``: whether some
+    rank registers what has strayed.
     """
     crowd, tracks = now.crowd, now.tracks
     tracks.advance(dt)
@@ -46,15 +54,24 @@ def detect(now: Scene, mu: Floats, give: float, dt: float, size: float, redraw: 
         now.node_face.wake()
         now.edge_edge.wake()
     tracks.measure(crowd.x, crowd.v, now.faces.corners, now.edges.corners)
-    strayed = float(tracks.searched.left[now.slots.tracked].max(initial=0.0))
-    if strayed > 0.5 * now.rules.skin or now.pending:
-        registration.renew(now, crowd.x, crowd.v, strayed)
+    stray = _renewed(now, together)
     now.reserve()
-    return _test(now, Step.of(crowd.x, crowd.v, crowd.part, mu, give, dt), size)
+    contacts, approach, opening = _test(now, Step.of(crowd.x, crowd.v, crowd.part, mu, give, dt), size)
+    return Detected(contacts, approach, opening, stray)
 
 
-def _test(now: Scene, step: Step, size: float) -> Detected:
-    """The narrow phase."""
+def _renewed(now: Scene, together: bool) -> bool:
+    """Registers what has to be; whether in the next step something will have strayed too far, if it goes on so."""
+    tracks, most, before = now.tracks, 0.5 * now.rules.skin, now.tracks.strayed
+    tracks.strayed = tracks.farthest(now.slots.tracked)
+    if tracks.strayed > (_JOIN if together else 1.0) * most or now.pending:
+        registration.renew(now, now.crowd.x, now.crowd.v, tracks.strayed)
+        before = tracks.strayed = tracks.farthest(now.slots.tracked)
+    return 2.0 * tracks.strayed - before > most
+
+
+def _test(now: Scene, step: Step, size: float) -> tuple[int, float, Ints]:
+    """The narrow phase: contacts, approach and opening of ``Detected``."""
     tracks, faces, pairs = now.tracks, now.face_table(), now.node_face.arrays()
     n, tested = node_face(now.active.room, 0, pairs, now.slot_table(), faces, step, tracks.end)
     now.node_face.tested = pairs.active[:tested]
@@ -65,4 +82,4 @@ def _test(now: Scene, step: Step, size: float) -> Detected:
     now.faces.fresh[:], now.edges.fresh[:], now.slots.fresh[:] = False, False, False
     opening = np.empty(len(now.cracks), np.int64)
     n, wide = across(now.active.room, n, opening, now.cracks, size, step)
-    return Detected(int(n), limit, opening[:wide])
+    return int(n), float(limit), opening[:wide]

@@ -49,7 +49,7 @@ def renew(scene: Scene, x: Floats, v: Floats, strayed: float) -> None:
     ``x``, ``v`` (slots, 3): as the step begins, v before contact.
     """
     off = scene.settle_live()
-    if strayed > 0.5 * scene.rules.skin:
+    if strayed > 0.5 * _PARTLY * scene.rules.skin:
         off |= scene.slots.tracked & (scene.tracks.searched.left > 0.5 * _PARTLY * scene.rules.skin)
         scene.slots.new |= off
         scene.faces.new |= off[scene.faces.corners[:, :3]].any(axis=1)

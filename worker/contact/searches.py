@@ -102,7 +102,7 @@ class Searches:
         now.look(nodes)
         exterior.show(now, now.own.local)
         now.enliven(np.flatnonzero(now.faces.exposed).astype(np.int32))
-        self.foresee()
+        self.foresee(anew=True)
         registration.news(now)
         if self.rubs:
             now.remember(*self._kept, nodes, self._comm)
@@ -135,13 +135,19 @@ class Searches:
             follower.cracks(self._exterior.cracks)
         follower.settle(self._neighbours, self._comm)
 
-    def foresee(self) -> None:
-        """The faces of cracks that may open soon are searched."""
-        now = self.scene
-        if now is not None and len(now.cracks):
-            rows = widening(now.cracks, now.crowd.x, self._exterior.size)
-            sides = now.rows_of(self._exterior.cracks.faces[rows].reshape(-1))
-            now.enliven(sides[~now.faces.live[sides]])
+    def foresee(self, *, anew: bool = False) -> None:
+        """The faces of cracks that may open soon are searched, by all ranks that have them; all take part. ``anew``:
+        after a search, when others have come near.
+        """
+        now, cracks = self.scene, self._exterior.cracks
+        if now is None or not self._case.fractures:
+            return
+        rows = widening(now.cracks, now.crowd.x, self._exterior.size)
+        faces = cracks.faces[rows[cracks.foreseen[rows]]]
+        if not anew:
+            faces = faces[~now.faces.live[now.rows_of(faces[:, 0])]]
+        sides = now.rows_of(self._comm.join(faces.reshape(-1)))
+        now.enliven(sides[~now.faces.live[sides]])
 
     def separate(self, split: Split) -> None:
         """Follows nodes as they separate; all ranks take part."""

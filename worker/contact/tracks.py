@@ -11,7 +11,7 @@ mean velocities of these steps they are much closer to the slots, and nobody has
 import numpy as np
 
 from ..jit import njit
-from ..state import Floats, Indices, extended
+from ..state import Flags, Floats, Indices, extended
 
 _V1, _V2, _N2 = "float64[::1]", "float64[:, ::1]", "int32[:, ::1]"
 
@@ -74,6 +74,8 @@ class Tracks:
         """Of the step's beginning, s after the search."""
         self.end = 0.0
         """Of its end."""
+        self.strayed = 0.0
+        """How far any slot that is watched leaves the line that is searched in the step, m."""
 
     def add(self, x: Floats, course: Floats) -> None:
         """Takes up more slots, as they are, (n, 3) each."""
@@ -102,6 +104,10 @@ class Tracks:
         self.short.measure(x, v, self.t, dt)
         _largest(self.faces, faces, 3, self.short.left)
         _largest(self.edges, edges, 2, self.short.left)
+
+    def farthest(self, some: Flags) -> float:
+        """How far any of ``some`` (slots,) leaves the line that is searched in the step, m."""
+        return float(self.searched.left[some].max(initial=0.0))
 
     def begin_anew(self, some: "np.ndarray", x: Floats) -> None:
         """New lines to search along for ``some`` (slots,), from ``x`` (slots, 3) on."""
