@@ -109,14 +109,14 @@ class World:
         self.scene = self.search(self.scene)
 
     def begin(self, dt: float) -> None:
-        """A step begins as the stage of contact has it begin."""
+        """A step begins as the stage of contact has it begin; in some another rank registers what has strayed."""
         now, of = self.scene, self.scene.crowd
         of.x[:], of.v[:] = self.x[of.id], self.v[of.id]
         now.tracks.advance(dt)
         now.tracks.measure(of.x, of.v, now.faces.corners, now.edges.corners)
-        strayed = float(now.tracks.searched.left[now.slots.tracked].max(initial=0.0))
-        if strayed > 0.5 * SKIN or now.pending:
-            registration.renew(now, of.x, of.v, strayed)
+        due = now.tracks.farthest(now.slots.tracked) > 0.5 * SKIN * (1.0 if self.registered % 3 else 0.6)
+        if due or now.pending:
+            registration.renew(now, of.x, of.v, due)
             self.registered += 1
 
     def step(self, number: int) -> None:

@@ -64,8 +64,9 @@ def _renewed(now: Scene, together: bool) -> bool:
     """Registers what has to be; whether in the next step something will have strayed too far, if it goes on so."""
     tracks, most, before = now.tracks, 0.5 * now.rules.skin, now.tracks.strayed
     tracks.strayed = tracks.farthest(now.slots.tracked)
-    if tracks.strayed > (_JOIN if together else 1.0) * most or now.pending:
-        registration.renew(now, now.crowd.x, now.crowd.v, tracks.strayed)
+    due = tracks.strayed > (_JOIN if together else 1.0) * most
+    if due or now.pending:
+        registration.renew(now, now.crowd.x, now.crowd.v, due)
         before = tracks.strayed = tracks.farthest(now.slots.tracked)
     return 2.0 * tracks.strayed - before > most
 

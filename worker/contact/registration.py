@@ -43,13 +43,13 @@ def news(scene: Scene) -> None:
     _register(scene)
 
 
-def renew(scene: Scene, x: Floats, v: Floats, strayed: float) -> None:
-    """Registers what is new, and gives new lines to what has left its own; ``strayed``: how far at most, m.
+def renew(scene: Scene, x: Floats, v: Floats, strayed: bool) -> None:
+    """Registers what is new and, with ``strayed``, gives new lines to what has left its own.
 
     ``x``, ``v`` (slots, 3): as the step begins, v before contact.
     """
     off = scene.settle_live()
-    if strayed > 0.5 * _PARTLY * scene.rules.skin:
+    if strayed:
         off |= scene.slots.tracked & (scene.tracks.searched.left > 0.5 * _PARTLY * scene.rules.skin)
         scene.slots.new |= off
         scene.faces.new |= off[scene.faces.corners[:, :3]].any(axis=1)
