@@ -20,7 +20,10 @@ router = APIRouter()
 
 @router.post("/v1/cases:validate", openapi_extra=openapi.CASE_BODY)
 async def validate(
-    service: ServiceOf, identity: Submitter, body: Body, content_type: Annotated[str, Header()] = ""
+    service: ServiceOf,
+    identity: Submitter,
+    body: Body,
+    content_type: Annotated[str, Header(include_in_schema=False)] = "",
 ) -> dict[str, Any]:
     """Whether the case could be submitted: every problem at once, or warnings, estimate, the case with all defaults."""
     try:

@@ -37,7 +37,7 @@ async def submit(
     service: ServiceOf,
     identity: Submitter,
     body: Body,
-    content_type: Annotated[str, Header()] = "",
+    content_type: Annotated[str, Header(include_in_schema=False)] = "",
     idempotency_key: Annotated[str | None, Header()] = None,
     label: Annotated[list[str] | None, Query(description="NAME=VALUE, by which the run is found again")] = None,
     profile: Annotated[str, Query(description="of the site's batch system; the site's default when empty")] = "",

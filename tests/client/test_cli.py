@@ -116,6 +116,7 @@ def test_a_label_is_a_name_and_a_value(quiet_home: Path) -> None:
     assert (result.exit_code, result.stderr) == (1, "conoid: label = 'batch': write NAME=VALUE\n")
 
 
+@pytest.mark.usefixtures("warm")
 def test_view_draws_a_folder(quiet_home: Path) -> None:
     folder = write_run(quiet_home / "bar")
     result = conoid(
@@ -126,6 +127,7 @@ def test_view_draws_a_folder(quiet_home: Path) -> None:
     assert (quiet_home / "p.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.usefixtures("warm")
 def test_view_takes_times_with_their_units(quiet_home: Path) -> None:
     folder = write_run(quiet_home / "bar")
     words = ("view", folder, "--camera", "-x", "--size", 200, 150, "--json", "--out", "p.png", "--time")
@@ -249,10 +251,8 @@ def test_run_does_it_all_and_leaves_no_process(alone: Path) -> None:
     assert json.loads((folders[0] / "case.resolved.json").read_bytes())["run"]["ranks"] == 2
     assert f"results    {folders[0]}" in done.stdout
     assert processes_of(alone / "runs") == []
-    checked = subprocess.run(
-        [*CONOID, *words, "--check", "--json"], capture_output=True, text=True, timeout=120, check=False
-    )
-    assert checked.returncode == 1, "a reference number is missed"
+    checked = conoid(*words, "--check", "--json")
+    assert checked.exit_code == 1, "a reference number is missed"
     assert json.loads(checked.stdout)["outcome"]["steps"] == 3
 
 
