@@ -17,6 +17,9 @@ from . import batch, layout
 from .batch import Job, Profile
 
 PENDING = frozenset({"PENDING", "REQUEUED", "REQUEUE_HOLD", "REQUEUE_FED", "RESV_DEL_HOLD", "SPECIAL_EXIT"})
+NOT_LAUNCHED = "launch failed requeued held"
+"""Reason of a pending job, with spaces or underscores: its node did not start it, and Slurm waits for somebody to look
+at that."""
 FINAL = frozenset(
     {"BOOT_FAIL", "CANCELLED", "COMPLETED", "DEADLINE", "FAILED", "NODE_FAIL", "OUT_OF_MEMORY", "PREEMPTED", "REVOKED",
      "TIMEOUT"}
@@ -58,6 +61,11 @@ class Entry(NamedTuple):
     name: str
     """Of the job; of a task of an array with its place, as ``batch.key_of`` has it."""
     reason: str
+
+    @property
+    def not_launched(self) -> bool:
+        """Whether it waits because a node did not start it."""
+        return self.state in PENDING and self.reason.replace("_", " ").lower() == NOT_LAUNCHED
 
 
 def call(place: str, words: Sequence[str], keep: int | None = None) -> str:
@@ -190,6 +198,12 @@ def kill(place: str, job: str) -> None:
     with suppress(RefusedError):
         call(place, ["scancel", "--full", "--signal=KILL", job])
     cancel(place, job)
+
+
+def release(place: str, job: str) -> None:
+    """A job that is held may start again. Raises AwayError; one that is not held, or has ended, is none to release."""
+    with suppress(RefusedError):
+        call(place, ["scontrol", "release", job])
 
 
 def requeue(place: str, job: str) -> None:

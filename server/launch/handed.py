@@ -18,6 +18,9 @@ _LATE = 10.0
 """s after which an outcome of a run that nobody writes to is its end, whatever Slurm says or does not say. Chosen."""
 _MOST = 20
 """Jobs that are handed over for one run, one after the other, because the one before was lost. Chosen."""
+_RELEASES = 3
+"""Times that a job is released which a node did not start: a node that is busy or restarts is over it, a broken one is
+not. Chosen."""
 _READINGS: dict[str, Reading] = {
     "CANCELLED": (State.CANCELLED, Cause.CANCELLED, "was cancelled"),
     "TIMEOUT": (State.TIMED_OUT, Cause.WALLTIME, "has reached its time limit"),
@@ -43,6 +46,7 @@ class SlurmWorker:
         self._exit: Exit | None = None
         self._stop, self._kill, self._told = (folder / layout.STOP_REQUEST).exists(), False, ""
         self._missing, self._ended, self._away, self._why = 0, 0.0, 0.0, ""
+        self._released = 0
 
     @property
     def name(self) -> str:
@@ -143,11 +147,23 @@ class SlurmWorker:
         elif entry.state in slurm.PENDING and (self._folder / layout.OUTCOME).exists():
             slurm.cancel(self._site.bin, entry.job)
             self._exit = Exit(None, False, "")
+        elif entry.not_launched and not self._stop:
+            self._launch_again(entry)
         elif self._kill:
             slurm.kill(self._site.bin, entry.job)
         elif self._stop and self._told != entry.state:
             slurm.notify(self._site.bin, entry.job)
             self._told = entry.state
+
+    def _launch_again(self, entry: Entry) -> None:
+        """Slurm holds a job that a node did not start: nobody else would let it go."""
+        if self._released < _RELEASES:
+            self._released += 1
+            slurm.release(self._site.bin, entry.job)
+            return
+        slurm.cancel(self._site.bin, entry.job)
+        why = f"no node has started Slurm job {entry.job}, which was released {_RELEASES} times"
+        self._exit = Exit(None, False, "", (State.LOST, Cause.NODE, why))
 
     def _hand_over(self) -> None:
         if self._stop:
@@ -224,6 +240,7 @@ class SlurmWorker:
         fresh = batch.new_job(job.run, job.ranks, profile, job.command, time.time(), attempt, job.bin)
         whole.write(self._folder / layout.JOB, batch.to_json(fresh))
         self._job, self._entry, self._ended, self._missing, self._told = fresh, None, 0.0, 0, ""
+        self._released = 0
 
     def _code(self) -> int | None:
         """Of the job's script; minus the signal that has ended it; None when nobody knows."""

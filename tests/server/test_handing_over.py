@@ -34,6 +34,8 @@ SQUEUE = """#!/bin/bash
 cd {place}; [ -e away ] && {{ echo "slurm_load_jobs error: Unable to contact slurm controller" >&2; exit 1; }}
 cat queue 2>/dev/null; exit 0
 """
+TELL = {"scancel": "ended", "scontrol": "released"}
+"""Commands that write their words into a file."""
 ACCEPT = 'echo "$((100 + $(wc -l < calls)))|PENDING|N/A|$name|Resources" >> queue'
 
 
@@ -47,7 +49,8 @@ def place(tmp_path: Path) -> Path:
 
 def commands(place: Path, body: str) -> str:
     """An sbatch that does ``body``, and a squeue that tells what it has queued."""
-    for name, text in (("sbatch", SBATCH), ("squeue", SQUEUE), ("scancel", "#!/bin/bash\necho $@ >> {place}/ended\n")):
+    told = {name: f"#!/bin/bash\necho $@ >> {{place}}/{file}\n" for name, file in TELL.items()}
+    for name, text in {"sbatch": SBATCH, "squeue": SQUEUE, **told}.items():
         path = place / "bin" / name
         path.write_text(text.format(place=place, body=body))
         path.chmod(0o755)
@@ -126,6 +129,33 @@ def test_of_two_jobs_the_one_that_has_begun_stays(place: Path) -> None:
     told = batch.read_job(place / "run")
     assert told is not None
     assert told.job == "8"
+
+
+@pytest.mark.parametrize("reason", ["launch failed requeued held", "launch_failed_requeued_held"])
+def test_a_job_that_no_node_starts_is_released_a_few_times_and_then_lost(place: Path, reason: str) -> None:
+    """Slurm holds it until somebody looks at it; a run never waits for that in vain."""
+    worker = SlurmWorker(place / "run", JOB, Slurm(profiles={"a": Profile()}, bin=commands(place, "exit 1")))
+    worker.write_down(job="7")
+    held, runs = Entry("7", "PENDING", 0.0, JOB.name, reason), Entry("7", "RUNNING", 5.0, JOB.name, "None")
+    for entry in (held, runs, held, held):
+        worker.turn([entry])
+        assert worker.exited() is None
+    assert (place / "released").read_text().splitlines() == ["release 7"] * 3
+    worker.turn([held])
+    assert (place / "ended").read_text() == "7\n"
+    ended = worker.exited()
+    assert ended is not None
+    assert ended.reading is not None
+    assert ended.reading[:2] == (State.LOST, Cause.NODE)
+
+
+@pytest.mark.parametrize("reason", ["JobHeldUser", "JobHeldAdmin", "Resources"])
+def test_a_job_that_somebody_holds_stays_held(place: Path, reason: str) -> None:
+    worker = SlurmWorker(place / "run", JOB, Slurm(profiles={"a": Profile()}, bin=commands(place, "exit 1")))
+    worker.write_down(job="7")
+    worker.turn([Entry("7", "PENDING", 0.0, JOB.name, reason)])
+    assert not (place / "released").exists()
+    assert worker.note().endswith(reason)
 
 
 @pytest.mark.parametrize(("asked", "state"), [(None, State.RUNNING), (Cause.CANCELLED, State.STOPPING)])
