@@ -30,7 +30,8 @@ class Detected:
     opening: Ints
     """Rows of the cracks that have become so wide that they open."""
     stray: bool
-    """Whether a slot will have strayed so far in the next step that it is registered anew."""
+    """Whether a slot will have strayed so far in the next step that it is registered anew; of any rank, once they have
+    agreed on the step."""
 
     @classmethod
     def nothing(cls) -> "Detected":

@@ -59,8 +59,6 @@ class Contact:
         """Last time at which nodes of this rank were pushed, s."""
         self._mean_dt = 0.0
         """Of the last step with a scene, s."""
-        self._together = False
-        """Whether some rank will register what has strayed in this step."""
 
     def keep(self, parcel: Parcel) -> None:
         """Adds all but what was found of candidates: a search finds it again."""
@@ -149,7 +147,7 @@ class Contact:
         """Takes what all ranks have found in the step; all ranks take part."""
         self.books.agreed = all_ranks.costs.sum(axis=0).reshape(2, 2)
         self.searches.due |= all_ranks.search
-        self._together = all_ranks.stray
+        self.found.stray = all_ranks.stray
         self.limit = all_ranks.approach
         if all_ranks.opening:
             self.open_cracks()
@@ -249,7 +247,7 @@ class Contact:
         if step % _FORESIGHT == 0:
             self.searches.foresee()
         redraw = step % normals.EVERY == 0
-        self.found = detect(now, self.searches.mu, give, dt, self.exterior.size, redraw, self._together)
+        self.found = detect(now, self.searches.mu, give, dt, self.exterior.size, redraw, self.found.stray)
         now.active.n = self.found.contacts
         if self._restitution > 0.0:
             rebound(now.active.room, now.active.n, now.crowd.v, now.slots.before, self._restitution)

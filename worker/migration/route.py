@@ -8,11 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..errors import ConoidError
 from ..parallel.comm import Comm
 from ..parallel.decompose import Cut, bisect, place
 from ..parallel.ownership import Neighbour
 from ..state import Flags, Floats, Indices, Ints, among
-from .parcel import Parcel, joined, length, once, take
+from .parcel import Parcel, Table, joined, length, once, take
 
 _NOBODY = np.iinfo(np.int64).max
 """In place of the smallest tet of a rank that has none at a node."""
@@ -68,7 +69,7 @@ def route(parcel: Parcel, scale: tuple[float, float, float], comm: Comm) -> Arri
     others = [Parcel.unpacked(words) for words in received.values()]
     whole = Parcel.of([mine, *others])
     whole.known, whole.sums = parcel.known, parcel.sums
-    whole.rows = {name: once(rows, rows["key"]) if "key" in rows else rows for name, rows in whole.rows.items()}
+    whole.rows = {name: _one_of_each(name, rows) if "key" in rows else rows for name, rows in whole.rows.items()}
     moved = (sum(length(t) for p in others for t in p.tets.values()), length(whole.nodes) - length(mine.nodes))
     directory, neighbours, owner = _settle(whole, comm)
     _to_owners(parcel, whole, directory)
@@ -76,6 +77,18 @@ def route(parcel: Parcel, scale: tuple[float, float, float], comm: Comm) -> Arri
     for other in neighbours:
         border[other.nodes] = True
     return Arrived(whole, owner, border, neighbours, moved)
+
+
+def _one_of_each(name: str, rows: Table) -> Table:
+    """The rows by ascending key, once each. Raises ConoidError when the copies of one are not equal: the answer would
+    depend on which of them is taken.
+    """
+    found = once(rows, rows["key"])
+    at = np.searchsorted(found["key"], rows["key"])
+    for column, values in rows.items():
+        if column != "tet" and not np.array_equal(found[column][at], values, equal_nan=True):
+            raise ConoidError(f"ranks disagree on {column} of {name}")
+    return found
 
 
 def _cut(parcel: Parcel, scale: Floats, comm: Comm) -> tuple[dict[int, Indices], list[Cut]]:
