@@ -60,7 +60,6 @@ PORES = 20
 """Of the pores that a tension cut-off has opened: their volume over that of the solid matter; with a linear pressure
 the logarithm of one and that."""
 
-
 INTACT, BROKEN, WIDE = range(3)
 """Bond of a face to the one behind it: whole; broken; broken and so far apart that it is part of the surface."""
 _IDS_A_LOOK = 32
@@ -234,6 +233,8 @@ class Block:
     """CPU time of the passes over the block so far."""
     group: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
     """(n,) see Model.groups; (0,) where nobody asks."""
+    quiet: Ints = field(default_factory=lambda: np.zeros((0, 3), np.int64))
+    """(chunks, 3) which chunks are at rest (elements/rest.py)."""
 
     @property
     def chunks(self) -> int:
@@ -265,7 +266,7 @@ class Block:
             if len(table):
                 table[holes] = table[movers]
         self.state[holes // CHUNK, :, holes % CHUNK] = self.state[movers // CHUNK, :, movers % CHUNK]
-        self.n = left
+        self.n, self.quiet[:] = left, 0
         self.tets, self.id = self.tets[:left], self.id[:left]
         self.across, self.worn, self.group = self.across[:left], self.worn[:left], self.group[:left]
         self.border_chunks = min(self.border_chunks, self.chunks)

@@ -49,7 +49,7 @@ time = "2 min"
 notice = "60 s"
 """
 BREAKING = Path(__file__).parents[1] / "parallel" / "breaking.toml"
-DIGEST = "3ec5d1ff7ce42428"
+DIGEST = tomllib.loads(BREAKING.with_name("digests.toml").read_text(encoding="utf-8"))["here"]["breaking"]
 """Of that case, on any number of ranks."""
 LONG = "12 us"
 """Until which the same case takes some ten seconds: long enough to be interrupted."""

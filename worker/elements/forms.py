@@ -177,7 +177,7 @@ class Elements:
         sweep.standard_pass(
             nodes.x0, nodes.x, nodes.v, nodes.force, block.tets, block.state.reshape(-1), block.params, self._w,
             self._wi, self._bits, self.peaks, block.id, block.worn, block.life, block.hot, block.weakest,
-            block.shear_weight, block.kind, block.eos, block.state.shape[1], begin, end, dt, scale,
+            block.quiet, block.shear_weight, block.kind, block.eos, block.state.shape[1], begin, end, dt, scale,
         )  # fmt: skip
 
     def _again(self, block: Block, begin: int, end: int, scale: float) -> None:
@@ -283,8 +283,8 @@ class AveragedElements(Elements):
         nodes = self.model.nodes
         sweep.strain_pass(
             nodes.x0, nodes.x, nodes.v, self._volumes, self._weight, self.pressure, self._projected, self.split,
-            block.tets, block.state.reshape(-1), block.params, self._w, block.kind, block.state.shape[1], begin, end,
-            dt,
+            block.tets, block.state.reshape(-1), block.params, self._w, block.quiet, block.kind, block.state.shape[1],
+            begin, end, dt,
         )  # fmt: skip
 
     def _forces(self, block: Block, begin: int, end: int, dt: float, scale: float) -> None:
@@ -292,6 +292,6 @@ class AveragedElements(Elements):
         sweep.force_pass(
             nodes.x, nodes.v, self._strain, nodes.force, self.pressure, self._gradient, self.split, block.tets,
             block.state.reshape(-1), block.params, self._w, self._wi, self._bits, self.peaks, block.id, block.worn,
-            block.life, block.hot, block.weakest, block.shear_weight, block.kind, block.eos, block.state.shape[1],
-            begin, end, dt, scale,
+            block.life, block.hot, block.weakest, block.quiet, block.shear_weight, block.kind, block.eos,
+            block.state.shape[1], begin, end, dt, scale,
         )  # fmt: skip

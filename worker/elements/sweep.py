@@ -6,6 +6,8 @@ viscosity, forces). ``forces_again`` repeats only the sum of forces, in a coarse
 the pressure, the plastic return comes after the equation of state, and with it, in two passes, the whole deviatoric
 stress: then the second pass makes the velocity gradient again.
 
+Chunks at rest, which no wave has reached, are passed over (rest.py).
+
 ``peaks`` collects what the step needs of all tets of a rank; ``LARGEST_LIMIT`` and the names beside it are its places.
 """
 
@@ -17,9 +19,9 @@ from ..materials.models import press, strengthen
 from ..materials.viscosity import bulk_viscosity
 from ..state import CHUNK
 from . import pressure as averaged
-from . import tet4
+from . import rest, tet4
 from .hot import mark_hot
-from .wear import mark_worn
+from .wear import SOUND, mark_worn
 
 LARGEST_LIMIT, LIMITING_TET, LARGEST_FORCE, WORN, HOT = range(5)
 """Places in ``peaks``: bits of the largest one-over-stable-step, 1/s; smallest global id of the tets that have it; bits
@@ -95,57 +97,41 @@ def note_peaks(peaks, bits, ids, n, force):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    f"void({_I2}, {_F1}, {_I2}, boolean, {_T2}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, {_I1}, int64, float64)",
+    f"int64({_I2}, {_F1}, {_I2}, boolean, {_T2}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, {_I1}, int64, float64)",
     cache=True,
     error_model="numpy",
 )
 def sum_forces(force, pressure, gradient, split, t, s, w, wi, bits, peaks, ids, n, scale):  # type: ignore[no-untyped-def]
-    """Adds the forces of a chunk, and with ``split`` its share of the projected pressure gradient."""
+    """Adds the forces of a chunk, and with ``split`` its share of the pressure gradient; returns the largest."""
     largest = tet4.internal_forces(wi, w, s, n, scale)
     tet4.scatter_forces(force, wi, t, n)
     if split:
         largest = max(largest, averaged.pressure_fluxes(wi, w, pressure, t, n, scale))
         averaged.scatter_fluxes(gradient, wi, t, n)
     note_peaks(peaks, bits, ids, n, largest)
+    return largest
 
 
 @njit(
     f"void({_F2}, {_F2}, {_F2}, {_I2}, {_T2}, {_F1}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, {_I1}, {_B1}, {_F1}, "
-    f"uint8[::1], {_F1}, float64, int64, int64, int64, int64, int64, float64, float64)",
+    f"uint8[::1], {_F1}, {_I2}, float64, int64, int64, int64, int64, int64, float64, float64)",
     cache=True,
     error_model="numpy",
 )
 def standard_pass(  # type: ignore[no-untyped-def]
-    x0,
-    x,
-    v,
-    force,
-    tets,
-    state,
-    params,
-    w,
-    wi,
-    bits,
-    peaks,
-    ids,
-    worn,
-    life,
-    hot,
-    weakest,
-    shear,
-    strength,
-    eos,
-    rows,
-    begin,
-    end,
-    dt,
-    scale,
-):
+    x0, x, v, force, tets, state, params, w, wi, bits, peaks, ids, worn, life, hot, weakest, quiet, shear, strength,
+    eos, rows, begin, end, dt, scale
+):  # fmt: skip
     """Stress and forces at n+1 of chunks ``begin`` to ``end``, each tet with its own pressure."""
     for c in range(begin, end):
         t = tets[c * CHUNK : (c + 1) * CHUNK]
         s = state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
         n = len(t)
+        still = dt > 0.0 and rest.at_rest(v, t, n)
+        if still and quiet[c, rest.NOTED] > 0:
+            rest.pass_over(peaks, quiet[c], LARGEST_LIMIT, LIMITING_TET)
+            continue
+        before = s.copy() if still else s[:0]
         tet4.gather(w[tet4.EDGE :], x, t, n)
         tet4.gather(w[tet4.RATE :], v, t, n)
         motion(params, w, x0, t, n, dt)
@@ -154,37 +140,53 @@ def standard_pass(  # type: ignore[no-untyped-def]
         averaged.own_strains(w, n, dt)
         pressure_and_limit(eos, w, s, params, n, dt)
         return_at_pressure(strength, w, s, params, n, dt)
+        found, some_hot = SOUND, False
         if len(worn) > 0:
             found = mark_worn(worn[c * CHUNK : c * CHUNK + n], w, s, params, life, rows, n)
             peaks[WORN] = max(peaks[WORN], found)
         if len(hot) > 0:
             at = c * CHUNK
-            peaks[HOT] |= mark_hot(hot[at : at + n], w, s, weakest[at : at + n], shear, n)
+            some_hot = mark_hot(hot[at : at + n], w, s, weakest[at : at + n], shear, n)
+            peaks[HOT] |= some_hot
         largest = tet4.internal_forces(wi, w, s, n, scale)
         tet4.scatter_forces(force, wi, t, n)
         note_peaks(peaks, bits, ids[c * CHUNK : c * CHUNK + n], n, largest)
+        quiet[c, rest.NOTED] = 0
+        if still and largest == 0 and found == SOUND and not some_hot and rest.same(before, s):
+            rest.note(quiet[c], bits, ids[c * CHUNK : c * CHUNK + n], n)
 
 
 @njit(
-    f"void({_F2}, {_F2}, {_F2}, {_I2}, {_F1}, {_F1}, {_F2}, boolean, {_T2}, {_F1}, {_F1}, {_F1}, "
+    f"void({_F2}, {_F2}, {_F2}, {_I2}, {_F1}, {_F1}, {_F2}, boolean, {_T2}, {_F1}, {_F1}, {_F1}, {_I2}, "
     "int64, int64, int64, int64, float64)",
     cache=True,
     error_model="numpy",
 )
 def strain_pass(  # type: ignore[no-untyped-def]
-    x0, x, v, sums, weight, pressure, projected, split, tets, state, params, w, strength, rows, begin, end, dt
+    x0, x, v, sums, weight, pressure, projected, split, tets, state, params, w, quiet, strength, rows, begin, end, dt
 ):
-    """Deviatoric stress at n+1, and the nodal sums of volume change; with ``split``, stabilised."""
+    """Deviatoric stress at n+1, and the nodal sums of volume change; with ``split``, stabilised.
+
+    Of a chunk that is noted as at rest only the volumes, which the mean over its nodes' tets needs.
+    """
     for c in range(begin, end):
         t = tets[c * CHUNK : (c + 1) * CHUNK]
         s = state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
         n = len(t)
+        still = not split and dt > 0.0 and rest.at_rest(v, t, n)
         tet4.gather(w[tet4.EDGE :], x, t, n)
         tet4.gather(w[tet4.RATE :], v, t, n)
+        if still and quiet[c, rest.NOTED] > 0:
+            tet4.dilatation(w, n, dt)
+            averaged.scatter_volumes(sums, w, weight, t, n, dt)
+            continue
+        before = s.copy() if still else s[:0]
         motion(params, w, x0, t, n, dt)
         if params[ORDER] != AFTER_PRESSURE:
             deviatoric_stress(strength, w, s, params, n, dt)
         averaged.keep_flux(w, s, n)
+        quiet[c, rest.NOTED] = 0
+        quiet[c, rest.STEADY] = 1 if still and rest.same(before, s) else 0
         if split:
             tet4.end_gradients(w, n)
             averaged.gather_projection(w, pressure, projected, t, n)
@@ -196,44 +198,24 @@ def strain_pass(  # type: ignore[no-untyped-def]
 
 @njit(
     f"void({_F2}, {_F2}, {_F1}, {_I2}, {_F1}, {_I2}, boolean, {_T2}, {_F1}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, {_I1}, "
-    f"{_B1}, {_F1}, uint8[::1], {_F1}, float64, int64, int64, int64, int64, int64, float64, float64)",
+    f"{_B1}, {_F1}, uint8[::1], {_F1}, {_I2}, float64, int64, int64, int64, int64, int64, float64, float64)",
     cache=True,
     error_model="numpy",
 )
 def force_pass(  # type: ignore[no-untyped-def]
-    x,
-    v,
-    strain,
-    force,
-    pressure,
-    gradient,
-    split,
-    tets,
-    state,
-    params,
-    w,
-    wi,
-    bits,
-    peaks,
-    ids,
-    worn,
-    life,
-    hot,
-    weakest,
-    shear,
-    strength,
-    eos,
-    rows,
-    begin,
-    end,
-    dt,
-    scale,
-):
+    x, v, strain, force, pressure, gradient, split, tets, state, params, w, wi, bits, peaks, ids, worn, life, hot,
+    weakest, quiet, shear, strength, eos, rows, begin, end, dt, scale
+):  # fmt: skip
     """Pressure from the averaged volume strain, viscosity and forces at n+1; with ``split``, pressure gradients."""
     for c in range(begin, end):
         t = tets[c * CHUNK : (c + 1) * CHUNK]
         s = state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
         n = len(t)
+        still = quiet[c, rest.STEADY] != 0 and rest.without(strain, t, n)
+        if still and quiet[c, rest.NOTED] > 0:
+            rest.pass_over(peaks, quiet[c], LARGEST_LIMIT, LIMITING_TET)
+            continue
+        before = s.copy() if still else s[:0]
         tet4.gather(w[tet4.EDGE :], x, t, n)
         if params[ORDER] == AFTER_PRESSURE:
             tet4.gather(w[tet4.RATE :], v, t, n)
@@ -244,13 +226,20 @@ def force_pass(  # type: ignore[no-untyped-def]
         averaged.recall_flux(w, s, n, dt)
         pressure_and_limit(eos, w, s, params, n, dt)
         return_at_pressure(strength, w, s, params, n, dt)
+        found, some_hot = SOUND, False
         if len(worn) > 0:
             found = mark_worn(worn[c * CHUNK : c * CHUNK + n], w, s, params, life, rows, n)
             peaks[WORN] = max(peaks[WORN], found)
         if len(hot) > 0:
             at = c * CHUNK
-            peaks[HOT] |= mark_hot(hot[at : at + n], w, s, weakest[at : at + n], shear, n)
-        sum_forces(force, pressure, gradient, split, t, s, w, wi, bits, peaks, ids[c * CHUNK : c * CHUNK + n], n, scale)
+            some_hot = mark_hot(hot[at : at + n], w, s, weakest[at : at + n], shear, n)
+            peaks[HOT] |= some_hot
+        largest = sum_forces(
+            force, pressure, gradient, split, t, s, w, wi, bits, peaks, ids[c * CHUNK : c * CHUNK + n], n, scale
+        )
+        quiet[c, rest.NOTED] = 0
+        if still and largest == 0 and found == SOUND and not some_hot and rest.same(before, s):
+            rest.note(quiet[c], bits, ids[c * CHUNK : c * CHUNK + n], n)
 
 
 @njit(

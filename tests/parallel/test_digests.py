@@ -1,0 +1,54 @@
+"""The digests that are committed: also on another machine, and with other versions of what makes the kernels."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from conoid.cases import layout
+from conoid.cases.outcome import from_json
+
+from .launching import together
+from .scenes import CASE
+
+KNOWN = tomllib.loads(Path(__file__).with_name("digests.toml").read_text(encoding="utf-8"))
+SHORT = {"shock_copper": "0.3 us", "spinning_cube": "10 us", "crossed_bars": "1 us", "plate_stack": "1 us"}
+"""Shipped cases whose meshes are made without a cosine, and until when they run here."""
+EVERYWHERE = [*SHORT, *(f"shattering_{form}" for form in ("standard", "nodal", "split"))]
+AT_ONCE = ("model=instant", "delay=0")
+"""How the bodies of ``shattering`` break."""
+
+
+def shattering() -> str:
+    """The scene that breaks, at once and with one strength a material: no power, logarithm or exponential."""
+    lines = CASE.read_text(encoding="utf-8").splitlines()
+    return "\n".join(line for line in lines if not line.startswith(("brittle.scatter", "fracture")))
+
+
+def arguments(name: str, place: Path) -> list[str]:
+    """The worker's, for a scene by its name."""
+    case, form = name, name.partition("_")[2]
+    words = ["run.frames=0", "run.samples=10", "reference=[]"]
+    if name in SHORT:
+        words.append(f"run.end_time={SHORT[name]}")
+    else:
+        case = str(place / "shattering.toml")
+        words += [f"numerics.pressure={form}", *(f"parts[{k}].fracture.{each}" for k in (0, 1) for each in AT_ONCE)]
+    return [case, *(word for change in words for word in ("--set", change)), "--out", str(place / name)]
+
+
+@pytest.fixture(scope="module")
+def digests(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """Of every scene, by its name, on three ranks."""
+    place = tmp_path_factory.mktemp("digests")
+    (place / "shattering.toml").write_text(shattering(), encoding="utf-8")
+    together(3, place, [arguments(name, place) for name in EVERYWHERE])
+    ends = {name: from_json((place / name / layout.OUTCOME).read_bytes()) for name in EVERYWHERE}
+    assert {end.state for end in ends.values()} == {"succeeded"}
+    assert all(end.broken > 100 for name, end in ends.items() if name not in SHORT)
+    return {name: str(end.digest)[:16] for name, end in ends.items()}
+
+
+@pytest.mark.parametrize("name", EVERYWHERE)
+def test_the_digest_is_the_committed_one(name: str, digests: dict[str, str]) -> None:
+    assert digests[name] == KNOWN["everywhere"][name]

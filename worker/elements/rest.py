@@ -1,0 +1,67 @@
+"""Chunks that no wave has reached: a pass over them changes nothing, so it is left out, and no bit of a run differs.
+
+A chunk is noted once a whole pass over it has found all its nodes at rest, has left every bit of its state as it was
+and has made no force. A pass is a function of that state, of the nodes' velocities, of their positions, which stay
+while they rest, and of the time step, which only ever meets zeros there: it would find the same again, and the same
+stable step.
+"""
+
+import numpy as np
+
+from ..jit import njit
+from .tet4 import LIMIT, MAGNITUDE
+
+NOTED, TET, STEADY = range(3)
+"""Places of a chunk in ``Block.quiet``: bits of its largest one-over-stable-step, 1/s, 0 where it is not noted; the
+smallest global id of its tets that have it; whether the first of two passes has left its state as it was."""
+
+
+@njit("boolean(float64[:, ::1], uint32[:, ::1], int64)", cache=True)
+def at_rest(v, tets, n):  # type: ignore[no-untyped-def]
+    """Whether all nodes of a chunk have the velocity zero, to the bit."""
+    for i in range(n):
+        for j in range(4):
+            a = tets[i, j]
+            for k in range(3):
+                if np.float64(v[a, k]).view(np.int64) != 0:
+                    return False
+    return True
+
+
+@njit("boolean(float64[::1], uint32[:, ::1], int64)", cache=True)
+def without(strain, tets, n):  # type: ignore[no-untyped-def]
+    """Whether all nodes of a chunk have no volume strain in the step."""
+    for i in range(n):
+        for j in range(4):
+            if np.float64(strain[tets[i, j]]).view(np.int64) != 0:
+                return False
+    return True
+
+
+@njit("boolean(float64[::1], float64[::1])", cache=True)
+def same(before, after):  # type: ignore[no-untyped-def]
+    """Whether two states are equal, to the bit."""
+    differ = np.int64(0)
+    for i in range(len(before)):
+        differ |= np.float64(before[i]).view(np.int64) ^ np.float64(after[i]).view(np.int64)
+    return differ == 0
+
+
+@njit("void(int64[::1], int64[::1], int64[::1], int64)", cache=True)
+def note(quiet, bits, ids, n):  # type: ignore[no-untyped-def]
+    """Notes a chunk, with the limit that its pass has left in the scratch and who has it."""
+    limit, first = 0, 0
+    for i in range(n):
+        own = bits[LIMIT + i] & MAGNITUDE
+        if own > limit or (own == limit and ids[i] < first):
+            limit, first = own, ids[i]
+    quiet[NOTED], quiet[TET] = limit, first
+
+
+@njit("void(int64[::1], int64[::1], int64, int64)", cache=True)
+def pass_over(peaks, quiet, place, tet):  # type: ignore[no-untyped-def]
+    """What a noted chunk adds to the ``peaks``: its limit at ``place``, and the smallest id that has it at ``tet``."""
+    if quiet[NOTED] > peaks[place]:
+        peaks[place], peaks[tet] = quiet[NOTED], quiet[TET]
+    elif quiet[NOTED] == peaks[place]:
+        peaks[tet] = min(peaks[tet], quiet[TET])
