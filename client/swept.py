@@ -16,7 +16,7 @@ _PANELS = 6
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 _FIRST = ("reference.", "fragments", "broken", "eroded", "energy.fracture", "energy.plastic", "energy.kinetic")
 """What is drawn rather than other columns."""
-_NEVER = frozenset({"elapsed", "cpu", "elements", "nodes", "worst_residual", "reference.worst_residual",
+_NEVER = frozenset({"time", "elapsed", "cpu", "elements", "nodes", "worst_residual", "reference.worst_residual",
                     "energy.residual", "energy.initial"})  # fmt: skip
 """What is drawn only when it is asked for: it tells of the machine or of the mesh."""
 
@@ -48,9 +48,10 @@ def _axis(rows: Sequence[Row], keys: Sequence[str], x: str | None) -> str:
 
 def _known(rows: Sequence[Row], name: str) -> str:
     there = [column for column in rows[0] if any(_number(row[column]) is not None for row in rows)]
-    if name not in there:
-        raise ClientError(f"{name!r}: the table has the numbers {', '.join(there)}")
-    return name
+    known = {_bare(column): column for column in there} | {column: column for column in there}
+    if name not in known:
+        raise ClientError(f"{name!r}: the table has the numbers {', '.join(map(_bare, there))}")
+    return known[name]
 
 
 def _telling(rows: Sequence[Row], keys: Sequence[str]) -> list[str]:
@@ -60,7 +61,8 @@ def _telling(rows: Sequence[Row], keys: Sequence[str]) -> list[str]:
         found = {value for row in rows if (value := _number(row[name])) is not None}
         return len(found) > 1
 
-    names = [name for name in rows[0] if name not in {*keys, *_NEVER, "run", "digest"} and differs(name)]
+    left_out = {*keys, *_NEVER, "run", "digest"}
+    names = [name for name in rows[0] if _bare(name) not in left_out and differs(name)]
     ranks = {name: next((n for n, first in enumerate(_FIRST) if name.startswith(first)), len(_FIRST)) for name in names}
     return sorted(names, key=lambda name: ranks[name])[:_PANELS]
 
@@ -77,11 +79,20 @@ def _panel(axes: Axes, rows: Sequence[Row], over: str, others: Sequence[str], na
         axes.plot(*zip(*points, strict=True), "o-", color=colour, markersize=4, linewidth=1.2, label=label)
     if unit is None:
         axes.set_xticks(list(places.values()), list(places))
-    axes.set(xlabel=f"{over}, {unit}" if unit else over, ylabel=name.removeprefix("reference."))
-    axes.set_title(name, fontsize=10)
+    axes.set(xlabel=f"{over}, {unit}" if unit else over, ylabel=_labelled(name))
     axes.grid(alpha=0.3)
     if others:
         axes.legend(fontsize=7, frameon=False)
+
+
+def _bare(column: str) -> str:
+    """The name of a column without its unit."""
+    return re.sub(r" \[[^]]*\]$", "", column)
+
+
+def _labelled(column: str) -> str:
+    """As an axis has it."""
+    return re.sub(r" \[([^]]*)\]$", r", \1", column.removeprefix("reference."))
 
 
 def _places(rows: Sequence[Row], over: str) -> tuple[str | None, dict[str, float]]:

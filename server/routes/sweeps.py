@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Header, Response
 from fastapi.responses import JSONResponse
+from msgspec import structs
 from starlette.concurrency import run_in_threadpool
 
 from conoid.cases.outcome import Outcome
@@ -101,11 +102,17 @@ def _line(service: Service, point: dict[str, Any], run: Run) -> dict[str, Any]:
 
 
 def _results(ended: Outcome | None) -> dict[str, Any]:
-    """The numbers of an outcome that stand alone, the terms of the energy, and the references."""
+    """The numbers of an outcome that stand alone, the terms of the energy, the references; with units in brackets."""
     if ended is None:
         return {}
-    names = ("steps", "time", "elapsed", "cpu", "elements", "nodes", "fragments", "broken", "eroded", "worst_residual")
-    energy = ended.energy
-    terms = {} if energy is None else {f"energy.{name}": getattr(energy, name) for name in energy.__struct_fields__}
-    checks = {f"reference.{check.name}": check.value for check in ended.reference}
-    return {**{name: getattr(ended, name) for name in names}, **terms, **checks, "digest": ended.digest}
+    names = ("elements", "nodes", "fragments", "broken", "eroded", "worst_residual")
+    times = {f"{name} [s]": getattr(ended, name) for name in ("time", "elapsed", "cpu")}
+    energy = {} if ended.energy is None else structs.asdict(ended.energy)
+    terms = {_with_unit(f"energy.{name}", "" if name == "residual" else "J"): joule for name, joule in energy.items()}
+    checks = {_with_unit(f"reference.{check.name}", check.unit): check.value for check in ended.reference}
+    numbers = {"steps": ended.steps, **times, **{name: getattr(ended, name) for name in names}}
+    return {**numbers, **terms, **checks, "digest": ended.digest}
+
+
+def _with_unit(name: str, unit: str) -> str:
+    return f"{name} [{unit}]" if unit else name

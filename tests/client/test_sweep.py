@@ -41,15 +41,15 @@ def test_points_from_a_file(tmp_path: Path) -> None:
 
 
 ROWS = [
-    {"v": f"{v} m/s", "run.ranks": str(ranks), "run": "r", "state": "succeeded", "cpu": str(v), "fragments": str(v * v),
-     "energy.plastic": str(v + ranks), "eroded": "0", "digest": ""}
+    {"v": f"{v} m/s", "run.ranks": str(ranks), "run": "r", "state": "succeeded", "cpu [s]": str(v),
+     "fragments": str(v * v), "energy.plastic [J]": str(v + ranks), "eroded": "0", "digest": ""}
     for v in (100, 200, 300) for ranks in (1, 2)
 ]  # fmt: skip
 
 
 def test_what_differs_is_drawn_over_what_was_changed() -> None:
-    made = swept.figure([*ROWS, {**ROWS[0], "fragments": "", "energy.plastic": ""}], ["v", "run.ranks"], None, [])
-    assert [axes.get_title() for axes in made.axes] == ["fragments", "energy.plastic"]
+    made = swept.figure([*ROWS, {**ROWS[0], "fragments": "", "energy.plastic [J]": ""}], ["v", "run.ranks"], None, [])
+    assert [axes.get_ylabel() for axes in made.axes] == ["fragments", "energy.plastic, J"]
     assert made.axes[0].get_xlabel() == "v, m/s"
     assert [line.get_label() for line in made.axes[0].lines] == ["run.ranks 1", "run.ranks 2"]
     assert [float(y) for y in np.asarray(made.axes[0].lines[0].get_ydata())] == [1e4, 4e4, 9e4]
@@ -57,7 +57,7 @@ def test_what_differs_is_drawn_over_what_was_changed() -> None:
 
 def test_words_on_the_axis_and_columns_by_name() -> None:
     made = swept.figure([{**row, "v": f"law {row['v'][0]}"} for row in ROWS], ["v", "run.ranks"], "v", ["cpu"])
-    assert [axes.get_title() for axes in made.axes] == ["cpu"]
+    assert [axes.get_ylabel() for axes in made.axes] == ["cpu, s"]
     assert [label.get_text() for label in made.axes[0].get_xticklabels()] == ["law 1", "law 2", "law 3"]
 
 
@@ -69,4 +69,4 @@ def test_a_plot_of_what_is_not_there_is_refused(x: str | None, columns: list[str
 
 def test_nothing_to_draw_is_told() -> None:
     with pytest.raises(ClientError, match="no run of the sweep has ended"):
-        swept.figure([{**ROWS[0], "cpu": ""}], ["v"], None, [])
+        swept.figure([{**ROWS[0], "cpu [s]": ""}], ["v"], None, [])
