@@ -22,6 +22,8 @@ from .journal import from_line
 from .pictures import Drawn, Mirror, Scene, Wall, draw
 
 _TABLE = re.compile(rf"{fragments.FOLDER}/fragments_(\d+)\.csv")
+_NAMED = 8
+"""Runs that are named when a folder holds some and is none. Chosen: as many as a line has room for."""
 
 
 class Folder(Protocol):
@@ -57,8 +59,16 @@ class LocalFolder:
         """The file itself."""
         path = self.root / name
         if not path.is_file():
-            raise UnfinishedError(f"{self.root} has no {name}")
+            raise UnfinishedError(self._lacks(name))
         return path
+
+    def _lacks(self, name: str) -> str:
+        """Why a file is not there: the folder may be one that holds those of runs."""
+        runs = sorted(path.parent.name for path in self.root.glob(f"*/{layout.JOURNAL}"))
+        if not runs or (self.root / layout.JOURNAL).exists():
+            return f"{self.root} has no {name}"
+        more = f" and {len(runs) - _NAMED} more" if len(runs) > _NAMED else ""
+        return f"{self.root} is not the folder of a run, it holds those of {', '.join(runs[:_NAMED])}{more}"
 
 
 @dataclass(frozen=True)

@@ -55,6 +55,17 @@ def test_a_run_that_goes_on_has_no_outcome(tmp_path: Path) -> None:
         _ = Result.open(tmp_path).outcome
 
 
+def test_a_folder_of_runs_is_told_from_that_of_a_run(tmp_path: Path) -> None:
+    for number in range(10):
+        (tmp_path / f"bar-{number}").mkdir()
+        (tmp_path / f"bar-{number}" / "journal.jsonl").touch()
+    with pytest.raises(UnfinishedError, match=r"not the folder of a run, .* of bar-0, .*, bar-7 and 2 more"):
+        _ = Result.open(tmp_path).outcome
+    (tmp_path / "journal.jsonl").touch()
+    with pytest.raises(UnfinishedError, match=r"has no outcome\.json"):
+        _ = Result.open(tmp_path).outcome
+
+
 def test_no_folder_and_a_damaged_outcome_are_one_line(tmp_path: Path) -> None:
     with pytest.raises(ClientError, match="no such folder"):
         Result.open(tmp_path / "nothing")
