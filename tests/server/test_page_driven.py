@@ -207,7 +207,9 @@ def test_everybody_can_use_it(site: Site, browser: Browser, watched: tuple[str, 
     page.wait("document.querySelector('td a.name')")
     assert violations(page) == []
     page.go(f"{site.url}#/runs/{watched[0]}")
-    page.wait(f"document.querySelector('table.checks') && {SHOWN}")
+    page.wait(f"document.querySelector('table.checks') && document.querySelector('.plot') && {SHOWN}")
+    page.evaluate("document.querySelector('.plot').scrollIntoView()")
+    page.wait("document.querySelector('.plot canvas')")
     assert violations(page) == []
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     page.go(f"{site.url}#/")

@@ -18,6 +18,7 @@ from conoid.cases.batch import Job, read_job
 from conoid.cases.messages import AnyMessage, Finished, Progress
 from conoid.cases.run import State
 from conoid.client import connect
+from conoid.client.link import Link
 from conoid.server.settings import WORKER
 
 from ..parallel.launching import command, ended
@@ -319,24 +320,37 @@ def test_two_ranks_by_both_launchers(solver: Site, profile: str) -> None:
     assert (ended["outcome"]["ranks"], ended["outcome"]["digest"][:16]) == (2, DIGEST)
 
 
+class Heard:
+    """A link that remembers what has come over it."""
+
+    def __init__(self, link: Link) -> None:
+        self.name, self._link = link.name, link
+        self.heard: list[AnyMessage] = []
+
+    def get(self, timeout: float) -> AnyMessage | None:
+        message = self._link.get(timeout)
+        if message is not None:
+            self.heard.append(message)
+        return message
+
+    def close(self) -> None:
+        self._link.close()
+
+
 @pytest.mark.slow
 def test_a_run_is_watched_live_over_zenoh(solver: Site) -> None:
     """Its rank 0 publishes with the credentials of a hidden file, for its owner alone."""
     run = solver.submit(with_ranks(2, LONG), "pmi2")
     token = str(solver.ann.http.headers["Authorization"]).removeprefix("Bearer ")
-    heard: list[AnyMessage] = []
     with connect(str(solver.ann.http.base_url), token) as session:
-        link = session.run(run).link()
+        link = Heard(session.run(run).link())
         assert link.name == "Zenoh"
-        deadline = time.monotonic() + 200.0
-        while not any(isinstance(message, Finished) for message in heard):
-            assert time.monotonic() < deadline, solver.tail(run)
-            if (message := link.get(1.0)) is not None:
-                heard.append(message)
-        link.close()
-    assert sum(isinstance(message, Progress) for message in heard) > 5
-    numbers = [message.seq for message in heard]
-    assert numbers == list(range(numbers[0], numbers[-1] + 1)), "nothing was lost on the way"
+        told = list(session.run(run).messages(link=link))
+    assert sum(isinstance(message, Progress) for message in link.heard) > 5
+    assert any(isinstance(message, Finished) for message in told)
+    assert [message.seq for message in told] == list(range(1, told[-1].seq + 1)), (
+        "nothing is lost on the way"
+    )
     assert solver.ended(run)["state"] == "succeeded"
     folder = solver.server.runs / run
     assert (folder / layout.ACCESS).stat().st_mode & 0o777 == 0o600
