@@ -13,6 +13,7 @@ import numpy as np
 from conoid.cases import layout, messages
 from conoid.cases.run import State
 from conoid.cases.snapshot import Column, Field, Header, pack
+from tests.server.visitor import OWNER
 
 _AROUND = 20
 """Triangles of a fragment, an icosahedron."""
@@ -80,7 +81,7 @@ def lay(folder: Path, made_of: Path, events: int, triangles: int, ranks: int = 2
     )
     submission = json.loads((folder / layout.SUBMISSION).read_text())
     (folder / layout.SUBMISSION).write_text(
-        json.dumps({**submission, "id": folder.name, "idempotency_key": None, "ranks": ranks})
+        json.dumps({**submission, "id": folder.name, "owner": OWNER, "idempotency_key": None, "ranks": ranks})
     )
     place = layout.snapshot(folder, 0)
     place.parent.mkdir()

@@ -348,9 +348,7 @@ def test_a_run_is_watched_live_over_zenoh(solver: Site) -> None:
         told = list(session.run(run).messages(link=link))
     assert sum(isinstance(message, Progress) for message in link.heard) > 5
     assert any(isinstance(message, Finished) for message in told)
-    assert [message.seq for message in told] == list(range(1, told[-1].seq + 1)), (
-        "nothing is lost on the way"
-    )
+    assert [message.seq for message in told] == list(range(1, told[-1].seq + 1)), "nothing is lost on the way"
     assert solver.ended(run)["state"] == "succeeded"
     folder = solver.server.runs / run
     assert (folder / layout.ACCESS).stat().st_mode & 0o777 == 0o600

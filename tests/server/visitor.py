@@ -20,11 +20,12 @@ from .chromium import Page
 ROOT = Path(__file__).parents[2]
 WEB = ROOT / "client" / "web"
 DEMO_CASE = ROOT / "cases" / "shipped" / "glass_steel_demo.toml"
-SHOWN = "document.querySelector('section[data-shown]')?.dataset.shown"
 CUTS = '\n[balance]\npolicy = "every"\nevery = 150\n'
 """So that there are markers to open, however evenly the ranks are loaded."""
 SHOWN = "document.querySelector('section[data-shown]')?.dataset.shown"
 """The number of the snapshot on the screen."""
+OWNER = "ann"
+"""Whose token a site has."""
 STANDARDS = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa"]
 
 
@@ -36,7 +37,7 @@ class Site:
         self.runs = runs
         runs.mkdir()
         store = Store(f"sqlite:///{runs / 'server.sqlite'}")
-        self.token = create_token(store, "ann", frozenset({"read", "submit"}))
+        self.token = create_token(store, OWNER, frozenset({"read", "submit"}))
         store.close()
         self.start()
 
