@@ -16,6 +16,7 @@ from .materials import Material
 from .mesh_size import MeshSize, mesh_size, surface_faces
 from .placed import Bulk, bulk
 from .schema import Case, Part, Rotation, Symmetry, Wall
+from .stages import AVERAGED, CONTACT, STATE, STEPS, STRENGTH, TETS
 
 NANOSECONDS = {"tet": 80.0, "nodal": 45.0, "split": 90.0, "eos": 15.0}
 """Core time per tet and step: what every tet takes, and what each feature adds; laws say theirs (cases/laws). Measured
@@ -64,6 +65,9 @@ class Estimate:
     """Of all ranks together."""
     core_seconds: float | None
     """CPU time of all ranks together, s."""
+    costs: dict[str, float]
+    """What of it each stage of the case takes (cases/stages.py), s; empty where it is not known. What breaks costs
+    more, and nobody knows before how much."""
     parts: tuple[PartEstimate, ...]
 
 
@@ -75,13 +79,15 @@ def estimate(case: Case, folder: Path | None = None) -> Estimate:
     shrunk = [None if p.dt is None else p.dt / shrinkage(case, q) for p, q in zip(parts, case.parts, strict=True)]
     mean = _least(shrunk)
     steps = None if mean is None else min(math.ceil(case.run.end_time / mean), case.run.max_steps)
+    costs = _costs(case, parts, steps)
     return Estimate(
         elements=_total([part.elements for part in parts]),
         nodes=_total([part.nodes for part in parts]),
         dt=dt,
         steps=steps,
         memory_bytes=_memory(case, parts),
-        core_seconds=_core_seconds(case, parts, steps),
+        core_seconds=sum(costs.values()) if costs else None,
+        costs=costs,
         parts=parts,
     )
 
@@ -187,11 +193,16 @@ def _tet_bytes(case: Case, part: Part) -> int:
     return TET_BYTES["tet"] + TET_BYTES.get(case.numerics.pressure, 0) + (TET_BYTES["strength"] if strength else 0)
 
 
-def _core_seconds(case: Case, parts: tuple[PartEstimate, ...], steps: int | None) -> float | None:
+def _costs(case: Case, parts: tuple[PartEstimate, ...], steps: int | None) -> dict[str, float]:
+    """Core seconds by stage; none where a mesh file does not tell the tets."""
     if steps is None or any(size.elements is None for size in parts):
-        return None
-    tets = sum((size.elements or 0) * _nanoseconds(case, part) for size, part in zip(parts, case.parts, strict=True))
-    return steps * ((tets + _contact(case)) * 1e-9 + case.run.ranks * STEP_OVERHEAD) + case.run.ranks * START
+        return {}
+    found = {STEPS: steps * case.run.ranks * STEP_OVERHEAD + case.run.ranks * START}
+    for size, part in zip(parts, case.parts, strict=True):
+        for name, nanoseconds in _nanoseconds(case, part).items():
+            found[name] = found.get(name, 0.0) + 1e-9 * steps * (size.elements or 0) * nanoseconds
+    found[CONTACT] = 1e-9 * steps * _contact(case)
+    return {name: seconds for name, seconds in found.items() if seconds > 0.0}
 
 
 def _contact(case: Case) -> float:
@@ -202,12 +213,15 @@ def _contact(case: Case) -> float:
     return faces * FACE_NANOSECONDS["erosion" if case.erodes else "contact"]
 
 
-def _nanoseconds(case: Case, part: Part) -> float:
+def _nanoseconds(case: Case, part: Part) -> dict[str, float]:
+    """Of a tet and a step, by stage."""
     made = material(case, part.material)
     turned = any(isinstance(b, Rotation) and (not b.parts or part.name in b.parts) for b in case.boundaries)
-    law = made.strength.nanoseconds if made.strength is not None and not turned else 0.0
-    state = NANOSECONDS["eos"] if made.eos is not None else 0.0
-    return NANOSECONDS["tet"] + NANOSECONDS.get(case.numerics.pressure, 0.0) + law + state
+    return {
+        TETS: NANOSECONDS["tet"], AVERAGED: NANOSECONDS.get(case.numerics.pressure, 0.0),
+        STRENGTH: made.strength.nanoseconds if made.strength is not None and not turned else 0.0,
+        STATE: NANOSECONDS["eos"] if made.eos is not None else 0.0,
+    }  # fmt: skip
 
 
 def _least(values: list[float | None]) -> float | None:

@@ -56,6 +56,8 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     """The largest energy residual of any ledger line of the run."""
     phases: dict[str, list[float]] = {}
     """CPU seconds per phase, one number a rank."""
+    without: list[str] = []
+    """Stages that the case does not have (cases/stages.py): none of its phases has computed them."""
     peak_memory: list[int] = []
     """Largest resident memory, bytes, one number a rank."""
     element_updates_per_second: float = 0.0

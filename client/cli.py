@@ -101,7 +101,7 @@ def validate(case: CaseArgument, overrides: Overrides = None, as_json: Json = Fa
     show(f"{checked.name}: valid{f', {len(odd)} warning' + 's' * (len(odd) > 1) if odd else ''}")
     show(tables.parts_table(checked, expected))
     show("")
-    show(tables.estimate_table(expected))
+    show(tables.estimate_table(checked, expected))
 
 
 app.command(short_help="Hand a case to the server.")(commands.submit)

@@ -14,6 +14,7 @@ from conoid.cases.outcome import Check, Outcome
 from conoid.cases.placed import Bulk
 from conoid.cases.run import State
 from conoid.cases.schema import Case
+from conoid.cases.stages import without
 
 from .compare import Comparison
 from .display import STATE_STYLE
@@ -78,8 +79,11 @@ def run_table(run: RunInfo) -> Table:
     })  # fmt: skip
 
 
-def estimate_table(expected: Estimate) -> Table:
-    """What a case needs, about; a dash where a mesh file does not tell."""
+def estimate_table(case: Case, expected: Estimate) -> Table:
+    """What a case needs, about; a dash where a mesh file does not tell. And what of it which stage takes."""
+    total = expected.core_seconds or 1.0
+    shares = sorted(expected.costs.items(), key=lambda cost: -cost[1])
+    more = ["more as it breaks"] if case.fractures else []
     return pairs({
         "tets": _about(expected.elements, count),
         "nodes": _about(expected.nodes, count),
@@ -87,6 +91,8 @@ def estimate_table(expected: Estimate) -> Table:
         "steps": _about(expected.steps, count),
         "memory": _about(expected.memory_bytes, lambda value: si(value, "B")),
         "core time": _about(expected.core_seconds, duration),
+        "of which": ", ".join([*(f"{name} {100 * seconds / total:.0f} %" for name, seconds in shares), *more]),
+        "without": ", ".join(without(case)),
     })  # fmt: skip
 
 

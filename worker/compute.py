@@ -14,6 +14,7 @@ from conoid.cases.outcome import Outcome
 from conoid.cases.quantities import FIELD_UNITS
 from conoid.cases.run import State
 from conoid.cases.schema import Case
+from conoid.cases.stages import without
 
 from . import digest, reference, simulation
 from .assembly import quiet
@@ -146,7 +147,7 @@ def _sum_up(
         worst_residual=sim.ledger.worst, rebalances=loop.balance.events, balancing_cost=loop.balance.spent,
         balancing_saved=loop.balance.saved,
         phases={name: [s[name] for s in seconds] for name in PHASES} if seconds else {},
-        peak_memory=memory or [],
+        without=without(sim.case), peak_memory=memory or [],
         element_updates_per_second=(loop.updates - start.updates) / total_cpu if total_cpu > 0.0 else 0.0,
         reference=checks,
         warnings=sim.fracture.warnings if sim.fracture is not None else [],

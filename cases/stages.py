@@ -1,0 +1,35 @@
+"""The stages of a case: what a step may do, and which of it a scene needs. What it does not need is not computed."""
+
+from .library import material
+from .schema import Case
+
+TETS, STEPS, AVERAGED, STRENGTH, STATE, CONTACT = (
+    "tets", "start and steps", "averaged pressure", "strength", "equation of state", "contact",
+)  # fmt: skip
+"""Names of those whose cost can be told before a run (cases/estimate.py); every case has the first two."""
+
+
+def stages(case: Case) -> dict[str, bool]:
+    """Which of the stages that a case may do without it has, by name. Raises CaseError, unknown material."""
+    made = [material(case, part.material) for part in case.parts]
+    contact = case.contact if case.in_contact else None
+    friction = contact is not None and (contact.friction > 0.0 or any(pair.friction > 0.0 for pair in contact.pairs))
+    fracture = [part.fracture for part in case.parts if part.fracture is not None]
+    return {
+        AVERAGED: case.numerics.pressure != "standard",
+        STRENGTH: any(one.strength is not None for one in made),
+        STATE: any(one.eos is not None for one in made),
+        "viscosity": case.numerics.viscosity is not None,
+        CONTACT: contact is not None,
+        "sharp edges": contact is not None and contact.edges,
+        "friction": friction,
+        "restitution": contact is not None and contact.restitution > 0.0,
+        "fracture": bool(fracture),
+        "cohesive facets": any(spec.model == "cohesive" for spec in fracture),
+        "erosion": case.erodes,
+    }
+
+
+def without(case: Case) -> list[str]:
+    """The names of those that it does not have."""
+    return [name for name, there in stages(case).items() if not there]
