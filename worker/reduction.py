@@ -138,6 +138,8 @@ class StepReduction(Fields):
         return comm.begin_maximum(self.own.words, self.words)
 
     def begin_again(self) -> None:
-        """Clears what was asked for once: a run that goes on from a checkpoint does not stop or report again."""
+        """Clears what was asked for once: a run that goes on from a checkpoint does not stop or report again, and
+        begins with a search.
+        """
         self.stop = 0
-        self.report = self.groups = self.grown = self.checkpoint = self.snapshot = False
+        self.report = self.groups = self.stray = self.grown = self.checkpoint = self.snapshot = False

@@ -10,7 +10,7 @@ from conoid.worker.reduction import Fields, Flag, Number, Real, StepReduction
 
 REALS = ("limit", "force", "approach")
 NUMBERS = ("stop", "worn", "breaking")
-FLAGS = ("report", "groups", "opening", "search", "grown", "checkpoint", "snapshot")
+FLAGS = ("report", "groups", "opening", "stray", "search", "grown", "checkpoint", "snapshot")
 
 
 def test_every_field_has_a_word_of_its_own() -> None:
