@@ -1,7 +1,7 @@
 """When to cut a mesh anew for its ranks: the rules by which a run decides, and its replay under another policy."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from .schema import Balance
 
@@ -38,6 +38,44 @@ class Guard:
         return outside > self.alpha * self.at_cut
 
 
+_MOMENTS = 32
+"""At most so many moments of a stretch of steps are remembered; then every other one. Chosen."""
+
+
+@dataclass
+class Stretch:
+    """The work of each rank since the last cut."""
+
+    _moments: list[tuple[int, list[float]]] = field(default_factory=list)
+    """Steps and work of each rank, s, from the cut up to the end of each of some windows."""
+
+    def add(self, loads: Sequence[float], steps: int) -> None:
+        """Takes the ``loads`` of all ranks, s a step, over some steps."""
+        before = self.work or [0.0] * len(loads)
+        self._moments.append((self.steps + steps, [w + steps * load for w, load in zip(before, loads, strict=True)]))
+        if len(self._moments) > _MOMENTS:
+            self._moments = self._moments[1::2] if len(self._moments) % 2 == 0 else self._moments[::2]
+
+    @property
+    def steps(self) -> int:
+        """How many."""
+        return self._moments[-1][0] if self._moments else 0
+
+    @property
+    def work(self) -> list[float]:
+        """Of each rank, s; what ranks lose to each other in turn no cut would mend."""
+        return self._moments[-1][1] if self._moments else []
+
+    @property
+    def halves(self) -> tuple[float, float]:
+        """The imbalance of the first half of the steps, and of what came after it."""
+        if not self._moments:
+            return 1.0, 1.0
+        _, middle = next(moment for moment in self._moments if 2 * moment[0] >= self.steps)
+        late = [now - then for now, then in zip(self.work, middle, strict=True)]
+        return imbalance(middle), imbalance(late) if any(late) else imbalance(middle)
+
+
 @dataclass
 class Trigger:
     """Whether a cut is due, by the policy of a case; the same on all ranks."""
@@ -47,22 +85,29 @@ class Trigger:
     """Of the last cut, s; at first of what takes as long."""
     step: int = 0
     """Of the last cut."""
-    work: Sequence[float] = ()
-    """Of each rank since then, s: what ranks lose to each other in turn no cut would mend."""
-    steps: int = 0
-    """Since then, over which that was."""
+    stretch: Stretch = field(default_factory=Stretch)
+    """Since then."""
     fruitless: int = 0
     """Cuts in a row that saved less than they cost: each doubles what has to be lost before the next."""
 
     def look(self, loads: Sequence[float], steps: int) -> None:
         """Takes the ``loads`` of all ranks, s a step, over some steps."""
-        self.work = [before + steps * load for before, load in zip(self.work or [0.0] * len(loads), loads, strict=True)]
-        self.steps += steps
+        self.stretch.add(loads, steps)
 
     @property
     def lost(self) -> float:
         """To imbalance since the last cut, s."""
-        return lost(self.work) if self.work else 0.0
+        return lost(self.stretch.work) if self.stretch.steps else 0.0
+
+    @property
+    def bearable(self) -> float:
+        """What may be lost before the next cut, s."""
+        return self.cost * 2.0**self.fruitless
+
+    @property
+    def half_way(self) -> bool:
+        """Whether half of that is."""
+        return self.lost > 0.5 * self.bearable
 
     def cause(self, step: int, grown: bool) -> str | None:
         """Why to cut before ``step``, if so; ``grown``: whether a rank has more outside nodes than it may."""
@@ -73,11 +118,11 @@ class Trigger:
             return f"every {spec.every} steps" if step % spec.every == 0 else None
         if spec.policy == "outside":
             return f"a rank has {spec.alpha:g} times its outside nodes" if grown else None
-        return "time lost exceeds the cost" if self.lost > self.cost * 2**self.fruitless else None
+        return "time lost exceeds the cost" if self.lost > self.bearable else None
 
     def settle(self, step: int, cost: float, paid: bool = True) -> None:
         """Begins to count anew after a cut before ``step`` that took ``cost``, s; ``paid``: whether the one before
         has saved what it cost.
         """
         self.fruitless = 0 if paid else self.fruitless + 1
-        self.step, self.cost, self.work, self.steps = step, cost, (), 0
+        self.step, self.cost, self.stretch = step, cost, Stretch()

@@ -55,14 +55,18 @@ class Balance:
     comm: Comm
     trigger: Trigger
     _meter: Meter
-    """Set at the last cut."""
+    """Set at the last cut, and again when half of what calls for the next one is lost: fronts move, and costs over the
+    things of the present are those of the present.
+    """
     spent: float = 0.0
     """Wall time of all cuts, s."""
     events: int = 0
+    _half: bool = False
+    """Whether the meter has been set again since the last cut."""
     _guard: Guard | None = None
     _latest: Window | None = None
     _before: float | None = None
-    """The imbalance before the last cut."""
+    """The imbalance of the steps just before the last cut."""
     _saved: float = 0.0
     """By the cuts before the last one, s."""
 
@@ -79,11 +83,13 @@ class Balance:
 
     @property
     def saved(self) -> float:
-        """By all cuts so far, s: what the work would have taken with the imbalance before each, less what it took."""
-        work = self.trigger.work
-        if self._before is None or not work:
+        """By all cuts so far, s: what the work would have taken with the imbalance just before each cut instead of just
+        after it. What has grown since then is no fault of the cut.
+        """
+        stretch = self.trigger.stretch
+        if self._before is None or not stretch.steps:
             return self._saved
-        return self._saved + self._before * float(np.mean(work)) - max(work)
+        return self._saved + (self._before - stretch.halves[0]) * float(np.mean(stretch.work))
 
     def grown(self, sim: Simulation) -> bool:
         """Whether this rank has more outside nodes than it may."""
@@ -94,7 +100,11 @@ class Balance:
 
     def cause(self, sim: Simulation) -> str | None:
         """Why to cut now, if so; the same on all ranks."""
-        return self.trigger.cause(sim.clock.step, sim.reduction.grown) if self.comm.size > 1 else None
+        if self.comm.size == 1:
+            return None
+        if not self._half and self.trigger.half_way:
+            self._meter, self._half = Meter.of(sim), True
+        return self.trigger.cause(sim.clock.step, sim.reduction.grown)
 
     def move(self, sim: Simulation) -> tuple[Simulation, dict[str, Any]]:
         """Cuts by the costs and moves what has to; the new simulation and what to tell. All ranks take part."""
@@ -119,9 +129,9 @@ class Balance:
         """Begins to count anew after a cut that took ``cost`` on the clock, and ``work`` of the slowest rank, s."""
         paid = self._before is None or self.saved - self._saved >= self.trigger.cost
         self.events, self.spent, self._saved = self.events + 1, self.spent + cost, self.saved
-        self._before, self._latest = balancing.imbalance(self.trigger.work) if self.trigger.work else None, None
+        self._before, self._latest = self.trigger.stretch.halves[1] if self.trigger.stretch.steps else None, None
         self.trigger.settle(sim.clock.step, work, paid)
-        self._meter = Meter.of(sim)
+        self._meter, self._half = Meter.of(sim), False
         self._guard = Guard(self.case.balance.alpha, sim.contact.outside if sim.contact is not None else 0)
 
     def weigh(self, sim: Simulation, parcel: Parcel) -> None:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from conoid.cases.balancing import Guard, Trigger, imbalance, lost
+from conoid.cases.balancing import Guard, Stretch, Trigger, imbalance, lost
 from conoid.cases.schema import Balance
 
 EVEN, ODD = [2.0, 2.0], [3.0, 1.0]
@@ -81,10 +81,32 @@ def test_cuts_that_do_not_pay_become_rare() -> None:
     trigger = Trigger(Balance(), 1.0)
     waited = []
     for paid in (False, False, False, True):
-        trigger.settle(trigger.step + trigger.steps, 1.0, paid)
+        trigger.settle(trigger.step + trigger.stretch.steps, 1.0, paid)
         trigger.look([1.0, 1.0], 1)
-        while trigger.cause(trigger.step + trigger.steps, False) is None:
+        while trigger.cause(trigger.step + trigger.stretch.steps, False) is None:
             trigger.look([1.5, 0.5], 1)
-        waited.append(trigger.steps)
+        waited.append(trigger.stretch.steps)
     assert waited[3] < waited[0] < waited[1] < waited[2]
     assert [w - 1 for w in waited[:2]] == pytest.approx([4, 8], abs=1.5)
+
+
+def test_a_stretch_tells_its_beginning_from_its_end() -> None:
+    """Even for 100 steps, then 1 s a step in favour of one: halves of 1 and 1.5, whatever the windows are."""
+    for window in (1, 3, 10, 50):
+        stretch = Stretch()
+        for step in range(0, 200, window):
+            n = min(window, 200 - step)
+            even = min(max(100 - step, 0), n)
+            stretch.add([2.0 + (n - even) / n, 2.0 - (n - even) / n], n)
+        first, late = stretch.halves
+        assert stretch.steps == 200
+        assert stretch.work == pytest.approx([500.0, 300.0])
+        assert first == pytest.approx(1.0, abs=0.05)
+        assert late == pytest.approx(1.5, abs=0.05)
+
+
+def test_a_stretch_of_one_window_is_the_same_before_and_after() -> None:
+    stretch = Stretch()
+    assert (stretch.halves, stretch.work, stretch.steps) == ((1.0, 1.0), [], 0)
+    stretch.add(ODD, 10)
+    assert (stretch.halves, stretch.work, stretch.steps) == ((1.5, 1.5), [30.0, 10.0], 10)
