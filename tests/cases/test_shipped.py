@@ -11,7 +11,7 @@ from conoid.cases.estimate import estimate, wave_speed
 from conoid.cases.geometry import altitude, volume
 from conoid.cases.library import library
 from conoid.cases.load import parse_json, read_case, resolved_json, shipped
-from conoid.cases.materials import JohnsonCook
+from conoid.cases.materials import JohnsonCook, MohrCoulomb
 from conoid.cases.schema import Case, Prescribed, Reference
 
 from .one_dimension import broken_rod
@@ -269,6 +269,22 @@ def test_plastic_bar_wave() -> None:
     assert window.until is not None
     assert 0.062 / precursor < window.since < window.until < (2 * LENGTH - 0.062) / precursor
     assert 0.027 / front < reference("plastic_bar_wave", "plateau_stress").since
+
+
+def test_triaxial_glass() -> None:
+    """The strength by Mohr's circles, and no cap below it; the tolerance is what the one of the sides makes."""
+    law = library()["soda_lime_mohr_coulomb"].strength
+    assert isinstance(law, MohrCoulomb)
+    sides = -reference("triaxial_glass", "lateral").value
+    sine, grows = math.sin(law.friction_angle), math.tan(math.pi / 4 + law.friction_angle / 2) ** 2
+    axial = 2 * law.cohesion * math.sqrt(grows) + grows * sides
+    assert axial - sides == pytest.approx(2 * law.cohesion * math.cos(law.friction_angle) + sine * (axial + sides))
+    assert reference("triaxial_glass", "axial").value == pytest.approx(-axial, rel=1e-3)
+    assert reference("triaxial_glass", "axial").tolerance == pytest.approx(
+        grows * reference("triaxial_glass", "lateral").tolerance, rel=0.01
+    )
+    assert law.strength_cap is not None
+    assert law.strength_cap > axial - sides
 
 
 # Shocks ---------------------------------------------------------------------------------------------------------------

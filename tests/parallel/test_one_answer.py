@@ -38,6 +38,7 @@ SHORT = {
     "plastic_bar_wave": "1.5 us",
     "plastic_wave": "1.5 us",
     "plate_stack": "3.5 us",
+    "plugging_weldox": "3 us",
     "shock_copper": "0.5 us",
     "shock_tungsten": "0.3 us",
     "sliding_block": "1.4 ms",
@@ -47,6 +48,7 @@ SHORT = {
     "taylor_42crmo4": "1.5 us",
     "taylor_copper": "1.5 us",
     "taylor_copper_split": "1.5 us",
+    "triaxial_glass": "4 us",
     "two_tets": "0.3 ms",
 }
 """End times at which every shipped case has taken some fifty steps."""
