@@ -56,9 +56,18 @@ def _common(one: tuple[Vector, Vector], other: tuple[Vector, Vector]) -> tuple[V
     return ((a, b, c), (d, e, f)) if min(d - a, e - b, f - c) > _TOUCH * size else None
 
 
+def _round(point: Vector, margin: float) -> Iterator[Vector]:
+    """Six points round one: where bodies that are turned touch, rounding puts the one between them into both."""
+    x, y, z = point
+    for off in (-margin, margin):
+        yield from ((x + off, y, z), (x, y + off, z), (x, y, z + off))
+
+
 def _depth(one: Placed, other: Placed, low: Vector, high: Vector) -> float:
     """The thinnest extent, m, of what both hold of a box; 0 when that is nothing."""
     both = [point for point in lattice(low, high, _POINTS) if one.holds(point) and other.holds(point)]
+    margin = _TOUCH * max(b - a for body in (one, other) for a, b in zip(*body.bounds(), strict=True))
+    both = [point for point in both if all(one.holds(each) and other.holds(each) for each in _round(point, margin))]
     if not both:
         return 0.0
     cells = [(b - a) / _POINTS for a, b in zip(low, high, strict=True)]

@@ -83,10 +83,15 @@ def _is(schema: Schema, value: Mapping[str, Any]) -> bool:
 def _taken(location: Location, value: Any, schema: Schema, data: Mapping[str, Any]) -> Iterator[Problem]:
     listed = isinstance(value, list | tuple)
     values, schemas = (value, schema.get("prefixItems", ())) if listed else ([value], [schema])
-    unit = next((each["unit"] for each in schemas if each.get("unit")), "")
+    bare = [
+        to["unit"]
+        for each, to in zip(values, schemas, strict=False)
+        if to.get("unit") and isinstance(each, int | float) and not isinstance(each, bool) and each != 0
+    ]
+    unit = next(iter(bare), "")
     if unit == QUANTITY:
         unit = unit_of_reference(data, location)
-    if unit and any(isinstance(each, int | float) and not isinstance(each, bool) and each != 0 for each in values):
+    if unit:
         shown = f"[{', '.join(map(str, values))}]" if listed else f"{value:g}"
         yield Problem(
             problem(location, ..., "").key, shown, f"no unit, taken for {unit if listed else f'{shown} {unit}'}"

@@ -75,6 +75,19 @@ def test_turned_bodies_are_where_they_are_turned_to() -> None:
     assert len(told(data)) == 1
 
 
+@pytest.mark.parametrize("angle", [30, 45, 60, 90, 120, 150])
+def test_turned_bodies_that_touch_do_not(angle: int) -> None:
+    """At 30 degrees the points that are looked at lie on the common face to rounding."""
+    turn = {"axis": "z", "angle": f"{angle} deg", "centre": ["0.7 mm", "0.3 mm", "0.1 mm"]}
+    block = {**BLOCK, "low": [0, 0, 0], "high": [2e-3, 2e-3, 2e-3]}
+    data = scene(block, {**block, "low": [2e-3, 0, 0], "high": [4e-3, 2e-3, 2e-3]})
+    for part in data["parts"]:
+        part["turn"] = turn
+    assert told(data) == []
+    data["parts"][1]["mesh"]["low"] = [1.7e-3, 0, 0]
+    assert len(told(data)) == 1
+
+
 @pytest.mark.parametrize("contact", ["none", {"overlap": "push"}, {"parts": ["one"]}])
 def test_bodies_that_need_not_be_apart(contact: object) -> None:
     assert told(scene(BLOCK, {**BALL, "centre": [0, 0, 0]}, contact=contact)) == []

@@ -103,6 +103,15 @@ def test_zero_and_what_has_no_unit_may_be_bare(override: str) -> None:
     assert bare_numbers(rod(override)) == []
 
 
+@pytest.mark.parametrize(("time", "told"), [("2 us", []), (2e-6, ["boundaries[3].course[1]"])])
+def test_the_factor_of_a_course_has_no_unit(time: object, told: list[str]) -> None:
+    course = [["0 us", 0], [time, 1], ["3 us", 0.5]]
+    driven = {"kind": "velocity", "parts": ["bar"], "x": "1 m/s", "course": course}
+    data = rod()
+    data["boundaries"] = [*data["boundaries"], driven]
+    assert [each.key for each in bare_numbers(data)] == told
+
+
 def test_a_case_in_si_is_told_once_a_key() -> None:
     case = parse_case(rod())
     found = [each.key for each in bare_numbers(Case.model_validate_json(resolved_json(case)).model_dump(mode="json"))]

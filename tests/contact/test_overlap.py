@@ -53,3 +53,16 @@ def test_bodies_are_moved_apart_without_a_stress(across: float) -> None:
     run(sim)
     assert abs(sim.ledger.lost) < 0.3
     assert np.abs(sim.model.nodes.v).max() < 1.5
+
+
+def test_bodies_are_moved_apart_by_no_more_than_they_overlap() -> None:
+    """A ridge of the dent is nearest to a corner node of the smaller block: its foot lies on the far side alone."""
+    wide, small = block((4, 4, 2), SIZE, shake=0.0), block((4, 4, 3), 0.8 * SIZE, shake=0.0)
+    low = np.array([-2 * SIZE, -2 * SIZE, 0.0])
+    bodies = [
+        TetMesh(wide.points + low, wide.tets),
+        TetMesh(small.points + np.array([-1.5 * SIZE, -1.5 * SIZE, 0.01 * SIZE - 2.4 * SIZE]), small.tets),
+    ]
+    sim = build(meeting_of([{}, {}], {"overlap": "push"}, end=2e-7), bodies)
+    before = np.concatenate([mesh.points for mesh in bodies])
+    assert np.abs(sim.model.nodes.x - before).max() <= 0.01001 * SIZE

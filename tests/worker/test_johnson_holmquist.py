@@ -127,6 +127,25 @@ def test_uniaxial_strain_follows_an_independent_integration(name: str) -> None:
     assert patch.get(WORK)[0] > patch.get(WORK_PLASTIC)[0] > 0.0
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_what_becomes_bulking_is_not_booked_as_plastic_work(name: str) -> None:
+    """Without pressure only the deviator holds energy, V s : s / 4 G: the work less the plastic work."""
+    made, law, bulk, shear = constants(name)
+    mesh = free_tets(1, 3)
+    patch, dt, new = Patch(mesh, made), 1e-9, 1.0
+    turn = 1.0 - 3.0 * law.hel / (bulk + 4.0 / 3.0 * shear)
+    back = False
+    while not back or patch.get(PRESSURE)[0] > 0.0:
+        back = back or new <= turn
+        old, new = new, new + (1e-5 if back else -1e-5)
+        patch.nodes.x[:, 2], patch.nodes.v[:, 2] = mesh.points[:, 2] * new, mesh.points[:, 2] * (new - old) / dt
+        patch.advance(dt)
+    plastic = patch.get(WORK_PLASTIC)[0]
+    held = float(mesh.volumes()[0]) * 1.5 * patch.get(S_ZZ)[0] ** 2 / (4.0 * shear)
+    assert patch.get(BULKING)[0] > 0.05 * law.pressure_hel
+    assert patch.get(WORK)[0] - plastic == pytest.approx(held, abs=0.04 * plastic)
+
+
 def test_boron_carbide_collapses_at_its_limit_to_its_crumbled_strength() -> None:
     _, law, bulk, shear = constants("boron_carbide_jh2")
     strain = 2.0 * law.hel / (bulk + 4.0 / 3.0 * shear)

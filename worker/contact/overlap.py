@@ -92,7 +92,8 @@ def _normals(points: Floats, faces: Indices) -> Floats:
 def _nearest(node: Floats, outward: Floats, triangles: Floats) -> tuple[float, Floats]:
     """Depth below the nearest of the triangles (f, 3, 3) that the node faces, m, and the unit normal there.
 
-    The depth is zero for a node on the surface.
+    The depth is zero for a node on the surface, and where no triangle that it faces has its foot. Where the surface is
+    dented the nearest one need not have it: a ridge of the dent may be nearest, and the foot lie on the far side.
     """
     e, f, r = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0], node - triangles[:, 0]
     normals = np.cross(e, f)
@@ -102,10 +103,19 @@ def _nearest(node: Floats, outward: Floats, triangles: Floats) -> tuple[float, F
     ee, ff, ef = (e * e).sum(axis=1), (f * f).sum(axis=1), (e * f).sum(axis=1)
     er, fr = (e * r).sum(axis=1), (f * r).sum(axis=1)
     s, t = (ff * er - ef * fr) / area**2, (ee * fr - ef * er) / area**2
-    over = (np.minimum(np.minimum(s, t), 1.0 - s - t) >= -_INSIDE) & (heights <= _ROUNDING * np.sqrt(area))
-    over &= normals @ outward <= FACING
+    faced = (normals @ outward <= FACING) & (heights <= _ROUNDING * np.sqrt(area))
+    over = (np.minimum(np.minimum(s, t), 1.0 - s - t) >= -_INSIDE) & faced
     if not over.any():
         return 0.0, np.zeros(3)
-    best = np.flatnonzero(over)[np.argmax(heights[over])]
+    away = np.where(over, -heights, _to_borders(node, triangles))
+    best = np.flatnonzero(faced)[np.argmin(away[faced])]
     depth = -float(heights[best])
     return (depth if depth > _ROUNDING * np.sqrt(area[best]) else 0.0), normals[best]
+
+
+def _to_borders(node: Floats, triangles: Floats) -> Floats:
+    """(f,) distance, m, of a node from the nearest border of each of the triangles (f, 3, 3)."""
+    along = np.roll(triangles, -1, axis=1) - triangles
+    share = (along * (node - triangles)).sum(axis=2) / (along * along).sum(axis=2)
+    off = triangles + np.clip(share, 0.0, 1.0)[:, :, None] * along - node
+    return np.asarray(np.linalg.norm(off, axis=2).min(axis=1))

@@ -107,7 +107,8 @@ def johnson_holmquist(w, s, params, n, dt):  # type: ignore[no-untyped-def]
     """Returns the trial deviators to the strength at the new pressure; damage and bulking; books the plastic work.
 
     The strength is that of the damage at n: the return is a division. The plastic work is that of the mean of the
-    rotated old stress and the new one (as in mohr_coulomb.py), also where damage or pressure let the strength fall.
+    rotated old stress and the new one (as in mohr_coulomb.py), also where damage or pressure let the strength fall;
+    what becomes bulking is kept, and is taken off.
     """
     equivalent_stress(w, s, n)
     _factors(w, s, params, n)
@@ -145,6 +146,7 @@ def johnson_holmquist(w, s, params, n, dt):  # type: ignore[no-untyped-def]
             free = (strength * strength - after * after) / (6.0 * shear)
             whole = bulk * m + s[_BULKING + i]
             s[_BULKING + i] = math.sqrt(whole * whole + 2.0 * params[_BETA] * bulk * free) - bulk * m
+            s[_PLASTIC + i] -= w[VOLUME_MID + i] * params[_BETA] * free
 
 
 def _constants(law: JohnsonHolmquist) -> tuple[float, ...]:
