@@ -144,6 +144,8 @@ class History(msgspec.Struct, kw_only=True):
     state: str | None
     elapsed: float
     series: dict[str, Any]
+    parts: dict[str, dict[str, list[float | None]]]
+    """Energies of each part at the times of the series, J; empty where there is one part alone."""
     ranks: dict[str, Any]
     balance: list[dict[str, Any]]
     snapshots: list[dict[str, Any]]

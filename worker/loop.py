@@ -7,8 +7,10 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from conoid.cases import layout, messages
-from conoid.cases.messages import Energy
+from conoid.cases.messages import Energy, PartEnergy
 from conoid.cases.run import Cause, State
 
 from . import simulation, step
@@ -85,6 +87,7 @@ class Loop:
         """``start``: what is known when the first step begins."""
         self.sim = sim
         self.energy: Energy | None = None
+        self._parts: dict[str, PartEnergy] = {}
         self.stopped = 0
         self._told = False
         self._folder = folder
@@ -199,12 +202,13 @@ class Loop:
     def _look(self, before: Floats) -> None:
         """A line of the history: ledger, momentum and probes at time n."""
         sim, clock = self.sim, self.sim.clock
-        self.energy = sim.ledger.close(before)
+        self.energy, self._parts = sim.ledger.close(before), sim.ledger.parts
         probes = sim.probes.measure()
         self._sample = int(clock.t * sim.case.run.samples / sim.case.run.end_time) + 1
         limiter = sim.limiter()
         if self._history is not None:
-            extra = [*sim.ledger.momentum, *probes]
+            parts = [value for part in self._parts.values() for value in msgspec.structs.astuple(part)]
+            extra = [*sim.ledger.momentum, *parts, *probes]
             self._history.write(clock.step, clock.t, clock.told, limiter, self.energy, extra)
         if not self.energy.residual <= sim.case.run.residual_limit:
             raise EnergyError(
@@ -256,7 +260,7 @@ class Loop:
             self._tell(
                 messages.Progress, end_time=sim.case.run.end_time, dt=clock.told, limiter=limiter,
                 eta=self._pace.left(sim.case.run.end_time - clock.t), energy=self.energy,
-                updates_per_second=(self.updates - self._reported_updates) / elapsed,
+                updates_per_second=(self.updates - self._reported_updates) / elapsed, parts=self._parts,
             )  # fmt: skip
         self._tell(messages.Load, phases=work, imbalance=window.imbalance, steps=window.steps, **told)
         self._reported, self._reported_updates = now, self.updates

@@ -12,7 +12,7 @@ export class Live {
   constructor(run) {
     Object.assign(this, { run, seq: 0, state: "accepted", cause: null, message: "", began: null, wall: 0, heard: 0 });
     Object.assign(this, { started: null, progress: null, load: null, counts: null, finished: null, loaded: 0 });
-    this.ledger = []; // { t, dt, limiter, energy }
+    this.ledger = []; // { t, dt, limiter, energy, parts: { name: { kinetic, internal } } }
     this.loads = []; // { t, imbalance, contact: share, shares: [of the busiest, a rank] }
     this.sizes = []; // { t, nodes, facets, fragments }
     this.balances = []; // the messages
@@ -41,8 +41,8 @@ export class Live {
 
   on_progress(message) {
     this.progress = message;
-    const { t, dt, limiter, energy } = message;
-    keep(this.ledger, { t, dt, limiter, energy });
+    const { t, dt, limiter, energy, parts = {} } = message;
+    keep(this.ledger, { t, dt, limiter, energy, parts });
   }
 
   on_load(message) {

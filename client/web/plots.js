@@ -1,6 +1,7 @@
 // What each chart of a run shows: the record of the run (live.js) as series.
 
 import { Chart, axis, heat, limit, pins, series, time } from "./charts.js";
+import { named } from "./colours.js";
 import { h, percent, si } from "./figures.js";
 import { TERMS } from "./live.js";
 import { sizes } from "./snapshot.js";
@@ -8,17 +9,23 @@ import { sizes } from "./snapshot.js";
 const TALL = 250;
 const MOST_COLUMNS = 240; // Of the heat map; more are less than a pixel wide on a phone.
 const COUNTED = [["nodes", "compute"], ["facets", "exchange"], ["fragments", "fracture"]];
+const ENERGIES = { terms: "Energy without the kinetic", internal: "Internal energy of the parts", kinetic: "Kinetic energy of the parts" };
 const CURVE = 60; // Points of a fitted law.
 const LEAST = 1; // Fragment, where the axis of their number begins.
 const FLOOR = 1e-10; // Residuals below it are rounding.
 const RESIDUAL = 1e-2; // Above it a run's energy does not close.
 
-// { name: { title, chart, note } }; `onBalance` gets the place of a balance event in live.balances.
+// { name: [chart, title, what stands beside the title] }; `onBalance` gets the place of a balance event in live.balances.
 export function plots(live, onBalance) {
+  const title = h("span", {}, ENERGIES.terms);
+  const by = h("select", { "aria-label": "energy by", hidden: "", onchange: () => {
+    title.textContent = ENERGIES[by.value];
+    made.energy[0].draw();
+  } }, Object.entries({ terms: "by term", internal: "internal, by part", kinetic: "kinetic, by part" }).map(([value, words]) => h("option", { value }, words)));
   const made = {
     sizes: [new Chart(TALL, "number of fragments of a size and more", () => ofSizes(made.snapshot), { alone: true }), "Fragment sizes"],
     counts: [new Chart(TALL, "counts over time", () => ofCounts(live)), "Counts"],
-    energy: [new Chart(TALL, "energy over time, without the kinetic", () => ofEnergy(live)), "Energy without the kinetic"],
+    energy: [new Chart(TALL, "energy over time", () => ofEnergy(live, by)), title, by],
     residual: [new Chart(TALL, "energy residual over time", () => ofResidual(live)), "Energy residual"],
     imbalance: [new Chart(TALL, "load imbalance over time", () => ofImbalance(live),
       { onClick: ({ seriesName, dataIndex }) => seriesName === "balance" && onBalance(dataIndex), onEnter: (at) => live.balances.length && onBalance(nearest(live, at)) }), "Load imbalance, slowest over mean"],
@@ -30,16 +37,23 @@ export function plots(live, onBalance) {
 }
 
 export const card = (title, note, ...content) => h("section.card.half", {}, h("div.card-head", {}, h("h2", {}, title), note), ...content);
+export const parts = ({ ledger }) => Object.keys(ledger.at(-1)?.parts ?? {});
 
 const end = ({ progress, ledger }) => (progress?.end_time ?? ledger.at(-1)?.t ?? 1);
 const option = (live, y, list) => ({ xAxis: time(end(live)), yAxis: y, series: list });
 
-function ofEnergy(live) {
+function ofEnergy(live, by) {
   if (live.ledger.length < 2) return null;
+  by.hidden = !parts(live).length;
+  if (by.value !== "terms") return option(live, axis("J"), ofParts(live, by.value));
   const there = TERMS.filter(([name]) => name !== "kinetic" && live.ledger.some(({ energy }) => energy[name]));
   return option(live, axis("J"), there.map(([name, tone]) =>
     series({ name, colour: tone, unit: "J", stack: "energy", data: live.ledger.map(({ t, energy }) => [t, Math.max(0, energy[name])]) })));
 }
+
+// One area a part, in the colours that the parts have in the view of the body.
+export const ofParts = (live, name) => parts(live).map((part, i) => series({ name: part, colour: named(i), unit: "J", stack: "energy",
+  data: live.ledger.filter((row) => row.parts[part]).map((row) => [row.t, Math.max(0, row.parts[part][name] ?? 0)]) }));
 
 function ofResidual(live) {
   if (live.ledger.length < 2) return null;

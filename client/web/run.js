@@ -41,7 +41,10 @@ export class RunPage {
       this.charts.snapshot = snapshot;
       this.charts.sizes[0].draw();
     });
-    const plot = (name) => card(this.charts[name][1], this.notes[name], this.charts[name][0].element);
+    const plot = (name) => {
+      const [chart, title, beside] = this.charts[name];
+      return card(title, h("span.beside", {}, beside, this.notes[name]), chart.element);
+    };
     this.buttons = ["checkpoint", "snapshot", "cancel"].map((verb) =>
       h(verb === "cancel" ? "button.stop" : "button.quiet", { type: "button", onclick: ({ currentTarget }) => this.ask(verb, currentTarget) }, verb[0].toUpperCase() + verb.slice(1)));
     this.element = h("div", {}, this.head, h("div.cards", {}, this.body.element, this.checks,

@@ -27,6 +27,12 @@ ENERGY = {
 }
 
 
+def parts(k: int) -> dict[str, messages.PartEnergy]:
+    """Told of by newer workers alone."""
+    made = {"rod": (2.0, 0.5 * k), "ball": (1.0, 0.0)}
+    return {name: messages.PartEnergy(kinetic=a, internal=b) for name, (a, b) in made.items()} if k else {}
+
+
 def told(reports: int, ranks: int = 2, every: int = 100) -> Iterator[messages.AnyMessage]:
     """What a run says that has so many reports, and now and then a cut and a snapshot."""
     yield messages.Status(run="r", wall=1000.0, state=State.ACCEPTED)
@@ -39,7 +45,7 @@ def told(reports: int, ranks: int = 2, every: int = 100) -> Iterator[messages.An
             )
         yield messages.Progress(
             **at, end_time=1.0, dt=1e-9 + 1e-15 * k, limiter="stability: tet 1 of rod", eta=1.0,
-            energy=messages.Energy(**ENERGY, residual=1e-6 * k), updates_per_second=1e6,
+            energy=messages.Energy(**ENERGY, residual=1e-6 * k), updates_per_second=1e6, parts=parts(k),
         )  # fmt: skip
         phases = {"elements": [3.0] * ranks, "contact": [1.0] * ranks}
         yield messages.Load(**at, phases=phases, imbalance=1.0 + 1e-3 * k, steps=10, waiting=[0.1] * ranks)
@@ -99,6 +105,11 @@ def test_short_runs_are_told_whole(server: Running, run: str) -> None:
     assert series["residual"] == [1e-6 * k for k in range(200)]
     assert series["kinetic"] == [3.0] * 200
     assert series["share_elements"] == [0.75] * 200
+    assert found["parts"]["rod"] == {
+        "kinetic": [None, *[2.0] * 199],
+        "internal": [None, *(0.5 * k for k in range(1, 200))],
+    }
+    assert list(found["parts"]) == ["rod", "ball"]
     assert found["ranks"]["contact"] == [[1.0, 1.0]] * 200
     assert [event["cause"] for event in found["balance"]] == ["time lost"] * 2
     assert [event["n"] for event in found["snapshots"]] == [0, 1]

@@ -143,3 +143,20 @@ def test_keys_that_differ_are_told_by_their_place(ask: Ask) -> None:
 )
 def test_numbers_are_written_with_a_prefix(ask: Ask, value: float | None, text: str) -> None:
     assert ask("figures.js", "page.si(data, 'Pa')", value) == text
+
+
+def test_energies_of_parts_come_from_the_history_and_from_messages_alike(ask: Ask) -> None:
+    parts = {
+        "rod": {"kinetic": [3.0, 2.0], "internal": [0.0, 1.5]},
+        "ball": {"kinetic": [1.0, 1.0], "internal": [0.0, 0.5]},
+    }
+    told = {"series": {"t": [0.0, 1e-6], "dt": [1e-9] * 2}, "parts": parts, "last": 5}
+    newest = {name: {"kinetic": 1.0, "internal": 2.0} for name in parts}
+    message = {"type": "progress", "seq": 6, "t": 2e-6, "dt": 1e-9, "limiter": "", "energy": {}, "parts": newest}
+    script = """(() => {
+        const live = { ledger: [] };
+        page.take(live, data.told);
+        live.ledger.push(data.message);
+        return live.ledger.map(({ parts }) => [parts.rod.kinetic, parts.ball.internal]);
+    })()"""
+    assert ask("history.js", script, {"told": told, "message": message}) == [[3.0, 0.0], [2.0, 0.5], [1.0, 2.0]]
