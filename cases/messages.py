@@ -129,6 +129,14 @@ class Counts(Message, frozen=True):
     particles: int = 0
     facets: int = 0
     """That have broken."""
+    smallest: int = 0
+    """Where ``sizes`` begins."""
+    sizes: list[int] = []
+    """How many fragments are as long as 2^((smallest + i) / 2) m, and shorter than the next; empty where nothing can
+    break."""
+    counted: int = -1
+    """Step of the state whose ``fragments`` and ``sizes`` these are, the present one or one not long before; -1 where
+    that is not known."""
 
 
 class Balance(Message, frozen=True):

@@ -30,6 +30,7 @@ def body(history: History, points: int) -> bytes:
         "elapsed": 0.0 if history.began is None else (history.wall if final else time.time()) - history.began,
         "series": _columns(once, history.began or 0.0),
         "parts": _parts(once),
+        "sizes": _sizes(once[-1].counted if once else None),
         "ranks": _ranks(_spread(loads, _NUMBERS // max(1, sum(map(len, loads[-1].phases.values()))) if loads else 1)),
         "balance": [msgspec.Raw(line) for line in history.cuts],
         "snapshots": listed(history),
@@ -48,10 +49,10 @@ class _Report(msgspec.Struct, frozen=True):
     snapshot: Snapshot | None
 
     @property
-    def fragments(self) -> int | None:
-        """By whatever was told last."""
+    def counted(self) -> Counts | Snapshot | None:
+        """Whatever tells of the fragments of the latest state."""
         told = [message for message in (self.counts, self.snapshot) if message is not None]
-        return max(told, key=lambda message: message.seq).fragments if told else None
+        return max(told, key=lambda message: (_counted(message), message.seq)) if told else None
 
 
 def _read(sample: Sample) -> _Report:
@@ -84,7 +85,7 @@ def _columns(reports: list[_Report], began: float) -> dict[str, list[Any]]:
         "step": [r.load.step for r in reports],
         "elapsed": [r.load.wall - began for r in reports],
         "imbalance": [r.load.imbalance for r in reports],
-        "fragments": [r.fragments for r in reports],
+        "fragments": [r.counted.fragments if r.counted is not None else None for r in reports],
     }
     for name in ("elements", "nodes", "shared", "facets", "particles"):
         columns[name] = [getattr(r.counts, name, None) for r in reports]
@@ -96,6 +97,16 @@ def _columns(reports: list[_Report], began: float) -> dict[str, list[Any]]:
     for name in {name: None for share in shares for name in share}:
         columns[f"share_{name}"] = [share.get(name) for share in shares]
     return columns
+
+
+def _counted(message: Counts | Snapshot) -> int:
+    """The step of the fragments that it tells of."""
+    return message.counted if isinstance(message, Counts) and message.counted >= 0 else message.step
+
+
+def _sizes(told: Counts | Snapshot | None) -> dict[str, Any]:
+    """How many fragments have which size, as these messages have it; ``t`` in s."""
+    return {"t": told.t, "smallest": told.smallest, "sizes": told.sizes} if told is not None else {}
 
 
 def _parts(reports: list[_Report]) -> dict[str, dict[str, list[float | None]]]:

@@ -19,6 +19,7 @@ from .errors import EnergyError
 from .groups import Groups
 from .migration import checkpoint
 from .output import frames
+from .output.counts import Counter
 from .output.damage import damage
 from .output.history import History
 from .output.journal import Journal
@@ -102,7 +103,7 @@ class Loop:
         self._reported_step = sim.clock.step
         self._pace = Pace(sim.clock.t, self._began)
         self._logged = -math.inf
-        self._counted = (0, 0, 0)
+        self._counter = Counter()
         self.balance = balance
         self._groups = Groups(sim, balance.trigger.cost)
         self.snapshots = Snapshots(sim, folder, journal)
@@ -224,7 +225,7 @@ class Loop:
         if sim.record is None:
             path = frames.write(self._folder, index, clock.t, sim.model, sim.comm, damage=damaged)
         else:
-            sim.record.look()
+            self._counter.find(sim)
             path = frames.write(self._folder, index, clock.t, sim.model, sim.comm, sim.record.labels, damaged)
             sim.record.write(self._folder, index, clock.t)
         clock.frame += 1
@@ -240,13 +241,17 @@ class Loop:
             limiter = sim.limiter()
             outside = sim.contact.outside if sim.contact is not None else 0
             sent = {"waiting": waiting, "outside": outside, **sim.comm.sent.since_last()}
-            loads = sim.comm.share((seconds, sent))
-            self._count()
+            ending = clock.done or bool(sim.reduction.stop)
+            loads = sim.comm.share((seconds, sent, self._counter.due(sim, time.monotonic(), ending=ending)))
+            if loads[0][2]:
+                self._counter.find(sim)
+            if counted := self._counter.changed(sim, self.balance.events):
+                self._tell(messages.Counts, **counted)
         work, told = ({name: [load[i][name] for load in loads] for name in loads[0][i]} for i in (0, 1))
         window = Window(clock.step - self._reported_step, work)
         self._reported_step = clock.step
         self.balance.look(window)
-        if sim.reduction.groups or clock.done or sim.reduction.stop:
+        if sim.reduction.groups or ending:
             self._record()
         if self._journal is None:
             return
@@ -269,20 +274,6 @@ class Loop:
         """Loads of groups to the journal; all ranks take part."""
         with self.sim.timers.phase("output"):
             self._tell(messages.Groups, **self._groups.record(self.sim))
-
-    def _count(self) -> None:
-        """How large the model is, when that has changed; all ranks take part."""
-        sim, model = self.sim, self.sim.model
-        if (model.elements_global, model.nodes_global, self.balance.events) == self._counted:
-            return
-        self._counted = model.elements_global, model.nodes_global, self.balance.events
-        held, shared = sim.comm.gather(sum(block.n for block in model.blocks)), sim.shared_nodes()
-        self._tell(
-            messages.Counts, elements=model.elements_global, nodes=model.nodes_global, shared=shared,
-            fragments=sim.record.count if sim.record is not None else len(model.parts), elements_per_rank=held or [],
-            particles=sim.erosion.particles if sim.erosion is not None else 0,
-            facets=sim.fracture.broken if sim.fracture is not None else 0,
-        )  # fmt: skip
 
     def _tell(self, kind: type[messages.Message], **fields: Any) -> None:
         if self._journal is not None:

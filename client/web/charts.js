@@ -5,7 +5,7 @@ import { echarts } from "./libraries.js";
 
 const GROUP = "run";
 const FONT = 12;
-const NEAR = "100px"; // Of the window: a chart farther off is drawn once, when there is time, and again when it comes near.
+const NEAR = "100px"; // Of the window: a chart farther off is drawn when there is time, and again when it comes near.
 const whenIdle = globalThis.requestIdleCallback ?? ((work) => setTimeout(work, 200)); // Not every browser has it.
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 
@@ -41,14 +41,15 @@ export class Chart {
     if (stale) this.draw();
   }
 
-  draw() {
+  // Out of view only the first time, and where that is `needed`.
+  draw(needed = false) {
     if (this.seen) this.paint();
-    else if (!this.chart && !this.waiting) this.waiting = whenIdle(() => this.first());
+    else if ((needed || !this.chart) && !this.waiting) this.waiting = whenIdle(() => this.late());
   }
 
-  first() {
+  late() {
     this.waiting = 0;
-    if (!this.chart && !this.closed) this.paint();
+    if (!this.closed) this.paint();
   }
 
   paint() {

@@ -21,12 +21,13 @@ export async function readPlan(run, signal) {
 }
 
 export function take(live, history, info = {}, plan = null) {
-  const { series = {}, parts = {}, ranks = {}, balance = [], snapshots = [], last, state, elapsed } = history;
+  const { series = {}, parts = {}, sizes = {}, ranks = {}, balance = [], snapshots = [], last, state, elapsed } = history;
   const number = series.t?.length ?? 0;
   const rows = Array.from({ length: number }, (_, i) => Object.fromEntries(Object.entries(series).map(([name, values]) => [name, values[i]])));
   live.ledger = rows.map((row, i) => ({ t: row.t, dt: row.dt, limiter: row.limiter, energy: energy(row), parts: at(parts, i) })).filter(({ dt }) => Number.isFinite(dt));
   live.sizes = rows.filter((row) => Number.isFinite(row.nodes)).map(({ t, nodes, facets, fragments }) => ({ t, nodes, facets, fragments }));
   live.loads = loads(ranks, rows);
+  if (sizes.sizes?.length) live.spread = sizes;
   live.balances = balance;
   live.snapshots = snapshots;
   Object.assign(live, { seq: last, state, heard: Date.now() / 1000 });

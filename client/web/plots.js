@@ -23,7 +23,7 @@ export function plots(live, onBalance) {
     made.energy[0].draw();
   } }, Object.entries({ terms: "by term", internal: "internal, by part", kinetic: "kinetic, by part" }).map(([value, words]) => h("option", { value }, words)));
   const made = {
-    sizes: [new Chart(TALL, "number of fragments of a size and more", () => ofSizes(made.snapshot), { alone: true }), "Fragment sizes"],
+    sizes: [new Chart(TALL, "number of fragments of a size and more", () => ofSizes(made.snapshot, live.spread), { alone: true }), "Fragment sizes"],
     counts: [new Chart(TALL, "counts over time", () => ofCounts(live)), "Counts"],
     energy: [new Chart(TALL, "energy over time", () => ofEnergy(live, by)), title, by],
     residual: [new Chart(TALL, "energy residual over time", () => ofResidual(live)), "Energy residual"],
@@ -108,18 +108,43 @@ function ofContact(live) {
     [{ ...series({ name: "contact", colour: "contact", data: live.loads.map(({ t, contact }) => [t, contact]) }), tooltip: { valueFormatter: (value) => percent(value) } }]);
 }
 
-// N(size) over the size, both logarithmic, with the law that fits best.
-function ofSizes(snapshot) {
-  if (!snapshot) return null;
-  const { points, best } = sizes(snapshot);
-  if (points.length < 2) return null;
-  const list = [{ ...series({ name: "fragments as long and longer", colour: "compute", data: points }), type: "scatter", symbolSize: 4 }];
+// N(size) over the size, both logarithmic: of the snapshot that is shown, with the law that fits best, and of the newest
+// report in its bins, which counts dust too.
+function ofSizes(snapshot, spread) {
+  const list = [...(snapshot ? ofSnapshot(snapshot) : []), ...(spread ? [ofSpread(spread)] : [])];
+  if (!list.length) return null;
+  return { xAxis: axis("m", { type: "log", splitLine: { show: false } }), yAxis: axis("", { type: "log", min: LEAST }), series: list,
+    tooltip: { trigger: "item", formatter: ({ value }) => `${Math.round(value[1])} of ${si(value[0], "m")} and more` } };
+}
+
+function ofSnapshot(snapshot) {
+  const { points, best } = fitted(snapshot);
+  if (points.length < 2) return [];
+  const list = [{ ...series({ name: "as long and longer", colour: "compute", data: points }), type: "scatter", symbolSize: 4 }];
   if (best) {
     const [low, high] = [points[0][0], points.at(-1)[0]];
     const curve = Array.from({ length: CURVE }, (_, i) => low * (high / low) ** (i / (CURVE - 1))).map((size) => [size, points.length * best.longer(size)]);
     const told = best.law === "power" ? `exponent ${best.parameter.toFixed(2)}` : si(best.parameter, "m");
     list.push({ ...series({ name: `${best.law} law, ${told}`, colour: "bad", data: curve.filter(([, number]) => number >= LEAST) }), lineStyle: { type: "dashed" } });
   }
-  return { xAxis: axis("m", { type: "log", splitLine: { show: false } }), yAxis: axis("", { type: "log", min: LEAST }), series: list,
-    tooltip: { trigger: "item", formatter: ({ value }) => `${Math.round(value[1])} of ${si(value[0], "m")} and more` } };
+  return list;
+}
+
+const known = new WeakMap(); // Fits by snapshot: the chart is drawn more often than it has new points.
+
+function fitted(snapshot) {
+  if (!known.has(snapshot)) known.set(snapshot, sizes(snapshot));
+  return known.get(snapshot);
+}
+
+const ofSpread = ({ t, ...spread }) => ({ ...series({ name: `dust too, ${si(t, "s")}`, colour: "faint", data: longer(spread) }), step: "end", sampling: undefined });
+
+// [size, number of fragments as long and longer] at the beginning of each bin, from bins of half a power of two.
+export function longer({ smallest, sizes: counts }) {
+  let left = counts.reduce((sum, count) => sum + count, 0);
+  return counts.map((count, i) => {
+    const point = [2 ** ((smallest + i) / 2), left];
+    left -= count;
+    return point;
+  });
 }

@@ -39,7 +39,7 @@ export class RunPage {
     this.charts = plots(live, (place) => this.balances.open(place));
     this.body = new Body(live.run, (snapshot) => {
       this.charts.snapshot = snapshot;
-      this.charts.sizes[0].draw();
+      this.charts.sizes[0].draw(true);
     });
     const plot = (name) => {
       const [chart, title, beside] = this.charts[name];
@@ -160,8 +160,7 @@ export class RunPage {
 
   // After the frame that has the news in the head and the bars.
   drawCharts() {
-    const charts = Object.entries(this.charts).filter(([name, value]) => name !== "sizes" && Array.isArray(value));
-    if (!this.abort.signal.aborted) for (const [, [chart]] of charts) chart.draw();
+    if (!this.abort.signal.aborted) for (const [chart] of Object.values(this.charts).filter(Array.isArray)) chart.draw(FINAL.has(this.live.state));
   }
 
   drawNotes() {

@@ -7,6 +7,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 
 from conoid.cases import layout, messages
@@ -233,3 +234,31 @@ def test_a_million_events_open_in_two_seconds(server: Running, run: str) -> None
     assert shown(server, run)["last"] == last
     assert first <= 2.0
     assert time.monotonic() - began - first <= 0.5
+
+
+def test_sizes_are_those_of_the_latest_state_that_was_counted(server: Running, run: str) -> None:
+    at: dict[str, Any] = {
+        "run": "r",
+        "t": 1e-6,
+        "wall": 1011.0,
+        "elements": 9,
+        "nodes": 9,
+        "shared": 0,
+        "elements_per_rank": [9],
+    }
+    load = messages.Load(run="r", step=30, phases={"elements": [1.0]}, imbalance=1.0)
+    journal: list[messages.AnyMessage] = [
+        messages.Status(run="r", wall=1010.0, state=State.RUNNING),
+        messages.Counts(**at, step=20, fragments=3, smallest=-9, sizes=[1, 2], counted=18),
+    ]
+    last = write(server.ann.runs / run, iter([*journal, load]))
+    assert shown(server, run)["sizes"] == {"t": 1e-6, "smallest": -9, "sizes": [1, 2]}
+    made = msgspec.structs.replace(snapshot(0, "x", run="r", step=25), smallest=-8, sizes=[4])
+    late = messages.Counts(**at, step=40, fragments=3, smallest=-9, sizes=[1, 2], counted=18)
+    last = write(server.ann.runs / run, iter([made, late, msgspec.structs.replace(load, step=40)]), last)
+    told = shown(server, run)
+    assert told["sizes"]["sizes"] == [4]
+    assert told["series"]["fragments"] == [3, 7]
+    newer = msgspec.structs.replace(late, step=50, counted=45, fragments=9, sizes=[9])
+    write(server.ann.runs / run, iter([newer, msgspec.structs.replace(load, step=50)]), last)
+    assert shown(server, run)["sizes"]["sizes"] == [9]
