@@ -1,16 +1,29 @@
 """The columns of history.csv, and how they are written: ``t [s]`` with a unit, ``step`` without."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
-from .messages import Energy
+from .messages import Energy, PartEnergy
 
 CLOCK: dict[str, str] = {"step": "", "t": "s", "dt": "s", "limiter": ""}
 LEDGER: dict[str, str] = {name: "" if name == "residual" else "J" for name in Energy.__struct_fields__}
 MOMENTUM: dict[str, str] = {f"momentum_{axis}": "kg m/s" for axis in "xyz"}
 COLUMNS: dict[str, str] = {**CLOCK, **LEDGER, **MOMENTUM}
-"""Columns and units of every run; those of its probes follow."""
+"""Columns and units of every run; those of its parts follow, and then those of its probes."""
+OF_PARTS = PartEnergy.__struct_fields__
+"""What is told of each part, J."""
 _HEADER = re.compile(r"(.*?)(?: \[([^\]]*)\])?")
+
+
+def of_parts(parts: Sequence[str]) -> dict[str, str]:
+    """Columns and units of the parts: ``kinetic.bar``. None where there is one part alone: it is the whole."""
+    return {f"{name}.{part}": "J" for part in parts for name in OF_PARTS} if len(parts) > 1 else {}
+
+
+def part_of(column: str) -> tuple[str, str] | None:
+    """What a column tells of which part; None for those that are of none. A name of a probe has no point."""
+    name, point, part = column.partition(".")
+    return (name, part) if point and name in OF_PARTS else None
 
 
 def header(columns: Mapping[str, str]) -> list[str]:

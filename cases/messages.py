@@ -71,6 +71,14 @@ class Energy(msgspec.Struct, kw_only=True, frozen=True):
     """|sum of all lines - initial - external| over the largest energy that came in; dimensionless."""
 
 
+class PartEnergy(msgspec.Struct, kw_only=True, frozen=True):
+    """Of one part, J. The sums over all parts are those of the ledger, but for what has left with eroded tets."""
+
+    kinetic: float
+    internal: float
+    """Work of stress and of bulk viscosity in the tets that are there: elastic, plastic and viscous."""
+
+
 class Progress(Message, frozen=True):
     """How far the run is. ``eta`` is wall time left, s; ``limiter`` says what holds the time step down."""
 
@@ -80,6 +88,8 @@ class Progress(Message, frozen=True):
     eta: float
     energy: Energy
     updates_per_second: float
+    parts: dict[str, PartEnergy] = {}
+    """Empty where there is one part alone."""
 
 
 class Load(Message, frozen=True):
@@ -119,6 +129,14 @@ class Counts(Message, frozen=True):
     particles: int = 0
     facets: int = 0
     """That have broken."""
+    smallest: int = 0
+    """Where ``sizes`` begins."""
+    sizes: list[int] = []
+    """How many fragments are as long as 2^((smallest + i) / 2) m, and shorter than the next; empty where nothing can
+    break."""
+    counted: int = -1
+    """Step of the state whose ``fragments`` and ``sizes`` these are, the present one or one not long before; -1 where
+    that is not known."""
 
 
 class Balance(Message, frozen=True):

@@ -85,6 +85,15 @@ def _column(column: list[str]) -> Column:
         return column
 
 
+def by_part(told: Columns) -> dict[str, dict[str, Sequence[float]]]:
+    """The energies of the parts in a history by name and part; empty where there is one part alone."""
+    found: dict[str, dict[str, Sequence[float]]] = {}
+    for column in told:
+        if (named := history.part_of(column)) is not None:
+            found.setdefault(named[0], {})[named[1]] = told.numbers(column)
+    return found
+
+
 def joined(tables: Iterable[tuple[int, Columns]]) -> Columns:
     """Fragment tables one below the other, with the number of each table's frame as the column ``frame``."""
     names = list(fragments.COLUMNS)

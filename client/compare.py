@@ -143,7 +143,7 @@ def material(a: Result, b: Result, names: Sequence[str] = ()) -> Material:
     told = {name: run.history for name, run in runs.items()}
     both = common(a.history, b.history)
     chosen = [n for n in both if n in _DRAWN and any(any(each.numbers(n)) for each in told.values())]
-    chosen += [n for n in both if n not in history.COLUMNS]
+    chosen += [n for n in both if n not in history.COLUMNS and history.part_of(n) is None]
     tables = {name: run.fragments_of() for name, run in runs.items() if run.fragment_tables}
     return Material(told, tables, list(names or chosen))
 

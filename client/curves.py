@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from conoid.cases import history
 from conoid.cases.fragments import DUST
 
-from .columns import Columns
+from .columns import Columns, by_part
 from .compare import Material
 from .errors import ClientError
 
@@ -35,8 +35,11 @@ def save(figure: Figure, out: Path) -> Path:
 
 
 def energy(told: Columns) -> Figure:
-    """The whole ledger; its terms without the kinetic one and what came in; the residual."""
-    figure, (left, middle, right) = _panels(3)
+    """The whole ledger; its terms without the kinetic one and what came in; the residual; and of several parts the
+    kinetic and the internal energy of each.
+    """
+    parts = {name: _largest(some) for name, some in by_part(told).items()}
+    figure, (left, middle, right, *others) = _panels(3 + len(parts))
     t = _micro(told)
     left.plot(t, told.numbers("kinetic"), color="#4c78a8", label="kinetic", linewidth=1.4)
     came = [a + b for a, b in zip(told.numbers("initial"), told.numbers("external"), strict=True)]
@@ -52,7 +55,17 @@ def energy(told: Columns) -> Figure:
     _name(left, "energy", "energy, J", ylim=(0, None))
     _name(middle, "without the kinetic term", "energy, J")
     _name(right, "residual of the ledger", "of the largest energy that came in")
+    for axes, (name, some) in zip(others, parts.items(), strict=True):
+        for (part, values), colour in zip(some.items(), _COLOURS * len(some), strict=False):
+            axes.plot(t, values, color=colour, label=part, linewidth=1.4)
+        _name(axes, f"{name} energy of each part", "energy, J")
     return figure
+
+
+def _largest(curves: dict[str, Sequence[float]]) -> dict[str, Sequence[float]]:
+    """As many as a panel has room for, those that rise highest."""
+    chosen = sorted(curves, key=lambda name: -max(curves[name], default=0.0))[:_PROBES]
+    return {name: curves[name] for name in curves if name in chosen}
 
 
 def steps(told: Columns) -> Figure:
@@ -110,8 +123,8 @@ def columns(told: Columns, names: Sequence[str] = ()) -> Figure:
 
 
 def probes(told: Columns) -> list[str]:
-    """The columns that belong to the case alone."""
-    return [name for name in told if name not in history.COLUMNS]
+    """The columns that belong to the probes of the case."""
+    return [name for name in told if name not in history.COLUMNS and history.part_of(name) is None]
 
 
 def overlaid(runs: Mapping[str, Columns], names: Sequence[str], spare: int = 0) -> Figure:

@@ -10,6 +10,7 @@ from conoid.cases.messages import Balance, Load, Log
 from conoid.cases.outcome import Outcome
 
 from . import html, replay3d
+from .columns import by_part
 from .compare import summary
 from .errors import ClientError, UnfinishedError, ViewError
 from .figures import count, si
@@ -144,7 +145,18 @@ def _energy(result: Result) -> str:
         terms = ((name, getattr(ended.energy, name)) for name in ended.energy.__struct_fields__ if name != "residual")
         rows = [[name, si(value, "J")] for name, value in terms if value]
     at_the_end = html.table(["energy at the end", ""], rows, [1]) if rows else ""
-    return _curve(result, "energy", "The energy ledger over time") + at_the_end
+    return _curve(result, "energy", "The energy ledger over time") + at_the_end + _parts(result)
+
+
+def _parts(result: Result) -> str:
+    """The energy of each part at the end of the history; nothing where there is one part alone."""
+    try:
+        told = by_part(result.history)
+    except UnfinishedError:
+        return ""
+    parts = next(iter(told.values()), {})
+    rows = [[part, *(si(of[part][-1], "J") for of in told.values())] for part, values in parts.items() if values]
+    return html.table(["part, at the end", *told], rows, [1, 2]) if rows else ""
 
 
 def _fragments(result: Result) -> str:

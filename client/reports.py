@@ -31,7 +31,7 @@ def drawing(module: str) -> Any:
 
 @figures.command(name="energy")
 def energy_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: Token = None) -> None:
-    """Draw the energy ledger over time, also without its kinetic term, and the residual."""
+    """Draw the energy ledger over time, also without its kinetic term, the residual, and each part's energy."""
     curves = drawing("curves")
     with opened(source, url, token) as result:
         typer.echo(curves.save(curves.energy(result.history), out))

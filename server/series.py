@@ -6,6 +6,7 @@ from typing import Any
 
 import msgspec
 
+from conoid.cases.history import OF_PARTS
 from conoid.cases.messages import Counts, Energy, Load, Progress, Snapshot
 
 from .history import History, Sample
@@ -21,13 +22,15 @@ _snapshot = msgspec.json.Decoder(Snapshot)
 def body(history: History, points: int) -> bytes:
     """The whole answer; under the lock of the history."""
     reports = [_read(sample) for sample in _spread(_kept(history), points)]
-    loads = [report.load for report in reports]
+    loads, once = [report.load for report in reports], _once(reports)
     final = history.state.final
     return msgspec.json.encode({
         "last": history.last,
         "state": history.state,
         "elapsed": 0.0 if history.began is None else (history.wall if final else time.time()) - history.began,
-        "series": _columns(reports, history.began or 0.0),
+        "series": _columns(once, history.began or 0.0),
+        "parts": _parts(once),
+        "sizes": _sizes(once[-1].counted if once else None),
         "ranks": _ranks(_spread(loads, _NUMBERS // max(1, sum(map(len, loads[-1].phases.values()))) if loads else 1)),
         "balance": [msgspec.Raw(line) for line in history.cuts],
         "snapshots": listed(history),
@@ -46,10 +49,10 @@ class _Report(msgspec.Struct, frozen=True):
     snapshot: Snapshot | None
 
     @property
-    def fragments(self) -> int | None:
-        """By whatever was told last."""
+    def counted(self) -> Counts | Snapshot | None:
+        """Whatever tells of the fragments of the latest state."""
         told = [message for message in (self.counts, self.snapshot) if message is not None]
-        return max(told, key=lambda message: message.seq).fragments if told else None
+        return max(told, key=lambda message: (_counted(message), message.seq)) if told else None
 
 
 def _read(sample: Sample) -> _Report:
@@ -76,14 +79,13 @@ def _spread(items: Sequence[Any], most: int) -> list[Any]:
 
 
 def _columns(reports: list[_Report], began: float) -> dict[str, list[Any]]:
-    """By name; a run that has gone on from a checkpoint has told some times twice, and the later word counts."""
-    reports = _once(reports)
+    """By name."""
     columns: dict[str, list[Any]] = {
         "t": [r.load.t for r in reports],
         "step": [r.load.step for r in reports],
         "elapsed": [r.load.wall - began for r in reports],
         "imbalance": [r.load.imbalance for r in reports],
-        "fragments": [r.fragments for r in reports],
+        "fragments": [r.counted.fragments if r.counted is not None else None for r in reports],
     }
     for name in ("elements", "nodes", "shared", "facets", "particles"):
         columns[name] = [getattr(r.counts, name, None) for r in reports]
@@ -97,7 +99,25 @@ def _columns(reports: list[_Report], began: float) -> dict[str, list[Any]]:
     return columns
 
 
+def _counted(message: Counts | Snapshot) -> int:
+    """The step of the fragments that it tells of."""
+    return message.counted if isinstance(message, Counts) and message.counted >= 0 else message.step
+
+
+def _sizes(told: Counts | Snapshot | None) -> dict[str, Any]:
+    """How many fragments have which size, as these messages have it; ``t`` in s."""
+    return {"t": told.t, "smallest": told.smallest, "sizes": told.sizes} if told is not None else {}
+
+
+def _parts(reports: list[_Report]) -> dict[str, dict[str, list[float | None]]]:
+    """By part and name, a number a report; empty where there is one part alone."""
+    told = [report.progress.parts if report.progress is not None else {} for report in reports]
+    names = {part: None for each in told for part in each}
+    return {part: {name: [getattr(each.get(part), name, None) for each in told] for name in OF_PARTS} for part in names}
+
+
 def _once(reports: list[_Report]) -> list[_Report]:
+    """A run that has gone on from a checkpoint has told some times twice, and the later word counts."""
     kept: list[_Report] = []
     for report in reversed(reports):
         if not kept or report.load.step < kept[-1].load.step:

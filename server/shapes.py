@@ -144,6 +144,10 @@ class History(msgspec.Struct, kw_only=True):
     state: str | None
     elapsed: float
     series: dict[str, Any]
+    parts: dict[str, dict[str, list[float | None]]]
+    """Energies of each part at the times of the series, J; empty where there is one part alone."""
+    sizes: dict[str, Any]
+    """Newest distribution of the sizes of fragments, as messages of counts and snapshots have it."""
     ranks: dict[str, Any]
     balance: list[dict[str, Any]]
     snapshots: list[dict[str, Any]]

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from conoid.cases import messages
+from conoid.cases.history import of_parts
 from conoid.cases.outcome import Outcome
 from conoid.cases.quantities import FIELD_UNITS
 from conoid.cases.run import State
@@ -54,7 +55,8 @@ def compute(
         rewind.rewind(folder, sim.clock.step, sim.clock.frame)
         checkpoint.forget(folder, sim.clock.step)
     probes = {probe.name: FIELD_UNITS[probe.field] for probe in case.probes}
-    history = History(folder, probes) if comm.rank == 0 else None
+    columns = {**of_parts(sim.model.parts), **probes}
+    history = History(folder, columns) if comm.rank == 0 else None
     setup = time.monotonic() - began
     _announce(sim, journal, setup)
     loop = Loop(sim, folder, journal, history, signals, Balance.of(sim), start)

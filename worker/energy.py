@@ -4,11 +4,14 @@ Kinetic energy is the form that the leapfrog step conserves together with the tr
 1/2 m v(n-1/2) . v(n+1/2) for equal steps, and with the old step dt- beside the mean step dt of the kick
 1/2 m v(n-1/2) . v(n+1/2) + 1/2 (dt- - dt) v(n-1/2) . f(n). Work of the stress is summed tet by tet from stress and
 strain rate, not from nodal forces, so the residual compares two independent accounts.
+
+The sums over nodes and tets are made part by part, in the quanta of the whole: those of the whole are the sums of the
+same integers, so that their bits do not know of parts, and what each part has costs no further pass.
 """
 
 import numpy as np
 
-from conoid.cases.messages import Energy
+from conoid.cases.messages import Energy, PartEnergy
 
 from .boundaries import Boundary
 from .clock import Clock
@@ -17,7 +20,7 @@ from .erosion import Erosion
 from .fracture.stage import Fracture
 from .jit import njit
 from .parallel.comm import Comm
-from .parallel.fixed_point import Table, add_limbs, exact_sums, exact_totals
+from .parallel.fixed_point import Grouped, add_limbs, exact_sums, exact_totals
 from .state import CHUNK, WORK, WORK_PLASTIC, WORK_VISCOUS, Block, Floats, Ints, Model
 
 _WORKS = (WORK, WORK_VISCOUS, WORK_PLASTIC)
@@ -47,6 +50,8 @@ class Ledger:
         """Linear momentum at the last call, kg m/s, that of what has left included."""
         self.eroded_mass = 0.0
         """kg; of nodes that have left, at the last call."""
+        self.parts: dict[str, PartEnergy] = {}
+        """Of each part at the last call; empty where there is one part alone."""
 
     def keep(self) -> tuple[float, float, float, Floats, float]:
         """What it remembers, equal on all ranks."""
@@ -62,8 +67,11 @@ class Ledger:
         uneven = 0.5 * (self._clock.last_dt - self._clock.mean_dt) / nodes.scale
         loss, external = self._boundary_work()
         columns = _of_nodes(before, nodes.v, nodes.force, nodes.mass, loss, external, nodes.owned, uneven)
-        sums = exact_totals(self._comm, Table(columns), ElementWork(self._model.blocks))
+        parts = len(self._model.parts)
+        of_nodes = Grouped(columns, nodes.part[nodes.owned], parts)
+        sums, of_parts = exact_totals(self._comm, of_nodes, ElementWork(self._model.blocks, parts))
         node_sums, (work, viscous, plastic) = sums[:6], sums[6:]
+        self.parts = _named(self._model.parts, of_parts[:, 0], of_parts[:, 6] + of_parts[:, 7])
         gone_work, gone_viscous, gone_plastic, gone_kinetic, gone_momentum = self._gone()
         self.momentum = node_sums[3:6] + gone_momentum
         self.lost = float(node_sums[1]) / self.initial if self.initial > 0.0 else 0.0
@@ -109,13 +117,19 @@ class Ledger:
         return loss, external
 
 
+def _named(parts: list[str], kinetic: Floats, internal: Floats) -> dict[str, PartEnergy]:
+    """By part; none where there is one part alone."""
+    rows = zip(parts, kinetic.tolist(), internal.tolist(), strict=True)
+    return {part: PartEnergy(kinetic=k, internal=i) for part, k, i in rows} if len(parts) > 1 else {}
+
+
 class ElementWork:
-    """Three columns over all tets: work of the stress, of the bulk viscosity, and plastic work, J; read where they
-    are.
+    """Three columns over all tets, grouped by part: work of the stress, of the bulk viscosity, and plastic work, J;
+    read where they are.
     """
 
-    def __init__(self, blocks: list[Block]) -> None:
-        self._blocks = blocks
+    def __init__(self, blocks: list[Block], parts: int) -> None:
+        self._blocks, self._parts = blocks, parts
 
     def largest(self) -> Floats:
         return self._visited(np.zeros(0))[0]
@@ -124,9 +138,9 @@ class ElementWork:
         return self._visited(scale)[1]
 
     def _visited(self, scale: Floats) -> tuple[Floats, Ints]:
-        largest, words = np.zeros(3), np.zeros(6, np.int64)
+        largest, words = np.zeros(3), np.zeros((self._parts, 6), np.int64)
         for block in self._blocks:
-            _visit_work(largest, words, block.state, block.n, scale)
+            _visit_work(largest, words[block.part], block.state, block.n, scale)
         return largest, words
 
 

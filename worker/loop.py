@@ -7,8 +7,10 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from conoid.cases import layout, messages
-from conoid.cases.messages import Energy
+from conoid.cases.messages import Energy, PartEnergy
 from conoid.cases.run import Cause, State
 
 from . import simulation, step
@@ -17,6 +19,7 @@ from .errors import EnergyError
 from .groups import Groups
 from .migration import checkpoint
 from .output import frames
+from .output.counts import Counter
 from .output.damage import damage
 from .output.history import History
 from .output.journal import Journal
@@ -85,6 +88,7 @@ class Loop:
         """``start``: what is known when the first step begins."""
         self.sim = sim
         self.energy: Energy | None = None
+        self._parts: dict[str, PartEnergy] = {}
         self.stopped = 0
         self._told = False
         self._folder = folder
@@ -99,7 +103,7 @@ class Loop:
         self._reported_step = sim.clock.step
         self._pace = Pace(sim.clock.t, self._began)
         self._logged = -math.inf
-        self._counted = (0, 0, 0)
+        self._counter = Counter()
         self.balance = balance
         self._groups = Groups(sim, balance.trigger.cost)
         self.snapshots = Snapshots(sim, folder, journal)
@@ -199,12 +203,13 @@ class Loop:
     def _look(self, before: Floats) -> None:
         """A line of the history: ledger, momentum and probes at time n."""
         sim, clock = self.sim, self.sim.clock
-        self.energy = sim.ledger.close(before)
+        self.energy, self._parts = sim.ledger.close(before), sim.ledger.parts
         probes = sim.probes.measure()
         self._sample = int(clock.t * sim.case.run.samples / sim.case.run.end_time) + 1
         limiter = sim.limiter()
         if self._history is not None:
-            extra = [*sim.ledger.momentum, *probes]
+            parts = [value for part in self._parts.values() for value in msgspec.structs.astuple(part)]
+            extra = [*sim.ledger.momentum, *parts, *probes]
             self._history.write(clock.step, clock.t, clock.told, limiter, self.energy, extra)
         if not self.energy.residual <= sim.case.run.residual_limit:
             raise EnergyError(
@@ -220,7 +225,7 @@ class Loop:
         if sim.record is None:
             path = frames.write(self._folder, index, clock.t, sim.model, sim.comm, damage=damaged)
         else:
-            sim.record.look()
+            self._counter.find(sim)
             path = frames.write(self._folder, index, clock.t, sim.model, sim.comm, sim.record.labels, damaged)
             sim.record.write(self._folder, index, clock.t)
         clock.frame += 1
@@ -236,13 +241,17 @@ class Loop:
             limiter = sim.limiter()
             outside = sim.contact.outside if sim.contact is not None else 0
             sent = {"waiting": waiting, "outside": outside, **sim.comm.sent.since_last()}
-            loads = sim.comm.share((seconds, sent))
-            self._count()
+            ending = clock.done or bool(sim.reduction.stop)
+            loads = sim.comm.share((seconds, sent, self._counter.due(sim, time.monotonic(), ending=ending)))
+            if loads[0][2]:
+                self._counter.find(sim)
+            if counted := self._counter.changed(sim, self.balance.events):
+                self._tell(messages.Counts, **counted)
         work, told = ({name: [load[i][name] for load in loads] for name in loads[0][i]} for i in (0, 1))
         window = Window(clock.step - self._reported_step, work)
         self._reported_step = clock.step
         self.balance.look(window)
-        if sim.reduction.groups or clock.done or sim.reduction.stop:
+        if sim.reduction.groups or ending:
             self._record()
         if self._journal is None:
             return
@@ -256,7 +265,7 @@ class Loop:
             self._tell(
                 messages.Progress, end_time=sim.case.run.end_time, dt=clock.told, limiter=limiter,
                 eta=self._pace.left(sim.case.run.end_time - clock.t), energy=self.energy,
-                updates_per_second=(self.updates - self._reported_updates) / elapsed,
+                updates_per_second=(self.updates - self._reported_updates) / elapsed, parts=self._parts,
             )  # fmt: skip
         self._tell(messages.Load, phases=work, imbalance=window.imbalance, steps=window.steps, **told)
         self._reported, self._reported_updates = now, self.updates
@@ -265,20 +274,6 @@ class Loop:
         """Loads of groups to the journal; all ranks take part."""
         with self.sim.timers.phase("output"):
             self._tell(messages.Groups, **self._groups.record(self.sim))
-
-    def _count(self) -> None:
-        """How large the model is, when that has changed; all ranks take part."""
-        sim, model = self.sim, self.sim.model
-        if (model.elements_global, model.nodes_global, self.balance.events) == self._counted:
-            return
-        self._counted = model.elements_global, model.nodes_global, self.balance.events
-        held, shared = sim.comm.gather(sum(block.n for block in model.blocks)), sim.shared_nodes()
-        self._tell(
-            messages.Counts, elements=model.elements_global, nodes=model.nodes_global, shared=shared,
-            fragments=sim.record.count if sim.record is not None else len(model.parts), elements_per_rank=held or [],
-            particles=sim.erosion.particles if sim.erosion is not None else 0,
-            facets=sim.fracture.broken if sim.fracture is not None else 0,
-        )  # fmt: skip
 
     def _tell(self, kind: type[messages.Message], **fields: Any) -> None:
         if self._journal is not None:

@@ -5,7 +5,8 @@ import { echarts } from "./libraries.js";
 
 const GROUP = "run";
 const FONT = 12;
-const NEAR = "100px"; // Of the window: a chart farther off is not drawn, and is when it comes near.
+const NEAR = "100px"; // Of the window: a chart farther off is drawn when there is time, and again when it comes near.
+const whenIdle = globalThis.requestIdleCallback ?? ((work) => setTimeout(work, 200)); // Not every browser has it.
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 
 // A chart of `height` px. `option()` gives what ECharts calls an option, or null while there is nothing to draw.
@@ -40,8 +41,18 @@ export class Chart {
     if (stale) this.draw();
   }
 
-  draw() {
-    if (!this.seen) return;
+  // Out of view only the first time, and where that is `needed`.
+  draw(needed = false) {
+    if (this.seen) this.paint();
+    else if ((needed || !this.chart) && !this.waiting) this.waiting = whenIdle(() => this.late());
+  }
+
+  late() {
+    this.waiting = 0;
+    if (!this.closed) this.paint();
+  }
+
+  paint() {
     const option = this.kit && this.element.clientWidth ? this.option() : null;
     if (!option) return;
     this.chart ??= this.init();
@@ -70,6 +81,7 @@ export class Chart {
   }
 
   close() {
+    this.closed = true;
     this.watch.disconnect();
     this.eye.disconnect();
     this.dark.removeEventListener("change", this.redraw);

@@ -21,12 +21,13 @@ export async function readPlan(run, signal) {
 }
 
 export function take(live, history, info = {}, plan = null) {
-  const { series = {}, ranks = {}, balance = [], snapshots = [], last, state, elapsed } = history;
+  const { series = {}, parts = {}, sizes = {}, ranks = {}, balance = [], snapshots = [], last, state, elapsed } = history;
   const number = series.t?.length ?? 0;
   const rows = Array.from({ length: number }, (_, i) => Object.fromEntries(Object.entries(series).map(([name, values]) => [name, values[i]])));
-  live.ledger = rows.filter((row) => Number.isFinite(row.dt)).map((row) => ({ t: row.t, dt: row.dt, limiter: row.limiter, energy: energy(row) }));
+  live.ledger = rows.map((row, i) => ({ t: row.t, dt: row.dt, limiter: row.limiter, energy: energy(row), parts: at(parts, i) })).filter(({ dt }) => Number.isFinite(dt));
   live.sizes = rows.filter((row) => Number.isFinite(row.nodes)).map(({ t, nodes, facets, fragments }) => ({ t, nodes, facets, fragments }));
   live.loads = loads(ranks, rows);
+  if (sizes.sizes?.length) live.spread = sizes;
   live.balances = balance;
   live.snapshots = snapshots;
   Object.assign(live, { seq: last, state, heard: Date.now() / 1000 });
@@ -37,15 +38,19 @@ export function take(live, history, info = {}, plan = null) {
 
 // What the head and the bars show until the next message: the newest report.
 function latest(live, row, ranks, progress, plan) {
-  const at = live.ledger.at(-1);
+  const ledger = live.ledger.at(-1);
   const end = plan?.run?.end_time ?? progress?.end_time ?? row.t;
-  const told = { ...row, limiter: at?.limiter ?? "", dt: at?.dt ?? 0, energy: at?.energy };
-  if (at) live.progress = progress ?? { ...told, end_time: end };
+  const told = { ...row, limiter: ledger?.limiter ?? "", dt: ledger?.dt ?? 0, energy: ledger?.energy };
+  if (ledger) live.progress = progress ?? { ...told, end_time: end };
   if (Number.isFinite(row.nodes)) live.counts = row;
   const [phases, waiting] = phasesAt(ranks, (ranks.t?.length ?? 0) - 1);
   const groups = grouped({ phases, waiting }, 0);
   live.load = { imbalance: row.imbalance, groups, totals: totals(groups) };
 }
+
+// Of { part: { kinetic: […], internal: […] } } one moment.
+const at = (parts, i) => Object.fromEntries(Object.entries(parts).map(([part, columns]) =>
+  [part, Object.fromEntries(Object.entries(columns).map(([name, values]) => [name, values[i]]))]));
 
 const energy = (row) => Object.fromEntries([...TERMS.map(([name]) => name), "external", "initial", "residual"].map((name) => [name, row[name] ?? 0]));
 

@@ -12,9 +12,11 @@ export class Live {
   constructor(run) {
     Object.assign(this, { run, seq: 0, state: "accepted", cause: null, message: "", began: null, wall: 0, heard: 0 });
     Object.assign(this, { started: null, progress: null, load: null, counts: null, finished: null, loaded: 0 });
-    this.ledger = []; // { t, dt, limiter, energy }
+    this.ledger = []; // { t, dt, limiter, energy, parts: { name: { kinetic, internal } } }
     this.loads = []; // { t, imbalance, contact: share, shares: [of the busiest, a rank] }
     this.sizes = []; // { t, nodes, facets, fragments }
+    this.spread = null; // { t, smallest, sizes }: how many fragments have which size now
+    this.found = -1; // Step of the newest state whose fragments are known
     this.balances = []; // the messages
     this.snapshots = []; // { n, t, fragments, … }
     this.log = []; // messages for people
@@ -41,8 +43,8 @@ export class Live {
 
   on_progress(message) {
     this.progress = message;
-    const { t, dt, limiter, energy } = message;
-    keep(this.ledger, { t, dt, limiter, energy });
+    const { t, dt, limiter, energy, parts = {} } = message;
+    keep(this.ledger, { t, dt, limiter, energy, parts });
   }
 
   on_load(message) {
@@ -52,17 +54,27 @@ export class Live {
     keep(this.loads, { t: message.t, imbalance: message.imbalance, ...compared(groups) });
   }
 
+  // Its fragments may be those of a step not long before, and a snapshot may have told of later ones.
   on_counts(message) {
-    this.counts = message;
-    const { t, nodes, facets, fragments } = message;
+    const { t, step, nodes, facets, counted = -1 } = message;
+    const fragments = this.spreads(counted < 0 ? step : counted, message) ? message.fragments : this.counts?.fragments ?? message.fragments;
+    this.counts = { ...message, fragments };
     keep(this.sizes, { t, nodes, facets, fragments });
+  }
+
+  // Whether nothing is known of a later step than that of the fragments of a message; their sizes are taken in.
+  spreads(step, { t, smallest, sizes }) {
+    if (step < this.found) return false;
+    this.found = step;
+    if (sizes?.length) this.spread = { t, smallest, sizes };
+    return true;
   }
 
   on_balance(message) { this.balances.push(message); }
 
-  // It counts the fragments too, and often later than the counts do.
+  // It counts the fragments too.
   on_snapshot(message) {
-    if (this.counts) this.counts = { ...this.counts, fragments: message.fragments };
+    if (this.spreads(message.step, message) && this.counts) this.counts = { ...this.counts, fragments: message.fragments };
     if (!this.snapshots.some(({ n }) => n === message.n)) this.snapshots.push(message);
   }
 

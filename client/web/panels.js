@@ -1,7 +1,7 @@
 // The parts of a run's page that are no charts: bars of the ranks, balance events, the log by rank, reference numbers.
 
 import { tail } from "./api.js";
-import { clock, h, legend, si, words } from "./figures.js";
+import { clock, h, legend, si } from "./figures.js";
 import { GROUPS } from "./live.js";
 
 const MOST_RANKS = 24;
@@ -120,13 +120,18 @@ export class Logs {
   }
 }
 
+const COLUMNS = ["quantity", "computed", "expected", "tolerance", "result", "source"];
+
+// A narrow window shows a row as lines, each with the name of its column; the roles stay when the layout is no table's.
+const cell = (what, column, text) => h(what, { role: "cell", "data-name": COLUMNS[column] }, text);
+
 export function checksTable(checks) {
   const exact = (value, unit) => (unit ? si(value, unit, 4) : String(Number(value?.toPrecision(4))));
-  return [h("div.card-head", {}, h("h2", {}, "Against the reference")), h("div.scroll", { tabindex: 0 }, h("table.checks", {},
-    h("thead", {}, h("tr", {}, ["quantity", "computed", "expected", "tolerance", "result", "source"].map((name) => h("th", { scope: "col" }, words(name))))),
-    h("tbody", {}, checks.map((check) => h("tr", {},
-      h("td", {}, check.name),
-      ...[exact(check.value, check.unit), exact(check.expected, check.unit), `± ${exact(check.tolerance, check.unit)}`].map((text) => h("td.number", {}, text)),
-      h(`td.${check.pass ? "good" : "bad"}`, {}, check.pass ? "agrees" : "differs"),
-      h("td.hint", {}, check.source ?? ""))))))];
+  return [h("div.card-head", {}, h("h2", {}, "Against the reference")), h("div.scroll", { tabindex: 0 }, h("table.checks.stacked", { role: "table" },
+    h("thead", { role: "rowgroup" }, h("tr", { role: "row" }, COLUMNS.map((name) => h("th", { scope: "col", role: "columnheader" }, name)))),
+    h("tbody", { role: "rowgroup" }, checks.map((check) => h("tr", { role: "row" },
+      cell("td", 0, check.name),
+      [exact(check.value, check.unit), exact(check.expected, check.unit), `± ${exact(check.tolerance, check.unit)}`].map((text, i) => cell("td.number", 1 + i, text)),
+      cell(`td.${check.pass ? "good" : "bad"}`, 4, check.pass ? "agrees" : "differs"),
+      cell("td.hint", 5, check.source ?? ""))))))];
 }

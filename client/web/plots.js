@@ -1,6 +1,7 @@
 // What each chart of a run shows: the record of the run (live.js) as series.
 
 import { Chart, axis, heat, limit, pins, series, time } from "./charts.js";
+import { named } from "./colours.js";
 import { h, percent, si } from "./figures.js";
 import { TERMS } from "./live.js";
 import { sizes } from "./snapshot.js";
@@ -8,17 +9,23 @@ import { sizes } from "./snapshot.js";
 const TALL = 250;
 const MOST_COLUMNS = 240; // Of the heat map; more are less than a pixel wide on a phone.
 const COUNTED = [["nodes", "compute"], ["facets", "exchange"], ["fragments", "fracture"]];
+const ENERGIES = { terms: "Energy without the kinetic", internal: "Internal energy of the parts", kinetic: "Kinetic energy of the parts" };
 const CURVE = 60; // Points of a fitted law.
 const LEAST = 1; // Fragment, where the axis of their number begins.
 const FLOOR = 1e-10; // Residuals below it are rounding.
 const RESIDUAL = 1e-2; // Above it a run's energy does not close.
 
-// { name: { title, chart, note } }; `onBalance` gets the place of a balance event in live.balances.
+// { name: [chart, title, what stands beside the title] }; `onBalance` gets the place of a balance event in live.balances.
 export function plots(live, onBalance) {
+  const title = h("span", {}, ENERGIES.terms);
+  const by = h("select", { "aria-label": "energy by", hidden: "", onchange: () => {
+    title.textContent = ENERGIES[by.value];
+    made.energy[0].draw();
+  } }, Object.entries({ terms: "by term", internal: "internal, by part", kinetic: "kinetic, by part" }).map(([value, words]) => h("option", { value }, words)));
   const made = {
-    sizes: [new Chart(TALL, "number of fragments of a size and more", () => ofSizes(made.snapshot), { alone: true }), "Fragment sizes"],
+    sizes: [new Chart(TALL, "number of fragments of a size and more", () => ofSizes(made.snapshot, live.spread), { alone: true }), "Fragment sizes"],
     counts: [new Chart(TALL, "counts over time", () => ofCounts(live)), "Counts"],
-    energy: [new Chart(TALL, "energy over time, without the kinetic", () => ofEnergy(live)), "Energy without the kinetic"],
+    energy: [new Chart(TALL, "energy over time", () => ofEnergy(live, by)), title, by],
     residual: [new Chart(TALL, "energy residual over time", () => ofResidual(live)), "Energy residual"],
     imbalance: [new Chart(TALL, "load imbalance over time", () => ofImbalance(live),
       { onClick: ({ seriesName, dataIndex }) => seriesName === "balance" && onBalance(dataIndex), onEnter: (at) => live.balances.length && onBalance(nearest(live, at)) }), "Load imbalance, slowest over mean"],
@@ -30,16 +37,23 @@ export function plots(live, onBalance) {
 }
 
 export const card = (title, note, ...content) => h("section.card.half", {}, h("div.card-head", {}, h("h2", {}, title), note), ...content);
+export const parts = ({ ledger }) => Object.keys(ledger.at(-1)?.parts ?? {});
 
 const end = ({ progress, ledger }) => (progress?.end_time ?? ledger.at(-1)?.t ?? 1);
 const option = (live, y, list) => ({ xAxis: time(end(live)), yAxis: y, series: list });
 
-function ofEnergy(live) {
+function ofEnergy(live, by) {
   if (live.ledger.length < 2) return null;
+  by.hidden = !parts(live).length;
+  if (by.value !== "terms") return option(live, axis("J"), ofParts(live, by.value));
   const there = TERMS.filter(([name]) => name !== "kinetic" && live.ledger.some(({ energy }) => energy[name]));
   return option(live, axis("J"), there.map(([name, tone]) =>
     series({ name, colour: tone, unit: "J", stack: "energy", data: live.ledger.map(({ t, energy }) => [t, Math.max(0, energy[name])]) })));
 }
+
+// One area a part, in the colours that the parts have in the view of the body.
+export const ofParts = (live, name) => parts(live).map((part, i) => series({ name: part, colour: named(i), unit: "J", stack: "energy",
+  data: live.ledger.filter((row) => row.parts[part]).map((row) => [row.t, Math.max(0, row.parts[part][name] ?? 0)]) }));
 
 function ofResidual(live) {
   if (live.ledger.length < 2) return null;
@@ -94,18 +108,43 @@ function ofContact(live) {
     [{ ...series({ name: "contact", colour: "contact", data: live.loads.map(({ t, contact }) => [t, contact]) }), tooltip: { valueFormatter: (value) => percent(value) } }]);
 }
 
-// N(size) over the size, both logarithmic, with the law that fits best.
-function ofSizes(snapshot) {
-  if (!snapshot) return null;
-  const { points, best } = sizes(snapshot);
-  if (points.length < 2) return null;
-  const list = [{ ...series({ name: "fragments as long and longer", colour: "compute", data: points }), type: "scatter", symbolSize: 4 }];
+// N(size) over the size, both logarithmic: of the snapshot that is shown, with the law that fits best, and of the newest
+// report in its bins, which counts dust too.
+function ofSizes(snapshot, spread) {
+  const list = [...(snapshot ? ofSnapshot(snapshot) : []), ...(spread ? [ofSpread(spread)] : [])];
+  if (!list.length) return null;
+  return { xAxis: axis("m", { type: "log", splitLine: { show: false } }), yAxis: axis("", { type: "log", min: LEAST }), series: list,
+    tooltip: { trigger: "item", formatter: ({ value }) => `${Math.round(value[1])} of ${si(value[0], "m")} and more` } };
+}
+
+function ofSnapshot(snapshot) {
+  const { points, best } = fitted(snapshot);
+  if (points.length < 2) return [];
+  const list = [{ ...series({ name: "as long and longer", colour: "compute", data: points }), type: "scatter", symbolSize: 4 }];
   if (best) {
     const [low, high] = [points[0][0], points.at(-1)[0]];
     const curve = Array.from({ length: CURVE }, (_, i) => low * (high / low) ** (i / (CURVE - 1))).map((size) => [size, points.length * best.longer(size)]);
     const told = best.law === "power" ? `exponent ${best.parameter.toFixed(2)}` : si(best.parameter, "m");
     list.push({ ...series({ name: `${best.law} law, ${told}`, colour: "bad", data: curve.filter(([, number]) => number >= LEAST) }), lineStyle: { type: "dashed" } });
   }
-  return { xAxis: axis("m", { type: "log", splitLine: { show: false } }), yAxis: axis("", { type: "log", min: LEAST }), series: list,
-    tooltip: { trigger: "item", formatter: ({ value }) => `${Math.round(value[1])} of ${si(value[0], "m")} and more` } };
+  return list;
+}
+
+const known = new WeakMap(); // Fits by snapshot: the chart is drawn more often than it has new points.
+
+function fitted(snapshot) {
+  if (!known.has(snapshot)) known.set(snapshot, sizes(snapshot));
+  return known.get(snapshot);
+}
+
+const ofSpread = ({ t, ...spread }) => ({ ...series({ name: `dust too, ${si(t, "s")}`, colour: "faint", data: longer(spread) }), step: "end", sampling: undefined });
+
+// [size, number of fragments as long and longer] at the beginning of each bin, from bins of half a power of two.
+export function longer({ smallest, sizes: counts }) {
+  let left = counts.reduce((sum, count) => sum + count, 0);
+  return counts.map((count, i) => {
+    const point = [2 ** ((smallest + i) / 2), left];
+    left -= count;
+    return point;
+  });
 }

@@ -39,9 +39,12 @@ export class RunPage {
     this.charts = plots(live, (place) => this.balances.open(place));
     this.body = new Body(live.run, (snapshot) => {
       this.charts.snapshot = snapshot;
-      this.charts.sizes[0].draw();
+      this.charts.sizes[0].draw(true);
     });
-    const plot = (name) => card(this.charts[name][1], this.notes[name], this.charts[name][0].element);
+    const plot = (name) => {
+      const [chart, title, beside] = this.charts[name];
+      return card(title, h("span.beside", {}, beside, this.notes[name]), chart.element);
+    };
     this.buttons = ["checkpoint", "snapshot", "cancel"].map((verb) =>
       h(verb === "cancel" ? "button.stop" : "button.quiet", { type: "button", onclick: ({ currentTarget }) => this.ask(verb, currentTarget) }, verb[0].toUpperCase() + verb.slice(1)));
     this.element = h("div", {}, this.head, h("div.cards", {}, this.body.element, this.checks,
@@ -157,8 +160,7 @@ export class RunPage {
 
   // After the frame that has the news in the head and the bars.
   drawCharts() {
-    const charts = Object.entries(this.charts).filter(([name, value]) => name !== "sizes" && Array.isArray(value));
-    if (!this.abort.signal.aborted) for (const [, [chart]] of charts) chart.draw();
+    if (!this.abort.signal.aborted) for (const [chart] of Object.values(this.charts).filter(Array.isArray)) chart.draw(FINAL.has(this.live.state));
   }
 
   drawNotes() {

@@ -19,6 +19,7 @@ OUT = Path(__file__).parents[2] / "docs" / "page.png"
 _OF_16 = "1k0aaaaaaaaaaaaaaaaaaa"
 _WINDOW, _PHONE = (1280, 720), (390, 844)
 _LOOKS = (("light", _WINDOW, False), ("dark", _WINDOW, True), ("phone", _PHONE, False), ("phone dark", _PHONE, True))
+_DRAWN = "[...document.querySelectorAll('.plot')].every((plot) => plot.querySelector('canvas'))"
 _SETTLED = 2.0
 """s after which nothing moves any more. Chosen."""
 
@@ -70,18 +71,19 @@ def _draw_all(browser: Browser, site: Site, run: str, folder: Path) -> None:
     for name, size, dark in _LOOKS:
         page = _opened(browser.page(*size, dark=dark, phone=size == _PHONE), site, run)
         page.draw(folder / f"{name}.png")
-        for at in range(
-            0, page.evaluate("document.body.scrollHeight"), size[1]
-        ):  # Charts are drawn when they are seen.
-            page.evaluate(f"scrollTo(0, {at})")
-            time.sleep(0.5)
-        page.evaluate("scrollTo(0, 0)")
-        page.draw(folder / f"{name} whole.png", whole=True)
+        _draw_whole(page, folder / f"{name} whole.png")
         page.go(f"{site.url}#/")
         page.wait("document.querySelector('td a.name')")
         page.draw(folder / f"{name} list.png")
         page.close()
-    _opened(browser.page(*_WINDOW), site, _OF_16).draw(folder / "16 ranks.png", whole=True)
+    _draw_whole(_opened(browser.page(*_WINDOW), site, _OF_16), folder / "16 ranks.png")
+
+
+def _draw_whole(page: Page, out: Path) -> None:
+    """With every chart, also those out of view; a heat map of many ranks is drawn in pieces."""
+    page.wait(_DRAWN)
+    time.sleep(_SETTLED)
+    page.draw(out, whole=True)
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ EXAMPLES: list[messages.AnyMessage] = [
     messages.Started(run="r", seq=2, ranks=2, elements=6, nodes=8, end_time=1e-3, setup=0.5, parts={"rod": 6}),
     messages.Progress(
         run="r", seq=3, step=7, t=1e-6, end_time=1e-3, dt=1e-9, limiter="tet 3 of rod: sound", eta=3.0, energy=ENERGY,
-        updates_per_second=1e7,
+        updates_per_second=1e7, parts={"rod": messages.PartEnergy(kinetic=1.0, internal=9.0)},
     ),
     messages.Load(run="r", seq=4, phases={"forces": [0.1, 0.2]}, imbalance=4 / 3),
     messages.Balance(

@@ -81,6 +81,18 @@ def test_energy_is_drawn_without_its_kinetic_term(runs: tuple[Result, Result]) -
     assert not middle.lines, "nothing but kinetic energy is there"
 
 
+def test_energy_is_drawn_part_by_part_where_there_are_several(tmp_path: Path) -> None:
+    parts = {f"{name}.{part}": [1.0, 2.0] for part in ("glass", "steel") for name in ("kinetic", "internal")}
+    write_history(
+        write_run(tmp_path / "bar"), t=[0.0, 1e-6], initial=[8.0] * 2, residual=[1e-6] * 2, **parts, push=[0.0, 1.0]
+    )
+    told = Result.open(tmp_path / "bar").history
+    *_, kinetic, internal = curves.energy(told).axes
+    assert [line.get_label() for line in kinetic.get_lines()] == ["glass", "steel"]
+    assert internal.get_title() == "internal energy of each part"
+    assert curves.probes(told) == ["push"]
+
+
 def test_the_step_is_drawn_by_what_holds_it(runs: tuple[Result, Result]) -> None:
     axes = curves.steps(runs[0].history).axes[0]
     assert {str(line.get_label()) for line in axes.lines[1:]} == {"stability: rod"}

@@ -101,6 +101,21 @@ def test_a_run_that_has_not_ended_has_a_report_of_what_is_there(folder: Path, tm
 
 
 @pytest.mark.usefixtures("warm")
+def test_the_parts_have_their_energies_where_there_are_several(folder: Path, tmp_path: Path) -> None:
+    assert "part, at the end" not in read(report.write(Result.open(folder), tmp_path / "one.html", fields=[])).text
+    parts = {
+        "kinetic.rod": [5.0, 3.0],
+        "internal.rod": [0.0, 1.25],
+        "kinetic.ball": [1.0, 0.5],
+        "internal.ball": [0.0] * 2,
+    }
+    write_history(folder, t=[0.0, 4e-5], dt=[1e-8] * 2, **parts)
+    told = read(report.write(Result.open(folder), tmp_path / "two.html", fields=[])).text
+    assert "part, at the endkineticinternal" in told
+    assert "rod3.00 J1.25 J" in told
+    assert "ball500 mJ0 J" in told
+
+
 def test_a_field_that_cannot_be_drawn_is_a_line(folder: Path, tmp_path: Path) -> None:
     text = read(report.write(Result.open(folder), tmp_path / "bar.html", ["fragment"])).text
     assert "fragment: this frame has no field 'fragment'" in text

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from conoid.cases import fragments, history, layout, snapshot
-from conoid.cases.messages import Snapshot, from_json
+from conoid.cases.messages import Counts, Snapshot, from_json
 from conoid.cases.outcome import from_json as outcome_from_json
 
 from .launching import command, ended, processes, started, together, wait_for, wait_until_gone
@@ -43,6 +43,13 @@ def arrays(data: bytes) -> dict[str, Any]:
         name: np.frombuffer(data, array.dtype, int(np.prod(array.shape)), array.offset).reshape(array.shape)
         for name, array in header.arrays.items()
     }
+
+
+def spread(folder: Path, kind: type[Counts | Snapshot]) -> tuple[int, int, list[int]]:
+    """How many fragments the last message of a kind counts, and of which sizes."""
+    lines = (folder / layout.JOURNAL).read_bytes().splitlines()
+    last = [message for message in map(from_json, lines) if isinstance(message, kind)][-1]
+    return last.fragments, last.smallest, last.sizes
 
 
 def of_cause(folder: Path, cause: str) -> bytes:
@@ -81,6 +88,7 @@ def test_the_last_snapshot_says_what_the_tables_say(ranks: int, breaking: Callab
     assert (header.step, header.t) == (int(last["step"]), float(last["t"]))
     assert header.fragments_total == len(rows) == outcome.fragments == len(got["fragment_id"]) > 10
     assert header.tets == outcome.elements - outcome.eroded
+    assert spread(folder, Counts) == spread(folder, Snapshot)
     for row, label in enumerate(got["fragment_id"].tolist()):
         line = rows[label]
         assert got["fragment_mass"][row] == line["mass"]

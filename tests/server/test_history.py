@@ -7,6 +7,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 
 from conoid.cases import layout, messages
@@ -27,6 +28,12 @@ ENERGY = {
 }
 
 
+def parts(k: int) -> dict[str, messages.PartEnergy]:
+    """Told of by newer workers alone."""
+    made = {"rod": (2.0, 0.5 * k), "ball": (1.0, 0.0)}
+    return {name: messages.PartEnergy(kinetic=a, internal=b) for name, (a, b) in made.items()} if k else {}
+
+
 def told(reports: int, ranks: int = 2, every: int = 100) -> Iterator[messages.AnyMessage]:
     """What a run says that has so many reports, and now and then a cut and a snapshot."""
     yield messages.Status(run="r", wall=1000.0, state=State.ACCEPTED)
@@ -39,7 +46,7 @@ def told(reports: int, ranks: int = 2, every: int = 100) -> Iterator[messages.An
             )
         yield messages.Progress(
             **at, end_time=1.0, dt=1e-9 + 1e-15 * k, limiter="stability: tet 1 of rod", eta=1.0,
-            energy=messages.Energy(**ENERGY, residual=1e-6 * k), updates_per_second=1e6,
+            energy=messages.Energy(**ENERGY, residual=1e-6 * k), updates_per_second=1e6, parts=parts(k),
         )  # fmt: skip
         phases = {"elements": [3.0] * ranks, "contact": [1.0] * ranks}
         yield messages.Load(**at, phases=phases, imbalance=1.0 + 1e-3 * k, steps=10, waiting=[0.1] * ranks)
@@ -99,6 +106,11 @@ def test_short_runs_are_told_whole(server: Running, run: str) -> None:
     assert series["residual"] == [1e-6 * k for k in range(200)]
     assert series["kinetic"] == [3.0] * 200
     assert series["share_elements"] == [0.75] * 200
+    assert found["parts"]["rod"] == {
+        "kinetic": [None, *[2.0] * 199],
+        "internal": [None, *(0.5 * k for k in range(1, 200))],
+    }
+    assert list(found["parts"]) == ["rod", "ball"]
     assert found["ranks"]["contact"] == [[1.0, 1.0]] * 200
     assert [event["cause"] for event in found["balance"]] == ["time lost"] * 2
     assert [event["n"] for event in found["snapshots"]] == [0, 1]
@@ -222,3 +234,31 @@ def test_a_million_events_open_in_two_seconds(server: Running, run: str) -> None
     assert shown(server, run)["last"] == last
     assert first <= 2.0
     assert time.monotonic() - began - first <= 0.5
+
+
+def test_sizes_are_those_of_the_latest_state_that_was_counted(server: Running, run: str) -> None:
+    at: dict[str, Any] = {
+        "run": "r",
+        "t": 1e-6,
+        "wall": 1011.0,
+        "elements": 9,
+        "nodes": 9,
+        "shared": 0,
+        "elements_per_rank": [9],
+    }
+    load = messages.Load(run="r", step=30, phases={"elements": [1.0]}, imbalance=1.0)
+    journal: list[messages.AnyMessage] = [
+        messages.Status(run="r", wall=1010.0, state=State.RUNNING),
+        messages.Counts(**at, step=20, fragments=3, smallest=-9, sizes=[1, 2], counted=18),
+    ]
+    last = write(server.ann.runs / run, iter([*journal, load]))
+    assert shown(server, run)["sizes"] == {"t": 1e-6, "smallest": -9, "sizes": [1, 2]}
+    made = msgspec.structs.replace(snapshot(0, "x", run="r", step=25), smallest=-8, sizes=[4])
+    late = messages.Counts(**at, step=40, fragments=3, smallest=-9, sizes=[1, 2], counted=18)
+    last = write(server.ann.runs / run, iter([made, late, msgspec.structs.replace(load, step=40)]), last)
+    told = shown(server, run)
+    assert told["sizes"]["sizes"] == [4]
+    assert told["series"]["fragments"] == [3, 7]
+    newer = msgspec.structs.replace(late, step=50, counted=45, fragments=9, sizes=[9])
+    write(server.ann.runs / run, iter([newer, msgspec.structs.replace(load, step=50)]), last)
+    assert shown(server, run)["sizes"]["sizes"] == [9]

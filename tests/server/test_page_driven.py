@@ -87,6 +87,7 @@ def test_what_is_shown_is_what_the_files_say(site: Site, watched: tuple[str, Pag
     told = list(csv.reader((folder / layout.HISTORY).read_text().splitlines()))
     line = dict(zip([history.split(name)[0] for name in told[0]], told[-1], strict=True))
     shown = facts(page)
+    page.wait("[...document.querySelectorAll('.plot')].every((plot) => plot.querySelector('canvas'))")
     assert number(shown["fragments"]) == len(rows)
     assert number(shown["step"]) == int(line["step"])
     assert shown["residual"] == page.evaluate(f"({line['residual']}).toExponential(1)")

@@ -143,3 +143,40 @@ def test_keys_that_differ_are_told_by_their_place(ask: Ask) -> None:
 )
 def test_numbers_are_written_with_a_prefix(ask: Ask, value: float | None, text: str) -> None:
     assert ask("figures.js", "page.si(data, 'Pa')", value) == text
+
+
+def test_energies_of_parts_come_from_the_history_and_from_messages_alike(ask: Ask) -> None:
+    parts = {
+        "rod": {"kinetic": [3.0, 2.0], "internal": [0.0, 1.5]},
+        "ball": {"kinetic": [1.0, 1.0], "internal": [0.0, 0.5]},
+    }
+    told = {"series": {"t": [0.0, 1e-6], "dt": [1e-9] * 2}, "parts": parts, "last": 5}
+    newest = {name: {"kinetic": 1.0, "internal": 2.0} for name in parts}
+    message = {"type": "progress", "seq": 6, "t": 2e-6, "dt": 1e-9, "limiter": "", "energy": {}, "parts": newest}
+    script = """(() => {
+        const live = { ledger: [] };
+        page.take(live, data.told);
+        live.ledger.push(data.message);
+        return live.ledger.map(({ parts }) => [parts.rod.kinetic, parts.ball.internal]);
+    })()"""
+    assert ask("history.js", script, {"told": told, "message": message}) == [[3.0, 0.0], [2.0, 0.5], [1.0, 2.0]]
+
+
+def test_the_newest_fragments_are_shown_whoever_tells_of_them(ask: Ask) -> None:
+    counts = {"type": "counts", "t": 1e-6, "nodes": 9, "facets": 1, "smallest": -4, "sizes": [2, 1]}
+    snapshot = {"type": "snapshot", "n": 0, "t": 2e-6, "step": 25, "fragments": 7, "smallest": -4, "sizes": [4, 2, 1]}
+    told = [
+        {**counts, "step": 20, "counted": 18, "fragments": 3}, snapshot,
+        {**counts, "step": 40, "counted": 18, "fragments": 3}, {**counts, "step": 50, "counted": 45, "fragments": 9},
+    ]  # fmt: skip
+    script = """data.map((message, at) => {
+        const live = new page.Live("r");
+        data.slice(0, at + 1).forEach((one, i) => live.take({ ...one, seq: i + 1 }));
+        return [live.counts.fragments, live.spread.sizes.length];
+    })"""
+    assert ask("live.js", script, told) == [[3, 2], [7, 3], [7, 3], [9, 2]]
+
+
+def test_a_distribution_in_bins_is_summed_from_the_largest(ask: Ask) -> None:
+    found = ask("plots.js", "page.longer(data)", {"smallest": -4, "sizes": [4, 0, 2, 1]})
+    assert found == [[pytest.approx(2 ** (k / 2)), n] for k, n in zip(range(-4, 0), [7, 3, 3, 1], strict=True)]

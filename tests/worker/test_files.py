@@ -37,6 +37,25 @@ def test_a_history_has_its_units_in_the_header(tmp_path: Path) -> None:
     assert [history.split(text) for text in head[-2:]] == [("push", "N"), ("load", "")]
 
 
+def test_a_file_of_an_earlier_worker_keeps_its_columns(tmp_path: Path) -> None:
+    History(tmp_path, {"push": "N"}).close()
+    table = History(tmp_path, {**history.of_parts(["rod", "ball"]), "push": "N"})
+    table.write(1, 1e-7, 1e-7, "tet 1", ENERGY, [0.0, 0.0, 1.5, 2.0, 1.0, 0.5, 0.25, 7.0])
+    table.close()
+    with (tmp_path / layout.HISTORY).open(encoding="utf-8") as file:
+        head, line = csv.reader(file)
+    assert dict(zip(head, line, strict=True))["push [N]"] == "7.0"
+    assert not any(history.part_of(name) for name in head)
+
+
+def test_one_part_alone_has_no_columns() -> None:
+    assert history.of_parts(["rod"]) == {}
+    assert [history.part_of(name) for name in history.of_parts(["rod", "ball"])][1:3] == [
+        ("internal", "rod"), ("kinetic", "ball")
+    ]  # fmt: skip
+    assert history.part_of("kinetic") is None
+
+
 def test_parquet_has_the_same_numbers_and_the_units(tmp_path: Path) -> None:
     write_history(tmp_path)
     table = pyarrow.parquet.read_table(tmp_path / layout.HISTORY_PARQUET)

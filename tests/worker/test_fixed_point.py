@@ -7,7 +7,15 @@ import numpy as np
 import pytest
 
 from conoid.worker.parallel.comm import SerialComm
-from conoid.worker.parallel.fixed_point import CONTRIBUTION_BITS, HEADROOM_BITS, exact_sums, outgrown, scale_for
+from conoid.worker.parallel.fixed_point import (
+    CONTRIBUTION_BITS,
+    HEADROOM_BITS,
+    Grouped,
+    exact_sums,
+    exact_totals,
+    outgrown,
+    scale_for,
+)
 from conoid.worker.simulation import Simulation
 from conoid.worker.state import WORK
 
@@ -106,3 +114,13 @@ def test_a_sum_that_outgrows_its_quantum_is_repeated(form: Form) -> None:
     work = [sim.model.blocks[0].row(WORK).sum() for sim in (fine, coarse)]
     assert math.isclose(work[0], work[1], rel_tol=1e-9)
     assert fine.ledger.close(fine.model.nodes.v).residual < 0.02
+
+
+def test_groups_have_their_own_sums_and_do_not_change_those_of_all() -> None:
+    columns = values(5000, 3)
+    group = np.random.default_rng(4).integers(0, 3, 5000).astype(np.int32)
+    total, each = exact_totals(SerialComm(), Grouped(columns, group, 4))
+    assert total.tobytes() == exact_sums(SerialComm(), columns).tobytes()
+    for k in range(4):
+        assert each[k] == pytest.approx([math.fsum(column[group == k]) for column in columns.T], rel=1e-12, abs=1e-3)
+    assert each[3].tolist() == [0.0] * 4

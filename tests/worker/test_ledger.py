@@ -74,3 +74,21 @@ def test_a_free_body_keeps_its_momentum_in_the_ledger() -> None:
     first = (sim.model.nodes.mass[:, None] * sim.model.nodes.v).sum(axis=0)
     run(sim, look)
     assert abs(first).max() > mass
+
+
+def test_the_parts_are_what_the_ledger_sums_up() -> None:
+    """Two plastic bodies, of which one flies and the other meets the wall; one part alone is not told of."""
+    one = scene(COPPER, "standard", end=4e-6, viscosity={}, **FLIGHT)
+    part = one.parts[0]
+    slow = part.model_copy(update={"name": "slow", "velocity": (0.0, 0.0, 40.0)})
+    sim = build(one.model_copy(update={"parts": (part, slow)}), [MESH, MESH])
+    line = lines(sim)[-1]
+    body, other = sim.ledger.parts["body"], sim.ledger.parts["slow"]
+    assert body.kinetic + other.kinetic == pytest.approx(line.kinetic, rel=1e-14)
+    assert body.internal + other.internal == pytest.approx(line.elastic + line.plastic + line.viscous, rel=1e-14)
+    assert other.kinetic == pytest.approx(0.16 * line.initial / 1.16, rel=1e-12)
+    assert other.internal == pytest.approx(0.0, abs=1e-12 * line.initial)
+    assert body.internal > 0.3 * line.initial
+    alone = build(one, [MESH])
+    lines(alone)
+    assert alone.ledger.parts == {}

@@ -1,5 +1,5 @@
-"""history.csv: one line per sample: clock, ledger, momentum, probes. At its end the same as history.parquet, where
-pyarrow is there.
+"""history.csv: one line per sample: clock, ledger, momentum, parts, probes. At its end the same as
+history.parquet, where pyarrow is there.
 """
 
 import csv
@@ -15,25 +15,40 @@ from conoid.cases.messages import Energy
 class History:
     """Writes the lines, flushed one by one, behind those that are there."""
 
-    def __init__(self, folder: Path, probes: Mapping[str, str]) -> None:
-        """``probes``: names of further columns, with their units."""
+    def __init__(self, folder: Path, further: Mapping[str, str]) -> None:
+        """``further``: names of columns of the parts and probes, with their units. A file that an earlier worker began
+        keeps the columns that it has.
+        """
         self._path = folder / layout.HISTORY
-        new = not self._path.exists()
+        head = history.header({**history.COLUMNS, **further})
+        there = _head(self._path) or head
+        self._places = [k for k, name in enumerate(head) if name in there]
         self._file = self._path.open("a", newline="", encoding="utf-8")
         self._writer = csv.writer(self._file)
-        if new:
-            self._writer.writerow(history.header({**history.COLUMNS, **probes}))
+        if not self._path.stat().st_size:
+            self._writer.writerow(head)
 
     def write(self, step: int, t: float, dt: float, limiter: str, energy: Energy, extra: list[float]) -> None:
-        """One line; ``extra`` is momentum and probes. Numbers are written so that they read back to the same bits."""
+        """One line; ``extra`` is momentum, parts and probes. Numbers are written so that they read back to the same
+        bits.
+        """
         values = [*msgspec.structs.astuple(energy), *extra]
-        self._writer.writerow([step, repr(t), repr(dt), limiter, *(repr(float(v)) for v in values)])
+        line = [step, repr(t), repr(dt), limiter, *(repr(float(v)) for v in values)]
+        self._writer.writerow([line[k] for k in self._places])
         self._file.flush()
 
     def close(self) -> None:
         """Closes the file, and writes it as Parquet where that can be."""
         self._file.close()
         write_parquet(self._path)
+
+
+def _head(path: Path) -> list[str]:
+    """The first line of a table; empty where there is none."""
+    if not path.exists():
+        return []
+    with path.open(newline="", encoding="utf-8") as file:
+        return next(csv.reader(file), [])
 
 
 def write_parquet(path: Path) -> Path | None:

@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from ..jit import njit
-from ..state import Floats, Ints
+from ..state import Floats, Indices, Ints
 from .comm import Comm
 
 CONTRIBUTION_BITS = 52
@@ -71,6 +71,16 @@ def _limbs(columns, scale):  # type: ignore[no-untyped-def]
     return words
 
 
+@njit("int64[:, ::1](float64[:, ::1], int32[::1], int64, float64[::1])", cache=True)
+def _limbs_by_group(columns, group, groups, scale):  # type: ignore[no-untyped-def]
+    """(groups, 2k) what ``_limbs`` gives, of the rows of each ``group`` (n,)."""
+    words = np.zeros((groups, 2 * columns.shape[1]), np.int64)
+    for i in range(columns.shape[0]):
+        for j in range(columns.shape[1]):
+            add_limbs(words[group[i]], j, columns[i, j], scale[j])
+    return words
+
+
 class Tally:
     """Sums that grow through a whole run: integers in two limbs, so that neither order nor ranks matter."""
 
@@ -110,11 +120,13 @@ class Columns(Protocol):
         """(k,) largest magnitude of each column."""
 
     def limbs(self, scale: Floats) -> Ints:
-        """(2k,) sums of the high limbs of each column, in quanta of one over ``scale`` (k,), and of the low ones."""
+        """(groups, 2k) sums of the high limbs of each column, in quanta of one over ``scale`` (k,), and of the low
+        ones; of each group of rows.
+        """
 
 
 class Table:
-    """The columns of an array."""
+    """The columns of an array, all rows in one group."""
 
     def __init__(self, values: Floats) -> None:
         self._values = values
@@ -123,27 +135,43 @@ class Table:
         return np.asarray(_largest(self._values))
 
     def limbs(self, scale: Floats) -> Ints:
-        return np.asarray(_limbs(self._values, scale))
+        return np.asarray(_limbs(self._values, scale))[None]
+
+
+class Grouped(Table):
+    """The columns of an array whose row i belongs to ``group`` i, (n,), of so many."""
+
+    def __init__(self, values: Floats, group: Indices, groups: int) -> None:
+        super().__init__(values)
+        self._group, self._groups = group, groups
+
+    def limbs(self, scale: Floats) -> Ints:
+        return np.asarray(_limbs_by_group(self._values, self._group, self._groups, scale))
 
 
 def exact_sums(comm: Comm, *tables: Floats) -> Floats:
     """(k,) sums of the columns of ``tables`` (n, .) over all ranks, see ``exact_totals``."""
-    return exact_totals(comm, *map(Table, tables))
+    return exact_totals(comm, *map(Table, tables))[0] if tables else np.zeros(0)
 
 
-def exact_totals(comm: Comm, *tables: Columns) -> Floats:
-    """(k,) sums of the columns of ``tables`` over all ranks: the same bits for any order and partition.
+def exact_totals(comm: Comm, *tables: Columns) -> tuple[Floats, Floats]:
+    """(k,) sums of the columns of ``tables`` over all ranks, and (groups, k) of each group of rows: the same bits for
+    any order and partition. All tables have as many groups.
 
     Each value is split into two integer limbs of a common quantum, 2^-60 of the column's largest magnitude; the
     result is off by at most n times that quantum.
     """
-    if not tables:
-        return np.zeros(0)
     mine = [table.largest() for table in tables]
     largest = comm.maximum(np.concatenate(mine))
     exponent = np.frexp(largest)[1]
     scales = np.split(np.ldexp(1.0, 30 - exponent), np.cumsum([len(each) for each in mine])[:-1])
-    limbs = [table.limbs(scale).reshape(2, -1) for table, scale in zip(tables, scales, strict=True)]
-    high, low = comm.sum(np.concatenate(limbs, axis=1))
+    limbs = [table.limbs(scale).reshape(-1, 2, len(scale)) for table, scale in zip(tables, scales, strict=True)]
+    words = comm.sum(np.concatenate(limbs, axis=2))
+    return _valued(words.sum(axis=0), exponent), np.array([_valued(group, exponent) for group in words])
+
+
+def _valued(words: Ints, exponent: Indices) -> Floats:
+    """(k,) what sums of limbs (2, k) are."""
+    high, low = words
     whole = zip(high, low, exponent, strict=True)
     return np.array([math.ldexp(int(a) * 2**30 + int(b), int(e) - 60) for a, b, e in whole])

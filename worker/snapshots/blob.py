@@ -39,7 +39,7 @@ class Made:
     triangles: int
     fragments: int
     smallest: int
-    """See ``table.sizes``, as the next."""
+    """See ``table.by_size``, as the next."""
     sizes: list[int]
 
 
@@ -71,7 +71,7 @@ def made(whole: Whole, told: dict[str, Any], births: Births, budget: Budget) -> 
         fragments_listed=min(len(every.label), table.MOST_ROWS),
     )  # fmt: skip
     data = pack(header, {name: _column(values) for name, values in (arrays | columns).items()})
-    return Made(data, len(drawn.tet), len(every.label), *table.sizes(every))
+    return Made(data, len(drawn.tet), len(every.label), *table.by_size(every.size))
 
 
 def _drawn(whole: Whole, drawn: Outline, row: Ints) -> tuple[Any, dict[str, "np.ndarray"]]:

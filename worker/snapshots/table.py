@@ -86,11 +86,11 @@ def _rest(table: Table, rest: Ints) -> dict[str, "np.ndarray"]:
     }  # fmt: skip
 
 
-def sizes(table: Table) -> tuple[int, list[int]]:
-    """How many fragments there are of each size: a first number k and counts, the i-th of those from 2^((k+i)/2) m on,
-    up to the next. None without an extent is counted.
+def by_size(size: Floats) -> tuple[int, list[int]]:
+    """How many fragments there are of each ``size`` (g,), m: a first number k and counts, the i-th of those from
+    2^((k+i)/2) m on, up to the next. None without an extent is counted.
     """
-    steps = np.floor(2.0 * np.log2(table.size[table.size > 0.0])).astype(np.int64)
+    steps = np.floor(2.0 * np.log2(size[size > 0.0])).astype(np.int64)
     if not len(steps):
         return 0, []
     first = int(steps.min())

@@ -1,0 +1,104 @@
+"""Fragments between frames: their sizes are those of the tables on any number of ranks, and they take their share."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from conoid.worker.fracture import connectivity
+from conoid.worker.output import counts
+from conoid.worker.output.counts import Counter
+from conoid.worker.parallel.comm import Comm, SerialComm
+from conoid.worker.snapshots import share, table
+
+from ..contact.ranks import on_ranks
+from ..snapshots.shattered import PARTS, shattered
+
+
+@pytest.mark.parametrize("ranks", [1, 3])
+def test_sizes_are_those_of_a_snapshot_on_any_number_of_ranks(ranks: int) -> None:
+    body = shattered(6, 60)
+    shares = body.shares(ranks)
+
+    def work(comm: Comm) -> tuple[int, list[int]]:
+        mine = share.joined([shares[comm.rank]], PARTS)
+        return counts.sizes(mine.model, connectivity.labels(mine.model, mine.held, comm), comm)
+
+    found = on_ranks(ranks, work)
+    whole = body.whole(1)
+    known = table.measured(whole, connectivity.labels(whole.model, whole.held, SerialComm()))
+    assert found[0] == table.by_size(known.size)
+    assert sum(found[0][1]) == len(known.label) > 50
+    assert found[1:] == [(0, [])] * (ranks - 1)
+
+
+class Clock:
+    """Seconds that pass when fragments are looked for."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def monotonic(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    made = Clock()
+    monkeypatch.setattr(counts, "time", made)
+    return made
+
+
+def breaking(clock: Clock, cost: float) -> Any:
+    """What the counter sees of a simulation in which finding fragments takes ``cost``, s."""
+    model = SimpleNamespace(elements_global=10, nodes_global=5, parts=["one"], blocks=[], nodes=None)
+
+    def look() -> None:
+        clock.now += cost
+
+    return SimpleNamespace(
+        model=model, fracture=SimpleNamespace(broken=0), erosion=None, comm=SerialComm(), shared_nodes=lambda: 0,
+        record=SimpleNamespace(look=look, labels=[], count=3), clock=SimpleNamespace(step=0),
+    )  # fmt: skip
+
+
+def test_fragments_are_found_as_often_as_their_share_of_the_time_allows(clock: Clock) -> None:
+    sim, counter, cost = breaking(clock, 0.1), Counter(), 0.1
+    began, found = clock.now, 0
+    while clock.now - began < 100.0:
+        sim.clock.step += 1
+        sim.fracture.broken += 1
+        if counter.due(sim, clock.now, ending=False):
+            counter.find(sim)
+            found += 1
+        clock.now += 0.25
+    assert found * cost == pytest.approx(100.0 * counts.SHARE, rel=0.1)
+
+
+def test_nothing_is_looked_for_where_nothing_has_broken_since(clock: Clock) -> None:
+    sim, counter = breaking(clock, 0.001), Counter()
+    assert counter.due(sim, clock.now, ending=False)
+    counter.find(sim)
+    assert not counter.due(sim, clock.now + 1e3, ending=True)
+    sim.fracture.broken = 1
+    assert counter.due(sim, clock.now + 1e3, ending=False)
+    counter.find(sim)
+    sim.fracture.broken = 2
+    assert not counter.due(sim, clock.now, ending=False)
+    assert counter.due(sim, clock.now, ending=True)
+    sim.record = None
+    assert not counter.due(sim, clock.now + 1e3, ending=True)
+
+
+def test_counts_are_told_when_they_have_changed(clock: Clock) -> None:
+    sim, counter = breaking(clock, 0.0), Counter()
+    told = counter.changed(sim, 0)
+    assert told is not None
+    assert (told["fragments"], told["counted"], told["sizes"]) == (3, -1, [])
+    assert counter.changed(sim, 0) is None
+    sim.clock.step = 7
+    counter.find(sim)
+    told = counter.changed(sim, 0)
+    assert told is not None
+    assert told["counted"] == 7
+    assert counter.changed(sim, 1) is not None
