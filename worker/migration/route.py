@@ -1,7 +1,8 @@
 """Where everything goes: a cut of all tets, parcels from rank to rank, and who holds and owns what afterwards.
 
-Tets take along the nodes that they need. Who shares a node with whom is settled by a directory: the rank that a node's
-id falls to receives the ranks that hold it and sends each of them the others.
+A box of the cut goes to the rank that has most of it already. Tets take along the nodes that they need. Who shares a
+node with whom is settled by a directory: the rank that a node's id falls to receives the ranks that hold it and sends
+each of them the others.
 """
 
 from dataclasses import dataclass
@@ -62,8 +63,10 @@ def route(parcel: Parcel, scale: tuple[float, float, float], comm: Comm) -> Arri
 
     ``scale`` multiplies positions before the cut.
     """
-    targets, cuts = _cut(parcel, np.array(scale), comm)
-    sends = {rank: _share(parcel, targets, cuts, rank, np.array(scale)) for rank in range(comm.size)}
+    places, cuts = _cut(parcel, np.array(scale), comm)
+    home = _homes(places, comm)
+    targets = {part: home[place] for part, place in places.items()}
+    sends = {rank: _share(parcel, targets, (cuts, home), rank, np.array(scale)) for rank in range(comm.size)}
     mine = sends.pop(comm.rank)
     received = comm.swap({rank: share.packed() for rank, share in sends.items() if length(share.nodes)})
     others = [Parcel.unpacked(words) for words in received.values()]
@@ -92,7 +95,7 @@ def _one_of_each(name: str, rows: Table) -> Table:
 
 
 def _cut(parcel: Parcel, scale: Floats, comm: Comm) -> tuple[dict[int, Indices], list[Cut]]:
-    """The rank of every tet, by part."""
+    """Where every tet lies among the boxes of the cut, by part."""
     nodes, points, ids, weights = parcel.nodes, [np.zeros((0, 3))], [np.zeros(0, np.int64)], [np.zeros((0, 3))]
     for table in parcel.tets.values():
         corners = np.searchsorted(nodes["id"], table["corners"])
@@ -104,8 +107,26 @@ def _cut(parcel: Parcel, scale: Floats, comm: Comm) -> tuple[dict[int, Indices],
     return dict(zip(parcel.tets, np.split(owner, ends), strict=True)) if parcel.tets else {}, cuts
 
 
-def _share(parcel: Parcel, targets: dict[int, Indices], cuts: list[Cut], rank: int, scale: Floats) -> Parcel:
-    """What goes to ``rank``, without what goes to owners of nodes, which are settled later."""
+def _homes(places: dict[int, Indices], comm: Comm) -> Indices:
+    """(boxes,) the rank that each box goes to: the one that has most of its tets already, as far as that is free."""
+    here = np.bincount(np.concatenate([np.zeros(0, np.int32), *places.values()]), minlength=comm.size)
+    held = np.array(comm.share(here))
+    home, free = np.full(comm.size, -1, np.int32), np.ones(comm.size, bool)
+    some = np.argwhere(held)
+    for rank, box in some[np.argsort(-held[tuple(some.T)], kind="stable")].tolist():
+        if free[rank] and home[box] < 0:
+            home[box], free[rank] = rank, False
+    home[home < 0] = np.flatnonzero(free)
+    return home
+
+
+def _share(
+    parcel: Parcel, targets: dict[int, Indices], boxes: tuple[list[Cut], Indices], rank: int, scale: Floats
+) -> Parcel:  # fmt: skip
+    """What goes to ``rank``, without what goes to owners of nodes, which are settled later; ``boxes``: the cuts, and
+    the rank that each box goes to.
+    """
+    cuts, home = boxes
     tets = {part: take(table, targets[part] == rank) for part, table in parcel.tets.items()}
     there = np.sort(np.concatenate([np.zeros(0, np.int64), *(table["id"] for table in tets.values())]))
     rows, needed = {}, [np.zeros(0, np.int64), *(table["corners"].reshape(-1) for table in tets.values())]
@@ -113,7 +134,7 @@ def _share(parcel: Parcel, targets: dict[int, Indices], cuts: list[Cut], rank: i
         if "tet" in table:
             rows[name] = take(table, among(there, table["tet"]))
         elif "at" in table:
-            rows[name] = take(table, place(cuts, table["at"] * scale) == rank)
+            rows[name] = take(table, home[place(cuts, table["at"] * scale)] == rank)
         if name in rows and "with" in table:
             needed.append(rows[name]["with"].reshape(-1))
     wanted = np.unique(np.concatenate(needed))
