@@ -231,8 +231,11 @@ def _elements(
     form = case.numerics.pressure
     if form == "standard":
         return Elements(model, comm, neighbours, timers)
-    bulk = np.array([moduli(find_material(case, part.material))[0] for part in case.parts])
-    return AveragedElements(model, comm, neighbours, timers, 1.0 / node_volume, bulk[model.nodes.part], form == "split")
+    materials = [find_material(case, part.material) for part in case.parts]
+    bulk, heated = np.array([moduli(each)[0] for each in materials]), any(each.eos is not None for each in materials)
+    return AveragedElements(
+        model, comm, neighbours, timers, 1.0 / node_volume, bulk[model.nodes.part], form == "split", heated
+    )
 
 
 def _force_floor(model: Model, comm: Comm) -> float:

@@ -59,6 +59,11 @@ DAMAGE = 19
 PORES = 20
 """Of the pores that a tension cut-off has opened: their volume over that of the solid matter; with a linear pressure
 the logarithm of one and that."""
+HEAT = 21
+"""Energy that the pressure sees, a volume of matter, over the bulk modulus at rest (averaged pressure forms, where the
+equation of state has heat)."""
+TOLD = 22
+"""Work, J, that the nodes have been told of for it."""
 
 INTACT, BROKEN, WIDE = range(3)
 """Bond of a face to the one behind it: whole; broken; broken and so far apart that it is part of the surface."""

@@ -203,24 +203,27 @@ class AveragedElements(Elements):
 
     def __init__(
         self, model: Model, comm: Comm, neighbours: list[Neighbour], timers: Timers,
-        weight: Floats, bulk: Floats, split: bool,
+        weight: Floats, bulk: Floats, split: bool, heated: bool,
     ) -> None:  # fmt: skip
-        """``weight`` (nodes,): one over the reference volume, 1/m^3; ``bulk`` (nodes,): modulus of the part, Pa."""
+        """``weight`` (nodes,): one over the reference volume, 1/m^3; ``bulk`` (nodes,): modulus of the part, Pa;
+        ``heated``: whether an equation of state of the case has heat.
+        """
         n = model.nodes.n
         self.split = split
+        self._columns = 3 if heated else 2
         self._gradient = np.zeros((n if split else 1, 3), np.int64)
         super().__init__(model, comm, neighbours, timers)
         self._weight = weight
         self._bulk = bulk
-        self._volumes = np.zeros((n, 2), np.int64)
-        self._strain = np.zeros(n)
+        self._volumes = np.zeros((n, self._columns), np.int64)
+        self._strain, self._heat = np.zeros(n), np.zeros(n)
         self._projected = np.zeros((n if split else 1, 3))
         self.pressure = np.zeros(n if split else 1)
         self._scale = 1.0
 
     def _connect(self) -> None:
         super()._connect()
-        self.shared_volumes = SharedSum(self._comm, self._neighbours, 2, Tag.VOLUME)
+        self.shared_volumes = SharedSum(self._comm, self._neighbours, self._columns, Tag.VOLUME)
         if self.split:
             self.shared_gradients = SharedSum(self._comm, self._neighbours, 3, Tag.GRADIENT)
 
@@ -256,6 +259,8 @@ class AveragedElements(Elements):
         with self._timers.phase("exchange"):
             self.shared_volumes.finish(self._volumes)
         self._strain = pressure.nodal_strains(self._volumes)
+        if self._columns > 2:
+            self._heat = pressure.nodal_strains(self._volumes, 2)
         if self.split:
             self.pressure -= self._bulk * self._strain
         self._begin(scale)
@@ -290,8 +295,8 @@ class AveragedElements(Elements):
     def _forces(self, block: Block, begin: int, end: int, dt: float, scale: float) -> None:
         nodes = self.model.nodes
         sweep.force_pass(
-            nodes.x, nodes.v, self._strain, nodes.force, self.pressure, self._gradient, self.split, block.tets,
-            block.state.reshape(-1), block.params, self._w, self._wi, self._bits, self.peaks, block.id, block.worn,
-            block.life, block.hot, block.weakest, block.quiet, block.shear_weight, block.kind, block.eos,
+            nodes.x, nodes.v, self._strain, self._heat, nodes.force, self.pressure, self._gradient, self.split,
+            block.tets, block.state.reshape(-1), block.params, self._w, self._wi, self._bits, self.peaks, block.id,
+            block.worn, block.life, block.hot, block.weakest, block.quiet, block.shear_weight, block.kind, block.eos,
             block.state.shape[1], begin, end, dt, scale,
         )  # fmt: skip

@@ -3,9 +3,11 @@
 One-point tets with their own pressure lock in plastic flow. ``nodal`` replaces the volume strain of a tet by the mean
 of its nodes' values, each the volume-weighted mean over the tets round it (averaged nodal pressure, Bonet and Burton
 1998, in rate form; the pressure stays with the tet, so any equation of state works and a node that splits loses
-nothing). ``split`` adds to the nodal balance the pressure-gradient-projection form of the operator split
-(Zienkiewicz et al. 1998): Oñate-Codina stabilisation that acts on the difference between a tet's pressure gradient and
-the mean of the projected gradients of its nodes, and vanishes where pressure is linear.
+nothing). An equation of state with heat sees the energy averaged in the same way: heat of a tet alone would drive it
+against its neighbours, and volumes of nodes would not resist. ``split`` adds to the nodal balance the projection form
+of the operator split for pressure gradients (Zienkiewicz et al. 1998): Oñate-Codina stabilisation that acts on the
+difference between a tet's pressure gradient and the mean of the projected gradients of its nodes, and vanishes where
+pressure is linear.
 
 Nodal sums are integers. Each contribution is taken relative to the node's reference volume and so lies near one,
 whatever the size of the tets: one fixed scale, QUANTA, serves every scene.
@@ -14,13 +16,15 @@ whatever the size of the tets: one fixed scale, QUANTA, serves every scene.
 import numpy as np
 
 from ..jit import njit
-from ..state import CHUNK, MASS, VOLUME_FLUX, Floats, Ints
+from ..materials.law import BULK, DENSITY
+from ..state import CHUNK, HEAT, MASS, TOLD, VOLUME_FLUX, WORK, WORK_VISCOUS, Floats, Ints
 from .tet4 import CHANGE, DILATATION, EDGE, NODAL, SEEN, VOLUME, VOLUME_MID, largest_of, quanta
 
 QUANTA = float(2**52)
 """Quanta per unit of volume strain, and per unit of relative nodal volume."""
 
 _FLUX, _MASS = VOLUME_FLUX * CHUNK, MASS * CHUNK
+_WORK, _WORK_VISCOUS, _HEAT, _TOLD = WORK * CHUNK, WORK_VISCOUS * CHUNK, HEAT * CHUNK, TOLD * CHUNK
 _STABILISE = NODAL
 """Rows of the scratch: the four stabilising volume fluxes, m^3/s."""
 _PROJECTED = NODAL + 4 * CHUNK
@@ -57,6 +61,22 @@ def scatter_volumes(sums, w, weight, tets, n, dt):  # type: ignore[no-untyped-de
             quanta = weight[a] * QUANTA
             sums[a, 0] += np.int64(np.rint(change * quanta))
             sums[a, 1] += np.int64(np.rint(volume * quanta))
+
+
+@njit("void(int64[:, ::1], float64[::1], float64[::1], float64[::1], float64[::1], uint32[:, ::1], int64)", cache=True)
+def scatter_heat(sums, w, s, params, weight, tets, n):  # type: ignore[no-untyped-def]
+    """Adds a quarter of what each tet has got of work since the last time, over its mass, to the sums of its nodes.
+
+    By volume, as the volume changes, and in units of the bulk modulus over the density; ``sums`` (nodes, 3).
+    """
+    unit = params[DENSITY] / params[BULK]
+    for i in range(n):
+        work = s[_WORK + i] + s[_WORK_VISCOUS + i]
+        heat = 0.25 * w[VOLUME_MID + i] * unit * (work - s[_TOLD + i]) / s[_MASS + i]
+        s[_TOLD + i] = work
+        for k in range(4):
+            a = tets[i, k]
+            sums[a, 2] += np.int64(np.rint(heat * weight[a] * QUANTA))
 
 
 @njit("void(int64[:, ::1], float64[::1], float64[::1], uint32[:, ::1], int64, float64)", cache=True)
@@ -119,6 +139,13 @@ def gather_strains(w, strain, tets, n):  # type: ignore[no-untyped-def]
         w[SEEN + i] = 0.25 * ((strain[tets[i, 0]] + strain[tets[i, 1]]) + (strain[tets[i, 2]] + strain[tets[i, 3]]))
 
 
+@njit("void(float64[::1], float64[::1], uint32[:, ::1], int64)", cache=True)
+def gather_heat(s, heat, tets, n):  # type: ignore[no-untyped-def]
+    """HEAT: what the pressure of each tet sees grows by the mean of the four nodes."""
+    for i in range(n):
+        s[_HEAT + i] += 0.25 * ((heat[tets[i, 0]] + heat[tets[i, 1]]) + (heat[tets[i, 2]] + heat[tets[i, 3]]))
+
+
 @njit("void(float64[::1], int64, float64)", cache=True)
 def own_strains(w, n, dt):  # type: ignore[no-untyped-def]
     """SEEN and CHANGE of the ``standard`` form: each tet sees its own volume strain."""
@@ -156,7 +183,9 @@ def scatter_fluxes(gradient, wi, tets, n):  # type: ignore[no-untyped-def]
             gradient[d, k] += flux
 
 
-def nodal_strains(sums: Ints) -> Floats:
-    """(n,) volume strain of the step at the nodes from the completed sums (n, 2); zero at a node without tets."""
-    strains: Floats = np.where(sums[:, 1] > 0, sums[:, 0] / np.maximum(sums[:, 1], 1), 0.0)
+def nodal_strains(sums: Ints, column: int = 0) -> Floats:
+    """(n,) volume strain of the step at the nodes from the completed sums (n, 2 or 3), or the heat, in ``column`` 2;
+    zero at a node without tets.
+    """
+    strains: Floats = np.where(sums[:, 1] > 0, sums[:, column] / np.maximum(sums[:, 1], 1), 0.0)
     return strains

@@ -17,7 +17,7 @@ from ..materials.hyperelastic import stiffen
 from ..materials.law import AFTER_PRESSURE, BEFORE_PRESSURE, FROM_SHAPE, ORDER, Q_LINEAR, Q_QUADRATIC, SHEAR
 from ..materials.models import press, strengthen
 from ..materials.viscosity import bulk_viscosity
-from ..state import CHUNK
+from ..state import CHUNK, TOLD
 from . import pressure as averaged
 from . import rest, tet4
 from .hot import mark_hot
@@ -185,6 +185,8 @@ def strain_pass(  # type: ignore[no-untyped-def]
         if params[ORDER] != AFTER_PRESSURE:
             deviatoric_stress(strength, w, s, params, n, dt)
         averaged.keep_flux(w, s, n)
+        if rows > TOLD:
+            averaged.scatter_heat(sums, w, s, params, weight, t, n)
         quiet[c, rest.NOTED] = 0
         quiet[c, rest.STEADY] = 1 if still and rest.same(before, s) else 0
         if split:
@@ -197,21 +199,25 @@ def strain_pass(  # type: ignore[no-untyped-def]
 
 
 @njit(
-    f"void({_F2}, {_F2}, {_F1}, {_I2}, {_F1}, {_I2}, boolean, {_T2}, {_F1}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, {_I1}, "
-    f"{_B1}, {_F1}, uint8[::1], {_F1}, {_I2}, float64, int64, int64, int64, int64, int64, float64, float64)",
+    f"void({_F2}, {_F2}, {_F1}, {_F1}, {_I2}, {_F1}, {_I2}, boolean, {_T2}, {_F1}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, "
+    f"{_I1}, {_B1}, {_F1}, uint8[::1], {_F1}, {_I2}, float64, int64, int64, int64, int64, int64, float64, float64)",
     cache=True,
     error_model="numpy",
 )
 def force_pass(  # type: ignore[no-untyped-def]
-    x, v, strain, force, pressure, gradient, split, tets, state, params, w, wi, bits, peaks, ids, worn, life, hot,
+    x, v, strain, heat, force, pressure, gradient, split, tets, state, params, w, wi, bits, peaks, ids, worn, life, hot,
     weakest, quiet, shear, strength, eos, rows, begin, end, dt, scale
 ):  # fmt: skip
-    """Pressure from the averaged volume strain, viscosity and forces at n+1; with ``split``, pressure gradients."""
+    """Pressure from the averaged volume strain and ``heat`` (nodes,), viscosity and forces at n+1; with ``split``,
+    pressure gradients.
+    """
     for c in range(begin, end):
         t = tets[c * CHUNK : (c + 1) * CHUNK]
         s = state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
         n = len(t)
         still = quiet[c, rest.STEADY] != 0 and rest.without(strain, t, n)
+        if still and rows > TOLD:
+            still = rest.without(heat, t, n)
         if still and quiet[c, rest.NOTED] > 0:
             rest.pass_over(peaks, quiet[c], LARGEST_LIMIT, LIMITING_TET)
             continue
@@ -223,6 +229,8 @@ def force_pass(  # type: ignore[no-untyped-def]
             deviatoric_stress(strength, w, s, params, n, dt)
         tet4.end_gradients(w, n)
         averaged.gather_strains(w, strain, t, n)
+        if rows > TOLD:
+            averaged.gather_heat(s, heat, t, n)
         averaged.recall_flux(w, s, n, dt)
         pressure_and_limit(eos, w, s, params, n, dt)
         return_at_pressure(strength, w, s, params, n, dt)

@@ -10,14 +10,15 @@ from conoid.cases.materials import MieGruneisen
 
 from ..elements.tet4 import CHANGE, MODULUS, NODAL, SEEN, VOLUME
 from ..jit import njit
-from ..state import CHUNK, MASS, PORES, PRESSURE, VOLUME_RATIO, WORK, WORK_PLASTIC, WORK_VISCOUS
+from ..state import CHUNK, HEAT, MASS, PORES, PRESSURE, TOLD, VOLUME_RATIO, WORK, WORK_PLASTIC, WORK_VISCOUS
 from .law import BULK, DENSITY, EQUATION, SHEAR, SPALL, Equation
 
 _C0, _SLOPE, _GAMMA = range(EQUATION, EQUATION + 3)
 _P, _MASS, _WORK, _RATIO = PRESSURE * CHUNK, MASS * CHUNK, WORK * CHUNK, VOLUME_RATIO * CHUNK
 _WORK_VISCOUS, _WORK_PLASTIC, _PORES = WORK_VISCOUS * CHUNK, WORK_PLASTIC * CHUNK, PORES * CHUNK
-_OLD = NODAL
-"""Row of the scratch: the pressure before the step, Pa."""
+_HEAT = HEAT * CHUNK
+_OLD, _KNOWN, _FACTOR = NODAL, NODAL + CHUNK, NODAL + 2 * CHUNK
+"""Rows of the scratch: the pressure before the step, Pa; of the energy equation factor * new = cold part + known."""
 _LEAST = 0.05
 """Of the bulk modulus at rest: what the wave speed has at least. Chosen: it makes steps shorter, never too long."""
 
@@ -80,19 +81,26 @@ def mie_gruneisen(w, s, params, n):  # type: ignore[no-untyped-def]
 
     e is the work done so far (stress, plastic and viscous) over the mass. The energy equation with the mean pressure
     of the step is linear in the new pressure and solved in closed form. The factor 1 - gamma chi / 2 applies to
-    compression only.
+    compression only. Where the volume strain is averaged e is, too (HEAT, up to this step's work of the pressure), and
+    that work is the one of the volume that the pressure sees.
     """
-    heating = params[_GAMMA] * params[DENSITY]
+    gamma, heating = params[_GAMMA], params[_GAMMA] * params[DENSITY]
+    averaged, bulk = len(s) > TOLD * CHUNK, params[BULK]
     for i in range(n):
         half = 0.5 * w[SEEN + i]
         ratio = s[_RATIO + i] * (1.0 + half) / (1.0 - half)
         cold, tangent = _cold(params, ratio)
         change = w[CHANGE + i]
         mass, old = s[_MASS + i], s[_P + i]
-        coefficient = heating / mass
-        known = cold + coefficient * (s[_WORK + i] + s[_WORK_VISCOUS + i] - 0.5 * old * change)
-        new = known / (1.0 + 0.5 * coefficient * change)
-        w[_OLD + i] = old
+        if averaged:
+            moved = ratio - s[_RATIO + i]
+            known, factor = gamma * (bulk * s[_HEAT + i] - 0.5 * old * moved), 1.0 + 0.5 * gamma * moved
+        else:
+            coefficient = heating / mass
+            known = coefficient * (s[_WORK + i] + s[_WORK_VISCOUS + i] - 0.5 * old * change)
+            factor = 1.0 + 0.5 * coefficient * change
+        new = (cold + known) / factor
+        w[_OLD + i], w[_KNOWN + i], w[_FACTOR + i] = old, known, factor
         s[_P + i] = new
         s[_RATIO + i] = ratio
         s[_WORK + i] -= 0.5 * (old + new) * change
@@ -111,10 +119,9 @@ def _tear(w, s, params, n):  # type: ignore[no-untyped-def]
         p, pores = s[_P + i], s[_PORES + i]
         if p >= -spall and not (pores > 0.0 and p > 0.0):
             continue
-        old, change, heating = w[_OLD + i], w[CHANGE + i], params[_GAMMA] * params[DENSITY] / s[_MASS + i]
+        old, change, known, factor = w[_OLD + i], w[CHANGE + i], w[_KNOWN + i], w[_FACTOR + i]
         before = s[_WORK + i] + 0.5 * (old + p) * change
-        known = heating * (before + s[_WORK_VISCOUS + i] - 0.5 * old * change)
-        factor, whole = 1.0 + 0.5 * heating * change, (1.0 + pores) * s[_RATIO + i]
+        whole = (1.0 + pores) * s[_RATIO + i]
         new = -spall if p < 0.0 else 0.0
         ratio = 1.0 - (new * factor - known) / stiffness
         if ratio > whole:

@@ -92,7 +92,7 @@ def parameters(material: Material, viscosity: Viscosity | None) -> Floats:
 
 def rows_of(material: Material, pressure: str) -> int:
     """How many rows of state an element of this material needs (worker/state.py)."""
-    averaged = 0 if pressure == "standard" else state.VOLUME_FLUX + 1
+    averaged = 0 if pressure == "standard" else state.VOLUME_FLUX + 1 if material.eos is None else state.TOLD + 1
     porous = 0 if material.spall is None else state.PORES + 1
     return max(law_of(material).rows(material.strength), equation_of(material).rows, averaged, porous)
 
