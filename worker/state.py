@@ -67,7 +67,7 @@ TOLD = 22
 
 INTACT, BROKEN, WIDE = range(3)
 """Bond of a face to the one behind it: whole; broken; broken and so far apart that it is part of the surface."""
-_IDS_A_LOOK = 32
+IDS_A_LOOK = 32
 """Entries of a table that cost as much to lay out as a bisection."""
 LAID_BARE = -2
 """``Block.across`` of a face that erosion has exposed; -1 for one that was exposed at the start."""
@@ -91,7 +91,7 @@ def located(known: Ints, wanted: Ints) -> Indices:
     """Where ``wanted`` ids, which must be there, stand among the ascending ``known``, in their shape: by a table of all
     ids up to the largest where many are wanted, by bisection where few are.
     """
-    if not len(known) or wanted.size * _IDS_A_LOOK < known[-1]:
+    if not len(known) or wanted.size * IDS_A_LOOK < known[-1]:
         return np.searchsorted(known, wanted).astype(np.int32)
     table = np.empty(known[-1] + 1, np.int32)
     table[known] = np.arange(len(known), dtype=np.int32)

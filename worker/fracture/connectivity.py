@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..parallel.comm import Comm
-from ..state import Block, Ints, Model
+from ..state import IDS_A_LOOK, Block, Ints, Model
 
 _PART = 1 << 62
 """Added to the number of a part: the name of what joins its tets, above all tet ids."""
@@ -60,9 +60,16 @@ def _joints(block: Block) -> Ints:
 
 
 def places(known: Ints, wanted: Ints) -> Ints:
-    """Where ``wanted`` stand in the ascending ``known``, -1 for those that do not."""
+    """Where ``wanted`` stand in the ascending ``known``, -1 for those that do not; all are at least 0. By a table of
+    all ids where many are wanted, by bisection where few are.
+    """
     if not len(known):
         return np.full(wanted.shape, -1)
+    beyond = int(known[-1]) + 1
+    if beyond <= wanted.size * IDS_A_LOOK:
+        table = np.full(beyond + 1, -1)
+        table[known] = np.arange(len(known))
+        return np.asarray(table[np.minimum(wanted, beyond)])
     at = np.minimum(np.searchsorted(known, wanted), len(known) - 1)
     return np.asarray(np.where(known[at] == wanted, at, -1))
 
