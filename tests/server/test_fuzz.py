@@ -12,9 +12,12 @@ from typing import Any
 
 import pytest
 
+from conoid.cases import layout
+from conoid.cases.messages import Status
 from conoid.cases.run import State
 
 from .running import Process, User, case_text, processes
+from .test_history import told, write
 
 REJECTED, ACCEPTED = "ST202", "ST201"
 """What schemathesis calls a request that suits the schema and is refused, and one that does not and is taken."""
@@ -48,13 +51,22 @@ def seeds(ann: User, place: Path) -> dict[str, list[Any]]:
     runs = [ann.submit() for _ in range(ENDED)]
     for run in runs:
         ann.wait_for(run)
+        speak(ann.runs / run)
     lives = ann.submit(wait=str(place / "never"))
     ann.wait_for(lives, State.RUNNING)
     sweep = ann.http.post("/v1/sweeps", json=wish()).json()["id"]
     return {
         "run_id": [*runs, lives], "sweep_id": [sweep], "path": ["case.toml", "log/rank-0.log", "outcome.json"],
-        "rank": ["0", "launcher"], "name": ["bar_on_bar"],
+        "rank": ["0", "launcher"], "name": ["bar_on_bar"], "n": [0, 1],
     }  # fmt: skip
+
+
+def speak(folder: Path) -> None:
+    """The run has said more than the fake worker does: reports, a cut, a snapshot."""
+    said = [message for message in told(100) if not isinstance(message, Status)]
+    write(folder, iter(said), after=len((folder / layout.JOURNAL).read_bytes().splitlines()))
+    layout.snapshot(folder, 0).parent.mkdir()
+    layout.snapshot(folder, 0).write_bytes(b"99")
 
 
 def wish() -> dict[str, Any]:
