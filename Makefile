@@ -7,12 +7,14 @@
 #             then studies and failures that take minutes; root on Debian gets Slurm and libfaketime for them
 #
 # Each target first brings .venv to the versions of requirements.lock, when that file or pyproject.toml has changed.
-# Kernels are compiled while pip installs what they do not need. Nothing takes 10 s without a word.
+# Kernels are compiled while pip installs what they do not need. Nothing takes 10 s without a word. What a worker, a server and
+# the command line import is kept as bytecode, also where the environment (that of many containers) lets nothing be kept.
 
 PYTHON ?= $(firstword $(foreach name,python3.11 python3.12 python3.13 python3,$(shell command -v $(name))))
 BIN := .venv/bin
 READY := .venv/.ready
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
+KEPT := PYTHONDONTWRITEBYTECODE= $(BIN)/python
 HOUSES := cases client server worker
 
 # $(call told,words,command) runs a command and says every 5 s how long it has taken so far.
@@ -63,8 +65,9 @@ $(READY): requirements.lock pyproject.toml
 	$(call told,making .venv,$(PYTHON) -m venv .venv)
 	$(call told,installing what the worker needs,$(PIP) -c requirements.lock setuptools \
 		&& $(PIP) -c requirements.lock --no-build-isolation -e ".[worker]")
-	$(call told,installing the rest,$(BIN)/python -m conoid.worker.compile & kernels=$$!; \
+	$(call told,installing the rest,$(KEPT) -m conoid.worker.compile & kernels=$$!; \
 		$(PIP) --no-deps -r requirements.lock || { kill $$kernels; exit 1; }; wait $$kernels)
+	@$(KEPT) -c "import conoid.client.cli, conoid.server.serve"
 	@mkdir -p build/types/conoid
 	@for house in $(HOUSES); do ln -sfn ../../../$$house build/types/conoid/$$house; done
 	@touch $(READY)

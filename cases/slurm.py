@@ -76,8 +76,8 @@ def call(place: str, words: Sequence[str], keep: int | None = None) -> str:
     path = str(Path(place) / words[0]) if place else words[0]
     try:
         done = subprocess.run(
-            [path, *words[1:]], stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=_LONGEST, check=False,
-            env=environment(os.environ), pass_fds=() if keep is None else (keep,),
+            [path, *words[1:]], stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace",
+            timeout=_LONGEST, check=False, env=environment(os.environ), pass_fds=() if keep is None else (keep,),
         )  # fmt: skip
     except subprocess.TimeoutExpired:
         raise AwayError(f"{words[0]} has not answered within {_LONGEST:g} s") from None
@@ -100,8 +100,17 @@ def jobs(place: str, name: str = "") -> list[Entry]:
     """This user's jobs that Slurm remembers, of one name or all. Raises AwayError, RefusedError."""
     words = ["squeue", "--noheader", "--array", "--states=all", f"--user={os.getuid()}", "--format=%i|%T|%S|%j|%r"]
     told = call(place, [*words, *([f"--name={name}"] if name else [])])
-    rows = [line.strip().split("|", 4) for line in told.splitlines()]
-    return [Entry(row[0], row[1], _time(row[2]), _key(row[0], row[3]), row[4]) for row in rows if len(row) == 5]
+    if told and not told.endswith("\n"):
+        raise AwayError("squeue has broken off in the middle of its list")
+    return [_entry(line) for line in told.splitlines()]
+
+
+def _entry(line: str) -> Entry:
+    """What is no line of a list makes the whole no list: a job that is not on it may be there all the same."""
+    row = line.strip().split("|", 4)
+    if len(row) != 5 or not row[0][:1].isdigit() or not row[1].isupper():
+        raise AwayError(f"squeue has answered what is no list: {line.strip()[:60]!r}")
+    return Entry(row[0], row[1], _time(row[2]), _key(row[0], row[3]), row[4])
 
 
 def _key(job: str, name: str) -> str:
@@ -157,7 +166,15 @@ def submit(place: str, folder: Path, job: Job, profile: Profile) -> str:
             if known := jobs(place, job.name):
                 return known[0].job
             raise
-    return told.strip().partition(";")[0]
+    return _number(told)
+
+
+def _number(told: str) -> str:
+    """Of a new job, as ``sbatch --parsable`` says it. Raises AwayError."""
+    number = told.strip().partition(";")[0]
+    if not number.isdecimal():
+        raise AwayError(f"sbatch has not said the number of the job, but {told.strip()[:60]!r}")
+    return number
 
 
 def submit_array(place: str, records: Sequence[Job], profile: Profile) -> dict[int, str]:
@@ -174,7 +191,7 @@ def submit_array(place: str, records: Sequence[Job], profile: Profile) -> dict[i
         lacking = [job.task for job in records if job.task is not None and job.key not in there]
         if lacking:
             told = call(place, ["sbatch", *batch.array_words(records[0], profile, lacking)], lock.fileno())
-            number = told.strip().partition(";")[0]
+            number = _number(told)
             found |= {task: f"{number}_{task}" for task in lacking}
     return found
 

@@ -1,12 +1,15 @@
 """The shapes of the answers, for OpenAPI and for those who read it. The routes build what has these shapes."""
 
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
 
 from conoid.cases.messages import Progress, Snapshot
 from conoid.cases.outcome import Outcome
 from conoid.cases.run import Cause, State
+
+MOST_POINTS = 1000
+"""Of a sweep. Chosen: what is expanded in a second."""
 
 
 class ProblemEntry(msgspec.Struct, kw_only=True):
@@ -157,8 +160,8 @@ class Wish(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
     """A sweep that is handed in: a case as plain data, the changes of each point by key, runs at a time."""
 
     case: dict[str, Any]
-    points: list[dict[str, Any]]
-    at_once: int | None = None
+    points: Annotated[list[dict[str, Any]], msgspec.Meta(min_length=1, max_length=MOST_POINTS)]
+    at_once: Annotated[int, msgspec.Meta(ge=1)] | None = None
 
 
 class SweepLine(msgspec.Struct, kw_only=True):

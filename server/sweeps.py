@@ -17,12 +17,13 @@ from conoid.cases.load import CaseError, Problem, apply_overrides, json_data
 from . import durable, folder
 from .errors import ServiceError, invalid_case
 from .settings import Settings
+from .shapes import MOST_POINTS
 from .submission import Desk, Wishes
 from .waiting import Need
 
 FOLDER = "sweeps"
-_MOST_POINTS, _MOST_BYTES = 1000, 16 << 20
-"""Points of a sweep, and bytes of all its cases together. Chosen: what is expanded in a second."""
+_MOST_BYTES = 16 << 20
+"""Of all cases of a sweep together. Chosen: what is expanded in a second."""
 _JSON = "application/json"
 
 
@@ -160,8 +161,8 @@ def _wish(body: bytes) -> Wish:
         raise invalid_case(error.problems) from None
     except msgspec.ValidationError as error:
         raise ServiceError(422, "invalid_sweep", str(error), hint="case, points, at_once") from None
-    if not 1 <= len(wish.points) <= _MOST_POINTS:
-        raise ServiceError(422, "invalid_sweep", f"{len(wish.points)} points; allowed: 1 to {_MOST_POINTS}")
+    if not 1 <= len(wish.points) <= MOST_POINTS:
+        raise ServiceError(422, "invalid_sweep", f"{len(wish.points)} points; allowed: 1 to {MOST_POINTS}")
     if wish.at_once is not None and wish.at_once < 1:
         raise ServiceError(422, "invalid_sweep", f"at_once = {wish.at_once}: at least 1")
     return wish

@@ -2,7 +2,8 @@
 
 A drill that was interrupted goes on where it was: what was true in build/drill/faults.jsonl is not tried again unless
 ``--fresh`` says so. ``--shard 2/4`` tries every fourth group from the second on, ``--only WORDS`` those whose names
-have the words, ``--list`` names them. The exit code is 0 when every state became true in time.
+have the words, or whose kind of stand is of that name (``slurm``), ``--list`` names them. The exit code is 0 when every
+state became true in time.
 """
 
 import argparse
@@ -16,7 +17,7 @@ from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
-from . import damage, strike, strikes, workers
+from . import cluster, damage, strike, strikes, workers
 from .grounds import Grounds, grounds
 from .judge import TRUE, Row
 from .table import write
@@ -29,7 +30,7 @@ Group = tuple[str, Callable[[Grounds], Iterator[Row]]]
 def groups() -> dict[str, Group]:
     """What is tried together, by name."""
     found: dict[str, Group] = {}
-    for one in strikes.everything():
+    for one in [*strikes.everything(), *cluster.everything()]:
         found[one.name] = (one.stand, partial(_struck, one))
     for name, (kind, deed) in damage.groups().items():
         found[name] = (kind, partial(_on, kind, deed))
@@ -49,7 +50,8 @@ def _on(kind: str, deed: Callable[..., Iterator[Row]], made: Grounds) -> Iterato
 
 def main() -> int:
     options = _options()
-    chosen = {name: group for name, group in groups().items() if options.only in name}
+    known = groups()
+    chosen = {name: group for name, group in known.items() if options.only in name or options.only == group[0]}
     names = list(chosen)[options.shard[0] - 1 :: options.shard[1]]
     if options.list:
         print(*names, sep="\n")
@@ -63,7 +65,7 @@ def main() -> int:
         for name in names:
             if name not in done or any(row.verdict != TRUE for row in done[name]):
                 _try(name, chosen[name], made, book)
-    found = [(row, name) for name, rows in _done(book).items() for row in rows]
+    found = [(row, name) for name, rows in _done(book).items() if name in known for row in rows]
     return write(PLACE / "faults.md", [row for row, _ in found])
 
 

@@ -18,6 +18,8 @@ from .stand import Stand
 
 CASE = "case.toml"
 GONE = frozenset({"410"})
+IN_A_ROW = 4
+"""Runs that wait at a time: they run one after the other, and the time that each is given is not for the queue."""
 LOST = frozenset({"lost/service", "lost/storage", "failed/storage", "failed/service"})
 ANY_FAILURE = STORAGE | {"failed/input"}
 
@@ -184,8 +186,9 @@ def batches(some: Iterable[Damage], size: int) -> Iterator[list[Damage]]:
     kinds: dict[tuple[str, bool], list[Damage]] = {}
     for one in some:
         kinds.setdefault((one.doing, one.down), []).append(one)
-    for same in kinds.values():
-        yield from (same[n : n + size] for n in range(0, len(same), size))
+    for (doing, _), same in kinds.items():
+        step = min(size, IN_A_ROW) if doing == "waits" else size
+        yield from (same[n : n + step] for n in range(0, len(same), step))
 
 
 def groups(size: int = 12) -> dict[str, tuple[str, Callable[[Stand], Iterator[Row]]]]:

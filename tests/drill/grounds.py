@@ -4,9 +4,11 @@ import os
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
+from ..server import real_slurm
+from . import cluster
 from .stand import UNPRIVILEGED, Stand, can_drop
 
 DISK = "size=1100m,nr_inodes=4000"
@@ -21,10 +23,13 @@ class Grounds:
         self._place = place
         self._stands: dict[str, Stand] = {}
         self._mounts: list[Path] = []
+        self._cluster: real_slurm.Cluster | None = None
+        self._ends = ExitStack()
         self._make: dict[str, Callable[[Path], Stand]] = {
             "plain": Stand, "wide": lambda root: Stand(root, slots=40, before=UNPRIVILEGED),
             "narrow": lambda root: Stand(root, slots=3, before=UNPRIVILEGED),
             "unprivileged": lambda root: Stand(root, before=UNPRIVILEGED), "disk": self._on_a_disk, "clock": _clock,
+            "slurm": lambda root: cluster.stand(root, self._slurm()),
         }  # fmt: skip
 
     def lacks(self, kind: str) -> str:
@@ -35,7 +40,7 @@ class Grounds:
             return "only root can mount a small disk"
         if kind == "clock" and not _libfaketime():
             return "no libfaketime (apt-get install faketime; make drill does it)"
-        return ""
+        return real_slurm.missing() if kind == "slurm" else ""
 
     def stand(self, kind: str) -> Stand:
         """With a server that answers."""
@@ -60,6 +65,7 @@ class Grounds:
         """Ends all servers and their workers."""
         for kind in tuple(self._stands):
             self.renew(kind)
+        self._ends.close()
 
     def _close(self, stand: Stand) -> None:
         stand.close()
@@ -70,6 +76,12 @@ class Grounds:
             with suppress(OSError):
                 path.chmod(0o700)
         shutil.rmtree(stand.root, ignore_errors=True)
+
+    def _slurm(self) -> real_slurm.Cluster:
+        """One for all stands; it takes a while to start."""
+        if self._cluster is None:
+            self._cluster = self._ends.enter_context(real_slurm.running(self._place / "cluster"))
+        return self._cluster
 
     def _on_a_disk(self, root: Path) -> Stand:
         made = Stand(root)

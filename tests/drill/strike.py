@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from . import judge, situations
 from .judge import TRUE, Row
@@ -26,6 +26,8 @@ class Strike:
     """What is true of a worker that could not write how it ended, where the fault hits what workers write as well."""
     hold: float = 2.5
     lives: Sequence[Situation] = situations.ALL
+    launches: int = 1
+    """How often any run may be started at most."""
 
 
 def rows(stand: Stand, strike: Strike) -> Iterator[Row]:
@@ -41,7 +43,7 @@ def rows(stand: Stand, strike: Strike) -> Iterator[Row]:
     time.sleep(strike.hold)
     strike.lift(stand)
     since = time.monotonic()
-    truths = [_after(life) for life in lives]
+    truths = [_after(life, strike.launches) for life in lives]
     first = []
     ends = judge.settled(stand, truths, since)
     for situation, truth, (seen, seconds) in zip(strike.lives, truths, ends, strict=True):
@@ -84,10 +86,10 @@ def _settled(stand: Stand) -> None:
         time.sleep(0.1)
 
 
-def _after(life: Life) -> Truth:
+def _after(life: Life, launches: int) -> Truth:
     try:
         next(life)
     except StopIteration as end:
         found: Truth = end.value
-        return found
+        return replace(found, launches=max(found.launches, launches))
     raise AssertionError("a life has three parts")

@@ -1,10 +1,11 @@
 """A worker that computes nothing and keeps the contract: command line, journal, outcome, signals, exit codes.
 
 What it does stands in the case's ``description`` as JSON: ``steps``, ``pace`` (s a step), ``end`` (see the function),
-and ``wait`` (a file whose appearance lets it go on).
+and ``wait`` (a file whose appearance lets it go on). Rank 0 holds the lock of the folder while it lives.
 """
 
 import argparse
+import fcntl
 import json
 import os
 import signal
@@ -29,10 +30,15 @@ def main() -> int:
     parser.add_argument("--ranks")
     parser.add_argument("--set")
     parser.add_argument("--interruptible", action="store_true")
+    parser.add_argument("--restart", action="store_true")
     options = parser.parse_args()
     rank = int(os.environ.get("PMI_RANK", "0"))
     (options.out / layout.LOGS / f"rank-{rank}.log").write_text(f"rank {rank} says hello\n")
-    return run(options) if rank == 0 else 0
+    if rank:
+        return 0
+    with (options.out / layout.LOCK).open("a") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        return run(options)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -100,12 +106,21 @@ def end(how: str, options: argparse.Namespace, say: object, steps: int) -> int:
     if how == "deaf":
         time.sleep(600)
     state = "cancelled" if stop else "succeeded"
+    if stop and options.interruptible and not (options.out / layout.STOP_REQUEST).exists():
+        return interrupted(options, steps)
     result = outcome.Outcome(state=state, cause="cancelled" if stop else None, steps=steps, time=1.0, digest="d" * 64)
     (options.out / layout.OUTCOME).write_bytes(outcome.to_json(result))
     say(messages.Finished(run=options.run, wall=time.time(), state=state, digest="d" * 64, steps=steps, elapsed=0.1))
     if how == "hang":
         time.sleep(600)
     return ExitCode.INTERRUPTED if stop else ExitCode.SUCCEEDED
+
+
+def interrupted(options: argparse.Namespace, steps: int) -> int:
+    """A checkpoint, and what is told of the run so far; who has started it says what the interruption was."""
+    layout.checkpoint(options.out, steps).mkdir(parents=True, exist_ok=True)
+    (options.out / layout.INTERRUPTED).write_bytes(outcome.to_json(outcome.Outcome(state="cancelled", steps=steps)))
+    return ExitCode.INTERRUPTED
 
 
 def ask_to_stop(_signal: int, _frame: object) -> None:

@@ -101,16 +101,21 @@ class Cluster:
 
     def await_node(self) -> None:
         """Returns when the node takes jobs."""
-        deadline = time.monotonic() + _PATIENCE
+        deadline, state = time.monotonic() + _PATIENCE, "unknown"
         while time.monotonic() < deadline:
             with suppress(AssertionError):
-                state = self.command("sinfo", "-h", "-o", "%T").splitlines()[0]
+                state = self.resume()
                 if state in {"idle", "mixed", "allocated"}:
                     return
-                if "drain" in state or "down" in state:
-                    self.command("scontrol", "update", f"nodename={self.host}", "state=resume")
             time.sleep(0.2)
-        raise AssertionError(f"the node is not ready: {(self.place / 'slurmctld.log').read_text()[-2000:]}")
+        raise AssertionError(f"the node is {state}, not ready: {(self.place / 'slurmctld.log').read_text()[-2000:]}")
+
+    def resume(self) -> str:
+        """The state of the node; one that was taken out is let in again, as an operator does."""
+        state = self.command("sinfo", "-h", "-o", "%T").splitlines()[0]
+        if "drain" in state or "down" in state:
+            self.command("scontrol", "update", f"nodename={self.host}", "state=resume")
+        return state
 
     def _env(self) -> dict[str, str]:
         return {**os.environ, "SLURM_CONF": str(self.conf)}

@@ -6,15 +6,18 @@ import re
 import subprocess
 import sys
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from conoid.cases import layout
+from conoid.cases.messages import Status
 from conoid.cases.run import State
 
 from .running import Process, User, case_text, processes
+from .test_history import told, write
 
 REJECTED, ACCEPTED = "ST202", "ST201"
 """What schemathesis calls a request that suits the schema and is refused, and one that does not and is taken."""
@@ -48,13 +51,22 @@ def seeds(ann: User, place: Path) -> dict[str, list[Any]]:
     runs = [ann.submit() for _ in range(ENDED)]
     for run in runs:
         ann.wait_for(run)
+        speak(ann.runs / run)
     lives = ann.submit(wait=str(place / "never"))
     ann.wait_for(lives, State.RUNNING)
     sweep = ann.http.post("/v1/sweeps", json=wish()).json()["id"]
     return {
         "run_id": [*runs, lives], "sweep_id": [sweep], "path": ["case.toml", "log/rank-0.log", "outcome.json"],
-        "rank": ["0", "launcher"], "name": ["bar_on_bar"],
+        "rank": ["0", "launcher"], "name": ["bar_on_bar"], "n": [0, 1],
     }  # fmt: skip
+
+
+def speak(folder: Path) -> None:
+    """The run has said more than the fake worker does: reports, a cut, a snapshot."""
+    said = [message for message in told(100) if not isinstance(message, Status)]
+    write(folder, iter(said), after=len((folder / layout.JOURNAL).read_bytes().splitlines()))
+    layout.snapshot(folder, 0).parent.mkdir()
+    layout.snapshot(folder, 0).write_bytes(b"99")
 
 
 def wish() -> dict[str, Any]:
@@ -94,16 +106,30 @@ def hold_whole(report: dict[str, Any], said: str) -> None:
         assert report["valid_rates"][route]["examples"]["accepted"] >= 1, f"{route}: {report['valid_rates'][route]}"
 
 
-def failures(said: str) -> list[tuple[str, str, str]]:
-    """What schemathesis found: the code of its check, the route, the status of the answer."""
+def failures(said: str, paths: Iterable[str]) -> list[tuple[str, str, str]]:
+    """What schemathesis found: the code of its check, the route, the status of the answer. One block a route, and one
+    for all that came of requests in a row, where the last of them is meant; ``paths`` are those of the description.
+    """
     text = said.partition("= FAILURES =")[2].rpartition("= SUMMARY =")[0]
     found = []
-    for block in re.split(r"^_{3,} (?=[A-Z]+ /)", text, flags=re.MULTILINE)[1:]:
+    for block in re.split(r"^_{3,} (?=[A-Z]+ /|Stateful)", text, flags=re.MULTILINE)[1:]:
         for case in re.split(r"^\d+\. Test Case ID", block, flags=re.MULTILINE)[1:]:
             status = re.search(r"^\[(\d+)\]", case, re.MULTILINE)
             codes = re.findall(r"^- (ST\d+)", case, re.MULTILINE)
-            found += [(code, block.partition(" _")[0], status[1] if status else "") for code in codes]
+            title = block.partition(" _")[0]
+            route = last_route(case, paths) if title.startswith("Stateful") else title
+            found += [(code, route, status[1] if status else "") for code in codes]
     return found
+
+
+def last_route(case: str, paths: Iterable[str]) -> str:
+    """Of the last request that it takes to reproduce a case; empty when none is like that."""
+    asked = re.findall(r"^ *curl -X ([A-Z]+) .*https?://[^/ ]+(/[^\s?']*)", case, re.MULTILINE)
+    if not asked:
+        return ""
+    method, url = asked[-1]
+    likely = [path for path in paths if re.fullmatch(re.sub(r"\\{\w+\\}", ".+", re.escape(path)), url)]
+    return f"{method} {max(likely, key=lambda path: path.count('/'))}" if likely else ""
 
 
 def test_what_did_not_run_is_no_success() -> None:
@@ -127,17 +153,37 @@ def test_what_did_not_run_is_no_success() -> None:
             hold_whole({**good, **wrong}, "")
 
 
+def test_what_came_of_requests_in_a_row_belongs_to_the_last_of_them() -> None:
+    said = """= FAILURES =
+____ POST /v1/sweeps ____
+1. Test Case ID: a
+- ST202 Schema-valid request rejected
+[422] Unprocessable Content:
+____ Stateful tests ____
+1. Test Case ID: b
+- ST201 Schema-violating request accepted
+[204] No Content:
+    curl -X GET http://127.0.0.1:1/v1/runs
+    curl -X GET -H 'last-event-id;' 'http://127.0.0.1:1/v1/runs/1k0/stream?after=72'
+= SUMMARY ="""
+    paths = ["/v1/runs", "/v1/runs/{run_id}", "/v1/runs/{run_id}/stream"]
+    found = [("ST202", "POST /v1/sweeps", "422"), ("ST201", "GET /v1/runs/{run_id}/stream", "204")]
+    assert failures(said, paths) == found
+
+
 @pytest.mark.slow
 def test_no_request_fails_the_server_or_its_schema(ann: User, tmp_path: Path) -> None:
     pytest.importorskip("schemathesis", reason="pip install schemathesis")
     description = ann.http.get("/openapi.json").json()
     (tmp_path / "openapi.json").write_text(json.dumps(seeded(description, seeds(ann, tmp_path))))
+    # How fast requests are made up says something of the machine, nothing of the server.
     command = [
         sys.executable, "-c", "from schemathesis.cli import schemathesis; schemathesis()", "run",
         str(tmp_path / "openapi.json"), "--url", str(ann.http.base_url),
         "--header", f"Authorization: {ann.http.headers['authorization']}", "--checks", "all",
         "--max-examples", str(EXAMPLES), "--phases", ",".join(PHASES), "--continue-on-failure",
-        "--seed", "1", "--request-timeout", "70", "--no-color", "--report-json-path", str(tmp_path / "report.json"),
+        "--seed", "1", "--suppress-health-check", "too_slow", "--request-timeout", "70", "--no-color",
+        "--report-json-path", str(tmp_path / "report.json"),
     ]  # fmt: skip
     done = subprocess.run(
         command, capture_output=True, text=True, timeout=3000, check=False, cwd=tmp_path, env=hooked()
@@ -147,7 +193,7 @@ def test_no_request_fails_the_server_or_its_schema(ann: User, tmp_path: Path) ->
     assert "Tested: " in summary, done.stderr + done.stdout[-2000:]
     report = json.loads((tmp_path / "report.json").read_bytes())
     hold_whole(report, done.stdout)
-    found = failures(done.stdout)
+    found = failures(done.stdout, description["paths"])
     assert len(found) == sum(kind["count"] for kind in report["failures"]), "each is read"
     wrong = [one for one in found if one[:2] not in ALLOWED and one[2] != "410"]
     assert not wrong, f"{wrong}\n{done.stdout[-6000:]}"

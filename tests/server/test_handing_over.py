@@ -78,6 +78,27 @@ def test_nobody_hands_over_while_the_queue_cannot_be_read(place: Path) -> None:
     assert calls(place) == 0
 
 
+@pytest.mark.parametrize(
+    "said", [b"\xff{|||\n", b"<html>\n", b"7|\n", b"7|RUNNING|0|conoid-a|None\n8|PEND", b"a|b|c|d|e\n"]
+)
+def test_a_list_that_is_none_is_no_empty_list(place: Path, said: bytes) -> None:
+    """A run whose job is not on it would be handed over again."""
+    found = commands(place, "echo 101")
+    (place / "queue").write_bytes(said)
+    with pytest.raises(slurm.AwayError, match="squeue"):
+        slurm.submit(found, place / "run", JOB, Profile())
+    assert calls(place) == 0
+
+
+@pytest.mark.parametrize("said", ["", "<html>", "101 102"])
+def test_a_number_that_is_none_is_looked_for(place: Path, said: str) -> None:
+    found = commands(place, f"{ACCEPT}; echo '{said}'")
+    with pytest.raises(slurm.AwayError, match="sbatch"):
+        slurm.submit(found, place / "run", JOB, Profile())
+    assert slurm.submit(found, place / "run", JOB, Profile()) == "101"
+    assert calls(place) == 1
+
+
 def test_an_sbatch_that_outlives_its_server_keeps_the_next_from_a_second(place: Path) -> None:
     found = commands(place, f"sleep 2; {ACCEPT}; echo 101")
     code = (
