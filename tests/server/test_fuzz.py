@@ -17,7 +17,7 @@ from conoid.cases.messages import Status
 from conoid.cases.run import State
 
 from .running import Process, User, case_text, processes
-from .test_history import told, write
+from .spoken import told, write
 
 REJECTED, ACCEPTED = "ST202", "ST201"
 """What schemathesis calls a request that suits the schema and is refused, and one that does not and is taken."""
