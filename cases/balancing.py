@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 from .schema import Balance
 
@@ -39,7 +40,7 @@ class Guard:
 
 
 _MOMENTS = 32
-"""At most so many moments of a stretch of steps are remembered; then every other one. Chosen."""
+"""So many moments of a stretch of steps are remembered, at most. Chosen."""
 
 
 @dataclass
@@ -48,13 +49,18 @@ class Stretch:
 
     _moments: list[tuple[int, list[float]]] = field(default_factory=list)
     """Steps and work of each rank, s, from the cut up to the end of each of some windows."""
+    _apart: float = 0.0
+    """Steps between two of them, but for the last."""
 
     def add(self, loads: Sequence[float], steps: int) -> None:
         """Takes the ``loads`` of all ranks, s a step, over some steps."""
         before = self.work or [0.0] * len(loads)
-        self._moments.append((self.steps + steps, [w + steps * load for w, load in zip(before, loads, strict=True)]))
+        now = self.steps + steps, [w + steps * load for w, load in zip(before, loads, strict=True)]
+        if len(self._moments) > 1 and self.steps - self._moments[-2][0] < self._apart:
+            self._moments.pop()
+        self._moments.append(now)
         if len(self._moments) > _MOMENTS:
-            self._moments = self._moments[1::2] if len(self._moments) % 2 == 0 else self._moments[::2]
+            self._moments, self._apart = self._moments[::2], 2.0 * self.steps / _MOMENTS
 
     @property
     def steps(self) -> int:
@@ -71,9 +77,11 @@ class Stretch:
         """The imbalance of the first half of the steps, and of what came after it."""
         if not self._moments:
             return 1.0, 1.0
-        _, middle = next(moment for moment in self._moments if 2 * moment[0] >= self.steps)
-        late = [now - then for now, then in zip(self.work, middle, strict=True)]
-        return imbalance(middle), imbalance(late) if any(late) else imbalance(middle)
+        half, moments = 0.5 * self.steps, [(0, [0.0] * len(self.work)), *self._moments]
+        before, after = next(pair for pair in pairwise(moments) if pair[1][0] >= half)
+        share = (half - before[0]) / (after[0] - before[0])
+        first = [a + share * (b - a) for a, b in zip(before[1], after[1], strict=True)]
+        return imbalance(first), imbalance([whole - part for whole, part in zip(self.work, first, strict=True)])
 
 
 @dataclass
