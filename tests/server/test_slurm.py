@@ -50,6 +50,8 @@ time = "2 min"
 notice = "60 s"
 """
 BREAKING = Path(__file__).parents[1] / "parallel" / "breaking.toml"
+_DONE_WITH = 3.0
+"""s: a node has done with a job that is put back by then."""
 DIGEST = tomllib.loads(BREAKING.with_name("digests.toml").read_text(encoding="utf-8"))["here"]["breaking"]
 """Of that case, on any number of ranks."""
 LONG = "12 us"
@@ -387,11 +389,14 @@ def test_a_preempted_run_goes_on_to_the_same_digest(solver: Site, profile: str, 
 
 
 def hurry(solver: Site, run: str) -> None:
-    """Slurm lets a job that it has put back wait for two minutes, which are not waited for here."""
+    """Slurm lets a job that it has put back wait for two minutes, which are not waited for here; but the node must have
+    done with it: it takes one that starts in the second of its end for the one that was ended.
+    """
     deadline = time.monotonic() + 20.0
     while time.monotonic() < deadline and solver.ann.show(run)["state"] == "queued":
         for job, state in solver.jobs(run):
             if state == "PENDING":
+                time.sleep(_DONE_WITH)
                 solver.cluster.command("scontrol", "update", f"jobid={job}", "StartTime=now")
                 return
         time.sleep(0.2)
