@@ -392,11 +392,11 @@ def hurry(solver: Site, run: str) -> None:
     """Slurm lets a job that it has put back wait for two minutes, which are not waited for here; but the node must have
     done with it: it takes one that starts in the second of its end for the one that was ended.
     """
+    since = dict[str, float]()
     deadline = time.monotonic() + 20.0
     while time.monotonic() < deadline and solver.ann.show(run)["state"] == "queued":
         for job, state in solver.jobs(run):
-            if state == "PENDING":
-                time.sleep(_DONE_WITH)
+            if state == "PENDING" and time.monotonic() > since.setdefault(job, time.monotonic()) + _DONE_WITH:
                 solver.cluster.command("scontrol", "update", f"jobid={job}", "StartTime=now")
                 return
         time.sleep(0.2)
