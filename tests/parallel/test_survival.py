@@ -1,6 +1,7 @@
 """A run survives anything: cut anew in mid-flight, stopped and gone on with on other ranks, killed; the same bits."""
 
 import contextlib
+import itertools
 import os
 import random
 import signal
@@ -152,9 +153,9 @@ def test_a_run_goes_on_on_other_ranks(name: str, legs: list[tuple[int, int]], wh
 @pytest.mark.parametrize("kills", [2, pytest.param(50, marks=[pytest.mark.slow, pytest.mark.timeout(1200)])])
 def test_a_run_survives_being_killed(kills: int, whole: Made, tmp_path: Path) -> None:
     """With a checkpoint in every step, killed at any moment, in the midst of writing one too; in one run or in many."""
-    draw, killed = random.Random(SEED), 0
+    draw, killed, runs = random.Random(SEED), 0, itertools.count()
     while killed < kills:
-        root = tmp_path / str(killed)
+        root = tmp_path / str(next(runs))
         root.mkdir()
         words = [*case("nodal", root, root), "--set", "run.checkpoint_every=1 ns"]
         killed += killed_and_ended(draw, words, root / "nodal", kills - killed)
