@@ -16,12 +16,13 @@ from conoid.cases.balancing import MOVED, WORK, Guard, Trigger
 from conoid.cases.schema import Case
 
 from . import simulation
+from .ids import located
 from .meter import Meter
 from .migration.parcel import Parcel
 from .migration.route import route
 from .parallel.comm import Comm
 from .simulation import Simulation
-from .state import Floats, Ints
+from .state import Floats
 from .timers import worked
 
 _LEAST = 1e-9
@@ -156,7 +157,7 @@ class Balance:
 def _with_their_first_tets(parcel: Parcel, effort: "np.ndarray") -> dict[int, Floats]:
     """By part (n, k): the ``effort`` (nodes, k) of all nodes whose tet of smallest id here it is."""
     ids, first = parcel.nodes["id"], np.full(len(effort), np.iinfo(np.int64).max)
-    corners: dict[int, Ints] = {part: np.searchsorted(ids, t["corners"]) for part, t in parcel.tets.items()}
+    corners = {part: located(ids, t["corners"]) for part, t in parcel.tets.items()}
     for part, table in parcel.tets.items():
         np.minimum.at(first, corners[part], table["id"][:, None])
     found = {}

@@ -4,6 +4,7 @@ Rank 0 builds the whole mesh (assembly.py), numbers it and cuts it; every rank r
 Global ids follow the order of the parts and, within a part, the order of the mesh, on any number of ranks.
 """
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -69,6 +70,8 @@ class Piece:
     """Tets, nodes and shared nodes of the whole."""
     part_starts: Ints
     """Global id of the first tet of each part."""
+    mean_volumes: Floats
+    """(parts,) m^3."""
     size: float
     """Largest coordinate of the whole, m."""
 
@@ -88,9 +91,13 @@ def cut(whole: Whole, ranks: int, scale: tuple[float, float, float] = (1.0, 1.0,
     for nodes in nodes_of:
         holders[nodes] += 1
     home, grouped = _home(whole, owner), _grouped(whole, centres)
+    starts = np.searchsorted(whole.tet_part, np.arange(whole.tet_part[-1] + 1))
+    means = np.array([math.fsum(part) / len(part) for part in np.split(whole.volumes, starts[1:])])
     shared = holders > 1
     totals = (len(whole.tets), len(whole.points), int(shared.sum()))
-    return [_piece(whole, owner, rank, nodes_of, shared, home, grouped, totals) for rank in range(ranks)]
+    return [
+        _piece(whole, owner, rank, nodes_of, shared, home, grouped, totals, (starts, means)) for rank in range(ranks)
+    ]
 
 
 def _grouped(whole: Whole, centres: Floats) -> tuple[Indices, Indices, Floats]:
@@ -111,7 +118,7 @@ def _home(whole: Whole, owner: Indices) -> Indices:
 
 def _piece(
     whole: Whole, owner: Indices, rank: int, nodes_of: list[Ints], shared: Flags, home: Indices,
-    grouped: tuple[Indices, Indices, Floats], totals: tuple[int, int, int],
+    grouped: tuple[Indices, Indices, Floats], totals: tuple[int, int, int], parts: tuple[Ints, Floats],
 ) -> Piece:  # fmt: skip
     nodes, ids = nodes_of[rank], np.flatnonzero(owner == rank)
     local = np.full(len(whole.points), -1, np.int32)
@@ -130,8 +137,7 @@ def _piece(
         ids.astype(np.int64),
         whole.tet_part[ids], local[tets], whole.volumes[ids],
         whole.across[ids] if len(whole.across) else whole.across, np.any(shared[tets], axis=1),
-        grouped[0][nodes], grouped[1][ids], grouped[2], neighbours, totals,
-        np.searchsorted(whole.tet_part, np.arange(whole.tet_part[-1] + 1)), float(np.abs(whole.points).max()),
+        grouped[0][nodes], grouped[1][ids], grouped[2], neighbours, totals, *parts, float(np.abs(whole.points).max()),
     )  # fmt: skip
 
 
@@ -164,8 +170,8 @@ def _model(case: schema.Case, piece: Piece) -> Model:
     )  # fmt: skip
     blocks = [_block(case, piece, index) for index in range(len(case.parts)) if (piece.tet_part == index).any()]
     return Model(
-        nodes, blocks, [p.name for p in case.parts], piece.totals[0], piece.totals[1], piece.part_starts, piece.size,
-        piece.groups,
+        nodes, blocks, [p.name for p in case.parts], piece.totals[0], piece.totals[1], piece.part_starts,
+        piece.mean_volumes, piece.size, piece.groups,
     )  # fmt: skip
 
 

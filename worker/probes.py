@@ -96,7 +96,7 @@ class Probes:
         """Which walls each probe is of."""
         self._model = model
         self._comm = comm
-        centres = [model.nodes.x0[block.tets].mean(axis=1) for block in model.blocks] if case.probes else []
+        centres = [_centres(block, model) for block in model.blocks] if case.probes else []
         self._chosen = [
             [_inside(probe, block, model, x) for block, x in zip(model.blocks, centres, strict=True)]
             for probe in case.probes
@@ -187,10 +187,17 @@ class Probes:
         return places
 
 
+def _centres(block: Block, model: Model) -> Floats:
+    """(3, tets) initial centres, m."""
+    return np.array([x[block.tets].sum(axis=1) for x in model.nodes.x0.T.copy()]) / 4.0
+
+
 def _inside(probe: Probe, block: Block, model: Model, centres: Floats) -> "np.ndarray":
     if model.parts[block.part] != probe.part:
         return np.zeros(0, np.int64)
     if probe.low is None or probe.high is None:
         return block.id.copy()
-    inside = ((centres >= np.array(probe.low)) & (centres <= np.array(probe.high))).all(axis=1)
+    inside = np.ones(block.n, bool)
+    for x, low, high in zip(centres, probe.low, probe.high, strict=True):
+        inside &= (x >= low) & (x <= high)
     return np.asarray(block.id[inside])

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from . import ids as ids_of
 from .growing import Rooms
 
 Floats = npt.NDArray[np.float64]
@@ -67,8 +68,6 @@ TOLD = 22
 
 INTACT, BROKEN, WIDE = range(3)
 """Bond of a face to the one behind it: whole; broken; broken and so far apart that it is part of the surface."""
-IDS_A_LOOK = 32
-"""Entries of a table that cost as much to lay out as a bisection."""
 LAID_BARE = -2
 """``Block.across`` of a face that erosion has exposed; -1 for one that was exposed at the start."""
 
@@ -85,24 +84,6 @@ def extended(array: "np.ndarray", rows: "np.ndarray") -> "np.ndarray":
         room[:n] = array
     room[n:m] = rows
     return room[:m]
-
-
-def located(known: Ints, wanted: Ints) -> Indices:
-    """Where ``wanted`` ids, which must be there, stand among the ascending ``known``, in their shape: by a table of all
-    ids up to the largest where many are wanted, by bisection where few are.
-    """
-    if not len(known) or wanted.size * IDS_A_LOOK < known[-1]:
-        return np.searchsorted(known, wanted).astype(np.int32)
-    table = np.empty(known[-1] + 1, np.int32)
-    table[known] = np.arange(len(known), dtype=np.int32)
-    return np.asarray(table[wanted])
-
-
-def among(known: Ints, wanted: Ints) -> Flags:
-    """(n,) which of ``wanted`` are in the ascending ``known``."""
-    if not len(known):
-        return np.zeros(len(wanted), bool)
-    return np.asarray(known[np.minimum(np.searchsorted(known, wanted), len(known) - 1)] == wanted)
 
 
 @dataclass
@@ -141,8 +122,7 @@ class Nodes:
 
     def places(self, ids: Ints) -> Indices:
         """Local indices of nodes with these global ids, -1 for those that are not here."""
-        at = np.minimum(np.searchsorted(self.id, ids), len(self.id) - 1)
-        return np.where(self.id[at] == ids, at, -1).astype(np.int32)
+        return ids_of.places(self.id, ids)
 
     def grow(self, copies: "Copies") -> None:
         """Takes up copies of nodes: they begin as their parents are, whose mass is their own less the copies'."""
@@ -289,6 +269,8 @@ class Model:
     nodes_global: int = 0
     part_starts: Ints = field(default_factory=lambda: np.zeros(1, np.int64))
     """Global id of the first tet of each part."""
+    mean_volumes: Floats = field(default_factory=lambda: np.zeros(0))
+    """(parts,) of the tets of each at the start, m^3."""
     size: float = 0.0
     """Largest coordinate of the whole mesh at the start, m: what round-off in positions is measured by."""
     groups: Floats = field(default_factory=lambda: np.zeros((0, 4)))

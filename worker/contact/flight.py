@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from ..ids import located
 from ..jit import njit
 from ..parallel.comm import Comm
 from ..parallel.fixed_point import exact_sums
-from ..state import Floats, Indices, Ints, Nodes, extended, located
+from ..state import Floats, Indices, Ints, Nodes, extended
 from . import ghosts
 from .records import Crowd, merged
 from .sides import HALO, Sides

@@ -6,10 +6,11 @@ has the candidates of the node that it was part of, with the rank that computes 
 
 import numpy as np
 
+from ..ids import among
 from ..jit import njit
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
-from ..state import Flags, Indices, Ints, Nodes, among, extended
+from ..state import Flags, Indices, Ints, Nodes, extended
 from ..topology import keys
 from . import ghosts
 from .cracks import Cracks, computed, touching

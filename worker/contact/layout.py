@@ -2,11 +2,12 @@
 
 import numpy as np
 
+from ..ids import places
 from ..parallel.comm import Comm
 from ..state import Floats, Nodes
 from . import buckets
 from .columns import OwnSlots, SceneEdges, SceneFaces, SceneSlots
-from .scene import Scene, rows_of
+from .scene import Scene
 from .sides import Rules, Sides, with_ghosts
 from .tracks import Tracks
 
@@ -38,7 +39,7 @@ def build(sides: Sides, rules: Rules, horizon: float, drift: Floats, nodes: Node
         crowd=crowd, own=OwnSlots(held, crowd.local[held], place), slots=SceneSlots.at_rest(slave, pushes | slave),
         faces=SceneFaces.at_rest(corners, faces.id, faces.size, faces.exposed.copy()),
         edges=SceneEdges.at_rest(
-            ends, edges.sides, rows_of(faces.id, edges.sides), edges.size, edges.exposed.copy(), own, rank
+            ends, edges.sides, places(faces.id, edges.sides), edges.size, edges.exposed.copy(), own, rank
         ),
         rules=rules, tracks=Tracks(crowd.x, crowd.course, faces.n, edges.n, drift, horizon),
         cracks=np.zeros((0, 6), np.int32),

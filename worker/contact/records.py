@@ -10,7 +10,8 @@ from typing import Self
 
 import numpy as np
 
-from ..state import Flags, Floats, Indices, Ints, located
+from ..ids import located
+from ..state import Flags, Floats, Indices, Ints
 
 
 @dataclass

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..ids import places
 from ..state import Flags, Floats, Indices, Ints
 from . import search, sift
 from .narrow_phase import DEEP, DEEP_SELF
-from .scene import Scene, rows_of
+from .scene import Scene
 from .search import Things
 
 _PARTLY = 0.5
@@ -90,7 +91,7 @@ def carry(now: Scene, old: Scene) -> None:
 def _numbers(now: Ints, old: Ints) -> Indices:
     """Where the names ``old`` stand among ``now``, -1 where they do not."""
     order = np.argsort(now, kind="stable")
-    at = rows_of(now[order], old)
+    at = places(now[order], old)
     return np.where(at >= 0, order[at], -1).astype(np.int32) if len(order) else at
 
 

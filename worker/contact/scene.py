@@ -5,11 +5,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..ids import among, places
 from ..jit import njit
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, same
 from ..parallel.tags import Tag
-from ..state import Flags, Floats, Indices, Ints, Nodes, among
+from ..state import Flags, Floats, Indices, Ints, Nodes
 from . import ghosts, held
 from .columns import OwnSlots, SceneEdges, SceneFaces, SceneSlots
 from .company import Company
@@ -110,7 +111,7 @@ class Scene:
             owner = nodes.owner[nodes.places(keys[:, 0])]
             told = comm.swap({int(rank): rows[owner == rank] for rank in np.unique(owner)})
             rows = np.concatenate([rows[:0], *(words.reshape(-1, 6) for words in told.values())])
-        local, face = nodes.places(rows[:, 0]), rows_of(self.faces.id, rows[:, 1])
+        local, face = nodes.places(rows[:, 0]), places(self.faces.id, rows[:, 1])
         node = self.own.place[local]
         here = (local >= 0) & (node >= 0) & (face >= 0)
         self.node_face.recall(
@@ -119,7 +120,7 @@ class Scene:
 
     def rows_of(self, faces: Ints) -> Indices:
         """(k,) rows of those of the ``faces``, ids, that are here."""
-        rows = rows_of(self.faces.id, faces)
+        rows = places(self.faces.id, faces)
         return rows[rows >= 0]
 
     def expose(self, faces: Ints) -> None:
@@ -207,11 +208,3 @@ def _enliven(live, new, edges, faces, exposed, searched):  # type: ignore[no-unt
             both &= searched[faces[e, k]] if faces[e, k] >= 0 else exposed[e, k]
         new[e] |= both and not live[e]
         live[e] = both
-
-
-def rows_of(ids: Ints, wanted: Ints) -> Indices:
-    """Where ``wanted`` stand among the ascending ``ids``, in their shape; -1 where they do not."""
-    if not len(ids):
-        return np.full(wanted.shape, -1, np.int32)
-    at = np.minimum(np.searchsorted(ids, wanted), len(ids) - 1)
-    return np.where(ids[at] == wanted, at, -1).astype(np.int32)

@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from ..ids import places
 from ..parallel.comm import Comm
-from ..state import IDS_A_LOOK, Block, Ints, Model
+from ..state import Block, Indices, Ints, Model
 
 _PART = 1 << 62
 """Added to the number of a part: the name of what joins its tets, above all tet ids."""
@@ -30,7 +31,7 @@ def labels(model: Model, held: Ints, comm: Comm) -> list[Ints]:
     return np.split(found, np.cumsum([block.n for block in model.blocks])[:-1]) if model.blocks else []
 
 
-def components(n: int, edges: Ints) -> Ints:
+def components(n: int, edges: Ints | Indices) -> Ints:
     """(n,) the smallest number that each of n things is connected with by ``edges``, (m, 2).
 
     Every root hooks onto the smallest of its neighbours, then all things climb to their roots; edges inside a tree go.
@@ -57,21 +58,6 @@ def _joints(block: Block) -> Ints:
         whole &= block.bond == 0
     tet, face = np.nonzero(whole)
     return np.column_stack([block.id[tet], block.across[tet, face] // 4]).astype(np.int64)
-
-
-def places(known: Ints, wanted: Ints) -> Ints:
-    """Where ``wanted`` stand in the ascending ``known``, -1 for those that do not; all are at least 0. By a table of
-    all ids where many are wanted, by bisection where few are.
-    """
-    if not len(known):
-        return np.full(wanted.shape, -1)
-    beyond = int(known[-1]) + 1
-    if beyond <= wanted.size * IDS_A_LOOK:
-        table = np.full(beyond + 1, -1)
-        table[known] = np.arange(len(known))
-        return np.asarray(table[np.minimum(wanted, beyond)])
-    at = np.minimum(np.searchsorted(known, wanted), len(known) - 1)
-    return np.asarray(np.where(known[at] == wanted, at, -1))
 
 
 def _joined(border: Ints, known: Ints, piece: Ints, comm: Comm) -> Ints:

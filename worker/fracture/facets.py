@@ -6,8 +6,9 @@ import numpy as np
 
 from conoid.cases.schema import Fracture as Spec
 
+from ..ids import among, located, places
 from ..migration.parcel import Table
-from ..state import INTACT, Block, Floats, Indices, Ints, among
+from ..state import INTACT, Block, Floats, Indices, Ints
 from ..topology import Split
 from . import criterion
 from .records import FacetTable, Law, Mesh
@@ -81,8 +82,8 @@ def _beside(block: Block) -> Indices:
     for start in range(0, block.n, _BATCH):
         some = slice(start, start + _BATCH)
         behind = block.across[some] // 4
-        at = order[np.minimum(np.searchsorted(known, behind), block.n - 1)]
-        beside[some] = np.where(block.across[some] >= 0, np.where(block.id[at] == behind, at, ELSEWHERE), -1)
+        at = places(known, behind)
+        beside[some] = np.where(block.across[some] >= 0, np.where(at >= 0, order[at], ELSEWHERE), -1)
     return beside
 
 
@@ -109,6 +110,6 @@ def wind(body: Body, table: Table, step: int) -> None:
     mine = among(known, table["tet"])
     facet, tet = table["key"][mine], table["tet"][mine]
     first = among(known, facet // 4)
-    place = order[np.searchsorted(known, np.where(first, facet // 4, tet))]
+    place = order[located(known, np.where(first, facet // 4, tet))]
     face = np.where(first, facet % 4, np.argmax(body.block.across[place] == facet[:, None], axis=1))
     body.facets.since[place, face], body.facets.seen[place, face] = table["since"][mine], step

@@ -21,10 +21,10 @@ import numpy as np
 
 from conoid.cases import fragments as tables
 
+from ..ids import places
 from ..mesh.faces import FACES, areas
 from ..parallel.comm import Comm
 from ..state import MASS, Block, Floats, Ints, Model
-from .connectivity import places
 
 _NODE_BITS = 40
 """A node's global id stays below 2^40."""
@@ -163,7 +163,7 @@ def _node_counts(model: Model, tets: Ints, groups: Groups, comm: Comm) -> Ints:
     """(g,) nodes of each fragment. Those of a fragment of several ranks are counted by the nodes' owners."""
     nodes = model.nodes
     group, node = np.divmod(np.unique(groups.of[:, None] * np.int64(nodes.n) + tets), max(nodes.n, 1))
-    place = places(groups.split, groups.label)[group]
+    place = places(groups.split, groups.label).astype(np.int64)[group]
     found = np.bincount(group[place < 0], minlength=len(groups.label)).astype(np.int64)
     named = (place << _NODE_BITS | nodes.id[node])[place >= 0]
     owner = nodes.owner[node[place >= 0]]

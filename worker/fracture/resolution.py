@@ -2,13 +2,8 @@
 
 import logging
 
-import numpy as np
-
 from conoid.cases.schema import Fracture as Spec
 
-from ..parallel.comm import Comm
-from ..parallel.fixed_point import exact_sums
-from ..state import MASS, Model
 from .strength import Toughness
 
 _RESOLVED = 1.0 / 3.0
@@ -21,12 +16,9 @@ _REGULAR = (6.0 * 2.0**0.5) ** (1.0 / 3.0)
 log = logging.getLogger("conoid.worker")
 
 
-def mean_tet(model: Model, part: int, density: float, comm: Comm) -> tuple[float, float]:
-    """Mean volume of the tets of a part, m^3, and the edge of a regular tet of that volume, m; all ranks take part."""
-    masses = np.concatenate([np.zeros(0), *(block.row(MASS) for block in model.blocks if block.part == part)])
-    mass, count = exact_sums(comm, np.column_stack([masses, np.ones(len(masses))]))
-    volume = float(mass / count) / density
-    return volume, _REGULAR * volume ** (1.0 / 3.0)
+def edge(volume: float) -> float:
+    """Of a regular tet of that ``volume``, m^3; m."""
+    return float(_REGULAR * volume ** (1.0 / 3.0))
 
 
 def warnings(part: str, spec: Spec, tough: Toughness, size: float, safety: float) -> list[str]:

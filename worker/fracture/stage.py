@@ -50,7 +50,7 @@ class Fracture:
         self._model, self._elements, self._clock, self._comm = model, elements, clock, comm
         self.warnings: list[str] = []
         """What the user should know of the mesh."""
-        bodies, work = self._armed(case, comm)
+        bodies, work = self._armed(case)
         meshes = {body.index: body.mesh for body in bodies}
         self.separation = Separation(model, neighbours, meshes, comm)
         specs = [part.fracture for part in case.parts if part.fracture is not None]
@@ -135,14 +135,15 @@ class Fracture:
         if self.cohesion is not None:
             self._release.free()
 
-    def _armed(self, case: Case, comm: Comm) -> tuple[list[Body], float]:
+    def _armed(self, case: Case) -> tuple[list[Body], float]:
         """The bodies, and the order of magnitude of the work on a facet, J."""
         model, bodies, work, safety = self._model, list[Body](), 0.0, case.numerics.dt_safety
         for index, part in enumerate(case.parts):
             if part.fracture is None:
                 continue
             material = find_material(case, part.material)
-            volume, size = resolution.mean_tet(model, index, material.density, comm)
+            volume = float(model.mean_volumes[index])
+            size = resolution.edge(volume)
             tough = toughness(material, part.fracture, size)
             work = max(work, tough.energy * volume ** (2.0 / 3.0))
             self.warnings += resolution.warnings(part.name, part.fracture, tough, size, safety)

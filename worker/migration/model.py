@@ -5,6 +5,7 @@ import numpy as np
 from conoid.cases.schema import Case
 
 from .. import domain
+from ..ids import located
 from ..parallel.comm import Comm
 from ..state import CHUNK, Bits, Block, Indices, Ints, Model, Nodes, Tets
 from .parcel import Parcel, Table, length, take
@@ -20,7 +21,8 @@ def keep(model: Model) -> Parcel:
     nodes = model.nodes
     known = {
         "parts": model.parts, "elements_global": model.elements_global, "nodes_global": model.nodes_global,
-        "part_starts": model.part_starts, "size": model.size, "groups": model.groups, "scale": nodes.scale,
+        "part_starts": model.part_starts, "mean_volumes": model.mean_volumes, "size": model.size,
+        "groups": model.groups, "scale": nodes.scale,
     }  # fmt: skip
     columns = {name: getattr(nodes, name) for name in _NODAL}
     return Parcel(known, {}, columns, {b.part: _keep_block(b, nodes.id) for b in model.blocks if b.n}, {})
@@ -41,18 +43,18 @@ def resume(case: Case, arrived: Arrived, comm: Comm) -> Model:
     blocks = []
     for part in sorted(parcel.tets):
         if length(parcel.tets[part]):
-            corners = np.searchsorted(nodes.id, parcel.tets[part]["corners"])
+            corners = located(nodes.id, parcel.tets[part]["corners"])
             border = arrived.border[corners].any(axis=1)
             order = np.lexsort((parcel.tets[part]["id"], ~border))
             parcel.tets[part] = take(parcel.tets[part], order)
             blocks.append(_resume_block(case, part, parcel.tets[part], corners[order], int(border.sum())))
     return Model(
         nodes, blocks, known["parts"], known["elements_global"], known["nodes_global"], known["part_starts"],
-        known["size"], known["groups"],
+        known["mean_volumes"], known["size"], known["groups"],
     )  # fmt: skip
 
 
-def _resume_block(case: Case, part: int, table: Table, corners: Ints, border: int) -> Block:
+def _resume_block(case: Case, part: int, table: Table, corners: Indices, border: int) -> Block:
     n, rows = table["state"].shape
     state = np.empty((-(-n // CHUNK) * CHUNK, rows))
     state[:n], state[n:] = table["state"], table["state"][-1]

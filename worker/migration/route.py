@@ -10,10 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import ConoidError
+from ..ids import among, located, unique
 from ..parallel.comm import Comm
 from ..parallel.decompose import Cut, bisect, place
 from ..parallel.ownership import Neighbour
-from ..state import Flags, Floats, Indices, Ints, among
+from ..state import Flags, Floats, Indices, Ints
 from .parcel import Parcel, Table, joined, length, once, take
 
 _NOBODY = np.iinfo(np.int64).max
@@ -98,8 +99,8 @@ def _cut(parcel: Parcel, scale: Floats, comm: Comm) -> tuple[dict[int, Indices],
     """Where every tet lies among the boxes of the cut, by part."""
     nodes, points, ids, weights = parcel.nodes, [np.zeros((0, 3))], [np.zeros(0, np.int64)], [np.zeros((0, 3))]
     for table in parcel.tets.values():
-        corners = np.searchsorted(nodes["id"], table["corners"])
-        points.append(nodes["x"][corners].mean(axis=1) * scale)
+        corners = located(nodes["id"], table["corners"])
+        points.append(sum(nodes["x"][corner] for corner in corners.T) * (scale / 4.0))
         ids.append(table["id"])
         weights.append(table["weight"])
     owner, cuts = bisect(np.concatenate(points), np.concatenate(ids), np.concatenate(weights), comm.size, comm)
@@ -137,7 +138,7 @@ def _share(
             rows[name] = take(table, home[place(cuts, table["at"] * scale)] == rank)
         if name in rows and "with" in table:
             needed.append(rows[name]["with"].reshape(-1))
-    wanted = np.unique(np.concatenate(needed))
+    wanted = unique(np.concatenate(needed))
     chosen = among(wanted, parcel.nodes["id"])
     for name, table in parcel.rows.items():
         if "of" in table:
@@ -150,7 +151,7 @@ def _settle(whole: Parcel, comm: Comm) -> tuple[Directory, list[Neighbour], Indi
     ids = whole.nodes["id"]
     smallest = np.full(len(ids), _NOBODY)
     for table in whole.tets.values():
-        np.minimum.at(smallest, np.searchsorted(ids, table["corners"]), table["id"][:, None])
+        np.minimum.at(smallest, located(ids, table["corners"]), table["id"][:, None])
     home, words = ids % comm.size, np.column_stack([ids, smallest])
     told = comm.swap({rank: words[home == rank] for rank in range(comm.size)})
     rows = [np.column_stack([w.reshape(-1, 2), np.full(len(w) // 2, rank)]) for rank, w in told.items()]

@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from ..ids import located
 from ..jit import njit
 from ..parallel.comm import Comm
 from ..simulation import Simulation
 from ..snapshots.table import by_size
-from ..state import Floats, Ints, Model, located
+from ..state import Floats, Ints, Model
 
 SHARE = 1.0 / 50.0
 """Of the wall time, for finding fragments between frames. Chosen: a run of a minute takes a second longer."""

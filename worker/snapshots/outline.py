@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..fracture.connectivity import places
+from ..ids import places
 from ..mesh.faces import FACES, across
 from ..state import WIDE, Block, Floats, Ints, Model
 

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..state import DAMAGE, MASS, PLASTIC_STRAIN, TEMPERATURE, Block, Floats, Ints, Model, Nodes, located
+from ..ids import located
+from ..state import DAMAGE, MASS, PLASTIC_STRAIN, TEMPERATURE, Block, Floats, Ints, Model, Nodes
 
 ROWS = {"plastic_strain": PLASTIC_STRAIN, "temperature": TEMPERATURE, "damage": DAMAGE}
 """Rows of the state of tets that become fields, where a block has them."""
