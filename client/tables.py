@@ -83,17 +83,23 @@ def estimate_table(case: Case, expected: Estimate) -> Table:
     """What a case needs, about; a dash where a mesh file does not tell. And what of it which stage takes."""
     total = expected.core_seconds or 1.0
     shares = sorted(expected.costs.items(), key=lambda cost: -cost[1])
-    more = ["more as it breaks"] if case.fractures else []
     return pairs({
         "tets": _about(expected.elements, count),
         "nodes": _about(expected.nodes, count),
         "time step": _about(expected.dt, lambda value: si(value, "s")),
         "steps": _about(expected.steps, count),
         "memory": _about(expected.memory_bytes, lambda value: si(value, "B")),
-        "core time": _about(expected.core_seconds, duration),
-        "of which": ", ".join([*(f"{name} {100 * seconds / total:.0f} %" for name, seconds in shares), *more]),
+        "core time": _about(expected.core_seconds, duration) + _more(expected),
+        "of which": ", ".join(f"{name} {100 * seconds / total:.0f} %" for name, seconds in shares),
         "without": ", ".join(without(case)),
     })  # fmt: skip
+
+
+def _more(expected: Estimate) -> str:
+    """What it may take besides."""
+    if expected.core_seconds is None or not expected.breaking:
+        return ""
+    return f", up to {duration(expected.core_seconds + expected.breaking)} if all that may break turns to dust"
 
 
 def parts_table(case: Case, expected: Estimate) -> Table:

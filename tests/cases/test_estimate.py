@@ -12,7 +12,7 @@ from pydantic import TypeAdapter
 from conoid.cases.bodies import Mesh
 from conoid.cases.estimate import RANK_BYTES, estimate
 from conoid.cases.geometry import Generated, surface, volume
-from conoid.cases.load import parse_case, read_case, shipped
+from conoid.cases.load import parse_case, read_case, shipped, shipped_path
 from conoid.cases.mesh_size import graded_size, mesh_size
 from conoid.worker.mesh.build import build
 from conoid.worker.mesh.structured import structured
@@ -143,6 +143,15 @@ def test_cost_follows_size_law_and_ranks() -> None:
     assert plain.core_seconds < fine.core_seconds
     assert plain.elements == plain.parts[0].elements
     assert plain.dt == plain.parts[0].dt
+
+
+def test_what_may_break_may_cost_more() -> None:
+    whole = estimate(read_case(shipped_path("bar_on_bar")))
+    bar = estimate(read_case(shipped_path("glass_steel_bar")))
+    assert whole.breaking == 0.0
+    assert bar.core_seconds is not None
+    measured = 2 * 184.0  # s of two ranks: docs/bench.md
+    assert bar.core_seconds < measured < 1.1 * (bar.core_seconds + bar.breaking)
 
 
 def test_a_mesh_file_tells_its_tets_by_its_size_only(tmp_path: Path) -> None:
