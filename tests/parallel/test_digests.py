@@ -1,5 +1,9 @@
 """The digests that are committed: also on another machine, and with other versions of what makes the kernels."""
 
+import importlib
+import platform
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -37,10 +41,8 @@ def arguments(name: str, place: Path) -> list[str]:
     return [case, *(word for change in words for word in ("--set", change)), "--out", str(place / name)]
 
 
-@pytest.fixture(scope="module")
-def digests(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """Of every scene, by its name, on three ranks."""
-    place = tmp_path_factory.mktemp("digests")
+def ended(place: Path) -> dict[str, str]:
+    """The digest of every scene, by its name, on three ranks."""
     (place / "shattering.toml").write_text(shattering(), encoding="utf-8")
     together(3, place, [arguments(name, place) for name in EVERYWHERE])
     ends = {name: from_json((place / name / layout.OUTCOME).read_bytes()) for name in EVERYWHERE}
@@ -49,6 +51,27 @@ def digests(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return {name: str(end.digest)[:16] for name, end in ends.items()}
 
 
+@pytest.fixture(scope="module")
+def digests(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    return ended(tmp_path_factory.mktemp("digests"))
+
+
 @pytest.mark.parametrize("name", EVERYWHERE)
 def test_the_digest_is_the_committed_one(name: str, digests: dict[str, str]) -> None:
     assert digests[name] == KNOWN["everywhere"][name]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="the plainest processor that is named here is one of x86")
+def test_a_processor_without_wide_vectors_and_fused_products_has_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    numpy = importlib.import_module("numpy._core._multiarray_umath")
+    features = [name for name in numpy.__cpu_dispatch__ if numpy.__cpu_features__[name]]
+    for name, value in {
+        "NUMBA_CPU_NAME": "x86-64", "NUMBA_CPU_FEATURES": "", "NPY_DISABLE_CPU_FEATURES": " ".join(features),
+        "CONOID_CACHE_DIR": str(tmp_path / "cache"),
+    }.items():  # fmt: skip
+        monkeypatch.setenv(name, value)
+    subprocess.run([sys.executable, "-m", "conoid.worker.compile"], check=True, capture_output=True, timeout=1800)
+    assert ended(tmp_path) == KNOWN["everywhere"]
