@@ -25,7 +25,7 @@ QUANTA = float(2**52)
 
 _FLUX, _MASS = VOLUME_FLUX * CHUNK, MASS * CHUNK
 _WORK, _WORK_VISCOUS, _HEAT, _TOLD = WORK * CHUNK, WORK_VISCOUS * CHUNK, HEAT * CHUNK, TOLD * CHUNK
-_STABILISE = NODAL
+STABILISE = NODAL
 """Rows of the scratch: the four stabilising volume fluxes, m^3/s."""
 _PROJECTED = NODAL + 4 * CHUNK
 """Rows of the scratch: mean projected pressure gradient, Pa/m."""
@@ -88,7 +88,7 @@ def scatter_stabilised(sums, w, weight, tets, n, dt):  # type: ignore[no-untyped
         for k in range(4):
             a = tets[i, k]
             quanta = weight[a] * QUANTA
-            sums[a, 0] += np.int64(np.rint((flux + w[_STABILISE + k * CHUNK + i]) * dt * quanta))
+            sums[a, 0] += np.int64(np.rint((flux + w[STABILISE + k * CHUNK + i]) * dt * quanta))
             sums[a, 1] += np.int64(np.rint(volume * quanta))
 
 
@@ -126,10 +126,10 @@ def stabilise(w, s, n, dt):  # type: ignore[no-untyped-def]
             f2 += b2 * excess
             f3 += b3 * excess
         factor = 0.5 * dt * volume / mass
-        w[_STABILISE + CHUNK + i] = factor * f1
-        w[_STABILISE + 2 * CHUNK + i] = factor * f2
-        w[_STABILISE + 3 * CHUNK + i] = factor * f3
-        w[_STABILISE + i] = -factor * (f1 + f2 + f3)
+        w[STABILISE + CHUNK + i] = factor * f1
+        w[STABILISE + 2 * CHUNK + i] = factor * f2
+        w[STABILISE + 3 * CHUNK + i] = factor * f3
+        w[STABILISE + i] = -factor * (f1 + f2 + f3)
 
 
 @njit("void(float64[::1], float64[::1], uint32[:, ::1], int64)", cache=True)

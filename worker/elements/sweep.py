@@ -20,6 +20,7 @@ from ..materials.viscosity import bulk_viscosity
 from ..state import CHUNK, TOLD
 from . import pressure as averaged
 from . import rest, tet4
+from .flat import keep_out, see_own, without_flux
 from .hot import mark_hot
 from .wear import SOUND, mark_worn
 
@@ -97,16 +98,18 @@ def note_peaks(peaks, bits, ids, n, force):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    f"int64({_I2}, {_F1}, {_I2}, boolean, {_T2}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, {_I1}, int64, float64)",
+    f"int64({_I2}, {_F1}, {_I2}, boolean, {_B1}, {_T2}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, {_I1}, int64, float64)",
     cache=True,
     error_model="numpy",
 )
-def sum_forces(force, pressure, gradient, split, t, s, w, wi, bits, peaks, ids, n, scale):  # type: ignore[no-untyped-def]
+def sum_forces(force, pressure, gradient, split, flat, t, s, w, wi, bits, peaks, ids, n, scale):  # type: ignore[no-untyped-def]
     """Adds the forces of a chunk, and with ``split`` its share of the pressure gradient; returns the largest."""
     largest = tet4.internal_forces(wi, w, s, n, scale)
     tet4.scatter_forces(force, wi, t, n)
     if split:
         largest = max(largest, averaged.pressure_fluxes(wi, w, pressure, t, n, scale))
+        if len(flat) > 0:
+            without_flux(wi, flat, n)
         averaged.scatter_fluxes(gradient, wi, t, n)
     note_peaks(peaks, bits, ids, n, largest)
     return largest
@@ -157,14 +160,15 @@ def standard_pass(  # type: ignore[no-untyped-def]
 
 
 @njit(
-    f"void({_F2}, {_F2}, {_F2}, {_I2}, {_F1}, {_F1}, {_F2}, boolean, {_T2}, {_F1}, {_F1}, {_F1}, {_I2}, "
+    f"void({_F2}, {_F2}, {_F2}, {_I2}, {_F1}, {_F1}, {_F2}, boolean, {_T2}, {_F1}, {_F1}, {_F1}, {_B1}, {_I2}, "
     "int64, int64, int64, int64, float64)",
     cache=True,
     error_model="numpy",
 )
 def strain_pass(  # type: ignore[no-untyped-def]
-    x0, x, v, sums, weight, pressure, projected, split, tets, state, params, w, quiet, strength, rows, begin, end, dt
-):
+    x0, x, v, sums, weight, pressure, projected, split, tets, state, params, w, flat, quiet, strength, rows, begin, end,
+    dt
+):  # fmt: skip
     """Deviatoric stress at n+1, and the nodal sums of volume change; with ``split``, stabilised.
 
     Of a chunk that is noted as at rest only the volumes, which the mean over its nodes' tets needs.
@@ -178,6 +182,8 @@ def strain_pass(  # type: ignore[no-untyped-def]
         tet4.gather(w[tet4.RATE :], v, t, n)
         if still and quiet[c, rest.NOTED] > 0:
             tet4.dilatation(w, n, dt)
+            if len(flat) > 0:
+                keep_out(w, flat[c * CHUNK : c * CHUNK + n], n)
             averaged.scatter_volumes(sums, w, weight, t, n, dt)
             continue
         before = s.copy() if still else s[:0]
@@ -185,6 +191,8 @@ def strain_pass(  # type: ignore[no-untyped-def]
         if params[ORDER] != AFTER_PRESSURE:
             deviatoric_stress(strength, w, s, params, n, dt)
         averaged.keep_flux(w, s, n)
+        if len(flat) > 0:
+            keep_out(w, flat[c * CHUNK : c * CHUNK + n], n)
         if rows > TOLD:
             averaged.scatter_heat(sums, w, s, params, weight, t, n)
         quiet[c, rest.NOTED] = 0
@@ -193,6 +201,8 @@ def strain_pass(  # type: ignore[no-untyped-def]
             tet4.end_gradients(w, n)
             averaged.gather_projection(w, pressure, projected, t, n)
             averaged.stabilise(w, s, n, dt)
+            if len(flat) > 0:
+                keep_out(w, flat[c * CHUNK : c * CHUNK + n], n)
             averaged.scatter_stabilised(sums, w, weight, t, n, dt)
         else:
             averaged.scatter_volumes(sums, w, weight, t, n, dt)
@@ -200,13 +210,14 @@ def strain_pass(  # type: ignore[no-untyped-def]
 
 @njit(
     f"void({_F2}, {_F2}, {_F1}, {_F1}, {_I2}, {_F1}, {_I2}, boolean, {_T2}, {_F1}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, "
-    f"{_I1}, {_B1}, {_F1}, uint8[::1], {_F1}, {_I2}, float64, int64, int64, int64, int64, int64, float64, float64)",
+    f"{_I1}, {_B1}, {_B1}, {_F1}, uint8[::1], {_F1}, {_I2}, float64, int64, int64, int64, int64, int64, float64, "
+    "float64)",
     cache=True,
     error_model="numpy",
 )
 def force_pass(  # type: ignore[no-untyped-def]
-    x, v, strain, heat, force, pressure, gradient, split, tets, state, params, w, wi, bits, peaks, ids, worn, life, hot,
-    weakest, quiet, shear, strength, eos, rows, begin, end, dt, scale
+    x, v, strain, heat, force, pressure, gradient, split, tets, state, params, w, wi, bits, peaks, ids, flat, worn,
+    life, hot, weakest, quiet, shear, strength, eos, rows, begin, end, dt, scale
 ):  # fmt: skip
     """Pressure from the averaged volume strain and ``heat`` (nodes,), viscosity and forces at n+1; with ``split``,
     pressure gradients.
@@ -232,6 +243,9 @@ def force_pass(  # type: ignore[no-untyped-def]
         if rows > TOLD:
             averaged.gather_heat(s, heat, t, n)
         averaged.recall_flux(w, s, n, dt)
+        own = flat[c * CHUNK : c * CHUNK + n] if len(flat) > 0 else flat
+        if len(own) > 0:
+            see_own(w, s, params, own, rows, n)
         pressure_and_limit(eos, w, s, params, n, dt)
         return_at_pressure(strength, w, s, params, n, dt)
         found, some_hot = SOUND, False
@@ -243,7 +257,7 @@ def force_pass(  # type: ignore[no-untyped-def]
             some_hot = mark_hot(hot[at : at + n], w, s, weakest[at : at + n], shear, n)
             peaks[HOT] |= some_hot
         largest = sum_forces(
-            force, pressure, gradient, split, t, s, w, wi, bits, peaks, ids[c * CHUNK : c * CHUNK + n], n, scale
+            force, pressure, gradient, split, own, t, s, w, wi, bits, peaks, ids[c * CHUNK : c * CHUNK + n], n, scale
         )
         quiet[c, rest.NOTED] = 0
         if still and largest == 0 and found == SOUND and not some_hot and rest.same(before, s):
@@ -251,12 +265,14 @@ def force_pass(  # type: ignore[no-untyped-def]
 
 
 @njit(
-    f"void({_F2}, {_I2}, {_F1}, {_I2}, boolean, {_T2}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, {_I1}, "
+    f"void({_F2}, {_I2}, {_F1}, {_I2}, boolean, {_B1}, {_T2}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, {_I1}, "
     "int64, int64, int64, float64)",
     cache=True,
     error_model="numpy",
 )
-def forces_again(x, force, pressure, gradient, split, tets, state, w, wi, bits, peaks, ids, rows, begin, end, scale):  # type: ignore[no-untyped-def]
+def forces_again(  # type: ignore[no-untyped-def]
+    x, force, pressure, gradient, split, flat, tets, state, w, wi, bits, peaks, ids, rows, begin, end, scale
+):
     """The forces of the present stress once more, in another quantum; changes no state and no limit."""
     for c in range(begin, end):
         t = tets[c * CHUNK : (c + 1) * CHUNK]
@@ -265,4 +281,7 @@ def forces_again(x, force, pressure, gradient, split, tets, state, w, wi, bits, 
         tet4.gather(w[tet4.EDGE :], x, t, n)
         tet4.end_gradients(w, n)
         w[_LIMIT : _LIMIT + n] = 0.0
-        sum_forces(force, pressure, gradient, split, t, s, w, wi, bits, peaks, ids[c * CHUNK : c * CHUNK + n], n, scale)
+        own = flat[c * CHUNK : c * CHUNK + n] if len(flat) > 0 else flat
+        sum_forces(
+            force, pressure, gradient, split, own, t, s, w, wi, bits, peaks, ids[c * CHUNK : c * CHUNK + n], n, scale
+        )
