@@ -292,8 +292,8 @@ class AveragedElements(Elements):
         nodes = self.model.nodes
         sweep.strain_pass(
             nodes.x0, nodes.x, nodes.v, self._volumes, self._weight, self.pressure, self._projected, self.split,
-            block.tets, block.state.reshape(-1), block.params, self._w, block.flat, block.quiet, block.kind,
-            block.state.shape[1], begin, end, dt,
+            block.tets, block.state.reshape(-1), block.params, self._w, block.flat, block.worn, block.quiet,
+            block.kind, block.state.shape[1], begin, end, dt,
         )  # fmt: skip
 
     def _forces(self, block: Block, begin: int, end: int, dt: float, scale: float) -> None:

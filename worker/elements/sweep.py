@@ -22,7 +22,7 @@ from . import pressure as averaged
 from . import rest, tet4
 from .flat import keep_out, see_own, without_flux
 from .hot import mark_hot
-from .wear import SOUND, mark_worn
+from .wear import SOUND, any_inside_out, let_go, mark_worn
 
 LARGEST_LIMIT, LIMITING_TET, LARGEST_FORCE, WORN, HOT = range(5)
 """Places in ``peaks``: bits of the largest one-over-stable-step, 1/s; smallest global id of the tets that have it; bits
@@ -136,6 +136,7 @@ def standard_pass(  # type: ignore[no-untyped-def]
             continue
         before = s.copy() if still else s[:0]
         tet4.gather(w[tet4.EDGE :], x, t, n)
+        upset = s.copy() if len(worn) > 0 and any_inside_out(w, n) else s[:0]
         tet4.gather(w[tet4.RATE :], v, t, n)
         motion(params, w, x0, t, n, dt)
         deviatoric_stress(strength, w, s, params, n, dt)
@@ -143,6 +144,8 @@ def standard_pass(  # type: ignore[no-untyped-def]
         averaged.own_strains(w, n, dt)
         pressure_and_limit(eos, w, s, params, n, dt)
         return_at_pressure(strength, w, s, params, n, dt)
+        if len(upset) > 0:
+            let_go(w, s, upset, x, v, t, rows, n, dt)
         found, some_hot = SOUND, False
         if len(worn) > 0:
             found = mark_worn(worn[c * CHUNK : c * CHUNK + n], w, s, params, life, rows, n)
@@ -160,14 +163,14 @@ def standard_pass(  # type: ignore[no-untyped-def]
 
 
 @njit(
-    f"void({_F2}, {_F2}, {_F2}, {_I2}, {_F1}, {_F1}, {_F2}, boolean, {_T2}, {_F1}, {_F1}, {_F1}, {_B1}, {_I2}, "
-    "int64, int64, int64, int64, float64)",
+    f"void({_F2}, {_F2}, {_F2}, {_I2}, {_F1}, {_F1}, {_F2}, boolean, {_T2}, {_F1}, {_F1}, {_F1}, {_B1}, {_B1}, "
+    f"{_I2}, int64, int64, int64, int64, float64)",
     cache=True,
     error_model="numpy",
 )
 def strain_pass(  # type: ignore[no-untyped-def]
-    x0, x, v, sums, weight, pressure, projected, split, tets, state, params, w, flat, quiet, strength, rows, begin, end,
-    dt
+    x0, x, v, sums, weight, pressure, projected, split, tets, state, params, w, flat, worn, quiet, strength, rows,
+    begin, end, dt
 ):  # fmt: skip
     """Deviatoric stress at n+1, and the nodal sums of volume change; with ``split``, stabilised.
 
@@ -187,9 +190,12 @@ def strain_pass(  # type: ignore[no-untyped-def]
             averaged.scatter_volumes(sums, w, weight, t, n, dt)
             continue
         before = s.copy() if still else s[:0]
+        upset = s.copy() if len(worn) > 0 and any_inside_out(w, n) else s[:0]
         motion(params, w, x0, t, n, dt)
         if params[ORDER] != AFTER_PRESSURE:
             deviatoric_stress(strength, w, s, params, n, dt)
+        if len(upset) > 0:
+            let_go(w, s, upset, x, v, t, rows, n, dt)
         averaged.keep_flux(w, s, n)
         if len(flat) > 0:
             keep_out(w, flat[c * CHUNK : c * CHUNK + n], n)
@@ -239,6 +245,7 @@ def force_pass(  # type: ignore[no-untyped-def]
             tet4.kinematics(w, n, dt)
             deviatoric_stress(strength, w, s, params, n, dt)
         tet4.end_gradients(w, n)
+        upset = s.copy() if len(worn) > 0 and w[tet4.VOLUME : tet4.VOLUME + n].min() <= 0.0 else s[:0]
         averaged.gather_strains(w, strain, t, n)
         if rows > TOLD:
             averaged.gather_heat(s, heat, t, n)
@@ -248,6 +255,8 @@ def force_pass(  # type: ignore[no-untyped-def]
             see_own(w, s, params, own, rows, n)
         pressure_and_limit(eos, w, s, params, n, dt)
         return_at_pressure(strength, w, s, params, n, dt)
+        if len(upset) > 0:
+            let_go(w, s, upset, x, v, t, rows, n, 0.0)
         found, some_hot = SOUND, False
         if len(worn) > 0:
             found = mark_worn(worn[c * CHUNK : c * CHUNK + n], w, s, params, life, rows, n)
