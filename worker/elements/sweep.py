@@ -80,6 +80,7 @@ def pressure_and_limit(eos, w, s, params, n, dt):  # type: ignore[no-untyped-def
         bulk_viscosity(w, s, n, params[Q_LINEAR], params[Q_QUADRATIC], frequency)
     else:
         tet4.step_limit(w, s, n)
+    tet4.motion_limit(w, n)
 
 
 @njit(f"void({_I1}, {_I1}, {_I1}, int64, int64)", cache=True)
