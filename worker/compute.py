@@ -107,8 +107,11 @@ def _announce(sim: Simulation, journal: Journal | None, setup: float) -> None:
         sizes[block.part] += block.n
     log.info("%d tets, %d nodes here; set-up %.2f s", sizes.sum(), nodes.n, setup)
     parts = dict(zip(model.parts, (int(n) for n in sim.comm.sum(sizes)), strict=True))
+    flat = int(sim.comm.sum(np.array([sum(int(block.flat.sum()) for block in model.blocks)]))[0])
     if journal is None:
         return
+    if flat:
+        journal.write(messages.Log, level="info", text=f"{flat} flat tets have a pressure of their own")
     for text in sim.fracture.warnings if sim.fracture is not None else []:
         journal.write(messages.Log, level="warning", text=text)
     journal.write(messages.Status, state=State.RUNNING)

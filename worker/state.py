@@ -208,6 +208,8 @@ class Block:
     """(n,) smallest strength of the faces of each tet, Pa; (0,) where the part does not fracture."""
     hot: Bits = field(default_factory=lambda: np.zeros(0, np.uint8))
     """(n,) bit k: the tet's own traction on its face k is beyond ``weakest``."""
+    flat: Flags = field(default_factory=lambda: np.zeros(0, bool))
+    """(n,) tets whose volume strain is not averaged (elements/flat.py); (0,) where there is none."""
     shear_weight: float = 0.0
     """Of shear against normal traction."""
     worn: Flags = field(default_factory=lambda: np.zeros(0, bool))
@@ -247,13 +249,14 @@ class Block:
         """Takes the tets at these places out; the last ones move into the holes."""
         left = self.n - len(gone)
         holes, movers = gone[gone < left], np.setdiff1d(np.arange(left, self.n), gone)
-        for table in (self.tets, self.id, self.across, self.worn, self.group):
+        for table in (self.tets, self.id, self.across, self.worn, self.group, self.flat):
             if len(table):
                 table[holes] = table[movers]
         self.state[holes // CHUNK, :, holes % CHUNK] = self.state[movers // CHUNK, :, movers % CHUNK]
         self.n, self.quiet[:] = left, 0
         self.tets, self.id = self.tets[:left], self.id[:left]
         self.across, self.worn, self.group = self.across[:left], self.worn[:left], self.group[:left]
+        self.flat = self.flat[:left]
         self.border_chunks = min(self.border_chunks, self.chunks)
 
 

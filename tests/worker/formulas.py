@@ -36,6 +36,14 @@ def rotated(s: Floats, L: Floats, dt: float) -> Floats:
     return q @ s @ q.transpose(0, 2, 1)
 
 
+def stretching(L: Floats, dt: float) -> Floats:
+    """The deviator of D, turned from the middle of the step to its end by the root R of Q: I + Q is R times what is
+    symmetric and positive, so R is its polar rotation.
+    """
+    u, _, v = np.linalg.svd(IDENTITY + cayley(0.5 * (L - L.transpose(0, 2, 1)), dt))
+    return np.asarray((u @ v) @ deviator(L) @ (u @ v).transpose(0, 2, 1))
+
+
 def hyperelastic(F: Floats, shear: float) -> tuple[Floats, Floats]:
     """Deviatoric Cauchy stress G / 2J dev(b - b^-1), Pa, and its energy a volume, G/4 (tr b + tr b^-1 - 6), J/m^3."""
     J = np.linalg.det(F)
@@ -50,9 +58,9 @@ def mises(s: Floats) -> Floats:
     return np.asarray(np.sqrt(1.5 * (s * s).sum(axis=(1, 2))))
 
 
-def power(s: Floats, L: Floats) -> Floats:
-    """s : D."""
-    return np.asarray((s * deviator(L)).sum(axis=(1, 2)))
+def power(s: Floats, L: Floats, dt: float) -> Floats:
+    """s : D, with D as it is turned at the end of the step."""
+    return np.asarray((s * stretching(L, dt)).sum(axis=(1, 2)))
 
 
 def forces(volume: Floats, stress: Floats, grad: Floats) -> Floats:

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from conoid.cases.materials import Material
+from conoid.worker.mesh.model import TetMesh
 from conoid.worker.state import PRESSURE, WORK
 
 from . import formulas
 from .kernels import HARD, STEEL, Patch
-from .meshes import Floats, block, free_tets
+from .meshes import REGULAR, Floats, block, free_tets
 
 BULK, SHEAR = 200e9 / (3 * (1 - 0.6)), 200e9 / 2.6
 """Of STEEL, Pa."""
@@ -39,11 +40,11 @@ def relative(found: Floats, expected: Floats) -> float:
 
 
 def test_rate_of_deformation_at_mid_step() -> None:
-    """From no stress, one step leaves s = 2 G dt dev D and p = -K dt tr D."""
+    """From no stress, one step leaves s = 2 G dt dev D, turned to the end of the step, and p = -K dt tr D."""
     patch = moving(1)
     patch.advance(DT)
     _, L = mid_gradient(patch)
-    assert relative(patch.deviator, 2.0 * SHEAR * DT * formulas.deviator(L)) < 1e-12
+    assert relative(patch.deviator, 2.0 * SHEAR * DT * formulas.stretching(L, DT)) < 1e-12
     assert np.abs(patch.get(PRESSURE) + BULK * DT * np.trace(L, axis1=1, axis2=2)).max() < 1e-12 * BULK
 
 
@@ -53,7 +54,7 @@ def test_rotation_is_the_cayley_transform() -> None:
     patch.deviator = before
     patch.advance(DT)
     _, L = mid_gradient(patch)
-    expected = formulas.rotated(before, L, DT) + 2.0 * SHEAR * DT * formulas.deviator(L)
+    expected = formulas.rotated(before, L, DT) + 2.0 * SHEAR * DT * formulas.stretching(L, DT)
     assert relative(patch.deviator, expected) < 1e-12
 
 
@@ -74,6 +75,31 @@ def test_rotation_changes_no_invariant(rate: float) -> None:
     assert np.abs(formulas.mises(patch.deviator) / formulas.mises(before) - 1.0).max() < 1e-13 * max(1.0, rate * 1e-4)
     turn = rotation(axis, angle)
     assert relative(patch.deviator, turn @ before @ turn.T) < 1e-13 * max(1.0, rate * 1e-4)
+
+
+def turned_and_stretched(steps: int) -> float:
+    """Error, over the shear modulus, of the stress of a tet that turns by a radian and stretches along axes that turn
+    with it: 2 G times the logarithm of the stretch, turned.
+    """
+    patch = Patch(TetMesh(REGULAR, np.array([[0, 1, 2, 3]], np.int32)), HARD)
+    axis, along, start = np.array([0.36, 0.48, 0.8]), np.diag([0.2, -0.15, -0.05]), patch.nodes.x.copy()
+    for k in range(1, steps + 1):
+        share = k / steps
+        stretch = np.diag(np.exp(share * np.diag(along)))
+        end = start @ (rotation(axis, share) @ stretch).T
+        patch.nodes.v[:] = (end - patch.nodes.x) / DT
+        patch.nodes.x[:] = end
+        patch.advance(DT)
+    turn = rotation(axis, 1.0)
+    return float(np.abs(patch.deviator[0] / SHEAR - 2.0 * turn @ along @ turn.T).max())
+
+
+def test_strain_is_added_where_it_is_after_half_of_the_turn() -> None:
+    """Half the step makes a quarter of the error; strain that is added as it was in the middle makes half of it."""
+    errors = [turned_and_stretched(steps) for steps in (10, 20, 40)]
+    assert errors[1] / errors[0] == pytest.approx(0.25, abs=0.02)
+    assert errors[2] / errors[1] == pytest.approx(0.25, abs=0.02)
+    assert errors[2] < 1e-4
 
 
 def rotation(axis: Floats, angle: float) -> Floats:

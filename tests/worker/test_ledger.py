@@ -8,7 +8,7 @@ from conoid.cases import materials
 from conoid.cases.messages import Energy
 from conoid.worker.simulation import Simulation
 
-from .kernels import COPPER, COPPER_GAS, FORMS, GLASS, STEEL, STEEL_42CRMO4, Form, build, run, scene
+from .kernels import COPPER, COPPER_GAS, FORMS, GLASS, HARD, STEEL, STEEL_42CRMO4, Form, build, run, scene
 from .meshes import Floats, block
 
 MESH = block((3, 3, 6), 1e-3, seed=5)
@@ -46,6 +46,21 @@ def test_an_impact_closes_to_a_percent(material: materials.Material, form: Form)
 def test_every_line_closes_to_second_order(keys: dict[str, Any], frames: int) -> None:
     """Elastic, also where the step changes to meet a frame, where the run ends, and where a wall stops a whole face."""
     assert worst(STEEL, "standard", frames=frames, **keys) < 1e-3
+
+
+@pytest.mark.parametrize("material", [STEEL, HARD], ids=["from the shape", "by rates"])
+@pytest.mark.parametrize(("speed", "steps", "share"), [(800.0, 500, 0.005), (80.0, 2000, 0.001)])
+def test_what_rings_gains_no_energy(material: materials.Material, speed: float, steps: int, share: float) -> None:
+    """A cube of random velocities rings without viscosity; its strains are those of the plastic flow of an impact."""
+    sim = build(scene(material, "standard", jitter=speed), [block((6, 6, 6), 1e-3)])
+    found = []
+
+    def look(sim: Simulation, before: Floats) -> None:
+        if sim.clock.step % 25 == 0:
+            found.append(sim.ledger.close(before).residual)
+
+    run(sim, look, steps)
+    assert max(found) < share
 
 
 def test_plastic_work_and_viscous_work_never_fall() -> None:

@@ -34,8 +34,8 @@ def test_work_below_the_yield_stress_is_trapezoidal() -> None:
     start = formulas.rotated(patch.deviator, L, DT)
     volume, _ = formulas.gradients(strong.corners() - 0.5 * DT * strong.corners(strong.nodes.v))
     strong.advance(DT)
-    end = start + 2.0 * YOUNG_STEEL_SHEAR * DT * formulas.deviator(L)
-    work = 0.5 * DT * volume * (formulas.power(start, L) + formulas.power(end, L))
+    end = start + 2.0 * YOUNG_STEEL_SHEAR * DT * formulas.stretching(L, DT)
+    work = 0.5 * DT * volume * (formulas.power(start, L, DT) + formulas.power(end, L, DT))
     scale = DT * volume * formulas.mises(end) * np.sqrt((L * L).sum(axis=(1, 2)))
     assert np.abs((strong.get(WORK) - work) / scale).max() < 1e-13
 
@@ -49,7 +49,7 @@ def test_linear_hardening_return() -> None:
     volume, _ = formulas.gradients(patch.corners() - 0.5 * DT * patch.corners(patch.nodes.v))
     patch.advance(DT)
     turned = formulas.rotated(old, L, DT)
-    trial = turned + 2.0 * SHEAR * DT * formulas.deviator(L)
+    trial = turned + 2.0 * SHEAR * DT * formulas.stretching(L, DT)
     q = formulas.mises(trial)
     increment = np.maximum(q - YIELD_0 - HARDENING * start, 0.0) / (3.0 * SHEAR + HARDENING)
     assert 50 < (increment > 0.0).sum() < N - 50
@@ -60,7 +60,7 @@ def test_linear_hardening_return() -> None:
     assert np.abs(patch.deviator - stress).max() < 1e-12 * np.abs(stress).max()
     plastic = volume * np.maximum(((turned + stress) * (trial - stress)).sum(axis=(1, 2)), 0.0) / (4.0 * SHEAR)
     assert np.abs(patch.get(WORK_PLASTIC) - plastic).max() < 1e-12 * plastic.max()
-    work = 0.5 * DT * volume * (formulas.power(turned, L) + formulas.power(stress, L))
+    work = 0.5 * DT * volume * (formulas.power(turned, L, DT) + formulas.power(stress, L, DT))
     assert np.abs(patch.get(WORK) - work).max() < 1e-12 * np.abs(work).max()
 
 

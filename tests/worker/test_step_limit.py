@@ -12,7 +12,7 @@ from conoid.worker.simulation import Simulation
 from conoid.worker.state import VISCOUS, WORK, WORK_VISCOUS
 
 from . import formulas
-from .kernels import STEEL, Patch, build, run, scene
+from .kernels import FORMS, STEEL, Form, Patch, build, run, scene
 from .meshes import REGULAR, Floats, free_tets
 
 YOUNG, DENSITY = 200e9, 7850.0
@@ -133,6 +133,21 @@ def test_viscous_bound_shrinks_with_the_rate() -> None:
     limits = [squeezed(0, mesh, rate).limit for rate in (0.0, -1e3, -1e6, -1e8)]
     assert limits == sorted(limits)
     assert limits[-1] > 1.5 * limits[0]
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("rate", [-1e9, 1e9])
+def test_no_tet_changes_its_volume_by_more_than_a_quarter_in_a_step(rate: float, form: Form) -> None:
+    """From the first step on, for the pass in no time knows the rate, too; a slow motion leaves the step as it was."""
+    tet = TetMesh(1e-3 * REGULAR, np.array([[0, 1, 2, 3]], np.int32))
+    limits = []
+    for each in (0.0, 1e-3 * rate, rate):
+        patch = Patch(tet, STEEL, form)
+        patch.nodes.v[:] = each / 3.0 * patch.nodes.x
+        patch.advance(0.0)
+        limits.append(patch.limit)
+    assert limits[0] == limits[1] < limits[2]
+    assert limits[2] == pytest.approx(4.0 * abs(rate), rel=1e-12)
 
 
 @pytest.mark.parametrize("poisson", [0.22, 0.49])

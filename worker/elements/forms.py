@@ -17,6 +17,7 @@ from ..parallel.tags import Tag
 from ..state import CHUNK, Block, Copies, Floats, Ints, Model, extended
 from ..timers import Timers
 from . import pressure, sweep, tet4
+from .flat import flat_tets
 
 
 class Bridges(Protocol):
@@ -183,8 +184,9 @@ class Elements:
     def _again(self, block: Block, begin: int, end: int, scale: float) -> None:
         nodes = self.model.nodes
         sweep.forces_again(
-            nodes.x, nodes.force, self.pressure, self._gradients(), self.split, block.tets, block.state.reshape(-1),
-            self._w, self._wi, self._bits, self.peaks, block.id, block.state.shape[1], begin, end, scale,
+            nodes.x, nodes.force, self.pressure, self._gradients(), self.split, block.flat, block.tets,
+            block.state.reshape(-1), self._w, self._wi, self._bits, self.peaks, block.id, block.state.shape[1], begin,
+            end, scale,
         )  # fmt: skip
 
     def _gradients(self) -> Ints:
@@ -220,6 +222,8 @@ class AveragedElements(Elements):
         self._projected = np.zeros((n if split else 1, 3))
         self.pressure = np.zeros(n if split else 1)
         self._scale = 1.0
+        for block in model.blocks:
+            block.flat = flat_tets(block, model.nodes.x0)
 
     def _connect(self) -> None:
         super()._connect()
@@ -288,8 +292,8 @@ class AveragedElements(Elements):
         nodes = self.model.nodes
         sweep.strain_pass(
             nodes.x0, nodes.x, nodes.v, self._volumes, self._weight, self.pressure, self._projected, self.split,
-            block.tets, block.state.reshape(-1), block.params, self._w, block.quiet, block.kind, block.state.shape[1],
-            begin, end, dt,
+            block.tets, block.state.reshape(-1), block.params, self._w, block.flat, block.worn, block.quiet,
+            block.kind, block.state.shape[1], begin, end, dt,
         )  # fmt: skip
 
     def _forces(self, block: Block, begin: int, end: int, dt: float, scale: float) -> None:
@@ -297,6 +301,6 @@ class AveragedElements(Elements):
         sweep.force_pass(
             nodes.x, nodes.v, self._strain, self._heat, nodes.force, self.pressure, self._gradient, self.split,
             block.tets, block.state.reshape(-1), block.params, self._w, self._wi, self._bits, self.peaks, block.id,
-            block.worn, block.life, block.hot, block.weakest, block.quiet, block.shear_weight, block.kind, block.eos,
-            block.state.shape[1], begin, end, dt, scale,
+            block.flat, block.worn, block.life, block.hot, block.weakest, block.quiet, block.shear_weight, block.kind,
+            block.eos, block.state.shape[1], begin, end, dt, scale,
         )  # fmt: skip

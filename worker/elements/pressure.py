@@ -18,14 +18,14 @@ import numpy as np
 from ..jit import njit
 from ..materials.law import BULK, DENSITY
 from ..state import CHUNK, HEAT, MASS, TOLD, VOLUME_FLUX, WORK, WORK_VISCOUS, Floats, Ints
-from .tet4 import CHANGE, DILATATION, EDGE, NODAL, SEEN, VOLUME, VOLUME_MID, largest_of, quanta
+from .tet4 import CHANGE, DILATATION, EDGE, NODAL, SEEN, SPEED, VOLUME, VOLUME_MID, largest_of, quanta
 
 QUANTA = float(2**52)
 """Quanta per unit of volume strain, and per unit of relative nodal volume."""
 
 _FLUX, _MASS = VOLUME_FLUX * CHUNK, MASS * CHUNK
 _WORK, _WORK_VISCOUS, _HEAT, _TOLD = WORK * CHUNK, WORK_VISCOUS * CHUNK, HEAT * CHUNK, TOLD * CHUNK
-_STABILISE = NODAL
+STABILISE = NODAL
 """Rows of the scratch: the four stabilising volume fluxes, m^3/s."""
 _PROJECTED = NODAL + 4 * CHUNK
 """Rows of the scratch: mean projected pressure gradient, Pa/m."""
@@ -40,11 +40,12 @@ def keep_flux(w, s, n):  # type: ignore[no-untyped-def]
         s[_FLUX + i] = w[DILATATION + i] * w[VOLUME_MID + i]
 
 
-@njit("void(float64[::1], float64[::1], int64, float64)", cache=True)
+@njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def recall_flux(w, s, n, dt):  # type: ignore[no-untyped-def]
-    """CHANGE: the tet's own change of volume in the step, m^3."""
+    """CHANGE: the tet's own change of volume in the step, m^3; SPEED: its rate over the volume of the end, 1/s."""
     for i in range(n):
         w[CHANGE + i] = s[_FLUX + i] * dt
+        w[SPEED + i] = s[_FLUX + i] / w[VOLUME + i]
 
 
 @njit("void(int64[:, ::1], float64[::1], float64[::1], uint32[:, ::1], int64, float64)", cache=True)
@@ -88,7 +89,7 @@ def scatter_stabilised(sums, w, weight, tets, n, dt):  # type: ignore[no-untyped
         for k in range(4):
             a = tets[i, k]
             quanta = weight[a] * QUANTA
-            sums[a, 0] += np.int64(np.rint((flux + w[_STABILISE + k * CHUNK + i]) * dt * quanta))
+            sums[a, 0] += np.int64(np.rint((flux + w[STABILISE + k * CHUNK + i]) * dt * quanta))
             sums[a, 1] += np.int64(np.rint(volume * quanta))
 
 
@@ -126,10 +127,10 @@ def stabilise(w, s, n, dt):  # type: ignore[no-untyped-def]
             f2 += b2 * excess
             f3 += b3 * excess
         factor = 0.5 * dt * volume / mass
-        w[_STABILISE + CHUNK + i] = factor * f1
-        w[_STABILISE + 2 * CHUNK + i] = factor * f2
-        w[_STABILISE + 3 * CHUNK + i] = factor * f3
-        w[_STABILISE + i] = -factor * (f1 + f2 + f3)
+        w[STABILISE + CHUNK + i] = factor * f1
+        w[STABILISE + 2 * CHUNK + i] = factor * f2
+        w[STABILISE + 3 * CHUNK + i] = factor * f3
+        w[STABILISE + i] = -factor * (f1 + f2 + f3)
 
 
 @njit("void(float64[::1], float64[::1], uint32[:, ::1], int64)", cache=True)
@@ -148,8 +149,9 @@ def gather_heat(s, heat, tets, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], int64, float64)", cache=True)
 def own_strains(w, n, dt):  # type: ignore[no-untyped-def]
-    """SEEN and CHANGE of the ``standard`` form: each tet sees its own volume strain."""
+    """SEEN, CHANGE and SPEED of the ``standard`` form: each tet sees its own volume strain."""
     for i in range(n):
+        w[SPEED + i] = w[DILATATION + i]
         w[SEEN + i] = w[DILATATION + i] * dt
         w[CHANGE + i] = w[DILATATION + i] * dt * w[VOLUME_MID + i]
 

@@ -20,8 +20,9 @@ from ..materials.viscosity import bulk_viscosity
 from ..state import CHUNK, TOLD
 from . import pressure as averaged
 from . import rest, tet4
+from .flat import keep_out, see_own, without_flux
 from .hot import mark_hot
-from .wear import SOUND, mark_worn
+from .wear import SOUND, any_inside_out, let_go, mark_worn
 
 LARGEST_LIMIT, LIMITING_TET, LARGEST_FORCE, WORN, HOT = range(5)
 """Places in ``peaks``: bits of the largest one-over-stable-step, 1/s; smallest global id of the tets that have it; bits
@@ -79,6 +80,7 @@ def pressure_and_limit(eos, w, s, params, n, dt):  # type: ignore[no-untyped-def
         bulk_viscosity(w, s, n, params[Q_LINEAR], params[Q_QUADRATIC], frequency)
     else:
         tet4.step_limit(w, s, n)
+    tet4.motion_limit(w, n)
 
 
 @njit(f"void({_I1}, {_I1}, {_I1}, int64, int64)", cache=True)
@@ -97,16 +99,18 @@ def note_peaks(peaks, bits, ids, n, force):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    f"int64({_I2}, {_F1}, {_I2}, boolean, {_T2}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, {_I1}, int64, float64)",
+    f"int64({_I2}, {_F1}, {_I2}, boolean, {_B1}, {_T2}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, {_I1}, int64, float64)",
     cache=True,
     error_model="numpy",
 )
-def sum_forces(force, pressure, gradient, split, t, s, w, wi, bits, peaks, ids, n, scale):  # type: ignore[no-untyped-def]
+def sum_forces(force, pressure, gradient, split, flat, t, s, w, wi, bits, peaks, ids, n, scale):  # type: ignore[no-untyped-def]
     """Adds the forces of a chunk, and with ``split`` its share of the pressure gradient; returns the largest."""
     largest = tet4.internal_forces(wi, w, s, n, scale)
     tet4.scatter_forces(force, wi, t, n)
     if split:
         largest = max(largest, averaged.pressure_fluxes(wi, w, pressure, t, n, scale))
+        if len(flat) > 0:
+            without_flux(wi, flat, n)
         averaged.scatter_fluxes(gradient, wi, t, n)
     note_peaks(peaks, bits, ids, n, largest)
     return largest
@@ -133,6 +137,7 @@ def standard_pass(  # type: ignore[no-untyped-def]
             continue
         before = s.copy() if still else s[:0]
         tet4.gather(w[tet4.EDGE :], x, t, n)
+        upset = s.copy() if len(worn) > 0 and any_inside_out(w, n) else s[:0]
         tet4.gather(w[tet4.RATE :], v, t, n)
         motion(params, w, x0, t, n, dt)
         deviatoric_stress(strength, w, s, params, n, dt)
@@ -140,6 +145,8 @@ def standard_pass(  # type: ignore[no-untyped-def]
         averaged.own_strains(w, n, dt)
         pressure_and_limit(eos, w, s, params, n, dt)
         return_at_pressure(strength, w, s, params, n, dt)
+        if len(upset) > 0:
+            let_go(w, s, upset, x, v, t, rows, n, dt)
         found, some_hot = SOUND, False
         if len(worn) > 0:
             found = mark_worn(worn[c * CHUNK : c * CHUNK + n], w, s, params, life, rows, n)
@@ -157,14 +164,15 @@ def standard_pass(  # type: ignore[no-untyped-def]
 
 
 @njit(
-    f"void({_F2}, {_F2}, {_F2}, {_I2}, {_F1}, {_F1}, {_F2}, boolean, {_T2}, {_F1}, {_F1}, {_F1}, {_I2}, "
-    "int64, int64, int64, int64, float64)",
+    f"void({_F2}, {_F2}, {_F2}, {_I2}, {_F1}, {_F1}, {_F2}, boolean, {_T2}, {_F1}, {_F1}, {_F1}, {_B1}, {_B1}, "
+    f"{_I2}, int64, int64, int64, int64, float64)",
     cache=True,
     error_model="numpy",
 )
 def strain_pass(  # type: ignore[no-untyped-def]
-    x0, x, v, sums, weight, pressure, projected, split, tets, state, params, w, quiet, strength, rows, begin, end, dt
-):
+    x0, x, v, sums, weight, pressure, projected, split, tets, state, params, w, flat, worn, quiet, strength, rows,
+    begin, end, dt
+):  # fmt: skip
     """Deviatoric stress at n+1, and the nodal sums of volume change; with ``split``, stabilised.
 
     Of a chunk that is noted as at rest only the volumes, which the mean over its nodes' tets needs.
@@ -178,13 +186,20 @@ def strain_pass(  # type: ignore[no-untyped-def]
         tet4.gather(w[tet4.RATE :], v, t, n)
         if still and quiet[c, rest.NOTED] > 0:
             tet4.dilatation(w, n, dt)
+            if len(flat) > 0:
+                keep_out(w, flat[c * CHUNK : c * CHUNK + n], n)
             averaged.scatter_volumes(sums, w, weight, t, n, dt)
             continue
         before = s.copy() if still else s[:0]
+        upset = s.copy() if len(worn) > 0 and any_inside_out(w, n) else s[:0]
         motion(params, w, x0, t, n, dt)
         if params[ORDER] != AFTER_PRESSURE:
             deviatoric_stress(strength, w, s, params, n, dt)
+        if len(upset) > 0:
+            let_go(w, s, upset, x, v, t, rows, n, dt)
         averaged.keep_flux(w, s, n)
+        if len(flat) > 0:
+            keep_out(w, flat[c * CHUNK : c * CHUNK + n], n)
         if rows > TOLD:
             averaged.scatter_heat(sums, w, s, params, weight, t, n)
         quiet[c, rest.NOTED] = 0
@@ -193,6 +208,8 @@ def strain_pass(  # type: ignore[no-untyped-def]
             tet4.end_gradients(w, n)
             averaged.gather_projection(w, pressure, projected, t, n)
             averaged.stabilise(w, s, n, dt)
+            if len(flat) > 0:
+                keep_out(w, flat[c * CHUNK : c * CHUNK + n], n)
             averaged.scatter_stabilised(sums, w, weight, t, n, dt)
         else:
             averaged.scatter_volumes(sums, w, weight, t, n, dt)
@@ -200,13 +217,14 @@ def strain_pass(  # type: ignore[no-untyped-def]
 
 @njit(
     f"void({_F2}, {_F2}, {_F1}, {_F1}, {_I2}, {_F1}, {_I2}, boolean, {_T2}, {_F1}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, "
-    f"{_I1}, {_B1}, {_F1}, uint8[::1], {_F1}, {_I2}, float64, int64, int64, int64, int64, int64, float64, float64)",
+    f"{_I1}, {_B1}, {_B1}, {_F1}, uint8[::1], {_F1}, {_I2}, float64, int64, int64, int64, int64, int64, float64, "
+    "float64)",
     cache=True,
     error_model="numpy",
 )
 def force_pass(  # type: ignore[no-untyped-def]
-    x, v, strain, heat, force, pressure, gradient, split, tets, state, params, w, wi, bits, peaks, ids, worn, life, hot,
-    weakest, quiet, shear, strength, eos, rows, begin, end, dt, scale
+    x, v, strain, heat, force, pressure, gradient, split, tets, state, params, w, wi, bits, peaks, ids, flat, worn,
+    life, hot, weakest, quiet, shear, strength, eos, rows, begin, end, dt, scale
 ):  # fmt: skip
     """Pressure from the averaged volume strain and ``heat`` (nodes,), viscosity and forces at n+1; with ``split``,
     pressure gradients.
@@ -228,12 +246,18 @@ def force_pass(  # type: ignore[no-untyped-def]
             tet4.kinematics(w, n, dt)
             deviatoric_stress(strength, w, s, params, n, dt)
         tet4.end_gradients(w, n)
+        upset = s.copy() if len(worn) > 0 and w[tet4.VOLUME : tet4.VOLUME + n].min() <= 0.0 else s[:0]
         averaged.gather_strains(w, strain, t, n)
         if rows > TOLD:
             averaged.gather_heat(s, heat, t, n)
         averaged.recall_flux(w, s, n, dt)
+        own = flat[c * CHUNK : c * CHUNK + n] if len(flat) > 0 else flat
+        if len(own) > 0:
+            see_own(w, s, params, own, rows, n)
         pressure_and_limit(eos, w, s, params, n, dt)
         return_at_pressure(strength, w, s, params, n, dt)
+        if len(upset) > 0:
+            let_go(w, s, upset, x, v, t, rows, n, 0.0)
         found, some_hot = SOUND, False
         if len(worn) > 0:
             found = mark_worn(worn[c * CHUNK : c * CHUNK + n], w, s, params, life, rows, n)
@@ -243,7 +267,7 @@ def force_pass(  # type: ignore[no-untyped-def]
             some_hot = mark_hot(hot[at : at + n], w, s, weakest[at : at + n], shear, n)
             peaks[HOT] |= some_hot
         largest = sum_forces(
-            force, pressure, gradient, split, t, s, w, wi, bits, peaks, ids[c * CHUNK : c * CHUNK + n], n, scale
+            force, pressure, gradient, split, own, t, s, w, wi, bits, peaks, ids[c * CHUNK : c * CHUNK + n], n, scale
         )
         quiet[c, rest.NOTED] = 0
         if still and largest == 0 and found == SOUND and not some_hot and rest.same(before, s):
@@ -251,12 +275,14 @@ def force_pass(  # type: ignore[no-untyped-def]
 
 
 @njit(
-    f"void({_F2}, {_I2}, {_F1}, {_I2}, boolean, {_T2}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, {_I1}, "
+    f"void({_F2}, {_I2}, {_F1}, {_I2}, boolean, {_B1}, {_T2}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, {_I1}, "
     "int64, int64, int64, float64)",
     cache=True,
     error_model="numpy",
 )
-def forces_again(x, force, pressure, gradient, split, tets, state, w, wi, bits, peaks, ids, rows, begin, end, scale):  # type: ignore[no-untyped-def]
+def forces_again(  # type: ignore[no-untyped-def]
+    x, force, pressure, gradient, split, flat, tets, state, w, wi, bits, peaks, ids, rows, begin, end, scale
+):
     """The forces of the present stress once more, in another quantum; changes no state and no limit."""
     for c in range(begin, end):
         t = tets[c * CHUNK : (c + 1) * CHUNK]
@@ -265,4 +291,7 @@ def forces_again(x, force, pressure, gradient, split, tets, state, w, wi, bits, 
         tet4.gather(w[tet4.EDGE :], x, t, n)
         tet4.end_gradients(w, n)
         w[_LIMIT : _LIMIT + n] = 0.0
-        sum_forces(force, pressure, gradient, split, t, s, w, wi, bits, peaks, ids[c * CHUNK : c * CHUNK + n], n, scale)
+        own = flat[c * CHUNK : c * CHUNK + n] if len(flat) > 0 else flat
+        sum_forces(
+            force, pressure, gradient, split, own, t, s, w, wi, bits, peaks, ids[c * CHUNK : c * CHUNK + n], n, scale
+        )

@@ -13,8 +13,24 @@ from conoid.cases.schema import Erosion
 
 from ..jit import njit
 from ..materials.law import DENSITY
-from ..state import CHUNK, DAMAGE, MASS, PLASTIC_STRAIN, S_XX, VISCOUS, WORK, WORK_VISCOUS, Floats
-from .tet4 import LIMIT, VOLUME
+from ..state import (
+    CHUNK,
+    DAMAGE,
+    MASS,
+    PLASTIC_STRAIN,
+    PRESSURE,
+    S_XX,
+    S_XY,
+    S_YY,
+    S_YZ,
+    S_ZX,
+    S_ZZ,
+    VISCOUS,
+    WORK,
+    WORK_VISCOUS,
+    Floats,
+)
+from .tet4 import EDGE, LIMIT, VOLUME, VOLUME_MID
 
 STRAIN, LOW, HIGH, FREQUENCY, DAMAGED = range(5)
 """Places in a block's ``life``: largest plastic strain, smallest and largest volume over the initial one, largest
@@ -22,6 +38,7 @@ one-over-stable-step, 1/s, damage."""
 SOUND, TIRED, BROKEN = range(3)
 """What is found: no tet that leaves; some that can wait; some that cannot."""
 
+_SIXTH = 1.0 / 6.0
 _MASS, _STRAIN, _DAMAGE = MASS * CHUNK, PLASTIC_STRAIN * CHUNK, DAMAGE * CHUNK
 
 
@@ -48,6 +65,70 @@ def _release(s, i):  # type: ignore[no-untyped-def]
     """Takes the stress of a tet."""
     for row in range(S_XX, VISCOUS + 1):
         s[row * CHUNK + i] = 0.0
+
+
+@njit("boolean(float64[::1], int64)", cache=True, error_model="numpy")
+def any_inside_out(w, n):  # type: ignore[no-untyped-def]
+    """VOLUME at the end of the step, as tet4.end_gradients has it; whether some tet of the chunk is inside out then."""
+    least = np.inf
+    for i in range(n):
+        e1x, e1y, e1z = w[EDGE + i], w[EDGE + CHUNK + i], w[EDGE + 2 * CHUNK + i]
+        e2x, e2y, e2z = w[EDGE + 3 * CHUNK + i], w[EDGE + 4 * CHUNK + i], w[EDGE + 5 * CHUNK + i]
+        e3x, e3y, e3z = w[EDGE + 6 * CHUNK + i], w[EDGE + 7 * CHUNK + i], w[EDGE + 8 * CHUNK + i]
+        bx, by = (e2y * e3z - e2z * e3y) * _SIXTH, (e2z * e3x - e2x * e3z) * _SIXTH
+        bz = (e2x * e3y - e2y * e3x) * _SIXTH
+        volume = e1x * bx + e1y * by + e1z * bz
+        w[VOLUME + i] = volume
+        least = min(least, volume)
+    return least <= 0.0
+
+
+@njit("UniTuple(float64, 2)(float64[::1], float64[:, ::1], float64[:, ::1], uint32[::1], int64, float64)", cache=True)
+def _half_of_last(s, x, v, tet, i, dt):  # type: ignore[no-untyped-def]
+    """Half of what the nodes of tet ``i`` do against its forces of n on their way to n+1, J: without and of viscosity.
+
+    1/2 dt sum v_a . (stress b_a), b_a = V grad N_a at x(n) = x(n+1) - dt v.
+    """
+    e, u = np.empty((3, 3)), np.empty((3, 3))
+    for k in range(3):
+        for j in range(3):
+            u[k, j] = v[tet[k + 1], j] - v[tet[0], j]
+            e[k, j] = x[tet[k + 1], j] - x[tet[0], j] - dt * u[k, j]
+    work, flux = 0.0, 0.0
+    for k in range(3):
+        p, q = e[(k + 1) % 3], e[(k + 2) % 3]
+        bx, by, bz = p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]
+        ux, uy, uz = u[k]
+        flux += ux * bx + uy * by + uz * bz
+        sx = s[S_XX * CHUNK + i] * bx + s[S_XY * CHUNK + i] * by + s[S_ZX * CHUNK + i] * bz
+        sy = s[S_XY * CHUNK + i] * bx + s[S_YY * CHUNK + i] * by + s[S_YZ * CHUNK + i] * bz
+        sz = s[S_ZX * CHUNK + i] * bx + s[S_YZ * CHUNK + i] * by + s[S_ZZ * CHUNK + i] * bz
+        work += ux * sx + uy * sy + uz * sz
+    half = 0.5 * dt / 6.0
+    return half * (work - s[PRESSURE * CHUNK + i] * flux), -half * s[VISCOUS * CHUNK + i] * flux
+
+
+@njit(
+    "void(float64[::1], float64[::1], float64[::1], float64[:, ::1], float64[:, ::1], uint32[:, ::1], int64, int64, "
+    "float64)",
+    cache=True,
+    error_model="numpy",
+)
+def let_go(w, s, before, x, v, tets, rows, n, dt):  # type: ignore[no-untyped-def]
+    """Gives the tets of a chunk that have turned inside out the state that they had ``before``, without its stress.
+
+    The stress of the step's end never acts on a node; that of its beginning has done half of its work on the way of
+    ``dt``, which is booked here. They add nothing to the means of nodes.
+    """
+    for i in range(n):
+        if w[VOLUME + i] <= 0.0:
+            work, viscous = _half_of_last(before, x, v, tets[i], i, dt)
+            for row in range(rows):
+                s[row * CHUNK + i] = before[row * CHUNK + i]
+            s[WORK * CHUNK + i] += work
+            s[WORK_VISCOUS * CHUNK + i] += viscous
+            _release(s, i)
+            w[VOLUME_MID + i] = 0.0
 
 
 @njit(

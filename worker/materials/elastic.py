@@ -1,5 +1,7 @@
 """Hypoelastic deviatoric stress with the exact rotation update: the trial stress of materials with a strength."""
 
+import numpy as np
+
 from ..elements.tet4 import D_XX, D_XY, D_YY, D_YZ, D_ZX, D_ZZ, DILATATION, SPIN, VOLUME_MID
 from ..jit import njit
 from ..state import CHUNK, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, WORK
@@ -8,6 +10,34 @@ _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _WORK = WORK * CHUNK
 _THIRD = 1.0 / 3.0
+
+
+@njit("void(float64[::1], int64)", cache=True, error_model="numpy")
+def turn_rate(w, n):  # type: ignore[no-untyped-def]
+    """Turns the rate of deformation from the middle of the step to its end: by half of the angle of Q.
+
+    With a the axial vector of W dt/2, |a| = tan(angle / 2), that of the half is b = a / (1 + sqrt(1 + a.a)).
+    """
+    for i in range(n):
+        ax, ay, az = w[SPIN + i], w[SPIN + CHUNK + i], w[SPIN + 2 * CHUNK + i]
+        half = 1.0 / (1.0 + np.sqrt(1.0 + ax * ax + ay * ay + az * az))
+        ax, ay, az = half * ax, half * ay, half * az
+        f = 2.0 / (1.0 + ax * ax + ay * ay + az * az)
+        qxx, qyy, qzz = 1.0 - f * (ay * ay + az * az), 1.0 - f * (ax * ax + az * az), 1.0 - f * (ax * ax + ay * ay)
+        qxy, qyx = f * (ax * ay - az), f * (ax * ay + az)
+        qxz, qzx = f * (ax * az + ay), f * (ax * az - ay)
+        qyz, qzy = f * (ay * az - ax), f * (ay * az + ax)
+        xx, yy, zz = w[D_XX + i], w[D_YY + i], w[D_ZZ + i]
+        yz, zx, xy = w[D_YZ + i], w[D_ZX + i], w[D_XY + i]
+        txx, txy, txz = qxx * xx + qxy * xy + qxz * zx, qxx * xy + qxy * yy + qxz * yz, qxx * zx + qxy * yz + qxz * zz
+        tyx, tyy, tyz = qyx * xx + qyy * xy + qyz * zx, qyx * xy + qyy * yy + qyz * yz, qyx * zx + qyy * yz + qyz * zz
+        tzx, tzy, tzz = qzx * xx + qzy * xy + qzz * zx, qzx * xy + qzy * yy + qzz * yz, qzx * zx + qzy * yz + qzz * zz
+        w[D_XX + i] = txx * qxx + txy * qxy + txz * qxz
+        w[D_YY + i] = tyx * qyx + tyy * qyy + tyz * qyz
+        w[D_ZZ + i] = tzx * qzx + tzy * qzy + tzz * qzz
+        w[D_YZ + i] = tyx * qzx + tyy * qzy + tyz * qzz
+        w[D_ZX + i] = tzx * qxx + tzy * qxy + tzz * qxz
+        w[D_XY + i] = txx * qyx + txy * qyy + txz * qyz
 
 
 @njit("void(float64[::1], float64[::1], int64, float64, float64)", cache=True, error_model="numpy")
@@ -19,6 +49,7 @@ def predict(w, s, n, shear, dt):  # type: ignore[no-untyped-def]
     trapezoidal rule; here the half of the rotated stress is booked, and ``deviatoric_work`` adds the other once the new
     stress is known.
     """
+    turn_rate(w, n)
     twice_shear_dt = 2.0 * shear * dt
     for i in range(n):
         ax, ay, az = w[SPIN + i], w[SPIN + CHUNK + i], w[SPIN + 2 * CHUNK + i]

@@ -1,0 +1,66 @@
+"""Flat tets in the averaged pressure forms: each sees its own volume strain and adds nothing to the means of nodes.
+
+The volume of a flat tet is nothing beside that of its neighbours, so that a mean over nodes does not notice how it
+changes: a motion of one altitude, which hardly strains the neighbours, closes it, and once it yields nothing resists
+that. With its own pressure it resists as in the ``standard`` form; the few of them lock nothing.
+"""
+
+import numpy as np
+
+from ..jit import njit
+from ..materials.law import BULK, DENSITY
+from ..mesh.faces import FACES, normals
+from ..state import CHUNK, HEAT, MASS, TOLD, Block, Flags, Floats
+from .pressure import STABILISE
+from .tet4 import CHANGE, SEEN, VOLUME, VOLUME_MID
+
+THINNEST = 0.1
+"""Smallest altitude over longest edge of a tet whose volume strain is averaged; 0.82 for a regular tet. Chosen: what
+strains its neighbours by a tenth closes it (docs/numerics.md)."""
+
+_HEAT, _TOLD, _MASS = HEAT * CHUNK, TOLD * CHUNK, MASS * CHUNK
+
+
+def flat_tets(block: Block, x0: Floats) -> Flags:
+    """(n,) which tets of a block are flat at the start; (0,) where none is."""
+    tets = block.tets.astype(np.int64)
+    x = x0[tets]
+    edges = x[:, 1:] - x[:, :1]
+    volume = np.abs((edges[:, 0] * np.cross(edges[:, 1], edges[:, 2])).sum(axis=1))
+    faces = np.max([(normals(x0, tets[:, face]) ** 2).sum(axis=1) for face in FACES], axis=0)
+    longest = np.max([((x[:, a] - x[:, b]) ** 2).sum(axis=1) for a in range(4) for b in range(a)], axis=0)
+    flat: Flags = volume < THINNEST * np.sqrt(faces * longest)
+    return flat if flat.any() else flat[:0]
+
+
+@njit("void(float64[::1], boolean[::1], int64)", cache=True)
+def keep_out(w, flat, n):  # type: ignore[no-untyped-def]
+    """Takes flat tets out of what is added up at the nodes: they have no volume there, and no stabilising fluxes."""
+    for i in range(n):
+        if flat[i]:
+            w[VOLUME_MID + i] = 0.0
+            for k in range(4):
+                w[STABILISE + k * CHUNK + i] = 0.0
+
+
+@njit("void(float64[::1], float64[::1], float64[::1], boolean[::1], int64, int64)", cache=True, error_model="numpy")
+def see_own(w, s, params, flat, rows, n):  # type: ignore[no-untyped-def]
+    """SEEN, and HEAT where there is heat, of flat tets: their own.
+
+    The change of volume over the volume at mid-step, which is the end's less half the change but for terms of the
+    third order.
+    """
+    unit = params[DENSITY] / params[BULK]
+    for i in range(n):
+        if flat[i]:
+            w[SEEN + i] = w[CHANGE + i] / (w[VOLUME + i] - 0.5 * w[CHANGE + i])
+            if rows > TOLD:
+                s[_HEAT + i] = unit * s[_TOLD + i] / s[_MASS + i]
+
+
+@njit("void(int64[::1], boolean[::1], int64)", cache=True)
+def without_flux(wi, flat, n):  # type: ignore[no-untyped-def]
+    """Takes the pressure gradients of flat tets out of the sums at the nodes."""
+    for i in range(n):
+        if flat[i]:
+            wi[i] = wi[CHUNK + i] = wi[2 * CHUNK + i] = 0
