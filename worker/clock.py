@@ -68,6 +68,16 @@ class Clock:
         return self.mean_dt
 
     @property
+    def longest(self) -> float:
+        """The longest step that may follow the one ahead, s."""
+        return self._growth * self.dt
+
+    def choose_again(self, limit: float) -> float:
+        """The step anew, for another ``limit``, before it is used; see ``choose``."""
+        self.dt = self.last_dt
+        return self.choose(limit)
+
+    @property
     def told(self) -> float:
         """The step for people, s: the one ahead, and the one behind when none is ahead any more."""
         return self.dt if self.dt > 0.0 else self.last_dt

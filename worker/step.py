@@ -4,7 +4,7 @@ Leapfrog: positions, stresses and forces live at n, velocities at n-1/2. One pas
 and at once f(n+1) from it, so a step begins with forces that are already at hand:
 
 ==  =====================================================  ==========================
- 1  choose dt                                              from the limits at n
+ 1  choose dt (the first once more, after 4)               from the limits at n
  2  second half of the work of the last impulses           v(n-1/2)
  3  erosion: worn tets leave the body                      topology(n)
  4  contact: search, when it is due                        candidate pairs
@@ -54,6 +54,8 @@ def first_half(sim: Simulation) -> None:
                 f"{_when(sim)}: {sim.limiting_tet()} is crushed; the stable step is {clock.stable:.3g} s"
             )
         _before_kick(sim)  # 2 to 4
+        if sim.contact is not None and clock.step == 0 and sim.contact.look_ahead(nodes):
+            mean_dt = clock.choose_again(sim.limit)
         if sim.fracture is not None:
             sim.fracture.let_go()  # 5: f(n), less where cohesive facets would give what nobody has paid
         kick(nodes.v, nodes.force, nodes.mass, mean_dt / sim.scale)  # v*(n+1/2) = v(n-1/2) + dt f(n) / m

@@ -96,7 +96,7 @@ def node_face(
     table.hang(first, 0)
     slots = slot_table(first, np.zeros((len(x), 9)) if out is None else moments(out), np.zeros(len(x)), v.copy())
     of = face_table(faces, face_sizes(x, faces), np.zeros(len(faces)))
-    found, tested = face_kernels.node_face(room, 0, table.arrays(), slots, of, step_of(x, v, own, dt, mu), 0.0)
+    found, tested, _ = face_kernels.node_face(room, 0, table.arrays(), slots, of, step_of(x, v, own, dt, mu), 0.0)
     assert tested == len(pairs)
     return taken(room, np.arange(found))
 

@@ -11,7 +11,7 @@ import pytest
 
 from conoid.cases import schema
 from conoid.cases.messages import Energy
-from conoid.worker import assembly, simulation
+from conoid.worker import assembly, simulation, step
 from conoid.worker.digest import digest
 from conoid.worker.errors import InputError
 from conoid.worker.mesh.model import TetMesh
@@ -309,3 +309,19 @@ def test_the_answer_with_restitution_is_the_same_on_three_ranks() -> None:
     assert alone is not None
     found = on_threads(3, case, lambda sim: state_of(run(sim))[0], MESHES)
     assert [digest for digest in found if digest is not None] == [alone]
+
+
+@pytest.mark.parametrize(("gap", "restitution"), [(0.0, 0.0), (0.1, 0.0), (0.1, 1.0), (2.5, 0.0), (2.5, 1.0)])
+def test_the_step_in_which_fast_bodies_meet_first_is_short(gap: float, restitution: float) -> None:
+    """At 10 km/s, from a ``gap`` of so many edges: what contact gives to a node moves it by half of a tet at most."""
+    striker = moved(block((2, 2, 2), SIZE, seed=2), ((3.0 + gap) * SIZE, 0.4 * SIZE, 0.6 * SIZE))
+    case = meeting_of([{}, {"velocity": (-1e4, 0.0, 0.0)}], {"restitution": restitution}, end=1e-6)
+    sim = build(case, [block((3, 3, 3), SIZE, seed=1), striker])
+    assert sim.contact is not None
+    step.prepare(sim)
+    step.first_half(sim)
+    while not np.abs(sim.contact.impulses()).max() > 0.0:
+        step.second_half(sim)
+        step.first_half(sim)
+    assert sim.clock.t * 1e4 <= (gap + 0.5) * SIZE
+    assert (1.0 + restitution) * 1e4 * sim.clock.dt < 0.4 * SIZE

@@ -62,7 +62,7 @@ class Tables:
         nodes, ridges = ContactRows.room(len(self.node_face)), ContactRows.room(len(self.edge_edge))
         end, pairs, two = shards.tracks.end, self.node_face.arrays(), self.edge_edge.arrays()
         known, familiar = known_of(pairs, slots.fresh, faces.fresh), known_of(two, edges.fresh, edges.fresh)
-        n, some = node_face(nodes, 0, pairs, slots, faces, of, end)
+        n, some, _ = node_face(nodes, 0, pairs, slots, faces, of, end)
         m, few = edge_edge(ridges, 0, two, edges, of, slots.course, end)
         self.tested += some + few
         self.unforced += int(known[pairs.active[:some]].sum() + familiar[two.active[:few]].sum())

@@ -119,7 +119,7 @@ class Brute(Found):
             slots = slot_table(first, normals, none, step.v)._replace(on_surface=on_surface)
             of = face_table(faces, sides.faces.size, np.zeros(len(faces)))
             of = of._replace(id=sides.faces.id, exposed=sides.faces.exposed)
-            n, _ = node_face(room, 0, table.arrays(), slots, of, step, 0.0)
+            n, _, _ = node_face(room, 0, table.arrays(), slots, of, step, 0.0)
             met += written(room, n, sides.crowd.id)
         return met
 

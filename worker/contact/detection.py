@@ -8,7 +8,7 @@ from ..state import Floats, Ints
 from . import registration
 from .cracks import across
 from .edge_edge import edge_edge
-from .narrow_phase import Step
+from .narrow_phase import HASTY, Step
 from .node_face import approach, node_face
 from .scene import Scene
 
@@ -26,7 +26,8 @@ class Detected:
     contacts: int
     """How many."""
     approach: float
-    """One over the step in which no node passes more than half of a tet that it meets, 1/s."""
+    """One over the step in which no node passes more than half of a tet that it meets, or will in the next step,
+    1/s."""
     opening: Ints
     """Rows of the cracks that have become so wide that they open."""
     stray: bool
@@ -39,17 +40,36 @@ class Detected:
         return cls(0, 0.0, np.zeros(0, np.int64), False)
 
 
-def detect(
-    now: Scene, mu: Floats, give: float, dt: float, size: float, redraw: bool, together: bool
-) -> Detected:  # fmt: skip
-    """The active contacts of the step ahead, ``dt``, s, of the positions and velocities of the scene's nodes.
+@dataclass(frozen=True)
+class Ahead:
+    """How far ahead contacts are found."""
 
-    ``mu`` (parts, parts): friction, NaN where two parts do not meet; ``give``: see narrow_phase.PUSH_OUT; ``size``: the
-    typical one of a face, m; ``redraw``: whether short lines are drawn anew (tracks.py); ``together``: whether some
-    rank registers what has strayed.
+    dt: float
+    """The step ahead, s."""
+    most: float
+    """The longest step that may follow it, s."""
+    size: float
+    """The typical one of a face, m."""
+    rebound: float
+    """See narrow_phase.Step."""
+
+    def beyond(self, v: Floats) -> float:
+        """The step that follows if in it anything of ``v`` (slots, 3) may come nearer to anything by HASTY of a face;
+        else 0. No such pair is bounded, so that a rank where nothing is so fast need not know of any.
+        """
+        fastest = float(np.linalg.norm(v.max(axis=0) - v.min(axis=0))) if len(v) else 0.0
+        return self.most if fastest * self.most > HASTY * self.size else 0.0
+
+
+def detect(now: Scene, mu: Floats, give: float, ahead: Ahead, redraw: bool, together: bool) -> Detected:
+    """The active contacts of the step ahead, of the positions and velocities of the scene's nodes.
+
+    ``mu`` (parts, parts): friction, NaN where two parts do not meet; ``give``: see narrow_phase.PUSH_OUT; ``redraw``:
+    whether short lines are drawn anew (tracks.py); ``together``: whether some rank registers what has strayed.
     """
     crowd, tracks = now.crowd, now.tracks
-    tracks.advance(dt)
+    beyond = ahead.beyond(crowd.v)
+    tracks.advance(ahead.dt, beyond)
     if redraw:
         tracks.shorten(crowd.x)
         now.node_face.wake()
@@ -57,7 +77,9 @@ def detect(
     tracks.measure(crowd.x, crowd.v, now.faces.corners, now.edges.corners)
     stray = _renewed(now, together)
     now.reserve()
-    contacts, approach, opening = _test(now, Step.of(crowd.x, crowd.v, crowd.part, mu, give, dt), size)
+    step = Step.of(crowd.x, crowd.v, crowd.part, mu, give, ahead.dt)
+    step = step.followed(beyond, HASTY * ahead.size, ahead.rebound, now.face_table())
+    contacts, approach, opening = _test(now, step, ahead.size)
     return Detected(contacts, approach, opening, stray)
 
 
@@ -75,9 +97,9 @@ def _renewed(now: Scene, together: bool) -> bool:
 def _test(now: Scene, step: Step, size: float) -> tuple[int, float, Ints]:
     """The narrow phase: contacts, approach and opening of ``Detected``."""
     tracks, faces, pairs = now.tracks, now.face_table(), now.node_face.arrays()
-    n, tested = node_face(now.active.room, 0, pairs, now.slot_table(), faces, step, tracks.end)
+    n, tested, coming = node_face(now.active.room, 0, pairs, now.slot_table(), faces, step, tracks.end)
     now.node_face.tested = pairs.active[:tested]
-    limit = _KINEMATIC * approach(now.active.room, n, pairs, faces, step)
+    limit = _KINEMATIC * max(coming, approach(now.active.room, n, pairs, faces, step))
     pairs = now.edge_edge.arrays()
     n, tested = edge_edge(now.active.room, n, pairs, now.edge_table(), step, tracks.short.course, tracks.end)
     now.edge_edge.tested = pairs.active[:tested]

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..jit import njit, types
 from ..state import Flags, Floats, Indices, Ints
+from .geometry import at, cross, dot, minus
 
 NEAR = 0.02
 """Of the size of a face: a gap that is watched although it does not close by itself."""
@@ -18,6 +19,9 @@ DEEP = 0.25
 """Of the size of a face: deepest penetration that is still taken for one, not for the back of a thin body."""
 DEEP_SELF = 0.05
 """The same on one part, whose nodes lie behind its own faces anyway."""
+HASTY = 0.1
+"""Of the typical size of a face: pairs that come nearer by less in a step bound no step before they are active. A tet
+of that size is several times as high."""
 PUSH_OUT = 0.1
 """Largest share of a penetration that is taken back in a step, and of the speed of closing that is given back for it;
 nothing while contact has no energy to give back (``account.Account``)."""
@@ -67,6 +71,15 @@ class Step(NamedTuple):
     """Of a penetration, taken back in the step (PUSH_OUT)."""
     dt: float
     """s."""
+    beyond: float
+    """The longest step that may follow, s, of which pairs that will be active are to be found; 0 if none need."""
+    hasty: float
+    """m; pairs that come nearer by less in that step do not count."""
+    rebound: float
+    """Largest change of a speed by contact over the speed of closing: 1 + restitution."""
+    least: Floats
+    """(slots,) square of the least altitude of a node in the tets of its exposed faces, m^2; (0,) without ``beyond``.
+    """
 
     @classmethod
     def of(cls, x: Floats, v: Floats, part: Indices, mu: Floats, give: float, dt: float) -> "Step":
@@ -76,7 +89,14 @@ class Step(NamedTuple):
         first = -(room.ctypes.data // room.itemsize) % _LINE
         places = room[first : first + n * _LINE].reshape(n, _LINE)
         _place(places, x, v, dt)
-        return cls(places[:, :3], v, places[:, 3:6], part, mu, give, dt)
+        return cls(places[:, :3], v, places[:, 3:6], part, mu, give, dt, 0.0, 0.0, 1.0, np.empty(0))
+
+    def followed(self, beyond: float, hasty: float, rebound: float, faces: "FaceTable") -> "Step":
+        """And a step of up to ``beyond`` that may follow, see there."""
+        least = np.full(len(self.x) if beyond > 0.0 else 0, np.inf)
+        if beyond > 0.0:
+            least_altitudes(least, self.x, faces.corners, faces.exposed)
+        return self._replace(beyond=beyond, hasty=hasty, rebound=rebound, least=least)
 
 
 class Pairs(NamedTuple):
@@ -160,7 +180,7 @@ _N1, _N2, _I1, _B1, _B2 = (
 )  # fmt: skip
 _F1, _F2 = types.float64[::1], types.float64[:, ::1]
 CONTACT_ROWS = record(ContactRows, _N2, _F2, _F2, _F1, _F1, _N1)
-STEP = record(Step, types.float64[:, :], _F2, types.float64[:, :], _N1, _F2, types.float64, types.float64)
+STEP = record(Step, types.float64[:, :], _F2, types.float64[:, :], _N1, _F2, *(5 * [types.float64]), _F1)
 PAIRS = record(Pairs, _N2, _F1, _F1, _B1, _N1, _N1)
 SLOTS = record(SlotTable, _F2, _B1, _N1, _F1, _F2, _B1, _N1)
 FACES = record(FaceTable, _N2, _F1, _I1, _B1, _F1, _B1, _F2, _B1)
@@ -182,3 +202,22 @@ def _place(places, x, v, dt):  # type: ignore[no-untyped-def]
     for a in range(len(x)):
         for i in range(3):
             places[a, i], places[a, 3 + i] = x[a, i], x[a, i] + dt * v[a, i]
+
+
+@njit("float64(float64[:, :], int32, int32, int32, int32)", cache=True, error_model="numpy")
+def altitude(x, a, i, j, k):  # type: ignore[no-untyped-def]
+    """Square of the height of slot a over the face i, j, k, m^2."""
+    e, f, r = minus(at(x, j), at(x, i)), minus(at(x, k), at(x, i)), minus(at(x, a), at(x, i))
+    n = cross(e, f)
+    return dot(n, r) ** 2 / dot(n, n)
+
+
+@njit("void(float64[::1], float64[:, :], int32[:, ::1], boolean[::1])", cache=True)
+def least_altitudes(least, x, corners, exposed):  # type: ignore[no-untyped-def]
+    """See Step.least."""
+    for f in range(len(corners)):
+        if exposed[f]:
+            a, b, c, d = corners[f, 0], corners[f, 1], corners[f, 2], corners[f, 3]
+            least[a] = min(least[a], altitude(x, a, b, c, d))
+            least[b] = min(least[b], altitude(x, b, c, d, a))
+            least[c] = min(least[c], altitude(x, c, d, a, b))

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..jit import njit, types
 from .geometry import VECTOR, at, beyond, distance, dot, foot, height, minus, off
-from .narrow_phase import CONTACT_ROWS, DEEP, DEEP_SELF, FACES, NEAR, PAIRS, SLOTS, STEP, needed
+from .narrow_phase import CONTACT_ROWS, DEEP, DEEP_SELF, FACES, NEAR, PAIRS, SLOTS, STEP, altitude, needed
 
 _TOUCHING = 1e-3
 """Of the size of a face: deeper than this, a node is held by the nearest face of that part only."""
@@ -23,7 +23,8 @@ _BEND = 0.1
 """Largest motion of two corners of a face against each other, of the face's two sides, that is allowed for."""
 
 _X2, _V2, _N2 = "float64[:, :]", "float64[:, ::1]", "int32[:, ::1]"
-_PAIR, _F = types.Tuple((types.int64, types.int64)), types.float64  # type: ignore[no-untyped-call]
+_TRIPLE, _F = types.Tuple((types.int64, types.int64, types.float64)), types.float64  # type: ignore[no-untyped-call]
+_VECTOR = types.UniTuple(types.float64, 3)  # type: ignore[no-untyped-call]
 
 
 @njit("void(int32[::1], int32[::1], int32[:, ::1], int64)", cache=True)
@@ -140,9 +141,61 @@ def _outside(pairs, first, faces, x, part, p, depth, strayed, end):  # type: ign
     return False
 
 
-@njit(_PAIR(CONTACT_ROWS, types.int64, PAIRS, SLOTS, FACES, STEP, types.float64), cache=True, error_model="numpy")
+@njit(_F(STEP, types.int32[:, ::1], types.int64, types.int64), cache=True)
+def _fastest(step, corners, s, f):  # type: ignore[no-untyped-def]
+    """Square of the largest speed of node s against a corner of face f, m^2/s^2."""
+    most = 0.0
+    for m in range(3):
+        speed = 0.0
+        for i in range(3):
+            speed += (step.v[s, i] - step.v[corners[f, m], i]) ** 2
+        most = max(most, speed)
+    return most
+
+
+@njit(_F(STEP, types.int32[:, ::1], types.int64, types.int64, _F), cache=True, error_model="numpy")
+def _haste(step, corners, s, f, fastest):  # type: ignore[no-untyped-def]
+    """Square of what contact may give to node s or to face f over the least altitude of a tet of theirs, 1/s^2, where
+    they come nearer by more than ``step.hasty`` in a step; else 0. ``fastest``: of them (``_fastest``).
+    """
+    if not fastest * step.beyond**2 > step.hasty**2:
+        return 0.0
+    x, a, b, c, d = step.x, corners[f, 0], corners[f, 1], corners[f, 2], corners[f, 3]
+    one, two = min(altitude(x, a, b, c, d), altitude(x, b, c, d, a)), altitude(x, c, d, a, b)
+    return step.rebound**2 * fastest / min(one, two, altitude(x, d, a, b, c), step.least[s])
+
+
+@njit(
+    _F(STEP, types.float64[:, ::1], FACES, types.int64, types.int64, _VECTOR, _F),
+    cache=True,
+    error_model="numpy",
+)
+def _coming(step, normals, faces, s, f, m, gap):  # type: ignore[no-untyped-def]
+    """``_haste`` of node s and face f if they will meet in a step of ``step.beyond`` after this one; else 0. ``m``,
+    ``gap``: normal of the face, and height over it, m, at the end of this one.
+    """
+    v, ahead, corners = step.v, step.ahead, faces.corners
+    i, j, k = corners[f, 0], corners[f, 1], corners[f, 2]
+    rate = dot(m, minus(at(v, s), at(v, i)))
+    if not gap + step.beyond * rate < 0.0:
+        return 0.0
+    mean, least = facing(normals, s, m)
+    if not (mean <= FACING and least <= -FACING):
+        return 0.0
+    tau = -gap / rate
+    p, o = beyond(at(ahead, s), tau, at(v, s)), beyond(at(ahead, i), tau, at(v, i))
+    a, b = beyond(at(ahead, j), tau, at(v, j)), beyond(at(ahead, k), tau, at(v, k))
+    above, _ = height(p, o, a, b)
+    on, _ = foot(minus(p, o), minus(a, o), minus(b, o))
+    if not (on and abs(above) <= DEEP_SELF * faces.size[f]):
+        return 0.0
+    return _haste(step, corners, s, f, _fastest(step, corners, s, f))
+
+
+@njit(_TRIPLE(CONTACT_ROWS, types.int64, PAIRS, SLOTS, FACES, STEP, types.float64), cache=True, error_model="numpy")
 def node_face(out, n, pairs, slots, faces, step, end):  # type: ignore[no-untyped-def]
-    """Nodes that pass a face, from row ``n`` on; returns the new number of rows, and how many pairs were tested.
+    """Nodes that pass a face, from row ``n`` on; returns the new number of rows, how many pairs were tested, and the
+    largest speed over the altitude of a tet, 1/s, of those that will meet in the next step (``_coming``).
 
     A node meets a face that it faces: the rim of a bar not the side of another one of the same width, the surface under
     a block that slides not its front, which stands across. One that is inside of several parts is held by the nearest
@@ -157,12 +210,12 @@ def node_face(out, n, pairs, slots, faces, step, end):  # type: ignore[no-untype
     first = slots.first
     holder[:] = -1
     earlier, deepest = np.empty(len(rows), np.int32), np.empty(len(rows))
-    tested = 0
+    tested, most = 0, 0.0
     for p in range(len(rows)):
         s, f = rows[p, 0], rows[p, 1]
         if other[s] or fresh[f]:
             until[p], speed[p] = -np.inf, np.nan
-        if until[p] > strayed[s] + left[f] + speed[p] * end:
+        if until[p] > strayed[s] + left[f] + speed[p] * (end + step.beyond):
             continue
         if not exposed[f] or not on_surface[s]:
             until[p], speed[p] = np.inf, 0.0
@@ -189,6 +242,8 @@ def node_face(out, n, pairs, slots, faces, step, end):  # type: ignore[no-untype
                 speed[p] = max(distance(a, b), distance(a, c))
             until[p] = slack - strayed[s] - left[f] + speed[p] * end if slack > _WORTH * size[f] else np.nan
         if not gap1 <= NEAR * size[f]:
+            if step.beyond > 0.0:
+                most = max(most, _coming(step, normals, faces, s, f, m, gap1))
             continue
         mean, least = facing(normals, s, m)
         if not (mean <= FACING and least <= -FACING):
@@ -221,27 +276,25 @@ def node_face(out, n, pairs, slots, faces, step, end):  # type: ignore[no-untype
             rate += m[a] * (v[s, a] - (b[0] * v[i, a] + b[1] * v[j, a] + b[2] * v[k, a]))
         wanted[row] = rate + needed(gap0, gap1, rate, step.give, step.dt)
         out.friction[row], pair[row] = step.mu[part[s], part[i]], p
-    return n, tested
+    return n, tested, np.sqrt(most)
 
 
 @njit(types.float64(CONTACT_ROWS, types.int64, PAIRS, FACES, STEP), cache=True, error_model="numpy")
 def approach(out, n, pairs, faces, step):  # type: ignore[no-untyped-def]
-    """Largest relative speed of a node over the altitude of its face's tet, 1/s, of the first ``n`` active contacts."""
+    """Largest relative speed of a node over the altitude of its face's tet, 1/s, of the first ``n`` active contacts; or
+    ``_haste``.
+    """
     e, f, r = np.empty(3), np.empty(3), np.empty(3)
-    x, v, most = step.x, step.v, 0.0
+    x, most = step.x, 0.0
     for row in range(n):
         s, face = pairs.rows[out.pair[row], 0], pairs.rows[out.pair[row], 1]
-        corners = faces.corners[face]
+        corners, fastest = faces.corners[face], _fastest(step, faces.corners, s, face)
         a, b, c, d = corners[0], corners[1], corners[2], corners[3]
-        fastest = 0.0
-        for m in range(3):
-            speed = 0.0
-            for i in range(3):
-                speed += (v[s, i] - v[corners[m], i]) ** 2
-            fastest = max(fastest, speed)
         for i in range(3):
             e[i], f[i], r[i] = x[b, i] - x[a, i], x[c, i] - x[a, i], x[d, i] - x[a, i]
         nx, ny, nz = e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]
         square = (nx * r[0] + ny * r[1] + nz * r[2]) ** 2 / (nx * nx + ny * ny + nz * nz)
         most = max(most, fastest / square)
+        if step.beyond > 0.0:
+            most = max(most, _haste(step, faces.corners, s, face, fastest))
     return np.sqrt(most)

@@ -74,8 +74,10 @@ class Searches:
         self._kept = np.column_stack([kept["node"], kept["face"]]), kept["kept"]
 
     def spent(self, nodes: Nodes) -> bool:
-        """Whether a node of the surface will leave, in a step more, what the last search has allowed for."""
-        return self._exterior.flight.spent(nodes, self._clock.t, self._clock.dt)
+        """Whether a node of the surface will leave, in two steps more, what the last search has allowed for: the second
+        is the one that narrow_phase looks ahead.
+        """
+        return self._exterior.flight.spent(nodes, self._clock.t, 2.0 * self._clock.dt)
 
     def begin(self, nodes: Nodes) -> None:
         """Before a step: mean normals when it is their turn, a search when it is due; all ranks take part."""

@@ -20,7 +20,7 @@ from ..timers import Timers
 from ..topology import Split
 from . import held, normals
 from .books import Books
-from .detection import Detected, detect
+from .detection import Ahead, Detected, detect
 from .exterior import Exterior
 from .narrow_phase import PUSH_OUT
 from .restitution import rebound
@@ -206,6 +206,19 @@ class Contact:
         with self._timers.phase("contact"):
             return self.searches.spent(state)
 
+    def look_ahead(self, state: Nodes) -> bool:
+        """Before the first step, whose bound no step before has found: bounds it by what comes near, and says whether
+        it has; all ranks take part.
+        """
+        if (now := self.searches.scene) is None:
+            return False
+        with self._timers.phase("contact"):
+            held.take(now.crowd.x, now.crowd.v, now.own.slots, state.x, state.v, now.own.local)
+            ahead = Ahead(0.0, self._clock.dt, self.exterior.size, 1.0 + self._restitution)
+            own = detect(now, self.searches.mu, 0.0, ahead, redraw=True, together=False).approach
+            self.limit = float(self._comm.maximum(np.array([own]))[0])
+        return self.limit > 0.0
+
     def solve(self, state: Nodes, dt: float, t: float) -> None:
         """After the kick: the impulses of active contacts correct v(n+1/2) at time ``t``, s; all ranks take part."""
         if dt > 0.0 and (now := self.searches.scene) is not None:
@@ -247,7 +260,8 @@ class Contact:
         if step % _FORESIGHT == 0:
             self.searches.foresee()
         redraw = step % normals.EVERY == 0
-        self.found = detect(now, self.searches.mu, give, dt, self.exterior.size, redraw, self.found.stray)
+        ahead = Ahead(dt, self._clock.longest, self.exterior.size, 1.0 + self._restitution)
+        self.found = detect(now, self.searches.mu, give, ahead, redraw, self.found.stray)
         now.active.n = self.found.contacts
         if self._restitution > 0.0:
             rebound(now.active.room, now.active.n, now.crowd.v, now.slots.before, self._restitution)

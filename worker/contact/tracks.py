@@ -74,6 +74,8 @@ class Tracks:
         """Of the step's beginning, s after the search."""
         self.end = 0.0
         """Of its end."""
+        self.beyond = 0.0
+        """How long after that lines are measured, s."""
         self.strayed = 0.0
         """How far any slot that is watched leaves the line that is searched in the step, m."""
 
@@ -93,13 +95,13 @@ class Tracks:
         self.searched.take_over(slots, old.searched, self.t)
         self.short.take_over(slots, old.short, self.t)
 
-    def advance(self, dt: float) -> None:
-        """A step ``dt`` begins."""
-        self.t, self.end = self.end, self.end + dt
+    def advance(self, dt: float, beyond: float = 0.0) -> None:
+        """A step ``dt`` begins; what slots leave is measured ``beyond`` its end, s."""
+        self.t, self.end, self.beyond = self.end, self.end + dt, beyond
 
     def measure(self, x: Floats, v: Floats, faces: Indices, edges: Indices) -> None:
-        """How far everything leaves its lines in the step: see Lines."""
-        dt = self.end - self.t
+        """How far everything leaves its lines in the step and ``beyond``: see Lines."""
+        dt = self.end - self.t + self.beyond
         self.searched.measure(x, v, self.t, dt)
         self.short.measure(x, v, self.t, dt)
         _largest(self.faces, faces, 3, self.short.left)
