@@ -187,7 +187,7 @@ FACES = record(FaceTable, _N2, _F1, _I1, _B1, _F1, _B1, _F2, _B1)
 EDGES = record(EdgeTable, _N2, _F1, _B2, _F1, _B1)
 
 
-@njit("float64(float64, float64, float64, float64, float64)", cache=True)
+@njit("float64(float64, float64, float64, float64, float64)", cache=True, error_model="numpy")
 def needed(gap0, gap1, speed, give, dt):  # type: ignore[no-untyped-def]
     """By how much the normal speed must rise, m/s: not to pass, and when that has happened already, not deeper; a
     share ``give`` of the penetration is taken back (PUSH_OUT).
