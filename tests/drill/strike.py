@@ -50,7 +50,7 @@ def rows(stand: Stand, strike: Strike) -> Iterator[Row]:
     first = []
     ends = judge.settled(stand, truths, since)
     for situation, truth, (seen, seconds) in zip(strike.lives, truths, ends, strict=True):
-        wrong = judge.verdict(stand, truth, seen)
+        wrong = judge.verdict(stand, truth, seen, seconds)
         first.append((situation.__name__.replace("_", " "), truth, seen, seconds, wrong))
     stand.again()
     told = judge.stranded(stand)

@@ -160,8 +160,8 @@ def clock(words: str) -> Deed:
 
 
 def clocks() -> Iterator[Strike]:
-    """Set forward and back, fast and slow; the clock that nobody sets goes on."""
-    right = clock("+0")
+    """Set forward and back, fast and slow; the clock that nobody sets goes on. A rate lasts until another one is set."""
+    right = clock("+0 x1")
     for name, words in (
         ("set forward by a day", "+1d"), ("set back by a day", "-1d"), ("set forward by 10 s", "+10"),
         ("set back by 10 s", "-10"), ("set back by ten years", "-10y"), ("a hundred times too fast", "+0 x100"),

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from .judge import TRUE, Row
 
-WORDS = ("stranded", "lie", "orphan", "double", "acknowledged and lost")
+WORDS = ("stranded", "lie", "orphan", "double", "acknowledged and lost", "late")
 """With which the verdict of a fault that went wrong begins; anything else is counted by itself."""
 
 NAMED = 12
