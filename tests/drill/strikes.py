@@ -160,7 +160,7 @@ def clock(words: str) -> Deed:
 
 
 def clocks() -> Iterator[Strike]:
-    """Set forward and back, fast and slow; the clock that nobody sets goes on. A rate lasts until another one is set."""
+    """Set forward and back, fast and slow; the clock that nobody sets goes on. A rate lasts until the next."""
     right = clock("+0 x1")
     for name, words in (
         ("set forward by a day", "+1d"), ("set back by a day", "-1d"), ("set forward by 10 s", "+10"),
