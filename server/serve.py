@@ -12,7 +12,7 @@ from types import FrameType
 
 import uvicorn
 
-from . import connections, durable, quiet
+from . import connections, durable, heap, quiet
 from .app import build_app, opened
 from .service import Service
 from .settings import Settings, StartError
@@ -33,6 +33,7 @@ def serve(settings: Settings) -> None:
     Raises ServeError, and what ``opened`` raises.
     """
     os.umask(0o077)
+    heap.share()
     quiet.install()
     settings.runs.mkdir(parents=True, exist_ok=True)
     with _only_one(settings.runs), _listening(settings) as listener:

@@ -1,9 +1,9 @@
 """``python -m tests.drill``: every fault, one after the other; a table in build/drill.
 
 A drill that was interrupted goes on where it was: what was true in build/drill/faults.jsonl is not tried again unless
-``--fresh`` says so. ``--shard 2/4`` tries every fourth group from the second on, ``--only WORDS`` those whose names
-have the words, or whose kind of stand is of that name (``slurm``), ``--list`` names them. The exit code is 0 when every
-state became true in time.
+``--fresh`` says so; the table names what has not been tried yet. ``--shard 2/4`` tries every fourth group from the
+second on, ``--only WORDS`` those whose names have the words, or whose kind of stand is of that name (``slurm``),
+``--list`` names them. The exit code is 0 when every state became true in time.
 """
 
 import argparse
@@ -65,8 +65,9 @@ def main() -> int:
         for name in names:
             if name not in done or any(row.verdict != TRUE for row in done[name]):
                 _try(name, chosen[name], made, book)
-    found = [(row, name) for name, rows in _done(book).items() if name in known for row in rows]
-    return write(PLACE / "faults.md", [row for row, _ in found])
+    done = _done(book)
+    rows = [row for name in known for row in done.get(name, [])]
+    return write(PLACE / "faults.md", rows, [name for name in known if name not in done])
 
 
 def _try(name: str, group: Group, made: Grounds, book: Path) -> None:

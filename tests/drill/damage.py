@@ -169,7 +169,7 @@ def _made(stand: Stand, one: Damage) -> str:
 def _judged(stand: Stand, some: Sequence[Damage], truths: Sequence[Truth]) -> Iterator[Row]:
     since, found = time.monotonic(), []
     for truth, (seen, seconds) in zip(truths, judge.settled(stand, truths, since), strict=True):
-        found.append((seen, seconds, judge.verdict(stand, truth, seen)))
+        found.append((seen, seconds, judge.verdict(stand, truth, seen, seconds)))
         judge.reads(stand, truth.run)
     stand.again()
     for one, truth, (seen, seconds, wrong) in zip(some, truths, found, strict=True):

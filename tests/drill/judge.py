@@ -45,7 +45,7 @@ def settle(stand: Stand, truth: Truth, since: float) -> tuple[str, float]:
     return settled(stand, [truth], since)[0]
 
 
-def verdict(stand: Stand, truth: Truth, seen: str) -> str:
+def verdict(stand: Stand, truth: Truth, seen: str, seconds: float) -> str:
     """What is wrong, most severe first; ``TRUE`` for nothing."""
     if truth.run == "none":
         return "never accepted"
@@ -59,6 +59,7 @@ def verdict(stand: Stand, truth: Truth, seen: str) -> str:
     found = [_doubles(stand, truth), _orphans(stand, truth, seen), _success(stand, truth, seen)]
     if truth.whole:
         found.append(_folder(stand, truth, seen))
+    found.append(f"late: after {seconds:.1f} s" if seconds > stand.patience else "")
     return next(filter(None, found), TRUE)
 
 

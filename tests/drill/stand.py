@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,8 @@ from ..server.running import TOML, case_text
 HERE = Path(__file__).parent
 START = 180.0
 """s in which a server must be up, or have said why not."""
+PATIENCE = 60.0
+"""s for which a user waits for an answer."""
 UNPRIVILEGED = ("setpriv", "--bounding-set=-dac_override,-dac_read_search")
 """Before a command: root obeys the permissions of files as everybody does."""
 FINAL = {state.value for state in State if state.final}
@@ -108,7 +110,7 @@ class Stand:
             self.http.close()
         else:
             token = f"Bearer {self.token()}"
-        self.http = httpx2.Client(base_url=url, headers={"Authorization": token}, timeout=60.0)
+        self.http = httpx2.Client(base_url=url, headers={"Authorization": token}, timeout=PATIENCE)
 
     def token(self) -> str:
         """Of a user, made by the operator."""
@@ -168,6 +170,14 @@ class Stand:
             return answer.status_code, answer.json()
         except ValueError:
             return answer.status_code, answer.text
+
+    @contextmanager
+    def giving_up(self, seconds: float) -> Iterator[None]:
+        """Users wait no longer than so for an answer."""
+        assert self.http is not None
+        self.http.timeout = seconds
+        yield
+        self.http.timeout = PATIENCE
 
     def hand_in(self, key: str = "", **plan: Any) -> tuple[int, Any]:
         """One try to submit a run."""

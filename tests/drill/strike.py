@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from . import judge, situations
 from .judge import TRUE, Row
 from .situations import Life, Situation, Truth
-from .stand import Stand
+from .stand import PATIENCE, Stand
 
 Deed = Callable[[Stand], None]
 
@@ -28,6 +28,8 @@ class Strike:
     lives: Sequence[Situation] = situations.ALL
     launches: int = 1
     """How often any run may be started at most."""
+    waits: float = PATIENCE
+    """s after which whoever asks something meanwhile gives up: a fault ends at its time, whoever waits for it."""
 
 
 def rows(stand: Stand, strike: Strike) -> Iterator[Row]:
@@ -38,8 +40,9 @@ def rows(stand: Stand, strike: Strike) -> Iterator[Row]:
     _begin(stand, lives)
     stand.errors.clear()
     strike.deed(stand)
-    for life in lives:
-        next(life)
+    with stand.giving_up(strike.waits):
+        for life in lives:
+            next(life)
     time.sleep(strike.hold)
     strike.lift(stand)
     since = time.monotonic()
@@ -47,7 +50,7 @@ def rows(stand: Stand, strike: Strike) -> Iterator[Row]:
     first = []
     ends = judge.settled(stand, truths, since)
     for situation, truth, (seen, seconds) in zip(strike.lives, truths, ends, strict=True):
-        wrong = judge.verdict(stand, truth, seen)
+        wrong = judge.verdict(stand, truth, seen, seconds)
         first.append((situation.__name__.replace("_", " "), truth, seen, seconds, wrong))
     stand.again()
     told = judge.stranded(stand)

@@ -160,8 +160,8 @@ def clock(words: str) -> Deed:
 
 
 def clocks() -> Iterator[Strike]:
-    """Set forward and back, fast and slow; the clock that nobody sets goes on."""
-    right = clock("+0")
+    """Set forward and back, fast and slow; the clock that nobody sets goes on. A rate lasts until the next."""
+    right = clock("+0 x1")
     for name, words in (
         ("set forward by a day", "+1d"), ("set back by a day", "-1d"), ("set forward by 10 s", "+10"),
         ("set back by 10 s", "-10"), ("set back by ten years", "-10y"), ("a hundred times too fast", "+0 x100"),
@@ -351,10 +351,10 @@ def kills() -> Iterator[Strike]:
     yield Strike("the server killed", "kill", killed, started)
     yield Strike("the server killed three times", "kill", killed_often, started)
     yield Strike("the server told to stop", "kill", stopped, started)
-    yield Strike("the server paused for 3 s", "kill", paused, goes_on, hold=3.0)
+    yield Strike("the server paused for 3 s", "kill", paused, goes_on, hold=0.0, waits=1.0)
     yield Strike("the reader of cases killed", "kill", partial(reader_gets, number=signal.SIGKILL), nothing)
     stop, go = partial(reader_gets, number=signal.SIGSTOP), partial(reader_gets, number=signal.SIGCONT)
-    yield Strike("the reader of cases paused", "kill", stop, go)
+    yield Strike("the reader of cases paused", "kill", stop, go, waits=3.0)
 
 
 def everything() -> list[Strike]:

@@ -6,17 +6,27 @@ from pathlib import Path
 
 from .judge import TRUE, Row
 
-WORDS = ("stranded", "lie", "orphan", "double", "acknowledged and lost")
+WORDS = ("stranded", "lie", "orphan", "double", "acknowledged and lost", "late")
 """With which the verdict of a fault that went wrong begins; anything else is counted by itself."""
 
+NAMED = 12
+"""Groups that were not tried and are named."""
 
-def write(path: Path, rows: Sequence[Row]) -> int:
-    """Writes and prints; 0 when all are true."""
-    lines = [*summary(rows), "", "| fault | what happened | s to the truth | verdict |", "|---|---|---|---|"]
+
+def write(path: Path, rows: Sequence[Row], untried: Sequence[str] = ()) -> int:
+    """Writes and prints; 0 when all are true. ``untried``: groups of faults of which nothing is known."""
+    told = [*summary(rows), *missing(untried)]
+    lines = [*told, "", "| fault | what happened | s to the truth | verdict |", "|---|---|---|---|"]
     lines += [f"| {row.fault} | {row.happened} | {row.seconds:.1f} | {row.verdict} |" for row in rows]
     path.write_text("\n".join(lines) + "\n")
-    print(*summary(rows), f"table: {path}", sep="\n")
+    print(*told, f"table: {path}", sep="\n")
     return int(any(row.verdict != TRUE for row in rows))
+
+
+def missing(untried: Sequence[str]) -> list[str]:
+    """What the counts leave out."""
+    more = f"; and {len(untried) - NAMED} more" if len(untried) > NAMED else ""
+    return [f"groups not tried, {len(untried)}: {'; '.join(untried[:NAMED])}{more}"] if untried else []
 
 
 def summary(rows: Sequence[Row]) -> list[str]:

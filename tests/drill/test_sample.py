@@ -1,14 +1,17 @@
 """Twenty faults of the drill on one server: the tests of every day. All of them: ``python -m tests.drill``."""
 
 import errno
+import socket
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import httpx2
 import pytest
 
 from conoid.cases import layout
 
-from . import damage, strike, strikes
+from . import damage, strike, strikes, table
 from .damage import CASE, Damage
 from .judge import TRUE, Row
 from .stand import Stand
@@ -45,3 +48,19 @@ def test_twenty_faults_leave_every_state_true(stand: Stand) -> None:
     found: list[Row] = [*struck, *damage.rows(stand, FILES)]
     assert len(found) >= 20
     assert [f"{row.fault}: {row.verdict}" for row in found if row.verdict != TRUE] == []
+
+
+def test_nobody_waits_longer_than_told_for_a_server_that_hangs(tmp_path: Path) -> None:
+    """A fault of three seconds would last for minutes."""
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        stand = Stand(tmp_path, http=httpx2.Client(base_url=f"http://127.0.0.1:{silent.getsockname()[1]}"))
+        began = time.monotonic()
+        with stand.giving_up(0.2):
+            assert stand.ask("GET", "/v1/me")[0] == 0
+        assert time.monotonic() < began + 5.0
+
+
+def test_the_table_names_what_was_not_tried(tmp_path: Path) -> None:
+    row = Row("a fault", "kill", "succeeded", 1.0, TRUE)
+    assert table.write(tmp_path / "faults.md", [row], ["the server paused for 3 s"]) == 0
+    assert "groups not tried, 1: the server paused for 3 s" in (tmp_path / "faults.md").read_text()

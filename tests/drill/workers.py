@@ -68,7 +68,7 @@ def rows(stand: Stand, adopted: bool) -> Iterator[Row]:
     found = []
     truths = [Truth(run, _states(blow, adopted)) for blow, run in zip(all_, runs, strict=True)]
     for truth, (seen, seconds) in zip(truths, judge.settled(stand, truths, since), strict=True):
-        found.append((truth, seen, seconds, judge.verdict(stand, truth, seen)))
+        found.append((truth, seen, seconds, judge.verdict(stand, truth, seen, seconds)))
     stand.again()
     whose = "adopted" if adopted else "own"
     for blow, (truth, seen, seconds, wrong) in zip(all_, found, strict=True):
