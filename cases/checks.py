@@ -81,6 +81,8 @@ def _materials(case: Case) -> Iterator[Problem]:
             for key in ("eos", "spall"):
                 if made.strength.own_pressure and getattr(made, key) is not None:
                     yield problem(("materials", name, key), ..., f"{made.strength.model} has its own; remove the key")
+            if made.strength.linear_pressure and made.eos is not None:
+                yield problem(("materials", name, "eos"), ..., "what dilates has the linear pressure; remove the table")
             for key, value, message in made.strength.problems():
                 yield problem(("materials", name, "strength", key), value, message)
 

@@ -53,6 +53,9 @@ FLOW = 17
 """Flow stress of the last plastic step, Pa (the next one's first guess)."""
 BULKING = 17
 """The same row in Johnson-Holmquist's law: the pressure of its bulking, Pa."""
+DILATION = 17
+"""The same row in Mohr-Coulomb's law: the volume strain of its plastic flow in the last step; below
+zero once the nodes know of it (averaged pressure forms)."""
 TEMPERATURE = 18
 """K."""
 DAMAGE = 19

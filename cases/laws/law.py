@@ -28,6 +28,11 @@ class Law(Model):
     """Whether the law has an equation of state, and a tension cut-off, of its own."""
 
     @property
+    def linear_pressure(self) -> bool:
+        """Whether only the linear pressure of the elasticity goes with it."""
+        return False
+
+    @property
     def melting(self) -> float:
         """Temperature from which on nothing is left of the strength, K; none by default."""
         return math.inf

@@ -20,8 +20,8 @@ def _acute(angle: float) -> float:
 class MohrCoulomb(Law):
     """Brittle strength (s1 - s3) + (s1 + s3) sin(friction_angle) <= 2 cohesion cos(friction_angle), s1 >= s2 >= s3.
 
-    Tension is positive. Flow keeps the volume: there is no dilation. Tension beyond the apex takes the deviatoric
-    stress and leaves the pressure as it is.
+    Tension is positive. Flow keeps the volume, but for a dilation that is asked for. Tension beyond the apex takes the
+    deviatoric stress and leaves the pressure as it is.
     """
 
     model: Literal["mohr_coulomb"]
@@ -30,6 +30,9 @@ class MohrCoulomb(Law):
     """Shear strength without pressure."""
     friction_angle: Annotated[Angle, AfterValidator(_acute)]
     """How fast strength grows with pressure: ``"55 deg"``, at least 0 and below 90 deg."""
+    dilation_angle: Annotated[Angle, AfterValidator(_acute)] = 0.0
+    """psi: flow lets the volume grow by sin(psi) of its shear, until it fails; at most the friction angle. 0 keeps the
+    volume, the friction angle makes the flow associated. Needs the linear pressure: no table ``eos``."""
     strength_cap: Annotated[Stress, Positive] | None = None
     """Largest s1 - s3, however high the pressure; none by default."""
     failure_strain: Annotated[Ratio, Positive] | None = None
@@ -41,11 +44,18 @@ class MohrCoulomb(Law):
 
     nanoseconds: ClassVar[float] = 60.0
 
+    @property
+    def linear_pressure(self) -> bool:
+        return self.dilation_angle > 0.0
+
     def flow_stress(self) -> float:
         free = 2.0 * self.cohesion * math.cos(self.friction_angle) / (1.0 - math.sin(self.friction_angle))
         return min(free, self.strength_cap or math.inf)
 
     def problems(self) -> Iterator[Wrong]:
+        if self.dilation_angle > self.friction_angle:
+            message = f"must not be above {self.friction_angle:g} rad, the friction angle: flow would give work"
+            yield "dilation_angle", self.dilation_angle, message
         for key in ("cohesion", "friction_angle"):
             value, intact = getattr(self, f"residual_{key}"), getattr(self, key)
             here = f"residual_{key}"

@@ -157,16 +157,18 @@ def perturbed(mesh: TetMesh, size: float, seed: int) -> TetMesh:
     return TetMesh(points + move, mesh.tets)
 
 
-def random(body: Box | Plate, seed: int) -> TetMesh:
+def random(body: Box | Plate, seed: int, straight: float = 0.0) -> TetMesh:
     """One layer of prisms of three tets on a Delaunay triangulation of points without any order.
 
     The points of a grid are thrown half an element to either side, then moved to the means of their neighbours, ten
-    times. The border keeps its grid, in whose corners no triangle has all its corners on the border.
+    times. The border keeps its grid, in whose corners no triangle has all its corners on the border. So does the line
+    y = 0 up to x = ``straight``, m: a slit along it is smooth.
     """
     (x_low, y_low, z_low), (x_high, y_high, z_high) = bounds(body) or ((0.0,) * 3, (0.0,) * 3)
     lines = [np.linspace(a, b, divisions(b - a, body.element_size) + 1) for a, b in ((x_low, x_high), (y_low, y_high))]
     grid = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 2)
     inside = ((grid > [x_low, y_low]) & (grid < [x_high, y_high])).all(axis=1)
+    inside &= (np.abs(grid[:, 1]) > 0.1 * body.element_size) | (grid[:, 0] > straight)
     grid[inside] += np.random.default_rng(seed).uniform(-0.5, 0.5, (inside.sum(), 2)) * body.element_size
     near = 0.4 * body.element_size
     grid[inside] = np.clip(grid[inside], [x_low + near, y_low + near], [x_high - near, y_high - near])
@@ -197,6 +199,10 @@ class Plan:
     seed: int | None = None
     words: tuple[str, ...] = ()
     """Overrides of the case."""
+    text: str = ""
+    """The case itself, where it is neither shipped nor of this file."""
+    straight: bool = False
+    """Whether the slit of a ``random`` mesh is smooth: else it follows the facets."""
 
     @property
     def name(self) -> str:
@@ -208,8 +214,8 @@ class Plan:
 
 def prepared(plan: Plan) -> tuple[Case, TetMesh]:
     """The case, and its mesh with the slit. A plate is one element thick."""
-    shipped = {"strip": STRIP, "bar": BAR}
-    data = load.toml_data(shipped[plan.case]) if plan.case in shipped else load.read_data(load.shipped_path(plan.case))
+    text = plan.text or {"strip": STRIP, "bar": BAR}.get(plan.case)
+    data = load.toml_data(text) if text else load.read_data(load.shipped_path(plan.case))
     words = ["run.frames=0", f"parts[0].mesh.element_size={plan.size}", *plan.words]
     if data["parts"][0]["mesh"]["shape"] == "plate":
         words.append(f"parts[0].mesh.thickness={plan.size}")
@@ -217,7 +223,8 @@ def prepared(plan: Plan) -> tuple[Case, TetMesh]:
     body = case.parts[0].mesh
     assert isinstance(body, Box | Plate)
     if plan.kind == "random":
-        mesh = check(random(body, plan.seed or 0))
+        smooth = body.slit.high[1] if body.slit is not None and plan.straight else 0.0
+        mesh = check(random(body, plan.seed or 0, smooth))
     else:
         mesh = build.build(body.model_copy(update={"generator": plan.kind, "slit": None}), Path())
         if plan.seed is not None:

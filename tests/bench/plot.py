@@ -43,17 +43,19 @@ def speed_and_error(answers: Sequence[Answer], path: Path, limits: dict[tuple[st
     plt.close(figure)
 
 
-def paths(runs: Sequence[Run], path: Path) -> None:
-    """The open facets of plates with a slit, a panel a mesh, coloured by when they opened, as a PNG."""
-    figure, axes = plt.subplots(
-        -(-len(runs) // 3), 3, figsize=(10, 4.6), sharex=True, sharey=True, layout="constrained"
-    )
+def paths(runs: Sequence[Run], path: Path, across: tuple[float, float] = (-20, 20)) -> None:
+    """The open facets of plates with a slit, a panel a mesh, coloured by when they opened, as a PNG.
+
+    ``across``: from which y to which, mm.
+    """
+    size = 10, 2.4 + 0.055 * (across[1] - across[0])
+    figure, axes = plt.subplots(-(-len(runs) // 3), 3, figsize=size, sharex=True, sharey=True, layout="constrained")
     for ax, run in zip(axes.ravel(), runs, strict=False):
         crack = run.crack
         x, y = 1e3 * crack.centre[:, 0], 1e3 * crack.centre[:, 1]
         dots = ax.scatter(x, y, c=1e6 * crack.time, s=5, cmap="viridis", vmin=14, vmax=80)
         ax.plot([0, 1e3 * crack.begin], [0, 0], color="black", linewidth=1)
-        ax.set(title=run.plan.name, xlim=(40, 1e3 * crack.end), ylim=(-20, 20), aspect="equal")
+        ax.set(title=run.plan.name, xlim=(40, 1e3 * crack.end), ylim=across, aspect="equal")
         ax.title.set_fontsize(10)
     figure.supxlabel("x, mm", fontsize=10)
     figure.supylabel("y, mm", fontsize=10)

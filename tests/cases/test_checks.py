@@ -194,6 +194,7 @@ def test_melting_lies_above_the_reference_temperature() -> None:
         ("friction_angle='55 deg', failure_strain=1, residual_cohesion=11", "residual_cohesion", "above 10 Pa"),
         ("friction_angle='20 deg', failure_strain=1, residual_friction_angle='30 deg'", "residual_friction_angle",
          "above 0.349066 rad"),
+        ("friction_angle='20 deg', dilation_angle='21 deg'", "dilation_angle", "above 0.349066 rad, the friction"),
         ("friction_angle='20 deg', strength_cap=0", "strength_cap", "greater than 0"),
     ],
 )  # fmt: skip
@@ -202,3 +203,11 @@ def test_brittle_strength(law: str, key: str, message: str) -> None:
     found = said(f"materials.m={{density=1, elastic={{young=1, poisson=0}}, strength={strength}}}")
     assert list(found) == [f"materials.m.strength.{key}"]
     assert message in found[f"materials.m.strength.{key}"]
+
+
+def test_what_dilates_has_the_linear_pressure() -> None:
+    strength = "{model='mohr_coulomb', cohesion=10, friction_angle='20 deg', dilation_angle='5 deg'}"
+    eos = "{model='mie_gruneisen', c0=1, S=1, gamma0=1}"
+    found = said(f"materials.m={{density=1, elastic={{young=1, poisson=0}}, strength={strength}, eos={eos}}}")
+    assert list(found) == ["materials.m.eos"]
+    assert "linear pressure" in found["materials.m.eos"]

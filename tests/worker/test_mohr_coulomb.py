@@ -1,7 +1,6 @@
 """The Mohr-Coulomb return against its conditions, closed forms and strengths (H19 of the hard cases)."""
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,19 +10,9 @@ from conoid.worker.mesh.model import TetMesh
 from conoid.worker.state import CHUNK, PLASTIC_STRAIN, PRESSURE, WORK, WORK_PLASTIC
 
 from . import formulas
+from .brittle import BULK, DT, PHI, SHEAR, C, brittle, free, random_deviators, rotations, stretched
 from .kernels import FORMS, GLASS, Form, Patch
 from .meshes import REGULAR, Floats, block
-
-SHEAR, BULK = 72e9 / 2.44, 72e9 / 1.68
-DT = 1e-7
-C, PHI = 0.158e9, math.radians(54.9)
-
-
-def brittle(cohesion: float = C, angle: float = PHI, **keys: Any) -> materials.Material:
-    """Glass with this strength."""
-    law = materials.MohrCoulomb(model="mohr_coulomb", cohesion=cohesion, friction_angle=angle, **keys)
-    return materials.Material(density=2500.0, elastic=GLASS.elastic, strength=law)
-
 
 LAWS = {
     "glass": brittle(strength_cap=3.6e9),
@@ -31,34 +20,6 @@ LAWS = {
     "tresca": brittle(0.5e9, 0.0),
     "steep": brittle(1e6, math.radians(89.0), strength_cap=2e9),
 }
-
-
-def free(n: int, material: materials.Material, s: Floats, pressure: Floats | float) -> Patch:
-    """``n`` regular tets at rest with deviators (n, 3, 3) and pressures, Pa."""
-    points = np.tile(REGULAR, (n, 1))
-    patch = Patch(TetMesh(points, np.arange(4 * n, dtype=np.int32).reshape(n, 4)), material)
-    patch.deviator = s
-    patch.put(PRESSURE, pressure)
-    return patch
-
-
-def rotations(n: int, random: np.random.Generator) -> Floats:
-    return np.asarray(np.linalg.qr(random.normal(size=(n, 3, 3)))[0])
-
-
-def random_deviators(n: int, random: np.random.Generator) -> Floats:
-    """Von Mises stresses from 10 MPa to 100 GPa, any directions.
-
-    Every third has two equal principal values, every fifth two nearly equal ones, every seventh lies along the axes.
-    """
-    values = random.normal(size=(n, 3))
-    third, fifth = np.arange(n) % 3 == 0, np.arange(n) % 5 == 0
-    values[third, 1] = values[third, 0]
-    values[fifth, 1] = values[fifth, 0] * (1.0 + 10.0 ** random.uniform(-16.0, -6.0, fifth.sum()))
-    q = rotations(n, random)
-    q[np.arange(n) % 7 == 0] = np.eye(3)
-    s = formulas.deviator(np.einsum("nij,nj,nkj->nik", q, values, q))
-    return s * (10.0 ** random.uniform(7.0, 11.0, n) / formulas.mises(s))[:, None, None]
 
 
 def excess(s: Floats, pressure: Floats | float, law: materials.MohrCoulomb) -> Floats:
@@ -155,13 +116,6 @@ def test_a_stress_gives_the_same_bits_in_any_place(length: int) -> None:
     for kind in range(kinds):
         alike = rows[chosen == kind].view(np.int64)
         assert (alike == alike[0]).all()
-
-
-def stretched(patch: Patch, L: Floats, dt: float = DT) -> None:
-    """A step with the velocity gradient L (3, 3), 1/s, about the mesh as it was at the start."""
-    patch.nodes.x[:] = patch.sim.model.nodes.x0
-    patch.strain(L, dt)
-    patch.advance(dt)
 
 
 @pytest.mark.parametrize("form", FORMS)

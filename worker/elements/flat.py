@@ -8,9 +8,9 @@ that. With its own pressure it resists as in the ``standard`` form; the few of t
 import numpy as np
 
 from ..jit import njit
-from ..materials.law import BULK, DENSITY
+from ..materials.law import BULK, DENSITY, DILATES
 from ..mesh.faces import FACES, normals
-from ..state import CHUNK, HEAT, MASS, TOLD, Block, Flags, Floats
+from ..state import CHUNK, DILATION, HEAT, MASS, TOLD, Block, Flags, Floats
 from .pressure import STABILISE
 from .tet4 import CHANGE, SEEN, VOLUME, VOLUME_MID
 
@@ -18,7 +18,7 @@ THINNEST = 0.1
 """Smallest altitude over longest edge of a tet whose volume strain is averaged; 0.82 for a regular tet. Chosen: what
 strains its neighbours by a tenth closes it (docs/numerics.md)."""
 
-_HEAT, _TOLD, _MASS = HEAT * CHUNK, TOLD * CHUNK, MASS * CHUNK
+_HEAT, _TOLD, _MASS, _GROWN = HEAT * CHUNK, TOLD * CHUNK, MASS * CHUNK, DILATION * CHUNK
 
 
 def flat_tets(block: Block, x0: Floats) -> Flags:
@@ -54,6 +54,8 @@ def see_own(w, s, params, flat, rows, n):  # type: ignore[no-untyped-def]
     for i in range(n):
         if flat[i]:
             w[SEEN + i] = w[CHANGE + i] / (w[VOLUME + i] - 0.5 * w[CHANGE + i])
+            if params[DILATES] > 0.0:
+                w[SEEN + i] += s[_GROWN + i]  # what ``tell_dilation`` has taken back
             if rows > TOLD:
                 s[_HEAT + i] = unit * s[_TOLD + i] / s[_MASS + i]
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..jit import njit
 from ..materials.law import BULK, DENSITY
-from ..state import CHUNK, HEAT, MASS, TOLD, VOLUME_FLUX, WORK, WORK_VISCOUS, Floats, Ints
+from ..state import CHUNK, DILATION, HEAT, MASS, PRESSURE, TOLD, VOLUME_FLUX, WORK, WORK_VISCOUS, Floats, Ints
 from .tet4 import CHANGE, DILATATION, EDGE, NODAL, SEEN, SPEED, VOLUME, VOLUME_MID, largest_of, quanta
 
 QUANTA = float(2**52)
@@ -25,6 +25,7 @@ QUANTA = float(2**52)
 
 _FLUX, _MASS = VOLUME_FLUX * CHUNK, MASS * CHUNK
 _WORK, _WORK_VISCOUS, _HEAT, _TOLD = WORK * CHUNK, WORK_VISCOUS * CHUNK, HEAT * CHUNK, TOLD * CHUNK
+_P, _GROWN = PRESSURE * CHUNK, DILATION * CHUNK
 STABILISE = NODAL
 """Rows of the scratch: the four stabilising volume fluxes, m^3/s."""
 _PROJECTED = NODAL + 4 * CHUNK
@@ -38,6 +39,24 @@ def keep_flux(w, s, n):  # type: ignore[no-untyped-def]
     """Keeps the tet's own volume flux, m^3/s, for the second pass over the elements."""
     for i in range(n):
         s[_FLUX + i] = w[DILATATION + i] * w[VOLUME_MID + i]
+
+
+@njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
+def tell_dilation(w, s, params, n, dt):  # type: ignore[no-untyped-def]
+    """Hands the dilation of the last step to the nodes: what they take from it is what the pressure sees, not the own.
+
+    The law has put its own share into the pressure at once, so that the stress is on the surface; that is taken back
+    here, with its work. DILATATION is from now on that of the elastic strain.
+    """
+    if dt <= 0.0:
+        return
+    bulk, frequency = params[BULK], 1.0 / dt
+    for i in range(n):
+        grown = s[_GROWN + i]
+        s[_P + i] -= bulk * grown
+        s[_WORK + i] -= 0.5 * bulk * grown * s[_FLUX + i] * dt
+        s[_GROWN + i] = 0.0 - grown
+        w[DILATATION + i] -= grown * frequency
 
 
 @njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")

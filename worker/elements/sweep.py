@@ -14,7 +14,7 @@ Chunks at rest, which no wave has reached, are passed over (rest.py).
 from ..jit import njit
 from ..materials.elastic import deviatoric_work, predict
 from ..materials.hyperelastic import stiffen
-from ..materials.law import AFTER_PRESSURE, BEFORE_PRESSURE, FROM_SHAPE, ORDER, Q_LINEAR, Q_QUADRATIC, SHEAR
+from ..materials.law import AFTER_PRESSURE, BEFORE_PRESSURE, DILATES, FROM_SHAPE, ORDER, Q_LINEAR, Q_QUADRATIC, SHEAR
 from ..materials.models import press, strengthen
 from ..materials.viscosity import bulk_viscosity
 from ..state import CHUNK, TOLD
@@ -198,6 +198,8 @@ def strain_pass(  # type: ignore[no-untyped-def]
         if len(upset) > 0:
             let_go(w, s, upset, x, v, t, rows, n, dt)
         averaged.keep_flux(w, s, n)
+        if params[DILATES] > 0.0:
+            averaged.tell_dilation(w, s, params, n, dt)
         if len(flat) > 0:
             keep_out(w, flat[c * CHUNK : c * CHUNK + n], n)
         if rows > TOLD:

@@ -10,10 +10,10 @@ from typing import Any
 
 from ..state import Floats
 
-DENSITY, BULK, SHEAR, Q_LINEAR, Q_QUADRATIC, ORDER, SPALL = range(7)
+DENSITY, BULK, SHEAR, Q_LINEAR, Q_QUADRATIC, ORDER, SPALL, DILATES = range(8)
 """Places in a block's constants: what every material has. ORDER says when its law acts; SPALL is infinite where the
-material names none."""
-EQUATION, FIRST, SIZE = 7, 12, 40
+material names none; DILATES is the sine of the dilation angle, zero where flow keeps the volume."""
+EQUATION, FIRST, SIZE = 8, 13, 40
 """Where the constants of the equation of state and of the law begin, and how many there is room for."""
 FROM_SHAPE, BEFORE_PRESSURE, AFTER_PRESSURE = range(3)
 """When a law acts: it makes the deviatoric stress from the undeformed shape; it returns the trial stress, before the
@@ -37,6 +37,8 @@ class Law:
     kernel: Any
     equation: str = ""
     """Name of the equation of state that the law brings; else that of the material holds."""
+    dilates: Callable[[Any], float] = lambda _: 0.0
+    """Sine of the dilation angle, from its table; above zero the law keeps row DILATION."""
 
 
 @dataclass(frozen=True)

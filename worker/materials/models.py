@@ -15,7 +15,22 @@ from .. import state
 from ..jit import njit
 from ..state import Floats
 from . import equation_of_state, hyperelastic, johnson_cook, johnson_holmquist, mohr_coulomb, plastic
-from .law import BULK, DENSITY, EQUATION, FIRST, ORDER, Q_LINEAR, Q_QUADRATIC, SHEAR, SIZE, SPALL, Equation, Law, placed
+from .law import (
+    BULK,
+    DENSITY,
+    DILATES,
+    EQUATION,
+    FIRST,
+    ORDER,
+    Q_LINEAR,
+    Q_QUADRATIC,
+    SHEAR,
+    SIZE,
+    SPALL,
+    Equation,
+    Law,
+    placed,
+)
 
 LAWS = (hyperelastic.LAW, plastic.LAW, johnson_cook.LAW, mohr_coulomb.LAW, johnson_holmquist.LAW)
 EQUATIONS = (equation_of_state.ELASTIC, equation_of_state.GRUNEISEN, johnson_holmquist.PRESSURE_LAW)
@@ -83,6 +98,7 @@ def parameters(material: Material, viscosity: Viscosity | None) -> Floats:
     params[DENSITY], params[ORDER] = material.density, law.order
     params[SPALL] = math.inf if material.spall is None else material.spall
     params[BULK], params[SHEAR] = moduli(material)
+    params[DILATES] = law.dilates(material.strength)
     if viscosity is not None:
         params[Q_LINEAR], params[Q_QUADRATIC] = viscosity.linear, viscosity.quadratic
     placed(params, EQUATION, equation_of(material).constants(material.eos), FIRST - EQUATION)

@@ -1,6 +1,7 @@
-"""Mohr-Coulomb strength of brittle materials with flow at constant volume: the deviator returns at the given pressure.
+"""Mohr-Coulomb strength of brittle materials: the deviator returns at the given pressure, or with dilation.
 
 f = (s1 - s3) + (s1 + s3) sin(phi) - 2 c cos(phi) <= 0 with s1 >= s2 >= s3, tension positive, and s1 - s3 <= cap.
+Flow keeps the volume, or is along the same form with the dilation angle psi instead of phi, and the pressure rises.
 Derived in docs/numerics.md. The steps of the return are inlined by force: as calls they take three times as long.
 """
 
@@ -10,10 +11,23 @@ import numpy as np
 
 from conoid.cases.laws.mohr_coulomb import MohrCoulomb
 
-from ..elements.tet4 import D_XX, D_XY, D_YY, D_YZ, D_ZX, D_ZZ, TRIAL, VOLUME_MID
+from ..elements.tet4 import CHANGE, D_XX, D_XY, D_YY, D_YZ, D_ZX, D_ZZ, SEEN, TRIAL, VOLUME_MID
 from ..jit import njit
-from ..state import CHUNK, PLASTIC_STRAIN, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, WORK_PLASTIC
-from .law import AFTER_PRESSURE, FIRST, SHEAR, Law
+from ..state import (
+    CHUNK,
+    DILATION,
+    PLASTIC_STRAIN,
+    PRESSURE,
+    S_XX,
+    S_XY,
+    S_YY,
+    S_YZ,
+    S_ZX,
+    S_ZZ,
+    WORK,
+    WORK_PLASTIC,
+)
+from .law import AFTER_PRESSURE, BULK, DILATES, FIRST, SHEAR, Law
 from .plastic import equivalent_stress
 
 _SINE, _COHESION, _CAP, _FAILURE = FIRST, FIRST + 1, FIRST + 4, FIRST + 5
@@ -22,6 +36,7 @@ _RESIDUAL = 2
 _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _P, _STRAIN, _WORK = PRESSURE * CHUNK, PLASTIC_STRAIN * CHUNK, WORK_PLASTIC * CHUNK
+_WHOLE_WORK, _GROWN = WORK * CHUNK, DILATION * CHUNK
 _THIRD, _TWO_THIRDS = 1.0 / 3.0, 2.0 / 3.0
 _MISES = 2.0 / 3.0**0.5
 """Largest s1 - s3 at a von Mises stress of one, in pure shear."""
@@ -85,6 +100,51 @@ def returned(d1, d2, d3, strength, sine, cap):  # type: ignore[no-untyped-def]
 
 
 @njit(
+    "UniTuple(float64, 4)(float64, float64, float64, float64, float64, float64, float64, float64, float64)",
+    cache=True,
+    error_model="numpy",
+    forceinline=True,
+)
+def dilated(d1, d2, d3, strength, sine, cap, psi, shear2, bulk):  # type: ignore[no-untyped-def]
+    """As ``returned`` with flow along (1 + psi, 0, psi - 1), which lets the volume and so the pressure and the strength
+    grow; psi is the sine. With the new values how much flow there was: the volume strain is 2 psi of it.
+
+    The cap comes first, at constant volume. Where nothing is left of the deviator, flow ends.
+    """
+    d1, d2, d3 = returned(d1, d2, d3, np.inf, sine, cap)
+    up, down, stiff = 1.0 + psi * _THIRD, 1.0 - psi * _THIRD, 4.0 * bulk * sine * psi
+    flow = ((1.0 + sine) * d1 - (1.0 - sine) * d3 - strength) / (2.0 * shear2 * (1.0 + sine * psi * _THIRD) + stiff)
+    if flow <= 0.0:
+        return d1, d2, d3, 0.0
+    e1, e2, e3 = d1 - shear2 * up * flow, d2 + shear2 * _TWO_THIRDS * psi * flow, d3 + shear2 * down * flow
+    if e1 < e2:
+        half = 0.5 * (3.0 - sine)
+        flow = min((-half * d3 - strength) / (half * down * shear2 + stiff), -d3 / (shear2 * down))
+        low = max(-0.5 * (d3 + shear2 * down * flow), 0.0)
+        return low, low, -2.0 * low, flow
+    if e3 > e2:
+        half = 0.5 * (3.0 + sine)
+        flow = min((half * d1 - strength) / (half * up * shear2 + stiff), d1 / (shear2 * up))
+        high = max(0.5 * (d1 - shear2 * up * flow), 0.0)
+        return 2.0 * high, -high, -high, flow
+    return e1, e2, e3, flow
+
+
+@njit("void(float64[::1], float64[::1], int64, float64, float64, float64)", cache=True, error_model="numpy",
+      forceinline=True)  # fmt: skip
+def grow(w, s, i, grown, told, bulk):  # type: ignore[no-untyped-def]
+    """Adds a plastic volume strain to the pressure of tet ``i``: its work is that of the mean pressure of the step.
+
+    ``told`` is the strain of the step before that the averaged forms have taken back from the old pressure.
+    """
+    more = bulk * grown
+    s[_P + i] += more
+    s[_GROWN + i] = grown
+    s[_WHOLE_WORK + i] -= 0.5 * more * w[CHANGE + i]
+    s[_WORK + i] -= w[VOLUME_MID + i] * grown * (s[_P + i] + 0.5 * (bulk * (w[SEEN + i] + told) - more))
+
+
+@njit(
     "UniTuple(float64, 6)(float64, float64, float64, float64, float64, float64, "
     "float64, float64, float64, float64, float64, float64)",
     cache=True,
@@ -122,9 +182,12 @@ def mohr_coulomb(w, s, params, n, dt):  # type: ignore[no-untyped-def]
     the elastic energy of the stress, also where the strength itself falls, by a release of pressure or by failure.
     """
     equivalent_stress(w, s, n)
-    shear2, cap = 2.0 * params[SHEAR], params[_CAP]
+    shear2, cap, dilates = 2.0 * params[SHEAR], params[_CAP], params[DILATES] > 0.0
     for i in range(n):
-        k = _RESIDUAL if s[_STRAIN + i] > params[_FAILURE] else 0
+        k, told = _RESIDUAL if s[_STRAIN + i] > params[_FAILURE] else 0, 0.0
+        if dilates:
+            told = max(-s[_GROWN + i], 0.0)
+            s[_GROWN + i] = 0.0
         sine = params[_SINE + k]
         strength = params[_COHESION + k] + 2.0 * sine * s[_P + i]
         q = w[TRIAL + i]
@@ -136,7 +199,11 @@ def mohr_coulomb(w, s, params, n, dt):  # type: ignore[no-untyped-def]
         sxx, syy, szz = r * (s[_SXX + i] - mean), r * (s[_SYY + i] - mean), r * (s[_SZZ + i] - mean)
         syz, szx, sxy = r * s[_SYZ + i], r * s[_SZX + i], r * s[_SXY + i]
         d1, d2, d3 = principal(sxx, syy, szz, syz, szx, sxy)
-        e1, e2, e3 = returned(d1, d2, d3, max(r * strength, 0.0), sine, r * cap)
+        if dilates and k == 0:
+            e1, e2, e3, flow = dilated(d1, d2, d3, r * strength, sine, r * cap, params[DILATES], shear2, params[BULK])
+            grow(w, s, i, 2.0 * params[DILATES] * q * flow, told, params[BULK])
+        else:
+            e1, e2, e3 = returned(d1, d2, d3, max(r * strength, 0.0), sine, r * cap)
         if e1 == d1:
             continue
         nxx, nyy, nzz, nyz, nzx, nxy = with_values(sxx, syy, szz, syz, szx, sxy, d1, d2, d3, e1, e2, e3)
@@ -171,5 +238,12 @@ def _sine_and_cohesion(cohesion: float, angle: float) -> tuple[float, float]:
     return math.sin(angle), 2.0 * cohesion * math.cos(angle)
 
 
-LAW = Law("mohr_coulomb", AFTER_PRESSURE, lambda _: WORK_PLASTIC + 1, _constants, lambda *_: {}, mohr_coulomb)
+def _rows(law: MohrCoulomb) -> int:
+    return (DILATION if law.dilation_angle else WORK_PLASTIC) + 1
+
+
+LAW = Law(
+    "mohr_coulomb", AFTER_PRESSURE, _rows, _constants, lambda *_: {}, mohr_coulomb,
+    dilates=lambda law: math.sin(law.dilation_angle),
+)  # fmt: skip
 """Beyond the apex nothing is left of the deviator; the pressure of tension stays, to be broken by facets."""

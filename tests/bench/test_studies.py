@@ -1,0 +1,37 @@
+"""The studies of single scenes: their cases are read, their meshes are what their tables say."""
+
+import numpy as np
+import pytest
+
+from . import kalthoff
+from .cracks import Crack, Run, prepared
+
+
+def test_a_random_plate_has_a_smooth_slit_of_the_length_that_is_asked_for() -> None:
+    """Its sides are doubled nodes, all on y = 0, which the tets nowhere cross; the tip holds."""
+    plan = kalthoff.plan("random", 2.5e-3, 1)
+    _, mesh = prepared(plan)
+    _, where, count = np.unique(mesh.points.round(9), axis=0, return_index=True, return_counts=True)
+    doubled = mesh.points[where[count > 1]]
+    assert (doubled[:, 1] == 0.0).all()
+    assert len(doubled) == 2 * 20
+    assert doubled[:, 0].max() == pytest.approx(kalthoff.TIP - plan.size)
+    y = mesh.points[mesh.tets, 1]
+    crossing = (y.min(axis=1) < -1e-9) & (y.max(axis=1) > 1e-9)
+    assert mesh.points[mesh.tets[crossing], 0].mean(axis=1).min() > kalthoff.TIP
+
+
+def test_the_angle_and_the_speed_of_a_crack_that_is_known() -> None:
+    """Facets along 65 degrees from the tip of the slit, at 1.5 km/s from 20 us on, and some from the far side."""
+    r, turned = np.linspace(0.5e-3, 60e-3, 60), np.radians(65.0)
+    centre = np.column_stack([kalthoff.TIP + r * np.cos(turned), r * np.sin(turned), 0.0 * r])
+    far = np.array([[90e-3, -20e-3, 0.0]] * 5)
+    crack = Crack(1e-3, kalthoff.TIP, 0.1, np.arange(65), np.concatenate([centre, far]), np.ones(65),
+                  np.concatenate([20e-6 + r / 1500.0, np.full(5, 50e-6)]))  # fmt: skip
+    case, _ = prepared(kalthoff.plan("structured", 2.5e-3))
+    path = kalthoff.Path(Run(kalthoff.plan("structured", 1e-3), case, 0, crack, None, 0, 0, 0.0, 0.0))  # type: ignore[arg-type]
+    assert path.angle(1.0) == pytest.approx(65.0)
+    assert path.angle(20e-3) == pytest.approx(65.0)
+    assert path.speed == pytest.approx(1500.0)
+    assert path.reach == pytest.approx(60e-3)
+    assert path.share == pytest.approx(60 / 65)
