@@ -10,6 +10,7 @@ from conoid.worker.mesh.model import TetMesh
 from conoid.worker.probes import tet_volumes
 from conoid.worker.simulation import Simulation
 
+from .brittle import brittle, stretched
 from .kernels import COPPER, COPPER_GAS, Form, Patch, build, run, scene
 from .meshes import Floats, block
 from .simulations import on
@@ -62,6 +63,24 @@ def test_a_flat_tet_is_not_crushed(form: Form, aspect: float, seed: int) -> None
     volume, residual = lowest(form, aspect, 200.0, seed)
     assert volume > lowest("standard", aspect, 200.0, seed)[0] - 0.02
     assert residual < 1e-4
+
+
+@pytest.mark.parametrize("form", AVERAGED)
+def test_a_flat_tet_dilates_as_in_the_standard_form(form: Form) -> None:
+    """Sheared under pressure; its nodes take no share of what it dilates."""
+    corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.3, 0.7, 0.0], [0.3, 0.3, 0.01]])
+    mesh = TetMesh(MM * corners, np.array([[0, 1, 2, 3]], np.int32))
+    found = []
+    for each in (form, "standard"):
+        tet = Patch(mesh, brittle(1e7, 0.7, dilation_angle=0.5), each)
+        tet.put(state.PRESSURE, 1e8)
+        pressures = []
+        for _ in range(6):
+            stretched(tet, np.array([[0.0, 3e3, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, -1e3]]))
+            pressures.append(float(tet.get(state.PRESSURE)[0]))
+        found.append([*pressures, float(tet.get(state.WORK)[0])])
+    assert found[1][5] > found[1][4] > found[1][0]
+    assert np.allclose(found[0], found[1], rtol=1e-6)
 
 
 def test_what_is_flat() -> None:
