@@ -46,10 +46,12 @@ def taken(met: ContactRows, rows: "np.ndarray") -> ContactRows:
 
 
 def moments(out: Floats) -> Floats:
-    """(n, 9) means of n and of n n (xx, yy, zz, yz, zx, xy) of the normals (n, faces, 3) of nodes' faces."""
+    """(n, 12) means of n and of n n (xx, yy, zz, yz, zx, xy) of the normals (n, faces, 3) of nodes' faces, which rise
+    nowhere.
+    """
     squares = np.einsum("nfi,nfj->nij", out, out) / out.shape[1]
     pairs = [squares[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1))]
-    return np.ascontiguousarray(np.column_stack([out.mean(axis=1), *pairs]))
+    return np.ascontiguousarray(np.column_stack([out.mean(axis=1), *pairs, np.zeros((len(out), 3))]))
 
 
 def step_of(x: Floats, v: Floats, part: "np.ndarray", dt: float, mu: Floats | None = None) -> Step:
@@ -85,16 +87,19 @@ def pair_table(pairs: Indices) -> PairTable:
 
 def node_face(
     x: Floats, v: Floats, faces: Indices, pairs: Indices, dt: float, part: "np.ndarray | None" = None,
-    mu: Floats | None = None, out: Floats | None = None,
+    mu: Floats | None = None, out: Floats | None = None, normals: Floats | None = None,
 ) -> ContactRows:  # fmt: skip
     """The nodes that pass a face; the slaves are of another part unless ``part`` says something else.
 
-    ``out`` (n, faces, 3): unit normals of a node's faces, all of one area, zero for a node without faces.
+    ``out`` (n, faces, 3): unit normals of a node's faces, all of one area, zero for a node without faces; or
+    ``normals`` (n, 12), see SlotTable.
     """
     own = np.where(np.isin(np.arange(len(x)), faces), 0, 1) if part is None else part
     room, table, first = ContactRows.room(len(pairs)), pair_table(pairs), np.full(len(x), -1, np.int32)
     table.hang(first, 0)
-    slots = slot_table(first, np.zeros((len(x), 9)) if out is None else moments(out), np.zeros(len(x)), v.copy())
+    if normals is None:
+        normals = np.zeros((len(x), 12)) if out is None else moments(out)
+    slots = slot_table(first, normals, np.zeros(len(x)), v.copy())
     of = face_table(faces, face_sizes(x, faces), np.zeros(len(faces)))
     found, tested, _ = face_kernels.node_face(room, 0, table.arrays(), slots, of, step_of(x, v, own, dt, mu), 0.0)
     assert tested == len(pairs)

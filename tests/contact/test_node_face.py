@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from conoid.worker.contact import search
+from conoid.worker.contact import normals, search
 from conoid.worker.contact.geometry import MARGIN
 from conoid.worker.contact.narrow_phase import DEEP, DEEP_SELF, NEAR, PUSH_OUT, ContactRows
 from conoid.worker.contact.node_face import _TOUCHING
 from conoid.worker.contact.search import Things
+from conoid.worker.mesh.faces import FACES
 
 from ..worker.meshes import Floats, block
 from .bodies import Indices, crowd_of, meeting_of, pieces_of, sheet, surface_of
@@ -173,6 +174,31 @@ def test_a_node_meets_what_its_faces_look_at(faces: list[tuple[float, ...]], mee
     out = np.zeros((5, len(faces), 3))
     out[4] = faces
     assert (many(node_face(x, v, FACE, every_pair(np.array([4]), 1), 1.0, out=out)) == 1) == meets
+
+
+FLAKE = np.array([[0.0, 0.0, 0.0], [-0.9, 0.9, 0.3], [-0.2, -0.9, 0.4], [-0.8, -0.7, 0.9]])
+"""A tet whose first corner is its lowest; the cosines of its faces there, -0.82, 0.73 and 0.76, have a mean of 0.25."""
+
+
+@pytest.mark.parametrize(("height", "own"), [(0.01, True), (0.01, False), (-0.01, True), (-0.1, False)])
+def test_the_lowest_corner_of_a_flake_meets_what_it_enters(height: float, own: bool) -> None:
+    """Whatever the mean of its normals, before it is inside and when it is."""
+    x, v = np.concatenate([TRIANGLE, FLAKE + np.array([0.3, 0.3, height])]), np.zeros((8, 3))
+    v[4:, 2] = -0.05
+    sums, faces = np.zeros((8, normals.COLUMNS), np.int64), (FACES + 4).astype(np.int32)
+    normals.add(sums, normals.shares(x, faces, SIZE), faces)
+    part = np.array([0] * 4 + [0 if own else 1] * 4)
+    met = node_face(x, v, FACE, every_pair(np.array([4]), 1), 1.0, part, normals=normals.means(sums))
+    assert many(met) == 1
+
+
+@pytest.mark.parametrize(("height", "own", "meets"), [(0.01, False, True), (0.01, True, False), (-0.1, False, False)])
+def test_a_node_of_another_part_meets_what_it_passes_from_outside(height: float, own: bool, meets: bool) -> None:
+    """Where one of its faces faces the face, though their mean does not, and they do not rise."""
+    x, v, out = np.concatenate([TRIANGLE, [[0.3, 0.3, height]]]), np.zeros((5, 3)), np.zeros((5, 3, 3))
+    v[4, 2], out[4] = -0.05, [(0.6, 0.0, 0.8), (-0.6, 0.0, 0.8), (0.0, 0.8, -0.6)]
+    part = np.array([0] * 4 + [0 if own else 1])
+    assert (many(node_face(x, v, FACE, every_pair(np.array([4]), 1), 1.0, part, out=out)) == 1) == meets
 
 
 def test_a_node_beside_an_acute_edge_is_not_inside() -> None:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..state import Flags, Floats, Indices, Ints, extended
+from .normals import COLUMNS
 from .records import Crowd
 
 
@@ -41,7 +42,7 @@ class SceneSlots:
     first: Indices
     """(slots,) the first pair with a face, -1 for none."""
     normals: Floats
-    """(slots, 9) mean normals; see narrow_phase.SlotTable."""
+    """(slots, COLUMNS) mean normals; see narrow_phase.SlotTable."""
     total: Ints
     """(slots, 3) impulses of the last step, quanta."""
     before: Floats
@@ -53,7 +54,7 @@ class SceneSlots:
         n = len(slave)
         live, new, fresh, tracked, on_surface = np.zeros((5, n), bool)
         first, normals, total, before = (
-            np.full(n, -1, np.int32), np.zeros((n, 9)), np.zeros((n, 3), np.int64), np.zeros((n, 3)),
+            np.full(n, -1, np.int32), np.zeros((n, COLUMNS)), np.zeros((n, 3), np.int64), np.zeros((n, 3)),
         )  # fmt: skip
         return cls(slave, pushes, live, new, fresh, tracked, on_surface, first, normals, total, before)
 

@@ -8,8 +8,9 @@ from ..state import Floats, Ints
 from . import registration
 from .cracks import across
 from .edge_edge import edge_edge
+from .haste import approach
 from .narrow_phase import HASTY, Step
-from .node_face import approach, node_face
+from .node_face import node_face
 from .scene import Scene
 
 _KINEMATIC = 2.0

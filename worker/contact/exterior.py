@@ -14,7 +14,7 @@ from .cracks import Cracks
 from .flight import Flight, typical
 from .scene import Scene
 
-_WORDS = 27
+_WORDS = 9 + 2 * normals.SHARE
 """Of the row of a crack that opens (Exterior.widened)."""
 _NO_SIDES = np.zeros((0, 3), np.int32)
 """Of cracks that may open: none (block, place, face)."""
@@ -34,7 +34,7 @@ class Exterior:
         self.size = typical(self.surface.faces.size, comm)
         """Of the faces of all ranks at the start, m."""
         self.flight = Flight(self.surface, model.nodes, mobilities(model.nodes, bounds), self.size, comm)
-        self._moments = np.zeros((model.nodes.n, 9), np.int64)
+        self._moments = np.zeros((model.nodes.n, normals.COLUMNS), np.int64)
         self._changed = False
         """Whether the surface is another one than that of the last search."""
         self._separated = False
@@ -125,14 +125,14 @@ class Exterior:
             self.flight.refresh(nodes)
 
     def widened(self, rows: Ints) -> Ints:
-        """(k, 27) of the cracks ``rows`` (k,): whether the last search has taken them up; ids of both sides; of the
+        """(k, _WORDS) of the cracks ``rows`` (k,): whether the last search has taken them up; ids of both sides; of the
         nodes of either, outward; and what each side adds to the moments of its nodes.
         """
         if not len(rows):
             return np.zeros((0, _WORDS), np.int64)
         nodes, cracks = self._model.nodes, self.cracks
         sides = cracks.nodes[rows][:, [0, 1, 2, 3, 5, 4]]
-        shares = normals.shares(nodes.x, sides.reshape(-1, 3), self.size).reshape(-1, 18)
+        shares = normals.shares(nodes.x, sides.reshape(-1, 3), self.size).reshape(-1, 2 * normals.SHARE)
         return np.column_stack([cracks.foreseen[rows], cracks.faces[rows], nodes.id[sides], shares])
 
     def open(self, told: Ints, scene: Scene | None) -> bool:
@@ -140,7 +140,7 @@ class Exterior:
         told = told.reshape(-1, _WORDS)
         nodes, sides = self._model.nodes, told[:, 3:9].reshape(-1, 3)
         local = nodes.places(sides)
-        normals.add(self._moments, told[:, 9:].reshape(-1, 9), local)
+        normals.add(self._moments, told[:, 9:].reshape(-1, normals.SHARE), local)
         local = np.unique(local[local >= 0])
         self.surface.flags[local] = True
         faces = np.sort(told[:, 1:3].reshape(-1))

@@ -120,7 +120,8 @@ class SlotTable(NamedTuple):
     """The slots, as nodes that meet faces."""
 
     normals: Floats
-    """(slots, 9) means of n and of n n (xx, yy, zz, yz, zx, xy) of the normals of a node's faces; zero without."""
+    """(slots, 12) means over a node's faces of their normal n, of n n (xx, yy, zz, yz, zx, xy) and of the unit vector
+    to the middle of the other side; zero without."""
     on_surface: Flags
     """(slots,) only these meet faces."""
     first: Indices

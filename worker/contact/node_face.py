@@ -8,13 +8,18 @@ import numpy as np
 
 from ..jit import njit, types
 from .geometry import VECTOR, at, beyond, distance, dot, foot, height, minus, off
-from .narrow_phase import CONTACT_ROWS, DEEP, DEEP_SELF, FACES, NEAR, PAIRS, SLOTS, STEP, altitude, needed
+from .haste import fastest_of, haste
+from .narrow_phase import CONTACT_ROWS, DEEP, DEEP_SELF, FACES, NEAR, PAIRS, SLOTS, STEP, needed
 
 _TOUCHING = 1e-3
 """Of the size of a face: deeper than this, a node is held by the nearest face of that part only."""
 FACING = 0.1
-"""A node faces a face when the cosines of the face's normal and those of its own faces have a mean below this, and
-their mean less their deviation comes below minus this."""
+"""A node faces a face when the cosines of the face's normal and those of its own faces have a mean less deviation below
+minus this, and a mean below it; or when its own faces rise from it, by the sine of the mean slope, by more than this.
+So does a corner of a flake that is the lowest of its tet, whatever the mean of its three normals."""
+_SOME = 0.25
+"""A node of another part that passes a face from outside meets it when the mean less deviation is below minus this:
+then some face of its faces it. Of cosines none of which is negative it is (1 - sqrt(2)) / 2 = -0.207 at least."""
 _ROUND = 0.01
 """Of the size of a face: added to the distance at which a pair may meet."""
 _WORTH = 0.02
@@ -38,18 +43,21 @@ def chain(first, following, pairs, begin):  # type: ignore[no-untyped-def]
 
 @njit(f"UniTuple(float64, 2)({_V2}, int64, {VECTOR})", cache=True)
 def facing(normals, s, m):  # type: ignore[no-untyped-def]
-    """Mean, and mean less deviation, of the cosines of m and the normals of the faces of node s; -1 for one without
-    faces, which faces any.
+    """By how much m has to turn until node s faces a face of this normal (FACING), and until it does or one of its own
+    faces does (_SOME); none, or less, when it does, and -1 for a node without faces, which faces any.
     """
-    mean, square, length = 0.0, 0.0, 0.0
+    mean, square, length, rise = 0.0, 0.0, 0.0, 0.0
     for a in range(3):
         b, c = (a + 1) % 3, (a + 2) % 3
         mean += normals[s, a] * m[a]
+        rise += normals[s, 9 + a] * m[a]
         length += normals[s, a] * normals[s, a]
         square += normals[s, 3 + a] * m[a] * m[a] + 2.0 * normals[s, 6 + a] * m[b] * m[c]
     if length == 0.0:
         return -1.0, -1.0
-    return mean, mean - np.sqrt(max(square - mean * mean, 0.0))
+    least = mean - np.sqrt(max(square - mean * mean, 0.0))
+    turn = max(min(mean - FACING, FACING - rise), 0.5 * (least + FACING))
+    return turn, min(turn, 0.5 * (least + _SOME))
 
 
 @njit(f"float64({_X2}, int64, int64, int64, int64)", cache=True, error_model="numpy")
@@ -63,14 +71,13 @@ def _distance(x, s, i, j, k):  # type: ignore[no-untyped-def]
     return min(off(p, o, a), off(p, a, b), off(p, b, o))
 
 
-@njit(f"float64(float64, float64, {_X2}, int64, int64, int64)", cache=True, error_model="numpy")
-def _bent(mean, least, x, i, j, k):  # type: ignore[no-untyped-def]
-    """Half of the D, m, that a face has to spare before a node faces it (``facing``); none, or less, when it does.
+@njit(f"float64(float64, {_X2}, int64, int64, int64)", cache=True, error_model="numpy")
+def _bent(turn, x, i, j, k):  # type: ignore[no-untyped-def]
+    """Half of the D, m, that a face has to spare until its normal has changed by ``turn``.
 
     The normal of a face of sides e, f and area A changes by less than D (|e| + |f| + D) / A while no two of its corners
     have moved by D against each other.
     """
-    turn = max(mean - FACING, 0.5 * (least + FACING))
     e, f = minus(at(x, j), at(x, i)), minus(at(x, k), at(x, i))
     ee, ff, ef = dot(e, e), dot(f, f), dot(e, f)
     sides = np.sqrt(ee) + np.sqrt(ff)
@@ -141,37 +148,13 @@ def _outside(pairs, first, faces, x, part, p, depth, strayed, end):  # type: ign
     return False
 
 
-@njit(_F(STEP, types.int32[:, ::1], types.int64, types.int64), cache=True)
-def _fastest(step, corners, s, f):  # type: ignore[no-untyped-def]
-    """Square of the largest speed of node s against a corner of face f, m^2/s^2."""
-    most = 0.0
-    for m in range(3):
-        speed = 0.0
-        for i in range(3):
-            speed += (step.v[s, i] - step.v[corners[f, m], i]) ** 2
-        most = max(most, speed)
-    return most
-
-
-@njit(_F(STEP, types.int32[:, ::1], types.int64, types.int64, _F), cache=True, error_model="numpy")
-def _haste(step, corners, s, f, fastest):  # type: ignore[no-untyped-def]
-    """Square of what contact may give to node s or to face f over the least altitude of a tet of theirs, 1/s^2, where
-    they come nearer by more than ``step.hasty`` in a step; else 0. ``fastest``: of them (``_fastest``).
-    """
-    if not fastest * step.beyond**2 > step.hasty**2:
-        return 0.0
-    x, a, b, c, d = step.x, corners[f, 0], corners[f, 1], corners[f, 2], corners[f, 3]
-    one, two = min(altitude(x, a, b, c, d), altitude(x, b, c, d, a)), altitude(x, c, d, a, b)
-    return step.rebound**2 * fastest / min(one, two, altitude(x, d, a, b, c), step.least[s])
-
-
 @njit(
     _F(STEP, types.float64[:, ::1], FACES, types.int64, types.int64, _VECTOR, _F),
     cache=True,
     error_model="numpy",
 )
 def _coming(step, normals, faces, s, f, m, gap):  # type: ignore[no-untyped-def]
-    """``_haste`` of node s and face f if they will meet in a step of ``step.beyond`` after this one; else 0. ``m``,
+    """``haste`` of node s and face f if they will meet in a step of ``step.beyond`` after this one; else 0. ``m``,
     ``gap``: normal of the face, and height over it, m, at the end of this one.
     """
     v, ahead, corners = step.v, step.ahead, faces.corners
@@ -179,8 +162,8 @@ def _coming(step, normals, faces, s, f, m, gap):  # type: ignore[no-untyped-def]
     rate = dot(m, minus(at(v, s), at(v, i)))
     if not gap + step.beyond * rate < 0.0:
         return 0.0
-    mean, least = facing(normals, s, m)
-    if not (mean <= FACING and least <= -FACING):
+    every, some = facing(normals, s, m)
+    if not (every if step.part[s] == step.part[i] else some) <= 0.0:
         return 0.0
     tau = -gap / rate
     p, o = beyond(at(ahead, s), tau, at(v, s)), beyond(at(ahead, i), tau, at(v, i))
@@ -189,7 +172,7 @@ def _coming(step, normals, faces, s, f, m, gap):  # type: ignore[no-untyped-def]
     on, _ = foot(minus(p, o), minus(a, o), minus(b, o))
     if not (on and abs(above) <= DEEP_SELF * faces.size[f]):
         return 0.0
-    return _haste(step, corners, s, f, _fastest(step, corners, s, f))
+    return haste(step, corners, s, f, fastest_of(step, corners, s, f))
 
 
 @njit(_TRIPLE(CONTACT_ROWS, types.int64, PAIRS, SLOTS, FACES, STEP, types.float64), cache=True, error_model="numpy")
@@ -237,18 +220,20 @@ def node_face(out, n, pairs, slots, faces, step, end):  # type: ignore[no-untype
             slack = _distance(ahead, s, i, j, k) - (_ROUND + max(reach, NEAR)) * size[f]
             turned[p] = not slack > _WORTH * size[f]
             if turned[p]:
-                mean, least = facing(normals, s, m)
-                slack = _bent(mean, least, ahead, i, j, k)
+                every, some = facing(normals, s, m)
+                slack = _bent(every if part[s] == part[i] else some, ahead, i, j, k)
                 speed[p] = max(distance(a, b), distance(a, c))
             until[p] = slack - strayed[s] - left[f] + speed[p] * end if slack > _WORTH * size[f] else np.nan
         if not gap1 <= NEAR * size[f]:
             if step.beyond > 0.0:
                 most = max(most, _coming(step, normals, faces, s, f, m, gap1))
             continue
-        mean, least = facing(normals, s, m)
-        if not (mean <= FACING and least <= -FACING):
+        every, some = facing(normals, s, m)
+        if not (every if part[s] == part[i] else some) <= 0.0:
             continue
         gap0, now = height(at(x, s), at(x, i), at(x, j), at(x, k))
+        if not (every <= 0.0 or gap0 >= -NEAR * size[f]):
+            continue
         passes, b = _passes(x, ahead, corners, s, f, now, gap0, gap1, reach * size[f])
         if not passes:
             continue
@@ -277,24 +262,3 @@ def node_face(out, n, pairs, slots, faces, step, end):  # type: ignore[no-untype
         wanted[row] = rate + needed(gap0, gap1, rate, step.give, step.dt)
         out.friction[row], pair[row] = step.mu[part[s], part[i]], p
     return n, tested, np.sqrt(most)
-
-
-@njit(types.float64(CONTACT_ROWS, types.int64, PAIRS, FACES, STEP), cache=True, error_model="numpy")
-def approach(out, n, pairs, faces, step):  # type: ignore[no-untyped-def]
-    """Largest relative speed of a node over the altitude of its face's tet, 1/s, of the first ``n`` active contacts; or
-    ``_haste``.
-    """
-    e, f, r = np.empty(3), np.empty(3), np.empty(3)
-    x, most = step.x, 0.0
-    for row in range(n):
-        s, face = pairs.rows[out.pair[row], 0], pairs.rows[out.pair[row], 1]
-        corners, fastest = faces.corners[face], _fastest(step, faces.corners, s, face)
-        a, b, c, d = corners[0], corners[1], corners[2], corners[3]
-        for i in range(3):
-            e[i], f[i], r[i] = x[b, i] - x[a, i], x[c, i] - x[a, i], x[d, i] - x[a, i]
-        nx, ny, nz = e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]
-        square = (nx * r[0] + ny * r[1] + nz * r[2]) ** 2 / (nx * nx + ny * ny + nz * nz)
-        most = max(most, fastest / square)
-        if step.beyond > 0.0:
-            most = max(most, _haste(step, faces.corners, s, face, fastest))
-    return np.sqrt(most)

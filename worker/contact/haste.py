@@ -1,0 +1,53 @@
+"""How fast active contacts close: what bounds the next step, so that no node passes too much of a tet in it."""
+
+import numpy as np
+
+from ..jit import njit, types
+from .narrow_phase import CONTACT_ROWS, FACES, PAIRS, STEP, altitude
+
+_F = types.float64
+
+
+@njit(_F(STEP, types.int32[:, ::1], types.int64, types.int64), cache=True)
+def fastest_of(step, corners, s, f):  # type: ignore[no-untyped-def]
+    """Square of the largest speed of node s against a corner of face f, m^2/s^2."""
+    most = 0.0
+    for m in range(3):
+        speed = 0.0
+        for i in range(3):
+            speed += (step.v[s, i] - step.v[corners[f, m], i]) ** 2
+        most = max(most, speed)
+    return most
+
+
+@njit(_F(STEP, types.int32[:, ::1], types.int64, types.int64, _F), cache=True, error_model="numpy")
+def haste(step, corners, s, f, fastest):  # type: ignore[no-untyped-def]
+    """Square of what contact may give to node s or to face f over the least altitude of a tet of theirs, 1/s^2, where
+    they come nearer by more than ``step.hasty`` in a step; else 0. ``fastest``: of them (``fastest_of``).
+    """
+    if not fastest * step.beyond**2 > step.hasty**2:
+        return 0.0
+    x, a, b, c, d = step.x, corners[f, 0], corners[f, 1], corners[f, 2], corners[f, 3]
+    one, two = min(altitude(x, a, b, c, d), altitude(x, b, c, d, a)), altitude(x, c, d, a, b)
+    return step.rebound**2 * fastest / min(one, two, altitude(x, d, a, b, c), step.least[s])
+
+
+@njit(types.float64(CONTACT_ROWS, types.int64, PAIRS, FACES, STEP), cache=True, error_model="numpy")
+def approach(out, n, pairs, faces, step):  # type: ignore[no-untyped-def]
+    """Largest relative speed of a node over the altitude of its face's tet, 1/s, of the first ``n`` active contacts; or
+    ``haste``.
+    """
+    e, f, r = np.empty(3), np.empty(3), np.empty(3)
+    x, most = step.x, 0.0
+    for row in range(n):
+        s, face = pairs.rows[out.pair[row], 0], pairs.rows[out.pair[row], 1]
+        corners, fastest = faces.corners[face], fastest_of(step, faces.corners, s, face)
+        a, b, c, d = corners[0], corners[1], corners[2], corners[3]
+        for i in range(3):
+            e[i], f[i], r[i] = x[b, i] - x[a, i], x[c, i] - x[a, i], x[d, i] - x[a, i]
+        nx, ny, nz = e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]
+        square = (nx * r[0] + ny * r[1] + nz * r[2]) ** 2 / (nx * nx + ny * ny + nz * nz)
+        most = max(most, fastest / square)
+        if step.beyond > 0.0:
+            most = max(most, haste(step, faces.corners, s, face, fastest))
+    return np.sqrt(most)
