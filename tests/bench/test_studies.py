@@ -3,8 +3,22 @@
 import numpy as np
 import pytest
 
-from . import kalthoff
+from conoid.cases import load
+
+from . import comparable_rod, kalthoff
 from .cracks import Crack, Run, prepared
+
+
+@pytest.mark.parametrize("variant", comparable_rod.VARIANTS, ids=lambda variant: variant.name)
+def test_a_variant_of_the_rod_is_a_case(variant: comparable_rod.Variant) -> None:
+    """Whole, and each with something of its own."""
+    load.parse_case(comparable_rod.data_of(variant))
+    alike = [
+        other.name
+        for other in comparable_rod.VARIANTS
+        if comparable_rod.data_of(other) == comparable_rod.data_of(variant)
+    ]
+    assert alike == [variant.name]
 
 
 def test_a_random_plate_has_a_smooth_slit_of_the_length_that_is_asked_for() -> None:
