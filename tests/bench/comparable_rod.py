@@ -108,6 +108,9 @@ _BOTH = (0, 1)
 VARIANTS = (
     Variant("1.4 mm, strain 2"),
     Variant("1 mm", meshed(1.0)),
+    Variant("steps 1 % shorter", ("numerics.dt_safety=0.891",)),
+    Variant("steps 2 % shorter", ("numerics.dt_safety=0.882",)),
+    Variant("steps 3 % shorter", ("numerics.dt_safety=0.873",)),
     Variant("strain 1", eroding(_BOTH, plastic_strain=1.0)),
     Variant("strain 1.5", eroding(_BOTH, plastic_strain=1.5)),
     Variant("strain 3", eroding(_BOTH, plastic_strain=3.0)),
