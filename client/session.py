@@ -14,7 +14,7 @@ from .errors import ClientError
 from .http import Http
 from .run import Run, RunInfo, quoted
 from .submission import CaseSource, body_of, data_of
-from .sweep import Point, Sweep, SweepInfo, SweepPage
+from .sweep import Point, Sweep, SweepInfo, SweepPage, points_along
 
 
 class Verdict(msgspec.Struct, kw_only=True, frozen=True):
@@ -79,13 +79,16 @@ class Session(Http):
         return Run(self, self.post(RunInfo, path, key=key or str(uuid.uuid4())).id)
 
     def sweep(
-        self, case: CaseSource, points: Sequence[Point], at_once: int | None = None, key: str | None = None
-    ) -> Sweep:
+        self, case: CaseSource, points: Sequence[Point] | Mapping[str, Sequence[Any]], at_once: int | None = None,
+        key: str | None = None, *, grid: bool = False,
+    ) -> Sweep:  # fmt: skip
         """Hands a case in at many points, each a mapping of keys to values: all become runs, or none.
 
+        A mapping of keys to as many values each is one point after the other, or each with each for a ``grid``.
         ``at_once`` of them run at a time; ``key`` as for ``submit``. Raises CaseError, ServiceError.
         """
-        wish = {"case": data_of(case), "points": list(points), "at_once": at_once}
+        chosen = points_along(points, grid=grid) if isinstance(points, Mapping) else list(points)
+        wish = {"case": data_of(case), "points": chosen, "at_once": at_once}
         body = msgspec.json.encode(wish)
         made = self.post(SweepInfo, "/v1/sweeps", body, "application/json", key or str(uuid.uuid4()))
         return Sweep(self, made.id)

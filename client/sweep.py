@@ -5,7 +5,7 @@ import io
 import itertools
 import math
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -120,13 +120,20 @@ def points_of(words: Iterable[str], *, grid: bool = False) -> list[Point]:
     axes = dict(_axis(word) for word in words)
     if not axes:
         raise CaseError([Problem("--set", "", "write at least one key with its values, such as run.ranks=1,2")])
+    return points_along(axes, grid=grid, named="--set")
+
+
+def points_along(axes: Mapping[str, Sequence[Any]], *, grid: bool = False, named: str = "points") -> list[Point]:
+    """The points of the values of each key: one after the other with all keys at once, or each with each for a
+    ``grid``; ``named``: what errors call them. Raises CaseError.
+    """
     if grid:
         rows: Iterable[tuple[Any, ...]] = itertools.product(*axes.values())
     else:
         counts = {key: len(values) for key, values in axes.items()}
         if len(set(counts.values())) > 1:
             told = ", ".join(f"{key} has {n}" for key, n in counts.items())
-            raise CaseError([Problem("--set", "", f"as many values for each key, or --grid: {told}")])
+            raise CaseError([Problem(named, "", f"as many values for each key, or a grid: {told}")])
         rows = zip(*axes.values(), strict=True)
     return [dict(zip(axes, row, strict=True)) for row in rows]
 

@@ -135,7 +135,7 @@ def test_the_same_from_python(server: Running, tmp_path: Path) -> None:
     with Session("http://127.0.0.1") as session:
         session._http.close()
         session._http = server.ann.http
-        made = session.sweep(tomllib.loads(case_text()), [{"run.end_time": end} for end in ENDS], at_once=2)
+        made = session.sweep(tomllib.loads(case_text()), {"run.end_time": ENDS}, at_once=2)
         assert made.wait(60.0).over
         assert [line["state"] for line in made.table()] == ["succeeded"] * len(ENDS)
         assert list(made.frame()["steps"]) == [3] * len(ENDS)
