@@ -62,7 +62,7 @@ class Clock:
         self.last_dt = self.dt
         self._stable = min(self._safety / limit if limit > 0.0 else math.inf, self._growth * self._stable)
         left = self.frame_time(self.frame + 1 if self.frame_due else self.frame) - self.t
-        self.dt = left / math.ceil(left / self._stable) if left > 0.0 else 0.0
+        self.dt = left / max(math.ceil(left / self._stable), 1) if left > 0.0 else 0.0
         self._first = self._first or self._stable
         self.mean_dt = 0.5 * (self.last_dt + self.dt)
         return self.mean_dt

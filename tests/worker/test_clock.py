@@ -93,3 +93,12 @@ def test_the_step_that_people_read_is_never_zero_at_the_end() -> None:
     steps = [dt for _, dt, _ in steps_of(clock, [3e7])]
     assert (clock.dt, clock.told) == (0.0, steps[-2])
     assert steps[-2] > 0.0
+
+
+def test_time_goes_on_when_no_tet_is_left_however_many_frames_are_wanted() -> None:
+    """Without a limit the stable step grows from step to step, in the end beyond all numbers."""
+    clock = Clock(1e-3, 0.9, 2.0, 2000)
+    clock.choose(1e7)
+    clock.advance()
+    assert sum(due for _, _, due in steps_of(clock, [0.0])) == 2001
+    assert clock.stable == math.inf

@@ -3,6 +3,7 @@
 import csv
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pyarrow.parquet
 import pytest
@@ -10,10 +11,17 @@ import pytest
 from conoid.cases import history, layout
 from conoid.cases.messages import Energy
 from conoid.worker.fracture.columns import FacetConstants, Facets, PairState, Softening
+from conoid.worker.output import frames
 from conoid.worker.output.damage import spent_energy
 from conoid.worker.output.frames import principal
 from conoid.worker.output.history import History
 from conoid.worker.output.rewind import rewind
+from conoid.worker.parallel.comm import Comm, SerialComm
+from conoid.worker.state import Model, Nodes
+
+from ..contact.ranks import on_ranks
+from .kernels import Patch
+from .meshes import free_tets
 
 ENERGY = Energy(
     kinetic=2.0, elastic=1.0, plastic=0.0, viscous=0.0, contact=0.0, external=0.0, initial=3.0, residual=0.0
@@ -64,6 +72,32 @@ def test_parquet_has_the_same_numbers_and_the_units(tmp_path: Path) -> None:
     assert table.schema.field("push").metadata == {b"unit": b"N"}
     rewind(tmp_path, 2, 0)
     assert not (tmp_path / layout.HISTORY_PARQUET).exists(), "a run that goes on has no end yet"
+
+
+def without_tets(nodes: int) -> Model:
+    """What a rank has that others, or erosion, have left without tets; ``nodes`` of all ranks."""
+    none, points, force = np.zeros(0, np.int32), np.zeros((0, 3)), np.zeros((0, 3), np.int64)
+    mine = Nodes(np.zeros(0, np.int64), none, none, np.zeros(0, bool), points, points, points, np.zeros(0), force)
+    return Model(mine, nodes_global=nodes)
+
+
+def test_a_frame_may_come_from_ranks_without_tets(tmp_path: Path) -> None:
+    """Rank 0 names the columns: it had none, and the run broke off; nor had a run of which all tets had eroded."""
+    model = Patch(free_tets(3, 1)).sim.model
+    labels, damage = [np.arange(3)], [np.ones(3)]
+
+    def write(models: list[Model], comm: Comm) -> None:
+        mine, here = models[comm.rank], len(models[comm.rank].blocks)
+        frames.write(tmp_path, len(models), 0.0, mine, comm, labels[:here], damage[:here])
+
+    on_ranks(2, lambda comm: write([without_tets(model.nodes_global), model], comm))
+    write([without_tets(0)], SerialComm())
+    for index, tets in ((2, 3), (1, 0)):
+        with h5py.File(layout.frame(tmp_path, index)) as file:
+            cells = {name: len(values) for name, values in file["VTKHDF/CellData"].items()}
+            assert {"tet", "mises", "stress", "fragment", "damage"} <= cells.keys()
+            assert set(cells.values()) == {tets}
+            assert len(file["VTKHDF/Types"]) == tets
 
 
 def test_principal_stresses() -> None:

@@ -5,6 +5,7 @@ A file is written beside its place, flushed to disk and renamed: whoever sees it
 
 import json
 import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from conoid.cases import layout
 
 from ..parallel.comm import Comm
 from ..state import (
+    CHUNK,
     PLASTIC_STRAIN,
     PRESSURE,
     S_XX,
@@ -80,8 +82,8 @@ def _share(model: Model, rank: int, labels: list[Ints] | None, damage: list[Floa
     """What this rank gives to a frame."""
     nodes = model.nodes
     cells = [
-        _cells(block, rank, labels[b] if labels else None, damage[b] if damage is not None else None)
-        for b, block in enumerate(model.blocks)
+        _cells(block, rank, None if labels is None else each, None if damage is None else share)
+        for block, each, share in _by_block(model, labels, damage)
     ]
     return {
         "ids": nodes.id,
@@ -89,8 +91,22 @@ def _share(model: Model, rank: int, labels: list[Ints] | None, damage: list[Floa
         "velocity": nodes.v.astype(np.float32),
         "displacement": (nodes.x - nodes.x0).astype(np.float32),
         "tets": np.concatenate([nodes.id[b.tets] for b in model.blocks] or [np.zeros((0, 4), np.int64)]),
-        "cells": {name: np.concatenate([c[name] for c in cells]) for name in cells[0]} if cells else {},
+        "cells": {name: np.concatenate([c[name] for c in cells]) for name in cells[0]},
     }
+
+
+def _by_block(
+    model: Model, labels: list[Ints] | None, damage: list[Floats] | None
+) -> Iterator[tuple[Block, Ints, Floats]]:  # fmt: skip
+    """Each block with what is known of its tets. A rank without tets (they have left, or others have them all) has a
+    block without any: every rank names all columns.
+    """
+    none: tuple[Ints, Floats] = np.zeros(0, np.int64), np.zeros(0)
+    if not model.blocks:
+        state = np.zeros((0, PRESSURE + 1, CHUNK))
+        yield Block(0, 0, np.zeros((0, 4), np.uint32), none[0], state, 0, 0, none[1]), *none
+    for b, block in enumerate(model.blocks):
+        yield block, labels[b] if labels else none[0], damage[b] if damage else none[1]
 
 
 def write(
@@ -124,7 +140,7 @@ def _write_grid(file: "h5py.File", pieces: list[dict[str, Any]], total: int) -> 
     root.attrs["Version"] = (2, 3)
     root.attrs.create("Type", b"UnstructuredGrid", dtype=h5py.string_dtype("ascii", 16))
     point_data = {name: _by_id(pieces, name, total) for name in ("points", "velocity", "displacement")}
-    cells = {name: np.concatenate([p["cells"][name] for p in pieces if p["cells"]]) for name in pieces[0]["cells"]}
+    cells = {name: np.concatenate([p["cells"][name] for p in pieces]) for name in pieces[0]["cells"]}
     order = np.argsort(cells["tet"])
     tets = np.concatenate([p["tets"] for p in pieces])[order]
     n = len(tets)
