@@ -6,6 +6,7 @@ second is booked when ``note`` is called before the next kick.
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -21,6 +22,9 @@ zero because the node lies on a plane of symmetry across that axis."""
 _SWEEPS = 4
 """Times a node is taken to each wall. Chosen: two walls at right angles take one; what a sharper corner leaves after
 four is taken in the next step."""
+_ACROSS = 1e-12
+"""Of a wall's unit normal, what is left of its square along the planes of symmetry that hold a node: with less the wall
+lies along a plane and cannot push the node. Chosen far above rounding (1e-32) and below any angle that is meant."""
 KEPT = ("contact_loss", "external_work", "_impulse")
 """What every boundary remembers of its nodes."""
 
@@ -117,13 +121,17 @@ class RigidWalls(Boundary):
     """No node ends the step behind a wall: an impulse along its normal stops the node there, never pulls.
 
     ``points`` and ``normals`` (w, 3), ``held`` (n, w): which walls hold which node. A node between two walls is taken
-    to each in turn, a few times.
+    to each in turn, a few times. ``mirrored`` (n, 3): the components that planes of symmetry hold, none if not given; a
+    wall that is not at right angles to a plane pushes the nodes on it along it, and the plane takes the rest.
     """
 
     after_contact = True
 
-    def __init__(self, nodes: Indices, points: Floats, normals: Floats, held: Flags) -> None:
+    def __init__(
+        self, nodes: Indices, points: Floats, normals: Floats, held: Flags, mirrored: Flags | None = None
+    ) -> None:
         super().__init__(nodes)
+        self._mirrored = np.zeros((len(nodes), 3), bool) if mirrored is None else mirrored
         self._points = points
         self._normals = normals / np.linalg.norm(normals, axis=1)[:, None]
         self._held = held
@@ -144,6 +152,7 @@ class RigidWalls(Boundary):
 
     def _inherit(self, at: Ints) -> None:
         self._held = extended(self._held, self._held[at])
+        self._mirrored = extended(self._mirrored, self._mirrored[at])
         self.given = extended(self.given, np.zeros((len(at), self.given.shape[1])))
 
     def keep(self, parcel: Parcel, name: str) -> None:
@@ -174,6 +183,7 @@ class RigidWalls(Boundary):
             self._points,
             self._normals,
             self._held,
+            self._mirrored,
             dt,
         )
         if self._pushed:
@@ -182,6 +192,14 @@ class RigidWalls(Boundary):
 
     def _book(self) -> None:
         self.contact_loss -= 0.5 * (self._impulse * self._before).sum(axis=1)
+
+
+def mirrored(n: int, bounds: Iterable[Boundary]) -> Flags:
+    """(n, 3) which components of the velocities of ``n`` nodes planes of symmetry hold."""
+    found = np.zeros((n, 3), bool)
+    for bound in bounds:
+        found[bound.nodes] |= bound.held_components() == MIRRORED
+    return found
 
 
 def free(nodes: Indices) -> Bits:
@@ -218,13 +236,13 @@ def _hold(v, nodes, axis):  # type: ignore[no-untyped-def]
 
 @njit(
     "boolean(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], int32[::1], "
-    "float64[:, ::1], float64[:, ::1], boolean[:, ::1], float64)",
+    "float64[:, ::1], float64[:, ::1], boolean[:, ::1], boolean[:, ::1], float64)",
     cache=True,
     error_model="numpy",
 )
-def _push_out(x, v, impulse, given, mass, nodes, points, normals, held, dt):  # type: ignore[no-untyped-def]
-    """Impulse form: the gap at the end of the step is never negative. Adds to ``impulse`` and to what each wall has
-    ``given``; whether a wall pushed.
+def _push_out(x, v, impulse, given, mass, nodes, points, normals, held, mirrored, dt):  # type: ignore[no-untyped-def]
+    """Impulse form: the gap at the end of the step is never negative; the impulse is along what is left of the normal
+    without the ``mirrored`` components. Adds to ``impulse`` and to what each wall has ``given``; whether a wall pushed.
     """
     pushed = False
     for j in range(len(nodes)):
@@ -232,13 +250,17 @@ def _push_out(x, v, impulse, given, mass, nodes, points, normals, held, dt):  # 
         for _ in range(_SWEEPS):
             moved = False
             for k in range(len(points)):
-                gap, speed = 0.0, 0.0
+                gap, speed, along = 0.0, 0.0, 1.0
                 for i in range(3):
                     gap += (x[a, i] - points[k, i]) * normals[k, i]
                     speed += v[a, i] * normals[k, i]
-                if held[j, k] and gap + dt * speed < 0.0:
+                    if mirrored[j, i]:
+                        along -= normals[k, i] * normals[k, i]
+                if held[j, k] and gap + dt * speed < 0.0 and along > _ACROSS:
                     for i in range(3):
-                        change = -(gap / dt + speed) * normals[k, i]
+                        if mirrored[j, i]:
+                            continue
+                        change = -(gap / dt + speed) / along * normals[k, i]
                         v[a, i] += change
                         impulse[j, i] += mass[a] * change
                         given[j, 3 * k + i] += mass[a] * change

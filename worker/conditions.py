@@ -4,7 +4,7 @@ import numpy as np
 
 from conoid.cases import schema
 
-from .boundaries import MIRRORED, PRESCRIBED, Boundary, RigidWalls, SymmetryPlane
+from .boundaries import MIRRORED, PRESCRIBED, Boundary, RigidWalls, SymmetryPlane, mirrored
 from .drivers import Course, Gravity, PrescribedRotation, PrescribedVelocity, Traction
 from .errors import InputError
 from .migration.parcel import Parcel
@@ -50,7 +50,7 @@ def build(case: schema.Case, model: Model, loads: list[Load]) -> list[Boundary]:
     moved = np.zeros(nodes.n, bool)
     for boundary in boundaries:
         moved[boundary.nodes] |= (boundary.held_components() == PRESCRIBED).any(axis=1)
-    return [*boundaries, *_walls(case, [h & ~moved for h in held])]
+    return [*boundaries, *_walls(case, [h & ~moved for h in held], mirrored(nodes.n, boundaries))]
 
 
 def start(case: schema.Case, model: Model, boundaries: list[Boundary], comm: Comm) -> None:
@@ -84,14 +84,14 @@ def _held_by(spec: schema.Boundary, model: Model) -> Flags:
     return chosen
 
 
-def _walls(case: schema.Case, held: list[Flags]) -> list[Boundary]:
+def _walls(case: schema.Case, held: list[Flags], planes: Flags) -> list[Boundary]:
     found = [(spec, held[index]) for index, spec in case.boundaries_of(schema.Wall)]
     if not found:
         return []
     touched = np.any([h for _, h in found], axis=0)
     points, normals = np.array([spec.point for spec, _ in found]), np.array([spec.normal for spec, _ in found])
     which = np.ascontiguousarray(np.array([h[touched] for _, h in found]).T)
-    return [RigidWalls(_indices(touched), points, normals, which)]
+    return [RigidWalls(_indices(touched), points, normals, which, planes[touched])]
 
 
 def _refuse_overlaps(case: schema.Case, model: Model, boundaries: list[Boundary], comm: Comm) -> None:

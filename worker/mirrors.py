@@ -6,7 +6,7 @@ import numpy as np
 
 from conoid.cases.schema import Case, Symmetry
 
-from .boundaries import PRESCRIBED, Boundary, RigidWalls
+from .boundaries import PRESCRIBED, Boundary, RigidWalls, mirrored
 from .conditions import ON_PLANE
 from .state import Model, Nodes
 
@@ -34,7 +34,8 @@ class Mirrors(RigidWalls):
             normals = np.vstack([normals, axis, -axis])
             held = np.column_stack([held, off & (height > 0.0), off & (height < 0.0)])
         some = held.any(axis=1)
-        return cls(np.flatnonzero(some).astype(np.int32), points, normals, np.ascontiguousarray(held[some]))
+        planes = mirrored(nodes.n, bounds)[some]
+        return cls(np.flatnonzero(some).astype(np.int32), points, normals, np.ascontiguousarray(held[some]), planes)
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
         super().apply(state, dt, self.last_push)

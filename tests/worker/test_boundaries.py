@@ -133,6 +133,38 @@ def test_nodes_on_a_symmetry_plane_stay_on_it(axis: str, at: float) -> None:
     assert sim.boundaries[0].contact_loss.sum() == sim.boundaries[0].external_work.sum() == 0.0
 
 
+@pytest.mark.parametrize("order", [1, -1], ids=["plane first", "wall first"])
+def test_a_wall_across_a_symmetry_plane_pushes_along_it(order: int) -> None:
+    """Half a block falls on a wall at 37 degrees to its plane: nodes stay on the plane and before the wall, the
+    ledger closes, and without the plane the same wall pushes the same nodes off it.
+    """
+    slope = math.radians(37.0)
+    low = MESH.points.min(axis=0)
+    tilted = {"kind": "wall", "point": tuple(low.tolist()), "normal": (math.sin(slope), 0.0, math.cos(slope))}
+    bounds = ({"kind": "symmetry", "axis": "x", "at": 0.0}, tilted)[::order]
+    sim = build(scene(STEEL, end=2e-6, velocity=(0.0, 0.0, -100.0), boundaries=bounds), [MESH])
+    on, nodes = np.abs(MESH.points[:, 0]) < 1e-12, sim.model.nodes
+
+    def look(sim: Simulation, before: Floats) -> None:
+        assert not nodes.v[on, 0].any()
+        sim.ledger.close(before)
+
+    run(sim, look)
+    assert (nodes.x[on, 0] == MESH.points[on, 0]).all()
+    assert ((nodes.x - low) @ np.array(tilted["normal"])).min() > -1e-15
+    assert sim.boundaries[-1].contact_loss[np.isin(sim.boundaries[-1].nodes, np.flatnonzero(on))].sum() > 0.0
+    assert sim.ledger.worst < 2e-3
+
+
+def test_a_wall_along_a_symmetry_plane_cannot_push_what_is_on_it() -> None:
+    """The plane holds the nodes, and their velocities along it keep every bit of what forces make of them."""
+    bounds = ({"kind": "symmetry", "axis": "z", "at": 0.0}, wall(0.0, (0.0, 0.0, 1.0)))
+    sims = [build(scene(STEEL, end=1e-6, velocity=(3.0, 0.0, 9.0), boundaries=bounds[:n]), [MESH]) for n in (1, 2)]
+    for sim in sims:
+        run(sim)
+    assert (sims[0].model.nodes.v == sims[1].model.nodes.v).all()
+
+
 def test_prescribed_velocity_and_its_work() -> None:
     """One end of a block is pulled: given components are met to the bit, others are free, the work becomes energy."""
     spec = {"kind": "velocity", "low": (0.0, 0.0, 2.9e-3), "high": (1.0, 1.0, 1.0), "z": 20.0}
