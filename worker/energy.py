@@ -20,7 +20,7 @@ from .erosion import Erosion
 from .fracture.stage import Fracture
 from .jit import njit
 from .parallel.comm import Comm
-from .parallel.fixed_point import Grouped, add_limbs, exact_sums, exact_totals
+from .parallel.fixed_point import Grouped, add_limbs, exact_sums, exact_totals, larger
 from .state import CHUNK, WORK, WORK_PLASTIC, WORK_VISCOUS, Block, Floats, Ints, Model
 
 _WORKS = (WORK, WORK_VISCOUS, WORK_PLASTIC)
@@ -83,8 +83,9 @@ class Ledger:
             lost, cohesive = self._fracture.cohesion.energies(self._comm)
         total = kinetic_sum + float(work - plastic) + plastic_sum + viscous_sum + loss_sum + eroded + lost + cohesive
         friction = self._contact.friction_work() if self._contact is not None else 0.0
-        scale = max(self.initial, abs(external_sum), abs(float(work)), abs(kinetic_sum))
-        residual = abs(total - self.initial - external_sum) / scale if scale > 0.0 else 0.0
+        scale = float(np.abs([self.initial, external_sum, work, kinetic_sum]).max())
+        left = abs(total - self.initial - external_sum)
+        residual = left / scale if scale != 0.0 else left
         self.worst = max(self.worst, residual)
         return Energy(
             kinetic=kinetic_sum, elastic=float(work - plastic), plastic=plastic_sum, viscous=viscous_sum,
@@ -153,7 +154,7 @@ def _visit_work(largest, words, state, n, scale):  # type: ignore[no-untyped-def
             continue
         for c in range(state.shape[0]):
             for i in range(min(CHUNK, n - c * CHUNK)):
-                largest[j] = max(largest[j], abs(state[c, row, i]))
+                largest[j] = larger(largest[j], state[c, row, i])
                 if len(scale) > 0:
                     add_limbs(words, j, state[c, row, i], scale[j])
 

@@ -124,3 +124,17 @@ def test_groups_have_their_own_sums_and_do_not_change_those_of_all() -> None:
     for k in range(4):
         assert each[k] == pytest.approx([math.fsum(column[group == k]) for column in columns.T], rel=1e-12, abs=1e-3)
     assert each[3].tolist() == [0.0] * 4
+
+
+@pytest.mark.parametrize("odd", [math.nan, math.inf, -math.inf])
+def test_a_sum_with_a_value_that_is_not_finite_is_not_a_number(odd: float) -> None:
+    """Of that column alone, in all and in each group, whether the value comes first or last."""
+    for row in (0, 4999):
+        columns = values(5000, 5)
+        whole = exact_sums(SerialComm(), columns)
+        columns[row, 1] = odd
+        group = (np.arange(5000, dtype=np.int32) > 2500).astype(np.int32)
+        total, each = exact_totals(SerialComm(), Grouped(columns, group, 2))
+        assert np.isnan(total).tolist() == [False, True, False, False]
+        assert np.isnan(each).tolist() == [[False, True, False, False]] * 2
+        assert total[[0, 2, 3]].tobytes() == whole[[0, 2, 3]].tobytes()

@@ -1,5 +1,6 @@
 """The ledger: every line closes, whatever the step does and whatever pushes."""
 
+import math
 from typing import Any
 
 import pytest
@@ -7,6 +8,7 @@ import pytest
 from conoid.cases import materials
 from conoid.cases.messages import Energy
 from conoid.worker.simulation import Simulation
+from conoid.worker.state import WORK, WORK_VISCOUS
 
 from .kernels import COPPER, COPPER_GAS, FORMS, GLASS, HARD, STEEL, STEEL_42CRMO4, Form, build, run, scene
 from .meshes import Floats, block
@@ -107,3 +109,13 @@ def test_the_parts_are_what_the_ledger_sums_up() -> None:
     alone = build(one, [MESH])
     lines(alone)
     assert alone.ledger.parts == {}
+
+
+@pytest.mark.parametrize("row", [WORK, WORK_VISCOUS])
+def test_a_work_that_is_not_a_number_is_no_residual_of_nothing(row: int) -> None:
+    """Also where no energy was there to begin with: the run ends by its limit."""
+    sim = build(scene(STEEL, end=1e-6, viscosity={}), [MESH])
+    run(sim)
+    assert sim.ledger.close(sim.model.nodes.v).residual == 0.0
+    sim.model.blocks[0].state[0, row, 3] = math.nan
+    assert math.isnan(sim.ledger.close(sim.model.nodes.v).residual)

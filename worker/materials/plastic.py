@@ -35,17 +35,6 @@ def equivalent_stress(w, s, n):  # type: ignore[no-untyped-def]
         w[TRIAL + i] = np.sqrt(1.5 * (sxx * sxx + syy * syy + szz * szz + 2.0 * (syz * syz + szx * szx + sxy * sxy)))
 
 
-@njit("void(float64[::1], int64, float64)", cache=True)
-def scale_deviator(s, i, factor):  # type: ignore[no-untyped-def]
-    """Multiplies the deviatoric stress of element ``i`` of the chunk."""
-    s[_SXX + i] *= factor
-    s[_SYY + i] *= factor
-    s[_SZZ + i] *= factor
-    s[_SYZ + i] *= factor
-    s[_SZX + i] *= factor
-    s[_SXY + i] *= factor
-
-
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def linear_hardening(w, s, params, n, dt):  # type: ignore[no-untyped-def]
     """Returns the trial stress to the yield surface; strain increment (q - yield) / (3 G + H), exact for this law. The

@@ -42,13 +42,19 @@ def outgrown(largest: float, scale: float) -> bool:
     return not largest * scale < 2.0**CONTRIBUTION_BITS
 
 
+@njit("float64(float64, float64)", cache=True)
+def larger(largest, value):  # type: ignore[no-untyped-def]
+    """The greater magnitude; infinite for what is not a number, which no maximum over ranks may drop."""
+    return max(largest, abs(value)) if math.isfinite(value) else math.inf
+
+
 @njit("float64[::1](float64[:, ::1])", cache=True)
 def _largest(columns):  # type: ignore[no-untyped-def]
-    """(k,) largest magnitude of each column."""
+    """(k,) largest magnitude of each column, by ``larger``."""
     largest = np.zeros(columns.shape[1])
     for i in range(columns.shape[0]):
         for j in range(columns.shape[1]):
-            largest[j] = max(largest[j], abs(columns[i, j]))
+            largest[j] = larger(largest[j], columns[i, j])
     return largest
 
 
@@ -117,7 +123,7 @@ class Columns(Protocol):
     """Columns of values that are somewhere, not necessarily side by side."""
 
     def largest(self) -> Floats:
-        """(k,) largest magnitude of each column."""
+        """(k,) largest magnitude of each column, by ``larger``."""
 
     def limbs(self, scale: Floats) -> Ints:
         """(groups, 2k) sums of the high limbs of each column, in quanta of one over ``scale`` (k,), and of the low
@@ -159,15 +165,18 @@ def exact_totals(comm: Comm, *tables: Columns) -> tuple[Floats, Floats]:
     any order and partition. All tables have as many groups.
 
     Each value is split into two integer limbs of a common quantum, 2^-60 of the column's largest magnitude; the
-    result is off by at most n times that quantum.
+    result is off by at most n times that quantum. The sum of a column with a value that is not finite is not a number.
     """
     mine = [table.largest() for table in tables]
     largest = comm.maximum(np.concatenate(mine))
-    exponent = np.frexp(largest)[1]
+    valued = np.isfinite(largest)
+    exponent = np.frexp(np.where(valued, largest, 0.0))[1]
     scales = np.split(np.ldexp(1.0, 30 - exponent), np.cumsum([len(each) for each in mine])[:-1])
     limbs = [table.limbs(scale).reshape(-1, 2, len(scale)) for table, scale in zip(tables, scales, strict=True)]
     words = comm.sum(np.concatenate(limbs, axis=2))
-    return _valued(words.sum(axis=0), exponent), np.array([_valued(group, exponent) for group in words])
+    totals = np.array([_valued(group, exponent) for group in (words.sum(axis=0), *words)])
+    totals[:, ~valued] = math.nan
+    return totals[0], totals[1:]
 
 
 def _valued(words: Ints, exponent: Indices) -> Floats:
