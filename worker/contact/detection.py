@@ -8,7 +8,7 @@ from ..state import Floats, Ints
 from . import registration
 from .cracks import across
 from .edge_edge import edge_edge
-from .haste import approach
+from .haste import approach, spread
 from .narrow_phase import HASTY, Step
 from .node_face import node_face
 from .scene import Scene
@@ -58,7 +58,7 @@ class Ahead:
         """The step that follows if in it anything of ``v`` (slots, 3) may come nearer to anything by HASTY of a face;
         else 0. No such pair is bounded, so that a rank where nothing is so fast need not know of any.
         """
-        fastest = float(np.linalg.norm(v.max(axis=0) - v.min(axis=0))) if len(v) else 0.0
+        fastest = spread(v)
         return self.most if fastest * self.most > HASTY * self.size else 0.0
 
 

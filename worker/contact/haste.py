@@ -8,6 +8,16 @@ from .narrow_phase import CONTACT_ROWS, FACES, PAIRS, STEP, altitude
 _F = types.float64
 
 
+@njit("float64(float64[:, ::1])", cache=True)
+def spread(v):  # type: ignore[no-untyped-def]
+    """No two of the velocities ``v`` (n, 3) differ by more, m/s: the diagonal of their box."""
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for a in range(len(v)):
+        for i in range(3):
+            low[i], high[i] = min(low[i], v[a, i]), max(high[i], v[a, i])
+    return np.sqrt(((high - low) ** 2).sum()) if len(v) > 0 else 0.0
+
+
 @njit(_F(STEP, types.int32[:, ::1], types.int64, types.int64), cache=True)
 def fastest_of(step, corners, s, f):  # type: ignore[no-untyped-def]
     """Square of the largest speed of node s against a corner of face f, m^2/s^2."""
