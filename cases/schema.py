@@ -145,15 +145,19 @@ class Contact(Model):
 
 
 class Viscosity(Model):
-    """Bulk viscosity q = density * l * (quadratic * l * rate^2 + linear * c * |rate|) in compression.
+    """Bulk viscosity q = density * u * ((linear + shock * S) * c + quadratic * u), u = l * |rate|, in compression.
 
+    S = u / (u + c / 100) is next to nothing in elastic waves and next to one in shocks.
     l is V^(1/3) for a regular tet and follows the altitude of a flat one: 1.2009 / sqrt(sum |grad N|^2).
     """
 
     linear: Annotated[Ratio, Field(ge=0)] = 0.06
-    """Coefficient of the linear term: damps ringing behind a front."""
+    """Coefficient of the linear term: damps ringing, that of elastic waves too."""
+    shock: Annotated[Ratio, Field(ge=0)] = 0.4
+    """By how much the linear coefficient is larger in shocks: spreads them over some tets, so that they do not
+    overshoot."""
     quadratic: Annotated[Ratio, Field(ge=0)] = 1.5
-    """Coefficient of the quadratic term: spreads a shock over some tets."""
+    """Coefficient of the quadratic term: spreads strong shocks."""
 
 
 class Numerics(Model):

@@ -19,7 +19,7 @@ from .table import Cell, table
 Floats = npt.NDArray[np.float64]
 
 LENGTH, RADIUS, END = 32.4e-3, 3.2e-3, 80e-6
-LINEAR, QUADRATIC = 0.06, 1.5
+LINEAR, SHOCK, QUADRATIC, HALF = 0.06, 0.4, 1.5, 0.01
 """Bulk viscosity, as in the shipped cases."""
 SAFETY = 0.8
 
@@ -171,8 +171,10 @@ def _forces(metal, x, v, quads, mass, stress, pressure, strain, temperature, for
             steepest = max(steepest, (g[p] * g[p]).sum())
         steepest, density, rate = math.sqrt(steepest), mass[e] / volume, max(-dilatation, 0.0)
         c = math.sqrt((metal.bulk + 4.0 / 3.0 * metal.shear) / density)
-        q = density / steepest * rate * (LINEAR * c + QUADRATIC * rate / steepest)
-        tangent = LINEAR * c + 2.0 * QUADRATIC * rate / steepest if rate > 0.0 else 0.0
+        u = rate / steepest
+        share = u / (u + HALF * c)
+        q = density * u * ((LINEAR + SHOCK * share) * c + QUADRATIC * u)
+        tangent = (LINEAR + SHOCK * share * (2.0 - share)) * c + 2.0 * QUADRATIC * u if rate > 0.0 else 0.0
         limit = max(limit, steepest * (tangent + math.sqrt(tangent * tangent + c * c)))
         for p in range(4):
             s, all_round = stress[e, p], pressure[e] + q

@@ -19,7 +19,7 @@ STEPS = 14
 
 def struck(material: Material, form: Form, skip: bool) -> tuple[Simulation, list[int]]:
     """A bar whose lower end has been pushed, after some steps; and how many chunks were noted after each."""
-    viscosity, mesh = {"linear": 0.06, "quadratic": 1.5}, block((3, 3, 36), MM)
+    viscosity, mesh = {"linear": 0.06, "shock": 0.4, "quadratic": 1.5}, block((3, 3, 36), MM)
     along = np.argsort(mesh.points[mesh.tets].mean(axis=1)[:, 2])
     sim = build(scene(material, form, viscosity=viscosity), [TetMesh(mesh.points, mesh.tets[along])])
     nodes = sim.model.nodes

@@ -17,7 +17,7 @@ from .meshes import REGULAR, Floats, free_tets
 
 YOUNG, DENSITY = 200e9, 7850.0
 DT = 1e-9
-LINEAR, QUADRATIC = 0.06, 1.5
+LINEAR, SHOCK, QUADRATIC = 0.06, 0.4, 1.5
 
 
 def moduli(poisson: float) -> tuple[float, float]:
@@ -74,7 +74,7 @@ def test_length_factor_makes_the_length_of_a_regular_tet_its_cube_root() -> None
 
 def squeezed(i: int, mesh: TetMesh, rate: float, poisson: float = 0.3) -> Patch:
     """Tet ``i`` at the end of a step of ``DT`` in which its volume changed at ``rate``, 1/s, with viscosity."""
-    patch = one(mesh, i, poisson, viscosity={"linear": LINEAR, "quadratic": QUADRATIC})
+    patch = one(mesh, i, poisson, viscosity={"linear": LINEAR, "shock": SHOCK, "quadratic": QUADRATIC})
     patch.strain(rate / 3.0 * np.eye(3), DT)
     patch.advance(DT)
     return patch
@@ -92,8 +92,10 @@ def viscous_law(patch: Patch, rate: float, poisson: float = 0.3) -> tuple[float,
     c = math.sqrt((bulk + 4.0 / 3.0 * shear * free_volume(patch) / float(volume[0])) / density)
     length = LENGTH_FACTOR / float(formulas.inverse_length(grad)[0])
     squeeze = max(-rate * float(middle[0] / volume[0]), 0.0)
-    q = density * length * squeeze * (LINEAR * c + QUADRATIC * length * squeeze)
-    return q, density * length * (LINEAR * c + 2.0 * QUADRATIC * length * squeeze)
+    speed = length * squeeze
+    share = speed / (speed + 0.01 * c)
+    q = density * speed * ((LINEAR + SHOCK * share) * c + QUADRATIC * speed)
+    return q, density * length * ((LINEAR + SHOCK * share * (2.0 - share)) * c + 2.0 * QUADRATIC * speed)
 
 
 def free_volume(patch: Patch) -> float:

@@ -14,7 +14,17 @@ Chunks at rest, which no wave has reached, are passed over (rest.py).
 from ..jit import njit
 from ..materials.elastic import deviatoric_work, predict
 from ..materials.hyperelastic import stiffen
-from ..materials.law import AFTER_PRESSURE, BEFORE_PRESSURE, DILATES, FROM_SHAPE, ORDER, Q_LINEAR, Q_QUADRATIC, SHEAR
+from ..materials.law import (
+    AFTER_PRESSURE,
+    BEFORE_PRESSURE,
+    DILATES,
+    FROM_SHAPE,
+    ORDER,
+    Q_LINEAR,
+    Q_QUADRATIC,
+    Q_SHOCK,
+    SHEAR,
+)
 from ..materials.models import press, strengthen
 from ..materials.viscosity import bulk_viscosity
 from ..state import CHUNK, TOLD
@@ -75,9 +85,10 @@ def pressure_and_limit(eos, w, s, params, n, dt):  # type: ignore[no-untyped-def
     press(eos, w, s, params, n)
     if params[ORDER] == FROM_SHAPE:
         stiffen(w, s, params, n)
-    if params[Q_LINEAR] > 0.0 or params[Q_QUADRATIC] > 0.0:
+    linear, shock, quadratic = params[Q_LINEAR], params[Q_SHOCK], params[Q_QUADRATIC]
+    if max(linear, shock, quadratic) > 0.0:
         frequency = 1.0 / dt if dt > 0.0 else 0.0
-        bulk_viscosity(w, s, n, params[Q_LINEAR], params[Q_QUADRATIC], frequency)
+        bulk_viscosity(w, s, n, linear, shock, quadratic, frequency)
     else:
         tet4.step_limit(w, s, n)
     tet4.motion_limit(w, n)

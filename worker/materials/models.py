@@ -24,6 +24,7 @@ from .law import (
     ORDER,
     Q_LINEAR,
     Q_QUADRATIC,
+    Q_SHOCK,
     SHEAR,
     SIZE,
     SPALL,
@@ -101,6 +102,7 @@ def parameters(material: Material, viscosity: Viscosity | None) -> Floats:
     params[DILATES] = law.dilates(material.strength)
     if viscosity is not None:
         params[Q_LINEAR], params[Q_QUADRATIC] = viscosity.linear, viscosity.quadratic
+        params[Q_SHOCK] = viscosity.shock
     placed(params, EQUATION, equation_of(material).constants(material.eos), FIRST - EQUATION)
     placed(params, FIRST, law.constants(material.strength), SIZE - FIRST)
     return params
