@@ -59,6 +59,26 @@ def test_two_ways_with_solid_between_them_are_branches() -> None:
     assert crack.straight == pytest.approx(16.0 + 2 * 24.0 * math.sqrt(2.0), rel=0.15)
 
 
+def test_facets_that_open_aside_and_ahead_of_the_tip_are_no_length() -> None:
+    """A crack that is straight as far as it goes has the area of a line, whatever has opened before its tip."""
+    x = [*np.arange(0.5, 29.0), 31.5]
+    crack = facets(x, [*np.zeros(29), 4.0], x)
+    assert crack.straight > 1.1 * crack.area.sum()
+    assert crack.inflation == pytest.approx(1.0, abs=1e-12)
+    assert math.isnan(facets([0.5], [0.0], [1.0]).inflation)
+
+
+@pytest.mark.parametrize("hole", [(10.5,), (10.5, 11.5), (10.5, 11.5, 12.5)])
+@pytest.mark.parametrize("end", [32.0, 40.0])
+def test_what_holds_behind_the_tip_is_missed(hole: tuple[float, ...], end: float) -> None:
+    """In a crack that is through, and in one that is not; where a whole bin holds as well."""
+    x = [at for at in np.arange(0.5, end) if at not in hole]
+    crack = facets(x, np.zeros(len(x)).tolist(), x)
+    length = end if end == 40.0 else 18.0
+    assert crack.wake.straight == pytest.approx(length, rel=1e-12)
+    assert crack.inflation == pytest.approx(1.0 - len(hole) / length, rel=1e-12)
+
+
 def test_the_slit_of_a_regular_mesh_is_that_of_the_generator() -> None:
     case = load.parse_case(load.read_data(load.shipped_path("branching_plate")))
     body = case.parts[0].mesh
