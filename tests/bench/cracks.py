@@ -459,7 +459,9 @@ _KINDS: tuple[tuple[Kind, int | None], ...] = (("structured", None), ("structure
 PLATES = tuple(Plan("branching_plate", size, kind, seed) for size in (1e-3, FINE) for kind, seed in _KINDS)
 """The branching benchmark on four kinds of meshes."""
 SIBLINGS = tuple(Plan("branching_plate", FINE, "random", seed) for seed in range(1, 5))
-"""With the last of PLATES five meshes of one kind."""
+"""More of the kind of the last of PLATES."""
+RANDOM = (PLATES[-1], *SIBLINGS)
+"""Five meshes of one kind: without directions, of the finer elements."""
 SHOWN = (PLATES[0], PLATES[6], PLATES[7], *SIBLINGS[:3])
 """Meshes whose cracks are drawn."""
 STRIPS = (Plan("strip", 0.5e-3), Plan("strip", 0.5e-3, "random", 0))
@@ -497,7 +499,7 @@ def report(runs: Sequence[Run]) -> str:
 
 
 def _sibling(run: Run) -> bool:
-    return run.plan in (*SIBLINGS, PLATES[-1])
+    return run.plan in RANDOM
 
 
 def _some(value: float, digits: int = 1) -> Cell:
