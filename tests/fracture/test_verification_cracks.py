@@ -59,6 +59,26 @@ def test_two_ways_with_solid_between_them_are_branches() -> None:
     assert crack.straight == pytest.approx(16.0 + 2 * 24.0 * math.sqrt(2.0), rel=0.15)
 
 
+def test_facets_that_open_aside_and_ahead_of_the_tip_are_no_length() -> None:
+    """A crack that is straight as far as it goes has the area of a line, whatever has opened before its tip."""
+    x = [*np.arange(0.5, 29.0), 31.5]
+    crack = facets(x, [*np.zeros(29), 4.0], x)
+    assert crack.straight > 1.1 * crack.area.sum()
+    assert crack.inflation == pytest.approx(1.0, abs=1e-12)
+    assert math.isnan(facets([0.5], [0.0], [1.0]).inflation)
+
+
+@pytest.mark.parametrize("hole", [(10.5,), (10.5, 11.5), (10.5, 11.5, 12.5)])
+@pytest.mark.parametrize("end", [32.0, 40.0])
+def test_what_holds_behind_the_tip_is_missed(hole: tuple[float, ...], end: float) -> None:
+    """In a crack that is through, and in one that is not; where a whole bin holds as well."""
+    x = [at for at in np.arange(0.5, end) if at not in hole]
+    crack = facets(x, np.zeros(len(x)).tolist(), x)
+    length = end if end == 40.0 else 18.0
+    assert crack.wake.straight == pytest.approx(length, rel=1e-12)
+    assert crack.inflation == pytest.approx(1.0 - len(hole) / length, rel=1e-12)
+
+
 def test_the_slit_of_a_regular_mesh_is_that_of_the_generator() -> None:
     case = load.parse_case(load.read_data(load.shipped_path("branching_plate")))
     body = case.parts[0].mesh
@@ -120,25 +140,31 @@ def test_a_random_mesh_has_no_direction_and_no_flat_tets() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(600)
+@pytest.mark.timeout(1200)
 def test_branching_plate_starts_branches_and_ends_as_published() -> None:
-    """On a mesh without directions: start, below 0.6 of the Rayleigh speed, branches, at the edge after 75 to 80 us.
+    """On meshes without directions: start, below 0.6 of the Rayleigh speed, branches, at the edge after 75 to 80 us.
 
-    This is the first of five such meshes. One more branches, and later: which is what docs/bench.md is about.
+    Which of five such meshes branch is chance: a step a hundredth shorter moves the branches of one by 9 mm and 11 us
+    (docs/bench.md, Cracks). So the five are judged together: all start in time, the median of their largest speeds is
+    below the bound, some branch, and the times at the edge differ from the published ones by no more than among
+    themselves, which is no more than the published ones do.
 
     It cannot start before K = 2 s / (1 - m) sqrt(c t (1 - 2 m) / pi) = sqrt(E G) (Freund 1990) for crack faces with the
     sudden pressure s = 2 MPa that makes them free of stress, in plane stress, m = nu / (1 + nu). A fully open facet is
     the far end of a cohesive zone, which has to form first: later than the published 11 to 14 us.
     """
-    run = cracks.watch(cracks.PLATES[-1])
-    crack, m = run.crack, 0.2 / 1.2
+    runs, m = [cracks.watch(plan) for plan in cracks.RANDOM], 0.2 / 1.2
     wait = math.pi * 32e9 * 3.0 * (1 - m) ** 2 / (4 * 4e12 * 3689.0 * (1 - 2 * m))
     assert STEP + wait == pytest.approx(10.75e-6, rel=5e-3)
-    print(f"start {crack.start:.4g}, branches at {crack.branched:.4g} m, {crack.passed(crack.branched):.4g} s")
-    assert STEP + wait < crack.start < 1.5 * (STEP + wait)
-    assert np.isfinite(crack.branched)
-    assert 75e-6 < crack.passed(crack.end - 1.5 * FINE) < 80e-6
-    assert run.fastest[0] < 0.6
+    for crack in (run.crack for run in runs):
+        print(f"start {crack.start:.4g}, branches at {crack.branched:.4g} m, {crack.passed(crack.branched):.4g} s")
+        assert STEP + wait < crack.start < 1.5 * (STEP + wait)
+    assert np.median([run.fastest[0] for run in runs]) < 0.6
+    assert any(np.isfinite(run.crack.branched) for run in runs)
+    edge = np.array([run.crack.passed(run.crack.end - 1.5 * FINE) for run in runs])
+    print(f"at the edge after {edge.mean():.4g} s, standard deviation {edge.std():.2g} s")
+    assert edge.std() < 5e-6
+    assert 75e-6 - edge.std() < edge.mean() < 80e-6 + edge.std()
 
 
 @pytest.mark.slow
