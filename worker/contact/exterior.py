@@ -4,6 +4,7 @@ import numpy as np
 
 from ..boundaries import FREE, Boundary
 from ..errors import InputError
+from ..ids import among
 from ..migration.parcel import Parcel
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
@@ -29,7 +30,8 @@ class Exterior:
         """``edges``: whether sharp edges meet each other; all ranks take part."""
         self._model, self._neighbours, self._comm, self._edges = model, neighbours, comm, edges
         self._planes = symmetry_planes(model.nodes.n, bounds)
-        self.cracks = Cracks.none()
+        self.cracks, self._turned = Cracks.none(), np.zeros(0, np.int64)
+        """Facets that have broken; names of the edges here that have become sharp since the start, ascending."""
         self.surface = self._build(np.zeros(model.nodes.n, bool))
         self.size = typical(self.surface.faces.size, comm)
         """Of the faces of all ranks at the start, m."""
@@ -41,13 +43,16 @@ class Exterior:
         """Whether nodes of any rank have separated: cracks may be open."""
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds cracks, nodes of the surface and moments of normals."""
+        """Adds cracks, edges that have become sharp, nodes of the surface and moments of normals."""
         parcel.rows["contact.cracks"] = self.cracks.keep(parcel.nodes["id"])
+        parcel.rows["contact.turned"] = {"tet": self._turned >> 34, "name": self._turned}
         parcel.nodes["contact.flags"], parcel.nodes["contact.moments"] = self.surface.flags, self._moments
 
     def resume(self, parcel: Parcel, size: float, separated: bool) -> None:
         """Takes them back; all ranks take part."""
         self.size, self._separated = size, separated
+        self._turned = np.sort(parcel.rows["contact.turned"]["name"])
+        self.surface.edges.sharp |= among(self._turned, self.surface.edges.names)
         self.surface.flags = np.array(parcel.nodes["contact.flags"])
         self._moments = np.array(parcel.nodes["contact.moments"])
         nodes = self._model.nodes
@@ -79,7 +84,19 @@ class Exterior:
         sides = self.cracks.foresee() if len(self.cracks.faces) else _NO_SIDES
         found = surface.build(self._model, self._planes, self._neighbours, self._comm, self._edges, sides)
         found.flags[: len(flags)] |= flags
+        if len(self._turned):
+            names = found.edges.names
+            found.edges.sharp |= among(self._turned, names)
+            self._turned = np.intersect1d(names, self._turned)
         return found
+
+    def sharpen(self, scene: Scene) -> None:
+        """Which edges have become sharp."""
+        turned = scene.sharpen()
+        if turned.any():
+            edges, own = self.surface.edges, turned[: self.surface.edges.n]
+            edges.sharp |= own
+            self._turned = np.union1d(self._turned, edges.names[own])
 
     def uncover(self, loose: Flags, removed: Flags) -> None:
         """The surface after tets have left; ``loose`` (nodes,): nodes without tets that fly on, ``removed``: those that

@@ -1,4 +1,4 @@
-"""The surface of the bodies on one rank: exposed faces, sharp edges, and the nodes on either."""
+"""The surface of the bodies on one rank: exposed faces, the edges between them, and the nodes on either."""
 
 from dataclasses import dataclass
 
@@ -24,7 +24,7 @@ class Surface:
     faces: Faces
     """Of this rank's tets."""
     edges: Edges
-    """Whose face of smaller id is of this rank's tets."""
+    """Those whose face of smaller id is of this rank's tets, sharp or not."""
     flags: Flags
     """(nodes,) which nodes of this rank are on the surface, by a face of any rank; or were, and have lost it."""
     waiting: Flags
