@@ -17,7 +17,7 @@ from conoid.worker.parallel.comm import Comm
 
 from ..worker.kernels import HARD, build, run
 from ..worker.meshes import Floats, positive
-from ..worker.test_kept_again import kept_again
+from ..worker.simulations import kept_again
 from .bodies import meeting_of, rotation
 from .ranks import on_ranks
 
@@ -110,7 +110,7 @@ def flown(comm: Comm, folder: Path, stops: tuple[int, ...]) -> tuple[str | None,
         if sim.clock.step in stops:
             sim = kept_again(sim, case, folder)
     assert sim.contact is not None
-    many = int(comm.sum(np.array([len(sim.contact.exterior._turned)]))[0])
+    many = int(comm.sum(np.array([len(sim.contact.exterior.surface.turned)]))[0])
     found = digest(sim.model, comm, []), many
     sim.free()
     return found

@@ -1,9 +1,10 @@
 """The surface of the bodies on one rank: exposed faces, the edges between them, and the nodes on either."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..ids import among
 from ..jit import njit
 from ..mesh.faces import FACES
 from ..parallel.comm import Comm
@@ -33,6 +34,14 @@ class Surface:
     """(k,) ids of nodes of ``edges`` that this rank does not hold."""
     far_owner: Indices
     """(k,) their owners."""
+    turned: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    """(t,) names of those of ``edges`` that flow has made sharp, ascending."""
+
+    def sharpen(self, names: Ints) -> None:
+        """Those of the edges that have such ``names``, ascending, have become sharp."""
+        if len(names):
+            own = self.edges.names
+            self.turned, self.edges.sharp[among(names, own)] = np.intersect1d(own, names), True
 
 
 def build(
