@@ -58,9 +58,12 @@ def test_the_order_of_the_two_edges_turns_the_normal_only() -> None:
 
 
 def test_parallel_edges_are_left_to_nodes_and_faces() -> None:
-    for angle in (0.0, 0.04, np.pi, np.pi - 0.04):
+    for angle in (0.0, 5e-4, np.pi, np.pi - 5e-4):
         assert many(meets(angle=angle)) == 0
-    assert many(meets(angle=0.06)) == 1
+    for angle in (2e-3, 0.04, np.pi - 2e-3, np.pi - 0.04):
+        met = meets(angle=angle)
+        assert many(met) == 1
+        assert met.normals[0] == pytest.approx([0.0, 0.0, 1.0], abs=1e-10)
 
 
 def test_edges_that_cross_beyond_an_end_do_not_meet() -> None:

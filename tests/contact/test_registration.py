@@ -60,7 +60,10 @@ class World:
         crowd = crowd_of(self.x, self.v, self.part).take(nodes)
         sides = Sides(
             Faces(faces, self.faces[faces], self.size[faces], shown[faces]),
-            Edges(self.edges[edges], self.sides[edges], self.length[edges], shown[self.sides[edges]]), crowd, nodes,
+            Edges(
+                self.edges[edges], self.sides[edges], self.length[edges], shown[self.sides[edges]],
+                np.ones(len(edges), bool),
+            ), crowd, nodes,
         )  # fmt: skip
         all_nodes: Any = SimpleNamespace(n=4 * SHARDS, places=lambda ids: ids.astype(np.int32))
         rules, drift = Rules("arbitrary", ALLOWED, 2.0, SKIN, 1.0, True), self.v[nodes].mean(axis=0)

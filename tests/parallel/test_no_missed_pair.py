@@ -17,7 +17,7 @@ import pytest
 from conoid.cases.load import apply_overrides, parse_case, read_data, shipped
 from conoid.cases.schema import Case
 from conoid.worker import simulation, step
-from conoid.worker.contact import domain, search
+from conoid.worker.contact import domain, normals, search
 from conoid.worker.contact.edge_edge import edge_edge
 from conoid.worker.contact.narrow_phase import ContactRows, Step
 from conoid.worker.contact.node_face import node_face
@@ -98,6 +98,8 @@ class Brute(Found):
 
     def meet(self, now: Scene, give: float, dt: float) -> None:
         if self.sim.clock.step % EVERY == 0:
+            if self.sim.clock.step % normals.EVERY == 0:
+                self.contact.exterior.sharpen(now)
             step = self._step(give, dt)
             self.all[self.sim.clock.step] = self._nodes(step) + self._edges(step)
         super().meet(now, give, dt)
@@ -110,13 +112,13 @@ class Brute(Found):
     def _nodes(self, step: Step) -> Met:
         sides, met = self.contact.exterior.flight.sides, Met()
         faces, local, slaves = sides.face_places, sides.crowd.local, sides.crowd.places(sides.slaves)
-        normals, on_surface = means(self.contact.exterior._moments[local]), self.contact.exterior.surface.flags[local]
+        mean, on_surface = means(self.contact.exterior._moments[local]), self.contact.exterior.surface.flags[local]
         none = np.zeros(len(local))
         for pairs in self._pairs(slaves[:, None], faces[:, :3]):
             room, table, first = ContactRows.room(len(pairs)), PairTable(), np.full(len(local), -1, np.int32)
             table.add(np.column_stack([slaves[pairs[:, 0]], pairs[:, 1]]).astype(np.int32))
             table.hang(first, 0)
-            slots = slot_table(first, normals, none, step.v)._replace(on_surface=on_surface)
+            slots = slot_table(first, mean, none, step.v)._replace(on_surface=on_surface)
             of = face_table(faces, sides.faces.size, np.zeros(len(faces)))
             of = of._replace(id=sides.faces.id, exposed=sides.faces.exposed)
             n, _, _ = node_face(room, 0, table.arrays(), slots, of, step, 0.0)
@@ -125,7 +127,8 @@ class Brute(Found):
 
     def _edges(self, step: Step) -> Met:
         sides, met = self.contact.exterior.flight.sides, Met()
-        edges = sides.edges.take(np.lexsort((sides.edges.sides[:, 1], sides.edges.sides[:, 0])))
+        edges = sides.edges.take(sides.edges.sharp)
+        edges = edges.take(np.lexsort((edges.sides[:, 1], edges.sides[:, 0])))
         places = sides.crowd.places(edges.nodes)
         of = edge_table(places, edges.size, np.zeros(len(places)))._replace(exposed=edges.exposed)
         for every in self._pairs(places[:, :2], places[:, :2]):

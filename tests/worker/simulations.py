@@ -1,4 +1,4 @@
-"""Simulations on several ranks of this process, and steps of theirs that begin with a removal."""
+"""Simulations on several ranks of this process: steps that begin with a removal, runs that go on from a checkpoint."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -10,7 +10,10 @@ import numpy as np
 from conoid.cases import schema
 from conoid.worker import assembly, simulation, step
 from conoid.worker.mesh.model import TetMesh
+from conoid.worker.migration import checkpoint
+from conoid.worker.migration.route import route
 from conoid.worker.simulation import Simulation
+from conoid.worker.timers import Timers
 
 from ..contact.ranks import on_ranks
 
@@ -42,3 +45,15 @@ def on(ranks: int, case: schema.Case, meshes: Sequence[TetMesh], work: Callable[
     ready = iter(meshes)
     with patch.object(assembly, "build_mesh", lambda *_, **__: next(ready)):
         return on_ranks(ranks, lambda comm: work(simulation.build(case, Path(), comm)))
+
+
+def kept_again(sim: Simulation, case: schema.Case, folder: Path) -> Simulation:
+    """Goes on from a checkpoint, with another case where that is allowed."""
+    checkpoint.write(simulation.keep(sim), sim.case, folder, sim.clock.step, sim.clock.t, sim.comm)
+    sim.free()
+    place, manifest = checkpoint.latest(folder)
+    checkpoint.require_same(case, manifest)
+    arrived = route(checkpoint.read(place, manifest, sim.comm), (1.0, 1.0, 1.0), sim.comm)
+    resumed = simulation.resume(case, arrived, sim.comm, Timers(sim.comm))
+    resumed.reduction.begin_again()
+    return resumed

@@ -17,12 +17,10 @@ from conoid.worker import simulation, step
 from conoid.worker.digest import digest
 from conoid.worker.errors import InputError
 from conoid.worker.migration import checkpoint
-from conoid.worker.migration.route import route
 from conoid.worker.parallel.comm import Comm
-from conoid.worker.simulation import Simulation
-from conoid.worker.timers import Timers
 
 from ..contact.ranks import on_ranks
+from .simulations import kept_again
 
 BREAKING = Path(__file__).parents[1] / "parallel" / "breaking.toml"
 STEPS = 32
@@ -43,18 +41,6 @@ class Course(NamedTuple):
 
 def case_of(*changes: str) -> schema.Case:
     return parse_case(apply_overrides(read_data(BREAKING), ["balance.weights=tets", *changes]))
-
-
-def kept_again(sim: Simulation, case: schema.Case, folder: Path) -> Simulation:
-    """Goes on from a checkpoint, with another case where that is allowed."""
-    checkpoint.write(simulation.keep(sim), sim.case, folder, sim.clock.step, sim.clock.t, sim.comm)
-    sim.free()
-    place, manifest = checkpoint.latest(folder)
-    checkpoint.require_same(case, manifest)
-    arrived = route(checkpoint.read(place, manifest, sim.comm), (1.0, 1.0, 1.0), sim.comm)
-    resumed = simulation.resume(case, arrived, sim.comm, Timers(sim.comm))
-    resumed.reduction.begin_again()
-    return resumed
 
 
 def course(comm: Comm, folder: Path, cases: Sequence[schema.Case], stops: Sequence[int]) -> Course:

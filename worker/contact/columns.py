@@ -97,7 +97,7 @@ class SceneFaces:
 
 @dataclass
 class SceneEdges:
-    """The sharp edges."""
+    """The edges; only sharp ones are searched."""
 
     corners: Indices
     """(e, 4) slots."""
@@ -108,6 +108,8 @@ class SceneEdges:
     size: Floats
     exposed: Flags
     """(e, 2) whether either face is; only edges between exposed faces are met."""
+    sharp: Flags
+    """(e,) whether it is, or has been (sharp.py)."""
     own: Flags
     """(e,) whose face of smaller id is of this rank."""
     rank: Ints
@@ -123,11 +125,12 @@ class SceneEdges:
 
     @classmethod
     def at_rest(
-        cls, corners: Indices, sides: Ints, faces: Indices, size: Floats, exposed: Flags, own: Flags, rank: Ints
+        cls, corners: Indices, sides: Ints, faces: Indices, size: Floats, exposed: Flags, sharp: Flags, own: Flags,
+        rank: Ints,
     ) -> "SceneEdges":  # fmt: skip
         """Nothing is searched yet."""
         far = np.flatnonzero((faces < 0).any(axis=1))
-        return cls(corners, sides, faces, size, exposed, own, rank, far, *np.zeros((3, len(corners)), bool))
+        return cls(corners, sides, faces, size, exposed, sharp, own, rank, far, *np.zeros((3, len(corners)), bool))
 
     @property
     def names(self) -> Ints:

@@ -9,8 +9,9 @@ from ..jit import njit, types
 from .geometry import VECTOR, at, beyond, cross, distance, dot, minus, segments
 from .narrow_phase import CONTACT_ROWS, DEEP_SELF, EDGES, NEAR, PAIRS, STEP, needed
 
-_PARALLEL = 0.05
-"""Sine of the angle below which edges are left to nodes and faces."""
+_PARALLEL = 1e-3
+"""Sine of the angle below which edges are left to nodes and faces. Ridges may pass each other through a gap that is as
+wide as this share of an edge; where edges cross is known to 1e-10 of them there."""
 _ROUND = 0.01
 """Of the length of an edge: added to the distance at which a pair may meet."""
 _WORTH = 0.02

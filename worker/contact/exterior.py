@@ -30,7 +30,7 @@ class Exterior:
         self._model, self._neighbours, self._comm, self._edges = model, neighbours, comm, edges
         self._planes = symmetry_planes(model.nodes.n, bounds)
         self.cracks = Cracks.none()
-        self.surface = self._build(np.zeros(model.nodes.n, bool))
+        self.surface = self._build(np.zeros(model.nodes.n, bool), np.zeros(0, np.int64))
         self.size = typical(self.surface.faces.size, comm)
         """Of the faces of all ranks at the start, m."""
         self.flight = Flight(self.surface, model.nodes, mobilities(model.nodes, bounds), self.size, comm)
@@ -41,13 +41,15 @@ class Exterior:
         """Whether nodes of any rank have separated: cracks may be open."""
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds cracks, nodes of the surface and moments of normals."""
+        """Adds cracks, edges that have become sharp, nodes of the surface and moments of normals."""
         parcel.rows["contact.cracks"] = self.cracks.keep(parcel.nodes["id"])
+        parcel.rows["contact.turned"] = {"tet": self.surface.turned >> 34, "name": self.surface.turned}
         parcel.nodes["contact.flags"], parcel.nodes["contact.moments"] = self.surface.flags, self._moments
 
     def resume(self, parcel: Parcel, size: float, separated: bool) -> None:
         """Takes them back; all ranks take part."""
         self.size, self._separated = size, separated
+        self.surface.sharpen(np.sort(parcel.rows["contact.turned"]["name"]))
         self.surface.flags = np.array(parcel.nodes["contact.flags"])
         self._moments = np.array(parcel.nodes["contact.moments"])
         nodes = self._model.nodes
@@ -72,20 +74,27 @@ class Exterior:
         """(nodes,) nodes of the surface that this rank owns."""
         return self.surface.flags & self._model.nodes.owned
 
-    def _build(self, flags: Flags) -> surface.Surface:
-        """The surface, with sides of cracks that may open; nodes that have been on it, ``flags`` (n,), still are. All
-        ranks take part.
+    def _build(self, flags: Flags, turned: Ints) -> surface.Surface:
+        """The surface, with sides of cracks that may open; nodes that have been on it, ``flags`` (n,), still are, and
+        edges that have become sharp, ``turned``, stay so. All ranks take part.
         """
         sides = self.cracks.foresee() if len(self.cracks.faces) else _NO_SIDES
         found = surface.build(self._model, self._planes, self._neighbours, self._comm, self._edges, sides)
         found.flags[: len(flags)] |= flags
+        found.sharpen(turned)
         return found
+
+    def sharpen(self, scene: Scene) -> None:
+        """Which edges have become sharp."""
+        turned = scene.sharpen()[: self.surface.edges.n]
+        if turned.any():
+            self.surface.sharpen(np.union1d(self.surface.turned, self.surface.edges.names[turned]))
 
     def uncover(self, loose: Flags, removed: Flags) -> None:
         """The surface after tets have left; ``loose`` (nodes,): nodes without tets that fly on, ``removed``: those that
         have left. All ranks take part.
         """
-        self.surface, self._changed = self._build(self.surface.flags | loose), True
+        self.surface, self._changed = self._build(self.surface.flags | loose, self.surface.turned), True
         self.surface.flags &= ~removed
         self.turn()
 
@@ -96,7 +105,7 @@ class Exterior:
     def take_up_cracks(self) -> None:
         """The surface anew, with the cracks that may open; all ranks take part."""
         if self._separated:
-            self.surface, self._changed = self._build(self.surface.flags), True
+            self.surface, self._changed = self._build(self.surface.flags, self.surface.turned), True
 
     def turn(self) -> None:
         """Mean normals of all nodes anew; all ranks take part."""

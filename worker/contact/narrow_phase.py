@@ -157,7 +157,7 @@ class FaceTable(NamedTuple):
 
 
 class EdgeTable(NamedTuple):
-    """The sharp edges."""
+    """The edges; pairs are of sharp ones."""
 
     corners: Indices
     """(e, 4) slots: records.Edges."""

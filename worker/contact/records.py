@@ -53,7 +53,7 @@ class Faces(Rows):
 
 @dataclass
 class Edges(Rows):
-    """Sharp edges; a row (a, b, c, d): edge ab between face abc and face bad, that of the smaller id first. Where
+    """Edges; a row (a, b, c, d): edge ab between face abc and face bad, that of the smaller id first. Where
     more than two faces meet in an edge, every two of them that may enclose a body make a row.
     """
 
@@ -64,7 +64,14 @@ class Edges(Rows):
     size: Floats
     """(n,) initial length, m."""
     exposed: Flags
-    """(n, 2) whether either face is exposed; the edge meets others when both are."""
+    """(n, 2) whether either face is exposed; the edge meets others when both are, and it is sharp."""
+    sharp: Flags
+    """(n,) see sharp.py."""
+
+    @property
+    def names(self) -> Ints:
+        """(n,) the two faces of each edge as one number: two faces have one edge in common."""
+        return (self.sides[:, 0] << 32) + self.sides[:, 1]
 
 
 @dataclass

@@ -11,7 +11,7 @@ from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, same
 from ..parallel.tags import Tag
 from ..state import Flags, Floats, Indices, Ints, Nodes
-from . import ghosts, held
+from . import ghosts, held, sharp
 from .columns import OwnSlots, SceneEdges, SceneFaces, SceneSlots
 from .company import Company
 from .ghosts import Copies
@@ -149,7 +149,7 @@ class Scene:
         self.slots.live |= nodes
         self.slots.new |= nodes
         edges = self.edges
-        _enliven(edges.live, edges.new, edges.corners, edges.faces, edges.exposed, self.faces.live)
+        _enliven(edges.live, edges.new, edges.corners, edges.faces, edges.exposed, edges.sharp, self.faces.live)
         self.slots.tracked[:] = self.slots.live
         self.slots.tracked[self.faces.corners[self.faces.live, :3]] = True
         self.slots.tracked[self.edges.corners[self.edges.live, :2]] = True
@@ -158,7 +158,15 @@ class Scene:
     @property
     def pending(self) -> bool:
         """Whether anything has to be registered."""
-        return bool(self.faces.new.any() or self.slots.new.any())
+        return bool(self.faces.new.any() or self.slots.new.any() or self.edges.new.any())
+
+    def sharpen(self) -> Flags:
+        """Which edges (e,) are sharp now and were not before; they are searched from this step on."""
+        edges = self.edges
+        turned: Flags = sharp.turned(edges.sharp, edges.corners, edges.exposed, self.crowd.x, sharp.SHARP)
+        edges.sharp |= turned
+        edges.new |= turned
+        return turned
 
     def chain(self) -> None:
         """The chains of the pairs of each node, anew."""
@@ -199,11 +207,14 @@ def _expose(exposed, fresh, faces, shown):  # type: ignore[no-untyped-def]
                 exposed[e, k], fresh[e] = True, True
 
 
-@njit("void(boolean[::1], boolean[::1], int32[:, ::1], int32[:, ::1], boolean[:, ::1], boolean[::1])", cache=True)
-def _enliven(live, new, edges, faces, exposed, searched):  # type: ignore[no-untyped-def]
-    """Edges both of whose ``faces`` (e, 2) are ``searched`` (f,), or exposed where they are not here."""
+@njit(
+    "void(boolean[::1], boolean[::1], int32[:, ::1], int32[:, ::1], boolean[:, ::1], boolean[::1], boolean[::1])",
+    cache=True,
+)
+def _enliven(live, new, edges, faces, exposed, sharp, searched):  # type: ignore[no-untyped-def]
+    """Edges that are ``sharp``, both of whose ``faces`` (e, 2) are ``searched`` (f,), or exposed where not here."""
     for e in range(len(live)):
-        both = edges[e, 0] != edges[e, 1]
+        both = sharp[e] and edges[e, 0] != edges[e, 1]
         for k in range(2):
             both &= searched[faces[e, k]] if faces[e, k] >= 0 else exposed[e, k]
         new[e] |= both and not live[e]

@@ -1,7 +1,9 @@
-"""Sharp edges: where two faces of the surface meet at an angle, and can meet other edges.
+"""Edges: where two faces of the surface meet; those that are sharp, at an angle, can meet other edges.
 
 A half edge is an edge as one face sees it, (a, b) of the face abc. Every two half edges that run against each other
-between the same nodes make an edge, but those of the two sides of one facet.
+between the same nodes make an edge, but those of the two sides of one facet. An edge is sharp when its faces meet at an
+angle at the start, or have done so, and bulge, at a step at which the mean normals of nodes are taken anew
+(normals.EVERY): flow makes edges, too. So it depends on the steps alone, not on when candidates were searched.
 """
 
 import numpy as np
@@ -10,29 +12,30 @@ from ..jit import njit
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
 from ..state import Flags, Floats, Indices, Ints, Model
+from .geometry import at, cross, dot, minus
 from .records import Edges, Faces
 
 SHARP = np.cos(np.radians(25.0))
-"""Edges between faces whose initial normals differ by more than this can meet other edges."""
+"""Edges between faces whose normals differ by more than this can meet other edges."""
 
 _A, _B, _C, _OWNER, _FACE, _EXPOSED, _LENGTH, _NORMAL = 0, 1, 2, 3, 4, 5, 6, 7
 """Columns of a half edge that travels: its nodes and the third node of its face, the owner of that one, the face,
 whether that is exposed, initial length, m, and the unit normal of the face; floats as their bits."""
-_HALF, _ROW = 10, 11
+_HALF, _ROW = 10, 12
 """Columns of a half edge, and of an edge (``_matched``)."""
 
 
 def none() -> tuple[Edges, Ints, Indices]:
     """No edge (``find``)."""
     nothing = np.zeros((0, 4), np.int64)
-    edges = Edges(nothing, nothing[:, :2], np.zeros(0), np.zeros((0, 2), bool))
+    edges = Edges(nothing, nothing[:, :2], np.zeros(0), np.zeros((0, 2), bool), np.zeros(0, bool))
     return edges, np.zeros(0, np.int64), np.zeros(0, np.int32)
 
 
 def find(
     model: Model, faces: Faces, local: Indices, units: Floats, some: Flags, neighbours: list[Neighbour], comm: Comm
 ) -> tuple[Edges, Ints, Indices]:
-    """Sharp edges by the ids of their faces, and ids of the nodes of theirs that are not held here, with their owners.
+    """The edges by the ids of their faces, and ids of the nodes of theirs that are not held here, with their owners.
 
     Of ``some`` (f,) of the faces, with the ``local`` nodes (f, 4) and unit normals (f, 3). Where other ranks may hold
     faces of an edge, the owner of the lower node brings them together, and the rank of the face of smaller id has the
@@ -42,13 +45,14 @@ def find(
     away = half & _common(local, model.nodes.n, neighbours) if neighbours else np.zeros_like(half)
     pairs = _pairs(local, half & ~away, units, model.nodes.n, SHARP)
     n = len(pairs)
-    edges = Edges(np.empty((n, 4), np.int64), np.empty((n, 2), np.int64), np.empty(n), np.empty((n, 2), bool))
-    _fill(*edges.columns(), pairs, local, faces.nodes, faces.id, faces.exposed, model.nodes.x0)
+    table = np.empty((n, 4), np.int64), np.empty((n, 2), np.int64), np.empty(n), np.empty((n, 2), bool)
+    _fill(*table, pairs, local, faces.nodes, faces.id, faces.exposed, model.nodes.x0)
+    edges = Edges(*table, pairs[:, 4] > 0)
     if comm.size == 1:
         return edges, *none()[1:]
     rows = _elsewhere(model, faces, local, units, away, comm)
     floats = np.ascontiguousarray(rows[:, 8]).view(np.float64)
-    edges = Edges.joined([edges, Edges(rows[:, :4], rows[:, 6:8], floats, rows[:, 9:] > 0)])
+    edges = Edges.joined([edges, Edges(rows[:, :4], rows[:, 6:8], floats, rows[:, 9:11] > 0, rows[:, 11] > 0)])
     ends, owners = rows[:, 2:4].reshape(-1), rows[:, 4:6].reshape(-1)
     absent = ~np.isin(ends, model.nodes.id)
     far, first = np.unique(ends[absent], return_index=True)
@@ -80,8 +84,8 @@ def _elsewhere(model: Model, faces: Faces, local: Indices, units: Floats, away: 
 
 
 def _matched(halves: Ints, sender: Ints) -> tuple[Ints, Ints]:
-    """Rows (a, b, c, d, owner of c, owner of d, face abc, face bad, length, whether either face is exposed) of the
-    sharp edges of ``halves``, and the sender of the first face of each.
+    """Rows (a, b, c, d, owner of c, owner of d, face abc, face bad, length, whether either face is exposed, whether it
+    is sharp) of the edges of ``halves``, and the sender of the first face of each.
     """
     order = np.argsort(halves[:, _FACE], kind="stable")
     halves, sender = halves[order], sender[order]
@@ -93,12 +97,14 @@ def _matched(halves: Ints, sender: Ints) -> tuple[Ints, Ints]:
     one, two = halves[pairs[:, 0]], halves[pairs[:, 2]]
     others = (np.column_stack([one[:, k], two[:, k]]) for k in (_C, _OWNER, _FACE))
     exposed = np.column_stack([one[:, _EXPOSED], two[:, _EXPOSED]])
-    return np.column_stack([one[:, [_A, _B]], *others, one[:, _LENGTH], exposed]), sender[pairs[:, 0]]
+    rows = np.column_stack([one[:, [_A, _B]], *others, one[:, _LENGTH], exposed, pairs[:, 4]])
+    return rows, sender[pairs[:, 0]]
 
 
 @njit("int32[:, ::1](int32[:, ::1], boolean[:, ::1], float64[:, ::1], int64, float64)", cache=True)
 def _pairs(corners, half, units, nodes, sharp):  # type: ignore[no-untyped-def]
-    """(p, 4) sharp edges: a face, which of its half edges, and the same of the other face; by face, then by face.
+    """(p, 5) edges: a face, which of its half edges, the same of the other face, and whether it is sharp; by face, then
+    by face.
 
     ``corners`` (f, 3 or more) of faces by ascending id, fewer than ``nodes``; ``half`` (f, 3): which of their half
     edges, k from corner k to the next, count; ``sharp``: cosine of the least angle between their ``units``.
@@ -111,7 +117,7 @@ def _pairs(corners, half, units, nodes, sharp):  # type: ignore[no-untyped-def]
                 a, b = corners[f, k], corners[f, (k + 1) % 3]
                 higher[at[min(a, b)]], which[at[min(a, b)]] = max(a, b), 3 * f + k
                 at[min(a, b)] += 1
-    found, n = np.empty((len(which) // 2 + 1, 4), np.int32), 0
+    found, n = np.empty((len(which) // 2 + 1, 5), np.int32), 0
     at[:] = begin[:-1]
     for f in range(len(corners)):
         first = n
@@ -125,16 +131,16 @@ def _pairs(corners, half, units, nodes, sharp):  # type: ignore[no-untyped-def]
                 if higher[i] != high:
                     continue
                 g, m = which[i] // 3, which[i] % 3
-                cosine = units[f, 0] * units[g, 0] + units[f, 1] * units[g, 1] + units[f, 2] * units[g, 2]
-                if corners[g, m] == a or corners[g, (m + 2) % 3] == c or not cosine < sharp:
+                if corners[g, m] == a or corners[g, (m + 2) % 3] == c:
                     continue
+                cosine = units[f, 0] * units[g, 0] + units[f, 1] * units[g, 1] + units[f, 2] * units[g, 2]
                 if n == len(found):
                     found = np.concatenate((found, np.empty_like(found)))
                 j = n
                 while j > first and found[j - 1, 2] > g:
                     found[j] = found[j - 1]
                     j -= 1
-                found[j, 0], found[j, 1], found[j, 2], found[j, 3] = f, k, g, m
+                found[j, 0], found[j, 1], found[j, 2], found[j, 3], found[j, 4] = f, k, g, m, cosine < sharp
                 n += 1
     return found[:n].copy()
 
@@ -169,3 +175,21 @@ def _fill(nodes, sides, size, exposed, pairs, local, face_nodes, face_id, face_e
         a, b = local[f, k], local[f, (k + 1) % 3]
         dx, dy, dz = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
         size[p] = np.sqrt(dx * dx + dy * dy + dz * dz)
+
+
+@njit("boolean[::1](boolean[::1], int32[:, ::1], boolean[:, ::1], float64[:, ::1], float64)", cache=True)
+def turned(sharp, corners, exposed, x, least):  # type: ignore[no-untyped-def]
+    """(e,) which edges between ``exposed`` faces are not ``sharp`` yet, bulge at the positions ``x`` (slots, 3), m, and
+    have faces whose normals have a cosine below ``least``; ``corners`` (e, 4): see records.Edges.
+    """
+    found = np.zeros(len(sharp), np.bool_)
+    for e in range(len(sharp)):
+        a, b = corners[e, 0], corners[e, 1]
+        if sharp[e] or a == b or not (exposed[e, 0] and exposed[e, 1]):
+            continue
+        o = at(x, a)
+        u, to, fro = minus(at(x, b), o), minus(at(x, corners[e, 2]), o), minus(at(x, corners[e, 3]), o)
+        one, two = cross(u, to), cross(fro, u)
+        cosine = dot(one, two) / np.sqrt(dot(one, one) * dot(two, two))
+        found[e] = dot(one, fro) < 0.0 and cosine < least
+    return found

@@ -260,6 +260,8 @@ class Contact:
         if step % _FORESIGHT == 0:
             self.searches.foresee()
         redraw = step % normals.EVERY == 0
+        if redraw:
+            self.exterior.sharpen(now)
         ahead = Ahead(dt, self._clock.longest, self.exterior.size, 1.0 + self._restitution)
         self.found = detect(now, self.searches.mu, give, ahead, redraw, self.found.stray)
         now.active.n = self.found.contacts

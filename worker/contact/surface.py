@@ -1,9 +1,10 @@
-"""The surface of the bodies on one rank: exposed faces, sharp edges, and the nodes on either."""
+"""The surface of the bodies on one rank: exposed faces, the edges between them, and the nodes on either."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..ids import among
 from ..jit import njit
 from ..mesh.faces import FACES
 from ..parallel.comm import Comm
@@ -24,7 +25,7 @@ class Surface:
     faces: Faces
     """Of this rank's tets."""
     edges: Edges
-    """Whose face of smaller id is of this rank's tets."""
+    """Those whose face of smaller id is of this rank's tets, sharp or not."""
     flags: Flags
     """(nodes,) which nodes of this rank are on the surface, by a face of any rank; or were, and have lost it."""
     waiting: Flags
@@ -33,6 +34,14 @@ class Surface:
     """(k,) ids of nodes of ``edges`` that this rank does not hold."""
     far_owner: Indices
     """(k,) their owners."""
+    turned: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    """(t,) names of those of ``edges`` that flow has made sharp, ascending."""
+
+    def sharpen(self, names: Ints) -> None:
+        """Those of the edges that have such ``names``, ascending, have become sharp."""
+        if len(names):
+            own = self.edges.names
+            self.turned, self.edges.sharp[among(names, own)] = np.intersect1d(own, names), True
 
 
 def build(

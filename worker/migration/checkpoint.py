@@ -26,8 +26,8 @@ from ..errors import InputError
 from ..parallel.comm import Comm
 from .parcel import Parcel, Table, take
 
-FORMAT = 4
-"""Of the files; 4 has the mean volumes of tets. Others are not read."""
+FORMAT = 5
+"""Of the files; 5 has the edges that flow has made sharp. Others are not read."""
 _KEPT = 2
 """Checkpoints that stay; the older ones go."""
 _MANIFEST = "manifest.json"

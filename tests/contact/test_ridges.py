@@ -1,0 +1,123 @@
+"""Ridges that meet: bodies do not pass into each other where two edges cross, however small the angle, and whether the
+edges are there from the start or made by flow.
+"""
+
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from conoid.cases.load import apply_overrides, parse_case, read_data
+from conoid.worker import simulation, step
+from conoid.worker.contact.sharp import SHARP, turned
+from conoid.worker.digest import digest
+from conoid.worker.mesh.model import TetMesh
+from conoid.worker.parallel.comm import Comm
+
+from ..worker.kernels import HARD, build, run
+from ..worker.meshes import Floats, positive
+from ..worker.simulations import kept_again
+from .bodies import meeting_of, rotation
+from .ranks import on_ranks
+
+SIZE = 1e-3
+ROOF = SIZE * np.array([[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0], [0.0, 0.5, -0.6], [0.0, -0.5, -0.6]])
+"""A tet with an edge along x on its top, whose faces fall by 50 degrees."""
+TET = np.array([[0, 1, 2, 3]])
+
+
+def tet(points: Floats) -> TetMesh:
+    return TetMesh(points, positive(points, TET))
+
+
+def deep(x: Floats, y: Floats) -> float:
+    """How far two tets (4, 3) overlap along the way on which they do least, m; negative when they are apart."""
+    sides = [np.array([p[j] - p[i] for i in range(4) for j in range(i + 1, 4)]) for p in (x, y)]
+    axes = [np.cross(p[[1, 0, 0, 0]] - p[[2, 3, 1, 2]], p[[3, 2, 3, 1]] - p[[2, 3, 1, 2]]) for p in (x, y)]
+    every = np.concatenate([*axes, np.cross(sides[0][:, None], sides[1][None]).reshape(-1, 3)])
+    length = np.linalg.norm(every, axis=1)
+    every = every[length > 1e-9 * length.max()]
+    one, two = x @ every.T, y @ every.T
+    overlap = np.minimum(one.max(axis=0) - two.min(axis=0), two.max(axis=0) - one.min(axis=0))
+    return float((overlap / np.linalg.norm(every, axis=1)).min())
+
+
+@pytest.mark.parametrize("angle", [0.5, 3.0, 30.0])
+def test_tets_that_come_ridge_on_ridge_do_not_pass_into_each_other(angle: float) -> None:
+    """Degrees between the ridges: at 2.9 and less they met as nodes and faces only, of which none is in the way."""
+    over = ROOF @ rotation((1, 0, 0), np.pi).T @ rotation((0, 0, 1), np.radians(angle)).T + [0.0, 0.0, 0.01 * SIZE]
+    motions = [{"velocity": (0.0, 0.0, 30.0)}, {"velocity": (0.0, 0.0, -30.0)}]
+    sim = build(meeting_of(motions, end=4e-6), [tet(ROOF), tet(over)])
+    most = [0.0]
+    run(sim, lambda sim, _: most.append(deep(sim.model.nodes.x[:4], sim.model.nodes.x[4:])))
+    assert sim.contact is not None
+    assert sim.contact.last_push > 0.0
+    assert max(most) < 0.005 * SIZE
+
+
+FLAT = SIZE * np.array([[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, -0.5, 0.0], [0.0, 0.0, -1.2]])
+"""Two tets side by side under a flat top, whose middle is an edge along x."""
+PAIR = np.array([[0, 1, 2, 4], [1, 0, 3, 4]])
+
+
+def folded(angle: float) -> Floats:
+    """``FLAT`` with its top folded about that edge until the normals of its halves are ``angle`` apart, degrees."""
+    points, half = FLAT.copy(), np.radians(0.5 * angle)
+    points[2:4] = points[2:4] * np.cos(half) - [0.0, 0.0, 0.5 * SIZE * np.sin(half)]
+    return points
+
+
+def test_tets_that_flow_has_folded_do_not_pass_into_each_other() -> None:
+    """Their tops are flat at the start and folded by 80 degrees since: the middles met nothing, for their nodes are far
+    away."""
+    half_turn = rotation((1, 0, 0), np.pi).T @ rotation((0, 0, 1), 0.5 * np.pi).T
+    gap = [0.0, 0.0, 0.01 * SIZE]
+    motions = [{"velocity": (0.0, 0.0, 30.0)}, {"velocity": (0.0, 0.0, -30.0)}]
+    meshes = [TetMesh(points, positive(points, PAIR)) for points in (FLAT, FLAT @ half_turn + gap)]
+    sim = build(meeting_of(motions, material=HARD, end=4e-6), meshes)
+    assert sim.contact is not None
+    assert not (np.isin(sim.contact.exterior.surface.edges.nodes[:, :2], [0, 1]).all(axis=1)
+                & sim.contact.exterior.surface.edges.sharp).any()  # fmt: skip
+    x = sim.model.nodes.x
+    x[:5], x[5:] = folded(80.0), folded(80.0) @ half_turn + gap
+    most = [0.0]
+    run(sim, lambda sim, _: most.extend(deep(x[a], x[5 + b]) for a, b in product(PAIR, PAIR)))
+    assert sim.contact.last_push > 0.0
+    assert max(most) < 0.005 * SIZE
+
+
+@pytest.mark.parametrize(("angle", "found"), [(20.0, False), (30.0, True), (-30.0, False)])
+def test_an_edge_becomes_sharp_when_it_bulges_by_more_than_25_degrees(angle: float, found: bool) -> None:
+    corners, one, both = np.array([[0, 1, 2, 3]], np.int32), np.zeros(1, bool), np.ones((1, 2), bool)
+    assert turned(one, corners, both, folded(angle), SHARP).tolist() == [found]
+    assert not turned(~one, corners, both, folded(angle), SHARP).any()
+    assert not turned(one, corners, both & [True, False], folded(angle), SHARP).any()
+
+
+STOPS = (150, 300)
+MEETING = Path(__file__).parents[1] / "parallel" / "meeting.toml"
+
+
+def flown(comm: Comm, folder: Path, stops: tuple[int, ...]) -> tuple[str | None, int]:
+    """Digest of the scene, and how many edges flow has made sharp; kept and resumed at ``stops``, steps."""
+    case = parse_case(apply_overrides(read_data(MEETING), ["run.frames=0", "balance.weights=tets"]))
+    sim = simulation.build(case, Path(), comm)
+    step.prepare(sim)
+    while sim.clock.step < STOPS[-1] + 20:
+        step.first_half(sim)
+        step.second_half(sim)
+        if sim.clock.step in stops:
+            sim = kept_again(sim, case, folder)
+    assert sim.contact is not None
+    many = int(comm.sum(np.array([len(sim.contact.exterior.surface.turned)]))[0])
+    found = digest(sim.model, comm, []), many
+    sim.free()
+    return found
+
+
+def test_edges_made_by_flow_are_the_same_on_any_number_of_ranks_and_after_a_checkpoint(tmp_path: Path) -> None:
+    one = on_ranks(1, lambda comm: flown(comm, tmp_path / "never", ()))[0]
+    assert one[1] > 20
+    assert on_ranks(1, lambda comm: flown(comm, tmp_path / "alone", STOPS))[0] == one
+    assert on_ranks(3, lambda comm: flown(comm, tmp_path / "three", STOPS))[0] == one
