@@ -136,6 +136,7 @@ class Erosion:
         """Before the kick: books the second half of what the last removal has begun."""
         self._book_last_work(state)
         self._nodal.words += self._half
+        self._nodal.carry()
         self._half[:] = 0
 
     def remove(self, state: Nodes) -> None:
