@@ -236,7 +236,10 @@ def _elements(
     if form == "standard":
         return Elements(model, comm, neighbours, timers)
     materials = [find_material(case, part.material) for part in case.parts]
-    bulk, more = np.array([moduli(each)[0] for each in materials]), any(equation_of(each).averaged for each in materials)
+    bulk, more = (
+        np.array([moduli(each)[0] for each in materials]),
+        any(equation_of(each).averaged for each in materials),
+    )
     return AveragedElements(
         model, comm, neighbours, timers, 1.0 / node_volume, bulk[model.nodes.part], form == "split", more > 0
     )
