@@ -84,7 +84,11 @@ class Erosion:
                 block.life[FREQUENCY] = limit / spec.time_step
 
     def grow(self, split: Split, ids: Ints) -> None:
-        """Takes up the copies of nodes."""
+        """Takes up the copies of nodes.
+
+        A part that fractures does not erode (cases/checks.py): the tets of its nodes stay, and one is as good a count
+        as any that is not zero.
+        """
         parents = split.copies.parents
         self.removed = extended(self.removed, self.removed[parents])
         self._leaves = extended(self._leaves, self._leaves[parents])
@@ -136,6 +140,7 @@ class Erosion:
         """Before the kick: books the second half of what the last removal has begun."""
         self._book_last_work(state)
         self._nodal.words += self._half
+        self._nodal.carry()
         self._half[:] = 0
 
     def remove(self, state: Nodes) -> None:

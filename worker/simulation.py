@@ -20,7 +20,7 @@ from .erosion import Erosion
 from .fracture.record import Record
 from .fracture.stage import Fracture
 from .materials.law import BULK, DENSITY, SHEAR
-from .materials.models import moduli
+from .materials.models import equation_of, moduli
 from .migration import model as model_of
 from .migration.parcel import Parcel
 from .migration.route import Arrived
@@ -83,10 +83,14 @@ class Simulation:
         """All that has a ``last_push``."""
         return [*self.boundaries, *([self.contact] if self.contact is not None else [])]
 
-    def limiting_tet(self) -> str:
-        """The tet that holds the time step down, of smallest id when several do; all ranks take part."""
+    def limiting_id(self) -> int:
+        """The tet that holds the time step down, the smallest id when several do; all ranks take part."""
         mine = self.elements.limit_bits == StepReduction.limit.word(self.reduction)
-        first = -int(self.comm.maximum(np.array([-float(self.elements.limiting) if mine else -np.inf]))[0])
+        return -int(self.comm.maximum(np.array([-float(self.elements.limiting) if mine else -np.inf]))[0])
+
+    def limiting_tet(self) -> str:
+        """The name of that tet; all ranks take part."""
+        first = self.limiting_id()
         part = int(np.searchsorted(self.model.part_starts, first, side="right")) - 1
         return f"tet {first} of {self.model.parts[part]}"
 
@@ -232,9 +236,12 @@ def _elements(
     if form == "standard":
         return Elements(model, comm, neighbours, timers)
     materials = [find_material(case, part.material) for part in case.parts]
-    bulk, heated = np.array([moduli(each)[0] for each in materials]), any(each.eos is not None for each in materials)
+    bulk, more = (
+        np.array([moduli(each)[0] for each in materials]),
+        any(equation_of(each).averaged for each in materials),
+    )
     return AveragedElements(
-        model, comm, neighbours, timers, 1.0 / node_volume, bulk[model.nodes.part], form == "split", heated
+        model, comm, neighbours, timers, 1.0 / node_volume, bulk[model.nodes.part], form == "split", more > 0
     )
 
 

@@ -66,6 +66,12 @@ the logarithm of one and that."""
 HEAT = 21
 """Energy that the pressure sees, a volume of matter, over the bulk modulus at rest (averaged pressure forms, where the
 equation of state has heat)."""
+UNTOLD = 21
+"""The same row in Johnson-Holmquist's law: bulking of the last step, Pa, that the nodes do not have yet (averaged
+pressure forms)."""
+CORNERS = 22
+"""And the three behind it in Johnson-Holmquist's law: current over initial volume at each node of a tet, as the
+pressure there sees it (averaged pressure forms)."""
 TOLD = 22
 """Work, J, that the nodes have been told of for it."""
 

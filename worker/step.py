@@ -30,6 +30,7 @@ reduction.
 
 import math
 
+from . import failed
 from .errors import PhysicsError
 from .fracture.stage import NOTHING, OVERSTRESSED, Fracture
 from .motion import kick, move
@@ -128,7 +129,7 @@ def _elements(sim: Simulation, dt: float, fracture: Fracture | None) -> None:
             elements.finish()
         pending.finish()
     if not (math.isfinite(reduction.limit) and math.isfinite(reduction.force)):
-        raise PhysicsError(f"{_when(sim)}: {sim.limiting_tet()} turned inside out, or its stress is not a number")
+        raise PhysicsError(f"{_when(sim)}: {sim.limiting_tet()} {failed.why(sim)}")
     if sim.contact is not None:
         sim.contact.agree(reduction)
     if sim.erosion is not None:

@@ -146,3 +146,14 @@ def test_even_phases_do_not_depend_on_who_holds_the_points() -> None:
     for rank, (owner, same) in enumerate(on_ranks(3, share)):
         assert owner.tolist() == one[holder == rank].tolist()
         assert same == cuts
+
+
+def test_weights_beyond_the_integers_of_a_float_are_counted_exactly() -> None:
+    """A cut goes where the integers say, whatever the order of the points."""
+    keys, quanta = np.array([1, 1, 1, 2]) << 40, np.array([2**54, 1, 1, 2**54])
+    found = []
+    for order in ([0, 1, 2, 3], [1, 2, 0, 3]):
+        cut = decompose.Cut(0, 2, 0, 0.0, 1.0, 0)
+        decompose._search([cut], [keys[order]], [quanta[order]], SerialComm())
+        found.append(cut.key >> 40)
+    assert found == [1, 1]

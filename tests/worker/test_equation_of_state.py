@@ -7,10 +7,13 @@ import numpy as np
 import pytest
 
 from conoid.cases.materials import MieGruneisen
+from conoid.worker import step
+from conoid.worker.errors import PhysicsError
+from conoid.worker.simulation import Simulation
 from conoid.worker.state import MASS, PRESSURE, VOLUME_RATIO, WORK, WORK_VISCOUS
 
 from . import formulas
-from .kernels import COPPER_GAS, STEEL, Patch, drive
+from .kernels import COPPER_GAS, FORMS, STEEL, Form, Patch, build, drive, scene
 from .meshes import Floats, free_tets
 
 assert COPPER_GAS.eos is not None
@@ -144,3 +147,32 @@ def test_speed_of_sound_is_the_slope_of_the_adiabat(ratio: float, energy: float)
 def test_speed_of_sound_of_a_linear_solid() -> None:
     point = drive(STEEL, np.zeros((3, 3)), 0.0, 1)
     assert math.isclose(speed_of_sound(point), 5856.38, rel_tol=1e-5)
+
+
+def test_there_is_no_pressure_beyond_the_pole() -> None:
+    """p_H is infinite at the compression 1 / S; what lies beyond has no pressure, not a finite one that falls again."""
+    for ratio, finite in ((1.0 - 0.99 / GAS.S, True), (1.0 - 1.01 / GAS.S, False), (-0.1, False)):
+        patch = Patch(free_tets(1, 5), COPPER_GAS)
+        patch.put(VOLUME_RATIO, ratio)
+        patch.advance(0.0)
+        assert np.isfinite(patch.get(PRESSURE)[0]) == finite
+        assert np.isfinite(patch.limit) == finite
+
+
+@pytest.mark.parametrize("spall", [None, 1e9])
+@pytest.mark.parametrize("form", FORMS)
+def test_a_tet_that_passes_the_pole_ends_the_run(form: Form, spall: float | None) -> None:
+    """With one line that names it and says how far it is compressed; it went on with whatever pressure before."""
+    case = scene(COPPER_GAS.model_copy(update={"spall": spall}), form)
+    sim = build(case, [free_tets(1, 5)])
+    step.prepare(sim)
+    sim.model.nodes.v[:] = -(sim.model.nodes.x - sim.model.nodes.x.mean(axis=0)) * 0.4 * sim.reduction.limit
+    line = r"^step \d+, t = \S+ s: tet 0 of body is compressed by 1 - V/V0 = [01]\.\d+; .* the pole, 0\.6711$"
+    with pytest.raises(PhysicsError, match=line):
+        _steps(sim, 20)
+
+
+def _steps(sim: Simulation, n: int) -> None:
+    for _ in range(n):
+        step.first_half(sim)
+        step.second_half(sim)

@@ -11,6 +11,7 @@ from conoid.worker.parallel.fixed_point import (
     CONTRIBUTION_BITS,
     HEADROOM_BITS,
     Grouped,
+    Tally,
     exact_sums,
     exact_totals,
     outgrown,
@@ -138,3 +139,24 @@ def test_a_sum_with_a_value_that_is_not_finite_is_not_a_number(odd: float) -> No
         assert np.isnan(total).tolist() == [False, True, False, False]
         assert np.isnan(each).tolist() == [[False, True, False, False]] * 2
         assert total[[0, 2, 3]].tobytes() == whole[[0, 2, 3]].tobytes()
+
+
+@pytest.mark.parametrize("share", [0.49, -0.49])
+def test_the_low_limb_of_a_tally_does_not_grow(share: float) -> None:
+    """Values far below a quantum of the high limb are in the low one alone, where 2^34 of them would wrap."""
+    tally, small = Tally(np.array([1.0])), share * 2.0**-29
+    for _ in range(50):
+        tally.add(np.full((20, 1), small))
+    assert abs(int(tally.words[1, 0])) <= 2**29
+    assert tally.total(SerialComm())[0] == pytest.approx(1000.0 * small, rel=1e-9)
+
+
+def test_where_a_tally_carries_over_changes_no_bit() -> None:
+    """One sum in many additions, or of many ranks, of which each has carried over what it had."""
+    columns = values(5000, 3)[:, :2]
+    whole, parts = Tally(np.array([10.0, 1e9])), [Tally(np.array([10.0, 1e9])) for _ in range(3)]
+    whole.add(columns)
+    for i, row in enumerate(columns):
+        parts[i % 3].add(row[None])
+    words = np.sum([part.words for part in parts], axis=0)
+    assert whole.valued(words).tobytes() == whole.total(SerialComm()).tobytes()

@@ -27,6 +27,10 @@ class Account:
         """Quanta of the high limb per joule."""
         return float(self._tally.scale[0])
 
+    def carry(self) -> None:
+        """Keeps the low limbs from wrapping; see Tally."""
+        self._tally.carry()
+
     def settle(self, words: Ints) -> bool:
         """Whether contact may take penetrations back in the step ahead; ``words`` (2, 2): the sum of those of all
         ranks.

@@ -99,12 +99,14 @@ class ActiveSet:
         """Books what the impulses take from the bodies; ``before`` (crowd, 3): v(n-1/2)."""
         for part in self._parts:
             booking.cost(account.words, part, self._room.active, before, self.places, account.scale)
+        account.carry()
 
     def heat(self, friction: Tally, before: Floats) -> None:
         """Books the work of friction."""
         words = friction.words.reshape(-1)
         for part in self._parts:
             booking.heat(words, part, self._room.active, before, self.places, float(friction.scale[0]))
+        friction.carry()
 
     def store(self, kept: Floats) -> None:
         """Stores the impulses with their pairs, ``kept`` (candidates, 4), all zero."""

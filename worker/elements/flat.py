@@ -10,7 +10,7 @@ import numpy as np
 from ..jit import njit
 from ..materials.law import BULK, DENSITY, DILATES
 from ..mesh.faces import FACES, normals
-from ..state import CHUNK, DILATION, HEAT, MASS, TOLD, Block, Flags, Floats
+from ..state import CHUNK, CORNERS, DILATION, HEAT, MASS, TOLD, Block, Flags, Floats
 from .pressure import STABILISE
 from .tet4 import CHANGE, SEEN, VOLUME, VOLUME_MID
 
@@ -56,7 +56,11 @@ def see_own(w, s, params, flat, rows, n):  # type: ignore[no-untyped-def]
             w[SEEN + i] = w[CHANGE + i] / (w[VOLUME + i] - 0.5 * w[CHANGE + i])
             if params[DILATES] > 0.0:
                 w[SEEN + i] += s[_GROWN + i]  # what ``tell_dilation`` has taken back
-            if rows > TOLD:
+            if rows > TOLD + 1:
+                for k in range(4):
+                    half = 0.5 * w[SEEN + i]
+                    s[(CORNERS + k) * CHUNK + i] *= (1.0 + half) / (1.0 - half)
+            elif rows > TOLD:
                 s[_HEAT + i] = unit * s[_TOLD + i] / s[_MASS + i]
 
 

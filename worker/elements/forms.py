@@ -205,20 +205,20 @@ class AveragedElements(Elements):
 
     def __init__(
         self, model: Model, comm: Comm, neighbours: list[Neighbour], timers: Timers,
-        weight: Floats, bulk: Floats, split: bool, heated: bool,
+        weight: Floats, bulk: Floats, split: bool, more: bool,
     ) -> None:  # fmt: skip
         """``weight`` (nodes,): one over the reference volume, 1/m^3; ``bulk`` (nodes,): modulus of the part, Pa;
-        ``heated``: whether an equation of state of the case has heat.
+        ``more``: whether an equation of state of the case has means besides, of heat or bulking.
         """
         n = model.nodes.n
         self.split = split
-        self._columns = 3 if heated else 2
+        self._columns = 3 if more else 2
         self._gradient = np.zeros((n if split else 1, 3), np.int64)
         super().__init__(model, comm, neighbours, timers)
         self._weight = weight
         self._bulk = bulk
         self._volumes = np.zeros((n, self._columns), np.int64)
-        self._strain, self._heat = np.zeros(n), np.zeros(n)
+        self._strain, self._more = np.zeros(n), np.zeros(n)
         self._projected = np.zeros((n if split else 1, 3))
         self.pressure = np.zeros(n if split else 1)
         self._scale = 1.0
@@ -264,7 +264,7 @@ class AveragedElements(Elements):
             self.shared_volumes.finish(self._volumes)
         self._strain = pressure.nodal_strains(self._volumes)
         if self._columns > 2:
-            self._heat = pressure.nodal_strains(self._volumes, 2)
+            self._more = pressure.nodal_strains(self._volumes, 2)
         if self.split:
             self.pressure -= self._bulk * self._strain
         self._begin(scale)
@@ -299,7 +299,7 @@ class AveragedElements(Elements):
     def _forces(self, block: Block, begin: int, end: int, dt: float, scale: float) -> None:
         nodes = self.model.nodes
         sweep.force_pass(
-            nodes.x, nodes.v, self._strain, self._heat, nodes.force, self.pressure, self._gradient, self.split,
+            nodes.x, nodes.v, self._strain, self._more, nodes.force, self.pressure, self._gradient, self.split,
             block.tets, block.state.reshape(-1), block.params, self._w, self._wi, self._bits, self.peaks, block.id,
             block.flat, block.worn, block.life, block.hot, block.weakest, block.quiet, block.shear_weight, block.kind,
             block.eos, block.state.shape[1], begin, end, dt, scale,

@@ -4,7 +4,8 @@ One-point tets with their own pressure lock in plastic flow. ``nodal`` replaces 
 of its nodes' values, each the volume-weighted mean over the tets round it (averaged nodal pressure, Bonet and Burton
 1998, in rate form; the pressure stays with the tet, so any equation of state works and a node that splits loses
 nothing). An equation of state with heat sees the energy averaged in the same way: heat of a tet alone would drive it
-against its neighbours, and volumes of nodes would not resist. ``split`` adds to the nodal balance the projection form
+against its neighbours, and volumes of nodes would not resist. So would bulking of its own.
+``split`` adds to the nodal balance the projection form
 of the operator split for pressure gradients (Zienkiewicz et al. 1998): Oñate-Codina stabilisation that acts on the
 difference between a tet's pressure gradient and the mean of the projected gradients of its nodes, and vanishes where
 pressure is linear.
@@ -17,7 +18,22 @@ import numpy as np
 
 from ..jit import njit
 from ..materials.law import BULK, DENSITY
-from ..state import CHUNK, DILATION, HEAT, MASS, PRESSURE, TOLD, VOLUME_FLUX, WORK, WORK_VISCOUS, Floats, Ints
+from ..state import (
+    BULKING,
+    CHUNK,
+    CORNERS,
+    DILATION,
+    HEAT,
+    MASS,
+    PRESSURE,
+    TOLD,
+    UNTOLD,
+    VOLUME_FLUX,
+    WORK,
+    WORK_VISCOUS,
+    Floats,
+    Ints,
+)
 from .tet4 import CHANGE, DILATATION, EDGE, NODAL, SEEN, SPEED, VOLUME, VOLUME_MID, largest_of, quanta
 
 QUANTA = float(2**52)
@@ -26,6 +42,9 @@ QUANTA = float(2**52)
 _FLUX, _MASS = VOLUME_FLUX * CHUNK, MASS * CHUNK
 _WORK, _WORK_VISCOUS, _HEAT, _TOLD = WORK * CHUNK, WORK_VISCOUS * CHUNK, HEAT * CHUNK, TOLD * CHUNK
 _P, _GROWN = PRESSURE * CHUNK, DILATION * CHUNK
+_BULKING, _UNTOLD, _CORNERS = BULKING * CHUNK, UNTOLD * CHUNK, CORNERS * CHUNK
+_HEATED = TOLD + 1
+"""Rows of a tet with heat; one with bulking has more."""
 STABILISE = NODAL
 """Rows of the scratch: the four stabilising volume fluxes, m^3/s."""
 _PROJECTED = NODAL + 4 * CHUNK
@@ -99,6 +118,35 @@ def scatter_heat(sums, w, s, params, weight, tets, n):  # type: ignore[no-untype
             sums[a, 2] += np.int64(np.rint(heat * weight[a] * QUANTA))
 
 
+@njit("void(int64[:, ::1], float64[::1], float64[::1], float64[::1], float64[::1], uint32[:, ::1], int64)", cache=True)
+def scatter_bulking(sums, w, s, params, weight, tets, n):  # type: ignore[no-untyped-def]
+    """Adds a quarter of the new bulking of each tet to the sums of its nodes, by volume as ``scatter_heat``.
+
+    In units of the bulk modulus. A flat tet, which has no volume here, keeps it for itself.
+    """
+    per_bulk = 1.0 / params[BULK]
+    for i in range(n):
+        if w[VOLUME_MID + i] == 0.0:
+            s[_BULKING + i] += s[_UNTOLD + i]
+        share = 0.25 * w[VOLUME_MID + i] * per_bulk * s[_UNTOLD + i]
+        s[_UNTOLD + i] = 0.0
+        for k in range(4):
+            a = tets[i, k]
+            sums[a, 2] += np.int64(np.rint(share * weight[a] * QUANTA))
+
+
+@njit(
+    "void(int64[:, ::1], float64[::1], float64[::1], float64[::1], float64[::1], uint32[:, ::1], int64, int64)",
+    cache=True,
+)
+def scatter_more(sums, w, s, params, weight, tets, rows, n):  # type: ignore[no-untyped-def]
+    """Heat, or bulking: what a tet with so many ``rows`` has."""
+    if rows == _HEATED:
+        scatter_heat(sums, w, s, params, weight, tets, n)
+    else:
+        scatter_bulking(sums, w, s, params, weight, tets, n)
+
+
 @njit("void(int64[:, ::1], float64[::1], float64[::1], uint32[:, ::1], int64, float64)", cache=True)
 def scatter_stabilised(sums, w, weight, tets, n, dt):  # type: ignore[no-untyped-def]
     """As ``scatter_volumes``, with the stabilising fluxes of ``stabilise`` added to the change of volume."""
@@ -166,6 +214,33 @@ def gather_heat(s, heat, tets, n):  # type: ignore[no-untyped-def]
         s[_HEAT + i] += 0.25 * ((heat[tets[i, 0]] + heat[tets[i, 1]]) + (heat[tets[i, 2]] + heat[tets[i, 3]]))
 
 
+@njit("void(float64[::1], float64[::1], float64[::1], uint32[:, ::1], boolean[::1], int64)", cache=True)
+def gather_bulking(s, params, bulking, tets, flat, n):  # type: ignore[no-untyped-def]
+    """BULKING: that of each tet grows by the mean of the four nodes; ``flat`` (n,), or (0,), have their own."""
+    quarter = 0.25 * params[BULK]
+    for i in range(n):
+        if len(flat) == 0 or not flat[i]:
+            a, b, c, d = tets[i, 0], tets[i, 1], tets[i, 2], tets[i, 3]
+            s[_BULKING + i] += quarter * ((bulking[a] + bulking[b]) + (bulking[c] + bulking[d]))
+
+
+@njit(
+    "void(float64[::1], float64[::1], float64[::1], uint32[:, ::1], float64[::1], boolean[::1], int64, int64)",
+    cache=True,
+)
+def gather_more(s, params, more, tets, strain, flat, rows, n):  # type: ignore[no-untyped-def]
+    """What ``scatter_more`` has given, as means over nodes; with bulking the ratio of volumes at each node, too."""
+    if rows == _HEATED:
+        gather_heat(s, more, tets, n)
+        return
+    gather_bulking(s, params, more, tets, flat, n)
+    for i in range(n):
+        if len(flat) == 0 or not flat[i]:
+            for k in range(4):
+                half = 0.5 * strain[tets[i, k]]
+                s[_CORNERS + k * CHUNK + i] *= (1.0 + half) / (1.0 - half)
+
+
 @njit("void(float64[::1], int64, float64)", cache=True)
 def own_strains(w, n, dt):  # type: ignore[no-untyped-def]
     """SEEN, CHANGE and SPEED of the ``standard`` form: each tet sees its own volume strain."""
@@ -205,7 +280,7 @@ def scatter_fluxes(gradient, wi, tets, n):  # type: ignore[no-untyped-def]
 
 
 def nodal_strains(sums: Ints, column: int = 0) -> Floats:
-    """(n,) volume strain of the step at the nodes from the completed sums (n, 2 or 3), or the heat, in ``column`` 2;
+    """(n,) volume strain of the step at the nodes from the completed sums (n, 2 or 3); of ``column`` 2 heat or bulking;
     zero at a node without tets.
     """
     strains: Floats = np.where(sums[:, 1] > 0, sums[:, column] / np.maximum(sums[:, 1], 1), 0.0)

@@ -27,7 +27,7 @@ from ..materials.law import (
 )
 from ..materials.models import press, strengthen
 from ..materials.viscosity import bulk_viscosity
-from ..state import CHUNK, TOLD
+from ..state import CHUNK, UNTOLD
 from . import pressure as averaged
 from . import rest, tet4
 from .flat import keep_out, see_own, without_flux
@@ -213,8 +213,8 @@ def strain_pass(  # type: ignore[no-untyped-def]
             averaged.tell_dilation(w, s, params, n, dt)
         if len(flat) > 0:
             keep_out(w, flat[c * CHUNK : c * CHUNK + n], n)
-        if rows > TOLD:
-            averaged.scatter_heat(sums, w, s, params, weight, t, n)
+        if rows > UNTOLD:
+            averaged.scatter_more(sums, w, s, params, weight, t, rows, n)
         quiet[c, rest.NOTED] = 0
         quiet[c, rest.STEADY] = 1 if still and rest.same(before, s) else 0
         if split:
@@ -236,19 +236,19 @@ def strain_pass(  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def force_pass(  # type: ignore[no-untyped-def]
-    x, v, strain, heat, force, pressure, gradient, split, tets, state, params, w, wi, bits, peaks, ids, flat, worn,
+    x, v, strain, more, force, pressure, gradient, split, tets, state, params, w, wi, bits, peaks, ids, flat, worn,
     life, hot, weakest, quiet, shear, strength, eos, rows, begin, end, dt, scale
 ):  # fmt: skip
-    """Pressure from the averaged volume strain and ``heat`` (nodes,), viscosity and forces at n+1; with ``split``,
-    pressure gradients.
+    """Pressure from the averaged volume strain and ``more``, heat or bulking (nodes,), viscosity and forces at n+1;
+    with ``split``, pressure gradients.
     """
     for c in range(begin, end):
         t = tets[c * CHUNK : (c + 1) * CHUNK]
         s = state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
         n = len(t)
         still = quiet[c, rest.STEADY] != 0 and rest.without(strain, t, n)
-        if still and rows > TOLD:
-            still = rest.without(heat, t, n)
+        if still and rows > UNTOLD:
+            still = rest.without(more, t, n)
         if still and quiet[c, rest.NOTED] > 0:
             rest.pass_over(peaks, quiet[c], LARGEST_LIMIT, LIMITING_TET)
             continue
@@ -261,10 +261,10 @@ def force_pass(  # type: ignore[no-untyped-def]
         tet4.end_gradients(w, n)
         upset = s.copy() if len(worn) > 0 and w[tet4.VOLUME : tet4.VOLUME + n].min() <= 0.0 else s[:0]
         averaged.gather_strains(w, strain, t, n)
-        if rows > TOLD:
-            averaged.gather_heat(s, heat, t, n)
-        averaged.recall_flux(w, s, n, dt)
         own = flat[c * CHUNK : c * CHUNK + n] if len(flat) > 0 else flat
+        if rows > UNTOLD:
+            averaged.gather_more(s, params, more, t, strain, own, rows, n)
+        averaged.recall_flux(w, s, n, dt)
         if len(own) > 0:
             see_own(w, s, params, own, rows, n)
         pressure_and_limit(eos, w, s, params, n, dt)

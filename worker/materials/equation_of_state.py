@@ -10,7 +10,19 @@ from conoid.cases.materials import MieGruneisen
 
 from ..elements.tet4 import CHANGE, MODULUS, NODAL, SEEN, VOLUME
 from ..jit import njit
-from ..state import CHUNK, HEAT, MASS, PORES, PRESSURE, TOLD, VOLUME_RATIO, WORK, WORK_PLASTIC, WORK_VISCOUS
+from ..state import (
+    CHUNK,
+    HEAT,
+    MASS,
+    PORES,
+    PRESSURE,
+    TOLD,
+    VOLUME_RATIO,
+    WORK,
+    WORK_PLASTIC,
+    WORK_VISCOUS,
+    Floats,
+)
 from .law import BULK, DENSITY, EQUATION, SHEAR, SPALL, Equation
 
 _C0, _SLOPE, _GAMMA = range(EQUATION, EQUATION + 3)
@@ -45,7 +57,7 @@ def _tear_linear(w, s, params, n):  # type: ignore[no-untyped-def]
     bulk, spall = params[BULK], params[SPALL]
     for i in range(n):
         p, pores = s[_P + i], s[_PORES + i]
-        if p >= -spall and not (pores > 0.0 and p > 0.0):
+        if not (p < -spall or (pores > 0.0 and p > 0.0)):
             continue
         strain = max((-spall - p) / bulk if p < 0.0 else -p / bulk, -pores)
         s[_P + i] = p + bulk * strain
@@ -56,12 +68,16 @@ def _tear_linear(w, s, params, n):  # type: ignore[no-untyped-def]
 
 @njit("UniTuple(float64, 2)(float64[::1], float64)", cache=True, error_model="numpy", forceinline=True)
 def _cold(params, ratio):  # type: ignore[no-untyped-def]
-    """The pressure without heat at a volume ratio, p_H (1 - gamma chi / 2), and its slope by chi less gamma p_H / 2."""
+    """The pressure without heat at a volume ratio, p_H (1 - gamma chi / 2), and its slope by chi less gamma p_H / 2.
+
+    Not a number where there is no Hugoniot: from the pole of p_H on, chi = 1 / S, and without a volume.
+    """
     gamma, slope = params[_GAMMA], params[_SLOPE]
     stiffness = params[DENSITY] * params[_C0] * params[_C0]
     chi = 1.0 - ratio
     squeezed = max(chi, 0.0)
-    d = 1.0 / (1.0 - slope * squeezed)
+    gap = min(1.0 - slope * squeezed, ratio)
+    d = 1.0 / (1.0 - slope * squeezed) if gap > 0.0 else np.nan
     return (
         stiffness * chi * d * d * (1.0 - 0.5 * gamma * squeezed),
         stiffness * d * d * d * (1.0 + (slope - gamma) * squeezed),
@@ -117,7 +133,7 @@ def _tear(w, s, params, n):  # type: ignore[no-untyped-def]
     spall, stiffness = params[SPALL], params[BULK]
     for i in range(n):
         p, pores = s[_P + i], s[_PORES + i]
-        if p >= -spall and not (pores > 0.0 and p > 0.0):
+        if not (p < -spall or (pores > 0.0 and p > 0.0)):
             continue
         old, change, known, factor = w[_OLD + i], w[CHANGE + i], w[_KNOWN + i], w[_FACTOR + i]
         before = s[_WORK + i] + 0.5 * (old + p) * change
@@ -137,7 +153,12 @@ def _gruneisen(eos: MieGruneisen) -> tuple[float, ...]:
     return eos.c0, eos.S, eos.gamma0
 
 
+def pole(params: Floats) -> float:
+    """The compression 1 - V/V0 at which p_H is infinite, 1 / S; at most 1, where nothing is left of the volume."""
+    return 1.0 / max(float(params[_SLOPE]), 1.0)
+
+
 ELASTIC = Equation("", 0, lambda _: (), linear)
 """The pressure of the elasticity."""
-GRUNEISEN = Equation("mie_gruneisen", VOLUME_RATIO + 1, _gruneisen, mie_gruneisen)
+GRUNEISEN = Equation("mie_gruneisen", VOLUME_RATIO + 1, _gruneisen, mie_gruneisen, TOLD + 1)
 """Compression and heat."""

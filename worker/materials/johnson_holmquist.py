@@ -29,6 +29,7 @@ from ..jit import njit
 from ..state import (
     BULKING,
     CHUNK,
+    CORNERS,
     DAMAGE,
     PLASTIC_STRAIN,
     PRESSURE,
@@ -38,6 +39,7 @@ from ..state import (
     S_YZ,
     S_ZX,
     S_ZZ,
+    UNTOLD,
     VOLUME_RATIO,
     WORK,
     WORK_PLASTIC,
@@ -51,6 +53,7 @@ _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _P, _STRAIN, _PLASTIC, _WORK = PRESSURE * CHUNK, PLASTIC_STRAIN * CHUNK, WORK_PLASTIC * CHUNK, WORK * CHUNK
 _DAMAGE, _BULKING, _RATIO = DAMAGE * CHUNK, BULKING * CHUNK, VOLUME_RATIO * CHUNK
+_UNTOLD, _CORNERS = UNTOLD * CHUNK, CORNERS * CHUNK
 # Rows of the scratch: (p* + T*)^N; (p* + T*)^D2; p*^M; the logarithm of the relative rate.
 _INTACT, _FRACTURE, _CRUMBLED, _FAST = (NODAL + k * CHUNK for k in range(4))
 _TINY = 1e-300
@@ -60,19 +63,38 @@ _LEAST = 0.05
 _THIRD, _TWO_THIRDS = 1.0 / 3.0, 2.0 / 3.0
 
 
+@njit(
+    "UniTuple(float64, 2)(float64[::1], float64, float64, float64)", cache=True, error_model="numpy", forceinline=True
+)
+def _pressed(params, ratio, bulking, least):  # type: ignore[no-untyped-def]
+    """p = K m + K2 m^2 + K3 m^3 + bulking, m = V0/V - 1; in tension K m + bulking, and at ``least`` -T (1 - D); and the
+    modulus of the bulk.
+    """
+    bulk, second, third = params[BULK], params[_K2], params[_K3]
+    m = 1.0 / ratio - 1.0
+    squeezed = max(m, 0.0)
+    free = bulk * m + squeezed * squeezed * (second + third * squeezed) + bulking
+    stiff = (1.0 + m) * (bulk + squeezed * (2.0 * second + 3.0 * third * squeezed))
+    return (least if free < least else free), stiff
+
+
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def crumbling(w, s, params, n):  # type: ignore[no-untyped-def]
-    """p = K m + K2 m^2 + K3 m^3 + bulking, m = V0/V - 1; in tension K m + bulking, and at least -T (1 - D)."""
-    bulk, second, third = params[BULK], params[_K2], params[_K3]
+    """The pressure of ``_pressed``; where it is averaged the mean of that at the four nodes, each with the end of its
+    own tension.
+    """
+    bulk, averaged = params[BULK], len(s) > _UNTOLD
     for i in range(n):
         half = 0.5 * w[SEEN + i]
         ratio = s[_RATIO + i] * (1.0 + half) / (1.0 - half)
-        m = 1.0 / ratio - 1.0
-        squeezed = max(m, 0.0)
-        free = bulk * m + squeezed * squeezed * (second + third * squeezed) + s[_BULKING + i]
         least = -params[_T] * (1.0 - s[_DAMAGE + i])
-        new = least if free < least else free
-        stiff = (1.0 + m) * (bulk + squeezed * (2.0 * second + 3.0 * third * squeezed))
+        if averaged:
+            new, stiff = 0.0, 0.0
+            for k in range(4):
+                p, modulus = _pressed(params, s[_CORNERS + k * CHUNK + i], s[_BULKING + i], least)
+                new, stiff = new + 0.25 * p, stiff if modulus < stiff else modulus
+        else:
+            new, stiff = _pressed(params, ratio, s[_BULKING + i], least)
         s[_WORK + i] -= 0.5 * (s[_P + i] + new) * w[CHANGE + i]
         s[_P + i], s[_RATIO + i] = new, ratio
         w[MODULUS + i] = (_LEAST * bulk if stiff < _LEAST * bulk else stiff) + 4.0 / 3.0 * params[SHEAR]
@@ -108,12 +130,13 @@ def johnson_holmquist(w, s, params, n, dt):  # type: ignore[no-untyped-def]
 
     The strength is that of the damage at n: the return is a division. The plastic work is that of the mean of the
     rotated old stress and the new one (as in mohr_coulomb.py), also where damage or pressure let the strength fall;
-    what becomes bulking is kept, and is taken off.
+    what becomes bulking is kept, and is taken off. Where the pressure is a mean over nodes, the new bulking goes to the
+    nodes first (elements/pressure.py).
     """
     equivalent_stress(w, s, n)
     _factors(w, s, params, n)
     shear, bulk, hel = params[SHEAR], params[BULK], params[_STRENGTH]
-    tension = params[_T]
+    tension, grows = params[_T], _UNTOLD if len(s) > _UNTOLD else _BULKING
     for i in range(n):
         q, p, damage = w[TRIAL + i], s[_P + i], s[_DAMAGE + i]
         rate = 1.0 + 0.5 * params[_C] * w[_FAST + i]
@@ -145,7 +168,7 @@ def johnson_holmquist(w, s, params, n, dt):  # type: ignore[no-untyped-def]
             after = intact - grown * (intact - crumbled)
             free = (strength * strength - after * after) / (6.0 * shear)
             whole = bulk * m + s[_BULKING + i]
-            s[_BULKING + i] = math.sqrt(whole * whole + 2.0 * params[_BETA] * bulk * free) - bulk * m
+            s[grows + i] += math.sqrt(whole * whole + 2.0 * params[_BETA] * bulk * free) - whole
             s[_PLASTIC + i] -= w[VOLUME_MID + i] * params[_BETA] * free
 
 
@@ -157,10 +180,11 @@ def _constants(law: JohnsonHolmquist) -> tuple[float, ...]:
     )  # fmt: skip
 
 
-PRESSURE_LAW = Equation("johnson_holmquist", DAMAGE + 1, lambda _: (), crumbling)
-"""Its own pressure: it has the bulking, and its own tension cut-off."""
+PRESSURE_LAW = Equation("johnson_holmquist", DAMAGE + 1, lambda _: (), crumbling, CORNERS + 4)
+"""Its own pressure: it has the bulking, a mean over nodes where the pressure is one, and its own tension cut-off."""
 LAW = Law(
-    "johnson_holmquist", AFTER_PRESSURE, lambda _: DAMAGE + 1, _constants, lambda *_: {}, johnson_holmquist,
+    "johnson_holmquist", AFTER_PRESSURE, lambda _: DAMAGE + 1, _constants,
+    lambda *_: {CORNERS + k: 1.0 for k in range(4)}, johnson_holmquist,
     PRESSURE_LAW.model,
 )  # fmt: skip
 """Tension ends at T (1 - D): what has crumbled has none."""

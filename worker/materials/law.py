@@ -52,6 +52,8 @@ class Equation:
     constants: Callable[[Any], tuple[float, ...]]
     """Its constants from its table in the case; they stand from EQUATION on."""
     kernel: Any
+    averaged: int = 0
+    """How many it needs in the averaged pressure forms, where it adds a mean over nodes of its own (UNTOLD, HEAT)."""
 
 
 def placed(params: Floats, begin: int, constants: tuple[float, ...], room: int) -> None:

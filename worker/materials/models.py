@@ -110,9 +110,10 @@ def parameters(material: Material, viscosity: Viscosity | None) -> Floats:
 
 def rows_of(material: Material, pressure: str) -> int:
     """How many rows of state an element of this material needs (worker/state.py)."""
-    averaged = 0 if pressure == "standard" else state.VOLUME_FLUX + 1 if material.eos is None else state.TOLD + 1
+    equation = equation_of(material)
+    averaged = 0 if pressure == "standard" else max(state.VOLUME_FLUX + 1, equation.averaged)
     porous = 0 if material.spall is None else state.PORES + 1
-    return max(law_of(material).rows(material.strength), equation_of(material).rows, averaged, porous)
+    return max(law_of(material).rows(material.strength), equation.rows, averaged, porous)
 
 
 def beginning(material: Material, temperature: float) -> dict[int, float]:

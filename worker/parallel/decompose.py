@@ -209,11 +209,11 @@ def _search(cuts: list[Cut], keys: list[Ints], quanta: list[Ints], comm: Comm) -
     total = comm.sum(np.array([q.sum() for q in quanta], np.int64))
     wanted = [int(t) * cut.left // cut.parts for t, cut in zip(total, cuts, strict=True)]
     for shift in range(64 - _DIGIT, -1, -_DIGIT):
-        sums = np.zeros((len(cuts), 1 << _DIGIT))
+        sums = np.zeros((len(cuts), 1 << _DIGIT), np.int64)
         digits = [(k >> shift) & ((1 << _DIGIT) - 1) for k in keys]
         for g, own in enumerate(digits):
-            sums[g] = np.bincount(own[alive[g]], quanta[g][alive[g]], 1 << _DIGIT)
-        every = comm.sum(sums.astype(np.int64))
+            np.add.at(sums[g], own[alive[g]], quanta[g][alive[g]])
+        every = comm.sum(sums)
         for g, cut in enumerate(cuts):
             upto = np.cumsum(every[g])
             digit = min(int(np.searchsorted(upto, wanted[g], side="right")), (1 << _DIGIT) - 1)

@@ -18,7 +18,8 @@ CONTRIBUTION_BITS = 52
 """A contribution stays below 2^52 quanta, where float64 still counts integers one by one."""
 HEADROOM_BITS = 6
 """The next step may grow 64-fold before its sum has to be repeated."""
-_LIMB = 2.0**30
+_LIMB_BITS = 30
+_LIMB = 2.0**_LIMB_BITS
 """Quanta of the low limb in one of the high: 60 bits in two limbs, each of which sums 2^32 values in an int64."""
 
 
@@ -107,6 +108,18 @@ class Tally:
     def add(self, values: Floats) -> None:
         """Adds every row of ``values`` (n, k)."""
         self.words += self.quanta(values)
+        self.carry()
+
+    def carry(self) -> None:
+        """Carries what the low limbs have over into the high ones, which leaves the sums as they are, to the bit.
+
+        A low limb has 2^29 quanta for each value at most, and values far below a quantum of the high limb are in the
+        low one alone: without this it would wrap after 2^34 of them, as contact may add in a long run.
+        """
+        high, low = self.words
+        over = (low + (1 << (_LIMB_BITS - 1))) >> _LIMB_BITS
+        high += over
+        low -= over << _LIMB_BITS
 
     def total(self, comm: Comm) -> Floats:
         """(k,) sums over all ranks; all ranks take part."""
