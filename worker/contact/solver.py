@@ -101,10 +101,9 @@ class ActiveSet:
             booking.cost(account.words, part, self._room.active, before, self.places, account.scale)
 
     def heat(self, friction: Tally, before: Floats) -> None:
-        """Books the work of friction."""
-        words = friction.words.reshape(-1)
+        """Books the work of friction, see booking.heat."""
         for part in self._parts:
-            booking.heat(words, part, self._room.active, before, self.places, float(friction.scale[0]))
+            booking.heat(friction.words, part, self._room.active, before, self.places, float(friction.scale[0]))
 
     def store(self, kept: Floats) -> None:
         """Stores the impulses with their pairs, ``kept`` (candidates, 4), all zero."""

@@ -26,7 +26,7 @@ from ..errors import InputError
 from ..parallel.comm import Comm
 from .parcel import Parcel, Table, take
 
-FORMAT = 4
+FORMAT = 5
 """Of the files; 4 has the mean volumes of tets. Others are not read."""
 _KEPT = 2
 """Checkpoints that stay; the older ones go."""
