@@ -170,6 +170,6 @@ class Solver:
 
     def heat(self, v_old: Floats) -> float:
         """Work of friction, J, of the contacts that were pushed from the velocities ``v_old``."""
-        friction = Tally(np.ones(1))
+        friction = Tally(np.ones(2))
         self.active.heat(friction, v_old)
         return float(friction.total(SerialComm())[0])

@@ -13,7 +13,9 @@ from conoid.worker.contact.active import PUSH, ActiveNodes, Loaded
 from conoid.worker.parallel.comm import Comm, SerialComm
 from conoid.worker.simulation import Simulation
 
-from ..worker.kernels import Floats, run
+from ..worker.kernels import Floats, build, run
+from ..worker.meshes import block
+from .bodies import meeting_of, moved
 from .ranks import on_ranks
 
 SPHERES = (
@@ -36,6 +38,27 @@ def test_spheres_that_meet_get_no_energy_from_contact(safety: float) -> None:
     assert sim.ledger.worst < 1e-3
     assert min(lines) > -1e-12
     assert 0.0 < lines[-1] < 5e-3
+
+
+@pytest.mark.parametrize("mu", [0.1, 0.8])
+def test_the_ledger_has_the_same_half_of_friction_and_of_the_normal_impulse(mu: float) -> None:
+    """A block that slides over another and is pressed on it. The line of the first moment has the half of the first
+    impulses that is done with the initial velocities: friction to contact as mu times the speed of sliding to that of
+    closing. At the end, with dt = 0, all is done.
+    """
+    size, sliding, closing = 1e-3, 15.0, 5.0
+    low, high = block((4, 4, 2), size, seed=1), block((3, 3, 2), size, seed=2)
+    case = meeting_of([{}, {"velocity": (sliding, 0.0, -closing)}], {"friction": mu}, end=2e-6)
+    sim = build(case, [low, moved(high, (0.5 * size, 0.5 * size, 2.0 * size))])
+    lines = []
+    run(sim, lambda sim, before: lines.append(sim.ledger.close(before)))
+    assert sim.contact is not None
+    assert lines[0].friction / lines[0].contact == pytest.approx(mu * sliding / closing, rel=1e-9)
+    assert min(line.contact for line in lines) > 0.0
+    work, later = sim.contact.books.friction.total(SerialComm())
+    assert sim.clock.dt == 0.0
+    assert later == 0.0
+    assert lines[-1].friction == pytest.approx(work, rel=1e-12)
 
 
 def test_the_cost_of_an_impulse_is_the_work_between_two_half_steps() -> None:

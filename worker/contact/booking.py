@@ -5,7 +5,7 @@ import numpy as np
 from ..jit import njit, types
 from .active import LOADED, MU, NODES, PUSH, PUSH_T, V
 
-_I1, _I2, _N1 = types.int64[::1], types.int64[:, ::1], types.int32[::1]
+_I2, _N1 = types.int64[:, ::1], types.int32[::1]
 _F1, _F2, _F = types.float64[::1], types.float64[:, ::1], types.float64
 
 
@@ -37,23 +37,27 @@ def cost(words, loaded, active, before, places, joule):  # type: ignore[no-untyp
                 words[1, m] += np.int64(np.rint((value[m] * joule - high) * 2.0**30))
 
 
-@njit(types.void(_I1, LOADED, NODES, _F2, _N1, _F), cache=True)
+@njit(types.void(_I2, LOADED, NODES, _F2, _N1, _F), cache=True)
 def heat(words, loaded, active, before, places, joule):  # type: ignore[no-untyped-def]
-    """Adds the work of friction, mean sliding velocity times impulse, to two limbs of quanta of 1 / ``joule`` J."""
+    """Adds the work of friction, mean sliding velocity times impulse, and the half of it with v(n+1/2), which the
+    ledger at time n does not have, to two limbs (rows of ``words``) of quanta of 1 / ``joule`` J.
+    """
     values, normal, tangent, slots = active.moving, loaded.normal, loaded.tangent, loaded.slots
+    value = np.empty(2)
     for q in range(loaded.many[0]):
         if normal[q, MU] > 0.0 and normal[q, PUSH] > 0.0:
-            work, many = 0.0, 2 if slots[q, 2] < 0 else 4
+            early, late, many = 0.0, 0.0, 2 if slots[q, 2] < 0 else 4
             for i in range(3):
-                rate = 0.0
+                push = tangent[q, PUSH_T + i]
                 for k in range(many):
-                    rate += tangent[q, k] * before[places[slots[q, k]], i]
-                for k in range(many):
-                    rate += tangent[q, k] * values[slots[q, k], V + i]
-                work -= 0.5 * tangent[q, PUSH_T + i] * rate
-            high = np.rint(work * joule)
-            words[0] += np.int64(high)
-            words[1] += np.int64(np.rint((work * joule - high) * 2.0**30))
+                    early += push * tangent[q, k] * before[places[slots[q, k]], i]
+                    late += push * tangent[q, k] * values[slots[q, k], V + i]
+            value[0] = -0.5 * (early + late)
+            value[1] = -0.5 * late
+            for m in range(2):
+                high = np.rint(value[m] * joule)
+                words[0, m] += np.int64(high)
+                words[1, m] += np.int64(np.rint((value[m] * joule - high) * 2.0**30))
 
 
 @njit(types.void(_F1, _F1, _N1, _N1, _F2, _I2, _F2, _F), cache=True)

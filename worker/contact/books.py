@@ -23,7 +23,8 @@ class Books:
         mass, speed = extremes
         self.scale = fixed_point.scale_for(mass * speed)
         """Quanta per N s."""
-        self.friction = fixed_point.Tally(np.array([mass * speed * speed]))
+        self.friction = fixed_point.Tally(np.full(2, mass * speed * speed))
+        """Work of friction so far, J, and the second half of that of the last step until it is due."""
         self.account = Account(mass * speed * speed)
         self.agreed = self.account.words
         """What contact has taken on all ranks, when they last agreed (account.py)."""
@@ -57,12 +58,19 @@ class Books:
         self.external_work = extended(self.external_work, np.zeros(copies))
 
     def friction_work(self, comm: Comm) -> float:
-        """Heat of friction so far of the contacts of all ranks, J; all ranks take part."""
-        return float(self.friction.total(comm)[0])
+        """Heat of friction so far of the contacts of all ranks, J, that of the last step as far as ``contact_loss`` has
+        it; all ranks take part.
+        """
+        work, later = self.friction.total(comm)
+        return float(work - later)
 
     def impulses(self, comm: Comm) -> Floats:
         """(parts, 3) what contact has given each part so far, N s; all ranks take part."""
         return np.asarray(comm.sum(self.parts) / self.scale)
+
+    def due(self) -> None:
+        """The second half of the work of the last impulses is due: friction's as well."""
+        self.friction.words[:, 1] = 0
 
     def book(self, scene: Scene, places: Indices) -> None:
         """Half of the work of the last impulses, at the ``places`` of the scene, with the velocities in ``before``."""

@@ -102,10 +102,9 @@ class ActiveSet:
         account.carry()
 
     def heat(self, friction: Tally, before: Floats) -> None:
-        """Books the work of friction."""
-        words = friction.words.reshape(-1)
+        """Books the work of friction, see booking.heat."""
         for part in self._parts:
-            booking.heat(words, part, self._room.active, before, self.places, float(friction.scale[0]))
+            booking.heat(friction.words, part, self._room.active, before, self.places, float(friction.scale[0]))
         friction.carry()
 
     def store(self, kept: Floats) -> None:

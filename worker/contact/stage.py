@@ -187,6 +187,7 @@ class Contact:
     def note(self, state: Nodes) -> None:
         """Before the kick: keeps v(n-1/2), and books the second half of the last impulses' work."""
         now = self.searches.scene
+        self.books.due()
         if now is None:
             self.books.book_resumed(state, self.exterior.flight.mobility)
             return

@@ -27,7 +27,7 @@ from ..parallel.comm import Comm
 from .parcel import Parcel, Table, take
 
 FORMAT = 5
-"""Of the files; 5 has the edges that flow has made sharp. Others are not read."""
+"""Of the files; 5 has the edges that flow has made sharp and the later half of friction. Others are not read."""
 _KEPT = 2
 """Checkpoints that stay; the older ones go."""
 _MANIFEST = "manifest.json"
