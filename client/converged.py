@@ -49,11 +49,18 @@ class Book:
         return {name: (each, goal) for name, (each, goal) in found.items() if goal is not None}
 
     def leading(self, wanted: str | None = None) -> str | None:
-        """The quantity of the advice: the wanted one, or the first that converges and has not settled on all meshes."""
+        """The quantity of the advice: the wanted one, or the first that converges and has not settled on all meshes.
+        One that has settled is none where a reference has no limit.
+        """
         goals = self.goals()
         if wanted is not None:
             return next((name for name in goals if wanted in name), None)
-        return next(iter(self.moving() or goals), None)
+        return next(iter(self.moving() or ([] if self.open_references() else goals)), None)
+
+    def open_references(self) -> list[Number]:
+        """References of the case that have no limit on these meshes."""
+        goals = self.goals()
+        return [each for each in self.numbers if each.expected is not None and each.name not in goals]
 
     def moving(self) -> list[str]:
         """Quantities that converge, and have not settled on all meshes; of those with a relative error."""
@@ -67,9 +74,21 @@ class Book:
         """One line."""
         name = self.leading(wanted)
         if name is None:
-            return "Nothing converges on these meshes: there is no error to weigh against the cost."
+            return self._nothing()
         each, goal = self.goals()[name]
         return trade.advice(self.series, each, goal, self.accuracy, self.own_size)
+
+    def _nothing(self) -> str:
+        """What to say where there is no error to weigh against the cost."""
+        said = "Nothing converges on these meshes: there is no error to weigh against the cost"
+        own = next((each for each in self.series if each.variant == self.own), None)
+        for each in self.open_references():
+            if own is not None and each.name in own.meshes[0].samples:
+                mesh, limit = own.meshes[0], own.limits[each.name]
+                value = f"{number(mesh.samples[each.name].mean)} {each.unit}".strip()
+                where, by = si(self.own_size * mesh.factor, "m"), f"{limit.uncertainty:.2g}"
+                return f"{said}. {each.name} {limit.trend.value}: {value} at {where}, uncertain by {by}."
+        return f"{said}."
 
 
 def to_markdown(book: Book, wanted: str | None = None) -> str:

@@ -30,6 +30,9 @@ def figure(book: Book) -> Figure:
 
 def _panel(axes: Axes, book: Book, number: Number, goal: Target) -> None:
     points = trade.worths(book.series, number, goal)
+    errors = [_percent(p.error) for p in points] + [_percent(goal.uncertainty)]
+    axes.set(xscale="log", yscale="log", ylim=(0.3 * min(errors), 3.0 * max(errors)))
+    axes.set(xlabel="CPU time, s", ylabel="from the limit, %")
     for colour, series in zip(_COLOURS * len(book.series), book.series, strict=False):
         mine = sorted((p for p in points if p.variant == series.variant), key=lambda p: p.mesh.size)
         axes.plot([p.cost for p in mine], [_percent(p.error) for p in mine], "o-", color=colour, markersize=4,
@@ -40,9 +43,7 @@ def _panel(axes: Axes, book: Book, number: Number, goal: Target) -> None:
     front = trade.front(points)
     axes.plot([p.cost for p in front], [_percent(p.error) for p in front], color="#1d2733", linewidth=3.5, alpha=0.18,
               label="Pareto front")  # fmt: skip
-    least = min([_percent(p.error) for p in points] + [_percent(goal.uncertainty)])
     axes.axhspan(_percent(0.0), _percent(goal.uncertainty), color="#e8e4d8", zorder=0, label="uncertainty of the limit")
-    axes.set(xscale="log", yscale="log", ylim=(0.3 * least, None), xlabel="CPU time, s", ylabel="from the limit, %")
     axes.set_title(number.name, fontsize=9)
     axes.grid(alpha=0.3)
     axes.legend(fontsize=7, frameon=False)

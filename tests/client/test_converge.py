@@ -10,7 +10,7 @@ from conoid.cases.load import parse_case, read_data, shipped_path
 from conoid.cases.messages import Energy
 from conoid.cases.outcome import Check, Outcome
 from conoid.cases.schema import Case
-from conoid.client import cli, converged, trade
+from conoid.client import cli, converged, pareto, trade
 from conoid.client.columns import read_columns
 from conoid.client.converged import Book
 from conoid.client.convergence import Done, series
@@ -96,6 +96,17 @@ def test_what_only_scatters_has_no_order_and_what_grows_is_said_to() -> None:
     assert "No limit, does not converge: broken, number." in text
     assert "ensemble of 3 runs" in text
     assert found.advice().startswith("Nothing converges")
+
+
+def test_a_count_that_has_settled_does_not_stand_for_a_reference_without_a_limit(tmp_path: Path) -> None:
+    """A case is run for its references; the picture of errors that are all nothing has axes all the same."""
+    lengths = {0.5: 2.2, 1.0: 2.4, 2.0: 2.1}
+    found = book([run(NODAL, h, length, 10.0 * h**-4, broken=7.0) for h, length in lengths.items()])
+    assert found.leading() is None
+    assert found.leading("broken") == "broken, number"
+    assert found.advice().startswith("Nothing converges on these meshes")
+    assert "length oscillates: 2.2 m at 500 µm, uncertain by" in found.advice()
+    pareto.figure(found).savefig(tmp_path / "front.png")
 
 
 def test_tables_and_json_have_every_mesh_and_name_what_failed() -> None:
