@@ -49,7 +49,8 @@ class Started(Message, frozen=True):
 class Energy(msgspec.Struct, kw_only=True, frozen=True):
     """The ledger, J: what is there and what was lost = initial + external, up to the residual.
 
-    There: kinetic, elastic, cohesive. Lost: plastic, viscous, contact, friction, eroded, fracture.
+    There: kinetic, elastic, cohesive. Lost: plastic, viscous, contact, friction, eroded, fracture,
+    stepping.
     """
 
     kinetic: float
@@ -65,6 +66,8 @@ class Energy(msgspec.Struct, kw_only=True, frozen=True):
     """By cohesive facets, for good."""
     cohesive: float = 0.0
     """What the closing of cohesive facets would give back."""
+    stepping: float = 0.0
+    """By time steps of unequal length, an error of the method; below zero where they have given energy."""
     external: float
     initial: float
     residual: float

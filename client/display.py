@@ -146,7 +146,7 @@ def _ledger(energy: Energy) -> RenderableType:
         "kinetic": energy.kinetic, "elastic": energy.elastic, "plastic": energy.plastic,
         "viscous": energy.viscous, "contact": energy.contact,
         "friction": energy.friction, "eroded": energy.eroded,
-        "fracture": energy.fracture, "cohesive": energy.cohesive,
+        "fracture": energy.fracture, "cohesive": energy.cohesive, "stepping": energy.stepping,
     }  # fmt: skip
     whole = max(abs(energy.initial + energy.external), *(abs(value) for value in terms.values()), 1e-300)
     grid = Table.grid(padding=(0, 1))

@@ -19,6 +19,8 @@ class Clock:
         """The step behind, s."""
         self.mean_dt = 0.0
         """Mean of the two: it carries v(n-1/2) to v(n+1/2)."""
+        self.shorter = 0.0
+        """A quarter of what the step ahead is shorter than the one behind, s."""
         self._first = 0.0
         self._lost = 0.0
         self._stable = math.inf
@@ -64,7 +66,7 @@ class Clock:
         left = self.frame_time(self.frame + 1 if self.frame_due else self.frame) - self.t
         self.dt = left / max(math.ceil(left / self._stable), 1) if left > 0.0 else 0.0
         self._first = self._first or self._stable
-        self.mean_dt = 0.5 * (self.last_dt + self.dt)
+        self.mean_dt, self.shorter = 0.5 * (self.last_dt + self.dt), 0.25 * (self.last_dt - self.dt)
         return self.mean_dt
 
     @property

@@ -166,6 +166,7 @@ def _model(case: schema.Case, piece: Piece) -> Model:
     nodes = Nodes(
         id=piece.node_ids, part=piece.node_part, owner=piece.node_owner, owned=piece.owned, x0=piece.points.copy(),
         x=piece.points, v=piece.velocity, mass=piece.mass, force=np.zeros(piece.points.shape, np.int64),
+        stepping=np.zeros(len(piece.mass)),
         group=piece.node_group,
     )  # fmt: skip
     blocks = [_block(case, piece, index) for index in range(len(case.parts)) if (piece.tet_part == index).any()]

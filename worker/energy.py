@@ -1,9 +1,10 @@
 """The ledger: every joule has a line, and the residual says whether the lines close.
 
-Kinetic energy is the form that the leapfrog step conserves together with the trapezoidal work of the forces:
-1/2 m v(n-1/2) . v(n+1/2) for equal steps, and with the old step dt- beside the mean step dt of the kick
-1/2 m v(n-1/2) . v(n+1/2) + 1/2 (dt- - dt) v(n-1/2) . f(n). Work of the stress is summed tet by tet from stress and
-strain rate, not from nodal forces, so the residual compares two independent accounts.
+Kinetic energy is the form that leapfrog with equal steps conserves together with the trapezoidal work of the forces:
+1/2 m v(n-1/2) . v(n+1/2). Where the steps dt- and dt+ before and after n differ, the two part by
+1/4 (dt- - dt+) f(n) . (v(n-1/2) - v(n+1/2)): an error of the method, booked node by node as ``stepping``
+(docs/numerics.md, Time integration), of which the half with v(n-1/2) is there at n. Work of the stress is summed tet by
+tet from stress and strain rate, not from nodal forces, so the residual compares two independent accounts.
 
 The sums over nodes and tets are made part by part, in the quanta of the whole: those of the whole are the sums of the
 same integers, so that their bits do not know of parts, and what each part has costs no further pass.
@@ -14,7 +15,6 @@ import numpy as np
 from conoid.cases.messages import Energy, PartEnergy
 
 from .boundaries import Boundary
-from .clock import Clock
 from .contact.stage import Contact
 from .erosion import Erosion
 from .fracture.stage import Fracture
@@ -31,7 +31,7 @@ class Ledger:
 
     def __init__(
         self, model: Model, boundaries: list[Boundary], contact: Contact | None, erosion: Erosion | None,
-        fracture: Fracture | None, comm: Comm, clock: Clock,
+        fracture: Fracture | None, comm: Comm,
     ) -> None:  # fmt: skip
         self._model = model
         self._boundaries = boundaries
@@ -39,13 +39,14 @@ class Ledger:
         self._erosion = erosion
         self._fracture = fracture
         self._comm = comm
-        self._clock = clock
         nodes = model.nodes
         self.initial = float(self._node_sum(0.5 * nodes.mass * (nodes.v * nodes.v).sum(axis=1)))
         self.worst = 0.0
         """Largest residual so far."""
         self.lost = 0.0
         """Share of the initial energy that contact has taken, friction included, at the last call."""
+        self.stepping = 0.0
+        """Magnitude of what unequal steps have taken, over the largest energy that came in, at the last call."""
         self.momentum = np.zeros(3)
         """Linear momentum at the last call, kg m/s, that of what has left included."""
         self.eroded_mass = 0.0
@@ -64,33 +65,34 @@ class Ledger:
     def close(self, before: Floats) -> Energy:
         """The ledger at time n; ``before`` is v(n-1/2), the model holds v(n+1/2)."""
         nodes = self._model.nodes
-        uneven = 0.5 * (self._clock.last_dt - self._clock.mean_dt) / nodes.scale
         loss, external = self._boundary_work()
-        columns = _of_nodes(before, nodes.v, nodes.force, nodes.mass, loss, external, nodes.owned, uneven)
+        columns = _of_nodes(before, nodes.v, nodes.stepping, nodes.mass, loss, external, nodes.owned)
         parts = len(self._model.parts)
         of_nodes = Grouped(columns, nodes.part[nodes.owned], parts)
         sums, of_parts = exact_totals(self._comm, of_nodes, ElementWork(self._model.blocks, parts))
-        node_sums, (work, viscous, plastic) = sums[:6], sums[6:]
-        self.parts = _named(self._model.parts, of_parts[:, 0], of_parts[:, 6] + of_parts[:, 7])
+        node_sums, (work, viscous, plastic) = sums[:7], sums[7:]
+        self.parts = _named(self._model.parts, of_parts[:, 0], of_parts[:, 7] + of_parts[:, 8])
         gone_work, gone_viscous, gone_plastic, gone_kinetic, gone_momentum = self._gone()
         self.momentum = node_sums[3:6] + gone_momentum
         self.lost = float(node_sums[1]) / self.initial if self.initial > 0.0 else 0.0
-        kinetic_sum, loss_sum, external_sum = (float(v) for v in node_sums[:3])
+        kinetic_sum, loss_sum, external_sum, stepping = (float(v) for v in (*node_sums[:3], node_sums[6]))
         eroded = gone_work - gone_plastic + gone_kinetic
         plastic_sum, viscous_sum = float(plastic) + gone_plastic, float(viscous) + gone_viscous
         lost, cohesive = 0.0, 0.0
         if self._fracture is not None and self._fracture.cohesion is not None:
             lost, cohesive = self._fracture.cohesion.energies(self._comm)
-        total = kinetic_sum + float(work - plastic) + plastic_sum + viscous_sum + loss_sum + eroded + lost + cohesive
+        inside = float(work - plastic) + plastic_sum + viscous_sum
+        total = kinetic_sum + inside + loss_sum + eroded + lost + cohesive + stepping
         friction = self._contact.friction_work() if self._contact is not None else 0.0
         scale = float(np.abs([self.initial, external_sum, work, kinetic_sum]).max())
         left = abs(total - self.initial - external_sum)
         residual = left / scale if scale != 0.0 else left
+        self.stepping = abs(stepping) / scale if scale != 0.0 else 0.0
         self.worst = max(self.worst, residual)
         return Energy(
             kinetic=kinetic_sum, elastic=float(work - plastic), plastic=plastic_sum, viscous=viscous_sum,
             contact=loss_sum - friction, friction=friction, eroded=eroded, fracture=lost, cohesive=cohesive,
-            external=external_sum, initial=self.initial, residual=residual,
+            stepping=stepping, external=external_sum, initial=self.initial, residual=residual,
         )  # fmt: skip
 
     def _node_sum(self, values: Floats) -> float:
@@ -160,21 +162,22 @@ def _visit_work(largest, words, state, n, scale):  # type: ignore[no-untyped-def
 
 
 @njit(
-    "float64[:, ::1](float64[:, ::1], float64[:, ::1], int64[:, ::1], float64[::1], float64[::1], float64[::1], "
-    "boolean[::1], float64)",
+    "float64[:, ::1](float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64[::1], float64[::1], "
+    "boolean[::1])",
     cache=True,
 )
-def _of_nodes(before, v, force, mass, loss, external, owned, uneven):  # type: ignore[no-untyped-def]
-    """(owned nodes, 6) kinetic energy, J, energy lost by impacts and work from outside, J, and momentum, kg m/s."""
-    out, m = np.empty((len(owned), 6)), 0
+def _of_nodes(before, v, stepping, mass, loss, external, owned):  # type: ignore[no-untyped-def]
+    """(owned nodes, 7) kinetic energy, J, energy lost by impacts and work from outside, J, momentum, kg m/s, and what
+    unequal steps have taken, J.
+    """
+    out, m = np.empty((len(owned), 7)), 0
     for a in range(len(owned)):
         if not owned[a]:
             continue
-        squares, work = 0.0, 0.0
+        squares = 0.0
         for i in range(3):
             squares += before[a, i] * v[a, i]
-            work += before[a, i] * force[a, i]
             out[m, 3 + i] = 0.5 * mass[a] * (before[a, i] + v[a, i])
-        out[m, 0], out[m, 1], out[m, 2] = 0.5 * mass[a] * squares + uneven * work, loss[a], external[a]
+        out[m, 0], out[m, 1], out[m, 2], out[m, 6] = 0.5 * mass[a] * squares, loss[a], external[a], stepping[a]
         m += 1
     return out[:m]

@@ -156,8 +156,7 @@ class Erosion:
         if len(leaving):
             owned = leaving[state.owned[leaving]]
             before, after, mass = self._before[state.owned[leaving]], state.v[owned], state.mass[owned]
-            uneven = 0.5 * (self._clock.last_dt - self._clock.mean_dt) / state.scale
-            energy = 0.5 * mass * (before * after).sum(axis=1) + uneven * (before * state.force[owned]).sum(axis=1)
+            energy = 0.5 * mass * (before * after).sum(axis=1)
             half = 0.5 * mass[:, None] * after
             self._half = self._nodal.quanta(np.column_stack([np.zeros((len(half), 2)), half]))
             self._nodal.add(np.column_stack([energy, mass, half]))

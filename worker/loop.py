@@ -211,11 +211,11 @@ class Loop:
             parts = [value for part in self._parts.values() for value in msgspec.structs.astuple(part)]
             extra = [*sim.ledger.momentum, *parts, *probes]
             self._history.write(clock.step, clock.t, clock.told, limiter, self.energy, extra)
-        if not self.energy.residual <= sim.case.run.residual_limit:
-            raise EnergyError(
-                f"the energy residual {self.energy.residual:.3g} passed run.residual_limit "
-                f"{sim.case.run.residual_limit:g} at step {clock.step}, t = {clock.t:.6g} s"
-            )
+        limit, when = sim.case.run.residual_limit, f"at step {clock.step}, t = {clock.t:.6g} s"
+        shares = {"the energy residual": self.energy.residual, "the energy of unequal time steps": sim.ledger.stepping}
+        for what, share in shares.items():
+            if not share <= limit:
+                raise EnergyError(f"{what}, {share:.3g}, passed run.residual_limit {limit:g} {when}")
 
     def _write_frame(self) -> None:
         sim, clock = self.sim, self.sim.clock

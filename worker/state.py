@@ -117,11 +117,15 @@ class Nodes:
     """(n,) lumped mass, kg."""
     force: Ints
     """(n, 3) internal force in quanta."""
+    stepping: Floats
+    """(n,) energy that steps of unequal length have taken, J (energy.py)."""
     scale: float = 1.0
     """Quanta per newton of ``force`` as it stands."""
     group: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
     """(n,) see Model.groups; copies stay in that of their parents. (0,) where nobody asks."""
-    _inherited: Rooms = field(default_factory=lambda: Rooms("part", "x0", "x", "v", "mass", "force"), init=False)
+    _inherited: Rooms = field(
+        default_factory=lambda: Rooms("part", "x0", "x", "v", "mass", "force", "stepping"), init=False
+    )
     _given: Rooms = field(default_factory=lambda: Rooms("id", "owner", "owned"), init=False)
 
     @property

@@ -59,7 +59,8 @@ def first_half(sim: Simulation) -> None:
             mean_dt = clock.choose_again(sim.limit)
         if sim.fracture is not None:
             sim.fracture.let_go()  # 5: f(n), less where cohesive facets would give what nobody has paid
-        kick(nodes.v, nodes.force, nodes.mass, mean_dt / sim.scale)  # v*(n+1/2) = v(n-1/2) + dt f(n) / m
+        # v*(n+1/2) = v(n-1/2) + dt f(n) / m
+        kick(nodes.v, nodes.force, nodes.mass, nodes.stepping, mean_dt / sim.scale, clock.shorter / sim.scale)
         _after_kick(sim)  # 6 to 9: v(n+1/2)
 
 
@@ -94,7 +95,8 @@ def second_half(sim: Simulation) -> None:
     """11 to 15: from v(n+1/2) to f(n+1)."""
     nodes, clock = sim.model.nodes, sim.clock
     with sim.timers.phase("nodes"):
-        move(nodes.x, nodes.v, clock.dt)  # 11: x(n+1) = x(n) + dt v(n+1/2)
+        # 11: x(n+1) = x(n) + dt v(n+1/2)
+        move(nodes.x, nodes.v, nodes.force, nodes.stepping, clock.dt, clock.shorter / sim.scale)
         clock.advance()
         if sim.contact is not None:
             own = sim.reduction.own

@@ -2,7 +2,7 @@
 
 export const FINAL = new Set(["succeeded", "failed", "cancelled", "timed_out", "lost"]);
 export const GROUPS = ["compute", "contact", "exchange", "waiting", "output", "descheduled"];
-export const TERMS = [["kinetic", "kinetic"], ["elastic", "elastic"], ["plastic", "plastic"], ["viscous", "viscous"], ["contact", "contact-work"], ["friction", "friction"], ["eroded", "eroded"], ["fracture", "fracture"], ["cohesive", "cohesive"]];
+export const TERMS = [["kinetic", "kinetic"], ["elastic", "elastic"], ["plastic", "plastic"], ["viscous", "viscous"], ["contact", "contact-work"], ["friction", "friction"], ["eroded", "eroded"], ["fracture", "fracture"], ["cohesive", "cohesive"], ["stepping", "stepping"]];
 
 const MOST_POINTS = 2000;
 const MOST_LINES = 500;

@@ -15,7 +15,8 @@ def course(x: Floats, v: Floats, tets: list[list[int]], brittle: bool = True) ->
     """Of nodes of 1 kg."""
     n, corners = len(x), np.array(tets, np.uint32)
     one = np.zeros(n, np.int32)
-    nodes = Nodes(np.arange(n), one, one, np.ones(n, bool), x, x, v, np.ones(n), np.zeros((n, 3), np.int64))
+    force = np.zeros((n, 3), np.int64)
+    nodes = Nodes(np.arange(n), one, one, np.ones(n, bool), x, x, v, np.ones(n), force, np.zeros(n))
     bond = np.zeros((len(tets) if brittle else 0, 4), np.uint8)
     block = Block(0, len(tets), corners, np.arange(len(tets)), np.zeros((0, 0, 0)), 0, 0, np.zeros(0), bond=bond)
     return courses([block], nodes, [], SerialComm())

@@ -43,7 +43,8 @@ def test_a_crack_that_comes_after_others_have_opened_stands_behind_those_that_ar
 def test_who_gets_both_sides_of_a_crack_has_the_nodes_in_the_order_of_the_first_side() -> None:
     """Ranks that have had a side each begin with different nodes, and the last bit of a normal depends on that."""
     ids, places, zeros = np.array([10, 11, 12]), np.zeros(3, np.int32), np.zeros((3, 3))
-    nodes = Nodes(ids, places, places, np.ones(3, bool), zeros, zeros, zeros, np.zeros(3), zeros.astype(np.int64))
+    none, force = np.zeros(3), zeros.astype(np.int64)
+    nodes = Nodes(ids, places, places, np.ones(3, bool), zeros, zeros, zeros, none, force, none)
     had = []
     for k, order in enumerate(([0, 1, 2], [1, 2, 0])):
         sides = np.full((1, 2, 3), -1, np.int32)

@@ -55,7 +55,7 @@ class Body:
         zeros = np.zeros(len(ids))
         nodes = Nodes(
             ids, zeros.astype(np.int32), home[ids], home[ids] == rank, self.x0[ids], self.x[ids], self.v[ids], zeros,
-            np.zeros((len(ids), 3), np.int64),
+            np.zeros((len(ids), 3), np.int64), zeros,
         )  # fmt: skip
         random = np.random.default_rng(rank)
         chosen = [random.permutation(mine[self.part[mine] == part]) for part in range(self.part.max() + 1)]

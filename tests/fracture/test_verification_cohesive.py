@@ -46,7 +46,7 @@ class Facet:
         n = len(x)
         nodes = Nodes(
             np.arange(n), np.zeros(n, np.int32), np.zeros(n, np.int32), np.ones(n, bool), x.copy(), x.copy(),
-            np.zeros((n, 3)), np.ones(n), np.zeros((n, 3), np.int64),
+            np.zeros((n, 3)), np.ones(n), np.zeros((n, 3), np.int64), np.zeros(n),
         )  # fmt: skip
         one = np.ones(1)
         sides = np.arange(6, dtype=np.int32)[None]

@@ -10,6 +10,7 @@ from conoid.cases import layout, messages
 from conoid.cases.outcome import Outcome, from_json
 
 from .launching import command, ended, processes, started, wait_for, wait_until_gone
+from .scenes import CASE as BREAKING
 
 pytestmark = pytest.mark.slow
 
@@ -182,11 +183,19 @@ def test_a_case_that_is_not_there(tmp_path: Path) -> None:
     assert outcome(tmp_path / "run").cause == "input"
 
 
-def test_a_ledger_that_does_not_close_fails_the_run(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("case", "keys", "words"),
+    [
+        ("free_spin", [*LONG, "--set", "run.residual_limit=1e-14"], "energy residual"),
+        (str(BREAKING), ["--set", "run.residual_limit=1e-4"], "energy of unequal time steps"),
+    ],
+)
+def test_a_ledger_that_does_not_close_fails_the_run(case: str, keys: list[str], words: str, tmp_path: Path) -> None:
     folder = tmp_path / "run"
-    done = ended(command(2, "free_spin", "--out", str(folder), *LONG, "--set", "run.residual_limit=1e-14"))
+    done = ended(command(2, case, "--out", str(folder), *keys))
     assert done.returncode == 3
     assert (outcome(folder).state, outcome(folder).cause) == ("failed", "energy")
+    assert words in outcome(folder).message
     assert "run.residual_limit" in outcome(folder).message
 
 

@@ -11,7 +11,7 @@ def model_of(rows: int) -> Model:
     n, x = 4, np.zeros((4, 3))
     nodes = Nodes(
         np.arange(n), np.zeros(n, np.int32), np.zeros(n, np.int32), np.ones(n, bool), x, x, x, np.ones(n),
-        np.zeros((n, 3), np.int64),
+        np.zeros((n, 3), np.int64), np.zeros(n),
     )  # fmt: skip
     blocks = []
     for k in range(2):

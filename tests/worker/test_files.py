@@ -76,8 +76,8 @@ def test_parquet_has_the_same_numbers_and_the_units(tmp_path: Path) -> None:
 
 def without_tets(nodes: int) -> Model:
     """What a rank has that others, or erosion, have left without tets; ``nodes`` of all ranks."""
-    none, points, force = np.zeros(0, np.int32), np.zeros((0, 3)), np.zeros((0, 3), np.int64)
-    mine = Nodes(np.zeros(0, np.int64), none, none, np.zeros(0, bool), points, points, points, np.zeros(0), force)
+    none, points, force, no = np.zeros(0, np.int32), np.zeros((0, 3)), np.zeros((0, 3), np.int64), np.zeros(0)
+    mine = Nodes(np.zeros(0, np.int64), none, none, np.zeros(0, bool), points, points, points, no, force, no)
     return Model(mine, nodes_global=nodes)
 
 

@@ -22,7 +22,7 @@ def nodes(n: int) -> Nodes:
     x: Floats = np.zeros((n, 3))
     part = np.zeros(n, np.int32)
     owned, force = np.ones(n, bool), np.zeros((n, 3), np.int64)
-    return Nodes(np.arange(n), part, part, owned, x, x.copy(), x.copy(), np.full(n, 2.0), force)
+    return Nodes(np.arange(n), part, part, owned, x, x.copy(), x.copy(), np.full(n, 2.0), force, np.zeros(n))
 
 
 class Piston(Driver):

@@ -11,7 +11,7 @@ from ..state import CHUNK, Bits, Block, Indices, Ints, Model, Nodes, Tets
 from .parcel import Parcel, Table, length, take
 from .route import Arrived
 
-_NODAL = ("id", "part", "x0", "x", "v", "mass", "force", "group")
+_NODAL = ("id", "part", "x0", "x", "v", "mass", "force", "stepping", "group")
 _OF_TETS = ("across", "bond", "weakest", "worn")
 """Columns that a block has where the scene needs them."""
 

@@ -77,7 +77,7 @@ def joined(shares: Sequence[Share], parts: list[str]) -> Whole:
     n = len(ids)
     nodes = Nodes(
         ids, np.zeros(n, np.int32), np.zeros(n, np.int32), np.ones(n, bool), x, x, v, np.zeros(n),
-        np.zeros((n, 3), np.int64),
+        np.zeros((n, 3), np.int64), np.zeros(n),
     )  # fmt: skip
     gathered = [_block(shares, part, ids) for part in range(len(parts))]
     blocks = [block for block, _ in gathered if block.n]
