@@ -67,9 +67,7 @@ def test_what_rings_gains_no_energy(material: materials.Material, speed: float, 
 
 
 def test_what_unequal_steps_take_has_its_line() -> None:
-    """A cube that rings at steps of random lengths: the line is what is derived node by node, in plain numpy, and nearly
-    all by which the accounts would not close.
-    """
+    """A cube that rings at steps of random lengths: what is derived node by node, in plain numpy; the rest closes."""
     sim = build(scene(STEEL, "standard", jitter=20.0, end=4e-6, dt_growth=2.0), [block((6, 6, 6), 1e-3)])
     random, taken, seen = np.random.default_rng(4), [0.0], []
 
