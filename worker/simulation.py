@@ -14,7 +14,8 @@ from .assembly import Say, quiet
 from .boundaries import Boundary, RigidWalls
 from .clock import Clock
 from .contact.stage import Contact
-from .elements.forms import AveragedElements, Elements
+from .elements.averaging import AveragedElements
+from .elements.forms import Elements
 from .energy import Ledger
 from .erosion import Erosion
 from .fracture.record import Record

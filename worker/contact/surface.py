@@ -49,7 +49,7 @@ def build(
 ) -> Surface:
     """The surface; all ranks take part.
 
-        ``planes`` (nodes, planes) says which nodes lie on which symmetry plane. A face with all three nodes on the same
+    ``planes`` (nodes, planes) says which nodes lie on which symmetry plane. A face with all three nodes on the same
     plane is no surface; a face of a body one tet thick, with nodes on two parallel planes, is part of it. ``cracks``
     (m, 3): block, place and face of the sides here of cracks that may open before the next search. Faces that erosion
     has laid bare meet nodes; their edges meet no edges: they would be as many as the faces, and all sharp.

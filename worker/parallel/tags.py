@@ -12,9 +12,9 @@ class Tag(IntEnum):
     FORCE = 1
     """Sums of nodal forces, in every step (elements/forms.py)."""
     VOLUME = 2
-    """Sums of nodal volumes, in every step of the averaged pressure forms (elements/forms.py)."""
+    """Sums of nodal volumes, in every step of the averaged pressure forms (elements/averaging.py)."""
     GRADIENT = 3
-    """Sums of nodal pressure gradients, in every step of the ``split`` form (elements/forms.py)."""
+    """Sums of nodal pressure gradients, in every step of the ``split`` form (elements/averaging.py)."""
     SURFACE = 10
     """Which nodes are on the surface, when it is built (contact/surface.py)."""
     GHOST = 11

@@ -1,0 +1,119 @@
+"""The pressure forms that average over nodes, ``nodal`` and ``split``, as the time step sees them."""
+
+import numpy as np
+
+from ..migration.parcel import Parcel
+from ..parallel.comm import Comm
+from ..parallel.ownership import Neighbour, SharedSum
+from ..parallel.tags import Tag
+from ..state import Block, Copies, Floats, Ints, Model, extended
+from ..timers import Timers
+from . import pressure, sweep
+from .flat import flat_tets
+from .forms import Elements
+
+
+class AveragedElements(Elements):
+    """The ``nodal`` and ``split`` forms: two passes with the completed nodal volume sums between them."""
+
+    def __init__(
+        self, model: Model, comm: Comm, neighbours: list[Neighbour], timers: Timers,
+        weight: Floats, bulk: Floats, split: bool, more: bool,
+    ) -> None:  # fmt: skip
+        """``weight`` (nodes,): one over the reference volume, 1/m^3; ``bulk`` (nodes,): modulus of the part, Pa;
+        ``more``: whether an equation of state of the case has means besides, of heat or bulking.
+        """
+        n = model.nodes.n
+        self.split = split
+        self._columns = 3 if more else 2
+        self._gradient = np.zeros((n if split else 1, 3), np.int64)
+        super().__init__(model, comm, neighbours, timers)
+        self._weight = weight
+        self._bulk = bulk
+        self._volumes = np.zeros((n, self._columns), np.int64)
+        self._strain, self._more = np.zeros(n), np.zeros(n)
+        self._projected = np.zeros((n if split else 1, 3))
+        self.pressure = np.zeros(n if split else 1)
+        self._scale = 1.0
+        for block in model.blocks:
+            block.flat = flat_tets(block, model.nodes.x0)
+
+    def _connect(self) -> None:
+        super()._connect()
+        self.shared_volumes = SharedSum(self._comm, self._neighbours, self._columns, Tag.VOLUME)
+        if self.split:
+            self.shared_gradients = SharedSum(self._comm, self._neighbours, 3, Tag.GRADIENT)
+
+    def grow(self, copies: Copies) -> None:
+        super().grow(copies)
+        parents = copies.parents
+        for name in ("_weight", "_bulk", "_volumes", *(("_gradient", "_projected", "pressure") if self.split else ())):
+            values = getattr(self, name)
+            setattr(self, name, extended(values, values[parents]))
+
+    def keep(self, parcel: Parcel) -> None:
+        super().keep(parcel)
+        for name in self._kept:
+            parcel.nodes[f"elements.{name}"] = getattr(self, name)
+
+    def resume(self, parcel: Parcel) -> None:
+        super().resume(parcel)
+        for name in self._kept:
+            setattr(self, name, np.ascontiguousarray(parcel.nodes[f"elements.{name}"]))
+
+    @property
+    def _kept(self) -> tuple[str, ...]:
+        return ("_weight", "pressure", "_projected") if self.split else ("_weight",)
+
+    def _exchanges(self) -> list[SharedSum]:
+        return [self.shared_forces, self.shared_volumes, *([self.shared_gradients] if self.split else [])]
+
+    def advance(self, dt: float, scale: float) -> None:
+        self.peaks[:] = 0
+        self._volumes[:] = 0
+        send = self.shared_volumes.begin
+        self._both_regions(lambda block, begin, end: self._strains(block, begin, end, dt), lambda: send(self._volumes))
+        with self._timers.phase("exchange"):
+            self.shared_volumes.finish(self._volumes)
+        self._strain = pressure.nodal_strains(self._volumes)
+        if self._columns > 2:
+            self._more = pressure.nodal_strains(self._volumes, 2)
+        if self.split:
+            self.pressure -= self._bulk * self._strain
+        self._begin(scale)
+        self._gradient[:] = 0
+        self._scale = scale
+        self._both_regions(lambda block, begin, end: self._forces(block, begin, end, dt, scale), self._send)
+
+    def again(self, scale: float) -> None:
+        self._gradient[:] = 0
+        self._scale = scale
+        super().again(scale)
+
+    def finish(self) -> None:
+        super().finish()
+        if self.split:
+            self.shared_gradients.begin(self._gradient)
+            self.shared_gradients.finish(self._gradient)
+            volumes = np.maximum(self._volumes[:, 1], 1) / (self._weight * pressure.QUANTA)
+            self._projected = self._gradient / (self._scale * volumes[:, None])
+
+    def _gradients(self) -> Ints:
+        return self._gradient
+
+    def _strains(self, block: Block, begin: int, end: int, dt: float) -> None:
+        nodes = self.model.nodes
+        sweep.strain_pass(
+            nodes.x0, nodes.x, nodes.v, self._volumes, self._weight, self.pressure, self._projected, self.split,
+            block.tets, block.state.reshape(-1), block.params, self._w, block.flat, block.worn, block.quiet,
+            block.kind, block.state.shape[1], begin, end, dt,
+        )  # fmt: skip
+
+    def _forces(self, block: Block, begin: int, end: int, dt: float, scale: float) -> None:
+        nodes = self.model.nodes
+        sweep.force_pass(
+            nodes.x, nodes.v, self._strain, self._more, nodes.force, self.pressure, self._gradient, self.split,
+            block.tets, block.state.reshape(-1), block.params, self._w, self._wi, self._bits, self.peaks, block.id,
+            block.flat, block.worn, block.life, block.hot, block.weakest, block.quiet, block.shear_weight, block.kind,
+            block.eos, block.state.shape[1], begin, end, dt, scale,
+        )  # fmt: skip
