@@ -191,7 +191,7 @@ class RigidWalls(Boundary):
             self._book()
 
     def _book(self) -> None:
-        self.contact_loss -= 0.5 * (self._impulse * self._before).sum(axis=1)
+        book_half(self.contact_loss, self._impulse, self._before, -0.5)
 
 
 def mirrored(n: int, bounds: Iterable[Boundary]) -> Flags:
@@ -226,6 +226,18 @@ def _inherit(nodes, loss, work, impulse, before, n, parents, first):  # type: ig
         at[k] = p
         k += 1
     return at[:k].copy()
+
+
+@njit("void(float64[::1], float64[:, ::1], float64[:, ::1], float64)", cache=True)
+def book_half(account, impulse, v, factor):  # type: ignore[no-untyped-def]
+    """Adds ``factor``, a half with a sign, times the work of the impulses (n, 3) at velocities ``v`` (n, 3) to an
+    ``account`` (n,), J.
+    """
+    for j in range(len(account)):
+        work = 0.0
+        for i in range(3):
+            work += impulse[j, i] * v[j, i]
+        account[j] += factor * work
 
 
 @njit("void(float64[:, ::1], int32[::1], int64)", cache=True)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .boundaries import FREE, KEPT, PRESCRIBED, Boundary, free
+from .boundaries import FREE, KEPT, PRESCRIBED, Boundary, book_half, free
 from .migration.parcel import Parcel
 from .state import Bits, Floats, Indices, Ints, Load, Nodes, extended
 from .topology import Split
@@ -18,7 +18,7 @@ class Driver(Boundary):
         self._book()
 
     def _book(self) -> None:
-        self.external_work += 0.5 * (self._impulse * self._before).sum(axis=1)
+        book_half(self.external_work, self._impulse, self._before, 0.5)
 
 
 class Course:
