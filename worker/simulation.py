@@ -147,7 +147,7 @@ def _assemble(
 ) -> Simulation:  # fmt: skip
     """The stages that the case needs, round a model and its boundaries; ``node_volume`` (nodes,): at the start, m^3."""
     began, run, numerics = worked(comm), case.run, case.numerics
-    clock = Clock(run.end_time, numerics.dt_safety, numerics.dt_growth, run.frames)
+    clock = Clock(run.end_time, numerics.dt_safety, case.dt_growth, run.frames)
     extremes = _extremes(model, comm)
     contact, erosion = None, None
     if case.in_contact:

@@ -26,3 +26,18 @@ def rebound(rows, n, v, before, share):  # type: ignore[no-untyped-def]
                 approach -= weight * rows.normals[p, i] * before[s, i]
         if rows.wanted[p] > closing:
             rows.wanted[p] = max(rows.wanted[p], share * approach)
+
+
+@njit(types.void(CONTACT_ROWS, types.int64, _V), cache=True)
+def hold_back(rows, n, before):  # type: ignore[no-untyped-def]
+    """Lowers the target velocity of those of the first ``n`` active contacts that were parting, at u- of ``before``
+    (slots, 3), v(n-1/2), to -u-: less closing than that is energy that nobody paid.
+    """
+    for p in range(n):
+        parting = 0.0
+        for k in range(4):
+            s, weight = rows.nodes[p, k], rows.weights[p, k]
+            for i in range(3):
+                parting += weight * rows.normals[p, i] * before[s, i]
+        if parting > 0.0:
+            rows.wanted[p] = min(rows.wanted[p], -parting)

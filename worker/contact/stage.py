@@ -23,7 +23,7 @@ from .books import Books
 from .detection import Ahead, Detected, detect
 from .exterior import Exterior
 from .narrow_phase import PUSH_OUT
-from .restitution import rebound
+from .restitution import hold_back, rebound
 from .scene import Scene
 from .searches import Searches
 from .solver import ActiveSet
@@ -32,6 +32,8 @@ _SURFACE, _LISTED, _TESTED, _ACTIVE = 9.0, 0.1, 3.0, 4.0
 """What a step costs for a node of the surface (searches and registrations, shared out), for a pair that is listed, for
 one that is tested, as a crack is, and for an active contact: 450, 3, 150 and 200 ns by the profile of the shattering
 bar to 40 us on one rank."""
+_SWEEPS, _SWEEPS_BACK = 5, 10
+"""Without restitution, and with it; what more are good for: docs/numerics.md, "Contact"."""
 _FORESIGHT = 8
 """Steps between two looks at how wide the cracks are."""
 
@@ -50,7 +52,8 @@ class Contact:
         self.searches = Searches(case, model, neighbours, self.exterior, comm, clock)
         self.books = Books(model.nodes.n, len(case.parts), extremes)
         self._active = ActiveSet(self.books.scale)
-        self._sweeps, self._restitution = case.contact.sweeps, case.contact.restitution
+        self._restitution = case.contact.restitution
+        self._sweeps = case.contact.sweeps or (_SWEEPS_BACK if self._restitution > 0.0 else _SWEEPS)
         self.found = Detected.nothing()
         """What the last step has found here."""
         self.limit = 0.0
@@ -268,6 +271,8 @@ class Contact:
         now.active.n = self.found.contacts
         if self._restitution > 0.0:
             rebound(now.active.room, now.active.n, now.crowd.v, now.slots.before, self._restitution)
+        if give == 0.0:
+            hold_back(now.active.room, now.active.n, now.slots.before)
 
     def free(self) -> None:
         """Gives the messages back to MPI."""
