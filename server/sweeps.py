@@ -41,6 +41,16 @@ class Plan(msgspec.Struct, kw_only=True, frozen=True):
     points: list[dict[str, Any]]
     runs: list[str] = []
 
+    @property
+    def whole(self) -> bool:
+        """Whether all of its runs are accepted."""
+        return len(self.runs) == len(self.points)
+
+    @property
+    def keys(self) -> list[str]:
+        """The idempotency keys of its runs."""
+        return [f"sweep-{self.id}-{n}" for n in range(len(self.points))]
+
 
 class Wish(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
     """What is handed in: a case as plain data, the changes of each point, the limit."""
@@ -79,15 +89,20 @@ class Sweeps:
         digest = hashlib.sha256(body).hexdigest()
         with self._lock:
             plan = self._earlier(owner, key, digest)
-            if plan is not None and plan.runs:
+            if plan is not None and plan.whole:
                 return plan
             bodies = self._bodies(body)
+            fresh = plan or self._new(owner, body, key, digest)
+            self._desk.check_room(owner, fresh.keys)
             if plan is None:
-                plan = self._new(owner, body, key, digest)
-                self._write(plan)
+                self._write(fresh)
+            plan = fresh
             self._filling = plan.id
             try:
                 return self._fill(plan, bodies)
+            except ServiceError:
+                self._take_back(plan.id)
+                raise
             finally:
                 self._filling = ""
 
@@ -134,13 +149,21 @@ class Sweeps:
         )  # fmt: skip
 
     def _fill(self, plan: Plan, bodies: Sequence[bytes]) -> Plan:
-        for n, body in enumerate(bodies):
+        plan = msgspec.structs.replace(plan, runs=[])
+        for n, (body, key) in enumerate(zip(bodies, plan.keys, strict=True)):
             labels = {"sweep": plan.id, "point": str(n)}
-            receipt = self._desk.submit(plan.owner, body, _JSON, f"sweep-{plan.id}-{n}", Wishes(labels))
+            receipt = self._desk.submit(plan.owner, body, _JSON, key, Wishes(labels))
             plan = msgspec.structs.replace(plan, runs=[*plan.runs, receipt["id"]])
             self._plans[plan.id] = plan
         self._write(plan)
         return plan
+
+    def _take_back(self, sweep_id: str) -> None:
+        """Cancels the runs of a sweep that was refused in the middle, before any of them has started."""
+        for run_id in self._plans[sweep_id].runs:
+            self._desk.take_back(run_id)
+        del self._plans[sweep_id]
+        (self._folder / f"{sweep_id}.json").unlink(missing_ok=True)
 
     def _keep(self, plan: Plan) -> None:
         self._plans[plan.id] = plan

@@ -4,16 +4,23 @@ import csv
 import io
 import json
 import tomllib
+from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import pytest
+from starlette.testclient import TestClient
 
 from conoid.cases.run import State
-from conoid.server import folder
+from conoid.server import folder, limits
+from conoid.server.app import build_app, opened
+from conoid.server.errors import ServiceError
+from conoid.server.settings import Caps, Settings
 from conoid.server.submission import Desk
 from conoid.server.sweeps import Sweeps
+from conoid.server.tokens import create_token
 
 from .running import Running, User, case_text
 
@@ -143,3 +150,56 @@ def test_the_same_from_python(server: Running, tmp_path: Path) -> None:
         assert session.find_sweep("last").id == made.id
         assert [run.status().labels["point"] for run in made.runs()] == ["0", "1", "2", "3"]
         assert made.cancel().states == {"succeeded": len(ENDS)}
+
+
+# All or none ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def narrow(settings: Settings) -> Iterator[User]:
+    """A user who may have as many open runs as the sweep has points, and has one already."""
+    allowed = replace(settings, caps=Caps(free_disk=0, queued=len(ENDS)))
+    with opened(allowed) as service, TestClient(build_app(service), base_url="http://127.0.0.1") as client:
+        client.headers["Authorization"] = f"Bearer {create_token(service.store, 'ann', frozenset({'read', 'submit'}))}"
+        yield User(client, "ann", settings.runs)
+        service.supervisor.end_all()
+
+
+def test_a_sweep_for_which_there_is_no_room_makes_no_run(narrow: User, tmp_path: Path) -> None:
+    first = narrow.submit(wait=str(tmp_path / "go"))
+    for _ in range(2):
+        said = handed_in(narrow, wish(), "k", 429)
+        assert "1 of your runs have not ended, and the sweep has 4; this server allows 4" in said["detail"]
+    assert [run["id"] for run in narrow.http.get("/v1/runs").json()["runs"]] == [first]
+    assert narrow.http.get("/v1/sweeps").json() == {"sweeps": []}
+    (tmp_path / "go").touch()
+    narrow.wait_for(first)
+    assert len(handed_in(narrow, wish(), "k")["points"]) == len(ENDS)
+
+
+def test_a_sweep_larger_than_any_room_is_refused_for_good(narrow: User) -> None:
+    said = handed_in(narrow, wish(points=[{}] * 5), status=422)
+    assert (said["detail"], said["retryable"]) == ("5 points; this server allows 4 open runs of a user", False)
+
+
+def test_a_sweep_that_is_refused_in_the_middle_leaves_nothing_that_runs(
+    server: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real, left = limits.check_room, [3]
+
+    def full(*arguments: Any) -> None:
+        left[0] -= 1
+        if left[0] < 0:
+            raise ServiceError(507, "disk_full", "0 bytes are free", retryable=True)
+        real(*arguments)
+
+    monkeypatch.setattr(limits, "check_room", full)
+    assert handed_in(server.ann, wish(), "k", 507)["code"] == "disk_full"
+    monkeypatch.undo()
+    runs = server.ann.http.get("/v1/runs").json()["runs"]
+    assert [run["state"] for run in runs] == ["cancelled"] * 2
+    assert server.ann.http.get("/v1/sweeps").json() == {"sweeps": []}
+    assert not list((server.service.settings.runs / "sweeps").glob("*.json"))
+    made = handed_in(server.ann, wish(), "k")
+    assert len(made["points"]) == len(ENDS)
+    assert {server.ann.wait_for(point["run"]["id"])["state"] for point in made["points"]} == {"succeeded"}
