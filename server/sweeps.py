@@ -196,6 +196,8 @@ def _changed(case: dict[str, Any], point: dict[str, Any], n: int) -> bytes:
         return json.dumps(apply_overrides(case, point)).encode()
     except CaseError as error:
         raise _at(n, error) from None
+    except RecursionError:
+        raise _at(n, CaseError([Problem("", "", "its values are nested too deeply")])) from None
 
 
 def _at(n: int, error: CaseError) -> ServiceError:

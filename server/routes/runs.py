@@ -185,12 +185,17 @@ def _pin(service: Service, run: Run, keep: bool) -> Response:
 def cancel(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
     """Stops a run: at its next step, or hard when it does not. Asking again changes nothing."""
     run = find(service, identity, run_id)
+    ask_to_stop(service, run.id)
+    return Response(view.snapshot(service, find(service, identity, run_id)).body, 202, media_type="application/json")
+
+
+def ask_to_stop(service: Service, run_id: str) -> None:
+    """Raises ServiceError 503 when the request could not be recorded."""
     try:
-        service.supervisor.cancel(run.id)
+        service.supervisor.cancel(run_id)
     except Exception as error:
         detail = f"the request could not be recorded: {str(error) or 'no answer in time'}".splitlines()[0]
         raise ServiceError(503, "unavailable", detail, retryable=True) from error
-    return Response(view.snapshot(service, find(service, identity, run_id)).body, 202, media_type="application/json")
 
 
 @router.post("/v1/runs/{run_id}:restart", status_code=202)

@@ -1,5 +1,6 @@
 """Sweeps: all runs or none, each once, as many at a time as was said, a table of what came out."""
 
+import asyncio
 import csv
 import io
 import json
@@ -14,7 +15,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from conoid.cases.run import State
-from conoid.server import folder, limits
+from conoid.server import folder, limits, view
 from conoid.server.app import build_app, opened
 from conoid.server.errors import ServiceError
 from conoid.server.settings import Caps, Settings
@@ -203,3 +204,55 @@ def test_a_sweep_that_is_refused_in_the_middle_leaves_nothing_that_runs(
     made = handed_in(server.ann, wish(), "k")
     assert len(made["points"]) == len(ENDS)
     assert {server.ann.wait_for(point["run"]["id"])["state"] for point in made["points"]} == {"succeeded"}
+
+
+# What is told of one --------------------------------------------------------------------------------------------------
+
+
+def test_a_run_that_is_forgotten_shifts_no_other_to_its_point(server: Running) -> None:
+    sweep = handed_in(server.ann, wish())
+    runs = [point["run"]["id"] for point in sweep["points"]]
+    for run in runs:
+        server.ann.wait_for(run)
+    with server.service.store._engine.begin() as connection:
+        connection.exec_driver_sql(f"delete from runs where id = '{runs[1]}'")
+    points = server.ann.http.get(sweep["url"]).json()["points"]
+    rest = dict(zip(ENDS, runs, strict=True))
+    del rest[ENDS[1]]
+    assert {point["values"]["run.end_time"]: point["run"]["id"] for point in points} == rest
+    lines = csv.DictReader(io.StringIO(server.ann.http.get(f"{sweep['url']}/table").text))
+    assert {line["run.end_time"]: line["run"] for line in lines} == rest
+
+
+def test_a_cancel_that_cannot_be_recorded_says_so(server: Running, tmp_path: Path) -> None:
+    body = json.dumps({"case": tomllib.loads(case_text(wait=str(tmp_path / "go"))), "points": [{}]}).encode()
+    sweep = handed_in(server.ann, body)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(server.service.supervisor, "cancel", lambda run_id: (_ for _ in ()).throw(TimeoutError()))
+        answer = server.ann.http.post(f"{sweep['url']}:cancel")
+    assert answer.status_code == 503
+    assert answer.json()["detail"] == "the request could not be recorded: no answer in time"
+    server.ann.http.post(f"{sweep['url']}:cancel")
+
+
+def test_the_answer_to_a_sweep_is_not_made_in_the_event_loop(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    threads: list[bool] = []
+    real = view.brief
+
+    def brief(*arguments: Any) -> dict[str, Any]:
+        try:
+            asyncio.get_running_loop()
+        except RuntimeError:
+            threads.append(True)
+        else:
+            threads.append(False)
+        return real(*arguments)
+
+    monkeypatch.setattr(view, "brief", brief)
+    handed_in(server.ann, wish())
+    assert threads == [True] * len(ENDS), "a thousand points would stop all other answers"
+
+
+def test_a_point_that_is_nested_too_deeply_is_refused(server: Running) -> None:
+    point = {"a" + ".a" * 5000: 1}
+    assert "nested too deeply (point 0)" in handed_in(server.ann, wish(points=[point]), status=422)["detail"]
