@@ -65,7 +65,8 @@ class Limits(msgspec.Struct, frozen=True):
 def of(settings: Settings) -> Limits:
     """The limits of a site."""
     caps = settings.caps
-    return Limits(settings.slots, caps.elements, caps.steps, caps.memory, caps.core_seconds, caps.wall_time)
+    memory = min((most for most in (caps.memory, settings.site.queue.memory) if most is not None), default=None)
+    return Limits(settings.slots, caps.elements, caps.steps, memory, caps.core_seconds, caps.wall_time)
 
 
 def check(case: Case, limits: Limits) -> list[Problem]:
