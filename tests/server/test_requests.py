@@ -379,6 +379,22 @@ def test_metrics(server: Running) -> None:
     assert "conoid_slots 2" in text
 
 
+def test_odd_methods_make_one_series(server: Running) -> None:
+    for n in range(3):
+        assert server.nobody.http.request(f"ODD{n}", "/v1/runs").status_code == 405
+    text = server.ann.http.get("/metrics").text
+    assert "ODD" not in text
+    assert 'conoid_answers_total{method="other",route="/v1/runs",status="405"} 3' in text
+
+
+def test_a_crash_is_counted(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server.service.store, "page", lambda *_: 1 // 0)
+    with pytest.raises(ZeroDivisionError):
+        server.ann.http.get("/v1/runs")
+    text = server.ann.http.get("/metrics").text
+    assert 'conoid_answers_total{method="GET",route="/v1/runs",status="500"} 1' in text
+
+
 def test_readiness_tells_a_dead_supervisor(server: Running) -> None:
     server.service.supervisor.close()
     answer = server.nobody.http.get("/readyz")
