@@ -14,7 +14,7 @@ import msgspec
 
 from conoid.cases.messages import AnyMessage
 
-from .errors import UnreachableError, refusal
+from .errors import ClientError, UnreachableError, refusal
 from .journal import from_line
 
 T = TypeVar("T")
@@ -49,11 +49,20 @@ class Http:
     """A server that answers requests. Use it as a context manager, or close it."""
 
     def __init__(self, url: str, token: str | None = None, transport: httpx2.BaseTransport | None = None) -> None:
-        """Connects at the first request. ``transport`` replaces the network, for a server in the same process."""
-        headers = {"Authorization": f"Bearer {token}"} if token else {}
+        """Connects at the first request. ``transport`` replaces the network, for a server in the same process.
+
+        Raises ClientError for a token, UnreachableError for an address, that cannot be one.
+        """
+        shown = (token or "").strip()
+        if not all("!" <= letter <= "~" for letter in shown):
+            raise ClientError("token: only visible ASCII characters are allowed; was it copied whole?")
+        headers = {"Authorization": f"Bearer {shown}"} if shown else {}
         self.url = url.rstrip("/")
-        self._has_token = bool(token)
-        self._http = httpx2.Client(base_url=self.url, headers=headers, timeout=_TIMEOUT, transport=transport)
+        self._has_token = bool(shown)
+        try:
+            self._http = httpx2.Client(base_url=self.url, headers=headers, timeout=_TIMEOUT, transport=transport)
+        except httpx2.InvalidURL as error:
+            raise UnreachableError(f"url = {self.url!r}: {error}") from None
 
     def __enter__(self) -> Self:
         """Itself."""
