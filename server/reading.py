@@ -12,6 +12,8 @@ import signal
 import socket
 import sys
 import traceback
+from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -126,7 +128,15 @@ def main(path: str) -> int:
             with connection:
                 if os.fork() == 0:
                     _child(connection)
+    _tidy(Path(path))
     return 0
+
+
+def _tidy(place: Path) -> None:
+    """Removes the socket, and the folder where it was alone there: a server that was killed does not."""
+    with suppress(OSError):
+        place.unlink(missing_ok=True)
+        place.parent.rmdir()
 
 
 def _child(connection: socket.socket) -> None:
