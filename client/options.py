@@ -68,13 +68,16 @@ Labels = Annotated[
 SourceArgument = Annotated[str, typer.Argument(metavar="RUN", help="The id of a run, 'last', or its folder.")]
 
 
-def labels_of(words: Iterable[str] | None) -> dict[str, str]:
+def labels_of(words: Sequence[str] | None) -> dict[str, str]:
     """Of ``NAME=VALUE``. Raises ClientError."""
     pairs = [word.partition("=") for word in words or ()]
     for name, equals, _ in pairs:
         if not (name and equals):
             raise ClientError(f"label = {name!r}: write NAME=VALUE")
-    return {name: value for name, _, value in pairs}
+    labels = {name: value for name, _, value in pairs}
+    if len(labels) < len(pairs):
+        raise ClientError(f"label: each has one value; given are {', '.join(words or ())}")
+    return labels
 
 
 def complain(*lines: str) -> None:

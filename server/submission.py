@@ -178,7 +178,14 @@ def labels_of(texts: Sequence[str]) -> dict[str, str]:
         wrong = next((word for word, read in zip(texts, found, strict=True) if read is None), f"{len(texts)} of them")
         hint = f"at most {_MOST_LABELS}: a name of letters, digits, '.', '_' or '-', '=', and up to 200 characters"
         raise ServiceError(400, "bad_parameter", f"label = {wrong[:80]!r}: not a label", pointer="label", hint=hint)
-    return {read[1]: read[2] for read in found if read is not None}
+    pairs = [(read[1], read[2]) for read in found if read is not None]
+    labels = dict(pairs)
+    if len(labels) < len(pairs):
+        name = next(name for n, (name, _) in enumerate(pairs) if name in dict(pairs[:n]))
+        raise ServiceError(
+            400, "bad_parameter", f"label = {name!r}: it has one value, and is given twice", pointer="label"
+        )
+    return labels
 
 
 def receipt(made: Submission) -> dict[str, Any]:
