@@ -19,9 +19,10 @@ from .journal import from_line
 
 T = TypeVar("T")
 
-_TIMEOUT = httpx2.Timeout(30.0, connect=5.0)
+_ANSWER, _CONNECTION = 30.0, 5.0
 """s: an answer may take a while when a disk is slow, a connection may not. Chosen."""
-_STREAM_TIMEOUT = httpx2.Timeout(60.0, connect=5.0)
+_TIMEOUT = httpx2.Timeout(_ANSWER, connect=_CONNECTION)
+_STREAM_TIMEOUT = httpx2.Timeout(60.0, connect=_CONNECTION)
 """s of silence on a stream: four times the 15 s after which the server sends a comment (server/stream.py)."""
 UNAUTHORIZED = 401
 """HTTP's status of a request without a valid token."""
@@ -84,12 +85,18 @@ class Http:
         """The answer at ``path``; a list gives its name several times. Raises ServiceError, UnreachableError."""
         return self._decoded(kind, self._request("GET", path, params=query))
 
-    def post(self, kind: type[T], path: str, body: bytes = b"", content: str = "", key: str | None = None) -> T:
-        """The answer to a POST. It is tried again, when the network fails, only with an idempotency key."""
+    def post(
+        self, kind: type[T], path: str, body: bytes = b"", content: str = "", key: str | None = None,
+        more: float = 0.0,
+    ) -> T:  # fmt: skip
+        """The answer to a POST. It is tried again, when the network fails, only with an idempotency key. ``more``: s
+        that the answer may take beyond what others may.
+        """
         headers = {"Content-Type": content} if content else {}
         if key is not None:
             headers["Idempotency-Key"] = key
-        response = self._request("POST", path, content=body, headers=headers, repeat=key is not None)
+        timeout = httpx2.Timeout(_ANSWER + more, connect=_CONNECTION)
+        response = self._request("POST", path, content=body, headers=headers, repeat=key is not None, timeout=timeout)
         return self._decoded(kind, response)
 
     def delete(self, path: str) -> None:

@@ -63,9 +63,11 @@ class Desk:
         return self._reader.read(Question(body=body, json=kind == "case.json", limits=self._limits))
 
     def submit(
-        self, owner: str, body: bytes, content_type: str, key: str | None, wishes: Wishes | None = None
+        self, owner: str, body: bytes, content_type: str, key: str | None, wishes: Wishes | None = None,
+        reading: Reading | None = None,
     ) -> dict[str, Any]:  # fmt: skip
-        """Accepts a run and returns its receipt: the same one for the same key and body.
+        """Accepts a run and returns its receipt: the same one for the same key and body. ``reading``: the case, where
+        it has been read already.
 
         Raises ServiceError. The case and the first line of the journal are on disk when this returns.
         """
@@ -80,7 +82,7 @@ class Desk:
         if earlier := self._earlier(owner, key, digest, wishes.restart):
             return earlier
         try:
-            reading = self.read(body, content_type)
+            reading = reading or self.read(body, content_type)
         except CaseError as error:
             raise invalid_case(error.problems) from None
         with self._lock:

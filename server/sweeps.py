@@ -16,6 +16,7 @@ from conoid.cases.load import CaseError, Problem, apply_overrides, json_data
 
 from . import durable, folder
 from .errors import ServiceError, invalid_case
+from .reading import Reading
 from .settings import Settings
 from .shapes import MOST_POINTS
 from .submission import Desk, Wishes
@@ -91,7 +92,7 @@ class Sweeps:
             plan = self._earlier(owner, key, digest)
             if plan is not None and plan.whole:
                 return plan
-            bodies = self._bodies(body)
+            cases = self._cases(body)
             fresh = plan or self._new(owner, body, key, digest)
             self._desk.check_room(owner, fresh.keys)
             if plan is None:
@@ -99,7 +100,7 @@ class Sweeps:
             plan = fresh
             self._filling = plan.id
             try:
-                return self._fill(plan, bodies)
+                return self._fill(plan, cases)
             except ServiceError:
                 self._take_back(plan.id)
                 raise
@@ -127,18 +128,19 @@ class Sweeps:
             raise ServiceError(422, "key_reused", detail, pointer="Idempotency-Key", hint="use a new key")
         return found[0] if found else None
 
-    def _bodies(self, body: bytes) -> list[bytes]:
+    def _cases(self, body: bytes) -> list[tuple[bytes, Reading]]:
         """The case of each point, each of which can be run. Raises ServiceError with what is wrong."""
         wish = _wish(body)
         made = [_changed(wish.case, point, n) for n, point in enumerate(wish.points)]
         if sum(map(len, made)) > _MOST_BYTES:
             raise ServiceError(413, "too_large", f"the cases have more than {_MOST_BYTES} bytes together")
+        cases = []
         for n, text in enumerate(made):
             try:
-                self._desk.read(text, _JSON)
+                cases.append((text, self._desk.read(text, _JSON)))
             except CaseError as error:
                 raise _at(n, error) from None
-        return made
+        return cases
 
     def _new(self, owner: str, body: bytes, key: str | None, digest: str) -> Plan:
         wish = _wish(body)
@@ -148,11 +150,11 @@ class Sweeps:
             at_once=wish.at_once, points=wish.points,
         )  # fmt: skip
 
-    def _fill(self, plan: Plan, bodies: Sequence[bytes]) -> Plan:
+    def _fill(self, plan: Plan, cases: Sequence[tuple[bytes, Reading]]) -> Plan:
         plan = msgspec.structs.replace(plan, runs=[])
-        for n, (body, key) in enumerate(zip(bodies, plan.keys, strict=True)):
-            labels = {"sweep": plan.id, "point": str(n)}
-            receipt = self._desk.submit(plan.owner, body, _JSON, key, Wishes(labels))
+        for n, ((body, reading), key) in enumerate(zip(cases, plan.keys, strict=True)):
+            wishes = Wishes({"sweep": plan.id, "point": str(n)})
+            receipt = self._desk.submit(plan.owner, body, _JSON, key, wishes, reading)
             plan = msgspec.structs.replace(plan, runs=[*plan.runs, receipt["id"]])
             self._plans[plan.id] = plan
         self._write(plan)

@@ -11,7 +11,9 @@ from conoid.cases.run import State
 from conoid.client.errors import ServiceError, UnreachableError
 from conoid.client.http import Http
 from conoid.client.run import Run, RunInfo
+from conoid.client.session import Session
 from conoid.client.stream import follow
+from conoid.client.sweep import SweepInfo
 
 
 class Away(httpx2.BaseTransport):
@@ -108,3 +110,19 @@ def test_who_may_not_follow_a_run_is_told_so() -> None:
 
     with pytest.raises(ServiceError):
         list(follow(Silent(), refill, lambda: False))
+
+
+def test_a_large_sweep_may_take_its_time() -> None:
+    """A server reads, checks and writes each point before it answers."""
+    seconds = []
+
+    class Slow(httpx2.BaseTransport):
+        def handle_request(self, request: httpx2.Request) -> httpx2.Response:
+            seconds.append(request.extensions["timeout"]["read"])
+            made = SweepInfo(id="s", name="bar", submitted=0.0, total=1000, states={})
+            return httpx2.Response(202, content=msgspec.json.encode(made))
+
+    with Session("http://x", transport=Slow()) as session:
+        session.sweep({"name": "bar"}, [{"run.ranks": 1}] * 1000)
+        session.sweep({"name": "bar"}, [{"run.ranks": 1}])
+    assert seconds == [530.0, 30.5]
