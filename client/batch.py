@@ -80,6 +80,8 @@ def hand_over(
     folder = (out or Path("runs") / checked.name).resolve()
     try:
         chosen = batch.profile_of(site, profile or checked.run.profile)
+        if shutil.which("sbatch", path=site.bin or None) is None:
+            raise ClientError("sbatch: there is none; Slurm's commands are in PATH, or [slurm] bin names their folder")
         job = _known(folder, site) if folder.exists() else None
         if job is None:
             job = _prepared(
