@@ -12,7 +12,7 @@ import pytest
 from conoid.cases.batch import Site
 from conoid.cases.policy import Retention
 from conoid.cases.run import State
-from conoid.server import keeper
+from conoid.server import keeper, pins
 from conoid.server.farewells import FILE, Farewells
 from conoid.server.keeper import Keeper
 from conoid.server.store import Store
@@ -136,7 +136,7 @@ def test_a_run_that_is_removed_during_a_look_ends_no_look(server: Running) -> No
         return False
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(keeper.pins, "pinned", removed)
+        patch.setattr(pins, "pinned", removed)
         looks.look()
     for run in (first, second):
         assert "by ann" in server.ann.http.get(f"/v1/runs/{run}").json()["detail"]
