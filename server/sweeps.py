@@ -67,9 +67,10 @@ class Sweeps:
     def __init__(self, settings: Settings, desk: Desk) -> None:
         """Reads what is there; a file that cannot be read is left alone."""
         self._folder, self._desk = settings.runs / FOLDER, desk
-        self._lock = threading.Lock()
+        self._locks: dict[str, threading.Lock] = {}
+        """By owner: who hands in many points does not hold up others."""
         self._plans: dict[str, Plan] = {}
-        self._filling = ""
+        self._filling: set[str] = set()
         for path in sorted(self._folder.glob("*.json")):
             try:
                 self._keep(msgspec.json.decode(path.read_bytes(), type=Plan))
@@ -88,7 +89,7 @@ class Sweeps:
     def submit(self, owner: str, body: bytes, key: str | None) -> Plan:
         """Accepts all runs of a sweep, or none. Raises ServiceError. The same key and body give the same sweep."""
         digest = hashlib.sha256(body).hexdigest()
-        with self._lock:
+        with self._locks.setdefault(owner, threading.Lock()):
             plan = self._earlier(owner, key, digest)
             if plan is not None and plan.whole:
                 return plan
@@ -98,14 +99,14 @@ class Sweeps:
             if plan is None:
                 self._write(fresh)
             plan = fresh
-            self._filling = plan.id
+            self._filling.add(plan.id)
             try:
                 return self._fill(plan, cases)
             except ServiceError:
                 self._take_back(plan.id)
                 raise
             finally:
-                self._filling = ""
+                self._filling.discard(plan.id)
 
     def held(self, need: Need, active: Iterable[Need]) -> str:
         """Why a run waits for its sweep: for all its runs to be there, or for those that are ``active``. The label of
@@ -114,7 +115,7 @@ class Sweeps:
         plan = self.get(need.sweep, need.owner)
         if plan is None:
             return ""
-        if plan.id == self._filling:
+        if plan.id in self._filling:
             return "its sweep is being handed in"
         if plan.at_once is None:
             return ""

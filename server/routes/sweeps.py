@@ -31,7 +31,7 @@ async def submit(
     service: ServiceOf, identity: Submitter, body: Body, idempotency_key: Annotated[str | None, Header()] = None
 ) -> Response:
     """Takes a case and the points at which it is to be run; all runs are accepted, or none."""
-    async with service.turns.turn(identity.owner):
+    async with service.sweep_turns.turn(identity.owner):
         plan = await run_in_threadpool(service.sweeps.submit, identity.owner, body, idempotency_key)
     shown = await run_in_threadpool(_shown, service, plan)
     return JSONResponse(shown, 202, {"Location": f"/v1/sweeps/{plan.id}"})

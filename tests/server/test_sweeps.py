@@ -4,6 +4,7 @@ import asyncio
 import csv
 import io
 import json
+import threading
 import tomllib
 from collections.abc import Iterator
 from dataclasses import replace
@@ -15,7 +16,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from conoid.cases.run import State
-from conoid.server import folder, limits, view
+from conoid.server import folder, limits, reader, view
 from conoid.server.app import build_app, opened
 from conoid.server.errors import ServiceError
 from conoid.server.settings import Caps, Settings
@@ -256,3 +257,49 @@ def test_the_answer_to_a_sweep_is_not_made_in_the_event_loop(server: Running, mo
 def test_a_point_that_is_nested_too_deeply_is_refused(server: Running) -> None:
     point = {"a" + ".a" * 5000: 1}
     assert "nested too deeply (point 0)" in handed_in(server.ann, wish(points=[point]), status=422)["detail"]
+
+
+def test_nobody_who_hands_in_a_run_waits_for_sweeps(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not even who hands in the sweep; and one sweep does not wait for that of somebody else."""
+    monkeypatch.setattr(reader, "usable_cores", lambda: 1)
+    real, reading, go = Desk.read, {"ann": threading.Event(), "bob": threading.Event()}, threading.Event()
+
+    def slow(self: Desk, body: bytes, content_type: str) -> Any:
+        case = tomllib.loads(body.decode()) if content_type == "application/toml" else json.loads(body)
+        if case["name"] in reading:
+            reading[case["name"]].set()
+            assert go.wait(20)
+        return real(self, body, content_type)
+
+    monkeypatch.setattr(Desk, "read", slow)
+    with opened(settings) as service, TestClient(build_app(service), base_url="http://127.0.0.1") as client:
+        told: dict[str, int] = {}
+
+        def hand_in(name: str, path: str, body: bytes, kind: str) -> None:
+            scopes = frozenset({"read", "submit"})
+            headers = {"Authorization": f"Bearer {create_token(service.store, name, scopes)}", "Content-Type": kind}
+            told[f"{name} {path}"] = client.post(path, content=body, headers=headers).status_code
+
+        sweeps = [
+            threading.Thread(
+                target=hand_in,
+                args=(name, "/v1/sweeps", wish(case=tomllib.loads(case_text(name))), "application/json"),
+            )
+            for name in reading
+        ]
+        for thread in sweeps:
+            thread.start()
+        try:
+            assert all(event.wait(10) for event in reading.values()), "a sweep waits for another one"
+            run = threading.Thread(
+                target=hand_in, args=("ann", "/v1/runs", case_text("other").encode(), "application/toml")
+            )
+            run.start()
+            run.join(10)
+            assert told == {"ann /v1/runs": 202}
+        finally:
+            go.set()
+            for thread in sweeps:
+                thread.join()
+        assert told == {"ann /v1/runs": 202, "ann /v1/sweeps": 202, "bob /v1/sweeps": 202}
+        service.supervisor.end_all()
