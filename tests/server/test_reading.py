@@ -14,7 +14,7 @@ from conoid.server.reading import Question
 from conoid.server.submission import Desk
 
 from .running import Running, case_text
-from .test_sweeps import ENDS, handed_in, wish
+from .swept import ENDS, handed_in, wish
 
 QUESTION = Question(
     body=case_text().encode(), json=False,

@@ -25,23 +25,7 @@ from conoid.server.sweeps import Sweeps
 from conoid.server.tokens import create_token
 
 from .running import Running, User, case_text
-
-ENDS = [f"{n} us" for n in range(1, 5)]
-
-
-def wish(**extra: Any) -> bytes:
-    """A sweep over four ends."""
-    points = [{"run.end_time": end} for end in ENDS]
-    return json.dumps({"case": tomllib.loads(case_text()), "points": points, **extra}).encode()
-
-
-def handed_in(user: User, body: bytes, key: str | None = None, status: int = 202) -> dict[str, Any]:
-    """The answer to a sweep."""
-    headers = {"Content-Type": "application/json", **({"Idempotency-Key": key} if key else {})}
-    answer = user.http.post("/v1/sweeps", content=body, headers=headers)
-    assert answer.status_code == status, answer.text
-    found: dict[str, Any] = answer.json()
-    return found
+from .swept import ENDS, handed_in, wish
 
 
 def test_a_sweep_ends_in_a_table(server: Running) -> None:
