@@ -25,6 +25,7 @@ from .options import (
     complain,
     find,
     labels_of,
+    named,
     show,
     show_json,
     warn_of,
@@ -34,7 +35,7 @@ from .run import Run, RunInfo
 from .session import connect
 from .watch import watch
 
-RunArgument = Annotated[str, typer.Argument(metavar="RUN", help="The id of a run, or 'last'.")]
+RunArgument = Annotated[str, typer.Argument(metavar="RUN", callback=named, help="The id of a run, or 'last'.")]
 
 
 def submit(

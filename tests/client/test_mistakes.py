@@ -2,14 +2,19 @@
 
 from pathlib import Path
 
+import httpx2
 import msgspec
 import pytest
 from typer.testing import CliRunner, Result
 
 from conoid.cases import layout, messages
-from conoid.client import cli, http
+from conoid.client import cli, http, sweeping
 from conoid.client.cli import app
+from conoid.client.errors import ClientError
 from conoid.client.following import FolderRun
+from conoid.client.run import inside
+from conoid.client.session import Session
+from conoid.client.sweep import SweepInfo
 
 
 def conoid(*words: object) -> Result:
@@ -127,6 +132,30 @@ def test_a_token_that_no_server_makes_is_not_sent(quiet_home: Path, token: str) 
 def test_space_round_a_token_is_no_part_of_it() -> None:
     with http.Http("http://x", " conoid_1_2\n") as made:
         assert made._http.headers["authorization"] == "Bearer conoid_1_2"
+
+
+@pytest.mark.parametrize("words", [("show",), ("watch",), ("cancel",), ("get",), ("report",), ("sweep-table",)])
+def test_an_empty_id_is_none(quiet_home: Path, words: tuple[str, ...]) -> None:
+    """A variable of a script that is not set."""
+    assert "an id, or 'last'" in refused(1, *words, "")
+
+
+def test_a_file_outside_of_a_run_is_not_fetched(quiet_home: Path) -> None:
+    with pytest.raises(ClientError, match=r"^'\.\./x' lies outside the run's folder$"):
+        inside(quiet_home, "../x")
+
+
+@pytest.mark.parametrize(("state", "said"), [("succeeded", "s has ended\n"), ("running", "s cancelling\n")])
+def test_a_sweep_that_has_ended_is_not_said_to_be_cancelled(
+    quiet_home: Path, monkeypatch: pytest.MonkeyPatch, state: str, said: str
+) -> None:
+    class Server(httpx2.BaseTransport):
+        def handle_request(self, request: httpx2.Request) -> httpx2.Response:
+            info = SweepInfo(id="s", name="bar", submitted=0.0, total=2, states={state: 2})
+            return httpx2.Response(202, content=msgspec.json.encode(info))
+
+    monkeypatch.setattr(sweeping, "connect", lambda *_: Session("http://x", transport=Server()))
+    assert conoid("sweep-cancel", "s").stdout == said
 
 
 # Cases ----------------------------------------------------------------------------------------------------------------
