@@ -37,7 +37,7 @@ class LocalServer:
     """A server on loopback ports of its own choosing, with a token only this process knows.
 
     A context manager: it is up inside, and stopped after. It is not in the terminal's process group, so that Ctrl-C
-    reaches this process alone; on Linux it ends, with its runs, when this process dies.
+    reaches this process alone; on Linux it ends when this process dies.
     """
 
     def __init__(self, runs: Path, slots: int) -> None:
@@ -50,7 +50,7 @@ class LocalServer:
         """Starts the server and waits until it answers. Raises ClientError with its own last words."""
         self.runs.mkdir(parents=True, exist_ok=True)
         self.token = _token(self.runs)
-        options = ["--port", "0", "--zenoh-port", "0", "--slots", str(self.slots), "--grace", str(GRACE), "--end-runs"]
+        options = ["--port", "0", "--zenoh-port", "0", "--slots", str(self.slots), "--grace", str(GRACE)]
         with (self.runs / LOG_FILE).open("wb") as log:
             self._process = subprocess.Popen(
                 [*_TETHERED, str(os.getpid()), "--runs", str(self.runs), *options], stdin=subprocess.DEVNULL,

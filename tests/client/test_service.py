@@ -1,15 +1,9 @@
 """The Python API against a real server in a process of its own, over Zenoh and over SSE."""
 
-import os
-import subprocess
-import sys
-import time
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
-from conoid.cases import layout
 from conoid.cases.problems import CaseError
 from conoid.cases.run import State
 from conoid.client.errors import NotFoundError, ServiceError, UnfinishedError
@@ -17,7 +11,7 @@ from conoid.client.local import LocalServer
 from conoid.client.session import Session
 from conoid.client.stream import SseLink, ZenohLink
 
-from .fakes import FAKE_WORKER, case_file
+from .fakes import case_file
 
 
 @pytest.fixture
@@ -139,29 +133,3 @@ def test_runs_are_found_by_their_labels(session: Session, tmp_path: Path) -> Non
     assert "batch=7" in made[0]._repr_html_()
     with pytest.raises(ServiceError, match="label = 'a b=1': not a label"):
         session.submit(case_file(tmp_path), labels={"a b": "1"})
-
-
-def test_nothing_goes_on_when_the_process_of_a_local_server_is_killed(tmp_path: Path) -> None:
-    """A terminal that is closed, a machine without memory: nobody is left who would stop the workers."""
-    case = case_file(tmp_path, steps=100_000, pace=0.02)
-    words = [sys.executable, "-m", "conoid.client.cli", "run", str(case), "--plain", "--out", str(tmp_path / "runs")]
-    process = subprocess.Popen(
-        words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env={**os.environ, "CONOID_WORKER": FAKE_WORKER}
-    )
-    with process:
-        assert process.stdout is not None
-        assert any(b"  running" in line for line in process.stdout)
-        process.kill()
-    deadline = time.monotonic() + 30.0
-    while living := [path for path in Path("/proc").glob("[0-9]*/cmdline") if _names(path, tmp_path)]:
-        assert time.monotonic() < deadline, f"{living} live on"
-        time.sleep(0.05)
-    (outcome,) = (tmp_path / "runs").glob(f"*/{layout.OUTCOME}")
-    assert b'"cancelled"' in outcome.read_bytes()
-
-
-def _names(path: Path, folder: Path) -> bool:
-    """Whether a process names the folder in its command."""
-    with suppress(OSError):
-        return str(folder).encode() in path.read_bytes()
-    return False
