@@ -19,6 +19,7 @@ from conoid.cases.run import State
 
 from .errors import ClientError
 from .options import CaseArgument, Json, Overrides, show_json, warn_of
+from .result import LocalFolder
 from .submission import data_of, locate
 
 _PLACES = ("~/.config/conoid/site.toml", "/etc/conoid/site.toml")
@@ -79,6 +80,8 @@ def hand_over(
     folder = (out or Path("runs") / checked.name).resolve()
     try:
         chosen = batch.profile_of(site, profile or checked.run.profile)
+        if shutil.which("sbatch", path=site.bin or None) is None:
+            raise ClientError("sbatch: there is none; Slurm's commands are in PATH, or [slurm] bin names their folder")
         job = _known(folder, site) if folder.exists() else None
         if job is None:
             job = _prepared(
@@ -152,7 +155,13 @@ def _mpiexec() -> str:
 
 
 def cancel_folder(folder: Path) -> str:
-    """Asks the run in a folder to stop for good, and Slurm to end its job when that waits; one line that says so."""
+    """Asks the run in a folder to stop for good, and Slurm to end its job when that waits; one line that says so.
+
+    Raises UnfinishedError for a folder that is none of a run, OSError.
+    """
+    LocalFolder(folder).path(layout.JOURNAL)
+    if (folder / layout.OUTCOME).exists():
+        return f"{folder} has ended"
     (folder / layout.STOP_REQUEST).touch()
     job = batch.read_job(folder)
     if job is None or not job.job:

@@ -1,5 +1,6 @@
 """The command line: ``conoid serve | validate | submit | ls | show | watch | cancel | get | view | run``, and more."""
 
+import errno
 import os
 import sys
 from importlib import metadata
@@ -12,6 +13,7 @@ from typer.core import TyperGroup
 from conoid.cases.estimate import estimate
 from conoid.cases.load import CaseError, parse_case
 from conoid.cases.plausible import doubts
+from conoid.cases.problems import Problem
 from conoid.cases.run import ExitCode
 
 from . import benches, commands, converging, hard, reports, shelf, sweeping, tables, viewing
@@ -45,6 +47,11 @@ class Guarded(TyperGroup):
         except ClientError as error:
             complain(str(error))
             raise typer.Exit(error.exit_code) from None
+        except OSError as error:
+            if error.errno == errno.EPIPE:  # who reads has gone: typer ends without a word
+                raise
+            complain(f"{error.filename}: {error.strerror}" if error.filename else str(error))
+            raise typer.Exit(1) from None
         except KeyboardInterrupt:
             raise typer.Exit(130) from None
 
@@ -92,7 +99,10 @@ def validate(case: CaseArgument, overrides: Overrides = None, as_json: Json = Fa
     """
     data = data_of(case, overrides or ())
     checked = parse_case(data)
-    expected = estimate(checked, locate(case).parent)
+    try:
+        expected = estimate(checked, locate(case).parent)
+    except (ArithmeticError, ValueError):
+        raise CaseError([Problem("parts", "", "the elements are too many or too small to be counted")]) from None
     odd = doubts(data, checked, expected)
     if as_json:
         show_json({"name": checked.name, "valid": True, "warnings": odd, "estimate": expected})

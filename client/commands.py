@@ -25,15 +25,17 @@ from .options import (
     complain,
     find,
     labels_of,
+    named,
     show,
     show_json,
     warn_of,
 )
+from .result import LocalFolder
 from .run import Run, RunInfo
 from .session import connect
 from .watch import watch
 
-RunArgument = Annotated[str, typer.Argument(metavar="RUN", help="The id of a run, or 'last'.")]
+RunArgument = Annotated[str, typer.Argument(metavar="RUN", callback=named, help="The id of a run, or 'last'.")]
 
 
 def submit(
@@ -117,7 +119,11 @@ def watch_run(
 ) -> None:
     """Follow a run until it ends: 0 succeeded, 1 failed, 2 bad input, 4 cancelled. Ctrl-C leaves it running."""
     if Path(run).is_dir():
-        known = watch(FolderRun(Path(run), slurm_of(None).bin), False if plain else None)
+        LocalFolder(Path(run)).path(layout.JOURNAL)
+        followed = FolderRun(Path(run), slurm_of(None).bin)
+        if as_json:
+            raise typer.Exit(_print_messages(followed))
+        known = watch(followed, False if plain else None)
     else:
         known = _watched(run, plain, url, token, as_json)
     if known.message or known.cause:
@@ -137,7 +143,7 @@ def _watched(run: str, plain: bool, url: str | None, token: str | None, as_json:
             raise
 
 
-def _print_messages(run: Run) -> int:
+def _print_messages(run: Run | FolderRun) -> int:
     known = Live(run.id)
     for message in run.messages():
         known.take(message)

@@ -58,7 +58,7 @@ def _state(live: Live) -> Text:
 
 def _told(live: Live) -> list[str]:
     """Cause and message, where they say more than the state."""
-    return [part for part in (live.cause, live.message) if part and part != live.state.value]
+    return [part for part in (live.cause, live.told) if part and part != live.state.value]
 
 
 def _bar(live: Live) -> RenderableType:

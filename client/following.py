@@ -68,7 +68,10 @@ class FolderRun:
         while True:
             raw, offset = self._read(offset)
             for line in raw:
-                last = from_line(line)
+                try:
+                    last = from_line(line)
+                except msgspec.DecodeError:  # a killed worker has left it half written
+                    continue
                 yield last
                 if isinstance(last, Status) and State(last.state).final:
                     return

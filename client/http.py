@@ -14,14 +14,15 @@ import msgspec
 
 from conoid.cases.messages import AnyMessage
 
-from .errors import UnreachableError, refusal
+from .errors import ClientError, UnreachableError, refusal
 from .journal import from_line
 
 T = TypeVar("T")
 
-_TIMEOUT = httpx2.Timeout(30.0, connect=5.0)
+_ANSWER, _CONNECTION = 30.0, 5.0
 """s: an answer may take a while when a disk is slow, a connection may not. Chosen."""
-_STREAM_TIMEOUT = httpx2.Timeout(60.0, connect=5.0)
+_TIMEOUT = httpx2.Timeout(_ANSWER, connect=_CONNECTION)
+_STREAM_TIMEOUT = httpx2.Timeout(60.0, connect=_CONNECTION)
 """s of silence on a stream: four times the 15 s after which the server sends a comment (server/stream.py)."""
 UNAUTHORIZED = 401
 """HTTP's status of a request without a valid token."""
@@ -49,11 +50,20 @@ class Http:
     """A server that answers requests. Use it as a context manager, or close it."""
 
     def __init__(self, url: str, token: str | None = None, transport: httpx2.BaseTransport | None = None) -> None:
-        """Connects at the first request. ``transport`` replaces the network, for a server in the same process."""
-        headers = {"Authorization": f"Bearer {token}"} if token else {}
+        """Connects at the first request. ``transport`` replaces the network, for a server in the same process.
+
+        Raises ClientError for a token, UnreachableError for an address, that cannot be one.
+        """
+        shown = (token or "").strip()
+        if not all("!" <= letter <= "~" for letter in shown):
+            raise ClientError("token: only visible ASCII characters are allowed; was it copied whole?")
+        headers = {"Authorization": f"Bearer {shown}"} if shown else {}
         self.url = url.rstrip("/")
-        self._has_token = bool(token)
-        self._http = httpx2.Client(base_url=self.url, headers=headers, timeout=_TIMEOUT, transport=transport)
+        self._has_token = bool(shown)
+        try:
+            self._http = httpx2.Client(base_url=self.url, headers=headers, timeout=_TIMEOUT, transport=transport)
+        except httpx2.InvalidURL as error:
+            raise UnreachableError(f"url = {self.url!r}: {error}") from None
 
     def __enter__(self) -> Self:
         """Itself."""
@@ -75,12 +85,18 @@ class Http:
         """The answer at ``path``; a list gives its name several times. Raises ServiceError, UnreachableError."""
         return self._decoded(kind, self._request("GET", path, params=query))
 
-    def post(self, kind: type[T], path: str, body: bytes = b"", content: str = "", key: str | None = None) -> T:
-        """The answer to a POST. It is tried again, when the network fails, only with an idempotency key."""
+    def post(
+        self, kind: type[T], path: str, body: bytes = b"", content: str = "", key: str | None = None,
+        more: float = 0.0,
+    ) -> T:  # fmt: skip
+        """The answer to a POST. It is tried again, when the network fails, only with an idempotency key. ``more``: s
+        that the answer may take beyond what others may.
+        """
         headers = {"Content-Type": content} if content else {}
         if key is not None:
             headers["Idempotency-Key"] = key
-        response = self._request("POST", path, content=body, headers=headers, repeat=key is not None)
+        timeout = httpx2.Timeout(_ANSWER + more, connect=_CONNECTION)
+        response = self._request("POST", path, content=body, headers=headers, repeat=key is not None, timeout=timeout)
         return self._decoded(kind, response)
 
     def delete(self, path: str) -> None:

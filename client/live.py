@@ -23,6 +23,8 @@ class Live:
     state: State = State.ACCEPTED
     cause: str | None = None
     message: str = ""
+    reason: str = ""
+    """What it waited for when the server was asked last."""
     seq: int = 0
     wall: float = 0.0
     """Unix time of the last message, s."""
@@ -78,6 +80,11 @@ class Live:
         interval = message.wall - self.loaded if self.loaded else 0.0
         self.load, self.loaded = message, message.wall
         self.phases = grouped(message.phases, interval)
+
+    @property
+    def told(self) -> str:
+        """The message of its state, or what a run in the queue waits for."""
+        return self.message or (self.reason if self.state is State.QUEUED else "")
 
     @property
     def fraction(self) -> float:

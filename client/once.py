@@ -22,7 +22,7 @@ from .result import Result
 from .run import Run, RunInfo
 from .submission import data_of
 from .view import view
-from .watch import show, tell
+from .watch import explained, show, tell
 
 _LAST_WORDS = 30.0
 """s that the server gets to tell the end of a run whose last message has come."""
@@ -75,10 +75,11 @@ def _follow(run: Run, case: Case, out: Console, plain: bool) -> RunInfo:
         link = run.link()
         known.link = link.name
         messages = run.messages(link=link)
-        if out.is_terminal and not plain and not out.quiet:
-            show(messages, known, out)
-        else:
-            tell(messages, known, lambda text: out.print(text, markup=False, soft_wrap=True))
+        with explained(run, known):
+            if out.is_terminal and not plain and not out.quiet:
+                show(messages, known, out)
+            else:
+                tell(messages, known, lambda text: out.print(text, markup=False, soft_wrap=True))
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         signal.signal(signal.SIGTERM, signal.SIG_IGN)

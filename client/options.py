@@ -51,6 +51,13 @@ def _complete_files(incomplete: str) -> list[str]:
     return [*complete_cases(incomplete), *(f"{path}/" if path.is_dir() else str(path) for path in files)]
 
 
+def named(text: str) -> str:
+    """The id of a run or a sweep as it was given. Raises ClientError for an empty one: a variable that is not set."""
+    if not text.strip():
+        raise ClientError("the name is empty: write an id, or 'last'")
+    return text
+
+
 CaseArgument = Annotated[
     str,
     typer.Argument(
@@ -65,16 +72,21 @@ Labels = Annotated[
     list[str] | None,
     typer.Option("--label", metavar="NAME=VALUE", help="By which runs are found again; may be repeated."),
 ]
-SourceArgument = Annotated[str, typer.Argument(metavar="RUN", help="The id of a run, 'last', or its folder.")]
+SourceArgument = Annotated[
+    str, typer.Argument(metavar="RUN", callback=named, help="The id of a run, 'last', or its folder.")
+]
 
 
-def labels_of(words: Iterable[str] | None) -> dict[str, str]:
+def labels_of(words: Sequence[str] | None) -> dict[str, str]:
     """Of ``NAME=VALUE``. Raises ClientError."""
     pairs = [word.partition("=") for word in words or ()]
     for name, equals, _ in pairs:
         if not (name and equals):
             raise ClientError(f"label = {name!r}: write NAME=VALUE")
-    return {name: value for name, _, value in pairs}
+    labels = {name: value for name, _, value in pairs}
+    if len(labels) < len(pairs):
+        raise ClientError(f"label: each has one value; given are {', '.join(words or ())}")
+    return labels
 
 
 def complain(*lines: str) -> None:

@@ -129,8 +129,12 @@ class Result:
 
     @cached_property
     def case(self) -> dict[str, Any]:
-        """The case with every default filled in, in SI, as plain data."""
-        data: dict[str, Any] = json.loads(self.folder.path(layout.RESOLVED_CASE).read_bytes())
+        """The case with every default filled in, in SI, as plain data. Raises UnfinishedError, ClientError."""
+        path = self.folder.path(layout.RESOLVED_CASE)
+        try:
+            data: dict[str, Any] = json.loads(path.read_bytes())
+        except ValueError as error:
+            raise ClientError(f"{path}: this case cannot be read: {error}") from None
         return data
 
     @cached_property
@@ -226,7 +230,7 @@ class Result:
         """What a picture takes from the case; nothing when there is no case to read."""
         try:
             case = self.case
-        except (UnfinishedError, ValueError):
+        except ClientError:
             return Scene()
         boundaries: list[dict[str, Any]] = case.get("boundaries", [])
         return Scene(

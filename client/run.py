@@ -294,5 +294,5 @@ def inside(root: Path, name: str) -> Path:
     """The path of ``name`` below ``root``. Raises ClientError for a name that would leave it."""
     path = PurePosixPath(name)
     if path.is_absolute() or ".." in path.parts or not path.parts:
-        raise ClientError(f"the server names a file {name!r}, which lies outside the run's folder")
+        raise ClientError(f"{name!r} lies outside the run's folder")
     return root.joinpath(*path.parts)

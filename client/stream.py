@@ -20,7 +20,7 @@ from conoid.cases import keys
 from conoid.cases.messages import AnyMessage, Snapshot, Status, fragments_from_msgpack, from_msgpack
 from conoid.cases.run import State
 
-from .errors import ClientError, UnreachableError
+from .errors import ClientError, passes
 from .http import Router
 from .link import Link
 from .order import InOrder, Refill
@@ -172,8 +172,8 @@ def follow(link: Link, refill: Refill, ended: Callable[[], bool], after: int = 0
     """Every message after ``after``, once and in order, to the run's final status; closes ``link``.
 
     ``refill`` reads the journal, ``ended`` asks the server whether the run is over. While the link is silent both are
-    asked every few seconds, so a dead router delays messages and loses none. A server that does not answer is waited
-    for, a minute long; then UnreachableError is raised.
+    asked every few seconds, so a dead router delays messages and loses none. A server that does not answer, or answers
+    that it cannot now, is waited for, a minute long; then UnreachableError or ServiceError is raised.
     """
     order = InOrder(_patient(refill), after)
     try:
@@ -193,9 +193,18 @@ def _told(link: Link, order: InOrder, ended: Callable[[], bool]) -> Iterator[Any
         if message is not None:
             yield from order.take(message)
             continue
-        with suppress(UnreachableError):
-            over = ended()
+        over = _asked(ended)
         yield from order.catch_up()
+
+
+def _asked(ended: Callable[[], bool]) -> bool:
+    """Whether the run is over; not while nobody can say."""
+    try:
+        return ended()
+    except ClientError as error:
+        if not passes(error):
+            raise
+        return False
 
 
 def _patient(refill: Refill) -> Refill:
@@ -204,8 +213,8 @@ def _patient(refill: Refill) -> Refill:
         while True:
             try:
                 return refill(after)
-            except UnreachableError:
-                if time.monotonic() > deadline:
+            except ClientError as error:
+                if not passes(error) or time.monotonic() > deadline:
                     raise
                 time.sleep(1.0)
 

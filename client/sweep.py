@@ -140,8 +140,13 @@ def points_along(axes: Mapping[str, Sequence[Any]], *, grid: bool = False, named
 
 def points_in(path: Path) -> list[Point]:
     """The points in a CSV file: its first line has the keys. Raises CaseError, OSError."""
-    with path.open(newline="", encoding="utf-8") as file:
-        lines = list(csv.DictReader(file))
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            lines = list(csv.DictReader(file))
+    except UnicodeDecodeError:
+        raise CaseError([Problem("--list", repr(str(path)), "not UTF-8 text")]) from None
+    except csv.Error as error:
+        raise CaseError([Problem("--list", repr(str(path)), f"not a table: {error}")]) from None
     if not lines or any(None in line or None in line.values() for line in lines):
         raise CaseError([Problem("--list", repr(str(path)), "a line of keys, then lines with a value for each")])
     return [{key.strip(): value_of(text) for key, text in line.items()} for line in lines]

@@ -6,11 +6,11 @@ from typing import Annotated
 import typer
 
 from .errors import ClientError
-from .options import CaseArgument, Json, Token, Url, show_json
+from .options import CaseArgument, Json, Token, Url, named, show_json
 from .session import connect
 from .sweep import SweepInfo, points_in, points_of
 
-SweepArgument = Annotated[str, typer.Argument(metavar="SWEEP", help="Id of a sweep, or 'last'.")]
+SweepArgument = Annotated[str, typer.Argument(metavar="SWEEP", callback=named, help="Id of a sweep, or 'last'.")]
 Sets = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=A,B,C", help="Values of a key; may be given again.")
 ]
@@ -83,4 +83,4 @@ def sweep_cancel(sweep: SweepArgument, url: Url = None, token: Token = None, as_
     if as_json:
         show_json(info)
     else:
-        typer.echo(f"{info.id} cancelling")
+        typer.echo(f"{info.id} {'has ended' if info.over else 'cancelling'}")

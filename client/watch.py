@@ -1,23 +1,29 @@
 """Shows a run in the terminal until it ends: a live panel on a terminal, plain lines anywhere else."""
 
+import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from typing import Protocol
 
 from rich.console import Console
 from rich.live import Live as Screen
 
 from conoid.cases.messages import AnyMessage, Log, Progress, Snapshot, Status
+from conoid.cases.run import State
 
 from . import silence
 from .console import PlainConsole
 from .display import line, panel, seen
+from .errors import ClientError
 from .figures import clock, duration
 from .link import Link
 from .live import Live
 
 LINE_EVERY = 2.0
 """s between two plain lines of progress; changes of state and warnings are told at once."""
+REASON_EVERY = 3.0
+"""s between two questions what a run in the queue waits for. Chosen: below the 8 s after which silence is broken."""
 
 
 class Titled(Protocol):
@@ -50,9 +56,29 @@ def watch(run: Watched, live: bool | None = None, console: Console | None = None
     link = run.link()
     known.link = link.name
     messages = run.messages(link=link)
-    if out.is_terminal if live is None else live:
-        return show(messages, known, out)
-    return tell(messages, known, lambda text: out.print(text, highlight=False, markup=False, soft_wrap=True))
+    with explained(run, known):
+        if out.is_terminal if live is None else live:
+            return show(messages, known, out)
+        return tell(messages, known, lambda text: out.print(text, highlight=False, markup=False, soft_wrap=True))
+
+
+@contextmanager
+def explained(run: Watched, known: Live) -> Iterator[None]:
+    """While ``run`` is in the queue, its server is asked now and then what it waits for, by a thread."""
+    over = threading.Event()
+
+    def ask() -> None:
+        while not over.wait(REASON_EVERY):
+            if known.state is State.QUEUED:
+                with suppress(ClientError, RuntimeError):  # the session may be closed by now
+                    known.reason = getattr(run.status(), "reason", "")
+
+    thread = threading.Thread(target=ask, name="reason", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
 
 
 def show(messages: Iterable[AnyMessage], known: Live, out: Console) -> Live:
@@ -86,5 +112,5 @@ def tell(messages: Iterable[AnyMessage], known: Live, write: Callable[[str], Non
 
 def _waiting(known: Live) -> str:
     lasting = f", for {duration(time.time() - known.changed)}" if known.changed else ""
-    at = f": {known.message}" if known.message else ""
+    at = f": {known.told}" if known.told else ""
     return f"{clock(time.time())}  {known.run}  still {known.state.value}{lasting}{at}"

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from .settings import Caps, Settings, StartError, capped, command, site_of
+from .settings import Caps, Settings, SettingsError, StartError, capped, command, site_of
 from .store import Store
 from .tokens import SCOPES, TokenError, create_token
 
@@ -91,6 +91,9 @@ def _token_commands(parser: argparse.ArgumentParser) -> None:
 def _settings(options: argparse.Namespace) -> Settings:
     site = site_of(options.site)
     told = {name: value for name, _, _ in _CAPS if (value := getattr(options, f"max_{name}")) is not None}
+    for name, value in told.items():
+        if not 0 < value < float("inf"):
+            raise SettingsError(f"--max-{name.replace('_', '-')} {value}: above 0, finite")
     given: dict[str, Any] = {**capped(site), **told}
     chosen = {"slots": options.slots} if options.slots is not None else {}
     if site.launcher == "slurm" and site.slurm is not None:

@@ -84,7 +84,19 @@ def opened(settings: Settings) -> Iterator[Service]:
         stack.callback(watchman.close)
         readiness, histories, turns = Readiness(settings, store), Histories(), Turns()
         yield Service(
-            settings, store, bell, telemetry, supervisor, desk, histories, readiness, turns, sweeps, watchman, lines
+            settings,
+            store,
+            bell,
+            telemetry,
+            supervisor,
+            desk,
+            histories,
+            readiness,
+            turns,
+            Turns(),
+            sweeps,
+            watchman,
+            lines,
         )
 
 

@@ -116,8 +116,8 @@ def respond(request: Request, folder: Path, relative: str) -> Response:
 
 
 def tags(text: str) -> set[str]:
-    """The ETags of a header."""
-    return {tag.strip() for tag in text.split(",")}
+    """The ETags of a header; those that a proxy has made weak count as well."""
+    return {tag.strip().removeprefix("W/") for tag in text.split(",")}
 
 
 def _part(request: Request, size: int, etag: str) -> tuple[int, int, int]:

@@ -125,13 +125,15 @@ async def _http_error(request: Request, error: Exception) -> Response:
 
 
 def _allowed(request: Request) -> str:
-    """The methods of all routes of the path: where several patterns match, the longest one is meant."""
+    """The methods of all routes of the path: where several patterns match, the longest one is meant. Where none does,
+    it is a file of the page.
+    """
     found: dict[str, set[str]] = {}
     for router in request.app.state.routers:
         for route in router.routes:
             if isinstance(route, APIRoute) and route.path_regex.match(request.url.path):
                 found.setdefault(route.path, set()).update(route.methods or ())
-    return ", ".join(sorted(found[max(found, key=len)])) if found else ""
+    return ", ".join(sorted(found[max(found, key=len)])) if found else "GET, HEAD"
 
 
 async def _parameter_error(_: Request, error: Exception) -> Response:

@@ -5,6 +5,7 @@ import os
 import re
 import secrets
 import shutil
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
@@ -72,18 +73,17 @@ class Process(msgspec.Struct, kw_only=True, frozen=True):
 
 _submission = msgspec.json.Decoder(Submission)
 _process = msgspec.json.Decoder(Process)
-_last_stamp = 0
+_last_stamp, _stamping = 0, threading.Lock()
 
 
 def new_id() -> tuple[str, float]:
     """An id of 22 letters and digits, and the Unix time in s. Half of each id is random, and ids sort in the order in
     which they are made, also where the clock is set back.
-
-    Not for several threads at a time.
     """
     global _last_stamp
-    _last_stamp = max(time.time_ns() // 1000, _last_stamp + 1)
-    return _letters(_last_stamp, 11) + _letters(secrets.randbits(55), 11), time.time()
+    with _stamping:
+        _last_stamp = stamp = max(time.time_ns() // 1000, _last_stamp + 1)
+    return _letters(stamp, 11) + _letters(secrets.randbits(55), 11), time.time()
 
 
 def begin_after(run_id: str) -> None:

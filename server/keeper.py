@@ -5,6 +5,8 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
 
 from sqlalchemy.exc import SQLAlchemyError
 
@@ -27,7 +29,10 @@ class Keeper:
         """``is_open`` says whether a run has not ended for good."""
         self._settings, self._store, self._lines, self._is_open = settings, store, lines, is_open
         self._rules = settings.site.retention
+        self._lock = threading.Lock()
         self._sizes: dict[str, int] = {}
+        self._settled: set[str] = set()
+        """Runs whose size was read after their end."""
         self._kept: Counter[str] = Counter()
         self._leave = threading.Event()
         self._thread = threading.Thread(target=self._work, name="keeper", daemon=True)
@@ -54,23 +59,35 @@ class Keeper:
             raise FileNotFoundError(path)
         self._lines.add(farewells.of(run, path, why))
         folder.purge(self._settings.runs, run.id)
-        self._kept[run.owner] -= self._sizes.pop(run.id, 0)
+        with self._lock:
+            self._kept[run.owner] -= self._sizes.pop(run.id, 0)
 
     def look(self) -> None:
         """One look at all folders. Raises OSError, SQLAlchemyError."""
         known = {run.id: run for run in self._store.all()}
         paths = [path for path in folder.runs_in(self._settings.runs) if path.name in known]
-        for path in paths:
-            if path.name not in self._sizes or not known[path.name].state.final:
-                self._sizes[path.name] = folder.size(path)
-        there = {path.name for path in paths}
-        self._sizes = {run_id: size for run_id, size in self._sizes.items() if run_id in there}
-        self._kept = Counter()
-        for run_id, size in self._sizes.items():
-            self._kept[known[run_id].owner] += size
+        self._weigh(paths, known)
         for run, why in self._due([known[path.name] for path in paths], time.time()):
-            self.remove(run, why)
-            _log.info("run %s of %s is removed: %s", run.id, run.owner, why)
+            with suppress(FileNotFoundError):  # its owner was faster
+                self.remove(run, why)
+                _log.info("run %s of %s is removed: %s", run.id, run.owner, why)
+
+    def _weigh(self, paths: list[Path], known: dict[str, Run]) -> None:
+        """Reads the sizes of all folders but those that change no more."""
+        for path in paths:
+            if path.name not in self._settled:
+                size = folder.size(path)
+                with self._lock:
+                    self._sizes[path.name] = size
+                if known[path.name].state.final and not self._is_open(path.name):
+                    self._settled.add(path.name)
+        there = {path.name for path in paths}
+        self._settled &= there
+        with self._lock:
+            self._sizes = {run_id: size for run_id, size in self._sizes.items() if run_id in there}
+            self._kept = Counter()
+            for run_id, size in self._sizes.items():
+                self._kept[known[run_id].owner] += size
 
     def _due(self, runs: list[Run], now: float) -> Iterator[tuple[Run, str]]:
         """The runs to be removed, oldest first, and why."""
@@ -82,7 +99,7 @@ class Keeper:
                 continue
             if pins.pinned(self._settings.runs / run.id):
                 continue
-            total -= self._sizes[run.id]
+            total -= self._sizes.get(run.id, 0)
             yield run, f"older than {self._rules.age}" if old else f"all runs had more than {most} bytes"
 
     def _work(self) -> None:
@@ -93,6 +110,8 @@ class Keeper:
                 self.look()
             except (OSError, SQLAlchemyError) as error:
                 _log.error("folders are looked at again in %g s: %s", rest, words(error))
+            except Exception:
+                _log.exception("folders are looked at again in %g s", rest)
 
 
 def restore(store: Store, lines: Farewells) -> None:

@@ -65,7 +65,8 @@ class Limits(msgspec.Struct, frozen=True):
 def of(settings: Settings) -> Limits:
     """The limits of a site."""
     caps = settings.caps
-    return Limits(settings.slots, caps.elements, caps.steps, caps.memory, caps.core_seconds, caps.wall_time)
+    memory = min((most for most in (caps.memory, settings.site.queue.memory) if most is not None), default=None)
+    return Limits(settings.slots, caps.elements, caps.steps, memory, caps.core_seconds, caps.wall_time)
 
 
 def check(case: Case, limits: Limits) -> list[Problem]:
@@ -139,10 +140,15 @@ def check_output(kept: int, quota: Quota) -> None:
         raise _later("output_quota", detail)
 
 
-def check_room(runs: Path, open_runs: int, caps: Caps) -> None:
-    """Raises ServiceError 429 when the owner has too many open runs, 507 when the disk is nearly full."""
-    if open_runs >= caps.queued:
-        detail = f"{open_runs} of your runs have not ended; this server allows {caps.queued}"
+def check_room(runs: Path, open_runs: int, caps: Caps, more: int = 1) -> None:
+    """Raises ServiceError 429 when the owner would have too many open runs with so many ``more``, 422 when these alone
+    are too many, 507 when the disk is nearly full.
+    """
+    if more > max(1, caps.queued):
+        raise ServiceError(422, "invalid_sweep", f"{more} points; this server allows {caps.queued} open runs of a user")
+    if open_runs + more > caps.queued:
+        new = f", and the sweep has {more}" if more > 1 else ""
+        detail = f"{open_runs} of your runs have not ended{new}; this server allows {caps.queued}"
         raise _later("queue_full", detail)
     free = shutil.disk_usage(runs).free
     if free < caps.free_disk:

@@ -16,6 +16,10 @@ _BUCKETS = (0.005, 0.01, 0.025, 0.05, 0.1, 0.2, 0.5, 1.0, 5.0, 30.0)
 """s: bounds of the histogram. Chosen round the 50 and 200 ms that an answer may take."""
 
 
+_METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
+"""That have series of their own. A caller may write any word there, and each would be kept for good."""
+
+
 class Metrics:
     """Of one server."""
 
@@ -38,8 +42,9 @@ class Metrics:
     def answered(self, scope: Scope, status: int, seconds: float) -> None:
         """Counts an answer under the pattern of its route, so that there are as many series as routes."""
         route = getattr(scope.get("route"), "path", "none")
-        self.answers.labels(scope["method"], route, str(status)).inc()
-        self.seconds.labels(scope["method"], route).observe(seconds)
+        method = scope["method"] if scope["method"] in _METHODS else "other"
+        self.answers.labels(method, route, str(status)).inc()
+        self.seconds.labels(method, route).observe(seconds)
 
 
 class _Runs(Collector):
@@ -73,12 +78,25 @@ class Timed:
         self._app, self._metrics = app, metrics
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes on, and looks at the clock when the answer begins."""
-        began = time.perf_counter()
+        """Passes on, and looks at the clock when the answer begins. A crash is answered farther out, with 500."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        began, answered = time.perf_counter(), False
+
+        def count(status: int) -> None:
+            nonlocal answered
+            answered = True
+            self._metrics.answered(scope, status, time.perf_counter() - began)
 
         async def told(message: Message) -> None:
             if message["type"] == "http.response.start":
-                self._metrics.answered(scope, message["status"], time.perf_counter() - began)
+                count(message["status"])
             await send(message)
 
-        await self._app(scope, receive, told if scope["type"] == "http" else send)
+        try:
+            await self._app(scope, receive, told)
+        except Exception:
+            if not answered:
+                count(500)
+            raise

@@ -69,7 +69,7 @@ ANSWERS: dict[tuple[str, str], dict[int, tuple[str, str]]] = {
 _OPEN = {"/v1/case.schema.json", "/healthz", "/readyz"}
 _REFUSALS = {
     400: "a parameter is wrong", 401: "no valid token", 403: "the token lacks the scope", 404: "there is none",
-    408: "the body did not arrive in time", 409: "not in this state", 410: "its folder has been removed",
+    408: "the body did not arrive in time", 409: "not in this state", 410: "the run's folder has been removed",
     413: "the body is too large", 415: "not a type of a case", 416: "no such range", 422: "the case is wrong",
     429: "too many wait", 500: "the server failed", 503: "not now", 507: "the disk is full",
 }  # fmt: skip
@@ -83,7 +83,7 @@ def refusals(method: str, path: str) -> set[int]:
     if "{run_id}" in path:
         found |= {410}
     if method == "post" and "{" not in path:
-        found |= {408, 413, 415, 422, 429, 507}
+        found |= {408, 410, 413, 415, 422, 429, 507}
     if path.endswith((":checkpoint", ":snapshot")) or method == "delete":
         found |= {409}
     if path.endswith(":restart"):

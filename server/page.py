@@ -19,6 +19,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
+from starlette.types import Scope
 
 PACKAGE, VERSION = "nicegui", "3.18.0"
 TESTED = {
@@ -91,8 +92,20 @@ def install(app: FastAPI, web: Path, *, auth: bool) -> str:
     except LibraryError as error:
         problem = str(error)
     app.mount("/lib", _served(files, problem, auth), name="libraries")
-    app.mount("/", StaticFiles(directory=web, html=True), name="page")
+    app.mount("/", _Page(directory=web, html=True), name="page")
     return problem
+
+
+class _Page(StaticFiles):
+    """The page's own files. A browser asks each time whether they are still the same: a server may be a newer one."""
+
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        """Raises HTTPException 404 whatever is asked of what is not there: the mount sees every unknown address."""
+        if scope["method"] not in {"GET", "HEAD"} and self.lookup_path(path)[1] is None:
+            raise HTTPException(404)
+        answer = await super().get_response(path, scope)
+        answer.headers["Cache-Control"] = "no-cache"
+        return answer
 
 
 def _served(files: Mapping[str, Library], problem: str, auth: bool) -> Starlette:

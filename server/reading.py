@@ -12,12 +12,14 @@ import signal
 import socket
 import sys
 import traceback
+from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import msgspec
 
 from conoid.cases.estimate import Estimate, estimate
-from conoid.cases.load import CaseError, Problem, json_data, parse_case, resolved_json, toml_data
+from conoid.cases.load import CaseError, Problem, json_data, parse_case, resolved_json, shipped_path, toml_data
 from conoid.cases.plausible import doubts
 from conoid.cases.schema import Case
 
@@ -29,6 +31,8 @@ CPU, WALL, MEMORY = 5, 60, 1 << 30
 takes 0.1 s and 100 MB; a machine may be busy."""
 _NICE = 5
 """Steps of priority below the server, which goes on answering. Chosen."""
+_SHIPPED = "demo"
+"""Read once before all others. Chosen: small, with a material of the library."""
 _BACKLOG = 128
 """Connections that wait. Chosen: more than are let in at a time."""
 
@@ -117,6 +121,7 @@ def main(path: str) -> int:
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(_NICE)
+    _warm()
     with socket.socket(socket.AF_UNIX) as listener:
         listener.bind(path)
         listener.listen(_BACKLOG)
@@ -126,7 +131,22 @@ def main(path: str) -> int:
             with connection:
                 if os.fork() == 0:
                     _child(connection)
+    _tidy(Path(path))
     return 0
+
+
+def _warm() -> None:
+    """Reads a shipped case: what is made at the first case (validators, the materials) is there in each fork then."""
+    none = Limits(slots=1 << 20, elements=None, steps=None, memory=None, core_seconds=None, wall_time=None)
+    told = read(Question(body=shipped_path(_SHIPPED).read_bytes(), json=False, limits=none))
+    assert told.reading is not None, told
+
+
+def _tidy(place: Path) -> None:
+    """Removes the socket, and the folder where it was alone there: a server that was killed does not."""
+    with suppress(OSError):
+        place.unlink(missing_ok=True)
+        place.parent.rmdir()
 
 
 def _child(connection: socket.socket) -> None:

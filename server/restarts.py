@@ -9,6 +9,8 @@ from conoid.cases.load import apply_overrides, read_data
 
 from .errors import ServiceError
 
+_TRIES = 5
+"""Times that the newest checkpoint is looked for. Chosen."""
 LABEL = "restart"
 """Of the new run: the id of the other one."""
 
@@ -26,18 +28,32 @@ def body(case: Path, ranks: int | None) -> dict[str, object]:
 
 def fill(source: Path, folder: Path) -> None:
     """Gives the new run the newest checkpoint of ``source``, its frames and its history, which the worker cuts at the
-    checkpoint. Raises ServiceError 409, OSError.
+    checkpoint. Raises ServiceError 409, 503, OSError.
     """
-    checkpoint = latest(source)
-    if checkpoint is None:
-        detail = f"run {source.name} has no checkpoint; a run that has succeeded keeps none"
-        raise ServiceError(409, "no_checkpoint", detail)
-    shutil.copytree(checkpoint, folder / layout.CHECKPOINTS / checkpoint.name, copy_function=_link)
+    if not any(_taken(source, folder / layout.CHECKPOINTS) for _ in range(_TRIES)):
+        detail = f"the checkpoints of run {source.name} are replaced faster than they can be taken over"
+        raise ServiceError(503, "unavailable", detail, retryable=True)
     for name, copy in ((layout.FRAMES, _link), (fragments.FOLDER, shutil.copy2)):
         if (source / name).is_dir():
             shutil.copytree(source / name, folder / name, copy_function=copy)
     if (source / layout.HISTORY).exists():
         shutil.copy2(source / layout.HISTORY, folder / layout.HISTORY)
+
+
+def _taken(source: Path, target: Path) -> bool:
+    """False when the checkpoint was removed meanwhile: a run that goes on keeps its newest ones."""
+    checkpoint = latest(source)
+    if checkpoint is None:
+        detail = f"run {source.name} has no checkpoint; a run that has succeeded keeps none"
+        raise ServiceError(409, "no_checkpoint", detail)
+    try:
+        shutil.copytree(checkpoint, target / checkpoint.name, copy_function=_link)
+    except OSError:  # shutil.Error is one
+        if checkpoint.is_dir():
+            raise
+        shutil.rmtree(target / checkpoint.name, ignore_errors=True)
+        return False
+    return True
 
 
 def _link(source: str, target: str) -> None:

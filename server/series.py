@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 
@@ -11,6 +11,7 @@ from conoid.cases.messages import Counts, Energy, Load, Progress, Snapshot
 
 from .history import History, Sample
 
+T = TypeVar("T")
 _NUMBERS = 100_000
 """Of ranks, phases and times together that are sent, at most. Chosen: a megabyte."""
 _progress = msgspec.json.Decoder(Progress)
@@ -21,7 +22,8 @@ _snapshot = msgspec.json.Decoder(Snapshot)
 
 def body(history: History, points: int) -> bytes:
     """The whole answer; under the lock of the history."""
-    reports = [_read(sample) for sample in _spread(_kept(history), points)]
+    read = (_read(sample) for sample in _spread(_kept(history), points))
+    reports = [report for report in read if report is not None]
     loads, once = [report.load for report in reports], _once(reports)
     final = history.state.final
     return msgspec.json.encode({
@@ -55,13 +57,22 @@ class _Report(msgspec.Struct, frozen=True):
         return max(told, key=lambda message: (_counted(message), message.seq)) if told else None
 
 
-def _read(sample: Sample) -> _Report:
+def _read(sample: Sample) -> _Report | None:
+    """None where the line of the load is damaged; what else is damaged is left out."""
+    load = _sound(_load, sample.load)
+    if load is None:
+        return None
     return _Report(
-        _load.decode(sample.load),
-        _progress.decode(sample.progress) if sample.progress else None,
-        _counts.decode(sample.counts) if sample.counts else None,
-        _snapshot.decode(sample.snapshot) if sample.snapshot else None,
+        load, _sound(_progress, sample.progress), _sound(_counts, sample.counts), _sound(_snapshot, sample.snapshot)
     )
+
+
+def _sound(decoder: msgspec.json.Decoder[T], line: bytes) -> T | None:
+    """The message of a line; None where there is none, or where it is none."""
+    try:
+        return decoder.decode(line) if line else None
+    except (msgspec.MsgspecError, ValueError):
+        return None
 
 
 def _kept(history: History) -> list[Sample]:

@@ -32,6 +32,8 @@ class Service:
     histories: Histories
     readiness: Readiness
     turns: Turns
+    sweep_turns: Turns
+    """Of sweeps, each of which reads for seconds: nobody who hands in a run waits for them."""
     sweeps: Sweeps
     keeper: Keeper
     farewells: Farewells

@@ -83,11 +83,13 @@ class Settings:
             raise SettingsError(f"--no-auth with --host {self.host}: allowed only on a loopback address")
         if self.slots < 1:
             raise SettingsError(f"--slots {self.slots}: at least one rank must be able to run")
-        if self.grace <= 0:
+        if not self.grace > 0:
             raise SettingsError(f"--grace {self.grace}: a number of seconds above 0")
         for name, port in (("--port", self.port), ("--zenoh-port", self.zenoh_port or 0)):
             if not 0 <= port <= 65535:
                 raise SettingsError(f"{name} {port}: 0 (any free port) to 65535")
+        if self.mpiexec:
+            command(self.mpiexec, "--mpiexec")
         if self.web is not None and not self.web.is_dir():
             raise SettingsError(f"--web {self.web}: there is no such folder")
 
@@ -121,12 +123,12 @@ def site_of(path: Path | None) -> Site:
         raise SettingsError(f"--site {error}") from None
 
 
-def command(text: str) -> tuple[str, ...]:
+def command(text: str, option: str = "--worker") -> tuple[str, ...]:
     """A command line as a list of arguments; no shell is involved. Raises SettingsError."""
     try:
         words = tuple(shlex.split(text))
     except ValueError as error:
-        raise SettingsError(f"--worker {text!r}: {error}") from None
+        raise SettingsError(f"{option} {text!r}: {error}") from None
     if not words:
-        raise SettingsError("--worker '': a command is needed")
+        raise SettingsError(f"{option} '': a command is needed")
     return words

@@ -1,5 +1,6 @@
 """From a body to an accepted run: read, check, estimate, write to disk, and only then say yes."""
 
+import logging
 import re
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -16,12 +17,14 @@ from conoid.cases.load import CaseError
 from . import folder, limits, restarts
 from .errors import ServiceError, database_away, invalid_case
 from .folder import Submission
+from .holds import words
 from .reader import the_reader
 from .reading import Question, Reading
 from .settings import Settings
 from .store import Store
 from .supervisor import Supervisor
 
+_log = logging.getLogger("conoid.server")
 KINDS = {"application/toml": "case.toml", "application/json": "case.json"}
 """Content types of a case, and the names under which they are kept."""
 _LABEL = re.compile(r"([A-Za-z0-9._-]{1,63})=([^\x00-\x1f\x7f]{0,200})")
@@ -60,9 +63,11 @@ class Desk:
         return self._reader.read(Question(body=body, json=kind == "case.json", limits=self._limits))
 
     def submit(
-        self, owner: str, body: bytes, content_type: str, key: str | None, wishes: Wishes | None = None
+        self, owner: str, body: bytes, content_type: str, key: str | None, wishes: Wishes | None = None,
+        reading: Reading | None = None,
     ) -> dict[str, Any]:  # fmt: skip
-        """Accepts a run and returns its receipt: the same one for the same key and body.
+        """Accepts a run and returns its receipt: the same one for the same key and body. ``reading``: the case, where
+        it has been read already.
 
         Raises ServiceError. The case and the first line of the journal are on disk when this returns.
         """
@@ -77,7 +82,7 @@ class Desk:
         if earlier := self._earlier(owner, key, digest, wishes.restart):
             return earlier
         try:
-            reading = self.read(body, content_type)
+            reading = reading or self.read(body, content_type)
         except CaseError as error:
             raise invalid_case(error.problems) from None
         with self._lock:
@@ -90,6 +95,23 @@ class Desk:
                 reading,
                 replace(wishes, profile=self._profile(wishes.profile or reading.profile)),
             )
+
+    def check_room(self, owner: str, keys: Sequence[str]) -> None:
+        """Raises ServiceError 422, 429, 507 unless the owner may hand in a run for each of ``keys`` that has none."""
+        more = sum(self._store.run_of_key(owner, key) is None for key in keys)
+        if more:
+            self._check_room(owner, more)
+
+    def _check_room(self, owner: str, more: int = 1) -> None:
+        limits.check_output(self.kept(owner), self._settings.site.quota)
+        limits.check_room(self._settings.runs, self._store.open_runs(owner), self._settings.caps, more)
+
+    def take_back(self, run_id: str) -> None:
+        """Cancels a run; what keeps it from being cancelled is logged."""
+        try:
+            self._supervisor.cancel(run_id)
+        except Exception as error:
+            _log.error("run %s is not taken back: %s", run_id, words(error))
 
     def _profile(self, name: str, *, named: bool = False) -> str:
         """The profile that is meant; empty where there is no batch system. ``named``: in the request, not in the case.
@@ -124,9 +146,7 @@ class Desk:
         self, owner: str, body: bytes, content_type: str, key: str | None, digest: str, reading: Reading,
         wishes: Wishes,
     ) -> dict[str, Any]:  # fmt: skip
-        caps = self._settings.caps
-        limits.check_output(self.kept(owner), self._settings.site.quota)
-        limits.check_room(self._settings.runs, self._store.open_runs(owner), caps)
+        self._check_room(owner)
         run_id, now = folder.new_id()
         made = Submission(
             id=run_id, owner=owner, name=reading.name, title=reading.title, ranks=reading.ranks, submitted=now,
@@ -153,14 +173,21 @@ class Desk:
         return receipt(made)
 
 
-def labels_of(words: Sequence[str]) -> dict[str, str]:
+def labels_of(texts: Sequence[str]) -> dict[str, str]:
     """The labels of ``NAME=VALUE``. Raises ServiceError 400."""
-    found = [_LABEL.fullmatch(word) for word in words]
-    if None in found or len(words) > _MOST_LABELS:
-        wrong = next((word for word, read in zip(words, found, strict=True) if read is None), f"{len(words)} of them")
+    found = [_LABEL.fullmatch(word) for word in texts]
+    if None in found or len(texts) > _MOST_LABELS:
+        wrong = next((word for word, read in zip(texts, found, strict=True) if read is None), f"{len(texts)} of them")
         hint = f"at most {_MOST_LABELS}: a name of letters, digits, '.', '_' or '-', '=', and up to 200 characters"
         raise ServiceError(400, "bad_parameter", f"label = {wrong[:80]!r}: not a label", pointer="label", hint=hint)
-    return {read[1]: read[2] for read in found if read is not None}
+    pairs = [(read[1], read[2]) for read in found if read is not None]
+    labels = dict(pairs)
+    if len(labels) < len(pairs):
+        name = next(name for n, (name, _) in enumerate(pairs) if name in dict(pairs[:n]))
+        raise ServiceError(
+            400, "bad_parameter", f"label = {name!r}: it has one value, and is given twice", pointer="label"
+        )
+    return labels
 
 
 def receipt(made: Submission) -> dict[str, Any]:

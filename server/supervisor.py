@@ -291,9 +291,9 @@ class Supervisor:
                 self._apply(run_id, Broken(_GONE))
 
     def _found(self, left: Left) -> None:
-        """A run that an earlier server has left."""
+        """A run that an earlier server has left; one that has ended is known here until the database knows it too."""
         if left.worker is not None:
             self._hands.found[left.run.id] = left.worker
-        if not left.run.state.final:
+        if not left.run.state.final or left.run.id in self._index.unsaved:
             self._open[left.run.id] = left.run
             self._apply(left.run.id, left.found)

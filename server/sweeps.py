@@ -16,6 +16,7 @@ from conoid.cases.load import CaseError, Problem, apply_overrides, json_data
 
 from . import durable, folder
 from .errors import ServiceError, invalid_case
+from .reading import Reading
 from .settings import Settings
 from .shapes import MOST_POINTS
 from .submission import Desk, Wishes
@@ -41,6 +42,16 @@ class Plan(msgspec.Struct, kw_only=True, frozen=True):
     points: list[dict[str, Any]]
     runs: list[str] = []
 
+    @property
+    def whole(self) -> bool:
+        """Whether all of its runs are accepted."""
+        return len(self.runs) == len(self.points)
+
+    @property
+    def keys(self) -> list[str]:
+        """The idempotency keys of its runs."""
+        return [f"sweep-{self.id}-{n}" for n in range(len(self.points))]
+
 
 class Wish(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
     """What is handed in: a case as plain data, the changes of each point, the limit."""
@@ -56,9 +67,10 @@ class Sweeps:
     def __init__(self, settings: Settings, desk: Desk) -> None:
         """Reads what is there; a file that cannot be read is left alone."""
         self._folder, self._desk = settings.runs / FOLDER, desk
-        self._lock = threading.Lock()
+        self._locks: dict[str, threading.Lock] = {}
+        """By owner: who hands in many points does not hold up others."""
         self._plans: dict[str, Plan] = {}
-        self._filling = ""
+        self._filling: set[str] = set()
         for path in sorted(self._folder.glob("*.json")):
             try:
                 self._keep(msgspec.json.decode(path.read_bytes(), type=Plan))
@@ -77,19 +89,24 @@ class Sweeps:
     def submit(self, owner: str, body: bytes, key: str | None) -> Plan:
         """Accepts all runs of a sweep, or none. Raises ServiceError. The same key and body give the same sweep."""
         digest = hashlib.sha256(body).hexdigest()
-        with self._lock:
+        with self._locks.setdefault(owner, threading.Lock()):
             plan = self._earlier(owner, key, digest)
-            if plan is not None and plan.runs:
+            if plan is not None and plan.whole:
                 return plan
-            bodies = self._bodies(body)
+            cases = self._cases(body)
+            fresh = plan or self._new(owner, body, key, digest)
+            self._desk.check_room(owner, fresh.keys)
             if plan is None:
-                plan = self._new(owner, body, key, digest)
-                self._write(plan)
-            self._filling = plan.id
+                self._write(fresh)
+            plan = fresh
+            self._filling.add(plan.id)
             try:
-                return self._fill(plan, bodies)
+                return self._fill(plan, cases)
+            except ServiceError:
+                self._take_back(plan.id)
+                raise
             finally:
-                self._filling = ""
+                self._filling.discard(plan.id)
 
     def held(self, need: Need, active: Iterable[Need]) -> str:
         """Why a run waits for its sweep: for all its runs to be there, or for those that are ``active``. The label of
@@ -98,7 +115,7 @@ class Sweeps:
         plan = self.get(need.sweep, need.owner)
         if plan is None:
             return ""
-        if plan.id == self._filling:
+        if plan.id in self._filling:
             return "its sweep is being handed in"
         if plan.at_once is None:
             return ""
@@ -112,18 +129,19 @@ class Sweeps:
             raise ServiceError(422, "key_reused", detail, pointer="Idempotency-Key", hint="use a new key")
         return found[0] if found else None
 
-    def _bodies(self, body: bytes) -> list[bytes]:
+    def _cases(self, body: bytes) -> list[tuple[bytes, Reading]]:
         """The case of each point, each of which can be run. Raises ServiceError with what is wrong."""
         wish = _wish(body)
         made = [_changed(wish.case, point, n) for n, point in enumerate(wish.points)]
         if sum(map(len, made)) > _MOST_BYTES:
             raise ServiceError(413, "too_large", f"the cases have more than {_MOST_BYTES} bytes together")
+        cases = []
         for n, text in enumerate(made):
             try:
-                self._desk.read(text, _JSON)
+                cases.append((text, self._desk.read(text, _JSON)))
             except CaseError as error:
                 raise _at(n, error) from None
-        return made
+        return cases
 
     def _new(self, owner: str, body: bytes, key: str | None, digest: str) -> Plan:
         wish = _wish(body)
@@ -133,14 +151,22 @@ class Sweeps:
             at_once=wish.at_once, points=wish.points,
         )  # fmt: skip
 
-    def _fill(self, plan: Plan, bodies: Sequence[bytes]) -> Plan:
-        for n, body in enumerate(bodies):
-            labels = {"sweep": plan.id, "point": str(n)}
-            receipt = self._desk.submit(plan.owner, body, _JSON, f"sweep-{plan.id}-{n}", Wishes(labels))
+    def _fill(self, plan: Plan, cases: Sequence[tuple[bytes, Reading]]) -> Plan:
+        plan = msgspec.structs.replace(plan, runs=[])
+        for n, ((body, reading), key) in enumerate(zip(cases, plan.keys, strict=True)):
+            wishes = Wishes({"sweep": plan.id, "point": str(n)})
+            receipt = self._desk.submit(plan.owner, body, _JSON, key, wishes, reading)
             plan = msgspec.structs.replace(plan, runs=[*plan.runs, receipt["id"]])
             self._plans[plan.id] = plan
         self._write(plan)
         return plan
+
+    def _take_back(self, sweep_id: str) -> None:
+        """Cancels the runs of a sweep that was refused in the middle, before any of them has started."""
+        for run_id in self._plans[sweep_id].runs:
+            self._desk.take_back(run_id)
+        del self._plans[sweep_id]
+        (self._folder / f"{sweep_id}.json").unlink(missing_ok=True)
 
     def _keep(self, plan: Plan) -> None:
         self._plans[plan.id] = plan
@@ -173,6 +199,8 @@ def _changed(case: dict[str, Any], point: dict[str, Any], n: int) -> bytes:
         return json.dumps(apply_overrides(case, point)).encode()
     except CaseError as error:
         raise _at(n, error) from None
+    except RecursionError:
+        raise _at(n, CaseError([Problem("", "", "its values are nested too deeply")])) from None
 
 
 def _at(n: int, error: CaseError) -> ServiceError:

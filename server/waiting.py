@@ -116,14 +116,14 @@ def plan(
 ) -> Plan:
     """What starts at the Unix time ``now``, out of ``room`` of which ``busy`` have a part; ``queue`` in its order.
 
-    ``blocked`` says of a run, and of those that start before it, why it may not start whatever is free; such a run
-    holds nobody up.
+    ``blocked`` says of a run, and of those that start before it, why it may not start whatever is free. Such a run
+    holds nobody up, and one that needs more than there is neither.
     """
     made, starts, holds, first = Plan(), list[Need](), list(busy), None
     waits = 0
     for need in queue:
         free = room.less(*holds)
-        if why := blocked(need, starts):
+        if why := blocked(need, starts) or _beyond(need, room):
             made.why[need.run] = why
         elif free.fits(need) and (first is None or _passes(need, first, holds, free, now)):
             starts.append(need)
@@ -133,6 +133,17 @@ def plan(
             first, waits = first or need, waits + 1
     made.start = [need.run for need in starts]
     return made
+
+
+def _beyond(need: Need, room: Room) -> str:
+    """Why a run can never start; a server may have been started again with less."""
+    if need.ranks > room.ranks:
+        return f"it needs {need.ranks} slots, and this server has {room.ranks}: it cannot start here"
+    if need.memory > room.memory:
+        return (
+            f"it needs {need.memory:.3g} bytes of memory, and this server has {room.memory:.3g}: it cannot start here"
+        )
+    return ""
 
 
 def _reason(need: Need, room: Room, free: Room, waits: int) -> str:

@@ -17,6 +17,9 @@ export class Problem extends Error {
   }
 }
 
+// Whether the server will not answer later either; a proxy says 502 and 503 for a server that starts again.
+export const refused = (error) => error instanceof Problem && error.status < 500 && error.status !== 429;
+
 const address = (path) => new URL(path, document.baseURI);
 
 async function send(path, { method = "GET", headers = {}, signal, cache = "no-store" } = {}) {

@@ -1,6 +1,6 @@
 // Which page is shown: sign in, the list of runs, one run, or two of them.
 
-import { Problem, call, token } from "./api.js";
+import { Problem, call, refused, token } from "./api.js";
 import { duration, h, meter, moment, pill } from "./figures.js";
 import { offer } from "./libraries.js";
 import { FINAL } from "./live.js";
@@ -63,15 +63,15 @@ class RunsPage {
 
   async read() {
     try {
-      const { runs } = await call("v1/runs?limit=100");
+      const { runs, next } = await call("v1/runs?limit=100");
       await Promise.all(runs.filter((run) => run.state === "running").slice(0, MOST_ASKED).map(async (run) => {
         Object.assign(run, await call(`v1/runs/${encodeURIComponent(run.id)}`));
       }));
-      if (!this.closed) this.draw(runs);
+      if (!this.closed) this.draw(runs, next);
     } catch (error) {
       if (this.closed) return;
       if (error instanceof Problem && error.status === 401) signIn("The server does not accept this token any more.");
-      else this.say(h("span.problem", {}, `No answer from the server: ${error.message}`));
+      else this.say(h("span.problem", {}, refused(error) ? error.message : `No answer from the server: ${error.message}`));
     }
   }
 
@@ -86,12 +86,13 @@ class RunsPage {
     for (const box of this.body.querySelectorAll("[data-marks]")) box.checked = this.marked.includes(box.dataset.marks);
   }
 
-  draw(runs) {
+  draw(runs, next) {
     const focused = document.activeElement?.dataset?.marks;
     this.body.replaceChildren(...runs.map((run) => row(run, this.marked.includes(run.id), () => this.mark(run.id))));
     if (focused) this.body.querySelector(`[data-marks="${CSS.escape(focused)}"]`)?.focus();
     this.table.hidden = !runs.length;
-    if (runs.length) this.say();
+    if (next) this.say(`The newest ${runs.length} are shown; `, h("code", {}, "conoid ls --limit 1000"), " lists more.");
+    else if (runs.length) this.say();
     else this.say("No runs yet. Submit one: ", h("code", {}, "conoid submit taylor_copper"));
   }
 }

@@ -1,10 +1,15 @@
 // three.js and ECharts, out of the package that the server has found; each is loaded when it is needed, once.
 
-let asked = null;
-const loaded = {};
+const known = {};
+
+// What `read` gives, read once; again where that has failed: the server may be back.
+const once = (name, read) => (known[name] ??= read().catch((error) => {
+  delete known[name];
+  throw error;
+}));
 
 // { auth, problem, three, echarts }: what the server has. It needs no token.
-export const offer = () => (asked ??= fetch(new URL("lib/index.json", document.baseURI)).then((answer) => answer.json()));
+export const offer = () => once("offer", () => fetch(new URL("lib/index.json", document.baseURI)).then((answer) => answer.json()));
 
 async function library(name) {
   const { [name]: place, problem } = await offer();
@@ -12,5 +17,5 @@ async function library(name) {
   return import(new URL(place, document.baseURI));
 }
 
-export const three = () => (loaded.three ??= library("three"));
-export const echarts = () => (loaded.echarts ??= library("echarts").then((module) => module.echarts));
+export const three = () => once("three", () => library("three"));
+export const echarts = () => once("echarts", () => library("echarts").then((module) => module.echarts));

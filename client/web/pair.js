@@ -1,6 +1,6 @@
 // Two runs on one page: the keys that differ, their histories over each other, what became of their fragments.
 
-import { binary, call } from "./api.js";
+import { binary, call, refused } from "./api.js";
 import { Chart, axis, series, time } from "./charts.js";
 import { count, duration, h, pill, si } from "./figures.js";
 import { readPlan } from "./history.js";
@@ -9,14 +9,14 @@ import { card } from "./plots.js";
 import { decode, sizes } from "./snapshot.js";
 
 const TALL = 250;
-const AGAIN = 5000; // ms until runs that go on are read again.
+const AGAIN = 5000; // ms until runs that go on, or of which nobody answered, are read again.
 const POINTS = 1000;
 const TONES = ["compute", "bad"];
 const NEVER = /^(name|title|description|reference\b.*)$/; // Keys that change no answer.
 
 export class PairPage {
-  constructor(runs) {
-    Object.assign(this, { runs, told: [], abort: new AbortController() });
+  constructor(runs, again = AGAIN) {
+    Object.assign(this, { runs, again, told: [], abort: new AbortController() });
     this.charts = charts(this);
     this.head = h("div.card", {}, h("p.hint", {}, "Loading …"));
     this.keys = h("section.card.wide", { hidden: "" });
@@ -38,11 +38,18 @@ export class PairPage {
     try {
       this.told = await Promise.all(this.runs.map((run) => readRun(run, signal)));
     } catch (error) {
-      if (!signal.aborted) this.head.replaceChildren(h("p.problem", {}, error.message));
+      if (signal.aborted) return;
+      this.head.replaceChildren(h("p.problem", {}, refused(error) ? error.message : `No answer from the server: ${error.message}`));
+      if (!refused(error)) this.later();
       return;
     }
+    if (signal.aborted) return;
     this.draw();
-    if (this.told.some(({ info }) => !FINAL.has(info.state))) this.timer = setTimeout(() => this.read(), AGAIN);
+    if (this.told.some(({ info }) => !FINAL.has(info.state))) this.later();
+  }
+
+  later() {
+    this.timer = setTimeout(() => this.read(), this.again);
   }
 
   draw() {

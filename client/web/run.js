@@ -1,6 +1,6 @@
 // The page of one run: everything on it follows from the run's history and messages.
 
-import { Problem, call, messages } from "./api.js";
+import { call, messages, refused } from "./api.js";
 import { Body } from "./body.js";
 import { count, duration, h, meter, percent, pill, si } from "./figures.js";
 import { fill, readPlan } from "./history.js";
@@ -74,7 +74,7 @@ export class RunPage {
         }
       } catch (error) {
         if (this.abort.signal.aborted) return;
-        if (error instanceof Problem && error.status < 500 && error.status !== 429) return this.fail(error);
+        if (refused(error)) return this.fail(error);
       }
       if (FINAL.has(live.state)) break;
       this.connection = ["waiting", "reconnecting"];
@@ -96,7 +96,7 @@ export class RunPage {
       this.info = await call(this.path, { signal: this.abort.signal });
       this.later();
     } catch (error) {
-      if (error instanceof Problem && error.status < 500) this.fail(error);
+      if (refused(error)) this.fail(error);
     }
   }
 
@@ -133,6 +133,7 @@ export class RunPage {
     this.due = true;
     requestAnimationFrame(() => {
       this.due = false;
+      if (this.abort.signal.aborted) return; // Another page is shown.
       this.draw();
       const start = 1000 * this.born - performance.timeOrigin;
       this.born = undefined;

@@ -102,7 +102,7 @@ def _log_of(folder: Path) -> BinaryIO:
 def find_mpiexec(chosen: str) -> tuple[str, ...]:
     """The site's own when it names one, then the one beside this Python, then the one in PATH. Raises LaunchError."""
     if chosen:
-        return command(chosen)
+        return command(chosen, "--mpiexec")
     beside = Path(sys.executable).with_name("mpiexec")
     found = str(beside) if beside.is_file() else shutil.which("mpiexec")
     if found is None:

@@ -16,7 +16,7 @@ from conoid.cases.load import CaseError
 from conoid.cases.policy import PRIORITY
 from conoid.cases.run import State
 
-from .. import folder, openapi, pins, restarts, view
+from .. import download, folder, openapi, pins, restarts, view
 from ..auth import Identity, Pass, Reader, Submitter, unauthorized
 from ..errors import ServiceError, invalid_case, not_found
 from ..events import Run
@@ -126,12 +126,13 @@ async def show(
 ) -> Response:
     """The run. With ``wait``, the answer comes when its state has changed, or, when If-None-Match is sent, when
     anything has; at most so many seconds later. A run that has ended is answered at once."""
-    known = request.headers.get("if-none-match")
+    told = request.headers.get("if-none-match")
+    known = None if told is None else download.tags(told)
     first = await run_in_threadpool(view.snapshot, service, run)
     latest, deadline, may = first, time.monotonic() + wait, Pass(service, identity)
     with service.bell.listen(run.id) as listener:
         while not (latest.state.final or service.bell.closed):
-            changed = latest.state is not first.state if known is None else latest.etag != known
+            changed = latest.state is not first.state if known is None else latest.etag not in known
             left = deadline - time.monotonic()
             if changed or left <= 0:
                 break
@@ -141,7 +142,7 @@ async def show(
                 raise unauthorized()
             latest = await run_in_threadpool(lambda: view.snapshot(service, find(service, identity, run.id)))
     headers = {"ETag": latest.etag, "Cache-Control": "private, no-cache"}
-    if latest.etag == known:
+    if known is not None and latest.etag in known:
         return Response(status_code=304, headers=headers)
     return Response(latest.body, 200, headers, "application/json")
 
@@ -185,12 +186,17 @@ def _pin(service: Service, run: Run, keep: bool) -> Response:
 def cancel(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
     """Stops a run: at its next step, or hard when it does not. Asking again changes nothing."""
     run = find(service, identity, run_id)
+    ask_to_stop(service, run.id)
+    return Response(view.snapshot(service, find(service, identity, run_id)).body, 202, media_type="application/json")
+
+
+def ask_to_stop(service: Service, run_id: str) -> None:
+    """Raises ServiceError 503 when the request could not be recorded."""
     try:
-        service.supervisor.cancel(run.id)
+        service.supervisor.cancel(run_id)
     except Exception as error:
         detail = f"the request could not be recorded: {str(error) or 'no answer in time'}".splitlines()[0]
         raise ServiceError(503, "unavailable", detail, retryable=True) from error
-    return Response(view.snapshot(service, find(service, identity, run_id)).body, 202, media_type="application/json")
 
 
 @router.post("/v1/runs/{run_id}:restart", status_code=202)

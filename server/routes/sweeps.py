@@ -3,6 +3,7 @@
 import csv
 import io
 from collections import Counter
+from collections.abc import Sequence
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Header, Response
@@ -19,6 +20,7 @@ from ..events import Run
 from ..limits import read_body
 from ..service import Service, ServiceOf
 from ..sweeps import Plan
+from .runs import ask_to_stop
 
 router = APIRouter()
 Body = Annotated[bytes, Depends(read_body)]
@@ -29,9 +31,10 @@ async def submit(
     service: ServiceOf, identity: Submitter, body: Body, idempotency_key: Annotated[str | None, Header()] = None
 ) -> Response:
     """Takes a case and the points at which it is to be run; all runs are accepted, or none."""
-    async with service.turns.turn(identity.owner):
+    async with service.sweep_turns.turn(identity.owner):
         plan = await run_in_threadpool(service.sweeps.submit, identity.owner, body, idempotency_key)
-    return JSONResponse(_shown(service, plan), 202, {"Location": f"/v1/sweeps/{plan.id}"})
+    shown = await run_in_threadpool(_shown, service, plan)
+    return JSONResponse(shown, 202, {"Location": f"/v1/sweeps/{plan.id}"})
 
 
 @router.get("/v1/sweeps")
@@ -50,7 +53,7 @@ def show(service: ServiceOf, identity: Reader, sweep_id: str) -> dict[str, Any]:
 def table(service: ServiceOf, identity: Reader, sweep_id: str) -> Response:
     """A line a point as CSV: what was changed, the state of the run, and its results as far as it has any."""
     plan = _find(service, identity, sweep_id)
-    lines = [_line(service, point, run) for point, run in zip(plan.points, _runs(service, plan), strict=False)]
+    lines = [_line(service, point, run) for point, run in _pairs(service, plan)]
     out = io.StringIO()
     columns = list(dict.fromkeys(name for line in lines for name in line))
     writer = csv.DictWriter(out, columns, lineterminator="\n")
@@ -65,7 +68,7 @@ def cancel(service: ServiceOf, identity: Submitter, sweep_id: str) -> dict[str, 
     plan = _find(service, identity, sweep_id)
     for run_id in plan.runs:
         if service.supervisor.is_open(run_id):
-            service.supervisor.cancel(run_id)
+            ask_to_stop(service, run_id)
     return _shown(service, plan)
 
 
@@ -76,13 +79,18 @@ def _find(service: Service, identity: Identity, sweep_id: str) -> Plan:
     return plan
 
 
-def _runs(service: Service, plan: Plan) -> list[Run]:
+def _pairs(service: Service, plan: Plan) -> list[tuple[dict[str, Any], Run]]:
+    """Each point with its run; without those of which the server knows nothing any more."""
     found = (service.supervisor.current(run_id) or service.store.get(run_id) for run_id in plan.runs)
-    return [run for run in found if run is not None]
+    return [(point, run) for point, run in zip(plan.points, found, strict=False) if run is not None]
 
 
 def _brief(service: Service, plan: Plan) -> dict[str, Any]:
-    states = Counter(run.state.value for run in _runs(service, plan))
+    return _headed(plan, _pairs(service, plan))
+
+
+def _headed(plan: Plan, pairs: Sequence[tuple[dict[str, Any], Run]]) -> dict[str, Any]:
+    states = Counter(run.state.value for _, run in pairs)
     return {
         "id": plan.id, "owner": plan.owner, "name": plan.name, "submitted": plan.submitted, "at_once": plan.at_once,
         "total": len(plan.points), "states": dict(states), "url": f"/v1/sweeps/{plan.id}",
@@ -90,9 +98,9 @@ def _brief(service: Service, plan: Plan) -> dict[str, Any]:
 
 
 def _shown(service: Service, plan: Plan) -> dict[str, Any]:
-    runs = _runs(service, plan)
-    points = [{"values": point, "run": view.brief(service, run)} for point, run in zip(plan.points, runs, strict=False)]
-    return {**_brief(service, plan), "points": points}
+    pairs = _pairs(service, plan)
+    points = [{"values": point, "run": view.brief(service, run)} for point, run in pairs]
+    return {**_headed(plan, pairs), "points": points}
 
 
 def _line(service: Service, point: dict[str, Any], run: Run) -> dict[str, Any]:

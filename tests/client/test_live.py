@@ -10,8 +10,9 @@ from rich.console import Console
 from conoid.cases.messages import AnyMessage
 from conoid.cases.run import State
 from conoid.client import display, silence
+from conoid.client.link import Link
 from conoid.client.live import Live, exit_code, grouped
-from conoid.client.watch import show, tell
+from conoid.client.watch import show, tell, watch
 
 from . import stories
 
@@ -153,3 +154,56 @@ def test_the_live_screen_ends_with_the_last_picture() -> None:
     show(stories.whole(), Live(stories.RUN), out)
     assert isinstance(out.file, io.StringIO)
     assert "succeeded" in out.file.getvalue()
+
+
+class Queued:
+    """A run that waits until somebody has been told why."""
+
+    id, title, reason = stories.RUN, "A bar", "waiting for 4 of 2 slots; 1 free"
+
+    def __init__(self) -> None:
+        self.heard = threading.Event()
+
+    def status(self) -> "Queued":
+        return self
+
+    def link(self) -> Link:
+        return Nothing()
+
+    def messages(self, *, link: Link) -> Iterator[AnyMessage]:
+        yield stories.status(1, "queued")
+        assert self.heard.wait(10)
+        yield stories.status(2, "running")
+        yield stories.status(3, "succeeded")
+
+
+class Nothing:
+    """A subscription over which nothing comes."""
+
+    name = "none"
+
+    def get(self, timeout: float) -> AnyMessage | None:
+        return None
+
+    def close(self) -> None:
+        """Nothing to let go."""
+
+
+def test_what_a_run_in_the_queue_waits_for_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(silence, "LONGEST", 0.05)
+    monkeypatch.setattr("conoid.client.watch.REASON_EVERY", 0.01)
+    run, out = Queued(), io.StringIO()
+
+    class Heard(Console):
+        def print(self, *told: object, **options: object) -> None:
+            super().print(*told, **options)  # type: ignore[arg-type]
+            if run.reason in str(told):
+                run.heard.set()
+
+    known = watch(run, live=False, console=Heard(file=out, width=200))
+    lines = [line for line in out.getvalue().splitlines() if run.reason in line]
+    assert lines
+    assert all("still queued" in line for line in lines)
+    assert run.reason not in rendered(known)
+    known.state = State.QUEUED
+    assert run.reason in rendered(known), "the panel tells it too"

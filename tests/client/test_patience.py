@@ -1,4 +1,4 @@
-"""Waiting for the end of a run outlasts a server that is away."""
+"""Waiting for the end of a run, and following it, outlasts a server that is away."""
 
 import time
 
@@ -6,10 +6,14 @@ import httpx2
 import msgspec
 import pytest
 
+from conoid.cases.messages import AnyMessage, Status
 from conoid.cases.run import State
 from conoid.client.errors import ServiceError, UnreachableError
 from conoid.client.http import Http
 from conoid.client.run import Run, RunInfo
+from conoid.client.session import Session
+from conoid.client.stream import follow
+from conoid.client.sweep import SweepInfo
 
 
 class Away(httpx2.BaseTransport):
@@ -26,6 +30,19 @@ class Away(httpx2.BaseTransport):
         if self.status is None:
             raise httpx2.ConnectError("refused")
         return httpx2.Response(self.status, json={"detail": "not now", "retryable": self.status == 503})
+
+
+class Silent:
+    """A subscription over which nothing comes."""
+
+    name = "none"
+
+    def get(self, timeout: float) -> AnyMessage | None:
+        time.sleep(timeout)
+        return None
+
+    def close(self) -> None:
+        """Nothing to let go."""
 
 
 @pytest.fixture(autouse=True)
@@ -57,3 +74,55 @@ def test_the_timeout_holds_while_the_server_is_away() -> None:
 def test_a_refusal_is_no_absence() -> None:
     with pytest.raises(ServiceError):
         Run(Http("http://x", transport=Away(1, 403)), "a").wait()
+
+
+@pytest.mark.parametrize("status", [None, 502, 503])
+def test_who_follows_a_run_outlasts_a_proxy_whose_server_starts_again(status: int | None) -> None:
+    """The shipped nginx answers 502 while the server behind it is away."""
+    left = [20]
+
+    def refill(after: int) -> list[AnyMessage]:
+        left[0] -= 1
+        if left[0] >= 0:
+            raise UnreachableError("none") if status is None else ServiceError(status, {})
+        told: list[AnyMessage] = [Status(run="a", seq=1, state="succeeded")]
+        return told[after:]
+
+    assert [message.seq for message in follow(Silent(), refill, lambda: False)] == [1]
+
+
+@pytest.mark.parametrize("status", [502, 503])
+def test_an_end_that_cannot_be_asked_for_now_is_asked_for_again(status: int) -> None:
+    left = [3]
+
+    def ended() -> bool:
+        left[0] -= 1
+        if left[0] >= 0:
+            raise ServiceError(status, {})
+        return True
+
+    assert list(follow(Silent(), lambda after: [], ended)) == []
+
+
+def test_who_may_not_follow_a_run_is_told_so() -> None:
+    def refill(after: int) -> list[AnyMessage]:
+        raise ServiceError(401, {})
+
+    with pytest.raises(ServiceError):
+        list(follow(Silent(), refill, lambda: False))
+
+
+def test_a_large_sweep_may_take_its_time() -> None:
+    """A server reads, checks and writes each point before it answers."""
+    seconds = []
+
+    class Slow(httpx2.BaseTransport):
+        def handle_request(self, request: httpx2.Request) -> httpx2.Response:
+            seconds.append(request.extensions["timeout"]["read"])
+            made = SweepInfo(id="s", name="bar", submitted=0.0, total=1000, states={})
+            return httpx2.Response(202, content=msgspec.json.encode(made))
+
+    with Session("http://x", transport=Slow()) as session:
+        session.sweep({"name": "bar"}, [{"run.ranks": 1}] * 1000)
+        session.sweep({"name": "bar"}, [{"run.ranks": 1}])
+    assert seconds == [530.0, 30.5]

@@ -44,6 +44,12 @@ def say(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Said:
         (["--web", "/no/such/folder"], "--web /no/such/folder: there is no such folder"),
         (["--grace", "0"], "--grace 0.0: a number of seconds above 0"),
         (["--worker", "'"], '--worker "\'": No closing quotation'),
+        (["--mpiexec", "'"], '--mpiexec "\'": No closing quotation'),
+        (["--mpiexec", " "], "--mpiexec '': a command is needed"),
+        (["--grace", "nan"], "--grace nan: a number of seconds above 0"),
+        (["--max-queued", "-1"], "--max-queued -1: above 0"),
+        (["--max-wall-time", "nan"], "--max-wall-time nan: above 0"),
+        (["--max-core-seconds", "inf"], "--max-core-seconds inf: above 0, finite"),
         (["--host", "192.0.2.1"], "--host 192.0.2.1 --port 8750: "),
     ],
 )

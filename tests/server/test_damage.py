@@ -7,10 +7,11 @@ import time
 from pathlib import Path
 
 import pytest
+from sqlalchemy.exc import OperationalError
 
 from conoid.cases import layout
 from conoid.cases.run import State
-from conoid.server import farewell, folder, holds
+from conoid.server import farewell, folder, holds, index
 from conoid.server.events import Run
 
 from .faulty import House, Plan, faults
@@ -197,4 +198,30 @@ def test_a_run_whose_folder_was_emptied_is_taken_up_all_the_same(tmp_path: Path,
     ended = turned(house, run)
     assert ended.state in {State.LOST, State.FAILED}
     assert len(house.puppets.made) == 1
+    house.store.close()
+
+
+def test_an_end_that_the_database_has_missed_twice_is_told_once_it_can_be_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It could not be written when the run ended, nor when the next server started."""
+    house = House(tmp_path / "runs")
+    run = house.accept()
+
+    def away(*_: object) -> None:
+        raise OperationalError("update", {}, Exception("database is locked"))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(house.store, "save", away)
+        patch.setattr(house.store, "add", away)
+        assert turned(house, run).state is State.SUCCEEDED
+        house.supervisor = house.begin()
+        seen = house.supervisor.current(run.id)
+        assert seen is not None
+        assert seen.state is State.SUCCEEDED, "the database says that it waits"
+    monkeypatch.setattr(index, "_REST", 0.0)
+    house.supervisor._tidy()
+    told = house.store.get(run.id)
+    assert told is not None
+    assert (told.state, house.supervisor.current(run.id)) == (State.SUCCEEDED, None)
     house.store.close()

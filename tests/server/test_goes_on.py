@@ -1,9 +1,15 @@
 """``:restart``: a new run goes on from a checkpoint of another one."""
 
+import os
+import shutil
 from pathlib import Path
+
+import pytest
 
 from conoid.cases import layout
 from conoid.cases.run import State
+from conoid.server import restarts
+from conoid.server.errors import ServiceError
 
 from .running import Running
 
@@ -53,3 +59,47 @@ def test_without_a_checkpoint_there_is_nothing_to_go_on_from(server: Running) ->
     assert server.bob.http.post(f"/v1/runs/{run}:restart").status_code == 404
     with_checkpoint(server, run, 3)
     assert server.ann.http.post(f"/v1/runs/{run}:restart?ranks=3").status_code == 422, "there are 2 slots"
+
+
+def made(folder: Path, *steps: int) -> Path:
+    """A run's folder with checkpoints."""
+    for step in steps:
+        layout.checkpoint(folder, step).mkdir(parents=True)
+        (layout.checkpoint(folder, step) / "rank-0.h5").write_bytes(b"state")
+    return folder
+
+
+def test_a_checkpoint_that_is_replaced_meanwhile_is_looked_for_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a run that goes on: it keeps its newest ones, and may write one at any moment."""
+    source, real = made(tmp_path / "a", 10), os.link
+
+    def replaced(one: str, other: str) -> None:
+        if layout.checkpoint(source, 10).exists():
+            shutil.rmtree(layout.checkpoint(source, 10))
+            made(source, 20)
+        real(one, other)
+
+    monkeypatch.setattr(os, "link", replaced)
+    restarts.fill(source, tmp_path / "b")
+    assert [path.name for path in (tmp_path / "b" / layout.CHECKPOINTS).iterdir()] == [
+        layout.checkpoint(source, 20).name
+    ]
+
+
+def test_checkpoints_that_are_replaced_all_the_time_are_asked_for_later(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = made(tmp_path / "a", 10)
+
+    def replaced(one: str, other: str) -> None:
+        step = int(Path(one).parent.name)
+        shutil.rmtree(layout.checkpoint(source, step))
+        made(source, step + 10)
+        raise FileNotFoundError(one)
+
+    monkeypatch.setattr(os, "link", replaced)
+    with pytest.raises(ServiceError, match="replaced faster") as told:
+        restarts.fill(source, tmp_path / "b")
+    assert (told.value.status, told.value.body["retryable"]) == (503, True)

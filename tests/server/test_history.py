@@ -108,6 +108,8 @@ def test_garbage_in_the_journal_does_no_harm(server: Running, run: str) -> None:
     write(folder, told(20))
     with (folder / layout.JOURNAL).open("ab") as file:
         file.write(b'{"type":"balance","run":"half\n{"type":"snapshot"}\n{"type":"status","state":"odd"}\n\xff\n\n')
+        file.write(b'{"type":"progress","seq":90,"run":\n{"type":"counts","seq":91,"fragments":"many"}\n')
+        file.write(b'{"type":"load","seq":92,"run":"half\n{"type":"load","seq":93,"t":"\xff"}\n')
     found = shown(server, run)
     assert (len(found["series"]["t"]), found["balance"], found["snapshots"]) == (20, [], [])
 

@@ -1,5 +1,6 @@
 """How long runs are kept: by age, by size, for good; what is told of one that has been removed."""
 
+import threading
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +12,7 @@ import pytest
 from conoid.cases.batch import Site
 from conoid.cases.policy import Retention
 from conoid.cases.run import State
-from conoid.server import keeper
+from conoid.server import keeper, pins
 from conoid.server.farewells import FILE, Farewells
 from conoid.server.keeper import Keeper
 from conoid.server.store import Store
@@ -106,3 +107,54 @@ def farewell(lines: Farewells, run: str, other: str) -> Any:
 @pytest.mark.parametrize("verb", ["keep", "release"])
 def test_others_pin_nothing(server: Running, verb: str) -> None:
     assert server.bob.http.post(f"/v1/runs/{ended(server.ann)}:{verb}").status_code == 404
+
+
+def test_what_a_run_writes_after_the_last_look_at_it_counts(server: Running, tmp_path: Path) -> None:
+    run = server.ann.submit(wait=str(tmp_path / "go"))
+    server.ann.wait_for(run, State.RUNNING)
+    looks = keeper_of(server, age="1 h")
+    looks.look()
+    before = looks.kept("ann")
+    (server.ann.runs / run / "large").write_bytes(bytes(1_000_000))
+    (tmp_path / "go").touch()
+    server.ann.wait_for(run)
+    looks.look()
+    assert looks.kept("ann") > before + 1_000_000
+    looks.look()
+    assert looks.kept("ann") > before + 1_000_000
+
+
+def test_a_run_that_is_removed_during_a_look_ends_no_look(server: Running) -> None:
+    first, second = ended(server.ann), ended(server.ann)
+    looks = keeper_of(server, bytes=1)
+    store = server.service.store
+
+    def removed(folder: Path) -> bool:
+        run = store.get(folder.name)
+        assert run is not None
+        looks.remove(run, "by ann")
+        return False
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pins, "pinned", removed)
+        looks.look()
+    for run in (first, second):
+        assert "by ann" in server.ann.http.get(f"/v1/runs/{run}").json()["detail"]
+    assert looks.kept("ann") == 0
+
+
+def test_no_error_ends_the_looks(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    looked = threading.Event()
+    left = [2]
+
+    def fails(self: Keeper) -> None:
+        left[0] -= 1
+        if left[0] >= 0:
+            raise KeyError("something that nobody has thought of")
+        looked.set()
+
+    monkeypatch.setattr(Keeper, "look", fails)
+    looks = keeper_of(server, age="1 h", every="0.01 s")
+    looks.start()
+    assert looked.wait(5)
+    looks.close()

@@ -58,6 +58,21 @@ def test_nothing_is_evaluated_and_nothing_comes_from_elsewhere(client: TestClien
     assert scripts.split() == ["script-src", "'self'"]
 
 
+def test_a_browser_asks_whether_the_page_is_still_the_same(client: TestClient) -> None:
+    for address in ("/", "/app.js", "/style.css"):
+        answer = client.get(address)
+        assert (answer.status_code, answer.headers["cache-control"]) == (200, "no-cache"), address
+        again = client.get(address, headers={"If-None-Match": answer.headers["etag"]})
+        assert (again.status_code, again.headers["cache-control"]) == (304, "no-cache")
+
+
+def test_the_page_does_not_take_unknown_addresses_for_its_own(client: TestClient) -> None:
+    for method in ("POST", "DELETE"):
+        assert client.request(method, "/v1/runz").status_code == 404
+        refused = client.request(method, "/app.js")
+        assert (refused.status_code, refused.headers["allow"]) == (405, "GET, HEAD")
+
+
 @pytest.mark.parametrize(
     ("version", "words"),
     [(None, "nicegui 3.18.0 is not installed"), ("3.17.0", "nicegui 3.17.0 is installed, tested is 3.18.0")],

@@ -154,3 +154,12 @@ def test_a_wrong_setting_is_named(tmp_path: Path, text: str, words: str) -> None
     (tmp_path / "site.toml").write_text(text)
     with pytest.raises(SiteError, match=re.escape(words)):
         read_site(tmp_path / "site.toml")
+
+
+def test_a_case_that_the_queue_could_never_hold_is_refused(settings: Settings) -> None:
+    site = Site(queue=Queue(memory=1_000_000))
+    with opened(replace(settings, site=site)) as service, TestClient(build_app(service)) as client:
+        client.headers["Authorization"] = f"Bearer {create_token(service.store, 'ann', frozenset({'submit'}))}"
+        answer = client.post("/v1/runs", content=case_text(), headers=TOML)
+    assert (answer.status_code, answer.json()["code"]) == (422, "invalid_case")
+    assert "bytes of memory; this server allows 1e+06" in answer.json()["detail"]

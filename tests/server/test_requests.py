@@ -379,6 +379,22 @@ def test_metrics(server: Running) -> None:
     assert "conoid_slots 2" in text
 
 
+def test_odd_methods_make_one_series(server: Running) -> None:
+    for n in range(3):
+        assert server.nobody.http.request(f"ODD{n}", "/v1/runs").status_code == 405
+    text = server.ann.http.get("/metrics").text
+    assert "ODD" not in text
+    assert 'conoid_answers_total{method="other",route="/v1/runs",status="405"} 3' in text
+
+
+def test_a_crash_is_counted(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server.service.store, "page", lambda *_: 1 // 0)
+    with pytest.raises(ZeroDivisionError):
+        server.ann.http.get("/v1/runs")
+    text = server.ann.http.get("/metrics").text
+    assert 'conoid_answers_total{method="GET",route="/v1/runs",status="500"} 1' in text
+
+
 def test_readiness_tells_a_dead_supervisor(server: Running) -> None:
     server.service.supervisor.close()
     answer = server.nobody.http.get("/readyz")
@@ -460,3 +476,25 @@ def test_a_case_that_may_be_run_is_doubted_all_the_same(server: Running) -> None
     assert verdict["valid"]
     odd = {each["key"]: each["message"] for each in verdict["warnings"]}
     assert odd["run.end_time"] == "no unit, taken for 1e-06 s"
+
+
+def test_the_key_of_a_run_that_was_removed_is_answered_as_openapi_says(server: Running) -> None:
+    headers = {**TOML, "Idempotency-Key": "k"}
+    run = server.ann.http.post("/v1/runs", content=case_text(), headers=headers).json()["id"]
+    server.ann.wait_for(run)
+    assert server.ann.http.delete(f"/v1/runs/{run}").status_code == 204
+    refusal(server.ann.http.post("/v1/runs", content=case_text(), headers=headers), 410, "gone")
+    told = server.ann.http.get("/openapi.json").json()["paths"]
+    for path in ("/v1/runs", "/v1/sweeps"):
+        assert "410" in told[path]["post"]["responses"], path
+
+
+def test_what_is_known_is_known_in_every_form_of_its_tag(server: Running) -> None:
+    """A proxy that compresses makes a tag weak; a browser may send several (RFC 9110, 13.1.2)."""
+    run = server.ann.submit()
+    server.ann.wait_for(run)
+    for path in (f"/v1/runs/{run}", f"/v1/runs/{run}/files/case.toml", f"/v1/runs/{run}/snapshots"):
+        tag = server.ann.http.get(path).headers["etag"]
+        for form in (tag, f"W/{tag}", f'"other", W/{tag}'):
+            assert server.ann.http.get(path, headers={"If-None-Match": form}).status_code == 304, (path, form)
+        assert server.ann.http.get(path, headers={"If-None-Match": '"other"'}).status_code == 200

@@ -191,3 +191,20 @@ def living(run: str) -> bool:
             except OSError:
                 continue
     return False
+
+
+def test_a_server_that_is_killed_leaves_no_folder_of_its_reader(
+    process: MakeProcess, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    passing = tmp_path / "passing"
+    passing.mkdir()
+    monkeypatch.setenv("TMPDIR", str(passing))
+    server = process("--no-zenoh")
+    ann = server.user(server.start()["url"])
+    ann.wait_for(ann.submit(steps=1))
+    assert list(passing.glob("conoid-reader-*"))
+    server.end(signal.SIGKILL)
+    deadline = time.monotonic() + PATIENCE
+    while list(passing.glob("conoid-reader-*")):
+        assert time.monotonic() < deadline
+        time.sleep(0.01)

@@ -247,6 +247,12 @@ def test_runs_are_found_by_their_labels(server: Running) -> None:
     assert found(9, "batch=3")["runs"] == []
     assert {run["id"] for run in found(9)["runs"]} >= set(runs)
     assert server.ann.http.get("/v1/runs", params={"label": "batch"}).status_code == 400
+    for answer in (
+        server.ann.http.get("/v1/runs", params={"label": ["batch=1", "batch=2"]}),
+        server.ann.http.post("/v1/runs", params={"label": ["a=1", "a=2"]}, content=case_text(), headers=TOML),
+    ):
+        assert (answer.status_code, answer.json()["pointer"]) == (400, "label")
+        assert "given twice" in answer.json()["detail"]
 
 
 def test_a_run_that_has_ended_can_be_removed(server: Running, tmp_path: Path) -> None:

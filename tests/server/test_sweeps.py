@@ -1,38 +1,31 @@
 """Sweeps: all runs or none, each once, as many at a time as was said, a table of what came out."""
 
+import asyncio
 import csv
 import io
 import json
+import threading
 import tomllib
+from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import pytest
+from starlette.testclient import TestClient
 
 from conoid.cases.run import State
-from conoid.server import folder
+from conoid.server import folder, limits, reader, view
+from conoid.server.app import build_app, opened
+from conoid.server.errors import ServiceError
+from conoid.server.settings import Caps, Settings
 from conoid.server.submission import Desk
 from conoid.server.sweeps import Sweeps
+from conoid.server.tokens import create_token
 
 from .running import Running, User, case_text
-
-ENDS = [f"{n} us" for n in range(1, 5)]
-
-
-def wish(**extra: Any) -> bytes:
-    """A sweep over four ends."""
-    points = [{"run.end_time": end} for end in ENDS]
-    return json.dumps({"case": tomllib.loads(case_text()), "points": points, **extra}).encode()
-
-
-def handed_in(user: User, body: bytes, key: str | None = None, status: int = 202) -> dict[str, Any]:
-    """The answer to a sweep."""
-    headers = {"Content-Type": "application/json", **({"Idempotency-Key": key} if key else {})}
-    answer = user.http.post("/v1/sweeps", content=body, headers=headers)
-    assert answer.status_code == status, answer.text
-    found: dict[str, Any] = answer.json()
-    return found
+from .swept import ENDS, handed_in, wish
 
 
 def test_a_sweep_ends_in_a_table(server: Running) -> None:
@@ -143,3 +136,154 @@ def test_the_same_from_python(server: Running, tmp_path: Path) -> None:
         assert session.find_sweep("last").id == made.id
         assert [run.status().labels["point"] for run in made.runs()] == ["0", "1", "2", "3"]
         assert made.cancel().states == {"succeeded": len(ENDS)}
+
+
+# All or none ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def narrow(settings: Settings) -> Iterator[User]:
+    """A user who may have as many open runs as the sweep has points, and has one already."""
+    allowed = replace(settings, caps=Caps(free_disk=0, queued=len(ENDS)))
+    with opened(allowed) as service, TestClient(build_app(service), base_url="http://127.0.0.1") as client:
+        client.headers["Authorization"] = f"Bearer {create_token(service.store, 'ann', frozenset({'read', 'submit'}))}"
+        yield User(client, "ann", settings.runs)
+        service.supervisor.end_all()
+
+
+def test_a_sweep_for_which_there_is_no_room_makes_no_run(narrow: User, tmp_path: Path) -> None:
+    first = narrow.submit(wait=str(tmp_path / "go"))
+    for _ in range(2):
+        said = handed_in(narrow, wish(), "k", 429)
+        assert "1 of your runs have not ended, and the sweep has 4; this server allows 4" in said["detail"]
+    assert [run["id"] for run in narrow.http.get("/v1/runs").json()["runs"]] == [first]
+    assert narrow.http.get("/v1/sweeps").json() == {"sweeps": []}
+    (tmp_path / "go").touch()
+    narrow.wait_for(first)
+    assert len(handed_in(narrow, wish(), "k")["points"]) == len(ENDS)
+
+
+def test_a_sweep_larger_than_any_room_is_refused_for_good(narrow: User) -> None:
+    said = handed_in(narrow, wish(points=[{}] * 5), status=422)
+    assert (said["detail"], said["retryable"]) == ("5 points; this server allows 4 open runs of a user", False)
+
+
+def test_a_sweep_that_is_refused_in_the_middle_leaves_nothing_that_runs(
+    server: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real, left = limits.check_room, [3]
+
+    def full(*arguments: Any) -> None:
+        left[0] -= 1
+        if left[0] < 0:
+            raise ServiceError(507, "disk_full", "0 bytes are free", retryable=True)
+        real(*arguments)
+
+    monkeypatch.setattr(limits, "check_room", full)
+    assert handed_in(server.ann, wish(), "k", 507)["code"] == "disk_full"
+    monkeypatch.undo()
+    runs = server.ann.http.get("/v1/runs").json()["runs"]
+    assert [run["state"] for run in runs] == ["cancelled"] * 2
+    assert server.ann.http.get("/v1/sweeps").json() == {"sweeps": []}
+    assert not list((server.service.settings.runs / "sweeps").glob("*.json"))
+    made = handed_in(server.ann, wish(), "k")
+    assert len(made["points"]) == len(ENDS)
+    assert {server.ann.wait_for(point["run"]["id"])["state"] for point in made["points"]} == {"succeeded"}
+
+
+# What is told of one --------------------------------------------------------------------------------------------------
+
+
+def test_a_run_that_is_forgotten_shifts_no_other_to_its_point(server: Running) -> None:
+    sweep = handed_in(server.ann, wish())
+    runs = [point["run"]["id"] for point in sweep["points"]]
+    for run in runs:
+        server.ann.wait_for(run)
+    with server.service.store._engine.begin() as connection:
+        connection.exec_driver_sql(f"delete from runs where id = '{runs[1]}'")
+    points = server.ann.http.get(sweep["url"]).json()["points"]
+    rest = dict(zip(ENDS, runs, strict=True))
+    del rest[ENDS[1]]
+    assert {point["values"]["run.end_time"]: point["run"]["id"] for point in points} == rest
+    lines = csv.DictReader(io.StringIO(server.ann.http.get(f"{sweep['url']}/table").text))
+    assert {line["run.end_time"]: line["run"] for line in lines} == rest
+
+
+def test_a_cancel_that_cannot_be_recorded_says_so(server: Running, tmp_path: Path) -> None:
+    body = json.dumps({"case": tomllib.loads(case_text(wait=str(tmp_path / "go"))), "points": [{}]}).encode()
+    sweep = handed_in(server.ann, body)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(server.service.supervisor, "cancel", lambda run_id: (_ for _ in ()).throw(TimeoutError()))
+        answer = server.ann.http.post(f"{sweep['url']}:cancel")
+    assert answer.status_code == 503
+    assert answer.json()["detail"] == "the request could not be recorded: no answer in time"
+    server.ann.http.post(f"{sweep['url']}:cancel")
+
+
+def test_the_answer_to_a_sweep_is_not_made_in_the_event_loop(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    threads: list[bool] = []
+    real = view.brief
+
+    def brief(*arguments: Any) -> dict[str, Any]:
+        try:
+            asyncio.get_running_loop()
+        except RuntimeError:
+            threads.append(True)
+        else:
+            threads.append(False)
+        return real(*arguments)
+
+    monkeypatch.setattr(view, "brief", brief)
+    handed_in(server.ann, wish())
+    assert threads == [True] * len(ENDS), "a thousand points would stop all other answers"
+
+
+def test_a_point_that_is_nested_too_deeply_is_refused(server: Running) -> None:
+    point = {"a" + ".a" * 5000: 1}
+    assert "nested too deeply (point 0)" in handed_in(server.ann, wish(points=[point]), status=422)["detail"]
+
+
+def test_nobody_who_hands_in_a_run_waits_for_sweeps(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not even who hands in the sweep; and one sweep does not wait for that of somebody else."""
+    monkeypatch.setattr(reader, "usable_cores", lambda: 1)
+    real, reading, go = Desk.read, {"ann": threading.Event(), "bob": threading.Event()}, threading.Event()
+
+    def slow(self: Desk, body: bytes, content_type: str) -> Any:
+        case = tomllib.loads(body.decode()) if content_type == "application/toml" else json.loads(body)
+        if case["name"] in reading:
+            reading[case["name"]].set()
+            assert go.wait(20)
+        return real(self, body, content_type)
+
+    monkeypatch.setattr(Desk, "read", slow)
+    with opened(settings) as service, TestClient(build_app(service), base_url="http://127.0.0.1") as client:
+        told: dict[str, int] = {}
+
+        def hand_in(name: str, path: str, body: bytes, kind: str) -> None:
+            scopes = frozenset({"read", "submit"})
+            headers = {"Authorization": f"Bearer {create_token(service.store, name, scopes)}", "Content-Type": kind}
+            told[f"{name} {path}"] = client.post(path, content=body, headers=headers).status_code
+
+        sweeps = [
+            threading.Thread(
+                target=hand_in,
+                args=(name, "/v1/sweeps", wish(case=tomllib.loads(case_text(name))), "application/json"),
+            )
+            for name in reading
+        ]
+        for thread in sweeps:
+            thread.start()
+        try:
+            assert all(event.wait(10) for event in reading.values()), "a sweep waits for another one"
+            run = threading.Thread(
+                target=hand_in, args=("ann", "/v1/runs", case_text("other").encode(), "application/toml")
+            )
+            run.start()
+            run.join(10)
+            assert told == {"ann /v1/runs": 202}
+        finally:
+            go.set()
+            for thread in sweeps:
+                thread.join()
+        assert told == {"ann /v1/runs": 202, "ann /v1/sweeps": 202, "bob /v1/sweeps": 202}
+        service.supervisor.end_all()

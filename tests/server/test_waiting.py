@@ -94,6 +94,16 @@ def test_who_is_held_holds_nobody_up() -> None:
     assert (made.start, made.why) == (["1", "3"], {"2": "no more than one"})
 
 
+def test_who_can_never_start_holds_nobody_up() -> None:
+    """A server that was started again with fewer slots, or with less memory."""
+    made = plan([need("0", ranks=4), need("1", memory=9e9), need("2")], [], Room(2, 4e9), NOW, free)
+    assert made.start == ["2"]
+    assert made.why == {
+        "0": "it needs 4 slots, and this server has 2: it cannot start here",
+        "1": "it needs 9e+09 bytes of memory, and this server has 4e+09: it cannot start here",
+    }
+
+
 def test_no_backfill_ever_delays_the_first_that_waits() -> None:
     """Random queues, played to their ends with true run times: the large run starts when it would have without the
     small ones, although what runs ends in an order that nobody has foreseen.

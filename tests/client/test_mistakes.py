@@ -1,0 +1,166 @@
+"""What a user gets wrong, or finds damaged, is told in one line: never a traceback, a wait without end, or a yes."""
+
+from pathlib import Path
+
+import httpx2
+import msgspec
+import pytest
+from typer.testing import CliRunner, Result
+
+from conoid.cases import layout, messages
+from conoid.client import cli, http, sweeping
+from conoid.client.cli import app
+from conoid.client.errors import ClientError
+from conoid.client.following import FolderRun
+from conoid.client.run import inside
+from conoid.client.session import Session
+from conoid.client.sweep import SweepInfo
+
+
+def conoid(*words: object) -> Result:
+    return CliRunner().invoke(app, [str(word) for word in words])
+
+
+def refused(code: int, *words: object) -> str:
+    """The one line that is told."""
+    result = conoid(*words)
+    assert result.exit_code == code, repr(result.exception)
+    (line,) = result.stderr.splitlines()
+    assert line.startswith("conoid: ")
+    return line
+
+
+@pytest.fixture
+def damaged(quiet_home: Path) -> Path:
+    """A run's folder whose files are damaged; it has ended."""
+    folder = quiet_home / "damaged"
+    folder.mkdir()
+    said = [messages.Status(run="r", seq=1, state="running"), messages.Status(run="r", seq=3, state="succeeded")]
+    lines = [messages.to_json(said[0]), b"garbage", b'{"type": "progress", "ru', b"[]", messages.to_json(said[1])]
+    (folder / layout.JOURNAL).write_bytes(b"\n".join(lines) + b"\n")
+    (folder / layout.OUTCOME).write_text("x")
+    (folder / layout.RESOLVED_CASE).write_text("{")
+    return folder
+
+
+# A folder that is none of a run ---------------------------------------------------------------------------------------
+
+
+def test_a_folder_that_is_none_of_a_run_is_not_followed(quiet_home: Path) -> None:
+    Path("empty").mkdir()
+    assert refused(1, "watch", "empty") == "conoid: empty has no journal.jsonl"
+    (quiet_home / "many" / "one").mkdir(parents=True)
+    (quiet_home / "many" / "one" / layout.JOURNAL).touch()
+    assert "many is not the folder of a run, it holds those of one" in refused(1, "watch", "many")
+
+
+def test_nothing_is_put_into_a_folder_that_is_none_of_a_run(quiet_home: Path) -> None:
+    Path("empty").mkdir()
+    assert refused(1, "cancel", "empty") == "conoid: empty has no journal.jsonl"
+    assert not list(Path("empty").iterdir())
+
+
+def test_a_run_that_has_ended_is_not_asked_to_stop(damaged: Path) -> None:
+    assert conoid("cancel", "damaged").stdout == "damaged has ended\n"
+    assert not (damaged / layout.STOP_REQUEST).exists()
+
+
+def test_a_damaged_journal_is_followed_to_its_end(damaged: Path) -> None:
+    assert [message.seq for message in FolderRun(damaged).messages()] == [1, 3]
+
+
+def test_messages_of_a_folder_are_json_too(damaged: Path) -> None:
+    result = conoid("watch", "damaged", "--json")
+    assert result.exit_code == 0, repr(result.exception)
+    assert [msgspec.json.decode(line)["seq"] for line in result.stdout.splitlines()] == [1, 3]
+
+
+@pytest.mark.parametrize("command", ["report", "replay-balance"])
+def test_a_damaged_case_is_named(damaged: Path, command: str) -> None:
+    assert "case.resolved.json: this case cannot be read: " in refused(1, command, "damaged")
+
+
+# Files ----------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("sweep", "demo", "--list", "missing.csv"), "missing.csv: No such file or directory"),
+        (("sweep", "demo", "--list", "."), ".: Is a directory"),
+        (("run", "demo", "--out", "/proc/none"), "/proc/none: No such file or directory"),
+        (("run", "demo", "--out", "file"), "file: File exists"),
+    ],
+)
+def test_a_file_that_cannot_be_used_is_named(quiet_home: Path, words: tuple[str, ...], said: str) -> None:
+    Path("file").touch()
+    assert refused(1, *words).endswith(said)
+
+
+def test_a_table_that_is_no_text_is_named(quiet_home: Path) -> None:
+    Path("points.csv").write_bytes(b"run.ranks,x\n1,\xff\n")
+    assert refused(2, "sweep", "demo", "--list", "points.csv") == "conoid: --list = 'points.csv': not UTF-8 text"
+
+
+def test_what_did_not_come_in_time_is_told(quiet_home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def late(*_: object) -> None:
+        raise TimeoutError("run x is still running after 30 s")
+
+    monkeypatch.setattr(cli, "data_of", late)
+    assert refused(1, "validate", "demo") == "conoid: run x is still running after 30 s"
+
+
+def test_without_slurm_nothing_is_prepared(quiet_home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", str(quiet_home))
+    assert refused(1, "batch", "demo", "--ranks", "1").startswith("conoid: sbatch: there is none; ")
+    assert not Path("runs").exists()
+
+
+# Servers and tokens ---------------------------------------------------------------------------------------------------
+
+
+def test_an_address_that_is_none_is_named(quiet_home: Path) -> None:
+    assert "url = 'http://[::1': " in refused(1, "ls", "--url", "http://[::1")
+
+
+@pytest.mark.parametrize("token", ["conoid_12ab…", "two words", "line\nfeed"])
+def test_a_token_that_no_server_makes_is_not_sent(quiet_home: Path, token: str) -> None:
+    line = refused(1, "ls", "--url", "http://127.0.0.1:1", "--token", token)
+    assert line == "conoid: token: only visible ASCII characters are allowed; was it copied whole?"
+
+
+def test_space_round_a_token_is_no_part_of_it() -> None:
+    with http.Http("http://x", " conoid_1_2\n") as made:
+        assert made._http.headers["authorization"] == "Bearer conoid_1_2"
+
+
+@pytest.mark.parametrize("words", [("show",), ("watch",), ("cancel",), ("get",), ("report",), ("sweep-table",)])
+def test_an_empty_id_is_none(quiet_home: Path, words: tuple[str, ...]) -> None:
+    """A variable of a script that is not set."""
+    assert "an id, or 'last'" in refused(1, *words, "")
+
+
+def test_a_file_outside_of_a_run_is_not_fetched(quiet_home: Path) -> None:
+    with pytest.raises(ClientError, match=r"^'\.\./x' lies outside the run's folder$"):
+        inside(quiet_home, "../x")
+
+
+@pytest.mark.parametrize(("state", "said"), [("succeeded", "s has ended\n"), ("running", "s cancelling\n")])
+def test_a_sweep_that_has_ended_is_not_said_to_be_cancelled(
+    quiet_home: Path, monkeypatch: pytest.MonkeyPatch, state: str, said: str
+) -> None:
+    class Server(httpx2.BaseTransport):
+        def handle_request(self, request: httpx2.Request) -> httpx2.Response:
+            info = SweepInfo(id="s", name="bar", submitted=0.0, total=2, states={state: 2})
+            return httpx2.Response(202, content=msgspec.json.encode(info))
+
+    monkeypatch.setattr(sweeping, "connect", lambda *_: Session("http://x", transport=Server()))
+    assert conoid("sweep-cancel", "s").stdout == said
+
+
+# Cases ----------------------------------------------------------------------------------------------------------------
+
+
+def test_a_case_that_cannot_be_estimated_is_refused(quiet_home: Path) -> None:
+    line = refused(2, "validate", "demo", "--set", "parts[0].mesh.element_size='1e-300 m'")
+    assert line == "conoid: parts: the elements are too many or too small to be counted"

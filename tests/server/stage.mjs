@@ -1,0 +1,51 @@
+// A page without a browser: elements that keep what is put into them, and a server that answers what a test says.
+// { module, script } in JSON on standard input; what the async script returns is written to standard output. It has
+// `load(module)`, `text(element)`, `pause(ms)` and `state.served`: a function from a path to what is sent as
+// JSON, or to a number, which is a status; it may throw, and then nobody answers.
+
+import { readFileSync } from "node:fs";
+import { pathToFileURL } from "node:url";
+
+class Element {
+  constructor(tag) { Object.assign(this, { tag, children: [], style: {}, dataset: {}, options: [], classList: { add() {} }, hidden: false }); }
+  append(...children) { this.children.push(...children); }
+  replaceChildren(...children) { this.children = children; }
+  setAttribute(name, value) { this[name] = value; }
+  set textContent(value) { this.children = [value]; }
+  querySelectorAll() { return []; }
+  querySelector() { return null; }
+  get childElementCount() { return this.children.length; }
+  addEventListener() {}
+  focus() {}
+}
+
+class Observer {
+  observe() {}
+  disconnect() {}
+}
+
+const known = {};
+const stage = {
+  document: { baseURI: "http://x/", title: "", createElement: (tag) => new Element(tag), getElementById: (id) => (known[id] ??= new Element(id)), documentElement: new Element("html") },
+  location: { hash: "" }, sessionStorage: { getItem: () => "token", setItem() {}, removeItem() {} }, addEventListener() {},
+  matchMedia: () => ({ addEventListener() {}, removeEventListener() {} }), getComputedStyle: () => ({ getPropertyValue: () => "" }),
+  IntersectionObserver: Observer, ResizeObserver: Observer, requestAnimationFrame: (work) => setTimeout(work),
+};
+Object.assign(globalThis, stage);
+
+export const state = { served: () => { throw new Error("away"); }, asked: [] };
+globalThis.fetch = async (url) => {
+  const path = new URL(url).pathname.slice(1);
+  state.asked.push(path);
+  const told = state.served(path);
+  const status = typeof told === "number" ? told : 200;
+  return { ok: status < 300, status, headers: new Map(), json: async () => told };
+};
+
+const text = (element) => (element instanceof Element ? element.children.map(text).join(" ") : String(element));
+const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+const { module, script } = JSON.parse(readFileSync(0, "utf8"));
+const load = (name) => import(new URL(name, pathToFileURL(module)));
+const Async = (async () => {}).constructor;
+const answer = await new Async("load", "state", "text", "pause", script)(load, state, text, pause);
+process.stdout.write(JSON.stringify(answer ?? null), () => process.exit(0));
