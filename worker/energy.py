@@ -1,10 +1,11 @@
 """The ledger: every joule has a line, and the residual says whether the lines close.
 
-Kinetic energy is the form that leapfrog with equal steps conserves together with the trapezoidal work of the forces:
-1/2 m v(n-1/2) . v(n+1/2). Where the steps dt- and dt+ before and after n differ, the two part by
+Kinetic energy is the form that the leapfrog step conserves together with the trapezoidal work of the forces:
+1/2 m v(n-1/2) . v(n+1/2) for equal steps, and with the steps dt- before n and dt+ after it, seen from before,
+1/2 m v(n-1/2) . v(n+1/2) + 1/4 (dt- - dt+) v(n-1/2) . f(n). Seen from after it is less by
 1/4 (dt- - dt+) f(n) . (v(n-1/2) - v(n+1/2)): an error of the method, booked node by node as ``stepping``
-(docs/numerics.md, Time integration), of which the half with v(n-1/2) is there at n. Work of the stress is summed tet by
-tet from stress and strain rate, not from nodal forces, so the residual compares two independent accounts.
+(docs/numerics.md, Time integration). Work of the stress is summed tet by tet from stress and strain rate, not from
+nodal forces, so the residual compares two independent accounts.
 
 The sums over nodes and tets are made part by part, in the quanta of the whole: those of the whole are the sums of the
 same integers, so that their bits do not know of parts, and what each part has costs no further pass.
@@ -15,6 +16,7 @@ import numpy as np
 from conoid.cases.messages import Energy, PartEnergy
 
 from .boundaries import Boundary
+from .clock import Clock
 from .contact.stage import Contact
 from .erosion import Erosion
 from .fracture.stage import Fracture
@@ -31,7 +33,7 @@ class Ledger:
 
     def __init__(
         self, model: Model, boundaries: list[Boundary], contact: Contact | None, erosion: Erosion | None,
-        fracture: Fracture | None, comm: Comm,
+        fracture: Fracture | None, comm: Comm, clock: Clock,
     ) -> None:  # fmt: skip
         self._model = model
         self._boundaries = boundaries
@@ -39,6 +41,7 @@ class Ledger:
         self._erosion = erosion
         self._fracture = fracture
         self._comm = comm
+        self._clock = clock
         nodes = model.nodes
         self.initial = float(self._node_sum(0.5 * nodes.mass * (nodes.v * nodes.v).sum(axis=1)))
         self.worst = 0.0
@@ -66,7 +69,10 @@ class Ledger:
         """The ledger at time n; ``before`` is v(n-1/2), the model holds v(n+1/2)."""
         nodes = self._model.nodes
         loss, external = self._boundary_work()
-        columns = _of_nodes(before, nodes.v, nodes.stepping, nodes.mass, loss, external, nodes.owned)
+        shorter = self._clock.shorter / nodes.scale
+        columns = _of_nodes(
+            before, nodes.v, nodes.force, shorter, nodes.stepping, nodes.mass, loss, external, nodes.owned
+        )
         parts = len(self._model.parts)
         of_nodes = Grouped(columns, nodes.part[nodes.owned], parts)
         sums, of_parts = exact_totals(self._comm, of_nodes, ElementWork(self._model.blocks, parts))
@@ -162,22 +168,24 @@ def _visit_work(largest, words, state, n, scale):  # type: ignore[no-untyped-def
 
 
 @njit(
-    "float64[:, ::1](float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64[::1], float64[::1], "
-    "boolean[::1])",
+    "float64[:, ::1](float64[:, ::1], float64[:, ::1], int64[:, ::1], float64, float64[::1], float64[::1], "
+    "float64[::1], float64[::1], boolean[::1])",
     cache=True,
 )
-def _of_nodes(before, v, stepping, mass, loss, external, owned):  # type: ignore[no-untyped-def]
+def _of_nodes(before, v, force, shorter, stepping, mass, loss, external, owned):  # type: ignore[no-untyped-def]
     """(owned nodes, 7) kinetic energy, J, energy lost by impacts and work from outside, J, momentum, kg m/s, and what
-    unequal steps have taken, J.
+    unequal steps have taken, J: that ``kick`` has booked the half of this one already is kinetic energy until n.
     """
     out, m = np.empty((len(owned), 7)), 0
     for a in range(len(owned)):
         if not owned[a]:
             continue
-        squares = 0.0
+        squares, power = 0.0, 0.0
         for i in range(3):
             squares += before[a, i] * v[a, i]
+            power += before[a, i] * force[a, i]
             out[m, 3 + i] = 0.5 * mass[a] * (before[a, i] + v[a, i])
-        out[m, 0], out[m, 1], out[m, 2], out[m, 6] = 0.5 * mass[a] * squares, loss[a], external[a], stepping[a]
+        out[m, 0], out[m, 6] = 0.5 * mass[a] * squares + shorter * power, stepping[a] - shorter * power
+        out[m, 1], out[m, 2] = loss[a], external[a]
         m += 1
     return out[:m]

@@ -156,7 +156,9 @@ class Erosion:
         if len(leaving):
             owned = leaving[state.owned[leaving]]
             before, after, mass = self._before[state.owned[leaving]], state.v[owned], state.mass[owned]
-            energy = 0.5 * mass * (before * after).sum(axis=1)
+            early = self._clock.shorter / state.scale * (self._before * state.force[leaving]).sum(axis=1)
+            state.stepping[leaving] -= early
+            energy = 0.5 * mass * (before * after).sum(axis=1) + early[state.owned[leaving]]
             half = 0.5 * mass[:, None] * after
             self._half = self._nodal.quanta(np.column_stack([np.zeros((len(half), 2)), half]))
             self._nodal.add(np.column_stack([energy, mass, half]))

@@ -164,7 +164,7 @@ def _assemble(
         fracture = Fracture(case, model, neighbours, elements, by_node, contact, comm, clock)
     return Simulation(
         case=case, comm=comm, model=model, elements=elements, boundaries=scene, contact=contact, erosion=erosion,
-        fracture=fracture, clock=clock, ledger=Ledger(model, scene, contact, erosion, fracture, comm),
+        fracture=fracture, clock=clock, ledger=Ledger(model, scene, contact, erosion, fracture, comm, clock),
         probes=probes, timers=timers, record=Record(model, fracture, comm) if fracture is not None else None,
         neighbours=neighbours, floor=_force_floor(model, comm), reduction=StepReduction(comm.size, comm.rank),
         assembled=float(comm.maximum(np.array([worked(comm) - began]))[0]),
