@@ -220,5 +220,6 @@ def test_blocks_in_a_stack_at_rest_do_not_drift(friction: float) -> None:
     assert np.abs(np.array(places) - places[0]).max() < 1e-3 * 5e-3
     assert all(line.contact + line.friction >= 0.0 for line in lines)
     swings = [fifth.max() for fifth in np.array_split([line.kinetic for line in lines], 5)]
+    assert swings[-1] < 2.0 / 3.0 * swings[0]
     assert (np.diff(swings) < -0.05 * swings[-1]).all(), "12 ms, about a swing, each: one that has not lost has bounced"
     assert sim.ledger.worst < 1e-3
