@@ -16,6 +16,7 @@ from ..jit import njit, types
 from ..migration.parcel import Table, once
 from ..state import WIDE, Block, Flags, Indices, Ints, Nodes, extended
 from ..topology import Split
+from .geometry import at, cross, dot, half, minus, plus
 from .narrow_phase import CONTACT_ROWS, DEEP_SELF, NEAR, STEP, needed
 
 _WIDE = 0.2
@@ -95,6 +96,12 @@ class Cracks:
         self.foreseen[:] = True
         sides = self.sides.reshape(-1, 3)
         return sides[sides[:, 1] >= 0]
+
+    def arrange(self) -> None:
+        """By the places of their first nodes, as the scene has them: what is near in space is near in memory."""
+        order = np.argsort(self.places[:, 0], kind="stable")
+        for column in vars(self).values():
+            column[:] = column[order]
 
     def open(self, faces: Ints, blocks: list[Block]) -> None:
         """Makes surface of the cracks whose first sides are among ``faces``, ascending, and forgets them: the last ones
@@ -189,43 +196,31 @@ def across(out, n, opening, cracks, typical, step):  # type: ignore[no-untyped-d
     ``typical``: size of a face, m. Returns the new number of rows, and how many of the cracks have become so wide that
     they open; ``opening`` (m,) says which.
     """
-    e, f, m = np.empty(3), np.empty(3), np.empty(3)
     x, v, part, mu, dt = step.x, step.v, step.part, step.mu, step.dt
     wide = 0
     for c in range(len(cracks)):
         if cracks[c, 0] < 0:
             continue
-        for i in range(3):
-            start = x[cracks[c, 0], i] + x[cracks[c, 3], i]
-            e[i] = 0.5 * (x[cracks[c, 1], i] + x[cracks[c, 4], i] - start)
-            f[i] = 0.5 * (x[cracks[c, 2], i] + x[cracks[c, 5], i] - start)
-        square = 0.0
-        for i in range(3):
-            j, k = (i + 1) % 3, (i + 2) % 3
-            m[i] = e[j] * f[k] - e[k] * f[j]
-            square += m[i] * m[i]
-        size = np.sqrt(np.sqrt(square))
-        for i in range(3):
-            m[i] /= np.sqrt(square)
+        start = plus(at(x, cracks[c, 0]), at(x, cracks[c, 3]))
+        e = half(minus(plus(at(x, cracks[c, 1]), at(x, cracks[c, 4])), start))
+        f = half(minus(plus(at(x, cracks[c, 2]), at(x, cracks[c, 5])), start))
+        m = cross(e, f)
+        twice = np.sqrt(dot(m, m))
+        size, m = np.sqrt(twice), (m[0] / twice, m[1] / twice, m[2] / twice)
         most = 0.0
         for k in range(3):
             p, q = cracks[c, k], cracks[c, 3 + k]
             if p == q:
                 continue
-            gap0, speed, apart = 0.0, 0.0, 0.0
-            for i in range(3):
-                width = x[q, i] - x[p, i]
-                gap0 += m[i] * width
-                speed += m[i] * (v[q, i] - v[p, i])
-                apart += width * width
-            most = max(most, apart)
+            width = minus(at(x, q), at(x, p))
+            most = max(most, dot(width, width))
+            gap0, speed = dot(m, width), dot(m, minus(at(v, q), at(v, p)))
             gap1 = gap0 + dt * speed
             if not (gap1 <= NEAR * size and gap0 >= -DEEP_SELF * size and mu[part[p], part[q]] >= 0.0):
                 continue
             out.nodes[n, 0], out.nodes[n, 1], out.nodes[n, 2], out.nodes[n, 3] = q, p, p, p
             out.weights[n, 0], out.weights[n, 1], out.weights[n, 2], out.weights[n, 3] = 1.0, -1.0, 0.0, 0.0
-            for i in range(3):
-                out.normals[n, i] = m[i]
+            out.normals[n, 0], out.normals[n, 1], out.normals[n, 2] = m
             out.wanted[n] = speed + needed(gap0, gap1, speed, step.give, dt)
             out.friction[n], out.pair[n] = mu[part[p], part[q]], -1
             n += 1

@@ -74,6 +74,7 @@ class Follower:
         cracks.places[:] = -1
         self._add(self._here.take(self._lacking(cracks, rows)))
         self._across(cracks, rows)
+        cracks.arrange()
 
     def _lacking(self, cracks: Cracks, rows: Ints) -> Indices:
         """Which nodes of some of the cracks, ascending, are not in the crowd yet."""

@@ -24,6 +24,18 @@ def minus(a, b):  # type: ignore[no-untyped-def]
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
+@njit(f"{VECTOR}({VECTOR}, {VECTOR})", cache=True)
+def plus(a, b):  # type: ignore[no-untyped-def]
+    """a + b."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@njit(f"{VECTOR}({VECTOR})", cache=True)
+def half(a):  # type: ignore[no-untyped-def]
+    """a / 2."""
+    return 0.5 * a[0], 0.5 * a[1], 0.5 * a[2]
+
+
 @njit(f"{VECTOR}({VECTOR}, float64, {VECTOR})", cache=True)
 def beyond(a, t, b):  # type: ignore[no-untyped-def]
     """a + t b."""
