@@ -40,14 +40,14 @@ class Company:
     def agree(self, contacts: Indices, local: Indices) -> "ActiveSum":
         """The sums of a step with active ``contacts`` (n, 4), slots; ``local`` (slots,): -1 for what is not held."""
         if not self.neighbours:
-            return ActiveSum([], [], [], self._comm)
+            nothing = np.zeros(0, np.int32)
+            return ActiveSum([], nothing, nothing, np.zeros((0, 2), np.int64), self._comm)
         _tell(self._out, self._every, self._ends, self._words, contacts, local)
         self._exchange.begin()
         self._exchange.finish()
         sends, receives, counts = _agreed(self._out, self._in, self._every, self._ends, self._words)
-        ends = np.cumsum(counts, axis=0)[:-1]
         ranks = [some.rank for some in self.neighbours]
-        return ActiveSum(ranks, np.split(sends, ends[:, 0]), np.split(receives, ends[:, 1]), self._comm)
+        return ActiveSum(ranks, sends, receives, counts, self._comm)
 
     def free(self) -> None:
         """Gives its messages back to MPI."""
@@ -57,11 +57,12 @@ class Company:
 class ActiveSum:
     """Completes sums of a step at nodes that are pushed."""
 
-    def __init__(self, ranks: list[int], sends: list[Indices], receives: list[Indices], comm: Comm) -> None:
-        """``sends`` and ``receives``: slots of the crowd for each of the ``ranks``."""
-        self._sends, self._receives = (np.concatenate([np.zeros(0, np.int32), *some]) for some in (sends, receives))
-        self._out, self._in = (np.zeros((len(some), _COLUMNS), np.int64) for some in (self._sends, self._receives))
-        self._exchange = comm.exchange(_parts(self._out, ranks, sends), _parts(self._in, ranks, receives), Tag.CONTACT)
+    def __init__(self, ranks: list[int], sends: Indices, receives: Indices, counts: Ints, comm: Comm) -> None:
+        """``sends`` and ``receives``: slots of the crowd, rank after rank; ``counts`` (ranks, 2): how many of each."""
+        self._sends, self._receives = sends, receives
+        self._out, self._in = (np.zeros((len(some), _COLUMNS), np.int64) for some in (sends, receives))
+        out, into = (_parts(words, ranks, many) for words, many in zip((self._out, self._in), counts.T, strict=True))
+        self._exchange = comm.exchange(out, into, Tag.CONTACT)
 
     @property
     def shared(self) -> Indices:
@@ -87,11 +88,14 @@ class ActiveSum:
         self._exchange.free()
 
 
-def _parts(words: Ints, ranks: list[int], slots: list[Indices]) -> list[tuple[int, Ints]]:
+def _parts(words: Ints, ranks: list[int], counts: Ints) -> list[tuple[int, Ints]]:
     """The rows of each rank that has any."""
-    ends = np.cumsum([len(some) for some in slots])
-    rows = [(rank, words[end - len(some) : end]) for rank, some, end in zip(ranks, slots, ends, strict=True)]
-    return [(rank, some) for rank, some in rows if len(some)]
+    parts, end = [], 0
+    for rank, many in zip(ranks, counts.tolist(), strict=True):
+        end += many
+        if many:
+            parts.append((rank, words[end - many : end]))
+    return parts
 
 
 @njit("void(int64[::1], int32[::1], int64[::1], int64[::1], int32[:, ::1], int32[::1])", cache=True)

@@ -78,8 +78,7 @@ class ActiveSet:
             return
 
         def correct(ahead: float, part: Loaded) -> None:
-            sweeps.load(part, contacts, active, self._fastest)
-            sweeps.sweep(active, part, ahead, scale)
+            sweeps.correct(active, part, contacts, self._fastest, ahead, scale)
 
         for k in range(many):
             self._complete(partial(correct, sweeps.momentum(k, many)), active.moving_words, IMPULSE, 3)

@@ -251,12 +251,18 @@ def give(active, n, scale):  # type: ignore[no-untyped-def]
             path[s] += length
 
 
+@njit(types.void(NODES, LOADED, CONTACTS, _F, _F, _F), cache=True)
+def correct(active, loaded, contacts, fastest, ahead, scale):  # type: ignore[no-untyped-def]
+    """``load`` and ``sweep``."""
+    load(loaded, contacts, active, fastest)
+    sweep(active, loaded, ahead, scale)
+
+
 @njit(types.void(NODES, LOADED, CONTACTS, _F, _I, _F, _I), cache=True)
 def sweep_all(active, loaded, contacts, fastest, n, scale, many):  # type: ignore[no-untyped-def]
-    """``many`` sweeps (``load``, ``sweep``, ``give``) of contacts of which no other rank shares a node."""
+    """``many`` sweeps (``correct``, ``give``) of contacts of which no other rank shares a node."""
     for k in range(many):
-        load(loaded, contacts, active, fastest)
-        sweep(active, loaded, momentum(k, many), scale)
+        correct(active, loaded, contacts, fastest, momentum(k, many), scale)
         give(active, n, scale)
 
 
