@@ -24,6 +24,14 @@ from .sides import HALO, Rules
 
 _SHORTEST = 10.0
 """Steps of free flight that a search looks ahead at least; at most twice what the last search was good for."""
+_AHEAD = 2.0
+"""Steps before the end of what a search looked ahead at which another one is due: the second is the one that
+narrow_phase looks ahead.
+"""
+_LEAST = 3.0 + _AHEAD
+"""Steps that a search must be good for still, so that what has changed is added to it: with fewer the next one would
+be due at once. Chosen: one more than that, and one for a step that grows.
+"""
 _LONGEST = 80.0
 """The same at most where bodies break: with 300 steps the pairs between fragments cost a quarter more than the searches
 that they save (docs/bench.md, the bar to 40 us).
@@ -74,10 +82,8 @@ class Searches:
         self._kept = np.column_stack([kept["node"], kept["face"]]), kept["kept"]
 
     def spent(self, nodes: Nodes) -> bool:
-        """Whether a node of the surface will leave, in two steps more, what the last search has allowed for: the second
-        is the one that narrow_phase looks ahead.
-        """
-        return self._exterior.flight.spent(nodes, self._clock.t, 2.0 * self._clock.dt)
+        """Whether a node of the surface will soon (_AHEAD) leave what the last search has allowed for."""
+        return self._exterior.flight.spent(nodes, self._clock.t, _AHEAD * self._clock.dt)
 
     def begin(self, nodes: Nodes) -> None:
         """Before a step: mean normals when it is their turn, a search when it is due; all ranks take part."""
@@ -96,7 +102,7 @@ class Searches:
             self._kept = old.kept
         if self._case.fractures:
             exterior.take_up_cracks()
-        goes_on = old is not None and self._clock.t + self._clock.dt <= flight.until
+        goes_on = old is not None and self._clock.t + _LEAST * self._clock.dt <= flight.until
         now = self.scene = self._laid_out(nodes, goes_on)
         if old is not None and goes_on:
             registration.carry(now, old)
