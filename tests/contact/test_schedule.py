@@ -7,7 +7,7 @@ import pytest
 
 from conoid.cases.load import apply_overrides, parse_case, read_data
 from conoid.worker import simulation, step
-from conoid.worker.contact import cracks, flight
+from conoid.worker.contact import cracks, flight, searches
 from conoid.worker.digest import digest
 from conoid.worker.parallel.comm import Comm, SerialComm
 
@@ -46,11 +46,11 @@ def test_no_answer_depends_on_the_skin(name: str, skin: float) -> None:
 
 @pytest.mark.parametrize("name", STEPS)
 def test_no_answer_depends_on_how_often_is_searched(name: str) -> None:
-    one, searches = alone(name)
+    one, many = alone(name)
     for every in (1, 7):
         other, more = ran(name, SerialComm(), every)
         assert other == one
-        assert more > searches
+        assert more > many
 
 
 @pytest.mark.parametrize("foreseen", [0.0, 0.9])
@@ -72,3 +72,10 @@ def test_nor_on_either_on_several_ranks(ranks: int, changes: tuple[str, ...]) ->
     """Every rank searches when one of them must; what it is sent depends on the skin and the contact domain."""
     one = alone("breaking")[0]
     assert on_ranks(ranks, lambda comm: ran("breaking", comm, 5, *changes))[0][0] == one
+
+
+def test_what_a_search_looks_ahead_ends_with_one_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not with one that keeps the end, a step or two away, and another one behind it."""
+    monkeypatch.setattr(flight, "_LOOKS", flight._LOOKS[:1])
+    good_for = flight._LOOKS[0] - searches._AHEAD
+    assert ran("meeting", SerialComm())[1] <= 1 + STEPS["meeting"] / good_for
