@@ -24,6 +24,10 @@ from .sides import HALO, Rules
 
 _SHORTEST = 10.0
 """Steps of free flight that a search looks ahead at least; at most twice what the last search was good for."""
+_LONGEST = 80.0
+"""The same at most where bodies break: with 300 steps the pairs between fragments cost a quarter more than the searches
+that they save (docs/bench.md, the bar to 40 us).
+"""
 _AHEAD = 2.0
 """Steps before the end of what a search looked ahead at which another one is due: the second is the one that
 narrow_phase looks ahead.
@@ -31,10 +35,6 @@ narrow_phase looks ahead.
 _LEAST = 3.0 + _AHEAD
 """Steps that a search must be good for still, so that what has changed is added to it: with fewer the next one would
 be due at once. Chosen: one more than that, and one for a step that grows.
-"""
-_LONGEST = 80.0
-"""The same at most where bodies break: with 300 steps the pairs between fragments cost a quarter more than the searches
-that they save (docs/bench.md, the bar to 40 us).
 """
 
 
