@@ -22,6 +22,13 @@ class Rooms:
                 room[:n] = column
         return list(self._rooms.values())
 
+    def append(self, table: object, more: int, **rows: Any) -> None:
+        """``more`` rows behind the columns of ``table``: of each column an array, or one value for all."""
+        for room, name in zip(self.of(table, more), self._rooms, strict=True):
+            n = len(getattr(table, name))
+            room[n : n + more] = rows[name]
+            setattr(table, name, room[: n + more])
+
     def take(self, table: object, m: int) -> None:
         """Makes the first ``m`` rows of each room the column of ``table``."""
         for name, room in self._rooms.items():

@@ -46,7 +46,7 @@ def test_who_pushes_or_holds_a_node_has_the_sum_of_all_and_nothing_else_is_sent(
             agreed.finish(again, 1, 3)
         sent = sum((pushed[me] & known[me] & known[k] & (pushed[k] | held[k])).sum() for k in range(RANKS) if k != me)
         assert comm.sent.since_last()["bytes"] == 2 * sent * 4 * 8
-        assert told == sum(2 * 8 * -(-len(both[k]) // 63) for k in range(RANKS) if k != me)
+        assert told == sum(2 * 8 * 4 * (1 + len(both[k]) // (4 * 63)) for k in range(RANKS) if k != me)
         assert not again[:, [0, 4]].any()
         assert np.array_equal(np.unique(agreed.shared), np.unique(slots[_concerned(known, held, pushed, me)]))
         return again[slots, 1:4], sent

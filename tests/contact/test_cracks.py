@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from conoid.worker.contact.cracks import Cracks, computed
-from conoid.worker.contact.kin import Family, inherited
+from conoid.worker.contact.kin import Family, families, inherited
 from conoid.worker.contact.node_face import chain
 from conoid.worker.migration.parcel import joined, once
 from conoid.worker.state import Nodes
@@ -76,8 +76,8 @@ def test_every_copy_has_the_candidates_of_its_parent() -> None:
 
 
 def test_a_family_tells_where_the_copies_of_a_node_begin_and_end() -> None:
-    family = Family.of(np.array([[3, 6], [3, 7], [1, 8]], np.int32), 9)
+    family = Family(*families(np.array([[3, 6], [3, 7], [-1, 5], [4, -1], [1, 8]], np.int32), 9))
     assert family.first.tolist() == [-1, 2, -1, 0, -1, -1, -1, -1, -1]
     assert family.member.tolist() == [[6, 0], [7, 1], [8, 1]]
     assert family.most == 2
-    assert Family.of(np.zeros((0, 2), np.int32), 2).most == 0
+    assert families(np.zeros((0, 2), np.int32), 2)[2] == 0

@@ -1,17 +1,24 @@
 """What a scene knows of its slots, faces and edges: a column each, by their rows."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..state import Flags, Floats, Indices, Ints, extended
+from ..growing import Rooms
+from ..state import Flags, Floats, Indices, Ints
 from .normals import COLUMNS
 from .records import Crowd
+
+_FRESH = {
+    **dict.fromkeys(("slave", "pushes", "live", "new", "fresh", "tracked", "on_surface"), False),
+    "first": -1, "normals": 0.0, "total": 0,
+}  # fmt: skip
+"""What a slot begins with."""
 
 
 @dataclass
 class OwnSlots:
-    """The slots of the nodes that this rank holds."""
+    """Which nodes have which slots: those that this rank holds, and others."""
 
     slots: Indices
     """(h,) which they are."""
@@ -19,6 +26,38 @@ class OwnSlots:
     """(h,) indices of their nodes on this rank."""
     place: Indices
     """(nodes,) slot of each node of this rank, -1 for those that have none."""
+    far: Indices
+    """(k,) slots of nodes that this rank does not hold."""
+    far_ids: Ints
+    """(k,) global ids of these, ascending."""
+    _rooms: Rooms = field(default_factory=lambda: Rooms("slots", "local"), init=False, repr=False)
+    _by_node: Rooms = field(default_factory=lambda: Rooms("place"), init=False, repr=False)
+
+    @classmethod
+    def of(cls, crowd: Crowd, nodes: int) -> "OwnSlots":
+        """Of all slots, for so many ``nodes`` of this rank."""
+        slots, none = np.zeros(0, np.int32), np.zeros(0, np.int64)
+        own = cls(slots, slots, np.full(nodes, -1, np.int32), slots, none)
+        own.add(0, crowd)
+        return own
+
+    def add(self, first: int, rows: Crowd) -> None:
+        """Takes up more slots, from ``first`` on."""
+        held = np.flatnonzero(rows.local >= 0)
+        slots, local = (first + held).astype(np.int32), rows.local[held]
+        self._rooms.append(self, len(held), slots=slots, local=local)
+        self.place[local] = slots
+        if len(held) < rows.n:
+            far = np.flatnonzero(rows.local < 0)
+            ids = np.concatenate([self.far_ids, rows.id[far]])
+            order = np.argsort(ids)
+            self.far = np.concatenate([self.far, (first + far).astype(np.int32)])[order]
+            self.far_ids = ids[order]
+
+    def grow(self, nodes: int) -> None:
+        """Up to so many ``nodes`` of this rank; the new ones have no slots yet."""
+        if nodes > len(self.place):
+            self._by_node.append(self, nodes - len(self.place), place=-1)
 
 
 @dataclass
@@ -47,6 +86,7 @@ class SceneSlots:
     """(slots, 3) impulses of the last step, quanta."""
     before: Floats
     """(slots, 3) v(n-1/2)."""
+    _rooms: Rooms = field(default_factory=lambda: Rooms("before", *_FRESH), init=False, repr=False)
 
     @classmethod
     def at_rest(cls, slave: Flags, pushes: Flags) -> "SceneSlots":
@@ -60,10 +100,7 @@ class SceneSlots:
 
     def add(self, rows: Crowd) -> None:
         """Takes up more slots."""
-        more = SceneSlots.at_rest(*np.zeros((2, rows.n), bool))
-        more.before = rows.v
-        for name, column in vars(more).items():
-            setattr(self, name, extended(getattr(self, name), column))
+        self._rooms.append(self, rows.n, before=rows.v, **_FRESH)
 
     def inherit(self, copies: Indices, parents: Indices) -> None:
         """Copies have the normals of their parents, are searched as they are, and pushed by the same ranks."""

@@ -9,13 +9,15 @@ is zero.
 import numpy as np
 
 from ..jit import njit
-from ..parallel.comm import Comm
+from ..parallel.comm import Comm, Exchange
 from ..parallel.ownership import Neighbour
 from ..parallel.tags import Tag
 from ..state import Indices, Ints
 
 _WORD = 63
 """Bits of a word that are used."""
+_ROOM = 4
+"""Words by which the messages of a rank grow. Chosen: some 250 nodes that separate need no new messages."""
 _COLUMNS = 4
 """The most that are summed at once (active.ActiveNodes.row_weights)."""
 
@@ -25,13 +27,23 @@ class Company:
 
     def __init__(self, neighbours: list[Neighbour], comm: Comm) -> None:
         """``neighbours``: the slots in the same order on both ranks."""
-        self.neighbours, self._comm = neighbours, comm
+        self._comm = comm
+        self._words = np.zeros(0, np.int64)
+        self._exchange: Exchange | None = None
+        self.take(neighbours)
+
+    def take(self, neighbours: list[Neighbour]) -> None:
+        """Other slots. Messages that have room for them stay."""
+        self.neighbours = neighbours
         self._every = np.concatenate([np.zeros(0, np.int32), *(some.nodes for some in neighbours)])
         self._ends = np.cumsum([0, *(len(some.nodes) for some in neighbours)])
-        words = [2 * -(-len(some.nodes) // _WORD) for some in neighbours]
-        self._words = np.cumsum([0, *words])
-        self._out, self._in = (np.zeros(self._words[-1], np.int64) for _ in range(2))
-        self._exchange = comm.exchange(self._slices(self._out), self._slices(self._in), Tag.CONTACT_FLAGS)
+        words = np.cumsum([0, *(2 * _ROOM * (1 + len(some.nodes) // (_ROOM * _WORD)) for some in neighbours)])
+        if self._exchange is not None and np.array_equal(words, self._words):
+            return
+        self.free()
+        self._words = words
+        self._out, self._in = (np.zeros(words[-1], np.int64) for _ in range(2))
+        self._exchange = self._comm.exchange(self._slices(self._out), self._slices(self._in), Tag.CONTACT_FLAGS)
 
     def _slices(self, words: Ints) -> list[tuple[int, Ints]]:
         begins, ends = self._words[:-1], self._words[1:]
@@ -42,6 +54,7 @@ class Company:
         if not self.neighbours:
             nothing = np.zeros(0, np.int32)
             return ActiveSum([], nothing, nothing, np.zeros((0, 2), np.int64), self._comm)
+        assert self._exchange is not None
         _tell(self._out, self._every, self._ends, self._words, contacts, local)
         self._exchange.begin()
         self._exchange.finish()
@@ -51,7 +64,8 @@ class Company:
 
     def free(self) -> None:
         """Gives its messages back to MPI."""
-        self._exchange.free()
+        if self._exchange is not None:
+            self._exchange.free()
 
 
 class ActiveSum:

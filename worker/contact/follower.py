@@ -6,17 +6,15 @@ has the candidates of the node that it was part of, with the rank that computes 
 
 import numpy as np
 
-from ..ids import among
 from ..jit import njit
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
 from ..state import Flags, Indices, Ints, Nodes, extended
-from ..topology import keys
-from . import ghosts
+from . import ghosts, kin
 from .cracks import Cracks, computed, touching
-from .kin import Family, apart_from_edges, apart_from_faces, inherited
-from .news import News
-from .records import Crowd, merged
+from .kin import Family
+from .news import News, meets
+from .records import Crowd
 from .scene import Scene
 
 
@@ -27,65 +25,51 @@ class Follower:
         """``here``: every node of this rank, by local index."""
         self._scene, self._here = scene, here
         self._nodes = nodes
-        if len(scene.own.place) < nodes.n:
-            scene.own.place = extended(scene.own.place, np.full(nodes.n - len(scene.own.place), -1, np.int32))
-        self._sort()
+        scene.own.grow(nodes.n)
 
     def places(self, ids: Ints) -> Indices:
         """Where ids stand in the crowd, in their shape, -1 where they do not."""
-        far, far_ids = self._far
-        found = _located(ids.ravel(), self._nodes.id, self._scene.own.place, far_ids, far)
+        own = self._scene.own
+        found = _located(ids.ravel(), self._nodes.id, own.place, own.far_ids, own.far)
         return np.asarray(found.reshape(ids.shape))
-
-    def _sort(self) -> None:
-        """Places and ids, ascending, of the nodes of the crowd that this rank does not hold."""
-        crowd = self._scene.crowd
-        far = np.flatnonzero(crowd.local < 0)
-        far = far[np.argsort(crowd.id[far])]
-        self._far = far, crowd.id[far]
 
     def follow(self, heard: News, cracks: Cracks, neighbours: list[Neighbour]) -> None:
         """Faces, edges and candidates after the split, and the places of the cracks."""
-        rows = touching(cracks.nodes, _flagged(self._nodes.places(heard.rows.id), self._nodes.n))
+        rows = touching(cracks.nodes, _flagged(self._nodes.id, heard.rows.id))
         rows = computed(rows, cracks.nodes, cracks.sides)
-        self._join(heard, self._lacking(cracks, rows), neighbours)
-        n, pairs = self._scene.crowd.n, np.column_stack([self.places(heard.parent), self.places(heard.copy)])
-        parents, family = _flagged(pairs[:, 0], n), Family.of(pairs[(pairs >= 0).all(axis=1)], n)
+        self._join(heard, neighbours)
+        self._hold(_lacking(rows, cracks.nodes, self._scene.own.place))
+        family = Family(*kin.families(self.places(heard.family), self._scene.crowd.n))
+        became = self.places(heard.became)
         self._candidates(family)
-        self._faces(heard, parents, family)
-        self._edges(heard, parents, family)
+        self._faces(heard, became, family)
+        self._edges(heard, became, family)
         self._across(cracks, rows)
 
-    def _join(self, heard: News, lacking: Indices, neighbours: list[Neighbour]) -> None:
-        """Takes the families of the crowd's nodes and of those that other ranks hold into the crowd, and the nodes of
-        this rank that are ``lacking``; and the masses of all that have separated.
+    def _join(self, heard: News, neighbours: list[Neighbour]) -> None:
+        """Takes the families of the crowd's nodes and of those that other ranks hold into the crowd; and the masses of
+        all that have separated.
         """
-        have, local = self.places(heard.parent) >= 0, self._nodes.places(heard.parent)
+        local, have = self._nodes.places(heard.family[:, 0]), self.places(heard.family[:, 0]) >= 0
         for other in neighbours:
-            have |= _flagged(other.nodes, self._nodes.n)[local]
-        families = np.sort(np.concatenate([heard.parent[have], heard.copy[have]]))
-        self._add(merged([heard.rows.take(among(families, heard.rows.id)), self._here.take(lacking)]))
-        at = self.places(heard.rows.id)
-        self._scene.crowd.mobility[at[at >= 0]] = heard.rows.mobility[at >= 0]
+            _mark(have, local, other.nodes)
+        rows, at = heard.rows, self.places(heard.rows.id)
+        self._add(rows.take(_joining(rows.id, at, heard.family, have)))
+        at = self.places(rows.id)
+        self._scene.crowd.mobility[at[at >= 0]] = rows.mobility[at >= 0]
 
     def cracks(self, cracks: Cracks) -> None:
         """The places of all cracks that this rank computes."""
         rows = computed(np.arange(len(cracks.nodes)), cracks.nodes, cracks.sides)
         cracks.places[:] = -1
-        self._add(self._here.take(self._lacking(cracks, rows)))
+        self._hold(_lacking(rows, cracks.nodes, self._scene.own.place))
         self._across(cracks, rows)
         cracks.arrange()
 
-    def _lacking(self, cracks: Cracks, rows: Ints) -> Indices:
-        """Which nodes of some of the cracks, ascending, are not in the crowd yet."""
-        nodes = cracks.nodes[rows]
-        return np.unique(nodes[self._scene.own.place[nodes] < 0])
-
     def _across(self, cracks: Cracks, rows: Ints) -> None:
         """Places some of the cracks, whose nodes that have separated may be pushed."""
-        scene, nodes = self._scene, cracks.nodes[rows]
-        places = cracks.places[rows] = scene.own.place[nodes]
-        scene.slots.pushes[places[nodes != nodes[:, [3, 4, 5, 0, 1, 2]]]] = True
+        scene = self._scene
+        _place(cracks.places, scene.slots.pushes, rows, cracks.nodes, scene.own.place)
         scene.cracks = cracks.places
 
     def settle(self, neighbours: list[Neighbour], comm: Comm) -> None:
@@ -97,94 +81,74 @@ class Follower:
         used = np.sort(scene.crowd.id[scene.slots.pushes])
         owners = scene.crowd.owner[self.places(used)]
         shared = ghosts.members(used, owners, neighbours, nodes, comm)
-        self._hold(np.unique(np.concatenate([used[:0], *shared.values()])))
+        local = nodes.places(np.unique(np.concatenate([used[:0], *shared.values()])))
+        self._hold(local[(local >= 0) & (scene.own.place[local] < 0)])
         scene.connect([Neighbour(rank, self.places(ids)) for rank, ids in sorted(shared.items())], nodes, comm)
 
-    def share(self, heard: News, neighbours: list[Neighbour], comm: Comm) -> None:
+    def share(self, heard: News, neighbours: list[Neighbour]) -> None:
         """Follows who shares which node. Nobody has to be asked: who shares a node shares its copies, since they are
         held, pushed and sent by the same ranks as it; and a node that separates is shared by all that hold it, since it
         may be pushed across the crack.
         """
-        scene = self._scene
-        order = np.argsort(heard.copy)
-        family = np.column_stack([heard.parent, heard.copy])[order]
-        local, at = self._nodes.places(family), self.places(family)
-        company, none = {some.rank: some for some in scene.messages.company.neighbours}, np.zeros(0, np.int32)
+        messages, crowd, nodes = self._scene.messages, self._scene.crowd, self._nodes
+        family = heard.family[np.argsort(heard.family[:, 1])]
+        local, at = nodes.places(family), self.places(family)
+        held, there = np.zeros(nodes.n, bool), np.zeros(crowd.n, bool)
+        company, none = {some.rank: some for some in messages.company.neighbours}, np.zeros(0, np.int32)
         for other in neighbours:
-            shared = _flagged(other.nodes, self._nodes.n)[local[:, 0]]
             some = company.get(other.rank, Neighbour(other.rank, none))
-            fresh = shared & ~_flagged(some.nodes, scene.crowd.n)[at[:, 0]]
-            if fresh.any():
-                parents = self.places(np.unique(family[fresh, 0]))
+            parents = _newly_shared(family[:, 0], local[:, 0], at[:, 0], other.nodes, some.nodes, there)
+            if len(parents):
                 company[other.rank] = Neighbour(other.rank, extended(some.nodes, parents))
-        scene.extend(
-            [_heirs(some, at, scene.crowd.n) for _, some in sorted(company.items())],
-            [_heirs(some, local, self._nodes.n) for some in scene.messages.copies.sends],
-            [_heirs(some, at, scene.crowd.n) for some in scene.messages.copies.receives], comm,
-        )  # fmt: skip
+        self._scene.extend(
+            [_heirs(some, at, there) for _, some in sorted(company.items())],
+            [_heirs(some, local, held) for some in messages.copies.sends],
+            [_heirs(some, at, there) for some in messages.copies.receives],
+        )
 
-    def _hold(self, ids: Ints) -> None:
-        """Adds those of this rank's nodes that the crowd lacks."""
-        local = self._nodes.places(ids)
-        self._add(self._here.take(local[local >= 0]))
+    def _hold(self, local: Indices) -> None:
+        """Adds nodes of this rank, which the crowd lacks."""
+        if len(local):
+            self._add(self._here.take(local))
 
     def _add(self, rows: Crowd) -> None:
         scene = self._scene
-        rows = rows.take(self.places(rows.id) < 0)
         if not rows.n:
             return
         first = scene.crowd.n
-        scene.crowd = Crowd(*(extended(a, b) for a, b in zip(scene.crowd.columns(), rows.columns(), strict=True)))
-        held = np.flatnonzero(rows.local >= 0).astype(np.int32)
-        scene.own.slots = extended(scene.own.slots, first + held)
-        scene.own.local = extended(scene.own.local, rows.local[held])
-        scene.own.place[rows.local[held]] = first + held
+        scene.crowd.append(rows)
         scene.slots.add(rows)
         scene.tracks.add(rows.x, rows.course)
-        if (rows.local < 0).any():
-            self._sort()
+        scene.own.add(first, rows)
 
-    def _followed(self, heard: News, places: Indices, tets: Ints) -> Indices:
-        """What nodes at ``places`` (n, k) of tets (n,) have become."""
-        if not len(heard.key):
-            return places
-        wanted = keys(self._scene.crowd.id[places], tets[:, None])
-        at = np.minimum(np.searchsorted(heard.key, wanted), len(heard.key) - 1)
-        now = heard.key[at] == wanted
-        out = places.copy()
-        out[now] = self.places(heard.became[at[now]])
-        return out
-
-    def _faces(self, heard: News, parents: Flags, family: Family) -> None:
+    def _faces(self, heard: News, became: Indices, family: Family) -> None:
         """Faces take up the copies of their corners; a node meets those that have just left it, too."""
-        scene = self._scene
-        rows = touching(scene.faces.corners, parents)
-        old = scene.faces.corners[rows]
-        now = self._followed(heard, old, scene.faces.id[rows] // 4)
-        scene.faces.corners[rows], scene.faces.fresh[rows] = now, True
+        faces, slots, crowd = self._scene.faces, self._scene.slots, self._scene.crowd
+        rows, old = kin.follow_faces(
+            faces.corners, faces.fresh, faces.id, family.first, crowd.id, heard.key, became
+        )  # fmt: skip
+        if not len(rows):
+            return
         pairs = np.empty((3 * len(rows) * (1 + family.most), 2), np.int32)
-        searched = scene.faces.live[rows] & self._meets(old[:, 0])
-        n = apart_from_faces(pairs, rows, old, now, family.first, family.member, scene.slots.live, searched)
+        searched = faces.live[rows] & self._meets(old[:, 0])
+        n = kin.apart_from_faces(
+            pairs, rows, old, faces.corners[rows], family.first, family.member, slots.live, searched
+        )  # fmt: skip
         self._add_pairs(pairs[:n])
 
-    def _edges(self, heard: News, parents: Flags, family: Family) -> None:
+    def _edges(self, heard: News, became: Indices, family: Family) -> None:
         """An edge goes when its two faces have separated there; it meets those that have left its ends."""
-        scene = self._scene
-        rows = touching(scene.edges.corners, parents)
-        nodes, sides = scene.edges.corners[rows], scene.edges.sides[rows]
-        one = self._followed(heard, nodes[:, [0, 1, 2]], sides[:, 0] // 4)
-        two = self._followed(heard, nodes[:, [0, 1, 3]], sides[:, 1] // 4)
-        now = np.column_stack([one, two[:, 2]]).astype(np.int32)
-        gone = (one[:, :2] != two[:, :2]).any(axis=1)
-        now[gone] = now[gone][:, [0, 0, 0, 0]]
-        scene.edges.corners[rows], scene.edges.fresh[rows] = now, True
-        order = np.lexsort((sides[:, 1], sides[:, 0]))
-        order = order[(scene.edges.live[rows] & ~gone)[order] & self._meets(nodes[order, 0])]
-        ends = nodes[order, :2]
-        at = np.argsort(ends.reshape(-1), kind="stable")
-        at = at[family.first[ends.reshape(-1)[at]] >= 0]
-        found = apart_from_edges(at, ends, now[order], scene.edges.own[rows[order]])
-        scene.edge_edge.add(rows[order][found].astype(np.int32))
+        edges, crowd = self._scene.edges, self._scene.crowd
+        rows, old, gone = kin.follow_edges(
+            edges.corners, edges.fresh, edges.sides, family.first, crowd.id, heard.key, became
+        )  # fmt: skip
+        some = edges.live[rows] & ~gone & self._meets(old[:, 0])
+        if some.any():
+            rows, old = rows[some], old[some]
+            order = np.argsort(edges.names[rows])
+            rows, old = rows[order], old[order]
+            found = kin.apart_from_edges(old, edges.corners[rows], family.first, edges.own[rows])
+            self._scene.edge_edge.add(rows[found].astype(np.int32))
 
     def _meets(self, places: Indices) -> Flags:
         """(n,) whether the parts of nodes at ``places`` meet themselves."""
@@ -195,28 +159,112 @@ class Follower:
         scene, (parent, copy) = self._scene, family.pairs.T
         scene.slots.inherit(copy, parent)
         scene.tracks.inherit(copy, parent)
-        self._add_pairs(inherited(family.pairs, scene.slots.first, scene.node_face.next, scene.node_face.rows))
+        self._add_pairs(kin.inherited(family.pairs, scene.slots.first, scene.node_face.next, scene.node_face.rows))
 
     def _add_pairs(self, pairs: Indices) -> None:
         """More candidates of nodes and faces."""
-        scene, n = self._scene, len(self._scene.node_face)
-        scene.node_face.add(pairs.astype(np.int32))
-        scene.node_face.hang(scene.slots.first, n)
+        if len(pairs):
+            scene, n = self._scene, len(self._scene.node_face)
+            scene.node_face.add(pairs)
+            scene.node_face.hang(scene.slots.first, n)
 
 
-def _flagged(some: Indices, n: int) -> Flags:
-    """(n + 1,) which of n are among ``some``; the last stands for what is not there, -1."""
-    flags = np.zeros(n + 1, bool)
-    flags[some] = True
+def _heirs(some: Neighbour, family: Indices, flags: Flags) -> Neighbour:
+    """Nodes shared with a rank, and behind them their copies: ``family`` (c, 2) parents and copies, -1 for none here;
+    ``flags``: room, all false.
+    """
+    heirs = family[meets(flags, some.nodes, family), 1]
+    return Neighbour(some.rank, extended(some.nodes, heirs)) if len(heirs) else some
+
+
+@njit("boolean[::1](int64[::1], int64[::1])", cache=True)
+def _flagged(ids, wanted):  # type: ignore[no-untyped-def]
+    """(n + 1,) which of the ascending ``ids`` are ``wanted``; the last stands for what is not there, -1."""
+    flags = np.zeros(len(ids) + 1, np.bool_)
+    for i in range(len(wanted)):
+        at = np.searchsorted(ids, wanted[i])
+        if at < len(ids) and ids[at] == wanted[i]:
+            flags[at] = True
     return flags
 
 
-def _heirs(some: Neighbour, family: Indices, n: int) -> Neighbour:
-    """Nodes shared with a rank, and behind them their copies: ``family`` (c, 2) parents and copies, out of ``n``."""
-    return Neighbour(some.rank, extended(some.nodes, family[_flagged(some.nodes, n)[family[:, 0]], 1]))
+@njit("void(boolean[::1], int32[::1], int32[::1])", cache=True)
+def _mark(flags, some, others):  # type: ignore[no-untyped-def]
+    """Flags those of ``some`` that are among the ascending ``others``."""
+    for i in range(len(some)):
+        at = np.searchsorted(others, some[i])
+        if at < len(others) and others[at] == some[i]:
+            flags[i] = True
 
 
-@njit("int32[::1](int64[::1], int64[::1], int32[::1], int64[::1], int64[::1])", cache=True)
+@njit("int64[::1](int64[::1], int32[::1], int64[:, ::1], boolean[::1])", cache=True)
+def _joining(ids, places, family, have):  # type: ignore[no-untyped-def]
+    """Which of ``ids`` have no place yet and are of a ``family`` (c, 2) that the scene shall ``have``."""
+    wanted = np.sort(family[have].reshape(-1))
+    rows, n = np.empty(len(ids), np.int64), 0
+    for i in range(len(ids)):
+        at = np.searchsorted(wanted, ids[i])
+        if places[i] < 0 and at < len(wanted) and wanted[at] == ids[i]:
+            rows[n] = i
+            n += 1
+    return rows[:n].copy()
+
+
+@njit("int32[::1](int64[::1], int32[:, ::1], int32[::1])", cache=True)
+def _lacking(rows, nodes, place):  # type: ignore[no-untyped-def]
+    """Nodes, ascending, of the ``rows`` of cracks that have no place yet."""
+    some, n = np.empty(6 * len(rows), np.int32), 0
+    for c in rows:
+        for k in range(6):
+            if place[nodes[c, k]] < 0:
+                some[n] = nodes[c, k]
+                n += 1
+    return np.unique(some[:n])
+
+
+@njit("void(int32[:, ::1], boolean[::1], int64[::1], int32[:, ::1], int32[::1])", cache=True)
+def _place(places, pushes, rows, nodes, place):  # type: ignore[no-untyped-def]
+    """Slots of the nodes of some ``rows`` of cracks; those that have separated may be pushed."""
+    for c in rows:
+        for k in range(6):
+            places[c, k] = place[nodes[c, k]]
+            if nodes[c, k] != nodes[c, (k + 3) % 6]:
+                pushes[places[c, k]] = True
+
+
+@njit("int32[::1](int64[:], int32[:], int32[:], int32[::1], int32[::1], boolean[::1])", cache=True)
+def _newly_shared(ids, local, places, holds, shares, flags):  # type: ignore[no-untyped-def]
+    """Places, by ascending id and each once, of parents that a rank ``holds`` and that are not among those that it
+    ``shares`` yet; ``flags``: room, all false. ``ids``, ``local`` and ``places``: of the parents.
+    """
+    some, n = np.empty(len(ids), np.int64), 0
+    for i in range(len(ids)):
+        at = np.searchsorted(holds, local[i])
+        if local[i] >= 0 and at < len(holds) and holds[at] == local[i]:
+            some[n] = i
+            n += 1
+    if n == 0:
+        return np.empty(0, np.int32)
+    flags[shares] = True
+    found, m = np.empty(n, np.int64), 0
+    for i in some[:n]:
+        if not flags[places[i]]:
+            flags[places[i]] = True
+            found[m] = i
+            m += 1
+    flags[shares] = False
+    fresh = np.empty(m, np.int64)
+    for k in range(m):
+        flags[places[found[k]]] = False
+        fresh[k] = ids[found[k]]
+    out = np.empty(m, np.int32)
+    order = np.argsort(fresh)
+    for k in range(m):
+        out[k] = places[found[order[k]]]
+    return out
+
+
+@njit("int32[::1](int64[::1], int64[::1], int32[::1], int64[::1], int32[::1])", cache=True)
 def _located(wanted, ids, place, far_ids, far):  # type: ignore[no-untyped-def]
     """(n,) the ``place`` of those that are among the ``ids`` of this rank, ``far`` of the others, -1 for no place."""
     found = np.empty(len(wanted), np.int32)

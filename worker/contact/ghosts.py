@@ -13,6 +13,8 @@ from .records import Crowd, Edges, Faces
 
 _CROWD_WORDS = 15
 """Words of a node in a message (``pack``)."""
+_ROOM = 32
+"""Rows by which the message of a rank grows, so that few nodes that separate need no new one. Chosen: 2 kB."""
 
 
 def pack(faces: Faces, edges: Edges, crowd: Crowd) -> Ints:
@@ -107,10 +109,23 @@ class Copies:
 
     def __init__(self, sends: list[Neighbour], receives: list[Neighbour], comm: Comm, tag: Tag) -> None:
         """``sends``: local nodes, ``receives``: places in the crowd."""
+        self._comm, self._tag = comm, tag
+        self._rows: tuple[list[int], list[int]] | None = None
+        self.take(sends, receives)
+
+    def take(self, sends: list[Neighbour], receives: list[Neighbour]) -> None:
+        """Other nodes. Messages that have room for them stay."""
         self.sends, self.receives = sends, receives
-        self._from, self._to = (_joined([some.nodes for some in each]) for each in (sends, receives))
-        self._out, self._in = np.empty((len(self._from), 9)), np.empty((len(self._to), 9))
-        self._exchange = comm.exchange(_slices(self._out, sends), _slices(self._in, receives), tag)
+        rows = _rooms(sends), _rooms(receives)
+        self._from, self._to = _padded(sends, rows[0]), _padded(receives, rows[1])
+        if rows == self._rows:
+            return
+        if self._rows is not None:
+            self.free()
+        self._rows = rows
+        self._out, self._in = np.zeros((len(self._from), 9)), np.empty((len(self._to), 9))
+        into = _slices(self._in, receives, rows[1])
+        self._exchange = self._comm.exchange(_slices(self._out, sends, rows[0]), into, self._tag)
 
     def note(self, nodes: Nodes) -> None:
         """Keeps v(n-1/2) for the others."""
@@ -135,26 +150,37 @@ class Copies:
 @njit("void(float64[:, ::1], int64, float64[:, ::1], int32[::1])", cache=True)
 def _pack(out, first, values, rows):  # type: ignore[no-untyped-def]
     for r in range(len(rows)):
-        for i in range(3):
-            out[r, first + i] = values[rows[r], i]
+        if rows[r] >= 0:
+            for i in range(3):
+                out[r, first + i] = values[rows[r], i]
 
 
 @njit("void(float64[:, ::1], float64[:, ::1], float64[:, ::1], int32[::1], float64[:, ::1])", cache=True)
 def _unpack(x, v, before, rows, got):  # type: ignore[no-untyped-def]
     for r in range(len(rows)):
-        for i in range(3):
-            x[rows[r], i], v[rows[r], i], before[rows[r], i] = got[r, i], got[r, 3 + i], got[r, 6 + i]
+        if rows[r] >= 0:
+            for i in range(3):
+                x[rows[r], i], v[rows[r], i], before[rows[r], i] = got[r, i], got[r, 3 + i], got[r, 6 + i]
 
 
-def _joined(some: list[Indices]) -> Indices:
-    return np.concatenate([np.zeros(0, np.int32), *some])
+def _rooms(others: list[Neighbour]) -> list[int]:
+    """Rows of each rank's message."""
+    return [_ROOM * (1 + len(other.nodes) // _ROOM) for other in others]
 
 
-def _slices(buffer: Floats, others: list[Neighbour]) -> list[tuple[int, Ints]]:
+def _padded(others: list[Neighbour], rooms: list[int]) -> Indices:
+    """The nodes of each rank in turn, -1 behind them up to its ``rooms``."""
+    rows, begin = np.full(sum(rooms), -1, np.int32), 0
+    for other, room in zip(others, rooms, strict=True):
+        rows[begin : begin + len(other.nodes)] = other.nodes
+        begin += room
+    return rows
+
+
+def _slices(buffer: Floats, others: list[Neighbour], rooms: list[int]) -> list[tuple[int, Ints]]:
     """The words of each rank in turn."""
-    ends = np.cumsum([len(other.nodes) for other in others])
-    words = buffer.view(np.int64)
-    return [(other.rank, words[end - len(other.nodes) : end]) for other, end in zip(others, ends, strict=True)]
+    words, ends = buffer.view(np.int64), np.cumsum(rooms).tolist()
+    return [(other.rank, words[end - room : end]) for other, room, end in zip(others, rooms, ends, strict=True)]
 
 
 def copies(crowd: Crowd, nodes: Nodes, comm: Comm, tag: Tag) -> Copies:

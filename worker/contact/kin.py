@@ -1,16 +1,22 @@
-"""New candidates of a split: what a copy has from its parent, and what had nodes in common until it separated."""
+"""What a split makes of faces, edges and candidates: whose copies are whose, what corners have become, and the new
+candidates: what a copy has from its parent, and what had nodes in common until it separated.
+"""
 
-from dataclasses import dataclass
-from typing import Self
+from typing import NamedTuple
 
 import numpy as np
 
-from ..jit import njit
+from ..fracture.records import several
+from ..jit import njit, types
 from ..state import Indices
+from ..topology import KEY
+
+_I, _I1, _I2, _N1, _N2, _B1 = (
+    types.int64, types.int64[::1], types.int64[:, ::1], types.int32[::1], types.int32[:, ::1], types.boolean[::1],
+)  # fmt: skip
 
 
-@dataclass
-class Family:
+class Family(NamedTuple):
     """Nodes that separate, and what comes out of them."""
 
     first: Indices
@@ -22,15 +28,90 @@ class Family:
     pairs: Indices
     """(c, 2) places of the parent and of the copy."""
 
-    @classmethod
-    def of(cls, pairs: Indices, n: int) -> Self:
-        """The families of ``pairs``, those of a parent one after the other, in a crowd of ``n``."""
-        parent, first = pairs[:, 0], np.full(n, -1, np.int32)
-        last = np.append(parent[1:] != parent[:-1], True)[: len(parent)]
-        end = np.flatnonzero(last) + 1
-        count = np.diff(end, prepend=0)
-        first[parent[end - 1]] = end - count
-        return cls(first, np.column_stack([pairs[:, 1], last]).astype(np.int32), int(count.max(initial=0)), pairs)
+
+@njit(several(_N1, _N2, _I, _N2)(_N2, _I), cache=True)
+def families(places, n):  # type: ignore[no-untyped-def]
+    """``Family`` of the parents and copies at ``places`` (c, 2), those of a parent one after the other, in a crowd of
+    ``n``; -1 for what is not there.
+    """
+    first, k = np.full(n, np.int32(-1), np.int32), 0
+    member, pairs = np.empty_like(places), np.empty_like(places)
+    most, count = 0, 0
+    for c in range(len(places)):
+        parent, copy = places[c, 0], places[c, 1]
+        if parent < 0 or copy < 0:
+            continue
+        if first[parent] < 0:
+            first[parent], count = k, 0
+        else:
+            member[k - 1, 1] = 0
+        count += 1
+        most = max(most, count)
+        member[k, 0], member[k, 1] = copy, 1
+        pairs[k, 0], pairs[k, 1] = parent, copy
+        k += 1
+    return first, member[:k].copy(), most, pairs[:k].copy()
+
+
+@njit(types.int32(_I1, _I1, _N1, types.int32, _I), cache=True)
+def _become(ids, key, became, node, tet):  # type: ignore[no-untyped-def]
+    """What the ``node`` of a tet (global id) has become; ``ids``: of the nodes; ``key`` and ``became``: News."""
+    wanted = ids[node] * KEY + tet
+    at = np.searchsorted(key, wanted)
+    return became[at] if at < len(key) and key[at] == wanted else node
+
+
+@njit(several(_I1, _N2)(_N2, _B1, _I1, _N1, _I1, _I1, _N1), cache=True)
+def follow_faces(corners, fresh, faces, first, ids, key, became):  # type: ignore[no-untyped-def]
+    """Gives faces of the ids ``faces`` (f,) the copies of their ``corners`` (f, 4); ``first``: see Family, ``ids``: of
+    the nodes, ``key`` and ``became``: see News, as places. Returns the rows of those that have lost a node, and their
+    corners until then.
+    """
+    rows, n = np.empty(len(corners), np.int64), 0
+    for f in range(len(corners)):
+        for k in range(4):
+            if first[corners[f, k]] >= 0:
+                rows[n] = f
+                n += 1
+                break
+    old = np.empty((n, 4), np.int32)
+    for r in range(n):
+        f = rows[r]
+        fresh[f] = True
+        for k in range(4):
+            old[r, k] = corners[f, k]
+            if first[corners[f, k]] >= 0:
+                corners[f, k] = _become(ids, key, became, corners[f, k], faces[f] // 4)
+    return rows[:n].copy(), old
+
+
+@njit(several(_I1, _N2, _B1)(_N2, _B1, _I2, _N1, _I1, _I1, _N1), cache=True)
+def follow_edges(corners, fresh, sides, first, ids, key, became):  # type: ignore[no-untyped-def]
+    """The same for edges between ``sides`` (e, 2), ids of faces; and which of them are gone, whose faces have separated
+    there.
+    """
+    rows, n = np.empty(len(corners), np.int64), 0
+    for e in range(len(corners)):
+        for k in range(4):
+            if first[corners[e, k]] >= 0:
+                rows[n] = e
+                n += 1
+                break
+    old, gone = np.empty((n, 4), np.int32), np.zeros(n, np.bool_)
+    for r in range(n):
+        e = rows[r]
+        fresh[e] = True
+        one, two = sides[e, 0] // 4, sides[e, 1] // 4
+        for k in range(4):
+            old[r, k] = corners[e, k]
+        for k in range(2):
+            corners[e, k] = _become(ids, key, became, old[r, k], one)
+            gone[r] |= corners[e, k] != _become(ids, key, became, old[r, k], two)
+        corners[e, 2] = _become(ids, key, became, old[r, 2], one)
+        corners[e, 3] = _become(ids, key, became, old[r, 3], two)
+        if gone[r]:
+            corners[e, 1:] = corners[e, 0]
+    return rows[:n].copy(), old, gone
 
 
 @njit("int32[:, ::1](int32[:, ::1], int32[::1], int32[::1], int32[:, ::1])", cache=True)
@@ -81,32 +162,39 @@ def apart_from_faces(pairs, rows, old, now, first, member, slave, meets):  # typ
     return n
 
 
-@njit("int64[:, ::1](int64[::1], int32[:, ::1], int32[:, ::1], boolean[::1])", cache=True)
-def apart_from_edges(order, old, now, own):  # type: ignore[no-untyped-def]
-    """(p, 2) pairs of edges that had an end in common before the split and have none now, where the one of smaller
-    faces, the first, is this rank's own.
+@njit(_I2(_N2, _N2, _N1, _B1), cache=True)
+def apart_from_edges(old, now, first, own):  # type: ignore[no-untyped-def]
+    """(p, 2) pairs of edges, by ascending faces, that had an end in common before the split and have none now, where
+    the one of smaller faces, the first, is this rank's own.
 
-    ``old`` and ``now`` (e, 2 and 4): their nodes; ``order``: of the ends, flat, by node.
+    ``old`` and ``now`` (e, 4): their nodes; ``first``: see Family.
     """
-    ends, many = old.reshape(-1), 0
+    ends, m = np.empty(2 * len(old), np.int32), 0
+    at = np.empty(2 * len(old), np.int64)
+    for e in range(len(old)):
+        for k in range(2):
+            if first[old[e, k]] >= 0:
+                ends[m], at[m] = old[e, k], e
+                m += 1
+    order, many = np.argsort(ends[:m], kind="mergesort"), 0
     for write in range(2):
         if write:
             pairs = np.empty((many, 2), np.int64)
         many, i = 0, 0
-        while i < len(order):
-            j = i
-            while j < len(order) and ends[order[j]] == ends[order[i]]:
+        while i < m:
+            j, node = i, ends[order[i]]
+            while j < m and ends[order[j]] == node:
                 j += 1
             for a in range(i, j):
-                for b in range(i, j):
-                    one, two = order[a] // 2, order[b] // 2
-                    if one >= two or not own[one]:
+                for b in range(a + 1, j):
+                    one, two = at[order[a]], at[order[b]]
+                    if not own[one]:
                         continue
                     common = False
                     for k in range(2):
                         common |= now[one, k] == now[two, 0] or now[one, k] == now[two, 1]
                     both = old[one, 0] == old[two, 0] and old[one, 1] == old[two, 1]
-                    if common or (both and ends[order[i]] != old[one, 0]):
+                    if common or (both and node != old[one, 0]):
                         continue
                     if write:
                         pairs[many, 0], pairs[many, 1] = one, two

@@ -25,9 +25,6 @@ def build(sides: Sides, rules: Rules, horizon: float, drift: Floats, nodes: Node
     slot[order] = np.arange(crowd.n)
     corners, ends = slot[seen.face_places], slot[seen.edge_places]
     crowd.local = nodes.places(crowd.id)
-    held = np.flatnonzero(crowd.local >= 0).astype(np.int32)
-    place = np.full(nodes.n, -1, np.int32)
-    place[crowd.local[held]] = held
     slave, pushes = np.zeros(crowd.n, bool), np.zeros(crowd.n, bool)
     slave[slot[seen.crowd.places(sides.slaves)]] = True
     pushes[corners[:, :3]] = pushes[ends[:, :2]] = True
@@ -36,7 +33,7 @@ def build(sides: Sides, rules: Rules, horizon: float, drift: Floats, nodes: Node
         rank[np.lexsort((edges.sides[:, 1], edges.sides[:, 0]))] = np.arange(edges.n)
     own = np.arange(edges.n) < sides.edges.n
     return Scene(
-        crowd=crowd, own=OwnSlots(held, crowd.local[held], place), slots=SceneSlots.at_rest(slave, pushes | slave),
+        crowd=crowd, own=OwnSlots.of(crowd, nodes.n), slots=SceneSlots.at_rest(slave, pushes | slave),
         faces=SceneFaces.at_rest(corners, faces.id, faces.size, faces.exposed.copy()),
         edges=SceneEdges.at_rest(
             ends, edges.sides, places(faces.id, edges.sides), edges.size, edges.exposed.copy(), edges.sharp.copy(),

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..jit import njit
 from ..parallel.comm import Comm
-from ..state import Ints
+from ..state import Indices, Ints
 from ..topology import Split
 from . import ghosts
 from .records import Crowd
@@ -20,10 +21,8 @@ class News:
     """(r,) ids of a node and of a tet as one number, ascending."""
     became: Ints
     """(r,) id of the copy that the node of that tet has become."""
-    parent: Ints
-    """(c,) ids of the parents of all copies, ascending."""
-    copy: Ints
-    """(c,) ids of the copies."""
+    family: Ints
+    """(c, 2) ids of the parents of all copies, ascending, and of the copies."""
     rows: Crowd
     """Parents and copies."""
 
@@ -36,23 +35,10 @@ def news(split: Split, scene: Scene, here: Crowd, comm: Comm) -> News | None:
         return None
     parents, copies = split.copies.parents, split.first + np.arange(split.copies.n)
     table = np.column_stack([split.key, here.id[split.node]])
-    family = np.column_stack([here.id[parents], here.id[copies]])
-    rows = here.take(np.unique(np.concatenate([parents, copies])))
+    local = np.column_stack([parents, copies]).astype(np.int32)
+    family, rows = here.id[local], here.take(np.unique(local))
     if split.copies.n:
-        told, flags = {}, np.zeros(here.n, bool)
-        for other in scene.messages.copies.sends:
-            flags[other.nodes] = True
-            for_it = flags[parents]
-            flags[other.nodes] = False
-            if for_it.any():
-                some = np.unique(np.concatenate([parents[for_it], copies[for_it]]))
-                round_it = table[for_it[split.node - split.first]]
-                packed = ghosts.pack_crowd(here.take(some))
-                lengths = np.array([len(round_it), int(for_it.sum())])
-                told[other.rank] = np.concatenate([
-                    lengths, round_it.reshape(-1), family[for_it].reshape(-1), packed.reshape(-1)
-                ])  # fmt: skip
-        heard = comm.swap(told)
+        heard = comm.swap(_told(split, scene, here, table, local))
     if heard:
         for words in heard.values():
             ends = 2 + 2 * np.cumsum(words[:2])
@@ -60,4 +46,38 @@ def news(split: Split, scene: Scene, here: Crowd, comm: Comm) -> News | None:
             family = np.concatenate([family, words[ends[0] : ends[1]].reshape(-1, 2)])
             rows = Crowd.joined([rows, ghosts.unpack_crowd(words[ends[1] :])])
         table, family = table[np.argsort(table[:, 0])], family[np.lexsort((family[:, 1], family[:, 0]))]
-    return News(table[:, 0].copy(), table[:, 1].copy(), family[:, 0].copy(), family[:, 1].copy(), rows)
+    return News(table[:, 0].copy(), table[:, 1].copy(), family, rows)
+
+
+def _told(split: Split, scene: Scene, here: Crowd, table: Ints, local: Indices) -> dict[int, Ints]:
+    """What other ranks must hear: rows of ``table`` (News.key and became) and families, and their nodes; ``local``
+    (c, 2): the families of this rank.
+    """
+    told, flags = {}, np.zeros(here.n, bool)
+    for other in scene.messages.copies.sends:
+        some = meets(flags, other.nodes, local)
+        if len(some):
+            flags[some] = True
+            round_it = table[flags[split.node - split.first]]
+            flags[some] = False
+            packed = ghosts.pack_crowd(here.take(np.unique(local[some])))
+            lengths = np.array([len(round_it), len(some)])
+            told[other.rank] = np.concatenate([
+                lengths, round_it.reshape(-1), here.id[local[some]].reshape(-1), packed.reshape(-1)
+            ])  # fmt: skip
+    return told
+
+
+@njit("int64[::1](boolean[::1], int32[::1], int32[:, ::1])", cache=True)
+def meets(flags, nodes, family):  # type: ignore[no-untyped-def]
+    """Rows of a ``family`` (c, 2) whose parents are among the ``nodes``; ``flags``: room, all false."""
+    rows, n = np.empty(len(family), np.int64), 0
+    for a in nodes:
+        flags[a] = True
+    for c in range(len(family)):
+        if family[c, 0] >= 0 and flags[family[c, 0]]:
+            rows[n] = c
+            n += 1
+    for a in nodes:
+        flags[a] = False
+    return rows[:n].copy()

@@ -18,10 +18,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..growing import Rooms
 from ..jit import njit
-from ..state import Flags, Floats, Indices, extended
+from ..state import Flags, Floats, Indices
 from .narrow_phase import Pairs
 from .node_face import chain
+
+_FRESH = {"until": -np.inf, "speed": np.nan, "turned": False, "kept": 0.0, "next": -1}
+"""What a pair begins with: it is tested in the next step."""
 
 
 @dataclass
@@ -37,6 +41,7 @@ class PairTable:
     next: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
     tested: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
     """Pairs that the narrow phase of the last step has tested."""
+    _rooms: Rooms = field(default_factory=lambda: Rooms("rows", *_FRESH), init=False, repr=False)
 
     def __len__(self) -> int:
         """Number of pairs."""
@@ -44,13 +49,8 @@ class PairTable:
 
     def add(self, rows: Indices) -> None:
         """Takes up more pairs, to be tested in the next step."""
-        n = len(rows)
-        self.rows = extended(self.rows, rows)
-        self.until = extended(self.until, np.full(n, -np.inf))
-        self.speed = extended(self.speed, np.full(n, np.nan))
-        self.turned = extended(self.turned, np.zeros(n, bool))
-        self.kept = extended(self.kept, np.zeros((n, 4)))
-        self.next = extended(self.next, np.full(n, -1, np.int32))
+        if len(rows):
+            self._rooms.append(self, len(rows), rows=rows, **_FRESH)
 
     def hang(self, first: Indices, begin: int) -> None:
         """Hangs the pairs from row ``begin`` on into the chains of their nodes, ``first`` (slots,)."""

@@ -6,10 +6,12 @@ two nodes and, of each of the two faces that meet there, the third one. Rows tra
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Self
 
 import numpy as np
 
+from ..growing import Rooms
 from ..ids import located
 from ..state import Flags, Floats, Indices, Ints
 
@@ -23,9 +25,20 @@ class Rows:
         """Number of rows."""
         return len(next(iter(vars(self).values())))
 
+    @cached_property
+    def _rooms(self) -> Rooms:
+        """Of a table that grows."""
+        return Rooms(*vars(self))
+
     def columns(self) -> list["np.ndarray"]:
         """The columns, in the order of their names here."""
-        return list(vars(self).values())
+        return [column for name, column in vars(self).items() if name != "_rooms"]
+
+    def append(self, rows: Self) -> None:
+        """Takes up more rows, behind these."""
+        columns = dict(vars(rows))
+        columns.pop("_rooms", None)
+        self._rooms.append(self, rows.n, **columns)
 
     def take(self, chosen: "np.ndarray") -> Self:
         """Some of the rows."""

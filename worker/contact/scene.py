@@ -1,6 +1,5 @@
 """A scene: the surface near this rank, the candidate pairs on it, and the room to work in."""
 
-import itertools
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -76,13 +75,13 @@ class Scene:
         """
         self.messages = Messages(Company(company, comm), ghosts.copies(self.crowd, nodes, comm, Tag.GHOST))
 
-    def extend(self, company: list[Neighbour], sends: list[Neighbour], receives: list[Neighbour], comm: Comm) -> None:
+    def extend(self, company: list[Neighbour], sends: list[Neighbour], receives: list[Neighbour]) -> None:
         """The messages with more nodes, of which this rank knows as the others do; what has not grown stays."""
-        had = self.messages.company.neighbours, self.messages.copies.sends, self.messages.copies.receives
-        if same([*itertools.chain(*had)], [*company, *sends, *receives]):
-            return
-        self.free()
-        self.messages = Messages(Company(company, comm), Copies(sends, receives, comm, Tag.GHOST))
+        messages = self.messages
+        if not same(messages.company.neighbours, company):
+            messages.company.take(company)
+        if not same([*messages.copies.sends, *messages.copies.receives], [*sends, *receives]):
+            messages.copies.take(sends, receives)
 
     def look(self, nodes: Nodes) -> None:
         """Takes v(n-1/2), before the kick."""

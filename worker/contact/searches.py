@@ -168,7 +168,7 @@ class Searches:
         follower = Follower(self.scene, here, nodes)
         follower.follow(heard, self._exterior.cracks, self._neighbours)
         if self._comm.size > 1:
-            follower.share(heard, self._neighbours, self._comm)
+            follower.share(heard, self._neighbours)
 
     def free(self) -> None:
         """Gives the messages back to MPI."""

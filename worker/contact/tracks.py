@@ -10,8 +10,9 @@ mean velocities of these steps they are much closer to the slots, and nobody has
 
 import numpy as np
 
+from ..growing import Rooms
 from ..jit import njit
-from ..state import Flags, Floats, Indices, extended
+from ..state import Flags, Floats, Indices
 
 _V1, _V2, _N2 = "float64[::1]", "float64[:, ::1]", "int32[:, ::1]"
 
@@ -26,12 +27,11 @@ class Lines:
         """(slots,) when each line began, s."""
         self.left = np.zeros(len(x))
         """(slots,) how far each slot leaves its line in the step ahead, the larger of beginning and end, m."""
+        self._rooms = Rooms("x", "course", "since", "left")
 
     def add(self, x: Floats, course: Floats, t: float) -> None:
         """Takes up more slots, as they are at time ``t``, (n, 3) each."""
-        n = len(x)
-        self.x, self.course = extended(self.x, x - t * course), extended(self.course, course)
-        self.since, self.left = extended(self.since, np.full(n, t)), extended(self.left, np.zeros(n))
+        self._rooms.append(self, len(x), x=x - t * course, course=course, since=t, left=0.0)
 
     def inherit(self, heirs: Indices, parents: Indices) -> None:
         """The copies of slots are on the lines of their parents."""
