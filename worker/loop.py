@@ -1,5 +1,6 @@
 """The run: steps, and whoever is due to look at them. Signals, wall time and the ledger end it in good order."""
 
+import gc
 import logging
 import math
 import time
@@ -110,6 +111,8 @@ class Loop:
 
     def run(self) -> None:
         """Steps until the end time, or until a reason to stop. Raises PhysicsError."""
+        gc.collect()
+        gc.freeze()  # else Python looks through all that numba keeps, 0.1 s, in a step of each rank while others wait
         self.sim.timers.begin()
         self.sim.comm.sent.since_last()
         if not self._start.resumed:
