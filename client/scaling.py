@@ -60,7 +60,7 @@ def _succeeded(folder: Path) -> bool:
 
 def _run(case: Path, overrides: Sequence[str], ranks: int, folder: Path) -> None:
     (folder / layout.LOGS).mkdir(parents=True)
-    command = [*_mpiexec(), "-n", str(ranks), sys.executable, "-m", "mpi4py", "-m", "conoid.worker", str(case)]
+    command = [*mpiexec(), "-n", str(ranks), sys.executable, "-m", "mpi4py", "-m", "conoid.worker", str(case)]
     changes = [word for override in overrides for word in ("--set", override)]
     crowded = {"MPIR_CVAR_ENABLE_HEAVY_YIELD": "1"} if ranks > CORES else {}
     with (folder / layout.LOGS / layout.LAUNCHER_LOG).open("wb") as log:
@@ -71,7 +71,7 @@ def _run(case: Path, overrides: Sequence[str], ranks: int, folder: Path) -> None
     _succeeded(folder)
 
 
-def _mpiexec() -> list[str]:
+def mpiexec() -> list[str]:
     """The site's own when it names one, else the one beside this Python or in PATH. Raises ClientError."""
     beside = Path(sys.executable).with_name("mpiexec")
     chosen = shlex.split(os.environ.get("CONOID_MPIEXEC", ""))

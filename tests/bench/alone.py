@@ -1,0 +1,65 @@
+"""Ranks one by one: what a run on many ranks would take on as many cores, each rank measured with a core to itself.
+
+``python -m tests.bench.alone CASE RANKS [KEY=VALUE ...]`` runs the case once on all ranks, however few cores there are,
+with what they tell each other on tapes, then each rank alone from its tape (tape.py), and puts together when each would
+have waited for which (timeline.py). Unlike ``conoid bench scale`` it has no caches that others have emptied, and no
+windows in which ranks make up for each other. The tapes take up to 4 MB a step on 16 ranks of the glass bar.
+"""
+
+import pickle
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from conoid.cases.outcome import from_json
+from conoid.client.projection import Network
+from conoid.client.scaling import CORES, mpiexec
+from conoid.client.study import table
+
+from .tape import calls
+from .timeline import Timeline
+
+NETWORK = Network(latency=2e-6, bandwidth=5e9)
+
+
+def recorded(case: str, ranks: int, changes: list[str], folder: Path) -> str:
+    """Makes the tapes of a run; its digest. Raises CalledProcessError."""
+    arguments = [case, "--out", str(folder / "run"), *(word for change in changes for word in ("--set", change))]
+    run = [sys.executable, "-m", "mpi4py", "-m", "tests.bench.tape", "record", str(folder), *arguments]
+    crowded = ["-genv", "MPIR_CVAR_ENABLE_HEAVY_YIELD", "1"] if ranks > CORES else []
+    subprocess.run([*mpiexec(), "-n", str(ranks), *crowded, *run], check=True)
+    for rank in range(ranks):
+        alone = folder / f"alone-{rank}"
+        (alone / "log").mkdir(parents=True)
+        arguments[2] = str(alone)
+        subprocess.run(
+            [sys.executable, "-m", "tests.bench.tape", "replay", str(folder), str(rank), *arguments], check=True
+        )
+    return from_json((folder / "run" / "outcome.json").read_bytes()).digest
+
+
+def measured(ranks: int, folder: Path) -> Timeline:
+    """What the ranks have done alone, put together."""
+    timeline = Timeline([pickle.loads(calls(folder, rank).read_bytes()) for rank in range(ranks)], NETWORK)
+    timeline.run()
+    return timeline
+
+
+def main(case: str, number: str, *changes: str) -> None:
+    """Prints the table."""
+    ranks = int(number)
+    with tempfile.TemporaryDirectory() as passing:
+        digest = recorded(case, ranks, list(changes), Path(passing))
+        timeline = measured(ranks, Path(passing))
+    work = [sum(call.work for call in each) for each in timeline.calls]
+    row = [
+        str(ranks), f"{max(timeline.now):.2f}", f"{sum(work) / ranks:.2f}", f"{max(work):.2f}",
+        f"{sum(timeline.waited) / ranks:.2f}", f"{sum(map(len, timeline.calls)) / ranks:,.0f}", digest[:16],
+    ]  # fmt: skip
+    head = ("ranks", "s", "work of a rank s", "of the busiest s", "waits of a rank s", "calls of a rank", "digest")
+    print(table(head, [row]))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,221 @@
+"""A rank by itself: what the others have told it in a run is written to a tape, from which it can run again alone.
+
+``mpiexec -n P python -m mpi4py -m tests.bench.tape record FOLDER <arguments of the worker>`` makes the tapes,
+``python -m tests.bench.tape replay FOLDER RANK <arguments of the worker>`` runs a rank from its tape and leaves its
+calls (timeline.Call) in FOLDER. Alone, a rank finds the caches as it has left them, as it does on a core of its own,
+and nobody's turn comes between. It does what it did in the run: all that depends on others, and on the clock, is told.
+"""
+
+import pickle
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from conoid.worker import main as worker
+from conoid.worker.parallel.comm import Comm, Exchange, Pending, Sent
+from conoid.worker.parallel.mpi import connect, leave
+from conoid.worker.parallel.tags import Tag
+from conoid.worker.state import Ints
+
+from .timeline import Call
+
+_TWICE = ("join", "share", "gather", "scatter", "broadcast")
+"""Calls that are two collectives: a length goes ahead."""
+
+
+def tape(folder: Path, rank: int) -> Path:
+    """What the others have told a rank."""
+    return folder / f"tape-{rank}"
+
+
+def calls(folder: Path, rank: int) -> Path:
+    """What a rank has done alone."""
+    return folder / f"calls-{rank}"
+
+
+class Recorder:
+    """A communicator that writes down all that it is told."""
+
+    def __init__(self, comm: Comm, folder: Path) -> None:
+        self._comm, self.rank, self.size, self.sent = comm, comm.rank, comm.size, comm.sent
+        self._file = tape(folder, comm.rank).open("wb")
+
+    @property
+    def waited(self) -> float:
+        """See Comm."""
+        return self._comm.waited
+
+    def note(self, told: Any) -> Any:
+        """Writes down what has been told."""
+        pickle.dump(told, self._file)
+        return told
+
+    def begin_maximum(self, words: Ints, result: Ints) -> Pending:
+        """See Comm."""
+        return _Noted(self, self._comm.begin_maximum(words, result), [result])
+
+    def exchange(self, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: Tag) -> Exchange:
+        """See Comm."""
+        return _Noted(self, self._comm.exchange(sends, receives, tag), [words for _, words in receives])
+
+    def __getattr__(self, name: str) -> Any:
+        """Every other verb: what it returns is noted."""
+        verb = getattr(self._comm, name)
+        return lambda *items: self.note(verb(*items))
+
+
+class _Noted:
+    """An exchange, or a collective under way, whose results are noted."""
+
+    def __init__(self, comm: Recorder, inner: Any, results: list[Ints]) -> None:
+        self._comm, self._inner, self._results = comm, inner, results
+
+    def begin(self) -> None:
+        """See Exchange."""
+        self._inner.begin()
+
+    def free(self) -> None:
+        """See Exchange."""
+        self._inner.free()
+
+    def finish(self) -> None:
+        """See Comm."""
+        self._inner.finish()
+        self._comm.note([words.copy() for words in self._results])
+
+
+class Player:
+    """A communicator that tells what is on a tape, and notes what a rank does in between."""
+
+    waited = 0.0
+
+    def __init__(self, folder: Path, rank: int, size: int) -> None:
+        self.rank, self.size = rank, size
+        self.sent = _Sent(self)
+        self.calls: list[Call] = []
+        self._file = tape(folder, rank).open("rb")
+        self._clock: Callable[[], float] | None = None
+        self._last = 0.0
+
+    def begin(self) -> None:
+        """The first step begins: calls count from here on."""
+        from conoid.worker.jit import cpu_time  # numba, which must not be there before the worker has named its cache
+
+        self._clock, self._last = cpu_time, cpu_time()
+
+    def note(self, **parts: Any) -> None:
+        """A call begins."""
+        if self._clock is not None:
+            self.calls.append(Call(self._clock() - self._last, **parts))
+
+    def told(self) -> Any:
+        """What comes next on the tape; with it the call ends."""
+        item = pickle.load(self._file)
+        if self._clock is not None:
+            self._last = self._clock()
+        return item
+
+    def posted(self) -> None:
+        """A call ends that waits for nothing."""
+        if self._clock is not None:
+            self._last = self._clock()
+
+    def begin_maximum(self, words: Ints, result: Ints) -> Pending:
+        """See Comm."""
+        self.note(enters=True)
+        self.posted()
+        return _Played(self, {"leaves": 1, "size": words.nbytes * self.size}, [], [result])
+
+    def exchange(self, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: Tag) -> Exchange:
+        """See Comm."""
+        out = [(rank, int(tag), words.nbytes) for rank, words in sends]
+        awaited = {"receives": [(rank, int(tag)) for rank, _ in receives]}
+        return _Played(self, awaited, out, [words for _, words in receives])
+
+    def swap(self, sends: dict[int, Ints]) -> dict[int, Ints]:
+        """See Comm."""
+        began = len(self.calls)
+        self.note(enters=True, leaves=1, size=8 * self.size)
+        told: dict[int, Ints] = self.told()
+        for call in self.calls[began:]:
+            call.sends = [(rank, int(Tag.SWAP), words.nbytes) for rank, words in sends.items() if words.size]
+            call.receives = [(rank, int(Tag.SWAP)) for rank in told]
+        return told
+
+    def trade(self, sends: dict[int, Ints]) -> dict[int, Ints]:
+        """See Comm."""
+        out = [(rank, int(Tag.TRADE), words.nbytes) for rank, words in sends.items()]
+        self.note(sends=out, receives=[(rank, int(Tag.TRADE)) for rank in sends])
+        told: dict[int, Ints] = self.told()
+        return told
+
+    def __getattr__(self, name: str) -> Any:
+        """Every other verb is a collective, or two."""
+        return lambda *_: self._collective(2 if name in _TWICE else 1)
+
+    def _collective(self, many: int) -> Any:
+        began = len(self.calls)
+        self.note(enters=True, leaves=many)
+        told = self.told()
+        for call in self.calls[began:]:
+            call.size = told.nbytes if isinstance(told, np.ndarray) else 0
+        return told
+
+
+class _Played:
+    """An exchange, or a collective under way, that is finished from the tape."""
+
+    def __init__(
+        self, comm: Player, awaited: dict[str, Any], sends: list[tuple[int, int, int]], results: list[Ints]
+    ) -> None:
+        self._comm, self._awaited, self._sends, self._results = comm, awaited, sends, results
+
+    def begin(self) -> None:
+        """See Exchange."""
+        self._comm.note(sends=self._sends)
+        self._comm.posted()
+
+    def finish(self) -> None:
+        """See Exchange."""
+        self._comm.note(**self._awaited)
+        for words, told in zip(self._results, self._comm.told(), strict=True):
+            words[...] = told
+        self._comm.posted()
+
+    def free(self) -> None:
+        """See Exchange."""
+
+
+class _Sent(Sent):
+    """Is asked for the first time as the first step begins (Loop.run)."""
+
+    def __init__(self, comm: Player) -> None:
+        super().__init__()
+        self._comm: Player | None = comm
+
+    def since_last(self) -> dict[str, int]:
+        """See Sent."""
+        if self._comm is not None:
+            self._comm.begin()
+            self._comm = None
+        return {"messages": 0, "bytes": 0, "collectives": 0, "collective_bytes": 0}
+
+
+def main(mode: str, folder: Path, *words: str) -> int:
+    """Runs the worker on all ranks, or one rank of it alone; its exit code."""
+    if mode == "record":
+        vars(worker)["connect"] = lambda: Recorder(connect(), folder)
+        return worker.main(list(words))
+    rank, ranks = int(words[0]), len(list(folder.glob(tape(folder, 0).name[:-1] + "*")))
+    player = Player(folder, rank, ranks)
+    vars(worker)["connect"] = lambda: player
+    code = worker.main(list(words[1:]))
+    calls(folder, rank).write_bytes(pickle.dumps(player.calls))
+    return code
+
+
+if __name__ == "__main__":
+    leave(main(sys.argv[1], Path(sys.argv[2]), *sys.argv[3:]))

@@ -1,0 +1,114 @@
+"""When ranks with a core each would be done: what every rank works between two calls of its communicator, in order, and
+whom it waits for.
+
+A message arrives a latency and its bytes over the bandwidth after it was sent; a collective ends for all when the last
+rank has come, after two passes through a binary tree. Each call, and each message at either end, keeps the rank busy
+for a while. Nothing is averaged over steps: a rank that is late in one step makes the others wait in that step.
+"""
+
+from collections import defaultdict, deque
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+from conoid.client.projection import Network
+
+CALL = 3e-6
+"""s: of a call of the communicator, from Python to MPI and back. Measured with messages of a rank to itself."""
+MESSAGE = 0.5e-6
+"""s: of a message, at each of its ends. Chosen: what MPI takes to post one in shared memory."""
+
+
+@dataclass
+class Call:
+    """A call of the communicator, in the order in which its parts happen."""
+
+    work: float
+    """CPU time of the rank since the call before, s."""
+    enters: bool = False
+    """Whether it comes to a collective."""
+    leaves: int = 0
+    """So many collectives in one it waits for, and takes home ``size`` bytes."""
+    size: int = 0
+    sends: list[tuple[int, int, int]] = field(default_factory=list)
+    """Messages: to whom, tag, bytes."""
+    receives: list[tuple[int, int]] = field(default_factory=list)
+    """Messages that it waits for: from whom, tag."""
+
+
+class DeadlockError(Exception):
+    """Ranks wait for each other: the calls do not belong to one run."""
+
+
+@dataclass
+class Timeline:
+    """All ranks, as far as they have come."""
+
+    calls: Sequence[Sequence[Call]]
+    """Of each rank."""
+    network: Network
+    now: list[float] = field(init=False)
+    """Of each rank, s."""
+    waited: list[float] = field(init=False)
+    """s."""
+
+    def __post_init__(self) -> None:
+        ranks = len(self.calls)
+        self.now, self.waited = [0.0] * ranks, [0.0] * ranks
+        self._mail: dict[tuple[int, int, int], deque[float]] = defaultdict(deque)
+        self._come: list[dict[int, float]] = []
+        self._entered, self._left = [0] * ranks, [0] * ranks
+        self._levels = (ranks - 1).bit_length()
+
+    def run(self) -> float:
+        """Time of the last rank, s. Raises DeadlockError."""
+        under_way = {rank: self._steps(rank) for rank in range(len(self.calls))}
+        while under_way:
+            before = len(under_way), self._progress()
+            for rank, steps in list(under_way.items()):
+                if next(steps, None) is None:
+                    del under_way[rank]
+            if before == (len(under_way), self._progress()):
+                raise DeadlockError(f"ranks {sorted(under_way)} wait for what nobody sends")
+        return max(self.now)
+
+    def _progress(self) -> tuple[float, int]:
+        return sum(self.now), sum(map(len, self._mail.values())) + sum(map(len, self._come))
+
+    def _steps(self, rank: int) -> Iterator[int]:
+        """Goes through the calls of a rank, and stops wherever it has to wait."""
+        for call in self.calls[rank]:
+            self.now[rank] += call.work + CALL
+            if call.enters:
+                self._enter(rank)
+            if call.leaves:
+                while not self._all_there(rank):
+                    yield rank
+                self._leave(rank, call)
+            for target, tag, size in call.sends:
+                self.now[rank] += MESSAGE
+                arrives = self.now[rank] + self.network.latency + size / self.network.bandwidth
+                self._mail[rank, target, tag].append(arrives)
+            for source, tag in call.receives:
+                while not self._mail[source, rank, tag]:
+                    yield rank
+                self._wait(rank, self._mail[source, rank, tag].popleft())
+                self.now[rank] += MESSAGE
+
+    def _enter(self, rank: int) -> None:
+        if self._entered[rank] == len(self._come):
+            self._come.append({})
+        self._come[self._entered[rank]][rank] = self.now[rank]
+        self._entered[rank] += 1
+
+    def _all_there(self, rank: int) -> bool:
+        return len(self._come[self._left[rank]]) == len(self.calls)
+
+    def _leave(self, rank: int, call: Call) -> None:
+        last = max(self._come[self._left[rank]].values())
+        self._left[rank] += 1
+        passes = 2 * self._levels * call.leaves * self.network.latency
+        self._wait(rank, last + passes + call.size / self.network.bandwidth)
+
+    def _wait(self, rank: int, until: float) -> None:
+        self.waited[rank] += max(0.0, until - self.now[rank])
+        self.now[rank] = max(self.now[rank], until)
