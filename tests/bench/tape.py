@@ -118,6 +118,10 @@ class Player:
             self._last = self._clock()
         return item
 
+    def close(self) -> None:
+        """The run has ended."""
+        self._file.close()
+
     def posted(self) -> None:
         """A call ends that waits for nothing."""
         if self._clock is not None:
@@ -213,6 +217,7 @@ def main(mode: str, folder: Path, *words: str) -> int:
     player = Player(folder, rank, ranks)
     vars(worker)["connect"] = lambda: player
     code = worker.main(list(words[1:]))
+    player.close()
     calls(folder, rank).write_bytes(pickle.dumps(player.calls))
     return code
 

@@ -48,6 +48,7 @@ def test_a_rank_alone_is_told_what_it_was_told_and_counts_from_the_first_step_on
     player.sent.since_last()
     assert player.swap({}) == told[1]
     assert player.share(None) == told[2]
+    player.close()
     assert [(call.enters, call.leaves, call.receives) for call in player.calls] == [
         (True, 1, [(1, Tag.SWAP), (3, Tag.SWAP)]), (True, 2, []),
     ]  # fmt: skip
