@@ -1,5 +1,6 @@
 """Boundaries that do work from outside: gravity, tractions, prescribed motion."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -8,6 +9,7 @@ from .boundaries import FREE, KEPT, PRESCRIBED, Boundary, book_half, free
 from .migration.parcel import Parcel
 from .state import Bits, Floats, Indices, Ints, Load, Nodes, extended
 from .topology import Split
+from .turning import sine_and_cosine
 
 
 class Driver(Boundary):
@@ -153,10 +155,10 @@ class PrescribedRotation(PrescribedVelocity):
 
     def _target(self, state: Nodes, dt: float, t: float) -> Floats:
         r = state.x[self.nodes] - self._centre
-        speed = float(np.linalg.norm(self._rate))
+        speed = math.sqrt(sum(float(component) ** 2 for component in self._rate))
         if dt == 0.0 or speed == 0.0:
             return np.cross(self._rate, r)
-        axis, angle = self._rate / speed, speed * dt
+        axis, (sine, cosine) = self._rate / speed, sine_and_cosine(speed * dt)
         across = np.cross(axis, r)
-        chord: Floats = (np.sin(angle) * across + (1.0 - np.cos(angle)) * np.cross(axis, across)) / dt
+        chord: Floats = (sine * across + (1.0 - cosine) * np.cross(axis, across)) / dt
         return chord
