@@ -10,7 +10,7 @@ from ..ids import among
 from ..jit import njit
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
-from ..state import Flags, Indices, Ints, Nodes, extended
+from ..state import Block, Flags, Indices, Ints, Nodes, extended
 from ..topology import keys
 from . import ghosts
 from .cracks import Cracks, computed, touching
@@ -44,17 +44,18 @@ class Follower:
         far = far[np.argsort(crowd.id[far])]
         self._far = far, crowd.id[far]
 
-    def follow(self, heard: News, cracks: Cracks, neighbours: list[Neighbour]) -> None:
+    def follow(self, heard: News, cracks: Cracks, blocks: list[Block], neighbours: list[Neighbour]) -> None:
         """Faces, edges and candidates after the split, and the places of the cracks."""
         rows = touching(cracks.nodes, _flagged(self._nodes.places(heard.rows.id), self._nodes.n))
+        near, apart = cracks.beside(rows, blocks)
         rows = computed(rows, cracks.nodes, cracks.sides)
-        self._join(heard, self._lacking(cracks, rows), neighbours)
+        self._join(heard, self._lacking(cracks, rows, near), neighbours)
         n, pairs = self._scene.crowd.n, np.column_stack([self.places(heard.parent), self.places(heard.copy)])
         parents, family = _flagged(pairs[:, 0], n), Family.of(pairs[(pairs >= 0).all(axis=1)], n)
         self._candidates(family)
         self._faces(heard, parents, family)
         self._edges(heard, parents, family)
-        self._across(cracks, rows)
+        self._across(cracks, rows, apart)
 
     def _join(self, heard: News, lacking: Indices, neighbours: list[Neighbour]) -> None:
         """Takes the families of the crowd's nodes and of those that other ranks hold into the crowd, and the nodes of
@@ -68,24 +69,29 @@ class Follower:
         at = self.places(heard.rows.id)
         self._scene.crowd.mobility[at[at >= 0]] = heard.rows.mobility[at >= 0]
 
-    def cracks(self, cracks: Cracks) -> None:
+    def cracks(self, cracks: Cracks, blocks: list[Block]) -> None:
         """The places of all cracks that this rank computes."""
-        rows = computed(np.arange(len(cracks.nodes)), cracks.nodes, cracks.sides)
+        every = np.arange(len(cracks.nodes))
+        rows, (near, apart) = computed(every, cracks.nodes, cracks.sides), cracks.beside(every, blocks)
         cracks.places[:] = -1
-        self._add(self._here.take(self._lacking(cracks, rows)))
-        self._across(cracks, rows)
+        self._add(self._here.take(self._lacking(cracks, rows, near)))
+        self._across(cracks, rows, apart)
         cracks.arrange()
 
-    def _lacking(self, cracks: Cracks, rows: Ints) -> Indices:
-        """Which nodes of some of the cracks, ascending, are not in the crowd yet."""
-        nodes = cracks.nodes[rows]
-        return np.unique(nodes[self._scene.own.place[nodes] < 0])
+    def _lacking(self, cracks: Cracks, rows: Ints, near: Flags) -> Indices:
+        """Which nodes of some of the cracks, and of those ``near`` (nodes,), ascending, are not in the crowd yet."""
+        lacking = near.copy()
+        lacking[cracks.nodes[rows]] = True
+        return np.flatnonzero(lacking & (self._scene.own.place < 0)).astype(np.int32)
 
-    def _across(self, cracks: Cracks, rows: Ints) -> None:
-        """Places some of the cracks, whose nodes that have separated may be pushed."""
+    def _across(self, cracks: Cracks, rows: Ints, apart: Flags) -> None:
+        """Places some of the cracks. Their nodes that have separated, and those that are ``apart`` (nodes,) of the
+        tets, may be pushed.
+        """
         scene, nodes = self._scene, cracks.nodes[rows]
         places = cracks.places[rows] = scene.own.place[nodes]
         scene.slots.pushes[places[nodes != nodes[:, [3, 4, 5, 0, 1, 2]]]] = True
+        scene.slots.pushes[scene.own.place[apart]] = True
         scene.cracks = cracks.places
 
     def settle(self, neighbours: list[Neighbour], comm: Comm) -> None:
