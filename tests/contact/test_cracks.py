@@ -4,16 +4,18 @@ import numpy as np
 import pytest
 
 from conoid.worker.contact.cracks import Cracks, computed
+from conoid.worker.contact.families import Families
 from conoid.worker.contact.kin import Family, families, inherited
 from conoid.worker.contact.node_face import chain
 from conoid.worker.migration.parcel import joined, once
-from conoid.worker.state import Nodes
+from conoid.worker.state import Copies, Nodes
+from conoid.worker.topology import Split
 
 
 def cracks_of(n: int) -> Cracks:
     """``n`` cracks whose columns all tell which one it is; no side is here."""
     number = np.arange(n)
-    found = Cracks.none()
+    found = Cracks.none(np.arange(0))
     tets, nodes = np.column_stack([2 * number, 2 * number + 1]), np.repeat(number[:, None], 3, axis=1)
     found.add(tets, nodes.astype(np.int32), np.full((n, 2, 3), -1, np.int32), [])
     found.places[:] = number[:, None]
@@ -49,13 +51,13 @@ def test_who_gets_both_sides_of_a_crack_has_the_nodes_in_the_order_of_the_first_
     for k, order in enumerate(([0, 1, 2], [1, 2, 0])):
         sides = np.full((1, 2, 3), -1, np.int32)
         sides[0, k] = 0
-        one = Cracks.none()
+        one = Cracks.none(np.arange(0))
         one.add(np.array([[5, 9]]), np.array([order], np.int32), sides, [])
         one.sides, one.faces = sides, np.array([[20, 36]])
         had.append(one.keep(ids))
     for every in (had, had[::-1]):
         table = joined(every)
-        cracks = Cracks.resume(once(table, table["key"]), [], nodes)
+        cracks = Cracks.resume(once(table, table["key"]), ids, [], nodes)
         assert cracks.nodes.tolist() == [[0, 1, 2, 0, 1, 2]]
 
 
@@ -81,3 +83,21 @@ def test_a_family_tells_where_the_copies_of_a_node_begin_and_end() -> None:
     assert family.member.tolist() == [[6, 0], [7, 1], [8, 1]]
     assert family.most == 2
     assert families(np.zeros((0, 2), np.int32), 2)[2] == 0
+
+
+@pytest.mark.parametrize("root", [[], [4], [4, 4], [7, 2, 7, 2, 7, 9]])
+def test_the_nodes_of_a_root_are_one_family(root: list[int]) -> None:
+    every = Families.of(np.array(root, np.int64))
+    for node, one in enumerate(root):
+        found = every.members(np.array([node]))
+        assert found.tolist() == [other == one for other in root]
+
+
+def test_copies_join_the_families_of_their_parents() -> None:
+    none, copies = np.zeros(0, np.int32), np.array([1, 1, 2], np.int64)
+    new = Copies(copies, np.arange(4, 7), np.zeros(3, np.int32), np.ones(3, bool), np.zeros(3))
+    families = Families.of(np.array([10, 11, 12, 11], np.int64))
+    families.grow(Split(new, 4, none.astype(np.int64), none, none, none, none))
+    assert families.root.tolist() == [10, 11, 12, 11, 11, 11, 12]
+    assert np.flatnonzero(families.members(np.array([3]))).tolist() == [1, 3, 4, 5]
+    assert np.flatnonzero(families.members(np.array([0, 6]))).tolist() == [0, 2, 6]

@@ -16,6 +16,7 @@ from ..jit import njit, types
 from ..migration.parcel import Table, once
 from ..state import WIDE, Block, Flags, Indices, Ints, Nodes, extended
 from ..topology import Split
+from .families import Families
 from .geometry import at, cross, dot, half, minus, plus
 from .narrow_phase import CONTACT_ROWS, DEEP_SELF, NEAR, STEP, needed
 
@@ -42,12 +43,15 @@ class Cracks:
     places: Indices
     """(m, 6) of the nodes, in the scene; all -1 for a crack without nodes that have separated, and for one that another
     rank computes, that of the first side."""
+    families: Families
+    """Of all nodes here."""
 
     @classmethod
-    def none(cls) -> "Cracks":
-        """No facet."""
+    def none(cls, ids: Ints) -> "Cracks":
+        """No facet; ``ids``: of the local nodes."""
         faces, sides = np.zeros((0, 2), np.int64), np.zeros((0, 2, 3), np.int32)
-        return cls(faces, np.zeros((0, 6), np.int32), sides, np.zeros(0, bool), np.zeros((0, 6), np.int32))
+        families, none = Families.of(ids), np.zeros((0, 6), np.int32)
+        return cls(faces, none, sides, np.zeros(0, bool), none, families)
 
     def add(self, tets: Ints, nodes: Indices, sides: Indices, blocks: list[Block]) -> None:
         """Takes up facets of ``tets`` (m, 2) with their three ``nodes`` (m, 3)."""
@@ -67,6 +71,7 @@ class Cracks:
         parents[split.copies.parents] = True
         rows = touching(self.nodes, parents)
         self.nodes[rows] = split.followed_sides(self.nodes[rows], ids, self.faces[rows] // 4)
+        self.families.grow(split)
 
     def keep(self, ids: Ints) -> Table:
         """The facets as a table, a row a side; ``ids``: of the local nodes."""
@@ -76,7 +81,7 @@ class Cracks:
                 "with": ids[self.nodes[rows]]}  # fmt: skip
 
     @classmethod
-    def resume(cls, table: Table, blocks: list[Block], nodes: Nodes) -> "Cracks":
+    def resume(cls, table: Table, root: Ints, blocks: list[Block], nodes: Nodes) -> "Cracks":
         """Facets from a table by ascending key. The row of the first side is taken where it is there: a rank that has
         had the second one alone may have begun with another node, and the last bit of a normal depends on that.
         """
@@ -89,7 +94,8 @@ class Cracks:
             rows, k = np.nonzero(block.id[at] == faces // 4)
             sides[rows, k] = np.column_stack([np.full(len(rows), b), at[rows, k], faces[rows, k] % 4])
         nowhere = np.full((len(faces), 6), -1, np.int32)
-        return cls(faces, nodes.places(table["with"]), sides, np.zeros(len(faces), bool), nowhere)
+        families = Families.of(root)
+        return cls(faces, nodes.places(table["with"]), sides, np.zeros(len(faces), bool), nowhere, families)
 
     def foresee(self) -> Indices:
         """(k, 3) block, place and face of all sides here, which a scene takes up."""
@@ -97,10 +103,23 @@ class Cracks:
         sides = self.sides.reshape(-1, 3)
         return sides[sides[:, 1] >= 0]
 
+    def beside(self, rows: Ints, blocks: list[Block]) -> tuple[Flags, Flags]:
+        """(nodes,) which nodes the tets here at some of the cracks and the families at their corners have; and which
+        of these have separated.
+        """
+        families, near = self.families, np.zeros(len(self.families.ring), bool)
+        nodes = self.nodes[rows]
+        torn = nodes != nodes[:, [3, 4, 5, 0, 1, 2]]
+        sides = self.sides[rows[torn.any(axis=1)]].reshape(-1, 3)
+        for b, block in enumerate(blocks):
+            near[block.tets[sides[(sides[:, 0] == b) & (sides[:, 1] >= 0), 1]]] = True
+        near |= families.members(nodes[torn].astype(np.int64))
+        return near, near & (families.ring != np.arange(len(near)))
+
     def arrange(self) -> None:
         """By the places of their first nodes, as the scene has them: what is near in space is near in memory."""
         order = np.argsort(self.places[:, 0], kind="stable")
-        for column in vars(self).values():
+        for column in self._columns().values():
             column[:] = column[order]
 
     def open(self, faces: Ints, blocks: list[Block]) -> None:
@@ -116,9 +135,13 @@ class Cracks:
         stays = np.ones(len(rows), bool)
         stays[rows[rows >= left] - left] = False
         holes, movers = rows[rows < left], left + np.flatnonzero(stays)
-        for name, column in vars(self).items():
+        for name, column in self._columns().items():
             column[holes] = column[movers]
             setattr(self, name, column[:left])
+
+    def _columns(self) -> "dict[str, np.ndarray]":
+        """What has a row for each facet."""
+        return {name: column for name, column in vars(self).items() if name != "families"}
 
 
 @njit("int64[::1](int32[:, ::1], float64[:, ::1], float64)", cache=True)

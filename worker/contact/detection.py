@@ -4,10 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..state import Floats, Ints
+from ..state import Floats, Indices, Ints
 from . import registration
 from .cracks import across
 from .edge_edge import edge_edge
+from .exterior import Exterior
+from .families import pushed_out
 from .haste import approach, spread
 from .narrow_phase import HASTY, Step
 from .node_face import node_face
@@ -62,11 +64,14 @@ class Ahead:
         return self.most if fastest * self.most > HASTY * self.size else 0.0
 
 
-def detect(now: Scene, mu: Floats, give: float, ahead: Ahead, redraw: bool, together: bool) -> Detected:
+def detect(
+    now: Scene, surface: Exterior, mu: Floats, give: float, ahead: Ahead, redraw: bool, together: bool
+) -> Detected:  # fmt: skip
     """The active contacts of the step ahead, of the positions and velocities of the scene's nodes.
 
-    ``mu`` (parts, parts): friction, NaN where two parts do not meet; ``give``: see narrow_phase.PUSH_OUT; ``redraw``:
-    whether short lines are drawn anew (tracks.py); ``together``: whether some rank registers what has strayed.
+    ``surface``: of this rank; ``mu`` (parts, parts): friction, NaN where two parts do not meet; ``give``: see
+    narrow_phase.PUSH_OUT; ``redraw``: whether short lines are drawn anew (tracks.py); ``together``: whether some rank
+    registers what has strayed.
     """
     crowd, tracks = now.crowd, now.tracks
     beyond = ahead.beyond(crowd.v)
@@ -77,10 +82,11 @@ def detect(now: Scene, mu: Floats, give: float, ahead: Ahead, redraw: bool, toge
         now.edge_edge.wake()
     tracks.measure(crowd.x, crowd.v, now.faces.corners, now.edges.corners)
     stray = _renewed(now, together)
-    now.reserve()
     step = Step.of(crowd.x, crowd.v, crowd.part, mu, give, ahead.dt)
+    inside = surface.entering(now, step)
+    now.reserve(sum(len(nodes) for nodes, _ in inside))
     step = step.followed(beyond, HASTY * ahead.size, ahead.rebound, now.face_table())
-    contacts, approach, opening = _test(now, step, ahead.size)
+    contacts, approach, opening = _test(now, step, ahead.size, inside)
     return Detected(contacts, approach, opening, stray)
 
 
@@ -95,8 +101,8 @@ def _renewed(now: Scene, together: bool) -> bool:
     return 2.0 * tracks.strayed - before > most
 
 
-def _test(now: Scene, step: Step, size: float) -> tuple[int, float, Ints]:
-    """The narrow phase: contacts, approach and opening of ``Detected``."""
+def _test(now: Scene, step: Step, size: float, inside: list[tuple[Indices, Floats]]) -> tuple[int, float, Ints]:
+    """The narrow phase: contacts, approach and opening of ``Detected``; ``inside``: see Exterior.entering."""
     tracks, faces, pairs = now.tracks, now.face_table(), now.node_face.arrays()
     n, tested, coming = node_face(now.active.room, 0, pairs, now.slot_table(), faces, step, tracks.end)
     now.node_face.tested = pairs.active[:tested]
@@ -107,4 +113,6 @@ def _test(now: Scene, step: Step, size: float) -> tuple[int, float, Ints]:
     now.faces.fresh[:], now.edges.fresh[:], now.slots.fresh[:] = False, False, False
     opening = np.empty(len(now.cracks), np.int64)
     n, wide = across(now.active.room, n, opening, now.cracks, size, step)
+    for nodes, weights in inside:
+        n = pushed_out(now.active.room, n, nodes, weights, step)
     return int(n), float(limit), opening[:wide]

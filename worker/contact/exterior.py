@@ -11,7 +11,9 @@ from ..state import Flags, Floats, Indices, Ints, Model, Nodes, extended
 from ..topology import Split
 from . import normals, surface
 from .cracks import Cracks
+from .families import entering
 from .flight import Flight, typical
+from .narrow_phase import Step
 from .scene import Scene
 
 _WORDS = 9 + 2 * normals.SHARE
@@ -29,7 +31,7 @@ class Exterior:
         """``edges``: whether sharp edges meet each other; all ranks take part."""
         self._model, self._neighbours, self._comm, self._edges = model, neighbours, comm, edges
         self._planes = symmetry_planes(model.nodes.n, bounds)
-        self.cracks = Cracks.none()
+        self.cracks = Cracks.none(model.nodes.id)
         self.surface = self._build(np.zeros(model.nodes.n, bool), np.zeros(0, np.int64))
         self.size = typical(self.surface.faces.size, comm)
         """Of the faces of all ranks at the start, m."""
@@ -43,6 +45,7 @@ class Exterior:
     def keep(self, parcel: Parcel) -> None:
         """Adds cracks, edges that have become sharp, nodes of the surface and moments of normals."""
         parcel.rows["contact.cracks"] = self.cracks.keep(parcel.nodes["id"])
+        parcel.nodes["family"] = self.cracks.families.root
         parcel.rows["contact.turned"] = {"tet": self.surface.turned >> 34, "name": self.surface.turned}
         parcel.nodes["contact.flags"], parcel.nodes["contact.moments"] = self.surface.flags, self._moments
 
@@ -54,7 +57,8 @@ class Exterior:
         self._moments = np.array(parcel.nodes["contact.moments"])
         nodes = self._model.nodes
         self.flight = Flight(self.surface, nodes, self.flight.mobility, size, self._comm)
-        self.cracks = Cracks.resume(parcel.rows["contact.cracks"], self._model.blocks, nodes)
+        root = np.array(parcel.nodes["family"])
+        self.cracks = Cracks.resume(parcel.rows["contact.cracks"], root, self._model.blocks, nodes)
 
     def require_faces(self, allowed: Flags) -> None:
         """Raises InputError, on every rank alike, when a part that may meet any, ``allowed`` (parts, parts), has no
@@ -159,6 +163,14 @@ class Exterior:
             scene.slots.fresh[self.show(scene, local)] = True
             scene.cracks = self.cracks.places
         return bool((told[:, 0] == 0).any())
+
+    def entering(self, scene: Scene, step: Step) -> list[tuple[Indices, Floats]]:
+        """Of each block, the nodes that would come in through a narrow side; see families.entering."""
+        some, ring, place = self.cracks, self.cracks.families.ring, scene.own.place
+        return [
+            entering(some.nodes, some.sides, b, block.tets, block.across, block.bond, ring, place, step)
+            for b, block in enumerate(self._model.blocks) if len(block.bond) and len(some.faces)
+        ]  # fmt: skip
 
     def separate(self, split: Split) -> None:
         """Follows nodes as they separate on any rank."""

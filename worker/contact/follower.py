@@ -9,7 +9,7 @@ import numpy as np
 from ..jit import njit
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
-from ..state import Flags, Indices, Ints, Nodes, extended
+from ..state import Block, Flags, Indices, Ints, Nodes, extended
 from . import ghosts, kin
 from .cracks import Cracks, computed, touching
 from .kin import Family
@@ -33,18 +33,19 @@ class Follower:
         found = _located(ids.ravel(), self._nodes.id, own.place, own.far_ids, own.far)
         return np.asarray(found.reshape(ids.shape))
 
-    def follow(self, heard: News, cracks: Cracks, neighbours: list[Neighbour]) -> None:
+    def follow(self, heard: News, cracks: Cracks, blocks: list[Block], neighbours: list[Neighbour]) -> None:
         """Faces, edges and candidates after the split, and the places of the cracks."""
         rows = touching(cracks.nodes, _flagged(self._nodes.id, heard.rows.id))
+        near, apart = cracks.beside(rows, blocks)
         rows = computed(rows, cracks.nodes, cracks.sides)
         self._join(heard, neighbours)
-        self._hold(_lacking(rows, cracks.nodes, self._scene.own.place))
+        self._hold(_lacking(near, rows, cracks.nodes, self._scene.own.place))
         family = Family(*kin.families(self.places(heard.family), self._scene.crowd.n))
         became = self.places(heard.became)
         self._candidates(family)
         self._faces(heard, became, family)
         self._edges(heard, became, family)
-        self._across(cracks, rows)
+        self._across(cracks, rows, apart)
 
     def _join(self, heard: News, neighbours: list[Neighbour]) -> None:
         """Takes the families of the crowd's nodes and of those that other ranks hold into the crowd; and the masses of
@@ -58,18 +59,22 @@ class Follower:
         at = self.places(rows.id)
         self._scene.crowd.mobility[at[at >= 0]] = rows.mobility[at >= 0]
 
-    def cracks(self, cracks: Cracks) -> None:
+    def cracks(self, cracks: Cracks, blocks: list[Block]) -> None:
         """The places of all cracks that this rank computes."""
-        rows = computed(np.arange(len(cracks.nodes)), cracks.nodes, cracks.sides)
+        every = np.arange(len(cracks.nodes))
+        rows, (near, apart) = computed(every, cracks.nodes, cracks.sides), cracks.beside(every, blocks)
         cracks.places[:] = -1
-        self._hold(_lacking(rows, cracks.nodes, self._scene.own.place))
-        self._across(cracks, rows)
+        self._hold(_lacking(near, rows, cracks.nodes, self._scene.own.place))
+        self._across(cracks, rows, apart)
         cracks.arrange()
 
-    def _across(self, cracks: Cracks, rows: Ints) -> None:
-        """Places some of the cracks, whose nodes that have separated may be pushed."""
+    def _across(self, cracks: Cracks, rows: Ints, apart: Flags) -> None:
+        """Places some of the cracks. Their nodes that have separated, and those that are ``apart`` (nodes,) of the
+        tets, may be pushed.
+        """
         scene = self._scene
         _place(cracks.places, scene.slots.pushes, rows, cracks.nodes, scene.own.place)
+        scene.slots.pushes[scene.own.place[apart]] = True
         scene.cracks = cracks.places
 
     def settle(self, neighbours: list[Neighbour], comm: Comm) -> None:
@@ -210,16 +215,19 @@ def _joining(ids, places, family, have):  # type: ignore[no-untyped-def]
     return rows[:n].copy()
 
 
-@njit("int32[::1](int64[::1], int32[:, ::1], int32[::1])", cache=True)
-def _lacking(rows, nodes, place):  # type: ignore[no-untyped-def]
-    """Nodes, ascending, of the ``rows`` of cracks that have no place yet."""
-    some, n = np.empty(6 * len(rows), np.int32), 0
+@njit("int32[::1](boolean[::1], int64[::1], int32[:, ::1], int32[::1])", cache=True)
+def _lacking(near, rows, nodes, place):  # type: ignore[no-untyped-def]
+    """Which nodes of the ``rows`` of cracks, and of those ``near`` (nodes,), ascending, have no place yet."""
+    flags, n = near.copy(), 0
     for c in rows:
         for k in range(6):
-            if place[nodes[c, k]] < 0:
-                some[n] = nodes[c, k]
-                n += 1
-    return np.unique(some[:n])
+            flags[nodes[c, k]] = True
+    some = np.empty(len(flags), np.int32)
+    for a in range(len(flags)):
+        if flags[a] and place[a] < 0:
+            some[n] = a
+            n += 1
+    return some[:n].copy()
 
 
 @njit("void(int32[:, ::1], boolean[::1], int64[::1], int32[:, ::1], int32[::1])", cache=True)

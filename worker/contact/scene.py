@@ -88,9 +88,9 @@ class Scene:
         held.gather(self.slots.before, nodes.v, self.own.slots, self.own.local)
         self.messages.copies.note(nodes)
 
-    def reserve(self) -> None:
-        """Room for every contact that may become active; the rows of the last step stay."""
-        self.active.reserve(len(self.node_face) + len(self.edge_edge) + 3 * len(self.cracks))
+    def reserve(self, more: int) -> None:
+        """Room for every contact that may become active, and for ``more``; the rows of the last step stay."""
+        self.active.reserve(len(self.node_face) + len(self.edge_edge) + 3 * len(self.cracks) + more)
 
     @property
     def kept(self) -> tuple[Ints, Floats]:

@@ -140,7 +140,7 @@ class Searches:
         """Takes the cracks up into a new scene, and settles who shares what of it; all ranks take part."""
         follower = Follower(found, self._exterior.flight.here(nodes), nodes)
         if self._case.fractures:
-            follower.cracks(self._exterior.cracks)
+            follower.cracks(self._exterior.cracks, self._model.blocks)
         follower.settle(self._neighbours, self._comm)
 
     def foresee(self, *, anew: bool = False) -> None:
@@ -166,7 +166,7 @@ class Searches:
         if heard is None:
             return
         follower = Follower(self.scene, here, nodes)
-        follower.follow(heard, self._exterior.cracks, self._neighbours)
+        follower.follow(heard, self._exterior.cracks, self._model.blocks, self._neighbours)
         if self._comm.size > 1:
             follower.share(heard, self._neighbours)
 

@@ -219,7 +219,7 @@ class Contact:
         with self._timers.phase("contact"):
             held.take(now.crowd.x, now.crowd.v, now.own.slots, state.x, state.v, now.own.local)
             ahead = Ahead(0.0, self._clock.dt, self.exterior.size, 1.0 + self._restitution)
-            own = detect(now, self.searches.mu, 0.0, ahead, redraw=True, together=False).approach
+            own = detect(now, self.exterior, self.searches.mu, 0.0, ahead, redraw=True, together=False).approach
             self.limit = float(self._comm.maximum(np.array([own]))[0])
         return self.limit > 0.0
 
@@ -267,7 +267,7 @@ class Contact:
         if redraw:
             self.exterior.sharpen(now)
         ahead = Ahead(dt, self._clock.longest, self.exterior.size, 1.0 + self._restitution)
-        self.found = detect(now, self.searches.mu, give, ahead, redraw, self.found.stray)
+        self.found = detect(now, self.exterior, self.searches.mu, give, ahead, redraw, self.found.stray)
         now.active.n = self.found.contacts
         if self._restitution > 0.0:
             rebound(now.active.room, now.active.n, now.crowd.v, now.slots.before, self._restitution)

@@ -26,7 +26,7 @@ from ..errors import InputError
 from ..parallel.comm import Comm
 from .parcel import Parcel, Table, take
 
-FORMAT = 5
+FORMAT = 6
 """Of the files; 5 has the edges that flow has made sharp and the later half of friction. Others are not read."""
 _KEPT = 2
 """Checkpoints that stay; the older ones go."""

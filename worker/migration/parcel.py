@@ -48,7 +48,8 @@ class Parcel:
     sums: dict[str, Ints] = field(default_factory=dict)
     """What adds up over the ranks."""
     nodes: Table = field(default_factory=dict)
-    """A row a node; ``id`` (n,) among the columns, ascending when a parcel is whole."""
+    """A row a node; ``id`` (n,) among the columns, ascending when a parcel is whole. Where there is a column ``family``
+    (n,), the corners of a tet bring along all nodes of their families."""
     tets: dict[int, Table] = field(default_factory=dict)
     """By part, a row a tet: ``id`` (n,), ``corners`` (n, 4) global ids, and the rest."""
     rows: dict[str, Table] = field(default_factory=dict)

@@ -131,6 +131,7 @@ def _share(
     tets = {part: take(table, targets[part] == rank) for part, table in parcel.tets.items()}
     there = np.sort(np.concatenate([np.zeros(0, np.int64), *(table["id"] for table in tets.values())]))
     rows, needed = {}, [np.zeros(0, np.int64), *(table["corners"].reshape(-1) for table in tets.values())]
+    corners = len(needed)
     for name, table in parcel.rows.items():
         if "tet" in table:
             rows[name] = take(table, among(there, table["tet"]))
@@ -138,12 +139,20 @@ def _share(
             rows[name] = take(table, home[place(cuts, table["at"] * scale)] == rank)
         if name in rows and "with" in table:
             needed.append(rows[name]["with"].reshape(-1))
-    wanted = unique(np.concatenate(needed))
+    wanted = unique(np.concatenate([*needed, _relatives(parcel.nodes, unique(np.concatenate(needed[:corners])))]))
     chosen = among(wanted, parcel.nodes["id"])
     for name, table in parcel.rows.items():
         if "of" in table:
             rows[name] = take(table, among(wanted, table["of"]))
     return Parcel(nodes=take(parcel.nodes, chosen), tets=tets, rows=rows)
+
+
+def _relatives(nodes: Table, corners: Ints) -> Ints:
+    """(k,) the nodes that are of the family of one of these ``corners``."""
+    if "family" not in nodes or not len(corners):
+        return corners[:0]
+    families = unique(nodes["family"][among(corners, nodes["id"])])
+    return np.asarray(nodes["id"][among(families, nodes["family"])])
 
 
 def _settle(whole: Parcel, comm: Comm) -> tuple[Directory, list[Neighbour], Indices]:
