@@ -166,9 +166,10 @@ class Exterior:
 
     def entering(self, scene: Scene, step: Step) -> list[tuple[Indices, Floats]]:
         """Of each block, the nodes that would come in through a narrow side; see families.entering."""
-        some, ring, place = self.cracks, self.cracks.families.ring, scene.own.place
+        some, family = self.cracks, self.cracks.families
+        where = family.ring, family.leader, scene.own.place, step
         return [
-            entering(some.nodes, some.sides, b, block.tets, block.across, block.bond, ring, place, step)
+            entering(some.nodes, some.sides, b, block.tets, block.across, block.bond, *where)
             for b, block in enumerate(self._model.blocks) if len(block.bond) and len(some.faces)
         ]  # fmt: skip
 

@@ -35,22 +35,25 @@ class Families:
     """(nodes,) global id of the node that each was part of at the start."""
     ring: Indices
     """(nodes,) the next one of its family here, itself where it is alone."""
+    leader: Indices
+    """(nodes,) the one here that stands for its family."""
 
     @classmethod
     def of(cls, root: Ints) -> "Families":
         """The nodes of each ``root`` (nodes,) as a ring."""
-        ring, order = np.empty(len(root), np.int32), np.argsort(root, kind="stable")
+        (ring, leader), order = np.empty((2, len(root)), np.int32), np.argsort(root, kind="stable")
         first = np.flatnonzero(np.append(True, np.diff(root[order]) != 0)[: len(root)])
-        following = np.roll(order, -1)
-        following[np.append(first, len(root))[1:] - 1] = order[first]
-        ring[order] = following
-        return cls(root, ring)
+        following, ends = np.roll(order, -1), np.append(first, len(root))[1:]
+        following[ends - 1] = order[first]
+        ring[order], leader[order] = following, np.repeat(order[first], ends - first)
+        return cls(root, ring, leader)
 
     def grow(self, split: Split) -> None:
         """Takes up the copies of a split."""
         parents = split.copies.parents
         self.root = extended(self.root, self.root[parents])
         self.ring = extended(self.ring, np.zeros(len(parents), np.int32))
+        self.leader = extended(self.leader, self.leader[parents])
         _insert(self.ring, parents, split.first)
 
     def members(self, nodes: Ints) -> Flags:
@@ -76,7 +79,11 @@ def _members(ring, nodes):  # type: ignore[no-untyped-def]
     return found
 
 
-@njit("UniTuple(int64, 2)(uint32[:, ::1], int32[:, ::1], uint8[:, ::1], int64, int64, int64)", cache=True)
+@njit(
+    "UniTuple(int64, 2)(uint32[:, ::1], int32[:, ::1], uint8[:, ::1], int64, int64, int64)",
+    cache=True,
+    forceinline=True,
+)
 def _corner(tets, across, bond, e, face, node):  # type: ignore[no-untyped-def]
     """The node of tet ``e`` opposite to ``face``; and which of the sides at ``node`` are broken or exposed: 1 that
     opposite to the node that follows, 2 to the next, counter-clockwise seen from outside.
@@ -93,7 +100,7 @@ def _corner(tets, across, bond, e, face, node):  # type: ignore[no-untyped-def]
     return np.int64(tets[e, face]), opened
 
 
-@njit(f"UniTuple(float64, 2)({VECTOR}, {VECTOR}, {VECTOR})", cache=True)
+@njit(f"UniTuple(float64, 2)({VECTOR}, {VECTOR}, {VECTOR})", cache=True, forceinline=True)
 def _foot(r, e, f):  # type: ignore[no-untyped-def]
     """Shares of the ends of e and f in the foot of a point on their plane, times the square of twice their area; ``r``:
     the point, from where they begin.
@@ -102,7 +109,7 @@ def _foot(r, e, f):  # type: ignore[no-untyped-def]
     return ff * er - ef * fr, ee * fr - ef * er
 
 
-@njit(f"boolean({VECTOR}, {VECTOR}, {VECTOR}, {VECTOR}, float64)", cache=True)
+@njit(f"boolean({VECTOR}, {VECTOR}, {VECTOR}, {VECTOR}, float64)", cache=True, forceinline=True)
 def _nearer(r, inward, e, f, depth):  # type: ignore[no-untyped-def]
     """Whether the point ``r``, below the side of edges e and f, has its foot between them and is less than ``depth``
     below.
@@ -113,7 +120,12 @@ def _nearer(r, inward, e, f, depth):  # type: ignore[no-untyped-def]
     return min(b, c) >= 0.0
 
 
-@njit(f"Tuple((boolean, float64, float64))({VECTOR}, {VECTOR}, {VECTOR}, {VECTOR})", cache=True, error_model="numpy")
+@njit(
+    f"Tuple((boolean, float64, float64))({VECTOR}, {VECTOR}, {VECTOR}, {VECTOR})",
+    cache=True,
+    forceinline=True,
+    error_model="numpy",
+)
 def _below(r, inward, e, f):  # type: ignore[no-untyped-def]
     """Whether the point ``r`` is below the side of edges e and f, of the normal ``inward``, with its foot on it; and
     its shares of the ends of e and f. All from the corner.
@@ -131,7 +143,7 @@ def _below(r, inward, e, f):  # type: ignore[no-untyped-def]
     return True, max(b, 0.0) / square, max(c, 0.0) / square
 
 
-@njit(f"boolean({VECTOR}, {VECTOR}, {VECTOR}, {VECTOR}, {VECTOR}, int64)", cache=True)
+@njit(f"boolean({VECTOR}, {VECTOR}, {VECTOR}, {VECTOR}, {VECTOR}, int64)", cache=True, forceinline=True)
 def _beside(r, inward, e, f, g, opened):  # type: ignore[no-untyped-def]
     """Whether the point ``r``, below the side of edges f and g of a corner of edges e, f, g, and of the normal
     ``inward``, is above another side that is ``opened`` (_corner), or nearer to it.
@@ -149,22 +161,25 @@ def _beside(r, inward, e, f, g, opened):  # type: ignore[no-untyped-def]
 
 @njit(
     types.Tuple((_N2, _F2))(  # type: ignore[no-untyped-call]
-        _N2, types.int32[:, :, ::1], _I, types.uint32[:, ::1], _N2, types.uint8[:, ::1], _N1, _N1, STEP
+        _N2, types.int32[:, :, ::1], _I, types.uint32[:, ::1], _N2, types.uint8[:, ::1], _N1, _N1, _N1, STEP
     ),
     cache=True,
     error_model="numpy",
 )
-def entering(cracks, sides, block, tets, across, bond, ring, place, step):  # type: ignore[no-untyped-def]
+def entering(cracks, sides, block, tets, across, bond, ring, leader, place, step):  # type: ignore[no-untyped-def]
     """Nodes that would come in through a narrow side of a tet of a ``block`` at a corner that they were one with, their
     twins across left out: (n, 4) slots of the node, of the corner and of the rest of the side, clockwise seen from
     outside; and (n, 3) the weights of the side's nodes at the foot.
 
     ``cracks`` (m, 6) local nodes of all cracks, and their ``sides`` (m, 2, 3); ``tets``, ``across`` and ``bond`` of the
-    block; ``place`` (nodes,) in the scene. A node of the side that has not separated is pushed by nobody: what would be
-    its due the others get.
+    block; ``ring`` and ``leader``: see Families; ``place`` (nodes,) in the scene. A node of the side that has
+    not separated is pushed by nobody: what would be its due the others get. Where the members of a family will be is
+    looked up once for all of its sides.
     """
     ahead, part, mu = step.ahead, step.part, step.mu
     nodes, weights, n = np.empty((_FEWEST, 4), np.int32), np.empty((_FEWEST, 3)), 0
+    first, last, end = np.full(len(ring), np.int32(-1), np.int32), np.empty(len(ring), np.int32), 0
+    members, there = np.empty(len(ring), np.int32), np.empty((len(ring), 3))
     for m in range(6 * len(cracks)):
         c, k, h = m // 6, m % 6, m % 6 // 3
         p, q, e = cracks[c, k], cracks[c, (k + 3) % 6], sides[c, h, 1]
@@ -173,25 +188,37 @@ def entering(cracks, sides, block, tets, across, bond, ring, place, step):  # ty
         a, two, three = place[p], cracks[c, 3 * h + (k + 1 + h) % 3], cracks[c, 3 * h + (k + 2 - h) % 3]
         if not mu[part[a], part[a]] >= 0.0:
             continue
+        one = leader[p]
+        if first[one] < 0:
+            first[one], d = end, p
+            while end == first[one] or d != p:
+                members[end] = d
+                for i in range(3):
+                    there[end, i] = ahead[place[d], i]
+                d, end = ring[d], end + 1
+            last[one] = end
         f, g, o, opened = place[three], place[two], at(ahead, a), -1
         to_f, to_g, to_top = minus(at(ahead, f), o), minus(at(ahead, g), o), o
-        inward, d = cross(to_f, to_g), ring[p]
-        while d != p:
-            r = minus(at(ahead, place[d]), o)
+        inward = cross(to_f, to_g)
+        for j in range(first[one], last[one]):
+            d, r = members[j], minus((there[j, 0], there[j, 1], there[j, 2]), o)
+            if d in (p, q) or not dot(inward, r) > 0.0:
+                continue
             came, w_f, w_g = _below(r, inward, to_f, to_g)
-            if came and d != q:
-                if opened < 0:
-                    top, opened = _corner(tets, across, bond, e, sides[c, h, 2], p)
-                    to_top = minus(at(ahead, place[top]), o)
-                if not _beside(r, inward, to_top, to_f, to_g, opened):
-                    if n == len(nodes):
-                        nodes, weights = np.concatenate((nodes, nodes)), np.concatenate((weights, weights))
-                    nodes[n, 0], nodes[n, 1], nodes[n, 2], nodes[n, 3] = place[d], a, f, g
-                    weights[n, 0], weights[n, 1], weights[n, 2] = 1.0 - w_f - w_g, w_f, w_g
-                    weights[n, 1] *= ring[three] != three
-                    weights[n, 2] *= ring[two] != two
-                    n += 1
-            d = ring[d]
+            if not came:
+                continue
+            if opened < 0:
+                top, opened = _corner(tets, across, bond, e, sides[c, h, 2], p)
+                to_top = minus(at(ahead, place[top]), o)
+            if _beside(r, inward, to_top, to_f, to_g, opened):
+                continue
+            if n == len(nodes):
+                nodes, weights = np.concatenate((nodes, nodes)), np.concatenate((weights, weights))
+            nodes[n, 0], nodes[n, 1], nodes[n, 2], nodes[n, 3] = place[d], a, f, g
+            weights[n, 0], weights[n, 1], weights[n, 2] = 1.0 - w_f - w_g, w_f, w_g
+            weights[n, 1] *= ring[three] != three
+            weights[n, 2] *= ring[two] != two
+            n += 1
     return nodes[:n].copy(), weights[:n].copy()
 
 
