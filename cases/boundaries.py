@@ -43,7 +43,8 @@ class Wall(Model):
 class Prescribed(Model):
     """Nodes that start inside the box ``low``..``high`` (all of the parts when absent) move with a given velocity.
 
-    Only the components that are given are prescribed.
+    Only the components that are given are prescribed. Two boundaries may not prescribe one component of a node in two
+    ways. Walls do not hold nodes of which a component is prescribed.
     """
 
     kind: Literal["velocity"]
@@ -66,7 +67,7 @@ class Prescribed(Model):
 
 
 class Rotation(Model):
-    """All nodes of the parts turn rigidly, exactly, at the given spin."""
+    """All nodes of the parts turn rigidly, exactly, at the given spin; walls do not hold them."""
 
     kind: Literal["rotation"]
     """The kind of boundary."""

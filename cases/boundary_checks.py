@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Iterator
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 from .bodies import MeshFile
+from .drives import clash
 from .geometry import lowest_along
-from .problems import Location, Problem, nearest, problem
-from .schema import Case, Gravity, Prescribed, Traction, Wall
+from .problems import Location, Problem, choices, nearest, problem
+from .schema import Case, Gravity, Prescribed, Rotation, Traction, Wall
 
 ROUNDING = 1e-9
 """Of a length or a time: two numbers that agree to this were meant to be equal. Chosen far above the rounding of
@@ -27,6 +28,24 @@ def check_boundaries(case: Case) -> Iterator[Problem]:
             yield problem(("boundaries", i, "acceleration"), "0, 0, 0", "must not be zero")
         elif isinstance(boundary, Traction):
             yield from _traction(boundary, ("boundaries", i))
+    yield from _two_drives(case)
+
+
+def _two_drives(case: Case) -> Iterator[Problem]:
+    """Two boundaries that drive the whole of a part, each in its own way; the worker looks at the nodes of boxes."""
+    drives = [(i, each) for i, each in enumerate(case.boundaries) if isinstance(each, Rotation) or _whole(each)]
+    names = [part.name for part in case.parts]
+    for (i, first), (j, second) in combinations(drives, 2):
+        shared = [name for name in names if all(not each.parts or name in each.parts for each in (first, second))]
+        axes = clash(first, second)
+        if shared and axes:
+            what = f"the velocity of part {shared[0]!r} along {choices(axes)}"
+            message = f"prescribes {what}, and so does boundaries[{i}] in another way; keep one of the two"
+            yield problem(("boundaries", j), ..., message)
+
+
+def _whole(boundary: object) -> bool:
+    return isinstance(boundary, Prescribed) and boundary.low is None and boundary.high is None
 
 
 def _prescribed(boundary: Prescribed, location: Location) -> Iterator[Problem]:

@@ -10,12 +10,13 @@ from pydantic import BaseModel, ValidationError
 from .bodies import MeshFile
 from .boundary_checks import ROUNDING, check_boundaries, check_walls, ordered
 from .geometry import AXES, bounds, centre, cut_directions, whole_bounds
+from .history import COLUMNS
 from .library import library
-from .materials import Material
+from .materials import Material, Strength
 from .mesh_checks import check_mesh
 from .overlap import overlaps
 from .problems import Location, Problem, choices, dotted, nearest, problem
-from .schema import Case, Contact, Part, Probe, Reference, Symmetry, Wall
+from .schema import Case, Contact, Erosion, Part, Probe, Reference, Symmetry, Wall
 
 NEEDED: dict[str, frozenset[str]] = {
     "extent": frozenset({"part", "axis"}),
@@ -100,14 +101,23 @@ def _parts(case: Case) -> Iterator[Problem]:
             message = f"must be below {law.melting} K, where {part.material} melts"
             yield problem(("parts", i, "temperature"), part.temperature, message)
         yield from check_mesh(part.mesh, ("parts", i, "mesh"))
-        if law is None and part.erosion is not None and part.erosion.plastic_strain is not None:
-            message = f"{part.material} is elastic (no table strength) and never strains plastically; remove the key"
-            yield problem(("parts", i, "erosion", "plastic_strain"), part.erosion.plastic_strain, message)
+        if part.erosion is not None:
+            yield from _erosion(part.erosion, part.material, law, ("parts", i, "erosion"))
         yield from _fracture(part, known[part.material], ("parts", i, "fracture"))
         if part.turn is not None and not isinstance(part.mesh, MeshFile) and part.mesh.sector != "full":
             yield problem(
                 ("parts", i, "turn"), ..., f"a {part.mesh.sector} of a body cannot be turned; model all of it"
             )
+
+
+def _erosion(spec: Erosion, name: str, law: Strength | None, location: Location) -> Iterator[Problem]:
+    """Limits that nothing of the material can ever reach."""
+    if law is None and spec.plastic_strain is not None:
+        message = f"{name} is elastic (no table strength) and never strains plastically; remove the key"
+        yield problem((*location, "plastic_strain"), spec.plastic_strain, message)
+    if spec.damage is not None and not (law is not None and law.counts_damage):
+        message = f"{name} counts no damage; allowed with johnson_holmquist, and with johnson_cook with a table damage"
+        yield problem((*location, "damage"), spec.damage, message)
 
 
 def _fracture(part: Part, made: Material, location: Location) -> Iterator[Problem]:
@@ -169,6 +179,9 @@ def _probes(case: Case) -> Iterator[Problem]:
     yield from _unique([probe.name for probe in case.probes], "probes")
     parts = {part.name: part for part in case.parts}
     for i, probe in enumerate(case.probes):
+        if probe.name in COLUMNS:
+            message = f"is a column of every history.csv; allowed: any name but {choices(COLUMNS)}"
+            yield problem(("probes", i, "name"), probe.name, message)
         if (probe.low is None) != (probe.high is None):
             yield problem(("probes", i), ..., "low and high go together; give both, or none for the whole part")
         elif probe.low is not None and probe.high is not None:

@@ -22,7 +22,7 @@ class Probe(Model):
     """
 
     name: Name
-    """Of the column, and for references."""
+    """Of the column, and for references; no column of every run, such as ``kinetic`` or ``dt``, has it."""
     part: Name
     """Whose tets are measured."""
     field: ProbeField

@@ -9,6 +9,7 @@ from itertools import chain
 from typing import Any
 
 from .approach import strangers
+from .driven import passing
 from .estimate import Estimate, wave_speed
 from .library import material
 from .materials import Material
@@ -43,6 +44,7 @@ def doubts(data: Mapping[str, Any], case: Case, expected: Estimate) -> list[Prob
         *_materials(case),
         *_bodies(case, expected),
         *strangers(case),
+        *passing(case),
     ]
 
 

@@ -130,8 +130,9 @@ class Contact(Model):
     """Whether sharp edges meet edges."""
     overlap: Literal["refuse", "push"] = "refuse"
     """What becomes of bodies that overlap at the start: ``refuse`` ends with an error, ``push`` moves them apart
-    without a stress. A body overlaps another where their primitives reach into each other, or where a node of its
-    surface lies inside the mesh of the other, deeper than a millionth of the size of a face: bodies that touch do not.
+    without a stress, and ends with an error where they overlap too deeply for their tets. A body overlaps another where
+    their primitives reach into each other, or where a node of its surface lies inside the mesh of the other, deeper
+    than a millionth of the size of a face: bodies that touch do not.
     Parts that do not meet each other may overlap."""
     sweeps: Annotated[Count, Field(ge=1, le=1000)] | None = None
     """Jacobi sweeps over the active contacts of a step, with momentum; 5 by default, and 10 with ``restitution``, where

@@ -91,19 +91,41 @@ def _apart(case: schema.Case, x: Floats, tets: Indices, part: Indices, exposed: 
     tet, face = np.nonzero(exposed)
     faces = tets[tet[:, None], FACES[face]]
     surface, allowed = overlap.Surface(faces, part[faces[:, 0]], exposed), ~np.isnan(pairing.friction(case))
+    before, out_of = x, np.full(len(x), -1, np.int32)
     if case.contact.overlap == "push":
-        x = overlap.move_apart(x, tets, part, surface, allowed)
+        x, out_of = overlap.move_apart(x, tets, part, surface, allowed)
+    for tet in overlap.crushed(before, x, tets):
+        node = tets[tet, np.argmax(out_of[tets[tet]])]
+        raise _too_deep(case, part[node], out_of[node], before[node])
     found = overlap.find(x, tets, part, surface, allowed)
-    if not len(found.nodes):
-        return x
+    if len(found.nodes):
+        raise _overlapping(case, found, x, part)
+    for tet, other in overlap.nested(x, tets, part, surface, allowed):
+        raise _too_deep(case, part[tets[tet, 0]], part[tets[other, 0]], before[tets[tet]].mean(axis=0))
+    return x
+
+
+def _overlapping(case: schema.Case, found: overlap.Overlaps, x: Floats, part: Indices) -> InputError:
+    assert case.contact is not None
     worst = int(np.argmax(found.depth))
     node = found.nodes[worst]
     one, other = case.parts[part[node]].name, case.parts[found.part[worst]].name
-    place = ", ".join(f"{c:.6g}" for c in x[node])
     way = "set contact.overlap = 'push'" if case.contact.overlap == "refuse" else "contact.overlap = 'push' could not"
-    raise InputError(
-        f"parts: {one!r} overlaps {other!r} by {found.depth[worst]:.3g} m at ({place}) m; move them apart, or {way}"
+    return InputError(
+        f"parts: {one!r} overlaps {other!r} by {found.depth[worst]:.3g} m at ({_place(x[node])}) m; "
+        f"move them apart, or {way}"
     )
+
+
+def _too_deep(case: schema.Case, one: int, other: int, place: Floats) -> InputError:
+    return InputError(
+        f"parts: {case.parts[one].name!r} overlaps {case.parts[other].name!r} at ({_place(place)}) m, "
+        "deeper than contact.overlap = 'push' can undo; move them apart"
+    )
+
+
+def _place(point: Floats) -> str:
+    return ", ".join(f"{c:.6g}" for c in point)
 
 
 def _quarters(tets: Indices, values: Floats, n: int) -> Floats:

@@ -1,8 +1,11 @@
 """The boundary conditions of a case: which nodes each holds, and what of them cannot be."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from conoid.cases import schema
+from conoid.cases.drives import clash, motions
 
 from .boundaries import MIRRORED, PRESCRIBED, Boundary, RigidWalls, SymmetryPlane, mirrored
 from .drivers import Course, Gravity, PrescribedRotation, PrescribedVelocity, Traction
@@ -56,12 +59,14 @@ def build(case: schema.Case, model: Model, loads: list[Load]) -> list[Boundary]:
 def start(case: schema.Case, model: Model, boundaries: list[Boundary], comm: Comm) -> None:
     """Makes the initial velocities agree with the boundaries; all ranks take part.
 
-    Raises InputError, on every rank alike, for a boundary that holds no node, a body that starts behind a wall, and
-    motion prescribed across a symmetry plane.
+    Raises InputError, on every rank alike, for a boundary that holds no node, two that drive a node in two ways, a body
+    that starts behind a wall, and motion prescribed across a symmetry plane.
     """
-    counts = comm.sum(np.array([int(_held_by(spec, model).sum()) for spec in case.boundaries], np.int64))
+    held = [_held_by(spec, model) for spec in case.boundaries]
+    counts = comm.sum(np.array([int(each.sum()) for each in held], np.int64))
     for index in np.flatnonzero(counts == 0):
         raise InputError(f"boundaries[{index}]: holds no node; check its place and its parts")
+    _refuse_two_drives(case.boundaries, held, comm)
     _refuse_conflicts(boundaries, model.nodes, comm)
     _refuse_overlaps(case, model, boundaries, comm)
     for boundary in boundaries:
@@ -101,6 +106,31 @@ def _refuse_overlaps(case: schema.Case, model: Model, boundaries: list[Boundary]
             for index, depth in zip(indices, comm.maximum(walls.depths(model.nodes)), strict=True):
                 if depth > ON_PLANE * model.size:
                     raise InputError(f"boundaries[{index}]: a body starts {depth:.3g} m behind this wall")
+
+
+def _refuse_two_drives(specs: Sequence[schema.Boundary], held: list[Flags], comm: Comm) -> None:
+    """A component of a node has one drive: of two the last would win."""
+    found = comm.maximum(np.array([float(_two_drives(specs, held))]))[0]
+    if found >= 0:
+        second, first = divmod(int(found), len(specs))
+        axes = ", ".join(clash(specs[first], specs[second]))
+        raise InputError(
+            f"boundaries[{second}]: drives nodes along {axes} that boundaries[{first}] drives in another way there; "
+            "give each nodes of its own"
+        )
+
+
+def _two_drives(specs: Sequence[schema.Boundary], held: list[Flags]) -> int:
+    """Two boundaries that drive a node of this rank each in its own way: second * boundaries + first; -1 for none."""
+    drivers = {axis: np.full(len(held[0]) if held else 0, -1) for axis in _AXES}
+    for second, spec in enumerate(specs):
+        for axis in motions(spec):
+            of = drivers[axis]
+            for first in np.unique(of[held[second]]):
+                if first >= 0 and axis in clash(specs[first], spec):
+                    return second * len(specs) + int(first)
+            of[held[second]] = second
+    return -1
 
 
 def _refuse_conflicts(boundaries: list[Boundary], nodes: Nodes, comm: Comm) -> None:

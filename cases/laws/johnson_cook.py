@@ -66,6 +66,10 @@ class JohnsonCook(Law):
     def melting(self) -> float:
         return self.melt_temperature
 
+    @property
+    def counts_damage(self) -> bool:
+        return self.damage is not None
+
     def flow_stress(self) -> float:
         return self.A + self.B * math.pow(0.1, self.n)
 

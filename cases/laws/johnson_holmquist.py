@@ -62,6 +62,10 @@ class JohnsonHolmquist(Law):
         """Von Mises stress at the Hugoniot elastic limit, Pa."""
         return 1.5 * (self.hel - self.pressure_hel)
 
+    @property
+    def counts_damage(self) -> bool:
+        return True
+
     def flow_stress(self) -> float:
         return float(self.strength_hel * self.A * (self.tension / self.pressure_hel) ** self.N)
 

@@ -37,6 +37,11 @@ class Law(Model):
         """Temperature from which on nothing is left of the strength, K; none by default."""
         return math.inf
 
+    @property
+    def counts_damage(self) -> bool:
+        """Whether the law counts damage, at which a tet can be told to leave."""
+        return False
+
     def flow_stress(self) -> float:
         """Strength at a tenth of plastic strain, without pressure and rate, Pa."""
         raise NotImplementedError

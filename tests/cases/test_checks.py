@@ -93,6 +93,12 @@ def test_the_rod_is_sound() -> None:
         (["parts[0].erosion={time_step=1}"], "parts[0].erosion.time_step", "less than 1"),
         (["parts[0].erosion={time_step=0}"], "parts[0].erosion.time_step", "greater than 0"),
         (["parts[0].erosion={nodes='keep'}"], "parts[0].erosion.nodes", "'particles' or 'remove'"),
+        (["parts[0].material=steel_42crmo4", "parts[0].erosion={damage=1}"], "parts[0].erosion.damage",
+         "allowed with johnson_holmquist, and with johnson_cook with a table damage"),
+        (["parts[0].erosion={damage=1}"], "parts[0].erosion.damage", "steel counts no damage"),
+        (["probes[0].name=kinetic"], "probes[0].name", "allowed: any name but 'step', 't', 'dt'"),
+        (["probes[0].name=dt"], "probes[0].name", "is a column of every history.csv"),
+        (["probes[0].name=momentum_x"], "probes[0].name", "is a column of every history.csv"),
         (["parts[0].erosion={strain=1}"], "parts[0].erosion.strain", "did you mean 'plastic_strain'?"),
     ],
 )  # fmt: skip
@@ -211,3 +217,40 @@ def test_what_dilates_has_the_linear_pressure() -> None:
     found = said(f"materials.m={{density=1, elastic={{young=1, poisson=0}}, strength={strength}, eos={eos}}}")
     assert list(found) == ["materials.m.eos"]
     assert "linear pressure" in found["materials.m.eos"]
+
+
+SPIN = "{kind='rotation', spin={centre=[0, 0, 0], rate=[0, 0, '1000 rad/s']}}"
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "axes"),
+    [
+        ("{kind='velocity', x='1 m/s'}", "{kind='velocity', parts=['rod'], x='2 m/s', z=0}", "'x'"),
+        ("{kind='velocity', x='1 m/s', z=0}", "{kind='velocity', x='1 m/s', z=0, course=[[0, 0], [1, 1]]}", "'x'"),
+        (SPIN, "{kind='velocity', x='1 m/s', z='1 m/s'}", "'x', 'z'"),
+        ("{kind='velocity', y=0}", SPIN, "'y'"),
+        (SPIN, SPIN.replace("1000", "1001"), "'x', 'y'"),
+    ],
+)
+def test_a_part_has_one_drive_along_an_axis(first: str, second: str, axes: str) -> None:
+    found = said(f"boundaries=[{first}, {second}]", "parts[0].mesh.sector=full")
+    message = f"prescribes the velocity of part 'rod' along {axes}, and so does boundaries[0] in another way"
+    assert found == {"boundaries[1]": f"{message}; keep one of the two"}
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        ("{kind='velocity', x='1 m/s'}", "{kind='velocity', y='2 m/s'}"),
+        ("{kind='velocity', x='1 m/s'}", "{kind='velocity', x='1 m/s', z=0}"),
+        ("{kind='velocity', x=0}", "{kind='velocity', x='1 m/s', course=[[0, 0]]}"),
+        ("{kind='velocity', z=0}", SPIN),
+        ("{kind='velocity', x=0}", "{kind='velocity', x='1 m/s', low=[0, 0, 0], high=[0, 0, 0]}"),
+    ],
+)
+def test_drives_that_agree_or_may_hold_other_nodes_are_sound(first: str, second: str) -> None:
+    parse_case(rod(f"boundaries=[{first}, {second}]", "parts[0].mesh.sector=full"))
+
+
+def test_a_law_that_counts_damage_lets_tets_erode_by_it() -> None:
+    parse_case(rod("parts[0].material=weldox_460e", "parts[0].erosion={damage=1}"))

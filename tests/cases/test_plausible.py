@@ -1,10 +1,12 @@
 """What a slip of units makes is told: bare numbers, odd constants, speeds, sizes, places; shipped cases are sound."""
 
 import math
+import time
 from typing import Any
 
 import pytest
 
+from conoid.cases.driven import passing
 from conoid.cases.estimate import estimate
 from conoid.cases.library import library
 from conoid.cases.load import parse_case, read_case, read_data, resolved_json, shipped, toml_data
@@ -143,6 +145,72 @@ def test_a_sound_scene_raises_no_doubt() -> None:
 def test_what_is_odd(changes: dict[str, Any], key: str, message: str) -> None:
     found = told(target(**changes))
     assert message in found[key], found
+
+
+FLOOR = {"kind": "wall", "point": [0, 0, "-5 mm"], "normal": [0, 0, 1]}
+DOWN = {"kind": "velocity", "parts": ["plate"], "z": "-50 m/s"}
+BELOW = {"low": ["-1 m", "-1 m", "-5 mm"], "high": ["1 m", "1 m", "-5 mm"]}
+
+
+def warned(*boundaries: dict[str, Any]) -> dict[str, str]:
+    return told({**target(), "boundaries": list(boundaries)})
+
+
+@pytest.mark.parametrize(
+    ("drive", "depth"),
+    [
+        (DOWN, "0.0005 m"),
+        ({**DOWN, **BELOW}, "0.0005 m"),
+        ({**DOWN, "course": [["0 us", 0], ["10 us", 1]]}, "0.00025 m"),
+        ({**DOWN, "course": [["0 us", 1], ["5 us", 1], ["5.1 us", -1]]}, "0.00025"),
+        ({"kind": "velocity", "parts": ["ball"], "x": 0}, "0.0005 m"),
+    ],
+)
+def test_a_drive_into_a_wall_is_told(drive: dict[str, Any], depth: str) -> None:
+    """The ball flies on along z, and no wall holds it as its x is prescribed: its lowest point goes from 1 mm to -4."""
+    part = drive["parts"][0]
+    floor = FLOOR if part == "plate" else {**FLOOR, "point": [0, 0, "-3.5 mm"], "parts": ["ball"]}
+    found = warned(floor, drive)["boundaries[1]"]
+    assert found.startswith(f": nodes of {part!r} come {depth}")
+    assert found.endswith("behind boundaries[0], a wall; walls do not hold nodes that are driven")
+
+
+@pytest.mark.parametrize(
+    "drive",
+    [
+        {**DOWN, "z": 0},
+        {**DOWN, "z": "50 m/s"},
+        {**DOWN, "parts": ["ball"], "z": "-100 m/s"},
+        {**DOWN, "low": ["-1 m", "-1 m", "-4 mm"], "high": ["1 m", "1 m", "0 mm"]},
+        {**DOWN, "z": "-500 m/s", "course": [["0 us", 0]]},
+    ],
+)
+def test_a_drive_that_stays_before_a_wall_raises_no_doubt(drive: dict[str, Any]) -> None:
+    assert warned(FLOOR, drive) == {}
+
+
+def test_many_drives_of_many_bodies_cost_little_time() -> None:
+    """Two hundred plates and as many drives of all of them: of 40,000 driven bodies the first are looked at."""
+    data = target()
+    plate = data["parts"][1]
+    bases = [[0, 0, f"{-10 * k - 5} mm"] for k in range(200)]
+    data["parts"] = [{**plate, "name": f"p{k}", "mesh": {**plate["mesh"], "base": at}} for k, at in enumerate(bases)]
+    drive = {"kind": "velocity", "z": "-1 m/s"}
+    data["boundaries"] = [{**FLOOR, "point": [0, 0, "-3 m"]}, *[drive] * 200]
+    case = parse_case(data)
+    begin = time.perf_counter()
+    assert list(passing(case)) == []
+    assert time.perf_counter() - begin < 20.0
+
+
+def test_two_driven_bodies_that_pass_through_each_other_are_told() -> None:
+    ball = {"kind": "velocity", "parts": ["ball"], "z": "-500 m/s"}
+    held = {"kind": "velocity", "parts": ["plate"], "x": 0, "y": 0, "z": 0}
+    message = "'ball' comes into 'plate', which boundaries[0] drives; contact does not change prescribed motion"
+    assert warned(held, ball) == {"boundaries[1]": f": {message}"}
+    assert warned(held, {**ball, "z": "-99 m/s"}) == {}
+    assert warned({**held, **BELOW}, ball) == {}
+    assert warned({"kind": "velocity", "parts": ["plate"], "x": 0}, ball) == {}
 
 
 @pytest.mark.parametrize(

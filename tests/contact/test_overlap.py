@@ -66,3 +66,41 @@ def test_bodies_are_moved_apart_by_no_more_than_they_overlap() -> None:
     sim = build(meeting_of([{}, {}], {"overlap": "push"}, end=2e-7), bodies)
     before = np.concatenate([mesh.points for mesh in bodies])
     assert np.abs(sim.model.nodes.x - before).max() <= 0.01001 * SIZE
+
+
+def pushed(*bodies: TetMesh) -> Simulation:
+    return build(meeting_of([{} for _ in bodies], {"overlap": "push"}, end=2e-7), bodies)
+
+
+TOO_DEEP = r"^parts: 'body[01]' overlaps 'body[01]' at \(.*\) m, deeper than contact\.overlap = 'push' can undo; move "
+WIDE = block((4, 4, 4), SIZE, shake=0.0)
+
+
+def test_bodies_that_are_one_cannot_be_pushed_apart() -> None:
+    """No node is inside the other body: each rests on a face of it."""
+    with pytest.raises(InputError, match=TOO_DEEP):
+        pushed(WIDE, WIDE)
+
+
+@pytest.mark.parametrize("cells", [(1, 1, 1), (2, 2, 2)])
+def test_a_body_inside_another_cannot_be_pushed_out(cells: tuple[int, int, int]) -> None:
+    inner = block(cells, SIZE, shake=0.0)
+    with pytest.raises(InputError, match=TOO_DEEP):
+        pushed(WIDE, TetMesh(inner.points + 0.9 * SIZE, inner.tets))
+
+
+@pytest.mark.parametrize("across", [0.0, 0.3 * SIZE])
+@pytest.mark.parametrize("depth", [1.0, 2.0, 2.5])
+def test_bodies_that_overlap_by_elements_cannot_be_pushed_apart(depth: float, across: float) -> None:
+    with pytest.raises(InputError, match=TOO_DEEP):
+        pushed(WIDE, TetMesh(WIDE.points + np.array([across, across, (4.0 - depth) * SIZE]), WIDE.tets))
+
+
+def test_bodies_that_coincide_and_are_not_pushed_are_refused_by_the_worker() -> None:
+    with pytest.raises(InputError, match=TOO_DEEP):
+        build(meeting_of([{}, {}], {"overlap": "refuse"}, end=2e-7), [WIDE, WIDE])
+
+
+def test_what_flush_bodies_share_of_a_plane_is_no_overlap() -> None:
+    for off in ((4 * SIZE, 0.0, 0.0), (2 * SIZE, 0.0, 4 * SIZE), (4 * SIZE, 4 * SIZE, 0.0)):
+        pushed(WIDE, TetMesh(WIDE.points + np.array(off), WIDE.tets))

@@ -282,6 +282,23 @@ PULL: dict[str, Any] = {"kind": "traction", "stress": (2e6, -1e6, 5e7)}
 TOP: dict[str, Any] = {"low": (0.0, 0.0, 2.9e-3), "high": (1.0, 1.0, 1.0)}
 
 
+def test_nodes_of_two_boxes_that_prescribe_one_component_in_two_ways_are_refused() -> None:
+    upper, side = (
+        {"kind": "velocity", "x": 1.0, "z": 7.0, **TOP},
+        {"kind": "velocity", "y": 0.0, "z": 8.0, "low": (2.9e-3, 0.0, 0.0), "high": (1.0, 1.0, 1.0)},
+    )
+    message = r"boundaries\[1\]: drives nodes along z that boundaries\[0\] drives in another way there"
+    with pytest.raises(InputError, match=message):
+        build(scene(STEEL, boundaries=(upper, side)), [MESH])
+
+
+def test_nodes_of_two_boxes_may_move_alike_or_along_other_axes() -> None:
+    upper = {"kind": "velocity", "x": 1.0, "z": 7.0, **TOP}
+    others = [{"kind": "velocity", "z": 7.0}, {"kind": "velocity", "y": 1.0}]
+    sim = build(scene(STEEL, boundaries=(upper, *others)), [MESH])
+    assert (sim.model.nodes.v[:, 1:] == (1.0, 7.0)).all()
+
+
 def pushed(sim: Simulation) -> Traction:
     (boundary,) = (b for b in sim.boundaries if isinstance(b, Traction))
     return boundary

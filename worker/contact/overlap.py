@@ -1,4 +1,4 @@
-"""Bodies that overlap before the first step: where and how deep; and moving them apart."""
+"""Bodies that overlap before the first step: where and how deep; moving them apart, and when that has not helped."""
 
 from dataclasses import dataclass
 
@@ -16,6 +16,10 @@ _ROUNDING = 1e-6
 """Of the size of a face: depths below this are none."""
 _TRIES = 30
 """Times overlapping bodies are moved apart before that is given up. Chosen."""
+
+
+_CRUSHED = 0.1
+"""Of its volume: a tet that is left with less has been pushed too far. Chosen."""
 
 
 @dataclass(frozen=True)
@@ -62,15 +66,46 @@ def find(points: Floats, tets: Indices, part: Indices, surface: Surface, allowed
     return Overlaps(met[kept, 0].astype(np.int32), met[kept, 1].astype(np.int32), depth[kept], way[kept])
 
 
-def move_apart(points: Floats, tets: Indices, part: Indices, surface: Surface, allowed: Flags) -> Floats:
-    """Points with overlapping nodes moved to the surface that they are below, half the way at a time, in turns."""
-    moved = points.copy()
+def move_apart(
+    points: Floats, tets: Indices, part: Indices, surface: Surface, allowed: Flags
+) -> tuple[Floats, Indices]:
+    """Points with overlapping nodes moved to the surface that they are below, half the way at a time, in turns; and the
+    part that each has been moved out of last, -1 for none.
+    """
+    moved, out_of = points.copy(), np.full(len(points), -1, np.int32)
     for _ in range(_TRIES):
         found = find(moved, tets, part, surface, allowed)
         if not len(found.nodes):
             break
         moved[found.nodes] += 0.51 * found.depth[:, None] * found.way
-    return moved
+        out_of[found.nodes] = found.part
+    return moved, out_of
+
+
+def crushed(before: Floats, after: Floats, tets: Indices) -> Indices:
+    """Tets that being moved apart has left with a tenth of their volume, or turned inside out."""
+    return np.flatnonzero(_volumes(after[tets]) < _CRUSHED * _volumes(before[tets])).astype(np.int32)
+
+
+def nested(points: Floats, tets: Indices, part: Indices, surface: Surface, allowed: Flags) -> Indices:
+    """(n, 2) tets of the surface whose centre lies inside a tet of another part that theirs meets, and those tets.
+
+    Bodies whose surfaces coincide have no node inside each other: their nodes rest on each other's faces.
+    """
+    others = allowed & ~np.eye(len(allowed), dtype=bool)
+    outer = np.flatnonzero(surface.exposed.any(axis=1)).astype(np.int32)
+    centres = points[tets[outer]].mean(axis=1)
+    every, of = np.concatenate([points, centres]), np.concatenate([part, part[tets[outer, 0]]])
+    places = np.arange(len(points), len(every), dtype=np.int32)
+    small, large = (Things(of_them, np.zeros(len(of_them))) for of_them in (places[:, None], tets))
+    pairs = search.find(small, large, every, np.zeros_like(every), of, others, 0.0, None)
+    inside = (_shares(centres[pairs[:, 0]], points[tets[pairs[:, 1]]]) > _ROUNDING).all(axis=1)
+    return np.column_stack([outer[pairs[inside, 0]], pairs[inside, 1]])
+
+
+def _volumes(corners: Floats) -> Floats:
+    """(n,) six times the volumes of tets (n, 4, 3)."""
+    return np.asarray(np.linalg.det(corners[:, 1:] - corners[:, :1]))
 
 
 def _shares(nodes: Floats, corners: Floats) -> Floats:
