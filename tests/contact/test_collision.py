@@ -275,11 +275,11 @@ def test_a_part_whose_faces_all_lie_on_symmetry_planes_is_named(parts: tuple[str
     planes = tuple(
         schema.Symmetry(kind="symmetry", axis=axis, at=at, parts=parts)
         for axis in ("x", "y", "z")
-        for at in (0.0, 2.0 * SIZE)
+        for at in ((0.0, 2.0 * SIZE) if parts or axis != "z" else (0.0, 2.0 * SIZE, 4.0 * SIZE))
     )
     case = meeting_of([{}, {}], end=END).model_copy(update={"boundaries": planes})
     with pytest.raises(InputError, match=rf"part '{named}' has no exposed face.*leave it out of contact.parts"):
-        build(case, [moved(cube, (0.0, 0.0, 2.5 * SIZE)) if parts else cube, cube])
+        build(case, [moved(cube, (0.0, 0.0, (2.5 if parts else 2.0) * SIZE)), cube])
 
 
 def collided(share: float) -> tuple[Simulation, list[Energy], Floats]:

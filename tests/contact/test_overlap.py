@@ -96,8 +96,18 @@ def test_bodies_that_overlap_by_elements_cannot_be_pushed_apart(depth: float, ac
         pushed(WIDE, TetMesh(WIDE.points + np.array([across, across, (4.0 - depth) * SIZE]), WIDE.tets))
 
 
+@pytest.mark.parametrize("cells", [1, 4])
+@pytest.mark.parametrize("depth", [0.01, 0.5])
+def test_the_rims_of_bodies_with_sides_in_one_plane_are_pushed_apart_too(cells: int, depth: float) -> None:
+    """They lie on faces of the other body's sides, and sink in all the same."""
+    body = block((cells, cells, 4), SIZE, shake=0.0)
+    sim = pushed(body, TetMesh(body.points + np.array([0.0, 0.0, (4.0 - depth) * SIZE]), body.tets))
+    lower, upper = np.split(sim.model.nodes.x[:, 2], 2)
+    assert lower.max() < upper.min() < lower.max() + 0.1 * depth * SIZE
+
+
 def test_bodies_that_coincide_and_are_not_pushed_are_refused_by_the_worker() -> None:
-    with pytest.raises(InputError, match=TOO_DEEP):
+    with pytest.raises(InputError, match=r"^parts: 'body0' overlaps 'body1' by"):
         build(meeting_of([{}, {}], {"overlap": "refuse"}, end=2e-7), [WIDE, WIDE])
 
 

@@ -55,10 +55,11 @@ def find(points: Floats, tets: Indices, part: Indices, surface: Surface, allowed
     node, corners = nodes[pairs[:, 0]], tets[pairs[:, 1]]
     shares = _shares(points[node], points[corners])
     inside = np.asarray((shares >= -_INSIDE).all(axis=1))
-    resting = inside & ((shares < _ROUNDING) & surface.exposed[pairs[:, 1]]).any(axis=1)
     outward = _normals(points, surface.faces)
-    met, at = np.unique(np.column_stack([node[inside], part[corners[inside, 0]]]), axis=0, return_inverse=True)
-    met = met[np.bincount(at.reshape(-1), resting[inside], len(met)) == 0]
+    at = (shares < _ROUNDING) & surface.exposed[pairs[:, 1]]
+    resting = inside & (at & _faced(outward[node], points[corners])).any(axis=1)
+    met, of = np.unique(np.column_stack([node[inside], part[corners[inside, 0]]]), axis=0, return_inverse=True)
+    met = met[np.bincount(of.reshape(-1), resting[inside], len(met)) == 0]
     depth, way = np.zeros(len(met)), np.zeros((len(met), 3))
     for k, (a, other) in enumerate(met):
         depth[k], way[k] = _nearest(points[a], outward[a], points[surface.faces[surface.part == other]])
@@ -113,6 +114,17 @@ def _shares(nodes: Floats, corners: Floats) -> Floats:
     edges = corners[:, 1:] - corners[:, :1]
     tail = np.einsum("pi,pij->pj", nodes - corners[:, 0], np.linalg.inv(edges))
     return np.column_stack([1.0 - tail.sum(axis=1), tail])
+
+
+def _faced(outward: Floats, corners: Floats) -> Flags:
+    """(p, 4) the faces, each across from a corner, of tets (p, 4, 3) that look against the way out (p, 3) of a node.
+
+    Where sides of two bodies lie in one plane, the rim of one that sinks into the other is on a face of it and does not
+    rest there.
+    """
+    tail = np.swapaxes(np.linalg.inv(corners[:, 1:] - corners[:, :1]), 1, 2)
+    inward = np.concatenate([-tail.sum(axis=1, keepdims=True), tail], axis=1)
+    return np.asarray((inward * outward[:, None]).sum(axis=2) >= -FACING * np.linalg.norm(inward, axis=2))
 
 
 def _normals(points: Floats, faces: Indices) -> Floats:
