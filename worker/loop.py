@@ -215,10 +215,13 @@ class Loop:
             extra = [*sim.ledger.momentum, *parts, *probes]
             self._history.write(clock.step, clock.t, clock.told, limiter, self.energy, extra)
         limit, when = sim.case.run.residual_limit, f"at step {clock.step}, t = {clock.t:.6g} s"
-        shares = {"the energy residual": self.energy.residual, "the energy of unequal time steps": sim.ledger.stepping}
-        for what, share in shares.items():
+        shares = (
+            ("the energy residual", self.energy.residual, ""),
+            ("the energy of unequal time steps", sim.ledger.stepping, "; a smaller numerics.dt_safety lowers it"),
+        )
+        for what, share, remedy in shares:
             if not share <= limit:
-                raise EnergyError(f"{what}, {share:.3g}, passed run.residual_limit {limit:g} {when}")
+                raise EnergyError(f"{what}, {share:.3g}, passed run.residual_limit {limit:g} {when}{remedy}")
 
     def _write_frame(self) -> None:
         sim, clock = self.sim, self.sim.clock
