@@ -85,7 +85,8 @@ def move_apart(
 
 def crushed(before: Floats, after: Floats, tets: Indices) -> Indices:
     """Tets that being moved apart has left with a tenth of their volume, or turned inside out."""
-    return np.flatnonzero(_volumes(after[tets]) < _CRUSHED * _volumes(before[tets])).astype(np.int32)
+    had = _volumes(before[tets])
+    return np.flatnonzero((had > 0.0) & (_volumes(after[tets]) < _CRUSHED * had)).astype(np.int32)
 
 
 def nested(points: Floats, tets: Indices, part: Indices, surface: Surface, allowed: Flags) -> Indices:
