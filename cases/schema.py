@@ -168,7 +168,7 @@ class Numerics(Model):
     pressure: Literal["standard", "nodal", "split"] = "nodal"
     """``standard``: pressure from each tet (locks in plastic flow). ``nodal``: averaged nodal pressure. ``split``: the
     operator split, stabilised by pressure-gradient projection. Tets whose smallest altitude is below a tenth of their
-    longest edge at the start, or that have lost three fifths of their volume, keep a pressure of their own in both."""
+    longest edge at the start keep a pressure of their own in both."""
     viscosity: Annotated[Viscosity | None, BeforeValidator(_off), Switch()] = Viscosity()
     """``viscosity = "none"`` switches it off."""
     dt_safety: Annotated[Ratio, Field(gt=0, le=1)] = 0.9

@@ -222,7 +222,7 @@ class Block:
     hot: Bits = field(default_factory=lambda: np.zeros(0, np.uint8))
     """(n,) bit k: the tet's own traction on its face k is beyond ``weakest``."""
     flat: Flags = field(default_factory=lambda: np.zeros(0, bool))
-    """(n,) tets whose volume strain is not averaged (elements/flat.py); (0,) without such means."""
+    """(n,) tets whose volume strain is not averaged (elements/flat.py); (0,) where there is none."""
     shear_weight: float = 0.0
     """Of shear against normal traction."""
     worn: Flags = field(default_factory=lambda: np.zeros(0, bool))

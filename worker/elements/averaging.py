@@ -36,8 +36,7 @@ class AveragedElements(Elements):
         self.pressure = np.zeros(n if split else 1)
         self._scale = 1.0
         for block in model.blocks:
-            if not len(block.flat):
-                block.flat = flat_tets(block, model.nodes.x0)
+            block.flat = flat_tets(block, model.nodes.x0)
 
     def _connect(self) -> None:
         super()._connect()

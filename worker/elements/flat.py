@@ -3,17 +3,14 @@
 The volume of a flat tet is nothing beside that of its neighbours, so that a mean over nodes does not notice how it
 changes: a motion of one altitude, which hardly strains the neighbours, closes it, and once it yields nothing resists
 that. With its own pressure it resists as in the ``standard`` form; the few of them lock nothing.
-
-So does a tet that loses most of its volume on the way: from that step on, and for good. Its pressure goes on from
-where it is, since only what it sees of later strains is another.
 """
 
 import numpy as np
 
 from ..jit import njit
-from ..materials.law import DENSITY, DILATES
+from ..materials.law import BULK, DENSITY, DILATES
 from ..mesh.faces import FACES, normals
-from ..state import CHUNK, CORNERS, DILATION, MASS, TOLD, Block, Flags, Floats
+from ..state import CHUNK, CORNERS, DILATION, HEAT, MASS, TOLD, Block, Flags, Floats
 from .pressure import STABILISE
 from .tet4 import CHANGE, SEEN, VOLUME, VOLUME_MID
 
@@ -21,15 +18,11 @@ THINNEST = 0.1
 """Smallest altitude over longest edge of a tet whose volume strain is averaged; 0.82 for a regular tet. Chosen: what
 strains its neighbours by a tenth closes it (docs/numerics.md)."""
 
-LEAST = 0.4
-"""Volume over the initial one below which a tet sees its own volume strain. Chosen: the least of a Taylor bar is 0.56,
-and below 0.4 runs take more steps to the same end (docs/numerics.md)."""
-
-_MASS, _GROWN = MASS * CHUNK, DILATION * CHUNK
+_HEAT, _TOLD, _MASS, _GROWN = HEAT * CHUNK, TOLD * CHUNK, MASS * CHUNK, DILATION * CHUNK
 
 
 def flat_tets(block: Block, x0: Floats) -> Flags:
-    """(n,) which tets of a block are flat at the start."""
+    """(n,) which tets of a block are flat at the start; (0,) where none is."""
     tets = block.tets.astype(np.int64)
     x = x0[tets]
     edges = x[:, 1:] - x[:, :1]
@@ -37,24 +30,7 @@ def flat_tets(block: Block, x0: Floats) -> Flags:
     faces = np.max([(normals(x0, tets[:, face]) ** 2).sum(axis=1) for face in FACES], axis=0)
     longest = np.max([((x[:, a] - x[:, b]) ** 2).sum(axis=1) for a in range(4) for b in range(a)], axis=0)
     flat: Flags = volume < THINNEST * np.sqrt(faces * longest)
-    return flat
-
-
-@njit("boolean(boolean[::1], float64[::1], float64[::1], float64[::1], int64)", cache=True)
-def mark_crushed(flat, w, s, params, n):  # type: ignore[no-untyped-def]
-    """Marks the tets of a chunk of whose volume at mid-step too little is left; whether any is marked."""
-    density, marked = params[DENSITY], False
-    for i in range(n):
-        flat[i] |= w[VOLUME_MID + i] * density < LEAST * s[_MASS + i]
-        marked |= flat[i]
-    return marked
-
-
-@njit("boolean[::1](boolean[::1], int64, int64)", cache=True)
-def marked_of(flat, c, n):  # type: ignore[no-untyped-def]
-    """(n,) which tets of chunk ``c`` are flat; (0,) where none is. ``flat`` may be (0,), too."""
-    own = flat[c * CHUNK : c * CHUNK + n]
-    return own if own.any() else own[:0]
+    return flat if flat.any() else flat[:0]
 
 
 @njit("void(float64[::1], boolean[::1], int64)", cache=True)
@@ -69,11 +45,12 @@ def keep_out(w, flat, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], boolean[::1], int64, int64)", cache=True, error_model="numpy")
 def see_own(w, s, params, flat, rows, n):  # type: ignore[no-untyped-def]
-    """SEEN of flat tets: their own.
+    """SEEN, and HEAT where there is heat, of flat tets: their own.
 
     The change of volume over the volume at mid-step, which is the end's less half the change but for terms of the
     third order.
     """
+    unit = params[DENSITY] / params[BULK]
     for i in range(n):
         if flat[i]:
             w[SEEN + i] = w[CHANGE + i] / (w[VOLUME + i] - 0.5 * w[CHANGE + i])
@@ -83,6 +60,8 @@ def see_own(w, s, params, flat, rows, n):  # type: ignore[no-untyped-def]
                 for k in range(4):
                     half = 0.5 * w[SEEN + i]
                     s[(CORNERS + k) * CHUNK + i] *= (1.0 + half) / (1.0 - half)
+            elif rows > TOLD:
+                s[_HEAT + i] = unit * s[_TOLD + i] / s[_MASS + i]
 
 
 @njit("void(int64[::1], boolean[::1], int64)", cache=True)

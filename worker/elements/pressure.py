@@ -106,15 +106,12 @@ def scatter_volumes(sums, w, weight, tets, n, dt):  # type: ignore[no-untyped-de
 def scatter_heat(sums, w, s, params, weight, tets, n):  # type: ignore[no-untyped-def]
     """Adds a quarter of what each tet has got of work since the last time, over its mass, to the sums of its nodes.
 
-    By volume, as the volume changes, and in units of the bulk modulus over the density; ``sums`` (nodes, 3). A flat
-    tet, which has no volume here, keeps it for itself.
+    By volume, as the volume changes, and in units of the bulk modulus over the density; ``sums`` (nodes, 3).
     """
     unit = params[DENSITY] / params[BULK]
     for i in range(n):
         work = s[_WORK + i] + s[_WORK_VISCOUS + i]
         heat = 0.25 * w[VOLUME_MID + i] * unit * (work - s[_TOLD + i]) / s[_MASS + i]
-        if w[VOLUME_MID + i] == 0.0:
-            s[_HEAT + i] += unit * (work - s[_TOLD + i]) / s[_MASS + i]
         s[_TOLD + i] = work
         for k in range(4):
             a = tets[i, k]
@@ -210,12 +207,11 @@ def gather_strains(w, strain, tets, n):  # type: ignore[no-untyped-def]
         w[SEEN + i] = 0.25 * ((strain[tets[i, 0]] + strain[tets[i, 1]]) + (strain[tets[i, 2]] + strain[tets[i, 3]]))
 
 
-@njit("void(float64[::1], float64[::1], uint32[:, ::1], boolean[::1], int64)", cache=True)
-def gather_heat(s, heat, tets, flat, n):  # type: ignore[no-untyped-def]
-    """HEAT: what each tet sees grows by the mean of the four nodes; ``flat`` (n,), or (0,), have their own."""
+@njit("void(float64[::1], float64[::1], uint32[:, ::1], int64)", cache=True)
+def gather_heat(s, heat, tets, n):  # type: ignore[no-untyped-def]
+    """HEAT: what the pressure of each tet sees grows by the mean of the four nodes."""
     for i in range(n):
-        if len(flat) == 0 or not flat[i]:
-            s[_HEAT + i] += 0.25 * ((heat[tets[i, 0]] + heat[tets[i, 1]]) + (heat[tets[i, 2]] + heat[tets[i, 3]]))
+        s[_HEAT + i] += 0.25 * ((heat[tets[i, 0]] + heat[tets[i, 1]]) + (heat[tets[i, 2]] + heat[tets[i, 3]]))
 
 
 @njit("void(float64[::1], float64[::1], float64[::1], uint32[:, ::1], boolean[::1], int64)", cache=True)
@@ -235,7 +231,7 @@ def gather_bulking(s, params, bulking, tets, flat, n):  # type: ignore[no-untype
 def gather_more(s, params, more, tets, strain, flat, rows, n):  # type: ignore[no-untyped-def]
     """What ``scatter_more`` has given, as means over nodes; with bulking the ratio of volumes at each node, too."""
     if rows == _HEATED:
-        gather_heat(s, more, tets, flat, n)
+        gather_heat(s, more, tets, n)
         return
     gather_bulking(s, params, more, tets, flat, n)
     for i in range(n):

@@ -30,7 +30,7 @@ from ..materials.viscosity import bulk_viscosity
 from ..state import CHUNK, UNTOLD
 from . import pressure as averaged
 from . import rest, tet4
-from .flat import keep_out, mark_crushed, marked_of, see_own, without_flux
+from .flat import keep_out, see_own, without_flux
 from .hot import mark_hot
 from .wear import SOUND, any_inside_out, let_go, mark_worn
 
@@ -191,20 +191,19 @@ def strain_pass(  # type: ignore[no-untyped-def]
     for c in range(begin, end):
         t = tets[c * CHUNK : (c + 1) * CHUNK]
         s = state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
-        n, own = len(t), flat[c * CHUNK : c * CHUNK + len(t)]
+        n = len(t)
         still = not split and dt > 0.0 and rest.at_rest(v, t, n)
         tet4.gather(w[tet4.EDGE :], x, t, n)
         tet4.gather(w[tet4.RATE :], v, t, n)
         if still and quiet[c, rest.NOTED] > 0:
             tet4.dilatation(w, n, dt)
-            if own.any():
-                keep_out(w, own, n)
+            if len(flat) > 0:
+                keep_out(w, flat[c * CHUNK : c * CHUNK + n], n)
             averaged.scatter_volumes(sums, w, weight, t, n, dt)
             continue
         before = s.copy() if still else s[:0]
         upset = s.copy() if len(worn) > 0 and any_inside_out(w, n) else s[:0]
         motion(params, w, x0, t, n, dt)
-        marked = mark_crushed(own, w, s, params, n)
         if params[ORDER] != AFTER_PRESSURE:
             deviatoric_stress(strength, w, s, params, n, dt)
         if len(upset) > 0:
@@ -212,8 +211,8 @@ def strain_pass(  # type: ignore[no-untyped-def]
         averaged.keep_flux(w, s, n)
         if params[DILATES] > 0.0:
             averaged.tell_dilation(w, s, params, n, dt)
-        if marked:
-            keep_out(w, own, n)
+        if len(flat) > 0:
+            keep_out(w, flat[c * CHUNK : c * CHUNK + n], n)
         if rows > UNTOLD:
             averaged.scatter_more(sums, w, s, params, weight, t, rows, n)
         quiet[c, rest.NOTED] = 0
@@ -222,8 +221,8 @@ def strain_pass(  # type: ignore[no-untyped-def]
             tet4.end_gradients(w, n)
             averaged.gather_projection(w, pressure, projected, t, n)
             averaged.stabilise(w, s, n, dt)
-            if marked:
-                keep_out(w, own, n)
+            if len(flat) > 0:
+                keep_out(w, flat[c * CHUNK : c * CHUNK + n], n)
             averaged.scatter_stabilised(sums, w, weight, t, n, dt)
         else:
             averaged.scatter_volumes(sums, w, weight, t, n, dt)
@@ -262,7 +261,7 @@ def force_pass(  # type: ignore[no-untyped-def]
         tet4.end_gradients(w, n)
         upset = s.copy() if len(worn) > 0 and w[tet4.VOLUME : tet4.VOLUME + n].min() <= 0.0 else s[:0]
         averaged.gather_strains(w, strain, t, n)
-        own = marked_of(flat, c, n)
+        own = flat[c * CHUNK : c * CHUNK + n] if len(flat) > 0 else flat
         if rows > UNTOLD:
             averaged.gather_more(s, params, more, t, strain, own, rows, n)
         averaged.recall_flux(w, s, n, dt)
@@ -305,7 +304,7 @@ def forces_again(  # type: ignore[no-untyped-def]
         tet4.gather(w[tet4.EDGE :], x, t, n)
         tet4.end_gradients(w, n)
         w[_LIMIT : _LIMIT + n] = 0.0
-        own = marked_of(flat, c, n)
+        own = flat[c * CHUNK : c * CHUNK + n] if len(flat) > 0 else flat
         sum_forces(
             force, pressure, gradient, split, own, t, s, w, wi, bits, peaks, ids[c * CHUNK : c * CHUNK + n], n, scale
         )

@@ -12,7 +12,7 @@ from .parcel import Parcel, Table, length, take
 from .route import Arrived
 
 _NODAL = ("id", "part", "x0", "x", "v", "mass", "force", "stepping", "group")
-_OF_TETS = ("across", "bond", "weakest", "worn", "flat")
+_OF_TETS = ("across", "bond", "weakest", "worn")
 """Columns that a block has where the scene needs them."""
 
 
@@ -65,8 +65,6 @@ def _resume_block(case: Case, part: int, table: Table, corners: Indices, border:
     block.group = table["group"]
     if "worn" in table:
         block.worn = table["worn"]
-    if "flat" in table:
-        block.flat = np.ascontiguousarray(table["flat"])
     if "bond" in table:
         bond: Bits = table["bond"]
         block.bond, block.weakest, block.hot = bond, table["weakest"], np.zeros(n, np.uint8)
