@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from conoid.client.projection import Network
 
 CALL = 3e-6
-"""s: of a call of the communicator, from Python to MPI and back. Measured with messages of a rank to itself."""
+"""s: of a call of the communicator, from Python to MPI and back. Chosen: what a call from Python to a kernel takes."""
 MESSAGE = 0.5e-6
 """s: of a message, at each of its ends. Chosen: what MPI takes to post one in shared memory."""
 

@@ -61,28 +61,35 @@ def _become(ids, key, became, node, tet):  # type: ignore[no-untyped-def]
     return became[at] if at < len(key) and key[at] == wanted else node
 
 
+@njit(_I1(_N2, _N1), cache=True)
+def _torn(corners, first):  # type: ignore[no-untyped-def]
+    """Rows of ``corners`` (n, 4) with a node that has copies; ``first``: see Family."""
+    rows, n = np.empty(len(corners), np.int64), 0
+    for row in range(len(corners)):
+        for k in range(4):
+            if first[corners[row, k]] >= 0:
+                rows[n] = row
+                n += 1
+                break
+    return rows[:n].copy()
+
+
 @njit(several(_I1, _N2)(_N2, _B1, _I1, _N1, _I1, _I1, _N1), cache=True)
 def follow_faces(corners, fresh, faces, first, ids, key, became):  # type: ignore[no-untyped-def]
     """Gives faces of the ids ``faces`` (f,) the copies of their ``corners`` (f, 4); ``first``: see Family, ``ids``: of
     the nodes, ``key`` and ``became``: see News, as places. Returns the rows of those that have lost a node, and their
     corners until then.
     """
-    rows, n = np.empty(len(corners), np.int64), 0
-    for f in range(len(corners)):
-        for k in range(4):
-            if first[corners[f, k]] >= 0:
-                rows[n] = f
-                n += 1
-                break
-    old = np.empty((n, 4), np.int32)
-    for r in range(n):
+    rows = _torn(corners, first)
+    old = np.empty((len(rows), 4), np.int32)
+    for r in range(len(rows)):
         f = rows[r]
         fresh[f] = True
         for k in range(4):
             old[r, k] = corners[f, k]
             if first[corners[f, k]] >= 0:
                 corners[f, k] = _become(ids, key, became, corners[f, k], faces[f] // 4)
-    return rows[:n].copy(), old
+    return rows, old
 
 
 @njit(several(_I1, _N2, _B1)(_N2, _B1, _I2, _N1, _I1, _I1, _N1), cache=True)
@@ -90,15 +97,9 @@ def follow_edges(corners, fresh, sides, first, ids, key, became):  # type: ignor
     """The same for edges between ``sides`` (e, 2), ids of faces; and which of them are gone, whose faces have separated
     there.
     """
-    rows, n = np.empty(len(corners), np.int64), 0
-    for e in range(len(corners)):
-        for k in range(4):
-            if first[corners[e, k]] >= 0:
-                rows[n] = e
-                n += 1
-                break
-    old, gone = np.empty((n, 4), np.int32), np.zeros(n, np.bool_)
-    for r in range(n):
+    rows = _torn(corners, first)
+    old, gone = np.empty((len(rows), 4), np.int32), np.zeros(len(rows), np.bool_)
+    for r in range(len(rows)):
         e = rows[r]
         fresh[e] = True
         one, two = sides[e, 0] // 4, sides[e, 1] // 4
@@ -111,7 +112,7 @@ def follow_edges(corners, fresh, sides, first, ids, key, became):  # type: ignor
         corners[e, 3] = _become(ids, key, became, old[r, 3], two)
         if gone[r]:
             corners[e, 1:] = corners[e, 0]
-    return rows[:n].copy(), old, gone
+    return rows, old, gone
 
 
 @njit("int32[:, ::1](int32[:, ::1], int32[::1], int32[::1], int32[:, ::1])", cache=True)
