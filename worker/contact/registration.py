@@ -101,7 +101,7 @@ def _register(scene: Scene) -> None:
     flight = _Flight(
         tracks.positions(), tracks.searched.course - scene.tracks.drift, scene.crowd.part, scene.tracks.until - tracks.t
     )
-    some = np.flatnonzero(pairs.kept.any(axis=1)) if scene.rules.rubs else np.zeros(0, np.int64)
+    some = np.flatnonzero(pairs.kept.any(axis=1))
     old, kept = pairs.rows[some], pairs.kept[some]
     pairs.drop(nodes, faces)
     scene.edge_edge.drop(edges, edges)

@@ -57,7 +57,7 @@ class Searches:
         self._last = -math.inf
         """Step of the last one from nothing."""
         self._kept: tuple[Ints, Floats] = np.zeros((0, 2), np.int64), np.zeros((0, 4))
-        """Candidates with friction, and what they have kept, that the next search takes over from elsewhere."""
+        """Candidates, and what they have kept, that the next search takes over from elsewhere."""
 
     @cached_property
     def rubs(self) -> bool:
@@ -69,7 +69,7 @@ class Searches:
         """How to search."""
         contact, size = self._case.contact, self._exterior.size
         assert contact is not None
-        return Rules(contact.domain, ~np.isnan(self.mu), 2.0 * size, contact.skin * size, HALO * size, self.rubs)
+        return Rules(contact.domain, ~np.isnan(self.mu), 2.0 * size, contact.skin * size, HALO * size)
 
     def keep(self, parcel: Parcel) -> None:
         """Adds what pairs have kept: the candidates themselves a search finds again."""
@@ -112,8 +112,7 @@ class Searches:
         now.enliven(np.flatnonzero(now.faces.exposed).astype(np.int32))
         self.foresee(anew=True)
         registration.news(now)
-        if self.rubs:
-            now.remember(*self._kept, nodes, self._comm)
+        now.remember(*self._kept, nodes, self._comm)
         self.due = False
         self.many += 1
 

@@ -30,8 +30,6 @@ class Rules:
     """Two slots that leave their lines by half of this, each, may meet without being candidates, m."""
     halo: float
     """The same of slots of different ranks, m."""
-    rubs: bool
-    """Whether there is friction anywhere."""
 
 
 @dataclass

@@ -60,7 +60,7 @@ class ActiveSet:
         self._complete(add, active.row_weights, 0, _ROW_WEIGHTS)
 
     def resume(self, kept: Floats, ratio: float) -> None:
-        """Begins with ``ratio`` times what pairs with friction have ``kept`` (candidates, 4) of the step before."""
+        """Begins with ``ratio`` times what pairs have ``kept`` (candidates, 4) of the step before."""
         active, contacts = self._room.active, self._contacts
 
         def begin(part: Loaded) -> None:

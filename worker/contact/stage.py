@@ -238,12 +238,11 @@ class Contact:
         shared = now.messages.company.agree(now.active.room.nodes[: now.active.n], crowd.local)
         active.begin(now.active.room, now.active.n, crowd, shared)
         active.weigh()
-        if self.searches.rubs:
-            active.resume(now.node_face.kept, self._resume())
+        active.resume(now.node_face.kept, self._resume())
         active.sweep(self._sweeps)
+        now.node_face.kept[:] = 0.0
+        active.store(now.node_face.kept)
         if self.searches.rubs:
-            now.node_face.kept[:] = 0.0
-            active.store(now.node_face.kept)
             active.heat(books.friction, now.slots.before)
         active.cost(books.account, now.slots.before)
         if active.leave(crowd, now.slots.total, state, books.parts):

@@ -6,9 +6,9 @@ of |w_k| |n_i| S_ki / m_k, with S_ki the sum of |w| |n_i| over all contacts at t
 alone and for any number along one normal, and never an overshoot however many share a node. That bound is far from
 the diagonal where many share a node, and plain sweeps crawl: so every impulse along a normal goes on as it has changed,
 by a share that grows with the sweeps (``momentum``). Impulses never pull; friction is Coulomb's, on the sum over the
-sweeps. Impulses are integers: a contact's add up to zero, and no order of contacts or ranks changes a bit. Where there
-is friction, a pair of a node and a face begins with its impulses of the step before, so that what sticks does not
-creep, however few the sweeps are.
+sweeps. Impulses are integers: a contact's add up to zero, and no order of contacts or ranks changes a bit. A pair of a
+node and a face begins with its impulses of the step before: what sticks does not creep, and what is under pressure does
+not sink in, however few the sweeps are.
 
 A contact that has had no impulse in the step and closes no faster than it may is idle: it changes nothing until sweeps
 have moved its nodes by as much as it has left. The others are loaded: their data lie together, and only they are swept.
@@ -131,14 +131,14 @@ def load(loaded, contacts, active, fastest):  # type: ignore[no-untyped-def]
 
 @njit(types.void(LOADED, CONTACTS, NODES, _F2), cache=True)
 def load_kept(loaded, contacts, active, kept):  # type: ignore[no-untyped-def]
-    """Takes those of the idle contacts among the loaded that have friction and whose pairs have ``kept``
-    (candidates, 4) an impulse of the step before.
+    """Takes those of the idle contacts among the loaded whose pairs have ``kept`` (candidates, 4) an impulse of the
+    step before.
     """
-    friction, pair, idle, count = contacts.friction, contacts.pair, loaded.idle, loaded.many
+    pair, idle, count = contacts.pair, loaded.idle, loaded.many
     n, m = 0, 0
     for q in range(count[1]):
         p = idle[q]
-        if friction[p] > 0.0 and pair[p] >= 0 and kept[pair[p], 0] > 0.0:
+        if pair[p] >= 0 and kept[pair[p], 0] > 0.0:
             loaded.row[n] = p
             n += 1
         else:
