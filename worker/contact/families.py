@@ -24,6 +24,8 @@ _FEWEST = 64
 """Rows that there is room for at first."""
 _BENT = 1.0 - SHARP * SHARP
 """Square of the sine of the angle by which two faces of one surface may be bent: that of edges that are not sharp."""
+_ROUNDING = 2.0**-40
+"""Of a height, by the squares of a face's edges: far more than what it may be off by for another order of corners."""
 _I, _F2, _N1, _N2 = types.int64, types.float64[:, ::1], types.int32[::1], types.int32[:, ::1]
 
 
@@ -159,6 +161,16 @@ def _beside(r, inward, e, f, g, opened):  # type: ignore[no-untyped-def]
     return False
 
 
+@njit(f"Tuple(({VECTOR}, float64))(float64[:, :], int64, int64, int64)", cache=True, forceinline=True)
+def _outward(x, a, b, c):  # type: ignore[no-untyped-def]
+    """Normal of the face of corners ``x[a]``, ``x[b]``, ``x[c]``, twice its area long; and by how much the product with
+    a vector of the l1 norm 1 may be off if another corner comes first.
+    """
+    o = at(x, a)
+    e, f = minus(at(x, b), o), minus(at(x, c), o)
+    return cross(e, f), _ROUNDING * (dot(e, e) + dot(f, f))
+
+
 @njit(
     types.Tuple((_N2, _F2))(  # type: ignore[no-untyped-call]
         _N2, types.int32[:, :, ::1], _I, types.uint32[:, ::1], _N2, types.uint8[:, ::1], _N1, _N1, _N1, STEP
@@ -174,51 +186,64 @@ def entering(cracks, sides, block, tets, across, bond, ring, leader, place, step
     ``cracks`` (m, 6) local nodes of all cracks, and their ``sides`` (m, 2, 3); ``tets``, ``across`` and ``bond`` of the
     block; ``ring`` and ``leader``: see Families; ``place`` (nodes,) in the scene. A node of the side that has
     not separated is pushed by nobody: what would be its due the others get. Where the members of a family will be is
-    looked up once for all of its sides.
+    looked up once for all of its sides; of a side one normal sorts out the members above it, and each of the others is
+    looked at from the corner that it was one with.
     """
     ahead, part, mu = step.ahead, step.part, step.mu
     nodes, weights, n = np.empty((_FEWEST, 4), np.int32), np.empty((_FEWEST, 3)), 0
     first, last, end = np.full(len(ring), np.int32(-1), np.int32), np.empty(len(ring), np.int32), 0
-    members, there = np.empty(len(ring), np.int32), np.empty((len(ring), 3))
-    for m in range(6 * len(cracks)):
-        c, k, h = m // 6, m % 6, m % 6 // 3
-        p, q, e = cracks[c, k], cracks[c, (k + 3) % 6], sides[c, h, 1]
-        if p == q or e < 0 or sides[c, h, 0] != block or ring[ring[p]] == p:
+    members, there, below = np.empty(len(ring), np.int32), np.empty((len(ring), 3)), np.empty(len(ring), np.int32)
+    for m in range(2 * len(cracks)):
+        c, h = m // 2, m % 2
+        e, outward, rounding = sides[c, h, 1], (0.0, 0.0, 0.0), -1.0
+        if e < 0 or sides[c, h, 0] != block:
             continue
-        a, two, three = place[p], cracks[c, 3 * h + (k + 1 + h) % 3], cracks[c, 3 * h + (k + 2 - h) % 3]
-        if not mu[part[a], part[a]] >= 0.0:
-            continue
-        one = leader[p]
-        if first[one] < 0:
-            first[one], d = end, p
-            while end == first[one] or d != p:
-                members[end] = d
-                for i in range(3):
-                    there[end, i] = ahead[place[d], i]
-                d, end = ring[d], end + 1
-            last[one] = end
-        f, g, o, opened = place[three], place[two], at(ahead, a), -1
-        to_f, to_g, to_top = minus(at(ahead, f), o), minus(at(ahead, g), o), o
-        inward = cross(to_f, to_g)
-        for j in range(first[one], last[one]):
-            d, r = members[j], minus((there[j, 0], there[j, 1], there[j, 2]), o)
-            if d in (p, q) or not dot(inward, r) > 0.0:
+        for k in range(3):
+            p, q = cracks[c, 3 * h + k], cracks[c, 3 * (1 - h) + k]
+            if p == q or ring[ring[p]] == p or not mu[part[place[p]], part[place[p]]] >= 0.0:
                 continue
-            came, w_f, w_g = _below(r, inward, to_f, to_g)
-            if not came:
-                continue
-            if opened < 0:
-                top, opened = _corner(tets, across, bond, e, sides[c, h, 2], p)
-                to_top = minus(at(ahead, place[top]), o)
-            if _beside(r, inward, to_top, to_f, to_g, opened):
-                continue
-            if n == len(nodes):
-                nodes, weights = np.concatenate((nodes, nodes)), np.concatenate((weights, weights))
-            nodes[n, 0], nodes[n, 1], nodes[n, 2], nodes[n, 3] = place[d], a, f, g
-            weights[n, 0], weights[n, 1], weights[n, 2] = 1.0 - w_f - w_g, w_f, w_g
-            weights[n, 1] *= ring[three] != three
-            weights[n, 2] *= ring[two] != two
-            n += 1
+            if rounding < 0.0:
+                outward, rounding = _outward(
+                    ahead, place[cracks[c, 3 * h]], place[cracks[c, 3 * h + 1 + h]], place[cracks[c, 3 * h + 2 - h]]
+                )
+            one = leader[p]
+            if first[one] < 0:
+                first[one], d = end, p
+                while end == first[one] or d != p:
+                    members[end] = d
+                    for i in range(3):
+                        there[end, i] = ahead[place[d], i]
+                    d, end = ring[d], end + 1
+                last[one] = end
+            a, o, to_top, opened = place[p], at(ahead, place[p]), at(ahead, place[p]), -1
+            many = 0
+            for j in range(first[one], last[one]):
+                r, below[many] = minus(at(there, j), o), j
+                many += dot(outward, r) < rounding * (abs(r[0]) + abs(r[1]) + abs(r[2]))
+            for b in range(many):
+                j = below[b]
+                d, r = members[j], minus(at(there, j), o)
+                if d == q:
+                    continue
+                two, three = cracks[c, 3 * h + (k + 1 + h) % 3], cracks[c, 3 * h + (k + 2 - h) % 3]
+                f, g = place[three], place[two]
+                to_f, to_g = minus(at(ahead, f), o), minus(at(ahead, g), o)
+                inward = cross(to_f, to_g)
+                came, w_f, w_g = _below(r, inward, to_f, to_g)
+                if not came:
+                    continue
+                if opened < 0:
+                    top, opened = _corner(tets, across, bond, e, sides[c, h, 2], p)
+                    to_top = minus(at(ahead, place[top]), o)
+                if _beside(r, inward, to_top, to_f, to_g, opened):
+                    continue
+                if n == len(nodes):
+                    nodes, weights = np.concatenate((nodes, nodes)), np.concatenate((weights, weights))
+                nodes[n, 0], nodes[n, 1], nodes[n, 2], nodes[n, 3] = place[d], a, f, g
+                weights[n, 0], weights[n, 1], weights[n, 2] = 1.0 - w_f - w_g, w_f, w_g
+                weights[n, 1] *= ring[three] != three
+                weights[n, 2] *= ring[two] != two
+                n += 1
     return nodes[:n].copy(), weights[:n].copy()
 
 
