@@ -46,6 +46,10 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     fragments: int = 0
     broken: int = 0
     """Facets that have broken."""
+    inside: int = 0
+    """Nodes that end inside of another body or fragment, deeper than 0.05 of the typical size of a face."""
+    deepest: float = 0.0
+    """How deep the deepest of them is that has not gone through the outermost tets, in typical sizes of a face."""
     rebalances: int = 0
     balancing_cost: float = 0.0
     """s; of all cuts."""

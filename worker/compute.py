@@ -20,6 +20,7 @@ from conoid.cases.stages import without
 from . import digest, reference, simulation
 from .assembly import quiet
 from .balance import Balance
+from .contact.inside import look
 from .errors import InputError, PhysicsError
 from .jit import cpu_time
 from .loop import STOPS, Loop, Start
@@ -140,6 +141,7 @@ def _sum_up(
     if sim.record is not None:
         sim.record.look()
         fragments = sim.record.count
+    inside = look(sim.contact, sim.model, sim.record.labels if sim.record else None, sim.comm) if sim.contact else None
     state, cause, message = STOPS[loop.stopped] if loop.stopped else (State.SUCCEEDED, None, "")
     if failure is not None:
         state, cause, message = State.FAILED, failure.cause, str(failure)
@@ -148,12 +150,13 @@ def _sum_up(
         elapsed=elapsed, setup=setup, cpu=total_cpu, digest=hexdigest or "", elements=start.elements,
         eroded=start.elements - sim.model.elements_global, eroded_mass=sim.ledger.eroded_mass,
         nodes_initial=start.nodes, nodes=sim.model.nodes_global, fragments=fragments,
-        broken=sim.fracture.broken if sim.fracture is not None else 0, energy=loop.energy,
+        broken=sim.fracture.broken if sim.fracture is not None else 0,
+        inside=inside.nodes if inside else 0, deepest=inside.deepest if inside else 0.0, energy=loop.energy,
         worst_residual=sim.ledger.worst, rebalances=loop.balance.events, balancing_cost=loop.balance.spent,
         balancing_saved=loop.balance.saved,
         phases={name: [s[name] for s in seconds] for name in PHASES} if seconds else {},
         without=without(sim.case), peak_memory=memory or [],
         element_updates_per_second=(loop.updates - start.updates) / total_cpu if total_cpu > 0.0 else 0.0,
         reference=checks,
-        warnings=sim.fracture.warnings if sim.fracture is not None else [],
+        warnings=[*(sim.fracture.warnings if sim.fracture is not None else []), *(inside.warnings if inside else [])],
     )  # fmt: skip

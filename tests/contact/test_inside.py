@@ -1,0 +1,76 @@
+"""Nodes that contact has not held are found, with how deep they are."""
+
+import numpy as np
+import pytest
+
+from conoid.worker.contact.inside import Inside, look
+from conoid.worker.parallel.comm import SerialComm
+from conoid.worker.simulation import Simulation
+
+from ..worker.kernels import build
+from ..worker.meshes import block
+from .bodies import meeting_of, moved
+
+SIZE = 1e-3
+
+
+def sunk(depth: float) -> Simulation:
+    """A small block that has come ``depth``, m, into the top of a larger one, its lower corners off the nodes there."""
+    lower, upper = block((4, 4, 4), SIZE, shake=0.0), block((2, 2, 2), 0.6 * SIZE, shake=0.0)
+    case = meeting_of([{}, {}], end=2e-7)
+    sim = build(case, [lower, moved(upper, (1.13 * SIZE, 1.21 * SIZE, 4.5 * SIZE))])
+    sim.model.nodes.x[sim.model.nodes.part == 1, 2] -= 0.5 * SIZE + depth
+    return sim
+
+
+def seen(sim: Simulation) -> Inside:
+    assert sim.contact is not None
+    return look(sim.contact, sim.model, None, SerialComm())
+
+
+@pytest.mark.parametrize("depth", [-0.1 * SIZE, 0.0, 0.01 * SIZE])
+def test_what_is_apart_in_touch_or_hardly_deep_is_not_inside(depth: float) -> None:
+    found = seen(sunk(depth))
+    assert (found.nodes, found.buried, found.deepest) == (0, 0, 0.0)
+    assert found.warnings == []
+
+
+@pytest.mark.parametrize("depth", [0.2 * SIZE, 0.3 * SIZE])
+def test_the_lower_nodes_of_a_block_are_as_deep_as_it_has_sunk(depth: float) -> None:
+    """Nine nodes; those in tets without a face on top count by their distance from the nearest face of the tet, which
+    may be slight.
+    """
+    sim = sunk(depth)
+    found = seen(sim)
+    assert sim.contact is not None
+    assert found.looked == 5**3 - 3**3 + 3**3 - 1
+    assert 0 < found.nodes <= 9
+    assert found.buried == 0
+    assert found.deepest * sim.contact.exterior.size == pytest.approx(depth, rel=1e-9)
+
+
+def test_what_has_gone_through_the_outermost_tets_is_buried() -> None:
+    """The block has sunk by two of its three layers of nodes; the middle of the larger one has no corner outside."""
+    found = seen(sunk(2.0 * SIZE))
+    assert found.nodes > 9
+    assert found.buried > 0
+    [line] = found.warnings
+    assert line.startswith(f"contact has let {found.nodes} of {found.looked} nodes into other bodies")
+    assert f"{found.buried} of them through the outermost tets" in line
+
+
+def test_fragments_of_one_part_are_as_good_as_bodies() -> None:
+    """Two halves of a body that nothing holds together; and a body that is whole is inside of nothing."""
+    sim = sunk(0.3 * SIZE)
+    assert sim.contact is not None
+    one = [np.zeros(b.n, np.int64) for b in sim.model.blocks]
+    assert look(sim.contact, sim.model, one, SerialComm()).nodes == 0
+    apart = [np.full(b.n, 7 * k, np.int64) for k, b in enumerate(sim.model.blocks)]
+    assert look(sim.contact, sim.model, apart, SerialComm()) == seen(sim)
+    assert seen(sim).nodes > 0
+
+
+def test_parts_that_do_not_meet_may_be_in_each_other() -> None:
+    case = meeting_of([{}, {}], {"parts": ("body0",)}, end=2e-7)
+    sim = build(case, [block((4, 4, 4), SIZE), moved(block((2, 2, 2), 0.6 * SIZE), (SIZE, SIZE, SIZE))])
+    assert seen(sim).nodes == 0

@@ -1,0 +1,122 @@
+"""What contact has not held: nodes that are inside of another body or fragment.
+
+A node that lies in a tet which nothing holds together with its own has come through that body's surface. How deep it
+is below the surface the tet alone tells: below the nearest of its own open faces; and in one that has no open face but
+a corner on the surface, below the nearest of its faces at least. In a tet without a corner on the surface it is deeper
+than the outermost layer. Nodes of the surface and nodes that have separated are looked at, against the tets of
+all ranks, so that no cut changes what is found.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..parallel.comm import Comm
+from ..state import INTACT, Block, Flags, Floats, Ints, Model
+from . import search
+from .search import Things
+from .stage import Contact
+
+SLIGHT = 0.05
+"""Of the typical size of a face: depths below this are none. Chosen: what sweeps leave undone is less."""
+_WORDS = 6
+"""Of what is told of a node."""
+DEEP = 0.25
+"""The same: deeper than this is worth a warning. Chosen: half of the altitude of a regular tet, about."""
+
+
+@dataclass(frozen=True)
+class Inside:
+    """Equal on all ranks."""
+
+    looked: int
+    """Nodes that were looked at."""
+    nodes: int
+    """Those of them that are inside of another body or fragment, deeper than SLIGHT."""
+    buried: int
+    """Those of these in tets without a corner on the surface."""
+    deepest: float
+    """Of the others, in typical sizes of a face; 0 where no node is deeper than SLIGHT."""
+
+    @property
+    def warnings(self) -> list[str]:
+        """One line, if any is deeper than DEEP."""
+        if not self.buried and self.deepest <= DEEP:
+            return []
+        deeper = f", {self.buried} of them through the outermost tets" if self.buried else ""
+        return [
+            f"contact has let {self.nodes} of {self.looked} nodes into other bodies or fragments{deeper}; the others "
+            f"are up to {self.deepest:.2g} of a face deep: raise contact.sweeps or refine the mesh there"
+        ]
+
+
+def look(contact: Contact, model: Model, labels: list[Ints] | None, comm: Comm) -> Inside:
+    """Who is inside of what, at the positions as they are; all ranks take part.
+
+    ``labels``: for each block (n,) the fragment of each tet; without, every part is one.
+    """
+    fragments = labels or [np.full(block.n, block.part, np.int64) for block in model.blocks]
+    told = comm.join(_seen(contact, model, fragments)).reshape(-1, _WORDS)
+    parts, x = told[:, 2].astype(np.int32), np.ascontiguousarray(told[:, 3:]).view(np.float64)
+    points, part = np.concatenate([model.nodes.x, x]), np.concatenate([model.nodes.part, parts])
+    found, size = [np.zeros((0, 2))], contact.exterior.size
+    for block, fragment in zip(model.blocks, fragments, strict=True):
+        one = Things(np.arange(model.nodes.n, len(points), dtype=np.int32)[:, None], np.zeros(len(told)))
+        other = Things(np.ascontiguousarray(block.tets, np.int32), np.zeros(block.n))
+        allowed = ~np.isnan(contact.searches.mu)
+        pairs = search.find(one, other, points, np.zeros_like(points), part, allowed, 0.0, None)
+        pairs = pairs[told[pairs[:, 0], 1] != fragment[pairs[:, 1]]]
+        corners, opened = model.nodes.x[block.tets[pairs[:, 1]]], _open(block, contact)[pairs[:, 1]]
+        depth = _depths(x[pairs[:, 0]], corners, opened)
+        some = depth > SLIGHT * size
+        found.append(np.column_stack([told[pairs[some, 0], 0], depth[some] / size]))
+    everywhere = np.concatenate(comm.share(np.concatenate(found)))
+    buried = np.isinf(everywhere[:, 1])
+    return Inside(
+        len(told), len(np.unique(everywhere[:, 0])), len(np.unique(everywhere[buried, 0])),
+        float(everywhere[~buried, 1].max(initial=0.0)),
+    )  # fmt: skip
+
+
+def _seen(contact: Contact, model: Model, fragments: list[Ints]) -> Ints:
+    """(k, _WORDS) of the nodes of this rank that are looked at: id, fragment, part and the words of the position; one
+    that has lost its tets is a fragment of its own.
+    """
+    nodes = model.nodes
+    of = np.full(nodes.n, -1, np.int64)
+    some = nodes.owned & _outer(contact)
+    for block, fragment in zip(model.blocks, fragments, strict=True):
+        of[block.tets] = fragment[:, None]
+    return np.asarray(np.column_stack([nodes.id, of, nodes.part, nodes.x.view(np.int64)])[some])
+
+
+def _outer(contact: Contact) -> Flags:
+    """(nodes,) of the surface, and those that have separated."""
+    ring = contact.exterior.cracks.families.ring
+    return np.asarray(contact.exterior.surface.flags | (ring != np.arange(len(ring))))
+
+
+def _open(block: Block, contact: Contact) -> Flags:
+    """(n, 4) faces of tets that are exposed or broken, those in symmetry planes left out; all faces of a tet that has
+    none but a corner on the surface.
+    """
+    faces = contact.exterior.surface.faces
+    opened = np.isin(4 * block.id[:, None] + np.arange(4), faces.id[faces.exposed])
+    if len(block.bond):
+        opened |= block.bond != INTACT
+    outer = np.asarray(_outer(contact)[block.tets].any(axis=1))
+    return np.asarray(opened | (outer & ~opened.any(axis=1))[:, None])
+
+
+def _depths(points: Floats, corners: Floats, opened: Flags) -> Floats:
+    """(p,) how deep points (p, 3) in tets (p, 4, 3) are below the nearest face that is ``opened`` (p, 4), m: infinite
+    where none is, negative outside of the tet and in a tet without volume.
+    """
+    edges = corners[:, 1:] - corners[:, :1]
+    solid = np.linalg.det(edges) > 0.0
+    edges = np.linalg.inv(np.where(solid[:, None, None], edges, np.eye(3)))
+    tail = np.einsum("pi,pij->pj", points - corners[:, 0], edges)
+    shares = np.column_stack([1.0 - tail.sum(axis=1), tail])
+    steepness = np.linalg.norm(np.concatenate([edges.sum(axis=2)[:, None], np.swapaxes(edges, 1, 2)], axis=1), axis=2)
+    heights = np.where(opened, shares / steepness, np.inf)
+    return np.where(solid & (shares > 0.0).all(axis=1), heights.min(axis=1), -1.0)
