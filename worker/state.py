@@ -41,6 +41,9 @@ DISTORTION = 11
 """Elastic energy of the deviatoric stress, J (materials without a strength)."""
 VOLUME_FLUX = 12
 """Rate of change of the volume at mid-step, m^3/s (averaged pressure forms)."""
+TET_VOLUME = 12
+"""The same row in materials without a strength: volume at the end of the last pass, m^3. The first pass, which takes no
+step, sets it."""
 VOLUME_RATIO = 13
 """Current over initial volume, by the dilatation that the pressure sees."""
 PLASTIC_STRAIN = 14

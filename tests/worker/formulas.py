@@ -7,6 +7,14 @@ Floats = npt.NDArray[np.float64]
 IDENTITY = np.eye(3)
 
 
+def volumes(corners: Floats) -> Floats:
+    """Volumes (n,) of tets with the nodes ``corners`` (n, 4, 3), to the bit as the kernels have them."""
+    e1, e2, e3 = ((corners[:, k] - corners[:, 0]).T for k in (1, 2, 3))
+    sixth = 1.0 / 6.0
+    bx, by = (e2[1] * e3[2] - e2[2] * e3[1]) * sixth, (e2[2] * e3[0] - e2[0] * e3[2]) * sixth
+    return np.asarray(e1[0] * bx + e1[1] * by + e1[2] * ((e2[0] * e3[1] - e2[1] * e3[0]) * sixth))
+
+
 def gradients(corners: Floats) -> tuple[Floats, Floats]:
     """Volumes (n,) and shape-function gradients (n, 4, 3) of tets with the nodes ``corners`` (n, 4, 3)."""
     jacobian = corners[:, 1:] - corners[:, :1]

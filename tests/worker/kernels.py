@@ -15,10 +15,13 @@ import numpy.typing as npt
 from conoid.cases import bodies, materials, schema
 from conoid.worker import assembly, domain, simulation, state, step
 from conoid.worker.boundaries import Boundary
+from conoid.worker.materials import law
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.parallel import fixed_point
 from conoid.worker.parallel.comm import Comm, SerialComm
 from conoid.worker.simulation import Simulation
+
+from . import formulas
 
 Floats = npt.NDArray[np.float64]
 Form = Literal["standard", "nodal", "split"]
@@ -110,6 +113,8 @@ class Patch:
 
     def advance(self, dt: float) -> None:
         """One pass: x(n+1) and v(n+1/2) stand in ``nodes``; stress and forces become those of n+1."""
+        if self.block.params[law.ORDER] == law.FROM_SHAPE:
+            self.put(state.TET_VOLUME, formulas.volumes(self.corners(self.nodes.x - dt * self.nodes.v)))
         self._used = self.scale or self.sim.next_scale()
         self.elements.advance(dt, self._used)
         self.elements.finish()

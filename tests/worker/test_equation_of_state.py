@@ -32,17 +32,20 @@ def cold(ratio: Floats | float) -> Floats:
 
 
 def compressed(seed: int, rate: float) -> tuple[Patch, Floats, Floats]:
-    """Copper tets in random states, without shear stress, swelling or shrinking alike in all directions; strains."""
+    """Copper tets in random states, without shear stress, swelling or shrinking alike in all directions; their strains
+    and mean volumes in the step.
+    """
     patch = Patch(free_tets(N, seed), COPPER_GAS)
     random = np.random.default_rng(seed)
     patch.put(VOLUME_RATIO, random.uniform(0.75, 1.05, N))
     patch.put(PRESSURE, random.uniform(-1e9, 50e9, N))
     patch.put(WORK, random.uniform(0.0, 1e6, N) * patch.get(MASS))
     patch.put(WORK_VISCOUS, random.uniform(0.0, 1e5, N) * patch.get(MASS))
-    strain = random.uniform(-rate, rate, N)
+    sixth = random.uniform(-rate, rate, N) / 6.0
+    old, new = ((1.0 + sign * sixth) ** 3 for sign in (-1.0, 1.0))
     volume, _ = formulas.gradients(patch.corners())
-    patch.strain(strain[:, None, None] / (3.0 * DT) * np.eye(3), DT)
-    return patch, strain, volume
+    patch.strain(2.0 * sixth[:, None, None] / DT * np.eye(3), DT)
+    return patch, (new - old) / (0.5 * (old + new)), 0.5 * (old + new) * volume
 
 
 def test_linear_pressure_is_logarithmic() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from conoid.cases.materials import Material
-from conoid.worker.materials.hyperelastic import inverse_cube_root
+from conoid.worker.materials.hyperelastic import inverse_sixth_root
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.simulation import Simulation
 from conoid.worker.state import DISTORTION, PRESSURE, WORK
@@ -39,17 +39,11 @@ def volumes(patch: Patch) -> Floats:
     return formulas.gradients(patch.corners(patch.nodes.x0))[0]
 
 
-@pytest.mark.parametrize("power", [-2.0, -1.0, -0.1, 0.0, 1e-3, 0.5, 1.0, 2.0])
-def test_cube_root(power: float) -> None:
+@pytest.mark.parametrize("power", [-24.0, -8.0, -2.0, -1.0, -0.1, 0.0, 1e-3, 0.15, 0.5, 1.0, 2.0, 4.0, 8.0, 24.0])
+def test_sixth_root(power: float) -> None:
+    """Also where a volume has changed by a factor of 10^12."""
     u = 10.0**power
-    assert math.isclose(inverse_cube_root(u), u ** (-1.0 / 3.0), rel_tol=1e-15)
-
-
-@pytest.mark.parametrize("power", [-8.0, 4.0, 6.0, 8.0, 12.0])
-def test_the_cube_root_of_what_is_far_off_is_no_nonsense(power: float) -> None:
-    """Volumes that change by factors of 100 and more: positive, and at most the root."""
-    u = 10.0**power
-    assert 0.0 < inverse_cube_root(u) < u ** (-1.0 / 3.0) * (1.0 + 1e-15)
+    assert math.isclose(inverse_sixth_root(u), u ** (-1.0 / 6.0), rel_tol=1e-15)
 
 
 @pytest.mark.parametrize("viscosity", [{}, {"viscosity": {}}], ids=["plain", "viscous"])
@@ -61,7 +55,7 @@ def test_a_tet_that_is_inside_out_has_no_stable_step(height: float, viscosity: d
 
 
 def test_nothing_is_left_of_no_strain() -> None:
-    assert inverse_cube_root(1.0) == 1.0
+    assert inverse_sixth_root(1.0) == 1.0
 
 
 @pytest.mark.parametrize("size", [0.01, 0.1, 0.3])

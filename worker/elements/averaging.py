@@ -112,8 +112,8 @@ class AveragedElements(Elements):
     def _forces(self, block: Block, begin: int, end: int, dt: float, scale: float) -> None:
         nodes = self.model.nodes
         sweep.force_pass(
-            nodes.x, nodes.v, self._strain, self._more, nodes.force, self.pressure, self._gradient, self.split,
-            block.tets, block.state.reshape(-1), block.params, self._w, self._wi, self._bits, self.peaks, block.id,
-            block.flat, block.worn, block.life, block.hot, block.weakest, block.quiet, block.shear_weight, block.kind,
-            block.eos, block.state.shape[1], begin, end, dt, scale,
+            nodes.x0, nodes.x, nodes.v, self._strain, self._more, nodes.force, self.pressure, self._gradient,
+            self.split, block.tets, block.state.reshape(-1), block.params, self._w, self._wi, self._bits, self.peaks,
+            block.id, block.flat, block.worn, block.life, block.hot, block.weakest, block.quiet, block.shear_weight,
+            block.kind, block.eos, block.state.shape[1], begin, end, dt, scale,
         )  # fmt: skip

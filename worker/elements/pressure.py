@@ -26,6 +26,7 @@ from ..state import (
     HEAT,
     MASS,
     PRESSURE,
+    TET_VOLUME,
     TOLD,
     UNTOLD,
     VOLUME_FLUX,
@@ -39,7 +40,7 @@ from .tet4 import CHANGE, DILATATION, EDGE, NODAL, SEEN, SPEED, VOLUME, VOLUME_M
 QUANTA = float(2**52)
 """Quanta per unit of volume strain, and per unit of relative nodal volume."""
 
-_FLUX, _MASS = VOLUME_FLUX * CHUNK, MASS * CHUNK
+_FLUX, _VOLUME, _MASS = VOLUME_FLUX * CHUNK, TET_VOLUME * CHUNK, MASS * CHUNK
 _WORK, _WORK_VISCOUS, _HEAT, _TOLD = WORK * CHUNK, WORK_VISCOUS * CHUNK, HEAT * CHUNK, TOLD * CHUNK
 _P, _GROWN = PRESSURE * CHUNK, DILATION * CHUNK
 _BULKING, _UNTOLD, _CORNERS = BULKING * CHUNK, UNTOLD * CHUNK, CORNERS * CHUNK
@@ -84,6 +85,18 @@ def recall_flux(w, s, n, dt):  # type: ignore[no-untyped-def]
     for i in range(n):
         w[CHANGE + i] = s[_FLUX + i] * dt
         w[SPEED + i] = s[_FLUX + i] / w[VOLUME + i]
+
+
+@njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
+def recall_growth(w, s, n, dt):  # type: ignore[no-untyped-def]
+    """As ``recall_flux``, of tets that know their volume before the step; from now on they know the present one."""
+    frequency = 1.0 / dt if dt > 0.0 else 0.0
+    for i in range(n):
+        volume = w[VOLUME + i]
+        change = volume - s[_VOLUME + i] if dt > 0.0 else 0.0
+        w[CHANGE + i] = change
+        w[SPEED + i] = change * frequency / volume
+        s[_VOLUME + i] = volume
 
 
 @njit("void(int64[:, ::1], float64[::1], float64[::1], uint32[:, ::1], int64, float64)", cache=True)
@@ -248,6 +261,21 @@ def own_strains(w, n, dt):  # type: ignore[no-untyped-def]
         w[SPEED + i] = w[DILATATION + i]
         w[SEEN + i] = w[DILATATION + i] * dt
         w[CHANGE + i] = w[DILATATION + i] * dt * w[VOLUME_MID + i]
+
+
+@njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
+def own_growth(w, s, n, dt):  # type: ignore[no-untyped-def]
+    """As ``own_strains``, of tets that know their volume before the step; from now on they know the present one."""
+    frequency = 1.0 / dt if dt > 0.0 else 0.0
+    for i in range(n):
+        volume = w[VOLUME + i]
+        old = s[_VOLUME + i] if dt > 0.0 else volume
+        change = volume - old
+        strain = change / (0.5 * (old + volume))
+        w[SPEED + i] = strain * frequency
+        w[SEEN + i] = strain
+        w[CHANGE + i] = change
+        s[_VOLUME + i] = volume
 
 
 @njit("int64(int64[::1], float64[::1], float64[::1], uint32[:, ::1], int64, float64)", cache=True)

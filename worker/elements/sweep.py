@@ -46,25 +46,26 @@ _F1, _F2, _I1, _I2, _T2 = "float64[::1]", "float64[:, ::1]", "int64[::1]", "int6
 _B1 = "boolean[::1]"
 
 
-@njit(f"void({_F1}, {_F1}, {_F2}, {_T2}, int64, float64)", cache=True, error_model="numpy")
-def motion(params, w, x0, t, n, dt):  # type: ignore[no-untyped-def]
-    """What the stress of a chunk is made from: rates of deformation, or dilatation and the undeformed shape."""
-    if params[ORDER] == FROM_SHAPE:
-        tet4.dilatation(w, n, dt)
-        tet4.gather(w[tet4.REFERENCE :], x0, t, n)
-    else:
-        tet4.kinematics(w, n, dt)
+@njit(f"void({_F1}, {_F2}, {_T2}, int64, float64)", cache=True, error_model="numpy")
+def rates(w, v, t, n, dt):  # type: ignore[no-untyped-def]
+    """Rates of deformation, from the edges of a chunk and its nodes' velocities."""
+    tet4.gather(w[tet4.RATE :], v, t, n)
+    tet4.kinematics(w, n, dt)
+
+
+@njit(f"void({_F1}, {_F2}, {_T2}, int64)", cache=True, error_model="numpy")
+def first_speeds(w, v, t, n):  # type: ignore[no-untyped-def]
+    """SPEED of tets that know no volume before the present one: by their nodes' velocities."""
+    tet4.gather(w[tet4.RATE :], v, t, n)
+    tet4.speeds(w, n)
 
 
 @njit(f"void(int64, {_F1}, {_F1}, {_F1}, int64, float64)", cache=True, error_model="numpy")
-def deviatoric_stress(strength, w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """The deviatoric stress of a chunk, and its work: from the shape, or rotation, elastic trial and plastic return.
+def from_rates(strength, w, s, params, n, dt):  # type: ignore[no-untyped-def]
+    """The deviatoric stress of a chunk, and its work, by rotation, elastic trial and plastic return.
 
     With a law that acts after the pressure only the trial: ``return_at_pressure`` does the rest.
     """
-    if params[ORDER] == FROM_SHAPE:
-        strengthen(strength, w, s, params, n, dt)
-        return
     predict(w, s, n, params[SHEAR], dt)
     if params[ORDER] == BEFORE_PRESSURE:
         strengthen(strength, w, s, params, n, dt)
@@ -138,6 +139,7 @@ def standard_pass(  # type: ignore[no-untyped-def]
     eos, rows, begin, end, dt, scale
 ):  # fmt: skip
     """Stress and forces at n+1 of chunks ``begin`` to ``end``, each tet with its own pressure."""
+    shape = params[ORDER] == FROM_SHAPE
     for c in range(begin, end):
         t = tets[c * CHUNK : (c + 1) * CHUNK]
         s = state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
@@ -147,13 +149,22 @@ def standard_pass(  # type: ignore[no-untyped-def]
             rest.pass_over(peaks, quiet[c], LARGEST_LIMIT, LIMITING_TET)
             continue
         before = s.copy() if still else s[:0]
-        tet4.gather(w[tet4.EDGE :], x, t, n)
+        if shape:
+            tet4.gather_moved(w, x0, x, t, n)
+        else:
+            tet4.gather(w[tet4.EDGE :], x, t, n)
         upset = s.copy() if len(worn) > 0 and any_inside_out(w, n) else s[:0]
-        tet4.gather(w[tet4.RATE :], v, t, n)
-        motion(params, w, x0, t, n, dt)
-        deviatoric_stress(strength, w, s, params, n, dt)
-        tet4.end_gradients(w, n)
-        averaged.own_strains(w, n, dt)
+        if shape:
+            tet4.end_gradients(w, n)
+            strengthen(strength, w, s, params, n, dt)
+            averaged.own_growth(w, s, n, dt)
+            if dt <= 0.0:
+                first_speeds(w, v, t, n)
+        else:
+            rates(w, v, t, n, dt)
+            from_rates(strength, w, s, params, n, dt)
+            tet4.end_gradients(w, n)
+            averaged.own_strains(w, n, dt)
         pressure_and_limit(eos, w, s, params, n, dt)
         return_at_pressure(strength, w, s, params, n, dt)
         if len(upset) > 0:
@@ -184,31 +195,46 @@ def strain_pass(  # type: ignore[no-untyped-def]
     x0, x, v, sums, weight, pressure, projected, split, tets, state, params, w, flat, worn, quiet, strength, rows,
     begin, end, dt
 ):  # fmt: skip
-    """Deviatoric stress at n+1, and the nodal sums of volume change; with ``split``, stabilised.
+    """The nodal sums of volume change, with ``split`` stabilised; deviatoric stress at n+1 of laws that act so early.
 
-    Of a chunk that is noted as at rest only the volumes, which the mean over its nodes' tets needs.
+    A law from the shape does where the nodes must have its work, for their heat; else it acts in ``force_pass``. Of a
+    chunk that is noted as at rest only the volumes, which the mean over its nodes' tets needs.
     """
+    shape, early = params[ORDER] == FROM_SHAPE, rows > UNTOLD
     for c in range(begin, end):
         t = tets[c * CHUNK : (c + 1) * CHUNK]
         s = state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
         n = len(t)
         still = not split and dt > 0.0 and rest.at_rest(v, t, n)
-        tet4.gather(w[tet4.EDGE :], x, t, n)
-        tet4.gather(w[tet4.RATE :], v, t, n)
         if still and quiet[c, rest.NOTED] > 0:
-            tet4.dilatation(w, n, dt)
+            if shape:
+                tet4.unchanged(w, s, n)
+            else:
+                tet4.gather(w[tet4.EDGE :], x, t, n)
+                tet4.at_rest(w, n)
             if len(flat) > 0:
                 keep_out(w, flat[c * CHUNK : c * CHUNK + n], n)
             averaged.scatter_volumes(sums, w, weight, t, n, dt)
             continue
+        if shape and early:
+            tet4.gather_moved(w, x0, x, t, n)
+        else:
+            tet4.gather(w[tet4.EDGE :], x, t, n)
         before = s.copy() if still else s[:0]
         upset = s.copy() if len(worn) > 0 and any_inside_out(w, n) else s[:0]
-        motion(params, w, x0, t, n, dt)
-        if params[ORDER] != AFTER_PRESSURE:
-            deviatoric_stress(strength, w, s, params, n, dt)
+        if shape:
+            tet4.end_gradients(w, n) if early or split else tet4.volumes(w, n)
+            tet4.growth(w, s, n, dt)
+            if early:
+                strengthen(strength, w, s, params, n, dt)
+        else:
+            rates(w, v, t, n, dt)
+            if params[ORDER] != AFTER_PRESSURE:
+                from_rates(strength, w, s, params, n, dt)
         if len(upset) > 0:
             let_go(w, s, upset, x, v, t, rows, n, dt)
-        averaged.keep_flux(w, s, n)
+        if not shape:
+            averaged.keep_flux(w, s, n)
         if params[DILATES] > 0.0:
             averaged.tell_dilation(w, s, params, n, dt)
         if len(flat) > 0:
@@ -218,7 +244,8 @@ def strain_pass(  # type: ignore[no-untyped-def]
         quiet[c, rest.NOTED] = 0
         quiet[c, rest.STEADY] = 1 if still and rest.same(before, s) else 0
         if split:
-            tet4.end_gradients(w, n)
+            if not shape:
+                tet4.end_gradients(w, n)
             averaged.gather_projection(w, pressure, projected, t, n)
             averaged.stabilise(w, s, n, dt)
             if len(flat) > 0:
@@ -229,19 +256,20 @@ def strain_pass(  # type: ignore[no-untyped-def]
 
 
 @njit(
-    f"void({_F2}, {_F2}, {_F1}, {_F1}, {_I2}, {_F1}, {_I2}, boolean, {_T2}, {_F1}, {_F1}, {_F1}, {_I1}, {_I1}, {_I1}, "
-    f"{_I1}, {_B1}, {_B1}, {_F1}, uint8[::1], {_F1}, {_I2}, float64, int64, int64, int64, int64, int64, float64, "
-    "float64)",
+    f"void({_F2}, {_F2}, {_F2}, {_F1}, {_F1}, {_I2}, {_F1}, {_I2}, boolean, {_T2}, {_F1}, {_F1}, {_F1}, {_I1}, {_I1}, "
+    f"{_I1}, {_I1}, {_B1}, {_B1}, {_F1}, uint8[::1], {_F1}, {_I2}, float64, int64, int64, int64, int64, int64, "
+    "float64, float64)",
     cache=True,
     error_model="numpy",
 )
 def force_pass(  # type: ignore[no-untyped-def]
-    x, v, strain, more, force, pressure, gradient, split, tets, state, params, w, wi, bits, peaks, ids, flat, worn,
+    x0, x, v, strain, more, force, pressure, gradient, split, tets, state, params, w, wi, bits, peaks, ids, flat, worn,
     life, hot, weakest, quiet, shear, strength, eos, rows, begin, end, dt, scale
 ):  # fmt: skip
     """Pressure from the averaged volume strain and ``more``, heat or bulking (nodes,), viscosity and forces at n+1;
     with ``split``, pressure gradients.
     """
+    shape, early = params[ORDER] == FROM_SHAPE, rows > UNTOLD
     for c in range(begin, end):
         t = tets[c * CHUNK : (c + 1) * CHUNK]
         s = state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
@@ -253,18 +281,27 @@ def force_pass(  # type: ignore[no-untyped-def]
             rest.pass_over(peaks, quiet[c], LARGEST_LIMIT, LIMITING_TET)
             continue
         before = s.copy() if still else s[:0]
-        tet4.gather(w[tet4.EDGE :], x, t, n)
+        if shape and not early:
+            tet4.gather_moved(w, x0, x, t, n)
+        else:
+            tet4.gather(w[tet4.EDGE :], x, t, n)
+        upset = s.copy() if len(worn) > 0 and any_inside_out(w, n) else s[:0]
         if params[ORDER] == AFTER_PRESSURE:
-            tet4.gather(w[tet4.RATE :], v, t, n)
-            tet4.kinematics(w, n, dt)
-            deviatoric_stress(strength, w, s, params, n, dt)
+            rates(w, v, t, n, dt)
+            from_rates(strength, w, s, params, n, dt)
         tet4.end_gradients(w, n)
-        upset = s.copy() if len(worn) > 0 and w[tet4.VOLUME : tet4.VOLUME + n].min() <= 0.0 else s[:0]
+        if shape and not early:
+            strengthen(strength, w, s, params, n, dt)
         averaged.gather_strains(w, strain, t, n)
         own = flat[c * CHUNK : c * CHUNK + n] if len(flat) > 0 else flat
         if rows > UNTOLD:
             averaged.gather_more(s, params, more, t, strain, own, rows, n)
-        averaged.recall_flux(w, s, n, dt)
+        if shape:
+            averaged.recall_growth(w, s, n, dt)
+            if dt <= 0.0:
+                first_speeds(w, v, t, n)
+        else:
+            averaged.recall_flux(w, s, n, dt)
         if len(own) > 0:
             see_own(w, s, params, own, rows, n)
         pressure_and_limit(eos, w, s, params, n, dt)

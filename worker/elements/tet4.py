@@ -27,12 +27,12 @@ from ..state import (
     S_YZ,
     S_ZX,
     S_ZZ,
+    TET_VOLUME,
     VISCOUS,
 )
 
 # Rows of the scratch, in numbers of float64. EDGE holds e1, e2, e3 and later b1, b2, b3 at the end of the step;
-# RATE holds the velocity differences, then the rate of deformation and the spin; REFERENCE the edges of the undeformed
-# tet.
+# RATE holds the velocity differences, then the rate of deformation and the spin; MOVED the differences of displacement.
 EDGE = 0
 RATE = 9 * CHUNK
 D_XX, D_YY, D_ZZ, D_YZ, D_ZX, D_XY = (RATE + k * CHUNK for k in range(6))
@@ -47,13 +47,13 @@ TRIAL = 24 * CHUNK
 SEEN = 25 * CHUNK
 CHANGE = 26 * CHUNK
 NODAL = 27 * CHUNK
-REFERENCE = 40 * CHUNK
+MOVED = 40 * CHUNK
 SPEED = 49 * CHUNK
 SCRATCH = 50 * CHUNK
 
 _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
-_P, _Q, _MASS = PRESSURE * CHUNK, VISCOUS * CHUNK, MASS * CHUNK
+_P, _Q, _MASS, _VOLUME = PRESSURE * CHUNK, VISCOUS * CHUNK, MASS * CHUNK, TET_VOLUME * CHUNK
 _SIXTH = 1.0 / 6.0
 CLOSING = 4.0
 """Steps at least in which a tet would lose, or gain, all of its volume at the rate of the step before. Chosen: about
@@ -69,8 +69,7 @@ MAGNITUDE = 0x7FFFFFFFFFFFFFFF
 def gather(rows, values, tets, n):  # type: ignore[no-untyped-def]
     """Nine rows: the differences of nodes 1, 2, 3 to node 0 in nodal ``values`` (nodes, 3).
 
-    With x and the rows from EDGE on the edges, with x0 and those from REFERENCE on the edges of the undeformed tet,
-    with v and those from RATE on the velocity differences.
+    With x and the rows from EDGE on the edges, with v and those from RATE on the velocity differences.
     """
     first, second, third = rows, rows[3 * CHUNK :], rows[6 * CHUNK :]
     for i in range(n):
@@ -80,6 +79,21 @@ def gather(rows, values, tets, n):  # type: ignore[no-untyped-def]
             first[k * CHUNK + i] = values[b, k] - origin
             second[k * CHUNK + i] = values[c, k] - origin
             third[k * CHUNK + i] = values[d, k] - origin
+
+
+@njit("void(float64[::1], float64[:, ::1], float64[:, ::1], uint32[:, ::1], int64)", cache=True, error_model="numpy")
+def gather_moved(w, x0, x, tets, n):  # type: ignore[no-untyped-def]
+    """EDGE: the edges; MOVED: the differences of the displacements of nodes 1, 2, 3 to node 0."""
+    for i in range(n):
+        a, b, c, d = tets[i, 0], tets[i, 1], tets[i, 2], tets[i, 3]
+        for k in range(3):
+            origin = x[a, k]
+            e1, e2, e3 = x[b, k] - origin, x[c, k] - origin, x[d, k] - origin
+            w[EDGE + k * CHUNK + i], w[EDGE + (3 + k) * CHUNK + i], w[EDGE + (6 + k) * CHUNK + i] = e1, e2, e3
+            origin = x0[a, k]
+            w[MOVED + k * CHUNK + i] = e1 - (x0[b, k] - origin)
+            w[MOVED + (3 + k) * CHUNK + i] = e2 - (x0[c, k] - origin)
+            w[MOVED + (6 + k) * CHUNK + i] = e3 - (x0[d, k] - origin)
 
 
 @njit("UniTuple(float64, 9)(float64[::1], int64)", cache=True, error_model="numpy", forceinline=True)
@@ -137,16 +151,50 @@ def kinematics(w, n, dt):  # type: ignore[no-untyped-def]
         w[SPIN + 2 * CHUNK + i] = 0.5 * h * (lyx - lxy)
 
 
-@njit("void(float64[::1], int64, float64)", cache=True, error_model="numpy")
-def dilatation(w, n, dt):  # type: ignore[no-untyped-def]
-    """Of ``kinematics`` only VOLUME_MID and DILATATION."""
-    h = 0.5 * dt
+@njit("void(float64[::1], int64)", cache=True, error_model="numpy")
+def at_rest(w, n):  # type: ignore[no-untyped-def]
+    """Of ``kinematics`` only VOLUME_MID and DILATATION, of tets that do not move."""
     for i in range(n):
-        ax, ay, az, bx, by, bz, cx, cy, cz = _rates(w, i)
-        six_volumes, g1x, g1y, g1z, g2x, g2y, g2z, g3x, g3y, g3z = _middle(w, i, h)
-        flux = (ax * g1x + ay * g1y + az * g1z) + (bx * g2x + by * g2y + bz * g2z) + (cx * g3x + cy * g3y + cz * g3z)
-        w[VOLUME_MID + i] = six_volumes * _SIXTH
-        w[DILATATION + i] = flux / six_volumes
+        e1x, e1y, e1z = w[EDGE + i], w[EDGE + CHUNK + i], w[EDGE + 2 * CHUNK + i]
+        e2x, e2y, e2z = w[EDGE + 3 * CHUNK + i], w[EDGE + 4 * CHUNK + i], w[EDGE + 5 * CHUNK + i]
+        e3x, e3y, e3z = w[EDGE + 6 * CHUNK + i], w[EDGE + 7 * CHUNK + i], w[EDGE + 8 * CHUNK + i]
+        gx, gy, gz = e2y * e3z - e2z * e3y, e2z * e3x - e2x * e3z, e2x * e3y - e2y * e3x
+        w[VOLUME_MID + i] = (e1x * gx + e1y * gy + e1z * gz) * _SIXTH
+        w[DILATATION + i] = 0.0
+
+
+@njit("void(float64[::1], int64)", cache=True, error_model="numpy")
+def volumes(w, n):  # type: ignore[no-untyped-def]
+    """VOLUME from the edges, as ``end_gradients`` has it to the bit."""
+    for i in range(n):
+        e1x, e1y, e1z = w[EDGE + i], w[EDGE + CHUNK + i], w[EDGE + 2 * CHUNK + i]
+        e2x, e2y, e2z = w[EDGE + 3 * CHUNK + i], w[EDGE + 4 * CHUNK + i], w[EDGE + 5 * CHUNK + i]
+        e3x, e3y, e3z = w[EDGE + 6 * CHUNK + i], w[EDGE + 7 * CHUNK + i], w[EDGE + 8 * CHUNK + i]
+        bx, by = (e2y * e3z - e2z * e3y) * _SIXTH, (e2z * e3x - e2x * e3z) * _SIXTH
+        bz = (e2x * e3y - e2y * e3x) * _SIXTH
+        w[VOLUME + i] = e1x * bx + e1y * by + e1z * bz
+
+
+@njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
+def growth(w, s, n, dt):  # type: ignore[no-untyped-def]
+    """VOLUME_MID, the mean of VOLUME and the volume before the step, and DILATATION, their difference over it and dt.
+
+    As those of ``kinematics`` but for terms of the third order in the step. Without a step there is no change.
+    """
+    frequency = 1.0 / dt if dt > 0.0 else 0.0
+    for i in range(n):
+        volume = w[VOLUME + i]
+        old = s[_VOLUME + i] if dt > 0.0 else volume
+        middle = 0.5 * (old + volume)
+        w[VOLUME_MID + i] = middle
+        w[DILATATION + i] = (volume - old) * frequency / middle
+
+
+@njit("void(float64[::1], float64[::1], int64)", cache=True)
+def unchanged(w, s, n):  # type: ignore[no-untyped-def]
+    """VOLUME_MID and DILATATION of tets whose volume before the step is known, and that do not move."""
+    for i in range(n):
+        w[VOLUME_MID + i], w[DILATATION + i] = s[_VOLUME + i], 0.0
 
 
 @njit("void(float64[::1], int64)", cache=True, error_model="numpy")
@@ -172,6 +220,17 @@ def end_gradients(w, n):  # type: ignore[no-untyped-def]
         w[EDGE + i], w[EDGE + CHUNK + i], w[EDGE + 2 * CHUNK + i] = b1x, b1y, b1z
         w[EDGE + 3 * CHUNK + i], w[EDGE + 4 * CHUNK + i], w[EDGE + 5 * CHUNK + i] = b2x, b2y, b2z
         w[EDGE + 6 * CHUNK + i], w[EDGE + 7 * CHUNK + i], w[EDGE + 8 * CHUNK + i] = b3x, b3y, b3z
+
+
+@njit("void(float64[::1], int64)", cache=True, error_model="numpy")
+def speeds(w, n):  # type: ignore[no-untyped-def]
+    """SPEED, the rate of change of the volume over it, 1/s, from V grad N and the velocity differences."""
+    for i in range(n):
+        ax, ay, az, bx, by, bz, cx, cy, cz = _rates(w, i)
+        first = ax * w[EDGE + i] + ay * w[EDGE + CHUNK + i] + az * w[EDGE + 2 * CHUNK + i]
+        second = bx * w[EDGE + 3 * CHUNK + i] + by * w[EDGE + 4 * CHUNK + i] + bz * w[EDGE + 5 * CHUNK + i]
+        third = cx * w[EDGE + 6 * CHUNK + i] + cy * w[EDGE + 7 * CHUNK + i] + cz * w[EDGE + 8 * CHUNK + i]
+        w[SPEED + i] = (first + second + third) / w[VOLUME + i]
 
 
 @njit("UniTuple(int64, 3)(float64, float64, float64, float64)", cache=True, error_model="numpy")

@@ -6,113 +6,119 @@ order in strain is Hencky's, G (ln V : ln V). Derived in docs/numerics.md.
 
 import numpy as np
 
-from ..elements.tet4 import EDGE, MODULUS, RATE, REFERENCE, SEEN, TRIAL, VOLUME
+from ..elements.tet4 import EDGE, MODULUS, MOVED, RATE, TRIAL, VOLUME
 from ..jit import njit
-from ..state import CHUNK, DISTORTION, MASS, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, WORK
+from ..state import CHUNK, DISTORTION, MASS, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, TET_VOLUME, WORK
 from .law import DENSITY, FROM_SHAPE, SHEAR, Law
 
 _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _WORK, _MASS, _DISTORTION = WORK * CHUNK, MASS * CHUNK, DISTORTION * CHUNK
-_THIRD, _SIXTH = 1.0 / 3.0, 1.0 / 6.0
+_THIRD = 1.0 / 3.0
+_ONE = 0x3FF0000000000000
+"""Bits of 1.0."""
 # Rows of the scratch: rate of deformation and spin are not needed here.
-_BXX, _BYY, _BZZ, _BYZ, _BZX, _BXY = (RATE + k * CHUNK for k in range(6))
-_MORE, _LESS, _HALF_SHEAR, _K, _SIX_VOLUMES = RATE + 6 * CHUNK, RATE + 7 * CHUNK, RATE + 8 * CHUNK, TRIAL, SEEN
+_AXX, _AYY, _AZZ, _AYZ, _AZX, _AXY = (RATE + k * CHUNK for k in range(6))
+_MORE, _LESS, _HALF_SHEAR, _K = RATE + 6 * CHUNK, RATE + 7 * CHUNK, RATE + 8 * CHUNK, TRIAL
 
 
 @njit("float64(float64)", cache=True, error_model="numpy", forceinline=True)
-def inverse_cube_root(u):  # type: ignore[no-untyped-def]
-    """u^(-1/3), to round-off for u from 0.01 to 100: with t = u^(1/4) it is t^(-1/3) / t, by Newton's method.
+def inverse_sixth_root(u):  # type: ignore[no-untyped-def]
+    """u^(-1/6), to round-off for u from 1e-24 to 1e24: y (1 - r)^(-1/6), 1 - r = u y^6, by its series, three times.
 
-    Only + - * / and roots, which round alike in a vector lane and in a scalar. The start is the Pade approximant at 1,
-    and below the root for large t, from where the method is safe, if slow.
+    Only + - * and the bits of a float64 as an integer, which are alike in a vector lane and in a scalar: no root and no
+    quotient, which take a processor as long as ten products. The bits are a logarithm, piecewise linear; a sixth of
+    their distance from those of 1, by shifts, makes the y to begin with, which is right at 1.
     """
-    t = np.sqrt(np.sqrt(u))
-    y = min((2.0 + t) / (1.0 + 2.0 * t), 3.0 / (1.0 + t))
-    for _ in range(4):
-        y *= (4.0 - t * y * y * y) * _THIRD
-    return y / t
+    far = np.float64(u).view(np.int64) - _ONE
+    y = np.int64(_ONE - ((far >> 3) + (far >> 5) + (far >> 7) + (far >> 9) + (far >> 11))).view(np.float64)
+    for _ in range(3):
+        square = y * y
+        r = 1.0 - u * (square * square * square)
+        y += y * (r * (1 / 6 + r * (7 / 72 + r * (91 / 1296))))
+    return y
 
 
 @njit("void(float64[::1], int64)", cache=True, error_model="numpy")
 def _strains(w, n):  # type: ignore[no-untyped-def]
-    """Rows of B = F F^T - 1 = H + H^T + H H^T, of det(1 + B) - 1, and six times the undeformed volume, m^3."""
+    """Rows of A = F^-T F^-1 - 1 = K^T K - K - K^T, K = du/dx = sum over nodes of u_a b_a / V, and of det(1 + A) - 1."""
     for i in range(n):
-        r1x, r1y, r1z = w[REFERENCE + i], w[REFERENCE + CHUNK + i], w[REFERENCE + 2 * CHUNK + i]
-        r2x, r2y, r2z = w[REFERENCE + 3 * CHUNK + i], w[REFERENCE + 4 * CHUNK + i], w[REFERENCE + 5 * CHUNK + i]
-        r3x, r3y, r3z = w[REFERENCE + 6 * CHUNK + i], w[REFERENCE + 7 * CHUNK + i], w[REFERENCE + 8 * CHUNK + i]
-        g1x, g1y, g1z = r2y * r3z - r2z * r3y, r2z * r3x - r2x * r3z, r2x * r3y - r2y * r3x
-        g2x, g2y, g2z = r3y * r1z - r3z * r1y, r3z * r1x - r3x * r1z, r3x * r1y - r3y * r1x
-        g3x, g3y, g3z = r1y * r2z - r1z * r2y, r1z * r2x - r1x * r2z, r1x * r2y - r1y * r2x
-        six_volumes = r1x * g1x + r1y * g1y + r1z * g1z
-        r = 1.0 / six_volumes
-        u1x, u1y, u1z = w[EDGE + i] - r1x, w[EDGE + CHUNK + i] - r1y, w[EDGE + 2 * CHUNK + i] - r1z
-        u2x, u2y, u2z = w[EDGE + 3 * CHUNK + i] - r2x, w[EDGE + 4 * CHUNK + i] - r2y, w[EDGE + 5 * CHUNK + i] - r2z
-        u3x, u3y, u3z = w[EDGE + 6 * CHUNK + i] - r3x, w[EDGE + 7 * CHUNK + i] - r3y, w[EDGE + 8 * CHUNK + i] - r3z
-        hxx, hxy = r * (u1x * g1x + u2x * g2x + u3x * g3x), r * (u1x * g1y + u2x * g2y + u3x * g3y)
-        hxz, hyx = r * (u1x * g1z + u2x * g2z + u3x * g3z), r * (u1y * g1x + u2y * g2x + u3y * g3x)
-        hyy, hyz = r * (u1y * g1y + u2y * g2y + u3y * g3y), r * (u1y * g1z + u2y * g2z + u3y * g3z)
-        hzx, hzy = r * (u1z * g1x + u2z * g2x + u3z * g3x), r * (u1z * g1y + u2z * g2y + u3z * g3y)
-        hzz = r * (u1z * g1z + u2z * g2z + u3z * g3z)
-        bxx = 2.0 * hxx + (hxx * hxx + hxy * hxy + hxz * hxz)
-        byy = 2.0 * hyy + (hyx * hyx + hyy * hyy + hyz * hyz)
-        bzz = 2.0 * hzz + (hzx * hzx + hzy * hzy + hzz * hzz)
-        byz = hyz + hzy + (hyx * hzx + hyy * hzy + hyz * hzz)
-        bzx = hzx + hxz + (hzx * hxx + hzy * hxy + hzz * hxz)
-        bxy = hxy + hyx + (hxx * hyx + hxy * hyy + hxz * hyz)
-        axx, ayy, azz = byy * bzz - byz * byz, bzz * bxx - bzx * bzx, bxx * byy - bxy * bxy
-        azx, axy = bxy * byz - byy * bzx, byz * bzx - bzz * bxy
-        trace = bxx + byy + bzz
-        w[_MORE + i] = trace + (axx + ayy + azz) + (bxx * axx + bxy * axy + bzx * azx)
-        w[_BXX + i], w[_BYY + i], w[_BZZ + i] = bxx, byy, bzz
-        w[_BYZ + i], w[_BZX + i], w[_BXY + i] = byz, bzx, bxy
-        w[_SIX_VOLUMES + i] = six_volumes
+        b1x, b1y, b1z = w[EDGE + i], w[EDGE + CHUNK + i], w[EDGE + 2 * CHUNK + i]
+        b2x, b2y, b2z = w[EDGE + 3 * CHUNK + i], w[EDGE + 4 * CHUNK + i], w[EDGE + 5 * CHUNK + i]
+        b3x, b3y, b3z = w[EDGE + 6 * CHUNK + i], w[EDGE + 7 * CHUNK + i], w[EDGE + 8 * CHUNK + i]
+        u1x, u1y, u1z = w[MOVED + i], w[MOVED + CHUNK + i], w[MOVED + 2 * CHUNK + i]
+        u2x, u2y, u2z = w[MOVED + 3 * CHUNK + i], w[MOVED + 4 * CHUNK + i], w[MOVED + 5 * CHUNK + i]
+        u3x, u3y, u3z = w[MOVED + 6 * CHUNK + i], w[MOVED + 7 * CHUNK + i], w[MOVED + 8 * CHUNK + i]
+        r = 1.0 / w[VOLUME + i]
+        kxx, kxy = r * (u1x * b1x + u2x * b2x + u3x * b3x), r * (u1x * b1y + u2x * b2y + u3x * b3y)
+        kxz, kyx = r * (u1x * b1z + u2x * b2z + u3x * b3z), r * (u1y * b1x + u2y * b2x + u3y * b3x)
+        kyy, kyz = r * (u1y * b1y + u2y * b2y + u3y * b3y), r * (u1y * b1z + u2y * b2z + u3y * b3z)
+        kzx, kzy = r * (u1z * b1x + u2z * b2x + u3z * b3x), r * (u1z * b1y + u2z * b2y + u3z * b3y)
+        kzz = r * (u1z * b1z + u2z * b2z + u3z * b3z)
+        axx = (kxx * kxx + kyx * kyx + kzx * kzx) - 2.0 * kxx
+        ayy = (kxy * kxy + kyy * kyy + kzy * kzy) - 2.0 * kyy
+        azz = (kxz * kxz + kyz * kyz + kzz * kzz) - 2.0 * kzz
+        ayz = (kxy * kxz + kyy * kyz + kzy * kzz) - (kyz + kzy)
+        azx = (kxz * kxx + kyz * kyx + kzz * kzx) - (kzx + kxz)
+        axy = (kxx * kxy + kyx * kyy + kzx * kzy) - (kxy + kyx)
+        mxx, myy, mzz = ayy * azz - ayz * ayz, azz * axx - azx * azx, axx * ayy - axy * axy
+        mzx, mxy = axy * ayz - ayy * azx, ayz * azx - azz * axy
+        w[_MORE + i] = (axx + ayy + azz) + (mxx + myy + mzz) + (axx * mxx + axy * mxy + azx * mzx)
+        w[_AXX + i], w[_AYY + i], w[_AZZ + i] = axx, ayy, azz
+        w[_AYZ + i], w[_AZX + i], w[_AXY + i] = ayz, azx, axy
 
 
 @njit("void(float64[::1], int64, float64)", cache=True, error_model="numpy")
 def _roots(w, n, shear):  # type: ignore[no-untyped-def]
-    """Rows k = det(1 + B)^(-1/3), k - 1 without cancellation, G / 2J: long chains, which overlap in a loop alone."""
+    """Rows k = det(1 + A)^(-1/3), k - 1 without cancellation, G / 2J: long chains, which overlap in a loop alone.
+
+    Not a number where round-off leaves no positive determinant.
+    """
+    half = 0.5 * shear
     for i in range(n):
         more = w[_MORE + i]
-        k = inverse_cube_root(1.0 + more)
-        w[_LESS + i] = -more / ((1.0 + more) * (1.0 + k + k * k))
+        u = 1.0 + more
+        root = inverse_sixth_root(u if u > 0.0 else np.nan)
+        k = root * root
+        inverse = k * root
+        w[_LESS + i] = -more * (inverse * inverse) / (1.0 + k + k * k)
         w[_K + i] = k
-        w[_HALF_SHEAR + i] = 0.5 * shear / np.sqrt(1.0 + more)
+        w[_HALF_SHEAR + i] = half * (u * inverse)
 
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def hyperelastic(w, s, params, n, dt):  # type: ignore[no-untyped-def]
     """The deviatoric stress G / 2J dev(b - b^-1) of a chunk, Pa; its work is the change of its potential.
 
-    ``w`` holds the edges of the end of the step and, from REFERENCE on, those of the undeformed tets. All is made of B
-    and so of the displacement gradient H, so that small strains keep their digits and none leaves nothing:
-    b - 1 = k B + (k - 1), and b^-1 is the adjugate of b, whose determinant is one.
+    ``w`` holds V grad N of the end of the step, and from MOVED on the displacements. All is made of A and so of their
+    gradient, so that small strains keep their digits and none leaves nothing: b^-1 = k (1 + A), so that
+    b^-1 - 1 = k A + (k - 1), and b is the adjugate of b^-1, whose determinant is one.
     """
     _strains(w, n)
     _roots(w, n, params[SHEAR])
-    of_energy = 0.25 * _SIXTH * params[SHEAR]
+    of_energy = 0.25 * params[SHEAR] / params[DENSITY]
     for i in range(n):
-        bxx, byy, bzz = w[_BXX + i], w[_BYY + i], w[_BZZ + i]
-        byz, bzx, bxy = w[_BYZ + i], w[_BZX + i], w[_BXY + i]
-        axx, ayy, azz = byy * bzz - byz * byz, bzz * bxx - bzx * bzx, bxx * byy - bxy * bxy
-        ayz, azx, axy = bzx * bxy - bxx * byz, bxy * byz - byy * bzx, byz * bzx - bzz * bxy
+        axx, ayy, azz = w[_AXX + i], w[_AYY + i], w[_AZZ + i]
+        ayz, azx, axy = w[_AYZ + i], w[_AZX + i], w[_AXY + i]
+        mxx, myy, mzz = ayy * azz - ayz * ayz, azz * axx - azx * azx, axx * ayy - axy * axy
+        myz, mzx, mxy = azx * axy - axx * ayz, axy * ayz - ayy * azx, ayz * azx - azz * axy
         k, less, g = w[_K + i], w[_LESS + i], w[_HALF_SHEAR + i]
         square = k * k
-        own = square * (bxx + byy + bzz) + (k + 1.0) * less
+        own = square * (axx + ayy + azz) + (k + 1.0) * less
         excess = (
-            (k * bxx + less) * (square * (bxx - axx) - own)
-            + (k * byy + less) * (square * (byy - ayy) - own)
-            + (k * bzz + less) * (square * (bzz - azz) - own)
-            + 2.0 * k * square * (byz * (byz - ayz) + bzx * (bzx - azx) + bxy * (bxy - axy))
+            (k * axx + less) * (square * (axx - mxx) - own)
+            + (k * ayy + less) * (square * (ayy - myy) - own)
+            + (k * azz + less) * (square * (azz - mzz) - own)
+            + 2.0 * k * square * (ayz * (ayz - myz) + azx * (azx - mzx) + axy * (axy - mxy))
         )
-        energy = of_energy * w[_SIX_VOLUMES + i] * excess
+        energy = of_energy * s[_MASS + i] * excess
         s[_WORK + i] += energy - s[_DISTORTION + i]
         s[_DISTORTION + i] = energy
         one, two = g * (k + square), g * square
-        sxx, syy, szz = one * bxx - two * axx, one * byy - two * ayy, one * bzz - two * azz
+        sxx, syy, szz = two * mxx - one * axx, two * myy - one * ayy, two * mzz - one * azz
         mean = (sxx + syy + szz) * _THIRD
         s[_SXX + i], s[_SYY + i], s[_SZZ + i] = sxx - mean, syy - mean, szz - mean
-        s[_SYZ + i], s[_SZX + i], s[_SXY + i] = one * byz - two * ayz, one * bzx - two * azx, one * bxy - two * axy
+        s[_SYZ + i], s[_SZX + i], s[_SXY + i] = two * myz - one * ayz, two * mzx - one * azx, two * mxy - one * axy
 
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
@@ -128,5 +134,5 @@ def stiffen(w, s, params, n):  # type: ignore[no-untyped-def]
         w[MODULUS + i] += 4.0 * _THIRD * (stiff - shear)
 
 
-LAW = Law("", FROM_SHAPE, lambda _: DISTORTION + 1, lambda _: (), lambda *_: {}, hyperelastic)
+LAW = Law("", FROM_SHAPE, lambda _: TET_VOLUME + 1, lambda _: (), lambda *_: {}, hyperelastic)
 """Materials without a strength."""

@@ -26,8 +26,8 @@ from ..errors import InputError
 from ..parallel.comm import Comm
 from .parcel import Parcel, Table, take
 
-FORMAT = 6
-"""Of the files; 5 has the edges that flow has made sharp and the later half of friction. Others are not read."""
+FORMAT = 7
+"""Of the files; 7 has the volumes of tets without a strength. Others are not read."""
 _KEPT = 2
 """Checkpoints that stay; the older ones go."""
 _MANIFEST = "manifest.json"
