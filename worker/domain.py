@@ -202,7 +202,7 @@ def block(
     return Block(
         part=index, n=len(ids), id=ids, state=state, tets=tets,
         kind=models.strength_of(material), eos=models.eos_of(material),
-        params=models.parameters(material, case.numerics.viscosity),
+        params=models.parameters(material, case.numerics.viscosity, breaks=part.fracture is not None),
         border_chunks=-(-border // CHUNK), temperature=part.temperature, across=across,
         worn=np.zeros(len(ids) if part.erosion is not None else 0, bool), life=wear.life(part.erosion),
         quiet=np.zeros((-(-len(ids) // CHUNK), 3), np.int64),

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from conoid.worker.elements.tet4 import LENGTH_FACTOR
+from conoid.worker.materials.law import BREAKS
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import VISCOUS, WORK, WORK_VISCOUS
+from conoid.worker.state import PRESSURE, VISCOUS, WORK, WORK_VISCOUS
 
 from . import formulas
 from .kernels import FORMS, STEEL, Form, Patch, build, run, scene
@@ -132,6 +133,27 @@ def test_viscous_bound_is_never_above_the_exact_limit(rate: float) -> None:
         mass = free_volume(patch) * DENSITY / 4.0
         dt = 1.0 / patch.limit
         assert np.linalg.eigvalsh(mass * np.eye(12) - 0.5 * dt * damping - 0.25 * dt**2 * stiffness)[0] > -1e-9 * mass
+
+
+def test_what_may_break_is_bounded_in_tension_as_if_it_were_let_go() -> None:
+    """By the viscosity at the speed |p| / (density c); a part that does not fracture is not, nor is one without."""
+    mesh, found = free_tets(1, 4), []
+    for breaks in (False, True):
+        patch = one(mesh, 0, 0.3, viscosity={"linear": LINEAR, "shock": SHOCK, "quadratic": QUADRATIC})
+        patch.block.params[BREAKS] = breaks
+        patch.strain(1e6 * np.eye(3), DT)
+        patch.advance(DT)
+        found.append(patch.limit)
+        volume, grad = formulas.gradients(patch.corners())
+    density, bulk, shear = DENSITY * float(free_volume(patch) / volume[0]), *moduli(0.3)
+    c = math.sqrt((bulk + 4.0 / 3.0 * shear * free_volume(patch) / float(volume[0])) / density)
+    u = -float(patch.get(PRESSURE)[0]) / (density * c)
+    share = u / (u + 0.01 * c)
+    tangent = LENGTH_FACTOR * ((LINEAR + SHOCK * share * (2.0 - share)) * c + 2.0 * QUADRATIC * u)
+    steep = float(formulas.inverse_length(grad)[0])
+    assert u > 1.0
+    assert found[0] == pytest.approx(steep * c, rel=1e-8)
+    assert found[1] == pytest.approx(steep * (tangent + math.sqrt(tangent**2 + c**2)), rel=1e-8)
 
 
 def test_viscous_bound_shrinks_with_the_rate() -> None:

@@ -17,6 +17,7 @@ from ..materials.hyperelastic import stiffen
 from ..materials.law import (
     AFTER_PRESSURE,
     BEFORE_PRESSURE,
+    BREAKS,
     DILATES,
     FROM_SHAPE,
     ORDER,
@@ -89,7 +90,7 @@ def pressure_and_limit(eos, w, s, params, n, dt):  # type: ignore[no-untyped-def
     linear, shock, quadratic = params[Q_LINEAR], params[Q_SHOCK], params[Q_QUADRATIC]
     if max(linear, shock, quadratic) > 0.0:
         frequency = 1.0 / dt if dt > 0.0 else 0.0
-        bulk_viscosity(w, s, n, linear, shock, quadratic, frequency)
+        bulk_viscosity(w, s, n, linear, shock, quadratic, frequency, params[BREAKS] > 0.0)
     else:
         tet4.step_limit(w, s, n)
     tet4.motion_limit(w, n)

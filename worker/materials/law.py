@@ -10,10 +10,11 @@ from typing import Any
 
 from ..state import Floats
 
-DENSITY, BULK, SHEAR, Q_LINEAR, Q_SHOCK, Q_QUADRATIC, ORDER, SPALL, DILATES = range(9)
+DENSITY, BULK, SHEAR, Q_LINEAR, Q_SHOCK, Q_QUADRATIC, ORDER, SPALL, DILATES, BREAKS = range(10)
 """Places in a block's constants: what every material has. ORDER says when its law acts; SPALL is infinite where the
-material names none; DILATES is the sine of the dilation angle, zero where flow keeps the volume."""
-EQUATION, FIRST, SIZE = 9, 14, 41
+material names none; DILATES is the sine of the dilation angle, zero where flow keeps the volume; BREAKS is 1
+where the part fractures."""
+EQUATION, FIRST, SIZE = 10, 15, 42
 """Where the constants of the equation of state and of the law begin, and how many there is room for."""
 FROM_SHAPE, BEFORE_PRESSURE, AFTER_PRESSURE = range(3)
 """When a law acts: it makes the deviatoric stress from the undeformed shape; it returns the trial stress, before the

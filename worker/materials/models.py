@@ -16,6 +16,7 @@ from ..jit import njit
 from ..state import Floats
 from . import equation_of_state, hyperelastic, johnson_cook, johnson_holmquist, mohr_coulomb, plastic
 from .law import (
+    BREAKS,
     BULK,
     DENSITY,
     DILATES,
@@ -93,13 +94,15 @@ def moduli(material: Material) -> tuple[float, float]:
     return young / (3.0 * (1.0 - 2.0 * poisson)), shear
 
 
-def parameters(material: Material, viscosity: Viscosity | None) -> Floats:
-    """(SIZE,) constants of a material, SI; ``viscosity`` None switches the bulk viscosity off."""
+def parameters(material: Material, viscosity: Viscosity | None, *, breaks: bool = False) -> Floats:
+    """(SIZE,) constants of a material, SI; ``viscosity`` None switches the bulk viscosity off; ``breaks``: whether the
+    part fractures.
+    """
     law, params = law_of(material), np.zeros(SIZE)
     params[DENSITY], params[ORDER] = material.density, law.order
     params[SPALL] = math.inf if material.spall is None else material.spall
     params[BULK], params[SHEAR] = moduli(material)
-    params[DILATES] = law.dilates(material.strength)
+    params[DILATES], params[BREAKS] = law.dilates(material.strength), float(breaks)
     if viscosity is not None:
         params[Q_LINEAR], params[Q_QUADRATIC] = viscosity.linear, viscosity.quadratic
         params[Q_SHOCK] = viscosity.shock

@@ -4,23 +4,28 @@ import numpy as np
 
 from ..elements.tet4 import AREAS, CHANGE, LENGTH_FACTOR, LIMIT, MODULUS, VOLUME
 from ..jit import njit
-from ..state import CHUNK, MASS, VISCOUS, WORK_VISCOUS
+from ..state import CHUNK, MASS, PRESSURE, VISCOUS, WORK_VISCOUS
 
 HALF = 0.01
 """Of the wave speed: a difference of speed over a tet at which half of the shock term is there. Chosen between elastic
 waves in bars (10 m/s over some tets: 5e-4) and weak shocks (300 m/s in copper: 0.03)."""
-_Q, _MASS, _WORK = VISCOUS * CHUNK, MASS * CHUNK, WORK_VISCOUS * CHUNK
+_P, _Q, _MASS, _WORK = PRESSURE * CHUNK, VISCOUS * CHUNK, MASS * CHUNK, WORK_VISCOUS * CHUNK
 
 
-@njit("void(float64[::1], float64[::1], int64, float64, float64, float64, float64)", cache=True, error_model="numpy")
-def bulk_viscosity(w, s, n, linear, shock, quadratic, rate_of_change):  # type: ignore[no-untyped-def]
+@njit(
+    "void(float64[::1], float64[::1], int64, float64, float64, float64, float64, boolean)",
+    cache=True,
+    error_model="numpy",
+)
+def bulk_viscosity(w, s, n, linear, shock, quadratic, rate_of_change, breaks):  # type: ignore[no-untyped-def]
     """q = density u ((linear + shock S) c + quadratic u), u = l |rate|, in compression, Pa; its work; LIMIT, 1/s.
 
     von Neumann and Richtmyer 1950 (quadratic), Landshoff 1955 (linear); S = u / (u + HALF c) tells a shock from an
     elastic wave. ``rate_of_change`` turns CHANGE into a volume flux, 1/s. With G = sqrt(sum |grad N|^2) and Q the
     tangent (linear + shock S (2 - S)) c + 2 quadratic u the largest stable step is
     1 / (G (G l Q + sqrt((G l Q)^2 + c^2))); l = LENGTH_FACTOR / G. Both are derived in docs/numerics.md. A tet that is
-    inside out has no viscosity, and NaN as its limit.
+    inside out has no viscosity, and NaN as its limit. Where a part ``breaks`` a tet in tension is bounded as one that
+    is compressed at the speed at which it would be let go, |p| / (density c).
     """
     for i in range(n):
         mass, change = s[_MASS + i], w[CHANGE + i]
@@ -35,8 +40,11 @@ def bulk_viscosity(w, s, n, linear, shock, quadratic, rate_of_change):  # type: 
         u = length * rate
         share = u / (u + HALF * c)
         new = density * u * ((linear + shock * share) * c + quadratic * u)
+        if breaks:
+            u = max(u, -s[_P + i] / (density * c))
+            share = u / (u + HALF * c)
         tangent = LENGTH_FACTOR * ((linear + shock * share * (2.0 - share)) * c + 2.0 * quadratic * u)
-        tangent = 0.0 if rate == 0.0 else tangent
+        tangent = 0.0 if u == 0.0 else tangent
         s[_WORK + i] -= 0.5 * (s[_Q + i] + new) * change
         s[_Q + i] = new
         limit = gradient * (tangent + np.sqrt(tangent * tangent + c * c))
