@@ -11,7 +11,8 @@ from .state import VOLUME_FLUX, Floats, Model
 def digest(model: Model, comm: Comm, nodal: list[Floats]) -> str | None:
     """Hex digest on rank 0, None elsewhere.
 
-    Positions, velocities, what else the nodes carry (``nodal``), and every row of the tets' state but the scratch one.
+    Positions, velocities, what else the nodes carry (``nodal``), and every row of the tets' state but VOLUME_FLUX:
+    it is scratch, or in a material without a strength the volume, which the positions say.
     """
     nodes, h = model.nodes, hashlib.sha256()
     owned = nodes.owned

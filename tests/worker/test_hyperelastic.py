@@ -10,11 +10,11 @@ from conoid.cases.materials import Material
 from conoid.worker.materials.hyperelastic import inverse_sixth_root
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import DISTORTION, PRESSURE, WORK
+from conoid.worker.state import DISTORTION, PRESSURE, TET_VOLUME, WORK
 
 from . import formulas
-from .kernels import HARD, STEEL, Patch, build, run, scene
-from .meshes import REGULAR, Floats, free_tets
+from .kernels import COPPER_GAS, FORMS, HARD, STEEL, Form, Patch, build, run, scene
+from .meshes import REGULAR, Floats, block, free_tets
 
 SHEAR, BULK = 200e9 / 2.6, 200e9 / 1.2
 N = 400
@@ -172,6 +172,16 @@ def test_a_stretched_regular_tet_is_stiffer() -> None:
     modulus = BULK + 4.0 / 3.0 * (SHEAR + 2.0 * energy) / J
     c = math.sqrt(modulus * J / 7850.0)
     assert math.isclose(patch.limit, c * float(formulas.inverse_length(grad)[0]), rel_tol=1e-12)
+
+
+@pytest.mark.parametrize("material", [STEEL, COPPER_GAS], ids=["steel", "gas"])
+@pytest.mark.parametrize("form", FORMS)
+def test_a_tet_keeps_the_volume_of_its_positions(form: Form, material: Material) -> None:
+    sim = build(scene(material, form), [block((3, 3, 3), 1e-3, shake=0.2, seed=1)])
+    nodes, body = sim.model.nodes, sim.model.blocks[0]
+    nodes.v[:] = np.random.default_rng(2).uniform(-30.0, 30.0, nodes.v.shape)
+    run(sim, steps=20)
+    assert np.array_equal(body.row(TET_VOLUME), formulas.volumes(nodes.x[body.tets]))
 
 
 def rung(material: Material) -> tuple[float, float]:

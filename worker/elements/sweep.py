@@ -4,7 +4,8 @@
 between them: ``strain_pass`` (velocity gradient, deviatoric stress, nodal volume sums) and ``force_pass`` (pressure,
 viscosity, forces). ``forces_again`` repeats only the sum of forces, in a coarser quantum. Where the strength depends on
 the pressure, the plastic return comes after the equation of state, and with it, in two passes, the whole deviatoric
-stress: then the second pass makes the velocity gradient again.
+stress: then the second pass makes the velocity gradient again. A law from the shape has no velocity gradient: the first
+of two passes finds volumes alone.
 
 Chunks at rest, which no wave has reached, are passed over (rest.py).
 
