@@ -163,8 +163,15 @@ class Solver:
         self.active.leave(self._crowd, self.total, self._nodes, np.zeros((1, 3), np.int64))
         assert (self.total.sum(axis=0) == 0).all()
 
+    @property
+    def kept(self) -> Floats:
+        """(candidates, 4) what the pairs keep of the step."""
+        kept = np.zeros((many(self.met), 4))
+        self.active.store(kept)
+        return kept
+
     def resume(self, kept: Floats, ratio: float = 1.0) -> None:
-        """Begins with ``ratio`` times the pushes (candidates, 4) that were kept."""
+        """Begins with ``ratio`` times what was ``kept`` (candidates, 4)."""
         self.active.resume(kept, ratio)
         self._leave()
 

@@ -71,8 +71,8 @@ class Plain:
         met, changes = self.met, np.zeros((CONTACTS, 3))
         for p in np.flatnonzero(met.pair >= 0):
             along = _dot(kept[met.pair[p], 1:], met.normals[p])
-            self.push[p, 0] = self.last[p] = 0.8 * ratio * kept[met.pair[p], 0]
-            self.push[p, 1:] = ratio * (kept[met.pair[p], 1:] - along * met.normals[p])
+            self.push[p, 0] = self.last[p] = 0.8 * ratio * kept[met.pair[p], 0] / self.norms[p, 0]
+            self.push[p, 1:] = ratio * (kept[met.pair[p], 1:] - along * met.normals[p]) / self.norms[p, 1]
             changes[p] = self.push[p, 0] * met.normals[p] + self.push[p, 1:]
         self.give(changes)
 

@@ -305,8 +305,19 @@ def test_a_step_begins_with_the_impulses_of_the_one_before() -> None:
     met, v, mobility = network(7, friction=0.4)
     first, again = Solver(met, v, mobility), Solver(met, v, mobility)
     solved = first.sweep(2000)
-    again.resume(first.push)
+    again.resume(first.kept)
     across = first.push[:, 1:] - (first.push[:, 1:] * met.normals).sum(axis=1)[:, None] * met.normals
     assert again.push[:, 1:] == pytest.approx(across, abs=1e-9)
     assert again.push[:, 0] == pytest.approx(0.8 * first.push[:, 0], abs=1e-9)
     assert np.abs(again.sweep(5) - solved).max() < 0.5 * np.abs(Solver(met, v, mobility).sweep(5) - solved).max()
+
+
+def test_a_node_that_has_become_lighter_begins_with_less() -> None:
+    """With as much speed as before: an eighth of the mass on either side, an eighth of the impulse."""
+    met, v, mobility = network(7, friction=0.4)
+    heavy, same, light = Solver(met, v, mobility), Solver(met, v, mobility), Solver(met, v, 8.0 * mobility)
+    heavy.sweep(2000)
+    same.resume(heavy.kept)
+    light.resume(heavy.kept)
+    assert light.push == pytest.approx(same.push / 8.0, abs=1e-9)
+    assert light.v - v == pytest.approx(same.v - v, abs=1e-9)

@@ -70,7 +70,9 @@ def at_rest(sim: Simulation) -> Simulation:
         if sim.model.nodes_global > first:
             break
     assert sim.model.nodes_global == first + 16
-    nodes.x[:], nodes.v[:], nodes.force[:] = nodes.x0, 0.0, 0
+    nodes.x[:], nodes.v[:] = nodes.x0, 0.0
+    step.prepare(sim)  # the volumes that tets keep
+    nodes.force[:] = 0
     for b in sim.model.blocks:
         b.state[:, : state.VISCOUS + 1, :] = 0.0
     return sim

@@ -37,7 +37,8 @@ class PairTable:
     speed: Floats = field(default_factory=lambda: np.zeros(0))
     turned: Flags = field(default_factory=lambda: np.zeros(0, bool))
     kept: Floats = field(default_factory=lambda: np.zeros((0, 4)))
-    """(p, 4) the pair's impulse of the last step, zero where it was not active: along the normal, and across, N s."""
+    """(p, 4) the pair's impulse of the last step times its row norm, zero where it was not active: along the normal,
+    and across, m/s."""
     next: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
     tested: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
     """Pairs that the narrow phase of the last step has tested."""

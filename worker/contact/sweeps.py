@@ -150,17 +150,18 @@ def load_kept(loaded, contacts, active, kept):  # type: ignore[no-untyped-def]
 
 @njit(types.void(NODES, LOADED, _F2, _ROWS, _F, _F), cache=True)
 def resume(active, loaded, kept, pair, ratio, scale):  # type: ignore[no-untyped-def]
-    """The loaded contacts begin with ``ratio`` times what their pairs have ``kept`` (candidates, 4), along and across
-    the normal as it is now.
+    """The loaded contacts begin with ``ratio`` times what their pairs have ``kept`` (candidates, 4), m/s, along and
+    across the normal as it is now: over the row norms as they are now, so that a node that has separated, and is
+    lighter, or that shares its load with others begins with less.
     """
     words, normal, tangent, slots, row = active.moving_words, loaded.normal, loaded.tangent, loaded.slots, loaded.row
     for q in range(loaded.many[0]):
         last, along = pair[row[q]], 0.0
         for i in range(3):
             along += kept[last, 1 + i] * normal[q, i]
-        normal[q, PUSH] = normal[q, LAST] = _KEPT * ratio * kept[last, 0]
+        normal[q, PUSH] = normal[q, LAST] = _KEPT * ratio * kept[last, 0] / normal[q, ROW_NORM]
         for i in range(3):
-            tangent[q, PUSH_T + i] = ratio * (kept[last, 1 + i] - along * normal[q, i])
+            tangent[q, PUSH_T + i] = ratio * (kept[last, 1 + i] - along * normal[q, i]) / tangent[q, ROW_NORM_T]
             change = normal[q, PUSH] * normal[q, i] + tangent[q, PUSH_T + i]
             rest = np.int64(0)
             for k in range(1, 4):
@@ -268,10 +269,10 @@ def sweep_all(active, loaded, contacts, fastest, n, scale, many):  # type: ignor
 
 @njit(types.void(_F2, LOADED, _ROWS), cache=True)
 def store(kept, loaded, pair):  # type: ignore[no-untyped-def]
-    """Stores the impulses of loaded contacts with their pairs, ``kept`` (candidates, 4)."""
+    """Stores the impulses of loaded contacts times their row norms with their pairs, ``kept`` (candidates, 4), m/s."""
     for q in range(loaded.many[0]):
         k = pair[loaded.row[q]]
-        if k >= 0:
-            kept[k, 0] = loaded.normal[q, PUSH]
+        if k >= 0 and loaded.normal[q, PUSH] > 0.0:
+            kept[k, 0] = loaded.normal[q, PUSH] * loaded.normal[q, ROW_NORM]
             for i in range(3):
-                kept[k, 1 + i] = loaded.tangent[q, PUSH_T + i]
+                kept[k, 1 + i] = loaded.tangent[q, PUSH_T + i] * loaded.tangent[q, ROW_NORM_T]
