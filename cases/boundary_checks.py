@@ -4,11 +4,12 @@ import math
 from collections.abc import Iterator
 from itertools import combinations, pairwise
 
-from .bodies import MeshFile
+from .bodies import Loose, MeshFile
 from .drives import clash
-from .geometry import lowest_along
+from .geometry import index, lowest_along
+from .placed import Placed
 from .problems import Location, Problem, choices, nearest, problem
-from .schema import Case, Gravity, Prescribed, Rotation, Traction, Wall
+from .schema import Case, Gravity, Prescribed, Rotation, Symmetry, Traction, Wall
 
 ROUNDING = 1e-9
 """Of a length or a time: two numbers that agree to this were meant to be equal. Chosen far above the rounding of
@@ -28,7 +29,38 @@ def check_boundaries(case: Case) -> Iterator[Problem]:
             yield problem(("boundaries", i, "acceleration"), "0, 0, 0", "must not be zero")
         elif isinstance(boundary, Traction):
             yield from _traction(boundary, ("boundaries", i))
+        yield from _out_of_reach(case, i)
     yield from _two_drives(case)
+
+
+def _out_of_reach(case: Case, number: int) -> Iterator[Problem]:
+    """A plane or a box off all bodies that it is for; what lies between nodes of a body the worker finds."""
+    boundary = case.boundaries[number]
+    parts = [part for part in case.parts if not boundary.parts or part.name in boundary.parts]
+    bodies = [Placed(part.mesh, part.turn).bounds() for part in parts if not isinstance(part.mesh, MeshFile | Loose)]
+    if not bodies or len(bodies) < len(parts):
+        return
+    margin = ROUNDING * max(1.0, *(abs(x) for body in bodies for corner in body for x in corner))
+    if isinstance(boundary, Symmetry):
+        d = index(boundary.axis)
+        if not any(low[d] - margin <= boundary.at <= high[d] + margin for low, high in bodies):
+            reach = f"{min(low[d] for low, _ in bodies):g} and {max(high[d] for _, high in bodies):g} m"
+            message = f"no node lies on this plane: the bodies are between {reach} along {boundary.axis}"
+            yield problem(("boundaries", number, "at"), f"{boundary.at:g} m", message)
+    elif isinstance(boundary, Prescribed | Traction) and boundary.low is not None and boundary.high is not None:
+        box = list(zip(boundary.low, boundary.high, strict=True))
+        if all(a <= b for a, b in box) and not any(
+            all(a <= top + margin and b >= bottom - margin for (a, b), bottom, top in zip(box, *body, strict=True))
+            for body in bodies
+        ):
+            low, high = (
+                [pick(x) for x in zip(*corners, strict=True)]
+                for pick, corners in zip((min, max), zip(*bodies, strict=True), strict=True)
+            )
+            reach = " to ".join(f"({', '.join(f'{x:g}' for x in corner)})" for corner in (low, high))
+            yield problem(
+                ("boundaries", number), ..., f"the box misses all bodies that it is for; they are in {reach} m"
+            )
 
 
 def _two_drives(case: Case) -> Iterator[Problem]:

@@ -173,6 +173,12 @@ def _contact(case: Case) -> Iterator[Problem]:
                 yield problem((*location, k), name, f"no part of this name; {nearest(name, names)}")
             elif contact.parts and name not in contact.parts:
                 yield problem((*location, k), name, f"must be in contact.parts: {choices(contact.parts)}")
+    meet = {*contact.self_contact, *(part.name for part in case.parts if part.fracture is not None)}
+    for i, pair in enumerate(contact.pairs):
+        one, other = pair.parts
+        if one == other and one in names and one not in meet:
+            message = "a part that does not meet itself; name it in contact.self_contact, or let it fracture"
+            yield problem(("contact", "pairs", i, "parts"), f"{one}, {other}", message)
 
 
 def _probes(case: Case) -> Iterator[Problem]:

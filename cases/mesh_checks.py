@@ -1,6 +1,7 @@
 """What the models cannot check one by one in a mesh: sizes that must fit, slits on planes of nodes."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from pathlib import Path
 
 from .bodies import Box, Loose, Mesh, MeshFile, Plate, Primitive, Tube
 from .geometry import AXES, across, cut_directions, index, thinnest
@@ -35,6 +36,13 @@ def check_mesh(mesh: Mesh, location: Location) -> Iterator[Problem]:
         yield problem((*location, "element_size"), mesh.element_size, message)
     elif isinstance(mesh, Box | Plate):
         yield from _slit(mesh, (*location, "slit"))
+
+
+def missing_files(parts: Iterable[Mesh], folder: Path) -> Iterator[Problem]:
+    """Mesh files of the ``parts`` that are not where the case says, from its ``folder`` on."""
+    for i, mesh in enumerate(parts):
+        if isinstance(mesh, MeshFile) and not (folder / mesh.path).is_file():
+            yield problem(("parts", i, "mesh", "path"), mesh.path, f"no such file ({(folder / mesh.path).absolute()})")
 
 
 def _slit(mesh: Box | Plate, location: Location) -> Iterator[Problem]:

@@ -12,6 +12,7 @@ from typer.core import TyperGroup
 
 from conoid.cases.estimate import estimate
 from conoid.cases.load import CaseError, parse_case
+from conoid.cases.mesh_checks import missing_files
 from conoid.cases.plausible import doubts
 from conoid.cases.problems import Problem
 from conoid.cases.run import ExitCode
@@ -98,9 +99,12 @@ def validate(case: CaseArgument, overrides: Overrides = None, as_json: Json = Fa
     No server is asked. Warnings go to standard error and leave the exit code 0.
     """
     data = data_of(case, overrides or ())
-    checked = parse_case(data)
+    checked, folder = parse_case(data), locate(case).parent
+    missing = list(missing_files((part.mesh for part in checked.parts), folder))
+    if missing:
+        raise CaseError(missing)
     try:
-        expected = estimate(checked, locate(case).parent)
+        expected = estimate(checked, folder)
     except (ArithmeticError, ValueError):
         raise CaseError([Problem("parts", "", "the elements are too many or too small to be counted")]) from None
     odd = doubts(data, checked, expected)

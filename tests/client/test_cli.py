@@ -68,6 +68,12 @@ def test_validate_tells_every_error_and_ends_with_2(quiet_home: Path) -> None:
     assert said[1:] == ["conoid: run.end_tim: unknown key; did you mean 'end_time'?"]
 
 
+def test_validate_looks_for_mesh_files(quiet_home: Path) -> None:
+    result = conoid("validate", "demo", "--set", 'parts[0].mesh={shape="file", path="rod.msh", unit="1 mm"}')
+    assert result.exit_code == 2
+    assert "parts[0].mesh.path = 'rod.msh': no such file (" in result.stderr
+
+
 def test_validate_tells_what_parts_bring_along(quiet_home: Path) -> None:
     shown = conoid("validate", "demo").stdout
     line = next(line for line in shown.splitlines() if line.startswith("rod"))
