@@ -7,6 +7,11 @@ COLLAPSE = 1e-6
 Chosen: a run of a million times the steps never ends."""
 
 
+STARVED = 1e-3
+"""A stable step below this share of the first one is worth a warning: what is left takes a thousand times the steps.
+Chosen: dust and penetration take it down to a hundredth."""
+
+
 class Clock:
     """Simulated time, compensated (Kahan), and the step that leads on."""
 
@@ -88,6 +93,16 @@ class Clock:
     def collapsed(self) -> bool:
         """Whether the stable step has fallen so far below the first that the run would not end."""
         return self._stable < COLLAPSE * self._first
+
+    @property
+    def starved(self) -> bool:
+        """Whether the stable step has fallen so far that people should know."""
+        return self._stable < STARVED * self._first
+
+    @property
+    def steps_left(self) -> float:
+        """To the end of the run, at the stable step as it is."""
+        return (self._end - self.t) / self._stable
 
     @property
     def stable(self) -> float:

@@ -158,5 +158,8 @@ def _sum_up(
         without=without(sim.case), peak_memory=memory or [],
         element_updates_per_second=(loop.updates - start.updates) / total_cpu if total_cpu > 0.0 else 0.0,
         reference=checks,
-        warnings=[*(sim.fracture.warnings if sim.fracture is not None else []), *(inside.warnings if inside else [])],
+        warnings=[
+            *loop.warnings, *(sim.fracture.warnings if sim.fracture is not None else []),
+            *(inside.warnings if inside else []),
+        ],
     )  # fmt: skip

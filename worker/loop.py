@@ -91,6 +91,8 @@ class Loop:
         self.energy: Energy | None = None
         self._parts: dict[str, PartEnergy] = {}
         self.stopped = 0
+        self.warnings: list[str] = []
+        """What the steps have given reason for; equal on all ranks."""
         self._told = False
         self._folder = folder
         self._journal = journal
@@ -141,6 +143,8 @@ class Loop:
         sampling = ending or clock.t >= self._sample * sim.case.run.end_time / sim.case.run.samples
         before = sim.model.nodes.v.copy() if sampling else None
         step.first_half(sim)
+        if clock.starved and not self.warnings:
+            self._warn_of_steps()
         with sim.timers.phase("output"):
             if before is not None:
                 self._look(before)
@@ -148,6 +152,17 @@ class Loop:
                 self._write_frame()
             self.snapshots.look(sim, due=sim.reduction.snapshot, ending=ending)
         self.snapshots.tell()
+
+    def _warn_of_steps(self) -> None:
+        """All ranks take part."""
+        sim, clock = self.sim, self.sim.clock
+        text = (
+            f"the stable step has fallen to {clock.stable:.2g} s, below 1/1000 of the first, at {clock.t:.3g} s ("
+            f"{sim.limiter()}): about {clock.steps_left:.2g} steps are left; erosion.time_step lets go of such tets, "
+            "run.max_steps ends the run"
+        )
+        self.warnings.append(text)
+        self._tell(messages.Log, level="warning", text=text)
 
     def _move(self) -> None:
         """Tets to other ranks, when that is due and a step is left."""

@@ -1,0 +1,68 @@
+"""A run whose stable step falls by orders says so, with the tet and what helps, on any number of ranks."""
+
+from pathlib import Path
+
+import pytest
+
+from conoid.cases import layout
+from conoid.cases.outcome import Outcome, from_json
+
+from .launching import command, ended
+
+SQUASHED = """
+name = "squashed"
+contact = "none"
+[materials.rubber]
+density = 1000
+elastic = { young = 1e6, poisson = 0.3 }
+[[parts]]
+name = "block"
+material = "rubber"
+[parts.mesh]
+shape = "box"
+low = [0, 0, 0]
+high = [1e-3, 1e-3, 1e-3]
+generator = "structured"
+element_size = 1e-3
+[[boundaries]]
+kind = "velocity"
+low = [-1, -1, 0.9e-3]
+high = [1, 1, 1.1e-3]
+z = -1
+x = 0
+y = 0
+[[boundaries]]
+kind = "velocity"
+low = [-1, -1, -0.1e-3]
+high = [1, 1, 0.1e-3]
+x = 0
+y = 0
+z = 0
+[run]
+end_time = END
+frames = 0
+"""
+"""All nodes are driven: flat at 1 ms."""
+
+
+def outcome(tmp_path: Path, end: str, ranks: int) -> Outcome:
+    case, out = tmp_path / "squashed.toml", tmp_path / f"{end}_{ranks}"
+    case.write_text(SQUASHED.replace("END", f'"{end}"'), encoding="utf-8")
+    ended(command(ranks, str(case), "--out", str(out)))
+    return from_json((out / layout.OUTCOME).read_bytes())
+
+
+def test_half_flat_is_no_reason_to_say_anything(tmp_path: Path) -> None:
+    end = outcome(tmp_path, "0.5 ms", 1)
+    assert (end.state, end.warnings) == ("succeeded", [])
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_flat_is(tmp_path: Path, ranks: int) -> None:
+    end = outcome(tmp_path, "1.1 ms", ranks)
+    assert end.state == "failed"
+    [line] = end.warnings
+    assert line.startswith("the stable step has fallen to ")
+    assert "below 1/1000 of the first, at 0.00099" in line
+    assert " s (stability: tet " in line
+    assert " of block): about " in line
