@@ -10,13 +10,17 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from llvmlite import ir
 from numba import types
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher, cpu_target
+from numba.extending import intrinsic
 
-__all__ = ["DECLARED", "Kernel", "njit", "types"]
+__all__ = ["DECLARED", "Kernel", "njit", "prefetch", "types"]
 
 _BLAS = "scipy.linalg"
+_TO_READ, _TO_SECOND, _DATA = 0, 2, 1
+"""Of LLVM's prefetch: to read, into the second level of the cache, data."""
 DECLARED: list["Kernel"] = []
 """Every kernel of the modules that are imported."""
 
@@ -60,6 +64,25 @@ def njit(signature: Any, *, cache: bool = True, **options: Any) -> Callable[[Cal
         return kernel
 
     return declare
+
+
+def _prefetch(_: Any, array: Any, index: Any) -> Any:
+    word, byte = ir.IntType(32), ir.IntType(8).as_pointer()
+
+    def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        data = context.make_array(signature.args[0])(context, builder, args[0]).data
+        kind = ir.FunctionType(ir.VoidType(), [byte, word, word, word])
+        call = builder.module.declare_intrinsic("llvm.prefetch", [byte], kind)
+        place = builder.bitcast(builder.gep(data, [args[1]]), byte)
+        builder.call(call, [place, word(_TO_READ), word(_TO_SECOND), word(_DATA)])
+        return context.get_dummy_value()
+
+    return types.void(array, index), emit
+
+
+prefetch: Any = intrinsic(_prefetch)
+"""In a kernel: has the cache line of a place of a one-dimensional array brought near; a place beyond its end does no
+harm. It changes no value."""
 
 
 class _Loading:

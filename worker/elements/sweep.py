@@ -51,14 +51,14 @@ _B1 = "boolean[::1]"
 @njit(f"void({_F1}, {_F2}, {_T2}, int64, float64)", cache=True, error_model="numpy")
 def rates(w, v, t, n, dt):  # type: ignore[no-untyped-def]
     """Rates of deformation, from the edges of a chunk and its nodes' velocities."""
-    tet4.gather(w[tet4.RATE :], v, t, n)
+    tet4.gather(w[tet4.RATE :], v, t, w[:0], n)
     tet4.kinematics(w, n, dt)
 
 
 @njit(f"void({_F1}, {_F2}, {_T2}, int64)", cache=True, error_model="numpy")
 def first_speeds(w, v, t, n):  # type: ignore[no-untyped-def]
     """SPEED of tets that know no volume before the present one: by their nodes' velocities."""
-    tet4.gather(w[tet4.RATE :], v, t, n)
+    tet4.gather(w[tet4.RATE :], v, t, w[:0], n)
     tet4.speeds(w, n)
 
 
@@ -152,9 +152,9 @@ def standard_pass(  # type: ignore[no-untyped-def]
             continue
         before = s.copy() if still else s[:0]
         if shape:
-            tet4.gather_moved(w, x0, x, t, n)
+            tet4.gather_moved(w, x0, x, t, s, n)
         else:
-            tet4.gather(w[tet4.EDGE :], x, t, n)
+            tet4.gather(w[tet4.EDGE :], x, t, s, n)
         upset = s.copy() if len(worn) > 0 and any_inside_out(w, n) else s[:0]
         if shape:
             tet4.end_gradients(w, n)
@@ -212,16 +212,16 @@ def strain_pass(  # type: ignore[no-untyped-def]
             if shape:
                 tet4.unchanged(w, s, n)
             else:
-                tet4.gather(w[tet4.EDGE :], x, t, n)
+                tet4.gather(w[tet4.EDGE :], x, t, s[:0], n)
                 tet4.at_rest(w, n)
             if len(flat) > 0:
                 keep_out(w, flat[c * CHUNK : c * CHUNK + n], n)
             averaged.scatter_volumes(sums, w, weight, t, n, dt)
             continue
         if shape and early:
-            tet4.gather_moved(w, x0, x, t, n)
+            tet4.gather_moved(w, x0, x, t, s, n)
         else:
-            tet4.gather(w[tet4.EDGE :], x, t, n)
+            tet4.gather(w[tet4.EDGE :], x, t, s[:0] if shape else s, n)
         before = s.copy() if still else s[:0]
         upset = s.copy() if len(worn) > 0 and any_inside_out(w, n) else s[:0]
         if shape:
@@ -284,9 +284,9 @@ def force_pass(  # type: ignore[no-untyped-def]
             continue
         before = s.copy() if still else s[:0]
         if shape and not early:
-            tet4.gather_moved(w, x0, x, t, n)
+            tet4.gather_moved(w, x0, x, t, s, n)
         else:
-            tet4.gather(w[tet4.EDGE :], x, t, n)
+            tet4.gather(w[tet4.EDGE :], x, t, s, n)
         upset = s.copy() if len(worn) > 0 and any_inside_out(w, n) else s[:0]
         if params[ORDER] == AFTER_PRESSURE:
             rates(w, v, t, n, dt)
@@ -340,7 +340,7 @@ def forces_again(  # type: ignore[no-untyped-def]
         t = tets[c * CHUNK : (c + 1) * CHUNK]
         s = state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
         n = len(t)
-        tet4.gather(w[tet4.EDGE :], x, t, n)
+        tet4.gather(w[tet4.EDGE :], x, t, s, n)
         tet4.end_gradients(w, n)
         w[_LIMIT : _LIMIT + n] = 0.0
         own = flat[c * CHUNK : c * CHUNK + n] if len(flat) > 0 else flat

@@ -95,7 +95,7 @@ def _forces(room, place, chosen, n, mesh, x, scale):  # type: ignore[no-untyped-
             room.tets[i, k] = mesh.tets[e, k]
         for row in range(_ROWS):
             room.state[row * CHUNK + i] = mesh.state[at + row * CHUNK]
-    gather(room.w[EDGE:], x, room.tets, n)
+    gather(room.w[EDGE:], x, room.tets, room.w[:0], n)
     end_gradients(room.w, n)
     internal_forces(room.forces, room.w, room.state, n, scale)
 
