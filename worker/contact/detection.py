@@ -8,8 +8,8 @@ from ..state import Floats, Indices, Ints
 from . import registration
 from .cracks import across
 from .edge_edge import edge_edge
+from .entering import pushed_out
 from .exterior import Exterior
-from .families import pushed_out
 from .haste import approach, spread
 from .narrow_phase import HASTY, Step
 from .node_face import node_face

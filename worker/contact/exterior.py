@@ -11,7 +11,7 @@ from ..state import Flags, Floats, Indices, Ints, Model, Nodes, extended
 from ..topology import Split
 from . import normals, surface
 from .cracks import Cracks
-from .families import entering
+from .entering import entering
 from .flight import Flight, typical
 from .narrow_phase import Step
 from .scene import Scene
@@ -165,7 +165,7 @@ class Exterior:
         return bool((told[:, 0] == 0).any())
 
     def entering(self, scene: Scene, step: Step) -> list[tuple[Indices, Floats]]:
-        """Of each block, the nodes that would come in through a narrow side; see families.entering."""
+        """Of each block, the nodes that would come in through a narrow side; see entering.py."""
         some, family = self.cracks, self.cracks.families
         where = family.ring, family.leader, scene.own.place, step
         return [

@@ -5,10 +5,11 @@ the velocities, dt n . sum(w_k v_k) plus a constant, with the weights w of ``wei
 area coordinates of the point of the face (the defence node, Zhong 1993), or the two ends of two edges.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from ..fracture.records import record
 from ..jit import njit, types
 from ..state import Flags, Floats, Indices, Ints
 from .geometry import at, cross, dot, minus
@@ -169,11 +170,6 @@ class EdgeTable(NamedTuple):
     """(e,) the larger of its ends, m."""
     fresh: Flags
     """(e,) with new corners, or exposed since the last step."""
-
-
-def record(name: type, *kinds: Any) -> Any:
-    """The numba type of a named tuple of arrays."""
-    return types.NamedTuple(kinds, name)  # type: ignore[no-untyped-call]
 
 
 _N1, _N2, _I1, _B1, _B2 = (
