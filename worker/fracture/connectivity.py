@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..ids import places
+from ..jit import njit
 from ..parallel.comm import Comm
 from ..state import Block, Indices, Ints, Model
 
@@ -31,19 +32,25 @@ def labels(model: Model, held: Ints, comm: Comm) -> list[Ints]:
     return np.split(found, np.cumsum([block.n for block in model.blocks])[:-1]) if model.blocks else []
 
 
-def components(n: int, edges: Ints | Indices) -> Ints:
-    """(n,) the smallest number that each of n things is connected with by ``edges``, (m, 2).
-
-    Every root hooks onto the smallest of its neighbours, then all things climb to their roots; edges inside a tree go.
-    """
+@njit("int64[::1](int64, int64[:, ::1])", cache=True)
+def _roots(n, edges):  # type: ignore[no-untyped-def]
+    """See ``components``: of two trees that an edge joins, the one of the larger root hangs onto the smaller root."""
     root = np.arange(n)
-    while len(edges):
-        np.minimum.at(root, np.maximum(*edges.T), np.minimum(*edges.T))
-        while not np.array_equal(up := root[root], root):
-            root = up
-        edges = root[edges]
-        edges = edges[edges[:, 0] != edges[:, 1]]
+    for m in range(len(edges)):
+        a, b = edges[m, 0], edges[m, 1]
+        while root[a] != a:
+            root[a] = a = root[root[a]]
+        while root[b] != b:
+            root[b] = b = root[root[b]]
+        root[max(a, b)] = min(a, b)
+    for a in range(n):
+        root[a] = root[root[a]]
     return root
+
+
+def components(n: int, edges: Ints | Indices) -> Ints:
+    """(n,) the smallest number that each of n things is connected with by ``edges``, (m, 2)."""
+    return np.asarray(_roots(n, np.ascontiguousarray(edges, np.int64)))
 
 
 def _joints(block: Block) -> Ints:
