@@ -9,15 +9,14 @@ The corners of narrow sides are taken family by family: what each member is to t
 loops over these, in rows of a few kilobytes that compilers make vectors of. Few of them are looked at on their own.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
-from ..fracture.records import record, several
-from ..jit import njit, types
-from ..state import INTACT, Indices
+from ..fracture.records import several
+from ..jit import njit, prefetch, types
+from ..state import INTACT
+from .families import by_family
 from .geometry import VECTOR, at, cross, dot, height, minus
-from .narrow_phase import CONTACT_ROWS, DEEP_SELF, STEP, needed
+from .narrow_phase import CONTACT_ROWS, DEEP_SELF, LINE, STEP, needed
 from .sharp import SHARP
 
 _FEWEST = 64
@@ -34,64 +33,12 @@ the node across; the normal of the side."""
 _SQUARE, _FF, _GG, _FG, _TWIN = (_MANY * row for row in (15, 16, 17, 18, 19))
 """Rows: dot products of the normal and of the two edges, and the number of the corner's twin among the members."""
 _ROWS = 20
+_SOON, _NEXT, _NOW = 16, 8, 4
+"""How many corners ahead is brought near where a corner is, its tet and the ends of its side, and the node across."""
 _LATER = np.array([0, 1, 2, 0, 1])
 """Corners of a side, one after the other."""
 _I, _F, _F1, _F2 = types.int64, types.float64, types.float64[::1], types.float64[:, ::1]
 _N1, _N2, _N3 = types.int32[::1], types.int32[:, ::1], types.int32[:, :, ::1]
-
-
-class Corners(NamedTuple):
-    """Corners of narrow sides whose node has separated into three pieces or more, by families."""
-
-    members: Indices
-    """Nodes of the families, one family after the other."""
-    begin: Indices
-    """(families + 1,) where those of each begin."""
-    among: Indices
-    """(nodes,) where a node of a family is among the ``members``."""
-    corners: Indices
-    """8 crack + 4 side + corner (0 to 2), one family after the other."""
-    start: Indices
-    """(families + 1,) where those of each begin."""
-
-
-@njit(record(Corners, *(5 * [_N1]))(_N2, _N3, _I, _N1, _N1), cache=True)
-def _by_family(cracks, sides, block, ring, leader):  # type: ignore[no-untyped-def]
-    """``Corners`` of a ``block``; see ``entering``."""
-    alone, unknown = -2, -1
-    family = np.full(len(ring), np.int32(unknown), np.int32)
-    members, among, end = np.empty(len(ring), np.int32), np.empty(len(ring), np.int32), 0
-    begin, count, many = np.empty(len(ring) + 1, np.int32), np.zeros(len(ring) + 1, np.int32), 0
-    found, of, n = np.empty(6 * len(cracks), np.int32), np.empty(6 * len(cracks), np.int32), 0
-    for c in range(len(cracks)):
-        for h in range(2):
-            if sides[c, h, 1] < 0 or sides[c, h, 0] != block:
-                continue
-            for k in range(3):
-                p = cracks[c, 3 * h + k]
-                if p == cracks[c, 3 - 3 * h + k]:
-                    continue
-                f = family[leader[p]]
-                if f == unknown:
-                    f = alone
-                    if ring[ring[p]] != p:
-                        f, begin[many], d = many, end, p
-                        while end == begin[f] or d != p:
-                            members[end], among[d], d, end = d, end, ring[d], end + 1
-                        many += 1
-                    family[leader[p]] = f
-                if f >= 0:
-                    found[n], of[n] = 8 * c + 4 * h + k, f
-                    count[f] += 1
-                    n += 1
-    start, corners, total = np.empty(many + 1, np.int32), np.empty(n, np.int32), 0
-    for f in range(many):
-        start[f], total, count[f] = total, total + count[f], total
-    begin[many], start[many] = end, total
-    for i in range(n):
-        corners[count[of[i]]] = found[i]
-        count[of[i]] += 1
-    return Corners(members[:end].copy(), begin[: many + 1].copy(), among, corners, start)
 
 
 @njit("int64(uint32[:, ::1], int32[:, ::1], uint8[:, ::1], int64, int64, int64)", cache=True, forceinline=True)
@@ -103,6 +50,30 @@ def _opened(tets, across, bond, e, f, g):  # type: ignore[no-untyped-def]
         second += k * (tets[e, k] == g)
     one = (across[e, first] < 0) | (bond[e, first] != INTACT)
     return one + 2 * ((across[e, second] < 0) | (bond[e, second] != INTACT))
+
+
+@njit(
+    types.void(_N1, _I, _N2, _N3, types.uint32[:, ::1], _N2, types.uint8[:, ::1], _N1, types.float64[:, :]),
+    cache=True,
+    forceinline=True,
+)
+def _bring(corners, i, cracks, sides, tets, across, bond, place, ahead):  # type: ignore[no-untyped-def]
+    """Has what corners behind the place ``i`` need brought near: it is apart in memory, and one leads to the other."""
+    last = len(corners) - 1
+    c = corners[min(i + _SOON, last)] >> 3
+    prefetch(cracks, 6 * c)
+    prefetch(sides, 6 * c)
+    m = corners[min(i + _NEXT, last)]
+    c, h = m >> 3, m >> 2 & 1
+    e = sides[c, h, 1]
+    prefetch(tets, 4 * e)
+    prefetch(across, 4 * e)
+    prefetch(bond, 4 * e)
+    for k in range(3):
+        prefetch(ahead, LINE * place[cracks[c, 3 * h + k]])
+    m = corners[min(i + _NOW, last)]
+    c, h = m >> 3, m >> 2 & 1
+    prefetch(ahead, LINE * place[tets[sides[c, h, 1], sides[c, h, 2]]])
 
 
 @njit(f"UniTuple(float64, 2)({VECTOR}, {VECTOR}, {VECTOR})", cache=True, forceinline=True)
@@ -209,7 +180,7 @@ def entering(cracks, sides, block, tets, across, bond, ring, leader, place, step
     """
     ahead, part, mu = step.ahead, step.part, step.mu
     nodes, weights, n = np.empty((_FEWEST, 4), np.int32), np.empty((_FEWEST, 3)), 0
-    members, begin, among, corners, start = _by_family(cracks, sides, block, ring, leader)
+    members, begin, among, corners, start = by_family(cracks, sides, block, ring, leader)
     w, flags, some = np.zeros(_ROWS * _MANY), np.zeros(_MANY, np.uint8), np.empty(_WORD, np.int64)
     words, opened, rest = flags.view(np.uint64), np.empty(_MANY, np.int64), np.empty((_MANY, 3), np.int32)
     for family in range(len(start) - 1):
@@ -220,6 +191,7 @@ def entering(cracks, sides, block, tets, across, bond, ring, leader, place, step
             many = min(start[family + 1] - head, _MANY)
             full = (many + _WORD - 1) // _WORD
             for i in range(many):
+                _bring(corners, head + i, cracks, sides, tets, across, bond, place, ahead)
                 m = corners[head + i]
                 c, h, k = m >> 3, m >> 2 & 1, m & 3
                 e, p = sides[c, h, 1], cracks[c, 3 * h + k]

@@ -1,12 +1,16 @@
 """Families: nodes that were one. Whoever has a tet at a node holds all of its family."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from ..jit import njit
+from ..fracture.records import record
+from ..jit import njit, types
 from ..state import Flags, Indices, Ints, extended
 from ..topology import Split
+
+_N1, _N2 = types.int32[::1], types.int32[:, ::1]
 
 
 @dataclass
@@ -59,3 +63,60 @@ def _members(ring, nodes):  # type: ignore[no-untyped-def]
             found[a] = True
             a = ring[a]
     return found
+
+
+class Corners(NamedTuple):
+    """Corners of narrow sides whose node has separated into three pieces or more, by families."""
+
+    members: Indices
+    """Nodes of the families, one family after the other."""
+    begin: Indices
+    """(families + 1,) where those of each begin."""
+    among: Indices
+    """(nodes,) where a node of a family is among the ``members``."""
+    corners: Indices
+    """8 crack + 4 side + corner (0 to 2), one family after the other."""
+    start: Indices
+    """(families + 1,) where those of each begin."""
+
+
+@njit(record(Corners, *(5 * [_N1]))(_N2, types.int32[:, :, ::1], types.int64, _N1, _N1), cache=True)
+def by_family(cracks, sides, block, ring, leader):  # type: ignore[no-untyped-def]
+    """``Corners`` of a ``block``.
+
+    ``cracks`` (m, 6) nodes of all cracks and ``sides`` (m, 2, 3): see Cracks; ``ring`` and ``leader``: see Families.
+    """
+    alone, unknown = -2, -1
+    family = np.full(len(ring), np.int32(unknown), np.int32)
+    members, among, end = np.empty(len(ring), np.int32), np.empty(len(ring), np.int32), 0
+    begin, count, many = np.empty(len(ring) + 1, np.int32), np.zeros(len(ring) + 1, np.int32), 0
+    found, of, n = np.empty(6 * len(cracks), np.int32), np.empty(6 * len(cracks), np.int32), 0
+    for c in range(len(cracks)):
+        for h in range(2):
+            if sides[c, h, 1] < 0 or sides[c, h, 0] != block:
+                continue
+            for k in range(3):
+                p = cracks[c, 3 * h + k]
+                if p == cracks[c, 3 - 3 * h + k]:
+                    continue
+                f = family[leader[p]]
+                if f == unknown:
+                    f = alone
+                    if ring[ring[p]] != p:
+                        f, begin[many], d = many, end, p
+                        while end == begin[f] or d != p:
+                            members[end], among[d], d, end = d, end, ring[d], end + 1
+                        many += 1
+                    family[leader[p]] = f
+                if f >= 0:
+                    found[n], of[n] = 8 * c + 4 * h + k, f
+                    count[f] += 1
+                    n += 1
+    start, corners, total = np.empty(many + 1, np.int32), np.empty(n, np.int32), 0
+    for f in range(many):
+        start[f], total, count[f] = total, total + count[f], total
+    begin[many], start[many] = end, total
+    for i in range(n):
+        corners[count[of[i]]] = found[i]
+        count[of[i]] += 1
+    return Corners(members[:end].copy(), begin[: many + 1].copy(), among, corners, start)

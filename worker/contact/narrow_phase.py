@@ -26,7 +26,7 @@ of that size is several times as high."""
 PUSH_OUT = 0.1
 """Largest share of a penetration that is taken back in a step, and of the speed of closing that is given back for it;
 nothing while contact has no energy to give back (``account.Account``)."""
-_LINE = 8
+LINE = 8
 """Words of a cache line."""
 _FEWEST = 2
 """Rows of a table that is more than one line: numba takes a part of a single one for an array of its own."""
@@ -86,9 +86,9 @@ class Step(NamedTuple):
     def of(cls, x: Floats, v: Floats, part: Indices, mu: Floats, give: float, dt: float) -> "Step":
         """A step ``dt`` from ``x`` on."""
         n = max(len(x), _FEWEST)
-        room = np.empty(n * _LINE + _LINE)
-        first = -(room.ctypes.data // room.itemsize) % _LINE
-        places = room[first : first + n * _LINE].reshape(n, _LINE)
+        room = np.empty(n * LINE + LINE)
+        first = -(room.ctypes.data // room.itemsize) % LINE
+        places = room[first : first + n * LINE].reshape(n, LINE)
         _place(places, x, v, dt)
         return cls(places[:, :3], v, places[:, 3:6], part, mu, give, dt, 0.0, 0.0, 1.0, np.empty(0))
 
