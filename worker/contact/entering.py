@@ -146,7 +146,7 @@ def _under(flags, w, n, member, x, y, z):  # type: ignore[no-untyped-def]
     """Below the sides of which of the first ``n`` corners the ``member`` would be, at x, y, z, with its foot on them.
 
     Outside of a side is a foot that is further beyond an edge than the next face, bent by less than a sharp edge is,
-    would reach over it.
+    would reach over it, or behind the corner, where no face reaches.
     """
     for i in range(n):
         r = x - w[_CORNER + i], y - w[_CORNER + _MANY + i], z - w[_CORNER + 2 * _MANY + i]
@@ -159,8 +159,8 @@ def _under(flags, w, n, member, x, y, z):  # type: ignore[no-untyped-def]
             (below > 0.0)
             & (w[_TWIN + i] != member)
             & (of_f + of_g <= w[_SQUARE + i])
-            & ((of_f >= 0.0) | (of_f * of_f <= beyond * w[_GG + i]))
-            & ((of_g >= 0.0) | (of_g * of_g <= beyond * w[_FF + i]))
+            & ((of_f >= 0.0) | ((along_g > 0.0) & (of_f * of_f <= beyond * w[_GG + i])))
+            & ((of_g >= 0.0) | ((along_f > 0.0) & (of_g * of_g <= beyond * w[_FF + i])))
         )
 
 
