@@ -13,7 +13,9 @@ Course = tuple[tuple[Time, Ratio], ...]
 
 
 class Symmetry(Model):
-    """Nodes that start on the plane ``axis = at`` stay on it; no friction. All parts when ``parts`` is empty."""
+    """Nodes that start on the plane ``axis = at`` stay on it. What flies at it meets its mirror image there: no node
+    passes the plane, and none sticks to it. No friction. All parts when ``parts`` is empty.
+    """
 
     kind: Literal["symmetry"]
     """The kind of boundary."""

@@ -1,4 +1,7 @@
-"""Symmetry planes for nodes without tets: they would fly through a plane that holds the nodes on it only."""
+"""Symmetry planes for the nodes beside them: what flies at a plane meets its mirror image there.
+
+Two images press with equal forces, so that neither passes the plane. That is a wall for each side of it.
+"""
 
 from typing import Self
 
@@ -6,36 +9,116 @@ import numpy as np
 
 from conoid.cases.schema import Case, Symmetry
 
-from .boundaries import PRESCRIBED, Boundary, RigidWalls, mirrored
+from .boundaries import PRESCRIBED, Boundary, book_half, free
 from .conditions import ON_PLANE
-from .state import Model, Nodes
+from .jit import njit
+from .migration.parcel import Parcel
+from .state import Bits, Floats, Indices, Ints, Model, Nodes, extended
+
+_TOGETHER = 64
+"""Nodes that are looked at in one loop, which compilers make vectors of; only where one of them would be beyond are
+they looked at on their own."""
 
 
-class Mirrors(RigidWalls):
-    """Symmetry planes as they are for nodes that have lost their tets: walls, where they meet their mirror images."""
+class Mirrors(Boundary):
+    """No node ends the step beyond a symmetry plane that it started beside: an impulse stops it there, never pulls."""
+
+    after_contact = True
+
+    def __init__(self, nodes: Indices, axes: Ints, at: Floats, sides: Floats, restitution: float = 0.0) -> None:
+        """Planes across the ``axes`` (planes,) at the heights ``at`` (planes,), m; ``sides`` (n, planes): 1 for a node
+        above, -1 for one below, 0 for one that the plane does not hold; ``restitution``: as of contact.
+        """
+        super().__init__(nodes)
+        self._axes, self._at, self._sides, self._restitution = axes, at, sides, restitution
+        self._pushed = False
 
     @classmethod
     def of(cls, case: Case, model: Model, bounds: list[Boundary]) -> Self:
-        """A wall for either side of every plane, and the nodes of eroding parts that start on that side of it.
-
-        Nodes of prescribed motion are left alone.
+        """All symmetry planes of a case, and the nodes that start beside them; those of prescribed motion are left
+        alone.
         """
         nodes = model.nodes
-        wears = np.array([part.erosion is not None for part in case.parts])[nodes.part]
+        driven = np.zeros(nodes.n, bool)
         for bound in bounds:
-            wears[bound.nodes] &= (bound.held_components() != PRESCRIBED).all(axis=1)
-        points, normals, held = np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((nodes.n, 0), bool)
-        for _, spec in case.boundaries_of(Symmetry):
-            there = np.array([part.name in spec.parts or not spec.parts for part in case.parts])[nodes.part]
-            axis = np.eye(3)["xyz".index(spec.axis)]
-            height = nodes.x0 @ axis - spec.at
-            off = wears & there & (np.abs(height) > ON_PLANE * max(model.size, abs(spec.at)))
-            points = np.vstack([points, spec.at * axis, spec.at * axis])
-            normals = np.vstack([normals, axis, -axis])
-            held = np.column_stack([held, off & (height > 0.0), off & (height < 0.0)])
-        some = held.any(axis=1)
-        planes = mirrored(nodes.n, bounds)[some]
-        return cls(np.flatnonzero(some).astype(np.int32), points, normals, np.ascontiguousarray(held[some]), planes)
+            driven[bound.nodes] |= (bound.held_components() == PRESCRIBED).any(axis=1)
+        specs = [spec for _, spec in case.boundaries_of(Symmetry)]
+        axes, at = np.array(["xyz".index(spec.axis) for spec in specs], np.int64), np.array([s.at for s in specs])
+        sides = np.zeros((nodes.n, len(specs)))
+        for k, spec in enumerate(specs):
+            there = np.array([part.name in spec.parts or not spec.parts for part in case.parts])[nodes.part] & ~driven
+            height = nodes.x0[:, axes[k]] - spec.at
+            beside = there & (np.abs(height) > ON_PLANE * max(model.size, abs(spec.at)))
+            sides[beside, k] = np.sign(height[beside])
+        some = sides.any(axis=1)
+        back = case.contact.restitution if case.contact is not None else 0.0
+        return cls(np.flatnonzero(some).astype(np.int32), axes, at, sides[some], back)
+
+    def held_components(self) -> Bits:
+        return free(self.nodes)
+
+    def _inherit(self, at: Ints) -> None:
+        self._sides = extended(self._sides, self._sides[at])
+
+    def resume(self, parcel: Parcel, name: str, dt: float) -> None:
+        super().resume(parcel, name, dt)
+        self._pushed = True
+
+    def note(self, state: Nodes) -> None:
+        _copy(self._before, state.v, self.nodes)
+        if self._pushed:
+            self._book()
+            self._impulse[:] = 0.0
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
-        super().apply(state, dt, self.last_push)
+        self._pushed = dt > 0.0 and _stop(
+            state.x, state.v, self._before, self._impulse, state.mass, self.nodes, self._axes, self._at, self._sides,
+            self._restitution, dt,
+        )  # fmt: skip
+        if self._pushed:
+            self._book()
+
+    def _book(self) -> None:
+        book_half(self.contact_loss, self._impulse, self._before, -0.5)
+
+
+@njit("void(float64[:, ::1], float64[:, ::1], int32[::1])", cache=True)
+def _copy(before, v, nodes):  # type: ignore[no-untyped-def]
+    """Velocities of the ``nodes``."""
+    for j in range(len(nodes)):
+        for i in range(3):
+            before[j, i] = v[nodes[j], i]
+
+
+@njit(
+    "boolean(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], int32[::1], "
+    "int64[::1], float64[::1], float64[:, ::1], float64, float64)",
+    cache=True,
+    error_model="numpy",
+)
+def _stop(x, v, before, impulse, mass, nodes, axes, at, sides, restitution, dt):  # type: ignore[no-untyped-def]
+    """The velocity of a node that would be beyond a plane ends it on the plane, or leads away from it with a share of
+    the speed at which it came, of ``before`` (n, 3): v(n-1/2). Adds to ``impulse``; whether any was stopped.
+    """
+    stopped = False
+    for k in range(len(axes)):
+        i, plane = axes[k], at[k]
+        for first in range(0, len(nodes), _TOGETHER):
+            last, beyond = min(first + _TOGETHER, len(nodes)), 0
+            for j in range(first, last):
+                a = nodes[j]
+                beyond += sides[j, k] * (x[a, i] - plane + dt * v[a, i]) < 0.0
+            if not beyond:
+                continue
+            stopped = True
+            for j in range(first, last):
+                a, side = nodes[j], sides[j, k]
+                height = side * (x[a, i] - plane)
+                if side * (x[a, i] - plane + dt * v[a, i]) < 0.0:
+                    away, back = -height / dt, -restitution * side * before[j, i]
+                    if back > 0.0:
+                        away = max(away, back)
+                    change = side * away - v[a, i]
+                    v[a, i] += change
+                    impulse[j, i] += mass[a] * change
+    return stopped

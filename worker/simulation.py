@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from conoid.cases.library import material as find_material
-from conoid.cases.schema import Case
+from conoid.cases.schema import Case, Symmetry
 
 from . import conditions, domain
 from .assembly import Say, quiet
@@ -154,6 +154,7 @@ def _assemble(
         contact = Contact(case, model, neighbours, scene, comm, clock, timers, extremes)
     if case.erodes:
         erosion = Erosion(case, model, neighbours, contact, comm, clock, extremes)
+    if case.boundaries_of(Symmetry):
         scene.append(Mirrors.of(case, model, scene))
     walls = next((bound for bound in scene if type(bound) is RigidWalls), None)
     probes = Probes(case, model, contact, walls, clock, comm)

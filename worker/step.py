@@ -12,7 +12,7 @@ and at once f(n+1) from it, so a step begins with forces that are already at han
  6  gravity, tractions, symmetry, prescribed motion        v*(n+1/2)
  7  erosion: removed nodes stop                            v*(n+1/2)
  8  contact: impulses of active contacts                   v*(n+1/2)
- 9  walls                                                  v*(n+1/2) -> v(n+1/2)
+ 9  walls, mirror images behind symmetry planes            v*(n+1/2) -> v(n+1/2)
 10  output at time n: ledger, probes, frames               x(n), stress(n)
 11  positions                                              x(n) -> x(n+1)
 12  velocity gradient at x(n+1/2), stress, pressure        stress(n) -> stress(n+1)

@@ -51,7 +51,7 @@ def test_a_boundary_that_does_not_answer_cannot_be_made() -> None:
     [
         (Gravity(SOME, np.ones(3)), (FREE, FREE, FREE)),
         (RigidWalls(SOME, POINT, NORMAL, np.ones((2, 1), bool)), (FREE, FREE, FREE)),
-        (Mirrors(SOME, POINT, NORMAL, np.ones((2, 1), bool)), (FREE, FREE, FREE)),
+        (Mirrors(SOME, np.array([1]), np.zeros(1), np.ones((2, 1))), (FREE, FREE, FREE)),
         (SymmetryPlane(SOME, 2), (FREE, FREE, MIRRORED)),
         (PrescribedVelocity(SOME, np.array([np.nan, 0.0, 3.0]), Course()), (FREE, PRESCRIBED, PRESCRIBED)),
         (PrescribedRotation(SOME, np.zeros(3), np.ones(3)), (PRESCRIBED, PRESCRIBED, PRESCRIBED)),

@@ -26,8 +26,8 @@ from ..errors import InputError
 from ..parallel.comm import Comm
 from .parcel import Parcel, Table, take
 
-FORMAT = 7
-"""Of the files; 7 has the volumes of tets without a strength. Others are not read."""
+FORMAT = 8
+"""Of the files; 8 has what symmetry planes have taken from all nodes beside them. Others are not read."""
 _KEPT = 2
 """Checkpoints that stay; the older ones go."""
 _MANIFEST = "manifest.json"

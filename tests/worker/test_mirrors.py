@@ -1,0 +1,68 @@
+"""A body that flies at a symmetry plane meets its mirror image there."""
+
+import numpy as np
+import pytest
+
+from conoid.worker import step
+from conoid.worker.mesh.model import TetMesh
+from conoid.worker.mirrors import Mirrors
+from conoid.worker.simulation import Simulation
+
+from ..contact.bodies import meeting_of, moved
+from .kernels import COPPER, STEEL, build
+from .meshes import block
+from .simulations import tick
+
+MM = 1e-3
+PLANE = {"kind": "symmetry", "axis": "y"}
+SPEED, GAP = 100.0, 0.02 * MM
+
+
+def above() -> TetMesh:
+    """A cube of 2 mm above the plane y = 0, which it does not touch."""
+    return moved(block((4, 4, 4), 0.5 * MM, shake=0.1), (0.0, GAP, 0.0))
+
+
+def image(mesh: TetMesh) -> TetMesh:
+    """The mesh below the plane."""
+    return TetMesh(mesh.points * [1.0, -1.0, 1.0], np.ascontiguousarray(mesh.tets[:, [0, 2, 1, 3]]))
+
+
+def mean(sim: Simulation, part: int) -> float:
+    """Velocity of a part across the plane, m/s."""
+    nodes = sim.model.nodes
+    mine = nodes.part == part
+    return float((nodes.mass[mine] @ nodes.v[mine, 1]) / nodes.mass[mine].sum())
+
+
+@pytest.mark.parametrize(("back", "apart"), [(0.0, 1e-6), (0.6, 0.02)])
+def test_half_a_collision_is_half_of_the_whole(back: float, apart: float) -> None:
+    """Contact stops facing nodes of equal masses in the middle, which is the plane; with restitution its ten sweeps
+    leave 0.6 % of what they ask for.
+    """
+    contact = {"restitution": back}
+    down, up = {"velocity": (0.0, -SPEED, 0.0)}, {"velocity": (0.0, SPEED, 0.0)}
+    whole = build(meeting_of([down, up], contact, material=COPPER, end=1.0), [above(), image(above())])
+    aside = moved(block((4, 4, 4), 0.5 * MM, shake=0.0), (0.0, 0.0, 9 * MM))
+    half = build(meeting_of([down, {}], contact, material=COPPER, end=1.0, boundaries=(PLANE,)), [above(), aside])
+    for sim in (whole, half):
+        step.prepare(sim)
+        while sim.clock.t < 2.5e-6:
+            assert tick(sim) < 1e-4
+    assert abs(mean(half, 0)) < 0.2 * SPEED
+    assert mean(half, 0) == pytest.approx(mean(whole, 0), rel=apart)
+    assert (half.model.nodes.x[:, 1] > -1e-15).all()
+    lost = sum(bound.contact_loss.sum() for bound in half.boundaries if isinstance(bound, Mirrors))
+    assert 2.0 * lost == pytest.approx(whole.ledger.close(whole.model.nodes.v).contact, rel=apart)
+
+
+def test_nodes_on_the_plane_stay_there_and_driven_ones_are_let_through() -> None:
+    """A body with nodes on the plane and on both of its sides; and a driven one, which the drive moves."""
+    both = moved(block((2, 2, 2), MM, shake=0.0), (0.0, -1.0 * MM, 0.0))
+    drive = {"kind": "velocity", "parts": ["body1"], "y": -SPEED}
+    case = meeting_of([{}, {}], material=STEEL, end=1.0, boundaries=(PLANE, drive))
+    sim = build(case, [both, moved(block((2, 2, 2), MM), (9 * MM, 0.1 * MM, 0.0))])
+    (mirrors,) = (bound for bound in sim.boundaries if isinstance(bound, Mirrors))
+    heights = sim.model.nodes.x0[mirrors.nodes, 1]
+    assert len(heights) == 18
+    assert sorted(set(heights.round(6))) == [-1.0 * MM, 1.0 * MM]
