@@ -36,7 +36,7 @@ def overlaps(parts: Iterable[tuple[int, Part]], contact: Contact | None) -> Iter
         depth = _depth(one, other, *box)
         if depth > 0.0:
             way = "move them apart, or set contact.overlap = 'push'"
-            message = f"{second.name!r} overlaps parts[{i}], {first.name!r}, by about {depth:.2g} m; {way}"
+            message = f"{second.name!r} overlaps parts[{i}], {first.name!r}, by about {depth:.2g} m or more; {way}"
             yield problem(("parts", j, "mesh"), ..., message)
 
 

@@ -45,7 +45,7 @@ def test_bodies_that_overlap(one: dict[str, Any], other: dict[str, Any], depth: 
     (line,) = told(scene(one, other))
     assert line.startswith("parts[1].mesh: 'other' overlaps parts[0], 'one', by about ")
     assert float(line.split("about ")[1].split()[0]) == pytest.approx(depth, rel=0.1)
-    assert line.endswith(" m; move them apart, or set contact.overlap = 'push'")
+    assert line.endswith(" m or more; move them apart, or set contact.overlap = 'push'")
 
 
 @pytest.mark.parametrize(

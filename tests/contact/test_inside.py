@@ -74,3 +74,16 @@ def test_parts_that_do_not_meet_may_be_in_each_other() -> None:
     case = meeting_of([{}, {}], {"parts": ("body0",)}, end=2e-7)
     sim = build(case, [block((4, 4, 4), SIZE), moved(block((2, 2, 2), 0.6 * SIZE), (SIZE, SIZE, SIZE))])
     assert seen(sim).nodes == 0
+
+
+def test_nodes_on_faces_between_tets_are_inside() -> None:
+    """A cube that has sunk into its like: all nodes of either are on edges and faces of tets of the other, those in
+    the middle of the two faces and of the body in none but these.
+    """
+    cube = block((2, 2, 2), SIZE, shake=0.0)
+    sim = build(meeting_of([{}, {}], end=2e-7), [cube, moved(cube, (0.0, 0.0, 2.0 * SIZE))])
+    sim.model.nodes.x[sim.model.nodes.part == 1, 2] -= 0.3 * SIZE
+    found = seen(sim)
+    assert sim.contact is not None
+    assert found.nodes >= 2
+    assert found.deepest * sim.contact.exterior.size == pytest.approx(0.3 * SIZE, rel=1e-9)

@@ -21,6 +21,8 @@ SLIGHT = 0.05
 """Of the typical size of a face: depths below this are none. Chosen: what sweeps leave undone is less."""
 _WORDS = 6
 """Of what is told of a node."""
+_ROUNDING = 1e-9
+"""Of the shares of a tet's corners: a node on a face between two tets is in both."""
 DEEP = 0.25
 """The same: deeper than this is worth a warning. Chosen: half of the altitude of a regular tet, about."""
 
@@ -119,4 +121,4 @@ def _depths(points: Floats, corners: Floats, opened: Flags) -> Floats:
     shares = np.column_stack([1.0 - tail.sum(axis=1), tail])
     steepness = np.linalg.norm(np.concatenate([edges.sum(axis=2)[:, None], np.swapaxes(edges, 1, 2)], axis=1), axis=2)
     heights = np.where(opened, shares / steepness, np.inf)
-    return np.where(solid & (shares > 0.0).all(axis=1), heights.min(axis=1), -1.0)
+    return np.where(solid & (shares >= -_ROUNDING).all(axis=1), heights.min(axis=1), -1.0)

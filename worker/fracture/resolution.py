@@ -13,6 +13,9 @@ _STEP = 6.0**-0.5
 _REGULAR = (6.0 * 2.0**0.5) ** (1.0 / 3.0)
 """Edge of a regular tet over the cube root of its volume."""
 
+_ROUNDING = 1e-9
+"""Of a ratio: a strength that is lowered until so many elements fit meets their number to the last bits."""
+
 log = logging.getLogger("conoid.worker")
 
 
@@ -29,17 +32,19 @@ def warnings(part: str, spec: Spec, tough: Toughness, size: float, safety: float
         "%s breaks at %.4g MPa with %.4g J/m^2: cohesive zone %.3g mm, elements %.3g mm, %.3g to 1",
         part, tough.strength * 1e-6, tough.energy, tough.zone * 1e3, size * 1e3, ratio,
     )  # fmt: skip
-    if ratio > _RESOLVED:
+    if ratio > _RESOLVED * (1.0 + _ROUNDING):
+        lower = "fracture.resolve = 'strength' keeps it and lowers the strength"
+        more = f"fracture.resolution = {1.0 / _RESOLVED:.0f} keeps it and lowers the strength further"
         told.append(
             f"{part}: elements of {size * 1e3:.3g} mm in a cohesive zone of {tough.zone * 1e3:.3g} mm, "
             f"{ratio:.3g} to 1, resolved below {_RESOLVED:.2g}: the mesh decides on the energy of fracture; "
-            "fracture.resolve = 'strength' keeps it and lowers the strength"
+            f"{more if spec.resolve == 'strength' else lower}"
         )
     opening = tough.strength * step / tough.impedance
     if spec.model == "cohesive" and opening > tough.critical:
         told.append(
             f"{part}: a facet opens by {opening * 1e6:.3g} um in a step of {step * 1e9:.3g} ns, and by "
             f"{tough.critical * 1e6:.3g} um altogether: no law can be followed; use fracture.model = 'instant', "
-            f"fracture.resolve = 'strength', or numerics.dt_safety {opening / tough.critical:.0f} times smaller"
+            f"fracture.resolve = 'strength', or numerics.dt_safety below {safety * tough.critical / opening:.2g}"
         )
     return told
