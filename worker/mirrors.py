@@ -9,7 +9,7 @@ import numpy as np
 
 from conoid.cases.schema import Case, Symmetry
 
-from .boundaries import PRESCRIBED, Boundary, book_half, free
+from .boundaries import PRESCRIBED, Boundary, free
 from .conditions import ON_PLANE
 from .jit import njit
 from .migration.parcel import Parcel
@@ -31,7 +31,8 @@ class Mirrors(Boundary):
         """
         super().__init__(nodes)
         self._axes, self._at, self._sides, self._restitution = axes, at, sides, restitution
-        self._pushed = False
+        self._stopped: Ints = np.zeros(0, np.int64)
+        """Places of the nodes that were stopped in the last step."""
 
     @classmethod
     def of(cls, case: Case, model: Model, bounds: list[Boundary]) -> Self:
@@ -62,24 +63,21 @@ class Mirrors(Boundary):
 
     def resume(self, parcel: Parcel, name: str, dt: float) -> None:
         super().resume(parcel, name, dt)
-        self._pushed = True
+        self._stopped = np.flatnonzero(self._impulse.any(axis=1))
 
     def note(self, state: Nodes) -> None:
         _copy(self._before, state.v, self.nodes)
-        if self._pushed:
-            self._book()
-            self._impulse[:] = 0.0
+        _book(self.contact_loss, self._impulse, self._before, self._stopped)
+        self._impulse[self._stopped] = 0.0
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
-        self._pushed = dt > 0.0 and _stop(
-            state.x, state.v, self._before, self._impulse, state.mass, self.nodes, self._axes, self._at, self._sides,
-            self._restitution, dt,
-        )  # fmt: skip
-        if self._pushed:
-            self._book()
-
-    def _book(self) -> None:
-        book_half(self.contact_loss, self._impulse, self._before, -0.5)
+        self._stopped = self._stopped[:0]
+        if dt > 0.0:
+            self._stopped = _stop(
+                state.x, state.v, self._before, self._impulse, state.mass, self.nodes, self._axes, self._at,
+                self._sides, self._restitution, dt,
+            )  # fmt: skip
+            _book(self.contact_loss, self._impulse, self._before, self._stopped)
 
 
 @njit("void(float64[:, ::1], float64[:, ::1], int32[::1])", cache=True)
@@ -90,17 +88,26 @@ def _copy(before, v, nodes):  # type: ignore[no-untyped-def]
             before[j, i] = v[nodes[j], i]
 
 
+@njit("void(float64[::1], float64[:, ::1], float64[:, ::1], int64[::1])", cache=True)
+def _book(loss, impulse, before, rows):  # type: ignore[no-untyped-def]
+    """Half of what the impulses of these ``rows`` take from the body, at the velocities ``before`` them."""
+    for j in rows:
+        for i in range(3):
+            loss[j] -= 0.5 * impulse[j, i] * before[j, i]
+
+
 @njit(
-    "boolean(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], int32[::1], "
+    "int64[::1](float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], int32[::1], "
     "int64[::1], float64[::1], float64[:, ::1], float64, float64)",
     cache=True,
     error_model="numpy",
 )
 def _stop(x, v, before, impulse, mass, nodes, axes, at, sides, restitution, dt):  # type: ignore[no-untyped-def]
     """The velocity of a node that would be beyond a plane ends it on the plane, or leads away from it with a share of
-    the speed at which it came, of ``before`` (n, 3): v(n-1/2). Adds to ``impulse``; whether any was stopped.
+    the speed at which it came, of ``before`` (n, 3): v(n-1/2). Adds to ``impulse``; returns the places of those that
+    were stopped, by some plane.
     """
-    stopped = False
+    stopped, n = np.empty(len(nodes), np.int64), 0
     for k in range(len(axes)):
         i, plane = axes[k], at[k]
         for first in range(0, len(nodes), _TOGETHER):
@@ -110,7 +117,6 @@ def _stop(x, v, before, impulse, mass, nodes, axes, at, sides, restitution, dt):
                 beyond += sides[j, k] * (x[a, i] - plane + dt * v[a, i]) < 0.0
             if not beyond:
                 continue
-            stopped = True
             for j in range(first, last):
                 a, side = nodes[j], sides[j, k]
                 height = side * (x[a, i] - plane)
@@ -120,5 +126,9 @@ def _stop(x, v, before, impulse, mass, nodes, axes, at, sides, restitution, dt):
                         away = max(away, back)
                     change = side * away - v[a, i]
                     v[a, i] += change
+                    known = impulse[j].any()
                     impulse[j, i] += mass[a] * change
-    return stopped
+                    if not known and impulse[j].any():
+                        stopped[n] = j
+                        n += 1
+    return stopped[:n].copy()
