@@ -1,7 +1,8 @@
 """Primitives that overlap before anything is meshed."""
 
+import math
 from collections.abc import Iterable, Iterator
-from itertools import combinations, islice
+from itertools import combinations, islice, permutations
 
 from .bodies import Cylinder, Loose, MeshFile, Sphere, Tube
 from .geometry import Generated, Vector
@@ -37,6 +38,35 @@ def overlaps(parts: Iterable[tuple[int, Part]], contact: Contact | None) -> Iter
         if depth > 0.0:
             way = "move them apart, or set contact.overlap = 'push'"
             message = f"{second.name!r} overlaps parts[{i}], {first.name!r}, by about {depth:.2g} m or more; {way}"
+            yield problem(("parts", j, "mesh"), ..., message)
+
+
+def grazes(parts: Iterable[tuple[int, Part]], contact: Contact | None) -> Iterator[Problem]:
+    """A doubt for each of the numbered ``parts`` that fills the hole of another but for what facets may cut off the
+    tube there, h^2 / 8 r: two circles of one radius become polygons that overlap.
+    """
+    if contact is None or contact.overlap != "refuse":
+        return
+    round_ones = [
+        (i, part, part.mesh)
+        for i, part in parts
+        if isinstance(part.mesh, Cylinder | Tube) and (not contact.parts or part.name in contact.parts)
+    ]
+    for (i, outer, tube), (j, inner, rod) in permutations(round_ones, 2):
+        if not isinstance(tube, Tube) or tube.axis != rod.axis or outer.turn != inner.turn:
+            continue
+        along = "xyz".index(tube.axis)
+        off = math.hypot(*(tube.base[k] - rod.base[k] for k in range(3) if k != along))
+        gap = tube.inner_radius - rod.radius - off
+        apart = max(tube.base[along], rod.base[along]) >= min(
+            tube.base[along] + tube.length, rod.base[along] + rod.length
+        )
+        if abs(gap) < tube.element_size**2 / (8.0 * tube.inner_radius) and not apart:
+            room = f"leaves {gap:.2g} m in" if gap > 0.0 else "fills"
+            message = (
+                f"{inner.name!r} {room} the hole of parts[{i}], {outer.name!r}: the facets of the two may overlap; "
+                "contact.overlap = 'push' moves them apart"
+            )
             yield problem(("parts", j, "mesh"), ..., message)
 
 

@@ -13,6 +13,7 @@ from .driven import passing
 from .estimate import Estimate, wave_speed
 from .library import material
 from .materials import Material
+from .overlap import grazes
 from .problems import Location, Problem, problem
 from .quantities import unit_of_reference
 from .reference import Schema, definition, json_schema, variants
@@ -43,6 +44,7 @@ def doubts(data: Mapping[str, Any], case: Case, expected: Estimate) -> list[Prob
         *_effort(case, expected),
         *_materials(case),
         *_bodies(case, expected),
+        *grazes(enumerate(case.parts), case.contact),
         *strangers(case),
         *passing(case),
     ]

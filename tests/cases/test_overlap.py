@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from conoid.cases.load import CaseError, parse_case
+from conoid.cases.overlap import grazes
 from conoid.worker import assembly
 from conoid.worker.errors import InputError
 
@@ -133,3 +134,28 @@ def test_many_bodies_cost_little_time() -> None:
     shells = [{**TUBE, "inner_radius": 1e-3 * k + 1e-3, "radius": 1e-3 * k + 2e-3} for k in range(200)]
     parts = [{"name": f"shell_{k}", "material": "steel", "mesh": shell} for k, shell in enumerate(shells)]
     assert told({"name": "shells", "run": {"end_time": "1 us"}, "parts": parts}) == []
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "close"),
+    [
+        (TUBE, ROD, True),
+        (ROD, TUBE, True),
+        (TUBE, {**ROD, "radius": 1.9e-3, "base": [0.09e-3, 0, 0]}, True),
+        (TUBE, {**TUBE, "inner_radius": 1e-3, "radius": 1.97e-3, "element_size": 0.9e-3}, True),
+        (TUBE, {**ROD, "radius": 1.9e-3}, False),
+        (TUBE, {**ROD, "base": [0, 0, 8e-3]}, False),
+        (TUBE, {**ROD, "base": [9e-3, 0, 0]}, False),
+        (TUBE, {**ROD, "axis": "x", "radius": 1e-3, "base": [-9e-3, 0, 9e-3]}, False),
+        (ROD, {**ROD, "base": [0, 0, 8e-3]}, False),
+    ],
+)
+def test_a_rod_that_fills_a_tube_is_doubted(one: dict[str, Any], other: dict[str, Any], close: bool) -> None:
+    """Facets cut 0.06 mm off the tube at its hole."""
+    data = scene(one, other, contact={})
+    case = parse_case(data)
+    found = [str(doubt) for doubt in grazes(enumerate(case.parts), case.contact)]
+    assert len(found) == close
+    assert all("may overlap; contact.overlap = 'push' moves them apart" in line for line in found)
+    pushed = parse_case({**data, "contact": {"overlap": "push"}})
+    assert list(grazes(enumerate(pushed.parts), pushed.contact)) == []
