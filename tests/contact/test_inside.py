@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conoid.worker.contact.inside import Inside, look
+from conoid.worker.contact.inside import Inside, _depths, look
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.simulation import Simulation
 
@@ -87,3 +87,13 @@ def test_nodes_on_faces_between_tets_are_inside() -> None:
     assert sim.contact is not None
     assert found.nodes >= 2
     assert found.deepest * sim.contact.exterior.size == pytest.approx(0.3 * SIZE, rel=1e-9)
+
+
+def test_no_node_is_deeper_than_it_is_away_from_a_corner_on_the_surface() -> None:
+    """The only open face of a tet is far; beside its other corner the surface belongs to the neighbours."""
+    corners = np.vstack([np.zeros(3), np.eye(3)])[None]
+    opened, outer = np.array([[True, False, False, False]]), np.array([[False, True, True, True]])
+    near = np.full((1, 3), 0.1)
+    assert _depths(near, corners, opened, outer) == pytest.approx(0.7 / np.sqrt(3.0))
+    assert _depths(near, corners, opened, outer | True) == pytest.approx(0.1 * np.sqrt(3.0))
+    assert _depths(-near, corners, opened, outer) == pytest.approx(-1.0)

@@ -167,7 +167,7 @@ def test_branching_plates_start_and_branch_as_published(plates: list[cracks.Run]
 
 @pytest.mark.slow
 @pytest.mark.timeout(1200)
-@pytest.mark.xfail(strict=False, reason="twenty runs have 0.62 +- 0.08 of the Rayleigh speed")
+@pytest.mark.xfail(strict=False, reason="fifteen runs have 0.62 +- 0.08 of the Rayleigh speed")
 def test_branching_plates_are_no_faster_than_published(plates: list[cracks.Run]) -> None:
     """The median of their largest speeds before they branch is below 0.6 of the Rayleigh speed."""
     fastest = [run.fastest[0] for run in plates]
@@ -177,7 +177,7 @@ def test_branching_plates_are_no_faster_than_published(plates: list[cracks.Run])
 
 @pytest.mark.slow
 @pytest.mark.timeout(1200)
-@pytest.mark.xfail(strict=False, reason="five random meshes are at the edge after 73.6 +- 3.0 us in the mean")
+@pytest.mark.xfail(strict=False, reason="fourteen of fifteen runs are at the edge after 74.3 +- 1.9 us")
 def test_branching_plates_are_at_the_edge_as_published(plates: list[cracks.Run]) -> None:
     """In the mean after 75 to 80 us, with a deviation of no more than that."""
     edge = np.array([run.crack.passed(run.crack.end - 1.5 * FINE) for run in plates])

@@ -2,9 +2,9 @@
 
 A node that lies in a tet which nothing holds together with its own has come through that body's surface. How deep it
 is below the surface the tet alone tells: below the nearest of its own open faces; and in one that has no open face but
-a corner on the surface, below the nearest of its faces at least. In a tet without a corner on the surface it is deeper
-than the outermost layer. Nodes of the surface and nodes that have separated are looked at, against the tets of
-all ranks, so that no cut changes what is found.
+a corner on the surface, below the nearest of its faces at least; nowhere deeper than it is away from a corner of the
+tet on the surface. In a tet without one it is deeper than the outermost layer. Nodes of the surface and nodes that have
+separated are looked at, against the tets of all ranks, so that no cut changes what is found.
 """
 
 from dataclasses import dataclass
@@ -68,8 +68,8 @@ def look(contact: Contact, model: Model, labels: list[Ints] | None, comm: Comm) 
         allowed = ~np.isnan(contact.searches.mu)
         pairs = search.find(one, other, points, np.zeros_like(points), part, allowed, 0.0, None)
         pairs = pairs[told[pairs[:, 0], 1] != fragment[pairs[:, 1]]]
-        corners, opened = model.nodes.x[block.tets[pairs[:, 1]]], _open(block, contact)[pairs[:, 1]]
-        depth = _depths(x[pairs[:, 0]], corners, opened)
+        tets, opened = block.tets[pairs[:, 1]], _open(block, contact)[pairs[:, 1]]
+        depth = _depths(x[pairs[:, 0]], model.nodes.x[tets], opened, _outer(contact)[tets])
         some = depth > SLIGHT * size
         found.append(np.column_stack([told[pairs[some, 0], 0], depth[some] / size]))
     everywhere = np.concatenate(comm.share(np.concatenate(found)))
@@ -110,9 +110,10 @@ def _open(block: Block, contact: Contact) -> Flags:
     return np.asarray(opened | (outer & ~opened.any(axis=1))[:, None])
 
 
-def _depths(points: Floats, corners: Floats, opened: Flags) -> Floats:
-    """(p,) how deep points (p, 3) in tets (p, 4, 3) are below the nearest face that is ``opened`` (p, 4), m: infinite
-    where none is, negative outside of the tet and in a tet without volume.
+def _depths(points: Floats, corners: Floats, opened: Flags, outer: Flags) -> Floats:
+    """(p,) how deep points (p, 3) in tets (p, 4, 3) are below the nearest face that is ``opened`` (p, 4), or from the
+    nearest corner on the surface, ``outer`` (p, 4), m: infinite where none is, negative outside of the tet and in a tet
+    without volume.
     """
     edges = corners[:, 1:] - corners[:, :1]
     solid = np.linalg.det(edges) > 0.0
@@ -120,5 +121,6 @@ def _depths(points: Floats, corners: Floats, opened: Flags) -> Floats:
     tail = np.einsum("pi,pij->pj", points - corners[:, 0], edges)
     shares = np.column_stack([1.0 - tail.sum(axis=1), tail])
     steepness = np.linalg.norm(np.concatenate([edges.sum(axis=2)[:, None], np.swapaxes(edges, 1, 2)], axis=1), axis=2)
-    heights = np.where(opened, shares / steepness, np.inf)
-    return np.where(solid & (shares >= -_ROUNDING).all(axis=1), heights.min(axis=1), -1.0)
+    heights = np.where(opened, shares / steepness, np.inf).min(axis=1)
+    away = np.where(outer, np.linalg.norm(points[:, None] - corners, axis=2), np.inf).min(axis=1)
+    return np.where(solid & (shares >= -_ROUNDING).all(axis=1), np.minimum(heights, away), -1.0)
