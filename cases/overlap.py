@@ -43,7 +43,7 @@ def overlaps(parts: Iterable[tuple[int, Part]], contact: Contact | None) -> Iter
 
 def grazes(parts: Iterable[tuple[int, Part]], contact: Contact | None) -> Iterator[Problem]:
     """A doubt for each of the numbered ``parts`` that fills the hole of another but for what facets may cut off the
-    tube there, h^2 / 8 r: two circles of one radius become polygons that overlap.
+    tube there: two circles of one radius become polygons that overlap.
     """
     if contact is None or contact.overlap != "refuse":
         return
@@ -58,10 +58,8 @@ def grazes(parts: Iterable[tuple[int, Part]], contact: Contact | None) -> Iterat
         along = "xyz".index(tube.axis)
         off = math.hypot(*(tube.base[k] - rod.base[k] for k in range(3) if k != along))
         gap = tube.inner_radius - rod.radius - off
-        apart = max(tube.base[along], rod.base[along]) >= min(
-            tube.base[along] + tube.length, rod.base[along] + rod.length
-        )
-        if abs(gap) < tube.element_size**2 / (8.0 * tube.inner_radius) and not apart:
+        low, high = max(tube.base[along], rod.base[along]), min(m.base[along] + m.length for m in (tube, rod))
+        if abs(gap) < _cut_off(tube.inner_radius, tube.element_size) and low < high:
             room = f"leaves {gap:.2g} m in" if gap > 0.0 else "fills"
             message = (
                 f"{inner.name!r} {room} the hole of parts[{i}], {outer.name!r}: the facets of the two may overlap; "
@@ -71,11 +69,16 @@ def grazes(parts: Iterable[tuple[int, Part]], contact: Contact | None) -> Iterat
 
 
 def _core(mesh: Generated) -> Generated:
-    """A body without what facets of the size of its elements may cut off its curved surface: h^2 / 8 R."""
+    """A body without what facets of the size of its elements may cut off its curved surface."""
     if not isinstance(mesh, Cylinder | Tube | Sphere):
         return mesh
-    left = max(0.5 * mesh.radius, mesh.radius - mesh.element_size**2 / (8.0 * mesh.radius))
+    left = max(0.5 * mesh.radius, mesh.radius - _cut_off(mesh.radius, mesh.element_size))
     return mesh.model_copy(update={"radius": left})
+
+
+def _cut_off(radius: float, size: float) -> float:
+    """What a chord of this ``size`` cuts off a circle, m: h^2 / 8 R, the height of the arc."""
+    return size**2 / (8.0 * radius)
 
 
 def _common(one: tuple[Vector, Vector], other: tuple[Vector, Vector]) -> tuple[Vector, Vector] | None:

@@ -202,6 +202,14 @@ def mirrored(n: int, bounds: Iterable[Boundary]) -> Flags:
     return found
 
 
+def driven(n: int, bounds: Iterable[Boundary]) -> Flags:
+    """(n,) which of ``n`` nodes have a component of their velocity prescribed."""
+    found = np.zeros(n, bool)
+    for bound in bounds:
+        found[bound.nodes] |= (bound.held_components() == PRESCRIBED).any(axis=1)
+    return found
+
+
 def free(nodes: Indices) -> Bits:
     """(n, 3) what a boundary holds that holds nothing."""
     return np.full((len(nodes), 3), FREE, np.uint8)

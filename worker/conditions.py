@@ -7,14 +7,14 @@ import numpy as np
 from conoid.cases import schema
 from conoid.cases.drives import clash, motions
 
-from .boundaries import MIRRORED, PRESCRIBED, Boundary, RigidWalls, SymmetryPlane, mirrored
+from .boundaries import MIRRORED, Boundary, RigidWalls, SymmetryPlane, driven, mirrored
 from .drivers import Course, Gravity, PrescribedRotation, PrescribedVelocity, Traction
 from .errors import InputError
 from .migration.parcel import Parcel
 from .parallel.comm import Comm
-from .state import Flags, Indices, Load, Model, Nodes
+from .state import Flags, Floats, Indices, Load, Model, Nodes
 
-_AXES = {"x": 0, "y": 1, "z": 2}
+AXES = {"x": 0, "y": 1, "z": 2}
 ON_PLANE = 1e-9
 """Of the size of the mesh: closer than this is on a plane. Chosen far above the rounding of coordinates (1e-16) and far
 below the smallest tets (1e-4)."""
@@ -40,9 +40,7 @@ def build(case: schema.Case, model: Model, loads: list[Load]) -> list[Boundary]:
         Traction(nodes.places(load.nodes), load, Course(spec.course))
         for (_, spec), load in zip(case.boundaries_of(schema.Traction), loads, strict=True)
     ]
-    boundaries += [
-        SymmetryPlane(_indices(held[i]), _AXES[spec.axis]) for i, spec in case.boundaries_of(schema.Symmetry)
-    ]
+    boundaries += [SymmetryPlane(_indices(held[i]), AXES[spec.axis]) for i, spec in case.boundaries_of(schema.Symmetry)]
     for spec, h in zip(case.boundaries, held, strict=True):
         if isinstance(spec, schema.Prescribed):
             velocity = np.array([np.nan if c is None else c for c in (spec.x, spec.y, spec.z)])
@@ -50,9 +48,7 @@ def build(case: schema.Case, model: Model, loads: list[Load]) -> list[Boundary]:
         elif isinstance(spec, schema.Rotation):
             centre, rate = np.array(spec.spin.centre), np.array(spec.spin.rate)
             boundaries.append(PrescribedRotation(_indices(h), centre, rate))
-    moved = np.zeros(nodes.n, bool)
-    for boundary in boundaries:
-        moved[boundary.nodes] |= (boundary.held_components() == PRESCRIBED).any(axis=1)
+    moved = driven(nodes.n, boundaries)
     return [*boundaries, *_walls(case, [h & ~moved for h in held], mirrored(nodes.n, boundaries))]
 
 
@@ -75,18 +71,33 @@ def start(case: schema.Case, model: Model, boundaries: list[Boundary], comm: Com
 
 def _held_by(spec: schema.Boundary, model: Model) -> Flags:
     """(n,) the nodes that a boundary acts on."""
-    nodes = model.nodes
-    chosen = np.ones(nodes.n, bool)
-    if spec.parts:
-        chosen = np.isin(nodes.part, [model.parts.index(p) for p in spec.parts])
+    nodes, chosen = model.nodes, _of_parts(spec, model)
     if isinstance(spec, schema.Symmetry):
-        chosen &= np.abs(nodes.x0[:, _AXES[spec.axis]] - spec.at) <= ON_PLANE * max(model.size, abs(spec.at))
+        chosen &= heights(spec, model) == 0.0
     elif isinstance(spec, schema.Prescribed):
         if spec.low is not None:
             chosen &= (nodes.x0 >= np.array(spec.low)).all(axis=1)
         if spec.high is not None:
             chosen &= (nodes.x0 <= np.array(spec.high)).all(axis=1)
     return chosen
+
+
+def _of_parts(spec: schema.Boundary, model: Model) -> Flags:
+    """(n,) the nodes of the parts that a boundary names; of all where it names none."""
+    if not spec.parts:
+        return np.ones(model.nodes.n, bool)
+    return np.isin(model.nodes.part, [model.parts.index(p) for p in spec.parts])
+
+
+def heights(spec: schema.Symmetry, model: Model) -> Floats:
+    """(n,) of the nodes over a symmetry plane at the start, m; zero on it."""
+    found = model.nodes.x0[:, AXES[spec.axis]] - spec.at
+    return np.where(np.abs(found) <= ON_PLANE * max(model.size, abs(spec.at)), 0.0, found)
+
+
+def sides(spec: schema.Symmetry, model: Model) -> Floats:
+    """(n,) on which side of a symmetry plane that holds them nodes start: 1 above, -1 below, else 0."""
+    return np.where(_of_parts(spec, model), np.sign(heights(spec, model)), 0.0)
 
 
 def _walls(case: schema.Case, held: list[Flags], planes: Flags) -> list[Boundary]:
@@ -122,7 +133,7 @@ def _refuse_two_drives(specs: Sequence[schema.Boundary], held: list[Flags], comm
 
 def _two_drives(specs: Sequence[schema.Boundary], held: list[Flags]) -> int:
     """Two boundaries that drive a node of this rank each in its own way: second * boundaries + first; -1 for none."""
-    drivers = {axis: np.full(len(held[0]) if held else 0, -1) for axis in _AXES}
+    drivers = {axis: np.full(len(held[0]) if held else 0, -1) for axis in AXES}
     for second, spec in enumerate(specs):
         for axis in motions(spec):
             of = drivers[axis]

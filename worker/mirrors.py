@@ -9,8 +9,8 @@ import numpy as np
 
 from conoid.cases.schema import Case, Symmetry
 
-from .boundaries import PRESCRIBED, Boundary, free
-from .conditions import ON_PLANE
+from .boundaries import Boundary, driven, free
+from .conditions import AXES, sides
 from .jit import njit
 from .migration.parcel import Parcel
 from .state import Bits, Floats, Indices, Ints, Model, Nodes, extended
@@ -39,21 +39,12 @@ class Mirrors(Boundary):
         """All symmetry planes of a case, and the nodes that start beside them; those of prescribed motion are left
         alone.
         """
-        nodes = model.nodes
-        driven = np.zeros(nodes.n, bool)
-        for bound in bounds:
-            driven[bound.nodes] |= (bound.held_components() == PRESCRIBED).any(axis=1)
         specs = [spec for _, spec in case.boundaries_of(Symmetry)]
-        axes, at = np.array(["xyz".index(spec.axis) for spec in specs], np.int64), np.array([s.at for s in specs])
-        sides = np.zeros((nodes.n, len(specs)))
-        for k, spec in enumerate(specs):
-            there = np.array([part.name in spec.parts or not spec.parts for part in case.parts])[nodes.part] & ~driven
-            height = nodes.x0[:, axes[k]] - spec.at
-            beside = there & (np.abs(height) > ON_PLANE * max(model.size, abs(spec.at)))
-            sides[beside, k] = np.sign(height[beside])
-        some = sides.any(axis=1)
+        axes, at = np.array([AXES[spec.axis] for spec in specs]), np.array([spec.at for spec in specs])
+        held = np.column_stack([sides(spec, model) for spec in specs])
+        some = held.any(axis=1) & ~driven(model.nodes.n, bounds)
         back = case.contact.restitution if case.contact is not None else 0.0
-        return cls(np.flatnonzero(some).astype(np.int32), axes, at, sides[some], back)
+        return cls(np.flatnonzero(some).astype(np.int32), axes, at, held[some], back)
 
     def held_components(self) -> Bits:
         return free(self.nodes)
@@ -66,7 +57,7 @@ class Mirrors(Boundary):
         self._stopped = np.flatnonzero(self._impulse.any(axis=1))
 
     def note(self, state: Nodes) -> None:
-        _copy(self._before, state.v, self.nodes)
+        np.take(state.v, self.nodes, axis=0, out=self._before, mode="clip")
         _book(self.contact_loss, self._impulse, self._before, self._stopped)
         self._impulse[self._stopped] = 0.0
 
@@ -78,14 +69,6 @@ class Mirrors(Boundary):
                 self._sides, self._restitution, dt,
             )  # fmt: skip
             _book(self.contact_loss, self._impulse, self._before, self._stopped)
-
-
-@njit("void(float64[:, ::1], float64[:, ::1], int32[::1])", cache=True)
-def _copy(before, v, nodes):  # type: ignore[no-untyped-def]
-    """Velocities of the ``nodes``."""
-    for j in range(len(nodes)):
-        for i in range(3):
-            before[j, i] = v[nodes[j], i]
 
 
 @njit("void(float64[::1], float64[:, ::1], float64[:, ::1], int64[::1])", cache=True)
@@ -108,27 +91,26 @@ def _stop(x, v, before, impulse, mass, nodes, axes, at, sides, restitution, dt):
     were stopped, by some plane.
     """
     stopped, n = np.empty(len(nodes), np.int64), 0
-    for k in range(len(axes)):
-        i, plane = axes[k], at[k]
-        for first in range(0, len(nodes), _TOGETHER):
-            last, beyond = min(first + _TOGETHER, len(nodes)), 0
+    for first in range(0, len(nodes), _TOGETHER):
+        last, met = min(first + _TOGETHER, len(nodes)), 0
+        for k in range(len(axes)):
+            i, plane = axes[k], at[k]
             for j in range(first, last):
                 a = nodes[j]
-                beyond += sides[j, k] * (x[a, i] - plane + dt * v[a, i]) < 0.0
-            if not beyond:
-                continue
-            for j in range(first, last):
-                a, side = nodes[j], sides[j, k]
-                height = side * (x[a, i] - plane)
-                if side * (x[a, i] - plane + dt * v[a, i]) < 0.0:
-                    away, back = -height / dt, -restitution * side * before[j, i]
-                    if back > 0.0:
-                        away = max(away, back)
-                    change = side * away - v[a, i]
+                met += sides[j, k] * (x[a, i] - plane + dt * v[a, i]) < 0.0
+        if not met:
+            continue
+        for j in range(first, last):
+            a = nodes[j]
+            for k in range(len(axes)):
+                i, side = axes[k], sides[j, k]
+                height, speed = side * (x[a, i] - at[k]), side * v[a, i]
+                if height + dt * speed < 0.0:
+                    back = -restitution * side * before[j, i]
+                    change = side * (max(-height / dt, back if back > 0.0 else -np.inf) - speed)
                     v[a, i] += change
-                    known = impulse[j].any()
                     impulse[j, i] += mass[a] * change
-                    if not known and impulse[j].any():
-                        stopped[n] = j
-                        n += 1
+            if impulse[j].any():
+                stopped[n] = j
+                n += 1
     return stopped[:n].copy()

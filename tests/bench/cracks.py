@@ -5,7 +5,7 @@ A facet counts from when it carries nothing any more, not from when it breaks: b
 
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 from unittest.mock import patch
@@ -462,6 +462,18 @@ SIBLINGS = tuple(Plan("branching_plate", FINE, "random", seed) for seed in range
 """More of the kind of the last of PLATES."""
 RANDOM = (PLATES[-1], *SIBLINGS)
 """Five meshes of one kind: without directions, of the finer elements."""
+_SAFETIES = (0.9, 0.899, 0.898, 0.897, 0.896, 0.895, 0.89)
+
+
+def _stepped(plan: Plan, safety: float) -> Plan:
+    return replace(plan, words=(f"numerics.dt_safety={safety}",))
+
+
+STEPPED = (
+    *(_stepped(PLATES[3], safety) for safety in _SAFETIES),
+    *(_stepped(plan, safety) for safety in (0.897, 0.893) for plan in RANDOM),
+)
+"""What a step that is hardly another one changes: a coarse mesh with seven of them, and RANDOM with two more."""
 SHOWN = (PLATES[0], PLATES[6], PLATES[7], *SIBLINGS[:3])
 """Meshes whose cracks are drawn."""
 STRIPS = (Plan("strip", 0.5e-3), Plan("strip", 0.5e-3, "random", 0))
@@ -481,7 +493,7 @@ def measure(plans: Iterable[Plan]) -> Iterator[Run]:
 def as_data(runs: Sequence[Run]) -> dict[str, list[float]]:
     """Work, J, fragments, CPU-s and, of cracks, the columns of the table."""
     return {
-        f"{r.plan.case}, {r.plan.name}": [
+        ", ".join((r.plan.case, r.plan.name, *r.plan.words)): [
             r.taken,
             float(r.fragments),
             r.cpu,
@@ -494,12 +506,13 @@ def as_data(runs: Sequence[Run]) -> dict[str, list[float]]:
 def report(runs: Sequence[Run]) -> str:
     """All tables."""
     of = {name: [r for r in runs if r.plan.case == name] for name in ("branching_plate", "strip", "bar")}
-    texts = [_cracks(of["branching_plate"]), _scatter([r for r in of["branching_plate"] if _sibling(r)])]
-    return "\n\n".join([*texts, _cracks(of["strip"]), _bars(of["bar"])])
-
-
-def _sibling(run: Run) -> bool:
-    return run.plan in RANDOM
+    plates = [r for r in of["branching_plate"] if not r.plan.words]
+    random = [r for r in plates if r.plan in RANDOM]
+    fine, coarse = ([r for r in runs if r.plan in STEPPED and r.plan.size == size] for size in (FINE, PLATES[3].size))
+    return "\n\n".join([
+        _cracks(plates), scatter("meshes", random), scatter("runs of these, three steps", [*random, *fine]),
+        scatter("runs of one, 1 mm, seven steps", coarse), _cracks(of["strip"]), _bars(of["bar"]),
+    ])  # fmt: skip
 
 
 def _some(value: float, digits: int = 1) -> Cell:
@@ -529,13 +542,15 @@ def _cracks(runs: Sequence[Run]) -> str:
     return table(["mesh", "tets", *_HEAD, "CPU s", "residual"], rows)
 
 
-def _scatter(runs: Sequence[Run]) -> str:
-    values = np.array([_columns(r) for r in runs])
-    rows: list[list[Cell]] = [
-        [name, *(_some(float(v), d) for v, d in zip(of(values, axis=0), _DIGITS, strict=True))]
-        for name, of in (("mean", np.mean), ("standard deviation", np.std), ("smallest", np.min), ("largest", np.max))
-    ]
-    return table([f"{len(runs)} meshes", *_HEAD], rows)
+def scatter(what: str, runs: Sequence[Run]) -> str:
+    """Of the runs that have a value; ``what`` they are."""
+    values = np.array([[*_columns(r), 1e3 * r.energy.contact] for r in runs]).T
+    some = [column[np.isfinite(column)] for column in values]
+    rows: list[list[Cell]] = [["of", *(len(column) for column in some)]]
+    for name, of in (("mean", np.mean), ("standard deviation", np.std), ("smallest", np.min), ("largest", np.max)):
+        found = (float(of(column)) if len(column) else np.nan for column in some)
+        rows.append([name, *(_some(v, d) for v, d in zip(found, (*_DIGITS, 3), strict=True))])
+    return table([f"{len(runs)} {what}", *_HEAD, "contact, mJ"], rows)
 
 
 def _bars(runs: Sequence[Run]) -> str:

@@ -66,3 +66,12 @@ def test_nodes_on_the_plane_stay_there_and_driven_ones_are_let_through() -> None
     heights = sim.model.nodes.x0[mirrors.nodes, 1]
     assert len(heights) == 18
     assert sorted(set(heights.round(6))) == [-1.0 * MM, 1.0 * MM]
+    nodes = sim.model.nodes
+    on, moved_ones = np.flatnonzero(nodes.x0[:, 1] == 0.0), nodes.part == 1
+    step.prepare(sim)
+    while sim.clock.t < 4e-6:
+        tick(sim)
+    assert len(on) == 9
+    assert (nodes.x[on, 1] == 0.0).all()
+    assert nodes.x[moved_ones, 1].min() < -0.2 * MM
+    assert nodes.v[moved_ones, 1] == pytest.approx(-SPEED, rel=1e-12)

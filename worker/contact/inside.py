@@ -58,7 +58,8 @@ def look(contact: Contact, model: Model, labels: list[Ints] | None, comm: Comm) 
     ``labels``: for each block (n,) the fragment of each tet; without, every part is one.
     """
     fragments = labels or [np.full(block.n, block.part, np.int64) for block in model.blocks]
-    told = comm.join(_seen(contact, model, fragments)).reshape(-1, _WORDS)
+    outer = _outer(contact)
+    told = comm.join(_seen(outer, model, fragments)).reshape(-1, _WORDS)
     parts, x = told[:, 2].astype(np.int32), np.ascontiguousarray(told[:, 3:]).view(np.float64)
     points, part = np.concatenate([model.nodes.x, x]), np.concatenate([model.nodes.part, parts])
     found, size = [np.zeros((0, 2))], contact.exterior.size
@@ -68,8 +69,8 @@ def look(contact: Contact, model: Model, labels: list[Ints] | None, comm: Comm) 
         allowed = ~np.isnan(contact.searches.mu)
         pairs = search.find(one, other, points, np.zeros_like(points), part, allowed, 0.0, None)
         pairs = pairs[told[pairs[:, 0], 1] != fragment[pairs[:, 1]]]
-        tets, opened = block.tets[pairs[:, 1]], _open(block, contact)[pairs[:, 1]]
-        depth = _depths(x[pairs[:, 0]], model.nodes.x[tets], opened, _outer(contact)[tets])
+        tets, opened = block.tets[pairs[:, 1]], _open(block, contact, outer)[pairs[:, 1]]
+        depth = _depths(x[pairs[:, 0]], model.nodes.x[tets], opened, outer[tets])
         some = depth > SLIGHT * size
         found.append(np.column_stack([told[pairs[some, 0], 0], depth[some] / size]))
     everywhere = np.concatenate(comm.share(np.concatenate(found)))
@@ -80,13 +81,13 @@ def look(contact: Contact, model: Model, labels: list[Ints] | None, comm: Comm) 
     )  # fmt: skip
 
 
-def _seen(contact: Contact, model: Model, fragments: list[Ints]) -> Ints:
-    """(k, _WORDS) of the nodes of this rank that are looked at: id, fragment, part and the words of the position; one
+def _seen(outer: Flags, model: Model, fragments: list[Ints]) -> Ints:
+    """(k, _WORDS) of the ``outer`` nodes (nodes,) of this rank: id, fragment, part and the words of the position; one
     that has lost its tets is a fragment of its own.
     """
     nodes = model.nodes
     of = np.full(nodes.n, -1, np.int64)
-    some = nodes.owned & _outer(contact)
+    some = nodes.owned & outer
     for block, fragment in zip(model.blocks, fragments, strict=True):
         of[block.tets] = fragment[:, None]
     return np.asarray(np.column_stack([nodes.id, of, nodes.part, nodes.x.view(np.int64)])[some])
@@ -98,7 +99,7 @@ def _outer(contact: Contact) -> Flags:
     return np.asarray(contact.exterior.surface.flags | (ring != np.arange(len(ring))))
 
 
-def _open(block: Block, contact: Contact) -> Flags:
+def _open(block: Block, contact: Contact, outer: Flags) -> Flags:
     """(n, 4) faces of tets that are exposed or broken, those in symmetry planes left out; all faces of a tet that has
     none but a corner on the surface.
     """
@@ -106,8 +107,8 @@ def _open(block: Block, contact: Contact) -> Flags:
     opened = np.isin(4 * block.id[:, None] + np.arange(4), faces.id[faces.exposed])
     if len(block.bond):
         opened |= block.bond != INTACT
-    outer = np.asarray(_outer(contact)[block.tets].any(axis=1))
-    return np.asarray(opened | (outer & ~opened.any(axis=1))[:, None])
+    touching = np.asarray(outer[block.tets].any(axis=1))
+    return np.asarray(opened | (touching & ~opened.any(axis=1))[:, None])
 
 
 def _depths(points: Floats, corners: Floats, opened: Flags, outer: Flags) -> Floats:

@@ -12,7 +12,6 @@ _STEP = 6.0**-0.5
 """Stable step of a regular tet times the speed of sound, over its edge."""
 _REGULAR = (6.0 * 2.0**0.5) ** (1.0 / 3.0)
 """Edge of a regular tet over the cube root of its volume."""
-
 _ROUNDING = 1e-9
 """Of a ratio: a strength that is lowered until so many elements fit meets their number to the last bits."""
 
