@@ -1,9 +1,9 @@
 """Erosion: worn-out tets leave the body, what they covered is laid bare, and what left is booked.
 
 A tet is marked in the pass over the elements (elements/wear.py), with its force at n+1 already in the nodal sums. It
-leaves before the search for contact of the next step, so that what it covered meets other bodies in that very step. Its
-last force acts through one more kick: the second half of that work is booked a step later, as for a boundary. Tets that
-have only strained enough are gathered for a few steps, because every removal calls for a new search.
+leaves before the contact of the next step, so that what it covered meets other bodies in that very step. Its last force
+acts through one more kick: the second half of that work is booked a step later, as for a boundary. Tets that have only
+strained enough are gathered for a few steps, because every removal calls for new mean normals.
 """
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from conoid.cases.schema import Case
 
 from .clock import Clock
+from .contact import bare
 from .contact.stage import Contact
 from .elements.wear import BROKEN, FREQUENCY, SOUND
 from .mesh.faces import FACES
@@ -22,7 +23,6 @@ from .parallel.ownership import Neighbour, complete
 from .parallel.tags import Tag
 from .state import (
     CHUNK,
-    LAID_BARE,
     PRESSURE,
     S_XX,
     S_XY,
@@ -44,7 +44,7 @@ from .state import (
 from .topology import Split
 
 GATHERED = 10
-"""Steps in which worn tets are gathered. Chosen: every removal calls for a search."""
+"""Steps in which worn tets are gathered. Chosen: every removal calls for mean normals and tests of all pairs."""
 
 
 class Erosion:
@@ -167,12 +167,12 @@ class Erosion:
 
     def _remove(self, state: Nodes) -> None:
         """Takes the marked tets out; all ranks take part."""
-        gone, left = [np.zeros((0, 5), np.int64)], []
+        gone, left = [np.zeros((0, bare.WORDS), np.int64)], []
         for block in self._model.blocks:
             worn = np.flatnonzero(block.worn)
             if len(worn):
                 if self._contact is not None:
-                    gone.append(np.column_stack([block.id[worn], block.across[worn]]))
+                    gone.append(bare.leaving(block, worn, state.id))
                 left.append(block.tets[worn].astype(np.int64))
                 self._last.append((left[-1], _forces(block, worn, state.x)))
                 self._work.add(_energies(block, worn))
@@ -184,18 +184,7 @@ class Erosion:
         self._leaving, self.removed = np.flatnonzero(leaving), self.removed | leaving
         self._before = state.v[self._leaving]
         if self._contact is not None:
-            self._lay_bare(np.concatenate(gone))
-            self._contact.uncover(alone & ~self.removed, self.removed)
-
-    def _lay_bare(self, gone: Ints) -> None:
-        """Exposes the faces behind tets ``gone`` (k, 5: id, faces across) of this rank and its neighbours."""
-        told = self._comm.swap({other.rank: gone for other in self._neighbours})
-        every = np.concatenate([gone, *(words.reshape(-1, 5) for words in told.values())])
-        for block in self._model.blocks:
-            beside = np.flatnonzero(np.isin(block.id, every[:, 1:] // 4))
-            rows = block.across[beside]
-            rows[np.isin(rows // 4, every[:, 0])] = LAID_BARE
-            block.across[beside] = rows
+            self._contact.uncover(np.concatenate(gone), alone & ~self.removed, self.removed)
 
     def _completed(self, tets: list[Ints]) -> Ints:
         """(nodes,) how many of these tets of all ranks have each node; all ranks take part."""

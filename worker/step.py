@@ -21,11 +21,10 @@ and at once f(n+1) from it, so a step begins with forces that are already at han
 15  facets that pass break, nodes separate                 topology(n+1), f(n+1)
 ==  =====================================================  ==========================
 
-What erosion uncovers takes part in the search of the same step. 12 and 13 are one pass over each chunk of tets (two
-with an averaged pressure, with the exchange of the nodal volumes between them); 14 is started after the border tets
-and finished after the interior ones, before the criterion. Which facets pass it is found before the reduction, which
-says whether any rank has some and whom they concern; which cracks open is found in 8, and they open after the
-reduction.
+What erosion uncovers meets in the same step. 12 and 13 are one pass over each chunk of tets (two with an averaged
+pressure, with the exchange of the nodal volumes between them); 14 is started after the border tets and finished after
+the interior ones, before the criterion. Which facets pass it is found before the reduction, which says whether any rank
+has some and whom they concern; which cracks open is found in 8, and they open after the reduction.
 """
 
 import math

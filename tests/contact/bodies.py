@@ -60,7 +60,9 @@ def surface_of(
 ) -> Surface:
     """The surface of a rank's piece; ``planes`` (nodes, planes): which nodes are on which symmetry plane."""
     on_planes = np.zeros((model.nodes.n, 0), bool) if planes is None else planes
-    return surface.build(model, on_planes, piece.neighbours, comm or SerialComm(), edges, np.zeros((0, 3), np.int32))
+    return surface.build(
+        model, on_planes, piece.neighbours, comm or SerialComm(), edges, *np.zeros((2, 0, 3), np.int32)
+    )
 
 
 def crowd_of(x: Floats, v: Floats | None = None, part: Indices | None = None) -> Crowd:

@@ -7,7 +7,7 @@ import pytest
 
 from conoid.cases.load import apply_overrides, parse_case, read_data
 from conoid.worker import simulation, step
-from conoid.worker.contact import cracks, flight, searches
+from conoid.worker.contact import bare, cracks, flight, searches
 from conoid.worker.digest import digest
 from conoid.worker.parallel.comm import Comm, SerialComm
 
@@ -58,6 +58,19 @@ def test_no_answer_depends_on_which_cracks_a_search_foresees(monkeypatch: pytest
     one = alone("breaking")[0]
     monkeypatch.setattr(cracks, "_FORESEEN", foreseen)
     assert ran("breaking", SerialComm())[0] == one
+
+
+@pytest.mark.parametrize("ranks", [1, 3])
+@pytest.mark.parametrize("share", [0.0, 0.9, 2.0])
+def test_no_answer_depends_on_which_tets_a_search_expects_to_leave(
+    monkeypatch: pytest.MonkeyPatch, ranks: int, share: float
+) -> None:
+    """All, few or none: what is laid bare by a tet that was not expected to leave is taken up by a search."""
+    usual, many = bare.TIRING, on_ranks(ranks, lambda comm: ran("eroding", comm))[0][1]
+    monkeypatch.setattr(bare, "TIRING", share)
+    other, more = on_ranks(ranks, lambda comm: ran("eroding", comm))[0]
+    assert other == alone("eroding")[0]
+    assert (more > many) == (share > usual)
 
 
 @pytest.mark.parametrize("name", STEPS)

@@ -269,6 +269,35 @@ def test_what_is_laid_bare_meets_in_the_same_step() -> None:
     assert wanted <= candidates()
 
 
+def test_what_a_tiring_tet_covers_comes_to_the_surface_without_a_search() -> None:
+    case, meshes = scene_of_two()
+    copper = case.model_copy(update={"materials": {"metal": COPPER}})
+    sim = build(wearing(copper, schema.Erosion(plastic_strain=1.0)), meshes)
+    step.prepare(sim)
+    assert sim.contact is not None
+    searches, part, behind = sim.contact.searches, sim.model.blocks[0], across(meshes[0].tets)
+    tick(sim, part.id[:1])
+    inner = np.flatnonzero((behind[part.id] >= 0).all(axis=1))[0]
+    tired, covers = int(part.id[inner]), behind[part.id[inner]]
+    part.state[inner // state.CHUNK, state.PLASTIC_STRAIN, inner % state.CHUNK] = 0.6
+    searches.due = True
+    tick(sim)
+    many, scene = searches.many, searches.scene
+    assert scene is not None
+    rows = scene.rows_of(covers)
+    assert len(rows) == 4
+    assert not scene.faces.exposed[rows].any()
+    tick(sim, np.array([tired]))
+    assert searches.many == many
+    assert searches.scene is scene
+    assert scene.faces.exposed[rows].all()
+    assert not scene.faces.exposed[scene.rows_of(4 * tired + np.arange(4))].any()
+    corners = scene.faces.corners[rows, :3]
+    assert scene.slots.on_surface[corners].all()
+    assert scene.slots.live[corners].all()
+    assert (part.across[np.isin(part.id, covers // 4)] == state.LAID_BARE).sum() >= 4
+
+
 def test_what_loses_its_support_is_held_by_what_lies_below() -> None:
     """A driven tip is about to land when the tet under it leaves: in that step it lands on the slope behind."""
     speed, aside = 1000.0, 3e-3

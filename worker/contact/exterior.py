@@ -4,12 +4,13 @@ import numpy as np
 
 from ..boundaries import FREE, Boundary
 from ..errors import InputError
+from ..ids import among
 from ..migration.parcel import Parcel
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
 from ..state import Flags, Floats, Indices, Ints, Model, Nodes, extended
 from ..topology import Split
-from . import normals, surface
+from . import bare, normals, surface
 from .cracks import Cracks
 from .entering import entering
 from .flight import Flight, typical
@@ -19,7 +20,7 @@ from .scene import Scene
 _WORDS = 9 + 2 * normals.SHARE
 """Of the row of a crack that opens (Exterior.widened)."""
 _NO_SIDES = np.zeros((0, 3), np.int32)
-"""Of cracks that may open: none (block, place, face)."""
+"""That may become surface: none (block, place, face)."""
 
 
 class Exterior:
@@ -32,13 +33,13 @@ class Exterior:
         self._model, self._neighbours, self._comm, self._edges = model, neighbours, comm, edges
         self._planes = symmetry_planes(model.nodes.n, bounds)
         self.cracks = Cracks.none(model.nodes.id)
+        self._tiring: Ints | None = None
+        """Ids, ascending, of the tets here that the last search has expected to leave; None before any tet has left."""
         self.surface = self._build(np.zeros(model.nodes.n, bool), np.zeros(0, np.int64))
         self.size = typical(self.surface.faces.size, comm)
         """Of the faces of all ranks at the start, m."""
         self.flight = Flight(self.surface, model.nodes, mobilities(model.nodes, bounds), self.size, comm)
         self._moments = np.zeros((model.nodes.n, normals.COLUMNS), np.int64)
-        self._changed = False
-        """Whether the surface is another one than that of the last search."""
         self._separated = False
         """Whether nodes of any rank have separated: cracks may be open."""
 
@@ -79,11 +80,15 @@ class Exterior:
         return self.surface.flags & self._model.nodes.owned
 
     def _build(self, flags: Flags, turned: Ints) -> surface.Surface:
-        """The surface, with sides of cracks that may open; nodes that have been on it, ``flags`` (n,), still are, and
-        edges that have become sharp, ``turned``, stay so. All ranks take part.
+        """The surface, with sides of cracks that may open and faces that tiring tets cover; nodes that have been on it,
+        ``flags`` (n,), still are, and edges that have become sharp, ``turned``, stay so. All ranks take part.
         """
+        model, neighbours, comm = self._model, self._neighbours, self._comm
         sides = self.cracks.foresee() if len(self.cracks.faces) else _NO_SIDES
-        found = surface.build(self._model, self._planes, self._neighbours, self._comm, self._edges, sides)
+        covered = _NO_SIDES
+        if self._tiring is not None:
+            covered = bare.covered(model.blocks, self._tiring, neighbours, comm)
+        found = surface.build(model, self._planes, neighbours, comm, self._edges, sides, covered)
         found.flags[: len(flags)] |= flags
         found.sharpen(turned)
         return found
@@ -94,22 +99,41 @@ class Exterior:
         if turned.any():
             self.surface.sharpen(np.union1d(self.surface.turned, self.surface.edges.names[turned]))
 
-    def uncover(self, loose: Flags, removed: Flags) -> None:
-        """The surface after tets have left; ``loose`` (nodes,): nodes without tets that fly on, ``removed``: those that
-        have left. All ranks take part.
+    def uncover(self, gone: Ints, loose: Flags, removed: Flags, scene: Scene | None) -> bool:
+        """Mean normals, nodes of the surface and the ``scene`` after tets ``gone`` (k, bare.WORDS) of this rank have
+        left; ``loose`` (nodes,): nodes without tets that fly on, ``removed``: those that have left. Returns whether a
+        search has to take up what has been laid bare; all ranks take part.
         """
-        self.surface, self._changed = self._build(self.surface.flags | loose, self.surface.turned), True
-        self.surface.flags &= ~removed
+        if self._tiring is None:
+            self._tiring = np.zeros(0, np.int64)
+        known = among(self._tiring, gone[:, 0])
+        told = self._comm.join(np.column_stack([known, gone]).reshape(-1)).reshape(-1, 1 + bare.WORDS)
+        laid = bare.laid(told[:, 1:])
+        bare.lay(self._model.blocks, laid.bare)
+        flags, local = self.surface.flags, self._model.nodes.places(laid.nodes)
+        flags[local[local >= 0]] = True
+        flags |= loose
+        flags &= ~removed
+        self.flight.forget(removed)
         self.turn()
+        if scene is not None:
+            scene.node_face.wake()
+        if scene is None or not told[:, 0].all():
+            return True
+        scene.uncover(laid.gone, laid.bare, scene.own.place[removed])
+        self.show(scene, scene.own.local)
+        return False
 
     def crack(self, tets: Ints, nodes: Indices, sides: Indices) -> None:
         """Takes up broken facets; see ``Cracks.add``."""
         self.cracks.add(tets, nodes, sides, self._model.blocks)
 
-    def take_up_cracks(self) -> None:
-        """The surface anew, with the cracks that may open; all ranks take part."""
-        if self._separated:
-            self.surface, self._changed = self._build(self.surface.flags, self.surface.turned), True
+    def take_up(self) -> None:
+        """The surface anew, with what may become part of it before the next search; all ranks take part."""
+        if self._tiring is not None:
+            self._tiring = bare.tiring(self._model.blocks)
+        if self._separated or self._tiring is not None:
+            self.surface = self._build(self.surface.flags, self.surface.turned)
 
     def turn(self) -> None:
         """Mean normals of all nodes anew; all ranks take part."""
@@ -131,9 +155,8 @@ class Exterior:
         """
         nodes = self._model.nodes
         self.flight.begin(nodes, course, t)
-        if self._changed:
+        if self.flight.found is not self.surface:
             self.flight.follow(self.surface, nodes)
-            self._changed = False
         else:
             self.flight.refresh(nodes)
 

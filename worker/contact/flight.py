@@ -6,7 +6,7 @@ from ..ids import located
 from ..jit import njit
 from ..parallel.comm import Comm
 from ..parallel.fixed_point import exact_sums
-from ..state import Floats, Indices, Ints, Nodes, extended
+from ..state import Flags, Floats, Indices, Ints, Nodes, extended
 from . import ghosts
 from .records import Crowd, merged
 from .sides import HALO, Sides
@@ -34,10 +34,15 @@ class Flight:
 
     def follow(self, found: Surface, nodes: Nodes) -> None:
         """Takes a new surface; all ranks take part."""
-        self._found = found
+        self.found = found
+        """The surface."""
         self._watched = found.flags | found.waiting
         self.sides = self._whole(nodes, located(nodes.id, found.faces.nodes))
         """What this rank has of the surface."""
+
+    def forget(self, removed: Flags) -> None:
+        """Nodes that are ``removed`` (nodes,) do not fly any more."""
+        self._watched &= ~removed
 
     def begin(self, nodes: Nodes, course: Floats, t: float) -> None:
         """Free flight with the velocities ``course`` (nodes, 3) from time ``t`` on."""
@@ -56,7 +61,7 @@ class Flight:
 
     def grow(self, parents: Ints) -> None:
         """Takes up copies of nodes: they fly as their parents do."""
-        found = self._found
+        found = self.found
         found.flags = extended(found.flags, found.flags[parents])
         self._watched = extended(self._watched, self._watched[parents])
         self._x, self._course = extended(self._x, self._x[parents]), extended(self._course, self._course[parents])
@@ -68,7 +73,7 @@ class Flight:
 
     def _whole(self, nodes: Nodes, local: Indices) -> Sides:
         """``local`` (f, 4): nodes of the faces."""
-        found, here = self._found, self.here(nodes)
+        found, here = self.found, self.here(nodes)
         used = self._watched.copy()
         used[local] = True
         far = ghosts.fetch(found.far, found.far_owner, here, self._comm)
@@ -77,7 +82,7 @@ class Flight:
 
     def refresh(self, nodes: Nodes) -> None:
         """Positions and velocities of the surface as they are."""
-        crowd, found = self.sides.crowd, self._found
+        crowd, found = self.sides.crowd, self.found
         held = crowd.local >= 0
         local = crowd.local[held]
         crowd.x[held], crowd.v[held], crowd.course[held] = nodes.x[local], nodes.v[local], self._course[local]

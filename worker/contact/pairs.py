@@ -20,7 +20,7 @@ import numpy as np
 
 from ..growing import Rooms
 from ..jit import njit
-from ..state import Flags, Floats, Indices
+from ..state import Flags, Floats, Indices, Ints
 from .narrow_phase import Pairs
 from .node_face import chain
 
@@ -64,13 +64,16 @@ class PairTable:
             setattr(self, name, getattr(self, name)[:n])
         self.tested = self.tested[:0]
 
-    def recall(self, rows: Indices, kept: Floats) -> None:
-        """Pairs that are among ``rows`` (k, 2) have what these have ``kept``, (k, 4)."""
-        if len(rows):
-            width = 1 + max(int(self.rows[:, 1].max(initial=0)), int(rows[:, 1].max()))
-            one, two = (pairs[:, 0].astype(np.int64) * width + pairs[:, 1] for pairs in (self.rows, rows))
-            _, here, there = np.intersect1d(one, two, assume_unique=True, return_indices=True)
-            self.kept[here] = kept[there]
+    @property
+    def pushed(self) -> Ints:
+        """(k,) which pairs have had impulses in the last step."""
+        return np.asarray(_pushed(self.kept))
+
+    def recall(self, first: Indices, rows: Indices, kept: Floats) -> None:
+        """Pairs of nodes and faces that are among ``rows`` (k, 2) have what these have ``kept``, (k, 4); ``first``: see
+        ``hang``.
+        """
+        _recall(self.kept, first, self.next, self.rows, rows, kept)
 
     def carried(self, one: Indices, two: Indices) -> "PairTable":
         """The pairs whose things have new numbers ``one`` and ``two``, -1 for those that have gone; in the order of the
@@ -89,6 +92,26 @@ class PairTable:
     def arrays(self) -> Pairs:
         """As kernels take it."""
         return Pairs(self.rows, self.until, self.speed, self.turned, self.next, np.empty(len(self.rows), np.int32))
+
+
+@njit("int64[::1](float64[:, ::1])", cache=True)
+def _pushed(kept):  # type: ignore[no-untyped-def]
+    some, n = np.empty(len(kept), np.int64), 0
+    for p in range(len(kept)):
+        some[n] = p
+        n += kept[p, 0] != 0.0 or kept[p, 1] != 0.0 or kept[p, 2] != 0.0 or kept[p, 3] != 0.0
+    return some[:n].copy()
+
+
+@njit("void(float64[:, ::1], int32[::1], int32[::1], int32[:, ::1], int32[:, ::1], float64[:, ::1])", cache=True)
+def _recall(kept, first, following, pairs, rows, values):  # type: ignore[no-untyped-def]
+    for k in range(len(rows)):
+        p = first[rows[k, 0]]
+        while p >= 0 and pairs[p, 1] != rows[k, 1]:
+            p = following[p]
+        if p >= 0:
+            for i in range(4):
+                kept[p, i] = values[k, i]
 
 
 @njit("Tuple((int64[::1], int32[:, ::1]))(int32[:, ::1], int32[::1], int32[::1], int64)", cache=True)

@@ -101,14 +101,14 @@ def _register(scene: Scene) -> None:
     flight = _Flight(
         tracks.positions(), tracks.searched.course - scene.tracks.drift, scene.crowd.part, scene.tracks.until - tracks.t
     )
-    some = np.flatnonzero(pairs.kept.any(axis=1))
+    some = pairs.pushed
     old, kept = pairs.rows[some], pairs.kept[some]
     pairs.drop(nodes, faces)
     scene.edge_edge.drop(edges, edges)
     pairs.add(_node_face(scene, nodes, faces, flight))
     scene.edge_edge.add(_edge_edge(scene, edges, flight))
-    pairs.recall(old, kept)
     scene.chain()
+    pairs.recall(scene.slots.first, old, kept)
     scene.slots.new[:], scene.faces.new[:], scene.edges.new[:] = False, False, False
 
 

@@ -96,7 +96,7 @@ class Scene:
     def kept(self) -> tuple[Ints, Floats]:
         """(k, 2) ids of node and face of the pairs with impulses in the last step, and (k, 4) what they have kept."""
         table = self.node_face
-        some = np.flatnonzero(table.kept.any(axis=1))
+        some = table.pushed
         node, face = table.rows[some].T
         return np.column_stack([self.crowd.id[node], self.faces.id[face]]), table.kept[some]
 
@@ -113,9 +113,8 @@ class Scene:
         local, face = nodes.places(rows[:, 0]), places(self.faces.id, rows[:, 1])
         node = self.own.place[local]
         here = (local >= 0) & (node >= 0) & (face >= 0)
-        self.node_face.recall(
-            np.column_stack([node, face])[here], np.ascontiguousarray(rows[here, 2:]).view(np.float64)
-        )
+        pairs = np.column_stack([node, face])[here]
+        self.node_face.recall(self.slots.first, pairs, np.ascontiguousarray(rows[here, 2:]).view(np.float64))
 
     def rows_of(self, faces: Ints) -> Indices:
         """(k,) rows of those of the ``faces``, ids, that are here."""
@@ -130,6 +129,16 @@ class Scene:
             self.edges.exposed[far] |= among(np.sort(faces), self.edges.sides[far].reshape(-1)).reshape(-1, 2)
         _expose(self.edges.exposed, self.edges.fresh, self.edges.faces, self.faces.exposed)
         self.enliven(rows)
+
+    def uncover(self, gone: Ints, bare: Ints, removed: Indices) -> None:
+        """Faces ``gone`` leave the surface, the faces ``bare`` come to it, ids, ascending; ``removed``: slots of nodes
+        that have left, -1 for those that have none.
+        """
+        rows, removed = self.rows_of(gone), removed[removed >= 0]
+        self.faces.exposed[rows] = self.faces.live[rows] = False
+        self.edges.exposed[among(gone, self.edges.sides)] = False
+        self.slots.slave[removed] = self.slots.live[removed] = False
+        self.expose(bare)
 
     def enliven(self, rows: Indices) -> None:
         """Faces, with their nodes and edges, are searched from now on."""

@@ -100,8 +100,7 @@ class Searches:
         if old is not None:
             old.free()
             self._kept = old.kept
-        if self._case.fractures:
-            exterior.take_up_cracks()
+        exterior.take_up()
         goes_on = old is not None and self._clock.t + _LEAST * self._clock.dt <= flight.until
         now = self.scene = self._laid_out(nodes, goes_on)
         if old is not None and goes_on:

@@ -125,15 +125,12 @@ class Contact:
         """(parts, 3) what contact has given each part so far, N s; all ranks take part."""
         return self.books.impulses(self._comm)
 
-    def uncover(self, loose: Flags, removed: Flags) -> None:
-        """The surface after tets have left; ``loose`` (nodes,): nodes without tets that fly on, ``removed``: those that
-        have left. All ranks take part.
+    def uncover(self, gone: Ints, loose: Flags, removed: Flags) -> None:
+        """The surface after tets ``gone`` (k, bare.WORDS) of this rank have left; ``loose`` (nodes,): nodes without
+        tets that fly on, ``removed``: those that have left. All ranks take part.
         """
         with self._timers.phase("contact"):
-            self.exterior.uncover(loose, removed)
-            if self.searches.scene is not None:
-                self.searches.scene.node_face.wake()
-            self.searches.due = True
+            self.searches.due |= self.exterior.uncover(gone, loose, removed, self.searches.scene)
 
     def crack(self, tets: Ints, nodes: Indices, sides: Indices) -> None:
         """Takes up broken facets that have a side here, with the local ``nodes`` (m, 3) that the sides have in common;

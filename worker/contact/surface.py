@@ -14,8 +14,9 @@ from ..state import LAID_BARE, WIDE, Bits, Flags, Indices, Ints, Model
 from . import sharp
 from .records import Edges, Faces
 
-_UNSEEN, _CLOSED, _EXPOSED, _BARE = range(4)
-"""Kinds of faces: none of the surface; side of a crack that may open; exposed; exposed by erosion."""
+_UNSEEN, _COVERED, _CLOSED, _EXPOSED, _BARE = range(5)
+"""Kinds of faces: none of the surface; one that erosion may lay bare; side of a crack that may open; exposed; exposed
+by erosion."""
 
 
 @dataclass
@@ -29,7 +30,7 @@ class Surface:
     flags: Flags
     """(nodes,) which nodes of this rank are on the surface, by a face of any rank; or were, and have lost it."""
     waiting: Flags
-    """(nodes,) which nodes of this rank are on a crack that may open, by a face of any rank."""
+    """(nodes,) which nodes of this rank are on what may become surface before the next search, by any rank's face."""
     far: Ints
     """(k,) ids of nodes of ``edges`` that this rank does not hold."""
     far_owner: Indices
@@ -45,34 +46,36 @@ class Surface:
 
 
 def build(
-    model: Model, planes: Flags, neighbours: list[Neighbour], comm: Comm, edges: bool, cracks: Indices
+    model: Model, planes: Flags, neighbours: list[Neighbour], comm: Comm, edges: bool, cracks: Indices, covered: Indices
 ) -> Surface:
     """The surface; all ranks take part.
 
     ``planes`` (nodes, planes) says which nodes lie on which symmetry plane. A face with all three nodes on the same
     plane is no surface; a face of a body one tet thick, with nodes on two parallel planes, is part of it. ``cracks``
-    (m, 3): block, place and face of the sides here of cracks that may open before the next search. Faces that erosion
-    has laid bare meet nodes; their edges meet no edges: they would be as many as the faces, and all sharp.
+    and ``covered`` (m, 3): block, place and face of the sides here of cracks that may open before the next search, and
+    of faces that erosion may lay bare. Those that it has laid bare meet nodes; their edges meet no edges: they would be
+    as many as the faces, and all sharp.
     """
-    local, ids, kind = _faces(model, planes, cracks)
+    local, ids, kind = _faces(model, planes, cracks, covered)
     nodes, n = model.nodes, len(ids)
     units, counts = np.empty((n, 3)), np.zeros((nodes.n, 2), np.int64)
     faces = Faces(ids, np.empty((n, 4), np.int64), np.empty(n), kind >= _EXPOSED)
     _measure(faces.nodes, faces.size, units, counts, local, faces.exposed, nodes.id, nodes.x0)
     complete(comm, neighbours, counts, Tag.SURFACE)
-    some = (kind != _BARE) & edges
+    some = ((kind == _CLOSED) | (kind == _EXPOSED)) & edges
     found = sharp.find(model, faces, local, units, some, neighbours, comm) if edges else sharp.none()
     return Surface(faces, found[0], counts[:, 0] > 0, counts[:, 1] > 0, *found[1:])
 
 
-def _faces(model: Model, planes: Flags, cracks: Indices) -> tuple[Indices, Ints, Bits]:
-    """(f, 4) local nodes of the exposed faces and of the ``cracks``, the opposite one last; their ids, ascending; and
-    kinds.
+def _faces(model: Model, planes: Flags, cracks: Indices, covered: Indices) -> tuple[Indices, Ints, Bits]:
+    """(f, 4) local nodes of the exposed faces, the ``cracks`` and those that are ``covered``, the opposite one last;
+    their ids, ascending; and kinds.
     """
     kinds, counts = [np.zeros((block.n, 4), np.uint8) for block in model.blocks], []
     for b, (block, kind) in enumerate(zip(model.blocks, kinds, strict=True)):
-        closed = cracks[cracks[:, 0] == b]
-        kind[closed[:, 1], closed[:, 2]] = _CLOSED
+        for sides, what in ((covered, _COVERED), (cracks, _CLOSED)):
+            some = sides[sides[:, 0] == b]
+            kind[some[:, 1], some[:, 2]] = what
         counts.append(_sort_out(kind, block.tets, block.across, block.bond, planes))
     begin = np.cumsum([0, *counts])
     local, ids, kept = np.empty((begin[-1], 4), np.int32), np.empty(begin[-1], np.int64), np.empty(begin[-1], np.uint8)
@@ -84,8 +87,8 @@ def _faces(model: Model, planes: Flags, cracks: Indices) -> tuple[Indices, Ints,
 
 @njit("int64(uint8[:, ::1], uint32[:, ::1], int32[:, ::1], uint8[:, ::1], boolean[:, ::1])", cache=True)
 def _sort_out(kind, tets, across, bond, planes):  # type: ignore[no-untyped-def]
-    """The kinds of the faces of a block, in ``kind`` (n, 4), which knows the sides of cracks; returns how many are
-    surface.
+    """The kinds of the faces of a block, in ``kind`` (n, 4), which has those that may become surface; returns how many
+    are, or may.
     """
     n = 0
     for e in range(len(tets)):
