@@ -1,6 +1,5 @@
 """The whole mesh of a case, on rank 0: the parts as they are meshed, turned, moved apart, loaded and set in motion."""
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -17,6 +16,7 @@ from .hashing import uniform
 from .mesh.build import build as build_mesh
 from .mesh.faces import FACES, across, normals
 from .state import Flags, Floats, Indices, Load
+from .turning import sine_and_cosine
 
 Say = Callable[[str], None]
 """Reports what the start is doing."""
@@ -78,7 +78,7 @@ def assemble(case: schema.Case, folder: Path, say: Say = quiet) -> Whole:
 def _turned(points: Floats, turn: schema.Turn) -> Floats:
     """Points (n, 3) after the rotation."""
     i, j = ((1, 2), (2, 0), (0, 1))["xyz".index(turn.axis)]
-    cosine, sine = math.cos(turn.angle), math.sin(turn.angle)
+    sine, cosine = sine_and_cosine(turn.angle)
     arms, turned = points - np.array(turn.centre), points.copy()
     turned[:, i] = turn.centre[i] + cosine * arms[:, i] - sine * arms[:, j]
     turned[:, j] = turn.centre[j] + sine * arms[:, i] + cosine * arms[:, j]
@@ -136,7 +136,7 @@ def _quarters(tets: Indices, values: Floats, n: int) -> Floats:
 def _volumes(x: Floats, tets: Indices) -> Floats:
     origin = x[tets[:, 0]]
     e1, e2, e3 = x[tets[:, 1]] - origin, x[tets[:, 2]] - origin, x[tets[:, 3]] - origin
-    volumes: Floats = np.einsum("ij,ij->i", e1, np.cross(e2, e3)) / 6.0
+    volumes: Floats = (e1 * np.cross(e2, e3)).sum(axis=1) / 6.0
     return volumes
 
 

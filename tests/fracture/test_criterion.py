@@ -12,7 +12,7 @@ from conoid.worker import state, step
 from conoid.worker.elements import hot, tet4
 from conoid.worker.fracture import criterion
 from conoid.worker.fracture.facets import facet_ids
-from conoid.worker.fracture.strength import Toughness, exponent, toughness
+from conoid.worker.fracture.strength import Toughness, toughness
 from conoid.worker.fracture.strength import required as required_traction
 from conoid.worker.mesh.faces import FACES
 from conoid.worker.simulation import Simulation
@@ -278,8 +278,7 @@ def test_strengths_do_not_know_of_order_or_ranks() -> None:
 
 def required(made: Toughness, strength: Floats, since: Floats) -> Floats:
     """(n,) traction, Pa, that breaks facets by the times ``since`` after they first passed their strength."""
-    grown = np.expm1([exponent(s, t, made.delay) for s, t in zip(strength, since, strict=True)])
-    return np.array([required_traction(s, g) for s, g in zip(strength, grown, strict=True)])
+    return np.array([required_traction(s, t, made.delay) for s, t in zip(strength, since, strict=True)])
 
 
 @pytest.mark.parametrize("factor", [0.5, 1.0])

@@ -52,7 +52,7 @@ notice = "60 s"
 BREAKING = Path(__file__).parents[1] / "parallel" / "breaking.toml"
 _DONE_WITH = 3.0
 """s: a node has done with a job that is put back by then."""
-DIGEST = tomllib.loads(BREAKING.with_name("digests.toml").read_text(encoding="utf-8"))["here"]["breaking"]
+DIGEST = tomllib.loads(BREAKING.with_name("digests.toml").read_text(encoding="utf-8"))["breaking"]
 """Of that case, on any number of ranks."""
 LONG = "12 us"
 """Until which the same case takes some ten seconds: long enough to be interrupted."""

@@ -8,8 +8,7 @@ from ..jit import njit, types
 from ..mesh.faces import FACES
 from ..state import CHUNK, MASS, Flags, Floats, Ints
 from .facets import Body
-from .records import BREAKING, CANDIDATES, INTERFACE, MESH, TABLE, BreakingFacets, Candidates, InterfaceFacets
-from .strength import required
+from .records import BREAKING, CANDIDATES, INTERFACE, MESH, BreakingFacets, Candidates, InterfaceFacets
 
 
 @dataclass
@@ -37,8 +36,8 @@ class Breaking:
 
 
 def gathered(body: Body, found: Candidates, shared: InterfaceFacets) -> Breaking | None:
-    """Those of the candidates that reach what the delayed criterion requires; None for none."""
-    facets: BreakingFacets = _gather(found, np.expm1(found.exponent), shared, body.mesh, body.facets, body.index)
+    """The candidates with all that is known of them; None for none."""
+    facets: BreakingFacets = _gather(found, shared, body.mesh, body.index)
     return Breaking(body, facets) if len(facets.mass) else None
 
 
@@ -47,10 +46,10 @@ def _mass(mesh, e):  # type: ignore[no-untyped-def]
     return mesh.state[(e // CHUNK * mesh.columns + MASS) * CHUNK + e % CHUNK]
 
 
-@njit(types.void(BREAKING, types.int64, types.int64, CANDIDATES, INTERFACE, MESH, types.int64), cache=True)
-def _fill(out, m, i, found, shared, mesh, block):  # type: ignore[no-untyped-def]
-    """Row ``m`` from candidate ``i``."""
-    place, face, row = found.place[i], found.face[i], found.shared[i]
+@njit(types.void(BREAKING, types.int64, CANDIDATES, INTERFACE, MESH, types.int64), cache=True)
+def _fill(out, m, found, shared, mesh, block):  # type: ignore[no-untyped-def]
+    """Row ``m`` from the candidate of that number."""
+    place, face, row = found.place[m], found.face[m], found.shared[m]
     behind, mass = mesh.across[place, face], _mass(mesh, place)
     first = row < 0 or shared.first[row]
     here = 0 if first else 1
@@ -66,22 +65,17 @@ def _fill(out, m, i, found, shared, mesh, block):  # type: ignore[no-untyped-def
     out.nodes[m, 0], out.nodes[m, 1], out.nodes[m, 2] = a, b if first else c, c if first else b
     out.first[m] = first
     for k in range(4):
-        out.traction[m, k] = found.traction[i, k]
+        out.traction[m, k] = found.traction[m, k]
 
 
-@njit(BREAKING(CANDIDATES, types.float64[::1], INTERFACE, MESH, TABLE, types.int64), cache=True)
-def _gather(found, grown, shared, mesh, table, block):  # type: ignore[no-untyped-def]
+@njit(BREAKING(CANDIDATES, INTERFACE, MESH, types.int64), cache=True)
+def _gather(found, shared, mesh, block):  # type: ignore[no-untyped-def]
     """See ``gathered``; ``block``: index of the body's."""
-    chosen, n = np.empty(len(grown), np.int64), 0
-    for i in range(len(grown)):
-        strength = table.strength[found.place[i], found.face[i]]
-        if found.traction[i, 3] >= required(strength, grown[i]):
-            chosen[n] = i
-            n += 1
+    n = len(found.place)
     out = BreakingFacets(
         np.empty((n, 2), np.int64), np.empty((n, 3), np.int32), np.full((n, 2, 3), -1, np.int32),
         np.empty(n, np.bool_), np.empty((n, 4)), np.empty(n),
     )  # fmt: skip
     for m in range(n):
-        _fill(out, m, chosen[m], found, shared, mesh, block)
+        _fill(out, m, found, shared, mesh, block)
     return out

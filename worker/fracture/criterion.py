@@ -12,13 +12,11 @@ from ..jit import njit, types
 from ..mesh.faces import FACES
 from ..state import CHUNK, INTACT, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ
 from .records import CANDIDATES, INTERFACE, LAW, MESH, POINTS, TABLE
-from .strength import exponent, required
+from .strength import required
 
 _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _P = PRESSURE * CHUNK
-_FAR = 1.0 + 1e-9
-"""More than the rounding of expm1 here and in numpy, whose bits decide."""
 _TOGETHER = 64
 """Facets whose stresses are read together."""
 _I1, _F1 = types.int64[::1], types.float64[::1]
@@ -207,8 +205,8 @@ def across(out, n, shared, chosen, mesh, table, x, law):  # type: ignore[no-unty
 
 @njit(types.int64(CANDIDATES, types.int64, TABLE, LAW, types.int64, types.float64), cache=True, error_model="numpy")
 def clock(found, n, table, law, step, t):  # type: ignore[no-untyped-def]
-    """Sets the clocks and exponents of the ``n`` candidates, and moves those to the front that may break by the delayed
-    criterion; returns their number.
+    """Sets the clocks of the ``n`` candidates, and moves those to the front that break by the delayed criterion;
+    returns their number.
 
     The clock of an overstressed facet goes on if the last step, of number ``step`` - 1, had started or kept it, else
     starts at the time ``t``. With nodal tractions some candidates are not overstressed.
@@ -221,11 +219,9 @@ def clock(found, n, table, law, step, t):  # type: ignore[no-untyped-def]
             if table.seen[place, face] != step - 1:
                 table.since[place, face] = t
             table.seen[place, face] = step
-            power = exponent(strength, t - table.since[place, face], law.delay)
-            if found.traction[i, 3] * _FAR >= required(strength, np.expm1(power)):
+            if found.traction[i, 3] >= required(strength, t - table.since[place, face], law.delay):
                 found.place[m], found.face[m], found.shared[m] = place, face, found.shared[i]
                 found.traction[m] = found.traction[i]
-                found.exponent[m] = power
                 m += 1
     return m
 

@@ -50,17 +50,17 @@ def inserted(
     shear; ``stiffness`` (m,) that the time step allows, Pa/m.
     """
     frame = frames(nodes.x, before)
-    along = np.einsum("mci,mi->mc", frame, traction)
+    along = (frame * traction[:, None]).sum(axis=2)
     along[:, 0] = np.maximum(along[:, 0], 0.0)
     shear = 1.0 / weight
     # T = strength / e (<d_n> n + b^2 d_t) is the traction where d_n = e t_n / strength, d_t = e t_t / (b^2 strength);
     # under pressure the effective traction counts the shear that friction leaves.
     e = np.maximum(1.0, shear) * effective / stiffness
     pressed = along[:, 0] == 0.0
-    across = np.hypot(along[:, 1], along[:, 2])
+    across = np.sqrt(along[:, 1] ** 2 + along[:, 2] ** 2)
     held = np.where(pressed, effective * np.sqrt(shear) / np.where(across > 0.0, across, 1.0), 1.0)
     offset = (e / effective)[:, None] * along
     offset[:, 1:] *= (held / shear)[:, None]
     carried = along * np.stack([np.ones(len(area)), held, held], axis=1)
-    force = (area / 3.0)[:, None] * np.einsum("mci,mc->mi", frame, carried)
+    force = (area / 3.0)[:, None] * (frame * carried[:, :, None]).sum(axis=1)
     return fresh(tets, after, effective, energy, area, shear, offset, force)

@@ -81,18 +81,16 @@ class Candidates(NamedTuple):
     """(m,) row of a shared facet, -1 for one within the rank."""
     traction: Floats
     """(m, 4) on the outward normal of the tet of smaller id, and the effective one, Pa."""
-    exponent: Floats
-    """(m,) of the delayed criterion: minus the time since the clock started, over t_c."""
 
     @classmethod
     def of(cls, m: int) -> "Candidates":
         """Room for as many."""
         places = np.empty((3, m), np.int64)
-        return cls(places[0], places[1], places[2], np.empty((m, 4)), np.empty(m))
+        return cls(places[0], places[1], places[2], np.empty((m, 4)))
 
     def first(self, n: int) -> "Candidates":
         """The first ``n``."""
-        return Candidates(self.place[:n], self.face[:n], self.shared[:n], self.traction[:n], self.exponent[:n])
+        return Candidates(self.place[:n], self.face[:n], self.shared[:n], self.traction[:n])
 
 
 class BreakingFacets(NamedTuple):
@@ -139,5 +137,5 @@ MESH = record(Mesh, types.uint32[:, ::1], _I1, _N2, _N2, types.uint8[:, ::1], ty
 TABLE = record(FacetTable, _F2, _F2, _I2)
 INTERFACE = record(InterfaceFacets, _N2, _B1, _F1, _F2, _F2, _I1, _I1)
 LAW = record(Law, types.float64, types.float64, types.float64)
-CANDIDATES = record(Candidates, _I1, _I1, _I1, _F2, _F1)
+CANDIDATES = record(Candidates, _I1, _I1, _I1, _F2)
 BREAKING = record(BreakingFacets, _I2, _N2, _N3, _B1, _F2, _F1)

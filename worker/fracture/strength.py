@@ -15,6 +15,7 @@ from conoid.cases.schema import Fracture
 
 from ..hashing import uniform
 from ..jit import njit
+from ..materials.elementary import exp_less_one, log, power
 from ..state import Floats, Ints
 
 
@@ -48,21 +49,28 @@ class Toughness:
         scatter = self.scatter
         if scatter is None:
             return np.full(len(face), self.strength)
-        chance = -np.log1p(-uniform(face, scatter.seed))
-        if scatter.area is not None:
-            chance = chance * (scatter.area / area)
-        return np.asarray(scatter.minimum + (self.strength - scatter.minimum) * chance ** (1.0 / scatter.modulus))
+        share = np.ones(len(face)) if scatter.area is None else scatter.area / area
+        drawn = _weibull(uniform(face, scatter.seed), share, scatter.modulus)
+        return np.asarray(scatter.minimum + (self.strength - scatter.minimum) * drawn)
+
+
+@njit("float64[::1](float64[::1], float64[::1], float64)", cache=True, error_model="numpy")
+def _weibull(random, share, modulus):  # type: ignore[no-untyped-def]
+    """(n,) Weibull's variable of scale 1 from ``random`` numbers in [0, 1); ``share``: the area of the scale over that
+    of each.
+    """
+    drawn = np.empty(len(random))
+    for i in range(len(random)):
+        drawn[i] = power(-log(1.0 - random[i]) * share[i], 1.0 / modulus)
+    return drawn
 
 
 @njit("float64(float64, float64, float64)", cache=True, error_model="numpy")
-def exponent(strength, since, delay):  # type: ignore[no-untyped-def]
-    """- t / t_c of a facet, t ``since`` it first passed its strength, s; minus infinity without delay."""
-    return -since * strength * strength / delay if delay > 0.0 else -np.inf
-
-
-@njit("float64(float64, float64)", cache=True, error_model="numpy")
-def required(strength, grown):  # type: ignore[no-untyped-def]
-    """Traction, Pa, that breaks a facet; ``grown``: e^(-t / t_c) - 1, from numpy's expm1."""
+def required(strength, since, delay):  # type: ignore[no-untyped-def]
+    """Traction, Pa, that breaks a facet, t ``since`` it first passed its strength, s; ``delay``: see records.Law."""
+    if delay <= 0.0:
+        return strength
+    grown = exp_less_one(-since * strength * strength / delay)
     return strength / -grown if grown < 0.0 else np.inf
 
 

@@ -43,9 +43,9 @@ def log(x):  # type: ignore[no-untyped-def]
     return exponent * _LN2_HIGH + (2.0 * s + (2.0 * s * tail + exponent * _LN2_LOW))
 
 
-@njit("float64(float64)", cache=True, error_model="numpy", forceinline=True)
-def exp(x):  # type: ignore[no-untyped-def]
-    """e^x for x from LEAST to MOST, within 3e-16 of it: 2^k e^r with r = x - k ln 2, and 13 terms of e^r."""
+@njit("UniTuple(float64, 2)(float64)", cache=True, error_model="numpy", forceinline=True)
+def _reduced(x):  # type: ignore[no-untyped-def]
+    """k, in the last bits of a float64, and e^r - 1 in 12 terms, with r = x - k ln 2."""
     shifted = x * _INVERSE_LN2 + _NEAREST
     k = shifted - _NEAREST
     r = (x - k * _LN2_HIGH) - k * _LN2_LOW
@@ -54,8 +54,36 @@ def exp(x):  # type: ignore[no-untyped-def]
     low = (1 / 2 + r * (1 / 6)) + r2 * (1 / 24 + r * (1 / 120))
     middle = (1 / 720 + r * (1 / 5040)) + r2 * (1 / 40320 + r * (1 / 362880))
     high = (1 / 3628800 + r * (1 / 39916800)) + r2 * (1 / 479001600 + r * (1 / 6227020800))
-    p = 1.0 + (r + r2 * (low + r4 * (middle + r4 * high)))
-    return np.int64(np.float64(p).view(np.int64) + (np.float64(shifted).view(np.int64) << 52)).view(np.float64)
+    return shifted, r + r2 * (low + r4 * (middle + r4 * high))
+
+
+@njit("float64(float64, float64)", cache=True, error_model="numpy", forceinline=True)
+def _doubled(x, shifted):  # type: ignore[no-untyped-def]
+    """2^k x, with k in the last bits of ``shifted``."""
+    return np.int64(np.float64(x).view(np.int64) + (np.float64(shifted).view(np.int64) << 52)).view(np.float64)
+
+
+@njit("float64(float64)", cache=True, error_model="numpy", forceinline=True)
+def exp(x):  # type: ignore[no-untyped-def]
+    """e^x for x from LEAST to MOST, within 3e-16 of it: 2^k e^r."""
+    shifted, grown = _reduced(x)
+    return _doubled(1.0 + grown, shifted)
+
+
+@njit("float64(float64)", cache=True, error_model="numpy")
+def exp_less_one(x):  # type: ignore[no-untyped-def]
+    """e^x - 1 for x up to MOST, within 4e-16 of it: 2^k (e^r - 1) + (2^k - 1); -1 below LEAST."""
+    if x < LEAST:
+        return -1.0
+    shifted, grown = _reduced(x)
+    power = _doubled(1.0, shifted)
+    return power * grown + (power - 1.0)
+
+
+@njit("float64(float64, float64)", cache=True, error_model="numpy")
+def power(x, exponent):  # type: ignore[no-untyped-def]
+    """x to the ``exponent``, for x that is 0 or a positive normal number and an exponent that is positive."""
+    return exp(max(min(exponent * log(x), MOST), LEAST)) if x > 0.0 else 0.0
 
 
 @njit("void(float64[::1], int64, int64)", cache=True, error_model="numpy")

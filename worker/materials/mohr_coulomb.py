@@ -27,6 +27,7 @@ from ..state import (
     WORK,
     WORK_PLASTIC,
 )
+from ..turning import sine_and_cosine
 from .law import AFTER_PRESSURE, BULK, DILATES, FIRST, SHEAR, Law
 from .plastic import equivalent_stress
 
@@ -235,7 +236,8 @@ def _constants(law: MohrCoulomb) -> tuple[float, ...]:
 
 def _sine_and_cohesion(cohesion: float, angle: float) -> tuple[float, float]:
     """sin(phi) and 2 c cos(phi), Pa."""
-    return math.sin(angle), 2.0 * cohesion * math.cos(angle)
+    sine, cosine = sine_and_cosine(angle)
+    return sine, 2.0 * cohesion * cosine
 
 
 def _rows(law: MohrCoulomb) -> int:
@@ -244,6 +246,6 @@ def _rows(law: MohrCoulomb) -> int:
 
 LAW = Law(
     "mohr_coulomb", AFTER_PRESSURE, _rows, _constants, lambda *_: {}, mohr_coulomb,
-    dilates=lambda law: math.sin(law.dilation_angle),
+    dilates=lambda law: sine_and_cosine(law.dilation_angle)[0],
 )  # fmt: skip
 """Beyond the apex nothing is left of the deviator; the pressure of tension stays, to be broken by facets."""

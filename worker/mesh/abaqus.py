@@ -5,6 +5,7 @@ it does not know, does not place instances and cannot say which line is wrong. T
 makes this reader open another file. Everything that is not mesh (materials, steps, node sets) is passed over.
 """
 
+import math
 from array import array
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import MeshError
+from ..turning import sine_and_cosine
 from .gmsh_session import NamedMesh, gathered
 from .model import Floats, Ids
 
@@ -289,8 +291,8 @@ def _whole(line: int, value: float) -> int:
 
 def _turned(points: Floats, start: Floats, end: Floats, degrees: float) -> Floats:
     """Points turned by ``degrees`` about the line from ``start`` to ``end`` (Rodrigues)."""
-    axis = (end - start) / np.linalg.norm(end - start)
-    angle, arm = np.radians(degrees), points - start
-    along = np.outer(arm @ axis, axis)
-    turned: Floats = start + along + np.cos(angle) * (arm - along) + np.sin(angle) * np.cross(axis, arm)
+    axis, arm = (end - start) / math.sqrt(((end - start) ** 2).sum()), points - start
+    sine, cosine = sine_and_cosine(math.radians(degrees))
+    along = (arm * axis).sum(axis=1)[:, None] * axis
+    turned: Floats = start + along + cosine * (arm - along) + sine * np.cross(axis, arm)
     return turned

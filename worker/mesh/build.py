@@ -116,9 +116,9 @@ def _file_digest(source: Path, mesh: MeshFile, key: str) -> str:
 
 @cache
 def _maker() -> str:
-    """The sources of this package and the versions of what it calls."""
-    sources = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.glob("*.py")):
+    """The sources of this package, and of what it computes with, and the versions of what it calls."""
+    sources, here = hashlib.sha256(), Path(__file__).parent
+    for path in [*sorted(here.glob("*.py")), *(here.parent / f"{name}.py" for name in ("hashing", "turning"))]:
         sources.update(path.name.encode() + path.read_bytes())
     return " ".join([sources.hexdigest(), *_versions("gmsh", "numpy")])
 

@@ -10,9 +10,10 @@ from conoid.cases.bodies import Shards, TwoTets
 from conoid.cases.geometry import altitude, pitch
 
 from ..hashing import uniform
+from ..turning import sine_and_cosine, sines_and_cosines
 from .model import Floats, TetMesh
 
-_CORNERS = np.array([[1, 1, 1], [1, -1, -1], [-1, -1, 1], [-1, 1, -1]]) / 8**0.5
+_CORNERS = np.array([[1, 1, 1], [1, -1, -1], [-1, -1, 1], [-1, 1, -1]]) / math.sqrt(8.0)
 """The regular tet of edge 1 about its centre, positive."""
 
 _RANDOM = 15
@@ -23,7 +24,7 @@ def shards(body: Shards) -> TetMesh:
     """Each tet amid its own cube, turned by any rotation alike, its nodes moved after that."""
     cubes = np.array(list(itertools.product(*map(range, body.count))), np.float64)
     random = uniform(np.arange(_RANDOM * len(cubes)), body.seed).reshape(-1, _RANDOM)
-    turned = np.einsum("nij,kj->nki", rotations(random[:, :3]), _CORNERS)
+    turned = (rotations(random[:, :3])[:, None] * _CORNERS[:, None]).sum(axis=3)
     moved = turned + body.perturbation * (2.0 * random[:, 3:].reshape(-1, 4, 3) - 1.0)
     points = np.array(body.base) + pitch(body) * (cubes + 0.5)[:, None, :] + body.element_size * moved
     return TetMesh(points.reshape(-1, 3), np.arange(4 * len(cubes), dtype=np.int32).reshape(-1, 4))
@@ -33,7 +34,8 @@ def rotations(random: Floats) -> Floats:
     """(n, 3, 3) rotations, all directions and angles alike, from numbers (n, 3) in [0, 1): Shoemake 1992."""
     one, two = np.sqrt(1.0 - random[:, 0]), np.sqrt(random[:, 0])
     a, b = 2.0 * math.pi * random[:, 1], 2.0 * math.pi * random[:, 2]
-    x, y, z, w = one * np.sin(a), one * np.cos(a), two * np.sin(b), two * np.cos(b)
+    (sine_a, cosine_a), (sine_b, cosine_b) = sines_and_cosines(a), sines_and_cosines(b)
+    x, y, z, w = one * sine_a, one * cosine_a, two * sine_b, two * cosine_b
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
         [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
@@ -45,7 +47,8 @@ def rotations(random: Floats) -> Floats:
 def two_tets(body: TwoTets) -> tuple[Floats, NDArray[np.int32]]:
     """Points in the body's frame, m, and tets: the common face lies about the origin, across the third direction."""
     edge = body.element_size
-    turn = 2.0 * math.pi / 3.0 * np.arange(3)
-    face = edge / 3**0.5 * np.stack([np.cos(turn), np.sin(turn), np.zeros(3)], axis=1)
-    top = altitude(body) * np.array([math.tan(body.lean), 0.0, 1.0])
+    sine, cosine = sines_and_cosines(2.0 * math.pi / 3.0 * np.arange(3.0))
+    face = edge / math.sqrt(3.0) * np.stack([cosine, sine, np.zeros(3)], axis=1)
+    leaning, upright = sine_and_cosine(body.lean)
+    top = altitude(body) * np.array([leaning / upright, 0.0, 1.0])
     return np.concatenate([face, [top, -top]]), np.array([[0, 1, 2, 3], [0, 2, 1, 4]], np.int32)

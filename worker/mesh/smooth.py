@@ -94,5 +94,5 @@ class _Smoothing:
 
 
 def _unit(vector: Floats) -> Floats:
-    length = np.linalg.norm(vector)
+    length = np.sqrt((vector**2).sum())
     return vector / length if length > 0 else vector

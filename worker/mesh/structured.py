@@ -13,6 +13,7 @@ from conoid.cases.bodies import Box, Cylinder, Plate, Shards, Tube, TwoTets
 from conoid.cases.geometry import Generated
 
 from ..errors import MeshError
+from ..turning import sines_and_cosines
 from .frame import block, refuse_impossible, to_space
 from .loose import shards, two_tets
 from .model import Floats, Ints, TetMesh
@@ -60,7 +61,8 @@ def disk(u: Floats, v: Floats) -> tuple[Floats, Floats]:
     x, y = np.abs(u), np.abs(v)
     radius, less = np.maximum(x, y), np.minimum(x, y)
     angle = np.pi / 4 * np.divide(less, radius, out=np.zeros_like(radius), where=radius > 0)
-    near, side = radius * np.cos(angle), radius * np.sin(angle)
+    sine, cosine = sines_and_cosines(angle)
+    near, side = radius * cosine, radius * sine
     return np.copysign(np.where(x >= y, near, side), u), np.copysign(np.where(x >= y, side, near), v)
 
 
@@ -97,7 +99,7 @@ def _tube(body: Tube) -> tuple[Floats, list[int], list[Cells]]:
 def _circle(step: Lines, n: int) -> Floats:
     """Cosine of ``step`` quarter turns / n, with exact zeros and ones."""
     turn, rest = np.divmod(step, n)
-    cosine, sine = np.cos(np.pi / 2 * rest / n), np.sin(np.pi / 2 * rest / n)
+    sine, cosine = sines_and_cosines(np.pi / 2 * rest / n)
     return np.choose(turn % 4, [cosine, -sine, -cosine, sine]) + 0.0
 
 
