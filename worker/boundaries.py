@@ -146,7 +146,7 @@ class RigidWalls(Boundary):
         """(w,) how deep the deepest node starts behind each wall, m."""
         depths = np.full(len(self._points), -np.inf)
         for k, (point, normal) in enumerate(zip(self._points, self._normals, strict=True)):
-            behind = (point - state.x[self.nodes[self._held[:, k]]]) @ normal
+            behind = ((point - state.x[self.nodes[self._held[:, k]]]) * normal).sum(axis=1)
             depths[k] = behind.max(initial=-np.inf)
         return depths
 

@@ -20,6 +20,7 @@ from .energy import Ledger
 from .erosion import Erosion
 from .fracture.record import Record
 from .fracture.stage import Fracture
+from .materials.elementary import power
 from .materials.law import BULK, DENSITY, SHEAR
 from .materials.models import equation_of, moduli
 from .migration import model as model_of
@@ -251,5 +252,5 @@ def _force_floor(model: Model, comm: Comm) -> float:
     largest = 0.0
     for block in model.blocks:
         volume = float(block.row(MASS).max()) / float(block.params[0])
-        largest = max(largest, float(block.params[BULK]) * volume ** (2.0 / 3.0))
+        largest = max(largest, float(block.params[BULK]) * power(volume, 2.0 / 3.0))
     return _SMALLEST_STRAIN * float(comm.maximum(np.array([largest]))[0])

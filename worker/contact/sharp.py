@@ -6,16 +6,19 @@ angle at the start, or have done so, and bulge, at a step at which the mean norm
 (normals.EVERY): flow makes edges, too. So it depends on the steps alone, not on when candidates were searched.
 """
 
+import math
+
 import numpy as np
 
 from ..jit import njit
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
 from ..state import Flags, Floats, Indices, Ints, Model
+from ..turning import sine_and_cosine
 from .geometry import at, cross, dot, minus
 from .records import Edges, Faces
 
-SHARP = np.cos(np.radians(25.0))
+SHARP = sine_and_cosine(math.radians(25.0))[1]
 """Edges between faces whose normals differ by more than this can meet other edges."""
 
 _A, _B, _C, _OWNER, _FACE, _EXPOSED, _LENGTH, _NORMAL = 0, 1, 2, 3, 4, 5, 6, 7

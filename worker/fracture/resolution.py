@@ -1,17 +1,19 @@
 """Whether the mesh resolves what the fracture of a part needs: its cohesive zone, and its opening in time."""
 
 import logging
+import math
 
 from conoid.cases.schema import Fracture as Spec
 
+from ..materials.elementary import power
 from .strength import Toughness
 
 _RESOLVED = 1.0 / 3.0
 """Elements to a cohesive zone, at most, for its energy to be that of the law."""
-_STEP = 6.0**-0.5
+_STEP = 1.0 / math.sqrt(6.0)
 """Stable step of a regular tet times the speed of sound, over its edge."""
-_REGULAR = (6.0 * 2.0**0.5) ** (1.0 / 3.0)
-"""Edge of a regular tet over the cube root of its volume."""
+_REGULAR = 6.0 * math.sqrt(2.0)
+"""Cube of the edge of a regular tet over its volume."""
 _ROUNDING = 1e-9
 """Of a ratio: a strength that is lowered until so many elements fit meets their number to the last bits."""
 
@@ -20,7 +22,7 @@ log = logging.getLogger("conoid.worker")
 
 def edge(volume: float) -> float:
     """Of a regular tet of that ``volume``, m^3; m."""
-    return float(_REGULAR * volume ** (1.0 / 3.0))
+    return float(power(_REGULAR * volume, 1.0 / 3.0))
 
 
 def warnings(part: str, spec: Spec, tough: Toughness, size: float, safety: float) -> list[str]:

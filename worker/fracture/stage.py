@@ -18,6 +18,7 @@ from conoid.cases.schema import Case
 from ..clock import Clock
 from ..contact.stage import Contact
 from ..elements.forms import Elements
+from ..materials.elementary import power
 from ..migration.parcel import Parcel
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
@@ -145,7 +146,7 @@ class Fracture:
             volume = float(model.mean_volumes[index])
             size = resolution.edge(volume)
             tough = toughness(material, part.fracture, size)
-            work = max(work, tough.energy * volume ** (2.0 / 3.0))
+            work = max(work, tough.energy * power(volume, 2.0 / 3.0))
             self.warnings += resolution.warnings(part.name, part.fracture, tough, size, safety)
             here = [(i, block) for i, block in enumerate(model.blocks) if block.part == index]
             bodies += [facets.arm(i, block, part.fracture, tough, model.nodes.x0) for i, block in here]

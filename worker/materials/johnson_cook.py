@@ -28,7 +28,7 @@ from ..state import (
     WORK_PLASTIC,
     YIELD,
 )
-from .elementary import logarithms, powers
+from .elementary import logarithms, power, powers
 from .law import BEFORE_PRESSURE, FIRST, SHEAR, Law
 from .plastic import equivalent_stress
 
@@ -224,7 +224,7 @@ def initial_yield(law: JohnsonCook, temperature: float) -> float:
     """Flow stress at zero plastic strain and vanishing rate, Pa."""
     span = law.melt_temperature - law.reference_temperature
     homologous = min(max((temperature - law.reference_temperature) / span, 0.0), 1.0)
-    return float(law.A * (1.0 - homologous**law.m))
+    return float(law.A * (1.0 - power(homologous, law.m)))
 
 
 def _rows(law: JohnsonCook) -> int:

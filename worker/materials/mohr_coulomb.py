@@ -39,9 +39,9 @@ _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _P, _STRAIN, _WORK = PRESSURE * CHUNK, PLASTIC_STRAIN * CHUNK, WORK_PLASTIC * CHUNK
 _WHOLE_WORK, _GROWN = WORK * CHUNK, DILATION * CHUNK
 _THIRD, _TWO_THIRDS = 1.0 / 3.0, 2.0 / 3.0
-_MISES = 2.0 / 3.0**0.5
+_MISES = 2.0 / math.sqrt(3.0)
 """Largest s1 - s3 at a von Mises stress of one, in pure shear."""
-_SHEAR, _AXIAL = 1.0 / 3.0**0.5, 2.0 / 3.0
+_SHEAR, _AXIAL = 1.0 / math.sqrt(3.0), 2.0 / 3.0
 """Largest principal deviatoric stress at a von Mises stress of one, in pure shear and in tension along an axis."""
 
 

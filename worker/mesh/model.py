@@ -12,6 +12,7 @@ Node order of a tet, positive: seen from node 3, nodes 0, 1, 2 run clockwise::
           1
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,7 +27,7 @@ Ids = NDArray[np.int64]
 MAX_TETS = 50_000_000
 """More than this is taken for a slip in ``element_size``, not for a wish."""
 
-REGULAR_STEP = 6**-0.5
+REGULAR_STEP = 1.0 / math.sqrt(6.0)
 """Step length of the regular tet with edge 1: half its altitude."""
 
 _FLAT = 1e-9
@@ -105,7 +106,7 @@ def check(mesh: TetMesh, names: Names | None = None) -> TetMesh:
 
 def _check_volumes(mesh: TetMesh, names: Names) -> None:
     volumes, areas = _volume_and_area(mesh.points, mesh.tets)
-    nothing = _FLAT * areas**1.5
+    nothing = _FLAT * areas * np.sqrt(areas)
     bad = np.flatnonzero(volumes <= nothing)
     if len(bad):
         tet, inverted = bad[0], volumes[bad[0]] < -nothing[bad[0]]
