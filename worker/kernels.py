@@ -2,6 +2,8 @@
 
 numba's disk cache does not see an edited callee in another file, so the cache folder is named by a hash of every source
 that a kernel is made of (files with kernels, and what they import from the worker), the versions and the processor.
+Within the folder numba goes by the place and the time of a source: they are in the hash, too, or a copy of the sources
+elsewhere would find the folder complete, and its ranks would compile every kernel at its first call, all at once.
 Rank 0 hashes the sources once a run and compiles what is missing (worker/compile.py); the other ranks get the hash from
 it.
 """
@@ -23,10 +25,12 @@ DECLARATION = "\n@njit("
 
 @cache
 def source_hash(root: Path = ROOT) -> str:
-    """Names what the kernels below ``root`` are made of: sources and versions. 0.08 CPU seconds on an idle core."""
+    """Names what the kernels below ``root`` are made of: sources, with their places and times, and versions. 0.08 CPU
+    seconds on an idle core.
+    """
     h = hashlib.sha256()
     for source in sorted(kernel_sources(root)):
-        h.update(source.read_bytes())
+        h.update(f"{source} {source.stat().st_mtime_ns} ".encode() + source.read_bytes())
     for part in (version("numba"), version("llvmlite"), version("numpy"), platform.python_version()):
         h.update(part.encode())
     return h.hexdigest()

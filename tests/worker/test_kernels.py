@@ -3,6 +3,7 @@
 import fcntl
 import importlib
 import os
+import shutil
 import subprocess
 import sys
 import threading
@@ -70,6 +71,16 @@ def test_an_edited_source_of_a_kernel_names_another_folder(tree: Path, edited: s
     kernels.source_hash.cache_clear()
     assert (kernels.source_hash(tree) != before) == another
     assert (kernels.cache_folder(kernels.source_hash(tree)) != kernels.cache_folder(before)) == another
+
+
+def test_a_copy_elsewhere_and_one_that_was_written_again_have_folders_of_their_own(tree: Path, tmp_path: Path) -> None:
+    """numba would take none of the kernels in this one's."""
+    before = kernels.source_hash(tree)
+    copied = shutil.copytree(tree, tmp_path / "copied")
+    assert kernels.source_hash(copied) != before
+    os.utime(tree / "above.py", (1e9, 1e9))
+    kernels.source_hash.cache_clear()
+    assert kernels.source_hash(tree) != before
 
 
 def test_ranks_but_the_first_hash_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
