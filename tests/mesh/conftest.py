@@ -3,7 +3,7 @@
 import pytest
 
 
-@pytest.fixture(autouse=True, scope="session")
+@pytest.fixture(autouse=True, scope="package")
 def mesh_cache(tmp_path_factory: pytest.TempPathFactory) -> object:
     """Points ``CONOID_CACHE_DIR`` to an empty folder while these tests run."""
     with pytest.MonkeyPatch.context() as patch:
