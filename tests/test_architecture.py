@@ -294,9 +294,9 @@ def blurred(path: Path) -> set[str]:
         elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.MatMult):
             found.add(f"{name_of(path)}:{node.lineno}: @")
         elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
-            whole = isinstance(node.right, ast.Constant) and isinstance(node.right.value, int)
+            power = node.right.value if isinstance(node.right, ast.Constant) else None
             two = isinstance(node.left, ast.Constant) and node.left.value == 2
-            if not (whole or two):
+            if not (isinstance(power, int) or (two and power is None)):
                 found.add(f"{name_of(path)}:{node.lineno}: {ast.unparse(node)}")
     return found
 

@@ -51,9 +51,9 @@ def arguments(name: str, place: Path) -> list[str]:
 
 
 def ended(place: Path) -> dict[str, str]:
-    """The digest of every scene, by its name, on two ranks."""
+    """The digest of every scene, by its name, on three ranks."""
     (place / "shattering.toml").write_text(shattering(), encoding="utf-8")
-    together(2, place, [arguments(name, place) for name in EVERYWHERE])
+    together(3, place, [arguments(name, place) for name in EVERYWHERE])
     ends = {name: from_json((place / name / layout.OUTCOME).read_bytes()) for name in EVERYWHERE}
     assert {end.state for end in ends.values()} == {"succeeded"}
     assert all(end.broken > 100 for name, end in ends.items() if name.startswith(("shattering", "breaking")))

@@ -67,7 +67,7 @@ class PairTable:
     @property
     def pushed(self) -> Ints:
         """(k,) which pairs have had impulses in the last step."""
-        return np.asarray(_pushed(self.kept))
+        return np.flatnonzero(self.kept.any(axis=1))
 
     def recall(self, first: Indices, rows: Indices, kept: Floats) -> None:
         """Pairs of nodes and faces that are among ``rows`` (k, 2) have what these have ``kept``, (k, 4); ``first``: see
@@ -92,15 +92,6 @@ class PairTable:
     def arrays(self) -> Pairs:
         """As kernels take it."""
         return Pairs(self.rows, self.until, self.speed, self.turned, self.next, np.empty(len(self.rows), np.int32))
-
-
-@njit("int64[::1](float64[:, ::1])", cache=True)
-def _pushed(kept):  # type: ignore[no-untyped-def]
-    some, n = np.empty(len(kept), np.int64), 0
-    for p in range(len(kept)):
-        some[n] = p
-        n += kept[p, 0] != 0.0 or kept[p, 1] != 0.0 or kept[p, 2] != 0.0 or kept[p, 3] != 0.0
-    return some[:n].copy()
 
 
 @njit("void(float64[:, ::1], int32[::1], int32[::1], int32[:, ::1], int32[:, ::1], float64[:, ::1])", cache=True)

@@ -82,7 +82,9 @@ def exp_less_one(x):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64, float64)", cache=True, error_model="numpy")
 def power(x, exponent):  # type: ignore[no-untyped-def]
-    """x to the ``exponent``, for x that is 0 or a positive normal number and an exponent that is positive."""
+    """x to the ``exponent``, for x that is 0 or a positive normal number and an exponent that is positive; no less than
+    e^LEAST and no more than e^MOST but for 0.
+    """
     return exp(max(min(exponent * log(x), MOST), LEAST)) if x > 0.0 else 0.0
 
 
