@@ -19,7 +19,7 @@ import msgspec
 from conoid.cases.load import CaseError
 
 from .errors import ServiceError
-from .reading import CPU, WALL, Answer, Question, Reading
+from .reading import CPU, WALL, Answer, Question, Reading, address
 from .settings import usable_cores
 
 _log = logging.getLogger("conoid.server")
@@ -58,7 +58,8 @@ class Reader:
     def _ask(self, question: bytes) -> bytes:
         with socket.socket(socket.AF_UNIX) as connection:
             connection.settimeout(WALL + _PATIENCE)
-            connection.connect(self._address())
+            with address(self._socket()) as there:
+                connection.connect(there)
             connection.sendall(question)
             connection.shutdown(socket.SHUT_WR)
             chunks = []
@@ -66,12 +67,12 @@ class Reader:
                 chunks.append(chunk)
             return b"".join(chunks)
 
-    def _address(self) -> str:
+    def _socket(self) -> Path:
         with self._lock:
             if self._program is None or self._program.poll() is not None:
                 self.close()
                 self._start()
-            return str(Path(self._folder) / "socket")
+            return Path(self._folder) / "socket"
 
     def _start(self) -> None:
         self._folder = tempfile.mkdtemp(prefix="conoid-reader-")

@@ -12,7 +12,8 @@ import signal
 import socket
 import sys
 import traceback
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -123,7 +124,8 @@ def main(path: str) -> int:
     os.nice(_NICE)
     _warm()
     with socket.socket(socket.AF_UNIX) as listener:
-        listener.bind(path)
+        with address(Path(path)) as here:
+            listener.bind(here)
         listener.listen(_BACKLOG)
         print("ready", flush=True)
         while listener in select.select([listener, sys.stdin], [], [])[0]:
@@ -133,6 +135,16 @@ def main(path: str) -> int:
                     _child(connection)
     _tidy(Path(path))
     return 0
+
+
+@contextmanager
+def address(place: Path) -> Iterator[str]:
+    """Of the socket at ``place``, whose own path may have more than the 107 bytes that fit."""
+    folder = os.open(place.parent, os.O_PATH)
+    try:
+        yield f"/proc/self/fd/{folder}/{place.name}"
+    finally:
+        os.close(folder)
 
 
 def _warm() -> None:

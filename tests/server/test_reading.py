@@ -10,7 +10,7 @@ import msgspec
 import pytest
 
 from conoid.server.limits import Limits
-from conoid.server.reading import Question
+from conoid.server.reading import Question, address
 from conoid.server.submission import Desk
 
 from .running import Running, case_text
@@ -44,12 +44,15 @@ def test_a_case_finds_everything_loaded(tmp_path: Path) -> None:
     """CPU time of the first fork, against that of a first case in a program of its own."""
     told = msgspec.msgpack.encode(QUESTION)
     alone = subprocess.run([sys.executable, "-c", TIMED], input=told, capture_output=True, check=True)
-    place = str(tmp_path / "socket")
+    folder = tmp_path / ("long" * 30)
+    folder.mkdir()
+    place = str(folder / "socket")
     program = subprocess.Popen([sys.executable, "-c", TIMED, place], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     with program, socket.socket(socket.AF_UNIX) as connection:
         assert program.stdout is not None
         assert program.stdout.readline() == b"ready\n"
-        connection.connect(place)
+        with address(folder / "socket") as there:
+            connection.connect(there)
         connection.sendall(told)
         connection.shutdown(socket.SHUT_WR)
         seconds = float(connection.recv(100))
