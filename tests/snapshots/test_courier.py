@@ -1,8 +1,12 @@
 """What a rank gives away becomes a snapshot in a process of its own; nothing that happens there holds up the solver."""
 
 import hashlib
+import io
+import json
 import os
 import signal
+import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,7 +16,7 @@ import pytest
 
 from conoid.cases import layout, messages, snapshot
 from conoid.worker.output.telemetry import Telemetry
-from conoid.worker.snapshots import share
+from conoid.worker.snapshots import packer, share
 from conoid.worker.snapshots.courier import Courier
 
 from .shattered import PARTS, shattered
@@ -88,6 +92,21 @@ def test_a_packer_that_hangs_holds_nobody_up(courier: Courier) -> None:
     assert courier.under_way == 2
     os.kill(courier.packer, signal.SIGCONT)
     assert answer(courier)[0]["n"] == 1
+
+
+def test_the_last_snapshot_does_not_wait_for_what_others_leave(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def made(*_: object) -> dict[str, Any]:
+        return {"priority": os.getpriority(os.PRIO_PROCESS, threading.get_native_id())}
+
+    lines = [json.dumps({**task(n), "cause": cause}) for n, cause in enumerate(("start", "run.snapshots", "end"))]
+    monkeypatch.setattr(packer, "_made", made)
+    monkeypatch.setattr(sys, "stdin", io.StringIO("\n".join(lines)))
+    packer.main(tmp_path)
+    first, second, last = (json.loads(line)["priority"] for line in capsys.readouterr().out.splitlines())
+    assert last == os.getpriority(os.PRIO_PROCESS, 0)
+    assert first == second == min(last + 10, 19)
 
 
 def test_what_waits_for_the_network_is_bounded_and_counted() -> None:

@@ -1,15 +1,17 @@
 """The process that makes snapshots of what the ranks give away: ``python -m conoid.worker.snapshots.packer FOLDER``.
 
 A thread of the solver's process would take the interpreter from it again and again; this one takes what the machine has
-left. One task a line on stdin, one answer a line on stdout; it ends with its stdin. A snapshot is written beside its
-place, flushed to disk and renamed.
+left, but for the last snapshot, for which the run waits. One task a line on stdin, one answer a line on stdout; it ends
+with its stdin. A snapshot is written beside its place, flushed to disk and renamed.
 """
 
 import hashlib
 import json
 import os
 import sys
+import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +23,7 @@ from . import blob, share
 from .births import Births
 
 _NICE = 10
-"""A process that computes has nine times the right to a core. Chosen: what is left over is enough."""
+"""Who computes has nine times the right to a core. Chosen: what is left over is enough."""
 _PATIENCE = 60.0
 """s that the share of a rank may take to appear. Chosen: many times what a slow disk takes."""
 _LOOK = 0.005
@@ -30,16 +32,24 @@ _LOOK = 0.005
 
 def main(folder: Path) -> None:
     """Makes one snapshot after the other."""
-    os.nice(_NICE)
     births: Births | None = None
-    for line in sys.stdin:
-        task, began = json.loads(line), time.process_time()
-        births = births or Births(folder, task["end"], task["frames"])
-        try:
-            answer = _made(folder, task, births)
-        except Exception as error:  # of one snapshot; the next may be made
-            answer = {"error": f"{type(error).__name__}: {error}"}
-        print(json.dumps({"n": task["n"], "cpu": time.process_time() - began, **answer}), flush=True)
+    with ThreadPoolExecutor(1, initializer=_step_back) as behind:
+        for line in sys.stdin:
+            task, began = json.loads(line), time.process_time()
+            births = births or Births(folder, task["end"], task["frames"])
+            try:
+                if task["cause"] == "end":
+                    answer = _made(folder, task, births)
+                else:
+                    answer = behind.submit(_made, folder, task, births).result()
+            except Exception as error:  # of one snapshot; the next may be made
+                answer = {"error": f"{type(error).__name__}: {error}"}
+            print(json.dumps({"n": task["n"], "cpu": time.process_time() - began, **answer}), flush=True)
+
+
+def _step_back() -> None:
+    """Lowers the priority of this thread alone, which nobody but the superuser could take back."""
+    os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICE)
 
 
 def _made(folder: Path, task: dict[str, Any], births: Births) -> dict[str, Any]:
