@@ -6,6 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from conoid.worker.elements.tet4 import quanta
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.parallel.fixed_point import (
     CONTRIBUTION_BITS,
@@ -67,15 +68,26 @@ def test_sums_of_nothing_and_of_one() -> None:
 
 @pytest.mark.parametrize("largest", [1e-9, 0.75, 1.0, 3.0, 1e5, 2.0**40, 1e300])
 def test_scale_leaves_the_stated_headroom(largest: float) -> None:
-    """A power of two; the largest contribution uses all bits but the headroom, and may grow 64-fold."""
+    """A power of two; the largest contribution uses all bits but the headroom, and may grow 32-fold."""
     scale = scale_for(largest)
     assert math.frexp(scale)[0] == 0.5
     bits = CONTRIBUTION_BITS - HEADROOM_BITS
     assert 2.0 ** (bits - 1) <= largest * scale <= 2.0**bits
-    assert not outgrown(largest * 63.0, scale)
-    assert outgrown(largest * 129.0, scale)
+    assert not outgrown(largest * 31.0, scale)
+    assert outgrown(largest * 65.0, scale)
     assert outgrown(math.nan, scale)
     assert outgrown(math.inf, scale)
+
+
+def test_contributions_are_rounded_to_the_nearest_even_integer() -> None:
+    """Up to the last bit of the largest: halves, their neighbours, and numbers of all sizes."""
+    edge = 2.0**CONTRIBUTION_BITS
+    halves = np.concatenate([np.arange(-9.5, 10.0), [0.0, edge - 0.5, edge - 1.0, 0.5 - edge, 1.0 - edge]])
+    sizes = np.random.default_rng(2).normal(size=999) * 2.0 ** np.linspace(-60.0, CONTRIBUTION_BITS - 3.0, 999)
+    every = np.concatenate([halves, np.nextafter(halves, np.inf), np.nextafter(halves, -np.inf), sizes])
+    every = every[abs(every) < edge]
+    found = [quanta(value / 8.0, -value / 8.0, 0.0, 8.0) for value in every]
+    assert found == [(round(value), -round(value), 0) for value in every]
 
 
 def collision(form: Form, floor: float) -> tuple[Simulation, int]:

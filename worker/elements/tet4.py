@@ -64,6 +64,8 @@ root, l is V^(1/3) for a regular tet and shrinks with the altitude of a flat one
 _LINE = 8
 """Numbers in a line of the cache, of 64 bytes where processors have vectors; where lines are longer some are brought
 twice."""
+_NEAREST, _NEAREST_BITS = 6755399441055744.0, 0x4338000000000000
+"""1.5 times 2^52: in its sum with a smaller number the nearest integer stands in the last bits; and its own bits."""
 MAGNITUDE = 0x7FFFFFFFFFFFFFFF
 """Mask of a float64's bits without the sign: as integers these order like absolute values, with NaN above all."""
 
@@ -249,10 +251,18 @@ def speeds(w, n):  # type: ignore[no-untyped-def]
         w[SPEED + i] = (first + second + third) / w[VOLUME + i]
 
 
+@njit("int64(float64)", cache=True, error_model="numpy", forceinline=True)
+def _whole(x):  # type: ignore[no-untyped-def]
+    """x, of a magnitude below 2^51, rounded to the nearest integer, the even one of two: the last bits of a sum. Many
+    processors have no instruction that makes integers of a vector of float64.
+    """
+    return np.float64(x + _NEAREST).view(np.int64) - _NEAREST_BITS
+
+
 @njit("UniTuple(int64, 3)(float64, float64, float64, float64)", cache=True, error_model="numpy")
 def quanta(a, b, c, scale):  # type: ignore[no-untyped-def]
-    """In quanta of 1/scale, rounded to the nearest integer."""
-    return np.int64(np.rint(a * scale)), np.int64(np.rint(b * scale)), np.int64(np.rint(c * scale))
+    """In quanta of 1/scale, rounded to the nearest integer; any if that is beyond fixed_point.CONTRIBUTION_BITS."""
+    return _whole(a * scale), _whole(b * scale), _whole(c * scale)
 
 
 @njit("int64(float64, float64, float64)", cache=True, error_model="numpy")

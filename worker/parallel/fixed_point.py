@@ -1,8 +1,8 @@
 """Sums that do not depend on their order: integers in units of a power of two.
 
 The scale of the nodal forces follows the largest contribution of the step before; when a step outgrows it, the sum is
-repeated in a coarser quantum. A contribution has 52 bits; node 0 of a tet may get three of them, so a node could have
-340 tets before its sum wraps: ten times what a mesh has.
+repeated in a coarser quantum. A contribution has 51 bits; node 0 of a tet may get three of them, so a node could have
+680 tets before its sum wraps: twenty times what a mesh has.
 """
 
 import math
@@ -14,10 +14,11 @@ from ..jit import njit
 from ..state import Floats, Indices, Ints
 from .comm import Comm
 
-CONTRIBUTION_BITS = 52
-"""A contribution stays below 2^52 quanta, where float64 still counts integers one by one."""
-HEADROOM_BITS = 6
-"""The next step may grow 64-fold before its sum has to be repeated."""
+CONTRIBUTION_BITS = 51
+"""A contribution stays below 2^51 quanta, where a float64 beside 1.5 times 2^52 counts integers one by one
+(elements/tet4.py)."""
+HEADROOM_BITS = 5
+"""The next step may grow 32-fold before its sum has to be repeated."""
 _LIMB_BITS = 30
 _LIMB = 2.0**_LIMB_BITS
 """Quanta of the low limb in one of the high: 60 bits in two limbs, each of which sums 2^32 values in an int64."""
