@@ -2,10 +2,14 @@
 
 import pytest
 
+from conoid.worker.kernels import cache_folder
+
 
 @pytest.fixture(autouse=True, scope="package")
 def mesh_cache(tmp_path_factory: pytest.TempPathFactory) -> object:
-    """Points ``CONOID_CACHE_DIR`` to an empty folder while these tests run."""
+    """Points ``CONOID_CACHE_DIR`` to a folder without meshes while these tests run; kernels are where they are."""
+    folder, kernels = tmp_path_factory.mktemp("cache"), cache_folder().parent
+    (folder / kernels.name).symlink_to(kernels)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("CONOID_CACHE_DIR", str(tmp_path_factory.mktemp("cache")))
+        patch.setenv("CONOID_CACHE_DIR", str(folder))
         yield

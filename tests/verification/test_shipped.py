@@ -14,7 +14,7 @@ from conoid.cases.outcome import Outcome, from_json
 
 HEAVY = {
     "branching_plate", "breathing_facet", "demo", "free_tets", "glass_steel_bar", "glass_steel_demo", "hertz_spheres",
-    "long_rod", "taylor_42crmo4", "taylor_copper", "taylor_copper_split",
+    "long_rod", "plugging_weldox", "taylor_42crmo4", "taylor_copper", "taylor_copper_split",
 }  # fmt: skip
 """Half a minute and more."""
 MANY = Path(__file__).parents[1] / "parallel" / "many.py"
