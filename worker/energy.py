@@ -50,6 +50,10 @@ class Ledger:
         """Share of the initial energy that contact has taken, friction included, at the last call."""
         self.stepping = 0.0
         """Magnitude of what unequal steps have taken, over the largest energy that came in, at the last call."""
+        self.made = 0.0
+        """What contact has given beyond all that it has taken, over ``came``, at the last call."""
+        self.came = self.initial
+        """The largest energy that has come in so far, J."""
         self.momentum = np.zeros(3)
         """Linear momentum at the last call, kg m/s, that of what has left included."""
         self.eroded_mass = 0.0
@@ -57,13 +61,13 @@ class Ledger:
         self.parts: dict[str, PartEnergy] = {}
         """Of each part at the last call; empty where there is one part alone."""
 
-    def keep(self) -> tuple[float, float, float, Floats, float]:
+    def keep(self) -> tuple[float, float, float, float, Floats, float]:
         """What it remembers, equal on all ranks."""
-        return self.initial, self.worst, self.lost, self.momentum, self.eroded_mass
+        return self.initial, self.came, self.worst, self.lost, self.momentum, self.eroded_mass
 
-    def resume(self, known: tuple[float, float, float, Floats, float]) -> None:
+    def resume(self, known: tuple[float, float, float, float, Floats, float]) -> None:
         """Takes it back."""
-        self.initial, self.worst, self.lost, self.momentum, self.eroded_mass = known
+        self.initial, self.came, self.worst, self.lost, self.momentum, self.eroded_mass = known
 
     def close(self, before: Floats) -> Energy:
         """The ledger at time n; ``before`` is v(n-1/2), the model holds v(n+1/2)."""
@@ -94,6 +98,8 @@ class Ledger:
         left = abs(total - self.initial - external_sum)
         residual = left / scale if scale != 0.0 else left
         self.stepping = abs(stepping) / scale if scale != 0.0 else 0.0
+        self.came = max(self.came, abs(external_sum))
+        self.made = max(friction - loss_sum, 0.0) / self.came if self.came > 0.0 else 0.0
         self.worst = max(self.worst, residual)
         return Energy(
             kinetic=kinetic_sum, elastic=float(work - plastic), plastic=plastic_sum, viscous=viscous_sum,

@@ -231,6 +231,7 @@ class Loop:
             self._history.write(clock.step, clock.t, clock.told, limiter, self.energy, extra)
         limit, when = sim.case.run.residual_limit, f"at step {clock.step}, t = {clock.t:.6g} s"
         shares = (
+            ("the energy that contact has made", sim.ledger.made, "; flat tets that overlap may be the cause"),
             ("the energy residual", self.energy.residual, ""),
             ("the energy of unequal time steps", sim.ledger.stepping, "; a smaller numerics.dt_safety lowers it"),
         )

@@ -107,6 +107,18 @@ def test_edges_meet_when_they_pass_or_are_near_and_not_too_deep(gap: float, spee
     assert many(meets(gap=gap, speed=speed)) == found
 
 
+@pytest.mark.parametrize("order", [1, -1])
+def test_the_opposite_edges_of_a_flat_tet_do_not_meet(order: int) -> None:
+    """They are as deep behind each other as it is thick; two such edges of two tets have passed each other."""
+    flat = np.array([[-1.0, 0.0, 0.01], [1.0, 0.0, 0.01], [0.0, -1.0, -0.01], [0.0, 1.0, -0.01]])
+    one, two = [0, 1, 3, 2], [2, 3, 1, 0]
+    v = np.zeros((8, 3))
+    alone = np.array([one, two], np.int32)[::order].copy()
+    assert many(edge_edge(np.concatenate([flat, flat]), v, alone, PAIR, 1.0, never=1)) == 0
+    apart = np.array([one, [k + 4 for k in two]], np.int32)[::order].copy()
+    assert many(edge_edge(np.concatenate([flat, flat]), v, apart, PAIR, 1.0)) == 1
+
+
 def test_what_is_wanted_ends_the_step_with_edges_that_touch() -> None:
     for gap, speed in ((0.1, -0.5), (-0.05, -0.5)):
         met = meets(gap=gap, speed=speed, angle=0.8)

@@ -70,6 +70,13 @@ def _fastest(course, a, b, c, d):  # type: ignore[no-untyped-def]
     return max(distance(p, r), distance(p, s), distance(q, r), distance(q, s))
 
 
+@njit(f"boolean({_N2}, int64, int64)", cache=True)
+def _opposite(edges, one, two):  # type: ignore[no-untyped-def]
+    """Whether an edge joins the nodes that the faces of the other one have besides it: both are of one tet, alone."""
+    a, b, c, d = edges[one, 2], edges[one, 3], edges[two, 0], edges[two, 1]
+    return (a == c and b == d) or (a == d and b == c)
+
+
 @njit(
     _PAIR(CONTACT_ROWS, types.int64, PAIRS, EDGES, STEP, types.float64[:, ::1], types.float64),
     cache=True,
@@ -79,7 +86,8 @@ def edge_edge(out, n, pairs, edges, step, course, end):  # type: ignore[no-untyp
     """Edges that pass an edge, from row ``n`` on; returns the new number of rows, and how many pairs were tested.
 
     ``course`` (slots, 3): velocities of the reference motions, m/s; ``end``: of the step, s after the search. An edge
-    whose ends are one node has gone.
+    whose ends are one node has gone. The opposite edges of a flat tet do not pass each other: it is as thick as they
+    are apart.
     """
     rows, until, speed, active = pairs.rows, pairs.until, pairs.speed, pairs.active
     corners, size, exposed, left, fresh = edges.corners, edges.size, edges.exposed, edges.left, edges.fresh
@@ -94,7 +102,7 @@ def edge_edge(out, n, pairs, edges, step, course, end):  # type: ignore[no-untyp
             continue
         a, b, c, d = corners[one, 0], corners[one, 1], corners[two, 0], corners[two, 1]
         here = exposed[one, 0] and exposed[one, 1] and exposed[two, 0] and exposed[two, 1]
-        if not here or a == b or c == d:
+        if not here or a == b or c == d or _opposite(corners, one, two):
             until[p], speed[p] = np.inf, 0.0
             continue
         active[tested] = p

@@ -26,7 +26,7 @@ from ..errors import InputError
 from ..parallel.comm import Comm
 from .parcel import Parcel, Table, take
 
-FORMAT = 8
+FORMAT = 9
 """Of the files; 8 has what symmetry planes have taken from all nodes beside them. Others are not read."""
 _KEPT = 2
 """Checkpoints that stay; the older ones go."""
