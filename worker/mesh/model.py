@@ -112,8 +112,8 @@ def _check_volumes(mesh: TetMesh, names: Names) -> None:
         tet, inverted = bad[0], volumes[bad[0]] < -nothing[bad[0]]
         raise MeshError(
             f"tet {names.tets[tet]} is {'inverted' if inverted else 'flat'}: its nodes "
-            f"{_list(names.nodes[mesh.tets[tet]])} span a volume of {volumes[tet]:.3g} m^3; it must be positive "
-            f"({_count(bad, volumes)} tets are inverted or flat)"
+            f"{_list(names.nodes[mesh.tets[tet]])} span a volume of {volumes[tet]:.3g} m^3; it must be above "
+            f"{nothing[tet]:.2g} ({_count(bad, volumes)} tets are inverted or flat)"
         )
 
 
