@@ -19,6 +19,7 @@ from .boundaries import Boundary
 from .clock import Clock
 from .contact.stage import Contact
 from .erosion import Erosion
+from .errors import EnergyError
 from .fracture.stage import Fracture
 from .jit import njit
 from .parallel.comm import Comm
@@ -49,7 +50,9 @@ class Ledger:
         self.lost = 0.0
         """Share of the initial energy that contact has taken, friction included, at the last call."""
         self.stepping = 0.0
-        """Magnitude of what unequal steps have taken, over the largest energy that came in, at the last call."""
+        """Magnitude of what unequal steps have taken, over the largest energy there is, at the last call."""
+        self.residual = 0.0
+        """What does not add up, over the largest energy there is, at the last call."""
         self.made = 0.0
         """What contact has given beyond all that it has taken, over ``came``, at the last call."""
         self.came = self.initial
@@ -96,16 +99,26 @@ class Ledger:
         friction = self._contact.friction_work() if self._contact is not None else 0.0
         scale = float(np.abs([self.initial, external_sum, work, kinetic_sum]).max())
         left = abs(total - self.initial - external_sum)
-        residual = left / scale if scale != 0.0 else left
+        self.residual = left / scale if scale != 0.0 else left
         self.stepping = abs(stepping) / scale if scale != 0.0 else 0.0
         self.came = max(self.came, abs(external_sum))
         self.made = max(friction - loss_sum, 0.0) / self.came if self.came > 0.0 else 0.0
-        self.worst = max(self.worst, residual)
+        self.worst = max(self.worst, self.residual)
         return Energy(
             kinetic=kinetic_sum, elastic=float(work - plastic), plastic=plastic_sum, viscous=viscous_sum,
             contact=loss_sum - friction, friction=friction, eroded=eroded, fracture=lost, cohesive=cohesive,
-            stepping=stepping, external=external_sum, initial=self.initial, residual=residual,
+            stepping=stepping, external=external_sum, initial=self.initial, residual=self.residual,
         )  # fmt: skip
+
+    def require(self, limit: float, when: str) -> None:
+        """Raises EnergyError when the last call has found more than ``limit``, run.residual_limit; ``when``: of it."""
+        for what, share, remedy in (
+            ("the energy that contact has made", self.made, ""),
+            ("the energy residual", self.residual, ""),
+            ("the energy of unequal time steps", self.stepping, "; a smaller numerics.dt_safety lowers it"),
+        ):
+            if not share <= limit:
+                raise EnergyError(f"{what}, {share:.3g}, passed run.residual_limit {limit:g} {when}{remedy}")
 
     def _node_sum(self, values: Floats) -> float:
         return float(exact_sums(self._comm, values[self._model.nodes.owned][:, None])[0])

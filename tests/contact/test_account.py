@@ -11,7 +11,6 @@ from conoid.worker.contact import booking
 from conoid.worker.contact.account import Account
 from conoid.worker.contact.active import PUSH, ActiveNodes, Loaded
 from conoid.worker.errors import EnergyError
-from conoid.worker.loop import Loop
 from conoid.worker.parallel.comm import Comm, SerialComm
 from conoid.worker.simulation import Simulation
 
@@ -64,20 +63,21 @@ def test_the_ledger_has_the_same_half_of_friction_and_of_the_normal_impulse(mu: 
 
 
 def test_contact_that_makes_energy_ends_the_run() -> None:
-    """More than run.residual_limit of what came in."""
+    """More of it than run.residual_limit, over what came in."""
     low, high = block((2, 2, 2), 1e-3), block((2, 2, 2), 1e-3)
     case = meeting_of([{}, {"velocity": (0.0, 0.0, -5.0)}], {}, end=1e-7)
     sim = build(case, [low, moved(high, (0.0, 0.0, 2.1e-3))])
     assert sim.contact is not None
-    loop, v = Loop.__new__(Loop), sim.model.nodes.v
-    loop.sim, loop._history = sim, None
+    v = sim.model.nodes.v
     sim.ledger.close(v)
+    sim.ledger.require(1e-9, "at the start")
     sim.contact.books.contact_loss[0] = -0.04 * sim.ledger.initial
     sim.ledger.close(v)
     assert sim.ledger.made == pytest.approx(0.04, rel=1e-9)
     sim.contact.books.contact_loss[1] = -0.02 * sim.ledger.initial
+    sim.ledger.close(v)
     with pytest.raises(EnergyError, match=r"the energy that contact has made, 0\.06, passed run\.residual_limit 0\.05"):
-        loop._look(v)
+        sim.ledger.require(0.05, "at the end")
 
 
 def test_the_cost_of_an_impulse_is_the_work_between_two_half_steps() -> None:

@@ -12,8 +12,6 @@ from pathlib import Path
 
 MPIEXEC = Path(sys.executable).with_name("mpiexec")
 PATIENCE = 180.0
-_MORE = 20.0
-"""s for each of many runs. Chosen: ten times what one takes."""
 _PROCESS = re.compile(r"rank \d+ of \d+, process (\d+)")
 
 
@@ -39,10 +37,10 @@ def started(words: list[str]) -> Iterator[subprocess.Popen[str]]:
                     os.killpg(launcher.pid, 9)
 
 
-def ended(words: list[str], patience: float = PATIENCE) -> subprocess.CompletedProcess[str]:
-    """The launcher after its end, at most ``patience`` s later."""
+def ended(words: list[str]) -> subprocess.CompletedProcess[str]:
+    """The launcher after its end."""
     with started(words) as launcher:
-        out, err = launcher.communicate(timeout=patience)
+        out, err = launcher.communicate(timeout=PATIENCE)
     return subprocess.CompletedProcess(words, launcher.returncode, out, err)
 
 
@@ -53,7 +51,7 @@ def together(ranks: int, place: Path, runs: Sequence[Sequence[str]]) -> None:
     place.mkdir(exist_ok=True)
     (place / "runs.json").write_text(json.dumps(runs), encoding="utf-8")
     program = Path(__file__).with_name("many.py")
-    finished = ended(command(ranks, str(place / "runs.json"), module=[str(program)]), PATIENCE + _MORE * len(runs))
+    finished = ended(command(ranks, str(place / "runs.json"), module=[str(program)]))
     assert finished.returncode == 0, finished.stdout + finished.stderr
 
 

@@ -65,7 +65,6 @@ def digests(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return ended(tmp_path_factory.mktemp("digests"))
 
 
-@pytest.mark.timeout(660)
 @pytest.mark.parametrize("name", EVERYWHERE)
 def test_the_digest_is_the_committed_one(name: str, digests: dict[str, str]) -> None:
     assert digests[name] == KNOWN[name]

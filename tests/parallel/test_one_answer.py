@@ -197,7 +197,6 @@ def test_every_shipped_case_is_here() -> None:
     assert set(SHORT) == set(load.shipped())
 
 
-@pytest.mark.timeout(900)
 @pytest.mark.parametrize(
     ("name", "ranks"),
     [pytest.param(name, n, marks=slowly(name, n)) for n in RANKS for name in NAMES if n <= TETS.get(name, n)],

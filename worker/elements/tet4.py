@@ -17,6 +17,7 @@ the chunk. Loops over a chunk use no function that could round differently in a 
 import numpy as np
 
 from ..jit import njit, prefetch
+from ..materials.elementary import NEAREST
 from ..state import (
     CHUNK,
     MASS,
@@ -64,8 +65,8 @@ root, l is V^(1/3) for a regular tet and shrinks with the altitude of a flat one
 _LINE = 8
 """Numbers in a line of the cache, of 64 bytes where processors have vectors; where lines are longer some are brought
 twice."""
-_NEAREST, _NEAREST_BITS = 6755399441055744.0, 0x4338000000000000
-"""1.5 times 2^52: in its sum with a smaller number the nearest integer stands in the last bits; and its own bits."""
+_NEAREST_BITS = 0x4338000000000000
+"""Bits of NEAREST."""
 MAGNITUDE = 0x7FFFFFFFFFFFFFFF
 """Mask of a float64's bits without the sign: as integers these order like absolute values, with NaN above all."""
 
@@ -256,7 +257,7 @@ def _whole(x):  # type: ignore[no-untyped-def]
     """x, of a magnitude below 2^51, rounded to the nearest integer, the even one of two: the last bits of a sum. Many
     processors have no instruction that makes integers of a vector of float64.
     """
-    return np.float64(x + _NEAREST).view(np.int64) - _NEAREST_BITS
+    return np.float64(x + NEAREST).view(np.int64) - _NEAREST_BITS
 
 
 @njit("UniTuple(int64, 3)(float64, float64, float64, float64)", cache=True, error_model="numpy")

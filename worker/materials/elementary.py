@@ -13,7 +13,7 @@ _LN2_HIGH, _LN2_LOW = 0.693147180369123816490, 1.90821492927058770002e-10
 """ln 2 in two parts: the first has 33 bits, so that its product with an exponent is exact; together they have 86."""
 _INVERSE_LN2 = 1.4426950408889634
 """1 / ln 2."""
-_NEAREST = 6755399441055744.0
+NEAREST = 6755399441055744.0
 """1.5 times 2^52: where it is added to a smaller number, the nearest integer stands in the last bits of the sum."""
 _ROOT_HALF = 0x3FE6A09E667F3BCD
 """Bits of sqrt(1/2): what lies above is divided by a power of two until it does not."""
@@ -46,8 +46,8 @@ def log(x):  # type: ignore[no-untyped-def]
 @njit("UniTuple(float64, 2)(float64)", cache=True, error_model="numpy", forceinline=True)
 def _reduced(x):  # type: ignore[no-untyped-def]
     """k, in the last bits of a float64, and e^r - 1 in 12 terms, with r = x - k ln 2."""
-    shifted = x * _INVERSE_LN2 + _NEAREST
-    k = shifted - _NEAREST
+    shifted = x * _INVERSE_LN2 + NEAREST
+    k = shifted - NEAREST
     r = (x - k * _LN2_HIGH) - k * _LN2_LOW
     r2 = r * r
     r4 = r2 * r2

@@ -27,7 +27,7 @@ from ..parallel.comm import Comm
 from .parcel import Parcel, Table, take
 
 FORMAT = 9
-"""Of the files; 8 has what symmetry planes have taken from all nodes beside them. Others are not read."""
+"""Of the files; 9 has the largest energy that has come in. Others are not read."""
 _KEPT = 2
 """Checkpoints that stay; the older ones go."""
 _MANIFEST = "manifest.json"
