@@ -7,9 +7,10 @@ import pytest
 from scipy.optimize import brentq
 
 from conoid.cases.materials import JohnsonCook
-from conoid.worker.materials.johnson_cook import initial_yield
+from conoid.worker.elements.tet4 import TRIAL, VOLUME_MID
+from conoid.worker.materials.johnson_cook import gather, increments, initial_yield
 from conoid.worker.mesh.model import TetMesh
-from conoid.worker.state import FLOW, MASS, PLASTIC_STRAIN, TEMPERATURE, WORK_PLASTIC, YIELD
+from conoid.worker.state import CHUNK, FLOW, MASS, PLASTIC_STRAIN, TEMPERATURE, WORK_PLASTIC, YIELD
 
 from . import formulas
 from .kernels import STEEL_42CRMO4, Patch, drive
@@ -118,6 +119,44 @@ def test_increments_equal_halved_brackets() -> None:
     error = np.abs(formulas.mises(patch.deviator) - (before["trial"] - 3.0 * SHEAR * root))
     flowed = before["trial"] > before["static"] * (1 + 1e-12)
     assert (error < 1e-8 * before["trial"] + ROUND_OFF)[flowed].all()
+
+
+def test_small_increments_are_right_by_themselves() -> None:
+    """Also where the rate begins to count, at d = dt times the reference rate, and on the first yield, where the flow
+    stress rises a million times more steeply than the trial stress falls: the stress is right there for any increment.
+    """
+    patch, before, dt = random_states(100_000, 97)
+    patch.advance(dt)
+    d = patch.get(PLASTIC_STRAIN) - before["strain"]
+    known = (before["strain"] < 1e-3 * d) & (before["temperature"] < LAW.melt_temperature - 1.0) & (d > 1e-13)
+    near = np.flatnonzero(known & (d > 0.1 * dt) & (d < 10.0 * dt))
+    assert len(near) > 20
+    for i in [*near, *np.flatnonzero(known)[::20]]:
+        state = tuple(float(before[name][i]) for name in ("trial", "strain", "temperature", "density"))
+        root = brentq(excess, 0.0, state[0] / (3.0 * SHEAR), (*state, dt), 1e-300, 1e-14, 2000)
+        assert abs(d[i] - root) < 1e-6 * root + 1e-15
+
+
+def test_increments_take_few_steps() -> None:
+    """With trial stresses from 1 Pa to 2 GPa beyond the flow stress, the rate counting or not, worked or not. Newton in d
+    with halvings, as it was, takes 19.
+    """
+    random = np.random.default_rng(5)
+    params = Patch(TetMesh(REGULAR, np.arange(4)[None]), STEEL_42CRMO4).block.params
+    taken = []
+    for _ in range(20):
+        w, s = np.zeros((200, CHUNK)), np.zeros((40, CHUNK))
+        strain = np.where(random.uniform(size=CHUNK) < 0.02, 0.0, 10.0 ** random.uniform(-6.0, 0.3, CHUNK))
+        temperature = random.uniform(293.15, 1500.0, CHUNK)
+        static = flow_stress(strain, np.zeros(CHUNK), temperature)
+        s[PLASTIC_STRAIN], s[TEMPERATURE], s[YIELD], s[MASS] = strain, temperature, static, 7830.0
+        s[FLOW] = static * (1.0 + LAW.C * random.uniform(0.0, 14.0, CHUNK))
+        w[TRIAL // CHUNK] = static + 10.0 ** random.uniform(0.0, 9.3, CHUNK)
+        w[VOLUME_MID // CHUNK] = 1.0
+        m = gather(w.reshape(-1), s.reshape(-1), params, CHUNK)
+        assert m == CHUNK
+        taken.append(increments(w.reshape(-1), params, m, 1e-8) / m)
+    assert np.mean(taken) < 7.0
 
 
 def excess(d: float, q: float, strain: float, temperature: float, density: float, dt: float) -> float:

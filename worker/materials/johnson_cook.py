@@ -3,8 +3,8 @@
 sigma = (A + B e^n) (1 + C ln max(rate / rate_0, 1)) (1 - T*^m). Johnson and Cook 1983.
 
 The tets of a chunk that yield are laid side by side in the scratch and solved for together, loop after loop, with
-logarithms and powers of our own. A tet that has converged keeps its answer while others go on: it does not depend on
-which tets share the chunk.
+logarithms and powers of our own. Those that have converged are laid behind the others and left alone: no answer depends
+on which tets share the chunk.
 """
 
 from conoid.cases.laws.johnson_cook import JohnsonCook
@@ -42,13 +42,15 @@ _TEMPERATURE, _MASS, _P, _DAMAGE = TEMPERATURE * CHUNK, MASS * CHUNK, PRESSURE *
 _PLACE, _Q, _KNOWN, _HOT, _WARM, _LOW, _HIGH, _D, _OPEN, _STATIC, _SUM, _FAST, _SOFT, _T = (
     NODAL + k * CHUNK for k in range(14)
 )
-_MOST = 60
-"""Newton steps at most: halving alone, from a bracket, has reached the last bit of a float64 by then (52 bits)."""
+_MOST = 140
+"""Steps at most: the halvings among them alone have reached the last bit of a float64 by then (52 bits)."""
 _CLOSE = 1e-4
 """A Newton step below this share of the strain increment leaves an error of its square: below 1e-8 of the stress."""
-_PATIENT = 8
-"""Steps after which every second one is a halving: where the rate begins to count the flow stress has a kink, and
-Newton may jump to and fro across it."""
+_PATIENT = 20
+"""Steps after which every second one is a halving: a metal that softens may have Newton jump to and fro. The first
+yield, whose increments lie anywhere between 1e-2 and 1e-21, takes up to 15."""
+_BELOW = 1.0 - 2.0**-40
+"""Of the increment from which on the rate counts, where the flow stress has a kink: safely on the side without."""
 _NARROW = 1e-12
 """A bracket that is narrower, relative to the largest increment, holds the answer."""
 _STEEPEST = 600.0
@@ -63,7 +65,7 @@ _TINY = 1e-300
 
 
 @njit("int64(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
-def _gather(w, s, params, n):  # type: ignore[no-untyped-def]
+def gather(w, s, params, n):  # type: ignore[no-untyped-def]
     """Lays the tets beyond their rate-free flow stress side by side; returns how many. The root is in [0, q / 3 G]."""
     m, shear3 = 0, 3.0 * params[SHEAR]
     for i in range(n):
@@ -102,43 +104,80 @@ def _factors(w, params, m, dt):  # type: ignore[no-untyped-def]
         powers(w, _SOFT, m, params[_M])
 
 
-@njit("int64(float64[::1], float64[::1], int64, boolean)", cache=True, error_model="numpy")
-def _newton(w, params, m, halve):  # type: ignore[no-untyped-def]
+@njit("int64(float64[::1], float64[::1], int64, float64, boolean)", cache=True, error_model="numpy")
+def _newton(w, params, m, dt, halve):  # type: ignore[no-untyped-def]
     """A step of Newton towards q - 3 G d = flow stress(d), or a halving; how many go on.
 
     The left side falls and the right side rises with d until the metal softens, so the root stays bracketed. A step
     that leaves the bracket is a halving, and all are with ``halve``.
+
+    Where the flow stress rises more steeply than the trial stress falls it rises as the logarithm or a power of d, by
+    its rate or on the first yield. There, and where a step in d would pass the kink at which the rate begins to count,
+    it is one in ln d, to second order: steps in d would lead to and fro between increments of 1e-9 and 1e-5. One that
+    passes the kink all the same ends there.
     """
-    shear3, going = 3.0 * params[SHEAR], 0
+    shear3, going, kink = 3.0 * params[SHEAR], 0, _BELOW * dt * params[_RATE]
     a, b, n, c, per_span = params[_A], params[_B], params[_N], params[_C], params[_M] / (params[_MELT] - params[_T0])
     for j in range(m):
         d, low, high, warm = w[_D + j], w[_LOW + j], w[_HIGH + j], w[_WARM + j]
         stress, within = w[_Q + j] - shear3 * d, w[_T + j]
-        power = b * w[_SUM + j]
+        power, strain = b * w[_SUM + j], max(w[_KNOWN + j] + d, _TINY)
         hardening, rate = a + power, 1.0 + c * w[_FAST + j]
         soft = w[_SOFT + j] if within > 0.0 else 0.0
         heat = 1.0 - soft
         melting = (within > 0.0) & (within < 1.0)
         by_heat = per_span * soft / (within if melting else 1.0)
         by_heat = -by_heat if melting else 0.0
-        rising = c * hardening / d
-        rising = rising if w[_FAST + j] > 0.0 else 0.0
-        by_strain = (n * power / max(w[_KNOWN + j] + d, _TINY) * rate + rising) * heat
+        counts = w[_FAST + j] > 0.0
+        by_rate = c * hardening / d
+        by_rate = by_rate * heat if counts else 0.0
+        by_strain = n * power / strain * rate * heat
         residual = stress - hardening * rate * heat
-        slope = -shear3 - by_strain - hardening * rate * by_heat * warm * (stress - shear3 * d)
+        slope = -shear3 - by_strain - by_rate - hardening * rate * by_heat * warm * (stress - shear3 * d)
         low, high = (d if residual > 0.0 else low), (high if residual > 0.0 else d)
         new = d - residual / slope
+        x = (new - d) / d
+        grown = 1.0 + abs(x) + 0.5 * x * x
+        grown = d * grown if x > 0.0 else d / grown
+        steep = (by_rate + by_strain * d / strain > shear3) | (counts & (new < kink))
+        new = grown if steep else new
+        passes = counts & (new < kink)
+        new = kink if passes else new
         newton = (low <= new) & (new <= high) & (slope < 0.0) & (not halve)
         new = new if newton else 0.5 * (low + high)
-        done = (newton & (abs(new - d) <= _CLOSE * new)) | (high - low <= _NARROW * high)
-        active = w[_OPEN + j] > 0.0
-        w[_STATIC + j] = hardening * heat if active else w[_STATIC + j]
-        w[_D + j] = new if active else d
-        w[_LOW + j], w[_HIGH + j] = low, high
-        left = 1.0 if active & (not done) else 0.0
-        w[_OPEN + j] = left
-        going += int(left)
+        done = (newton & (not passes) & (abs(new - d) <= _CLOSE * new)) | (high - low <= _NARROW * high)
+        w[_STATIC + j] = hardening * heat
+        w[_D + j], w[_LOW + j], w[_HIGH + j] = new, low, high
+        w[_OPEN + j] = 0.0 if done else 1.0
+        going += int(not done)
     return going
+
+
+@njit("int64(float64[::1], int64)", cache=True)
+def _open_first(w, m):  # type: ignore[no-untyped-def]
+    """Lays those of ``m`` tets that are still sought before the others; how many."""
+    n = 0
+    for j in range(m):
+        if w[_OPEN + j] > 0.0:
+            if n < j:
+                for row in range(_PLACE, _STATIC + CHUNK, CHUNK):
+                    w[row + n], w[row + j] = w[row + j], w[row + n]
+            n += 1
+    return n
+
+
+@njit("int64(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
+def increments(w, params, m, dt):  # type: ignore[no-untyped-def]
+    """Finds the strain increments of the ``m`` tets in the scratch; how many steps they took in all."""
+    sought, steps = m, 0
+    for k in range(_MOST):
+        steps += sought
+        _factors(w, params, sought, dt)
+        if _newton(w, params, sought, dt, k >= _PATIENT and k % 2 == 1) < sought:
+            sought = _open_first(w, sought)
+        if sought == 0:
+            break
+    return steps
 
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, int64, float64)", cache=True, error_model="numpy")
@@ -200,13 +239,10 @@ def _wear(w, s, params, m, dt):  # type: ignore[no-untyped-def]
 def johnson_cook(w, s, params, n, dt):  # type: ignore[no-untyped-def]
     """Returns the trial stress of the tets beyond their rate-free flow stress; heats them by the plastic work."""
     equivalent_stress(w, s, n)
-    m = _gather(w, s, params, n)
+    m = gather(w, s, params, n)
     if m == 0:
         return
-    for k in range(_MOST):
-        _factors(w, params, m, dt)
-        if _newton(w, params, m, k >= _PATIENT and k % 2 == 1) == 0:
-            break
+    increments(w, params, m, dt)
     _return(w, s, params, m, n, dt)
     if params[_DAMAGED] > 0.0:
         _wear(w, s, params, m, dt)
