@@ -22,6 +22,19 @@ def face_counts(tets: Ints) -> NDArray[np.int64]:
     return _groups(tets[:, FACES].reshape(-1, 3))[1]
 
 
+def same_side(tets: Ints) -> NDArray[np.int64]:
+    """(k, 2) tets, positively oriented, that lie on the same side of a face that both have: they overlap. Of more than
+    two on one side every two that follow each other.
+    """
+    faces = tets[:, FACES].reshape(-1, 3)
+    a, b, c = faces.T
+    odd = (a > b) ^ (b > c) ^ (a > c)
+    side = _groups(faces)[0] * 2 + odd
+    order = np.argsort(side, kind="stable")
+    again = np.flatnonzero(np.diff(side[order]) == 0)
+    return np.column_stack([order[again], order[again + 1]]) // 4
+
+
 def across(tets: Ints) -> Ints:
     """(n, 4) what lies behind each face: 4 * tet + local face of its other side, -1 where there is none."""
     group, size = _groups(tets[:, FACES].reshape(-1, 3))

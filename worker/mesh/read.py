@@ -15,7 +15,7 @@ from conoid.cases.bodies import MeshFile
 
 from ..errors import MeshError
 from .abaqus import read_inp
-from .faces import face_counts
+from .faces import same_side
 from .gmsh_session import NamedMesh, first_error, session, tet_mesh
 from .model import TetMesh, check
 
@@ -33,8 +33,11 @@ def read(file: MeshFile, path: Path, key: str = "mesh") -> TetMesh:
     try:
         found = readers[path.suffix.lower()](path, file.group, key)
         mesh = check(TetMesh(found.mesh.points * file.unit, found.mesh.tets), found.names)
-        if face_counts(mesh.tets).max() > 2:
-            raise MeshError("a face belongs to more than two tets; is a tet there twice?")
+        if len(twins := same_side(mesh.tets)):
+            one, other = found.names.tets[twins[0]]
+            raise MeshError(
+                f"tets {one} and {other} lie on the same side of a face that both have; is a tet there twice?"
+            )
         return mesh
     except MeshError as error:
         text = str(error)
