@@ -64,12 +64,14 @@ class Clock:
         Returns the mean step.
 
         The way to the next frame is divided into equal steps, as few as are stable: steps that change little cost
-        little energy, and none is a sliver. ``growth`` bounds the stable step.
+        little energy, and none is a sliver. ``growth`` bounds the stable step. At the end of the run it is the step
+        that would follow, as long as the last one where that is stable.
         """
         self.last_dt = self.dt
         self._stable = min(self._safety / limit if limit > 0.0 else math.inf, self._growth * self._stable)
         left = self.frame_time(self.frame + 1 if self.frame_due else self.frame) - self.t
-        self.dt = left / max(math.ceil(left / self._stable), 1) if left > 0.0 else 0.0
+        following = min(self._stable, self.last_dt)
+        self.dt = left / max(math.ceil(left / self._stable), 1) if left > 0.0 else following
         self._first = self._first or self._stable
         self.mean_dt, self.shorter = 0.5 * (self.last_dt + self.dt), 0.25 * (self.last_dt - self.dt)
         return self.mean_dt
@@ -83,11 +85,6 @@ class Clock:
         """The step anew, for another ``limit``, before it is used; see ``choose``."""
         self.dt = self.last_dt
         return self.choose(limit)
-
-    @property
-    def told(self) -> float:
-        """The step for people, s: the one ahead, and the one behind when none is ahead any more."""
-        return self.dt if self.dt > 0.0 else self.last_dt
 
     @property
     def collapsed(self) -> bool:

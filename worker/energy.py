@@ -26,6 +26,10 @@ from .parallel.comm import Comm
 from .parallel.fixed_point import Grouped, add_limbs, exact_sums, exact_totals, larger
 from .state import CHUNK, WORK, WORK_PLASTIC, WORK_VISCOUS, Block, Floats, Ints, Model
 
+_TOLD = 0.01
+"""Share of the largest energy that unequal steps may take or make without a word. Chosen: what the other
+lines of a ledger are usually read to.
+"""
 _WORKS = (WORK, WORK_VISCOUS, WORK_PLASTIC)
 
 
@@ -109,6 +113,16 @@ class Ledger:
             contact=loss_sum - friction, friction=friction, eroded=eroded, fracture=lost, cohesive=cohesive,
             stepping=stepping, external=external_sum, initial=self.initial, residual=self.residual,
         )  # fmt: skip
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the user should know of the account, by the last call."""
+        if self.stepping <= _TOLD:
+            return []
+        return [
+            f"unequal time steps have taken or made {self.stepping:.2g} of the largest energy; a smaller "
+            "numerics.dt_safety lowers it"
+        ]
 
     def require(self, limit: float, when: str) -> None:
         """Raises EnergyError when the last call has found more than ``limit``, run.residual_limit; ``when``: of it."""

@@ -146,7 +146,7 @@ class Loop:
             self._warn_of_steps()
         with sim.timers.phase("output"):
             if before is not None:
-                self._look(before)
+                self._look(before, ending=ending)
             if clock.frame_due:
                 self._write_frame()
             self.snapshots.look(sim, due=sim.reduction.snapshot, ending=ending)
@@ -217,17 +217,19 @@ class Loop:
             (every is not None and now - self._kept > every) or (own.report and self._asked())
         )
 
-    def _look(self, before: Floats) -> None:
-        """A line of the history: ledger, momentum and probes at time n."""
+    def _look(self, before: Floats, *, ending: bool) -> None:
+        """A line of the history: ledger, momentum and probes at time n; ``ending``: after the last step."""
         sim, clock = self.sim, self.sim.clock
         self.energy, self._parts = sim.ledger.close(before), sim.ledger.parts
+        if ending:
+            step.end(sim, before)
         probes = sim.probes.measure()
         self._sample = int(clock.t * sim.case.run.samples / sim.case.run.end_time) + 1
         limiter = sim.limiter()
         if self._history is not None:
             parts = [value for part in self._parts.values() for value in msgspec.structs.astuple(part)]
             extra = [*sim.ledger.momentum, *parts, *probes]
-            self._history.write(clock.step, clock.t, clock.told, limiter, self.energy, extra)
+            self._history.write(clock.step, clock.t, clock.dt, limiter, self.energy, extra)
         sim.ledger.require(sim.case.run.residual_limit, f"at step {clock.step}, t = {clock.t:.6g} s")
 
     def _write_frame(self) -> None:
@@ -271,12 +273,12 @@ class Loop:
         now = time.monotonic()
         if now - self._logged > _LOG_EVERY:
             self._logged = now
-            log.info("step %d, t %.4g s, dt %.3g s, %s", clock.step, clock.t, clock.told, limiter)
+            log.info("step %d, t %.4g s, dt %.3g s, %s", clock.step, clock.t, clock.dt, limiter)
         elapsed = now - self._reported
         self._pace.add(clock.t, now)
         if self.energy is not None:
             self._tell(
-                messages.Progress, end_time=sim.case.run.end_time, dt=clock.told, limiter=limiter,
+                messages.Progress, end_time=sim.case.run.end_time, dt=clock.dt, limiter=limiter,
                 eta=self._pace.left(sim.case.run.end_time - clock.t), energy=self.energy,
                 updates_per_second=(self.updates - self._reported_updates) / elapsed, parts=self._parts,
             )  # fmt: skip

@@ -102,7 +102,7 @@ class Simulation:
         if self.limit > self.reduction.limit:
             return "contact: speed of approach"
         why = "stability" if stable * self.reduction.limit >= 0.999 * self.case.numerics.dt_safety else "growth"
-        if self.clock.told < 0.9 * stable:
+        if self.clock.dt < 0.9 * stable:
             why = "output time"
         return f"{why}: {self.limiting_tet()}"
 

@@ -35,6 +35,7 @@ from .fracture.stage import NOTHING, OVERSTRESSED, Fracture
 from .motion import kick, move
 from .parallel import fixed_point
 from .simulation import Simulation
+from .state import Floats
 
 
 def prepare(sim: Simulation) -> None:
@@ -61,6 +62,15 @@ def first_half(sim: Simulation) -> None:
         # v*(n+1/2) = v(n-1/2) + dt f(n) / m
         kick(nodes.v, nodes.force, nodes.mass, nodes.stepping, mean_dt / sim.scale, clock.shorter / sim.scale)
         _after_kick(sim)  # 6 to 9: v(n+1/2)
+
+
+def end(sim: Simulation, before: Floats) -> None:
+    """After the first half of the step that would follow the last one: v(n), between v(n-1/2), ``before`` (nodes, 3),
+    and v(n+1/2), in which walls and contact have had their part as in any step.
+    """
+    nodes, clock = sim.model.nodes, sim.clock
+    if clock.mean_dt > 0.0:
+        nodes.v[:] = before + 0.5 * clock.last_dt / clock.mean_dt * (nodes.v - before)
 
 
 def _before_kick(sim: Simulation) -> None:

@@ -220,6 +220,8 @@ def run(sim: Simulation, watch: Watch | None = None, steps: int = -1) -> Simulat
             watch(sim, before)
         if sim.clock.frame_due:
             sim.clock.frame += 1
+        if sim.clock.done:
+            step.end(sim, before)
         if sim.clock.done or sim.clock.step == steps:
             return sim
         step.second_half(sim)
