@@ -8,13 +8,16 @@ from pathlib import Path
 import numpy as np
 
 from conoid.cases import schema
+from conoid.cases.bodies import MeshFile
 from conoid.cases.library import material as find_material
 
 from .contact import overlap, pairing
 from .errors import InputError
+from .fracture.connectivity import components
 from .hashing import uniform
 from .mesh.build import build as build_mesh
 from .mesh.faces import FACES, across, normals
+from .mesh.model import TetMesh
 from .state import Flags, Floats, Indices, Load
 from .turning import sine_and_cosine
 
@@ -40,6 +43,8 @@ class Whole:
     velocity: Floats
     loads: list[Load]
     """Of the tractions of the case."""
+    warnings: list[str]
+    """What the user should know of the meshes."""
 
 
 def quiet(what: str) -> None:
@@ -48,11 +53,12 @@ def quiet(what: str) -> None:
 
 def assemble(case: schema.Case, folder: Path, say: Say = quiet) -> Whole:
     """Builds the meshes of all parts; ``folder`` is where relative mesh paths start. Raises MeshError."""
-    points, tets, node_part, tet_part, density = [], [], [], [], []
+    points, tets, node_part, tet_part, density, warnings = [], [], [], [], [], list[str]()
     offset = 0
     for index, part in enumerate(case.parts):
         meshing = f"meshing {part.name}, part {index + 1} of {len(case.parts)}"
         mesh = build_mesh(part.mesh, folder, key=f"parts[{index}].mesh", made=partial(say, meshing))
+        warnings += _pieces(case, index, mesh)
         points.append(mesh.points if part.turn is None else _turned(mesh.points, part.turn))
         tets.append(mesh.tets.astype(np.int64) + offset)
         node_part.append(np.full(len(mesh.points), index, np.int32))
@@ -71,8 +77,26 @@ def assemble(case: schema.Case, folder: Path, say: Say = quiet) -> Whole:
         points=x, node_part=part_of_node, tets=t, tet_part=part_of_tet, volumes=volumes,
         across=behind,
         node_volume=_quarters(t, volumes, len(x)), mass=_quarters(t, volumes * np.array(density)[part_of_tet], len(x)),
-        velocity=_velocities(case, x, part_of_node), loads=_loads(case, x, part_of_node, t),
+        velocity=_velocities(case, x, part_of_node), loads=_loads(case, x, part_of_node, t), warnings=warnings,
     )  # fmt: skip
+
+
+def _pieces(case: schema.Case, index: int, mesh: TetMesh) -> list[str]:
+    """A warning where the mesh from a file of a part that does not meet itself is in several pieces: nodes that
+    coincide and are not merged are the commonest slip in a mesh.
+    """
+    part = case.parts[index]
+    meets_itself = part.fracture is not None or (case.contact is not None and part.name in case.contact.self_contact)
+    if not isinstance(part.mesh, MeshFile) or meets_itself:
+        return []
+    sides = np.concatenate([mesh.tets[:, [0, k]] for k in (1, 2, 3)])
+    many = len(np.unique(components(len(mesh.points), sides)))
+    if many == 1:
+        return []
+    return [
+        f"parts[{index}].mesh: {many} pieces that share no node, and they do not meet each other: merge the nodes "
+        f"where they coincide, or name {part.name!r} in contact.self_contact"
+    ]
 
 
 def _turned(points: Floats, turn: schema.Turn) -> Floats:

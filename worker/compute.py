@@ -51,7 +51,8 @@ def compute(
         sim, start = _resumed(case, folder, comm)
     else:
         sim = simulation.build(case, meshes, comm, say)
-        start = Start(sim.model.elements_global, sim.model.nodes_global, reference.thicknesses(sim))
+        thick = reference.thicknesses(sim)
+        start = Start(sim.model.elements_global, sim.model.nodes_global, thick, warnings=sim.warnings)
     if comm.rank == 0:
         rewind.rewind(folder, sim.clock.step, sim.clock.frame)
         checkpoint.forget(folder, sim.clock.step)
@@ -113,7 +114,7 @@ def _announce(sim: Simulation, journal: Journal | None, setup: float) -> None:
         return
     if flat:
         journal.write(messages.Log, level="info", text=f"{flat} flat tets have a pressure of their own")
-    for text in sim.fracture.warnings if sim.fracture is not None else []:
+    for text in (*sim.warnings, *(sim.fracture.warnings if sim.fracture is not None else [])):
         journal.write(messages.Log, level="warning", text=text)
     journal.write(messages.Status, state=State.RUNNING)
     journal.write(
@@ -159,7 +160,7 @@ def _sum_up(
         element_updates_per_second=(loop.updates - start.updates) / total_cpu if total_cpu > 0.0 else 0.0,
         reference=checks,
         warnings=[
-            *loop.warnings, *sim.ledger.warnings, *(sim.fracture.warnings if sim.fracture is not None else []),
-            *(inside.warnings if inside else []),
+            *start.warnings, *loop.warnings, *sim.ledger.warnings,
+            *(sim.fracture.warnings if sim.fracture is not None else []), *(inside.warnings if inside else []),
         ],
     )  # fmt: skip

@@ -74,6 +74,8 @@ class Piece:
     """(parts,) m^3."""
     size: float
     """Largest coordinate of the whole, m."""
+    warnings: list[str]
+    """See Whole."""
 
 
 def cut(whole: Whole, ranks: int, scale: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> list[Piece]:
@@ -138,6 +140,7 @@ def _piece(
         whole.tet_part[ids], local[tets], whole.volumes[ids],
         whole.across[ids] if len(whole.across) else whole.across, np.any(shared[tets], axis=1),
         grouped[0][nodes], grouped[1][ids], grouped[2], neighbours, totals, *parts, float(np.abs(whole.points).max()),
+        whole.warnings,
     )  # fmt: skip
 
 

@@ -58,6 +58,8 @@ class Start:
     updates: int = 0
     """Tets times steps so far."""
     resumed: bool = False
+    warnings: tuple[str, ...] = ()
+    """See Simulation."""
 
 
 class Pace:

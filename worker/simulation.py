@@ -65,6 +65,8 @@ class Simulation:
     floor: float
     """Forces below this, N, do not refine the force quantum."""
     reduction: StepReduction
+    warnings: tuple[str, ...] = ()
+    """What the user should know of the meshes, of a run that begins."""
 
     @property
     def scale(self) -> float:
@@ -136,6 +138,7 @@ def build(case: Case, folder: Path, comm: Comm, say: Say = quiet) -> Simulation:
     scene = conditions.build(case, model, piece.loads)
     conditions.start(case, model, scene, comm)
     sim = _assemble(case, model, piece.neighbours, scene, piece.node_volume, comm, Timers(comm))
+    sim.warnings = tuple(piece.warnings)
     sim.probes.require_tets(case)
     if sim.contact is not None:
         sim.contact.require_faces()

@@ -171,6 +171,39 @@ def test_tets_without_common_nodes_need_no_neighbours() -> None:
         assert not piece.border.any()
 
 
+TWO_TETS = """*NODE
+1, 0, 0, 0
+2, 1, 0, 0
+3, 0, 1, 0
+4, 0, 0, 1
+5, 0, 0, -1
+6, 0, 0, 0
+7, 1, 0, 0
+8, 0, 1, 0
+*ELEMENT, TYPE=C3D4
+1, 1, 2, 3, 4
+"""
+"""Nodes 6 to 8 coincide with 1 to 3."""
+
+
+@pytest.mark.parametrize(
+    ("second", "more", "told"),
+    [
+        ("2, 1, 3, 2, 5", "", False),
+        ("2, 6, 8, 7, 5", "", True),
+        ("2, 6, 8, 7, 5", "contact = { self_contact = ['body'] }", False),
+    ],
+)
+def test_pieces_of_a_part_that_do_not_meet_are_told(second: str, more: str, told: bool, tmp_path: Path) -> None:
+    (tmp_path / "two.inp").write_text(TWO_TETS + second)
+    mesh = "mesh = { shape = 'file', path = 'two.inp', unit = '1 mm' }"
+    case = parse_toml(f"name='two'\n{more}\nrun={{end_time='1 us'}}\n[[parts]]\nname='body'\nmaterial='steel'\n{mesh}")
+    _, piece = domain.build(case, tmp_path, SerialComm())
+    assert [text.partition(", and they do not meet")[0] for text in piece.warnings] == [
+        "parts[0].mesh: 2 pieces that share no node"
+    ] * told
+
+
 def test_the_start_says_what_it_is_at(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Meshes that are kept are read without a word."""
     monkeypatch.setenv("CONOID_CACHE_DIR", str(tmp_path))

@@ -143,7 +143,7 @@ def test_increments_take_few_steps() -> None:
     Newton in d with halvings, as it was, takes 19.
     """
     random = np.random.default_rng(5)
-    params = Patch(TetMesh(REGULAR, np.arange(4)[None]), STEEL_42CRMO4).block.params
+    params = Patch(TetMesh(REGULAR, np.arange(4, dtype=np.int32)[None]), STEEL_42CRMO4).block.params
     taken = []
     for _ in range(20):
         w, s = np.zeros((200, CHUNK)), np.zeros((40, CHUNK))
