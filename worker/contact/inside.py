@@ -45,10 +45,12 @@ class Inside:
         """One line, if any is deeper than DEEP."""
         if not self.buried and self.deepest <= DEEP:
             return []
-        deeper = f", {self.buried} of them through the outermost tets" if self.buried else ""
+        how = [f"{self.buried} of them through the outermost tets"] if self.buried else []
+        if self.nodes > self.buried:
+            how.append(f"{'the others ' if self.buried else ''}up to {self.deepest:.2g} of a face deep")
         return [
-            f"contact has let {self.nodes} of {self.looked} nodes into other bodies or fragments{deeper}; the others "
-            f"are up to {self.deepest:.2g} of a face deep: raise contact.sweeps or refine the mesh there"
+            f"contact has let {self.nodes} of {self.looked} nodes into other bodies or fragments, {', '.join(how)}: "
+            "raise contact.sweeps or refine the mesh there"
         ]
 
 
