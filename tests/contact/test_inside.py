@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conoid.worker.contact.inside import Inside, _depths, look
+from conoid.worker.contact.inside import Inside, _depths, _from_edges, look
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.simulation import Simulation
 
@@ -97,3 +97,13 @@ def test_no_node_is_deeper_than_it_is_away_from_a_corner_on_the_surface() -> Non
     assert _depths(near, corners, opened, outer) == pytest.approx(0.7 / np.sqrt(3.0))
     assert _depths(near, corners, opened, outer | True) == pytest.approx(0.1 * np.sqrt(3.0))
     assert _depths(-near, corners, opened, outer) == pytest.approx(-1.0)
+
+
+def test_a_node_on_an_edge_between_two_corners_on_the_surface_touches() -> None:
+    """The tet has an open face elsewhere, below which the node is deep."""
+    corners, on = np.concatenate([np.zeros((1, 3)), np.eye(3)])[None], np.array([[0.4, 0.0, 0.0]])
+    opened, outer = np.array([[False, True, False, False]]), np.ones((1, 4), bool)
+    assert _depths(on, corners, opened, outer) == pytest.approx(0.4)
+    assert _from_edges(on, corners, outer) == pytest.approx(0.0)
+    assert _from_edges(on, corners, np.array([[True, False, True, True]])) == pytest.approx(0.4)
+    assert _from_edges(on, corners, np.array([[True, False, False, False]])) == np.inf

@@ -3,11 +3,13 @@
 A node that lies in a tet which nothing holds together with its own has come through that body's surface. How deep it
 is below the surface the tet alone tells: below the nearest of its own open faces; and in one that has no open face but
 a corner on the surface, below the nearest of its faces at least; nowhere deeper than it is away from a corner of the
-tet on the surface. In a tet without one it is deeper than the outermost layer. Nodes of the surface and nodes that have
-separated are looked at, against the tets of all ranks, so that no cut changes what is found.
+tet on the surface. In a tet without one it is deeper than the outermost layer. One on an edge between two corners on
+the surface is taken to touch it: a tet that has an edge there may have no open face beside it. Nodes of the surface and
+nodes that have separated are looked at, against the tets of all ranks, so that no cut changes what is found.
 """
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
@@ -72,8 +74,9 @@ def look(contact: Contact, model: Model, labels: list[Ints] | None, comm: Comm) 
         pairs = search.find(one, other, points, np.zeros_like(points), part, allowed, 0.0, None)
         pairs = pairs[told[pairs[:, 0], 1] != fragment[pairs[:, 1]]]
         tets, opened = block.tets[pairs[:, 1]], _open(block, contact, outer)[pairs[:, 1]]
-        depth = _depths(x[pairs[:, 0]], model.nodes.x[tets], opened, outer[tets])
-        some = depth > SLIGHT * size
+        places, corners = x[pairs[:, 0]], model.nodes.x[tets]
+        depth = _depths(places, corners, opened, outer[tets])
+        some = (depth > SLIGHT * size) & (_from_edges(places, corners, outer[tets]) > SLIGHT * size)
         found.append(np.column_stack([told[pairs[some, 0], 0], depth[some] / size]))
     everywhere = np.concatenate(comm.share(np.concatenate(found)))
     buried = np.isinf(everywhere[:, 1])
@@ -127,3 +130,17 @@ def _depths(points: Floats, corners: Floats, opened: Flags, outer: Flags) -> Flo
     heights = np.where(opened, shares / steepness, np.inf).min(axis=1)
     away = np.where(outer, np.linalg.norm(points[:, None] - corners, axis=2), np.inf).min(axis=1)
     return np.where(solid & (shares >= -_ROUNDING).all(axis=1), np.minimum(heights, away), -1.0)
+
+
+def _from_edges(points: Floats, corners: Floats, outer: Flags) -> Floats:
+    """(p,) how far points (p, 3) are from the nearest edge of tets (p, 4, 3) between two corners on the surface,
+    ``outer`` (p, 4), m; infinite where there is none.
+    """
+    nearest = np.full(len(points), np.inf)
+    for a, b in combinations(range(4), 2):
+        along, arm = corners[:, b] - corners[:, a], points - corners[:, a]
+        square = (along * along).sum(axis=1)
+        share = np.clip((arm * along).sum(axis=1) / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
+        away = np.linalg.norm(arm - share[:, None] * along, axis=1)
+        nearest = np.minimum(nearest, np.where(outer[:, a] & outer[:, b], away, np.inf))
+    return nearest
