@@ -1,5 +1,5 @@
 # make demo   steel breaks glass: submitted over HTTP, run on 2 MPI ranks, watched live, checked, drawn (demo.png)
-# make test   linters, types and every test that takes seconds
+# make test   linters, types and every test that takes seconds, in two halves at a time (the dots are of both)
 # make bench  speed, and speed against error, in 15 minutes: tables in build/bench (BENCH=quick: 2, BENCH=long: 60)
 # make accuracy  docs/accuracy.md: every row of the verification catalogue as measured here (ACCURACY=quick: no studies)
 # make reference  docs/case.md and the JSON schema, from the texts of the models in cases/
@@ -16,20 +16,22 @@ READY := .venv/.ready
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 KEPT := PYTHONDONTWRITEBYTECODE= $(BIN)/python
 HOUSES := cases client server worker
+CHECK := $(BIN)/pytest -q -m "not slow" -p no:cacheprovider
+SERVICES := tests/parallel tests/server tests/client
 
 # $(call told,words,command) runs a command and says every 5 s how long it has taken so far.
 told = @echo "$(1)"; began=$$(date +%s); \
 	while sleep 5 >/dev/null 2>&1; do echo "$(1): $$(($$(date +%s) - began)) s"; done & clock=$$!; \
 	trap "kill $$clock" EXIT; $(2)
 
-.PHONY: demo test lint style types check bench accuracy reference drill clean
+.PHONY: demo test lint style types check check-solver check-services bench accuracy reference drill clean
 .DEFAULT_GOAL := test
 
 demo: $(READY)
 	$(BIN)/conoid run glass_steel_demo --ranks 2 --view demo.png --check
 
 test: style
-	@$(MAKE) --no-print-directory --jobs 2 types check
+	@$(MAKE) --no-print-directory --jobs 2 check-solver check-services types
 
 lint: style types
 
@@ -40,8 +42,13 @@ style: $(READY)
 types: $(READY)
 	$(BIN)/mypy
 
-check: $(READY)
-	$(BIN)/pytest -q -m "not slow"
+check: check-solver check-services
+
+check-solver: $(READY)
+	$(CHECK) $(SERVICES:%=--ignore=%) tests
+
+check-services: $(READY)
+	$(CHECK) $(SERVICES)
 
 bench: $(READY)
 	$(BIN)/python -m tests.bench
