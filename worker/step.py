@@ -21,6 +21,8 @@ and at once f(n+1) from it, so a step begins with forces that are already at han
 15  facets that pass break, nodes separate                 topology(n+1), f(n+1)
 ==  =====================================================  ==========================
 
+After the last step 1 to 10 are done once more, and ``end`` takes the velocities at n.
+
 What erosion uncovers meets in the same step. 12 and 13 are one pass over each chunk of tets (two with an averaged
 pressure, with the exchange of the nodal volumes between them); 14 is started after the border tets and finished after
 the interior ones, before the criterion. Which facets pass it is found before the reduction, which says whether any rank
@@ -71,6 +73,8 @@ def end(sim: Simulation, before: Floats) -> None:
     nodes, clock = sim.model.nodes, sim.clock
     if clock.mean_dt > 0.0:
         nodes.v[:] = before + 0.5 * clock.last_dt / clock.mean_dt * (nodes.v - before)
+    if sim.erosion is not None:
+        nodes.v[sim.erosion.removed] = 0.0
 
 
 def _before_kick(sim: Simulation) -> None:

@@ -1,8 +1,12 @@
-"""How far the worst tet of a mesh is from the others, by step lengths."""
+"""How far the worst tet of a mesh is from the others, by step lengths; and how tets share faces."""
 
 from dataclasses import dataclass
 
-from conoid.worker.mesh.model import TetMesh
+import numpy as np
+from numpy.typing import NDArray
+
+from conoid.worker.mesh.faces import FACES
+from conoid.worker.mesh.model import Ints, TetMesh
 
 
 @dataclass(frozen=True)
@@ -24,3 +28,9 @@ def quality(mesh: TetMesh) -> Quality:
     steps = mesh.step_lengths()
     worst = int(steps.argmin())
     return Quality(float(steps[worst]), float(steps.mean()), worst)
+
+
+def face_counts(tets: Ints) -> NDArray[np.int64]:
+    """(k,) how many tets share each distinct face: 1 on the boundary, 2 inside, more only in a broken mesh."""
+    faces = np.sort(tets[:, FACES].reshape(-1, 3), axis=1)
+    return np.asarray(np.unique(faces, axis=0, return_counts=True)[1])

@@ -10,12 +10,12 @@ from conoid.cases.bodies import Shards, TwoTets
 from conoid.cases.geometry import bounds, pitch, surface, volume
 from conoid.cases.mesh_size import mesh_size
 from conoid.worker.hashing import uniform
-from conoid.worker.mesh.faces import areas, boundary_faces, face_counts, normals
+from conoid.worker.mesh.faces import areas, boundary_faces, normals
 from conoid.worker.mesh.loose import rotations
 from conoid.worker.mesh.model import REGULAR_STEP, Floats, TetMesh, check
 from conoid.worker.mesh.structured import structured
 
-from .quality import quality
+from .quality import face_counts, quality
 
 
 def shards(**more: object) -> Shards:

@@ -5,12 +5,12 @@ import pytest
 
 from conoid.cases.bodies import Box
 from conoid.worker.errors import MeshError
-from conoid.worker.mesh.faces import FACES, areas, boundary_faces, face_counts
+from conoid.worker.mesh.faces import FACES, areas, boundary_faces
 from conoid.worker.mesh.model import REGULAR_STEP, Ints, Names, TetMesh, check
 from conoid.worker.mesh.order import morton_codes, morton_ordered
 from conoid.worker.mesh.structured import structured
 
-from .quality import quality
+from .quality import face_counts, quality
 
 CORNER = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
 ONE = np.array([[0, 1, 2, 3]])

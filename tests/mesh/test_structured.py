@@ -11,12 +11,12 @@ from pydantic import TypeAdapter
 from conoid.cases.bodies import Box, Cylinder, Grading, Mesh, MeshFile, Sphere
 from conoid.cases.geometry import Generated, bounds, centre, cut_directions, volume
 from conoid.worker.errors import MeshError
-from conoid.worker.mesh.faces import areas, boundary_faces, face_counts
+from conoid.worker.mesh.faces import areas, boundary_faces
 from conoid.worker.mesh.model import REGULAR_STEP, TetMesh, check
 from conoid.worker.mesh.order import morton_ordered
 from conoid.worker.mesh.structured import structured
 
-from .quality import quality
+from .quality import face_counts, quality
 
 SHAPES: dict[str, dict[str, Any]] = {
     "box": {"low": (-0.5, -1.0, -0.75), "high": (1.0, 1.0, 1.0)},

@@ -10,13 +10,13 @@ from pydantic import TypeAdapter
 from conoid.cases.bodies import Box, Cylinder, Mesh, Plate, Sphere, Tube
 from conoid.cases.geometry import Generated, bounds, centre, cut_directions, index, volume
 from conoid.worker.mesh.build import build
-from conoid.worker.mesh.faces import areas, boundary_faces, face_counts
+from conoid.worker.mesh.faces import areas, boundary_faces
 from conoid.worker.mesh.model import REGULAR_STEP, TetMesh, check
 from conoid.worker.mesh.skin import Skin
 from conoid.worker.mesh.smooth import smoothed
 from conoid.worker.mesh.structured import structured
 
-from .quality import quality
+from .quality import face_counts, quality
 
 HERE = Path(__file__).parent
 SHAPES: dict[str, dict[str, Any]] = {

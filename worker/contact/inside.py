@@ -4,8 +4,9 @@ A node that lies in a tet which nothing holds together with its own has come thr
 is below the surface the tet alone tells: below the nearest of its own open faces; and in one that has no open face but
 a corner on the surface, below the nearest of its faces at least; nowhere deeper than it is away from a corner of the
 tet on the surface. In a tet without one it is deeper than the outermost layer. One on an edge between two corners on
-the surface is taken to touch it: a tet that has an edge there may have no open face beside it. Nodes of the surface and
-nodes that have separated are looked at, against the tets of all ranks, so that no cut changes what is found.
+the surface is taken to touch it: a tet that has an edge there may have no open face beside it; what is on an edge that
+runs through a plate of one tet is so taken, too. Nodes of the surface and nodes that have separated are looked at,
+against the tets of all ranks, so that no cut changes what is found.
 """
 
 from dataclasses import dataclass

@@ -48,11 +48,12 @@ _CLOSE = 1e-4
 """A Newton step below this share of the strain increment leaves an error of its square: below 1e-8 of the stress."""
 _PATIENT = 20
 """Steps after which every second one is a halving: a metal that softens may have Newton jump to and fro. The first
-yield, whose increments lie anywhere between 1e-2 and 1e-21, takes up to 15."""
+yield, whose increments may be 1e-2 or 1e-21, takes up to 20 by itself; smaller ones still, of a trial stress less than
+1e5 Pa beyond the flow stress, up to 100 with the halvings."""
 _BELOW = 1.0 - 2.0**-40
 """Of the increment from which on the rate counts, where the flow stress has a kink: safely on the side without."""
 _NARROW = 1e-12
-"""A bracket that is narrower, relative to the largest increment, holds the answer."""
+"""A bracket that is narrower, relative to its upper end, holds the answer."""
 _STEEPEST = 600.0
 """Largest exponent of e in the fracture strain, either way: strains of 1e260 and of nothing."""
 _MOST_TENSE = 1.5

@@ -17,11 +17,6 @@ def boundary_faces(tets: Ints) -> Ints:
     return outer
 
 
-def face_counts(tets: Ints) -> NDArray[np.int64]:
-    """(k,) how many tets share each distinct face: 1 on the boundary, 2 inside, more only in a broken mesh."""
-    return _groups(tets[:, FACES].reshape(-1, 3))[1]
-
-
 def same_side(tets: Ints) -> NDArray[np.int64]:
     """(k, 2) tets, positively oriented, that lie on the same side of a face that both have: they overlap. Of more than
     two on one side every two that follow each other.
@@ -30,6 +25,8 @@ def same_side(tets: Ints) -> NDArray[np.int64]:
     a, b, c = faces.T
     odd = (a > b) ^ (b > c) ^ (a > c)
     side = _groups(faces)[0] * 2 + odd
+    if np.bincount(side).max(initial=0) <= 1:
+        return np.zeros((0, 2), np.int64)
     order = np.argsort(side, kind="stable")
     again = np.flatnonzero(np.diff(side[order]) == 0)
     return np.column_stack([order[again], order[again + 1]]) // 4
