@@ -85,9 +85,9 @@ def _pieces(case: schema.Case, index: int, mesh: TetMesh) -> list[str]:
     """A warning where the mesh from a file of a part that does not meet itself is in several pieces: nodes that
     coincide and are not merged are the commonest slip in a mesh.
     """
-    part = case.parts[index]
-    meets_itself = case.contact is not None and not np.isnan(pairing.friction(case)[index, index])
-    if not isinstance(part.mesh, MeshFile) or meets_itself:
+    if not isinstance(case.parts[index].mesh, MeshFile):
+        return []
+    if case.contact is not None and not np.isnan(pairing.friction(case)[index, index]):
         return []
     sides = np.concatenate([mesh.tets[:, [0, k]] for k in (1, 2, 3)])
     many = len(np.unique(components(len(mesh.points), sides)))

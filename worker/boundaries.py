@@ -173,7 +173,7 @@ class RigidWalls(Boundary):
             self._impulse[:] = 0.0
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
-        self._pushed = dt > 0.0 and _push_out(
+        self._pushed = _push_out(
             state.x,
             state.v,
             self._impulse,

@@ -62,13 +62,11 @@ class Mirrors(Boundary):
         self._impulse[self._stopped] = 0.0
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
-        self._stopped = self._stopped[:0]
-        if dt > 0.0:
-            self._stopped = _stop(
-                state.x, state.v, self._before, self._impulse, state.mass, self.nodes, self._axes, self._at,
-                self._sides, self._restitution, dt,
-            )  # fmt: skip
-            _book(self.contact_loss, self._impulse, self._before, self._stopped)
+        self._stopped = _stop(
+            state.x, state.v, self._before, self._impulse, state.mass, self.nodes, self._axes, self._at,
+            self._sides, self._restitution, dt,
+        )  # fmt: skip
+        _book(self.contact_loss, self._impulse, self._before, self._stopped)
 
 
 @njit("void(float64[::1], float64[:, ::1], float64[:, ::1], int64[::1])", cache=True)

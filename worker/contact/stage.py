@@ -198,9 +198,8 @@ class Contact:
 
     def search_if_due(self, state: Nodes) -> None:
         """Finds the candidate pairs of the next steps, when that is due; all ranks take part."""
-        if self._clock.dt > 0.0:
-            with self._timers.phase("contact"):
-                self.searches.begin(state)
+        with self._timers.phase("contact"):
+            self.searches.begin(state)
 
     def spent(self, state: Nodes) -> bool:
         """Whether a node of the surface will leave, in a step more, what the last search has allowed for."""
@@ -222,7 +221,7 @@ class Contact:
 
     def solve(self, state: Nodes, dt: float, t: float) -> None:
         """After the kick: the impulses of active contacts correct v(n+1/2) at time ``t``, s; all ranks take part."""
-        if dt > 0.0 and (now := self.searches.scene) is not None:
+        if (now := self.searches.scene) is not None:
             with self._timers.phase("contact"):
                 self._push(now, state, dt, t)
 
