@@ -50,7 +50,7 @@ class Energy(msgspec.Struct, kw_only=True, frozen=True):
     """The ledger, J: what is there and what was lost = initial + external, up to the residual.
 
     There: kinetic, elastic, cohesive. Lost: plastic, viscous, contact, friction, eroded, fracture,
-    stepping.
+    stepping. Both: averaging.
     """
 
     kinetic: float
@@ -68,6 +68,9 @@ class Energy(msgspec.Struct, kw_only=True, frozen=True):
     """What the closing of cohesive facets would give back."""
     stepping: float = 0.0
     """By time steps of unequal length, an error of the method; below zero where they have given energy."""
+    averaging: float = 0.0
+    """By pressures that are averaged over nodes: what their differences store, and what is lost where neighbours yield
+    or tear at different times; ``nodal`` and ``split`` alone."""
     external: float
     initial: float
     residual: float
@@ -79,7 +82,7 @@ class PartEnergy(msgspec.Struct, kw_only=True, frozen=True):
 
     kinetic: float
     internal: float
-    """Work of stress and of bulk viscosity in the tets that are there: elastic, plastic and viscous."""
+    """Work of stress and of bulk viscosity in the tets that are there: elastic, plastic, viscous and averaging."""
 
 
 class Progress(Message, frozen=True):

@@ -18,7 +18,9 @@ _OUTCOME = (
     "steps", "time", "ranks", "elapsed", "cpu", "elements", "nodes", "fragments", "broken", "eroded", "eroded_mass",
     "inside", "deepest", "rebalances", "worst_residual", "element_updates_per_second",
 )  # fmt: skip
-_DRAWN = ("kinetic", "elastic", "plastic", "contact", "friction", "eroded", "fracture", "cohesive", "stepping")
+_DRAWN = (
+    "kinetic", "elastic", "plastic", "contact", "friction", "eroded", "fracture", "cohesive", "stepping", "averaging",
+)  # fmt: skip
 _UNITS = {"time": "s", "elapsed": "s", "cpu": "s", "eroded_mass": "kg", "element_updates_per_second": "1/s"}
 
 

@@ -16,8 +16,12 @@ from .compare import Material
 from .errors import ClientError
 
 _INK, _FAINT = "#1d2733", "#b5bcc4"
-_COLOURS = ("#4c78a8", "#f58518", "#54a24b", "#e45756", "#72b7b2", "#b279a2", "#eeca3b", "#9d755d", "#ff9da6")
-_LEDGER = ("elastic", "cohesive", "plastic", "viscous", "contact", "friction", "eroded", "fracture", "stepping")
+_COLOURS = (
+    "#4c78a8", "#f58518", "#54a24b", "#e45756", "#72b7b2", "#b279a2", "#eeca3b", "#9d755d", "#ff9da6", "#8c96a3",
+)  # fmt: skip
+_LEDGER = (
+    "elastic", "cohesive", "plastic", "viscous", "contact", "friction", "eroded", "fracture", "stepping", "averaging",
+)  # fmt: skip
 _DASHES = ("-", "--", ":")
 _LIMITERS = 6
 """Limiters of the step that have a colour of their own. Chosen."""

@@ -147,6 +147,7 @@ def _ledger(energy: Energy) -> RenderableType:
         "viscous": energy.viscous, "contact": energy.contact,
         "friction": energy.friction, "eroded": energy.eroded,
         "fracture": energy.fracture, "cohesive": energy.cohesive, "stepping": energy.stepping,
+        "averaging": energy.averaging,
     }  # fmt: skip
     whole = max(abs(energy.initial + energy.external), *(abs(value) for value in terms.values()), 1e-300)
     grid = Table.grid(padding=(0, 1))

@@ -72,7 +72,7 @@ def _energies(outcome: Outcome) -> Iterator[Number]:
         return
     came = max(energy.initial + max(energy.external, 0.0), 1e-300)
     for name in Energy.__struct_fields__:
-        if name in history.LEDGER and name not in ("initial", "external", "stepping", "residual"):
+        if name in history.LEDGER and name not in ("initial", "external", "stepping", "averaging", "residual"):
             value = float(getattr(energy, name))
             if abs(value) > 1e-4 * came:
                 yield Number(f"{name} energy, share", value / came)

@@ -24,13 +24,13 @@ from .fracture.stage import Fracture
 from .jit import njit
 from .parallel.comm import Comm
 from .parallel.fixed_point import Grouped, add_limbs, exact_sums, exact_totals, larger
-from .state import CHUNK, WORK, WORK_PLASTIC, WORK_VISCOUS, Block, Floats, Ints, Model
+from .state import CHUNK, WORK, WORK_AVERAGED, WORK_PLASTIC, WORK_VISCOUS, Block, Floats, Ints, Model
 
 _TOLD = 0.01
 """Share of the largest energy that unequal steps may take or make without a word. Chosen: what the other
 lines of a ledger are usually read to.
 """
-_WORKS = (WORK, WORK_VISCOUS, WORK_PLASTIC)
+_WORKS = (WORK, WORK_VISCOUS, WORK_PLASTIC, WORK_AVERAGED)
 
 
 class Ledger:
@@ -87,18 +87,20 @@ class Ledger:
         parts = len(self._model.parts)
         of_nodes = Grouped(columns, nodes.part[nodes.owned], parts)
         sums, of_parts = exact_totals(self._comm, of_nodes, ElementWork(self._model.blocks, parts))
-        node_sums, (work, viscous, plastic) = sums[:7], sums[7:]
+        node_sums, (work, viscous, plastic, averaged) = sums[:7], sums[7:]
         self.parts = _named(self._model.parts, of_parts[:, 0], of_parts[:, 7] + of_parts[:, 8])
-        gone_work, gone_viscous, gone_plastic, gone_kinetic, gone_momentum = self._gone()
+        gone, gone_kinetic, gone_momentum = self._gone()
+        gone_work, gone_viscous, gone_plastic, gone_averaged = gone.tolist()
         self.momentum = node_sums[3:6] + gone_momentum
         self.lost = float(node_sums[1]) / self.initial if self.initial > 0.0 else 0.0
         kinetic_sum, loss_sum, external_sum, stepping = (float(v) for v in (*node_sums[:3], node_sums[6]))
-        eroded = gone_work - gone_plastic + gone_kinetic
+        eroded = gone_work - gone_plastic - gone_averaged + gone_kinetic
         plastic_sum, viscous_sum = float(plastic) + gone_plastic, float(viscous) + gone_viscous
+        elastic, averaging = float(work - plastic - averaged), float(averaged) + gone_averaged
         lost, cohesive = 0.0, 0.0
         if self._fracture is not None and self._fracture.cohesion is not None:
             lost, cohesive = self._fracture.cohesion.energies(self._comm)
-        inside = float(work - plastic) + plastic_sum + viscous_sum
+        inside = elastic + plastic_sum + viscous_sum + averaging
         total = kinetic_sum + inside + loss_sum + eroded + lost + cohesive + stepping
         friction = self._contact.friction_work() if self._contact is not None else 0.0
         scale = float(np.abs([self.initial, external_sum, work, kinetic_sum]).max())
@@ -109,7 +111,7 @@ class Ledger:
         self.made = max(friction - loss_sum, 0.0) / self.came if self.came > 0.0 else 0.0
         self.worst = max(self.worst, self.residual)
         return Energy(
-            kinetic=kinetic_sum, elastic=float(work - plastic), plastic=plastic_sum, viscous=viscous_sum,
+            kinetic=kinetic_sum, elastic=elastic, plastic=plastic_sum, viscous=viscous_sum, averaging=averaging,
             contact=loss_sum - friction, friction=friction, eroded=eroded, fracture=lost, cohesive=cohesive,
             stepping=stepping, external=external_sum, initial=self.initial, residual=self.residual,
         )  # fmt: skip
@@ -137,14 +139,13 @@ class Ledger:
     def _node_sum(self, values: Floats) -> float:
         return float(exact_sums(self._comm, values[self._model.nodes.owned][:, None])[0])
 
-    def _gone(self) -> tuple[float, float, float, float, Floats]:
-        """Work, viscous and plastic work of eroded tets, J; energy, J, and momentum, kg m/s, of eroded nodes."""
+    def _gone(self) -> tuple[Floats, float, Floats]:
+        """(4,) works of eroded tets as of ``ElementWork``, J; energy, J, and momentum, kg m/s, of eroded nodes."""
         if self._erosion is None:
-            return 0.0, 0.0, 0.0, 0.0, np.zeros(3)
-        work, viscous, plastic = self._erosion.work()
+            return np.zeros(4), 0.0, np.zeros(3)
         kinetic, mass, *momentum = self._erosion.nodal()
         self.eroded_mass = float(mass)
-        return float(work), float(viscous), float(plastic), float(kinetic), np.array(momentum)
+        return self._erosion.work(), float(kinetic), np.array(momentum)
 
     def _boundary_work(self) -> tuple[Floats, Floats]:
         """(nodes,) energy lost by impacts, and work from outside, J."""
@@ -166,8 +167,8 @@ def _named(parts: list[str], kinetic: Floats, internal: Floats) -> dict[str, Par
 
 
 class ElementWork:
-    """Three columns over all tets, grouped by part: work of the stress, of the bulk viscosity, and plastic work, J;
-    read where they are.
+    """Four columns over all tets, grouped by part: work of the stress, of the bulk viscosity, plastic work, and what
+    averaging the pressure has taken, J; read where they are.
     """
 
     def __init__(self, blocks: list[Block], parts: int) -> None:
@@ -180,7 +181,7 @@ class ElementWork:
         return self._visited(scale)[1]
 
     def _visited(self, scale: Floats) -> tuple[Floats, Ints]:
-        largest, words = np.zeros(3), np.zeros((self._parts, 6), np.int64)
+        largest, words = np.zeros(4), np.zeros((self._parts, 8), np.int64)
         for block in self._blocks:
             _visit_work(largest, words[block.part], block.state, block.n, scale)
         return largest, words
@@ -188,8 +189,8 @@ class ElementWork:
 
 @njit("void(float64[::1], int64[::1], float64[:, :, ::1], int64, float64[::1])", cache=True)
 def _visit_work(largest, words, state, n, scale):  # type: ignore[no-untyped-def]
-    """Raises the ``largest`` (3,) magnitudes; adds to the limbs ``words`` (6,) where ``scale`` (3,) is given."""
-    for j in range(3):
+    """Raises the ``largest`` (4,) magnitudes; adds to the limbs ``words`` (8,) where ``scale`` (4,) is given."""
+    for j in range(4):
         row = _WORKS[j]
         if row >= state.shape[1]:
             continue

@@ -32,6 +32,7 @@ from .state import (
     S_ZZ,
     VISCOUS,
     WORK,
+    WORK_AVERAGED,
     WORK_PLASTIC,
     WORK_VISCOUS,
     Block,
@@ -68,7 +69,7 @@ class Erosion:
         """Nodes that leave in this step, and their v(n-1/2), m/s."""
         mass, speed = extremes
         energy, momentum = mass * speed * speed, mass * speed
-        self._work = Tally(np.full(3, energy))
+        self._work = Tally(np.full(4, energy))
         self._nodal = Tally(np.array([energy, mass, momentum, momentum, momentum]))
         self._half = self._nodal.quanta(np.zeros((0, 5)))
         self._limit = 0.0
@@ -123,7 +124,9 @@ class Erosion:
         self.due = found == BROKEN or (found > SOUND and self._clock.step % GATHERED == 0)
 
     def work(self) -> Floats:
-        """(3,) work, viscous work and plastic work of the tets that have left, J; all ranks take part."""
+        """(4,) of the tets that have left, J: work, viscous work, plastic work, and what averaging the pressure has
+        taken; all ranks take part.
+        """
         return self._work.total(self._comm)
 
     def nodal(self) -> Floats:
@@ -200,7 +203,7 @@ class Erosion:
             for corner in range(4):
                 for i in range(3):
                     work -= 0.5 * self._clock.last_dt * forces[:, corner, i] * state.v[tets[:, corner], i]
-            self._work.add(np.column_stack([work, np.zeros((len(work), 2))]))
+            self._work.add(np.column_stack([work, np.zeros((len(work), 3))]))
         self._last = []
 
 
@@ -210,10 +213,10 @@ def _rows(block: Block, chosen: Ints, rows: "np.ndarray") -> Floats:
 
 
 def _energies(block: Block, chosen: Ints) -> Floats:
-    """(k, 3) work, viscous work and plastic work of some tets, J."""
-    plastic = [WORK_PLASTIC] if block.has(WORK_PLASTIC) else []
-    values = _rows(block, chosen, np.array([WORK, WORK_VISCOUS, *plastic]))
-    return values if plastic else np.column_stack([values, np.zeros(len(values))])
+    """(k, 4) work, viscous work, plastic work, and what averaging the pressure has taken, of some tets, J."""
+    columns = [block.at(row, chosen) if block.has(row) else np.zeros(len(chosen))
+               for row in (WORK, WORK_VISCOUS, WORK_PLASTIC, WORK_AVERAGED)]  # fmt: skip
+    return np.column_stack(columns)
 
 
 def _forces(block: Block, chosen: Ints, x: Floats) -> Floats:

@@ -44,38 +44,40 @@ VOLUME_FLUX = 12
 TET_VOLUME = 12
 """The same row in materials without a strength: volume at the end of the last pass, m^3. The first pass, which takes no
 step, sets it."""
-VOLUME_RATIO = 13
+WORK_AVERAGED = 13
+"""Of WORK, what the pressure has not done on the volume that it sees, J (averaged pressure forms; elements/mean.py)."""
+VOLUME_RATIO = 14
 """Current over initial volume, by the dilatation that the pressure sees."""
-PLASTIC_STRAIN = 14
+PLASTIC_STRAIN = 15
 """Effective plastic strain."""
-WORK_PLASTIC = 15
+WORK_PLASTIC = 16
 """J."""
-YIELD = 16
+YIELD = 17
 """Flow stress at vanishing rate, Pa: below it no plastic flow."""
-FLOW = 17
+FLOW = 18
 """Flow stress of the last plastic step, Pa (the next one's first guess)."""
-BULKING = 17
+BULKING = 18
 """The same row in Johnson-Holmquist's law: the pressure of its bulking, Pa."""
-DILATION = 17
+DILATION = 18
 """The same row in Mohr-Coulomb's law: the volume strain of its plastic flow in the last step; below
 zero once the nodes know of it (averaged pressure forms)."""
-TEMPERATURE = 18
+TEMPERATURE = 19
 """K."""
-DAMAGE = 19
+DAMAGE = 20
 """0 whole, 1 done for (laws that count it)."""
-PORES = 20
+PORES = 21
 """Of the pores that a tension cut-off has opened: their volume over that of the solid matter; with a linear pressure
 the logarithm of one and that."""
-HEAT = 21
+HEAT = 22
 """Energy that the pressure sees, a volume of matter, over the bulk modulus at rest (averaged pressure forms, where the
 equation of state has heat)."""
-UNTOLD = 21
+UNTOLD = 22
 """The same row in Johnson-Holmquist's law: bulking of the last step, Pa, that the nodes do not have yet (averaged
 pressure forms)."""
-CORNERS = 22
+CORNERS = 23
 """And the three behind it in Johnson-Holmquist's law: current over initial volume at each node of a tet, as the
 pressure there sees it (averaged pressure forms)."""
-TOLD = 22
+TOLD = 23
 """Work, J, that the nodes have been told of for it."""
 
 INTACT, BROKEN, WIDE = range(3)

@@ -2,7 +2,7 @@
 
 export const FINAL = new Set(["succeeded", "failed", "cancelled", "timed_out", "lost"]);
 export const GROUPS = ["compute", "contact", "exchange", "waiting", "output", "descheduled"];
-export const TERMS = [["kinetic", "kinetic"], ["elastic", "elastic"], ["plastic", "plastic"], ["viscous", "viscous"], ["contact", "contact-work"], ["friction", "friction"], ["eroded", "eroded"], ["fracture", "fracture"], ["cohesive", "cohesive"], ["stepping", "stepping"]];
+export const TERMS = [["kinetic", "kinetic"], ["elastic", "elastic"], ["plastic", "plastic"], ["viscous", "viscous"], ["contact", "contact-work"], ["friction", "friction"], ["eroded", "eroded"], ["fracture", "fracture"], ["cohesive", "cohesive"], ["stepping", "stepping"], ["averaging", "averaging"]];
 
 const MOST_POINTS = 2000;
 const MOST_LINES = 500;

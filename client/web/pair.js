@@ -126,7 +126,7 @@ export function statistics({ info, history, snapshot }) {
 
 // Charts ---------------------------------------------------------------------------------------------------------------
 
-const LOST = ["elastic", "plastic", "viscous", "contact", "friction", "eroded", "fracture", "cohesive", "stepping"];
+const LOST = ["elastic", "plastic", "viscous", "contact", "friction", "eroded", "fracture", "cohesive", "stepping", "averaging"];
 const inside = (history) => history.series.t.map((_, i) => LOST.reduce((sum, name) => sum + (history.series[name]?.[i] ?? 0), 0));
 const column = (name) => (history) => history.series[name] ?? [];
 

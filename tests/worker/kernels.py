@@ -63,7 +63,8 @@ DUMMY = bodies.Box(shape="box", low=(0.0, 0.0, 0.0), high=(1.0, 1.0, 1.0), eleme
 
 def scene(material: materials.Material = STEEL, form: Form = "standard", end: float = 1.0, **keys: Any) -> schema.Case:
     """A case of one part ``body``, without viscosity; ``keys`` are those of the part, of ``numerics``, of the case."""
-    of_part = {key: keys.pop(key) for key in ("velocity", "spin", "stretch", "jitter", "temperature") if key in keys}
+    own = ("velocity", "spin", "stretch", "jitter", "temperature", "erosion")
+    of_part = {key: keys.pop(key) for key in own if key in keys}
     numerics = {key: keys.pop(key) for key in ("dt_safety", "dt_growth") if key in keys}
     viscosity = schema.Viscosity(**keys.pop("viscosity")) if "viscosity" in keys else None
     return schema.Case(

@@ -10,8 +10,8 @@ import numpy as np
 from ..jit import njit
 from ..materials.law import BULK, DENSITY, DILATES
 from ..mesh.faces import FACES, normals
-from ..state import CHUNK, CORNERS, DILATION, HEAT, MASS, TOLD, Block, Flags, Floats
-from .pressure import STABILISE
+from ..state import CHUNK, DILATION, HEAT, MASS, TOLD, Block, Flags, Floats
+from .pressure import STABILISE, stretch_corner
 from .tet4 import CHANGE, SEEN, VOLUME, VOLUME_MID
 
 THINNEST = 0.1
@@ -58,8 +58,7 @@ def see_own(w, s, params, flat, rows, n):  # type: ignore[no-untyped-def]
                 w[SEEN + i] += s[_GROWN + i]  # what ``tell_dilation`` has taken back
             if rows > TOLD + 1:
                 for k in range(4):
-                    half = 0.5 * w[SEEN + i]
-                    s[(CORNERS + k) * CHUNK + i] *= (1.0 + half) / (1.0 - half)
+                    stretch_corner(w, s, i, k, w[SEEN + i])
             elif rows > TOLD:
                 s[_HEAT + i] = unit * s[_TOLD + i] / s[_MASS + i]
 

@@ -35,7 +35,21 @@ from ..state import (
     Floats,
     Ints,
 )
-from .tet4 import CHANGE, DILATATION, EDGE, NODAL, SEEN, SPEED, VOLUME, VOLUME_MID, largest_of, quanta
+from .mean import take_bulking
+from .tet4 import (
+    CHANGE,
+    CORNER_CHANGE,
+    DILATATION,
+    EDGE,
+    NODAL,
+    SEEN,
+    SPEED,
+    VOLUME,
+    VOLUME_MID,
+    VOLUME_SEEN,
+    largest_of,
+    quanta,
+)
 
 QUANTA = float(2**52)
 """Quanta per unit of volume strain, and per unit of relative nodal volume."""
@@ -140,7 +154,7 @@ def scatter_bulking(sums, w, s, params, weight, tets, n):  # type: ignore[no-unt
     per_bulk = 1.0 / params[BULK]
     for i in range(n):
         if w[VOLUME_MID + i] == 0.0:
-            s[_BULKING + i] += s[_UNTOLD + i]
+            take_bulking(s, params, i, s[_UNTOLD + i])
         share = 0.25 * w[VOLUME_MID + i] * per_bulk * s[_UNTOLD + i]
         s[_UNTOLD + i] = 0.0
         for k in range(4):
@@ -234,15 +248,26 @@ def gather_bulking(s, params, bulking, tets, flat, n):  # type: ignore[no-untype
     for i in range(n):
         if len(flat) == 0 or not flat[i]:
             a, b, c, d = tets[i, 0], tets[i, 1], tets[i, 2], tets[i, 3]
-            s[_BULKING + i] += quarter * ((bulking[a] + bulking[b]) + (bulking[c] + bulking[d]))
+            take_bulking(s, params, i, quarter * ((bulking[a] + bulking[b]) + (bulking[c] + bulking[d])))
+
+
+@njit("void(float64[::1], float64[::1], int64, int64, float64)", cache=True, error_model="numpy", forceinline=True)
+def stretch_corner(w, s, i, k, strain):  # type: ignore[no-untyped-def]
+    """The ratio of volumes at corner ``k`` of tet ``i`` after a volume strain; CORNER_CHANGE."""
+    half, before = 0.5 * strain, s[_CORNERS + k * CHUNK + i]
+    after = before * (1.0 + half) / (1.0 - half)
+    s[_CORNERS + k * CHUNK + i], w[CORNER_CHANGE + k * CHUNK + i] = after, after - before
 
 
 @njit(
-    "void(float64[::1], float64[::1], float64[::1], uint32[:, ::1], float64[::1], boolean[::1], int64, int64)",
+    "void(float64[::1], float64[::1], float64[::1], float64[::1], uint32[:, ::1], float64[::1], boolean[::1], int64, "
+    "int64)",
     cache=True,
 )
-def gather_more(s, params, more, tets, strain, flat, rows, n):  # type: ignore[no-untyped-def]
-    """What ``scatter_more`` has given, as means over nodes; with bulking the ratio of volumes at each node, too."""
+def gather_more(w, s, params, more, tets, strain, flat, rows, n):  # type: ignore[no-untyped-def]
+    """What ``scatter_more`` has given, as means over nodes; with bulking the ratio of volumes at each node, too, and
+    CORNER_CHANGE, by how much it has changed.
+    """
     if rows == _HEATED:
         gather_heat(s, more, tets, n)
         return
@@ -250,14 +275,14 @@ def gather_more(s, params, more, tets, strain, flat, rows, n):  # type: ignore[n
     for i in range(n):
         if len(flat) == 0 or not flat[i]:
             for k in range(4):
-                half = 0.5 * strain[tets[i, k]]
-                s[_CORNERS + k * CHUNK + i] *= (1.0 + half) / (1.0 - half)
+                stretch_corner(w, s, i, k, strain[tets[i, k]])
 
 
 @njit("void(float64[::1], int64, float64)", cache=True)
 def own_strains(w, n, dt):  # type: ignore[no-untyped-def]
-    """SEEN, CHANGE and SPEED of the ``standard`` form: each tet sees its own volume strain."""
+    """SEEN, VOLUME_SEEN, CHANGE and SPEED of the ``standard`` form: each tet sees its own volume strain."""
     for i in range(n):
+        w[VOLUME_SEEN + i] = w[VOLUME_MID + i]
         w[SPEED + i] = w[DILATATION + i]
         w[SEEN + i] = w[DILATATION + i] * dt
         w[CHANGE + i] = w[DILATATION + i] * dt * w[VOLUME_MID + i]
@@ -271,10 +296,12 @@ def own_growth(w, s, n, dt):  # type: ignore[no-untyped-def]
         volume = w[VOLUME + i]
         old = s[_VOLUME + i] if dt > 0.0 else volume
         change = volume - old
-        strain = change / (0.5 * (old + volume))
+        middle = 0.5 * (old + volume)
+        strain = change / middle
         w[SPEED + i] = strain * frequency
         w[SEEN + i] = strain
         w[CHANGE + i] = change
+        w[VOLUME_SEEN + i] = middle
         s[_VOLUME + i] = volume
 
 

@@ -27,13 +27,14 @@ from ..materials.law import (
     Q_SHOCK,
     SHEAR,
 )
-from ..materials.models import press, strengthen
+from ..materials.models import press, strengthen, swell
 from ..materials.viscosity import bulk_viscosity
 from ..state import CHUNK, UNTOLD
 from . import pressure as averaged
 from . import rest, tet4
 from .flat import keep_out, see_own, without_flux
 from .hot import mark_hot
+from .mean import book_averaged, keep_before
 from .wear import SOUND, any_inside_out, let_go, mark_worn
 
 LARGEST_LIMIT, LIMITING_TET, LARGEST_FORCE, WORN, HOT = range(5)
@@ -297,7 +298,7 @@ def force_pass(  # type: ignore[no-untyped-def]
         averaged.gather_strains(w, strain, t, n)
         own = flat[c * CHUNK : c * CHUNK + n] if len(flat) > 0 else flat
         if rows > UNTOLD:
-            averaged.gather_more(s, params, more, t, strain, own, rows, n)
+            averaged.gather_more(w, s, params, more, t, strain, own, rows, n)
         if shape:
             averaged.recall_growth(w, s, n, dt)
             if dt <= 0.0:
@@ -306,8 +307,11 @@ def force_pass(  # type: ignore[no-untyped-def]
             averaged.recall_flux(w, s, n, dt)
         if len(own) > 0:
             see_own(w, s, params, own, rows, n)
+        swell(eos, w, s, params, n)
+        keep_before(w, s, params, n)
         pressure_and_limit(eos, w, s, params, n, dt)
         return_at_pressure(strength, w, s, params, n, dt)
+        book_averaged(w, s, n)
         if len(upset) > 0:
             let_go(w, s, upset, x, v, t, rows, n, 0.0)
         found, some_hot = SOUND, False

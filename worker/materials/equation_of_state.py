@@ -8,14 +8,19 @@ import numpy as np
 
 from conoid.cases.materials import MieGruneisen
 
-from ..elements.tet4 import CHANGE, MODULUS, NODAL, SEEN, VOLUME
+from ..elements.tet4 import CHANGE, MODULUS, NODAL, SEEN, VOLUME_SEEN
 from ..jit import njit
 from ..state import (
     CHUNK,
+    DILATION,
     HEAT,
     MASS,
     PORES,
     PRESSURE,
+    S_XX,
+    S_XY,
+    S_YZ,
+    S_ZZ,
     TOLD,
     VOLUME_RATIO,
     WORK,
@@ -23,12 +28,13 @@ from ..state import (
     WORK_VISCOUS,
     Floats,
 )
-from .law import BULK, DENSITY, EQUATION, SHEAR, SPALL, Equation
+from .elementary import exp
+from .law import BULK, DENSITY, DILATES, EQUATION, FROM_SHAPE, ORDER, SHEAR, SPALL, Equation
 
 _C0, _SLOPE, _GAMMA = range(EQUATION, EQUATION + 3)
 _P, _MASS, _WORK, _RATIO = PRESSURE * CHUNK, MASS * CHUNK, WORK * CHUNK, VOLUME_RATIO * CHUNK
 _WORK_VISCOUS, _WORK_PLASTIC, _PORES = WORK_VISCOUS * CHUNK, WORK_PLASTIC * CHUNK, PORES * CHUNK
-_HEAT = HEAT * CHUNK
+_HEAT, _GROWN = HEAT * CHUNK, DILATION * CHUNK
 _OLD, _KNOWN, _FACTOR = NODAL, NODAL + CHUNK, NODAL + 2 * CHUNK
 """Rows of the scratch: the pressure before the step, Pa; of the energy equation factor * new = cold part + known."""
 _LEAST = 0.05
@@ -49,10 +55,25 @@ def linear(w, s, params, n):  # type: ignore[no-untyped-def]
         _tear_linear(w, s, params, n)
 
 
+@njit("void(float64[::1], float64[::1], float64[::1], int64, float64, float64)", cache=True, error_model="numpy")
+def _book_pores(w, s, params, i, strain, mean):  # type: ignore[no-untyped-def]
+    """The plastic work of pores that have grown by ``strain`` of the volume: the ``mean`` pressure of the step times
+    that, as the whole work is. What the stress stores is of more volume afterwards, or of less.
+    """
+    p, square = s[_P + i], 0.0
+    if params[ORDER] != FROM_SHAPE:
+        for row in range(S_XX, S_ZZ + 1):
+            square += s[row * CHUNK + i] * s[row * CHUNK + i]
+        for row in range(S_YZ, S_XY + 1):
+            square += 2.0 * s[row * CHUNK + i] * s[row * CHUNK + i]
+    stored = 0.5 * p * p / params[BULK] + 0.25 * square / params[SHEAR]
+    s[_WORK_PLASTIC + i] -= w[VOLUME_SEEN + i] * strain * (mean + stored)
+
+
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def _tear_linear(w, s, params, n):  # type: ignore[no-untyped-def]
     """Moves volume strain between matter and pores: no pressure is below minus the spall pressure, nor above zero while
-    there are pores. Opening takes the spall pressure times the volume, and keeps it.
+    there are pores.
     """
     bulk, spall = params[BULK], params[SPALL]
     for i in range(n):
@@ -63,7 +84,33 @@ def _tear_linear(w, s, params, n):  # type: ignore[no-untyped-def]
         s[_P + i] = p + bulk * strain
         s[_PORES + i] = pores + strain
         s[_WORK + i] -= 0.5 * bulk * strain * w[CHANGE + i]
-        s[_WORK_PLASTIC + i] += spall * max(strain, 0.0) * w[VOLUME + i]
+        _book_pores(w, s, params, i, strain, 0.5 * (p + bulk * w[SEEN + i] + s[_P + i]))
+
+
+@njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
+def volumes_by_ratio(w, s, params, n):  # type: ignore[no-untyped-def]
+    """VOLUME_SEEN of n, m^3, where a tet knows the ratio of volumes of its matter."""
+    per_density, porous = 1.0 / params[DENSITY], params[SPALL] < np.inf
+    for i in range(n):
+        whole = 1.0 + s[_PORES + i] if porous else 1.0
+        w[VOLUME_SEEN + i] = s[_MASS + i] * per_density * s[_RATIO + i] * whole
+
+
+@njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
+def volumes_by_pressure(w, s, params, n):  # type: ignore[no-untyped-def]
+    """VOLUME_SEEN of n of the linear pressure, m^3: V0 exp(pores - p / K); of what dilates, whose pressure does not say
+    it, by the ratio, which nothing else needs.
+    """
+    per_density, per_bulk, porous = 1.0 / params[DENSITY], 1.0 / params[BULK], params[SPALL] < np.inf
+    if params[DILATES] > 0.0:
+        volumes_by_ratio(w, s, params, n)
+        for i in range(n):
+            strain = w[SEEN + i] - s[_GROWN + i]
+            s[_RATIO + i] *= 1.0 + strain * (1.0 + 0.5 * strain)
+        return
+    for i in range(n):
+        pores = s[_PORES + i] if porous else 0.0
+        w[VOLUME_SEEN + i] = s[_MASS + i] * per_density * exp(pores - s[_P + i] * per_bulk)
 
 
 @njit("UniTuple(float64, 2)(float64[::1], float64)", cache=True, error_model="numpy", forceinline=True)
@@ -145,7 +192,7 @@ def _tear(w, s, params, n):  # type: ignore[no-untyped-def]
             new = (_cold(params, ratio)[0] + known) / factor
         s[_P + i], s[_RATIO + i], s[_PORES + i] = new, ratio, whole / ratio - 1.0
         s[_WORK + i] = before - 0.5 * (old + new) * change
-        s[_WORK_PLASTIC + i] += spall * max(1.0 - (1.0 + pores) * ratio / whole, 0.0) * w[VOLUME + i]
+        _book_pores(w, s, params, i, 1.0 - (1.0 + pores) * ratio / whole, 0.5 * (old + new))
         w[MODULUS + i] = _modulus(params, ratio, _cold(params, ratio)[1], new)
 
 
@@ -158,7 +205,7 @@ def pole(params: Floats) -> float:
     return 1.0 / max(float(params[_SLOPE]), 1.0)
 
 
-ELASTIC = Equation("", 0, lambda _: (), linear)
+ELASTIC = Equation("", 0, lambda _: (), linear, volumes_by_pressure)
 """The pressure of the elasticity."""
-GRUNEISEN = Equation("mie_gruneisen", VOLUME_RATIO + 1, _gruneisen, mie_gruneisen, TOLD + 1)
+GRUNEISEN = Equation("mie_gruneisen", VOLUME_RATIO + 1, _gruneisen, mie_gruneisen, volumes_by_ratio, TOLD + 1)
 """Compression and heat."""

@@ -11,7 +11,10 @@ import numpy as np
 from conoid.cases.laws.johnson_holmquist import JohnsonHolmquist
 
 from ..elements.tet4 import (
+    BEFORE,
     CHANGE,
+    CHANGE_SEEN,
+    CORNER_CHANGE,
     D_XX,
     D_XY,
     D_YY,
@@ -31,6 +34,7 @@ from ..state import (
     CHUNK,
     CORNERS,
     DAMAGE,
+    MASS,
     PLASTIC_STRAIN,
     PRESSURE,
     S_XX,
@@ -42,10 +46,12 @@ from ..state import (
     UNTOLD,
     VOLUME_RATIO,
     WORK,
+    WORK_AVERAGED,
     WORK_PLASTIC,
 )
-from .elementary import logarithms, powers
-from .law import AFTER_PRESSURE, BULK, FIRST, SHEAR, Equation, Law
+from .elementary import log, logarithms, powers
+from .equation_of_state import volumes_by_ratio
+from .law import AFTER_PRESSURE, BULK, DENSITY, FIRST, SHEAR, Equation, Law
 from .plastic import equivalent_stress
 
 _STRENGTH, _PHEL, _T, _A, _N, _B, _M, _C, _RATE, _MOST, _D1, _D2, _K2, _K3, _BETA = range(FIRST, FIRST + 15)
@@ -54,6 +60,7 @@ _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _P, _STRAIN, _PLASTIC, _WORK = PRESSURE * CHUNK, PLASTIC_STRAIN * CHUNK, WORK_PLASTIC * CHUNK, WORK * CHUNK
 _DAMAGE, _BULKING, _RATIO = DAMAGE * CHUNK, BULKING * CHUNK, VOLUME_RATIO * CHUNK
 _UNTOLD, _CORNERS = UNTOLD * CHUNK, CORNERS * CHUNK
+_AVERAGED, _MASS = WORK_AVERAGED * CHUNK, MASS * CHUNK
 # Rows of the scratch: (p* + T*)^N; (p* + T*)^D2; p*^M; the logarithm of the relative rate.
 _INTACT, _FRACTURE, _CRUMBLED, _FAST = (NODAL + k * CHUNK for k in range(4))
 _TINY = 1e-300
@@ -78,10 +85,35 @@ def _pressed(params, ratio, bulking, least):  # type: ignore[no-untyped-def]
     return (least if free < least else free), stiff
 
 
+@njit("float64(float64[::1], float64, float64, float64, float64)", cache=True, error_model="numpy")
+def _stored(params, ratio, p, bulking, least):  # type: ignore[no-untyped-def]
+    """What the pressure ``p`` of ``_pressed`` stores, of the undeformed volume, Pa: the integral of -p over the ratio
+    from that without pressure on. Beyond that of ``least`` it is constant; under compression a triangle will do.
+    """
+    bulk = params[BULK]
+    stiff = bulk - bulking
+    free, end = bulk / stiff, bulk / (stiff + least)
+    if not ratio > free:
+        return 0.5 * p * (free - ratio)
+    to = min(ratio, end)
+    return stiff * (to - free) - bulk * log(to / free) - least * (ratio - to)
+
+
+@njit("float64(float64[::1], float64, float64, float64, float64, float64, float64)", cache=True, error_model="numpy")
+def _beyond(params, before, after, old, new, bulking, least):  # type: ignore[no-untyped-def]
+    """Of the mean pressure's work between two ratios, what is not stored, of the undeformed volume, Pa: none but where
+    the tension comes to its end in between.
+    """
+    if (new > least or not after > before) and (old > least or not before > after):
+        return 0.0
+    more = _stored(params, after, new, bulking, least) - _stored(params, before, old, bulking, least)
+    return -0.5 * (old + new) * (after - before) - more
+
+
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def crumbling(w, s, params, n):  # type: ignore[no-untyped-def]
     """The pressure of ``_pressed``; where it is averaged the mean of that at the four nodes, each with the end of its
-    own tension.
+    own tension, and what it stores is the sum over them (elements/mean.py).
     """
     bulk, averaged = params[BULK], len(s) > _UNTOLD
     for i in range(n):
@@ -89,12 +121,22 @@ def crumbling(w, s, params, n):  # type: ignore[no-untyped-def]
         ratio = s[_RATIO + i] * (1.0 + half) / (1.0 - half)
         least = -params[_T] * (1.0 - s[_DAMAGE + i])
         if averaged:
-            new, stiff = 0.0, 0.0
+            new, stiff, stored, beyond = 0.0, 0.0, 0.0, 0.0
             for k in range(4):
-                p, modulus = _pressed(params, s[_CORNERS + k * CHUNK + i], s[_BULKING + i], least)
+                corner, change = s[_CORNERS + k * CHUNK + i], w[CORNER_CHANGE + k * CHUNK + i]
+                p, modulus = _pressed(params, corner, s[_BULKING + i], least)
+                old, _ = _pressed(params, corner - change, s[_BULKING + i], least)
                 new, stiff = new + 0.25 * p, stiff if modulus < stiff else modulus
+                stored += (old + p) * change
+                beyond += 0.25 * _beyond(params, corner - change, corner, old, p, s[_BULKING + i], least)
+            seen = 0.125 * s[_MASS + i] / params[DENSITY] * stored
+            s[_AVERAGED + i] += seen - 0.5 * (w[BEFORE + i] + new) * w[CHANGE_SEEN + i]
         else:
             new, stiff = _pressed(params, ratio, s[_BULKING + i], least)
+            old, _ = _pressed(params, s[_RATIO + i], s[_BULKING + i], least)
+            s[_PLASTIC + i] -= 0.5 * (s[_P + i] - old) * w[CHANGE + i]
+            beyond = _beyond(params, s[_RATIO + i], ratio, old, new, s[_BULKING + i], least)
+        s[_PLASTIC + i] += s[_MASS + i] / params[DENSITY] * beyond
         s[_WORK + i] -= 0.5 * (s[_P + i] + new) * w[CHANGE + i]
         s[_P + i], s[_RATIO + i] = new, ratio
         w[MODULUS + i] = (_LEAST * bulk if stiff < _LEAST * bulk else stiff) + 4.0 / 3.0 * params[SHEAR]
@@ -124,6 +166,19 @@ def _factors(w, s, params, n):  # type: ignore[no-untyped-def]
     logarithms(w, _FAST, n)
 
 
+@njit("float64(float64[::1], float64[::1], int64, float64, float64, boolean)", cache=True, error_model="numpy")
+def _let_go(s, params, i, damage, grown, averaged):  # type: ignore[no-untyped-def]
+    """What tension stores less than before when the damage of tet ``i`` has ``grown``, of the undeformed volume, Pa."""
+    before, after = -params[_T] * (1.0 - damage), -params[_T] * (1.0 - grown)
+    lost = 0.0
+    for k in range(4 if averaged else 1):
+        ratio = s[_CORNERS + k * CHUNK + i] if averaged else s[_RATIO + i]
+        if ratio > 1.0:
+            bulking = s[_BULKING + i]
+            lost += _stored(params, ratio, 0.0, bulking, before) - _stored(params, ratio, 0.0, bulking, after)
+    return 0.25 * lost if averaged else lost
+
+
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def johnson_holmquist(w, s, params, n, dt):  # type: ignore[no-untyped-def]
     """Returns the trial deviators to the strength at the new pressure; damage and bulking; books the plastic work.
@@ -136,7 +191,8 @@ def johnson_holmquist(w, s, params, n, dt):  # type: ignore[no-untyped-def]
     equivalent_stress(w, s, n)
     _factors(w, s, params, n)
     shear, bulk, hel = params[SHEAR], params[BULK], params[_STRENGTH]
-    tension, grows = params[_T], _UNTOLD if len(s) > _UNTOLD else _BULKING
+    tension, averaged = params[_T], len(s) > _UNTOLD
+    grows = _UNTOLD if averaged else _BULKING
     for i in range(n):
         q, p, damage = w[TRIAL + i], s[_P + i], s[_DAMAGE + i]
         rate = 1.0 + 0.5 * params[_C] * w[_FAST + i]
@@ -163,13 +219,17 @@ def johnson_holmquist(w, s, params, n, dt):  # type: ignore[no-untyped-def]
         s[_STRAIN + i] += strain
         s[_PLASTIC + i] += w[VOLUME_MID + i] * max(lost, 0.0)
         s[_DAMAGE + i] = grown
+        s[_PLASTIC + i] += s[_MASS + i] / params[DENSITY] * _let_go(s, params, i, damage, grown, averaged)
         m = 1.0 / s[_RATIO + i] - 1.0
         if m > 0.0:
             after = intact - grown * (intact - crumbled)
             free = (strength * strength - after * after) / (6.0 * shear)
             whole = bulk * m + s[_BULKING + i]
             s[grows + i] += math.sqrt(whole * whole + 2.0 * params[_BETA] * bulk * free) - whole
-            s[_PLASTIC + i] -= w[VOLUME_MID + i] * params[_BETA] * free
+            kept = w[VOLUME_MID + i] * params[_BETA] * free
+            s[_PLASTIC + i] -= kept
+            if averaged:
+                s[_AVERAGED + i] += kept
 
 
 def _constants(law: JohnsonHolmquist) -> tuple[float, ...]:
@@ -180,7 +240,7 @@ def _constants(law: JohnsonHolmquist) -> tuple[float, ...]:
     )  # fmt: skip
 
 
-PRESSURE_LAW = Equation("johnson_holmquist", DAMAGE + 1, lambda _: (), crumbling, CORNERS + 4)
+PRESSURE_LAW = Equation("johnson_holmquist", DAMAGE + 1, lambda _: (), crumbling, volumes_by_ratio, CORNERS + 4)
 """Its own pressure: it has the bulking, a mean over nodes where the pressure is one, and its own tension cut-off."""
 LAW = Law(
     "johnson_holmquist", AFTER_PRESSURE, lambda _: DAMAGE + 1, _constants,

@@ -53,6 +53,8 @@ class Equation:
     constants: Callable[[Any], tuple[float, ...]]
     """Its constants from its table in the case; they stand from EQUATION on."""
     kernel: Any
+    volume: Any
+    """Its kernel(w, s, params, n) makes VOLUME_SEEN of n, m^3: of the matter and pores that have the pressure of n."""
     averaged: int = 0
     """How many it needs in the averaged pressure forms, where it adds a mean over nodes of its own (UNTOLD, HEAT)."""
 

@@ -64,6 +64,15 @@ def press(equation, w, s, params, n):  # type: ignore[no-untyped-def]
         johnson_holmquist.crumbling(w, s, params, n)
 
 
+@njit("void(int64, float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
+def swell(equation, w, s, params, n):  # type: ignore[no-untyped-def]
+    """The volumes of an equation of EQUATIONS: VOLUME_SEEN of a chunk, before the step."""
+    if equation == 0:
+        equation_of_state.volumes_by_pressure(w, s, params, n)
+    else:
+        equation_of_state.volumes_by_ratio(w, s, params, n)
+
+
 def strength_of(material: Material) -> int:
     """The number of the material's law of strength."""
     return [law.model for law in LAWS].index("" if material.strength is None else material.strength.model)
@@ -114,7 +123,7 @@ def parameters(material: Material, viscosity: Viscosity | None, *, breaks: bool 
 def rows_of(material: Material, pressure: str) -> int:
     """How many rows of state an element of this material needs (worker/state.py)."""
     equation = equation_of(material)
-    averaged = 0 if pressure == "standard" else max(state.VOLUME_FLUX + 1, equation.averaged)
+    averaged = 0 if pressure == "standard" else max(state.WORK_AVERAGED + 1, equation.averaged)
     porous = 0 if material.spall is None else state.PORES + 1
     return max(law_of(material).rows(material.strength), equation.rows, averaged, porous)
 

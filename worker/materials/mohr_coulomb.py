@@ -11,7 +11,7 @@ import numpy as np
 
 from conoid.cases.laws.mohr_coulomb import MohrCoulomb
 
-from ..elements.tet4 import CHANGE, D_XX, D_XY, D_YY, D_YZ, D_ZX, D_ZZ, SEEN, TRIAL, VOLUME_MID
+from ..elements.tet4 import CHANGE, D_XX, D_XY, D_YY, D_YZ, D_ZX, D_ZZ, SEEN, TRIAL, VOLUME_MID, VOLUME_SEEN
 from ..jit import njit
 from ..state import (
     CHUNK,
@@ -142,7 +142,7 @@ def grow(w, s, i, grown, told, bulk):  # type: ignore[no-untyped-def]
     s[_P + i] += more
     s[_GROWN + i] = grown
     s[_WHOLE_WORK + i] -= 0.5 * more * w[CHANGE + i]
-    s[_WORK + i] -= w[VOLUME_MID + i] * grown * (s[_P + i] + 0.5 * (bulk * (w[SEEN + i] + told) - more))
+    s[_WORK + i] -= w[VOLUME_SEEN + i] * grown * (s[_P + i] + 0.5 * (bulk * (w[SEEN + i] + told) - more))
 
 
 @njit(
@@ -181,6 +181,7 @@ def mohr_coulomb(w, s, params, n, dt):  # type: ignore[no-untyped-def]
 
     Plastic work is that of the mean of the rotated old stress and the new one, as the whole work is: what remains is
     the elastic energy of the stress, also where the strength itself falls, by a release of pressure or by failure.
+    Where the volume grows, that energy is of more volume afterwards, and the flow has given it.
     """
     equivalent_stress(w, s, n)
     shear2, cap, dilates = 2.0 * params[SHEAR], params[_CAP], params[DILATES] > 0.0
@@ -202,7 +203,10 @@ def mohr_coulomb(w, s, params, n, dt):  # type: ignore[no-untyped-def]
         d1, d2, d3 = principal(sxx, syy, szz, syz, szx, sxy)
         if dilates and k == 0:
             e1, e2, e3, flow = dilated(d1, d2, d3, r * strength, sine, r * cap, params[DILATES], shear2, params[BULK])
-            grow(w, s, i, 2.0 * params[DILATES] * q * flow, told, params[BULK])
+            grown = 2.0 * params[DILATES] * q * flow
+            grow(w, s, i, grown, told, params[BULK])
+            stored = s[_P + i] * s[_P + i] / params[BULK] + q * q / shear2 * (e1 * e1 + e2 * e2 + e3 * e3)
+            s[_WORK + i] -= 0.5 * w[VOLUME_SEEN + i] * grown * stored
         else:
             e1, e2, e3 = returned(d1, d2, d3, max(r * strength, 0.0), sine, r * cap)
         if e1 == d1:

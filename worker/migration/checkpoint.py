@@ -26,8 +26,8 @@ from ..errors import InputError
 from ..parallel.comm import Comm
 from .parcel import Parcel, Table, take
 
-FORMAT = 9
-"""Of the files; 9 has the largest energy that has come in. Others are not read."""
+FORMAT = 10
+"""Of the files; 10 has what averaging the pressure has taken of each tet. Others are not read."""
 _KEPT = 2
 """Checkpoints that stay; the older ones go."""
 _MANIFEST = "manifest.json"

@@ -1,0 +1,56 @@
+"""What averaging the pressure takes: the forces work on a tet's own volume, its pressure on the mean that it sees.
+
+A tet's stress does -p dV on its own volume; the energy that an averaged pressure stores is -p dW, with W the volume by
+the strain that the pressure sees. Over all tets round a node the two agree where the pressure is uniform. The rest is
+booked tet by tet as WORK_AVERAGED: what differences of pressure within an average store, which comes back; what is
+lost for good, where neighbours yield, tear or leave at different times; and what the stabilising fluxes of ``split``
+dissipate (docs/numerics.md, Averaged pressure).
+"""
+
+from ..jit import njit
+from ..materials.law import BULK, DENSITY, DILATES
+from ..state import BULKING, CHUNK, CORNERS, DILATION, MASS, PRESSURE, WORK_AVERAGED
+from .tet4 import BEFORE, CHANGE, CHANGE_SEEN, SEEN, VOLUME_SEEN
+
+_P, _GROWN, _WORK = PRESSURE * CHUNK, DILATION * CHUNK, WORK_AVERAGED * CHUNK
+_BULKING, _MASS, _CORNERS = BULKING * CHUNK, MASS * CHUNK, CORNERS * CHUNK
+
+
+@njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy", forceinline=True)
+def take_bulking(s, params, i, more):  # type: ignore[no-untyped-def]
+    """Adds ``more`` to the bulking of tet ``i``, Pa, and what that stores, for the law has given what its own would
+    store to the nodes. As there (materials/johnson_holmquist.py) it is (K m + bulking)^2 / 2K of a volume, of a quarter
+    at each corner; none where the matter is wider than without stress.
+    """
+    bulk, stored = params[BULK], 0.0
+    for k in range(4):
+        ratio = s[_CORNERS + k * CHUNK + i]
+        whole = bulk * (1.0 / ratio - 1.0) + s[_BULKING + i]
+        before, after = max(whole, 0.0), max(whole + more, 0.0)
+        stored += ratio * (after * after - before * before)
+    s[_WORK + i] -= 0.125 * s[_MASS + i] / (params[DENSITY] * bulk) * stored
+    s[_BULKING + i] += more
+
+
+@njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
+def keep_before(w, s, params, n):  # type: ignore[no-untyped-def]
+    """BEFORE: the pressure before the step; CHANGE_SEEN: how the seen volume changes; VOLUME_SEEN: at mid-step.
+
+    Before the equation of state; VOLUME_SEEN is that of the step's beginning then. What ``tell_dilation`` has taken
+    back is of the step before.
+    """
+    bulk, dilates = params[BULK], params[DILATES] > 0.0
+    for i in range(n):
+        back = -s[_GROWN + i] if dilates else 0.0
+        strain = w[SEEN + i] + back
+        change = w[VOLUME_SEEN + i] * strain * (1.0 + 0.5 * strain)
+        w[BEFORE + i] = s[_P + i] + bulk * back
+        w[CHANGE_SEEN + i] = change
+        w[VOLUME_SEEN + i] += 0.5 * change
+
+
+@njit("void(float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
+def book_averaged(w, s, n):  # type: ignore[no-untyped-def]
+    """WORK_AVERAGED: what the mean pressure of the step has done on the own volume less what on the seen one."""
+    for i in range(n):
+        s[_WORK + i] -= 0.5 * (w[BEFORE + i] + s[_P + i]) * (w[CHANGE + i] - w[CHANGE_SEEN + i])
