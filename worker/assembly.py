@@ -18,13 +18,16 @@ from .hashing import uniform
 from .mesh.build import build as build_mesh
 from .mesh.faces import FACES, across, normals
 from .mesh.model import TetMesh
-from .state import Flags, Floats, Indices, Load
+from .state import Flags, Floats, Indices, Ints, Load
 from .turning import sine_and_cosine
 
 Say = Callable[[str], None]
 """Reports what the start is doing."""
 _JITTER = 0x6A697474
 """Seed of the random velocities of the start."""
+_MANY = 1_000
+"""Pieces of a part beyond which nothing finds out whether they overlap each other. Chosen: the table of who meets whom
+grows with their square."""
 
 
 @dataclass
@@ -54,11 +57,15 @@ def quiet(what: str) -> None:
 def assemble(case: schema.Case, folder: Path, say: Say = quiet) -> Whole:
     """Builds the meshes of all parts; ``folder`` is where relative mesh paths start. Raises MeshError."""
     points, tets, node_part, tet_part, density, warnings = [], [], [], [], [], list[str]()
+    bodies, part_of_body = [], list[int]()
     offset = 0
     for index, part in enumerate(case.parts):
         meshing = f"meshing {part.name}, part {index + 1} of {len(case.parts)}"
         mesh = build_mesh(part.mesh, folder, key=f"parts[{index}].mesh", made=partial(say, meshing))
-        warnings += _pieces(case, index, mesh)
+        piece, told = _pieces(case, index, mesh)
+        warnings += told
+        bodies.append(piece + len(part_of_body))
+        part_of_body += [index] * (int(piece.max(initial=0)) + 1)
         points.append(mesh.points if part.turn is None else _turned(mesh.points, part.turn))
         tets.append(mesh.tets.astype(np.int64) + offset)
         node_part.append(np.full(len(mesh.points), index, np.int32))
@@ -71,7 +78,7 @@ def assemble(case: schema.Case, folder: Path, say: Say = quiet) -> Whole:
     part_of_node = np.concatenate(node_part)
     behind = across(t) if case.in_contact or case.fractures else np.zeros((0, 4), np.int32)
     if case.in_contact:
-        x = _apart(case, x, t, part_of_node, behind < 0)
+        x = _apart(case, x, t, np.concatenate(bodies), np.array(part_of_body), behind < 0)
         volumes = _volumes(x, t)
     return Whole(
         points=x, node_part=part_of_node, tets=t, tet_part=part_of_tet, volumes=volumes,
@@ -81,22 +88,29 @@ def assemble(case: schema.Case, folder: Path, say: Say = quiet) -> Whole:
     )  # fmt: skip
 
 
-def _pieces(case: schema.Case, index: int, mesh: TetMesh) -> list[str]:
-    """A warning where the mesh from a file of a part that does not meet itself is in several pieces: nodes that
-    coincide and are not merged are the commonest slip in a mesh.
+def _pieces(case: schema.Case, index: int, mesh: TetMesh) -> tuple[Indices, list[str]]:
+    """(nodes,) which piece of its part each node belongs to, where the mesh is from a file and the part meets itself;
+    else all to the first.
+
+    A warning where a part in several pieces does not: nodes that coincide and are not merged are the commonest slip in
+    a mesh.
     """
+    whole = np.zeros(len(mesh.points), np.int32)
     if not isinstance(case.parts[index].mesh, MeshFile):
-        return []
-    if case.contact is not None and not np.isnan(pairing.friction(case)[index, index]):
-        return []
+        return whole, []
     sides = np.concatenate([mesh.tets[:, [0, k]] for k in (1, 2, 3)])
-    many = len(np.unique(components(len(mesh.points), sides)))
+    first, piece = np.unique(components(len(mesh.points), sides), return_inverse=True)
+    many, pieces = len(first), f"parts[{index}].mesh: {len(first)} pieces that share no node"
     if many == 1:
-        return []
-    return [
-        f"parts[{index}].mesh: {many} pieces that share no node, and they do not meet each other: merge the nodes "
-        "where they coincide, or let the part meet itself (contact.self_contact)"
-    ]
+        return whole, []
+    if case.contact is None or np.isnan(pairing.friction(case)[index, index]):
+        return whole, [
+            f"{pieces}, and they do not meet each other: merge the nodes where they coincide, or let the part meet "
+            "itself (contact.self_contact)"
+        ]
+    if many > _MANY:
+        return whole, [f"{pieces}: whether they overlap each other at the start is found out for {_MANY} at most"]
+    return piece.reshape(-1).astype(np.int32), []
 
 
 def _turned(points: Floats, turn: schema.Turn) -> Floats:
@@ -109,43 +123,52 @@ def _turned(points: Floats, turn: schema.Turn) -> Floats:
     return turned
 
 
-def _apart(case: schema.Case, x: Floats, tets: Indices, part: Indices, exposed: Flags) -> Floats:
-    """The points, when no part overlaps another; moved apart where the case asks for that. Raises InputError."""
+def _apart(case: schema.Case, x: Floats, tets: Indices, body: Indices, part: Ints, exposed: Flags) -> Floats:
+    """The points, when no body overlaps another; moved apart where the case asks for that. Raises InputError.
+
+    ``body``: (nodes,), ``part``: (bodies,). A part is one body but for one that is several pieces and meets itself.
+    """
     assert case.contact is not None
     tet, face = np.nonzero(exposed)
     faces = tets[tet[:, None], FACES[face]]
-    surface, allowed = overlap.Surface(faces, part[faces[:, 0]], exposed), ~np.isnan(pairing.friction(case))
+    allowed = ~np.isnan(pairing.friction(case))[part[:, None], part]
+    surface = overlap.Surface(faces, body[faces[:, 0]], exposed)
     before, out_of = x, np.full(len(x), -1, np.int32)
     if case.contact.overlap == "push":
-        x, out_of = overlap.move_apart(x, tets, part, surface, allowed)
+        x, out_of = overlap.move_apart(x, tets, body, surface, allowed)
     for tet in overlap.crushed(before, x, tets):
         node = tets[tet, np.argmax(out_of[tets[tet]])]
-        raise _too_deep(case, part[node], out_of[node], before[node])
-    found = overlap.find(x, tets, part, surface, allowed)
+        raise _too_deep(case, part[body[node]], part[out_of[node]], before[node])
+    found = overlap.find(x, tets, body, surface, allowed)
     if len(found.nodes):
-        raise _overlapping(case, found, x, part)
-    for tet, other in overlap.nested(x, tets, part, surface, allowed):
-        raise _too_deep(case, part[tets[tet, 0]], part[tets[other, 0]], before[tets[tet]].mean(axis=0))
+        worst = int(np.argmax(found.depth))
+        node = found.nodes[worst]
+        raise _overlapping(case, part[body[node]], part[found.part[worst]], found.depth[worst], x[node])
+    for tet, other in overlap.nested(x, tets, body, surface, allowed):
+        one, other = (part[body[tets[each, 0]]] for each in (tet, other))
+        raise _too_deep(case, one, other, before[tets[tet]].mean(axis=0))
     return x
 
 
-def _overlapping(case: schema.Case, found: overlap.Overlaps, x: Floats, part: Indices) -> InputError:
+def _overlapping(case: schema.Case, one: int, other: int, depth: float, place: Floats) -> InputError:
     assert case.contact is not None
-    worst = int(np.argmax(found.depth))
-    node = found.nodes[worst]
-    one, other = case.parts[part[node]].name, case.parts[found.part[worst]].name
     way = "set contact.overlap = 'push'" if case.contact.overlap == "refuse" else "contact.overlap = 'push' could not"
     return InputError(
-        f"parts: {one!r} overlaps {other!r} by {found.depth[worst]:.3g} m at ({_place(x[node])}) m; "
-        f"move them apart, or {way}"
+        f"parts: {_who(case, one, other)} by {depth:.3g} m at ({_place(place)}) m; move them apart, or {way}"
     )
 
 
 def _too_deep(case: schema.Case, one: int, other: int, place: Floats) -> InputError:
     return InputError(
-        f"parts: {case.parts[one].name!r} overlaps {case.parts[other].name!r} at ({_place(place)}) m, "
-        "deeper than contact.overlap = 'push' can undo; move them apart"
+        f"parts: {_who(case, one, other)} at ({_place(place)}) m, deeper than contact.overlap = 'push' can undo; move "
+        "them apart"
     )
+
+
+def _who(case: schema.Case, one: int, other: int) -> str:
+    if one == other:
+        return f"a piece of {case.parts[one].name!r} overlaps another of its pieces"
+    return f"{case.parts[one].name!r} overlaps {case.parts[other].name!r}"
 
 
 def _place(point: Floats) -> str:

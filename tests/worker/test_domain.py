@@ -1,5 +1,6 @@
 """The cut of the mesh: every tet once, every shared node known to all its holders and owned once; complete sums."""
 
+import contextlib
 from itertools import product
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from conoid.cases.load import parse_toml
 from conoid.worker import domain
 from conoid.worker.assembly import Whole
 from conoid.worker.domain import Piece
+from conoid.worker.errors import InputError
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.parallel.ownership import SharedSum
@@ -202,6 +204,26 @@ def test_pieces_of_a_part_that_do_not_meet_are_told(second: str, more: str, told
     assert [text.partition(", and they do not meet")[0] for text in piece.warnings] == [
         "parts[0].mesh: 2 pieces that share no node"
     ] * told
+
+
+@pytest.mark.parametrize(
+    ("overlap", "told"),
+    [
+        ("refuse", r"^parts: a piece of 'body' overlaps another of its pieces by 0\.0001\d* m at \(.*\) m; move them"),
+        ("push", None),
+    ],
+)
+def test_pieces_of_a_part_that_meets_itself_may_not_overlap(overlap: str, told: str | None, tmp_path: Path) -> None:
+    """The upper tet stands on the lower one and reaches 0.1 mm into it."""
+    deeper = TWO_TETS.replace("5, 0, 0, -1", "5, 0, 0, -1.1")
+    for node in ("6, 0, 0", "7, 1, 0", "8, 0, 1"):
+        deeper = deeper.replace(f"{node}, 0", f"{node}, 0.1")
+    (tmp_path / "two.inp").write_text(deeper + "2, 6, 8, 7, 5")
+    mesh = "mesh = { shape = 'file', path = 'two.inp', unit = '1 mm' }"
+    meets = f"contact = {{ self_contact = ['body'], overlap = '{overlap}' }}"
+    case = parse_toml(f"name='two'\n{meets}\nrun={{end_time='1 us'}}\n[[parts]]\nname='body'\nmaterial='steel'\n{mesh}")
+    with pytest.raises(InputError, match=told) if told else contextlib.nullcontext():
+        domain.build(case, tmp_path, SerialComm())
 
 
 def test_the_start_says_what_it_is_at(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
