@@ -32,6 +32,7 @@ from ..materials.viscosity import bulk_viscosity
 from ..state import CHUNK, UNTOLD
 from . import pressure as averaged
 from . import rest, tet4
+from .barrier import resist
 from .flat import keep_out, see_own, without_flux
 from .hot import mark_hot
 from .mean import book_averaged, keep_before
@@ -310,6 +311,8 @@ def force_pass(  # type: ignore[no-untyped-def]
         swell(eos, w, s, params, n)
         keep_before(w, s, params, n)
         pressure_and_limit(eos, w, s, params, n, dt)
+        if len(worn) == 0:
+            resist(w, s, params, n)
         return_at_pressure(strength, w, s, params, n, dt)
         book_averaged(w, s, n)
         if len(upset) > 0:

@@ -1,0 +1,83 @@
+"""What keeps a tet of an averaged form from being squeezed to nothing: its potential, and scenes that ended without."""
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from conoid.cases import schema
+from conoid.cases.bodies import Box
+from conoid.worker import simulation
+from conoid.worker.elements.barrier import SQUEEZED, STIFF
+from conoid.worker.parallel.comm import SerialComm
+from conoid.worker.state import PRESSURE, VISCOUS, WORK
+
+from . import formulas
+from .kernels import HARD, STEEL, Floats, Patch, run
+from .meshes import free_tets
+
+BULK = 200e9 / 1.2
+DT = 1e-8
+
+
+@pytest.mark.parametrize("material", [STEEL, HARD])
+def test_it_is_a_potential_of_the_own_volume(material: object) -> None:
+    """Squeezed to 8 % of its volume and back: the pressure by its formula, the work by the integral of that."""
+    mesh = free_tets(1, 3)
+    patch = Patch(mesh, material, "nodal")  # type: ignore[arg-type]
+    there = np.linspace(1.0, 0.08, 4000) ** (1.0 / 3.0)
+    pressures, work, extra = [0.0], [0.0], 0.0
+    volume = float(mesh.volumes()[0])
+    for old, new in pairwise(np.concatenate([there, there[::-1][1:]])):
+        patch.nodes.v[:], patch.nodes.x[:] = mesh.points * (new - old) / DT, mesh.points * new
+        before, done = patch.get(PRESSURE)[0], patch.get(WORK)[0]
+        patch.advance(DT)
+        change = volume * (new**3 - old**3)
+        extra += patch.get(WORK)[0] - done + 0.5 * (before + patch.get(PRESSURE)[0]) * change
+        pressures.append(patch.get(VISCOUS)[0])
+        work.append(extra)
+    ratio = np.concatenate([there, there[::-1][1:]]) ** 3
+    depth = np.log(SQUEEZED / np.minimum(ratio, SQUEEZED))
+    assert np.allclose(pressures, STIFF * BULK * depth**2, rtol=1e-9, atol=1e-3)
+    integral = ratio * (depth**2 + 2.0 * depth + 2.0) - 2.0 * SQUEEZED  # of ln(s / J)^2 from J to s, less the sign
+    stored = -STIFF * BULK * volume * np.where(ratio < SQUEEZED, integral, 0.0)
+    assert np.abs(work - stored).max() < 1e-3 * stored.max()
+    assert abs(work[-1]) < 1e-6 * stored.max()
+
+
+def test_a_plate_that_meets_another_is_not_crushed_at_its_edge() -> None:
+    """Plates of copper at 1.5 km/s each, `nodal`: a tet of the contact plane went to no volume at 2.18 us, and its
+    step with it.
+    """
+    bodies = {"upper": (0.01, 2.01, -1500.0), "lower": (-3.0, 0.0, 1500.0)}
+    plates = [
+        schema.Part(
+            name=name, material="copper_ofhc", velocity=(0.0, 0.0, speed),
+            mesh=Box(
+                shape="box", low=(-4e-3, -4e-3, 1e-3 * low), high=(4e-3, 4e-3, 1e-3 * high), element_size=0.8e-3,
+                generator="structured",
+            ),
+        )
+        for name, (low, high, speed) in bodies.items()
+    ]  # fmt: skip
+    case = schema.Case(
+        name="plates", parts=tuple(plates), contact=schema.Contact(), run=schema.Run(end_time=2.4e-6, frames=0)
+    )
+    sim = simulation.build(case, Path(), SerialComm())
+    least: list[float] = []
+
+    def watch(now: simulation.Simulation, before: Floats) -> None:
+        if now.clock.step % 20 == 0:
+            now.ledger.close(before)
+            ratios = [
+                formulas.volumes(now.model.nodes.x[part.tets.astype(np.int64)])
+                / formulas.volumes(now.model.nodes.x0[part.tets.astype(np.int64)])
+                for part in now.model.blocks
+            ]
+            least.append(float(np.concatenate(ratios).min()))
+
+    run(sim, watch, 3000)
+    assert sim.clock.done
+    assert 0.03 < min(least) < SQUEEZED
+    assert sim.ledger.worst < 2e-4
