@@ -54,7 +54,8 @@ def first_half(sim: Simulation) -> None:
         mean_dt = clock.choose(sim.limit)  # 1: dt between n and n+1
         if clock.collapsed:
             raise PhysicsError(
-                f"{_when(sim)}: {sim.limiting_tet()} is crushed; the stable step is {clock.stable:.3g} s"
+                f"{_when(sim)}: {sim.limiting_tet()} is crushed; the stable step is {clock.stable:.3g} s. Where its "
+                "part erodes (parts[].erosion) such a tet leaves"
             )
         _before_kick(sim)  # 2 to 4
         if sim.contact is not None and clock.step == 0 and sim.contact.look_ahead(nodes):

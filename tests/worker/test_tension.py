@@ -97,7 +97,8 @@ def test_a_cut_off_of_mie_gruneisen_keeps_the_energy_equation() -> None:
     assert found["p"][-1] > 3e9
     volume = found["mass"][0] / 8930.0
     opened = volume * (found["ratio"] * found["pores"]).max()
-    assert found["plastic"][-1] == pytest.approx(SPALL * opened, rel=0.005)
+    stored = SPALL**2 / (2.0 * 8930.0 * eos.c0**2)  # comes back from more volume than it went into
+    assert found["plastic"][-1] == pytest.approx((SPALL - stored) * opened, rel=0.002)
 
 
 def ball(spall: float | None) -> simulation.Simulation:

@@ -4,7 +4,7 @@ A tet's stress does -p dV on its own volume; the energy that an averaged pressur
 the strain that the pressure sees. Over all tets round a node the two agree where the pressure is uniform. The rest is
 booked tet by tet as WORK_AVERAGED: what differences of pressure within an average store, which comes back; what is
 lost for good, where neighbours yield, tear or leave at different times; and what the stabilising fluxes of ``split``
-dissipate (docs/numerics.md, Averaged pressure).
+dissipate (docs/numerics.md, What averaging takes).
 """
 
 from ..jit import njit
@@ -12,7 +12,7 @@ from ..materials.law import BULK, DENSITY, DILATES
 from ..state import BULKING, CHUNK, CORNERS, DILATION, MASS, PRESSURE, WORK_AVERAGED
 from .tet4 import BEFORE, CHANGE, CHANGE_SEEN, SEEN, VOLUME_SEEN
 
-_P, _GROWN, _WORK = PRESSURE * CHUNK, DILATION * CHUNK, WORK_AVERAGED * CHUNK
+_P, _GROWN, _TAKEN = PRESSURE * CHUNK, DILATION * CHUNK, WORK_AVERAGED * CHUNK
 _BULKING, _MASS, _CORNERS = BULKING * CHUNK, MASS * CHUNK, CORNERS * CHUNK
 
 
@@ -28,7 +28,7 @@ def take_bulking(s, params, i, more):  # type: ignore[no-untyped-def]
         whole = bulk * (1.0 / ratio - 1.0) + s[_BULKING + i]
         before, after = max(whole, 0.0), max(whole + more, 0.0)
         stored += ratio * (after * after - before * before)
-    s[_WORK + i] -= 0.125 * s[_MASS + i] / (params[DENSITY] * bulk) * stored
+    s[_TAKEN + i] -= 0.125 * s[_MASS + i] / (params[DENSITY] * bulk) * stored
     s[_BULKING + i] += more
 
 
@@ -53,4 +53,4 @@ def keep_before(w, s, params, n):  # type: ignore[no-untyped-def]
 def book_averaged(w, s, n):  # type: ignore[no-untyped-def]
     """WORK_AVERAGED: what the mean pressure of the step has done on the own volume less what on the seen one."""
     for i in range(n):
-        s[_WORK + i] -= 0.5 * (w[BEFORE + i] + s[_P + i]) * (w[CHANGE + i] - w[CHANGE_SEEN + i])
+        s[_TAKEN + i] -= 0.5 * (w[BEFORE + i] + s[_P + i]) * (w[CHANGE + i] - w[CHANGE_SEEN + i])

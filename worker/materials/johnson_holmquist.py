@@ -113,7 +113,8 @@ def _beyond(params, before, after, old, new, bulking, least):  # type: ignore[no
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def crumbling(w, s, params, n):  # type: ignore[no-untyped-def]
     """The pressure of ``_pressed``; where it is averaged the mean of that at the four nodes, each with the end of its
-    own tension, and what it stores is the sum over them (elements/mean.py).
+    own tension, and what it stores is the sum over them (elements/mean.py). Plastic work is also what the pressure of n
+    does otherwise than that of the same ratio with the bulking and the damage of now, and what is beyond the tension.
     """
     bulk, averaged = params[BULK], len(s) > _UNTOLD
     for i in range(n):
