@@ -24,13 +24,12 @@ from .fracture.stage import Fracture
 from .jit import njit
 from .parallel.comm import Comm
 from .parallel.fixed_point import Grouped, add_limbs, exact_sums, exact_totals, larger
-from .state import CHUNK, WORK, WORK_AVERAGED, WORK_PLASTIC, WORK_VISCOUS, Block, Floats, Ints, Model
+from .state import CHUNK, WORKS, Block, Floats, Ints, Model
 
 _TOLD = 0.01
 """Share of the largest energy that unequal steps may take or make without a word. Chosen: what the other
 lines of a ledger are usually read to.
 """
-_WORKS = (WORK, WORK_VISCOUS, WORK_PLASTIC, WORK_AVERAGED)
 
 
 class Ledger:
@@ -140,9 +139,9 @@ class Ledger:
         return float(exact_sums(self._comm, values[self._model.nodes.owned][:, None])[0])
 
     def _gone(self) -> tuple[Floats, float, Floats]:
-        """(4,) works of eroded tets as of ``ElementWork``, J; energy, J, and momentum, kg m/s, of eroded nodes."""
+        """(4,) WORKS of eroded tets, J; energy, J, and momentum, kg m/s, of eroded nodes."""
         if self._erosion is None:
-            return np.zeros(4), 0.0, np.zeros(3)
+            return np.zeros(len(WORKS)), 0.0, np.zeros(3)
         kinetic, mass, *momentum = self._erosion.nodal()
         self.eroded_mass = float(mass)
         return self._erosion.work(), float(kinetic), np.array(momentum)
@@ -167,9 +166,7 @@ def _named(parts: list[str], kinetic: Floats, internal: Floats) -> dict[str, Par
 
 
 class ElementWork:
-    """Four columns over all tets, grouped by part: work of the stress, of the bulk viscosity, plastic work, and what
-    averaging the pressure has taken, J; read where they are.
-    """
+    """The columns WORKS over all tets, grouped by part, J; read where they are."""
 
     def __init__(self, blocks: list[Block], parts: int) -> None:
         self._blocks, self._parts = blocks, parts
@@ -181,7 +178,7 @@ class ElementWork:
         return self._visited(scale)[1]
 
     def _visited(self, scale: Floats) -> tuple[Floats, Ints]:
-        largest, words = np.zeros(4), np.zeros((self._parts, 8), np.int64)
+        largest, words = np.zeros(len(WORKS)), np.zeros((self._parts, 2 * len(WORKS)), np.int64)
         for block in self._blocks:
             _visit_work(largest, words[block.part], block.state, block.n, scale)
         return largest, words
@@ -190,8 +187,8 @@ class ElementWork:
 @njit("void(float64[::1], int64[::1], float64[:, :, ::1], int64, float64[::1])", cache=True)
 def _visit_work(largest, words, state, n, scale):  # type: ignore[no-untyped-def]
     """Raises the ``largest`` (4,) magnitudes; adds to the limbs ``words`` (8,) where ``scale`` (4,) is given."""
-    for j in range(4):
-        row = _WORKS[j]
+    for j in range(len(WORKS)):
+        row = WORKS[j]
         if row >= state.shape[1]:
             continue
         for c in range(state.shape[0]):

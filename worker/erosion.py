@@ -31,10 +31,7 @@ from .state import (
     S_ZX,
     S_ZZ,
     VISCOUS,
-    WORK,
-    WORK_AVERAGED,
-    WORK_PLASTIC,
-    WORK_VISCOUS,
+    WORKS,
     Block,
     Floats,
     Ints,
@@ -69,7 +66,7 @@ class Erosion:
         """Nodes that leave in this step, and their v(n-1/2), m/s."""
         mass, speed = extremes
         energy, momentum = mass * speed * speed, mass * speed
-        self._work = Tally(np.full(4, energy))
+        self._work = Tally(np.full(len(WORKS), energy))
         self._nodal = Tally(np.array([energy, mass, momentum, momentum, momentum]))
         self._half = self._nodal.quanta(np.zeros((0, 5)))
         self._limit = 0.0
@@ -124,9 +121,7 @@ class Erosion:
         self.due = found == BROKEN or (found > SOUND and self._clock.step % GATHERED == 0)
 
     def work(self) -> Floats:
-        """(4,) of the tets that have left, J: work, viscous work, plastic work, and what averaging the pressure has
-        taken; all ranks take part.
-        """
+        """(4,) WORKS of the tets that have left, J; all ranks take part."""
         return self._work.total(self._comm)
 
     def nodal(self) -> Floats:
@@ -203,7 +198,7 @@ class Erosion:
             for corner in range(4):
                 for i in range(3):
                     work -= 0.5 * self._clock.last_dt * forces[:, corner, i] * state.v[tets[:, corner], i]
-            self._work.add(np.column_stack([work, np.zeros((len(work), 3))]))
+            self._work.add(np.column_stack([work, np.zeros((len(work), len(WORKS) - 1))]))
         self._last = []
 
 
@@ -213,10 +208,8 @@ def _rows(block: Block, chosen: Ints, rows: "np.ndarray") -> Floats:
 
 
 def _energies(block: Block, chosen: Ints) -> Floats:
-    """(k, 4) work, viscous work, plastic work, and what averaging the pressure has taken, of some tets, J."""
-    columns = [block.at(row, chosen) if block.has(row) else np.zeros(len(chosen))
-               for row in (WORK, WORK_VISCOUS, WORK_PLASTIC, WORK_AVERAGED)]  # fmt: skip
-    return np.column_stack(columns)
+    """(k, 4) WORKS of some tets, J."""
+    return np.column_stack([block.at(row, chosen) if block.has(row) else np.zeros(len(chosen)) for row in WORKS])
 
 
 def _forces(block: Block, chosen: Ints, x: Floats) -> Floats:

@@ -79,6 +79,8 @@ CORNERS = 23
 pressure there sees it (averaged pressure forms)."""
 TOLD = 23
 """Work, J, that the nodes have been told of for it."""
+WORKS = WORK, WORK_VISCOUS, WORK_PLASTIC, WORK_AVERAGED
+"""What the ledger adds up of each tet, also of those that have left."""
 
 INTACT, BROKEN, WIDE = range(3)
 """Bond of a face to the one behind it: whole; broken; broken and so far apart that it is part of the surface."""

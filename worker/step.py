@@ -72,8 +72,7 @@ def end(sim: Simulation, before: Floats) -> None:
     and v(n+1/2), in which walls and contact have had their part as in any step.
     """
     nodes, clock = sim.model.nodes, sim.clock
-    if clock.mean_dt > 0.0:
-        nodes.v[:] = before + 0.5 * clock.last_dt / clock.mean_dt * (nodes.v - before)
+    nodes.v[:] = before + 0.5 * clock.last_dt / clock.mean_dt * (nodes.v - before)
     if sim.erosion is not None:
         nodes.v[sim.erosion.removed] = 0.0
 

@@ -51,7 +51,9 @@ def test_the_kernel_of_a_law_is_the_one_that_is_called(number: int) -> None:
 def test_the_kernel_of_an_equation_is_the_one_that_is_called(number: int) -> None:
     made = next(m for m in MATERIALS if models.eos_of(m) == number)
     (w, s, params), (w1, s1, _), (_, before, _) = (chunk(made, number) for _ in range(3))
+    models.swell(number, w, s, params, N)
     models.press(number, w, s, params, N)
+    models.EQUATIONS[number].volume(w1, s1, params, N)
     models.EQUATIONS[number].kernel(w1, s1, params, N)
     assert np.array_equal(s, s1)
     assert np.array_equal(w, w1)

@@ -34,6 +34,7 @@ from ..state import (
 
 # Rows of the scratch, in numbers of float64. EDGE holds e1, e2, e3 and later b1, b2, b3 at the end of the step;
 # RATE holds the velocity differences, then the rate of deformation and the spin; MOVED the differences of displacement.
+# From NODAL to MOVED each pass and law has rows of its own; the four from CORNER_CHANGE on are the second pass's.
 EDGE = 0
 RATE = 9 * CHUNK
 D_XX, D_YY, D_ZZ, D_YZ, D_ZX, D_XY = (RATE + k * CHUNK for k in range(6))
