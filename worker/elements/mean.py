@@ -8,9 +8,10 @@ dissipate (docs/numerics.md, What averaging takes).
 """
 
 from ..jit import njit
+from ..materials.elastic import sheared, squeezed
 from ..materials.law import BULK, DENSITY, DILATES
 from ..state import BULKING, CHUNK, CORNERS, DILATION, MASS, PRESSURE, WORK_AVERAGED
-from .tet4 import BEFORE, CHANGE, CHANGE_SEEN, SEEN, VOLUME_SEEN
+from .tet4 import BEFORE, CHANGE, CHANGE_SEEN, SEEN, VOLUME_MID, VOLUME_SEEN
 
 _P, _GROWN, _TAKEN = PRESSURE * CHUNK, DILATION * CHUNK, WORK_AVERAGED * CHUNK
 _BULKING, _MASS, _CORNERS = BULKING * CHUNK, MASS * CHUNK, CORNERS * CHUNK
@@ -36,21 +37,32 @@ def take_bulking(s, params, i, more):  # type: ignore[no-untyped-def]
 def keep_before(w, s, params, n):  # type: ignore[no-untyped-def]
     """BEFORE: the pressure before the step; CHANGE_SEEN: how the seen volume changes; VOLUME_SEEN: at mid-step.
 
-    Before the equation of state; VOLUME_SEEN is that of the step's beginning then. What ``tell_dilation`` has taken
-    back is of the step before.
+    Before the equation of state; VOLUME_SEEN is that of the step's beginning then. What dilates sees its own: its
+    pressure does not say a volume, and its flow adds up to the growth of all tets round its nodes. What
+    ``tell_dilation`` has taken back is of the step before.
     """
-    bulk, dilates = params[BULK], params[DILATES] > 0.0
+    if params[DILATES] > 0.0:
+        for i in range(n):
+            back = -s[_GROWN + i]
+            w[BEFORE + i] = s[_P + i] + params[BULK] * back
+            w[VOLUME_SEEN + i] = w[VOLUME_MID + i]
+            w[CHANGE_SEEN + i] = w[VOLUME_MID + i] * (w[SEEN + i] + back)
+        return
     for i in range(n):
-        back = -s[_GROWN + i] if dilates else 0.0
-        strain = w[SEEN + i] + back
-        change = w[VOLUME_SEEN + i] * strain * (1.0 + 0.5 * strain)
-        w[BEFORE + i] = s[_P + i] + bulk * back
+        change = w[VOLUME_SEEN + i] * w[SEEN + i] * (1.0 + 0.5 * w[SEEN + i])
+        w[BEFORE + i] = s[_P + i]
         w[CHANGE_SEEN + i] = change
         w[VOLUME_SEEN + i] += 0.5 * change
 
 
-@njit("void(float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
-def book_averaged(w, s, n):  # type: ignore[no-untyped-def]
-    """WORK_AVERAGED: what the mean pressure of the step has done on the own volume less what on the seen one."""
+@njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
+def book_averaged(w, s, params, n):  # type: ignore[no-untyped-def]
+    """WORK_AVERAGED: what the mean pressure of the step has done on the own volume less what on the seen one.
+
+    The stress of what dilates is that of its own volume: where that grows by the dilation of others, more is stored.
+    """
+    dilates = params[DILATES] > 0.0
     for i in range(n):
-        s[_TAKEN + i] -= 0.5 * (w[BEFORE + i] + s[_P + i]) * (w[CHANGE + i] - w[CHANGE_SEEN + i])
+        stored = squeezed(s, params, i) + sheared(s, params, i) if dilates else 0.0
+        pressure = 0.5 * (w[BEFORE + i] + s[_P + i])
+        s[_TAKEN + i] -= (pressure + stored) * (w[CHANGE + i] - w[CHANGE_SEEN + i])

@@ -314,7 +314,7 @@ def force_pass(  # type: ignore[no-untyped-def]
         if len(worn) == 0:
             resist(w, s, params, n)
         return_at_pressure(strength, w, s, params, n, dt)
-        book_averaged(w, s, n)
+        book_averaged(w, s, params, n)
         if len(upset) > 0:
             let_go(w, s, upset, x, v, t, rows, n, 0.0)
         found, some_hot = SOUND, False

@@ -4,12 +4,28 @@ import numpy as np
 
 from ..elements.tet4 import D_XX, D_XY, D_YY, D_YZ, D_ZX, D_ZZ, DILATATION, SPIN, VOLUME_MID
 from ..jit import njit
-from ..state import CHUNK, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, WORK
+from ..state import CHUNK, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, WORK
+from .law import BULK, SHEAR
 
 _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
-_WORK = WORK * CHUNK
+_WORK, _P = WORK * CHUNK, PRESSURE * CHUNK
 _THIRD = 1.0 / 3.0
+
+
+@njit("float64(float64[::1], float64[::1], int64)", cache=True, error_model="numpy", forceinline=True)
+def sheared(s, params, i):  # type: ignore[no-untyped-def]
+    """What the deviatoric stress of tet ``i`` stores, s:s / 4G, J/m^3."""
+    sxx, syy, szz = s[_SXX + i], s[_SYY + i], s[_SZZ + i]
+    syz, szx, sxy = s[_SYZ + i], s[_SZX + i], s[_SXY + i]
+    square = sxx * sxx + syy * syy + szz * szz + 2.0 * (syz * syz + szx * szx + sxy * sxy)
+    return 0.25 * square / params[SHEAR]
+
+
+@njit("float64(float64[::1], float64[::1], int64)", cache=True, error_model="numpy", forceinline=True)
+def squeezed(s, params, i):  # type: ignore[no-untyped-def]
+    """What a pressure that is linear stores in tet ``i``, p^2 / 2K, J/m^3."""
+    return 0.5 * s[_P + i] * s[_P + i] / params[BULK]
 
 
 @njit("void(float64[::1], int64)", cache=True, error_model="numpy")

@@ -12,15 +12,10 @@ from ..elements.tet4 import CHANGE, MODULUS, NODAL, SEEN, VOLUME_SEEN
 from ..jit import njit
 from ..state import (
     CHUNK,
-    DILATION,
     HEAT,
     MASS,
     PORES,
     PRESSURE,
-    S_XX,
-    S_XY,
-    S_YZ,
-    S_ZZ,
     TOLD,
     VOLUME_RATIO,
     WORK,
@@ -28,13 +23,14 @@ from ..state import (
     WORK_VISCOUS,
     Floats,
 )
+from .elastic import sheared, squeezed
 from .elementary import exp
-from .law import BULK, DENSITY, DILATES, EQUATION, FROM_SHAPE, ORDER, SHEAR, SPALL, Equation
+from .law import BULK, DENSITY, EQUATION, FROM_SHAPE, ORDER, SHEAR, SPALL, Equation
 
 _C0, _SLOPE, _GAMMA = range(EQUATION, EQUATION + 3)
 _P, _MASS, _WORK, _RATIO = PRESSURE * CHUNK, MASS * CHUNK, WORK * CHUNK, VOLUME_RATIO * CHUNK
 _WORK_VISCOUS, _WORK_PLASTIC, _PORES = WORK_VISCOUS * CHUNK, WORK_PLASTIC * CHUNK, PORES * CHUNK
-_HEAT, _GROWN = HEAT * CHUNK, DILATION * CHUNK
+_HEAT = HEAT * CHUNK
 _OLD, _KNOWN, _FACTOR = NODAL, NODAL + CHUNK, NODAL + 2 * CHUNK
 """Rows of the scratch: the pressure before the step, Pa; of the energy equation factor * new = cold part + known."""
 _LEAST = 0.05
@@ -60,13 +56,9 @@ def _book_pores(w, s, params, i, strain, mean):  # type: ignore[no-untyped-def]
     """The plastic work of pores that have grown by ``strain`` of the volume: the ``mean`` pressure of the step times
     that, as the whole work is. What the stress stores is of more volume afterwards, or of less.
     """
-    p, square = s[_P + i], 0.0
+    stored = squeezed(s, params, i)
     if params[ORDER] != FROM_SHAPE:
-        for row in range(S_XX, S_ZZ + 1):
-            square += s[row * CHUNK + i] * s[row * CHUNK + i]
-        for row in range(S_YZ, S_XY + 1):
-            square += 2.0 * s[row * CHUNK + i] * s[row * CHUNK + i]
-    stored = 0.5 * p * p / params[BULK] + 0.25 * square / params[SHEAR]
+        stored += sheared(s, params, i)
     s[_WORK_PLASTIC + i] -= w[VOLUME_SEEN + i] * strain * (mean + stored)
 
 
@@ -98,16 +90,8 @@ def volumes_by_ratio(w, s, params, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def volumes_by_pressure(w, s, params, n):  # type: ignore[no-untyped-def]
-    """VOLUME_SEEN of n of the linear pressure, m^3: V0 exp(pores - p / K); of what dilates, whose pressure does not say
-    it, by the ratio, which nothing else needs.
-    """
+    """VOLUME_SEEN of n of the linear pressure, m^3: V0 exp(pores - p / K)."""
     per_density, per_bulk, porous = 1.0 / params[DENSITY], 1.0 / params[BULK], params[SPALL] < np.inf
-    if params[DILATES] > 0.0:
-        volumes_by_ratio(w, s, params, n)
-        for i in range(n):
-            strain = w[SEEN + i] - s[_GROWN + i]
-            s[_RATIO + i] *= 1.0 + strain * (1.0 + 0.5 * strain)
-        return
     for i in range(n):
         pores = s[_PORES + i] if porous else 0.0
         w[VOLUME_SEEN + i] = s[_MASS + i] * per_density * exp(pores - s[_P + i] * per_bulk)

@@ -28,6 +28,7 @@ from ..state import (
     WORK_PLASTIC,
 )
 from ..turning import sine_and_cosine
+from .elastic import squeezed
 from .law import AFTER_PRESSURE, BULK, DILATES, FIRST, SHEAR, Law
 from .plastic import equivalent_stress
 
@@ -205,8 +206,8 @@ def mohr_coulomb(w, s, params, n, dt):  # type: ignore[no-untyped-def]
             e1, e2, e3, flow = dilated(d1, d2, d3, r * strength, sine, r * cap, params[DILATES], shear2, params[BULK])
             grown = 2.0 * params[DILATES] * q * flow
             grow(w, s, i, grown, told, params[BULK])
-            stored = s[_P + i] * s[_P + i] / params[BULK] + q * q / shear2 * (e1 * e1 + e2 * e2 + e3 * e3)
-            s[_WORK + i] -= 0.5 * w[VOLUME_SEEN + i] * grown * stored
+            stored = squeezed(s, params, i) + 0.5 * q * q / shear2 * (e1 * e1 + e2 * e2 + e3 * e3)
+            s[_WORK + i] -= w[VOLUME_SEEN + i] * grown * stored
         else:
             e1, e2, e3 = returned(d1, d2, d3, max(r * strength, 0.0), sine, r * cap)
         if e1 == d1:
