@@ -92,7 +92,8 @@ class Gravity(Model):
 
 class Traction(Model):
     """A force per initial area, Pa, on the exposed faces whose three nodes start inside the box ``low``..``high`` (all
-    of the parts when absent), turning with nothing. Either ``stress`` or ``pressure`` is given."""
+    of the parts when absent), turning with nothing, until erosion takes the tet of the face. Either ``stress`` or
+    ``pressure`` is given."""
 
     kind: Literal["traction"]
     """The kind of boundary."""

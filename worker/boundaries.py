@@ -36,6 +36,8 @@ class Boundary(ABC):
     """Whether it acts after contact: nothing may undo what it corrects."""
     mirrors = False
     """Whether its nodes lie on one plane in which the body is mirrored: exposed faces in that plane are no surface."""
+    on_faces = False
+    """Whether it acts on faces of tets, not on nodes."""
 
     def __init__(self, nodes: Indices) -> None:
         self.nodes = nodes
@@ -77,6 +79,9 @@ class Boundary(ABC):
         if len(at):
             self._rooms.take(self, n + len(at))
             self._inherit(at)
+
+    def drop(self, tets: Ints) -> None:  # noqa: B027 (most boundaries act on nodes)
+        """Tets with these global ids have left, on any rank; what is ``on_faces`` of theirs goes with them."""
 
     def keep(self, parcel: Parcel, name: str) -> None:
         """Adds what the boundary must remember to a parcel, under its ``name``."""

@@ -65,10 +65,13 @@ class Gravity(Driver):
 
 
 class Traction(Driver):
-    """Forces on corners of tets, times the mean factor of the ``course`` over the mean step of the kick.
+    """Forces on corners of tets, times the mean factor of the ``course`` over the mean step of the kick. They go with
+    their tets.
 
     ``load`` is on all ``corners`` (m,) that are local nodes.
     """
+
+    on_faces = True
 
     def __init__(self, corners: Indices, load: Load, course: Course) -> None:
         super().__init__(np.unique(corners))
@@ -100,6 +103,12 @@ class Traction(Driver):
         super().grow(split, ids)
         self._corners = split.followed(self._corners[:, None], ids, self._load.tets)[:, 0]
         self.force = self._summed()
+
+    def drop(self, tets: Ints) -> None:
+        stay = ~np.isin(self._load.tets, tets)
+        if not stay.all():
+            self._load, self._corners = self._load.take(stay), self._corners[stay]
+            self.force = self._summed()
 
     def _summed(self) -> Floats:
         force = np.zeros((len(self.nodes), 3))

@@ -10,6 +10,7 @@ import numpy as np
 
 from conoid.cases.schema import Case
 
+from .boundaries import Boundary
 from .clock import Clock
 from .contact import bare
 from .contact.stage import Contact
@@ -49,11 +50,12 @@ class Erosion:
     """The erosion of a case on one rank."""
 
     def __init__(
-        self, case: Case, model: Model, neighbours: list[Neighbour], contact: Contact | None, comm: Comm,
-        clock: Clock, extremes: tuple[float, float],
+        self, case: Case, model: Model, neighbours: list[Neighbour], contact: Contact | None, bounds: list[Boundary],
+        comm: Comm, clock: Clock, extremes: tuple[float, float],
     ) -> None:  # fmt: skip
         """``extremes``: largest nodal mass, kg, and speed, m/s, of the scene."""
         self._model, self._neighbours, self._contact = model, neighbours, contact
+        self._loads = [bound for bound in bounds if bound.on_faces]
         self._comm, self._clock = comm, clock
         self._specs = [part.erosion for part in case.parts]
         leaves = np.array([spec is not None and spec.nodes == "remove" for spec in self._specs])
@@ -165,16 +167,18 @@ class Erosion:
 
     def _remove(self, state: Nodes) -> None:
         """Takes the marked tets out; all ranks take part."""
-        gone, left = [np.zeros((0, bare.WORDS), np.int64)], []
+        gone, left, ids = [np.zeros((0, bare.WORDS), np.int64)], [], [np.zeros(0, np.int64)]
         for block in self._model.blocks:
             worn = np.flatnonzero(block.worn)
             if len(worn):
                 if self._contact is not None:
                     gone.append(bare.leaving(block, worn, state.id))
                 left.append(block.tets[worn].astype(np.int64))
+                ids.append(block.id[worn])
                 self._last.append((left[-1], _forces(block, worn, state.x)))
                 self._work.add(_energies(block, worn))
                 block.drop(worn)
+        self._unload(np.concatenate(ids))
         self._tets_at -= self._completed(left)
         self._model.elements_global -= int(self._comm.sum(np.array([sum(len(tets) for tets in left)]))[0])
         alone = self._tets_at == 0
@@ -183,6 +187,15 @@ class Erosion:
         self._before = state.v[self._leaving]
         if self._contact is not None:
             self._contact.uncover(np.concatenate(gone), alone & ~self.removed, self.removed)
+
+    def _unload(self, gone: Ints) -> None:
+        """Tets ``gone`` from this rank, global ids, carry no boundary any more, which acts on every rank that holds a
+        node of theirs; all ranks take part.
+        """
+        if self._loads:
+            gone = self._comm.join(gone)
+            for load in self._loads:
+                load.drop(gone)
 
     def _completed(self, tets: list[Ints]) -> Ints:
         """(nodes,) how many of these tets of all ranks have each node; all ranks take part."""

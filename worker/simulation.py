@@ -136,9 +136,9 @@ def build(case: Case, folder: Path, comm: Comm, say: Say = quiet) -> Simulation:
     model, piece = domain.build(case, folder, comm, say)
     say("setting up the first step")
     scene = conditions.build(case, model, piece.loads)
-    conditions.start(case, model, scene, comm)
+    told = conditions.start(case, model, scene, comm)
     sim = _assemble(case, model, piece.neighbours, scene, piece.node_volume, comm, Timers(comm))
-    sim.warnings = tuple(piece.warnings)
+    sim.warnings = *piece.warnings, *told
     sim.probes.require_tets(case)
     if sim.contact is not None:
         sim.contact.require_faces()
@@ -157,7 +157,7 @@ def _assemble(
     if case.in_contact:
         contact = Contact(case, model, neighbours, scene, comm, clock, timers, extremes)
     if case.erodes:
-        erosion = Erosion(case, model, neighbours, contact, comm, clock, extremes)
+        erosion = Erosion(case, model, neighbours, contact, scene, comm, clock, extremes)
     if case.boundaries_of(Symmetry):
         scene.append(Mirrors.of(case, model, scene))
     walls = next((bound for bound in scene if type(bound) is RigidWalls), None)

@@ -144,7 +144,9 @@ MEETING = ["meeting_arbitrary", "meeting_box"]
 """Four bodies collide, turn and rub, seen by either contact domain (meeting.toml)."""
 ERODING = ["eroding_arbitrary", "eroding_box"]
 """A rod goes through two plates and hundreds of tets leave, seen by either contact domain (eroding.toml)."""
-SCENES = [*EVERYTHING, *MEETING, *ERODING]
+SHEDDING = "shedding"
+"""A slab that is pressed on tears itself apart until nothing carries the pressure (shedding.toml)."""
+SCENES = [*EVERYTHING, *MEETING, *ERODING, SHEDDING]
 NAMES = sorted([*SHORT, *SCENES])
 
 
@@ -154,9 +156,9 @@ def arguments(name: str, folder: Path) -> list[str]:
     case = name
     if name in EVERYTHING:
         case, words = str(folder.parent / "everything.toml"), [f"numerics.pressure={name.partition('_')[2]}"]
-    if name in [*MEETING, *ERODING]:
+    if name in [*MEETING, *ERODING, SHEDDING]:
         file, _, domain = name.partition("_")
-        case, words = str(Path(__file__).with_name(f"{file}.toml")), [f"contact.domain={domain}"]
+        case, words = str(Path(__file__).with_name(f"{file}.toml")), [f"contact.domain={domain or 'arbitrary'}"]
     sets = [word for change in words for word in ("--set", change)]
     return [case, *sets, "--out", str(folder / name)]
 

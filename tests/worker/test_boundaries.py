@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conoid.cases import materials
+from conoid.cases import materials, schema
 from conoid.worker import domain, step
 from conoid.worker.boundaries import RigidWalls
 from conoid.worker.drivers import Traction
@@ -18,6 +18,7 @@ from conoid.worker.state import PRESSURE, S_ZZ, WORK, Flags
 from ..contact.bodies import meeting_of, moved
 from .kernels import COPPER, STEEL, Watch, around, build, run, scene, whole_of
 from .meshes import Floats, block
+from .simulations import on, tick
 
 MESH = block((3, 3, 3), 1e-3, seed=2)
 TILTED = (1.0, -2.0, 3.0)
@@ -149,6 +150,33 @@ def test_nodes_on_a_symmetry_plane_stay_on_it(axis: str, at: float) -> None:
     assert (sim.model.nodes.x[on, k] == MESH.points[on, k]).all()
     assert np.abs(sim.model.nodes.x[on] - MESH.points[on]).max() > 1e-6
     assert sim.boundaries[0].contact_loss.sum() == sim.boundaries[0].external_work.sum() == 0.0
+
+
+def test_a_body_through_a_symmetry_plane_is_refused() -> None:
+    """It would lie in its own mirror image."""
+    even = block((2, 2, 2), 1e-3)
+    message = r"^boundaries\[0\]: part 'body' lies on both sides of this plane of symmetry, and in its own mirror image"
+    for at in (0.4e-3, 1.3e-3):
+        with pytest.raises(InputError, match=message):
+            build(scene(STEEL, boundaries=({"kind": "symmetry", "axis": "y", "at": at},)), [even])
+    assert build(scene(STEEL, boundaries=({"kind": "symmetry", "axis": "y", "at": 0.0},)), [even]).warnings == ()
+
+
+def test_a_body_may_fly_at_a_symmetry_plane() -> None:
+    """No node starts on it, which is told; what arrives is thrown back."""
+    plane = {"kind": "symmetry", "axis": "z", "at": -1e-5}
+    sim = with_boundary(plane, velocity=(0.0, 0.0, -100.0), end=1.5e-6)
+    assert sim.warnings == ("boundaries[0]: no node starts on this plane of symmetry; it holds what comes to it later",)
+    run(sim)
+    assert sim.model.nodes.x[:, 2].min() >= -1e-5 - 1e-12
+    assert np.average(sim.model.nodes.v[:, 2], weights=sim.model.nodes.mass) > 50.0
+
+
+def test_motion_that_a_symmetry_plane_stops_at_the_start_is_told() -> None:
+    sim = with_boundary({"kind": "symmetry", "axis": "z"}, velocity=(5.0, 0.0, 30.0))
+    (told,) = sim.warnings
+    assert told.startswith("boundaries[0]: nodes start on this plane of symmetry with up to 30 m/s across it")
+    assert with_boundary({"kind": "symmetry", "axis": "z"}, velocity=(5.0, 0.0, 0.0)).warnings == ()
 
 
 @pytest.mark.parametrize("order", [1, -1], ids=["plane first", "wall first"])
@@ -364,6 +392,29 @@ def test_a_traction_without_a_face_is_refused() -> None:
     for box in ({"low": (0.0, 0.0, 1.4e-3), "high": (1.0, 1.0, 1.6e-3)}, {"parts": ("nobody",)}):
         with pytest.raises(InputError, match=r"^boundaries\[1\]: acts on no face; check its box and its parts$"):
             build(scene(STEEL, boundaries=(GRAVITY, {**PULL, **box})), [MESH])
+
+
+@pytest.mark.parametrize("ranks", [1, 3])
+def test_a_traction_leaves_with_the_tets_of_its_faces(ranks: int) -> None:
+    """What they leave behind flies on: a force that stayed would drive their nodes, of hardly any mass, for ever."""
+    top = {frozenset(face.tolist()) for face in boundary_faces(MESH.tets) if (MESH.points[face][:, 2] > 2.9e-3).all()}
+    loaded = {e: [c for c in top if c <= set(tet.tolist())] for e, tet in enumerate(MESH.tets)}
+    gone = np.array([e for e, faces in loaded.items() if faces][::2])
+    stay = [list(face) for e, faces in loaded.items() if e not in gone for face in faces]
+    area = sum(float(np.linalg.norm(np.cross(*(MESH.points[f[1:]] - MESH.points[f[0]])))) / 2.0 for f in stay)
+    assert 0.3 * 9e-6 < area < 0.7 * 9e-6
+
+    def work(sim: Simulation) -> Floats:
+        step.prepare(sim)
+        tick(sim)
+        assert tick(sim, gone) < 1e-3
+        load = pushed(sim)
+        return np.asarray(load.force[sim.model.nodes.owned[load.nodes]].sum(axis=0))
+
+    erosion = schema.Erosion(plastic_strain=5.0)
+    case = scene(COPPER, boundaries=({**PULL, **TOP},), erosion=erosion)
+    force = np.sum(on(ranks, case, [MESH], work), axis=0)
+    assert force == pytest.approx(area * np.array(PULL["stress"]), rel=1e-12)
 
 
 def test_a_free_body_under_traction_is_accelerated_exactly() -> None:
