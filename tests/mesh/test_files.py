@@ -165,6 +165,22 @@ def test_a_bad_tet_is_named_as_in_the_file(
         read(name, tmp_path, unit=1e-3)
 
 
+def test_groups_of_one_entity_are_not_taken_for_each_other(tmp_path: Path) -> None:
+    """In the format 2.2 a group is that of a tet; both tets would be in both groups. Without a group all is well."""
+    (tmp_path / "mixed.msh").write_text(MSH.format(height=1).replace("101 4 2 1 1", "101 4 2 2 1"))
+    with pytest.raises(
+        MeshError, match="tets of its elementary entity 1 are in the groups 1, 2, which cannot be told apart"
+    ):
+        read("mixed.msh", tmp_path, group="2")
+    assert len(read("mixed.msh", tmp_path).tets) == 2
+
+
+def test_a_group_without_tets_is_named(tmp_path: Path) -> None:
+    (tmp_path / "empty.inp").write_text(INP.format(height=1) + "*ELSET, ELSET=NONE\n")
+    with pytest.raises(MeshError, match=r"^parts\[1\]\.mesh\.group = 'none': no tet is in it$"):
+        read("empty.inp", tmp_path, group="none")
+
+
 @pytest.mark.parametrize("more", ["102, 10, 20, 30, 40", "102, 20, 30, 10, 40"])
 def test_a_tet_that_is_there_twice_is_refused(more: str, tmp_path: Path) -> None:
     (tmp_path / "twice.inp").write_text(INP.format(height=1) + more)

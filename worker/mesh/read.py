@@ -32,6 +32,8 @@ def read(file: MeshFile, path: Path, key: str = "mesh") -> TetMesh:
         raise MeshError(f"{key}.path = {file.path!r}: expected a file name that ends in {' or '.join(readers)}")
     try:
         found = readers[path.suffix.lower()](path, file.group, key)
+        if file.group is not None and not len(found.mesh.tets):
+            raise MeshError(f"{key}.group = {file.group!r}: no tet is in it")
         mesh = check(TetMesh(found.mesh.points * file.unit, found.mesh.tets), found.names)
         if len(twins := same_side(mesh.tets)):
             one, other = found.names.tets[twins[0]]
@@ -45,12 +47,14 @@ def read(file: MeshFile, path: Path, key: str = "mesh") -> TetMesh:
 
 
 def _read_msh(path: Path, group: str | None, key: str) -> NamedMesh:
-    _check_header(path)
+    version = _checked_header(path)
     with tempfile.TemporaryDirectory() as folder, session({"General.NumThreads": 1}) as gmsh:
         private = os.path.join(folder, "mesh.msh")
         os.symlink(path.resolve(), private)
         _open(gmsh, private)
         entities = None if group is None else _entities(gmsh, group, key)
+        if version == "2.2":
+            _refuse_mixed(gmsh, entities or [])
         _refuse_other_volumes(gmsh, entities)
         return tet_mesh(gmsh, entities)
 
@@ -70,7 +74,8 @@ def _remark(gmsh: Any, path: str) -> str:
     return f" (gmsh: {text})" if text and path not in text else ""
 
 
-def _check_header(path: Path) -> None:
+def _checked_header(path: Path) -> str:
+    """The version of the format, one of _VERSIONS."""
     with path.open("rb") as file:
         first, second = file.readline(80).strip(), file.readline(80).split()
     if first != b"$MeshFormat":
@@ -78,6 +83,7 @@ def _check_header(path: Path) -> None:
     version = second[0].decode("ascii", "replace") if second else ""
     if version not in _VERSIONS:
         raise MeshError(f"the .msh format {version!r} is not read; save it as {' or '.join(_VERSIONS)}")
+    return version
 
 
 def _entities(gmsh: Any, group: str, key: str) -> list[int]:
@@ -89,6 +95,19 @@ def _entities(gmsh: Any, group: str, key: str) -> list[int]:
     if group not in known:
         raise MeshError(f"{key}.group = {group!r}: no such group of volumes; known: {', '.join(known) or 'none'}")
     return [int(tag) for tag in gmsh.model.getEntitiesForPhysicalGroup(3, known[group])]
+
+
+def _refuse_mixed(gmsh: Any, entities: list[int]) -> None:
+    """The format 2.2 gives each tet its group; gmsh puts all tets of an entity into the groups of any of them."""
+    for entity in entities:
+        groups = [
+            gmsh.model.getPhysicalName(3, tag) or str(tag) for tag in gmsh.model.getPhysicalGroupsForEntity(3, entity)
+        ]
+        if len(groups) > 1:
+            raise MeshError(
+                f"the tets of its elementary entity {entity} are in the groups {', '.join(groups)}, which cannot be told "
+                "apart in the format 2.2; give each group entities of its own, or save it as 4.1"
+            )
 
 
 def _refuse_other_volumes(gmsh: Any, entities: list[int] | None) -> None:
