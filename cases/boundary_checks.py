@@ -9,7 +9,7 @@ from .drives import clash
 from .geometry import index, lowest_along
 from .placed import Placed
 from .problems import Location, Problem, choices, nearest, problem
-from .schema import Case, Gravity, Prescribed, Rotation, Symmetry, Traction, Wall
+from .schema import Case, Gravity, Part, Prescribed, Rotation, Symmetry, Traction, Wall
 
 ROUNDING = 1e-9
 """Of a length or a time: two numbers that agree to this were meant to be equal. Chosen far above the rounding of
@@ -43,9 +43,12 @@ def _out_of_reach(case: Case, number: int) -> Iterator[Problem]:
     margin = ROUNDING * max(1.0, *(abs(x) for body in bodies for corner in body for x in corner))
     if isinstance(boundary, Symmetry):
         d = index(boundary.axis)
-        if not any(low[d] - margin <= boundary.at <= high[d] + margin for low, high in bodies):
+        apart = not any(low[d] - margin <= boundary.at <= high[d] + margin for low, high in bodies)
+        if apart and not any(
+            _comes(case, part, d, boundary.at - low[d]) for part, (low, _) in zip(parts, bodies, strict=True)
+        ):
             reach = f"{min(low[d] for low, _ in bodies):g} and {max(high[d] for _, high in bodies):g} m"
-            message = f"no node lies on this plane: the bodies are between {reach} along {boundary.axis}"
+            message = f"nothing lies on this plane or flies at it: the bodies are between {reach} along {boundary.axis}"
             yield problem(("boundaries", number, "at"), f"{boundary.at:g} m", message)
     elif isinstance(boundary, Prescribed | Traction) and boundary.low is not None and boundary.high is not None:
         box = list(zip(boundary.low, boundary.high, strict=True))
@@ -61,6 +64,14 @@ def _out_of_reach(case: Case, number: int) -> Iterator[Problem]:
             yield problem(
                 ("boundaries", number), ..., f"the box misses all bodies that it is for; they are in {reach} m"
             )
+
+
+def _comes(case: Case, part: Part, axis: int, way: float) -> bool:
+    """Whether a part moves along ``axis`` to where it comes by going the ``way``, m, as far as that can be said."""
+    pulls = [boundary.acceleration[axis] for boundary in case.boundaries if isinstance(boundary, Gravity)]
+    unknown = part.spin is not None or part.stretch is not None or part.jitter > 0.0
+    driven = any(isinstance(boundary, Prescribed | Rotation | Traction) for boundary in case.boundaries)
+    return unknown or driven or any(speed * way > 0.0 for speed in (part.velocity[axis], *pulls))
 
 
 def _two_drives(case: Case) -> Iterator[Problem]:

@@ -18,6 +18,8 @@ AXES = {"x": 0, "y": 1, "z": 2}
 ON_PLANE = 1e-9
 """Of the size of the mesh: closer than this is on a plane. Chosen far above the rounding of coordinates (1e-16) and far
 below the smallest tets (1e-4)."""
+_ASIDE = 1e-9
+"""Of the largest speed: less across a symmetry plane is rounding."""
 
 
 def loads(parcel: Parcel) -> list[Load]:
@@ -52,21 +54,49 @@ def build(case: schema.Case, model: Model, loads: list[Load]) -> list[Boundary]:
     return [*boundaries, *_walls(case, [h & ~moved for h in held], mirrored(nodes.n, boundaries))]
 
 
-def start(case: schema.Case, model: Model, boundaries: list[Boundary], comm: Comm) -> None:
-    """Makes the initial velocities agree with the boundaries; all ranks take part.
+def start(case: schema.Case, model: Model, boundaries: list[Boundary], comm: Comm) -> list[str]:
+    """Makes the initial velocities agree with the boundaries; what the user should know of them. All ranks take part.
 
     Raises InputError, on every rank alike, for a boundary that holds no node, two that drive a node in two ways, a body
-    that starts behind a wall, and motion prescribed across a symmetry plane.
+    that starts behind a wall or through a symmetry plane, and motion prescribed across one.
     """
     held = [_held_by(spec, model) for spec in case.boundaries]
     counts = comm.sum(np.array([int(each.sum()) for each in held], np.int64))
-    for index in np.flatnonzero(counts == 0):
-        raise InputError(f"boundaries[{index}]: holds no node; check its place and its parts")
+    beside = _beside(case, model, comm)
+    for index in np.flatnonzero(counts == 0).tolist():
+        if index not in beside:
+            raise InputError(f"boundaries[{index}]: holds no node; check its place and its parts")
     _refuse_two_drives(case.boundaries, held, comm)
     _refuse_conflicts(boundaries, model.nodes, comm)
     _refuse_overlaps(case, model, boundaries, comm)
+    _refuse_crossings(case, model, comm)
+    told = [
+        f"boundaries[{index}]: no node starts on this plane of symmetry; it holds what comes to it later"
+        for index in beside if counts[index] == 0
+    ]  # fmt: skip
+    told += _stopped(case, held, model.nodes, comm)
     for boundary in boundaries:
         boundary.start(model.nodes)
+    return told
+
+
+def _beside(case: schema.Case, model: Model, comm: Comm) -> list[int]:
+    """The symmetry planes beside which nodes start."""
+    planes = case.boundaries_of(schema.Symmetry)
+    found = comm.sum(np.array([int(np.count_nonzero(sides(spec, model))) for _, spec in planes], np.int64))
+    return [index for (index, _), many in zip(planes, found, strict=True) if many]
+
+
+def _stopped(case: schema.Case, held: list[Flags], nodes: Nodes, comm: Comm) -> list[str]:
+    """Where symmetry planes take a velocity from nodes that start on them."""
+    planes = case.boundaries_of(schema.Symmetry)
+    across = [np.abs(nodes.v[held[index], AXES[spec.axis]]).max(initial=0.0) for index, spec in planes]
+    speeds = comm.maximum(np.array([*across, np.abs(nodes.v).max(initial=0.0)]))
+    return [
+        f"boundaries[{index}]: nodes start on this plane of symmetry with up to {speed:.3g} m/s across it, and are "
+        "stopped; is the motion symmetric?"
+        for (index, _), speed in zip(planes, speeds[:-1], strict=True) if speed > _ASIDE * speeds[-1]
+    ]  # fmt: skip
 
 
 def _held_by(spec: schema.Boundary, model: Model) -> Flags:
@@ -117,6 +147,21 @@ def _refuse_overlaps(case: schema.Case, model: Model, boundaries: list[Boundary]
             for index, depth in zip(indices, comm.maximum(walls.depths(model.nodes)), strict=True):
                 if depth > ON_PLANE * model.size:
                     raise InputError(f"boundaries[{index}]: a body starts {depth:.3g} m behind this wall")
+
+
+def _refuse_crossings(case: schema.Case, model: Model, comm: Comm) -> None:
+    """A tet through a symmetry plane would lie in its own mirror image."""
+    for index, spec in case.boundaries_of(schema.Symmetry):
+        side, found = sides(spec, model), -1.0
+        for block in model.blocks:
+            of = side[block.tets]
+            if (of.min(axis=1) * of.max(axis=1) < 0.0).any():
+                found = float(block.part)
+        if (part := int(comm.maximum(np.array([found]))[0])) >= 0:
+            raise InputError(
+                f"boundaries[{index}]: part {model.parts[part]!r} lies on both sides of this plane of symmetry, and in "
+                "its own mirror image; let it end on the plane, or name the parts that have an image in parts"
+            )
 
 
 def _refuse_two_drives(specs: Sequence[schema.Boundary], held: list[Flags], comm: Comm) -> None:

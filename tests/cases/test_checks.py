@@ -114,6 +114,12 @@ def test_a_fault_is_named(overrides: list[str], key: str, message: str) -> None:
     assert message in found[key]
 
 
+def test_what_flies_at_a_symmetry_plane_need_not_lie_on_it() -> None:
+    """The rod moves down: to a plane below it, not to one above."""
+    parse_case(rod("boundaries[0]={kind='symmetry', axis='z', at='-1 mm'}"))
+    assert "boundaries[0].at" in said("boundaries[0]={kind='symmetry', axis='z', at='40 mm'}")
+
+
 def test_names_are_unique() -> None:
     data = rod()
     data["parts"].append({**data["parts"][0]})
