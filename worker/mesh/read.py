@@ -105,8 +105,8 @@ def _refuse_mixed(gmsh: Any, entities: list[int]) -> None:
         ]
         if len(groups) > 1:
             raise MeshError(
-                f"the tets of its elementary entity {entity} are in the groups {', '.join(groups)}, which cannot be told "
-                "apart in the format 2.2; give each group entities of its own, or save it as 4.1"
+                f"the tets of its elementary entity {entity} are in the groups {', '.join(groups)}, which cannot be "
+                "told apart in the format 2.2; give each group entities of its own, or save it as 4.1"
             )
 
 
