@@ -180,7 +180,11 @@ def _fracture(extent: Extent, book: Book) -> None:
 
 def _cracks(extent: Extent, book: Book) -> None:
     if extent is not QUICK:
-        runs = list(cracks.measure([*cracks.PLATES, *cracks.SIBLINGS, *cracks.STEPPED, *cracks.STRIPS, *cracks.BARS]))
+        runs = list(
+            cracks.measure(
+                [*cracks.PLATES, *cracks.SIBLINGS, *cracks.STEPPED, *cracks.ROWS, *cracks.STRIPS, *cracks.BARS]
+            )
+        )
         from . import plot
 
         book.add("Cracks", cracks.report(runs), cracks.as_data(runs))

@@ -35,6 +35,8 @@ OUT = ROOT / "build" / "accuracy"
 _QUIET = {"run.ranks": 1, "run.frames": 0, "run.snapshots": 0, "run.checkpoint_every": "none"}
 _COARSE = 2.0
 """Of the element sizes, for the second, cheaper run of a case. Chosen."""
+_RANKS = ("tests/parallel/", "tests/server/", "tests/client/")
+"""Where tests are whose work is done by processes that they start."""
 _QUICK = 60.0
 """Estimated CPU s of a case above which ``quick`` leaves it out. Chosen."""
 
@@ -83,15 +85,21 @@ def _told(key: str, run: Run) -> Any:
 
 
 def tests(quick: bool) -> dict[str, Any]:
-    """Every test that a row names, with what it has asserted."""
+    """Every test that a row names, with what it has asserted: those that start ranks beside all others."""
     nodes = sorted({f"tests/{node}" for row in catalogue() for node in row.get("tests", ())})
-    command = [
-        sys.executable, "-m", "pytest", "-q", "-p", "tests.bench.recorder", "-o", "enable_assertion_pass_hook=true",
-        "--recorded", str(OUT / "recorded.json"), "--timeout", "3600", *(["-m", "not slow"] if quick else []), *nodes,
-    ]  # fmt: skip
+    halves = [[node for node in nodes if node.startswith(_RANKS) == several] for several in (False, True)]
     environment = {**os.environ, "PYTHONPYCACHEPREFIX": str(OUT / "bytecode"), "PYTHONPATH": str(ROOT)}
-    subprocess.run(command, cwd=ROOT, env=environment, check=False)
-    return dict(json.loads((OUT / "recorded.json").read_text(encoding="utf-8")))
+    files = [OUT / f"recorded-{number}.json" for number in range(len(halves))]
+    under_way = []
+    for half, file in zip(halves, files, strict=True):
+        command = [
+            sys.executable, "-m", "pytest", "-q", "-p", "tests.bench.recorder", "-o", "enable_assertion_pass_hook=true",
+            "--recorded", str(file), "--timeout", "3600", *(["-m", "not slow"] if quick else []), *half,
+        ]  # fmt: skip
+        under_way.append(subprocess.Popen(command, cwd=ROOT, env=environment))
+    for process in under_way:
+        process.wait()
+    return {node: entry for file in files for node, entry in json.loads(file.read_text(encoding="utf-8")).items()}
 
 
 def hard_cases(_: bool) -> list[Any]:

