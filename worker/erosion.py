@@ -131,6 +131,11 @@ class Erosion:
         return self._nodal.total(self._comm)
 
     @property
+    def warnings(self) -> list[str]:
+        """What the user should know at the end."""
+        return [] if self._model.elements_global else ["no tet is left: erosion has taken them all"]
+
+    @property
     def particles(self) -> int:
         """Nodes without tets that fly on; all ranks take part."""
         nodes = self._model.nodes

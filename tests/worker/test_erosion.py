@@ -362,6 +362,8 @@ def test_a_run_outlives_its_tets(left: int, erosion: schema.Erosion) -> None:
             first = sim.clock.t >= 0.1e-6 and sim.model.elements_global > left * len(meshes[1].tets)
             residuals.append(tick(sim, ids if first else None))
         assert sim.model.elements_global == left * len(meshes[1].tets)
+        assert sim.erosion is not None
+        assert sim.erosion.warnings == ([] if left else ["no tet is left: erosion has taken them all"])
         worst.append(max(residuals))
     assert worst[0] < 1e-3
     assert worst[1] < 0.25 * worst[0]
