@@ -152,15 +152,16 @@ def _refuse_overlaps(case: schema.Case, model: Model, boundaries: list[Boundary]
 def _refuse_crossings(case: schema.Case, model: Model, comm: Comm) -> None:
     """A tet through a symmetry plane would lie in its own mirror image."""
     for index, spec in case.boundaries_of(schema.Symmetry):
-        side, found = sides(spec, model), -1.0
+        height, beyond = np.where(_of_parts(spec, model), heights(spec, model), 0.0), np.zeros(len(model.parts))
         for block in model.blocks:
-            of = side[block.tets]
-            if (of.min(axis=1) * of.max(axis=1) < 0.0).any():
-                found = float(block.part)
-        if (part := int(comm.maximum(np.array([found]))[0])) >= 0:
+            of = height[block.tets]
+            beyond[block.part] = np.minimum(of.max(axis=1), -of.min(axis=1)).max(initial=beyond[block.part])
+        beyond = comm.maximum(beyond)
+        if (most := beyond.max()) > 0.0:
             raise InputError(
-                f"boundaries[{index}]: part {model.parts[part]!r} lies on both sides of this plane of symmetry, and in "
-                "its own mirror image; let it end on the plane, or name the parts that have an image in parts"
+                f"boundaries[{index}]: tets of part {model.parts[int(beyond.argmax())]!r} reach {most:.3g} m through "
+                "this plane of symmetry into their own mirror images; let the body end on it, or name the parts that "
+                "have an image in parts"
             )
 
 

@@ -155,8 +155,10 @@ def test_nodes_on_a_symmetry_plane_stay_on_it(axis: str, at: float) -> None:
 def test_a_body_through_a_symmetry_plane_is_refused() -> None:
     """It would lie in its own mirror image."""
     even = block((2, 2, 2), 1e-3)
-    message = r"^boundaries\[0\]: part 'body' lies on both sides of this plane of symmetry, and in its own mirror image"
     for at in (0.4e-3, 1.3e-3):
+        message = (
+            r"^boundaries\[0\]: tets of part 'body' reach 0\.000\d+ m through this plane of symmetry into their own"
+        )
         with pytest.raises(InputError, match=message):
             build(scene(STEEL, boundaries=({"kind": "symmetry", "axis": "y", "at": at},)), [even])
     assert build(scene(STEEL, boundaries=({"kind": "symmetry", "axis": "y", "at": 0.0},)), [even]).warnings == ()
