@@ -130,10 +130,13 @@ class Erosion:
         """(5,) energy, J, mass, kg, and momentum, kg m/s, of the nodes that have left; all ranks take part."""
         return self._nodal.total(self._comm)
 
-    @property
     def warnings(self) -> list[str]:
-        """What the user should know at the end."""
-        return [] if self._model.elements_global else ["no tet is left: erosion has taken them all"]
+        """What the user should know at the end; all ranks take part."""
+        left = np.zeros(len(self._model.parts), np.int64)
+        for block in self._model.blocks:
+            left[block.part] += block.n
+        gone = np.flatnonzero(self._comm.sum(left) == 0).tolist()
+        return [f"part {self._model.parts[part]!r} has no tet left: erosion has taken them all" for part in gone]
 
     @property
     def particles(self) -> int:

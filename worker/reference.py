@@ -102,13 +102,13 @@ def _mean_speed(sim: Simulation, spec: Reference) -> float:
         chosen = chosen & ~sim.erosion.removed
     mass = nodes.mass[chosen]
     momentum, total = exact_sums(sim.comm, np.column_stack([mass * nodes.v[chosen, _AXES[spec.axis or "z"]], mass]))
-    return float(momentum / total)
+    return float(momentum / total) if total > 0.0 else float("nan")
 
 
 def _largest(sim: Simulation, spec: Reference) -> float:
     names = _STRESSES if spec.quantity == "stress_max" else (spec.quantity.removesuffix("_max"),)
-    fields = (field(b, name, sim.model, np.arange(b.n)) for b in _blocks(sim, spec.part) for name in names)
-    return _maximum(sim.comm, [float(np.abs(values).max(initial=0.0)) for values in fields])
+    fields = (field(b, name, sim.model, np.arange(b.n)) for b in _blocks(sim, spec.part) if b.n for name in names)
+    return _maximum(sim.comm, [float(np.abs(values).max()) for values in fields])
 
 
 def _passed(sim: Simulation, spec: Reference) -> tuple[Floats, float]:

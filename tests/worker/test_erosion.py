@@ -1,6 +1,7 @@
 """Erosion: accounts that close whatever leaves, a surface that follows, particles, parts and ranks without tets."""
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 
 from conoid.cases import schema
 from conoid.cases.materials import Material
-from conoid.worker import digest, state, step
+from conoid.worker import digest, reference, state, step
 from conoid.worker.mesh.faces import across, boundary_faces
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.mirrors import Mirrors
@@ -363,7 +364,8 @@ def test_a_run_outlives_its_tets(left: int, erosion: schema.Erosion) -> None:
             residuals.append(tick(sim, ids if first else None))
         assert sim.model.elements_global == left * len(meshes[1].tets)
         assert sim.erosion is not None
-        assert sim.erosion.warnings == ([] if left else ["no tet is left: erosion has taken them all"])
+        gone = ["body0"] if left else ["body0", "body1"]
+        assert [text.split("'")[1] for text in sim.erosion.warnings()] == gone
         worst.append(max(residuals))
     assert worst[0] < 1e-3
     assert worst[1] < 0.25 * worst[0]
@@ -384,6 +386,23 @@ def test_probes_of_what_has_left_are_no_number() -> None:
         assert sim.probes.measure() == pytest.approx([expected, 8930.0], rel=1e-9, nan_ok=True)
     tick(sim, part.id.copy())
     assert np.isnan(sim.probes.measure()).all()
+
+
+@pytest.mark.parametrize("erosion", [EROSION, REMOVE], ids=["particles", "remove"])
+def test_no_reference_of_what_has_left_is_met(erosion: schema.Erosion) -> None:
+    """Nothing is as large as was expected, however wide the tolerance; particles have a speed."""
+    quantities: tuple[Any, ...] = ("plastic_strain_max", "stress_max", "extent", "radius", "speed_mean")
+    wide: dict[str, Any] = {"part": "body0", "value": 0.0, "tolerance": 1e9, "source": "-"}
+    specs = [schema.Reference(quantity=q, axis="z" if q in quantities[2:] else None, **wide) for q in quantities]
+    sim = alone(block((2, 2, 2), MM), erosion, (0, 0, 100))
+    sim.case = sim.case.model_copy(update={"reference": tuple(specs)})
+    step.prepare(sim)
+    thick = reference.thicknesses(sim)
+    assert all(check.passed for check in reference.measure(sim, Path(), thick))
+    tick(sim, sim.model.blocks[0].id.copy())
+    tick(sim)
+    met = [check.passed for check in reference.measure(sim, Path(), thick)]
+    assert met == [False, False, False, False, erosion is EROSION]
 
 
 # Symmetry planes

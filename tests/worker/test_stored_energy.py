@@ -29,6 +29,7 @@ LAWS = {
     "spall": COPPER.model_copy(update={"spall": 0.3e9}),
     "mohr_coulomb": brittle(C, PHI),
     "dilation": brittle(C, PHI, dilation_angle=math.radians(20.0)),
+    "dilation_and_spall": brittle(0.1e9, PHI, dilation_angle=PHI).model_copy(update={"spall": 0.05e9}),
     "johnson_holmquist": library()["alumina_995_jh2"],
 }
 SPEED = 60.0

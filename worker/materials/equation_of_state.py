@@ -12,6 +12,7 @@ from ..elements.tet4 import CHANGE, MODULUS, NODAL, SEEN, VOLUME_SEEN
 from ..jit import njit
 from ..state import (
     CHUNK,
+    DILATION,
     HEAT,
     MASS,
     PORES,
@@ -25,12 +26,12 @@ from ..state import (
 )
 from .elastic import sheared, squeezed
 from .elementary import exp
-from .law import BULK, DENSITY, EQUATION, FROM_SHAPE, ORDER, SHEAR, SPALL, Equation
+from .law import BULK, DENSITY, DILATES, EQUATION, FROM_SHAPE, ORDER, SHEAR, SPALL, Equation
 
 _C0, _SLOPE, _GAMMA = range(EQUATION, EQUATION + 3)
 _P, _MASS, _WORK, _RATIO = PRESSURE * CHUNK, MASS * CHUNK, WORK * CHUNK, VOLUME_RATIO * CHUNK
 _WORK_VISCOUS, _WORK_PLASTIC, _PORES = WORK_VISCOUS * CHUNK, WORK_PLASTIC * CHUNK, PORES * CHUNK
-_HEAT = HEAT * CHUNK
+_HEAT, _GROWN = HEAT * CHUNK, DILATION * CHUNK
 _OLD, _KNOWN, _FACTOR = NODAL, NODAL + CHUNK, NODAL + 2 * CHUNK
 """Rows of the scratch: the pressure before the step, Pa; of the energy equation factor * new = cold part + known."""
 _LEAST = 0.05
@@ -65,9 +66,9 @@ def _book_pores(w, s, params, i, strain, mean):  # type: ignore[no-untyped-def]
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def _tear_linear(w, s, params, n):  # type: ignore[no-untyped-def]
     """Moves volume strain between matter and pores: no pressure is below minus the spall pressure, nor above zero while
-    there are pores.
+    there are pores. A dilation that averaging has taken back (below zero) was in the pressure before the step.
     """
-    bulk, spall = params[BULK], params[SPALL]
+    bulk, spall, dilates = params[BULK], params[SPALL], params[DILATES] > 0.0
     for i in range(n):
         p, pores = s[_P + i], s[_PORES + i]
         if not (p < -spall or (pores > 0.0 and p > 0.0)):
@@ -76,7 +77,8 @@ def _tear_linear(w, s, params, n):  # type: ignore[no-untyped-def]
         s[_P + i] = p + bulk * strain
         s[_PORES + i] = pores + strain
         s[_WORK + i] -= 0.5 * bulk * strain * w[CHANGE + i]
-        _book_pores(w, s, params, i, strain, 0.5 * (p + bulk * w[SEEN + i] + s[_P + i]))
+        told = max(-s[_GROWN + i], 0.0) if dilates else 0.0
+        _book_pores(w, s, params, i, strain, 0.5 * (p + bulk * (w[SEEN + i] + told) + s[_P + i]))
 
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
