@@ -17,6 +17,7 @@ from ..state import (
     CHUNK,
     DILATION,
     PLASTIC_STRAIN,
+    PORES,
     PRESSURE,
     S_XX,
     S_XY,
@@ -29,7 +30,7 @@ from ..state import (
 )
 from ..turning import sine_and_cosine
 from .elastic import squeezed
-from .law import AFTER_PRESSURE, BULK, DILATES, FIRST, SHEAR, Law
+from .law import AFTER_PRESSURE, BULK, DILATES, FIRST, SHEAR, SPALL, Law
 from .plastic import equivalent_stress
 
 _SINE, _COHESION, _CAP, _FAILURE = FIRST, FIRST + 1, FIRST + 4, FIRST + 5
@@ -38,7 +39,7 @@ _RESIDUAL = 2
 _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _P, _STRAIN, _WORK = PRESSURE * CHUNK, PLASTIC_STRAIN * CHUNK, WORK_PLASTIC * CHUNK
-_WHOLE_WORK, _GROWN = WORK * CHUNK, DILATION * CHUNK
+_WHOLE_WORK, _GROWN, _PORES = WORK * CHUNK, DILATION * CHUNK, PORES * CHUNK
 _THIRD, _TWO_THIRDS = 1.0 / 3.0, 2.0 / 3.0
 _MISES = 2.0 / math.sqrt(3.0)
 """Largest s1 - s3 at a von Mises stress of one, in pure shear."""
@@ -182,10 +183,12 @@ def mohr_coulomb(w, s, params, n, dt):  # type: ignore[no-untyped-def]
 
     Plastic work is that of the mean of the rotated old stress and the new one, as the whole work is: what remains is
     the elastic energy of the stress, also where the strength itself falls, by a release of pressure or by failure.
-    Where the volume grows, that energy is of more volume afterwards, and the flow has given it.
+    Where the volume grows, that energy is of more volume afterwards, and the flow has given it. While there are pores
+    nothing dilates: they would take the growth, and no pressure would rise.
     """
     equivalent_stress(w, s, n)
     shear2, cap, dilates = 2.0 * params[SHEAR], params[_CAP], params[DILATES] > 0.0
+    porous = params[SPALL] < np.inf
     for i in range(n):
         k, told = _RESIDUAL if s[_STRAIN + i] > params[_FAILURE] else 0, 0.0
         if dilates:
@@ -202,7 +205,7 @@ def mohr_coulomb(w, s, params, n, dt):  # type: ignore[no-untyped-def]
         sxx, syy, szz = r * (s[_SXX + i] - mean), r * (s[_SYY + i] - mean), r * (s[_SZZ + i] - mean)
         syz, szx, sxy = r * s[_SYZ + i], r * s[_SZX + i], r * s[_SXY + i]
         d1, d2, d3 = principal(sxx, syy, szz, syz, szx, sxy)
-        if dilates and k == 0:
+        if dilates and k == 0 and not (porous and s[_PORES + i] > 0.0):
             e1, e2, e3, flow = dilated(d1, d2, d3, r * strength, sine, r * cap, params[DILATES], shear2, params[BULK])
             grown = 2.0 * params[DILATES] * q * flow
             grow(w, s, i, grown, told, params[BULK])
