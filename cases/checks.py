@@ -179,6 +179,10 @@ def _contact(case: Case) -> Iterator[Problem]:
         if one == other and one in names and one not in meet:
             message = "a part that does not meet itself; name it in contact.self_contact, or let it fracture"
             yield problem(("contact", "pairs", i, "parts"), f"{one}, {other}", message)
+        for k, earlier in enumerate(contact.pairs[:i]):
+            if sorted(earlier.parts) == sorted(pair.parts):
+                message = f"contact.pairs[{k}] is of these parts; keep one of the two"
+                yield problem(("contact", "pairs", i, "parts"), f"{one}, {other}", message)
 
 
 def _probes(case: Case) -> Iterator[Problem]:

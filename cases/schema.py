@@ -216,8 +216,8 @@ class Run(Model):
     """Wall time between checkpoints; one is also written when a run is stopped on request or by ``max_wall_time``.
     ``"none"``: then alone."""
     residual_limit: Annotated[Ratio, Positive] = 0.05
-    """The run fails with cause ``energy`` when the energy residual, what contact has made, or what unequal steps
-    took passes this."""
+    """The run fails with cause ``energy`` when the energy residual, what contact has made, what moves beyond all energy
+    that has come in, or what unequal steps took passes this."""
 
 
 class Balance(Model):

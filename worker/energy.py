@@ -53,9 +53,13 @@ class Ledger:
         self.lost = 0.0
         """Share of the initial energy that contact has taken, friction included, at the last call."""
         self.stepping = 0.0
-        """Magnitude of what unequal steps have taken, over the largest energy there is, at the last call."""
+        """Magnitude of what unequal steps have taken, over the largest energy, at the last call: of what has come in so
+        far, of the work of the stress and of motion."""
         self.residual = 0.0
-        """What does not add up, over the largest energy there is, at the last call."""
+        """What does not add up, over the same, at the last call."""
+        self.beyond = 0.0
+        """Energy of motion beyond all that has come in, over the same, at the last call: all other lines add up to less
+        than nothing."""
         self.made = 0.0
         """What contact has given beyond all that it has taken, over ``came``, at the last call."""
         self.came = self.initial
@@ -102,11 +106,12 @@ class Ledger:
         inside = elastic + plastic_sum + viscous_sum + averaging
         total = kinetic_sum + inside + loss_sum + eroded + lost + cohesive + stepping
         friction = self._contact.friction_work() if self._contact is not None else 0.0
-        scale = float(np.abs([self.initial, external_sum, work, kinetic_sum]).max())
+        self.came = max(self.came, abs(external_sum))
+        scale = max(self.came, abs(float(work)), kinetic_sum)
         left = abs(total - self.initial - external_sum)
         self.residual = left / scale if scale != 0.0 else left
         self.stepping = abs(stepping) / scale if scale != 0.0 else 0.0
-        self.came = max(self.came, abs(external_sum))
+        self.beyond = max(kinetic_sum - self.initial - external_sum, 0.0) / scale if scale != 0.0 else 0.0
         self.made = max(friction - loss_sum, 0.0) / self.came if self.came > 0.0 else 0.0
         self.worst = max(self.worst, self.residual)
         return Energy(
@@ -129,6 +134,7 @@ class Ledger:
         """Raises EnergyError when the last call has found more than ``limit``, run.residual_limit; ``when``: of it."""
         for what, share, remedy in (
             ("the energy that contact has made", self.made, ""),
+            ("the energy of motion beyond all that has come in", self.beyond, ""),
             ("the energy residual", self.residual, ""),
             ("the energy of unequal time steps", self.stepping, "; a smaller numerics.dt_safety lowers it"),
         ):

@@ -8,8 +8,9 @@ import pytest
 
 from conoid.cases import materials
 from conoid.cases.messages import Energy
+from conoid.worker.errors import EnergyError
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import WORK, WORK_VISCOUS
+from conoid.worker.state import WORK, WORK_PLASTIC, WORK_VISCOUS
 
 from .kernels import COPPER, COPPER_GAS, FORMS, GLASS, HARD, STEEL, STEEL_42CRMO4, Form, build, run, scene
 from .meshes import Floats, block
@@ -140,3 +141,50 @@ def test_a_work_that_is_not_a_number_is_no_residual_of_nothing(row: int) -> None
     assert sim.ledger.close(sim.model.nodes.v).residual == 0.0
     sim.model.blocks[0].state[0, row, 3] = math.nan
     assert math.isnan(sim.ledger.close(sim.model.nodes.v).residual)
+
+
+def test_motion_that_nobody_has_paid_for_ends_the_run() -> None:
+    """Whatever line is below zero for it: here plastic work is taken back, and the sum closes."""
+    sim = build(scene(COPPER, end=4e-6, **FLIGHT), [MESH])
+    ran = False
+
+    def gain(sim: Simulation, before: Floats) -> None:
+        nonlocal ran
+        if sim.clock.step != 5:
+            return
+        sim.ledger.close(before)
+        sim.ledger.require(0.05, "now")
+        gained = 0.2 * sim.ledger.initial
+        (part,) = sim.model.blocks
+        for row in (WORK, WORK_PLASTIC):
+            part.row(row)[0] -= gained
+        before *= math.sqrt(1.2)
+        sim.model.nodes.v[:] *= math.sqrt(1.2)
+        sim.ledger.close(before)
+        with pytest.raises(
+            EnergyError, match=r"the energy of motion beyond all that has come in, 0\.\d+, passed run\."
+        ):
+            sim.ledger.require(0.05, "now")
+        ran = True
+
+    run(sim, gain)
+    assert ran
+
+
+def test_errors_are_shares_of_the_largest_energy_there_has_been() -> None:
+    """A pressure that comes at once and gives back all its work: the share is that of what it has done at most."""
+    push = {"kind": "traction", "pressure": 1e6}
+    sim = build(scene(STEEL, end=10e-6, boundaries=(push,), viscosity={}), [block((1, 1, 1), 1e-3)])
+    most, shares = 0.0, list[float]()
+
+    def look(sim: Simulation, before: Floats) -> None:
+        nonlocal most
+        line = sim.ledger.close(before)
+        most = max(most, abs(line.external))
+        if most > 0.0:
+            largest = max(most, abs(line.elastic), line.kinetic)
+            shares.append(max(abs(line.external), abs(line.elastic), line.kinetic) / largest)
+            assert sim.ledger.stepping == pytest.approx(abs(line.stepping) / largest, rel=1e-12)
+
+    run(sim, look)
+    assert min(shares) < 0.5

@@ -88,7 +88,7 @@ def test_no_pores_pay_for_dilation(form: Form) -> None:
     plastic = np.array([energy.plastic for energy, _ in seen])
     assert np.diff(plastic).min() > 0.0
     assert 0.3 * initial < plastic[-1] < initial
-    assert max(energy.kinetic for energy, _ in seen) <= initial
+    assert max(energy.kinetic for energy, _ in seen) < 1.0001 * initial
 
 
 @pytest.mark.parametrize("form", FORMS)
