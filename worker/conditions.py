@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from conoid.cases import schema
-from conoid.cases.drives import clash, motions
+from conoid.cases.drives import REST, clash, motions
 
-from .boundaries import MIRRORED, Boundary, RigidWalls, SymmetryPlane, driven, mirrored
+from .boundaries import Boundary, RigidWalls, SymmetryPlane, driven, mirrored
 from .drivers import Course, Gravity, PrescribedRotation, PrescribedVelocity, Traction
 from .errors import InputError
 from .migration.parcel import Parcel
@@ -67,7 +67,7 @@ def start(case: schema.Case, model: Model, boundaries: list[Boundary], comm: Com
         if index not in beside:
             raise InputError(f"boundaries[{index}]: holds no node; check its place and its parts")
     _refuse_two_drives(case.boundaries, held, comm)
-    _refuse_conflicts(boundaries, model.nodes, comm)
+    _refuse_conflicts(case.boundaries, held, boundaries, model.nodes, comm)
     _refuse_overlaps(case, model, boundaries, comm)
     _refuse_crossings(case, model, comm)
     told = [
@@ -190,16 +190,29 @@ def _two_drives(specs: Sequence[schema.Boundary], held: list[Flags]) -> int:
     return -1
 
 
-def _refuse_conflicts(boundaries: list[Boundary], nodes: Nodes, comm: Comm) -> None:
-    """Motion prescribed across a symmetry plane would do work on it that never happened."""
+def _refuse_conflicts(
+    specs: Sequence[schema.Boundary], held: list[Flags], boundaries: list[Boundary], nodes: Nodes, comm: Comm
+) -> None:
+    """Motion prescribed across a symmetry plane, now or later, would do work on it that never happened."""
     before = nodes.v.copy()
     for boundary in boundaries:
         boundary.start(nodes)
-    speeds = [float(np.abs(nodes.v[b.nodes][b.held_components() == MIRRORED]).max(initial=0.0)) for b in boundaries]
+    planes = [(index, spec.axis) for index, spec in enumerate(specs) if isinstance(spec, schema.Symmetry)]
+    crossed = np.zeros((len(planes), len(specs)))
+    for row, (plane, axis) in zip(crossed, planes, strict=True):
+        turned = (nodes.v[:, AXES[axis]] != 0.0) & held[plane]
+        for drive, spec in enumerate(specs):
+            if motions(spec).get(axis, REST) != REST:
+                nodes_of_both = turned if isinstance(spec, schema.Rotation) else held[plane]
+                row[drive] = float((nodes_of_both & held[drive]).any())
     nodes.v[:] = before
-    fastest = comm.maximum(np.array([max(speeds, default=0.0)]))[0]
-    if fastest > 0.0:
-        raise InputError("boundaries: a prescribed motion leads nodes off their symmetry plane; allowed: along it")
+    crossed = comm.maximum(crossed.reshape(-1)).reshape(crossed.shape)
+    for row, drive in np.argwhere(crossed):
+        plane, axis = planes[row]
+        raise InputError(
+            f"boundaries[{drive}]: leads nodes off their plane of symmetry, boundaries[{plane}], along {axis}; allowed "
+            "is motion along it"
+        )
 
 
 def _indices(chosen: Flags) -> Indices:

@@ -5,6 +5,7 @@ load every kernel of the worker at its start, whatever its scene. ``njit`` of th
 does the same at the first call, from Python or from another kernel.
 """
 
+import os
 import sys
 import time
 from collections.abc import Callable
@@ -12,6 +13,7 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
+from numba.core.bytecode import FunctionIdentity
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher, cpu_target
 from numba.extending import intrinsic
@@ -21,6 +23,10 @@ __all__ = ["DECLARED", "Kernel", "njit", "prefetch", "types"]
 _BLAS = "scipy.linalg"
 _TO_READ, _TO_SECOND, _DATA = 0, 2, 1
 """Of LLVM's prefetch: to read, into the second level of the cache, data."""
+FunctionIdentity._unique_ids = iter(lambda: int.from_bytes(os.urandom(8), "big"), None)  # type: ignore[assignment]
+"""Draws the numbers by which numba tells functions of one name apart, which it counts in each process. Of functions
+that are called the same in the objects of two kernels the first that is loaded serves both, so kernels that several
+processes have compiled could call each other's sorting, and crash (numba issue 10486)."""
 DECLARED: list["Kernel"] = []
 """Every kernel of the modules that are imported."""
 

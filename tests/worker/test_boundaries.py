@@ -164,6 +164,24 @@ def test_a_body_through_a_symmetry_plane_is_refused() -> None:
     assert build(scene(STEEL, boundaries=({"kind": "symmetry", "axis": "y", "at": 0.0},)), [even]).warnings == ()
 
 
+@pytest.mark.parametrize(
+    "drive",
+    [
+        {"kind": "velocity", "x": 1.0, "z": 3.0},
+        {"kind": "velocity", "z": 3.0, "course": ((0.0, 0.0), (1e-6, 1.0))},
+        {"kind": "rotation", "spin": {"centre": (0.0, 0.0, 0.0), "rate": (0.0, 1e3, 0.0)}},
+    ],
+    ids=["at once", "later", "turning"],
+)
+def test_motion_across_a_symmetry_plane_is_refused(drive: dict[str, Any]) -> None:
+    plane = {"kind": "symmetry", "axis": "z"}
+    with pytest.raises(
+        InputError, match=r"^boundaries\[1\]: leads nodes off their plane of symmetry, boundaries\[0\], along z"
+    ):
+        build(scene(STEEL, boundaries=(plane, drive)), [MESH])
+    build(scene(STEEL, boundaries=(plane, {"kind": "velocity", "x": 1.0, "z": 0.0})), [MESH])
+
+
 def test_a_body_may_fly_at_a_symmetry_plane() -> None:
     """No node starts on it, which is told; what arrives is thrown back."""
     plane = {"kind": "symmetry", "axis": "z", "at": -1e-5}

@@ -254,3 +254,13 @@ def test_numba_is_not_imported_before_its_cache_has_a_name() -> None:
     clean = {key: value for key, value in os.environ.items() if key != kernels.VARIABLE}
     told = subprocess.run([sys.executable, "-c", text], env=clean, capture_output=True, text=True, check=False)
     assert "numba was imported before" in told.stderr
+
+
+def test_no_two_processes_call_a_function_the_same() -> None:
+    """What numba compiles for a kernel has a name of its own in every process: objects of several are loaded."""
+    ask = "from conoid.worker import jit; from numba.core.bytecode import FunctionIdentity as F; "
+    ask += "print(next(F._unique_ids))"
+    told = [subprocess.run([sys.executable, "-c", ask], capture_output=True, text=True, check=True) for _ in range(2)]
+    one, other = (int(each.stdout) for each in told)
+    assert one != other
+    assert min(one, other) > 2**40
