@@ -18,7 +18,7 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher, cpu_target
 from numba.extending import intrinsic
 
-__all__ = ["DECLARED", "Kernel", "njit", "prefetch", "types"]
+__all__ = ["DECLARED", "Kernel", "njit", "prefetch", "record", "several", "types"]
 
 _BLAS = "scipy.linalg"
 _TO_READ, _TO_SECOND, _DATA = 0, 2, 1
@@ -70,6 +70,18 @@ def njit(signature: Any, *, cache: bool = True, **options: Any) -> Callable[[Cal
         return kernel
 
     return declare
+
+
+def several(*kinds: Any) -> Any:
+    """The type of a tuple."""
+    return types.Tuple(kinds)  # type: ignore[no-untyped-call]
+
+
+def record(name: type, *kinds: Any) -> Any:
+    """The type of a named tuple."""
+    if len(set(kinds)) == 1:
+        return types.NamedUniTuple(kinds[0], len(kinds), name)  # type: ignore[no-untyped-call]
+    return types.NamedTuple(kinds, name)  # type: ignore[no-untyped-call]
 
 
 def _prefetch(_: Any, array: Any, index: Any) -> Any:

@@ -8,8 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..fracture.records import record
-from ..jit import types
+from ..jit import record, types
 from ..state import Floats, Indices, Ints
 
 _LINE = 8

@@ -11,8 +11,7 @@ loops over these, in rows of a few kilobytes that compilers make vectors of. Few
 
 import numpy as np
 
-from ..fracture.records import several
-from ..jit import njit, prefetch, types
+from ..jit import njit, prefetch, several, types
 from ..state import INTACT
 from .families import by_family
 from .geometry import VECTOR, at, cross, dot, height, minus

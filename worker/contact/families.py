@@ -5,8 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..fracture.records import record
-from ..jit import njit, types
+from ..jit import njit, record, types
 from ..state import Flags, Indices, Ints, extended
 from ..topology import Split
 

@@ -5,8 +5,7 @@ the nodes of the active set stand in the crowd, and ``index`` (crowd,) what each
 copy.
 """
 
-from ..fracture.records import several
-from ..jit import njit, prefetch, types
+from ..jit import njit, prefetch, several, types
 from .active import IMPULSE, MOBILITY, NODES, TOTAL, V
 
 _NAMED = -2

@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..fracture.records import several
-from ..jit import njit, types
+from ..jit import njit, several, types
 from ..state import Indices
 from ..topology import KEY
 

@@ -9,8 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..fracture.records import record
-from ..jit import njit, types
+from ..jit import njit, record, types
 from ..state import Flags, Floats, Indices, Ints
 from .geometry import at, cross, dot, minus
 

@@ -5,9 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..jit import types
+from ..jit import record, types
 from ..state import Flags, Floats, Indices, Ints, extended
-from .records import record
 
 
 class FacetConstants(NamedTuple):

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elements.tet4 import EDGE, SCRATCH, end_gradients, gather, internal_forces
-from ..jit import njit, types
+from ..jit import njit, record, types
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
 from ..state import CHUNK, VISCOUS, Floats, Ints, Model, Tets
@@ -13,7 +13,7 @@ from ..topology import Split
 from .cohesive import Cohesion
 from .columns import Facets
 from .law import scatter_copies
-from .records import MESH, POINTS, Mesh, record
+from .records import MESH, POINTS, Mesh
 from .separation import common
 
 _ROWS = VISCOUS + 1

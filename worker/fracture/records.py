@@ -1,10 +1,10 @@
 """What kernels of fracture take: records of arrays, and their numba types, which signatures name."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from ..jit import types
+from ..jit import record, types
 from ..state import Bits, Flags, Floats, Indices, Ints, Tets
 
 
@@ -115,18 +115,6 @@ class BreakingFacets(NamedTuple):
             self.tets[chosen], self.nodes[chosen], self.sides[chosen], self.first[chosen], self.traction[chosen],
             self.mass[chosen],
         )  # fmt: skip
-
-
-def several(*kinds: Any) -> Any:
-    """The type of a tuple."""
-    return types.Tuple(kinds)  # type: ignore[no-untyped-call]
-
-
-def record(name: type, *kinds: Any) -> Any:
-    """The type of a named tuple."""
-    if len(set(kinds)) == 1:
-        return types.NamedUniTuple(kinds[0], len(kinds), name)  # type: ignore[no-untyped-call]
-    return types.NamedTuple(kinds, name)  # type: ignore[no-untyped-call]
 
 
 _I1, _I2, _N2, _N3 = types.int64[::1], types.int64[:, ::1], types.int32[:, ::1], types.int32[:, :, ::1]

@@ -11,14 +11,14 @@ Which ranks have some is known before, from the reduction of the step.
 
 import numpy as np
 
-from ..jit import njit, types
+from ..jit import njit, several, types
 from ..mesh.faces import FACES
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
 from ..state import BROKEN, Copies, Indices, Ints, Model, extended
 from ..topology import KEY, Split, keys
 from . import stars
-from .records import MESH, Mesh, several
+from .records import MESH, Mesh
 from .stars import Stars
 
 _I1, _I2, _N1 = types.int64[::1], types.int64[:, ::1], types.int32[::1]

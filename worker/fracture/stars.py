@@ -9,12 +9,12 @@ facet inside a body separates nothing; a closed sheet of them round a node does.
 import numpy as np
 
 from ..growing import Rooms
-from ..jit import njit, types
+from ..jit import njit, several, types
 from ..mesh.faces import FACES
 from ..state import CHUNK, INTACT, Indices, Ints, Tets
 from ..state import MASS as MASS_ROW
 from ..topology import keys
-from .records import MESH, several
+from .records import MESH
 
 NODE, TET, RANK, MASS, BEHIND = 0, 1, 2, 3, 4
 """Columns of a row, one a node and tet of its star: global ids of the node and the tet, rank of the tet, bits of its
