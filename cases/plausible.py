@@ -31,6 +31,7 @@ LIKELY: dict[str, tuple[float, float, str]] = {
     "fracture energy": (1e-2, 1e6, "J/m^2: glass has 8, tough steel 100,000"),
     "temperature": (100.0, 6_000.0, "K: 20 degrees Celsius are 293 K"),
     "extent": (1e-6, 100.0, "m"),
+    "bulk modulus, density c0^2, over that of elastic,": (0.5, 2.0, "both are of one solid at rest"),
 }
 """Between what a quantity of any solid lies, and the ends as people know them (handbooks)."""
 _UNLIKE = 1000.0
@@ -122,6 +123,9 @@ def _materials(case: Case) -> Iterator[Problem]:
     for name, made in case.materials.items():
         for key, what, value in _constants(made):
             yield from _unlikely(("materials", name, *key), what, value)
+        if made.spall is not None and made.brittle is not None and made.spall < made.brittle.strength:
+            strength = f"brittle.strength, {made.brittle.strength:.3g} Pa: under tension from all sides no facet breaks"
+            yield problem(("materials", name, "spall"), f"{made.spall:.3g} Pa", f"pores open below {strength}")
 
 
 def _constants(made: Material) -> Iterator[tuple[Location, str, float]]:
@@ -137,6 +141,10 @@ def _constants(made: Material) -> Iterator[tuple[Location, str, float]]:
             made.brittle.strength / made.elastic.young,
         )
         yield ("brittle", "energy"), "fracture energy", made.brittle.energy
+    if made.eos is not None:
+        bulk = made.elastic.young / (3.0 * (1.0 - 2.0 * made.elastic.poisson))
+        what = "bulk modulus, density c0^2, over that of elastic,"
+        yield ("eos", "c0"), what, made.density * made.eos.c0**2 / bulk
 
 
 def _unlikely(location: Location, what: str, value: float) -> Iterator[Problem]:

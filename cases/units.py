@@ -59,6 +59,8 @@ QUANTITY = "the quantity's"
 _LONGEST = 80
 """Characters of a quantity that are read: longer than any number with its unit. Chosen, so that a text that is no
 quantity costs no time."""
+LARGEST = 1e30
+"""Of a quantity in SI units, and one over it the smallest. Chosen: energies of any such mass and speed are numbers."""
 
 
 def parse_unit(text: str) -> tuple[float, Dimension]:
@@ -82,13 +84,15 @@ def parse_unit(text: str) -> tuple[float, Dimension]:
 def parse_quantity(value: object, unit: str) -> float:
     """The SI value of ``value``, a number (already SI) or text with a unit of the same dimension as ``unit``.
 
-    Raises ValueError for a wrong dimension, an unknown unit, NaN or infinity.
+    Raises ValueError for a wrong dimension, an unknown unit, NaN, infinity, and what is beyond LARGEST either way.
     """
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise ValueError(f"expected a quantity in {unit or 'plain numbers'}, got {value!r}")
     number = _read_text(value, unit) if isinstance(value, str) else _to_float(value)
     if not math.isfinite(number):
         raise ValueError(f"{value!r} is not finite")
+    if number and not 1.0 / LARGEST <= abs(number) <= LARGEST:
+        raise ValueError(f"{value!r} cannot be used: in SI units it is not between {1.0 / LARGEST:g} and {LARGEST:g}")
     return number
 
 

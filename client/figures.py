@@ -8,13 +8,17 @@ _PREFIXES = ((1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, 
 
 
 def si(value: float, unit: str, digits: int = 3) -> str:
-    """``value`` with an SI prefix before ``unit`` and ``digits`` significant digits."""
+    """``value`` with an SI prefix before ``unit`` and ``digits`` significant digits; without a prefix where none
+    is small or large enough.
+    """
     if not math.isfinite(value):
         return f"{value} {unit}".strip()
     if value == 0:
         return f"0 {unit}".strip()
     factor, prefix = next((pair for pair in _PREFIXES if abs(value) >= 0.9995 * pair[0]), (1e-12, "p"))
     scaled = value / factor
+    if not 5e-3 <= abs(scaled) < 1e4:
+        return f"{value:.{digits}g} {unit}".strip()
     before = max(1, math.floor(math.log10(abs(scaled)) + 1e-3) + 1)
     return f"{scaled:.{max(0, digits - before)}f} {prefix}{unit}".strip()
 

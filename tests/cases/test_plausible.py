@@ -223,6 +223,10 @@ def test_two_driven_bodies_that_pass_through_each_other_are_told() -> None:
         ({"strength": {"model": "linear_hardening", "yield_stress": "400 GPa"}}, "strength.yield_stress",
          "a yield stress over Young's modulus of 2 is above 0.1"),
         ({"brittle": {"strength": "100 MPa", "energy": "8 MJ/m^2"}}, "brittle.energy", "a fracture energy of 8e+06 is"),
+        ({"eos": {"model": "mie_gruneisen", "c0": "457 m/s", "S": 1.5, "gamma0": 2}}, "eos.c0",
+         "a bulk modulus, density c0^2, over that of elastic, of 0.00984 is below 0.5"),
+        ({"spall": "50 MPa", "brittle": {"strength": "100 MPa", "energy": "8 J/m^2"}}, "spall",
+         "pores open below brittle.strength, 1e+08 Pa: under tension from all sides no facet breaks"),
     ],
 )  # fmt: skip
 def test_constants_of_no_solid(material: dict[str, Any], key: str, message: str) -> None:

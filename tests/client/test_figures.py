@@ -17,7 +17,9 @@ from conoid.client.figures import count, duration, number, si
         (-215e6, "Pa", "-215 MPa"),
         (9.7e6, "", "9.70 M"),
         (0.0, "J", "0 J"),
-        (2e-15, "s", "0.00 ps"),
+        (5e-14, "s", "0.05 ps"),
+        (2e-15, "s", "2e-15 s"),
+        (7.85e24, "N s", "7.85e+24 N s"),
         (math.inf, "s", "inf s"),
     ],
 )
