@@ -6,11 +6,12 @@ from ..migration.parcel import Parcel
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum
 from ..parallel.tags import Tag
-from ..state import Block, Copies, Floats, Ints, Model, extended
+from ..state import Block, Copies, Floats, Model, extended
 from ..timers import Timers
 from . import pressure, sweep
 from .flat import flat_tets
 from .forms import Elements
+from .records import Body, Marks, Means, Motion
 
 
 class AveragedElements(Elements):
@@ -98,22 +99,16 @@ class AveragedElements(Elements):
             volumes = np.maximum(self._volumes[:, 1], 1) / (self._weight * pressure.QUANTA)
             self._projected = self._gradient / (self._scale * volumes[:, None])
 
-    def _gradients(self) -> Ints:
-        return self._gradient
+    def _means(self) -> Means:
+        return Means(
+            self._volumes, self._weight, self._strain, self._more, self.split, self.pressure, self._projected,
+            self._gradient,
+        )  # fmt: skip
 
     def _strains(self, block: Block, begin: int, end: int, dt: float) -> None:
-        nodes = self.model.nodes
-        sweep.strain_pass(
-            nodes.x0, nodes.x, nodes.v, self._volumes, self._weight, self.pressure, self._projected, self.split,
-            block.tets, block.state.reshape(-1), block.params, self._w, block.flat, block.worn, block.quiet,
-            block.kind, block.state.shape[1], begin, end, dt,
-        )  # fmt: skip
+        motion, body, marks = Motion.of(self.model.nodes), Body.of(block), Marks.of(block)
+        sweep.strain_pass(motion, body, marks, self._scratch, self._means(), begin, end, dt)
 
     def _forces(self, block: Block, begin: int, end: int, dt: float, scale: float) -> None:
-        nodes = self.model.nodes
-        sweep.force_pass(
-            nodes.x0, nodes.x, nodes.v, self._strain, self._more, nodes.force, self.pressure, self._gradient,
-            self.split, block.tets, block.state.reshape(-1), block.params, self._w, self._wi, self._bits, self.peaks,
-            block.id, block.flat, block.worn, block.life, block.hot, block.weakest, block.quiet, block.shear_weight,
-            block.kind, block.eos, block.state.shape[1], begin, end, dt, scale,
-        )  # fmt: skip
+        motion, body, marks = Motion.of(self.model.nodes), Body.of(block), Marks.of(block)
+        sweep.force_pass(motion, body, marks, self._scratch, self._means(), begin, end, dt, scale)

@@ -11,7 +11,8 @@ from ..jit import njit
 from ..materials.law import BULK, DENSITY, DILATES
 from ..mesh.faces import FACES, normals
 from ..state import CHUNK, DILATION, HEAT, MASS, TOLD, Block, Flags, Floats
-from .pressure import STABILISE, stretch_corner
+from .heat_and_bulking import stretch_corner
+from .pressure import STABILISE
 from .tet4 import CHANGE, SEEN, VOLUME, VOLUME_MID
 
 THINNEST = 0.1

@@ -15,9 +15,10 @@ from ..parallel import fixed_point
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum
 from ..parallel.tags import Tag
-from ..state import CHUNK, Block, Copies, Floats, Ints, Model
+from ..state import Block, Copies, Floats, Ints, Model
 from ..timers import Timers
-from . import sweep, tet4
+from . import records, sweep
+from .records import Body, Marks, Means, Motion, Scratch
 
 
 class Bridges(Protocol):
@@ -50,11 +51,9 @@ class Elements:
     def __init__(self, model: Model, comm: Comm, neighbours: list[Neighbour], timers: Timers) -> None:
         self.model = model
         self._timers = timers
-        self.peaks: Ints = np.zeros(sweep.PEAKS, np.int64)
-        """(PEAKS,) see elements/sweep.py."""
-        self._w = _aligned(tet4.SCRATCH)
-        self._wi = np.zeros(9 * CHUNK, np.int64)
-        self._bits = self._w.view(np.int64)
+        self._scratch = Scratch.of_rank()
+        self.peaks: Ints = self._scratch.peaks
+        """(5,) see elements/records.py."""
         self._comm, self._neighbours = comm, neighbours
         self._herald: Herald | None = None
         self._connect()
@@ -66,7 +65,7 @@ class Elements:
     @property
     def limit_bits(self) -> int:
         """Bits of the largest one-over-stable-step of this rank's tets."""
-        return int(self.peaks[sweep.LARGEST_LIMIT])
+        return int(self.peaks[records.LARGEST_LIMIT])
 
     @property
     def limit(self) -> float:
@@ -76,22 +75,22 @@ class Elements:
     @property
     def limiting(self) -> int:
         """Smallest global id of the tets of this rank that have the limit."""
-        return int(self.peaks[sweep.LIMITING_TET])
+        return int(self.peaks[records.LIMITING_TET])
 
     @property
     def force(self) -> float:
         """Largest contribution to a nodal force of this rank, N."""
-        return fixed_point.float_of(int(self.peaks[sweep.LARGEST_FORCE]))
+        return fixed_point.float_of(int(self.peaks[records.LARGEST_FORCE]))
 
     @property
     def worn(self) -> int:
         """What has been found of worn-out tets (elements/wear.py)."""
-        return int(self.peaks[sweep.WORN])
+        return int(self.peaks[records.WORN])
 
     @property
     def hot(self) -> bool:
         """Whether some face passes the strength by its tet's own stress."""
-        return bool(self.peaks[sweep.HOT])
+        return bool(self.peaks[records.HOT])
 
     def advance(self, dt: float, scale: float) -> None:
         """Stress and forces at n+1; the completion of the shared forces is under way when it returns."""
@@ -101,11 +100,11 @@ class Elements:
 
     def again(self, scale: float) -> None:
         """The forces of the present stress in a coarser quantum."""
-        limit = self.peaks[[sweep.LARGEST_LIMIT, sweep.LIMITING_TET]]
-        self.peaks[sweep.LARGEST_FORCE] = 0
+        limit = self.peaks[[records.LARGEST_LIMIT, records.LIMITING_TET]]
+        self.peaks[records.LARGEST_FORCE] = 0
         self._begin(scale, again=True)
         self._both_regions(lambda block, begin, end: self._again(block, begin, end, scale), self._send)
-        self.peaks[[sweep.LARGEST_LIMIT, sweep.LIMITING_TET]] = limit
+        self.peaks[[records.LARGEST_LIMIT, records.LIMITING_TET]] = limit
 
     def _begin(self, scale: float, again: bool = False) -> None:
         """Forces other than those of tets."""
@@ -115,7 +114,7 @@ class Elements:
             if not again:
                 self.cohesion.open(nodes.x)
             largest = self.cohesion.scatter(nodes.force, scale)
-            self.peaks[sweep.LARGEST_FORCE] = max(int(self.peaks[sweep.LARGEST_FORCE]), largest)
+            self.peaks[records.LARGEST_FORCE] = max(int(self.peaks[records.LARGEST_FORCE]), largest)
 
     def grow(self, copies: Copies) -> None:
         """Takes up copies of nodes; they are shared already."""
@@ -131,7 +130,7 @@ class Elements:
 
     def resume(self, parcel: Parcel) -> None:
         """Takes it back."""
-        self.peaks[[sweep.LARGEST_LIMIT, sweep.LIMITING_TET]] = parcel.known["peaks"]
+        self.peaks[[records.LARGEST_LIMIT, records.LIMITING_TET]] = parcel.known["peaks"]
 
     def employ(self, herald: Herald) -> None:
         """From now on a word for each neighbour goes with the forces; neighbours take part."""
@@ -162,39 +161,26 @@ class Elements:
         self.shared_forces.begin(self.model.nodes.force, words)
 
     def _both_regions(self, work: Callable[[Block, int, int], None], send: Callable[[], None]) -> None:
-        self._over_blocks(lambda block: work(block, 0, block.border_chunks))
+        self._over_blocks(work, lambda block: (0, block.border_chunks))
         send()
-        self._over_blocks(lambda block: work(block, block.border_chunks, block.chunks))
+        self._over_blocks(work, lambda block: (block.border_chunks, block.chunks))
 
-    def _over_blocks(self, work: Callable[[Block], None]) -> None:
+    def _over_blocks(self, work: Callable[[Block, int, int], None], chunks: Callable[[Block], tuple[int, int]]) -> None:
         now = cpu_time()
         for block in self.model.blocks:
-            work(block)
+            begin, end = chunks(block)
+            if begin < end:
+                work(block, begin, end)
             start, now = now, cpu_time()
             block.seconds += now - start
 
     def _standard(self, block: Block, begin: int, end: int, dt: float, scale: float) -> None:
-        nodes = self.model.nodes
-        sweep.standard_pass(
-            nodes.x0, nodes.x, nodes.v, nodes.force, block.tets, block.state.reshape(-1), block.params, self._w,
-            self._wi, self._bits, self.peaks, block.id, block.worn, block.life, block.hot, block.weakest,
-            block.quiet, block.shear_weight, block.kind, block.eos, block.state.shape[1], begin, end, dt, scale,
-        )  # fmt: skip
+        motion, body, marks = Motion.of(self.model.nodes), Body.of(block), Marks.of(block)
+        sweep.standard_pass(motion, body, marks, self._scratch, begin, end, dt, scale)
 
     def _again(self, block: Block, begin: int, end: int, scale: float) -> None:
-        nodes = self.model.nodes
-        sweep.forces_again(
-            nodes.x, nodes.force, self.pressure, self._gradients(), self.split, block.flat, block.tets,
-            block.state.reshape(-1), self._w, self._wi, self._bits, self.peaks, block.id, block.state.shape[1], begin,
-            end, scale,
-        )  # fmt: skip
+        motion, body = Motion.of(self.model.nodes), Body.of(block)
+        sweep.forces_again(motion, body, self._scratch, self._means(), begin, end, scale)
 
-    def _gradients(self) -> Ints:
-        return self.model.nodes.force
-
-
-def _aligned(n: int) -> Floats:
-    """(n,) zeros that begin on a cache line: the same speed wherever memory is given."""
-    line = 64
-    room = np.zeros(n + line // 8)
-    return room[(-room.ctypes.data % line) // 8 :][:n]
+    def _means(self) -> Means:
+        return Means.none()

@@ -9,28 +9,11 @@ dissipate (docs/numerics.md, What averaging takes).
 
 from ..jit import njit
 from ..materials.elastic import sheared, squeezed
-from ..materials.law import BULK, DENSITY, DILATES
-from ..state import BULKING, CHUNK, CORNERS, DILATION, MASS, PRESSURE, WORK_AVERAGED
+from ..materials.law import BULK, DILATES
+from ..state import CHUNK, DILATION, PRESSURE, WORK_AVERAGED
 from .tet4 import BEFORE, CHANGE, CHANGE_SEEN, SEEN, VOLUME_MID, VOLUME_SEEN
 
 _P, _GROWN, _TAKEN = PRESSURE * CHUNK, DILATION * CHUNK, WORK_AVERAGED * CHUNK
-_BULKING, _MASS, _CORNERS = BULKING * CHUNK, MASS * CHUNK, CORNERS * CHUNK
-
-
-@njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy", forceinline=True)
-def take_bulking(s, params, i, more):  # type: ignore[no-untyped-def]
-    """Adds ``more`` to the bulking of tet ``i``, Pa, and what that stores, for the law has given what its own would
-    store to the nodes. As there (materials/johnson_holmquist.py) it is (K m + bulking)^2 / 2K of a volume, of a quarter
-    at each corner; none where the matter is wider than without stress.
-    """
-    bulk, stored = params[BULK], 0.0
-    for k in range(4):
-        ratio = s[_CORNERS + k * CHUNK + i]
-        whole = bulk * (1.0 / ratio - 1.0) + s[_BULKING + i]
-        before, after = max(whole, 0.0), max(whole + more, 0.0)
-        stored += ratio * (after * after - before * before)
-    s[_TAKEN + i] -= 0.125 * s[_MASS + i] / (params[DENSITY] * bulk) * stored
-    s[_BULKING + i] += more
 
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")

@@ -3,12 +3,10 @@
 One-point tets with their own pressure lock in plastic flow. ``nodal`` replaces the volume strain of a tet by the mean
 of its nodes' values, each the volume-weighted mean over the tets round it (averaged nodal pressure, Bonet and Burton
 1998, in rate form; the pressure stays with the tet, so any equation of state works and a node that splits loses
-nothing). An equation of state with heat sees the energy averaged in the same way: heat of a tet alone would drive it
-against its neighbours, and volumes of nodes would not resist. So would bulking of its own.
-``split`` adds to the nodal balance the projection form
-of the operator split for pressure gradients (Zienkiewicz et al. 1998): Oñate-Codina stabilisation that acts on the
-difference between a tet's pressure gradient and the mean of the projected gradients of its nodes, and vanishes where
-pressure is linear.
+nothing). ``split`` adds to the nodal balance the projection form of the operator split for pressure gradients
+(Zienkiewicz et al. 1998): Oñate-Codina stabilisation that acts on the difference between a tet's pressure gradient and
+the mean of the projected gradients of its nodes, and vanishes where pressure is linear. Heat and bulking are averaged
+in the same way (heat_and_bulking.py).
 
 Nodal sums are integers. Each contribution is taken relative to the node's reference volume and so lies near one,
 whatever the size of the tets: one fixed scale, QUANTA, serves every scene.
@@ -17,28 +15,10 @@ whatever the size of the tets: one fixed scale, QUANTA, serves every scene.
 import numpy as np
 
 from ..jit import njit
-from ..materials.law import BULK, DENSITY
-from ..state import (
-    BULKING,
-    CHUNK,
-    CORNERS,
-    DILATION,
-    HEAT,
-    MASS,
-    PRESSURE,
-    TET_VOLUME,
-    TOLD,
-    UNTOLD,
-    VOLUME_FLUX,
-    WORK,
-    WORK_VISCOUS,
-    Floats,
-    Ints,
-)
-from .mean import take_bulking
+from ..materials.law import BULK
+from ..state import CHUNK, DILATION, MASS, PRESSURE, TET_VOLUME, VOLUME_FLUX, WORK, Floats, Ints
 from .tet4 import (
     CHANGE,
-    CORNER_CHANGE,
     DILATATION,
     EDGE,
     NODAL,
@@ -55,11 +35,7 @@ QUANTA = float(2**52)
 """Quanta per unit of volume strain, and per unit of relative nodal volume."""
 
 _FLUX, _VOLUME, _MASS = VOLUME_FLUX * CHUNK, TET_VOLUME * CHUNK, MASS * CHUNK
-_WORK, _WORK_VISCOUS, _HEAT, _TOLD = WORK * CHUNK, WORK_VISCOUS * CHUNK, HEAT * CHUNK, TOLD * CHUNK
-_P, _GROWN = PRESSURE * CHUNK, DILATION * CHUNK
-_BULKING, _UNTOLD, _CORNERS = BULKING * CHUNK, UNTOLD * CHUNK, CORNERS * CHUNK
-_HEATED = TOLD + 1
-"""Rows of a tet with heat; one with bulking has more."""
+_WORK, _P, _GROWN = WORK * CHUNK, PRESSURE * CHUNK, DILATION * CHUNK
 STABILISE = NODAL
 """Rows of the scratch: the four stabilising volume fluxes, m^3/s."""
 _PROJECTED = NODAL + 4 * CHUNK
@@ -129,51 +105,6 @@ def scatter_volumes(sums, w, weight, tets, n, dt):  # type: ignore[no-untyped-de
             sums[a, 1] += np.int64(np.rint(volume * quanta))
 
 
-@njit("void(int64[:, ::1], float64[::1], float64[::1], float64[::1], float64[::1], uint32[:, ::1], int64)", cache=True)
-def scatter_heat(sums, w, s, params, weight, tets, n):  # type: ignore[no-untyped-def]
-    """Adds a quarter of what each tet has got of work since the last time, over its mass, to the sums of its nodes.
-
-    By volume, as the volume changes, and in units of the bulk modulus over the density; ``sums`` (nodes, 3).
-    """
-    unit = params[DENSITY] / params[BULK]
-    for i in range(n):
-        work = s[_WORK + i] + s[_WORK_VISCOUS + i]
-        heat = 0.25 * w[VOLUME_MID + i] * unit * (work - s[_TOLD + i]) / s[_MASS + i]
-        s[_TOLD + i] = work
-        for k in range(4):
-            a = tets[i, k]
-            sums[a, 2] += np.int64(np.rint(heat * weight[a] * QUANTA))
-
-
-@njit("void(int64[:, ::1], float64[::1], float64[::1], float64[::1], float64[::1], uint32[:, ::1], int64)", cache=True)
-def scatter_bulking(sums, w, s, params, weight, tets, n):  # type: ignore[no-untyped-def]
-    """Adds a quarter of the new bulking of each tet to the sums of its nodes, by volume as ``scatter_heat``.
-
-    In units of the bulk modulus. A flat tet, which has no volume here, keeps it for itself.
-    """
-    per_bulk = 1.0 / params[BULK]
-    for i in range(n):
-        if w[VOLUME_MID + i] == 0.0:
-            take_bulking(s, params, i, s[_UNTOLD + i])
-        share = 0.25 * w[VOLUME_MID + i] * per_bulk * s[_UNTOLD + i]
-        s[_UNTOLD + i] = 0.0
-        for k in range(4):
-            a = tets[i, k]
-            sums[a, 2] += np.int64(np.rint(share * weight[a] * QUANTA))
-
-
-@njit(
-    "void(int64[:, ::1], float64[::1], float64[::1], float64[::1], float64[::1], uint32[:, ::1], int64, int64)",
-    cache=True,
-)
-def scatter_more(sums, w, s, params, weight, tets, rows, n):  # type: ignore[no-untyped-def]
-    """Heat, or bulking: what a tet with so many ``rows`` has."""
-    if rows == _HEATED:
-        scatter_heat(sums, w, s, params, weight, tets, n)
-    else:
-        scatter_bulking(sums, w, s, params, weight, tets, n)
-
-
 @njit("void(int64[:, ::1], float64[::1], float64[::1], uint32[:, ::1], int64, float64)", cache=True)
 def scatter_stabilised(sums, w, weight, tets, n, dt):  # type: ignore[no-untyped-def]
     """As ``scatter_volumes``, with the stabilising fluxes of ``stabilise`` added to the change of volume."""
@@ -232,50 +163,6 @@ def gather_strains(w, strain, tets, n):  # type: ignore[no-untyped-def]
     """SEEN: mean volume strain of the step of the four nodes."""
     for i in range(n):
         w[SEEN + i] = 0.25 * ((strain[tets[i, 0]] + strain[tets[i, 1]]) + (strain[tets[i, 2]] + strain[tets[i, 3]]))
-
-
-@njit("void(float64[::1], float64[::1], uint32[:, ::1], int64)", cache=True)
-def gather_heat(s, heat, tets, n):  # type: ignore[no-untyped-def]
-    """HEAT: what the pressure of each tet sees grows by the mean of the four nodes."""
-    for i in range(n):
-        s[_HEAT + i] += 0.25 * ((heat[tets[i, 0]] + heat[tets[i, 1]]) + (heat[tets[i, 2]] + heat[tets[i, 3]]))
-
-
-@njit("void(float64[::1], float64[::1], float64[::1], uint32[:, ::1], boolean[::1], int64)", cache=True)
-def gather_bulking(s, params, bulking, tets, flat, n):  # type: ignore[no-untyped-def]
-    """BULKING: that of each tet grows by the mean of the four nodes; ``flat`` (n,), or (0,), have their own."""
-    quarter = 0.25 * params[BULK]
-    for i in range(n):
-        if len(flat) == 0 or not flat[i]:
-            a, b, c, d = tets[i, 0], tets[i, 1], tets[i, 2], tets[i, 3]
-            take_bulking(s, params, i, quarter * ((bulking[a] + bulking[b]) + (bulking[c] + bulking[d])))
-
-
-@njit("void(float64[::1], float64[::1], int64, int64, float64)", cache=True, error_model="numpy", forceinline=True)
-def stretch_corner(w, s, i, k, strain):  # type: ignore[no-untyped-def]
-    """The ratio of volumes at corner ``k`` of tet ``i`` after a volume strain; CORNER_CHANGE."""
-    half, before = 0.5 * strain, s[_CORNERS + k * CHUNK + i]
-    after = before * (1.0 + half) / (1.0 - half)
-    s[_CORNERS + k * CHUNK + i], w[CORNER_CHANGE + k * CHUNK + i] = after, after - before
-
-
-@njit(
-    "void(float64[::1], float64[::1], float64[::1], float64[::1], uint32[:, ::1], float64[::1], boolean[::1], int64, "
-    "int64)",
-    cache=True,
-)
-def gather_more(w, s, params, more, tets, strain, flat, rows, n):  # type: ignore[no-untyped-def]
-    """What ``scatter_more`` has given, as means over nodes; with bulking the ratio of volumes at each node, too, and
-    CORNER_CHANGE, by how much it has changed.
-    """
-    if rows == _HEATED:
-        gather_heat(s, more, tets, n)
-        return
-    gather_bulking(s, params, more, tets, flat, n)
-    for i in range(n):
-        if len(flat) == 0 or not flat[i]:
-            for k in range(4):
-                stretch_corner(w, s, i, k, strain[tets[i, k]])
 
 
 @njit("void(float64[::1], int64, float64)", cache=True)

@@ -113,8 +113,9 @@ def _beyond(params, before, after, old, new, bulking, least):  # type: ignore[no
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def crumbling(w, s, params, n):  # type: ignore[no-untyped-def]
     """The pressure of ``_pressed``; where it is averaged the mean of that at the four nodes, each with the end of its
-    own tension, and what it stores is the sum over them (elements/mean.py). Plastic work is also what the pressure of n
-    does otherwise than that of the same ratio with the bulking and the damage of now, and what is beyond the tension.
+    own tension, and what it stores is the sum over them (elements/heat_and_bulking.py). Plastic work is also what the
+    pressure of n does otherwise than that of the same ratio with the bulking and the damage of now, and what is beyond
+    the tension.
     """
     bulk, averaged = params[BULK], len(s) > _UNTOLD
     for i in range(n):
@@ -187,7 +188,7 @@ def johnson_holmquist(w, s, params, n, dt):  # type: ignore[no-untyped-def]
     The strength is that of the damage at n: the return is a division. The plastic work is that of the mean of the
     rotated old stress and the new one (as in mohr_coulomb.py), also where damage or pressure let the strength fall;
     what becomes bulking is kept, and is taken off. Where the pressure is a mean over nodes, the new bulking goes to the
-    nodes first (elements/pressure.py).
+    nodes first (elements/heat_and_bulking.py).
     """
     equivalent_stress(w, s, n)
     _factors(w, s, params, n)

@@ -1,0 +1,143 @@
+"""What the passes over the elements take: records of arrays, and their numba types, which signatures name."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..jit import record, types
+from ..state import CHUNK, Bits, Block, Flags, Floats, Ints, Nodes, Tets
+from . import tet4
+
+LARGEST_LIMIT, LIMITING_TET, LARGEST_FORCE, WORN, HOT = range(5)
+"""Places in ``Scratch.peaks``: bits of the largest one-over-stable-step, 1/s; smallest global id of the tets that have
+it; bits of the largest force, N; what is found of worn-out tets (wear.py); whether faces are hot (hot.py)."""
+_PEAKS = 5
+"""Number of these places."""
+_LINE = 8
+"""Numbers in a line of the cache."""
+
+
+class Motion(NamedTuple):
+    """The nodes of a rank, and the sums of the forces on them."""
+
+    x0: Floats
+    """(nodes, 3) initial positions, m."""
+    x: Floats
+    """(nodes, 3) positions at n+1, m."""
+    v: Floats
+    """(nodes, 3) velocities at n+1/2, m/s."""
+    force: Ints
+    """(nodes, 3) quanta."""
+
+    @classmethod
+    def of(cls, nodes: Nodes) -> "Motion":
+        """That of ``nodes`` as they are now."""
+        return cls(nodes.x0, nodes.x, nodes.v, nodes.force)
+
+
+class Body(NamedTuple):
+    """The elements of a block."""
+
+    tets: Tets
+    """(n, 4) local nodes."""
+    id: Ints
+    """(n,) global ids."""
+    state: Floats
+    """All of the block, flat."""
+    rows: int
+    """Of the state, in a chunk."""
+    params: Floats
+    """Constants of the material."""
+    strength: int
+    """Which strength model."""
+    eos: int
+    """Which equation of state."""
+    quiet: Ints
+    """(chunks, 3) see rest.py."""
+    flat: Flags
+    """(n,) tets whose volume strain is not averaged; (0,) where there is none."""
+
+    @classmethod
+    def of(cls, block: Block) -> "Body":
+        """That of a block as it is now."""
+        rows = int(block.state.shape[1])
+        return cls(
+            block.tets, block.id, block.state.reshape(-1), rows, block.params, block.kind, block.eos, block.quiet,
+            block.flat,
+        )  # fmt: skip
+
+
+class Marks(NamedTuple):
+    """What the passes look for in the tets of a block, and whom they mark."""
+
+    worn: Flags
+    """(n,) tets that are about to leave; (0,) where the part does not erode."""
+    life: Floats
+    """(5,) see wear.py."""
+    hot: Bits
+    """(n,) see hot.py; (0,) where the part does not fracture."""
+    weakest: Floats
+    """(n,) smallest strength of the faces of each tet, Pa."""
+    shear: float
+    """Weight of shear against normal traction."""
+
+    @classmethod
+    def of(cls, block: Block) -> "Marks":
+        """Those of a block as it is now."""
+        return cls(block.worn, block.life, block.hot, block.weakest, block.shear_weight)
+
+
+class Scratch(NamedTuple):
+    """Room for one chunk, and what the step needs of all tets of a rank."""
+
+    w: Floats
+    """Rows of CHUNK numbers, see tet4.py."""
+    wi: Ints
+    """Nine rows of forces, quanta."""
+    bits: Ints
+    """``w`` once more, as integers."""
+    peaks: Ints
+    """(5,) see LARGEST_LIMIT and the names beside it."""
+
+    @classmethod
+    def of_rank(cls) -> "Scratch":
+        """Rows that begin on a cache line: the same speed wherever memory is given."""
+        room = np.zeros(tet4.SCRATCH + _LINE)
+        w = room[-(room.ctypes.data // room.itemsize) % _LINE :][: tet4.SCRATCH]
+        return cls(w, np.zeros(9 * CHUNK, np.int64), w.view(np.int64), np.zeros(_PEAKS, np.int64))
+
+
+class Means(NamedTuple):
+    """Nodal sums and means of the averaged pressure forms."""
+
+    sums: Ints
+    """(nodes, 2 or 3) of volume change and volume, and of heat or bulking where there are such, quanta."""
+    weight: Floats
+    """(nodes,) one over the reference volume, 1/m^3."""
+    strain: Floats
+    """(nodes,) volume strain of the step."""
+    more: Floats
+    """(nodes,) heat or bulking of the step."""
+    split: bool
+    """Whether pressure gradients stabilise; the arrays below are of one row if not."""
+    pressure: Floats
+    """(nodes,) Pa."""
+    projected: Floats
+    """(nodes, 3) projected gradient of the pressure, Pa/m."""
+    gradient: Ints
+    """(nodes, 3) its sums, quanta."""
+
+    @classmethod
+    def none(cls) -> "Means":
+        """Of the ``standard`` form."""
+        row, lines = np.zeros(1), np.zeros((1, 3), np.int64)
+        return cls(lines, row, row, row, False, row, np.zeros((1, 3)), lines)
+
+
+_F1, _F2, _I1, _I2 = types.float64[::1], types.float64[:, ::1], types.int64[::1], types.int64[:, ::1]
+_B1, _INT, _FLAG = types.boolean[::1], types.int64, types.boolean
+MOTION = record(Motion, _F2, _F2, _F2, _I2)
+BODY = record(Body, types.uint32[:, ::1], _I1, _F1, _INT, _F1, _INT, _INT, _I2, _B1)
+MARKS = record(Marks, _B1, _F1, types.uint8[::1], _F1, types.float64)
+SCRATCH = record(Scratch, _F1, _I1, _I1, _I1)
+MEANS = record(Means, _I2, _F1, _F1, _F1, _FLAG, _F1, _F2, _I2)
