@@ -2,10 +2,10 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, GetJsonSchemaHandler
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
-from .units import Length, Speed
+from .units import Length, Speed, usable
 
 Axis = Literal["x", "y", "z"]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,63}$")]
@@ -25,7 +25,8 @@ def _no_truth(value: Any) -> Any:
 
 
 Count = Annotated[int, BeforeValidator(_no_truth)]
-Direction = Annotated[tuple[float, float, float], BeforeValidator(_floats)]
+_Component = Annotated[float, AfterValidator(usable)]
+Direction = Annotated[tuple[_Component, _Component, _Component], BeforeValidator(_floats)]
 
 
 class Switch:

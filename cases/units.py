@@ -91,8 +91,13 @@ def parse_quantity(value: object, unit: str) -> float:
     number = _read_text(value, unit) if isinstance(value, str) else _to_float(value)
     if not math.isfinite(number):
         raise ValueError(f"{value!r} is not finite")
+    return usable(number, f"{value!r} cannot be used: in SI units it")
+
+
+def usable(number: float, what: str = "it") -> float:
+    """The number, if it is not beyond LARGEST either way; ``what`` says so. Raises ValueError."""
     if number and not 1.0 / LARGEST <= abs(number) <= LARGEST:
-        raise ValueError(f"{value!r} cannot be used: in SI units it is not between {1.0 / LARGEST:g} and {LARGEST:g}")
+        raise ValueError(f"{what} is not between {1.0 / LARGEST:g} and {LARGEST:g}")
     return number
 
 

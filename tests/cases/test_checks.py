@@ -52,6 +52,7 @@ def test_the_rod_is_sound() -> None:
         (["boundaries[1].axis=z"], "parts[0].mesh.sector", "axis = 'x', at = 0 for part 'rod'"),
         (["boundaries[2].at=1 mm"], "parts[0].mesh.sector", "axis = 'y', at = 0 for part 'rod'"),
         (["boundaries[0].normal=[0, 0, 0]"], "boundaries[0].normal", "must not be zero"),
+        (["boundaries[0].normal=[0, 0, 1e200]"], "boundaries[0].normal[2]", "is not between 1e-30 and 1e+30"),
         (["boundaries[0].normal=[0, 0, -1]"], "boundaries[0]", "part 'rod' starts 0.03 m behind this wall"),
         (["boundaries[0].point=[0, 0, '1 mm']"], "boundaries[0]", "part 'rod' starts 0.001 m behind this wall"),
         (["boundaries[0]={kind='gravity', acceleration=[0, 0, 0]}"], "boundaries[0].acceleration", "must not be zero"),

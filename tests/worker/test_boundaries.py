@@ -1,22 +1,25 @@
 """Walls push and never pull, planes hold, prescribed motion and free fall are exact; what they do is booked."""
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from conoid.cases import materials, schema
-from conoid.worker import domain, step
+from conoid.cases.load import parse_case
+from conoid.worker import domain, simulation, step
 from conoid.worker.boundaries import RigidWalls
 from conoid.worker.drivers import Traction
 from conoid.worker.errors import InputError
 from conoid.worker.mesh.faces import boundary_faces
+from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.simulation import Simulation
 from conoid.worker.state import PRESSURE, S_ZZ, WORK, Flags
 
 from ..contact.bodies import meeting_of, moved
-from .kernels import COPPER, STEEL, Watch, around, build, run, scene, whole_of
+from .kernels import COPPER, FORMS, STEEL, Form, Watch, around, build, run, scene, whole_of
 from .meshes import Floats, block
 from .simulations import on, tick
 
@@ -42,6 +45,33 @@ def heights(sim: Simulation, gap: float) -> Floats:
     """(nodes,) distances from the tilted wall, m."""
     n = np.array(TILTED) / np.linalg.norm(TILTED)
     return np.asarray(sim.model.nodes.x @ n - (MESH.points @ n).min() + gap)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_quarter_between_planes_of_symmetry_is_a_quarter_of_the_whole(form: Form) -> None:
+    """Every line of the ledger, to rounding: cells cut into five tets, which mirror each other."""
+    cube = {"shape": "box", "high": [2e-3] * 3, "element_size": 1e-3, "generator": "structured", "split": 5}
+    data = {
+        "name": "cube", "numerics": {"pressure": form}, "run": {"end_time": 2e-6, "frames": 0},
+        "materials": {"stone": {"density": 2000, "elastic": {"young": 20e9, "poisson": 0.25}}},
+    }  # fmt: skip
+    part = {"name": "cube", "material": "stone", "stretch": {"rate": [1e4, -2e4, 9e3]}}
+
+    def lines(low: list[float], *boundaries: dict[str, Any]) -> Floats:
+        case = parse_case({**data, "parts": [{**part, "mesh": {**cube, "low": low}}], "boundaries": boundaries})
+        seen = []
+
+        def watch(sim: Simulation, before: Floats) -> None:
+            energy = sim.ledger.close(before)
+            seen.append((energy.kinetic, energy.elastic, energy.viscous, energy.averaging))
+
+        run(simulation.build(case, Path(), SerialComm()), watch)
+        return np.array(seen)
+
+    whole = lines([-2e-3, -2e-3, 0.0])
+    quarter = lines([0.0] * 3, *({"kind": "symmetry", "axis": axis} for axis in "xy"))
+    assert 4.0 * quarter == pytest.approx(whole, rel=1e-8, abs=1e-9 * whole.max())
+    assert form == "standard" or whole[:, 3].max() > 1e-3 * whole.max()
 
 
 @pytest.mark.parametrize("gap", [0.0, 3e-5])
