@@ -6,14 +6,29 @@ import numpy as np
 import numpy.typing as npt
 
 _DIGITS = Context(prec=60)
-"""More than a float64 needs after terms as large as those of some turns have cancelled."""
+"""More than a float64 needs after terms as large as those of a turn have cancelled."""
+_MANY = Context(prec=120)
+"""As many again as the largest angle of a case has before the point."""
 _SMALL = Decimal("1e-40")
 """Terms from here on change no float64."""
 
 
+def _arc_tangent(n: int) -> Decimal:
+    """Of 1 / n."""
+    total, power, k = Decimal(0), _MANY.divide(Decimal(1), Decimal(n)), 1
+    while power > Decimal(f"1e-{_MANY.prec}"):
+        term = _MANY.divide(power, Decimal(k if k % 4 == 1 else -k))
+        total, power, k = _MANY.add(total, term), _MANY.divide(power, Decimal(n * n)), k + 2
+    return total
+
+
+_TURN = _MANY.subtract(_MANY.multiply(Decimal(32), _arc_tangent(5)), _MANY.multiply(Decimal(8), _arc_tangent(239)))
+"""2 pi, by Machin's formula."""
+
+
 def sine_and_cosine(angle: float) -> tuple[float, float]:
-    """Of a finite ``angle``, radians, of at most some turns: the power series in decimals, then rounded."""
-    x = Decimal(angle)
+    """Of an ``angle``, radians, below 1e60: whole turns off, the power series in decimals, then rounded."""
+    x = _MANY.remainder(Decimal(angle), _TURN)
     sums, term, k = [Decimal(0), Decimal(1)], Decimal(1), 0
     while _DIGITS.abs(term) > _SMALL:
         k += 1

@@ -9,7 +9,9 @@ import pytest
 from conoid.worker.turning import sine_and_cosine, sines_and_cosines
 
 
-@pytest.mark.parametrize("angle", [0.0, 1e-300, 1e-9, 0.1, -0.1, 1.0, math.pi / 2, 3.0, -20.0, 100.0])
+@pytest.mark.parametrize(
+    "angle", [0.0, 1e-300, 1e-9, 0.1, -0.1, 1.0, math.pi / 2, 3.0, -20.0, 100.0, 158.65, -1e9, 1e22]
+)
 def test_sine_and_cosine_are_those_of_the_library_but_for_the_last_bit(angle: float) -> None:
     for mine, theirs in zip(sine_and_cosine(angle), (math.sin(angle), math.cos(angle)), strict=True):
         assert abs(mine - theirs) <= math.ulp(theirs)

@@ -14,18 +14,17 @@ from .scene import Scene
 class Books:
     """One half of the work of an impulse is booked in the step that gives it, the other in the next one."""
 
-    def __init__(self, nodes: int, parts: int, extremes: tuple[float, float]) -> None:
-        """``extremes``: largest nodal mass, kg, and speed, m/s, of the scene."""
+    def __init__(self, nodes: int, parts: int, impulse: float, energy: float) -> None:
+        """The most that may be on one node in a step: ``impulse``, N s, and ``energy``, J."""
         self.contact_loss = np.zeros(nodes)
         """(nodes,) energy lost by impact and friction, J."""
         self.external_work = np.zeros(nodes)
         """(nodes,) work that what holds nodes does against contact, J."""
-        mass, speed = extremes
-        self.scale = fixed_point.scale_for(mass * speed)
+        self.scale = fixed_point.scale_for(impulse)
         """Quanta per N s."""
-        self.friction = fixed_point.Tally(np.full(2, mass * speed * speed))
+        self.friction = fixed_point.Tally(np.full(2, energy))
         """Work of friction so far, J, and the second half of that of the last step until it is due."""
-        self.account = Account(mass * speed * speed)
+        self.account = Account(energy)
         self.agreed = self.account.words
         """What contact has taken on all ranks, when they last agreed (account.py)."""
         self.parts = np.zeros((parts, 3), np.int64)

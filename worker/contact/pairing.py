@@ -1,10 +1,11 @@
-"""Which parts meet, and with what friction."""
+"""Which parts meet, with what friction, and what the lighter of two that meet weighs."""
 
 import numpy as np
 
 from conoid.cases.schema import Case
 
-from ..state import Floats
+from ..parallel.comm import Comm
+from ..state import Floats, Nodes
 
 
 def friction(case: Case) -> Floats:
@@ -20,3 +21,20 @@ def friction(case: Case) -> Floats:
         i, j = (names.index(name) for name in pair.parts)
         mu[i, j] = mu[j, i] = pair.friction
     return mu
+
+
+def lighter(mu: Floats, nodes: Nodes, mobility: Floats, comm: Comm) -> float:
+    """The heaviest node, kg, of the lighter of two parts that meet, over all that do; all ranks take part.
+
+    No impulse is more than it times a speed: the lighter body cannot give more. What is held along some direction,
+    ``mobility`` (nodes, 3) 0, gives as much as it gets. 0 where no parts meet.
+    """
+    mass, held = np.zeros(len(mu)), np.zeros(len(mu))
+    np.maximum.at(mass, nodes.part, nodes.mass)
+    np.maximum.at(held, nodes.part, (mobility <= 0.0).any(axis=1))
+    mass, held = comm.maximum(np.stack([mass, held]))
+    gives = np.where(held > 0.0, np.inf, mass)
+    pairs = np.minimum.outer(gives, gives)
+    pairs = np.where(np.isinf(pairs), np.maximum.outer(mass, mass), pairs)
+    np.fill_diagonal(pairs, mass)
+    return float(pairs[~np.isnan(mu)].max(initial=0.0))

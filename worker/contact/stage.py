@@ -18,7 +18,7 @@ from ..reduction import StepReduction
 from ..state import Flags, Floats, Indices, Ints, Model, Nodes
 from ..timers import Timers
 from ..topology import Split
-from . import held, normals
+from . import held, normals, pairing
 from .books import Books
 from .detection import Ahead, Detected, detect
 from .exterior import Exterior
@@ -50,7 +50,9 @@ class Contact:
         self._fractures, self._comm, self._clock, self._timers = case.fractures, comm, clock, timers
         self.exterior = Exterior(model, neighbours, bounds, case.contact.edges, comm)
         self.searches = Searches(case, model, neighbours, self.exterior, comm, clock)
-        self.books = Books(model.nodes.n, len(case.parts), extremes)
+        largest, speed = extremes
+        mass = pairing.lighter(self.searches.mu, model.nodes, self.exterior.flight.mobility, comm) or largest
+        self.books = Books(model.nodes.n, len(case.parts), mass * speed, mass * speed * speed)
         self._active = ActiveSet(self.books.scale)
         self._restitution = case.contact.restitution
         self._sweeps = case.contact.sweeps or (_SWEEPS_BACK if self._restitution > 0.0 else _SWEEPS)
