@@ -161,6 +161,7 @@ def test_a_sweep_that_has_ended_is_not_said_to_be_cancelled(
 # Cases ----------------------------------------------------------------------------------------------------------------
 
 
-def test_a_case_that_cannot_be_estimated_is_refused(quiet_home: Path) -> None:
+def test_a_number_that_cannot_be_computed_with_is_refused(quiet_home: Path) -> None:
     line = refused(2, "validate", "demo", "--set", "parts[0].mesh.element_size='1e-300 m'")
-    assert line == "conoid: parts: the elements are too many or too small to be counted"
+    told = "cannot be used: in SI units it is not between 1e-30 and 1e+30"
+    assert line == f"conoid: parts[0].mesh.element_size = '1e-300 m': {told}"
