@@ -141,10 +141,7 @@ def _viscous_factor(case: Case) -> float:
 
 def wave_speed(made: Material) -> float:
     """Speed of plane waves at rest, m/s: sqrt((K + 4 G / 3) / density), K from the equation of state where given."""
-    young, poisson = made.elastic.young, made.elastic.poisson
-    shear = young / (2.0 * (1.0 + poisson))
-    bulk = young / (3.0 * (1.0 - 2.0 * poisson)) if made.eos is None else made.density * made.eos.c0**2
-    return math.sqrt((bulk + 4.0 / 3.0 * shear) / made.density)
+    return math.sqrt((made.bulk + 4.0 / 3.0 * made.elastic.shear) / made.density)
 
 
 def shrinkage(case: Case, part: Part) -> float:

@@ -25,6 +25,16 @@ class Elastic(Model):
     poisson: Annotated[Ratio, Field(gt=-1, lt=0.5)]
     """Poisson's ratio."""
 
+    @property
+    def shear(self) -> float:
+        """Shear modulus, Pa."""
+        return self.young / (2.0 * (1.0 + self.poisson))
+
+    @property
+    def bulk(self) -> float:
+        """Bulk modulus, Pa."""
+        return self.young / (3.0 * (1.0 - 2.0 * self.poisson))
+
 
 Strength = Annotated[LinearHardening | JohnsonCook | MohrCoulomb | JohnsonHolmquist, Field(discriminator="model")]
 
@@ -87,3 +97,8 @@ class Material(Model):
     """What breaks facets; without it a part of this material cannot fracture."""
     description: str = ""
     """For people, with the sources of the constants."""
+
+    @property
+    def bulk(self) -> float:
+        """Bulk modulus at rest, Pa: density c0^2 where there is an equation of state."""
+        return self.elastic.bulk if self.eos is None else self.density * self.eos.c0**2

@@ -142,9 +142,7 @@ def _constants(made: Material) -> Iterator[tuple[Location, str, float]]:
         )
         yield ("brittle", "energy"), "fracture energy", made.brittle.energy
     if made.eos is not None:
-        bulk = made.elastic.young / (3.0 * (1.0 - 2.0 * made.elastic.poisson))
-        what = "bulk modulus, density c0^2, over that of elastic,"
-        yield ("eos", "c0"), what, made.density * made.eos.c0**2 / bulk
+        yield ("eos", "c0"), "bulk modulus, density c0^2, over that of elastic,", made.bulk / made.elastic.bulk
 
 
 def _unlikely(location: Location, what: str, value: float) -> Iterator[Problem]:

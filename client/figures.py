@@ -5,11 +5,13 @@ from datetime import datetime
 
 _PREFIXES = ((1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 """SI."""
+_SHOWN = 5e-3, 1e4
+"""Before a prefix: less is 0.00 of the smallest one, more has five digits of the largest before the point."""
 
 
 def si(value: float, unit: str, digits: int = 3) -> str:
-    """``value`` with an SI prefix before ``unit`` and ``digits`` significant digits; without a prefix where none
-    is small or large enough.
+    """``value`` with an SI prefix before ``unit`` and ``digits`` significant digits; without a prefix where none is
+    small or large enough (_SHOWN).
     """
     if not math.isfinite(value):
         return f"{value} {unit}".strip()
@@ -17,7 +19,7 @@ def si(value: float, unit: str, digits: int = 3) -> str:
         return f"0 {unit}".strip()
     factor, prefix = next((pair for pair in _PREFIXES if abs(value) >= 0.9995 * pair[0]), (1e-12, "p"))
     scaled = value / factor
-    if not 5e-3 <= abs(scaled) < 1e4:
+    if not _SHOWN[0] <= abs(scaled) < _SHOWN[1]:
         return f"{value:.{digits}g} {unit}".strip()
     before = max(1, math.floor(math.log10(abs(scaled)) + 1e-3) + 1)
     return f"{scaled:.{max(0, digits - before)}f} {prefix}{unit}".strip()

@@ -244,9 +244,7 @@ def _elements(
     materials = [find_material(case, part.material) for part in case.parts]
     bulk = np.array([moduli(each)[0] for each in materials])[model.nodes.part]
     more = any(equation_of(each).averaged for each in materials)
-    return AveragedElements(
-        model, comm, neighbours, timers, 1.0 / node_volume, bulk, form == "split", more
-    )  # fmt: skip
+    return AveragedElements(model, comm, neighbours, timers, 1.0 / node_volume, bulk, form == "split", more)
 
 
 def _force_floor(model: Model, comm: Comm) -> float:

@@ -42,7 +42,7 @@ def test_a_huge_body_elsewhere_changes_nothing_of_an_impact() -> None:
 def test_a_huge_body_is_hit_as_a_large_one() -> None:
     large, huge = (losses(size, 0.0, hit=True) for size in (0.3, 30.0))
     assert large[1] > 0.01 * large[0]
-    assert huge == pytest.approx(large, rel=1e-3)
+    assert huge == pytest.approx(large, rel=1e-6)
 
 
 def test_the_lighter_of_those_that_meet_counts() -> None:

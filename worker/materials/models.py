@@ -95,12 +95,8 @@ def equation_of(material: Material) -> Equation:
 
 
 def moduli(material: Material) -> tuple[float, float]:
-    """Bulk and shear modulus, Pa; with a Mie-Grueneisen equation of state the bulk modulus is density * c0^2."""
-    young, poisson = material.elastic.young, material.elastic.poisson
-    shear = young / (2.0 * (1.0 + poisson))
-    if material.eos is not None:
-        return material.density * material.eos.c0**2, shear
-    return young / (3.0 * (1.0 - 2.0 * poisson)), shear
+    """Bulk modulus at rest and shear modulus, Pa."""
+    return material.bulk, material.elastic.shear
 
 
 def parameters(material: Material, viscosity: Viscosity | None, *, breaks: bool = False) -> Floats:
