@@ -64,6 +64,9 @@ class Boundary(ABC):
     def note(self, state: Nodes) -> None:  # noqa: B027 (a symmetry plane does no work)
         """Before the kick: keeps v(n-1/2), and books the second half of the last impulses' work."""
 
+    def mirror(self, vectors: Floats) -> None:  # noqa: B027 (most boundaries mirror nothing)
+        """Takes what the mirror image cancels out of the means of ``vectors`` (nodes, 3) over the tets of its nodes."""
+
     @abstractmethod
     def apply(self, state: Nodes, dt: float, t: float) -> None:
         """Corrects v(n+1/2) at time ``t``, s; ``dt`` is the step ahead, s."""
@@ -120,6 +123,9 @@ class SymmetryPlane(Boundary):
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
         _hold(state.v, self.nodes, self._axis)
+
+    def mirror(self, vectors: Floats) -> None:
+        _hold(vectors, self.nodes, self._axis)
 
 
 class RigidWalls(Boundary):

@@ -162,7 +162,7 @@ def _assemble(
         scene.append(Mirrors.of(case, model, scene))
     walls = next((bound for bound in scene if type(bound) is RigidWalls), None)
     probes = Probes(case, model, contact, walls, clock, comm)
-    elements = _elements(case, model, neighbours, node_volume, comm, timers)
+    elements = _elements(case, model, neighbours, scene, node_volume, comm, timers)
     fracture = None
     if case.fractures:
         by_node: list[KeptByNode] = [*scene, *(stage for stage in (erosion, contact) if stage is not None)]
@@ -236,7 +236,8 @@ def _extremes(model: Model, comm: Comm) -> tuple[float, float]:
 
 
 def _elements(
-    case: Case, model: Model, neighbours: list[Neighbour], node_volume: Floats, comm: Comm, timers: Timers
+    case: Case, model: Model, neighbours: list[Neighbour], scene: list[Boundary], node_volume: Floats, comm: Comm,
+    timers: Timers,
 ) -> Elements:  # fmt: skip
     form = case.numerics.pressure
     if form == "standard":
@@ -244,7 +245,9 @@ def _elements(
     materials = [find_material(case, part.material) for part in case.parts]
     bulk = np.array([moduli(each)[0] for each in materials])[model.nodes.part]
     more = any(equation_of(each).averaged for each in materials)
-    return AveragedElements(model, comm, neighbours, timers, 1.0 / node_volume, bulk, form == "split", more)
+    return AveragedElements(
+        model, comm, neighbours, timers, 1.0 / node_volume, bulk, scene, form == "split", more
+    )  # fmt: skip
 
 
 def _force_floor(model: Model, comm: Comm) -> float:

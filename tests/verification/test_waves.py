@@ -16,8 +16,13 @@ LENGTH, SPEED = 40e-3, 5856.3822
 START = np.array([1.0, 1.0, 0.0])
 
 
-def ring(cells: int, form: Form = "standard", periods: float = 4.0) -> tuple[Simulation, Floats, Floats]:
-    """v_z = sin(2 pi z / L) at the start; times and modal amplitudes of the velocity, energies of the lines."""
+def ring(
+    cells: int, form: Form = "standard", periods: float = 4.0, mirrored: bool = False
+) -> tuple[Simulation, Floats, Floats]:
+    """v_z = sin(2 pi z / L) at the start; times and modal amplitudes of the velocity, energies of the lines.
+
+    ``mirrored``: the mesh goes on behind the rollers as its mirror image, so that this is a wave in a wide body.
+    """
     size = LENGTH / cells
     faces = tuple(
         {"kind": "symmetry", "axis": axis, "at": at}
@@ -25,7 +30,7 @@ def ring(cells: int, form: Form = "standard", periods: float = 4.0) -> tuple[Sim
         for at in (0.0, top)
     )
     case = scene(STEEL, form, end=periods * LENGTH / SPEED, boundaries=faces)
-    sim = build(case, [block((2, 2, cells), size, shake=0.0)])
+    sim = build(case, [block((2, 2, cells), size, shake=0.0, mirrored=mirrored)])
     nodes = sim.model.nodes
     mode = np.sin(2.0 * np.pi * nodes.x0[:, 2] / LENGTH)
     nodes.v[:, 2] = 1e-3 * mode
@@ -72,11 +77,11 @@ def test_a_wave_of_twenty_elements_keeps_its_height(form: Form) -> None:
 
     The ledger closes in any case.
     """
-    _, seen, energies = ring(20, form, periods=8.0)
-    assert -1e-5 < loss(seen) < (1.3e-3 if form == "split" else 1e-5)
+    _, seen, energies = ring(20, form, periods=8.0, mirrored=True)
+    assert -1e-5 < loss(seen) < (1.6e-3 if form == "split" else 1e-5)
     assert np.abs(energies / energies[0] - 1.0).max() < 1e-8
 
 
 def test_what_the_split_form_spends_falls_fast() -> None:
     """The stabilisation acts on fourth differences of the pressure, over a time step: order three in the size."""
-    assert_converges("split_loss", [loss(ring(cells, "split", periods=8.0)[1]) for cells in (10, 20, 40)])
+    assert_converges("split_loss", [loss(ring(cells, "split", 8.0, mirrored=True)[1]) for cells in (10, 20, 40)])

@@ -15,25 +15,32 @@ REGULAR = np.array(
 """Nodes of the regular tet with edge 1."""
 
 
-def block(cells: tuple[int, int, int], size: float = 1.0, shake: float = 0.2, seed: int = 1) -> TetMesh:
+def block(
+    cells: tuple[int, int, int], size: float = 1.0, shake: float = 0.2, seed: int = 1, mirrored: bool = False
+) -> TetMesh:
     """A block of cubes of edge ``size``, m, each cut into six tets; nodes moved by up to ``shake`` of the edge.
 
-    Nodes on a face stay in its plane, so that the block keeps its shape.
+    Nodes on a face stay in its plane, so that the block keeps its shape. ``mirrored``: every cube is cut as the mirror
+    image of its neighbours, and so goes on behind planes of symmetry.
     """
     steps = [np.arange(n + 1) for n in cells]
     grid = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 3).astype(float)
     move = np.random.default_rng(seed).uniform(-shake, shake, grid.shape)
     move[(grid == 0.0) | (grid == np.array(cells))] = 0.0
     strides = np.array([(cells[1] + 1) * (cells[2] + 1), cells[2] + 1, 1])
-    corner = np.stack(np.meshgrid(*[np.arange(n) for n in cells], indexing="ij"), axis=-1).reshape(-1, 3) @ strides
-    tets = np.concatenate([corner[:, None] + path for path in _paths(strides)])
+    cubes = np.stack(np.meshgrid(*[np.arange(n) for n in cells], indexing="ij"), axis=-1).reshape(-1, 3)
+    turned = cubes % 2 if mirrored else np.zeros_like(cubes)
+    corner = (cubes + turned) @ strides
+    ways = strides * (1 - 2 * turned)
+    tets = np.concatenate([corner[:, None] + path for path in _paths(ways)])
     return TetMesh((grid + move) * size, positive(grid, tets))
 
 
-def _paths(strides: npt.NDArray[np.int64]) -> list[npt.NDArray[np.int64]]:
-    """The six ways from a cube's near corner to its far one."""
+def _paths(ways: npt.NDArray[np.int64]) -> list[npt.NDArray[np.int64]]:
+    """(cubes, 4) from a cube's first corner to that across, six times; ``ways`` (cubes, 3) are its edges as strides."""
+    start, end = np.zeros(len(ways), np.int64), ways.sum(axis=1)
     return [
-        np.array([0, strides[a], strides[a] + strides[b], strides.sum()])
+        np.stack([start, ways[:, a], ways[:, a] + ways[:, b], end], axis=1)
         for a, b, _ in itertools.permutations(range(3))
     ]
 

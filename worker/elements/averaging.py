@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..boundaries import Boundary
 from ..migration.parcel import Parcel
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum
@@ -19,10 +20,11 @@ class AveragedElements(Elements):
 
     def __init__(
         self, model: Model, comm: Comm, neighbours: list[Neighbour], timers: Timers,
-        weight: Floats, bulk: Floats, split: bool, more: bool,
+        weight: Floats, bulk: Floats, scene: list[Boundary], split: bool, more: bool,
     ) -> None:  # fmt: skip
         """``weight`` (nodes,): one over the reference volume, 1/m^3; ``bulk`` (nodes,): modulus of the part, Pa;
-        ``more``: whether an equation of state of the case has means besides, of heat or bulking.
+        ``scene``: its planes of symmetry have mirror images behind them; ``more``: whether an equation of state of the
+        case has means besides, of heat or bulking.
         """
         n = model.nodes.n
         self.split = split
@@ -31,6 +33,7 @@ class AveragedElements(Elements):
         super().__init__(model, comm, neighbours, timers)
         self._weight = weight
         self._bulk = bulk
+        self._scene = scene
         self._volumes = np.zeros((n, self._columns), np.int64)
         self._strain, self._more = np.zeros(n), np.zeros(n)
         self._projected = np.zeros((n if split else 1, 3))
@@ -98,6 +101,8 @@ class AveragedElements(Elements):
             self.shared_gradients.finish(self._gradient)
             volumes = np.maximum(self._volumes[:, 1], 1) / (self._weight * pressure.QUANTA)
             self._projected = self._gradient / (self._scale * volumes[:, None])
+            for boundary in self._scene:
+                boundary.mirror(self._projected)
 
     def _means(self) -> Means:
         return Means(
