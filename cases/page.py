@@ -18,7 +18,7 @@ A first case, step by step: [tutorial.md](tutorial.md).
 
 **Quantities** are text with a unit, such as `"210 m/s"` or `"7850 kg/m^3"`. A bare number is taken in the SI unit that
 stands with the key; `conoid validate` warns of each that is not 0. In SI units all lie between 1e-30 and 1e30, or are
-0. Units, to be combined with `*`, `/` and `^`:
+0; which unit was written changes no bit of a run. Units, to be combined with `*`, `/` and `^`:
 {units}.
 
 **Places** are coordinates in one frame for all bodies. Stress is positive in tension, pressure in compression.

@@ -5,12 +5,14 @@ The grammar is closed (no evaluation of any kind)::
     quantity = number [ unit { ("*" | "/" | " ") unit } ]
     unit     = symbol [ "^" integer ]
 
-A bare number is taken as SI. Errors name the text, what was wrong and what would be allowed.
+A bare number is taken as SI. Factors are exact and a quantity is rounded once: ``0.4 mm`` and ``400 um`` are equal to
+the bit, and so are the runs. Errors name the text, what was wrong and what would be allowed.
 """
 
 import math
 import re
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, GetJsonSchemaHandler
@@ -24,21 +26,23 @@ _FORCE, _STRESS, _ENERGY, _POWER = (1, 1, -2, 0), (-1, 1, -2, 0), (2, 1, -2, 0),
 _NONE, _FREQUENCY = (0, 0, 0, 0), (0, 0, -1, 0)
 """Dimensions by their exponents of m, kg, s, K."""
 
-UNITS: dict[str, tuple[float, Dimension]] = {
-    "1": (1.0, (0, 0, 0, 0)),
-    "m": (1.0, _LENGTH), "km": (1e3, _LENGTH), "cm": (1e-2, _LENGTH), "mm": (1e-3, _LENGTH),
-    "um": (1e-6, _LENGTH), "µm": (1e-6, _LENGTH), "nm": (1e-9, _LENGTH), "in": (0.0254, _LENGTH),
-    "kg": (1.0, _MASS), "g": (1e-3, _MASS), "mg": (1e-6, _MASS), "t": (1e3, _MASS),
-    "s": (1.0, _TIME), "ms": (1e-3, _TIME), "us": (1e-6, _TIME), "µs": (1e-6, _TIME), "ns": (1e-9, _TIME),
-    "min": (60.0, _TIME), "h": (3600.0, _TIME),
-    "K": (1.0, _TEMPERATURE),
-    "Hz": (1.0, _FREQUENCY), "kHz": (1e3, _FREQUENCY), "rad": (1.0, _NONE),
-    "deg": (math.pi / 180.0, _NONE), "rev": (2.0 * math.pi, _NONE),
-    "N": (1.0, _FORCE), "kN": (1e3, _FORCE), "MN": (1e6, _FORCE),
-    "Pa": (1.0, _STRESS), "kPa": (1e3, _STRESS), "MPa": (1e6, _STRESS), "GPa": (1e9, _STRESS),
-    "bar": (1e5, _STRESS), "Mbar": (1e11, _STRESS),
-    "J": (1.0, _ENERGY), "mJ": (1e-3, _ENERGY), "kJ": (1e3, _ENERGY), "MJ": (1e6, _ENERGY),
-    "W": (1.0, _POWER), "%": (1e-2, _NONE),
+_ONE, _KILO, _MEGA, _GIGA = Fraction(1), Fraction(1000), Fraction(10**6), Fraction(10**9)
+_CENTI, _MILLI, _MICRO, _NANO = Fraction(1, 100), Fraction(1, 1000), Fraction(1, 10**6), Fraction(1, 10**9)
+UNITS: dict[str, tuple[Fraction, Dimension]] = {
+    "1": (_ONE, _NONE),
+    "m": (_ONE, _LENGTH), "km": (_KILO, _LENGTH), "cm": (_CENTI, _LENGTH), "mm": (_MILLI, _LENGTH),
+    "um": (_MICRO, _LENGTH), "µm": (_MICRO, _LENGTH), "nm": (_NANO, _LENGTH), "in": (Fraction("0.0254"), _LENGTH),
+    "kg": (_ONE, _MASS), "g": (_MILLI, _MASS), "mg": (_MICRO, _MASS), "t": (_KILO, _MASS),
+    "s": (_ONE, _TIME), "ms": (_MILLI, _TIME), "us": (_MICRO, _TIME), "µs": (_MICRO, _TIME), "ns": (_NANO, _TIME),
+    "min": (Fraction(60), _TIME), "h": (Fraction(3600), _TIME),
+    "K": (_ONE, _TEMPERATURE),
+    "Hz": (_ONE, _FREQUENCY), "kHz": (_KILO, _FREQUENCY), "rad": (_ONE, _NONE),
+    "deg": (Fraction(math.pi) / 180, _NONE), "rev": (2 * Fraction(math.pi), _NONE),
+    "N": (_ONE, _FORCE), "kN": (_KILO, _FORCE), "MN": (_MEGA, _FORCE),
+    "Pa": (_ONE, _STRESS), "kPa": (_KILO, _STRESS), "MPa": (_MEGA, _STRESS), "GPa": (_GIGA, _STRESS),
+    "bar": (Fraction(10**5), _STRESS), "Mbar": (Fraction(10**11), _STRESS),
+    "J": (_ONE, _ENERGY), "mJ": (_MILLI, _ENERGY), "kJ": (_KILO, _ENERGY), "MJ": (_MEGA, _ENERGY),
+    "W": (_ONE, _POWER), "%": (_CENTI, _NONE),
 }  # fmt: skip
 
 KINDS: dict[Dimension, str] = {
@@ -63,9 +67,9 @@ LARGEST = 1e30
 """Of a quantity in SI units, and one over it the smallest. Chosen: energies of any such mass and speed are numbers."""
 
 
-def parse_unit(text: str) -> tuple[float, Dimension]:
-    """Factor to SI and dimension of a unit such as ``kg/m^3``. Raises ValueError."""
-    factor, dimension, position = 1.0, [0, 0, 0, 0], 0
+def parse_unit(text: str) -> tuple[Fraction, Dimension]:
+    """Exact factor to SI and dimension of a unit such as ``kg/m^3``. Raises ValueError."""
+    factor, dimension, position = _ONE, [0, 0, 0, 0], 0
     while position < len(text):
         match = _FACTOR.match(text, position)
         if match is None:
@@ -116,7 +120,10 @@ def _read_text(text: str, unit: str) -> float:
     factor, dimension = parse_unit(match[2])
     if match[2] and dimension != parse_unit(unit)[1]:
         raise ValueError(f"{text!r} has the wrong dimension; expected {kind_of(unit)}")
-    return float(match[1]) * factor
+    try:
+        return float(Fraction(match[1]) * factor)
+    except OverflowError:
+        return math.inf
 
 
 def kind_of(unit: str) -> str:

@@ -64,6 +64,19 @@ def test_refuses(text: object, unit: str, said: str) -> None:
     assert said in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("texts", "unit"),
+    [
+        (["0.004 mm", "4 um", "4e-9 km", "4000 nm", "0.0004 cm"], "m"),
+        (["7.83 g/cm^3", "7830 kg/m^3", "7.83e-9 t/mm^3", "7.83e-6 kg/mm^3"], "kg/m^3"),
+        (["0.37 GPa", "370 MPa", "3700 bar", "370 N/mm^2"], "Pa"),
+        (["0.7 mm/us", "700 m/s", "0.7 km/s", "2520 km/h"], "m/s"),
+    ],
+)
+def test_a_quantity_is_the_same_to_the_bit_in_any_unit(texts: list[str], unit: str) -> None:
+    assert len({parse_quantity(text, unit) for text in texts}) == 1
+
+
 def test_units_multiply_and_divide_from_the_left() -> None:
     assert parse_unit("J/kg/K") == parse_unit("J kg^-1*K^-1")
     assert parse_unit("kg/m^3") == (1.0, (-3, 1, 0, 0))
