@@ -151,7 +151,8 @@ class Viscosity(Model):
     """Bulk viscosity q = density * u * ((linear + shock * S) * c + quadratic * u), u = l * |rate|, in compression.
 
     S = u / (u + c / 100) is next to nothing in elastic waves and next to one in shocks.
-    l is V^(1/3) for a regular tet and follows the altitude of a flat one: 1.2009 / sqrt(sum |grad N|^2).
+    l is V^(1/3) for a regular tet and follows the altitude of a flat one: 1.2009 / sqrt(sum |grad N|^2). The rate is
+    that which the pressure sees: with ``nodal`` and ``split`` the mean of its nodes.
     """
 
     linear: Annotated[Ratio, Field(ge=0)] = 0.06

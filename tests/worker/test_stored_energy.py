@@ -47,10 +47,10 @@ def stored(sim: Simulation) -> float:
 
 
 def shaken(
-    material: Material, form: Form, erosion: Erosion | None = None, speed: float = SPEED
+    material: Material, form: Form, erosion: Erosion | None = None, speed: float = SPEED, every: int = 10
 ) -> tuple[list[tuple[Energy, float]], float]:
-    """Every tenth ledger of a block whose nodes fly in all directions, with what is stored then; the energy at the
-    start, J.
+    """The ledgers, ``every`` so many steps, of a block whose nodes fly in all directions, with what is stored then; the
+    energy at the start, J.
     """
     sim = build(scene(material, form, viscosity={}, erosion=erosion), [block((3, 3, 3), 1e-3)])
     nodes = sim.model.nodes
@@ -59,7 +59,7 @@ def shaken(
     seen: list[tuple[Energy, float]] = []
 
     def watch(now: Simulation, before: Floats) -> None:
-        if now.clock.step % 10 == 0:
+        if now.clock.step % every == 0:
             seen.append((now.ledger.close(before), stored(now)))
 
     run(sim, watch, 200)
@@ -70,8 +70,9 @@ def shaken(
 @pytest.mark.parametrize("name", LAWS)
 def test_the_elastic_line_is_what_the_stresses_store(name: str, form: Form) -> None:
     """With averaged pressures it was off by 1 to 9 % of the energy, by 2 % where alumina crumbles or copper tears."""
-    seen, initial = shaken(LAWS[name], form)
-    linear = seen if name != "johnson_holmquist" else seen[5:]  # until it has crumbled its pressure is not linear
+    crumbles = name == "johnson_holmquist"  # within twenty steps; until then its pressure is not linear
+    seen, initial = shaken(LAWS[name], form, every=5 if crumbles else 10)
+    linear = seen[10:] if crumbles else seen
     assert max(abs(energy.elastic - there) for energy, there in linear) < SHARE * initial
     assert max(energy.residual for energy, _ in seen) < 5e-4
     assert max(there for _, there in seen) > 0.005 * initial

@@ -10,6 +10,7 @@ from ..materials.law import (
     AFTER_PRESSURE,
     BEFORE_PRESSURE,
     BREAKS,
+    DILATES,
     FROM_SHAPE,
     ORDER,
     Q_LINEAR,
@@ -66,16 +67,19 @@ def return_at_pressure(strength, w, s, params, n, dt):  # type: ignore[no-untype
         deviatoric_work(w, s, n, dt)
 
 
-@njit(types.void(_I, _F1, _F1, _F1, _I, _F), cache=True, error_model="numpy")
-def pressure_and_limit(eos, w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """Equation of state, bulk viscosity and stable step of a chunk."""
+@njit(types.void(_I, _F1, _F1, _F1, _I, _F, _B), cache=True, error_model="numpy")
+def pressure_and_limit(eos, w, s, params, n, dt, averaged):  # type: ignore[no-untyped-def]
+    """Equation of state, bulk viscosity and stable step of a chunk; ``averaged``: of the forms with means, where what
+    dilates sees its own volume all the same.
+    """
     press(eos, w, s, params, n)
     if params[ORDER] == FROM_SHAPE:
         stiffen(w, s, params, n)
     linear, shock, quadratic = params[Q_LINEAR], params[Q_SHOCK], params[Q_QUADRATIC]
     if max(linear, shock, quadratic) > 0.0:
         frequency = 1.0 / dt if dt > 0.0 else 0.0
-        bulk_viscosity(w, s, n, linear, shock, quadratic, frequency, params[BREAKS] > 0.0)
+        breaks, means = params[BREAKS] > 0.0, averaged and params[DILATES] == 0.0
+        bulk_viscosity(w, s, n, linear, shock, quadratic, frequency, breaks, means)
     else:
         tet4.step_limit(w, s, n)
     tet4.motion_limit(w, n)

@@ -59,7 +59,7 @@ def standard_pass(motion, body, marks, scratch, begin, end, dt, scale):  # type:
             chunks.from_rates(strength, w, s, params, n, dt)
             tet4.end_gradients(w, n)
             averaged.own_strains(w, n, dt)
-        chunks.pressure_and_limit(eos, w, s, params, n, dt)
+        chunks.pressure_and_limit(eos, w, s, params, n, dt, False)
         chunks.return_at_pressure(strength, w, s, params, n, dt)
         if len(upset) > 0:
             let_go(w, s, upset, x, v, t, rows, n, dt)
@@ -185,7 +185,7 @@ def force_pass(motion, body, marks, scratch, means, begin, end, dt, scale):  # t
             see_own(w, s, params, flat, rows, n)
         swell(eos, w, s, params, n)
         keep_before(w, s, params, n)
-        chunks.pressure_and_limit(eos, w, s, params, n, dt)
+        chunks.pressure_and_limit(eos, w, s, params, n, dt, True)
         if not erodes:
             resist(w, s, params, n)
         chunks.return_at_pressure(strength, w, s, params, n, dt)

@@ -2,22 +2,37 @@
 
 import numpy as np
 
-from ..elements.tet4 import AREAS, CHANGE, LENGTH_FACTOR, LIMIT, MODULUS, VOLUME
+from ..elements.tet4 import AREAS, CHANGE, LENGTH_FACTOR, LIMIT, MODULUS, SEEN, VOLUME, VOLUME_SEEN
 from ..jit import njit
 from ..state import CHUNK, MASS, PRESSURE, VISCOUS, WORK_VISCOUS
 
 HALF = 0.01
 """Of the wave speed: a difference of speed over a tet at which half of the shock term is there. Chosen between elastic
 waves in bars (10 m/s over some tets: 5e-4) and weak shocks (300 m/s in copper: 0.03)."""
+STILL = 1e-12
+"""Of the wave speed: what is slower over a tet does not bound the step. Chosen above what rounding leaves of the rates
+in free flight, some 1e-16 times how many tets from the origin, and below anything that moves."""
 _P, _Q, _MASS, _WORK = PRESSURE * CHUNK, VISCOUS * CHUNK, MASS * CHUNK, WORK_VISCOUS * CHUNK
 
 
+@njit("float64(float64, float64, float64)", cache=True, error_model="numpy")
+def resisted(own, mean, kept):  # type: ignore[no-untyped-def]
+    """The rate of compression, 1/s, that the viscosity of an averaged tet resists: the ``mean`` that its pressure sees.
+
+    Of what its ``own`` is beyond that, noise for the most part, the share of the seen volume that the tet has lost:
+    ``kept`` is its volume over the seen one. No pressure stops a tet that is smaller than it is seen.
+    """
+    mean = max(mean, 0.0)
+    lost = min(max(1.0 - kept, 0.0), 1.0)
+    return mean + lost * max(own - mean, 0.0)
+
+
 @njit(
-    "void(float64[::1], float64[::1], int64, float64, float64, float64, float64, boolean)",
+    "void(float64[::1], float64[::1], int64, float64, float64, float64, float64, boolean, boolean)",
     cache=True,
     error_model="numpy",
 )
-def bulk_viscosity(w, s, n, linear, shock, quadratic, rate_of_change, breaks):  # type: ignore[no-untyped-def]
+def bulk_viscosity(w, s, n, linear, shock, quadratic, rate_of_change, breaks, averaged):  # type: ignore[no-untyped-def]
     """q = density u ((linear + shock S) c + quadratic u), u = l |rate|, in compression, Pa; its work; LIMIT, 1/s.
 
     von Neumann and Richtmyer 1950 (quadratic), Landshoff 1955 (linear); S = u / (u + HALF c) tells a shock from an
@@ -25,7 +40,8 @@ def bulk_viscosity(w, s, n, linear, shock, quadratic, rate_of_change, breaks):  
     tangent (linear + shock S (2 - S)) c + 2 quadratic u the largest stable step is
     1 / (G (G l Q + sqrt((G l Q)^2 + c^2))); l = LENGTH_FACTOR / G. Both are derived in docs/numerics.md. A tet that is
     inside out has no viscosity, and NaN as its limit. Where a part ``breaks`` a tet in tension is bounded as one that
-    is compressed at the speed at which it would be let go, |p| / (density c).
+    is compressed at the speed at which it would be let go, |p| / (density c). ``averaged``: the pressure sees the mean
+    of the nodes, and so does the viscosity (``resisted``).
     """
     for i in range(n):
         mass, change = s[_MASS + i], w[CHANGE + i]
@@ -36,6 +52,8 @@ def bulk_viscosity(w, s, n, linear, shock, quadratic, rate_of_change, breaks):  
         c = np.sqrt(w[MODULUS + i] / density)
         gradient, length = area / volume, LENGTH_FACTOR * volume / area
         rate = -change * rate_of_change / volume
+        if averaged:
+            rate = resisted(rate, -w[SEEN + i] * rate_of_change, volume / w[VOLUME_SEEN + i])
         rate = 0.0 if inside_out or rate < 0.0 else rate
         u = length * rate
         share = u / (u + HALF * c)
@@ -44,7 +62,7 @@ def bulk_viscosity(w, s, n, linear, shock, quadratic, rate_of_change, breaks):  
             u = max(u, -s[_P + i] / (density * c))
             share = u / (u + HALF * c)
         tangent = LENGTH_FACTOR * ((linear + shock * share * (2.0 - share)) * c + 2.0 * quadratic * u)
-        tangent = 0.0 if u == 0.0 else tangent
+        tangent = 0.0 if u <= STILL * c else tangent
         s[_WORK + i] -= 0.5 * (s[_Q + i] + new) * change
         s[_Q + i] = new
         limit = gradient * (tangent + np.sqrt(tangent * tangent + c * c))

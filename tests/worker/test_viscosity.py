@@ -1,0 +1,45 @@
+"""Bulk viscosity where the pressure is averaged: it resists what the pressure sees."""
+
+import pytest
+
+from conoid.worker.materials.viscosity import resisted
+
+from .kernels import COPPER, FORMS, Form, build, run, scene
+from .meshes import block
+
+
+@pytest.mark.parametrize(
+    ("own", "mean", "kept", "rate"),
+    [
+        (3.0, 1.0, 1.0, 1.0),  # what is beyond the mean is noise
+        (3.0, 1.0, 1.2, 1.0),
+        (3.0, 1.0, 0.6, 1.8),  # but not where the tet has lost volume to its neighbours
+        (3.0, 1.0, 0.0, 3.0),
+        (3.0, 1.0, -0.5, 3.0),
+        (3.0, -1.0, 1.0, 0.0),
+        (3.0, -1.0, 0.5, 1.5),
+        (-3.0, 1.0, 0.5, 1.0),  # it grows again: no less than the mean
+        (-3.0, -1.0, 0.5, 0.0),
+    ],
+)
+def test_what_is_resisted_lies_between_the_mean_and_the_own_rate(
+    own: float, mean: float, kept: float, rate: float
+) -> None:
+    assert resisted(own, mean, kept) == pytest.approx(rate, rel=1e-15)
+
+
+def test_averaged_forms_lose_no_more_to_viscosity_than_the_standard_one() -> None:
+    """A copper block of 3 x 3 x 6 cubes flows against a wall at 100 m/s. With each tet's own rate it lost 3.8 and 3.6 %
+    of its energy with the averaged forms, 2.9 % with the standard one.
+    """
+
+    def lost(form: Form) -> float:
+        wall = {"kind": "wall", "point": (0.0, 0.0, 0.0), "normal": (0.0, 0.0, 1.0)}
+        case = scene(COPPER, form, end=20e-6, velocity=(0.0, 0.0, -100.0), viscosity={}, boundaries=(wall,))
+        sim = run(build(case, [block((3, 3, 6), 1e-3)]))
+        energy = sim.ledger.close(sim.model.nodes.v.copy())
+        assert energy.plastic > 0.8 * energy.initial
+        return energy.viscous / energy.initial
+
+    standard, *averaged = (lost(form) for form in FORMS)
+    assert all(0.01 < share < 0.8 * standard for share in averaged)
