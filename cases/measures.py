@@ -18,7 +18,8 @@ class Probe(Model):
 
     Without ``low`` and ``high`` it is the whole part. ``internal_energy`` is per mass, J/kg; stresses are positive in
     tension, pressure in compression. ``contact_force`` is what other bodies push the whole part with, N, as a mean
-    since the line before; ``wall_force`` what a wall, or all walls, push it with.
+    since the line before; ``wall_force`` what a wall, or all walls, push it with. Both hold the whole last step of a
+    run, of which its last velocities hold half.
     """
 
     name: Name

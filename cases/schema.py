@@ -125,7 +125,8 @@ class Contact(Model):
     restitution: Annotated[Ratio, Field(ge=0, le=1)] = 0.0
     """Share of the speed of approach with which nodes part from faces, and edges from edges, that they run into: at 0
     an impact of nodes is perfectly plastic, which takes energy that falls with the size of the tets; at 1 it takes
-    none. Bodies rebound by their elasticity whatever it is. At a high speed unequal time steps may take or make more
+    none. Bodies rebound by their elasticity whatever it is. Above 0 ``sweeps`` and ``numerics.dt_growth`` have other
+    defaults, and what parts falls back: next to 0 is not 0. At a high speed unequal time steps may take or make more
     than it gives back: the outcome says when it is above 1 %. Walls are not concerned: there it is always 0."""
     edges: bool = True
     """Whether sharp edges meet edges."""

@@ -225,6 +225,13 @@ def tough(**changes: object) -> Toughness:
     return toughness(GLASS.model_copy(update={"brittle": brittle}), schema.Fracture(), 1e-3)
 
 
+def test_a_modulus_next_to_nothing_makes_facets_that_never_break() -> None:
+    """And some that break at once, without a word of numpy."""
+    found = tough(modulus=1e-3).strengths(np.arange(100), np.ones(100))
+    assert 0.0 < found.min() < 1e-200
+    assert np.inf in found
+
+
 @pytest.mark.parametrize("modulus", [2.0, 8.0, 30.0])
 @pytest.mark.parametrize("seed", [0, 5])
 def test_strengths_are_weibulls(modulus: float, seed: int) -> None:

@@ -51,7 +51,8 @@ class Toughness:
             return np.full(len(face), self.strength)
         share = np.ones(len(face)) if scatter.area is None else scatter.area / area
         drawn = _weibull(uniform(face, scatter.seed), share, scatter.modulus)
-        return np.asarray(scatter.minimum + (self.strength - scatter.minimum) * drawn)
+        with np.errstate(over="ignore"):  # a modulus far below 1 draws infinite ones, which never break
+            return np.asarray(scatter.minimum + (self.strength - scatter.minimum) * drawn)
 
 
 @njit("float64[::1](float64[::1], float64[::1], float64)", cache=True, error_model="numpy")
