@@ -11,11 +11,11 @@ from pathlib import Path
 
 from .bodies import MeshFile
 from .geometry import AXES, bounds
+from .impact import impact_speed, wave_speed
 from .library import material
-from .materials import Material
 from .mesh_size import MeshSize, mesh_size, surface_faces
 from .placed import Bulk, bulk
-from .schema import Case, Part, Rotation, Symmetry, Wall
+from .schema import Case, Part, Rotation, Symmetry
 from .stages import AVERAGED, CONTACT, STATE, STEPS, STRENGTH, TETS
 
 NANOSECONDS = {"tet": 80.0, "nodal": 45.0, "split": 90.0, "eos": 15.0}
@@ -139,11 +139,6 @@ def _viscous_factor(case: Case) -> float:
     return linear + math.hypot(1.0, linear)
 
 
-def wave_speed(made: Material) -> float:
-    """Speed of plane waves at rest, m/s: sqrt((K + 4 G / 3) / density), K from the equation of state where given."""
-    return math.sqrt((made.bulk + 4.0 / 3.0 * made.elastic.shear) / made.density)
-
-
 def shrinkage(case: Case, part: Part) -> float:
     """Initial over mean time step: impact flattens the tets, and compression makes waves faster.
 
@@ -159,13 +154,6 @@ def shrinkage(case: Case, part: Part) -> float:
     if made.strength is None:
         return 1.0
     return min(deepest, math.exp(min(4.0 * made.density * speed**2 / (2.0 * made.strength.flow_stress()), 10.0)))
-
-
-def impact_speed(case: Case, part: Part) -> float:
-    """The largest speed, m/s, at which a part may meet a wall or another part."""
-    met = [other.velocity for other in case.parts if other is not part]
-    met += [(0.0, 0.0, 0.0) for boundary in case.boundaries if isinstance(boundary, Wall)]
-    return max((math.dist(part.velocity, velocity) for velocity in met), default=0.0)
 
 
 def _confined(case: Case, part: Part) -> bool:

@@ -10,7 +10,8 @@ from typing import Any
 
 from .approach import strangers
 from .driven import passing
-from .estimate import Estimate, wave_speed
+from .estimate import Estimate
+from .impact import wave_speed
 from .library import material
 from .materials import Material
 from .overlap import grazes

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from conoid.cases.bodies import TwoTets
-from conoid.cases.estimate import estimate, wave_speed
+from conoid.cases.estimate import estimate
 from conoid.cases.geometry import altitude, volume
+from conoid.cases.impact import wave_speed
 from conoid.cases.library import library
 from conoid.cases.load import parse_json, read_case, resolved_json, shipped
 from conoid.cases.materials import JohnsonCook, MohrCoulomb

@@ -9,23 +9,26 @@ from .meshes import block
 
 
 @pytest.mark.parametrize(
-    ("own", "mean", "kept", "rate"),
+    ("own", "mean", "kept", "squeezed", "rate"),
     [
-        (3.0, 1.0, 1.0, 1.0),  # what is beyond the mean is noise
-        (3.0, 1.0, 1.2, 1.0),
-        (3.0, 1.0, 0.6, 1.8),  # but not where the tet has lost volume to its neighbours
-        (3.0, 1.0, 0.0, 3.0),
-        (3.0, 1.0, -0.5, 3.0),
-        (3.0, -1.0, 1.0, 0.0),
-        (3.0, -1.0, 0.5, 1.5),
-        (-3.0, 1.0, 0.5, 1.0),  # it grows again: no less than the mean
-        (-3.0, -1.0, 0.5, 0.0),
+        (3.0, 1.0, 1.0, 0.0, 1.0),  # what is beyond the mean is noise
+        (3.0, 1.0, 1.2, -0.3, 1.0),
+        (3.0, 1.0, 0.6, 0.0, 1.8),  # but not where the tet has lost volume to its neighbours
+        (3.0, 1.0, 0.0, 0.0, 3.0),
+        (3.0, 1.0, -0.5, 0.0, 3.0),
+        (3.0, 1.0, 1.0, 0.05, 2.0),  # nor under a pressure to which its strength is nothing
+        (3.0, 1.0, 0.8, 0.05, 2.4),
+        (3.0, 1.0, 1.0, 0.4, 3.0),
+        (3.0, -1.0, 1.0, 0.0, 0.0),
+        (3.0, -1.0, 0.5, 0.0, 1.5),
+        (-3.0, 1.0, 0.5, 0.2, 1.0),  # it grows again: no less than the mean
+        (-3.0, -1.0, 0.5, 0.2, 0.0),
     ],
 )
 def test_what_is_resisted_lies_between_the_mean_and_the_own_rate(
-    own: float, mean: float, kept: float, rate: float
+    own: float, mean: float, kept: float, squeezed: float, rate: float
 ) -> None:
-    assert resisted(own, mean, kept) == pytest.approx(rate, rel=1e-15)
+    assert resisted(own, mean, kept, squeezed) == pytest.approx(rate, rel=1e-15)
 
 
 def test_averaged_forms_lose_no_more_to_viscosity_than_the_standard_one() -> None:

@@ -7,6 +7,7 @@ everybody ends with the same velocity, to the bit.
 
 import numpy as np
 
+from conoid.cases.impact import sweeps
 from conoid.cases.schema import Case
 
 from ..boundaries import Boundary
@@ -32,8 +33,6 @@ _SURFACE, _LISTED, _TESTED, _ACTIVE = 9.0, 0.1, 3.0, 4.0
 """What a step costs for a node of the surface (searches and registrations, shared out), for a pair that is listed, for
 one that is tested, as a crack is, and for an active contact: 450, 3, 150 and 200 ns by the profile of the shattering
 bar to 40 us on one rank."""
-_SWEEPS, _SWEEPS_BACK = 5, 10
-"""Without restitution, and with it; what more are good for: docs/numerics.md, "Contact"."""
 _FORESIGHT = 8
 """Steps between two looks at how wide the cracks are."""
 
@@ -55,7 +54,7 @@ class Contact:
         self.books = Books(model.nodes.n, len(case.parts), mass * speed, mass * speed * speed)
         self._active = ActiveSet(self.books.scale)
         self._restitution = case.contact.restitution
-        self._sweeps = case.contact.sweeps or (_SWEEPS_BACK if self._restitution > 0.0 else _SWEEPS)
+        self._sweeps = sweeps(case)
         self.found = Detected.nothing()
         """What the last step has found here."""
         self.limit = 0.0

@@ -10,6 +10,7 @@ from ..materials.law import (
     AFTER_PRESSURE,
     BEFORE_PRESSURE,
     BREAKS,
+    DENSITY,
     DILATES,
     FROM_SHAPE,
     ORDER,
@@ -78,8 +79,8 @@ def pressure_and_limit(eos, w, s, params, n, dt, averaged):  # type: ignore[no-u
     linear, shock, quadratic = params[Q_LINEAR], params[Q_SHOCK], params[Q_QUADRATIC]
     if max(linear, shock, quadratic) > 0.0:
         frequency = 1.0 / dt if dt > 0.0 else 0.0
-        breaks, means = params[BREAKS] > 0.0, averaged and params[DILATES] == 0.0
-        bulk_viscosity(w, s, n, linear, shock, quadratic, frequency, breaks, means)
+        initial = params[DENSITY] if averaged and params[DILATES] == 0.0 else 0.0
+        bulk_viscosity(w, s, n, linear, shock, quadratic, frequency, params[BREAKS] > 0.0, initial)
     else:
         tet4.step_limit(w, s, n)
     tet4.motion_limit(w, n)

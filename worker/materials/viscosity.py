@@ -12,27 +12,31 @@ waves in bars (10 m/s over some tets: 5e-4) and weak shocks (300 m/s in copper: 
 STILL = 1e-12
 """Of the wave speed: what is slower over a tet does not bound the step. Chosen above what rounding leaves of the rates
 in free flight, some 1e-16 times how many tets from the origin, and below anything that moves."""
+SQUEEZED = 0.1
+"""Of the volume: compression in which an averaged tet's own rate is resisted in full. Chosen by what columns of metal
+bear at 1.5 and 2 km/s (docs/numerics.md, "Plates under 100 GPa"); where metal flows at 100 m/s it is some 1e-3."""
 _P, _Q, _MASS, _WORK = PRESSURE * CHUNK, VISCOUS * CHUNK, MASS * CHUNK, WORK_VISCOUS * CHUNK
 
 
-@njit("float64(float64, float64, float64)", cache=True, error_model="numpy")
-def resisted(own, mean, kept):  # type: ignore[no-untyped-def]
+@njit("float64(float64, float64, float64, float64)", cache=True, error_model="numpy")
+def resisted(own, mean, kept, squeezed):  # type: ignore[no-untyped-def]
     """The rate of compression, 1/s, that the viscosity of an averaged tet resists: the ``mean`` that its pressure sees.
 
-    Of what its ``own`` is beyond that, noise for the most part, the share of the seen volume that the tet has lost:
-    ``kept`` is its volume over the seen one. No pressure stops a tet that is smaller than it is seen.
+    Of what its ``own`` is beyond that, noise for the most part, a share: the volume that it has lost to its neighbours,
+    ``kept`` is its own over the seen one, and what all are ``squeezed`` by, 1 - V_seen / V0, over SQUEEZED. No pressure
+    stops a tet that is smaller than it is seen, and noise under a high one crushes it.
     """
     mean = max(mean, 0.0)
-    lost = min(max(1.0 - kept, 0.0), 1.0)
-    return mean + lost * max(own - mean, 0.0)
+    share = min(max(1.0 - kept, 0.0) + max(squeezed, 0.0) / SQUEEZED, 1.0)
+    return mean + share * max(own - mean, 0.0)
 
 
 @njit(
-    "void(float64[::1], float64[::1], int64, float64, float64, float64, float64, boolean, boolean)",
+    "void(float64[::1], float64[::1], int64, float64, float64, float64, float64, boolean, float64)",
     cache=True,
     error_model="numpy",
 )
-def bulk_viscosity(w, s, n, linear, shock, quadratic, rate_of_change, breaks, averaged):  # type: ignore[no-untyped-def]
+def bulk_viscosity(w, s, n, linear, shock, quadratic, rate_of_change, breaks, initial):  # type: ignore[no-untyped-def]
     """q = density u ((linear + shock S) c + quadratic u), u = l |rate|, in compression, Pa; its work; LIMIT, 1/s.
 
     von Neumann and Richtmyer 1950 (quadratic), Landshoff 1955 (linear); S = u / (u + HALF c) tells a shock from an
@@ -40,8 +44,8 @@ def bulk_viscosity(w, s, n, linear, shock, quadratic, rate_of_change, breaks, av
     tangent (linear + shock S (2 - S)) c + 2 quadratic u the largest stable step is
     1 / (G (G l Q + sqrt((G l Q)^2 + c^2))); l = LENGTH_FACTOR / G. Both are derived in docs/numerics.md. A tet that is
     inside out has no viscosity, and NaN as its limit. Where a part ``breaks`` a tet in tension is bounded as one that
-    is compressed at the speed at which it would be let go, |p| / (density c). ``averaged``: the pressure sees the mean
-    of the nodes, and so does the viscosity (``resisted``).
+    is compressed at the speed at which it would be let go, |p| / (density c). ``initial``: the density at the start
+    where the pressure sees the mean of the nodes, and so does the viscosity (``resisted``); else 0.
     """
     for i in range(n):
         mass, change = s[_MASS + i], w[CHANGE + i]
@@ -52,8 +56,9 @@ def bulk_viscosity(w, s, n, linear, shock, quadratic, rate_of_change, breaks, av
         c = np.sqrt(w[MODULUS + i] / density)
         gradient, length = area / volume, LENGTH_FACTOR * volume / area
         rate = -change * rate_of_change / volume
-        if averaged:
-            rate = resisted(rate, -w[SEEN + i] * rate_of_change, volume / w[VOLUME_SEEN + i])
+        if initial > 0.0:
+            seen = w[VOLUME_SEEN + i]
+            rate = resisted(rate, -w[SEEN + i] * rate_of_change, volume / seen, 1.0 - initial * seen / mass)
         rate = 0.0 if inside_out or rate < 0.0 else rate
         u = length * rate
         share = u / (u + HALF * c)

@@ -1,0 +1,36 @@
+"""How fast bodies meet, and how many sweeps of contact that asks for."""
+
+import math
+
+from .library import material
+from .materials import Material
+from .schema import Case, Part, Wall
+
+FEW, MANY = 5, 10
+"""Sweeps of contact in a step; what more are good for: docs/numerics.md, "Contact"."""
+FAST = 0.2
+"""Of the wave speed of what is met: faster bodies are pressed together beyond their strength. Chosen by columns of four
+metals at 0.6 to 2 km/s (docs/numerics.md, "Plates under 100 GPa")."""
+
+
+def wave_speed(made: Material) -> float:
+    """Speed of plane waves at rest, m/s: sqrt((K + 4 G / 3) / density), K from the equation of state where given."""
+    return math.sqrt((made.bulk + 4.0 / 3.0 * made.elastic.shear) / made.density)
+
+
+def impact_speed(case: Case, part: Part, walls: bool = True) -> float:
+    """The largest speed, m/s, at which a part may meet another part, or a wall where ``walls`` count."""
+    met = [other.velocity for other in case.parts if other is not part]
+    met += [(0.0, 0.0, 0.0) for boundary in case.boundaries if walls and isinstance(boundary, Wall)]
+    return max((math.dist(part.velocity, velocity) for velocity in met), default=0.0)
+
+
+def sweeps(case: Case) -> int:
+    """Sweeps over the active contacts of a step: what ``contact.sweeps`` says, or what the scene needs."""
+    assert case.contact is not None
+    if case.contact.sweeps is not None:
+        return case.contact.sweeps
+    fast = not case.fractures and any(
+        impact_speed(case, part, walls=False) > FAST * wave_speed(material(case, part.material)) for part in case.parts
+    )
+    return MANY if fast or case.contact.restitution > 0.0 else FEW

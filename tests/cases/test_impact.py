@@ -1,0 +1,52 @@
+"""How fast bodies meet, and how many sweeps of contact that asks for."""
+
+from typing import Any
+
+import pytest
+
+from conoid.cases.impact import impact_speed, sweeps
+from conoid.cases.load import parse_case
+from conoid.cases.schema import Case
+
+BRITTLE = {"density": 2500, "elastic": {"young": 72e9, "poisson": 0.22}, "brittle": {"strength": 60e6, "energy": 5}}
+
+
+def meeting(speed: float, contact: dict[str, Any] | None = None, **other: Any) -> Case:
+    """A block of steel that flies at one at rest, c = 5,917 m/s."""
+    cube = {"shape": "box", "low": [0, 0, 0], "high": [1e-3] * 3, "element_size": 5e-4}
+    away = {**cube, "low": [0, 0, 2e-3], "high": [1e-3, 1e-3, 3e-3]}
+    return parse_case(
+        {
+            "name": "two", "run": {"end_time": 1e-6}, "materials": {"glass": BRITTLE}, "contact": contact or {},
+            "parts": [
+                {"name": "a", "material": "steel", "mesh": cube, "velocity": [0, 0, speed]},
+                {"name": "b", "material": "steel", "mesh": away, **other},
+            ],
+        }
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("case", "number"),
+    [
+        (meeting(1100.0), 5),
+        (meeting(1300.0), 10),
+        (meeting(600.0, velocity=[0, 0, -700.0]), 10),
+        (meeting(1300.0, velocity=[0, 0, 1300.0]), 5),
+        (meeting(100.0, {"restitution": 1}), 10),
+        (meeting(1300.0, {"sweeps": 3}), 3),
+        (meeting(1300.0, material="glass", fracture={}), 5),
+        (meeting(1300.0, {"restitution": 1}, material="glass", fracture={}), 10),
+    ],
+)
+def test_what_meets_fast_gets_more_sweeps(case: Case, number: int) -> None:
+    """More than a fifth of the speed of waves; not where bodies break, whose pieces depend on the number."""
+    assert sweeps(case) == number
+
+
+def test_a_wall_is_met_at_the_speed_of_the_part() -> None:
+    case = meeting(100.0, velocity=[0, 0, 100.0])
+    wall = {"kind": "wall", "point": [0, 0, -1.0], "normal": [0, 0, 1]}
+    walled = parse_case({**case.model_dump(mode="json", exclude_none=True), "boundaries": [wall]})
+    assert [impact_speed(walled, part) for part in walled.parts] == [100.0, 100.0]
+    assert [impact_speed(walled, part, walls=False) for part in walled.parts] == [0.0, 0.0]
