@@ -28,6 +28,7 @@ _NONE, _FREQUENCY = (0, 0, 0, 0), (0, 0, -1, 0)
 
 _ONE, _KILO, _MEGA, _GIGA = Fraction(1), Fraction(1000), Fraction(10**6), Fraction(10**9)
 _CENTI, _MILLI, _MICRO, _NANO = Fraction(1, 100), Fraction(1, 1000), Fraction(1, 10**6), Fraction(1, 10**9)
+"""SI prefixes, exact."""
 UNITS: dict[str, tuple[Fraction, Dimension]] = {
     "1": (_ONE, _NONE),
     "m": (_ONE, _LENGTH), "km": (_KILO, _LENGTH), "cm": (_CENTI, _LENGTH), "mm": (_MILLI, _LENGTH),
