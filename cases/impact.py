@@ -11,6 +11,8 @@ FEW, MANY = 5, 10
 FAST = 0.2
 """Of the wave speed of what is met: faster bodies are pressed together beyond their strength. Chosen by columns of four
 metals at 0.6 to 2 km/s (docs/numerics.md, "Plates under 100 GPa")."""
+PRESSING = 0.1
+"""Of the same. Chosen: half of where irregular plates of copper lost their pressure."""
 
 
 def wave_speed(made: Material) -> float:
@@ -25,12 +27,22 @@ def impact_speed(case: Case, part: Part, walls: bool = True) -> float:
     return max((math.dist(part.velocity, velocity) for velocity in met), default=0.0)
 
 
+def _fast(case: Case, share: float) -> bool:
+    """Whether two parts meet at more than a ``share`` of the wave speed of one of them."""
+    return any(
+        impact_speed(case, part, walls=False) > share * wave_speed(material(case, part.material)) for part in case.parts
+    )
+
+
+def pressed(case: Case) -> bool:
+    """Whether parts meet so fast that they are pressed together beyond their strength: flat surfaces buckle there."""
+    return _fast(case, PRESSING)
+
+
 def sweeps(case: Case) -> int:
     """Sweeps over the active contacts of a step: what ``contact.sweeps`` says, or what the scene needs."""
     assert case.contact is not None
     if case.contact.sweeps is not None:
         return case.contact.sweeps
-    fast = not case.fractures and any(
-        impact_speed(case, part, walls=False) > FAST * wave_speed(material(case, part.material)) for part in case.parts
-    )
+    fast = _fast(case, FAST) and not case.fractures
     return MANY if fast or case.contact.restitution > 0.0 else FEW

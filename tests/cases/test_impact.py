@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from conoid.cases.impact import impact_speed, sweeps
+from conoid.cases.impact import impact_speed, pressed, sweeps
 from conoid.cases.load import parse_case
 from conoid.cases.schema import Case
 
@@ -42,6 +42,11 @@ def meeting(speed: float, contact: dict[str, Any] | None = None, **other: Any) -
 def test_what_meets_fast_gets_more_sweeps(case: Case, number: int) -> None:
     """More than a fifth of the speed of waves; not where bodies break, whose pieces depend on the number."""
     assert sweeps(case) == number
+
+
+def test_bodies_are_pressed_together_at_a_tenth_of_the_speed_of_waves() -> None:
+    assert [pressed(meeting(speed)) for speed in (550.0, 650.0)] == [False, True]
+    assert pressed(meeting(650.0, material="glass", fracture={}))
 
 
 def test_a_wall_is_met_at_the_speed_of_the_part() -> None:

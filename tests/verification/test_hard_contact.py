@@ -8,6 +8,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from conoid.cases import materials
+from conoid.cases.library import library
 from conoid.cases.load import apply_overrides, parse_case, read_data, shipped
 from conoid.worker import simulation, state, step
 from conoid.worker.mesh.model import TetMesh
@@ -322,6 +323,36 @@ def test_columns_of_metal_hold_each_other_under_a_shock(metal: str, speed: float
     sim = run(simulation.build(case, Path(), SerialComm()), watch)
     assert max(fastest) < 1.02 * speed / 2
     assert sim.ledger.worst < 1e-3
+
+
+def test_irregular_plates_keep_the_pressure_of_their_impact() -> None:
+    """Copper on copper at 1 km/s: rho0 (c0 + S u) u, u = 500 m/s, behind the shock and at the interface.
+
+    Ridges of faces that were flat crossed, and what overlaps has no pressure: the interface had lost a quarter of it.
+    """
+    copper = library()["copper_ofhc"]
+    assert copper.eos is not None
+    pressure = copper.density * (copper.eos.c0 + copper.eos.S * 500.0) * 500.0
+    square = {"shape": "box", "element_size": 0.1e-3, "generator": "gmsh"}
+    case = parse_case(
+        {
+            "name": "plates", "run": {"end_time": 0.35e-6, "frames": 0},
+            "parts": [
+                {
+                    "name": name, "material": "copper_ofhc", "velocity": [0, 0, speed],
+                    "mesh": {**square, "low": [0, 0, low], "high": [0.2e-3, 0.2e-3, high]},
+                }
+                for name, speed, low, high in (("flyer", 1000.0, -2e-3, 0.0), ("target", 0.0, 0.0, 3e-3))
+            ],
+            "boundaries": [{"kind": "symmetry", "axis": axis, "at": at} for axis in "xy" for at in (0.0, 0.2e-3)],
+        }
+    )  # fmt: skip
+    sim = run(simulation.build(case, Path(), SerialComm()))
+    height = np.concatenate([sim.model.nodes.x0[part.tets].mean(axis=1)[:, 2] for part in sim.model.blocks])
+    found, mass = (np.concatenate([part.row(k) for part in sim.model.blocks]) for k in (state.PRESSURE, state.MASS))
+    for low, high in ((-0.6e-3, -0.1e-3), (-0.1e-3, 0.1e-3), (0.1e-3, 0.6e-3)):
+        inside = (height > low) & (height < high)
+        assert np.average(found[inside], weights=mass[inside]) == pytest.approx(pressure, rel=0.015)
 
 
 # H16: the shock that an impact sends out ------------------------------------------------------------------------------

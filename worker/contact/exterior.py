@@ -93,9 +93,9 @@ class Exterior:
         found.sharpen(turned)
         return found
 
-    def sharpen(self, scene: Scene) -> None:
-        """Which edges have become sharp."""
-        turned = scene.sharpen()[: self.surface.edges.n]
+    def sharpen(self, scene: Scene, least: float) -> None:
+        """Which edges have become sharp, their faces' normals at a cosine below ``least``."""
+        turned = scene.sharpen(least)[: self.surface.edges.n]
         if turned.any():
             self.surface.sharpen(np.union1d(self.surface.turned, self.surface.edges.names[turned]))
 

@@ -168,10 +168,10 @@ class Scene:
         """Whether anything has to be registered."""
         return bool(self.faces.new.any() or self.slots.new.any() or self.edges.new.any())
 
-    def sharpen(self) -> Flags:
-        """Which edges (e,) are sharp now and were not before; they are searched from this step on."""
+    def sharpen(self, least: float) -> Flags:
+        """Which edges (e,) are sharp now and were not before, ``least`` the cosine; searched from this step on."""
         edges = self.edges
-        turned: Flags = sharp.turned(edges.sharp, edges.corners, edges.exposed, self.crowd.x, sharp.SHARP)
+        turned: Flags = sharp.turned(edges.sharp, edges.corners, edges.exposed, self.crowd.x, least)
         edges.sharp |= turned
         edges.new |= turned
         return turned

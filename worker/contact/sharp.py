@@ -20,6 +20,10 @@ from .records import Edges, Faces
 
 SHARP = sine_and_cosine(math.radians(25.0))[1]
 """Edges between faces whose normals differ by more than this can meet other edges."""
+BENT, PRESSED = sine_and_cosine(math.radians(5.0))[1], 4
+"""The same where bodies are pressed together beyond their strength, and after how many steps edges are looked at there:
+ridges of surfaces that were flat cross without a node inside, and what overlaps has no pressure. Chosen by flyer plates
+of copper at 1 to 2.4 km/s (docs/numerics.md, "Plates under 100 GPa")."""
 
 _A, _B, _C, _OWNER, _FACE, _EXPOSED, _LENGTH, _NORMAL = 0, 1, 2, 3, 4, 5, 6, 7
 """Columns of a half edge that travels: its nodes and the third node of its face, the owner of that one, the face,

@@ -7,7 +7,7 @@ everybody ends with the same velocity, to the bit.
 
 import numpy as np
 
-from conoid.cases.impact import sweeps
+from conoid.cases.impact import pressed, sweeps
 from conoid.cases.schema import Case
 
 from ..boundaries import Boundary
@@ -19,7 +19,7 @@ from ..reduction import StepReduction
 from ..state import Flags, Floats, Indices, Ints, Model, Nodes
 from ..timers import Timers
 from ..topology import Split
-from . import held, normals, pairing
+from . import held, normals, pairing, sharp
 from .books import Books
 from .detection import Ahead, Detected, detect
 from .exterior import Exterior
@@ -55,6 +55,7 @@ class Contact:
         self._active = ActiveSet(self.books.scale)
         self._restitution = case.contact.restitution
         self._sweeps = sweeps(case)
+        self._looks, self._sharp = (sharp.PRESSED, sharp.BENT) if pressed(case) else (normals.EVERY, sharp.SHARP)
         self.found = Detected.nothing()
         """What the last step has found here."""
         self.limit = 0.0
@@ -260,8 +261,8 @@ class Contact:
         if step % _FORESIGHT == 0:
             self.searches.foresee()
         redraw = step % normals.EVERY == 0
-        if redraw:
-            self.exterior.sharpen(now)
+        if step % self._looks == 0:
+            self.exterior.sharpen(now, self._sharp)
         ahead = Ahead(dt, self._clock.longest, self.exterior.size, 1.0 + self._restitution)
         self.found = detect(now, self.exterior, self.searches.mu, give, ahead, redraw, self.found.stray)
         now.active.n = self.found.contacts
