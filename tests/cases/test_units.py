@@ -1,6 +1,7 @@
 """Quantities: the closed grammar, SI values, and one clear line for everything else."""
 
 import math
+from fractions import Fraction
 
 import pytest
 
@@ -79,4 +80,4 @@ def test_a_quantity_is_the_same_to_the_bit_in_any_unit(texts: list[str], unit: s
 
 def test_units_multiply_and_divide_from_the_left() -> None:
     assert parse_unit("J/kg/K") == parse_unit("J kg^-1*K^-1")
-    assert parse_unit("kg/m^3") == (1.0, (-3, 1, 0, 0))
+    assert parse_unit("kg/m^3") == (Fraction(1), (-3, 1, 0, 0))
