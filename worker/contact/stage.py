@@ -5,6 +5,8 @@ surfaces make that possible. The impulses on a node are completed over all ranks
 everybody ends with the same velocity, to the bit.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from conoid.cases.impact import pressed, sweeps
@@ -37,6 +39,24 @@ _FORESIGHT = 8
 """Steps between two looks at how wide the cracks are."""
 
 
+@dataclass(frozen=True)
+class _Scheme:
+    """What the scene asks of contact, the same in all steps."""
+
+    restitution: float
+    sweeps: int
+    looks: int
+    """Steps between two looks at which edges have become sharp."""
+    sharp: float
+    """Cosine of the angle from which on they are."""
+
+    @classmethod
+    def of(cls, case: Case) -> "_Scheme":
+        assert case.contact is not None
+        looks, angle = (sharp.PRESSED, sharp.BENT) if pressed(case) else (normals.EVERY, sharp.SHARP)
+        return cls(case.contact.restitution, sweeps(case), looks, angle)
+
+
 class Contact:
     """The contact of a case on one rank."""
 
@@ -53,9 +73,7 @@ class Contact:
         mass = pairing.lighter(self.searches.mu, model.nodes, self.exterior.flight.mobility, comm) or largest
         self.books = Books(model.nodes.n, len(case.parts), mass * speed, mass * speed * speed)
         self._active = ActiveSet(self.books.scale)
-        self._restitution = case.contact.restitution
-        self._sweeps = sweeps(case)
-        self._looks, self._sharp = (sharp.PRESSED, sharp.BENT) if pressed(case) else (normals.EVERY, sharp.SHARP)
+        self._scheme = _Scheme.of(case)
         self.found = Detected.nothing()
         """What the last step has found here."""
         self.limit = 0.0
@@ -216,7 +234,7 @@ class Contact:
             return False
         with self._timers.phase("contact"):
             held.take(now.crowd.x, now.crowd.v, now.own.slots, state.x, state.v, now.own.local)
-            ahead = Ahead(0.0, self._clock.dt, self.exterior.size, 1.0 + self._restitution)
+            ahead = Ahead(0.0, self._clock.dt, self.exterior.size, 1.0 + self._scheme.restitution)
             own = detect(now, self.exterior, self.searches.mu, 0.0, ahead, redraw=True, together=False).approach
             self.limit = float(self._comm.maximum(np.array([own]))[0])
         return self.limit > 0.0
@@ -237,7 +255,7 @@ class Contact:
         active.begin(now.active.room, now.active.n, crowd, shared)
         active.weigh()
         active.resume(now.node_face.kept, self._resume())
-        active.sweep(self._sweeps)
+        active.sweep(self._scheme.sweeps)
         now.node_face.kept[:] = 0.0
         active.store(now.node_face.kept)
         if self.searches.rubs:
@@ -261,13 +279,13 @@ class Contact:
         if step % _FORESIGHT == 0:
             self.searches.foresee()
         redraw = step % normals.EVERY == 0
-        if step % self._looks == 0:
-            self.exterior.sharpen(now, self._sharp)
-        ahead = Ahead(dt, self._clock.longest, self.exterior.size, 1.0 + self._restitution)
+        if step % self._scheme.looks == 0:
+            self.exterior.sharpen(now, self._scheme.sharp)
+        ahead = Ahead(dt, self._clock.longest, self.exterior.size, 1.0 + self._scheme.restitution)
         self.found = detect(now, self.exterior, self.searches.mu, give, ahead, redraw, self.found.stray)
         now.active.n = self.found.contacts
-        if self._restitution > 0.0:
-            rebound(now.active.room, now.active.n, now.crowd.v, now.slots.before, self._restitution)
+        if self._scheme.restitution > 0.0:
+            rebound(now.active.room, now.active.n, now.crowd.v, now.slots.before, self._scheme.restitution)
         if give == 0.0:
             hold_back(now.active.room, now.active.n, now.slots.before)
 
