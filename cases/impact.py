@@ -1,4 +1,4 @@
-"""How fast bodies meet, and how many sweeps of contact that asks for."""
+"""How fast bodies meet, and what that asks of contact."""
 
 import math
 
@@ -9,10 +9,11 @@ from .schema import Case, Part, Wall
 FEW, MANY = 5, 10
 """Sweeps of contact in a step; what more are good for: docs/numerics.md, "Contact"."""
 FAST = 0.2
-"""Of the wave speed of what is met: faster bodies are pressed together beyond their strength. Chosen by columns of four
-metals at 0.6 to 2 km/s (docs/numerics.md, "Plates under 100 GPa")."""
+"""Of the wave speed of what is met: above it there are MANY sweeps. Chosen: below half of where few were too few for
+columns of metal (docs/numerics.md, "Plates under 100 GPa")."""
 PRESSING = 0.1
-"""Of the same. Chosen: half of where irregular plates of copper lost their pressure."""
+"""Of the same: above it flat surfaces buckle. Chosen: half of where irregular plates of copper lost their pressure
+(docs/numerics.md, "Ridges under pressure")."""
 
 
 def wave_speed(made: Material) -> float:

@@ -293,12 +293,20 @@ def test_a_fast_fragment_makes_no_searches_for_others() -> None:
 
 
 @pytest.mark.parametrize(
-    ("metal", "speed"), [("steel_4340", 1500.0), ("aluminium_2024", 2000.0), ("tungsten_alloy", 1500.0)]
+    ("metal", "speed"),
+    [
+        ("steel_4340", 1500.0),
+        ("aluminium_2024", 2000.0),
+        ("tungsten_alloy", 1500.0),
+        ("aluminium_2024", 4000.0),
+        ("copper_ofhc", 4000.0),
+    ],
 )
 def test_columns_of_metal_hold_each_other_under_a_shock(metal: str, speed: float) -> None:
     """Between planes of symmetry, irregular tets, averaged pressure: behind the shock nothing is faster than it was.
 
-    With five sweeps nodes of the interface ran away, at more than the speed of the columns, and tets were crushed.
+    Nodes of the interface ran away, at more than the speed of the columns, and tets were crushed: where ridges of faces
+    that were flat crossed, and at 4 km/s with five sweeps as well.
     """
     cube = {"shape": "box", "element_size": 0.5e-3, "generator": "gmsh"}
     case = parse_case(

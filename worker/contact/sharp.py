@@ -2,8 +2,8 @@
 
 A half edge is an edge as one face sees it, (a, b) of the face abc. Every two half edges that run against each other
 between the same nodes make an edge, but those of the two sides of one facet. An edge is sharp when its faces meet at an
-angle at the start, or have done so, and bulge, at a step at which the mean normals of nodes are taken anew
-(normals.EVERY): flow makes edges, too. So it depends on the steps alone, not on when candidates were searched.
+angle at the start, or have done so, and bulge, when all are looked at: every normals.EVERY steps, or every
+PRESSED: flow makes edges, too. So it depends on the steps alone, not on when candidates were searched.
 """
 
 import math
@@ -23,7 +23,7 @@ SHARP = sine_and_cosine(math.radians(25.0))[1]
 BENT, PRESSED = sine_and_cosine(math.radians(5.0))[1], 4
 """The same where bodies are pressed together beyond their strength, and after how many steps edges are looked at there:
 ridges of surfaces that were flat cross without a node inside, and what overlaps has no pressure. Chosen by flyer plates
-of copper at 1 to 2.4 km/s (docs/numerics.md, "Plates under 100 GPa")."""
+of copper at 1 to 2.4 km/s (docs/numerics.md, "Ridges under pressure")."""
 
 _A, _B, _C, _OWNER, _FACE, _EXPOSED, _LENGTH, _NORMAL = 0, 1, 2, 3, 4, 5, 6, 7
 """Columns of a half edge that travels: its nodes and the third node of its face, the owner of that one, the face,
