@@ -143,27 +143,27 @@ class Probes:
 
     def _forces(self, passed: float) -> Floats:
         """(parts, 3) mean force of contact on each part over the time ``passed``, s, since the last call, N; zero when
-        none has.
+        none has, and the impulses that have been until then are in the next.
         """
-        if self._contact is None or not any(name in _FORCE for name in self._fields):
-            return self._pushed
+        if passed == 0.0 or self._contact is None or not any(name in _FORCE for name in self._fields):
+            return np.zeros_like(self._pushed)
         pushed = self._contact.impulses()
-        forces = (pushed - self._pushed) / passed if passed > 0.0 else np.zeros_like(pushed)
+        forces = (pushed - self._pushed) / passed
         self._pushed = pushed
         return np.asarray(forces)
 
     def _wall_forces(self, passed: float) -> Floats:
         """(probes,) the same of walls, zero for other probes; all ranks take part."""
         nodes, walls = self._model.nodes, self._walls
-        if not any(name in _WALL for name in self._fields):
-            return self._given
+        if passed == 0.0 or not any(name in _WALL for name in self._fields):
+            return np.zeros_like(self._given)
         columns = np.zeros((0 if walls is None else len(walls.nodes), len(self._fields)))
         for k, name in enumerate(self._fields):
             if walls is not None and name in _WALL:
                 mine = nodes.owned[walls.nodes] & (nodes.part[walls.nodes] == self._parts[k])
                 columns[:, k] = walls.given[:, [3 * w + _WALL[name] for w in self._of_walls[k]]].sum(axis=1) * mine
         given = np.array([float(total) for total in exact_sums(self._comm, columns)])
-        forces = (given - self._given) / passed if passed > 0.0 else np.zeros_like(given)
+        forces = (given - self._given) / passed
         self._given = given
         return np.asarray(forces)
 

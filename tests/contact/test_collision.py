@@ -303,6 +303,36 @@ def test_an_impact_of_bodies_from_which_all_comes_back_takes_nothing() -> None:
     assert abs(taken[2]) < 1e-10
 
 
+@pytest.mark.parametrize("gap", [0.0, 0.02])
+def test_the_force_of_contact_is_what_changes_the_momentum(gap: float) -> None:
+    """Force times time over all lines of the history, of blocks that touch from the start and of blocks that do not."""
+    fields = {f"{a}{i}": (f"contact_force_{a}", f"body{i}") for i in range(2) for a in "xyz"}
+    case = meeting_of(
+        [{}, {"velocity": (-80.0, 10.0, 0.0)}], end=1e-6,
+        probes=tuple(schema.Probe(name=name, field=field, part=part) for name, (field, part) in fields.items()),
+    )  # fmt: skip
+    striker = moved(block((2, 2, 2), SIZE, seed=2), ((3.0 + gap) * SIZE, 0.4 * SIZE, 0.6 * SIZE))
+    sim = build(case, [block((3, 3, 3), SIZE, seed=1), striker])
+    first, given, change, last = _momenta_of_parts(sim), np.zeros(6), np.zeros(6), 0.0
+
+    def look(sim: Simulation, _: Floats) -> None:
+        nonlocal last
+        if sim.clock.step % 7 == 0 or sim.clock.done:
+            given[:] += sim.probes.measure() * (sim.clock.t - last)
+            change[:] = _momenta_of_parts(sim) - first
+            last = sim.clock.t
+
+    run(sim, look)
+    assert given == pytest.approx(change, rel=1e-9, abs=1e-9 * np.abs(change).max())
+
+
+def _momenta_of_parts(sim: Simulation) -> Floats:
+    """(6,) of v(n+1/2), of body0 and body1, kg m/s."""
+    nodes = sim.model.nodes
+    p = nodes.mass[:, None] * nodes.v
+    return np.array([math.fsum(column) for part in range(2) for column in p[nodes.part == part].T])
+
+
 def test_the_answer_with_restitution_is_the_same_on_three_ranks() -> None:
     case = case_of(restitution=0.8)
     alone = answer(case)[0]

@@ -84,12 +84,13 @@ def test_no_node_ends_behind_the_wall(gap: float) -> None:
     assert min(lowest) < 1e-9
 
 
+@pytest.mark.parametrize("gap", [1e-5, 0.0])
 @pytest.mark.parametrize("name", ["floor", None])
-def test_the_force_of_walls_is_what_changes_the_momentum(name: str | None) -> None:
-    """Force times time over all lines of the history, of one of two walls or of both."""
+def test_the_force_of_walls_is_what_changes_the_momentum(name: str | None, gap: float) -> None:
+    """Force times time over all lines of the history, of one of two walls or of both, touched from the start or not."""
     walls = [
-        {**wall(1e-5), "name": "floor"},
-        {"kind": "wall", "name": "x", "point": (-1e-5, 0, 0), "normal": (1, 0, 0)},
+        {**wall(gap), "name": "floor"},
+        {"kind": "wall", "name": "x", "point": (-gap, 0, 0), "normal": (1, 0, 0)},
     ]
     probes = tuple({"name": a, "part": "body", "field": f"wall_force_{a}", "wall": name} for a in "xyz")
     sim = build(scene(STEEL, end=1e-6, velocity=(-60.0, 90.0, -150.0), boundaries=tuple(walls), probes=probes), [MESH])
