@@ -11,10 +11,10 @@ from pathlib import Path
 
 from .bodies import MeshFile
 from .geometry import AXES, bounds
-from .impact import impact_speed, wave_speed
+from .impact import impact_speeds, wave_speed
 from .library import material
 from .mesh_size import MeshSize, mesh_size, surface_faces
-from .placed import Bulk, bulk
+from .placed import Bulk, bulk, driven
 from .schema import Case, Part, Rotation, Symmetry
 from .stages import AVERAGED, CONTACT, STATE, STEPS, STRENGTH, TETS
 
@@ -85,7 +85,10 @@ def estimate(case: Case, folder: Path | None = None) -> Estimate:
     sizes = [_size(part, folder or Path()) for part in case.parts]
     parts = tuple(_part(case, part, size) for part, size in zip(case.parts, sizes, strict=True))
     dt = _least([part.dt for part in parts])
-    shrunk = [None if p.dt is None else p.dt / shrinkage(case, q) for p, q in zip(parts, case.parts, strict=True)]
+    shrunk = [
+        None if p.dt is None else p.dt / shrinkage(case, q, speed)
+        for p, q, speed in zip(parts, case.parts, impact_speeds(case), strict=True)
+    ]
     mean = _least(shrunk)
     steps = None if mean is None else min(math.ceil(case.run.end_time / mean), case.run.max_steps)
     costs = _costs(case, parts, steps)
@@ -118,18 +121,10 @@ def _part(case: Case, part: Part, size: MeshSize | int | None) -> PartEstimate:
         return PartEstimate(part.name, size, None, None)
     made = material(case, part.material)
     slowest = wave_speed(made) * _viscous_factor(case)
-    brings = None if isinstance(part.mesh, MeshFile) else bulk(_driven(case, part), part.mesh, made.density)
+    brings = None if isinstance(part.mesh, MeshFile) else bulk(driven(case, part), part.mesh, made.density)
     return PartEstimate(
         part.name, size.elements, size.nodes, case.numerics.dt_safety * size.step_length / slowest, brings
     )
-
-
-def _driven(case: Case, part: Part) -> Part:
-    """A part as it moves where a boundary turns it."""
-    for _, boundary in case.boundaries_of(Rotation):
-        if not boundary.parts or part.name in boundary.parts:
-            return part.model_copy(update={"velocity": (0.0, 0.0, 0.0), "spin": boundary.spin, "stretch": None})
-    return part
 
 
 def _viscous_factor(case: Case) -> float:
@@ -139,13 +134,14 @@ def _viscous_factor(case: Case) -> float:
     return linear + math.hypot(1.0, linear)
 
 
-def shrinkage(case: Case, part: Part) -> float:
-    """Initial over mean time step: impact flattens the tets, and compression makes waves faster.
+def shrinkage(case: Case, part: Part, speed: float) -> float:
+    """Initial over mean time step of a part that is met at a ``speed``, m/s: impact flattens the tets, and compression
+    makes waves faster.
 
     Free to flow, a metal that stops from the speed v takes the strain density v^2 / (2 yield stress); the mean step
     falls as exp(4 strain), which fits Taylor bars of copper and steel. Held on all sides, it is compressed by a shock.
     """
-    made, speed = material(case, part.material), impact_speed(case, part)
+    made = material(case, part.material)
     deepest = DEEPEST if part.erosion is None else DEEPEST_ERODING
     if _confined(case, part):
         shock = made.eos.c0 + made.eos.S * speed if made.eos is not None else wave_speed(made)

@@ -1,10 +1,17 @@
 """How fast bodies meet, and what that asks of contact."""
 
+import itertools
 import math
+from collections import Counter
+from collections.abc import Sequence
 
+from .bodies import MeshFile
+from .boundaries import Course, Prescribed, Wall
+from .geometry import Vector
 from .library import material
 from .materials import Material
-from .schema import Case, Part, Wall
+from .placed import Placed, driven, velocity
+from .schema import Case, Part
 
 FEW, MANY = 5, 10
 """Sweeps of contact in a step; what more are good for: docs/numerics.md, "Contact"."""
@@ -14,6 +21,8 @@ columns of metal (docs/numerics.md, "Plates under 100 GPa")."""
 PRESSING = 0.1
 """Of the same: above it flat surfaces buckle. Chosen: half of where irregular plates of copper lost their pressure
 (docs/numerics.md, "Ridges under pressure")."""
+_REST: Vector = (0.0, 0.0, 0.0)
+"""The velocity of a wall, m/s."""
 
 
 def wave_speed(made: Material) -> float:
@@ -21,17 +30,65 @@ def wave_speed(made: Material) -> float:
     return math.sqrt((made.bulk + 4.0 / 3.0 * made.elastic.shear) / made.density)
 
 
-def impact_speed(case: Case, part: Part, walls: bool = True) -> float:
-    """The largest speed, m/s, at which a part may meet another part, or a wall where ``walls`` count."""
-    met = [other.velocity for other in case.parts if other is not part]
-    met += [(0.0, 0.0, 0.0) for boundary in case.boundaries if walls and isinstance(boundary, Wall)]
-    return max((math.dist(part.velocity, velocity) for velocity in met), default=0.0)
+def impact_speeds(case: Case, walls: bool = True) -> list[float]:
+    """The largest speed, m/s, at which each part may meet another part, or a wall where ``walls`` count: by the bounds
+    of their velocities, so up to sqrt(3) times what it is where a body turns.
+    """
+    bounds = [_velocities(case, part) for part in case.parts]
+    there = Counter(bounds)
+    if walls and any(True for _ in case.boundaries_of(Wall)):
+        there[_REST, _REST] += len(bounds)
+    return [
+        max((_apart(*own, *other) for other, many in there.items() if other != own or many > 1), default=0.0)
+        for own in bounds
+    ]
+
+
+def _apart(low: Vector, high: Vector, low2: Vector, high2: Vector) -> float:
+    """The largest distance of a point of one box from a point of another."""
+    return math.hypot(*(max(b - c, d - a) for a, b, c, d in zip(low, high, low2, high2, strict=True)))
+
+
+def _velocities(case: Case, part: Part) -> tuple[Vector, Vector]:
+    """Bounds of the velocities, m/s, that nodes of a part start with or are driven with; a mesh file neither turns nor
+    stretches here.
+    """
+    if isinstance(part.mesh, MeshFile):
+        found = [part.velocity]
+    else:
+        moving, corners = driven(case, part), zip(*Placed(part.mesh, part.turn).bounds(), strict=True)
+        found = [velocity(moving, corner) for corner in itertools.product(*corners)]
+    for _, drive in case.boundaries_of(Prescribed):
+        if not drive.parts or part.name in drive.parts:
+            given = [_given(drive, factor, speeds) for factor in _extremes(drive.course) for speeds in found]
+            found = given if drive.low is None and drive.high is None else [*found, *given]
+    low, high = ([pick(each) for each in zip(*found, strict=True)] for pick in (min, max))
+    return _shifted(low, -part.jitter), _shifted(high, part.jitter)
+
+
+def _extremes(course: Course) -> tuple[float, float]:
+    factors = [factor for _, factor in course] or [1.0]
+    return min(factors), max(factors)
+
+
+def _given(drive: Prescribed, factor: float, speeds: Vector) -> Vector:
+    x, y, z = (
+        old if new is None else factor * new for new, old in zip((drive.x, drive.y, drive.z), speeds, strict=True)
+    )
+    return x, y, z
+
+
+def _shifted(vector: Sequence[float], by: float) -> Vector:
+    x, y, z = vector
+    return x + by, y + by, z + by
 
 
 def _fast(case: Case, share: float) -> bool:
     """Whether two parts meet at more than a ``share`` of the wave speed of one of them."""
+    speeds = impact_speeds(case, walls=False)
     return any(
-        impact_speed(case, part, walls=False) > share * wave_speed(material(case, part.material)) for part in case.parts
+        speed > share * wave_speed(material(case, part.material))
+        for part, speed in zip(case.parts, speeds, strict=True)
     )
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from . import geometry
 from .geometry import Generated, Vector, across, index
-from .schema import Part, Turn
+from .schema import Case, Part, Rotation, Turn
 
 LATTICE = 20
 """Points a direction at which a body is looked at. Chosen: 8,000 points in all, moments of inertia within 1 %."""
@@ -54,6 +54,14 @@ def _turned(point: Vector, turn: Turn | None, sense: float = 1.0) -> Vector:
     p, q = point[i] - turn.centre[i], point[j] - turn.centre[j]
     new = {along: point[along], i: turn.centre[i] + cosine * p - sine * q, j: turn.centre[j] + sine * p + cosine * q}
     return new[0], new[1], new[2]
+
+
+def driven(case: Case, part: Part) -> Part:
+    """A part as it moves where a boundary turns it."""
+    for _, boundary in case.boundaries_of(Rotation):
+        if not boundary.parts or part.name in boundary.parts:
+            return part.model_copy(update={"velocity": (0.0, 0.0, 0.0), "spin": boundary.spin, "stretch": None})
+    return part
 
 
 def velocity(part: Part, point: Vector) -> Vector:

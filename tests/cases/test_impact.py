@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from conoid.cases.impact import impact_speed, pressed, sweeps
+from conoid.cases.impact import impact_speeds, pressed, sweeps
 from conoid.cases.load import parse_case
 from conoid.cases.schema import Case
 
@@ -49,9 +49,42 @@ def test_bodies_are_pressed_together_at_a_tenth_of_the_speed_of_waves() -> None:
     assert pressed(meeting(650.0, material="glass", fracture={}))
 
 
+def bounded(case: Case, boundary: dict[str, Any]) -> Case:
+    return parse_case({**case.model_dump(mode="json", exclude_none=True), "boundaries": [boundary]})
+
+
 def test_a_wall_is_met_at_the_speed_of_the_part() -> None:
-    case = meeting(100.0, velocity=[0, 0, 100.0])
-    wall = {"kind": "wall", "point": [0, 0, -1.0], "normal": [0, 0, 1]}
-    walled = parse_case({**case.model_dump(mode="json", exclude_none=True), "boundaries": [wall]})
-    assert [impact_speed(walled, part) for part in walled.parts] == [100.0, 100.0]
-    assert [impact_speed(walled, part, walls=False) for part in walled.parts] == [0.0, 0.0]
+    walled = bounded(
+        meeting(100.0, velocity=[0, 0, 100.0]), {"kind": "wall", "point": [0, 0, -1.0], "normal": [0, 0, 1]}
+    )
+    assert impact_speeds(walled) == [100.0, 100.0]
+    assert impact_speeds(walled, walls=False) == [0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("drive", "speed"),
+    [
+        ({"z": -700.0, "parts": ["b"]}, 1300.0),
+        ({"z": -700.0, "parts": ["b"], "course": [[0, 0], [1e-6, 0.5]]}, 950.0),
+        ({"z": 700.0, "parts": ["b"], "low": [0, 0, 2e-3], "high": [1e-3, 1e-3, 2e-3]}, 600.0),
+        ({"z": 600.0, "parts": ["b"]}, 0.0),
+        ({"x": 800.0, "parts": ["a"]}, 1000.0),
+    ],
+)
+def test_what_is_driven_comes_at_the_speed_of_its_drive(drive: dict[str, Any], speed: float) -> None:
+    """A box of a body besides what it flies with, a whole body instead."""
+    assert impact_speeds(bounded(meeting(600.0), {"kind": "velocity", **drive})) == pytest.approx([speed] * 2)
+
+
+def test_what_turns_comes_at_the_speed_of_its_rim() -> None:
+    """A cube of 1 mm about its edge along z, at 1e6 rad/s: corners have up to 1,000 m/s along x and y."""
+    spin = {"centre": [0, 0, 0], "rate": [0, 0, 1e6]}
+    spun = parse_case(
+        {
+            **(case := meeting(0.0).model_dump(mode="json", exclude_none=True)),
+            "parts": [{**case["parts"][0], "spin": spin}, case["parts"][1]],
+        }
+    )
+    assert impact_speeds(spun) == pytest.approx([1414.2] * 2, rel=1e-4)
+    driven = bounded(meeting(300.0), {"kind": "rotation", "parts": ["a"], "spin": spin})
+    assert impact_speeds(driven) == pytest.approx([1414.2] * 2, rel=1e-4)
