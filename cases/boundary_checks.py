@@ -1,12 +1,13 @@
 """What the models cannot check of boundaries: parts that must exist, boxes that hold something, walls in front."""
 
+import itertools
 import math
 from collections.abc import Iterator
-from itertools import combinations, pairwise
 
-from .bodies import Loose, MeshFile
+from .bodies import Box as Brick
+from .bodies import Loose, MeshFile, Plate, Tube
 from .drives import clash
-from .geometry import index, lowest_along
+from .geometry import Vector, index, lowest_along
 from .placed import Placed
 from .problems import Location, Problem, choices, nearest, problem
 from .schema import Case, Gravity, Part, Prescribed, Rotation, Symmetry, Traction, Wall
@@ -14,6 +15,8 @@ from .schema import Case, Gravity, Part, Prescribed, Rotation, Symmetry, Tractio
 ROUNDING = 1e-9
 """Of a length or a time: two numbers that agree to this were meant to be equal. Chosen far above the rounding of
 units (1e-16) and far below any tolerance of a drawing."""
+Box = list[tuple[float, float]]
+"""From where to where along x, y and z, m."""
 
 
 def check_boundaries(case: Case) -> Iterator[Problem]:
@@ -29,6 +32,7 @@ def check_boundaries(case: Case) -> Iterator[Problem]:
             yield problem(("boundaries", i, "acceleration"), "0, 0, 0", "must not be zero")
         elif isinstance(boundary, Traction):
             yield from _traction(boundary, ("boundaries", i))
+            yield from _buried(case, i, boundary)
         yield from _out_of_reach(case, i)
     yield from _two_drives(case)
 
@@ -52,10 +56,8 @@ def _out_of_reach(case: Case, number: int) -> Iterator[Problem]:
             yield problem(("boundaries", number, "at"), f"{boundary.at:g} m", message)
     elif isinstance(boundary, Prescribed | Traction) and boundary.low is not None and boundary.high is not None:
         box = list(zip(boundary.low, boundary.high, strict=True))
-        if all(a <= b for a, b in box) and not any(
-            all(a <= top + margin and b >= bottom - margin for (a, b), bottom, top in zip(box, *body, strict=True))
-            for body in bodies
-        ):
+        wider = [(a - margin, b + margin) for a, b in box]
+        if all(a <= b for a, b in box) and not any(_meet(wider, body) for body in bodies):
             low, high = (
                 [pick(x) for x in zip(*corners, strict=True)]
                 for pick, corners in zip((min, max), zip(*bodies, strict=True), strict=True)
@@ -64,6 +66,36 @@ def _out_of_reach(case: Case, number: int) -> Iterator[Problem]:
             yield problem(
                 ("boundaries", number), ..., f"the box misses all bodies that it is for; they are in {reach} m"
             )
+
+
+def _buried(case: Case, number: int, boundary: Traction) -> Iterator[Problem]:
+    """A box that lies inside of the bodies that it is for, and so holds none of their faces."""
+    low, high = boundary.low, boundary.high
+    parts = [part for part in case.parts if not boundary.parts or part.name in boundary.parts]
+    if low is None or high is None or any(a > b for a, b in zip(low, high, strict=True)):
+        return
+    margin = ROUNDING * max(1.0, *map(abs, (*low, *high)))
+    box = [(a - margin, b + margin) for a, b in zip(low, high, strict=True)]
+    reached = [part for part in parts if _may_hold(part, box)]
+    if reached and all(_surrounds(part, box) for part in reached):
+        names = choices(part.name for part in reached)
+        yield problem(("boundaries", number), ..., f"the box lies inside of {names}; tractions act on surfaces")
+
+
+def _meet(box: Box, body: tuple[Vector, Vector]) -> bool:
+    return all(a <= top and b >= bottom for (a, b), bottom, top in zip(box, *body, strict=True))
+
+
+def _may_hold(part: Part, box: Box) -> bool:
+    return isinstance(part.mesh, MeshFile) or _meet(box, Placed(part.mesh, part.turn).bounds())
+
+
+def _surrounds(part: Part, box: Box) -> bool:
+    """Whether a box lies in a body, as far as its corners tell: they do where it has no hole, and is not loose."""
+    mesh = part.mesh
+    if isinstance(mesh, MeshFile | Loose | Tube) or (isinstance(mesh, Brick | Plate) and mesh.slit is not None):
+        return False
+    return all(Placed(mesh, part.turn).holds(corner) for corner in itertools.product(*box))
 
 
 def _comes(case: Case, part: Part, axis: int, way: float) -> bool:
@@ -78,7 +110,7 @@ def _two_drives(case: Case) -> Iterator[Problem]:
     """Two boundaries that drive the whole of a part, each in its own way; the worker looks at the nodes of boxes."""
     drives = [(i, each) for i, each in enumerate(case.boundaries) if isinstance(each, Rotation) or _whole(each)]
     names = [part.name for part in case.parts]
-    for (i, first), (j, second) in combinations(drives, 2):
+    for (i, first), (j, second) in itertools.combinations(drives, 2):
         shared = [name for name in names if all(not each.parts or name in each.parts for each in (first, second))]
         axes = clash(first, second)
         if shared and axes:
@@ -110,7 +142,7 @@ def _traction(boundary: Traction, location: Location) -> Iterator[Problem]:
 
 
 def _course(boundary: Prescribed | Traction, location: Location) -> Iterator[Problem]:
-    for k, ((before, _), (after, _)) in enumerate(pairwise(boundary.course)):
+    for k, ((before, _), (after, _)) in enumerate(itertools.pairwise(boundary.course)):
         if not after > before:
             yield problem(
                 (*location, "course", k + 1, 0), after, f"must be later than the time before it, {before:g} s"

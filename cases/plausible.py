@@ -17,6 +17,7 @@ from .materials import Material
 from .overlap import grazes
 from .problems import Location, Problem, problem
 from .quantities import unit_of_reference
+from .reach import cut_bodies, scant_probes
 from .reference import Schema, definition, json_schema, variants
 from .schema import Case
 from .units import QUANTITY
@@ -49,6 +50,8 @@ def doubts(data: Mapping[str, Any], case: Case, expected: Estimate) -> list[Prob
         *grazes(enumerate(case.parts), case.contact),
         *strangers(case),
         *passing(case),
+        *cut_bodies(case),
+        *scant_probes(case, expected),
     ]
 
 

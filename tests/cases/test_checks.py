@@ -63,6 +63,8 @@ def test_the_rod_is_sound() -> None:
          "misses all bodies that it is for; they are in ("),
         (["boundaries[0]={kind='traction', pressure=1, low=[0, 0, -2], high=[1, 1, -1]}"], "boundaries[0]",
          "misses all bodies that it is for"),
+        (["boundaries[0]={kind='traction', pressure=1, low=['1 mm', '1 mm', '9 mm'], high=['2 mm', '2 mm', '10 mm']}"],
+         "boundaries[0]", "the box lies inside of 'rod'; tractions act on surfaces"),
         (["contact={pairs=[{parts=['rod', 'rod'], friction=0.1}]}"], "contact.pairs[0].parts", "does not meet itself"),
         (["contact.self_contact=['rod']",
           "contact.pairs=[{parts=['rod', 'rod'], friction=0.1}, {parts=['rod', 'rod'], friction=0.2}]"],

@@ -282,3 +282,23 @@ def test_velocity_is_that_of_the_worker() -> None:
     case = parse_case(rod("parts[0].spin={centre=[0, 0, 0], rate=[1, 2, 3]}", "parts[0].stretch={rate=[4, 5, 6]}"))
     x, y, z = velocity(case.parts[0], (0.1, 0.2, 0.3))
     assert (x, y, z) == pytest.approx((2 * 0.3 - 3 * 0.2 + 0.4, 3 * 0.1 - 1 * 0.3 + 1.0, -10.0 + 0.2 - 2 * 0.1 + 1.8))
+
+
+def test_a_plane_of_symmetry_through_a_body_is_told() -> None:
+    """On its surface, or off it, it is not."""
+    plane = {"kind": "symmetry", "axis": "x"}
+    assert told({**target(), "boundaries": [{**plane, "at": "1 mm", "parts": ["plate"]}]}) == {
+        "boundaries[0].at": "'0.001 m': goes through part 'plate', which lies between -0.01 and 0.01 m: each side meets "
+        "its own mirror image; model one of them"
+    }
+    assert told({**target(), "boundaries": [{**plane, "at": "10 mm", "parts": ["plate"]}]}) == {}
+
+
+@pytest.mark.parametrize(("side", "warned"), [(0.0, True), (0.3, True), (1.0, False)])
+def test_the_box_of_a_probe_that_has_no_room_for_a_tet_is_told(side: float, warned: bool) -> None:
+    """A tet of 1 mm has some 0.12 mm^3."""
+    box = {"low": [0, 0, "-3 mm"], "high": [f"{side} mm", f"{side} mm", f"{side - 3.0} mm"]}
+    probe = {"name": "p", "part": "plate", "field": "pressure", **box}
+    odd = told({**target(), "probes": [probe]})
+    assert list(odd) == (["probes[0]"] if warned else [])
+    assert all("where it holds no centre of one the run does not start" in each for each in odd.values())
