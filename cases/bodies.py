@@ -33,7 +33,8 @@ class Primitive(Model):
     """What all generated meshes share. ``structured`` is the regular generator kept for verification."""
 
     element_size: Annotated[Length, Positive]
-    """Edge of a tet, about; not above the smallest extent of the body."""
+    """Edge of a tet, about; not above the smallest extent of the body, and a quarter of the thickness where it bends:
+    with 4 tets through it the averaged forms are 13 % too stiff, with 2 50 %, ``standard`` is 26 and 100 %."""
     generator: Literal["gmsh", "structured"] = "gmsh"
     """``gmsh`` makes unstructured meshes; ``structured`` cuts the cells of a regular grid into tets, but
     for spheres."""

@@ -80,12 +80,15 @@ class Rotation(Model):
 
 
 class Gravity(Model):
-    """A constant acceleration of all nodes of the parts, of all parts when ``parts`` is empty."""
+    """An acceleration of all nodes of the parts, of all parts when ``parts`` is empty."""
 
     kind: Literal["gravity"]
     """The kind of boundary."""
     acceleration: tuple[Acceleration, Acceleration, Acceleration]
     """Along x, y, z; not zero."""
+    course: Course = ()
+    """Pairs of a time and a factor of the acceleration: linear in between, constant before the first and after the
+    last. Without them it is constant from the first moment on, and what stood free begins to bounce."""
     parts: tuple[Name, ...] = ()
     """Parts that it acts on; all when empty."""
 

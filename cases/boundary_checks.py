@@ -28,8 +28,8 @@ def check_boundaries(case: Case) -> Iterator[Problem]:
                 yield problem(("boundaries", i, "parts", j), name, f"no part of this name; {nearest(name, names)}")
         if isinstance(boundary, Prescribed):
             yield from _prescribed(boundary, ("boundaries", i))
-        elif isinstance(boundary, Gravity) and not any(boundary.acceleration):
-            yield problem(("boundaries", i, "acceleration"), "0, 0, 0", "must not be zero")
+        elif isinstance(boundary, Gravity):
+            yield from _gravity(boundary, ("boundaries", i))
         elif isinstance(boundary, Traction):
             yield from _traction(boundary, ("boundaries", i))
             yield from _buried(case, i, boundary)
@@ -130,6 +130,12 @@ def _prescribed(boundary: Prescribed, location: Location) -> Iterator[Problem]:
     yield from _course(boundary, location)
 
 
+def _gravity(boundary: Gravity, location: Location) -> Iterator[Problem]:
+    if not any(boundary.acceleration):
+        yield problem((*location, "acceleration"), "0, 0, 0", "must not be zero")
+    yield from _course(boundary, location)
+
+
 def _traction(boundary: Traction, location: Location) -> Iterator[Problem]:
     if (boundary.stress is None) == (boundary.pressure is None):
         yield problem(location, ..., "give either stress or pressure")
@@ -141,7 +147,7 @@ def _traction(boundary: Traction, location: Location) -> Iterator[Problem]:
     yield from _course(boundary, location)
 
 
-def _course(boundary: Prescribed | Traction, location: Location) -> Iterator[Problem]:
+def _course(boundary: Prescribed | Gravity | Traction, location: Location) -> Iterator[Problem]:
     for k, ((before, _), (after, _)) in enumerate(itertools.pairwise(boundary.course)):
         if not after > before:
             yield problem(

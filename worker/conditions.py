@@ -36,7 +36,8 @@ def build(case: schema.Case, model: Model, loads: list[Load]) -> list[Boundary]:
     nodes = model.nodes
     held = [_held_by(spec, model) for spec in case.boundaries]
     boundaries: list[Boundary] = [
-        Gravity(_indices(held[i]), np.array(spec.acceleration)) for i, spec in case.boundaries_of(schema.Gravity)
+        Gravity(_indices(held[i]), np.array(spec.acceleration), Course(spec.course))
+        for i, spec in case.boundaries_of(schema.Gravity)
     ]
     boundaries += [
         Traction(nodes.places(load.nodes), load, Course(spec.course))

@@ -42,11 +42,13 @@ class Course:
 
 
 class Gravity(Driver):
-    """A constant ``acceleration`` (3,), m/s^2, over the mean step of the kick: free fall is exact at n and at n+1/2."""
+    """An ``acceleration`` (3,), m/s^2, times the mean factor of the ``course`` over the mean step of the kick: in free
+    fall velocities are exact at n+1/2, and positions at n where it is constant.
+    """
 
-    def __init__(self, nodes: Indices, acceleration: Floats) -> None:
+    def __init__(self, nodes: Indices, acceleration: Floats, course: Course) -> None:
         super().__init__(nodes)
-        self._acceleration = acceleration
+        self._acceleration, self._course = acceleration, course
         self._last_dt = 0.0
 
     def held_components(self) -> Bits:
@@ -57,7 +59,8 @@ class Gravity(Driver):
         self._last_dt = dt
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
-        gained = 0.5 * (self._last_dt + dt) * self._acceleration
+        factor = self._course.mean(t - 0.5 * self._last_dt, t + 0.5 * dt)
+        gained = 0.5 * (self._last_dt + dt) * factor * self._acceleration
         self._last_dt = dt
         self._impulse = state.mass[self.nodes, None] * gained
         state.v[self.nodes] += gained

@@ -56,6 +56,8 @@ def test_the_rod_is_sound() -> None:
         (["boundaries[0].normal=[0, 0, -1]"], "boundaries[0]", "part 'rod' starts 0.03 m behind this wall"),
         (["boundaries[0].point=[0, 0, '1 mm']"], "boundaries[0]", "part 'rod' starts 0.001 m behind this wall"),
         (["boundaries[0]={kind='gravity', acceleration=[0, 0, 0]}"], "boundaries[0].acceleration", "must not be zero"),
+        (["boundaries[0]={kind='gravity', acceleration=[0, 0, 1], course=[[1, 1], [1, 0]]}"],
+         "boundaries[0].course[1][0]", "must be later than the time before it, 1 s"),
         (["boundaries[0]={kind='gravity', acceleration=[0, 0, 1], parts=['a']}"], "boundaries[0].parts[0]", "no part"),
         (["boundaries[0]={kind='traction', stress=[0, 0, 0]}"], "boundaries[0].stress", "must not be zero"),
         (["boundaries[0]={kind='symmetry', axis='z', at='40 mm'}"], "boundaries[0].at", "between 0 and 0.03 m along z"),

@@ -288,8 +288,8 @@ def test_a_plane_of_symmetry_through_a_body_is_told() -> None:
     """On its surface, or off it, it is not."""
     plane = {"kind": "symmetry", "axis": "x"}
     assert told({**target(), "boundaries": [{**plane, "at": "1 mm", "parts": ["plate"]}]}) == {
-        "boundaries[0].at": "'0.001 m': goes through part 'plate', which lies between -0.01 and 0.01 m: each side meets "
-        "its own mirror image; model one of them"
+        "boundaries[0].at": "'0.001 m': goes through part 'plate', which lies between -0.01 and 0.01 m: each side "
+        "meets its own mirror image; model one of them"
     }
     assert told({**target(), "boundaries": [{**plane, "at": "10 mm", "parts": ["plate"]}]}) == {}
 

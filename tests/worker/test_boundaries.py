@@ -334,6 +334,21 @@ def test_free_fall_is_exact_at_every_time() -> None:
     assert np.linalg.norm(g) * sim.clock.t > 20.0
 
 
+def test_gravity_follows_its_course() -> None:
+    """Of a body that flies free while gravity grows for 0.4 us: velocities at n+1/2 are its integral, exactly."""
+    grown, g = 4e-7, np.array(FALL)
+    sim = with_boundary({**GRAVITY, "course": ((0.0, 0.0), (grown, 1.0))}, dt_growth=2.0)
+
+    def look(sim: Simulation, _: Floats) -> None:
+        half = sim.clock.t + 0.5 * sim.clock.dt
+        time = half - 0.5 * grown if half > grown else 0.5 * half**2 / grown
+        assert np.abs(sim.model.nodes.v - g * time).max() < 1e-12 * np.linalg.norm(g) * 1e-6
+
+    run(sim, uneven(look))
+    assert sim.clock.t > 2.0 * grown
+    assert sim.ledger.worst < 1e-12
+
+
 def test_the_ledger_of_a_free_fall_closes_to_round_off() -> None:
     """Whatever the steps are; gravity has done 1/2 m v(n-1/2) . v(n+1/2), the kinetic energy of the ledger."""
     sim = with_boundary(GRAVITY, dt_growth=2.0)

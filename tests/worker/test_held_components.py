@@ -49,7 +49,7 @@ def test_a_boundary_that_does_not_answer_cannot_be_made() -> None:
 @pytest.mark.parametrize(
     ("bound", "held"),
     [
-        (Gravity(SOME, np.ones(3)), (FREE, FREE, FREE)),
+        (Gravity(SOME, np.ones(3), Course()), (FREE, FREE, FREE)),
         (RigidWalls(SOME, POINT, NORMAL, np.ones((2, 1), bool)), (FREE, FREE, FREE)),
         (Mirrors(SOME, np.array([1]), np.zeros(1), np.ones((2, 1))), (FREE, FREE, FREE)),
         (SymmetryPlane(SOME, 2), (FREE, FREE, MIRRORED)),
