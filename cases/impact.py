@@ -13,14 +13,15 @@ from .materials import Material
 from .placed import Placed, driven, velocity
 from .schema import Case, Part
 
-FEW, MANY = 5, 10
+FEW, MANY, MOST = 5, 10, 20
 """Sweeps of contact in a step; what more are good for: docs/numerics.md, "Contact"."""
 FAST = 0.2
 """Of the wave speed of what is met: above it there are MANY sweeps. Chosen: below half of where few were too few for
 columns of metal (docs/numerics.md, "Plates under 100 GPa")."""
 PRESSING = 0.1
 """Of the same: above it flat surfaces buckle. Chosen: half of where irregular plates of copper lost their pressure
-(docs/numerics.md, "Ridges under pressure")."""
+(docs/numerics.md, "Ridges under pressure"), and where fewer than MOST sweeps lose the pressure of what
+breaks ("Dust under pressure")."""
 _REST: Vector = (0.0, 0.0, 0.0)
 """The velocity of a wall, m/s."""
 
@@ -102,5 +103,6 @@ def sweeps(case: Case) -> int:
     assert case.contact is not None
     if case.contact.sweeps is not None:
         return case.contact.sweeps
-    fast = _fast(case, FAST) and not case.fractures
-    return MANY if fast or case.contact.restitution > 0.0 else FEW
+    if case.fractures and pressed(case):
+        return MOST
+    return MANY if _fast(case, FAST) or case.contact.restitution > 0.0 else FEW
