@@ -95,7 +95,8 @@ def _surrounds(part: Part, box: Box) -> bool:
     mesh = part.mesh
     if isinstance(mesh, MeshFile | Loose | Tube) or (isinstance(mesh, Brick | Plate) and mesh.slit is not None):
         return False
-    return all(Placed(mesh, part.turn).holds(corner) for corner in itertools.product(*box))
+    body, (first, second, third) = Placed(mesh, part.turn), box
+    return all(body.holds((x, y, z)) for x, y, z in itertools.product(first, second, third))
 
 
 def _comes(case: Case, part: Part, axis: int, way: float) -> bool:

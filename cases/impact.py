@@ -57,14 +57,15 @@ def _velocities(case: Case, part: Part) -> tuple[Vector, Vector]:
     if isinstance(part.mesh, MeshFile):
         found = [part.velocity]
     else:
-        moving, corners = driven(case, part), zip(*Placed(part.mesh, part.turn).bounds(), strict=True)
-        found = [velocity(moving, corner) for corner in itertools.product(*corners)]
+        moving, (low, high) = driven(case, part), Placed(part.mesh, part.turn).bounds()
+        sides = (low[0], high[0]), (low[1], high[1]), (low[2], high[2])
+        found = [velocity(moving, (x, y, z)) for x, y, z in itertools.product(*sides)]
     for _, drive in case.boundaries_of(Prescribed):
         if not drive.parts or part.name in drive.parts:
             given = [_given(drive, factor, speeds) for factor in _extremes(drive.course) for speeds in found]
             found = given if drive.low is None and drive.high is None else [*found, *given]
-    low, high = ([pick(each) for each in zip(*found, strict=True)] for pick in (min, max))
-    return _shifted(low, -part.jitter), _shifted(high, part.jitter)
+    least, most = ([pick(each) for each in zip(*found, strict=True)] for pick in (min, max))
+    return _shifted(least, -part.jitter), _shifted(most, part.jitter)
 
 
 def _extremes(course: Course) -> tuple[float, float]:

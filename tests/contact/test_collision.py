@@ -306,10 +306,13 @@ def test_an_impact_of_bodies_from_which_all_comes_back_takes_nothing() -> None:
 @pytest.mark.parametrize("gap", [0.0, 0.02])
 def test_the_force_of_contact_is_what_changes_the_momentum(gap: float) -> None:
     """Force times time over all lines of the history, of blocks that touch from the start and of blocks that do not."""
-    fields = {f"{a}{i}": (f"contact_force_{a}", f"body{i}") for i in range(2) for a in "xyz"}
     case = meeting_of(
         [{}, {"velocity": (-80.0, 10.0, 0.0)}], end=1e-6,
-        probes=tuple(schema.Probe(name=name, field=field, part=part) for name, (field, part) in fields.items()),
+        probes=tuple(
+            schema.Probe.model_validate({"name": f"{a}{i}", "part": f"body{i}", "field": f"contact_force_{a}"})
+            for i in range(2)
+            for a in "xyz"
+        ),
     )  # fmt: skip
     striker = moved(block((2, 2, 2), SIZE, seed=2), ((3.0 + gap) * SIZE, 0.4 * SIZE, 0.6 * SIZE))
     sim = build(case, [block((3, 3, 3), SIZE, seed=1), striker])

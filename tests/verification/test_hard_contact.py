@@ -366,7 +366,8 @@ def test_irregular_plates_keep_the_pressure_of_their_impact() -> None:
 @pytest.mark.parametrize(("sweeps", "share"), [(None, (0.8, 1.1)), (5, (0.0, 0.4))])
 def test_broken_ceramic_keeps_the_pressure_of_its_impact(sweeps: int | None, share: tuple[float, float]) -> None:
     """Alumina on alumina at 1.1 km/s, more than a tenth of the speed of waves: between planes of symmetry it crumbles
-    by shear, and what has no strength has sqrt(K density) v / 2. With five sweeps most of it is lost: the check can fail.
+    by shear, and what has no strength has sqrt(K density) v / 2. With five sweeps most of it is lost: the check can
+    fail.
     """
     alumina, speed = library()["alumina"], 1100.0
     square = {"shape": "box", "element_size": 0.1e-3, "generator": "gmsh"}
