@@ -4,8 +4,7 @@ import itertools
 import math
 from collections.abc import Iterator
 
-from .bodies import Box as Brick
-from .bodies import Loose, MeshFile, Plate, Tube
+from .bodies import Box, Loose, MeshFile, Plate, Tube
 from .drives import clash
 from .geometry import Vector, index, lowest_along
 from .placed import Placed
@@ -15,8 +14,6 @@ from .schema import Case, Gravity, Part, Prescribed, Rotation, Symmetry, Tractio
 ROUNDING = 1e-9
 """Of a length or a time: two numbers that agree to this were meant to be equal. Chosen far above the rounding of
 units (1e-16) and far below any tolerance of a drawing."""
-Box = list[tuple[float, float]]
-"""From where to where along x, y and z, m."""
 
 
 def check_boundaries(case: Case) -> Iterator[Problem]:
@@ -32,18 +29,20 @@ def check_boundaries(case: Case) -> Iterator[Problem]:
             yield from _gravity(boundary, ("boundaries", i))
         elif isinstance(boundary, Traction):
             yield from _traction(boundary, ("boundaries", i))
-            yield from _buried(case, i, boundary)
         yield from _out_of_reach(case, i)
     yield from _two_drives(case)
 
 
 def _out_of_reach(case: Case, number: int) -> Iterator[Problem]:
-    """A plane or a box off all bodies that it is for; what lies between nodes of a body the worker finds."""
+    """A plane or a box off all bodies that it is for, and a traction inside of them; what lies between nodes of a body
+    the worker finds.
+    """
     boundary = case.boundaries[number]
     parts = [part for part in case.parts if not boundary.parts or part.name in boundary.parts]
-    bodies = [Placed(part.mesh, part.turn).bounds() for part in parts if not isinstance(part.mesh, MeshFile | Loose)]
-    if not bodies or len(bodies) < len(parts):
+    known = {part.name: Placed(part.mesh, part.turn) for part in parts if not isinstance(part.mesh, MeshFile | Loose)}
+    if not known or len(known) < len(parts):
         return
+    bodies = [body.bounds() for body in known.values()]
     margin = ROUNDING * max(1.0, *(abs(x) for body in bodies for corner in body for x in corner))
     if isinstance(boundary, Symmetry):
         d = index(boundary.axis)
@@ -56,8 +55,11 @@ def _out_of_reach(case: Case, number: int) -> Iterator[Problem]:
             yield problem(("boundaries", number, "at"), f"{boundary.at:g} m", message)
     elif isinstance(boundary, Prescribed | Traction) and boundary.low is not None and boundary.high is not None:
         box = list(zip(boundary.low, boundary.high, strict=True))
+        if any(a > b for a, b in box):
+            return
         wider = [(a - margin, b + margin) for a, b in box]
-        if all(a <= b for a, b in box) and not any(_meet(wider, body) for body in bodies):
+        reached = {name: body for name, body in known.items() if _meet(wider, body.bounds())}
+        if not reached:
             low, high = (
                 [pick(x) for x in zip(*corners, strict=True)]
                 for pick, corners in zip((min, max), zip(*bodies, strict=True), strict=True)
@@ -66,36 +68,20 @@ def _out_of_reach(case: Case, number: int) -> Iterator[Problem]:
             yield problem(
                 ("boundaries", number), ..., f"the box misses all bodies that it is for; they are in {reach} m"
             )
+        elif isinstance(boundary, Traction) and all(_surrounds(body, wider) for body in reached.values()):
+            message = f"the box lies inside of {choices(reached)}; tractions act on surfaces"
+            yield problem(("boundaries", number), ..., message)
 
 
-def _buried(case: Case, number: int, boundary: Traction) -> Iterator[Problem]:
-    """A box that lies inside of the bodies that it is for, and so holds none of their faces."""
-    low, high = boundary.low, boundary.high
-    parts = [part for part in case.parts if not boundary.parts or part.name in boundary.parts]
-    if low is None or high is None or any(a > b for a, b in zip(low, high, strict=True)):
-        return
-    margin = ROUNDING * max(1.0, *map(abs, (*low, *high)))
-    box = [(a - margin, b + margin) for a, b in zip(low, high, strict=True)]
-    reached = [part for part in parts if _may_hold(part, box)]
-    if reached and all(_surrounds(part, box) for part in reached):
-        names = choices(part.name for part in reached)
-        yield problem(("boundaries", number), ..., f"the box lies inside of {names}; tractions act on surfaces")
-
-
-def _meet(box: Box, body: tuple[Vector, Vector]) -> bool:
+def _meet(box: list[tuple[float, float]], body: tuple[Vector, Vector]) -> bool:
     return all(a <= top and b >= bottom for (a, b), bottom, top in zip(box, *body, strict=True))
 
 
-def _may_hold(part: Part, box: Box) -> bool:
-    return isinstance(part.mesh, MeshFile) or _meet(box, Placed(part.mesh, part.turn).bounds())
-
-
-def _surrounds(part: Part, box: Box) -> bool:
-    """Whether a box lies in a body, as far as its corners tell: they do where it has no hole, and is not loose."""
-    mesh = part.mesh
-    if isinstance(mesh, MeshFile | Loose | Tube) or (isinstance(mesh, Brick | Plate) and mesh.slit is not None):
+def _surrounds(body: Placed, box: list[tuple[float, float]]) -> bool:
+    """Whether a box lies in a body, as far as its corners tell: they do where it has neither hole nor slit."""
+    if isinstance(body.mesh, Tube) or (isinstance(body.mesh, Box | Plate) and body.mesh.slit is not None):
         return False
-    body, (first, second, third) = Placed(mesh, part.turn), box
+    first, second, third = box
     return all(body.holds((x, y, z)) for x, y, z in itertools.product(first, second, third))
 
 

@@ -20,8 +20,7 @@ FAST = 0.2
 columns of metal (docs/numerics.md, "Plates under 100 GPa")."""
 PRESSING = 0.1
 """Of the same: above it flat surfaces buckle. Chosen: half of where irregular plates of copper lost their pressure
-(docs/numerics.md, "Ridges under pressure"), and where fewer than MOST sweeps lose the pressure of what
-breaks ("Dust under pressure")."""
+(docs/numerics.md, "Ridges under pressure"). Where bodies break it asks for MOST sweeps ("Dust under pressure")."""
 _REST: Vector = (0.0, 0.0, 0.0)
 """The velocity of a wall, m/s."""
 
@@ -38,7 +37,7 @@ def impact_speeds(case: Case, walls: bool = True) -> list[float]:
     bounds = [_velocities(case, part) for part in case.parts]
     there = Counter(bounds)
     if walls and any(True for _ in case.boundaries_of(Wall)):
-        there[_REST, _REST] += len(bounds)
+        there[_REST, _REST] += 1
     return [
         max((_apart(*own, *other) for other, many in there.items() if other != own or many > 1), default=0.0)
         for own in bounds

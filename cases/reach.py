@@ -17,13 +17,17 @@ _FEWEST = 1.0
 
 
 def cut_bodies(case: Case) -> Iterator[Problem]:
-    """A warning for each plane of symmetry that goes through a body, of which both sides are there."""
+    """A warning for each plane of symmetry that goes through a body, of which both sides are there; none for bodies
+    that are turned, of which only a box round them is known.
+    """
     for number, plane in case.boundaries_of(Symmetry):
         d = index(plane.axis)
         for part in case.parts:
-            if isinstance(part.mesh, MeshFile | Loose) or (plane.parts and part.name not in plane.parts):
+            if isinstance(part.mesh, MeshFile | Loose) or part.turn is not None:
                 continue
-            low, high = (corner[d] for corner in Placed(part.mesh, part.turn).bounds())
+            if plane.parts and part.name not in plane.parts:
+                continue
+            low, high = (corner[d] for corner in Placed(part.mesh).bounds())
             if min(plane.at - low, high - plane.at) > _TOUCH * (high - low):
                 message = f"goes through part {part.name!r}, which lies between {low:g} and {high:g} m"
                 message = f"{message}: each side meets its own mirror image; model one of them"
