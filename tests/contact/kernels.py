@@ -7,6 +7,7 @@ import numpy as np
 
 from conoid.worker.contact import edge_edge as edge_kernels
 from conoid.worker.contact import node_face as face_kernels
+from conoid.worker.contact.active import Kept
 from conoid.worker.contact.company import Company
 from conoid.worker.contact.narrow_phase import PUSH_OUT, ContactRows, EdgeTable, FaceTable, SlotTable, Step
 from conoid.worker.contact.pairs import PairTable
@@ -166,14 +167,14 @@ class Solver:
         assert (self.total.sum(axis=0) == 0).all()
 
     @property
-    def kept(self) -> Floats:
-        """(candidates, 4) what the pairs keep of the step."""
-        kept = np.zeros((many(self.met), 4))
+    def kept(self) -> Kept:
+        """What the contacts keep of the step; before it there was something else."""
+        kept = Kept(*np.full((2, many(self.met), 4), np.nan))
         self.active.store(kept)
         return kept
 
-    def resume(self, kept: Floats, ratio: float = 1.0) -> None:
-        """Begins with ``ratio`` times what was ``kept`` (candidates, 4)."""
+    def resume(self, kept: Kept, ratio: float = 1.0) -> None:
+        """Begins with ``ratio`` times what was ``kept``."""
         self.active.resume(kept, ratio)
         self._leave()
 

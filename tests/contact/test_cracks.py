@@ -18,7 +18,7 @@ def cracks_of(n: int) -> Cracks:
     found = Cracks.none(np.arange(0))
     tets, nodes = np.column_stack([2 * number, 2 * number + 1]), np.repeat(number[:, None], 3, axis=1)
     found.add(tets, nodes.astype(np.int32), np.full((n, 2, 3), -1, np.int32), [])
-    found.places[:] = number[:, None]
+    found.places[:], found.kept[:] = number[:, None], number[:, None]
     return found
 
 
@@ -31,6 +31,7 @@ def test_cracks_that_open_leave_and_all_others_keep_their_columns(opened: list[i
     assert np.array_equal((cracks.faces + 1) // 4, np.column_stack([2 * left, 2 * left + 1]))
     for column in (cracks.nodes, cracks.places):
         assert np.array_equal(column, np.repeat(left[:, None], 6, axis=1))
+    assert np.array_equal(cracks.kept, np.repeat(left[:, None], 12, axis=1))
 
 
 def test_a_crack_that_comes_after_others_have_opened_stands_behind_those_that_are_left() -> None:
@@ -42,8 +43,9 @@ def test_a_crack_that_comes_after_others_have_opened_stands_behind_those_that_ar
     assert cracks.places[3].tolist() == [-1] * 6
 
 
-def test_who_gets_both_sides_of_a_crack_has_the_nodes_in_the_order_of_the_first_side() -> None:
-    """Ranks that have had a side each begin with different nodes, and the last bit of a normal depends on that."""
+def test_who_gets_both_sides_of_a_crack_has_what_the_first_side_has() -> None:
+    """Ranks that have had a side each begin with different nodes, and the last bit of a normal depends on that; and the
+    one with the first side has computed the crack."""
     ids, places, zeros = np.array([10, 11, 12]), np.zeros(3, np.int32), np.zeros((3, 3))
     none, force = np.zeros(3), zeros.astype(np.int64)
     nodes = Nodes(ids, places, places, np.ones(3, bool), zeros, zeros, zeros, none, force, none)
@@ -53,12 +55,13 @@ def test_who_gets_both_sides_of_a_crack_has_the_nodes_in_the_order_of_the_first_
         sides[0, k] = 0
         one = Cracks.none(np.arange(0))
         one.add(np.array([[5, 9]]), np.array([order], np.int32), sides, [])
-        one.sides, one.faces = sides, np.array([[20, 36]])
+        one.sides, one.faces, one.kept = sides, np.array([[20, 36]]), np.full((1, 12), float(k))
         had.append(one.keep(ids))
     for every in (had, had[::-1]):
         table = joined(every)
         cracks = Cracks.resume(once(table, table["key"]), ids, [], nodes)
         assert cracks.nodes.tolist() == [[0, 1, 2, 0, 1, 2]]
+        assert not cracks.kept.any()
 
 
 def test_only_cracks_with_their_first_side_here_and_nodes_apart_are_computed() -> None:

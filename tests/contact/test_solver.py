@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from conoid.worker.contact.narrow_phase import ContactRows
+from conoid.worker.contact.active import Kept
+from conoid.worker.contact.narrow_phase import CRACK, ContactRows
 
 from ..worker.meshes import Floats
 from .kernels import Solver
@@ -24,7 +25,8 @@ def scene(seed: int) -> tuple[ContactRows, Floats, Floats]:
     normals = random.normal(size=(CONTACTS, 3))
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     friction = np.where(random.uniform(size=CONTACTS) < 0.3, 0.3, 0.0)
-    pair = np.where(crack, -1, np.arange(CONTACTS)).astype(np.int32)
+    pair = np.where(crack, CRACK - np.arange(CONTACTS), np.arange(CONTACTS)).astype(np.int32)
+    pair[random.uniform(size=CONTACTS) < 0.2] = -1
     mobility = np.repeat(10.0 ** random.uniform(-1.0, 1.0, (NODES, 1)), 3, axis=1)
     mobility[random.uniform(size=(NODES, 3)) < 0.05] = 0.0
     wanted = -2.0 * random.uniform(size=CONTACTS)
@@ -66,13 +68,14 @@ class Plain:
         self.total += impulse
         self.v = np.where(impulse != 0, self.v + impulse * (self.mobility / _SCALE), self.v)
 
-    def resume(self, kept: Floats, ratio: float) -> None:
-        """Begins with what pairs have kept."""
+    def resume(self, kept: Kept, ratio: float) -> None:
+        """Begins with what is kept of pairs and cracks."""
         met, changes = self.met, np.zeros((CONTACTS, 3))
-        for p in np.flatnonzero(met.pair >= 0):
-            along = _dot(kept[met.pair[p], 1:], met.normals[p])
-            self.push[p, 0] = self.last[p] = 0.8 * ratio * kept[met.pair[p], 0] / self.norms[p, 0]
-            self.push[p, 1:] = ratio * (kept[met.pair[p], 1:] - along * met.normals[p]) / self.norms[p, 1]
+        for p in np.flatnonzero(met.pair != -1):
+            share, last = (0.8, kept.pairs[p]) if met.pair[p] >= 0 else (1.0, kept.cracks[p])
+            along = _dot(last[1:], met.normals[p])
+            self.push[p, 0] = self.last[p] = share * ratio * last[0] / self.norms[p, 0]
+            self.push[p, 1:] = ratio * (last[1:] - along * met.normals[p]) / self.norms[p, 1]
             changes[p] = self.push[p, 0] * met.normals[p] + self.push[p, 1:]
         self.give(changes)
 
@@ -112,8 +115,9 @@ def test_kernels_have_the_bits_of_the_formula(seed: int, resumed: bool) -> None:
     met, v, mobility = scene(seed)
     plain, solver = Plain(met, v, mobility), Solver(met, v, mobility, _SCALE)
     if resumed:
-        kept = np.abs(np.random.default_rng(seed + 100).normal(size=(CONTACTS, 4))) * [0.1, 0.01, 0.01, 0.01]
-        kept[::3], kept[met.friction == 0.0, 1:] = 0.0, 0.0
+        some = np.abs(np.random.default_rng(seed + 100).normal(size=(2, CONTACTS, 4))) * [0.1, 0.01, 0.01, 0.01]
+        some[:, ::3], some[:, met.friction == 0.0, 1:] = 0.0, 0.0
+        kept = Kept(*some)
         plain.resume(kept, 0.9)
         solver.resume(kept, 0.9)
     for _ in range(SWEEPS):

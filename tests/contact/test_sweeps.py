@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conoid.worker.contact.narrow_phase import ContactRows
+from conoid.worker.contact.narrow_phase import CRACK, ContactRows
 
 from ..worker.meshes import Floats
 from .bodies import rotation
@@ -300,15 +300,19 @@ def test_energy_lost_is_friction_heat_and_the_work_of_the_normal_impulse(seed: i
     assert lost == pytest.approx(normal + heat, rel=1e-7)
 
 
-def test_a_step_begins_with_the_impulses_of_the_one_before() -> None:
-    """Friction whole, across the normal as it is now, and the push along it in part."""
+@pytest.mark.parametrize(("cracks", "share"), [(False, 0.8), (True, 1.0)])
+def test_a_step_begins_with_the_impulses_of_the_one_before(cracks: bool, share: float) -> None:
+    """Friction whole, across the normal as it is now, and the push along it in part, or of cracks whole."""
     met, v, mobility = network(7, friction=0.4)
+    if cracks:
+        met.nodes[:, 2:], met.weights[:] = met.nodes[:, 1:2], (1.0, -1.0, 0.0, 0.0)
+        met.pair[:] = CRACK - met.pair
     first, again = Solver(met, v, mobility), Solver(met, v, mobility)
     solved = first.sweep(2000)
     again.resume(first.kept)
     across = first.push[:, 1:] - (first.push[:, 1:] * met.normals).sum(axis=1)[:, None] * met.normals
     assert again.push[:, 1:] == pytest.approx(across, abs=1e-9)
-    assert again.push[:, 0] == pytest.approx(0.8 * first.push[:, 0], abs=1e-9)
+    assert again.push[:, 0] == pytest.approx(share * first.push[:, 0], abs=1e-9)
     assert np.abs(again.sweep(5) - solved).max() < 0.5 * np.abs(Solver(met, v, mobility).sweep(5) - solved).max()
 
 

@@ -364,12 +364,17 @@ def test_irregular_plates_keep_the_pressure_of_their_impact() -> None:
         assert np.average(found[inside], weights=mass[inside]) == pytest.approx(pressure, rel=0.015)
 
 
-@pytest.mark.parametrize(("sweeps", "share"), [(None, (0.8, 1.1)), (5, (0.0, 0.4))])
-def test_broken_ceramic_keeps_the_pressure_of_its_impact(sweeps: int | None, share: tuple[float, float]) -> None:
-    """Alumina on alumina, faster than a tenth of the speed of waves: with five sweeps most of the pressure is lost, so
-    that the check can fail.
+@pytest.mark.parametrize(
+    ("speed", "sweeps", "share"), [(1100.0, None, (0.8, 1.1)), (1100.0, 5, (0.0, 0.75)), (200.0, None, (1.0, 1.38))]
+)
+def test_broken_ceramic_keeps_the_pressure_of_its_impact(
+    speed: float, sweeps: int | None, share: tuple[float, float]
+) -> None:
+    """Alumina on alumina, faster than a tenth of the speed of waves: with five sweeps much of the pressure is lost, so
+    that the check can fail. Slower, and by default with five, it is between what is broken and what is whole has (1.38
+    as much): 0.6 of the lower one where cracks begin from nothing in every step.
     """
-    speed, (low, high) = 1100.0, share
+    low, high = share
     found = dust.measure(dust.flyer("alumina", speed, sweeps, wide=0.3e-3, long=(1.5e-3, 1.5e-3), end=0.15e-6), 0.07e-6)
     broken, _ = dust.expected("alumina", speed)
     assert low < found.pressure / broken < high

@@ -37,9 +37,18 @@ class ActiveContacts(NamedTuple):
     friction: Floats
     """(room,) Coulomb's coefficient."""
     pair: Indices
-    """(room,) candidate pair of a node and a face, -1 for others."""
+    """(room,) see narrow_phase.ContactRows."""
     reach: Floats
     """(room,) the sum of the paths of its nodes up to which an idle contact stays idle, m/s."""
+
+
+class Kept(NamedTuple):
+    """Impulses of a step times their row norms, zero where there were none: along the normal and across (3), m/s."""
+
+    pairs: Floats
+    """(candidates, 4) of nodes and faces."""
+    cracks: Floats
+    """(3 cracks, 4) of nodes across cracks."""
 
 
 class ActiveNodes(NamedTuple):
@@ -99,4 +108,5 @@ _I2, _N1, _N2 = types.int64[:, ::1], types.int32[::1], types.int32[:, ::1]
 _F1, _F2 = types.float64[::1], types.float64[:, ::1]
 CONTACTS = record(ActiveContacts, _N2, _F2, _F2, _F1, _F1, _N1, _F1)
 NODES = record(ActiveNodes, _F2, _I2, _F2, _I2, _I2, _F1)
+KEPT = record(Kept, _F2, _F2)
 LOADED = record(Loaded, _F2, _F2, _N2, _N1, _N1, types.int64[::1])

@@ -14,11 +14,11 @@ import numpy as np
 
 from ..jit import njit, prefetch, types
 from ..migration.parcel import Table, once
-from ..state import WIDE, Block, Flags, Indices, Ints, Nodes, extended
+from ..state import WIDE, Block, Flags, Floats, Indices, Ints, Nodes, extended
 from ..topology import Split
 from .families import Families
 from .geometry import at, cross, dot, half, minus, plus
-from .narrow_phase import CONTACT_ROWS, DEEP_SELF, LINE, NEAR, STEP, needed
+from .narrow_phase import CONTACT_ROWS, CRACK, DEEP_SELF, LINE, NEAR, STEP, needed
 
 _WIDE = 0.2
 """Of the typical size of a face: two sides that have moved so far apart are surface from then on. At 0.1, 33 of 38
@@ -26,6 +26,8 @@ searches in the first 500 steps of the glass bar are called by cracks that open 
 """
 _FORESEEN = 0.5
 """Of that width: the faces of a crack as wide as this are searched, so that they have their pairs when it opens."""
+_KEPT = 12
+"""Columns of what a crack has kept."""
 _AHEAD = 8
 """How many cracks ahead the nodes are brought near."""
 
@@ -45,6 +47,9 @@ class Cracks:
     places: Indices
     """(m, 6) of the nodes, in the scene; all -1 for a crack without nodes that have separated, and for one that another
     rank computes, that of the first side."""
+    kept: Floats
+    """(m, 12) of each of the three pairs of nodes across: impulse of the last step times its row norm, zero where it
+    was not active, along the normal and across (3), m/s; of one that another rank computes, nothing that counts."""
     families: Families
     """Of all nodes here."""
 
@@ -53,7 +58,7 @@ class Cracks:
         """No facet; ``ids``: of the local nodes."""
         faces, sides = np.zeros((0, 2), np.int64), np.zeros((0, 2, 3), np.int32)
         families, none = Families.of(ids), np.zeros((0, 6), np.int32)
-        return cls(faces, none, sides, np.zeros(0, bool), none, families)
+        return cls(faces, none, sides, np.zeros(0, bool), none, np.zeros((0, _KEPT)), families)
 
     def add(self, tets: Ints, nodes: Indices, sides: Indices, blocks: list[Block]) -> None:
         """Takes up facets of ``tets`` (m, 2) with their three ``nodes`` (m, 3)."""
@@ -66,6 +71,7 @@ class Cracks:
         self.nodes = extended(self.nodes, np.concatenate([nodes, nodes], axis=1))
         self.foreseen = extended(self.foreseen, np.zeros(len(faces), bool))
         self.places = extended(self.places, np.full((len(faces), 6), -1, np.int32))
+        self.kept = extended(self.kept, np.zeros((len(faces), _KEPT)))
 
     def follow(self, split: Split, ids: Ints) -> None:
         """Takes up the copies of a split; ``ids``: of the local nodes."""
@@ -80,12 +86,13 @@ class Cracks:
         rows, k = np.nonzero(self.sides[:, :, 1] >= 0)
         faces = self.faces[rows]
         return {"tet": faces[range(len(rows)), k] // 4, "key": 2 * faces[:, 0] + k, "faces": faces,
-                "with": ids[self.nodes[rows]]}  # fmt: skip
+                "with": ids[self.nodes[rows]], "kept": self.kept[rows]}  # fmt: skip
 
     @classmethod
     def resume(cls, table: Table, root: Ints, blocks: list[Block], nodes: Nodes) -> "Cracks":
         """Facets from a table by ascending key. The row of the first side is taken where it is there: a rank that has
-        had the second one alone may have begun with another node, and the last bit of a normal depends on that.
+        had the second one alone may have begun with another node, and the last bit of a normal depends on that; nor has
+        it computed the crack, and so kept anything of it.
         """
         table = once(table, table["faces"][:, 0])
         faces = np.array(table["faces"])
@@ -95,9 +102,9 @@ class Cracks:
             at = order[np.minimum(np.searchsorted(block.id[order], faces // 4), block.n - 1)]
             rows, k = np.nonzero(block.id[at] == faces // 4)
             sides[rows, k] = np.column_stack([np.full(len(rows), b), at[rows, k], faces[rows, k] % 4])
-        nowhere = np.full((len(faces), 6), -1, np.int32)
+        nowhere, kept = np.full((len(faces), 6), -1, np.int32), np.array(table["kept"])
         families = Families.of(root)
-        return cls(faces, nodes.places(table["with"]), sides, np.zeros(len(faces), bool), nowhere, families)
+        return cls(faces, nodes.places(table["with"]), sides, np.zeros(len(faces), bool), nowhere, kept, families)
 
     def foresee(self) -> Indices:
         """(k, 3) block, place and face of all sides here, which a scene takes up."""
@@ -251,7 +258,7 @@ def across(out, n, opening, cracks, typical, step):  # type: ignore[no-untyped-d
             out.weights[n, 0], out.weights[n, 1], out.weights[n, 2], out.weights[n, 3] = 1.0, -1.0, 0.0, 0.0
             out.normals[n, 0], out.normals[n, 1], out.normals[n, 2] = m
             out.wanted[n] = speed + needed(gap0, gap1, speed, step.give, dt)
-            out.friction[n], out.pair[n] = mu[part[p], part[q]], -1
+            out.friction[n], out.pair[n] = mu[part[p], part[q]], CRACK - (3 * c + k)
             n += 1
         if most >= (_WIDE * typical) ** 2:
             opening[wide] = c

@@ -25,6 +25,8 @@ of that size is several times as high."""
 PUSH_OUT = 0.1
 """Largest share of a penetration that is taken back in a step, and of the speed of closing that is given back for it;
 nothing while contact has no energy to give back (``account.Account``)."""
+CRACK = -2
+"""The first number that stands for a pair of nodes across a crack, others are below."""
 LINE = 8
 """Words of a cache line."""
 _FEWEST = 2
@@ -45,7 +47,8 @@ class ContactRows(NamedTuple):
     friction: Floats
     """(room,) Coulomb's coefficient."""
     pair: Indices
-    """(room,) which candidate pair of a node and a face it was; -1 for edges and cracks."""
+    """(room,) which candidate pair of a node and a face it was; CRACK - (3 c + k) for the pair of nodes k across crack
+    c; -1 for others."""
 
     @classmethod
     def room(cls, n: int) -> "ContactRows":

@@ -9,7 +9,7 @@ from ..parallel.fixed_point import Tally
 from ..state import Floats, Indices, Ints, Nodes
 from . import booking, held, sweeps
 from .account import Account
-from .active import IMPULSE, PUSH, PUSH_T, ActiveContacts, ActiveNodes, Loaded
+from .active import IMPULSE, PUSH, PUSH_T, ActiveContacts, ActiveNodes, Kept, Loaded
 from .company import ActiveSum
 from .narrow_phase import ContactRows
 from .records import Crowd
@@ -59,8 +59,8 @@ class ActiveSet:
 
         self._complete(add, active.row_weights, 0, _ROW_WEIGHTS)
 
-    def resume(self, kept: Floats, ratio: float) -> None:
-        """Begins with ``ratio`` times what pairs have ``kept`` (candidates, 4) of the step before."""
+    def resume(self, kept: Kept, ratio: float) -> None:
+        """Begins with ``ratio`` times what contacts have ``kept`` of the step before."""
         active, contacts = self._room.active, self._contacts
 
         def begin(part: Loaded) -> None:
@@ -106,8 +106,9 @@ class ActiveSet:
             booking.heat(friction.words, part, self._room.active, before, self.places, float(friction.scale[0]))
         friction.carry()
 
-    def store(self, kept: Floats) -> None:
-        """Stores the impulses with their pairs, ``kept`` (candidates, 4), all zero."""
+    def store(self, kept: Kept) -> None:
+        """What contacts have ``kept`` of this step."""
+        kept.pairs[:], kept.cracks[:] = 0.0, 0.0
         for part in self._parts:
             sweeps.store(kept, part, self._contacts.pair)
 

@@ -22,6 +22,7 @@ from ..state import Flags, Floats, Indices, Ints, Model, Nodes
 from ..timers import Timers
 from ..topology import Split
 from . import held, normals, pairing, sharp
+from .active import Kept
 from .books import Books
 from .detection import Ahead, Detected, detect
 from .exterior import Exterior
@@ -254,10 +255,10 @@ class Contact:
         shared = now.messages.company.agree(now.active.room.nodes[: now.active.n], crowd.local)
         active.begin(now.active.room, now.active.n, crowd, shared)
         active.weigh()
-        active.resume(now.node_face.kept, self._resume())
+        kept = Kept(now.node_face.kept, self.exterior.cracks.kept.reshape(-1, 4))
+        active.resume(kept, self._resume())
         active.sweep(self._scheme.sweeps)
-        now.node_face.kept[:] = 0.0
-        active.store(now.node_face.kept)
+        active.store(kept)
         if self.searches.rubs:
             active.heat(books.friction, now.slots.before)
         active.cost(books.account, now.slots.before)

@@ -7,8 +7,8 @@ alone and for any number along one normal, and never an overshoot however many s
 the diagonal where many share a node, and plain sweeps crawl: so every impulse along a normal goes on as it has changed,
 by a share that grows with the sweeps (``momentum``). Impulses never pull; friction is Coulomb's, on the sum over the
 sweeps. Impulses are integers: a contact's add up to zero, and no order of contacts or ranks changes a bit. A pair of a
-node and a face begins with its impulses of the step before: what sticks does not creep, and what is under pressure does
-not sink in, however few the sweeps are.
+node and a face, and nodes across a crack, begin with their impulses of the step before: what sticks does not creep, and
+what is under pressure does not sink in, however few the sweeps are.
 
 A contact that has had no impulse in the step and closes no faster than it may is idle: it changes nothing until sweeps
 have moved its nodes by as much as it has left. The others are loaded: their data lie together, and only they are swept.
@@ -22,6 +22,7 @@ from ..jit import njit, types
 from .active import (
     CONTACTS,
     IMPULSE,
+    KEPT,
     LAST,
     LOADED,
     MOBILITY,
@@ -35,11 +36,14 @@ from .active import (
     WANTED,
     V,
 )  # fmt: skip
+from .narrow_phase import CRACK
 
 SHARES = float(2**30)
 """Quanta per unit of weight."""
-_KEPT = 0.8
-"""Share of the last push along the normal that a pair begins with: all of it would lag behind and make energy."""
+_PAIR, _CRACK = 0.8, 1.0
+"""Share of the last push along the normal that a node and a face begin with, for all of it would lag behind and make
+energy; and nodes across a crack, of which so many press on each other that sweeps cannot make up for any of it
+(docs/numerics.md, "Dust under pressure")."""
 _ACROSS = (1.0, -1.0, 0.0, 0.0)
 """Weights of the nodes on either side of a crack."""
 _ROUNDING = 2.0**-40
@@ -129,16 +133,15 @@ def load(loaded, contacts, active, fastest):  # type: ignore[no-untyped-def]
     count[0], count[1] = n, m
 
 
-@njit(types.void(LOADED, CONTACTS, NODES, _F2), cache=True)
+@njit(types.void(LOADED, CONTACTS, NODES, KEPT), cache=True)
 def load_kept(loaded, contacts, active, kept):  # type: ignore[no-untyped-def]
-    """Takes those of the idle contacts among the loaded whose pairs have ``kept`` (candidates, 4) an impulse of the
-    step before.
-    """
-    pair, idle, count = contacts.pair, loaded.idle, loaded.many
+    """Takes those of the idle contacts among the loaded that have ``kept`` an impulse of the step before."""
+    pair, idle, count, pairs, cracks = contacts.pair, loaded.idle, loaded.many, kept.pairs, kept.cracks
     n, m = 0, 0
     for q in range(count[1]):
         p = idle[q]
-        if pair[p] >= 0 and kept[pair[p], 0] > 0.0:
+        k = pair[p]
+        if (k >= 0 and pairs[k, 0] > 0.0) or (k <= CRACK and cracks[CRACK - k, 0] > 0.0):
             loaded.row[n] = p
             n += 1
         else:
@@ -148,23 +151,26 @@ def load_kept(loaded, contacts, active, kept):  # type: ignore[no-untyped-def]
     count[0], count[1] = n, m
 
 
-@njit(types.void(NODES, LOADED, _F2, _ROWS, _F, _F), cache=True)
+@njit(types.void(NODES, LOADED, KEPT, _ROWS, _F, _F), cache=True)
 def resume(active, loaded, kept, pair, ratio, scale):  # type: ignore[no-untyped-def]
-    """The loaded contacts begin with ``ratio`` times what their pairs have ``kept`` (candidates, 4), m/s, along and
-    across the normal as it is now: over the row norms as they are now, so that a node that has separated, and is
-    lighter, or that shares its load with others begins with less.
+    """The loaded contacts begin with ``ratio`` times what they have ``kept``, along and across the normal as it is now:
+    over the row norms as they are now, so that a node that has separated, and is lighter, or that shares its load with
+    others begins with less.
     """
     words, normal, tangent, slots, row = active.moving_words, loaded.normal, loaded.tangent, loaded.slots, loaded.row
+    pairs, cracks, last = kept.pairs, kept.cracks, np.empty(4)
     for q in range(loaded.many[0]):
-        last, along = pair[row[q]], 0.0
+        p, along = pair[row[q]], 0.0
+        for i in range(4):
+            last[i] = pairs[p, i] if p >= 0 else cracks[CRACK - p, i]
         for i in range(3):
-            along += kept[last, 1 + i] * normal[q, i]
-        normal[q, PUSH] = normal[q, LAST] = _KEPT * ratio * kept[last, 0] / normal[q, ROW_NORM]
+            along += last[1 + i] * normal[q, i]
+        normal[q, PUSH] = normal[q, LAST] = (_PAIR if p >= 0 else _CRACK) * ratio * last[0] / normal[q, ROW_NORM]
         for i in range(3):
-            tangent[q, PUSH_T + i] = ratio * (kept[last, 1 + i] - along * normal[q, i]) / tangent[q, ROW_NORM_T]
+            tangent[q, PUSH_T + i] = ratio * (last[1 + i] - along * normal[q, i]) / tangent[q, ROW_NORM_T]
             change = normal[q, PUSH] * normal[q, i] + tangent[q, PUSH_T + i]
             rest = np.int64(0)
-            for k in range(1, 4):
+            for k in range(1, 4 if p >= 0 else 2):
                 part = np.int64(np.rint(tangent[q, k] * change * scale))
                 words[slots[q, k], IMPULSE + i] += part
                 rest += part
@@ -267,12 +273,21 @@ def sweep_all(active, loaded, contacts, fastest, n, scale, many):  # type: ignor
         give(active, n, scale)
 
 
-@njit(types.void(_F2, LOADED, _ROWS), cache=True)
+@njit(types.void(KEPT, LOADED, _ROWS), cache=True)
 def store(kept, loaded, pair):  # type: ignore[no-untyped-def]
-    """Stores the impulses of loaded contacts times their row norms with their pairs, ``kept`` (candidates, 4), m/s."""
+    """What loaded contacts have ``kept``: their impulses times their row norms."""
+    pairs, cracks, normal, tangent, row = kept.pairs, kept.cracks, loaded.normal, loaded.tangent, loaded.row
     for q in range(loaded.many[0]):
-        k = pair[loaded.row[q]]
-        if k >= 0 and loaded.normal[q, PUSH] > 0.0:
-            kept[k, 0] = loaded.normal[q, PUSH] * loaded.normal[q, ROW_NORM]
-            for i in range(3):
-                kept[k, 1 + i] = loaded.tangent[q, PUSH_T + i] * loaded.tangent[q, ROW_NORM_T]
+        p, push = pair[row[q]], normal[q, PUSH] * normal[q, ROW_NORM]
+        if not push > 0.0 or p == -1:
+            continue
+        if p >= 0:
+            pairs[p, 0] = push
+        else:
+            cracks[CRACK - p, 0] = push
+        for i in range(3):
+            across = tangent[q, PUSH_T + i] * tangent[q, ROW_NORM_T]
+            if p >= 0:
+                pairs[p, 1 + i] = across
+            else:
+                cracks[CRACK - p, 1 + i] = across
