@@ -27,8 +27,8 @@ from .parallel.fixed_point import Grouped, add_limbs, exact_sums, exact_totals, 
 from .state import CHUNK, WORKS, Block, Floats, Ints, Model
 
 _TOLD = 0.01
-"""Share of the largest energy that unequal steps may take or make without a word. Chosen: what the other
-lines of a ledger are usually read to.
+"""Share of the largest energy that unequal steps may take or make without a word, and of the energy of fracture that
+may come back. Chosen: what the other lines of a ledger are usually read to.
 """
 
 
@@ -62,6 +62,11 @@ class Ledger:
         than nothing."""
         self.made = 0.0
         """What contact has given beyond all that it has taken, over ``came``, at the last call."""
+        self.unpaid = 0.0
+        """Most that the energy lost to fracture has fallen by so far, over what all broken facets take: facets gave
+        what nobody had paid."""
+        self._taken = 0.0
+        """The largest energy lost to fracture so far, J."""
         self.came = self.initial
         """The largest energy that has come in so far, J."""
         self.momentum = np.zeros(3)
@@ -71,13 +76,15 @@ class Ledger:
         self.parts: dict[str, PartEnergy] = {}
         """Of each part at the last call; empty where there is one part alone."""
 
-    def keep(self) -> tuple[float, float, float, float, Floats, float]:
+    def keep(self) -> tuple[tuple[float, float, float, float, float, float], Floats, float]:
         """What it remembers, equal on all ranks."""
-        return self.initial, self.came, self.worst, self.lost, self.momentum, self.eroded_mass
+        largest = self.initial, self.came, self.worst, self.lost, self._taken, self.unpaid
+        return largest, self.momentum, self.eroded_mass
 
-    def resume(self, known: tuple[float, float, float, float, Floats, float]) -> None:
+    def resume(self, known: tuple[tuple[float, float, float, float, float, float], Floats, float]) -> None:
         """Takes it back."""
-        self.initial, self.came, self.worst, self.lost, self.momentum, self.eroded_mass = known
+        largest, self.momentum, self.eroded_mass = known
+        self.initial, self.came, self.worst, self.lost, self._taken, self.unpaid = largest
 
     def close(self, before: Floats) -> Energy:
         """The ledger at time n; ``before`` is v(n-1/2), the model holds v(n+1/2)."""
@@ -102,7 +109,9 @@ class Ledger:
         elastic, averaging = float(work - plastic - averaged), float(averaged) + gone_averaged
         lost, cohesive = 0.0, 0.0
         if self._fracture is not None and self._fracture.cohesion is not None:
-            lost, cohesive = self._fracture.cohesion.energies(self._comm)
+            lost, cohesive, whole = self._fracture.cohesion.energies(self._comm)
+            self._taken = max(self._taken, lost)
+            self.unpaid = max(self.unpaid, (self._taken - lost) / whole if whole > 0.0 else 0.0)
         inside = elastic + plastic_sum + viscous_sum + averaging
         total = kinetic_sum + inside + loss_sum + eroded + lost + cohesive + stepping
         friction = self._contact.friction_work() if self._contact is not None else 0.0
@@ -123,12 +132,16 @@ class Ledger:
     @property
     def warnings(self) -> list[str]:
         """What the user should know of the account, by the last call."""
-        if self.stepping <= _TOLD:
-            return []
-        return [
-            f"unequal time steps have taken or made {self.stepping:.2g} of the largest energy; a smaller "
-            "numerics.dt_safety lowers it"
+        remedy = "a smaller numerics.dt_safety lowers it"
+        told = [
+            (self.stepping, f"unequal time steps have taken or made {self.stepping:.2g} of the largest energy"),
+            (
+                self.unpaid,
+                f"facets that closed have given {self.unpaid:.2g} of the energy that all broken facets take, which "
+                "nobody had paid",
+            ),
         ]
+        return [f"{text}; {remedy}" for share, text in told if share > _TOLD]
 
     def require(self, limit: float, when: str) -> None:
         """Raises EnergyError when the last call has found more than ``limit``, run.residual_limit; ``when``: of it."""

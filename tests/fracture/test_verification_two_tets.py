@@ -62,6 +62,30 @@ def test_tearing_two_tets_takes_the_fracture_energy(lean: float) -> None:
     assert sim.ledger.worst < 1e-4
 
 
+@pytest.mark.parametrize("back", [0.0, 0.005, 0.02])
+def test_energy_that_a_facet_gives_unpaid_is_told(back: float) -> None:
+    """Of its energy, taken off its work halfway: the last word says how much, above a hundredth."""
+    sim, taken, area = torn(0.0), False, 0.0
+
+    def look(sim: Simulation, before: Floats) -> None:
+        nonlocal taken, area
+        assert sim.fracture is not None
+        assert sim.fracture.cohesion is not None
+        facets = sim.fracture.cohesion.facets
+        if sim.ledger.close(before).fracture > 0.5 * ENERGY * AREA and not taken:
+            area = float(facets.constants.area[0])
+            facets.state.work[0, 0] -= back * ENERGY * area
+            taken = True
+            sim.ledger.close(before)
+
+    run(sim, look)
+    assert taken
+    assert sim.ledger.unpaid == pytest.approx(back, rel=1e-6, abs=1e-9)
+    told = [text for text in sim.ledger.warnings if "nobody had paid" in text]
+    assert len(told) == (back > 0.01)
+    assert all("given 0.02 of" in text for text in told)
+
+
 def test_the_traction_follows_the_law_in_every_step() -> None:
     """Each pair for itself: a third of the area times strength (1 - opening / critical), or the secant."""
     sim = torn(math.radians(30.0))

@@ -43,7 +43,8 @@ class Cohesion:
     def __init__(self, energy: float) -> None:
         """``energy``: order of magnitude of the work on a facet, J."""
         self.facets = Facets.none()
-        self._gone = Tally(np.array([energy]))
+        self._gone = Tally(np.array([energy, energy]))
+        """Work on the facets that have failed, J, and what they should have taken."""
 
     def insert(self, new: Facets) -> None:
         """Takes up facets that have just broken."""
@@ -66,7 +67,7 @@ class Cohesion:
         if law.open_facets(f, x):
             failed = f.state.top - f.softening.knee >= np.maximum(f.softening.critical, tiny)
             kept: Flags = np.asarray(~failed.all(axis=1))
-            self._gone.add(f.state.work[~kept].sum(axis=1)[:, None])
+            self._gone.add(np.column_stack([f.state.work.sum(axis=1), _whole(f)])[~kept])
             self.facets = f.take(kept)
 
     def let_go(self, change: Ints, nodes: Nodes, steps: Floats, whole: bool) -> None:
@@ -96,15 +97,23 @@ class Cohesion:
         """Adds the forces in quanta of 1 / ``scale`` N to the nodal sums; returns the bits of the largest."""
         return int(law.scatter(force, self.facets.nodes, self.facets.state.pull, scale))
 
-    def energies(self, comm: Comm) -> tuple[float, float]:
-        """Energy, J, that is lost for good, and that the closing of facets would give back; all ranks take part."""
+    def energies(self, comm: Comm) -> tuple[float, float, float]:
+        """Energy, J, that is lost for good, that the closing of facets would give back, and that all facets take which
+        have ever been inserted, when they have failed; all ranks take part.
+        """
         f, s = self.facets.softening, self.facets.state
         beyond = np.maximum(s.top - f.knee, 0.0)
         share = np.divide(beyond, f.critical, out=(beyond > 0.0).astype(float), where=f.critical > 0.0)
         stiffness = f.strength * np.maximum(1.0 - share, 0.0) / s.top
         back = (self.facets.constants.area / 6.0) * (stiffness * (s.size**2 - f.lent**2)).sum(axis=1)
-        work, reversible = exact_sums(comm, np.column_stack([s.work.sum(axis=1), back]))
-        return float(work + self._gone.total(comm)[0] - reversible), float(reversible)
+        work, reversible, whole = exact_sums(comm, np.column_stack([s.work.sum(axis=1), back, _whole(self.facets)]))
+        gone_work, gone_whole = self._gone.total(comm)
+        return float(work + gone_work - reversible), float(reversible), float(whole + gone_whole)
+
+
+def _whole(facets: Facets) -> Floats:
+    """(m,) energy, J, that each of the facets takes in the end."""
+    return facets.constants.energy * facets.constants.area
 
 
 def sizes(offset: Floats, shear: Floats) -> Floats:

@@ -3,7 +3,7 @@
 import logging
 import math
 
-from conoid.cases.schema import Fracture as Spec
+from conoid.cases.schema import Part
 
 from ..materials.elementary import power
 from .strength import Toughness
@@ -25,26 +25,32 @@ def edge(volume: float) -> float:
     return float(power(_REGULAR * volume, 1.0 / 3.0))
 
 
-def warnings(part: str, spec: Spec, tough: Toughness, size: float, safety: float) -> list[str]:
-    """What to know of a part with tets of edge ``size``, m, before it runs; ``safety``: of the time step."""
+def warnings(part: Part, tough: Toughness, size: float, safety: float) -> list[str]:
+    """What to know of a part that breaks, with tets of edge ``size``, m, before it runs; ``safety``: of the time step.
+
+    A facet opens as its stress is released, and as what it holds together is drawn apart at the start.
+    """
+    name, spec = part.name, part.fracture
+    assert spec is not None
     step = safety * _STEP * size / tough.speed
     ratio, told = size / tough.zone, []
     log.info(
         "%s breaks at %.4g MPa with %.4g J/m^2: cohesive zone %.3g mm, elements %.3g mm, %.3g to 1",
-        part, tough.strength * 1e-6, tough.energy, tough.zone * 1e3, size * 1e3, ratio,
+        name, tough.strength * 1e-6, tough.energy, tough.zone * 1e3, size * 1e3, ratio,
     )  # fmt: skip
     if ratio > _RESOLVED * (1.0 + _ROUNDING):
         lower = "fracture.resolve = 'strength' keeps it and lowers the strength"
         more = f"fracture.resolution = {1.0 / _RESOLVED:.0f} keeps it and lowers the strength further"
         told.append(
-            f"{part}: elements of {size * 1e3:.3g} mm in a cohesive zone of {tough.zone * 1e3:.3g} mm, "
+            f"{name}: elements of {size * 1e3:.3g} mm in a cohesive zone of {tough.zone * 1e3:.3g} mm, "
             f"{ratio:.3g} to 1, resolved below {_RESOLVED:.2g}: the mesh decides on the energy of fracture; "
             f"{more if spec.resolve == 'strength' else lower}"
         )
-    opening = tough.strength * step / tough.impedance
+    drawn = max(*part.stretch.rate, 0.0) if part.stretch is not None else 0.0
+    opening = (tough.strength / tough.impedance + drawn * size) * step
     if spec.model == "cohesive" and opening > tough.critical:
         told.append(
-            f"{part}: a facet opens by {opening * 1e6:.3g} um in a step of {step * 1e9:.3g} ns, and by "
+            f"{name}: a facet opens by {opening * 1e6:.3g} um in a step of {step * 1e9:.3g} ns, and by "
             f"{tough.critical * 1e6:.3g} um altogether: no law can be followed; use fracture.model = 'instant', "
             f"fracture.resolve = 'strength', or numerics.dt_safety below {safety * tough.critical / opening:.2g}"
         )

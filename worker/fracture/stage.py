@@ -147,7 +147,7 @@ class Fracture:
             size = resolution.edge(volume)
             tough = toughness(material, part.fracture, size)
             work = max(work, tough.energy * power(volume, 2.0 / 3.0))
-            self.warnings += resolution.warnings(part.name, part.fracture, tough, size, safety)
+            self.warnings += resolution.warnings(part, tough, size, safety)
             here = [(i, block) for i, block in enumerate(model.blocks) if block.part == index]
             bodies += [facets.arm(i, block, part.fracture, tough, model.nodes.x0) for i, block in here]
         return bodies, work
