@@ -29,19 +29,27 @@ _NONE, _FREQUENCY = (0, 0, 0, 0), (0, 0, -1, 0)
 _ONE, _KILO, _MEGA, _GIGA = Fraction(1), Fraction(1000), Fraction(10**6), Fraction(10**9)
 _CENTI, _MILLI, _MICRO, _NANO = Fraction(1, 100), Fraction(1, 1000), Fraction(1, 10**6), Fraction(1, 10**9)
 """SI prefixes, exact."""
+_INCH, _POUND = Fraction("0.0254"), Fraction("0.45359237")
+"""m and kg, exact by the agreement of 1959."""
+_PSI = _POUND * Fraction("9.80665") / _INCH**2
+"""A pound of force, by standard gravity, on a square inch; Pa, exact."""
 UNITS: dict[str, tuple[Fraction, Dimension]] = {
     "1": (_ONE, _NONE),
     "m": (_ONE, _LENGTH), "km": (_KILO, _LENGTH), "cm": (_CENTI, _LENGTH), "mm": (_MILLI, _LENGTH),
-    "um": (_MICRO, _LENGTH), "µm": (_MICRO, _LENGTH), "nm": (_NANO, _LENGTH), "in": (Fraction("0.0254"), _LENGTH),
+    "um": (_MICRO, _LENGTH), "µm": (_MICRO, _LENGTH), "nm": (_NANO, _LENGTH), "in": (_INCH, _LENGTH),
+    "ft": (12 * _INCH, _LENGTH),
     "kg": (_ONE, _MASS), "g": (_MILLI, _MASS), "mg": (_MICRO, _MASS), "t": (_KILO, _MASS),
+    "lb": (_POUND, _MASS),
     "s": (_ONE, _TIME), "ms": (_MILLI, _TIME), "us": (_MICRO, _TIME), "µs": (_MICRO, _TIME), "ns": (_NANO, _TIME),
     "min": (Fraction(60), _TIME), "h": (Fraction(3600), _TIME),
     "K": (_ONE, _TEMPERATURE),
     "Hz": (_ONE, _FREQUENCY), "kHz": (_KILO, _FREQUENCY), "rad": (_ONE, _NONE),
     "deg": (Fraction(math.pi) / 180, _NONE), "rev": (2 * Fraction(math.pi), _NONE),
+    "rpm": (Fraction(math.pi) / 30, _FREQUENCY),
     "N": (_ONE, _FORCE), "kN": (_KILO, _FORCE), "MN": (_MEGA, _FORCE),
     "Pa": (_ONE, _STRESS), "kPa": (_KILO, _STRESS), "MPa": (_MEGA, _STRESS), "GPa": (_GIGA, _STRESS),
-    "bar": (Fraction(10**5), _STRESS), "Mbar": (Fraction(10**11), _STRESS),
+    "bar": (Fraction(10**5), _STRESS), "kbar": (Fraction(10**8), _STRESS), "Mbar": (Fraction(10**11), _STRESS),
+    "psi": (_PSI, _STRESS), "ksi": (_KILO * _PSI, _STRESS),
     "J": (_ONE, _ENERGY), "mJ": (_MILLI, _ENERGY), "kJ": (_KILO, _ENERGY), "MJ": (_MEGA, _ENERGY),
     "W": (_ONE, _POWER), "%": (_CENTI, _NONE),
 }  # fmt: skip
