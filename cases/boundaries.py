@@ -28,7 +28,7 @@ class Symmetry(Model):
 
 
 class Wall(Model):
-    """A rigid, fixed, frictionless half-space: nodes cannot go to the side that ``normal`` points away from."""
+    """A rigid, fixed half-space: nodes cannot go to the side that ``normal`` points away from."""
 
     kind: Literal["wall"]
     """The kind of boundary."""
@@ -40,6 +40,8 @@ class Wall(Model):
     """Points out of the wall, to the side where bodies are; its length does not count."""
     parts: tuple[Name, ...] = ()
     """Parts that it stops; all when empty."""
+    friction: Annotated[Ratio, Field(ge=0)] = 0.0
+    """Coulomb's coefficient."""
 
 
 class Prescribed(Model):

@@ -1,5 +1,6 @@
 """The stages of a case: what a step may do, and which of it a scene needs. What it does not need is not computed."""
 
+from .boundaries import Wall
 from .library import material
 from .schema import Case
 
@@ -13,7 +14,9 @@ def stages(case: Case) -> dict[str, bool]:
     """Which of the stages that a case may do without it has, by name. Raises CaseError, unknown material."""
     made = [material(case, part.material) for part in case.parts]
     contact = case.contact if case.in_contact else None
-    friction = contact is not None and (contact.friction > 0.0 or any(pair.friction > 0.0 for pair in contact.pairs))
+    rubbing = [wall.friction for _, wall in case.boundaries_of(Wall)]
+    if contact is not None:
+        rubbing += [contact.friction, *(pair.friction for pair in contact.pairs)]
     fracture = [part.fracture for part in case.parts if part.fracture is not None]
     return {
         AVERAGED: case.numerics.pressure != "standard",
@@ -22,7 +25,7 @@ def stages(case: Case) -> dict[str, bool]:
         "viscosity": case.numerics.viscosity is not None,
         CONTACT: contact is not None,
         "sharp edges": contact is not None and contact.edges,
-        "friction": friction,
+        "friction": any(friction > 0.0 for friction in rubbing),
         "restitution": contact is not None and contact.restitution > 0.0,
         "fracture": bool(fracture),
         "cohesive facets": any(spec.model == "cohesive" for spec in fracture),

@@ -7,12 +7,13 @@ import numpy as np
 from conoid.cases import schema
 from conoid.cases.drives import REST, clash, motions
 
-from .boundaries import Boundary, RigidWalls, SymmetryPlane, driven, mirrored
+from .boundaries import Boundary, SymmetryPlane, driven, mirrored
 from .drivers import Course, Gravity, PrescribedRotation, PrescribedVelocity, Traction
 from .errors import InputError
 from .migration.parcel import Parcel
 from .parallel.comm import Comm
 from .state import Flags, Floats, Indices, Load, Model, Nodes
+from .walls import RigidWalls
 
 AXES = {"x": 0, "y": 1, "z": 2}
 ON_PLANE = 1e-9
@@ -138,7 +139,8 @@ def _walls(case: schema.Case, held: list[Flags], planes: Flags) -> list[Boundary
     touched = np.any([h for _, h in found], axis=0)
     points, normals = np.array([spec.point for spec, _ in found]), np.array([spec.normal for spec, _ in found])
     which = np.ascontiguousarray(np.array([h[touched] for _, h in found]).T)
-    return [RigidWalls(_indices(touched), points, normals, which, planes[touched])]
+    friction = np.array([spec.friction for spec, _ in found])
+    return [RigidWalls(_indices(touched), points, normals, which, planes[touched], friction)]
 
 
 def _refuse_overlaps(case: schema.Case, model: Model, boundaries: list[Boundary], comm: Comm) -> None:

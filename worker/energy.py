@@ -114,7 +114,7 @@ class Ledger:
             self.unpaid = max(self.unpaid, (self._taken - lost) / whole if whole > 0.0 else 0.0)
         inside = elastic + plastic_sum + viscous_sum + averaging
         total = kinetic_sum + inside + loss_sum + eroded + lost + cohesive + stepping
-        friction = self._contact.friction_work() if self._contact is not None else 0.0
+        friction = self._friction_work()
         self.came = max(self.came, abs(external_sum))
         scale = max(self.came, abs(float(work)), kinetic_sum)
         left = abs(total - self.initial - external_sum)
@@ -164,6 +164,17 @@ class Ledger:
         kinetic, mass, *momentum = self._erosion.nodal()
         self.eroded_mass = float(mass)
         return self._erosion.work(), float(kinetic), np.array(momentum)
+
+    def _friction_work(self) -> float:
+        """Energy, J, that friction has taken, of contact and of boundaries."""
+        rubbed = [bound for bound in self._boundaries if bound.friction_loss is not None]
+        work = self._contact.friction_work() if self._contact is not None else 0.0
+        if rubbed:
+            loss = np.zeros(self._model.nodes.n)
+            for boundary in rubbed:
+                np.add.at(loss, boundary.nodes, boundary.friction_loss)
+            work += self._node_sum(loss)
+        return work
 
     def _boundary_work(self) -> tuple[Floats, Floats]:
         """(nodes,) energy lost by impacts, and work from outside, J."""

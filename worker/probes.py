@@ -6,7 +6,6 @@ import numpy as np
 
 from conoid.cases.schema import Case, Probe, Wall
 
-from .boundaries import RigidWalls
 from .clock import Clock
 from .contact.stage import Contact
 from .errors import InputError
@@ -34,6 +33,7 @@ from .state import (
     Model,
     Tets,
 )
+from .walls import RigidWalls
 
 _NORMAL = {"stress_xx": S_XX, "stress_yy": S_YY, "stress_zz": S_ZZ}
 _SHEAR = {"stress_yz": S_YZ, "stress_zx": S_ZX, "stress_xy": S_XY}

@@ -11,7 +11,7 @@ from conoid.cases.schema import Case, Symmetry
 
 from . import conditions, domain
 from .assembly import Say, quiet
-from .boundaries import Boundary, RigidWalls
+from .boundaries import Boundary
 from .clock import Clock
 from .contact.stage import Contact
 from .elements.averaging import AveragedElements
@@ -35,6 +35,7 @@ from .reduction import StepReduction
 from .state import MASS, Floats, Model
 from .timers import Timers, worked
 from .topology import KeptByNode
+from .walls import RigidWalls
 
 _SMALLEST_STRAIN = 1e-12
 """Forces of a smaller strain than this need no finer quantum. Chosen: its stress in steel is 0.2 Pa."""

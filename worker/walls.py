@@ -1,0 +1,156 @@
+"""Rigid walls: an impulse stops a node there, and friction what it has of speed along the wall."""
+
+import numpy as np
+
+from .boundaries import Boundary, book_half, free, keep_columns
+from .jit import njit
+from .migration.parcel import Parcel
+from .state import Bits, Flags, Floats, Indices, Ints, Nodes, extended
+
+_SWEEPS = 4
+"""Times a node is taken to each wall. Chosen: two walls at right angles take one; what a sharper corner leaves after
+four is taken in the next step."""
+_ACROSS = 1e-12
+"""Of a wall's unit normal, what is left of its square along the planes of symmetry that hold a node: with less the wall
+lies along a plane and cannot push the node. Chosen far above rounding (1e-32) and below any angle that is meant."""
+
+
+class RigidWalls(Boundary):
+    """No node ends the step behind a wall: an impulse along its normal stops the node there, never pulls. Another along
+    the wall takes what the node has of speed there, with as much of that impulse at most as Coulomb's ``friction`` (w,)
+    allows.
+
+    ``points`` and ``normals`` (w, 3), ``held`` (n, w): which walls hold which node. A node between two walls is taken
+    to each in turn, a few times. ``mirrored`` (n, 3): the components that planes of symmetry hold, none if not given; a
+    wall that is not at right angles to a plane pushes the nodes on it along it, and the plane takes the rest.
+    """
+
+    after_contact = True
+
+    def __init__(
+        self, nodes: Indices, points: Floats, normals: Floats, held: Flags, mirrored: Flags | None = None,
+        friction: Floats | None = None,
+    ) -> None:  # fmt: skip
+        super().__init__(nodes)
+        self._friction = np.zeros(len(points)) if friction is None else friction
+        self._rubs = bool(self._friction.any())
+        self._rubbed = np.zeros((len(nodes) if self._rubs else 0, 3))
+        """(n, 3) impulse of friction of the last step, N s; (0, 3) where there is no friction."""
+        if self._rubs:
+            self.friction_loss = np.zeros(len(nodes))
+        self._mirrored = np.zeros((len(nodes), 3), bool) if mirrored is None else mirrored
+        self._points = points
+        self._normals = normals / np.linalg.norm(normals, axis=1)[:, None]
+        self._held = held
+        self._pushed = False
+        self.given = np.zeros((len(nodes), 3 * len(points)))
+        """(n, 3 walls) what each wall has given each node so far, N s."""
+
+    def held_components(self) -> Bits:
+        return free(self.nodes)
+
+    def depths(self, state: Nodes) -> Floats:
+        """(w,) how deep the deepest node starts behind each wall, m."""
+        depths = np.full(len(self._points), -np.inf)
+        for k, (point, normal) in enumerate(zip(self._points, self._normals, strict=True)):
+            behind = ((point - state.x[self.nodes[self._held[:, k]]]) * normal).sum(axis=1)
+            depths[k] = behind.max(initial=-np.inf)
+        return depths
+
+    def _inherit(self, at: Ints) -> None:
+        self._held = extended(self._held, self._held[at])
+        self._mirrored = extended(self._mirrored, self._mirrored[at])
+        for key in self._kept:
+            values = getattr(self, key)
+            setattr(self, key, extended(values, np.zeros((len(at), *values.shape[1:]))))
+
+    @property
+    def _kept(self) -> tuple[str, ...]:
+        """What it remembers of its nodes besides KEPT."""
+        return ("given", "friction_loss", "_rubbed") if self._rubs else ("given",)
+
+    def keep(self, parcel: Parcel, name: str) -> None:
+        super().keep(parcel, name)
+        keep_columns(self, self._kept, parcel, name)
+
+    def resume(self, parcel: Parcel, name: str, dt: float) -> None:
+        super().resume(parcel, name, dt)
+        for key in self._kept:
+            setattr(self, key, parcel.nodes[f"{name}.{key}"][self.nodes])
+        self._pushed = True
+
+    def note(self, state: Nodes) -> None:
+        self._before = state.v[self.nodes]
+        if self._pushed:
+            self._book()
+            self._impulse[:], self._rubbed[:] = 0.0, 0.0
+
+    def apply(self, state: Nodes, dt: float, t: float) -> None:
+        self._pushed = _push_out(
+            state.x, state.v, self._impulse, self._rubbed, self.given, state.mass, self.nodes, self._points,
+            self._normals, self._friction, self._held, self._mirrored, dt,
+        )  # fmt: skip
+        if self._pushed:
+            self.last_push = t
+            self._book()
+
+    def _book(self) -> None:
+        book_half(self.contact_loss, self._impulse, self._before, -0.5)
+        if self.friction_loss is not None:
+            book_half(self.friction_loss, self._rubbed, self._before, -0.5)
+
+
+@njit(
+    "boolean(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], "
+    "int32[::1], float64[:, ::1], float64[:, ::1], float64[::1], boolean[:, ::1], boolean[:, ::1], float64)",
+    cache=True,
+    error_model="numpy",
+)
+def _push_out(  # type: ignore[no-untyped-def]
+    x, v, impulse, rubbed, given, mass, nodes, points, normals, friction, held, mirrored, dt
+):
+    """Impulse form: the gap at the end of the step is never negative; the impulse is along what is left of the normal
+    without the ``mirrored`` components, and that of friction across it. Adds to ``impulse``, to what of it friction has
+    ``rubbed``, where there is some, and to what each wall has ``given``; whether a wall pushed.
+    """
+    pushed = False
+    slide = np.empty(3)
+    for j in range(len(nodes)):
+        a = nodes[j]
+        for _ in range(_SWEEPS):
+            moved = False
+            for k in range(len(points)):
+                gap, speed, along = 0.0, 0.0, 1.0
+                for i in range(3):
+                    gap += (x[a, i] - points[k, i]) * normals[k, i]
+                    speed += v[a, i] * normals[k, i]
+                    if mirrored[j, i]:
+                        along -= normals[k, i] * normals[k, i]
+                if held[j, k] and gap + dt * speed < 0.0 and along > _ACROSS:
+                    push = -(gap / dt + speed) / along
+                    for i in range(3):
+                        if mirrored[j, i]:
+                            continue
+                        change = push * normals[k, i]
+                        v[a, i] += change
+                        impulse[j, i] += mass[a] * change
+                        given[j, 3 * k + i] += mass[a] * change
+                    moved = pushed = True
+                    if friction[k] == 0.0:
+                        continue
+                    speed, size = 0.0, 0.0
+                    for i in range(3):
+                        speed += v[a, i] * normals[k, i]
+                    for i in range(3):
+                        slide[i] = 0.0 if mirrored[j, i] else v[a, i] - speed / along * normals[k, i]
+                        size += slide[i] * slide[i]
+                    most = friction[k] * push
+                    share = most / np.sqrt(size) if size > most * most else 1.0
+                    for i in range(3):
+                        v[a, i] -= share * slide[i]
+                        impulse[j, i] -= mass[a] * share * slide[i]
+                        rubbed[j, i] -= mass[a] * share * slide[i]
+                        given[j, 3 * k + i] -= mass[a] * share * slide[i]
+            if not moved or len(points) == 1:
+                break
+    return pushed
