@@ -167,13 +167,12 @@ class Ledger:
 
     def _friction_work(self) -> float:
         """Energy, J, that friction has taken, of contact and of boundaries."""
-        rubbed = [bound for bound in self._boundaries if bound.friction_loss is not None]
         work = self._contact.friction_work() if self._contact is not None else 0.0
-        if rubbed:
-            loss = np.zeros(self._model.nodes.n)
-            for boundary in rubbed:
-                np.add.at(loss, boundary.nodes, boundary.friction_loss)
-            work += self._node_sum(loss)
+        for boundary in self._boundaries:
+            if boundary.friction_loss is not None:
+                loss = np.zeros(self._model.nodes.n)
+                loss[boundary.nodes] = boundary.friction_loss
+                work += self._node_sum(loss)
         return work
 
     def _boundary_work(self) -> tuple[Floats, Floats]:
