@@ -21,42 +21,46 @@ class Check(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Outcome(msgspec.Struct, kw_only=True, frozen=True):
-    """How a run ended; times in s, energies in J."""
+    """How a run ended; times in s, energies in J.
+
+    A count that is not known is None, another number NaN: null in the file. A run that was lost, or that never started,
+    knows no more than its journal has told (server/ends.py).
+    """
 
     state: str
     cause: str | None = None
     message: str = ""
-    steps: int = 0
-    time: float = 0.0
+    steps: int | None = None
+    time: float = math.nan
     ranks: int = 1
-    elapsed: float = 0.0
-    setup: float = 0.0
+    elapsed: float = math.nan
+    setup: float = math.nan
     """s from the worker's start to its first step."""
-    cpu: float = 0.0
+    cpu: float = math.nan
     """CPU s of all ranks together, in the step loop."""
     digest: str = ""
     """sha256 over node and tet state in global-id order: equal for any number of ranks."""
-    elements: int = 0
-    eroded: int = 0
+    elements: int | None = None
+    eroded: int | None = None
     """Tets that have left."""
-    eroded_mass: float = 0.0
+    eroded_mass: float = math.nan
     """kg; of nodes that have left with the last of their tets."""
-    nodes_initial: int = 0
-    nodes: int = 0
-    fragments: int = 0
-    broken: int = 0
+    nodes_initial: int | None = None
+    nodes: int | None = None
+    fragments: int | None = None
+    broken: int | None = None
     """Facets that have broken."""
-    inside: int = 0
+    inside: int | None = None
     """Nodes that end inside of another body or fragment, deeper than 0.05 of the typical size of a face."""
-    deepest: float = 0.0
+    deepest: float = math.nan
     """How deep the deepest of them is that has not gone through the outermost tets, in typical sizes of a face."""
-    rebalances: int = 0
-    balancing_cost: float = 0.0
+    rebalances: int | None = None
+    balancing_cost: float = math.nan
     """s; of all cuts."""
-    balancing_saved: float = 0.0
+    balancing_saved: float = math.nan
     """s: what steps would have taken with the imbalance from before each cut, less what they took."""
     energy: Energy | None = None
-    worst_residual: float = 0.0
+    worst_residual: float = math.nan
     """The largest energy residual of any ledger line of the run."""
     phases: dict[str, list[float]] = {}
     """CPU seconds per phase, one number a rank."""
@@ -64,10 +68,18 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     """Stages that the case does not have (cases/stages.py): none of its phases has computed them."""
     peak_memory: list[int] = []
     """Largest resident memory, bytes, one number a rank."""
-    element_updates_per_second: float = 0.0
+    element_updates_per_second: float = math.nan
     """Per CPU-second and core."""
     reference: list[Check] = []
     warnings: list[str] = []
+
+
+def last_message(outcome: Outcome) -> dict[str, Any]:
+    """The fields of the message that tells of the outcome (messages.Finished): 0 for what is not known."""
+    t, elapsed = (0.0 if math.isnan(seconds) else seconds for seconds in (outcome.time, outcome.elapsed))
+    steps = outcome.steps or 0
+    told = {"state": outcome.state, "digest": outcome.digest, "steps": steps, "elapsed": elapsed}
+    return {"step": steps, "t": t, **told}
 
 
 def to_json(outcome: Outcome) -> bytes:

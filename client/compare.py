@@ -9,6 +9,7 @@ import msgspec
 
 from conoid.cases import fragments, history
 from conoid.cases.fragments import Summary
+from conoid.cases.outcome import Outcome
 
 from .columns import Columns
 from .errors import UnfinishedError
@@ -33,7 +34,9 @@ class Key(msgspec.Struct, frozen=True):
 
 
 class Value(msgspec.Struct, frozen=True):
-    """A number of both runs; ``difference`` is b - a, ``relative`` that over the larger magnitude."""
+    """A number of both runs, NaN where it is not known; ``difference`` is b - a, ``relative`` that over the larger
+    magnitude.
+    """
 
     name: str
     unit: str
@@ -94,10 +97,14 @@ def _flat(data: Any, path: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def _outcomes(a: Result, b: Result) -> list[Value]:
-    return [
-        Value(name, _UNITS.get(name, ""), float(getattr(a.outcome, name)), float(getattr(b.outcome, name)))
-        for name in _OUTCOME
-    ]
+    """NaN where one run does not know it; what neither knows is left out."""
+    pairs = ((name, _known(a.outcome, name), _known(b.outcome, name)) for name in _OUTCOME)
+    return [Value(n, _UNITS.get(n, ""), *both) for n, *both in pairs if not all(map(math.isnan, both))]
+
+
+def _known(ended: Outcome, name: str) -> float:
+    value = getattr(ended, name)
+    return math.nan if value is None else float(value)
 
 
 def _energies(a: Result, b: Result) -> list[Value]:

@@ -90,7 +90,7 @@ def _ended(point: Point, case: Case, run: Run) -> Done:
     if outcome is None or info.state is not State.SUCCEEDED:
         return Done(point, run.id, problem=f"{info.state.value}: {info.message or info.cause}")
     numbers = of_run(case, outcome, run.result().history)
-    return Done(point, run.id, outcome.elements, outcome.steps, outcome.cpu, tuple(numbers))
+    return Done(point, run.id, outcome.elements or 0, outcome.steps or 0, outcome.cpu, tuple(numbers))
 
 
 def series(done: Sequence[Done]) -> list[Series]:

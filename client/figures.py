@@ -11,9 +11,11 @@ _SHOWN = 5e-3, 1e4
 
 def si(value: float, unit: str, digits: int = 3) -> str:
     """``value`` with an SI prefix before ``unit`` and ``digits`` significant digits; without a prefix where none is
-    small or large enough (_SHOWN).
+    small or large enough (_SHOWN). A dash when it is not known.
     """
-    if not math.isfinite(value):
+    if math.isnan(value):
+        return "–"
+    if math.isinf(value):
         return f"{value} {unit}".strip()
     if value == 0:
         return f"0 {unit}".strip()
@@ -25,8 +27,10 @@ def si(value: float, unit: str, digits: int = 3) -> str:
     return f"{scaled:.{max(0, digits - before)}f} {prefix}{unit}".strip()
 
 
-def count(value: float) -> str:
-    """A whole number with spaces between thousands: ``12 400``."""
+def count(value: float | None) -> str:
+    """A whole number with spaces between thousands: ``12 400``; a dash when it is not known."""
+    if value is None:
+        return "–"
     return f"{round(value):,}".replace(",", " ")
 
 
@@ -56,5 +60,15 @@ def day(wall: float) -> str:
 
 
 def number(value: float) -> str:
-    """Six significant digits, for tables."""
-    return f"{value:.6g}"
+    """Six significant digits, for tables; a dash when it is not known."""
+    return known(value, ".6g")
+
+
+def rough(value: float) -> str:
+    """Two significant digits and the power of ten, for residuals; a dash when it is not known."""
+    return known(value, ".1e")
+
+
+def known(value: float, form: str) -> str:
+    """The number in this form; a dash when it is not known."""
+    return "–" if math.isnan(value) else format(value, form)

@@ -1,6 +1,7 @@
 """The command ``conoid hard``: the suite of hard cases, several at once, with what came of each."""
 
 import json
+import math
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -18,7 +19,7 @@ from conoid.cases.suite import Hard, drift, faults, is_free, suite
 
 from .columns import Columns
 from .errors import ClientError
-from .figures import count
+from .figures import count, known, rough
 from .local import LocalServer
 from .options import complain
 from .run import Run
@@ -109,16 +110,15 @@ def to_markdown(ended: Sequence[Verdict]) -> str:
     rows = [
         [
             verdict.hard.name, " ".join(verdict.hard.rows), verdict.outcome.state,
-            f"{verdict.outcome.worst_residual:.1e}", "-" if verdict.drifted is None else f"{verdict.drifted:.1e}",
-            count(verdict.outcome.steps), count(verdict.outcome.elements), f"{verdict.outcome.cpu:.1f}",
+            rough(verdict.outcome.worst_residual), "-" if verdict.drifted is None else f"{verdict.drifted:.1e}",
+            count(verdict.outcome.steps), count(verdict.outcome.elements), known(verdict.outcome.cpu, ".1f"),
             _references(verdict.outcome),
         ]
         for verdict in ended
     ]  # fmt: skip
     bad = [f"- **{verdict.hard.name}**: {'; '.join(verdict.faults)}" for verdict in ended if verdict.faults]
-    said = (
-        f"{len(ended) - len(bad)} of {len(ended)} ended well, in {sum(v.outcome.cpu for v in ended):.0f} s of CPU time."
-    )
+    spent = sum(v.outcome.cpu for v in ended if not math.isnan(v.outcome.cpu))
+    said = f"{len(ended) - len(bad)} of {len(ended)} ended well, in {spent:.0f} s of CPU time."
     return "\n\n".join(filter(None, [table(head, rows), said, "\n".join(bad)])) + "\n"
 
 

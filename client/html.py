@@ -7,7 +7,7 @@ from importlib import metadata
 
 from conoid.cases.outcome import Outcome
 
-from .figures import count, duration, number, si
+from .figures import count, duration, number, rough, si
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int] = ()) -> str:
@@ -40,7 +40,8 @@ def head(name: str, title: str, ended: Outcome | None) -> str:
             ["tets", f"{count(ended.elements)}, of which {count(ended.eroded)} eroded"],
             ["nodes", f"{count(ended.nodes_initial)} at first, {count(ended.nodes)} at the end"],
             ["fragments", f"{count(ended.fragments)}; {count(ended.broken)} facets broken"],
-            ["energy", f"worst residual {ended.worst_residual:.1e}"], ["digest", ended.digest], ["written by", release],
+            ["energy", f"worst residual {rough(ended.worst_residual)}"], ["digest", ended.digest],
+            ["written by", release],
         ]  # fmt: skip
     return f"<header><h1>{escape(title)}</h1><p>{state}</p>{table(['', ''], rows)}</header>"
 

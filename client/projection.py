@@ -123,10 +123,10 @@ def project(journal: Iterable[AnyMessage], outcome: Outcome, network: Network) -
             shared_steps += shared * message.steps
     works = [_work(load) for load in loads]
     busy = [_busy(work) for work in works]
-    ranks, steps = outcome.ranks, max(outcome.steps, 1)
+    ranks, steps = outcome.ranks, outcome.steps or 1
     sent = sum(sum(load.bytes) for load in loads)
     return Projection(
-        ranks=ranks, steps=outcome.steps, windows=len(loads), wall=outcome.elapsed - outcome.setup,
+        ranks=ranks, steps=outcome.steps or 0, windows=len(loads), wall=outcome.elapsed - outcome.setup,
         work=sum(map(sum, busy)), longest=sum(map(max, busy)),
         longest_coarse=sum(max(map(sum, zip(*busy[i : i + 2], strict=True))) for i in range(0, len(busy), 2)),
         messages=sum(_messages(load, network) for load in loads),
@@ -134,7 +134,8 @@ def project(journal: Iterable[AnyMessage], outcome: Outcome, network: Network) -
         phases={name: _phase([work[name] for work in works]) for name in (works[0] if works else ())},
         messages_sent=sum(sum(load.messages) for load in loads) / ranks / steps, bytes_sent=sent / ranks / steps,
         collectives_made=sum(max(load.collectives) for load in loads) / steps,
-        bytes_shared=sent / shared_steps if shared_steps else 0.0, rebalances=outcome.rebalances, digest=outcome.digest,
+        bytes_shared=sent / shared_steps if shared_steps else 0.0, rebalances=outcome.rebalances or 0,
+        digest=outcome.digest,
     )  # fmt: skip
 
 

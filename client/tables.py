@@ -18,7 +18,7 @@ from conoid.cases.stages import without
 
 from .compare import Comparison
 from .display import STATE_STYLE
-from .figures import count, day, duration, number, si
+from .figures import count, day, duration, known, number, rough, si
 from .replay import Account
 from .run import RunInfo
 
@@ -164,14 +164,15 @@ def outcome_table(outcome: Outcome) -> Table:
     """How a run ended."""
     energy, ranks = outcome.energy, f"{outcome.ranks} rank{'' if outcome.ranks == 1 else 's'}"
     entries: dict[str, str | Text] = {"state": state_text(State(outcome.state), outcome.cause), "why": outcome.message}
+    speed, setup, worst = outcome.element_updates_per_second, outcome.setup, rough(outcome.worst_residual)
     if outcome.steps:
         entries |= {
             "simulated": f"{si(outcome.time, 's')} in {count(outcome.steps)} steps",
-            "took": f"{duration(outcome.elapsed)} on {ranks}, {duration(outcome.setup)} to the first step",
+            "took": f"{duration(outcome.elapsed)} on {ranks}, {duration(setup)} to the first step",
             "model": f"{count(outcome.elements)} tets, {count(outcome.nodes)} nodes",
-            "speed": f"{si(outcome.element_updates_per_second, '')} element updates a CPU-second and core",
+            "speed": "" if math.isnan(speed) else f"{si(speed, '')} element updates a CPU-second and core",
             "memory": f"{si(max(outcome.peak_memory), 'B')} in the largest rank" if outcome.peak_memory else "",
-            "energy": "" if energy is None else f"residual {energy.residual:.1e}, worst {outcome.worst_residual:.1e}",
+            "energy": "" if energy is None else f"residual {rough(energy.residual)}, worst {worst}",
             "digest": outcome.digest[:16],
         }
     return pairs({**entries, "warnings": "\n".join(outcome.warnings)})
@@ -214,7 +215,7 @@ def comparison_tables(found: Comparison) -> list[Table | str]:
         if values:
             made = table(title, "unit", a, b, "difference", "%", right=(a, b, "difference", "%"), wide=title)
             for one in values:
-                share = f"{100 * one.relative:+.2f}" if one.difference else ""
+                share = known(100 * one.relative, "+.2f") if one.difference else ""
                 change = number(one.difference) if one.difference else "same"
                 made.add_row(one.name, one.unit, number(one.a), number(one.b), change, share)
             parts += ["", made]

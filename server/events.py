@@ -115,6 +115,8 @@ class WorkerExited:
     """What it left for people in place of an outcome."""
     reading: tuple[State, Cause, str] | None = None
     """What a batch system says of an end without an outcome."""
+    at: float = 0.0
+    """When that was by its files, Unix s; 0 where nobody knows better than that it is now."""
 
 
 @dataclass(frozen=True)
@@ -127,6 +129,8 @@ class Found:
     code: int | None = None
     """What its launcher says of its end, where it could."""
     disk_failed: bool = False
+    at: float = 0.0
+    """When it was last heard of by its files, Unix s; 0 where they do not tell."""
 
 
 Event = (

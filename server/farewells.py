@@ -1,5 +1,6 @@
 """purged.jsonl: a line for every run whose folder has been removed, so that what came of it is not forgotten."""
 
+import math
 import os
 import threading
 import time
@@ -34,9 +35,9 @@ class Farewell(msgspec.Struct, kw_only=True, frozen=True):
     removed: float
     why: str
     """Who or what has removed it."""
-    steps: int = 0
-    time: float = 0.0
-    """Reached by the computation, s."""
+    steps: int | None = None
+    """This and the time that the computation reached, s, are None where nobody knows them."""
+    time: float | None = None
     digest: str = ""
     bytes: int = 0
 
@@ -57,13 +58,17 @@ def of(run: Run, path: Path, why: str) -> Farewell:
     """The line of a run that has ended, while its folder is there."""
     ended = folder.outcome(path)
     results: dict[str, Any] = (
-        {} if ended is None else {"steps": ended.steps, "time": ended.time, "digest": ended.digest}
+        {} if ended is None else {"steps": ended.steps, "time": _known(ended.time), "digest": ended.digest}
     )
     return Farewell(
         id=run.id, owner=run.owner, name=run.name, ranks=run.ranks, submitted=run.submitted, started=run.started,
         finished=run.finished, state=run.state.value, cause=run.cause.value if run.cause else None,
         message=run.message, removed=time.time(), why=why, bytes=folder.size(path), **results,
     )  # fmt: skip
+
+
+def _known(seconds: float) -> float | None:
+    return None if math.isnan(seconds) else seconds
 
 
 class Farewells:

@@ -131,6 +131,20 @@ def _status_in(raw: bytes) -> Status | None:
     return status
 
 
+def last(path: Path) -> bytes:
+    """The last line that is one, without the line feed; b"" where there is none. Raises OSError."""
+    window = _CHUNK
+    with open(path, "rb", buffering=0) as file:
+        size = os.fstat(file.fileno()).st_size
+        while True:
+            start = max(0, size - window)
+            raws = os.pread(file.fileno(), size - start, start).splitlines()
+            found = next((line.raw for raw in reversed(raws[1 if start else 0 :]) if (line := _line(raw))), b"")
+            if found or not start:
+                return found
+            window *= 4
+
+
 def append(path: Path, status: Status) -> Status:
     """Appends ``status`` under the next number and returns it as written; on disk when this returns. Raises OSError.
 

@@ -123,7 +123,12 @@ def _exited(run: Run, event: WorkerExited, now: float) -> Next:
     asked = Cause.CANCELLED in {run.stopping_for, said}
     if outcome.state == State.CANCELLED and not asked:
         outcome = _renamed(run, event, outcome)
-    return _end(run, now, outcome, written=outcome is event.outcome)
+    return _end(run, _at(run, event, now), outcome, written=outcome is event.outcome)
+
+
+def _at(run: Run, event: WorkerExited | Found, now: float) -> float:
+    """When it ended: as its files tell it where nobody was there to see it."""
+    return max(event.at, run.started) if event.at else now
 
 
 def _renamed(run: Run, event: WorkerExited, outcome: Outcome) -> Outcome:
@@ -186,16 +191,16 @@ def _found(run: Run, event: Found, now: float) -> Next:
     if run.state is State.QUEUED:
         return run, ()
     if event.outcome is not None and _readable(event.outcome):
-        return _exited(run, WorkerExited(None, event.outcome), now)
+        return _exited(run, WorkerExited(None, event.outcome, at=event.at), now)
     if event.worker == "none" and run.state is State.STARTING:
         return _enter(replace(run, started=0.0), State.QUEUED, "the server was restarted before the launch")
     if run.stopping_for is not None:
-        return _exited(run, WorkerExited(None, None), now)
+        return _exited(run, WorkerExited(None, None, at=event.at), now)
     if event.code is not None or event.disk_failed:
-        return _exited(run, WorkerExited(event.code, None, disk_failed=event.disk_failed), now)
+        return _exited(run, WorkerExited(event.code, None, disk_failed=event.disk_failed, at=event.at), now)
     if event.rebooted:
         lost = Outcome(state=State.LOST, cause=Cause.NODE, message="the machine was restarted", ranks=run.ranks)
     else:
         message = "the worker ended without an outcome while no server was there to see it"
         lost = Outcome(state=State.LOST, cause=Cause.SERVICE, message=message, ranks=run.ranks)
-    return _end(run, now, lost)
+    return _end(run, _at(run, event, now), lost)

@@ -1,5 +1,6 @@
 """What OpenAPI says of the routes: the case in a body, which FastAPI sees as bytes, and each answer with its shape."""
 
+import math
 from functools import cache
 from typing import Any
 
@@ -104,6 +105,7 @@ def install(app: FastAPI) -> None:
         made = own()
         case = reference.json_schema("#/components/schemas/{model}")
         _, shapes_ = msgspec.json.schema_components(shapes.ALL, ref_template="#/components/schemas/{name}")
+        _tell_of_null(shapes_["Outcome"]["properties"])
         made["components"] = {
             "schemas": {**case.pop("$defs"), "Case": case, **shapes_},
             "securitySchemes": {"token": {"type": "http", "scheme": "bearer"}},
@@ -114,6 +116,14 @@ def install(app: FastAPI) -> None:
         return made
 
     app.openapi = openapi  # type: ignore[method-assign]
+
+
+def _tell_of_null(properties: dict[str, dict[str, Any]]) -> None:
+    """JSON has no NaN: a number that is not known is null."""
+    for schema in properties.values():
+        default = schema.get("default")
+        if isinstance(default, float) and math.isnan(default):
+            schema |= {"type": ["number", "null"], "default": None}
 
 
 def _complete(operation: dict[str, Any], method: str, path: str) -> None:

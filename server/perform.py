@@ -11,7 +11,7 @@ from conoid.cases import layout
 from conoid.cases.messages import Status
 from conoid.cases.run import Cause, State
 
-from . import durable, folder, journal
+from . import durable, ends, folder, journal
 from .events import Action, Adopt, Journal, Kill, Launch, LaunchFailed, LaunchPutOff, Run, Stop, WriteOutcome
 from .holds import passing
 from .launch import DamagedError, Job, Launcher, LaunchError, Worker
@@ -39,9 +39,11 @@ class Performer:
         path = self._settings.runs / run.id
         match action:
             case Journal(state, cause, message):
-                self._tell(run, Status(run=run.id, wall=now, state=state, cause=cause, message=message))
+                wall = run.finished if state.final else now
+                self._tell(run, Status(run=run.id, wall=wall, state=state, cause=cause, message=message))
             case WriteOutcome(outcome):
-                folder.write_outcome(path, outcome)
+                ended = outcome if outcome.steps is not None else ends.so_far(outcome, run, path)
+                folder.write_outcome(path, ended)
             case Launch():
                 self.watches[run.id] = self._launch(run, path)
             case Adopt():

@@ -11,7 +11,7 @@ from conoid.cases.messages import Status
 from conoid.cases.outcome import Outcome
 from conoid.cases.run import State
 
-from . import farewell, folder, journal
+from . import ends, farewell, folder, journal
 from .events import Found, Run
 from .folder import Submission
 from .launch import Launcher, Trace, Worker
@@ -42,7 +42,7 @@ def look(path: Path, known: Run | None, launcher: Launcher) -> Left:
     trace = launcher.find(accepted.id, path)
     run = _mended(folder.replay(accepted, told), bool(told), known, path, trace, launcher.queues)
     code, full = farewell.exit_code(path), farewell.disk_failed(path)
-    found = Found(_fate(path, trace), _outcome(path), trace.rebooted, code, full)
+    found = Found(_fate(path, trace), _outcome(path), trace.rebooted, code, full, ends.when(path))
     return Left(
         _stopping(run, known, path, launcher.queues), made.idempotency_key if made else None, found, trace.worker
     )

@@ -11,7 +11,7 @@ from conoid.cases import layout
 from conoid.cases.messages import Progress, Status
 from conoid.cases.run import State
 
-from . import farewell, folder, journal
+from . import ends, farewell, folder, journal
 from .events import Event, GraceOver, OutputOver, WallTimeOver, WorkerExited, WorkerRuns, WorkerStarts, WorkerWaits
 from .launch import Phase, Worker
 
@@ -53,7 +53,7 @@ class Watch:
         if self._phase == self.worker.phase() == "waits" and now < self._next:
             return
         self._next = now + _PATIENCE
-        exit_ = self.worker.exited()
+        exit_, unseen = self.worker.exited(), self._phase == "unknown"
         yield from self._turn()
         if self._read(now):
             yield WorkerRuns()
@@ -62,7 +62,8 @@ class Watch:
             code = farewell.exit_code(self._folder) if exit_.code is None else exit_.code
             self._full = told is None and (self._full or farewell.disk_failed(self._folder))
             traces = self._traces(exit_.last_words)
-            yield WorkerExited(code, told, exit_.out_of_memory, self._full, traces, exit_.reading)
+            at = ends.when(self._folder) if unseen or told is not None else 0.0
+            yield WorkerExited(code, told, exit_.out_of_memory, self._full, traces, exit_.reading, at)
         elif now >= self._kill_at:
             self._kill_at = now + 1.0
             self.worker.kill()

@@ -221,10 +221,7 @@ def end(folder: Path, job: Job, ended: Outcome) -> None:
     whole.write(folder / layout.OUTCOME, outcome.to_json(last))
     (folder / layout.INTERRUPTED).unlink(missing_ok=True)
     journal = Journal(folder, job.run)
-    journal.write(
-        messages.Finished, last.steps, last.time, state=last.state, digest=last.digest, steps=last.steps,
-        elapsed=last.elapsed,
-    )  # fmt: skip
+    journal.write(messages.Finished, **outcome.last_message(last))
     journal.close()
     if lock is not None:
         lock.close()

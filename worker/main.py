@@ -219,10 +219,7 @@ def _close(outcome: Outcome, options: argparse.Namespace, journal: Journal, tele
         whole.write(options.out / layout.INTERRUPTED, outcomes.to_json(outcome))
     else:
         whole.write(options.out / layout.OUTCOME, outcomes.to_json(outcome))
-        journal.write(
-            messages.Finished, outcome.steps, outcome.time, state=outcome.state, digest=outcome.digest,
-            steps=outcome.steps, elapsed=outcome.elapsed,
-        )  # fmt: skip
+        journal.write(messages.Finished, **outcomes.last_message(outcome))
     journal.close()
     if telemetry is not None:
         telemetry.close()

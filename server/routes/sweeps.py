@@ -2,6 +2,7 @@
 
 import csv
 import io
+import math
 from collections import Counter
 from collections.abc import Sequence
 from typing import Annotated, Any
@@ -119,7 +120,12 @@ def _results(ended: Outcome | None) -> dict[str, Any]:
     terms = {_with_unit(f"energy.{name}", "" if name == "residual" else "J"): joule for name, joule in energy.items()}
     checks = {_with_unit(f"reference.{check.name}", check.unit): check.value for check in ended.reference}
     numbers = {"steps": ended.steps, **times, **{name: getattr(ended, name) for name in names}}
-    return {**numbers, **terms, **checks, "digest": ended.digest}
+    found = {**numbers, **terms, **checks}
+    return {**{name: "" if _unknown(value) else value for name, value in found.items()}, "digest": ended.digest}
+
+
+def _unknown(value: float | None) -> bool:
+    return value is None or math.isnan(value)
 
 
 def _with_unit(name: str, unit: str) -> str:

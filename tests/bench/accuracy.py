@@ -90,8 +90,8 @@ def _run(plan: Plan) -> Answer:
         subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=7200)
         outcome = from_json((Path(out) / layout.OUTCOME).read_bytes())
     return Answer(
-        plan, outcome.elements, outcome.steps, outcome.elapsed - outcome.setup, outcome.cpu, outcome.worst_residual,
-        tuple(outcome.reference), outcome.message,
+        plan, outcome.elements or 0, outcome.steps or 0, outcome.elapsed - outcome.setup, outcome.cpu,
+        outcome.worst_residual, tuple(outcome.reference), outcome.message,
     )  # fmt: skip
 
 

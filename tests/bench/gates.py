@@ -145,6 +145,6 @@ def of_contact(costs: Sequence[Cost]) -> Iterator[Gate]:
     for cost in costs:
         what = f"{cost.scene.name}, {cost.outcome.elements:,} tets"
         yield Gate(f"{what}: contact over elements", "<= 1", f"{cost.contact:.2f}", cost.contact <= 1.0)
-        if "elastic" in cost.scene.name and cost.outcome.elements < 1e5:
+        if "elastic" in cost.scene.name and (cost.outcome.elements or 0) < 1e5:
             speed = cost.outcome.element_updates_per_second * 1e-6
             yield Gate(f"{what}: everything", ">= 5 M updates / CPU-s", f"{speed:.1f} M", speed >= 5.0)

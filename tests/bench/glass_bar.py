@@ -162,8 +162,9 @@ def _row(bar: Bar) -> list[Cell]:
     past = next((m for m in bar.course if m.front >= 50e-3), None)
     pieces = last.pieces
     return [
-        bar.size, out.elements, out.nodes_initial, out.nodes, out.nodes / out.nodes_initial, 1e3 * arrested(bar.course),
-        1e-3 * past.front / past.time if past else None, last.outward, pieces.fragments, pieces.dust_share,
+        bar.size, out.elements, out.nodes_initial, out.nodes, (out.nodes or 0) / (out.nodes_initial or 1),
+        1e3 * arrested(bar.course), 1e-3 * past.front / past.time if past else None, last.outward, pieces.fragments,
+        pieces.dust_share,
         out.worst_residual, out.elapsed, out.cpu,
         1e-6 * out.element_updates_per_second,
     ]  # fmt: skip
@@ -189,7 +190,7 @@ def course(bar: Bar) -> str:
         steps, cpu = (sum(column) for column in zip(*spent, strict=True))
         rows.append([
             1e6 * m.time, 1e3 * m.front, speed, m.swelling, m.outward, m.nodes, m.pieces.fragments, m.pieces.dust,
-            m.pieces.largest_share, 1e-6 * bar.outcome.elements * steps / cpu,
+            m.pieces.largest_share, 1e-6 * (bar.outcome.elements or 0) * steps / cpu,
         ])  # fmt: skip
     return table(head, rows)
 

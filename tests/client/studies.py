@@ -41,7 +41,7 @@ def one_rank() -> Projection:
         phases={"elements": [5.0], "exchange": [0.0], "contact": [2.0]}, waiting=[0.0], steps=4, messages=[0],
         bytes=[0], collectives=[0], collective_bytes=[0],
     )  # fmt: skip
-    return project([counts(0), alone], Outcome(state="succeeded", steps=4, elapsed=9.0, digest="abc"), SLOW)
+    return project([counts(0), alone], Outcome(state="succeeded", steps=4, elapsed=9.0, setup=0.0, digest="abc"), SLOW)
 
 
 def study(*runs: Projection, case: str = "long_rod") -> Study:

@@ -63,6 +63,15 @@ def test_ends_and_fragments_are_compared(runs: tuple[Result, Result]) -> None:
     assert values["largest fragment, of the mass"].b == pytest.approx(2.0 / 6.0)
 
 
+def test_a_run_that_never_ended_by_itself_is_compared_too(runs: tuple[Result, Result], tmp_path: Path) -> None:
+    (tmp_path / "b" / "outcome.json").write_text('{"state": "lost", "steps": null, "time": null, "elements": 5}')
+    told = CliRunner().invoke(app, ["compare", str(tmp_path / "a"), str(tmp_path / "b")])
+    assert told.exit_code == 0, told.output
+    steps = next(line for line in told.stdout.splitlines() if line.startswith("steps"))
+    assert steps.split()[2:] == ["–", "–", "–"], "of b, the difference, the share"
+    assert "nan" not in told.stdout
+
+
 def test_the_command_tells_and_draws(runs: tuple[Result, Result], tmp_path: Path) -> None:
     out = tmp_path / "both.png"
     told = CliRunner().invoke(app, ["compare", str(tmp_path / "a"), str(tmp_path / "b"), "--out", str(out)])

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from conoid.client.figures import count, duration, number, si
+from conoid.client.figures import count, duration, number, rough, si
 
 
 @pytest.mark.parametrize(
@@ -39,3 +39,4 @@ def test_duration(seconds: float, text: str) -> None:
 def test_counts_and_numbers() -> None:
     assert count(1234567.4) == "1 234 567"
     assert number(0.0214612345) == "0.0214612"
+    assert {count(None), number(math.nan), rough(math.nan), si(math.nan, "s")} == {"–"}, "not known"

@@ -59,10 +59,10 @@ def frame_fields(folder: Path) -> dict[str, bytes]:
 @pytest.mark.parametrize("name", [pytest.param(name, marks=marks(name)) for name in SCENES])
 def test_the_scenes_break_thoroughly(name: str, breaking: Answers) -> None:
     end = outcome(breaking(1, name))
-    assert end.steps >= 30
+    assert (end.steps or 0) >= 30
     assert end.fragments is not None
     assert end.fragments > 50
-    assert end.eroded > 20
+    assert (end.eroded or 0) > 20
     assert end.energy is not None
     assert end.energy.residual < 1e-3
     assert end.energy.contact != 0.0

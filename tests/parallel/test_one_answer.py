@@ -219,7 +219,7 @@ def test_the_answer_is_the_same_on_any_number_of_ranks(name: str, ranks: int, an
 def test_the_runs_are_worth_comparing(name: str, answers: Answers) -> None:
     """Dozens of steps, and energy that went somewhere."""
     end = outcome(answers(1, name))
-    assert end.steps >= 40
+    assert (end.steps or 0) >= 40
     assert len(end.digest) == 64
     assert end.energy is not None
     if name in SCENES:
@@ -231,7 +231,7 @@ def test_the_runs_are_worth_comparing(name: str, answers: Answers) -> None:
         assert end.energy.contact > 0.001 * end.energy.initial
         assert end.energy.friction > 0.001 * end.energy.initial
     if name in ERODING:
-        assert 300 < end.eroded < end.elements - 300
+        assert 300 < (end.eroded or 0) < (end.elements or 0) - 300
         assert end.energy.eroded > 0.01 * end.energy.initial
         assert end.energy.friction > 0.001 * end.energy.initial
         assert 0.001 < end.reference[0].value < 0.005

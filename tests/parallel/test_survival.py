@@ -115,7 +115,7 @@ def must_have_moved(whole: Path, other: Path) -> None:
     """The same answer, and tets that went from rank to rank."""
     must_be_one(whole, other)
     moved = [message for message in journal(other) if isinstance(message, Balance)]
-    assert len(moved) == outcome(other).rebalances > 0
+    assert len(moved) == (outcome(other).rebalances or 0) > 0
     assert sum(message.tets for message in moved) > 0
 
 
@@ -126,7 +126,7 @@ def test_triggers_change_no_bit(policy: str, whole: Made, tmp_path: Path) -> Non
     together(4, tmp_path, [[*case("instant", tmp_path, tmp_path), *words]])
     must_be_one(whole("instant"), tmp_path / "instant")
     if policy == "outside":
-        assert outcome(tmp_path / "instant").rebalances > 0
+        assert outcome(tmp_path / "instant").rebalances
 
 
 FIXED = [(2, 11), (3, 24), (1, 10**9)]

@@ -62,7 +62,8 @@ def run(options: argparse.Namespace) -> int:
         print("parts[0].mesh: nothing is left of it", file=sys.stderr)
         return ExitCode.BAD_INPUT
     say(messages.Status(run=name, wall=time.time(), state="running"))
-    say(messages.Started(run=name, ranks=1, elements=5, nodes=8, end_time=1.0, setup=0.1, parts={"rod": 5}))
+    size: dict[str, int] = {"ranks": 1, "elements": 5, "nodes": 8}
+    say(messages.Started(run=name, wall=time.time(), end_time=1.0, setup=0.1, parts={"rod": 5}, **size))
     if "wait" in plan:
         while not Path(plan["wait"]).exists() and not stop:
             time.sleep(0.005)

@@ -33,6 +33,10 @@ class Aftermath:
         """The run of that name as the new server tells it."""
         return self.ann.show(self.names[name])
 
+    def last_words(self, name: str) -> float:
+        """When its worker has said the last that it said."""
+        return float(self.ann.events(self.names[name])[-2]["wall"])
+
     def states(self, name: str) -> list[str]:
         """What its journal tells."""
         return self.ann.states(self.names[name])
@@ -121,8 +125,10 @@ def test_a_deaf_worker_is_killed_by_the_next_server(after: Aftermath) -> None:
 
 
 def test_a_worker_that_finished_meanwhile_is_read_from_its_outcome(after: Aftermath) -> None:
-    assert after.show("finishes")["state"] == "succeeded"
+    ended = after.show("finishes")
+    assert ended["state"] == "succeeded"
     assert after.states("finishes")[-1] == "succeeded"
+    assert ended["finished"] == after.last_words("finishes"), "when the worker said so, not when a server came back"
 
 
 @pytest.mark.parametrize(("name", "cause"), [("dies", "service"), ("rebooted", "node"), ("replaced", "service")])
@@ -130,6 +136,9 @@ def test_a_worker_that_died_meanwhile_is_lost(after: Aftermath, name: str, cause
     ended = after.show(name)
     assert (ended["state"], ended["cause"], ended["outcome"]["state"]) == ("lost", cause, "lost")
     assert after.states(name)[-1] == "lost"
+    assert ended["finished"] == after.last_words(name)
+    assert ended["outcome"]["elapsed"] == pytest.approx(ended["finished"] - ended["started"])
+    assert (ended["outcome"]["elements"], ended["outcome"]["steps"]) == (5, None), "it was told, and was not"
 
 
 def test_everything_acknowledged_runs_once(after: Aftermath) -> None:

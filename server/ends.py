@@ -1,0 +1,85 @@
+"""What a run's plain files tell of its end where its worker has not: when that was, and how far it had come."""
+
+import math
+from pathlib import Path
+from typing import Any, TypeVar
+
+import msgspec
+
+from conoid.cases import layout
+from conoid.cases.messages import Counts, Message, Progress, Started
+from conoid.cases.outcome import Outcome
+
+from . import folder, journal
+from .events import Run
+
+M = TypeVar("M", bound=Message)
+
+_BLOCK = 4 << 20
+"""Bytes of a journal that are read at once. Chosen."""
+_TYPE = slice(9, 13)
+"""Of a line: the first letters of its type, behind ``{"type":"``."""
+
+
+class _Said(msgspec.Struct):
+    """The part of a message that tells when it was written."""
+
+    wall: float
+
+
+_said = msgspec.json.Decoder(_Said)
+
+
+def when(path: Path) -> float:
+    """Unix time, s, of the last that was heard of the run in ``path``: the last message of its journal, or, where there
+    is none, its outcome; 0 where neither can be read.
+    """
+    try:
+        return _said.decode(journal.last(path / layout.JOURNAL)).wall or _written(path)
+    except (*folder.DAMAGED, msgspec.MsgspecError):
+        return _written(path)
+
+
+def _written(path: Path) -> float:
+    try:
+        return (path / layout.OUTCOME).stat().st_mtime
+    except OSError:
+        return 0.0
+
+
+def so_far(outcome: Outcome, run: Run, path: Path) -> Outcome:
+    """``outcome`` with what the journal in ``path`` has last told, where a worker has begun to step."""
+    started, told, counts = _newest(path / layout.JOURNAL)
+    if started is None:
+        return outcome
+    known: dict[str, Any] = {
+        "elements": started.elements, "nodes_initial": started.nodes, "setup": started.setup,
+        "elapsed": max(0.0, run.finished - run.started) if run.started else math.nan,
+    }  # fmt: skip
+    if told is not None:
+        known |= {"steps": told.step, "time": told.t, "energy": told.energy}
+    if counts is not None:
+        gone = started.elements - counts.elements
+        known |= {"nodes": counts.nodes, "eroded": gone, "fragments": counts.fragments, "broken": counts.facets}
+    return msgspec.structs.replace(outcome, **known)
+
+
+def _newest(path: Path) -> tuple[Started | None, Progress | None, Counts | None]:
+    """The newest message of each kind; a line that cannot be read is none."""
+    lines = {b"star": b"", b"prog": b"", b"coun": b""}
+    try:
+        tail = journal.Tail(path)
+        while block := tail.block(_BLOCK):
+            for line in block.split(b"\n"):
+                if line[_TYPE] in lines:
+                    lines[line[_TYPE]] = line
+    except folder.DAMAGED:
+        pass
+    return _message(Started, lines[b"star"]), _message(Progress, lines[b"prog"]), _message(Counts, lines[b"coun"])
+
+
+def _message(kind: type[M], line: bytes) -> M | None:
+    try:
+        return msgspec.json.decode(line, type=kind)
+    except msgspec.MsgspecError:
+        return None

@@ -1,0 +1,75 @@
+"""What the files of a run tell of its end where its worker has not."""
+
+import math
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from conoid.cases import layout
+from conoid.cases.messages import AnyMessage, Counts, Progress, Started, Status, to_json
+from conoid.cases.outcome import Outcome, from_json
+from conoid.cases.outcome import to_json as outcome_to_json
+from conoid.cases.run import State
+from conoid.server import ends
+from conoid.server.events import Run
+
+from .fake_worker import progress
+from .running import Running
+
+LOST = Outcome(state="lost", cause="service", ranks=2)
+RUN = Run("a", "ann", "bar", 2, submitted=1.0, state=State.LOST, started=10.0, finished=14.5)
+STARTED = Started(run="a", wall=11.0, ranks=2, elements=50, nodes=30, end_time=1.0, setup=0.5, parts={"rod": 50})
+COUNTS = Counts(run="a", elements=45, nodes=33, shared=2, fragments=4, elements_per_rank=[20, 25], facets=9)
+
+
+def told(folder: Path, *messages: AnyMessage) -> Path:
+    """A folder whose journal has these messages, and half a line."""
+    (folder / layout.JOURNAL).write_bytes(b"".join(to_json(each) + b"\n" for each in messages) + b'{"type":"prog')
+    return folder
+
+
+def at(step: int) -> Progress:
+    return progress("a", step, 10)
+
+
+def test_a_lost_run_has_come_as_far_as_its_journal_tells(tmp_path: Path) -> None:
+    told(tmp_path, Status(run="a", state="starting"), STARTED, at(3), COUNTS, at(7), Status(run="a", state="running"))
+    ended = ends.so_far(LOST, RUN, tmp_path)
+    assert (ended.steps, ended.time, ended.elements, ended.setup, ended.elapsed) == (7, 0.7, 50, 0.5, 4.5)
+    assert (ended.nodes_initial, ended.nodes, ended.eroded, ended.fragments, ended.broken) == (30, 33, 5, 4, 9)
+    assert ended.energy == at(7).energy
+    assert math.isnan(ended.worst_residual), "lines of the history lie between two reports"
+    assert (ended.state, ended.cause, ended.digest) == ("lost", "service", "")
+
+
+@pytest.mark.parametrize("messages", [[], [Status(run="a", state="queued")]])
+def test_what_nobody_has_told_is_null(messages: list[AnyMessage], tmp_path: Path) -> None:
+    ended = ends.so_far(LOST, replace(RUN, started=0.0), told(tmp_path, *messages) if messages else tmp_path)
+    assert ended == LOST
+    text = outcome_to_json(ended)
+    assert b'"steps": null' in text
+    assert text.count(b"null") > 12
+    assert from_json(text).steps is None
+    assert math.isnan(from_json(text).elapsed)
+
+
+def test_the_end_is_the_last_that_was_heard(tmp_path: Path) -> None:
+    assert ends.when(tmp_path) == 0.0
+    (tmp_path / layout.OUTCOME).write_bytes(b"{}")
+    os.utime(tmp_path / layout.OUTCOME, (70.0, 70.0))
+    assert ends.when(tmp_path) == 70.0
+    assert ends.when(told(tmp_path, STARTED)) == 11.0
+
+
+def test_a_run_that_never_started_has_no_numbers(server: Running, tmp_path: Path) -> None:
+    go = tmp_path / "go"
+    for _ in range(2):
+        server.ann.wait_for(server.ann.submit(wait=str(go)), State.RUNNING)
+    waits = server.ann.submit()
+    server.ann.http.post(f"/v1/runs/{waits}:cancel")
+    ended = server.ann.wait_for(waits)["outcome"]
+    known = {name for name, value in ended.items() if value not in (None, [], {})}
+    assert known == {"state", "cause", "message", "ranks", "digest"}
+    go.touch()
