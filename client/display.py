@@ -57,7 +57,9 @@ def _state(live: Live) -> Text:
 
 
 def _told(live: Live) -> list[str]:
-    """Cause and message, where they say more than the state."""
+    """Cause and message, where they say more than the state; that nobody can say more now."""
+    if live.away:
+        return ["when it was last heard of; no server answers"]
     return [part for part in (live.cause, live.told) if part and part != live.state.value]
 
 

@@ -25,6 +25,8 @@ class Live:
     message: str = ""
     reason: str = ""
     """What it waited for when the server was asked last."""
+    away: float = 0.0
+    """Unix time, s, since which no server answers; 0 while one does."""
     seq: int = 0
     wall: float = 0.0
     """Unix time of the last message, s."""
@@ -48,7 +50,7 @@ class Live:
 
     def take(self, message: AnyMessage) -> None:
         """Takes one message in."""
-        self.seq, self.wall = message.seq, message.wall
+        self.seq, self.wall, self.away = message.seq, message.wall, 0.0
         match message:
             case Status():
                 self._status(message)

@@ -3,7 +3,7 @@
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from typing import Protocol
 
 from rich.console import Console
@@ -15,7 +15,7 @@ from conoid.cases.run import State
 from . import silence
 from .console import PlainConsole
 from .display import line, panel, seen
-from .errors import ClientError
+from .errors import ClientError, UnreachableError
 from .figures import clock, duration
 from .link import Link
 from .live import Live
@@ -64,14 +64,17 @@ def watch(run: Watched, live: bool | None = None, console: Console | None = None
 
 @contextmanager
 def explained(run: Watched, known: Live) -> Iterator[None]:
-    """While ``run`` is in the queue, its server is asked now and then what it waits for, by a thread."""
+    """While ``run`` is in the queue, or silent, a thread asks its server now and then: what it waits for, and whether
+    there is a server at all.
+    """
     over = threading.Event()
 
     def ask() -> None:
+        heard = -1
         while not over.wait(REASON_EVERY):
-            if known.state is State.QUEUED:
-                with suppress(ClientError, RuntimeError):  # the session may be closed by now
-                    known.reason = getattr(run.status(), "reason", "")
+            if known.state is State.QUEUED or known.seq == heard:
+                _ask(run, known)
+            heard = known.seq
 
     thread = threading.Thread(target=ask, name="reason", daemon=True)
     thread.start()
@@ -79,6 +82,15 @@ def explained(run: Watched, known: Live) -> Iterator[None]:
         yield
     finally:
         over.set()
+
+
+def _ask(run: Watched, known: Live) -> None:
+    try:
+        known.reason, known.away = getattr(run.status(), "reason", ""), 0.0
+    except UnreachableError:
+        known.away = known.away or time.time()
+    except (ClientError, RuntimeError):  # the session may be closed by now
+        return
 
 
 def show(messages: Iterable[AnyMessage], known: Live, out: Console) -> Live:
@@ -111,6 +123,9 @@ def tell(messages: Iterable[AnyMessage], known: Live, write: Callable[[str], Non
 
 
 def _waiting(known: Live) -> str:
+    if known.away:
+        away = f"no server answers, for {duration(time.time() - known.away)}"
+        return f"{clock(time.time())}  {known.run}  {away}; it was {known.state.value} when it was last heard of"
     lasting = f", for {duration(time.time() - known.changed)}" if known.changed else ""
     at = f": {known.told}" if known.told else ""
     return f"{clock(time.time())}  {known.run}  still {known.state.value}{lasting}{at}"

@@ -10,6 +10,7 @@ from rich.console import Console
 from conoid.cases.messages import AnyMessage
 from conoid.cases.run import State
 from conoid.client import display, silence
+from conoid.client.errors import UnreachableError
 from conoid.client.link import Link
 from conoid.client.live import Live, exit_code, grouped
 from conoid.client.watch import show, tell, watch
@@ -175,6 +176,42 @@ class Queued:
         assert self.heard.wait(10)
         yield stories.status(2, "running")
         yield stories.status(3, "succeeded")
+
+
+class Deserted(Queued):
+    """A run that is silent, since its server is gone, until somebody has been told so."""
+
+    def status(self) -> "Queued":
+        if self.asked:
+            raise UnreachableError("no answer from http://x: is it running there? (conoid serve)")
+        self.asked = True
+        return self
+
+    asked = False
+
+    def messages(self, *, link: Link) -> Iterator[AnyMessage]:
+        yield stories.status(1, "running")
+        assert self.heard.wait(10)
+        yield stories.status(2, "succeeded")
+
+
+def test_a_server_that_is_gone_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nobody knows then whether the run still runs."""
+    monkeypatch.setattr(silence, "LONGEST", 0.05)
+    monkeypatch.setattr("conoid.client.watch.REASON_EVERY", 0.01)
+    run, lines = Deserted(), list[str]()
+
+    class Heard(Console):
+        def print(self, *told: object, **options: object) -> None:
+            lines.append(str(told[0]))
+            if "no server answers, for " in lines[-1]:
+                run.heard.set()
+
+    known = watch(run, live=False, console=Heard(file=io.StringIO()))
+    assert any(line.endswith("it was running when it was last heard of") for line in lines)
+    assert "no server answers" not in rendered(known), "it has come back"
+    known.away = stories.START
+    assert "no server answers" in rendered(known), "the panel tells it too"
 
 
 class Nothing:
