@@ -30,7 +30,8 @@ def journal(folder: Path) -> list[messages.AnyMessage]:
 def test_a_signal_to_the_launcher_cancels_the_run(number: signal.Signals, tmp_path: Path) -> None:
     folder = tmp_path / "run"
     with started(command(2, "free_spin", "--out", str(folder), *LONG)) as launcher:
-        wait_for(folder / layout.JOURNAL, '"progress"', launcher)
+        for kind in ("progress", "snapshot"):
+            wait_for(folder / layout.JOURNAL, f'"{kind}"', launcher)
         launcher.send_signal(number)
         launcher.communicate(timeout=30.0)
     assert launcher.returncode == 4
@@ -43,6 +44,8 @@ def test_a_signal_to_the_launcher_cancels_the_run(number: signal.Signals, tmp_pa
     assert isinstance(said[-1], messages.Finished)
     assert said[-1].state == "cancelled"
     assert [message.seq for message in said] == list(range(1, len(said) + 1))
+    seen = [message for message in said if isinstance(message, messages.Snapshot)]
+    assert seen[-1].step == outcome(folder).steps, "the last state has a snapshot"
     assert not wait_until_gone(processes(folder))
 
 

@@ -80,6 +80,18 @@ def test_a_packer_that_dies_costs_one_snapshot(courier: Courier) -> None:
     assert "error" not in told[1]
 
 
+def test_a_request_to_stop_the_run_leaves_the_packer_for_the_last_snapshot(courier: Courier) -> None:
+    """A launcher sends it to every process of a rank."""
+    (mine,) = shattered(2, 2).shares(1)
+    courier.send(task(0), mine)
+    answer(courier)
+    assert courier.packer is not None
+    for number in (signal.SIGTERM, signal.SIGUSR1, signal.SIGINT):
+        os.kill(courier.packer, number)
+    courier.send(task(1), mine)
+    assert "error" not in answer(courier)[0]
+
+
 def test_a_packer_that_hangs_holds_nobody_up(courier: Courier) -> None:
     (mine,) = shattered(2, 2).shares(1)
     courier.send(task(0), mine)
