@@ -20,7 +20,8 @@ from pathlib import Path
 from typing import IO
 
 from . import kernels
-from .errors import CompileError
+from .errors import CompileError, StoppedError
+from .signals import REQUESTS
 
 Tell = Callable[[int, int], None]
 """Is told every few seconds how many kernels are compiled, and of how many."""
@@ -160,13 +161,17 @@ class _Child:
     errors: IO[bytes]
 
     def compile(self, module: str) -> None:
-        """Returns when all kernels of the module are in the cache. Raises CompileError."""
+        """Returns when all kernels of the module are in the cache. Raises CompileError, and StoppedError where the run
+        was asked to stop: launchers tell all processes of a rank.
+        """
         assert self.process.stdin is not None
         assert self.process.stdout is not None
         with suppress(BrokenPipeError):
             self.process.stdin.write(module.encode() + b"\n")
             if self.process.stdout.readline().decode().strip() == module:
                 return
+        if -self.process.wait() in REQUESTS:
+            raise StoppedError("stopped on request, before its kernels were compiled")
         raise CompileError(f"kernels of {module} cannot be compiled: {self._reason()}")
 
     def _reason(self) -> str:
@@ -227,7 +232,7 @@ def main() -> int:
     """Compiles what is missing and reports the progress; the exit code."""
     try:
         fresh = compile_all(kernels.cache_folder(), lambda done, total: print(words(done, total), flush=True))
-    except CompileError as error:
+    except (CompileError, StoppedError) as error:
         print(error, file=sys.stderr)
         return CompileError.exit_code
     if not fresh:

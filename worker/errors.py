@@ -4,6 +4,7 @@
 
     ConoidError                      exit 1   anything the worker raises on purpose; one of the client's tree, too
     ├── CompileError             exit 1   kernels cannot be compiled
+    ├── StoppedError             exit 4   somebody has asked the run to stop before its first step
     ├── InputError (ValueError)      exit 2   the case, or a file it names, is wrong
     │   └── MeshError                exit 2   the mesh cannot be made, read or used
     └── PhysicsError                 exit 3   the run itself failed: diverged
@@ -15,7 +16,7 @@ The text of every one of them is a single line for the person who wrote the case
 from typing import ClassVar
 
 from conoid.cases import problems
-from conoid.cases.run import Cause, ExitCode
+from conoid.cases.run import Cause, ExitCode, State
 
 
 class ConoidError(problems.ConoidError):
@@ -23,10 +24,19 @@ class ConoidError(problems.ConoidError):
 
     exit_code: ClassVar[int] = ExitCode.CRASHED
     cause: ClassVar[Cause] = Cause.SERVICE
+    state: ClassVar[State] = State.FAILED
 
 
 class CompileError(ConoidError):
     """Kernels cannot be compiled."""
+
+
+class StoppedError(ConoidError):
+    """Somebody has asked the run to stop before its first step."""
+
+    exit_code = ExitCode.INTERRUPTED
+    cause = Cause.CANCELLED
+    state = State.CANCELLED
 
 
 class InputError(ConoidError, ValueError):

@@ -19,7 +19,7 @@ from conoid.cases.schema import Case
 
 from . import compile as ahead
 from . import kernels
-from .errors import CompileError, ConoidError
+from .errors import CompileError, ConoidError, StoppedError
 from .lock import hold
 from .output import storage
 from .output.journal import Journal
@@ -104,14 +104,14 @@ def _outcome(
         outcome = _compute(case, options, comm, journal, signals, began)
         return outcome, _CODES[State(outcome.state)]
     except CaseError as error:
-        return _failed(Cause.INPUT, str(error), comm, began), ExitCode.BAD_INPUT
+        return _unbegun(State.FAILED, Cause.INPUT, str(error), comm, began), ExitCode.BAD_INPUT
     except ConoidError as error:
-        return _failed(error.cause, str(error), comm, began), error.exit_code
+        return _unbegun(error.state, error.cause, str(error), comm, began), error.exit_code
 
 
-def _failed(cause: Cause, message: str, comm: Comm, began: float) -> Outcome:
+def _unbegun(state: State, cause: Cause, message: str, comm: Comm, began: float) -> Outcome:
     elapsed = time.monotonic() - began
-    return Outcome(state=State.FAILED, cause=cause, message=message, ranks=comm.size, elapsed=elapsed)
+    return Outcome(state=state, cause=cause, message=message, ranks=comm.size, elapsed=elapsed)
 
 
 def _parse(arguments: list[str]) -> argparse.Namespace:
@@ -187,13 +187,13 @@ def _compute(
 def ready_kernels(comm: Comm, journal: Journal | None) -> None:
     """Every rank uses the same kernels: rank 0 hashes the sources and compiles what is missing, the others sleep.
 
-    Must come before numba is imported. Raises CompileError on all ranks alike.
+    Must come before numba is imported. Raises CompileError, StoppedError on all ranks alike.
     """
-    failure: CompileError | None = None
+    failure: ConoidError | None = None
     if comm.rank == 0:
         try:
             ahead.compile_all(kernels.cache_folder(), lambda done, total: _say(journal, ahead.words(done, total)))
-        except CompileError as error:
+        except (CompileError, StoppedError) as error:
             failure = error
     comm.await_all()
     sources, failure = comm.broadcast((kernels.source_hash(), failure) if comm.rank == 0 else None)

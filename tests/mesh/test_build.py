@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from conoid.cases.bodies import Box, Cylinder, MeshFile
-from conoid.worker.errors import MeshError
+from conoid.worker.errors import MeshError, StoppedError
 from conoid.worker.mesh import build as building
 from conoid.worker.mesh.build import build, cache_folder
 from conoid.worker.mesh.child import Limits, run_child
@@ -143,6 +143,15 @@ def test_a_child_that_wants_too_much_memory_is_stopped(tmp_path: Path) -> None:
     with pytest.raises(MeshError, match=r"^mesh: .*memory") as raised:
         run_child(BAR, None, tmp_path / "m.npz", "mesh", Limits(memory=150 * 2**20))
     assert "\n" not in str(raised.value)
+
+
+def test_a_child_that_is_told_to_stop_has_not_failed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A launcher passes a cancel on to every process of a rank."""
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    (tmp_path / "sitecustomize.py").write_text("import os; os.kill(os.getpid(), 15)")
+    with pytest.raises(StoppedError, match="stopped on request") as raised:
+        run_child(BAR, None, tmp_path / "m.npz", "mesh", Limits())
+    assert (raised.value.state, raised.value.exit_code) == ("cancelled", 4)
 
 
 def test_the_child_gets_no_secrets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -17,7 +17,7 @@ import pytest
 
 from conoid.worker import compile as ahead
 from conoid.worker import jit, kernels, main
-from conoid.worker.errors import CompileError
+from conoid.worker.errors import CompileError, StoppedError
 from conoid.worker.parallel.comm import SerialComm
 
 BELOW = """
@@ -198,6 +198,14 @@ def test_a_child_that_fails_ends_in_one_line(tree: Path, tmp_path: Path, wrong: 
     assert reason in str(caught.value)
     assert "\n" not in str(caught.value)
     assert not (tmp_path / "cache" / ahead.COMPLETE).exists()
+
+
+def test_a_child_that_is_told_to_stop_has_not_failed(tree: Path, tmp_path: Path) -> None:
+    """A launcher passes a cancel on to every process of a rank."""
+    with (tree / "above.py").open("a") as file:
+        file.write("\n\nimport os, signal\nos.kill(os.getpid(), signal.SIGTERM)\n")
+    with pytest.raises(StoppedError, match="stopped on request"):
+        ahead.compile_all(tmp_path / "cache", lambda *_: None, tree, "tiny")
 
 
 def test_a_child_that_hangs_is_not_waited_for(tree: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -22,7 +22,8 @@ from pydantic import TypeAdapter
 from conoid.cases.bodies import Mesh, MeshFile
 from conoid.cases.run import ExitCode
 
-from ..errors import InputError, MeshError
+from ..errors import InputError, MeshError, StoppedError
+from ..signals import REQUESTS
 
 _PASSED_ON = ("HOME", "LANG", "LC_ALL", "LD_LIBRARY_PATH", "PATH", "PYTHONPATH", "TMPDIR", "VIRTUAL_ENV")
 """The environment variables that the child gets."""
@@ -49,7 +50,8 @@ class Limits:
 def run_child(mesh: Mesh, source: Path | None, target: Path, key: str, limits: Limits) -> None:
     """Makes ``mesh`` (reads ``source`` when it is a file) in a child process, which leaves it in ``target``.
 
-    Raises MeshError with the child's own line, or with the limit that it broke.
+    Raises MeshError with the child's own line, or with the limit that it broke; StoppedError where the run was asked to
+    stop: launchers tell all processes of a rank.
     """
     request = {
         "mesh": mesh.model_dump(mode="json"),
@@ -64,6 +66,8 @@ def run_child(mesh: Mesh, source: Path | None, target: Path, key: str, limits: L
         pipe = subprocess.PIPE
         with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, cwd=folder, env=environment) as child:
             errors = _watched(child, json.dumps(request).encode(), key, limits)
+    if -child.returncode in REQUESTS:
+        raise StoppedError("stopped on request, before its mesh was made")
     if child.returncode != 0:
         raise MeshError(_reason(key, child.returncode, errors.decode("utf-8", "replace"), limits))
 

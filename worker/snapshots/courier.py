@@ -15,13 +15,12 @@ from typing import Any
 
 from conoid.cases import layout
 
+from ..signals import REQUESTS
 from . import share
 from .share import Share
 
 _FAREWELL = 30.0
 """s that the last snapshots may take after the last step. Chosen: a hundred times what one of 150,000 tets takes."""
-_REQUESTS = {signal.SIGTERM, signal.SIGUSR1, signal.SIGINT}
-"""To stop (worker/signals.py). Launchers send them to all processes of a rank; the packer has the last one to make."""
 _SECRETS = ("CONOID_ZENOH_USER", "CONOID_ZENOH_PASSWORD")
 
 log = logging.getLogger("conoid.worker")
@@ -71,10 +70,10 @@ class Courier:
         self._packer = None
 
     def _work(self) -> None:
-        """The packer has the signals of this thread that are held back, from its first moment on; it ends with its
-        stdin.
+        """Launchers send the requests to stop to all processes of a rank, and the packer has the last snapshot to make:
+        it holds back what this thread holds back, from its first moment on, and ends with its stdin.
         """
-        signal.pthread_sigmask(signal.SIG_BLOCK, _REQUESTS)
+        signal.pthread_sigmask(signal.SIG_BLOCK, REQUESTS)
         while (task := self._tasks.get()) is not None:
             try:
                 share.write(layout.share(self._folder, task[0]["n"], self._rank), task[1])
