@@ -5,6 +5,7 @@ import io
 import itertools
 import math
 import time
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -117,10 +118,11 @@ def points_of(words: Iterable[str], *, grid: bool = False) -> list[Point]:
 
     Raises CaseError.
     """
-    axes = dict(_axis(word) for word in words)
+    axes = [_axis(word) for word in words]
     if not axes:
         raise CaseError([Problem("--set", "", "write at least one key with its values, such as run.ranks=1,2")])
-    return points_along(axes, grid=grid, named="--set")
+    _once("--set", (key for key, _ in axes), "write all values of a key at once, such as run.ranks=1,2")
+    return points_along(dict(axes), grid=grid, named="--set")
 
 
 def points_along(axes: Mapping[str, Sequence[Any]], *, grid: bool = False, named: str = "points") -> list[Point]:
@@ -140,16 +142,29 @@ def points_along(axes: Mapping[str, Sequence[Any]], *, grid: bool = False, named
 
 def points_in(path: Path) -> list[Point]:
     """The points in a CSV file: its first line has the keys. Raises CaseError, OSError."""
+    named = repr(str(path))
     try:
-        with path.open(newline="", encoding="utf-8") as file:
-            lines = list(csv.DictReader(file))
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            head, *lines = [line for line in csv.reader(file) if line] or [[]]
     except UnicodeDecodeError:
-        raise CaseError([Problem("--list", repr(str(path)), "not UTF-8 text")]) from None
+        raise CaseError([Problem("--list", named, "not UTF-8 text")]) from None
     except csv.Error as error:
-        raise CaseError([Problem("--list", repr(str(path)), f"not a table: {error}")]) from None
-    if not lines or any(None in line or None in line.values() for line in lines):
-        raise CaseError([Problem("--list", repr(str(path)), "a line of keys, then lines with a value for each")])
-    return [{key.strip(): value_of(text) for key, text in line.items()} for line in lines]
+        raise CaseError([Problem("--list", named, f"not a table: {error}")]) from None
+    keys = [key.strip() for key in head]
+    for sign, name in ((";", "semicolons"), ("\t", "tabs")):
+        if any(sign in key for key in keys):
+            raise CaseError([Problem("--list", named, f"its columns are parted by {name}; write commas between them")])
+    if not lines or not all(keys) or any(len(line) != len(keys) for line in lines):
+        raise CaseError([Problem("--list", named, "a line of keys, then lines with a value for each")])
+    _once("--list", keys, f"each column of {named} has a key of its own")
+    return [dict(zip(keys, map(value_of, line), strict=True)) for line in lines]
+
+
+def _once(named: str, keys: Iterable[str], allowed: str) -> None:
+    """Raises CaseError for a key that is given twice: which of its values was meant, nobody knows."""
+    twice = [key for key, times in Counter(keys).items() if times > 1]
+    if twice:
+        raise CaseError(Problem(named, repr(key), f"is given more than once; {allowed}") for key in twice)
 
 
 def value_of(text: str) -> Any:

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from conoid.cases.load import CaseError
 from conoid.client import swept
 from conoid.client.errors import ClientError
 from conoid.client.sweep import points_in, points_of
@@ -37,6 +38,25 @@ def test_points_from_a_file(tmp_path: Path) -> None:
     assert points_in(path)[1] == {"run.ranks": 2, "run.end_time": "2 us"}
     path.write_text("run.ranks,run.end_time\n1\n")
     with pytest.raises(ValueError, match="--list"):
+        points_in(path)
+
+
+def test_a_key_has_one_list_of_values(tmp_path: Path) -> None:
+    with pytest.raises(CaseError, match=r"--set = 'run.ranks': is given more than once; write all values") as raised:
+        points_of(["run.ranks=1", "run.end_time=1 us", "run.ranks =2"])
+    assert len(raised.value.problems) == 1
+    path = tmp_path / "points.csv"
+    path.write_text("run.ranks,run.end_time, run.ranks\n1,1 us,2\n")
+    with pytest.raises(CaseError, match=r"--list = 'run.ranks': is given more than once; each column of '"):
+        points_in(path)
+
+
+def test_what_spreadsheets_write(tmp_path: Path) -> None:
+    path = tmp_path / "points.csv"
+    path.write_bytes(b"\xef\xbb\xbfrun.ranks,run.end_time\r\n1,1 us\r\n\r\n")
+    assert points_in(path) == [{"run.ranks": 1, "run.end_time": "1 us"}]
+    path.write_text("run.ranks;run.end_time\n1;1,5 us\n")
+    with pytest.raises(CaseError, match=r"its columns are parted by semicolons; write commas between them"):
         points_in(path)
 
 
