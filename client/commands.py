@@ -22,6 +22,7 @@ from .options import (
     SourceArgument,
     Token,
     Url,
+    aloud,
     complain,
     find,
     labels_of,
@@ -203,4 +204,6 @@ def get(
         target = out or Path(found.id)
         every = (file.path for file in found.files())
         for name in names or [path for path in every if not path.startswith(f"{layout.CHECKPOINTS}/")]:
-            typer.echo(str(found.download(target, name)))
+            with aloud(f"fetching {name}"):
+                fetched = found.download(target, name)
+            typer.echo(str(fetched))

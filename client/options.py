@@ -1,6 +1,7 @@
 """What the commands have in common: options, how a run is found, how things are printed."""
 
-from collections.abc import Iterable, Iterator, Sequence
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated, Any
@@ -14,8 +15,10 @@ from conoid.cases.load import CaseError, materials, parse_case, shipped
 from conoid.cases.plausible import doubts
 from conoid.cases.problems import Problem
 
+from . import silence
 from .console import PlainConsole, plain
 from .errors import ClientError
+from .figures import duration
 from .result import Result
 from .run import Run
 from .session import Session, connect
@@ -118,6 +121,19 @@ def show(thing: RenderableType) -> None:
 def show_json(thing: Any) -> None:
     """Prints for scripts: one JSON document."""
     typer.echo(msgspec.json.format(msgspec.json.encode(thing), indent=2).decode())
+
+
+@contextmanager
+def aloud(what: str) -> Iterator[Callable[[str], None]]:
+    """While what is done inside takes long, people are told ``what`` it is at, or what it was last called with."""
+    at, began = what, time.monotonic()
+
+    def name(now: str) -> None:
+        nonlocal at
+        at = now
+
+    with silence.broken(complain, lambda: f"{at}, {duration(time.monotonic() - began)} so far"):
+        yield name
 
 
 def find(session: Session, run: str) -> Run:

@@ -32,24 +32,33 @@ img { max-width: 100%; height: auto } pre { overflow-x: auto; font-size: 12.5px;
 """  # noqa: E501
 
 
-def write(result: Result, out: Path, fields: Sequence[str] | None = None) -> Path:
-    """Writes the report of a run; ``fields`` are drawn, none for no pictures, by default what tells most.
+def write(
+    result: Result, out: Path, fields: Sequence[str] | None = None, at: Callable[[str], None] = lambda _: None
+) -> Path:
+    """Writes the report of a run; ``fields`` are drawn, none for no pictures, by default what tells most. ``at`` is
+    called with what it is at.
 
     Raises ClientError, UnfinishedError where not even the case is there.
     """
     case = result.case
     title = str(case.get("title") or case.get("name"))
-    parts = [
-        html.head(result.folder.name, title, _outcome(result)),
-        _section("Case", _case(case)),
-        _section("References", html.references(_outcome(result))),
-        _section("Pictures", _pictures(result, fields)), _section("Replay", replay3d.html(result)),
-        _section("Energy", _energy(result)), _section("Fragments", _fragments(result)),
-        _section("Time step", _curve(result, "steps", "Length of the time step over time")),
-        _section("Probes", _curve(result, "columns", "Probes over time")),
-        _section("Ranks and balance", _balance(result)),
-        _section("Messages", _messages(result)), _section("All keys of the case", _keys(case)),
-    ]  # fmt: skip
+    sections: dict[str, Callable[[], str]] = {
+        "Case": lambda: _case(case),
+        "References": lambda: html.references(_outcome(result)),
+        "Pictures": lambda: _pictures(result, fields, at),
+        "Replay": lambda: replay3d.html(result),
+        "Energy": lambda: _energy(result),
+        "Fragments": lambda: _fragments(result),
+        "Time step": lambda: _curve(result, "steps", "Length of the time step over time"),
+        "Probes": lambda: _curve(result, "columns", "Probes over time"),
+        "Ranks and balance": lambda: _balance(result),
+        "Messages": lambda: _messages(result),
+        "All keys of the case": lambda: _keys(case),
+    }
+    parts = [html.head(result.folder.name, title, _outcome(result))]
+    for name, made in sections.items():
+        at(f"writing {out}: {name.lower()}")
+        parts.append(_section(name, made()))
     page = (
         '<!doctype html><html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
         f"<title>{escape(title)}: {escape(result.folder.name)}</title><style>{_STYLE}</style></head>"
@@ -98,7 +107,7 @@ def telling(result: Result) -> list[str]:
     return ["plastic_strain" if energy is not None and energy.plastic > 0.0 else "mises", "speed"]
 
 
-def _pictures(result: Result, fields: Sequence[str] | None) -> str:
+def _pictures(result: Result, fields: Sequence[str] | None, at: Callable[[str], None]) -> str:
     """Each field at some times; what cannot be drawn is said."""
     frames, fields = [frame.index for frame in result.frames], telling(result) if fields is None else fields
     if not frames or not fields:
@@ -107,6 +116,7 @@ def _pictures(result: Result, fields: Sequence[str] | None) -> str:
     drawn = []
     with tempfile.TemporaryDirectory() as folder:
         for field in fields:
+            at(f"drawing {field} at {len(chosen)} times")
             try:
                 out = Path(folder) / f"{field}.png"
                 result.view(field, out, frame=chosen, size=(1400, 800), mirror="auto")

@@ -12,7 +12,7 @@ from . import compare as comparing
 from . import replay, tables
 from . import report as reporting
 from .errors import ViewError
-from .options import Json, SourceArgument, Token, Url, opened, show, show_json
+from .options import Json, SourceArgument, Token, Url, aloud, opened, show, show_json
 from .pictures import require_field
 
 figures = typer.Typer(no_args_is_help=True, help="Charts from what a run has told.")
@@ -33,7 +33,7 @@ def drawing(module: str) -> Any:
 def energy_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: Token = None) -> None:
     """Draw the energy ledger over time, also without its kinetic term, the residual, and each part's energy."""
     curves = drawing("curves")
-    with opened(source, url, token) as result:
+    with opened(source, url, token) as result, aloud(f"drawing {out}"):
         typer.echo(curves.save(curves.energy(result.history), out))
 
 
@@ -41,7 +41,7 @@ def energy_figure(source: SourceArgument, out: OutArgument, url: Url = None, tok
 def dt_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: Token = None) -> None:
     """Draw the length of the time step, and what holds it down."""
     curves = drawing("curves")
-    with opened(source, url, token) as result:
+    with opened(source, url, token) as result, aloud(f"drawing {out}"):
         typer.echo(curves.save(curves.steps(result.history), out))
 
 
@@ -49,7 +49,7 @@ def dt_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: 
 def fragments_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: Token = None) -> None:
     """Draw how many fragments there are over time, and how many of which mass in the end."""
     curves = drawing("curves")
-    with opened(source, url, token) as result:
+    with opened(source, url, token) as result, aloud(f"drawing {out}"):
         tables_of = [result.fragments_of(index) for index in result.fragment_tables]
         typer.echo(curves.save(curves.fragments(tables_of), out))
 
@@ -67,7 +67,7 @@ def history_figure(
 ) -> None:
     """Draw columns of history.csv over time, those of one unit in one panel."""
     curves = drawing("curves")
-    with opened(source, url, token) as result:
+    with opened(source, url, token) as result, aloud(f"drawing {out}"):
         typer.echo(curves.save(curves.columns(result.history, column or ()), out))
 
 
@@ -86,7 +86,9 @@ def report(
         for each in field or ():
             require_field(each)
         target = out or Path(f"{result.folder.name}.html")
-        typer.echo(reporting.write(result, target, field if pictures else ()))
+        with aloud("reading the run") as at:
+            written = reporting.write(result, target, field if pictures else (), at)
+        typer.echo(written)
 
 
 def compare(
@@ -102,7 +104,7 @@ def compare(
     as_json: Json = False,
 ) -> None:
     """Tell in what two runs differ: keys, final values, fragments; draw their histories over each other."""
-    with opened(a, url, token) as first, opened(b, url, token) as second:
+    with opened(a, url, token) as first, opened(b, url, token) as second, aloud("comparing the runs"):
         found = comparing.compare(first, second)
         if out is not None:
             curves = drawing("curves")
@@ -120,7 +122,7 @@ def compare(
 def balance_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: Token = None) -> None:
     """Draw the outside nodes of each rank with the cuts, and where the CPU time went."""
     charts = drawing("charts")
-    with opened(source, url, token) as result:
+    with opened(source, url, token) as result, aloud(f"drawing {out}"):
         name = str(result.case["name"])
         charts.balance(charts.course(result.messages), f"{name}, {result.folder.name}", name, out)
     typer.echo(out)
@@ -142,7 +144,7 @@ def replay_balance(
     as_json: Json = False,
 ) -> None:
     """Tell what other balance policies would have cost and saved, from the loads that a run has told."""
-    with opened(source, url, token) as result:
+    with opened(source, url, token) as result, aloud("reading the run"):
         spec = Balance.model_validate(result.case.get("balance", {}))
         record = replay.read(result.messages, replay.named(spec))
         x, y, z = result.case["run"].get("cut_scale", (1.0, 1.0, 1.0))

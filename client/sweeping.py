@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from .errors import ClientError
-from .options import CaseArgument, Json, Token, Url, named, show_json
+from .options import CaseArgument, Json, Token, Url, aloud, named, show_json
 from .session import connect
 from .sweep import SweepInfo, points_in, points_of
 
@@ -34,8 +34,10 @@ def sweep(
         raise ClientError("give the points with --set KEY=A,B,C, or with --list FILE")
     points = points_in(listed) if listed is not None else points_of(sets or (), grid=grid)
     with connect(url, token) as session:
-        made = session.sweep(case, points, at_once=at_once)
-        info = made.wait() if wait else made.status()
+        with aloud(f"handing {len(points)} points in"):
+            made = session.sweep(case, points, at_once=at_once)
+        with aloud(f"sweep {made.id}: waiting for its runs"):
+            info = made.wait() if wait else made.status()
     if as_json:
         show_json(info)
     else:
@@ -50,7 +52,7 @@ def sweep_table(
     token: Token = None,
 ) -> None:
     """Print a sweep as CSV: a line a point with its values, the state of its run and its results."""
-    with connect(url, token) as session:
+    with connect(url, token) as session, aloud("reading the sweep"):
         text = session.find_sweep(sweep).csv()
     if out is None:
         typer.echo(text, nl=False)
@@ -73,7 +75,9 @@ def sweep_plot(
 ) -> None:
     """Draw the results of a sweep over what was changed: a panel a result, a curve a value of other keys."""
     with connect(url, token) as session:
-        typer.echo(str(session.find_sweep(sweep).plot(out, columns or (), x)))
+        with aloud(f"drawing {out}"):
+            drawn = session.find_sweep(sweep).plot(out, columns or (), x)
+        typer.echo(str(drawn))
 
 
 def sweep_cancel(sweep: SweepArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:

@@ -8,7 +8,7 @@ import typer
 from conoid.cases.units import parse_quantity
 
 from .errors import ViewError
-from .options import Json, Token, Url, find, show_json
+from .options import Json, Token, Url, aloud, find, show_json
 from .pictures import FIELDS
 from .session import connect
 from .view import view
@@ -62,11 +62,12 @@ def view_frames(
         "section": section, "camera": camera, "up": up, "zoom": zoom, "limits": limits, "percentiles": percentiles,
         "size": size, "raw": raw, "edges": edges, "scale": scale, "transparent": transparent, "rate": rate,
     }  # fmt: skip
-    if Path(source).exists() or Path(source).suffix:
-        drawn = view(source, field, **options)
-    else:
-        with connect(url, token) as session:
-            drawn = view(find(session, source).result(), field, **options)
+    with aloud("drawing"):
+        if Path(source).exists() or Path(source).suffix:
+            drawn = view(source, field, **options)
+        else:
+            with connect(url, token) as session:
+                drawn = view(find(session, source).result(), field, **options)
     if as_json:
         show_json(drawn)
     else:

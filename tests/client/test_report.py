@@ -3,13 +3,14 @@
 import base64
 import json
 import re
+import threading
 from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
-from conoid.client import replay3d, report
+from conoid.client import options, replay3d, report, silence
 from conoid.client.cli import app
 from conoid.client.errors import UnfinishedError
 from conoid.client.result import Result
@@ -128,6 +129,25 @@ def test_the_command_names_the_file_after_the_run(folder: Path, quiet_home: Path
     assert "Pictures" not in read(quiet_home / "bar.html").text
     wrong = CliRunner().invoke(app, ["report", str(folder), "--field", "x"])
     assert "field = 'x': allowed: mises" in wrong.stderr
+
+
+def test_what_takes_long_says_what_it_is_at(folder: Path, quiet_home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(silence, "LONGEST", 0.05)
+    heard = threading.Event()
+
+    def told(*lines: str) -> None:
+        if lines[0].startswith("writing bar.html: energy, "):
+            heard.set()
+
+    def energy(_: Result) -> str:
+        assert heard.wait(30.0)
+        return ""
+
+    monkeypatch.setattr(options, "complain", told)
+    monkeypatch.setattr(report, "_energy", energy)
+    done = CliRunner().invoke(app, ["report", str(folder), "--no-pictures"])
+    assert done.exit_code == 0, done.output
+    assert done.stdout == "bar.html\n", "scripts read no more than the file"
 
 
 # The replay -----------------------------------------------------------------------------------------------------------
