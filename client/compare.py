@@ -22,6 +22,8 @@ _OUTCOME = (
 _DRAWN = (
     "kinetic", "elastic", "plastic", "contact", "friction", "eroded", "fracture", "cohesive", "stepping", "averaging",
 )  # fmt: skip
+AT_THE_END = ", at the end"
+"""Behind the name of a column of the history: its last value."""
 _UNITS = {"time": "s", "elapsed": "s", "cpu": "s", "eroded_mass": "kg", "element_updates_per_second": "1/s"}
 
 
@@ -129,7 +131,7 @@ def _last(a: Result, b: Result) -> list[Value]:
     shared = [name for name in common(first, second) if name not in (*history.CLOCK, *history.LEDGER)]
     if not (first.rows and second.rows):
         return []
-    return [Value(f"{n}, at the end", first.units[n], first.numbers(n)[-1], second.numbers(n)[-1]) for n in shared]
+    return [Value(f"{n}{AT_THE_END}", first.units[n], first.numbers(n)[-1], second.numbers(n)[-1]) for n in shared]
 
 
 def common(a: Columns, b: Columns) -> list[str]:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from typing import Literal
 
 from rich import box
 from rich.table import Table
@@ -16,18 +17,24 @@ from conoid.cases.run import State
 from conoid.cases.schema import Case
 from conoid.cases.stages import without
 
-from .compare import Comparison
+from .compare import AT_THE_END, Comparison
 from .display import STATE_STYLE
 from .figures import count, day, duration, known, number, rough, si
 from .replay import Account
 from .run import RunInfo
 
 
-def table(*columns: str, right: Sequence[str] = (), wide: str = "case") -> Table:
-    """An open table with these columns; those named in ``right`` are numbers, ``wide`` is wrapped where need be."""
+def table(*columns: str, right: Sequence[str] = (), wide: Sequence[str] = ("case",), least: int | None = None) -> Table:
+    """An open table with these columns; those named in ``right`` are numbers, ``wide`` ones are wrapped where need be,
+    the first of them to ``least`` characters.
+    """
     made = Table(box=box.SIMPLE_HEAD, header_style="bold", pad_edge=False, show_edge=False, padding=(0, 1, 0, 0))
     for column in columns:
-        made.add_column(column, justify="right" if column in right else "left", overflow="fold", no_wrap=column != wide)
+        justify: Literal["left", "right"] = "right" if column in right else "left"
+        made.add_column(
+            column, justify=justify, overflow="fold", no_wrap=column not in wide,
+            min_width=least if column == wide[0] else None,
+        )  # fmt: skip
     return made
 
 
@@ -105,7 +112,7 @@ def _more(expected: Estimate) -> str:
 def parts_table(case: Case, expected: Estimate) -> Table:
     """What is modelled of each part, about: its size, and what it brings along at the start."""
     right = ("tets", "mass", "extent", "momentum", "energy")
-    made = table("part", "material", *right, right=right, wide="material")
+    made = table("part", "material", *right, right=right, wide=("material",))
     for part, size in zip(case.parts, expected.parts, strict=True):
         tets = "–" if size.elements is None else count(size.elements)
         made.add_row(part.name, part.material, tets, *(_brings(size.bulk) if size.bulk is not None else "–" * 4))
@@ -131,7 +138,7 @@ def _about(value: float | None, shown: Callable[[float], str]) -> str:
 
 def cases_table(cases: Mapping[str, Case]) -> Table:
     """One line a shipped case, with the CPU time that it takes, about."""
-    made = table("case", "title", "tets", "core time", right=("tets", "core time"), wide="title")
+    made = table("case", "title", "tets", "core time", right=("tets", "core time"), wide=("title",))
     for name, case in cases.items():
         expected = estimate(case)
         tets, core = expected.elements, expected.core_seconds
@@ -141,7 +148,7 @@ def cases_table(cases: Mapping[str, Case]) -> Table:
 
 def materials_table(materials: Mapping[str, Material]) -> Table:
     """One line a material of the library."""
-    made = table("material", "kg/m^3", "what it is", right=("kg/m^3",), wide="what it is")
+    made = table("material", "kg/m^3", "what it is", right=("kg/m^3",), wide=("what it is",))
     for name, each in sorted(materials.items()):
         made.add_row(name, number(each.density), each.description)
     return made
@@ -203,20 +210,26 @@ def checks_table(checks: Sequence[Check]) -> Table:
     return made
 
 
+_NUMBERS = ("A", "B", "difference", "%")
+_LEAST = 26
+"""Characters of names beside numbers. Chosen: what they leave of 80, and most names fit."""
+
+
 def comparison_tables(found: Comparison) -> list[Table | str]:
     """What differs between two runs, what their ends are, and what is said of their fragments."""
-    a, b = found.names
     same = "the same answer, to the bit" if found.same_answer else "different answers"
-    keys = table("key", a, b, wide="key")
+    keys = table("key", "A", "B", wide=("key", "A", "B"), least=_LEAST)
     for each in found.keys:
         keys.add_row(each.key, *("–" if value is None else str(value) for value in (each.a, each.b)))
-    parts: list[Table | str] = [f"{a} and {b}: {same}", "", keys if found.keys else "no key of the case differs"]
+    runs = pairs(dict(zip("AB", found.names, strict=True)))
+    parts: list[Table | str] = [runs, same, "", keys if found.keys else "no key of the case differs"]
     for title, values in (("at the end", found.ends), ("fragments", found.sizes)):
         if values:
-            made = table(title, "unit", a, b, "difference", "%", right=(a, b, "difference", "%"), wide=title)
+            made = table(title, "unit", *_NUMBERS, right=_NUMBERS, wide=(title,), least=_LEAST)
+            made.padding = 0
             for one in values:
                 share = known(100 * one.relative, "+.2f") if one.difference else ""
                 change = number(one.difference) if one.difference else "same"
-                made.add_row(one.name, one.unit, number(one.a), number(one.b), change, share)
+                made.add_row(one.name.removesuffix(AT_THE_END), one.unit, number(one.a), number(one.b), change, share)
             parts += ["", made]
     return parts

@@ -76,12 +76,23 @@ def test_the_command_tells_and_draws(runs: tuple[Result, Result], tmp_path: Path
     out = tmp_path / "both.png"
     told = CliRunner().invoke(app, ["compare", str(tmp_path / "a"), str(tmp_path / "b"), "--out", str(out)])
     assert told.exit_code == 0, told.output
-    assert "a and b: the same answer, to the bit" in told.stdout
+    assert "the same answer, to the bit" in told.stdout
     assert "parts.rod.mesh.element_size" in told.stdout
     assert out.read_bytes().startswith(b"\x89PNG")
     drawn = curves.comparison(material(*runs))
     assert [axes.get_ylabel() for axes in drawn.axes] == ["J", "m/s", "N"]
     assert [len(axes.lines) for axes in drawn.axes] == [2, 2, 2], "a curve a run"
+
+
+def test_the_tables_are_read_on_a_terminal_of_80_columns(runs: tuple[Result, Result], tmp_path: Path) -> None:
+    """Runs of a server have names of 22 letters."""
+    folders = [(tmp_path / name).rename(tmp_path / f"1k17skpaczsdw34brntcee{name}") for name in ("a", "b")]
+    told = CliRunner().invoke(app, ["compare", *map(str, folders)], env={"COLUMNS": "80"})
+    lines = [line.rstrip() for line in told.stdout.splitlines()]
+    assert max(map(len, lines)) <= 80
+    assert [line.split() for line in lines[:2]] == [["A", folders[0].name], ["B", folders[1].name]]
+    shown = {line.split()[0] for line in lines if line}
+    assert {"steps", "time", "ranks", "push", "dust", "parts.rod.mesh.element_size"} <= shown, "a line each"
 
 
 def test_energy_is_drawn_without_its_kinetic_term(runs: tuple[Result, Result]) -> None:
