@@ -1,13 +1,16 @@
 """A new run that goes on where another one has left a checkpoint: what it takes over of that run's folder."""
 
+import json
 import os
 import shutil
 from pathlib import Path
 
 from conoid.cases import fragments, layout
 from conoid.cases.load import apply_overrides, read_data
+from conoid.cases.run import State
 
 from .errors import ServiceError
+from .folder import outcome
 
 _TRIES = 5
 """Times that the newest checkpoint is looked for. Chosen."""
@@ -44,8 +47,7 @@ def _taken(source: Path, target: Path) -> bool:
     """False when the checkpoint was removed meanwhile: a run that goes on keeps its newest ones."""
     checkpoint = latest(source)
     if checkpoint is None:
-        detail = f"run {source.name} has no checkpoint; a run that has succeeded keeps none"
-        raise ServiceError(409, "no_checkpoint", detail)
+        raise ServiceError(409, "no_checkpoint", f"run {source.name} has no checkpoint: {_why(source)}")
     try:
         shutil.copytree(checkpoint, target / checkpoint.name, copy_function=_link)
     except OSError:  # shutil.Error is one
@@ -54,6 +56,25 @@ def _taken(source: Path, target: Path) -> bool:
         shutil.rmtree(target / checkpoint.name, ignore_errors=True)
         return False
     return True
+
+
+def _why(source: Path) -> str:
+    """Why a run has none, and how one gets some."""
+    ended = outcome(source)
+    if ended is not None and ended.state == State.SUCCEEDED:
+        return "one that has succeeded keeps none"
+    said = "it began no step" if ended is not None and not ended.steps else "it has written none"
+    every = f"run.checkpoint_every ({_every(source)} in its case)"
+    return f"{said}; one is written every {every}, and when 'conoid checkpoint' asks for one"
+
+
+def _every(source: Path) -> str:
+    """As the case has it."""
+    try:
+        every = json.loads((source / layout.RESOLVED_CASE).read_bytes())["run"]["checkpoint_every"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return "?"
+    return "never" if every is None else f"{every:g} s"
 
 
 def _link(source: str, target: str) -> None:

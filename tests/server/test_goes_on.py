@@ -54,11 +54,22 @@ def test_without_a_checkpoint_there_is_nothing_to_go_on_from(server: Running) ->
     server.ann.wait_for(run)
     answer = server.ann.http.post(f"/v1/runs/{run}:restart")
     assert (answer.status_code, answer.json()["code"]) == (409, "no_checkpoint")
+    assert answer.json()["detail"] == f"run {run} has no checkpoint: one that has succeeded keeps none"
     assert len(server.ann.http.get("/v1/runs").json()["runs"]) == 1
     assert not list(server.ann.runs.glob(".new-*"))
     assert server.bob.http.post(f"/v1/runs/{run}:restart").status_code == 404
     with_checkpoint(server, run, 3)
     assert server.ann.http.post(f"/v1/runs/{run}:restart?ranks=3").status_code == 422, "there are 2 slots"
+
+
+def test_a_run_that_has_none_yet_says_how_it_gets_some(server: Running) -> None:
+    run = server.ann.submit(end="crash", extra='checkpoint_every = "60 s"')
+    server.ann.wait_for(run)
+    said = server.ann.http.post(f"/v1/runs/{run}:restart").json()["detail"]
+    assert said.startswith(
+        f"run {run} has no checkpoint: it has written none; one is written every run.checkpoint_every"
+    )
+    assert "(60 s in its case)" in said
 
 
 def made(folder: Path, *steps: int) -> Path:
