@@ -18,10 +18,14 @@ from conoid.cases.outcome import Outcome
 from . import html
 from .columns import Columns, joined, read_columns
 from .errors import ClientError, NotFoundError, UnfinishedError, ViewError
+from .figures import si
 from .journal import from_line
 from .pictures import Drawn, Mirror, Scene, Wall, draw
 
 _TABLE = re.compile(rf"{fragments.FOLDER}/fragments_(\d+)\.csv")
+_BEYOND = 0.01
+"""Of the time from the first frame to the last by which one may miss them. Chosen: a run ends within a step of its end.
+"""
 _NAMED = 8
 """Runs that are named when a folder holds some and is none. Chosen: as many as a line has room for."""
 
@@ -220,11 +224,17 @@ class Result:
         return [*frames, *(self.nearest(time) for time in times)]
 
     def nearest(self, time: float) -> int:
-        """The number of the frame that is nearest to ``time``, s. Raises UnfinishedError where no time is known."""
-        known = [(abs(one.time - time), one.index) for one in self.frames if one.time is not None]
+        """The number of the frame that is nearest to ``time``, s. Raises UnfinishedError where no time is known,
+        ViewError where the time lies before or beyond all frames.
+        """
+        known = {one.time: one.index for one in self.frames if one.time is not None}
         if not known:
             raise UnfinishedError(f"{self.folder.name} has no frame whose time is known")
-        return min(known)[1]
+        first, last = min(known), max(known)
+        if not first - _BEYOND * (last - first) <= time <= last + _BEYOND * (last - first):
+            told = f"the frames of {self.folder.name} are of {si(first, 's')} to {si(last, 's')}"
+            raise ViewError(f"time = {si(time, 's')}: {told}")
+        return known[min(known, key=lambda at: abs(at - time))]
 
     def scene(self) -> Scene:
         """What a picture takes from the case; nothing when there is no case to read."""

@@ -33,4 +33,6 @@ def view(
         raise ViewError(f"{path}: there is no such run, folder or frame")
     if path.suffix not in {".vtkhdf", ".vtu"}:
         raise ViewError(f"{path}: a frame file ends in .vtkhdf")
+    if frame not in (None, []) or time not in (None, []):
+        raise ViewError(f"{path}: this is one frame; a frame or a time is chosen of a run")
     return draw([path], Scene(), path.resolve().stem, field, out, **options)

@@ -8,10 +8,14 @@ import typer
 from conoid.cases.units import parse_quantity
 
 from .errors import ViewError
-from .options import Json, Token, Url, aloud, find, show_json
+from .figures import si
+from .options import Json, Token, Url, aloud, complain, find, show_json
 from .pictures import FIELDS
 from .session import connect
 from .view import view
+
+_NEAR = 0.005
+"""Of a time, by which a frame may be of another one without a word. Chosen: what three digits show."""
 
 
 def view_frames(
@@ -68,10 +72,18 @@ def view_frames(
         else:
             with connect(url, token) as session:
                 drawn = view(find(session, source).result(), field, **options)
+    _tell_of_times(options["time"], drawn.times)
     if as_json:
         show_json(drawn)
     else:
         typer.echo(drawn.out)
+
+
+def _tell_of_times(asked: list[float], drawn: list[float | None]) -> None:
+    """Says of each time how far the nearest frame is, where that is not as good as the same."""
+    for wanted, found in zip(asked, drawn[len(drawn) - len(asked) :], strict=True):
+        if found is not None and abs(found - wanted) > _NEAR * max(abs(wanted), abs(found)):
+            complain(f"time = {si(wanted, 's')}: the nearest frame is of {si(found, 's')}")
 
 
 def _seconds(text: str) -> float:

@@ -139,7 +139,13 @@ def test_view_draws_a_folder(quiet_home: Path) -> None:
 def test_view_takes_times_with_their_units(quiet_home: Path) -> None:
     folder = write_run(quiet_home / "bar")
     words = ("view", folder, "--camera", "-x", "--size", 200, 150, "--json", "--out", "p.png", "--time")
-    assert read(conoid(*words, "79 us"))["times"] == [80e-6]
+    near = conoid(*words, "79 us")
+    assert read(near)["times"] == [80e-6]
+    assert near.stderr == "conoid: time = 79.0 µs: the nearest frame is of 80.0 µs\n"
+    assert conoid(*words, "80 us").stderr == ""
+    assert conoid(*words, "1 ms").stderr == "conoid: time = 1.00 ms: the frames of bar are of 0 s to 80.0 µs\n"
+    one = conoid("view", folder / "frames" / "000007.vtkhdf", "--time", "80 us")
+    assert one.stderr.endswith("000007.vtkhdf: this is one frame; a frame or a time is chosen of a run\n")
     assert conoid(*words, "79").stderr == "conoid: time = '79': write it with its unit, such as '60 us'\n"
 
 
