@@ -19,7 +19,8 @@ from .store import Store
 
 _log = logging.getLogger("conoid.server")
 _PATIENCE = 5.0
-"""s after its start at which a server first looks at the folders, so that it answers before. Chosen."""
+"""s after its start at which a server first looks at the folders, so that it answers before, and between two looks for
+who asks. Chosen."""
 
 
 class Keeper:
@@ -29,7 +30,8 @@ class Keeper:
         """``is_open`` says whether a run has not ended for good."""
         self._settings, self._store, self._lines, self._is_open = settings, store, lines, is_open
         self._rules = settings.site.retention
-        self._lock = threading.Lock()
+        self._lock, self._asking = threading.Lock(), threading.Lock()
+        self._asked_again = 0.0
         self._sizes: dict[str, int] = {}
         self._settled: set[str] = set()
         """Runs whose size was read after their end."""
@@ -52,6 +54,15 @@ class Keeper:
         """Bytes of the folders of an owner's runs, at the last look."""
         return self._kept[owner]
 
+    def kept_now(self, owner: str) -> int:
+        """The same; where no thread looks they are looked at now, at most every ``_PATIENCE`` s. Raises SQLAlchemyError."""
+        with self._asking:
+            if not self._thread.is_alive() and time.monotonic() >= self._asked_again:
+                with suppress(OSError):
+                    self._weigh(*self._all())
+                self._asked_again = time.monotonic() + _PATIENCE
+        return self._kept[owner]
+
     def remove(self, run: Run, why: str) -> None:
         """Removes the folder of a run that has ended; its line is on disk first. Raises OSError."""
         path = self._settings.runs / run.id
@@ -64,13 +75,17 @@ class Keeper:
 
     def look(self) -> None:
         """One look at all folders. Raises OSError, SQLAlchemyError."""
-        known = {run.id: run for run in self._store.all()}
-        paths = [path for path in folder.runs_in(self._settings.runs) if path.name in known]
+        paths, known = self._all()
         self._weigh(paths, known)
         for run, why in self._due([known[path.name] for path in paths], time.time()):
             with suppress(FileNotFoundError):  # its owner was faster
                 self.remove(run, why)
                 _log.info("run %s of %s is removed: %s", run.id, run.owner, why)
+
+    def _all(self) -> tuple[list[Path], dict[str, Run]]:
+        """The folders of all runs that the database knows, and these."""
+        known = {run.id: run for run in self._store.all()}
+        return [path for path in folder.runs_in(self._settings.runs) if path.name in known], known
 
     def _weigh(self, paths: list[Path], known: dict[str, Run]) -> None:
         """Reads the sizes of all folders but those that change no more."""

@@ -51,7 +51,7 @@ def _used(service: Service, owner: str) -> dict[str, float]:
         "queued": service.store.open_runs(owner),
         "running": running,
         "core_seconds": seconds,
-        "output_bytes": service.keeper.kept(owner),
+        "output_bytes": service.keeper.kept_now(owner),
     }
 
 

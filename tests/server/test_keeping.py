@@ -124,6 +124,19 @@ def test_what_a_run_writes_after_the_last_look_at_it_counts(server: Running, tmp
     assert looks.kept("ann") > before + 1_000_000
 
 
+def test_who_asks_is_told_what_his_runs_have_on_disk_where_no_rule_has_them_looked_at(
+    server: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def told(user: User) -> int:
+        return int(user.http.get("/v1/me").json()["used"]["output_bytes"])
+
+    monkeypatch.setattr(keeper, "_PATIENCE", 0.0)
+    assert told(server.ann) == 0
+    (server.ann.runs / ended(server.ann) / "large").write_bytes(bytes(1_000_000))
+    assert 1_000_000 < told(server.ann) < 1_100_000
+    assert told(server.bob) == 0
+
+
 def test_a_run_that_is_removed_during_a_look_ends_no_look(server: Running) -> None:
     first, second = ended(server.ann), ended(server.ann)
     looks = keeper_of(server, bytes=1)
