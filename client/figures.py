@@ -5,6 +5,10 @@ from datetime import datetime
 
 _PREFIXES = ((1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 """SI."""
+_MOST = 1e12
+"""From which on a whole number is written with its power of ten. Chosen: nobody reads five groups of digits."""
+_MOST_HOURS = 10_000
+"""From which on minutes are left out. Chosen: a year."""
 _SHOWN = 5e-3, 1e4
 """Before a prefix: less is 0.00 of the smallest one, more has five digits of the largest before the point."""
 
@@ -28,9 +32,11 @@ def si(value: float, unit: str, digits: int = 3) -> str:
 
 
 def count(value: float | None) -> str:
-    """A whole number with spaces between thousands: ``12 400``; a dash when it is not known."""
+    """A whole number with spaces between thousands: ``12 400``, from 10^12 on ``2.4e+21``; a dash when not known."""
     if value is None:
         return "–"
+    if abs(value) >= _MOST:
+        return f"{value:.3g}"
     return f"{round(value):,}".replace(",", " ")
 
 
@@ -45,7 +51,9 @@ def duration(seconds: float) -> str:
         return f"{whole} s"
     if whole < 3600:
         return f"{whole // 60} min {whole % 60:02d} s"
-    return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
+    if whole < 3600 * _MOST_HOURS:
+        return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
+    return f"{seconds / 3600:.3g} h"
 
 
 def clock(wall: float) -> str:

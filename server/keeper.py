@@ -55,7 +55,10 @@ class Keeper:
         return self._kept[owner]
 
     def kept_now(self, owner: str) -> int:
-        """The same; where no thread looks they are looked at now, at most every ``_PATIENCE`` s. Raises SQLAlchemyError."""
+        """The same; where no thread looks they are looked at now, at most every ``_PATIENCE`` s.
+
+        Raises SQLAlchemyError.
+        """
         with self._asking:
             if not self._thread.is_alive() and time.monotonic() >= self._asked_again:
                 with suppress(OSError):

@@ -29,7 +29,8 @@ def test_si(value: float, unit: str, text: str) -> None:
 
 @pytest.mark.parametrize(
     ("seconds", "text"),
-    [(0.42, "0.4 s"), (9.96, "10 s"), (59.6, "1 min 00 s"), (125, "2 min 05 s"), (11040, "3 h 04 min"), (-1, "–"),
+    [(0.42, "0.4 s"), (9.96, "10 s"), (59.6, "1 min 00 s"), (125, "2 min 05 s"), (11040, "3 h 04 min"),
+     (1.2e22, "3.33e+18 h"), (-1, "–"),
      (math.nan, "–")],
 )  # fmt: skip
 def test_duration(seconds: float, text: str) -> None:
@@ -38,5 +39,6 @@ def test_duration(seconds: float, text: str) -> None:
 
 def test_counts_and_numbers() -> None:
     assert count(1234567.4) == "1 234 567"
+    assert count(2.4e21) == "2.4e+21"
     assert number(0.0214612345) == "0.0214612"
     assert {count(None), number(math.nan), rough(math.nan), si(math.nan, "s")} == {"–"}, "not known"
