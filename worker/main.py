@@ -54,8 +54,8 @@ def main(arguments: list[str]) -> int:
         return _run(options, comm, signals, began)
     except BaseException as error:
         log.error("rank %d stops the job\n%s", comm.rank, traceback.format_exc())
-        if storage.failed(error):
-            print(f"a file of the run cannot be written: {error}", file=sys.stderr, flush=True)
+        if storage.failed(error) or storage.gone(error, options.out):
+            print(f"a file of the run is gone or cannot be written: {error}", file=sys.stderr, flush=True)
             abort(ExitCode.STORAGE)
         raise
 

@@ -22,6 +22,8 @@ _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NU
 _NOT_FOR_WORKERS = ("CONOID_DATABASE", "CONOID_TOKEN")
 _CROWDED = 4
 """Ranks a core from which MPICH's waiting ranks had better sleep than spin."""
+_ABORTS = "Abort("
+"""What MPICH begins with where a rank ends all others."""
 _LAST_WORDS, _LOG_TAIL = 300, 1 << 14
 """Characters of a launcher's last line that are told; bytes at the end of its log in which that line is looked for.
 Chosen."""
@@ -188,12 +190,12 @@ class LocalWorker:
                 self._child.wait(_BURIAL)
 
     def _last_words(self) -> str:
-        """The last line that is not part of the launcher's own banner."""
+        """The last line that is neither of the launcher's own banner nor of MPI, which says that a rank has ended."""
         try:
             with open(self._folder / layout.LOGS / layout.LAUNCHER_LOG, "rb") as log:
                 log.seek(max(0, os.fstat(log.fileno()).st_size - _LOG_TAIL))
                 text = log.read().decode(errors="replace")
         except OSError:
             return ""
-        said = text.partition("=====")[0].strip().splitlines()
-        return said[-1].strip()[:_LAST_WORDS] if said else ""
+        said = [line.strip() for line in text.partition("=====")[0].splitlines() if not line.startswith(_ABORTS)]
+        return next((line[:_LAST_WORDS] for line in reversed(said) if line), "")

@@ -95,6 +95,10 @@ def end(how: str, options: argparse.Namespace, say: object, steps: int) -> int:
     if how == "full":
         print("OSError: [Errno 28] No space left on device", file=sys.stderr)
         return ExitCode.CRASHED
+    if how == "gone":
+        print("a file of the run is gone or cannot be written: history.csv", file=sys.stderr)
+        print("Abort(5) on node 0 (rank 0 in comm 0): application called MPI_Abort(COMM_WORLD, 5)", file=sys.stderr)
+        return ExitCode.STORAGE
     if how == "killed":
         os.kill(os.getpid(), signal.SIGKILL)
     if how == "torn":

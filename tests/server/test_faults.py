@@ -81,6 +81,13 @@ def test_a_worker_that_complains_of_a_full_disk_failed_for_storage(server: Runni
     assert (ended["state"], ended["cause"]) == ("failed", "storage")
 
 
+def test_a_worker_whose_file_was_removed_says_which(server: Running) -> None:
+    """MPI has the last word, and says nothing of it."""
+    ended = server.ann.wait_for(server.ann.submit(end="gone"))
+    assert (ended["state"], ended["cause"]) == ("failed", "storage")
+    assert ended["message"].endswith("its last words: a file of the run is gone or cannot be written: history.csv")
+
+
 # Folders --------------------------------------------------------------------------------------------------------------
 
 

@@ -11,7 +11,7 @@ import pytest
 from conoid.cases import history, layout
 from conoid.cases.messages import Energy
 from conoid.worker.fracture.columns import FacetConstants, Facets, PairState, Softening
-from conoid.worker.output import frames
+from conoid.worker.output import frames, storage
 from conoid.worker.output.damage import spent_energy
 from conoid.worker.output.frames import principal
 from conoid.worker.output.history import History
@@ -54,6 +54,18 @@ def test_a_file_of_an_earlier_worker_keeps_its_columns(tmp_path: Path) -> None:
         head, line = csv.reader(file)
     assert dict(zip(head, line, strict=True))["push [N]"] == "7.0"
     assert not any(history.part_of(name) for name in head)
+
+
+def test_a_file_of_the_run_that_is_gone_is_told_from_other_files(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    folder.mkdir()
+    table = History(folder, {})
+    (folder / layout.HISTORY).unlink()
+    with pytest.raises(FileNotFoundError) as raised:
+        table.close()
+    assert storage.gone(raised.value, folder)
+    assert not storage.gone(raised.value, tmp_path / "other")
+    assert not storage.gone(ValueError(str(folder)), folder)
 
 
 def test_one_part_alone_has_no_columns() -> None:

@@ -1,8 +1,17 @@
-"""Whether a failure is one of the disk: full, over its quota, or broken."""
+"""Whether a failure is one of the run's files: the disk is full, over its quota or broken, or a file is gone."""
 
 import errno
+import os
+from pathlib import Path
 
 _STORAGE = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.EFBIG, errno.ESTALE})
+
+
+def gone(error: BaseException, folder: Path) -> bool:
+    """True when a file below ``folder`` is the trouble: somebody has taken it away, or locked it up."""
+    if not isinstance(error, OSError) or not isinstance(error.filename, str | bytes):
+        return False
+    return Path(os.fsdecode(error.filename)).resolve().is_relative_to(folder.resolve())
 
 
 def failed(error: BaseException) -> bool:
