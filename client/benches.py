@@ -13,7 +13,7 @@ from conoid.cases.schema import MOST_RANKS
 from conoid.cases.units import parse_quantity
 
 from . import chart, study
-from .errors import ClientError
+from .errors import UsageError
 from .options import CaseArgument, Overrides, complain
 from .projection import Network, bandwidth
 from .scaling import CORES, scale
@@ -61,7 +61,7 @@ def _numbers(text: str) -> list[int]:
     words = [word.strip() for word in text.split(",")]
     if not all(word.isascii() and word.isdigit() and 1 <= int(word[:9]) <= MOST_RANKS for word in words):
         message = f"allowed: whole numbers from 1 to {MOST_RANKS} with commas between them, such as 1,2,4"
-        raise ClientError(f"--ranks = {shown(text)}: {message}")
+        raise UsageError(f"--ranks = {shown(text)}: {message}")
     return [int(word) for word in words]
 
 
@@ -70,7 +70,7 @@ def _read(option: str, text: str, reading: Callable[[str], float]) -> float:
     try:
         return reading(text)
     except ValueError as error:
-        raise ClientError(f"{option} = {shown(text)}: {str(error).removeprefix(f'{text!r} ')}") from None
+        raise UsageError(f"{option} = {shown(text)}: {str(error).removeprefix(f'{text!r} ')}") from None
 
 
 def _time(text: str) -> float:

@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 
 from conoid.cases import fragments, history
 
-from .errors import ClientError
+from .errors import ClientError, UsageError
 from .figures import number
 
 Column: TypeAlias = "array[float] | list[str]"
@@ -36,7 +36,7 @@ class Columns(dict[str, Column]):
         column = self.get(name)
         if not isinstance(column, array):
             known = ", ".join(each for each, values in self.items() if isinstance(values, array))
-            raise ClientError(f"column = {name!r}: columns of numbers are: {known}")
+            raise UsageError(f"column = {name!r}: columns of numbers are: {known}")
         return column
 
     def frame(self) -> Any:

@@ -4,8 +4,9 @@ import os
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.parse import urlsplit
 
-from .errors import ClientError
+from .errors import ClientError, UsageError
 
 DEFAULT_URL = "http://127.0.0.1:8750"
 
@@ -25,15 +26,28 @@ def config_file() -> Path:
 
 
 def target(url: str | None = None, token: str | None = None) -> Target:
-    """The server to talk to. A token from the file is only shown to the server that the file names."""
+    """The server to talk to. A token from the file is only shown to the server that the file names.
+
+    Raises ClientError.
+    """
     saved = read_config()
     chosen = (url or os.environ.get("CONOID_URL") or saved.get("url") or DEFAULT_URL).rstrip("/")
-    if not chosen.startswith(("http://", "https://")):
-        raise ClientError(f"url = {chosen!r}: write it with http:// or https://, such as {DEFAULT_URL}")
+    if not _is_address(chosen):
+        raise UsageError(f"url = {chosen!r}: write it with http:// or https://, such as {DEFAULT_URL}")
     shown = token or os.environ.get("CONOID_TOKEN")
     if not shown and chosen == saved.get("url", DEFAULT_URL).rstrip("/"):
         shown = saved.get("token")
     return Target(chosen, shown or None)
+
+
+def _is_address(url: str) -> bool:
+    """Whether it names a server: scheme, host, and a port that there may be."""
+    try:
+        parts = urlsplit(url)
+        fits = parts.port is None or parts.port > 0
+    except ValueError:
+        return False
+    return fits and parts.scheme in {"http", "https"} and bool(parts.hostname) and url.isprintable() and " " not in url
 
 
 def read_config() -> dict[str, str]:

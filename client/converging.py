@@ -16,7 +16,7 @@ from conoid.cases.schema import Case
 from . import converged
 from .converged import Book
 from .convergence import Done, run_all, series
-from .errors import ClientError
+from .errors import UsageError
 from .local import LocalServer
 from .options import CaseArgument, Overrides, Token, Url, complain
 from .reports import drawing
@@ -111,7 +111,7 @@ def _numbers(option: str, text: str) -> list[float]:
     except ValueError:
         values = [0.0]
     if not all(0.0 < value < 1e6 for value in values) or (option == "--meshes" and not values):
-        raise ClientError(f"{option} = {shown(text)}: allowed: positive numbers with commas between them")
+        raise UsageError(f"{option} = {shown(text)}: allowed: positive numbers with commas between them")
     return sorted(set(values))
 
 
@@ -121,5 +121,5 @@ def _forms(text: str) -> list[str]:
 
 def _one_of(option: str, word: str, allowed: Sequence[str]) -> str:
     if word not in allowed:
-        raise ClientError(f"{option} = {shown(word)}: allowed: {', '.join(allowed)}")
+        raise UsageError(f"{option} = {shown(word)}: allowed: {', '.join(allowed)}")
     return word

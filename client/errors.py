@@ -10,7 +10,11 @@
         ├── UnreachableError no server answered
         ├── NotFoundError    there is no such run, file or folder, here or on the server (then a ServiceError, too)
         ├── UnfinishedError  a result was asked of a run that has none yet
+        ├── UsageError       what was asked for is wrong: an argument, a value, a name that nobody knows
         └── ViewError        no picture could be made
+            └── LookError    a picture was asked for that there is none of (then a UsageError, too)
+
+The command line ends with 2 where what was asked for is wrong, be it a case or an argument, and with 1 for the rest.
 """
 
 from collections.abc import Mapping
@@ -66,8 +70,18 @@ class UnfinishedError(ClientError):
     """The run has not written what was asked for yet."""
 
 
+class UsageError(ClientError):
+    """What was asked for is wrong: an argument, a value, a name that nobody knows."""
+
+    exit_code = 2
+
+
 class ViewError(ClientError):
     """No picture could be made; the text says what is missing."""
+
+
+class LookError(UsageError, ViewError):
+    """A picture was asked for as there is none: an option, a field, a time."""
 
 
 def _line(status: int, problem: Mapping[str, Any]) -> str:

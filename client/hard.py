@@ -18,7 +18,7 @@ from conoid.cases.schema import Case
 from conoid.cases.suite import Hard, drift, faults, is_free, suite
 
 from .columns import Columns
-from .errors import ClientError
+from .errors import UsageError
 from .figures import count, known, rough
 from .local import LocalServer
 from .options import complain
@@ -78,7 +78,7 @@ def chosen(known: Sequence[Hard], words: Sequence[str]) -> list[Hard]:
     for word in words:
         if not any(word == each.name or word in each.rows for each in known):
             names = ", ".join(each.name for each in known)
-            raise ClientError(f"hard = {word!r}: allowed: a row as H14, or one of {names}")
+            raise UsageError(f"hard = {word!r}: allowed: a row as H14, or one of {names}")
     return [each for each in known if not words or each.name in words or set(each.rows) & set(words)]
 
 

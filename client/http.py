@@ -14,7 +14,7 @@ import msgspec
 
 from conoid.cases.messages import AnyMessage
 
-from .errors import ClientError, UnreachableError, refusal
+from .errors import UnreachableError, UsageError, refusal
 from .journal import from_line
 
 T = TypeVar("T")
@@ -56,7 +56,7 @@ class Http:
         """
         shown = (token or "").strip()
         if not all("!" <= letter <= "~" for letter in shown):
-            raise ClientError("token: only visible ASCII characters are allowed; was it copied whole?")
+            raise UsageError("token: only visible ASCII characters are allowed; was it copied whole?")
         headers = {"Authorization": f"Bearer {shown}"} if shown else {}
         self.url = url.rstrip("/")
         self._has_token = bool(shown)

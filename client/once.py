@@ -14,7 +14,7 @@ from conoid.cases.schema import Case
 
 from . import silence, tables
 from .console import PlainConsole
-from .errors import ClientError
+from .errors import UsageError
 from .live import Live, exit_code
 from .local import GRACE, LocalServer
 from .pictures import FIELDS, Drawn
@@ -44,7 +44,7 @@ def run_once(
     Ctrl-C, and SIGTERM, cancel the run, wait for its end and stop the server.
     """
     if field is not None and field not in FIELDS:
-        raise ClientError(f"field = {field!r}: allowed: {', '.join(FIELDS)}")
+        raise UsageError(f"field = {field!r}: allowed: {', '.join(FIELDS)}")
     data = data_of(case, overrides)
     checked = parse_case(data)
     out = PlainConsole(quiet=as_json, highlight=False)

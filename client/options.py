@@ -17,7 +17,7 @@ from conoid.cases.problems import Problem
 
 from . import silence
 from .console import PlainConsole, plain
-from .errors import ClientError
+from .errors import ClientError, NotFoundError, UsageError
 from .figures import duration
 from .result import Result
 from .run import Run
@@ -55,9 +55,13 @@ def _complete_files(incomplete: str) -> list[str]:
 
 
 def named(text: str) -> str:
-    """The id of a run or a sweep as it was given. Raises ClientError for an empty one: a variable that is not set."""
+    """The id of a run or a sweep as it was given, or a folder. Raises UsageError for an empty one: a variable that is
+    not set; NotFoundError for a path at which there is no folder: no id has a ``/``.
+    """
     if not text.strip():
-        raise ClientError("the name is empty: write an id, or 'last'")
+        raise UsageError("the name is empty: write an id, or 'last'")
+    if "/" in text and not Path(text).is_dir():
+        raise NotFoundError(f"{text}: this is no folder of a run; write its folder, its id, or 'last'")
     return text
 
 
@@ -85,10 +89,10 @@ def labels_of(words: Sequence[str] | None) -> dict[str, str]:
     pairs = [word.partition("=") for word in words or ()]
     for name, equals, _ in pairs:
         if not (name and equals):
-            raise ClientError(f"label = {name!r}: write NAME=VALUE")
+            raise UsageError(f"label = {name!r}: write NAME=VALUE")
     labels = {name: value for name, _, value in pairs}
     if len(labels) < len(pairs):
-        raise ClientError(f"label: each has one value; given are {', '.join(words or ())}")
+        raise UsageError(f"label: each has one value; given are {', '.join(words or ())}")
     return labels
 
 
@@ -137,7 +141,9 @@ def aloud(what: str) -> Iterator[Callable[[str], None]]:
 
 
 def find(session: Session, run: str) -> Run:
-    """The run of an id, or the newest one for ``last``. Raises ClientError when there is none yet."""
+    """The run of an id, or the newest one for ``last``. Raises ClientError when there is none yet, or for a folder."""
+    if "/" in run:
+        raise UsageError(f"run = {run!r}: this asks a server; write the id of a run, or 'last'")
     if run != "last":
         return session.run(run)
     newest = session.runs(limit=1)

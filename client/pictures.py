@@ -18,7 +18,7 @@ from typing import Any
 
 import msgspec
 
-from .errors import ClientError, ViewError
+from .errors import ClientError, LookError, ViewError
 
 _SECONDS = 180.0
 """s that a frame may take to be drawn. Chosen: without a graphics card a large one takes long."""
@@ -152,12 +152,12 @@ def draw(
     try:
         look = Look(**options)
     except TypeError as error:
-        raise ViewError(f"{error}; allowed: {', '.join(Look.__struct_fields__)}") from None
+        raise LookError(f"{error}; allowed: {', '.join(Look.__struct_fields__)}") from None
     target = Path(out or f"{name}-{field}.png").resolve()
     _check(look, target)
     planes, sections = mirrors(look.mirror, scene), mirrors(look.section, scene, "section")
     if {plane.axis for plane in planes} & {plane.axis for plane in sections}:
-        raise ViewError(f"section = {look.section!r}: across an axis that is mirrored; leave one of the two out")
+        raise LookError(f"section = {look.section!r}: across an axis that is mirrored; leave one of the two out")
     picture = Picture(
         frames=[str(frame) for frame in frames], out=str(target), field=field, look=look,
         camera=direction(look.camera, "camera"), up=direction(look.up, "up"),
@@ -170,19 +170,19 @@ def draw(
 def _check(look: Look, target: Path) -> None:
     low, high = look.percentiles
     if not 0.0 <= low < high <= 100.0:
-        raise ViewError(f"percentiles = {low:g}, {high:g}: two numbers from 0 to 100, the smaller one first")
+        raise LookError(f"percentiles = {low:g}, {high:g}: two numbers from 0 to 100, the smaller one first")
     if look.limits is not None and not look.limits[0] < look.limits[1]:
-        raise ViewError(f"limits = {look.limits[0]:g}, {look.limits[1]:g}: the smaller one first")
+        raise LookError(f"limits = {look.limits[0]:g}, {look.limits[1]:g}: the smaller one first")
     if not (look.zoom > 0.0 and look.rate > 0.0):
-        raise ViewError(f"zoom = {look.zoom:g}, rate = {look.rate:g}: both above 0")
+        raise LookError(f"zoom = {look.zoom:g}, rate = {look.rate:g}: both above 0")
     if target.suffix.lower() not in {".png", ".gif"}:
-        raise ViewError(f"{target.name}: the name of a picture ends in .png or .gif")
+        raise LookError(f"{target.name}: the name of a picture ends in .png or .gif")
 
 
 def require_field(name: str) -> None:
     """Raises ViewError for a field that nobody knows."""
     if name not in FIELDS:
-        raise ViewError(f"field = {name!r}: allowed: {', '.join(FIELDS)}")
+        raise LookError(f"field = {name!r}: allowed: {', '.join(FIELDS)}")
 
 
 _NUMBER = r"[+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?\d+)?"
@@ -200,7 +200,7 @@ def mirrors(text: str, scene: Scene, option: str = "mirror") -> tuple[Mirror, ..
     planes = [_PLANE.fullmatch(plane) for plane in text.split(",")]
     if None in planes:
         auto = "auto, none, or " if option == "mirror" else ""
-        raise ViewError(f"{option} = {text!r}: write {auto}planes such as x or x,y=0.002 (in m)")
+        raise LookError(f"{option} = {text!r}: write {auto}planes such as x or x,y=0.002 (in m)")
     return tuple(Mirror("xyz".index(plane[1]), float(plane[2] or 0.0)) for plane in planes if plane is not None)
 
 
@@ -213,7 +213,7 @@ def direction(text: str, option: str) -> tuple[float, float, float] | None:
         return sign * (axis[2] == "x"), sign * (axis[2] == "y"), sign * (axis[2] == "z")
     found = _DIRECTION.fullmatch(text)
     if found is None or not any(float(each) for each in found.groups()):
-        raise ViewError(f"{option} = {text!r}: write an axis such as -x, or a direction such as 1,-1.5,0.6")
+        raise LookError(f"{option} = {text!r}: write an axis such as -x, or a direction such as 1,-1.5,0.6")
     return float(found[1]), float(found[2]), float(found[3])
 
 

@@ -11,7 +11,7 @@ from conoid.cases.balancing import WORK, Guard, Trigger, lost
 from conoid.cases.messages import AnyMessage, Balance, Groups, Load
 from conoid.cases.schema import Balance as Spec
 
-from .errors import ClientError
+from .errors import ClientError, UsageError
 
 Point = tuple[float, float, float]
 Shares = list[tuple[int, float]]
@@ -110,7 +110,7 @@ def replay(record: Record, spec: Spec, ranks: int, cost: float, scale: Point = (
     ``scale`` multiplies positions before every cut. At most as many ranks as groups.
     """
     if not 1 <= ranks <= len(record.centres):
-        raise ClientError(f"ranks = {ranks}: 1 to {len(record.centres)}, the number of groups")
+        raise UsageError(f"ranks = {ranks}: 1 to {len(record.centres)}, the number of groups")
     places = [(x * scale[0], y * scale[1], z * scale[2]) for x, y, z in record.centres]
     account, trigger, first = Account(named(spec), ranks), Trigger(spec, cost), record.moments[0]
     held = divide(places, record.tets, ranks)
@@ -140,7 +140,7 @@ def compare(record: Record, spec: Spec, ranks: int, cost: float, scale: Point) -
 
 
 def chosen(spec: Spec, words: str, alpha: float | None = None) -> Spec:
-    """The ``spec`` of a case with another policy, as a user writes it: ``every:500``. Raises ClientError."""
+    """The ``spec`` of a case with another policy, as a user writes it: ``every:500``. Raises UsageError."""
     policy, colon, every = words.partition(":")
     told = {"policy": policy} | ({"every": every} if every else {}) | ({"alpha": alpha} if alpha is not None else {})
     try:
@@ -148,7 +148,7 @@ def chosen(spec: Spec, words: str, alpha: float | None = None) -> Spec:
             raise ValueError
         return Spec.model_validate(spec.model_dump() | told)
     except ValueError:
-        raise ClientError(
+        raise UsageError(
             f"policy = {words!r}, alpha = {told.get('alpha', spec.alpha):g}: "
             "allowed: measured, outside, every, every:N, never; alpha greater than 1"
         ) from None

@@ -17,7 +17,7 @@ from conoid.cases.outcome import Outcome
 
 from . import html
 from .columns import Columns, joined, read_columns
-from .errors import ClientError, NotFoundError, UnfinishedError, ViewError
+from .errors import ClientError, LookError, NotFoundError, UnfinishedError, ViewError
 from .figures import si
 from .journal import from_line
 from .pictures import Drawn, Mirror, Scene, Wall, draw
@@ -233,7 +233,7 @@ class Result:
         first, last = min(known), max(known)
         if not first - _BEYOND * (last - first) <= time <= last + _BEYOND * (last - first):
             told = f"the frames of {self.folder.name} are of {si(first, 's')} to {si(last, 's')}"
-            raise ViewError(f"time = {si(time, 's')}: {told}")
+            raise LookError(f"time = {si(time, 's')}: {told}")
         return known[min(known, key=lambda at: abs(at - time))]
 
     def scene(self) -> Scene:

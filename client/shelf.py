@@ -9,7 +9,7 @@ from conoid.cases import library, load, reference
 from conoid.cases.page import page
 
 from . import tables
-from .errors import ClientError
+from .errors import ClientError, UsageError
 from .options import Json, complete_cases, complete_materials, show, show_json
 
 cases = typer.Typer(invoke_without_command=True, help="The shipped cases: list them, copy one.")
@@ -75,7 +75,7 @@ def copy_case(
     text = load.shipped_path(name).read_text(encoding="utf-8")
     target = out or Path(f"{name}.toml")
     if target.suffix != ".toml":
-        raise ClientError(f"--out = {str(target)!r}: the name of a case file ends in .toml")
+        raise UsageError(f"--out = {str(target)!r}: the name of a case file ends in .toml")
     if target.exists():
         raise ClientError(f"{target} is there already; name another file with --out")
     _write(target, text.replace(f"{reference.LINE} ../{reference.FILE}", f"{reference.LINE} ./{reference.FILE}", 1))

@@ -141,11 +141,13 @@ def points_along(axes: Mapping[str, Sequence[Any]], *, grid: bool = False, named
 
 
 def points_in(path: Path) -> list[Point]:
-    """The points in a CSV file: its first line has the keys. Raises CaseError, OSError."""
+    """The points in a CSV file: its first line has the keys. Raises CaseError."""
     named = repr(str(path))
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             head, *lines = [line for line in csv.reader(file) if line] or [[]]
+    except OSError as error:
+        raise CaseError([Problem("--list", named, str(error.strerror))]) from None
     except UnicodeDecodeError:
         raise CaseError([Problem("--list", named, "not UTF-8 text")]) from None
     except csv.Error as error:

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from .errors import ClientError
+from .errors import UsageError
 from .options import CaseArgument, Json, Token, Url, aloud, named, show_json
 from .session import connect
 from .sweep import SweepInfo, points_in, points_of
@@ -31,7 +31,7 @@ def sweep(
 ) -> None:
     """Run a case at many points; prints the id of the sweep. sweep-table and sweep-plot show what came out."""
     if (listed is None) == (not sets):
-        raise ClientError("give the points with --set KEY=A,B,C, or with --list FILE")
+        raise UsageError("give the points with --set KEY=A,B,C, or with --list FILE")
     points = points_in(listed) if listed is not None else points_of(sets or (), grid=grid)
     with connect(url, token) as session:
         with aloud(f"handing {len(points)} points in"):

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from .errors import ClientError
+from .errors import ClientError, UsageError
 
 Row = Mapping[str, str]
 
@@ -41,7 +41,7 @@ def figure(rows: Sequence[Row], keys: Sequence[str], x: str | None, columns: Seq
 
 def _axis(rows: Sequence[Row], keys: Sequence[str], x: str | None) -> str:
     if x is not None and x not in keys:
-        raise ClientError(f"x = {x!r}: the sweep changes {', '.join(keys)}")
+        raise UsageError(f"x = {x!r}: the sweep changes {', '.join(keys)}")
     varies = [key for key in keys if len({row[key] for row in rows}) > 1]
     return x or next(iter([*varies, *keys]))
 
@@ -50,7 +50,7 @@ def _known(rows: Sequence[Row], name: str) -> str:
     there = [column for column in rows[0] if any(_number(row[column]) is not None for row in rows)]
     known = {_bare(column): column for column in there} | {column: column for column in there}
     if name not in known:
-        raise ClientError(f"{name!r}: the table has the numbers {', '.join(map(_bare, there))}")
+        raise UsageError(f"{name!r}: the table has the numbers {', '.join(map(_bare, there))}")
     return known[name]
 
 

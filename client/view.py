@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from .errors import ViewError
+from .errors import LookError, ViewError
 from .pictures import Drawn, Scene, draw, require_field
 from .result import Result
 
@@ -32,7 +32,7 @@ def view(
     if not path.is_file():
         raise ViewError(f"{path}: there is no such run, folder or frame")
     if path.suffix not in {".vtkhdf", ".vtu"}:
-        raise ViewError(f"{path}: a frame file ends in .vtkhdf")
+        raise LookError(f"{path}: a frame file ends in .vtkhdf")
     if frame not in (None, []) or time not in (None, []):
-        raise ViewError(f"{path}: this is one frame; a frame or a time is chosen of a run")
+        raise LookError(f"{path}: this is one frame; a frame or a time is chosen of a run")
     return draw([path], Scene(), path.resolve().stem, field, out, **options)

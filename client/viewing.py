@@ -7,7 +7,7 @@ import typer
 
 from conoid.cases.units import parse_quantity
 
-from .errors import ViewError
+from .errors import LookError
 from .figures import si
 from .options import Json, Token, Url, aloud, complain, find, show_json
 from .pictures import FIELDS
@@ -67,7 +67,7 @@ def view_frames(
         "size": size, "raw": raw, "edges": edges, "scale": scale, "transparent": transparent, "rate": rate,
     }  # fmt: skip
     with aloud("drawing"):
-        if Path(source).exists() or Path(source).suffix:
+        if Path(source).exists() or Path(source).suffix or "/" in source:
             drawn = view(source, field, **options)
         else:
             with connect(url, token) as session:
@@ -94,4 +94,4 @@ def _seconds(text: str) -> float:
         reason = "write it with its unit, such as '60 us'"
     except ValueError as error:
         reason = str(error)
-    raise ViewError(f"time = {text!r}: {reason}")
+    raise LookError(f"time = {text!r}: {reason}")

@@ -151,7 +151,7 @@ def test_view_takes_times_with_their_units(quiet_home: Path) -> None:
 
 def test_view_says_what_it_knows(quiet_home: Path) -> None:
     result = conoid("view", write_run(quiet_home / "bar"), "--field", "misses")
-    assert result.exit_code == 1
+    assert result.exit_code == 2
     assert result.stderr.startswith("conoid: field = 'misses': allowed: mises, pressure, principal_stress, damage")
 
 
@@ -339,7 +339,7 @@ def test_run_refuses_a_wrong_case_before_anything_starts(alone: Path) -> None:
     assert result.stderr.startswith("conoid: run.end_time = -1: ")
     assert not (alone / "runs").exists()
     assert time.monotonic() - began < 10
-    assert conoid("run", "demo", "--field", "colour").exit_code == 1
+    assert conoid("run", "demo", "--field", "colour").exit_code == 2
 
 
 def test_serve_hands_its_options_on(alone: Path) -> None:

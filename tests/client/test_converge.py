@@ -180,5 +180,5 @@ def test_the_numbers_of_a_run_are_references_probes_and_shares_of_energy() -> No
 )
 def test_options_that_mean_nothing_are_refused(words: list[str], said: str) -> None:
     ended = CliRunner().invoke(cli.app, ["converge", "bar_on_bar", *words])
-    assert ended.exit_code == 1
+    assert ended.exit_code == 2
     assert said in ended.output

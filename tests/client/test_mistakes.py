@@ -10,6 +10,7 @@ from typer.testing import CliRunner, Result
 from conoid.cases import layout, messages
 from conoid.client import cli, http, sweeping
 from conoid.client.cli import app
+from conoid.client.config import DEFAULT_URL
 from conoid.client.errors import ClientError
 from conoid.client.following import FolderRun
 from conoid.client.run import inside
@@ -54,6 +55,31 @@ def test_a_folder_that_is_none_of_a_run_is_not_followed(quiet_home: Path) -> Non
     assert "many is not the folder of a run, it holds those of one" in refused(1, "watch", "many")
 
 
+@pytest.mark.parametrize("command", ["watch", "show", "report", "get", "cancel"])
+def test_a_path_at_which_there_is_no_run_asks_no_server(command: str, quiet_home: Path) -> None:
+    assert refused(1, command, "runs/none") == (
+        "conoid: runs/none: this is no folder of a run; write its folder, its id, or 'last'"
+    )
+
+
+def test_a_folder_is_told_that_a_server_wants_an_id(quiet_home: Path) -> None:
+    (quiet_home / "runs" / "one").mkdir(parents=True)
+    assert refused(2, "show", "runs/one") == (
+        "conoid: run = 'runs/one': this asks a server; write the id of a run, or 'last'"
+    )
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("submit", "demo", "--label", "x"), ("submit", "none.toml"), ("sweep", "demo"),
+        ("view", ".", "--time", "60"), ("view", ".", "--field", "x"), ("show", ""),
+    ],
+)  # fmt: skip
+def test_what_is_asked_wrongly_ends_with_2(words: tuple[str, ...], quiet_home: Path) -> None:
+    refused(2, *words)
+
+
 def test_nothing_is_put_into_a_folder_that_is_none_of_a_run(quiet_home: Path) -> None:
     Path("empty").mkdir()
     assert refused(1, "cancel", "empty") == "conoid: empty has no journal.jsonl"
@@ -84,17 +110,17 @@ def test_a_damaged_case_is_named(damaged: Path, command: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "code", "said"),
     [
-        (("sweep", "demo", "--list", "missing.csv"), "missing.csv: No such file or directory"),
-        (("sweep", "demo", "--list", "."), ".: Is a directory"),
-        (("run", "demo", "--out", "/proc/none"), "/proc/none: No such file or directory"),
-        (("run", "demo", "--out", "file"), "file: File exists"),
+        (("sweep", "demo", "--list", "missing.csv"), 2, "--list = 'missing.csv': No such file or directory"),
+        (("sweep", "demo", "--list", "."), 2, "--list = '.': Is a directory"),
+        (("run", "demo", "--out", "/proc/none"), 1, "/proc/none: No such file or directory"),
+        (("run", "demo", "--out", "file"), 1, "file: File exists"),
     ],
 )
-def test_a_file_that_cannot_be_used_is_named(quiet_home: Path, words: tuple[str, ...], said: str) -> None:
+def test_a_file_that_cannot_be_used_is_named(quiet_home: Path, words: tuple[str, ...], code: int, said: str) -> None:
     Path("file").touch()
-    assert refused(1, *words).endswith(said)
+    assert refused(code, *words).endswith(said)
 
 
 def test_a_table_that_is_no_text_is_named(quiet_home: Path) -> None:
@@ -119,13 +145,15 @@ def test_without_slurm_nothing_is_prepared(quiet_home: Path, monkeypatch: pytest
 # Servers and tokens ---------------------------------------------------------------------------------------------------
 
 
-def test_an_address_that_is_none_is_named(quiet_home: Path) -> None:
-    assert "url = 'http://[::1': " in refused(1, "ls", "--url", "http://[::1")
+@pytest.mark.parametrize("url", ["http://[", "http://[::1", "http://a:b", "http://a b", "http://h:99999", "http://:1"])
+def test_an_address_that_is_none_is_one_line(url: str, quiet_home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CONOID_URL", url)
+    assert refused(2, "ls") == f"conoid: url = {url!r}: write it with http:// or https://, such as {DEFAULT_URL}"
 
 
 @pytest.mark.parametrize("token", ["conoid_12ab…", "two words", "line\nfeed"])
 def test_a_token_that_no_server_makes_is_not_sent(quiet_home: Path, token: str) -> None:
-    line = refused(1, "ls", "--url", "http://127.0.0.1:1", "--token", token)
+    line = refused(2, "ls", "--url", "http://127.0.0.1:1", "--token", token)
     assert line == "conoid: token: only visible ASCII characters are allowed; was it copied whole?"
 
 
@@ -137,7 +165,7 @@ def test_space_round_a_token_is_no_part_of_it() -> None:
 @pytest.mark.parametrize("words", [("show",), ("watch",), ("cancel",), ("get",), ("report",), ("sweep-table",)])
 def test_an_empty_id_is_none(quiet_home: Path, words: tuple[str, ...]) -> None:
     """A variable of a script that is not set."""
-    assert "an id, or 'last'" in refused(1, *words, "")
+    assert "an id, or 'last'" in refused(2, *words, "")
 
 
 def test_a_file_outside_of_a_run_is_not_fetched(quiet_home: Path) -> None:

@@ -182,4 +182,4 @@ def test_the_command_compares_all_policies_in_a_folder(tmp_path: Path) -> None:
     assert "on 4 ranks, the run had 2; a cut costs 1 s; 17 moments, 8 groups" in shown.stdout
     assert "the run: every:10" in shown.stdout
     refused = CliRunner().invoke(app, ["replay-balance", folder, "--policy", "sometimes"])
-    assert (refused.exit_code, refused.stderr[:30]) == (1, "conoid: policy = 'sometimes', ")
+    assert (refused.exit_code, refused.stderr[:30]) == (2, "conoid: policy = 'sometimes', ")

@@ -116,7 +116,7 @@ def test_another_answer_on_more_ranks_is_an_error(
 @pytest.mark.parametrize(("option", "value"), [("--ranks", "two"), ("--latency", "2 m"), ("--bandwidth", "5")])
 def test_what_cannot_be_read_is_one_line(option: str, value: str) -> None:
     result = conoid("demo", option, value)
-    assert result.exit_code == 1
+    assert result.exit_code == 2
     assert len(result.stderr.splitlines()) == 1
     assert result.stderr.startswith(f"conoid: {option} = '{value}': ")
 
@@ -124,7 +124,7 @@ def test_what_cannot_be_read_is_one_line(option: str, value: str) -> None:
 @pytest.mark.parametrize("ranks", ["two", "0", "-1", "1,,2", "1 2", "2.5", "4097", "9" * 5000, "²", ""])
 def test_numbers_of_ranks_that_cannot_be(ranks: str) -> None:
     result = conoid("demo", "--ranks", ranks)
-    assert result.exit_code == 1
+    assert result.exit_code == 2
     said = "allowed: whole numbers from 1 to 4096 with commas between them, such as 1,2,4\n"
     assert result.stderr.endswith(said)
     assert len(result.stderr) < 200

@@ -61,7 +61,7 @@ def test_a_copy_is_the_case_and_names_the_schema_beside_it(quiet_home: Path) -> 
         ),
         (
             ("cases", "copy", "demo", "--out", "demo.json"),
-            1,
+            2,
             "conoid: --out = 'demo.json': the name of a case file ends in",
         ),
         (("materials", "stel"), 2, "conoid: material = 'stel': unknown material; did you mean 'steel'?"),
