@@ -52,7 +52,9 @@ class Value(msgspec.Struct, frozen=True):
 
     @property
     def relative(self) -> float:
-        """Of the larger magnitude; 0 where both are 0."""
+        """Of the larger magnitude; 0 where both are 0, NaN where one is not known."""
+        if math.isnan(self.difference):
+            return math.nan
         return self.difference / max(abs(self.a), abs(self.b)) if self.difference else 0.0
 
 

@@ -64,6 +64,8 @@ def test_ends_and_fragments_are_compared(runs: tuple[Result, Result]) -> None:
 
 
 def test_a_run_that_never_ended_by_itself_is_compared_too(runs: tuple[Result, Result], tmp_path: Path) -> None:
+    ended = json.loads((tmp_path / "a" / "outcome.json").read_text())
+    (tmp_path / "a" / "outcome.json").write_text(json.dumps({**ended, "eroded": 0}))
     (tmp_path / "b" / "outcome.json").write_text('{"state": "lost", "steps": null, "time": null, "elements": 5}')
     told = CliRunner().invoke(app, ["compare", str(tmp_path / "a"), str(tmp_path / "b")])
     assert told.exit_code == 0, told.output
