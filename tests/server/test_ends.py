@@ -13,7 +13,9 @@ from conoid.cases.outcome import Outcome, from_json
 from conoid.cases.outcome import to_json as outcome_to_json
 from conoid.cases.run import State
 from conoid.server import ends
-from conoid.server.events import Run
+from conoid.server.events import Run, WorkerExited
+from conoid.server.launch import Exit, Phase
+from conoid.server.watch import Watch
 
 from .fake_worker import progress
 from .running import Running
@@ -61,6 +63,33 @@ def test_the_end_is_the_last_that_was_heard(tmp_path: Path) -> None:
     os.utime(tmp_path / layout.OUTCOME, (70.0, 70.0))
     assert ends.when(tmp_path) == 70.0
     assert ends.when(told(tmp_path, STARTED)) == 11.0
+
+
+class Gone:
+    """A worker that has ended, unless it lives."""
+
+    def __init__(self, alive: bool) -> None:
+        self.alive_now = alive
+
+    def exited(self) -> Exit | None:
+        return None if self.alive_now else Exit(None, False, "")
+
+    def phase(self) -> Phase:
+        return "runs"
+
+    def began(self) -> float:
+        return 5.0
+
+
+@pytest.mark.parametrize(("seen", "at"), [(True, 0.0), (False, 11.0)], ids=["seen alive", "gone when first looked at"])
+def test_an_end_that_nobody_saw_is_when_the_run_was_last_heard_of(seen: bool, at: float, tmp_path: Path) -> None:
+    """Of a job of Slurm that has ended while no server was there."""
+    worker = Gone(alive=seen)
+    watch = Watch(told(tmp_path, STARTED), worker, None)  # type: ignore[arg-type]
+    looks = [*watch.look()]
+    worker.alive_now = False
+    looks += watch.look()
+    assert [event.at for event in looks if isinstance(event, WorkerExited)][:1] == [at]
 
 
 def test_a_run_that_never_started_has_no_numbers(server: Running, tmp_path: Path) -> None:
