@@ -210,6 +210,14 @@ def checks_table(checks: Sequence[Check]) -> Table:
     return made
 
 
+_LONGEST = 60
+"""Characters of the value of a key that are shown. Chosen: two lines beside another one; a description is a page."""
+
+
+def _brief(text: str) -> str:
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
+
+
 _NUMBERS = ("A", "B", "difference", "%")
 _LEAST = 26
 """Characters of names beside numbers. Chosen: what they leave of 80, and most names fit."""
@@ -218,9 +226,9 @@ _LEAST = 26
 def comparison_tables(found: Comparison) -> list[Table | str]:
     """What differs between two runs, what their ends are, and what is said of their fragments."""
     same = "the same answer, to the bit" if found.same_answer else "different answers"
-    keys = table("key", "A", "B", wide=("key", "A", "B"), least=_LEAST)
+    keys = table("key", "A", "B", wide=("A", "B"))
     for each in found.keys:
-        keys.add_row(each.key, *("–" if value is None else str(value) for value in (each.a, each.b)))
+        keys.add_row(each.key, *("–" if value is None else _brief(str(value)) for value in (each.a, each.b)))
     runs = pairs(dict(zip("AB", found.names, strict=True)))
     parts: list[Table | str] = [runs, same, "", keys if found.keys else "no key of the case differs"]
     for title, values in (("at the end", found.ends), ("fragments", found.sizes)):

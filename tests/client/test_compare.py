@@ -88,6 +88,10 @@ def test_the_command_tells_and_draws(runs: tuple[Result, Result], tmp_path: Path
 
 def test_the_tables_are_read_on_a_terminal_of_80_columns(runs: tuple[Result, Result], tmp_path: Path) -> None:
     """Runs of a server have names of 22 letters."""
+    for name in ("a", "b"):
+        case = json.loads((tmp_path / name / "case.resolved.json").read_text())
+        said = f"{name} bar of steel that hits a wall " * 20
+        (tmp_path / name / "case.resolved.json").write_text(json.dumps({**case, "description": said}))
     folders = [(tmp_path / name).rename(tmp_path / f"1k17skpaczsdw34brntcee{name}") for name in ("a", "b")]
     told = CliRunner().invoke(app, ["compare", *map(str, folders)], env={"COLUMNS": "80"})
     lines = [line.rstrip() for line in told.stdout.splitlines()]
@@ -95,6 +99,8 @@ def test_the_tables_are_read_on_a_terminal_of_80_columns(runs: tuple[Result, Res
     assert [line.split() for line in lines[:2]] == [["A", folders[0].name], ["B", folders[1].name]]
     shown = {line.split()[0] for line in lines if line}
     assert {"steps", "time", "ranks", "push", "dust", "parts.rod.mesh.element_size"} <= shown, "a line each"
+    assert next(line for line in lines if line.startswith("push")).endswith(" -20.00"), "nothing is cut off"
+    assert sum("steel" in line for line in lines) <= 3, "of a description the beginning is enough"
 
 
 def test_energy_is_drawn_without_its_kinetic_term(runs: tuple[Result, Result]) -> None:
