@@ -14,7 +14,7 @@ from conoid.cases.units import parse_quantity
 
 from . import chart, study
 from .errors import UsageError
-from .options import CaseArgument, Overrides, complain
+from .options import CaseArgument, Overrides, aloud, complain
 from .projection import Network, bandwidth
 from .scaling import CORES, scale
 from .submission import case_of
@@ -42,11 +42,12 @@ def bench_scale(
     """
     numbers = _numbers(ranks)
     network = Network(_read("--latency", latency, _time), _read("--bandwidth", width, bandwidth))
-    with tempfile.TemporaryDirectory() as passing:
+    with tempfile.TemporaryDirectory() as passing, aloud(f"0 of {len(numbers)} runs have ended") as name:
         runs = []
         for run in scale(case, overrides or (), numbers, out or Path(passing), network):
             complain(f"ranks {run.ranks}: {run.steps} steps in {run.wall:.1f} s")
             runs.append(run)
+            name(f"{len(runs)} of {len(numbers)} runs have ended")
     done = study.Study(case_of(case, overrides or ()).name, overrides or (), CORES, network, runs)
     if out is not None:
         (out / "scale.md").write_text(study.to_markdown(done), encoding="utf-8")

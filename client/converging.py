@@ -18,7 +18,7 @@ from .converged import Book
 from .convergence import Done, run_all, series
 from .errors import UsageError
 from .local import LocalServer
-from .options import CaseArgument, Overrides, Token, Url, complain
+from .options import CaseArgument, Overrides, Token, Url, aloud, complain
 from .reports import drawing
 from .scaling import CORES
 from .session import Session, connect
@@ -60,9 +60,14 @@ def converge(
                 _one_of("--vary", vary, (STEPS, SEEDS)), ranks)  # fmt: skip
     done: list[Done] = []
     many = len(plan.points(checked))
-    with tempfile.TemporaryDirectory() as passing, _session(out or Path(passing), ranks, on_server, url, token) as at:
+    with (
+        tempfile.TemporaryDirectory() as passing,
+        aloud(f"0 of {many} runs have ended") as name,
+        _session(out or Path(passing), ranks, on_server, url, token) as at,
+    ):
         for each in run_all(at, data, plan):
             done.append(each)
+            name(f"{len(done)} of {many} runs have ended")
             complain(f"{len(done)} of {many}: {_told(each)}")
     book = _book(checked, overrides or (), plan, accuracy, done)
     _write(book, quantity, out)

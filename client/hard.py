@@ -21,7 +21,7 @@ from .columns import Columns
 from .errors import UsageError
 from .figures import count, known, rough
 from .local import LocalServer
-from .options import complain
+from .options import aloud, complain
 from .run import Run
 from .scaling import CORES
 from .session import Session
@@ -59,11 +59,13 @@ def hard(
         return
     with (
         tempfile.TemporaryDirectory() as passing,
+        aloud(f"0 of {len(some)} runs have ended") as name,
         LocalServer((out or Path(passing)) / "runs", max(ranks, CORES)) as at,
     ):
         ended = []
         for verdict in run_all(at.session, some, ranks):
             ended.append(verdict)
+            name(f"{len(ended)} of {len(some)} runs have ended")
             complain(f"{len(ended)} of {len(some)}: {verdict.hard.name}: {'; '.join(verdict.faults) or 'ended well'}")
     text = to_markdown(ended)
     if out is not None:

@@ -27,6 +27,9 @@ from .submission import data_of, locate
 _MOST_WARNINGS = 12
 """Lines of warnings that are printed. Chosen: half a screen."""
 
+_RARER = 1.2
+"""From one word to the next, over the time that something takes. Chosen: some forty words in a day."""
+
 Url = Annotated[str | None, typer.Option("--url", help="The server [CONOID_URL, or the configuration file].")]
 Token = Annotated[str | None, typer.Option("--token", help="Who asks [CONOID_TOKEN, or the configuration file].")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
@@ -129,14 +132,23 @@ def show_json(thing: Any) -> None:
 
 @contextmanager
 def aloud(what: str) -> Iterator[Callable[[str], None]]:
-    """While what is done inside takes long, people are told ``what`` it is at, or what it was last called with."""
-    at, began = what, time.monotonic()
+    """While what is done inside takes long, people are told ``what`` it is at, or what it was last called with; of what
+    takes hours more and more rarely.
+    """
+    at, began, due = what, time.monotonic(), 0.0
 
     def name(now: str) -> None:
         nonlocal at
         at = now
 
-    with silence.broken(complain, lambda: f"{at}, {duration(time.monotonic() - began)} so far"):
+    def say(text: str) -> None:
+        nonlocal due
+        spent = time.monotonic() - began
+        if spent >= due:
+            complain(text)
+            due = _RARER * spent
+
+    with silence.broken(say, lambda: f"{at}, {duration(time.monotonic() - began)} so far"):
         yield name
 
 
