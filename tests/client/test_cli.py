@@ -119,9 +119,9 @@ def test_no_server_is_one_line(words: tuple[str, ...], quiet_home: Path) -> None
 
 def test_a_label_is_a_name_and_a_value(quiet_home: Path) -> None:
     result = conoid("ls", "--label", "batch", "--url", "http://127.0.0.1:1")
-    assert (result.exit_code, result.stderr) == (1, "conoid: label = 'batch': write NAME=VALUE\n")
+    assert (result.exit_code, result.stderr) == (2, "conoid: label = 'batch': write NAME=VALUE\n")
     result = conoid("ls", "--label", "a=1", "--label", "a=2", "--url", "http://127.0.0.1:1")
-    assert (result.exit_code, result.stderr) == (1, "conoid: label: each has one value; given are a=1, a=2\n")
+    assert (result.exit_code, result.stderr) == (2, "conoid: label: each has one value; given are a=1, a=2\n")
 
 
 @pytest.mark.usefixtures("warm")
