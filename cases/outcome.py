@@ -74,12 +74,18 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     warnings: list[str] = []
 
 
+def known(value: float | None) -> float | None:
+    """A number of an outcome; None where it is not known."""
+    return None if value is None or math.isnan(value) else value
+
+
 def last_message(outcome: Outcome) -> dict[str, Any]:
     """The fields of the message that tells of the outcome (messages.Finished): 0 for what is not known."""
-    t, elapsed = (0.0 if math.isnan(seconds) else seconds for seconds in (outcome.time, outcome.elapsed))
     steps = outcome.steps or 0
-    told = {"state": outcome.state, "digest": outcome.digest, "steps": steps, "elapsed": elapsed}
-    return {"step": steps, "t": t, **told}
+    return {
+        "step": steps, "t": known(outcome.time) or 0.0, "state": outcome.state, "digest": outcome.digest,
+        "steps": steps, "elapsed": known(outcome.elapsed) or 0.0,
+    }  # fmt: skip
 
 
 def to_json(outcome: Outcome) -> bytes:

@@ -23,6 +23,12 @@ from .figures import count, day, duration, known, number, rough, si
 from .replay import Account
 from .run import RunInfo
 
+_LONGEST = 60
+"""Characters of the value of a key that are shown. Chosen: two lines beside another one; a description is a page."""
+_NUMBERS = ("A", "B", "difference", "%")
+_LEAST = 26
+"""Characters of names beside numbers. Chosen: what they leave of 80, and most names fit."""
+
 
 def table(*columns: str, right: Sequence[str] = (), wide: Sequence[str] = ("case",), least: int | None = None) -> Table:
     """An open table with these columns; those named in ``right`` are numbers, ``wide`` ones are wrapped where need be,
@@ -210,17 +216,8 @@ def checks_table(checks: Sequence[Check]) -> Table:
     return made
 
 
-_LONGEST = 60
-"""Characters of the value of a key that are shown. Chosen: two lines beside another one; a description is a page."""
-
-
 def _brief(text: str) -> str:
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
-
-
-_NUMBERS = ("A", "B", "difference", "%")
-_LEAST = 26
-"""Characters of names beside numbers. Chosen: what they leave of 80, and most names fit."""
 
 
 def comparison_tables(found: Comparison) -> list[Table | str]:

@@ -1,6 +1,5 @@
 """purged.jsonl: a line for every run whose folder has been removed, so that what came of it is not forgotten."""
 
-import math
 import os
 import threading
 import time
@@ -11,6 +10,7 @@ from typing import Any
 
 import msgspec
 
+from conoid.cases.outcome import known
 from conoid.cases.run import Cause, State
 
 from . import durable, folder
@@ -58,17 +58,13 @@ def of(run: Run, path: Path, why: str) -> Farewell:
     """The line of a run that has ended, while its folder is there."""
     ended = folder.outcome(path)
     results: dict[str, Any] = (
-        {} if ended is None else {"steps": ended.steps, "time": _known(ended.time), "digest": ended.digest}
+        {} if ended is None else {"steps": ended.steps, "time": known(ended.time), "digest": ended.digest}
     )
     return Farewell(
         id=run.id, owner=run.owner, name=run.name, ranks=run.ranks, submitted=run.submitted, started=run.started,
         finished=run.finished, state=run.state.value, cause=run.cause.value if run.cause else None,
         message=run.message, removed=time.time(), why=why, bytes=folder.size(path), **results,
     )  # fmt: skip
-
-
-def _known(seconds: float) -> float | None:
-    return None if math.isnan(seconds) else seconds
 
 
 class Farewells:

@@ -6,7 +6,7 @@ second is booked when ``note`` is called before the next kick.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -49,6 +49,8 @@ class Boundary(ABC):
         self._impulse = np.zeros((len(nodes), 3))
         """(n, 3) of the last step, N s."""
         self._rooms = Rooms("nodes", *KEPT, "_before")
+        self._kept: tuple[str, ...] = KEPT
+        """What it remembers of its nodes."""
 
     @abstractmethod
     def held_components(self) -> Bits:
@@ -84,11 +86,15 @@ class Boundary(ABC):
 
     def keep(self, parcel: Parcel, name: str) -> None:
         """Adds what the boundary must remember to a parcel, under its ``name``."""
-        keep_columns(self, KEPT, parcel, name)
+        for key in self._kept:
+            values = getattr(self, key)
+            column = np.zeros((length(parcel.nodes), *values.shape[1:]))
+            column[self.nodes] = values
+            parcel.nodes[f"{name}.{key}"] = column
 
     def resume(self, parcel: Parcel, name: str, dt: float) -> None:
         """Takes it back; ``dt``: of the last step, s."""
-        for key in KEPT:
+        for key in self._kept:
             setattr(self, key, parcel.nodes[f"{name}.{key}"][self.nodes])
         self._before = np.zeros((len(self.nodes), 3))
 
@@ -118,15 +124,6 @@ class SymmetryPlane(Boundary):
 
     def mirror(self, vectors: Floats) -> None:
         _hold(vectors, self.nodes, self._axis)
-
-
-def keep_columns(boundary: Boundary, keys: Sequence[str], parcel: Parcel, name: str) -> None:
-    """Adds what a boundary has under these ``keys``, a row a node of it, to a parcel under its ``name``."""
-    for key in keys:
-        values = getattr(boundary, key)
-        column = np.zeros((length(parcel.nodes), *values.shape[1:]))
-        column[boundary.nodes] = values
-        parcel.nodes[f"{name}.{key}"] = column
 
 
 def mirrored(n: int, bounds: Iterable[Boundary]) -> Flags:

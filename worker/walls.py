@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .boundaries import Boundary, book_half, free, keep_columns
+from .boundaries import KEPT, Boundary, book_half, free
 from .jit import njit
 from .migration.parcel import Parcel
 from .state import Bits, Flags, Floats, Indices, Ints, Nodes, extended
@@ -33,11 +33,8 @@ class RigidWalls(Boundary):
     ) -> None:  # fmt: skip
         super().__init__(nodes)
         self._friction = np.zeros(len(points)) if friction is None else friction
-        self._rubs = bool(self._friction.any())
-        self._rubbed = np.zeros((len(nodes) if self._rubs else 0, 3))
+        self._rubbed = np.zeros((len(nodes) if self._friction.any() else 0, 3))
         """(n, 3) impulse of friction of the last step, N s; (0, 3) where there is no friction."""
-        if self._rubs:
-            self.friction_loss = np.zeros(len(nodes))
         self._mirrored = np.zeros((len(nodes), 3), bool) if mirrored is None else mirrored
         self._points = points
         self._normals = normals / np.linalg.norm(normals, axis=1)[:, None]
@@ -45,6 +42,10 @@ class RigidWalls(Boundary):
         self._pushed = False
         self.given = np.zeros((len(nodes), 3 * len(points)))
         """(n, 3 walls) what each wall has given each node so far, N s."""
+        self._kept = (*KEPT, "given")
+        if self._friction.any():
+            self.friction_loss = np.zeros(len(nodes))
+            self._kept = (*self._kept, "friction_loss", "_rubbed")
 
     def held_components(self) -> Bits:
         return free(self.nodes)
@@ -60,23 +61,12 @@ class RigidWalls(Boundary):
     def _inherit(self, at: Ints) -> None:
         self._held = extended(self._held, self._held[at])
         self._mirrored = extended(self._mirrored, self._mirrored[at])
-        for key in self._kept:
+        for key in self._kept[len(KEPT) :]:
             values = getattr(self, key)
             setattr(self, key, extended(values, np.zeros((len(at), *values.shape[1:]))))
 
-    @property
-    def _kept(self) -> tuple[str, ...]:
-        """What it remembers of its nodes besides KEPT."""
-        return ("given", "friction_loss", "_rubbed") if self._rubs else ("given",)
-
-    def keep(self, parcel: Parcel, name: str) -> None:
-        super().keep(parcel, name)
-        keep_columns(self, self._kept, parcel, name)
-
     def resume(self, parcel: Parcel, name: str, dt: float) -> None:
         super().resume(parcel, name, dt)
-        for key in self._kept:
-            setattr(self, key, parcel.nodes[f"{name}.{key}"][self.nodes])
         self._pushed = True
 
     def note(self, state: Nodes) -> None:

@@ -2,7 +2,6 @@
 
 import csv
 import io
-import math
 from collections import Counter
 from collections.abc import Sequence
 from typing import Annotated, Any
@@ -12,7 +11,7 @@ from fastapi.responses import JSONResponse
 from msgspec import structs
 from starlette.concurrency import run_in_threadpool
 
-from conoid.cases.outcome import Outcome
+from conoid.cases.outcome import Outcome, known
 
 from .. import openapi, view
 from ..auth import Identity, Reader, Submitter
@@ -121,11 +120,7 @@ def _results(ended: Outcome | None) -> dict[str, Any]:
     checks = {_with_unit(f"reference.{check.name}", check.unit): check.value for check in ended.reference}
     numbers = {"steps": ended.steps, **times, **{name: getattr(ended, name) for name in names}}
     found = {**numbers, **terms, **checks}
-    return {**{name: "" if _unknown(value) else value for name, value in found.items()}, "digest": ended.digest}
-
-
-def _unknown(value: float | None) -> bool:
-    return value is None or math.isnan(value)
+    return {**{name: "" if known(value) is None else value for name, value in found.items()}, "digest": ended.digest}
 
 
 def _with_unit(name: str, unit: str) -> str:

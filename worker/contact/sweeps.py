@@ -277,17 +277,16 @@ def sweep_all(active, loaded, contacts, fastest, n, scale, many):  # type: ignor
 def store(kept, loaded, pair):  # type: ignore[no-untyped-def]
     """What loaded contacts have ``kept``: their impulses times their row norms."""
     pairs, cracks, normal, tangent, row = kept.pairs, kept.cracks, loaded.normal, loaded.tangent, loaded.row
+    last = np.empty(4)
     for q in range(loaded.many[0]):
-        p, push = pair[row[q]], normal[q, PUSH] * normal[q, ROW_NORM]
-        if not push > 0.0 or p == -1:
+        p = pair[row[q]]
+        last[0] = normal[q, PUSH] * normal[q, ROW_NORM]
+        if not last[0] > 0.0:
             continue
-        if p >= 0:
-            pairs[p, 0] = push
-        else:
-            cracks[CRACK - p, 0] = push
         for i in range(3):
-            across = tangent[q, PUSH_T + i] * tangent[q, ROW_NORM_T]
+            last[1 + i] = tangent[q, PUSH_T + i] * tangent[q, ROW_NORM_T]
+        for i in range(4):
             if p >= 0:
-                pairs[p, 1 + i] = across
-            else:
-                cracks[CRACK - p, 1 + i] = across
+                pairs[p, i] = last[i]
+            elif p <= CRACK:
+                cracks[CRACK - p, i] = last[i]
