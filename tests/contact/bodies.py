@@ -12,7 +12,7 @@ import numpy.typing as npt
 from conoid.cases import schema
 from conoid.worker import assembly, domain
 from conoid.worker.contact import surface
-from conoid.worker.contact.records import Crowd
+from conoid.worker.contact.records import CrackSides, Crowd
 from conoid.worker.contact.surface import Surface
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.parallel.comm import Comm, SerialComm
@@ -60,9 +60,8 @@ def surface_of(
 ) -> Surface:
     """The surface of a rank's piece; ``planes`` (nodes, planes): which nodes are on which symmetry plane."""
     on_planes = np.zeros((model.nodes.n, 0), bool) if planes is None else planes
-    return surface.build(
-        model, on_planes, piece.neighbours, comm or SerialComm(), edges, *np.zeros((2, 0, 3), np.int32)
-    )
+    nothing = CrackSides.none(), np.zeros((0, 3), np.int32)
+    return surface.build(model, on_planes, piece.neighbours, comm or SerialComm(), edges, *nothing)
 
 
 def crowd_of(x: Floats, v: Floats | None = None, part: Indices | None = None) -> Crowd:

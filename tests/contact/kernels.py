@@ -76,7 +76,7 @@ def face_table(corners: Indices, size: Floats, left: Floats) -> FaceTable:
 def edge_table(corners: Indices, size: Floats, left: Floats) -> EdgeTable:
     """Edges between exposed faces."""
     n = len(corners)
-    return EdgeTable(corners, size, np.ones((n, 2), bool), left, np.zeros(n, bool))
+    return EdgeTable(corners, size, np.ones(n, bool), left, np.zeros(n, bool))
 
 
 def pair_table(pairs: Indices) -> PairTable:

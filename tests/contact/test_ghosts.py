@@ -46,7 +46,7 @@ def test_what_is_packed_comes_out_bit_by_bit(f: int, e: int, n: int) -> None:
 
     faces = Faces(random.integers(0, 2**50, f), random.integers(0, 2**40, (f, 4)), random.normal(size=f), flags(f))
     ends, sides = random.integers(0, 2**40, (e, 4)), random.integers(0, 2**40, (e, 2))
-    edges = Edges(ends, sides, random.normal(size=e), flags(e, 2), flags(e))
+    edges = Edges(ends, sides, random.normal(size=e), flags(e, 2), flags(e, 2), flags(e))
     crowd = random_crowd(random, n)
     got_faces, got_edges, got_crowd = ghosts.unpack(ghosts.pack(faces, edges, crowd))
     assert (got_faces.id == faces.id).all()

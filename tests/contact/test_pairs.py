@@ -85,7 +85,7 @@ class Shards:
         self.edges = (first[:, None, None] + EDGES).reshape(-1, 4).astype(np.int32)
         self.size, self.length = face_sizes(self.x, self.faces), edge_sizes(self.x, self.edges)
         self.exposed = draw.uniform(size=len(self.faces)) < 0.8
-        self.ridges = draw.uniform(size=(len(self.edges), 2)) < 0.9
+        self.ridges = (draw.uniform(size=(len(self.edges), 2)) < 0.9).all(axis=1)
         self.on_surface = draw.uniform(size=len(self.x)) < 0.9
         outward = np.tile(CORNERS - CORNERS.mean(axis=0), (SHARDS, 1))
         self.normals = self.facing(outward)
@@ -115,7 +115,7 @@ class Shards:
         slots = slot_table(first, self.normals, tracks.short.left, tracks.short.course)
         slots = slots._replace(on_surface=self.on_surface, fresh=self.node_fresh)
         faces = face_table(self.faces, self.size, tracks.faces)._replace(exposed=self.exposed, fresh=self.face_fresh)
-        edges = edge_table(self.edges, self.length, tracks.edges)._replace(exposed=self.ridges, fresh=self.edge_fresh)
+        edges = edge_table(self.edges, self.length, tracks.edges)._replace(meets=self.ridges, fresh=self.edge_fresh)
         return slots, faces, edges, step_of(self.x, self.v, part, dt)
 
     def knock(self) -> None:
@@ -129,7 +129,7 @@ class Shards:
         edges = self.draw.uniform(size=len(self.edges)) < 0.02
         nodes = self.draw.uniform(size=len(self.x)) < 0.02
         self.exposed, self.face_fresh = self.exposed | faces, self.face_fresh | faces
-        self.ridges, self.edge_fresh = self.ridges | edges[:, None], self.edge_fresh | edges
+        self.ridges, self.edge_fresh = self.ridges | edges, self.edge_fresh | edges
         self.on_surface, self.node_fresh = self.on_surface | nodes, self.node_fresh | nodes
         self.normals[nodes] = self.facing(self.draw.normal(size=(int(nodes.sum()), 3)))
 

@@ -62,6 +62,7 @@ class World:
             Faces(faces, self.faces[faces], self.size[faces], shown[faces]),
             Edges(
                 self.edges[edges], self.sides[edges], self.length[edges], shown[self.sides[edges]],
+                shown[self.sides[edges]],
                 np.ones(len(edges), bool),
             ), crowd, nodes,
         )  # fmt: skip

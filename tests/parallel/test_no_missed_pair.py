@@ -130,7 +130,9 @@ class Brute(Found):
         edges = sides.edges.take(sides.edges.sharp)
         edges = edges.take(np.lexsort((edges.sides[:, 1], edges.sides[:, 0])))
         places = sides.crowd.places(edges.nodes)
-        of = edge_table(places, edges.size, np.zeros(len(places)))._replace(exposed=edges.exposed)
+        of = edge_table(places, edges.size, np.zeros(len(places)))._replace(
+            meets=np.asarray(edges.aged.all(axis=1) & edges.exposed.any(axis=1))
+        )
         for every in self._pairs(places[:, :2], places[:, :2]):
             pairs, table = every[every[:, 0] < every[:, 1]], PairTable()
             room = ContactRows.room(len(pairs))

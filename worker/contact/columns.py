@@ -144,7 +144,11 @@ class SceneEdges:
     """(e, 2) rows of these, -1 for a face that is not here."""
     size: Floats
     exposed: Flags
-    """(e, 2) whether either face is; only edges between exposed faces are met."""
+    """(e, 2) whether either face is."""
+    aged: Flags
+    """(e, 2) see records.Edges."""
+    meets: Flags
+    """(e,) whether its faces allow that others meet it: see records.Edges."""
     sharp: Flags
     """(e,) whether it is, or has been (sharp.py)."""
     own: Flags
@@ -162,12 +166,13 @@ class SceneEdges:
 
     @classmethod
     def at_rest(
-        cls, corners: Indices, sides: Ints, faces: Indices, size: Floats, exposed: Flags, sharp: Flags, own: Flags,
-        rank: Ints,
+        cls, corners: Indices, sides: Ints, faces: Indices, size: Floats, exposed: Flags, aged: Flags, sharp: Flags,
+        own: Flags, rank: Ints,
     ) -> "SceneEdges":  # fmt: skip
         """Nothing is searched yet."""
-        far = np.flatnonzero((faces < 0).any(axis=1))
-        return cls(corners, sides, faces, size, exposed, sharp, own, rank, far, *np.zeros((3, len(corners)), bool))
+        far, meets = np.flatnonzero((faces < 0).any(axis=1)), np.asarray(aged.all(axis=1) & exposed.any(axis=1))
+        live, new, fresh = np.zeros((3, len(corners)), bool)
+        return cls(corners, sides, faces, size, exposed, aged, meets, sharp, own, rank, far, live, new, fresh)
 
     @property
     def names(self) -> Ints:

@@ -19,6 +19,7 @@ from ..topology import Split
 from .families import Families
 from .geometry import at, cross, dot, half, minus, plus
 from .narrow_phase import CONTACT_ROWS, CRACK, DEEP_SELF, LINE, NEAR, STEP, needed
+from .records import CrackSides
 
 _WIDE = 0.2
 """Of the typical size of a face: two sides that have moved so far apart are surface from then on. At 0.1, 33 of 38
@@ -26,6 +27,8 @@ searches in the first 500 steps of the glass bar are called by cracks that open 
 """
 _FORESEEN = 0.5
 """Of that width: the faces of a crack as wide as this are searched, so that they have their pairs when it opens."""
+AGE, _YOUNG = 16, 0.1
+"""Steps between two in which cracks may come of age, and the share of young ones from which on they do."""
 _KEPT = 12
 """Columns of what a crack has kept."""
 _AHEAD = 8
@@ -44,6 +47,8 @@ class Cracks:
     """(m, 2, 3) block, place and face of either side, -1 for one of another rank."""
     foreseen: Flags
     """(m,) whether the scene of the last search has the sides."""
+    aged: Flags
+    """(m,) whether it was there when cracks came of age: edges between its sides and surface meet others since."""
     places: Indices
     """(m, 6) of the nodes, in the scene; all -1 for a crack without nodes that have separated, and for one that another
     rank computes, that of the first side."""
@@ -57,8 +62,8 @@ class Cracks:
     def none(cls, ids: Ints) -> "Cracks":
         """No facet; ``ids``: of the local nodes."""
         faces, sides = np.zeros((0, 2), np.int64), np.zeros((0, 2, 3), np.int32)
-        families, none = Families.of(ids), np.zeros((0, 6), np.int32)
-        return cls(faces, none, sides, np.zeros(0, bool), none, np.zeros((0, _KEPT)), families)
+        families, none, flags = Families.of(ids), np.zeros((0, 6), np.int32), np.zeros(0, bool)
+        return cls(faces, none, sides, flags, flags, none, np.zeros((0, _KEPT)), families)
 
     def add(self, tets: Ints, nodes: Indices, sides: Indices, blocks: list[Block]) -> None:
         """Takes up facets of ``tets`` (m, 2) with their three ``nodes`` (m, 3)."""
@@ -70,6 +75,7 @@ class Cracks:
         self.faces, self.sides = extended(self.faces, faces), extended(self.sides, sides)
         self.nodes = extended(self.nodes, np.concatenate([nodes, nodes], axis=1))
         self.foreseen = extended(self.foreseen, np.zeros(len(faces), bool))
+        self.aged = extended(self.aged, np.zeros(len(faces), bool))
         self.places = extended(self.places, np.full((len(faces), 6), -1, np.int32))
         self.kept = extended(self.kept, np.zeros((len(faces), _KEPT)))
 
@@ -86,7 +92,7 @@ class Cracks:
         rows, k = np.nonzero(self.sides[:, :, 1] >= 0)
         faces = self.faces[rows]
         return {"tet": faces[range(len(rows)), k] // 4, "key": 2 * faces[:, 0] + k, "faces": faces,
-                "with": ids[self.nodes[rows]], "kept": self.kept[rows]}  # fmt: skip
+                "with": ids[self.nodes[rows]], "aged": self.aged[rows], "kept": self.kept[rows]}  # fmt: skip
 
     @classmethod
     def resume(cls, table: Table, root: Ints, blocks: list[Block], nodes: Nodes) -> "Cracks":
@@ -104,13 +110,29 @@ class Cracks:
             sides[rows, k] = np.column_stack([np.full(len(rows), b), at[rows, k], faces[rows, k] % 4])
         nowhere, kept = np.full((len(faces), 6), -1, np.int32), np.array(table["kept"])
         families = Families.of(root)
-        return cls(faces, nodes.places(table["with"]), sides, np.zeros(len(faces), bool), nowhere, kept, families)
+        foreseen, aged = np.zeros(len(faces), bool), np.array(table["aged"])
+        return cls(faces, nodes.places(table["with"]), sides, foreseen, aged, nowhere, kept, families)
 
-    def foresee(self) -> Indices:
-        """(k, 3) block, place and face of all sides here, which a scene takes up."""
+    def foresee(self) -> CrackSides:
+        """All sides here, which a scene takes up."""
         self.foreseen[:] = True
-        sides = self.sides.reshape(-1, 3)
-        return sides[sides[:, 1] >= 0]
+        sides, aged = self.sides.reshape(-1, 3), np.repeat(self.aged, 2)
+        here = sides[:, 1] >= 0
+        return CrackSides(sides[here & ~aged], sides[here & aged])
+
+    @property
+    def ages(self) -> Ints:
+        """(2,) how many are young, and how many there are, each counted by the rank that has its first side."""
+        mine = self.sides[:, 0, 1] >= 0
+        return np.array([int((mine & ~self.aged).sum()), int(mine.sum())])
+
+    def age(self, ages: Ints) -> bool:
+        """All come of age if enough are young, by the ``ages`` of all ranks; whether they do. That is not left to the
+        searches that other things call for: no answer depends on when they happen.
+        """
+        if due := bool(ages[0] > _YOUNG * ages[1]):
+            self.aged[:] = True
+        return due
 
     def beside(self, rows: Ints, blocks: list[Block]) -> tuple[Flags, Flags]:
         """(nodes,) which nodes the tets here at some of the cracks and the families at their corners have; and which

@@ -90,7 +90,7 @@ def edge_edge(out, n, pairs, edges, step, course, end):  # type: ignore[no-untyp
     are apart.
     """
     rows, until, speed, active = pairs.rows, pairs.until, pairs.speed, pairs.active
-    corners, size, exposed, left, fresh = edges.corners, edges.size, edges.exposed, edges.left, edges.fresh
+    corners, size, meets, left, fresh = edges.corners, edges.size, edges.meets, edges.left, edges.fresh
     nodes, weights, normals, wanted = out.nodes, out.weights, out.normals, out.wanted
     x, v, ahead, dt = step.x, step.v, step.ahead, step.dt
     tested = 0
@@ -101,8 +101,7 @@ def edge_edge(out, n, pairs, edges, step, course, end):  # type: ignore[no-untyp
         if until[p] > left[one] + left[two] + speed[p] * end:
             continue
         a, b, c, d = corners[one, 0], corners[one, 1], corners[two, 0], corners[two, 1]
-        here = exposed[one, 0] and exposed[one, 1] and exposed[two, 0] and exposed[two, 1]
-        if not here or a == b or c == d or _opposite(corners, one, two):
+        if not (meets[one] and meets[two]) or a == b or c == d or _opposite(corners, one, two):
             until[p], speed[p] = np.inf, 0.0
             continue
         active[tested] = p

@@ -19,8 +19,6 @@ from .scene import Scene
 
 _WORDS = 9 + 2 * normals.SHARE
 """Of the row of a crack that opens (Exterior.widened)."""
-_NO_SIDES = np.zeros((0, 3), np.int32)
-"""That may become surface: none (block, place, face)."""
 
 
 class Exterior:
@@ -53,7 +51,9 @@ class Exterior:
     def resume(self, parcel: Parcel, size: float, separated: bool) -> None:
         """Takes them back; all ranks take part."""
         self.size, self._separated = size, separated
-        self.surface.sharpen(np.sort(parcel.rows["contact.turned"]["name"]))
+        turned = np.sort(parcel.rows["contact.turned"]["name"])
+        self.surface.sharpen(turned)
+        self.surface.turned = turned  # those at cracks, too, which the next search brings to the surface
         self.surface.flags = np.array(parcel.nodes["contact.flags"])
         self._moments = np.array(parcel.nodes["contact.moments"])
         nodes = self._model.nodes
@@ -84,8 +84,7 @@ class Exterior:
         ``flags`` (n,), still are, and edges that have become sharp, ``turned``, stay so. All ranks take part.
         """
         model, neighbours, comm = self._model, self._neighbours, self._comm
-        sides = self.cracks.foresee() if len(self.cracks.faces) else _NO_SIDES
-        covered = _NO_SIDES
+        sides, covered = self.cracks.foresee(), np.zeros((0, 3), np.int32)
         if self._tiring is not None:
             covered = bare.covered(model.blocks, self._tiring, neighbours, comm)
         found = surface.build(model, self._planes, neighbours, comm, self._edges, sides, covered)
@@ -134,6 +133,12 @@ class Exterior:
             self._tiring = bare.tiring(self._model.blocks)
         if self._separated or self._tiring is not None:
             self.surface = self._build(self.surface.flags, self.surface.turned)
+
+    def age(self) -> bool:
+        """Edges of all cracks that are there may meet others from now on, where edges do; whether a search has to take
+        them up. All ranks take part.
+        """
+        return self._edges and self.cracks.age(self._comm.sum(self.cracks.ages))
 
     def turn(self) -> None:
         """Mean normals of all nodes anew; all ranks take part."""

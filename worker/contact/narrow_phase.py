@@ -166,12 +166,12 @@ class EdgeTable(NamedTuple):
     """(e, 4) slots: records.Edges."""
     size: Floats
     """(e,) initial length, m."""
-    exposed: Flags
-    """(e, 2) whether either face is; only edges between exposed faces are met."""
+    meets: Flags
+    """(e,) whether its faces allow that others meet it: records.Edges."""
     left: Floats
     """(e,) the larger of its ends, m."""
     fresh: Flags
-    """(e,) with new corners, or exposed since the last step."""
+    """(e,) with new corners, or a face exposed since the last step."""
 
 
 _N1, _N2, _I1, _B1, _B2 = (
@@ -183,7 +183,7 @@ STEP = record(Step, types.float64[:, :], _F2, types.float64[:, :], _N1, _F2, *(5
 PAIRS = record(Pairs, _N2, _F1, _F1, _B1, _N1, _N1)
 SLOTS = record(SlotTable, _F2, _B1, _N1, _F1, _F2, _B1, _N1)
 FACES = record(FaceTable, _N2, _F1, _I1, _B1, _F1, _B1, _F2, _B1)
-EDGES = record(EdgeTable, _N2, _F1, _B2, _F1, _B1)
+EDGES = record(EdgeTable, _N2, _F1, _B1, _F1, _B1)
 
 
 @njit("float64(float64, float64, float64, float64, float64)", cache=True, error_model="numpy")

@@ -77,7 +77,10 @@ class Edges(Rows):
     size: Floats
     """(n,) initial length, m."""
     exposed: Flags
-    """(n, 2) whether either face is exposed; the edge meets others when both are, and it is sharp."""
+    """(n, 2) whether either face is exposed."""
+    aged: Flags
+    """(n, 2) whether either face is, or is the side of a crack that is old enough (cracks.AGE): an edge meets others
+    when it is sharp, both faces are that and one is exposed."""
     sharp: Flags
     """(n,) see sharp.py."""
 
@@ -85,6 +88,21 @@ class Edges(Rows):
     def names(self) -> Ints:
         """(n,) the two faces of each edge as one number: two faces have one edge in common."""
         return (self.sides[:, 0] << 32) + self.sides[:, 1]
+
+
+@dataclass(frozen=True)
+class CrackSides:
+    """Sides of cracks on a rank: block, place and face."""
+
+    young: Indices
+    """(k, 3) whose edges meet none yet."""
+    aged: Indices
+    """(m, 3)"""
+
+    @classmethod
+    def none(cls) -> "CrackSides":
+        """No sides."""
+        return cls(*np.zeros((2, 0, 3), np.int32))
 
 
 @dataclass

@@ -81,6 +81,8 @@ def carry(now: Scene, old: Scene) -> None:
     ):
         for name in ("live", "new", "fresh"):
             getattr(mine, name)[rows[rows >= 0]] = getattr(theirs, name)[rows >= 0]
+    kept = edges[edges >= 0]
+    now.edges.fresh[kept] |= now.edges.meets[kept] & ~old.edges.meets[edges >= 0]
     now.slots.live &= now.slots.slave
     here = np.flatnonzero(slots >= 0)
     slots[here[~now.slots.slave[slots[here]]]] = -1

@@ -125,9 +125,13 @@ class Scene:
         """Faces of these ids become surface."""
         rows = self.rows_of(faces)
         self.faces.exposed[rows] = self.faces.fresh[rows] = True
-        if len(far := self.edges.far):
-            self.edges.exposed[far] |= among(np.sort(faces), self.edges.sides[far].reshape(-1)).reshape(-1, 2)
-        _expose(self.edges.exposed, self.edges.fresh, self.edges.faces, self.faces.exposed)
+        edges = self.edges
+        if len(far := edges.far):
+            shown = among(np.sort(faces), edges.sides[far].reshape(-1)).reshape(-1, 2)
+            edges.fresh[far] |= (shown & ~edges.exposed[far]).any(axis=1)
+            edges.exposed[far] |= shown
+            edges.aged[far] |= shown
+        _expose(edges.exposed, edges.aged, edges.meets, edges.fresh, edges.faces, self.faces.exposed)
         self.enliven(rows)
 
     def uncover(self, gone: Ints, bare: Ints, removed: Indices) -> None:
@@ -136,7 +140,8 @@ class Scene:
         """
         rows, removed = self.rows_of(gone), removed[removed >= 0]
         self.faces.exposed[rows] = self.faces.live[rows] = False
-        self.edges.exposed[among(gone, self.edges.sides)] = False
+        lost = among(gone, self.edges.sides)
+        self.edges.exposed[lost] = self.edges.aged[lost] = False
         self.slots.slave[removed] = self.slots.live[removed] = False
         self.expose(bare)
 
@@ -157,7 +162,7 @@ class Scene:
         self.slots.live |= nodes
         self.slots.new |= nodes
         edges = self.edges
-        _enliven(edges.live, edges.new, edges.corners, edges.faces, edges.exposed, edges.sharp, self.faces.live)
+        _enliven(edges.live, edges.new, edges.corners, edges.faces, edges.aged, edges.sharp, self.faces.live)
         self.slots.tracked[:] = self.slots.live
         self.slots.tracked[self.faces.corners[self.faces.live, :3]] = True
         self.slots.tracked[self.edges.corners[self.edges.live, :2]] = True
@@ -171,7 +176,7 @@ class Scene:
     def sharpen(self, least: float) -> Flags:
         """Which edges (e,) are sharp now and were not before, ``least`` the cosine; searched from this step on."""
         edges = self.edges
-        turned: Flags = sharp.turned(edges.sharp, edges.corners, edges.exposed, self.crowd.x, least)
+        turned: Flags = sharp.turned(edges.sharp, edges.corners, edges.meets, self.crowd.x, least)
         edges.sharp |= turned
         edges.new |= turned
         return turned
@@ -199,31 +204,38 @@ class Scene:
 
     def edge_table(self) -> EdgeTable:
         """The edges."""
-        return EdgeTable(self.edges.corners, self.edges.size, self.edges.exposed, self.tracks.edges, self.edges.fresh)
+        return EdgeTable(self.edges.corners, self.edges.size, self.edges.meets, self.tracks.edges, self.edges.fresh)
 
     def free(self) -> None:
         """Gives its messages back to MPI."""
         self.messages.free()
 
 
-@njit("void(boolean[:, ::1], boolean[::1], int32[:, ::1], boolean[::1])", cache=True)
-def _expose(exposed, fresh, faces, shown):  # type: ignore[no-untyped-def]
-    """Edges whose ``faces`` (e, 2) are ``shown`` (f,)."""
+@njit(
+    "void(boolean[:, ::1], boolean[:, ::1], boolean[::1], boolean[::1], int32[:, ::1], boolean[::1])",
+    cache=True,
+)
+def _expose(exposed, aged, meets, fresh, faces, shown):  # type: ignore[no-untyped-def]
+    """Edges whose ``faces`` (e, 2) are ``shown`` (f,), and which meet others since; see SceneEdges."""
     for e in range(len(exposed)):
         for k in range(2):
             if faces[e, k] >= 0 and shown[faces[e, k]] and not exposed[e, k]:
-                exposed[e, k], fresh[e] = True, True
+                exposed[e, k], aged[e, k], fresh[e] = True, True, True
+        meets[e] = aged[e, 0] and aged[e, 1] and (exposed[e, 0] or exposed[e, 1])
 
 
 @njit(
     "void(boolean[::1], boolean[::1], int32[:, ::1], int32[:, ::1], boolean[:, ::1], boolean[::1], boolean[::1])",
     cache=True,
 )
-def _enliven(live, new, edges, faces, exposed, sharp, searched):  # type: ignore[no-untyped-def]
-    """Edges that are ``sharp``, both of whose ``faces`` (e, 2) are ``searched`` (f,), or exposed where not here."""
+def _enliven(live, new, edges, faces, aged, sharp, searched):  # type: ignore[no-untyped-def]
+    """Edges that are ``sharp``, one of whose ``faces`` (e, 2) is ``searched`` (f,), and the other one too if it is not
+    ``aged``. Of a face that is not here nobody says when it is exposed: it is taken to be searched.
+    """
     for e in range(len(live)):
-        both = sharp[e] and edges[e, 0] != edges[e, 1]
+        one, both = False, sharp[e] and edges[e, 0] != edges[e, 1]
         for k in range(2):
-            both &= searched[faces[e, k]] if faces[e, k] >= 0 else exposed[e, k]
-        new[e] |= both and not live[e]
-        live[e] = both
+            some = faces[e, k] < 0 or searched[faces[e, k]]
+            one, both = one or some, both and (some or aged[e, k])
+        new[e] |= both and one and not live[e]
+        live[e] = both and one

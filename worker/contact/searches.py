@@ -15,7 +15,7 @@ from ..state import Floats, Ints, Model, Nodes
 from ..topology import Split
 from . import layout, normals, pairing, registration
 from .course import courses
-from .cracks import widening
+from .cracks import AGE, widening
 from .exterior import Exterior
 from .follower import Follower
 from .news import news
@@ -91,6 +91,8 @@ class Searches:
             self._exterior.turn()
             if self.scene is not None:
                 self._exterior.show(self.scene, self.scene.own.local)
+        if self._case.fractures and self._clock.step % AGE == 0:
+            self.due |= self._exterior.age()
         if self.due or self.scene is None:
             self._search(nodes)
 

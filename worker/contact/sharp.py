@@ -25,41 +25,52 @@ BENT, PRESSED = sine_and_cosine(math.radians(5.0))[1], 4
 ridges of surfaces that were flat cross without a node inside, and what overlaps has no pressure. Chosen by flyer plates
 of copper at 1 to 2.4 km/s (docs/numerics.md, "Ridges under pressure")."""
 
-_A, _B, _C, _OWNER, _FACE, _EXPOSED, _LENGTH, _NORMAL = 0, 1, 2, 3, 4, 5, 6, 7
+_A, _B, _C, _OWNER, _FACE, _OPEN, _LENGTH, _NORMAL = 0, 1, 2, 3, 4, 5, 6, 7
 """Columns of a half edge that travels: its nodes and the third node of its face, the owner of that one, the face,
-whether that is exposed, initial length, m, and the unit normal of the face; floats as their bits."""
+how far that is open, initial length, m, and the unit normal of the face; floats as their bits."""
 _HALF, _ROW = 10, 12
 """Columns of a half edge, and of an edge (``_matched``)."""
+_AGED = 1
+"""How far a face is open: 0 for a side of a young crack, one more for an exposed face."""
 
 
 def none() -> tuple[Edges, Ints, Indices]:
     """No edge (``find``)."""
-    nothing = np.zeros((0, 4), np.int64)
-    edges = Edges(nothing, nothing[:, :2], np.zeros(0), np.zeros((0, 2), bool), np.zeros(0, bool))
+    nothing, flags = np.zeros((0, 4), np.int64), np.zeros((0, 2), bool)
+    edges = Edges(nothing, nothing[:, :2], np.zeros(0), flags, flags, flags[:, 0])
     return edges, np.zeros(0, np.int64), np.zeros(0, np.int32)
 
 
 def find(
-    model: Model, faces: Faces, local: Indices, units: Floats, some: Flags, neighbours: list[Neighbour], comm: Comm
+    model: Model,
+    faces: Faces,
+    local: Indices,
+    units: Floats,
+    some: Flags,
+    aged: Flags,
+    neighbours: list[Neighbour],
+    comm: Comm,
 ) -> tuple[Edges, Ints, Indices]:
     """The edges by the ids of their faces, and ids of the nodes of theirs that are not held here, with their owners.
 
-    Of ``some`` (f,) of the faces, with the ``local`` nodes (f, 4) and unit normals (f, 3). Where other ranks may hold
-    faces of an edge, the owner of the lower node brings them together, and the rank of the face of smaller id has the
-    edge.
+    Of ``some`` (f,) of the faces, with the ``local`` nodes (f, 4) and unit normals (f, 3); ``aged`` (f,): see Edges.
+    Where other ranks may hold faces of an edge, the owner of the lower node brings them together, and the rank of the
+    face of smaller id has the edge.
     """
     half = np.repeat(some[:, None], 3, axis=1)
     away = half & _common(local, model.nodes.n, neighbours) if neighbours else np.zeros_like(half)
     pairs = _pairs(local, half & ~away, units, model.nodes.n, SHARP)
     n = len(pairs)
-    table = np.empty((n, 4), np.int64), np.empty((n, 2), np.int64), np.empty(n), np.empty((n, 2), bool)
-    _fill(*table, pairs, local, faces.nodes, faces.id, faces.exposed, model.nodes.x0)
+    flags = np.empty((2, n, 2), bool)
+    table = np.empty((n, 4), np.int64), np.empty((n, 2), np.int64), np.empty(n), flags[0], flags[1]
+    _fill(*table, pairs, local, faces.nodes, faces.id, faces.exposed, aged, model.nodes.x0)
     edges = Edges(*table, pairs[:, 4] > 0)
     if comm.size == 1:
         return edges, *none()[1:]
-    rows = _elsewhere(model, faces, local, units, away, comm)
+    rows = _elsewhere(model, faces, local, units, away, aged, comm)
     floats = np.ascontiguousarray(rows[:, 8]).view(np.float64)
-    edges = Edges.joined([edges, Edges(rows[:, :4], rows[:, 6:8], floats, rows[:, 9:11] > 0, rows[:, 11] > 0)])
+    exposed, aged = rows[:, 9:11] > _AGED, rows[:, 9:11] >= _AGED
+    edges = Edges.joined([edges, Edges(rows[:, :4], rows[:, 6:8], floats, exposed, aged, rows[:, 11] > 0)])
     ends, owners = rows[:, 2:4].reshape(-1), rows[:, 4:6].reshape(-1)
     absent = ~np.isin(ends, model.nodes.id)
     far, first = np.unique(ends[absent], return_index=True)
@@ -75,12 +86,12 @@ def _common(local: Indices, n: int, neighbours: list[Neighbour]) -> Flags:
     return np.asarray(a & b)
 
 
-def _elsewhere(model: Model, faces: Faces, local: Indices, units: Floats, away: Flags, comm: Comm) -> Ints:
+def _elsewhere(model: Model, faces: Faces, local: Indices, units: Floats, away: Flags, aged: Flags, comm: Comm) -> Ints:
     """Rows (``_matched``) of this rank's edges among the half edges ``away`` (f, 3); all ranks take part."""
     nodes, (f, k) = model.nodes, np.nonzero(away)
     a, b, c = (local[f, (k + i) % 3] for i in range(3))
     floats = np.column_stack([np.linalg.norm(nodes.x0[b] - nodes.x0[a], axis=1), units[f]]).view(np.int64)
-    known = nodes.id[a], nodes.id[b], nodes.id[c], nodes.owner[c], faces.id[f], faces.exposed[f]
+    known = nodes.id[a], nodes.id[b], nodes.id[c], nodes.owner[c], faces.id[f], _AGED * aged[f] + faces.exposed[f]
     halves, home = np.column_stack([*known, floats]), nodes.owner[np.minimum(a, b)]
     found = comm.swap({int(rank): halves[home == rank] for rank in np.unique(home)})
     gathered = np.concatenate([halves[:0], *(words.reshape(-1, _HALF) for words in found.values())])
@@ -91,7 +102,7 @@ def _elsewhere(model: Model, faces: Faces, local: Indices, units: Floats, away: 
 
 
 def _matched(halves: Ints, sender: Ints) -> tuple[Ints, Ints]:
-    """Rows (a, b, c, d, owner of c, owner of d, face abc, face bad, length, whether either face is exposed, whether it
+    """Rows (a, b, c, d, owner of c, owner of d, face abc, face bad, length, how far either face is open, whether it
     is sharp) of the edges of ``halves``, and the sender of the first face of each.
     """
     order = np.argsort(halves[:, _FACE], kind="stable")
@@ -103,8 +114,8 @@ def _matched(halves: Ints, sender: Ints) -> tuple[Ints, Ints]:
     pairs = _pairs(corners.reshape(-1, 3).astype(np.int32), half, units, len(ids), SHARP)
     one, two = halves[pairs[:, 0]], halves[pairs[:, 2]]
     others = (np.column_stack([one[:, k], two[:, k]]) for k in (_C, _OWNER, _FACE))
-    exposed = np.column_stack([one[:, _EXPOSED], two[:, _EXPOSED]])
-    rows = np.column_stack([one[:, [_A, _B]], *others, one[:, _LENGTH], exposed, pairs[:, 4]])
+    opened = np.column_stack([one[:, _OPEN], two[:, _OPEN]])
+    rows = np.column_stack([one[:, [_A, _B]], *others, one[:, _LENGTH], opened, pairs[:, 4]])
     return rows, sender[pairs[:, 0]]
 
 
@@ -166,11 +177,11 @@ def _by_lower_node(corners, half, nodes):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    "void(int64[:, ::1], int64[:, ::1], float64[::1], boolean[:, ::1], int32[:, ::1], int32[:, ::1], int64[:, ::1], "
-    "int64[::1], boolean[::1], float64[:, ::1])",
+    "void(int64[:, ::1], int64[:, ::1], float64[::1], boolean[:, ::1], boolean[:, ::1], int32[:, ::1], int32[:, ::1], "
+    "int64[:, ::1], int64[::1], boolean[::1], boolean[::1], float64[:, ::1])",
     cache=True,
 )
-def _fill(nodes, sides, size, exposed, pairs, local, face_nodes, face_id, face_exposed, x):  # type: ignore[no-untyped-def]
+def _fill(nodes, sides, size, exposed, aged, pairs, local, face_nodes, face_id, face_exposed, face_aged, x):  # type: ignore[no-untyped-def]
     """The columns of the edges that are ``pairs``."""
     for p in range(len(pairs)):
         f, k, g, m = pairs[p, 0], pairs[p, 1], pairs[p, 2], pairs[p, 3]
@@ -179,20 +190,22 @@ def _fill(nodes, sides, size, exposed, pairs, local, face_nodes, face_id, face_e
         nodes[p, 3] = face_nodes[g, (m + 2) % 3]
         sides[p, 0], sides[p, 1] = face_id[f], face_id[g]
         exposed[p, 0], exposed[p, 1] = face_exposed[f], face_exposed[g]
+        aged[p, 0], aged[p, 1] = face_aged[f], face_aged[g]
         a, b = local[f, k], local[f, (k + 1) % 3]
         dx, dy, dz = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
         size[p] = np.sqrt(dx * dx + dy * dy + dz * dz)
 
 
-@njit("boolean[::1](boolean[::1], int32[:, ::1], boolean[:, ::1], float64[:, ::1], float64)", cache=True)
-def turned(sharp, corners, exposed, x, least):  # type: ignore[no-untyped-def]
-    """(e,) which edges between ``exposed`` faces are not ``sharp`` yet, bulge at the positions ``x`` (slots, 3), m, and
-    have faces whose normals have a cosine below ``least``; ``corners`` (e, 4): see records.Edges.
+@njit("boolean[::1](boolean[::1], int32[:, ::1], boolean[::1], float64[:, ::1], float64)", cache=True)
+def turned(sharp, corners, meets, x, least):  # type: ignore[no-untyped-def]
+    """(e,) which edges whose faces allow that others meet them, ``meets``, are not ``sharp`` yet, bulge at the
+    positions ``x`` (slots, 3), m, and have faces whose normals have a cosine below ``least``; ``corners`` (e, 4): see
+    records.Edges.
     """
     found = np.zeros(len(sharp), np.bool_)
     for e in range(len(sharp)):
         a, b = corners[e, 0], corners[e, 1]
-        if sharp[e] or a == b or not (exposed[e, 0] and exposed[e, 1]):
+        if sharp[e] or a == b or not meets[e]:
             continue
         o = at(x, a)
         u, to, fro = minus(at(x, b), o), minus(at(x, corners[e, 2]), o), minus(at(x, corners[e, 3]), o)

@@ -12,11 +12,11 @@ from ..parallel.ownership import Neighbour, complete
 from ..parallel.tags import Tag
 from ..state import LAID_BARE, WIDE, Bits, Flags, Indices, Ints, Model
 from . import sharp
-from .records import Edges, Faces
+from .records import CrackSides, Edges, Faces
 
-_UNSEEN, _COVERED, _CLOSED, _EXPOSED, _BARE = range(5)
-"""Kinds of faces: none of the surface; one that erosion may lay bare; side of a crack that may open; exposed; exposed
-by erosion."""
+_UNSEEN, _COVERED, _YOUNG, _AGED, _EXPOSED, _BARE = range(6)
+"""Kinds of faces: none of the surface; one that erosion may lay bare; side of a crack that may open, whose edges
+do not meet others yet, or do; exposed; exposed by erosion."""
 
 
 @dataclass
@@ -46,15 +46,20 @@ class Surface:
 
 
 def build(
-    model: Model, planes: Flags, neighbours: list[Neighbour], comm: Comm, edges: bool, cracks: Indices, covered: Indices
+    model: Model,
+    planes: Flags,
+    neighbours: list[Neighbour],
+    comm: Comm,
+    edges: bool,
+    cracks: CrackSides,
+    covered: Indices,
 ) -> Surface:
     """The surface; all ranks take part.
 
     ``planes`` (nodes, planes) says which nodes lie on which symmetry plane. A face with all three nodes on the same
-    plane is no surface; a face of a body one tet thick, with nodes on two parallel planes, is part of it. ``cracks``
-    and ``covered`` (m, 3): block, place and face of the sides here of cracks that may open before the next search, and
-    of faces that erosion may lay bare. Those that it has laid bare meet nodes; their edges meet no edges: they would be
-    as many as the faces, and all sharp.
+    plane is no surface; a face of a body one tet thick, with nodes on two parallel planes, is part of it. ``cracks``:
+    those that may open before the next search; ``covered`` (m, 3): block, place and face of what erosion may lay bare.
+    What it has laid bare meets nodes; edges there meet no edges: they would be as many as the faces, and all sharp.
     """
     local, ids, kind = _faces(model, planes, cracks, covered)
     nodes, n = model.nodes, len(ids)
@@ -62,18 +67,18 @@ def build(
     faces = Faces(ids, np.empty((n, 4), np.int64), np.empty(n), kind >= _EXPOSED)
     _measure(faces.nodes, faces.size, units, counts, local, faces.exposed, nodes.id, nodes.x0)
     complete(comm, neighbours, counts, Tag.SURFACE)
-    some = ((kind == _CLOSED) | (kind == _EXPOSED)) & edges
-    found = sharp.find(model, faces, local, units, some, neighbours, comm) if edges else sharp.none()
+    some = ((kind == _YOUNG) | (kind == _AGED) | (kind == _EXPOSED)) & edges
+    found = sharp.find(model, faces, local, units, some, kind >= _AGED, neighbours, comm) if edges else sharp.none()
     return Surface(faces, found[0], counts[:, 0] > 0, counts[:, 1] > 0, *found[1:])
 
 
-def _faces(model: Model, planes: Flags, cracks: Indices, covered: Indices) -> tuple[Indices, Ints, Bits]:
+def _faces(model: Model, planes: Flags, cracks: CrackSides, covered: Indices) -> tuple[Indices, Ints, Bits]:
     """(f, 4) local nodes of the exposed faces, the ``cracks`` and those that are ``covered``, the opposite one last;
     their ids, ascending; and kinds.
     """
     kinds, counts = [np.zeros((block.n, 4), np.uint8) for block in model.blocks], []
     for b, (block, kind) in enumerate(zip(model.blocks, kinds, strict=True)):
-        for sides, what in ((covered, _COVERED), (cracks, _CLOSED)):
+        for sides, what in ((covered, _COVERED), (cracks.young, _YOUNG), (cracks.aged, _AGED)):
             some = sides[sides[:, 0] == b]
             kind[some[:, 1], some[:, 2]] = what
         counts.append(_sort_out(kind, block.tets, block.across, block.bond, planes))
