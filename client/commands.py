@@ -29,6 +29,7 @@ from .options import (
     named,
     show,
     show_json,
+    show_lines,
     warn_of,
 )
 from .result import LocalFolder
@@ -90,7 +91,7 @@ def list_runs(
     if as_json:
         show_json(runs)
     elif runs:
-        show(tables.runs_table(runs))
+        show_lines(tables.runs_table(runs))
     else:
         typer.echo("no runs")
 

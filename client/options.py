@@ -30,6 +30,9 @@ _MOST_WARNINGS = 12
 _RARER = 1.2
 """From one word to the next, over the time that something takes. Chosen: some forty words in a day."""
 
+_NO_WIDTH = 1000
+"""Characters of a line in a file or a pipe. Chosen: more than any table needs."""
+
 Url = Annotated[str | None, typer.Option("--url", help="The server [CONOID_URL, or the configuration file].")]
 Token = Annotated[str | None, typer.Option("--token", help="Who asks [CONOID_TOKEN, or the configuration file].")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
@@ -123,6 +126,14 @@ def warn_of(case: str, overrides: Iterable[str]) -> None:
 def show(thing: RenderableType) -> None:
     """Prints for people."""
     PlainConsole(highlight=False).print(thing)
+
+
+def show_lines(rows: RenderableType) -> None:
+    """Prints a table of one line an entry; what is not a terminal has no width, and gets the lines whole."""
+    console = PlainConsole(highlight=False)
+    if not console.is_terminal:
+        console.width = _NO_WIDTH
+    console.print(rows)
 
 
 def show_json(thing: Any) -> None:

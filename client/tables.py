@@ -62,12 +62,15 @@ def state_text(state: State, cause: str | None = None) -> Text:
 
 
 def runs_table(runs: Sequence[RunInfo]) -> Table:
-    """One line a run."""
-    made = table("run", "case", "state", "ranks", "submitted", "took", right=("ranks", "took"))
+    """One line a run: where the terminal is too narrow, names and causes end in an ellipsis."""
+    made = table("run", "case", "state", "ranks", "submitted", "took", right=("ranks", "took"), wide=("case", "state"))
+    made.padding = 0
     for run in runs:
         took = duration((run.finished or 0) - run.started) if run.started and run.finished else ""
-        state = state_text(run.state, run.cause)
-        made.add_row(run.id, run.name, state, str(run.ranks), day(run.submitted), took)
+        name, state = Text(run.name), state_text(run.state, run.cause)
+        for text in (name, state):
+            text.no_wrap, text.overflow = True, "ellipsis"
+        made.add_row(run.id, name, state, str(run.ranks), day(run.submitted), took)
     return made
 
 
