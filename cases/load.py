@@ -146,15 +146,20 @@ def apply_overrides(data: Mapping[str, Any], overrides: Overrides) -> dict[str, 
 
     The value of an assignment is read as TOML where it is TOML and as text otherwise; one by key is taken as it is, a
     mapping key by key. Tables that are missing on the way are made; list items must exist. Raises CaseError with every
-    assignment that cannot be made.
+    assignment that cannot be made, and with every key that has two: which of them was meant, nobody knows.
     """
     changed: dict[str, Any] = copy.deepcopy(dict(data))
     problems: list[Problem] = []
+    made: set[tuple[int | str, ...]] = set()
     for key, told, value in _assignments(overrides):
         try:
             if value is ... or not _KEY.fullmatch(key):
                 raise ValueError("write an assignment such as run.ranks=2 or parts[0].velocity[2]='-200 m/s'")
-            _assign(changed, _items(key), value)
+            items = _items(key)
+            if tuple(items) in made:
+                raise ValueError("this key is set more than once; give it one value")
+            made.add(tuple(items))
+            _assign(changed, items, value)
         except ValueError as error:
             problems.append(Problem(key, told, str(error)))
     if problems:

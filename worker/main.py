@@ -154,8 +154,8 @@ def _read(options: argparse.Namespace, ranks: int) -> Case:
     path = Path(options.case)
     if not path.exists() and not path.suffix:
         path = load.shipped_path(options.case)
-    overrides = [*options.set, f"run.ranks={ranks}"]
-    return load.parse_case(load.apply_overrides(load.read_data(path), overrides))
+    data = load.apply_overrides(load.read_data(path), options.set)
+    return load.parse_case(load.apply_overrides(data, {"run.ranks": ranks}))
 
 
 def _prepare_folder(folder: Path, comm: Comm) -> AbstractContextManager[Any] | None:

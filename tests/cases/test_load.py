@@ -219,6 +219,18 @@ def test_overrides_that_cannot_be_made(override: str, message: str) -> None:
     assert message in caught.value.problems[0].message
 
 
+def test_a_key_is_overridden_once() -> None:
+    given: list[dict[str, object] | list[str]] = [
+        ["run.ranks=2", "run.ranks = 2"], {"run.ranks": 2, "run": {"ranks": 3}},
+        ["parts[0].name=a", "parts[00].name=b"],
+    ]  # fmt: skip
+    for each in given:
+        with pytest.raises(CaseError, match="this key is set more than once") as caught:
+            apply_overrides(rod(), each)
+        assert len(caught.value.problems) == 1
+    assert apply_overrides(rod(), ["parts[0].velocity=[0, 0, 1]", "parts[0].velocity[2]=2"])
+
+
 def test_an_override_cannot_smuggle_in_other_keys() -> None:
     changed = rod("title=1\nname = 'other'")
     assert changed["name"] == "rod"

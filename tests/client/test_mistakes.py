@@ -72,6 +72,18 @@ def test_a_folder_is_told_that_a_server_wants_an_id(quiet_home: Path) -> None:
 @pytest.mark.parametrize(
     "words",
     [
+        ("validate", "demo", "--set", "run.ranks=1", "--set", "run.ranks=2"),
+        ("submit", "demo", "--set", "run.ranks=1", "--set", "run.ranks=2"),
+        ("run", "demo", "--set", "run.ranks=1", "--ranks", "2"),
+    ],
+)
+def test_a_key_that_is_set_twice_is_named(words: tuple[str, ...], quiet_home: Path) -> None:
+    assert refused(2, *words) == "conoid: run.ranks = '2': this key is set more than once; give it one value"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
         ("submit", "demo", "--label", "x"), ("submit", "none.toml"), ("sweep", "demo"),
         ("view", ".", "--time", "60"), ("view", ".", "--field", "x"), ("show", ""),
     ],
