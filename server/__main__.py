@@ -15,7 +15,7 @@ from .tokens import SCOPES, TokenError, create_token
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Exit code 0, or 2 with one line that says what is wrong."""
+    """Exit code 0; or one line that says what is wrong, and 2 where it was asked wrongly, 1 where it cannot be done."""
     options = _parser().parse_args(arguments)
     logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", level=logging.INFO)
     try:
@@ -23,10 +23,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         act(options)
     except StartError as error:
         print(f"conoid.server: {error}", file=sys.stderr)
-        return 2
+        return error.exit_code
     except OSError as error:
         print(f"conoid.server: {error.filename or ''}: {error.strerror}", file=sys.stderr)
-        return 2
+        return 1
     return 0
 
 

@@ -16,9 +16,14 @@ WORKER = (sys.executable, "-m", "mpi4py", "-m", "conoid.worker")
 class StartError(Exception):
     """The server, or a command of it, cannot do its work; the text is one line for people."""
 
+    exit_code = 1
+    """What the command ends with: 2 where it was asked for something wrong, 1 for the rest, as the client's do."""
+
 
 class SettingsError(StartError):
     """A setting cannot be used; the text names it, its value and what is allowed."""
+
+    exit_code = 2
 
 
 def usable_cores() -> int:

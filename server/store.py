@@ -84,8 +84,10 @@ class Store:
             self._engine = _engine(url)
             _meta.create_all(self._engine)
         except (SQLAlchemyError, ImportError) as error:
-            reason = str(error).splitlines()[0]
-            raise StoreError(f"the database cannot be opened: {reason}") from None
+            failure = StoreError(f"the database cannot be opened: {str(error).splitlines()[0]}")
+            if isinstance(error, sa.exc.ArgumentError):  # this URL is none
+                failure.exit_code = 2
+            raise failure from None
 
     def close(self) -> None:
         """Closes every connection."""

@@ -21,7 +21,9 @@ _NOBODY = Token("", "", "0" * 64, frozenset(), 0.0)
 
 
 class TokenError(StartError):
-    """A token cannot be made; the text says why."""
+    """A token cannot be made, or ended; the text says why."""
+
+    exit_code = 2
 
 
 def create_token(store: Store, owner: str, scopes: frozenset[str]) -> str:
