@@ -124,17 +124,33 @@ def _serve(options: argparse.Namespace) -> None:
     serve(_settings(options))
 
 
+def _untouched(settings: Settings) -> bool:
+    """Whether neither a server nor a token has made the database of this folder yet."""
+    return not settings.database and not settings.database_file.exists()
+
+
 def _store(options: argparse.Namespace) -> Store:
+    """The database that has the tokens. Raises SettingsError where there is none yet: the folder may be another one."""
     settings = _settings(options)
+    if _untouched(settings):
+        raise SettingsError(f"--runs {settings.runs}: no server has used this folder, and it has no tokens")
     os.umask(0o077)
-    settings.runs.mkdir(parents=True, exist_ok=True)
     return Store(settings.database_url)
 
 
 def _add(options: argparse.Namespace) -> None:
-    store = _store(options)
-    print(create_token(store, options.name, frozenset(options.scopes.split(","))))
+    """Makes the folder and its database where need be, as the server does, and then says which."""
+    settings = _settings(options)
+    new = _untouched(settings)
+    os.umask(0o077)
+    if not settings.database:
+        settings.runs.mkdir(parents=True, exist_ok=True)
+    store = Store(settings.database_url)
+    print(create_token(store, options.name, frozenset(options.scopes.split(","))), flush=True)
     store.close()
+    if new:
+        told = f"{settings.database_file} is new: the token is valid at a server with this --runs"
+        print(f"conoid.server: {told}", file=sys.stderr)
 
 
 def _list(options: argparse.Namespace) -> None:

@@ -101,7 +101,12 @@ class Settings:
     @property
     def database_url(self) -> str:
         """The URL in use."""
-        return self.database or f"sqlite:///{self.runs / 'server.sqlite'}"
+        return self.database or f"sqlite:///{self.database_file}"
+
+    @property
+    def database_file(self) -> Path:
+        """The database where no URL names another one."""
+        return self.runs / "server.sqlite"
 
 
 def loopback(host: str) -> bool:

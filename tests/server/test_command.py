@@ -87,22 +87,37 @@ def test_a_database_that_cannot_be_opened(url: str, code: int) -> None:
 
 def test_tokens(say: Said, tmp_path: Path) -> None:
     code, out, err = say("token", "add", "ann", "--scopes", "read")
-    assert (code, err) == (0, "")
+    assert code == 0
+    assert (
+        err == f"conoid.server: {tmp_path}/runs/server.sqlite is new: the token is valid at a server with this --runs\n"
+    )
+    assert say("token", "add", "ben")[::2] == (0, "")
     store = Store(f"sqlite:///{tmp_path}/runs/server.sqlite")
     found = check_token(store, out.strip())
     assert found is not None
     assert (found.owner, found.scopes) == ("ann", frozenset({"read"}))
-    listed = say("token", "list")[1]
+    listed = say("token", "list")[1].splitlines()[0]
     assert listed.split()[:3] == [found.id, "ann", "read"]
     assert out.strip().split("_", 2)[2] not in listed
     assert say("token", "revoke", found.id)[0] == 0
     assert check_token(store, out.strip()) is None
-    assert say("token", "list")[1] == ""
+    assert found.id not in say("token", "list")[1]
     assert say("token", "revoke", found.id)[::2] == (
         2,
         f"conoid.server: token '{found.id}': there is none; 'token list' shows all\n",
     )
     store.close()
+
+
+@pytest.mark.parametrize("asked", [("list",), ("revoke", "0123456789")])
+def test_a_folder_without_tokens_is_named_and_not_made(
+    asked: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["token", *asked, "--runs", "elsewhere"]) == 2
+    said = f"conoid.server: --runs {tmp_path}/elsewhere: no server has used this folder, and it has no tokens\n"
+    assert capsys.readouterr().err == said
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(
