@@ -96,6 +96,8 @@ class Progress(Message, frozen=True):
     updates_per_second: float
     parts: dict[str, PartEnergy] = {}
     """Empty where there is one part alone."""
+    worst_residual: float | None = None
+    """The largest of any ledger line so far, of which some lie between two messages."""
 
 
 class Load(Message, frozen=True):

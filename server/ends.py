@@ -58,6 +58,7 @@ def so_far(outcome: Outcome, run: Run, path: Path) -> Outcome:
     }  # fmt: skip
     if told is not None:
         known |= {"steps": told.step, "time": told.t, "energy": told.energy}
+        known |= {"worst_residual": told.worst_residual} if told.worst_residual is not None else {}
     if counts is not None:
         gone = started.elements - counts.elements
         known |= {"nodes": counts.nodes, "eroded": gone, "fragments": counts.fragments, "broken": counts.facets}

@@ -282,6 +282,7 @@ class Loop:
             self._tell(
                 messages.Progress, end_time=sim.case.run.end_time, dt=clock.dt, limiter=limiter,
                 eta=self._pace.left(sim.case.run.end_time - clock.t), energy=self.energy,
+                worst_residual=sim.ledger.worst,
                 updates_per_second=(self.updates - self._reported_updates) / elapsed, parts=self._parts,
             )  # fmt: skip
         self._tell(messages.Load, phases=work, imbalance=window.imbalance, steps=window.steps, **told)

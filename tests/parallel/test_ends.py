@@ -44,6 +44,8 @@ def test_a_signal_to_the_launcher_cancels_the_run(number: signal.Signals, tmp_pa
     assert isinstance(said[-1], messages.Finished)
     assert said[-1].state == "cancelled"
     assert [message.seq for message in said] == list(range(1, len(said) + 1))
+    worst = [message.worst_residual for message in said if isinstance(message, messages.Progress)]
+    assert 0.0 < (worst[-1] or 0.0) <= outcome(folder).worst_residual
     seen = [message for message in said if isinstance(message, messages.Snapshot)]
     assert seen[-1].step == outcome(folder).steps, "the last state has a snapshot"
     assert not wait_until_gone(processes(folder))

@@ -5,6 +5,7 @@ import os
 from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from conoid.cases import layout
@@ -33,7 +34,13 @@ def told(folder: Path, *messages: AnyMessage) -> Path:
 
 
 def at(step: int) -> Progress:
-    return progress("a", step, 10)
+    return msgspec.structs.replace(progress("a", step, 10), worst_residual=3e-4)
+
+
+def test_a_journal_without_the_worst_residual_is_read_too(tmp_path: Path) -> None:
+    ended = ends.so_far(LOST, RUN, told(tmp_path, STARTED, progress("a", 3, 10)))
+    assert ended.steps == 3
+    assert math.isnan(ended.worst_residual)
 
 
 def test_a_lost_run_has_come_as_far_as_its_journal_tells(tmp_path: Path) -> None:
@@ -42,7 +49,7 @@ def test_a_lost_run_has_come_as_far_as_its_journal_tells(tmp_path: Path) -> None
     assert (ended.steps, ended.time, ended.elements, ended.setup, ended.elapsed) == (7, 0.7, 50, 0.5, 4.5)
     assert (ended.nodes_initial, ended.nodes, ended.eroded, ended.fragments, ended.broken) == (30, 33, 5, 4, 9)
     assert ended.energy == at(7).energy
-    assert math.isnan(ended.worst_residual), "lines of the history lie between two reports"
+    assert ended.worst_residual == 3e-4, "of lines of the history between the reports, too"
     assert (ended.state, ended.cause, ended.digest) == ("lost", "service", "")
 
 
