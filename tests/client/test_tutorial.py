@@ -1,9 +1,12 @@
-"""The tutorial: its pieces are a case that is sound, follows the schema, and is estimated as it says."""
+"""The tutorial: its pieces are a case that is sound, follows the schema, and is estimated and runs as it says."""
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import jsonschema
+import pytest
 from typer.testing import CliRunner
 
 from conoid.cases.estimate import estimate
@@ -11,6 +14,8 @@ from conoid.cases.load import parse_case, toml_data
 from conoid.cases.plausible import doubts
 from conoid.cases.reference import json_schema
 from conoid.client.cli import app
+from conoid.client.figures import rough
+from conoid.client.result import Result
 
 TEXT = (Path(__file__).parents[2] / "docs" / "tutorial.md").read_text(encoding="utf-8")
 CASE = "\n".join(re.findall(r"```toml\n(.*?)```", TEXT, re.DOTALL))
@@ -31,3 +36,33 @@ def test_what_it_shows_is_what_is_printed(quiet_home: Path) -> None:
     assert [line.rstrip() for line in printed.stdout.splitlines()] == shown[1].splitlines()
     warned = CliRunner().invoke(app, ["validate", "tile.toml", "--set", "run.end_time=15"])
     assert warned.stderr.splitlines()[0] in TEXT.splitlines()
+
+
+def ran(folder: Path, case: str) -> Result:
+    path = folder / "tile.toml"
+    path.write_text(case, encoding="utf-8")
+    out = folder / "run"
+    subprocess.run([sys.executable, "-m", "conoid.worker", str(path), "--out", str(out)], check=True, timeout=600)
+    return Result.open(out)
+
+
+@pytest.mark.slow
+def test_it_ends_as_it_says(tmp_path: Path) -> None:
+    result = ran(tmp_path, CASE)
+    end, told = result.outcome, result.history
+    times, speeds, forces = ([abs(float(v)) for v in told[name]] for name in ("t", "sphere_speed", "backing_force"))
+    force, at = max(zip(forces, times, strict=True))
+    for said in (
+        f"ends after {end.steps} steps with `{end.state}`, a worst residual of {rough(end.worst_residual)}",
+        f"{end.fragments} fragments", f"sphere still has {speeds[-1]:.0f} m/s",
+        f"up to {1e-3 * force:.0f} kN, of the quarter, after {1e6 * at:.0f} us",
+    ):  # fmt: skip
+        assert said in " ".join(TEXT.split())
+
+
+@pytest.mark.slow
+def test_without_erosion_it_takes_three_times_as_many_steps(tmp_path: Path) -> None:
+    (words,) = re.findall(r"ends after (\d+) steps", TEXT)
+    result = ran(tmp_path, re.sub("(?m)^erosion.*$", "", CASE))
+    assert result.outcome.state == "succeeded"
+    assert round((result.outcome.steps or 0) / int(words)) == 3
