@@ -222,8 +222,8 @@ class Run:
         number = n if n >= 0 else max((told.n for told in self.snapshots()), default=0)
         try:
             return Snapshot(self.session.fetch(f"{self.path}/snapshots/{number}"))
-        except NotFoundError:
-            raise UnfinishedError(f"run {self.id} has no snapshot {number}") from None
+        except NotFoundError as error:
+            raise self._lacks(error, f"snapshot {number}") from None
 
     def fragments(self, after: int = 0, link: Link | None = None) -> Generator[Snapshot]:
         """Every snapshot whose message comes after message ``after``, as they are made, to the run's end.
@@ -247,14 +247,15 @@ class Run:
         root = Path(folder)
         names = [name] if name is not None else [file.path for file in self.files()]
         for each in names:
-            self._fetch(each, inside(root, each))
+            try:
+                self.session.download(f"{self.path}/files/{quoted(each, safe='/')}", inside(root, each))
+            except NotFoundError as error:
+                raise self._lacks(error, each) from None
         return inside(root, name) if name is not None else root
 
-    def _fetch(self, name: str, target: Path) -> None:
-        try:
-            self.session.download(f"{self.path}/files/{quoted(name, safe='/')}", target)
-        except NotFoundError:
-            raise UnfinishedError(f"run {self.id} has no {name}") from None
+    def _lacks(self, error: NotFoundError, what: str) -> ClientError:
+        """What is raised for something that the run has not written; for a run that there is none of, ``error``."""
+        return error if str(error).startswith("run ") else UnfinishedError(f"run {self.id} has no {what}")
 
     def result(self) -> Result:
         """What it has written: fetched when it is asked for, kept until the result is gone."""

@@ -92,6 +92,10 @@ def test_files_are_listed_and_copied(session: Session, tmp_path: Path) -> None:
     assert (copy / "case.toml").read_bytes() == (tmp_path / "bar.toml").read_bytes()
     with pytest.raises(UnfinishedError, match=r"has no frames/000000\.vtkhdf"):
         run.download(tmp_path, "frames/000000.vtkhdf")
+    with pytest.raises(NotFoundError, match="run 'nosuch': there is none"):
+        session.run("nosuch").download(tmp_path, "outcome.json")
+    with pytest.raises(NotFoundError, match="run 'nosuch': there is none"):
+        session.run("nosuch").snapshot(0)
 
 
 def test_the_same_key_makes_one_run(session: Session, tmp_path: Path) -> None:
