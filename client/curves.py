@@ -33,7 +33,9 @@ def save(figure: Figure, out: Path) -> Path:
     """Writes a figure, as PNG or what the name ends in. Raises ClientError."""
     try:
         figure.savefig(out, dpi=100)
-    except (OSError, ValueError) as error:
+    except OSError as error:
+        raise ClientError(f"{out}: cannot be written: {error.strerror or error}") from None
+    except ValueError as error:
         raise ClientError(f"{out}: cannot be written: {error}") from None
     return out
 

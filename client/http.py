@@ -108,7 +108,10 @@ class Http:
         return self._request("GET", path).content
 
     def download(self, path: str, target: Path) -> None:
-        """Writes the body at ``path`` to a file that appears whole, with the server's sha256, or not at all."""
+        """Writes the body at ``path`` to a file that appears whole, with the server's sha256, or not at all.
+
+        Raises ServiceError, UnreachableError, and OSError with the name of the file.
+        """
         target.parent.mkdir(parents=True, exist_ok=True)
         beside = target.with_name(f".{target.name}.part")
         try:
@@ -121,6 +124,9 @@ class Http:
             if told is not None and told != f"sha-256=:{base64.b64encode(digest.digest()).decode()}:":
                 raise UnreachableError(f"{path} arrived damaged: its sha256 is not the one that the server told")
             beside.replace(target)
+        except OSError as error:
+            error.filename = str(target)
+            raise
         finally:
             beside.unlink(missing_ok=True)
 

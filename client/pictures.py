@@ -232,6 +232,13 @@ def render(picture: Picture) -> Drawn:
     raise explain(done.returncode, done.stderr.decode(errors="replace"))
 
 
+def reason(error: Exception, out: str) -> str:
+    """The line that the child tells of a failure; ``out`` is what it was to write."""
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename or out}: {error.strerror}"
+    return " ".join(str(error).split()) or type(error).__name__
+
+
 def explain(code: int, errors: str) -> ClientError:
     """Why the child ended with ``code`` and this text on its standard error."""
     if code < 0 or code >= 128:

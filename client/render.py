@@ -18,7 +18,7 @@ from PIL import Image
 from . import camera, scales, sheet
 from .camera import Camera
 from .errors import ViewError
-from .pictures import FIELDS, Drawn, Field, Mirror, Picture, Wall
+from .pictures import FIELDS, Drawn, Field, Mirror, Picture, Wall, reason
 from .sheet import Sheet
 
 _INK, _PAPER = "#1d2733", "#ffffff"
@@ -287,11 +287,11 @@ def _add_wall(plotter: Any, surface: Any, wall: Wall) -> None:
 
 def main() -> int:
     """Reads standard input, draws, prints the result as one line of JSON; a failure is one line on standard error."""
+    picture = msgspec.json.decode(sys.stdin.buffer.read(), type=Picture)
     try:
-        picture = msgspec.json.decode(sys.stdin.buffer.read(), type=Picture)
         print(msgspec.json.encode(draw(picture)).decode())
     except (ViewError, OSError, ValueError, RuntimeError) as error:
-        print(" ".join(str(error).split()) or type(error).__name__, file=sys.stderr)
+        print(reason(error, picture.out), file=sys.stderr)
         return 1
     return 0
 

@@ -164,6 +164,15 @@ def test_a_file_name_cannot_leave_the_folder(name: str, tmp_path: Path) -> None:
 # The case that is sent ------------------------------------------------------------------------------------------------
 
 
+def test_a_download_for_which_there_is_no_room_is_named(tmp_path: Path) -> None:
+    (tmp_path / ".a.csv.part").symlink_to("/dev/full")
+    session = served(lambda _: httpx2.Response(200, content=b"x"))
+    with pytest.raises(OSError, match="No space left on device") as raised:
+        session.run("r").download(tmp_path, "a.csv")
+    assert raised.value.filename == str(tmp_path / "a.csv")
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_file_is_sent_as_it_is_written(tmp_path: Path) -> None:
     path = tmp_path / "bar.toml"
     path.write_text("# a comment\nname = 'bar'\n")

@@ -14,7 +14,7 @@ from PIL import Image
 
 from conoid.client import camera, pictures, scales
 from conoid.client.errors import ViewError
-from conoid.client.pictures import FIELDS, Look, Mirror, Picture, Scene, direction, explain, mirrors
+from conoid.client.pictures import FIELDS, Look, Mirror, Picture, Scene, direction, explain, mirrors, reason
 from conoid.client.view import view
 
 from .bodies import write_frame, write_run
@@ -263,3 +263,11 @@ def test_cameras_are_read() -> None:
 def test_a_wrong_choice_is_one_line(options: dict[str, Any], said: str, folder: Path) -> None:
     with pytest.raises(ViewError, match=said):
         view(folder, "mises", **options)
+
+
+def test_a_picture_that_cannot_be_written_is_named(folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(ViewError) as told:
+        view(folder, "pressure", tmp_path / "file" / "bar.png", size=SIZE)
+    assert str(told.value) == f"{tmp_path}/file: File exists"
+    assert reason(OSError(28, "No space left on device"), "bar.gif") == "bar.gif: No space left on device"

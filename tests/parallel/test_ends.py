@@ -181,6 +181,14 @@ def test_a_bad_mesh_is_one_line_and_exit_code_two(height: object, words: tuple[s
     assert all(word in end.message for word in ("parts[0].mesh", *words)), end.message
 
 
+def test_a_folder_that_cannot_be_made_is_one_line() -> None:
+    done = ended(command(1, "free_spin", "--out", "/proc/none"))
+    assert done.returncode == 5
+    said = [line for line in done.stderr.splitlines() if "application called MPI_Abort" not in line]
+    assert len(said) == 1, done.stderr
+    assert "gone or cannot be written: [Errno 2] No such file or directory: '/proc/none" in said[0]
+
+
 def test_a_case_that_is_not_there(tmp_path: Path) -> None:
     done = ended(command(1, "fre_spin", "--out", str(tmp_path / "run")))
     assert done.returncode == 2
