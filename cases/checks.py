@@ -16,7 +16,7 @@ from .materials import Material, Strength
 from .mesh_checks import check_mesh
 from .overlap import overlaps
 from .problems import Location, Problem, choices, dotted, nearest, problem
-from .schema import Case, Contact, Erosion, Part, Probe, Reference, Symmetry, Wall
+from .schema import MOST_PARTS, Case, Contact, Erosion, Part, Probe, Reference, Symmetry, Wall
 
 NEEDED: dict[str, frozenset[str]] = {
     "extent": frozenset({"part", "axis"}),
@@ -51,7 +51,7 @@ def check_parts(data: Mapping[str, Any]) -> Iterator[Problem]:
     listed, own = data.get("parts"), data.get("materials")
     known = {*library(), *(own if isinstance(own, Mapping) else ())}
     parts: list[tuple[int, Part]] = []
-    for i, entry in enumerate(listed if isinstance(listed, list | tuple) else ()):
+    for i, entry in enumerate(listed[:MOST_PARTS] if isinstance(listed, list | tuple) else ()):
         name = entry.get("material") if isinstance(entry, Mapping) else None
         if isinstance(name, str) and name not in known:
             yield problem(("parts", i, "material"), name, f"unknown material; {nearest(name, sorted(known))}")

@@ -27,6 +27,8 @@ _ITEM = re.compile(r"([A-Za-z_][A-Za-z0-9_-]*)|\[(\d+)\]")
 _DEEPEST = 32
 """Words of a dotted key in TOML, whose cost grows with their square. Chosen: a case has 6."""
 _DEEP = re.compile(rf"""(?<![\w"'.-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{_DEEPEST}}}""", re.ASCII)
+_MARK = "\ufeff"
+"""What some editors begin a file in UTF-8 with."""
 _LINE = re.compile(r"\(at line (\d+), column \d+\)")
 
 
@@ -80,7 +82,7 @@ def toml_data(text: str) -> dict[str, Any]:
     if _DEEP.search(text):
         raise CaseError([Problem("", "", f"a key of more than {_DEEPEST} words with dots between")])
     try:
-        return tomllib.loads(text)
+        return tomllib.loads(text.removeprefix(_MARK))
     except tomllib.TOMLDecodeError as error:
         raise CaseError([_syntax(str(error), text)]) from None
     except ValueError:
@@ -92,7 +94,8 @@ def toml_data(text: str) -> dict[str, Any]:
 def json_data(text: str | bytes) -> dict[str, Any]:
     """The object in JSON text; a repeated key is an error. Raises CaseError that names the line."""
     try:
-        data = json.loads(text, object_pairs_hook=_no_repeats)
+        bare = text.removeprefix(_MARK) if isinstance(text, str) else text.removeprefix(_MARK.encode())
+        data = json.loads(bare, object_pairs_hook=_no_repeats)
     except json.JSONDecodeError as error:
         raise CaseError([_at_line(error.lineno, str(error.doc), f"broken JSON: {error.msg}")]) from None
     except UnicodeDecodeError:

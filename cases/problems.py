@@ -124,6 +124,9 @@ def _translate(detail: ErrorDetails, data: Mapping[str, Any]) -> Problem:
             return problem(location, value, "expected a table of keys")
         case "too_short":
             return problem(location, ..., "at least one is needed")
+        case "too_long":
+            many, most = context["actual_length"], context["max_length"]
+            return problem(location, ..., f"{many} are too many; allowed: up to {most}")
         case "int_parsing" | "int_type" | "int_from_float":
             return problem(location, value, "expected a whole number")
         case "float_parsing" | "float_type":

@@ -185,8 +185,8 @@ class Numerics(Model):
 Scale = Annotated[Ratio, Field(gt=0)]
 
 
-MOST_RANKS = 4096
-"""Of a run. Chosen: far beyond what has been run."""
+MOST_RANKS, MOST_PARTS = 4096, 256
+"""Of a run, of a case. Chosen: far beyond what has been run."""
 
 
 class Run(Model):
@@ -252,7 +252,7 @@ class Case(Model):
     """What the case shows, for people."""
     materials: dict[Name, Material] = Field(default_factory=dict)
     """Materials of the case's own, each under its name; they win over those of the library."""
-    parts: Annotated[tuple[Part, ...], Field(min_length=1, max_length=256)]
+    parts: Annotated[tuple[Part, ...], Field(min_length=1, max_length=MOST_PARTS)]
     """The bodies, in TOML one ``[[parts]]`` each."""
     boundaries: tuple[Boundary, ...] = ()
     """What holds or drives nodes, in TOML one ``[[boundaries]]`` each; ``kind`` says which."""

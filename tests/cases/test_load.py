@@ -1,6 +1,7 @@
 """From text to a case: every error at once, each one line under the key that the user wrote."""
 
 import json
+import time
 from pathlib import Path
 
 import pytest
@@ -8,7 +9,9 @@ import pytest
 from conoid.cases.bodies import Cylinder
 from conoid.cases.load import (
     CaseError,
+    Problem,
     apply_overrides,
+    json_data,
     material,
     parse_case,
     parse_json,
@@ -17,6 +20,7 @@ from conoid.cases.load import (
     resolved_json,
     shipped,
     shipped_path,
+    toml_data,
 )
 
 from .scenes import ROD, problems, rod, said
@@ -217,6 +221,23 @@ def test_overrides_that_cannot_be_made(override: str, message: str) -> None:
         apply_overrides(rod(), [override, override])
     assert len(caught.value.problems) == 2
     assert message in caught.value.problems[0].message
+
+
+def test_too_many_parts_are_counted_and_not_compared() -> None:
+    data = rod()
+    one = data["parts"][0]
+    data["parts"] = [{**one, "name": f"rod{i}", "mesh": {**one["mesh"], "base": [i, 0, 0]}} for i in range(3000)]
+    began = time.process_time()
+    with pytest.raises(CaseError) as caught:
+        parse_case(data)
+    assert caught.value.problems[0] == Problem("parts", "", "3000 are too many; allowed: up to 256")
+    assert time.process_time() - began < 3.0, "each with each of 3000 are 4.5 million pairs"
+
+
+def test_a_byte_order_mark_is_no_part_of_a_case() -> None:
+    for mark in ("", "\ufeff"):
+        assert toml_data(f'{mark}name = "rod"') == json_data(f'{mark}{{"name": "rod"}}') == {"name": "rod"}
+    assert json_data(b'\xef\xbb\xbf{"name": "rod"}') == {"name": "rod"}
 
 
 def test_a_key_is_overridden_once() -> None:
