@@ -146,7 +146,7 @@ def _add(options: argparse.Namespace) -> None:
     if not settings.database:
         settings.runs.mkdir(parents=True, exist_ok=True)
     store = Store(settings.database_url)
-    print(create_token(store, options.name, frozenset(options.scopes.split(","))), flush=True)
+    print(create_token(store, options.name, frozenset(word.strip() for word in options.scopes.split(","))), flush=True)
     store.close()
     if new:
         told = f"{settings.database_file} is new: the token is valid at a server with this --runs"

@@ -31,7 +31,7 @@ def create_token(store: Store, owner: str, scopes: frozenset[str]) -> str:
     if not _OWNER.fullmatch(owner):
         raise TokenError(f"{owner!r}: a name starts with a letter or digit and has up to 63 letters, digits, _ or -")
     if unknown := scopes - SCOPES.keys():
-        raise TokenError(f"unknown scope {', '.join(sorted(unknown))}; known: {', '.join(SCOPES)}")
+        raise TokenError(f"unknown scope {', '.join(map(repr, sorted(unknown)))}; known: {', '.join(SCOPES)}")
     token_id, secret = secrets.token_hex(5), secrets.token_urlsafe(32)
     store.add_token(Token(token_id, owner, _hash(secret), scopes, time.time()))
     return f"{_PREFIX}_{token_id}_{secret}"

@@ -91,7 +91,7 @@ def test_tokens(say: Said, tmp_path: Path) -> None:
     assert (
         err == f"conoid.server: {tmp_path}/runs/server.sqlite is new: the token is valid at a server with this --runs\n"
     )
-    assert say("token", "add", "ben")[::2] == (0, "")
+    assert say("token", "add", "ben", "--scopes", "read, submit")[::2] == (0, "")
     store = Store(f"sqlite:///{tmp_path}/runs/server.sqlite")
     found = check_token(store, out.strip())
     assert found is not None
@@ -122,7 +122,11 @@ def test_a_folder_without_tokens_is_named_and_not_made(
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
-    [(["a/b"], "a name starts with"), (["ann", "--scopes", "read,rule"], "unknown scope rule; known: read, submit")],
+    [
+        (["a/b"], "a name starts with"),
+        (["ann", "--scopes", ""], "unknown scope ''; known: read, submit"),
+        (["ann", "--scopes", "read,rule"], "unknown scope 'rule'; known: read, submit"),
+    ],
 )
 def test_tokens_that_cannot_be(say: Said, arguments: list[str], words: str) -> None:
     code, out, err = say("token", "add", *arguments)
