@@ -12,6 +12,7 @@ from conoid.cases.run import State
 
 from . import tables
 from .batch import cancel_folder, slurm_of
+from .errors import UsageError
 from .following import FolderRun
 from .live import Live, exit_code
 from .options import (
@@ -37,13 +38,24 @@ from .run import Run, RunInfo
 from .session import connect
 from .watch import watch
 
+
+def _filled(key: str | None) -> str | None:
+    """The key. Raises UsageError for an empty one: a variable that is not set would make a second run."""
+    if key is not None and not key.strip():
+        raise UsageError("--key is empty: write one, or leave it out")
+    return key
+
+
 RunArgument = Annotated[str, typer.Argument(metavar="RUN", callback=named, help="The id of a run, or 'last'.")]
 
 
 def submit(
     case: CaseArgument,
     overrides: Overrides = None,
-    key: Annotated[str | None, typer.Option("--key", help="Idempotency key: the same one makes no second run.")] = None,
+    key: Annotated[
+        str | None,
+        typer.Option("--key", callback=_filled, help="Idempotency key: the same one makes no second run."),
+    ] = None,
     label: Labels = None,
     profile: Annotated[str, typer.Option("--profile", help="Of the site's batch system; its default.")] = "",
     priority: Annotated[int, typer.Option("--priority", help="Among your own runs: -100 to 100.")] = 0,

@@ -86,6 +86,7 @@ def test_a_key_that_is_set_twice_is_named(words: tuple[str, ...], quiet_home: Pa
     [
         ("submit", "demo", "--label", "x"), ("submit", "none.toml"), ("sweep", "demo"),
         ("view", ".", "--time", "60"), ("view", ".", "--field", "x"), ("show", ""),
+        ("submit", "demo", "--key", ""),
     ],
 )  # fmt: skip
 def test_what_is_asked_wrongly_ends_with_2(words: tuple[str, ...], quiet_home: Path) -> None:
