@@ -99,7 +99,10 @@ def _ranks(case: Case, settings: Limits) -> Iterator[Problem]:
 def _files(case: Case) -> Iterator[Problem]:
     for index, part in enumerate(case.parts):
         if isinstance(part.mesh, MeshFile):
-            message = "a server does not read mesh files; allowed: box, plate, cylinder, tube, sphere"
+            message = (
+                "a server does not read mesh files, python -m conoid.worker and conoid batch do; "
+                "allowed: box, plate, cylinder, tube, sphere"
+            )
             yield Problem(f"parts[{index}].mesh.path", repr(part.mesh.path), message)
 
 

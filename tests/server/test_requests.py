@@ -229,7 +229,7 @@ def test_a_mesh_file_is_refused_before_anything_is_read(server: Running) -> None
     text = f'{head}[parts.mesh]\nshape = "file"\npath = "/etc/passwd"\nunit = "1 mm"\n{tail}'
     problem = refusal(server.ann.http.post("/v1/runs", content=text, headers=TOML), 422, "invalid_case")
     assert [entry["key"] for entry in problem["errors"]] == ["parts[0].mesh.path"]
-    assert "does not read mesh files" in problem["detail"]
+    assert "does not read mesh files, python -m conoid.worker and conoid batch do; allowed: box" in problem["detail"]
 
 
 @pytest.mark.parametrize(
