@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from conoid.cases import layout, messages
+from conoid.cases.estimate import RANK_BYTES
 from conoid.cases.outcome import Outcome, from_json
 
 from .launching import command, ended, processes, started, wait_for, wait_until_gone
@@ -234,4 +235,5 @@ def test_as_many_ranks_as_tets_and_not_more(tmp_path: Path) -> None:
         digests.append(outcome(folder).digest)
     assert digests[0] == digests[1]
     assert outcome(tmp_path / "5").elements == 5
+    assert max(outcome(tmp_path / "5").peak_memory) == pytest.approx(RANK_BYTES, rel=0.15)
     assert "run.ranks = 6: at most 5" in outcome(tmp_path / "6").message
