@@ -212,16 +212,15 @@ def test_a_node_beside_an_acute_edge_is_not_inside() -> None:
     assert many(node_face(x, np.zeros_like(x), faces, every_pair(np.array([4]), 4), 1.0)) == 1
 
 
-def test_a_deep_node_is_held_by_the_nearest_face_and_a_touching_one_by_all() -> None:
-    """In the corner of a cube: three faces about one node."""
+def test_a_node_in_a_convex_corner_is_held_by_the_nearest_face() -> None:
+    """In the corner of a cube, three faces about one node: deep, or by less than a node is taken to be on a face."""
     ((piece, model),) = pieces_of(meeting_of([{}], {"self_contact": ("body0",)}), [block((1, 1, 1), shake=0.0)])
     faces = surface_of(piece, model).faces.nodes.astype(np.int32)
-    for depth, count in ((np.array([0.03, 0.02, 0.04]), 1), (np.array([3e-4, 2e-4, 4e-4]), 3)):
+    for depth in (np.array([0.03, 0.02, 0.04]), np.array([3e-4, 2e-4, 4e-4])):
         x = np.concatenate([model.nodes.x, 1.0 - depth[None]])
         met = node_face(x, np.zeros_like(x), faces, every_pair(np.array([8]), len(faces)), 1.0)
-        assert len(np.unique(met.normals.round(9), axis=0)) == count
-        assert many(met) == 1 or count > 1
-        assert (met.normals == [0.0, 1.0, 0.0]).all(axis=1).any()
+        assert many(met) >= 1
+        assert (met.normals == [0.0, 1.0, 0.0]).all()
 
 
 @pytest.mark.parametrize("gap", [0.0, 5e-4, -5e-4, -0.05])

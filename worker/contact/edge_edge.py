@@ -1,12 +1,13 @@
 """Narrow phase of sharp edges: who passes whom in the step ahead, and who need not be tested for a while.
 
-Edges meet where they cross.
+Edges meet where they cross, but for their ends, which are nodes and meet faces: the end of an edge that lies on another
+one slides along a surface.
 """
 
 import numpy as np
 
 from ..jit import njit, types
-from .geometry import VECTOR, at, beyond, cross, distance, dot, minus, segments
+from .geometry import MARGIN, VECTOR, at, beyond, cross, distance, dot, minus, segments
 from .narrow_phase import CONTACT_ROWS, DEEP_SELF, EDGES, NEAR, PAIRS, STEP, needed
 
 _PARALLEL = 1e-3
@@ -126,7 +127,7 @@ def edge_edge(out, n, pairs, edges, step, course, end):  # type: ignore[no-untyp
         if not area > _PARALLEL * _PARALLEL * uu * ww:
             continue
         s, t = (ww * ur - uw * wr) / area, (uw * ur - uu * wr) / area
-        if not (min(s, t) >= 0.0 and max(s, t) <= 1.0):
+        if not (min(s, t) >= MARGIN and max(s, t) <= 1.0 - MARGIN):
             continue
         h, m, length = share * dt, cross(u, w), np.sqrt(area)
         m = m[0] / length, m[1] / length, m[2] / length

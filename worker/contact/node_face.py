@@ -7,7 +7,7 @@ handed over.
 import numpy as np
 
 from ..jit import njit, types
-from .geometry import VECTOR, at, beyond, distance, dot, foot, height, minus, off
+from .geometry import MARGIN, VECTOR, at, beyond, distance, dot, foot, height, minus, off
 from .haste import fastest_of, haste
 from .narrow_phase import CONTACT_ROWS, DEEP, DEEP_SELF, FACES, NEAR, PAIRS, SLOTS, STEP, needed
 
@@ -20,6 +20,9 @@ So does a corner of a flake that is the lowest of its tet, whatever the mean of 
 _SOME = 0.25
 """A node of another part that passes a face from outside meets it when the mean less deviation is below minus this:
 then some face of its faces it. Of cosines none of which is negative it is (1 - sqrt(2)) / 2 = -0.207 at least."""
+_BEHIND = 0.1
+"""Of the size of a face: the sum of the depths of its corners behind another face, from which on the edge between them
+is convex. Chosen: less for a face that is bent by 25 degrees than that has, more than rounding."""
 _ROUND = 0.01
 """Of the size of a face: added to the distance at which a pair may meet."""
 _WORTH = 0.02
@@ -149,6 +152,48 @@ def _outside(pairs, first, faces, x, part, p, depth, strayed, end):  # type: ign
 
 
 @njit(
+    types.boolean(PAIRS, types.int32[::1], FACES, STEP, types.float64[:, ::1], types.int64, _F, _F, _F),
+    cache=True,
+    error_model="numpy",
+)
+def _in_front(pairs, first, faces, step, normals, p, gap, strayed, end):  # type: ignore[no-untyped-def]
+    """Whether the node of pair ``p``, that is at height ``gap`` over its face at the end of the step, where its foot is
+    on the border of that, is in front of another face of that part which it faces.
+
+    Then it has passed beside a convex edge, along which it slides or flies, and is not in the body. The other face has
+    a corner in common, and this one lies behind it. ``strayed`` and ``end``: see _outside.
+    """
+    rows, until, speed, turned, following = pairs.rows, pairs.until, pairs.speed, pairs.turned, pairs.next
+    exposed, corners, size, left, fresh = faces.exposed, faces.corners, faces.size, faces.left, faces.fresh
+    ahead, part = step.ahead, step.part
+    s, g = rows[p, 0], rows[p, 1]
+    a, b, c = corners[g, 0], corners[g, 1], corners[g, 2]
+    point, q = at(ahead, s), first[s]
+    while q >= 0:
+        f, far = rows[q, 1], until[q] > strayed + left[rows[q, 1]] + speed[q] * end and not turned[q]
+        q = following[q]
+        i, j, k = corners[f, 0], corners[f, 1], corners[f, 2]
+        if (far and not fresh[f]) or not exposed[f] or f == g or part[i] != part[a]:
+            continue
+        if a not in (i, j, k) and b not in (i, j, k) and c not in (i, j, k):
+            continue
+        o, e, h = at(ahead, i), at(ahead, j), at(ahead, k)
+        above, m = height(point, o, e, h)
+        if not (max(gap, -_TOUCHING * size[f]) < above <= NEAR * size[f]):
+            continue
+        behind = dot(m, minus(at(ahead, a), o)) + dot(m, minus(at(ahead, b), o)) + dot(m, minus(at(ahead, c), o))
+        if not behind < -_BEHIND * size[g]:
+            continue
+        every, some = facing(normals, s, m)
+        if not (every if part[s] == part[i] else some) <= 0.0:
+            continue
+        on, _ = foot(minus(point, o), minus(e, o), minus(h, o))
+        if on:
+            return True
+    return False
+
+
+@njit(
     _F(STEP, types.float64[:, ::1], FACES, types.int64, types.int64, _VECTOR, _F),
     cache=True,
     error_model="numpy",
@@ -237,6 +282,10 @@ def node_face(out, n, pairs, slots, faces, step, end):  # type: ignore[no-untype
         passes, b = _passes(x, ahead, corners, s, f, now, gap0, gap1, reach * size[f])
         if not passes:
             continue
+        leaves = np.inf if other[s] else strayed[s]
+        edge = min(b[0], b[1], b[2]) <= MARGIN
+        if edge and _in_front(pairs, first, faces, step, normals, p, gap1, leaves, end + step.dt):
+            continue
         row = n
         if gap0 < -_TOUCHING * size[f]:
             row = holder[s]
@@ -246,7 +295,6 @@ def node_face(out, n, pairs, slots, faces, step, end):  # type: ignore[no-untype
                 same = gap0 == deepest[row] and faces.id[f] < faces.id[rows[pair[row], 1]]
                 if not (gap0 > deepest[row] or same):
                     continue
-            leaves = np.inf if other[s] else strayed[s]
             if _outside(pairs, first, faces, x, part, p, -gap0, leaves, end + step.dt):
                 continue
             if row < 0:

@@ -1,0 +1,78 @@
+"""Bodies that pass along each other's free edges: flush, or nearer than a node is taken to be on a face.
+
+A node beside a convex edge is in front of one of the two faces there, and so not in the body, however little it is
+beyond the border of the other one.
+"""
+
+import numpy as np
+import pytest
+
+from conoid.worker.mesh.model import TetMesh
+from conoid.worker.simulation import Simulation
+
+from ..worker.kernels import build, run
+from ..worker.meshes import block
+from .bodies import meeting_of, moved
+
+SPEED = 100.0
+END = 50e-6
+MM = 1e-3
+
+
+def box(cells: tuple[int, int, int], size: float, low: tuple[float, float, float]) -> TetMesh:
+    """Cubes of ``size`` from ``low`` on, mm."""
+    return moved(block(cells, MM * size, 0.0), [MM * value for value in low])
+
+
+def passed(*meshes: TetMesh) -> Simulation:
+    """The first one has flown at the others along x, without friction."""
+    motions = [{"velocity": (SPEED, 0.0, 0.0)}, *({} for _ in meshes[1:])]
+    return run(build(meeting_of(motions, end=END), meshes))
+
+
+def speed(sim: Simulation, part: int = 0) -> float:
+    """Mean velocity of a part along x, m/s."""
+    nodes = sim.model.nodes
+    mass = nodes.mass * (nodes.part == part)
+    return float(mass @ nodes.v[:, 0] / mass.sum())
+
+
+PLATE = box((4, 7, 3), 2.2, (8.0, -7.7, -6.6))
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.001, 0.002, 0.003])
+def test_a_block_flies_over_a_plate(gap: float) -> None:
+    assert speed(passed(box((5, 5, 3), 2.0, (-4.0, -5.0, gap)), PLATE)) == pytest.approx(SPEED, rel=1e-6)
+
+
+def test_a_block_slides_over_the_seam_of_two_plates() -> None:
+    before = box((6, 8, 3), 2.0, (-4.0, -8.0, -6.0))
+    sim = passed(box((5, 5, 3), 1.7, (-3.0, -4.0, 0.0)), before, PLATE)
+    assert speed(sim) == pytest.approx(SPEED, rel=1e-6)
+
+
+def test_bars_fly_past_each_other_side_by_side() -> None:
+    sim = passed(box((6, 2, 2), 1.0, (-6.0, 0.0, 0.3)), box((8, 2, 2), 0.9, (0.5, -1.8, 0.0)))
+    assert speed(sim) == pytest.approx(SPEED, rel=1e-6)
+    assert speed(sim, 1) == pytest.approx(0.0, abs=1e-6 * SPEED)
+
+
+@pytest.mark.parametrize("depth", [0.0, 0.1, 1.0, 5.9])
+def test_what_is_lower_than_the_top_of_the_plate_meets_it(depth: float) -> None:
+    """Head-on with tops that are flush, and by less of the height, to a tenth of a millimetre."""
+    low = -6.0 + depth
+    assert speed(passed(box((5, 5, 3), 2.0, (-4.0, -5.0, low)), PLATE)) < 0.9 * SPEED
+
+
+@pytest.mark.parametrize("above", [0.0, 0.001])
+def test_what_slides_on_a_floor_meets_the_wall_at_its_end(above: float) -> None:
+    """Of one body, concave: a node in front of the floor comes in through the wall."""
+    whole = box((12, 6, 6), 2.0, (-6.0, -6.0, -6.0))
+    middles = whole.points[whole.tets].mean(axis=1)
+    tets = whole.tets[(middles[:, 0] > 8.0 * MM) | (middles[:, 2] < 0.0)]
+    used, corners = np.unique(tets, return_inverse=True)
+    step = TetMesh(whole.points[used], corners.reshape(tets.shape).astype(np.int32))
+    sim = passed(box((4, 4, 2), 1.7, (-2.0, -3.4, above)), step)
+    assert speed(sim) < 0.5 * SPEED
+    x, part = sim.model.nodes.x, sim.model.nodes.part
+    assert x[part == 0, 0].max() < x[part == 1, 0].max() - 7.5 * MM
