@@ -85,7 +85,7 @@ class Shards:
         self.edges = (first[:, None, None] + EDGES).reshape(-1, 4).astype(np.int32)
         self.size, self.length = face_sizes(self.x, self.faces), edge_sizes(self.x, self.edges)
         self.exposed = draw.uniform(size=len(self.faces)) < 0.8
-        self.ridges = (draw.uniform(size=(len(self.edges), 2)) < 0.9).all(axis=1)
+        self.ridges = np.asarray((draw.uniform(size=(len(self.edges), 2)) < 0.9).all(axis=1))
         self.on_surface = draw.uniform(size=len(self.x)) < 0.9
         outward = np.tile(CORNERS - CORNERS.mean(axis=0), (SHARDS, 1))
         self.normals = self.facing(outward)
