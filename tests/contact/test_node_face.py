@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from conoid.worker.contact import normals, search
+from conoid.worker.contact.beside import TOUCHING
 from conoid.worker.contact.geometry import MARGIN
 from conoid.worker.contact.narrow_phase import DEEP, DEEP_SELF, NEAR, PUSH_OUT, ContactRows
-from conoid.worker.contact.node_face import _TOUCHING
 from conoid.worker.contact.search import Things
 from conoid.worker.mesh.faces import FACES
 
@@ -52,7 +52,7 @@ class Expected:
         depth = max(-self.gap0, 0.0)
         back = PUSH_OUT * min(depth / dt, max(-speed, 0.0))
         self.wanted = speed - (depth + self.gap1) / dt + back
-        self.deep = self.gap0 < -_TOUCHING * size
+        self.deep = self.gap0 < -TOUCHING * size
 
 
 def random_scene(seed: int, nodes: int = 40, faces: int = 12) -> tuple[Floats, Floats, Indices, "np.ndarray"]:

@@ -7,7 +7,7 @@ import numpy as np
 from ..mesh.faces import normals as face_normals
 from ..state import Flags, Floats, Indices
 from . import search
-from .node_face import FACING
+from .beside import FACING
 from .search import Things
 
 _INSIDE = 1e-9

@@ -1,0 +1,118 @@
+"""On which side of a body a node is: what faces what, and who is beside an edge, in front of another face there."""
+
+import numpy as np
+
+from ..jit import njit, types
+from .geometry import VECTOR, at, dot, foot, height, minus, off
+from .narrow_phase import DEEP, DEEP_SELF, FACES, NEAR, PAIRS, STEP
+
+TOUCHING = 1e-3
+"""Of the size of a face: deeper than this, a node is held by the nearest face of that part only."""
+FACING = 0.1
+"""A node faces a face when the cosines of the face's normal and those of its own faces have a mean less deviation below
+minus this, and a mean below it; or when its own faces rise from it, by the sine of the mean slope, by more than this.
+So does a corner of a flake that is the lowest of its tet, whatever the mean of its three normals."""
+_SOME = 0.25
+"""A node of another part that passes a face from outside meets it when the mean less deviation is below minus this:
+then some face of its faces it. Of cosines none of which is negative it is (1 - sqrt(2)) / 2 = -0.207 at least."""
+_BEHIND = 0.1
+"""Of the size of a face: the sum of the depths of its corners behind another face, from which on the edge between them
+is convex. Chosen: less for a face that is bent by 25 degrees than that has, more than rounding."""
+_F = types.float64
+
+
+@njit(f"UniTuple(float64, 2)(float64[:, ::1], int64, {VECTOR})", cache=True)
+def facing(normals, s, m):  # type: ignore[no-untyped-def]
+    """By how much m has to turn until node s faces a face of this normal (FACING), and until it does or one of its own
+    faces does (_SOME); none, or less, when it does, and -1 for a node without faces, which faces any.
+    """
+    mean, square, length, rise = 0.0, 0.0, 0.0, 0.0
+    for a in range(3):
+        b, c = (a + 1) % 3, (a + 2) % 3
+        mean += normals[s, a] * m[a]
+        rise += normals[s, 9 + a] * m[a]
+        length += normals[s, a] * normals[s, a]
+        square += normals[s, 3 + a] * m[a] * m[a] + 2.0 * normals[s, 6 + a] * m[b] * m[c]
+    if length == 0.0:
+        return -1.0, -1.0
+    least = mean - np.sqrt(max(square - mean * mean, 0.0))
+    turn = max(min(mean - FACING, FACING - rise), 0.5 * (least + FACING))
+    return turn, min(turn, 0.5 * (least + _SOME))
+
+
+@njit(
+    types.boolean(PAIRS, types.int32[::1], FACES, types.float64[:, :], types.int32[::1], types.int64, _F, _F, _F),
+    cache=True,
+    error_model="numpy",
+)
+def outside(pairs, first, faces, x, part, p, depth, strayed, end):  # type: ignore[no-untyped-def]
+    """Whether the node of pair ``p``, ``depth`` below its face, is nearer to the front of another face of that part.
+
+    Then it is beside an acute edge and not in the body: the nearest face decides on which side a node is. Only faces
+    within the share of their size that every list of candidates has are asked, and of these none that its pair is left
+    alone for: it is further away. ``strayed``: how far the node leaves its line, infinite when pairs are not known;
+    ``end``: of the step, with the length of the step once more, for a pair may just have been measured at its end.
+    """
+    rows, until, speed, turned, following = pairs.rows, pairs.until, pairs.speed, pairs.turned, pairs.next
+    exposed, corners, size, left, fresh = faces.exposed, faces.corners, faces.size, faces.left, faces.fresh
+    s, body = rows[p, 0], part[corners[rows[p, 1], 0]]
+    point, reach = at(x, s), DEEP_SELF if part[s] == body else DEEP
+    q = first[s]
+    while q >= 0:
+        f, far = rows[q, 1], until[q] > strayed + left[rows[q, 1]] + speed[q] * end and not turned[q]
+        q = following[q]
+        i, j, k = corners[f, 0], corners[f, 1], corners[f, 2]
+        if (far and not fresh[f]) or not exposed[f] or part[i] != body:
+            continue
+        o, a, b = at(x, i), at(x, j), at(x, k)
+        near, (away, _) = min(depth, reach * size[f]), height(point, o, a, b)
+        if not 0.0 < away < near:
+            continue
+        on, _ = foot(minus(point, o), minus(a, o), minus(b, o))
+        if not on:
+            away = min(off(point, o, a), off(point, a, b), off(point, b, o))
+        if away < near:
+            return True
+    return False
+
+
+@njit(
+    types.boolean(PAIRS, types.int32[::1], FACES, STEP, types.float64[:, ::1], types.int64, _F, _F, _F),
+    cache=True,
+    error_model="numpy",
+)
+def in_front(pairs, first, faces, step, normals, p, gap, strayed, end):  # type: ignore[no-untyped-def]
+    """Whether the node of pair ``p``, that is at height ``gap`` over its face at the end of the step, where its foot is
+    on the border of that, is in front of another face of that part which it faces.
+
+    Then it has passed beside a convex edge, along which it slides or flies, and is not in the body. The other face has
+    a corner in common, and this one lies behind it. ``strayed`` and ``end``: see outside.
+    """
+    rows, until, speed, turned, following = pairs.rows, pairs.until, pairs.speed, pairs.turned, pairs.next
+    exposed, corners, size, left, fresh = faces.exposed, faces.corners, faces.size, faces.left, faces.fresh
+    ahead, part = step.ahead, step.part
+    s, g = rows[p, 0], rows[p, 1]
+    a, b, c = corners[g, 0], corners[g, 1], corners[g, 2]
+    point, q = at(ahead, s), first[s]
+    while q >= 0:
+        f, far = rows[q, 1], until[q] > strayed + left[rows[q, 1]] + speed[q] * end and not turned[q]
+        q = following[q]
+        i, j, k = corners[f, 0], corners[f, 1], corners[f, 2]
+        if (far and not fresh[f]) or not exposed[f] or f == g or part[i] != part[a]:
+            continue
+        if a not in (i, j, k) and b not in (i, j, k) and c not in (i, j, k):
+            continue
+        o, e, h = at(ahead, i), at(ahead, j), at(ahead, k)
+        above, m = height(point, o, e, h)
+        if not (max(gap, -TOUCHING * size[f]) < above <= NEAR * size[f]):
+            continue
+        behind = dot(m, minus(at(ahead, a), o)) + dot(m, minus(at(ahead, b), o)) + dot(m, minus(at(ahead, c), o))
+        if not behind < -_BEHIND * size[g]:
+            continue
+        every, some = facing(normals, s, m)
+        if not (every if part[s] == part[i] else some) <= 0.0:
+            continue
+        on, _ = foot(minus(point, o), minus(e, o), minus(h, o))
+        if on:
+            return True
+    return False
