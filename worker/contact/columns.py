@@ -1,14 +1,17 @@
 """What a scene knows of its slots, faces and edges: a column each, by their rows."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from ..growing import Rooms
-from ..state import Flags, Floats, Indices, Ints
+from ..state import Bits, Flags, Floats, Indices, Ints
 from .normals import COLUMNS
 from .records import Crowd
 
+OPEN = 2
+"""How far a face of an edge is open that is exposed."""
 _FRESH = {
     **dict.fromkeys(("slave", "pushes", "live", "new", "fresh", "tracked", "on_surface"), False),
     "first": -1, "normals": 0.0, "total": 0,
@@ -143,10 +146,8 @@ class SceneEdges:
     faces: Indices
     """(e, 2) rows of these, -1 for a face that is not here."""
     size: Floats
-    exposed: Flags
-    """(e, 2) whether either face is."""
-    aged: Flags
-    """(e, 2) see records.Edges."""
+    opened: Bits
+    """(e, 2) how far either face is open: OPEN where it is exposed, 1 where it is aged, else 0 (records.Edges)."""
     meets: Flags
     """(e,) whether its faces allow that others meet it: see records.Edges."""
     sharp: Flags
@@ -155,8 +156,6 @@ class SceneEdges:
     """(e,) whose face of smaller id is of this rank."""
     rank: Ints
     """(e,) of two edges, that of lower rank has the pair."""
-    far: Ints
-    """Rows of edges with a face that is not here."""
     live: Flags
     """(e,) which are searched."""
     new: Flags
@@ -170,9 +169,15 @@ class SceneEdges:
         own: Flags, rank: Ints,
     ) -> "SceneEdges":  # fmt: skip
         """Nothing is searched yet."""
-        far, meets = np.flatnonzero((faces < 0).any(axis=1)), np.asarray(aged.all(axis=1) & exposed.any(axis=1))
-        live, new, fresh = np.zeros((3, len(corners)), bool)
-        return cls(corners, sides, faces, size, exposed, aged, meets, sharp, own, rank, far, live, new, fresh)
+        opened, meets = aged.astype(np.uint8) + exposed, np.asarray(aged.all(axis=1) & exposed.any(axis=1))
+        return cls(
+            corners, sides, faces, size, opened, meets, sharp, own, rank, *np.zeros((3, len(corners)), bool)
+        )  # fmt: skip
+
+    @cached_property
+    def far(self) -> Ints:
+        """Rows of edges with a face that is not here."""
+        return np.flatnonzero((self.faces < 0).any(axis=1))
 
     @property
     def names(self) -> Ints:

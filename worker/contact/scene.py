@@ -11,7 +11,7 @@ from ..parallel.ownership import Neighbour, same
 from ..parallel.tags import Tag
 from ..state import Flags, Floats, Indices, Ints, Nodes
 from . import ghosts, held, sharp
-from .columns import OwnSlots, SceneEdges, SceneFaces, SceneSlots
+from .columns import OPEN, OwnSlots, SceneEdges, SceneFaces, SceneSlots
 from .company import Company
 from .ghosts import Copies
 from .narrow_phase import ContactRows, EdgeTable, FaceTable, SlotTable
@@ -128,10 +128,9 @@ class Scene:
         edges = self.edges
         if len(far := edges.far):
             shown = among(np.sort(faces), edges.sides[far].reshape(-1)).reshape(-1, 2)
-            edges.fresh[far] |= (shown & ~edges.exposed[far]).any(axis=1)
-            edges.exposed[far] |= shown
-            edges.aged[far] |= shown
-        _expose(edges.exposed, edges.aged, edges.meets, edges.fresh, edges.faces, self.faces.exposed)
+            edges.fresh[far] |= (shown & (edges.opened[far] < OPEN)).any(axis=1)
+            edges.opened[far] = np.where(shown, np.uint8(OPEN), edges.opened[far])
+        _expose(edges.opened, edges.meets, edges.fresh, edges.faces, self.faces.exposed)
         self.enliven(rows)
 
     def uncover(self, gone: Ints, bare: Ints, removed: Indices) -> None:
@@ -140,8 +139,7 @@ class Scene:
         """
         rows, removed = self.rows_of(gone), removed[removed >= 0]
         self.faces.exposed[rows] = self.faces.live[rows] = False
-        lost = among(gone, self.edges.sides)
-        self.edges.exposed[lost] = self.edges.aged[lost] = False
+        self.edges.opened[among(gone, self.edges.sides)] = 0
         self.slots.slave[removed] = self.slots.live[removed] = False
         self.expose(bare)
 
@@ -162,7 +160,7 @@ class Scene:
         self.slots.live |= nodes
         self.slots.new |= nodes
         edges = self.edges
-        _enliven(edges.live, edges.new, edges.corners, edges.faces, edges.aged, edges.sharp, self.faces.live)
+        _enliven(edges.live, edges.new, edges.corners, edges.faces, edges.opened, edges.sharp, self.faces.live)
         self.slots.tracked[:] = self.slots.live
         self.slots.tracked[self.faces.corners[self.faces.live, :3]] = True
         self.slots.tracked[self.edges.corners[self.edges.live, :2]] = True
@@ -211,31 +209,28 @@ class Scene:
         self.messages.free()
 
 
-@njit(
-    "void(boolean[:, ::1], boolean[:, ::1], boolean[::1], boolean[::1], int32[:, ::1], boolean[::1])",
-    cache=True,
-)
-def _expose(exposed, aged, meets, fresh, faces, shown):  # type: ignore[no-untyped-def]
+@njit("void(uint8[:, ::1], boolean[::1], boolean[::1], int32[:, ::1], boolean[::1])", cache=True)
+def _expose(opened, meets, fresh, faces, shown):  # type: ignore[no-untyped-def]
     """Edges whose ``faces`` (e, 2) are ``shown`` (f,), and which meet others since; see SceneEdges."""
-    for e in range(len(exposed)):
+    for e in range(len(opened)):
         for k in range(2):
-            if faces[e, k] >= 0 and shown[faces[e, k]] and not exposed[e, k]:
-                exposed[e, k], aged[e, k], fresh[e] = True, True, True
-        meets[e] = aged[e, 0] and aged[e, 1] and (exposed[e, 0] or exposed[e, 1])
+            if faces[e, k] >= 0 and shown[faces[e, k]] and opened[e, k] < OPEN:
+                opened[e, k], fresh[e] = OPEN, True
+        meets[e] = min(opened[e, 0], opened[e, 1]) > 0 and max(opened[e, 0], opened[e, 1]) == OPEN
 
 
 @njit(
-    "void(boolean[::1], boolean[::1], int32[:, ::1], int32[:, ::1], boolean[:, ::1], boolean[::1], boolean[::1])",
+    "void(boolean[::1], boolean[::1], int32[:, ::1], int32[:, ::1], uint8[:, ::1], boolean[::1], boolean[::1])",
     cache=True,
 )
-def _enliven(live, new, edges, faces, aged, sharp, searched):  # type: ignore[no-untyped-def]
+def _enliven(live, new, edges, faces, opened, sharp, searched):  # type: ignore[no-untyped-def]
     """Edges that are ``sharp``, one of whose ``faces`` (e, 2) is ``searched`` (f,), and the other one too if it is not
-    ``aged``. Of a face that is not here nobody says when it is exposed: it is taken to be searched.
+    ``opened`` (e, 2) at all. Of a face that is not here nobody says when it is exposed: it is taken to be searched.
     """
     for e in range(len(live)):
         one, both = False, sharp[e] and edges[e, 0] != edges[e, 1]
         for k in range(2):
             some = faces[e, k] < 0 or searched[faces[e, k]]
-            one, both = one or some, both and (some or aged[e, k])
+            one, both = one or some, both and (some or opened[e, k] > 0)
         new[e] |= both and one and not live[e]
         live[e] = both and one
