@@ -60,7 +60,8 @@ def surface_of(
 ) -> Surface:
     """The surface of a rank's piece; ``planes`` (nodes, planes): which nodes are on which symmetry plane."""
     on_planes = np.zeros((model.nodes.n, 0), bool) if planes is None else planes
-    nothing = CrackSides.none(), np.zeros((0, 3), np.int32)
+    none = np.zeros((0, 3), np.int32)
+    nothing = CrackSides(none, none), none
     return surface.build(model, on_planes, piece.neighbours, comm or SerialComm(), edges, *nothing)
 
 

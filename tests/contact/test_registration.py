@@ -14,7 +14,7 @@ import pytest
 
 from conoid.worker.contact import layout, registration
 from conoid.worker.contact.narrow_phase import DEEP, DEEP_SELF
-from conoid.worker.contact.records import Edges, Faces
+from conoid.worker.contact.records import OPEN, Edges, Faces
 from conoid.worker.contact.scene import Scene
 from conoid.worker.contact.sides import Rules, Sides
 from conoid.worker.parallel.comm import SerialComm
@@ -57,12 +57,12 @@ class World:
         shards = np.flatnonzero(self.here)
         faces, edges, nodes = (self.rows(shards, many) for many in (4, 6, 4))
         shown = np.repeat(self.shown, 4)
+        opened = np.uint8(OPEN) * shown[self.sides[edges]]
         crowd = crowd_of(self.x, self.v, self.part).take(nodes)
         sides = Sides(
             Faces(faces, self.faces[faces], self.size[faces], shown[faces]),
             Edges(
-                self.edges[edges], self.sides[edges], self.length[edges], shown[self.sides[edges]],
-                shown[self.sides[edges]],
+                self.edges[edges], self.sides[edges], self.length[edges], opened,
                 np.ones(len(edges), bool),
             ), crowd, nodes,
         )  # fmt: skip

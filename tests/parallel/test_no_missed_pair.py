@@ -23,6 +23,7 @@ from conoid.worker.contact.narrow_phase import ContactRows, Step
 from conoid.worker.contact.node_face import node_face
 from conoid.worker.contact.normals import means
 from conoid.worker.contact.pairs import PairTable
+from conoid.worker.contact.records import AGED, OPEN
 from conoid.worker.contact.scene import Scene
 from conoid.worker.contact.search import Things
 from conoid.worker.parallel.comm import Comm, SerialComm
@@ -131,7 +132,7 @@ class Brute(Found):
         edges = edges.take(np.lexsort((edges.sides[:, 1], edges.sides[:, 0])))
         places = sides.crowd.places(edges.nodes)
         of = edge_table(places, edges.size, np.zeros(len(places)))._replace(
-            meets=np.asarray(edges.aged.all(axis=1) & edges.exposed.any(axis=1))
+            meets=np.asarray((edges.opened >= AGED).all(axis=1) & (edges.opened == OPEN).any(axis=1))
         )
         for every in self._pairs(places[:, :2], places[:, :2]):
             pairs, table = every[every[:, 0] < every[:, 1]], PairTable()

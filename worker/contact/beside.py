@@ -40,6 +40,14 @@ def facing(normals, s, m):  # type: ignore[no-untyped-def]
     return turn, min(turn, 0.5 * (least + _SOME))
 
 
+@njit(types.boolean(PAIRS, FACES, types.int32[::1], types.int64, types.int64, _F, _F), cache=True)
+def _asked(pairs, faces, part, q, body, strayed, end):  # type: ignore[no-untyped-def]
+    """Whether the face of pair ``q`` is exposed, of a part ``body``, and not left alone; see outside."""
+    f = pairs.rows[q, 1]
+    far = pairs.until[q] > strayed + faces.left[f] + pairs.speed[q] * end and not pairs.turned[q]
+    return (faces.fresh[f] or not far) and faces.exposed[f] and part[faces.corners[f, 0]] == body
+
+
 @njit(
     types.boolean(PAIRS, types.int32[::1], FACES, types.float64[:, :], types.int32[::1], types.int64, _F, _F, _F),
     cache=True,
@@ -53,17 +61,15 @@ def outside(pairs, first, faces, x, part, p, depth, strayed, end):  # type: igno
     alone for: it is further away. ``strayed``: how far the node leaves its line, infinite when pairs are not known;
     ``end``: of the step, with the length of the step once more, for a pair may just have been measured at its end.
     """
-    rows, until, speed, turned, following = pairs.rows, pairs.until, pairs.speed, pairs.turned, pairs.next
-    exposed, corners, size, left, fresh = faces.exposed, faces.corners, faces.size, faces.left, faces.fresh
+    rows, corners, size = pairs.rows, faces.corners, faces.size
     s, body = rows[p, 0], part[corners[rows[p, 1], 0]]
-    point, reach = at(x, s), DEEP_SELF if part[s] == body else DEEP
-    q = first[s]
-    while q >= 0:
-        f, far = rows[q, 1], until[q] > strayed + left[rows[q, 1]] + speed[q] * end and not turned[q]
-        q = following[q]
-        i, j, k = corners[f, 0], corners[f, 1], corners[f, 2]
-        if (far and not fresh[f]) or not exposed[f] or part[i] != body:
+    point, reach, following = at(x, s), DEEP_SELF if part[s] == body else DEEP, first[s]
+    while following >= 0:
+        q, following = following, pairs.next[following]
+        if not _asked(pairs, faces, part, q, body, strayed, end):
             continue
+        f = rows[q, 1]
+        i, j, k = corners[f, 0], corners[f, 1], corners[f, 2]
         o, a, b = at(x, i), at(x, j), at(x, k)
         near, (away, _) = min(depth, reach * size[f]), height(point, o, a, b)
         if not 0.0 < away < near:
@@ -88,18 +94,16 @@ def in_front(pairs, first, faces, step, normals, p, gap, strayed, end):  # type:
     Then it has passed beside a convex edge, along which it slides or flies, and is not in the body. The other face has
     a corner in common, and this one lies behind it. ``strayed`` and ``end``: see outside.
     """
-    rows, until, speed, turned, following = pairs.rows, pairs.until, pairs.speed, pairs.turned, pairs.next
-    exposed, corners, size, left, fresh = faces.exposed, faces.corners, faces.size, faces.left, faces.fresh
-    ahead, part = step.ahead, step.part
+    rows, corners, size, ahead, part = pairs.rows, faces.corners, faces.size, step.ahead, step.part
     s, g = rows[p, 0], rows[p, 1]
     a, b, c = corners[g, 0], corners[g, 1], corners[g, 2]
-    point, q = at(ahead, s), first[s]
-    while q >= 0:
-        f, far = rows[q, 1], until[q] > strayed + left[rows[q, 1]] + speed[q] * end and not turned[q]
-        q = following[q]
-        i, j, k = corners[f, 0], corners[f, 1], corners[f, 2]
-        if (far and not fresh[f]) or not exposed[f] or f == g or part[i] != part[a]:
+    point, body, following = at(ahead, s), part[a], first[s]
+    while following >= 0:
+        q, following = following, pairs.next[following]
+        if q == p or not _asked(pairs, faces, part, q, body, strayed, end):
             continue
+        f = rows[q, 1]
+        i, j, k = corners[f, 0], corners[f, 1], corners[f, 2]
         if a not in (i, j, k) and b not in (i, j, k) and c not in (i, j, k):
             continue
         o, e, h = at(ahead, i), at(ahead, j), at(ahead, k)
@@ -110,7 +114,7 @@ def in_front(pairs, first, faces, step, normals, p, gap, strayed, end):  # type:
         if not behind < -_BEHIND * size[g]:
             continue
         every, some = facing(normals, s, m)
-        if not (every if part[s] == part[i] else some) <= 0.0:
+        if not (every if part[s] == body else some) <= 0.0:
             continue
         on, _ = foot(minus(point, o), minus(e, o), minus(h, o))
         if on:

@@ -8,10 +8,8 @@ import numpy as np
 from ..growing import Rooms
 from ..state import Bits, Flags, Floats, Indices, Ints
 from .normals import COLUMNS
-from .records import Crowd
+from .records import AGED, OPEN, Crowd
 
-OPEN = 2
-"""How far a face of an edge is open that is exposed."""
 _FRESH = {
     **dict.fromkeys(("slave", "pushes", "live", "new", "fresh", "tracked", "on_surface"), False),
     "first": -1, "normals": 0.0, "total": 0,
@@ -147,7 +145,7 @@ class SceneEdges:
     """(e, 2) rows of these, -1 for a face that is not here."""
     size: Floats
     opened: Bits
-    """(e, 2) how far either face is open: OPEN where it is exposed, 1 where it is aged, else 0 (records.Edges)."""
+    """(e, 2) how far either face is open: see records.Edges."""
     meets: Flags
     """(e,) whether its faces allow that others meet it: see records.Edges."""
     sharp: Flags
@@ -165,11 +163,11 @@ class SceneEdges:
 
     @classmethod
     def at_rest(
-        cls, corners: Indices, sides: Ints, faces: Indices, size: Floats, exposed: Flags, aged: Flags, sharp: Flags,
-        own: Flags, rank: Ints,
+        cls, corners: Indices, sides: Ints, faces: Indices, size: Floats, opened: Bits, sharp: Flags, own: Flags,
+        rank: Ints,
     ) -> "SceneEdges":  # fmt: skip
         """Nothing is searched yet."""
-        opened, meets = aged.astype(np.uint8) + exposed, np.asarray(aged.all(axis=1) & exposed.any(axis=1))
+        meets = np.asarray((opened.min(axis=1, initial=OPEN) >= AGED) & (opened.max(axis=1, initial=0) == OPEN))
         return cls(
             corners, sides, faces, size, opened, meets, sharp, own, rank, *np.zeros((3, len(corners)), bool)
         )  # fmt: skip

@@ -13,7 +13,10 @@ import numpy as np
 
 from ..growing import Rooms
 from ..ids import located
-from ..state import Flags, Floats, Indices, Ints
+from ..state import Bits, Flags, Floats, Indices, Ints
+
+AGED, OPEN = 1, 2
+"""How far a face of an edge is open."""
 
 
 @dataclass
@@ -76,11 +79,9 @@ class Edges(Rows):
     """(n, 2) ids of the faces abc and bad."""
     size: Floats
     """(n,) initial length, m."""
-    exposed: Flags
-    """(n, 2) whether either face is exposed."""
-    aged: Flags
-    """(n, 2) whether either face is, or is the side of a crack that is old enough (cracks.AGE): an edge meets others
-    when it is sharp, both faces are that and one is exposed."""
+    opened: Bits
+    """(n, 2) how far either face is open: OPEN where it is exposed, AGED for the side of a crack that has come of age
+    (cracks.AGE), else 0. The edge meets others when it is sharp, both faces are open at all and one is exposed."""
     sharp: Flags
     """(n,) see sharp.py."""
 
@@ -97,12 +98,7 @@ class CrackSides:
     young: Indices
     """(k, 3) whose edges meet none yet."""
     aged: Indices
-    """(m, 3)"""
-
-    @classmethod
-    def none(cls) -> "CrackSides":
-        """No sides."""
-        return cls(*np.zeros((2, 0, 3), np.int32))
+    """(m, 3) whose edges do."""
 
 
 @dataclass

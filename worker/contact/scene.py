@@ -11,12 +11,12 @@ from ..parallel.ownership import Neighbour, same
 from ..parallel.tags import Tag
 from ..state import Flags, Floats, Indices, Ints, Nodes
 from . import ghosts, held, sharp
-from .columns import OPEN, OwnSlots, SceneEdges, SceneFaces, SceneSlots
+from .columns import OwnSlots, SceneEdges, SceneFaces, SceneSlots
 from .company import Company
 from .ghosts import Copies
 from .narrow_phase import ContactRows, EdgeTable, FaceTable, SlotTable
 from .pairs import PairTable
-from .records import Crowd
+from .records import AGED, OPEN, Crowd
 from .sides import Rules
 from .tracks import Tracks
 
@@ -216,7 +216,7 @@ def _expose(opened, meets, fresh, faces, shown):  # type: ignore[no-untyped-def]
         for k in range(2):
             if faces[e, k] >= 0 and shown[faces[e, k]] and opened[e, k] < OPEN:
                 opened[e, k], fresh[e] = OPEN, True
-        meets[e] = min(opened[e, 0], opened[e, 1]) > 0 and max(opened[e, 0], opened[e, 1]) == OPEN
+        meets[e] = min(opened[e, 0], opened[e, 1]) >= AGED and max(opened[e, 0], opened[e, 1]) == OPEN
 
 
 @njit(
@@ -231,6 +231,6 @@ def _enliven(live, new, edges, faces, opened, sharp, searched):  # type: ignore[
         one, both = False, sharp[e] and edges[e, 0] != edges[e, 1]
         for k in range(2):
             some = faces[e, k] < 0 or searched[faces[e, k]]
-            one, both = one or some, both and (some or opened[e, k] > 0)
+            one, both = one or some, both and (some or opened[e, k] >= AGED)
         new[e] |= both and one and not live[e]
         live[e] = both and one

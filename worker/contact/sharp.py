@@ -13,7 +13,7 @@ import numpy as np
 from ..jit import njit
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
-from ..state import Flags, Floats, Indices, Ints, Model
+from ..state import Bits, Flags, Floats, Indices, Ints, Model
 from ..turning import sine_and_cosine
 from .geometry import at, cross, dot, minus
 from .records import Edges, Faces
@@ -30,14 +30,12 @@ _A, _B, _C, _OWNER, _FACE, _OPEN, _LENGTH, _NORMAL = 0, 1, 2, 3, 4, 5, 6, 7
 how far that is open, initial length, m, and the unit normal of the face; floats as their bits."""
 _HALF, _ROW = 10, 12
 """Columns of a half edge, and of an edge (``_matched``)."""
-_AGED = 1
-"""How far a face is open: 0 for a side of a young crack, one more for an exposed face."""
 
 
 def none() -> tuple[Edges, Ints, Indices]:
     """No edge (``find``)."""
-    nothing, flags = np.zeros((0, 4), np.int64), np.zeros((0, 2), bool)
-    edges = Edges(nothing, nothing[:, :2], np.zeros(0), flags, flags, flags[:, 0])
+    nothing = np.zeros((0, 4), np.int64)
+    edges = Edges(nothing, nothing[:, :2], np.zeros(0), np.zeros((0, 2), np.uint8), np.zeros(0, bool))
     return edges, np.zeros(0, np.int64), np.zeros(0, np.int32)
 
 
@@ -47,13 +45,13 @@ def find(
     local: Indices,
     units: Floats,
     some: Flags,
-    aged: Flags,
+    opened: Bits,
     neighbours: list[Neighbour],
     comm: Comm,
 ) -> tuple[Edges, Ints, Indices]:
     """The edges by the ids of their faces, and ids of the nodes of theirs that are not held here, with their owners.
 
-    Of ``some`` (f,) of the faces, with the ``local`` nodes (f, 4) and unit normals (f, 3); ``aged`` (f,): see Edges.
+    Of ``some`` (f,) of the faces, with the ``local`` nodes (f, 4) and unit normals (f, 3); ``opened`` (f,): see Edges.
     Where other ranks may hold faces of an edge, the owner of the lower node brings them together, and the rank of the
     face of smaller id has the edge.
     """
@@ -61,16 +59,15 @@ def find(
     away = half & _common(local, model.nodes.n, neighbours) if neighbours else np.zeros_like(half)
     pairs = _pairs(local, half & ~away, units, model.nodes.n, SHARP)
     n = len(pairs)
-    flags = np.empty((2, n, 2), bool)
-    table = np.empty((n, 4), np.int64), np.empty((n, 2), np.int64), np.empty(n), flags[0], flags[1]
-    _fill(*table, pairs, local, faces.nodes, faces.id, faces.exposed, aged, model.nodes.x0)
+    table = np.empty((n, 4), np.int64), np.empty((n, 2), np.int64), np.empty(n), np.empty((n, 2), np.uint8)
+    _fill(*table, pairs, local, faces.nodes, faces.id, opened, model.nodes.x0)
     edges = Edges(*table, pairs[:, 4] > 0)
     if comm.size == 1:
         return edges, *none()[1:]
-    rows = _elsewhere(model, faces, local, units, away, aged, comm)
+    rows = _elsewhere(model, faces, local, units, away, opened, comm)
     floats = np.ascontiguousarray(rows[:, 8]).view(np.float64)
-    exposed, aged = rows[:, 9:11] > _AGED, rows[:, 9:11] >= _AGED
-    edges = Edges.joined([edges, Edges(rows[:, :4], rows[:, 6:8], floats, exposed, aged, rows[:, 11] > 0)])
+    far_opened = rows[:, 9:11].astype(np.uint8)
+    edges = Edges.joined([edges, Edges(rows[:, :4], rows[:, 6:8], floats, far_opened, rows[:, 11] > 0)])
     ends, owners = rows[:, 2:4].reshape(-1), rows[:, 4:6].reshape(-1)
     absent = ~np.isin(ends, model.nodes.id)
     far, first = np.unique(ends[absent], return_index=True)
@@ -86,12 +83,14 @@ def _common(local: Indices, n: int, neighbours: list[Neighbour]) -> Flags:
     return np.asarray(a & b)
 
 
-def _elsewhere(model: Model, faces: Faces, local: Indices, units: Floats, away: Flags, aged: Flags, comm: Comm) -> Ints:
+def _elsewhere(
+    model: Model, faces: Faces, local: Indices, units: Floats, away: Flags, opened: Bits, comm: Comm
+) -> Ints:
     """Rows (``_matched``) of this rank's edges among the half edges ``away`` (f, 3); all ranks take part."""
     nodes, (f, k) = model.nodes, np.nonzero(away)
     a, b, c = (local[f, (k + i) % 3] for i in range(3))
     floats = np.column_stack([np.linalg.norm(nodes.x0[b] - nodes.x0[a], axis=1), units[f]]).view(np.int64)
-    known = nodes.id[a], nodes.id[b], nodes.id[c], nodes.owner[c], faces.id[f], _AGED * aged[f] + faces.exposed[f]
+    known = nodes.id[a], nodes.id[b], nodes.id[c], nodes.owner[c], faces.id[f], opened[f]
     halves, home = np.column_stack([*known, floats]), nodes.owner[np.minimum(a, b)]
     found = comm.swap({int(rank): halves[home == rank] for rank in np.unique(home)})
     gathered = np.concatenate([halves[:0], *(words.reshape(-1, _HALF) for words in found.values())])
@@ -177,11 +176,11 @@ def _by_lower_node(corners, half, nodes):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    "void(int64[:, ::1], int64[:, ::1], float64[::1], boolean[:, ::1], boolean[:, ::1], int32[:, ::1], int32[:, ::1], "
-    "int64[:, ::1], int64[::1], boolean[::1], boolean[::1], float64[:, ::1])",
+    "void(int64[:, ::1], int64[:, ::1], float64[::1], uint8[:, ::1], int32[:, ::1], int32[:, ::1], int64[:, ::1], "
+    "int64[::1], uint8[::1], float64[:, ::1])",
     cache=True,
 )
-def _fill(nodes, sides, size, exposed, aged, pairs, local, face_nodes, face_id, face_exposed, face_aged, x):  # type: ignore[no-untyped-def]
+def _fill(nodes, sides, size, opened, pairs, local, face_nodes, face_id, face_opened, x):  # type: ignore[no-untyped-def]
     """The columns of the edges that are ``pairs``."""
     for p in range(len(pairs)):
         f, k, g, m = pairs[p, 0], pairs[p, 1], pairs[p, 2], pairs[p, 3]
@@ -189,8 +188,7 @@ def _fill(nodes, sides, size, exposed, aged, pairs, local, face_nodes, face_id, 
             nodes[p, i] = face_nodes[f, (k + i) % 3]
         nodes[p, 3] = face_nodes[g, (m + 2) % 3]
         sides[p, 0], sides[p, 1] = face_id[f], face_id[g]
-        exposed[p, 0], exposed[p, 1] = face_exposed[f], face_exposed[g]
-        aged[p, 0], aged[p, 1] = face_aged[f], face_aged[g]
+        opened[p, 0], opened[p, 1] = face_opened[f], face_opened[g]
         a, b = local[f, k], local[f, (k + 1) % 3]
         dx, dy, dz = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
         size[p] = np.sqrt(dx * dx + dy * dy + dz * dz)

@@ -68,7 +68,8 @@ def build(
     _measure(faces.nodes, faces.size, units, counts, local, faces.exposed, nodes.id, nodes.x0)
     complete(comm, neighbours, counts, Tag.SURFACE)
     some = ((kind == _YOUNG) | (kind == _AGED) | (kind == _EXPOSED)) & edges
-    found = sharp.find(model, faces, local, units, some, kind >= _AGED, neighbours, comm) if edges else sharp.none()
+    opened = (kind >= _AGED).astype(np.uint8) + faces.exposed
+    found = sharp.find(model, faces, local, units, some, opened, neighbours, comm) if edges else sharp.none()
     return Surface(faces, found[0], counts[:, 0] > 0, counts[:, 1] > 0, *found[1:])
 
 
