@@ -222,8 +222,8 @@ class Run:
         number = n if n >= 0 else max((told.n for told in self.snapshots()), default=0)
         try:
             return Snapshot(self.session.fetch(f"{self.path}/snapshots/{number}"))
-        except NotFoundError as error:
-            raise self._lacks(error, f"snapshot {number}") from None
+        except NotFoundError:
+            raise self._lacks(f"snapshot {number}") from None
 
     def fragments(self, after: int = 0, link: Link | None = None) -> Generator[Snapshot]:
         """Every snapshot whose message comes after message ``after``, as they are made, to the run's end.
@@ -249,13 +249,17 @@ class Run:
         for each in names:
             try:
                 self.session.download(f"{self.path}/files/{quoted(each, safe='/')}", inside(root, each))
-            except NotFoundError as error:
-                raise self._lacks(error, each) from None
+            except NotFoundError:
+                raise self._lacks(each) from None
         return inside(root, name) if name is not None else root
 
-    def _lacks(self, error: NotFoundError, what: str) -> ClientError:
-        """What is raised for something that the run has not written; for a run that there is none of, ``error``."""
-        return error if str(error).startswith("run ") else UnfinishedError(f"run {self.id} has no {what}")
+    def _lacks(self, what: str) -> ClientError:
+        """What is raised for something that the run has not written, or for a run that there is none of."""
+        try:
+            self.status()
+        except NotFoundError as error:
+            return error
+        return UnfinishedError(f"run {self.id} has no {what}")
 
     def result(self) -> Result:
         """What it has written: fetched when it is asked for, kept until the result is gone."""
