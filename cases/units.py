@@ -27,7 +27,8 @@ _NONE, _FREQUENCY = (0, 0, 0, 0), (0, 0, -1, 0)
 """Dimensions by their exponents of m, kg, s, K."""
 
 _ONE, _KILO, _MEGA, _GIGA = Fraction(1), Fraction(1000), Fraction(10**6), Fraction(10**9)
-_CENTI, _MILLI, _MICRO, _NANO = Fraction(1, 100), Fraction(1, 1000), Fraction(1, 10**6), Fraction(1, 10**9)
+_CENTI, _MILLI, _MICRO = Fraction(1, 100), Fraction(1, 1000), Fraction(1, 10**6)
+_NANO, _PICO = Fraction(1, 10**9), Fraction(1, 10**12)
 """SI prefixes, exact."""
 _INCH, _POUND = Fraction("0.0254"), Fraction("0.45359237")
 """m and kg, exact by the agreement of 1959."""
@@ -41,7 +42,7 @@ UNITS: dict[str, tuple[Fraction, Dimension]] = {
     "kg": (_ONE, _MASS), "g": (_MILLI, _MASS), "mg": (_MICRO, _MASS), "t": (_KILO, _MASS),
     "lb": (_POUND, _MASS),
     "s": (_ONE, _TIME), "ms": (_MILLI, _TIME), "us": (_MICRO, _TIME), "µs": (_MICRO, _TIME), "ns": (_NANO, _TIME),
-    "min": (Fraction(60), _TIME), "h": (Fraction(3600), _TIME),
+    "ps": (_PICO, _TIME), "min": (Fraction(60), _TIME), "h": (Fraction(3600), _TIME),
     "K": (_ONE, _TEMPERATURE),
     "Hz": (_ONE, _FREQUENCY), "kHz": (_KILO, _FREQUENCY), "rad": (_ONE, _NONE),
     "deg": (Fraction(math.pi) / 180, _NONE), "rev": (2 * Fraction(math.pi), _NONE),

@@ -28,6 +28,7 @@ from conoid.cases.units import parse_quantity, parse_unit
         ("1 1/s", "1/s", 1.0),
         ("80 us", "s", 8e-5),
         ("80 µs", "s", 8e-5),
+        ("250 ps", "s", 2.5e-10),
         ("5 %", "", 0.05),
         ("0.3", "", 0.3),
         ("0.3", "m", 0.3),
