@@ -1,7 +1,7 @@
 """A server and the words of its API."""
 
 import uuid
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 from urllib.parse import urlencode
 
@@ -13,8 +13,8 @@ from .config import target
 from .errors import ClientError
 from .http import Http
 from .run import Run, RunInfo, quoted
-from .submission import CaseSource, body_of, data_of
-from .sweep import Point, Sweep, SweepInfo, SweepPage, points_along
+from .submission import CaseSource, body_of, data_of, to_json
+from .sweep import Point, Sweep, SweepInfo, SweepPage, listed, points_along
 
 _POINT = 0.5
 """s that a server may take for each point of a sweep, which it reads, checks and writes to disk before it answers.
@@ -84,7 +84,7 @@ class Session(Http):
         return Run(self, self.post(RunInfo, path, key=key or str(uuid.uuid4())).id)
 
     def sweep(
-        self, case: CaseSource, points: Sequence[Point] | Mapping[str, Sequence[Any]], at_once: int | None = None,
+        self, case: CaseSource, points: Sequence[Point] | Mapping[str, Iterable[Any]], at_once: int | None = None,
         key: str | None = None, *, grid: bool = False,
     ) -> Sweep:  # fmt: skip
         """Hands a case in at many points, each a mapping of keys to values: all become runs, or none.
@@ -92,9 +92,9 @@ class Session(Http):
         A mapping of keys to as many values each is one point after the other, or each with each for a ``grid``.
         ``at_once`` of them run at a time; ``key`` as for ``submit``. Raises CaseError, ServiceError.
         """
-        chosen = points_along(points, grid=grid) if isinstance(points, Mapping) else list(points)
+        chosen = listed(points_along(points, grid=grid) if isinstance(points, Mapping) else points)
         wish = {"case": data_of(case), "points": chosen, "at_once": at_once}
-        body = msgspec.json.encode(wish)
+        body = to_json(wish)
         more = _POINT * len(chosen)
         made = self.post(SweepInfo, "/v1/sweeps", body, "application/json", key or str(uuid.uuid4()), more)
         return Sweep(self, made.id)

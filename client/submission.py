@@ -52,4 +52,15 @@ def body_of(source: CaseSource, overrides: Overrides = ()) -> tuple[str, bytes]:
             return _SUFFIXES[path.suffix], path.read_bytes()
         except (OSError, KeyError):
             read_data(path)
-    return "application/json", json.dumps(data_of(source, changes), default=str).encode()
+    return "application/json", to_json(data_of(source, changes))
+
+
+def to_json(data: Mapping[str, Any]) -> bytes:
+    """Plain data as it is sent: NaN and infinity as such, which the server refuses with their key; numbers of numpy
+    as numbers, and what JSON has no word for as text.
+    """
+    return json.dumps(data, default=_plain).encode()
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if hasattr(value, "tolist") else str(value)

@@ -14,6 +14,7 @@ from typing import Any
 import msgspec
 
 from conoid.cases.load import CaseError, Problem, apply_overrides
+from conoid.cases.problems import shown
 from conoid.cases.run import State
 
 from .errors import ClientError
@@ -125,19 +126,40 @@ def points_of(words: Iterable[str], *, grid: bool = False) -> list[Point]:
     return points_along(dict(axes), grid=grid, named="--set")
 
 
-def points_along(axes: Mapping[str, Sequence[Any]], *, grid: bool = False, named: str = "points") -> list[Point]:
+def points_along(axes: Mapping[str, Iterable[Any]], *, grid: bool = False, named: str = "points") -> list[Point]:
     """The points of the values of each key: one after the other with all keys at once, or each with each for a
     ``grid``; ``named``: what errors call them. Raises CaseError.
     """
+    lists = {key: _values(key, values, named) for key, values in axes.items()}
     if grid:
-        rows: Iterable[tuple[Any, ...]] = itertools.product(*axes.values())
+        rows: Iterable[tuple[Any, ...]] = itertools.product(*lists.values())
     else:
-        counts = {key: len(values) for key, values in axes.items()}
+        counts = {key: len(values) for key, values in lists.items()}
         if len(set(counts.values())) > 1:
             told = ", ".join(f"{key} has {n}" for key, n in counts.items())
             raise CaseError([Problem(named, "", f"as many values for each key, or a grid: {told}")])
-        rows = zip(*axes.values(), strict=True)
-    return [dict(zip(axes, row, strict=True)) for row in rows]
+        rows = zip(*lists.values(), strict=True)
+    return [dict(zip(lists, row, strict=True)) for row in rows]
+
+
+def _values(key: str, values: Any, named: str) -> list[Any]:
+    """The values of a key as a list; arrays are sequences, too. Raises CaseError for one value, a text among them."""
+    if isinstance(values, Iterable) and not isinstance(values, str | bytes | Mapping):
+        return list(values.tolist() if hasattr(values, "tolist") else values)
+    message = f"{key} has one value; write a list of values, such as [{values!r}]"
+    raise CaseError([Problem(named, shown(values), message)])
+
+
+def listed(points: Any) -> list[Point]:
+    """The points as they are sent, each a mapping of keys to values. Raises CaseError."""
+    found: list[Any] = [points] if isinstance(points, str) or not isinstance(points, Iterable) else list(points)
+    told = "a point is a mapping of keys to values, such as {'run.ranks': 2}"
+    wrong = [
+        Problem(f"points[{n}]", shown(point), told) for n, point in enumerate(found) if not isinstance(point, Mapping)
+    ]
+    if wrong:
+        raise CaseError(wrong)
+    return [dict(point) for point in found]
 
 
 def points_in(path: Path) -> list[Point]:

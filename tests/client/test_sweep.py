@@ -8,7 +8,7 @@ import pytest
 from conoid.cases.load import CaseError
 from conoid.client import swept
 from conoid.client.errors import ClientError
-from conoid.client.sweep import points_in, points_of
+from conoid.client.sweep import listed, points_along, points_in, points_of
 
 
 def test_keys_go_together_or_each_with_each() -> None:
@@ -30,6 +30,24 @@ def test_a_comma_in_a_list_or_in_quotes_divides_nothing() -> None:
 def test_wrong_words_are_refused(words: list[str]) -> None:
     with pytest.raises(ValueError, match="--set"):
         points_of(words)
+
+
+def test_arrays_ranges_and_tuples_are_lists_of_values() -> None:
+    both = points_along({"run.ranks": range(1, 3), "parts[0].temperature": np.array([300.0, 400.0])}, grid=False)
+    assert both == [{"run.ranks": 1, "parts[0].temperature": 300.0}, {"run.ranks": 2, "parts[0].temperature": 400.0}]
+
+
+@pytest.mark.parametrize("value", ["1 us", 4, None, {"ranks": [1]}])
+def test_one_value_is_no_list_of_values(value: object) -> None:
+    """A text has letters to go through, and a table keys."""
+    with pytest.raises(CaseError, match=r"^points = .*: run.end_time has one value; write a list of values, such as"):
+        points_along({"run.end_time": value})  # type: ignore[dict-item]
+
+
+@pytest.mark.parametrize("points", ["run.ranks", 4, [{"run.ranks": 1}, ("run.ranks", 2)]])
+def test_a_point_is_a_mapping(points: object) -> None:
+    with pytest.raises(CaseError, match=r"^points\[\d\] = .*: a point is a mapping of keys to values, such as"):
+        listed(points)
 
 
 def test_points_from_a_file(tmp_path: Path) -> None:

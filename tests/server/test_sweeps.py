@@ -4,6 +4,7 @@ import asyncio
 import csv
 import io
 import json
+import math
 import threading
 import tomllib
 from collections.abc import Iterator
@@ -12,9 +13,11 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from conoid.cases.problems import CaseError
 from conoid.cases.run import State
 from conoid.server import folder, limits, reader, view
 from conoid.server.app import build_app, opened
@@ -136,6 +139,19 @@ def test_the_same_from_python(server: Running, tmp_path: Path) -> None:
         assert session.find_sweep("last").id == made.id
         assert [run.status().labels["point"] for run in made.runs()] == ["0", "1", "2", "3"]
         assert made.cancel().states == {"succeeded": len(ENDS)}
+
+
+def test_a_number_that_is_none_is_named(server: Running) -> None:
+    from conoid.client.session import Session
+
+    with Session("http://127.0.0.1") as session:
+        session._http.close()
+        session._http = server.ann.http
+        case = tomllib.loads(case_text())
+        with pytest.raises(CaseError, match=r"^run.end_time = nan: is not finite \(point 1\)$"):
+            session.sweep(case, {"run.end_time": ["1 us", math.nan]})
+        made = session.sweep(case, {"run.samples": np.array([10, 20]), "run.end_time": [1e-6, np.float64(2e-6)]})
+        assert [point.values["run.samples"] for point in made.status().points] == [10, 20]
 
 
 # All or none ----------------------------------------------------------------------------------------------------------
