@@ -16,6 +16,7 @@ from . import chart, study
 from .errors import UsageError
 from .options import CaseArgument, Overrides, aloud, complain
 from .projection import Network, bandwidth
+from .saving import save_text
 from .scaling import CORES, scale
 from .submission import case_of
 
@@ -50,9 +51,9 @@ def bench_scale(
             name(f"{len(runs)} of {len(numbers)} runs have ended")
     done = study.Study(case_of(case, overrides or ()).name, overrides or (), CORES, network, runs)
     if out is not None:
-        (out / "scale.md").write_text(study.to_markdown(done), encoding="utf-8")
-        (out / "scale.json").write_bytes(study.to_json(done))
-        (out / "scale.svg").write_text(chart.speed_up(done), encoding="utf-8")
+        save_text(out / "scale.md", study.to_markdown(done))
+        save_text(out / "scale.json", study.to_json(done).decode())
+        save_text(out / "scale.svg", chart.speed_up(done))
     typer.echo(study.to_markdown(done), nl=False)
     raise typer.Exit(ExitCode.SUCCEEDED if done.equal else ExitCode.CRASHED)
 

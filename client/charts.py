@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from conoid.cases.messages import AnyMessage, Balance, Load
 
 from .errors import ClientError
+from .saving import whole
 
 _COLOURS = {
     "elements": "#4c78a8", "nodes": "#72b7b2", "contact": "#f58518", "fracture": "#e45756", "output": "#54a24b",
@@ -78,7 +79,8 @@ def balance(told: Course, title: str, case: str, out: Path) -> None:
         axes.spines[["top", "right"]].set_visible(False)
     figure.suptitle(title, fontsize=11, color=_INK)
     figure.supxlabel(PAPER.get(case, ""), fontsize=8, color=_INK)
-    figure.savefig(out, dpi=100)
+    with whole(out) as part:
+        figure.savefig(part, dpi=100)
 
 
 def _outside(axes: Axes, told: Course) -> None:

@@ -20,6 +20,7 @@ from .errors import UsageError
 from .local import LocalServer
 from .options import CaseArgument, Overrides, Token, Url, aloud, complain
 from .reports import drawing
+from .saving import save_text
 from .scaling import CORES
 from .session import Session, connect
 from .submission import data_of
@@ -103,8 +104,8 @@ def _book(case: Case, changes: Sequence[str], plan: Plan, accuracy: float, done:
 def _write(book: Book, quantity: str | None, out: Path | None) -> None:
     text = converged.to_markdown(book, quantity)
     if out is not None:
-        (out / "converge.md").write_text(text, encoding="utf-8")
-        (out / "converge.json").write_bytes(converged.to_json(book, quantity))
+        save_text(out / "converge.md", text)
+        save_text(out / "converge.json", converged.to_json(book, quantity).decode())
         drawing("curves").save(drawing("pareto").figure(book), out / "converge.png")
     typer.echo(text, nl=False)
 

@@ -14,6 +14,7 @@ from conoid.cases.fragments import DUST
 from .columns import Columns, by_part
 from .compare import Material
 from .errors import ClientError
+from .saving import whole
 
 _INK, _FAINT = "#1d2733", "#b5bcc4"
 _COLOURS = (
@@ -32,9 +33,8 @@ _PROBES = 8
 def save(figure: Figure, out: Path) -> Path:
     """Writes a figure, as PNG or what the name ends in. Raises ClientError."""
     try:
-        figure.savefig(out, dpi=100)
-    except OSError as error:
-        raise ClientError(f"{out}: cannot be written: {error.strerror or error}") from None
+        with whole(out) as part:
+            figure.savefig(part, dpi=100)
     except ValueError as error:
         raise ClientError(f"{out}: cannot be written: {error}") from None
     return out

@@ -23,6 +23,7 @@ from .figures import count, known, rough
 from .local import LocalServer
 from .options import aloud, complain
 from .run import Run
+from .saving import save_text
 from .scaling import CORES
 from .session import Session
 from .study import table
@@ -69,8 +70,8 @@ def hard(
             complain(f"{len(ended)} of {len(some)}: {verdict.hard.name}: {'; '.join(verdict.faults) or 'ended well'}")
     text = to_markdown(ended)
     if out is not None:
-        (out / "hard.md").write_text(text, encoding="utf-8")
-        (out / "hard.json").write_bytes(msgspec.json.format(msgspec.json.encode(ended), indent=1))
+        save_text(out / "hard.md", text)
+        save_text(out / "hard.json", msgspec.json.format(msgspec.json.encode(ended), indent=1).decode())
     typer.echo(text, nl=False)
     raise typer.Exit(ExitCode.CRASHED if any(verdict.faults for verdict in ended) else ExitCode.SUCCEEDED)
 

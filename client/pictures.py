@@ -19,6 +19,7 @@ from typing import Any
 import msgspec
 
 from .errors import ClientError, LookError, ViewError
+from .saving import whole
 
 _SECONDS = 180.0
 """s that a frame may take to be drawn. Chosen: without a graphics card a large one takes long."""
@@ -167,12 +168,16 @@ def draw(
     return render(picture)
 
 
+_RANGE = "limits (--range)"
+"""What Python and the command line call the ends of the colour bar."""
+
+
 def _check(look: Look, target: Path) -> None:
     low, high = look.percentiles
     if not 0.0 <= low < high <= 100.0:
         raise LookError(f"percentiles = {low:g}, {high:g}: two numbers from 0 to 100, the smaller one first")
     if look.limits is not None and not look.limits[0] < look.limits[1]:
-        raise LookError(f"limits = {look.limits[0]:g}, {look.limits[1]:g}: the smaller one first")
+        raise LookError(f"{_RANGE} = {look.limits[0]:g}, {look.limits[1]:g}: two numbers, the lower end first")
     if not (look.zoom > 0.0 and look.rate > 0.0):
         raise LookError(f"zoom = {look.zoom:g}, rate = {look.rate:g}: both above 0")
     if target.suffix.lower() not in {".png", ".gif"}:
@@ -218,7 +223,16 @@ def direction(text: str, option: str) -> tuple[float, float, float] | None:
 
 
 def render(picture: Picture) -> Drawn:
-    """Draws in a child process. Raises ViewError that names what is missing."""
+    """Draws in a child process; the file is there when all of it is. Raises ViewError that names what is missing."""
+    with whole(Path(picture.out)) as part:
+        code, told, errors = child(msgspec.structs.replace(picture, out=str(part)))
+        if code:
+            raise explain(code, errors.replace(str(part), picture.out))
+    return msgspec.structs.replace(msgspec.json.decode(told, type=Drawn), out=picture.out)
+
+
+def child(picture: Picture) -> tuple[int, bytes, str]:
+    """Its exit code, its last line, and what it has complained of. Raises ViewError when it hangs."""
     command = [sys.executable, "-m", "conoid.client.render"]
     seconds = _SECONDS * max(1, len(picture.frames))
     try:
@@ -227,9 +241,7 @@ def render(picture: Picture) -> Drawn:
         )
     except subprocess.TimeoutExpired:
         raise ViewError(f"the renderer did not finish within {seconds:.0f} s") from None
-    if done.returncode == 0:
-        return msgspec.json.decode(done.stdout.splitlines()[-1], type=Drawn)
-    raise explain(done.returncode, done.stderr.decode(errors="replace"))
+    return done.returncode, b"".join(done.stdout.splitlines()[-1:]), done.stderr.decode(errors="replace")
 
 
 def reason(error: Exception, out: str) -> str:
@@ -252,7 +264,7 @@ def explain(code: int, errors: str) -> ClientError:
     missing = re.search(r"(lib[\w+-]+)\.so[.\d]*: cannot open shared object", told)
     if missing:
         return ViewError(f"VTK needs the system library {missing[1]}; on Debian and Ubuntu: {_package(missing[1])}")
-    return ViewError(told)
+    return LookError(told) if code == LookError.exit_code else ViewError(told)
 
 
 def _package(library: str) -> str:

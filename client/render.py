@@ -17,7 +17,7 @@ from PIL import Image
 
 from . import camera, scales, sheet
 from .camera import Camera
-from .errors import ViewError
+from .errors import LookError, ViewError
 from .pictures import FIELDS, Drawn, Field, Mirror, Picture, Wall, reason
 from .sheet import Sheet
 
@@ -99,8 +99,9 @@ def _surface(mesh: Any, picture: Picture) -> Any:
     length = float(mesh.length)
     mesh = _with_field(mesh, picture.field, picture.look.raw or field.kind in scales.NAMED)
     towards = camera.direction(picture, np.asarray(mesh.center))
+    bounds = np.reshape(mesh.bounds, (3, 2))
     for plane in picture.sections:
-        mesh = _cut(mesh, plane, float(towards[plane.axis]))
+        mesh = _cut(mesh, plane, float(towards[plane.axis]), bounds[plane.axis])
     surface = mesh.extract_surface(algorithm="dataset_surface")
     for mirror in picture.mirrors:
         surface = _reflected(surface, mirror, length)
@@ -126,13 +127,17 @@ def _require(data: Any, name: str) -> None:
         raise ViewError(f"this frame has no field {name!r}; it has: {', '.join(data.keys()) or 'none'}")
 
 
-def _cut(mesh: Any, plane: Mirror, side: float) -> Any:
-    """Without what lies between the plane and the camera, which is on this side of it."""
+def _cut(mesh: Any, plane: Mirror, side: float, extent: Any) -> Any:
+    """Without what lies between the plane and the camera, which is on this side of it; ``extent``: of the whole body
+    across the plane, m.
+    """
     normal, origin = np.zeros(3), np.zeros(3)
     normal[plane.axis], origin[plane.axis] = (1.0 if side >= 0.0 else -1.0), plane.at
     left = mesh.clip(normal=normal, origin=origin)
     if left.n_cells == 0:
-        raise ViewError(f"section = {'xyz'[plane.axis]}={plane.at:g}: nothing of the body lies behind it")
+        axis, (low, high) = "xyz"[plane.axis], extent
+        told = f"nothing of the body lies behind it, which is between {axis}={low:.4g} and {axis}={high:.4g} (in m)"
+        raise LookError(f"section = {axis}={plane.at:g}: {told}")
     return left
 
 
@@ -287,13 +292,18 @@ def _add_wall(plotter: Any, surface: Any, wall: Wall) -> None:
 
 def main() -> int:
     """Reads standard input, draws, prints the result as one line of JSON; a failure is one line on standard error."""
-    picture = msgspec.json.decode(sys.stdin.buffer.read(), type=Picture)
+    code, line = told(sys.stdin.buffer.read())
+    print(line, file=sys.stderr if code else sys.stdout)
+    return code
+
+
+def told(asked: bytes) -> tuple[int, str]:
+    """The exit code and the line for a Picture as JSON."""
+    picture = msgspec.json.decode(asked, type=Picture)
     try:
-        print(msgspec.json.encode(draw(picture)).decode())
+        return 0, msgspec.json.encode(draw(picture)).decode()
     except (ViewError, OSError, ValueError, RuntimeError) as error:
-        print(reason(error, picture.out), file=sys.stderr)
-        return 1
-    return 0
+        return LookError.exit_code if isinstance(error, LookError) else 1, reason(error, picture.out)
 
 
 if __name__ == "__main__":

@@ -12,9 +12,10 @@ from conoid.cases.outcome import Outcome
 from . import html, replay3d
 from .columns import by_part
 from .compare import summary
-from .errors import ClientError, UnfinishedError, ViewError
+from .errors import UnfinishedError, ViewError
 from .figures import count, si
 from .result import Result
+from .saving import save_text
 
 _SHOTS = 3
 """Times of a picture, evenly over the frames. Chosen: they fit beside each other."""
@@ -64,10 +65,7 @@ def write(
         f"<title>{escape(title)}: {escape(result.folder.name)}</title><style>{_STYLE}</style></head>"
         f"<body>{''.join(parts)}</body></html>"
     )
-    try:
-        out.write_text(page, encoding="utf-8")
-    except OSError as error:
-        raise ClientError(f"{out}: cannot be written: {error.strerror}") from None
+    save_text(out, page)
     return out
 
 

@@ -43,6 +43,9 @@ class Folder(Protocol):
     def path(self, name: str) -> Path:
         """A local path of a file. Raises UnfinishedError when the run has not written it."""
 
+    def told(self, name: str) -> str:
+        """What to call a file where people are told of it."""
+
 
 @dataclass(frozen=True)
 class LocalFolder:
@@ -66,9 +69,14 @@ class LocalFolder:
             raise UnfinishedError(self._lacks(name))
         return path
 
+    def told(self, name: str) -> str:
+        """Its path."""
+        return str(self.root / name)
+
     def _lacks(self, name: str) -> str:
         """Why a file is not there: the folder may be one that holds those of runs."""
-        runs = sorted(path.parent.name for path in self.root.glob(f"*/{layout.JOURNAL}"))
+        found = (path for depth in ("*", "*/*") for path in self.root.glob(f"{depth}/{layout.JOURNAL}"))
+        runs = sorted(path.parent.relative_to(self.root).as_posix() for path in found)
         if not runs or (self.root / layout.JOURNAL).exists():
             return f"{self.root} has no {name}"
         more = f" and {len(runs) - _NAMED} more" if len(runs) > _NAMED else ""
@@ -129,7 +137,7 @@ class Result:
         try:
             return outcome.from_json(path.read_bytes())
         except msgspec.MsgspecError as error:
-            raise ClientError(f"{path}: this outcome cannot be read: {error}") from None
+            raise ClientError(f"{self.folder.told(layout.OUTCOME)}: this outcome cannot be read: {error}") from None
 
     @cached_property
     def case(self) -> dict[str, Any]:
@@ -138,7 +146,7 @@ class Result:
         try:
             data: dict[str, Any] = json.loads(path.read_bytes())
         except ValueError as error:
-            raise ClientError(f"{path}: this case cannot be read: {error}") from None
+            raise ClientError(f"{self.folder.told(layout.RESOLVED_CASE)}: this case cannot be read: {error}") from None
         return data
 
     @cached_property
@@ -214,6 +222,9 @@ class Result:
         of a GIF every one. ``options`` are the fields of ``conoid.client.pictures.Look``. Raises ViewError.
         """
         every = Path(out or "").suffix.lower() == ".gif"
+        if not self.frames:
+            self.folder.path(layout.JOURNAL)  # a folder without frames may be none of a run
+            raise UnfinishedError(f"{self.folder.name} has not written any frame")
         chosen = self._chosen(_listed(frame), _listed(time), every)
         return draw([self.frame(one) for one in chosen], self.scene(), self.folder.name, field, out, **options)
 

@@ -289,6 +289,10 @@ class RemoteFolder:
         target = inside(self.root, name)
         return target if target.is_file() else self.run.download(self.root, name)
 
+    def told(self, name: str) -> str:
+        """Its run and server: the local copy goes away."""
+        return f"{name} of run {self.run.id} at {self.run.session.url}"
+
 
 def quoted(text: str, safe: str = "") -> str:
     """``text`` as a part of an address."""

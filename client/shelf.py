@@ -11,6 +11,7 @@ from conoid.cases.page import page
 from . import tables
 from .errors import ClientError, UsageError
 from .options import Json, complete_cases, complete_materials, show, show_json
+from .saving import save_text
 
 cases = typer.Typer(invoke_without_command=True, help="The shipped cases: list them, copy one.")
 OutOption = Annotated[Path | None, typer.Option("--out", help="Write to this file.")]
@@ -25,7 +26,7 @@ def schema(
     if out is None:
         typer.echo(text, nl=False)
     else:
-        _write(out, text)
+        save_text(out, text)
 
 
 def materials(
@@ -78,14 +79,7 @@ def copy_case(
         raise UsageError(f"--out = {str(target)!r}: the name of a case file ends in .toml")
     if target.exists():
         raise ClientError(f"{target} is there already; name another file with --out")
-    _write(target, text.replace(f"{reference.LINE} ../{reference.FILE}", f"{reference.LINE} ./{reference.FILE}", 1))
+    save_text(target, text.replace(f"{reference.LINE} ../{reference.FILE}", f"{reference.LINE} ./{reference.FILE}", 1))
     typer.echo(str(target))
-    _write(target.with_name(reference.FILE), reference.schema_text())
+    save_text(target.with_name(reference.FILE), reference.schema_text())
     typer.echo(str(target.with_name(reference.FILE)))
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ClientError(f"{path}: cannot be written: {error.strerror}") from None

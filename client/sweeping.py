@@ -7,6 +7,7 @@ import typer
 
 from .errors import UsageError
 from .options import CaseArgument, Json, Token, Url, aloud, named, show_json
+from .saving import save_text
 from .session import connect
 from .sweep import SweepInfo, points_in, points_of
 
@@ -57,7 +58,7 @@ def sweep_table(
     if out is None:
         typer.echo(text, nl=False)
     else:
-        out.write_text(text, encoding="utf-8")
+        save_text(out, text)
         typer.echo(str(out))
 
 

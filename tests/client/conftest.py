@@ -10,10 +10,10 @@ import zenoh
 from conoid.client import pictures
 from conoid.client.http import Router
 from conoid.client.local import LocalServer
-from conoid.client.pictures import Drawn, Picture
+from conoid.client.pictures import Picture
 
 from .fakes import FAKE_WORKER, Broker, free_port
-from .studio import studio
+from .studio import Ended, studio
 
 
 @pytest.fixture(scope="module")
@@ -37,16 +37,16 @@ def broker(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Broker]:
 
 
 @pytest.fixture(scope="session")
-def one_child() -> Iterator[Callable[[Picture], Drawn]]:
+def one_child() -> Iterator[Callable[[Picture], Ended]]:
     """Starts when the first picture is drawn."""
-    with studio() as render:
-        yield render
+    with studio() as draw:
+        yield draw
 
 
 @pytest.fixture
-def warm(one_child: Callable[[Picture], Drawn], monkeypatch: pytest.MonkeyPatch) -> None:
+def warm(one_child: Callable[[Picture], Ended], monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures are drawn by one child, not each by its own."""
-    monkeypatch.setattr(pictures, "render", one_child)
+    monkeypatch.setattr(pictures, "child", one_child)
 
 
 @pytest.fixture

@@ -7,25 +7,23 @@ from contextlib import contextmanager
 
 import msgspec
 
-from conoid.client.errors import ViewError
-from conoid.client.pictures import Drawn, Picture, _environment
+from conoid.client.pictures import Picture, _environment
+
+Ended = tuple[int, bytes, str]
+"""Exit code, last line, complaints."""
 
 _LOOP = """
-import sys, msgspec
+import sys
 from conoid.client import render
-from conoid.client.errors import ViewError
 for line in sys.stdin.buffer:
-    try:
-        told = b"1" + msgspec.json.encode(render.draw(msgspec.json.decode(line, type=render.Picture)))
-    except (ViewError, OSError, ValueError, RuntimeError) as error:
-        told = b"0" + " ".join(str(error).split()).encode()
-    print(told.decode(), flush=True)
+    code, told = render.told(line)
+    print(f"{code}{told}", flush=True)
 """
 
 
 @contextmanager
-def studio() -> Iterator[Callable[[Picture], Drawn]]:
-    """What stands in for ``pictures.render``, without 3 s for the start of each."""
+def studio() -> Iterator[Callable[[Picture], Ended]]:
+    """What stands in for ``pictures.child``, without 3 s for the start of each."""
     child = subprocess.Popen(
         [sys.executable, "-c", _LOOP], stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=_environment()
     )
@@ -33,14 +31,13 @@ def studio() -> Iterator[Callable[[Picture], Drawn]]:
     assert child.stdout is not None
     talk, listen = child.stdin, child.stdout
 
-    def render(picture: Picture) -> Drawn:
+    def draw(picture: Picture) -> Ended:
         talk.write(msgspec.json.encode(picture) + b"\n")
         talk.flush()
-        told = listen.readline()
-        if told.startswith(b"1"):
-            return msgspec.json.decode(told[1:], type=Drawn)
-        raise ViewError(told[1:].decode().strip())
+        line = listen.readline()
+        code, told = int(line[:1]), line[1:]
+        return code, told, told.decode() if code else ""
 
     with child:
-        yield render
+        yield draw
         talk.close()

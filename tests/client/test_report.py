@@ -2,6 +2,7 @@
 
 import base64
 import json
+import os
 import re
 import threading
 from html.parser import HTMLParser
@@ -12,8 +13,9 @@ from typer.testing import CliRunner
 
 from conoid.client import options, replay3d, report, silence
 from conoid.client.cli import app
-from conoid.client.errors import UnfinishedError
+from conoid.client.errors import ClientError, UnfinishedError
 from conoid.client.result import Result
+from conoid.client.saving import save_text
 from conoid.server import page
 
 from .bodies import write_fragments, write_history, write_run
@@ -55,6 +57,26 @@ def folder(tmp_path: Path) -> Path:
     write_fragments(made, 7, [1.0, 2.0, 1e-4])
     (made / "journal.jsonl").write_text("")
     return made
+
+
+def test_a_report_for_which_the_disk_is_too_small_leaves_the_old_one(folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "bar.html"
+    out.write_text("old")
+    (tmp_path / f".bar.{os.getpid()}.part.html").symlink_to("/dev/full")
+    with pytest.raises(ClientError, match=r"bar.html: cannot be written: No space left on device$"):
+        report.write(Result.open(folder), out, ())
+    assert out.read_text() == "old"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bar", "bar.html"]
+
+
+def test_what_is_no_file_is_written_to_as_it_is(tmp_path: Path) -> None:
+    """A link to a file stays one; a device is not replaced."""
+    (tmp_path / "link").symlink_to(tmp_path / "file")
+    for out in (tmp_path / "link", Path("/dev/null")):
+        save_text(out, "text")
+    assert (tmp_path / "file").read_text() == "text"
+    assert (tmp_path / "link").is_symlink()
+    assert Path("/dev/null").is_char_device()
 
 
 @pytest.mark.usefixtures("warm")

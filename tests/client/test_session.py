@@ -35,6 +35,14 @@ def _no_pauses(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("conoid.client.http.time.sleep", lambda _: None)
 
 
+def test_a_damaged_file_of_a_server_is_named_by_its_run() -> None:
+    """Not by its local copy, which is gone when the line is read."""
+    session = served(lambda _: httpx2.Response(200, content=b"{"))
+    for name, said in (("case.resolved.json", "case"), ("outcome.json", "outcome")):
+        with pytest.raises(ClientError, match=f"^{name} of run r1 at http://conoid.test: this {said} cannot be read: "):
+            _ = session.run("r1").result().case if said == "case" else session.run("r1").result().outcome
+
+
 def test_a_refusal_is_its_detail_and_hint() -> None:
     session = served(problem(403, detail="the token lacks the scope 'submit'", hint="ask the operator"))
     with pytest.raises(ServiceError) as caught:

@@ -13,7 +13,7 @@ from matplotlib.image import imread
 from PIL import Image
 
 from conoid.client import camera, pictures, scales
-from conoid.client.errors import ViewError
+from conoid.client.errors import LookError, UnfinishedError, ViewError
 from conoid.client.pictures import FIELDS, Look, Mirror, Picture, Scene, direction, explain, mirrors, reason
 from conoid.client.view import view
 
@@ -94,6 +94,17 @@ def test_a_file_that_is_no_frame_is_one_line(tmp_path: Path) -> None:
 def test_what_cannot_be_drawn_is_said_before_anything_starts(source: str, field: str, said: str) -> None:
     with pytest.raises(ViewError, match=said):
         view(source, field)
+
+
+@pytest.mark.parametrize("out", ["bar.png", "bar.gif"])
+def test_a_folder_of_runs_is_no_run_to_draw(tmp_path: Path, out: str) -> None:
+    for name in ("one", "local/two"):
+        (tmp_path / name).mkdir(parents=True)
+        (tmp_path / name / "journal.jsonl").touch()
+    with pytest.raises(UnfinishedError, match=r"is not the folder of a run, it holds those of local/two, one$"):
+        view(tmp_path, "mises", out)
+    with pytest.raises(UnfinishedError, match=r"^one has not written any frame$"):
+        view(tmp_path / "one", "mises", out)
 
 
 def test_mirror_planes_are_read() -> None:
@@ -183,8 +194,11 @@ def test_a_section_cuts_away_what_lies_before_it(folder: Path, tmp_path: Path) -
     above = view(folder, "temperature", tmp_path / "c.png", size=SIZE, camera="z", section="z=0.02")
     assert below.high < 400.0 < whole.high, "the hot foot lies between the plane and the camera"
     assert above.high == pytest.approx(whole.high)
-    with pytest.raises(ViewError, match="nothing of the body lies behind"):
+    with pytest.raises(LookError) as told:
         view(folder, "temperature", tmp_path / "d.png", size=SIZE, camera="z", section="z=-1")
+    between = "which is between z=0 and z=0.02657 (in m)"
+    assert str(told.value) == f"section = z=-1: nothing of the body lies behind it, {between}"
+    assert told.value.exit_code == 2
     with pytest.raises(ViewError, match="across an axis that is mirrored"):
         view(folder, "temperature", tmp_path / "d.png", size=SIZE, mirror="x", section="x")
 
@@ -256,7 +270,7 @@ def test_cameras_are_read() -> None:
 
 @pytest.mark.parametrize(
     ("options", "said"),
-    [({"percentiles": (50, 50)}, "the smaller one first"), ({"limits": (2, 1)}, "limits = 2, 1"),
+    [({"percentiles": (50, 50)}, "the smaller one first"), ({"limits": (2, 1)}, "= 2, 1: two numbers, the lower end"),
      ({"zoom": 0}, "above 0"), ({"out": "x.jpg"}, r"ends in \.png or \.gif"),
      ({"colour": "red"}, "allowed: mirror, section")],
 )  # fmt: skip
@@ -270,4 +284,19 @@ def test_a_picture_that_cannot_be_written_is_named(folder: Path, tmp_path: Path)
     with pytest.raises(ViewError) as told:
         view(folder, "pressure", tmp_path / "file" / "bar.png", size=SIZE)
     assert str(told.value) == f"{tmp_path}/file: File exists"
+
+
+@pytest.mark.usefixtures("warm")
+@pytest.mark.parametrize("name", ["bar.png", "bar.gif"])
+def test_a_picture_for_which_the_disk_is_too_small_leaves_the_old_one(name: str, folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / name
+    out.write_bytes(b"old")
+    out.with_name(f".bar.{os.getpid()}.part{out.suffix}").symlink_to("/dev/full")
+    with pytest.raises(ViewError) as told:
+        view(folder, "pressure", out, size=SIZE)
+    assert str(told.value) == f"{out}: No space left on device"
+    assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [(name, b"old")]
+
+
+def test_what_a_failure_is_told_by() -> None:
     assert reason(OSError(28, "No space left on device"), "bar.gif") == "bar.gif: No space left on device"
