@@ -160,7 +160,7 @@ def _sum_up(
         element_updates_per_second=(loop.updates - start.updates) / total_cpu if total_cpu > 0.0 else 0.0,
         reference=checks,
         warnings=[
-            *start.warnings, *loop.warnings, *sim.ledger.warnings,
+            *start.warnings, *loop.warnings, *loop.lost, *sim.ledger.warnings,
             *(sim.erosion.warnings() if sim.erosion is not None else []),
             *(sim.fracture.warnings if sim.fracture is not None else []), *(inside.warnings if inside else []),
         ],

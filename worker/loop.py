@@ -23,6 +23,7 @@ from .output.counts import Counter
 from .output.damage import damage
 from .output.history import History
 from .output.journal import Journal
+from .output.losses import Losses
 from .signals import Signals
 from .simulation import Simulation
 from .snapshots.stage import Snapshots
@@ -94,6 +95,8 @@ class Loop:
         self.stopped = 0
         self.warnings: list[str] = []
         """What the steps have given reason for; equal on all ranks."""
+        self.lost: list[str] = []
+        """What somebody has removed of the run's files; on rank 0."""
         self._told = False
         self._folder = folder
         self._journal = journal
@@ -111,6 +114,7 @@ class Loop:
         self.balance = balance
         self._groups = Groups(sim, balance.trigger.cost)
         self.snapshots = Snapshots(sim, folder, journal)
+        self._losses = Losses(folder) if journal is not None else None
 
     def run(self) -> None:
         """Steps until the end time, or until a reason to stop. Raises PhysicsError."""
@@ -134,6 +138,7 @@ class Loop:
                 if self.stopped:
                     self._tell(messages.Status, state=State.STOPPING, message=STOPS[self.stopped][2])
                 self._report()
+                self._tell_losses()
                 return
             self.updates += sim.model.elements_global
             step.second_half(sim)
@@ -234,9 +239,15 @@ class Loop:
             self._history.write(clock.step, clock.t, clock.dt, limiter, self.energy, extra)
         sim.ledger.require(sim.case.run.residual_limit, f"at step {clock.step}, t = {clock.t:.6g} s")
 
+    def _tell_losses(self) -> None:
+        for text in self._losses.found() if self._losses is not None else ():
+            self.lost.append(text)
+            self._tell(messages.Log, level="warning", text=text)
+
     def _write_frame(self) -> None:
         sim, clock = self.sim, self.sim.clock
         index = clock.frame
+        self._tell_losses()
         cohesion = sim.fracture.cohesion if sim.fracture is not None else None
         damaged = damage(sim.case, sim.model, cohesion, sim.comm)
         if sim.record is None:

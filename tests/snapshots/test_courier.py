@@ -4,6 +4,7 @@ import hashlib
 import io
 import json
 import os
+import shutil
 import signal
 import sys
 import threading
@@ -66,6 +67,19 @@ def test_a_share_that_cannot_be_read_costs_one_snapshot(courier: Courier, tmp_pa
     assert not list((tmp_path / layout.SNAPSHOTS).iterdir())
     courier.send(task(1), mine)
     assert answer(courier)[0]["bytes"] > 0
+
+
+def test_a_folder_that_is_removed_costs_one_snapshot(courier: Courier, tmp_path: Path) -> None:
+    (mine,) = shattered(2, 2).shares(1)
+    courier.send(task(0), mine)
+    assert "error" not in answer(courier)[0]
+    shutil.rmtree(tmp_path / layout.SNAPSHOTS)
+    courier.send(task(1), mine)
+    assert answer(courier)[0]["bytes"] > 0
+    began = time.monotonic()
+    with pytest.raises(FileNotFoundError, match="snapshots was removed"):
+        packer._awaited(tmp_path / "none" / layout.SNAPSHOTS / "share")
+    assert time.monotonic() - began < 1.0
 
 
 def test_a_packer_that_dies_costs_one_snapshot(courier: Courier) -> None:

@@ -1,6 +1,7 @@
 """Frames and histories as files: fields, units, times."""
 
 import csv
+import shutil
 from pathlib import Path
 
 import h5py
@@ -15,6 +16,8 @@ from conoid.worker.output import frames, storage
 from conoid.worker.output.damage import spent_energy
 from conoid.worker.output.frames import principal
 from conoid.worker.output.history import History
+from conoid.worker.output.journal import Journal
+from conoid.worker.output.losses import Losses
 from conoid.worker.output.rewind import rewind
 from conoid.worker.parallel.comm import Comm, SerialComm
 from conoid.worker.state import Model, Nodes
@@ -66,6 +69,37 @@ def test_a_file_of_the_run_that_is_gone_is_told_from_other_files(tmp_path: Path)
     assert storage.gone(raised.value, folder)
     assert not storage.gone(raised.value, tmp_path / "other")
     assert not storage.gone(ValueError(str(folder)), folder)
+
+
+def test_what_is_removed_while_a_run_goes_on_is_told_once(tmp_path: Path) -> None:
+    for name in ("frames/000000.vtkhdf", "frames/000001.vtkhdf", "frames/000002.part", "snapshots/000000.snap"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).touch()
+    losses = Losses(tmp_path)
+    assert losses.found() == []
+    shutil.rmtree(tmp_path / "frames")
+    (tmp_path / "snapshots/000000.snap").rename(tmp_path / "snapshots/000001.snap")
+    assert losses.found() == [
+        "frames: 2 files from 000000.vtkhdf to 000001.vtkhdf removed while the run goes on; what follows is written",
+        "snapshots: 000000.snap removed while the run goes on; what follows is written",
+    ]
+    assert losses.found() == []
+
+
+def test_a_journal_and_a_history_that_are_removed_take_no_more_lines(tmp_path: Path) -> None:
+    """What is written to an open file that has no name is nowhere, and the run would end as if all were there."""
+    journal, table = Journal(tmp_path, "r"), History(tmp_path, {})
+    journal.starting("at first")
+    (tmp_path / layout.JOURNAL).unlink()
+    (tmp_path / layout.HISTORY).unlink()
+    with pytest.raises(FileNotFoundError, match=layout.JOURNAL) as raised:
+        journal.starting("at last")
+    assert storage.gone(raised.value, tmp_path)
+    with pytest.raises(FileNotFoundError, match=layout.HISTORY):
+        table.write(1, 1e-7, 1e-7, "tet 1", ENERGY, [0.0, 0.0, 1.5])
+    with pytest.raises(FileNotFoundError, match=layout.HISTORY):
+        table.close()
+    journal.close()
 
 
 def test_one_part_alone_has_no_columns() -> None:

@@ -11,6 +11,8 @@ import msgspec
 from conoid.cases import history, layout
 from conoid.cases.messages import Energy
 
+from . import storage
+
 
 class History:
     """Writes the lines, flushed one by one, behind those that are there."""
@@ -30,8 +32,9 @@ class History:
 
     def write(self, step: int, t: float, dt: float, limiter: str, energy: Energy, extra: list[float]) -> None:
         """One line; ``extra`` is momentum, parts and probes. Numbers are written so that they read back to the same
-        bits.
+        bits. Raises OSError, also when somebody has removed the file.
         """
+        storage.require(self._file, self._path)
         values = [*msgspec.structs.astuple(energy), *extra]
         line = [step, repr(t), repr(dt), limiter, *(repr(float(v)) for v in values)]
         self._writer.writerow([line[k] for k in self._places])

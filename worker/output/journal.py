@@ -11,6 +11,8 @@ import msgspec
 from conoid.cases import layout, messages
 from conoid.cases.run import State
 
+from . import storage
+
 M = TypeVar("M", bound=messages.Message)
 
 
@@ -25,7 +27,7 @@ class Journal:
     """Appends to the journal of a run folder, going on from the last number in it."""
 
     def __init__(self, folder: Path, run: str, listener: Listener | None = None) -> None:
-        path = folder / layout.JOURNAL
+        self._path = path = folder / layout.JOURNAL
         self._run = run
         self.frames: set[int] = set()
         """Indices of the frames that it lists."""
@@ -44,7 +46,10 @@ class Journal:
         self._listener = listener
 
     def write(self, kind: type[M], step: int = 0, t: float = 0.0, blob: bytes = b"", **fields: Any) -> M:
-        """Writes one message and passes it on, with the ``blob`` of a snapshot."""
+        """Writes one message and passes it on, with the ``blob`` of a snapshot. Raises OSError, also when somebody has
+        removed the file: what is written to it is nowhere.
+        """
+        storage.require(self._file, self._path)
         self._seq += 1
         message = kind(run=self._run, seq=self._seq, wall=time.time(), step=step, t=t, **fields)
         line = msgspec.json.encode(message) + b"\n"

@@ -3,6 +3,7 @@
 import errno
 import os
 from pathlib import Path
+from typing import IO, Any
 
 _STORAGE = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.EFBIG, errno.ESTALE})
 
@@ -12,6 +13,12 @@ def gone(error: BaseException, folder: Path) -> bool:
     if not isinstance(error, OSError) or not isinstance(error.filename, str | bytes):
         return False
     return Path(os.fsdecode(error.filename)).resolve().is_relative_to(folder.resolve())
+
+
+def require(file: IO[Any], path: Path) -> None:
+    """Raises FileNotFoundError when nothing leads to an open ``file`` any more, which had this ``path``."""
+    if os.fstat(file.fileno()).st_nlink == 0:
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
 
 
 def failed(error: BaseException) -> bool:

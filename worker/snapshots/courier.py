@@ -76,6 +76,7 @@ class Courier:
         signal.pthread_sigmask(signal.SIG_BLOCK, REQUESTS)
         while (task := self._tasks.get()) is not None:
             try:
+                (self._folder / layout.SNAPSHOTS).mkdir(exist_ok=True)  # somebody may have removed it
                 share.write(layout.share(self._folder, task[0]["n"], self._rank), task[1])
                 if self._rank == 0:
                     self._ask(task[0])

@@ -75,6 +75,8 @@ def _made(folder: Path, task: dict[str, Any], births: Births) -> dict[str, Any]:
 def _awaited(path: Path) -> share.Share:
     limit = time.monotonic() + _PATIENCE
     while not path.exists():
+        if not path.parent.exists():
+            raise FileNotFoundError(f"{path.parent.name} was removed")
         if time.monotonic() > limit:
             raise TimeoutError(f"{path.name} has not come within {_PATIENCE:g} s")
         time.sleep(_LOOK)
