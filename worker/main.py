@@ -18,7 +18,7 @@ from conoid.cases.run import Cause, ExitCode, State
 from conoid.cases.schema import Case
 
 from . import compile as ahead
-from . import kernels
+from . import heap, kernels
 from .errors import CompileError, ConoidError, StoppedError
 from .lock import hold
 from .output import storage
@@ -47,6 +47,7 @@ _CODES = {
 def main(arguments: list[str]) -> int:
     """Runs one case on all ranks of MPI's world; returns the exit code of the process."""
     began = time.monotonic()
+    heap.tidy()
     options = _parse(arguments)
     signals = Signals()
     comm = connect()
