@@ -36,10 +36,19 @@ BREAKING_OVERHEAD = 2e-3
 150 to 24,000 tets."""
 
 RANK_BYTES = 260_000_000
-"""Memory of a rank without a mesh: the interpreter, the libraries and the kernels of a body alone. Those of contact and
-fracture take 20 to 40 MB more, and what has broken to dust takes its nodes and contacts besides."""
-TET_BYTES = {"tet": 330, "nodal": 110, "split": 140, "strength": 50}
-"""Memory a tet, its share of the nodes included, at its peak while the model is set up."""
+"""Memory of a rank without a mesh: the interpreter, the libraries and the kernels of a body alone. Rank 0, which has
+all files, takes it, the others 40 to 50 MB less."""
+STAGE_BYTES = {"contact": 20_000_000, "fracture": 30_000_000}
+"""What the kernels and tables of a stage take of a rank besides: bar_on_bar had 276 MB in all, the tile of
+docs/tutorial.md before it breaks 301 MB."""
+TET_BYTES = {"tet": 330, "nodal": 110, "split": 140, "strength": 50, "facets": 130}
+"""Memory a tet, its share of the nodes included, at its peak while the model is set up (docs/bench.md)."""
+DUST_BYTES = 20_000
+"""Memory a tet besides, of a body that has turned to dust: copies of nodes, surface, candidate pairs and tables that
+they are made of. Measured are peaks of a rank where half of the facets were broken, less what it takes before: 12 to 16
+kB in glass_steel_demo and glass_ball_cohesive, 15 and 20 kB in tiles of 16,800 and 4,200 tets (docs/tutorial.md),
+18 kB in cases/hard/wedge_glass.toml; bars of glass of which a quarter of the facets was broken, glass_steel_bar with
+9,000 and 39,000 tets, had 7 and 5 kB."""
 FILE_BYTES = {".msh": 42, ".inp": 48}
 """Bytes of a text mesh file a tet, its share of the node lines included."""
 
@@ -70,7 +79,7 @@ class Estimate:
     """The first time step, s."""
     steps: int | None
     memory_bytes: int | None
-    """Of all ranks together."""
+    """Of all ranks together, while nothing breaks."""
     core_seconds: float | None
     """CPU time of all ranks together, s."""
     costs: dict[str, float]
@@ -78,6 +87,8 @@ class Estimate:
     more: nobody knows before how much."""
     breaking: float
     """CPU time, s, that comes on top where all parts that fracture turn to dust; 0 where none does."""
+    dust_bytes: int
+    """Memory of all ranks that comes on top there."""
     parts: tuple[PartEstimate, ...]
 
 
@@ -102,6 +113,7 @@ def estimate(case: Case, folder: Path | None = None) -> Estimate:
         core_seconds=sum(costs.values()) if costs else None,
         costs=costs,
         breaking=_breaking(case, parts, steps) if costs else 0.0,
+        dust_bytes=DUST_BYTES * _tets_that_break(case, parts),
         parts=parts,
     )
 
@@ -177,12 +189,15 @@ def _memory(case: Case, parts: tuple[PartEstimate, ...]) -> int | None:
         for size, part in zip(parts, case.parts, strict=True)
     ]
     tets = _total(needed)
-    return None if tets is None else tets + case.run.ranks * RANK_BYTES
+    there = {"contact": case.in_contact, "fracture": case.fractures}
+    rank = RANK_BYTES + sum(STAGE_BYTES[stage] for stage, is_there in there.items() if is_there)
+    return None if tets is None else tets + case.run.ranks * rank
 
 
 def _tet_bytes(case: Case, part: Part) -> int:
-    strength = material(case, part.material).strength
-    return TET_BYTES["tet"] + TET_BYTES.get(case.numerics.pressure, 0) + (TET_BYTES["strength"] if strength else 0)
+    there = {"strength": material(case, part.material).strength is not None, "facets": part.fracture is not None}
+    features = sum(TET_BYTES[feature] for feature, is_there in there.items() if is_there)
+    return TET_BYTES["tet"] + TET_BYTES.get(case.numerics.pressure, 0) + features
 
 
 def _costs(case: Case, parts: tuple[PartEstimate, ...], steps: int | None) -> dict[str, float]:
@@ -199,9 +214,14 @@ def _costs(case: Case, parts: tuple[PartEstimate, ...], steps: int | None) -> di
 
 def _breaking(case: Case, parts: tuple[PartEstimate, ...], steps: int | None) -> float:
     """Core seconds of fracture, and of the contact of what has come apart, at most."""
-    tets = [size.elements or 0 for size, part in zip(parts, case.parts, strict=True) if part.fracture is not None]
-    rate = case.run.ranks * BREAKING_OVERHEAD + 1e-9 * BROKEN_NANOSECONDS * sum(tets)
-    return (steps or 0) * rate if tets else 0.0
+    rate = case.run.ranks * BREAKING_OVERHEAD + 1e-9 * BROKEN_NANOSECONDS * _tets_that_break(case, parts)
+    return (steps or 0) * rate if case.fractures else 0.0
+
+
+def _tets_that_break(case: Case, parts: tuple[PartEstimate, ...]) -> int:
+    """As far as mesh files tell."""
+    pairs = zip(parts, case.parts, strict=True)
+    return sum(size.elements or 0 for size, part in pairs if part.fracture is not None)
 
 
 def _contact(case: Case) -> float:

@@ -104,18 +104,18 @@ def estimate_table(case: Case, expected: Estimate) -> Table:
         "nodes": _about(expected.nodes, count),
         "time step": _about(expected.dt, lambda value: si(value, "s")),
         "steps": _about(expected.steps, count),
-        "memory": _about(expected.memory_bytes, lambda value: si(value, "B")),
-        "core time": _about(expected.core_seconds, duration) + _more(expected),
+        "memory": _up_to(expected.memory_bytes, expected.dust_bytes, lambda value: si(value, "B")),
+        "core time": _up_to(expected.core_seconds, expected.breaking, duration),
         "of which": ", ".join(f"{name} {100 * seconds / total:.0f} %" for name, seconds in shares),
         "without": ", ".join(without(case)),
     })  # fmt: skip
 
 
-def _more(expected: Estimate) -> str:
-    """What it may take besides."""
-    if expected.core_seconds is None or not expected.breaking:
-        return ""
-    return f", up to {duration(expected.core_seconds + expected.breaking)} if all that may break turns to dust"
+def _up_to(value: float | None, more: float, shown: Callable[[float], str]) -> str:
+    """What it takes, and what where bodies turn to dust, which takes so much ``more``."""
+    if value is None or not more:
+        return _about(value, shown)
+    return f"{_about(value, shown)}, up to {shown(value + more)} if all that may break turns to dust"
 
 
 def parts_table(case: Case, expected: Estimate) -> Table:

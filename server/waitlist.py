@@ -1,5 +1,6 @@
 """The queue as the supervisor uses it: what each run needs, who has taken how much, and whose turn it is now."""
 
+import math
 import time
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Sequence
@@ -116,15 +117,18 @@ class Waitlist:
                 made = folder.submission(self._settings.runs / run.id)
             except (OSError, msgspec.MsgspecError):
                 return Need(run.id, run.owner, run.ranks)
-            self._needs[run.id] = need_of(made, self._settings.grace)
+            self._needs[run.id] = need_of(made, self._settings.grace, self._room().memory)
         return self._needs[run.id]
 
 
-def need_of(made: Submission, grace: float) -> Need:
-    """What a submission asks for; ``grace``: s after its limit at which the run is ended by force at the latest."""
+def need_of(made: Submission, grace: float, room: float = math.inf) -> Need:
+    """What a submission asks for; ``grace``: s after its limit at which the run is ended by force at the latest. Bodies
+    that may break take memory as if they were dust, but for a run that would not fit into ``room``, bytes, for that.
+    """
     seconds = made.estimate.get("core_seconds", 0.0) / made.ranks
-    limit = float("inf") if made.wall_time is None else made.wall_time + 2.0 * grace
-    memory = float(made.estimate.get("memory_bytes", 0.0))
+    limit = math.inf if made.wall_time is None else made.wall_time + 2.0 * grace
+    whole = float(made.estimate.get("memory_bytes", 0.0))
+    memory = max(whole, min(whole + made.estimate.get("dust_bytes", 0.0), room))
     return Need(
         made.id, made.owner, made.ranks, memory, seconds, limit, made.priority, made.labels.get("sweep", "")
     )  # fmt: skip

@@ -154,6 +154,19 @@ def test_what_may_break_may_cost_more() -> None:
     assert bar.core_seconds < measured < 1.1 * (bar.core_seconds + bar.breaking)
 
 
+@pytest.mark.parametrize(
+    ("name", "whole", "dust"),
+    [("bar_on_bar", 276e6, None), ("glass_steel_demo", None, 620e6), ("glass_ball_cohesive", None, 638e6)],
+)
+def test_memory_is_a_bound_that_is_not_far_off(name: str, whole: float | None, dust: float | None) -> None:
+    """Peaks of all ranks that the case asks for: bodies that stay whole, and others that turn to dust."""
+    expected = estimate(read_case(shipped_path(name)))
+    assert expected.memory_bytes is not None
+    assert (expected.dust_bytes > 0) == (dust is not None)
+    for measured, told in ((whole, expected.memory_bytes), (dust, expected.memory_bytes + expected.dust_bytes)):
+        assert measured is None or 1.0 <= told / measured < 1.3
+
+
 def test_a_mesh_file_tells_its_tets_by_its_size_only(tmp_path: Path) -> None:
     file = parse_case(rod('parts[0].mesh={shape="file", unit="1 mm", path="rod.msh"}'))
     assert estimate(file, tmp_path).elements is None

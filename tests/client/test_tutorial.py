@@ -50,6 +50,9 @@ def ran(folder: Path, case: str) -> Result:
 def test_it_ends_as_it_says(tmp_path: Path) -> None:
     result = ran(tmp_path, CASE)
     end, told = result.outcome, result.history
+    expected = estimate(parse_case(toml_data(CASE)))
+    assert expected.memory_bytes is not None
+    assert 1.0 <= (expected.memory_bytes + expected.dust_bytes) / end.peak_memory[0] < 1.3
     times, speeds, forces = ([abs(float(v)) for v in told[name]] for name in ("t", "sphere_speed", "backing_force"))
     force, at = max(zip(forces, times, strict=True))
     for said in (

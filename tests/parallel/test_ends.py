@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from conoid.cases import layout, messages
-from conoid.cases.estimate import RANK_BYTES
+from conoid.cases.estimate import RANK_BYTES, estimate
+from conoid.cases.load import read_case, shipped_path
 from conoid.cases.outcome import Outcome, from_json
 
 from .launching import command, ended, processes, started, wait_for, wait_until_gone
@@ -237,3 +238,11 @@ def test_as_many_ranks_as_tets_and_not_more(tmp_path: Path) -> None:
     assert outcome(tmp_path / "5").elements == 5
     assert max(outcome(tmp_path / "5").peak_memory) == pytest.approx(RANK_BYTES, rel=0.15)
     assert "run.ranks = 6: at most 5" in outcome(tmp_path / "6").message
+
+
+def test_what_turns_to_dust_takes_the_memory_that_was_expected(tmp_path: Path) -> None:
+    expected = estimate(read_case(shipped_path("glass_ball_cohesive")))
+    done = ended(command(2, "glass_ball_cohesive", "--out", str(tmp_path)))
+    assert done.returncode == 0, done.stderr
+    assert expected.memory_bytes is not None
+    assert 1.0 <= (expected.memory_bytes + expected.dust_bytes) / sum(outcome(tmp_path).peak_memory) < 1.3

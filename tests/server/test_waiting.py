@@ -7,8 +7,10 @@ from collections.abc import Sequence
 import pytest
 
 from conoid.cases.policy import Share
+from conoid.server.folder import Submission
 from conoid.server.usage import Took, Usage
 from conoid.server.waiting import Busy, Need, Room, ordered, plan
+from conoid.server.waitlist import need_of
 
 NOW = 1000.0
 
@@ -84,6 +86,19 @@ def test_memory_is_summed_over_what_runs() -> None:
     assert made.start == ["1"]
     assert made.why["2"] == "waiting for 3e+09 of 8e+09 bytes of memory; 1e+09 free"
     assert made.why["3"] == "waiting for 1 run before it"
+
+
+@pytest.mark.parametrize(
+    ("dust", "room", "memory"), [(0.0, math.inf, 3e9), (2e9, math.inf, 5e9), (2e9, 4e9, 4e9), (2e9, 1e9, 3e9)]
+)
+def test_what_may_break_takes_memory_for_its_dust_where_there_is_some(dust: float, room: float, memory: float) -> None:
+    """What is too large for the server as dust starts alone there; what is too large as it is does not."""
+    told: dict[str, int | float] = {"memory_bytes": 3e9, **({"dust_bytes": dust} if dust else {})}
+    made = Submission(
+        id="1", owner="ann", name="", title="", ranks=1, submitted=0.0, case_file="case.toml", body_sha256="",
+        idempotency_key=None, wall_time=None, estimate=told,
+    )  # fmt: skip
+    assert need_of(made, 1.0, room).memory == memory
 
 
 def test_who_is_held_holds_nobody_up() -> None:
