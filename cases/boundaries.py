@@ -1,5 +1,6 @@
 """What holds or drives nodes: symmetry planes, walls, prescribed motion, gravity, tractions."""
 
+import math
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -95,10 +96,32 @@ class Gravity(Model):
     """Parts that it acts on; all when empty."""
 
 
+class Around(Model):
+    """What lies between two radii round a line, however far along it. With the ``radius`` of its hole it is the bore of
+    a tube, with its outer one as ``inner_radius`` the outside.
+    """
+
+    base: Point = (0.0, 0.0, 0.0)
+    """Any point of the line."""
+    axis: Axis = "z"
+    """Direction of the line."""
+    inner_radius: Annotated[Length, Field(ge=0)] = 0.0
+    """Smallest distance from the line."""
+    radius: Annotated[Length, Field(gt=0)]
+    """Largest distance from the line; not below ``inner_radius``. Nodes within a millionth of it are in."""
+
+    def holds(self, point: tuple[float, float, float], slack: float) -> bool:
+        """Whether a point, m, is in it, or as near to it as ``slack`` of its radius."""
+        d = "xyz".index(self.axis)
+        p, q = (point[e] - self.base[e] for e in ((d + 1) % 3, (d + 2) % 3))
+        return self.inner_radius - slack * self.radius <= math.hypot(p, q) <= (1.0 + slack) * self.radius
+
+
 class Traction(Model):
-    """A force per initial area, Pa, on the exposed faces whose three nodes start inside the box ``low``..``high`` (all
-    of the parts when absent), turning with nothing, until erosion takes the tet of the face. Either ``stress`` or
-    ``pressure`` is given."""
+    """A force per initial area, Pa, on the exposed faces whose three nodes start inside the box ``low``..``high`` and
+    the ``cylinder`` (all of the parts when both are absent), turning with nothing, until erosion takes the tet of the
+    face. Either ``stress`` or ``pressure`` is given. ``conoid validate`` says about how large the faces are together.
+    """
 
     kind: Literal["traction"]
     """The kind of boundary."""
@@ -115,6 +138,8 @@ class Traction(Model):
     """Lowest corner of the box; with ``high``."""
     high: Point | None = None
     """Highest corner of the box; with ``low``."""
+    cylinder: Around | None = None
+    """``{ axis = "z", radius = "5 mm" }`` is the bore of a tube with this inner radius; with a box, what is in both."""
 
 
 Boundary = Annotated[Symmetry | Wall | Prescribed | Rotation | Gravity | Traction, Field(discriminator="kind")]

@@ -130,6 +130,9 @@ def _traction(boundary: Traction, location: Location) -> Iterator[Problem]:
         yield problem((*location, "stress"), "0, 0, 0", "must not be zero")
     elif boundary.pressure == 0.0:
         yield problem((*location, "pressure"), 0, "must not be zero")
+    if (round_ := boundary.cylinder) is not None and round_.inner_radius > round_.radius:
+        message = f"must not be above radius, {round_.radius:g} m"
+        yield problem((*location, "cylinder", "inner_radius"), f"{round_.inner_radius:g} m", message)
     yield from _box(boundary, location)
     yield from _course(boundary, location)
 

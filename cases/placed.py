@@ -24,6 +24,10 @@ class Placed:
         """Whether ``point``, m, lies in what is modelled."""
         return geometry.holds(self.mesh, _turned(point, self.turn, -1.0))
 
+    def turned(self, point: Vector) -> Vector:
+        """Where a point of the body as its mesh has it is, m."""
+        return _turned(point, self.turn)
+
     def bounds(self) -> tuple[Vector, Vector]:
         """Lowest and highest coordinates, m; of a turned body those of the box round it."""
         low, high = geometry.bounds(self.mesh) or ((0.0,) * 3, (0.0,) * 3)

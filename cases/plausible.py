@@ -14,6 +14,7 @@ from .driven import passing
 from .estimate import Estimate
 from .impact import impact_speeds, wave_speed
 from .library import material
+from .loaded import unloaded
 from .materials import Material
 from .overlap import grazes
 from .problems import Location, Problem, problem
@@ -59,6 +60,7 @@ def doubts(data: Mapping[str, Any], case: Case, expected: Estimate) -> list[Prob
         *grazes(enumerate(case.parts), case.contact),
         *strangers(case),
         *passing(case),
+        *unloaded(case),
         *cut_bodies(case),
         *scant_probes(case, expected),
     ]

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import BeforeValidator, Field
 
 from .bodies import Mesh
-from .boundaries import Boundary, Gravity, Prescribed, Rotation, Symmetry, Traction, Wall
+from .boundaries import Around, Boundary, Gravity, Prescribed, Rotation, Symmetry, Traction, Wall
 from .materials import Material
 from .measures import Probe, Reference
 from .motion import Spin, Stretch, Turn
@@ -18,9 +18,9 @@ from .tables import Count, Model, Name, Positive, Switch, Velocity
 from .units import Ratio, Speed, Temperature, Time
 
 __all__ = [
-    "MOST_RANKS", "Balance", "Boundary", "Case", "Contact", "ContactPair", "Erosion", "Fracture", "Gravity", "Numerics",
-    "Part", "Prescribed", "Probe", "Reference", "Rotation", "Run", "Spin", "Stretch", "Symmetry", "Traction", "Turn",
-    "Viscosity", "Wall",
+    "MOST_RANKS", "Around", "Balance", "Boundary", "Case", "Contact", "ContactPair", "Erosion", "Fracture", "Gravity",
+    "Numerics", "Part", "Prescribed", "Probe", "Reference", "Rotation", "Run", "Spin", "Stretch", "Symmetry",
+    "Traction", "Turn", "Viscosity", "Wall",
 ]  # fmt: skip
 
 

@@ -12,6 +12,7 @@ from typer.core import TyperGroup
 
 from conoid.cases.estimate import estimate
 from conoid.cases.load import CaseError, parse_case
+from conoid.cases.loaded import loads
 from conoid.cases.mesh_checks import missing_files
 from conoid.cases.plausible import doubts
 from conoid.cases.problems import Problem
@@ -109,11 +110,14 @@ def validate(case: CaseArgument, overrides: Overrides = None, as_json: Json = Fa
         raise CaseError([Problem("parts", "", "the elements are too many or too small to be counted")]) from None
     odd = doubts(data, checked, expected)
     if as_json:
-        show_json({"name": checked.name, "valid": True, "warnings": odd, "estimate": expected})
+        show_json({"name": checked.name, "valid": True, "warnings": odd, "estimate": expected, "loads": loads(checked)})
         return
     warn(odd)
     show(f"{checked.name}: valid{f', {len(odd)} warning' + 's' * (len(odd) > 1) if odd else ''}")
     show(tables.parts_table(checked, expected))
+    if acted_on := loads(checked):
+        show("")
+        show(tables.loads_table(checked, acted_on))
     show("")
     show(tables.estimate_table(checked, expected))
 

@@ -10,11 +10,12 @@ from rich.text import Text
 
 from conoid.cases.estimate import Estimate, estimate
 from conoid.cases.library import Constant
+from conoid.cases.loaded import Load
 from conoid.cases.materials import Material
 from conoid.cases.outcome import Check, Outcome
 from conoid.cases.placed import Bulk
 from conoid.cases.run import State
-from conoid.cases.schema import Case
+from conoid.cases.schema import Case, Traction
 from conoid.cases.stages import without
 
 from .compare import AT_THE_END, Comparison
@@ -125,6 +126,18 @@ def parts_table(case: Case, expected: Estimate) -> Table:
     for part, size in zip(case.parts, expected.parts, strict=True):
         tets = "–" if size.elements is None else count(size.elements)
         made.add_row(part.name, part.material, tets, *(_brings(size.bulk) if size.bulk is not None else "–" * 4))
+    return made
+
+
+def loads_table(case: Case, acted_on: Sequence[Load]) -> Table:
+    """What each traction acts on, about, of what is modelled."""
+    made = table("boundary", "traction", "area", "faces", right=("area", "faces"), wide=("traction",))
+    for load in acted_on:
+        spec = case.boundaries[load.boundary]
+        assert isinstance(spec, Traction)
+        loaded = f"pressure of {si(spec.pressure, 'Pa')}" if spec.pressure is not None else "stress"
+        area = "–" if load.area is None else f"about {1e6 * load.area:.3g} mm^2"
+        made.add_row(f"boundaries[{load.boundary}]", loaded, area, _about(load.faces, count))
     return made
 
 

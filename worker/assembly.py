@@ -1,5 +1,6 @@
 """The whole mesh of a case, on rank 0: the parts as they are meshed, turned, moved apart, loaded and set in motion."""
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -21,10 +22,14 @@ from .mesh.model import TetMesh
 from .state import Flags, Floats, Indices, Ints, Load
 from .turning import sine_and_cosine
 
+log = logging.getLogger("conoid.worker")
+
 Say = Callable[[str], None]
 """Reports what the start is doing."""
 _JITTER = 0x6A697474
 """Seed of the random velocities of the start."""
+_ROUND = 1e-6
+"""Of a radius: nodes this near to it are in a cylinder. Chosen: more than meshers miss round faces by."""
 _MANY = 1_000
 """Pieces of a part beyond which nothing finds out whether they overlap each other. Chosen: the table of who meets whom
 grows with their square."""
@@ -215,11 +220,16 @@ def _loads(case: schema.Case, x: Floats, part: Indices, tets: Indices) -> list[L
         chosen = np.isin(part, [i for i, p in enumerate(case.parts) if not spec.parts or p.name in spec.parts])
         if spec.low is not None and spec.high is not None:
             chosen &= ((x >= np.array(spec.low)) & (x <= np.array(spec.high))).all(axis=1)
+        if spec.cylinder is not None:
+            chosen &= _around(spec.cylinder, x)
         inside = chosen[faces].all(axis=1)
         loaded = faces[inside]
         if not len(loaded):
-            raise InputError(f"boundaries[{index}]: acts on no face; check its box and its parts")
+            where = "its box and its parts" if spec.cylinder is None else "its cylinder, its box and its parts"
+            raise InputError(f"boundaries[{index}]: acts on no face; check {where}")
         outward = 0.5 * normals(x, loaded)
+        area = 1e6 * float(np.linalg.norm(outward, axis=1).sum())
+        log.info("boundaries[%d] acts on %d faces, %.6g mm^2", index, len(loaded), area)
         if spec.stress is not None:
             force = np.linalg.norm(outward, axis=1)[:, None] / 3.0 * np.array(spec.stress)
         else:
@@ -227,3 +237,11 @@ def _loads(case: schema.Case, x: Floats, part: Indices, tets: Indices) -> list[L
         of, nodes = np.repeat(tet[inside], 3).astype(np.int64), loaded.reshape(-1).astype(np.int64)
         loads.append(Load(np.arange(len(of)), of, nodes, np.repeat(force, 3, axis=0)))
     return loads
+
+
+def _around(region: schema.Around, x: Floats) -> Flags:
+    """(n,) the points between two radii round a line."""
+    d = "xyz".index(region.axis)
+    p, q = (x[:, e] - region.base[e] for e in ((d + 1) % 3, (d + 2) % 3))
+    distance, slack = np.sqrt(p * p + q * q), _ROUND * region.radius
+    return (distance >= region.inner_radius - slack) & (distance <= region.radius + slack)

@@ -483,6 +483,19 @@ def test_a_traction_leaves_with_the_tets_of_its_faces(ranks: int) -> None:
     assert force == pytest.approx(area * np.array(PULL["stress"]), rel=1e-12)
 
 
+def test_a_cylinder_and_a_box_have_what_is_in_both() -> None:
+    """The top of the cube, and of it the faces of which all nodes are within 1.5 mm of a line through a corner."""
+    near = {"cylinder": {"base": (3e-3, 3e-3, 0.0), "radius": 1.5e-3}}
+    load = pushed(with_boundary({**PULL, **TOP, **near}))
+    x, y, z = MESH.points.T
+    inside = (z > 2.9e-3) & (np.hypot(x - 3e-3, y - 3e-3) <= 1.5e-3)
+    faces = [face for face in boundary_faces(MESH.tets) if inside[face].all()]
+    assert load.nodes.tolist() == np.unique(faces).tolist()
+    assert 0 < len(load.nodes) < 16
+    with pytest.raises(InputError, match=r"acts on no face; check its cylinder, its box and its parts$"):
+        build(scene(STEEL, boundaries=({**PULL, "cylinder": {"radius": 1e-6}},)), [MESH])
+
+
 def test_a_free_body_under_traction_is_accelerated_exactly() -> None:
     """x(n) and v(n+1/2) of the centre of mass, with steps of any size; the books of its work close."""
     sim = with_boundary({**PULL, **TOP}, end=3e-6, velocity=(3.0, 0.0, -5.0), dt_growth=2.0)
