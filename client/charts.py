@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 
 from conoid.cases.messages import AnyMessage, Balance, Load
 
+from .curves import save
 from .errors import ClientError
-from .saving import whole
 
 _COLOURS = {
     "elements": "#4c78a8", "nodes": "#72b7b2", "contact": "#f58518", "fracture": "#e45756", "output": "#54a24b",
@@ -79,8 +79,7 @@ def balance(told: Course, title: str, case: str, out: Path) -> None:
         axes.spines[["top", "right"]].set_visible(False)
     figure.suptitle(title, fontsize=11, color=_INK)
     figure.supxlabel(PAPER.get(case, ""), fontsize=8, color=_INK)
-    with whole(out) as part:
-        figure.savefig(part, dpi=100)
+    save(figure, out)
 
 
 def _outside(axes: Axes, told: Course) -> None:

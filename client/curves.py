@@ -13,7 +13,7 @@ from conoid.cases.fragments import DUST
 
 from .columns import Columns, by_part
 from .compare import Material
-from .errors import ClientError
+from .errors import ClientError, UsageError
 from .saving import whole
 
 _INK, _FAINT = "#1d2733", "#b5bcc4"
@@ -31,12 +31,12 @@ _PROBES = 8
 
 
 def save(figure: Figure, out: Path) -> Path:
-    """Writes a figure, as PNG or what the name ends in. Raises ClientError."""
+    """Writes a figure, as PNG or what the name ends in. Raises ClientError, UsageError for an ending nobody knows."""
     try:
         with whole(out) as part:
             figure.savefig(part, dpi=100)
     except ValueError as error:
-        raise ClientError(f"{out}: cannot be written: {error}") from None
+        raise UsageError(f"{out}: cannot be written: {error}") from None
     return out
 
 

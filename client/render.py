@@ -37,12 +37,15 @@ class Shot:
 
     surface: Any
     time: float | None
+    bounds: Any
+    """(3, 2) lowest and highest coordinates of the whole body, m."""
 
 
 def draw(picture: Picture) -> Drawn:
     """Writes ``picture.out``. Raises ViewError where a frame cannot be drawn."""
     field = FIELDS[picture.field]
     shots = [_shot(path, picture) for path in picture.frames]
+    _require_sections(picture, np.array([shot.bounds for shot in shots]))
     values = [np.asarray(shot.surface["shown"]) for shot in shots]
     scale = None if field.kind in scales.NAMED else scales.ends(values, field, picture.look)
     Path(picture.out).parent.mkdir(parents=True, exist_ok=True)
@@ -72,7 +75,7 @@ def _animation(shots: Sequence[Shot], picture: Picture, scale: Scale) -> None:
 
 def _shot(path: str, picture: Picture) -> Shot:
     mesh, time = _read(path)
-    return Shot(_surface(mesh, picture), time)
+    return Shot(_surface(mesh, picture), time, np.reshape(mesh.bounds, (3, 2)))
 
 
 def read_mesh(path: Path) -> Any:
@@ -136,9 +139,20 @@ def _cut(mesh: Any, plane: Mirror, side: float, extent: Any) -> Any:
     left = mesh.clip(normal=normal, origin=origin)
     if left.n_cells == 0:
         axis, (low, high) = "xyz"[plane.axis], extent
-        told = f"nothing of the body lies behind it, which is between {axis}={low:.4g} and {axis}={high:.4g} (in m)"
-        raise LookError(f"section = {axis}={plane.at:g}: {told}")
+        raise _beyond(axis, plane.at, low, high)
     return left
+
+
+def _require_sections(picture: Picture, bounds: Any) -> None:
+    """Raises LookError for a section off the bodies of all frames, which have the ``bounds`` (frames, 3, 2), m."""
+    for plane in picture.sections:
+        low, high = bounds[:, plane.axis, 0].min(), bounds[:, plane.axis, 1].max()
+        if not low <= plane.at <= high:
+            raise _beyond("xyz"[plane.axis], plane.at, low, high)
+
+
+def _beyond(axis: str, at: float, low: float, high: float) -> LookError:
+    return LookError(f"section = {axis}={at:g}: the body is between {axis}={low:.4g} and {axis}={high:.4g} (in m)")
 
 
 def _reflected(surface: Any, mirror: Mirror, length: float) -> Any:

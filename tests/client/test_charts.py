@@ -8,7 +8,7 @@ from matplotlib.image import imread
 
 from conoid.cases.messages import AnyMessage, Balance, Load
 from conoid.client import charts
-from conoid.client.errors import ClientError
+from conoid.client.errors import ClientError, UsageError
 
 
 def load(t: float, outside: list[int]) -> Load:
@@ -53,3 +53,10 @@ def test_a_chart_is_written(outside: list[int], tmp_path: Path) -> None:
     picture = imread(out)
     assert picture.shape[:2] == (480, 1100)
     assert picture[..., :3].std() > 0.1
+
+
+def test_a_chart_whose_ending_nobody_knows_is_asked_wrongly(tmp_path: Path) -> None:
+    course = charts.course([load(0.5e-6, [4, 9])])
+    with pytest.raises(UsageError, match=r"balance.foo: cannot be written: Format 'foo' is not supported"):
+        charts.balance(course, "a bar", "glass_steel_bar", tmp_path / "balance.foo")
+    assert not list(tmp_path.iterdir())
