@@ -57,7 +57,8 @@ def main(arguments: list[str]) -> int:
         if log.hasHandlers():  # the folder of the run is there
             log.error("rank %d stops the job\n%s", comm.rank, traceback.format_exc())
         if storage.failed(error) or storage.gone(error, options.out):
-            print(f"a file of the run is gone or cannot be written: {error}", file=sys.stderr, flush=True)
+            named = "" if isinstance(error, OSError) and error.filename else f" (in {options.out})"
+            print(f"a file of the run is gone or cannot be written: {error}{named}", file=sys.stderr, flush=True)
             abort(ExitCode.STORAGE)
         raise
 

@@ -23,6 +23,7 @@ from conoid.cases.load import resolved_json
 from conoid.cases.schema import Case
 
 from ..errors import InputError
+from ..output import hdf5
 from ..parallel.comm import Comm
 from .parcel import Parcel, Table, take
 
@@ -140,7 +141,7 @@ def _nothing_of(parcel: Parcel) -> Parcel:
 
 
 def _write_parcel(path: Path, parcel: Parcel) -> None:
-    with h5py.File(path, "w") as file:
+    with hdf5.created(path) as file:
         for name, words in parcel.sums.items():
             file[f"sums/{name}"] = words
         _write_table(file, "nodes", parcel.nodes)
@@ -148,8 +149,6 @@ def _write_parcel(path: Path, parcel: Parcel) -> None:
             _write_table(file, f"tets/{part}", table)
         for name, table in parcel.rows.items():
             _write_table(file, f"rows/{name}", table)
-    with path.open("rb") as handle:
-        os.fsync(handle.fileno())
 
 
 def _write_table(file: "h5py.File", name: str, table: Table) -> None:

@@ -4,7 +4,6 @@ A file is written beside its place, flushed to disk and renamed: whoever sees it
 """
 
 import json
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -27,6 +26,7 @@ from ..state import (
     Ints,
     Model,
 )
+from . import hdf5
 
 _TETRA = 10
 """VTK_TETRA, the type of a cell (vtkCellType.h)."""
@@ -123,13 +123,11 @@ def write(
     path = layout.frame(folder, index)
     path.parent.mkdir(exist_ok=True)
     beside = path.with_suffix(".part")
-    with h5py.File(beside, "w") as file:
+    with hdf5.created(beside) as file:
         _write_grid(file, pieces, model.nodes_global)
         file.attrs["time"], file.attrs["time_unit"] = t, "s"
         file["VTKHDF/FieldData/time"] = np.array([t])
         file["VTKHDF/FieldData/time"].attrs["unit"] = "s"
-    with beside.open("rb") as handle:
-        os.fsync(handle.fileno())
     beside.rename(path)
     _append_series(path, t)
     return str(path.relative_to(folder))
