@@ -256,6 +256,7 @@ class Loop:
             self._counter.find(sim)
             path = frames.write(self._folder, index, clock.t, sim.model, sim.comm, sim.record.labels, damaged)
             sim.record.write(self._folder, index, clock.t)
+        self._tell_losses()  # what was written is known from now on
         clock.frame += 1
         if path is not None and self._journal is not None and index not in self._journal.frames:
             self._journal.frames.add(index)
