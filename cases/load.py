@@ -151,6 +151,9 @@ def apply_overrides(data: Mapping[str, Any], overrides: Overrides) -> dict[str, 
     mapping key by key. Tables that are missing on the way are made; list items must exist. Raises CaseError with every
     assignment that cannot be made, and with every key that has two: which of them was meant, nobody knows.
     """
+    if isinstance(overrides, str) or not isinstance(overrides, Iterable):
+        message = "write a list of assignments, such as ['run.ranks=2'], or values by key, such as {'run.ranks': 2}"
+        raise CaseError([Problem("overrides", shown(overrides), message)])
     changed: dict[str, Any] = copy.deepcopy(dict(data))
     problems: list[Problem] = []
     made: set[tuple[int | str, ...]] = set()

@@ -10,7 +10,7 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from ctypes.util import find_library
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +23,10 @@ from .saving import whole
 
 _SECONDS = 180.0
 """s that a frame may take to be drawn. Chosen: without a graphics card a large one takes long."""
+
+
+SMALLEST = 64
+"""Pixels of a picture, each way. Chosen: below it nothing is to be seen."""
 
 
 @dataclass(frozen=True)
@@ -150,10 +154,7 @@ def draw(
     folder. Raises ViewError.
     """
     require_field(field)
-    try:
-        look = Look(**options)
-    except TypeError as error:
-        raise LookError(f"{error}; allowed: {', '.join(Look.__struct_fields__)}") from None
+    look = _look(options)
     target = Path(out or f"{name}-{field}.png").resolve()
     _check(look, target)
     planes, sections = mirrors(look.mirror, scene), mirrors(look.section, scene, "section")
@@ -168,6 +169,18 @@ def draw(
     return render(picture)
 
 
+def _look(options: Mapping[str, Any]) -> Look:
+    """Raises LookError for an option that there is none of, or of another kind."""
+    for name in options.keys() - set(Look.__struct_fields__):
+        raise LookError(f"{name}: there is no such option; allowed: {', '.join(Look.__struct_fields__)}")
+    try:
+        return msgspec.convert(dict(options), Look)
+    except msgspec.ValidationError as error:
+        name = str(error).partition("$.")[2].rstrip("`").partition("[")[0]
+        told = str(error).partition(" - at ")[0]
+        raise LookError(f"{name} = {options.get(name)!r}: {told[:1].lower()}{told[1:]}") from None
+
+
 _RANGE = "limits (--range)"
 """What Python and the command line call the ends of the colour bar."""
 
@@ -180,6 +193,8 @@ def _check(look: Look, target: Path) -> None:
         raise LookError(f"{_RANGE} = {look.limits[0]:g}, {look.limits[1]:g}: two numbers, the lower end first")
     if not (look.zoom > 0.0 and look.rate > 0.0):
         raise LookError(f"zoom = {look.zoom:g}, rate = {look.rate:g}: both above 0")
+    if min(look.size) < SMALLEST:
+        raise LookError(f"size = {look.size[0]}, {look.size[1]}: width and height, at least {SMALLEST} pixels")
     if target.suffix.lower() not in {".png", ".gif"}:
         raise LookError(f"{target.name}: the name of a picture ends in .png or .gif")
 

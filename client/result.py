@@ -14,6 +14,7 @@ import msgspec
 from conoid.cases import fragments, layout, outcome
 from conoid.cases.messages import AnyMessage
 from conoid.cases.outcome import Outcome
+from conoid.cases.units import parse_quantity
 
 from . import html
 from .columns import Columns, joined, read_columns
@@ -213,19 +214,20 @@ class Result:
         out: Path | str | None = None,
         *,
         frame: int | Sequence[int] | None = None,
-        time: float | Sequence[float] | None = None,
+        time: float | str | Sequence[float | str] | None = None,
         **options: Any,
     ) -> Drawn:
         """Draws frames: as a PNG, side by side where there are several, or as a GIF where ``out`` ends in ``.gif``.
 
-        ``frame`` has their numbers, ``time`` times in s, of each the nearest frame. Without both it is the last one,
-        of a GIF every one. ``options`` are the fields of ``conoid.client.pictures.Look``. Raises ViewError.
+        ``frame`` has their numbers, ``time`` times in s or as ``"60 us"``, of each the nearest frame. Without both it
+        is the last one, of a GIF every one. ``options`` are the fields of ``conoid.client.pictures.Look``. Raises
+        ViewError.
         """
         every = Path(out or "").suffix.lower() == ".gif"
         if not self.frames:
             self.folder.path(layout.JOURNAL)  # a folder without frames may be none of a run
             raise UnfinishedError(f"{self.folder.name} has not written any frame")
-        chosen = self._chosen(_listed(frame), _listed(time), every)
+        chosen = self._chosen(_listed(frame), [seconds(one) for one in _listed(time)], every)
         return draw([self.frame(one) for one in chosen], self.scene(), self.folder.name, field, out, **options)
 
     def _chosen(self, frames: Sequence[int], times: Sequence[float], every: bool) -> list[int]:
@@ -273,7 +275,20 @@ class Result:
             return {}
 
 
-def _listed(value: float | Sequence[Any] | None) -> Sequence[Any]:
+def seconds(time: object) -> float:
+    """Of a number, in s, or of a text such as ``60 us``; a text without a unit is refused, as it would be taken for
+    seconds. Raises LookError.
+    """
+    try:
+        if not isinstance(time, str) or time.strip()[-1:].isalpha():
+            return parse_quantity(time, "s")
+        reason = "write it with its unit, such as '60 us'"
+    except ValueError as error:
+        reason = str(error)
+    raise LookError(f"time = {time!r}: {reason}")
+
+
+def _listed(value: float | str | Sequence[Any] | None) -> Sequence[Any]:
     if value is None:
         return ()
-    return value if isinstance(value, Sequence) else (value,)
+    return value if isinstance(value, Sequence) and not isinstance(value, str) else (value,)

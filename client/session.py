@@ -8,9 +8,10 @@ from urllib.parse import urlencode
 import msgspec
 
 from conoid.cases.load import CaseError, Overrides, Problem
+from conoid.cases.problems import shown
 
 from .config import target
-from .errors import ClientError
+from .errors import ClientError, UsageError
 from .http import Http
 from .run import Run, RunInfo, quoted
 from .submission import CaseSource, body_of, data_of, to_json
@@ -65,7 +66,7 @@ class Session(Http):
         higher ``priority`` comes first. Raises CaseError, ServiceError, UnreachableError.
         """
         kind, body = body_of(case, overrides)
-        words = [("label", f"{name}={value}") for name, value in (labels or {}).items()]
+        words = [("label", word) for word in _words(labels)]
         words += [("profile", profile)] if profile else []
         words += [("priority", str(priority))] if priority else []
         path = f"/v1/runs?{urlencode(words)}" if words else "/v1/runs"
@@ -121,9 +122,10 @@ class Session(Http):
     ) -> list[RunInfo]:
         """Our runs, newest first, at most ``limit``; with ``labels``, those that have all of them."""
         found: list[RunInfo] = []
-        query: dict[str, str | list[str]] = {"state": ",".join(states)} if states else {}
+        wanted = states if isinstance(states, str) else ",".join(states)
+        query: dict[str, str | list[str]] = {"state": wanted} if wanted else {}
         if labels:
-            query["label"] = [f"{name}={value}" for name, value in labels.items()]
+            query["label"] = _words(labels)
         while len(found) < limit:
             page = self.get(Page, "/v1/runs", limit=min(100, limit - len(found)), **query)
             found += page.runs
@@ -131,6 +133,13 @@ class Session(Http):
                 break
             query["cursor"] = page.next
         return found[:limit]
+
+
+def _words(labels: Mapping[str, str] | None) -> list[str]:
+    """``name=value`` of each label. Raises UsageError."""
+    if labels is not None and not isinstance(labels, Mapping):
+        raise UsageError(f"labels = {shown(labels)}: write names with their values, such as {{'batch': 'first'}}")
+    return [f"{name}={value}" for name, value in (labels or {}).items()]
 
 
 def connect(url: str | None = None, token: str | None = None) -> Session:

@@ -1,7 +1,7 @@
 """A case as the user names it: a file, the name of a shipped case, or plain data; sent as it is written."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +30,8 @@ def data_of(source: CaseSource, overrides: Overrides = ()) -> dict[str, Any]:
         data = source.model_dump(mode="json", exclude_unset=True)
     elif isinstance(source, Mapping):
         data = dict(source)
+    elif not isinstance(source, str | Path):
+        raise CaseError([Problem("case", shown(source), "a case is a file, the name of a shipped one, or plain data")])
     else:
         data = read_data(locate(source))
     return apply_overrides(data, overrides)
@@ -45,7 +47,7 @@ def body_of(source: CaseSource, overrides: Overrides = ()) -> tuple[str, bytes]:
 
     Raises CaseError when there is no such file, or an override cannot be made.
     """
-    changes = overrides if isinstance(overrides, Mapping) else list(overrides)
+    changes = list(overrides) if isinstance(overrides, Iterator) else overrides
     if isinstance(source, str | Path) and not changes:
         path = locate(source)
         try:

@@ -8,7 +8,7 @@ from conoid.cases.bodies import Loose, MeshFile
 from conoid.cases.load import material
 from conoid.cases.schema import Case
 
-from .errors import ClientError
+from .errors import UsageError
 from .scatter import perturbations
 
 FORMS = ("standard", "nodal", "split")
@@ -59,7 +59,7 @@ class Plan:
         return [Variant(form, safety) for form in forms for safety in safeties]
 
     def points(self, case: Case) -> list[Point]:
-        """Every run, the dearest first. Raises ClientError for a case that has no mesh to scale."""
+        """Every run, the dearest first. Raises UsageError for a case that has no mesh to scale."""
         shares = perturbations(self.members) if self.vary == STEPS else [0.0] * self.members
         return [
             Point(variant, factor, member, {
@@ -74,7 +74,7 @@ class Plan:
 def sizes(case: Case, factor: float) -> dict[str, float]:
     """Keys and values of all element sizes times ``factor``; those of mesh files and loose tets stay.
 
-    Raises ClientError where no part has a mesh that is generated.
+    Raises UsageError where no part has a mesh that is generated.
     """
     found: dict[str, float] = {}
     for index, part in enumerate(case.parts):
@@ -86,19 +86,19 @@ def sizes(case: Case, factor: float) -> dict[str, float]:
         if mesh.grading is not None:
             found[f"{key}.grading.far_size"] = factor * mesh.grading.far_size
     if not found:
-        raise ClientError(f"{case.name}: no part has a generated mesh, so there is no element size to change")
+        raise UsageError(f"{case.name}: no part has a generated mesh, so there is no element size to change")
     return found
 
 
 def seeds(case: Case, member: int) -> dict[str, int]:
-    """Keys and values of the seeds of scattered strengths for a member. Raises ClientError where nothing scatters."""
+    """Keys and values of the seeds of scattered strengths for a member. Raises UsageError where nothing scatters."""
     found = {}
     for name in {part.material for part in case.parts if part.fracture is not None}:
         scatter = getattr(material(case, name).brittle, "scatter", None)
         if scatter is not None and name in case.materials:
             found[f"materials.{name}.brittle.scatter.seed"] = scatter.seed + member
     if not found:
-        raise ClientError(f"{case.name}: no material of its own has a scatter of its strength; vary steps instead")
+        raise UsageError(f"{case.name}: no material of its own has a scatter of its strength; vary steps instead")
     return found
 
 

@@ -15,7 +15,7 @@ def view(
     out: Path | str | None = None,
     *,
     frame: int | Sequence[int] | None = None,
-    time: float | Sequence[float] | None = None,
+    time: float | str | Sequence[float | str] | None = None,
     **options: Any,
 ) -> Drawn:
     """Draws frames of a result, of a run's folder, or a frame file: a PNG, or a GIF. Raises ViewError.

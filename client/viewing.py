@@ -5,12 +5,10 @@ from typing import Annotated, Any
 
 import typer
 
-from conoid.cases.units import parse_quantity
-
-from .errors import LookError
 from .figures import si
 from .options import Json, Token, Url, aloud, complain, find, show_json
-from .pictures import FIELDS
+from .pictures import FIELDS, SMALLEST
+from .result import seconds
 from .session import connect
 from .view import view
 
@@ -47,7 +45,7 @@ def view_frames(
         tuple[float, float],
         typer.Option("--percentiles", help="Values at the ends of the colour bar where --range is not given."),
     ] = (0.5, 99.5),
-    size: Annotated[tuple[int, int], typer.Option("--size", min=64, max=16384, help="Width and height.")] = (
+    size: Annotated[tuple[int, int], typer.Option("--size", min=SMALLEST, max=16384, help="Width and height.")] = (
         1600,
         1200,
     ),
@@ -62,7 +60,7 @@ def view_frames(
 ) -> None:
     """Draw frames off screen: as a PNG, side by side where there are several, or as a GIF (--out x.gif: all frames)."""
     options: dict[str, Any] = {
-        "out": out, "frame": frame, "time": [_seconds(each) for each in time or ()], "mirror": mirror,
+        "out": out, "frame": frame, "time": [seconds(each) for each in time or ()], "mirror": mirror,
         "section": section, "camera": camera, "up": up, "zoom": zoom, "limits": limits, "percentiles": percentiles,
         "size": size, "raw": raw, "edges": edges, "scale": scale, "transparent": transparent, "rate": rate,
     }  # fmt: skip
@@ -84,14 +82,3 @@ def _tell_of_times(asked: list[float], drawn: list[float | None]) -> None:
     for wanted, found in zip(asked, drawn[len(drawn) - len(asked) :], strict=True):
         if found is not None and abs(found - wanted) > _NEAR * max(abs(wanted), abs(found)):
             complain(f"time = {si(wanted, 's')}: the nearest frame is of {si(found, 's')}")
-
-
-def _seconds(text: str) -> float:
-    """Of ``60 us``; a number without a unit is refused, as it would be taken for seconds."""
-    try:
-        if text.strip()[-1:].isalpha():
-            return parse_quantity(text, "s")
-        reason = "write it with its unit, such as '60 us'"
-    except ValueError as error:
-        reason = str(error)
-    raise LookError(f"time = {text!r}: {reason}")

@@ -12,7 +12,7 @@ import pytest
 from conoid.cases.load import CaseError
 from conoid.cases.problems import ConoidError
 from conoid.client.config import DEFAULT_URL, target
-from conoid.client.errors import ClientError, NotFoundError, ServiceError, UnreachableError
+from conoid.client.errors import ClientError, NotFoundError, ServiceError, UnreachableError, UsageError
 from conoid.client.result import Result
 from conoid.client.run import inside
 from conoid.client.session import Session
@@ -41,6 +41,35 @@ def test_a_damaged_file_of_a_server_is_named_by_its_run() -> None:
     for name, said in (("case.resolved.json", "case"), ("outcome.json", "outcome")):
         with pytest.raises(ClientError, match=f"^{name} of run r1 at http://conoid.test: this {said} cannot be read: "):
             _ = session.run("r1").result().case if said == "case" else session.run("r1").result().outcome
+
+
+@pytest.mark.parametrize(("overrides", "told"), [("run.ranks=2", "'run.ranks=2'"), (5, "5")])
+def test_one_text_is_no_list_of_assignments(overrides: Any, told: str) -> None:
+    """It was gone through letter by letter."""
+    with pytest.raises(
+        CaseError, match=rf"^overrides = {told}: write a list of assignments, such as \['run.ranks=2'\]"
+    ):
+        body_of("demo", overrides)
+
+
+@pytest.mark.parametrize("case", [None, 5, ["demo"]])
+def test_what_is_no_case_is_told(case: Any) -> None:
+    with pytest.raises(CaseError, match=r"^case = .*: a case is a file, the name of a shipped one, or plain data$"):
+        body_of(case)
+
+
+def test_labels_are_names_with_values_and_one_state_is_a_list_of_one() -> None:
+    asked: list[str] = []
+
+    def answer(request: httpx2.Request) -> httpx2.Response:
+        asked.append(request.url.query.decode())
+        return httpx2.Response(200, json={"runs": []})
+
+    session = served(answer)
+    with pytest.raises(UsageError, match=r"^labels = a list: write names with their values, such as"):
+        session.submit("demo", labels=["a=b"])  # type: ignore[arg-type]
+    assert session.runs(states="succeeded") == session.runs(states=["succeeded"]) == []
+    assert asked == ["limit=50&state=succeeded"] * 2
 
 
 def test_a_refusal_is_its_detail_and_hint() -> None:

@@ -273,7 +273,11 @@ def test_cameras_are_read() -> None:
     ("options", "said"),
     [({"percentiles": (50, 50)}, "the smaller one first"), ({"limits": (2, 1)}, "= 2, 1: two numbers, the lower end"),
      ({"zoom": 0}, "above 0"), ({"out": "x.jpg"}, r"ends in \.png or \.gif"),
-     ({"colour": "red"}, "allowed: mirror, section")],
+     ({"colour": "red"}, "colour: there is no such option; allowed: mirror, section"),
+     ({"size": (10,)}, r"size = \(10,\): expected `array` of length 2"),
+     ({"size": (0, 0)}, "size = 0, 0: .* at least 64"), ({"zoom": "a"}, "zoom = 'a': expected `float`"),
+     ({"limits": (1,)}, r"limits = \(1,\): expected `array` of length 2"),
+     ({"time": "60"}, "time = '60': write it with its unit"), ({"time": "x us"}, "time = 'x us': ")],
 )  # fmt: skip
 def test_a_wrong_choice_is_one_line(options: dict[str, Any], said: str, folder: Path) -> None:
     with pytest.raises(ViewError, match=said):
