@@ -124,10 +124,12 @@ class Contact(Model):
     """Pairs of parts with a friction of their own."""
     restitution: Annotated[Ratio, Field(ge=0, le=1)] = 0.0
     """Share of the speed of approach with which nodes part from faces, and edges from edges, that they run into: at 0
-    an impact of nodes is perfectly plastic, which takes energy that falls with the size of the tets; at 1 it takes
-    none. Bodies rebound by their elasticity whatever it is. Above 0 ``sweeps`` and ``numerics.dt_growth`` have other
-    defaults, and what parts falls back: next to 0 is not 0. At a high speed unequal time steps may take or make more
-    than it gives back: the outcome says when it is above 1 %. Walls are not concerned: there it is always 0."""
+    an impact of nodes is perfectly plastic; at 1 it takes no energy. In the impact of two bodies it is their first
+    nodes that pay, and what they pay falls with the size of the tets; where erosion lays bare ever new nodes, or a
+    cloud of debris arrives, all of them do, whatever their size: 8 to 9 % in a penetration at constant speed. Bodies
+    rebound by their elasticity whatever it is. Above 0 ``sweeps`` and ``numerics.dt_growth`` have other defaults, and
+    what parts falls back: next to 0 is not 0. At a high speed unequal time steps may take or make more than it gives
+    back: the outcome says when it is above 1 %. Walls are not concerned: there it is always 0."""
     edges: bool = True
     """Whether sharp edges meet edges."""
     overlap: Literal["refuse", "push"] = "refuse"
@@ -176,7 +178,8 @@ class Numerics(Model):
     viscosity: Annotated[Viscosity | None, BeforeValidator(_off), Switch()] = Viscosity()
     """``viscosity = "none"`` switches it off."""
     dt_safety: Annotated[Ratio, Field(gt=0, le=1)] = 0.9
-    """Share of the rigorous element bound 1 / (c sqrt(sum |grad N|^2))."""
+    """Share of the rigorous element bound 1 / (c sqrt(sum |grad N|^2)). Bodies that shatter end with some 15 % less
+    energy of fracture at 0.9, and with fewer fragments, than at 0.6 and below."""
     dt_growth: Annotated[Ratio, Field(gt=1, le=2)] | None = None
     """Largest growth of the time step in one step: 1.05 by default, and 1.002 with ``contact.restitution``, since steps
     that rise and fall with the impacts give energy that nothing takes then."""
