@@ -12,7 +12,7 @@ from .convergence import Done, Series
 from .figures import count, duration, number, si
 from .quantities import Number
 from .richardson import Trend
-from .scatter import runs_needed
+from .scatter import differ, runs_needed
 from .study import table
 from .trade import Target
 from .variants import Variant
@@ -81,10 +81,13 @@ class Book:
     def _nothing(self) -> str:
         """What to say where there is no error to weigh against the cost."""
         said = "Nothing converges on these meshes: there is no error to weigh against the cost"
+        if len(self.series) > 1:
+            said += "; how far the variants differ is in their table"
         own = next((each for each in self.series if each.variant == self.own), None)
         for each in self.open_references():
-            if own is not None and each.name in own.meshes[0].samples:
-                mesh, limit = own.meshes[0], own.limits[each.name]
+            limit = None if own is None else own.limits[each.name]
+            if own is not None and limit is not None and not math.isnan(limit.uncertainty):
+                mesh = own.meshes[0]
                 value = f"{number(mesh.samples[each.name].mean)} {each.unit}".strip()
                 where, by = si(self.own_size * mesh.factor, "m"), f"{limit.uncertainty:.2g}"
                 return f"{said}. {each.name} {limit.trend.value}: {value} at {where}, uncertain by {by}."
@@ -99,6 +102,7 @@ def to_markdown(book: Book, wanted: str | None = None) -> str:
         _ensembles(book),
         *(text for each in book.series for text in (f"**{each.variant}**", _costs(book, each), _values(book, each))),
         _unresolved(book),
+        _between(book),
         _scatter(book) if book.members > 1 else "",
         *([] if name is None else [f"Error over cost, {name}:", _worth(book, name)]),
         "\n".join(f"- {each.point.variant}, sizes x {each.point.factor:g}: {each.problem}" for each in book.failed),
@@ -131,10 +135,12 @@ def _values(book: Book, series: Series) -> str:
         shown = [number(m.samples[each.name].mean) if each.name in m.samples else "-" for m in meshes]
         order = "-" if math.isnan(found.order) else f"{found.order:.1f}"
         limit = number(found.value) if found.trend is Trend.CONVERGES else "-"
-        share = f"{100.0 * found.uncertainty / each.scale:.2g}" if each.scale and not each.of_nothing else "-"
+        known = not math.isnan(found.uncertainty)
+        uncertain = f"{found.uncertainty:.2g}" if known else "-"
+        share = f"{100.0 * found.uncertainty / each.scale:.2g}" if known and each.scale and not each.of_nothing else "-"
         expected = "-" if each.expected is None else f"{number(each.expected)} +- {number(each.tolerance)}"
         rows.append([
-            _titled(each), *shown, found.trend.value, order, limit, f"{found.uncertainty:.2g}", share, expected
+            _titled(each), *shown, found.trend.value, order, limit, uncertain, share, expected
         ])  # fmt: skip
     head = ["quantity", *(si(book.own_size * m.factor, "m") for m in meshes)]
     return table([*head, "trend", "order", "limit", "U of the finest", "U %", "expected"], rows)
@@ -152,6 +158,24 @@ def _unresolved(book: Book) -> str:
         if all(trend in (Trend.DIVERGES, Trend.OSCILLATES, Trend.SCATTERS) for trend in trends):
             lost.setdefault(max(trends, key=trends.count), []).append(each.name)
     return "\n\n".join(f"No limit, {trend.value}: {'; '.join(names)}." for trend, names in lost.items())
+
+
+def _between(book: Book) -> str:
+    """What each variant makes of a quantity on its finest mesh, and by how much they differ."""
+    if len(book.series) == 1:
+        return ""
+    rows = []
+    for each in book.numbers:
+        there = [series.meshes[0].samples.get(each.name) for series in book.series]
+        known = sorted((sample for sample in there if sample is not None), key=lambda sample: sample.mean)
+        largest = max((abs(sample.mean) for sample in known), default=0.0)
+        if len(known) > 1 and largest:
+            by = 100.0 * (known[-1].mean - known[0].mean) / largest
+            chance = "yes" if differ(known[0], known[-1]) else "no"
+            shown = ["-" if sample is None else number(sample.mean) for sample in there]
+            rows.append([_titled(each), *shown, f"{by:.2g}", chance])
+    head = ("quantity", *(str(series.variant) for series in book.series), "differ by %", "by more than chance")
+    return f"Between variants, on the finest mesh of each:\n\n{table(head, rows)}"
 
 
 def _scatter(book: Book) -> str:

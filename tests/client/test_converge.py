@@ -1,6 +1,7 @@
 """Studies of convergence from runs that are made up, whose order, cost and scatter are known."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -96,6 +97,24 @@ def test_what_only_scatters_has_no_order_and_what_grows_is_said_to() -> None:
     assert "No limit, does not converge: broken, number." in text
     assert "ensemble of 3 runs" in text
     assert found.advice().startswith("Nothing converges")
+
+
+def test_variants_on_one_mesh_are_told_apart_from_their_scatter() -> None:
+    """A study of the step alone has no limit; what the step makes of a quantity is the answer."""
+    shorter = Variant("nodal", 0.6)
+    done = [
+        run(variant, 1.0, length + 0.01 * member, 10.0, member, broken=100.0 + 3.0 * member + other)
+        for variant, length, other in ((NODAL, 1.8, 0.0), (shorter, 2.0, 1.0))
+        for member in range(3)
+    ]
+    found = book(done, members=3)
+    text = converged.to_markdown(found)
+    table = text.split("Between variants, on the finest mesh of each:")[1]
+    rows = {cells[1]: cells[2:6] for line in table.splitlines() if len(cells := re.split(r" *\| *", line)) == 7}
+    assert rows["length, m"] == ["1.81", "2.01", "10", "yes"]
+    assert rows["broken, number"][2:] == ["0.96", "no"]
+    assert found.advice().endswith("to weigh against the cost; how far the variants differ is in their table.")
+    assert "nan" not in text
 
 
 def test_a_count_that_has_settled_does_not_stand_for_a_reference_without_a_limit(tmp_path: Path) -> None:
