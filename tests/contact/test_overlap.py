@@ -14,6 +14,7 @@ from ..worker.meshes import block
 from .bodies import meeting_of
 
 SIZE = 1e-3
+SLOPE = float(np.tan(np.radians(20.0)))
 
 
 def lowered(depth: float, across: float = 0.0) -> list[TetMesh]:
@@ -114,3 +115,29 @@ def test_bodies_that_coincide_and_are_not_pushed_are_refused_by_the_worker() -> 
 def test_what_flush_bodies_share_of_a_plane_is_no_overlap() -> None:
     for off in ((4 * SIZE, 0.0, 0.0), (2 * SIZE, 0.0, 4 * SIZE), (4 * SIZE, 4 * SIZE, 0.0)):
         pushed(WIDE, TetMesh(WIDE.points + np.array(off), WIDE.tets))
+
+
+def wedge(cells: int) -> TetMesh:
+    """4 mm high, 3 mm thick, of 40 degrees, its tip cut off 0.2 mm from where its sides meet, at the origin."""
+    mesh = block((1, 1, cells), 1.0, shake=0.0)
+    across, along, up = (mesh.points / (1, 1, cells)).T
+    z = 0.2 + 4.0 * up
+    return TetMesh(1e-3 * np.column_stack([(2.0 * across - 1.0) * SLOPE * z, 3.0 * along - 1.5, z]), mesh.tets)
+
+
+def beside_wedge(cells: int, moved: float = 0.0) -> TetMesh:
+    """A block 3.3 mm thick that touches all of the left side of the wedge, ``moved``, m, to the right."""
+    mesh = block((1, 1, cells), 1.0, shake=0.0)
+    across, along, up = (mesh.points / (1, 1, cells)).T
+    z = 0.2 + 4.0 * up
+    points = 1e-3 * np.column_stack([-4.0 + (4.0 - SLOPE * z) * across, 3.3 * along - 1.65, z])
+    return TetMesh(points + np.array([moved, 0.0, 0.0]), mesh.tets)
+
+
+@pytest.mark.parametrize("cells", [(6, 5), (1, 2), (5, 6), (7, 5), (3, 7), (11, 9)])
+def test_a_corner_on_the_rim_of_two_slanted_sides_touches(cells: tuple[int, int]) -> None:
+    """It may face neither side by the mean of its normals, and was said to lie 3.15 mm deep: at the far side."""
+    case = meeting_of([{}, {"velocity": (0.0, 0.0, 0.0)}], {}, end=1e-7)
+    build(case, [wedge(cells[0]), beside_wedge(cells[1])])
+    with pytest.raises(InputError, match=r"overlaps .* by 4\.7e-05 m"):
+        build(case, [wedge(cells[0]), beside_wedge(cells[1], 5e-5)])

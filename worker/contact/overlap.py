@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..mesh.faces import normals as face_normals
-from ..state import Flags, Floats, Indices
+from ..state import Flags, Floats, Indices, Ints
 from . import search
 from .beside import FACING
 from .search import Things
@@ -58,11 +58,16 @@ def find(points: Floats, tets: Indices, part: Indices, surface: Surface, allowed
     outward = _normals(points, surface.faces)
     at = (shares < _ROUNDING) & surface.exposed[pairs[:, 1]]
     resting = inside & (at & _faced(outward[node], points[corners])).any(axis=1)
+    for face in range(4):
+        asked = np.flatnonzero(inside & ~resting & at[:, face])
+        resting[asked] = _clear(points, tets, node[asked], _inward(points[corners[asked]])[:, face])
     met, of = np.unique(np.column_stack([node[inside], part[corners[inside, 0]]]), axis=0, return_inverse=True)
     met = met[np.bincount(of.reshape(-1), resting[inside], len(met)) == 0]
     depth, way = np.zeros(len(met)), np.zeros((len(met), 3))
+    rows, begin, end = _stars(tets, met[:, 0])
     for k, (a, other) in enumerate(met):
-        depth[k], way[k] = _nearest(points[a], outward[a], points[surface.faces[surface.part == other]])
+        ways = (points[tets[rows[begin[k] : end[k]]]] - points[a]).reshape(-1, 3)
+        depth[k], way[k] = _nearest(points[a], outward[a], ways, points[surface.faces[surface.part == other]])
     kept = depth > 0.0
     return Overlaps(met[kept, 0].astype(np.int32), met[kept, 1].astype(np.int32), depth[kept], way[kept])
 
@@ -123,9 +128,37 @@ def _faced(outward: Floats, corners: Floats) -> Flags:
     Where sides of two bodies lie in one plane, the rim of one that sinks into the other is on a face of it and does not
     rest there.
     """
+    return np.asarray((_inward(corners) * outward[:, None]).sum(axis=2) >= -FACING)
+
+
+def _inward(corners: Floats) -> Floats:
+    """(p, 4, 3) unit normals, into tets (p, 4, 3), of the faces across from each corner."""
     tail = np.swapaxes(np.linalg.inv(corners[:, 1:] - corners[:, :1]), 1, 2)
     inward = np.concatenate([-tail.sum(axis=1, keepdims=True), tail], axis=1)
-    return np.asarray((inward * outward[:, None]).sum(axis=2) >= -FACING * np.linalg.norm(inward, axis=2))
+    return np.asarray(inward / np.linalg.norm(inward, axis=2)[:, :, None])
+
+
+def _clear(points: Floats, tets: Indices, nodes: Indices, inward: Floats) -> Flags:
+    """(p,) whether no tet at one of ``nodes`` (p,) reaches behind the plane through it with the normal ``inward``
+    (p, 3): then it rests there, whatever the mean of its normals. A corner on the rim of two slanted sides may face
+    neither.
+    """
+    rows, begin, end = _stars(tets, nodes)
+    pair = np.repeat(np.arange(len(nodes)), end - begin)
+    first = np.repeat(begin - np.cumsum(end - begin) + (end - begin), end - begin)
+    ways = points[tets[rows[first + np.arange(len(pair))]]] - points[nodes[pair], None]
+    behind = (ways * inward[pair, None]).sum(axis=2).max(axis=1)
+    deep = behind > _ROUNDING * np.linalg.norm(ways, axis=2).max(axis=1)
+    return np.asarray(np.bincount(pair, deep, len(nodes)) == 0)
+
+
+def _stars(tets: Indices, nodes: Indices) -> tuple[Ints, Ints, Ints]:
+    """Rows of the tets (k, 4) at ``nodes`` (p,), by node, and (p,) where those of each begin and end."""
+    rows, corner = np.nonzero(np.isin(tets, nodes))
+    owner = tets[rows, corner]
+    order = np.argsort(owner, kind="stable")
+    begin, end = np.searchsorted(owner[order], nodes), np.searchsorted(owner[order], nodes, side="right")
+    return rows[order].astype(np.int64), begin, end
 
 
 def _normals(points: Floats, faces: Indices) -> Floats:
@@ -137,8 +170,9 @@ def _normals(points: Floats, faces: Indices) -> Floats:
     return np.asarray(normals / np.where(lengths > 0.0, lengths, 1.0)[:, None])
 
 
-def _nearest(node: Floats, outward: Floats, triangles: Floats) -> tuple[float, Floats]:
-    """Depth below the nearest of the triangles (f, 3, 3) that the node faces, m, and the unit normal there.
+def _nearest(node: Floats, outward: Floats, ways: Floats, triangles: Floats) -> tuple[float, Floats]:
+    """Depth below the nearest of the triangles (f, 3, 3) that the node faces, m, and the unit normal there: by the mean
+    of its normals, or since none of its tets, whose corners are ``ways`` (w, 3) from it, reaches behind their plane.
 
     The depth is zero for a node on the surface, and where no triangle that it faces has its foot. Where the surface is
     dented the nearest one need not have it: a ridge of the dent may be nearest, and the foot lie on the far side.
@@ -151,7 +185,8 @@ def _nearest(node: Floats, outward: Floats, triangles: Floats) -> tuple[float, F
     ee, ff, ef = (e * e).sum(axis=1), (f * f).sum(axis=1), (e * f).sum(axis=1)
     er, fr = (e * r).sum(axis=1), (f * r).sum(axis=1)
     s, t = (ff * er - ef * fr) / area**2, (ee * fr - ef * er) / area**2
-    faced = (normals @ outward <= FACING) & (heights <= _ROUNDING * np.sqrt(area))
+    clear = (normals @ ways.T).min(axis=1) >= -_ROUNDING * np.linalg.norm(ways, axis=1).max()
+    faced = ((normals @ outward <= FACING) | clear) & (heights <= _ROUNDING * np.sqrt(area))
     over = (np.minimum(np.minimum(s, t), 1.0 - s - t) >= -_INSIDE) & faced
     if not over.any():
         return 0.0, np.zeros(3)
