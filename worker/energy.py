@@ -27,8 +27,8 @@ from .parallel.fixed_point import Grouped, add_limbs, exact_sums, exact_totals, 
 from .state import CHUNK, WORKS, Block, Floats, Ints, Model
 
 _TOLD = 0.01
-"""Share of the largest energy that unequal steps may take or make without a word, and of the energy of fracture that
-may come back. Chosen: what the other lines of a ledger are usually read to.
+"""Share of the largest energy that may be missing or that unequal steps may take or make without a word, and of the
+energy of fracture that may come back. Chosen: what the other lines of a ledger are usually read to.
 """
 
 
@@ -134,6 +134,7 @@ class Ledger:
         """What the user should know of the account, by the last call."""
         remedy = "a smaller numerics.dt_safety lowers it"
         told = [
+            (self.worst, f"the account of the energy has not closed by up to {self.worst:.2g} of the largest energy"),
             (self.stepping, f"unequal time steps have taken or made {self.stepping:.2g} of the largest energy"),
             (
                 self.unpaid,
