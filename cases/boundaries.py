@@ -97,6 +97,10 @@ class Gravity(Model):
     """Parts that it acts on; all when empty."""
 
 
+ROUND = 1e-6
+"""Of a radius: nodes this near to it are in a cylinder. Chosen: more than meshers miss round faces by."""
+
+
 class Around(Model):
     """What lies between two radii round a line, however far along it. With the ``radius`` of its hole it is the bore of
     a tube, with its outer one as ``inner_radius`` the outside.
@@ -111,11 +115,11 @@ class Around(Model):
     radius: Annotated[Length, Field(gt=0)]
     """Largest distance from the line; not below ``inner_radius``. Nodes within a millionth of it are in."""
 
-    def holds(self, point: tuple[float, float, float], slack: float) -> bool:
-        """Whether a point, m, is in it, or as near to it as ``slack`` of its radius."""
-        d = "xyz".index(self.axis)
+    def holds(self, point: tuple[float, float, float]) -> bool:
+        """Whether a point, m, is in it, or as near to it as ROUND of its radius."""
+        d, slack = "xyz".index(self.axis), ROUND * self.radius
         p, q = (point[e] - self.base[e] for e in ((d + 1) % 3, (d + 2) % 3))
-        return self.inner_radius - slack * self.radius <= math.hypot(p, q) <= (1.0 + slack) * self.radius
+        return self.inner_radius - slack <= math.hypot(p, q) <= self.radius + slack
 
 
 class Traction(Model):

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from .bodies import Box, Cylinder, Loose, MeshFile, Plate, Shards, Sphere, Tube, TwoTets
-from .boundaries import Traction
+from .boundaries import ROUND, Traction
 from .geometry import Generated, Vector, across, bounds, centre, index, surface
 from .mesh_size import FACES_PER_SURFACE, surface_faces
 from .placed import Placed
@@ -17,8 +17,6 @@ _FINEST = 60
 """Patches along a side of a surface, at most. Chosen: a tenth of a second for a body."""
 _MOST = 20
 """Bodies whose surfaces are gone through. Chosen: two seconds at most."""
-_NEAR = 1e-6
-"""Of a length: what is as near to a region is in it, as the worker has it for cylinders."""
 
 Point = Callable[[float, float], Vector]
 """The point of a surface at two numbers from 0 to 1."""
@@ -75,13 +73,13 @@ def _region(spec: Traction) -> Within | None:
     low, high, shell = spec.low, spec.high, spec.cylinder
     if shell is None and (low is None or high is None):
         return None
-    slack = _NEAR * max(map(abs, (*(low or ()), *(high or ()))), default=0.0)
+    slack = ROUND * max(map(abs, (*(low or ()), *(high or ()))), default=0.0)
 
     def within(point: Vector) -> bool:
         boxed = low is None or high is None or all(
             a - slack <= x <= b + slack for a, x, b in zip(low, point, high, strict=True)
         )  # fmt: skip
-        return boxed and (shell is None or shell.holds(point, _NEAR))
+        return boxed and (shell is None or shell.holds(point))
 
     return within
 

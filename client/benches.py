@@ -52,7 +52,7 @@ def bench_scale(
     done = study.Study(case_of(case, overrides or ()).name, overrides or (), CORES, network, runs)
     if out is not None:
         save_text(out / "scale.md", study.to_markdown(done))
-        save_text(out / "scale.json", study.to_json(done).decode())
+        save_text(out / "scale.json", study.to_json(done))
         save_text(out / "scale.svg", chart.speed_up(done))
     typer.echo(study.to_markdown(done), nl=False)
     raise typer.Exit(ExitCode.SUCCEEDED if done.equal else ExitCode.CRASHED)

@@ -85,9 +85,10 @@ class Book:
             said += "; how far the variants differ is in their table"
         own = next((each for each in self.series if each.variant == self.own), None)
         for each in self.open_references():
-            limit = None if own is None else own.limits[each.name]
-            if own is not None and limit is not None and not math.isnan(limit.uncertainty):
-                mesh = own.meshes[0]
+            if own is None or each.name not in own.meshes[0].samples:
+                continue
+            mesh, limit = own.meshes[0], own.limits[each.name]
+            if not math.isnan(limit.uncertainty):
                 value = f"{number(mesh.samples[each.name].mean)} {each.unit}".strip()
                 where, by = si(self.own_size * mesh.factor, "m"), f"{limit.uncertainty:.2g}"
                 return f"{said}. {each.name} {limit.trend.value}: {value} at {where}, uncertain by {by}."

@@ -105,7 +105,7 @@ def _write(book: Book, quantity: str | None, out: Path | None) -> None:
     text = converged.to_markdown(book, quantity)
     if out is not None:
         save_text(out / "converge.md", text)
-        save_text(out / "converge.json", converged.to_json(book, quantity).decode())
+        save_text(out / "converge.json", converged.to_json(book, quantity))
         drawing("curves").save(drawing("pareto").figure(book), out / "converge.png")
     typer.echo(text, nl=False)
 

@@ -71,7 +71,7 @@ def hard(
     text = to_markdown(ended)
     if out is not None:
         save_text(out / "hard.md", text)
-        save_text(out / "hard.json", msgspec.json.format(msgspec.json.encode(ended), indent=1).decode())
+        save_text(out / "hard.json", msgspec.json.format(msgspec.json.encode(ended), indent=1))
     typer.echo(text, nl=False)
     raise typer.Exit(ExitCode.CRASHED if any(verdict.faults for verdict in ended) else ExitCode.SUCCEEDED)
 

@@ -29,7 +29,7 @@ def whole(out: Path) -> Iterator[Path]:
                 part.unlink(missing_ok=True)
 
 
-def save_text(out: Path, text: str) -> None:
-    """Writes a text. Raises ClientError that names ``out``."""
+def save_text(out: Path, text: str | bytes) -> None:
+    """Writes a text, or one that is in UTF-8. Raises ClientError that names ``out``."""
     with whole(out) as part:
-        part.write_text(text, encoding="utf-8")
+        part.write_bytes(text if isinstance(text, bytes) else text.encode())

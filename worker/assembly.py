@@ -10,6 +10,7 @@ import numpy as np
 
 from conoid.cases import schema
 from conoid.cases.bodies import MeshFile
+from conoid.cases.boundaries import ROUND
 from conoid.cases.library import material as find_material
 
 from .contact import overlap, pairing
@@ -28,8 +29,6 @@ Say = Callable[[str], None]
 """Reports what the start is doing."""
 _JITTER = 0x6A697474
 """Seed of the random velocities of the start."""
-_ROUND = 1e-6
-"""Of a radius: nodes this near to it are in a cylinder. Chosen: more than meshers miss round faces by."""
 _MANY = 1_000
 """Pieces of a part beyond which nothing finds out whether they overlap each other. Chosen: the table of who meets whom
 grows with their square."""
@@ -243,5 +242,5 @@ def _around(region: schema.Around, x: Floats) -> Flags:
     """(n,) the points between two radii round a line."""
     d = "xyz".index(region.axis)
     p, q = (x[:, e] - region.base[e] for e in ((d + 1) % 3, (d + 2) % 3))
-    distance, slack = np.sqrt(p * p + q * q), _ROUND * region.radius
+    distance, slack = np.sqrt(p * p + q * q), ROUND * region.radius
     return (distance >= region.inner_radius - slack) & (distance <= region.radius + slack)

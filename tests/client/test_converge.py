@@ -99,6 +99,15 @@ def test_what_only_scatters_has_no_order_and_what_grows_is_said_to() -> None:
     assert found.advice().startswith("Nothing converges")
 
 
+def test_a_reference_that_the_finest_mesh_lacks_is_passed_over() -> None:
+    """A probe whose box no tet has its centre in there."""
+    numbers = (Number("broken, number", 7.0),)
+    finest = [Done(Point(NODAL, 0.5, 0, {}), "r", 64_000, 200, 160.0, numbers)]
+    done = [run(NODAL, h, length, 10.0 * h**-4, broken=7.0) for h, length in ((1.0, 2.4), (2.0, 2.1), (4.0, 2.2))]
+    found = Book("made", (), NODAL, 1e-3, 1, "steps", 0.02, done, series([*finest, *done]), done[0].numbers)
+    assert found.advice() == "Nothing converges on these meshes: there is no error to weigh against the cost."
+
+
 def test_variants_on_one_mesh_are_told_apart_from_their_scatter() -> None:
     """A study of the step alone has no limit; what the step makes of a quantity is the answer."""
     shorter = Variant("nodal", 0.6)

@@ -1,11 +1,12 @@
 """Bodies that overlap before the first step: where and how deep; moving them apart, and when that has not helped."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..mesh.faces import normals as face_normals
-from ..state import Flags, Floats, Indices, Ints
+from ..state import Flags, Floats, Indices
 from . import search
 from .beside import FACING
 from .search import Things
@@ -57,16 +58,15 @@ def find(points: Floats, tets: Indices, part: Indices, surface: Surface, allowed
     inside = np.asarray((shares >= -_INSIDE).all(axis=1))
     outward = _normals(points, surface.faces)
     at = (shares < _ROUNDING) & surface.exposed[pairs[:, 1]]
-    resting = inside & (at & _faced(outward[node], points[corners])).any(axis=1)
-    for face in range(4):
-        asked = np.flatnonzero(inside & ~resting & at[:, face])
-        resting[asked] = _clear(points, tets, node[asked], _inward(points[corners[asked]])[:, face])
+    inward = _inward(points[corners])
+    resting = inside & (at & _faced(outward[node], inward)).any(axis=1)
+    asked, face = np.nonzero((inside & ~resting)[:, None] & at)
+    for pair, side, ways in zip(asked, face, _ways(points, tets, node[asked]), strict=True):
+        resting[pair] |= _clear(-inward[pair, side][None], ways)[0]
     met, of = np.unique(np.column_stack([node[inside], part[corners[inside, 0]]]), axis=0, return_inverse=True)
     met = met[np.bincount(of.reshape(-1), resting[inside], len(met)) == 0]
     depth, way = np.zeros(len(met)), np.zeros((len(met), 3))
-    rows, begin, end = _stars(tets, met[:, 0])
-    for k, (a, other) in enumerate(met):
-        ways = (points[tets[rows[begin[k] : end[k]]]] - points[a]).reshape(-1, 3)
+    for k, ((a, other), ways) in enumerate(zip(met, _ways(points, tets, met[:, 0]), strict=True)):
         depth[k], way[k] = _nearest(points[a], outward[a], ways, points[surface.faces[surface.part == other]])
     kept = depth > 0.0
     return Overlaps(met[kept, 0].astype(np.int32), met[kept, 1].astype(np.int32), depth[kept], way[kept])
@@ -122,13 +122,13 @@ def _shares(nodes: Floats, corners: Floats) -> Floats:
     return np.column_stack([1.0 - tail.sum(axis=1), tail])
 
 
-def _faced(outward: Floats, corners: Floats) -> Flags:
-    """(p, 4) the faces, each across from a corner, of tets (p, 4, 3) that look against the way out (p, 3) of a node.
+def _faced(outward: Floats, inward: Floats) -> Flags:
+    """(p, 4) the faces, by their normals into tets (p, 4, 3), that look against the way out (p, 3) of a node.
 
     Where sides of two bodies lie in one plane, the rim of one that sinks into the other is on a face of it and does not
     rest there.
     """
-    return np.asarray((_inward(corners) * outward[:, None]).sum(axis=2) >= -FACING)
+    return np.asarray((inward * outward[:, None]).sum(axis=2) >= -FACING)
 
 
 def _inward(corners: Floats) -> Floats:
@@ -138,27 +138,22 @@ def _inward(corners: Floats) -> Floats:
     return np.asarray(inward / np.linalg.norm(inward, axis=2)[:, :, None])
 
 
-def _clear(points: Floats, tets: Indices, nodes: Indices, inward: Floats) -> Flags:
-    """(p,) whether no tet at one of ``nodes`` (p,) reaches behind the plane through it with the normal ``inward``
-    (p, 3): then it rests there, whatever the mean of its normals. A corner on the rim of two slanted sides may face
-    neither.
+def _clear(normals: Floats, ways: Floats) -> Flags:
+    """(f,) of planes through a node with these unit ``normals`` (f, 3), whether none of its ``ways`` (w, 3) leads
+    behind them: then it rests there, whatever the mean of its normals. A corner on the rim of two slanted sides may
+    face neither.
     """
-    rows, begin, end = _stars(tets, nodes)
-    pair = np.repeat(np.arange(len(nodes)), end - begin)
-    first = np.repeat(begin - np.cumsum(end - begin) + (end - begin), end - begin)
-    ways = points[tets[rows[first + np.arange(len(pair))]]] - points[nodes[pair], None]
-    behind = (ways * inward[pair, None]).sum(axis=2).max(axis=1)
-    deep = behind > _ROUNDING * np.linalg.norm(ways, axis=2).max(axis=1)
-    return np.asarray(np.bincount(pair, deep, len(nodes)) == 0)
+    return np.asarray((normals @ ways.T).min(axis=1) >= -_ROUNDING * np.linalg.norm(ways, axis=1).max())
 
 
-def _stars(tets: Indices, nodes: Indices) -> tuple[Ints, Ints, Ints]:
-    """Rows of the tets (k, 4) at ``nodes`` (p,), by node, and (p,) where those of each begin and end."""
+def _ways(points: Floats, tets: Indices, nodes: Indices) -> Iterator[Floats]:
+    """For each of the ``nodes`` (p,) the ways (w, 3), m, to the corners of its tets (k, 4)."""
     rows, corner = np.nonzero(np.isin(tets, nodes))
     owner = tets[rows, corner]
     order = np.argsort(owner, kind="stable")
     begin, end = np.searchsorted(owner[order], nodes), np.searchsorted(owner[order], nodes, side="right")
-    return rows[order].astype(np.int64), begin, end
+    for node, first, last in zip(nodes, begin, end, strict=True):
+        yield (points[tets[rows[order[first:last]]]] - points[node]).reshape(-1, 3)
 
 
 def _normals(points: Floats, faces: Indices) -> Floats:
@@ -185,8 +180,7 @@ def _nearest(node: Floats, outward: Floats, ways: Floats, triangles: Floats) -> 
     ee, ff, ef = (e * e).sum(axis=1), (f * f).sum(axis=1), (e * f).sum(axis=1)
     er, fr = (e * r).sum(axis=1), (f * r).sum(axis=1)
     s, t = (ff * er - ef * fr) / area**2, (ee * fr - ef * er) / area**2
-    clear = (normals @ ways.T).min(axis=1) >= -_ROUNDING * np.linalg.norm(ways, axis=1).max()
-    faced = ((normals @ outward <= FACING) | clear) & (heights <= _ROUNDING * np.sqrt(area))
+    faced = ((normals @ outward <= FACING) | _clear(normals, ways)) & (heights <= _ROUNDING * np.sqrt(area))
     over = (np.minimum(np.minimum(s, t), 1.0 - s - t) >= -_INSIDE) & faced
     if not over.any():
         return 0.0, np.zeros(3)
