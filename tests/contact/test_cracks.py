@@ -5,7 +5,7 @@ import pytest
 
 from conoid.worker.contact.cracks import Cracks, computed
 from conoid.worker.contact.families import Families
-from conoid.worker.contact.kin import Family, families, inherited
+from conoid.worker.contact.kin import Family, apart_from_edges, families, inherited
 from conoid.worker.contact.node_face import chain
 from conoid.worker.migration.parcel import joined, once
 from conoid.worker.state import Copies, Nodes
@@ -86,6 +86,21 @@ def test_a_family_tells_where_the_copies_of_a_node_begin_and_end() -> None:
     assert family.member.tolist() == [[6, 0], [7, 1], [8, 1]]
     assert family.most == 2
     assert families(np.zeros((0, 2), np.int32), 2)[2] == 0
+
+
+@pytest.mark.parametrize("second", [(0, 1), (1, 0)])
+@pytest.mark.parametrize("now", [(0, 1), (3, 1), (1, 4), (3, 4)])
+def test_edges_that_had_both_ends_in_common_are_a_pair_once_they_have_none(
+    second: tuple[int, int], now: tuple[int, int]
+) -> None:
+    """Whatever way either runs: it was two pairs where they ran against each other."""
+    family = Family(*families(np.array([[0, 3], [1, 4]], np.int32), 6))
+    old = np.array([[0, 1, 2, 5], [*second, 2, 5]], np.int32)
+    after = np.array([[0, 1, 2, 5], [*now, 2, 5]], np.int32)
+    apart = not {0, 1} & set(now)
+    for own in (True, False):
+        found = apart_from_edges(old, after, family.first, np.array([own, True]))
+        assert found.tolist() == ([[0, 1]] if apart and own else [])
 
 
 @pytest.mark.parametrize("root", [[], [4], [4, 4], [7, 2, 7, 2, 7, 9]])

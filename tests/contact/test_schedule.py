@@ -1,8 +1,10 @@
 """No answer depends on when a search happens, nor on what it takes up besides what meets."""
 
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from conoid.cases.load import apply_overrides, parse_case, read_data
@@ -10,26 +12,34 @@ from conoid.worker import simulation, step
 from conoid.worker.contact import bare, cracks, flight, searches
 from conoid.worker.digest import digest
 from conoid.worker.parallel.comm import Comm, SerialComm
+from conoid.worker.simulation import Simulation
 
 from .ranks import on_ranks
 
 SCENES = Path(__file__).parents[1] / "parallel"
 STEPS = {"breaking": 54, "eroding": 100, "meeting": 120}
+CRUSHED = "../../cases/hard/crush_cohesive"
 
 
-def ran(name: str, comm: Comm, every: int = 0, *changes: str) -> tuple[str | None, int]:
-    """Digest and number of searches of a scene; ``every``: a search at least each so many steps."""
+def stepping(name: str, steps: int, comm: Comm, every: int = 0, *changes: str) -> Iterator[Simulation]:
+    """A scene after each of its first ``steps``; ``every``: a search at least each so many of them."""
     case = parse_case(apply_overrides(read_data(SCENES / f"{name}.toml"), ["run.frames=0", *changes]))
     sim = simulation.build(case, Path(), comm)
     assert sim.contact is not None
     step.prepare(sim)
-    for number in range(STEPS[name]):
+    for number in range(steps):
         sim.contact.searches.due |= every > 0 and number % every == 0
         step.first_half(sim)
         step.second_half(sim)
-    found = digest(sim.model, comm, []), sim.contact.searches.many
+        yield sim
     sim.free()
-    return found
+
+
+def ran(name: str, comm: Comm, every: int = 0, *changes: str) -> tuple[str | None, int]:
+    """Digest and number of searches at the end."""
+    *_, sim = stepping(name, STEPS[name], comm, every, *changes)
+    assert sim.contact is not None
+    return digest(sim.model, comm, []), sim.contact.searches.many
 
 
 @cache
@@ -51,6 +61,22 @@ def test_no_answer_depends_on_how_often_is_searched(name: str) -> None:
         other, more = ran(name, SerialComm(), every)
         assert other == one
         assert more > many
+
+
+def doubled(sim: Simulation) -> int:
+    """How many candidate pairs of a rank stand in their tables more than once."""
+    assert sim.contact is not None
+    scene = sim.contact.searches.scene
+    assert scene is not None
+    every = scene.node_face.rows, np.sort(scene.edge_edge.rows, axis=1)
+    return sum(len(rows) - len(np.unique(rows, axis=0)) for rows in every)
+
+
+@pytest.mark.parametrize("ranks", [1, 3])
+def test_no_pair_stands_twice(ranks: int) -> None:
+    """It would push twice, until a search; edges did that ran against each other between two nodes that separated."""
+    found = on_ranks(ranks, lambda comm: [doubled(sim) for sim in stepping(CRUSHED, 40, comm)])
+    assert found == [[0] * 40] * ranks
 
 
 @pytest.mark.parametrize("foreseen", [0.0, 0.9])

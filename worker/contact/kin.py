@@ -102,6 +102,7 @@ def follow_edges(corners, fresh, sides, first, ids, key, became):  # type: ignor
         e = rows[r]
         fresh[e] = True
         one, two = sides[e, 0] // 4, sides[e, 1] // 4
+        gone[r] = corners[e, 0] == corners[e, 1]
         for k in range(4):
             old[r, k] = corners[e, k]
         for k in range(2):
@@ -193,7 +194,9 @@ def apart_from_edges(old, now, first, own):  # type: ignore[no-untyped-def]
                     common = False
                     for k in range(2):
                         common |= now[one, k] == now[two, 0] or now[one, k] == now[two, 1]
-                    both = old[one, 0] == old[two, 0] and old[one, 1] == old[two, 1]
+                    both = True
+                    for k in range(2):
+                        both &= old[one, k] == old[two, 0] or old[one, k] == old[two, 1]
                     if common or (both and node != old[one, 0]):
                         continue
                     if write:
