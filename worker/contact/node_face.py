@@ -7,8 +7,8 @@ handed over.
 import numpy as np
 
 from ..jit import njit, types
-from .beside import TOUCHING, facing, in_front, outside
-from .geometry import MARGIN, VECTOR, at, beyond, distance, dot, foot, height, minus, off
+from .beside import RIM, TOUCHING, facing, in_front, outside
+from .geometry import VECTOR, at, beyond, distance, dot, foot, height, minus, off
 from .haste import fastest_of, haste
 from .narrow_phase import CONTACT_ROWS, DEEP, DEEP_SELF, FACES, NEAR, PAIRS, SLOTS, STEP, needed
 
@@ -174,9 +174,9 @@ def node_face(out, n, pairs, slots, faces, step, end):  # type: ignore[no-untype
         passes, b = _passes(x, ahead, corners, s, f, now, gap0, gap1, reach * size[f])
         if not passes:
             continue
-        leaves = np.inf if other[s] else strayed[s]
-        edge = min(b[0], b[1], b[2]) <= MARGIN
-        if edge and in_front(pairs, first, faces, step, normals, p, gap1, leaves, end + step.dt):
+        leaves, until_end = np.inf if other[s] else strayed[s], end + step.dt
+        border = min(b[0], b[1], b[2]) <= RIM
+        if border and in_front(pairs, first, faces, step, normals, p, gap0, gap1, leaves, until_end):
             continue
         row = n
         if gap0 < -TOUCHING * size[f]:
@@ -187,7 +187,7 @@ def node_face(out, n, pairs, slots, faces, step, end):  # type: ignore[no-untype
                 same = gap0 == deepest[row] and faces.id[f] < faces.id[rows[pair[row], 1]]
                 if not (gap0 > deepest[row] or same):
                     continue
-            if outside(pairs, first, faces, x, part, p, -gap0, leaves, end + step.dt):
+            if outside(pairs, first, faces, x, part, p, -gap0, leaves, until_end):
                 continue
             if row < 0:
                 row, earlier[n], holder[s] = n, holder[s], n
