@@ -206,7 +206,8 @@ class Run(Model):
     short then. Small along the way of an impact, every rank gets a share of where it happens. The answer does not
     depend on it."""
     frames: Annotated[Count, Field(ge=0, le=100_000)] = 20
-    """Number of frames, evenly spaced to the end; the initial state is frame 0 (0: none are written)."""
+    """Number of frames, evenly spaced to the end; the initial state is frame 0 (0: none are written). A step ends at
+    each, so another number makes other steps: what shatters then breaks otherwise, as by another ``dt_safety``."""
     samples: Annotated[Count, Field(ge=1, le=1_000_000)] = 500
     """Number of lines of history.csv, evenly spaced."""
     snapshots: Annotated[Count, Field(ge=0, le=100_000)] = 100
