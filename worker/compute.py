@@ -30,6 +30,7 @@ from .output import rewind
 from .output.history import History
 from .output.journal import Journal
 from .parallel.comm import Comm
+from .preload import preload
 from .signals import Signals
 from .simulation import Simulation
 from .timers import PHASES, Timers
@@ -46,6 +47,8 @@ def compute(
     With ``restart`` from the latest checkpoint that is there. Raises ConoidError.
     """
     say = journal.starting if journal is not None else quiet
+    if comm.size > 1:
+        preload(case)
     if restart:
         say("reading the latest checkpoint")
         sim, start = _resumed(case, folder, comm)
