@@ -26,6 +26,7 @@ from ..elements.tet4 import (
     NODAL,
     SEEN,
     TRIAL,
+    VOLUME,
     VOLUME_MID,
 )
 from ..jit import njit
@@ -88,7 +89,7 @@ def _pressed(params, ratio, bulking, least):  # type: ignore[no-untyped-def]
 @njit("float64(float64[::1], float64, float64, float64, float64)", cache=True, error_model="numpy")
 def _stored(params, ratio, p, bulking, least):  # type: ignore[no-untyped-def]
     """What the pressure ``p`` of ``_pressed`` stores, of the undeformed volume, Pa: the integral of -p over the ratio
-    from that without pressure on. Beyond that of ``least`` it is constant; under compression a triangle will do.
+    from that without pressure on. Beyond that of ``least`` nothing is added; under compression a triangle will do.
     """
     bulk = params[BULK]
     stiff = bulk - bulking
@@ -96,13 +97,13 @@ def _stored(params, ratio, p, bulking, least):  # type: ignore[no-untyped-def]
     if not ratio > free:
         return 0.5 * p * (free - ratio)
     to = min(ratio, end)
-    return stiff * (to - free) - bulk * log(to / free) - least * (ratio - to)
+    return stiff * (to - free) - bulk * log(to / free)
 
 
 @njit("float64(float64[::1], float64, float64, float64, float64, float64, float64)", cache=True, error_model="numpy")
 def _beyond(params, before, after, old, new, bulking, least):  # type: ignore[no-untyped-def]
     """Of the mean pressure's work between two ratios, what is not stored, of the undeformed volume, Pa: none but where
-    the tension comes to its end in between.
+    the tension comes to its end.
     """
     if (new > least or not after > before) and (old > least or not before > after):
         return 0.0
@@ -110,12 +111,20 @@ def _beyond(params, before, after, old, new, bulking, least):  # type: ignore[no
     return -0.5 * (old + new) * (after - before) - more
 
 
+@njit("float64(float64[::1], float64, float64, float64, float64)", cache=True, error_model="numpy", forceinline=True)
+def _opened(params, before, after, bulking, least):  # type: ignore[no-untyped-def]
+    """By how much a tet whose own ratio goes from ``before`` to ``after`` has opened beyond the end of its tension."""
+    end = params[BULK] / (params[BULK] - bulking + least)
+    return max(after - end, 0.0) - max(before - end, 0.0)
+
+
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def crumbling(w, s, params, n):  # type: ignore[no-untyped-def]
     """The pressure of ``_pressed``; where it is averaged the mean of that at the four nodes, each with the end of its
     own tension, and what it stores is the sum over them (elements/heat_and_bulking.py). Plastic work is also what the
     pressure of n does otherwise than that of the same ratio with the bulking and the damage of now, and what is beyond
-    the tension.
+    the tension. The pressure says no ratio there: it counts how far the tet has opened itself, not what neighbours that
+    have no tension any more have made of their nodes.
     """
     bulk, averaged = params[BULK], len(s) > _UNTOLD
     for i in range(n):
@@ -124,14 +133,22 @@ def crumbling(w, s, params, n):  # type: ignore[no-untyped-def]
         least = -params[_T] * (1.0 - s[_DAMAGE + i])
         if averaged:
             new, stiff, stored, beyond = 0.0, 0.0, 0.0, 0.0
+            whole = s[_MASS + i] / params[DENSITY]
+            own = _opened(
+                params, (w[VOLUME + i] - w[CHANGE + i]) / whole, w[VOLUME + i] / whole, s[_BULKING + i], least
+            )
             for k in range(4):
                 corner, change = s[_CORNERS + k * CHUNK + i], w[CORNER_CHANGE + k * CHUNK + i]
                 p, modulus = _pressed(params, corner, s[_BULKING + i], least)
                 old, _ = _pressed(params, corner - change, s[_BULKING + i], least)
                 new, stiff = new + 0.25 * p, stiff if modulus < stiff else modulus
-                stored += (old + p) * change
-                beyond += 0.25 * _beyond(params, corner - change, corner, old, p, s[_BULKING + i], least)
-            seen = 0.125 * s[_MASS + i] / params[DENSITY] * stored
+                if p > least or old > least:
+                    stored += (old + p) * change
+                    beyond += 0.25 * _beyond(params, corner - change, corner, old, p, s[_BULKING + i], least)
+                else:
+                    stored += 2.0 * least * own
+                    beyond -= 0.25 * least * own
+            seen = 0.125 * whole * stored
             s[_AVERAGED + i] += seen - 0.5 * (w[BEFORE + i] + new) * w[CHANGE_SEEN + i]
         else:
             new, stiff = _pressed(params, ratio, s[_BULKING + i], least)
