@@ -27,8 +27,8 @@ from .parallel.fixed_point import Grouped, add_limbs, exact_sums, exact_totals, 
 from .state import CHUNK, WORKS, Block, Floats, Ints, Model
 
 _TOLD = 0.01
-"""Share of the largest energy that may be missing or that unequal steps may take or make without a word, and of the
-energy of fracture that may come back. Chosen: what the other lines of a ledger are usually read to.
+"""Share of the largest energy that may be missing, that unequal steps may take or make and averaged pressures make,
+without a word, and of the energy of fracture that may come back. Chosen: what the other lines are usually read to.
 """
 
 
@@ -57,6 +57,8 @@ class Ledger:
         far, of the work of the stress and of motion."""
         self.residual = 0.0
         """What does not add up, over the same, at the last call."""
+        self.averaged = 0.0
+        """What averaged pressures have given beyond all that they have taken, over the same, at the last call."""
         self.beyond = 0.0
         """Energy of motion beyond all that has come in, over the same, at the last call: all other lines add up to less
         than nothing."""
@@ -120,6 +122,7 @@ class Ledger:
         left = abs(total - self.initial - external_sum)
         self.residual = left / scale if scale != 0.0 else left
         self.stepping = abs(stepping) / scale if scale != 0.0 else 0.0
+        self.averaged = max(-averaging, 0.0) / scale if scale != 0.0 else 0.0
         self.beyond = max(kinetic_sum - self.initial - external_sum, 0.0) / scale if scale != 0.0 else 0.0
         self.made = max(friction - loss_sum, 0.0) / self.came if self.came > 0.0 else 0.0
         self.worst = max(self.worst, self.residual)
@@ -132,17 +135,18 @@ class Ledger:
     @property
     def warnings(self) -> list[str]:
         """What the user should know of the account, by the last call."""
-        remedy = "a smaller numerics.dt_safety lowers it"
+        step, form = "a smaller numerics.dt_safety lowers it", "with numerics.pressure = 'standard' there is none"
         told = [
-            (self.worst, f"the account of the energy has not closed by up to {self.worst:.2g} of the largest energy"),
-            (self.stepping, f"unequal time steps have taken or made {self.stepping:.2g} of the largest energy"),
+            (self.worst, "the account of the energy has not closed by up to {:.2g} of the largest energy", step),
+            (self.stepping, "unequal time steps have taken or made {:.2g} of the largest energy", step),
+            (self.averaged, "averaged pressures have made {:.2g} of the largest energy", form),
             (
                 self.unpaid,
-                f"facets that closed have given {self.unpaid:.2g} of the energy that all broken facets take, which "
-                "nobody had paid",
+                "facets that closed have given {:.2g} of the energy that all broken facets take, which nobody had paid",
+                step,
             ),
         ]
-        return [f"{text}; {remedy}" for share, text in told if share > _TOLD]
+        return [f"{text.format(share)}; {remedy}" for share, text, remedy in told if share > _TOLD]
 
     def require(self, limit: float, when: str) -> None:
         """Raises EnergyError when the last call has found more than ``limit``, run.residual_limit; ``when``: of it."""
