@@ -16,6 +16,8 @@ _REGULAR = 6.0 * math.sqrt(2.0)
 """Cube of the edge of a regular tet over its volume."""
 _ROUNDING = 1e-9
 """Of a ratio: a strength that is lowered until so many elements fit meets their number to the last bits."""
+_NAMED = 5
+"""Parts that a warning names. Chosen: a line long enough to find them by."""
 
 log = logging.getLogger("conoid.worker")
 
@@ -55,3 +57,17 @@ def warnings(part: Part, tough: Toughness, size: float, safety: float) -> list[s
             f"fracture.resolve = 'strength', or numerics.dt_safety below {safety * tough.critical / opening:.2g}"
         )
     return told
+
+
+def alike(told: list[str]) -> list[str]:
+    """``warnings`` of several parts that say the same as one that names them: of many the first few."""
+    parts: dict[str, list[str]] = {}
+    for line in told:
+        name, _, text = line.partition(": ")
+        parts.setdefault(text, []).append(name)
+    return [f"{_listed(names)}: {text}" for text, names in parts.items()]
+
+
+def _listed(names: list[str]) -> str:
+    more = len(names) - _NAMED
+    return ", ".join(names[:_NAMED]) + (f" and {more} more" if more > 0 else "")

@@ -49,9 +49,7 @@ class Fracture:
     ) -> None:  # fmt: skip
         """``by_node``: besides the elements, what has arrays by node. All ranks take part."""
         self._model, self._elements, self._clock, self._comm = model, elements, clock, comm
-        self.warnings: list[str] = []
-        """What the user should know of the mesh."""
-        bodies, work = self._armed(case)
+        bodies, work, self.warnings = self._armed(case)
         meshes = {body.index: body.mesh for body in bodies}
         self.separation = Separation(model, neighbours, meshes, comm)
         specs = [part.fracture for part in case.parts if part.fracture is not None]
@@ -136,9 +134,10 @@ class Fracture:
         if self.cohesion is not None:
             self._release.free()
 
-    def _armed(self, case: Case) -> tuple[list[Body], float]:
-        """The bodies, and the order of magnitude of the work on a facet, J."""
+    def _armed(self, case: Case) -> tuple[list[Body], float, list[str]]:
+        """The bodies, the order of magnitude of the work on a facet, J, and what the user should know of the mesh."""
         model, bodies, work, safety = self._model, list[Body](), 0.0, case.numerics.dt_safety
+        told: list[str] = []
         for index, part in enumerate(case.parts):
             if part.fracture is None:
                 continue
@@ -147,10 +146,10 @@ class Fracture:
             size = resolution.edge(volume)
             tough = toughness(material, part.fracture, size)
             work = max(work, tough.energy * power(volume, 2.0 / 3.0))
-            self.warnings += resolution.warnings(part, tough, size, safety)
+            told += resolution.warnings(part, tough, size, safety)
             here = [(i, block) for i, block in enumerate(model.blocks) if block.part == index]
             bodies += [facets.arm(i, block, part.fracture, tough, model.nodes.x0) for i, block in here]
-        return bodies, work
+        return bodies, work, resolution.alike(told)
 
     def _break(self, broken: list[Breaking], touched: Ints) -> None:
         split = self.separation.separate(touched)
