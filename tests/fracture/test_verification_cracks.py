@@ -176,7 +176,7 @@ def test_branching_plates_are_no_faster_than_published(plates: list[cracks.Run])
 
 @pytest.mark.slow
 @pytest.mark.timeout(1200)
-@pytest.mark.xfail(strict=False, reason="fourteen of fifteen runs are at the edge after 74.3 +- 1.8 us")
+@pytest.mark.xfail(strict=False, reason="by chance: fourteen of fifteen runs are at the edge after 74.3 +- 1.8 us")
 def test_branching_plates_are_at_the_edge_as_published(plates: list[cracks.Run]) -> None:
     """In the mean after 75 to 80 us, with a deviation of no more than that."""
     edge = np.array([run.crack.passed(run.crack.end - 1.5 * FINE) for run in plates])
