@@ -7,15 +7,14 @@ nowhere: those that functions of the packages name.
 
 import sys
 from collections.abc import Iterator
-from functools import cached_property
-from inspect import isclass, isfunction, ismodule
+from importlib.abc import InspectLoader
+from inspect import ismodule
 from types import CodeType, ModuleType
-from typing import Any
 
 from conoid.cases.schema import Case
 
 from .inheriting import inherit
-from .jit import Kernel
+from .jit import DECLARED, Kernel
 
 _WORKER = __package__ or ""
 
@@ -38,35 +37,20 @@ def preload(case: Case) -> None:
 
 def called(module: ModuleType) -> Iterator[Kernel]:
     """The kernels that functions and methods of a module name, as its own or as those of another module."""
-    for code in _codes(vars(module), module.__name__):
-        names = code.co_names
-        known = [vars(module)[name] for name in names if name in vars(module)]
+    loader = module.__loader__
+    assert isinstance(loader, InspectLoader)
+    whole = loader.get_code(module.__name__)
+    assert whole is not None
+    for code in _functions(whole, {kernel.py_func.__code__ for kernel in DECLARED}):
+        known = [vars(module)[name] for name in code.co_names if name in vars(module)]
         others = [vars(found) for found in known if ismodule(found) and found.__name__.startswith(_WORKER)]
-        known += [other[name] for other in others for name in names if name in other]
+        known += [other[name] for other in others for name in code.co_names if name in other]
         yield from (found for found in known if isinstance(found, Kernel))
 
 
-def _codes(members: dict[str, Any], module: str) -> Iterator[CodeType]:
-    """Of the functions among the ``members`` that the ``module`` defines, of its classes, and what is within."""
-    for member in list(members.values()):
-        member = _function(member)
-        if isclass(member) and member.__module__ == module:
-            yield from _codes(dict(vars(member)), module)
-        elif isfunction(member) and member.__module__ == module:
-            yield from _nested(member.__code__)
-
-
-def _function(member: Any) -> Any:
-    """What a property, a class method or a static one is made of; others as they are."""
-    if isinstance(member, property):
-        return member.fget
-    if isinstance(member, cached_property):
-        return member.func
-    return getattr(member, "__func__", member)
-
-
-def _nested(code: CodeType) -> Iterator[CodeType]:
-    yield code
+def _functions(code: CodeType, kernels: set[CodeType]) -> Iterator[CodeType]:
+    """What is defined within, at any depth, but for ``kernels``, which call others of their own."""
     for constant in code.co_consts:
-        if isinstance(constant, CodeType):
-            yield from _nested(constant)
+        if isinstance(constant, CodeType) and constant not in kernels:
+            yield constant
+            yield from _functions(constant, kernels)

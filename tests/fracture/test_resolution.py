@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from conoid.cases import materials, schema
-from conoid.worker.fracture.resolution import alike, warnings
+from conoid.worker.fracture.resolution import told_once, warnings
 from conoid.worker.fracture.strength import toughness
 
 from ..worker.kernels import DUMMY
@@ -61,10 +61,8 @@ def test_what_is_drawn_apart_opens_by_that_besides() -> None:
     assert opening / step == pytest.approx(64e3 * 0.6e-3 + 60e6 / 14.2e6, rel=0.02)
 
 
-def test_parts_that_are_told_the_same_are_told_once() -> None:
-    bricks = [f"brick{k}: too coarse: refine" for k in range(8)]
-    assert alike(["a: long", *bricks[:2], "b: long", "a: wide"]) == [
-        "a, b: long", "brick0, brick1: too coarse: refine", "a: wide",
-    ]  # fmt: skip
-    assert alike(bricks) == ["brick0, brick1, brick2, brick3, brick4 and 3 more: too coarse: refine"]
-    assert alike([]) == []
+def test_a_line_names_all_parts_that_it_is_told_of_or_the_first_few() -> None:
+    bricks = [f"brick{k}" for k in range(8)]
+    assert told_once({"long": ["a", "b"], "wide": ["a"]}) == ["a, b: long", "a: wide"]
+    assert told_once({"long": bricks}) == ["brick0, brick1, brick2, brick3, brick4 and 3 more: long"]
+    assert told_once({}) == []

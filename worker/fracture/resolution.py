@@ -32,19 +32,19 @@ def warnings(part: Part, tough: Toughness, size: float, safety: float) -> list[s
 
     A facet opens as its stress is released, and as what it holds together is drawn apart at the start.
     """
-    name, spec = part.name, part.fracture
+    spec = part.fracture
     assert spec is not None
     step = safety * _STEP * size / tough.speed
     ratio, told = size / tough.zone, []
     log.info(
         "%s breaks at %.4g MPa with %.4g J/m^2: cohesive zone %.3g mm, elements %.3g mm, %.3g to 1",
-        name, tough.strength * 1e-6, tough.energy, tough.zone * 1e3, size * 1e3, ratio,
+        part.name, tough.strength * 1e-6, tough.energy, tough.zone * 1e3, size * 1e3, ratio,
     )  # fmt: skip
     if ratio > _RESOLVED * (1.0 + _ROUNDING):
         lower = "fracture.resolve = 'strength' keeps it and lowers the strength"
         more = f"fracture.resolution = {1.0 / _RESOLVED:.0f} keeps it and lowers the strength further"
         told.append(
-            f"{name}: elements of {size * 1e3:.3g} mm in a cohesive zone of {tough.zone * 1e3:.3g} mm, "
+            f"elements of {size * 1e3:.3g} mm in a cohesive zone of {tough.zone * 1e3:.3g} mm, "
             f"{ratio:.3g} to 1, resolved below {_RESOLVED:.2g}: the mesh decides on the energy of fracture; "
             f"{more if spec.resolve == 'strength' else lower}"
         )
@@ -52,20 +52,16 @@ def warnings(part: Part, tough: Toughness, size: float, safety: float) -> list[s
     opening = (tough.strength / tough.impedance + drawn * size) * step
     if spec.model == "cohesive" and opening > tough.critical:
         told.append(
-            f"{name}: a facet opens by {opening * 1e6:.3g} um in a step of {step * 1e9:.3g} ns, and by "
+            f"a facet opens by {opening * 1e6:.3g} um in a step of {step * 1e9:.3g} ns, and by "
             f"{tough.critical * 1e6:.3g} um altogether: no law can be followed; use fracture.model = 'instant', "
             f"fracture.resolve = 'strength', or numerics.dt_safety below {safety * tough.critical / opening:.2g}"
         )
     return told
 
 
-def alike(told: list[str]) -> list[str]:
-    """``warnings`` of several parts that say the same as one that names them: of many the first few."""
-    parts: dict[str, list[str]] = {}
-    for line in told:
-        name, _, text = line.partition(": ")
-        parts.setdefault(text, []).append(name)
-    return [f"{_listed(names)}: {text}" for text, names in parts.items()]
+def told_once(told: dict[str, list[str]]) -> list[str]:
+    """A line for each of the ``warnings``, with the parts that it is told of: of many the first few."""
+    return [f"{_listed(names)}: {text}" for text, names in told.items()]
 
 
 def _listed(names: list[str]) -> str:

@@ -137,7 +137,7 @@ class Fracture:
     def _armed(self, case: Case) -> tuple[list[Body], float, list[str]]:
         """The bodies, the order of magnitude of the work on a facet, J, and what the user should know of the mesh."""
         model, bodies, work, safety = self._model, list[Body](), 0.0, case.numerics.dt_safety
-        told: list[str] = []
+        told: dict[str, list[str]] = {}
         for index, part in enumerate(case.parts):
             if part.fracture is None:
                 continue
@@ -146,10 +146,11 @@ class Fracture:
             size = resolution.edge(volume)
             tough = toughness(material, part.fracture, size)
             work = max(work, tough.energy * power(volume, 2.0 / 3.0))
-            told += resolution.warnings(part, tough, size, safety)
+            for text in resolution.warnings(part, tough, size, safety):
+                told.setdefault(text, []).append(part.name)
             here = [(i, block) for i, block in enumerate(model.blocks) if block.part == index]
             bodies += [facets.arm(i, block, part.fracture, tough, model.nodes.x0) for i, block in here]
-        return bodies, work, resolution.alike(told)
+        return bodies, work, resolution.told_once(told)
 
     def _break(self, broken: list[Breaking], touched: Ints) -> None:
         split = self.separation.separate(touched)
