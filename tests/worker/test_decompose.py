@@ -135,8 +135,8 @@ def test_of_cuts_as_even_the_smaller_one_is_made() -> None:
 
 
 def test_even_phases_do_not_depend_on_who_holds_the_points() -> None:
-    points, weights = nosed(2000, 0.3)
-    ids, holder = np.arange(2000), np.random.default_rng(14).integers(0, 3, 2000)
+    points, weights = nosed(12_000, 0.3)
+    ids, holder = np.arange(12_000), np.random.default_rng(14).integers(0, 3, 12_000)
     one, cuts = decompose.bisect(points, ids, weights, 7, SerialComm())
 
     def share(comm: ThreadComm) -> tuple[Indices, list[decompose.Cut]]:
