@@ -11,6 +11,7 @@ import numpy as np
 from ..jit import njit
 from ..parallel.comm import Comm
 from ..state import Flags, Floats
+from .buckets import bucket_at
 from .search import Boxes
 
 _NONE = np.zeros(0, np.int64)
@@ -23,21 +24,28 @@ def choose(kind: str, askers: Boxes, things: list[Boxes], edge: float, comm: Com
     """
     mine = np.concatenate([askers.hull, np.minimum.reduce([t.hull for t in things])])
     hulls = comm.join(mine.view(np.int64)).view(np.float64).reshape(comm.size, 2, 6)
-    near = {
-        rank: [t.touching(asker) for t in things] for rank, (asker, _) in enumerate(hulls) if rank != comm.rank
-    }  # fmt: skip
+    asks, offers = hulls[:, 0], hulls[:, 1]
+    near = {rank: [t.touching(asks[rank]) for t in things] for rank in _touching(offers[comm.rank], asks, comm)}
     if kind == "arbitrary":
-        near = _in_cells(near, askers, things, [offer for _, offer in hulls], edge, comm)
+        asked = {rank: askers.touching(offers[rank]) for rank in _touching(asks[comm.rank], offers, comm)}
+        near = _in_cells(near, askers, asked, things, edge, comm)
     return {rank: flags for rank, flags in near.items() if any(f.any() for f in flags)}
 
 
+def _touching(hull: Floats, hulls: Floats, comm: Comm) -> list[int]:
+    """The other ranks whose ``hulls`` (ranks, 6) touch this one."""
+    touch = np.all((hulls[:, :3] <= -hull[3:]) & (-hulls[:, 3:] >= hull[:3]), axis=1)
+    touch[comm.rank] = False
+    found: list[int] = np.flatnonzero(touch).tolist()
+    return found
+
+
 def _in_cells(
-    near: dict[int, list[Flags]], askers: Boxes, things: list[Boxes], offers: list[Floats], edge: float, comm: Comm
+    near: dict[int, list[Flags]], askers: Boxes, asked: dict[int, Flags], things: list[Boxes], edge: float, comm: Comm
 ) -> dict[int, list[Flags]]:
-    """Keeps what touches a cell that the other rank has named."""
-    asked = {rank: askers.touching(offers[rank]) for rank in near}
+    """Keeps what touches a cell that the other rank has named; ``asked``: which boxes ask which rank."""
     cells = comm.swap({
-        rank: np.unique(_cells(askers.low, askers.high, some, edge)) for rank, some in asked.items() if some.any()
+        rank: np.sort(_cells(askers.low, askers.high, some, edge)) for rank, some in asked.items() if some.any()
     })  # fmt: skip
     return {
         rank: [_named(flag, thing.low, thing.high, cells.get(rank, _NONE), edge)
@@ -62,15 +70,9 @@ def _code(ix, iy, iz):  # type: ignore[no-untyped-def]
 
 @njit("int64[::1](float64[:, ::1], float64[:, ::1], boolean[::1], float64)", cache=True)
 def _cells(low, high, some, edge):  # type: ignore[no-untyped-def]
-    """The code of every cell that each of ``some`` boxes touches; one box after the other, so many stand twice."""
-    many, before = 0, 0
-    for j in range(len(low)):
-        if some[j]:
-            cells = 1
-            for i in range(3):
-                cells *= _cell(high[j, i], edge) - _cell(low[j, i], edge) + 1
-            many += cells
-    codes, n = np.empty(many, np.int64), 0
+    """The code of every cell that ``some`` of the boxes touch, each once."""
+    bits, n = 6, 0
+    codes, used, found = np.empty(1 << bits, np.int64), np.zeros(1 << bits, np.bool_), np.empty(1 << bits, np.int64)
     for j in range(len(low)):
         if not some[j]:
             continue
@@ -78,10 +80,28 @@ def _cells(low, high, some, edge):  # type: ignore[no-untyped-def]
             for iy in range(_cell(low[j, 1], edge), _cell(high[j, 1], edge) + 1):
                 for iz in range(_cell(low[j, 2], edge), _cell(high[j, 2], edge) + 1):
                     code = _code(ix, iy, iz)
-                    if n == 0 or code != before:
-                        codes[n], before = code, code
-                        n += 1
-    return codes[:n].copy()
+                    at = _place(codes, used, code, bits)
+                    if used[at]:
+                        continue
+                    codes[at], used[at], found[n] = code, True, code
+                    n += 1
+                    if 2 * n > len(codes):
+                        bits += 1
+                        codes, used = np.empty(1 << bits, np.int64), np.zeros(1 << bits, np.bool_)
+                        found = np.concatenate((found, np.empty(len(found), np.int64)))
+                        for k in range(n):
+                            at = _place(codes, used, found[k], bits)
+                            codes[at], used[at] = found[k], True
+    return found[:n].copy()
+
+
+@njit("int64(int64[::1], boolean[::1], int64, int64)", cache=True)
+def _place(codes, used, code, bits):  # type: ignore[no-untyped-def]
+    """Where a code stands in a table of 2^bits places, or would: its hash, or the next place behind it that is free."""
+    at = bucket_at(code, bits)
+    while used[at] and codes[at] != code:
+        at = (at + 1) % len(codes)
+    return at
 
 
 @njit("boolean[::1](boolean[::1], float64[:, ::1], float64[:, ::1], int64[::1], float64)", cache=True)

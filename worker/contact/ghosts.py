@@ -6,9 +6,9 @@ import numpy as np
 
 from ..jit import njit
 from ..parallel.comm import Comm
-from ..parallel.ownership import Neighbour
+from ..parallel.ownership import Neighbour, ranks
 from ..parallel.tags import Tag
-from ..state import Floats, Indices, Ints, Nodes
+from ..state import Flags, Floats, Indices, Ints, Nodes
 from .records import Crowd, Edges, Faces
 
 _CROWD_WORDS = 15
@@ -57,7 +57,7 @@ def unpack_crowd(words: Ints) -> Crowd:
 
 def fetch(ids: Ints, owners: Indices, held: Crowd, comm: Comm) -> Crowd:
     """Copies of nodes (ids, owners) that this rank does not hold; all ranks take part. ``held``: every own node."""
-    asked = comm.swap({rank: ids[owners == rank] for rank in _ranks(owners)})
+    asked = comm.swap({rank: ids[owners == rank] for rank in ranks(owners)})
     answers = comm.swap({rank: pack_crowd(held.take(held.places(want))) for rank, want in asked.items()})
     return unpack_crowd(np.concatenate([np.zeros(0, np.int64), *answers.values()]))
 
@@ -70,26 +70,28 @@ def members(used: Ints, owners: Indices, holders: list[Neighbour], nodes: Nodes,
     """
     pushed, rows = np.zeros(nodes.n, bool), [used[:0]]
     pushed[nodes.places(used[owners == comm.rank])] = True
-    asked = {rank: used[owners == rank] for rank in _ranks(owners) if rank != comm.rank}
+    asked = {rank: used[owners == rank] for rank in ranks(owners) if rank != comm.rank}
     for rank, ids in comm.swap(asked).items():
         pushed[nodes.places(ids)] = True
         rows.append(_rows(ids, rank, comm))
     for other in holders:
         some = other.nodes[pushed[other.nodes] & nodes.owned[other.nodes]]
         rows.append(_rows(nodes.id[some], other.rank, comm))
-    table = np.unique(np.concatenate(rows))
-    table = np.unique(np.concatenate([table, _rows(np.unique(table // comm.size), comm.rank, comm)]))
-    table = np.column_stack([table // comm.size, table % comm.size])
-    told = comm.swap({int(rank): _company(table, int(rank)) for rank in np.unique(table[:, 1])})
+    table = np.sort(np.concatenate(rows))
+    table = table[_begins(table)]
+    every = table // comm.size
+    table = np.sort(np.concatenate([table, _rows(every[_begins(every)], comm.rank, comm)]))
+    node, holder = table // comm.size, table % comm.size
+    group = np.cumsum(_begins(node)) - 1
+    told = comm.swap({member: _company(node, holder, group, member) for member in ranks(holder)})
     pairs = np.concatenate([np.zeros((0, 2), np.int64), *(words.reshape(-1, 2) for words in told.values())])
     pairs = pairs[np.lexsort((pairs[:, 0], pairs[:, 1]))]
-    return {int(rank): pairs[pairs[:, 1] == rank, 0] for rank in np.unique(pairs[:, 1]) if rank != comm.rank}
+    return {other: pairs[pairs[:, 1] == other, 0] for other in ranks(pairs[:, 1]) if other != comm.rank}
 
 
-def _ranks(owners: Indices) -> list[int]:
-    """Those that own something, ascending."""
-    found: list[int] = np.flatnonzero(np.bincount(owners)).tolist()
-    return found
+def _begins(values: Ints) -> Flags:
+    """(n,) which of the ascending values is the first of its kind."""
+    return np.concatenate([np.ones(min(len(values), 1), bool), values[1:] != values[:-1]])
 
 
 def _rows(ids: Ints, rank: int, comm: Comm) -> Ints:
@@ -97,11 +99,14 @@ def _rows(ids: Ints, rank: int, comm: Comm) -> Ints:
     return ids * comm.size + rank
 
 
-def _company(table: Ints, rank: int) -> Ints:
-    """Rows (node, rank) of the nodes that ``rank`` is a member of, its own rows left out."""
-    mine = table[table[:, 1] == rank, 0]
-    company: Ints = table[np.isin(table[:, 0], mine) & (table[:, 1] != rank)]
-    return company
+def _company(node: Ints, holder: Ints, group: Ints, member: int) -> Ints:
+    """Rows (node, holder) of the nodes that ``member`` is a member of, its own rows left out; ``group`` (n,): rows of
+    one node.
+    """
+    held = np.zeros(group[-1] + 1, bool)
+    held[group[holder == member]] = True
+    some = held[group] & (holder != member)
+    return np.column_stack([node[some], holder[some]])
 
 
 class Copies:
@@ -189,7 +194,7 @@ def copies(crowd: Crowd, nodes: Nodes, comm: Comm, tag: Tag) -> Copies:
     """
     far = np.flatnonzero(crowd.local < 0)
     owners = crowd.owner[far]
-    asked = comm.swap({rank: crowd.id[far[owners == rank]] for rank in _ranks(owners)})
-    receives = [Neighbour(rank, far[owners == rank].astype(np.int32)) for rank in _ranks(owners)]
+    asked = comm.swap({rank: crowd.id[far[owners == rank]] for rank in ranks(owners)})
+    receives = [Neighbour(rank, far[owners == rank].astype(np.int32)) for rank in ranks(owners)]
     sends = [Neighbour(rank, np.searchsorted(nodes.id, ids).astype(np.int32)) for rank, ids in asked.items()]
     return Copies(sends, receives, comm, tag)

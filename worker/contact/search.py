@@ -46,13 +46,20 @@ class Boxes:
     @property
     def hull(self) -> Floats:
         """(6,) lowest corner and minus the highest of them all; infinities when there is none."""
-        if not len(self.low):
-            return np.full(6, np.inf)
-        return np.concatenate([self.low.min(axis=0), -self.high.max(axis=0)])
+        return np.asarray(_hull(self.low, self.high))
 
     def touching(self, hull: Floats) -> Flags:
         """(n,) which boxes touch a hull."""
         return np.asarray(_in_hull(self.low, self.high, hull))
+
+
+@njit("float64[::1](float64[:, ::1], float64[:, ::1])", cache=True)
+def _hull(low, high):  # type: ignore[no-untyped-def]
+    found = np.full(6, np.inf)
+    for j in range(len(low)):
+        for i in range(3):
+            found[i], found[3 + i] = min(found[i], low[j, i]), min(found[3 + i], -high[j, i])
+    return found
 
 
 @njit("boolean[::1](float64[:, ::1], float64[:, ::1], float64[::1])", cache=True)

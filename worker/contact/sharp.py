@@ -10,9 +10,10 @@ import math
 
 import numpy as np
 
+from ..ids import among
 from ..jit import njit
 from ..parallel.comm import Comm
-from ..parallel.ownership import Neighbour
+from ..parallel.ownership import Neighbour, ranks
 from ..state import Bits, Flags, Floats, Indices, Ints, Model
 from ..turning import sine_and_cosine
 from .geometry import at, cross, dot, minus
@@ -69,7 +70,7 @@ def find(
     far_opened = rows[:, 9:11].astype(np.uint8)
     edges = Edges.joined([edges, Edges(rows[:, :4], rows[:, 6:8], floats, far_opened, rows[:, 11] > 0)])
     ends, owners = rows[:, 2:4].reshape(-1), rows[:, 4:6].reshape(-1)
-    absent = ~np.isin(ends, model.nodes.id)
+    absent = ~among(model.nodes.id, ends)
     far, first = np.unique(ends[absent], return_index=True)
     return edges.take(np.lexsort((edges.sides[:, 1], edges.sides[:, 0]))), far, owners[absent][first].astype(np.int32)
 
@@ -92,11 +93,11 @@ def _elsewhere(
     floats = np.column_stack([np.linalg.norm(nodes.x0[b] - nodes.x0[a], axis=1), units[f]]).view(np.int64)
     known = nodes.id[a], nodes.id[b], nodes.id[c], nodes.owner[c], faces.id[f], opened[f]
     halves, home = np.column_stack([*known, floats]), nodes.owner[np.minimum(a, b)]
-    found = comm.swap({int(rank): halves[home == rank] for rank in np.unique(home)})
+    found = comm.swap({rank: halves[home == rank] for rank in ranks(home)})
     gathered = np.concatenate([halves[:0], *(words.reshape(-1, _HALF) for words in found.values())])
     sender = np.repeat(np.array(list(found), np.int64), [len(words) // _HALF for words in found.values()])
     rows, target = _matched(gathered, sender)
-    back = comm.swap({int(rank): rows[target == rank] for rank in np.unique(target)})
+    back = comm.swap({rank: rows[target == rank] for rank in ranks(target)})
     return np.concatenate([rows[:0], *(words.reshape(-1, _ROW) for words in back.values())])
 
 

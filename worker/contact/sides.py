@@ -65,19 +65,19 @@ class Sides:
 
 def with_ghosts(sides: Sides, rules: Rules, horizon: float, drift: Floats, comm: Comm) -> Sides:
     """The sides with what other ranks' surfaces have near this one's, own edges first."""
-    crowd = sides.crowd
     nodes, faces, edges = sides.boxes(horizon, drift, 0.5 * rules.halo)
     askers = Boxes(np.concatenate([nodes.low, edges.low]), np.concatenate([nodes.high, edges.high]))
     chosen = domain.choose(rules.domain, askers, [faces, edges], rules.cell, comm)
-    parcels = {rank: (sides.faces.take(flags[0]), sides.edges.take(flags[1])) for rank, flags in chosen.items()}
-    got = comm.swap({rank: ghosts.pack(f, e, _nodes_of(f, e, crowd)) for rank, (f, e) in parcels.items()})
+    got = comm.swap({rank: ghosts.pack(*_some_of(sides, *flags)) for rank, flags in chosen.items()})
     others = [ghosts.unpack(words) for words in got.values()]
     return _joined(sides, others)
 
 
-def _nodes_of(faces: Faces, edges: Edges, crowd: Crowd) -> Crowd:
-    ids = np.unique(np.concatenate([faces.nodes.reshape(-1), edges.nodes.reshape(-1)]))
-    return crowd.take(crowd.places(ids))
+def _some_of(sides: Sides, faces: Flags, edges: Flags) -> tuple[Faces, Edges, Crowd]:
+    """Some of the faces and of the edges, and the nodes of these."""
+    nodes = np.zeros(sides.crowd.n, bool)
+    nodes[sides.face_places[faces]] = nodes[sides.edge_places[edges]] = True
+    return sides.faces.take(faces), sides.edges.take(edges), sides.crowd.take(nodes)
 
 
 def _joined(sides: Sides, others: list[tuple[Faces, Edges, Crowd]]) -> Sides:

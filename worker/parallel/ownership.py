@@ -27,6 +27,12 @@ def same(some: list[Neighbour], others: list[Neighbour]) -> bool:
     return len(some) == len(others) and all(a.nodes is b.nodes for a, b in zip(some, others, strict=True))
 
 
+def ranks(owners: Indices | Ints) -> list[int]:
+    """Those that own something, ascending."""
+    found: list[int] = np.flatnonzero(np.bincount(owners)).tolist()
+    return found
+
+
 @njit("void(int64[:, ::1], int32[::1], int64[:, ::1])", cache=True)
 def _pack(buffer, nodes, sums):  # type: ignore[no-untyped-def]
     for i in range(len(nodes)):
