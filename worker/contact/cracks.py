@@ -27,8 +27,9 @@ searches in the first 500 steps of the glass bar are called by cracks that open 
 """
 _FORESEEN = 0.5
 """Of that width: the faces of a crack as wide as this are searched, so that they have their pairs when it opens."""
-AGE, _YOUNG = 16, 0.1
-"""Steps between two in which cracks may come of age, and the share of young ones from which on they do."""
+AGE, _YOUNG = 16, 0.3
+"""Steps between two in which cracks may come of age, and the share of young ones from which on they do
+(docs/numerics.md, "Edges at cracks")."""
 _KEPT = 12
 """Columns of what a crack has kept."""
 _AHEAD = 8
