@@ -23,7 +23,17 @@ from .errors import EnergyError
 from .fracture.stage import Fracture
 from .jit import njit
 from .parallel.comm import Comm
-from .parallel.fixed_point import Grouped, add_limbs, exact_sums, exact_totals, larger
+from .parallel.fixed_point import (
+    Columns,
+    Grouped,
+    Table,
+    Tally,
+    exact_sums,
+    limbs,
+    magnitude,
+    most,
+    totals_and_words,
+)
 from .state import CHUNK, WORKS, Block, Floats, Ints, Model
 
 _TOLD = 0.01
@@ -43,7 +53,7 @@ class Ledger:
         self._boundaries = boundaries
         self._contact = contact
         self._erosion = erosion
-        self._fracture = fracture
+        self._cohesion = fracture.cohesion if fracture is not None else None
         self._comm = comm
         self._clock = clock
         nodes = model.nodes
@@ -90,18 +100,10 @@ class Ledger:
 
     def close(self, before: Floats) -> Energy:
         """The ledger at time n; ``before`` is v(n-1/2), the model holds v(n+1/2)."""
-        nodes = self._model.nodes
-        loss, external = self._boundary_work()
-        shorter = self._clock.shorter / nodes.scale
-        columns = _of_nodes(
-            before, nodes.v, nodes.force, shorter, nodes.stepping, nodes.mass, loss, external, nodes.owned
-        )
-        parts = len(self._model.parts)
-        of_nodes = Grouped(columns, nodes.part[nodes.owned], parts)
-        sums, of_parts = exact_totals(self._comm, of_nodes, ElementWork(self._model.blocks, parts))
-        node_sums, (work, viscous, plastic, averaged) = sums[:7], sums[7:]
+        sums, of_parts, told = self._added_up(before)
+        node_sums, (work, viscous, plastic, averaged) = sums[:7], sums[7:11]
         self.parts = _named(self._model.parts, of_parts[:, 0], of_parts[:, 7] + of_parts[:, 8])
-        gone, gone_kinetic, gone_momentum = self._gone()
+        gone, gone_kinetic, gone_momentum = self._gone(told)
         gone_work, gone_viscous, gone_plastic, gone_averaged = gone.tolist()
         self.momentum = node_sums[3:6] + gone_momentum
         self.lost = float(node_sums[1]) / self.initial if self.initial > 0.0 else 0.0
@@ -110,13 +112,13 @@ class Ledger:
         plastic_sum, viscous_sum = float(plastic) + gone_plastic, float(viscous) + gone_viscous
         elastic, averaging = float(work - plastic - averaged), float(averaged) + gone_averaged
         lost, cohesive = 0.0, 0.0
-        if self._fracture is not None and self._fracture.cohesion is not None:
-            lost, cohesive, whole = self._fracture.cohesion.energies(self._comm)
+        if self._cohesion is not None:
+            lost, cohesive, whole = self._cohesion.told(told["open"], told["facets"])
             self._taken = max(self._taken, lost)
             self.unpaid = max(self.unpaid, (self._taken - lost) / whole if whole > 0.0 else 0.0)
         inside = elastic + plastic_sum + viscous_sum + averaging
         total = kinetic_sum + inside + loss_sum + eroded + lost + cohesive + stepping
-        friction = self._friction_work()
+        friction = self._friction_work(told)
         self.came = max(self.came, abs(external_sum))
         scale = max(self.came, abs(float(work)), kinetic_sum)
         left = abs(total - self.initial - external_sum)
@@ -162,23 +164,60 @@ class Ledger:
     def _node_sum(self, values: Floats) -> float:
         return float(exact_sums(self._comm, values[self._model.nodes.owned][:, None])[0])
 
-    def _gone(self) -> tuple[Floats, float, Floats]:
+    def _added_up(self, before: Floats) -> tuple[Floats, Floats, dict[str, Floats]]:
+        """All that is added up over the ranks, at once: the sums of ``_of_nodes`` and of WORKS, those of each part, and
+        by their names those of friction on boundaries, of ``open`` facets and of what has been booked so far.
+        """
+        nodes, parts = self._model.nodes, len(self._model.parts)
+        columns = np.empty((7, nodes.n))
+        _of_nodes(
+            columns, before, nodes.v, nodes.force, self._clock.shorter / nodes.scale, nodes.stepping, nodes.mass,
+            *self._boundary_work(), nodes.owned,
+        )  # fmt: skip
+        tables: list[Columns] = [
+            Grouped(columns.T, nodes.part, parts), ElementWork(self._model.blocks, parts), *self._rubbed(parts)
+        ]  # fmt: skip
+        rubbed = len(tables) - 2
+        if self._cohesion is not None:
+            tables.append(Table(self._cohesion.columns(), parts))
+        tallies = self._tallies()
+        words = np.concatenate([np.zeros(0, np.int64), *(tally.words.reshape(-1) for tally in tallies.values())])
+        sums, of_parts, words = totals_and_words(self._comm, tables, words)
+        told = {"boundaries": sums[11 : 11 + rubbed], "open": sums[11 + rubbed :]}
+        for name, tally in tallies.items():
+            told[name] = tally.valued(words[: tally.words.size].reshape(2, -1))
+            words = words[tally.words.size :]
+        return sums, of_parts, told
+
+    def _tallies(self) -> dict[str, Tally]:
+        """What has been added up through the run."""
+        found = {}
+        if self._contact is not None:
+            found["friction"] = self._contact.books.friction
+        if self._erosion is not None:
+            found |= {"tets": self._erosion.work, "nodes": self._erosion.nodal}
+        if self._cohesion is not None:
+            found["facets"] = self._cohesion.gone
+        return found
+
+    def _rubbed(self, parts: int) -> list[Table]:
+        """(n, 1) what friction on each boundary has taken, J."""
+        owned = self._model.nodes.owned
+        pairs = [(each.nodes, each.friction_loss) for each in self._boundaries if each.friction_loss is not None]
+        return [Table(np.where(owned[nodes], loss, 0.0)[:, None], parts) for nodes, loss in pairs]
+
+    def _gone(self, told: dict[str, Floats]) -> tuple[Floats, float, Floats]:
         """(4,) WORKS of eroded tets, J; energy, J, and momentum, kg m/s, of eroded nodes."""
         if self._erosion is None:
             return np.zeros(len(WORKS)), 0.0, np.zeros(3)
-        kinetic, mass, *momentum = self._erosion.nodal()
+        kinetic, mass, *momentum = told["nodes"]
         self.eroded_mass = float(mass)
-        return self._erosion.work(), float(kinetic), np.array(momentum)
+        return told["tets"], float(kinetic), np.array(momentum)
 
-    def _friction_work(self) -> float:
+    def _friction_work(self, told: dict[str, Floats]) -> float:
         """Energy, J, that friction has taken, of contact and of boundaries."""
-        work = self._contact.friction_work() if self._contact is not None else 0.0
-        for boundary in self._boundaries:
-            if boundary.friction_loss is not None:
-                loss = np.zeros(self._model.nodes.n)
-                loss[boundary.nodes] = boundary.friction_loss
-                work += self._node_sum(loss)
-        return work
+        work = self._contact.books.heat(told["friction"]) if self._contact is not None else 0.0
+        return sum(told["boundaries"].tolist(), work)
 
     def _boundary_work(self) -> tuple[Floats, Floats]:
         """(nodes,) energy lost by impacts, and work from outside, J."""
@@ -186,8 +225,7 @@ class Ledger:
         loss = np.zeros(n) if contact is None else contact.books.contact_loss.copy()
         external = np.zeros(n)
         for boundary in self._boundaries:
-            np.add.at(loss, boundary.nodes, boundary.contact_loss)
-            np.add.at(external, boundary.nodes, boundary.external_work)
+            _add(loss, external, boundary.nodes, boundary.contact_loss, boundary.external_work)
         if contact is not None:
             external += contact.books.external_work
         return loss, external
@@ -206,51 +244,65 @@ class ElementWork:
         self._blocks, self._parts = blocks, parts
 
     def largest(self) -> Floats:
-        return self._visited(np.zeros(0))[0]
+        found = np.zeros(len(WORKS))
+        for block in self._blocks:
+            _largest_work(found, block.state, block.n)
+        return found
 
     def limbs(self, scale: Floats) -> Ints:
-        return self._visited(scale)[1]
-
-    def _visited(self, scale: Floats) -> tuple[Floats, Ints]:
-        largest, words = np.zeros(len(WORKS)), np.zeros((self._parts, 2 * len(WORKS)), np.int64)
+        words = np.zeros((self._parts, 2, len(WORKS)), np.int64)
         for block in self._blocks:
-            _visit_work(largest, words[block.part], block.state, block.n, scale)
-        return largest, words
+            _limbs_of_work(words[block.part], block.state, block.n, scale)
+        return words
 
 
-@njit("void(float64[::1], int64[::1], float64[:, :, ::1], int64, float64[::1])", cache=True)
-def _visit_work(largest, words, state, n, scale):  # type: ignore[no-untyped-def]
-    """Raises the ``largest`` (4,) magnitudes; adds to the limbs ``words`` (8,) where ``scale`` (4,) is given."""
+@njit("void(float64[::1], float64[:, :, ::1], int64)", cache=True, error_model="numpy")
+def _largest_work(largest, state, n):  # type: ignore[no-untyped-def]
+    """Raises the ``largest`` (4,) magnitudes of WORKS of the ``n`` tets."""
     for j in range(len(WORKS)):
-        row = WORKS[j]
-        if row >= state.shape[1]:
-            continue
-        for c in range(state.shape[0]):
-            for i in range(min(CHUNK, n - c * CHUNK)):
-                largest[j] = larger(largest[j], state[c, row, i])
-                if len(scale) > 0:
-                    add_limbs(words, j, state[c, row, i], scale[j])
+        found = 0
+        for c in range((n + CHUNK - 1) // CHUNK if WORKS[j] < state.shape[1] else 0):
+            found = max(found, most(state[c, WORKS[j], : min(CHUNK, n - c * CHUNK)]))
+        largest[j] = max(largest[j], magnitude(found))
+
+
+@njit("void(int64[:, ::1], float64[:, :, ::1], int64, float64[::1])", cache=True, error_model="numpy")
+def _limbs_of_work(words, state, n, scale):  # type: ignore[no-untyped-def]
+    """Adds the limbs of WORKS of the ``n`` tets to ``words`` (2, 4)."""
+    for j in range(len(WORKS)):
+        for c in range((n + CHUNK - 1) // CHUNK if WORKS[j] < state.shape[1] else 0):
+            high, low = limbs(state[c, WORKS[j], : min(CHUNK, n - c * CHUNK)], scale[j])
+            words[0, j] += high
+            words[1, j] += low
+
+
+@njit("void(float64[::1], float64[::1], int32[::1], float64[::1], float64[::1])", cache=True)
+def _add(loss, external, nodes, lost, worked):  # type: ignore[no-untyped-def]
+    """Adds what a boundary has booked of its ``nodes`` (n,) to two columns of all nodes."""
+    for i in range(len(nodes)):
+        loss[nodes[i]] += lost[i]
+        external[nodes[i]] += worked[i]
 
 
 @njit(
-    "float64[:, ::1](float64[:, ::1], float64[:, ::1], int64[:, ::1], float64, float64[::1], float64[::1], "
+    "void(float64[:, ::1], float64[:, ::1], float64[:, ::1], int64[:, ::1], float64, float64[::1], float64[::1], "
     "float64[::1], float64[::1], boolean[::1])",
     cache=True,
+    error_model="numpy",
 )
-def _of_nodes(before, v, force, shorter, stepping, mass, loss, external, owned):  # type: ignore[no-untyped-def]
-    """(owned nodes, 7) kinetic energy, J, energy lost by impacts and work from outside, J, momentum, kg m/s, and what
-    unequal steps have taken, J: that ``kick`` has booked the half of this one already is kinetic energy until n.
+def _of_nodes(out, before, v, force, shorter, stepping, mass, loss, external, owned):  # type: ignore[no-untyped-def]
+    """Sets ``out`` (7, nodes): kinetic energy, J, energy lost by impacts and work from outside, J, momentum, kg m/s, and
+    what unequal steps have taken, J: that ``kick`` has booked the half of this one already is kinetic energy until n.
+    Nothing of nodes that are not ``owned``.
     """
-    out, m = np.empty((len(owned), 7)), 0
-    for a in range(len(owned)):
-        if not owned[a]:
-            continue
-        squares, power = 0.0, 0.0
-        for i in range(3):
-            squares += before[a, i] * v[a, i]
-            power += before[a, i] * force[a, i]
-            out[m, 3 + i] = 0.5 * mass[a] * (before[a, i] + v[a, i])
-        out[m, 0], out[m, 6] = 0.5 * mass[a] * squares + shorter * power, stepping[a] - shorter * power
-        out[m, 1], out[m, 2] = loss[a], external[a]
-        m += 1
-    return out[:m]
+    for a in range(out.shape[1]):
+        half, mine = 0.5 * mass[a], owned[a]
+        x, y, z = before[a, 0], before[a, 1], before[a, 2]
+        power = x * force[a, 0] + y * force[a, 1] + z * force[a, 2]
+        squares = x * v[a, 0] + y * v[a, 1] + z * v[a, 2]
+        out[0, a] = half * squares + shorter * power if mine else 0.0
+        out[1, a], out[2, a] = loss[a] if mine else 0.0, external[a] if mine else 0.0
+        out[3, a] = half * (x + v[a, 0]) if mine else 0.0
+        out[4, a] = half * (y + v[a, 1]) if mine else 0.0
+        out[5, a] = half * (z + v[a, 2]) if mine else 0.0
+        out[6, a] = stepping[a] - shorter * power if mine else 0.0

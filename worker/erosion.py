@@ -68,9 +68,11 @@ class Erosion:
         """Nodes that leave in this step, and their v(n-1/2), m/s."""
         mass, speed = extremes
         energy, momentum = mass * speed * speed, mass * speed
-        self._work = Tally(np.full(len(WORKS), energy))
-        self._nodal = Tally(np.array([energy, mass, momentum, momentum, momentum]))
-        self._half = self._nodal.quanta(np.zeros((0, 5)))
+        self.work = Tally(np.full(len(WORKS), energy))
+        """WORKS of the tets that have left, J."""
+        self.nodal = Tally(np.array([energy, mass, momentum, momentum, momentum]))
+        """Energy, J, mass, kg, and momentum, kg m/s, of the nodes that have left."""
+        self._half = self.nodal.quanta(np.zeros((0, 5)))
         self._limit = 0.0
         self.due = False
         """Whether the next step begins with a removal."""
@@ -97,8 +99,8 @@ class Erosion:
     def keep(self, parcel: Parcel) -> None:
         """Adds what it must remember to a parcel."""
         nodes, ids = self._model.nodes, parcel.nodes["id"]
-        parcel.known["erosion"] = self._limit, self.due, self._work.scale, self._nodal.scale
-        for key, words in (("work", self._work.words), ("nodal", self._nodal.words), ("half", self._half)):
+        parcel.known["erosion"] = self._limit, self.due, self.work.scale, self.nodal.scale
+        for key, words in (("work", self.work.words), ("nodal", self.nodal.words), ("half", self._half)):
             parcel.sums[f"erosion.{key}"] = words
         parcel.nodes["erosion.removed"], parcel.nodes["erosion.tets_at"] = self.removed, self._tets_at
         alone = np.flatnonzero((self._tets_at == 0) & nodes.owned)
@@ -109,9 +111,9 @@ class Erosion:
 
     def resume(self, parcel: Parcel) -> None:
         """Takes it back."""
-        limit, self.due, self._work.scale, self._nodal.scale = parcel.known["erosion"]
+        limit, self.due, self.work.scale, self.nodal.scale = parcel.known["erosion"]
         self.begin(limit)
-        self._work.words, self._nodal.words, self._half = (
+        self.work.words, self.nodal.words, self._half = (
             parcel.sums[f"erosion.{key}"].copy() for key in ("work", "nodal", "half")
         )
         self.removed, self._tets_at = parcel.nodes["erosion.removed"], parcel.nodes["erosion.tets_at"]
@@ -121,14 +123,6 @@ class Erosion:
     def decide(self, found: int) -> None:
         """``found`` of all ranks (elements/wear.py): whether there is something to remove now."""
         self.due = found == BROKEN or (found > SOUND and self._clock.step % GATHERED == 0)
-
-    def work(self) -> Floats:
-        """(4,) WORKS of the tets that have left, J; all ranks take part."""
-        return self._work.total(self._comm)
-
-    def nodal(self) -> Floats:
-        """(5,) energy, J, mass, kg, and momentum, kg m/s, of the nodes that have left; all ranks take part."""
-        return self._nodal.total(self._comm)
 
     def warnings(self) -> list[str]:
         """What the user should know at the end; all ranks take part."""
@@ -147,8 +141,8 @@ class Erosion:
     def note(self, state: Nodes) -> None:
         """Before the kick: books the second half of what the last removal has begun."""
         self._book_last_work(state)
-        self._nodal.words += self._half
-        self._nodal.carry()
+        self.nodal.words += self._half
+        self.nodal.carry()
         self._half[:] = 0
 
     def remove(self, state: Nodes) -> None:
@@ -168,8 +162,8 @@ class Erosion:
             state.stepping[leaving] -= early
             energy = 0.5 * mass * (before * after).sum(axis=1) + early[state.owned[leaving]]
             half = 0.5 * mass[:, None] * after
-            self._half = self._nodal.quanta(np.column_stack([np.zeros((len(half), 2)), half]))
-            self._nodal.add(np.column_stack([energy, mass, half]))
+            self._half = self.nodal.quanta(np.column_stack([np.zeros((len(half), 2)), half]))
+            self.nodal.add(np.column_stack([energy, mass, half]))
             state.force[leaving] = 0
         state.v[self.removed] = 0.0
 
@@ -184,7 +178,7 @@ class Erosion:
                 left.append(block.tets[worn].astype(np.int64))
                 ids.append(block.id[worn])
                 self._last.append((left[-1], _forces(block, worn, state.x)))
-                self._work.add(_energies(block, worn))
+                self.work.add(_energies(block, worn))
                 block.drop(worn)
         self._unload(np.concatenate(ids))
         self._tets_at -= self._completed(left)
@@ -219,7 +213,7 @@ class Erosion:
             for corner in range(4):
                 for i in range(3):
                     work -= 0.5 * self._clock.last_dt * forces[:, corner, i] * state.v[tets[:, corner], i]
-            self._work.add(np.column_stack([work, np.zeros((len(work), len(WORKS) - 1))]))
+            self.work.add(np.column_stack([work, np.zeros((len(work), len(WORKS) - 1))]))
         self._last = []
 
 

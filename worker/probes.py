@@ -11,7 +11,7 @@ from .contact.stage import Contact
 from .errors import InputError
 from .output.frames import von_mises
 from .parallel.comm import Comm
-from .parallel.fixed_point import exact_sums
+from .parallel.fixed_point import Ragged, exact_sums, exact_totals
 from .state import (
     DAMAGE,
     MASS,
@@ -66,7 +66,8 @@ def field(block: Block, name: str, model: Model, places: Ints) -> Floats:
     if name in _ROWS:
         return row(_ROWS[name]) if block.has(_ROWS[name]) else np.zeros(len(places))
     if name in _VELOCITY:
-        return np.asarray(model.nodes.v[block.tets[places], _VELOCITY[name]].mean(axis=1))
+        a, b, c, d = model.nodes.v[block.tets[places].T, _VELOCITY[name]]
+        return np.asarray((a + b + c + d) / 4.0)
     if name == "pressure":
         return row(PRESSURE) + row(VISCOUS)
     if name == "mises":
@@ -102,8 +103,15 @@ class Probes:
             for probe in case.probes
         ]
         """Global ids of the tets that each probe has in each block."""
-        self._places: dict[tuple[int, int], tuple[int, Ints]] = {}
-        """Where these stand, by probe and block, and how many tets the block had then."""
+        self._means = [k for k, name in enumerate(self._fields) if name not in _FORCE and name not in _WALL]
+        self._counted: list[int] | None = None
+        """How many tets each block had when these were last found."""
+        self._found: list[tuple[str, Block, Ints, slice, slice]] = []
+        """Of means that have tets in a block: the field, the block, where these tets stand in it, and which of the
+        values that are added up are the field times mass, and mass.
+        """
+        self._starts = np.zeros(1, np.int64)
+        """Where the values of each begin."""
 
     def require_tets(self, case: Case) -> None:
         """Raises InputError, on every rank alike, when a probe holds no tet."""
@@ -128,8 +136,7 @@ class Probes:
         passed = self._clock.t - self._since
         forces, walls = self._forces(passed), self._wall_forces(passed)
         self._since = self._clock.t
-        means = [k for k, name in enumerate(self._fields) if name not in _FORCE and name not in _WALL]
-        sums = iter(exact_sums(self._comm, *(self._sums(k) for k in means)).reshape(-1, 2))
+        sums = iter(exact_totals(self._comm, self._columns())[0].reshape(-1, 2).tolist())
         values = []
         for k, (name, part) in enumerate(zip(self._fields, self._parts, strict=True)):
             if name in _FORCE:
@@ -138,7 +145,7 @@ class Probes:
                 values.append(float(walls[k]))
             else:
                 total, mass = next(sums)
-                values.append(float(total / mass) if mass > 0.0 else math.nan)
+                values.append(total / mass if mass > 0.0 else math.nan)
         return np.array(values)
 
     def _forces(self, passed: float) -> Floats:
@@ -167,24 +174,33 @@ class Probes:
         self._given = given
         return np.asarray(forces)
 
-    def _sums(self, probe: int) -> Floats:
-        """(n, 2) field times mass, and mass, of the tets of a probe."""
-        columns = [np.zeros((0, 2))]
-        for b, block in enumerate(self._model.blocks):
-            places = self._inside(probe, b)
-            if len(places):
-                mass = block.at(MASS, places)
-                columns.append(np.column_stack([field(block, self._fields[probe], self._model, places) * mass, mass]))
-        return np.concatenate(columns)
+    def _columns(self) -> Ragged:
+        """Of each mean the field times mass, and mass, of its tets."""
+        if self._counted != (counted := [block.n for block in self._model.blocks]):
+            self._find()
+            self._counted = counted
+        values = np.empty(self._starts[-1])
+        for name, block, places, product, weight in self._found:
+            values[weight] = mass = block.at(MASS, places)
+            np.multiply(field(block, name, self._model, places), mass, out=values[product])
+        return Ragged(values, self._starts)
 
-    def _inside(self, probe: int, b: int) -> Ints:
-        """Places of the tets of a probe in a block, found anew when tets have left."""
-        block, ids = self._model.blocks[b], self._chosen[probe][b]
-        n, places = self._places.get((probe, b), (-1, np.zeros(0, np.int64)))
-        if n != block.n:
-            places = np.flatnonzero(np.isin(block.id, ids)) if len(ids) else places[:0]
-            self._places[probe, b] = block.n, places
-        return places
+    def _find(self) -> None:
+        """Where the tets of each mean stand, anew when tets have left."""
+        self._found, starts, end = [], [0], 0
+        for k in self._means:
+            begin, there = end, []
+            for block, ids in zip(self._model.blocks, self._chosen[k], strict=True):
+                places = np.flatnonzero(np.isin(block.id, ids)) if len(ids) else ids
+                if len(places):
+                    there.append((block, places, slice(end, end + len(places))))
+                    end += len(places)
+            n = end - begin
+            for block, places, at in there:
+                self._found.append((self._fields[k], block, places, at, slice(at.start + n, at.stop + n)))
+            starts += [end, end + n]
+            end += n
+        self._starts = np.array(starts)
 
 
 def _centres(block: Block, model: Model) -> Floats:

@@ -254,7 +254,8 @@ class Block:
 
     def at(self, row: int, places: "np.ndarray") -> Floats:
         """(k,) copy of one row of the state at ``places`` (k,)."""
-        return np.asarray(self.state[places // CHUNK, row, places % CHUNK])
+        further = (int(self.state.shape[1]) - 1) * CHUNK  # from a chunk to the next, beyond what a row has
+        return np.asarray(self.state.reshape(-1)[places + (places // CHUNK * further + row * CHUNK)])
 
     def has(self, row: int) -> bool:
         """Whether the block carries that row."""

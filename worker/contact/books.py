@@ -60,7 +60,12 @@ class Books:
         """Heat of friction so far of the contacts of all ranks, J, that of the last step as far as ``contact_loss`` has
         it; all ranks take part.
         """
-        work, later = self.friction.total(comm)
+        return self.heat(self.friction.total(comm))
+
+    @staticmethod
+    def heat(friction: Floats) -> float:
+        """The same by the sums of ``friction`` over all ranks."""
+        work, later = friction
         return float(work - later)
 
     def impulses(self, comm: Comm) -> Floats:

@@ -43,7 +43,7 @@ class Cohesion:
     def __init__(self, energy: float) -> None:
         """``energy``: order of magnitude of the work on a facet, J."""
         self.facets = Facets.none()
-        self._gone = Tally(np.array([energy, energy]))
+        self.gone = Tally(np.array([energy, energy]))
         """Work on the facets that have failed, J, and what they should have taken."""
 
     def insert(self, new: Facets) -> None:
@@ -67,7 +67,7 @@ class Cohesion:
         if law.open_facets(f, x):
             failed = f.state.top - f.softening.knee >= np.maximum(f.softening.critical, tiny)
             kept: Flags = np.asarray(~failed.all(axis=1))
-            self._gone.add(np.column_stack([f.state.work.sum(axis=1), _whole(f)])[~kept])
+            self.gone.add(np.column_stack([f.state.work.sum(axis=1), _whole(f)])[~kept])
             self.facets = f.take(kept)
 
     def let_go(self, change: Ints, nodes: Nodes, steps: Floats, whole: bool) -> None:
@@ -85,13 +85,13 @@ class Cohesion:
         columns, ids = self.facets.columns(), parcel.nodes["id"]
         nodes, first = columns.pop("nodes"), columns["tets"][:, 0]
         parcel.rows["cohesive"] = {"tet": first, "with": ids[nodes], **columns}
-        parcel.sums["cohesive.gone"], parcel.known["cohesive"] = self._gone.words, self._gone.scale
+        parcel.sums["cohesive.gone"], parcel.known["cohesive"] = self.gone.words, self.gone.scale
 
     def resume(self, parcel: Parcel, nodes: Nodes) -> None:
         """Takes them back."""
         table = parcel.rows["cohesive"]
         self.facets = Facets.of({**table, "nodes": nodes.places(table["with"])})
-        self._gone.words, self._gone.scale = parcel.sums["cohesive.gone"], parcel.known["cohesive"]
+        self.gone.words, self.gone.scale = parcel.sums["cohesive.gone"], parcel.known["cohesive"]
 
     def scatter(self, force: Ints, scale: float) -> int:
         """Adds the forces in quanta of 1 / ``scale`` N to the nodal sums; returns the bits of the largest."""
@@ -101,13 +101,22 @@ class Cohesion:
         """Energy, J, that is lost for good, that the closing of facets would give back, and that all facets take which
         have ever been inserted, when they have failed; all ranks take part.
         """
+        return self.told(exact_sums(comm, self.columns()), self.gone.total(comm))
+
+    def columns(self) -> Floats:
+        """(m, 3) work on each facet, what its closing would give back, and what it takes in the end, J."""
         f, s = self.facets.softening, self.facets.state
         beyond = np.maximum(s.top - f.knee, 0.0)
         share = np.divide(beyond, f.critical, out=(beyond > 0.0).astype(float), where=f.critical > 0.0)
         stiffness = f.strength * np.maximum(1.0 - share, 0.0) / s.top
         back = (self.facets.constants.area / 6.0) * (stiffness * (s.size**2 - f.lent**2)).sum(axis=1)
-        work, reversible, whole = exact_sums(comm, np.column_stack([s.work.sum(axis=1), back, _whole(self.facets)]))
-        gone_work, gone_whole = self._gone.total(comm)
+        return np.column_stack([s.work.sum(axis=1), back, _whole(self.facets)])
+
+    @staticmethod
+    def told(sums: Floats, gone: Floats) -> tuple[float, float, float]:
+        """``energies`` by the sums of ``columns`` and of ``gone`` over all ranks."""
+        work, reversible, whole = sums
+        gone_work, gone_whole = gone
         return float(work + gone_work - reversible), float(reversible), float(whole + gone_whole)
 
 

@@ -46,7 +46,7 @@ class Record:
         cohesion = self._fracture.cohesion
         held = cohesion.facets.tets if cohesion is not None else np.zeros((0, 2), np.int64)
         self.labels = connectivity.labels(self._model, held, self._comm)
-        self.count = len(np.unique(np.concatenate(self._comm.share(np.unique(_flat(self.labels))))))
+        self.count = connectivity.count(self._model, self.labels, self._comm)
 
     def write(self, folder: Path, index: int, t: float) -> None:
         """Writes the table of frame ``index`` and adds to the genealogy."""

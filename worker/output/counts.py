@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..ids import located
+from ..ids import located, unique
 from ..jit import njit
 from ..parallel.comm import Comm
 from ..simulation import Simulation
@@ -78,10 +78,11 @@ def sizes(model: Model, labels: list[Ints], comm: Comm) -> tuple[int, list[int]]
 
     ``labels``: for each block (n,) the fragment of each tet. All ranks take part.
     """
-    here = np.unique(np.concatenate([np.zeros(0, np.int64), *labels]))
+    here = unique(np.concatenate([np.zeros(0, np.int64), *labels]))
     reach = np.full((len(here), 6), -np.inf)
     for block, of in zip(model.blocks, labels, strict=True):
-        _reach(reach, located(here, of), block.tets, model.nodes.x)
+        last = np.full(model.nodes.n, -1, np.int32)
+        _reach(reach, last, located(here, of), block.tets, model.nodes.x)
     pieces = comm.gather((here, reach))
     return by_size(_extents(pieces)) if pieces is not None else (0, [])
 
@@ -94,12 +95,19 @@ def _extents(pieces: list[tuple[Ints, Floats]]) -> Floats:
     return np.asarray((whole[:, :3] + whole[:, 3:]).max(axis=1, initial=0.0))
 
 
-@njit("void(float64[:, ::1], int32[::1], uint32[:, ::1], float64[:, ::1])", cache=True)
-def _reach(reach, of, tets, x):  # type: ignore[no-untyped-def]
-    """Raises ``reach`` (g, 6), high corners and negative low corners, by the nodes of tets of group ``of`` (n,)."""
+@njit("void(float64[:, ::1], int32[::1], int32[::1], uint32[:, ::1], float64[:, ::1])", cache=True)
+def _reach(reach, last, of, tets, x):  # type: ignore[no-untyped-def]
+    """Raises ``reach`` (g, 6), high corners and negative low corners, by the nodes of tets of group ``of`` (n,); the
+    ``last`` (nodes,) group that each has been seen in.
+    """
     for tet in range(len(tets)):
+        group = of[tet]
         for corner in range(4):
+            node = tets[tet, corner]
+            if last[node] == group:
+                continue
+            last[node] = group
             for i in range(3):
-                place = x[tets[tet, corner], i]
-                reach[of[tet], i] = max(reach[of[tet], i], place)
-                reach[of[tet], 3 + i] = max(reach[of[tet], 3 + i], -place)
+                place = x[node, i]
+                reach[group, i] = max(reach[group, i], place)
+                reach[group, 3 + i] = max(reach[group, 3 + i], -place)
