@@ -291,9 +291,9 @@ def _add(loss, external, nodes, lost, worked):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def _of_nodes(out, before, v, force, shorter, stepping, mass, loss, external, owned):  # type: ignore[no-untyped-def]
-    """Sets ``out`` (7, nodes): kinetic energy, J, energy lost by impacts and work from outside, J, momentum, kg m/s, and
-    what unequal steps have taken, J: that ``kick`` has booked the half of this one already is kinetic energy until n.
-    Nothing of nodes that are not ``owned``.
+    """Sets ``out`` (7, nodes): kinetic energy, J, energy lost by impacts and work from outside, J, momentum, kg m/s,
+    and what unequal steps have taken, J: that ``kick`` has booked the half of this one already is kinetic energy until
+    n. Nothing of nodes that are not ``owned``.
     """
     for a in range(out.shape[1]):
         half, mine = 0.5 * mass[a], owned[a]

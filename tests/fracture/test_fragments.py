@@ -140,6 +140,37 @@ def test_labels_are_those_of_scipy_on_any_number_of_ranks(broken: float) -> None
     assert 2 <= len(np.unique(expected)) <= len(expected) - len(b.held) / 2
 
 
+@pytest.mark.parametrize("ranks", RANKS)
+def test_labels_are_the_same_where_few_tets_have_far_ids(ranks: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A rank of a large mesh finds its tets by bisection."""
+    b = body(11, broken=0.7, parts=2)
+
+    def work(comm: Comm) -> list[tuple[Ints, Ints]]:
+        model, labels = labels_of(b, owners(b, ranks, ranks), comm)
+        return [(piece.id, label) for piece, label in zip(model.blocks, labels, strict=True)]
+
+    found = np.full(len(b.tets), -1)
+    monkeypatch.setattr(connectivity, "_SPARSE", 0)
+    for pairs in on_ranks(ranks, work):
+        for ids, label in pairs:
+            found[ids] = label
+    assert (found == b.labels()).all()
+
+
+def test_fragments_are_counted_on_any_number_of_ranks() -> None:
+    b = body(12, broken=0.7, parts=3)
+    b.bare = 1
+    b.held = b.held[b.part[b.held[:, 0]] != 1]
+    for ranks in RANKS:
+        owner = owners(b, ranks, ranks)
+
+        def work(comm: Comm, owner: Ints = owner) -> int:
+            model, labels = labels_of(b, owner, comm)
+            return connectivity.count(model, labels, comm)
+
+        assert on_ranks(ranks, work) == [len(np.unique(b.labels()))] * ranks
+
+
 def test_a_part_without_faces_is_one_fragment() -> None:
     b = body(3, broken=0.8, parts=3)
     b.bare = 1

@@ -7,16 +7,19 @@ import numpy as np
 import pytest
 
 from conoid.worker.elements.tet4 import quanta
+from conoid.worker.parallel import fixed_point
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.parallel.fixed_point import (
     CONTRIBUTION_BITS,
     HEADROOM_BITS,
     Grouped,
+    Ragged,
     Tally,
     exact_sums,
     exact_totals,
     outgrown,
     scale_for,
+    totals_and_words,
 )
 from conoid.worker.simulation import Simulation
 from conoid.worker.state import WORK
@@ -172,3 +175,71 @@ def test_where_a_tally_carries_over_changes_no_bit() -> None:
         parts[i % 3].add(row[None])
     words = np.sum([part.words for part in parts], axis=0)
     assert whole.valued(words).tobytes() == whole.total(SerialComm()).tobytes()
+
+
+def limbs_before(values: Floats, scale: float) -> tuple[int, int]:
+    """The two sums by numpy's own rounding."""
+    scaled = values * scale
+    high = np.rint(scaled)
+    return int(high.astype(np.int64).sum()), int(np.rint((scaled - high) * 2.0**30).astype(np.int64).sum())
+
+
+def odd_values() -> list[Floats]:
+    """Columns of all sizes up to the largest float, halves of a quantum of either limb, their neighbours, and zeros."""
+    random = np.random.default_rng(6)
+    sizes = random.normal(size=999) * 2.0 ** random.integers(-300, 300, 999)
+    halves = np.concatenate([np.arange(-9.5, 10.0), np.arange(-9.5, 10.0) * 2.0**-30, [2.0**29 + 0.5, 0.5 - 2.0**30]])
+    near = np.concatenate([halves, np.nextafter(halves, np.inf), np.nextafter(halves, -np.inf), -halves])
+    last = [np.nextafter(2.0**30, 0.0), np.nextafter(2.0**1023, 0.0), -1e308]
+    return [
+        sizes, near, -np.abs(near), np.array(last[:1]), np.array(last[1:]), np.array([0.0, -0.0]), np.zeros(0),
+        np.array([2.0**-993, 1e-300, -1e-305, 5e-324]), np.array([1.0, 1e-200, -1e-16, 2.0**-31, -(2.0**-61)]),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("values", odd_values())
+def test_limbs_are_those_of_numpys_rounding(values: Floats) -> None:
+    """To the integer, of values of any size below the scale's bound and of any number of them."""
+    largest = float(np.abs(values).max(initial=0.0))
+    assert fixed_point.magnitude(fixed_point.most(values)) == largest
+    scale = math.ldexp(1.0, 30 - max(math.frexp(largest)[1], -993))
+    for n in {len(values), len(values) // 2, min(len(values), 7)}:
+        assert fixed_point.limbs(values[:n], scale) == limbs_before(values[:n], scale)
+
+
+@pytest.mark.parametrize("odd", [math.nan, -math.nan, math.inf, -math.inf])
+def test_what_is_not_finite_is_above_all_that_is(odd: float) -> None:
+    for values in ([odd], [1.0, odd, -1e308], [odd, 0.0]):
+        assert fixed_point.magnitude(fixed_point.most(np.array(values))) == math.inf
+
+
+def test_the_smallest_floats_have_sums() -> None:
+    """Their quantum is that of 2^-993: what is below it rounds away."""
+    tiny = np.array([[2.0**-1000, 5e-324], [2.0**-1001, 0.0]])
+    assert exact_sums(SerialComm(), tiny).tolist() == [1.5 * 2.0**-1000, 0.0]
+
+
+def test_sums_of_limbs_are_rounded_once() -> None:
+    """Those below 2^53, and greater ones, as Python's integers are; of each sign, halves to even."""
+    random = np.random.default_rng(7)
+    for bits in (10, 50, 53, 54, 62):
+        high = random.integers(-(2**bits), 2**bits, 200)
+        low = random.integers(-(2**61), 2**61, 200)
+        words = np.stack([high, low])
+        words[:, :4] = [[2**23 + 1, 2**23 + 2, -(2**23) - 1, 0], [-1, 1, 1, -1]]
+        exact = [float(int(a) * 2**30 + int(b)) for a, b in words.T]
+        assert fixed_point._whole(words).tolist() == exact
+
+
+def test_ragged_columns_and_integers_go_along() -> None:
+    """Columns of any lengths have the sums that each has alone, in every group beside others."""
+    columns = [values(300, 8)[:, 0], np.zeros(0), values(70, 9)[:, 1]]
+    ragged = Ragged(np.concatenate(columns), np.array([0, 300, 300, 370]), 2)
+    group = (np.arange(40) % 2).astype(np.int32)
+    beside = Grouped(values(40, 10), group, 2)
+    sums, each, more = totals_and_words(SerialComm(), [ragged, beside], np.array([7, -(2**60)]))
+    alone = [float(exact_sums(SerialComm(), column[:, None])[0]) for column in columns]
+    assert sums[:3].tolist() == each[0, :3].tolist() == alone
+    assert each[1, :3].tolist() == [0.0] * 3
+    assert each[:, 3:].tobytes() == exact_totals(SerialComm(), beside)[1].tobytes()
+    assert more.tolist() == [7, -(2**60)]

@@ -1,7 +1,7 @@
 """Which tets hold together: connected pieces of a rank, joined with those of the others to fragments.
 
-Two trees of tets are joined by Rem's way, in which every tet hangs onto one of a smaller id and the paths of two tets to
-their roots are laid into one (Patwary, Blair and Manne, Experiments on union-find algorithms, 2010).
+Two trees of tets are joined in Rem's way, in which every tet hangs onto one of a smaller id and the paths of two tets
+to their roots are laid into one (Patwary, Blair and Manne, Experiments on union-find algorithms, 2010).
 """
 
 import numpy as np
@@ -145,10 +145,7 @@ def _bind(root, pairs, ids):  # type: ignore[no-untyped-def]
             a = above
 
 
-@njit(
-    "int64(int64[::1], int32[::1], int64[::1], int32[::1], int32[:, ::1], uint8[:, ::1], int64)",
-    cache=True,
-)
+@njit("int64(int64[::1], int32[::1], int64[::1], int32[::1], int32[:, ::1], uint8[:, ::1], int64)", cache=True)
 def _bind_faces(outer, root, ids, table, behind, bond, first):  # type: ignore[no-untyped-def]
     """The same of the tets of a block and what is ``behind`` their whole faces; sets the first of ``outer`` to the
     faces, 4 * tet + face, behind which is none of this rank, and returns how many there are.

@@ -63,7 +63,7 @@ def most(values):  # type: ignore[no-untyped-def]
     """The largest magnitude, as bits: they have the order of the floats, and what is not finite is above all that are,
     which no maximum over ranks may drop.
     """
-    found = 0
+    found = np.int64(0)
     for i in range(len(values)):
         found = max(found, np.float64(values[i]).view(np.int64) & _MAGNITUDE)
     return found
@@ -74,7 +74,7 @@ def limbs(values, scale):  # type: ignore[no-untyped-def]
     """Sums of the high and of the low limbs of ``values``, in quanta of one over ``scale`` and 2^-30 of it: any where
     these reach 2^51 of them. A number beside NEAREST has the nearest integer in its last bits, the even one of two.
     """
-    highs, lows = 0, 0
+    highs, lows = np.int64(0), np.int64(0)
     for i in range(len(values)):
         scaled = values[i] * scale
         shifted = scaled + NEAREST
