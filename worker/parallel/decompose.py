@@ -158,11 +158,12 @@ def _most_even(
     scale = _BINS / np.where(extent > 0.0, extent, 1.0)
     for g, (_, parts) in enumerate(groups):
         if g % _TOGETHER == 0:
-            sums = np.zeros((_TOGETHER, len(DIRECTIONS), _BINS, quanta.shape[1]), np.int64)
-            for k, (some, weights) in enumerate(samples[g : g + _TOGETHER], g):
-                _slice(sums[k - g], points, weights, some, DIRECTIONS, -reach[k, 1], scale[k])
-            every = np.asarray(comm.sum(sums), np.float64)
-        loss, through = _unevenness(every[g % _TOGETHER], parts)
+            now = samples[g : g + _TOGETHER]
+            sums = np.zeros((len(now), len(DIRECTIONS), _BINS, quanta.shape[1]), np.int64)
+            for k, (own, (some, weights)) in enumerate(zip(sums, now, strict=True), g):
+                _slice(own, points, weights, some, DIRECTIONS, -reach[k, 1], scale[k])
+            sums = comm.sum(sums)
+        loss, through = _unevenness(np.asarray(sums[g % _TOGETHER], np.float64), parts)
         long = extent[g] >= _SHORT * extent[g].max()
         through *= scale[g]
         least = through[long].min()
