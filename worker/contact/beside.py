@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..jit import njit, types
-from .geometry import VECTOR, at, dot, foot, height, minus, off
+from .geometry import MARGIN, VECTOR, at, dot, foot, height, minus, off
 from .narrow_phase import DEEP, DEEP_SELF, FACES, NEAR, PAIRS, STEP
 
 TOUCHING = 1e-3
@@ -25,6 +25,9 @@ beside the edge up to TOUCHING only, or a shot is seen a step late (H15). Chosen
 _BEHIND = 0.1
 """Of the size of a face: the sum of the depths of its corners behind another face, from which on the edge between them
 is convex. Chosen: less for a face that is bent by 25 degrees than that has, more than rounding."""
+_OVER = 0.1
+"""What the mean direction from a node to its faces' middles, of unit vectors, has along a face at least when it reaches
+over it: less is that of a blunt edge, whatever it is. Chosen: a third of what the corner of a cube has."""
 _F = types.float64
 
 
@@ -45,6 +48,25 @@ def facing(normals, s, m):  # type: ignore[no-untyped-def]
     least = mean - np.sqrt(max(square - mean * mean, 0.0))
     turn = max(min(mean - FACING, FACING - rise), 0.5 * (least + FACING))
     return turn, min(turn, 0.5 * (least + _SOME))
+
+
+@njit(f"boolean(float64[:, ::1], int64, {VECTOR}, {VECTOR}, {VECTOR}, float64)", cache=True, error_model="numpy")
+def reaches_over(normals, s, b, e, f, size):  # type: ignore[no-untyped-def]
+    """Whether the faces of node s, whose foot on the face of sides ``e`` and ``f`` has the area coordinates ``b``,
+    reach from there over the face, by their mean direction, and not away from it.
+
+    Then its body comes onto the face and not beside it: of two bodies that meet with equal faces all nodes do so on
+    the border, and none is ever inside of the other body if their tets grow narrower behind it.
+    """
+    way = normals[s, 9], normals[s, 10], normals[s, 11]
+    ee, ff, ef, er, fr = dot(e, e), dot(f, f), dot(e, f), dot(e, way), dot(f, way)
+    area = (ee * ff - ef * ef) / size
+    two, three = (ff * er - ef * fr) / area, (ee * fr - ef * er) / area
+    rates, least, most = (-two - three, two, three), np.inf, 0.0
+    for k in range(3):
+        if b[k] <= RIM:
+            least, most = min(least, rates[k]), max(most, rates[k])
+    return least >= -MARGIN and most >= _OVER
 
 
 @njit(types.boolean(PAIRS, FACES, types.int32[::1], types.int64, types.int64, _F, _F), cache=True)

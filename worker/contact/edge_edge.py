@@ -7,12 +7,19 @@ one slides along a surface.
 import numpy as np
 
 from ..jit import njit, types
-from .geometry import MARGIN, VECTOR, at, beyond, cross, distance, dot, minus, segments
+from .geometry import VECTOR, at, beyond, cross, distance, dot, minus, segments
 from .narrow_phase import CONTACT_ROWS, DEEP_SELF, EDGES, NEAR, PAIRS, STEP, needed
 
 _PARALLEL = 1e-3
 """Sine of the angle below which edges are left to nodes and faces. Ridges may pass each other through a gap that is as
 wide as this share of an edge; where edges cross is known to 1e-10 of them there."""
+_END = 1e-4
+"""Of the length of an edge: none meets nearer to its end, which is a node and meets faces. Chosen: a tenth of MARGIN,
+by which a node may be beside a face, so that what slides over a rim is held by the edge until the node is."""
+_FLUSH = 0.05
+"""Sine of the angle by which the normal of a contact may lie beyond that of a face: edges of faces that lie on each
+other cross there, a little to either side. Chosen by fragments that are pressed together (docs/numerics.md, "Face on
+face")."""
 _ROUND = 0.01
 """Of the length of an edge: added to the distance at which a pair may meet."""
 _WORTH = 0.02
@@ -38,10 +45,13 @@ def _sector(u, x, v, edges, e, h):  # type: ignore[no-untyped-def]
 
 @njit(f"boolean({_SECTOR}, {VECTOR}, float64)", cache=True)
 def _points_out(sector, n, sign):  # type: ignore[no-untyped-def]
-    """Whether ``sign`` n, square to a convex edge, points out between the normals of its two faces (``_sector``)."""
+    """Whether ``sign`` n, square to a convex edge, points out between the normals of its two faces (``_sector``), or
+    along one of them: edges of faces that lie on each other cross there.
+    """
     sense, one, two = sector
     along = sense * sign
-    return sense != 0.0 and along * dot(one, n) >= 0.0 and along * dot(two, n) <= 0.0
+    least, most = -_FLUSH * np.sqrt(dot(one, one)), _FLUSH * np.sqrt(dot(two, two))
+    return sense != 0.0 and along * dot(one, n) >= least and along * dot(two, n) <= most
 
 
 @njit(
@@ -127,7 +137,7 @@ def edge_edge(out, n, pairs, edges, step, course, end):  # type: ignore[no-untyp
         if not area > _PARALLEL * _PARALLEL * uu * ww:
             continue
         s, t = (ww * ur - uw * wr) / area, (uw * ur - uu * wr) / area
-        if not (min(s, t) >= MARGIN and max(s, t) <= 1.0 - MARGIN):
+        if not (min(s, t) >= _END and max(s, t) <= 1.0 - _END):
             continue
         h, m, length = share * dt, cross(u, w), np.sqrt(area)
         m = m[0] / length, m[1] / length, m[2] / length

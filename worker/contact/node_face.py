@@ -7,7 +7,7 @@ handed over.
 import numpy as np
 
 from ..jit import njit, types
-from .beside import RIM, TOUCHING, facing, in_front, outside
+from .beside import RIM, TOUCHING, facing, in_front, outside, reaches_over
 from .geometry import VECTOR, at, beyond, distance, dot, foot, height, minus, off
 from .haste import fastest_of, haste
 from .narrow_phase import CONTACT_ROWS, DEEP, DEEP_SELF, FACES, NEAR, PAIRS, SLOTS, STEP, needed
@@ -176,6 +176,8 @@ def node_face(out, n, pairs, slots, faces, step, end):  # type: ignore[no-untype
             continue
         leaves, until_end = np.inf if other[s] else strayed[s], end + step.dt
         border = min(b[0], b[1], b[2]) <= RIM
+        if border:
+            border = not reaches_over(normals, s, b, minus(at(x, j), at(x, i)), minus(at(x, k), at(x, i)), size[f])
         if border and in_front(pairs, first, faces, step, normals, p, gap0, gap1, leaves, until_end):
             continue
         row = n

@@ -1,0 +1,66 @@
+"""Bodies that meet with one face each, equal or nearly: all their nodes come down on the border of the other's face.
+
+None of them is ever inside of the other body where that grows narrower behind its face, so that nothing would be met
+any more once they have gone by; and edges cross there in the plane of both faces, on the limit of what they may meet.
+"""
+
+import numpy as np
+import pytest
+
+from conoid.worker.mesh.model import TetMesh
+
+from ..worker.kernels import build, run
+from ..worker.meshes import Floats
+from .bodies import meeting_of
+
+MANY = 25
+"""Pairs, each on its own."""
+APART, MM = 8.0, 1e-3
+CORNERS = np.array([[1.0, 0.0], [-0.5, 0.75**0.5], [-0.5, -(0.75**0.5)]])
+"""Of a face of circumradius 1."""
+POINTS = np.random.default_rng(7).dirichlet([0.6] * 4, 200)
+"""Area coordinates of points of a tet, many of them near its border."""
+
+
+def turned(degrees: float) -> Floats:
+    """(2, 2) rotation."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return np.array([[c, s], [-s, c]])
+
+
+def tets(corners: list[Floats], heights: float) -> TetMesh:
+    """A tet on each of the faces (3, 3), mm, with its tip ``heights`` above their middle, or below."""
+    points = np.concatenate([np.vstack([face, face.mean(axis=0) + np.array([0.0, 0.0, heights])]) for face in corners])
+    rows = np.arange(len(points), dtype=np.int32).reshape(-1, 4)
+    return TetMesh(MM * points, rows if heights > 0.0 else rows[:, [0, 2, 1, 3]])
+
+
+def common(one: Floats, two: Floats) -> float:
+    """The share of POINTS of a tet, corners (4, 3), that are inside of another one, by more than 0.01 of it."""
+    inside = np.linalg.solve((two[1:] - two[0]).T, (POINTS @ one - two[0]).T).T
+    return float((np.column_stack([inside, 1.0 - inside.sum(axis=1)]).min(axis=1) > 0.01).mean())
+
+
+@pytest.mark.parametrize(
+    ("height", "shift", "turn"),
+    [(2.0, 0.0, 0.0), (2.0, 0.05, 0.0), (2.0, 0.2, 0.0), (1.41, 0.1, 3.0), (6.0, 0.1, 3.0), (0.5, 0.2, 180.0)],
+)
+def test_equal_faces_do_not_pass_each_other(height: float, shift: float, turn: float) -> None:
+    """Shifted by up to ``shift`` of their circumradius, and turned by up to ``turn`` degrees."""
+    random, upper, lower = np.random.default_rng(1), [], []
+    for k in range(MANY):
+        place = np.array([APART * (k % 5), APART * (k // 5), 0.0])
+        face = CORNERS @ turned(random.uniform(-turn, turn)) + random.uniform(-shift, shift, 2)
+        upper.append(np.column_stack([face, np.full(3, 0.01)]) + place)
+        lower.append(np.column_stack([CORNERS, np.zeros(3)]) + place)
+    case = meeting_of([{"velocity": (0.0, 0.0, -50.0)}, {}], end=30e-6)
+    seen = np.zeros(MANY)
+
+    def look(sim, _):  # type: ignore[no-untyped-def]
+        nodes = sim.model.nodes
+        corners = np.concatenate([nodes.x[block.tets] for block in sim.model.blocks])
+        for k in range(MANY if sim.clock.step % 20 == 0 else 0):
+            seen[k] = max(seen[k], common(corners[k], corners[MANY + k]))
+
+    run(build(case, [tets(upper, height), tets(lower, -height)]), look)
+    assert seen.max() < 0.01
