@@ -74,3 +74,8 @@ class Reference(Model):
     """Begin of the window of ``probe_*``."""
     until: Time | None = None
     """End of the window of ``probe_*``; the end of the run when absent."""
+
+    @property
+    def title(self) -> str:
+        """What reports call it."""
+        return " ".join(word for word in (self.quantity, self.part, self.probe, self.axis) if word)

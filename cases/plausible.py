@@ -103,19 +103,23 @@ def _is(schema: Schema, value: Mapping[str, Any]) -> bool:
 def _taken(location: Location, value: Any, schema: Schema, data: Mapping[str, Any]) -> Iterator[Problem]:
     listed = isinstance(value, list | tuple)
     values, schemas = (value, schema.get("prefixItems", ())) if listed else ([value], [schema])
-    bare = [
-        to["unit"]
-        for each, to in zip(values, schemas, strict=False)
-        if to.get("unit") and isinstance(each, int | float) and not isinstance(each, bool) and each != 0
-    ]
+    bare = [to["unit"] for each, to in zip(values, schemas, strict=False) if to.get("unit") and _bare_number(each)]
     unit = next(iter(bare), "")
     if unit == QUANTITY:
         unit = unit_of_reference(data, location)
     if unit:
-        shown = f"[{', '.join(map(str, values))}]" if listed else f"{value:g}"
+        shown = f"[{', '.join(map(str, values))}]" if listed else f"{float(value):g}"
         yield Problem(
             problem(location, ..., "").key, shown, f"no unit, taken for {unit if listed else f'{shown} {unit}'}"
         )
+
+
+def _bare_number(value: Any) -> bool:
+    """Whether a value is a number without a unit, other than 0, also one that is written as text."""
+    try:
+        return not isinstance(value, bool) and float(value) != 0.0
+    except (TypeError, ValueError):
+        return False
 
 
 # What is odd ----------------------------------------------------------------------------------------------------------

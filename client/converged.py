@@ -73,6 +73,8 @@ class Book:
     def advice(self, wanted: str | None = None) -> str:
         """One line."""
         name = self.leading(wanted)
+        if name is None and wanted is not None:
+            return f"Nothing that is called {wanted!r} converges on these meshes."
         if name is None:
             return self._nothing()
         each, goal = self.goals()[name]

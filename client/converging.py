@@ -19,6 +19,7 @@ from .convergence import Done, run_all, series
 from .errors import UsageError
 from .local import LocalServer
 from .options import CaseArgument, Overrides, Token, Url, aloud, complain
+from .quantities import names
 from .reports import drawing
 from .saving import save_text
 from .scaling import CORES
@@ -56,6 +57,8 @@ def converge(
     """
     data = data_of(case, overrides or ())
     checked = parse_case(data)
+    if quantity is not None and not any(quantity in name for name in names(checked)):
+        raise UsageError(f"--quantity = {shown(quantity)}: allowed: {', '.join(names(checked))}, or a part of a name")
     members = ensemble or (_ENSEMBLE if chaotic(checked) else 1)
     plan = Plan(_numbers("--meshes", meshes), _forms(forms), _numbers("--dt-safety", safeties), members,
                 _one_of("--vary", vary, (STEPS, SEEDS)), ranks)  # fmt: skip

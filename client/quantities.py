@@ -1,6 +1,6 @@
 """The numbers of one finished run that a study compares: references, probes, energies, counts."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from conoid.cases import history
@@ -11,6 +11,8 @@ from conoid.cases.schema import Case
 from .columns import Columns
 
 _COUNTS = ("broken", "fragments", "eroded")
+_NO_STORE = ("initial", "external", "stepping", "averaging", "residual")
+"""Lines of the ledger that are no energy at the end."""
 _FLOOR, _SHARE = 1e-6, 0.01
 """Differences that mean nothing: a millionth of the value, and a hundredth of the tolerance of a reference. Chosen."""
 
@@ -48,11 +50,26 @@ def of_run(case: Case, outcome: Outcome, told: Columns) -> list[Number]:
     return [number for number in found if "worst_residual" not in number.name]
 
 
-def _references(outcome: Outcome) -> Iterator[Number]:
+def names(case: Case) -> list[str]:
+    """Of all that ``of_run`` may find."""
+    of_probes = (f"{what} of {probe.name}" for probe in case.probes for what in ("mean", "peak"))
+    energies = (f"{name} energy, share" for name in history.LEDGER if name not in _NO_STORE)
+    counts = (f"{name}, number" for name in _COUNTS if case.fractures or case.erodes)
+    found = [*_numbered(each.title for each in case.reference), *of_probes, *energies, *counts]
+    return [name for name in found if "worst_residual" not in name]
+
+
+def _numbered(titles: Iterable[str]) -> Iterator[str]:
+    """Those that stand there again with their number."""
     seen: dict[str, int] = {}
-    for check in outcome.reference:
-        seen[check.name] = seen.get(check.name, 0) + 1
-        name = check.name if seen[check.name] == 1 else f"{check.name} ({seen[check.name]})"
+    for title in titles:
+        seen[title] = seen.get(title, 0) + 1
+        yield title if seen[title] == 1 else f"{title} ({seen[title]})"
+
+
+def _references(outcome: Outcome) -> Iterator[Number]:
+    titles = _numbered(check.name for check in outcome.reference)
+    for name, check in zip(titles, outcome.reference, strict=True):
         yield Number(name, check.value, check.unit, check.expected, check.tolerance, check.source)
 
 
@@ -72,7 +89,7 @@ def _energies(outcome: Outcome) -> Iterator[Number]:
         return
     came = max(energy.initial + max(energy.external, 0.0), 1e-300)
     for name in Energy.__struct_fields__:
-        if name in history.LEDGER and name not in ("initial", "external", "stepping", "averaging", "residual"):
+        if name in history.LEDGER and name not in _NO_STORE:
             value = float(getattr(energy, name))
             if abs(value) > 1e-4 * came:
                 yield Number(f"{name} energy, share", value / came)

@@ -151,6 +151,8 @@ def _apart(case: schema.Case, x: Floats, tets: Indices, body: Indices, part: Int
     for tet, other in overlap.nested(x, tets, body, surface, allowed):
         one, other = (part[body[tets[each, 0]]] for each in (tet, other))
         raise _too_deep(case, one, other, before[tets[tet]].mean(axis=0))
+    for node, other in overlap.crossing(x, body, surface, allowed):
+        raise _too_deep(case, part[body[node]], part[body[other]], before[node])
     return x
 
 

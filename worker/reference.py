@@ -47,13 +47,9 @@ def measure(sim: Simulation, folder: Path, thick: list[list[list[float]]]) -> li
 
 def _check(spec: Reference, value: float, field_name: str | None) -> Check:
     return Check(
-        name=_name(spec), value=value, expected=spec.value, tolerance=spec.tolerance,
+        name=spec.title, value=value, expected=spec.value, tolerance=spec.tolerance,
         passed=abs(value - spec.value) <= spec.tolerance, unit=unit_of(spec.quantity, field_name), source=spec.source,
     )  # fmt: skip
-
-
-def _name(spec: Reference) -> str:
-    return " ".join(word for word in (spec.quantity, spec.part, spec.probe, spec.axis) if word)
 
 
 def _measured(sim: Simulation, spec: Reference, folder: Path, thick: list[list[float]]) -> float:

@@ -81,6 +81,7 @@ def test_a_material_of_the_library_raises_no_doubt(name: str) -> None:
     ("override", "key", "message"),
     [
         ("run.end_time=80", "run.end_time", "80: no unit, taken for 80 s"),
+        ("run.end_time='80'", "run.end_time", "80: no unit, taken for 80 s"),
         ("parts[0].velocity=[0, 0, -210]", "parts[0].velocity", "[0, 0, -210]: no unit, taken for m/s"),
         ("parts[0].mesh.radius=0.003", "parts[0].mesh.radius", "0.003: no unit, taken for 0.003 m"),
         ("parts[0].turn={axis='z', angle=45}", "parts[0].turn.angle", "45: no unit, taken for 45 rad"),

@@ -16,7 +16,7 @@ from conoid.client.columns import read_columns
 from conoid.client.converged import Book
 from conoid.client.convergence import Done, series
 from conoid.client.errors import ClientError
-from conoid.client.quantities import Number, of_run
+from conoid.client.quantities import Number, names, of_run
 from conoid.client.richardson import Trend
 from conoid.client.variants import SEEDS, Plan, Point, Variant, chaotic
 
@@ -202,10 +202,25 @@ def test_the_numbers_of_a_run_are_references_probes_and_shares_of_energy() -> No
     }  # fmt: skip
 
 
+@pytest.mark.parametrize("name", ["bar_on_bar", "plugging_weldox", "glass_ball_cohesive"])
+def test_what_advice_may_be_about_is_known_before_anything_runs(name: str) -> None:
+    made = case(name)
+    energy = Energy(kinetic=6.0, elastic=3.0, plastic=1.0, viscous=1.0, contact=1.0, external=0.0, initial=10.0,
+                    residual=0.0)  # fmt: skip
+    checks = [Check(name=each.title, value=1.0, expected=1.0, tolerance=0.1, passed=True) for each in made.reference]
+    head = ",".join(["t [s]", *(f"{probe.name} [Pa]" for probe in made.probes)])
+    told = read_columns("\n".join([head, ",".join("1" for _ in head.split(","))]) + "\n")
+    outcome = Outcome(state="succeeded", energy=energy, reference=checks, broken=1, fragments=2, eroded=3)
+    assert {number.name for number in of_run(made, outcome, told)} <= set(names(made))
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
-    [(["--meshes", "1,x"], "--meshes"), (["--forms", "nodal,cubic"], "--forms"), (["--vary", "moods"], "--vary")],
-)
+    [
+        (["--meshes", "1,x"], "--meshes"), (["--forms", "nodal,cubic"], "--forms"), (["--vary", "moods"], "--vary"),
+        (["--quantity", "nope"], "--quantity = 'nope': allowed: "),
+    ],
+)  # fmt: skip
 def test_options_that_mean_nothing_are_refused(words: list[str], said: str) -> None:
     ended = CliRunner().invoke(cli.app, ["converge", "bar_on_bar", *words])
     assert ended.exit_code == 2

@@ -11,7 +11,7 @@ from conoid.worker.simulation import Simulation
 
 from ..worker.kernels import build, run
 from ..worker.meshes import block
-from .bodies import meeting_of
+from .bodies import meeting_of, moved
 
 SIZE = 1e-3
 SLOPE = float(np.tan(np.radians(20.0)))
@@ -40,6 +40,16 @@ def test_an_overlap_is_refused_with_its_place_and_depth(across: float) -> None:
 def test_bodies_that_touch_do_not_overlap() -> None:
     met(0.0)
     met(1e-9 * SIZE)
+
+
+def test_bodies_that_cross_each_other_are_refused() -> None:
+    """Two bars stuck through each other; no node of either is inside of the other."""
+    one = block((8, 1, 1), SIZE, 0.0)
+    turned = TetMesh(one.points[:, [2, 0, 1]] * [0.8, 1.0, 1.4], one.tets)
+    other = moved(turned, [3.1 * SIZE, -3.5 * SIZE, -0.2 * SIZE])
+    with pytest.raises(InputError, match=r"'body[01]' overlaps 'body[01]' at \(.*\) m, deeper than"):
+        build(meeting_of([{}, {}]), [one, other])
+    build(meeting_of([{}, {}]), [one, moved(other, [0.0, 0.0, 1.3 * SIZE])])
 
 
 def test_what_does_not_meet_may_overlap() -> None:

@@ -19,6 +19,10 @@ _TRIES = 30
 """Times overlapping bodies are moved apart before that is given up. Chosen."""
 
 
+_THROUGH = 0.1
+"""Of the size of a face: an edge whose ends lie further in front of it and behind it goes through it, if it does so at
+that share of its height from its sides. Less is what rims, and facets of two round bodies that fit, have in common.
+Chosen."""
 _CRUSHED = 0.1
 """Of its volume: a tet that is left with less has been pushed too far. Chosen."""
 
@@ -108,6 +112,29 @@ def nested(points: Floats, tets: Indices, part: Indices, surface: Surface, allow
     pairs = search.find(small, large, every, np.zeros_like(every), of, others, 0.0, None)
     inside = (_shares(centres[pairs[:, 0]], points[tets[pairs[:, 1]]]) > _ROUNDING).all(axis=1)
     return np.column_stack([outer[pairs[inside, 0]], pairs[inside, 1]])
+
+
+def crossing(points: Floats, part: Indices, surface: Surface, allowed: Flags) -> Indices:
+    """(n, 2) nodes at one end of edges of the surface that go through a face of another part that theirs meets, and at
+    a corner of these faces: bodies that cross each other may have no node inside each other.
+    """
+    others, faces = allowed & ~np.eye(len(allowed), dtype=bool), np.ascontiguousarray(surface.faces, np.int32)
+    edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    small, large = Things(edges, np.zeros(len(edges))), Things(faces, np.zeros(len(faces)))
+    pairs = search.find(small, large, points, np.zeros_like(points), part, others, 0.0, None)
+    (p, q), (a, b, c) = (np.moveaxis(points[rows], 1, 0) for rows in (edges[pairs[:, 0]], faces[pairs[:, 1]]))
+    normal = np.cross(b - a, c - a)
+    above, below = ((each - a) * normal for each in (p, q))
+    above, below = above.sum(axis=1), below.sum(axis=1)
+    deep = _THROUGH * (normal * normal).sum(axis=1) ** 0.75
+    through = (above * below < 0.0) & (np.minimum(np.abs(above), np.abs(below)) > deep)
+    share = above / np.where(through, above - below, 1.0)
+    at = p + share[:, None] * (q - p)
+    sides = ((b - a, a), (c - b, b), (a - c, c))
+    most = _THROUGH * (normal * normal).sum(axis=1)
+    inner = [(np.cross(side, at - start) * normal).sum(axis=1) > most for side, start in sides]
+    found = through & np.logical_and.reduce(inner)
+    return np.column_stack([edges[pairs[found, 0], 0], faces[pairs[found, 1], 0]])
 
 
 def _volumes(corners: Floats) -> Floats:
