@@ -18,23 +18,14 @@ from conoid.cases.messages import Energy, PartEnergy
 from .boundaries import Boundary
 from .clock import Clock
 from .contact.stage import Contact
+from .elements.work import ElementWork
 from .erosion import Erosion
 from .errors import EnergyError
 from .fracture.stage import Fracture
 from .jit import njit
 from .parallel.comm import Comm
-from .parallel.fixed_point import (
-    Columns,
-    Grouped,
-    Table,
-    Tally,
-    exact_sums,
-    limbs,
-    magnitude,
-    most,
-    totals_and_words,
-)
-from .state import CHUNK, WORKS, Block, Floats, Ints, Model
+from .parallel.fixed_point import Columns, Grouped, Table, Tally, exact_sums, totals_and_words
+from .state import WORKS, Floats, Model
 
 _TOLD = 0.01
 """Share of the largest energy that may be missing, that unequal steps may take or make and averaged pressures make,
@@ -113,7 +104,7 @@ class Ledger:
         elastic, averaging = float(work - plastic - averaged), float(averaged) + gone_averaged
         lost, cohesive = 0.0, 0.0
         if self._cohesion is not None:
-            lost, cohesive, whole = self._cohesion.told(told["open"], told["facets"])
+            lost, cohesive, whole = self._cohesion.energies(told["open"], told["facets"])
             self._taken = max(self._taken, lost)
             self.unpaid = max(self.unpaid, (self._taken - lost) / whole if whole > 0.0 else 0.0)
         inside = elastic + plastic_sum + viscous_sum + averaging
@@ -216,7 +207,7 @@ class Ledger:
 
     def _friction_work(self, told: dict[str, Floats]) -> float:
         """Energy, J, that friction has taken, of contact and of boundaries."""
-        work = self._contact.books.heat(told["friction"]) if self._contact is not None else 0.0
+        work = self._contact.books.friction_work(told["friction"]) if self._contact is not None else 0.0
         return sum(told["boundaries"].tolist(), work)
 
     def _boundary_work(self) -> tuple[Floats, Floats]:
@@ -235,45 +226,6 @@ def _named(parts: list[str], kinetic: Floats, internal: Floats) -> dict[str, Par
     """By part; none where there is one part alone."""
     rows = zip(parts, kinetic.tolist(), internal.tolist(), strict=True)
     return {part: PartEnergy(kinetic=k, internal=i) for part, k, i in rows} if len(parts) > 1 else {}
-
-
-class ElementWork:
-    """The columns WORKS over all tets, grouped by part, J; read where they are."""
-
-    def __init__(self, blocks: list[Block], parts: int) -> None:
-        self._blocks, self._parts = blocks, parts
-
-    def largest(self) -> Floats:
-        found = np.zeros(len(WORKS))
-        for block in self._blocks:
-            _largest_work(found, block.state, block.n)
-        return found
-
-    def limbs(self, scale: Floats) -> Ints:
-        words = np.zeros((self._parts, 2, len(WORKS)), np.int64)
-        for block in self._blocks:
-            _limbs_of_work(words[block.part], block.state, block.n, scale)
-        return words
-
-
-@njit("void(float64[::1], float64[:, :, ::1], int64)", cache=True, error_model="numpy")
-def _largest_work(largest, state, n):  # type: ignore[no-untyped-def]
-    """Raises the ``largest`` (4,) magnitudes of WORKS of the ``n`` tets."""
-    for j in range(len(WORKS)):
-        found = 0
-        for c in range((n + CHUNK - 1) // CHUNK if WORKS[j] < state.shape[1] else 0):
-            found = max(found, most(state[c, WORKS[j], : min(CHUNK, n - c * CHUNK)]))
-        largest[j] = max(largest[j], magnitude(found))
-
-
-@njit("void(int64[:, ::1], float64[:, :, ::1], int64, float64[::1])", cache=True, error_model="numpy")
-def _limbs_of_work(words, state, n, scale):  # type: ignore[no-untyped-def]
-    """Adds the limbs of WORKS of the ``n`` tets to ``words`` (2, 4)."""
-    for j in range(len(WORKS)):
-        for c in range((n + CHUNK - 1) // CHUNK if WORKS[j] < state.shape[1] else 0):
-            high, low = limbs(state[c, WORKS[j], : min(CHUNK, n - c * CHUNK)], scale[j])
-            words[0, j] += high
-            words[1, j] += low
 
 
 @njit("void(float64[::1], float64[::1], int32[::1], float64[::1], float64[::1])", cache=True)

@@ -15,6 +15,7 @@ from conoid.worker.fracture.cohesive import Cohesion
 from conoid.worker.fracture.columns import Facets
 from conoid.worker.fracture.insertion import inserted
 from conoid.worker.parallel.comm import SerialComm
+from conoid.worker.parallel.fixed_point import exact_sums
 from conoid.worker.state import Nodes
 
 Floats = npt.NDArray[np.float64]
@@ -71,7 +72,12 @@ class Facet:
     @property
     def work(self) -> float:
         """Done so far, J."""
-        return sum(self.cohesion.energies(SerialComm())[:2])
+        return sum(self.energies()[:2])
+
+    def energies(self) -> tuple[float, float, float]:
+        """Lost for good, what closing would give back, and what it takes in the end, J."""
+        sums = exact_sums(SerialComm(), self.cohesion.columns())
+        return self.cohesion.energies(sums, self.cohesion.gone.total(SerialComm()))
 
     def open(self, u: Floats, turned: Floats | None = None) -> None:
         """The far side stands ``u`` (3,), m, from the first; ``turned`` (3, 3): rotation of everything."""
@@ -142,12 +148,12 @@ def test_a_facet_returns_on_the_secant_and_gives_back_what_lies_under_it(angle: 
         facet.open(share * most * way)
         assert facet.pull == pytest.approx(secant * (share * most + e) * way, abs=1e-9 * STRENGTH)
     assert facet.work == pytest.approx(taken, rel=1e-9)
-    lost, back, _ = facet.cohesion.energies(SerialComm())
+    lost, back, _ = facet.energies()
     assert back == pytest.approx(AREA * 0.5 * secant * ((most + e) ** 2 - e**2), rel=1e-9)
     assert lost + back == pytest.approx(AREA * 0.5 * (STRENGTH + top) * most, rel=1e-6)
     facet.open(0.0 * way)
     assert facet.work == pytest.approx(lost, rel=1e-9)
-    assert facet.cohesion.energies(SerialComm())[1] == pytest.approx(0.0, abs=1e-12 * lost)
+    assert facet.energies()[1] == pytest.approx(0.0, abs=1e-12 * lost)
     tear(facet, way)
     assert facet.work == pytest.approx(ENERGY * AREA, rel=1e-6)
 
@@ -165,7 +171,7 @@ def test_what_is_lost_never_comes_back() -> None:
         lent = facet.facets.softening.lent.copy()
         u, largest = u + change, max(largest, abs(float(change @ NORMAL)))
         facet.open(u)
-        one, back, _ = facet.cohesion.energies(SerialComm())
+        one, back, _ = facet.energies()
         assert back >= 0.0
         gone = len(facet.facets.state.work) == 0
         lost.append(one if gone else one + float(drop[(lent > 0.0) & (facet.facets.softening.lent == 0.0)].sum()))
@@ -183,12 +189,12 @@ def test_a_facet_that_is_pushed_back_beyond_the_start_lets_go(angle: float) -> N
     step = 1e-3 * facet.offset
     facet.open(-step * way)
     assert np.abs(facet.pull).max() == 0.0
-    lost, back, _ = facet.cohesion.energies(SerialComm())
+    lost, back, _ = facet.energies()
     assert back == 0.0
     assert lost == pytest.approx(-0.5 * STRENGTH * step * AREA, rel=1e-9)
     for share in np.linspace(0.0, 0.9, 201):
         facet.open(-(step + share * facet.offset) * way)
-        one, back, _ = facet.cohesion.energies(SerialComm())
+        one, back, _ = facet.energies()
         assert one == pytest.approx(lost, abs=1e-9 * ENERGY * AREA)
         assert back >= 0.0
     facet.open(-step * way)

@@ -56,15 +56,11 @@ class Books:
         self.contact_loss = extended(self.contact_loss, np.zeros(copies))
         self.external_work = extended(self.external_work, np.zeros(copies))
 
-    def friction_work(self, comm: Comm) -> float:
-        """Heat of friction so far of the contacts of all ranks, J, that of the last step as far as ``contact_loss`` has
-        it; all ranks take part.
-        """
-        return self.heat(self.friction.total(comm))
-
     @staticmethod
-    def heat(friction: Floats) -> float:
-        """The same by the sums of ``friction`` over all ranks."""
+    def friction_work(friction: Floats) -> float:
+        """Heat of friction so far of the contacts of all ranks, J, that of the last step as far as ``contact_loss`` has
+        it; by the sums of ``friction`` over them.
+        """
         work, later = friction
         return float(work - later)
 

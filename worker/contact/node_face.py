@@ -175,10 +175,9 @@ def node_face(out, n, pairs, slots, faces, step, end):  # type: ignore[no-untype
         if not passes:
             continue
         leaves, until_end = np.inf if other[s] else strayed[s], end + step.dt
-        border = min(b[0], b[1], b[2]) <= RIM
-        if border:
-            border = not reaches_over(normals, s, b, minus(at(x, j), at(x, i)), minus(at(x, k), at(x, i)), size[f])
-        if border and in_front(pairs, first, faces, step, normals, p, gap0, gap1, leaves, until_end):
+        sides = minus(at(x, j), at(x, i)), minus(at(x, k), at(x, i))
+        beside = min(b[0], b[1], b[2]) <= RIM and not reaches_over(normals, s, b, sides[0], sides[1], size[f])
+        if beside and in_front(pairs, first, faces, step, normals, p, gap0, gap1, leaves, until_end):
             continue
         row = n
         if gap0 < -TOUCHING * size[f]:

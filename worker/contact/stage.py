@@ -138,10 +138,6 @@ class Contact:
                 effort += weight * np.bincount(at[at >= 0], minlength=n)
         return np.column_stack([search, push])
 
-    def friction_work(self) -> float:
-        """Heat of friction so far of the contacts of all ranks, J; all ranks take part."""
-        return self.books.friction_work(self._comm)
-
     def impulses(self) -> Floats:
         """(parts, 3) what contact has given each part so far, N s; all ranks take part."""
         return self.books.impulses(self._comm)

@@ -29,8 +29,7 @@ A facet whose nodes have not separated holds by itself: its pairs are one node, 
 import numpy as np
 
 from ..migration.parcel import Parcel
-from ..parallel.comm import Comm
-from ..parallel.fixed_point import Tally, exact_sums
+from ..parallel.fixed_point import Tally
 from ..state import Flags, Floats, Indices, Ints, Nodes
 from ..topology import Split
 from . import law
@@ -97,12 +96,6 @@ class Cohesion:
         """Adds the forces in quanta of 1 / ``scale`` N to the nodal sums; returns the bits of the largest."""
         return int(law.scatter(force, self.facets.nodes, self.facets.state.pull, scale))
 
-    def energies(self, comm: Comm) -> tuple[float, float, float]:
-        """Energy, J, that is lost for good, that the closing of facets would give back, and that all facets take which
-        have ever been inserted, when they have failed; all ranks take part.
-        """
-        return self.told(exact_sums(comm, self.columns()), self.gone.total(comm))
-
     def columns(self) -> Floats:
         """(m, 3) work on each facet, what its closing would give back, and what it takes in the end, J."""
         f, s = self.facets.softening, self.facets.state
@@ -113,8 +106,10 @@ class Cohesion:
         return np.column_stack([s.work.sum(axis=1), back, _whole(self.facets)])
 
     @staticmethod
-    def told(sums: Floats, gone: Floats) -> tuple[float, float, float]:
-        """``energies`` by the sums of ``columns`` and of ``gone`` over all ranks."""
+    def energies(sums: Floats, gone: Floats) -> tuple[float, float, float]:
+        """Energy, J, that is lost for good, that the closing of facets would give back, and that all facets take which
+        have ever been inserted, when they have failed; by the sums of ``columns`` and of ``gone`` over all ranks.
+        """
         work, reversible, whole = sums
         gone_work, gone_whole = gone
         return float(work + gone_work - reversible), float(reversible), float(whole + gone_whole)

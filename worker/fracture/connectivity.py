@@ -100,8 +100,10 @@ def _bind_block(root: Indices, ids: Ints, where: _Where, block: Block, first: in
         _bind(root, np.column_stack([here[:-1], here[1:]]), ids)
         return np.array([[first, _PART + block.part]])
     table, behind = where.table(block.across)
-    outer = np.empty(block.across.size, np.int64)
-    outer = outer[: _bind_faces(outer, root, ids, table, behind, block.bond, first)]
+    pairs, outer = np.empty((block.across.size, 2), np.int64), np.empty(block.across.size, np.int64)
+    inner, rest = _across_faces(pairs, outer, table, behind, block.bond, first)
+    _bind(root, pairs[:inner], ids)
+    outer = outer[:rest]
     return np.column_stack([first + (outer >> 2), block.across.reshape(-1)[outer] >> 2])
 
 
@@ -145,30 +147,24 @@ def _bind(root, pairs, ids):  # type: ignore[no-untyped-def]
             a = above
 
 
-@njit("int64(int64[::1], int32[::1], int64[::1], int32[::1], int32[:, ::1], uint8[:, ::1], int64)", cache=True)
-def _bind_faces(outer, root, ids, table, behind, bond, first):  # type: ignore[no-untyped-def]
-    """The same of the tets of a block and what is ``behind`` their whole faces; sets the first of ``outer`` to the
-    faces, 4 * tet + face, behind which is none of this rank, and returns how many there are.
+@njit("UniTuple(int64, 2)(int64[:, ::1], int64[::1], int32[::1], int32[:, ::1], uint8[:, ::1], int64)", cache=True)
+def _across_faces(pairs, outer, table, behind, bond, first):  # type: ignore[no-untyped-def]
+    """Sets the first of ``pairs`` to the places of the tets of a block and of those ``behind`` their whole faces, and
+    the first of ``outer`` to the faces, 4 * tet + face, behind which is none of this rank; how many there are of both.
     """
-    rows, end = 0, len(table) - 1
+    inner, rest, end = 0, 0, len(table) - 1
     for tet in range(len(behind)):
         for face in range(4):
             if behind[tet, face] < 0 or (len(bond) and bond[tet, face] != 0):
                 continue
-            a, b = first + tet, table[min(behind[tet, face] >> 2, end)]
-            if b < 0:
-                outer[rows] = 4 * tet + face
-                rows += 1
-                continue
-            while root[a] != root[b]:  # as in _bind: called, it takes five times as long
-                if ids[root[a]] < ids[root[b]]:
-                    a, b = b, a
-                above = root[a]
-                root[a] = root[b]
-                if above == a:
-                    break
-                a = above
-    return rows
+            other = table[min(behind[tet, face] >> 2, end)]
+            if other < 0:
+                outer[rest] = 4 * tet + face
+                rest += 1
+            else:
+                pairs[inner, 0], pairs[inner, 1] = first + tet, other
+                inner += 1
+    return inner, rest
 
 
 @njit("void(int32[::1])", cache=True)
