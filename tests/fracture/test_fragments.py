@@ -140,23 +140,6 @@ def test_labels_are_those_of_scipy_on_any_number_of_ranks(broken: float) -> None
     assert 2 <= len(np.unique(expected)) <= len(expected) - len(b.held) / 2
 
 
-@pytest.mark.parametrize("ranks", RANKS)
-def test_labels_are_the_same_where_few_tets_have_far_ids(ranks: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A rank of a large mesh finds its tets by bisection."""
-    b = body(11, broken=0.7, parts=2)
-
-    def work(comm: Comm) -> list[tuple[Ints, Ints]]:
-        model, labels = labels_of(b, owners(b, ranks, ranks), comm)
-        return [(piece.id, label) for piece, label in zip(model.blocks, labels, strict=True)]
-
-    found = np.full(len(b.tets), -1)
-    monkeypatch.setattr(connectivity, "_SPARSE", 0)
-    for pairs in on_ranks(ranks, work):
-        for ids, label in pairs:
-            found[ids] = label
-    assert (found == b.labels()).all()
-
-
 def test_fragments_are_counted_on_any_number_of_ranks() -> None:
     b = body(12, broken=0.7, parts=3)
     b.bare = 1

@@ -13,9 +13,6 @@ from ..state import Block, Indices, Ints, Model
 
 _PART = 1 << 62
 """Added to the number of a part: the name of what joins its tets, above all tet ids."""
-_SPARSE = 128
-"""Times as many ids as tets from which on no table of the ids is laid out. Chosen: until then it has fewer bytes than
-the state of the tets."""
 
 
 def labels(model: Model, held: Ints, comm: Comm) -> list[Ints]:
@@ -51,34 +48,16 @@ def components(n: int, edges: Ints | Indices) -> Ints:
 
 
 class _Where:
-    """Where the tets of a rank stand, by their global ids (n,): a table of all ids, unless they are sparse."""
+    """Where the tets of a rank stand, by their global ids (n,)."""
 
     def __init__(self, ids: Ints) -> None:
-        self._end, self._n = int(ids.max(initial=-1)) + 1, len(ids)
-        self._sparse = self._end > _SPARSE * len(ids)
-        if self._sparse:
-            self._order = np.argsort(ids).astype(np.int32)
-            self._known = ids[self._order]
-        else:
-            self._table = np.full(self._end + 1, -1, np.int32)
-            self._table[ids] = np.arange(len(ids), dtype=np.int32)
+        self._order = np.argsort(ids, kind="stable").astype(np.int32)
+        self._known = ids[self._order]
 
     def of(self, wanted: Ints | Indices) -> Indices:
         """Places of tets, in their shape; -1 where they are not here."""
-        if not self._sparse:
-            return np.asarray(self._table[np.minimum(wanted, self._end)])
         at = places(self._known, wanted)
-        return np.where(at >= 0, self._order[at], -1).astype(np.int32)
-
-    def table(self, across: Indices) -> tuple[Indices, Indices]:
-        """A table of the places of some tets, -1 for those that are not here, and 4 times where each of those behind
-        faces, ``Block.across``, stands in it; others below zero.
-        """
-        if not self._sparse:
-            return self._table, across
-        at = self.of(across >> 2)
-        table = np.append(np.arange(self._n, dtype=np.int32), np.int32(-1))
-        return table, np.where(across < 0, -1, 4 * np.where(at >= 0, at, self._n)).astype(np.int32)
+        return np.where(at >= 0, self._order[at], -1) if len(self._order) else at
 
 
 def _bind_held(root: Indices, ids: Ints, where: _Where, pairs: Ints) -> Ints:
@@ -99,9 +78,8 @@ def _bind_block(root: Indices, ids: Ints, where: _Where, block: Block, first: in
         here = np.arange(first, first + block.n)
         _bind(root, np.column_stack([here[:-1], here[1:]]), ids)
         return np.array([[first, _PART + block.part]])
-    table, behind = where.table(block.across)
     pairs, outer = np.empty((block.across.size, 2), np.int64), np.empty(block.across.size, np.int64)
-    inner, rest = _across_faces(pairs, outer, table, behind, block.bond, first)
+    inner, rest = _across_faces(pairs, outer, where.of(block.across >> 2), block.across, block.bond, first)
     _bind(root, pairs[:inner], ids)
     outer = outer[:rest]
     return np.column_stack([first + (outer >> 2), block.across.reshape(-1)[outer] >> 2])
@@ -147,22 +125,21 @@ def _bind(root, pairs, ids):  # type: ignore[no-untyped-def]
             a = above
 
 
-@njit("UniTuple(int64, 2)(int64[:, ::1], int64[::1], int32[::1], int32[:, ::1], uint8[:, ::1], int64)", cache=True)
-def _across_faces(pairs, outer, table, behind, bond, first):  # type: ignore[no-untyped-def]
+@njit("UniTuple(int64, 2)(int64[:, ::1], int64[::1], int32[:, ::1], int32[:, ::1], uint8[:, ::1], int64)", cache=True)
+def _across_faces(pairs, outer, behind, across, bond, first):  # type: ignore[no-untyped-def]
     """Sets the first of ``pairs`` to the places of the tets of a block and of those ``behind`` their whole faces, and
     the first of ``outer`` to the faces, 4 * tet + face, behind which is none of this rank; how many there are of both.
     """
-    inner, rest, end = 0, 0, len(table) - 1
+    inner, rest = 0, 0
     for tet in range(len(behind)):
         for face in range(4):
-            if behind[tet, face] < 0 or (len(bond) and bond[tet, face] != 0):
+            if across[tet, face] < 0 or (len(bond) and bond[tet, face] != 0):
                 continue
-            other = table[min(behind[tet, face] >> 2, end)]
-            if other < 0:
+            if behind[tet, face] < 0:
                 outer[rest] = 4 * tet + face
                 rest += 1
             else:
-                pairs[inner, 0], pairs[inner, 1] = first + tet, other
+                pairs[inner, 0], pairs[inner, 1] = first + tet, behind[tet, face]
                 inner += 1
     return inner, rest
 
