@@ -4,7 +4,9 @@ import pytest
 
 from conoid.worker.materials.viscosity import resisted
 
-from .kernels import COPPER, FORMS, Form, build, run, scene
+from conoid.worker import step
+
+from .kernels import COPPER, FORMS, STEEL, Form, build, run, scene
 from .meshes import block
 
 
@@ -46,3 +48,21 @@ def test_averaged_forms_lose_no_more_to_viscosity_than_the_standard_one() -> Non
 
     standard, *averaged = (lost(form) for form in FORMS)
     assert all(0.01 < share < 0.8 * standard for share in averaged)
+
+
+def test_few_tets_that_ring_are_computed_in_steps_that_do_not_ring_with_them() -> None:
+    """A cube of steel that is pushed apart on a wall. Where tets at rest, or that expand, were bounded without
+    viscosity, the step went with each oscillation by the 6 % of the linear term: 1 % of the energy at once, 2 % later.
+    """
+    wall = {"kind": "wall", "point": (0.0, 0.0, 0.0), "normal": (0.0, 0.0, 1.0)}
+    case = scene(STEEL, "standard", viscosity={}, boundaries=(wall,), frames=0)
+    sim = build(case, [block((1, 1, 1), 1e-3)])
+    nodes = sim.model.nodes
+    nodes.v[:] = 100.0 * nodes.x0
+    initial = 0.5 * float(nodes.mass @ (nodes.v**2).sum(axis=1))
+    step.prepare(sim)
+    for _ in range(1000):
+        before = nodes.v.copy()
+        step.first_half(sim)
+        assert abs(sim.ledger.close(before).stepping) < 1e-3 * initial
+        step.second_half(sim)

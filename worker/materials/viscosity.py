@@ -9,9 +9,6 @@ from ..state import CHUNK, MASS, PRESSURE, VISCOUS, WORK_VISCOUS
 HALF = 0.01
 """Of the wave speed: a difference of speed over a tet at which half of the shock term is there. Chosen between elastic
 waves in bars (10 m/s over some tets: 5e-4) and weak shocks (300 m/s in copper: 0.03)."""
-STILL = 1e-12
-"""Of the wave speed: what is slower over a tet does not bound the step. Chosen above what rounding leaves of the rates
-in free flight, some 1e-16 times how many tets from the origin, and below anything that moves."""
 SQUEEZED = 0.1
 """Of the volume: compression in which an averaged tet's own rate is resisted in full. Chosen by what columns of metal
 bear at 1.5 and 2 km/s (docs/numerics.md, "Plates under 100 GPa"); where metal flows at 100 m/s it is some 1e-3."""
@@ -43,9 +40,10 @@ def bulk_viscosity(w, s, n, linear, shock, quadratic, rate_of_change, breaks, in
     elastic wave. ``rate_of_change`` turns CHANGE into a volume flux, 1/s. With G = sqrt(sum |grad N|^2) and Q the
     tangent (linear + shock S (2 - S)) c + 2 quadratic u the largest stable step is
     1 / (G (G l Q + sqrt((G l Q)^2 + c^2))); l = LENGTH_FACTOR / G. Both are derived in docs/numerics.md. A tet that is
-    inside out has no viscosity, and NaN as its limit. Where a part ``breaks`` a tet in tension is bounded as one that
-    is compressed at the speed at which it would be let go, |p| / (density c). ``initial``: the density at the start
-    where the pressure sees the mean of the nodes, and so does the viscosity (``resisted``); else 0.
+    inside out has no viscosity, and NaN as its limit. One that is at rest or expands is bounded as one that begins to
+    be compressed; where a part ``breaks``, one in tension as one that is compressed at the speed at which it would be
+    let go, |p| / (density c). ``initial``: the density at the start where the pressure sees the mean of the nodes, and
+    so does the viscosity (``resisted``); else 0.
     """
     for i in range(n):
         mass, change = s[_MASS + i], w[CHANGE + i]
@@ -67,7 +65,6 @@ def bulk_viscosity(w, s, n, linear, shock, quadratic, rate_of_change, breaks, in
             u = max(u, -s[_P + i] / (density * c))
             share = u / (u + HALF * c)
         tangent = LENGTH_FACTOR * ((linear + shock * share * (2.0 - share)) * c + 2.0 * quadratic * u)
-        tangent = 0.0 if u <= STILL * c else tangent
         s[_WORK + i] -= 0.5 * (s[_Q + i] + new) * change
         s[_Q + i] = new
         limit = gradient * (tangent + np.sqrt(tangent * tangent + c * c))
