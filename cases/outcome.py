@@ -54,6 +54,10 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     """Nodes that end inside of another body or fragment, deeper than 0.05 of the typical size of a face."""
     deepest: float = math.nan
     """How deep the deepest of them is that has not gone through the outermost tets, in typical sizes of a face."""
+    overlapping: int | None = None
+    """Tets at surfaces that end with more than a tenth of their volume in other bodies or fragments."""
+    overlap: float = math.nan
+    """What these bodies and fragments have in common, of the volume of all tets at surfaces."""
     rebalances: int | None = None
     balancing_cost: float = math.nan
     """s; of all cuts."""

@@ -17,7 +17,7 @@ from .result import Result
 
 _OUTCOME = (
     "steps", "time", "ranks", "elapsed", "cpu", "elements", "nodes", "fragments", "broken", "eroded", "eroded_mass",
-    "inside", "deepest", "rebalances", "worst_residual", "element_updates_per_second",
+    "inside", "deepest", "overlapping", "overlap", "rebalances", "worst_residual", "element_updates_per_second",
 )  # fmt: skip
 _DRAWN = (
     "kinetic", "elastic", "plastic", "contact", "friction", "eroded", "fracture", "cohesive", "stepping", "averaging",

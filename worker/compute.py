@@ -20,6 +20,7 @@ from conoid.cases.stages import without
 from . import digest, reference, simulation
 from .assembly import quiet
 from .balance import Balance
+from .contact import common_volume
 from .contact.inside import look
 from .errors import InputError, PhysicsError
 from .jit import cpu_time
@@ -145,7 +146,9 @@ def _sum_up(
     if sim.record is not None:
         sim.record.look()
         fragments = sim.record.count
-    inside = look(sim.contact, sim.model, sim.record.labels if sim.record else None, sim.comm) if sim.contact else None
+    labels = sim.record.labels if sim.record else None
+    inside = look(sim.contact, sim.model, labels, sim.comm) if sim.contact else None
+    common = common_volume.measure(sim.contact, sim.model, labels, sim.comm) if sim.contact else None
     state, cause, message = STOPS[loop.stopped] if loop.stopped else (State.SUCCEEDED, None, "")
     if failure is not None:
         state, cause, message = State.FAILED, failure.cause, str(failure)
@@ -155,7 +158,8 @@ def _sum_up(
         eroded=start.elements - sim.model.elements_global, eroded_mass=sim.ledger.eroded_mass,
         nodes_initial=start.nodes, nodes=sim.model.nodes_global, fragments=fragments,
         broken=sim.fracture.broken if sim.fracture is not None else 0,
-        inside=inside.nodes if inside else 0, deepest=inside.deepest if inside else 0.0, energy=loop.energy,
+        inside=inside.nodes if inside else 0, deepest=inside.deepest if inside else 0.0,
+        overlapping=common.large if common else 0, overlap=common.share if common else 0.0, energy=loop.energy,
         worst_residual=sim.ledger.worst, rebalances=loop.balance.events, balancing_cost=loop.balance.spent,
         balancing_saved=loop.balance.saved,
         phases={name: [s[name] for s in seconds] for name in PHASES} if seconds else {},
@@ -166,5 +170,6 @@ def _sum_up(
             *start.warnings, *loop.warnings, *loop.lost, *sim.ledger.warnings,
             *(sim.erosion.warnings() if sim.erosion is not None else []),
             *(sim.fracture.warnings if sim.fracture is not None else []), *(inside.warnings if inside else []),
+            *(common.warnings if common else []),
         ],
     )  # fmt: skip

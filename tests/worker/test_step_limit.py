@@ -136,7 +136,7 @@ def test_viscous_bound_is_never_above_the_exact_limit(rate: float) -> None:
 
 
 def test_what_may_break_is_bounded_in_tension_as_if_it_were_let_go() -> None:
-    """By the viscosity at the speed |p| / (density c); a part that does not fracture is not, nor is one without."""
+    """By the viscosity at the speed |p| / (density c); in a part that does not fracture by the linear term alone."""
     mesh, found = free_tets(1, 4), []
     for breaks in (False, True):
         patch = one(mesh, 0, 0.3, viscosity={"linear": LINEAR, "shock": SHOCK, "quadratic": QUADRATIC})
@@ -149,11 +149,12 @@ def test_what_may_break_is_bounded_in_tension_as_if_it_were_let_go() -> None:
     c = math.sqrt((bulk + 4.0 / 3.0 * shear * free_volume(patch) / float(volume[0])) / density)
     u = -float(patch.get(PRESSURE)[0]) / (density * c)
     share = u / (u + 0.01 * c)
+    least = LENGTH_FACTOR * LINEAR * c
     tangent = LENGTH_FACTOR * ((LINEAR + SHOCK * share * (2.0 - share)) * c + 2.0 * QUADRATIC * u)
     steep = float(formulas.inverse_length(grad)[0])
     assert u > 1.0
-    assert found[0] == pytest.approx(steep * c, rel=1e-8)
-    assert found[1] == pytest.approx(steep * (tangent + math.sqrt(tangent**2 + c**2)), rel=1e-8)
+    for limit, bound in zip(found, (least, tangent), strict=True):
+        assert limit == pytest.approx(steep * (bound + math.sqrt(bound**2 + c**2)), rel=1e-8)
 
 
 def test_viscous_bound_shrinks_with_the_rate() -> None:

@@ -2,9 +2,8 @@
 
 import pytest
 
-from conoid.worker.materials.viscosity import resisted
-
 from conoid.worker import step
+from conoid.worker.materials.viscosity import resisted
 
 from .kernels import COPPER, FORMS, STEEL, Form, build, run, scene
 from .meshes import block

@@ -63,7 +63,7 @@ def look(contact: Contact, model: Model, labels: list[Ints] | None, comm: Comm) 
     ``labels``: for each block (n,) the fragment of each tet; without, every part is one.
     """
     fragments = labels or [np.full(block.n, block.part, np.int64) for block in model.blocks]
-    outer = _outer(contact)
+    outer = outermost(contact)
     told = comm.join(_seen(outer, model, fragments)).reshape(-1, _WORDS)
     parts, x = told[:, 2].astype(np.int32), np.ascontiguousarray(told[:, 3:]).view(np.float64)
     points, part = np.concatenate([model.nodes.x, x]), np.concatenate([model.nodes.part, parts])
@@ -99,7 +99,7 @@ def _seen(outer: Flags, model: Model, fragments: list[Ints]) -> Ints:
     return np.asarray(np.column_stack([nodes.id, of, nodes.part, nodes.x.view(np.int64)])[some])
 
 
-def _outer(contact: Contact) -> Flags:
+def outermost(contact: Contact) -> Flags:
     """(nodes,) of the surface, and those that have separated."""
     ring = contact.exterior.cracks.families.ring
     return np.asarray(contact.exterior.surface.flags | (ring != np.arange(len(ring))))
