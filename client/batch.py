@@ -22,6 +22,8 @@ from .options import CaseArgument, Json, Overrides, show_json, warn_of
 from .result import LocalFolder
 from .submission import data_of, locate
 
+_CASE = "case.json"
+"""What is asked for, as it is handed to the worker."""
 _PLACES = ("~/.config/conoid/site.toml", "/etc/conoid/site.toml")
 
 
@@ -71,6 +73,12 @@ def slurm_of(site: Path | None) -> Slurm:
     return settings or Slurm(profiles={"default": batch.Profile()})
 
 
+def commands_of(folder: Path) -> str:
+    """Where the commands are of the Slurm that a run's folder was handed to; empty: in PATH. Raises ClientError."""
+    job = batch.read_job(folder)
+    return job.bin if job is not None and job.bin else slurm_of(None).bin
+
+
 def hand_over(
     case: str, ranks: int, overrides: Iterable[str], out: Path | None, profile: str, site: Slurm
 ) -> Handed:  # fmt: skip
@@ -82,11 +90,10 @@ def hand_over(
         chosen = batch.profile_of(site, profile or checked.run.profile)
         if shutil.which("sbatch", path=site.bin or None) is None:
             raise ClientError("sbatch: there is none; Slurm's commands are in PATH, or [slurm] bin names their folder")
-        job = _known(folder, site) if folder.exists() else None
+        data = _with_paths(data, locate(case).parent)
+        job = _known(folder, data, chosen[0] if profile else "", site) if folder.exists() else None
         if job is None:
-            job = _prepared(
-                folder, _with_paths(data, locate(case).parent), resolved_json(checked), ranks, chosen, site.bin
-            )
+            job = _prepared(folder, data, resolved_json(checked), ranks, chosen, site.bin)
         number = slurm.submit(site.bin, folder, job, batch.profile_of(site, job.profile)[1])
         noted = batch.Job(**{**{name: getattr(job, name) for name in job.__struct_fields__}, "job": number})
         whole.write(folder / layout.JOB, batch.to_json(noted))
@@ -99,8 +106,10 @@ def hand_over(
     return Handed(folder, number, job.profile, job.attempt)
 
 
-def _known(folder: Path, site: Slurm) -> Job | None:
-    """The record of a folder that was handed over before: of its job, or of a next one when that is lost."""
+def _known(folder: Path, data: dict[str, Any], profile: str, site: Slurm) -> Job | None:
+    """The record of a folder that was handed over before: of its job, or of a next one when that is lost. Raises
+    ClientError where it is of another case, or of another ``profile`` than the one that is asked for.
+    """
     job = batch.read_job(folder)
     if job is None:
         if any(folder.iterdir()):
@@ -108,12 +117,16 @@ def _known(folder: Path, site: Slurm) -> Job | None:
         return None
     if (folder / layout.OUTCOME).exists():
         raise ClientError(f"{folder}: this run has ended; --out names another folder")
+    if resolved_json(parse_case(json.loads((folder / _CASE).read_bytes()))) != resolved_json(parse_case(data)):
+        raise ClientError(f"{folder}: handed to Slurm with another case or other ranks; --out names another folder")
+    if profile not in ("", job.profile):
+        raise ClientError(f"{folder}: handed to Slurm with the profile {job.profile!r}; --out names another folder")
     known = slurm.jobs(site.bin, job.name)
     if not job.job or any(entry.state not in slurm.FINAL for entry in known) or slurm.held(folder):
         return job
     (folder / layout.STOP_REQUEST).unlink(missing_ok=True)
-    profile = batch.profile_of(site, job.profile)
-    fresh = batch.new_job(job.run, job.ranks, profile, job.command, time.time(), job.attempt + 1, site.bin)
+    chosen = batch.profile_of(site, job.profile)
+    fresh = batch.new_job(job.run, job.ranks, chosen, job.command, time.time(), job.attempt + 1, site.bin)
     whole.write(folder / layout.JOB, batch.to_json(fresh))
     return fresh
 
@@ -123,7 +136,7 @@ def _prepared(
 ) -> Job:  # fmt: skip
     """The run's folder, complete on disk before Slurm hears of it."""
     (folder / layout.LOGS).mkdir(parents=True, exist_ok=True)
-    case = folder / "case.json"
+    case = folder / _CASE
     case.write_text(json.dumps(data, indent=2, default=str), encoding="utf-8")
     (folder / layout.RESOLVED_CASE).write_bytes(resolved)
     worker = [sys.executable, "-m", "mpi4py", "-m", "conoid.worker", str(case), "--out", str(folder)]
@@ -167,7 +180,7 @@ def cancel_folder(folder: Path) -> str:
     if job is None or not job.job:
         return f"{folder} is asked to stop"
     try:
-        slurm.notify(slurm_of(None).bin, job.job)
+        slurm.notify(commands_of(folder), job.job)
     except slurm.SlurmError as error:
         return f"{folder} is asked to stop; Slurm does not answer: {error}"
     return f"{folder} is asked to stop, job {job.job}"

@@ -11,7 +11,7 @@ from conoid.cases import layout
 from conoid.cases.run import State
 
 from . import tables
-from .batch import cancel_folder, slurm_of
+from .batch import cancel_folder, commands_of
 from .errors import UsageError
 from .following import FolderRun
 from .live import Live, exit_code
@@ -134,7 +134,7 @@ def watch_run(
     """Follow a run until it ends: 0 succeeded, 1 failed, 2 bad input, 4 cancelled. Ctrl-C leaves it running."""
     if Path(run).is_dir():
         LocalFolder(Path(run)).path(layout.JOURNAL)
-        followed = FolderRun(Path(run), slurm_of(None).bin)
+        followed = FolderRun(Path(run), commands_of(Path(run)))
         if as_json:
             raise typer.Exit(_print_messages(followed))
         known = watch(followed, False if plain else None)

@@ -61,7 +61,9 @@ def page(
     limit: Annotated[int, Query(ge=1, le=500)] = 50,
     label: Annotated[list[str] | None, Query(description="NAME=VALUE; runs that have all of them")] = None,
 ) -> dict[str, Any]:
-    """Own runs, newest first; ``next`` is the cursor of the following page, null on the last."""
+    """Own runs, newest first, without those that have been removed; ``next`` is the cursor of the following page, null
+    on the last.
+    """
     before = None if cursor is None else view.from_cursor(cursor)
     pages = _pages(service, identity.owner, _states(state), before, limit + 1)
     wanted = labels_of(label or ()).items()
@@ -72,9 +74,9 @@ def page(
 
 
 def _pages(service: Service, owner: str, states: list[State], before: str | None, size: int) -> Iterator[Run]:
-    """The runs of an owner, newest first, so many at a time from the store."""
+    """The runs of an owner that have not been removed, newest first, so many at a time from the store."""
     while some := service.store.page(owner, states, before, size):
-        yield from some
+        yield from (run for run in some if run.id not in service.farewells)
         if len(some) < size:
             return
         before = some[-1].id

@@ -11,10 +11,12 @@ from typer.testing import CliRunner, Result
 
 from conoid.cases import batch, layout
 from conoid.cases.run import State
+from conoid.client.batch import commands_of
 from conoid.client.cli import app
 from conoid.client.following import FolderRun
 
 from . import real_slurm
+from .fake_slurm import ACCEPT, commands
 from .real_slurm import Cluster
 
 ROOT = Path(__file__).parents[2]
@@ -125,3 +127,37 @@ def test_following_ends_where_the_outcome_is(tmp_path: Path) -> None:
     told = list(FolderRun(tmp_path).messages())
     assert [message.seq for message in told] == [1, 2, 3, 0]
     assert getattr(told[-1], "state", "") == State.CANCELLED
+
+
+@pytest.fixture
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The settings file of a Slurm whose commands are in no PATH; nothing names it."""
+    (tmp_path / "bin").mkdir()
+    site = tmp_path / "site.toml"
+    profiles = "[slurm.profiles.standard]\n[slurm.profiles.long]\n"
+    place = commands(tmp_path, f"{ACCEPT}; echo $((100 + $(wc -l < calls)))")
+    site.write_text(f'[slurm]\nbin = "{place}"\ndefault = "standard"\n{profiles}')
+    monkeypatch.delenv("CONOID_SITE", raising=False)
+    monkeypatch.chdir(tmp_path)
+    return site
+
+
+def test_a_folder_is_handed_over_for_one_case(elsewhere: Path) -> None:
+    words = ["batch", "two_tets", "--ranks", 1, "--site", elsewhere]
+    assert conoid(*words).exit_code == 0
+    assert "job 101" in conoid(*words).stdout
+    for more, wrong in (
+        (["--set", "run.end_time=1us"], "another case or other ranks"),
+        (["--ranks", 2], "another case or other ranks"),
+        (["--slurm", "long"], "with the profile 'standard'"),
+    ):
+        other = conoid(*words, *more)
+        assert other.exit_code == 1
+        assert f"{wrong}; --out names another folder" in other.output
+    assert "job 101" in conoid(*words, "--slurm", "standard").stdout
+
+
+def test_a_folder_knows_where_the_commands_of_its_slurm_are(elsewhere: Path) -> None:
+    assert conoid("batch", "two_tets", "--ranks", 1, "--site", elsewhere).exit_code == 0
+    assert conoid("cancel", "runs/two_tets").stdout == "runs/two_tets is asked to stop, job 101\n"
+    assert commands_of(Path("runs/two_tets")) == str(elsewhere.parent / "bin")

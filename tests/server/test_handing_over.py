@@ -24,19 +24,9 @@ from conoid.server.settings import Settings
 from conoid.worker import job as attempt
 from conoid.worker.lock import hold
 
+from .fake_slurm import ACCEPT, commands
+
 JOB = batch.new_job("run", 2, ("a", Profile()), ["true"], 0.0)
-SBATCH = """#!/bin/bash
-for word in "$@"; do case "$word" in --job-name=*) name="${{word#--job-name=}}";; esac; done
-cd {place}; echo called >> calls
-{body}
-"""
-SQUEUE = """#!/bin/bash
-cd {place}; [ -e away ] && {{ echo "slurm_load_jobs error: Unable to contact slurm controller" >&2; exit 1; }}
-cat queue 2>/dev/null; exit 0
-"""
-TELL = {"scancel": "ended", "scontrol": "released"}
-"""Commands that write their words into a file."""
-ACCEPT = 'echo "$((100 + $(wc -l < calls)))|PENDING|N/A|$name|Resources" >> queue'
 
 
 @pytest.fixture
@@ -45,16 +35,6 @@ def place(tmp_path: Path) -> Path:
     (tmp_path / "bin").mkdir()
     (tmp_path / "run" / layout.LOGS).mkdir(parents=True)
     return tmp_path
-
-
-def commands(place: Path, body: str) -> str:
-    """An sbatch that does ``body``, and a squeue that tells what it has queued."""
-    told = {name: f"#!/bin/bash\necho $@ >> {{place}}/{file}\n" for name, file in TELL.items()}
-    for name, text in {"sbatch": SBATCH, "squeue": SQUEUE, **told}.items():
-        path = place / "bin" / name
-        path.write_text(text.format(place=place, body=body))
-        path.chmod(0o755)
-    return str(place / "bin")
 
 
 def calls(place: Path) -> int:

@@ -78,6 +78,17 @@ def test_who_removes_a_run_is_told_too(server: Running) -> None:
     assert (answer.status_code, answer.json()["outcome"]["why"]) == (410, "by ann")
 
 
+def test_what_has_been_removed_is_in_no_list(server: Running) -> None:
+    """It ended as ``succeeded`` and was listed so, the newest of all: nothing could be done with it."""
+    runs = [ended(server.ann) for _ in range(4)]
+    for gone in (runs[3], runs[1]):
+        server.ann.http.delete(f"/v1/runs/{gone}")
+    first = server.ann.http.get("/v1/runs", params={"limit": 1}).json()
+    second = server.ann.http.get("/v1/runs", params={"limit": 1, "cursor": first["next"]}).json()
+    assert [[run["id"] for run in page["runs"]] for page in (first, second)] == [[runs[2]], [runs[0]]]
+    assert second["next"] is None
+
+
 def test_lines_survive_a_lost_database_and_a_torn_end(server: Running, tmp_path: Path) -> None:
     run, other = ended(server.ann), ended(server.ann)
     server.ann.http.delete(f"/v1/runs/{run}")
