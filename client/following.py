@@ -8,7 +8,7 @@ from pathlib import Path
 import msgspec
 
 from conoid.cases import batch, layout, slurm
-from conoid.cases.messages import AnyMessage, Finished, Status
+from conoid.cases.messages import AnyMessage, Status
 from conoid.cases.outcome import from_json
 from conoid.cases.run import Cause, State
 
@@ -64,18 +64,19 @@ class FolderRun:
         self, *, link: Link | None = None, pause: Callable[[float], None] = time.sleep
     ) -> Iterator[AnyMessage]:
         """Every line once and in order, then how the run has ended."""
-        offset, last = 0, None
+        offset = 0
         while True:
+            end = self._outcome()  # written last: all that there is to read is there before
             raw, offset = self._read(offset)
             for line in raw:
                 try:
-                    last = from_line(line)
+                    message = from_line(line)
                 except msgspec.DecodeError:  # a killed worker has left it half written
                     continue
-                yield last
-                if isinstance(last, Status) and State(last.state).final:
+                yield message
+                if isinstance(message, Status) and State(message.state).final:
                     return
-            if isinstance(last, Finished) and (end := self._outcome()) is not None:
+            if end is not None:
                 yield end
                 return
             if not raw:

@@ -5,11 +5,13 @@ from typing import Annotated
 
 import typer
 
+from conoid.cases.run import State
+
 from .errors import UsageError
-from .options import CaseArgument, Json, Token, Url, aloud, named, show_json
+from .options import CaseArgument, Json, Token, Url, aloud, complain, named, show_json
 from .saving import save_text
 from .session import connect
-from .sweep import SweepInfo, points_in, points_of
+from .sweep import SweepInfo, SweepPoint, points_in, points_of
 
 SweepArgument = Annotated[str, typer.Argument(metavar="SWEEP", callback=named, help="Id of a sweep, or 'last'.")]
 Sets = Annotated[
@@ -37,13 +39,31 @@ def sweep(
     with connect(url, token) as session:
         with aloud(f"handing {len(points)} points in"):
             made = session.sweep(case, points, at_once=at_once)
-        with aloud(f"sweep {made.id}: waiting for its runs"):
-            info = made.wait() if wait else made.status()
+        try:
+            with aloud(f"sweep {made.id}: waiting for its runs"):
+                info = made.wait() if wait else made.status()
+        except KeyboardInterrupt:
+            complain(
+                f"the runs go on; conoid sweep-table {made.id} shows them, conoid sweep-cancel {made.id} stops them"
+            )
+            raise
     if as_json:
         show_json(info)
     else:
         typer.echo(info.id)
-    raise typer.Exit(int(wait and info.states != {"succeeded": info.total}))
+    failed = [point for point in info.points if wait and point.run.state is not State.SUCCEEDED]
+    if failed:
+        complain(told(failed, info.total))
+        raise typer.Exit(1)
+
+
+def told(failed: list[SweepPoint], total: int) -> str:
+    """How many runs have not succeeded, and the first of them."""
+    values, run = failed[0].values, failed[0].run
+    point = ", ".join(f"{key} = {value}" for key, value in values.items())
+    why = run.message or run.cause
+    how = f"{run.state.value}: {why}" if why else run.state.value
+    return f"{len(failed)} of {total} runs have not succeeded; {run.id} ({point}) {how}"
 
 
 def sweep_table(

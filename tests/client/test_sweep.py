@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from conoid.cases.load import CaseError
-from conoid.client import swept
+from conoid.cases.run import State
+from conoid.client import sweeping, swept
 from conoid.client.errors import ClientError
-from conoid.client.sweep import listed, points_along, points_in, points_of
+from conoid.client.run import RunInfo
+from conoid.client.sweep import SweepPoint, listed, points_along, points_in, points_of
 
 
 def test_keys_go_together_or_each_with_each() -> None:
@@ -108,3 +110,13 @@ def test_a_plot_of_what_is_not_there_is_refused(x: str | None, columns: list[str
 def test_nothing_to_draw_is_told() -> None:
     with pytest.raises(ClientError, match="no run of the sweep has ended"):
         swept.figure([{**ROWS[0], "cpu [s]": ""}], ["v"], None, [])
+
+
+def test_a_sweep_that_has_not_succeeded_names_a_run() -> None:
+    def point(speed: int, state: State, message: str) -> SweepPoint:
+        run = RunInfo(id=f"r{speed}", owner="ann", name="a", state=state, ranks=1, submitted=0.0, message=message)
+        return SweepPoint(values={"run.ranks": speed}, run=run)
+
+    failed = [point(2, State.FAILED, "the energy residual"), point(3, State.CANCELLED, "")]
+    assert sweeping.told(failed, 5) == "2 of 5 runs have not succeeded; r2 (run.ranks = 2) failed: the energy residual"
+    assert sweeping.told(failed[1:], 5) == "1 of 5 runs have not succeeded; r3 (run.ranks = 3) cancelled"

@@ -114,18 +114,20 @@ def test_what_a_run_is_called_is_no_word_for_a_shell(tmp_path: Path) -> None:
     assert re.fullmatch(r"conoid-[A-Za-z0-9_.-]+", job.name)
 
 
-def test_following_ends_where_the_outcome_is(tmp_path: Path) -> None:
+@pytest.mark.parametrize("whole", [3, 2])
+def test_following_ends_where_the_outcome_is(tmp_path: Path, whole: int) -> None:
+    """Also where a journal has lost its end."""
     lines = [
         '{"type":"status","run":"a","seq":1,"state":"queued"}',
         '{"type":"status","run":"a","seq":2,"state":"running"}',
-    ]
-    lines.append('{"type":"finished","run":"a","seq":3,"state":"cancelled","digest":"","steps":3,"elapsed":1.0}')
+        '{"type":"finished","run":"a","seq":3,"state":"cancelled","digest":"","steps":3,"elapsed":1.0}',
+    ][:whole]
     (tmp_path / layout.JOURNAL).write_text("\n".join(lines) + '\n{"type":"half')
     (tmp_path / layout.OUTCOME).write_text(
         '{"state": "cancelled", "cause": "cancelled", "message": "stopped on request"}'
     )
     told = list(FolderRun(tmp_path).messages())
-    assert [message.seq for message in told] == [1, 2, 3, 0]
+    assert [message.seq for message in told] == [*range(1, whole + 1), 0]
     assert getattr(told[-1], "state", "") == State.CANCELLED
 
 
