@@ -41,8 +41,8 @@ class Primitive(Model):
     split: Literal[5, 6] = 6
     """Tets per hexahedron of the structured generator."""
     sector: Literal["full", "half", "quarter"] = "full"
-    """Which part of the body is modelled: the positive side of its centre in the first, or both, of the two directions
-    across ``axis`` (in cyclic order: x, y for z; y, z for x; z, x for y)."""
+    """Which part of the body is modelled: the positive side of its centre (of a box: of the origin) in the first, or
+    both, of the two directions across ``axis`` (in cyclic order: x, y for z; y, z for x; z, x for y)."""
     grading: Grading | None = None
     """Coarser tets away from a place, with ``generator = "gmsh"``."""
 

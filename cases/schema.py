@@ -31,7 +31,8 @@ def _off(value: Any) -> Any:
 class Erosion(Model):
     """Tets that are worn out leave the body: what lay behind them is laid bare, and meets other bodies from then on.
 
-    A tet leaves when any of these is passed. Its elastic energy is booked as eroded.
+    A tet leaves when any of these is passed. Its elastic energy is booked as eroded. A part that erodes cannot
+    fracture.
     """
 
     plastic_strain: Annotated[Ratio, Positive] | None = None
@@ -48,14 +49,17 @@ class Erosion(Model):
 
 
 class Fracture(Model):
-    """Facets between tets break, nodes separate, and the pieces meet each other. The material must be ``brittle``."""
+    """Facets between tets break, nodes separate, and the pieces meet each other. The material must be ``brittle``; a
+    part that fractures cannot erode.
+    """
 
     model: Literal["instant", "cohesive"] = "instant"
     """``instant``: a facet that breaks carries nothing from then on (the paper). ``cohesive``: its traction falls
     linearly with the opening and takes the fracture energy with it (Camacho and Ortiz 1996)."""
     shear_weight: Annotated[Ratio, Field(ge=0)] | None = None
     """beta_tau of sqrt(<t_n>^2 + beta_tau t_s^2): 0 for ``instant`` (the paper: largest normal traction), 1 for
-    ``cohesive`` by default."""
+    ``cohesive`` by default, where it must be above 0. At 1 a facet breaks by shear alone at its strength: what is
+    compressed across the crack, as a disc between platens, breaks early unless ``friction`` holds it."""
     friction: Annotated[Ratio, Field(ge=0)] = 0.0
     """Internal friction: under a pressure |t_n| a facet breaks by t_s - friction * |t_n|."""
     traction: Literal["tets", "nodes"] = "tets"
