@@ -72,7 +72,18 @@ def _run(options: argparse.Namespace, comm: Comm, signals: Signals, began: float
         print(f"{options.out}: another worker writes into this folder", file=sys.stderr)
         return ExitCode.CRASHED
     with lock:
+        if options.restart and comm.broadcast(_succeeded(options.out) if comm.rank == 0 else False):
+            print(f"--restart: {options.out} has succeeded and has nothing left to do", file=sys.stderr)
+            return ExitCode.BAD_INPUT
         return _worked(options, comm, signals, began)
+
+
+def _succeeded(folder: Path) -> bool:
+    """Whether the run in a folder has come to its end: another word about it would be a lie."""
+    try:
+        return State(outcomes.from_json((folder / layout.OUTCOME).read_bytes()).state) is State.SUCCEEDED
+    except (OSError, ValueError):
+        return False
 
 
 def _worked(options: argparse.Namespace, comm: Comm, signals: Signals, began: float) -> int:

@@ -211,3 +211,12 @@ def test_what_cannot_go_on_says_why(tmp_path: Path) -> None:
     data[len(data) // 2] ^= 1
     file.write_bytes(data)
     assert refused(words) == f"--restart: {tmp_path / 'nodal'} has no checkpoint that is whole"
+
+
+def test_a_run_that_has_succeeded_stays_as_it_is(tmp_path: Path) -> None:
+    """It was told as failed by the attempt to go on with it."""
+    words = ["two_tets", "--out", str(tmp_path / "run"), "--set", "run.end_time=1 us", "--set", "run.frames=0"]
+    assert ended(command(1, *words)).returncode == 0
+    before = {path: path.read_bytes() for path in (tmp_path / "run").iterdir() if path.is_file()}
+    assert refused(words) == f"--restart: {tmp_path / 'run'} has succeeded and has nothing left to do"
+    assert all(path.read_bytes() == data for path, data in before.items())
