@@ -7,6 +7,7 @@ from pathlib import Path
 
 import msgspec
 from fastapi import Request
+from starlette.requests import ClientDisconnect
 
 from conoid.cases.bodies import MeshFile
 from conoid.cases.estimate import Estimate
@@ -28,7 +29,7 @@ _COUNTABLE = 1 << 53
 
 
 async def read_body(request: Request) -> bytes:
-    """The body, never more than ``BODY`` of it in memory. Raises ServiceError 413, 408."""
+    """The body, never more than ``BODY`` of it in memory. Raises ServiceError 413, 408, and 400 where it breaks off."""
     length = request.headers.get("content-length", "0")
     if length.isdigit() and int(length) > BODY:
         raise _too_large(int(length))
@@ -36,6 +37,8 @@ async def read_body(request: Request) -> bytes:
         return await asyncio.wait_for(_collect(request), _BODY_TIMEOUT)
     except TimeoutError:
         raise ServiceError(408, "timeout", "the body did not arrive in time", retryable=True) from None
+    except ClientDisconnect:
+        raise ServiceError(400, "incomplete", "the body broke off", retryable=True) from None
 
 
 async def _collect(request: Request) -> bytes:

@@ -1,19 +1,23 @@
 """What the server refuses, and how it says so; who may see what."""
 
+import asyncio
 import json
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import msgspec
 import pytest
 from fastapi.routing import APIRoute
+from starlette.requests import Request
 from starlette.testclient import TestClient
 
 from conoid.cases.reference import json_schema
 from conoid.server import shapes
 from conoid.server.app import ROUTERS, build_app, opened
-from conoid.server.limits import BODY
+from conoid.server.errors import ServiceError
+from conoid.server.limits import BODY, read_body
 from conoid.server.settings import Caps, Settings
 from conoid.server.tokens import check_token, create_token
 
@@ -498,3 +502,20 @@ def test_what_is_known_is_known_in_every_form_of_its_tag(server: Running) -> Non
         for form in (tag, f"W/{tag}", f'"other", W/{tag}'):
             assert server.ann.http.get(path, headers={"If-None-Match": form}).status_code == 304, (path, form)
         assert server.ann.http.get(path, headers={"If-None-Match": '"other"'}).status_code == 200
+
+
+def test_a_body_that_breaks_off_is_no_fault_of_the_server() -> None:
+    """It was one in the log, with two tracebacks."""
+    said: Iterator[dict[str, Any]] = iter(
+        [{"type": "http.request", "body": b"[run]", "more_body": True}, {"type": "http.disconnect"}]
+    )
+
+    async def receive() -> dict[str, Any]:
+        return next(said)
+
+    async def read() -> bytes:
+        return await read_body(Request({"type": "http", "headers": [(b"content-length", b"100")]}, receive))
+
+    with pytest.raises(ServiceError, match="the body broke off") as told:
+        asyncio.run(read())
+    assert told.value.status == 400
