@@ -175,8 +175,10 @@ def cancel_folder(folder: Path) -> str:
     LocalFolder(folder).path(layout.JOURNAL)
     if (folder / layout.OUTCOME).exists():
         return f"{folder} has ended"
-    (folder / layout.STOP_REQUEST).touch()
     job = batch.read_job(folder)
+    if job is None and not slurm.held(folder):
+        return f"{folder}: no worker writes into it; a run of a server is cancelled by its id"
+    (folder / layout.STOP_REQUEST).touch()
     if job is None or not job.job:
         return f"{folder} is asked to stop"
     try:

@@ -151,7 +151,11 @@ def _watched(run: str, plain: bool, url: str | None, token: str | None, as_json:
         if as_json:
             raise typer.Exit(_print_messages(found))
         try:
-            return watch(found, False if plain else None)
+            known = watch(found, False if plain else None)
+            if not known.state.final:  # a journal that has lost its end
+                info = found.status()
+                known.state, known.cause, known.message = info.state, info.cause, info.message
+            return known
         except KeyboardInterrupt:
             complain(f"the run goes on; conoid watch {found.id} shows it again")
             raise

@@ -19,6 +19,8 @@ _PAUSE = 0.5
 """s between two looks at the journal. Chosen: a run reports four times a second."""
 _ASK_EVERY = 10.0
 """s of silence after which Slurm is asked. Chosen: a few hundred watchers are one request in 30 ms."""
+_AT_WORK = {State.STARTING, State.RUNNING}
+"""States in which a worker writes into the folder."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,7 @@ class FolderRun:
         self, *, link: Link | None = None, pause: Callable[[float], None] = time.sleep
     ) -> Iterator[AnyMessage]:
         """Every line once and in order, then how the run has ended."""
-        offset = 0
+        offset, state = 0, State.QUEUED
         while True:
             end = self._outcome()  # written last: all that there is to read is there before
             raw, offset = self._read(offset)
@@ -74,13 +76,18 @@ class FolderRun:
                 except msgspec.DecodeError:  # a killed worker has left it half written
                     continue
                 yield message
-                if isinstance(message, Status) and State(message.state).final:
-                    return
+                if isinstance(message, Status):
+                    state = State(message.state)
+                    if state.final:
+                        return
             if end is not None:
                 yield end
                 return
             if not raw:
-                yield from self._ask()
+                for told in self._ask(state):
+                    yield told
+                    if State(told.state).final:
+                        return
                 pause(_PAUSE)
             else:
                 self._asked = time.monotonic()
@@ -106,12 +113,20 @@ class FolderRun:
     def _said(self, state: str, message: str, cause: str | None = None) -> Status:
         return Status(run=self.id, wall=time.time(), state=state, cause=cause, message=message)
 
-    def _ask(self) -> Iterator[AnyMessage]:
-        """What Slurm says of a job that is silent; only what is new."""
-        job = batch.read_job(self.folder) if time.monotonic() - self._asked > _ASK_EVERY else None
-        if job is None:
+    def _ask(self, state: State) -> Iterator[Status]:
+        """What Slurm says of a job that is silent, only what is new; without a job, whether the worker is still there
+        that has begun, by the ``state`` that was told last.
+        """
+        if time.monotonic() - self._asked <= _ASK_EVERY:
             return
         self._asked = time.monotonic()
+        job = batch.read_job(self.folder)
+        if job is None:
+            if state in _AT_WORK and not slurm.held(self.folder) and self._outcome() is None:
+                yield self._said(
+                    State.LOST, "no worker writes into its folder, and none has left an outcome", Cause.NODE
+                )
+            return
         try:
             entries = slurm.jobs(self._place, job.name)
         except slurm.SlurmError:

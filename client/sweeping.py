@@ -37,8 +37,14 @@ def sweep(
         raise UsageError("give the points with --set KEY=A,B,C, or with --list FILE")
     points = points_in(listed) if listed is not None else points_of(sets or (), grid=grid)
     with connect(url, token) as session:
-        with aloud(f"handing {len(points)} points in"):
-            made = session.sweep(case, points, at_once=at_once)
+        try:
+            with aloud(f"handing {len(points)} points in"):
+                made = session.sweep(case, points, at_once=at_once)
+        except KeyboardInterrupt:
+            complain(
+                "the server may have the points already; conoid sweep-cancel last stops them once it has taken all in"
+            )
+            raise
         try:
             with aloud(f"sweep {made.id}: waiting for its runs"):
                 info = made.wait() if wait else made.status()

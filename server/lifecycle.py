@@ -160,6 +160,8 @@ def _without_outcome(run: Run, event: WorkerExited) -> Outcome:
 
 def _reading_of(run: Run, event: WorkerExited) -> tuple[State, Cause, str]:
     killed = event.code in {-_SIGKILL, _SIGKILL, 128 + _SIGKILL}
+    if event.code == ExitCode.STORAGE or event.disk_failed:
+        return State.FAILED, Cause.STORAGE, "the worker could not write its files"
     if run.stopping_for is not None:
         return State.CANCELLED, Cause.CANCELLED, "stopped on request, without results"
     if event.reading is not None:
@@ -170,8 +172,6 @@ def _reading_of(run: Run, event: WorkerExited) -> tuple[State, Cause, str]:
         return State.LOST, Cause.NODE, "the worker was killed from outside"
     if event.code == ExitCode.BAD_INPUT:
         return State.FAILED, Cause.INPUT, "the worker refused the case"
-    if event.code == ExitCode.STORAGE or event.disk_failed:
-        return State.FAILED, Cause.STORAGE, "the worker could not write its files"
     if event.code in {-_SIGTERM, 128 + _SIGTERM}:
         return State.FAILED, Cause.PREEMPTED, "the worker was ended from outside"
     if event.code == ExitCode.PHYSICS:

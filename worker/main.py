@@ -178,6 +178,8 @@ def _prepare_folder(folder: Path, comm: Comm) -> AbstractContextManager[Any] | N
     if comm.rank == 0:
         (folder / layout.LOGS).mkdir(parents=True, exist_ok=True)
         held = hold(folder)
+        if held is not None and (folder / layout.OUTCOME).exists():  # what asked for that end asks for no other
+            (folder / layout.STOP_REQUEST).unlink(missing_ok=True)
     if not comm.broadcast(held is not None):
         return None
     logging.basicConfig(

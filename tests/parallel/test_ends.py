@@ -71,6 +71,17 @@ def test_a_file_in_the_folder_cancels_the_run_and_a_second_worker_keeps_out(tmp_
     assert [message.seq for message in said] == list(range(1, len(said) + 1))
 
 
+def test_what_asked_one_attempt_to_stop_stops_no_other(tmp_path: Path) -> None:
+    """The file stayed, and stopped every later one."""
+    folder = tmp_path / "run"
+    words = command(1, "free_spin", "--out", str(folder), "--set", "run.end_time=1us")
+    assert ended(words).returncode == 0
+    (folder / layout.STOP_REQUEST).touch()
+    assert ended(words).returncode == 0
+    assert outcome(folder).state == "succeeded"
+    assert not (folder / layout.STOP_REQUEST).exists()
+
+
 def test_an_interrupted_run_has_a_checkpoint_and_no_outcome(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     with started(command(2, "free_spin", "--out", str(folder), *LONG, "--interruptible")) as launcher:

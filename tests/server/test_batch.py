@@ -10,7 +10,8 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from conoid.cases import batch, layout
-from conoid.cases.run import State
+from conoid.cases.run import Cause, State
+from conoid.client import following
 from conoid.client.batch import commands_of
 from conoid.client.cli import app
 from conoid.client.following import FolderRun
@@ -163,3 +164,28 @@ def test_a_folder_knows_where_the_commands_of_its_slurm_are(elsewhere: Path) -> 
     assert conoid("batch", "two_tets", "--ranks", 1, "--site", elsewhere).exit_code == 0
     assert conoid("cancel", "runs/two_tets").stdout == "runs/two_tets is asked to stop, job 101\n"
     assert commands_of(Path("runs/two_tets")) == str(elsewhere.parent / "bin")
+
+
+def test_a_folder_without_a_worker_is_neither_cancelled_nor_still_running(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A killed worker leaves no word: the request stayed for the next one, and who watched never knew."""
+    monkeypatch.setattr(following, "_ASK_EVERY", 0.0)
+    (tmp_path / layout.JOURNAL).write_text('{"type":"status","run":"a","seq":1,"state":"running"}\n')
+    assert "no worker writes into it" in conoid("cancel", tmp_path).stdout
+    assert not (tmp_path / layout.STOP_REQUEST).exists()
+    running, lost = FolderRun(tmp_path).messages(pause=lambda _: None)
+    assert (running.seq, getattr(lost, "state", ""), getattr(lost, "cause", "")) == (1, State.LOST, Cause.NODE)
+
+
+def test_a_run_that_waits_for_its_worker_is_not_lost(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(following, "_ASK_EVERY", 0.0)
+    (tmp_path / layout.JOURNAL).write_text('{"type":"status","run":"a","seq":1,"state":"queued"}\n')
+    pauses = iter(range(3))
+
+    def pause(_: float) -> None:
+        if next(pauses, None) is None:
+            (tmp_path / layout.OUTCOME).write_text('{"state": "succeeded"}')
+
+    told = [getattr(message, "state", "") for message in FolderRun(tmp_path).messages(pause=pause)]
+    assert told == [State.QUEUED, State.SUCCEEDED]

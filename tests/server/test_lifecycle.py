@@ -6,7 +6,7 @@ from itertools import product
 import pytest
 
 from conoid.cases.outcome import Outcome
-from conoid.cases.run import FOLLOWERS, Cause, State
+from conoid.cases.run import FOLLOWERS, Cause, ExitCode, State
 from conoid.server.events import (
     Admitted,
     Adopt,
@@ -127,6 +127,13 @@ def test_cancel_stops_once_then_kills() -> None:
     run, actions = advance(run, WorkerExited(-9, None), 5.0)
     assert run.state is State.CANCELLED
     assert isinstance(actions[0], WriteOutcome)
+
+
+@pytest.mark.parametrize("ended", [WorkerExited(ExitCode.STORAGE, None), WorkerExited(-9, None, disk_failed=True)])
+def test_what_died_of_a_full_disk_was_not_cancelled(ended: WorkerExited) -> None:
+    run = replace(RUN, state=State.STOPPING, stopping_for=Cause.CANCELLED)
+    after, _ = advance(run, ended, 5.0)
+    assert (after.state, after.cause) == (State.FAILED, Cause.STORAGE)
 
 
 def test_a_run_that_ends_well_while_it_is_stopped_has_succeeded() -> None:
