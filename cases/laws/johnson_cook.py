@@ -28,6 +28,11 @@ class JohnsonCookDamage(Model):
     D5: Ratio = 0.0
     """Dependence on the temperature."""
 
+    @property
+    def in_tension(self) -> float:
+        """Fracture strain of a tensile test, t = 1/3, at the reference rate and temperature."""
+        return self.D1 + self.D2 * math.exp(min(self.D3 / 3.0, 300.0))
+
 
 class JohnsonCook(Law):
     """Flow stress (A + B e^n)(1 + C ln max(rate/reference_rate, 1))(1 - T*^m), adiabatic heating.
@@ -77,6 +82,11 @@ class JohnsonCook(Law):
         if self.melt_temperature <= self.reference_temperature:
             message = f"must be above {self.reference_temperature} K, the reference"
             yield "melt_temperature", self.melt_temperature, message
+        if self.damage is not None and not self.damage.in_tension > 0.0:
+            message = (
+                f"a tensile test would break at a plastic strain of {self.damage.in_tension:.3g}, D1 + D2 e^(D3/3)"
+            )
+            yield "damage.D1", self.damage.D1, message
 
     def likely(self, young: float) -> Iterator[Likely]:
         yield "A", "yield stress over Young's modulus", self.A / young

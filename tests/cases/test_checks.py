@@ -209,6 +209,17 @@ def test_melting_lies_above_the_reference_temperature() -> None:
     assert found == {"materials.m.strength.melt_temperature": "must be above 293.15 K, the reference"}
 
 
+def test_what_would_break_in_tension_before_it_strains_is_refused() -> None:
+    """D1 below zero is well known, of Armco iron -2.2: with D2 = 5.43 and D3 = -0.47 it breaks at 2.4."""
+    law = "{{model='johnson_cook', A=1, B=1, n=1, C=0, m=1, melt_temperature=2000, specific_heat=1, damage={}}}"
+    steel = "materials.m={{density=1, elastic={{young=1, poisson=0}}, strength={}}}"
+    parse_case(rod(steel.format(law.format("{D1=-2.2, D2=5.43, D3=-0.47}"))))
+    found = said(steel.format(law.format("{D1=-2.2, D2=1.0, D3=-0.47}")))
+    assert found == {
+        "materials.m.strength.damage.D1": "a tensile test would break at a plastic strain of -1.35, D1 + D2 e^(D3/3)"
+    }
+
+
 @pytest.mark.parametrize(
     ("law", "key", "message"),
     [
