@@ -9,7 +9,7 @@ from conoid.worker.contact import edge_edge as edge_kernels
 from conoid.worker.contact import node_face as face_kernels
 from conoid.worker.contact.active import Kept
 from conoid.worker.contact.company import Company
-from conoid.worker.contact.narrow_phase import PUSH_OUT, ContactRows, EdgeTable, FaceTable, SlotTable, Step
+from conoid.worker.contact.narrow_phase import DEEP_SELF, PUSH_OUT, ContactRows, EdgeTable, FaceTable, SlotTable, Step
 from conoid.worker.contact.pairs import PairTable
 from conoid.worker.contact.records import Crowd
 from conoid.worker.contact.solver import ActiveSet
@@ -73,10 +73,12 @@ def face_table(corners: Indices, size: Floats, left: Floats) -> FaceTable:
     return FaceTable(corners, size, np.arange(n), ~none, left, none.copy(), np.empty((n, 3)), none.copy())
 
 
-def edge_table(corners: Indices, size: Floats, left: Floats) -> EdgeTable:
+def edge_table(corners: Indices, size: Floats, left: Floats, deep: Floats | None = None) -> EdgeTable:
     """Edges between exposed faces."""
     n = len(corners)
-    return EdgeTable(corners, size, np.ones(n, bool), left, np.zeros(n, bool))
+    return EdgeTable(
+        corners, size, DEEP_SELF * size if deep is None else deep, np.ones(n, bool), left, np.zeros(n, bool)
+    )
 
 
 def pair_table(pairs: Indices) -> PairTable:
@@ -108,11 +110,15 @@ def node_face(
 
 
 def edge_edge(
-    x: Floats, v: Floats, edges: Indices, pairs: Indices, dt: float, mu: Floats | None = None, *, never: int = 0
-) -> ContactRows:
-    """The edges that pass an edge; ``never``: how many of the pairs cannot."""
+    x: Floats, v: Floats, edges: Indices, pairs: Indices, dt: float, mu: Floats | None = None, *, never: int = 0,
+    deep: Floats | None = None,
+) -> ContactRows:  # fmt: skip
+    """The edges that pass an edge; ``never``: how many of the pairs cannot; ``deep`` (edges,): see EdgeTable."""
     room, table = ContactRows.room(len(pairs)), pair_table(pairs)
-    of, step = edge_table(edges, edge_sizes(x, edges), np.zeros(len(edges))), step_of(x, v, np.zeros(len(x)), dt, mu)
+    of, step = (
+        edge_table(edges, edge_sizes(x, edges), np.zeros(len(edges)), deep),
+        step_of(x, v, np.zeros(len(x)), dt, mu),
+    )
     found, tested = edge_kernels.edge_edge(room, 0, table.arrays(), of, step, np.zeros_like(x), 0.0)
     assert tested == len(pairs) - never
     return taken(room, np.arange(found))

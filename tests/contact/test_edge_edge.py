@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conoid.worker.contact.narrow_phase import DEEP_SELF, NEAR, ContactRows
+from conoid.worker.contact.narrow_phase import DEEP, DEEP_SELF, NEAR, ContactRows
 
 from ..worker.meshes import Floats
 from .bodies import Indices, rotation
@@ -105,6 +105,19 @@ def test_an_edge_meets_only_what_comes_between_its_faces(tilt: float, found: int
 def test_edges_meet_when_they_pass_or_are_near_and_not_too_deep(gap: float, speed: float, found: int) -> None:
     """Both edges are 2 m long."""
     assert many(meets(gap=gap, speed=speed)) == found
+
+
+@pytest.mark.parametrize(
+    ("gap", "flat", "found"),
+    [(-0.24, 1.0, 1), (-0.3, 1.0, 1), (-0.4, 1.0, 0), (-0.11, 0.1, 0), (-0.09, 0.1, 1), (-0.24, 0.1, 0)],
+)
+def test_edges_of_single_tets_hold_to_a_quarter_of_their_height(gap: float, flat: float, found: int) -> None:
+    """Tets of height sqrt(2), above 2 m edges, where the limit is 0.35 m; a tenth as flat they hold as all edges do."""
+    one = ONE * np.array([1.0, 1.0, flat])
+    x = np.concatenate([one, turned(np.pi / 2) * np.array([1.0, 1.0, flat]) + np.array([0.0, 0.0, gap])])
+    deep = np.full(2, DEEP * 2.0)
+    assert many(edge_edge(x, np.zeros((8, 3)), EDGES, PAIR, 1.0, deep=deep)) == found
+    assert many(edge_edge(x, np.zeros((8, 3)), EDGES, PAIR, 1.0)) == (gap >= -DEEP_SELF * 2.0)
 
 
 @pytest.mark.parametrize("order", [1, -1])

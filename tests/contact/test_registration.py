@@ -27,7 +27,7 @@ from .kernels import edge_sizes, face_sizes
 from .shards import CORNERS, EDGES, FACES
 
 SHARDS, STEPS, SKIN = 50, 40, 0.2
-SEEDS = range(4)
+SEEDS = range(2, 6)
 ALLOWED = np.array([[True, True, True], [True, True, False], [True, False, False]])
 """Which of three parts meet."""
 SIDES = np.array([[k for k in range(4) if {a, b} <= set(FACES[k, :3])] for a, b, *_ in EDGES])

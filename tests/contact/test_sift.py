@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from conoid.worker.contact import sift
+from conoid.worker.contact.narrow_phase import DEEP_SELF
 
 from ..worker.meshes import Floats
 from .distances import above, across
@@ -33,7 +34,7 @@ def wrong_edges(seed: int, turn: float) -> tuple[int, float]:
     pairs = np.arange(2 * PAIRS, dtype=np.int32).reshape(-1, 2)
     size = np.linalg.norm(x[:, :, 1] - x[:, :, 0], axis=2).reshape(-1)
     corners = np.column_stack([ends, ends]).astype(np.int32)
-    kept = sift.edges(pairs, corners, size, x.reshape(-1, 3).copy(), v.reshape(-1, 3).copy(), SKIN, HORIZON)
+    kept = sift.edges(pairs, corners, DEEP_SELF * size, x.reshape(-1, 3).copy(), v.reshape(-1, 3).copy(), SKIN, HORIZON)
     x, v = x[~kept], v[~kept]
     ways = (x + t * v for t in TIMES)
     least = np.min([across(y[:, 0, 0], y[:, 0, 1], y[:, 1, 0], y[:, 1, 1]) for y in ways], axis=0)
@@ -78,4 +79,4 @@ def test_edges_that_turn_into_each_other_and_away_again_do_not_go() -> None:
     edges, pair = np.array([[0, 1, 0, 0], [2, 3, 0, 0]], np.int32), np.array([[0, 1]], np.int32)
     then = x + 0.125 * v
     assert across(*then) < 0.15
-    assert sift.edges(pair, edges, np.array([1.41, 1.0]), x, v, 0.2, 1.5).all()
+    assert sift.edges(pair, edges, DEEP_SELF * np.array([1.41, 1.0]), x, v, 0.2, 1.5).all()

@@ -8,7 +8,7 @@ import numpy as np
 from ..growing import Rooms
 from ..state import Bits, Flags, Floats, Indices, Ints
 from .normals import COLUMNS
-from .records import AGED, OPEN, Crowd
+from .records import AGED, OPEN, Crowd, depths
 
 _FRESH = {
     **dict.fromkeys(("slave", "pushes", "live", "new", "fresh", "tracked", "on_surface"), False),
@@ -171,6 +171,11 @@ class SceneEdges:
         return cls(
             corners, sides, faces, size, opened, meets, sharp, own, rank, *np.zeros((3, len(corners)), bool)
         )  # fmt: skip
+
+    @cached_property
+    def deep(self) -> Floats:
+        """(e,) see records.Edges."""
+        return depths(self.sides, self.size)
 
     @cached_property
     def far(self) -> Ints:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..jit import njit, types
 from .geometry import VECTOR, at, beyond, cross, distance, dot, minus, segments
-from .narrow_phase import CONTACT_ROWS, DEEP_SELF, EDGES, NEAR, PAIRS, STEP, needed
+from .narrow_phase import CONTACT_ROWS, DEEP, DEEP_SELF, EDGES, NEAR, PAIRS, STEP, needed
 
 _PARALLEL = 1e-3
 """Sine of the angle below which edges are left to nodes and faces. Ridges may pass each other through a gap that is as
@@ -81,6 +81,19 @@ def _fastest(course, a, b, c, d):  # type: ignore[no-untyped-def]
     return max(distance(p, r), distance(p, s), distance(q, r), distance(q, s))
 
 
+@njit(types.float64(types.float64[:, :], EDGES, types.int64), cache=True, error_model="numpy")
+def _deep(x, edges, e):  # type: ignore[no-untyped-def]
+    """How deep edge e holds, m: of one tet, whose corners are those of its faces, no deeper than DEEP of its height."""
+    least = DEEP_SELF * edges.size[e]
+    if not edges.deep[e] > least:
+        return edges.deep[e]
+    a, b, c, d = edges.corners[e, 0], edges.corners[e, 1], edges.corners[e, 2], edges.corners[e, 3]
+    u, to, fro = minus(at(x, b), at(x, a)), minus(at(x, c), at(x, a)), minus(at(x, d), at(x, a))
+    one, two, three, four = cross(u, to), cross(u, fro), cross(to, fro), cross(minus(to, u), minus(fro, u))
+    largest = np.sqrt(max(max(dot(one, one), dot(two, two)), max(dot(three, three), dot(four, four))))
+    return max(min(DEEP * abs(dot(one, fro)) / largest, edges.deep[e]), least)
+
+
 @njit(f"boolean({_N2}, int64, int64)", cache=True)
 def _opposite(edges, one, two):  # type: ignore[no-untyped-def]
     """Whether an edge joins the nodes that the faces of the other one have besides it: both are of one tet, alone."""
@@ -121,7 +134,7 @@ def edge_edge(out, n, pairs, edges, step, course, end):  # type: ignore[no-untyp
             if np.isnan(speed[p]):
                 speed[p] = _fastest(course, a, b, c, d)
             slack = segments(at(ahead, a), at(ahead, b), at(ahead, c), at(ahead, d))
-            slack -= (_ROUND + DEEP_SELF) * max(size[one], size[two])
+            slack -= _ROUND * max(size[one], size[two]) + max(edges.deep[one], edges.deep[two])
             until[p] = slack - left[one] - left[two] + speed[p] * end if slack > _WORTH * size[one] else np.nan
         u0, w0, r0 = minus(at(x, b), at(x, a)), minus(at(x, d), at(x, c)), minus(at(x, c), at(x, a))
         u, w = minus(at(ahead, b), at(ahead, a)), minus(at(ahead, d), at(ahead, c))
@@ -142,7 +155,7 @@ def edge_edge(out, n, pairs, edges, step, course, end):  # type: ignore[no-untyp
         h, m, length = share * dt, cross(u, w), np.sqrt(area)
         m = m[0] / length, m[1] / length, m[2] / length
         gap0, gap1 = _apart(m, x, v, a, b, c, d, s, t, 0.0), _apart(m, x, v, a, b, c, d, s, t, dt)
-        near, deep = NEAR * min(size[one], size[two]), DEEP_SELF * min(size[one], size[two])
+        near, deep = NEAR * min(size[one], size[two]), min(edges.deep[one], edges.deep[two])
         if (gap1 > near or gap0 < -deep) and (-gap1 > near or -gap0 < -deep):
             continue
         sector, sign = _sector(u, x, v, corners, one, h), 1.0
@@ -154,6 +167,8 @@ def edge_edge(out, n, pairs, edges, step, course, end):  # type: ignore[no-untyp
         if gap1 > near or gap0 < -deep:
             continue
         if not _points_out(_sector(w, x, v, corners, two, h), m, -sign):
+            continue
+        if gap0 < -min(_deep(x, edges, one), _deep(x, edges, two)):
             continue
         nodes[n, 0], nodes[n, 1], nodes[n, 2], nodes[n, 3] = c, d, a, b
         weights[n, 0], weights[n, 1], weights[n, 2], weights[n, 3] = 1.0 - t, t, s - 1.0, -s

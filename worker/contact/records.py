@@ -14,6 +14,7 @@ import numpy as np
 from ..growing import Rooms
 from ..ids import located
 from ..state import Bits, Flags, Floats, Indices, Ints
+from .narrow_phase import DEEP, DEEP_SELF
 
 AGED, OPEN = 1, 2
 """How far a face of an edge is open."""
@@ -89,6 +90,18 @@ class Edges(Rows):
     def names(self) -> Ints:
         """(n,) the two faces of each edge as one number: two faces have one edge in common."""
         return (self.sides[:, 0] << 32) + self.sides[:, 1]
+
+    @property
+    def deep(self) -> Floats:
+        """(n,) depth, m, beyond which it holds nothing."""
+        return depths(self.sides, self.size)
+
+
+def depths(sides: Ints, size: Floats) -> Floats:
+    """(n,) how deep edges hold, m, of their ``size`` (n,): DEEP where both of their ``sides`` (n, 2), ids of faces, are
+    of one tet, if that is as high; what is behind the faces of two tets nobody knows.
+    """
+    return np.where(sides[:, 0] // 4 == sides[:, 1] // 4, DEEP, DEEP_SELF) * size
 
 
 @dataclass(frozen=True)

@@ -202,7 +202,8 @@ class Scene:
 
     def edge_table(self) -> EdgeTable:
         """The edges."""
-        return EdgeTable(self.edges.corners, self.edges.size, self.edges.meets, self.tracks.edges, self.edges.fresh)
+        edges = self.edges
+        return EdgeTable(edges.corners, edges.size, edges.deep, edges.meets, self.tracks.edges, edges.fresh)
 
     def free(self) -> None:
         """Gives its messages back to MPI."""
