@@ -27,7 +27,8 @@ from .kernels import edge_sizes, face_sizes
 from .shards import CORNERS, EDGES, FACES
 
 SHARDS, STEPS, SKIN = 50, 40, 0.2
-SEEDS = range(2, 6)
+SEEDS = (0, 1, 4, 5)
+"""Among them worlds in which each of the faults below is seen."""
 ALLOWED = np.array([[True, True, True], [True, True, False], [True, False, False]])
 """Which of three parts meet."""
 SIDES = np.array([[k for k in range(4) if {a, b} <= set(FACES[k, :3])] for a, b, *_ in EDGES])
