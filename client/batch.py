@@ -83,17 +83,17 @@ def hand_over(
     case: str, ranks: int, overrides: Iterable[str], out: Path | None, profile: str, site: Slurm
 ) -> Handed:  # fmt: skip
     """One job for the run in a folder, whatever happened before. Raises CaseError, ClientError."""
-    data = data_of(case, [*overrides, f"run.ranks={ranks}"])
+    data = _with_paths(data_of(case, [*overrides, f"run.ranks={ranks}"]), locate(case).parent)
     checked = parse_case(data)
+    resolved = resolved_json(checked)
     folder = (out or Path("runs") / checked.name).resolve()
     try:
         chosen = batch.profile_of(site, profile or checked.run.profile)
         if shutil.which("sbatch", path=site.bin or None) is None:
             raise ClientError("sbatch: there is none; Slurm's commands are in PATH, or [slurm] bin names their folder")
-        data = _with_paths(data, locate(case).parent)
-        job = _known(folder, data, chosen[0] if profile else "", site) if folder.exists() else None
+        job = _known(folder, resolved, profile, site) if folder.exists() else None
         if job is None:
-            job = _prepared(folder, data, resolved_json(checked), ranks, chosen, site.bin)
+            job = _prepared(folder, data, resolved, ranks, chosen, site.bin)
         number = slurm.submit(site.bin, folder, job, batch.profile_of(site, job.profile)[1])
         noted = batch.Job(**{**{name: getattr(job, name) for name in job.__struct_fields__}, "job": number})
         whole.write(folder / layout.JOB, batch.to_json(noted))
@@ -106,7 +106,7 @@ def hand_over(
     return Handed(folder, number, job.profile, job.attempt)
 
 
-def _known(folder: Path, data: dict[str, Any], profile: str, site: Slurm) -> Job | None:
+def _known(folder: Path, resolved: bytes, profile: str, site: Slurm) -> Job | None:
     """The record of a folder that was handed over before: of its job, or of a next one when that is lost. Raises
     ClientError where it is of another case, or of another ``profile`` than the one that is asked for.
     """
@@ -117,7 +117,7 @@ def _known(folder: Path, data: dict[str, Any], profile: str, site: Slurm) -> Job
         return None
     if (folder / layout.OUTCOME).exists():
         raise ClientError(f"{folder}: this run has ended; --out names another folder")
-    if resolved_json(parse_case(json.loads((folder / _CASE).read_bytes()))) != resolved_json(parse_case(data)):
+    if resolved_json(parse_case(json.loads((folder / _CASE).read_bytes()))) != resolved:
         raise ClientError(f"{folder}: handed to Slurm with another case or other ranks; --out names another folder")
     if profile not in ("", job.profile):
         raise ClientError(f"{folder}: handed to Slurm with the profile {job.profile!r}; --out names another folder")

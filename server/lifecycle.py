@@ -160,10 +160,10 @@ def _without_outcome(run: Run, event: WorkerExited) -> Outcome:
 
 def _reading_of(run: Run, event: WorkerExited) -> tuple[State, Cause, str]:
     killed = event.code in {-_SIGKILL, _SIGKILL, 128 + _SIGKILL}
-    if event.code == ExitCode.STORAGE or event.disk_failed:
-        return State.FAILED, Cause.STORAGE, "the worker could not write its files"
+    full = State.FAILED, Cause.STORAGE, "the worker could not write its files"
+    stored = event.code != ExitCode.STORAGE and not event.disk_failed
     if run.stopping_for is not None:
-        return State.CANCELLED, Cause.CANCELLED, "stopped on request, without results"
+        return (State.CANCELLED, Cause.CANCELLED, "stopped on request, without results") if stored else full
     if event.reading is not None:
         return event.reading
     if killed and event.out_of_memory:
@@ -172,6 +172,8 @@ def _reading_of(run: Run, event: WorkerExited) -> tuple[State, Cause, str]:
         return State.LOST, Cause.NODE, "the worker was killed from outside"
     if event.code == ExitCode.BAD_INPUT:
         return State.FAILED, Cause.INPUT, "the worker refused the case"
+    if not stored:
+        return full
     if event.code in {-_SIGTERM, 128 + _SIGTERM}:
         return State.FAILED, Cause.PREEMPTED, "the worker was ended from outside"
     if event.code == ExitCode.PHYSICS:

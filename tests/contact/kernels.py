@@ -76,9 +76,8 @@ def face_table(corners: Indices, size: Floats, left: Floats) -> FaceTable:
 def edge_table(corners: Indices, size: Floats, left: Floats, deep: Floats | None = None) -> EdgeTable:
     """Edges between exposed faces."""
     n = len(corners)
-    return EdgeTable(
-        corners, size, DEEP_SELF * size if deep is None else deep, np.ones(n, bool), left, np.zeros(n, bool)
-    )
+    deep = DEEP_SELF * size if deep is None else deep
+    return EdgeTable(corners, size, deep, np.ones(n, bool), left, np.zeros(n, bool))
 
 
 def pair_table(pairs: Indices) -> PairTable:
@@ -115,10 +114,8 @@ def edge_edge(
 ) -> ContactRows:  # fmt: skip
     """The edges that pass an edge; ``never``: how many of the pairs cannot; ``deep`` (edges,): see EdgeTable."""
     room, table = ContactRows.room(len(pairs)), pair_table(pairs)
-    of, step = (
-        edge_table(edges, edge_sizes(x, edges), np.zeros(len(edges)), deep),
-        step_of(x, v, np.zeros(len(x)), dt, mu),
-    )
+    of = edge_table(edges, edge_sizes(x, edges), np.zeros(len(edges)), deep)
+    step = step_of(x, v, np.zeros(len(x)), dt, mu)
     found, tested = edge_kernels.edge_edge(room, 0, table.arrays(), of, step, np.zeros_like(x), 0.0)
     assert tested == len(pairs) - never
     return taken(room, np.arange(found))

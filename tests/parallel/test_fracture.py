@@ -44,6 +44,7 @@ def test_what_breaks_is_the_same_on_any_number_of_ranks(name: str, ranks: int, b
     assert (other.steps, other.energy, other.eroded) == (first.steps, first.energy, first.eroded)
     assert other.fragments == first.fragments
     assert (other.inside, other.deepest, other.warnings) == (first.inside, first.deepest, first.warnings)
+    assert (other.overlapping, other.overlap) == (first.overlapping, first.overlap)
     assert (many / layout.HISTORY).read_bytes() == (one / layout.HISTORY).read_bytes()
     fields = frame_fields(one)
     assert {"damage", "principal_stress", "stress"} <= fields.keys()

@@ -212,6 +212,7 @@ def test_the_answer_is_the_same_on_any_number_of_ranks(name: str, ranks: int, an
     assert (other.steps, other.time, other.energy) == (first.steps, first.time, first.energy)
     assert (other.eroded, other.reference) == (first.eroded, first.reference)
     assert (other.inside, other.deepest, other.warnings) == (first.inside, first.deepest, first.warnings)
+    assert (other.overlapping, other.overlap) == (first.overlapping, first.overlap)
     assert (many / layout.HISTORY).read_bytes() == (one / layout.HISTORY).read_bytes()
 
 

@@ -51,7 +51,7 @@ def test_averaged_forms_lose_no_more_to_viscosity_than_the_standard_one() -> Non
 
 def test_few_tets_that_ring_are_computed_in_steps_that_do_not_ring_with_them() -> None:
     """A cube of steel that is pushed apart on a wall. Where tets at rest, or that expand, were bounded without
-    viscosity, the step went with each oscillation by the 6 % of the linear term: 1 % of the energy at once, 2 % later.
+    viscosity, the step went with each oscillation by the 6 % of the linear term, which took 1 % of the energy at once.
     """
     wall = {"kind": "wall", "point": (0.0, 0.0, 0.0), "normal": (0.0, 0.0, 1.0)}
     case = scene(STEEL, "standard", viscosity={}, boundaries=(wall,), frames=0)

@@ -17,6 +17,7 @@ from ..parallel.comm import Comm
 from ..parallel.fixed_point import exact_sums
 from ..state import Floats, Ints, Model
 from . import search
+from .geometry import at, cross, dot, minus
 from .inside import outermost
 from .search import Things
 from .stage import Contact
@@ -133,25 +134,22 @@ def _volumes(corners: Floats) -> Floats:
     return np.asarray(np.maximum(np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6.0, 0.0))
 
 
-@njit("float64(float64[::1], float64[::1], float64[::1], float64[::1])", cache=True)
-def _triple(a, b, c, d):  # type: ignore[no-untyped-def]
-    """(b - a) x (c - a) . (d - a), m^3."""
-    x1, y1, z1 = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    x2, y2, z2 = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-    x3, y3, z3 = d[0] - a[0], d[1] - a[1], d[2] - a[2]
-    return (y1 * z2 - z1 * y2) * x3 + (z1 * x2 - x1 * z2) * y3 + (x1 * y2 - y1 * x2) * z3
+@njit("float64(float64[:, :], int64, int64, int64, float64[:, :], int64)", cache=True)
+def _triple(tet, a, b, c, other, k):  # type: ignore[no-untyped-def]
+    """Six times the volume, m^3, of the tet of three corners of one and corner ``k`` of another."""
+    start = at(tet, a)
+    return dot(cross(minus(at(tet, b), start), minus(at(tet, c), start)), minus(at(other, k), start))
 
 
-@njit("float64(float64[:, ::1])", cache=True)
+@njit("float64(float64[:, :])", cache=True)
 def _determinant(tet):  # type: ignore[no-untyped-def]
-    return _triple(tet[0], tet[1], tet[2], tet[3])
+    return _triple(tet, 0, 1, 2, tet, 3)
 
 
-@njit("float64(float64[:, ::1], int64, float64[::1])", cache=True)
-def _height(tet, face, point):  # type: ignore[no-untyped-def]
-    """Six times the volume of the tet that a point makes with the face across from a corner, m^3; above 0 inside."""
-    a, b, c = FACES[face, 0], FACES[face, 1], FACES[face, 2]
-    return -_triple(tet[a], tet[b], tet[c], point)
+@njit("float64(float64[:, :], int64, float64[:, :], int64)", cache=True)
+def _height(tet, face, other, k):  # type: ignore[no-untyped-def]
+    """``_triple`` of corner ``k`` of ``other`` and the face across from a corner; above 0 inside."""
+    return -_triple(tet, FACES[face, 0], FACES[face, 1], FACES[face, 2], other, k)
 
 
 @njit("boolean(float64[:, ::1], float64[:, ::1])", cache=True)
@@ -160,7 +158,7 @@ def _apart(one, other):  # type: ignore[no-untyped-def]
     for face in range(4):
         behind = True
         for k in range(4):
-            behind &= _height(one, face, other[k]) <= 0.0
+            behind &= _height(one, face, other, k) <= 0.0
         if behind:
             return True
     return False
@@ -174,51 +172,57 @@ def _meet(point, tet, height, a, b):  # type: ignore[no-untyped-def]
         point[i] = tet[a, i] + share * (tet[b, i] - tet[a, i])
 
 
+@njit("int64(float64[:, :, ::1], int64, float64[:, ::1], float64[::1], float64[:, ::1], int64[::1])", cache=True)
+def _in_front(out, n, tet, height, wedge, order):  # type: ignore[no-untyped-def]
+    """What of a tet is before a plane, by the heights of its corners, as pieces from row ``n`` of ``out`` on; returns
+    their new number. With one, two or three corners behind it, it is a wedge or half of one, of three tets, or the tet
+    at the corner before it. ``wedge`` (6, 3), ``order`` (4,): room.
+    """
+    before, end = 0, 4
+    for k in range(4):
+        if height[k] > 0.0:
+            order[before] = k
+            before += 1
+        else:
+            end -= 1
+            order[end] = k
+    if before == 4:
+        out[n] = tet
+        return n + 1
+    if before == 1:
+        out[n, 0] = tet[order[0]]
+        for k in range(1, 4):
+            _meet(out[n, k], tet, height, order[0], order[k])
+        return n + 1
+    if before == 0:
+        return n
+    for k in range(before):
+        if before == 2:  # an edge of the tet joins the ends of the wedge
+            wedge[3 * k] = tet[order[k]]
+            _meet(wedge[3 * k + 1], tet, height, order[k], order[2])
+            _meet(wedge[3 * k + 2], tet, height, order[k], order[3])
+        else:
+            wedge[k] = tet[order[k]]
+            _meet(wedge[3 + k], tet, height, order[k], order[3])
+    for k in range(3):
+        out[n + k] = wedge[k : k + 4]
+    return n + 3
+
+
 @njit("float64(float64[:, :, ::1], float64[:, :, ::1], float64[:, ::1], float64[:, ::1])", cache=True)
 def intersection(pieces, others, one, other):  # type: ignore[no-untyped-def]
-    """Six times the volume, m^3, that two tets (4, 3), neither inside out, have in common; with room for pieces, twice
-    (_PIECES, 4, 3).
-
-    The first is cut by the planes of the second, one after the other: of a tet with one, two or three corners behind a
-    plane remain a wedge or the two halves of one, three tets each, or the tet at the corner before it.
+    """Six times the volume, m^3, that two tets (4, 3), neither inside out, have in common: the first is cut by the
+    planes of the second, one after the other. With room for pieces, twice (_PIECES, 4, 3).
     """
-    n, height, front, back = 1, np.empty(4), np.empty(4, np.int64), np.empty(4, np.int64)
-    wedge = np.empty((6, 3))
+    n, height, wedge, order = 1, np.empty(4), np.empty((6, 3)), np.empty(4, np.int64)
     pieces[0] = one
     for face in range(4):
         kept = 0
         for piece in range(n):
-            tet, before, behind = pieces[piece], 0, 0
             for k in range(4):
-                height[k] = _height(other, face, tet[k])
-                if height[k] > 0.0:
-                    front[before] = k
-                    before += 1
-                else:
-                    back[behind] = k
-                    behind += 1
-            if behind == 0:
-                others[kept] = tet
-                kept += 1
-            elif before == 1:
-                others[kept, 0] = tet[front[0]]
-                for k in range(3):
-                    _meet(others[kept, 1 + k], tet, height, front[0], back[k])
-                kept += 1
-            elif before > 1:
-                for k in range(3):
-                    if before == 3:
-                        wedge[k] = tet[front[k]]
-                        _meet(wedge[3 + k], tet, height, front[k], back[0])
-                    elif k < 2:
-                        wedge[3 * k] = tet[front[k]]
-                        _meet(wedge[3 * k + 1], tet, height, front[k], back[0])
-                        _meet(wedge[3 * k + 2], tet, height, front[k], back[1])
-                for k in range(3):
-                    others[kept] = wedge[k : k + 4]
-                    kept += 1
-        n = kept
-        pieces, others = others, pieces
+                height[k] = _height(other, face, pieces[piece], k)
+            kept = _in_front(others, kept, pieces[piece], height, wedge, order)
+        pieces, others, n = others, pieces, kept
     common = 0.0
     for piece in range(n):
         common += abs(_determinant(pieces[piece]))

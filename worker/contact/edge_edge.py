@@ -168,7 +168,7 @@ def edge_edge(out, n, pairs, edges, step, course, end):  # type: ignore[no-untyp
             continue
         if not _points_out(_sector(w, x, v, corners, two, h), m, -sign):
             continue
-        if gap0 < -min(_deep(x, edges, one), _deep(x, edges, two)):
+        if gap0 < 0.0 and gap0 < -min(_deep(x, edges, one), _deep(x, edges, two)):
             continue
         nodes[n, 0], nodes[n, 1], nodes[n, 2], nodes[n, 3] = c, d, a, b
         weights[n, 0], weights[n, 1], weights[n, 2], weights[n, 3] = 1.0 - t, t, s - 1.0, -s
