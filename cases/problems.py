@@ -119,7 +119,7 @@ def _translate(detail: ErrorDetails, data: Mapping[str, Any]) -> Problem:
         case "string_pattern_mismatch":
             return problem(location, value, "a name starts with a letter and has up to 64 letters, digits, _ or -")
         case "tuple_type":
-            return problem(location, value, _list_wanted(location))
+            return problem(location, value, _list_wanted(location, _lengths(detail["loc"])))
         case "model_type" | "model_attributes_type" | "dict_type":
             return problem(location, value, "expected a table of keys")
         case "too_short":
@@ -127,6 +127,10 @@ def _translate(detail: ErrorDetails, data: Mapping[str, Any]) -> Problem:
         case "too_long":
             many, most = context["actual_length"], context["max_length"]
             return problem(location, ..., f"{many} are too many; allowed: up to {most}")
+        case "string_too_long":
+            return problem(
+                location, ..., f"{len(value)} characters are too many; allowed: up to {context['max_length']}"
+            )
         case "int_parsing" | "int_type" | "int_from_float":
             return problem(location, value, "expected a whole number")
         case "float_parsing" | "float_type":
@@ -136,10 +140,10 @@ def _translate(detail: ErrorDetails, data: Mapping[str, Any]) -> Problem:
             return problem(location, value, f"allowed: {message}" if message != detail["msg"] else message)
 
 
-def _list_wanted(location: Location) -> str:
+def _list_wanted(location: Location, lengths: set[int]) -> str:
     if len(location) == 1:
         return f"expected a list of tables; in TOML each one begins with [[{location[0]}]]"
-    return "expected a list"
+    return f"expected a list of {lengths.pop()}" if len(lengths) == 1 else "expected a list"
 
 
 def _written(location: Location, data: Any) -> Location:
@@ -170,6 +174,17 @@ def _step(data: Any, item: int | str) -> Any:
 def _keys(location: Location) -> list[str]:
     """The keys that the model at a pydantic location knows."""
     return sorted({key for model in _models_at(location) for key in model.model_fields})
+
+
+def _lengths(location: Location) -> set[int]:
+    """How long a list at a pydantic location may be; none where the list is as long as one likes."""
+    fields = [
+        model.model_fields[str(location[-1])]
+        for model in _models_at(location[:-1])
+        if location[-1] in model.model_fields
+    ]
+    kinds = [kind for field in fields for kind in (field.annotation, *get_args(field.annotation))]
+    return {len(get_args(kind)) for kind in kinds if get_origin(kind) is tuple and ... not in get_args(kind)}
 
 
 def _tags(location: Location) -> list[str]:

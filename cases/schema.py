@@ -255,9 +255,9 @@ class Case(Model):
 
     name: Name
     """Of the case and of its runs."""
-    title: str = ""
+    title: Annotated[str, Field(max_length=200)] = ""
     """One line for people."""
-    description: str = ""
+    description: Annotated[str, Field(max_length=20_000)] = ""
     """What the case shows, for people."""
     materials: dict[Name, Material] = Field(default_factory=dict)
     """Materials of the case's own, each under its name; they win over those of the library."""

@@ -3,6 +3,7 @@
 import argparse
 import logging
 import os
+import shutil
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -121,7 +122,18 @@ def _settings(options: argparse.Namespace) -> Settings:
 def _serve(options: argparse.Namespace) -> None:
     from .serve import serve
 
-    serve(_settings(options))
+    settings = _settings(options)
+    if settings.site.launcher == "local":
+        _check_programs(settings)
+    serve(settings)
+
+
+def _check_programs(settings: Settings) -> None:
+    """Raises SettingsError where no run could be started."""
+    launcher = command(settings.mpiexec, "--mpiexec") if settings.mpiexec else ()
+    for option, words in (("--mpiexec", launcher), ("--worker", settings.worker)):
+        if words and shutil.which(words[0]) is None:
+            raise SettingsError(f"{option} {words[0]}: there is no such program")
 
 
 def _untouched(settings: Settings) -> bool:

@@ -4,11 +4,11 @@ import asyncio
 from collections.abc import AsyncIterator, Iterator
 from contextlib import ExitStack, asynccontextmanager, contextmanager
 
-from fastapi import FastAPI
+from fastapi import Depends, FastAPI
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from . import errors, keeper, openapi, page
+from . import errors, keeper, limits, openapi, page
 from .bell import Bell
 from .farewells import Farewells
 from .history import Histories
@@ -122,6 +122,7 @@ def build_app(service: Service) -> FastAPI:
         docs_url=None,
         redoc_url=None,
         lifespan=lifespan,
+        dependencies=[Depends(limits.check_query)],
     )
     app.state.service, app.state.routers = service, ROUTERS
     errors.install(app)

@@ -1,4 +1,6 @@
-"""What the server refuses before it costs anything: large bodies, cases beyond the caps, full queues and disks."""
+"""What the server refuses before it costs anything: parameters that no route knows, large bodies, cases beyond the
+caps, full queues and disks.
+"""
 
 import asyncio
 import shutil
@@ -26,6 +28,17 @@ _BODY_TIMEOUT = 30.0
 
 _COUNTABLE = 1 << 53
 """Where nothing is capped: what every reader of JSON can still count (IEEE 754)."""
+
+
+def check_query(request: Request) -> None:
+    """Raises ServiceError 400 for a parameter that the route does not know: a misspelt one would pass as left out."""
+    path, method = request.scope["route"].path_format, request.method.lower().replace("head", "get")
+    parameters = request.app.openapi()["paths"][path][method].get("parameters", ())
+    known = sorted(told["name"] for told in parameters if told["in"] == "query")
+    for name in request.query_params:
+        if name not in known:
+            detail = f"{name[:80]}: {request.url.path} knows no such parameter; allowed: {', '.join(known) or 'none'}"
+            raise ServiceError(400, "bad_parameter", detail, pointer=name[:80])
 
 
 async def read_body(request: Request) -> bytes:

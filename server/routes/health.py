@@ -14,12 +14,14 @@ router = APIRouter()
 
 
 @router.get("/healthz")
+@router.head("/healthz", include_in_schema=False)
 def alive() -> dict[str, str]:
     """The process answers."""
     return {"status": "ok"}
 
 
 @router.get("/readyz")
+@router.head("/readyz", include_in_schema=False)
 def ready(service: ServiceOf) -> Response:
     """Runs can be taken and looked after: 200, or 503 with what is wrong."""
     checks = {"supervisor": service.supervisor.alive, **service.readiness.checks()}

@@ -103,7 +103,7 @@ def test_the_rod_is_sound() -> None:
         (["parts[0].erosion={volume=[0, 2]}"], "parts[0].erosion.volume[0]", "greater than 0"),
         (["parts[0].erosion={volume=[2, 3]}"], "parts[0].erosion.volume[0]", "less than 1"),
         (["parts[0].erosion={volume=[0.5, 1]}"], "parts[0].erosion.volume[1]", "greater than 1"),
-        (["parts[0].erosion={volume=0.1}"], "parts[0].erosion.volume", "expected a list"),
+        (["parts[0].erosion={volume=0.1}"], "parts[0].erosion.volume", "expected a list of 2"),
         (["parts[0].erosion={time_step=1}"], "parts[0].erosion.time_step", "less than 1"),
         (["parts[0].erosion={time_step=0}"], "parts[0].erosion.time_step", "greater than 0"),
         (["parts[0].erosion={nodes='keep'}"], "parts[0].erosion.nodes", "'particles' or 'remove'"),

@@ -223,6 +223,18 @@ def test_overrides_that_cannot_be_made(override: str, message: str) -> None:
     assert message in caught.value.problems[0].message
 
 
+def test_a_title_is_no_document() -> None:
+    with pytest.raises(CaseError) as caught:
+        parse_case(rod() | {"title": "x" * 900_000})
+    assert caught.value.problems == (Problem("title", "", "900000 characters are too many; allowed: up to 200"),)
+
+
+def test_a_list_is_told_its_length() -> None:
+    with pytest.raises(CaseError) as caught:
+        parse_case(apply_overrides(rod(), ["parts[0].velocity=10 m/s"]))
+    assert str(caught.value) == "parts[0].velocity = '10 m/s': expected a list of 3"
+
+
 def test_too_many_parts_are_counted_and_not_compared() -> None:
     data = rod()
     one = data["parts"][0]

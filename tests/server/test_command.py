@@ -46,6 +46,8 @@ def say(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Said:
         (["--worker", "'"], '--worker "\'": No closing quotation'),
         (["--mpiexec", "'"], '--mpiexec "\'": No closing quotation'),
         (["--mpiexec", " "], "--mpiexec '': a command is needed"),
+        (["--mpiexec", "/no/such/mpiexec -n"], "--mpiexec /no/such/mpiexec: there is no such program"),
+        (["--worker", "nosuch -m worker"], "--worker nosuch: there is no such program"),
         (["--grace", "nan"], "--grace nan: a number of seconds above 0"),
         (["--max-queued", "-1"], "--max-queued -1: above 0"),
         (["--max-wall-time", "nan"], "--max-wall-time nan: above 0"),

@@ -71,6 +71,7 @@ def test_the_list_of_routes_is_the_one_that_is_served(server: Running) -> None:
 @pytest.mark.parametrize("path", sorted(HEALTH))
 def test_health_needs_none(server: Running, path: str) -> None:
     assert server.nobody.http.get(path).json()["status"] == "ok"
+    assert server.nobody.http.head(path).status_code == 200
 
 
 def test_another_users_run_is_not_there(server: Running) -> None:
@@ -333,10 +334,18 @@ def test_pages(server: Running) -> None:
         ("/v1/runs?state=done", "state"),
         ("/v1/runs?cursor=nonsense", "cursor"),
         ("/v1/runs?cursor=%C3%A4", "cursor"),
+        ("/v1/runs?stat=failed", "stat"),
+        ("/v1/cases?limit=1", "limit"),
     ],
 )
 def test_bad_parameters(server: Running, path: str, pointer: str) -> None:
     assert refusal(server.ann.http.get(path), 400, "bad_parameter")["pointer"] == pointer
+
+
+def test_an_unknown_parameter_is_told_what_is_known(server: Running) -> None:
+    """A state that is misspelt would else list all runs."""
+    told = refusal(server.ann.http.get("/v1/runs?stat=failed"), 400, "bad_parameter")
+    assert told["detail"] == "stat: /v1/runs knows no such parameter; allowed: cursor, label, limit, state"
 
 
 @pytest.mark.parametrize(
