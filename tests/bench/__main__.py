@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -182,7 +183,7 @@ def _cracks(extent: Extent, book: Book) -> None:
     if extent is not QUICK:
         runs = list(
             cracks.measure(
-                [*cracks.PLATES, *cracks.SIBLINGS, *cracks.STEPPED, *cracks.ROWS, *cracks.STRIPS, *cracks.BARS]
+                [*cracks.PLATES, *cracks.SIBLINGS, *cracks.STEPPED, *chain(*cracks.ROWS), *cracks.STRIPS, *cracks.BARS]
             )
         )
         from . import plot

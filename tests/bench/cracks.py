@@ -474,8 +474,8 @@ STEPPED = (
     *(_stepped(plan, safety) for safety in (0.897, 0.893) for plan in RANDOM),
 )
 """What a step that is hardly another one changes: a coarse mesh with seven of them, and RANDOM with two more."""
-ROWS = tuple(_stepped(PLATES[4], safety) for safety in _SAFETIES)
-"""The finer mesh whose facets lie in rows along the crack, with seven steps: in which row it runs is chance."""
+ROWS = tuple(tuple(_stepped(plan, safety) for safety in _SAFETIES) for plan in (PLATES[0], PLATES[4]))
+"""The meshes whose facets lie in rows along the crack, with seven steps: in which row it runs is chance."""
 SHOWN = (PLATES[0], PLATES[6], PLATES[7], *SIBLINGS[:3])
 """Meshes whose cracks are drawn."""
 STRIPS = (Plan("strip", 0.5e-3), Plan("strip", 0.5e-3, "random", 0))
@@ -511,10 +511,10 @@ def report(runs: Sequence[Run]) -> str:
     plates = [r for r in of["branching_plate"] if not r.plan.words]
     random = [r for r in plates if r.plan in RANDOM]
     fine, coarse = ([r for r in runs if r.plan in STEPPED and r.plan.size == size] for size in (FINE, PLATES[3].size))
-    rows = [r for r in runs if r.plan in ROWS]
+    rows = (scatter(f"runs of {some[0].name}, seven steps", [r for r in runs if r.plan in some]) for some in ROWS)
     return "\n\n".join([
         _cracks(plates), scatter("meshes", random), scatter("runs of these, three steps", [*random, *fine]),
-        scatter("runs of one, 1 mm, seven steps", coarse), scatter("runs of structured, 0.67 mm, seven steps", rows),
+        scatter("runs of one, 1 mm, seven steps", coarse), *rows,
         _cracks(of["strip"]), _bars(of["bar"]),
     ])  # fmt: skip
 
