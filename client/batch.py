@@ -39,7 +39,9 @@ class Handed:
 
 def batch_run(
     case: CaseArgument,
-    ranks: Annotated[int, typer.Option("--ranks", min=1, help="MPI ranks.")],
+    ranks: Annotated[
+        int | None, typer.Option("--ranks", min=1, help="MPI ranks; the case's own number if not given.")
+    ] = None,
     profile: Annotated[
         str, typer.Option("--slurm", metavar="PROFILE", help="A profile of the site; its default.")
     ] = "",
@@ -55,7 +57,8 @@ def batch_run(
     The same command again makes no second job: it tells the one that there is, or goes on with a run that was lost.
     """
     warn_of(case, overrides or ())
-    handed = hand_over(case, ranks, overrides or (), out, profile, slurm_of(site))
+    words = [*(overrides or ()), *([f"run.ranks={ranks}"] if ranks is not None else [])]
+    handed = hand_over(case, words, out, profile, slurm_of(site))
     if as_json:
         show_json({"folder": str(handed.folder), "job": handed.job, "attempt": handed.attempt})
     else:
@@ -79,11 +82,9 @@ def commands_of(folder: Path) -> str:
     return job.bin if job is not None and job.bin else slurm_of(None).bin
 
 
-def hand_over(
-    case: str, ranks: int, overrides: Iterable[str], out: Path | None, profile: str, site: Slurm
-) -> Handed:  # fmt: skip
+def hand_over(case: str, overrides: Iterable[str], out: Path | None, profile: str, site: Slurm) -> Handed:
     """One job for the run in a folder, whatever happened before. Raises CaseError, ClientError."""
-    data = _with_paths(data_of(case, [*overrides, f"run.ranks={ranks}"]), locate(case).parent)
+    data = _with_paths(data_of(case, overrides), locate(case).parent)
     checked = parse_case(data)
     resolved = resolved_json(checked)
     folder = (out or Path("runs") / checked.name).resolve()
@@ -93,7 +94,7 @@ def hand_over(
             raise ClientError("sbatch: there is none; Slurm's commands are in PATH, or [slurm] bin names their folder")
         job = _known(folder, resolved, profile, site) if folder.exists() else None
         if job is None:
-            job = _prepared(folder, data, resolved, ranks, chosen, site.bin)
+            job = _prepared(folder, data, resolved, checked.run.ranks, chosen, site.bin)
         number = slurm.submit(site.bin, folder, job, batch.profile_of(site, job.profile)[1])
         noted = batch.Job(**{**{name: getattr(job, name) for name in job.__struct_fields__}, "job": number})
         whole.write(folder / layout.JOB, batch.to_json(noted))

@@ -51,7 +51,7 @@ def place(cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 def test_a_run_without_a_server_is_handed_over_once_and_followed_to_its_end(place: Path, cluster: Cluster) -> None:
     handed = conoid("batch", "two_tets", "--ranks", 1)
     assert handed.exit_code == 0, handed.output
-    again = conoid("batch", "two_tets", "--ranks", 1, "--json")
+    again = conoid("batch", "two_tets", "--json")
     folder = place / "runs" / "two_tets"
     watched = conoid("watch", "--plain", folder)
     assert watched.exit_code == 0, watched.output + (folder / "log/launcher.log").read_text()
