@@ -18,7 +18,7 @@ import re
 import secrets
 import shlex
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -233,11 +233,13 @@ def _words(job: Job, profile: Profile, folder: Path, log: Path) -> list[str]:
     return [*words, *profile.options, str(folder / layout.JOB_SCRIPT), str(folder), job.name]
 
 
-def starter(profile: Profile, ranks: int, mpiexec: list[str]) -> list[str]:
-    """What starts ``ranks`` ranks inside a job, before the worker's command. PMI2 is what the wheel of MPICH speaks."""
+def starter(profile: Profile, ranks: int, found: Callable[[], Sequence[str]]) -> list[str]:
+    """What starts ``ranks`` ranks inside a job, before the worker's command; ``found`` gives an mpiexec where the
+    profile has none of its own. PMI2 is what the wheel of MPICH speaks.
+    """
     if profile.mpi == "srun":
         return ["srun", "--mpi=pmi2", f"--ntasks={ranks}"]
-    return [*(shlex.split(profile.mpiexec) or mpiexec), "-n", str(ranks)]
+    return [*(shlex.split(profile.mpiexec) or found()), "-n", str(ranks)]
 
 
 def read_job(folder: Path) -> Job | None:

@@ -23,7 +23,8 @@ stands with the key; `conoid validate` warns of each that is not 0. In SI units 
 
 **Places** are coordinates in one frame for all bodies. Stress is positive in tension, pressure in compression.
 
-A key with a default may be absent: – means that nothing stands in for it.
+A key with a default may be absent: – means that nothing stands in for it. A name begins with a letter and has up to 64
+letters, digits, `_` and `-`. A case has at most 256 parts, its title 200 characters, its description 20,000.
 """
 
 

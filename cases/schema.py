@@ -31,8 +31,8 @@ def _off(value: Any) -> Any:
 class Erosion(Model):
     """Tets that are worn out leave the body: what lay behind them is laid bare, and meets other bodies from then on.
 
-    A tet leaves when any of these is passed. Its elastic energy is booked as eroded. A part that erodes cannot
-    fracture.
+    A tet leaves when any of these is passed, one that has only strained enough within ten steps. Its elastic energy is
+    booked as eroded. A part that erodes cannot fracture.
     """
 
     plastic_strain: Annotated[Ratio, Positive] | None = None
@@ -225,8 +225,8 @@ class Run(Model):
     """The run stops, with a checkpoint, when it has taken longer.
     Counted from the first step."""
     checkpoint_every: Annotated[Annotated[Time, Positive] | None, BeforeValidator(_off), Switch()] = 600.0
-    """Wall time between checkpoints; one is also written when a run is stopped on request or by ``max_wall_time``.
-    ``"none"``: then alone."""
+    """Wall time between checkpoints; one is also written when somebody asks for it, and when a run is stopped on
+    request or by ``max_wall_time``. ``"none"``: only then."""
     residual_limit: Annotated[Ratio, Positive] = 0.05
     """The run fails with cause ``energy`` when the energy residual, what contact has made, what moves beyond all energy
     that has come in, or what unequal steps took passes this."""

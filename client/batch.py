@@ -141,7 +141,7 @@ def _prepared(
     case.write_text(json.dumps(data, indent=2, default=str), encoding="utf-8")
     (folder / layout.RESOLVED_CASE).write_bytes(resolved)
     worker = [sys.executable, "-m", "mpi4py", "-m", "conoid.worker", str(case), "--out", str(folder)]
-    command = [*batch.starter(profile[1], ranks, [_mpiexec()]), *worker]
+    command = [*batch.starter(profile[1], ranks, _mpiexec), *worker]
     command += ["--run", folder.name, "--ranks", str(ranks), "--interruptible"]
     job = batch.new_job(folder.name, ranks, profile, command, time.time(), place=place)
     told = messages.Status(run=folder.name, seq=1, wall=time.time(), state=State.QUEUED, message="handed to Slurm")
@@ -160,12 +160,12 @@ def _with_paths(data: dict[str, Any], base: Path) -> dict[str, Any]:
     return data
 
 
-def _mpiexec() -> str:
+def _mpiexec() -> list[str]:
     beside = Path(sys.executable).with_name("mpiexec")
     found = str(beside) if beside.is_file() else shutil.which("mpiexec")
     if found is None:
         raise ClientError("no mpiexec: install conoid[mpich], or name the site's own in the profile")
-    return found
+    return [found]
 
 
 def cancel_folder(folder: Path) -> str:

@@ -4,6 +4,7 @@ import logging
 import sys
 import threading
 import time
+from functools import partial
 from pathlib import Path
 
 import msgspec
@@ -36,7 +37,8 @@ class SlurmLauncher:
         """Writes down what is to be handed over. Raises LaunchError."""
         try:
             profile = batch.profile_of(self._site, job.profile)
-            command = [*batch.starter(profile[1], job.ranks, [*find_mpiexec(self._mpiexec)]), *self._words(job)]
+            starter = batch.starter(profile[1], job.ranks, partial(find_mpiexec, self._mpiexec))
+            command = [*starter, *self._words(job)]
             record = batch.new_job(job.run, job.ranks, profile, command, time.time(), place=self._site.bin)
             if job.telemetry is not None:
                 self._write_access(job)

@@ -110,6 +110,15 @@ def test_the_shipped_profile_and_script_belong_together() -> None:
     assert words[-3:] == ["/runs/run/job.sh", "/runs/run", job.name]
 
 
+def test_an_mpiexec_is_looked_for_only_where_the_profile_needs_one() -> None:
+    def none() -> list[str]:
+        raise AssertionError("nobody asked for it")
+
+    assert batch.starter(batch.Profile(mpi="srun"), 4, none) == ["srun", "--mpi=pmi2", "--ntasks=4"]
+    assert batch.starter(batch.Profile(mpiexec="/opt/mpiexec -x"), 4, none) == ["/opt/mpiexec", "-x", "-n", "4"]
+    assert batch.starter(batch.Profile(), 4, lambda: ["mpiexec"]) == ["mpiexec", "-n", "4"]
+
+
 def test_what_a_run_is_called_is_no_word_for_a_shell(tmp_path: Path) -> None:
     job = batch.new_job("x;id $(id) `id`", 1, ("a", batch.Profile()), [], 0.0)
     assert re.fullmatch(r"conoid-[A-Za-z0-9_.-]+", job.name)
