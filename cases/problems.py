@@ -79,7 +79,7 @@ def choices(names: Iterable[str]) -> str:
 
 def nearest(word: str, known: Iterable[str]) -> str:
     """``did you mean 'radius'?`` or the list of the known names, for the end of a message."""
-    names = list(known)
+    names = list(dict.fromkeys(known))
     close = difflib.get_close_matches(word[:_LONGEST], names, n=3, cutoff=0.6)
     return f"did you mean {' or '.join(map(repr, close))}?" if close else f"known: {choices(names)}"
 

@@ -101,7 +101,7 @@ def list_runs(
     with connect(url, token) as session:
         runs = session.runs([one.value for one in state or ()], limit, labels_of(label))
     if as_json:
-        show_json(runs)
+        show_json([run.listed for run in runs])
     elif runs:
         show_lines(tables.runs_table(runs))
     else:
@@ -135,12 +135,10 @@ def watch_run(
     if Path(run).is_dir():
         LocalFolder(Path(run)).path(layout.JOURNAL)
         followed = FolderRun(Path(run), commands_of(Path(run)))
-        if as_json:
-            raise typer.Exit(_print_messages(followed))
-        known = watch(followed, False if plain else None)
+        known = _print_messages(followed) if as_json else watch(followed, False if plain else None)
     else:
         known = _watched(run, plain, url, token, as_json)
-    if known.message or known.cause:
+    if not as_json and (known.message or known.cause):
         complain(f"{known.run} {known.state.value}: {known.message or known.cause}")
     raise typer.Exit(exit_code(known.state, known.cause))
 
@@ -148,10 +146,8 @@ def watch_run(
 def _watched(run: str, plain: bool, url: str | None, token: str | None, as_json: bool) -> Live:
     with connect(url, token) as session:
         found = find(session, run)
-        if as_json:
-            raise typer.Exit(_print_messages(found))
         try:
-            known = watch(found, False if plain else None)
+            known = _print_messages(found) if as_json else watch(found, False if plain else None)
             if not known.state.final:  # a journal that has lost its end
                 info = found.status()
                 known.state, known.cause, known.message = info.state, info.cause, info.message
@@ -161,13 +157,13 @@ def _watched(run: str, plain: bool, url: str | None, token: str | None, as_json:
             raise
 
 
-def _print_messages(run: Run | FolderRun) -> int:
+def _print_messages(run: Run | FolderRun) -> Live:
     known = Live(run.id)
     for message in run.messages():
         known.take(message)
         typer.echo(msgspec.json.encode(message).decode())
         sys.stdout.flush()
-    return exit_code(known.state, known.cause)
+    return known
 
 
 def _tell(info: RunInfo, text: str, as_json: bool) -> None:

@@ -54,7 +54,7 @@ class NotFoundError(ClientError):
 
 
 class MissingError(ServiceError, NotFoundError):
-    """The server has no such run or file."""
+    """The server has no such run or file, or has it no longer."""
 
 
 class UnreachableError(ClientError):
@@ -97,4 +97,4 @@ def refusal(status: int, problem: Mapping[str, Any]) -> ConoidError:
         return CaseError(
             Problem(*(str(entry.get(name) or "") for name in ("key", "value", "message"))) for entry in entries
         )
-    return (MissingError if status == 404 else ServiceError)(status, problem)
+    return (MissingError if status in {404, 410} else ServiceError)(status, problem)

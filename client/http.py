@@ -94,7 +94,7 @@ class Http:
         """
         headers = {"Content-Type": content} if content else {}
         if key is not None:
-            headers["Idempotency-Key"] = key
+            headers["Idempotency-Key"] = _ascii(key)
         timeout = httpx2.Timeout(_ANSWER + more, connect=_CONNECTION)
         response = self._request("POST", path, content=body, headers=headers, repeat=key is not None, timeout=timeout)
         return self._decoded(kind, response)
@@ -197,3 +197,10 @@ def _reason(error: Exception) -> str:
     if isinstance(error, httpx2.ConnectError):
         return "is it running there? (conoid serve)"
     return " ".join(str(error).split()) or type(error).__name__
+
+
+def _ascii(key: str) -> str:
+    """A key that fits into a header; whether it is one the server says. Raises UsageError."""
+    if not key.isascii() or not key.isprintable():
+        raise UsageError(f"Idempotency-Key {key[:80]!r}: 1 to 255 visible ASCII characters")
+    return key

@@ -191,8 +191,9 @@ def _check(look: Look, target: Path) -> None:
         raise LookError(f"percentiles = {low:g}, {high:g}: two numbers from 0 to 100, the smaller one first")
     if look.limits is not None and not look.limits[0] < look.limits[1]:
         raise LookError(f"{_RANGE} = {look.limits[0]:g}, {look.limits[1]:g}: two numbers, the lower end first")
-    if not (look.zoom > 0.0 and look.rate > 0.0):
-        raise LookError(f"zoom = {look.zoom:g}, rate = {look.rate:g}: both above 0")
+    for name, value in (("zoom", look.zoom), ("rate", look.rate)):
+        if not value > 0.0:
+            raise LookError(f"{name} = {value:g}: above 0")
     if min(look.size) < SMALLEST:
         raise LookError(f"size = {look.size[0]}, {look.size[1]}: width and height, at least {SMALLEST} pixels")
     if target.suffix.lower() not in {".png", ".gif"}:

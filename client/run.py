@@ -35,6 +35,10 @@ _PATIENCE = 120.0
 """s that a server may be away while the end of a run is waited for. Chosen: time for a restart, twice over."""
 
 
+_OF_ONE = {"title", "estimate", "progress", "outcome_json"}
+"""What is told of one run, not in a list."""
+
+
 class RunInfo(msgspec.Struct, kw_only=True, frozen=True):
     """What the server tells of a run. Times are Unix s, None when they have not come yet."""
 
@@ -52,7 +56,7 @@ class RunInfo(msgspec.Struct, kw_only=True, frozen=True):
     finished: float | None = None
     labels: dict[str, str] = {}
     title: str = ""
-    """This and what follows is told of one run, not in a list."""
+    """This and what follows is told of one run, not in a list (_OF_ONE)."""
     estimate: dict[str, Any] = {}
     progress: Progress | None = None
     outcome_json: msgspec.Raw = msgspec.field(name="outcome", default=msgspec.Raw(b"null"))
@@ -69,6 +73,11 @@ class RunInfo(msgspec.Struct, kw_only=True, frozen=True):
         }
         lines = (f"<tr><th>{name}</th><td>{escape(text)}</td></tr>" for name, text in rows.items() if text)
         return f"<table>{''.join(lines)}</table>"
+
+    @property
+    def listed(self) -> dict[str, Any]:
+        """What a list tells of it, as plain data."""
+        return {name: getattr(self, name) for name in self.__struct_fields__ if name not in _OF_ONE}
 
     @property
     def outcome(self) -> Outcome | None:

@@ -99,7 +99,7 @@ def respond(request: Request, folder: Path, relative: str) -> Response:
             "X-Content-Type-Options": "nosniff",
             "Content-Type": _TYPES.get(Path(relative).suffix, "application/octet-stream"),
         }
-        if etag in tags(request.headers.get("if-none-match", "")):
+        if is_known(etag, request.headers.get("if-none-match", "")):
             file.close()
             return Response(status_code=304, headers=headers)
         begin, end, status = _part(request, size, etag)
@@ -115,9 +115,10 @@ def respond(request: Request, folder: Path, relative: str) -> Response:
         raise
 
 
-def tags(text: str) -> set[str]:
-    """The ETags of a header; those that a proxy has made weak count as well."""
-    return {tag.strip().removeprefix("W/") for tag in text.split(",")}
+def is_known(etag: str, text: str) -> bool:
+    """Whether an If-None-Match has this ETag, or all there are; one that a proxy has made weak counts as well."""
+    known = {tag.strip().removeprefix("W/") for tag in text.split(",")}
+    return etag in known or known == {"*"}
 
 
 def _part(request: Request, size: int, etag: str) -> tuple[int, int, int]:

@@ -120,20 +120,22 @@ async def _http_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
     code = _CODES.get(error.status_code, "error")
     detail = f"{request.method} {request.url.path}: {error.detail}"
-    headers = {"Allow": _allowed(request)} if error.status_code == 405 else error.headers
+    headers = error.headers
+    if error.status_code == 405:
+        headers = {"Allow": allowed(request.app, request.url.path) or "GET, HEAD"}
     return ServiceError(error.status_code, code, detail, headers=headers).response()
 
 
-def _allowed(request: Request) -> str:
-    """The methods of all routes of the path: where several patterns match, the longest one is meant. Where none does,
-    it is a file of the page.
+def allowed(app: FastAPI, path: str) -> str:
+    """The methods of all routes of the path: where several patterns match, the longest one is meant. Empty where none
+    does.
     """
     found: dict[str, set[str]] = {}
-    for router in request.app.state.routers:
+    for router in app.state.routers:
         for route in router.routes:
-            if isinstance(route, APIRoute) and route.path_regex.match(request.url.path):
+            if isinstance(route, APIRoute) and route.path_regex.match(path):
                 found.setdefault(route.path, set()).update(route.methods or ())
-    return ", ".join(sorted(found[max(found, key=len)])) if found else "GET, HEAD"
+    return ", ".join(sorted(found[max(found, key=len)])) if found else ""
 
 
 async def _parameter_error(_: Request, error: Exception) -> Response:

@@ -21,6 +21,8 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 from starlette.types import Scope
 
+from . import errors
+
 PACKAGE, VERSION = "nicegui", "3.18.0"
 TESTED = {
     "echarts/index.js": (
@@ -100,7 +102,11 @@ class _Page(StaticFiles):
     """The page's own files. A browser asks each time whether they are still the same: a server may be a newer one."""
 
     async def get_response(self, path: str, scope: Scope) -> Response:
-        """Raises HTTPException 404 whatever is asked of what is not there: the mount sees every unknown address."""
+        """Raises HTTPException 405 for what the server answers to other methods, and 404 whatever is asked of what is
+        not there: the mount sees every address that no route takes.
+        """
+        if self.lookup_path(path)[1] is None and errors.allowed(scope["app"], scope["path"]):
+            raise HTTPException(405)
         if scope["method"] not in {"GET", "HEAD"} and self.lookup_path(path)[1] is None:
             raise HTTPException(404)
         answer = await super().get_response(path, scope)

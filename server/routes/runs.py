@@ -128,13 +128,12 @@ async def show(
 ) -> Response:
     """The run. With ``wait``, the answer comes when its state has changed, or, when If-None-Match is sent, when
     anything has; at most so many seconds later. A run that has ended is answered at once."""
-    told = request.headers.get("if-none-match")
-    known = None if told is None else download.tags(told)
+    known = request.headers.get("if-none-match")
     first = await run_in_threadpool(view.snapshot, service, run)
     latest, deadline, may = first, time.monotonic() + wait, Pass(service, identity)
     with service.bell.listen(run.id) as listener:
         while not (latest.state.final or service.bell.closed):
-            changed = latest.state is not first.state if known is None else latest.etag not in known
+            changed = latest.state is not first.state if known is None else not download.is_known(latest.etag, known)
             left = deadline - time.monotonic()
             if changed or left <= 0:
                 break
@@ -144,7 +143,7 @@ async def show(
                 raise unauthorized()
             latest = await run_in_threadpool(lambda: view.snapshot(service, find(service, identity, run.id)))
     headers = {"ETag": latest.etag, "Cache-Control": "private, no-cache"}
-    if known is not None and latest.etag in known:
+    if known is not None and download.is_known(latest.etag, known):
         return Response(status_code=304, headers=headers)
     return Response(latest.body, 200, headers, "application/json")
 

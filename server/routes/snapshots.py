@@ -36,7 +36,7 @@ def listing(run: OwnedRun, service: ServiceOf, if_none_match: Known = "") -> Res
         body = msgspec.json.encode({"snapshots": series.listed(found)})
     etag = f'"{hashlib.sha256(body).hexdigest()[:32]}"'
     headers = {"ETag": etag, "Cache-Control": "private, no-cache"}
-    if etag in download.tags(if_none_match):
+    if download.is_known(etag, if_none_match):
         return Response(status_code=304, headers=headers)
     return Response(body, headers=headers, media_type="application/json")
 
@@ -46,7 +46,7 @@ def content(run: OwnedRun, service: ServiceOf, n: Number, if_none_match: Known =
     """One snapshot, as docs/snapshots.md has it; its ETag is its sha256, and it never changes."""
     told = _told(service, run, n)
     headers = {"ETag": f'"{told.sha256}"', "Cache-Control": "private, max-age=31536000, immutable"}
-    if headers["ETag"] in download.tags(if_none_match):
+    if download.is_known(headers["ETag"], if_none_match):
         return Response(status_code=304, headers=headers)
     with download.open_inside(service.settings.runs / run.id, told.path) as file:
         return Response(file.read(), headers=headers, media_type=_TYPE)

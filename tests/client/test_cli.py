@@ -167,7 +167,9 @@ def test_submit_show_ls_get(user: Path) -> None:
     assert "FAIL" in shown.stdout, "a reference number that is missed is told"
     listed = conoid("ls", "--limit", 5)
     assert run in listed.stdout
-    assert read(conoid("ls", "--json"))[0]["id"] == run
+    told = read(conoid("ls", "--json"))[0]
+    assert told["id"] == run
+    assert not told.keys() & {"title", "estimate", "outcome"}, "a list does not know them"
     assert read(conoid("show", run, "--json"))["outcome"]["steps"] == 2
     got = conoid("get", run, "outcome.json", "history.csv", "--out", "here")
     assert got.stdout.split() == ["here/outcome.json", "here/history.csv"]

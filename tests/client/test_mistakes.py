@@ -170,6 +170,12 @@ def test_a_token_that_no_server_makes_is_not_sent(quiet_home: Path, token: str) 
     assert line == "conoid: token: only visible ASCII characters are allowed; was it copied whole?"
 
 
+@pytest.mark.parametrize("key", ["é", "line\nfeed"])
+def test_a_key_that_no_header_can_have_is_one_line(quiet_home: Path, key: str) -> None:
+    line = refused(2, "submit", "demo", "--key", key, "--url", "http://127.0.0.1:1")
+    assert line == f"conoid: Idempotency-Key {key!r}: 1 to 255 visible ASCII characters"
+
+
 def test_space_round_a_token_is_no_part_of_it() -> None:
     with http.Http("http://x", " conoid_1_2\n") as made:
         assert made._http.headers["authorization"] == "Bearer conoid_1_2"

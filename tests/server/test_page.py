@@ -73,6 +73,17 @@ def test_the_page_does_not_take_unknown_addresses_for_its_own(client: TestClient
         assert (refused.status_code, refused.headers["allow"]) == (405, "GET, HEAD")
 
 
+def test_a_route_is_there_whatever_is_asked_of_it(client: TestClient) -> None:
+    """Also where the page has all other addresses."""
+    for method, path, allowed in (
+        ("PUT", "/v1/runs", "GET, POST"),
+        ("HEAD", "/v1/me", "GET"),
+        ("GET", "/v1/cases:validate", "POST"),
+    ):
+        refused = client.request(method, path)
+        assert (refused.status_code, refused.headers["allow"]) == (405, allowed), path
+
+
 @pytest.mark.parametrize(
     ("version", "words"),
     [(None, "nicegui 3.18.0 is not installed"), ("3.17.0", "nicegui 3.17.0 is installed, tested is 3.18.0")],
