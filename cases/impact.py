@@ -6,15 +6,15 @@ from collections import Counter
 from collections.abc import Sequence
 
 from .bodies import MeshFile
-from .boundaries import Course, Prescribed, Wall
+from .boundaries import Course, Prescribed, Rotation, Traction, Wall
 from .geometry import Vector
 from .library import material
 from .materials import Material
 from .placed import Placed, driven, velocity
 from .schema import Case, Part
 
-FEW, MANY, MOST = 5, 10, 20
-"""Sweeps of contact in a step; what more are good for: docs/numerics.md, "Contact"."""
+FEW, MANY, MOST, DRIVEN = 5, 10, 20, 40
+"""Sweeps of contact in a step; what more are good for: docs/numerics.md, "Contact", and "Driven rubble" there."""
 FAST = 0.2
 """Of the wave speed of what is met: above it there are MANY sweeps. Chosen: below half of where few were too few for
 columns of metal (docs/numerics.md, "Plates under 100 GPa")."""
@@ -98,11 +98,22 @@ def pressed(case: Case) -> bool:
     return _fast(case, PRESSING)
 
 
+def driven_together(case: Case) -> bool:
+    """Whether parts may meet, or walls, while a motion or a traction drives something: it presses for as long as it
+    lasts, where what flies presses until it has stopped.
+    """
+    moved = any(value for _, drive in case.boundaries_of(Prescribed) for value in (drive.x, drive.y, drive.z))
+    driving = moved or any(isinstance(spec, Rotation | Traction) for spec in case.boundaries)
+    return bool(driving) and max(impact_speeds(case)) > 0.0
+
+
 def sweeps(case: Case) -> int:
     """Sweeps over the active contacts of a step: what ``contact.sweeps`` says, or what the scene needs."""
     assert case.contact is not None
     if case.contact.sweeps is not None:
         return case.contact.sweeps
+    if case.fractures and driven_together(case):
+        return DRIVEN
     if case.fractures and pressed(case):
         return MOST
     return MANY if _fast(case, FAST) or case.contact.restitution > 0.0 else FEW

@@ -145,8 +145,9 @@ class Contact(Model):
     sweeps: Annotated[Count, Field(ge=1, le=1000)] | None = None
     """Jacobi sweeps over the active contacts of a step, with momentum. By default 5, and 10 with ``restitution``, where
     what they leave undone is energy, and where parts meet at more than a fifth of the speed of waves in one of them; 20
-    where parts fracture and some meet at more than a tenth of it. What breaks under pressure may want more: with
-    too few it is too soft, and shatters into more pieces than it should, or fewer."""
+    where parts fracture and some meet at more than a tenth of it, 40 where something is driven and may press them. What
+    breaks under pressure may want more: with too few it is too soft, and shatters into more pieces than it should, or
+    fewer."""
     skin: Annotated[Ratio, Positive] = 0.3
     """Of the (harmonic) mean face size: twice how far a node may depart from its extrapolated motion before its
     candidate pairs are searched again. Changes the cost, not the answer."""

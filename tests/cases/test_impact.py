@@ -45,6 +45,16 @@ def test_what_meets_fast_gets_more_sweeps(case: Case, number: int) -> None:
     assert sweeps(case) == number
 
 
+def test_what_is_driven_together_and_breaks_gets_the_most_sweeps() -> None:
+    """A motion or a traction presses for as long as it lasts; what holds does not, nor what moves one part alone."""
+    ram = {"kind": "velocity", "parts": ["b"], "z": -1.0}
+    slow = meeting(1.0, material="glass", fracture={})
+    assert [sweeps(bounded(slow, boundary)) for boundary in (ram, {**ram, "z": 0.0})] == [40, 5]
+    assert sweeps(bounded(meeting(1.0), ram)) == 5
+    alone = slow.model_copy(update={"parts": slow.parts[1:]})
+    assert sweeps(bounded(alone, {"kind": "velocity", "low": [-1, -1, -1], "high": [1, 1, 1], "z": -1.0})) == 5
+
+
 def test_bodies_are_pressed_together_at_a_tenth_of_the_speed_of_waves() -> None:
     assert [pressed(meeting(speed)) for speed in (550.0, 650.0)] == [False, True]
     assert pressed(meeting(650.0, material="glass", fracture={}))
