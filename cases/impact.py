@@ -13,14 +13,14 @@ from .materials import Material
 from .placed import Placed, driven, velocity
 from .schema import Case, Part
 
-FEW, MANY, MOST, DRIVEN = 5, 10, 20, 40
+FEW, MANY, PRESSED, DRIVEN = 5, 10, 20, 40
 """Sweeps of contact in a step; what more are good for: docs/numerics.md, "Contact", and "Driven rubble" there."""
 FAST = 0.2
 """Of the wave speed of what is met: above it there are MANY sweeps. Chosen: below half of where few were too few for
 columns of metal (docs/numerics.md, "Plates under 100 GPa")."""
 PRESSING = 0.1
 """Of the same: above it flat surfaces buckle. Chosen: half of where irregular plates of copper lost their pressure
-(docs/numerics.md, "Ridges under pressure"). Where bodies break it asks for MOST sweeps ("Dust under pressure")."""
+(docs/numerics.md, "Ridges under pressure"). Where bodies break it asks for PRESSED sweeps ("Dust under pressure")."""
 _REST: Vector = (0.0, 0.0, 0.0)
 """The velocity of a wall, m/s."""
 
@@ -104,7 +104,7 @@ def driven_together(case: Case) -> bool:
     """
     moved = any(value for _, drive in case.boundaries_of(Prescribed) for value in (drive.x, drive.y, drive.z))
     driving = moved or any(isinstance(spec, Rotation | Traction) for spec in case.boundaries)
-    return bool(driving) and max(impact_speeds(case)) > 0.0
+    return bool(driving) and any(impact_speeds(case))
 
 
 def sweeps(case: Case) -> int:
@@ -115,5 +115,5 @@ def sweeps(case: Case) -> int:
     if case.fractures and driven_together(case):
         return DRIVEN
     if case.fractures and pressed(case):
-        return MOST
+        return PRESSED
     return MANY if _fast(case, FAST) or case.contact.restitution > 0.0 else FEW

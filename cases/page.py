@@ -24,7 +24,7 @@ stands with the key; `conoid validate` warns of each that is not 0. In SI units 
 **Places** are coordinates in one frame for all bodies. Stress is positive in tension, pressure in compression.
 
 A key with a default may be absent: – means that nothing stands in for it. A name begins with a letter and has up to 64
-letters, digits, `_` and `-`. A case has at most 256 parts, its title 200 characters, its description 20,000.
+letters, digits, `_` and `-`.
 """
 
 
@@ -120,7 +120,8 @@ class _Page:
         if "prefixItems" in meant:
             return _fixed([self._value(each) for each in meant["prefixItems"]])
         if "items" in meant:
-            return f"list of: {self._value(meant['items'])}"
+            most = f" at most {meant['maxItems']}" if "maxItems" in meant else ""
+            return f"list of{most}: {self._value(meant['items'])}"
         if "patternProperties" in meant:
             return f"for each name: {self._value(next(iter(meant['patternProperties'].values())))}"
         return _scalar(meant)
@@ -155,7 +156,8 @@ def _scalar(schema: Schema) -> str:
     if "unit" in schema:
         return _noun(schema["unit"]) + _range(schema)
     if schema.get("type") == "string":
-        return "a name" if "pattern" in schema else "text"
+        most = f", at most {schema['maxLength']} characters" if "maxLength" in schema else ""
+        return "a name" if "pattern" in schema else f"text{most}"
     nouns = {"integer": "a whole number", "number": "a number", "boolean": "`true` or `false`"}
     return nouns[schema["type"]] + _range(schema)
 

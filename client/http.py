@@ -55,7 +55,7 @@ class Http:
         Raises ClientError for a token, UnreachableError for an address, that cannot be one.
         """
         shown = (token or "").strip()
-        if not all("!" <= letter <= "~" for letter in shown):
+        if not _visible(shown):
             raise UsageError("token: only visible ASCII characters are allowed; was it copied whole?")
         headers = {"Authorization": f"Bearer {shown}"} if shown else {}
         self.url = url.rstrip("/")
@@ -94,7 +94,9 @@ class Http:
         """
         headers = {"Content-Type": content} if content else {}
         if key is not None:
-            headers["Idempotency-Key"] = _ascii(key)
+            if not _visible(key):
+                raise UsageError(f"Idempotency-Key {key[:80]!r}: 1 to 255 visible ASCII characters")
+            headers["Idempotency-Key"] = key
         timeout = httpx2.Timeout(_ANSWER + more, connect=_CONNECTION)
         response = self._request("POST", path, content=body, headers=headers, repeat=key is not None, timeout=timeout)
         return self._decoded(kind, response)
@@ -199,8 +201,6 @@ def _reason(error: Exception) -> str:
     return " ".join(str(error).split()) or type(error).__name__
 
 
-def _ascii(key: str) -> str:
-    """A key that fits into a header; whether it is one the server says. Raises UsageError."""
-    if not key.isascii() or not key.isprintable():
-        raise UsageError(f"Idempotency-Key {key[:80]!r}: 1 to 255 visible ASCII characters")
-    return key
+def _visible(text: str) -> bool:
+    """Whether all of it is visible ASCII, which a header can have."""
+    return all("!" <= letter <= "~" for letter in text)

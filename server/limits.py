@@ -32,6 +32,8 @@ _COUNTABLE = 1 << 53
 
 def check_query(request: Request) -> None:
     """Raises ServiceError 400 for a parameter that the route does not know: a misspelt one would pass as left out."""
+    if not request.query_params:
+        return
     path, method = request.scope["route"].path_format, request.method.lower().replace("head", "get")
     parameters = request.app.openapi()["paths"][path][method].get("parameters", ())
     known = sorted(told["name"] for told in parameters if told["in"] == "query")

@@ -105,10 +105,10 @@ class _Page(StaticFiles):
         """Raises HTTPException 405 for what the server answers to other methods, and 404 whatever is asked of what is
         not there: the mount sees every address that no route takes.
         """
-        if self.lookup_path(path)[1] is None and errors.allowed(scope["app"], scope["path"]):
-            raise HTTPException(405)
-        if scope["method"] not in {"GET", "HEAD"} and self.lookup_path(path)[1] is None:
-            raise HTTPException(404)
+        if self.lookup_path(path)[1] is None:
+            known = errors.allowed(scope["app"], scope["path"])
+            if known or scope["method"] not in {"GET", "HEAD"}:
+                raise HTTPException(405 if known else 404)
         answer = await super().get_response(path, scope)
         answer.headers["Cache-Control"] = "no-cache"
         return answer

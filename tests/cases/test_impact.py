@@ -45,7 +45,7 @@ def test_what_meets_fast_gets_more_sweeps(case: Case, number: int) -> None:
     assert sweeps(case) == number
 
 
-def test_what_is_driven_together_and_breaks_gets_the_most_sweeps() -> None:
+def test_what_is_driven_together_and_breaks_gets_more_sweeps() -> None:
     """A motion or a traction presses for as long as it lasts; what holds does not, nor what moves one part alone."""
     ram = {"kind": "velocity", "parts": ["b"], "z": -1.0}
     slow = meeting(1.0, material="glass", fracture={})
