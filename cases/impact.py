@@ -4,6 +4,7 @@ import itertools
 import math
 from collections import Counter
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from .bodies import MeshFile
 from .boundaries import Course, Prescribed, Rotation, Traction, Wall
@@ -13,14 +14,15 @@ from .materials import Material
 from .placed import Placed, driven, velocity
 from .schema import Case, Part
 
-FEW, MANY, PRESSED, DRIVEN = 5, 10, 20, 40
-"""Sweeps of contact in a step; what more are good for: docs/numerics.md, "Contact", and "Driven rubble" there."""
+FEW, MANY, DRIVEN, MOST = 5, 10, 40, 80
+"""Sweeps of contact in a step: the fewest, also where bodies meet fast, also for rubble that is driven, and the most;
+what more are good for: docs/numerics.md, "Contact", "Driven rubble" and "Sweeps by need"."""
 FAST = 0.2
 """Of the wave speed of what is met: above it there are MANY sweeps. Chosen: below half of where few were too few for
 columns of metal (docs/numerics.md, "Plates under 100 GPa")."""
 PRESSING = 0.1
 """Of the same: above it flat surfaces buckle. Chosen: half of where irregular plates of copper lost their pressure
-(docs/numerics.md, "Ridges under pressure"). Where bodies break it asks for PRESSED sweeps ("Dust under pressure")."""
+(docs/numerics.md, "Ridges under pressure")."""
 _REST: Vector = (0.0, 0.0, 0.0)
 """The velocity of a wall, m/s."""
 
@@ -103,17 +105,24 @@ def driven_together(case: Case) -> bool:
     lasts, where what flies presses until it has stopped.
     """
     moved = any(value for _, drive in case.boundaries_of(Prescribed) for value in (drive.x, drive.y, drive.z))
-    driving = moved or any(isinstance(spec, Rotation | Traction) for spec in case.boundaries)
-    return bool(driving) and any(impact_speeds(case))
+    if any(isinstance(spec, Traction) for spec in case.boundaries):
+        return len(case.parts) > 1 or any(True for _ in case.boundaries_of(Wall))
+    turned = any(isinstance(spec, Rotation) for spec in case.boundaries)
+    return (bool(moved) or turned) and any(impact_speeds(case))
 
 
-def sweeps(case: Case) -> int:
-    """Sweeps over the active contacts of a step: what ``contact.sweeps`` says, or what the scene needs."""
+class Sweeps(NamedTuple):
+    """Bounds of the sweeps over the active contacts of a step; the first step has the least."""
+
+    least: int
+    most: int
+
+
+def sweeps(case: Case) -> Sweeps:
+    """What ``contact.sweeps`` says; or, from what the scene asks for on, as many as the step before needed."""
     assert case.contact is not None
     if case.contact.sweeps is not None:
-        return case.contact.sweeps
+        return Sweeps(case.contact.sweeps, case.contact.sweeps)
     if case.fractures and driven_together(case):
-        return DRIVEN
-    if case.fractures and pressed(case):
-        return PRESSED
-    return MANY if _fast(case, FAST) or case.contact.restitution > 0.0 else FEW
+        return Sweeps(DRIVEN, MOST)
+    return Sweeps(MANY if _fast(case, FAST) or case.contact.restitution > 0.0 else FEW, MOST)

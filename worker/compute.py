@@ -170,6 +170,6 @@ def _sum_up(
             *start.warnings, *loop.warnings, *loop.lost, *sim.ledger.warnings,
             *(sim.erosion.warnings() if sim.erosion is not None else []),
             *(sim.fracture.warnings if sim.fracture is not None else []), *(inside.warnings if inside else []),
-            *(common.warnings if common else []),
+            *(common.warnings if common else []), *(sim.contact.need.warnings if sim.contact else []),
         ],
     )  # fmt: skip

@@ -129,9 +129,10 @@ class Ledger:
     def warnings(self) -> list[str]:
         """What the user should know of the account, by the last call."""
         step, form = "a smaller numerics.dt_safety lowers it", "with numerics.pressure = 'standard' there is none"
+        growth = "numerics.dt_growth = 1.005 lowers it"
         told = [
             (self.worst, "the account of the energy has not closed by up to {:.2g} of the largest energy", step),
-            (self.stepping, "unequal time steps have taken or made {:.2g} of the largest energy", step),
+            (self.stepping, "unequal time steps have taken or made {:.2g} of the largest energy", growth),
             (self.averaged, "averaged pressures have made {:.2g} of the largest energy", form),
             (
                 self.unpaid,
@@ -147,7 +148,7 @@ class Ledger:
             ("the energy that contact has made", self.made, ""),
             ("the energy of motion beyond all that has come in", self.beyond, ""),
             ("the energy residual", self.residual, ""),
-            ("the energy of unequal time steps", self.stepping, "; a smaller numerics.dt_safety lowers it"),
+            ("the energy of unequal time steps", self.stepping, "; numerics.dt_growth = 1.005 lowers it"),
         ):
             if not share <= limit:
                 raise EnergyError(f"{what}, {share:.3g}, passed run.residual_limit {limit:g} {when}{remedy}")

@@ -14,8 +14,8 @@ from .parallel import fixed_point
 from .parallel.comm import Comm, Pending
 from .state import Ints
 
-_COSTS = 4
-"""Words of a rank about what contact takes."""
+_COSTS, _UNSETTLED = 4, 2
+"""Words of a rank about what contact takes, and about what its sweeps leave undone."""
 Value = TypeVar("Value", int, bool, float)
 
 
@@ -108,12 +108,15 @@ class Fields:
 
     def __init__(self, ranks: int = 1) -> None:
         """A word or some for each of the ``ranks`` stand behind the fields."""
-        self.words: Ints = np.zeros(self.size + (1 + _COSTS) * ranks, np.int64)
+        self.words: Ints = np.zeros(self.size + (1 + _COSTS + _UNSETTLED) * ranks, np.int64)
         """What the ranks exchange."""
         self.touched: Ints = self.words[self.size :][:ranks]
         """(ranks,) whom the facets that break concern (fracture/separation.py)."""
-        self.costs: Ints = self.words[self.size + ranks :].reshape(ranks, _COSTS)
+        each = self.words[self.size + ranks :].reshape(ranks, -1)
+        self.costs: Ints = each[:, :_COSTS]
         """(ranks, 4) what contact has taken from the bodies on each rank (contact/account.py)."""
+        self.unsettled: Ints = each[:, _COSTS:]
+        """(ranks, 2) what the sweeps of contact leave undone on each rank (contact/need.py)."""
 
 
 class StepReduction(Fields):
@@ -123,7 +126,8 @@ class StepReduction(Fields):
         """On this ``rank`` of so many."""
         super().__init__(ranks)
         self.own = Fields(ranks)
-        self.own.costs[np.arange(ranks) != rank] = np.iinfo(np.int64).min
+        for words in (self.own.costs, self.own.unsettled):
+            words[np.arange(ranks) != rank] = np.iinfo(np.int64).min
 
     def keep(self) -> Ints:
         """(fields,) what a run that goes on must know, on any number of ranks."""

@@ -115,7 +115,7 @@ def second_half(sim: Simulation) -> None:
             own = sim.reduction.own
             own.search, own.approach, own.opening = sim.contact.spent(nodes), sim.contact.approach, sim.contact.opening
             own.stray = sim.contact.stray
-            own.costs[sim.comm.rank] = sim.contact.costs
+            own.costs[sim.comm.rank], own.unsettled[sim.comm.rank] = sim.contact.costs, sim.contact.need.unsettled
     _elements(sim, clock.dt, sim.fracture)  # 12 to 14
     if sim.fracture is not None:
         with sim.timers.phase("fracture"):

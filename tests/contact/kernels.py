@@ -13,6 +13,7 @@ from conoid.worker.contact.narrow_phase import DEEP_SELF, PUSH_OUT, ContactRows,
 from conoid.worker.contact.pairs import PairTable
 from conoid.worker.contact.records import Crowd
 from conoid.worker.contact.solver import ActiveSet
+from conoid.worker.contact.stops import Stops
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.parallel.fixed_point import Tally
 
@@ -133,15 +134,22 @@ class Solver:
     """Sweeps over contacts of nodes with a mobility (nodes, 3), 1/kg; impulses in quanta of 1 / ``scale`` N s."""
 
     def __init__(
-        self, met: ContactRows, v: Floats, mobility: Floats, scale: float = 2.0**40, active: ActiveSet | None = None
-    ) -> None:
-        """``active``: of another step, to be used again."""
+        self, met: ContactRows, v: Floats, mobility: Floats, scale: float = 2.0**40, active: ActiveSet | None = None,
+        stops: Stops | None = None,
+    ) -> None:  # fmt: skip
+        """``active``: of another step, to be used again; ``stops``: all nodes are at the origin,
+        the first is of part 0, the others of part 1.
+        """
         self.met, self.v, self.scale, n = met, v.copy(), scale, len(v)
+        self.unsettled = np.zeros(2, np.int64)
         self.total = np.zeros((n, 3), np.int64)
-        self.active, every, part = active or ActiveSet(scale), np.arange(n, dtype=np.int32), np.zeros(n, np.int32)
-        self._crowd = Crowd(np.arange(n), every, part, part, mobility, self.v, self.v, self.v)
+        nothing, every, part = np.zeros((0, 3)), np.arange(n, dtype=np.int32), np.ones(n, np.int32)
+        part[0] = 0
+        self.active = active or ActiveSet(scale, stops or Stops(nothing, nothing, np.zeros((0, 2)), np.zeros(0)))
+        self._crowd = Crowd(np.arange(n), every, part, part, mobility, np.zeros((n, 3)), self.v, self.v)
         self._nodes: Any = SimpleNamespace(v=self.v, part=part, owned=np.ones(n, bool))
-        self.active.begin(met, many(met), self._crowd, Company([], SerialComm()).agree(met.nodes, every))
+        alone = Company([], SerialComm()).agree(met.nodes, every)
+        self.active.begin(met, many(met), self._crowd, alone, size=1.0, dt=1.0)
         self.active.weigh()
 
     @property
@@ -166,7 +174,7 @@ class Solver:
         return self.v
 
     def _leave(self) -> None:
-        self.active.leave(self._crowd, self.total, self._nodes, np.zeros((1, 3), np.int64))
+        self.active.leave(self._crowd, self.total, self._nodes, np.zeros((2, 3), np.int64), self.unsettled)
         assert (self.total.sum(axis=0) == 0).all()
 
     @property

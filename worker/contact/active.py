@@ -15,8 +15,9 @@ _LINE = 8
 """Words of a cache line."""
 V, IMPULSE = 0, 3
 """First word of a slot's velocity, m/s, and of its impulse of the sweep, quanta, in ``ActiveNodes.moving``."""
-MOBILITY, TOTAL = 0, 3
-"""First word of its mobility, 1/kg, and of its impulse of the step, quanta, in ``ActiveNodes.fixed``."""
+MOBILITY, TOTAL, CHANGED = 0, 3, 6
+"""First word of its mobility, 1/kg, and of its impulse of the step, quanta, in ``ActiveNodes.fixed``, and the l1 norm
+of what the last sweep has added to that, quanta."""
 WANTED, ROW_NORM, PUSH, MU, LAST = 3, 4, 5, 6, 7
 """Of ``Loaded.normal``, behind the unit normal."""
 ROW_NORM_T, PUSH_T = 4, 5

@@ -5,16 +5,21 @@ the nodes of the active set stand in the crowd, and ``index`` (crowd,) what each
 copy.
 """
 
+import numpy as np
+
 from ..jit import njit, prefetch, several, types
-from .active import IMPULSE, MOBILITY, NODES, TOTAL, V
+from .active import CHANGED, IMPULSE, MOBILITY, NODES, TOTAL, V
 
 _NAMED = -2
 """Of a node that a contact has and that has no slot yet."""
+_SMALL = 16
+"""Bits of an impulse that do not count in what is unsettled: 2^-30 of the largest (fixed_point.py), so that the sum
+over 2^28 nodes fits."""
 _AHEAD = 16
 """How many nodes ahead is brought near what is gathered from the rank's own."""
 _I2, _N1, _N2 = types.int64[:, ::1], types.int32[::1], types.int32[:, ::1]
-_F1, _F2, _F, _I, _B1 = (
-    types.float64[::1], types.float64[:, ::1], types.float64, types.int64, types.boolean[::1],
+_F1, _F2, _F, _I, _I1, _B1 = (
+    types.float64[::1], types.float64[:, ::1], types.float64, types.int64, types.int64[::1], types.boolean[::1],
 )  # fmt: skip
 
 
@@ -98,14 +103,15 @@ def load(active, places, v, mobility):  # type: ignore[no-untyped-def]
         for i in range(3):
             moving[s, V + i], fixed[s, MOBILITY + i] = v[a, i], mobility[a, i]
             words[s, IMPULSE + i] = total[s, TOTAL + i] = sums[s, i] = 0
-        sums[s, 3], active.path[s] = 0, 0.0
+        sums[s, 3], total[s, CHANGED], active.path[s] = 0, 0, 0.0
     return fastest
 
 
-@njit(types.boolean(_F2, _I2, _I2, _N1, NODES, _N1, _N1, _N1, _B1), cache=True)
-def leave(node_v, parts, total, slot, active, places, index, part, owned):  # type: ignore[no-untyped-def]
+@njit(types.boolean(_F2, _I2, _I1, _I2, _N1, NODES, _N1, _N1, _N1, _B1), cache=True)
+def leave(node_v, parts, unsettled, total, slot, active, places, index, part, owned):  # type: ignore[no-untyped-def]
     """Velocities to the nodes that this rank holds, impulses of the step to ``total`` (crowd, 3), and those of owned
-    nodes to the sums of their parts; no node has a slot any more. Whether any held node was pushed.
+    nodes to the sums of their parts and to what is ``unsettled`` (2,) of them, see need.py; no node has a slot any
+    more. Whether any held node was pushed.
     """
     moving, words = active.moving, active.fixed_words
     pushed = False
@@ -113,12 +119,17 @@ def leave(node_v, parts, total, slot, active, places, index, part, owned):  # ty
         a = places[s]
         h = index[a]
         slot[a] = -1
+        size = np.int64(0)
         for i in range(3):
             j = words[s, TOTAL + i]
+            size += abs(j)
             total[a, i] = j
             if h >= 0:
                 node_v[h, i] = moving[s, V + i]
                 pushed |= j != 0
                 if owned[h]:
                     parts[part[h], i] += j
+        if h >= 0 and owned[h]:
+            unsettled[0] += words[s, CHANGED] >> _SMALL
+            unsettled[1] += size >> _SMALL
     return pushed

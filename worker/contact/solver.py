@@ -7,12 +7,13 @@ import numpy as np
 
 from ..parallel.fixed_point import Tally
 from ..state import Floats, Indices, Ints, Nodes
-from . import booking, held, sweeps
+from . import booking, held, need, stops, sweeps
 from .account import Account
-from .active import IMPULSE, PUSH, PUSH_T, ActiveContacts, ActiveNodes, Kept, Loaded
+from .active import IMPULSE, PUSH, PUSH_T, ActiveContacts, ActiveNodes, Kept, Loaded, V
 from .company import ActiveSum
 from .narrow_phase import ContactRows
 from .records import Crowd
+from .stops import Braced, Stops
 
 _ROW_WEIGHTS = 4
 """Columns of ``ActiveNodes.row_weights``."""
@@ -21,22 +22,30 @@ _ROW_WEIGHTS = 4
 class ActiveSet:
     """The active contacts of a rank in a step, and the slots of their nodes; the first slots are of shared nodes."""
 
-    def __init__(self, scale: float) -> None:
-        """``scale``: quanta per N s, a power of two."""
-        self.scale = scale
+    def __init__(self, scale: float, near: Stops) -> None:
+        """``scale``: quanta per N s, a power of two; ``near``: walls and planes of symmetry."""
+        self.scale, self.stops = scale, near
         self.places: Indices = np.zeros(0, np.int32)
         """(slots,) where the nodes of the last step stand in the crowd."""
         self._slot: Indices = np.zeros(0, np.int32)
         """(crowd,) slot of each node, -1 for none; within a step only."""
-        self._room = _Room(0, 0)
+        self._room = _Room(0, 0, 0)
 
-    def begin(self, found: ContactRows, n: int, crowd: Crowd, shared: ActiveSum) -> None:
-        """Takes up the first ``n`` contacts that were ``found``, and the nodes whose sums are ``shared``."""
+    def go_on(self, scale: float, sides: Floats) -> None:
+        """Of a run that goes on; ``sides`` as of its stops."""
+        self.scale, self.stops = scale, self.stops._replace(sides=sides.reshape(self.stops.sides.shape))
+
+    def begin(
+        self, found: ContactRows, n: int, crowd: Crowd, shared: ActiveSum, size: float, dt: float
+    ) -> None:  # fmt: skip
+        """Takes up the first ``n`` contacts that were ``found`` in a step ``dt``, s, and the nodes whose sums are
+        ``shared``; ``size``: of a face, m.
+        """
         self._sum = shared
         if len(self._slot) != crowd.n:
             self._slot = np.full(crowd.n, -1, np.int32)
         if len(found.nodes) > self._room.contacts or crowd.n > self._room.nodes:
-            self._room = _Room(len(found.nodes), crowd.n)
+            self._room = _Room(len(found.nodes), crowd.n, len(self.stops.points))
         room, slot = self._room, self._slot
         self._first = held.number_shared(room.places, slot, shared.shared)
         self._n, border = held.number(
@@ -45,6 +54,8 @@ class ActiveSet:
         self.places = room.places[: self._n]
         shared.number(slot)
         self._fastest = held.load(room.active, self.places, crowd.v, crowd.mobility)
+        stops.find(room.braced, room.active, self.stops, self.places, crowd.x, crowd.part, size, dt)
+        stops.stop(room.active, room.braced)
         self._contacts = ActiveContacts(
             room.slots, found.weights, found.normals, found.wanted, found.friction, found.pair, room.reach
         )  # fmt: skip
@@ -69,12 +80,13 @@ class ActiveSet:
 
         self._complete(begin, active.moving_words, IMPULSE, 3)
         sweeps.give(active, self._n, self.scale)
+        stops.stop(active, self._room.braced)
 
     def sweep(self, many: int) -> None:
         """So many sweeps."""
-        active, contacts, scale = self._room.active, self._contacts, self.scale
+        active, contacts, scale, braced = self._room.active, self._contacts, self.scale, self._room.braced
         if not self._first:
-            sweeps.sweep_all(active, self._parts[1], contacts, self._fastest, self._n, scale, many)
+            sweeps.sweep_all(active, self._parts[1], contacts, braced, self._fastest, self._n, scale, many)
             return
 
         def correct(ahead: float, part: Loaded) -> None:
@@ -82,7 +94,10 @@ class ActiveSet:
 
         for k in range(many):
             self._complete(partial(correct, sweeps.momentum(k, many)), active.moving_words, IMPULSE, 3)
+            if k + 1 == many:
+                need.measure(active, self._n)
             sweeps.give(active, self._n, scale)
+            stops.stop(active, braced)
 
     def _complete(self, work: Callable[[Loaded], None], words: Ints, first: int, columns: int) -> None:
         """Does the work of all contacts, and completes these columns of the ``words`` of shared nodes; contacts without
@@ -112,12 +127,18 @@ class ActiveSet:
         for part in self._parts:
             sweeps.store(kept, part, self._contacts.pair)
 
-    def leave(self, crowd: Crowd, total: Ints, state: Nodes, parts: Ints) -> bool:
-        """Gives velocities to the nodes that are held here, and impulses to ``total`` (crowd, 3) and to the sums of the
-        ``parts`` (parts, 3); whether any was pushed.
+    def leave(self, crowd: Crowd, total: Ints, state: Nodes, parts: Ints, unsettled: Ints) -> bool:
+        """Gives velocities to the nodes that are held here, and impulses to ``total`` (crowd, 3), to the sums of the
+        ``parts`` (parts, 3) and to what is ``unsettled`` (2,); whether any was pushed.
         """
+        stops.let_go(self._room.active, self._room.braced)
         some = crowd.local, state.part, state.owned
-        return bool(held.leave(state.v, parts, total, self._slot, self._room.active, self.places, *some))
+        return bool(held.leave(state.v, parts, unsettled, total, self._slot, self._room.active, self.places, *some))
+
+    @property
+    def velocities(self) -> Floats:
+        """(slots, 3) m/s, as sweeps have left them, with what stops have given."""
+        return self._room.active.moving[: self._n, V : V + 3]
 
     def pushes(self) -> tuple[Indices, Floats]:
         """Which contacts have asked for an impulse in the step, and (k, 4) their impulses along the normal, and of
@@ -129,12 +150,12 @@ class ActiveSet:
 
 
 class _Room:
-    """Arrays for as many contacts, and nodes of the crowd."""
+    """Arrays for as many contacts, nodes of the crowd, and stops."""
 
-    def __init__(self, contacts: int, nodes: int) -> None:
+    def __init__(self, contacts: int, nodes: int, many: int) -> None:
         self.contacts, self.nodes = contacts, nodes
         self.slots = np.empty((contacts, 4), np.int32)
         self.reach = np.empty(contacts)
         self.rows = np.empty((2, contacts), np.int32)
         self.places = np.empty(nodes, np.int32)
-        self.active, self.loaded = ActiveNodes.of(nodes), Loaded.of(contacts)
+        self.active, self.loaded, self.braced = ActiveNodes.of(nodes), Loaded.of(contacts), Braced.room(many * nodes)

@@ -27,10 +27,12 @@ from .books import Books
 from .detection import Ahead, Detected, detect
 from .exterior import Exterior
 from .narrow_phase import PUSH_OUT
+from .need import Need
 from .restitution import hold_back, rebound
 from .scene import Scene
 from .searches import Searches
 from .solver import ActiveSet
+from .stops import Stops
 
 _SURFACE, _LISTED, _TESTED, _ACTIVE = 9.0, 0.1, 3.0, 4.0
 """What a step costs for a node of the surface (searches and registrations, shared out), for a pair that is listed, for
@@ -45,7 +47,6 @@ class _Scheme:
     """What the scene asks of contact, the same in all steps."""
 
     restitution: float
-    sweeps: int
     looks: int
     """Steps between two looks at which edges have become sharp."""
     sharp: float
@@ -55,7 +56,7 @@ class _Scheme:
     def of(cls, case: Case) -> "_Scheme":
         assert case.contact is not None
         looks, angle = (sharp.PRESSED, sharp.BENT) if pressed(case) else (normals.EVERY, sharp.SHARP)
-        return cls(case.contact.restitution, sweeps(case), looks, angle)
+        return cls(case.contact.restitution, looks, angle)
 
 
 class Contact:
@@ -73,8 +74,8 @@ class Contact:
         largest, speed = extremes
         mass = pairing.lighter(self.searches.mu, model.nodes, self.exterior.flight.mobility, comm) or largest
         self.books = Books(model.nodes.n, len(case.parts), mass * speed, mass * speed * speed)
-        self._active = ActiveSet(self.books.scale)
-        self._scheme = _Scheme.of(case)
+        self._active = ActiveSet(self.books.scale, Stops.of(case, model, comm))
+        self._scheme, self.need = _Scheme.of(case), Need(sweeps(case))
         self.found = Detected.nothing()
         """What the last step has found here."""
         self.limit = 0.0
@@ -89,7 +90,7 @@ class Contact:
         books = self.books
         parcel.known["contact"] = (
             books.scale, books.friction.scale, self.limit, self.searches.many, self._mean_dt, self.exterior.size,
-            books.account.known(),
+            self._active.stops.sides, self.need.known(), books.account.known(),
         )  # fmt: skip
         self.books.keep(parcel, self.searches.scene)
         self.exterior.keep(parcel)
@@ -99,9 +100,11 @@ class Contact:
         """Takes it back; all ranks take part."""
         books = self.books
         (
-            books.scale, books.friction.scale, self.limit, self.searches.many, self._mean_dt, size, account,
+            books.scale, books.friction.scale, self.limit, self.searches.many, self._mean_dt, size,
+            sides, need, account,
         ) = parcel.known["contact"]  # fmt: skip
-        self._active.scale = books.scale
+        self._active.go_on(books.scale, sides)
+        self.need.resume(need)
         books.resume(parcel, account)
         books.agreed = self._comm.sum(books.account.words)
         self.exterior.resume(parcel, size, self._fractures)
@@ -162,6 +165,7 @@ class Contact:
 
     def agree(self, all_ranks: StepReduction) -> None:
         """Takes what all ranks have found in the step; all ranks take part."""
+        self.need.agree(all_ranks.unsettled.sum(axis=0))
         self.books.agreed = all_ranks.costs.sum(axis=0).reshape(2, 2)
         self.searches.due |= all_ranks.search
         self.found.stray = all_ranks.stray
@@ -205,6 +209,7 @@ class Contact:
         """Before the kick: keeps v(n-1/2), and books the second half of the last impulses' work."""
         now = self.searches.scene
         self.books.due()
+        self.need.unsettled[:] = 0
         if now is None:
             self.books.book_resumed(state, self.exterior.flight.mobility)
             return
@@ -247,18 +252,20 @@ class Contact:
         now.messages.copies.begin(state)
         held.take(crowd.x, crowd.v, now.own.slots, state.x, state.v, now.own.local)
         now.messages.copies.finish(crowd.x, crowd.v, now.slots.before)
-        self._meet(now, PUSH_OUT if books.account.settle(books.agreed) else 0.0, dt)
+        give = PUSH_OUT if books.account.settle(books.agreed) else 0.0
+        self._meet(now, give, dt)
         shared = now.messages.company.agree(now.active.room.nodes[: now.active.n], crowd.local)
-        active.begin(now.active.room, now.active.n, crowd, shared)
+        active.begin(now.active.room, now.active.n, crowd, shared, self.exterior.size, dt)
         active.weigh()
         kept = Kept(now.node_face.kept, self.exterior.cracks.kept.reshape(-1, 4))
-        active.resume(kept, self._resume())
-        active.sweep(self._scheme.sweeps)
+        ratio = self._resume()
+        active.resume(kept, ratio if give > 0.0 or self._scheme.restitution > 0.0 else 0.0)
+        active.sweep(self.need.sweeps)
         active.store(kept)
         if self.searches.rubs:
             active.heat(books.friction, now.slots.before)
         active.cost(books.account, now.slots.before)
-        if active.leave(crowd, now.slots.total, state, books.parts):
+        if active.leave(crowd, now.slots.total, state, books.parts, self.need.unsettled):
             self.last_push = t
         shared.free()
         books.book(now, active.places)

@@ -37,6 +37,8 @@ from .active import (
     V,
 )  # fmt: skip
 from .narrow_phase import CRACK
+from .need import measure
+from .stops import BRACED, stop
 
 SHARES = float(2**30)
 """Quanta per unit of weight."""
@@ -265,12 +267,15 @@ def correct(active, loaded, contacts, fastest, ahead, scale):  # type: ignore[no
     sweep(active, loaded, ahead, scale)
 
 
-@njit(types.void(NODES, LOADED, CONTACTS, _F, _I, _F, _I), cache=True)
-def sweep_all(active, loaded, contacts, fastest, n, scale, many):  # type: ignore[no-untyped-def]
-    """``many`` sweeps (``correct``, ``give``) of contacts of which no other rank shares a node."""
+@njit(types.void(NODES, LOADED, CONTACTS, BRACED, _F, _I, _F, _I), cache=True)
+def sweep_all(active, loaded, contacts, braced, fastest, n, scale, many):  # type: ignore[no-untyped-def]
+    """``many`` sweeps (``correct``, ``give``, ``stop``) of contacts of which no other rank shares a node."""
     for k in range(many):
         correct(active, loaded, contacts, fastest, momentum(k, many), scale)
+        if k + 1 == many:
+            measure(active, n)
         give(active, n, scale)
+        stop(active, braced)
 
 
 @njit(types.void(KEPT, LOADED, _ROWS), cache=True)
