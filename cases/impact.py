@@ -104,11 +104,10 @@ def driven_together(case: Case) -> bool:
     """Whether parts may meet, or walls, while a motion or a traction drives something: it presses for as long as it
     lasts, where what flies presses until it has stopped.
     """
+    if case.boundaries_of(Traction):
+        return len(case.parts) > 1 or bool(case.boundaries_of(Wall))
     moved = any(value for _, drive in case.boundaries_of(Prescribed) for value in (drive.x, drive.y, drive.z))
-    if any(isinstance(spec, Traction) for spec in case.boundaries):
-        return len(case.parts) > 1 or any(True for _ in case.boundaries_of(Wall))
-    turned = any(isinstance(spec, Rotation) for spec in case.boundaries)
-    return (bool(moved) or turned) and any(impact_speeds(case))
+    return (moved or bool(case.boundaries_of(Rotation))) and any(impact_speeds(case))
 
 
 class Sweeps(NamedTuple):

@@ -114,11 +114,14 @@ def _held_by(spec: schema.Boundary, model: Model) -> Flags:
     return chosen
 
 
+def named(spec: schema.Boundary, model: Model) -> Flags:
+    """(parts,) the parts that a boundary names; all where it names none."""
+    return np.array([not spec.parts or name in spec.parts for name in model.parts])
+
+
 def _of_parts(spec: schema.Boundary, model: Model) -> Flags:
-    """(n,) the nodes of the parts that a boundary names; of all where it names none."""
-    if not spec.parts:
-        return np.ones(model.nodes.n, bool)
-    return np.isin(model.nodes.part, [model.parts.index(p) for p in spec.parts])
+    """(n,) the nodes of the parts that a boundary names."""
+    return np.asarray(named(spec, model)[model.nodes.part])
 
 
 def heights(spec: schema.Symmetry, model: Model) -> Floats:

@@ -27,6 +27,8 @@ from .parallel.comm import Comm
 from .parallel.fixed_point import Columns, Grouped, Table, Tally, exact_sums, totals_and_words
 from .state import WORKS, Floats, Model
 
+_GROWTH = "a smaller numerics.dt_growth, 1.005 say, lowers it"
+"""What helps against the energy of unequal time steps (docs/numerics.md, "Restitution")."""
 _TOLD = 0.01
 """Share of the largest energy that may be missing, that unequal steps may take or make and averaged pressures make,
 without a word, and of the energy of fracture that may come back. Chosen: what the other lines are usually read to.
@@ -129,10 +131,9 @@ class Ledger:
     def warnings(self) -> list[str]:
         """What the user should know of the account, by the last call."""
         step, form = "a smaller numerics.dt_safety lowers it", "with numerics.pressure = 'standard' there is none"
-        growth = "numerics.dt_growth = 1.005 lowers it"
         told = [
             (self.worst, "the account of the energy has not closed by up to {:.2g} of the largest energy", step),
-            (self.stepping, "unequal time steps have taken or made {:.2g} of the largest energy", growth),
+            (self.stepping, "unequal time steps have taken or made {:.2g} of the largest energy", _GROWTH),
             (self.averaged, "averaged pressures have made {:.2g} of the largest energy", form),
             (
                 self.unpaid,
@@ -148,7 +149,7 @@ class Ledger:
             ("the energy that contact has made", self.made, ""),
             ("the energy of motion beyond all that has come in", self.beyond, ""),
             ("the energy residual", self.residual, ""),
-            ("the energy of unequal time steps", self.stepping, "; numerics.dt_growth = 1.005 lowers it"),
+            ("the energy of unequal time steps", self.stepping, f"; {_GROWTH}"),
         ):
             if not share <= limit:
                 raise EnergyError(f"{what}, {share:.3g}, passed run.residual_limit {limit:g} {when}{remedy}")

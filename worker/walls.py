@@ -10,7 +10,7 @@ from .state import Bits, Flags, Floats, Indices, Ints, Nodes, extended
 _SWEEPS = 4
 """Times a node is taken to each wall. Chosen: two walls at right angles take one; what a sharper corner leaves after
 four is taken in the next step."""
-_ACROSS = 1e-12
+ACROSS = 1e-12
 """Of a wall's unit normal, what is left of its square along the planes of symmetry that hold a node: with less the wall
 lies along a plane and cannot push the node. Chosen far above rounding (1e-32) and below any angle that is meant."""
 
@@ -116,7 +116,7 @@ def _push_out(  # type: ignore[no-untyped-def]
                     speed += v[a, i] * normals[k, i]
                     if mirrored[j, i]:
                         along -= normals[k, i] * normals[k, i]
-                if held[j, k] and gap + dt * speed < 0.0 and along > _ACROSS:
+                if held[j, k] and gap + dt * speed < 0.0 and along > ACROSS:
                     push = -(gap / dt + speed) / along
                     for i in range(3):
                         if mirrored[j, i]:

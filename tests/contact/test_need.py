@@ -77,9 +77,3 @@ def test_a_run_tells_if_sweeps_have_left_too_much() -> None:
     again = Need(Sweeps(5, 40))
     again.resume(own.known())
     assert (again.warnings, again.sweeps) == (own.warnings, 8)
-
-
-def test_a_run_goes_on_within_the_bounds_of_its_case() -> None:
-    need = Need(Sweeps(10, 40))
-    need.resume((5, 0, 0))
-    assert need.sweeps == 10

@@ -3,10 +3,16 @@
 import numpy as np
 import pytest
 
+from conoid.cases import schema
 from conoid.worker.contact.stops import Stops
+from conoid.worker.mesh.model import TetMesh
 
-from ..worker.meshes import Floats
+from ..worker.meshes import Floats, block
+from .bodies import meeting_of, moved, pieces_of
 from .kernels import Solver, column
+from .ranks import on_ranks
+
+CUBE = block((1, 1, 1), 1.0)
 
 
 def wall(normal: Floats, side: float = 1.0, at: float = 0.0, friction: float = 0.0) -> Stops:
@@ -65,12 +71,29 @@ def test_a_stop_that_pushed_too_much_takes_it_back() -> None:
     assert solver.v[:, 0] == pytest.approx([1.0, 1.0], abs=1e-4), "they have their common speed, as without a wall"
 
 
-@pytest.mark.parametrize(("friction", "left"), [(0.0, 0.5), (0.2, 0.3), (0.6, 0.0)])
+@pytest.mark.parametrize(("friction", "left"), [(0.0, 0.5), (0.2, 0.4), (0.6, 0.2), (2.0, 0.0)])
 def test_friction_at_a_wall_takes_what_its_push_allows(friction: float, left: float) -> None:
-    """Of a node that another presses at the wall, both with 0.5 m/s along it; what the wall has given is taken off."""
+    """Of a node that another presses at the wall, both with 0.5 m/s along it; the other sticks to it and tells."""
     v = np.array([[0.0, 0.5, 0.0], [-1.0, 0.5, 0.0]])
-    solver = Solver(column(2), v, np.ones((2, 3)), stops=wall(np.array([1.0, 0.0, 0.0]), friction=friction))
-    solver.active.sweep(60)
-    along = solver.active.velocities[:, 1]
-    assert along == pytest.approx([left, 0.5], abs=5e-3)
-    assert solver.step(60)[:, 1] == pytest.approx([0.5, 0.5], rel=1e-12)
+    met = column(2)._replace(friction=np.full(1, 10.0))
+    solver = Solver(met, v, np.ones((2, 3)), stops=wall(np.array([1.0, 0.0, 0.0]), friction=friction))
+    assert solver.step(200)[1] == pytest.approx([0.0, left, 0.0], abs=5e-3)
+
+
+def test_walls_and_planes_hold_the_parts_that_they_name_on_their_side() -> None:
+    """Bodies above and below a plane, and one in two pieces on both sides of it, which sweeps leave to the plane."""
+    both = TetMesh(
+        np.concatenate([CUBE.points, CUBE.points - [0.0, 0.0, 3.0]]),
+        np.concatenate([CUBE.tets, CUBE.tets + len(CUBE.points)]),
+    )
+    boundaries = (
+        schema.Wall(kind="wall", point=(0.0, 0.0, -9.0), normal=(0.0, 3.0, 4.0), parts=("body1",), friction=0.3),
+        schema.Symmetry(kind="symmetry", axis="z", at=-1.0),
+    )
+    case = meeting_of([{}, {}, {}]).model_copy(update={"boundaries": boundaries})
+    pieces = pieces_of(case, [CUBE, moved(CUBE, (3.0, 0.0, -3.0)), moved(both, (6.0, 0.0, 0.0))], 2)
+    for stops in on_ranks(2, lambda comm: Stops.of(case, pieces[comm.rank][1], comm)):
+        assert stops.points.tolist() == [[0.0, 0.0, -9.0], [0.0, 0.0, -1.0]]
+        assert stops.normals == pytest.approx(np.array([[0.0, 0.6, 0.8], [0.0, 0.0, 1.0]]))
+        assert stops.sides.tolist() == [[0.0, 1.0, 0.0], [1.0, -1.0, 0.0]]
+        assert stops.friction.tolist() == [0.3, 0.0]

@@ -46,9 +46,8 @@ class Need:
         return self.sweeps, self._changed, self._impulse
 
     def resume(self, known: tuple[int, int, int]) -> None:
-        """Takes it back; a number of sweeps that is given now counts."""
-        sweeps, self._changed, self._impulse = known
-        self.sweeps = min(max(sweeps, self._bounds.least), self._bounds.most)
+        """Takes it back."""
+        self.sweeps, self._changed, self._impulse = known
 
     @property
     def warnings(self) -> list[str]:

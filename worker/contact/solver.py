@@ -9,7 +9,7 @@ from ..parallel.fixed_point import Tally
 from ..state import Floats, Indices, Ints, Nodes
 from . import booking, held, need, stops, sweeps
 from .account import Account
-from .active import IMPULSE, PUSH, PUSH_T, ActiveContacts, ActiveNodes, Kept, Loaded, V
+from .active import IMPULSE, PUSH, PUSH_T, ActiveContacts, ActiveNodes, Kept, Loaded
 from .company import ActiveSum
 from .narrow_phase import ContactRows
 from .records import Crowd
@@ -35,9 +35,7 @@ class ActiveSet:
         """Of a run that goes on; ``sides`` as of its stops."""
         self.scale, self.stops = scale, self.stops._replace(sides=sides.reshape(self.stops.sides.shape))
 
-    def begin(
-        self, found: ContactRows, n: int, crowd: Crowd, shared: ActiveSum, size: float, dt: float
-    ) -> None:  # fmt: skip
+    def begin(self, found: ContactRows, n: int, crowd: Crowd, shared: ActiveSum, size: float, dt: float) -> None:
         """Takes up the first ``n`` contacts that were ``found`` in a step ``dt``, s, and the nodes whose sums are
         ``shared``; ``size``: of a face, m.
         """
@@ -134,11 +132,6 @@ class ActiveSet:
         stops.let_go(self._room.active, self._room.braced)
         some = crowd.local, state.part, state.owned
         return bool(held.leave(state.v, parts, unsettled, total, self._slot, self._room.active, self.places, *some))
-
-    @property
-    def velocities(self) -> Floats:
-        """(slots, 3) m/s, as sweeps have left them, with what stops have given."""
-        return self._room.active.moving[: self._n, V : V + 3]
 
     def pushes(self) -> tuple[Indices, Floats]:
         """Which contacts have asked for an impulse in the step, and (k, 4) their impulses along the normal, and of

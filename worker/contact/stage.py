@@ -258,8 +258,7 @@ class Contact:
         active.begin(now.active.room, now.active.n, crowd, shared, self.exterior.size, dt)
         active.weigh()
         kept = Kept(now.node_face.kept, self.exterior.cracks.kept.reshape(-1, 4))
-        ratio = self._resume()
-        active.resume(kept, ratio if give > 0.0 or self._scheme.restitution > 0.0 else 0.0)
+        active.resume(kept, self._resume(give))
         active.sweep(self.need.sweeps)
         active.store(kept)
         if self.searches.rubs:
@@ -270,12 +269,14 @@ class Contact:
         shared.free()
         books.book(now, active.places)
 
-    def _resume(self) -> float:
-        """The step over the one before: what impulses of the same pairs are worth now."""
+    def _resume(self, give: float) -> float:
+        """The step over the one before: what impulses of the same pairs are worth now. Without restitution none while
+        there is no energy to ``give``, which too much of them would make.
+        """
         mean_dt = self._clock.mean_dt
         ratio = mean_dt / self._mean_dt if self._mean_dt > 0.0 else 0.0
         self._mean_dt = mean_dt
-        return ratio
+        return ratio if give > 0.0 or self._scheme.restitution > 0.0 else 0.0
 
     def _meet(self, now: Scene, give: float, dt: float) -> None:
         """Finds the active contacts of the step; ``give``: of penetrations, taken back (narrow_phase.PUSH_OUT)."""

@@ -15,17 +15,16 @@ import numpy as np
 from conoid.cases import schema
 from conoid.cases.schema import Case
 
-from ..conditions import AXES, sides
+from ..conditions import AXES, named, sides
 from ..jit import njit, record, types
 from ..parallel.comm import Comm
 from ..state import Floats, Indices, Ints, Model
+from ..walls import ACROSS
 from .active import MOBILITY, NODES, V
 
 _NEAR = 0.25
 """Of the typical size of a face: what is further from a plane is not looked at. Chosen: no step takes a node so far
 (clock.py), and if one did, the boundary would stop it all the same."""
-_ACROSS = 1e-12
-"""As of walls.py: of a normal, what is left of its square along components that are free."""
 
 
 class Stops(NamedTuple):
@@ -47,20 +46,21 @@ class Stops(NamedTuple):
         take part.
         """
         walls, planes = case.boundaries_of(schema.Wall), case.boundaries_of(schema.Symmetry)
-        points = [spec.point for _, spec in walls] + [np.eye(3)[AXES[spec.axis]] * spec.at for _, spec in planes]
-        normals = [spec.normal for _, spec in walls] + [np.eye(3)[AXES[spec.axis]] for _, spec in planes]
+        axes = [np.eye(3)[AXES[plane.axis]] for _, plane in planes]
+        heights = [plane.at for _, plane in planes]
+        points = [wall.point for _, wall in walls] + [at * axis for at, axis in zip(heights, axes, strict=True)]
+        normals = np.array([wall.normal for _, wall in walls] + axes, float).reshape(-1, 3)
         found = np.zeros((2, len(points), len(model.parts)))
         for k, (_, wall) in enumerate(walls):
-            found[0, k] = [not wall.parts or name in wall.parts for name in model.parts]
+            found[0, k] = named(wall, model)
         for k, (_, plane) in enumerate(planes, len(walls)):
             side = sides(plane, model)
             for way, sign in enumerate((1.0, -1.0)):
                 found[way, k, model.nodes.part[side == sign]] = 1.0
         ahead, behind = comm.maximum(found.ravel()).reshape(found.shape)
-        unit = np.array(normals, float).reshape(-1, 3)
-        unit /= np.linalg.norm(unit, axis=1)[:, None]
+        normals /= np.linalg.norm(normals, axis=1)[:, None]
         friction = np.array([*(wall.friction for _, wall in walls), *(0.0 for _ in planes)])
-        return cls(np.array(points, float).reshape(-1, 3), unit, ahead - behind, friction)
+        return cls(np.array(points, float).reshape(-1, 3), normals, ahead - behind, friction)
 
 
 class Braced(NamedTuple):
@@ -110,7 +110,7 @@ def find(braced, active, stops, places, x, part, size, dt):  # type: ignore[no-u
                 gap += side * stops.normals[k, i] * (x[a, i] - stops.points[k, i])
                 if fixed[s, MOBILITY + i] > 0.0:
                     along += stops.normals[k, i] * stops.normals[k, i]
-            if gap < _NEAR * size and along > _ACROSS:
+            if gap < _NEAR * size and along > ACROSS:
                 for i in range(3):
                     free = fixed[s, MOBILITY + i] > 0.0
                     braced.normal[n, i] = side * stops.normals[k, i] if free else 0.0
