@@ -8,7 +8,7 @@ import numpy as np
 from ..growing import Rooms
 from ..state import Bits, Flags, Floats, Indices, Ints
 from .normals import COLUMNS
-from .records import AGED, OPEN, Crowd, depths
+from .records import AGED, OPEN, Crowd
 
 _FRESH = {
     **dict.fromkeys(("slave", "pushes", "live", "new", "fresh", "tracked", "on_surface"), False),
@@ -138,7 +138,7 @@ class SceneEdges:
     """The edges; only sharp ones are searched."""
 
     corners: Indices
-    """(e, 4) slots."""
+    """(e, 6) slots: see records.Edges."""
     sides: Ints
     """(e, 2) ids of their faces."""
     faces: Indices
@@ -171,11 +171,6 @@ class SceneEdges:
         return cls(
             corners, sides, faces, size, opened, meets, sharp, own, rank, *np.zeros((3, len(corners)), bool)
         )  # fmt: skip
-
-    @cached_property
-    def deep(self) -> Floats:
-        """(e,) see records.Edges."""
-        return depths(self.sides, self.size)
 
     @cached_property
     def far(self) -> Ints:

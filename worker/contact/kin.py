@@ -62,10 +62,10 @@ def _become(ids, key, became, node, tet):  # type: ignore[no-untyped-def]
 
 @njit(_I1(_N2, _N1), cache=True)
 def _torn(corners, first):  # type: ignore[no-untyped-def]
-    """Rows of ``corners`` (n, 4) with a node that has copies; ``first``: see Family."""
+    """Rows of ``corners`` (n, 4 or 6) with a node that has copies; ``first``: see Family."""
     rows, n = np.empty(len(corners), np.int64), 0
     for row in range(len(corners)):
-        for k in range(4):
+        for k in range(corners.shape[1]):
             if first[corners[row, k]] >= 0:
                 rows[n] = row
                 n += 1
@@ -97,19 +97,20 @@ def follow_edges(corners, fresh, sides, first, ids, key, became):  # type: ignor
     there.
     """
     rows = _torn(corners, first)
-    old, gone = np.empty((len(rows), 4), np.int32), np.zeros(len(rows), np.bool_)
+    old, gone = np.empty((len(rows), 6), np.int32), np.zeros(len(rows), np.bool_)
     for r in range(len(rows)):
         e = rows[r]
         fresh[e] = True
         one, two = sides[e, 0] // 4, sides[e, 1] // 4
         gone[r] = corners[e, 0] == corners[e, 1]
-        for k in range(4):
+        for k in range(6):
             old[r, k] = corners[e, k]
         for k in range(2):
             corners[e, k] = _become(ids, key, became, old[r, k], one)
             gone[r] |= corners[e, k] != _become(ids, key, became, old[r, k], two)
-        corners[e, 2] = _become(ids, key, became, old[r, 2], one)
-        corners[e, 3] = _become(ids, key, became, old[r, 3], two)
+        for k in range(2, 6, 2):
+            corners[e, k] = _become(ids, key, became, old[r, k], one)
+            corners[e, k + 1] = _become(ids, key, became, old[r, k + 1], two)
         if gone[r]:
             corners[e, 1:] = corners[e, 0]
     return rows, old, gone
@@ -168,7 +169,7 @@ def apart_from_edges(old, now, first, own):  # type: ignore[no-untyped-def]
     """(p, 2) pairs of edges, by ascending faces, that had an end in common before the split and have none now, where
     the one of smaller faces, the first, is this rank's own.
 
-    ``old`` and ``now`` (e, 4): their nodes; ``first``: see Family.
+    ``old`` and ``now`` (e, 6): their nodes; ``first``: see Family.
     """
     ends, m = np.empty(2 * len(old), np.int32), 0
     at = np.empty(2 * len(old), np.int64)

@@ -16,10 +16,11 @@ from .geometry import at, cross, dot, minus
 NEAR = 0.02
 """Of the size of a face: a gap that is watched although it does not close by itself."""
 DEEP = 0.25
-"""Of the size of a face: deepest penetration that is still taken for one, not for the back of a thin body."""
+"""Of the size of a face, and of the length of an edge and the height of its tets: deepest penetration that is still
+taken for one, not for the back of a thin body."""
 DEEP_SELF = 0.05
-"""The same on one part, whose nodes lie behind its own faces anyway, and of edges but those of one tet
-(records.depths)."""
+"""The same of faces of one part, whose nodes lie behind its own faces anyway; as deep at least edges hold, however flat
+their tets."""
 HASTY = 0.1
 """Of the typical size of a face: pairs that come nearer by less in a step bound no step before they are active. A tet
 of that size is several times as high."""
@@ -164,11 +165,9 @@ class EdgeTable(NamedTuple):
     """The edges; pairs are of sharp ones."""
 
     corners: Indices
-    """(e, 4) slots: records.Edges."""
+    """(e, 6) slots: records.Edges."""
     size: Floats
     """(e,) initial length, m."""
-    deep: Floats
-    """(e,) depth beyond which it holds nothing, m: records.Edges."""
     meets: Flags
     """(e,) whether its faces allow that others meet it: records.Edges."""
     left: Floats
@@ -186,7 +185,7 @@ STEP = record(Step, types.float64[:, :], _F2, types.float64[:, :], _N1, _F2, *(5
 PAIRS = record(Pairs, _N2, _F1, _F1, _B1, _N1, _N1)
 SLOTS = record(SlotTable, _F2, _B1, _N1, _F1, _F2, _B1, _N1)
 FACES = record(FaceTable, _N2, _F1, _I1, _B1, _F1, _B1, _F2, _B1)
-EDGES = record(EdgeTable, _N2, _F1, _F1, _B1, _F1, _B1)
+EDGES = record(EdgeTable, _N2, _F1, _B1, _F1, _B1)
 
 
 @njit("float64(float64, float64, float64, float64, float64)", cache=True, error_model="numpy")

@@ -1,7 +1,8 @@
 """What contact knows of a surface: faces and edges as rows of global node ids, nodes with their state.
 
 A face is three nodes, counter-clockwise seen from outside, and the node of its tet that lies opposite. An edge is its
-two nodes and, of each of the two faces that meet there, the third one. Rows travel between ranks as they are.
+two nodes and, of each of the two faces that meet there, the third one and the one opposite. Rows travel between ranks
+as they are.
 """
 
 from collections.abc import Sequence
@@ -14,7 +15,6 @@ import numpy as np
 from ..growing import Rooms
 from ..ids import located
 from ..state import Bits, Flags, Floats, Indices, Ints
-from .narrow_phase import DEEP, DEEP_SELF
 
 AGED, OPEN = 1, 2
 """How far a face of an edge is open."""
@@ -70,12 +70,12 @@ class Faces(Rows):
 
 @dataclass
 class Edges(Rows):
-    """Edges; a row (a, b, c, d): edge ab between face abc and face bad, that of the smaller id first. Where
-    more than two faces meet in an edge, every two of them that may enclose a body make a row.
+    """Edges; a row (a, b, c, d, e, f): edge ab between face abc of tet abce and face bad of tet badf, that of the
+    smaller id first. Where more than two faces meet in an edge, every two of them that may enclose a body make a row.
     """
 
     nodes: Ints
-    """(n, 4) global ids."""
+    """(n, 6) global ids."""
     sides: Ints
     """(n, 2) ids of the faces abc and bad."""
     size: Floats
@@ -90,18 +90,6 @@ class Edges(Rows):
     def names(self) -> Ints:
         """(n,) the two faces of each edge as one number: two faces have one edge in common."""
         return (self.sides[:, 0] << 32) + self.sides[:, 1]
-
-    @property
-    def deep(self) -> Floats:
-        """(n,) depth, m, beyond which it holds nothing."""
-        return depths(self.sides, self.size)
-
-
-def depths(sides: Ints, size: Floats) -> Floats:
-    """(n,) how deep edges hold, m, of their ``size`` (n,): DEEP where both of their ``sides`` (n, 2), ids of faces, are
-    of one tet, if that is as high; what is behind the faces of two tets nobody knows.
-    """
-    return np.where(sides[:, 0] // 4 == sides[:, 1] // 4, DEEP, DEEP_SELF) * size
 
 
 @dataclass(frozen=True)

@@ -26,16 +26,16 @@ BENT, PRESSED = sine_and_cosine(math.radians(5.0))[1], 4
 ridges of surfaces that were flat cross without a node inside, and what overlaps has no pressure. Chosen by flyer plates
 of copper at 1 to 2.4 km/s (docs/numerics.md, "Ridges under pressure")."""
 
-_A, _B, _C, _OWNER, _FACE, _OPEN, _LENGTH, _NORMAL = 0, 1, 2, 3, 4, 5, 6, 7
-"""Columns of a half edge that travels: its nodes and the third node of its face, the owner of that one, the face,
-how far that is open, initial length, m, and the unit normal of the face; floats as their bits."""
-_HALF, _ROW = 10, 12
+_A, _B, _C, _D, _OWNER, _TOP, _FACE, _OPEN, _LENGTH, _NORMAL = range(10)
+"""Columns of a half edge that travels: its nodes, the third node of its face and the one opposite, the owners of these
+two, the face, how far that is open, initial length, m, and the unit normal of the face; floats as their bits."""
+_HALF, _ROW = 12, 16
 """Columns of a half edge, and of an edge (``_matched``)."""
 
 
 def none() -> tuple[Edges, Ints, Indices]:
     """No edge (``find``)."""
-    nothing = np.zeros((0, 4), np.int64)
+    nothing = np.zeros((0, 6), np.int64)
     edges = Edges(nothing, nothing[:, :2], np.zeros(0), np.zeros((0, 2), np.uint8), np.zeros(0, bool))
     return edges, np.zeros(0, np.int64), np.zeros(0, np.int32)
 
@@ -60,16 +60,16 @@ def find(
     away = half & _common(local, model.nodes.n, neighbours) if neighbours else np.zeros_like(half)
     pairs = _pairs(local, half & ~away, units, model.nodes.n, SHARP)
     n = len(pairs)
-    table = np.empty((n, 4), np.int64), np.empty((n, 2), np.int64), np.empty(n), np.empty((n, 2), np.uint8)
+    table = np.empty((n, 6), np.int64), np.empty((n, 2), np.int64), np.empty(n), np.empty((n, 2), np.uint8)
     _fill(*table, pairs, local, faces.nodes, faces.id, opened, model.nodes.x0)
     edges = Edges(*table, pairs[:, 4] > 0)
     if comm.size == 1:
         return edges, *none()[1:]
     rows = _elsewhere(model, faces, local, units, away, opened, comm)
-    floats = np.ascontiguousarray(rows[:, 8]).view(np.float64)
-    far_opened = rows[:, 9:11].astype(np.uint8)
-    edges = Edges.joined([edges, Edges(rows[:, :4], rows[:, 6:8], floats, far_opened, rows[:, 11] > 0)])
-    ends, owners = rows[:, 2:4].reshape(-1), rows[:, 4:6].reshape(-1)
+    floats = np.ascontiguousarray(rows[:, 12]).view(np.float64)
+    far_opened = rows[:, 13:15].astype(np.uint8)
+    edges = Edges.joined([edges, Edges(rows[:, :6], rows[:, 10:12], floats, far_opened, rows[:, 15] > 0)])
+    ends, owners = rows[:, 2:6].reshape(-1), rows[:, 6:10].reshape(-1)
     absent = ~among(model.nodes.id, ends)
     far, first = np.unique(ends[absent], return_index=True)
     return edges.take(np.lexsort((edges.sides[:, 1], edges.sides[:, 0]))), far, owners[absent][first].astype(np.int32)
@@ -89,9 +89,9 @@ def _elsewhere(
 ) -> Ints:
     """Rows (``_matched``) of this rank's edges among the half edges ``away`` (f, 3); all ranks take part."""
     nodes, (f, k) = model.nodes, np.nonzero(away)
-    a, b, c = (local[f, (k + i) % 3] for i in range(3))
+    a, b, c, d = (*(local[f, (k + i) % 3] for i in range(3)), local[f, 3])
     floats = np.column_stack([np.linalg.norm(nodes.x0[b] - nodes.x0[a], axis=1), units[f]]).view(np.int64)
-    known = nodes.id[a], nodes.id[b], nodes.id[c], nodes.owner[c], faces.id[f], opened[f]
+    known = *(nodes.id[some] for some in (a, b, c, d)), nodes.owner[c], nodes.owner[d], faces.id[f], opened[f]
     halves, home = np.column_stack([*known, floats]), nodes.owner[np.minimum(a, b)]
     found = comm.swap({rank: halves[home == rank] for rank in ranks(home)})
     gathered = np.concatenate([halves[:0], *(words.reshape(-1, _HALF) for words in found.values())])
@@ -102,8 +102,8 @@ def _elsewhere(
 
 
 def _matched(halves: Ints, sender: Ints) -> tuple[Ints, Ints]:
-    """Rows (a, b, c, d, owner of c, owner of d, face abc, face bad, length, how far either face is open, whether it
-    is sharp) of the edges of ``halves``, and the sender of the first face of each.
+    """Rows (nodes of records.Edges, owners of the last four, face abc, face bad, length, how far either face is open,
+    whether it is sharp) of the edges of ``halves``, and the sender of the first face of each.
     """
     order = np.argsort(halves[:, _FACE], kind="stable")
     halves, sender = halves[order], sender[order]
@@ -113,7 +113,7 @@ def _matched(halves: Ints, sender: Ints) -> tuple[Ints, Ints]:
     units = np.ascontiguousarray(halves[:, _NORMAL:]).view(np.float64)
     pairs = _pairs(corners.reshape(-1, 3).astype(np.int32), half, units, len(ids), SHARP)
     one, two = halves[pairs[:, 0]], halves[pairs[:, 2]]
-    others = (np.column_stack([one[:, k], two[:, k]]) for k in (_C, _OWNER, _FACE))
+    others = (np.column_stack([one[:, k], two[:, k]]) for k in (_C, _D, _OWNER, _TOP, _FACE))
     opened = np.column_stack([one[:, _OPEN], two[:, _OPEN]])
     rows = np.column_stack([one[:, [_A, _B]], *others, one[:, _LENGTH], opened, pairs[:, 4]])
     return rows, sender[pairs[:, 0]]
@@ -187,7 +187,7 @@ def _fill(nodes, sides, size, opened, pairs, local, face_nodes, face_id, face_op
         f, k, g, m = pairs[p, 0], pairs[p, 1], pairs[p, 2], pairs[p, 3]
         for i in range(3):
             nodes[p, i] = face_nodes[f, (k + i) % 3]
-        nodes[p, 3] = face_nodes[g, (m + 2) % 3]
+        nodes[p, 3], nodes[p, 4], nodes[p, 5] = face_nodes[g, (m + 2) % 3], face_nodes[f, 3], face_nodes[g, 3]
         sides[p, 0], sides[p, 1] = face_id[f], face_id[g]
         opened[p, 0], opened[p, 1] = face_opened[f], face_opened[g]
         a, b = local[f, k], local[f, (k + 1) % 3]
@@ -198,7 +198,7 @@ def _fill(nodes, sides, size, opened, pairs, local, face_nodes, face_id, face_op
 @njit("boolean[::1](boolean[::1], int32[:, ::1], boolean[::1], float64[:, ::1], float64)", cache=True)
 def turned(sharp, corners, meets, x, least):  # type: ignore[no-untyped-def]
     """(e,) which edges whose faces allow that others meet them, ``meets``, are not ``sharp`` yet, bulge at the
-    positions ``x`` (slots, 3), m, and have faces whose normals have a cosine below ``least``; ``corners`` (e, 4): see
+    positions ``x`` (slots, 3), m, and have faces whose normals have a cosine below ``least``; ``corners`` (e, 6): see
     records.Edges.
     """
     found = np.zeros(len(sharp), np.bool_)
