@@ -9,7 +9,7 @@ from conoid.worker.contact import edge_edge as edge_kernels
 from conoid.worker.contact import node_face as face_kernels
 from conoid.worker.contact.active import Kept
 from conoid.worker.contact.company import Company
-from conoid.worker.contact.narrow_phase import DEEP_SELF, PUSH_OUT, ContactRows, EdgeTable, FaceTable, SlotTable, Step
+from conoid.worker.contact.narrow_phase import PUSH_OUT, ContactRows, EdgeTable, FaceTable, SlotTable, Step
 from conoid.worker.contact.pairs import PairTable
 from conoid.worker.contact.records import Crowd
 from conoid.worker.contact.solver import ActiveSet
@@ -35,6 +35,23 @@ def face_sizes(x: Floats, faces: Indices) -> Floats:
 def edge_sizes(x: Floats, edges: Indices) -> Floats:
     """(e,) lengths, m."""
     return np.asarray(np.linalg.norm(x[edges[:, 1]] - x[edges[:, 0]], axis=1))
+
+
+def edge_depths(x: Floats, edges: Indices) -> Floats:
+    """(e,) how deep they hold, m: a quarter of their length and of the lowest height of the tets of their faces, but
+    no less than a twentieth of their length.
+    """
+    (a, b, c, d, e, f), size = edges.T, edge_sizes(x, edges)
+    low = np.minimum(lowest_heights(x[np.stack([a, b, c, e], 1)]), lowest_heights(x[np.stack([a, b, d, f], 1)]))
+    return np.asarray(np.maximum(0.25 * np.minimum(size, low), 0.05 * size))
+
+
+def lowest_heights(tets: Floats) -> Floats:
+    """(n,) of tets (n, 4, 3), m: three volumes over the largest face."""
+    volumes = np.abs(np.linalg.det(tets[:, 1:] - tets[:, :1])) / 6.0
+    one, two, three = (tets[:, [[0, 0, 0, 1], [1, 1, 2, 2], [2, 3, 3, 3]][k]] for k in range(3))
+    areas = 0.5 * np.linalg.norm(np.cross(two - one, three - one), axis=2)
+    return np.asarray(3.0 * volumes / areas.max(axis=1))
 
 
 def many(met: ContactRows) -> int:
@@ -74,10 +91,9 @@ def face_table(corners: Indices, size: Floats, left: Floats) -> FaceTable:
     return FaceTable(corners, size, np.arange(n), ~none, left, none.copy(), np.empty((n, 3)), none.copy())
 
 
-def edge_table(corners: Indices, size: Floats, left: Floats, deep: Floats | None = None) -> EdgeTable:
+def edge_table(corners: Indices, size: Floats, deep: Floats, left: Floats) -> EdgeTable:
     """Edges between exposed faces."""
     n = len(corners)
-    deep = DEEP_SELF * size if deep is None else deep
     return EdgeTable(corners, size, deep, np.ones(n, bool), left, np.zeros(n, bool))
 
 
@@ -110,12 +126,11 @@ def node_face(
 
 
 def edge_edge(
-    x: Floats, v: Floats, edges: Indices, pairs: Indices, dt: float, mu: Floats | None = None, *, never: int = 0,
-    deep: Floats | None = None,
+    x: Floats, v: Floats, edges: Indices, pairs: Indices, dt: float, mu: Floats | None = None, *, never: int = 0
 ) -> ContactRows:  # fmt: skip
-    """The edges that pass an edge; ``never``: how many of the pairs cannot; ``deep`` (edges,): see EdgeTable."""
+    """The edges that pass an edge; ``never``: how many of the pairs cannot."""
     room, table = ContactRows.room(len(pairs)), pair_table(pairs)
-    of = edge_table(edges, edge_sizes(x, edges), np.zeros(len(edges)), deep)
+    of = edge_table(edges, edge_sizes(x, edges), edge_depths(x, edges), np.zeros(len(edges)))
     step = step_of(x, v, np.zeros(len(x)), dt, mu)
     found, tested = edge_kernels.edge_edge(room, 0, table.arrays(), of, step, np.zeros_like(x), 0.0)
     assert tested == len(pairs) - never

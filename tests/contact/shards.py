@@ -5,5 +5,8 @@ import numpy as np
 CORNERS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 FACES = np.array([[0, 2, 1, 3], [0, 1, 3, 2], [1, 2, 3, 0], [0, 3, 2, 1]])
 """(4, 4) counter-clockwise seen from outside, the node opposite last."""
-EDGES = np.array([[0, 1, 2, 3], [0, 2, 3, 1], [0, 3, 1, 2], [1, 2, 0, 3], [1, 3, 2, 0], [2, 3, 0, 1]])
-"""(6, 4) ends, and the third nodes of the two faces."""
+EDGES = np.array([
+    [0, 1, 2, 3, 3, 2], [0, 2, 3, 1, 1, 3], [0, 3, 1, 2, 2, 1],
+    [1, 2, 0, 3, 3, 0], [1, 3, 2, 0, 0, 2], [2, 3, 0, 1, 1, 0],
+])  # fmt: skip
+"""(6, 6) ends, the third nodes of the two faces, and those opposite."""

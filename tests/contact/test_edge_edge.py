@@ -7,11 +7,12 @@ from conoid.worker.contact.narrow_phase import DEEP, DEEP_SELF, NEAR, ContactRow
 
 from ..worker.meshes import Floats
 from .bodies import Indices, rotation
-from .kernels import edge_edge, every_pair, many, node_face
+from .kernels import edge_edge, every_pair, lowest_heights, many, node_face
 
 ONE = np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, -1.0], [0.0, -1.0, -1.0]])
 """An edge along x on the back of a body: its two ends, the third nodes of its two faces."""
-EDGES = np.array([[0, 1, 2, 3], [4, 5, 6, 7]], np.int32)
+EDGES = np.array([[0, 1, 2, 3, 3, 2], [4, 5, 6, 7, 7, 6]], np.int32)
+"""Of two tets."""
 PAIR = np.array([[0, 1]], np.int32)
 
 
@@ -99,32 +100,44 @@ def test_an_edge_meets_only_what_comes_between_its_faces(tilt: float, found: int
     ("gap", "speed", "found"),
     [
         (0.5, -0.4, 0), (0.5, -0.6, 1), (1.9 * NEAR, 0.0, 1), (2.1 * NEAR, 0.0, 0), (1.9 * NEAR, 1.0, 0),
-        (-1.9 * DEEP_SELF, 0.0, 1), (-2.1 * DEEP_SELF, 0.0, 0), (-1.9 * DEEP_SELF, -0.5, 1),
+        (-1.4 * DEEP, 0.0, 1), (-1.42 * DEEP, 0.0, 0), (-1.4 * DEEP, -0.5, 1),
     ],
 )  # fmt: skip
 def test_edges_meet_when_they_pass_or_are_near_and_not_too_deep(gap: float, speed: float, found: int) -> None:
-    """Both edges are 2 m long."""
+    """Both edges are 2 m long, of tets of height sqrt(2)."""
     assert many(meets(gap=gap, speed=speed)) == found
 
 
-@pytest.mark.parametrize(
-    ("gap", "flat", "found"),
-    [(-0.24, 1.0, 1), (-0.3, 1.0, 1), (-0.4, 1.0, 0), (-0.11, 0.1, 0), (-0.09, 0.1, 1), (-0.24, 0.1, 0)],
-)
-def test_edges_of_single_tets_hold_to_a_quarter_of_their_height(gap: float, flat: float, found: int) -> None:
-    """Tets of height sqrt(2), above 2 m edges, where the limit is 0.35 m; a tenth as flat they hold as all edges do."""
-    one = ONE * np.array([1.0, 1.0, flat])
-    x = np.concatenate([one, turned(np.pi / 2) * np.array([1.0, 1.0, flat]) + np.array([0.0, 0.0, gap])])
-    deep = np.full(2, DEEP * 2.0)
-    assert many(edge_edge(x, np.zeros((8, 3)), EDGES, PAIR, 1.0, deep=deep)) == found
-    assert many(edge_edge(x, np.zeros((8, 3)), EDGES, PAIR, 1.0)) == (gap >= -DEEP_SELF * 2.0)
+@pytest.mark.parametrize(("gap", "found"), [(-0.95 * DEEP_SELF, 1), (-1.05 * DEEP_SELF, 0)])
+def test_edges_of_flat_tets_hold_to_a_share_of_their_length(gap: float, found: int) -> None:
+    """A tenth as high as the tets above, edges of 2 m."""
+    flat = np.array([1.0, 1.0, 0.1])
+    x = np.concatenate([ONE * flat, turned(np.pi / 2) * flat + np.array([0.0, 0.0, 2.0 * gap])])
+    assert many(edge_edge(x, np.zeros((8, 3)), EDGES, PAIR, 1.0)) == found
+
+
+@pytest.mark.parametrize("thick", [0.6, 0.9, 1.5, 6.0])
+@pytest.mark.parametrize("which", [0, 1])
+def test_edges_between_two_tets_hold_to_a_quarter_of_the_lower_one(thick: float, which: int) -> None:
+    """One of the two tets under ONE is ``thick``; the upper edge is of a tet four times as large."""
+    apexes = np.array([[0.0, 0.5, -0.5], [0.0, -0.5, -0.5]]) - 4.0 * np.array([[0.0, 1.0, 1.0], [0.0, -1.0, 1.0]])
+    apexes[which] *= thick / 6.0
+    edges = EDGES.copy()
+    edges[0, 4:] = 8, 9
+    heights = lowest_heights(np.array([[ONE[0], ONE[1], ONE[2 + k], apexes[k]] for k in (0, 1)]))
+    limit = DEEP * min(*heights, 2.0)
+    assert limit > DEEP_SELF * 2.0
+    for share, found in ((0.99, 1), (1.01, 0)):
+        upper = turned(np.pi / 2) * 4.0 - np.array([0.0, 0.0, share * limit])
+        x = np.concatenate([ONE, upper, apexes])
+        assert many(edge_edge(x, np.zeros((10, 3)), edges, PAIR, 1.0)) == found
 
 
 @pytest.mark.parametrize("order", [1, -1])
 def test_the_opposite_edges_of_a_flat_tet_do_not_meet(order: int) -> None:
     """They are as deep behind each other as it is thick; two such edges of two tets have passed each other."""
     flat = np.array([[-1.0, 0.0, 0.01], [1.0, 0.0, 0.01], [0.0, -1.0, -0.01], [0.0, 1.0, -0.01]])
-    one, two = [0, 1, 3, 2], [2, 3, 1, 0]
+    one, two = [0, 1, 3, 2, 2, 3], [2, 3, 1, 0, 0, 1]
     v = np.zeros((8, 3))
     alone = np.array([one, two], np.int32)[::order].copy()
     assert many(edge_edge(np.concatenate([flat, flat]), v, alone, PAIR, 1.0, never=1)) == 0
@@ -150,7 +163,7 @@ def surface_of(tet: "np.ndarray") -> tuple[Indices, Indices]:
         for j in range(i + 1, 4):
             (c,) = (_third(f, i, j) for f in _OUT if _runs(f, i, j))
             (d,) = (_third(f, i, j) for f in _OUT if _runs(f, j, i))
-            edges.append([tet[i], tet[j], tet[c], tet[d]])
+            edges.append([tet[i], tet[j], tet[c], tet[d], tet[d], tet[c]])
     return faces, np.array(edges, np.int32)
 
 
@@ -206,10 +219,8 @@ def meet(x: Floats, step: Floats) -> tuple[int, int]:
 
 
 def lowest_altitude(x: Floats) -> float:
-    """Of the two tets: three volumes over the area of the largest face."""
-    areas = 0.5 * np.linalg.norm(np.cross(x[FACES[:, 1]] - x[FACES[:, 0]], x[FACES[:, 2]] - x[FACES[:, 0]]), axis=1)
-    volumes = [abs(np.linalg.det(x[t[1:]] - x[t[0]])) / 6.0 for t in TETS]
-    return float(min(3.0 * v / a for v, a in zip(volumes, areas.reshape(2, 4).max(axis=1), strict=True)))
+    """Of the two tets, m."""
+    return float(lowest_heights(x[TETS]).min())
 
 
 @pytest.mark.parametrize(("share", "late"), [(0.5, 3), (0.05, 0)])

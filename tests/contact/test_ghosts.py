@@ -45,8 +45,9 @@ def test_what_is_packed_comes_out_bit_by_bit(f: int, e: int, n: int) -> None:
         return np.asarray(random.integers(0, 2, shape) > 0)
 
     faces = Faces(random.integers(0, 2**50, f), random.integers(0, 2**40, (f, 4)), random.normal(size=f), flags(f))
-    ends, sides = random.integers(0, 2**40, (e, 4)), random.integers(0, 2**40, (e, 2))
-    edges = Edges(ends, sides, random.normal(size=e), random.integers(0, 3, (e, 2), dtype=np.uint8), flags(e))
+    ends, sides = random.integers(0, 2**40, (e, 6)), random.integers(0, 2**40, (e, 2))
+    size, deep = random.normal(size=(2, e))
+    edges = Edges(ends, sides, size, deep, random.integers(0, 3, (e, 2), dtype=np.uint8), flags(e))
     crowd = random_crowd(random, n)
     got_faces, got_edges, got_crowd = ghosts.unpack(ghosts.pack(faces, edges, crowd))
     assert (got_faces.id == faces.id).all()
@@ -57,6 +58,7 @@ def test_what_is_packed_comes_out_bit_by_bit(f: int, e: int, n: int) -> None:
     assert (got_edges.sharp == edges.sharp).all()
     assert (got_edges.nodes == edges.nodes).all()
     assert (got_edges.size == edges.size).all()
+    assert (got_edges.deep == edges.deep).all()
     assert same(got_crowd, crowd)
     assert (got_crowd.local == -1).all()
 

@@ -17,7 +17,18 @@ from conoid.worker.parallel.comm import SerialComm
 
 from ..worker.meshes import Floats
 from .bodies import Flags, Indices
-from .kernels import edge_sizes, edge_table, face_sizes, face_table, moments, pair_table, slot_table, step_of, taken
+from .kernels import (
+    edge_depths,
+    edge_sizes,
+    edge_table,
+    face_sizes,
+    face_table,
+    moments,
+    pair_table,
+    slot_table,
+    step_of,
+    taken,
+)
 from .shards import CORNERS, EDGES, FACES
 
 SHARDS, STEPS = 60, 40
@@ -82,8 +93,9 @@ class Shards:
         self.v = np.repeat(draw.normal(0.0, 0.4, (SHARDS, 3)), 4, axis=0)
         self.shard, self.face_shard = np.repeat(shard, 4), np.repeat(shard, 4)
         self.faces = (first[:, None, None] + FACES).reshape(-1, 4).astype(np.int32)
-        self.edges = (first[:, None, None] + EDGES).reshape(-1, 4).astype(np.int32)
+        self.edges = (first[:, None, None] + EDGES).reshape(-1, 6).astype(np.int32)
         self.size, self.length = face_sizes(self.x, self.faces), edge_sizes(self.x, self.edges)
+        self.deep = edge_depths(self.x, self.edges)
         self.exposed = draw.uniform(size=len(self.faces)) < 0.8
         self.ridges = np.asarray((draw.uniform(size=(len(self.edges), 2)) < 0.9).all(axis=1))
         self.on_surface = draw.uniform(size=len(self.x)) < 0.9
@@ -115,7 +127,8 @@ class Shards:
         slots = slot_table(first, self.normals, tracks.short.left, tracks.short.course)
         slots = slots._replace(on_surface=self.on_surface, fresh=self.node_fresh)
         faces = face_table(self.faces, self.size, tracks.faces)._replace(exposed=self.exposed, fresh=self.face_fresh)
-        edges = edge_table(self.edges, self.length, tracks.edges)._replace(meets=self.ridges, fresh=self.edge_fresh)
+        edges = edge_table(self.edges, self.length, self.deep, tracks.edges)
+        edges = edges._replace(meets=self.ridges, fresh=self.edge_fresh)
         return slots, faces, edges, step_of(self.x, self.v, part, dt)
 
     def knock(self) -> None:

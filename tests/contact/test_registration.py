@@ -23,7 +23,7 @@ from conoid.worker.state import Ints
 from ..worker.meshes import Floats
 from .bodies import Flags, Indices, crowd_of, rotation
 from .distances import point_triangle, segment_segment
-from .kernels import edge_sizes, face_sizes
+from .kernels import edge_depths, edge_sizes, face_sizes
 from .shards import CORNERS, EDGES, FACES
 
 SHARDS, STEPS, SKIN = 50, 40, 0.2
@@ -45,9 +45,10 @@ class World:
         self.v = np.repeat(self.draw.normal(0.0, 0.4, (SHARDS, 3)), 4, axis=0)
         self.part = np.repeat(shard % 3, 4).astype(np.int32)
         self.faces = (first[:, None, None] + FACES).reshape(-1, 4)
-        self.edges = (first[:, None, None] + EDGES).reshape(-1, 4)
+        self.edges = (first[:, None, None] + EDGES).reshape(-1, 6)
         self.sides = (first[:, None, None] + SIDES).reshape(-1, 2)
         self.size, self.length = face_sizes(self.x, self.faces), edge_sizes(self.x, self.edges)
+        self.deep = edge_depths(self.x, self.edges)
         self.here = self.draw.uniform(size=SHARDS) < 0.8
         self.shown = self.draw.uniform(size=SHARDS) < 0.6
         self.registered, self.carried, self.opened, self.near = 0, 0, 0, np.zeros(2, int)
@@ -63,7 +64,7 @@ class World:
         sides = Sides(
             Faces(faces, self.faces[faces], self.size[faces], shown[faces]),
             Edges(
-                self.edges[edges], self.sides[edges], self.length[edges], opened,
+                self.edges[edges], self.sides[edges], self.length[edges], self.deep[edges], opened,
                 np.ones(len(edges), bool),
             ), crowd, nodes,
         )  # fmt: skip
@@ -176,9 +177,9 @@ def near_faces(now: Scene) -> Flags:
 
 def near_edges(now: Scene) -> Flags:
     """(edges, edges) the same of two edges, that of lower rank first."""
-    ends, size, rank = now.edges.corners[:, :2], now.edges.size, now.edges.rank
+    ends, rank = now.edges.corners[:, :2], now.edges.rank
     left = now.tracks.searched.left[ends].max(axis=1)
-    deep = DEEP_SELF * np.minimum(size[:, None], size[None])
+    deep = np.minimum(now.edges.deep[:, None], now.edges.deep[None])
     near = segment_segment(now.crowd.x[ends]) < 0.5 * (SKIN + deep - left[:, None] - left[None])
     live = now.edges.live[:, None] & now.edges.live & (rank[:, None] < rank[None])
     return np.asarray(near & live & allowed(now, ends, ends) & ~common(ends, ends))

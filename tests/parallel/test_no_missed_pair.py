@@ -131,7 +131,7 @@ class Brute(Found):
         edges = sides.edges.take(sides.edges.sharp)
         edges = edges.take(np.lexsort((edges.sides[:, 1], edges.sides[:, 0])))
         places = sides.crowd.places(edges.nodes)
-        of = edge_table(places, edges.size, np.zeros(len(places)), edges.deep)._replace(
+        of = edge_table(places, edges.size, edges.deep, np.zeros(len(places)))._replace(
             meets=np.asarray((edges.opened >= AGED).all(axis=1) & (edges.opened == OPEN).any(axis=1))
         )
         for every in self._pairs(places[:, :2], places[:, :2]):

@@ -144,6 +144,8 @@ class SceneEdges:
     faces: Indices
     """(e, 2) rows of these, -1 for a face that is not here."""
     size: Floats
+    deep: Floats
+    """(e,) see records.Edges."""
     opened: Bits
     """(e, 2) how far either face is open: see records.Edges."""
     meets: Flags
@@ -163,13 +165,13 @@ class SceneEdges:
 
     @classmethod
     def at_rest(
-        cls, corners: Indices, sides: Ints, faces: Indices, size: Floats, opened: Bits, sharp: Flags, own: Flags,
-        rank: Ints,
+        cls, corners: Indices, sides: Ints, faces: Indices, size: Floats, deep: Floats, opened: Bits, sharp: Flags,
+        own: Flags, rank: Ints,
     ) -> "SceneEdges":  # fmt: skip
         """Nothing is searched yet."""
         meets = np.asarray((opened.min(axis=1, initial=OPEN) >= AGED) & (opened.max(axis=1, initial=0) == OPEN))
         return cls(
-            corners, sides, faces, size, opened, meets, sharp, own, rank, *np.zeros((3, len(corners)), bool)
+            corners, sides, faces, size, deep, opened, meets, sharp, own, rank, *np.zeros((3, len(corners)), bool)
         )  # fmt: skip
 
     @cached_property

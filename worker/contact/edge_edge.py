@@ -7,7 +7,7 @@ one slides along a surface.
 import numpy as np
 
 from ..jit import njit, types
-from .geometry import VECTOR, at, beyond, cross, distance, dot, minus, segments
+from .geometry import VECTOR, at, beyond, cross, distance, dot, lowest_height, minus, segments
 from .narrow_phase import CONTACT_ROWS, DEEP, DEEP_SELF, EDGES, NEAR, PAIRS, STEP, needed
 
 _PARALLEL = 1e-3
@@ -81,21 +81,15 @@ def _fastest(course, a, b, c, d):  # type: ignore[no-untyped-def]
     return max(distance(p, r), distance(p, s), distance(q, r), distance(q, s))
 
 
-@njit("float64(float64[:, :], int64, int64, int64, int64)", cache=True, error_model="numpy")
-def _height(x, a, b, c, d):  # type: ignore[no-untyped-def]
-    """Lowest height of the tet abcd, m."""
-    u, to, fro = minus(at(x, b), at(x, a)), minus(at(x, c), at(x, a)), minus(at(x, d), at(x, a))
-    one, two, three, four = cross(u, to), cross(u, fro), cross(to, fro), cross(minus(to, u), minus(fro, u))
-    largest = np.sqrt(max(max(dot(one, one), dot(two, two)), max(dot(three, three), dot(four, four))))
-    return abs(dot(one, fro)) / largest
-
-
 @njit(types.float64(types.float64[:, :], EDGES, types.int64), cache=True, error_model="numpy")
 def _deep(x, edges, e):  # type: ignore[no-untyped-def]
-    """How deep edge e holds, m: no deeper than DEEP of its length and of the lowest height of the tets of its faces."""
+    """How deep edge e holds, m: no deeper than DEEP of the lowest height of the tets of its faces."""
+    least = DEEP_SELF * edges.size[e]
+    if not edges.deep[e] > least:
+        return edges.deep[e]
     a, b, c, d = edges.corners[e, 0], edges.corners[e, 1], edges.corners[e, 2], edges.corners[e, 3]
-    height = min(_height(x, a, b, c, edges.corners[e, 4]), _height(x, a, b, d, edges.corners[e, 5]))
-    return max(min(DEEP * height, DEEP * edges.size[e]), DEEP_SELF * edges.size[e])
+    low = min(lowest_height(x, a, b, c, edges.corners[e, 4]), lowest_height(x, a, b, d, edges.corners[e, 5]))
+    return max(min(DEEP * low, edges.deep[e]), least)
 
 
 @njit(f"boolean({_N2}, int64, int64)", cache=True)
@@ -138,7 +132,7 @@ def edge_edge(out, n, pairs, edges, step, course, end):  # type: ignore[no-untyp
             if np.isnan(speed[p]):
                 speed[p] = _fastest(course, a, b, c, d)
             slack = segments(at(ahead, a), at(ahead, b), at(ahead, c), at(ahead, d))
-            slack -= (_ROUND + DEEP) * max(size[one], size[two])
+            slack -= _ROUND * max(size[one], size[two]) + min(edges.deep[one], edges.deep[two])
             until[p] = slack - left[one] - left[two] + speed[p] * end if slack > _WORTH * size[one] else np.nan
         u0, w0, r0 = minus(at(x, b), at(x, a)), minus(at(x, d), at(x, c)), minus(at(x, c), at(x, a))
         u, w = minus(at(ahead, b), at(ahead, a)), minus(at(ahead, d), at(ahead, c))
@@ -159,7 +153,7 @@ def edge_edge(out, n, pairs, edges, step, course, end):  # type: ignore[no-untyp
         h, m, length = share * dt, cross(u, w), np.sqrt(area)
         m = m[0] / length, m[1] / length, m[2] / length
         gap0, gap1 = _apart(m, x, v, a, b, c, d, s, t, 0.0), _apart(m, x, v, a, b, c, d, s, t, dt)
-        near, deep = NEAR * min(size[one], size[two]), DEEP * min(size[one], size[two])
+        near, deep = NEAR * min(size[one], size[two]), min(edges.deep[one], edges.deep[two])
         if (gap1 > near or gap0 < -deep) and (-gap1 > near or -gap0 < -deep):
             continue
         sector, sign = _sector(u, x, v, corners, one, h), 1.0

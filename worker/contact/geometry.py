@@ -119,3 +119,12 @@ def nearest(a, b, c, d):  # type: ignore[no-untyped-def]
         t = 0.0 if t < 0.0 else 1.0
         s = min(max((ur + t * uw) / uu, 0.0), 1.0)
     return minus(beyond(c, t, w), beyond(a, s, u))
+
+
+@njit("float64(float64[:, :], int64, int64, int64, int64)", cache=True, error_model="numpy")
+def lowest_height(x, a, b, c, d):  # type: ignore[no-untyped-def]
+    """Of the tet abcd, m."""
+    u, to, fro = minus(at(x, b), at(x, a)), minus(at(x, c), at(x, a)), minus(at(x, d), at(x, a))
+    one, two, three, four = cross(u, to), cross(u, fro), cross(to, fro), cross(minus(to, u), minus(fro, u))
+    largest = max(max(dot(one, one), dot(two, two)), max(dot(three, three), dot(four, four)))
+    return abs(dot(one, fro)) / np.sqrt(largest)

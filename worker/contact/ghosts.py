@@ -22,8 +22,8 @@ def pack(faces: Faces, edges: Edges, crowd: Crowd) -> Ints:
     return np.concatenate([
         np.array([faces.n, edges.n], np.int64),
         faces.id, faces.nodes.reshape(-1), faces.size.view(np.int64), faces.exposed,
-        edges.nodes.reshape(-1), edges.sides.reshape(-1), edges.size.view(np.int64), edges.opened.reshape(-1),
-        edges.sharp,
+        edges.nodes.reshape(-1), edges.sides.reshape(-1), edges.size.view(np.int64), edges.deep.view(np.int64),
+        edges.opened.reshape(-1), edges.sharp,
         pack_crowd(crowd).reshape(-1),
     ])  # fmt: skip
 
@@ -31,11 +31,11 @@ def pack(faces: Faces, edges: Edges, crowd: Crowd) -> Ints:
 def unpack(words: Ints) -> tuple[Faces, Edges, Crowd]:
     """What ``pack`` made one message of."""
     f, e = int(words[0]), int(words[1])
-    ends = np.cumsum([2, f, 4 * f, f, f, 6 * e, 2 * e, e, 2 * e, e])
+    ends = np.cumsum([2, f, 4 * f, f, f, 6 * e, 2 * e, e, e, 2 * e, e])
     pieces = [words[a:b] for a, b in pairwise(ends)]
     faces = Faces(pieces[0], pieces[1].reshape(f, 4), pieces[2].view(np.float64), pieces[3] > 0)
-    sides, size = pieces[5].reshape(e, 2), pieces[6].view(np.float64)
-    edges = Edges(pieces[4].reshape(e, 6), sides, size, pieces[7].reshape(e, 2).astype(np.uint8), pieces[8] > 0)
+    sides, size, deep = pieces[5].reshape(e, 2), pieces[6].view(np.float64), pieces[7].view(np.float64)
+    edges = Edges(pieces[4].reshape(e, 6), sides, size, deep, pieces[8].reshape(e, 2).astype(np.uint8), pieces[9] > 0)
     return faces, edges, unpack_crowd(words[ends[-1] :])
 
 

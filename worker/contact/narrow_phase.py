@@ -168,6 +168,8 @@ class EdgeTable(NamedTuple):
     """(e, 6) slots: records.Edges."""
     size: Floats
     """(e,) initial length, m."""
+    deep: Floats
+    """(e,) depth beyond which it holds nothing, m: records.Edges."""
     meets: Flags
     """(e,) whether its faces allow that others meet it: records.Edges."""
     left: Floats
@@ -185,7 +187,7 @@ STEP = record(Step, types.float64[:, :], _F2, types.float64[:, :], _N1, _F2, *(5
 PAIRS = record(Pairs, _N2, _F1, _F1, _B1, _N1, _N1)
 SLOTS = record(SlotTable, _F2, _B1, _N1, _F1, _F2, _B1, _N1)
 FACES = record(FaceTable, _N2, _F1, _I1, _B1, _F1, _B1, _F2, _B1)
-EDGES = record(EdgeTable, _N2, _F1, _B1, _F1, _B1)
+EDGES = record(EdgeTable, _N2, _F1, _F1, _B1, _F1, _B1)
 
 
 @njit("float64(float64, float64, float64, float64, float64)", cache=True, error_model="numpy")

@@ -80,6 +80,8 @@ class Edges(Rows):
     """(n, 2) ids of the faces abc and bad."""
     size: Floats
     """(n,) initial length, m."""
+    deep: Floats
+    """(n,) depth, m, beyond which it holds nothing, however its tets deform; see sharp.depths."""
     opened: Bits
     """(n, 2) how far either face is open: OPEN where it is exposed, AGED for the side of a crack that has come of age
     (cracks.AGE), else 0. The edge meets others when it is sharp, both faces are open at all and one is exposed."""

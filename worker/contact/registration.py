@@ -135,7 +135,7 @@ def _node_face(scene: Scene, nodes: Flags, faces: Flags, flight: _Flight) -> Ind
 
 def _edge_edge(scene: Scene, edges: Flags, flight: _Flight) -> Indices:
     """(p, 2) edges of which one has changed, that of lower rank first; its rank has the pair."""
-    of = np.ascontiguousarray(scene.edges.corners[:, :2]), 0.5 * (scene.rules.skin + DEEP * scene.edges.size)
+    of = np.ascontiguousarray(scene.edges.corners[:, :2]), 0.5 * (scene.rules.skin + scene.edges.deep)
     allowed, rank = scene.rules.allowed, scene.edges.rank
     changed, others = (Things(*of, _rows(some)) for some in (edges, scene.edges.live & ~edges))
     one, two = flight.find(changed, changed, allowed, rank), flight.find(changed, others, allowed, None)
@@ -145,7 +145,7 @@ def _edge_edge(scene: Scene, edges: Flags, flight: _Flight) -> Indices:
     if not scene.edges.own.all():
         pairs = pairs[scene.edges.own[pairs[:, 0]]]
     sifted = sift.edges(
-        pairs, scene.edges.corners, scene.edges.size, flight.x, flight.course, scene.rules.skin, flight.horizon
+        pairs, scene.edges.corners, scene.edges.deep, flight.x, flight.course, scene.rules.skin, flight.horizon
     )  # fmt: skip
     return np.asarray(pairs[sifted])
 

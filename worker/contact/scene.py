@@ -203,7 +203,7 @@ class Scene:
     def edge_table(self) -> EdgeTable:
         """The edges."""
         edges = self.edges
-        return EdgeTable(edges.corners, edges.size, edges.meets, self.tracks.edges, edges.fresh)
+        return EdgeTable(edges.corners, edges.size, edges.deep, edges.meets, self.tracks.edges, edges.fresh)
 
     def free(self) -> None:
         """Gives its messages back to MPI."""

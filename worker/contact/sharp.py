@@ -16,7 +16,8 @@ from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, ranks
 from ..state import Bits, Flags, Floats, Indices, Ints, Model
 from ..turning import sine_and_cosine
-from .geometry import at, cross, dot, minus
+from .geometry import at, cross, dot, lowest_height, minus
+from .narrow_phase import DEEP, DEEP_SELF
 from .records import Edges, Faces
 
 SHARP = sine_and_cosine(math.radians(25.0))[1]
@@ -26,17 +27,19 @@ BENT, PRESSED = sine_and_cosine(math.radians(5.0))[1], 4
 ridges of surfaces that were flat cross without a node inside, and what overlaps has no pressure. Chosen by flyer plates
 of copper at 1 to 2.4 km/s (docs/numerics.md, "Ridges under pressure")."""
 
-_A, _B, _C, _D, _OWNER, _TOP, _FACE, _OPEN, _LENGTH, _NORMAL = range(10)
+_A, _B, _C, _D, _OWNER, _TOP, _FACE, _OPEN, _LENGTH, _LOW, _NORMAL = range(11)
 """Columns of a half edge that travels: its nodes, the third node of its face and the one opposite, the owners of these
-two, the face, how far that is open, initial length, m, and the unit normal of the face; floats as their bits."""
-_HALF, _ROW = 12, 16
+two, the face, how far that is open, initial length, m, the lowest initial height of its tet, m, and the unit normal of
+the face; floats as their bits."""
+_HALF, _ROW = 13, 17
 """Columns of a half edge, and of an edge (``_matched``)."""
 
 
 def none() -> tuple[Edges, Ints, Indices]:
     """No edge (``find``)."""
     nothing = np.zeros((0, 6), np.int64)
-    edges = Edges(nothing, nothing[:, :2], np.zeros(0), np.zeros((0, 2), np.uint8), np.zeros(0, bool))
+    lengths = np.zeros(0), np.zeros(0)
+    edges = Edges(nothing, nothing[:, :2], *lengths, np.zeros((0, 2), np.uint8), np.zeros(0, bool))
     return edges, np.zeros(0, np.int64), np.zeros(0, np.int32)
 
 
@@ -59,20 +62,30 @@ def find(
     half = np.repeat(some[:, None], 3, axis=1)
     away = half & _common(local, model.nodes.n, neighbours) if neighbours else np.zeros_like(half)
     pairs = _pairs(local, half & ~away, units, model.nodes.n, SHARP)
-    n = len(pairs)
-    table = np.empty((n, 6), np.int64), np.empty((n, 2), np.int64), np.empty(n), np.empty((n, 2), np.uint8)
-    _fill(*table, pairs, local, faces.nodes, faces.id, opened, model.nodes.x0)
+    n, low = len(pairs), _heights(local, model.nodes.x0)
+    table = np.empty((n, 6), np.int64), np.empty((n, 2), np.int64), np.empty(n), np.empty(n), np.empty((n, 2), np.uint8)
+    _fill(*table, pairs, local, faces.nodes, faces.id, opened, model.nodes.x0, low)
     edges = Edges(*table, pairs[:, 4] > 0)
+    edges.deep = depths(edges.size, edges.deep)
     if comm.size == 1:
         return edges, *none()[1:]
-    rows = _elsewhere(model, faces, local, units, away, opened, comm)
-    floats = np.ascontiguousarray(rows[:, 12]).view(np.float64)
-    far_opened = rows[:, 13:15].astype(np.uint8)
-    edges = Edges.joined([edges, Edges(rows[:, :6], rows[:, 10:12], floats, far_opened, rows[:, 15] > 0)])
+    rows = _elsewhere(model, faces, local, units, low, away, opened, comm)
+    size, low = np.ascontiguousarray(rows[:, 12:14].T).view(np.float64)
+    far = Edges(rows[:, :6], rows[:, 10:12], size, depths(size, low), rows[:, 14:16].astype(np.uint8), rows[:, 16] > 0)
+    edges = Edges.joined([edges, far])
     ends, owners = rows[:, 2:6].reshape(-1), rows[:, 6:10].reshape(-1)
     absent = ~among(model.nodes.id, ends)
-    far, first = np.unique(ends[absent], return_index=True)
-    return edges.take(np.lexsort((edges.sides[:, 1], edges.sides[:, 0]))), far, owners[absent][first].astype(np.int32)
+    missing, first = np.unique(ends[absent], return_index=True)
+    return (
+        edges.take(np.lexsort((edges.sides[:, 1], edges.sides[:, 0]))),
+        missing,
+        owners[absent][first].astype(np.int32),
+    )
+
+
+def depths(size: Floats, low: Floats) -> Floats:
+    """(e,) how deep edges of the initial length ``size`` hold, m, whose tets are as ``low`` at the start."""
+    return np.maximum(DEEP * np.minimum(size, low), DEEP_SELF * size)
 
 
 def _common(local: Indices, n: int, neighbours: list[Neighbour]) -> Flags:
@@ -85,12 +98,14 @@ def _common(local: Indices, n: int, neighbours: list[Neighbour]) -> Flags:
 
 
 def _elsewhere(
-    model: Model, faces: Faces, local: Indices, units: Floats, away: Flags, opened: Bits, comm: Comm
+    model: Model, faces: Faces, local: Indices, units: Floats, low: Floats, away: Flags, opened: Bits, comm: Comm
 ) -> Ints:
-    """Rows (``_matched``) of this rank's edges among the half edges ``away`` (f, 3); all ranks take part."""
+    """Rows (``_matched``) of this rank's edges among the half edges ``away`` (f, 3); ``low`` (f,): heights of tets;
+    all ranks take part.
+    """
     nodes, (f, k) = model.nodes, np.nonzero(away)
     a, b, c, d = (*(local[f, (k + i) % 3] for i in range(3)), local[f, 3])
-    floats = np.column_stack([np.linalg.norm(nodes.x0[b] - nodes.x0[a], axis=1), units[f]]).view(np.int64)
+    floats = np.column_stack([np.linalg.norm(nodes.x0[b] - nodes.x0[a], axis=1), low[f], units[f]]).view(np.int64)
     known = *(nodes.id[some] for some in (a, b, c, d)), nodes.owner[c], nodes.owner[d], faces.id[f], opened[f]
     halves, home = np.column_stack([*known, floats]), nodes.owner[np.minimum(a, b)]
     found = comm.swap({rank: halves[home == rank] for rank in ranks(home)})
@@ -102,8 +117,9 @@ def _elsewhere(
 
 
 def _matched(halves: Ints, sender: Ints) -> tuple[Ints, Ints]:
-    """Rows (nodes of records.Edges, owners of the last four, face abc, face bad, length, how far either face is open,
-    whether it is sharp) of the edges of ``halves``, and the sender of the first face of each.
+    """Rows (nodes of records.Edges, owners of the last four, face abc, face bad, length, lowest height of either tet,
+    how far either face is open, whether it is sharp) of the edges of ``halves``, and the sender of the first face of
+    each.
     """
     order = np.argsort(halves[:, _FACE], kind="stable")
     halves, sender = halves[order], sender[order]
@@ -115,7 +131,8 @@ def _matched(halves: Ints, sender: Ints) -> tuple[Ints, Ints]:
     one, two = halves[pairs[:, 0]], halves[pairs[:, 2]]
     others = (np.column_stack([one[:, k], two[:, k]]) for k in (_C, _D, _OWNER, _TOP, _FACE))
     opened = np.column_stack([one[:, _OPEN], two[:, _OPEN]])
-    rows = np.column_stack([one[:, [_A, _B]], *others, one[:, _LENGTH], opened, pairs[:, 4]])
+    low = np.minimum(one[:, _LOW], two[:, _LOW])
+    rows = np.column_stack([one[:, [_A, _B]], *others, one[:, _LENGTH], low, opened, pairs[:, 4]])
     return rows, sender[pairs[:, 0]]
 
 
@@ -177,12 +194,12 @@ def _by_lower_node(corners, half, nodes):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    "void(int64[:, ::1], int64[:, ::1], float64[::1], uint8[:, ::1], int32[:, ::1], int32[:, ::1], int64[:, ::1], "
-    "int64[::1], uint8[::1], float64[:, ::1])",
+    "void(int64[:, ::1], int64[:, ::1], float64[::1], float64[::1], uint8[:, ::1], int32[:, ::1], int32[:, ::1], "
+    "int64[:, ::1], int64[::1], uint8[::1], float64[:, ::1], float64[::1])",
     cache=True,
 )
-def _fill(nodes, sides, size, opened, pairs, local, face_nodes, face_id, face_opened, x):  # type: ignore[no-untyped-def]
-    """The columns of the edges that are ``pairs``."""
+def _fill(nodes, sides, size, low, opened, pairs, local, face_nodes, face_id, face_opened, x, heights):  # type: ignore[no-untyped-def]
+    """The columns of the edges that are ``pairs``, with the ``low`` height of their tets of the ``heights`` (f,)."""
     for p in range(len(pairs)):
         f, k, g, m = pairs[p, 0], pairs[p, 1], pairs[p, 2], pairs[p, 3]
         for i in range(3):
@@ -192,7 +209,16 @@ def _fill(nodes, sides, size, opened, pairs, local, face_nodes, face_id, face_op
         opened[p, 0], opened[p, 1] = face_opened[f], face_opened[g]
         a, b = local[f, k], local[f, (k + 1) % 3]
         dx, dy, dz = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
-        size[p] = np.sqrt(dx * dx + dy * dy + dz * dz)
+        size[p], low[p] = np.sqrt(dx * dx + dy * dy + dz * dz), min(heights[f], heights[g])
+
+
+@njit("float64[::1](int32[:, ::1], float64[:, ::1])", cache=True)
+def _heights(local, x):  # type: ignore[no-untyped-def]
+    """(f,) lowest height of the tet of each face, of ``local`` nodes (f, 4), m."""
+    low = np.empty(len(local))
+    for f in range(len(local)):
+        low[f] = lowest_height(x, local[f, 0], local[f, 1], local[f, 2], local[f, 3])
+    return low
 
 
 @njit("boolean[::1](boolean[::1], int32[:, ::1], boolean[::1], float64[:, ::1], float64)", cache=True)

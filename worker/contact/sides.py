@@ -59,7 +59,7 @@ class Sides:
         x, course = self.crowd.x, self.crowd.course - drift
         slaves = Things(self.crowd.places(self.slaves[:, None]), np.full(len(self.slaves), margin))
         faces = Things(np.ascontiguousarray(self.face_places[:, :3]), margin + DEEP * self.faces.size)
-        edges = Things(np.ascontiguousarray(self.edge_places[:, :2]), margin + 0.5 * DEEP * self.edges.size)
+        edges = Things(np.ascontiguousarray(self.edge_places[:, :2]), margin + 0.5 * self.edges.deep)
         return [search.swept(things, x, course, horizon) for things in (slaves, faces, edges)]
 
 

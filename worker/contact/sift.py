@@ -26,12 +26,12 @@ def faces(
 
 
 def edges(
-    pairs: Indices, places: Indices, size: Floats, x: Floats, v: Floats, skin: float, horizon: float
+    pairs: Indices, places: Indices, deep: Floats, x: Floats, v: Floats, skin: float, horizon: float
 ) -> Flags:  # fmt: skip
-    """(p,) which of ``pairs`` (p, 2), two edges, may meet; ``places`` (e, 2 or more); ``size`` (e,): their length, m;
+    """(p,) which of ``pairs`` (p, 2), two edges, may meet; ``places`` (e, 6); ``deep`` (e,): how deep they hold, m;
     ``x``, ``v`` (slots, 3): lines.
     """
-    return np.asarray(_near_edges(pairs, places, size, x, v, skin, horizon))
+    return np.asarray(_near_edges(pairs, places, deep, x, v, skin, horizon))
 
 
 @njit("float64(float64, float64, float64)", cache=True)
@@ -105,12 +105,12 @@ def _separated(x, v, a, b, c, d, begin, end, far):  # type: ignore[no-untyped-de
 
 
 @njit(f"boolean[::1]({_N2}, {_N2}, float64[::1], {_V2}, {_V2}, float64, float64)", cache=True, error_model="numpy")
-def _near_edges(pairs, edges, size, x, v, skin, horizon):  # type: ignore[no-untyped-def]
+def _near_edges(pairs, edges, deep, x, v, skin, horizon):  # type: ignore[no-untyped-def]
     kept, half = np.ones(len(pairs), np.bool_), 0.5 * horizon
     for p in range(len(pairs)):
         one, two = pairs[p, 0], pairs[p, 1]
         a, b, c, d = edges[one, 0], edges[one, 1], edges[two, 0], edges[two, 1]
-        far = skin + DEEP * min(size[one], size[two])
+        far = skin + min(deep[one], deep[two])
         r = nearest(at(x, a), at(x, b), at(x, c), at(x, d))
         if dot(r, r) > far * far:
             kept[p] = not (
