@@ -72,10 +72,12 @@ class Flight:
         return Crowd(nodes.id, every, nodes.owner, nodes.part, self.mobility, nodes.x, nodes.v, self._course)
 
     def _whole(self, nodes: Nodes, local: Indices) -> Sides:
-        """``local`` (f, 4): nodes of the faces."""
+        """``local`` (f, 4): nodes of the faces. The tet of an edge may be another rank's, and its opposite node held
+        here.
+        """
         found, here = self.found, self.here(nodes)
-        used = self._watched.copy()
-        used[local] = True
+        used, opposite = self._watched.copy(), nodes.places(found.edges.nodes[:, 4:])
+        used[local] = used[opposite[opposite >= 0]] = True
         far = ghosts.fetch(found.far, found.far_owner, here, self._comm)
         slaves = nodes.id[self._watched & nodes.owned]
         return Sides(found.faces, found.edges, merged([here.take(used), far]), slaves)
