@@ -143,9 +143,8 @@ class SceneEdges:
     """(e, 2) ids of their faces."""
     faces: Indices
     """(e, 2) rows of these, -1 for a face that is not here."""
-    size: Floats
-    deep: Floats
-    """(e,) see records.Edges."""
+    lengths: Floats
+    """(2, e) ``size`` and ``deep`` of records.Edges, m."""
     opened: Bits
     """(e, 2) how far either face is open: see records.Edges."""
     meets: Flags
@@ -165,14 +164,24 @@ class SceneEdges:
 
     @classmethod
     def at_rest(
-        cls, corners: Indices, sides: Ints, faces: Indices, size: Floats, deep: Floats, opened: Bits, sharp: Flags,
-        own: Flags, rank: Ints,
+        cls, corners: Indices, sides: Ints, faces: Indices, lengths: Floats, opened: Bits, sharp: Flags, own: Flags,
+        rank: Ints,
     ) -> "SceneEdges":  # fmt: skip
         """Nothing is searched yet."""
         meets = np.asarray((opened.min(axis=1, initial=OPEN) >= AGED) & (opened.max(axis=1, initial=0) == OPEN))
         return cls(
-            corners, sides, faces, size, deep, opened, meets, sharp, own, rank, *np.zeros((3, len(corners)), bool)
+            corners, sides, faces, lengths, opened, meets, sharp, own, rank, *np.zeros((3, len(corners)), bool)
         )  # fmt: skip
+
+    @property
+    def size(self) -> Floats:
+        """(e,) initial length, m."""
+        return np.asarray(self.lengths[0])
+
+    @property
+    def deep(self) -> Floats:
+        """(e,) depth beyond which it holds nothing, m."""
+        return np.asarray(self.lengths[1])
 
     @cached_property
     def far(self) -> Ints:

@@ -36,7 +36,7 @@ def build(sides: Sides, rules: Rules, horizon: float, drift: Floats, nodes: Node
         crowd=crowd, own=OwnSlots.of(crowd, nodes.n), slots=SceneSlots.at_rest(slave, pushes | slave),
         faces=SceneFaces.at_rest(corners, faces.id, faces.size, faces.exposed.copy()),
         edges=SceneEdges.at_rest(
-            ends, edges.sides, places(faces.id, edges.sides), edges.size, edges.deep, edges.opened.copy(),
+            ends, edges.sides, places(faces.id, edges.sides), np.stack([edges.size, edges.deep]), edges.opened.copy(),
             edges.sharp.copy(), own, rank,
         ),
         rules=rules, tracks=Tracks(crowd.x, crowd.course, faces.n, edges.n, drift, horizon),
