@@ -186,7 +186,8 @@ class Numerics(Model):
     """``viscosity = "none"`` switches it off."""
     dt_safety: Annotated[Ratio, Field(gt=0, le=1)] = 0.9
     """Share of the rigorous element bound 1 / (c sqrt(sum |grad N|^2)). Bodies that shatter end with some 15 % less
-    energy of fracture at 0.9, and with fewer fragments, than at 0.6 and below."""
+    energy of fracture at 0.9, and with fewer fragments, than at 0.6 and below; where cohesive zones are not resolved,
+    which a warning says, it may as well be more."""
     dt_growth: Annotated[Ratio, Field(gt=1, le=2)] | None = None
     """Largest growth of the time step in one step: 1.05 by default, and 1.002 with ``contact.restitution``, since steps
     that rise and fall with the impacts give energy that nothing takes then."""

@@ -6,10 +6,13 @@ COLLAPSE = 1e-6
 """A stable step below this share of the first one means that a tet is being crushed, not that it needs patience.
 Chosen: a run of a million times the steps never ends."""
 
-
 STARVED = 1e-3
 """A stable step below this share of the first one is worth a warning: what is left takes a thousand times the steps.
 Chosen: dust and penetration take it down to a hundredth."""
+
+SLOWED = 0.1
+"""A stable step below this share of the first one is named where a run has used up its time or its steps: it is why.
+Chosen: flow and dust take it down to a third without anybody's fault."""
 
 
 class Clock:
@@ -95,6 +98,11 @@ class Clock:
     def starved(self) -> bool:
         """Whether the stable step has fallen so far that people should know."""
         return self._stable < STARVED * self._first
+
+    @property
+    def share(self) -> float:
+        """Of the first stable step, what is left of it."""
+        return self._stable / self._first
 
     @property
     def steps_left(self) -> float:

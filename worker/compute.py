@@ -150,6 +150,8 @@ def _sum_up(
     inside = look(sim.contact, sim.model, labels, sim.comm) if sim.contact else None
     common = common_volume.measure(sim.contact, sim.model, labels, sim.comm) if sim.contact else None
     state, cause, message = STOPS[loop.stopped] if loop.stopped else (State.SUCCEEDED, None, "")
+    if loop.stopped:
+        message = loop.reason()
     if failure is not None:
         state, cause, message = State.FAILED, failure.cause, str(failure)
     return Outcome(

@@ -16,6 +16,7 @@ from conoid.cases.run import Cause, State
 
 from . import simulation, step
 from .balance import Balance, Window
+from .clock import SLOWED
 from .groups import Groups
 from .migration import checkpoint
 from .output import frames
@@ -169,6 +170,22 @@ class Loop:
         )
         self.warnings.append(text)
         self._tell(messages.Log, level="warning", text=text)
+
+    def reason(self) -> str:
+        """Why it has stopped early; of what was used up, when, and how far the stable step had fallen, if that was why.
+        All ranks take part.
+        """
+        sim, clock, text = self.sim, self.sim.clock, STOPS[self.stopped][2]
+        if self.stopped == CANCELLED:
+            return text
+        limiter = sim.limiter()
+        text += f", at {clock.t:.3g} s of {sim.case.run.end_time:.3g} s"
+        if not clock.share < SLOWED:
+            return text
+        return (
+            f"{text}; the stable step has fallen to {clock.stable:.2g} s, 1/{1.0 / clock.share:.0f} of the first "
+            f"({limiter}): about {clock.steps_left:.2g} steps are left; erosion.time_step lets go of such tets"
+        )
 
     def _move(self) -> None:
         """Tets to other ranks, when that is due and a step is left."""

@@ -230,6 +230,8 @@ def test_wall_time_and_steps_run_out(tmp_path: Path) -> None:
     assert slow.returncode == 4
     assert outcome(tmp_path / "slow").state == "timed_out"
     assert outcome(tmp_path / "slow").cause == "walltime"
+    assert outcome(tmp_path / "slow").message.startswith("run.max_wall_time is used up, at ")
+    assert "stable step" not in outcome(tmp_path / "slow").message
     short = ended(command(1, "free_spin", "--out", str(tmp_path / "short"), *LONG, "--set", "run.max_steps=20"))
     assert short.returncode == 3
     assert outcome(tmp_path / "short").steps == 20

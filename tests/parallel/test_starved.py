@@ -45,10 +45,10 @@ frames = 0
 """All nodes are driven: flat at 1 ms."""
 
 
-def outcome(tmp_path: Path, end: str, ranks: int) -> Outcome:
+def outcome(tmp_path: Path, end: str, ranks: int, *words: str) -> Outcome:
     case, out = tmp_path / "squashed.toml", tmp_path / f"{end}_{ranks}"
     case.write_text(SQUASHED.replace("END", f'"{end}"'), encoding="utf-8")
-    ended(command(ranks, str(case), "--out", str(out)))
+    ended(command(ranks, str(case), "--out", str(out), *words))
     return from_json((out / layout.OUTCOME).read_bytes())
 
 
@@ -66,3 +66,14 @@ def test_flat_is(tmp_path: Path, ranks: int) -> None:
     assert "below 1/1000 of the first, at 0.00099" in line
     assert " s (stability: tet " in line
     assert " of block): about " in line
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_what_is_used_up_says_how_short_the_steps_were(tmp_path: Path, ranks: int) -> None:
+    """A fifth of its height is left."""
+    end = outcome(tmp_path, "1.1 ms", ranks, "--set", "run.max_steps=300")
+    assert (end.state, end.steps, end.warnings) == ("failed", 300, [])
+    assert end.message.startswith("run.max_steps is used up before run.end_time, at 0.0008")
+    assert "; the stable step has fallen to " in end.message
+    assert " of the first (stability: tet " in end.message
+    assert end.message.endswith(" steps are left; erosion.time_step lets go of such tets")
