@@ -149,9 +149,9 @@ def _sum_up(
     labels = sim.record.labels if sim.record else None
     inside = look(sim.contact, sim.model, labels, sim.comm) if sim.contact else None
     common = common_volume.measure(sim.contact, sim.model, labels, sim.comm) if sim.contact else None
-    state, cause, message = STOPS[loop.stopped] if loop.stopped else (State.SUCCEEDED, None, "")
+    state, cause, message = State.SUCCEEDED, None, ""
     if loop.stopped:
-        message = loop.reason()
+        state, cause, message = *STOPS[loop.stopped][:2], loop.reason()
     if failure is not None:
         state, cause, message = State.FAILED, failure.cause, str(failure)
     return Outcome(

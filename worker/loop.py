@@ -160,14 +160,18 @@ class Loop:
             self.snapshots.look(sim, due=sim.reduction.snapshot, ending=ending)
         self.snapshots.tell()
 
+    def _fallen(self, so_far: str) -> str:
+        """That the stable step has fallen ``so_far``, which tet holds it down, and what helps; all ranks take part."""
+        clock = self.sim.clock
+        return (
+            f"the stable step has fallen to {clock.stable:.2g} s, {so_far} ({self.sim.limiter()}): about "
+            f"{clock.steps_left:.2g} steps are left; erosion.time_step lets go of such tets"
+        )
+
     def _warn_of_steps(self) -> None:
         """All ranks take part."""
-        sim, clock = self.sim, self.sim.clock
-        text = (
-            f"the stable step has fallen to {clock.stable:.2g} s, below 1/1000 of the first, at {clock.t:.3g} s ("
-            f"{sim.limiter()}): about {clock.steps_left:.2g} steps are left; erosion.time_step lets go of such tets, "
-            "run.max_steps ends the run"
-        )
+        clock = self.sim.clock
+        text = self._fallen(f"below 1/1000 of the first, at {clock.t:.3g} s") + ", run.max_steps ends the run"
         self.warnings.append(text)
         self._tell(messages.Log, level="warning", text=text)
 
@@ -175,17 +179,12 @@ class Loop:
         """Why it has stopped early; of what was used up, when, and how far the stable step had fallen, if that was why.
         All ranks take part.
         """
-        sim, clock, text = self.sim, self.sim.clock, STOPS[self.stopped][2]
+        clock, text = self.sim.clock, STOPS[self.stopped][2]
         if self.stopped == CANCELLED:
             return text
-        limiter = sim.limiter()
-        text += f", at {clock.t:.3g} s of {sim.case.run.end_time:.3g} s"
-        if not clock.share < SLOWED:
-            return text
-        return (
-            f"{text}; the stable step has fallen to {clock.stable:.2g} s, 1/{1.0 / clock.share:.0f} of the first "
-            f"({limiter}): about {clock.steps_left:.2g} steps are left; erosion.time_step lets go of such tets"
-        )
+        text += f", at {clock.t:.3g} s of {self.sim.case.run.end_time:.3g} s"
+        slow = clock.share < SLOWED
+        return f"{text}; {self._fallen(f'1/{1.0 / clock.share:.0f} of the first')}" if slow else text
 
     def _move(self) -> None:
         """Tets to other ranks, when that is due and a step is left."""

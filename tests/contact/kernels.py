@@ -9,7 +9,16 @@ from conoid.worker.contact import edge_edge as edge_kernels
 from conoid.worker.contact import node_face as face_kernels
 from conoid.worker.contact.active import Kept
 from conoid.worker.contact.company import Company
-from conoid.worker.contact.narrow_phase import PUSH_OUT, ContactRows, EdgeTable, FaceTable, SlotTable, Step
+from conoid.worker.contact.narrow_phase import (
+    DEEP,
+    DEEP_SELF,
+    PUSH_OUT,
+    ContactRows,
+    EdgeTable,
+    FaceTable,
+    SlotTable,
+    Step,
+)
 from conoid.worker.contact.pairs import PairTable
 from conoid.worker.contact.records import Crowd
 from conoid.worker.contact.solver import ActiveSet
@@ -38,12 +47,12 @@ def edge_sizes(x: Floats, edges: Indices) -> Floats:
 
 
 def edge_depths(x: Floats, edges: Indices) -> Floats:
-    """(e,) how deep they hold, m: a quarter of their length and of the lowest height of the tets of their faces, but
-    no less than a twentieth of their length.
+    """(e,) how deep they hold, m: DEEP of their length and of the lowest height of the tets of their faces, but no less
+    than DEEP_SELF of their length.
     """
     (a, b, c, d, e, f), size = edges.T, edge_sizes(x, edges)
     low = np.minimum(lowest_heights(x[np.stack([a, b, c, e], 1)]), lowest_heights(x[np.stack([a, b, d, f], 1)]))
-    return np.asarray(np.maximum(0.25 * np.minimum(size, low), 0.05 * size))
+    return np.asarray(np.maximum(DEEP * np.minimum(size, low), DEEP_SELF * size))
 
 
 def lowest_heights(tets: Floats) -> Floats:

@@ -62,25 +62,22 @@ def find(
     half = np.repeat(some[:, None], 3, axis=1)
     away = half & _common(local, model.nodes.n, neighbours) if neighbours else np.zeros_like(half)
     pairs = _pairs(local, half & ~away, units, model.nodes.n, SHARP)
-    n, low = len(pairs), _heights(local, model.nodes.x0)
-    table = np.empty((n, 6), np.int64), np.empty((n, 2), np.int64), np.empty(n), np.empty(n), np.empty((n, 2), np.uint8)
-    _fill(*table, pairs, local, faces.nodes, faces.id, opened, model.nodes.x0, low)
-    edges = Edges(*table, pairs[:, 4] > 0)
-    edges.deep = depths(edges.size, edges.deep)
+    n, heights = len(pairs), _heights(local, model.nodes.x0)
+    nodes, sides, either = np.empty((n, 6), np.int64), np.empty((n, 2), np.int64), np.empty((n, 2), np.uint8)
+    size, low = np.empty((2, n))
+    _fill(nodes, sides, size, low, either, pairs, local, faces.nodes, faces.id, opened, model.nodes.x0, heights)
+    edges = Edges(nodes, sides, size, depths(size, low), either, pairs[:, 4] > 0)
     if comm.size == 1:
         return edges, *none()[1:]
-    rows = _elsewhere(model, faces, local, units, low, away, opened, comm)
+    rows = _elsewhere(model, faces, local, units, heights, away, opened, comm)
     size, low = np.ascontiguousarray(rows[:, 12:14].T).view(np.float64)
     far = Edges(rows[:, :6], rows[:, 10:12], size, depths(size, low), rows[:, 14:16].astype(np.uint8), rows[:, 16] > 0)
     edges = Edges.joined([edges, far])
     ends, owners = rows[:, 2:6].reshape(-1), rows[:, 6:10].reshape(-1)
     absent = ~among(model.nodes.id, ends)
     missing, first = np.unique(ends[absent], return_index=True)
-    return (
-        edges.take(np.lexsort((edges.sides[:, 1], edges.sides[:, 0]))),
-        missing,
-        owners[absent][first].astype(np.int32),
-    )
+    edges = edges.take(np.lexsort((edges.sides[:, 1], edges.sides[:, 0])))
+    return edges, missing, owners[absent][first].astype(np.int32)
 
 
 def depths(size: Floats, low: Floats) -> Floats:
@@ -98,14 +95,14 @@ def _common(local: Indices, n: int, neighbours: list[Neighbour]) -> Flags:
 
 
 def _elsewhere(
-    model: Model, faces: Faces, local: Indices, units: Floats, low: Floats, away: Flags, opened: Bits, comm: Comm
+    model: Model, faces: Faces, local: Indices, units: Floats, heights: Floats, away: Flags, opened: Bits, comm: Comm
 ) -> Ints:
-    """Rows (``_matched``) of this rank's edges among the half edges ``away`` (f, 3); ``low`` (f,): heights of tets;
-    all ranks take part.
+    """Rows (``_matched``) of this rank's edges among the half edges ``away`` (f, 3); ``heights`` (f,): lowest of
+    their tets, m; all ranks take part.
     """
     nodes, (f, k) = model.nodes, np.nonzero(away)
     a, b, c, d = (*(local[f, (k + i) % 3] for i in range(3)), local[f, 3])
-    floats = np.column_stack([np.linalg.norm(nodes.x0[b] - nodes.x0[a], axis=1), low[f], units[f]]).view(np.int64)
+    floats = np.column_stack([np.linalg.norm(nodes.x0[b] - nodes.x0[a], axis=1), heights[f], units[f]]).view(np.int64)
     known = *(nodes.id[some] for some in (a, b, c, d)), nodes.owner[c], nodes.owner[d], faces.id[f], opened[f]
     halves, home = np.column_stack([*known, floats]), nodes.owner[np.minimum(a, b)]
     found = comm.swap({rank: halves[home == rank] for rank in ranks(home)})
