@@ -95,9 +95,22 @@ def _fast(case: Case, share: float) -> bool:
     )
 
 
-def pressed(case: Case) -> bool:
-    """Whether parts meet so fast that they are pressed together beyond their strength: flat surfaces buckle there."""
-    return _fast(case, PRESSING)
+def pressed(case: Case) -> list[bool]:
+    """Which parts are pressed together with others beyond their strength: flat surfaces buckle there. All are where two
+    parts meet at more than PRESSING of the wave speed of one of them; else those that flow, and do not break, where an
+    impact on their like has more than their flow stress: density c v / 2.
+    """
+    if _fast(case, PRESSING):
+        return [True] * len(case.parts)
+    return [
+        part.fracture is None and _flows(material(case, part.material), speed)
+        for part, speed in zip(case.parts, impact_speeds(case, walls=False), strict=True)
+    ]
+
+
+def _flows(made: Material, speed: float) -> bool:
+    """Whether an impact on its like at ``speed``, m/s, has more than its flow stress."""
+    return made.strength is not None and 0.5 * made.density * wave_speed(made) * speed > made.strength.flow_stress()
 
 
 def driven_together(case: Case) -> bool:

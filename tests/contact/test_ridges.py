@@ -90,9 +90,11 @@ def test_tets_that_flow_has_folded_do_not_pass_into_each_other() -> None:
 @pytest.mark.parametrize(("angle", "found"), [(20.0, False), (30.0, True), (-30.0, False)])
 def test_an_edge_becomes_sharp_when_it_bulges_by_more_than_25_degrees(angle: float, found: bool) -> None:
     corners, one, meets = np.array([[0, 1, 2, 3]], np.int32), np.zeros(1, bool), np.ones(1, bool)
-    assert turned(one, corners, meets, folded(angle), SHARP).tolist() == [found]
-    assert not turned(~one, corners, meets, folded(angle), SHARP).any()
-    assert not turned(one, corners, ~meets, folded(angle), SHARP).any()
+    part, least = np.ones(5, np.int32), np.array([-1.0, SHARP])
+    assert turned(one, corners, meets, folded(angle), part, least).tolist() == [found]
+    assert not turned(~one, corners, meets, folded(angle), part, least).any()
+    assert not turned(one, corners, ~meets, folded(angle), part, least).any()
+    assert not turned(one, corners, meets, folded(angle), part - 1, least).any()
 
 
 STOPS = (150, 300)

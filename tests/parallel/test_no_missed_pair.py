@@ -17,7 +17,7 @@ import pytest
 from conoid.cases.load import apply_overrides, parse_case, read_data, shipped
 from conoid.cases.schema import Case
 from conoid.worker import simulation, step
-from conoid.worker.contact import domain, normals, search, sharp
+from conoid.worker.contact import domain, search
 from conoid.worker.contact.edge_edge import edge_edge
 from conoid.worker.contact.narrow_phase import ContactRows, Step
 from conoid.worker.contact.node_face import node_face
@@ -99,8 +99,8 @@ class Brute(Found):
 
     def meet(self, now: Scene, give: float, dt: float) -> None:
         if self.sim.clock.step % EVERY == 0:
-            if self.sim.clock.step % normals.EVERY == 0:
-                self.contact.exterior.sharpen(now, sharp.SHARP)
+            if self.sim.clock.step % self.contact._scheme.looks == 0:
+                self.contact.exterior.sharpen(now, self.contact._scheme.sharp)
             step = self._step(give, dt)
             self.all[self.sim.clock.step] = self._nodes(step) + self._edges(step)
         super().meet(now, give, dt)

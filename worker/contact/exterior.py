@@ -92,8 +92,8 @@ class Exterior:
         found.sharpen(turned)
         return found
 
-    def sharpen(self, scene: Scene, least: float) -> None:
-        """Which edges have become sharp, their faces' normals at a cosine below ``least``."""
+    def sharpen(self, scene: Scene, least: Floats) -> None:
+        """Which edges have become sharp, their faces' normals at a cosine below that of their part, ``least``."""
         turned = scene.sharpen(least)[: self.surface.edges.n]
         if turned.any():
             self.surface.sharpen(np.union1d(self.surface.turned, self.surface.edges.names[turned]))

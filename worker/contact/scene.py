@@ -171,10 +171,10 @@ class Scene:
         """Whether anything has to be registered."""
         return bool(self.faces.new.any() or self.slots.new.any() or self.edges.new.any())
 
-    def sharpen(self, least: float) -> Flags:
-        """Which edges (e,) are sharp now and were not before, ``least`` the cosine; searched from this step on."""
-        edges = self.edges
-        turned: Flags = sharp.turned(edges.sharp, edges.corners, edges.meets, self.crowd.x, least)
+    def sharpen(self, least: Floats) -> Flags:
+        """Which edges (e,) are sharp now and were not, by the cosines ``least`` (parts,); searched from now on."""
+        edges, crowd = self.edges, self.crowd
+        turned: Flags = sharp.turned(edges.sharp, edges.corners, edges.meets, crowd.x, crowd.part, least)
         edges.sharp |= turned
         edges.new |= turned
         return turned

@@ -23,9 +23,9 @@ from .records import Edges, Faces
 SHARP = sine_and_cosine(math.radians(25.0))[1]
 """Edges between faces whose normals differ by more than this can meet other edges."""
 BENT, PRESSED = sine_and_cosine(math.radians(5.0))[1], 4
-"""The same where bodies are pressed together beyond their strength, and after how many steps edges are looked at there:
-ridges of surfaces that were flat cross without a node inside, and what overlaps has no pressure. Chosen by flyer plates
-of copper at 1 to 2.4 km/s (docs/numerics.md, "Ridges under pressure")."""
+"""The same of parts that are pressed together beyond their strength (cases/impact.py), and after how many steps edges
+are looked at there: ridges of surfaces that were flat cross without a node inside, and what overlaps has no pressure.
+Chosen by flyer plates of copper at 1 to 2.4 km/s (docs/numerics.md, "Ridges under pressure")."""
 
 _A, _B, _C, _D, _OWNER, _TOP, _FACE, _OPEN, _LENGTH, _LOW, _NORMAL = range(11)
 """Columns of a half edge that travels: its nodes, the third node of its face and the one opposite, the owners of these
@@ -218,11 +218,14 @@ def _heights(local, x):  # type: ignore[no-untyped-def]
     return low
 
 
-@njit("boolean[::1](boolean[::1], int32[:, ::1], boolean[::1], float64[:, ::1], float64)", cache=True)
-def turned(sharp, corners, meets, x, least):  # type: ignore[no-untyped-def]
+@njit(
+    "boolean[::1](boolean[::1], int32[:, ::1], boolean[::1], float64[:, ::1], int32[::1], float64[::1])",
+    cache=True,
+)
+def turned(sharp, corners, meets, x, part, least):  # type: ignore[no-untyped-def]
     """(e,) which edges whose faces allow that others meet them, ``meets``, are not ``sharp`` yet, bulge at the
-    positions ``x`` (slots, 3), m, and have faces whose normals have a cosine below ``least``; ``corners`` (e, 6): see
-    records.Edges.
+    positions ``x`` (slots, 3), m, and have faces whose normals have a cosine below the ``least`` (parts,) of their
+    ``part`` (slots,); ``corners`` (e, 6): see records.Edges.
     """
     found = np.zeros(len(sharp), np.bool_)
     for e in range(len(sharp)):
@@ -233,5 +236,5 @@ def turned(sharp, corners, meets, x, least):  # type: ignore[no-untyped-def]
         u, to, fro = minus(at(x, b), o), minus(at(x, corners[e, 2]), o), minus(at(x, corners[e, 3]), o)
         one, two = cross(u, to), cross(fro, u)
         cosine = dot(one, two) / np.sqrt(dot(one, one) * dot(two, two))
-        found[e] = dot(one, fro) < 0.0 and cosine < least
+        found[e] = dot(one, fro) < 0.0 and cosine < least[part[a]]
     return found

@@ -49,14 +49,15 @@ class _Scheme:
     restitution: float
     looks: int
     """Steps between two looks at which edges have become sharp."""
-    sharp: float
-    """Cosine of the angle from which on they are."""
+    sharp: Floats
+    """(parts,) cosine of the angle from which on they are."""
 
     @classmethod
     def of(cls, case: Case) -> "_Scheme":
         assert case.contact is not None
-        looks, angle = (sharp.PRESSED, sharp.BENT) if pressed(case) else (normals.EVERY, sharp.SHARP)
-        return cls(case.contact.restitution, looks, angle)
+        some = np.array(pressed(case))
+        looks = sharp.PRESSED if some.any() else normals.EVERY
+        return cls(case.contact.restitution, looks, np.where(some, sharp.BENT, sharp.SHARP))
 
 
 class Contact:
