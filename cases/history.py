@@ -7,8 +7,11 @@ from .messages import Energy, PartEnergy
 
 CLOCK: dict[str, str] = {"step": "", "t": "s", "dt": "s", "limiter": ""}
 LEDGER: dict[str, str] = {name: "" if name == "residual" else "J" for name in Energy.__struct_fields__}
-MOMENTUM: dict[str, str] = {f"momentum_{axis}": "kg m/s" for axis in "xyz"}
-COLUMNS: dict[str, str] = {**CLOCK, **LEDGER, **MOMENTUM}
+MOMENTA: dict[str, str] = {
+    **{f"momentum_{axis}": "kg m/s" for axis in "xyz"}, **{f"angular_momentum_{axis}": "kg m^2/s" for axis in "xyz"},
+}  # fmt: skip
+"""The second about the origin."""
+COLUMNS: dict[str, str] = {**CLOCK, **LEDGER, **MOMENTA}
 """Columns and units of every run; those of its parts follow, and then those of its probes."""
 OF_PARTS = PartEnergy.__struct_fields__
 """What is told of each part, J."""

@@ -34,6 +34,9 @@ _TOLD = 0.01
 without a word, and of the energy of fracture that may come back. Chosen: what the other lines are usually read to.
 """
 
+_NODAL = 10
+"""Sums over the nodes (``_of_nodes``), before those of the tets."""
+
 
 class Ledger:
     """Sums the accounts of all ranks; the first call sets the initial energy."""
@@ -76,29 +79,31 @@ class Ledger:
         """The largest energy that has come in so far, J."""
         self.momentum = np.zeros(3)
         """Linear momentum at the last call, kg m/s, that of what has left included."""
+        self.angular_momentum = np.zeros(3)
+        """The same about the origin, kg m^2/s."""
         self.eroded_mass = 0.0
         """kg; of nodes that have left, at the last call."""
         self.parts: dict[str, PartEnergy] = {}
         """Of each part at the last call; empty where there is one part alone."""
 
-    def keep(self) -> tuple[tuple[float, float, float, float, float, float], Floats, float]:
+    def keep(self) -> tuple[tuple[float, float, float, float, float, float], Floats, Floats, float]:
         """What it remembers, equal on all ranks."""
         largest = self.initial, self.came, self.worst, self.lost, self._taken, self.unpaid
-        return largest, self.momentum, self.eroded_mass
+        return largest, self.momentum, self.angular_momentum, self.eroded_mass
 
-    def resume(self, known: tuple[tuple[float, float, float, float, float, float], Floats, float]) -> None:
+    def resume(self, known: tuple[tuple[float, float, float, float, float, float], Floats, Floats, float]) -> None:
         """Takes it back."""
-        largest, self.momentum, self.eroded_mass = known
+        largest, self.momentum, self.angular_momentum, self.eroded_mass = known
         self.initial, self.came, self.worst, self.lost, self._taken, self.unpaid = largest
 
     def close(self, before: Floats) -> Energy:
         """The ledger at time n; ``before`` is v(n-1/2), the model holds v(n+1/2)."""
         sums, of_parts, told = self._added_up(before)
-        node_sums, (work, viscous, plastic, averaged) = sums[:7], sums[7:11]
-        self.parts = _named(self._model.parts, of_parts[:, 0], of_parts[:, 7] + of_parts[:, 8])
-        gone, gone_kinetic, gone_momentum = self._gone(told)
+        node_sums, (work, viscous, plastic, averaged) = sums[:_NODAL], sums[_NODAL : _NODAL + len(WORKS)]
+        self.parts = _named(self._model.parts, of_parts[:, 0], of_parts[:, _NODAL] + of_parts[:, _NODAL + 1])
+        gone, gone_kinetic, gone_momenta = self._gone(told)
         gone_work, gone_viscous, gone_plastic, gone_averaged = gone.tolist()
-        self.momentum = node_sums[3:6] + gone_momentum
+        self.momentum, self.angular_momentum = node_sums[3:6] + gone_momenta[:3], node_sums[7:] + gone_momenta[3:]
         self.lost = float(node_sums[1]) / self.initial if self.initial > 0.0 else 0.0
         kinetic_sum, loss_sum, external_sum, stepping = (float(v) for v in (*node_sums[:3], node_sums[6]))
         eroded = gone_work - gone_plastic - gone_averaged + gone_kinetic
@@ -162,10 +167,10 @@ class Ledger:
         by their names those of friction on boundaries, of ``open`` facets and of what has been booked so far.
         """
         nodes, parts = self._model.nodes, len(self._model.parts)
-        columns = np.empty((7, nodes.n))
+        columns = np.empty((_NODAL, nodes.n))
         _of_nodes(
-            columns, before, nodes.v, nodes.force, self._clock.shorter / nodes.scale, nodes.stepping, nodes.mass,
-            *self._boundary_work(), nodes.owned,
+            columns, nodes.x, before, nodes.v, nodes.force, self._clock.shorter / nodes.scale, nodes.stepping,
+            nodes.mass, *self._boundary_work(), nodes.owned,
         )  # fmt: skip
         tables: list[Columns] = [
             Grouped(columns.T, nodes.part, parts), ElementWork(self._model.blocks, parts), *self._rubbed(parts)
@@ -176,7 +181,8 @@ class Ledger:
         tallies = self._tallies()
         words = np.concatenate([np.zeros(0, np.int64), *(tally.words.reshape(-1) for tally in tallies.values())])
         sums, of_parts, words = totals_and_words(self._comm, tables, words)
-        told = {"boundaries": sums[11 : 11 + rubbed], "open": sums[11 + rubbed :]}
+        booked = sums[_NODAL + len(WORKS) :]
+        told = {"boundaries": booked[:rubbed], "open": booked[rubbed:]}
         for name, tally in tallies.items():
             told[name] = tally.valued(words[: tally.words.size].reshape(2, -1))
             words = words[tally.words.size :]
@@ -200,12 +206,12 @@ class Ledger:
         return [Table(np.where(owned[nodes], loss, 0.0)[:, None], parts) for nodes, loss in pairs]
 
     def _gone(self, told: dict[str, Floats]) -> tuple[Floats, float, Floats]:
-        """(4,) WORKS of eroded tets, J; energy, J, and momentum, kg m/s, of eroded nodes."""
+        """(4,) WORKS of eroded tets, J; of eroded nodes energy, J, momentum, kg m/s, and angular momentum, kg m^2/s."""
         if self._erosion is None:
-            return np.zeros(len(WORKS)), 0.0, np.zeros(3)
-        kinetic, mass, *momentum = told["nodes"]
+            return np.zeros(len(WORKS)), 0.0, np.zeros(6)
+        kinetic, mass, *momenta = told["nodes"]
         self.eroded_mass = float(mass)
-        return told["tets"], float(kinetic), np.array(momentum)
+        return told["tets"], float(kinetic), np.array(momenta)
 
     def _friction_work(self, told: dict[str, Floats]) -> float:
         """Energy, J, that friction has taken, of contact and of boundaries."""
@@ -239,15 +245,16 @@ def _add(loss, external, nodes, lost, worked):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    "void(float64[:, ::1], float64[:, ::1], float64[:, ::1], int64[:, ::1], float64, float64[::1], float64[::1], "
-    "float64[::1], float64[::1], boolean[::1])",
+    "void(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], int64[:, ::1], float64, float64[::1], "
+    "float64[::1], float64[::1], float64[::1], boolean[::1])",
     cache=True,
     error_model="numpy",
 )
-def _of_nodes(out, before, v, force, shorter, stepping, mass, loss, external, owned):  # type: ignore[no-untyped-def]
-    """Sets ``out`` (7, nodes): kinetic energy, J, energy lost by impacts and work from outside, J, momentum, kg m/s,
-    and what unequal steps have taken, J: that ``kick`` has booked the half of this one already is kinetic energy until
-    n. Nothing of nodes that are not ``owned``.
+def _of_nodes(out, at, before, v, force, shorter, stepping, mass, loss, external, owned):  # type: ignore[no-untyped-def]
+    """Sets ``out`` (_NODAL, nodes): kinetic energy, J, energy lost by impacts and work from outside, J, momentum,
+    kg m/s, what unequal steps have taken, J: that ``kick`` has booked the half of this one already is kinetic energy
+    until n; and angular momentum about the origin, kg m^2/s, by the positions ``at`` n, m. Nothing of nodes that are
+    not ``owned``.
     """
     for a in range(out.shape[1]):
         half, mine = 0.5 * mass[a], owned[a]
@@ -256,7 +263,9 @@ def _of_nodes(out, before, v, force, shorter, stepping, mass, loss, external, ow
         squares = x * v[a, 0] + y * v[a, 1] + z * v[a, 2]
         out[0, a] = half * squares + shorter * power if mine else 0.0
         out[1, a], out[2, a] = loss[a] if mine else 0.0, external[a] if mine else 0.0
-        out[3, a] = half * (x + v[a, 0]) if mine else 0.0
-        out[4, a] = half * (y + v[a, 1]) if mine else 0.0
-        out[5, a] = half * (z + v[a, 2]) if mine else 0.0
+        p, q, r = half * (x + v[a, 0]), half * (y + v[a, 1]), half * (z + v[a, 2])
+        out[3, a], out[4, a], out[5, a] = p if mine else 0.0, q if mine else 0.0, r if mine else 0.0
         out[6, a] = stepping[a] - shorter * power if mine else 0.0
+        out[7, a] = at[a, 1] * r - at[a, 2] * q if mine else 0.0
+        out[8, a] = at[a, 2] * p - at[a, 0] * r if mine else 0.0
+        out[9, a] = at[a, 0] * q - at[a, 1] * p if mine else 0.0

@@ -51,9 +51,9 @@ class Erosion:
 
     def __init__(
         self, case: Case, model: Model, neighbours: list[Neighbour], contact: Contact | None, bounds: list[Boundary],
-        comm: Comm, clock: Clock, extremes: tuple[float, float],
+        comm: Comm, clock: Clock, extremes: tuple[float, float, float],
     ) -> None:  # fmt: skip
-        """``extremes``: largest nodal mass, kg, and speed, m/s, of the scene."""
+        """``extremes``: largest nodal mass, kg, speed, m/s, and distance from the origin, m, of the scene."""
         self._model, self._neighbours, self._contact = model, neighbours, contact
         self._loads = [bound for bound in bounds if bound.on_faces]
         self._comm, self._clock = comm, clock
@@ -66,13 +66,13 @@ class Erosion:
         self._last: list[tuple[Ints, Floats]] = []
         self._leaving, self._before = np.zeros(0, np.int64), np.zeros((0, 3))
         """Nodes that leave in this step, and their v(n-1/2), m/s."""
-        mass, speed = extremes
-        energy, momentum = mass * speed * speed, mass * speed
+        mass, speed, arm = extremes
+        energy, momentum, spin = mass * speed * speed, mass * speed, mass * speed * arm
         self.work = Tally(np.full(len(WORKS), energy))
         """WORKS of the tets that have left, J."""
-        self.nodal = Tally(np.array([energy, mass, momentum, momentum, momentum]))
-        """Energy, J, mass, kg, and momentum, kg m/s, of the nodes that have left."""
-        self._half = self.nodal.quanta(np.zeros((0, 5)))
+        self.nodal = Tally(np.array([energy, mass, *[momentum] * 3, *[spin] * 3]))
+        """Energy, J, mass, kg, momentum, kg m/s, and angular momentum, kg m^2/s, of the nodes that have left."""
+        self._half = self.nodal.quanta(np.zeros((0, len(self.nodal.scale))))
         self._limit = 0.0
         self.due = False
         """Whether the next step begins with a removal."""
@@ -162,6 +162,7 @@ class Erosion:
             state.stepping[leaving] -= early
             energy = 0.5 * mass * (before * after).sum(axis=1) + early[state.owned[leaving]]
             half = 0.5 * mass[:, None] * after
+            half = np.column_stack([half, np.cross(state.x[owned], half)])
             self._half = self.nodal.quanta(np.column_stack([np.zeros((len(half), 2)), half]))
             self.nodal.add(np.column_stack([energy, mass, half]))
             state.force[leaving] = 0

@@ -241,7 +241,7 @@ class Loop:
         )
 
     def _look(self, before: Floats, *, ending: bool) -> None:
-        """A line of the history: ledger, momentum and probes at time n; ``ending``: after the last step."""
+        """A line of the history: ledger, momenta and probes at time n; ``ending``: after the last step."""
         sim, clock = self.sim, self.sim.clock
         self.energy, self._parts = sim.ledger.close(before), sim.ledger.parts
         if ending:
@@ -251,7 +251,7 @@ class Loop:
         limiter = sim.limiter()
         if self._history is not None:
             parts = [value for part in self._parts.values() for value in msgspec.structs.astuple(part)]
-            extra = [*sim.ledger.momentum, *parts, *probes]
+            extra = [*sim.ledger.momentum, *sim.ledger.angular_momentum, *parts, *probes]
             self._history.write(clock.step, clock.t, clock.dt, limiter, self.energy, extra)
         sim.ledger.require(sim.case.run.residual_limit, f"at step {clock.step}, t = {clock.t:.6g} s")
 

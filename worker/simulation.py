@@ -156,7 +156,7 @@ def _assemble(
     extremes = _extremes(model, comm)
     contact, erosion = None, None
     if case.in_contact:
-        contact = Contact(case, model, neighbours, scene, comm, clock, timers, extremes)
+        contact = Contact(case, model, neighbours, scene, comm, clock, timers, extremes[:2])
     if case.erodes:
         erosion = Erosion(case, model, neighbours, contact, scene, comm, clock, extremes)
     if case.boundaries_of(Symmetry):
@@ -226,14 +226,15 @@ def resume(case: Case, arrived: Arrived, comm: Comm, timers: Timers) -> Simulati
     return sim
 
 
-def _extremes(model: Model, comm: Comm) -> tuple[float, float]:
-    """The largest nodal mass, kg, and the largest of wave speed and velocity, m/s."""
+def _extremes(model: Model, comm: Comm) -> tuple[float, float, float]:
+    """The largest nodal mass, kg, the largest of wave speed and velocity, m/s, and distance from the origin, m."""
     speeds = [float(np.linalg.norm(model.nodes.v, axis=1).max(initial=0.0))]
     for block in model.blocks:
         p = block.params
         speeds.append(math.sqrt((p[BULK] + 4.0 / 3.0 * p[SHEAR]) / p[DENSITY]))
-    largest, fastest = comm.maximum(np.array([float(model.nodes.mass.max(initial=0.0)), max(speeds)]))
-    return float(largest), float(fastest)
+    mass, arm = model.nodes.mass.max(initial=0.0), np.linalg.norm(model.nodes.x, axis=1).max(initial=0.0)
+    largest, fastest, farthest = comm.maximum(np.array([mass, max(speeds), arm])).tolist()
+    return largest, fastest, farthest
 
 
 def _elements(

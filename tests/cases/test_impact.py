@@ -18,7 +18,8 @@ def meeting(speed: float, contact: dict[str, Any] | None = None, **other: Any) -
     away = {**cube, "low": [0, 0, 2e-3], "high": [1e-3, 1e-3, 3e-3]}
     return parse_case(
         {
-            "name": "two", "run": {"end_time": 1e-6}, "materials": {"glass": BRITTLE, "tough": TOUGH}, "contact": contact or {},
+            "name": "two", "run": {"end_time": 1e-6}, "contact": contact or {},
+            "materials": {"glass": BRITTLE, "tough": TOUGH},
             "parts": [
                 {"name": "a", "material": "steel", "mesh": cube, "velocity": [0, 0, speed]},
                 {"name": "b", "material": "steel", "mesh": away, **other},

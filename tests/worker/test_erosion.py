@@ -104,11 +104,13 @@ def test_the_accounts_close_for_a_spinning_body_without_contact(form: Form, node
     case = meeting_of([{"erosion": schema.Erosion(nodes=nodes), "spin": SPIN}], material=COPPER, form=form)
     sim = build(case.model_copy(update={"contact": None}), [block((3, 3, 3), MM)])
     momentum = (sim.model.nodes.mass[:, None] * sim.model.nodes.v).sum(axis=0)
+    turning = (sim.model.nodes.mass[:, None] * np.cross(sim.model.nodes.x, sim.model.nodes.v)).sum(axis=0)
     largest = (sim.model.nodes.mass[:, None] * np.abs(sim.model.nodes.v)).sum()
     residuals, sim = pulled(sim)
     assert sim.model.elements_global < 120
     assert max(residuals) < 1e-4
     assert np.abs(sim.ledger.momentum - momentum).max() < 1e-12 * largest
+    assert sim.ledger.angular_momentum == pytest.approx(turning, rel=1e-12)
     assert (sim.ledger.eroded_mass > 0.0) == (nodes == "remove")
 
 

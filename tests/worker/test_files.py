@@ -31,10 +31,13 @@ ENERGY = Energy(
 )
 
 
+MOMENTA = [0.0, 0.0, 1.5, 0.0, 0.0, 0.0]
+
+
 def write_history(folder: Path) -> None:
     table = History(folder, {"push": "N", "load": ""})
-    table.write(1, 1e-7, 1e-7, "tet 1", ENERGY, [0.0, 0.0, 1.5, 7.0, 0.1])
-    table.write(2, 2e-7, 1e-7, "tet, 2", ENERGY, [0.0, 0.0, 1.5, 8.0, 0.2])
+    table.write(1, 1e-7, 1e-7, "tet 1", ENERGY, [*MOMENTA, 7.0, 0.1])
+    table.write(2, 2e-7, 1e-7, "tet, 2", ENERGY, [*MOMENTA, 8.0, 0.2])
     table.close()
 
 
@@ -43,7 +46,7 @@ def test_a_history_has_its_units_in_the_header(tmp_path: Path) -> None:
     with (tmp_path / layout.HISTORY).open(encoding="utf-8") as file:
         head, *lines = csv.reader(file)
     assert head[:5] == ["step", "t [s]", "dt [s]", "limiter", "kinetic [J]"]
-    assert head[-3:] == ["momentum_z [kg m/s]", "push [N]", "load"]
+    assert head[-3:] == ["angular_momentum_z [kg m^2/s]", "push [N]", "load"]
     assert all(len(line) == len(head) for line in lines)
     assert [history.split(text) for text in head[-2:]] == [("push", "N"), ("load", "")]
 
@@ -51,7 +54,7 @@ def test_a_history_has_its_units_in_the_header(tmp_path: Path) -> None:
 def test_a_file_of_an_earlier_worker_keeps_its_columns(tmp_path: Path) -> None:
     History(tmp_path, {"push": "N"}).close()
     table = History(tmp_path, {**history.of_parts(["rod", "ball"]), "push": "N"})
-    table.write(1, 1e-7, 1e-7, "tet 1", ENERGY, [0.0, 0.0, 1.5, 2.0, 1.0, 0.5, 0.25, 7.0])
+    table.write(1, 1e-7, 1e-7, "tet 1", ENERGY, [*MOMENTA, 2.0, 1.0, 0.5, 0.25, 7.0])
     table.close()
     with (tmp_path / layout.HISTORY).open(encoding="utf-8") as file:
         head, line = csv.reader(file)
@@ -96,7 +99,7 @@ def test_a_journal_and_a_history_that_are_removed_take_no_more_lines(tmp_path: P
         journal.starting("at last")
     assert storage.gone(raised.value, tmp_path)
     with pytest.raises(FileNotFoundError, match=layout.HISTORY):
-        table.write(1, 1e-7, 1e-7, "tet 1", ENERGY, [0.0, 0.0, 1.5])
+        table.write(1, 1e-7, 1e-7, "tet 1", ENERGY, MOMENTA)
     with pytest.raises(FileNotFoundError, match=layout.HISTORY):
         table.close()
     journal.close()

@@ -104,15 +104,19 @@ def test_without_viscosity_there_is_none() -> None:
 def test_a_free_body_keeps_its_momentum_in_the_ledger() -> None:
     spin = {"centre": (1e-3, 1e-3, 1e-3), "rate": (2e4, 0.0, 5e4)}
     sim = build(scene(STEEL, end=2e-6, velocity=(3.0, -2.0, 1.0), spin=spin), [MESH])
-    mass = float(sim.model.nodes.mass.sum())
+    nodes = sim.model.nodes
+    mass = float(nodes.mass.sum())
 
     def look(sim: Simulation, before: Floats) -> None:
         sim.ledger.close(before)
         assert sim.ledger.momentum == pytest.approx(first, rel=1e-12)
+        assert sim.ledger.angular_momentum == pytest.approx(turning, rel=1e-12)
 
-    first = (sim.model.nodes.mass[:, None] * sim.model.nodes.v).sum(axis=0)
+    first = (nodes.mass[:, None] * nodes.v).sum(axis=0)
+    turning = (nodes.mass[:, None] * np.cross(nodes.x, nodes.v)).sum(axis=0)
     run(sim, look)
     assert abs(first).max() > mass
+    assert abs(turning).min() > 1e-4 * mass
 
 
 def test_the_parts_are_what_the_ledger_sums_up() -> None:

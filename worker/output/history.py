@@ -1,4 +1,4 @@
-"""history.csv: one line per sample: clock, ledger, momentum, parts, probes. At its end the same as
+"""history.csv: one line per sample: clock, ledger, momenta, parts, probes. At its end the same as
 history.parquet, where pyarrow is there.
 """
 
@@ -31,7 +31,7 @@ class History:
             self._writer.writerow(head)
 
     def write(self, step: int, t: float, dt: float, limiter: str, energy: Energy, extra: list[float]) -> None:
-        """One line; ``extra`` is momentum, parts and probes. Numbers are written so that they read back to the same
+        """One line; ``extra`` is momenta, parts and probes. Numbers are written so that they read back to the same
         bits. Raises OSError, also when somebody has removed the file.
         """
         storage.require(self._file, self._path)
