@@ -27,8 +27,8 @@ from ..output import hdf5
 from ..parallel.comm import Comm
 from .parcel import Parcel, Table, take
 
-FORMAT = 11
-"""Of the files; 11 has the sweeps of contact that the next step gets. Others are not read."""
+FORMAT = 12
+"""Of the files; 12 has the angular momentum of the ledger and of what has left. Others are not read."""
 _KEPT = 2
 """Checkpoints that stay; the older ones go."""
 _MANIFEST = "manifest.json"
