@@ -85,16 +85,26 @@ def _told(key: str, run: Run) -> Any:
 
 
 def tests(quick: bool) -> dict[str, Any]:
-    """Every test that a row names, with what it has asserted: those that start ranks beside all others."""
+    """Every test that a row names, with what it has asserted: those that start ranks first and alone, since their ranks
+    wait for each other with patience that has an end; then the others, their files shared out to the cores.
+    """
     nodes = sorted({f"tests/{node}" for row in catalogue() for node in row.get("tests", ())})
-    halves = [[node for node in nodes if node.startswith(_RANKS) == several] for several in (False, True)]
+    others = [node for node in nodes if not node.startswith(_RANKS)]
+    files = sorted({node.partition("::")[0] for node in others})
+    shares = [[node for node in others if files.index(node.partition("::")[0]) % CORES == k] for k in range(CORES)]
+    found = _recorded([[node for node in nodes if node.startswith(_RANKS)]], quick)
+    return found | _recorded([share for share in shares if share], quick)
+
+
+def _recorded(shares: list[list[str]], quick: bool) -> dict[str, Any]:
+    """What the tests of each share have asserted, by node; a process a share, side by side."""
     environment = {**os.environ, "PYTHONPYCACHEPREFIX": str(OUT / "bytecode"), "PYTHONPATH": str(ROOT)}
-    files = [OUT / f"recorded-{number}.json" for number in range(len(halves))]
+    files = [OUT / f"recorded-{number}.json" for number in range(len(shares))]
     under_way = []
-    for half, file in zip(halves, files, strict=True):
+    for share, file in zip(shares, files, strict=True):
         command = [
             sys.executable, "-m", "pytest", "-q", "-p", "tests.bench.recorder", "-o", "enable_assertion_pass_hook=true",
-            "--recorded", str(file), "--timeout", "3600", *(["-m", "not slow"] if quick else []), *half,
+            "--recorded", str(file), "--timeout", "3600", *(["-m", "not slow"] if quick else []), *share,
         ]  # fmt: skip
         under_way.append(subprocess.Popen(command, cwd=ROOT, env=environment))
     for process in under_way:
