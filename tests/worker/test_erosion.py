@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 import numpy as np
 import pytest
 
-from conoid.cases import schema
+from conoid.cases import materials, schema
 from conoid.cases.materials import Material
 from conoid.worker import digest, reference, state, step
 from conoid.worker.mesh.faces import across, boundary_faces
@@ -441,3 +441,32 @@ def test_a_particle_does_not_cross_a_symmetry_plane(side: float) -> None:
 def test_mirrors_hold_what_starts_off_the_plane() -> None:
     sim = flying(0.0, 1.0)
     assert sum(len(bound.nodes) for bound in sim.boundaries if isinstance(bound, Mirrors)) == 18
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_damage_that_takes_no_tet_is_told(ranks: int) -> None:
+    """A band that is narrower than a tet: nothing is said of little damage, nor once something has left."""
+    damaged = materials.JohnsonCookDamage(D1=0.05, D2=3.44, D3=-2.12, D4=0.002, D5=0.61)
+    assert STEEL_42CRMO4.strength is not None
+    law = STEEL_42CRMO4.strength.model_copy(update={"damage": damaged})
+    steel = STEEL_42CRMO4.model_copy(update={"strength": law})
+    wears = {"erosion": schema.Erosion(damage=1.0)}
+    case = meeting_of([wears, wears, {}], material=steel).model_copy(update={"contact": None})
+    meshes = [moved(block((3, 3, 3), MM, seed=k), (0.0, 0.0, 10.0 * k * MM)) for k in range(3)]
+
+    def work(sim: Simulation) -> list[list[str]]:
+        assert sim.erosion is not None
+        step.prepare(sim)
+        for part in sim.model.blocks:
+            part.state[:, state.WORK] = 1.0
+            part.state[0, state.DAMAGE, 0] = (0.2, 0.4, 0.4)[part.part]
+        told = [sim.erosion.warnings()]
+        tick(sim, np.arange(1))
+        sim.free()
+        return [*told, sim.erosion.warnings()]
+
+    for before, after in on(ranks, case, meshes, work):
+        assert [text.partition(":")[0] for text in before] == [
+            "part 'body1' is damaged to 0.4 of erosion.damage 1 and no tet has left"
+        ]
+        assert after == []

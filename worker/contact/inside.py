@@ -53,7 +53,7 @@ class Inside:
             how.append(f"{'the others ' if self.buried else ''}up to {self.deepest:.2g} of a face deep")
         return [
             f"contact has let {self.nodes} of {self.looked} nodes into other bodies or fragments, {', '.join(how)}: "
-            "raise contact.sweeps or refine the mesh there"
+            "refine the mesh there"
         ]
 
 
