@@ -12,6 +12,8 @@ import sys
 import time
 import tomllib
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from itertools import count, groupby, repeat
 from pathlib import Path
 from typing import Any
 
@@ -86,30 +88,29 @@ def _told(key: str, run: Run) -> Any:
 
 def tests(quick: bool) -> dict[str, Any]:
     """Every test that a row names, with what it has asserted: those that start ranks first and alone, since their ranks
-    wait for each other with patience that has an end; then the others, their files shared out to the cores.
+    wait for each other with patience that has an end; then the others, a file on each core.
     """
     nodes = sorted({f"tests/{node}" for row in catalogue() for node in row.get("tests", ())})
-    others = [node for node in nodes if not node.startswith(_RANKS)]
-    files = sorted({node.partition("::")[0] for node in others})
-    shares = [[node for node in others if files.index(node.partition("::")[0]) % CORES == k] for k in range(CORES)]
-    found = _recorded([[node for node in nodes if node.startswith(_RANKS)]], quick)
-    return found | _recorded([share for share in shares if share], quick)
+    ranked = [node for node in nodes if node.startswith(_RANKS)]
+    others = [node for node in nodes if node not in ranked]
+    files = [list(group) for _, group in groupby(others, lambda node: node.partition("::")[0])]
+    with ThreadPoolExecutor(CORES) as pool:
+        return _recorded(ranked, "ranks", quick) | {
+            node: entry for found in pool.map(_recorded, files, count(), repeat(quick)) for node, entry in found.items()
+        }
 
 
-def _recorded(shares: list[list[str]], quick: bool) -> dict[str, Any]:
-    """What the tests of each share have asserted, by node; a process a share, side by side."""
+def _recorded(nodes: list[str], name: object, quick: bool) -> dict[str, Any]:
+    """What these tests have asserted, by node; a process of its own."""
     environment = {**os.environ, "PYTHONPYCACHEPREFIX": str(OUT / "bytecode"), "PYTHONPATH": str(ROOT)}
-    files = [OUT / f"recorded-{number}.json" for number in range(len(shares))]
-    under_way = []
-    for share, file in zip(shares, files, strict=True):
-        command = [
-            sys.executable, "-m", "pytest", "-q", "-p", "tests.bench.recorder", "-o", "enable_assertion_pass_hook=true",
-            "--recorded", str(file), "--timeout", "3600", *(["-m", "not slow"] if quick else []), *share,
-        ]  # fmt: skip
-        under_way.append(subprocess.Popen(command, cwd=ROOT, env=environment))
-    for process in under_way:
-        process.wait()
-    return {node: entry for file in files for node, entry in json.loads(file.read_text(encoding="utf-8")).items()}
+    file = OUT / f"recorded-{name}.json"
+    command = [
+        sys.executable, "-m", "pytest", "-q", "-p", "tests.bench.recorder", "-o", "enable_assertion_pass_hook=true",
+        "--recorded", str(file), "--timeout", "3600", *(["-m", "not slow"] if quick else []), *nodes,
+    ]  # fmt: skip
+    file.unlink(missing_ok=True)
+    subprocess.run(command, cwd=ROOT, env=environment, check=False)
+    return dict(json.loads(file.read_text(encoding="utf-8"))) if file.is_file() else {}
 
 
 def hard_cases(_: bool) -> list[Any]:
