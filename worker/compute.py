@@ -142,6 +142,7 @@ def _sum_up(
     memory = sim.comm.gather(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
     hexdigest = digest.digest(sim.model, sim.comm, [sim.elements.pressure] if sim.elements.split else [])
     checks = reference.measure(sim, folder, start.thick) if failure is None and not loop.stopped else []
+    eroded = start.elements - sim.model.elements_global
     fragments = len(sim.model.parts)
     if sim.record is not None:
         sim.record.look()
@@ -157,7 +158,7 @@ def _sum_up(
     return Outcome(
         state=state, cause=cause, message=message, steps=sim.clock.step, time=sim.clock.t, ranks=sim.comm.size,
         elapsed=elapsed, setup=setup, cpu=total_cpu, digest=hexdigest or "", elements=start.elements,
-        eroded=start.elements - sim.model.elements_global, eroded_mass=sim.ledger.eroded_mass,
+        eroded=eroded, eroded_mass=sim.ledger.eroded_mass,
         nodes_initial=start.nodes, nodes=sim.model.nodes_global, fragments=fragments,
         broken=sim.fracture.broken if sim.fracture is not None else 0,
         inside=inside.nodes if inside else 0, deepest=inside.deepest if inside else 0.0,
@@ -170,7 +171,7 @@ def _sum_up(
         reference=checks,
         warnings=[
             *start.warnings, *loop.warnings, *loop.lost, *sim.ledger.warnings,
-            *(sim.erosion.warnings() if sim.erosion is not None else []),
+            *(sim.erosion.warnings(eroded) if sim.erosion is not None else []),
             *(sim.fracture.warnings if sim.fracture is not None else []), *(inside.warnings if inside else []),
             *(common.warnings if common else []), *(sim.contact.need.warnings if sim.contact else []),
         ],

@@ -14,7 +14,7 @@ from .boundaries import Boundary
 from .clock import Clock
 from .contact import bare
 from .contact.stage import Contact
-from .elements.wear import BROKEN, FREQUENCY, SOUND
+from .elements.wear import BROKEN, DAMAGED, FREQUENCY, SOUND, life
 from .mesh.faces import FACES
 from .mesh.faces import normals as face_normals
 from .migration.parcel import Parcel
@@ -128,29 +128,24 @@ class Erosion:
         """``found`` of all ranks (elements/wear.py): whether there is something to remove now."""
         self.due = found == BROKEN or (found > SOUND and self._clock.step % GATHERED == 0)
 
-    def warnings(self) -> list[str]:
-        """What the user should know at the end; all ranks take part."""
-        left = np.zeros(len(self._model.parts), np.int64)
+    def warnings(self, eroded: int) -> list[str]:
+        """What the user should know at the end, when so many tets of all ranks have left; all ranks take part."""
+        parts = self._model.parts
+        left, damage = np.zeros(len(parts), np.int64), np.zeros(len(parts))
         for block in self._model.blocks:
             left[block.part] += block.n
-        gone = np.flatnonzero(self._comm.sum(left) == 0).tolist()
-        empty = [f"part {self._model.parts[part]!r} has no tet left: erosion has taken them all" for part in gone]
-        return empty + self._undecided()
-
-    def _undecided(self) -> list[str]:
-        """Parts that are damaged where nothing has left: on a finer mesh it might; all ranks take part."""
-        damage = np.zeros(len(self._specs))
-        for block in self._model.blocks:
             if block.has(DAMAGE) and block.n:
                 damage[block.part] = max(damage[block.part], block.at(DAMAGE, np.arange(block.n)).max())
-        damage, gone = self._comm.maximum(damage), self._comm.sum(self.work.words).any()
-        limits = [spec.damage if spec is not None and spec.damage is not None else np.inf for spec in self._specs]
-        return [] if gone else [
-            f"part {name!r} is damaged to {most:.2g} of erosion.damage {limit:g} and no tet has left: shear bands are "
-            "no narrower than tets, and smaller ones reach it sooner (conoid converge says whether it matters)"
-            for name, most, limit in zip(self._model.parts, damage, limits, strict=True)
-            if UNDECIDED * limit < most < limit
-        ]  # fmt: skip
+        left, damage = self._comm.sum(left), self._comm.maximum(damage)
+        told = [f"part {parts[k]!r} has no tet left: erosion has taken them all" for k in np.flatnonzero(left == 0)]
+        limits = [float(life(spec)[DAMAGED]) for spec in self._specs]
+        undecided = [k for k, limit in enumerate(limits) if not eroded and UNDECIDED * limit < damage[k] < limit]
+        return told + [
+            f"part {parts[k]!r} is damaged to {damage[k]:.2g} of erosion.damage {limits[k]:g} and no tet has left: "
+            "shear bands are no narrower than tets, and smaller ones reach it sooner (conoid converge says whether it "
+            "matters)"
+            for k in undecided
+        ]
 
     @property
     def particles(self) -> int:
