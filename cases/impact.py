@@ -14,9 +14,10 @@ from .materials import Material
 from .placed import Placed, driven, velocity
 from .schema import Case, Part
 
-FEW, MANY, DRIVEN, MOST = 5, 10, 40, 80
-"""Sweeps of contact in a step: the fewest, also where bodies meet fast, also for rubble that is driven, and the most;
-what more are good for: docs/numerics.md, "Contact", "Driven rubble" and "Sweeps by need"."""
+FEW, MANY, FULL, MOST = 5, 10, 40, 80
+"""Sweeps of contact in a step: the fewest, also where bodies meet fast, also for rubble that is driven and with
+restitution, and the most; what more are good for: docs/numerics.md, "Contact", "Driven rubble", "Sweeps by need" and
+"Restitution"."""
 FAST = 0.2
 """Of the wave speed of what is met: above it there are MANY sweeps. Chosen: below half of where few were too few for
 columns of metal (docs/numerics.md, "Plates under 100 GPa")."""
@@ -135,6 +136,6 @@ def sweeps(case: Case) -> Sweeps:
     assert case.contact is not None
     if case.contact.sweeps is not None:
         return Sweeps(case.contact.sweeps, case.contact.sweeps)
-    if case.fractures and driven_together(case):
-        return Sweeps(DRIVEN, MOST)
-    return Sweeps(MANY if _fast(case, FAST) or case.contact.restitution > 0.0 else FEW, MOST)
+    if case.contact.restitution > 0.0 or (case.fractures and driven_together(case)):
+        return Sweeps(FULL, MOST)
+    return Sweeps(MANY if _fast(case, FAST) else FEW, MOST)
