@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from itertools import combinations
 
 from .bodies import MeshFile
 from .geometry import Vector, lowest_along
@@ -16,7 +17,7 @@ def strangers(case: Case) -> Iterator[Problem]:
     """A warning for each part that flies, and meets nothing before ``run.end_time`` although there is something.
 
     Nothing is said of a case with mesh files, with bodies that turn or stretch, or where more than walls and planes of
-    symmetry acts on nodes.
+    symmetry acts on nodes; nor of a part while others run into each other before the end, which may send one its way.
     """
     others = [boundary for boundary in case.boundaries if not isinstance(boundary, Wall | Symmetry)]
     walls = [boundary for boundary in case.boundaries if isinstance(boundary, Wall)]
@@ -24,10 +25,14 @@ def strangers(case: Case) -> Iterator[Problem]:
     if others or case.contact is None or None in boxes or len(case.parts) + len(walls) < 2:
         return
     known = [box for box in boxes if box is not None]
+    pushed = [
+        {i, j} for (i, part), (j, each) in combinations(enumerate(case.parts), 2)
+        if part.velocity != each.velocity and _meeting(known[i], known[j], part, each) <= case.run.end_time
+    ]  # fmt: skip
     for i, part in enumerate(case.parts):
         times = [_meeting(known[i], known[j], part, each) for j, each in enumerate(case.parts) if j != i]
         soonest = min([*times, *(_arrival(part, wall) for wall in walls)])
-        if any(part.velocity) and soonest > case.run.end_time:
+        if any(part.velocity) and soonest > case.run.end_time and all(i in pair for pair in pushed):
             when = "nothing at all" if soonest == math.inf else f"nothing before {soonest:.3g} s"
             message = f"{part.name!r} meets {when}; the run ends at {case.run.end_time:.3g} s"
             yield problem(("parts", i, "velocity"), ..., message)

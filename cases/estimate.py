@@ -11,7 +11,7 @@ from pathlib import Path
 
 from .bodies import MeshFile
 from .geometry import AXES, bounds
-from .impact import impact_speeds, wave_speed
+from .impact import driven_together, impact_speeds, wave_speed
 from .library import material
 from .mesh_size import MeshSize, mesh_size, surface_faces
 from .placed import Bulk, bulk, driven
@@ -31,6 +31,10 @@ START = 2.0
 BROKEN_NANOSECONDS = 700.0
 """Core time per tet and step of a body that has turned to dust: what the glass bar of the paper takes, in the mean of
 its 150 us, on two ranks."""
+PRESSED_NANOSECONDS = 20_000.0
+"""The same of dust that is held together and pressed, where every tet meets all round it and sweeps are many: a plug of
+glass under a ram (tests/bench/press.py) took 17,000 to 20,000 on one rank, a block of 3,600 tets between walls, into
+which a ram goes by a fifth and by a third of its height, 18,000 and 26,000; less where it can give way."""
 BREAKING_OVERHEAD = 2e-3
 """Core seconds that a rank takes for a step in which something breaks, however little: 1 to 4 ms in twelve scenes of
 150 to 24,000 tets."""
@@ -213,8 +217,11 @@ def _costs(case: Case, parts: tuple[PartEstimate, ...], steps: int | None) -> di
 
 
 def _breaking(case: Case, parts: tuple[PartEstimate, ...], steps: int | None) -> float:
-    """Core seconds of fracture, and of the contact of what has come apart, at most."""
-    rate = case.run.ranks * BREAKING_OVERHEAD + 1e-9 * BROKEN_NANOSECONDS * _tets_that_break(case, parts)
+    """Core seconds of fracture, and of the contact of what has come apart, at most; what flies is taken to come apart
+    freely, what is driven to be pressed.
+    """
+    dust = PRESSED_NANOSECONDS if case.in_contact and driven_together(case) else BROKEN_NANOSECONDS
+    rate = case.run.ranks * BREAKING_OVERHEAD + 1e-9 * dust * _tets_that_break(case, parts)
     return (steps or 0) * rate if case.fractures else 0.0
 
 

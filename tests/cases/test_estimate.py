@@ -154,6 +154,14 @@ def test_what_may_break_may_cost_more() -> None:
     assert bar.core_seconds < measured < 1.1 * (bar.core_seconds + bar.breaking)
 
 
+def test_dust_that_something_presses_costs_more_than_loose_dust() -> None:
+    """A glass rod that flies at a wall, and the same pushed on at its end."""
+    glass = rod("parts[0].material=soda_lime", "parts[0].fracture.model=cohesive", "contact.friction=0.1")
+    driven = {"kind": "velocity", "z": -10.0, "low": [0.0, 0.0, 0.029], "high": [0.003, 0.003, 0.031]}
+    pushed = {**glass, "boundaries": [*glass["boundaries"], driven]}
+    assert estimate(parse_case(pushed)).breaking > 10.0 * estimate(parse_case(glass)).breaking > 0.0
+
+
 @pytest.mark.parametrize(
     ("name", "whole", "dust"),
     [("bar_on_bar", 276e6, None), ("glass_steel_demo", None, 620e6), ("glass_ball_cohesive", None, 638e6)],

@@ -156,6 +156,15 @@ def test_what_is_odd(changes: dict[str, Any], key: str, message: str) -> None:
     assert message in found[key], found
 
 
+def test_what_others_may_send_on_its_way_is_not_odd() -> None:
+    """A second ball runs into the first, which would fly past the plate by itself."""
+    data = target(ball={"velocity": [0, 0, "5 m/s"]})
+    assert "'ball' meets nothing at all" in told(data)["parts[0].velocity"]
+    hammer = {**data["parts"][0], "name": "hammer", "velocity": [0, 0, "-900 m/s"]}
+    data["parts"].append({**hammer, "mesh": {**hammer["mesh"], "centre": [0, 0, "8 mm"]}})
+    assert "parts[0].velocity" not in told(data)
+
+
 EOS = {"model": "mie_gruneisen", "c0": "4600 m/s", "S": 1.49, "gamma0": 2}
 
 
