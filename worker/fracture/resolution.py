@@ -52,7 +52,7 @@ def warnings(part: Part, tough: Toughness, size: float, safety: float) -> list[s
     opening = (tough.strength / tough.impedance + drawn * size) * step
     if spec.model == "cohesive" and opening > tough.critical:
         told.append(
-            f"a facet opens by {opening * 1e6:.3g} um in a step of {step * 1e9:.3g} ns, and by "
+            f"a facet that breaks would open by {opening * 1e6:.3g} um in a step of {step * 1e9:.3g} ns, and by "
             f"{tough.critical * 1e6:.3g} um altogether: no law can be followed; use fracture.model = 'instant', "
             f"fracture.resolve = 'strength', or numerics.dt_safety below {safety * tough.critical / opening:.2g}"
         )
