@@ -128,12 +128,13 @@ class Contact(Model):
     """Pairs of parts with a friction of their own."""
     restitution: Annotated[Ratio, Field(ge=0, le=1)] = 0.0
     """Share of the speed of approach with which nodes part from faces, and edges from edges, that they run into: at 0
-    an impact of nodes is perfectly plastic; at 1 it takes no energy but what ``sweeps`` leave undone, mostly below
-    0.1 %. In the impact of two bodies it is their first nodes that pay, and what they pay falls with the size of the tets; where erosion lays bare ever new nodes, or a
-    cloud of debris arrives, all of them do, whatever their size: 8 to 9 % in a penetration at constant speed. Bodies
-    rebound by their elasticity whatever it is. Above 0 ``sweeps`` and ``numerics.dt_growth`` have other defaults, and
-    what parts falls back: next to 0 is not 0. At a high speed unequal time steps may take or make more than it gives
-    back: the outcome says when it is above 1 %. Walls are not concerned: there it is always 0."""
+    an impact of nodes is perfectly plastic; at 1 it takes no energy but what ``sweeps`` leave undone, mostly below 0.1
+    %. In the impact of two bodies it is their first nodes that pay, and what they pay falls with the size of the tets;
+    where erosion lays bare ever new nodes, or a cloud of debris arrives, all of them do, whatever their size: 8 to 9 %
+    in a penetration at constant speed. Bodies rebound by their elasticity whatever it is. Above 0 ``sweeps`` and
+    ``numerics.dt_growth`` have other defaults, and what parts falls back: next to 0 is not 0. At a high speed unequal
+    time steps may take or make more than it gives back: the outcome says when it is above 1 %. Walls are not concerned:
+    there it is always 0."""
     edges: bool = True
     """Whether sharp edges meet edges."""
     overlap: Literal["refuse", "push"] = "refuse"
@@ -145,8 +146,8 @@ class Contact(Model):
     sweeps: Annotated[Count, Field(ge=1, le=1000)] | None = None
     """Jacobi sweeps over the active contacts of a step, with momentum. By default as many as are needed, from 5 to 80:
     more where the last one of the step before has changed the impulses by more than 0.15 %, as it does in rubble under
-    pressure, fewer where it was less than half of that. At least 10 where parts meet at more than a fifth of the speed of
-    waves in one of them; at least 40 with ``restitution``, where what they leave undone is energy, and where parts
+    pressure, fewer where it was less than half of that. At least 10 where parts meet at more than a fifth of the speed
+    of waves in one of them; at least 40 with ``restitution``, where what they leave undone is energy, and where parts
     fracture and a motion or a traction drives something that may press them. With too few what has broken is too soft
     under pressure, and shatters into more pieces than it should, or fewer."""
     skin: Annotated[Ratio, Positive] = 0.3
