@@ -38,10 +38,10 @@ def test_it_is_a_potential_of_the_own_volume(material: object) -> None:
         pressures.append(patch.get(VISCOUS)[0])
         work.append(extra)
     ratio = np.concatenate([there, there[::-1][1:]]) ** 3
-    depth = np.log(SQUEEZED / np.minimum(ratio, SQUEEZED))
+    depth = SQUEEZED / np.minimum(ratio, SQUEEZED) - 1.0
     assert np.allclose(pressures, STIFF * BULK * depth**2, rtol=1e-9, atol=1e-3)
-    integral = ratio * (depth**2 + 2.0 * depth + 2.0) - 2.0 * SQUEEZED  # of ln(s / J)^2 from J to s, less the sign
-    stored = -STIFF * BULK * volume * np.where(ratio < SQUEEZED, integral, 0.0)
+    integral = SQUEEZED**2 / ratio - ratio - 2.0 * SQUEEZED * np.log(SQUEEZED / ratio)  # of (s / J - 1)^2, from J to s
+    stored = STIFF * BULK * volume * np.where(ratio < SQUEEZED, integral, 0.0)
     assert np.abs(work - stored).max() < 1e-3 * stored.max()
     assert abs(work[-1]) < 1e-6 * stored.max()
 
