@@ -8,11 +8,11 @@ import msgspec
 import typer
 
 from conoid.cases import layout
-from conoid.cases.run import State
+from conoid.cases.run import ExitCode, State
 
 from . import tables
 from .batch import cancel_folder, commands_of
-from .errors import UsageError
+from .errors import UnfinishedError, UsageError
 from .following import FolderRun
 from .live import Live, exit_code
 from .options import (
@@ -208,7 +208,7 @@ def get(
     token: Token = None,
     as_json: Annotated[bool, typer.Option("--json", help="List the run's files as JSON; copies nothing.")] = False,
 ) -> None:
-    """Copy a run's files here."""
+    """Copy a run's files here; those that it lacks are named, and the command ends with 1 then."""
     with connect(url, token) as session:
         found = find(session, run)
         if as_json:
@@ -216,7 +216,15 @@ def get(
             return
         target = out or Path(found.id)
         every = (file.path for file in found.files())
+        lacks = False
         for name in names or [path for path in every if not path.startswith(f"{layout.CHECKPOINTS}/")]:
-            with aloud(f"fetching {name}"):
-                fetched = found.download(target, name)
-            typer.echo(str(fetched))
+            try:
+                with aloud(f"fetching {name}"):
+                    fetched = found.download(target, name)
+            except UnfinishedError as error:
+                complain(str(error))
+                lacks = True
+            else:
+                typer.echo(str(fetched))
+        if lacks:
+            raise typer.Exit(ExitCode.CRASHED)

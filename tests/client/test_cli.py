@@ -175,6 +175,10 @@ def test_submit_show_ls_get(user: Path) -> None:
     assert got.stdout.split() == ["here/outcome.json", "here/history.csv"]
     assert (user / "here" / "history.csv").read_text().startswith("step,t")
     assert {file["path"] for file in read(conoid("get", run, "--json"))} >= {"outcome.json", "journal.jsonl"}
+    some = conoid("get", run, "nothing.csv", "history.csv", "--out", "there")
+    assert some.exit_code == 1
+    assert "has no nothing.csv" in some.stderr
+    assert some.stdout.split() == ["there/history.csv"]
     assert conoid("replay-balance", "last").stderr == "conoid: this run has not told the loads of its groups\n"
 
 
