@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conoid.worker.contact.inside import Inside, _depths, _from_edges, look
+from conoid.worker.contact.inside import Inside, _depths, _from_edges, _from_faces, look
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.simulation import Simulation
 
@@ -59,6 +59,19 @@ def test_what_has_gone_through_the_outermost_tets_is_buried() -> None:
     assert f"{found.buried} of them through the outermost tets" in line
 
 
+@pytest.mark.parametrize(("depth", "buried"), [(0.025 * SIZE, False), (0.1 * SIZE, True)])
+def test_what_touches_a_surface_whose_tets_are_flat_is_not_inside(depth: float, buried: bool) -> None:
+    """The top layer of the larger block is a hundredth as thick as it was: the tets below it have no corner on the
+    surface.
+    """
+    sim = sunk(depth)
+    x, part = sim.model.nodes.x, sim.model.nodes.part
+    x[(part == 0) & (x[:, 2] > 3.5 * SIZE), 2] -= 0.99 * SIZE
+    x[part == 1, 2] -= 0.99 * SIZE
+    assert (seen(sim).buried > 0) == buried
+    assert (seen(sim).nodes > 0) == buried
+
+
 def test_fragments_of_one_part_are_as_good_as_bodies() -> None:
     """Two halves of a body that nothing holds together; and a body that is whole is inside of nothing."""
     sim = sunk(0.3 * SIZE)
@@ -97,6 +110,14 @@ def test_no_node_is_deeper_than_it_is_away_from_a_corner_on_the_surface() -> Non
     assert _depths(near, corners, opened, outer) == pytest.approx(0.7 / np.sqrt(3.0))
     assert _depths(near, corners, opened, outer | True) == pytest.approx(0.1 * np.sqrt(3.0))
     assert _depths(-near, corners, opened, outer) == pytest.approx(-1.0)
+
+
+def test_how_far_points_are_from_triangles() -> None:
+    """Over the middle, beyond an edge, behind a corner, and of a triangle without an area."""
+    triangle = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    points = np.array([[0.2, 0.2, -0.3], [0.5, -0.4, 0.3], [-3.0, 0.0, 4.0], [0.5, 0.0, 2.0]])
+    corners = np.array([triangle, triangle, triangle, triangle[[0, 1, 1]]])
+    assert _from_faces(points, corners) == pytest.approx([0.3, 0.5, 5.0, 2.0])
 
 
 def test_a_node_on_an_edge_between_two_corners_on_the_surface_touches() -> None:

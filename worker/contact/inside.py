@@ -3,7 +3,8 @@
 A node that lies in a tet which nothing holds together with its own has come through that body's surface. How deep it
 is below the surface the tet alone tells: below the nearest of its own open faces; and in one that has no open face but
 a corner on the surface, below the nearest of its faces at least; nowhere deeper than it is away from a corner of the
-tet on the surface. In a tet without one it is deeper than the outermost layer. One on an edge between two corners on
+tet on the surface. In a tet without one it is deeper than the outermost layer; but where that has been squeezed flat it
+may lie on the surface all the same, as the nearest open faces of the body tell. One on an edge between two corners on
 the surface is taken to touch it: a tet that has an edge there may have no open face beside it; what is on an edge that
 runs through a plate of one tet is so taken, too. Nodes of the surface and nodes that have separated are looked at,
 against the tets of all ranks, so that no cut changes what is found.
@@ -14,8 +15,9 @@ from itertools import combinations
 
 import numpy as np
 
+from ..mesh.faces import FACES
 from ..parallel.comm import Comm
-from ..state import INTACT, Block, Flags, Floats, Ints, Model
+from ..state import INTACT, Block, Flags, Floats, Indices, Ints, Model
 from . import search
 from .search import Things
 from .stage import Contact
@@ -67,7 +69,7 @@ def look(contact: Contact, model: Model, labels: list[Ints] | None, comm: Comm) 
     told = comm.join(_seen(outer, model, fragments)).reshape(-1, _WORDS)
     parts, x = told[:, 2].astype(np.int32), np.ascontiguousarray(told[:, 3:]).view(np.float64)
     points, part = np.concatenate([model.nodes.x, x]), np.concatenate([model.nodes.part, parts])
-    found, size = [np.zeros((0, 2))], contact.exterior.size
+    found, size = [np.zeros((0, 3))], contact.exterior.size
     for block, fragment in zip(model.blocks, fragments, strict=True):
         one = Things(np.arange(model.nodes.n, len(points), dtype=np.int32)[:, None], np.zeros(len(told)))
         other = Things(np.ascontiguousarray(block.tets, np.int32), np.zeros(block.n))
@@ -78,8 +80,12 @@ def look(contact: Contact, model: Model, labels: list[Ints] | None, comm: Comm) 
         places, corners = x[pairs[:, 0]], model.nodes.x[tets]
         depth = _depths(places, corners, opened, outer[tets])
         some = (depth > SLIGHT * size) & (_from_edges(places, corners, outer[tets]) > SLIGHT * size)
-        found.append(np.column_stack([told[pairs[some, 0], 0], depth[some] / size]))
+        found.append(np.column_stack([pairs[some, 0], depth[some] / size, fragment[pairs[some, 1]]]))
     everywhere = np.concatenate(comm.share(np.concatenate(found)))
+    buried = np.isinf(everywhere[:, 1])
+    row, of = everywhere[buried][:, [0, 2]].astype(np.int64).T
+    at_surface = comm.sum(_at_surface(x[row], parts[row], of, contact, model, fragments)) > 0
+    everywhere = np.concatenate([everywhere[~buried], everywhere[buried][~at_surface]])
     buried = np.isinf(everywhere[:, 1])
     return Inside(
         len(told), len(np.unique(everywhere[:, 0])), len(np.unique(everywhere[buried, 0])),
@@ -105,14 +111,37 @@ def outermost(contact: Contact) -> Flags:
     return np.asarray(contact.exterior.surface.flags | (ring != np.arange(len(ring))))
 
 
-def _open(block: Block, contact: Contact, outer: Flags) -> Flags:
-    """(n, 4) faces of tets that are exposed or broken, those in symmetry planes left out; all faces of a tet that has
-    none but a corner on the surface.
-    """
+def _at_surface(
+    x: Floats, parts: Indices, of: Ints, contact: Contact, model: Model, fragments: list[Ints]
+) -> Ints:  # fmt: skip
+    """(p,) how many open faces of this rank, of fragments ``of`` (p,), are by SLIGHT of nodes at ``x`` (p, 3)."""
+    points, part = np.concatenate([model.nodes.x, x]), np.concatenate([model.nodes.part, parts])
+    reach, allowed = SLIGHT * contact.exterior.size, ~np.isnan(contact.searches.mu)
+    one = Things(np.arange(model.nodes.n, len(points), dtype=np.int32)[:, None], np.full(len(x), reach))
+    near = np.zeros(len(x), np.int64)
+    for block, fragment in zip(model.blocks, fragments, strict=True):
+        tet, side = np.nonzero(_exposed(block, contact))
+        faces = np.ascontiguousarray(block.tets[tet[:, None], FACES[side]], np.int32)
+        other = Things(faces, np.zeros(len(faces)))
+        pairs = search.find(one, other, points, np.zeros_like(points), part, allowed, 0.0, None)
+        pairs = pairs[of[pairs[:, 0]] == fragment[tet[pairs[:, 1]]]]
+        away = _from_faces(x[pairs[:, 0]], points[faces[pairs[:, 1]]])
+        near += np.bincount(pairs[away <= reach, 0], minlength=len(x))
+    return near
+
+
+def _exposed(block: Block, contact: Contact) -> Flags:
+    """(n, 4) faces of tets that are exposed or broken, those in symmetry planes left out."""
     faces = contact.exterior.surface.faces
     opened = np.isin(4 * block.id[:, None] + np.arange(4), faces.id[faces.exposed])
     if len(block.bond):
         opened |= block.bond != INTACT
+    return np.asarray(opened)
+
+
+def _open(block: Block, contact: Contact, outer: Flags) -> Flags:
+    """(n, 4) faces of tets that are ``_exposed``; all faces of a tet that has none but a corner on the surface."""
+    opened = _exposed(block, contact)
     touching = np.asarray(outer[block.tets].any(axis=1))
     return np.asarray(opened | (touching & ~opened.any(axis=1))[:, None])
 
@@ -131,6 +160,19 @@ def _depths(points: Floats, corners: Floats, opened: Flags, outer: Flags) -> Flo
     heights = np.where(opened, shares / steepness, np.inf).min(axis=1)
     away = np.where(outer, np.linalg.norm(points[:, None] - corners, axis=2), np.inf).min(axis=1)
     return np.where(solid & (shares >= -_ROUNDING).all(axis=1), np.minimum(heights, away), -1.0)
+
+
+def _from_faces(points: Floats, corners: Floats) -> Floats:
+    """(p,) how far points (p, 3) are from triangles (p, 3, 3), m."""
+    sides, arms = np.roll(corners, -1, axis=1) - corners, points[:, None] - corners
+    square = (sides * sides).sum(axis=2)
+    share = np.clip((arms * sides).sum(axis=2) / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
+    rim = np.linalg.norm(arms - share[:, :, None] * sides, axis=2).min(axis=1)
+    normal = np.cross(sides[:, 0], sides[:, 1])
+    length = np.linalg.norm(normal, axis=1)
+    over = (length > 0.0) & ((np.cross(normal[:, None], sides) * arms).sum(axis=2) >= 0.0).all(axis=1)
+    height = np.abs((arms[:, 0] * normal).sum(axis=1)) / np.where(length > 0.0, length, 1.0)
+    return np.asarray(np.where(over, height, rim))
 
 
 def _from_edges(points: Floats, corners: Floats, outer: Flags) -> Floats:
