@@ -17,7 +17,7 @@ def strangers(case: Case) -> Iterator[Problem]:
     """A warning for each part that flies, and meets nothing before ``run.end_time`` although there is something.
 
     Nothing is said of a case with mesh files, with bodies that turn or stretch, or where more than walls and planes of
-    symmetry acts on nodes; nor of a part while others run into each other before the end, which may send one its way.
+    symmetry acts on nodes; nor of a part that others may reach which run into each other before the end.
     """
     others = [boundary for boundary in case.boundaries if not isinstance(boundary, Wall | Symmetry)]
     walls = [boundary for boundary in case.boundaries if isinstance(boundary, Wall)]
@@ -25,17 +25,33 @@ def strangers(case: Case) -> Iterator[Problem]:
     if others or case.contact is None or None in boxes or len(case.parts) + len(walls) < 2:
         return
     known = [box for box in boxes if box is not None]
-    pushed = [
-        {i, j} for (i, part), (j, each) in combinations(enumerate(case.parts), 2)
-        if part.velocity != each.velocity and _meeting(known[i], known[j], part, each) <= case.run.end_time
-    ]  # fmt: skip
+    crashes = list(_crashes(case, known))
     for i, part in enumerate(case.parts):
         times = [_meeting(known[i], known[j], part, each) for j, each in enumerate(case.parts) if j != i]
         soonest = min([*times, *(_arrival(part, wall) for wall in walls)])
-        if any(part.velocity) and soonest > case.run.end_time and all(i in pair for pair in pushed):
+        reached = any(
+            _gap(known[i], known[j]) <= way + math.hypot(*part.velocity) * case.run.end_time for j, way in crashes
+        )
+        if any(part.velocity) and soonest > case.run.end_time and not reached:
             when = "nothing at all" if soonest == math.inf else f"nothing before {soonest:.3g} s"
             message = f"{part.name!r} meets {when}; the run ends at {case.run.end_time:.3g} s"
             yield problem(("parts", i, "velocity"), ..., message)
+
+
+def _crashes(case: Case, boxes: list[Bounds]) -> Iterator[tuple[int, float]]:
+    """Parts that others run into before the end, and how far away they may be then, m: a part may leave with its own
+    speed and twice that at which they meet.
+    """
+    for (i, part), (j, each) in combinations(enumerate(case.parts), 2):
+        speed, when = math.dist(part.velocity, each.velocity), _meeting(boxes[i], boxes[j], part, each)
+        if speed > 0.0 and when < case.run.end_time:
+            yield i, (math.hypot(*part.velocity) + 2.0 * speed) * case.run.end_time
+            yield j, (math.hypot(*each.velocity) + 2.0 * speed) * case.run.end_time
+
+
+def _gap(box: Bounds, other: Bounds) -> float:
+    """How far apart two boxes are, m."""
+    return math.hypot(*(max(a - high, low - b, 0.0) for low, high, a, b in zip(*box, *other, strict=True)))
 
 
 def _box(part: Part) -> Bounds | None:

@@ -21,8 +21,9 @@ class MohrCoulomb(Law):
     """Brittle strength (s1 - s3) + (s1 + s3) sin(friction_angle) <= 2 cohesion cos(friction_angle), s1 >= s2 >= s3.
 
     Tension is positive. Flow keeps the volume, but for a dilation that is asked for. Tension beyond the apex takes the
-    deviatoric stress and leaves the pressure as it is. Next to a face at which a shock begins the first ten tets flow
-    too far, with averaged pressures by half of it: ``pressure = "standard"`` and a load that rises have less of that.
+    deviatoric stress and leaves the pressure as it is. Next to a face at which a shock begins the first 20 tets flow
+    too far, by half of their plastic strain where the pressure is averaged: ``pressure = "standard"`` and a load that
+    rises have less of that.
     """
 
     model: Literal["mohr_coulomb"]

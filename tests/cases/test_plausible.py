@@ -157,12 +157,16 @@ def test_what_is_odd(changes: dict[str, Any], key: str, message: str) -> None:
 
 
 def test_what_others_may_send_on_its_way_is_not_odd() -> None:
-    """A second ball runs into the first, which would fly past the plate by itself."""
+    """A ball flies away from the plate, into which another one runs beside it: fragments may reach the first, but not
+    where it is a metre away.
+    """
     data = target(ball={"velocity": [0, 0, "5 m/s"]})
     assert "'ball' meets nothing at all" in told(data)["parts[0].velocity"]
-    hammer = {**data["parts"][0], "name": "hammer", "velocity": [0, 0, "-900 m/s"]}
-    data["parts"].append({**hammer, "mesh": {**hammer["mesh"], "centre": [0, 0, "8 mm"]}})
+    beside = {**data["parts"][0], "name": "beside", "velocity": [0, 0, "-900 m/s"]}
+    data["parts"].append({**beside, "mesh": {**beside["mesh"], "centre": ["7 mm", 0, "3 mm"]}})
     assert "parts[0].velocity" not in told(data)
+    data["parts"][0] = {**data["parts"][0], "mesh": {**data["parts"][0]["mesh"], "centre": [0, 0, "1 m"]}}
+    assert "'ball' meets nothing at all" in told(data)["parts[0].velocity"]
 
 
 EOS = {"model": "mie_gruneisen", "c0": "4600 m/s", "S": 1.49, "gamma0": 2}

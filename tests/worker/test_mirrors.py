@@ -37,8 +37,8 @@ def mean(sim: Simulation, part: int) -> float:
 
 @pytest.mark.parametrize(("back", "apart"), [(0.0, 1e-6), (0.6, 0.02)])
 def test_half_a_collision_is_half_of_the_whole(back: float, apart: float) -> None:
-    """Contact stops facing nodes of equal masses in the middle, which is the plane; with restitution its ten sweeps
-    leave 0.6 % of what they ask for.
+    """Contact stops facing nodes of equal masses in the middle, which is the plane; with restitution nodes fall
+    back several times, in the half at other moments, and 0.6 % are between the two with any number of sweeps.
     """
     contact = {"restitution": back}
     down, up = {"velocity": (0.0, -SPEED, 0.0)}, {"velocity": (0.0, SPEED, 0.0)}

@@ -41,7 +41,7 @@ class Inside:
     nodes: int
     """Those of them that are inside of another body or fragment, deeper than SLIGHT."""
     buried: int
-    """Those of these in tets without a corner on the surface."""
+    """Those of these in tets without a corner on the surface, further than SLIGHT from any open face of their body."""
     deepest: float
     """Of the others, in typical sizes of a face; 0 where no node is deeper than SLIGHT."""
 
@@ -114,7 +114,9 @@ def outermost(contact: Contact) -> Flags:
 def _at_surface(
     x: Floats, parts: Indices, of: Ints, contact: Contact, model: Model, fragments: list[Ints]
 ) -> Ints:  # fmt: skip
-    """(p,) how many open faces of this rank, of fragments ``of`` (p,), are by SLIGHT of nodes at ``x`` (p, 3)."""
+    """(p,) how many open faces of this rank, of the fragments ``of`` (p,), lie within SLIGHT of ``x`` (p, 3)."""
+    if not len(x):
+        return np.zeros(0, np.int64)
     points, part = np.concatenate([model.nodes.x, x]), np.concatenate([model.nodes.part, parts])
     reach, allowed = SLIGHT * contact.exterior.size, ~np.isnan(contact.searches.mu)
     one = Things(np.arange(model.nodes.n, len(points), dtype=np.int32)[:, None], np.full(len(x), reach))

@@ -19,7 +19,7 @@ from .tet4 import CHANGE, LIMIT, MODULUS, VOLUME
 SQUEEZED = 0.2
 """Of the initial volume. Chosen: tets of Taylor bars keep 0.56, of a long rod without erosion 0.28."""
 STIFF = 0.1
-"""Of the bulk modulus. Chosen: half of SQUEEZED takes 10 % of the bulk modulus, some ten times what metals yield at."""
+"""Of the bulk modulus. Chosen: half of SQUEEZED takes 10 % of the bulk modulus, far more than metals yield at."""
 
 _Q, _MASS, _WORK, _WORK_VISCOUS = VISCOUS * CHUNK, MASS * CHUNK, WORK * CHUNK, WORK_VISCOUS * CHUNK
 
