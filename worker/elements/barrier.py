@@ -21,6 +21,8 @@ SQUEEZED = 0.2
 STIFF = 0.1
 """Of the bulk modulus. Chosen: half of SQUEEZED takes 10 % of the bulk modulus, far more than metals yield at."""
 
+_ROUNDING = 1e-9
+"""Of a volume: far more than what two ways to compute a ratio differ by."""
 _Q, _MASS, _WORK, _WORK_VISCOUS = VISCOUS * CHUNK, MASS * CHUNK, WORK * CHUNK, WORK_VISCOUS * CHUNK
 
 
@@ -34,12 +36,24 @@ def _barrier(ratio, bulk):  # type: ignore[no-untyped-def]
     return STIFF * bulk * depth * depth, 2.0 * STIFF * bulk * depth * times
 
 
+@njit("boolean(float64[::1], float64[::1], float64, int64)", cache=True, error_model="numpy")
+def _any_squeezed(w, s, density, n):  # type: ignore[no-untyped-def]
+    """Whether any tet has, or had before the step, less than SQUEEZED of its volume, or next to it: in vectors."""
+    per_mass, found = density / (SQUEEZED * (1.0 + _ROUNDING)), 0
+    for i in range(n):
+        volume, before, mass = w[VOLUME + i] * per_mass, (w[VOLUME + i] - w[CHANGE + i]) * per_mass, s[_MASS + i]
+        found += (volume < mass) | (before < mass)
+    return found > 0
+
+
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def resist(w, s, params, n):  # type: ignore[no-untyped-def]
     """Adds the barrier to the row VISCOUS, which is made anew in every step, its work to WORK, its stiffness to LIMIT.
 
     The viscosity has booked its half of the work of the old row VISCOUS: what of that was the barrier's is taken back.
     """
+    if not _any_squeezed(w, s, params[DENSITY], n):
+        return
     viscous = max(params[Q_LINEAR], params[Q_SHOCK], params[Q_QUADRATIC]) > 0.0
     for i in range(n):
         whole = s[_MASS + i] / params[DENSITY]

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..jit import njit
 from ..materials.law import BULK
-from ..state import CHUNK, DILATION, MASS, PRESSURE, TET_VOLUME, VOLUME_FLUX, WORK, Floats, Ints
+from ..state import CHUNK, DILATION, MASS, PRESSURE, TET_VOLUME, VOLUME_FLUX, WORK
 from .tet4 import (
     CHANGE,
     DILATATION,
@@ -221,9 +221,11 @@ def scatter_fluxes(gradient, wi, tets, n):  # type: ignore[no-untyped-def]
             gradient[d, k] += flux
 
 
-def nodal_strains(sums: Ints, column: int = 0) -> Floats:
-    """(n,) volume strain of the step at the nodes from the completed sums (n, 2 or 3); of ``column`` 2 heat or bulking;
-    zero at a node without tets.
+@njit("void(float64[::1], int64[:, ::1], int64)", cache=True, error_model="numpy")
+def nodal_strains(strains, sums, column):  # type: ignore[no-untyped-def]
+    """The volume strains (n,) of the step at the nodes, from the completed sums (n, 2 or 3), of ``column`` 0; of 2 heat
+    or bulking; zero at a node without tets.
     """
-    strains: Floats = np.where(sums[:, 1] > 0, sums[:, column] / np.maximum(sums[:, 1], 1), 0.0)
-    return strains
+    for a in range(len(strains)):
+        volume = sums[a, 1]
+        strains[a] = sums[a, column] / volume if volume > 0 else 0.0
