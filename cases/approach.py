@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterator
-from itertools import combinations
 
 from .bodies import MeshFile
 from .geometry import Vector, lowest_along
@@ -25,28 +24,30 @@ def strangers(case: Case) -> Iterator[Problem]:
     if others or case.contact is None or None in boxes or len(case.parts) + len(walls) < 2:
         return
     known = [box for box in boxes if box is not None]
-    crashes = list(_crashes(case, known))
+    times = [
+        [math.inf if j == i else _meeting(known[i], known[j], part, each) for j, each in enumerate(case.parts)]
+        for i, part in enumerate(case.parts)
+    ]
+    ways = [_way(case, i, met) for i, met in enumerate(times)]
     for i, part in enumerate(case.parts):
-        times = [_meeting(known[i], known[j], part, each) for j, each in enumerate(case.parts) if j != i]
-        soonest = min([*times, *(_arrival(part, wall) for wall in walls)])
-        reached = any(
-            _gap(known[i], known[j]) <= way + math.hypot(*part.velocity) * case.run.end_time for j, way in crashes
-        )
-        if any(part.velocity) and soonest > case.run.end_time and not reached:
+        soonest = min([*times[i], *(_arrival(part, wall) for wall in walls)])
+        if not any(part.velocity) or soonest <= case.run.end_time:
+            continue
+        own = math.hypot(*part.velocity) * case.run.end_time
+        if not any(_gap(known[i], box) <= way + own for box, way in zip(known, ways, strict=True)):
             when = "nothing at all" if soonest == math.inf else f"nothing before {soonest:.3g} s"
             message = f"{part.name!r} meets {when}; the run ends at {case.run.end_time:.3g} s"
             yield problem(("parts", i, "velocity"), ..., message)
 
 
-def _crashes(case: Case, boxes: list[Bounds]) -> Iterator[tuple[int, float]]:
-    """Parts that others run into before the end, and how far away they may be then, m: a part may leave with its own
-    speed and twice that at which they meet.
+def _way(case: Case, i: int, times: list[float]) -> float:
+    """How far part ``i``, which meets others at ``times``, may be away at the end if one runs into it, m: it may leave
+    with its own speed and twice that at which they meet. Minus infinity where none does.
     """
-    for (i, part), (j, each) in combinations(enumerate(case.parts), 2):
-        speed, when = math.dist(part.velocity, each.velocity), _meeting(boxes[i], boxes[j], part, each)
-        if speed > 0.0 and when < case.run.end_time:
-            yield i, (math.hypot(*part.velocity) + 2.0 * speed) * case.run.end_time
-            yield j, (math.hypot(*each.velocity) + 2.0 * speed) * case.run.end_time
+    own, end = case.parts[i].velocity, case.run.end_time
+    speeds = [math.dist(own, each.velocity) for each, when in zip(case.parts, times, strict=True) if when < end]
+    most = max(speeds, default=0.0)
+    return (math.hypot(*own) + 2.0 * most) * end if most > 0.0 else -math.inf
 
 
 def _gap(box: Bounds, other: Bounds) -> float:

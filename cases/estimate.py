@@ -34,7 +34,7 @@ its 150 us, on two ranks."""
 PRESSED_NANOSECONDS = 26_000.0
 """The same of dust that is held together and pressed, where every tet meets all round it and sweeps are many: a plug of
 glass under a ram (tests/bench/press.py) took 17,000 to 20,000 on one rank, a block of 3,600 tets between walls, into
-which a ram goes by a fifth and by a third of its height, 18,000 and 26,000, the most seen; less where it gives way."""
+which a ram goes by a fifth and by a third of its height, 18,000 and 26,000 (by hand); less where it gives way."""
 BREAKING_OVERHEAD = 2e-3
 """Core seconds that a rank takes for a step in which something breaks, however little: 1 to 4 ms in twelve scenes of
 150 to 24,000 tets."""

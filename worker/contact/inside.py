@@ -19,12 +19,13 @@ from ..mesh.faces import FACES
 from ..parallel.comm import Comm
 from ..state import INTACT, Block, Flags, Floats, Indices, Ints, Model
 from . import search
+from .overlap import to_borders
 from .search import Things
 from .stage import Contact
 
 SLIGHT = 0.05
 """Of the typical size of a face: depths below this are none. Chosen: what sweeps leave undone is less."""
-_WORDS = 6
+_WORDS = 5
 """Of what is told of a node."""
 _ROUNDING = 1e-9
 """Of the shares of a tet's corners: a node on a face between two tets is in both."""
@@ -67,7 +68,7 @@ def look(contact: Contact, model: Model, labels: list[Ints] | None, comm: Comm) 
     fragments = labels or [np.full(block.n, block.part, np.int64) for block in model.blocks]
     outer = outermost(contact)
     told = comm.join(_seen(outer, model, fragments)).reshape(-1, _WORDS)
-    parts, x = told[:, 2].astype(np.int32), np.ascontiguousarray(told[:, 3:]).view(np.float64)
+    parts, x = told[:, 1].astype(np.int32), np.ascontiguousarray(told[:, 2:]).view(np.float64)
     points, part = np.concatenate([model.nodes.x, x]), np.concatenate([model.nodes.part, parts])
     found, size = [np.zeros((0, 3))], contact.exterior.size
     for block, fragment in zip(model.blocks, fragments, strict=True):
@@ -75,7 +76,7 @@ def look(contact: Contact, model: Model, labels: list[Ints] | None, comm: Comm) 
         other = Things(np.ascontiguousarray(block.tets, np.int32), np.zeros(block.n))
         allowed = ~np.isnan(contact.searches.mu)
         pairs = search.find(one, other, points, np.zeros_like(points), part, allowed, 0.0, None)
-        pairs = pairs[told[pairs[:, 0], 1] != fragment[pairs[:, 1]]]
+        pairs = pairs[told[pairs[:, 0], 0] != fragment[pairs[:, 1]]]
         tets, opened = block.tets[pairs[:, 1]], _open(block, contact, outer)[pairs[:, 1]]
         places, corners = x[pairs[:, 0]], model.nodes.x[tets]
         depth = _depths(places, corners, opened, outer[tets])
@@ -94,7 +95,7 @@ def look(contact: Contact, model: Model, labels: list[Ints] | None, comm: Comm) 
 
 
 def _seen(outer: Flags, model: Model, fragments: list[Ints]) -> Ints:
-    """(k, _WORDS) of the ``outer`` nodes (nodes,) of this rank: id, fragment, part and the words of the position; one
+    """(k, _WORDS) of the ``outer`` nodes (nodes,) of this rank: fragment, part and the words of the position; one
     that has lost its tets is a fragment of its own.
     """
     nodes = model.nodes
@@ -102,7 +103,7 @@ def _seen(outer: Flags, model: Model, fragments: list[Ints]) -> Ints:
     some = nodes.owned & outer
     for block, fragment in zip(model.blocks, fragments, strict=True):
         of[block.tets] = fragment[:, None]
-    return np.asarray(np.column_stack([nodes.id, of, nodes.part, nodes.x.view(np.int64)])[some])
+    return np.asarray(np.column_stack([of, nodes.part, nodes.x.view(np.int64)])[some])
 
 
 def outermost(contact: Contact) -> Flags:
@@ -167,14 +168,11 @@ def _depths(points: Floats, corners: Floats, opened: Flags, outer: Flags) -> Flo
 def _from_faces(points: Floats, corners: Floats) -> Floats:
     """(p,) how far points (p, 3) are from triangles (p, 3, 3), m."""
     sides, arms = np.roll(corners, -1, axis=1) - corners, points[:, None] - corners
-    square = (sides * sides).sum(axis=2)
-    share = np.clip((arms * sides).sum(axis=2) / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
-    rim = np.linalg.norm(arms - share[:, :, None] * sides, axis=2).min(axis=1)
     normal = np.cross(sides[:, 0], sides[:, 1])
     length = np.linalg.norm(normal, axis=1)
     over = (length > 0.0) & ((np.cross(normal[:, None], sides) * arms).sum(axis=2) >= 0.0).all(axis=1)
     height = np.abs((arms[:, 0] * normal).sum(axis=1)) / np.where(length > 0.0, length, 1.0)
-    return np.asarray(np.where(over, height, rim))
+    return np.asarray(np.where(over, height, to_borders(points[:, None], corners)))
 
 
 def _from_edges(points: Floats, corners: Floats, outer: Flags) -> Floats:

@@ -211,15 +211,16 @@ def _nearest(node: Floats, outward: Floats, ways: Floats, triangles: Floats) -> 
     over = (np.minimum(np.minimum(s, t), 1.0 - s - t) >= -_INSIDE) & faced
     if not over.any():
         return 0.0, np.zeros(3)
-    away = np.where(over, -heights, _to_borders(node, triangles))
+    away = np.where(over, -heights, to_borders(node, triangles))
     best = np.flatnonzero(faced)[np.argmin(away[faced])]
     depth = -float(heights[best])
     return (depth if depth > _ROUNDING * np.sqrt(area[best]) else 0.0), normals[best]
 
 
-def _to_borders(node: Floats, triangles: Floats) -> Floats:
-    """(f,) distance, m, of a node from the nearest border of each of the triangles (f, 3, 3)."""
+def to_borders(node: Floats, triangles: Floats) -> Floats:
+    """(f,) distance, m, of a node, or of one each (f, 1, 3), from the nearest border of the triangles (f, 3, 3)."""
     along = np.roll(triangles, -1, axis=1) - triangles
-    share = (along * (node - triangles)).sum(axis=2) / (along * along).sum(axis=2)
+    square = (along * along).sum(axis=2)
+    share = (along * (node - triangles)).sum(axis=2) / np.where(square > 0.0, square, 1.0)
     off = triangles + np.clip(share, 0.0, 1.0)[:, :, None] * along - node
     return np.asarray(np.linalg.norm(off, axis=2).min(axis=1))

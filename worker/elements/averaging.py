@@ -51,8 +51,7 @@ class AveragedElements(Elements):
     def grow(self, copies: Copies) -> None:
         super().grow(copies)
         parents = copies.parents
-        kept = "_weight", "_bulk", "_volumes", "_strain", "_more"
-        for name in (*kept, *(("_gradient", "_projected", "pressure") if self.split else ())):
+        for name in ("_weight", "_bulk", "_volumes", *(("_gradient", "_projected", "pressure") if self.split else ())):
             values = getattr(self, name)
             setattr(self, name, extended(values, values[parents]))
 
@@ -80,9 +79,9 @@ class AveragedElements(Elements):
         self._both_regions(lambda block, begin, end: self._strains(block, begin, end, dt), lambda: send(self._volumes))
         with self._timers.phase("exchange"):
             self.shared_volumes.finish(self._volumes)
-        pressure.nodal_strains(self._strain, self._volumes, 0)
+        self._strain = pressure.nodal_strains(self._volumes, 0)
         if self._columns > 2:
-            pressure.nodal_strains(self._more, self._volumes, 2)
+            self._more = pressure.nodal_strains(self._volumes, 2)
         if self.split:
             self.pressure -= self._bulk * self._strain
         self._begin(scale)

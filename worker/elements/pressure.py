@@ -221,11 +221,13 @@ def scatter_fluxes(gradient, wi, tets, n):  # type: ignore[no-untyped-def]
             gradient[d, k] += flux
 
 
-@njit("void(float64[::1], int64[:, ::1], int64)", cache=True, error_model="numpy")
-def nodal_strains(strains, sums, column):  # type: ignore[no-untyped-def]
-    """The volume strains (n,) of the step at the nodes, from the completed sums (n, 2 or 3), of ``column`` 0; of 2 heat
-    or bulking; zero at a node without tets.
+@njit("float64[::1](int64[:, ::1], int64)", cache=True, error_model="numpy")
+def nodal_strains(sums, column):  # type: ignore[no-untyped-def]
+    """(n,) volume strain of the step at the nodes from the completed sums (n, 2 or 3), of ``column`` 0; of 2 heat or
+    bulking; zero at a node without tets.
     """
-    for a in range(len(strains)):
+    strains = np.empty(len(sums))
+    for a in range(len(sums)):
         volume = sums[a, 1]
         strains[a] = sums[a, column] / volume if volume > 0 else 0.0
+    return strains
