@@ -103,9 +103,10 @@ class Balance:
         """Why to cut now, if so; the same on all ranks."""
         if self.comm.size == 1:
             return None
-        if not self._half and self.trigger.half_way:
+        cause = self.trigger.cause(sim.clock.step, sim.reduction.grown)
+        if cause is None and not self._half and self.trigger.half_way:
             self._meter, self._half = Meter.of(sim), True
-        return self.trigger.cause(sim.clock.step, sim.reduction.grown)
+        return cause
 
     def move(self, sim: Simulation) -> tuple[Simulation, dict[str, Any]]:
         """Cuts by the costs and moves what has to; the new simulation and what to tell. All ranks take part."""

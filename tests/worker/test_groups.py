@@ -8,7 +8,7 @@ import pytest
 from conoid.cases import materials, schema
 from conoid.cases.balancing import WORK
 from conoid.worker import domain, step
-from conoid.worker.balance import Balance
+from conoid.worker.balance import Balance, Window
 from conoid.worker.groups import Groups
 from conoid.worker.meter import Costs, Meter, _candidates
 from conoid.worker.simulation import Simulation
@@ -139,6 +139,24 @@ def test_costs_add_up_to_the_work_of_all_ranks() -> None:
     for ranks in (1, 2):
         results = on(ranks, case, MESHES, measured)
         assert results[0][0] == pytest.approx(sum(work for _, work in results), abs=256e-9)
+
+
+def test_a_cut_that_one_look_calls_for_is_weighed_by_what_was_measured_before_it() -> None:
+    """All of the loss that calls for it is seen at once."""
+
+    def predicted(sim: Simulation) -> tuple[str | None, float]:
+        balance = Balance.of(sim)
+        step.prepare(sim)
+        for _ in range(5):
+            tick(sim)
+        loads = {name: [2.0 + 2.0 * balance.trigger.cost, 1.0] for name in WORK}
+        balance.look(Window(5, loads))
+        cause = balance.cause(sim)
+        return cause, sum(balance.move(sim)[1]["predicted"])
+
+    for cause, weight in on(2, breaking(), MESHES, predicted):
+        assert cause == "time lost exceeds the cost"
+        assert weight > 50e-9 * sum(len(mesh.tets) for mesh in MESHES)
 
 
 def test_candidates_cost_what_they_have_cost_where_they_are() -> None:
