@@ -143,6 +143,7 @@ def _sum_up(
     hexdigest = digest.digest(sim.model, sim.comm, [sim.elements.pressure] if sim.elements.split else [])
     checks = reference.measure(sim, folder, start.thick) if failure is None and not loop.stopped else []
     eroded = start.elements - sim.model.elements_global
+    sim.count_nodes()
     fragments = len(sim.model.parts)
     if sim.record is not None:
         sim.record.look()

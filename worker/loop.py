@@ -263,6 +263,7 @@ class Loop:
     def _write_frame(self) -> None:
         sim, clock = self.sim, self.sim.clock
         index = clock.frame
+        sim.count_nodes()
         self._tell_losses()
         cohesion = sim.fracture.cohesion if sim.fracture is not None else None
         damaged = damage(sim.case, sim.model, cohesion, sim.comm)
@@ -290,6 +291,7 @@ class Loop:
             loads = sim.comm.share((seconds, sent, self._counter.due(sim, time.monotonic(), ending=ending)))
             if loads[0][2]:
                 self._counter.find(sim)
+            sim.count_nodes()
             if counted := self._counter.changed(sim, self.balance.events):
                 self._tell(messages.Counts, **counted)
         work, told = ({name: [load[i][name] for load in loads] for name in loads[0][i]} for i in (0, 1))

@@ -105,6 +105,8 @@ class Fields:
     """A checkpoint is asked for."""
     snapshot = Flag()
     """A snapshot of the fragments is due."""
+    nodes = Number()
+    """All nodes; a rank knows of those that have separated elsewhere since the last reduction when this one is done."""
 
     def __init__(self, ranks: int = 1) -> None:
         """A word or some for each of the ``ranks`` stand behind the fields."""

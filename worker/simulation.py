@@ -116,6 +116,11 @@ class Simulation:
             shared[other.nodes] = True
         return int(self.comm.sum(np.array([(shared & self.model.nodes.owned).sum()]))[0])
 
+    def count_nodes(self) -> None:
+        """Has all ranks know how many nodes there are, as the reduction of the next step would; all take part."""
+        most = self.comm.maximum(np.array([float(self.model.nodes_global)]))
+        self.model.nodes_global = int(most[0])
+
     def free(self) -> None:
         """Gives all standing messages back to MPI."""
         self.elements.free()
@@ -179,6 +184,7 @@ def _assemble(
 
 def keep(sim: Simulation) -> Parcel:
     """All that this rank must remember between two steps; all ranks take part."""
+    sim.count_nodes()
     parcel = model_of.keep(sim.model)
     pushes = sim.comm.maximum(np.array([each.last_push for each in sim.pushing]))
     parcel.known |= {

@@ -291,6 +291,7 @@ class Model:
     elements_global: int = 0
     """Tets of all ranks that are left."""
     nodes_global: int = 0
+    """Nodes of all ranks; see ``StepReduction.nodes`` for who knows of them when."""
     part_starts: Ints = field(default_factory=lambda: np.zeros(1, np.int64))
     """Global id of the first tet of each part."""
     mean_volumes: Floats = field(default_factory=lambda: np.zeros(0))

@@ -139,10 +139,12 @@ def _elements(sim: Simulation, dt: float, fracture: Fracture | None) -> None:
             own.breaking = fracture.find(own.touched)
     with sim.timers.phase("exchange"):
         own.limit, own.force, own.worn = elements.limit, elements.force, elements.worn
+        own.nodes = sim.model.nodes_global
         pending = reduction.begin(sim.comm)
         if fracture is None:
             elements.finish()
         pending.finish()
+        sim.model.nodes_global = reduction.nodes
     if not (math.isfinite(reduction.limit) and math.isfinite(reduction.force)):
         raise PhysicsError(f"{_when(sim)}: {sim.limiting_tet()} {failed.why(sim)}")
     if sim.contact is not None:

@@ -30,6 +30,8 @@ class Split:
     copies: Copies
     first: int
     """Local index of the first copy."""
+    touched: Ints
+    """(ranks,) not 0 for those that have a node of what breaks."""
     key: Ints
     """(r,) of the tets whose node has become a copy: ids of the node and of the tet as one number, ascending."""
     node: Indices
@@ -42,11 +44,11 @@ class Split:
     """(r,) index of the block."""
 
     @classmethod
-    def elsewhere(cls, first: int) -> Self:
+    def elsewhere(cls, first: int, touched: Ints) -> Self:
         """One of which a rank that has ``first`` nodes gets no copy."""
         words, places = np.zeros(0, np.int64), np.zeros(0, np.int32)
         copies = Copies(words, words, places, np.zeros(0, bool), np.zeros(0))
-        return cls(copies, first, words, places, places, places, places)
+        return cls(copies, first, touched, words, places, places, places, places)
 
     def followed(self, nodes: Indices, ids: Ints, tets: Ints) -> Indices:
         """What local ``nodes`` (n, k) of tets of global ids ``tets`` (n,) have become; ``ids``: of the local nodes."""

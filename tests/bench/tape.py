@@ -8,12 +8,13 @@ and nobody's turn comes between. It does what it did in the run: all that depend
 
 import pickle
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from conoid.client.scaling import CORES
 from conoid.worker import main as worker
 from conoid.worker.parallel.comm import Comm, Exchange, Pending, Sent
 from conoid.worker.parallel.mpi import connect, leave
@@ -42,6 +43,7 @@ class Recorder:
     def __init__(self, comm: Comm, folder: Path) -> None:
         self._comm, self.rank, self.size, self.sent = comm, comm.rank, comm.size, comm.sent
         self._file = tape(folder, comm.rank).open("wb")
+        self._crowd = max(comm.size / CORES, 1.0)
 
     @property
     def waited(self) -> float:
@@ -54,7 +56,12 @@ class Recorder:
         return told
 
     def begin_maximum(self, words: Ints, result: Ints) -> Pending:
-        """See Comm."""
+        """See Comm. Where ranks take turns, reports come as many steps apart as with a core for each."""
+        from conoid.worker import loop  # numba, see Player.begin
+
+        if self._crowd > 1.0:
+            vars(loop)["_REPORT_EVERY"] *= self._crowd
+            self._crowd = 1.0
         return _Noted(self, self._comm.begin_maximum(words, result), [result])
 
     def exchange(self, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: Tag) -> Exchange:
@@ -149,10 +156,10 @@ class Player:
             call.receives = [(rank, int(Tag.SWAP)) for rank in told]
         return told
 
-    def trade(self, sends: dict[int, Ints]) -> dict[int, Ints]:
+    def trade(self, sends: dict[int, Ints], sources: Iterable[int]) -> dict[int, Ints]:
         """See Comm."""
         out = [(rank, int(Tag.TRADE), words.nbytes) for rank, words in sends.items()]
-        self.note(sends=out, receives=[(rank, int(Tag.TRADE)) for rank in sends])
+        self.note(sends=out, receives=[(rank, int(Tag.TRADE)) for rank in sources])
         told: dict[int, Ints] = self.told()
         return told
 

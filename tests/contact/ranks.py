@@ -4,7 +4,7 @@ A rank that fails wakes all others, so that a test ends with the first error ins
 """
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from queue import SimpleQueue
 from typing import Any, TypeVar
@@ -82,13 +82,13 @@ class ThreadComm:
         rows = self._table(mine)
         return {rank: row[self.rank].copy() for rank, row in enumerate(rows) if len(row.get(self.rank, ()))}
 
-    def trade(self, sends: dict[int, Ints]) -> dict[int, Ints]:
+    def trade(self, sends: dict[int, Ints], sources: Iterable[int]) -> dict[int, Ints]:
         for rank, words in sends.items():
             assert words.dtype == np.int64
             assert rank != self.rank
             self._world.box(self.rank, rank, _TRADE_TAG).put(words.reshape(-1).copy())
         self.sent.message(len(sends), sum(words.nbytes for words in sends.values()))
-        return {rank: self._world.box(rank, self.rank, _TRADE_TAG).get(timeout=_PATIENCE) for rank in sends}
+        return {rank: self._world.box(rank, self.rank, _TRADE_TAG).get(timeout=_PATIENCE) for rank in sources}
 
     def join(self, words: Ints) -> Ints:
         assert words.dtype == np.int64

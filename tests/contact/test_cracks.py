@@ -115,7 +115,7 @@ def test_copies_join_the_families_of_their_parents() -> None:
     none, copies = np.zeros(0, np.int32), np.array([1, 1, 2], np.int64)
     new = Copies(copies, np.arange(4, 7), np.zeros(3, np.int32), np.ones(3, bool), np.zeros(3))
     families = Families.of(np.array([10, 11, 12, 11], np.int64))
-    families.grow(Split(new, 4, none.astype(np.int64), none, none, none, none))
+    families.grow(Split(new, 4, np.ones(1, np.int64), none.astype(np.int64), none, none, none, none))
     assert families.root.tolist() == [10, 11, 12, 11, 11, 11, 12]
     assert np.flatnonzero(families.members(np.array([3]))).tolist() == [1, 3, 4, 5]
     assert np.flatnonzero(families.members(np.array([0, 6]))).tolist() == [0, 2, 6]

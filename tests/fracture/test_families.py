@@ -63,6 +63,7 @@ def case_of() -> schema.Case:
 
 def columns(sim: Simulation) -> Ints:
     """(nodes,) which column each node belongs to: 1 for x, 2 for z beyond the middle; all ranks take part."""
+    sim.count_nodes()
     nodes = sim.model.nodes
     found = np.zeros(sim.model.nodes_global)
     for b in sim.model.blocks:

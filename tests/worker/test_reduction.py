@@ -9,7 +9,7 @@ from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.reduction import Fields, Flag, Number, Real, StepReduction
 
 REALS = ("limit", "force", "approach")
-NUMBERS = ("stop", "worn", "breaking")
+NUMBERS = ("stop", "worn", "breaking", "nodes")
 FLAGS = ("report", "groups", "opening", "stray", "search", "grown", "checkpoint", "snapshot")
 
 
@@ -52,4 +52,4 @@ def test_a_run_that_goes_on_keeps_the_limits_and_forgets_what_was_asked_for() ->
     reduction.words[:] = 1
     reduction.begin_again()
     left = {name for name in REALS + NUMBERS + FLAGS if getattr(reduction, name)}
-    assert left == {"limit", "force", "approach", "worn", "breaking", "opening", "search"}
+    assert left == {"limit", "force", "approach", "worn", "breaking", "nodes", "opening", "search"}

@@ -39,7 +39,7 @@ class Exterior:
         self.flight = Flight(self.surface, model.nodes, mobilities(model.nodes, bounds), self.size, comm)
         self._moments = np.zeros((model.nodes.n, normals.COLUMNS), np.int64)
         self._separated = False
-        """Whether nodes of any rank have separated: cracks may be open."""
+        """Whether facets of any rank have broken: cracks may be open."""
 
     def keep(self, parcel: Parcel) -> None:
         """Adds cracks, edges that have become sharp, nodes of the surface and moments of normals."""

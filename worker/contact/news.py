@@ -28,19 +28,22 @@ class News:
 
 
 def news(split: Split, scene: Scene, here: Crowd, comm: Comm) -> News | None:
-    """None where there is none; all ranks take part. ``here``: every node of this rank, by local index. Of nodes that
-    it does not hold, a rank hears from the one that sends it their state.
+    """None where there is none. ``here``: every node of this rank, by local index. Of nodes that it does not hold, a
+    rank hears from the one that sends it their state; such ranks take part.
     """
-    if not split.copies.n and not (heard := comm.swap({})):
+    sources = [other.rank for other in scene.messages.copies.receives if split.touched[other.rank]]
+    if not (sources or split.touched[comm.rank]):
         return None
     parents, copies = split.copies.parents, split.first + np.arange(split.copies.n)
     table = np.column_stack([split.key, here.id[split.node]])
     local = np.column_stack([parents, copies]).astype(np.int32)
+    told = _told(split, scene, here, table, local) if split.touched[comm.rank] else {}
+    heard = [words for words in comm.trade(told, sources).values() if len(words)]
+    if not (split.copies.n or heard):
+        return None
     family, rows = here.id[local], here.take(np.unique(local))
-    if split.copies.n:
-        heard = comm.swap(_told(split, scene, here, table, local))
     if heard:
-        for words in heard.values():
+        for words in heard:
             ends = 2 + 2 * np.cumsum(words[:2])
             table = np.concatenate([table, words[2 : ends[0]].reshape(-1, 2)])
             family = np.concatenate([family, words[ends[0] : ends[1]].reshape(-1, 2)])
@@ -55,6 +58,7 @@ def _told(split: Split, scene: Scene, here: Crowd, table: Ints, local: Indices) 
     """
     told, flags = {}, np.zeros(here.n, bool)
     for other in scene.messages.copies.sends:
+        told[other.rank] = np.zeros(0, np.int64)
         some = meets(flags, other.nodes, local)
         if len(some):
             flags[some] = True

@@ -71,7 +71,7 @@ class Handover:
         """Adds the other ranks' changes to those of shared copies."""
         shared = {o.rank: at for o in self._neighbours if len(at := common(parents, o.nodes))}
         if shared:
-            told = self._comm.trade({rank: change[at] for rank, at in shared.items()})
+            told = self._comm.trade({rank: change[at] for rank, at in shared.items()}, shared)
             for rank, at in shared.items():
                 change[at] += told[rank].reshape(-1, 3)
 

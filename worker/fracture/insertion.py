@@ -24,11 +24,11 @@ class Insertion:
         self.longest = 0.0
         """Longest stable step so far in which a face was overstressed, s."""
 
-    def facets(self, b: Breaking, nodes: Nodes, split: Split | None) -> Facets:
+    def facets(self, b: Breaking, nodes: Nodes, split: Split) -> Facets:
         """Those that break and whose first side is here, at the present positions."""
         f, block = b.facets, b.body.block
         before = np.concatenate([f.nodes, f.nodes], axis=1)
-        after = before if split is None else split.followed_sides(before, nodes.id, f.tets)
+        after = split.followed_sides(before, nodes.id, f.tets)
         places, faces = f.sides[:, 0, 1:].astype(np.int64).T.copy()
         size = criterion.areas(b.body.mesh.tets, places, faces, nodes.x)
         frequency = 4.0 * self._unused / self.longest**2

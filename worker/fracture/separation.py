@@ -5,8 +5,8 @@ both sides of a facet, whichever rank computes them. Each holder receives the re
 the others and cuts it by itself. The new ids follow from a list of all pieces of all ranks, sorted by the id of the
 node and the smallest tet of the piece (the paper's eqs 17 and 18 count per rank: ids would depend on the ranks).
 
-Ranks that share touched nodes exchange what they have of them; a rank without such nodes only takes part in that list.
-Which ranks have some is known before, from the reduction of the step.
+Ranks that share touched nodes exchange what they have of them, and all ranks that have some exchange that list; the
+others go on with their step meanwhile. Which ranks have some is known before, from the reduction of the step.
 """
 
 import numpy as np
@@ -55,37 +55,35 @@ class Separation:
             if meet(mine, other.nodes):
                 touched[other.rank] = 1
 
-    def separate(self, touched: Ints) -> Split | None:
-        """Separates the nodes of what breaks; None where no node of any rank does.
+    def separate(self, touched: Ints) -> Split:
+        """Separates the nodes of what breaks.
 
-        ``touched``: the maximum of those of all ranks. All ranks take part. Connectivity, masses and shared nodes are
-        changed; forces are left to the caller.
+        ``touched``: the maximum of those of all ranks; the ranks that are take part. Connectivity, masses and shared
+        nodes are changed; forces are left to the caller. The others hear in the reduction of the next step how many
+        nodes there are.
         """
         self.broken += int(touched.sum() - np.count_nonzero(touched))
-        if touched[self._comm.rank]:
-            return self._separated(self._touched(touched))
-        some = len(self._comm.join(_NO_NODES)) // 2
-        self._model.nodes_global += some
-        return Split.elsewhere(self._model.nodes.n) if some else None
+        if not touched[self._comm.rank]:
+            return Split.elsewhere(self._model.nodes.n, touched)
+        return self._separated(self._touched(touched), touched)
 
-    def _separated(self, touched: Ints) -> Split | None:
+    def _separated(self, some: Ints, touched: Ints) -> Split:
+        """``some``: the local nodes of what breaks."""
         model = self._model
-        rows, places = self._stars(touched)
+        rows, places = self._stars(some)
         of, mine, node, owner, mass = stars.pieces(rows)
-        every, new = self._number(mine), model.nodes.n
-        if not len(every):
-            return None
+        every, new = self._number(mine, touched), model.nodes.n
         first, model.nodes_global = model.nodes_global, model.nodes_global + len(every)
         if not len(mine):
-            return Split.elsewhere(new)
+            return Split.elsewhere(new, touched)
         ids = first + _positions(every, mine)
-        copies = Copies(touched[node], ids, owner, owner == self._comm.rank, mass)
+        copies = Copies(some[node], ids, owner, owner == self._comm.rank, mass)
         model.nodes.grow(copies)
         self._share(copies, new)
         for b, star in self.stars.items():
             star.grow(copies.n)
-            star.retie(self._meshes[b].tets, touched, rows, places, of, new, b)
-        return Split(copies, new, *_leaving(rows, places, of, new))
+            star.retie(self._meshes[b].tets, some, rows, places, of, new, b)
+        return Split(copies, new, touched, *_leaving(rows, places, of, new))
 
     def _touched(self, touched: Ints) -> Ints:
         """Local nodes of the facets that break on any rank, ascending."""
@@ -93,7 +91,7 @@ class Separation:
         company = [other for other in self._neighbours if touched[other.rank]]
         if not company:
             return mine
-        told = self._comm.trade({o.rank: ids[mine[common(mine, o.nodes)]] for o in company})
+        told = self._comm.trade({o.rank: ids[mine[common(mine, o.nodes)]] for o in company}, [o.rank for o in company])
         some = [np.searchsorted(ids, theirs) for theirs in told.values() if len(theirs)]
         every: Ints = distinct(np.concatenate([mine, *some])) if some else mine
         return every
@@ -118,17 +116,17 @@ class Separation:
             rank: np.concatenate([_stretches(rows, begin[at], begin[at + 1]) for rows, _, begin in found])
             for rank, at in shared.items() if len(at)
         }  # fmt: skip
-        return [words.reshape(-1, stars.COLUMNS) for words in self._comm.trade(sends).values() if len(words)]
+        return [words.reshape(-1, stars.COLUMNS) for words in self._comm.trade(sends, sends).values() if len(words)]
 
-    def _number(self, mine: Ints) -> Ints:
+    def _number(self, mine: Ints, touched: Ints) -> Ints:
         """(k, 2) node and label of every piece of all ranks that gets a copy, in the order of the new ids."""
-        if self._comm.size == 1:
+        others = [rank for rank in np.flatnonzero(touched).tolist() if rank != self._comm.rank]
+        if not others:
             return mine
-        words = mine
-        if len(mine):
-            words = mine[self._model.nodes.owned[np.searchsorted(self._model.nodes.id, mine[:, 0])]]
-        every = self._comm.join(words).reshape(-1, 2)
-        return every[np.lexsort((every[:, 1], every[:, 0]))] if len(mine) else every
+        words = mine[self._model.nodes.owned[np.searchsorted(self._model.nodes.id, mine[:, 0])]]
+        told = self._comm.trade(dict.fromkeys(others, words), others)
+        every = np.concatenate([words, *(theirs.reshape(-1, 2) for theirs in told.values())])
+        return every[np.lexsort((every[:, 1], every[:, 0]))]
 
     def _share(self, copies: Copies, first: int) -> None:
         """Whoever holds a node holds its copies."""

@@ -23,12 +23,12 @@ class TopologyUpdate:
         self._handover, self._contact = handover, contact
 
     def apply(
-        self, broken: list[Breaking], split: Split | None, fresh: list[Facets], cohesion: Cohesion | None
+        self, broken: list[Breaking], split: Split, fresh: list[Facets], cohesion: Cohesion | None
     ) -> None:  # fmt: skip
         """Takes up the ``broken`` facets, ``fresh`` cohesive ones among them, and the nodes that have separated. Ranks
-        that share copies take part.
+        that share copies, or have copies of their surface, take part.
         """
-        if split is not None and split.copies.n:
+        if split.copies.n:
             self._grow(split)
             self._handover.hand_over(split, cohesion, fresh)
         for new in fresh:
@@ -37,8 +37,7 @@ class TopologyUpdate:
         if self._contact is not None:
             for b in broken:
                 self._contact.crack(b.facets.tets, b.facets.nodes, b.facets.sides)
-            if split is not None:
-                self._contact.separate(split)
+            self._contact.separate(split)
 
     def _grow(self, split: Split) -> None:
         self._initiation.follow(split)

@@ -27,7 +27,7 @@ from ..output import hdf5
 from ..parallel.comm import Comm
 from .parcel import Parcel, Table, take
 
-FORMAT = 12
+FORMAT = 13
 """Of the files; 12 has the angular momentum of the ledger and of what has left. Others are not read."""
 _KEPT = 2
 """Checkpoints that stay; the older ones go."""

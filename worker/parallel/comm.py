@@ -3,6 +3,7 @@
 Everything that decides is a maximum over int64 words, or a sum of integers: no order of ranks can change a bit of it.
 """
 
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
@@ -73,9 +74,10 @@ class Comm(Protocol):
     def swap(self, sends: dict[int, Ints]) -> dict[int, Ints]:
         """What each rank has for this one, flat, by ascending rank, its own included; nothing is sent for no key."""
 
-    def trade(self, sends: dict[int, Ints]) -> dict[int, Ints]:
-        """What each of some ranks has for this one, flat, in the order of ``sends``: these ranks, and only they, name
-        this one in a call of their own. Of any length; what is for nobody is sent empty.
+    def trade(self, sends: dict[int, Ints], sources: Iterable[int]) -> dict[int, Ints]:
+        """What each of the ``sources`` has for this rank, flat, in their order. They, and only they, send to it in a
+        call of their own, as it is a source of those that it ``sends`` to. Of any length; what is nothing is sent
+        empty.
         """
 
     def join(self, words: Ints) -> Ints:
@@ -152,8 +154,8 @@ class SerialComm:
     def swap(self, sends: dict[int, Ints]) -> dict[int, Ints]:
         return {rank: words.reshape(-1) for rank, words in sends.items()}
 
-    def trade(self, sends: dict[int, Ints]) -> dict[int, Ints]:
-        if sends:
+    def trade(self, sends: dict[int, Ints], sources: Iterable[int]) -> dict[int, Ints]:
+        if sends or list(sources):
             raise ValueError("one rank has nobody to trade with")
         return {}
 

@@ -4,6 +4,7 @@ import os
 import pickle
 import sys
 import time
+from collections.abc import Iterable
 from typing import Any, NoReturn
 
 import numpy as np
@@ -89,13 +90,13 @@ class MpiComm:
                 self._mpi.Request.Waitall(requests)
         return received
 
-    def trade(self, sends: dict[int, Ints]) -> dict[int, Ints]:
+    def trade(self, sends: dict[int, Ints], sources: Iterable[int]) -> dict[int, Ints]:
         mine = {rank: np.ascontiguousarray(words) for rank, words in sends.items()}
         requests = [self._world.Isend(words, rank, Tag.TRADE) for rank, words in mine.items()]
         self.sent.message(len(mine), sum(words.nbytes for words in mine.values()))
         theirs, status = {}, self._mpi.Status()
         with self.waiting():
-            for rank in mine:
+            for rank in sources:
                 while (message := self._world.Improbe(rank, Tag.TRADE, status=status)) is None:
                     os.sched_yield()  # Mprobe keeps the core that the other rank may need
                 theirs[rank] = np.empty(status.Get_count(self._mpi.INT64_T), np.int64)
