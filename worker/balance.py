@@ -56,8 +56,8 @@ class Balance:
     comm: Comm
     trigger: Trigger
     _meter: Meter
-    """Set at the last cut, and again when half of what calls for the next one is lost: fronts move, and costs over the
-    things of the present are those of the present.
+    """Set at the last cut, and again in a look that finds half of what calls for the next one lost, but not all of it:
+    fronts move, and costs over the things of the present are those of the present.
     """
     spent: float = 0.0
     """Wall time of all cuts, s."""

@@ -32,6 +32,11 @@ class World:
         self._mail: dict[tuple[int, int, int], SimpleQueue[Ints]] = {}
         self._lock = threading.Lock()
 
+    @property
+    def unread(self) -> list[tuple[int, int, int]]:
+        """Source, target and tag of what still lies there."""
+        return [name for name, box in self._mail.items() if not box.empty()]
+
     def box(self, source: int, target: int, tag: int) -> SimpleQueue[Ints]:
         """Where messages lie; the same for both, whoever asks first."""
         with self._lock:
@@ -150,7 +155,7 @@ class Mail:
 
 
 def on_ranks(size: int, work: Callable[[ThreadComm], T]) -> list[T]:
-    """What ``work`` returns on each of ``size`` ranks."""
+    """What ``work`` returns on each of ``size`` ranks, which have to fetch all that is sent to them."""
     world = World(size)
 
     def one(rank: int) -> T:
@@ -165,4 +170,5 @@ def on_ranks(size: int, work: Callable[[ThreadComm], T]) -> list[T]:
     errors = [error for error in (future.exception() for future in futures) if error is not None]
     for error in sorted(errors, key=lambda error: isinstance(error, threading.BrokenBarrierError)):
         raise error
+    assert not world.unread, "messages that nobody has waited for"
     return [future.result() for future in futures]

@@ -67,6 +67,7 @@ def at_rest(sim: Simulation) -> Simulation:
     for _ in range(4):
         step.first_half(sim)
         step.second_half(sim)
+        sim.count_nodes()
         if sim.model.nodes_global > first:
             break
     assert sim.model.nodes_global == first + 16

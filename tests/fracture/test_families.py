@@ -86,6 +86,7 @@ def at_rest(sim: Simulation, axes: Sequence[int] = (0, 2)) -> Simulation:
     for _ in range(4):
         step.first_half(sim)
         step.second_half(sim)
+    sim.count_nodes()
     assert sim.model.nodes_global == (2**planes).sum()
     nodes.x[:], nodes.v[:], nodes.force[:] = nodes.x0, 0.0, 0
     for b in sim.model.blocks:

@@ -10,7 +10,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from conoid.cases import materials, schema
-from conoid.worker import step
+from conoid.worker import simulation, step
 from conoid.worker.fracture import stars
 from conoid.worker.fracture.facets import mesh_of
 from conoid.worker.fracture.separation import Separation
@@ -350,26 +350,56 @@ def test_a_step_in_which_nothing_breaks_costs_no_collective_of_its_own(model: st
 
 
 def test_a_break_costs_no_collective_of_its_own() -> None:
-    """Facets break in most steps, here or there; all ranks wait for nothing but the reduction of the step."""
-    case = pulled(delay=0.2).model_copy(update={"contact": None})
+    """Facets break in most steps, here or there, and fragments meet: those that break, and those that have copies of
+    their surface, tell each other, and nobody else waits.
+    """
+    case = pulled(delay=0.2)
 
-    def work(sim: Simulation) -> tuple[list[int], int]:
+    def work(sim: Simulation) -> tuple[list[int], int, int]:
         assert sim.fracture is not None
+        advance, rank, counts, elsewhere = sim.fracture.advance, sim.comm.rank, list[int](), 0
+
+        def watched(agreed: int, touched: Ints) -> None:
+            nonlocal elsewhere
+            sim.comm.sent.since_last()
+            advance(agreed, touched)
+            if touched.any():
+                counts.append(sim.comm.sent.since_last()["collectives"])
+                elsewhere += not touched[rank]
+
+        sim.fracture.advance = watched  # type: ignore[method-assign]
         step.prepare(sim)
-        counts, before = [], 0
         for _ in range(STEPS):
             step.first_half(sim)
-            sim.comm.sent.since_last()
             step.second_half(sim)
-            if sim.fracture.broken > before:
-                counts.append(sim.comm.sent.since_last()["collectives"])
-            before = sim.fracture.broken
-        return counts, before
+        return counts, elsewhere, sim.fracture.broken
 
-    for counts, broken in on(3, case, [block((2, 2, 4), 1e-3, seed=5)], work):
+    found = on(3, case, [block((2, 2, 9), 1e-3, seed=5)], work)
+    assert max(elsewhere for _, elsewhere, _ in found) > 5
+    for counts, _, broken in found:
         assert broken > 100
-        assert len(counts) > 10
-        assert set(counts) == {1}
+        assert set(counts) == {0}
+
+
+def test_what_is_kept_between_two_steps_has_all_nodes() -> None:
+    """Also those that have come far from rank 0 in the last step, of which no reduction has told it yet."""
+    case = pulled(delay=0.2).model_copy(update={"contact": None})
+
+    def work(sim: Simulation) -> tuple[bool, int]:
+        step.prepare(sim)
+        behind = False
+        for _ in range(STEPS):
+            step.first_half(sim)
+            step.second_half(sim)
+            nodes, known = sim.model.nodes, sim.model.nodes_global
+            every = int(sim.comm.sum(np.array([nodes.owned.sum()]))[0])
+            assert simulation.keep(sim).known["nodes_global"] == every
+            behind |= known < every
+        return behind, sim.model.nodes_global
+
+    found = on(3, case, [block((2, 2, 4), 1e-3, seed=5)], work)
+    assert any(behind for behind, _ in found)
+    assert len({nodes for _, nodes in found}) == 1
 
 
 @pytest.mark.parametrize("model", ["instant", "cohesive"])

@@ -124,6 +124,6 @@ def test_all_ranks_know_who_shares_what_separates() -> None:
             assert listed == theirs["sums"].get(one, [])
             assert len(set(listed)) == len(listed)
             assert {node for node, who in members.items() if {one, other} <= who} <= set(listed)
-            assert mine["sends"].get(other, []) == theirs["receives"].get(one, [])
+            assert mine["sends"].get(other) == theirs["receives"].get(one)
         for rank in split:
             assert sorted(node for some in rank["receives"].values() for node in some) == rank["lacks"]

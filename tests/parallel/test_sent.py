@@ -19,7 +19,7 @@ RANKS = 3
 KNOWN = {
     "exchange": (4, 4 * 5 * 3 * 8, 0, 0),
     "swap": (1, 7 * 8, 1, RANKS * 8),
-    "trade": (2, 3 * 8, 0, 0),
+    "trade": (1, 3 * 8, 0, 0),
     "sum": (0, 0, 1, 72),
     "maximum": (0, 0, 1, 16),
     "begin_maximum": (0, 0, 1, 72),

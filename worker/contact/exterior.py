@@ -203,7 +203,7 @@ class Exterior:
 
     def separate(self, split: Split) -> None:
         """Follows nodes as they separate on any rank."""
-        self._separated = True
+        self._separated |= bool(split.touched.any())
         if split.copies.n:
             parents = split.copies.parents
             self.cracks.follow(split, self._model.nodes.id)

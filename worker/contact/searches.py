@@ -158,7 +158,7 @@ class Searches:
         now.enliven(sides[~now.faces.live[sides]])
 
     def separate(self, split: Split) -> None:
-        """Follows nodes as they separate; all ranks take part."""
+        """Follows nodes as they separate; called on all ranks, see news.py for those that take part."""
         if self.scene is None:
             return
         nodes, here = self._model.nodes, self._exterior.flight.here(self._model.nodes)

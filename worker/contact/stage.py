@@ -197,7 +197,7 @@ class Contact:
             self.searches.due |= self.exterior.open(told, self.searches.scene)
 
     def separate(self, split: Split) -> None:
-        """Follows nodes as they separate; all ranks take part."""
+        """Follows nodes as they separate; called on all ranks, see news.py for those that take part."""
         self.exterior.separate(split)
         self.searches.separate(split)
 

@@ -6,8 +6,8 @@ table by node takes up the copies. In ``cohesive`` parts a facet keeps its tract
 the opening.
 
 What breaks, and which ranks it concerns, rides in the reduction of the step: ``find`` comes before it, ``advance``
-after it. A rank near which nothing is overstressed finds that out from the words of its neighbours; one that has no
-node of what breaks takes part in the list of new nodes only.
+after it. A rank near which nothing is overstressed finds that out from the words of its neighbours; one that has
+neither a node of what breaks nor a copy of the surface of a rank that has some goes on with the next step at once.
 """
 
 import numpy as np
@@ -95,7 +95,8 @@ class Fracture:
 
     def advance(self, agreed: int, touched: Ints) -> None:
         """Breaks what the stress of the present has overcome; ``agreed``, ``touched``: the maximum of what the ranks
-        had to say. All ranks take part.
+        had to say. Called on all ranks: all take part where nodal tractions or the order ``local_maximum`` are asked
+        for, else those whom the break concerns.
         """
         if agreed >= OVERSTRESSED:
             self._insertion.longest = max(self._insertion.longest, self._clock.stable)

@@ -28,7 +28,7 @@ from ..parallel.comm import Comm
 from .parcel import Parcel, Table, take
 
 FORMAT = 13
-"""Of the files; 12 has the angular momentum of the ledger and of what has left. Others are not read."""
+"""Of the files; 13 has the number of nodes among the words of the reduction. Others are not read."""
 _KEPT = 2
 """Checkpoints that stay; the older ones go."""
 _MANIFEST = "manifest.json"

@@ -1,4 +1,6 @@
-"""The tags of all messages between two ranks. Two exchanges that may be under way at once never share one."""
+"""The tags of all messages between two ranks. Two exchanges that may be under way at once never share one, but for
+trades: messages between two ranks arrive in the order in which they were sent, and both trade in the same order.
+"""
 
 from enum import IntEnum, unique
 
