@@ -3,12 +3,16 @@
 ``numba.njit`` compiles a function with a signature where it is declared, or loads it from the cache: every rank would
 load every kernel of the worker at its start, whatever its scene. ``njit`` of this module, the one that knows numba,
 does the same at the first call, from Python or from another kernel.
+
+numba counts who uses an array, atomically, for every array of every record that one kernel hands to another. A kernel
+that makes no array need not, and does not: that was three quarters of the narrow phase of a stack of plates.
 """
 
 import os
 import sys
 import time
 from collections.abc import Callable
+from types import ModuleType
 from typing import Any
 
 from llvmlite import ir
@@ -16,6 +20,7 @@ from numba import types
 from numba.core.bytecode import FunctionIdentity
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher, cpu_target
+from numba.core.sigutils import normalize_signature
 from numba.extending import intrinsic
 
 __all__ = ["DECLARED", "Kernel", "njit", "prefetch", "record", "several", "types"]
@@ -27,6 +32,11 @@ FunctionIdentity._unique_ids = iter(lambda: int.from_bytes(os.urandom(8), "big")
 """Draws the numbers by which numba tells functions of one name apart, which it counts in each process. Of functions
 that are called the same in the objects of two kernels the first that is loaded serves both, so kernels that several
 processes have compiled could call each other's sorting, and crash (numba issue 10486)."""
+_MAKERS = {
+    "arange", "argsort", "array", "concatenate", "copy", "cumsum", "empty", "full", "ones", "sort", "unique", "zeros",
+}  # fmt: skip
+"""Functions and methods that make arrays, by their names. numba refuses to compile a kernel that makes some by others,
+or by assigning whole rows: it is declared with ``_nrt=True``."""
 DECLARED: list["Kernel"] = []
 """Every kernel of the modules that are imported."""
 
@@ -37,12 +47,18 @@ class Kernel(CPUDispatcher):
     signature: Any = ""
     """As it is declared: in numba's notation, or made of its ``types``."""
 
+    @property
+    def result(self) -> Any:
+        """The type of what it returns."""
+        return normalize_signature(self.signature)[1]  # type: ignore[no-untyped-call]
+
     def load(self) -> None:
         """Compiles the kernel, or loads it from the cache, and what it calls; once, whatever thread asks."""
         with global_compiler_lock:
             if self.overloads:
                 return
             with _loading:
+                self.targetoptions.setdefault("_nrt", _makes_arrays(self))
                 super().compile(self.signature)
             self.disable_compile()
 
@@ -56,6 +72,21 @@ class Kernel(CPUDispatcher):
         """As numba asks for it at the first call from Python. Loaded, it is called again, and checks its arguments."""
         self.load()
         return self
+
+
+def _makes_arrays(kernel: Kernel) -> bool:
+    """Whether a kernel makes arrays, or calls one that hands it some, and so has to count who uses them."""
+    names = kernel.py_func.__code__.co_names
+    known = [kernel.py_func.__globals__.get(name) for name in names]
+    known += [getattr(module, name, None) for module in known if isinstance(module, ModuleType) for name in names]
+    handing = (kernel, *(each for each in known if isinstance(each, Kernel)))
+    return not _MAKERS.isdisjoint(names) or any(_holds_arrays(each.result) for each in handing)
+
+
+def _holds_arrays(kind: Any) -> bool:
+    if isinstance(kind, types.BaseTuple):
+        return any(_holds_arrays(each) for each in kind.types)  # type: ignore[attr-defined]
+    return isinstance(kind, types.Array)
 
 
 def njit(signature: Any, *, cache: bool = True, **options: Any) -> Callable[[Callable[..., Any]], Kernel]:

@@ -124,6 +124,34 @@ def test_a_kernel_is_loaded_at_its_first_call_with_what_it_calls() -> None:
     assert worked < 0.5 * spent, "what the loading took is no work"
 
 
+@jit.njit("float64[::1](int64)", cache=False)
+def made(n):  # type: ignore[no-untyped-def]
+    return np.full(n, 2.0)
+
+
+@jit.njit("float64(float64[::1], int64)", cache=False)
+def read(values, i):  # type: ignore[no-untyped-def]
+    return values[i]
+
+
+@jit.njit("float64(int64)", cache=False)
+def used(n):  # type: ignore[no-untyped-def]
+    values, found = made(n), 0.0
+    for i in range(n):
+        found += read(values, i)
+    return found
+
+
+def test_only_kernels_that_make_arrays_or_are_handed_some_count_who_uses_them() -> None:
+    """And what one of them makes is let go, whoever has read it."""
+    pages, many = Path("/proc/self/statm"), 1_000_000
+    assert used(10) == 20.0
+    assert [kernel.targetoptions["_nrt"] for kernel in (made, read, used)] == [True, False, True]
+    before = int(pages.read_text().split()[1])
+    assert [used(many) for _ in range(40)] == [2.0 * many] * 40
+    assert (int(pages.read_text().split()[1]) - before) * os.sysconf("SC_PAGE_SIZE") < 10 * 8 * many
+
+
 def test_threads_may_call_a_kernel_first_together() -> None:
     @jit.njit("float64(float64[::1])", cache=False)
     def first(values):  # type: ignore[no-untyped-def]

@@ -28,7 +28,7 @@ is convex. Chosen: less for a face that is bent by 25 degrees than that has, mor
 _OVER = 0.1
 """What the mean direction from a node to its faces' middles, of unit vectors, has along a face at least when it reaches
 over it: less is that of a blunt edge, whatever it is. Chosen: a third of what the corner of a cube has."""
-_F = types.float64
+_F, _VECTOR = types.float64, types.UniTuple(types.float64, 3)  # type: ignore[no-untyped-call]
 
 
 @njit(f"UniTuple(float64, 2)(float64[:, ::1], int64, {VECTOR})", cache=True)
@@ -69,7 +69,18 @@ def reaches_over(normals, s, b, e, f, size):  # type: ignore[no-untyped-def]
     return least >= -MARGIN and most >= _OVER
 
 
-@njit(types.boolean(PAIRS, FACES, types.int32[::1], types.int64, types.int64, _F, _F), cache=True)
+@njit(_VECTOR(FACES, types.float64[:, :], types.int64), cache=True, error_model="numpy", forceinline=True)
+def plane(faces, ahead, f):  # type: ignore[no-untyped-def]
+    """Unit normal of face ``f`` at the end of the step, which is found once a step; ``ahead``: where slots are then."""
+    if not faces.known[f]:
+        i, j, k = faces.corners[f, 0], faces.corners[f, 1], faces.corners[f, 2]
+        _, m = height(at(ahead, i), at(ahead, i), at(ahead, j), at(ahead, k))
+        faces.normal[f, 0], faces.normal[f, 1], faces.normal[f, 2] = m
+        faces.known[f] = True
+    return faces.normal[f, 0], faces.normal[f, 1], faces.normal[f, 2]
+
+
+@njit(types.boolean(PAIRS, FACES, types.int32[::1], types.int64, types.int64, _F, _F), cache=True, forceinline=True)
 def _asked(pairs, faces, part, q, body, strayed, end):  # type: ignore[no-untyped-def]
     """Whether the face of pair ``q`` is exposed, of a part ``body``, and not left alone; see outside."""
     f = pairs.rows[q, 1]
@@ -138,14 +149,15 @@ def in_front(pairs, first, faces, step, normals, p, gap0, gap1, strayed, end):  
         if a not in (i, j, k) and b not in (i, j, k) and c not in (i, j, k):
             continue
         o, e, h = at(ahead, i), at(ahead, j), at(ahead, k)
-        above, m = height(point, o, e, h)
+        m = plane(faces, ahead, f)
+        behind = dot(m, minus(at(ahead, a), o)) + dot(m, minus(at(ahead, b), o)) + dot(m, minus(at(ahead, c), o))
+        if not behind < -_BEHIND * size[g]:
+            continue
+        above, _ = height(point, o, e, h)
         before, _ = height(at(step.x, s), at(step.x, i), at(step.x, j), at(step.x, k))
         least, along = min(before, above), abs(above - before)
         slides = along < abs(gap1 - gap0) and along <= _SLIDES * size[f] and least > -RIM * size[f]
         if not ((slides or (above > gap1 and least > -TOUCHING * size[f])) and above <= NEAR * size[f]):
-            continue
-        behind = dot(m, minus(at(ahead, a), o)) + dot(m, minus(at(ahead, b), o)) + dot(m, minus(at(ahead, c), o))
-        if not behind < -_BEHIND * size[g]:
             continue
         every, some = facing(normals, s, m)
         if not (every if part[s] == body else some) <= 0.0:

@@ -172,7 +172,10 @@ def _meet(point, tet, height, a, b):  # type: ignore[no-untyped-def]
         point[i] = tet[a, i] + share * (tet[b, i] - tet[a, i])
 
 
-@njit("int64(float64[:, :, ::1], int64, float64[:, ::1], float64[::1], float64[:, ::1], int64[::1])", cache=True)
+@njit(
+    "int64(float64[:, :, ::1], int64, float64[:, ::1], float64[::1], float64[:, ::1], int64[::1])",
+    cache=True, _nrt=True,
+)  # fmt: skip
 def _in_front(out, n, tet, height, wedge, order):  # type: ignore[no-untyped-def]
     """What of a tet is before a plane, by the heights of its corners, as pieces from row ``n`` of ``out`` on; returns
     their new number. With one, two or three corners behind it, it is a wedge or half of one, of three tets, or the tet

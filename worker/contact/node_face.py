@@ -7,7 +7,7 @@ handed over.
 import numpy as np
 
 from ..jit import njit, types
-from .beside import RIM, TOUCHING, facing, in_front, outside, reaches_over
+from .beside import RIM, TOUCHING, facing, in_front, outside, plane, reaches_over
 from .geometry import VECTOR, at, beyond, distance, dot, foot, height, minus, off
 from .haste import fastest_of, haste
 from .narrow_phase import CONTACT_ROWS, DEEP, DEEP_SELF, FACES, NEAR, PAIRS, SLOTS, STEP, needed
@@ -123,7 +123,7 @@ def node_face(out, n, pairs, slots, faces, step, end):  # type: ignore[no-untype
     """
     rows, until, speed, turned, active = pairs.rows, pairs.until, pairs.speed, pairs.turned, pairs.active
     corners, size, exposed, left, fresh = faces.corners, faces.size, faces.exposed, faces.left, faces.fresh
-    planes, known, holder = faces.normal, faces.known, slots.holder
+    holder = slots.holder
     normals, on_surface, strayed, other, course = slots.normals, slots.on_surface, slots.left, slots.fresh, slots.course
     nodes, weights, out_normals, wanted, pair = out.nodes, out.weights, out.normals, out.wanted, out.pair
     x, v, ahead, part = step.x, step.v, step.ahead, step.part
@@ -143,11 +143,7 @@ def node_face(out, n, pairs, slots, faces, step, end):  # type: ignore[no-untype
         active[tested] = p
         tested += 1
         i, j, k = corners[f, 0], corners[f, 1], corners[f, 2]
-        if not known[f]:
-            _, m = height(at(ahead, s), at(ahead, i), at(ahead, j), at(ahead, k))
-            planes[f, 0], planes[f, 1], planes[f, 2] = m
-            known[f] = True
-        m = at(planes, f)
+        m = plane(faces, ahead, f)
         gap1 = dot(m, minus(at(ahead, s), at(ahead, i)))
         reach = DEEP_SELF if part[s] == part[i] else DEEP
         if not np.isnan(until[p]):  # left alone while it cannot meet

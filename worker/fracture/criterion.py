@@ -221,7 +221,8 @@ def clock(found, n, table, law, step, t):  # type: ignore[no-untyped-def]
             table.seen[place, face] = step
             if found.traction[i, 3] >= required(strength, t - table.since[place, face], law.delay):
                 found.place[m], found.face[m], found.shared[m] = place, face, found.shared[i]
-                found.traction[m] = found.traction[i]
+                for k in range(4):
+                    found.traction[m, k] = found.traction[i, k]
                 m += 1
     return m
 
