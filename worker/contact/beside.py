@@ -92,6 +92,7 @@ def _asked(pairs, faces, part, q, body, strayed, end):  # type: ignore[no-untype
     types.boolean(PAIRS, types.int32[::1], FACES, types.float64[:, :], types.int32[::1], types.int64, _F, _F, _F),
     cache=True,
     error_model="numpy",
+    forceinline=True,
 )
 def outside(pairs, first, faces, x, part, p, depth, strayed, end):  # type: ignore[no-untyped-def]
     """Whether the node of pair ``p``, ``depth`` below its face, is nearer to the front of another face of that part.
@@ -126,6 +127,7 @@ def outside(pairs, first, faces, x, part, p, depth, strayed, end):  # type: igno
     types.boolean(PAIRS, types.int32[::1], FACES, STEP, types.float64[:, ::1], types.int64, _F, _F, _F, _F),
     cache=True,
     error_model="numpy",
+    forceinline=True,
 )
 def in_front(pairs, first, faces, step, normals, p, gap0, gap1, strayed, end):  # type: ignore[no-untyped-def]
     """Whether the node of pair ``p``, whose foot is on the border (RIM) of its face, is beside it, in front of another

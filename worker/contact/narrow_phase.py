@@ -59,6 +59,14 @@ class ContactRows(NamedTuple):
         return cls(rows, np.empty((n, 4)), np.empty((n, 3)), np.empty(n), np.empty(n), numbers)
 
 
+def lines(n: int) -> Floats:
+    """(n, LINE) room for a step, a cache line a slot. Kept for many steps, it saves the system clearing its pages."""
+    n = max(n, _FEWEST)
+    room = np.empty(n * LINE + LINE)
+    first = -(room.ctypes.data // room.itemsize) % LINE
+    return room[first : first + n * LINE].reshape(n, LINE)
+
+
 class Step(NamedTuple):
     """The slots in the step ahead."""
 
@@ -87,12 +95,12 @@ class Step(NamedTuple):
     """
 
     @classmethod
-    def of(cls, x: Floats, v: Floats, part: Indices, mu: Floats, give: float, dt: float) -> "Step":
-        """A step ``dt`` from ``x`` on."""
+    def of(
+        cls, x: Floats, v: Floats, part: Indices, mu: Floats, give: float, dt: float, room: Floats | None = None
+    ) -> "Step":  # fmt: skip
+        """A step ``dt`` from ``x`` on; ``room``: see ``lines``."""
         n = max(len(x), _FEWEST)
-        room = np.empty(n * LINE + LINE)
-        first = -(room.ctypes.data // room.itemsize) % LINE
-        places = room[first : first + n * LINE].reshape(n, LINE)
+        places = (lines(n) if room is None else room)[:n]
         _place(places, x, v, dt)
         return cls(places[:, :3], v, places[:, 3:6], part, mu, give, dt, 0.0, 0.0, 1.0, np.empty(0))
 

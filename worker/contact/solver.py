@@ -17,6 +17,9 @@ from .stops import Braced, Stops
 
 _ROW_WEIGHTS = 4
 """Columns of ``ActiveNodes.row_weights``."""
+_SPARE = 1.25
+"""Times the nodes there are, room is made for: while a body breaks they become more in nearly every step, and the
+system clears every page of memory that is new. Chosen: a bar of glass has a quarter more every few hundred steps."""
 
 
 class ActiveSet:
@@ -43,7 +46,7 @@ class ActiveSet:
         if len(self._slot) != crowd.n:
             self._slot = np.full(crowd.n, -1, np.int32)
         if len(found.nodes) > self._room.contacts or crowd.n > self._room.nodes:
-            self._room = _Room(len(found.nodes), crowd.n, len(self.stops.points))
+            self._room = _Room(len(found.nodes), int(_SPARE * crowd.n), len(self.stops.points))
         room, slot = self._room, self._slot
         self._first = held.number_shared(room.places, slot, shared.shared)
         self._n, border = held.number(
