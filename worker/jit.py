@@ -8,6 +8,7 @@ numba counts who uses an array, atomically, for every array of every record that
 that makes no array need not, and does not: that was three quarters of the narrow phase of a stack of plates.
 """
 
+import inspect
 import os
 import sys
 import time
@@ -76,8 +77,8 @@ class Kernel(CPUDispatcher):
 
 def _makes_arrays(kernel: Kernel) -> bool:
     """Whether a kernel makes arrays, or calls one that hands it some, and so has to count who uses them."""
-    names = kernel.py_func.__code__.co_names
-    known = [kernel.py_func.__globals__.get(name) for name in names]
+    names, used = kernel.py_func.__code__.co_names, inspect.getclosurevars(kernel.py_func)
+    known = [*used.nonlocals.values(), *used.globals.values()]
     known += [getattr(module, name, None) for module in known if isinstance(module, ModuleType) for name in names]
     handing = (kernel, *(each for each in known if isinstance(each, Kernel)))
     return not _MAKERS.isdisjoint(names) or any(_holds_arrays(each.result) for each in handing)

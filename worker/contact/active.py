@@ -8,11 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..cache_lines import LINE, cache_lines
 from ..jit import record, types
 from ..state import Floats, Indices, Ints
 
-_LINE = 8
-"""Words of a cache line."""
 V, IMPULSE = 0, 3
 """First word of a slot's velocity, m/s, and of its impulse of the sweep, quanta, in ``ActiveNodes.moving``."""
 MOBILITY, TOTAL, CHANGED = 0, 3, 6
@@ -69,11 +68,9 @@ class ActiveNodes(NamedTuple):
     @classmethod
     def of(cls, n: int) -> "ActiveNodes":
         """Room for as many slots, from the beginning of a cache line on."""
-        room = np.empty(2 * n * _LINE + _LINE, np.int64)
-        first = -(room.ctypes.data // room.itemsize) % _LINE
-        moving, fixed = room[first : first + 2 * n * _LINE].reshape(2, n, _LINE)
+        moving, fixed = cache_lines(2 * n).reshape(2, n, LINE)
         sums, path = np.empty((n, 4), np.int64), np.empty(n)
-        return cls(moving.view(np.float64), moving, fixed.view(np.float64), fixed, sums, path)
+        return cls(moving, moving.view(np.int64), fixed, fixed.view(np.int64), sums, path)
 
 
 class Loaded(NamedTuple):

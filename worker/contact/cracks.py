@@ -12,13 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..cache_lines import LINE
 from ..jit import njit, prefetch, types
 from ..migration.parcel import Table, once
 from ..state import WIDE, Block, Flags, Floats, Indices, Ints, Nodes, extended
 from ..topology import Split
 from .families import Families
 from .geometry import at, cross, dot, half, minus, plus
-from .narrow_phase import CONTACT_ROWS, CRACK, DEEP_SELF, LINE, NEAR, STEP, needed
+from .narrow_phase import CONTACT_ROWS, CRACK, DEEP_SELF, NEAR, STEP, needed
 from .records import CrackSides
 
 _WIDE = 0.2

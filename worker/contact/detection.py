@@ -82,7 +82,7 @@ def detect(
         now.edge_edge.wake()
     tracks.measure(crowd.x, crowd.v, now.faces.corners, now.edges.corners)
     stray = _renewed(now, together)
-    step = Step.of(crowd.x, crowd.v, crowd.part, mu, give, ahead.dt, now.lines)
+    step = Step.of(crowd.x, crowd.v, crowd.part, mu, give, ahead.dt, now.step_room)
     inside = surface.entering(now, step)
     now.reserve(sum(len(nodes) for nodes, _ in inside))
     step = step.followed(beyond, HASTY * ahead.size, ahead.rebound, now.face_table())

@@ -11,11 +11,12 @@ loops over these, in rows of a few kilobytes that compilers make vectors of. Few
 
 import numpy as np
 
+from ..cache_lines import LINE
 from ..jit import njit, prefetch, several, types
 from ..state import INTACT
 from .families import by_family
 from .geometry import VECTOR, at, cross, dot, height, minus
-from .narrow_phase import CONTACT_ROWS, DEEP_SELF, LINE, STEP, needed
+from .narrow_phase import CONTACT_ROWS, DEEP_SELF, STEP, needed
 from .sharp import SHARP
 
 _FEWEST = 64

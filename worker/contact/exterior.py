@@ -38,7 +38,7 @@ class Exterior:
         """Of the faces of all ranks at the start, m."""
         self.flight = Flight(self.surface, model.nodes, mobilities(model.nodes, bounds), self.size, comm)
         self._moments = np.zeros((model.nodes.n, normals.COLUMNS), np.int64)
-        self._separated = False
+        self._broken = False
         """Whether facets of any rank have broken: cracks may be open."""
 
     def keep(self, parcel: Parcel) -> None:
@@ -48,9 +48,9 @@ class Exterior:
         parcel.rows["contact.turned"] = {"tet": self.surface.turned >> 34, "name": self.surface.turned}
         parcel.nodes["contact.flags"], parcel.nodes["contact.moments"] = self.surface.flags, self._moments
 
-    def resume(self, parcel: Parcel, size: float, separated: bool) -> None:
+    def resume(self, parcel: Parcel, size: float, broken: bool) -> None:
         """Takes them back; all ranks take part."""
-        self.size, self._separated = size, separated
+        self.size, self._broken = size, broken
         turned = np.sort(parcel.rows["contact.turned"]["name"])
         self.surface.sharpen(turned)
         self.surface.turned = turned  # those at cracks, too, which the next search brings to the surface
@@ -131,7 +131,7 @@ class Exterior:
         """The surface anew, with what may become part of it before the next search; all ranks take part."""
         if self._tiring is not None:
             self._tiring = bare.tiring(self._model.blocks)
-        if self._separated or self._tiring is not None:
+        if self._broken or self._tiring is not None:
             self.surface = self._build(self.surface.flags, self.surface.turned)
 
     def age(self) -> bool:
@@ -203,7 +203,7 @@ class Exterior:
 
     def separate(self, split: Split) -> None:
         """Follows nodes as they separate on any rank."""
-        self._separated |= bool(split.touched.any())
+        self._broken |= bool(split.touched.any())
         if split.copies.n:
             parents = split.copies.parents
             self.cracks.follow(split, self._model.nodes.id)

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..cache_lines import cache_lines
 from ..jit import njit, record, types
 from ..state import Flags, Floats, Indices, Ints
 from .geometry import at, cross, dot, minus
@@ -29,8 +30,6 @@ PUSH_OUT = 0.1
 nothing while contact has no energy to give back (``account.Account``)."""
 CRACK = -2
 """The first number that stands for a pair of nodes across a crack, others are below."""
-LINE = 8
-"""Words of a cache line."""
 _FEWEST = 2
 """Rows of a table that is more than one line: numba takes a part of a single one for an array of its own."""
 
@@ -59,12 +58,9 @@ class ContactRows(NamedTuple):
         return cls(rows, np.empty((n, 4)), np.empty((n, 3)), np.empty(n), np.empty(n), numbers)
 
 
-def lines(n: int) -> Floats:
-    """(n, LINE) room for a step, a cache line a slot. Kept for many steps, it saves the system clearing its pages."""
-    n = max(n, _FEWEST)
-    room = np.empty(n * LINE + LINE)
-    first = -(room.ctypes.data // room.itemsize) % LINE
-    return room[first : first + n * LINE].reshape(n, LINE)
+def step_room(slots: int) -> Floats:
+    """Room for a step of so many ``slots``. Kept for many steps, it saves the system clearing its pages."""
+    return cache_lines(max(slots, _FEWEST))
 
 
 class Step(NamedTuple):
@@ -98,9 +94,8 @@ class Step(NamedTuple):
     def of(
         cls, x: Floats, v: Floats, part: Indices, mu: Floats, give: float, dt: float, room: Floats | None = None
     ) -> "Step":  # fmt: skip
-        """A step ``dt`` from ``x`` on; ``room``: see ``lines``."""
-        n = max(len(x), _FEWEST)
-        places = (lines(n) if room is None else room)[:n]
+        """A step ``dt`` from ``x`` on; ``room``: see step_room."""
+        places = (step_room(len(x)) if room is None else room)[: max(len(x), _FEWEST)]
         _place(places, x, v, dt)
         return cls(places[:, :3], v, places[:, 3:6], part, mu, give, dt, 0.0, 0.0, 1.0, np.empty(0))
 

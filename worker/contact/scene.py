@@ -14,7 +14,7 @@ from . import ghosts, held, sharp
 from .columns import OwnSlots, SceneEdges, SceneFaces, SceneSlots
 from .company import Company
 from .ghosts import Copies
-from .narrow_phase import ContactRows, EdgeTable, FaceTable, SlotTable, lines
+from .narrow_phase import ContactRows, EdgeTable, FaceTable, SlotTable, step_room
 from .pairs import PairTable
 from .records import AGED, OPEN, Crowd
 from .sides import Rules
@@ -68,7 +68,7 @@ class Scene:
     edge_edge: PairTable = field(default_factory=PairTable)
     active: ActiveRows = field(default_factory=ActiveRows)
     messages: Messages = field(init=False)
-    _lines: Floats = field(default_factory=lambda: lines(0), init=False)
+    _step_room: Floats = field(default_factory=lambda: step_room(0), init=False)
 
     def connect(self, company: list[Neighbour], nodes: Nodes, comm: Comm) -> None:
         """Sets up the messages: sums over the nodes of the company, copies of what is not held here; all ranks take
@@ -90,11 +90,11 @@ class Scene:
         self.messages.copies.note(nodes)
 
     @property
-    def lines(self) -> Floats:
-        """Room for a step of all slots (narrow_phase.lines)."""
-        if len(self._lines) < self.crowd.n:
-            self._lines = lines(2 * self.crowd.n)
-        return self._lines
+    def step_room(self) -> Floats:
+        """Room for a step of all slots."""
+        if len(self._step_room) < self.crowd.n:
+            self._step_room = step_room(2 * self.crowd.n)
+        return self._step_room
 
     def reserve(self, more: int) -> None:
         """Room for every contact that may become active, and for ``more``; the rows of the last step stay."""

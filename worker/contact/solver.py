@@ -19,7 +19,7 @@ _ROW_WEIGHTS = 4
 """Columns of ``ActiveNodes.row_weights``."""
 _SPARE = 1.25
 """Times the nodes there are, room is made for: while a body breaks they become more in nearly every step, and the
-system clears every page of memory that is new. Chosen: a bar of glass has a quarter more every few hundred steps."""
+system clears every page of memory that is new. Chosen: a bar of glass has a quarter more after 400 steps."""
 
 
 class ActiveSet:
