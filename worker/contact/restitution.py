@@ -7,9 +7,20 @@ in the metric of the masses of Cirak and West (2005), Decomposition contact resp
 """
 
 from ..jit import njit, types
-from .narrow_phase import CONTACT_ROWS
+from ..state import Floats
+from .narrow_phase import CONTACT_ROWS, ContactRows
 
 _V = types.float64[:, ::1]
+
+
+def retarget(rows: ContactRows, n: int, v: Floats, before: Floats, share: float, give: float) -> None:
+    """Target velocities of the first ``n`` active contacts after detection: see ``rebound``, and ``hold_back`` where
+    there is nothing to ``give`` of penetrations (narrow_phase.PUSH_OUT).
+    """
+    if share > 0.0:
+        rebound(rows, n, v, before, share)
+    if give == 0.0:
+        hold_back(rows, n, before)
 
 
 @njit(types.void(CONTACT_ROWS, types.int64, _V, _V, types.float64), cache=True)

@@ -28,7 +28,7 @@ from .detection import Ahead, Detected, detect
 from .exterior import Exterior
 from .narrow_phase import PUSH_OUT
 from .need import Need
-from .restitution import hold_back, rebound
+from .restitution import retarget
 from .scene import Scene
 from .searches import Searches
 from .solver import ActiveSet
@@ -255,6 +255,7 @@ class Contact:
         now.messages.copies.finish(crowd.x, crowd.v, now.slots.before)
         give = PUSH_OUT if books.account.settle(books.agreed) else 0.0
         self._meet(now, give, dt)
+        retarget(now.active.room, now.active.n, crowd.v, now.slots.before, self._scheme.restitution, give)
         shared = now.messages.company.agree(now.active.room.nodes[: now.active.n], crowd.local)
         active.begin(now.active.room, now.active.n, crowd, shared, self.exterior.size, dt)
         active.weigh()
@@ -290,10 +291,6 @@ class Contact:
         ahead = Ahead(dt, self._clock.longest, self.exterior.size, 1.0 + self._scheme.restitution)
         self.found = detect(now, self.exterior, self.searches.mu, give, ahead, redraw, self.found.stray)
         now.active.n = self.found.contacts
-        if self._scheme.restitution > 0.0:
-            rebound(now.active.room, now.active.n, now.crowd.v, now.slots.before, self._scheme.restitution)
-        if give == 0.0:
-            hold_back(now.active.room, now.active.n, now.slots.before)
 
     def free(self) -> None:
         """Gives the messages back to MPI."""
