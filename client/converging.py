@@ -114,14 +114,15 @@ def _write(book: Book, quantity: str | None, out: Path | None) -> None:
 
 
 def _numbers(option: str, text: str) -> list[float]:
-    """Positive numbers with commas between them. Raises ClientError."""
+    """Positive numbers, each once, with commas between them. Raises ClientError."""
     try:
         values = [float(word) for word in text.split(",") if word.strip()]
     except ValueError:
         values = [0.0]
-    if not all(0.0 < value < 1e6 for value in values) or (option == "--meshes" and not values):
-        raise UsageError(f"{option} = {shown(text)}: allowed: positive numbers with commas between them")
-    return sorted(set(values))
+    wrong = not all(0.0 < value < 1e6 for value in values) or len(set(values)) < len(values)
+    if wrong or (option == "--meshes" and not values):
+        raise UsageError(f"{option} = {shown(text)}: allowed: positive numbers, each once, with commas between them")
+    return sorted(values)
 
 
 def _forms(text: str) -> list[str]:

@@ -7,6 +7,7 @@ from pathlib import Path
 import msgspec
 from rich.console import Console
 
+from conoid.cases import fields
 from conoid.cases.load import material, parse_case
 from conoid.cases.outcome import Outcome
 from conoid.cases.run import ExitCode
@@ -47,6 +48,8 @@ def run_once(
         raise UsageError(f"field = {field!r}: allowed: {', '.join(FIELDS)}")
     data = data_of(case, overrides)
     checked = parse_case(data)
+    if field in fields.lacking(checked):
+        raise UsageError(f"field = {field!r}: no frame of {checked.name} will have it")
     out = PlainConsole(quiet=as_json, highlight=False)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     server = LocalServer(runs, checked.run.ranks)

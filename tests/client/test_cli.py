@@ -346,6 +346,9 @@ def test_run_refuses_a_wrong_case_before_anything_starts(alone: Path) -> None:
     assert not (alone / "runs").exists()
     assert time.monotonic() - began < 10
     assert conoid("run", "demo", "--field", "colour").exit_code == 2
+    lacking = conoid("run", "taylor_copper", "--view", "bar.png", "--field", "damage", "--out", alone / "runs")
+    assert (lacking.exit_code, (alone / "runs").exists()) == (2, False)
+    assert lacking.stderr.startswith("conoid: field = 'damage': no frame of taylor_copper will have it")
 
 
 def test_serve_hands_its_options_on(alone: Path) -> None:

@@ -217,8 +217,8 @@ def test_what_advice_may_be_about_is_known_before_anything_runs(name: str) -> No
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--meshes", "1,x"], "--meshes"), (["--forms", "nodal,cubic"], "--forms"), (["--vary", "moods"], "--vary"),
-        (["--quantity", "nope"], "--quantity = 'nope': allowed: "),
+        (["--meshes", "1,x"], "--meshes"), (["--meshes", "1,1"], "each once"), (["--forms", "nodal,cubic"], "--forms"),
+        (["--vary", "moods"], "--vary"), (["--quantity", "nope"], "--quantity = 'nope': allowed: "),
     ],
 )  # fmt: skip
 def test_options_that_mean_nothing_are_refused(words: list[str], said: str) -> None:

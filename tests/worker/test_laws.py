@@ -83,3 +83,9 @@ def test_a_vector_of_constants_has_room_for_every_law() -> None:
         params = models.parameters(made, None)
         assert params.shape == (law.SIZE,)
         assert params[law.DENSITY] == made.density
+
+
+def test_a_law_of_the_case_counts_damage_where_its_tets_have_a_row_for_it() -> None:
+    counting = [made.strength is not None and made.strength.counts_damage for made in MATERIALS]
+    assert counting == [models.law_of(made).rows(made.strength) > state.DAMAGE for made in MATERIALS]
+    assert 0 < sum(counting) < len(MATERIALS)

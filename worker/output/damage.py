@@ -7,23 +7,22 @@ has.
 
 import numpy as np
 
-from conoid.cases.library import material
+from conoid.cases.fields import counting, damageable
 from conoid.cases.schema import Case
 
 from ..fracture.cohesive import Cohesion
 from ..fracture.columns import Facets
-from ..materials.models import law_of
 from ..parallel.comm import Comm
 from ..state import DAMAGE, PLASTIC_STRAIN, Block, Floats, Ints, Model
 
 
 def damage(case: Case, model: Model, cohesion: Cohesion | None, comm: Comm) -> list[Floats] | None:
     """For each block (n,) the damage of its tets; None where no part can be damaged so. All ranks take part."""
+    if not damageable(case):
+        return None
     cohesive = {i for i, part in enumerate(case.parts) if part.fracture and part.fracture.model == "cohesive"}
     limits = {i: p.erosion.plastic_strain for i, p in enumerate(case.parts) if p.erosion and p.erosion.plastic_strain}
     counted = counting(case)
-    if not cohesive and not limits and not counted:
-        return None
     held, spent = _facets(cohesion, comm) if cohesion is not None else (np.zeros((0, 2), np.int64), np.zeros(0))
     found = []
     for block in model.blocks:
@@ -31,11 +30,6 @@ def damage(case: Case, model: Model, cohesion: Cohesion | None, comm: Comm) -> l
         values = np.maximum(values, block.row(DAMAGE)) if block.part in counted else values
         found.append(np.maximum(values, _broken(block, held, spent)) if block.part in cohesive else values)
     return found
-
-
-def counting(case: Case) -> set[int]:
-    """The parts of a case whose material's law counts damage."""
-    return {i for i, part in enumerate(case.parts) if _counts(case, part.material)}
 
 
 def spent_energy(f: Facets) -> Floats:
@@ -48,12 +42,6 @@ def spent_energy(f: Facets) -> Floats:
     fallen = np.divide(beyond, law.critical, out=(beyond > 0.0).astype(float), where=law.critical > 0.0)
     left = 0.5 * law.strength * law.critical * np.maximum(1.0 - fallen, 0.0) ** 2
     return np.asarray(np.clip(1.0 - left.mean(axis=1) / f.constants.energy, 0.0, 1.0))
-
-
-def _counts(case: Case, name: str) -> bool:
-    """Whether the law of a material counts damage."""
-    made = material(case, name)
-    return law_of(made).rows(made.strength) > DAMAGE
 
 
 def _facets(cohesion: Cohesion, comm: Comm) -> tuple[Ints, Floats]:

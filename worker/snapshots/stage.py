@@ -12,10 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from conoid.cases import layout, messages
+from conoid.cases import fields, layout, messages
 
 from ..clock import Clock
-from ..output.damage import counting
 from ..output.journal import Journal
 from ..simulation import Simulation
 from .courier import Courier
@@ -43,7 +42,7 @@ class Snapshots:
         self._crowded = len(os.sched_getaffinity(0)) <= sim.comm.size
         self._dropped = 0
         self._asked_for = False
-        self._counting = counting(sim.case)
+        self._counting = fields.counting(sim.case)
         if sim.comm.rank == 0:
             _clear(folder, self._n)
         sim.comm.barrier()

@@ -1,0 +1,23 @@
+"""Which fields of frames a case has, of those that not every case has: ``damage`` and ``fragment``."""
+
+from .library import material
+from .schema import Case
+
+
+def counting(case: Case) -> set[int]:
+    """The parts of a case whose material's law counts damage."""
+    laws = [material(case, part.material).strength for part in case.parts]
+    return {i for i, law in enumerate(laws) if law is not None and law.counts_damage}
+
+
+def damageable(case: Case) -> bool:
+    """Whether anything is damaged: by its law, by cohesive facets that let go, or on the way to a strain of erosion."""
+    cohesive = any(part.fracture is not None and part.fracture.model == "cohesive" for part in case.parts)
+    strained = any(part.erosion is not None and part.erosion.plastic_strain is not None for part in case.parts)
+    return cohesive or strained or bool(counting(case))
+
+
+def lacking(case: Case) -> set[str]:
+    """Those of the two that no frame of the case has."""
+    there = {"damage": damageable(case), "fragment": case.fractures}
+    return {name for name, has in there.items() if not has}
