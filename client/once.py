@@ -48,8 +48,9 @@ def run_once(
         raise UsageError(f"field = {field!r}: allowed: {', '.join(FIELDS)}")
     data = data_of(case, overrides)
     checked = parse_case(data)
-    if field in fields.lacking(checked):
-        raise UsageError(f"field = {field!r}: no frame of {checked.name} will have it")
+    if field in (lacking := fields.lacking(checked)):
+        allowed = ", ".join(name for name in FIELDS if name not in lacking)
+        raise UsageError(f"field = {field!r}: no frame of {checked.name} has it; allowed: {allowed}")
     out = PlainConsole(quiet=as_json, highlight=False)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     server = LocalServer(runs, checked.run.ranks)

@@ -348,7 +348,7 @@ def test_run_refuses_a_wrong_case_before_anything_starts(alone: Path) -> None:
     assert conoid("run", "demo", "--field", "colour").exit_code == 2
     lacking = conoid("run", "taylor_copper", "--view", "bar.png", "--field", "damage", "--out", alone / "runs")
     assert (lacking.exit_code, (alone / "runs").exists()) == (2, False)
-    assert lacking.stderr.startswith("conoid: field = 'damage': no frame of taylor_copper will have it")
+    assert lacking.stderr.startswith("conoid: field = 'damage': no frame of taylor_copper has it; allowed: mises, ")
 
 
 def test_serve_hands_its_options_on(alone: Path) -> None:
