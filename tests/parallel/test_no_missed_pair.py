@@ -17,14 +17,14 @@ import pytest
 from conoid.cases.load import apply_overrides, parse_case, read_data, shipped
 from conoid.cases.schema import Case
 from conoid.worker import simulation, step
-from conoid.worker.contact import domain, search, surface
+from conoid.worker.contact import domain, search
 from conoid.worker.contact.edge_edge import edge_edge
 from conoid.worker.contact.flight import Flight
 from conoid.worker.contact.narrow_phase import ContactRows, Step
 from conoid.worker.contact.node_face import node_face
 from conoid.worker.contact.normals import means
 from conoid.worker.contact.pairs import PairTable
-from conoid.worker.contact.records import AGED, OPEN, CrackSides
+from conoid.worker.contact.records import AGED, OPEN
 from conoid.worker.contact.scene import Scene
 from conoid.worker.contact.search import Things
 from conoid.worker.contact.sides import Sides
@@ -112,12 +112,9 @@ class Brute(Found):
 
     def _sides(self) -> Sides:
         """The whole surface as it is now: what has been laid bare since the last search, without what has left."""
-        exterior, model, comm = self.contact.exterior, self.sim.model, self.sim.comm
-        none = np.zeros((0, 3), np.int32)
-        found = surface.build(model, exterior._planes, [], comm, exterior._edges, CrackSides(none, none), none)
-        found.flags |= exterior.surface.flags
-        found.sharpen(exterior.surface.turned)
-        return Flight(found, model.nodes, exterior.flight.mobility, exterior.size, comm).sides
+        exterior = self.contact.exterior
+        found = exterior._build(exterior.surface.flags, exterior.surface.turned)
+        return Flight(found, self.sim.model.nodes, exterior.flight.mobility, exterior.size, self.sim.comm).sides
 
     def _step(self, sides: Sides, give: float, dt: float) -> Step:
         nodes = self.sim.model.nodes
