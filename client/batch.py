@@ -17,8 +17,9 @@ from conoid.cases.batch import Job, Slurm
 from conoid.cases.load import parse_case, resolved_json
 from conoid.cases.run import State
 
+from .console import echo, echo_json
 from .errors import ClientError
-from .options import CaseArgument, Json, Overrides, show_json, warn_of
+from .options import CaseArgument, Json, Overrides, warn_of
 from .result import LocalFolder
 from .submission import data_of, locate
 
@@ -60,9 +61,9 @@ def batch_run(
     words = [*(overrides or ()), *([f"run.ranks={ranks}"] if ranks is not None else [])]
     handed = hand_over(case, words, out, profile, slurm_of(site))
     if as_json:
-        show_json({"folder": str(handed.folder), "job": handed.job, "attempt": handed.attempt})
+        echo_json({"folder": str(handed.folder), "job": handed.job, "attempt": handed.attempt})
     else:
-        typer.echo(f"job {handed.job}  profile {handed.profile}  folder {handed.folder}")
+        echo(f"job {handed.job}  profile {handed.profile}  folder {handed.folder}")
 
 
 def slurm_of(site: Path | None) -> Slurm:

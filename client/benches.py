@@ -13,6 +13,7 @@ from conoid.cases.schema import MOST_RANKS
 from conoid.cases.units import parse_quantity
 
 from . import chart, study
+from .console import echo
 from .errors import UsageError
 from .options import CaseArgument, Overrides, aloud, complain
 from .projection import Network, bandwidth
@@ -54,7 +55,7 @@ def bench_scale(
         save_text(out / "scale.md", study.to_markdown(done))
         save_text(out / "scale.json", study.to_json(done))
         save_text(out / "scale.svg", chart.speed_up(done))
-    typer.echo(study.to_markdown(done), nl=False)
+    echo(study.to_markdown(done), nl=False)
     raise typer.Exit(ExitCode.SUCCEEDED if done.equal else ExitCode.CRASHED)
 
 

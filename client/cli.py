@@ -5,7 +5,7 @@ import os
 import sys
 from importlib import metadata
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import typer
 from typer.core import TyperGroup
@@ -20,6 +20,7 @@ from conoid.cases.run import ExitCode
 
 from . import benches, commands, converging, hard, reports, shelf, sweeping, tables, viewing
 from .batch import batch_run
+from .console import echo, echo_json, one_line, prepare
 from .errors import ClientError
 from .once import run_once
 from .options import (
@@ -28,12 +29,14 @@ from .options import (
     Overrides,
     complain,
     show,
-    show_json,
     warn,
     warn_of,
 )
 from .pictures import FIELDS
 from .submission import data_of, locate
+
+_Mistake = cast(type[typer.BadParameter], typer.BadParameter.__base__)
+"""What typer raises for words that are no command, option or value; it has no public name."""
 
 
 class Guarded(TyperGroup):
@@ -54,6 +57,9 @@ class Guarded(TyperGroup):
                 raise
             complain(f"{error.filename}: {error.strerror}" if error.filename else str(error))
             raise typer.Exit(1) from None
+        except _Mistake as error:
+            error.message = one_line(error.message)
+            raise
         except KeyboardInterrupt:
             raise typer.Exit(130) from None
 
@@ -67,7 +73,7 @@ app.add_typer(benches.bench, name="bench")
 
 def _version(asked: bool) -> None:
     if asked:
-        typer.echo(f"conoid {metadata.version('conoid')}")
+        echo(f"conoid {metadata.version('conoid')}")
         raise typer.Exit
 
 
@@ -110,7 +116,7 @@ def validate(case: CaseArgument, overrides: Overrides = None, as_json: Json = Fa
         raise CaseError([Problem("parts", "", "the elements are too many or too small to be counted")]) from None
     odd = doubts(data, checked, expected)
     if as_json:
-        show_json({"name": checked.name, "valid": True, "warnings": odd, "estimate": expected, "loads": loads(checked)})
+        echo_json({"name": checked.name, "valid": True, "warnings": odd, "estimate": expected, "loads": loads(checked)})
         return
     warn(odd)
     show(f"{checked.name}: valid{f', {len(odd)} warning' + 's' * (len(odd) > 1) if odd else ''}")
@@ -174,6 +180,7 @@ app.command(short_help="List the material library, or one material.")(shelf.mate
 
 def main() -> None:
     """The entry point ``conoid``."""
+    prepare()
     app()
 
 

@@ -4,7 +4,6 @@ import sys
 from pathlib import Path
 from typing import Annotated
 
-import msgspec
 import typer
 
 from conoid.cases import layout
@@ -12,6 +11,7 @@ from conoid.cases.run import ExitCode, State
 
 from . import tables
 from .batch import cancel_folder, commands_of
+from .console import echo, echo_json
 from .errors import UnfinishedError, UsageError
 from .following import FolderRun
 from .live import Live, exit_code
@@ -29,7 +29,6 @@ from .options import (
     labels_of,
     named,
     show,
-    show_json,
     show_lines,
     warn_of,
 )
@@ -68,9 +67,9 @@ def submit(
     with connect(url, token) as session:
         run = session.submit(case, overrides or (), key, labels_of(label), profile, priority)
         if as_json:
-            show_json(run.status())
+            echo_json(run.status())
         else:
-            typer.echo(run.id)
+            echo(run.id)
 
 
 def restart(
@@ -84,9 +83,9 @@ def restart(
     with connect(url, token) as session:
         made = session.restart(find(session, run).id, ranks)
         if as_json:
-            show_json(made.status())
+            echo_json(made.status())
         else:
-            typer.echo(made.id)
+            echo(made.id)
 
 
 def list_runs(
@@ -101,11 +100,11 @@ def list_runs(
     with connect(url, token) as session:
         runs = session.runs([one.value for one in state or ()], limit, labels_of(label))
     if as_json:
-        show_json([run.listed for run in runs])
+        echo_json([run.listed for run in runs])
     elif runs:
         show_lines(tables.runs_table(runs))
     else:
-        typer.echo("no runs")
+        echo("no runs")
 
 
 def show_run(run: RunArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
@@ -113,7 +112,7 @@ def show_run(run: RunArgument, url: Url = None, token: Token = None, as_json: Js
     with connect(url, token) as session:
         info = find(session, run).status()
     if as_json:
-        show_json(info)
+        echo_json(info)
         return
     show(tables.run_table(info))
     if info.outcome is not None:
@@ -161,22 +160,22 @@ def _print_messages(run: Run | FolderRun) -> Live:
     known = Live(run.id)
     for message in run.messages():
         known.take(message)
-        typer.echo(msgspec.json.encode(message).decode())
+        echo_json(message, indent=False)
         sys.stdout.flush()
     return known
 
 
 def _tell(info: RunInfo, text: str, as_json: bool) -> None:
     if as_json:
-        show_json(info)
+        echo_json(info)
     else:
-        typer.echo(text)
+        echo(text)
 
 
 def cancel(run: RunArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
     """Stop a run at its next step; of a run without a server, name the folder."""
     if Path(run).is_dir():
-        typer.echo(cancel_folder(Path(run)))
+        echo(cancel_folder(Path(run)))
         return
     with connect(url, token) as session:
         info = find(session, run).cancel()
@@ -212,7 +211,7 @@ def get(
     with connect(url, token) as session:
         found = find(session, run)
         if as_json:
-            show_json(found.files())
+            echo_json(found.files())
             return
         target = out or Path(found.id)
         every = (file.path for file in found.files())
@@ -225,6 +224,6 @@ def get(
                 complain(str(error))
                 lacks = True
             else:
-                typer.echo(str(fetched))
+                echo(str(fetched))
         if lacks:
             raise typer.Exit(ExitCode.CRASHED)

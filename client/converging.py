@@ -14,6 +14,7 @@ from conoid.cases.run import ExitCode
 from conoid.cases.schema import Case
 
 from . import converged
+from .console import echo
 from .converged import Book
 from .convergence import Done, run_all, series
 from .errors import UsageError
@@ -110,7 +111,7 @@ def _write(book: Book, quantity: str | None, out: Path | None) -> None:
         save_text(out / "converge.md", text)
         save_text(out / "converge.json", converged.to_json(book, quantity))
         drawing("curves").save(drawing("pareto").figure(book), out / "converge.png")
-    typer.echo(text, nl=False)
+    echo(text, nl=False)
 
 
 def _numbers(option: str, text: str) -> list[float]:

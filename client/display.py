@@ -12,6 +12,7 @@ from rich.text import Text
 from conoid.cases.messages import Energy, Log, Snapshot
 from conoid.cases.run import State
 
+from .console import one_line
 from .figures import clock, count, duration, si
 from .live import Live
 
@@ -173,7 +174,7 @@ def _residual(residual: float) -> Text:
 def _log_line(entry: Log) -> Text:
     text = Text(overflow="ellipsis", no_wrap=True)
     text.append(f"{clock(entry.wall)} ", style="bright_black")
-    return text.append(f"[{entry.rank}] {entry.text}", style=_LEVEL_STYLE.get(entry.level, "default"))
+    return text.append(one_line(f"[{entry.rank}] {entry.text}"), style=_LEVEL_STYLE.get(entry.level, "default"))
 
 
 def seen(snapshot: Snapshot) -> str:

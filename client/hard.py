@@ -18,6 +18,7 @@ from conoid.cases.schema import Case
 from conoid.cases.suite import Hard, drift, faults, is_free, suite
 
 from .columns import Columns
+from .console import echo
 from .errors import UsageError
 from .figures import count, known, rough
 from .local import LocalServer
@@ -56,7 +57,7 @@ def hard(
     some = chosen(suite(), names or ())
     if listed:
         rows = [[each.name, " ".join(each.rows), each.case, " ".join(each.changes)] for each in some]
-        typer.echo(table(("name", "rows", "case", "changes"), rows))
+        echo(table(("name", "rows", "case", "changes"), rows))
         return
     with (
         tempfile.TemporaryDirectory() as passing,
@@ -72,7 +73,7 @@ def hard(
     if out is not None:
         save_text(out / "hard.md", text)
         save_text(out / "hard.json", msgspec.json.format(msgspec.json.encode(ended), indent=1))
-    typer.echo(text, nl=False)
+    echo(text, nl=False)
     raise typer.Exit(ExitCode.CRASHED if any(verdict.faults for verdict in ended) else ExitCode.SUCCEEDED)
 
 

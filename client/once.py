@@ -3,8 +3,8 @@
 import signal
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
-import msgspec
 from rich.console import Console
 
 from conoid.cases import fields
@@ -14,7 +14,7 @@ from conoid.cases.run import ExitCode
 from conoid.cases.schema import Case
 
 from . import silence, tables
-from .console import PlainConsole
+from .console import PlainConsole, echo_json, one_line
 from .errors import UsageError
 from .live import Live, exit_code
 from .local import GRACE, LocalServer
@@ -51,7 +51,7 @@ def run_once(
     if field in (lacking := fields.lacking(checked)):
         allowed = ", ".join(name for name in FIELDS if name not in lacking)
         raise UsageError(f"field = {field!r}: no frame of {checked.name} has it; allowed: {allowed}")
-    out = PlainConsole(quiet=as_json, highlight=False)
+    out = PlainConsole(quiet=as_json)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     server = LocalServer(runs, checked.run.ranks)
     with ExitStack() as up:
@@ -68,7 +68,7 @@ def run_once(
                 drawn = view(result, field or _telling_field(checked), picture)
             out.print(f"picture    {drawn.out}", soft_wrap=True)
     if as_json:
-        print(_document(run.id, result, info, drawn))
+        echo_json(_document(run.id, result, info, drawn))
     return _code(info, check)
 
 
@@ -83,7 +83,7 @@ def _follow(run: Run, case: Case, out: Console, plain: bool) -> RunInfo:
             if out.is_terminal and not plain and not out.quiet:
                 show(messages, known, out)
             else:
-                tell(messages, known, lambda text: out.print(text, markup=False, soft_wrap=True))
+                tell(messages, known, lambda text: out.print(one_line(text), soft_wrap=True))
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
@@ -111,10 +111,9 @@ def _telling_field(case: Case) -> str:
     return "plastic_strain" if yields else "mises"
 
 
-def _document(run: str, result: Result, info: RunInfo, drawn: Drawn | None) -> str:
+def _document(run: str, result: Result, info: RunInfo, drawn: Drawn | None) -> dict[str, Any]:
     folder = result.folder.path("case.resolved.json").parent
-    document = {"run": run, "folder": str(folder), "state": info.state, "outcome": info.outcome_json, "picture": drawn}
-    return msgspec.json.format(msgspec.json.encode(document), indent=2).decode()
+    return {"run": run, "folder": str(folder), "state": info.state, "outcome": info.outcome_json, "picture": drawn}
 
 
 def _code(info: RunInfo, check: bool) -> int:

@@ -4,9 +4,8 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-import msgspec
 import typer
 from rich.console import RenderableType
 
@@ -16,7 +15,7 @@ from conoid.cases.plausible import doubts
 from conoid.cases.problems import Problem
 
 from . import silence
-from .console import PlainConsole, plain
+from .console import PlainConsole, echo, one_line
 from .errors import ClientError, NotFoundError, UsageError
 from .figures import duration
 from .result import Result
@@ -105,7 +104,7 @@ def labels_of(words: Sequence[str] | None) -> dict[str, str]:
 def complain(*lines: str) -> None:
     """Tells people what is wrong, a line each."""
     for line in lines:
-        typer.echo(f"conoid: {plain(line)}", err=True)
+        echo(f"conoid: {one_line(line)}", err=True)
 
 
 def warn(odd: Sequence[Problem]) -> None:
@@ -125,20 +124,15 @@ def warn_of(case: str, overrides: Iterable[str]) -> None:
 
 def show(thing: RenderableType) -> None:
     """Prints for people."""
-    PlainConsole(highlight=False).print(thing)
+    PlainConsole().print(thing)
 
 
 def show_lines(rows: RenderableType) -> None:
     """Prints a table of one line an entry; what is not a terminal has no width, and gets the lines whole."""
-    console = PlainConsole(highlight=False)
+    console = PlainConsole()
     if not console.is_terminal:
         console.width = _NO_WIDTH
     console.print(rows)
-
-
-def show_json(thing: Any) -> None:
-    """Prints for scripts: one JSON document."""
-    typer.echo(msgspec.json.format(msgspec.json.encode(thing), indent=2).decode())
 
 
 @contextmanager

@@ -11,8 +11,9 @@ from conoid.cases.schema import Balance
 from . import compare as comparing
 from . import replay, tables
 from . import report as reporting
+from .console import echo, echo_json
 from .errors import ViewError
-from .options import Json, SourceArgument, Token, Url, aloud, opened, show, show_json
+from .options import Json, SourceArgument, Token, Url, aloud, opened, show
 from .pictures import require_field
 
 figures = typer.Typer(no_args_is_help=True, help="Charts from what a run has told.")
@@ -34,7 +35,7 @@ def energy_figure(source: SourceArgument, out: OutArgument, url: Url = None, tok
     """Draw the energy ledger over time, also without its kinetic term, the residual, and each part's energy."""
     curves = drawing("curves")
     with opened(source, url, token) as result, aloud(f"drawing {out}"):
-        typer.echo(curves.save(curves.energy(result.history), out))
+        echo(curves.save(curves.energy(result.history), out))
 
 
 @figures.command(name="dt")
@@ -42,7 +43,7 @@ def dt_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: 
     """Draw the length of the time step, and what holds it down."""
     curves = drawing("curves")
     with opened(source, url, token) as result, aloud(f"drawing {out}"):
-        typer.echo(curves.save(curves.steps(result.history), out))
+        echo(curves.save(curves.steps(result.history), out))
 
 
 @figures.command(name="fragments")
@@ -51,7 +52,7 @@ def fragments_figure(source: SourceArgument, out: OutArgument, url: Url = None, 
     curves = drawing("curves")
     with opened(source, url, token) as result, aloud(f"drawing {out}"):
         tables_of = [result.fragments_of(index) for index in result.fragment_tables]
-        typer.echo(curves.save(curves.fragments(tables_of), out))
+        echo(curves.save(curves.fragments(tables_of), out))
 
 
 @figures.command(name="history")
@@ -68,7 +69,7 @@ def history_figure(
     """Draw columns of history.csv over time, those of one unit in one panel."""
     curves = drawing("curves")
     with opened(source, url, token) as result, aloud(f"drawing {out}"):
-        typer.echo(curves.save(curves.columns(result.history, column or ()), out))
+        echo(curves.save(curves.columns(result.history, column or ()), out))
 
 
 def report(
@@ -88,7 +89,7 @@ def report(
         target = out or Path(f"{result.folder.name}.html")
         with aloud("reading the run") as at:
             written = reporting.write(result, target, field if pictures else (), at)
-        typer.echo(written)
+        echo(written)
 
 
 def compare(
@@ -110,12 +111,12 @@ def compare(
             curves = drawing("curves")
             curves.save(curves.comparison(comparing.material(first, second, column or ())), out)
     if as_json:
-        show_json(found)
+        echo_json(found)
         return
     for each in tables.comparison_tables(found):
         show(each)
     if out is not None:
-        typer.echo(out)
+        echo(out)
 
 
 @figures.command(name="balance")
@@ -125,7 +126,7 @@ def balance_figure(source: SourceArgument, out: OutArgument, url: Url = None, to
     with opened(source, url, token) as result, aloud(f"drawing {out}"):
         name = str(result.case["name"])
         charts.balance(charts.course(result.messages), f"{name}, {result.folder.name}", name, out)
-    typer.echo(out)
+    echo(out)
 
 
 def replay_balance(
@@ -151,10 +152,10 @@ def replay_balance(
     other, each = replay.chosen(spec, policy or spec.policy, alpha), record.cost if cost is None else cost
     accounts = replay.compare(record, other, ranks or record.happened.ranks, each, (x, y, z))
     if as_json:
-        show_json({"policies": accounts, "run": record.happened, "cost": each, "heaviest_group": record.heaviest})
+        echo_json({"policies": accounts, "run": record.happened, "cost": each, "heaviest_group": record.heaviest})
         return
     show(tables.balance_table(accounts, record.happened))
-    typer.echo(
+    echo(
         f"on {accounts[0].ranks} ranks, the run had {record.happened.ranks}; a cut costs {each:.3g} s; "
         f"{len(record.moments)} moments, {len(record.centres)} groups, "
         f"of which the heaviest has {record.heaviest:.1%} of the work"

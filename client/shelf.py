@@ -9,8 +9,9 @@ from conoid.cases import library, load, reference
 from conoid.cases.page import page
 
 from . import tables
+from .console import echo, echo_json
 from .errors import ClientError, UsageError
-from .options import Json, complete_cases, complete_materials, show, show_json
+from .options import Json, complete_cases, complete_materials, show
 from .saving import save_text
 
 cases = typer.Typer(invoke_without_command=True, help="The shipped cases: list them, copy one.")
@@ -24,7 +25,7 @@ def schema(
     """Print the keys of a case: as JSON schema, for editors, or as a page with unit, range, default and meaning."""
     text = page() if as_page else reference.schema_text()
     if out is None:
-        typer.echo(text, nl=False)
+        echo(text, nl=False)
     else:
         save_text(out, text)
 
@@ -39,13 +40,13 @@ def materials(
     if name is None:
         known = library.library()
         if as_json:
-            show_json(sorted(known))
+            echo_json(sorted(known))
         else:
             show(tables.materials_table(known))
         return
     found = library.constants(name)
     if as_json:
-        show_json(found)
+        echo_json(found)
         return
     show(f"{name}: {library.library()[name].description}")
     show(tables.constants_table(found))
@@ -60,7 +61,7 @@ def list_cases(ctx: typer.Context, as_json: Json = False) -> None:
         return
     known = {name: load.read_case(path) for name, path in load.shipped().items()}
     if as_json:
-        show_json(
+        echo_json(
             [{"name": name, "title": case.title, "description": case.description} for name, case in known.items()]
         )
     else:
@@ -80,6 +81,6 @@ def copy_case(
     if target.exists():
         raise ClientError(f"{target} is there already; name another file with --out")
     save_text(target, text.replace(f"{reference.LINE} ../{reference.FILE}", f"{reference.LINE} ./{reference.FILE}", 1))
-    typer.echo(str(target))
+    echo(str(target))
     save_text(target.with_name(reference.FILE), reference.schema_text())
-    typer.echo(str(target.with_name(reference.FILE)))
+    echo(str(target.with_name(reference.FILE)))

@@ -7,8 +7,9 @@ import typer
 
 from conoid.cases.run import State
 
+from .console import echo, echo_json
 from .errors import UsageError
-from .options import CaseArgument, Json, Token, Url, aloud, complain, named, show_json
+from .options import CaseArgument, Json, Token, Url, aloud, complain, named
 from .saving import save_text
 from .session import connect
 from .sweep import SweepInfo, SweepPoint, points_in, points_of
@@ -54,9 +55,9 @@ def sweep(
             )
             raise
     if as_json:
-        show_json(info)
+        echo_json(info)
     else:
-        typer.echo(info.id)
+        echo(info.id)
     failed = [point for point in info.points if wait and point.run.state is not State.SUCCEEDED]
     if failed:
         complain(told(failed, info.total))
@@ -82,10 +83,10 @@ def sweep_table(
     with connect(url, token) as session, aloud("reading the sweep"):
         text = session.find_sweep(sweep).csv()
     if out is None:
-        typer.echo(text, nl=False)
+        echo(text, nl=False)
     else:
         save_text(out, text)
-        typer.echo(str(out))
+        echo(str(out))
 
 
 def sweep_plot(
@@ -104,7 +105,7 @@ def sweep_plot(
     with connect(url, token) as session:
         with aloud(f"drawing {out}"):
             drawn = session.find_sweep(sweep).plot(out, columns or (), x)
-        typer.echo(str(drawn))
+        echo(str(drawn))
 
 
 def sweep_cancel(sweep: SweepArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
@@ -112,6 +113,6 @@ def sweep_cancel(sweep: SweepArgument, url: Url = None, token: Token = None, as_
     with connect(url, token) as session:
         info: SweepInfo = session.find_sweep(sweep).cancel()
     if as_json:
-        show_json(info)
+        echo_json(info)
     else:
-        typer.echo(f"{info.id} {'has ended' if info.over else 'cancelling'}")
+        echo(f"{info.id} {'has ended' if info.over else 'cancelling'}")

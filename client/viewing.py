@@ -5,8 +5,9 @@ from typing import Annotated, Any
 
 import typer
 
+from .console import echo, echo_json
 from .figures import si
-from .options import Json, Token, Url, aloud, complain, find, show_json
+from .options import Json, Token, Url, aloud, complain, find
 from .pictures import FIELDS, SMALLEST
 from .result import seconds
 from .session import connect
@@ -72,9 +73,9 @@ def view_frames(
                 drawn = view(find(session, source).result(), field, **options)
     _tell_of_times(options["time"], drawn.times)
     if as_json:
-        show_json(drawn)
+        echo_json(drawn)
     else:
-        typer.echo(drawn.out)
+        echo(drawn.out)
 
 
 def _tell_of_times(asked: list[float], drawn: list[float | None]) -> None:

@@ -13,7 +13,7 @@ from conoid.cases.messages import AnyMessage, Log, Progress, Snapshot, Status
 from conoid.cases.run import State
 
 from . import silence
-from .console import PlainConsole
+from .console import PlainConsole, one_line
 from .display import line, panel, seen
 from .errors import ClientError, UnreachableError
 from .figures import clock, duration
@@ -59,7 +59,7 @@ def watch(run: Watched, live: bool | None = None, console: Console | None = None
     with explained(run, known):
         if out.is_terminal if live is None else live:
             return show(messages, known, out)
-        return tell(messages, known, lambda text: out.print(text, highlight=False, markup=False, soft_wrap=True))
+        return tell(messages, known, lambda text: out.print(one_line(text), soft_wrap=True))
 
 
 @contextmanager

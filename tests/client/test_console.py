@@ -1,30 +1,137 @@
-"""Titles and messages reach the terminal as text."""
+"""Titles, messages and names reach the terminal as text, from whatever command."""
 
+import ast
 import io
+import json
+from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
+from typer.testing import CliRunner, Result
 
-from conoid.client.console import PlainConsole, plain
+from conoid.cases import layout, messages
+from conoid.client.cli import app
+from conoid.client.console import PlainConsole, one_line, plain
 
-EVIL = ["\x1b]0;owned\x07", "\x1b[2J", "\x9b31m", "\x1b]52;c;cm0=\x07", "a\rb", "\x08\x08", "\u202egnp.exe"]
+from .hostile import EVIL, OBEYED, Hostile, hostile, run_info, said
+
+CLIENT = Path(__file__).parents[2] / "client"
+SEQUENCES = ["\x1b]0;owned\x07", "\x1b[2J", "\x9b31m", "\x1b]52;c;cm0=\x07", "a\rb", "\x08\x08", "\u202egnp.exe"]
 
 
-@pytest.mark.parametrize("evil", EVIL)
-def test_what_a_terminal_would_obey_is_replaced(evil: str) -> None:
+@pytest.fixture
+def server(quiet_home: Path) -> Iterator[Hostile]:
+    with hostile() as made:
+        yield made
+
+
+def conoid(server: Hostile, *words: str) -> Result:
+    return CliRunner().invoke(app, [*words, "--url", server.url])
+
+
+def obeyed(text: str) -> set[str]:
+    """What a terminal would obey, or not show."""
+    return OBEYED & set(text)
+
+
+@pytest.mark.parametrize("evil", [*SEQUENCES, EVIL])
+def test_what_a_terminal_would_obey_is_escaped(evil: str) -> None:
     out = io.StringIO()
     console = PlainConsole(file=out, force_terminal=True, color_system="truecolor", width=80)
     table = Table(title=evil)
     table.add_column(evil)
-    table.add_row(Text(f"a {evil} b", style="bold"))
+    table.add_row(Text(f"a {evil} b", style="bold"), evil)
     for thing in (evil, Text(evil), Panel(evil, title=Text(evil)), table):
-        console.print(thing, markup=False)
+        console.print(thing)
     said = out.getvalue()
     assert evil not in said
+    assert not obeyed(said) - {"\x1b"}
     assert "\x1b[" in said, "its own colours stay"
 
 
 def test_a_line_of_text_stays_as_it_is() -> None:
-    assert plain("210 m/s, µs, °, tab\tand\nline") == "210 m/s, µs, °, tab\tand\nline"
+    text = "210 m/s, µs, °, tab\tand\nline\r\nüñ漢字 🙂 [0] a\\b"
+    assert plain(text) == text
+    assert one_line("one\ntwo\r\nthree") == "one\\ntwo\\nthree"
+
+
+def test_half_a_character_is_escaped() -> None:
+    """The name of a file that is no UTF-8."""
+    assert plain("a\udce4b") == "a\\udce4b"
+
+
+def test_an_escape_is_right_in_json() -> None:
+    assert json.loads(plain(json.dumps(EVIL, ensure_ascii=False))) == EVIL
+
+
+def test_one_module_prints() -> None:
+    """``render`` is a program of its own, whose output is read by another one."""
+    printing = {"print", "typer.echo", "typer.secho", "Console"}
+    found = {
+        path.name
+        for path in CLIENT.glob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call) and ast.unparse(node.func) in printing
+    }
+    assert found == {"console.py", "render.py"}
+
+
+TEXTS = dict.fromkeys(("owner", "name", "message", "reason", "title", "cause"), EVIL)
+RUN = run_info(**TEXTS, labels={EVIL: EVIL})
+ASKED = {
+    "/v1/runs": {"runs": [RUN], "next": None},
+    "/v1/runs/a": RUN,
+    "/v1/runs/a/files": {"files": [{"path": EVIL.replace("\0", ""), "size": 1}]},
+    "/v1/runs/a:cancel": RUN,
+    "/v1/sweeps/b": {"id": "b", "name": EVIL, "submitted": 0.0, "total": 0, "states": {}, "points": []},
+}
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("ls",), ("ls", "--json"), ("show", "a"), ("show", "a", "--json"), ("show", "last"), ("cancel", "a"),
+        ("cancel", "a", "--json"), ("get", "a", "--json"), ("get", "a"), ("get", "a", "none"), ("sweep-table", "b"),
+        ("checkpoint", "a"), ("submit", "demo"), ("view", "a"), ("report", "a"), ("compare", "a", "a"),
+    ],
+)  # fmt: skip
+def test_no_command_prints_what_a_terminal_would_obey(words: tuple[str, ...], server: Hostile) -> None:
+    refusal = said({"title": EVIL, "detail": EVIL, "hint": EVIL}, 409)
+    server.answers = {path: said(data) for path, data in ASKED.items()}
+    server.answers |= {"/v1/sweeps/b/table": said(EVIL.encode(), kind="text/csv"), "/v1/runs/a:checkpoint": refusal}
+    if words[0] == "submit":
+        server.answers["/v1/runs"] = refusal
+    result = conoid(server, *words)
+    assert result.exception is None or isinstance(result.exception, SystemExit), repr(result.exception)
+    assert not obeyed(result.output)
+    assert result.output.strip()
+    if "--json" in words and words[0] != "get":
+        told = json.loads(result.stdout)
+        assert (told[0] if isinstance(told, list) else told)["message"] == EVIL
+
+
+@pytest.mark.parametrize("more", [(), ("--json",), ("--plain",)])
+def test_a_folder_prints_nothing_that_a_terminal_would_obey(more: tuple[str, ...], quiet_home: Path) -> None:
+    folder = quiet_home / "run\x1b[31m"
+    folder.mkdir()
+    told: list[messages.AnyMessage] = [
+        messages.Status(run=EVIL, seq=1, state="running", message=EVIL),
+        messages.Log(run=EVIL, seq=2, level="error", text=f"one\nconoid: two {EVIL}"),
+        messages.Status(run=EVIL, seq=3, state="failed", message=EVIL, cause="crash"),
+    ]
+    (folder / layout.JOURNAL).write_bytes(b"".join(messages.to_json(each) + b"\n" for each in told))
+    (folder / layout.RESOLVED_CASE).write_text(json.dumps({"title": EVIL}))
+    result = CliRunner().invoke(app, ["watch", str(folder), *more])
+    assert result.exit_code == 1, repr(result.exception)
+    assert not obeyed(result.output)
+    assert not any(line.startswith("conoid: two") for line in result.output.splitlines())
+
+
+def test_words_that_are_no_command_are_escaped(quiet_home: Path) -> None:
+    for words in (["\x1b[31m"], ["ls", "--\x1b[31m"], ["ls", "--state", "\x1b[31m"]):
+        result = CliRunner().invoke(app, words)
+        assert result.exit_code == 2
+        assert "\x1b[31m" not in result.output
