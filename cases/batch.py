@@ -20,11 +20,11 @@ import shlex
 import tomllib
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import msgspec
 
-from . import layout, policy
+from . import layout, policy, whole
 from .units import parse_quantity
 
 
@@ -88,11 +88,19 @@ class Site(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True
     retention: policy.Retention = policy.Retention()
 
 
+_Name = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,127}\Z")]
+_Number = Annotated[str, msgspec.Meta(pattern=r"^([0-9]+(_[0-9]+)?)?\Z")]
+"""What stands in a record is given to commands: it can be none of their options."""
+
+
 class Job(msgspec.Struct, kw_only=True, frozen=True):
-    """job.json: what a job of the batch system runs. It is on disk before the batch system hears of it."""
+    """job.json: what a job of the batch system runs. It is on disk before the batch system hears of it.
+
+    Who looks at a folder believes nothing in it but the name and the number: ``command`` and ``bin`` are for the job.
+    """
 
     run: str
-    name: str
+    name: _Name
     """Of the job; no other job has it, so that a job is found whose number nobody could note."""
     attempt: int
     ranks: int
@@ -109,7 +117,7 @@ class Job(msgspec.Struct, kw_only=True, frozen=True):
     """Its place in an array, one job for several runs; None: a job of its own."""
     array: str = ""
     """The folder of the array."""
-    job: str = ""
+    job: _Number = ""
     """The number that the batch system gave; empty until it is known."""
     accounting: dict[str, str] = {}
     """What the batch system tells of a job that has ended."""
@@ -245,7 +253,7 @@ def starter(profile: Profile, ranks: int, found: Callable[[], Sequence[str]]) ->
 def read_job(folder: Path) -> Job | None:
     """The record in a run's folder; None when there is none. Raises OSError, msgspec.MsgspecError."""
     try:
-        return _job.decode((folder / layout.JOB).read_bytes())
+        return _job.decode(whole.read(folder / layout.JOB))
     except FileNotFoundError:
         return None
 

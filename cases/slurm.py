@@ -231,7 +231,7 @@ def requeue(place: str, job: str) -> None:
 def held(folder: Path) -> bool:
     """True while a rank 0 writes into the run's folder, on whatever node."""
     try:
-        with open(folder / layout.LOCK, "rb") as lock:
+        with open(os.open(folder / layout.LOCK, os.O_RDONLY | os.O_NONBLOCK), "rb") as lock:
             fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except FileNotFoundError:
         return False

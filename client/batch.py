@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
+import msgspec
 import typer
 
 from conoid.cases import batch, layout, messages, slurm, whole
@@ -77,10 +78,12 @@ def slurm_of(site: Path | None) -> Slurm:
     return settings or Slurm(profiles={"default": batch.Profile()})
 
 
-def commands_of(folder: Path) -> str:
-    """Where the commands are of the Slurm that a run's folder was handed to; empty: in PATH. Raises ClientError."""
-    job = batch.read_job(folder)
-    return job.bin if job is not None and job.bin else slurm_of(None).bin
+def job_of(folder: Path) -> Job | None:
+    """The record in a run's folder; None when there is none. Raises ClientError for one that cannot be read."""
+    try:
+        return batch.read_job(folder)
+    except msgspec.MsgspecError as error:
+        raise ClientError(f"{folder / layout.JOB}: this record cannot be read: {error}") from None
 
 
 def hand_over(case: str, overrides: Iterable[str], out: Path | None, profile: str, site: Slurm) -> Handed:
@@ -112,7 +115,7 @@ def _known(folder: Path, resolved: bytes, profile: str, site: Slurm) -> Job | No
     """The record of a folder that was handed over before: of its job, or of a next one when that is lost. Raises
     ClientError where it is of another case, or of another ``profile`` than the one that is asked for.
     """
-    job = batch.read_job(folder)
+    job = job_of(folder)
     if job is None:
         if any(folder.iterdir()):
             raise ClientError(f"{folder}: not empty, and no run of Slurm; --out names another folder")
@@ -123,14 +126,14 @@ def _known(folder: Path, resolved: bytes, profile: str, site: Slurm) -> Job | No
         raise ClientError(f"{folder}: handed to Slurm with another case or other ranks; --out names another folder")
     if profile not in ("", job.profile):
         raise ClientError(f"{folder}: handed to Slurm with the profile {job.profile!r}; --out names another folder")
+    chosen = batch.profile_of(site, job.profile)
+    command = _command(folder, job.ranks, chosen[1])
     known = slurm.jobs(site.bin, job.name)
     if not job.job or any(entry.state not in slurm.FINAL for entry in known) or slurm.held(folder):
-        return job
+        return _written(folder, msgspec.structs.replace(job, command=command, bin=site.bin), chosen[1])
     (folder / layout.STOP_REQUEST).unlink(missing_ok=True)
-    chosen = batch.profile_of(site, job.profile)
-    fresh = batch.new_job(job.run, job.ranks, chosen, job.command, time.time(), job.attempt + 1, site.bin)
-    whole.write(folder / layout.JOB, batch.to_json(fresh))
-    return fresh
+    fresh = batch.new_job(folder.name, job.ranks, chosen, command, time.time(), job.attempt + 1, site.bin)
+    return _written(folder, fresh, chosen[1])
 
 
 def _prepared(
@@ -141,13 +144,22 @@ def _prepared(
     case = folder / _CASE
     case.write_text(json.dumps(data, indent=2, default=str), encoding="utf-8")
     (folder / layout.RESOLVED_CASE).write_bytes(resolved)
-    worker = [sys.executable, "-m", "mpi4py", "-m", "conoid.worker", str(case), "--out", str(folder)]
-    command = [*batch.starter(profile[1], ranks, _mpiexec), *worker]
-    command += ["--run", folder.name, "--ranks", str(ranks), "--interruptible"]
-    job = batch.new_job(folder.name, ranks, profile, command, time.time(), place=place)
+    job = batch.new_job(folder.name, ranks, profile, _command(folder, ranks, profile[1]), time.time(), place=place)
     told = messages.Status(run=folder.name, seq=1, wall=time.time(), state=State.QUEUED, message="handed to Slurm")
     (folder / layout.JOURNAL).write_bytes(messages.to_json(told) + b"\n")
-    whole.write(folder / layout.JOB_SCRIPT, batch.script(profile[1], sys.executable).encode(), 0o755)
+    return _written(folder, job, profile[1])
+
+
+def _command(folder: Path, ranks: int, profile: batch.Profile) -> list[str]:
+    """What starts the ranks. It is made anew for every job: a record that lies in a folder chooses no program."""
+    worker = [sys.executable, "-m", "mpi4py", "-m", "conoid.worker", str(folder / _CASE), "--out", str(folder)]
+    words = ["--run", folder.name, "--ranks", str(ranks), "--interruptible"]
+    return [*batch.starter(profile, ranks, _mpiexec), *worker, *words]
+
+
+def _written(folder: Path, job: Job, profile: batch.Profile) -> Job:
+    """The record and the script of a job, on disk."""
+    whole.write(folder / layout.JOB_SCRIPT, batch.script(profile, sys.executable).encode(), 0o755)
     whole.write(folder / layout.JOB, batch.to_json(job))
     return job
 
@@ -172,19 +184,24 @@ def _mpiexec() -> list[str]:
 def cancel_folder(folder: Path) -> str:
     """Asks the run in a folder to stop for good, and Slurm to end its job when that waits; one line that says so.
 
-    Raises UnfinishedError for a folder that is none of a run, OSError.
+    Slurm's commands are those of the site's file, or of PATH; a number in the folder's record is only taken for that of
+    a job whose name is in the record, too. Raises UnfinishedError for a folder that is none of a run, ClientError,
+    OSError.
     """
     LocalFolder(folder).path(layout.JOURNAL)
     if (folder / layout.OUTCOME).exists():
         return f"{folder} has ended"
-    job = batch.read_job(folder)
+    job = job_of(folder)
     if job is None and not slurm.held(folder):
         return f"{folder}: no worker writes into it; a run of a server is cancelled by its id"
-    (folder / layout.STOP_REQUEST).touch()
+    whole.touch(folder / layout.STOP_REQUEST)
     if job is None or not job.job:
         return f"{folder} is asked to stop"
+    place = slurm_of(None).bin
     try:
-        slurm.notify(commands_of(folder), job.job)
+        if not any((entry.job, entry.name) == (job.job, job.key) for entry in slurm.jobs(place, job.name)):
+            return f"{folder} is asked to stop; Slurm has no job {job.job} of the name {job.name}"
+        slurm.notify(place, job.job)
     except slurm.SlurmError as error:
         return f"{folder} is asked to stop; Slurm does not answer: {error}"
     return f"{folder} is asked to stop, job {job.job}"

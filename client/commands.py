@@ -10,7 +10,7 @@ from conoid.cases import layout
 from conoid.cases.run import ExitCode, State
 
 from . import tables
-from .batch import cancel_folder, commands_of
+from .batch import cancel_folder, slurm_of
 from .console import echo, echo_json
 from .errors import UnfinishedError, UsageError
 from .following import FolderRun
@@ -133,7 +133,7 @@ def watch_run(
     """Follow a run until it ends: 0 succeeded, 1 failed, 2 bad input, 4 cancelled. Ctrl-C leaves it running."""
     if Path(run).is_dir():
         LocalFolder(Path(run)).path(layout.JOURNAL)
-        followed = FolderRun(Path(run), commands_of(Path(run)))
+        followed = FolderRun(Path(run), slurm_of(None).bin)
         known = _print_messages(followed) if as_json else watch(followed, False if plain else None)
     else:
         known = _watched(run, plain, url, token, as_json)

@@ -4,10 +4,11 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
-from conoid.cases import batch, layout, slurm
+from conoid.cases import batch, layout, slurm, whole
 from conoid.cases.messages import AnyMessage, Status
 from conoid.cases.outcome import from_json
 from conoid.cases.run import Cause, State
@@ -53,7 +54,7 @@ class FolderRun:
     def status(self) -> Titled:
         """The title of its case, when that is there already."""
         try:
-            case = msgspec.json.decode((self.folder / layout.RESOLVED_CASE).read_bytes())
+            case = msgspec.json.decode(whole.read(self.folder / layout.RESOLVED_CASE), type=dict[str, Any])
         except (OSError, msgspec.MsgspecError):
             return Titled("")
         return Titled(str(case.get("title") or case.get("name", "")))
@@ -100,12 +101,24 @@ class FolderRun:
                 data = file.read()
         except FileNotFoundError:
             return [], offset
-        whole = data[: data.rfind(b"\n") + 1]
-        return whole.splitlines(), offset + len(whole)
+        lines = data[: data.rfind(b"\n") + 1]
+        return lines.splitlines(), offset + len(lines)
+
+    def _job(self) -> batch.Job | None:
+        try:
+            return batch.read_job(self.folder)
+        except (OSError, msgspec.MsgspecError):
+            return None
+
+    def _pending(self, state: State, message: str) -> Iterator[Status]:
+        """That a run in the queue waits, where it is news."""
+        if state is State.QUEUED and message != self._told:
+            self._told = message
+            yield self._said(state, message)
 
     def _outcome(self) -> Status | None:
         try:
-            end = from_json((self.folder / layout.OUTCOME).read_bytes())
+            end = from_json(whole.read(self.folder / layout.OUTCOME))
         except (OSError, msgspec.MsgspecError):
             return None
         return self._said(end.state, end.message, end.cause)
@@ -120,7 +133,7 @@ class FolderRun:
         if time.monotonic() - self._asked <= _ASK_EVERY:
             return
         self._asked = time.monotonic()
-        job = batch.read_job(self.folder)
+        job = self._job()
         if job is None:
             if state in _AT_WORK and not slurm.held(self.folder) and self._outcome() is None:
                 yield self._said(
@@ -129,12 +142,12 @@ class FolderRun:
             return
         try:
             entries = slurm.jobs(self._place, job.name)
-        except slurm.SlurmError:
+        except slurm.SlurmError as error:
+            yield from self._pending(state, f"Slurm does not answer: {error}")
             return
         for entry in entries[:1]:
-            if entry.state in slurm.PENDING and entry.reason != self._told:
-                self._told = entry.reason
-                yield self._said(State.QUEUED, f"Slurm job {entry.job} is pending: {entry.reason}")
+            if entry.state in slurm.PENDING:
+                yield from self._pending(State.QUEUED, f"Slurm job {entry.job} is pending: {entry.reason}")
             elif entry.state in slurm.FINAL and not slurm.held(self.folder):
                 message = f"Slurm job {entry.job} ended as {entry.state} and left no outcome"
                 yield self._outcome() or self._said(State.LOST, message, Cause.NODE)

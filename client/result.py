@@ -14,6 +14,7 @@ import msgspec
 from conoid.cases import fragments, layout, outcome
 from conoid.cases.messages import AnyMessage
 from conoid.cases.outcome import Outcome
+from conoid.cases.run import State
 from conoid.cases.units import parse_quantity
 
 from . import html
@@ -64,10 +65,12 @@ class LocalFolder:
         return sorted(path.relative_to(self.root).as_posix() for path in self.root.rglob("*") if path.is_file())
 
     def path(self, name: str) -> Path:
-        """The file itself."""
+        """The file itself. Raises ClientError for a link that leads elsewhere: what it names is not the run's."""
         path = self.root / name
         if not path.is_file():
             raise UnfinishedError(self._lacks(name))
+        if not path.resolve().is_relative_to(self.root.resolve()):
+            raise ClientError(f"{path}: this link leads out of the run's folder")
         return path
 
     def told(self, name: str) -> str:
@@ -136,7 +139,7 @@ class Result:
         """How the run ended. Raises UnfinishedError before its end."""
         path = self.folder.path(layout.OUTCOME)
         try:
-            return outcome.from_json(path.read_bytes())
+            return outcome_of(path.read_bytes())
         except msgspec.MsgspecError as error:
             raise ClientError(f"{self.folder.told(layout.OUTCOME)}: this outcome cannot be read: {error}") from None
 
@@ -273,6 +276,13 @@ class Result:
             return {entry["name"]: float(entry["time"]) for entry in json.loads(text)["files"]}
         except (UnfinishedError, ValueError, KeyError):
             return {}
+
+
+def outcome_of(text: bytes) -> Outcome:
+    """An outcome as its file or a server has it. Raises msgspec.MsgspecError, also for a state that nobody knows."""
+    ended = outcome.from_json(text)
+    msgspec.convert(ended.state, State)
+    return ended
 
 
 def seconds(time: object) -> float:

@@ -15,7 +15,7 @@ from urllib.parse import quote
 
 import msgspec
 
-from conoid.cases import keys, outcome
+from conoid.cases import keys
 from conoid.cases.messages import AnyMessage, Progress
 from conoid.cases.messages import Snapshot as Told
 from conoid.cases.outcome import Outcome
@@ -26,7 +26,7 @@ from .http import Http
 from .journal import from_line
 from .link import Link
 from .live import Live
-from .result import Result
+from .result import Result, outcome_of
 from .snapshots import Snapshot
 
 _WAIT = 20.0
@@ -85,7 +85,7 @@ class RunInfo(msgspec.Struct, kw_only=True, frozen=True):
         if bytes(self.outcome_json) == b"null":
             return None
         try:
-            return outcome.from_json(bytes(self.outcome_json))
+            return outcome_of(bytes(self.outcome_json))
         except msgspec.MsgspecError as error:
             raise ClientError(f"the outcome of run {self.id} cannot be read: {error}") from None
 

@@ -55,6 +55,14 @@ def test_a_folder_that_is_none_of_a_run_is_not_followed(quiet_home: Path) -> Non
     assert "many is not the folder of a run, it holds those of one" in refused(1, "watch", "many")
 
 
+def test_a_link_out_of_a_folder_is_not_read(damaged: Path) -> None:
+    """A report would carry a file of its reader."""
+    (damaged / layout.RESOLVED_CASE).unlink()
+    (damaged.parent / "secret").write_text("{}")
+    (damaged / layout.RESOLVED_CASE).symlink_to(damaged.parent / "secret")
+    assert refused(1, "report", damaged).endswith("this link leads out of the run's folder")
+
+
 @pytest.mark.parametrize("command", ["watch", "show", "report", "get", "cancel"])
 def test_a_path_at_which_there_is_no_run_asks_no_server(command: str, quiet_home: Path) -> None:
     assert refused(1, command, "runs/none") == (

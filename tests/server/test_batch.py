@@ -1,18 +1,21 @@
 """A run as a job of Slurm without a server: the commands of docs/cluster.md, followed."""
 
 import json
+import os
 import re
 import time
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 
+import msgspec
 import pytest
 from typer.testing import CliRunner, Result
 
-from conoid.cases import batch, layout
+from conoid.cases import batch, layout, whole
 from conoid.cases.run import Cause, State
 from conoid.client import following
-from conoid.client.batch import commands_of
+from conoid.client.batch import slurm_of
 from conoid.client.cli import app
 from conoid.client.following import FolderRun
 
@@ -169,10 +172,79 @@ def test_a_folder_is_handed_over_for_one_case(elsewhere: Path) -> None:
     assert "job 101" in conoid(*words, "--slurm", "standard").stdout
 
 
-def test_a_folder_knows_where_the_commands_of_its_slurm_are(elsewhere: Path) -> None:
-    assert conoid("batch", "two_tets", "--ranks", 1, "--site", elsewhere).exit_code == 0
-    assert conoid("cancel", "runs/two_tets").stdout == "runs/two_tets is asked to stop, job 101\n"
-    assert commands_of(Path("runs/two_tets")) == str(elsewhere.parent / "bin")
+def evil(folder: Path, **changes: str) -> Path:
+    """A folder that somebody else has made: its record names programs of his, which leave a file."""
+    (folder / "bin").mkdir(parents=True)
+    for name in ("squeue", "scancel", "sbatch", "scontrol", "sacct"):
+        (folder / "bin" / name).write_text(f"#!/bin/sh\ntouch {folder}/owned\n")
+        (folder / "bin" / name).chmod(0o755)
+    record = batch.new_job("a", 1, ("standard", batch.Profile()), [str(folder / "bin" / "sbatch")], 0.0)
+    told = {**msgspec.to_builtins(record), "bin": str(folder / "bin"), "job": "7", **changes}
+    (folder / layout.JOB).write_text(json.dumps(told))
+    (folder / layout.JOB_SCRIPT).write_text(f"#!/bin/sh\ntouch {folder}/owned\n")
+    (folder / layout.JOURNAL).write_text('{"type":"status","run":"a","seq":1,"state":"queued"}\n')
+    return folder
+
+
+def test_a_folder_chooses_no_program(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not even by a number that is another job's: Slurm is asked by the site's commands for its name."""
+    monkeypatch.setenv("CONOID_SITE", str(elsewhere))
+    monkeypatch.setattr(following, "_ASK_EVERY", 0.0)
+    monkeypatch.chdir(folder := evil(elsewhere.parent / "theirs"))
+    told = conoid("cancel", ".").stdout
+    assert "Slurm has no job 7" in told
+    assert not (elsewhere.parent / "ended").exists()
+
+    def stop(seconds: float) -> None:
+        raise TimeoutError
+
+    with pytest.raises(TimeoutError):
+        list(FolderRun(folder, slurm_of(None).bin).messages(pause=stop))
+    assert not (folder / "owned").exists()
+
+
+@pytest.mark.parametrize(
+    "changes", [{"job": "--user=me"}, {"job": "7 8"}, {"job": "7\n"}, {"name": "-u"}, {"name": "a,b"}, {"name": "a\n"}]
+)
+def test_what_stands_in_a_record_is_no_option_of_a_command(changes: dict[str, str], elsewhere: Path) -> None:
+    folder = evil(elsewhere.parent / "theirs", **changes)
+    told = conoid("cancel", folder)
+    (line,) = told.stderr.splitlines()
+    assert told.exit_code == 1
+    assert "this record cannot be read" in line
+
+
+def test_a_run_that_goes_on_is_started_by_a_command_of_this_machine(elsewhere: Path) -> None:
+    """The same command again hands a lost run over, whatever its folder says that starts it."""
+    words = ["batch", "two_tets", "--ranks", 1, "--site", elsewhere, "--out", "run"]
+    assert conoid(*words).exit_code == 0
+    folder = elsewhere.parent / "run"
+    record = json.loads((folder / layout.JOB).read_text())
+    (folder / layout.JOB).write_text(json.dumps({**record, "command": ["/bin/evil"], "bin": "/evil"}))
+    (folder / layout.JOB_SCRIPT).write_text("#!/bin/sh\n/bin/evil\n")
+    assert conoid(*words).exit_code == 0
+    kept = batch.read_job(folder)
+    assert kept is not None
+    assert kept.command == record["command"]
+    assert "evil" not in kept.bin + (folder / layout.JOB_SCRIPT).read_text()
+
+
+@pytest.mark.parametrize("name", [layout.JOB, layout.OUTCOME, layout.RESOLVED_CASE, layout.LOCK])
+def test_a_pipe_in_a_folder_keeps_nobody_waiting(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(following, "_ASK_EVERY", 0.0)
+    (tmp_path / layout.JOURNAL).write_text('{"type":"status","run":"a","seq":1,"state":"running"}\n')
+    os.mkfifo(tmp_path / name)
+    assert FolderRun(tmp_path).status().title == ""
+    told = list(islice(FolderRun(tmp_path).messages(pause=lambda _: None), 2))
+    assert getattr(told[-1], "state", "") == State.LOST
+
+
+def test_a_request_to_stop_follows_no_link(tmp_path: Path) -> None:
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / layout.STOP_REQUEST).symlink_to(tmp_path / "made")
+    with pytest.raises(OSError, match="symbolic links"):
+        whole.touch(tmp_path / "run" / layout.STOP_REQUEST)
+    assert not (tmp_path / "made").exists()
 
 
 def test_a_folder_without_a_worker_is_neither_cancelled_nor_still_running(
