@@ -4,7 +4,7 @@
 # make accuracy  docs/accuracy.md: every row of the verification catalogue as measured here (ACCURACY=quick: no studies)
 # make reference  docs/case.md and the JSON schema, from the texts of the models in cases/
 # make drill  the long tests: faults by the hundred (table in build/drill; goes on where it was; DRILL="--shard 1/4"),
-#             then studies and failures that take minutes; root on Debian gets Slurm and libfaketime for them
+#             then studies and failures that take minutes; root on Debian gets Slurm, libfaketime, systemd
 #
 # Each target first brings .venv to the versions of requirements.lock, when that file or pyproject.toml has changed.
 # Kernels are compiled while pip installs what they do not need. Nothing takes 10 s without a word. What a worker, a server and
@@ -61,8 +61,8 @@ reference: $(READY)
 	$(BIN)/conoid schema --page --out docs/case.md
 
 drill: $(READY)
-	@if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null && ! { command -v slurmctld && command -v faketime; } >/dev/null; then \
-		apt-get install -y --no-install-recommends slurm-wlm munge faketime || echo "without Slurm: its tests are skipped"; fi
+	@if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null && ! { command -v slurmctld && command -v faketime && command -v systemd-analyze; } >/dev/null; then \
+		apt-get install -y --no-install-recommends slurm-wlm munge faketime systemd || echo "without Slurm and systemd: their tests are skipped"; fi
 	@$(PIP) "schemathesis>=4.32" || echo "without schemathesis: its test is skipped"
 	@wrong=0; $(BIN)/python -m tests.drill $(DRILL) || wrong=1; \
 		$(BIN)/python -m pytest -q -m slow --timeout 3600 --ignore tests/bench tests || wrong=1; exit $$wrong
