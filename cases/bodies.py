@@ -205,7 +205,8 @@ class MeshFile(Model):
     unit: Annotated[Length, Positive]
     """Length of 1 in the file: ``"1 mm"``."""
     group: str | None = None
-    """Physical group or element set; all tets when absent."""
+    """Of tets: a physical group of gmsh by its name or number; of Abaqus an element set, ``Bar-1.Set-1`` (a set of an
+    instance or a part), an instance or a part. All tets when absent. docs/meshes.md has what is read of a file."""
     sha256: str | None = None
     """Of the file; another one is refused. Not checked when absent."""
 

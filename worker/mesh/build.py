@@ -118,7 +118,7 @@ def _file_digest(source: Path, mesh: MeshFile, key: str) -> str:
 def _maker() -> str:
     """The sources of this package, and of what it computes with, and the versions of what it calls."""
     sources, here = hashlib.sha256(), Path(__file__).parent
-    for path in [*sorted(here.glob("*.py")), *(here.parent / f"{name}.py" for name in ("hashing", "turning"))]:
+    for path in [*sorted(here.rglob("*.py")), *(here.parent / f"{name}.py" for name in ("hashing", "turning"))]:
         sources.update(path.name.encode() + path.read_bytes())
     return " ".join([sources.hexdigest(), *_versions("gmsh", "numpy")])
 

@@ -20,6 +20,10 @@ class NamedMesh:
 
     mesh: TetMesh
     names: Names
+    places: Ids
+    """(n,) a number of each node that no other node of the file has."""
+    notes: tuple[str, ...] = ()
+    """What of the file is not in the mesh, or is taken otherwise than one might think, a line each."""
 
 
 @contextmanager
@@ -64,7 +68,7 @@ def gathered(node_tags: Ids, points: Any, tet_tags: Ids, corners: Ids) -> NamedM
         tet = tet_tags[(corners == lost).any(axis=1)][0]
         raise MeshError(f"tet {tet} uses node {lost}, which is not defined")
     mesh = TetMesh(np.asarray(points, np.float64)[order[place]], tets.reshape(-1, 4).astype(np.int32))
-    return NamedMesh(mesh, Names(used, tet_tags))
+    return NamedMesh(mesh, Names(used, tet_tags), used)
 
 
 def first_error(gmsh: Any) -> str | None:

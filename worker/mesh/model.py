@@ -36,6 +36,18 @@ regular tet has 0.15, rounding of its nodes 1e-16."""
 
 
 @dataclass(frozen=True, eq=False)
+class Origin:
+    """Where a mesh from a file comes from."""
+
+    file: str
+    """sha256 of the bytes of the file."""
+    nodes: Ids
+    """(n,) a number of each node that no other node of the file has."""
+    notes: tuple[str, ...] = ()
+    """What of the file is not in the mesh, or is taken otherwise than one might think, a line each."""
+
+
+@dataclass(frozen=True, eq=False)
 class TetMesh:
     """``points``: (n, 3) float64, m. ``tets``: (m, 4) int32 rows of node indices, positively oriented.
 
@@ -44,6 +56,8 @@ class TetMesh:
 
     points: Floats
     tets: Ints
+    origin: Origin | None = None
+    """None where the mesh was generated."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", np.ascontiguousarray(self.points, np.float64))

@@ -5,6 +5,7 @@ known header for a script in its own language, which can start programs, so the 
 file is handed over under a private name. ``.inp`` has its own reader, ``abaqus``.
 """
 
+import hashlib
 import os
 import tempfile
 from collections.abc import Callable
@@ -14,10 +15,10 @@ from typing import Any
 from conoid.cases.bodies import MeshFile
 
 from ..errors import MeshError
-from .abaqus import read_inp
+from .abaqus.reading import read_inp
 from .faces import same_side
 from .gmsh_session import NamedMesh, first_error, session, tet_mesh
-from .model import TetMesh, check
+from .model import Origin, TetMesh, check
 
 _VERSIONS = ("4.1", "2.2")
 
@@ -34,7 +35,9 @@ def read(file: MeshFile, path: Path, key: str = "mesh") -> TetMesh:
         found = readers[path.suffix.lower()](path, file.group, key)
         if file.group is not None and not len(found.mesh.tets):
             raise MeshError(f"{key}.group = {file.group!r}: no tet is in it")
-        mesh = check(TetMesh(found.mesh.points * file.unit, found.mesh.tets), found.names)
+        with path.open("rb") as content:
+            origin = Origin(hashlib.file_digest(content, "sha256").hexdigest(), found.places, found.notes)
+        mesh = check(TetMesh(found.mesh.points * file.unit, found.mesh.tets, origin), found.names)
         if len(twins := same_side(mesh.tets)):
             one, other = found.names.tets[twins[0]]
             raise MeshError(

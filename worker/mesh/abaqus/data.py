@@ -1,0 +1,87 @@
+"""Data lines of an Abaqus input file: elements, ranges of numbers, places and coordinates."""
+
+import math
+from array import array
+from collections.abc import Iterator
+
+from ...errors import MeshError
+from ...turning import sine_and_cosine
+from .elements import ElementType, Kind
+from .lines import fields, numbers, wholes
+
+_AXIS = 7
+"""Numbers of a rotation: two points and an angle."""
+
+
+def element_rows(lines: Iterator[tuple[int, str]], kind: ElementType) -> Iterator[tuple[int, list[str]]]:
+    """The first line and the fields of each element: its number and its nodes, over as many lines as these take.
+
+    A node that is left out stands for the ground, in elements without volume alone. Raises MeshError.
+    """
+    row: list[str] = []
+    first = 0
+    for number, text in lines:
+        items = fields(text)
+        grounded = kind.kind is Kind.EMPTY and len(row) + len(items) == 1 + (kind.nodes or 0)
+        goes_on = not items[-1]
+        first = first if row else number
+        row += items[:-1] if goes_on and not grounded else items
+        if grounded or _complete(row, kind, goes_on, first):
+            yield first, row
+            row = []
+    if row:
+        raise MeshError(f"line {first}: an element of the type {kind.name} with {len(row) - 1} nodes{_expected(kind)}")
+
+
+def _complete(row: list[str], kind: ElementType, goes_on: bool, line: int) -> bool:
+    if kind.nodes is None:
+        return not goes_on
+    if kind.kind is Kind.TET and len(row) > 1 + kind.nodes:
+        raise MeshError(f"line {line}: an element of the type {kind.name} with {len(row) - 1} nodes{_expected(kind)}")
+    return len(row) >= 1 + kind.nodes
+
+
+def _expected(kind: ElementType) -> str:
+    return "" if kind.nodes is None else f"; expected {kind.nodes}"
+
+
+def numbers_of(line: int, text: str) -> "array[int]":
+    """The numbers that GENERATE makes of a first one, a last one and a step. Raises MeshError."""
+    items = fields(text)
+    while len(items) > 2 and not items[-1]:
+        items.pop()
+    if not 2 <= len(items) <= 3:
+        raise MeshError(
+            f"line {line}: GENERATE takes a first number, a last one and a step; found {len(items)} numbers"
+        )
+    first, last, step = (*wholes(line, items), 1)[:3]
+    if last < first or (last - first) % step:
+        raise MeshError(f"line {line}: no steps of {step} lead from {first} to {last}")
+    return array("q", range(first, last + 1, step))
+
+
+def translation(line: int, text: str) -> tuple[float, ...]:
+    """By what an instance is moved. Raises MeshError."""
+    values = numbers(line, text)
+    if len(values) > 3:
+        raise MeshError(
+            f"line {line}: the first data line of *INSTANCE is a translation, 3 numbers; found {len(values)} (a "
+            "rotation alone has an empty line, or zeros, before it)"
+        )
+    return (*values, 0.0, 0.0, 0.0)[:3]
+
+
+def axis(line: int, text: str) -> tuple[float, ...]:
+    """Two points of the axis about which an instance is turned, and the angle in degrees. Raises MeshError."""
+    values = tuple(numbers(line, text))
+    if len(values) != _AXIS:
+        raise MeshError(f"line {line}: the second data line of *INSTANCE is a rotation, 7 numbers; found {len(values)}")
+    if values[:3] == values[3:6]:
+        raise MeshError(f"line {line}: the two points of the axis of rotation are the same")
+    return values
+
+
+def cylindrical(radius: float, angle: float, height: float) -> tuple[float, float, float]:
+    """Cartesian coordinates of a point that is given by cylindrical ones, ``angle`` in degrees."""
+    sine, cosine = sine_and_cosine(math.radians(angle))
+    return radius * cosine, radius * sine, height

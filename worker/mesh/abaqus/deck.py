@@ -1,0 +1,210 @@
+"""Reads the keywords of an Abaqus input file that make a mesh, each in the scope where it stands."""
+
+from array import array
+from collections.abc import Callable
+from pathlib import Path
+
+from ...errors import MeshError
+from .data import axis, cylindrical, element_rows, numbers_of, translation
+from .elements import Kind, element_type
+from .keywords import MESH, REFUSED, known, needed, options
+from .labels import Label, Labelled, label
+from .lines import Block, Source, fields, is_whole, numbers, shortened, whole, wholes
+from .scopes import OWN, ElementSet, Instance, Scope
+
+_ROOT = Label("", "")
+_NODE_VALUES = 6
+"""Coordinates of a node and the components of a normal, at most (Keywords Guide, *NODE)."""
+
+
+class Deck:
+    """The model of one file: what is in no part, the parts, and the instances."""
+
+    def __init__(self, path: Path) -> None:
+        """Reads all of ``path``. Raises MeshError with the number of the line that cannot be followed."""
+        self.root = Scope(_ROOT, 0)
+        self.parts: Labelled[Scope] = Labelled()
+        self.instances: Labelled[Instance] = Labelled()
+        self._here: Scope = self.root
+        self._assembly = self._step = False
+        self._source = Source(path)
+        for block in self._source.blocks():
+            self._take(block)
+        if self._here is not self.root:
+            raise MeshError(f"the file ends inside of {_named(self._here)}; is it cut off?")
+
+    def _take(self, block: Block) -> None:
+        word = known(block, self._step)
+        if word in ("STEP", "ENDSTEP"):
+            self._step = word == "STEP"
+        if word in REFUSED or (word in MESH and "INPUT" in dict(block.parameters)):
+            extra = "" if word in REFUSED else ", INPUT"
+            raise MeshError(f"line {block.line}: *{word}{extra} is not followed; write the nodes and elements out")
+        reader = _READERS.get(word)
+        if reader is not None:
+            reader(self, block, options(block, word))
+
+    # Scopes -----------------------------------------------------------------------------------------------------------
+
+    def _part(self, block: Block, found: dict[str, str]) -> None:
+        name = label(needed(block, found, "PART", "NAME"))
+        if self._here is not self.root or self._assembly:
+            raise MeshError(f"line {block.line}: *PART inside of {_named(self._here)}; *END PART is missing")
+        if self.parts.get(name) is not None:
+            raise MeshError(f"line {block.line}: the part {name.text!r} is defined twice")
+        self._here = self.parts.add(name, Scope(name, block.line))
+
+    def _end_part(self, block: Block, found: dict[str, str]) -> None:
+        if self._here is self.root or isinstance(self._here, Instance):
+            raise MeshError(f"line {block.line}: *END PART without *PART")
+        self._here = self.root
+
+    def _start_assembly(self, block: Block, found: dict[str, str]) -> None:
+        if self._here is not self.root or self._assembly:
+            raise MeshError(f"line {block.line}: *ASSEMBLY inside of {_named(self._here)}")
+        self._assembly = True
+
+    def _end_assembly(self, block: Block, found: dict[str, str]) -> None:
+        if self._here is not self.root or not self._assembly:
+            raise MeshError(f"line {block.line}: *END ASSEMBLY without *ASSEMBLY, or before *END INSTANCE")
+        self._assembly = False
+
+    def _instance(self, block: Block, found: dict[str, str]) -> None:
+        name, wanted = (label(needed(block, found, "INSTANCE", word)) for word in ("NAME", "PART"))
+        part = self.parts.get(wanted)
+        if part is None:
+            names = ", ".join(each.text for each, _ in self.parts) or "none"
+            raise MeshError(
+                f"line {block.line}: instance {name.text!r} of the unknown part {wanted.text!r}; known: {names}"
+            )
+        if self._here is not self.root:
+            raise MeshError(f"line {block.line}: *INSTANCE inside of {_named(self._here)}")
+        if self.instances.get(name) is not None:
+            raise MeshError(f"line {block.line}: the instance {name.text!r} is defined twice")
+        move, axis = self._placing()
+        self._here = self.instances.add(name, Instance(name, block.line, part=part, move=move, axis=axis))
+
+    def _placing(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """The two data lines of *INSTANCE: a translation, then an axis with an angle; either may be empty."""
+        lines = list(self._source.data())
+        while lines and not lines[-1][1].strip():
+            lines.pop()
+        if len(lines) > 2:
+            raise MeshError(f"line {lines[2][0]}: *INSTANCE has two data lines at most")
+        return translation(*lines[0]) if lines else (0.0, 0.0, 0.0), axis(*lines[1]) if lines[1:] else ()
+
+    def _end_instance(self, block: Block, found: dict[str, str]) -> None:
+        here = self._here
+        if not isinstance(here, Instance):
+            raise MeshError(f"line {block.line}: *END INSTANCE without *INSTANCE")
+        if not here.empty and not here.part.empty:
+            raise MeshError(f"line {block.line}: {_named(here)} has a mesh of its own, and its part has one, too")
+        self._here = self.root
+
+    # Mesh -------------------------------------------------------------------------------------------------------------
+
+    def _node(self, block: Block, found: dict[str, str]) -> None:
+        system = found.get("SYSTEM", "R").upper()
+        if system not in ("R", "C"):
+            raise MeshError(f"line {block.line}: *NODE, SYSTEM={system} is not read; allowed: R, C")
+        here = self._here
+        for number, text in self._source.filled():
+            first, _, rest = text.partition(",")
+            values = numbers(number, rest)
+            if len(values) > _NODE_VALUES:
+                raise MeshError(f"line {number}: a node has up to {_NODE_VALUES} values; found {len(values)}")
+            point = [*values, 0.0, 0.0, 0.0][:3]
+            here.nodes.append(whole(number, first))
+            here.points.extend(point if system == "R" else cylindrical(*point))
+
+    def _element(self, block: Block, found: dict[str, str]) -> None:
+        kind = element_type(needed(block, found, "ELEMENT", "TYPE"))
+        here, made = self._here, array("q")
+        for line, items in element_rows(self._source.filled(), kind):
+            row = wholes(line, items if kind.kind is Kind.TET else items[:1])
+            made.append(row[0])
+            here.corners.extend(row[1:])
+        if kind.kind is Kind.TET:
+            here.tets.extend(made)
+        elif made:
+            here.others.setdefault(kind, array("q")).extend(made)
+        if "ELSET" in found:
+            here.named_set(label(found["ELSET"])).add(OWN, made)
+
+    # Sets -------------------------------------------------------------------------------------------------------------
+
+    def _elset(self, block: Block, found: dict[str, str]) -> None:
+        instance = self._instance_of(block, found)
+        name = label(needed(block, found, "ELSET", "ELSET"))
+        one, owner = self._here.named_set(name), OWN if instance is None else instance.name.key
+        for number, text in self._source.filled():
+            items = [item for item in fields(text) if item]
+            if "GENERATE" in found:
+                one.add(owner, numbers_of(number, text))
+            elif all(map(is_whole, items)):
+                one.add(owner, array("q", wholes(number, items)))
+            else:
+                for item in items:
+                    self._member(one, instance, item, number)
+
+    def _instance_of(self, block: Block, found: dict[str, str]) -> Instance | None:
+        if "INSTANCE" not in found:
+            return None
+        instance = self.instances.get(label(found["INSTANCE"]))
+        if instance is None or self._here is not self.root:
+            names = ", ".join(each.text for each, _ in self.instances) or "none"
+            raise MeshError(f"line {block.line}: *ELSET of the unknown instance {found['INSTANCE']!r}; known: {names}")
+        return instance
+
+    def _member(self, one: ElementSet, instance: Instance | None, item: str, line: int) -> None:
+        """Adds an element, or the elements of a set, of an instance or of this scope, to a set."""
+        owner = OWN if instance is None else instance.name.key
+        if is_whole(item):
+            one.add(owner, array("q", [whole(line, item)]))
+            return
+        other = self._here.sets.get(label(item)) if instance is None else instance.set_named(label(item))
+        if other is None and instance is None and isinstance(self._here, Instance):
+            other = self._here.part.sets.get(label(item))
+        if other is not None:
+            one.include(other, owner)
+            return
+        place, rest = self._qualified(item)
+        if place is not None and is_whole(rest):
+            one.add(place.name.key, array("q", [whole(line, rest)]))
+        elif place is not None and (other := place.set_named(label(rest))) is not None:
+            one.include(other, place.name.key)
+        else:
+            raise MeshError(f"line {line}: {shortened(item)} is no element and no element set that is defined above")
+
+    def _qualified(self, item: str) -> tuple[Instance | None, str]:
+        """The instance and the rest of ``Bar-1.5`` or ``Bar-1.Set-1``, at the level of the assembly."""
+        if self._here is self.root:
+            for at in (i for i, sign in enumerate(item) if sign == "."):
+                start, rest = item[:at], item[at + 1 :]
+                if start.startswith('"') and not start.endswith('"'):
+                    start, rest = f'{start}"', f'"{rest}'
+                found = self.instances.get(label(start))
+                if found is not None:
+                    return found, rest
+        return None, item
+
+
+_READERS: dict[str, Callable[[Deck, Block, dict[str, str]], None]] = {
+    "PART": Deck._part,
+    "ENDPART": Deck._end_part,
+    "ASSEMBLY": Deck._start_assembly,
+    "ENDASSEMBLY": Deck._end_assembly,
+    "INSTANCE": Deck._instance,
+    "ENDINSTANCE": Deck._end_instance,
+    "NODE": Deck._node,
+    "ELEMENT": Deck._element,
+    "ELSET": Deck._elset,
+}
+
+
+def _named(scope: Scope) -> str:
+    """``the part 'Bar' (line 7)``."""
+    if not scope.line:
+        return "the assembly"
+    kind = "instance" if isinstance(scope, Instance) else "part"
+    return f"the {kind} {scope.name.text!r} (line {scope.line})"

@@ -1,0 +1,63 @@
+"""Names in an Abaqus input file.
+
+Abaqus turns a name to upper case and drops its blanks, but keeps what stands in quotation marks as it is (Analysis
+User's Guide, "Input syntax rules"). A name that is found in no other way is found without regard to its case.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Label:
+    """A name: ``text`` as written, without quotation marks; ``key`` by which names are compared."""
+
+    text: str
+    key: str
+
+
+def label(written: str) -> Label:
+    """The name that is ``written`` in a file."""
+    bare = written.strip()
+    if len(bare) > 1 and bare[0] == bare[-1] == '"':
+        return Label(bare[1:-1], bare[1:-1])
+    text = _joined(bare)
+    return Label(text, text.upper())
+
+
+class Labelled(Generic[T]):
+    """What has a name in one scope of a file, by name, in the order of the file."""
+
+    def __init__(self) -> None:
+        """Holds nothing."""
+        self._found: dict[str, tuple[Label, T]] = {}
+
+    def __iter__(self) -> Iterator[tuple[Label, T]]:
+        """Names and what they name."""
+        return iter(self._found.values())
+
+    def add(self, name: Label, value: T) -> T:
+        """Names a value; returns it."""
+        self._found[name.key] = name, value
+        return value
+
+    def get(self, name: Label) -> T | None:
+        """What is called ``name``, else the only one whose name differs in case alone."""
+        if name.key in self._found:
+            return self._found[name.key][1]
+        alike = [value for each, value in self if each.key.casefold() == name.key.casefold()]
+        return alike[0] if len(alike) == 1 else None
+
+    def meant(self, wanted: str) -> list[tuple[Label, T]]:
+        """What ``wanted``, written outside of the file in any case, may mean: several where these differ in case."""
+        words = {wanted.casefold(), _joined(wanted).casefold()}
+        alike = [(name, value) for name, value in self if name.key.casefold() in words]
+        exact = [(name, value) for name, value in alike if name.text == wanted]
+        return exact or alike
+
+
+def _joined(text: str) -> str:
+    return "".join(text.split())

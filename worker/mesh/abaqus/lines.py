@@ -1,0 +1,172 @@
+"""The text of an Abaqus input file: keyword lines with their parameters, and data lines.
+
+Rules of the Analysis User's Guide, "Input syntax rules": a line that begins with ``*`` is a keyword line, one that
+begins with ``**`` a comment; case and blanks mean nothing outside of quotation marks; a keyword line that ends with a
+comma goes on in the next line; a number may have a D for its exponent, an empty field is 0.
+"""
+
+import re
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from ...errors import MeshError
+
+_FIELD = re.compile(r'(?:"[^"]*"|[^",])*')
+_NUMBERS = re.compile(r"[0-9+\-.eEdD,\s]*", re.ASCII)
+_WHOLE = re.compile(r"\s*\+?[0-9]{1,18}\s*", re.ASCII)
+_WHOLES = re.compile(r"[0-9,\s]*", re.ASCII)
+_D = str.maketrans("dD", "ee")
+_LONGEST = 60
+"""Characters of a line that a message shows. Chosen: half a line of a terminal."""
+_UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+_UTF_8 = b"\xef\xbb\xbf"
+
+
+@dataclass(frozen=True)
+class Block:
+    """A keyword line: its word in upper case without blanks or hyphens, parameters as (word, value or None), number."""
+
+    word: str
+    parameters: list[tuple[str, str | None]]
+    line: int
+
+
+class Source:
+    """The lines of a file, read once from its start: a block, then its data lines."""
+
+    def __init__(self, path: Path) -> None:
+        """Opens ``path``. Raises MeshError for a file that is not text."""
+        self._name = path
+        self._number = 0
+        self._ahead: tuple[int, str] | None = None
+
+    def blocks(self) -> Iterator[Block]:
+        """Every keyword line; data lines that were not read are passed over. Raises MeshError."""
+        with self._name.open("rb") as start:
+            if start.read(2) in _UTF_16:
+                raise MeshError("the file is UTF-16; save it as UTF-8 text")
+        with self._name.open(encoding="latin-1", newline=None) as file:
+            self._lines = self._useful(file)
+            for number, text in self.data():
+                if text.strip():
+                    raise MeshError(f"line {number}: data before the first keyword; this is not an .inp file")
+            if self._ahead is None:
+                raise MeshError("the file has no keyword; this is not an .inp file")
+            while self._ahead is not None:
+                number, text = self._ahead
+                self._ahead = None
+                yield _block(self._continued(text), number)
+                for _ in self.data():
+                    pass
+
+    def data(self) -> Iterator[tuple[int, str]]:
+        """(line number, text) of the data lines up to the next keyword; empty ones are among them."""
+        if self._ahead is not None:
+            return
+        for number, text in self._lines:
+            if text.lstrip()[:1] == "*":
+                self._ahead = number, text
+                return
+            yield number, text
+
+    def filled(self) -> Iterator[tuple[int, str]]:
+        """The data lines that are not empty."""
+        return ((number, text) for number, text in self.data() if text.strip())
+
+    def _useful(self, file: Iterator[str]) -> Iterator[tuple[int, str]]:
+        """Lines that are no comments."""
+        for number, text in enumerate(file, 1):
+            if number == 1:
+                text = text.removeprefix(_UTF_8.decode("latin-1"))
+            if not text.isascii():
+                text = _decoded(text)
+            if "\0" in text:
+                raise MeshError(f"line {number}: a null byte; this is not a text file")
+            if not text.lstrip().startswith("**"):
+                yield number, text
+
+    def _continued(self, text: str) -> str:
+        """A keyword line with the lines that continue it."""
+        whole = text.strip()
+        while whole.endswith(","):
+            more = next(self.data(), None)
+            if more is None:
+                break
+            whole += more[1].strip()
+        return whole
+
+
+def _decoded(text: str) -> str:
+    """UTF-8 where it is that, else Latin-1."""
+    try:
+        return text.encode("latin-1").decode("utf-8")
+    except UnicodeDecodeError:
+        return text
+
+
+def _block(text: str, line: int) -> Block:
+    if text.count('"') % 2:
+        raise MeshError(f"line {line}: {shortened(text)} has a quotation mark without its partner")
+    word, *rest = fields(text[1:])
+    pairs = (_parameter(item) for item in rest if item)
+    return Block("".join(word.split()).replace("-", "").upper(), list(pairs), line)
+
+
+def _parameter(item: str) -> tuple[str, str | None]:
+    word, equals, value = item.partition("=")
+    return "".join(word.split()).upper(), value.strip() if equals else None
+
+
+def fields(text: str) -> list[str]:
+    """The fields between commas, without outer blanks; a comma in quotation marks divides nothing."""
+    if '"' not in text:
+        return [item.strip() for item in text.split(",")]
+    found, at = [], 0
+    while True:
+        item = _FIELD.match(text, at)
+        assert item is not None
+        found.append(item[0].strip())
+        at = item.end() + 1
+        if at > len(text):
+            return found
+
+
+def numbers(line: int, text: str) -> list[float]:
+    """The numbers of a data line; 0 for an empty field, none for the one after a last comma. Raises MeshError."""
+    if _NUMBERS.fullmatch(text):
+        try:
+            items = text.translate(_D).split(",")
+            if not items[-1].strip():
+                items.pop()
+            return [float(item) if item.strip() else 0.0 for item in items]
+        except ValueError:
+            pass
+    raise MeshError(f"line {line}: {shortened(text)} is not a list of numbers")
+
+
+def whole(line: int, item: str) -> int:
+    """The number of a node or of an element. Raises MeshError."""
+    if not _WHOLE.fullmatch(item):
+        raise MeshError(f"line {line}: {shortened(item)} is not a number of a node or element")
+    return int(item)
+
+
+def wholes(line: int, items: list[str]) -> list[int]:
+    """The numbers of nodes or elements in several fields. Raises MeshError."""
+    if _WHOLES.fullmatch(",".join(items)):
+        with suppress(ValueError):
+            return [int(item) for item in items]
+    return [whole(line, item) for item in items]
+
+
+def is_whole(item: str) -> bool:
+    """Whether a field is a number of a node or of an element."""
+    return _WHOLE.fullmatch(item) is not None
+
+
+def shortened(text: str) -> str:
+    """A line in quotation marks, as messages show it."""
+    bare = text.strip()
+    return repr(bare if len(bare) <= _LONGEST else f"{bare[:_LONGEST]}...")
