@@ -164,7 +164,7 @@ def _contact(case: Case) -> Iterator[Problem]:
     if contact is None:
         return
     named: list[tuple[Location, tuple[str, ...]]] = [
-        (("contact", "parts"), contact.parts), (("contact", "self_contact"), contact.self_contact),
+        (("contact", "parts"), contact.parts), (("contact", "self_contact"), contact.self_contact or ()),
         *((("contact", "pairs", i, "parts"), pair.parts) for i, pair in enumerate(contact.pairs)),
     ]  # fmt: skip
     for location, listed in named:
@@ -173,11 +173,10 @@ def _contact(case: Case) -> Iterator[Problem]:
                 yield problem((*location, k), name, f"no part of this name; {nearest(name, names)}")
             elif contact.parts and name not in contact.parts:
                 yield problem((*location, k), name, f"must be in contact.parts: {choices(contact.parts)}")
-    meet = {*contact.self_contact, *(part.name for part in case.parts if part.fracture is not None)}
     for i, pair in enumerate(contact.pairs):
         one, other = pair.parts
-        if one == other and one in names and one not in meet:
-            message = "a part that does not meet itself; name it in contact.self_contact, or let it fracture"
+        if one == other and one in names and one not in case.self_contact:
+            message = "a part that does not meet itself; name it in contact.self_contact"
             yield problem(("contact", "pairs", i, "parts"), f"{one}, {other}", message)
         for k, earlier in enumerate(contact.pairs[:i]):
             if sorted(earlier.parts) == sorted(pair.parts):

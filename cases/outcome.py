@@ -51,7 +51,8 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     broken: int | None = None
     """Facets that have broken."""
     inside: int | None = None
-    """Nodes that end inside of another body or fragment, deeper than 0.05 of the typical size of a face."""
+    """Nodes that end inside of another body or fragment or, without tets, of their own part, deeper than 0.05 of the
+    typical size of a face."""
     deepest: float = math.nan
     """How deep the deepest of them is that has not gone through the outermost tets, in typical sizes of a face."""
     overlapping: int | None = None

@@ -120,8 +120,10 @@ class Contact(Model):
 
     parts: tuple[Name, ...] = ()
     """Parts that meet each other; all when empty."""
-    self_contact: tuple[Name, ...] = ()
-    """Parts whose surface can meet itself; those that fracture always can."""
+    self_contact: tuple[Name, ...] | None = None
+    """Parts whose surface can meet itself; by default those that erode, whose nodes without tets would else pass
+    through the part that they come from. A list takes the place of this default: ``[]`` for none. Those that fracture
+    always can."""
     friction: Annotated[Ratio, Field(ge=0)] = 0.0
     """Coulomb's coefficient."""
     pairs: tuple[ContactPair, ...] = ()
@@ -306,6 +308,14 @@ class Case(Model):
     @property
     def in_contact(self) -> bool:
         """Whether anything of the scene can meet anything."""
+        return self.contact is not None and (len(self.parts) > 1 or bool(self.self_contact))
+
+    @property
+    def self_contact(self) -> tuple[str, ...]:
+        """The names of the parts whose surface can meet itself, in the order of the parts."""
         if self.contact is None:
-            return False
-        return len(self.parts) > 1 or bool(self.contact.self_contact) or self.fractures
+            return ()
+        named, meet = self.contact.self_contact, self.contact.parts
+        wears = (part.name for part in self.parts if part.erosion is not None)
+        may = {*(wears if named is None else named), *(part.name for part in self.parts if part.fracture is not None)}
+        return tuple(part.name for part in self.parts if part.name in may and (not meet or part.name in meet))

@@ -1,4 +1,5 @@
-"""What contact has not held: nodes that are inside of another body or fragment.
+"""What contact has not held: nodes that are inside of another body or fragment, and nodes without tets inside of the
+part that they come from, whether that meets itself or not.
 
 A node that lies in a tet which nothing holds together with its own has come through that body's surface. How deep it
 is below the surface the tet alone tells: below the nearest of its own open faces; and in one that has no open face but
@@ -12,6 +13,7 @@ against the tets of all ranks, so that no cut changes what is found.
 
 from dataclasses import dataclass
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,7 +42,10 @@ class Inside:
     looked: int
     """Nodes that were looked at."""
     nodes: int
-    """Those of them that are inside of another body or fragment, deeper than SLIGHT."""
+    """Those of them that are inside of another body or fragment, or without tets inside of their own part, deeper than
+    SLIGHT."""
+    own: int
+    """Those of these that are inside of their own part alone, and have no tets."""
     buried: int
     """Those of these in tets without a corner on the surface, further than SLIGHT from any open face of their body."""
     deepest: float
@@ -51,7 +56,8 @@ class Inside:
         """One line, if any is deeper than DEEP."""
         if not self.buried and self.deepest <= DEEP:
             return []
-        how = [f"{self.buried} of them through the outermost tets"] if self.buried else []
+        how = [f"{self.own} of them, without tets, into the part that they come from"] if self.own else []
+        how += [f"{self.buried} of them through the outermost tets"] if self.buried else []
         if self.nodes > self.buried:
             how.append(f"{'the others ' if self.buried else ''}up to {self.deepest:.2g} of a face deep")
         return [
@@ -66,44 +72,65 @@ def look(contact: Contact, model: Model, labels: list[Ints] | None, comm: Comm) 
     ``labels``: for each block (n,) the fragment of each tet; without, every part is one.
     """
     fragments = labels or [np.full(block.n, block.part, np.int64) for block in model.blocks]
-    outer = outermost(contact)
-    told = comm.join(_seen(outer, model, fragments)).reshape(-1, _WORDS)
-    parts, x = told[:, 1].astype(np.int32), np.ascontiguousarray(told[:, 2:]).view(np.float64)
+    outer, may = outermost(contact), _may(contact)
+    seen = _seen(outer, model, fragments, comm)
+    x, parts = seen.x, seen.part
     points, part = np.concatenate([model.nodes.x, x]), np.concatenate([model.nodes.part, parts])
-    found, size = [np.zeros((0, 3))], contact.exterior.size
+    found, size = [np.zeros((0, 4))], contact.exterior.size
     for block, fragment in zip(model.blocks, fragments, strict=True):
-        one = Things(np.arange(model.nodes.n, len(points), dtype=np.int32)[:, None], np.zeros(len(told)))
+        one = Things(np.arange(model.nodes.n, len(points), dtype=np.int32)[:, None], np.zeros(len(x)))
         other = Things(np.ascontiguousarray(block.tets, np.int32), np.zeros(block.n))
-        allowed = ~np.isnan(contact.searches.mu)
-        pairs = search.find(one, other, points, np.zeros_like(points), part, allowed, 0.0, None)
-        pairs = pairs[told[pairs[:, 0], 0] != fragment[pairs[:, 1]]]
+        pairs = search.find(one, other, points, np.zeros_like(points), part, may, 0.0, None)
+        pairs = pairs[seen.fragment[pairs[:, 0]] != fragment[pairs[:, 1]]]
         tets, opened = block.tets[pairs[:, 1]], _open(block, contact, outer)[pairs[:, 1]]
         places, corners = x[pairs[:, 0]], model.nodes.x[tets]
         depth = _depths(places, corners, opened, outer[tets])
         some = (depth > SLIGHT * size) & (_from_edges(places, corners, outer[tets]) > SLIGHT * size)
-        found.append(np.column_stack([pairs[some, 0], depth[some] / size, fragment[pairs[some, 1]]]))
+        which = np.column_stack([pairs[some, 0], depth[some] / size, fragment[pairs[some, 1]]])
+        found.append(np.column_stack([which, np.full(len(which), float(block.part))]))
     everywhere = np.concatenate(comm.share(np.concatenate(found)))
     buried = np.isinf(everywhere[:, 1])
     row, of = everywhere[buried][:, [0, 2]].astype(np.int64).T
     at_surface = comm.sum(_at_surface(x[row], parts[row], of, contact, model, fragments)) > 0
     everywhere = np.concatenate([everywhere[~buried], everywhere[buried][~at_surface]])
     buried = np.isinf(everywhere[:, 1])
+    rows = everywhere[:, 0].astype(np.int64)
+    others = rows[(seen.fragment[rows] >= 0) | (parts[rows] != everywhere[:, 3])]
+    every = len(np.unique(rows))
     return Inside(
-        len(told), len(np.unique(everywhere[:, 0])), len(np.unique(everywhere[buried, 0])),
+        len(x), every, every - len(np.unique(others)), len(np.unique(rows[buried])),
         float(everywhere[~buried, 1].max(initial=0.0)),
     )  # fmt: skip
 
 
-def _seen(outer: Flags, model: Model, fragments: list[Ints]) -> Ints:
-    """(k, _WORDS) of the ``outer`` nodes (nodes,) of this rank: fragment, part and the words of the position; one
-    that has lost its tets is a fragment of its own.
-    """
+def _may(contact: Contact) -> Flags:
+    """(parts, parts) which parts are asked about: those that meet, and of each of these its own nodes without tets."""
+    meet = ~np.isnan(contact.searches.mu)
+    return np.asarray(meet | (np.eye(len(meet), dtype=bool) & meet.any(axis=1)))
+
+
+class _Seen(NamedTuple):
+    """Nodes that are looked at; equal on all ranks."""
+
+    part: Indices
+    """(k,)."""
+    fragment: Ints
+    """(k,) -1 for one that has lost its tets."""
+    x: Floats
+    """(k, 3) m."""
+
+
+def _seen(outer: Flags, model: Model, fragments: list[Ints], comm: Comm) -> _Seen:
+    """The ``outer`` nodes (nodes,) of all ranks; all ranks take part."""
     nodes = model.nodes
-    of = np.full(nodes.n, -1, np.int64)
     some = nodes.owned & outer
+    told = comm.join(np.column_stack([nodes.id, nodes.part, nodes.x.view(np.int64)])[some]).reshape(-1, _WORDS)
+    here = np.full(nodes.n + 1, -1, np.int64)  # the last one: of a node that is not here
     for block, fragment in zip(model.blocks, fragments, strict=True):
-        of[block.tets] = fragment[:, None]
-    return np.asarray(np.column_stack([of, nodes.part, nodes.x.view(np.int64)])[some])
+        here[block.tets] = fragment[:, None]
+    known = here[nodes.places(told[:, 0])].astype(np.float64)
+    x = np.ascontiguousarray(told[:, 2:]).view(np.float64)
+    return _Seen(told[:, 1].astype(np.int32), comm.maximum(known).astype(np.int64), x)
 
 
 def outermost(contact: Contact) -> Flags:
@@ -119,7 +146,7 @@ def _at_surface(
     if not len(x):
         return np.zeros(0, np.int64)
     points, part = np.concatenate([model.nodes.x, x]), np.concatenate([model.nodes.part, parts])
-    reach, allowed = SLIGHT * contact.exterior.size, ~np.isnan(contact.searches.mu)
+    reach, allowed = SLIGHT * contact.exterior.size, _may(contact)
     one = Things(np.arange(model.nodes.n, len(points), dtype=np.int32)[:, None], np.full(len(x), reach))
     near = np.zeros(len(x), np.int64)
     for block, fragment in zip(model.blocks, fragments, strict=True):

@@ -15,7 +15,7 @@ def friction(case: Case) -> Floats:
     meets = np.array([name in spec.parts or not spec.parts for name in names])
     mu = np.where(meets[:, None] & meets[None, :], spec.friction, np.nan)
     for i, part in enumerate(case.parts):
-        if part.name not in spec.self_contact and part.fracture is None:
+        if part.name not in case.self_contact:
             mu[i, i] = np.nan
     for pair in spec.pairs:
         i, j = (names.index(name) for name in pair.parts)

@@ -1,0 +1,75 @@
+"""Nodes without tets meet the part that they come from."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from conoid.cases import schema
+from conoid.worker import step
+from conoid.worker.contact.inside import look
+from conoid.worker.parallel.comm import SerialComm
+from conoid.worker.simulation import Simulation
+
+from ..contact.bodies import meeting_of, moved
+from .kernels import STEEL, build
+from .meshes import block
+from .simulations import tick
+
+MM = 1e-3
+SPEED = 300.0
+EROSION = schema.Erosion()
+
+
+def fallen(contact: dict[str, Any], until: float = 7e-6) -> tuple[Simulation, int]:
+    """A block of 4 x 4 x 4 mm whose upper middle node has lost its tets and flies down and aside, and that node."""
+    beside = moved(block((1, 1, 1), MM), (9 * MM, 0.0, 0.0))
+    case = meeting_of([{"erosion": EROSION}, {}], contact, material=STEEL)
+    sim = build(case, [block((4, 4, 4), MM, shake=0.0), beside])
+    nodes, part = sim.model.nodes, sim.model.blocks[0]
+    node = int(np.abs(nodes.x0 - np.array([2.0, 2.0, 4.0]) * MM).sum(axis=1).argmin())
+    step.prepare(sim)
+    tick(sim, part.id[(part.tets == node).any(axis=1)])
+    nodes.v[node] = 0.2 * SPEED, 0.15 * SPEED, -SPEED
+    while sim.clock.t < until:
+        tick(sim)
+    return sim, node
+
+
+def test_a_node_without_tets_stays_outside_of_the_part_that_it_comes_from() -> None:
+    """It falls into the pit that its tets have left, and comes to rest on the bottom of it."""
+    sim, node = fallen({})
+    assert sim.contact is not None
+    assert sim.model.nodes.x[node, 2] > 2.9 * MM
+    assert sim.model.nodes.v[node, 2] > -0.1 * SPEED
+    found = look(sim.contact, sim.model, None, SerialComm())
+    assert (found.nodes, found.own) == (0, 0)
+
+
+def test_without_self_contact_it_passes_and_is_counted() -> None:
+    sim, node = fallen({"self_contact": ()})
+    assert sim.contact is not None
+    assert sim.model.nodes.x[node, 2] == pytest.approx(4.0 * MM - SPEED * 7e-6, abs=0.1 * MM)
+    found = look(sim.contact, sim.model, None, SerialComm())
+    assert (found.nodes, found.own) == (1, 1)
+    [line] = found.warnings
+    assert "1 of them, without tets, into the part that they come from" in line
+
+
+@pytest.mark.parametrize(
+    ("contact", "meet"),
+    [
+        ({}, ("wears", "breaks")), ({"self_contact": ()}, ("breaks",)), (None, ()),
+        ({"self_contact": ("stays",)}, ("breaks", "stays")), ({"parts": ("stays", "wears")}, ("wears",)),
+    ],
+)  # fmt: skip
+def test_what_erodes_or_fractures_meets_itself(contact: dict[str, Any] | None, meet: tuple[str, ...]) -> None:
+    """By default; a list takes the place of what erodes, and what fractures always does."""
+    case = meeting_of([{"erosion": EROSION}, {"fracture": schema.Fracture()}, {}])
+    named = zip(case.parts, ("wears", "breaks", "stays"), strict=True)
+    parts = tuple(part.model_copy(update={"name": name}) for part, name in named)
+    spec = schema.Contact(**contact) if contact is not None else None
+    case = case.model_copy(update={"parts": parts, "contact": spec})
+    assert case.self_contact == meet
+    one = case.model_copy(update={"parts": parts[:1]})
+    assert one.in_contact == ("wears" in meet)
