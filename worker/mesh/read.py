@@ -19,6 +19,7 @@ from .abaqus.reading import read_inp
 from .faces import same_side
 from .gmsh_session import NamedMesh, first_error, session, tet_mesh
 from .model import Origin, TetMesh, check
+from .scale import scaled
 
 _VERSIONS = ("4.1", "2.2")
 
@@ -37,7 +38,7 @@ def read(file: MeshFile, path: Path, key: str = "mesh") -> TetMesh:
             raise MeshError(f"{key}.group = {file.group!r}: no tet is in it")
         with path.open("rb") as content:
             origin = Origin(hashlib.file_digest(content, "sha256").hexdigest(), found.places, found.notes)
-        mesh = check(TetMesh(found.mesh.points * file.unit, found.mesh.tets, origin), found.names)
+        mesh = check(TetMesh(scaled(found.mesh.points, file.unit), found.mesh.tets, origin), found.names)
         if len(twins := same_side(mesh.tets)):
             one, other = found.names.tets[twins[0]]
             raise MeshError(

@@ -1,0 +1,44 @@
+"""Coordinates of a file in metres, rounded once: 0.001 is no binary fraction, and a product with it rounds twice."""
+
+from fractions import Fraction
+
+from .model import Floats
+
+_SPLITTER = 2.0**27 + 1.0
+"""Cuts a float64 into two halves of 26 bits (Dekker 1971, Numer. Math. 18, 224)."""
+_WHOLE = 2**53
+"""Whole numbers below it are exact as float64."""
+
+
+def scaled(points: Floats, unit: float) -> Floats:
+    """Points in units of ``unit`` m, in m: ``points`` times the decimal number that ``unit`` stands for, rounded once.
+
+    Where that decimal number is no fraction of whole numbers below 2^53 it is the product, which rounds twice.
+    """
+    exact = Fraction(repr(unit))
+    n, d = exact.numerator, exact.denominator
+    if max(n, d) >= _WHOLE:
+        return points * unit
+    if n == 1:
+        return points / d
+    if d == 1:
+        return points * n
+    high, low = _product(points, float(n))
+    quotient = high / d
+    back, more = _product(quotient, float(d))
+    return quotient + (((high - back) - more) + low) / d
+
+
+def _product(a: Floats, b: float) -> tuple[Floats, Floats]:
+    """The product as it is rounded, and exactly what the rounding left out (Dekker 1971)."""
+    product, (a1, a2) = a * b, _halves(a)
+    cut = _SPLITTER * b
+    b1 = cut - (cut - b)
+    b2 = b - b1
+    return product, ((a1 * b1 - product) + a1 * b2 + a2 * b1) + a2 * b2
+
+
+def _halves(a: Floats) -> tuple[Floats, Floats]:
+    cut = _SPLITTER * a
+    high = cut - (cut - a)
+    return high, a - high
