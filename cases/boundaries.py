@@ -1,6 +1,5 @@
 """What holds or drives nodes: symmetry planes, walls, prescribed motion, gravity, tractions."""
 
-import math
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -48,6 +47,7 @@ class Wall(Model):
 
 class Prescribed(Model):
     """Nodes that start inside the box ``low``..``high`` (all of the parts when absent) move with a given velocity.
+    Nodes no further outside of it than a hundredth of the shortest edge of their part are in.
 
     Only the components that are given are prescribed. Two boundaries may not prescribe one component of a node in two
     ways. Walls do not hold nodes of which a component is prescribed.
@@ -97,10 +97,6 @@ class Gravity(Model):
     """Parts that it acts on; all when empty."""
 
 
-ROUND = 1e-6
-"""Of a radius: nodes this near to it are in a cylinder. Chosen: more than meshers miss round faces by."""
-
-
 class Around(Model):
     """What lies between two radii round a line, however far along it. With the ``radius`` of its hole it is the bore of
     a tube, with its outer one as ``inner_radius`` the outside.
@@ -113,19 +109,16 @@ class Around(Model):
     inner_radius: Annotated[Length, Field(ge=0)] = 0.0
     """Smallest distance from the line."""
     radius: Annotated[Length, Field(gt=0)]
-    """Largest distance from the line; not below ``inner_radius``. Nodes within a millionth of it are in."""
-
-    def holds(self, point: tuple[float, float, float]) -> bool:
-        """Whether a point, m, is in it, or as near to it as ROUND of its radius."""
-        d, slack = "xyz".index(self.axis), ROUND * self.radius
-        p, q = (point[e] - self.base[e] for e in ((d + 1) % 3, (d + 2) % 3))
-        return self.inner_radius - slack <= math.hypot(p, q) <= self.radius + slack
+    """Largest distance from the line; not below ``inner_radius``. Nodes that are no further outside of either than a
+    hundredth of the shortest edge of their part are in."""
 
 
 class Traction(Model):
     """A force per initial area, Pa, on the exposed faces whose three nodes start inside the box ``low``..``high`` and
     the ``cylinder`` (all of the parts when both are absent), turning with nothing, until erosion takes the tet of the
-    face. Either ``stress`` or ``pressure`` is given. ``conoid validate`` says about how large the faces are together.
+    face. Nodes no further outside than a hundredth of the shortest edge of their part are in. Either ``stress`` or
+    ``pressure`` is given. ``conoid validate`` says about how large the faces are together; a run whose faces are not
+    warns.
     """
 
     kind: Literal["traction"]

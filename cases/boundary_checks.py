@@ -7,8 +7,10 @@ from collections.abc import Iterator
 from .bodies import Box, Loose, MeshFile, Plate, Tube
 from .drives import clash
 from .geometry import Vector, index, lowest_along
+from .loaded import idle, near
 from .placed import Placed
 from .problems import Location, Problem, choices, nearest, problem
+from .region import GENERATED
 from .schema import Case, Gravity, Part, Prescribed, Rotation, Symmetry, Traction, Wall
 
 ROUNDING = 1e-9
@@ -43,9 +45,9 @@ def _out_of_reach(case: Case, number: int) -> Iterator[Problem]:
     if not known or len(known) < len(parts):
         return
     bodies = [body.bounds() for body in known.values()]
-    margin = ROUNDING * max(1.0, *(abs(x) for body in bodies for corner in body for x in corner))
     if isinstance(boundary, Symmetry):
         d = index(boundary.axis)
+        margin = GENERATED * max(abs(x) for body in bodies for corner in body for x in corner)
         apart = not any(low[d] - margin <= boundary.at <= high[d] + margin for low, high in bodies)
         if apart and not any(
             _comes(case, part, d, boundary.at - low[d]) for part, (low, _) in zip(parts, bodies, strict=True)
@@ -57,6 +59,7 @@ def _out_of_reach(case: Case, number: int) -> Iterator[Problem]:
         box = list(zip(boundary.low, boundary.high, strict=True))
         if any(a > b for a, b in box):
             return
+        margin = max(near(body) for body in known.values())
         wider = [(a - margin, b + margin) for a, b in box]
         reached = {name: body for name, body in known.items() if _meet(wider, body.bounds())}
         if not reached:
@@ -71,6 +74,8 @@ def _out_of_reach(case: Case, number: int) -> Iterator[Problem]:
         elif isinstance(boundary, Traction) and all(_surrounds(body, wider) for body in reached.values()):
             message = f"the box lies inside of {choices(reached)}; tractions act on surfaces"
             yield problem(("boundaries", number), ..., message)
+        else:
+            yield from idle(case, number)
 
 
 def _meet(box: list[tuple[float, float]], body: tuple[Vector, Vector]) -> bool:
@@ -181,6 +186,6 @@ def _behind(case: Case, number: int, wall: Wall, length: float) -> Iterator[Prob
         if isinstance(part.mesh, MeshFile) or part.turn is not None or (wall.parts and part.name not in wall.parts):
             continue
         depth = level - lowest_along(part.mesh, normal)
-        if depth > ROUNDING * max(1.0, abs(level)):
+        if depth > GENERATED * max(abs(x) for corner in Placed(part.mesh).bounds() for x in corner):
             message = f"part {part.name!r} starts {depth:g} m behind this wall; move it, or turn the normal round"
             yield problem(("boundaries", number), ..., message)

@@ -9,6 +9,8 @@ from .bodies import MeshFile
 from .boundaries import Course, Prescribed, Wall
 from .drives import motions
 from .geometry import AXES, Generated, Vector, bounds, index, lowest_along
+from .loaded import near
+from .placed import Placed
 from .problems import Problem, problem
 from .schema import Case, Part
 
@@ -62,7 +64,7 @@ def _behind(body: Driven, wall: Wall) -> float:
     if drive.low is not None and drive.high is not None:
         (a, b, c), (d, e, f) = map(max, low, drive.low), map(min, high, drive.high)
         low, high = (a, b, c), (d, e, f)
-    if any(a > b for a, b in zip(low, high, strict=True)):
+    if any(a > b + near(Placed(body.mesh)) for a, b in zip(low, high, strict=True)):
         return -math.inf
     lowest = sum(min(n * a, n * b) for n, a, b in zip(normal, low, high, strict=True))
     if _whole(drive):

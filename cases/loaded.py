@@ -1,112 +1,225 @@
-"""What the tractions of a case act on, as far as that is known before there is a mesh: area and number of faces."""
+"""What tractions act on and what boxes hold before there is a mesh: areas, faces and nodes, by the shapes of bodies."""
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
-from .bodies import Box, Cylinder, Loose, MeshFile, Plate, Shards, Sphere, Tube, TwoTets
-from .boundaries import ROUND, Traction
-from .geometry import Generated, Vector, across, bounds, centre, index, surface
-from .mesh_size import FACES_PER_SURFACE, surface_faces
-from .placed import Placed
+from .bodies import Box, Cylinder, Loose, MeshFile, Plate, Sphere, Tube
+from .boundaries import Prescribed, Traction
+from .geometry import Generated, Vector, surface, volume
+from .mesh_size import FACES_PER_SURFACE, grid, mesh_size, surface_faces
+from .placed import Placed, lattice
 from .problems import Problem, problem
+from .region import Region, slack
 from .schema import Case, Part
+from .sheets import sheets
 
 _FINEST = 60
 """Patches along a side of a surface, at most. Chosen: a tenth of a second for a body."""
 _MOST = 20
-"""Bodies whose surfaces are gone through. Chosen: two seconds at most."""
-
-Point = Callable[[float, float], Vector]
-"""The point of a surface at two numbers from 0 to 1."""
-Sheet = tuple[Point, float, float]
-"""A part of a surface, and about how long it is along both numbers, m."""
-Within = Callable[[Vector], bool]
+"""Bodies that are gone through for a boundary. Chosen: two seconds at most."""
+_POINTS = 100_000
+"""Nodes of a turned grid that are gone through. Chosen: half a second."""
+_LATTICE = 20
+"""Points a direction at which a body is looked at in a box. Chosen: 8,000 points in all."""
+_FACETS, _CURVED, _FLAT = 0.3, 0.02, 1e-6
+"""Of an area, what facets may have less than the surface that they stand for, and patches less or more: the square of
+the size of an element by the radius times the first (a chord 1.3 times as long as an element and the end of a cylinder:
+a sixth of it squared), and the second; the third of flat faces. Chosen, but for the sixth (geometry)."""
+_FACTOR, _NODES = 3.0, 10
+"""Between an estimate of nodes and their number, and nodes more. Chosen: in a layer of an unstructured mesh are a third
+to three times as many as in the volume of a layer."""
 
 
 @dataclass(frozen=True)
 class Load:
-    """What a traction acts on, about; None where a mesh file or loose tets do not tell."""
+    """What a boundary acts on, about: a traction on faces, a prescribed velocity on nodes. None where a mesh file or
+    loose tets do not tell, and for the other kind of boundary.
+    """
 
     boundary: int
     """Number of the boundary."""
-    area: float | None
+    area: float | None = None
     """m^2."""
-    faces: int | None
+    faces: int | None = None
+    spread: float = 0.0
+    """By how much the area of the faces of a mesh may be another, m^2."""
+    nodes: int | None = None
+    exact: bool = False
+    """Whether nodes are counted and not estimated."""
+
+    def agrees(self, nodes: int, faces: int, area: float) -> bool:
+        """Whether a mesh has about as much: ``nodes`` that are driven, or ``faces`` with an ``area``, m^2."""
+        if self.area is not None and faces:
+            return abs(area - self.area) <= self.spread
+        if self.nodes is None or faces:
+            return True
+        few, many = sorted((nodes, self.nodes))
+        return few == many if self.exact else many <= _FACTOR * few + _NODES
+
+    def words(self) -> str:
+        """``about 32 faces, 4 mm^2``."""
+        if self.area is not None:
+            return f"about {self.faces} faces, {1e6 * self.area:.6g} mm^2"
+        if self.nodes is not None:
+            return f"{self.nodes} nodes" if self.exact else f"about {self.nodes} nodes"
+        return "not known before there is a mesh"
 
 
 def loads(case: Case) -> list[Load]:
-    """Of each traction of a case."""
-    return [Load(number, *_acted_on(case, spec)) for number, spec in case.boundaries_of(Traction)]
+    """Of each traction and each prescribed velocity of a case."""
+    found = [_acted_on(case, number, spec) for number, spec in case.boundaries_of(Traction)]
+    found += [_held(case, number, spec) for number, spec in case.boundaries_of(Prescribed)]
+    return sorted(found, key=lambda load: load.boundary)
+
+
+def idle(case: Case, number: int) -> Iterator[Problem]:
+    """An error for a boundary in whose box no node, or no face, of structured blocks lies that are not turned."""
+    spec = case.boundaries[number]
+    assert isinstance(spec, Prescribed | Traction)
+    if all(_empty(part, spec) for part in _parts(case, spec)):
+        what = "node" if isinstance(spec, Prescribed) else "face"
+        message = f"no {what} of the bodies that it is for lies in its box; let it reach over the nodes that are meant"
+        yield problem(("boundaries", number), ..., message)
+
+
+def _empty(part: Part, spec: Traction | Prescribed) -> bool:
+    """Whether a boundary is sure to find nothing of a part in its box."""
+    if isinstance(part.mesh, MeshFile):
+        return False
+    body, region = Placed(part.mesh, part.turn), Region.of(spec)
+    planes = _planes(body, region)
+    if planes is None:
+        return False
+    return 0 in planes if isinstance(spec, Prescribed) else _block_faces(body, region) is None
 
 
 def unloaded(case: Case) -> Iterator[Problem]:
-    """A warning for each traction in whose region no face seems to lie."""
+    """A warning for each boundary in whose region no face or node seems to lie."""
     for load in loads(case):
-        if load.faces == 0:
-            message = "no face of the bodies that it is for seems to lie in it; where there is none no run starts"
+        if load.faces == 0 or load.nodes == 0:
+            what = "face" if load.faces == 0 else "node"
+            message = f"no {what} of the bodies that it is for seems to lie in it; where there is none no run starts"
             yield problem(("boundaries", load.boundary), ..., message)
 
 
-def _acted_on(case: Case, spec: Traction) -> tuple[float | None, int | None]:
-    within = _region(spec)
-    area, faces, left = 0.0, 0.0, _MOST
-    for part in case.parts:
-        if spec.parts and part.name not in spec.parts:
-            continue
-        mesh = part.mesh
-        if isinstance(mesh, MeshFile):
-            return None, None
-        if within is None:
-            area, faces = area + surface(mesh), faces + surface_faces(mesh)
-        elif not _apart(spec, part, mesh):
-            if isinstance(mesh, Loose) or not left:
-                return None, None
-            more, number = _inside(mesh, part, within)
-            area, faces, left = area + more, faces + number, left - 1
-    return area, round(faces)
+def _parts(case: Case, spec: Traction | Prescribed) -> list[Part]:
+    return [part for part in case.parts if not spec.parts or part.name in spec.parts]
 
 
-def _region(spec: Traction) -> Within | None:
-    """Whether a point is in the box and in the cylinder of a traction; None where it has neither."""
-    low, high, shell = spec.low, spec.high, spec.cylinder
-    if shell is None and (low is None or high is None):
-        return None
-    slack = ROUND * max(map(abs, (*(low or ()), *(high or ()))), default=0.0)
-
-    def within(point: Vector) -> bool:
-        boxed = low is None or high is None or all(
-            a - slack <= x <= b + slack for a, x, b in zip(low, point, high, strict=True)
-        )  # fmt: skip
-        return boxed and (shell is None or shell.holds(point))
-
-    return within
+def near(body: Placed) -> float:
+    """How far outside of a region what belongs to a body is still in it, m; see ``region.slack``."""
+    reach = max(abs(x) for corner in body.bounds() for x in corner)
+    return slack(body.mesh, body.mesh.element_size, reach)
 
 
-def _apart(spec: Traction, part: Part, mesh: Generated) -> bool:
-    """Whether a body is off the box."""
-    if spec.low is None or spec.high is None:
-        return False
-    return any(
-        a > top or b < bottom
-        for a, b, bottom, top in zip(spec.low, spec.high, *Placed(mesh, part.turn).bounds(), strict=True)
+def _meets(region: Region, body: Placed) -> bool:
+    """Whether a body reaches into the box of a region."""
+    margin = near(body)
+    return all(
+        a <= top + margin and b >= bottom - margin
+        for a, b, bottom, top in zip(region.low or (), region.high or (), *body.bounds(), strict=False)
     )
 
 
-def _inside(mesh: Generated, part: Part, within: Within) -> tuple[float, float]:
-    """Area, m^2, and faces of a body whose corners are in a region: of patches as large as elements."""
-    body, area, faces = Placed(mesh, part.turn), 0.0, 0.0
-    for at, first, second in _sheets(mesh):
+# Faces ----------------------------------------------------------------------------------------------------------------
+
+
+def _acted_on(case: Case, number: int, spec: Traction) -> Load:
+    region, left = Region.of(spec), _MOST
+    area, faces, spread = 0.0, 0.0, 0.0
+    for part in _parts(case, spec):
+        mesh = part.mesh
+        if isinstance(mesh, MeshFile):
+            return Load(number)
+        body = Placed(mesh, part.turn)
+        if region.everything:
+            area, faces, spread = (
+                area + surface(mesh),
+                faces + surface_faces(mesh),
+                spread + _facets(mesh) * surface(mesh),
+            )
+        elif _meets(region, body):
+            if isinstance(mesh, Loose) or not left:
+                return Load(number)
+            exact = _block_faces(body, region)
+            more, count, rim = (*exact, _FLAT * exact[0]) if exact is not None else _inside(body, region)
+            area, faces, spread, left = area + more, faces + count, spread + rim, left - 1
+    return Load(number, area, round(faces), spread)
+
+
+def _planes(body: Placed, region: Region) -> list[int] | None:
+    """How many planes of nodes across x, y and z a box holds of a block of cubes that is neither turned nor slit; None
+    of other bodies and regions.
+    """
+    mesh, margin = body.mesh, near(body)
+    if not isinstance(mesh, Box | Plate) or not _regular(mesh) or mesh.slit is not None or body.turn is not None:
+        return None
+    if region.low is None or region.high is None or region.cylinder is not None:
+        return None
+    found = []
+    for row, low, high in zip(grid(mesh), region.low, region.high, strict=True):
+        first = max(0, math.ceil((low - margin - row.start) / row.spacing))
+        last = min(row.cells, math.floor((high + margin - row.start) / row.spacing))
+        found.append(max(0, last - first + 1))
+    return found
+
+
+def _block_faces(body: Placed, region: Region) -> tuple[float, int] | None:
+    """Area, m^2, and faces that a box holds of such a block; None of other bodies and regions, and without a face."""
+    planes, mesh, margin = _planes(body, region), body.mesh, near(body)
+    if planes is None or not isinstance(mesh, Box | Plate) or region.low is None or region.high is None:
+        return None
+    area, faces, rows = 0.0, 0, grid(mesh)
+    for d, row in enumerate(rows):
+        i, j = (d + 1) % 3, (d + 2) % 3
+        ends = sum(
+            region.low[d] - margin <= x <= region.high[d] + margin
+            for x in (row.start, row.start + row.cells * row.spacing)
+        )
+        cells = max(0, planes[i] - 1) * max(0, planes[j] - 1) * ends
+        area, faces = area + cells * rows[i].spacing * rows[j].spacing, faces + 2 * cells
+    return (area, faces) if faces else None
+
+
+def _inside(body: Placed, region: Region) -> tuple[float, float, float]:
+    """Area, m^2, and faces of a body whose corners are in a region, of patches as large as elements; and by how much
+    the area may be another: by that of patches on the border of the region, and of facets.
+    """
+    mesh, margin = body.mesh, near(body)
+    area, rim = 0.0, 0.0
+    for at, first, second in sheets(mesh):
         n, m = (max(1, min(_FINEST, round(length / mesh.element_size))) for length in (first, second))
+        aligned = _regular(mesh) and max(first, second) <= _FINEST * mesh.element_size
         rows = [[body.turned(at(i / n, j / m)) for j in range(m + 1)] for i in range(n + 1)]
-        inside = [[within(point) for point in row] for row in rows]
+        held = [[bool(region.holds(point, margin)) for point in row] for row in rows]
+        corners = [[sum(held[i][j : j + 2]) + sum(held[i + 1][j : j + 2]) for j in range(m)] for i in range(n)]
         for i, j in itertools.product(range(n), range(m)):
-            if inside[i][j] and inside[i + 1][j] and inside[i][j + 1] and inside[i + 1][j + 1]:
-                area += _quad(rows[i][j], rows[i + 1][j], rows[i + 1][j + 1], rows[i][j + 1])
-    per_area = 2.0 if mesh.generator == "structured" and not isinstance(mesh, Sphere) else FACES_PER_SURFACE
-    faces = per_area * area / mesh.element_size**2
-    return area, max(faces, 1.0) if area else 0.0
+            if corners[i][j] > 2:
+                patch = _quad(rows[i][j], rows[i + 1][j], rows[i + 1][j + 1], rows[i][j + 1])
+                area += patch * (corners[i][j] == 4)
+                rim += patch * (corners[i][j] == 3 or (not aligned and _on_rim(corners, i, j)))
+    faces = (2.0 if _counted(mesh) else FACES_PER_SURFACE) * area / mesh.element_size**2
+    return area, max(faces, 1.0) if area else 0.0, rim + _facets(mesh) * area
+
+
+def _on_rim(corners: list[list[int]], i: int, j: int) -> bool:
+    """Whether a patch of a sheet has a neighbour that is not wholly in."""
+    return any(count < 4 for row in corners[max(i - 1, 0) : i + 2] for count in row[max(j - 1, 0) : j + 2])
+
+
+def _regular(mesh: Generated) -> bool:
+    """Whether the faces of a mesh are halves of the patches."""
+    return isinstance(mesh, Box | Plate) and mesh.generator == "structured"
+
+
+def _facets(mesh: Generated) -> float:
+    """Of the area of a body, what facets may have less or more than it."""
+    if not isinstance(mesh, Cylinder | Tube | Sphere):
+        return _FLAT
+    radius = mesh.inner_radius if isinstance(mesh, Tube) else mesh.radius
+    return _CURVED + _FACETS * (mesh.element_size / radius) ** 2
 
 
 def _quad(a: Vector, b: Vector, c: Vector, d: Vector) -> float:
@@ -115,92 +228,59 @@ def _quad(a: Vector, b: Vector, c: Vector, d: Vector) -> float:
     return 0.5 * math.hypot(q * u - r * t, r * s - p * u, p * t - q * s)
 
 
-# Surfaces of bodies ---------------------------------------------------------------------------------------------------
+# Nodes ----------------------------------------------------------------------------------------------------------------
 
 
-def _sheets(mesh: Generated) -> Iterator[Sheet]:
-    if isinstance(mesh, TwoTets | Shards):
-        return
-    if isinstance(mesh, Box | Plate):
-        yield from _block(mesh)
-        return
-    begin, end = {"full": (0.0, 2.0), "half": (-0.5, 0.5), "quarter": (0.0, 0.5)}[mesh.sector]
-    yield from _ball(mesh, begin, end) if isinstance(mesh, Sphere) else _barrel(mesh, begin, end)
+def _held(case: Case, number: int, spec: Prescribed) -> Load:
+    region, nodes, exact, left = Region.of(spec), 0, True, _MOST
+    for part in _parts(case, spec):
+        mesh = part.mesh
+        if isinstance(mesh, MeshFile):
+            return Load(number)
+        body = Placed(mesh, part.turn)
+        if region.everything:
+            nodes, exact = nodes + mesh_size(mesh).nodes, exact and _counted(mesh)
+        elif _meets(region, body):
+            if isinstance(mesh, Loose) or not left:
+                return Load(number)
+            count = _grid_nodes(body, region)
+            nodes, exact, left = (
+                nodes + (_about(body, region) if count is None else count),
+                exact and count is not None,
+                left - 1,
+            )
+    return Load(number, nodes=nodes, exact=exact)
 
 
-def _block(mesh: Box | Plate) -> Iterator[Sheet]:
-    low, high = bounds(mesh) or ((0.0,) * 3, (0.0,) * 3)
-    for d in range(3):
-        for at in (low[d], high[d]):
-            yield _flat(d, at, low, high)
-    if (slit := mesh.slit) is not None:
-        a, b = list(low), list(high)
-        for k, e in enumerate(across(slit.axis)):
-            a[e], b[e] = max(low[e], slit.low[k]), min(high[e], slit.high[k])
-        for _ in range(2):
-            yield _flat(index(slit.axis), slit.at, a, b)
+def _counted(mesh: Generated) -> bool:
+    """Whether the nodes of a mesh are known exactly."""
+    return mesh.generator == "structured" and not isinstance(mesh, Sphere)
 
 
-def _flat(d: int, at: float, low: Sequence[float], high: Sequence[float]) -> Sheet:
-    """The rectangle across direction ``d`` at ``at``."""
-    i, j = (d + 1) % 3, (d + 2) % 3
-
-    def point(u: float, v: float) -> Vector:
-        x = [at, at, at]
-        x[i], x[j] = low[i] + u * (high[i] - low[i]), low[j] + v * (high[j] - low[j])
-        return x[0], x[1], x[2]
-
-    return point, high[i] - low[i], high[j] - low[j]
-
-
-def _barrel(mesh: Cylinder | Tube, begin: float, end: float) -> Iterator[Sheet]:
-    """A cylinder or a tube, of angles from ``begin`` to ``end``, in pi."""
-    inner, outer, length = mesh.inner_radius if isinstance(mesh, Tube) else 0.0, mesh.radius, mesh.length
-    turn, arc, wall = _turning(mesh, begin, end), (end - begin) * math.pi, outer - inner
-
-    def along(radius: float) -> Point:
-        return lambda u, v: turn(radius, u, length * v)
-
-    def at_end(height: float) -> Point:
-        return lambda u, v: turn(inner + wall * v, u, height)
-
-    def cut(side: float) -> Point:
-        return lambda u, v: turn(inner + wall * u, side, length * v)
-
-    for radius in (outer, inner)[: 1 + (inner > 0.0)]:
-        yield along(radius), arc * radius, length
-    for height in (0.0, length):
-        yield at_end(height), arc * outer, wall
-    for side in _cut(begin, end):
-        yield cut(side), wall, length
+def _grid_nodes(body: Placed, region: Region) -> int | None:
+    """The nodes of a block of cubes in a box; None for other meshes, and for turned ones of many nodes."""
+    if (planes := _planes(body, region)) is not None:
+        return math.prod(planes)
+    mesh, margin = body.mesh, near(body)
+    if not isinstance(mesh, Box | Plate) or not _regular(mesh) or mesh.slit is not None:
+        return None
+    rows = grid(mesh)
+    if math.prod(row.cells + 1 for row in rows) > _POINTS:
+        return None
+    x, y, z = ([row.start + k * row.spacing for k in range(row.cells + 1)] for row in rows)
+    return sum(bool(region.holds(body.turned(point), margin)) for point in itertools.product(x, y, z))
 
 
-def _ball(mesh: Sphere, begin: float, end: float) -> Iterator[Sheet]:
-    radius, turn = mesh.radius, _turning(mesh, begin, end)
-
-    def at(r: float, u: float, v: float) -> Vector:
-        return turn(r * math.sin(math.pi * v), u, -r * math.cos(math.pi * v))
-
-    def cut(side: float) -> Point:
-        return lambda u, v: at(radius * u, side, v)
-
-    yield (lambda u, v: at(radius, u, v)), (end - begin) * math.pi * radius, math.pi * radius
-    for side in _cut(begin, end):
-        yield cut(side), radius, math.pi * radius
-
-
-def _cut(begin: float, end: float) -> tuple[float, ...]:
-    """Shares of the way round at which a sector is cut; none of a whole body."""
-    return () if end - begin == 2.0 else (0.0, 1.0)
-
-
-def _turning(mesh: Cylinder | Tube | Sphere, begin: float, end: float) -> Callable[[float, float, float], Vector]:
-    """The point at a radius, a share of the way round and a height."""
-    start, k, (i, j) = centre(mesh), index(mesh.axis), across(mesh.axis)
-
-    def point(radius: float, u: float, height: float) -> Vector:
-        angle, x = math.pi * (begin + u * (end - begin)), list(start)
-        x[i], x[j], x[k] = x[i] + radius * math.cos(angle), x[j] + radius * math.sin(angle), x[k] + height
-        return x[0], x[1], x[2]
-
-    return point
+def _about(body: Placed, region: Region) -> int:
+    """The nodes of a body in a box, by the volume that the body has in it, half an element wider on all sides."""
+    assert region.low is not None
+    assert region.high is not None
+    half = 0.5 * body.mesh.element_size
+    bottom, top = body.bounds()
+    (a, b, c), (d, e, f) = (
+        [max(x - half, y) for x, y in zip(region.low, bottom, strict=True)],
+        [min(x + half, y) for x, y in zip(region.high, top, strict=True)],
+    )
+    held = sum(body.holds(point) for point in lattice((a, b, c), (d, e, f), _LATTICE)) / _LATTICE**3
+    share = held * (d - a) * (e - b) * (f - c) / volume(body.mesh)
+    return math.ceil(mesh_size(body.mesh).nodes * min(share, 1.0)) if share > 0.0 else 0

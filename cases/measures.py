@@ -14,7 +14,8 @@ ProbeField = Literal[
 
 
 class Probe(Model):
-    """A column of history.csv: the mean of a field over the tets of a part whose centre starts in a box.
+    """A column of history.csv: the mean of a field over the tets of a part whose centre starts in a box, or no further
+    outside of it than a hundredth of the shortest edge of the part.
 
     Without ``low`` and ``high`` it is the whole part. ``internal_energy`` is per mass, J/kg; stresses are positive in
     tension, pressure in compression. ``contact_force`` is what other bodies push the whole part with, N, as a mean

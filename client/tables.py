@@ -15,7 +15,7 @@ from conoid.cases.materials import Material
 from conoid.cases.outcome import Check, Outcome
 from conoid.cases.placed import Bulk
 from conoid.cases.run import State
-from conoid.cases.schema import Case, Traction
+from conoid.cases.schema import Boundary, Case, Traction
 from conoid.cases.stages import without
 
 from .compare import AT_THE_END, Comparison
@@ -130,15 +130,21 @@ def parts_table(case: Case, expected: Estimate) -> Table:
 
 
 def loads_table(case: Case, acted_on: Sequence[Load]) -> Table:
-    """What each traction acts on, about, of what is modelled."""
-    made = table("boundary", "traction", "area", "faces", right=("area", "faces"), wide=("traction",))
+    """What each traction and each prescribed velocity acts on, about, of what is modelled."""
+    columns = ("area", "faces", "nodes")
+    made = table("boundary", "acts by", *columns, right=columns, wide=("acts by",))
     for load in acted_on:
-        spec = case.boundaries[load.boundary]
-        assert isinstance(spec, Traction)
-        loaded = f"pressure of {si(spec.pressure, 'Pa')}" if spec.pressure is not None else "stress"
         area = "–" if load.area is None else f"about {1e6 * load.area:.3g} mm^2"
-        made.add_row(f"boundaries[{load.boundary}]", loaded, area, _about(load.faces, count))
+        nodes = count(load.nodes) if load.nodes is not None and load.exact else _about(load.nodes, count)
+        acts = _acts(case.boundaries[load.boundary])
+        made.add_row(f"boundaries[{load.boundary}]", acts, area, _about(load.faces, count), nodes)
     return made
+
+
+def _acts(spec: Boundary) -> str:
+    if isinstance(spec, Traction):
+        return f"pressure of {si(spec.pressure, 'Pa')}" if spec.pressure is not None else "stress"
+    return spec.kind
 
 
 def _brings(bulk: Bulk) -> tuple[str, str, str, str]:

@@ -10,9 +10,9 @@ import numpy as np
 
 from conoid.cases import schema
 from conoid.cases.bodies import MeshFile
-from conoid.cases.boundaries import ROUND
 from conoid.cases.library import material as find_material
 
+from . import selection
 from .contact import overlap, pairing
 from .errors import InputError
 from .fracture.connectivity import components
@@ -20,6 +20,7 @@ from .hashing import uniform
 from .mesh.build import build as build_mesh
 from .mesh.faces import FACES, across, normals
 from .mesh.model import TetMesh
+from .selection import Nearness, Selected
 from .state import Flags, Floats, Indices, Ints, Load
 from .turning import sine_and_cosine
 
@@ -50,8 +51,9 @@ class Whole:
     velocity: Floats
     loads: list[Load]
     """Of the tractions of the case."""
+    near: Nearness
     warnings: list[str]
-    """What the user should know of the meshes."""
+    """What the user should know of the meshes, and of what the boundaries of the case select of them."""
 
 
 def quiet(what: str) -> None:
@@ -84,11 +86,15 @@ def assemble(case: schema.Case, folder: Path, say: Say = quiet) -> Whole:
     if case.in_contact:
         x = _apart(case, x, t, np.concatenate(bodies), np.array(part_of_body), behind < 0)
         volumes = _volumes(x, t)
+    near = selection.nearness(case, x, part_of_node, t, part_of_tet)
+    loads, found, told = _loads(case, x, part_of_node, t, near)
+    driven, more = _driven(case, x, part_of_node, near)
     return Whole(
         points=x, node_part=part_of_node, tets=t, tet_part=part_of_tet, volumes=volumes,
         across=behind,
         node_volume=_quarters(t, volumes, len(x)), mass=_quarters(t, volumes * np.array(density)[part_of_tet], len(x)),
-        velocity=_velocities(case, x, part_of_node), loads=_loads(case, x, part_of_node, t), warnings=warnings,
+        velocity=_velocities(case, x, part_of_node), loads=loads, near=near,
+        warnings=[*warnings, *told, *more, *selection.compared(case, [*found, *driven])],
     )  # fmt: skip
 
 
@@ -208,41 +214,45 @@ def _velocities(case: schema.Case, x: Floats, part: Indices) -> Floats:
     return v
 
 
-def _loads(case: schema.Case, x: Floats, part: Indices, tets: Indices) -> list[Load]:
-    """The tractions of the case: a third of the force on each face for each of its nodes, in the order of the tets.
-
-    Raises InputError for one that acts on no face.
+def _loads(
+    case: schema.Case, x: Floats, part: Indices, tets: Indices, near: Nearness
+) -> tuple[list[Load], list[Selected], list[str]]:
+    """The tractions of the case: a third of the force on each face for each of its nodes, in the order of the tets;
+    what they act on, and warnings. Raises InputError for one that acts on no face.
     """
-    found = case.boundaries_of(schema.Traction)
-    loads = []
-    tet, face = np.nonzero(across(tets) < 0) if found else (np.zeros(0, np.int64), np.zeros(0, np.int64))
+    tractions = case.boundaries_of(schema.Traction)
+    loads, found, told = list[Load](), list[Selected](), list[str]()
+    tet, face = np.nonzero(across(tets) < 0) if tractions else (np.zeros(0, np.int64), np.zeros(0, np.int64))
     faces = tets[tet[:, None], FACES[face]]
-    for index, spec in found:
-        chosen = np.isin(part, [i for i, p in enumerate(case.parts) if not spec.parts or p.name in spec.parts])
-        if spec.low is not None and spec.high is not None:
-            chosen &= ((x >= np.array(spec.low)) & (x <= np.array(spec.high))).all(axis=1)
-        if spec.cylinder is not None:
-            chosen &= _around(spec.cylinder, x)
+    names = [each.name for each in case.parts]
+    for index, spec in tractions:
+        chosen = selection.named(spec, names)[part] & selection.inside(spec, x, part, near.slack)
         inside = chosen[faces].all(axis=1)
         loaded = faces[inside]
         if not len(loaded):
             where = "its box and its parts" if spec.cylinder is None else "its cylinder, its box and its parts"
             raise InputError(f"boundaries[{index}]: acts on no face; check {where}")
         outward = 0.5 * normals(x, loaded)
-        area = 1e6 * float(np.linalg.norm(outward, axis=1).sum())
-        log.info("boundaries[%d] acts on %d faces, %.6g mm^2", index, len(loaded), area)
+        areas = np.linalg.norm(outward, axis=1)
+        took = np.bincount(part[loaded[:, 0]], minlength=len(names)) > 0
+        told += selection.missed(case, index, x, part, near, took)
+        found.append(Selected(index, int(chosen.sum()), len(loaded), float(areas.sum())))
         if spec.stress is not None:
-            force = np.linalg.norm(outward, axis=1)[:, None] / 3.0 * np.array(spec.stress)
+            force = areas[:, None] / 3.0 * np.array(spec.stress)
         else:
             force = -(spec.pressure or 0.0) / 3.0 * outward
         of, nodes = np.repeat(tet[inside], 3).astype(np.int64), loaded.reshape(-1).astype(np.int64)
         loads.append(Load(np.arange(len(of)), of, nodes, np.repeat(force, 3, axis=0)))
-    return loads
+    return loads, found, told
 
 
-def _around(region: schema.Around, x: Floats) -> Flags:
-    """(n,) the points between two radii round a line."""
-    d = "xyz".index(region.axis)
-    p, q = (x[:, e] - region.base[e] for e in ((d + 1) % 3, (d + 2) % 3))
-    distance, slack = np.sqrt(p * p + q * q), ROUND * region.radius
-    return (distance >= region.inner_radius - slack) & (distance <= region.radius + slack)
+def _driven(case: schema.Case, x: Floats, part: Indices, near: Nearness) -> tuple[list[Selected], list[str]]:
+    """What the boxes of prescribed velocities hold, and warnings."""
+    found, told = list[Selected](), list[str]()
+    names = [each.name for each in case.parts]
+    for index, spec in case.boundaries_of(schema.Prescribed):
+        held = selection.named(spec, names)[part] & selection.inside(spec, x, part, near.slack)
+        took = np.bincount(part[held], minlength=len(names)) > 0
+        found.append(Selected(index, int(held.sum())))
+        told += selection.missed(case, index, x, part, near, took) if held.any() else []
+    return found, told

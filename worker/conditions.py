@@ -6,7 +6,9 @@ import numpy as np
 
 from conoid.cases import schema
 from conoid.cases.drives import REST, clash, motions
+from conoid.cases.region import GENERATED
 
+from . import selection
 from .boundaries import Boundary, SymmetryPlane, driven, mirrored
 from .drivers import Course, Gravity, PrescribedRotation, PrescribedVelocity, Traction
 from .errors import InputError
@@ -16,9 +18,6 @@ from .state import Flags, Floats, Indices, Load, Model, Nodes
 from .walls import RigidWalls
 
 AXES = {"x": 0, "y": 1, "z": 2}
-ON_PLANE = 1e-9
-"""Of the size of the mesh: closer than this is on a plane. Chosen far above the rounding of coordinates (1e-16) and far
-below the smallest tets (1e-4)."""
 _ASIDE = 1e-9
 """Of the largest speed: less across a symmetry plane is rounding."""
 
@@ -107,27 +106,19 @@ def _held_by(spec: schema.Boundary, model: Model) -> Flags:
     if isinstance(spec, schema.Symmetry):
         chosen &= heights(spec, model) == 0.0
     elif isinstance(spec, schema.Prescribed):
-        if spec.low is not None:
-            chosen &= (nodes.x0 >= np.array(spec.low)).all(axis=1)
-        if spec.high is not None:
-            chosen &= (nodes.x0 <= np.array(spec.high)).all(axis=1)
+        chosen &= selection.inside(spec, nodes.x0, nodes.part, model.slack)
     return chosen
-
-
-def named(spec: schema.Boundary, model: Model) -> Flags:
-    """(parts,) the parts that a boundary names; all where it names none."""
-    return np.array([not spec.parts or name in spec.parts for name in model.parts])
 
 
 def _of_parts(spec: schema.Boundary, model: Model) -> Flags:
     """(n,) the nodes of the parts that a boundary names."""
-    return np.asarray(named(spec, model)[model.nodes.part])
+    return np.asarray(selection.named(spec, model.parts)[model.nodes.part])
 
 
 def heights(spec: schema.Symmetry, model: Model) -> Floats:
-    """(n,) of the nodes over a symmetry plane at the start, m; zero on it."""
+    """(n,) of the nodes over a symmetry plane at the start, m; zero on it, and as near to it as rounding."""
     found = model.nodes.x0[:, AXES[spec.axis]] - spec.at
-    return np.where(np.abs(found) <= ON_PLANE * max(model.size, abs(spec.at)), 0.0, found)
+    return np.where(np.abs(found) <= model.rounding[model.nodes.part], 0.0, found)
 
 
 def sides(spec: schema.Symmetry, model: Model) -> Floats:
@@ -151,7 +142,7 @@ def _refuse_overlaps(case: schema.Case, model: Model, boundaries: list[Boundary]
     for walls in boundaries:
         if isinstance(walls, RigidWalls):
             for index, depth in zip(indices, comm.maximum(walls.depths(model.nodes)), strict=True):
-                if depth > ON_PLANE * model.size:
+                if depth > GENERATED * model.size:
                     raise InputError(f"boundaries[{index}]: a body starts {depth:.3g} m behind this wall")
 
 

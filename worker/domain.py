@@ -74,6 +74,9 @@ class Piece:
     """(parts,) m^3."""
     size: float
     """Largest coordinate of the whole, m."""
+    slack: Floats
+    rounding: Floats
+    """(parts,) see state.Model."""
     warnings: list[str]
     """See Whole."""
 
@@ -140,7 +143,7 @@ def _piece(
         whole.tet_part[ids], local[tets], whole.volumes[ids],
         whole.across[ids] if len(whole.across) else whole.across, np.any(shared[tets], axis=1),
         grouped[0][nodes], grouped[1][ids], grouped[2], neighbours, totals, *parts, float(np.abs(whole.points).max()),
-        whole.warnings,
+        whole.near.slack, whole.near.rounding, whole.warnings,
     )  # fmt: skip
 
 
@@ -175,7 +178,7 @@ def _model(case: schema.Case, piece: Piece) -> Model:
     blocks = [_block(case, piece, index) for index in range(len(case.parts)) if (piece.tet_part == index).any()]
     return Model(
         nodes, blocks, [p.name for p in case.parts], piece.totals[0], piece.totals[1], piece.part_starts,
-        piece.mean_volumes, piece.size, piece.groups,
+        piece.mean_volumes, piece.size, piece.slack, piece.rounding, piece.groups,
     )  # fmt: skip
 
 

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from conoid.cases.region import Region
 from conoid.cases.schema import Case, Probe, Wall
 
 from .clock import Clock
@@ -211,9 +212,5 @@ def _centres(block: Block, model: Model) -> Floats:
 def _inside(probe: Probe, block: Block, model: Model, centres: Floats) -> "np.ndarray":
     if model.parts[block.part] != probe.part:
         return np.zeros(0, np.int64)
-    if probe.low is None or probe.high is None:
-        return block.id.copy()
-    inside = np.ones(block.n, bool)
-    for x, low, high in zip(centres, probe.low, probe.high, strict=True):
-        inside &= (x >= low) & (x <= high)
+    inside = np.full(block.n, True) & Region.of(probe).holds(centres, model.slack[block.part])
     return np.asarray(block.id[inside])

@@ -298,6 +298,10 @@ class Model:
     """(parts,) of the tets of each at the start, m^3."""
     size: float = 0.0
     """Largest coordinate of the whole mesh at the start, m: what round-off in positions is measured by."""
+    slack: Floats = field(default_factory=lambda: np.zeros(0))
+    """(parts,) how far outside of a region a node of each part is still in it, m (cases/region.py)."""
+    rounding: Floats = field(default_factory=lambda: np.zeros(0))
+    """(parts,) how far off a plane of symmetry a node of each part is still on it, m."""
     groups: Floats = field(default_factory=lambda: np.zeros((0, 4)))
     """(groups, 4) centre, m, and number of tets at the start of each group: parts of the mesh that are neighbours then,
     and whose loads are told (worker/groups.py). They do not know how many ranks there are."""

@@ -8,8 +8,8 @@ import pytest
 
 from conoid.cases.load import CaseError, parse_case
 from conoid.cases.loaded import loads, unloaded
+from conoid.cases.region import Region
 from conoid.cases.schema import Case
-from conoid.worker.assembly import _around
 from conoid.worker.mesh.faces import boundary_faces, normals
 from conoid.worker.mesh.structured import structured
 
@@ -69,7 +69,7 @@ def test_area_and_faces_are_those_of_the_mesh(region: dict[str, Any]) -> None:
     case = pressed({**TUBE, "generator": "structured"}, region)
     (load,) = loads(case)
     made, spec = structured(case.parts[0].mesh), case.boundaries[0]  # type: ignore[arg-type]
-    inside = _around(spec.cylinder, made.points)  # type: ignore[union-attr, arg-type]
+    inside = Region(cylinder=spec.cylinder).holds(made.points.T, 1e-9)  # type: ignore[union-attr]
     if spec.low is not None:  # type: ignore[union-attr]
         z = made.points[:, 2]
         inside &= (z >= spec.low[2] - 1e-12) & (z <= spec.high[2] + 1e-12)  # type: ignore[union-attr, index]

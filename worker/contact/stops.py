@@ -15,9 +15,10 @@ import numpy as np
 from conoid.cases import schema
 from conoid.cases.schema import Case
 
-from ..conditions import AXES, named, sides
+from ..conditions import AXES, sides
 from ..jit import njit, record, types
 from ..parallel.comm import Comm
+from ..selection import named
 from ..state import Floats, Indices, Ints, Model
 from ..walls import ACROSS
 from .active import MOBILITY, NODES, V
@@ -52,7 +53,7 @@ class Stops(NamedTuple):
         normals = np.array([wall.normal for _, wall in walls] + axes, float).reshape(-1, 3)
         found = np.zeros((2, len(points), len(model.parts)))
         for k, (_, wall) in enumerate(walls):
-            found[0, k] = named(wall, model)
+            found[0, k] = named(wall, model.parts)
         for k, (_, plane) in enumerate(planes, len(walls)):
             side = sides(plane, model)
             for way, sign in enumerate((1.0, -1.0)):

@@ -27,8 +27,8 @@ from ..output import hdf5
 from ..parallel.comm import Comm
 from .parcel import Parcel, Table, take
 
-FORMAT = 13
-"""Of the files; 13 has the number of nodes among the words of the reduction. Others are not read."""
+FORMAT = 14
+"""Of the files; 14 has how near to a border the nodes of a part are on it. Others are not read."""
 _KEPT = 2
 """Checkpoints that stay; the older ones go."""
 _MANIFEST = "manifest.json"

@@ -22,7 +22,7 @@ def keep(model: Model) -> Parcel:
     known = {
         "parts": model.parts, "elements_global": model.elements_global, "nodes_global": model.nodes_global,
         "part_starts": model.part_starts, "mean_volumes": model.mean_volumes, "size": model.size,
-        "groups": model.groups, "scale": nodes.scale,
+        "slack": model.slack, "rounding": model.rounding, "groups": model.groups, "scale": nodes.scale,
     }  # fmt: skip
     columns = {name: getattr(nodes, name) for name in _NODAL}
     return Parcel(known, {}, columns, {b.part: _keep_block(b, nodes.id) for b in model.blocks if b.n}, {})
@@ -50,7 +50,7 @@ def resume(case: Case, arrived: Arrived, comm: Comm) -> Model:
             blocks.append(_resume_block(case, part, parcel.tets[part], corners[order], int(border.sum())))
     return Model(
         nodes, blocks, known["parts"], known["elements_global"], known["nodes_global"], known["part_starts"],
-        known["mean_volumes"], known["size"], known["groups"],
+        known["mean_volumes"], known["size"], known["slack"], known["rounding"], known["groups"],
     )  # fmt: skip
 
 

@@ -1,0 +1,269 @@
+"""What regions select of meshes that are turned, moved, scaled and rounded, against counts in whole numbers."""
+
+import random
+from decimal import Decimal
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+import pytest
+
+from conoid.cases.load import CaseError, parse_case
+from conoid.cases.loaded import loads
+from conoid.cases.schema import Case, Prescribed
+from conoid.worker import assembly, selection
+from conoid.worker.assembly import Whole
+from conoid.worker.errors import InputError
+from conoid.worker.mesh.model import TetMesh
+from conoid.worker.mesh.scale import scaled
+from conoid.worker.mesh.structured import structured
+
+from .kernels import build
+
+SIX_DIGITS, SINGLE = (np.vectorize(lambda x: float(f"{x:.6g}")), lambda x: np.float64(np.float32(x)))
+PRESSURE = {"kind": "traction", "pressure": "100 MPa"}
+PUSH = {"kind": "velocity", "x": "10 m/s"}
+METAL = {"density": "8000 kg/m^3", "elastic": {"young": "200 GPa", "poisson": 0.3}}
+PER_MM = {"m": Decimal("0.001"), "cm": Decimal("0.1"), "mm": Decimal(1), "um": Decimal(1000), "nm": Decimal(1000000)}
+
+
+def case_of(mesh: dict[str, Any], *boundaries: dict[str, Any], **part: Any) -> Case:
+    return parse_case({
+        "name": "selected", "materials": {"m": METAL}, "boundaries": boundaries, "run": {"end_time": "1 us"},
+        "contact": "none", "probes": part.pop("probes", []),
+        "parts": [{"name": "body", "material": "m", "mesh": mesh, **part}],
+    })  # fmt: skip
+
+
+def whole_of(case: Case, mesh: TetMesh | None = None) -> Whole:
+    made = structured(case.parts[0].mesh) if mesh is None else mesh  # type: ignore[arg-type]
+    with patch.object(assembly, "build_mesh", lambda *_, **__: made):
+        return assembly.assemble(case, Path())
+
+
+def held(case: Case, whole: Whole, number: int = 0) -> int:
+    spec = case.boundaries[number]
+    assert isinstance(spec, Prescribed)
+    return int(selection.inside(spec, whole.points, whole.node_part, whole.near.slack).sum())
+
+
+def faces(whole: Whole, number: int = 0) -> int:
+    return len(whole.loads[number].tets) // 3
+
+
+class Scene:
+    """A block of cubes somewhere, turned by quarters, and a box from plane to plane of its nodes; mm, exact."""
+
+    def __init__(self, seed: int) -> None:
+        rng = random.Random(seed)
+        self.unit = rng.choice(list(PER_MM))
+        self.size = Decimal(rng.choice(["0.1", "0.3", "0.7", "1.1", "0.05"]))
+        far = rng.choice([1, 300, 10_000])
+        self.cells = [rng.randint(1, 4) for _ in range(3)]
+        self.low = [far * rng.randint(-9, 9) * self.size / 10 for _ in range(3)]
+        self.axis, self.quarters = rng.choice("xyz"), rng.randint(0, 3)
+        self.centre = [rng.randint(-9, 9) * self.size for _ in range(3)]
+        self.first = [rng.randint(0, n) for n in self.cells]
+        self.last = [rng.randint(a, n) for a, n in zip(self.first, self.cells, strict=True)]
+        thin = rng.randrange(3)
+        if rng.random() < 0.5:  # a layer of no thickness, on the surface
+            self.first[thin] = self.last[thin] = rng.choice([0, self.cells[thin]])
+
+    def written(self, point: list[Decimal]) -> list[str]:
+        return [f"{(x * PER_MM[self.unit]).normalize():f} {self.unit}" for x in point]
+
+    def place(self, planes: list[int]) -> list[Decimal]:
+        """Where the node with these numbers is after the turn."""
+        x = [a + k * self.size for a, k in zip(self.low, planes, strict=True)]
+        i, j = (("xyz".index(self.axis) + k) % 3 for k in (1, 2))
+        for _ in range(self.quarters):
+            x[i], x[j] = self.centre[i] - (x[j] - self.centre[j]), self.centre[j] + (x[i] - self.centre[i])
+        return x
+
+    @property
+    def box(self) -> dict[str, Any]:
+        corners = list(zip(self.place(self.first), self.place(self.last), strict=True))
+        return {"low": self.written([min(c) for c in corners]), "high": self.written([max(c) for c in corners])}
+
+    @property
+    def nodes(self) -> int:
+        return int(np.prod([b - a + 1 for a, b in zip(self.first, self.last, strict=True)]))
+
+    @property
+    def faces(self) -> int:
+        found = 0
+        for d in range(3):
+            i, j = (d + 1) % 3, (d + 2) % 3
+            ends = (self.first[d] == 0) + (self.last[d] == self.cells[d])
+            found += 2 * ends * (self.last[i] - self.first[i]) * (self.last[j] - self.first[j])
+        return found
+
+    def case(self, *boundaries: dict[str, Any], file: bool = False) -> Case:
+        high = [a + n * self.size for a, n in zip(self.low, self.cells, strict=True)]
+        size = self.written([self.size])[0]
+        turn = {"axis": self.axis, "angle": f"{90 * self.quarters} deg", "centre": self.written(self.centre)}
+        mesh = {"shape": "box", "low": self.written(self.low), "high": self.written(high), "element_size": size}
+        if file:
+            mesh = {"shape": "file", "path": "a.inp", "unit": f"1 {self.unit}"}
+        else:
+            mesh["generator"] = "structured"
+        return case_of(mesh, *boundaries, turn=turn)
+
+    def file(self, rounded: Any) -> TetMesh:
+        """The mesh as a file has it: coordinates in its unit, rounded."""
+        made = structured(self.case().parts[0].mesh)  # type: ignore[arg-type]
+        numbers = [[x * PER_MM[self.unit] for x in point] for point in self._points(made)]
+        return TetMesh(scaled(rounded(np.array(numbers, float)), 1e-3 / float(PER_MM[self.unit])), made.tets)
+
+    def _points(self, made: TetMesh) -> list[list[Decimal]]:
+        lows = [float(x) / 1000 for x in self.low]
+        planes = np.rint((made.points - lows) / (float(self.size) / 1000)).astype(int)
+        return [[a + int(k) * self.size for a, k in zip(self.low, row, strict=True)] for row in planes]
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_a_box_from_plane_to_plane_has_all_nodes_and_faces_between_them(seed: int) -> None:
+    """The same in the mesh as in what ``validate`` expects, wherever the body is and in whatever unit it is written."""
+    made = Scene(seed)
+    boundaries = [{**PUSH, **made.box}, *([{**PRESSURE, **made.box}] if made.faces else [])]
+    case = made.case(*boundaries)
+    whole = whole_of(case)
+    assert held(case, whole) == made.nodes
+    expected = {load.boundary: load for load in loads(case)}
+    assert (expected[0].nodes, expected[0].exact) == (made.nodes, True)
+    if made.faces:
+        area = made.faces / 2 * (float(made.size) * 1e-3) ** 2
+        assert faces(whole) == made.faces == expected[1].faces
+        assert expected[1].area == pytest.approx(area, rel=1e-7)
+    assert whole.warnings == []
+
+
+@pytest.mark.parametrize("seed", range(60, 100))
+@pytest.mark.parametrize("rounded", [SIX_DIGITS, SINGLE], ids=["six_digits", "single"])
+def test_files_of_few_digits_have_all_nodes_and_faces_between_planes(seed: int, rounded: Any) -> None:
+    made = Scene(seed)
+    if max(map(abs, made.low)) > 1000 * made.size:
+        made.low = [x / 100 for x in made.low]
+    case = made.case({**PUSH, **made.box}, *([{**PRESSURE, **made.box}] if made.faces else []), file=True)
+    whole = whole_of(case, made.file(rounded))
+    assert held(case, whole) == made.nodes
+    assert made.faces == 0 or faces(whole) == made.faces
+    assert whole.warnings == []
+
+
+@pytest.mark.parametrize("axis", "xyz")
+@pytest.mark.parametrize(("angle", "base"), [(0, 0.0), (37, 10.0), (90, -3.3), (211, 0.7)])
+def test_a_bore_and_an_end_are_whole_after_a_turn_round_their_line(axis: str, angle: int, base: float) -> None:
+    d = "xyz".index(axis)
+    start, far = [0.0] * 3, [base] * 3
+    start[d] = base
+    tube = {"shape": "tube", "axis": axis, "inner_radius": 5e-3, "radius": 8e-3, "length": 6e-3, "base": far,
+            "element_size": 1e-3, "generator": "structured"}  # fmt: skip
+    low, high = ([b + sign * 9e-3 for b in far] for sign in (-1, 1))
+    low[d] = high[d] = base + 6e-3
+    boundaries: list[dict[str, Any]] = [
+        {**PRESSURE, "cylinder": {"axis": axis, "base": far, "radius": 5e-3}},
+        {**PRESSURE, "low": low, "high": high},
+        {**PRESSURE, "cylinder": {"axis": axis, "base": far, "inner_radius": 8e-3, "radius": 8e-3}},
+    ]
+    case = case_of(tube, *boundaries, turn={"axis": axis, "angle": f"{angle} deg", "centre": far})
+    whole = whole_of(case)
+    around = 4 * round(np.pi / 4 * 13)
+    assert [faces(whole, k) for k in range(3)] == [2 * around * 6, 2 * around * 3, 2 * around * 6]
+    assert whole.warnings == []
+
+
+def test_a_turned_bar_is_pressed_on_its_whole_end() -> None:
+    bar = {"shape": "box", "low": ["-1 mm", "-1 mm", 0], "high": ["1 mm", "1 mm", "4 mm"], "element_size": "0.5 mm"}
+    end = {"low": ["4 mm", "-1 mm", "-1 mm"], "high": ["4 mm", "1 mm", "1 mm"]}
+    case = case_of({**bar, "generator": "structured"}, {**PRESSURE, **end}, turn={"axis": "y", "angle": "90 deg"})
+    force = whole_of(case).loads[0].force.sum(axis=0)
+    assert force == pytest.approx([-400.0, 0.0, 0.0], abs=1e-9)
+
+
+def test_a_mesh_that_disagrees_with_what_is_expected_is_told(caplog: pytest.LogCaptureFixture) -> None:
+    """A whole end, where the mesh that is made ends a third of an element before it."""
+    caplog.set_level("INFO", "conoid.worker")
+    bar = {"shape": "box", "low": [0, 0, 0], "high": [2e-3, 2e-3, 4e-3], "element_size": 5e-4}
+    region = {"low": [0, 0, 3.9e-3], "high": [2e-3, 2e-3, 4.1e-3]}
+    case = case_of({**bar, "generator": "structured"}, {**PUSH, **region})
+    right, made = whole_of(case), structured(case.parts[0].mesh)  # type: ignore[arg-type]
+    assert right.warnings == []
+    assert "boundaries[0] drives 25 nodes; expected: 25 nodes" in caplog.text
+    shorter = TetMesh(made.points * [1.0, 1.0, 0.975], made.tets)
+    shorter.points[:, 0] += (shorter.points[:, 1] > 1.9e-3) * 2e-5  # one node of the layer leaves the box
+    (told,) = whole_of(case, shorter).warnings
+    assert told.startswith("boundaries[0]: drives 24 nodes, where validate expects 25 nodes; check its box")
+
+
+def test_a_layer_that_lies_just_outside_is_told() -> None:
+    bar = {"shape": "box", "low": [0, 0, 0], "high": [2e-3, 2e-3, 4e-3], "element_size": 5e-4}
+    box = {"low": [0, 0, 0], "high": [2e-3, 2e-3, 0.98e-3]}
+    case = case_of({**bar, "generator": "structured"}, {**PUSH, **box})
+    assert whole_of(case).warnings == [
+        "boundaries[0]: 25 nodes lie outside of its region by less than a tenth of an edge and are not in it; move its "
+        "border away from them"
+    ]
+
+
+def test_a_box_between_planes_is_refused_before_a_run_and_in_it() -> None:
+    bar = {"shape": "box", "low": [0, 0, 0], "high": [2e-3, 2e-3, 4e-3], "element_size": 5e-4}
+    between = {"low": [0, 0, 1.1e-3], "high": [2e-3, 2e-3, 1.4e-3]}
+    for kind, what in ((PUSH, "node"), (PRESSURE, "face")):
+        with pytest.raises(
+            CaseError, match=rf"^boundaries\[0\]: no {what} of the bodies that it is for lies in its box"
+        ):
+            case_of({**bar, "generator": "structured"}, {**kind, **between})
+    file = case_of({"shape": "file", "path": "a.inp", "unit": "1 mm"}, {**PUSH, **between})
+    with pytest.raises(InputError, match=r"^boundaries\[0\]: holds no node"):
+        build(file, [structured(case_of({**bar, "generator": "structured"}).parts[0].mesh)])  # type: ignore[arg-type]
+
+
+def test_nothing_of_a_part_that_is_named_is_told() -> None:
+    bar = {
+        "shape": "box",
+        "low": [0, 0, 0],
+        "high": [1e-3, 1e-3, 1e-3],
+        "element_size": 5e-4,
+        "generator": "structured",
+    }
+    other = {**bar, "low": [0, 0, 2e-3], "high": [1e-3, 1e-3, 3e-3]}
+    case = parse_case({
+        "name": "two", "materials": {"m": METAL}, "run": {"end_time": "1 us"}, "contact": "none",
+        "parts": [{"name": n, "material": "m", "mesh": mesh} for n, mesh in (("one", bar), ("other", other))],
+        "boundaries": [{**PUSH, "parts": ["one", "other"], "low": [0, 0, 0], "high": [1e-3, 1e-3, 1e-3]}],
+    })  # fmt: skip
+    meshes = iter([structured(part.mesh) for part in case.parts])  # type: ignore[arg-type]
+    with patch.object(assembly, "build_mesh", lambda *_, **__: next(meshes)):
+        (told,) = assembly.assemble(case, Path()).warnings
+    assert told == "boundaries[0]: acts on nothing of part 'other', which it names"
+
+
+@pytest.mark.parametrize("angle", [0, 90, 180, 270])
+def test_a_probe_has_the_centres_on_the_border_of_its_box(angle: int) -> None:
+    """The tets whose centres lie on a plane, wherever a turn has rounded it to."""
+    bar = {
+        "shape": "box",
+        "low": [0, 0, 0],
+        "high": [9e-4, 9e-4, 9e-4],
+        "element_size": 3e-4,
+        "generator": "structured",
+    }
+    turn = {"axis": "x", "angle": f"{angle} deg", "centre": [4.5e-4] * 3}
+    for layer in (0.75e-4, 3.75e-4, 6.75e-4):
+        box = {"low": [0, 0, layer], "high": [9e-4, 9e-4, layer]}
+        case = case_of(bar, turn=turn, probes=[{"name": "p", "part": "body", "field": "pressure", **box}])
+        sim = build(case, [structured(case.parts[0].mesh)])  # type: ignore[arg-type]
+        heights = sim.model.nodes.x0[sim.model.blocks[0].tets].mean(axis=1)[:, 2]
+        count = int((np.abs(heights - layer) < 1e-9).sum())
+        assert sum(len(ids) for ids in sim.probes._chosen[0]) == count > 0
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1e-6, 0.01, 0.0254, 0.3048, 1.0, 1e3, 0.0003])
+def test_coordinates_of_a_file_are_scaled_with_one_rounding(unit: float) -> None:
+    rng = np.random.default_rng(3)
+    points = np.concatenate([rng.normal(size=600) * 10.0 ** rng.integers(-6, 6, 600), np.arange(300) / 10.0])
+    exact = [float(Fraction(x) * Fraction(repr(unit))) for x in points.tolist()]
+    assert scaled(points.reshape(-1, 3), unit).reshape(-1).tolist() == exact
