@@ -4,10 +4,15 @@ import errno
 import os
 import stat
 from pathlib import Path
+from typing import BinaryIO
 
+MOST = 256 << 20
+"""Bytes of a file that is read as a whole. Chosen: a case, an outcome and a manifest have some MB at most."""
 _NO_LINK = getattr(os, "O_NOFOLLOW", 0)
 _AT_ONCE = getattr(os, "O_NONBLOCK", 0)
 """A pipe that nobody writes to is opened without waiting."""
+_NO_FILE = frozenset({errno.ELOOP, errno.ENXIO, errno.ENODEV, errno.EOPNOTSUPP})
+"""What open(2) says of a link to itself, of a socket, and of a device without a driver."""
 
 
 def write(path: Path, content: bytes, mode: int = 0o644) -> None:
@@ -25,9 +30,34 @@ def touch(path: Path) -> None:
     os.close(os.open(path, os.O_WRONLY | os.O_CREAT | _NO_LINK | _AT_ONCE, 0o666))
 
 
-def read(path: Path) -> bytes:
-    """The bytes of a plain file. Raises OSError, also for a pipe or a device, which could keep one waiting."""
-    with open(os.open(path, os.O_RDONLY | _AT_ONCE), "rb") as file:
-        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-            raise OSError(errno.EINVAL, "not a plain file", str(path))
-        return file.read()
+def opened(path: str | Path, *, folder: int | None = None) -> BinaryIO:
+    """A regular file, unbuffered, to read; ``folder``: the descriptor of the directory that ``path`` is relative to.
+
+    A pipe, a socket or a device would keep the reader waiting, or never end: each is refused as a directory is, with
+    IsADirectoryError. Raises OSError.
+    """
+    try:
+        handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC | _AT_ONCE, dir_fd=folder)
+    except OSError as error:
+        raise (_no_file(path, "is not a regular file") if error.errno in _NO_FILE else error) from None
+    if not stat.S_ISREG(os.fstat(handle).st_mode):
+        os.close(handle)
+        raise _no_file(path, "is not a regular file")
+    return open(handle, "rb", buffering=0)
+
+
+def read(path: str | Path, most: int = MOST) -> bytes:
+    """The bytes of a regular file that has at most ``most``. Raises IsADirectoryError for anything else, OSError."""
+    with opened(path) as file:
+        size = os.fstat(file.fileno()).st_size
+        pieces, left = [], min(size, most) + 1
+        while left > 0 and (piece := file.read(left)):
+            pieces.append(piece)
+            left -= len(piece)
+    if size > most:
+        raise _no_file(path, f"has more than {most} bytes")
+    return b"".join(pieces)
+
+
+def _no_file(path: str | Path, why: str) -> OSError:
+    return IsADirectoryError(errno.EISDIR, why, str(path))

@@ -3,9 +3,10 @@
 import json
 import os
 import shutil
+from contextlib import suppress
 from pathlib import Path
 
-from conoid.cases import fragments, layout
+from conoid.cases import checkpoints, fragments, layout, whole
 from conoid.cases.load import apply_overrides, read_data
 from conoid.cases.run import State
 
@@ -18,44 +19,44 @@ LABEL = "restart"
 """Of the new run: the id of the other one."""
 
 
-def latest(folder: Path) -> Path | None:
-    """The newest checkpoint of a run."""
-    found = (path for path in (folder / layout.CHECKPOINTS).glob("*") if path.name.isdigit())
-    return max(found, key=lambda path: int(path.name), default=None)
-
-
 def body(case: Path, ranks: int | None) -> dict[str, object]:
     """The case of a run, on so many ranks. Raises CaseError."""
     return apply_overrides(read_data(case), {} if ranks is None else {"run.ranks": ranks})
 
 
 def fill(source: Path, folder: Path) -> None:
-    """Gives the new run the newest checkpoint of ``source``, its frames and its history, which the worker cuts at the
-    checkpoint. Raises ServiceError 409, 503, OSError.
+    """Gives the new run the checkpoints of ``source``, its frames and its history, which the worker cuts at the
+    checkpoint that it takes: the newest whose files have their sha256. Raises ServiceError 409, 503, OSError.
     """
     if not any(_taken(source, folder / layout.CHECKPOINTS) for _ in range(_TRIES)):
         detail = f"the checkpoints of run {source.name} are replaced faster than they can be taken over"
         raise ServiceError(503, "unavailable", detail, retryable=True)
-    for name, copy in ((layout.FRAMES, _link), (fragments.FOLDER, shutil.copy2)):
+    for name, copy in ((layout.FRAMES, _link), (fragments.FOLDER, _copy)):
         if (source / name).is_dir():
             shutil.copytree(source / name, folder / name, copy_function=copy)
-    if (source / layout.HISTORY).exists():
-        shutil.copy2(source / layout.HISTORY, folder / layout.HISTORY)
+    _copy(str(source / layout.HISTORY), str(folder / layout.HISTORY))
 
 
 def _taken(source: Path, target: Path) -> bool:
-    """False when the checkpoint was removed meanwhile: a run that goes on keeps its newest ones."""
-    checkpoint = latest(source)
-    if checkpoint is None:
-        raise ServiceError(409, "no_checkpoint", f"run {source.name} has no checkpoint: {_why(source)}")
-    try:
-        shutil.copytree(checkpoint, target / checkpoint.name, copy_function=_link)
-    except OSError:  # shutil.Error is one
-        if checkpoint.is_dir():
-            raise
-        shutil.rmtree(target / checkpoint.name, ignore_errors=True)
-        return False
-    return True
+    """Links every checkpoint whose manifest is whole. False when they were removed meanwhile: a run that goes on keeps
+    its newest ones. Raises ServiceError 409 when there is none.
+    """
+    damaged: list[str] = []
+    places = checkpoints.found(source)
+    for place in places:
+        try:
+            checkpoints.manifest_of(place)
+            shutil.copytree(place, target / place.name, copy_function=_link)
+        except checkpoints.DamagedError as error:
+            damaged += [f"{place.name}: {error}"] if place.is_dir() else []
+        except OSError:  # shutil.Error is one
+            shutil.rmtree(target / place.name, ignore_errors=True)
+            if place.is_dir():
+                raise
+    if not places or len(damaged) == len(places):
+        why = f"all are damaged; {'; '.join(damaged)}" if damaged else _why(source)
+        raise ServiceError(409, "no_checkpoint", f"run {source.name} has no checkpoint: {why}")
+    return bool(checkpoints.found(target.parent))
 
 
 def _why(source: Path) -> str:
@@ -71,7 +72,7 @@ def _why(source: Path) -> str:
 def _every(source: Path) -> str:
     """As the case has it."""
     try:
-        every = json.loads((source / layout.RESOLVED_CASE).read_bytes())["run"]["checkpoint_every"]
+        every = json.loads(whole.read(source / layout.RESOLVED_CASE))["run"]["checkpoint_every"]
     except (OSError, ValueError, KeyError, TypeError):
         return "?"
     return "never" if every is None else f"{every:g} s"
@@ -80,6 +81,12 @@ def _every(source: Path) -> str:
 def _link(source: str, target: str) -> None:
     """A second name of the same file, which is only ever replaced as a whole; a copy of the list of frames."""
     if source.endswith(layout.FRAME_SERIES):
-        shutil.copy2(source, target)
+        _copy(source, target)
     else:
         os.link(source, target)
+
+
+def _copy(source: str, target: str) -> None:
+    """Of a regular file; what is none, or is gone, is left out."""
+    with suppress(FileNotFoundError, IsADirectoryError), whole.opened(source) as file, open(target, "xb") as copy:
+        shutil.copyfileobj(file, copy)

@@ -3,13 +3,14 @@
 import logging
 import resource
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from conoid.cases import messages
+from conoid.cases.checkpoints import Manifest
 from conoid.cases.history import of_parts
 from conoid.cases.outcome import Outcome
 from conoid.cases.quantities import FIELD_UNITS
@@ -52,7 +53,7 @@ def compute(
         preload(case)
     if restart:
         say("reading the latest checkpoint")
-        sim, start = _resumed(case, folder, comm)
+        sim, start = _resumed(case, folder, comm, journal)
     else:
         sim = simulation.build(case, meshes, comm, say)
         thick = reference.thicknesses(sim)
@@ -83,14 +84,18 @@ def compute(
     return outcome
 
 
-def _resumed(case: Case, folder: Path, comm: Comm) -> tuple[Simulation, Start]:
-    """The run in ``folder`` as its latest checkpoint has it; all ranks take part. Raises InputError on all alike."""
-    found: tuple[Path, dict[str, Any]] | None = None
+def _resumed(case: Case, folder: Path, comm: Comm, journal: Journal | None) -> tuple[Simulation, Start]:
+    """The run in ``folder`` as its latest checkpoint that is whole has it; all ranks take part. The journal gets a
+    warning of each later one, which is damaged. Raises InputError on all alike.
+    """
+    found: tuple[Path, Manifest] | None = None
     failure: InputError | None = None
     if comm.rank == 0:
         try:
-            found = checkpoint.latest(folder)
-            checkpoint.require_same(case, found[1])
+            place, manifest, damaged = checkpoint.latest(folder)
+            _warn(journal, damaged)
+            checkpoint.require_same(case, manifest)
+            found = place, manifest
         except InputError as error:
             failure = error
     found, failure = comm.broadcast((found, failure))
@@ -103,6 +108,13 @@ def _resumed(case: Case, folder: Path, comm: Comm) -> tuple[Simulation, Start]:
     sim.reduction.begin_again()
     log.info("goes on from %s, step %d, t %.6g s", place.name, sim.clock.step, sim.clock.t)
     return sim, replace(Start(**parcel.known["start"]), resumed=True)
+
+
+def _warn(journal: Journal | None, texts: Sequence[str]) -> None:
+    for text in texts:
+        log.warning(text)
+        if journal is not None:
+            journal.write(messages.Log, level="warning", text=text)
 
 
 def _announce(sim: Simulation, journal: Journal | None, setup: float) -> None:

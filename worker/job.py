@@ -18,7 +18,7 @@ from pathlib import Path
 
 import msgspec
 
-from conoid.cases import batch, layout, messages, outcome, slurm, whole
+from conoid.cases import batch, checkpoints, layout, messages, outcome, slurm, whole
 from conoid.cases.batch import Job
 from conoid.cases.outcome import Outcome
 from conoid.cases.run import Cause, ExitCode, State
@@ -105,7 +105,7 @@ def claim(folder: Path, job: Job, number: str) -> bool:
 
 def latest(folder: Path) -> int:
     """The step of the newest checkpoint; -1 when there is none."""
-    return max((int(path.name) for path in (folder / layout.CHECKPOINTS).glob("*[0-9]")), default=-1)
+    return next((int(place.name) for place in checkpoints.found(folder)), -1)
 
 
 def _run(folder: Path, job: Job, number: str, told: Told) -> int:

@@ -11,7 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO
 
-from conoid.cases import layout
+from conoid.cases import checkpoints, layout
 
 from .. import folder as run_folder
 from ..folder import Process
@@ -128,7 +128,7 @@ def environment(base: Mapping[str, str], job: Job) -> dict[str, str]:
 
 def _arguments(job: Job) -> list[str]:
     arguments = [str(job.case), "--out", str(job.folder), "--run", job.run, "--ranks", str(job.ranks)]
-    if any((job.folder / layout.CHECKPOINTS).glob("*[0-9]")):
+    if checkpoints.found(job.folder):
         arguments.append("--restart")
     if job.telemetry is not None:
         arguments += ["--telemetry", job.telemetry.endpoint, "--prefix", job.telemetry.prefix]

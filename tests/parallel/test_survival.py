@@ -201,7 +201,8 @@ def refused(words: Sequence[str]) -> str:
 
 def test_what_cannot_go_on_says_why(tmp_path: Path) -> None:
     words = case("nodal", tmp_path, tmp_path)
-    assert refused(words) == f"--restart: {tmp_path / 'nodal'} has no checkpoint that is whole"
+    none = f"--restart: {tmp_path / 'nodal'} has no checkpoint that is whole: "
+    assert refused(words) == f"{none}it has none"
     go(words, [(1, 4)])
     assert refused([*words, "--set", "run.end_time=2 us"]) == (
         "run.end_time: differs from the case of the checkpoint, and --restart goes on with that one"
@@ -210,7 +211,7 @@ def test_what_cannot_go_on_says_why(tmp_path: Path) -> None:
     data = bytearray(file.read_bytes())
     data[len(data) // 2] ^= 1
     file.write_bytes(data)
-    assert refused(words) == f"--restart: {tmp_path / 'nodal'} has no checkpoint that is whole"
+    assert refused(words) == f"{none}checkpoint 000000004 is damaged: rank-0.h5 differs from its sha256"
 
 
 def test_a_run_that_has_succeeded_stays_as_it_is(tmp_path: Path) -> None:

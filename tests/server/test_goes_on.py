@@ -1,5 +1,6 @@
 """``:restart``: a new run goes on from a checkpoint of another one."""
 
+import hashlib
 import os
 import shutil
 from pathlib import Path
@@ -7,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from conoid.cases import layout
+from conoid.cases.checkpoints import FORMAT, MANIFEST, SEAL, File, Manifest, sealed
 from conoid.cases.run import State
 from conoid.server import restarts
 from conoid.server.errors import ServiceError
@@ -16,9 +18,13 @@ from .running import Running
 
 def with_checkpoint(server: Running, run: str, step: int) -> Path:
     """Puts what a worker would have left into the folder of a run."""
-    path = server.ann.runs / run
+    return with_checkpoint_in(made(server.ann.runs / run, step))
+
+
+def with_checkpoint_in(path: Path) -> Path:
+    """Frames, fragments and a history beside the checkpoints."""
     for place, name in (
-        (layout.checkpoint(path, step), "rank-0.h5"), (path / layout.FRAMES, "000000.vtkhdf"),
+        (path / layout.FRAMES, "000000.vtkhdf"),
         (path / layout.FRAMES, layout.FRAME_SERIES), (path / "fragments", "000000.csv"),
     ):  # fmt: skip
         place.mkdir(parents=True, exist_ok=True)
@@ -27,7 +33,7 @@ def with_checkpoint(server: Running, run: str, step: int) -> Path:
     return path
 
 
-def test_a_new_run_takes_over_the_newest_checkpoint(server: Running, tmp_path: Path) -> None:
+def test_a_new_run_takes_over_the_checkpoints(server: Running, tmp_path: Path) -> None:
     run = server.ann.submit(wait=str(tmp_path / "go"))
     server.ann.wait_for(run, State.RUNNING)
     with_checkpoint(server, run, 7)
@@ -41,7 +47,7 @@ def test_a_new_run_takes_over_the_newest_checkpoint(server: Running, tmp_path: P
     assert fresh == made[1].json()["id"] != run
     assert made[0].json()["ranks"] == 2
     folder = server.ann.runs / fresh
-    assert [path.name for path in (folder / layout.CHECKPOINTS).iterdir()] == ["000000040"]
+    assert sorted(path.name for path in (folder / layout.CHECKPOINTS).iterdir()) == ["000000007", "000000040"]
     frame, history = folder / layout.FRAMES / "000000.vtkhdf", folder / layout.HISTORY
     assert frame.stat().st_ino == (source / layout.FRAMES / "000000.vtkhdf").stat().st_ino, "it takes no room"
     assert history.stat().st_ino != (source / layout.HISTORY).stat().st_ino, "this one is appended to"
@@ -75,9 +81,50 @@ def test_a_run_that_has_none_yet_says_how_it_gets_some(server: Running) -> None:
 def made(folder: Path, *steps: int) -> Path:
     """A run's folder with checkpoints."""
     for step in steps:
-        layout.checkpoint(folder, step).mkdir(parents=True)
-        (layout.checkpoint(folder, step) / "rank-0.h5").write_bytes(b"state")
+        place = layout.checkpoint(folder, step)
+        place.mkdir(parents=True)
+        (place / "rank-0.h5").write_bytes(b"state")
+        file = File("rank-0.h5", 5, hashlib.sha256(b"state").hexdigest())
+        for name, content in zip((MANIFEST, SEAL), sealed(Manifest(FORMAT, step, 0.0, {}, [file], {})), strict=True):
+            (place / name).write_bytes(content)
     return folder
+
+
+def remade(path: Path, kind: str) -> None:
+    """Something else in a file's place."""
+    path.unlink()
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "endless":
+        path.symlink_to("/dev/zero")
+    elif kind == "folder":
+        path.mkdir()
+
+
+@pytest.mark.parametrize("name", [MANIFEST, SEAL, "rank-0.h5"])
+@pytest.mark.parametrize("kind", ["gone", "empty", "half", "null", "pipe", "endless", "folder"])
+def test_where_the_newest_is_damaged_a_new_run_gets_the_one_before(tmp_path: Path, name: str, kind: str) -> None:
+    source = made(tmp_path / "a", 10, 20)
+    path = layout.checkpoint(source, 20) / name
+    if kind in {"empty", "half", "null"}:
+        path.write_bytes({"empty": b"", "half": path.read_bytes()[: path.stat().st_size // 2], "null": b"null"}[kind])
+    else:
+        remade(path, kind)
+    restarts.fill(source, tmp_path / "b")
+    assert [place.name for place in (tmp_path / "b" / layout.CHECKPOINTS).iterdir()] == ["000000010"]
+    shutil.rmtree(layout.checkpoint(source, 10))
+    with pytest.raises(ServiceError, match="no checkpoint: all are damaged; 000000020: ") as told:
+        restarts.fill(source, tmp_path / "c")
+    assert told.value.status == 409
+
+
+def test_what_is_no_file_among_the_results_is_left_out(tmp_path: Path) -> None:
+    source = with_checkpoint_in(made(tmp_path / "a", 10))
+    remade(source / "fragments" / "000000.csv", "pipe")
+    remade(source / layout.HISTORY, "endless")
+    restarts.fill(source, tmp_path / "b")
+    assert not (tmp_path / "b" / layout.HISTORY).exists()
+    assert (tmp_path / "b" / layout.FRAMES / "000000.vtkhdf").exists()
 
 
 def test_a_checkpoint_that_is_replaced_meanwhile_is_looked_for_again(

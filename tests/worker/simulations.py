@@ -51,7 +51,7 @@ def kept_again(sim: Simulation, case: schema.Case, folder: Path) -> Simulation:
     """Goes on from a checkpoint, with another case where that is allowed."""
     checkpoint.write(simulation.keep(sim), sim.case, folder, sim.clock.step, sim.clock.t, sim.comm)
     sim.free()
-    place, manifest = checkpoint.latest(folder)
+    place, manifest, _ = checkpoint.latest(folder)
     checkpoint.require_same(case, manifest)
     arrived = route(checkpoint.read(place, manifest, sim.comm), (1.0, 1.0, 1.0), sim.comm)
     resumed = simulation.resume(case, arrived, sim.comm, Timers(sim.comm))

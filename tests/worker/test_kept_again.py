@@ -11,6 +11,7 @@ from typing import NamedTuple
 import pytest
 
 from conoid.cases import schema
+from conoid.cases.checkpoints import FORMAT, Manifest
 from conoid.cases.load import apply_overrides, parse_case, read_data, resolved_json
 from conoid.cases.messages import Energy
 from conoid.worker import simulation, step
@@ -83,7 +84,7 @@ def test_what_is_kept_again_and_again_is_the_same_run(
 
 
 def test_what_the_answer_depends_on_may_not_change() -> None:
-    manifest = {"case": json.loads(resolved_json(case_of()))}
+    manifest = Manifest(FORMAT, 1, 0.0, json.loads(resolved_json(case_of())), [], {})
     checkpoint.require_same(case_of(*OTHER), manifest)
     with pytest.raises(InputError, match=r"^contact\.friction: differs from the case of the checkpoint"):
         checkpoint.require_same(case_of("contact.friction=0.3"), manifest)

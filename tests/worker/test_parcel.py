@@ -1,14 +1,21 @@
 """Parcels travel unchanged, as messages and as files."""
 
+import hashlib
 import json
 import math
+import os
+import shutil
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from conoid.cases import checkpoints
+from conoid.cases.checkpoints import FORMAT, MANIFEST, SEAL
 from conoid.cases.load import parse_case, read_data, shipped_path
+from conoid.worker.errors import InputError
 from conoid.worker.migration import checkpoint
 from conoid.worker.migration.parcel import Parcel, joined, length, once, take
 from conoid.worker.parallel.comm import SerialComm
@@ -47,26 +54,73 @@ def test_a_parcel_is_a_checkpoint(tmp_path: Path) -> None:
     case = parse_case(read_data(shipped_path("free_tets")))
     place, size = checkpoint.write(parcel(), case, tmp_path, 12, 1e-6, SerialComm())
     assert size == sum(file.stat().st_size for file in place.glob("*.h5"))
-    found, manifest = checkpoint.latest(tmp_path)
-    assert (found, manifest["step"], manifest["t"]) == (place, 12, 1e-6)
+    found, manifest, damaged = checkpoint.latest(tmp_path)
+    assert (found, manifest.step, manifest.t, damaged) == (place, 12, 1e-6, [])
     checkpoint.require_same(case, manifest)
     assert same(vars(checkpoint.read(place, manifest, SerialComm())), vars(parcel()))
 
 
-@pytest.mark.parametrize("harm", ["manifest", "file", "missing"])
+HARMS: dict[str, Callable[[Path], Any]] = {
+    "no manifest": lambda place: (place / MANIFEST).unlink(),
+    "an empty manifest": lambda place: (place / MANIFEST).write_bytes(b""),
+    "half a manifest": lambda place: os.truncate(place / MANIFEST, 200),
+    "a manifest of nothing": lambda place: (place / MANIFEST).write_text("null"),
+    "a manifest of other things": lambda place: (place / MANIFEST).write_text(json.dumps({"format": FORMAT})),
+    "a manifest that is a list": lambda place: resealed(place, b"[]"),
+    "a manifest of wrong types": lambda place: resealed(place, b'{"format": 15, "step": "3", "files": null}'),
+    "a manifest with another number": lambda place: flipped(place / MANIFEST, b'"step": 3', b'"step": 4'),
+    "a manifest that is a folder": lambda place: put(place / MANIFEST, Path.mkdir),
+    "a manifest that is a pipe": lambda place: put(place / MANIFEST, os.mkfifo),
+    "no sha256": lambda place: (place / SEAL).unlink(),
+    "a file without bytes": lambda place: os.truncate(place / "rank-0.h5", 0),
+    "half a file": lambda place: os.truncate(place / "rank-0.h5", 1000),
+    "a file with another byte": lambda place: flipped(place / "rank-0.h5"),
+    "no file": lambda place: (place / "rank-0.h5").unlink(),
+    "a file that is an endless one": lambda place: put(place / "rank-0.h5", lambda path: path.symlink_to("/dev/zero")),
+    "nothing": lambda place: emptied(place),
+}
+
+
+def put(path: Path, make: Callable[[Path], None]) -> None:
+    """Something else in the place of a file."""
+    path.unlink()
+    make(path)
+
+
+def emptied(place: Path) -> None:
+    """A folder without its files."""
+    for path in place.iterdir():
+        path.unlink()
+
+
+def flipped(path: Path, old: bytes = b"", new: bytes = b"") -> None:
+    """One byte differs, or ``old`` has become ``new``."""
+    content = path.read_bytes()
+    assert old in content
+    middle = len(content) // 2
+    other = bytes([content[middle] ^ 1])
+    path.write_bytes(content.replace(old, new) if old else content[:middle] + other + content[middle + 1 :])
+
+
+def resealed(place: Path, text: bytes) -> None:
+    """Another manifest, with the sha256 that belongs to it."""
+    (place / MANIFEST).write_bytes(text)
+    (place / SEAL).write_text(hashlib.sha256(text).hexdigest())
+
+
+@pytest.mark.parametrize("harm", HARMS)
 def test_a_checkpoint_that_is_not_whole_is_passed_over(tmp_path: Path, harm: str) -> None:
     case = parse_case(read_data(shipped_path("free_tets")))
     places = [checkpoint.write(parcel(), case, tmp_path, step, 0.0, SerialComm())[0] for step in (1, 2, 3)]
-    assert checkpoint.found(tmp_path) == places[:0:-1]
-    if harm == "manifest":
-        (places[2] / "manifest.json").write_text(json.dumps({"format": 1}))
-    elif harm == "file":
-        with (places[2] / "rank-0.h5").open("r+b") as file:
-            file.seek(2000)
-            file.write(b"\xff")
-    else:
-        (places[2] / "rank-0.h5").unlink()
-    assert checkpoint.latest(tmp_path)[0] == places[1]
+    (tmp_path / "checkpoints" / "notes.7").mkdir()
+    assert checkpoints.found(tmp_path) == places[:0:-1]
+    HARMS[harm](places[2])
+    place, manifest, damaged = checkpoint.latest(tmp_path)
+    assert (place, manifest.step) == (places[1], 2)
+    assert [line.partition(":")[0] for line in damaged] == ["checkpoint 000000003 is damaged"]
+    shutil.rmtree(places[1])
+    with pytest.raises(InputError, match="no checkpoint that is whole: checkpoint 000000003 is damaged: "):
+        checkpoint.latest(tmp_path)
 
 
 def test_tables() -> None:

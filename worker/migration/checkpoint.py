@@ -5,10 +5,10 @@
     checkpoints/000001200/rank-0.h5 ...   what each rank keeps: columns of nodes, tets and other things by global ids
                           manifest.json   step, time, the case, what all ranks know, bytes and sha256 of each file
 
-The folder is written under another name, flushed to disk and renamed. Any number of ranks can read it.
+The folder is written under another name, flushed to disk and renamed. Any number of ranks can read it. What makes it
+whole is in conoid.cases.checkpoints.
 """
 
-import hashlib
 import json
 import os
 import shutil
@@ -19,6 +19,19 @@ import h5py
 import numpy as np
 
 from conoid.cases import layout
+from conoid.cases.checkpoints import (
+    FORMAT,
+    MANIFEST,
+    SEAL,
+    DamagedError,
+    File,
+    Manifest,
+    check_bytes,
+    found,
+    manifest_of,
+    sealed,
+    sha256,
+)
 from conoid.cases.load import resolved_json
 from conoid.cases.schema import Case
 
@@ -27,11 +40,8 @@ from ..output import hdf5
 from ..parallel.comm import Comm
 from .parcel import Parcel, Table, take
 
-FORMAT = 14
-"""Of the files; 14 has how near to a border the nodes of a part are on it. Others are not read."""
 _KEPT = 2
 """Checkpoints that stay; the older ones go."""
-_MANIFEST = "manifest.json"
 _FREE = {
     "run": {
         "ranks", "profile", "cut_scale", "max_steps", "max_wall_time", "checkpoint_every", "residual_limit",
@@ -40,8 +50,6 @@ _FREE = {
     "contact": {"skin", "domain"},
 }  # fmt: skip
 """Keys that may change when a run goes on: the answer does not depend on them."""
-_PIECE = 1 << 24
-"""Bytes that are hashed at once."""
 
 
 def write(parcel: Parcel, case: Case, folder: Path, step: int, t: float, comm: Comm) -> tuple[Path, int]:
@@ -54,15 +62,12 @@ def write(parcel: Parcel, case: Case, folder: Path, step: int, t: float, comm: C
     comm.barrier()
     path = beside / f"rank-{comm.rank}.h5"
     _write_parcel(path, parcel)
-    files = comm.gather({"name": path.name, "bytes": path.stat().st_size, "sha256": _sha256(path)})
+    files = comm.gather(File(path.name, path.stat().st_size, sha256(path)))
     total = 0
     if files is not None:
-        total = sum(file["bytes"] for file in files)
+        total = sum(file.bytes for file in files)
         known, data = _plain(parcel.known), json.loads(resolved_json(case))
-        manifest = {"format": FORMAT, "step": step, "t": t, "case": data, "files": files, "known": known}
-        with (beside / _MANIFEST).open("w", encoding="utf-8") as file:
-            json.dump(manifest, file)
-            os.fsync(file.fileno())
+        _describe(beside, Manifest(FORMAT, step, t, data, files, known))
         shutil.rmtree(place, ignore_errors=True)
         beside.rename(place)
         _flush_folder(place.parent)
@@ -71,42 +76,46 @@ def write(parcel: Parcel, case: Case, folder: Path, step: int, t: float, comm: C
     return place, int(comm.broadcast(total))
 
 
-def found(folder: Path) -> list[Path]:
-    """Checkpoints of the run in ``folder``, the latest first; not looked into."""
-    return sorted((p for p in (folder / layout.CHECKPOINTS).glob("*[0-9]") if p.is_dir()), reverse=True)
+def _describe(beside: Path, manifest: Manifest) -> None:
+    """Writes the manifest and its sha256, flushed to disk."""
+    for name, content in zip((MANIFEST, SEAL), sealed(manifest), strict=True):
+        with (beside / name).open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
 
 
 def forget(folder: Path, step: int = -1) -> None:
-    """Takes away checkpoints of ``folder`` beyond a step, and what was never finished; all of them without a step."""
+    """Removes the checkpoints of ``folder`` beyond a step, and what was never finished; all of them without a step."""
     if step < 0:
         shutil.rmtree(folder / layout.CHECKPOINTS, ignore_errors=True)
+    kept = {place.name for place in found(folder) if int(place.name) <= step}
     for place in (folder / layout.CHECKPOINTS).glob("*"):
-        if place.suffix or int(place.name) > step:
+        if place.name not in kept:
             shutil.rmtree(place, ignore_errors=True)
 
 
-def latest(folder: Path) -> tuple[Path, dict[str, Any]]:
-    """The latest checkpoint that is whole, with its manifest. Raises InputError when there is none."""
+def latest(folder: Path) -> tuple[Path, Manifest, list[str]]:
+    """The latest checkpoint that is whole, its manifest, and a line about each later one, which is damaged.
+
+    Raises InputError when none is whole.
+    """
+    damaged: list[str] = []
     for place in found(folder):
-        manifest = _manifest(place)
-        if manifest is not None:
-            return place, manifest
-    raise InputError(f"--restart: {folder} has no checkpoint that is whole")
+        try:
+            manifest = manifest_of(place)
+            check_bytes(place, manifest)
+        except DamagedError as error:
+            damaged.append(f"checkpoint {place.name} is damaged: {error}")
+        else:
+            return place, manifest, damaged
+    why = "; ".join(damaged) or "it has none"
+    raise InputError(f"--restart: {folder} has no checkpoint that is whole: {why}")
 
 
-def _manifest(place: Path) -> dict[str, Any] | None:
-    """The manifest, when all files are as it says."""
-    try:
-        manifest: dict[str, Any] = json.loads((place / _MANIFEST).read_bytes())
-        whole = all(_sha256(place / file["name"]) == file["sha256"] for file in manifest["files"])
-    except (OSError, ValueError, KeyError):
-        return None
-    return manifest if whole and manifest["format"] == FORMAT else None
-
-
-def require_same(case: Case, manifest: dict[str, Any]) -> None:
+def require_same(case: Case, manifest: Manifest) -> None:
     """Raises InputError when the case differs from that of the checkpoint in what its answer depends on."""
-    now, then = (_answering(data) for data in (json.loads(resolved_json(case)), manifest["case"]))
+    now, then = (_answering(data) for data in (json.loads(resolved_json(case)), manifest.case))
     for key in sorted({*now, *then}):
         if now.get(key) != then.get(key):
             raise InputError(f"{key}: differs from the case of the checkpoint, and --restart goes on with that one")
@@ -122,12 +131,12 @@ def _answering(case: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def read(place: Path, manifest: dict[str, Any], comm: Comm) -> Parcel:
+def read(place: Path, manifest: Manifest, comm: Comm) -> Parcel:
     """This rank's share of a checkpoint: some of its files, or none of their rows."""
-    names = [file["name"] for file in manifest["files"]]
+    names = [file.name for file in manifest.files]
     mine = [_read_parcel(place / name) for name in names[comm.rank :: comm.size]]
     whole = Parcel.of(mine or [_nothing_of(_read_parcel(place / names[0]))])
-    whole.known = _rich(manifest["known"])
+    whole.known = _rich(manifest.known)
     return whole
 
 
@@ -186,14 +195,6 @@ def _rich(value: Any) -> Any:
             return np.array(value["values"], value["dtype"])
         return {key: _rich(item) for key, item in value.items()}
     return [_rich(item) for item in value] if isinstance(value, list) else value
-
-
-def _sha256(path: Path) -> str:
-    h = hashlib.sha256()
-    with path.open("rb") as file:
-        while piece := file.read(_PIECE):
-            h.update(piece)
-    return h.hexdigest()
 
 
 def _flush_folder(folder: Path) -> None:
