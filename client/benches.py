@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from conoid.cases.figures import counted, duration
 from conoid.cases.problems import shown
 from conoid.cases.run import ExitCode
 from conoid.cases.schema import MOST_RANKS
@@ -47,7 +48,7 @@ def bench_scale(
     with tempfile.TemporaryDirectory() as passing, aloud(f"0 of {len(numbers)} runs have ended") as name:
         runs = []
         for run in scale(case, overrides or (), numbers, out or Path(passing), network):
-            complain(f"ranks {run.ranks}: {run.steps} steps in {run.wall:.1f} s")
+            complain(f"ranks {run.ranks}: {counted(run.steps, 'step')} in {duration(run.wall)}")
             runs.append(run)
             name(f"{len(runs)} of {len(numbers)} runs have ended")
     done = study.Study(case_of(case, overrides or ()).name, overrides or (), CORES, network, runs)

@@ -10,6 +10,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from conoid.cases.figures import exact
+
 from .pictures import Picture
 
 Array: TypeAlias = "np.ndarray[Any, np.dtype[np.float64]]"
@@ -103,5 +105,4 @@ def round_length(most: float) -> float:
 def scale_bar(camera: Camera, aspect: float) -> tuple[float, str]:
     """A round length in m that fits below the body, and how it is written."""
     length = round_length(_SCALE * 2.0 * camera.half * aspect)
-    unit, factor = next(((u, f) for u, f in (("m", 1.0), ("mm", 1e3)) if length * f >= 0.9999), ("µm", 1e6))
-    return length, f"{length * factor:.3g} {unit}"
+    return length, exact(length, "m", 3)

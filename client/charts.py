@@ -8,6 +8,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from conoid.cases.figures import percent
 from conoid.cases.messages import AnyMessage, Balance, Load
 
 from .curves import save
@@ -107,7 +108,7 @@ def _phases(axes: Axes, seconds: dict[str, list[float]]) -> None:
     total = sum(map(sum, seconds.values())) or 1.0
     for name in _COLOURS:
         spent = seconds.get(name, [0.0] * ranks)
-        label = f"{name}{' and waiting' if name == 'exchange' else ''} {sum(spent) / total:.0%}"
+        label = f"{name}{' and waiting' if name == 'exchange' else ''} {percent(sum(spent) / total, 0)}"
         axes.bar(range(ranks), spent, bottom=low, color=_COLOURS[name], label=label)
         low = [a + b for a, b in zip(low, spent, strict=True)]
     axes.set(xlabel="rank", ylabel="CPU time, s", xticks=range(0, ranks, max(1, ranks // 16)))

@@ -11,6 +11,7 @@ import typer
 from typer.core import TyperGroup
 
 from conoid.cases.estimate import estimate
+from conoid.cases.figures import counted
 from conoid.cases.load import CaseError, parse_case
 from conoid.cases.loaded import loads
 from conoid.cases.mesh_checks import missing_files
@@ -119,7 +120,8 @@ def validate(case: CaseArgument, overrides: Overrides = None, as_json: Json = Fa
         echo_json({"name": checked.name, "valid": True, "warnings": odd, "estimate": expected, "loads": loads(checked)})
         return
     warn(odd)
-    show(f"{checked.name}: valid{f', {len(odd)} warning' + 's' * (len(odd) > 1) if odd else ''}")
+    found = f", {counted(len(odd), 'warning')}" if odd else ""
+    show(f"{checked.name}: valid{found}")
     show(tables.parts_table(checked, expected))
     if acted_on := loads(checked):
         show("")

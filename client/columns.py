@@ -8,9 +8,9 @@ from html import escape
 from typing import Any, TypeAlias
 
 from conoid.cases import fragments, history
+from conoid.cases.figures import number
 
 from .errors import ClientError, UsageError
-from .figures import number
 
 Column: TypeAlias = "array[float] | list[str]"
 """Numbers as a double array; text, such as the limiter of dt, as a list."""

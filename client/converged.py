@@ -7,9 +7,10 @@ from typing import Any
 
 import msgspec
 
+from conoid.cases.figures import alike, count, duration, exact, fixed, number, si
+
 from . import trade
 from .convergence import Done, Series
-from .figures import count, duration, number, si
 from .quantities import Number
 from .richardson import Trend
 from .scatter import differ, runs_needed
@@ -92,7 +93,7 @@ class Book:
             mesh, limit = own.meshes[0], own.limits[each.name]
             if not math.isnan(limit.uncertainty):
                 value = f"{number(mesh.samples[each.name].mean)} {each.unit}".strip()
-                where, by = si(self.own_size * mesh.factor, "m"), f"{limit.uncertainty:.2g}"
+                where, by = si(self.own_size * mesh.factor, "m"), exact(limit.uncertainty, "", 2)
                 return f"{said}. {each.name} {limit.trend.value}: {value} at {where}, uncertain by {by}."
         return f"{said}."
 
@@ -108,7 +109,9 @@ def to_markdown(book: Book, wanted: str | None = None) -> str:
         _between(book),
         _scatter(book) if book.members > 1 else "",
         *([] if name is None else [f"Error over cost, {name}:", _worth(book, name)]),
-        "\n".join(f"- {each.point.variant}, sizes x {each.point.factor:g}: {each.problem}" for each in book.failed),
+        "\n".join(
+            f"- {each.point.variant}, sizes x {number(each.point.factor)}: {each.problem}" for each in book.failed
+        ),
         f"**Advice.** {book.advice(wanted)}",
     ]
     return "\n\n".join(filter(None, parts)) + "\n"
@@ -122,9 +125,10 @@ def _ensembles(book: Book) -> str:
 
 
 def _costs(book: Book, series: Series) -> str:
+    sizes = alike([book.own_size * m.factor for m in series.meshes], "m")
     rows = [
-        [si(book.own_size * m.factor, "m"), f"{m.size:.3g}", count(m.tets), count(m.steps), _seconds(m.cpu)]
-        for m in series.meshes
+        [size, exact(m.size, "", 3), count(m.tets), count(m.steps), _seconds(m.cpu)]
+        for m, size in zip(series.meshes, sizes, strict=True)
     ]
     return table(("element size", "h / h of the case", "tets", "steps", "CPU s"), rows)
 
@@ -136,11 +140,11 @@ def _values(book: Book, series: Series) -> str:
     for each in book.numbers:
         found = series.limits[each.name]
         shown = [number(m.samples[each.name].mean) if each.name in m.samples else "-" for m in meshes]
-        order = "-" if math.isnan(found.order) else f"{found.order:.1f}"
+        order = "-" if math.isnan(found.order) else fixed(found.order, 1)
         limit = number(found.value) if found.trend is Trend.CONVERGES else "-"
         known = not math.isnan(found.uncertainty)
-        uncertain = f"{found.uncertainty:.2g}" if known else "-"
-        share = f"{100.0 * found.uncertainty / each.scale:.2g}" if known and each.scale and not each.of_nothing else "-"
+        uncertain = exact(found.uncertainty, "", 2) if known else "-"
+        share = _percent(found.uncertainty / each.scale) if known and each.scale and not each.of_nothing else "-"
         expected = "-" if each.expected is None else f"{number(each.expected)} +- {number(each.tolerance)}"
         rows.append([
             _titled(each), *shown, found.trend.value, order, limit, uncertain, share, expected
@@ -176,7 +180,7 @@ def _between(book: Book) -> str:
             by = 100.0 * (known[-1].mean - known[0].mean) / largest
             chance = "yes" if differ(known[0], known[-1]) else "no"
             shown = ["-" if sample is None else number(sample.mean) for sample in there]
-            rows.append([_titled(each), *shown, f"{by:.2g}", chance])
+            rows.append([_titled(each), *shown, exact(by, "", 2), chance])
     head = ("quantity", *(str(series.variant) for series in book.series), "differ by %", "by more than chance")
     return f"Between variants, on the finest mesh of each:\n\n{table(head, rows)}"
 
@@ -191,10 +195,17 @@ def _scatter(book: Book) -> str:
                 sample = mesh.samples[one.name]
                 rows.append([
                     str(each.variant), _titled(one), number(sample.mean), number(sample.deviation),
-                    f"{100.0 * sample.deviation / abs(sample.mean):.2g}",
+                    _percent(sample.deviation / abs(sample.mean)),
                     count(runs_needed(sample.deviation, _ENOUGH * abs(sample.mean))),
                 ])  # fmt: skip
-    head = ("variant, finest mesh", "quantity", "mean", "deviation", "%", f"runs a side to tell {100 * _ENOUGH:g} %")
+    head = (
+        "variant, finest mesh",
+        "quantity",
+        "mean",
+        "deviation",
+        "%",
+        f"runs a side to tell {number(100 * _ENOUGH)} %",
+    )
     return table(head, rows)
 
 
@@ -204,14 +215,14 @@ def _worth(book: Book, name: str) -> str:
     best = trade.front(points)
     rows = [
         [
-            str(p.variant), si(book.own_size * p.mesh.factor, "m"), _seconds(p.cost), f"{100.0 * p.error:.2g}",
+            str(p.variant), si(book.own_size * p.mesh.factor, "m"), _seconds(p.cost), _percent(p.error),
             "front" if p in best else "",
         ]
         for p in points
     ]  # fmt: skip
     said = (
         f"From the limit {number(goal.value)} {each.unit} of {goal.variant}, itself uncertain by "
-        f"{100.0 * goal.uncertainty:.2g} %, by way of each variant's own: errors that cancel by chance do not count."
+        f"{_percent(goal.uncertainty)} %, by way of each variant's own: errors that cancel by chance do not count."
     )
     others = [str(variant) for variant in trade.elsewhere(book.series, each, goal)]
     said += f" Another limit, further away than both are uncertain, has: {'; '.join(others)}." if others else ""
@@ -219,7 +230,12 @@ def _worth(book: Book, name: str) -> str:
 
 
 def _seconds(value: float) -> str:
-    return duration(value) if value >= 9.95 else f"{value:.2g} s"
+    return duration(value) if value >= 9.95 else f"{exact(value, '', 2)} s"
+
+
+def _percent(share: float) -> str:
+    """Two digits, without the sign."""
+    return exact(100.0 * share, "", 2)
 
 
 def to_json(book: Book, wanted: str | None = None) -> bytes:

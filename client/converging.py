@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from conoid.cases.figures import counted, duration, number
 from conoid.cases.load import parse_case
 from conoid.cases.problems import shown
 from conoid.cases.run import ExitCode
@@ -91,8 +92,9 @@ def _session(out: Path, ranks: int, on_server: bool, url: str | None, token: str
 
 
 def _told(each: Done) -> str:
-    where = f"{each.point.variant}, sizes x {each.point.factor:g}"
-    return f"{where}: {each.problem or f'{each.steps} steps, {each.cpu:.1f} s of CPU time'}"
+    where = f"{each.point.variant}, sizes x {number(each.point.factor)}"
+    cost = f"{counted(each.steps, 'step')}, {duration(each.cpu)} of CPU time"
+    return f"{where}: {each.problem or cost}"
 
 
 def _book(case: Case, changes: Sequence[str], plan: Plan, accuracy: float, done: Sequence[Done]) -> Book:

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from conoid.cases import history
+from conoid.cases.figures import counted, exact
 from conoid.cases.fragments import DUST
 
 from .columns import Columns, by_part
@@ -115,8 +116,8 @@ def distribution(axes: Axes, tables: Mapping[str, Columns]) -> None:
     """N(m), the number of fragments of mass m or more, on two logarithmic axes."""
     for (name, table), colour in zip(tables.items(), _COLOURS, strict=False):
         masses = sorted((1e3 * mass for mass in table.numbers("mass") if mass > 0.0), reverse=True)
-        when = f"{1e6 * table.numbers('t')[0]:.4g} µs" if table.rows else ""
-        label = ", ".join(filter(None, [name, when, f"{len(masses)} fragments"]))
+        when = exact(table.numbers("t")[0], "s", 4) if table.rows else ""
+        label = ", ".join(filter(None, [name, when, counted(len(masses), "fragment")]))
         axes.step(masses, range(1, len(masses) + 1), where="post", color=colour, label=label, linewidth=1.4)
     axes.set_xscale("log")
     axes.set_yscale("log")

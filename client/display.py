@@ -9,11 +9,11 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
+from conoid.cases.figures import alike, clock, count, counted, duration, fixed, large, percent, rough, si
 from conoid.cases.messages import Energy, Log, Snapshot
 from conoid.cases.run import State
 
 from .console import one_line
-from .figures import clock, count, duration, si
 from .live import Live
 
 STATE_STYLE = {
@@ -71,7 +71,7 @@ def _bar(live: Live) -> RenderableType:
     row.add_column(justify="right", no_wrap=True)
     waiting = live.progress is None and not live.state.final
     bar = ProgressBar(total=1.0, completed=live.fraction, pulse=waiting, complete_style="cyan", finished_style="green")
-    row.add_row(_state(live), bar, f"{100 * live.fraction:5.1f} %")
+    row.add_row(_state(live), bar, f"{percent(live.fraction):>7}")
     return row
 
 
@@ -97,13 +97,13 @@ def _number_rows(live: Live) -> list[list[str]]:
     elements = counts.elements if counts is not None else started.elements if started is not None else None
     nodes = counts.nodes if counts is not None else started.nodes if started is not None else None
     if elements is not None and nodes is not None:
-        speed = f"{si(progress.updates_per_second, '')} updates/s" if progress is not None else "–"
+        speed = f"{large(progress.updates_per_second)} updates/s" if progress is not None else "–"
         rows.append(["elements", count(elements), "nodes", count(nodes), "speed", speed])
     if counts is not None:
-        shared = f"{count(counts.shared)} nodes"
+        shared = counted(counts.shared, "node")
         rows.append(["shared", shared, "fragments", count(counts.fragments), "frames", str(live.frames)])
         if counts.particles:
-            rows.append(["particles", f"{count(counts.particles)} nodes", "", "", "", ""])
+            rows.append(["particles", counted(counts.particles, "node"), "", "", "", ""])
     if live.snapshot is not None:
         rows.append(["seen", seen(live.snapshot), "", "", "", ""])
     return rows
@@ -111,7 +111,7 @@ def _number_rows(live: Live) -> list[list[str]]:
 
 def _time(live: Live) -> str:
     end = live.progress.end_time if live.progress is not None else 0.0
-    return f"{si(live.fraction * end, 's')} of {si(end, 's')}"
+    return " of ".join(alike((live.fraction * end, end), "s"))
 
 
 def _ranks(live: Live) -> RenderableType:
@@ -124,11 +124,13 @@ def _ranks(live: Live) -> RenderableType:
     grid.add_column(justify="right", no_wrap=True)
     for rank in range(min(len(totals), _MOST_RANKS)):
         parts = {name: seconds[rank] for name, seconds in phases.items()}
-        grid.add_row(f"rank {rank}", _stacked(parts, longest), f"{100 * busy[rank]:3.0f} % busy")
+        grid.add_row(f"rank {rank}", _stacked(parts, longest), f"{percent(busy[rank], 0):>5} busy")
     legend = Text("  ").join(Text(f"■ {name}", style=_PHASE_STYLE[name]) for name in phases)
     imbalance = live.load.imbalance if live.load is not None else 1.0
     more = len(totals) - _MOST_RANKS
-    grid.add_row("", legend.append(f"   and {more} more ranks" if more > 0 else ""), f"imbalance {imbalance:.2f}")
+    grid.add_row(
+        "", legend.append(f"   and {counted(more, 'more rank')}" if more > 0 else ""), f"imbalance {fixed(imbalance)}"
+    )
     return grid
 
 
@@ -168,7 +170,7 @@ def _ledger(energy: Energy) -> RenderableType:
 
 def _residual(residual: float) -> Text:
     style = "green" if residual < 1e-3 else "yellow" if residual < 1e-2 else "bold red"
-    return Text(f"{residual:.1e}", style=style)
+    return Text(rough(residual), style=style)
 
 
 def _log_line(entry: Log) -> Text:
@@ -179,7 +181,7 @@ def _log_line(entry: Log) -> Text:
 
 def seen(snapshot: Snapshot) -> str:
     """A snapshot of the fragments in some words."""
-    return f"snapshot {snapshot.n} at t {si(snapshot.t, 's')}: {count(snapshot.fragments)} fragments"
+    return f"snapshot {snapshot.n} at t {si(snapshot.t, 's')}: {counted(snapshot.fragments, 'fragment')}"
 
 
 def line(live: Live) -> str:
@@ -189,11 +191,11 @@ def line(live: Live) -> str:
     progress = live.progress
     if progress is not None:
         parts += [
-            f"{100 * live.fraction:.1f} %", f"t {_time(live)}",
+            percent(live.fraction), f"t {_time(live)}",
             f"step {progress.step}", f"dt {si(progress.dt, 's')} ({progress.limiter})",
             "" if live.state.final else f"left {duration(progress.eta)}",
-            f"residual {progress.energy.residual:.1e}", f"{si(progress.updates_per_second, '')} updates/s",
+            f"residual {rough(progress.energy.residual)}", f"{large(progress.updates_per_second)} updates/s",
         ]  # fmt: skip
     if live.load is not None:
-        parts.append(f"imbalance {live.load.imbalance:.2f}")
+        parts.append(f"imbalance {fixed(live.load.imbalance)}")
     return "  ".join(part for part in parts if part)

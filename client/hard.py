@@ -11,6 +11,7 @@ from typing import Annotated
 import msgspec
 import typer
 
+from conoid.cases.figures import count, duration, fixed, rough
 from conoid.cases.load import apply_overrides, parse_case, read_data
 from conoid.cases.outcome import Outcome
 from conoid.cases.run import ExitCode
@@ -20,7 +21,6 @@ from conoid.cases.suite import Hard, drift, faults, is_free, suite
 from .columns import Columns
 from .console import echo
 from .errors import UsageError
-from .figures import count, known, rough
 from .local import LocalServer
 from .options import aloud, complain
 from .run import Run
@@ -114,15 +114,15 @@ def to_markdown(ended: Sequence[Verdict]) -> str:
     rows = [
         [
             verdict.hard.name, " ".join(verdict.hard.rows), verdict.outcome.state,
-            rough(verdict.outcome.worst_residual), "-" if verdict.drifted is None else f"{verdict.drifted:.1e}",
-            count(verdict.outcome.steps), count(verdict.outcome.elements), known(verdict.outcome.cpu, ".1f"),
+            rough(verdict.outcome.worst_residual), rough(verdict.drifted),
+            count(verdict.outcome.steps), count(verdict.outcome.elements), fixed(verdict.outcome.cpu, 1),
             _references(verdict.outcome),
         ]
         for verdict in ended
     ]  # fmt: skip
     bad = [f"- **{verdict.hard.name}**: {'; '.join(verdict.faults)}" for verdict in ended if verdict.faults]
     spent = sum(v.outcome.cpu for v in ended if not math.isnan(v.outcome.cpu))
-    said = f"{len(ended) - len(bad)} of {len(ended)} ended well, in {spent:.0f} s of CPU time."
+    said = f"{len(ended) - len(bad)} of {len(ended)} ended well, in {duration(spent)} of CPU time."
     return "\n\n".join(filter(None, [table(head, rows), said, "\n".join(bad)])) + "\n"
 
 

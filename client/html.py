@@ -5,9 +5,8 @@ from collections.abc import Sequence
 from html import escape
 from importlib import metadata
 
+from conoid.cases.figures import count, counted, duration, exacts, rough, si
 from conoid.cases.outcome import Outcome
-
-from .figures import count, duration, number, rough, si
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int] = ()) -> str:
@@ -35,11 +34,11 @@ def head(name: str, title: str, ended: Outcome | None) -> str:
         good = "good" if ended.state == "succeeded" else "bad"
         state = f"<span class={good}>{escape(ended.state)}</span> {escape(ended.message)}"
         rows = [
-            ["run", name], ["simulated", f"{si(ended.time, 's')} in {count(ended.steps)} steps"],
-            ["took", f"{duration(ended.elapsed)} on {ended.ranks} rank{'s' * (ended.ranks != 1)}"],
+            ["run", name], ["simulated", f"{si(ended.time, 's')} in {counted(ended.steps, 'step')}"],
+            ["took", f"{duration(ended.elapsed)} on {counted(ended.ranks, 'rank')}"],
             ["tets", f"{count(ended.elements)}, of which {count(ended.eroded)} eroded"],
             ["nodes", f"{count(ended.nodes_initial)} at first, {count(ended.nodes)} at the end"],
-            ["fragments", f"{count(ended.fragments)}; {count(ended.broken)} facets broken"],
+            ["fragments", f"{count(ended.fragments)}; {counted(ended.broken, 'facet')} broken"],
             ["energy", f"worst residual {rough(ended.worst_residual)}"], ["digest", ended.digest],
             ["written by", release],
         ]  # fmt: skip
@@ -53,11 +52,8 @@ def references(ended: Outcome | None) -> str:
     rows = []
     for check in ended.reference:
         verdict = "<span class=good>pass</span>" if check.passed else "<span class=bad>FAIL</span>"
-        values = (
-            f"{number(check.value)} {check.unit}",
-            f"{number(check.expected)} {check.unit}",
-            f"± {number(check.tolerance)}",
-        )
+        value, expected, tolerance = exacts((check.value, check.expected, check.tolerance), check.unit)
+        values = (value, expected, f"± {tolerance}")
         cells = "".join(f"<td class=n>{escape(each)}</td>" for each in values)
         rows.append(f"<tr><td>{escape(check.name)}</td>{cells}<td>{verdict}</td><td>{escape(check.source)}</td></tr>")
     head = "".join(f"<th class=n>{each}</th>" for each in ("value", "expected", "tolerance"))

@@ -10,6 +10,7 @@ from typing import Self
 
 import msgspec
 
+from conoid.cases.figures import duration
 from conoid.cases.run import State
 
 from .errors import ClientError
@@ -82,7 +83,7 @@ class LocalServer:
             if address is not None and address.pid == self._process.pid:
                 return address
             time.sleep(0.05)
-        raise ClientError(f"the server did not start within {_START_SECONDS:.0f} s; see {self.runs / LOG_FILE}")
+        raise ClientError(f"the server did not start within {duration(_START_SECONDS)}; see {self.runs / LOG_FILE}")
 
     def stop(self) -> None:
         """Asks the server to end, and ends it when it does not."""
@@ -120,7 +121,7 @@ def _token(runs: Path) -> str:
             env=_environment(), check=False,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
-        raise ClientError(f"the server did not start within {_START_SECONDS:.0f} s") from None
+        raise ClientError(f"the server did not start within {duration(_START_SECONDS)}") from None
     if made.returncode != 0 or not made.stdout.strip():
         said = made.stderr.strip().splitlines()
         raise ClientError(f"the server did not start: {said[-1] if said else f'it ended with code {made.returncode}'}")

@@ -10,6 +10,7 @@ import typer
 from rich.console import RenderableType
 
 from conoid.cases.estimate import estimate
+from conoid.cases.figures import duration
 from conoid.cases.load import CaseError, materials, parse_case, shipped
 from conoid.cases.plausible import doubts
 from conoid.cases.problems import Problem
@@ -17,7 +18,6 @@ from conoid.cases.problems import Problem
 from . import silence
 from .console import PlainConsole, echo, one_line
 from .errors import ClientError, NotFoundError, UsageError
-from .figures import duration
 from .result import Result
 from .run import Run
 from .session import Session, connect

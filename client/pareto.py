@@ -3,6 +3,8 @@
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from conoid.cases.figures import exact
+
 from . import trade
 from .converged import Book
 from .quantities import Number
@@ -38,7 +40,7 @@ def _panel(axes: Axes, book: Book, number: Number, goal: Target) -> None:
         axes.plot([p.cost for p in mine], [_percent(p.error) for p in mine], "o-", color=colour, markersize=4,
                   linewidth=1.0, label=str(series.variant))  # fmt: skip
         for p in (mine[0], mine[-1]) if mine else ():
-            axes.annotate(f"{1e3 * book.own_size * p.mesh.factor:.3g} mm", (p.cost, _percent(p.error)), fontsize=7,
+            axes.annotate(exact(book.own_size * p.mesh.factor, "m", 3), (p.cost, _percent(p.error)), fontsize=7,
                           xytext=(3, 4), textcoords="offset points")  # fmt: skip
     front = trade.front(points)
     axes.plot([p.cost for p in front], [_percent(p.error) for p in front], color="#1d2733", linewidth=3.5, alpha=0.18,

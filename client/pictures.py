@@ -18,6 +18,8 @@ from typing import Any
 
 import msgspec
 
+from conoid.cases.figures import duration, number, vector
+
 from .errors import ClientError, LookError, ViewError
 from .saving import whole
 
@@ -188,12 +190,14 @@ _RANGE = "limits (--range)"
 def _check(look: Look, target: Path) -> None:
     low, high = look.percentiles
     if not 0.0 <= low < high <= 100.0:
-        raise LookError(f"percentiles = {low:g}, {high:g}: two numbers from 0 to 100, the smaller one first")
+        raise LookError(
+            f"percentiles = {vector((low, high), digits=6)}: two numbers from 0 to 100, the smaller one first"
+        )
     if look.limits is not None and not look.limits[0] < look.limits[1]:
-        raise LookError(f"{_RANGE} = {look.limits[0]:g}, {look.limits[1]:g}: two numbers, the lower end first")
+        raise LookError(f"{_RANGE} = {vector(look.limits, digits=6)}: two numbers, the lower end first")
     for name, value in (("zoom", look.zoom), ("rate", look.rate)):
         if not value > 0.0:
-            raise LookError(f"{name} = {value:g}: above 0")
+            raise LookError(f"{name} = {number(value)}: above 0")
     if min(look.size) < SMALLEST:
         raise LookError(f"size = {look.size[0]}, {look.size[1]}: width and height, at least {SMALLEST} pixels")
     if target.suffix.lower() not in {".png", ".gif"}:
@@ -256,7 +260,7 @@ def child(picture: Picture) -> tuple[int, bytes, str]:
             command, input=msgspec.json.encode(picture), capture_output=True, timeout=seconds, env=_environment()
         )
     except subprocess.TimeoutExpired:
-        raise ViewError(f"the renderer did not finish within {seconds:.0f} s") from None
+        raise ViewError(f"the renderer did not finish within {duration(seconds)}") from None
     return done.returncode, b"".join(done.stdout.splitlines()[-1:]), done.stderr.decode(errors="replace")
 
 

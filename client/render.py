@@ -15,6 +15,8 @@ import numpy as np
 import pyvista as pv
 from PIL import Image
 
+from conoid.cases.figures import exacts, number
+
 from . import camera, scales, sheet
 from .camera import Camera
 from .errors import LookError, ViewError
@@ -152,7 +154,8 @@ def _require_sections(picture: Picture, bounds: Any) -> None:
 
 
 def _beyond(axis: str, at: float, low: float, high: float) -> LookError:
-    return LookError(f"section = {axis}={at:g}: the body is between {axis}={low:.4g} and {axis}={high:.4g} (in m)")
+    first, last = exacts((low, high), "", 4)
+    return LookError(f"section = {axis}={number(at)}: the body is between {axis}={first} and {axis}={last} (in m)")
 
 
 def _reflected(surface: Any, mirror: Mirror, length: float) -> Any:
@@ -245,10 +248,10 @@ def _set_camera(plotter: Any, eye: Camera) -> None:
 
 def _add_marks(plotter: Any, laid: Sheet, place: int, times: Sequence[float | None], picture: Picture) -> None:
     """Time of a panel among several; the axes at the lower left, at the lower right the bar of a round length."""
-    size, last = sheet.font(14, picture.look.size[1]), len(times) - 1
+    size, last, whens = sheet.font(14, picture.look.size[1]), len(times) - 1, sheet.when(times)
     if last:
         top = 1.0 - 40.0 / laid.height
-        plotter.add_text(sheet.when(times[place]), position=(0.03, top), viewport=True, font_size=size, color=_INK)
+        plotter.add_text(whens[place], position=(0.03, top), viewport=True, font_size=size, color=_INK)
     if place == last - last % laid.columns:
         share = min(0.16 * picture.look.size[1] / laid.height, 0.3)
         plotter.add_axes(color=_INK, line_width=3, viewport=(0.0, 0.0, share / max(laid.aspect, 1.0), share))
@@ -289,7 +292,7 @@ def _add_side(plotter: Any, picture: Picture, scale: Scale, drawn: Any, values: 
     plotter.add_text(name, position=(0.02, 0.85), viewport=True, font_size=sheet.font(13, height), color=_INK)
     low, high = min(float(np.min(each)) for each in values), max(float(np.max(each)) for each in values)
     if low < scale[0] or high > scale[1]:
-        text = f"values from {low:.4g}\nto {high:.4g}"
+        text = "values from {}\nto {}".format(*exacts((low, high), "", 4))
         plotter.add_text(text, position=(0.02, 0.11), viewport=True, font_size=sheet.font(9, height), color=_INK)
 
 

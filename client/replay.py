@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from conoid.cases.balancing import WORK, Guard, Trigger, lost
+from conoid.cases.figures import number
 from conoid.cases.messages import AnyMessage, Balance, Groups, Load
 from conoid.cases.schema import Balance as Spec
 
@@ -149,14 +150,14 @@ def chosen(spec: Spec, words: str, alpha: float | None = None) -> Spec:
         return Spec.model_validate(spec.model_dump() | told)
     except ValueError:
         raise UsageError(
-            f"policy = {words!r}, alpha = {told.get('alpha', spec.alpha):g}: "
+            f"policy = {words!r}, alpha = {number(spec.alpha if alpha is None else alpha)}: "
             "allowed: measured, outside, every, every:N, never; alpha greater than 1"
         ) from None
 
 
 def named(spec: Spec) -> str:
     """The policy and what it goes by."""
-    return spec.policy + {"outside": f" {spec.alpha:g}", "every": f":{spec.every}"}.get(spec.policy, "")
+    return spec.policy + {"outside": f" {number(spec.alpha)}", "every": f":{spec.every}"}.get(spec.policy, "")
 
 
 def _looks(spec: Spec, before: int, now: int) -> Iterator[int]:

@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from html import escape
 from pathlib import Path
 
+from conoid.cases.figures import alike, count, counted, exact, percent, si, vector
+from conoid.cases.fragments import Fit
 from conoid.cases.messages import Balance, Load, Log
 from conoid.cases.outcome import Outcome
 
@@ -13,7 +15,6 @@ from . import html, replay3d
 from .columns import by_part
 from .compare import summary
 from .errors import UnfinishedError, ViewError
-from .figures import count, si
 from .result import Result
 from .saving import save_text
 
@@ -84,13 +85,13 @@ def _case(case: dict[str, object]) -> str:
     parts = case.get("parts")
     rows = []
     for part in parts if isinstance(parts, list) else []:
-        speed = " ".join(f"{each:g}" for each in part.get("velocity") or [])
+        velocity = part.get("velocity")
         breaks = (part.get("fracture") or {}).get("model", "")
         mesh = part.get("mesh") or {}
         size = mesh.get("element_size")
         rows.append([
             part["name"], str(part.get("material", "")), str(mesh.get("shape", "")),
-            f"{1e3 * size:g} mm" if isinstance(size, float) else "", f"{speed} m/s" if speed else "", breaks,
+            exact(size, "m") if isinstance(size, float) else "", vector(velocity, "m/s", 6) if velocity else "", breaks,
         ])  # fmt: skip
     told = f"<p>{escape(str(case.get('description', '')))}</p>" if case.get("description") else ""
     return told + html.table(["part", "material", "shape", "element size", "velocity", "breaks"], rows)
@@ -151,7 +152,8 @@ def _energy(result: Result) -> str:
     rows = []
     if ended is not None and ended.energy is not None:
         terms = ((name, getattr(ended.energy, name)) for name in ended.energy.__struct_fields__ if name != "residual")
-        rows = [[name, si(value, "J")] for name, value in terms if value]
+        there = [(name, value) for name, value in terms if value]
+        rows = list(map(list, zip((name for name, _ in there), alike([value for _, value in there], "J"), strict=True)))
     at_the_end = html.table(["energy at the end", ""], rows, [1]) if rows else ""
     return _curve(result, "energy", "The energy ledger over time") + at_the_end + _parts(result)
 
@@ -163,7 +165,9 @@ def _parts(result: Result) -> str:
     except UnfinishedError:
         return ""
     parts = next(iter(told.values()), {})
-    rows = [[part, *(si(of[part][-1], "J") for of in told.values())] for part, values in parts.items() if values]
+    ended = [part for part, values in parts.items() if values]
+    columns = [alike([of[part][-1] for part in ended], "J") for of in told.values()]
+    rows = [list(row) for row in zip(ended, *columns, strict=True)]
     return html.table(["part, at the end", *told], rows, [1, 2]) if rows else ""
 
 
@@ -180,12 +184,17 @@ def _fragments(result: Result) -> str:
     assert said is not None
     rows = [
         ["fragments of ten tets or more", count(said.fragments)],
-        ["dust", f"{count(said.dust)}, {100 * said.dust_share:.3g} % of the mass"],
-        ["largest fragment", f"{100 * said.largest_share:.3g} % of the mass"],
-        *([f"masses, {fit.law} law", f"{fit.parameter:.4g}, ln L {fit.log_likelihood:.5g}"] for fit in said.masses),
-        *([f"extents, {fit.law} law", f"{fit.parameter:.4g}, ln L {fit.log_likelihood:.5g}"] for fit in said.sizes),
+        ["dust", f"{count(said.dust)}, {percent(said.dust_share)} of the mass"],
+        ["largest fragment", f"{percent(said.largest_share)} of the mass"],
+        *([f"masses, {fit.law} law", _fit(fit, "kg")] for fit in said.masses),
+        *([f"extents, {fit.law} law", _fit(fit, "m")] for fit in said.sizes),
     ]
     return _svg(draw, "Number of fragments over time and by mass") + html.table(["", ""], rows)
+
+
+def _fit(fit: Fit, unit: str) -> str:
+    """The exponent of a power law has no unit."""
+    return f"{exact(fit.parameter, '' if fit.law == 'power' else unit, 4)}, ln L {exact(fit.log_likelihood, '', 5)}"
 
 
 def _balance(result: Result) -> str:
@@ -201,11 +210,15 @@ def _balance(result: Result) -> str:
         charts.balance(charts.course(messages), f"{name}, {result.folder.name}", name, out)
 
     cuts = [message for message in messages if isinstance(message, Balance)]
+    some = cuts[:_CUTS]
+    times, costs, gains = (
+        alike(column, "s") for column in ([c.t for c in some], [c.cost for c in some], [c.saved for c in some])
+    )
     rows = [
-        [si(cut.t, "s"), count(cut.step), cut.cause, count(cut.tets), si(cut.cost, "s"), si(cut.saved, "s")]
-        for cut in cuts[:_CUTS]
+        [t, count(cut.step), cut.cause, count(cut.tets), cost, saved]
+        for cut, t, cost, saved in zip(some, times, costs, gains, strict=True)
     ]
-    told = f"<p>{len(cuts)} cuts{f', the first {_CUTS} of them:' if len(cuts) > _CUTS else ''}</p>"
+    told = f"<p>{counted(len(cuts), 'cut')}{f', the first {_CUTS} of them:' if len(cuts) > _CUTS else ''}</p>"
     if cuts:
         told += html.table(["time", "step", "cause", "tets moved", "cost", "saved by those before"], rows, [1, 3, 4, 5])
     if cuts and ended is not None:

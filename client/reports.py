@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
+from conoid.cases.figures import counted, percent, si
 from conoid.cases.schema import Balance
 
 from . import compare as comparing
@@ -156,7 +157,7 @@ def replay_balance(
         return
     show(tables.balance_table(accounts, record.happened))
     echo(
-        f"on {accounts[0].ranks} ranks, the run had {record.happened.ranks}; a cut costs {each:.3g} s; "
-        f"{len(record.moments)} moments, {len(record.centres)} groups, "
-        f"of which the heaviest has {record.heaviest:.1%} of the work"
+        f"on {counted(accounts[0].ranks, 'rank')}, the run had {record.happened.ranks}; a cut costs {si(each, 's')}; "
+        f"{counted(len(record.moments), 'moment')}, {counted(len(record.centres), 'group')}, "
+        f"of which the heaviest has {percent(record.heaviest)} of the work"
     )

@@ -12,6 +12,7 @@ from typing import Any, Protocol
 import msgspec
 
 from conoid.cases import fragments, layout, outcome
+from conoid.cases.figures import si
 from conoid.cases.messages import AnyMessage
 from conoid.cases.outcome import Outcome
 from conoid.cases.run import State
@@ -20,7 +21,6 @@ from conoid.cases.units import parse_quantity
 from . import html
 from .columns import Columns, joined, read_columns
 from .errors import ClientError, LookError, NotFoundError, UnfinishedError, ViewError
-from .figures import si
 from .journal import from_line
 from .pictures import Drawn, Mirror, Scene, Wall, draw
 

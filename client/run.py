@@ -16,6 +16,7 @@ from urllib.parse import quote
 import msgspec
 
 from conoid.cases import keys
+from conoid.cases.figures import duration
 from conoid.cases.messages import AnyMessage, Progress
 from conoid.cases.messages import Snapshot as Told
 from conoid.cases.outcome import Outcome
@@ -161,7 +162,7 @@ class Run:
             if info.state.final:
                 return info
             if heard >= deadline:
-                raise TimeoutError(f"run {self.id} is still {info.state.value} after {timeout:g} s")
+                raise TimeoutError(f"run {self.id} is still {info.state.value} after {duration(timeout)}")
 
     def cancel(self) -> RunInfo:
         """Asks it to stop; to ask twice does no harm."""

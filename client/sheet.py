@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from conoid.cases.figures import exacts
+
 from . import camera, scales
 from .camera import Camera
 from .pictures import Picture
@@ -64,14 +66,14 @@ def lay(points: Sequence[Any], n: int, picture: Picture, titled: bool, barred: b
     return Sheet(rows, columns, head, side, aspect, room[1] / rows, camera.place(points, picture, aspect))
 
 
-def when(time: float | None) -> str:
-    """How the time of a frame is written."""
-    return "" if time is None else f"t = {1e6 * time:.4g} µs"
+def when(times: Sequence[float | None]) -> list[str]:
+    """How the times of frames are written; nothing of one that is not known."""
+    return ["" if time is None else f"t = {text}" for time, text in zip(times, exacts(times, "s", 4), strict=True)]
 
 
 def title(picture: Picture, times: Sequence[float | None]) -> str:
     """Of the whole picture; with the time where there is one frame."""
-    return "   ".join(filter(None, [picture.title, when(times[0]) if len(times) == 1 else ""]))
+    return "   ".join(filter(None, [picture.title, when(times)[0] if len(times) == 1 else ""]))
 
 
 def font(size: float, height: float) -> int:

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from conoid.cases import snapshot
+from conoid.cases.figures import counted, exact
 
 from .errors import ClientError
 
@@ -25,7 +26,8 @@ class Snapshot:
     def __repr__(self) -> str:
         """The number, the time and what is seen."""
         head = self.header
-        return f"<snapshot {head.n}: step {head.step}, t {head.t:.6g} s, {head.fragments_total} fragments>"
+        seen = counted(head.fragments_total, "fragment")
+        return f"<snapshot {head.n}: step {head.step}, t {exact(head.t, 's')}, {seen}>"
 
     def array(self, name: str) -> "np.ndarray":
         """An array as it stands in the snapshot. Raises ClientError for a name that it has not."""

@@ -17,6 +17,7 @@ import msgspec
 import zenoh
 
 from conoid.cases import keys
+from conoid.cases.figures import duration
 from conoid.cases.messages import AnyMessage, Snapshot, Status, fragments_from_msgpack, from_msgpack
 from conoid.cases.run import State
 
@@ -135,7 +136,7 @@ def _within(seconds: float, work: Callable[[], T]) -> T:
     try:
         value, error = done.get(timeout=seconds)
     except queue.Empty:
-        raise StreamError(f"the Zenoh router did not answer within {seconds:g} s") from None
+        raise StreamError(f"the Zenoh router did not answer within {duration(seconds)}") from None
     if error is not None:
         raise StreamError(f"the Zenoh router refused or cannot be reached: {' '.join(str(error).split())}") from None
     return cast(T, value)

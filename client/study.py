@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import msgspec
 
-from .figures import count, si
+from conoid.cases.figures import count, fixed, percent, si
+
 from .projection import Network, Projection
 
 
@@ -88,11 +89,11 @@ def _speeds(study: Study) -> str:
     )  # fmt: skip
     rows = [
         [
-            str(run.ranks), count(run.steps), f"{run.steps / run.windows:.1f}",
-            f"{run.wall:.1f}" if run.ranks <= study.cores else "-", f"{100 * study.runs[0].work / run.work:.0f}",
-            _seconds(run.time), _seconds(run.coarse), _seconds(run.worst), f"{study.speed_up(run):.2f}",
-            f"{100 * study.speed_up(run) / run.ranks:.0f}", f"{study.runs[0].time / run.worst:.2f}",
-            f"{run.imbalance:.2f}", str(run.rebalances),
+            str(run.ranks), count(run.steps), fixed(run.steps / run.windows, 1),
+            fixed(run.wall, 1) if run.ranks <= study.cores else "-", fixed(100 * study.runs[0].work / run.work, 0),
+            _seconds(run.time), _seconds(run.coarse), _seconds(run.worst), fixed(study.speed_up(run)),
+            fixed(100 * study.speed_up(run) / run.ranks, 0), fixed(study.runs[0].time / run.worst),
+            fixed(run.imbalance), str(run.rebalances),
         ]
         for run in study.runs
     ]  # fmt: skip
@@ -113,7 +114,7 @@ def _losses(study: Study) -> str:
 
 
 def _loss(more: float, imbalance: float, whole: float) -> str:
-    share = f" ({100 * (more + imbalance) / whole:.0f} %)" if whole > 0.0 else ""
+    share = f" ({percent((more + imbalance) / whole, 0)})" if whole > 0.0 else ""
     return f"{_seconds(more)} + {_seconds(imbalance)}{share}"
 
 
@@ -121,8 +122,8 @@ def _traffic(study: Study) -> str:
     head = ("ranks", "messages a rank", "kB a rank", "bytes a shared node", "collectives")
     rows = [
         [
-            str(run.ranks), f"{run.messages_sent:.1f}", f"{run.bytes_sent / 1000:.1f}", f"{run.bytes_shared:.0f}",
-            f"{run.collectives_made:.1f}",
+            str(run.ranks), fixed(run.messages_sent, 1), fixed(run.bytes_sent / 1000, 1), fixed(run.bytes_shared, 0),
+            fixed(run.collectives_made, 1),
         ]
         for run in study.runs[1:]
     ]  # fmt: skip
@@ -130,7 +131,7 @@ def _traffic(study: Study) -> str:
 
 
 def _seconds(value: float) -> str:
-    return f"{value:.0f}" if abs(value) >= 100 else f"{value:.2f}"
+    return fixed(value, 0 if abs(value) >= 100 else 2)
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

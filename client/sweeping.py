@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from conoid.cases.figures import counted
 from conoid.cases.run import State
 
 from .console import echo, echo_json
@@ -39,7 +40,7 @@ def sweep(
     points = points_in(listed) if listed is not None else points_of(sets or (), grid=grid)
     with connect(url, token) as session:
         try:
-            with aloud(f"handing {len(points)} points in"):
+            with aloud(f"handing {counted(len(points), 'point')} in"):
                 made = session.sweep(case, points, at_once=at_once)
         except KeyboardInterrupt:
             complain(

@@ -9,6 +9,23 @@ from rich.table import Table
 from rich.text import Text
 
 from conoid.cases.estimate import Estimate, estimate
+from conoid.cases.figures import (
+    UNKNOWN,
+    alike,
+    count,
+    counted,
+    day,
+    duration,
+    exacts,
+    fixed,
+    large,
+    number,
+    percent,
+    rough,
+    si,
+    size,
+    vectors,
+)
 from conoid.cases.library import Constant
 from conoid.cases.loaded import Load
 from conoid.cases.materials import Material
@@ -20,7 +37,6 @@ from conoid.cases.stages import without
 
 from .compare import AT_THE_END, Comparison
 from .display import STATE_STYLE
-from .figures import count, day, duration, known, number, rough, si
 from .replay import Account
 from .run import RunInfo
 
@@ -78,7 +94,7 @@ def runs_table(runs: Sequence[RunInfo]) -> Table:
 def run_table(run: RunInfo) -> Table:
     """Everything about one run."""
     progress = run.progress
-    done = None if progress is None else 100 * progress.t / progress.end_time
+    done = progress.t / progress.end_time if progress is not None and progress.end_time > 0.0 else None
     return pairs({
         "run": run.id,
         "case": f"{run.name}  {run.title}".strip(),
@@ -90,7 +106,7 @@ def run_table(run: RunInfo) -> Table:
         "started": day(run.started) if run.started else "",
         "finished": day(run.finished) if run.finished else "",
         "progress": "" if progress is None or done is None else (
-            f"{done:.1f} %, step {count(progress.step)}, dt {si(progress.dt, 's')} held by {progress.limiter}, "
+            f"{percent(done)}, step {count(progress.step)}, dt {si(progress.dt, 's')} held by {progress.limiter}, "
             f"{duration(progress.eta)} left"
         ),
     })  # fmt: skip
@@ -105,9 +121,9 @@ def estimate_table(case: Case, expected: Estimate) -> Table:
         "nodes": _about(expected.nodes, count),
         "time step": _about(expected.dt, lambda value: si(value, "s")),
         "steps": _about(expected.steps, count),
-        "memory": _up_to(expected.memory_bytes, expected.dust_bytes, lambda value: si(value, "B")),
+        "memory": _up_to(expected.memory_bytes, expected.dust_bytes, size),
         "core time": _up_to(expected.core_seconds, expected.breaking, duration),
-        "of which": ", ".join(f"{name} {100 * seconds / total:.0f} %" for name, seconds in shares),
+        "of which": ", ".join(f"{name} {percent(seconds / total, 0)}" for name, seconds in shares),
         "without": ", ".join(without(case)),
     })  # fmt: skip
 
@@ -123,9 +139,9 @@ def parts_table(case: Case, expected: Estimate) -> Table:
     """What is modelled of each part, about: its size, and what it brings along at the start."""
     right = ("tets", "mass", "extent", "momentum", "energy")
     made = table("part", "material", *right, right=right, wide=("material",))
-    for part, size in zip(case.parts, expected.parts, strict=True):
-        tets = "–" if size.elements is None else count(size.elements)
-        made.add_row(part.name, part.material, tets, *(_brings(size.bulk) if size.bulk is not None else "–" * 4))
+    brought = _brings([each.bulk for each in expected.parts])
+    for part, each, bulk in zip(case.parts, expected.parts, brought, strict=True):
+        made.add_row(part.name, part.material, count(each.elements), *bulk)
     return made
 
 
@@ -134,7 +150,7 @@ def loads_table(case: Case, acted_on: Sequence[Load]) -> Table:
     columns = ("area", "faces", "nodes")
     made = table("boundary", "acts by", *columns, right=columns, wide=("acts by",))
     for load in acted_on:
-        area = "–" if load.area is None else f"about {1e6 * load.area:.3g} mm^2"
+        area = _about(load.area, lambda value: si(value, "m^2"))
         nodes = count(load.nodes) if load.nodes is not None and load.exact else _about(load.nodes, count)
         acts = _acts(case.boundaries[load.boundary])
         made.add_row(f"boundaries[{load.boundary}]", acts, area, _about(load.faces, count), nodes)
@@ -147,17 +163,15 @@ def _acts(spec: Boundary) -> str:
     return spec.kind
 
 
-def _brings(bulk: Bulk) -> tuple[str, str, str, str]:
-    """Mass, extent, momentum and kinetic energy."""
-    mass = si(1e3 * bulk.mass, "g") if bulk.mass < 1.0 else f"{bulk.mass:.3g} kg"
-    momentum = math.hypot(*bulk.momentum)
-    return mass, _extent(bulk.extent), si(momentum, "N s"), si(bulk.energy, "J")
-
-
-def _extent(lengths: tuple[float, float, float]) -> str:
-    """``6 x 6 x 30 mm``."""
-    unit, scale = next(((u, s) for u, s in (("m", 1.0), ("mm", 1e3)) if max(lengths) * s >= 1.0), ("µm", 1e6))
-    return f"{' x '.join(f'{scale * length:.3g}' for length in lengths)} {unit}"
+def _brings(parts: Sequence[Bulk | None]) -> list[tuple[str, ...]]:
+    """Mass, extent, momentum and kinetic energy of each part; dashes where a mesh file does not tell."""
+    known = [bulk for bulk in parts if bulk is not None]
+    columns = (
+        alike([bulk.mass for bulk in known], "kg"), vectors([bulk.extent for bulk in known], "m", between=" x "),
+        alike([math.hypot(*bulk.momentum) for bulk in known], "N s"), alike([bulk.energy for bulk in known], "J"),
+    )  # fmt: skip
+    rows = zip(*columns, strict=True)
+    return [(UNKNOWN,) * len(columns) if bulk is None else next(rows) for bulk in parts]
 
 
 def _about(value: float | None, shown: Callable[[float], str]) -> str:
@@ -170,7 +184,7 @@ def cases_table(cases: Mapping[str, Case]) -> Table:
     for name, case in cases.items():
         expected = estimate(case)
         tets, core = expected.elements, expected.core_seconds
-        made.add_row(name, case.title, "–" if tets is None else count(tets), "–" if core is None else duration(core))
+        made.add_row(name, case.title, count(tets), duration(core))
     return made
 
 
@@ -197,16 +211,16 @@ def sources_table(constants: Sequence[Constant]) -> Table:
 
 def outcome_table(outcome: Outcome) -> Table:
     """How a run ended."""
-    energy, ranks = outcome.energy, f"{outcome.ranks} rank{'' if outcome.ranks == 1 else 's'}"
+    energy, ranks = outcome.energy, counted(outcome.ranks, "rank")
     entries: dict[str, str | Text] = {"state": state_text(State(outcome.state), outcome.cause), "why": outcome.message}
     speed, setup, worst = outcome.element_updates_per_second, outcome.setup, rough(outcome.worst_residual)
     if outcome.steps:
         entries |= {
-            "simulated": f"{si(outcome.time, 's')} in {count(outcome.steps)} steps",
+            "simulated": f"{si(outcome.time, 's')} in {counted(outcome.steps, 'step')}",
             "took": f"{duration(outcome.elapsed)} on {ranks}, {duration(setup)} to the first step",
-            "model": f"{count(outcome.elements)} tets, {count(outcome.nodes)} nodes",
-            "speed": "" if math.isnan(speed) else f"{si(speed, '')} element updates a CPU-second and core",
-            "memory": f"{si(max(outcome.peak_memory), 'B')} in the largest rank" if outcome.peak_memory else "",
+            "model": f"{counted(outcome.elements, 'tet')}, {counted(outcome.nodes, 'node')}",
+            "speed": "" if math.isnan(speed) else f"{large(speed)} element updates a CPU-second and core",
+            "memory": f"{size(max(outcome.peak_memory))} in the largest rank" if outcome.peak_memory else "",
             "energy": "" if energy is None else f"residual {rough(energy.residual)}, worst {worst}",
             "digest": outcome.digest[:16],
         }
@@ -220,11 +234,16 @@ def balance_table(accounts: Sequence[Account], happened: Account) -> Table:
         right=("cuts", "lost", "cost of cuts", "total", "saved", "imbalance"),
     )  # fmt: skip
     never = next((account.total for account in accounts if account.policy == "never"), math.nan)
-    for account in (*accounts, happened):
-        saved = si(never - account.total, "s") if account is not happened else ""
-        times = [si(seconds, "s") for seconds in (account.lost, account.cost, account.total)]
-        name = f"the run: {account.policy}" if account is happened else account.policy
-        made.add_row(name, str(len(account.cuts)), *times, saved, f"{account.imbalance:.3f}")
+    every = (*accounts, happened)
+    columns = (
+        [each.lost for each in every], [each.cost for each in every], [each.total for each in every],
+        [never - each.total for each in every],
+    )  # fmt: skip
+    texts = zip(*(alike(column, "s") for column in columns), strict=True)
+    for account, (lost, cost, total, saved) in zip(every, texts, strict=True):
+        own = account is happened
+        name, gain = (f"the run: {account.policy}", "") if own else (account.policy, saved)
+        made.add_row(name, count(len(account.cuts)), lost, cost, total, gain, fixed(account.imbalance, 3))
     return made
 
 
@@ -233,8 +252,8 @@ def checks_table(checks: Sequence[Check]) -> Table:
     made = table("reference", "value", "expected", "tolerance", "", right=("value", "expected", "tolerance"))
     for check in checks:
         verdict = Text("pass", style="bold green") if check.passed else Text("FAIL", style="bold red")
-        value, expected = (f"{number(each)} {check.unit}".strip() for each in (check.value, check.expected))
-        made.add_row(check.name, value, expected, f"± {number(check.tolerance)}", verdict)
+        value, expected, tolerance = exacts((check.value, check.expected, check.tolerance), check.unit)
+        made.add_row(check.name, value, expected, f"± {tolerance}", verdict)
     return made
 
 
@@ -255,7 +274,8 @@ def comparison_tables(found: Comparison) -> list[Table | str]:
             made = table(title, "unit", *_NUMBERS, right=_NUMBERS, wide=(title,), least=_LEAST)
             made.padding = 0
             for one in values:
-                share = known(100 * one.relative, "+.2f") if one.difference else ""
+                share = fixed(100 * one.relative) if one.difference else ""
+                share = f"+{share}" if one.relative > 0 else share
                 change = number(one.difference) if one.difference else "same"
                 made.add_row(one.name.removesuffix(AT_THE_END), one.unit, number(one.a), number(one.b), change, share)
             parts += ["", made]

@@ -4,8 +4,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from conoid.cases.figures import duration, exact, si
+
 from .convergence import Mesh, Series
-from .figures import duration, si
 from .quantities import Number
 from .richardson import FORMAL, Trend
 from .variants import Variant
@@ -132,4 +133,4 @@ def _growth(all_series: Sequence[Series], variant: Variant) -> float:
 
 
 def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g} %"
+    return exact(100.0 * share, "%", 2)

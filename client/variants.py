@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from conoid.cases.bodies import Loose, MeshFile
+from conoid.cases.figures import number
 from conoid.cases.load import material
 from conoid.cases.schema import Case
 
@@ -25,7 +26,7 @@ class Variant:
 
     def __str__(self) -> str:
         """As tables name it."""
-        return f"{self.form}, dt_safety {self.safety:g}"
+        return f"{self.form}, dt_safety {number(self.safety)}"
 
 
 @dataclass(frozen=True)

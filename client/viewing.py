@@ -5,8 +5,9 @@ from typing import Annotated, Any
 
 import typer
 
+from conoid.cases.figures import si
+
 from .console import echo, echo_json
-from .figures import si
 from .options import Json, Token, Url, aloud, complain, find
 from .pictures import FIELDS, SMALLEST
 from .result import seconds

@@ -9,6 +9,7 @@ from typing import Protocol
 from rich.console import Console
 from rich.live import Live as Screen
 
+from conoid.cases.figures import clock, duration
 from conoid.cases.messages import AnyMessage, Log, Progress, Snapshot, Status
 from conoid.cases.run import State
 
@@ -16,7 +17,6 @@ from . import silence
 from .console import PlainConsole, one_line
 from .display import line, panel, seen
 from .errors import ClientError, UnreachableError
-from .figures import clock, duration
 from .link import Link
 from .live import Live
 

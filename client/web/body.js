@@ -2,7 +2,7 @@
 
 import { binary } from "./api.js";
 import { SCALE_CSS, named } from "./colours.js";
-import { count, h, si, words } from "./figures.js";
+import { alike, count, counted, h, si, vector, words } from "./figures.js";
 import { three } from "./libraries.js";
 import { colourings, decode, fragment, rowOf } from "./snapshot.js";
 import { View3d } from "./view3d.js";
@@ -114,7 +114,7 @@ export class Body {
       const [least, most] = this.ranges[name] ?? [low, high];
       this.ranges[name] = [Math.min(low, least), Math.max(high, most)];
     }
-    this.note.textContent = `${si(header.t, "s")} · step ${count(header.step)} · ${count(header.fragments_total)} fragments · ${count(snapshot.arrays.triangles.length / 3)} triangles`;
+    this.note.textContent = `${si(header.t, "s")} · step ${count(header.step)} · ${counted(header.fragments_total, "fragment")} · ${counted(snapshot.arrays.triangles.length / 3, "triangle")}`;
     this.scrub.setAttribute("aria-valuetext", si(header.t, "s"));
     this.onShow(snapshot);
     this.offer();
@@ -135,8 +135,9 @@ export class Body {
     }
     const { fragment_id: ids, fragment_mass: masses } = this.snapshot.arrays;
     const rows = [...ids.keys()].sort((a, b) => masses[b] - masses[a]).slice(0, HEAVIEST);
+    const weights = alike(rows.map((row) => masses[row]), "kg");
     this.chosen.replaceChildren(h("option", { value: -1 }, "none picked"),
-      ...rows.map((row) => h("option", { value: row }, ids[row] < 0n ? "the rest" : `${si(1000 * masses[row], "g")} (${ids[row]})`)));
+      ...rows.map((row, i) => h("option", { value: row }, ids[row] < 0n ? "the rest" : `${weights[i]} (${ids[row]})`)));
   }
 
   paint() {
@@ -148,7 +149,7 @@ export class Body {
     const names = by === "part" ? parts : by === "rank" ? Array.from({ length: ranks }, (_, rank) => `rank ${rank}`) : [];
     const legend = h("div.legend", {}, names.slice(0, MOST_NAMED).map((name, i) => h("span", {}, h("i", { style: { background: named(i) } }), name)));
     if (field) {
-      const [low, high] = this.ranges[by].map((value) => si(value, field.unit));
+      const [low, high] = alike(this.ranges[by], field.unit);
       this.key.replaceChildren(h("span", {}, low), h("i", { style: { background: SCALE_CSS } }), h("span", {}, high));
     } else this.key.replaceChildren(legend);
   }
@@ -170,14 +171,13 @@ export class Body {
   }
 
   facts(found) {
-    const vector = (values, unit) => values.map((value) => si(value, unit)).join(", ");
     const entry = (name, value, broad) => h(broad ? "div.broad" : "div", {}, h("dt", {}, name), h("dd", {}, value));
     return [
-      entry("fragment", found.rest ? "the rest" : String(found.id)), entry("mass", si(1000 * found.mass, "g")),
+      entry("fragment", found.rest ? "the rest" : String(found.id)), entry("mass", si(found.mass, "kg")),
       entry("size", si(found.size, "m")), entry("tets", count(found.tets)),
       entry("birth", found.birth > 0 ? si(found.birth, "s") : "from the start"),
-      entry("speed", si(Math.hypot(...found.velocity), "m/s")), entry("velocity", vector(found.velocity, "m/s"), true),
-      entry("centre", vector(found.centre, "m"), true),
+      entry("speed", si(Math.hypot(...found.velocity), "m/s")), entry("velocity", vector([...found.velocity], "m/s"), true),
+      entry("centre", vector([...found.centre], "m"), true),
     ];
   }
 

@@ -1,6 +1,6 @@
 // The charts of a run on ECharts: one cursor and one zoom for all of them, keys as well as the pointer.
 
-import { h, si } from "./figures.js";
+import { exact, h, onAxis, percent, si } from "./figures.js";
 import { echarts } from "./libraries.js";
 
 const GROUP = "run";
@@ -105,11 +105,10 @@ function common(alone) {
 }
 
 const line = () => ({ lineStyle: { color: colour("line") } });
-const label = (unit) => ({ color: colour("soft"), fontSize: FONT, hideOverlap: true, formatter: (value) => tidy(si(value, unit)) });
-const tidy = (text) => text.replace(/(\.\d*?)0+(?=\s|$)/, "$1").replace(/\.(?=\s|$)/, "");
+const label = (unit) => ({ color: colour("soft"), fontSize: FONT, hideOverlap: true, formatter: (value) => exact(value, unit, 3) });
 
 export const time = (end, more = {}) =>
-  ({ type: "value", min: 0, max: end, axisLine: line(), splitLine: { show: false }, axisLabel: label("s"), axisPointer: { label: { show: false } }, ...more });
+  ({ type: "value", min: 0, max: end, axisLine: line(), splitLine: { show: false }, axisLabel: { ...label("s"), formatter: onAxis(end, "s") }, axisPointer: { label: { show: false, formatter: ({ value }) => exact(Number(value), "s", 4) } }, ...more });
 export const axis = (unit, more = {}) =>
   ({ type: "value", splitNumber: 4, scale: more.scale ?? false, splitLine: line(), axisLabel: label(unit), ...more });
 
@@ -134,8 +133,8 @@ export const limit = (value) =>
 // cells [t, rank, share]: the colour says how a rank compares with the busiest one of the same moment.
 export function heat(ranks, times, cells) {
   return {
-    legend: { show: false }, tooltip: { ...common(true).tooltip, formatter: ({ value: [at, rank, share] }) => `${si(times[at], "s")}\nrank ${rank}: ${(100 * share).toFixed(0)} % of the busiest` },
-    xAxis: { type: "category", data: times, axisLine: line(), axisTick: { show: false }, axisLabel: { ...label("s"), formatter: (value) => tidy(si(Number(value), "s")) } },
+    legend: { show: false }, tooltip: { ...common(true).tooltip, formatter: ({ value: [at, rank, share] }) => `${si(times[at], "s")}\nrank ${rank}: ${percent(share, 0)} of the busiest` },
+    xAxis: { type: "category", data: times, axisLine: line(), axisTick: { show: false }, axisLabel: { ...label("s"), formatter: (value) => onAxis(times.at(-1), "s")(Number(value)) } },
     yAxis: { type: "category", data: Array.from({ length: ranks }, (_, rank) => `rank ${rank}`), inverse: true, axisLine: line(), axisTick: { show: false }, axisLabel: { color: colour("soft"), fontSize: FONT } },
     visualMap: { show: false, min: 0, max: 1, dimension: 2, inRange: { color: [colour("card"), colour("compute")] } },
     series: [{ type: "heatmap", data: cells, progressive: 0 }],

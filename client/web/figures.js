@@ -1,24 +1,118 @@
 // Numbers and times as people read them, and the making of elements.
+// They are those of cases/figures.py; tests/figures.json has inputs and texts that hold for both.
 
-const PREFIXES = [[1e12, "T"], [1e9, "G"], [1e6, "M"], [1e3, "k"], [1, ""], [1e-3, "m"], [1e-6, "µ"], [1e-9, "n"], [1e-12, "p"]];
+const UP = [[1e12, "T"], [1e9, "G"], [1e6, "M"], [1e3, "k"]];
+const DOWN = [[1, ""], [1e-3, "m"], [1e-6, "µ"], [1e-9, "n"], [1e-12, "p"]];
+const PREFIXED = ["m", "g", "J", "Pa", "N", "W", "B", "Hz", "m/s", "N s", "N m", "J/m^2", "B/s"]; // Units that take every prefix.
+const named = (unit, steps) => steps.map(([factor, prefix]) => [factor, prefix + unit]);
+const LADDERS = {
+  ...Object.fromEntries(PREFIXED.map((unit) => [unit, named(unit, [...UP, ...DOWN])])),
+  s: named("s", DOWN),
+  kg: [[1, "kg"], [1e-3, "g"], [1e-6, "mg"], [1e-9, "µg"]],
+  "m^2": [[1e-2, "m^2"], [1e-8, "mm^2"], [1e-12, "µm^2"]],
+  "m^3": [[1e-3, "m^3"], [1e-12, "mm^3"], [1e-18, "µm^3"]],
+};
+const WORTH = { "m^2": 1, "mm^2": 1e-6, "µm^2": 1e-12, "m^3": 1, "mm^3": 1e-9, "µm^3": 1e-18 };
+const PLAIN = [1e-3, 5]; // Without a power of ten from here on, below so many digits before the point.
+const MOST = 1e12; // From which on a whole number is written with its power of ten.
+const MOST_HOURS = 10000;
+export const UNKNOWN = "–";
 
-export function si(value, unit = "", digits = 3) {
-  if (value === undefined || value === null || !Number.isFinite(value)) return "–";
-  if (value === 0) return `0 ${unit}`.trim();
-  const [factor, prefix] = PREFIXES.find(([size]) => Math.abs(value) >= 0.9995 * size) ?? PREFIXES.at(-1);
-  const scaled = value / factor;
-  const before = Math.max(1, Math.floor(Math.log10(Math.abs(scaled)) + 1e-3) + 1);
-  return `${scaled.toFixed(Math.max(0, digits - before))} ${prefix}${unit}`.trim();
+const known = (value) => (typeof value === "number" ? value : NaN);
+const tied = (text, unit) => (text === UNKNOWN ? text : `${text} ${unit}`.trim());
+
+// With significant digits and the unit, which gets the prefix that fits where it takes one.
+export const si = (value, unit = "", digits = 3) => alike([value], unit, digits)[0];
+
+// Likewise, without zeros at the end.
+export const exact = (value, unit = "", digits = 6) => trimmed(si(value, unit, digits));
+
+// Values that belong together: all have the prefix of the largest magnitude.
+export function alike(values, unit = "", digits = 3) {
+  const [worth, name] = unitOf(values.map(known), unit, digits);
+  return values.map(known).map((value) => (Number.isNaN(value) ? UNKNOWN : tied(significant(value / worth, digits), name)));
 }
 
-export const count = (value) => (value === undefined ? "–" : Math.round(value).toLocaleString("en").replaceAll(",", "\u202f"));
+export const exacts = (values, unit = "", digits = 6) => alike(values, unit, digits).map(trimmed);
+
+// Components that belong together, with their unit once: "1, 200 mm".
+export function vector(values, unit = "", digits = 3, between = ", ") {
+  const [worth, name] = unitOf(values.map(known), unit, digits);
+  return tied(values.map((value) => trimmed(significant(known(value) / worth, digits))).join(between), name);
+}
+
+// Texts of an axis from 0 to `most`: all have the same prefix.
+export function onAxis(most, unit) {
+  const [worth, name] = unitOf([known(most)], unit, 3);
+  return (value) => tied(trimmed(significant(value / worth, 3)), name);
+}
+
+// A number without a unit, with k, M, G or T where it is large.
+export function large(value) {
+  const [worth, name] = step(Math.abs(known(value)), [...UP, [1, ""]], 3);
+  return tied(significant(known(value) / worth, 3), name);
+}
+
+function unitOf(values, unit, digits) {
+  const most = Math.max(0, ...values.filter(Number.isFinite).map(Math.abs));
+  if (!Object.hasOwn(LADDERS, unit) || most === 0) return [1, unit];
+  const [factor, name] = step(most, LADDERS[unit], digits);
+  return [WORTH[name] ?? factor, name];
+}
+
+const step = (most, ladder, digits) => ladder.find(([factor]) => most >= factor * (1 - 0.5 * 10 ** -digits)) ?? ladder.at(-1);
+
+export const number = (value) => exact(value);
+
+// Two significant digits and the power of ten, for residuals.
+export const rough = (value) => (Number.isFinite(value) && value !== 0 ? power(value, 2) : significant(known(value), 2));
+
+export const fixed = (value, decimals = 2) => (Number.isFinite(value) ? rounded(value, decimals) : UNKNOWN);
+
+export function percent(share, decimals = 1) {
+  const text = fixed(100 * known(share), decimals);
+  return text === UNKNOWN ? text : `${text} %`;
+}
+
+// Thousands are parted by a space at which no line ends.
+export function count(value) {
+  if (!Number.isFinite(value)) return UNKNOWN;
+  if (Math.abs(value) >= MOST) return power(value, 3);
+  return rounded(value, 0).replace(/\B(?=(\d{3})+$)/g, "\u202f");
+}
+
+export const counted = (value, noun, plural = "") => `${count(value)} ${value === 1 ? noun : plural || `${noun}s`}`;
+
+export const size = (value) => si(value, "B");
+
+function significant(value, digits) {
+  if (Number.isNaN(value)) return UNKNOWN;
+  if (!Number.isFinite(value)) return value > 0 ? "∞" : "-∞";
+  if (value === 0) return "0";
+  const text = power(value, digits);
+  const at = Number(text.split("e")[1]);
+  if (Math.abs(value) < PLAIN[0] || at >= Math.max(PLAIN[1], digits)) return text;
+  return rounded(value, Math.max(0, digits - 1 - at));
+}
+
+// Halves away from zero.
+function rounded(value, decimals) {
+  const text = Math.abs(value).toFixed(decimals);
+  return value < 0 && Number(text) !== 0 ? `-${text}` : text;
+}
+
+const power = (value, digits) => (value < 0 ? "-" : "") + Math.abs(value).toExponential(digits - 1).replace("e+", "e");
+
+// Without zeros behind the point at the end of the number.
+const trimmed = (text) => text.replace(/(\.\d*?)0+(?=e| |$)/, "$1").replace(/\.(?=e| |$)/, "");
 
 export function duration(seconds) {
-  if (seconds === undefined || !Number.isFinite(seconds) || seconds < 0) return "–";
-  if (seconds < 9.95) return `${seconds.toFixed(1)} s`;
-  const whole = Math.round(seconds);
+  if (!Number.isFinite(seconds) || seconds < 0) return UNKNOWN;
+  if (seconds < 9.95) return `${rounded(seconds, 1)} s`;
+  if (seconds >= 3600 * MOST_HOURS) return `${significant(seconds / 3600, 3)} h`;
+  const whole = Number(rounded(seconds, 0));
   if (whole < 60) return `${whole} s`;
-  const two = (number) => String(number).padStart(2, "0");
+  const two = (part) => String(part).padStart(2, "0");
   if (whole < 3600) return `${Math.floor(whole / 60)} min ${two(whole % 60)} s`;
   return `${Math.floor(whole / 3600)} h ${two(Math.floor((whole % 3600) / 60))} min`;
 }
@@ -32,8 +126,6 @@ export function moment(wall) {
   const time = then.toLocaleTimeString("en-GB", { hour: "2-digit", minute: "2-digit" });
   return today ? `today ${time}` : `${day} ${time}`;
 }
-
-export const percent = (share) => `${(100 * share).toFixed(1)} %`;
 
 export const words = (text) => String(text).replaceAll("_", " ");
 

@@ -2,7 +2,7 @@
 
 import { binary, call, refused } from "./api.js";
 import { Chart, axis, series, time } from "./charts.js";
-import { count, duration, h, pill, si } from "./figures.js";
+import { count, duration, fixed, h, number, pill, rough, si } from "./figures.js";
 import { readPlan } from "./history.js";
 import { FINAL } from "./live.js";
 import { card } from "./plots.js";
@@ -91,7 +91,7 @@ export function differences(one, other) {
   return keys.filter((key) => (a[key] ?? null) !== (b[key] ?? null) && !NEVER.test(key)).map((key) => [key, a[key], b[key]]);
 }
 
-const shown = (value) => (value === undefined || value === null ? "–" : typeof value === "number" ? String(Number(value.toPrecision(6))) : String(value));
+const shown = (value) => (value === undefined || value === null ? "–" : typeof value === "number" ? number(value) : String(value));
 
 function differing(told, names) {
   if (told.some(({ plan }) => !plan)) return h("p.hint", {}, "a case is not written yet");
@@ -115,12 +115,12 @@ export function statistics({ info, history, snapshot }) {
   const { points = [], best } = snapshot ? sizes(snapshot) : {};
   const masses = snapshot ? [...snapshot.arrays.fragment_mass].filter((_, row) => snapshot.arrays.fragment_id[row] >= 0n) : [];
   const middle = points.length ? points[Math.floor(points.length / 2)][0] : undefined;
-  const law = best ? `${best.law}, ${best.law === "power" ? `exponent ${best.parameter.toFixed(2)}` : si(best.parameter, "m")}` : "–";
+  const law = best ? `${best.law}, ${best.law === "power" ? `exponent ${fixed(best.parameter)}` : si(best.parameter, "m")}` : "–";
   return {
-    state: info.state, time: si(last("t"), "s"), step: count(last("step")), elapsed: duration(history.elapsed), "energy residual": last("residual")?.toExponential(1) ?? "–",
+    state: info.state, time: si(last("t"), "s"), step: count(last("step")), elapsed: duration(history.elapsed), "energy residual": rough(last("residual")),
     kinetic: si(last("kinetic"), "J"), nodes: count(last("nodes") ?? undefined), fragments: count(snapshot?.header.fragments_total),
     "of 10 tets and more": snapshot ? count(points.length) : "–", "median size of these": si(middle, "m"), "law of their sizes": law,
-    "heaviest fragment": si(masses.length ? 1000 * Math.max(...masses) : undefined, "g"),
+    "heaviest fragment": si(masses.length ? masses.reduce((most, mass) => Math.max(most, mass), 0) : undefined, "kg"),
   };
 }
 
@@ -154,5 +154,5 @@ function bothSizes(told) {
   if (!known.some((points) => points.length > 1)) return null;
   return { xAxis: axis("m", { type: "log", splitLine: { show: false } }), yAxis: axis("", { type: "log", min: 1 }),
     series: known.map((data, i) => ({ ...series({ name: names[i], colour: TONES[i], data }), type: "scatter", symbolSize: 4, sampling: undefined })),
-    tooltip: { trigger: "item", formatter: ({ seriesName, value }) => `${seriesName}\n${Math.round(value[1])} of ${si(value[0], "m")} and more` } };
+    tooltip: { trigger: "item", formatter: ({ seriesName, value }) => `${seriesName}\n${count(value[1])} of ${si(value[0], "m")} and more` } };
 }

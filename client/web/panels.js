@@ -1,7 +1,7 @@
 // The parts of a run's page that are no charts: bars of the ranks, balance events, the log by rank, reference numbers.
 
 import { tail } from "./api.js";
-import { clock, h, legend, si } from "./figures.js";
+import { alike, clock, count, exacts, fixed, h, legend, percent, si } from "./figures.js";
 import { GROUPS } from "./live.js";
 
 const MOST_RANKS = 24;
@@ -18,7 +18,7 @@ export class Ranks {
     const rows = totals.slice(0, MOST_RANKS).flatMap((_, rank) => {
       const pieces = Object.entries(groups).map(([name, seconds]) =>
         h("i", { title: `${name} ${si(seconds[rank], "s")}`, style: { width: `${(100 * seconds[rank]) / longest}%`, background: `var(--${name})` } }));
-      return [h("span.who", {}, `rank ${rank}`), h("div.stack", {}, pieces), h("span.busy", {}, `${Math.round(100 * share(rank))} % busy`)];
+      return [h("span.who", {}, `rank ${rank}`), h("div.stack", {}, pieces), h("span.busy", {}, `${percent(share(rank), 0)} busy`)];
     });
     const more = totals.length - MOST_RANKS;
     this.element.replaceChildren(
@@ -54,7 +54,7 @@ export class Balances {
     this.element.replaceChildren(
       h("div.card-head", {}, h("h2", {}, `Balance ${place + 1} of ${balances.length}`), h("span.note", {}, step("Earlier", place - 1), " ", step("Later", place + 1))),
       h("p.told", {}, event.cause),
-      h("dl.facts", {}, entry("time", si(event.t, "s")), entry("tets moved", String(event.tets)), entry("nodes moved", String(event.nodes)),
+      h("dl.facts", {}, entry("time", si(event.t, "s")), entry("tets moved", count(event.tets)), entry("nodes moved", count(event.nodes)),
         entry("cost", si(event.cost, "s")), entry("saved before", si(event.saved, "s"))),
       bars("before, s a step", summed(event.before)), bars("predicted", event.predicted));
   }
@@ -65,9 +65,10 @@ const summed = (phases) => Object.values(phases).reduce((total, seconds) => seco
 function bars(title, values) {
   const most = Math.max(...values, 1e-300);
   const mean = values.reduce((total, value) => total + value, 0) / (values.length || 1);
-  return h("div", {}, h("h3", {}, `${title}: slowest over mean ${(most / (mean || 1)).toFixed(2)}`),
+  const texts = alike(values, "s");
+  return h("div", {}, h("h3", {}, `${title}: slowest over mean ${fixed(most / (mean || 1))}`),
     h("div.ranks", {}, values.slice(0, MOST_RANKS).flatMap((value, rank) => [h("span.who", {}, `rank ${rank}`),
-      h("div.stack", {}, h("i", { style: { width: `${(100 * value) / most}%`, background: "var(--compute)" } })), h("span.busy", {}, si(value))])));
+      h("div.stack", {}, h("i", { style: { width: `${(100 * value) / most}%`, background: "var(--compute)" } })), h("span.busy", {}, texts[rank])])));
 }
 
 // Messages for people as they come, and the log file of each rank, by tabs that arrow keys move between.
@@ -126,12 +127,11 @@ const COLUMNS = ["quantity", "computed", "expected", "tolerance", "result", "sou
 const cell = (what, column, text) => h(what, { role: "cell", "data-name": COLUMNS[column] }, text);
 
 export function checksTable(checks) {
-  const exact = (value, unit) => (unit ? si(value, unit, 4) : String(Number(value?.toPrecision(4))));
   return [h("div.card-head", {}, h("h2", {}, "Against the reference")), h("div.scroll", { tabindex: 0 }, h("table.checks.stacked", { role: "table" },
     h("thead", { role: "rowgroup" }, h("tr", { role: "row" }, COLUMNS.map((name) => h("th", { scope: "col", role: "columnheader" }, name)))),
     h("tbody", { role: "rowgroup" }, checks.map((check) => h("tr", { role: "row" },
       cell("td", 0, check.name),
-      [exact(check.value, check.unit), exact(check.expected, check.unit), `± ${exact(check.tolerance, check.unit)}`].map((text, i) => cell("td.number", 1 + i, text)),
+      exacts([check.value, check.expected, check.tolerance], check.unit).map((text, i) => cell("td.number", 1 + i, i < 2 ? text : `± ${text}`)),
       cell(`td.${check.pass ? "good" : "bad"}`, 4, check.pass ? "agrees" : "differs"),
       cell("td.hint", 5, check.source ?? ""))))))];
 }

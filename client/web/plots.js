@@ -2,7 +2,7 @@
 
 import { Chart, axis, heat, limit, pins, series, time } from "./charts.js";
 import { named } from "./colours.js";
-import { h, percent, si } from "./figures.js";
+import { count, exact, fixed, h, percent, rough, si } from "./figures.js";
 import { TERMS } from "./live.js";
 import { sizes } from "./snapshot.js";
 
@@ -58,8 +58,8 @@ export const ofParts = (live, name) => parts(live).map((part, i) => series({ nam
 function ofResidual(live) {
   if (live.ledger.length < 2) return null;
   const data = live.ledger.map(({ t, energy }) => [t, Math.max(FLOOR, energy.residual)]);
-  return option(live, axis("", { type: "log", axisLabel: { formatter: (value) => value.toExponential(0) } }),
-    [{ ...series({ name: "residual", colour: "accent", data }), tooltip: { valueFormatter: (value) => Number(value).toExponential(1) }, markLine: limit(RESIDUAL) }]);
+  return option(live, axis("", { type: "log", axisLabel: { formatter: (value) => exact(value, "", 1) } }),
+    [{ ...series({ name: "residual", colour: "accent", data }), tooltip: { valueFormatter: (value) => rough(Number(value)) }, markLine: limit(RESIDUAL) }]);
 }
 
 function ofCounts(live) {
@@ -76,7 +76,7 @@ function ofImbalance(live) {
   if (!loads.length) return null;
   const at = (t) => loads.findLast((point) => point.t <= t)?.imbalance ?? loads[0].imbalance;
   return option(live, axis("", { min: 1 }), [
-    { ...series({ name: "imbalance", colour: "exchange", data: loads.map(({ t, imbalance }) => [t, imbalance]) }), tooltip: { valueFormatter: (value) => Number(value).toFixed(3) } },
+    { ...series({ name: "imbalance", colour: "exchange", data: loads.map(({ t, imbalance }) => [t, imbalance]) }), tooltip: { valueFormatter: (value) => fixed(Number(value), 3) } },
     pins("balance", balances.map(({ t }) => [t, at(t)])),
   ]);
 }
@@ -92,7 +92,7 @@ function ofHeat(live) {
   if (live.loads.length < 2) return null;
   const every = Math.ceil(live.loads.length / MOST_COLUMNS);
   const shown = live.loads.filter((_, i) => i % every === 0 && live.loads[i].shares.length === ranks);
-  return heat(ranks, shown.map(({ t }) => t), shown.flatMap(({ shares }, at) => shares.map((share, rank) => [at, rank, Number(share.toFixed(3))])));
+  return heat(ranks, shown.map(({ t }) => t), shown.flatMap(({ shares }, at) => shares.map((share, rank) => [at, rank, Math.round(1000 * share) / 1000])));
 }
 
 function ofStep(live) {
@@ -104,7 +104,7 @@ function ofStep(live) {
 
 function ofContact(live) {
   if (!live.loads.length) return null;
-  return option(live, axis("", { min: 0, max: 1, interval: 0.25, axisLabel: { formatter: (value) => `${Math.round(100 * value)} %` } }),
+  return option(live, axis("", { min: 0, max: 1, interval: 0.25, axisLabel: { formatter: (value) => percent(value, 0) } }),
     [{ ...series({ name: "contact", colour: "contact", data: live.loads.map(({ t, contact }) => [t, contact]) }), tooltip: { valueFormatter: (value) => percent(value) } }]);
 }
 
@@ -114,7 +114,7 @@ function ofSizes(snapshot, spread) {
   const list = [...(snapshot ? ofSnapshot(snapshot) : []), ...(spread ? [ofSpread(spread)] : [])];
   if (!list.length) return null;
   return { xAxis: axis("m", { type: "log", splitLine: { show: false } }), yAxis: axis("", { type: "log", min: LEAST }), series: list,
-    tooltip: { trigger: "item", formatter: ({ value }) => `${Math.round(value[1])} of ${si(value[0], "m")} and more` } };
+    tooltip: { trigger: "item", formatter: ({ value }) => `${count(value[1])} of ${si(value[0], "m")} and more` } };
 }
 
 function ofSnapshot(snapshot) {
@@ -124,7 +124,7 @@ function ofSnapshot(snapshot) {
   if (best) {
     const [low, high] = [points[0][0], points.at(-1)[0]];
     const curve = Array.from({ length: CURVE }, (_, i) => low * (high / low) ** (i / (CURVE - 1))).map((size) => [size, points.length * best.longer(size)]);
-    const told = best.law === "power" ? `exponent ${best.parameter.toFixed(2)}` : si(best.parameter, "m");
+    const told = best.law === "power" ? `exponent ${fixed(best.parameter)}` : si(best.parameter, "m");
     list.push({ ...series({ name: `${best.law} law, ${told}`, colour: "bad", data: curve.filter(([, number]) => number >= LEAST) }), lineStyle: { type: "dashed" } });
   }
   return list;

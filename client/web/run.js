@@ -2,7 +2,7 @@
 
 import { call, messages, refused } from "./api.js";
 import { Body } from "./body.js";
-import { count, duration, h, meter, percent, pill, si } from "./figures.js";
+import { alike, count, counted, duration, fixed, h, large, meter, percent, pill, rough, si } from "./figures.js";
 import { fill, readPlan } from "./history.js";
 import { FINAL, Live } from "./live.js";
 import { Balances, Logs, Ranks, checksTable } from "./panels.js";
@@ -170,8 +170,8 @@ export class RunPage {
       this.notes.residual.replaceChildren(residual(progress.energy.residual));
       this.notes.energy.textContent = `kinetic ${si(progress.energy.kinetic, "J")}`;
     }
-    this.notes.imbalance.textContent = load ? load.imbalance.toFixed(2) : "";
-    this.notes.counts.textContent = counts ? `${count(counts.fragments)} fragments` : "";
+    this.notes.imbalance.textContent = load ? fixed(load.imbalance) : "";
+    this.notes.counts.textContent = counts ? counted(counts.fragments, "fragment") : "";
   }
 
   drawHead() {
@@ -197,15 +197,15 @@ export class RunPage {
     const entry = (name, value, note, broad) =>
       h(broad ? "div.broad" : "div", {}, h("dt", {}, name), h("dd", {}, value, note ? h("small", {}, ` ${note}`) : null));
     return h("dl.facts", {},
-      entry("time", progress ? si(live.fraction * progress.end_time, "s") : "–", progress ? `of ${si(progress.end_time, "s")}` : ""),
+      entry("time", ...(progress ? timed(live.fraction * progress.end_time, progress.end_time) : ["–"])),
       entry("time left", FINAL.has(live.state) ? "–" : duration(progress?.eta)),
       entry("elapsed", duration(live.elapsed)),
       entry("step", count(progress?.step)),
       entry("dt", si(progress?.dt || live.ledger.findLast(({ dt }) => dt > 0)?.dt, "s")),
       entry("dt held by", progress?.limiter || "–", "", true),
-      entry("imbalance", load ? load.imbalance.toFixed(2) : "–"),
+      entry("imbalance", load ? fixed(load.imbalance) : "–"),
       entry("residual", progress ? residual(progress.energy.residual) : "–"),
-      entry("updates a second", si(progress?.updates_per_second)),
+      entry("updates a second", large(progress?.updates_per_second)),
       entry("elements", count(counts?.elements ?? started?.elements)),
       entry("nodes", count(counts?.nodes ?? started?.nodes)),
       entry("shared nodes", count(counts?.shared)),
@@ -221,7 +221,13 @@ export class RunPage {
   }
 }
 
+// The time so far and "of …" the end, in one unit.
+function timed(now, end) {
+  const [first, last] = alike([now, end], "s");
+  return [first, `of ${last}`];
+}
+
 function residual(value) {
   const tone = value < 1e-3 ? "good" : value < 1e-2 ? "warn" : "bad";
-  return h(`span.${tone}`, {}, value.toExponential(1));
+  return h(`span.${tone}`, {}, rough(value));
 }

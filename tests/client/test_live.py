@@ -81,7 +81,7 @@ def test_the_panel_shows_everything_that_is_watched() -> None:
     text = rendered(told(11))
     for shown in (
         "A bar", "running", "50.0 %", "40.0 µs of 80.0 µs", "8.10 ns", "tet 7 (bar): sound speed", "30 s",
-        "9.70 M updates/s", "rank 0", "65 % busy", "35 % busy", "imbalance 1.20", "kinetic", "6.00 J", "2.0e-04",
+        "9.70 M updates/s", "rank 0", "65 % busy", "35 % busy", "imbalance 1.20", "kinetic", "6.00 J", "2.0e-4",
         "the foot has folded", "310 nodes", "fragments",
     ):  # fmt: skip
         assert shown in text, shown

@@ -136,7 +136,7 @@ def test_the_parts_have_their_energies_where_there_are_several(folder: Path, tmp
     told = read(report.write(Result.open(folder), tmp_path / "two.html", fields=[])).text
     assert "part, at the endkineticinternal" in told
     assert "rod3.00 J1.25 J" in told
-    assert "ball500 mJ0 J" in told
+    assert "ball0.500 J0 J" in told
 
 
 def test_a_field_that_cannot_be_drawn_is_a_line(folder: Path, tmp_path: Path) -> None:

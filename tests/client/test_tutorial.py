@@ -10,11 +10,11 @@ import pytest
 from typer.testing import CliRunner
 
 from conoid.cases.estimate import estimate
+from conoid.cases.figures import rough
 from conoid.cases.load import parse_case, toml_data
 from conoid.cases.plausible import doubts
 from conoid.cases.reference import json_schema
 from conoid.client.cli import app
-from conoid.client.figures import rough
 from conoid.client.result import Result
 
 TEXT = (Path(__file__).parents[2] / "docs" / "tutorial.md").read_text(encoding="utf-8")

@@ -3,6 +3,7 @@
 import base64
 import json
 import math
+import re
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -138,11 +139,22 @@ def test_keys_that_differ_are_told_by_their_place(ask: Ask) -> None:
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("value", "text"), [(2.2e9, "2.20 GPa"), (0, "0 Pa"), (-999.6, "-1.00 kPa"), (8.1e-9, "8.10 nPa"), (None, "–")]
-)
-def test_numbers_are_written_with_a_prefix(ask: Ask, value: float | None, text: str) -> None:
-    assert ask("figures.js", "page.si(data, 'Pa')", value) == text
+def test_the_page_writes_numbers_as_python_does(ask: Ask) -> None:
+    table = json.loads((HERE.parents[1] / "figures.json").read_text(encoding="utf-8"))
+    told = ask("figures.js", "data.map(([name, given]) => page[name](...given))", table)
+    assert json.loads(json.dumps(told, ensure_ascii=False).replace("\u202f", " ")) == [text for _, _, text in table]
+
+
+def test_no_module_of_the_page_writes_numbers_on_its_own() -> None:
+    """A width in a style sheet is not read by anybody."""
+    own = re.compile(r"\.(toFixed|toExponential|toPrecision|toLocaleString)\(")
+    found = [
+        f"{path.name}: {line.strip()}"
+        for path in WEB.glob("*.js")
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if own.search(line) and path.name != "figures.js"
+    ]
+    assert not found
 
 
 def test_energies_of_parts_come_from_the_history_and_from_messages_alike(ask: Ask) -> None:

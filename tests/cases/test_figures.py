@@ -1,0 +1,45 @@
+"""Numbers as people read them: one table for Python and for the page."""
+
+import ast
+import json
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from conoid.cases import figures
+
+TABLE: list[tuple[str, list[Any], Any]] = json.loads(
+    (Path(__file__).parents[1] / "figures.json").read_text(encoding="utf-8")
+)
+
+
+@pytest.mark.parametrize(("name", "given", "text"), TABLE, ids=[f"{name} {given}" for name, given, _ in TABLE])
+def test_python_writes_a_number_as_the_table_has_it(name: str, given: list[Any], text: Any) -> None:
+    assert getattr(figures, name)(*given) == text
+
+
+def test_what_is_not_known_or_has_no_end() -> None:
+    assert figures.si(math.nan, "s") == figures.number(math.nan) == figures.rough(math.nan) == figures.UNKNOWN
+    assert (figures.si(math.inf, "s"), figures.number(-math.inf)) == ("∞ s", "-∞")
+    assert figures.day(1e18) == figures.UNKNOWN
+
+
+OWN = {"chart.py"}
+"""Coordinates of a drawing in SVG, which nobody reads."""
+
+
+def test_no_module_of_the_client_writes_numbers_on_its_own() -> None:
+    form = re.compile(r"[.,\d%+]*[eEfgG%]|,")
+    found = [
+        f"{path.name}:{node.lineno}"
+        for path in (Path(__file__).parents[2] / "client").glob("*.py")
+        if path.name not in OWN
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.FormattedValue)
+        and node.format_spec is not None
+        and form.fullmatch(ast.unparse(node.format_spec)[2:-1])
+    ]
+    assert not found
