@@ -10,6 +10,8 @@ from pathlib import Path
 
 from sqlalchemy.exc import SQLAlchemyError
 
+from conoid.cases.figures import size
+
 from . import farewells, folder, pins
 from .events import Run
 from .farewells import Farewells
@@ -118,7 +120,7 @@ class Keeper:
             if pins.pinned(self._settings.runs / run.id):
                 continue
             total -= self._sizes.get(run.id, 0)
-            yield run, f"older than {self._rules.age}" if old else f"all runs had more than {most} bytes"
+            yield run, f"older than {self._rules.age}" if old else f"all runs had more than {size(most)}"
 
     def _work(self) -> None:
         rest = min(_PATIENCE, self._rules.rest)

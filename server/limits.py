@@ -13,6 +13,7 @@ from starlette.requests import ClientDisconnect
 
 from conoid.cases.bodies import MeshFile
 from conoid.cases.estimate import Estimate
+from conoid.cases.figures import count, number, size
 from conoid.cases.policy import Quota
 from conoid.cases.problems import Problem
 from conoid.cases.schema import Case
@@ -65,8 +66,8 @@ async def _collect(request: Request) -> bytes:
     return bytes(body)
 
 
-def _too_large(size: int) -> ServiceError:
-    return ServiceError(413, "too_large", f"the body has {size} bytes or more; allowed: {BODY}")
+def _too_large(length: int) -> ServiceError:
+    return ServiceError(413, "too_large", f"the body has {length} bytes or more; allowed: {BODY}")
 
 
 class Limits(msgspec.Struct, frozen=True):
@@ -95,14 +96,14 @@ def check(case: Case, limits: Limits) -> list[Problem]:
 def check_size(estimate: Estimate, caps: Limits) -> list[Problem]:
     """Everything that the case needs more of than this server allows; what is not known is no reason to refuse."""
     needs = (
-        ("parts", "elements", estimate.elements, caps.elements),
-        ("run.end_time", "steps", estimate.steps, caps.steps),
-        ("parts", "bytes of memory", estimate.memory_bytes, caps.memory),
-        ("run.end_time", "core-seconds", estimate.core_seconds, caps.core_seconds),
+        ("parts", "elements", count, estimate.elements, caps.elements),
+        ("run.end_time", "steps", count, estimate.steps, caps.steps),
+        ("parts", "of memory", size, estimate.memory_bytes, caps.memory),
+        ("run.end_time", "core-seconds", number, estimate.core_seconds, caps.core_seconds),
     )
     return [
-        Problem(key, "", f"the case needs about {value:.3g} {what}; this server allows {cap or _COUNTABLE:.3g}")
-        for key, what, value, cap in needs
+        Problem(key, "", f"the case needs about {shown(value)} {what}; this server allows {shown(cap or _COUNTABLE)}")
+        for key, what, shown, value, cap in needs
         if value is not None and value > (_COUNTABLE if cap is None else cap)
     ]
 
@@ -160,7 +161,7 @@ def _later(code: str, detail: str) -> ServiceError:
 def check_output(kept: int, quota: Quota) -> None:
     """Raises ServiceError 429 when the folders of the owner's runs, ``kept`` bytes, are as large as they may be."""
     if quota.output_bytes is not None and kept >= quota.output_bytes:
-        detail = f"your runs have {kept} bytes on disk; this server allows {quota.output_bytes}: remove some"
+        detail = f"your runs have {size(kept)} on disk; this server allows {size(quota.output_bytes)}: remove some"
         raise _later("output_quota", detail)
 
 
@@ -176,5 +177,5 @@ def check_room(runs: Path, open_runs: int, caps: Caps, more: int = 1) -> None:
         raise _later("queue_full", detail)
     free = shutil.disk_usage(runs).free
     if free < caps.free_disk:
-        detail = f"{free} bytes are free on the server's disk; it keeps {caps.free_disk}"
+        detail = f"{size(free)} are free on the server's disk; it keeps {size(caps.free_disk)}"
         raise ServiceError(507, "disk_full", detail, retryable=True)

@@ -12,6 +12,7 @@ from typing import Any
 
 import msgspec
 
+from conoid.cases.figures import size
 from conoid.cases.load import CaseError, Problem, apply_overrides, json_data
 
 from . import durable, folder
@@ -134,7 +135,7 @@ class Sweeps:
         wish = _wish(body)
         made = [_changed(wish.case, point, n) for n, point in enumerate(wish.points)]
         if sum(map(len, made)) > _MOST_BYTES:
-            raise ServiceError(413, "too_large", f"the cases have more than {_MOST_BYTES} bytes together")
+            raise ServiceError(413, "too_large", f"the cases have more than {size(_MOST_BYTES)} together")
         cases = []
         for n, text in enumerate(made):
             try:

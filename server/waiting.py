@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 
+from conoid.cases.figures import counted, size
 from conoid.cases.policy import Share
 from conoid.cases.run import State
 
@@ -138,20 +139,18 @@ def plan(
 def _beyond(need: Need, room: Room) -> str:
     """Why a run can never start; a server may have been started again with less."""
     if need.ranks > room.ranks:
-        return f"it needs {need.ranks} slots, and this server has {room.ranks}: it cannot start here"
+        return f"it needs {counted(need.ranks, 'slot')}, and this server has {room.ranks}: it cannot start here"
     if need.memory > room.memory:
-        return (
-            f"it needs {need.memory:.3g} bytes of memory, and this server has {room.memory:.3g}: it cannot start here"
-        )
+        return f"it needs {size(need.memory)} of memory, and this server has {size(room.memory)}: it cannot start here"
     return ""
 
 
 def _reason(need: Need, room: Room, free: Room, waits: int) -> str:
     if waits:
-        return f"waiting for {waits} run{'s' if waits > 1 else ''} before it"
+        return f"waiting for {counted(waits, 'run')} before it"
     if need.ranks > free.ranks:
         return f"waiting for {need.ranks} of {room.ranks} slots; {max(0, free.ranks)} free"
-    return f"waiting for {need.memory:.3g} of {room.memory:.3g} bytes of memory; {max(0.0, free.memory):.3g} free"
+    return f"waiting for {size(need.memory)} of {size(room.memory)} of memory; {size(max(0.0, free.memory))} free"
 
 
 def _passes(need: Need, first: Need, busy: Sequence[Busy], free: Room, now: float) -> bool:

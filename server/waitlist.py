@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import msgspec
 
+from conoid.cases.figures import number
 from conoid.cases.run import State
 
 from . import folder, waiting
@@ -105,7 +106,8 @@ class Waitlist:
                 return f"{own} of your runs are running; this server allows {quota.running} at a time"
             used = self.usage.of(need.owner, time.time()) if quota.core_seconds is not None else 0.0
             if quota.core_seconds is not None and used >= quota.core_seconds:
-                return f"you have used {used:.3g} core-seconds lately; this server allows {quota.core_seconds:.3g}"
+                most = number(quota.core_seconds)
+                return f"you have used {number(used)} core-seconds lately; this server allows {most}"
             return held.sweep(need, [*has, *starts]) if need.sweep else ""
 
         return blocked

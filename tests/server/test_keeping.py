@@ -68,7 +68,7 @@ def test_the_oldest_go_until_the_rest_is_small_enough(server: Running) -> None:
     looks.look()
     assert [server.ann.http.get(f"/v1/runs/{run}").status_code for run in runs] == [410, 200, 200]
     assert 2_000_000 < looks.kept("ann") < 2_500_000
-    assert "more than 2500000 bytes" in server.ann.http.get(f"/v1/runs/{runs[0]}").json()["detail"]
+    assert "more than 2.50 MB" in server.ann.http.get(f"/v1/runs/{runs[0]}").json()["detail"]
 
 
 def test_who_removes_a_run_is_told_too(server: Running) -> None:

@@ -162,4 +162,4 @@ def test_a_case_that_the_queue_could_never_hold_is_refused(settings: Settings) -
         client.headers["Authorization"] = f"Bearer {create_token(service.store, 'ann', frozenset({'submit'}))}"
         answer = client.post("/v1/runs", content=case_text(), headers=TOML)
     assert (answer.status_code, answer.json()["code"]) == (422, "invalid_case")
-    assert "bytes of memory; this server allows 1e+06" in answer.json()["detail"]
+    assert "of memory; this server allows 1.00 MB" in answer.json()["detail"]

@@ -84,7 +84,7 @@ def test_memory_is_summed_over_what_runs() -> None:
     queue = [need("1", memory=3e9), need("2", memory=3e9), need("3", memory=1e9)]
     made = plan(queue, [Busy(1, 4e9)], Room(8, 8e9), NOW, free)
     assert made.start == ["1"]
-    assert made.why["2"] == "waiting for 3e+09 of 8e+09 bytes of memory; 1e+09 free"
+    assert made.why["2"] == "waiting for 3.00 GB of 8.00 GB of memory; 1.00 GB free"
     assert made.why["3"] == "waiting for 1 run before it"
 
 
@@ -115,7 +115,7 @@ def test_who_can_never_start_holds_nobody_up() -> None:
     assert made.start == ["2"]
     assert made.why == {
         "0": "it needs 4 slots, and this server has 2: it cannot start here",
-        "1": "it needs 9e+09 bytes of memory, and this server has 4e+09: it cannot start here",
+        "1": "it needs 9.00 GB of memory, and this server has 4.00 GB: it cannot start here",
     }
 
 
