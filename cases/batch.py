@@ -78,7 +78,9 @@ class Slurm(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
 
 
 class Site(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """What a site decides: how runs are started, and by ``policy`` when, how large, and how long they are kept."""
+    """What a site decides: how runs are started, and by ``policy`` when, how large, how long they are kept, and what
+    one user may hold of the server.
+    """
 
     launcher: Literal["local", "slurm"] = "local"
     slurm: Slurm | None = None
@@ -86,6 +88,7 @@ class Site(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True
     quota: policy.Quota = policy.Quota()
     caps: policy.RunCaps = policy.RunCaps()
     retention: policy.Retention = policy.Retention()
+    http: policy.Http = policy.Http()
 
 
 _Name = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,127}\Z")]
@@ -152,7 +155,7 @@ def read_site(path: Path) -> Site:
         site = msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), Site)
         if site.slurm is not None:
             _check(site.slurm)
-        policy.check(site.queue, site.quota, site.caps, site.retention)
+        policy.check(site.queue, site.quota, site.caps, site.retention, site.http)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise SiteError(f"{path}: {reason}") from None

@@ -19,6 +19,9 @@ Tables of a site's settings file::
     [retention]                       # of runs that have ended
     age = "2160 h"
     bytes = 4_000_000_000_000
+    [http]                            # of each user, and of each address that sends no token
+    requests = 16
+    streams = 100
 """
 
 import msgspec
@@ -105,10 +108,34 @@ class Retention(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields
         return parse_quantity(self.every, "s")
 
 
-def check(queue: Queue, quota: Quota, caps: RunCaps, retention: Retention) -> None:
+class Http(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """What one user may hold of the server at a time; so may an address whose requests have no valid token."""
+
+    requests: int = 16
+    """Requests in progress: with their bodies, of 1 MiB at most, and answers in memory. Chosen."""
+    waiting: int = 200
+    """Requests that wait for their turn; beyond it they are refused with 429. Chosen."""
+    streams: int = 100
+    """Event streams, followed logs, waits for a change and downloads; beyond it 429. Chosen."""
+    threads: int = 2
+    """Answers that are computed, or wait for the disk. Chosen: a server has 64 for all users, and one Python."""
+    patience: str = "20 s"
+    """After which a disk or a database that does not answer is answered with 503. Chosen."""
+
+    @property
+    def seconds(self) -> float:
+        """The patience, s."""
+        return parse_quantity(self.patience, "s")
+
+
+def check(queue: Queue, quota: Quota, caps: RunCaps, retention: Retention, http: Http) -> None:
     """Raises ValueError: the key, the value, what is allowed."""
-    for key, text in (("queue.half_life", queue.half_life), ("retention.every", retention.every)):
+    for key, text in (
+        ("queue.half_life", queue.half_life), ("retention.every", retention.every), ("http.patience", http.patience),
+    ):  # fmt: skip
         _time(key, text)
+    for name in ("requests", "waiting", "streams", "threads"):
+        _positive("http", name, getattr(http, name))
     if retention.age:
         _time("retention.age", retention.age)
     for name, user in queue.users.items():

@@ -102,7 +102,12 @@ class Session(Http):
 
     def sweeps(self) -> list[SweepInfo]:
         """Our sweeps, newest first, without their points."""
-        return self.get(SweepPage, "/v1/sweeps").sweeps
+        page = self.get(SweepPage, "/v1/sweeps", limit=500)
+        found = [*page.sweeps]
+        while page.next is not None:
+            page = self.get(SweepPage, "/v1/sweeps", limit=500, before=page.next)
+            found += page.sweeps
+        return found
 
     def find_sweep(self, sweep_id: str) -> Sweep:
         """A handle of a sweep by its id, or of the newest one for ``last``. Raises ClientError when there is none."""

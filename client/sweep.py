@@ -50,9 +50,10 @@ class SweepInfo(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class SweepPage(msgspec.Struct, kw_only=True, frozen=True):
-    """Sweeps, newest first."""
+    """Sweeps, newest first; ``next`` asks for those that are older, None where there are none."""
 
     sweeps: list[SweepInfo]
+    next: str | None = None
 
 
 @dataclass

@@ -8,16 +8,20 @@ from fastapi import Depends, FastAPI
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from . import errors, keeper, limits, openapi, page
+from . import connections, errors, keeper, limits, openapi, page, reader
 from .bell import Bell
+from .crowd import Crowd
+from .door import Door
+from .download import Downloads
 from .farewells import Farewells
+from .heads import Heads
 from .history import Histories
 from .keeper import Keeper
+from .lanes import Lanes
 from .launch import Launcher
 from .launch.local import LocalLauncher
 from .launch.slurm import SlurmLauncher
 from .metrics import Metrics, Timed
-from .reader import Turns
 from .readiness import Readiness
 from .routes import cases, events, files, health, history, logs, me, runs, snapshots
 from .routes import sweeps as sweep_routes
@@ -82,21 +86,25 @@ def opened(settings: Settings) -> Iterator[Service]:
         desk.kept = watchman.kept
         watchman.start()
         stack.callback(watchman.close)
-        readiness, histories, turns = Readiness(settings, store), Histories(), Turns()
+        http = settings.site.http
+        lanes = Lanes(http.threads, http.waiting, http.seconds)
         yield Service(
-            settings,
-            store,
-            bell,
-            telemetry,
-            supervisor,
-            desk,
-            histories,
-            readiness,
-            turns,
-            Turns(),
-            sweeps,
-            watchman,
-            lines,
+            settings=settings,
+            store=store,
+            bell=bell,
+            telemetry=telemetry,
+            supervisor=supervisor,
+            desk=desk,
+            histories=Histories(),
+            readiness=Readiness(settings, store),
+            crowd=Crowd(http, connections.raise_limit()),
+            downloads=Downloads(lanes),
+            lanes=lanes,
+            readers=reader.lanes(reader.CASE),
+            sweepers=reader.lanes(reader.SWEEP),
+            sweeps=sweeps,
+            keeper=watchman,
+            farewells=lines,
         )
 
 
@@ -128,6 +136,8 @@ def build_app(service: Service) -> FastAPI:
     errors.install(app)
     openapi.install(app)
     app.state.metrics = Metrics(service)
+    app.add_middleware(Door, service=service)
+    app.add_middleware(Heads)
     app.add_middleware(_SafeHeaders)
     app.add_middleware(Timed, metrics=app.state.metrics)
     for router in ROUTERS:

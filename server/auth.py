@@ -2,24 +2,22 @@
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from typing import Annotated
 
 from fastapi import Depends, Request
 from sqlalchemy.exc import SQLAlchemyError
-from starlette.concurrency import run_in_threadpool
 
+from .door import LOCAL_OWNER
 from .errors import ServiceError
 from .service import Service, ServiceOf
 from .settings import loopback
 from .store import Token
-from .tokens import SCOPES, check_token
+from .tokens import SCOPES
 
 RECHECK = 2.0
 """s after which the token behind a long answer is looked at again. Chosen: who is revoked hears no more within 5 s."""
-LOCAL_OWNER = "local"
-"""Owns all runs of a server without access control."""
 
 
 @dataclass(frozen=True)
@@ -35,13 +33,12 @@ class Identity:
         return self.token is None or scope in self.token.scopes
 
 
-def identify(request: Request, service: ServiceOf) -> Identity:
-    """The identity behind a request. Raises ServiceError 401."""
+async def identify(request: Request, service: ServiceOf) -> Identity:
+    """The identity behind a request, whose token the door has looked up. Raises ServiceError 401."""
     if not service.settings.auth:
         _same_machine_page(request)
         return Identity(LOCAL_OWNER, None)
-    scheme, _, text = request.headers.get("authorization", "").partition(" ")
-    token = check_token(service.store, text.strip()) if scheme.lower() == "bearer" else None
+    token: Token | None = request.scope["state"]["token"]
     if token is None:
         raise unauthorized()
     return Identity(token.owner, token)
@@ -65,10 +62,10 @@ def _same_machine_page(request: Request) -> None:
         raise ServiceError(403, "forbidden", f"Origin {origin!r}: pages of other sites may not use this server")
 
 
-def requires(scope: str) -> Callable[[Identity], Identity]:
+def requires(scope: str) -> Callable[[Identity], Awaitable[Identity]]:
     """A dependency that gives the identity. Raises ServiceError 401, or 403 when the token lacks ``scope``."""
 
-    def check(identity: Annotated[Identity, Depends(identify)]) -> Identity:
+    async def check(identity: Annotated[Identity, Depends(identify)]) -> Identity:
         if not identity.allows(scope):
             detail = f"the token lacks the scope {scope!r} ({SCOPES[scope]})"
             raise ServiceError(403, "forbidden", detail, hint="ask the server's operator for a token that has it")
@@ -102,7 +99,7 @@ class Pass:
         if now - self._looked < RECHECK:
             return True
         self._looked = now
-        return await run_in_threadpool(self._valid)
+        return await self._service.lanes.run(self._valid)
 
     def _valid(self) -> bool:
         """A database that cannot be asked now ends nobody's stream."""

@@ -5,7 +5,7 @@ import hashlib
 import os
 import re
 import stat
-from collections.abc import Iterator
+from collections.abc import AsyncIterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,13 +15,15 @@ from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
 from starlette.types import Receive, Scope, Send
 
+from .crowd import place_of
+from .digests import Digests, State, state_of
 from .errors import ServiceError, not_found
+from .lanes import Lanes
 
 _CHUNK = 1 << 18
 """Bytes that are read and sent at once. Chosen: larger ones are not faster."""
-_DIGESTS = 10_000
-"""Digests of files that are kept, 32 bytes each. Chosen."""
-_digests: dict[tuple[int, int, int, int], bytes] = {}
+_SMALL = 1 << 20
+"""Bytes of a file that is sent, and hashed, in a moment. Chosen: 1 ms of a processor."""
 _RANGE = re.compile(r"bytes=(\d{0,18})-(\d{0,18})")
 _TYPES = {
     ".json": "application/json", ".jsonl": "application/x-ndjson", ".toml": "application/toml",
@@ -83,42 +85,78 @@ def _walk(folder: Path, parts: list[str]) -> int:
     return descriptor
 
 
-def respond(request: Request, folder: Path, relative: str) -> Response:
-    """The file as it is now, honouring Range, If-Range and If-None-Match; its sha256 stands in Repr-Digest.
+class Downloads:
+    """Belongs to the event loop."""
 
-    A file that is still growing is sent up to its size at this moment. Raises ServiceError 404, 416.
-    """
+    def __init__(self, lanes: Lanes) -> None:
+        """Files are read in the lane of who asks."""
+        self._lanes, self._digests = lanes, Digests(lanes)
+
+    async def respond(self, request: Request, folder: Path, relative: str, ended: bool) -> Response:
+        """The file as it is now, honouring Range, If-Range and If-None-Match; its sha256 stands in Repr-Digest.
+
+        A large file of a run that goes on has no Repr-Digest: it may grow faster than it is read. A file that is still
+        growing is sent up to its size at this moment. Raises ServiceError 404, 416, 429, 503.
+        """
+        file, state = await self._lanes.run(_opened, folder, relative)
+        try:
+            size = state[-1]
+            if size > _SMALL:
+                place_of(request).lengthen()
+            headers = {
+                "Accept-Ranges": "bytes",
+                "Cache-Control": "private, no-cache",
+                "X-Content-Type-Options": "nosniff",
+                "Content-Type": _TYPES.get(Path(relative).suffix, "application/octet-stream"),
+            }
+            tag = hashlib.sha256(repr(state).encode()).digest()
+            if ended or size <= _SMALL:
+                tag = await self._digests.of(file, state)
+                headers["Repr-Digest"] = f"sha-256=:{base64.b64encode(tag).decode()}:"
+            etag = headers["ETag"] = f'"{tag.hex()[:32]}"'
+            if is_known(etag, request.headers.get("if-none-match", "")):
+                file.close()
+                return Response(status_code=304, headers=headers)
+            begin, end, status = _part(request, size, etag)
+            if status == 206:
+                headers["Content-Range"] = f"bytes {begin}-{end - 1}/{size}"
+            return _FileResponse(self._lanes, file, begin, end, status, headers)
+        except BaseException:
+            file.close()
+            raise
+
+    async def whole(
+        self, request: Request, folder: Path, relative: str, headers: Mapping[str, str], media_type: str
+    ) -> Response:
+        """A file that does not change, with headers of the caller's. Raises ServiceError 404, 429, 503."""
+        file, state = await self._lanes.run(_opened, folder, relative)
+        try:
+            if state[-1] > _SMALL:
+                place_of(request).lengthen()
+            return _FileResponse(self._lanes, file, 0, state[-1], 200, {**headers, "Content-Type": media_type})
+        except BaseException:
+            file.close()
+            raise
+
+
+def _opened(folder: Path, relative: str) -> tuple[BinaryIO, State]:
     file = open_inside(folder, relative)
-    try:
-        size, etag, digest = _identify(file)
-        headers = {
-            "ETag": etag,
-            "Accept-Ranges": "bytes",
-            "Repr-Digest": f"sha-256=:{base64.b64encode(digest).decode()}:",
-            "Cache-Control": "private, no-cache",
-            "X-Content-Type-Options": "nosniff",
-            "Content-Type": _TYPES.get(Path(relative).suffix, "application/octet-stream"),
-        }
-        if is_known(etag, request.headers.get("if-none-match", "")):
-            file.close()
-            return Response(status_code=304, headers=headers)
-        begin, end, status = _part(request, size, etag)
-        if status == 206:
-            headers["Content-Range"] = f"bytes {begin}-{end - 1}/{size}"
-        headers["Content-Length"] = str(end - begin)
-        if request.method == "HEAD":
-            file.close()
-            return Response(status_code=status, headers=headers)
-        return _FileResponse(file, begin, end, status, headers)
-    except BaseException:
-        file.close()
-        raise
+    return file, state_of(file)
 
 
 def is_known(etag: str, text: str) -> bool:
     """Whether an If-None-Match has this ETag, or all there are; one that a proxy has made weak counts as well."""
     known = {tag.strip().removeprefix("W/") for tag in text.split(",")}
     return etag in known or known == {"*"}
+
+
+def tagged(body: bytes, known: str) -> Response:
+    """JSON with an ETag, or 304 where the caller knows it."""
+    etag = f'"{hashlib.sha256(body).hexdigest()[:32]}"'
+    headers = {"ETag": etag, "Cache-Control": "private, no-cache"}
+    if is_known(etag, known):
+        return Response(status_code=304, headers=headers)
+    return Response(body, headers=headers, media_type="application/json")
 
 
 def _part(request: Request, size: int, etag: str) -> tuple[int, int, int]:
@@ -139,8 +177,10 @@ def _part(request: Request, size: int, etag: str) -> tuple[int, int, int]:
 class _FileResponse(StreamingResponse):
     """A part of an open file; closes it, also when the client leaves in the middle."""
 
-    def __init__(self, file: BinaryIO, begin: int, end: int, status: int, headers: dict[str, str]) -> None:
-        super().__init__(_chunks(file, begin, end), status, headers)
+    def __init__(
+        self, lanes: Lanes, file: BinaryIO, begin: int, end: int, status: int, headers: Mapping[str, str]
+    ) -> None:
+        super().__init__(_chunks(lanes, file, begin, end), status, {**headers, "Content-Length": str(end - begin)})
         self._file = file
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -150,29 +190,7 @@ class _FileResponse(StreamingResponse):
             self._file.close()
 
 
-def _chunks(file: BinaryIO, begin: int, end: int) -> Iterator[bytes]:
-    file.seek(begin)
-    while begin < end and (chunk := file.read(min(_CHUNK, end - begin))):
+async def _chunks(lanes: Lanes, file: BinaryIO, begin: int, end: int) -> AsyncIterator[bytes]:
+    while begin < end and (chunk := await lanes.run(os.pread, file.fileno(), min(_CHUNK, end - begin), begin)):
         begin += len(chunk)
         yield chunk
-
-
-def _identify(file: BinaryIO) -> tuple[int, str, bytes]:
-    """Size, ETag and sha256 of an open file. The digest is computed once for each state of the file."""
-    status = os.fstat(file.fileno())
-    state = (status.st_dev, status.st_ino, status.st_mtime_ns, status.st_size)
-    digest = _digests.get(state)
-    if digest is None:
-        digest = _digest(file, status.st_size)
-        if len(_digests) >= _DIGESTS:
-            _digests.clear()
-        _digests[state] = digest
-    return status.st_size, f'"{digest.hex()[:32]}"', digest
-
-
-def _digest(file: BinaryIO, size: int) -> bytes:
-    total = hashlib.sha256()
-    while size and (chunk := file.read(min(_CHUNK, size))):
-        total.update(chunk)
-        size -= len(chunk)
-    return total.digest()

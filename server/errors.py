@@ -134,7 +134,8 @@ def allowed(app: FastAPI, path: str) -> str:
     for router in app.state.routers:
         for route in router.routes:
             if isinstance(route, APIRoute) and route.path_regex.match(path):
-                found.setdefault(route.path, set()).update(route.methods or ())
+                methods = route.methods or set()
+                found.setdefault(route.path, set()).update(methods, {"HEAD"} if "GET" in methods else ())
     return ", ".join(sorted(found[max(found, key=len)])) if found else ""
 
 

@@ -66,6 +66,8 @@ class History:
     cuts: list[bytes] = field(default_factory=list)
     snapshots: dict[int, bytes] = field(default_factory=dict)
     """Lines by the numbers of the snapshots."""
+    answers: dict[int, tuple[int, bytes]] = field(default_factory=dict)
+    """Answers of a run that has ended, by their points: the last event, and the body."""
 
     def __post_init__(self) -> None:
         self.lock = threading.Lock()

@@ -2,6 +2,7 @@
 
 import logging
 import time
+from collections.abc import Mapping
 
 from sqlalchemy.exc import SQLAlchemyError
 
@@ -37,10 +38,10 @@ class Index:
         self.unsaved.discard(run.id)
         return True
 
-    def add(self, run: Run, key: str | None) -> None:
+    def add(self, run: Run, key: str | None, labels: Mapping[str, str]) -> None:
         """What is known already stays when nothing can be written now. Raises SQLAlchemyError."""
         try:
-            self._store.add(run, key)
+            self._store.add(run, key, labels)
         except SQLAlchemyError:
             if self._store.get(run.id) is None:
                 raise

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from . import folder, recovery
+from . import folder, pins, recovery
 from .events import Run
 from .holds import words
 from .index import Index
@@ -45,6 +45,9 @@ class Leavings:
                 self._take_up(self._runs / run_id, partial(known.get, run_id))
         if last:
             folder.begin_after(last)
+        if self._store.unlabelled:
+            for run in self._store.all():
+                self._store.relabel(run, pins.labels(self._runs / run.id))
 
     def again(self) -> None:
         """Those that could not be read."""
@@ -62,7 +65,7 @@ class Leavings:
             known = known_of()
             left = recovery.look(path, known, self._launcher)
             if left.run != known:
-                self._index.add(left.run, left.key)
+                self._index.add(left.run, left.key, pins.labels(path))
         except (OSError, ValueError, SQLAlchemyError) as error:
             self._failed[path] = words(error)
             if told != words(error):

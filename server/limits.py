@@ -9,6 +9,8 @@ from pathlib import Path
 
 import msgspec
 from fastapi import Request
+from fastapi.dependencies.models import Dependant
+from fastapi.routing import APIRoute
 from starlette.requests import ClientDisconnect
 
 from conoid.cases.bodies import MeshFile
@@ -31,21 +33,33 @@ _COUNTABLE = 1 << 53
 """Where nothing is capped: what every reader of JSON can still count (IEEE 754)."""
 
 
-def check_query(request: Request) -> None:
+async def check_query(request: Request) -> None:
     """Raises ServiceError 400 for a parameter that the route does not know: a misspelt one would pass as left out."""
     if not request.query_params:
         return
-    path, method = request.scope["route"].path_format, request.method.lower().replace("head", "get")
-    parameters = request.app.openapi()["paths"][path][method].get("parameters", ())
-    known = sorted(told["name"] for told in parameters if told["in"] == "query")
+    route: APIRoute = request.scope["route"]
+    known = sorted(set(_query(route.dependant)))
     for name in request.query_params:
         if name not in known:
             detail = f"{name[:80]}: {request.url.path} knows no such parameter; allowed: {', '.join(known) or 'none'}"
             raise ServiceError(400, "bad_parameter", detail, pointer=name[:80])
 
 
+def _query(dependant: Dependant) -> Iterator[str]:
+    yield from (field.alias for field in dependant.query_params)
+    for inner in dependant.dependencies:
+        yield from _query(inner)
+
+
 async def read_body(request: Request) -> bytes:
-    """The body, never more than ``BODY`` of it in memory. Raises ServiceError 413, 408, and 400 where it breaks off."""
+    """The body, never more than ``BODY`` of it in memory. Raises ServiceError 415 for one that is encoded, 413, 408,
+    and 400 where it breaks off.
+    """
+    encoding = request.headers.get("content-encoding", "identity").strip().lower()
+    if encoding not in {"", "identity"}:
+        detail = f"Content-Encoding {encoding[:80]!r}: a body is sent as it is"
+        headers = {"Accept-Encoding": "identity"}
+        raise ServiceError(415, "unsupported_encoding", detail, pointer="Content-Encoding", headers=headers)
     length = request.headers.get("content-length", "0")
     if length.isdigit() and int(length) > BODY:
         raise _too_large(int(length))

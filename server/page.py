@@ -1,11 +1,13 @@
 """The live page: its own files, and the two JavaScript libraries that it draws with, out of an installed wheel.
 
 three.js and ECharts come as ES modules inside the package ``nicegui``. Its metadata says where the files are; they are
-served, and the package is never imported: what it needs itself is not needed here.
+served, and the package is never imported: what it needs itself is not needed here. All files are read once, at the
+start: no address leads to a disk.
 """
 
 import gzip
 import hashlib
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,15 +15,13 @@ from importlib import metadata
 from pathlib import Path
 
 from fastapi import FastAPI
-from fastapi.staticfiles import StaticFiles
-from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import JSONResponse, Response
-from starlette.routing import Route
-from starlette.types import Scope
+from starlette.responses import Response
+from starlette.types import Receive, Scope, Send
 
 from . import errors
+from .download import is_known
 
 PACKAGE, VERSION = "nicegui", "3.18.0"
 TESTED = {
@@ -41,6 +41,12 @@ TESTED = {
 """Address below the version: the file in the package, and its sha256 in the wheel of ``VERSION`` on PyPI."""
 _FOREVER = "public, max-age=31536000, immutable"
 """The version is part of the address. One year is the longest that RFC 9111's readers take."""
+_WORTH = 1 << 10
+"""Bytes from which a file is compressed. Chosen: a packet has about as many."""
+_TYPES = {
+    ".js": "text/javascript", ".css": "text/css", ".html": "text/html", ".json": "application/json",
+    ".svg": "image/svg+xml", ".png": "image/png",
+}  # fmt: skip
 _LEVEL = 6
 """Of gzip: 1.1 MB become 0.37 MB in 50 ms, once."""
 
@@ -59,6 +65,14 @@ class Library:
     def zipped(self) -> bytes:
         """Compressed at the first request."""
         return gzip.compress(self.plain, _LEVEL, mtime=0)
+
+    @cached_property
+    def _digest(self) -> str:
+        return hashlib.sha256(self.plain).hexdigest()[:32]
+
+    def tag(self, zipped: bool) -> str:
+        """The ETag of one of its two forms."""
+        return f'"{self._digest}{"-gzip" if zipped else ""}"'
 
 
 def libraries() -> dict[str, Library]:
@@ -86,49 +100,56 @@ def _tested(path: Path, digest: str) -> Library:
 
 
 def install(app: FastAPI, web: Path, *, auth: bool) -> str:
-    """Mounts the page at ``/`` and the libraries at ``/lib``; what is wrong with the libraries, or an empty text."""
-    files: Mapping[str, Library] = {}
+    """Mounts the page at ``/`` and the libraries at ``/lib``; what is wrong with the libraries, or an empty text.
+
+    Raises OSError where the page cannot be read.
+    """
+    found: Mapping[str, Library] = {}
     problem = ""
     try:
-        files = libraries()
+        found = libraries()
     except LibraryError as error:
         problem = str(error)
-    app.mount("/lib", _served(files, problem, auth), name="libraries")
-    app.mount("/", _Page(directory=web, html=True), name="page")
+    known = {"auth": auth, "problem": problem}
+    names = {name: f"lib/{VERSION}/{name}/index.js" if found else None for name in ("echarts", "three")}
+    index = Library(json.dumps({**known, **names}).encode())
+    page = {str(path.relative_to(web)): Library(path.read_bytes()) for path in web.rglob("*") if _is_shown(path)}
+    app.mount("/lib", _Files({"index.json": index}, {f"{VERSION}/{name}": file for name, file in found.items()}))
+    app.mount("/", _Files({**page, "": page["index.html"]} if "index.html" in page else page, {}))
     return problem
 
 
-class _Page(StaticFiles):
-    """The page's own files. A browser asks each time whether they are still the same: a server may be a newer one."""
+def _is_shown(path: Path) -> bool:
+    """Whether a file belongs to the page, and not to the package that brings it."""
+    return path.is_file() and not path.parent.name.startswith("_") and not path.name.startswith(("_", "."))
 
-    async def get_response(self, path: str, scope: Scope) -> Response:
+
+class _Files:
+    """Files in memory, by address: ``fresh`` ones, of which a browser asks each time whether they are still the same (a
+    server may be a newer one), and those that are the same for ever.
+    """
+
+    def __init__(self, fresh: Mapping[str, Library], lasting: Mapping[str, Library]) -> None:
+        self._fresh, self._lasting = fresh, lasting
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Raises HTTPException 405 for what the server answers to other methods, and 404 whatever is asked of what is
         not there: the mount sees every address that no route takes.
         """
-        if self.lookup_path(path)[1] is None:
-            known = errors.allowed(scope["app"], scope["path"])
-            if known or scope["method"] not in {"GET", "HEAD"}:
-                raise HTTPException(405 if known else 404)
-        answer = await super().get_response(path, scope)
-        answer.headers["Cache-Control"] = "no-cache"
-        return answer
+        address = scope["path"].removeprefix(scope["root_path"]).removeprefix("/")
+        file, lasts = self._fresh.get(address) or self._lasting.get(address), address in self._lasting
+        if file is None or scope["method"] != "GET":
+            known = file is not None or errors.allowed(scope["app"], scope["path"])
+            raise HTTPException(405 if known else 404)
+        await _answer(Request(scope), address, file, lasts)(scope, receive, send)
 
 
-def _served(files: Mapping[str, Library], problem: str, auth: bool) -> Starlette:
-    names = {name: f"lib/{VERSION}/{name}/index.js" if files else None for name in ("echarts", "three")}
-    known = {"auth": auth, "problem": problem, **names}
-
-    def index(_: Request) -> Response:
-        return JSONResponse(known, headers={"Cache-Control": "no-cache"})
-
-    def content(request: Request) -> Response:
-        found = files.get(request.path_params["address"])
-        if found is None:
-            raise HTTPException(404)
-        headers = {"Cache-Control": _FOREVER, "Vary": "Accept-Encoding"}
-        if "gzip" not in request.headers.get("accept-encoding", ""):
-            return Response(found.plain, media_type="text/javascript", headers=headers)
+def _answer(request: Request, address: str, file: Library, lasts: bool) -> Response:
+    zipped = "gzip" in request.headers.get("accept-encoding", "") and len(file.plain) > _WORTH
+    headers = {"Cache-Control": _FOREVER if lasts else "no-cache", "Vary": "Accept-Encoding", "ETag": file.tag(zipped)}
+    if is_known(headers["ETag"], request.headers.get("if-none-match", "")):
+        return Response(status_code=304, headers=headers)
+    if zipped:
         headers["Content-Encoding"] = "gzip"
-        return Response(found.zipped, media_type="text/javascript", headers=headers)
-
-    return Starlette(routes=[Route("/index.json", index), Route(f"/{VERSION}/{{address:path}}", content)])
+    kind = _TYPES.get(Path(address or "index.html").suffix, "application/octet-stream")
+    return Response(file.zipped if zipped else file.plain, media_type=kind, headers=headers)

@@ -28,6 +28,18 @@ def told(folder: Path) -> str:
         return ""
 
 
+def labels(folder: Path) -> dict[str, str]:
+    """Those that a run was submitted with, and ``keep`` as was said last; none where the folder has been removed or
+    damaged.
+    """
+    try:
+        made = submission(folder).labels
+    except (OSError, msgspec.MsgspecError):
+        return {}
+    said = told(folder)
+    return {**made, "keep": said} if said else made
+
+
 def pin(folder: Path, keep: bool) -> None:
     """Keeps a run for good, or no longer. Raises OSError."""
     durable.write(folder / _PINNED, (_YES if keep else _NO).encode())

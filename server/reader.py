@@ -1,50 +1,57 @@
 """Has cases read by ``reading``, in processes with limits; decides who may have one read, and when."""
 
-import asyncio
 import atexit
 import logging
-import shutil
+import os
+import signal
 import socket
 import subprocess
 import sys
-import tempfile
 import threading
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import suppress
 from functools import cache
-from pathlib import Path
 
 import msgspec
 
 from conoid.cases.load import CaseError
 
 from .errors import ServiceError
-from .reading import CPU, WALL, Answer, Question, Reading, address
+from .lanes import Lanes
+from .reading import CPU, PID, WALL, Answer, Question, Reading
 from .settings import usable_cores
 
 _log = logging.getLogger("conoid.server")
-_PATIENCE = 30.0
+_LOAD = 30.0
 """s in which the program must have loaded what it needs. Chosen: it takes half a second."""
+_FORK = 10.0
+"""s in which the program must have begun with a case; one that has not is replaced. Chosen: it takes 10 ms."""
+_REST = 5.0
+"""s that a case may take beyond ``WALL`` before its process is killed from here. Chosen."""
 _WAITING = 100
 """Bodies of one owner that wait to be read. Chosen: each may have 1 MiB."""
+CASE, SWEEP = 120.0, 900.0
+"""s in which a case, and all cases of a sweep, must be read and taken, the waiting for a turn included. Chosen."""
+
+
+def lanes(patience: float) -> Lanes:
+    """As many cases are read at a time as there are cores; one owner alone never takes the last of the places."""
+    places = max(2, usable_cores())
+    return Lanes(each=places - 1, waiting=_WAITING, patience=patience, most=places)
 
 
 class Reader:
-    """A program that reads cases, started when it is first needed. May be used from any thread."""
+    """A program that reads cases, started when it is first needed, and anew where it has ended or hangs. May be used
+    from any thread.
+    """
 
     def __init__(self) -> None:
         """Starts nothing yet."""
         self._lock = threading.Lock()
-        self._program: subprocess.Popen[bytes] | None = None
-        self._folder = ""
+        self._program: _Program | None = None
 
     def read(self, question: Question) -> Reading:
         """Raises CaseError with every problem, ServiceError 422 for a case that costs too much, 503; RuntimeError."""
-        try:
-            told = self._ask(msgspec.msgpack.encode(question))
-        except OSError as error:
-            _log.error("a case cannot be read: %s", error)
-            raise ServiceError(503, "unavailable", "no case can be read now", retryable=True) from error
+        told = self._ask(msgspec.msgpack.encode(question))
         if not told:
             detail = f"the case takes too long to be read: more than {CPU} s, or too much memory"
             raise ServiceError(422, "too_costly", detail)
@@ -56,39 +63,91 @@ class Reader:
         return answer.reading
 
     def _ask(self, question: bytes) -> bytes:
-        with socket.socket(socket.AF_UNIX) as connection:
-            connection.settimeout(WALL + _PATIENCE)
-            with address(self._socket()) as there:
-                connection.connect(there)
-            connection.sendall(question)
-            connection.shutdown(socket.SHUT_WR)
-            chunks = []
-            while chunk := connection.recv(1 << 16):
-                chunks.append(chunk)
-            return b"".join(chunks)
-
-    def _socket(self) -> Path:
-        with self._lock:
-            if self._program is None or self._program.poll() is not None:
+        """Of the program, or of the next one. Raises ServiceError 503."""
+        error: OSError | None = None
+        for _ in range(2):
+            try:
+                program = self._running()
+                connection, pid = program.begun()
+            except OSError as raised:
+                _log.error("the program that reads cases is started anew: %s", raised)
+                error = raised
                 self.close()
-                self._start()
-            return Path(self._folder) / "socket"
+            else:
+                return _answer(connection, pid, question)
+        raise ServiceError(503, "unavailable", "no case can be read now", retryable=True) from error
 
-    def _start(self) -> None:
-        self._folder = tempfile.mkdtemp(prefix="conoid-reader-")
-        command = [sys.executable, "-m", "conoid.server.reading", str(Path(self._folder) / "socket")]
-        self._program = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
-        assert self._program.stdout is not None
-        if self._program.stdout.readline() != b"ready\n":
-            raise OSError("the program that reads cases ended at its start")
+    def _running(self) -> "_Program":
+        with self._lock:
+            if self._program is None:
+                self._program = _Program()
+            return self._program
 
     def close(self) -> None:
-        """Ends the program."""
-        if self._program is not None:
-            self._program.kill()
-            self._program.communicate()
+        """Ends the program; cases that it has begun with are read to their end."""
+        with self._lock:
+            if self._program is not None:
+                self._program.close()
             self._program = None
-            shutil.rmtree(self._folder, ignore_errors=True)
+
+
+class _Program:
+    """One that runs. It gets a connection for each case, and forks a process for it."""
+
+    def __init__(self) -> None:
+        """Raises OSError where it does not start."""
+        self._control, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with theirs:
+            command = [sys.executable, "-m", "conoid.server.reading"]
+            self._child = subprocess.Popen(command, stdin=theirs.fileno(), stdout=subprocess.DEVNULL)
+        self._control.settimeout(_LOAD)
+        try:
+            if not self._control.recv(1):
+                raise OSError("it ended at its start")
+        except OSError:
+            self.close()
+            raise
+        self._control.settimeout(_FORK)
+
+    def begun(self) -> tuple[socket.socket, int]:
+        """A connection to a process that waits for a case, and its number. Raises OSError."""
+        ours, theirs = socket.socketpair()
+        try:
+            with theirs:
+                socket.send_fds(self._control, [b"c"], [theirs.fileno()])
+            ours.settimeout(_FORK)
+            number = ours.recv(PID, socket.MSG_WAITALL)
+            if len(number) < PID:
+                raise OSError("it has ended")
+            return ours, int.from_bytes(number)
+        except BaseException:
+            ours.close()
+            raise
+
+    def close(self) -> None:
+        """Ends it."""
+        self._control.close()
+        self._child.kill()
+        self._child.wait()
+
+
+def _answer(connection: socket.socket, pid: int, question: bytes) -> bytes:
+    """What a process says of a case; empty where it was ended by its limits. Raises ServiceError 503."""
+    with connection:
+        connection.settimeout(WALL + _REST)
+        chunks = []
+        try:
+            connection.sendall(question)
+            connection.shutdown(socket.SHUT_WR)
+            while chunk := connection.recv(1 << 16):
+                chunks.append(chunk)
+        except TimeoutError:
+            with suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+            raise ServiceError(503, "unavailable", "the case cannot be read now", retryable=True) from None
+        except ConnectionError:
+            return b""
+        return b"".join(chunks)
 
 
 @cache
@@ -97,29 +156,3 @@ def the_reader() -> Reader:
     made = Reader()
     atexit.register(made.close)
     return made
-
-
-class Turns:
-    """As many cases are read at a time as there are cores; one owner alone never takes the last of the places."""
-
-    def __init__(self) -> None:
-        """Belongs to the event loop."""
-        self._places = max(2, usable_cores())
-        self._all = asyncio.Semaphore(self._places)
-        self._own: dict[str, asyncio.Semaphore] = {}
-        self._waiting: dict[str, int] = {}
-
-    @asynccontextmanager
-    async def turn(self, owner: str) -> AsyncIterator[None]:
-        """Waits for a place. Raises ServiceError 429 when too many of the owner wait already."""
-        if self._waiting.get(owner, 0) >= _WAITING:
-            detail = f"{_WAITING} of your cases wait to be read"
-            raise ServiceError(429, "busy", detail, retryable=True, headers={"Retry-After": "5"})
-        self._waiting[owner] = self._waiting.get(owner, 0) + 1
-        try:
-            async with self._own.setdefault(owner, asyncio.Semaphore(self._places - 1)), self._all:
-                yield
-        finally:
-            self._waiting[owner] -= 1
-            if not self._waiting[owner]:
-                del self._waiting[owner], self._own[owner]

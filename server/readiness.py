@@ -1,36 +1,39 @@
 """Whether the database and the folder of the runs take what the server would write."""
 
+import asyncio
 import shutil
-import threading
 import time
+from collections.abc import Callable
 
 from sqlalchemy.exc import SQLAlchemyError
 
 from . import durable
+from .errors import ServiceError
+from .lanes import Lanes
 from .settings import Settings
 from .store import Store
 
 _FRESH = 1.0
-"""s for which an answer holds: who asks needs no token, and each look writes to the disk. Chosen."""
+"""s for which an answer holds: who asks needs no token, and each check writes to the disk. Chosen."""
+_LIMIT = 2.0
+"""s that a check may take; one that takes longer has failed. Chosen: a disk that works answers within 0.1 s."""
 
 
 class Readiness:
-    """May be asked from any thread."""
+    """Belongs to the event loop."""
 
     def __init__(self, settings: Settings, store: Store) -> None:
-        """Looks at nothing yet."""
+        """Checks nothing yet."""
         self._settings, self._store = settings, store
-        self._lock = threading.Lock()
-        self._until = 0.0
-        self._checks: dict[str, bool] = {}
+        self._checks = {
+            name: _Check(look)
+            for name, look in (("database", self._database), ("runs", self._runs), ("disk", self._disk))
+        }
 
-    def checks(self) -> dict[str, bool]:
+    async def checks(self) -> dict[str, bool]:
         """What can be used now: ``database``, ``runs`` (takes files), ``disk`` (as much is free as is kept)."""
-        with self._lock:
-            if time.monotonic() >= self._until:
-                self._checks = {"database": self._database(), "runs": self._runs(), "disk": self._disk()}
-                self._until = time.monotonic() + _FRESH
-            return dict(self._checks)
+        passed = await asyncio.gather(*(check.passes() for check in self._checks.values()))
+        return dict(zip(self._checks, passed, strict=True))
 
     def _database(self) -> bool:
         try:
@@ -51,3 +54,27 @@ class Readiness:
             return shutil.disk_usage(self._settings.runs).free >= self._settings.caps.free_disk
         except OSError:
             return False
+
+
+class _Check:
+    """One of them: in a thread of its own, once for all who ask."""
+
+    def __init__(self, look: Callable[[], bool]) -> None:
+        self._look, self._thread = look, Lanes(each=1, waiting=1, patience=_LIMIT, most=1)
+        self._until, self._passed = 0.0, False
+        self._asked: asyncio.Task[None] | None = None
+
+    async def passes(self) -> bool:
+        """What was found less than ``_FRESH`` s ago, or is found now; False where that takes longer than ``_LIMIT``."""
+        if time.monotonic() >= self._until:
+            if self._asked is None or self._asked.done():
+                self._asked = asyncio.create_task(self._ask())
+            await asyncio.shield(self._asked)
+        return self._passed
+
+    async def _ask(self) -> None:
+        try:
+            self._passed = await self._thread.run(self._look)
+        except ServiceError:
+            self._passed = False
+        self._until = time.monotonic() + _FRESH

@@ -1,20 +1,18 @@
-"""``python -m conoid.server.reading SOCKET``: reads cases, each in a process of its own with limits.
+"""``python -m conoid.server.reading``: reads cases, each in a process of its own with limits.
 
 A body is somebody's text: what it costs to read is not known before. This program has everything loaded and forks for
-each case, so that one costs milliseconds, and a case that takes too long, or too much memory, ends its own process. It
-ends when its standard input does, with the server. One thread, since a fork copies only that.
+each case, so that one costs milliseconds, and a case that takes too long, or too much memory, ends its own process. Its
+standard input is a socket, which brings a connection for each case, and ends with the server. One thread, since a fork
+copies only that.
 """
 
 import os
 import resource
-import select
 import signal
 import socket
 import sys
 import traceback
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
-from pathlib import Path
+from contextlib import suppress
 from typing import Any
 
 import msgspec
@@ -27,15 +25,15 @@ from conoid.cases.schema import Case
 from . import limits
 from .limits import Limits
 
-CPU, WALL, MEMORY = 5, 60, 1 << 30
+CPU, WALL, MEMORY = 5, 20, 1 << 30
 """s of CPU time, s on the clock, and bytes of memory that a case may take to be read. Chosen: the largest shipped case
 takes 0.1 s and 100 MB; a machine may be busy."""
 _NICE = 5
 """Steps of priority below the server, which goes on answering. Chosen."""
 _SHIPPED = "demo"
 """Read once before all others. Chosen: small, with a material of the library."""
-_BACKLOG = 128
-"""Connections that wait. Chosen: more than are let in at a time."""
+PID = 4
+"""Bytes of the number of a process, which it sends first."""
 
 
 class Question(msgspec.Struct, frozen=True, kw_only=True):
@@ -117,34 +115,27 @@ def _text(body: bytes) -> str:
 # The process ----------------------------------------------------------------------------------------------------------
 
 
-def main(path: str) -> int:
-    """Answers until standard input ends."""
+def main() -> int:
+    """Answers until standard input ends. Says that it is ready by one byte."""
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(_NICE)
     _warm()
-    with socket.socket(socket.AF_UNIX) as listener:
-        with address(Path(path)) as here:
-            listener.bind(here)
-        listener.listen(_BACKLOG)
-        print("ready", flush=True)
-        while listener in select.select([listener, sys.stdin], [], [])[0]:
-            connection, _ = listener.accept()
-            with connection:
-                if os.fork() == 0:
-                    _child(connection)
-    _tidy(Path(path))
+    with socket.socket(fileno=sys.stdin.fileno()) as control:
+        control.send(b"r")
+        while _next(control):
+            pass
     return 0
 
 
-@contextmanager
-def address(place: Path) -> Iterator[str]:
-    """Of the socket at ``place``, whose own path may have more than the 107 bytes that fit."""
-    folder = os.open(place.parent, os.O_PATH)
-    try:
-        yield f"/proc/self/fd/{folder}/{place.name}"
-    finally:
-        os.close(folder)
+def _next(control: socket.socket) -> bool:
+    """One case; False where there is none any more. A process that cannot be made is an empty answer."""
+    told, descriptors, _, _ = socket.recv_fds(control, 1, 1)
+    for descriptor in descriptors:
+        with socket.socket(fileno=descriptor) as connection, suppress(OSError):
+            if os.fork() == 0:
+                _child(connection)
+    return bool(told)
 
 
 def _warm() -> None:
@@ -154,18 +145,12 @@ def _warm() -> None:
     assert told.reading is not None, told
 
 
-def _tidy(place: Path) -> None:
-    """Removes the socket, and the folder where it was alone there: a server that was killed does not."""
-    with suppress(OSError):
-        place.unlink(missing_ok=True)
-        place.parent.rmdir()
-
-
 def _child(connection: socket.socket) -> None:
     """One case; leaves without the ceremonies of an interpreter, which belong to the parent."""
     code = 1
     try:
         _limit()
+        connection.sendall(os.getpid().to_bytes(PID))
         question = msgspec.msgpack.decode(_received(connection), type=Question)
         connection.sendall(msgspec.msgpack.encode(read(question)))
         code = 0
@@ -189,4 +174,4 @@ def _received(connection: socket.socket) -> bytes:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1]))
+    sys.exit(main())

@@ -6,10 +6,12 @@ from typing import Annotated
 from fastapi import Depends, Request
 
 from .bell import Bell
+from .crowd import Crowd
+from .download import Downloads
 from .farewells import Farewells
 from .history import Histories
 from .keeper import Keeper
-from .reader import Turns
+from .lanes import Lanes
 from .readiness import Readiness
 from .settings import Settings
 from .store import Store
@@ -31,9 +33,14 @@ class Service:
     desk: Desk
     histories: Histories
     readiness: Readiness
-    turns: Turns
-    sweep_turns: Turns
-    """Of sweeps, each of which reads for seconds: nobody who hands in a run waits for them."""
+    crowd: Crowd
+    downloads: Downloads
+    lanes: Lanes
+    """For the disk and the database."""
+    readers: Lanes
+    """For cases that are read."""
+    sweepers: Lanes
+    """For sweeps, each of which is read for seconds: nobody who hands in a run waits for them."""
     sweeps: Sweeps
     keeper: Keeper
     farewells: Farewells

@@ -178,9 +178,10 @@ class SweepLine(msgspec.Struct, kw_only=True):
 
 
 class SweepPage(msgspec.Struct, kw_only=True):
-    """Own sweeps, newest first."""
+    """Own sweeps, newest first, and the ``before`` of the following page; null on the last."""
 
     sweeps: list[SweepLine]
+    next: str | None
 
 
 class SweepPoint(msgspec.Struct, kw_only=True):

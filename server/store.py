@@ -1,9 +1,9 @@
-"""The server's tables: runs, idempotency keys, tokens. SQLite by default, PostgreSQL by URL.
+"""The server's tables: runs, labels, idempotency keys, tokens. SQLite by default, PostgreSQL by URL.
 
-Runs and keys are an index over the runs' folders and can be rebuilt from them; tokens live here only.
+Runs, labels and keys are an index over the runs' folders and can be rebuilt from them; tokens live here only.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
@@ -43,6 +43,16 @@ _keys = sa.Table(
     sa.Column("run", sa.String(22), nullable=False),
     sa.UniqueConstraint("owner", "key"),
 )
+_labels = sa.Table(
+    "labels",
+    _meta,
+    sa.Column("run", sa.String(22), nullable=False),
+    sa.Column("name", sa.String(63), nullable=False),
+    sa.Column("owner", sa.String(64), nullable=False),
+    sa.Column("value", sa.String(200), nullable=False),
+    sa.PrimaryKeyConstraint("run", "name"),
+    sa.Index("runs_of_label", "owner", "name", "value", "run"),
+)
 _tokens = sa.Table(
     "tokens",
     _meta,
@@ -56,6 +66,8 @@ _tokens = sa.Table(
 _BUSY = 2000
 """ms that SQLite waits for another process to let go. Chosen: longer than any transaction of this server takes, shorter
 than what a caller waits for."""
+_AT_ONCE = 500
+"""Ids in one statement. Chosen: SQLite takes 999 in its older versions."""
 _OPEN = [state.value for state in State if not state.final]
 
 
@@ -82,6 +94,8 @@ class Store:
         """Opens the database and makes its tables where they are missing. Raises StoreError."""
         try:
             self._engine = _engine(url)
+            self.unlabelled = not sa.inspect(self._engine).has_table(_labels.name)
+            """Whether the labels of all runs are to be read from their folders: the database is new, or an old one."""
             _meta.create_all(self._engine)
         except (SQLAlchemyError, ImportError) as error:
             failure = StoreError(f"the database cannot be opened: {str(error).splitlines()[0]}")
@@ -104,13 +118,36 @@ class Store:
 
     # Runs -------------------------------------------------------------------------------------------------------------
 
-    def add(self, run: Run, key: str | None) -> None:
-        """A run, and the idempotency key that made it; adding it again changes nothing but its state."""
+    def add(self, run: Run, key: str | None, labels: Mapping[str, str] | None = None) -> None:
+        """A run, its labels, and the idempotency key that made it; adding it again changes its state and labels."""
         known = sa.select(_keys.c.run).where(_keys.c.owner == run.owner, _keys.c.key == key)
         with self._engine.begin() as connection:
             self._put(connection, run)
             if key is not None and connection.execute(known).first() is None:
                 connection.execute(sa.insert(_keys).values(owner=run.owner, key=key, run=run.id))
+            self._label(connection, run, labels or {})
+
+    def relabel(self, run: Run, labels: Mapping[str, str]) -> None:
+        """The labels of a run as they are now."""
+        with self._engine.begin() as connection:
+            self._label(connection, run, labels)
+
+    @staticmethod
+    def _label(connection: sa.Connection, run: Run, labels: Mapping[str, str]) -> None:
+        connection.execute(sa.delete(_labels).where(_labels.c.run == run.id))
+        if labels:
+            rows = [{"run": run.id, "name": name, "owner": run.owner, "value": labels[name]} for name in labels]
+            connection.execute(sa.insert(_labels), rows)
+
+    def labels(self, run_ids: Sequence[str]) -> dict[str, dict[str, str]]:
+        """The labels of some runs, by their ids."""
+        found: dict[str, dict[str, str]] = {run_id: {} for run_id in run_ids}
+        with self._engine.connect() as connection:
+            for some in _parts(run_ids):
+                rows = connection.execute(sa.select(_labels).where(_labels.c.run.in_(some)))
+                for run_id, name, _, value in rows:
+                    found[run_id][name] = value
+        return found
 
     def save(self, run: Run) -> None:
         """The run as it is now."""
@@ -134,13 +171,27 @@ class Store:
             row = connection.execute(sa.select(_runs).where(_runs.c.id == run_id)).mappings().first()
         return None if row is None else _run(row)
 
-    def page(self, owner: str, states: Sequence[State], before: str | None, limit: int) -> list[Run]:
-        """At most ``limit`` runs of ``owner``, newest first, older than the run ``before``; all states when none."""
+    def some(self, run_ids: Sequence[str]) -> dict[str, Run]:
+        """Those of the runs that are known, whoever owns them, by their ids."""
+        with self._engine.connect() as connection:
+            rows = (connection.execute(sa.select(_runs).where(_runs.c.id.in_(some))) for some in _parts(run_ids))
+            return {row["id"]: _run(row) for found in rows for row in found.mappings()}
+
+    def page(
+        self, owner: str, states: Sequence[State], before: str | None, limit: int,
+        labels: Mapping[str, str] | None = None,
+    ) -> list[Run]:  # fmt: skip
+        """At most ``limit`` runs of ``owner``, newest first, older than the run ``before``; all states when none; those
+        that have all ``labels``.
+        """
         query = sa.select(_runs).where(_runs.c.owner == owner).order_by(_runs.c.id.desc()).limit(limit)
         if states:
             query = query.where(_runs.c.state.in_([state.value for state in states]))
         if before is not None:
             query = query.where(_runs.c.id < before)
+        for name, value in (labels or {}).items():
+            same = (_labels.c.owner == owner, _labels.c.name == name, _labels.c.value == value)
+            query = query.where(_runs.c.id.in_(sa.select(_labels.c.run).where(*same)))
         with self._engine.connect() as connection:
             return [_run(row) for row in connection.execute(query).mappings()]
 
@@ -206,6 +257,11 @@ class Store:
         query = sa.update(_tokens).where(_tokens.c.id == token_id, _tokens.c.revoked.is_(False)).values(revoked=True)
         with self._engine.begin() as connection:
             return connection.execute(query).rowcount == 1
+
+
+def _parts(items: Sequence[str]) -> Iterator[Sequence[str]]:
+    """As many at a time as fit into one statement."""
+    return (items[n : n + _AT_ONCE] for n in range(0, len(items), _AT_ONCE))
 
 
 def _run(row: sa.RowMapping) -> Run:

@@ -9,8 +9,6 @@ import time
 from collections.abc import AsyncIterator
 from pathlib import Path
 
-from starlette.concurrency import run_in_threadpool
-
 from .auth import Pass
 from .journal import Line, Tail
 from .service import Service
@@ -34,7 +32,7 @@ async def events(service: Service, may: Pass, run_id: str, path: Path, after: in
         while not service.bell.closed and await may.holds():
             listener.clear()
             over = not service.supervisor.is_open(run_id)
-            lines = await run_in_threadpool(tail.read)
+            lines = await service.lanes.run(tail.read)
             if lines:
                 yield b"".join(map(event, lines))
                 silent = time.monotonic()

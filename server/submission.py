@@ -159,7 +159,7 @@ class Desk:
             runs = self._settings.runs
             fill = partial(restarts.fill, runs / wishes.restart) if wishes.restart else None
             folder.create(runs, made, body, reading.resolved, fill)
-            self._store.add(run, key)
+            self._store.add(run, key, made.labels)
         except OSError as error:
             folder.discard(self._settings.runs, run_id)
             raise ServiceError(507, "storage", f"the run cannot be kept: {error.strerror}", retryable=True) from error

@@ -2,6 +2,7 @@
 
 import base64
 import hashlib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -63,18 +64,8 @@ def outcome(path: Path) -> Outcome | None:
         return None
 
 
-def labels(service: Service, run: Run) -> dict[str, str]:
-    """Those it was submitted with; none where the folder of the run has been removed or damaged."""
-    path = service.settings.runs / run.id
-    made = _submission(path)
-    if made is None:
-        return {}
-    told = pins.told(path)
-    return {**made.labels, "keep": told} if told else made.labels
-
-
-def brief(service: Service, run: Run) -> dict[str, Any]:
-    """A run's line in a list."""
+def brief(service: Service, run: Run, labels: Mapping[str, str] | None = None) -> dict[str, Any]:
+    """A run's line in a list; its labels are read where they are not given."""
     return {
         "id": run.id,
         "owner": run.owner,
@@ -87,9 +78,15 @@ def brief(service: Service, run: Run) -> dict[str, Any]:
         "submitted": run.submitted,
         "started": run.started or None,
         "finished": run.finished or None,
-        "labels": labels(service, run),
+        "labels": pins.labels(service.settings.runs / run.id) if labels is None else labels,
         "url": f"/v1/runs/{run.id}",
     }
+
+
+def briefs(service: Service, runs: Sequence[Run]) -> list[dict[str, Any]]:
+    """Lines of a list, as the runs are now; the labels from the database, so that no file is read."""
+    labels = service.store.labels([run.id for run in runs])
+    return [brief(service, service.supervisor.current(run.id) or run, labels[run.id]) for run in runs]
 
 
 def to_cursor(run: Run) -> str:

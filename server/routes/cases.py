@@ -1,10 +1,10 @@
 """Cases: the check before anything runs, and the gallery that comes with Conoid."""
 
 import json
+from functools import cache
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Response
-from starlette.concurrency import run_in_threadpool
 
 from conoid.cases import reference
 from conoid.cases.load import CaseError, read_case, shipped
@@ -12,6 +12,7 @@ from conoid.cases.load import CaseError, read_case, shipped
 from .. import openapi
 from ..auth import Reader, Submitter
 from ..errors import entry, not_found
+from ..lanes import blocking
 from ..service import ServiceOf
 from .runs import Body
 
@@ -27,8 +28,7 @@ async def validate(
 ) -> dict[str, Any]:
     """Whether the case could be submitted: every problem at once, or warnings, estimate, the case with all defaults."""
     try:
-        async with service.turns.turn(identity.owner):
-            reading = await run_in_threadpool(service.desk.read, body, content_type)
+        reading = await service.readers.run(service.desk.read, body, content_type)
     except CaseError as error:
         return {"valid": False, "problems": [entry(problem) for problem in error.problems]}
     odd = [entry(doubt) for doubt in reading.doubts]
@@ -37,27 +37,40 @@ async def validate(
 
 
 @router.get("/v1/case.schema.json")
-def schema() -> Response:
+@blocking
+def schema(service: ServiceOf) -> Response:
     """The JSON schema of a case: the file that the first line of a shipped case names. Asks for no token."""
-    return Response(reference.schema_text(), media_type="application/schema+json")
+    return Response(_schema(), media_type="application/schema+json")
 
 
 @router.get("/v1/cases")
-def gallery(identity: Reader) -> dict[str, Any]:
+@blocking
+def gallery(service: ServiceOf, identity: Reader) -> Response:
     """The shipped cases."""
-    cases = {name: read_case(path) for name, path in shipped().items()}
-    return {
-        "cases": [
-            {"name": name, "title": case.title, "description": case.description, "url": f"/v1/cases/{name}"}
-            for name, case in cases.items()
-        ]
-    }
+    return Response(_gallery(), media_type="application/json")
 
 
 @router.get("/v1/cases/{name}")
-def shipped_case(identity: Reader, name: str) -> Response:
+@blocking
+def shipped_case(service: ServiceOf, identity: Reader, name: str) -> Response:
     """The TOML of a shipped case, ready to be changed and submitted."""
     path = shipped().get(name)
     if path is None:
         raise not_found(f"case {name[:80]!r}")
     return Response(path.read_bytes(), media_type="application/toml")
+
+
+@cache
+def _schema() -> str:
+    return reference.schema_text()
+
+
+@cache
+def _gallery() -> bytes:
+    """Made once: what comes with Conoid does not change while a server runs."""
+    cases = {name: read_case(path) for name, path in shipped().items()}
+    entries = [
+        {"name": name, "title": case.title, "description": case.description, "url": f"/v1/cases/{name}"}
+        for name, case in cases.items()
+    ]
+    return json.dumps({"cases": entries}).encode()

@@ -2,36 +2,42 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Header, Query, Response
+from fastapi import APIRouter, Header, Query, Request, Response
 from fastapi.responses import StreamingResponse
-from starlette.concurrency import run_in_threadpool
 
 from conoid.cases import layout
 
 from .. import journal, stream
 from ..auth import Pass, Reader
+from ..crowd import place_of
 from ..errors import ServiceError
+from ..lanes import blocking
 from ..service import ServiceOf
 from .runs import OwnedRun
 
 router = APIRouter()
 After = Annotated[int, Query(ge=0, description="the seq of the last event that is known")]
 
+_PAGE = 1 << 20
+"""Bytes of the events of one answer, or one event. Chosen: the answers of a user are in memory until they are sent."""
 Seconds = Annotated[
     float | None, Query(ge=0, le=86400, allow_inf_nan=False, description="s after which the answer ends; none: never")
 ]
 
 
 @router.get("/v1/runs/{run_id}/events")
+@blocking
 def replay(
     run: OwnedRun, service: ServiceOf, after: After = 0, limit: Annotated[int, Query(ge=1, le=10_000)] = 1000
 ) -> Response:
-    """The events with ``seq`` above ``after``, oldest first; ``last`` is the seq to go on from, ``more`` says whether
-    there are more already."""
+    """The events with ``seq`` above ``after``, oldest first, ``limit`` at most and about 1 MiB; ``last`` is the seq to
+    go on from, ``more`` says whether there are more already."""
     path = service.settings.runs / run.id / layout.JOURNAL
     found: list[journal.Line] = []
+    size = 0
     for line in journal.lines(path, after):
-        if len(found) == limit:
+        size += len(line.raw)
+        if len(found) == limit or (found and size > _PAGE):
             return _page(found, after, more=True)
         found.append(line)
     return _page(found, after, more=False)
@@ -50,6 +56,7 @@ def _page(found: list[journal.Line], after: int, *, more: bool) -> Response:
 
 @router.get("/v1/runs/{run_id}/stream")
 async def follow(
+    request: Request,
     run: OwnedRun,
     service: ServiceOf,
     identity: Reader,
@@ -69,7 +76,8 @@ async def follow(
     path = service.settings.runs / run.id / layout.JOURNAL
     if not service.supervisor.is_open(run.id):
         tail = journal.Tail(path, after)
-        if not await run_in_threadpool(tail.read):
+        if not await service.lanes.run(tail.read):
             return Response(status_code=204)
+    place_of(request).lengthen()
     body = stream.events(service, Pass(service, identity, seconds), run.id, path, after)
     return StreamingResponse(body, media_type=stream.MEDIA_TYPE, headers=stream.HEADERS)

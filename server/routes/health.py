@@ -7,6 +7,7 @@ from fastapi.responses import JSONResponse
 from prometheus_client import CONTENT_TYPE_PLAIN_0_0_4
 
 from ..auth import Identity, requires
+from ..lanes import blocking
 from ..metrics import Metrics
 from ..service import ServiceOf
 
@@ -14,23 +15,24 @@ router = APIRouter()
 
 
 @router.get("/healthz")
-@router.head("/healthz", include_in_schema=False)
-def alive() -> dict[str, str]:
-    """The process answers."""
+async def alive() -> dict[str, str]:
+    """The process answers, whatever it waits for."""
     return {"status": "ok"}
 
 
 @router.get("/readyz")
-@router.head("/readyz", include_in_schema=False)
-def ready(service: ServiceOf) -> Response:
+async def ready(service: ServiceOf) -> Response:
     """Runs can be taken and looked after: 200, or 503 with what is wrong."""
-    checks = {"supervisor": service.supervisor.alive, **service.readiness.checks()}
+    checks = {"supervisor": service.supervisor.alive, **await service.readiness.checks()}
     body: dict[str, Any] = {"status": "ok" if all(checks.values()) else "unavailable", "checks": checks}
     return JSONResponse(body, 200 if all(checks.values()) else 503)
 
 
 @router.get("/metrics")
-def metrics(request: Request, identity: Annotated[Identity, Depends(requires("metrics"))]) -> Response:
+@blocking
+def metrics(
+    request: Request, service: ServiceOf, identity: Annotated[Identity, Depends(requires("metrics"))]
+) -> Response:
     """Runs, slots, answers and their times in the text form that Prometheus reads."""
     found: Metrics = request.app.state.metrics
     return Response(found.text(), media_type=CONTENT_TYPE_PLAIN_0_0_4)

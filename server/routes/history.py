@@ -2,22 +2,26 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Header, Query, Response
 
 from conoid.cases import layout
 
-from .. import series
+from .. import download, series
+from ..lanes import blocking
 from ..service import ServiceOf
 from .runs import OwnedRun
 
 router = APIRouter()
+Known = Annotated[str, Header(alias="If-None-Match")]
 
 
 @router.get("/v1/runs/{run_id}/history")
+@blocking
 def history(
     run: OwnedRun,
     service: ServiceOf,
     points: Annotated[int, Query(ge=1, le=4096, description="reports, at most")] = 1000,
+    if_none_match: Known = "",
 ) -> Response:
     """The reports of a run, thinned to ``points``: ``series`` by name over ``t`` (step, dt, counts, imbalance, each
     term of the energy, and as ``share_...`` the phases of the step), ``ranks`` with CPU seconds by phase and rank, all
@@ -26,6 +30,4 @@ def history(
     found = service.histories.of(service.settings.runs / run.id / layout.JOURNAL)
     with found.lock:
         found.catch_up()
-        return Response(
-            series.body(found, points), headers={"Cache-Control": "no-store"}, media_type="application/json"
-        )
+        return download.tagged(series.body(found, points), if_none_match)

@@ -1,5 +1,6 @@
 """What the ranks wrote for people."""
 
+import time
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Annotated
@@ -7,12 +8,12 @@ from typing import Annotated
 from fastapi import APIRouter, Request, Response
 from fastapi import Path as PathParameter
 from fastapi.responses import StreamingResponse
-from starlette.concurrency import run_in_threadpool
 
 from conoid.cases import layout
 
-from .. import download
+from .. import download, stream
 from ..auth import Pass, Reader
+from ..crowd import place_of
 from ..errors import ServiceError
 from ..service import Service, ServiceOf
 from .events import Seconds
@@ -21,14 +22,15 @@ from .runs import OwnedRun
 router = APIRouter()
 _CHUNK = 1 << 16
 """Bytes of a log that are sent at once. Chosen."""
+ALIVE = b"\0"
+"""Is sent while a followed log is silent, so that proxies keep the connection; no byte of a log that is followed."""
 _LOOK = 0.25
 """s between two looks at a log that is being followed."""
 Rank = Annotated[str, PathParameter(pattern=r"^(\d{1,5}|launcher)$", description="a rank, or 'launcher'")]
 
 
-@router.head("/v1/runs/{run_id}/logs/{rank}", include_in_schema=False)
 @router.get("/v1/runs/{run_id}/logs/{rank}")
-def log(
+async def log(
     request: Request,
     run: OwnedRun,
     service: ServiceOf,
@@ -37,29 +39,36 @@ def log(
     follow: bool = False,
     seconds: Seconds = None,
 ) -> Response:
-    """The log of one rank, or of the launcher; Range as for files. ``follow`` goes on until the run has ended."""
+    """The log of one rank, or of the launcher; Range as for files. ``follow`` goes on until the run has ended; after
+    each 15 s without news a byte 0 is sent, which is no part of the log: text has none.
+    """
     folder = service.settings.runs / run.id
     relative = f"{layout.LOGS}/{layout.LAUNCHER_LOG if rank == 'launcher' else f'rank-{rank}.log'}"
     if not follow:
-        return download.respond(request, folder, relative)
+        return await service.downloads.respond(request, folder, relative, run.state.final)
     if rank != "launcher" and int(rank) >= run.ranks:
         raise ServiceError(404, "not_found", f"rank {rank}: the run has ranks 0 to {run.ranks - 1}")
-    may = Pass(service, identity, seconds)
-    return StreamingResponse(_follow(service, may, run.id, folder, relative), media_type="text/plain; charset=utf-8")
+    place_of(request).lengthen()
+    body = _follow(service, Pass(service, identity, seconds), run.id, folder, relative)
+    return StreamingResponse(body, media_type="text/plain; charset=utf-8", headers=stream.HEADERS)
 
 
 async def _follow(service: Service, may: Pass, run_id: str, folder: Path, relative: str) -> AsyncIterator[bytes]:
-    """The log's bytes as they come; it need not exist yet."""
-    offset = 0
+    """The log's bytes as they come, without bytes 0, and such a byte while it is silent; it need not exist yet."""
+    offset, spoke = 0, time.monotonic()
     with service.bell.listen(run_id) as listener:
         while await may.holds():
             over = service.bell.closed or not service.supervisor.is_open(run_id)
-            chunk = await run_in_threadpool(_read, folder, relative, offset)
+            chunk = await service.lanes.run(_read, folder, relative, offset)
             offset += len(chunk)
-            if chunk:
-                yield chunk
-            elif over:
+            if text := chunk.replace(ALIVE, b""):
+                yield text
+                spoke = time.monotonic()
+            elif over and not chunk:
                 return
+            elif time.monotonic() - spoke >= stream.KEEP_ALIVE:
+                yield ALIVE
+                spoke = time.monotonic()
             else:
                 listener.clear()
                 await listener.wait(_LOOK)

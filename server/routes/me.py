@@ -6,6 +6,7 @@ from fastapi import APIRouter, Depends, Request
 
 from ..auth import Identity, identify
 from ..errors import ServiceError
+from ..lanes import blocking
 from ..limits import BODY
 from ..service import Service, ServiceOf
 from ..settings import loopback
@@ -15,6 +16,7 @@ router = APIRouter()
 
 
 @router.get("/v1/me")
+@blocking
 def me(request: Request, service: ServiceOf, identity: Annotated[Identity, Depends(identify)]) -> dict[str, Any]:
     """Name and scopes; how to subscribe over Zenoh (null: not possible); slots, caps, quota and what is used of it."""
     caps = service.settings.caps

@@ -9,7 +9,6 @@ from typing import Annotated, Any
 import msgspec
 from fastapi import APIRouter, Depends, Header, Query, Request, Response
 from fastapi.responses import JSONResponse
-from starlette.concurrency import run_in_threadpool
 
 from conoid.cases import layout
 from conoid.cases.load import CaseError
@@ -18,8 +17,10 @@ from conoid.cases.run import State
 
 from .. import download, folder, openapi, pins, restarts, view
 from ..auth import Identity, Pass, Reader, Submitter, unauthorized
+from ..crowd import place_of
 from ..errors import ServiceError, invalid_case, not_found
 from ..events import Run
+from ..lanes import blocking
 from ..limits import read_body
 from ..service import Service, ServiceOf
 from ..submission import Wishes, labels_of
@@ -45,14 +46,14 @@ async def submit(
 ) -> Response:
     """Takes a case as TOML or JSON. The same Idempotency-Key and body give the same run and the same answer."""
     wishes = Wishes(labels_of(label or ()), profile, priority)
-    async with service.turns.turn(identity.owner):
-        receipt = await run_in_threadpool(
-            service.desk.submit, identity.owner, body, content_type, idempotency_key, wishes
-        )
+    receipt = await service.readers.run(
+        service.desk.submit, identity.owner, body, content_type, idempotency_key, wishes
+    )
     return JSONResponse(receipt, 202, {"Location": receipt["url"]})
 
 
 @router.get("/v1/runs")
+@blocking
 def page(
     service: ServiceOf,
     identity: Reader,
@@ -65,17 +66,17 @@ def page(
     on the last.
     """
     before = None if cursor is None else view.from_cursor(cursor)
-    pages = _pages(service, identity.owner, _states(state), before, limit + 1)
-    wanted = labels_of(label or ()).items()
-    runs = list(islice((run for run in pages if not wanted or wanted <= view.labels(service, run).items()), limit + 1))
+    pages = _pages(service, identity.owner, _states(state), before, limit + 1, labels_of(label or ()))
+    runs = list(islice(pages, limit + 1))
     following = view.to_cursor(runs[limit - 1]) if len(runs) > limit else None
-    now = (service.supervisor.current(run.id) or run for run in runs[:limit])
-    return {"runs": [view.brief(service, run) for run in now], "next": following}
+    return {"runs": view.briefs(service, runs[:limit]), "next": following}
 
 
-def _pages(service: Service, owner: str, states: list[State], before: str | None, size: int) -> Iterator[Run]:
+def _pages(
+    service: Service, owner: str, states: list[State], before: str | None, size: int, labels: dict[str, str]
+) -> Iterator[Run]:
     """The runs of an owner that have not been removed, newest first, so many at a time from the store."""
-    while some := service.store.page(owner, states, before, size):
+    while some := service.store.page(owner, states, before, size, labels):
         yield from (run for run in some if run.id not in service.farewells)
         if len(some) < size:
             return
@@ -90,6 +91,7 @@ def _states(text: str | None) -> list[State]:
         raise ServiceError(400, "bad_parameter", f"state: {error}; allowed: {allowed}", pointer="state") from None
 
 
+@blocking
 def owned_run(run_id: str, service: ServiceOf, identity: Reader) -> Run:
     """The run, when it belongs to who asks. Raises ServiceError 404 alike for no run and for somebody else's."""
     return find(service, identity, run_id)
@@ -129,7 +131,9 @@ async def show(
     """The run. With ``wait``, the answer comes when its state has changed, or, when If-None-Match is sent, when
     anything has; at most so many seconds later. A run that has ended is answered at once."""
     known = request.headers.get("if-none-match")
-    first = await run_in_threadpool(view.snapshot, service, run)
+    first = await service.lanes.run(view.snapshot, service, run)
+    if wait > 0.0 and not first.state.final:
+        place_of(request).lengthen()
     latest, deadline, may = first, time.monotonic() + wait, Pass(service, identity)
     with service.bell.listen(run.id) as listener:
         while not (latest.state.final or service.bell.closed):
@@ -141,7 +145,7 @@ async def show(
             listener.clear()
             if not await may.holds():
                 raise unauthorized()
-            latest = await run_in_threadpool(lambda: view.snapshot(service, find(service, identity, run.id)))
+            latest = await service.lanes.run(lambda: view.snapshot(service, find(service, identity, run.id)))
     headers = {"ETag": latest.etag, "Cache-Control": "private, no-cache"}
     if known is not None and download.is_known(latest.etag, known):
         return Response(status_code=304, headers=headers)
@@ -149,6 +153,7 @@ async def show(
 
 
 @router.delete("/v1/runs/{run_id}", status_code=204)
+@blocking
 def purge(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
     """Removes everything of a run that has ended; from then on it is answered with 410. There is no way back."""
     run = find(service, identity, run_id)
@@ -164,12 +169,14 @@ def purge(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
 
 
 @router.post("/v1/runs/{run_id}:keep")
+@blocking
 def keep(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
     """Keeps the run for good: no rule of the site removes it, only its owner does."""
     return _pin(service, find(service, identity, run_id), True)
 
 
 @router.post("/v1/runs/{run_id}:release")
+@blocking
 def release(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
     """The rules of the site may remove the run again, also one that was handed in with the label ``keep``."""
     return _pin(service, find(service, identity, run_id), False)
@@ -180,10 +187,12 @@ def _pin(service: Service, run: Run, keep: bool) -> Response:
         pins.pin(service.settings.runs / run.id, keep)
     except OSError as error:
         raise ServiceError(507, "storage", f"not recorded: {error.strerror}", retryable=True) from error
+    service.store.relabel(run, pins.labels(service.settings.runs / run.id))
     return Response(view.snapshot(service, run).body, media_type="application/json")
 
 
 @router.post("/v1/runs/{run_id}:cancel", status_code=202)
+@blocking
 def cancel(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
     """Stops a run: at its next step, or hard when it does not. Asking again changes nothing."""
     run = find(service, identity, run_id)
@@ -212,10 +221,9 @@ async def restart(
 ) -> Response:
     """A new run of the same case that goes on from the newest checkpoint of this one, and ends with the same answer.
     This one stays as it is."""
-    run = await run_in_threadpool(find, service, identity, run_id)
+    run = await service.lanes.run(find, service, identity, run_id)
     wishes = Wishes({restarts.LABEL: run.id}, profile, priority, run.id)
-    async with service.turns.turn(identity.owner):
-        receipt = await run_in_threadpool(_restarted, service, run, ranks, idempotency_key, wishes)
+    receipt = await service.readers.run(_restarted, service, run, ranks, idempotency_key, wishes)
     return JSONResponse(receipt, 202, {"Location": receipt["url"]})
 
 
@@ -232,12 +240,14 @@ def _restarted(service: Service, run: Run, ranks: int | None, key: str | None, w
 
 
 @router.post("/v1/runs/{run_id}:checkpoint", status_code=202)
+@blocking
 def checkpoint(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
     """Asks the worker for a checkpoint; the journal tells of it when it is on disk. Asking again changes nothing."""
     return _ask(service, find(service, identity, run_id), layout.CHECKPOINT_REQUEST, "keeps one")
 
 
 @router.post("/v1/runs/{run_id}:snapshot", status_code=202)
+@blocking
 def snapshot(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
     """Asks the worker for a snapshot of the fragments; the journal tells of it when it is on disk, with the cause
     "asked for". Asking again before then changes nothing."""

@@ -1,10 +1,9 @@
 """Snapshots of the fragments of a run (docs/snapshots.md)."""
 
-import hashlib
 from typing import Annotated, Any
 
 import msgspec
-from fastapi import APIRouter, Header, Response
+from fastapi import APIRouter, Request, Response
 from fastapi import Path as PathParameter
 
 from conoid.cases import layout
@@ -13,11 +12,12 @@ from conoid.cases.messages import Snapshot
 from .. import download, series
 from ..errors import not_found
 from ..events import Run
+from ..lanes import blocking
 from ..service import Service, ServiceOf
+from .history import Known
 from .runs import OwnedRun
 
 router = APIRouter()
-Known = Annotated[str, Header(alias="If-None-Match")]
 Number = Annotated[int, PathParameter(ge=0, le=10**9, description="the number of the snapshot")]
 _TYPE = "application/octet-stream"
 _BYTES: dict[int | str, dict[str, Any]] = {
@@ -28,28 +28,26 @@ _decode = msgspec.json.Decoder(Snapshot).decode
 
 
 @router.get("/v1/runs/{run_id}/snapshots")
+@blocking
 def listing(run: OwnedRun, service: ServiceOf, if_none_match: Known = "") -> Response:
     """The snapshots that the journal tells of: n, step, t in s, bytes, triangles, fragments, sha256 and more."""
     found = service.histories.of(service.settings.runs / run.id / layout.JOURNAL)
     with found.lock:
         found.catch_up()
         body = msgspec.json.encode({"snapshots": series.listed(found)})
-    etag = f'"{hashlib.sha256(body).hexdigest()[:32]}"'
-    headers = {"ETag": etag, "Cache-Control": "private, no-cache"}
-    if download.is_known(etag, if_none_match):
-        return Response(status_code=304, headers=headers)
-    return Response(body, headers=headers, media_type="application/json")
+    return download.tagged(body, if_none_match)
 
 
 @router.get("/v1/runs/{run_id}/snapshots/{n}", responses=_BYTES, response_class=Response)
-def content(run: OwnedRun, service: ServiceOf, n: Number, if_none_match: Known = "") -> Response:
+async def content(
+    request: Request, run: OwnedRun, service: ServiceOf, n: Number, if_none_match: Known = ""
+) -> Response:
     """One snapshot, as docs/snapshots.md has it; its ETag is its sha256, and it never changes."""
-    told = _told(service, run, n)
+    told = await service.lanes.run(_told, service, run, n)
     headers = {"ETag": f'"{told.sha256}"', "Cache-Control": "private, max-age=31536000, immutable"}
     if download.is_known(headers["ETag"], if_none_match):
         return Response(status_code=304, headers=headers)
-    with download.open_inside(service.settings.runs / run.id, told.path) as file:
-        return Response(file.read(), headers=headers, media_type=_TYPE)
+    return await service.downloads.whole(request, service.settings.runs / run.id, told.path, headers, _TYPE)
 
 
 def _told(service: Service, run: Run, n: int) -> Snapshot:

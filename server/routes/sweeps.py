@@ -6,10 +6,9 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, Header, Response
+from fastapi import APIRouter, Depends, Header, Query, Response
 from fastapi.responses import JSONResponse
 from msgspec import structs
-from starlette.concurrency import run_in_threadpool
 
 from conoid.cases.outcome import Outcome, known
 
@@ -17,6 +16,7 @@ from .. import openapi, view
 from ..auth import Identity, Reader, Submitter
 from ..errors import not_found
 from ..events import Run
+from ..lanes import blocking
 from ..limits import read_body
 from ..service import Service, ServiceOf
 from ..sweeps import Plan
@@ -31,25 +31,34 @@ async def submit(
     service: ServiceOf, identity: Submitter, body: Body, idempotency_key: Annotated[str | None, Header()] = None
 ) -> Response:
     """Takes a case and the points at which it is to be run; all runs are accepted, or none."""
-    async with service.sweep_turns.turn(identity.owner):
-        plan = await run_in_threadpool(service.sweeps.submit, identity.owner, body, idempotency_key)
-    shown = await run_in_threadpool(_shown, service, plan)
+    plan = await service.sweepers.run(service.sweeps.submit, identity.owner, body, idempotency_key)
+    shown = await service.lanes.run(_shown, service, plan)
     return JSONResponse(shown, 202, {"Location": f"/v1/sweeps/{plan.id}"})
 
 
 @router.get("/v1/sweeps")
-def page(service: ServiceOf, identity: Reader) -> dict[str, Any]:
-    """Own sweeps, newest first."""
-    return {"sweeps": [_brief(service, plan) for plan in service.sweeps.of(identity.owner)]}
+@blocking
+def page(
+    service: ServiceOf,
+    identity: Reader,
+    before: Annotated[str, Query(description="the id of a sweep: those older than it")] = "",
+    limit: Annotated[int, Query(ge=1, le=500)] = 50,
+) -> dict[str, Any]:
+    """Own sweeps, newest first; ``next`` is the ``before`` of the following page, null on the last."""
+    plans = [plan for plan in service.sweeps.of(identity.owner) if not before or plan.id < before]
+    following = plans[limit - 1].id if len(plans) > limit else None
+    return {"sweeps": [_brief(service, plan) for plan in plans[:limit]], "next": following}
 
 
 @router.get("/v1/sweeps/{sweep_id}")
+@blocking
 def show(service: ServiceOf, identity: Reader, sweep_id: str) -> dict[str, Any]:
     """The sweep: how many of its runs are in each state, and each point with its run."""
     return _shown(service, _find(service, identity, sweep_id))
 
 
 @router.get("/v1/sweeps/{sweep_id}/table")
+@blocking
 def table(service: ServiceOf, identity: Reader, sweep_id: str) -> Response:
     """A line a point as CSV: what was changed, the state of the run, and its results as far as it has any."""
     plan = _find(service, identity, sweep_id)
@@ -63,8 +72,12 @@ def table(service: ServiceOf, identity: Reader, sweep_id: str) -> Response:
 
 
 @router.post("/v1/sweeps/{sweep_id}:cancel", status_code=202)
-def cancel(service: ServiceOf, identity: Submitter, sweep_id: str) -> dict[str, Any]:
+async def cancel(service: ServiceOf, identity: Submitter, sweep_id: str) -> dict[str, Any]:
     """Cancels every run of the sweep that has not ended. Asking again changes nothing."""
+    return await service.sweepers.run(_cancelled, service, identity, sweep_id)
+
+
+def _cancelled(service: Service, identity: Identity, sweep_id: str) -> dict[str, Any]:
     plan = _find(service, identity, sweep_id)
     for run_id in plan.runs:
         if service.supervisor.is_open(run_id):
@@ -81,7 +94,8 @@ def _find(service: Service, identity: Identity, sweep_id: str) -> Plan:
 
 def _pairs(service: Service, plan: Plan) -> list[tuple[dict[str, Any], Run]]:
     """Each point with its run; without those of which the server knows nothing any more."""
-    found = (service.supervisor.current(run_id) or service.store.get(run_id) for run_id in plan.runs)
+    kept = service.store.some(plan.runs)
+    found = (service.supervisor.current(run_id) or kept.get(run_id) for run_id in plan.runs)
     return [(point, run) for point, run in zip(plan.points, found, strict=False) if run is not None]
 
 
@@ -99,7 +113,8 @@ def _headed(plan: Plan, pairs: Sequence[tuple[dict[str, Any], Run]]) -> dict[str
 
 def _shown(service: Service, plan: Plan) -> dict[str, Any]:
     pairs = _pairs(service, plan)
-    points = [{"values": point, "run": view.brief(service, run)} for point, run in pairs]
+    lines = view.briefs(service, [run for _, run in pairs])
+    points = [{"values": point, "run": line} for (point, _), line in zip(pairs, lines, strict=True)]
     return {**_headed(plan, pairs), "points": points}
 
 

@@ -10,7 +10,8 @@ import pytest
 from starlette.requests import Request
 from starlette.types import Message
 
-from conoid.server.download import respond
+from conoid.server.download import Downloads
+from conoid.server.lanes import Lanes
 
 from .running import PATIENCE, Running
 
@@ -137,9 +138,6 @@ def test_nothing_from_outside(server: Running, run: str, folder: Path) -> None:
 def test_a_file_that_grows_is_sent_up_to_its_size(folder: Path) -> None:
     path = folder / "history.csv"
     path.write_bytes(b"before")
-    answer = respond(Request({"type": "http", "method": "GET", "headers": []}), folder, "history.csv")
-    with path.open("ab") as file:
-        file.write(b" and after")
     sent = []
 
     async def send(message: Message) -> None:
@@ -149,8 +147,15 @@ def test_a_file_that_grows_is_sent_up_to_its_size(folder: Path) -> None:
         await asyncio.sleep(PATIENCE)
         return {"type": "http.disconnect"}
 
-    asyncio.run(answer({"type": "http"}, receive, send))
-    assert answer.headers["content-length"] == "6"
+    async def asked() -> str:
+        request = Request({"type": "http", "method": "GET", "headers": []})
+        answer = await Downloads(Lanes(1, 1, PATIENCE)).respond(request, folder, "history.csv", ended=False)
+        with path.open("ab") as file:
+            file.write(b" and after")
+        await answer({"type": "http"}, receive, send)
+        return answer.headers["content-length"]
+
+    assert asyncio.run(asked()) == "6"
     assert b"".join(sent) == b"before"
 
 

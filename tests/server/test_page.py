@@ -76,8 +76,8 @@ def test_the_page_does_not_take_unknown_addresses_for_its_own(client: TestClient
 def test_a_route_is_there_whatever_is_asked_of_it(client: TestClient) -> None:
     """Also where the page has all other addresses."""
     for method, path, allowed in (
-        ("PUT", "/v1/runs", "GET, POST"),
-        ("HEAD", "/v1/me", "GET"),
+        ("PUT", "/v1/runs", "GET, HEAD, POST"),
+        ("DELETE", "/v1/me", "GET, HEAD"),
         ("GET", "/v1/cases:validate", "POST"),
     ):
         refused = client.request(method, path)

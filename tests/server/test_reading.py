@@ -1,19 +1,26 @@
 """What it costs to read a case: each once, in a fork that has everything loaded."""
 
+import os
+import signal
 import socket
 import subprocess
 import sys
-from pathlib import Path
+import threading
+import time
+from collections.abc import Iterator
 from typing import Any
 
 import msgspec
 import pytest
 
+from conoid.server import reader
+from conoid.server.errors import ServiceError
 from conoid.server.limits import Limits
-from conoid.server.reading import Question, address
+from conoid.server.reader import Reader
+from conoid.server.reading import Question
 from conoid.server.submission import Desk
 
-from .running import Running, case_text
+from .running import PATIENCE, Running, case_text
 from .swept import ENDS, handed_in, wish
 
 QUESTION = Question(
@@ -35,28 +42,28 @@ def child(connection):
 
 reading._child = child
 if len(sys.argv) > 1:
-    sys.exit(reading.main(sys.argv[1]))
+    sys.exit(reading.main())
 print(timed(sys.stdin.buffer.read()))
 """
 
 
-def test_a_case_finds_everything_loaded(tmp_path: Path) -> None:
+def test_a_case_finds_everything_loaded() -> None:
     """CPU time of the first fork, against that of a first case in a program of its own."""
     told = msgspec.msgpack.encode(QUESTION)
     alone = subprocess.run([sys.executable, "-c", TIMED], input=told, capture_output=True, check=True)
-    folder = tmp_path / ("long" * 30)
-    folder.mkdir()
-    place = str(folder / "socket")
-    program = subprocess.Popen([sys.executable, "-c", TIMED, place], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
-    with program, socket.socket(socket.AF_UNIX) as connection:
-        assert program.stdout is not None
-        assert program.stdout.readline() == b"ready\n"
-        with address(folder / "socket") as there:
-            connection.connect(there)
+    control, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    connection, its = socket.socketpair()
+    program = subprocess.Popen([sys.executable, "-c", TIMED, "forks"], stdin=theirs.fileno())
+    with program, control, theirs, connection, its:
+        assert control.recv(1) == b"r"
+        socket.send_fds(control, [b"c"], [its.fileno()])
+        its.close()
         connection.sendall(told)
         connection.shutdown(socket.SHUT_WR)
         seconds = float(connection.recv(100))
-        program.communicate()
+        control.close()
+        theirs.close()
+        assert program.wait(PATIENCE) == 0
     assert seconds < float(alone.stdout) / 3.0
 
 
@@ -72,3 +79,59 @@ def test_each_point_of_a_sweep_is_read_once(server: Running, monkeypatch: pytest
     assert len(read) == len(ENDS)
     for point in sweep["points"]:
         server.ann.wait_for(point["run"]["id"])
+
+
+@pytest.fixture
+def made(monkeypatch: pytest.MonkeyPatch) -> Iterator[Reader]:
+    """One that waits 0.5 s for its program."""
+    monkeypatch.setattr(reader, "_FORK", 0.5)
+    one = Reader()
+    assert one.read(QUESTION).name == "bar"
+    yield one
+    one.close()
+
+
+def program_of(one: Reader) -> int:
+    assert one._program is not None
+    return one._program._child.pid
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_program_that_has_ended_or_hangs_is_replaced(made: Reader, number: signal.Signals) -> None:
+    before = program_of(made)
+    os.kill(before, number)
+    assert made.read(QUESTION).name == "bar"
+    assert program_of(made) != before
+
+
+def test_a_program_that_cannot_be_started_is_said_in_time(made: Reader, monkeypatch: pytest.MonkeyPatch) -> None:
+    os.kill(program_of(made), signal.SIGKILL)
+    monkeypatch.setattr(sys, "executable", "/bin/false")
+    with pytest.raises(ServiceError, match="no case can be read now") as told:
+        made.read(QUESTION)
+    assert told.value.status == 503
+
+
+def test_a_case_whose_process_hangs_is_given_up_and_holds_up_no_other(
+    made: Reader, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reader, "WALL", 0.0)
+    monkeypatch.setattr(reader, "_REST", 2.0)
+    assert made._program is not None
+    connection, pid = made._program.begun()
+    os.kill(pid, signal.SIGSTOP)
+    told: list[int] = []
+
+    def ask() -> None:
+        with pytest.raises(ServiceError, match="the case cannot be read now") as error:
+            reader._answer(connection, pid, b"")
+        told.append(error.value.status)
+
+    hung = threading.Thread(target=ask)
+    hung.start()
+    assert made.read(QUESTION).name == "bar"
+    hung.join(PATIENCE)
+    assert told == [503]
+    deadline = time.monotonic() + PATIENCE
+    while os.path.exists(f"/proc/{pid}"):
+        assert time.monotonic() < deadline, "its process is left"

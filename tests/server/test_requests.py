@@ -459,7 +459,7 @@ def test_openapi_has_the_schema_of_a_case(server: Running) -> None:
     assert not ours.keys() & json_schema()["$defs"].keys(), "two shapes of one name"
 
 
-@pytest.mark.parametrize(("path", "allowed"), [("/v1/runs", "GET, POST"), ("/v1/runs/x:cancel", "POST")])
+@pytest.mark.parametrize(("path", "allowed"), [("/v1/runs", "GET, HEAD, POST"), ("/v1/runs/x:cancel", "POST")])
 def test_a_wrong_method_is_told_the_right_ones(server: Running, path: str, allowed: str) -> None:
     assert server.ann.http.put(path).headers["allow"] == allowed
 

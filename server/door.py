@@ -1,0 +1,92 @@
+"""Middleware: who asks, and whether it is the turn of the request. What a user holds is bounded here (``crowd``)."""
+
+import hashlib
+from collections import OrderedDict
+from typing import Any
+
+from sqlalchemy.exc import SQLAlchemyError
+from starlette.datastructures import Headers
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from .errors import ServiceError, database_away
+from .lanes import asking
+from .service import Service
+from .store import Token
+from .tokens import check_token
+
+ALIVE = "/healthz"
+"""Is answered at once, whatever else the server does."""
+LOCAL_OWNER = "local"
+"""Owns all runs of a server without access control."""
+_SEEN = 1000
+"""Tokens that were valid lately, of which the owner is kept. Chosen."""
+
+
+class Door:
+    """Lets requests in. The app finds the token in the state of the scope, and the place of the request."""
+
+    def __init__(self, app: ASGIApp, service: Service) -> None:
+        self._app, self._service = app, service
+        self._owners: OrderedDict[bytes, str] = OrderedDict()
+        """By hash of a token that was valid lately: in whose lane the database is asked for it again."""
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answers 429 and 503 itself where a request does not come in."""
+        if scope["type"] != "http" or scope["path"] == ALIVE:
+            await self._app(scope, receive, send)
+            return
+        began = False
+
+        async def noted(message: Message) -> None:
+            nonlocal began
+            began = True
+            await send(message)
+
+        try:
+            await self._enter(scope, receive, noted)
+        except ServiceError as error:
+            if began:
+                raise
+            await error.response()(scope, receive, send)
+
+    async def _enter(self, scope: Scope, receive: Receive, send: Send) -> None:
+        state: dict[str, Any] = scope.setdefault("state", {})
+        token = state["token"] = await self._token(scope)
+        who = self._who(scope, token)
+        asking.set(who)
+        if (connection := state.get("connection")) is not None:
+            connection.owner = token.owner if token is not None else ""
+        async with self._service.crowd.place(who) as state["place"]:
+            await self._app(scope, receive, send)
+
+    def _who(self, scope: Scope, token: Token | None) -> str:
+        if not self._service.settings.auth:
+            return LOCAL_OWNER
+        return token.owner if token is not None else _address(scope)
+
+    async def _token(self, scope: Scope) -> Token | None:
+        """The token of the request; None where it shows none that is valid. Raises ServiceError 429, 503, 507."""
+        scheme, _, text = Headers(scope=scope).get("authorization", "").partition(" ")
+        if scheme.lower() != "bearer" or not self._service.settings.auth:
+            return None
+        shown = hashlib.sha256(text.strip().encode()).digest()
+        asking.set(self._owners.get(shown) or _address(scope))
+        try:
+            token = await self._service.lanes.run(check_token, self._service.store, text.strip())
+        except SQLAlchemyError as error:
+            raise database_away(error) from error
+        self._note(shown, token)
+        return token
+
+    def _note(self, shown: bytes, token: Token | None) -> None:
+        self._owners.pop(shown, None)
+        if token is not None:
+            self._owners[shown] = token.owner
+            if len(self._owners) > _SEEN:
+                self._owners.popitem(last=False)
+
+
+def _address(scope: Scope) -> str:
+    """No name of a user: those have no blank."""
+    client = scope.get("client")
+    return f"address {client[0]}" if client else "address"

@@ -1,0 +1,26 @@
+"""HEAD is answered wherever GET is: with the same headers, at once, and without a body."""
+
+import anyio
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+
+class Heads:
+    """Middleware that asks the app for GET, and ends the answer, however long it would become, after its headers."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Passes on what is no HEAD."""
+        if scope["type"] != "http" or scope["method"] != "HEAD":
+            await self._app(scope, receive, send)
+            return
+        with anyio.CancelScope() as answer:
+
+            async def first(message: Message) -> None:
+                if message["type"] == "http.response.start" and not answer.cancel_called:
+                    await send(message)
+                    await send({"type": "http.response.body", "body": b"", "more_body": False})
+                    answer.cancel()
+
+            await self._app({**scope, "method": "GET"}, receive, first)
