@@ -68,7 +68,7 @@ _CAPS: tuple[tuple[str, Callable[[str], float], str], ...] = (
 
 def _common(parser: argparse.ArgumentParser) -> None:
     runs = os.environ.get("CONOID_RUNS", "runs")
-    parser.add_argument("--runs", type=Path, default=Path(runs), help=f"folder of all runs [CONOID_RUNS] ({runs})")
+    parser.add_argument("--runs", type=Path, default=Path(runs), help="folder of all runs [CONOID_RUNS] (%(default)s)")
     parser.set_defaults(database=os.environ.get("CONOID_DATABASE", ""))
 
 

@@ -57,6 +57,8 @@ class Submission(msgspec.Struct, kw_only=True, frozen=True):
     """Of the batch system; empty where there is none."""
     priority: int = 0
     """Among the runs of its owner."""
+    wishes_sha256: str = ""
+    """Of labels, profile and priority as they were asked for; empty in what earlier servers wrote."""
 
 
 class Process(msgspec.Struct, kw_only=True, frozen=True):

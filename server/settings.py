@@ -7,6 +7,8 @@ import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from sqlalchemy import URL
+
 from conoid.cases.batch import Site, SiteError, read_site
 
 WORKER = (sys.executable, "-m", "mpi4py", "-m", "conoid.worker")
@@ -99,9 +101,9 @@ class Settings:
             raise SettingsError(f"--web {self.web}: there is no such folder")
 
     @property
-    def database_url(self) -> str:
-        """The URL in use."""
-        return self.database or f"sqlite:///{self.database_file}"
+    def database_url(self) -> str | URL:
+        """The URL in use; a path with ``%``, ``?`` or ``#`` is none as text."""
+        return self.database or URL.create("sqlite", database=str(self.database_file))
 
     @property
     def database_file(self) -> Path:

@@ -90,7 +90,7 @@ class StoreError(StartError):
 class Store:
     """All methods may be called from any thread; each is one transaction and raises SQLAlchemyError when it fails."""
 
-    def __init__(self, url: str) -> None:
+    def __init__(self, url: str | sa.URL) -> None:
         """Opens the database and makes its tables where they are missing. Raises StoreError."""
         try:
             self._engine = _engine(url)
@@ -276,8 +276,9 @@ def _token(row: sa.RowMapping) -> Token:
     return Token(row["id"], row["owner"], row["sha256"], frozenset(row["scopes"].split()), row["created"])
 
 
-def _engine(url: str) -> sa.Engine:
-    engine = sa.create_engine(url, pool_pre_ping=not url.startswith("sqlite"))
+def _engine(url: str | sa.URL) -> sa.Engine:
+    made = sa.make_url(url)
+    engine = sa.create_engine(made, pool_pre_ping=made.get_backend_name() != "sqlite")
     if engine.dialect.name == "sqlite":
         sa.event.listen(engine, "connect", _tune)
     return engine

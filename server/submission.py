@@ -1,5 +1,6 @@
 """From a body to an accepted run: read, check, estimate, write to disk, and only then say yes."""
 
+import hashlib
 import logging
 import re
 import threading
@@ -45,6 +46,11 @@ class Wishes:
     restart: str = ""
     """The run, his own, from whose newest checkpoint this one goes on."""
 
+    @property
+    def digest(self) -> str:
+        """Of all of them."""
+        return hashlib.sha256(msgspec.json.encode(self, order="sorted")).hexdigest()
+
 
 class Desk:
     """Where cases are handed in. Methods may be called from any thread."""
@@ -77,16 +83,17 @@ class Desk:
                 pointer="Idempotency-Key",
             )  # fmt: skip
         wishes = wishes or Wishes()
+        asked = wishes.digest
         self._profile(wishes.profile, named=True)
         digest = folder.digest_of(_file_name(content_type), body)
-        if earlier := self._earlier(owner, key, digest, wishes.restart):
+        if earlier := self._earlier(owner, key, digest, wishes):
             return earlier
         try:
             reading = reading or self.read(body, content_type)
         except CaseError as error:
             raise invalid_case(error.problems) from None
         with self._lock:
-            return self._earlier(owner, key, digest, wishes.restart) or self._accept(
+            return self._earlier(owner, key, digest, wishes) or self._accept(
                 owner,
                 body,
                 content_type,
@@ -94,6 +101,7 @@ class Desk:
                 digest,
                 reading,
                 replace(wishes, profile=self._profile(wishes.profile or reading.profile)),
+                asked,
             )
 
     def check_room(self, owner: str, keys: Sequence[str]) -> None:
@@ -128,7 +136,7 @@ class Desk:
             raise ServiceError(400, "bad_parameter", str(error), pointer="profile") from None
         return ""
 
-    def _earlier(self, owner: str, key: str | None, digest: str, restart: str) -> dict[str, Any] | None:
+    def _earlier(self, owner: str, key: str | None, digest: str, wishes: Wishes) -> dict[str, Any] | None:
         run_id = self._store.run_of_key(owner, key) if key is not None else None
         if run_id is None:
             return None
@@ -137,14 +145,17 @@ class Desk:
         except (*folder.DAMAGED, msgspec.MsgspecError):
             detail = f"the run of Idempotency-Key {key!r} was {run_id}; its folder has been removed or damaged"
             raise ServiceError(410, "gone", detail) from None
-        if made.body_sha256 != digest or restart not in {"", made.labels.get(restarts.LABEL)}:
+        if made.body_sha256 != digest or wishes.restart not in {"", made.labels.get(restarts.LABEL)}:
             detail = f"Idempotency-Key {key!r} was used for another case"
+            raise ServiceError(422, "key_reused", detail, pointer="Idempotency-Key", hint="use a new key for a new run")
+        if made.wishes_sha256 not in {"", wishes.digest}:
+            detail = f"Idempotency-Key {key!r} was used with other labels, another profile or another priority"
             raise ServiceError(422, "key_reused", detail, pointer="Idempotency-Key", hint="use a new key for a new run")
         return receipt(made)
 
     def _accept(
         self, owner: str, body: bytes, content_type: str, key: str | None, digest: str, reading: Reading,
-        wishes: Wishes,
+        wishes: Wishes, asked: str,
     ) -> dict[str, Any]:  # fmt: skip
         self._check_room(owner)
         run_id, now = folder.new_id()
@@ -152,7 +163,7 @@ class Desk:
             id=run_id, owner=owner, name=reading.name, title=reading.title, ranks=reading.ranks, submitted=now,
             case_file=_file_name(content_type), body_sha256=digest, idempotency_key=key,
             wall_time=reading.wall_time, estimate=reading.estimate, labels=dict(wishes.labels),
-            profile=wishes.profile, priority=wishes.priority,
+            profile=wishes.profile, priority=wishes.priority, wishes_sha256=asked,
         )  # fmt: skip
         run = folder.first(made)
         try:

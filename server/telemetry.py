@@ -24,12 +24,15 @@ from conoid.cases.batch import Slurm
 from conoid.cases.messages import Status, to_msgpack
 
 from . import durable
+from .connections import raise_limit
 from .launch import Access
 from .settings import StartError, loopback
 from .store import Token
 
 _log = logging.getLogger("conoid.server")
 _SECRET, _USERS = "server.secret", ".zenoh-users"
+_HANDSHAKE = 3000
+"""ms in which a connection must have said who it is. Chosen: it takes two round trips."""
 _HEARS = ["put", "delete", "reply", "declare_queryable", "liveliness_token"]
 _ASKS = ["declare_subscriber", "query", "liveliness_query", "declare_liveliness_subscriber"]
 _ANSWERS = ["query", "declare_subscriber"]
@@ -62,6 +65,8 @@ class Telemetry:
         self._runs, self._host, self._nodes = runs, host, nodes
         self.port = port or _free_port(host)
         self._secret = _read_secret(runs)
+        self._places = raise_limit()
+        """Sessions, and connections that have not said who they are, at a time."""
         self._lock = threading.Lock()
         self._tokens = None if tokens is None else frozenset((token.id, token.owner) for token in tokens)
         self._session: zenoh.Session | None = self._open()
@@ -146,6 +151,9 @@ class Telemetry:
             "scouting/multicast/enabled": False,
             "scouting/delay": 0,
             "transport/shared_memory/enabled": False,
+            "transport/unicast/accept_timeout": _HANDSHAKE,
+            "transport/unicast/accept_pending": self._places,
+            "transport/unicast/max_sessions": self._places,
         }
         if self._nodes is not None and self._nodes.listen:
             config["listen/endpoints"].append(self._nodes.listen)

@@ -5,6 +5,7 @@ import { duration, h, meter, moment, pill } from "./figures.js";
 import { offer } from "./libraries.js";
 import { FINAL } from "./live.js";
 import { PairPage } from "./pair.js";
+import { named } from "./place.js";
 import { RunPage } from "./run.js";
 
 const page = document.getElementById("page");
@@ -115,10 +116,9 @@ function row(run, marked, mark) {
 // Where we are ---------------------------------------------------------------------------------------------------------
 
 function route() {
-  const [, run] = /^#\/runs\/([^/]+)$/.exec(location.hash) ?? [];
-  const [, ...pair] = /^#\/compare\/([^/]+)\/([^/]+)$/.exec(location.hash) ?? [];
-  if (pair.length) show(new PairPage(pair.map(decodeURIComponent)));
-  else show(run ? new RunPage(decodeURIComponent(run)) : new RunsPage());
+  const runs = named(location.hash);
+  if (runs.length === 2) show(new PairPage(runs));
+  else show(runs.length ? new RunPage(runs[0]) : new RunsPage());
 }
 
 // A server with tokens is not asked before there is one.

@@ -1,16 +1,30 @@
 """A run's folder, to list and to download."""
 
+import os
 from dataclasses import asdict
 from typing import Any
+from urllib.parse import quote, unquote_to_bytes
 
 from fastapi import APIRouter, Request, Response
+from starlette.convertors import PathConvertor, register_url_convertor
 
 from .. import download
+from ..events import Run
 from ..lanes import blocking
 from ..service import ServiceOf
 from .runs import OwnedRun
 
+
+class _AnyPath(PathConvertor):
+    """The rest of an address, line feeds too: names of files have them."""
+
+    regex = "(?s:.*)"
+
+
+register_url_convertor("path", _AnyPath())
 router = APIRouter()
+_BEFORE = 5
+"""Slashes of an address before the name of a file."""
 
 
 @router.get("/v1/runs/{run_id}/files")
@@ -18,10 +32,20 @@ router = APIRouter()
 def listing(run: OwnedRun, service: ServiceOf) -> dict[str, Any]:
     """Every file of the run: path, size in bytes, time of the last change. HEAD of a file gives its sha256."""
     entries = download.listing(service.settings.runs / run.id)
-    return {"files": [{**asdict(entry), "url": f"/v1/runs/{run.id}/files/{entry.path}"} for entry in entries]}
+    return {"files": [_line(run, entry) for entry in entries]}
+
+
+def _line(run: Run, entry: download.Entry) -> dict[str, Any]:
+    """Bytes of a name that are no UTF-8 are shown as ``\\xff``; the url has every name as it is."""
+    name = os.fsencode(entry.path)
+    return {
+        **asdict(entry), "path": name.decode(errors="backslashreplace"),
+        "url": f"/v1/runs/{run.id}/files/{quote(name)}",
+    }  # fmt: skip
 
 
 @router.get("/v1/runs/{run_id}/files/{path:path}")
 async def content(request: Request, run: OwnedRun, path: str, service: ServiceOf) -> Response:
     """One file, whole or a Range of it; ETag, and in Repr-Digest its sha256, unless it is large and its run goes on."""
-    return await service.downloads.respond(request, service.settings.runs / run.id, path, run.state.final)
+    relative = os.fsdecode(unquote_to_bytes(request.scope["raw_path"]).split(b"/", _BEFORE)[-1])
+    return await service.downloads.respond(request, service.settings.runs / run.id, relative, run.state.final)

@@ -26,7 +26,7 @@ ALIVE = b"\0"
 """Is sent while a followed log is silent, so that proxies keep the connection; no byte of a log that is followed."""
 _LOOK = 0.25
 """s between two looks at a log that is being followed."""
-Rank = Annotated[str, PathParameter(pattern=r"^(\d{1,5}|launcher)$", description="a rank, or 'launcher'")]
+Rank = Annotated[str, PathParameter(pattern="^([0-9]{1,5}|launcher)$", description="a rank, or 'launcher'")]
 
 
 @router.get("/v1/runs/{run_id}/logs/{rank}")

@@ -102,7 +102,7 @@ OwnedRun = Annotated[Run, Depends(owned_run)]
 
 def find(service: Service, identity: Identity, run_id: str) -> Run:
     """The run as it is now. Raises ServiceError 404, and 410 when it has ended and its folder is gone."""
-    run = service.supervisor.current(run_id) or service.store.get(run_id)
+    run = (service.supervisor.current(run_id) or service.store.get(run_id)) if folder.is_id(run_id) else None
     if run is None or run.owner != identity.owner:
         raise not_found(f"run {run_id[:40]!r}")
     if run.state.final and not (service.settings.runs / run.id).is_dir():

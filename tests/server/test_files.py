@@ -4,12 +4,15 @@ import asyncio
 import base64
 import hashlib
 import os
+import time
 from pathlib import Path
 
 import pytest
 from starlette.requests import Request
 from starlette.types import Message
 
+from conoid.cases.run import State
+from conoid.server import stream
 from conoid.server.download import Downloads
 from conoid.server.lanes import Lanes
 
@@ -168,3 +171,84 @@ def test_logs(server: Running, run: str) -> None:
     assert server.ann.http.get(f"/v1/runs/{run}/logs/%2e%2e").status_code == 400
     assert server.ann.http.get(f"/v1/runs/{run}/logs/x").status_code == 400
     assert server.ann.http.get(f"/v1/runs/{run}/logs/0", params={"follow": True}).text == "rank 0 says hello\n"
+
+
+ODD = [
+    b"a b", b"50%", b"%41", b"a<b>", b"a#b", b"a?b=c", b"back\\slash", b"line\nfeed", b'quote"', b"not-\xff-utf-8",
+    "\u00e4\u0416\u4e2d".encode(), b"'a;b&c+d", b"~!*()", b"\x01\x1b[31m", "\u202egnp.exe".encode(), b"\xc0\xaf",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_a_file_of_any_name_is_listed_and_fetched(server: Running, run: str, folder: Path, name: bytes) -> None:
+    inner = os.fsencode(folder) + b"/frames/" + name
+    os.makedirs(inner)
+    for path in (inner + b"/" + name, os.fsencode(folder) + b"/" + name):
+        with open(path, "wb") as file:
+            file.write(path)
+    answer = server.ann.http.get(f"/v1/runs/{run}/files")
+    assert answer.status_code == 200
+    files = answer.json()["files"]
+    seen = [server.ann.http.get(file["url"]).content for file in files]
+    assert inner + b"/" + name in seen
+    assert os.fsencode(folder) + b"/" + name in seen
+    assert len({file["path"] for file in files}) == len(files)
+
+
+def test_names_that_differ_in_what_is_no_text_are_two_files(server: Running, run: str, folder: Path) -> None:
+    for name in (b"\xff", b"\xfe"):
+        with open(os.fsencode(folder) + b"/" + name, "wb") as file:
+            file.write(name)
+    assert server.ann.http.get(f"/v1/runs/{run}/files/%ff").content == b"\xff"
+    assert server.ann.http.get(f"/v1/runs/{run}/files/%FE").content == b"\xfe"
+    assert server.ann.http.get(f"/v1/runs/{run}/files/%FD").status_code == 404
+
+
+@pytest.mark.parametrize("odd", ["%00", "%ff", "%2f0", "%2e%2e", "..%2f..", "%5c", "%0a", "x" * 5000, "%f0%9f" * 900])
+def test_no_odd_address_is_a_fault_of_the_server(server: Running, run: str, odd: str) -> None:
+    for path in (
+        f"/v1/runs/{odd}", f"/v1/runs/{run}{odd}", f"/v1/runs/{run}/logs/{odd}", f"/v1/runs/{run}/logs/0{odd}",
+        f"/v1/runs/{run}/files/{odd}", f"/v1/runs/{run}/files/case.toml{odd}", f"/v1/runs/{run}/snapshots/{odd}",
+        f"/v1/cases/{odd}", f"/v1/cases/demo{odd}", f"/v1/sweeps/{odd}", f"/v1/sweeps/{odd}/table", f"/{odd}",
+    ):  # fmt: skip
+        for method in ("GET", "HEAD"):
+            assert server.ann.http.request(method, path).status_code in {400, 404}, path
+
+
+def test_head_is_answered_wherever_get_is(server: Running, run: str) -> None:
+    for path in (
+        f"/v1/runs/{run}", f"/v1/runs/{run}/files", f"/v1/runs/{run}/files/case.toml", f"/v1/runs/{run}/events",
+        f"/v1/runs/{run}/history", f"/v1/runs/{run}/logs/0", f"/v1/runs/{run}/logs/0?follow=true", "/v1/runs", "/v1/me",
+        f"/v1/runs/{run}/snapshots", f"/v1/runs/{run}/stream", "/v1/cases", "/v1/cases/demo", "/v1/sweeps", "/healthz",
+        "/readyz", "/metrics", "/openapi.json", "/v1/case.schema.json",
+    ):  # fmt: skip
+        head, got = server.ann.http.head(path), server.ann.http.get(path)
+        assert (head.status_code, head.content) == (got.status_code, b""), path
+        assert head.headers.get("content-type") == got.headers.get("content-type"), path
+        if path not in {"/v1/me", "/metrics", f"/v1/runs/{run}/history"}:
+            assert head.headers.get("content-length") == got.headers.get("content-length"), path
+
+
+def test_head_of_what_has_no_end_ends_at_once(server: Running, tmp_path: Path) -> None:
+    run = server.ann.submit(wait=str(tmp_path / "go"))
+    server.ann.wait_for(run, State.RUNNING)
+    began = time.monotonic()
+    for path in (f"/v1/runs/{run}/logs/0?follow=true", f"/v1/runs/{run}/stream"):
+        assert server.ann.http.head(path).status_code == 200
+    assert time.monotonic() - began < 5.0
+    (tmp_path / "go").touch()
+
+
+def test_a_silent_log_that_is_followed_says_that_it_is_there(
+    server: Running, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By bytes 0, which are in no log that is followed."""
+    monkeypatch.setattr(stream, "KEEP_ALIVE", 0.2)
+    run = server.ann.submit(wait=str(tmp_path / "go"))
+    server.ann.wait_for(run, State.RUNNING)
+    with (server.ann.runs / run / "log" / "rank-0.log").open("ab") as file:
+        file.write(b"a\0b\n")
+    answer = server.ann.http.get(f"/v1/runs/{run}/logs/0", params={"follow": True, "seconds": 1.5})
+    assert answer.content.count(b"\0") >= 2
+    assert answer.content.replace(b"\0", b"") == b"rank 0 says hello\nab\n"
+    (tmp_path / "go").touch()

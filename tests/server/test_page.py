@@ -73,6 +73,16 @@ def test_the_page_does_not_take_unknown_addresses_for_its_own(client: TestClient
         assert (refused.status_code, refused.headers["allow"]) == (405, "GET, HEAD")
 
 
+@pytest.mark.parametrize(
+    "address",
+    ["app.js%00", "app.js%00.html", "%2e%2e/app.js", "..%2fapi.js", "app.js/", "app.js%2f", "%ff", "x" * 5000,
+     "__init__.py", "lib/%00", f"lib/{page.VERSION}/three%00", f"lib/{page.VERSION}/%2e%2e/index.json"],
+)  # fmt: skip
+def test_an_odd_address_of_the_page_is_not_there(client: TestClient, address: str) -> None:
+    for method in ("GET", "HEAD"):
+        assert client.request(method, f"/{address}").status_code == 404
+
+
 def test_a_route_is_there_whatever_is_asked_of_it(client: TestClient) -> None:
     """Also where the page has all other addresses."""
     for method, path, allowed in (

@@ -192,3 +192,11 @@ def test_the_newest_fragments_are_shown_whoever_tells_of_them(ask: Ask) -> None:
 def test_a_distribution_in_bins_is_summed_from_the_largest(ask: Ask) -> None:
     found = ask("plots.js", "page.longer(data)", {"smallest": -4, "sizes": [4, 0, 2, 1]})
     assert found == [[pytest.approx(2 ** (k / 2)), n] for k, n in zip(range(-4, 0), [7, 3, 3, 1], strict=True)]
+
+
+def test_an_address_that_cannot_be_read_is_the_list(ask: Ask) -> None:
+    found = {
+        "": [], "#/": [], "#/runs/abc": ["abc"], "#/runs/a%20b": ["a b"], "#/compare/a/b": ["a", "b"],
+        "#/runs/%E0": [], "#/runs/%": [], "#/runs/%zz": [], "#/compare/a/%E0%A4%A": [], "#/runs/a/b": [],
+    }  # fmt: skip
+    assert ask("place.js", "data.map(page.named)", list(found)) == list(found.values())

@@ -1,6 +1,7 @@
 """What the server refuses, and how it says so; who may see what."""
 
 import asyncio
+import gzip
 import json
 import re
 from collections.abc import Iterator
@@ -288,6 +289,47 @@ def test_the_same_key_and_case_are_one_run(server: Running) -> None:
     assert refusal(other, 422, "key_reused")["pointer"] == "Idempotency-Key"
     theirs = server.bob.http.post("/v1/runs", content=case_text(), headers=headers)
     assert theirs.json()["id"] != first.json()["id"]
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        ({"label": "a=1"}, {"label": "a=2"}),
+        ({"label": "a=1"}, {}),
+        ({}, {"label": "a=1"}),
+        ({"priority": 1}, {"priority": 2}),
+        ({}, {"priority": 2}),
+    ],
+)
+def test_the_same_key_with_other_labels_or_priority_is_refused(
+    server: Running, first: dict[str, Any], second: dict[str, Any]
+) -> None:
+    headers = {**TOML, "Idempotency-Key": "k1"}
+    made = server.ann.http.post("/v1/runs", content=case_text(), headers=headers, params=first)
+    again = server.ann.http.post("/v1/runs", content=case_text(), headers=headers, params=first)
+    assert again.content == made.content
+    other = server.ann.http.post("/v1/runs", content=case_text(), headers=headers, params=second)
+    assert "other labels" in refusal(other, 422, "key_reused")["detail"]
+    server.ann.wait_for(made.json()["id"])
+
+
+def test_labels_in_another_order_are_the_same(server: Running) -> None:
+    headers = {**TOML, "Idempotency-Key": "k1"}
+    for labels in (["a=1", "b=2"], ["b=2", "a=1"]):
+        made = server.ann.http.post("/v1/runs", content=case_text(), headers=headers, params={"label": labels})
+        assert made.status_code == 202
+    server.ann.wait_for(made.json()["id"])
+
+
+@pytest.mark.parametrize("encoding", ["gzip", "br", "deflate", "zstd", "identity, gzip"])
+def test_an_encoded_body_is_refused(server: Running, encoding: str) -> None:
+    headers = {**TOML, "Content-Encoding": encoding}
+    for path in ("/v1/runs", "/v1/cases:validate", "/v1/sweeps"):
+        answer = server.ann.http.post(path, content=gzip.compress(case_text().encode()), headers=headers)
+        assert encoding in refusal(answer, 415, "unsupported_encoding")["detail"]
+        assert answer.headers["accept-encoding"] == "identity"
+    plain = {**TOML, "Content-Encoding": "identity"}
+    assert server.ann.http.post("/v1/cases:validate", content=case_text(), headers=plain).json()["valid"]
 
 
 def test_the_same_key_at_the_same_time_is_one_run(server: Running) -> None:

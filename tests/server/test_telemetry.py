@@ -1,10 +1,11 @@
 """The embedded Zenoh router: who hears whom."""
 
 import json
+import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -189,3 +190,18 @@ def test_without_tokens_anybody_on_this_machine_may_listen(tmp_path: Path) -> No
     with client(router.port) as session:
         assert Ear(session, "**").hears(lambda: session.put("conoid/v1/local/r1/state", b"x"))
     router.close()
+
+
+def test_silent_connections_close_the_port_to_nobody(telemetry: Telemetry) -> None:
+    """Neither those that are open, nor those that come instead of those that were closed."""
+    ann, worker = telemetry.reader("ann", ANN), telemetry.worker("ann", "r1")
+    with ExitStack() as crowd:
+        for _ in range(150):
+            crowd.enter_context(socket.create_connection(("127.0.0.1", telemetry.port)))
+        began = time.monotonic()
+        with (
+            client(telemetry.port, worker.user, worker.password) as workers,
+            client(telemetry.port, ann.user, ann.password) as anns,
+        ):
+            assert Ear(anns, "conoid/v1/ann/**").hears(lambda: workers.put(f"{worker.prefix}/state", b"hello"))
+        assert time.monotonic() - began < 5.0
