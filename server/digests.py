@@ -13,9 +13,8 @@ State = tuple[int, int, int, int, int]
 """Device, inode, times of the last change of content and of the file in ns, size in bytes."""
 _KEPT = 10_000
 """Digests that are kept, 32 bytes each. Chosen."""
-_SLICE = 1 << 25
-"""Bytes that are read in one piece of work. Chosen: 0.1 s, so that other requests of the user come between."""
-_CHUNK = 1 << 18
+_SLICE, _CHUNK = 1 << 25, 1 << 18
+"""Bytes that are read in one piece of work, and at once. Chosen: 0.1 s, and others of the user come between."""
 
 
 def state_of(file: BinaryIO) -> State:
