@@ -11,16 +11,20 @@ Edge = Annotated[Count, Field(ge=1, le=1000)]
 
 
 class Grading(Model):
-    """Element size grows from ``element_size`` to ``far_size`` with the distance from a point or from an axis line.
+    """Element size grows from ``element_size`` to ``far_size`` with the distance from a point, an axis line, or a
+    sphere or cylinder round one of them.
 
     Within ``near`` of the origin (or the line through it along ``axis``) the size is ``element_size``, beyond ``far``
-    it is ``far_size``, linear between.
+    it is ``far_size``, linear between. With ``radius`` distances are from the sphere (or cylinder) of that radius, on
+    either side of it.
     """
 
     origin: Point = (0.0, 0.0, 0.0)
     """Where distances begin."""
     axis: Axis | None = None
     """Distances are from the line along it through ``origin``; without it from the point."""
+    radius: Annotated[Length, Field(ge=0)] = 0.0
+    """Of the sphere, or cylinder, from which distances are measured: 0 is the point, or the line."""
     near: Annotated[Length, Field(ge=0)]
     """Up to this distance the size is ``element_size``; below ``far``."""
     far: Annotated[Length, Positive]

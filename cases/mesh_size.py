@@ -92,12 +92,16 @@ def graded_size(mesh: Generated, point: Vector) -> float:
 def size_at(mesh: Generated, grading: Grading) -> Callable[[Vector], float]:
     """The element size, m, at a point of a primitive that is graded: to be asked of many points."""
     size, near, more = mesh.element_size, grading.near, grading.far_size - mesh.element_size
-    width, origin = grading.far - grading.near, grading.origin
+    width, origin, radius = grading.far - grading.near, grading.origin, grading.radius
+
+    def at(distance: float) -> float:
+        return size + more * min(max((abs(distance - radius) - near) / width, 0.0), 1.0)
+
     if grading.axis is None:
-        return lambda point: size + more * min(max((math.dist(point, origin) - near) / width, 0.0), 1.0)
+        return lambda point: at(math.dist(point, origin))
     i, j = across(grading.axis)
     x, y = origin[i], origin[j]
-    return lambda point: size + more * min(max((math.hypot(point[i] - x, point[j] - y) - near) / width, 0.0), 1.0)
+    return lambda point: at(math.hypot(point[i] - x, point[j] - y))
 
 
 def _structured(mesh: Box | Plate | Cylinder | Tube | TwoTets | Shards) -> MeshSize:

@@ -113,6 +113,14 @@ def test_graded_size_runs_from_near_to_far() -> None:
     assert sizes == pytest.approx([0.1, 0.1, 0.3, 0.5, 0.5])
 
 
+@pytest.mark.parametrize("axis", [None, "z"])
+def test_graded_size_is_smallest_on_the_sphere_or_cylinder_of_the_radius(axis: str | None) -> None:
+    grading = {"near": 1, "far": 3, "far_size": 0.5, "radius": 4, "axis": axis}
+    body = mesh({"shape": "sphere", "radius": 9}, element_size=0.1, grading=grading)
+    sizes = [graded_size(body, (x, 0.0, 0.0)) for x in (0.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)]
+    assert sizes == pytest.approx([0.5, 0.3, 0.1, 0.1, 0.1, 0.3, 0.5])
+
+
 @pytest.mark.parametrize("name", sorted(shipped()))
 def test_steps_are_within_a_factor_of_two_of_what_was_measured(name: str) -> None:
     steps = estimate(read_case(shipped()[name])).steps

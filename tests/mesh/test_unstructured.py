@@ -108,15 +108,17 @@ def test_millimetres_are_meshed_as_metres_are() -> None:
     assert np.array_equal(large.points * 2.0**-10, small.points)
 
 
-@pytest.mark.parametrize("line", [None, "z"])
-def test_grading_sets_the_size_near_and_far(line: str | None) -> None:
-    grading = {"origin": (0.0, 0.0, 0.0), "axis": line, "near": 0.3, "far": 1.0, "far_size": 0.3}
+@pytest.mark.parametrize(("line", "radius"), [(None, 0.0), ("z", 0.0), ("z", 0.7)])
+def test_grading_sets_the_size_near_and_far(line: str | None, radius: float) -> None:
+    near, far = (0.3, 1.0) if radius == 0.0 else (0.1, 0.45)
+    grading = {"axis": line, "radius": radius, "near": near, "far": far, "far_size": 0.3}
     low, high = (-1.2, -1.2, -0.4), (1.2, 1.2, 0.4)
     mesh = build(body("box", low=low, high=high, element_size=0.08, grading=grading), HERE)
     middle = mesh.points[mesh.tets].mean(axis=1)
-    distance = np.linalg.norm(middle[:, : 2 if line else 3], axis=1)
+    distance = np.abs(np.linalg.norm(middle[:, : 2 if line else 3], axis=1) - radius)
     size = np.cbrt(6 * mesh.volumes())
-    for start, end, wanted in ((0.0, 0.3, 0.08), (0.6, 0.7, 0.19), (1.1, 2.0, 0.3)):
+    half = 0.5 * (near + far)
+    for start, end, wanted in ((0.0, near, 0.08), (half - 0.05, half + 0.05, 0.19), (1.1 * far, 2.0, 0.3)):
         measured = size[(distance >= start) & (distance < end)].mean()
         assert measured == pytest.approx(wanted, rel=0.25)
 

@@ -100,13 +100,13 @@ def _size(gmsh: Any, body: Generated, scale: float) -> None:
 
 
 def _grade(gmsh: Any, body: Generated, grading: Grading, scale: float) -> None:
-    """The size as a linear function of the distance from a point, or from a line along an axis."""
+    """The size as a linear function of the distance from a point, a line along an axis, or a sphere or cylinder."""
     origin = to_frame(body, grading.origin)
     along = None if grading.axis is None else directions(body).index(AXES.index(grading.axis))
     squares = [f"({'xyz'[i]}-({origin[i] / scale!r}))^2" for i in range(3) if i != along]
     field = gmsh.model.mesh.field
     distance, size = field.add("MathEval"), field.add("Threshold")
-    field.setString(distance, "F", f"Sqrt({'+'.join(squares)})")
+    field.setString(distance, "F", f"Abs(Sqrt({'+'.join(squares)})-{grading.radius / scale!r})")
     for name, value in (("DistMin", grading.near), ("DistMax", grading.far)):
         field.setNumber(size, name, value / scale)
     for name, value in (("SizeMin", body.element_size), ("SizeMax", grading.far_size)):
