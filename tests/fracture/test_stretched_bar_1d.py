@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from .bar_1d import Bar, Run, law, published
+from .bar_1d import Bar, Run, even, law, scattered
 
 ENOUGH = 20.0
 """t_0: from here to 25 t_0 fewer than 1 % of all cracks were added in any of the bars below."""
@@ -90,9 +90,20 @@ def test_fragments_that_meet_do_not_overlap() -> None:
 @pytest.mark.parametrize("x", [1.0, 3.0, 10.0])
 def test_a_bar_breaks_into_fragments_of_the_published_size(x: float) -> None:
     run = stretched(Bar(), x, 10.0)
-    assert run.size == pytest.approx(published(x), rel=0.05)
+    assert run.size == pytest.approx(scattered(x), rel=0.05)
     assert run.deepest < 1e-15
     assert run.energies().contact > 0.0
+
+
+@pytest.mark.parametrize("x", [0.1, 0.3, 1.0])
+def test_a_bar_of_even_strength_breaks_into_the_smaller_fragments_of_the_ring_of_the_literature(x: float) -> None:
+    """The other fit, of a ring of even strength, has 21 to 30 % more fragments than that of a scatter of 1 %."""
+    length = 60.0
+    bar = Bar(length=length * Bar().s_0, elements=24 * 60, scatter=1e-5)
+    size = stretched(bar, x, 35.0 if x < 0.2 else 20.0).size
+    print(f"x {x:g}: {size:.3f} s_0, even strength {even(x):.3f}, scatter {scattered(x):.3f}")
+    assert size == pytest.approx(even(x), rel=0.1)
+    assert size < 0.9 * scattered(x)
 
 
 @pytest.mark.slow
@@ -102,5 +113,5 @@ def test_bars_break_into_fragments_of_the_published_size(x: float) -> None:
     cracks = [stretched(Bar(seed=seed), x, ENOUGH).failed for seed in range(1, 6)]
     bar = Bar()
     size = bar.length / float(np.mean(cracks)) / bar.s_0
-    print(f"x {x:g}: {size:.4f} s_0, published {published(x):.4f}, {size / published(x) - 1.0:+.3f}, cracks {cracks}")
-    assert size == pytest.approx(published(x), rel=0.05)
+    print(f"x {x:g}: {size:.4f} s_0, published {scattered(x):.4f}, {size / scattered(x) - 1.0:+.3f}, cracks {cracks}")
+    assert size == pytest.approx(scattered(x), rel=0.05)
