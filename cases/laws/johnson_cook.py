@@ -14,7 +14,8 @@ from .law import Law, Likely, Wrong
 class JohnsonCookDamage(Model):
     """Damage: the sum of plastic strain over (D1 + D2 e^(D3 t)) (1 + D4 ln max(rate/reference_rate, 1)) (1 + D5 T*).
 
-    t is the mean stress over the flow stress. At ``erosion.damage`` a tet leaves. Johnson and Cook 1985.
+    t is the mean stress over the flow stress. At ``erosion.damage`` a tet leaves. Johnson and Cook 1985. The flow
+    stress is multiplied by 1 - softening * damage: Borvik, Hopperstad, Berstad and Langseth 2001.
     """
 
     D1: Ratio
@@ -27,6 +28,8 @@ class JohnsonCookDamage(Model):
     """Rate dependence."""
     D5: Ratio = 0.0
     """Dependence on the temperature."""
+    softening: Annotated[Ratio, Field(ge=0, lt=1)] = 0.0
+    """Share of the flow stress that damage 1 takes: the critical damage of Borvik and others. 0: damage takes none."""
 
     @property
     def in_tension(self) -> float:

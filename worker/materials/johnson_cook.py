@@ -1,6 +1,7 @@
 """Johnson-Cook flow stress, radial return with adiabatic heating.
 
-sigma = (A + B e^n) (1 + C ln max(rate / rate_0, 1)) (1 - T*^m). Johnson and Cook 1983.
+sigma = (A + B e^n) (1 + C ln max(rate / rate_0, 1)) (1 - T*^m). Johnson and Cook 1983. With ``softening`` s this is
+multiplied by 1 - s D, with the damage D of the beginning of the step. Borvik and others 2001.
 
 The tets of a chunk that yield are laid side by side in the scratch and solved for together, loop after loop, with
 logarithms and powers of our own. Those that have converged are laid behind the others and left alone: no answer depends
@@ -32,15 +33,16 @@ from .elementary import logarithms, power, powers
 from .law import BEFORE_PRESSURE, FIRST, SHEAR, Law
 from .plastic import equivalent_stress
 
-_A, _B, _N, _C, _M, _RATE, _T0, _MELT, _HEAT, _DAMAGED, _D1, _D2, _D3, _D4, _D5 = range(FIRST, FIRST + 15)
+_A, _B, _N, _C, _M, _RATE, _T0, _MELT, _HEAT, _DAMAGED, _D1, _D2, _D3, _D4, _D5, _SOFTENING = range(FIRST, FIRST + 16)
 _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _STRAIN, _WORK, _YIELD, _FLOW = PLASTIC_STRAIN * CHUNK, WORK_PLASTIC * CHUNK, YIELD * CHUNK, FLOW * CHUNK
 _TEMPERATURE, _MASS, _P, _DAMAGE = TEMPERATURE * CHUNK, MASS * CHUNK, PRESSURE * CHUNK, DAMAGE * CHUNK
-# Rows of the scratch, of the tets that yield: places in the chunk; what is known; the bracket, the increment, whether
-# it is still sought; the flow stress without the rate; e, T* and the relative rate, then logarithms and powers.
-_PLACE, _Q, _KNOWN, _HOT, _WARM, _LOW, _HIGH, _D, _OPEN, _STATIC, _SUM, _FAST, _SOFT, _T = (
-    NODAL + k * CHUNK for k in range(14)
+# Rows of the scratch, of the tets that yield: places in the chunk; what is known, with the share of the strength that
+# damage leaves; the bracket, the increment, whether it is still sought; the flow stress without the rate; e, T* and the
+# relative rate, then logarithms and powers.
+_PLACE, _Q, _KNOWN, _HOT, _WARM, _LEFT, _LOW, _HIGH, _D, _OPEN, _STATIC, _SUM, _FAST, _SOFT, _T = (
+    NODAL + k * CHUNK for k in range(15)
 )
 _MOST = 140
 """Steps at most: the halvings among them alone have reached the last bit of a float64 by then (52 bits)."""
@@ -68,7 +70,7 @@ _TINY = 1e-300
 @njit("int64(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def gather(w, s, params, n):  # type: ignore[no-untyped-def]
     """Lays the tets beyond their rate-free flow stress side by side; returns how many. The root is in [0, q / 3 G]."""
-    m, shear3 = 0, 3.0 * params[SHEAR]
+    m, shear3, softening = 0, 3.0 * params[SHEAR], params[_SOFTENING]
     for i in range(n):
         q = w[TRIAL + i]
         if q > s[_YIELD + i]:
@@ -76,6 +78,7 @@ def gather(w, s, params, n):  # type: ignore[no-untyped-def]
             w[_KNOWN + m], w[_HOT + m] = s[_STRAIN + i], s[_TEMPERATURE + i]
             w[_WARM + m] = w[VOLUME_MID + i] / s[_MASS + i]
             w[_D + m] = s[_FLOW + i]
+            w[_LEFT + m] = 1.0 - softening * s[_DAMAGE + i] if softening > 0.0 else 1.0
             m += 1
     for j in range(m):
         high = w[_Q + j] / shear3
@@ -125,10 +128,11 @@ def _newton(w, params, m, dt, halve):  # type: ignore[no-untyped-def]
         power, strain = b * w[_SUM + j], max(w[_KNOWN + j] + d, _TINY)
         hardening, rate = a + power, 1.0 + c * w[_FAST + j]
         soft = w[_SOFT + j] if within > 0.0 else 0.0
-        heat = 1.0 - soft
+        left = w[_LEFT + j]
+        heat = left * (1.0 - soft)
         melting = (within > 0.0) & (within < 1.0)
         by_heat = per_span * soft / (within if melting else 1.0)
-        by_heat = -by_heat if melting else 0.0
+        by_heat = -left * by_heat if melting else 0.0
         counts = w[_FAST + j] > 0.0
         by_rate = c * hardening / d
         by_rate = by_rate * heat if counts else 0.0
@@ -253,7 +257,7 @@ def _constants(law: JohnsonCook) -> tuple[float, ...]:
     heat = law.taylor_quinney / law.specific_heat
     return (
         law.A, law.B, law.n, law.C, law.m, law.reference_rate, law.reference_temperature, law.melt_temperature, heat,
-        *((0.0,) if (of := law.damage) is None else (1.0, of.D1, of.D2, of.D3, of.D4, of.D5)),
+        *((0.0,) * 7 if (of := law.damage) is None else (1.0, of.D1, of.D2, of.D3, of.D4, of.D5, of.softening)),
     )  # fmt: skip
 
 
@@ -274,4 +278,4 @@ def _begin(law: JohnsonCook, temperature: float) -> dict[int, float]:
 
 
 LAW = Law("johnson_cook", BEFORE_PRESSURE, _rows, _constants, _begin, johnson_cook)
-"""Strength with the heat of the plastic work; damage takes no strength, erosion looks at it."""
+"""Strength with the heat of the plastic work, and damage, at which erosion removes tets."""
