@@ -45,6 +45,8 @@ class Cause(StrEnum):
     ENERGY = "energy"
     MEMORY = "memory"
     WALLTIME = "walltime"
+    STEPS = "steps"
+    """``run.max_steps`` is used up before ``run.end_time``."""
     PREEMPTED = "preempted"
     NODE = "node"
     LAUNCH = "launch"

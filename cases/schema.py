@@ -226,7 +226,8 @@ class Run(Model):
     initial state (0: none but those asked for). At most one a second of wall time, and fewer where they would take more
     than 1/200 of it; the first and the last are always made."""
     max_steps: Annotated[Count, Field(ge=1)] = 100_000_000
-    """The run fails when it needs more."""
+    """The run stops, with a checkpoint, when it needs more: state ``timed_out``, cause ``steps``. A restart with a
+    larger number goes on."""
     max_wall_time: Annotated[Time, Positive] | None = None
     """The run stops, with a checkpoint, when it has taken longer.
     Counted from the first step."""

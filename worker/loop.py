@@ -35,9 +35,9 @@ CANCELLED, WALL_TIME, MAX_STEPS = 1, 2, 3
 STOPS = {
     CANCELLED: (State.CANCELLED, Cause.CANCELLED, "stopped on request"),
     WALL_TIME: (State.TIMED_OUT, Cause.WALLTIME, "run.max_wall_time is used up"),
-    MAX_STEPS: (State.FAILED, Cause.DIVERGED, "run.max_steps is used up before run.end_time"),
+    MAX_STEPS: (State.TIMED_OUT, Cause.STEPS, "run.max_steps is used up before run.end_time"),
 }
-_KEPT = (CANCELLED, WALL_TIME)
+_KEPT = (CANCELLED, WALL_TIME, MAX_STEPS)
 """Reasons after which the run can go on from a checkpoint."""
 _REPORT_EVERY = 0.25
 """s of wall time between two reports: four a second look alive. Chosen."""

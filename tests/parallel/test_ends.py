@@ -233,9 +233,13 @@ def test_wall_time_and_steps_run_out(tmp_path: Path) -> None:
     assert outcome(tmp_path / "slow").message.startswith("run.max_wall_time is used up, at ")
     assert "stable step" not in outcome(tmp_path / "slow").message
     short = ended(command(1, "free_spin", "--out", str(tmp_path / "short"), *LONG, "--set", "run.max_steps=20"))
-    assert short.returncode == 3
-    assert outcome(tmp_path / "short").steps == 20
-    assert "run.max_steps" in outcome(tmp_path / "short").message
+    assert short.returncode == 4
+    end = outcome(tmp_path / "short")
+    assert (end.state, end.cause, end.steps) == ("timed_out", "steps", 20)
+    assert end.message.startswith("run.max_steps is used up before run.end_time, at ")
+    more = ("--set", "run.max_steps=30", "--restart")
+    assert ended(command(1, "free_spin", "--out", str(tmp_path / "short"), *LONG, *more)).returncode == 4
+    assert outcome(tmp_path / "short").steps == 30
 
 
 def test_as_many_ranks_as_tets_and_not_more(tmp_path: Path) -> None:

@@ -72,7 +72,7 @@ def test_flat_is(tmp_path: Path, ranks: int) -> None:
 def test_what_is_used_up_says_how_short_the_steps_were(tmp_path: Path, ranks: int) -> None:
     """A fifth of its height is left."""
     end = outcome(tmp_path, "1.1 ms", ranks, "--set", "run.max_steps=300")
-    assert (end.state, end.steps, end.warnings) == ("failed", 300, [])
+    assert (end.state, end.cause, end.steps, end.warnings) == ("timed_out", "steps", 300, [])
     assert end.message.startswith("run.max_steps is used up before run.end_time, at 0.0008")
     assert "; the stable step has fallen to " in end.message
     assert " of the first (stability: tet " in end.message
