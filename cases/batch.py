@@ -25,6 +25,7 @@ from typing import Annotated, Literal
 import msgspec
 
 from . import layout, policy, whole
+from .similar import allowed
 from .units import parse_quantity
 
 
@@ -181,7 +182,7 @@ def profile_of(slurm: Slurm, name: str) -> tuple[str, Profile]:
     """The profile of that name, or the default one. Raises ValueError with those that there are."""
     chosen = name or slurm.default or next(iter(slurm.profiles))
     if chosen not in slurm.profiles:
-        raise ValueError(f"profile = {chosen[:40]!r}: allowed: {', '.join(slurm.profiles)}")
+        raise ValueError(f"profile = {chosen[:40]!r}: {allowed(chosen, slurm.profiles)}")
     return chosen, slurm.profiles[chosen]
 
 

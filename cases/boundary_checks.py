@@ -9,9 +9,10 @@ from .drives import clash
 from .geometry import Vector, index, lowest_along
 from .loaded import idle, near
 from .placed import Placed
-from .problems import Location, Problem, choices, nearest, problem
+from .problems import Location, Problem, problem
 from .region import GENERATED
 from .schema import Case, Gravity, Part, Prescribed, Rotation, Symmetry, Traction, Wall
+from .similar import choices, nearest
 
 ROUNDING = 1e-9
 """Of a length or a time: two numbers that agree to this were meant to be equal. Chosen far above the rounding of

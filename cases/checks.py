@@ -15,8 +15,9 @@ from .library import library
 from .materials import Material, Strength
 from .mesh_checks import check_mesh
 from .overlap import overlaps
-from .problems import Location, Problem, choices, dotted, nearest, problem
+from .problems import Location, Problem, dotted, problem
 from .schema import MOST_PARTS, Case, Contact, Erosion, Part, Probe, Reference, Symmetry, Wall
+from .similar import choices, nearest
 
 NEEDED: dict[str, frozenset[str]] = {
     "extent": frozenset({"part", "axis"}),

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from .materials import Material
-from .problems import CaseError, nearest, problem
+from .problems import CaseError, problem
 from .schema import Case
+from .similar import nearest
 
 PATH = Path(__file__).with_name("materials.toml")
 Confidence = Literal["paper", "read", "derived", "memory", "assumed"]

@@ -13,9 +13,10 @@ from pydantic import ValidationError
 
 from .checks import check, check_parts
 from .library import library, material
-from .problems import CaseError, Problem, from_pydantic, nearest, problem, shown
+from .problems import CaseError, Problem, from_pydantic, problem, shown
 from .quantities import read_references
 from .schema import Case
+from .similar import nearest
 
 __all__ = [
     "CaseError", "Problem", "apply_overrides", "material", "parse_case", "parse_json", "parse_toml",

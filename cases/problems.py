@@ -1,6 +1,6 @@
 """What is wrong with a case, one clear line each, under the keys that the user wrote."""
 
-import difflib
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import islice
@@ -10,6 +10,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from .schema import Case
+from .similar import choices, meant, nearest
 
 Location = tuple[int | str, ...]
 
@@ -72,18 +73,6 @@ def shown(value: object) -> str:
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 4]} ..."
 
 
-def choices(names: Iterable[str]) -> str:
-    """``'a', 'b'``: the allowed words, in the order given."""
-    return ", ".join(repr(name) for name in names) or "none"
-
-
-def nearest(word: str, known: Iterable[str]) -> str:
-    """``did you mean 'radius'?`` or the list of the known names, for the end of a message."""
-    names = list(dict.fromkeys(known))
-    close = difflib.get_close_matches(word[:_LONGEST], names, n=3, cutoff=0.6)
-    return f"did you mean {' or '.join(map(repr, close))}?" if close else f"known: {choices(names)}"
-
-
 def from_pydantic(error: ValidationError, data: Mapping[str, Any]) -> list[Problem]:
     """The errors of ``error`` under the keys of ``data``, without pydantic's own words where ours are clearer.
 
@@ -113,7 +102,7 @@ def _translate(detail: ErrorDetails, data: Mapping[str, Any]) -> Problem:
         case "union_tag_invalid":
             tag = str(context["discriminator"]).strip("'")
             known = _tags(detail["loc"])
-            return problem((*location, tag), context["tag"], f"allowed: {choices(known)}")
+            return problem((*location, tag), context["tag"], f"allowed: {choices(known)}{meant(context['tag'], known)}")
         case "value_error":
             return problem(location, value, str(context["error"]).removeprefix(f"{value!r} "))
         case "string_pattern_mismatch":
@@ -131,6 +120,9 @@ def _translate(detail: ErrorDetails, data: Mapping[str, Any]) -> Problem:
             return problem(
                 location, ..., f"{len(value)} characters are too many; allowed: up to {context['max_length']}"
             )
+        case "literal_error":
+            known = re.findall(r"'([^']*)'", context["expected"])
+            return problem(location, value, f"allowed: {context['expected']}{meant(value, known)}")
         case "int_parsing" | "int_type" | "int_from_float":
             return problem(location, value, "expected a whole number")
         case "float_parsing" | "float_type":

@@ -18,6 +18,8 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
+from .similar import meant
+
 Dimension = tuple[int, int, int, int]
 """Exponents of metre, kilogram, second, kelvin."""
 
@@ -77,8 +79,15 @@ LARGEST = 1e30
 """Of a quantity in SI units, and one over it the smallest. Chosen: energies of any such mass and speed are numbers."""
 
 
+_WRITTEN = str.maketrans({
+    "\N{GREEK SMALL LETTER MU}": "\N{MICRO SIGN}", "\N{SUPERSCRIPT TWO}": "^2", "\N{SUPERSCRIPT THREE}": "^3",
+})  # fmt: skip
+"""What else is read: keyboards have a Greek mu for the sign of micro, documents have raised exponents."""
+
+
 def parse_unit(text: str) -> tuple[Fraction, Dimension]:
     """Exact factor to SI and dimension of a unit such as ``kg/m^3``. Raises ValueError."""
+    text = text.translate(_WRITTEN)
     factor, dimension, position = _ONE, [0, 0, 0, 0], 0
     while position < len(text):
         match = _FACTOR.match(text, position)
@@ -86,7 +95,7 @@ def parse_unit(text: str) -> tuple[Fraction, Dimension]:
             raise ValueError(f"cannot read the unit {text!r}; write it like 'kg/m^3'")
         operator, symbol, power = match.groups()
         if symbol not in UNITS:
-            raise ValueError(f"unknown unit {symbol!r} in {text!r}; known: {', '.join(UNITS)}")
+            raise ValueError(f"unknown unit {symbol!r} in {text!r}; known: {', '.join(UNITS)}{meant(symbol, UNITS)}")
         exponent = int(power or 1) * (-1 if operator == "/" else 1)
         scale, base = UNITS[symbol]
         factor *= scale**exponent

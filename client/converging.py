@@ -13,6 +13,7 @@ from conoid.cases.load import parse_case
 from conoid.cases.problems import shown
 from conoid.cases.run import ExitCode
 from conoid.cases.schema import Case
+from conoid.cases.similar import allowed
 
 from . import converged
 from .console import echo
@@ -60,7 +61,7 @@ def converge(
     data = data_of(case, overrides or ())
     checked = parse_case(data)
     if quantity is not None and not any(quantity in name for name in names(checked)):
-        raise UsageError(f"--quantity = {shown(quantity)}: allowed: {', '.join(names(checked))}, or a part of a name")
+        raise UsageError(f"--quantity = {shown(quantity)}: a part of a name; {allowed(quantity, names(checked))}")
     members = ensemble or (_ENSEMBLE if chaotic(checked) else 1)
     plan = Plan(_numbers("--meshes", meshes), _forms(forms), _numbers("--dt-safety", safeties), members,
                 _one_of("--vary", vary, (STEPS, SEEDS)), ranks)  # fmt: skip
@@ -132,7 +133,7 @@ def _forms(text: str) -> list[str]:
     return [_one_of("--forms", word.strip(), FORMS) for word in text.split(",") if word.strip()]
 
 
-def _one_of(option: str, word: str, allowed: Sequence[str]) -> str:
-    if word not in allowed:
-        raise UsageError(f"{option} = {shown(word)}: allowed: {', '.join(allowed)}")
+def _one_of(option: str, word: str, known: Sequence[str]) -> str:
+    if word not in known:
+        raise UsageError(f"{option} = {shown(word)}: {allowed(word, known)}")
     return word

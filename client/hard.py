@@ -16,6 +16,7 @@ from conoid.cases.load import apply_overrides, parse_case, read_data
 from conoid.cases.outcome import Outcome
 from conoid.cases.run import ExitCode
 from conoid.cases.schema import Case
+from conoid.cases.similar import allowed
 from conoid.cases.suite import Hard, drift, faults, is_free, suite
 
 from .columns import Columns
@@ -81,8 +82,8 @@ def chosen(known: Sequence[Hard], words: Sequence[str]) -> list[Hard]:
     """Those of these names or rows; all without words. Raises ClientError for a word that is none of them."""
     for word in words:
         if not any(word == each.name or word in each.rows for each in known):
-            names = ", ".join(each.name for each in known)
-            raise UsageError(f"hard = {word!r}: allowed: a row as H14, or one of {names}")
+            names = allowed(word, [each.name for each in known])
+            raise UsageError(f"hard = {word!r}: a row as H14, or a name; {names}")
     return [each for each in known if not words or each.name in words or set(each.rows) & set(words)]
 
 

@@ -12,6 +12,7 @@ from conoid.cases.load import material, parse_case
 from conoid.cases.outcome import Outcome
 from conoid.cases.run import ExitCode
 from conoid.cases.schema import Case
+from conoid.cases.similar import allowed
 
 from . import silence, tables
 from .console import PlainConsole, echo_json, one_line
@@ -45,12 +46,12 @@ def run_once(
     Ctrl-C, and SIGTERM, cancel the run, wait for its end and stop the server.
     """
     if field is not None and field not in FIELDS:
-        raise UsageError(f"field = {field!r}: allowed: {', '.join(FIELDS)}")
+        raise UsageError(f"field = {field!r}: {allowed(field, FIELDS)}")
     data = data_of(case, overrides)
     checked = parse_case(data)
     if field in (lacking := fields.lacking(checked)):
-        allowed = ", ".join(name for name in FIELDS if name not in lacking)
-        raise UsageError(f"field = {field!r}: no frame of {checked.name} has it; allowed: {allowed}")
+        there = [name for name in FIELDS if name not in lacking]
+        raise UsageError(f"field = {field!r}: no frame of {checked.name} has it; {allowed(field, there)}")
     out = PlainConsole(quiet=as_json)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     server = LocalServer(runs, checked.run.ranks)

@@ -19,6 +19,7 @@ from typing import Any
 import msgspec
 
 from conoid.cases.figures import duration, number, vector
+from conoid.cases.similar import allowed
 
 from .errors import ClientError, LookError, ViewError
 from .saving import whole
@@ -174,7 +175,7 @@ def draw(
 def _look(options: Mapping[str, Any]) -> Look:
     """Raises LookError for an option that there is none of, or of another kind."""
     for name in options.keys() - set(Look.__struct_fields__):
-        raise LookError(f"{name}: there is no such option; allowed: {', '.join(Look.__struct_fields__)}")
+        raise LookError(f"{name}: there is no such option; {allowed(name, Look.__struct_fields__)}")
     try:
         return msgspec.convert(dict(options), Look)
     except msgspec.ValidationError as error:
@@ -207,7 +208,7 @@ def _check(look: Look, target: Path) -> None:
 def require_field(name: str) -> None:
     """Raises ViewError for a field that nobody knows."""
     if name not in FIELDS:
-        raise LookError(f"field = {name!r}: allowed: {', '.join(FIELDS)}")
+        raise LookError(f"field = {name!r}: {allowed(name, FIELDS)}")
 
 
 _NUMBER = r"[+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?\d+)?"

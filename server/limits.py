@@ -19,6 +19,7 @@ from conoid.cases.figures import count, number, size
 from conoid.cases.policy import Quota
 from conoid.cases.problems import Problem
 from conoid.cases.schema import Case
+from conoid.cases.similar import allowed
 
 from .errors import ServiceError
 from .settings import Caps, Settings
@@ -41,7 +42,7 @@ async def check_query(request: Request) -> None:
     known = sorted(set(_query(route.dependant)))
     for name in request.query_params:
         if name not in known:
-            detail = f"{name[:80]}: {request.url.path} knows no such parameter; allowed: {', '.join(known) or 'none'}"
+            detail = f"{name[:80]}: {request.url.path} knows no such parameter; {allowed(name, known)}"
             raise ServiceError(400, "bad_parameter", detail, pointer=name[:80])
 
 

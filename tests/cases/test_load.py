@@ -66,7 +66,7 @@ def test_all_errors_at_once() -> None:
         "parts[0].mesh.radius": "has the wrong dimension; expected a length, in a unit such as 'm'",
         "parts[0].mesh.sector": "allowed: 'full', 'half' or 'quarter'",
         "numerics.presure": "unknown key; did you mean 'pressure'?",
-        "numerics.pressure": "allowed: 'standard', 'nodal' or 'split'",
+        "numerics.pressure": "allowed: 'standard', 'nodal' or 'split'; did you mean 'nodal'?",
         "run.end_time": "allowed: greater than 0",
         "run.ranks": "expected a whole number",
         "reference[0].value": "'30 s' has the wrong dimension; expected a length, in a unit such as 'm'",

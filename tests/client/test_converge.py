@@ -218,7 +218,7 @@ def test_what_advice_may_be_about_is_known_before_anything_runs(name: str) -> No
     ("words", "said"),
     [
         (["--meshes", "1,x"], "--meshes"), (["--meshes", "1,1"], "each once"), (["--forms", "nodal,cubic"], "--forms"),
-        (["--vary", "moods"], "--vary"), (["--quantity", "nope"], "--quantity = 'nope': allowed: "),
+        (["--vary", "moods"], "--vary"), (["--quantity", "nope"], "--quantity = 'nope': a part of a name; allowed: "),
     ],
 )  # fmt: skip
 def test_options_that_mean_nothing_are_refused(words: list[str], said: str) -> None:

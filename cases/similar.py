@@ -1,0 +1,54 @@
+"""Names near a misspelt one, for the end of a message."""
+
+import difflib
+from collections.abc import Iterable
+
+_LONGEST = 80
+"""Characters of a word that are compared. Chosen: more than any name has that is known."""
+_CUTOFF, _MOST = 0.6, 3
+"""Likeness from which on a name is near (difflib's own), and how many are told. Chosen."""
+_PART = 3
+"""Letters of a name that have to be written to mean it. Chosen: fewer are in too many names."""
+
+
+def close(word: str, known: Iterable[str]) -> list[str]:
+    """Names that may have been meant, the likeliest first: capitals, blanks, ``-`` and ``_`` make no difference."""
+    names: dict[str, str] = {}
+    for name in known:
+        names.setdefault(_plain(name), name)
+    plain = _plain(word[:_LONGEST])
+    found = difflib.get_close_matches(plain, names, n=_MOST, cutoff=_CUTOFF)
+    begun = [name for name in names if len(plain) >= _PART and name.startswith(plain)]
+    return [names[name] for name in (found or begun[:_MOST])]
+
+
+def meant(word: object, known: Iterable[str]) -> str:
+    """``; did you mean 'mises'?`` for the end of a message that has the known names; nothing where none is near."""
+    found = close(word, known) if isinstance(word, str) else []
+    return f"; {_asked(found)}" if found else ""
+
+
+def allowed(word: object, known: Iterable[str]) -> str:
+    """``allowed: mises, pressure; did you mean 'mises'?`` for the end of a message."""
+    names = list(known)
+    return f"allowed: {', '.join(names) or 'none'}{meant(word, names)}"
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """``did you mean 'radius'?`` or the list of the known names, for the end of a message."""
+    names = list(dict.fromkeys(known))
+    found = close(word, names)
+    return _asked(found) if found else f"known: {choices(names)}"
+
+
+def choices(names: Iterable[str]) -> str:
+    """``'a', 'b'``: the allowed words, in the order given."""
+    return ", ".join(repr(name) for name in names) or "none"
+
+
+def _asked(found: list[str]) -> str:
+    return f"did you mean {' or '.join(map(repr, found))}?"
+
+
+def _plain(name: str) -> str:
+    return name.casefold().replace("-", "_").replace(" ", "_")
