@@ -84,11 +84,6 @@ def _lattice(mesh: Generated) -> list[tuple[float, float, float]]:
     return [point for x in lines[0] for y in lines[1] for z in lines[2] if inside(point := (x, y, z))] or [centre(mesh)]
 
 
-def graded_size(mesh: Generated, point: Vector) -> float:
-    """The element size, m, that a primitive asks for at ``point``."""
-    return mesh.element_size if mesh.grading is None else size_at(mesh, mesh.grading)(point)
-
-
 def size_at(mesh: Generated, grading: Grading) -> Callable[[Vector], float]:
     """The element size, m, at a point of a primitive that is graded: to be asked of many points."""
     size, near, more = mesh.element_size, grading.near, grading.far_size - mesh.element_size

@@ -1,7 +1,6 @@
 """Ensembles of a scene in which small causes have large effects: mean, deviation, and what a difference is worth."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import NormalDist, fmean, stdev
 
@@ -73,8 +72,3 @@ def student(probability: float, free: float) -> float:
     g3 = (3.0 * z**7 + 19.0 * z**5 + 17.0 * z**3 - 15.0 * z) / 384.0
     g4 = (79.0 * z**9 + 776.0 * z**7 + 1482.0 * z**5 - 1920.0 * z**3 - 945.0 * z) / 92160.0
     return z + g1 / free + g2 / free**2 + g3 / free**3 + g4 / free**4
-
-
-def of_all(members: Sequence[Sequence[float]]) -> list[Sample]:
-    """One sample a quantity, of the values of each member."""
-    return [Sample(tuple(values)) for values in zip(*members, strict=True)]

@@ -13,7 +13,7 @@ from conoid.cases.bodies import Mesh
 from conoid.cases.estimate import RANK_BYTES, estimate
 from conoid.cases.geometry import Generated, surface, volume
 from conoid.cases.load import parse_case, read_case, shipped, shipped_path
-from conoid.cases.mesh_size import graded_size, mesh_size
+from conoid.cases.mesh_size import mesh_size, size_at
 from conoid.worker.mesh.build import build
 from conoid.worker.mesh.structured import structured
 
@@ -109,7 +109,8 @@ def test_sectors_share_volume_and_outer_surface(
 def test_graded_size_runs_from_near_to_far() -> None:
     grading = {"near": 1, "far": 3, "far_size": 0.5, "axis": "z"}
     body = mesh({"shape": "sphere", "radius": 5}, element_size=0.1, grading=grading)
-    sizes = [graded_size(body, (x, 0.0, 9.0)) for x in (0.0, 1.0, 2.0, 3.0, 4.0)]
+    assert body.grading is not None
+    sizes = [size_at(body, body.grading)((x, 0.0, 9.0)) for x in (0.0, 1.0, 2.0, 3.0, 4.0)]
     assert sizes == pytest.approx([0.1, 0.1, 0.3, 0.5, 0.5])
 
 
@@ -117,7 +118,8 @@ def test_graded_size_runs_from_near_to_far() -> None:
 def test_graded_size_is_smallest_on_the_sphere_or_cylinder_of_the_radius(axis: str | None) -> None:
     grading = {"near": 1, "far": 3, "far_size": 0.5, "radius": 4, "axis": axis}
     body = mesh({"shape": "sphere", "radius": 9}, element_size=0.1, grading=grading)
-    sizes = [graded_size(body, (x, 0.0, 0.0)) for x in (0.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)]
+    assert body.grading is not None
+    sizes = [size_at(body, body.grading)((x, 0.0, 0.0)) for x in (0.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)]
     assert sizes == pytest.approx([0.5, 0.3, 0.1, 0.1, 0.1, 0.3, 0.5])
 
 

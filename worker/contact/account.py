@@ -19,7 +19,7 @@ class Account:
 
     @property
     def words(self) -> Ints:
-        """(2, 2) limbs of the sums of this rank; see sweeps.cost."""
+        """(2, 2) limbs of the sums of this rank; see booking.cost."""
         return self._tally.words
 
     @property

@@ -29,11 +29,9 @@ class Tag(IntEnum):
     """Sums of the face normals at nodes, in every sixteenth step and after erosion (contact/normals.py)."""
     TETS_AT_NODE = 15
     """How many tets a node has, at the start and in every removal (erosion.py)."""
-    SEPARATED_FORCE = 16
-    """Changes of the forces on nodes that separate, in a break (fracture/stage.py)."""
     TRACTION = 17
     """Stress on the other side of facets between two ranks, in every step that asks for tractions
-    (fracture/bodies.py)."""
+    (fracture/interface.py)."""
     NODAL_STRESS = 18
     """Sums of stress and mass at nodes, for the ``nodal`` criterion (fracture/nodal.py)."""
     COURSE = 19
