@@ -28,9 +28,11 @@ STEP_OVERHEAD = 0.3e-3
 START = 2.0
 """Core seconds of a rank before its first step, with a warm kernel cache."""
 
-BROKEN_NANOSECONDS = 700.0
-"""Core time per tet and step of a body that has turned to dust: what the glass bar of the paper takes, in the mean of
-its 150 us, on two ranks."""
+BROKEN_NANOSECONDS = 15_000.0
+"""Core time per tet and step of a body that has turned to dust whose pieces touch each other: 3 to 14 us in the ten
+hard cases that break without being driven (docs/accuracy.md: CPU s less what an estimate has without dust, by steps and
+tets that may break), 10 to 20 us in a plate of glass under an eroding cylinder, on aluminium, with friction. It is 7 us
+a broken facet, of which dust has two a tet."""
 PRESSED_NANOSECONDS = 26_000.0
 """The same of dust that is held together and pressed, where every tet meets all round it and sweeps are many: a plug of
 glass under a ram (tests/bench/press.py) took 17,000 to 20,000 on one rank, a block of 3,600 tets between walls, into
@@ -90,7 +92,7 @@ class Estimate:
     """What of it each stage of the case takes (cases/stages.py), s; empty where it is not known. What breaks costs
     more: nobody knows before how much."""
     breaking: float
-    """CPU time, s, that comes on top where all parts that fracture turn to dust; 0 where none does."""
+    """CPU time, s, that comes on top where the parts that fracture break as far as they may; 0 where none does."""
     dust_bytes: int
     """Memory of all ranks that comes on top there."""
     parts: tuple[PartEstimate, ...]
@@ -217,12 +219,34 @@ def _costs(case: Case, parts: tuple[PartEstimate, ...], steps: int | None) -> di
 
 
 def _breaking(case: Case, parts: tuple[PartEstimate, ...], steps: int | None) -> float:
-    """Core seconds of fracture, and of the contact of what has come apart, at most; what flies is taken to come apart
-    freely, what is driven to be pressed.
+    """Core seconds of fracture, and of the contact of what has come apart, at most; what flies is taken to break as far
+    as its motion can break it, what is driven to become dust and to be pressed.
     """
-    dust = PRESSED_NANOSECONDS if case.in_contact and driven_together(case) else BROKEN_NANOSECONDS
-    rate = case.run.ranks * BREAKING_OVERHEAD + 1e-9 * dust * _tets_that_break(case, parts)
+    pressed = case.in_contact and driven_together(case)
+    dust = 0.0
+    for size, part, speed in zip(parts, case.parts, impact_speeds(case), strict=True):
+        if part.fracture is not None:
+            share = 1.0 if pressed else broken_share(case, part, speed)
+            dust += share * (size.elements or 0) * (PRESSED_NANOSECONDS if pressed else BROKEN_NANOSECONDS)
+    rate = case.run.ranks * BREAKING_OVERHEAD + 1e-9 * dust
     return (steps or 0) * rate if case.fractures else 0.0
+
+
+def broken_share(case: Case, part: Part, speed: float) -> float:
+    """Of the facets of a part, those that may break where it meets others at a ``speed``, m/s, at most: fragments are
+    as large as the kinetic energy of their stretching can pay for in cracks, s^3 = 24 G / (density rate^2), Grady 1982
+    (J. Appl. Phys. 53, 322), and facets lie one element from each other. The rate is that of its stretch or of its
+    spin, the speed by the length of the part, or what strains the part to its strength while a wave goes through it.
+    1 of mesh files.
+    """
+    made, body = material(case, part.material), bounds(part.mesh)
+    if made.brittle is None or body is None or isinstance(part.mesh, MeshFile):
+        return 1.0
+    length = max(high - low for low, high in zip(*body, strict=True))
+    own = [abs(rate) for motion in (part.stretch, part.spin) if motion is not None for rate in motion.rate]
+    rate = max(speed / length, made.brittle.strength / made.elastic.young * wave_speed(made) / length, *own)
+    fragment = (24.0 * made.brittle.energy / (made.density * rate**2)) ** (1.0 / 3.0)
+    return min(1.0, part.mesh.element_size / fragment)
 
 
 def _tets_that_break(case: Case, parts: tuple[PartEstimate, ...]) -> int:

@@ -122,17 +122,19 @@ def estimate_table(case: Case, expected: Estimate) -> Table:
         "time step": _about(expected.dt, lambda value: si(value, "s")),
         "steps": _about(expected.steps, count),
         "memory": _up_to(expected.memory_bytes, expected.dust_bytes, size),
-        "core time": _up_to(expected.core_seconds, expected.breaking, duration),
+        "core time": _up_to(expected.core_seconds, expected.breaking, duration, "what breaks becomes dust"),
         "of which": ", ".join(f"{name} {percent(seconds / total, 0)}" for name, seconds in shares),
         "without": ", ".join(without(case)),
     })  # fmt: skip
 
 
-def _up_to(value: float | None, more: float, shown: Callable[[float], str]) -> str:
-    """What it takes, and what where bodies turn to dust, which takes so much ``more``."""
+def _up_to(
+    value: float | None, more: float, shown: Callable[[float], str], when: str = "all that may break turns to dust"
+) -> str:
+    """What it takes, and what ``when`` bodies turn to dust, which takes so much ``more``."""
     if value is None or not more:
         return _about(value, shown)
-    return f"{_about(value, shown)}, up to {shown(value + more)} if all that may break turns to dust"
+    return f"{_about(value, shown)}, up to {shown(value + more)} if {when}"
 
 
 def parts_table(case: Case, expected: Estimate) -> Table:
