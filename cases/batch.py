@@ -265,7 +265,7 @@ def read_job(folder: Path) -> Job | None:
 def read_access(folder: Path) -> Access | None:
     """Where the ranks publish; None: nowhere. Raises OSError, msgspec.MsgspecError."""
     try:
-        return _access.decode((folder / layout.ACCESS).read_bytes())
+        return _access.decode(whole.read(folder / layout.ACCESS))
     except FileNotFoundError:
         return None
 

@@ -3,8 +3,8 @@
 import errno
 import os
 import stat
+from io import FileIO
 from pathlib import Path
-from typing import BinaryIO
 
 MOST = 256 << 20
 """Bytes of a file that is read as a whole. Chosen: a case, an outcome and a manifest have some MB at most."""
@@ -30,7 +30,7 @@ def touch(path: Path) -> None:
     os.close(os.open(path, os.O_WRONLY | os.O_CREAT | _NO_LINK | _AT_ONCE, 0o666))
 
 
-def opened(path: str | Path, *, folder: int | None = None) -> BinaryIO:
+def opened(path: str | Path, *, folder: int | None = None) -> FileIO:
     """A regular file, unbuffered, to read; ``folder``: the descriptor of the directory that ``path`` is relative to.
 
     A pipe, a socket or a device would keep the reader waiting, or never end: each is refused as a directory is, with
@@ -40,23 +40,50 @@ def opened(path: str | Path, *, folder: int | None = None) -> BinaryIO:
         handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC | _AT_ONCE, dir_fd=folder)
     except OSError as error:
         raise (_no_file(path, "is not a regular file") if error.errno in _NO_FILE else error) from None
+    return _regular(handle, path, "rb")
+
+
+def appended(path: str | Path, mode: int = 0o666) -> FileIO:
+    """A regular file, unbuffered, to read and to append to; made where there is none.
+
+    Raises IsADirectoryError for a pipe, a socket or a device, OSError.
+    """
+    try:
+        handle = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC | _AT_ONCE, mode)
+    except OSError as error:
+        raise (_no_file(path, "is not a regular file") if error.errno in _NO_FILE else error) from None
+    return _regular(handle, path, "a+")
+
+
+def _regular(handle: int, path: str | Path, mode: str) -> FileIO:
     if not stat.S_ISREG(os.fstat(handle).st_mode):
         os.close(handle)
         raise _no_file(path, "is not a regular file")
-    return open(handle, "rb", buffering=0)
+    return FileIO(handle, mode)
 
 
 def read(path: str | Path, most: int = MOST) -> bytes:
     """The bytes of a regular file that has at most ``most``. Raises IsADirectoryError for anything else, OSError."""
     with opened(path) as file:
-        size = os.fstat(file.fileno()).st_size
-        pieces, left = [], min(size, most) + 1
+        left = _size(file, path, most)
+        pieces = []
         while left > 0 and (piece := file.read(left)):
             pieces.append(piece)
             left -= len(piece)
+    return b"".join(pieces)
+
+
+def check(path: str | Path, most: int = MOST) -> None:
+    """Raises what ``read`` would raise."""
+    with opened(path) as file:
+        _size(file, path, most)
+
+
+def _size(file: FileIO, path: str | Path, most: int) -> int:
+    size = os.fstat(file.fileno()).st_size
     if size > most:
         raise _no_file(path, f"has more than {most} bytes")
-    return b"".join(pieces)
+    return size
 
 
 def _no_file(path: str | Path, why: str) -> OSError:

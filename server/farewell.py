@@ -5,7 +5,7 @@ import os
 import re
 from pathlib import Path
 
-from conoid.cases import layout
+from conoid.cases import layout, whole
 
 _TAIL = 1 << 14
 """Bytes at the end of the log in which the banner of the launcher is looked for. Chosen: a banner has 700."""
@@ -14,12 +14,19 @@ _COMPLAINTS = [
     for number in (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.ESTALE, errno.EFBIG)
 ]
 _CODE = re.compile(rb"^=   EXIT CODE: (\d{1,3})$", re.MULTILINE)
+_PID = re.compile(rb"^=   PID (\d+) RUNNING AT ", re.MULTILINE)
 """MPICH's banner; Hydra writes it when a rank ends before the others, with the signal's number for a rank killed."""
 
 
 def exit_code(folder: Path) -> int | None:
     """The code of the rank that ended first, as the newest banner has it; None when there is none."""
     found = _CODE.findall(_tail(folder))
+    return int(found[-1]) if found else None
+
+
+def rank_killed(folder: Path) -> int | None:
+    """The number of the process that ended first, as the newest banner has it; None when there is none."""
+    found = _PID.findall(_tail(folder))
     return int(found[-1]) if found else None
 
 
@@ -37,7 +44,7 @@ def disk_failed(folder: Path) -> bool:
 
 def _tail(folder: Path) -> bytes:
     try:
-        with open(folder / layout.LOGS / layout.LAUNCHER_LOG, "rb") as log:
+        with whole.opened(folder / layout.LOGS / layout.LAUNCHER_LOG) as log:
             log.seek(max(0, os.fstat(log.fileno()).st_size - _TAIL))
             return log.read()
     except OSError:

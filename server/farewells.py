@@ -1,5 +1,6 @@
 """purged.jsonl: a line for every run whose folder has been removed, so that what came of it is not forgotten."""
 
+import io
 import os
 import threading
 import time
@@ -10,6 +11,7 @@ from typing import Any
 
 import msgspec
 
+from conoid.cases import whole
 from conoid.cases.outcome import known
 from conoid.cases.run import Cause, State
 
@@ -76,7 +78,7 @@ class Farewells:
         self._at: dict[str, int] = {}
         self._end = 0
         if self._path.exists():
-            with open(self._path, "rb") as file:
+            with io.BufferedReader(whole.opened(self._path)) as file:
                 for raw in file:
                     self._note(raw, self._end)
                     self._end += len(raw)
@@ -94,12 +96,11 @@ class Farewells:
 
     def add(self, line: Farewell) -> None:
         """On disk when this returns; a second line of a run replaces the first. Raises OSError."""
-        with self._lock, open(self._path, "ab", opener=_private) as file:
+        with self._lock, whole.appended(self._path, 0o600) as file:
             end = os.fstat(file.fileno()).st_size
             begin = b"" if not end or _last(self._path, end) == b"\n" else b"\n"
             try:
                 file.write(begin + msgspec.json.encode(line) + b"\n")
-                file.flush()
                 os.fsync(file.fileno())
             except OSError:
                 os.ftruncate(file.fileno(), end)
@@ -112,16 +113,12 @@ class Farewells:
         place = self._at.get(run_id)
         if place is None:
             return None
-        with open(self._path, "rb") as file:
+        with io.BufferedReader(whole.opened(self._path)) as file:
             file.seek(place)
             return _farewell.decode(file.readline())
 
 
 def _last(path: Path, end: int) -> bytes:
-    with open(path, "rb") as file:
+    with whole.opened(path) as file:
         file.seek(end - 1)
         return file.read(1)
-
-
-def _private(path: str, flags: int) -> int:
-    return os.open(path, flags, 0o600)

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import msgspec
 
-from conoid.cases import layout
+from conoid.cases import layout, whole
 from conoid.cases.messages import Status, to_json
 from conoid.cases.outcome import Outcome
 from conoid.cases.outcome import from_json as outcome_from_json
@@ -32,7 +32,7 @@ _TELLING = (layout.SUBMISSION, layout.JOURNAL, layout.WORKER)
 """One of these is left where a run has been, whatever was damaged."""
 _UNREADABLE = "outcome.unreadable.json"
 DAMAGED = (FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError)
-"""What the system says of a file that is gone, or is none any more, or not for this user."""
+"""What the system says of a file that is gone, or is none any more (``whole.opened``), or not for this user."""
 _NO_FILE = (FileNotFoundError, IsADirectoryError, NotADirectoryError)
 
 
@@ -69,8 +69,6 @@ class Process(msgspec.Struct, kw_only=True, frozen=True):
     """Clock ticks after the boot."""
     boot: str
     launched: float
-    oom_kills: int
-    """How many processes the machine had killed for want of memory by then."""
 
 
 _submission = msgspec.json.Decoder(Submission)
@@ -179,7 +177,7 @@ def size(folder: Path) -> int:
 
 def submission(folder: Path) -> Submission:
     """Raises OSError, or msgspec.MsgspecError when the file is not one."""
-    return _submission.decode((folder / layout.SUBMISSION).read_bytes())
+    return _submission.decode(whole.read(folder / layout.SUBMISSION))
 
 
 def run(folder: Path) -> Run:
@@ -208,7 +206,7 @@ def _after(told: Run, status: Status) -> Run:
 def outcome(folder: Path) -> Outcome | None:
     """What outcome.json says; None when there is none, or none that can be read."""
     try:
-        return outcome_from_json((folder / layout.OUTCOME).read_bytes())
+        return outcome_from_json(whole.read(folder / layout.OUTCOME))
     except (*_NO_FILE, msgspec.MsgspecError, UnicodeDecodeError):
         return None
 
@@ -216,7 +214,7 @@ def outcome(folder: Path) -> Outcome | None:
 def outcome_error(folder: Path) -> str:
     """Why outcome.json cannot be read; empty when it can, or when there is none."""
     try:
-        outcome_from_json((folder / layout.OUTCOME).read_bytes())
+        outcome_from_json(whole.read(folder / layout.OUTCOME))
     except FileNotFoundError:
         return ""
     except (IsADirectoryError, NotADirectoryError, PermissionError) as error:
@@ -248,7 +246,7 @@ def put_away(path: Path, kept: Path | None = None) -> None:
 
 def is_as_accepted(folder: Path, made: Submission) -> bool:
     """Whether the case is the one that was read and checked. Raises OSError."""
-    return made.body_sha256 in {"", digest_of(made.case_file, (folder / made.case_file).read_bytes())}
+    return made.body_sha256 in {"", digest_of(made.case_file, whole.read(folder / made.case_file))}
 
 
 def digest_of(case_file: str, body: bytes) -> str:
@@ -264,7 +262,7 @@ def write_stop(folder: Path, why: Cause) -> None:
 def stop_asked(folder: Path) -> Cause | None:
     """Why a stop was asked for; None when none was."""
     try:
-        return Cause((folder / layout.STOP_REQUEST).read_text())
+        return Cause(whole.read(folder / layout.STOP_REQUEST, 80).decode())
     except (OSError, ValueError):
         return None
 
@@ -272,7 +270,7 @@ def stop_asked(folder: Path) -> Cause | None:
 def process(folder: Path) -> Process | None:
     """The process that was started for the run; None when there was none."""
     try:
-        return _process.decode((folder / layout.WORKER).read_bytes())
+        return _process.decode(whole.read(folder / layout.WORKER))
     except (*DAMAGED, msgspec.MsgspecError):
         return None
 

@@ -18,8 +18,8 @@ _PASSING = frozenset(
 )  # fmt: skip
 _LASTING = 4.0
 """s of delay from which trouble that is none of the machine lasts. Chosen: the fourth try, 7 s after the first."""
-DAMAGE = frozenset({errno.EISDIR, errno.ENOTDIR, errno.EACCES, errno.EPERM, errno.ELOOP})
-"""Trouble of one file, which does not pass by itself."""
+DAMAGE = frozenset({errno.EISDIR, errno.ENOTDIR, errno.EACCES, errno.EPERM, errno.ELOOP, errno.EROFS})
+"""Trouble of one folder, which does not pass by itself where others can be written."""
 
 
 def passing(error: BaseException) -> bool:

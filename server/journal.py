@@ -7,6 +7,7 @@ from pathlib import Path
 
 import msgspec
 
+from conoid.cases import whole
 from conoid.cases.messages import Status, to_json
 from conoid.cases.run import Cause, State
 
@@ -65,7 +66,7 @@ class Tail:
     def _chunk(self, size: int = _CHUNK) -> bytes:
         """The next complete lines. A line longer than the chunk size is read whole."""
         try:
-            with open(self._path, "rb", buffering=0) as file:
+            with whole.opened(self._path) as file:
                 while True:
                     data = os.pread(file.fileno(), size, self._offset)
                     end = data.rfind(b"\n") + 1
@@ -80,7 +81,7 @@ def _line_before(path: Path, after: int) -> int:
     """Where some line with ``seq`` at most ``after`` begins, close to the last of them: numbers rise along the file."""
     if not path.exists():
         return 0
-    with open(path, "rb", buffering=0) as file:
+    with whole.opened(path) as file:
         low, high = 0, os.fstat(file.fileno()).st_size
         while high - low > _CHUNK:
             middle = (low + high) // 2
@@ -134,7 +135,7 @@ def _status_in(raw: bytes) -> Status | None:
 def last(path: Path) -> bytes:
     """The last line that is one, without the line feed; b"" where there is none. Raises OSError."""
     window = _CHUNK
-    with open(path, "rb", buffering=0) as file:
+    with whole.opened(path) as file:
         size = os.fstat(file.fileno()).st_size
         while True:
             start = max(0, size - window)
@@ -151,7 +152,7 @@ def append(path: Path, status: Status) -> Status:
     A line that a killed worker left half written is no event: it is cut off first; so is this one when it cannot be
     written whole.
     """
-    with open(path, "a+b", opener=_private) as file:
+    with whole.appended(path, 0o600) as file:
         numbered = msgspec.structs.replace(status, seq=_mend(file.fileno()) + 1)
         size = os.fstat(file.fileno()).st_size
         try:
@@ -163,12 +164,10 @@ def append(path: Path, status: Status) -> Status:
     return numbered
 
 
-def _private(path: str, flags: int) -> int:
-    return os.open(path, flags, 0o600)
-
-
 def _mend(descriptor: int) -> int:
-    """The number of the last line; what stands after the last line feed is completed or cut off."""
+    """The largest number of the last lines, however much damage follows them; what stands after the last line feed is
+    completed or cut off.
+    """
     window = _CHUNK
     while True:
         size = os.fstat(descriptor).st_size
@@ -176,11 +175,11 @@ def _mend(descriptor: int) -> int:
         data = os.pread(descriptor, size - start, start)
         end = data.rfind(b"\n") + 1
         torn = _line(data[end:]) if end or not start else None
+        known = [line.seq for raw in data[:end].splitlines() if (line := _line(raw))]
         if torn is not None:
             os.write(descriptor, b"\n")
-            return torn.seq
-        known = [line.seq for raw in data[:end].splitlines()[-3:] if (line := _line(raw))]
+            return max(torn.seq, *known, 0)
         if known or not start:
             os.ftruncate(descriptor, start + end)
-            return known[-1] if known else 0
+            return max(known, default=0)
         window *= 4

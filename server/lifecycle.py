@@ -98,8 +98,13 @@ def _end(run: Run, now: float, outcome: Outcome, *, written: bool = False) -> Ne
 
 
 def _broken(run: Run, event: Broken, now: float) -> Next:
-    """Nobody can say how it would have ended; what may still compute it ends first."""
-    outcome = Outcome(state=State.LOST, cause=Cause.STORAGE, message=event.message, ranks=run.ranks)
+    """Nobody can say how it would have ended, unless its owner has asked for the end; what may still compute it ends
+    first.
+    """
+    asked = run.stopping_for is Cause.CANCELLED
+    state, cause = (State.CANCELLED, Cause.CANCELLED) if asked else (State.LOST, Cause.STORAGE)
+    message = f"stopped on request, without results: {event.message}" if asked else event.message
+    outcome = Outcome(state=state, cause=cause, message=message, ranks=run.ranks)
     ended, actions = _end(run, now, outcome)
     return ended, (Kill(), *actions) if event.writable else (Kill(),)
 
@@ -169,7 +174,7 @@ def _reading_of(run: Run, event: WorkerExited) -> tuple[State, Cause, str]:
     if killed and event.out_of_memory:
         return State.FAILED, Cause.MEMORY, "the machine ran out of memory and ended the worker"
     if killed:
-        return State.LOST, Cause.NODE, "the worker was killed from outside"
+        return State.LOST, Cause.NODE, f"the worker was killed from outside, by signal {_SIGKILL}"
     if event.code == ExitCode.BAD_INPUT:
         return State.FAILED, Cause.INPUT, "the worker refused the case"
     if not stored:

@@ -4,6 +4,8 @@ from pathlib import Path
 
 import msgspec
 
+from conoid.cases import whole
+
 from . import durable
 from .folder import submission
 
@@ -23,8 +25,8 @@ def pinned(folder: Path) -> bool:
 def told(folder: Path) -> str:
     """``yes`` or ``no`` as was said last; empty when nobody has said anything."""
     try:
-        return (folder / _PINNED).read_text()
-    except OSError:
+        return whole.read(folder / _PINNED, 80).decode()
+    except (OSError, UnicodeDecodeError):
         return ""
 
 

@@ -20,7 +20,8 @@ LABEL = "restart"
 
 
 def body(case: Path, ranks: int | None) -> dict[str, object]:
-    """The case of a run, on so many ranks. Raises CaseError."""
+    """The case of a run, on so many ranks. Raises CaseError, OSError."""
+    whole.check(case)
     return apply_overrides(read_data(case), {} if ranks is None else {"run.ranks": ranks})
 
 

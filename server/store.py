@@ -3,6 +3,7 @@
 Runs, labels and keys are an index over the runs' folders and can be rebuilt from them; tokens live here only.
 """
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from enum import StrEnum
@@ -97,6 +98,7 @@ class Store:
             self.unlabelled = not sa.inspect(self._engine).has_table(_labels.name)
             """Whether the labels of all runs are to be read from their folders: the database is new, or an old one."""
             _meta.create_all(self._engine)
+            self._file = _identity(self._engine)
         except (SQLAlchemyError, ImportError) as error:
             failure = StoreError(f"the database cannot be opened: {str(error).splitlines()[0]}")
             if isinstance(error, sa.exc.ArgumentError):  # this URL is none
@@ -108,7 +110,9 @@ class Store:
         self._engine.dispose()
 
     def probe(self) -> None:
-        """Raises SQLAlchemyError when nothing can be written now."""
+        """Raises SQLAlchemyError when nothing can be written now, or what is written is in no file any more."""
+        if _identity(self._engine) != self._file:
+            raise SQLAlchemyError("the file of the database has been removed or replaced")
         with self._engine.connect() as connection:
             if self._engine.dialect.name == "sqlite":
                 connection.exec_driver_sql("begin immediate")
@@ -288,3 +292,13 @@ def _tune(connection: Any, _record: object) -> None:
     """WAL lets readers go on while one writes."""
     for pragma in ("journal_mode=wal", f"busy_timeout={_BUSY}"):
         connection.execute(f"pragma {pragma}").close()
+
+
+def _identity(engine: sa.Engine) -> tuple[int, int] | None:
+    """Device and number of the file of an SQLite database; None where there is none, as for other databases."""
+    place = engine.url.database if engine.dialect.name == "sqlite" else None
+    try:
+        status = os.stat(place) if place else None
+    except OSError:
+        return None
+    return (status.st_dev, status.st_ino) if status else None

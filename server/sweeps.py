@@ -12,6 +12,7 @@ from typing import Any
 
 import msgspec
 
+from conoid.cases import whole
 from conoid.cases.figures import size
 from conoid.cases.load import CaseError, Problem, apply_overrides, json_data
 
@@ -74,7 +75,7 @@ class Sweeps:
         self._filling: set[str] = set()
         for path in sorted(self._folder.glob("*.json")):
             try:
-                self._keep(msgspec.json.decode(path.read_bytes(), type=Plan))
+                self._keep(msgspec.json.decode(whole.read(path), type=Plan))
             except (OSError, msgspec.MsgspecError):
                 continue
 

@@ -9,6 +9,7 @@ import hashlib
 import hmac
 import json
 import logging
+import os
 import secrets
 import socket
 import threading
@@ -19,7 +20,7 @@ from typing import Any
 
 import zenoh
 
-from conoid.cases import keys
+from conoid.cases import keys, whole
 from conoid.cases.batch import Slurm
 from conoid.cases.messages import Status, to_msgpack
 
@@ -33,6 +34,8 @@ _log = logging.getLogger("conoid.server")
 _SECRET, _USERS = "server.secret", ".zenoh-users"
 _HANDSHAKE = 3000
 """ms in which a connection must have said who it is. Chosen: it takes two round trips."""
+_SECRET_BYTES, _SECRET_MOST = 32, 1 << 16
+"""Of the secret: at least, and what is read of a longer one."""
 _HEARS = ["put", "delete", "reply", "declare_queryable", "liveliness_token"]
 _ASKS = ["declare_subscriber", "query", "liveliness_query", "declare_liveliness_subscriber"]
 _ANSWERS = ["query", "declare_subscriber"]
@@ -212,11 +215,23 @@ def _worker_user(owner: str) -> str:
 
 
 def _read_secret(runs: Path) -> bytes:
-    """32 bytes from which all passwords follow, made at the first start."""
+    """The bytes from which all passwords follow, made at the first start. Raises TelemetryError for a file that others
+    can read, or that anybody could guess.
+    """
     path = runs / _SECRET
-    if not path.exists():
-        durable.write(path, secrets.token_bytes(32), mode=0o600)
-    return path.read_bytes()
+    remedy = "remove it, and the server makes a new one; whoever watches a run asks for a new password by himself"
+    try:
+        if not path.exists():
+            durable.write(path, secrets.token_bytes(_SECRET_BYTES), mode=0o600)
+        with whole.opened(path) as file:
+            status, found = os.fstat(file.fileno()), file.read(_SECRET_MOST)
+    except OSError as error:
+        raise TelemetryError(f"{path}: {error.strerror}: {remedy}") from None
+    if status.st_mode & 0o077:
+        raise TelemetryError(f"{path}: has the mode {status.st_mode & 0o777:o}, allowed is 600: {remedy}")
+    if len(found) < _SECRET_BYTES or len(set(found)) < _SECRET_BYTES // 4:
+        raise TelemetryError(f"{path}: has {len(found)} bytes that can be guessed, at least {_SECRET_BYTES}: {remedy}")
+    return found
 
 
 def _free_port(host: str) -> int:

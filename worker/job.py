@@ -208,7 +208,7 @@ def _cancelled(folder: Path, job: Job, message: str) -> int:
 def _so_far(folder: Path, state: State, cause: Cause, message: str) -> Outcome:
     """The outcome that the interrupted ranks have left, with its true reason."""
     try:
-        found = outcome.from_json((folder / layout.INTERRUPTED).read_bytes())
+        found = outcome.from_json(whole.read(folder / layout.INTERRUPTED))
     except (OSError, msgspec.MsgspecError):
         found = Outcome(state=state)
     return msgspec.structs.replace(found, state=state, cause=cause, message=message)

@@ -11,12 +11,13 @@ from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO
 
-from conoid.cases import checkpoints, layout
+from conoid.cases import checkpoints, layout, whole
 
+from .. import farewell
 from .. import folder as run_folder
 from ..folder import Process
 from ..settings import Settings, command, usable_cores
-from . import DamagedError, Exit, Job, LaunchError, Phase, Trace, Worker, processes
+from . import DamagedError, Exit, Job, LaunchError, Phase, Trace, Worker, memory, processes
 
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _NOT_FOR_WORKERS = ("CONOID_DATABASE", "CONOID_TOKEN")
@@ -45,11 +46,11 @@ class LocalLauncher:
         self._mpiexec, self._worker = settings.mpiexec, settings.worker
         self._living: dict[str, set[int]] = {}
         self._looked = -_FRESH
+        self._kills = memory.Kills()
 
     def start(self, job: Job) -> Worker:
         """Starts the ranks; their terminal output goes to log/launcher.log. Raises LaunchError."""
         argv = [*find_mpiexec(self._mpiexec), "-n", str(job.ranks), *self._worker, *_arguments(job)]
-        oom_kills = processes.oom_kills()
         with _log_of(job.folder) as log:
             try:
                 child = subprocess.Popen(
@@ -58,7 +59,7 @@ class LocalLauncher:
                 )  # fmt: skip
             except OSError as error:
                 raise LaunchError(f"{argv[0]} cannot be started: {error.strerror}") from None
-        worker = LocalWorker(job.run, job.folder, _record(child.pid, oom_kills), child)
+        worker = LocalWorker(job.run, job.folder, _record(child.pid), self._kills, child)
         try:
             run_folder.write_process(job.folder, worker.process)
         except OSError as error:
@@ -73,10 +74,10 @@ class LocalLauncher:
             leader = processes.leader_of(self._members(run))
             if leader is None:
                 return Trace(None, False, False)
-            process = _record(leader, processes.oom_kills())
+            process = _record(leader)
             with suppress(OSError):
                 run_folder.write_process(folder, process)
-        worker = LocalWorker(run, folder, process)
+        worker = LocalWorker(run, folder, process, self._kills)
         rebooted = process.boot != processes.boot()
         return Trace(worker if not rebooted and worker.alive() else None, True, rebooted)
 
@@ -96,7 +97,7 @@ def _log_of(folder: Path) -> BinaryIO:
     """Where the ranks say what they have to say, in a folder that is made anew when it was removed."""
     try:
         (folder / layout.LOGS).mkdir(0o700, exist_ok=True)
-        return open(folder / layout.LOGS / layout.LAUNCHER_LOG, "ab")
+        return whole.appended(folder / layout.LOGS / layout.LAUNCHER_LOG)
     except OSError as error:
         raise DamagedError(f"{layout.LOGS} cannot be written: {error.strerror}") from None
 
@@ -135,17 +136,20 @@ def _arguments(job: Job) -> list[str]:
     return arguments
 
 
-def _record(pid: int, oom_kills: int) -> Process:
+def _record(pid: int) -> Process:
     started = processes.start_time(pid) or 0
-    return Process(pid=pid, started=started, boot=processes.boot(), launched=time.time(), oom_kills=oom_kills)
+    return Process(pid=pid, started=started, boot=processes.boot(), launched=time.time())
 
 
 class LocalWorker:
     """A worker on this machine, started by this server or by one before it."""
 
-    def __init__(self, run: str, folder: Path, process: Process, child: subprocess.Popen[bytes] | None = None) -> None:
+    def __init__(
+        self, run: str, folder: Path, process: Process, kills: memory.Kills,
+        child: subprocess.Popen[bytes] | None = None,
+    ) -> None:  # fmt: skip
         """``child`` when this server is the parent."""
-        self._run, self._folder, self._child = run, folder, child
+        self._run, self._folder, self._kills, self._child = run, folder, kills, child
         self.process = process
 
     def alive(self) -> bool:
@@ -168,9 +172,10 @@ class LocalWorker:
 
     def exited(self) -> Exit | None:
         """None while ``mpiexec`` lives. Ranks that it left behind are killed, so that nobody writes any more."""
+        self._kills.count()
         if self.alive() or processes.end_run(self._run):
             return None
-        starved = processes.oom_kills() > self.process.oom_kills
+        starved = self._kills.ended(farewell.rank_killed(self._folder) or self.process.pid)
         return Exit(self._child.returncode if self._child else None, starved, self._last_words())
 
     def stop(self) -> None:
@@ -192,7 +197,7 @@ class LocalWorker:
     def _last_words(self) -> str:
         """The last line that is neither of the launcher's own banner nor of MPI, which says that a rank has ended."""
         try:
-            with open(self._folder / layout.LOGS / layout.LAUNCHER_LOG, "rb") as log:
+            with whole.opened(self._folder / layout.LOGS / layout.LAUNCHER_LOG) as log:
                 log.seek(max(0, os.fstat(log.fileno()).st_size - _LOG_TAIL))
                 text = log.read().decode(errors="replace")
         except OSError:

@@ -21,14 +21,6 @@ def boot() -> str:
     return (_PROC / "sys/kernel/random/boot_id").read_text().strip()
 
 
-def oom_kills() -> int:
-    """Processes that the kernel has ended for want of memory since the boot."""
-    for line in (_PROC / "vmstat").read_text().splitlines():
-        if line.startswith("oom_kill "):
-            return int(line.split()[1])
-    return 0
-
-
 def start_time(pid: int) -> int | None:
     """Clock ticks from the boot to the start of process ``pid``; None when it has ended, reaped or not."""
     fields = _stat(pid)

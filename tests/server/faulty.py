@@ -177,7 +177,7 @@ class Puppets:
         puppet = Puppet(job.run, job.folder, self.ends)
         self.made.append(puppet)
         try:
-            folder.write_process(job.folder, Process(pid=1, started=0, boot="b", launched=0.0, oom_kills=0))
+            folder.write_process(job.folder, Process(pid=1, started=0, boot="b", launched=0.0))
         except OSError as error:
             puppet.kill()
             raise LaunchError(f"the worker cannot be recorded: {error.strerror}") from None

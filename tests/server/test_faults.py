@@ -192,7 +192,7 @@ def test_ids_go_on_in_order_when_the_clock_was_set_back(monkeypatch: pytest.Monk
 
 def test_an_adopted_run_has_used_the_time_that_it_ran(tmp_path: Path) -> None:
     ticks = os.sysconf("SC_CLK_TCK") * (time.clock_gettime(time.CLOCK_BOOTTIME) - 100.0)
-    made = folder.Process(pid=1, started=int(ticks), boot="b", launched=0.0, oom_kills=0)
+    made = folder.Process(pid=1, started=int(ticks), boot="b", launched=0.0)
     folder.write_process(tmp_path, made)
     assert folder.runs_for(tmp_path) == pytest.approx(100.0, abs=1.0)
 

@@ -4,7 +4,9 @@ Where a write fails, HDF5 goes on with what it could not put down: it fails agai
 Python can only print that, and ends in a segmentation fault; or a file is taken for whole of which a part is missing.
 """
 
+import errno
 import os
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,14 +17,27 @@ import h5py
 
 @contextmanager
 def created(path: Path) -> Iterator["h5py.File"]:
-    """A new HDF5 file, flushed to disk at the end. Raises OSError with the name of the file where it is not whole."""
-    with path.open("w+b", buffering=0) as raw:
+    """A new HDF5 file, flushed to disk at the end. Raises OSError with the name of the file where it is not whole:
+    the first failure of the disk, whatever HDF5 has made of it.
+    """
+    with open(path, "w+b", buffering=0, opener=_at_once) as raw:
         disk = _Disk(raw)
-        with h5py.File(disk, "w") as file:
-            yield file
-        if disk.failure is not None:
-            raise OSError(disk.failure.errno, disk.failure.strerror, str(path))
+        try:
+            with h5py.File(disk, "w") as file:
+                yield file
+        finally:
+            if disk.failure is not None:
+                raise OSError(disk.failure.errno, disk.failure.strerror, str(path))
         os.fsync(raw.fileno())
+
+
+def _at_once(path: str, flags: int) -> int:
+    """What is no regular file takes no HDF5 file: a pipe would keep the rank waiting, a device forgets."""
+    handle = os.open(path, flags | os.O_NONBLOCK, 0o666)
+    if not stat.S_ISREG(os.fstat(handle).st_mode):
+        os.close(handle)
+        raise OSError(errno.ENOSPC, "is not a regular file, and keeps nothing", path)
+    return handle
 
 
 class _Disk:

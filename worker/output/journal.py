@@ -8,12 +8,24 @@ from typing import Any, Protocol, TypeVar
 
 import msgspec
 
-from conoid.cases import layout, messages
+from conoid.cases import layout, messages, whole
 from conoid.cases.run import State
 
 from . import storage
 
 M = TypeVar("M", bound=messages.Message)
+_MOST = 1 << 40
+"""Bytes of a journal: it has no limit of its own."""
+
+
+class _Head(msgspec.Struct):
+    """What every message has."""
+
+    seq: int
+    type: str
+
+
+_head = msgspec.json.Decoder(_Head)
 
 
 class Listener(Protocol):
@@ -33,15 +45,16 @@ class Journal:
         """Indices of the frames that it lists."""
         self.snapshots = 0
         """One more than the largest number of a snapshot that it lists."""
-        self._seq = 0
-        for message in _written(path):
-            self._seq = message.seq
+        self._file = whole.appended(path)
+        self._seq, content = 0, whole.read(path, _MOST)
+        for line in content.splitlines():
+            self._seq = max(self._seq, _number(line))
+        for message in _written(content):
             if isinstance(message, messages.Frame):
                 self.frames.add(message.index)
             elif isinstance(message, messages.Snapshot):
                 self.snapshots = max(self.snapshots, message.n + 1)
-        self._file = path.open("ab", buffering=0)
-        if path.stat().st_size and not path.read_bytes().endswith(b"\n"):
+        if content and not content.endswith(b"\n"):
             self._file.write(b"\n")
         self._listener = listener
 
@@ -68,8 +81,16 @@ class Journal:
         self._file.close()
 
 
-def _written(path: Path) -> Iterator[messages.AnyMessage]:
+def _number(line: bytes) -> int:
+    """Of a message, also of one that another version has written; 0 for what is none."""
+    try:
+        return _head.decode(line).seq
+    except (msgspec.DecodeError, UnicodeDecodeError):
+        return 0
+
+
+def _written(content: bytes) -> Iterator[messages.AnyMessage]:
     """The messages of a journal; a line that a crash has torn is passed over."""
-    for line in path.read_bytes().splitlines() if path.exists() else ():
-        with contextlib.suppress(msgspec.DecodeError):
+    for line in content.splitlines():
+        with contextlib.suppress(msgspec.DecodeError, UnicodeDecodeError):
             yield messages.from_json(line)

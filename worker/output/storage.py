@@ -12,7 +12,8 @@ def gone(error: BaseException, folder: Path) -> bool:
     """True when a file below ``folder`` is the trouble: somebody has taken it away, or locked it up."""
     if not isinstance(error, OSError) or not isinstance(error.filename, str | bytes):
         return False
-    return Path(os.fsdecode(error.filename)).resolve().is_relative_to(folder.resolve())
+    path = Path(os.fsdecode(error.filename))
+    return (path.parent.resolve() / path.name).is_relative_to(folder.resolve())
 
 
 def require(file: IO[Any], path: Path) -> None:

@@ -1,0 +1,86 @@
+"""Which processes the kernel has ended for want of memory.
+
+The kernel counts them, for the machine and for each control group, and writes the number of each into its log, which a
+service may not be permitted to read. Only a kill that one of these proves is told as want of memory.
+"""
+
+import ctypes
+import re
+import time
+from collections import deque
+from pathlib import Path
+
+_PROC, _CGROUPS = Path("/proc"), Path("/sys/fs/cgroup")
+_READ_ALL, _LOG = 3, 1 << 20
+"""Of klogctl(3); bytes of the kernel's log that are read, its newest."""
+_KILLED = re.compile(rb"Killed process (\d+) \(")
+_PAUSE, _RECENT = 0.25, 3.0
+"""s between two counts; s before the end of the ranks in which a count must have grown. Chosen: Hydra ends the other
+ranks within a second."""
+_FIRST_NAMESPACE = "pid:[4026531836]"
+"""Of process numbers: where those of the kernel's log hold (linux/proc_ns.h, PROC_PID_INIT_INO)."""
+
+
+def kills() -> int:
+    """Processes that the kernel has ended for want of memory: of this control group, where that is counted, else of
+    the machine.
+    """
+    own = _of_the_group()
+    return own if own is not None else _count(_PROC / "vmstat") or 0
+
+
+def _of_the_group() -> int | None:
+    for line in (_PROC / "self/cgroup").read_text().splitlines():
+        _, controllers, path = line.split(":", 2)
+        if not controllers:
+            found = _count(_CGROUPS / path.lstrip("/") / "memory.events")
+        elif "memory" in controllers.split(","):
+            found = _count(_CGROUPS / "memory" / path.lstrip("/") / "memory.oom_control")
+        else:
+            continue
+        if found is not None:
+            return found
+    return None
+
+
+def _count(path: Path) -> int | None:
+    try:
+        words = dict(line.split(None, 1) for line in path.read_text().splitlines())
+        return int(words["oom_kill"])
+    except (OSError, KeyError, ValueError):
+        return None
+
+
+class Kills:
+    """Belongs to the supervisor's thread."""
+
+    def __init__(self) -> None:
+        """Counts for the first time."""
+        self._counts: deque[tuple[float, int]] = deque([(time.monotonic(), kills())])
+
+    def count(self) -> None:
+        """To be called again and again while workers live."""
+        now = time.monotonic()
+        if now < self._counts[-1][0] + _PAUSE:
+            return
+        self._counts.append((now, kills()))
+        while len(self._counts) > 1 and self._counts[1][0] < now - _RECENT:
+            self._counts.popleft()
+
+    def ended(self, pid: int | None) -> bool:
+        """Whether the kernel has just ended process ``pid``: by its log, or, where that cannot be read, because it has
+        ended some process in these seconds.
+        """
+        if kills() == self._counts[0][1]:
+            return False
+        named = logged()
+        return named is None or pid is None or pid in named
+
+
+def logged() -> set[int] | None:
+    """The numbers in the kernel's log; None where this process may not read it, or has other numbers."""
+    room = ctypes.create_string_buffer(_LOG)
+    size = ctypes.CDLL(None).klogctl(_READ_ALL, room, _LOG)
+    if size <= 0 or (_PROC / "self/ns/pid").readlink().name != _FIRST_NAMESPACE:
+        return None
+    return {int(number) for number in _KILLED.findall(room.raw[:size])}
