@@ -246,7 +246,7 @@ def broken_share(case: Case, part: Part, speed: float) -> float:
     own = [abs(rate) for motion in (part.stretch, part.spin) if motion is not None for rate in motion.rate]
     rate = max(speed / length, made.brittle.strength / made.elastic.young * wave_speed(made) / length, *own)
     fragment = (24.0 * made.brittle.energy / (made.density * rate**2)) ** (1.0 / 3.0)
-    return min(1.0, part.mesh.element_size / fragment)
+    return float(min(1.0, part.mesh.element_size / fragment))
 
 
 def _tets_that_break(case: Case, parts: tuple[PartEstimate, ...]) -> int:
