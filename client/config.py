@@ -1,14 +1,19 @@
 """Where the server is and who asks: options first, then the environment, then the user's configuration file."""
 
 import os
+import re
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import urlsplit
 
+from conoid.cases.problems import shown
+
 from .errors import ClientError, UsageError
 
 DEFAULT_URL = "http://127.0.0.1:8750"
+_SIGNS = re.compile(r"[!-\[\]-~]+")
+"""Of an address: visible ASCII without the backslash, which some programs take for a slash."""
 
 
 @dataclass(frozen=True)
@@ -31,23 +36,28 @@ def target(url: str | None = None, token: str | None = None) -> Target:
     Raises ClientError.
     """
     saved = read_config()
-    chosen = (url or os.environ.get("CONOID_URL") or saved.get("url") or DEFAULT_URL).rstrip("/")
-    if not _is_address(chosen):
-        raise UsageError(f"url = {chosen!r}: write it with http:// or https://, such as {DEFAULT_URL}")
+    chosen = address(url or os.environ.get("CONOID_URL") or saved.get("url") or DEFAULT_URL)
     shown = token or os.environ.get("CONOID_TOKEN")
     if not shown and chosen == saved.get("url", DEFAULT_URL).rstrip("/"):
         shown = saved.get("token")
     return Target(chosen, shown or None)
 
 
-def _is_address(url: str) -> bool:
-    """Whether it names a server: scheme, host, and a port that there may be."""
+def address(url: str) -> str:
+    """The address of a server: scheme, host, perhaps port and path, without a slash at its end. Raises UsageError."""
     try:
         parts = urlsplit(url)
         fits = parts.port is None or parts.port > 0
     except ValueError:
-        return False
-    return fits and parts.scheme in {"http", "https"} and bool(parts.hostname) and url.isprintable() and " " not in url
+        fits = False
+    wanted = f"write it with http:// or https://, such as {DEFAULT_URL}"
+    if not (fits and parts.scheme in {"http", "https"} and parts.hostname and _SIGNS.fullmatch(url)):
+        raise UsageError(f"url = {shown(url)}: {wanted}")
+    if "@" in parts.netloc:
+        raise UsageError(f"url: a user or password in it is not sent; {wanted}, and the token with --token")
+    if parts.query or parts.fragment or url.endswith(("?", "#")):
+        raise UsageError(f"url = {shown(url)}: no ? or # may follow the address; {wanted}")
+    return url.rstrip("/")
 
 
 def read_config() -> dict[str, str]:

@@ -8,6 +8,7 @@
     └── ClientError
         ├── ServiceError     the server refused: the fields of an RFC 9457 problem
         ├── UnreachableError no server answered
+        │   └── AnswerError  what answered cannot be read, has no end, or is somewhere else
         ├── NotFoundError    there is no such run, file or folder, here or on the server (then a ServiceError, too)
         ├── UnfinishedError  a result was asked of a run that has none yet
         ├── UsageError       what was asked for is wrong: an argument, a value, a name that nobody knows
@@ -21,6 +22,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from conoid.cases.problems import CaseError, ConoidError, Problem
+
+_LONGEST = 1000
+"""Characters of a server's words that are shown. Chosen: half a screen."""
 
 
 class ClientError(ConoidError):
@@ -61,9 +65,17 @@ class UnreachableError(ClientError):
     """No server answered at the address, or the answer broke off."""
 
 
+class AnswerError(UnreachableError):
+    """What the server answered cannot be read, is longer than any answer, comes too slowly, or points elsewhere. To ask
+    again is of no use.
+    """
+
+
 def passes(error: ClientError) -> bool:
     """Whether the same request may succeed soon: nobody answered, or who answered says so."""
-    return isinstance(error, UnreachableError) or (isinstance(error, ServiceError) and error.retryable)
+    if isinstance(error, UnreachableError):
+        return not isinstance(error, AnswerError)
+    return isinstance(error, ServiceError) and error.retryable
 
 
 class UnfinishedError(ClientError):
@@ -85,14 +97,21 @@ class LookError(UsageError, ViewError):
 
 
 def _line(status: int, problem: Mapping[str, Any]) -> str:
-    said = str(problem.get("detail") or problem.get("title") or f"the server answered {status}")
-    hint = str(problem.get("hint") or "")
+    said = _brief(problem.get("detail") or problem.get("title") or f"the server answered {status}")
+    hint = _brief(problem.get("hint") or "")
     return f"{said} ({hint})" if hint and hint not in said else said
+
+
+def _brief(told: object) -> str:
+    """What a server says, as people can read it."""
+    text = str(told)
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
 
 
 def refusal(status: int, problem: Mapping[str, Any]) -> ConoidError:
     """What a refusal of the server is raised as: what is raised where the same is found on this machine."""
-    entries = [entry for entry in problem.get("errors") or [] if isinstance(entry, Mapping)]
+    told = problem.get("errors")
+    entries = [entry for entry in told if isinstance(entry, Mapping)] if isinstance(told, list) else []
     if status == 422 and entries:
         return CaseError(
             Problem(*(str(entry.get(name) or "") for name in ("key", "value", "message"))) for entry in entries

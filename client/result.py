@@ -7,7 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import msgspec
 
@@ -87,6 +87,37 @@ class LocalFolder:
         return f"{self.root} is not the folder of a run, it holds those of {', '.join(runs[:_NAMED])}{more}"
 
 
+class _Part(msgspec.Struct):
+    """What is used of a part of a case."""
+
+    name: str
+    material: str | None = None
+    velocity: tuple[float, float, float] | None = None
+    mesh: dict[str, Any] = {}
+    fracture: dict[str, Any] | None = None
+
+
+class _Boundary(msgspec.Struct):
+    """What is used of a boundary of a case; a wall has a point and a normal, a plane of symmetry an axis."""
+
+    kind: str
+    axis: Literal["x", "y", "z"] | None = None
+    at: float = 0.0
+    point: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    parts: list[str] | None = None
+
+
+class _Case(msgspec.Struct):
+    """What is used of a case: a file of another shape is refused with the place that is wrong."""
+
+    name: str | None = None
+    title: str | None = None
+    description: str | None = None
+    parts: list[_Part] = []
+    boundaries: list[_Boundary] = []
+
+
 @dataclass(frozen=True)
 class FrameFile:
     """One written frame: its number, its simulated time in s (None when it is not listed), its name in the folder."""
@@ -148,8 +179,9 @@ class Result:
         """The case with every default filled in, in SI, as plain data. Raises UnfinishedError, ClientError."""
         path = self.folder.path(layout.RESOLVED_CASE)
         try:
-            data: dict[str, Any] = json.loads(path.read_bytes())
-        except ValueError as error:
+            data = msgspec.json.decode(path.read_bytes(), type=dict[str, Any])
+            msgspec.convert(data, _Case)
+        except (msgspec.MsgspecError, RecursionError) as error:
             raise ClientError(f"{self.folder.told(layout.RESOLVED_CASE)}: this case cannot be read: {error}") from None
         return data
 
@@ -274,7 +306,7 @@ class Result:
         try:
             text = self.folder.path(f"{layout.FRAMES}/{layout.FRAME_SERIES}").read_bytes()
             return {entry["name"]: float(entry["time"]) for entry in json.loads(text)["files"]}
-        except (UnfinishedError, ValueError, KeyError):
+        except (UnfinishedError, ValueError, KeyError, TypeError):
             return {}
 
 

@@ -1,6 +1,7 @@
 """A handle of a run on a server: status, wait, watch, cancel, events, files, download, result."""
 
 import math
+import os
 import shutil
 import tempfile
 import time
@@ -9,8 +10,8 @@ from collections.abc import Generator
 from contextlib import suppress
 from dataclasses import dataclass
 from html import escape
-from pathlib import Path, PurePosixPath
-from typing import Any
+from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import Annotated, Any
 from urllib.parse import quote
 
 import msgspec
@@ -20,22 +21,26 @@ from conoid.cases.figures import duration
 from conoid.cases.messages import AnyMessage, Progress
 from conoid.cases.messages import Snapshot as Told
 from conoid.cases.outcome import Outcome
+from conoid.cases.problems import shown
 from conoid.cases.run import State
 
 from .errors import ClientError, NotFoundError, ServiceError, UnfinishedError, UnreachableError, passes
 from .http import Http
-from .journal import from_line
 from .link import Link
 from .live import Live
 from .result import Result, outcome_of
 from .snapshots import Snapshot
 
+ID = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,127}\Z"
+"""Of a run or a sweep: a name of a folder, too."""
 _WAIT = 20.0
 """s of a single request that waits for the end of a run: below the 30 s after which a request is given up (http.py)."""
 _PATIENCE = 120.0
 """s that a server may be away while the end of a run is waited for. Chosen: time for a restart, twice over."""
 
 
+_LONGEST_NAME = 255
+"""Bytes of the name of a file: NAME_MAX of Linux."""
 _OF_ONE = {"title", "estimate", "progress", "outcome_json"}
 """What is told of one run, not in a list."""
 
@@ -43,7 +48,7 @@ _OF_ONE = {"title", "estimate", "progress", "outcome_json"}
 class RunInfo(msgspec.Struct, kw_only=True, frozen=True):
     """What the server tells of a run. Times are Unix s, None when they have not come yet."""
 
-    id: str
+    id: Annotated[str, msgspec.Meta(pattern=ID)]
     owner: str
     name: str
     state: State
@@ -188,7 +193,7 @@ class Run:
         more = True
         while more:
             page = self.session.get(EventPage, f"{self.path}/events", after=after)
-            found += map(from_line, page.events)
+            found += [self.session.line(event) for event in page.events]
             after, more = page.last, page.more
         return found
 
@@ -310,8 +315,25 @@ def quoted(text: str, safe: str = "") -> str:
 
 
 def inside(root: Path, name: str) -> Path:
-    """The path of ``name`` below ``root``. Raises ClientError for a name that would leave it."""
-    path = PurePosixPath(name)
-    if path.is_absolute() or ".." in path.parts or not path.parts:
-        raise ClientError(f"{name!r} lies outside the run's folder")
-    return root.joinpath(*path.parts)
+    """The path of ``name``, which a server or a user has given, below ``root``.
+
+    Raises ClientError for a name that would leave it, here or on another system, also by a link that lies in ``root``,
+    and for one that no file can have.
+    """
+    path, other = PurePosixPath(name), PureWindowsPath(name)
+    if path.is_absolute() or other.anchor or ".." in (*path.parts, *other.parts) or not path.parts:
+        raise ClientError(f"{shown(name)} lies outside the run's folder")
+    if "\0" in name or not _writable(name):
+        raise ClientError(f"{shown(name)}: no file can have this name")
+    target = root.joinpath(*path.parts)
+    if not target.parent.resolve().is_relative_to(root.resolve()):
+        raise ClientError(f"{shown(name)}: a link in {root} leads out of it")
+    return target
+
+
+def _writable(name: str) -> bool:
+    """Whether each part of it fits a file system."""
+    try:
+        return all(len(os.fsencode(part)) <= _LONGEST_NAME for part in name.split("/"))
+    except UnicodeEncodeError:
+        return False

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
 
@@ -17,10 +17,12 @@ from conoid.cases.load import CaseError, Problem, apply_overrides
 from conoid.cases.problems import shown
 from conoid.cases.run import State
 
-from .errors import ClientError
+from .errors import AnswerError, ClientError
 from .http import Http
-from .run import Run, RunInfo, quoted
+from .run import ID, Run, RunInfo, quoted
 
+_COLUMNS = {"run", "state"}
+"""That the table of every sweep has."""
 Point = dict[str, Any]
 """What is changed at a point, by key: ``{"parts[0].velocity[2]": "-200 m/s"}``."""
 
@@ -35,7 +37,7 @@ class SweepPoint(msgspec.Struct, kw_only=True, frozen=True):
 class SweepInfo(msgspec.Struct, kw_only=True, frozen=True):
     """What the server tells of a sweep; ``submitted`` in Unix s, ``states`` counts its runs."""
 
-    id: str
+    id: Annotated[str, msgspec.Meta(pattern=ID)]
     name: str
     submitted: float
     total: int
@@ -88,8 +90,13 @@ class Sweep:
         return self.session.post(SweepInfo, f"{self.path}:cancel")
 
     def csv(self) -> str:
-        """A line a point: what was changed, the state of the run, its results."""
-        return self.session.fetch(f"{self.path}/table").decode()
+        """A line a point: what was changed, the state of the run, its results. Raises AnswerError for another text."""
+        text = self.session.fetch(f"{self.path}/table").decode(errors="replace")
+        if not set(next(csv.reader(io.StringIO(text)), [])) >= _COLUMNS:
+            raise AnswerError(
+                f"the answer of {self.session.url} is no table of a sweep: it begins with {shown(text[:40])}"
+            )
+        return text
 
     def table(self) -> list[dict[str, str]]:
         """The lines of the table by column, as text."""

@@ -79,6 +79,7 @@ def test_one_module_prints() -> None:
     assert found == {"console.py", "render.py"}
 
 
+TABLE = f"{EVIL},run,state\n".encode()
 TEXTS = dict.fromkeys(("owner", "name", "message", "reason", "title", "cause"), EVIL)
 RUN = run_info(**TEXTS, labels={EVIL: EVIL})
 ASKED = {
@@ -101,7 +102,10 @@ ASKED = {
 def test_no_command_prints_what_a_terminal_would_obey(words: tuple[str, ...], server: Hostile) -> None:
     refusal = said({"title": EVIL, "detail": EVIL, "hint": EVIL}, 409)
     server.answers = {path: said(data) for path, data in ASKED.items()}
-    server.answers |= {"/v1/sweeps/b/table": said(EVIL.encode(), kind="text/csv"), "/v1/runs/a:checkpoint": refusal}
+    server.answers |= {
+        "/v1/sweeps/b/table": said(TABLE, kind="text/csv"),
+        "/v1/runs/a:checkpoint": refusal,
+    }
     if words[0] == "submit":
         server.answers["/v1/runs"] = refusal
     result = conoid(server, *words)

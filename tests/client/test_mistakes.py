@@ -55,6 +55,22 @@ def test_a_folder_that_is_none_of_a_run_is_not_followed(quiet_home: Path) -> Non
     assert "many is not the folder of a run, it holds those of one" in refused(1, "watch", "many")
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[]", "5", "{", '{"parts": 5}', '{"parts": [5]}', '{"parts": [{}]}',
+        '{"boundaries": [{"kind": "wall", "point": 1}]}',
+        '{"boundaries": [{"kind": "symmetry", "axis": 7}]}', '{"parts": [{"name": "a", "mesh": []}]}', "[" * 100_000,
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("command", ["report", "compare"])
+def test_a_case_of_another_shape_is_one_line(command: str, text: str, damaged: Path) -> None:
+    (damaged / layout.RESOLVED_CASE).write_text(text)
+    (damaged / layout.OUTCOME).write_text('{"state": "succeeded"}')
+    words = (damaged, damaged) if command == "compare" else (damaged,)
+    assert "this case cannot be read" in refused(1, command, *words)
+
+
 def test_a_link_out_of_a_folder_is_not_read(damaged: Path) -> None:
     """A report would carry a file of its reader."""
     (damaged / layout.RESOLVED_CASE).unlink()

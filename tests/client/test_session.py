@@ -1,8 +1,10 @@
 """Requests and refusals, with answers made up by a transport in this process."""
 
+import errno
 import json
 import math
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +16,7 @@ from conoid.cases.problems import ConoidError
 from conoid.client.config import DEFAULT_URL, target
 from conoid.client.errors import ClientError, NotFoundError, ServiceError, UnreachableError, UsageError
 from conoid.client.result import Result
-from conoid.client.run import inside
+from conoid.client.run import Run, inside
 from conoid.client.session import Session
 from conoid.client.submission import body_of
 
@@ -201,11 +203,15 @@ def test_a_file_name_cannot_leave_the_folder(name: str, tmp_path: Path) -> None:
 # The case that is sent ------------------------------------------------------------------------------------------------
 
 
-def test_a_download_for_which_there_is_no_room_is_named(tmp_path: Path) -> None:
-    (tmp_path / ".a.csv.part").symlink_to("/dev/full")
+def test_a_download_for_which_there_is_no_room_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> Iterator[bytes]:
+        yield b"x"
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
     session = served(lambda _: httpx2.Response(200, content=b"x"))
+    monkeypatch.setattr(session, "_chunks", full)
     with pytest.raises(OSError, match="No space left on device") as raised:
-        session.run("r").download(tmp_path, "a.csv")
+        Run(session, "r").download(tmp_path, "a.csv")
     assert raised.value.filename == str(tmp_path / "a.csv")
     assert not list(tmp_path.iterdir())
 
