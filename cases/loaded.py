@@ -27,6 +27,9 @@ _FACETS, _CURVED, _FLAT = 0.3, 0.02, 1e-6
 """Of an area, what facets may have less than the surface that they stand for, and patches less or more: the square of
 the size of an element by the radius times the first (a chord 1.3 times as long as an element and the end of a cylinder:
 a sixth of it squared), and the second; the third of flat faces. Chosen, but for the sixth (geometry)."""
+_CORNERS = 4.0
+"""Faces of curved and unstructured meshes that may be in a region although no patch is, by the square of the size of an
+element. Chosen."""
 _FACTOR, _NODES = 3.0, 10
 """Between an estimate of nodes and their number, and nodes more. Chosen: in a layer of an unstructured mesh are a third
 to three times as many as in the volume of a layer."""
@@ -46,6 +49,8 @@ class Load:
     spread: float = 0.0
     """By how much the area of the faces of a mesh may be another, m^2."""
     nodes: int | None = None
+    fewest: int = 0
+    """Of them, those in a box that is not widened by half an element on all sides."""
     exact: bool = False
     """Whether nodes are counted and not estimated."""
 
@@ -55,8 +60,9 @@ class Load:
             return abs(area - self.area) <= self.spread
         if self.nodes is None or faces:
             return True
-        few, many = sorted((nodes, self.nodes))
-        return few == many if self.exact else many <= _FACTOR * few + _NODES
+        if self.exact:
+            return nodes == self.nodes
+        return self.fewest <= _FACTOR * nodes + _NODES and nodes <= _FACTOR * self.nodes + _NODES
 
     def words(self) -> str:
         """``about 32 faces, 4 mm^2``."""
@@ -201,7 +207,8 @@ def _inside(body: Placed, region: Region) -> tuple[float, float, float]:
                 area += patch * (corners[i][j] == 4)
                 rim += patch * (corners[i][j] == 3 or (not aligned and _on_rim(corners, i, j)))
     faces = (2.0 if _counted(mesh) else FACES_PER_SURFACE) * area / mesh.element_size**2
-    return area, max(faces, 1.0) if area else 0.0, rim + _facets(mesh) * area
+    corners_alone = 0.0 if _regular(mesh) else _CORNERS * mesh.element_size**2
+    return area, max(faces, 1.0) if area else 0.0, rim + _facets(mesh) * area + corners_alone
 
 
 def _on_rim(corners: list[list[int]], i: int, j: int) -> bool:
@@ -232,24 +239,26 @@ def _quad(a: Vector, b: Vector, c: Vector, d: Vector) -> float:
 
 
 def _held(case: Case, number: int, spec: Prescribed) -> Load:
-    region, nodes, exact, left = Region.of(spec), 0, True, _MOST
+    region, left = Region.of(spec), _MOST
+    nodes, fewest, exact = 0, 0, True
     for part in _parts(case, spec):
         mesh = part.mesh
         if isinstance(mesh, MeshFile):
             return Load(number)
         body = Placed(mesh, part.turn)
         if region.everything:
-            nodes, exact = nodes + mesh_size(mesh).nodes, exact and _counted(mesh)
-        elif _meets(region, body):
-            if isinstance(mesh, Loose) or not left:
-                return Load(number)
-            count = _grid_nodes(body, region)
-            nodes, exact, left = (
-                nodes + (_about(body, region) if count is None else count),
-                exact and count is not None,
-                left - 1,
-            )
-    return Load(number, nodes=nodes, exact=exact)
+            few = many = mesh_size(mesh).nodes
+            exact = exact and _counted(mesh)
+        elif not _meets(region, body):
+            continue
+        elif isinstance(mesh, Loose) or not left:
+            return Load(number)
+        else:
+            count, left = _grid_nodes(body, region), left - 1
+            few, many = (count, count) if count is not None else _between(body, region)
+            exact = exact and count is not None
+        nodes, fewest = nodes + many, fewest + few
+    return Load(number, nodes=nodes, fewest=fewest, exact=exact)
 
 
 def _counted(mesh: Generated) -> bool:
@@ -271,15 +280,19 @@ def _grid_nodes(body: Placed, region: Region) -> int | None:
     return sum(bool(region.holds(body.turned(point), margin)) for point in itertools.product(x, y, z))
 
 
-def _about(body: Placed, region: Region) -> int:
-    """The nodes of a body in a box, by the volume that the body has in it, half an element wider on all sides."""
+def _between(body: Placed, region: Region) -> tuple[int, int]:
+    """About how many nodes a body has in a box, and in the same half an element wider on all sides."""
+    return _about(body, region, 0.0), _about(body, region, 0.5 * body.mesh.element_size)
+
+
+def _about(body: Placed, region: Region, wider: float) -> int:
+    """The nodes of a body in a box that is ``wider``, m, on all sides, by the volume that the body has in it."""
     assert region.low is not None
     assert region.high is not None
-    half = 0.5 * body.mesh.element_size
     bottom, top = body.bounds()
     (a, b, c), (d, e, f) = (
-        [max(x - half, y) for x, y in zip(region.low, bottom, strict=True)],
-        [min(x + half, y) for x, y in zip(region.high, top, strict=True)],
+        [max(x - wider, y) for x, y in zip(region.low, bottom, strict=True)],
+        [min(x + wider, y) for x, y in zip(region.high, top, strict=True)],
     )
     held = sum(body.holds(point) for point in lattice((a, b, c), (d, e, f), _LATTICE)) / _LATTICE**3
     share = held * (d - a) * (e - b) * (f - c) / volume(body.mesh)

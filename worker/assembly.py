@@ -94,7 +94,10 @@ def assemble(case: schema.Case, folder: Path, say: Say = quiet) -> Whole:
         across=behind,
         node_volume=_quarters(t, volumes, len(x)), mass=_quarters(t, volumes * np.array(density)[part_of_tet], len(x)),
         velocity=_velocities(case, x, part_of_node), loads=loads, near=near,
-        warnings=[*warnings, *told, *more, *selection.compared(case, [*found, *driven])],
+        warnings=[
+            *warnings, *told, *more, *selection.off_planes(case, x, part_of_node, near),
+            *selection.compared(case, [*found, *driven]),
+        ],
     )  # fmt: skip
 
 

@@ -1,5 +1,6 @@
 """Probes: mass-weighted means of a field over chosen tets, as columns of history.csv."""
 
+import logging
 import math
 
 import numpy as np
@@ -35,6 +36,8 @@ from .state import (
     Tets,
 )
 from .walls import RigidWalls
+
+log = logging.getLogger("conoid.worker")
 
 _NORMAL = {"stress_xx": S_XX, "stress_yy": S_YY, "stress_zz": S_ZZ}
 _SHEAR = {"stress_yz": S_YZ, "stress_zx": S_ZX, "stress_xy": S_XY}
@@ -117,6 +120,9 @@ class Probes:
     def require_tets(self, case: Case) -> None:
         """Raises InputError, on every rank alike, when a probe holds no tet."""
         counts = self._comm.sum(np.array([sum(len(c) for c in chosen) for chosen in self._chosen], np.int64))
+        if self._comm.rank == 0:
+            for number, count in enumerate(counts.tolist()):
+                log.info("probes[%d] has %d tets", number, count)
         for index in np.flatnonzero(counts == 0):
             raise InputError(
                 f"probes[{index}]: no tet of part {case.probes[index].part!r} has its centre between low and high"

@@ -110,3 +110,16 @@ def missed(case: schema.Case, number: int, x: Floats, part: Indices, near: Nearn
             f"boundaries[{number}]: {fringe} nodes lie outside of its region by less than a tenth of an edge and are "
             "not in it; move its border away from them"
         )
+
+
+def off_planes(case: schema.Case, x: Floats, part: Indices, near: Nearness) -> Iterator[str]:
+    """A warning for each plane of symmetry off which nodes lie so little that they were hardly meant to."""
+    names = [each.name for each in case.parts]
+    for number, plane in case.boundaries_of(schema.Symmetry):
+        away = np.abs(x[:, "xyz".index(plane.axis)] - plane.at)
+        off = named(plane, names)[part] & (away > near.rounding[part]) & (away <= near.slack[part])
+        if off.sum() >= _FEWEST:
+            yield (
+                f"boundaries[{number}]: {int(off.sum())} nodes start up to {away[off].max():.2g} m off this plane of "
+                "symmetry, less than a hundredth of an edge, and are not on it: they are free until they reach it"
+            )

@@ -13,7 +13,7 @@ import pytest
 from conoid.cases.load import CaseError, parse_case
 from conoid.cases.loaded import loads
 from conoid.cases.schema import Case, Prescribed
-from conoid.worker import assembly, selection
+from conoid.worker import assembly, conditions, selection
 from conoid.worker.assembly import Whole
 from conoid.worker.errors import InputError
 from conoid.worker.mesh.model import TetMesh
@@ -239,6 +239,33 @@ def test_nothing_of_a_part_that_is_named_is_told() -> None:
     with patch.object(assembly, "build_mesh", lambda *_, **__: next(meshes)):
         (told,) = assembly.assemble(case, Path()).warnings
     assert told == "boundaries[0]: acts on nothing of part 'other', which it names"
+
+
+BAR = {"shape": "box", "low": [0, 0, 0], "high": [2e-3, 2e-3, 2e-3], "element_size": 5e-4, "generator": "structured"}
+
+
+def beside_a_plane(points: Any, at: str) -> tuple[int, tuple[str, ...]]:
+    """How many nodes of a bar from a file, given from its points, m, start on a plane across x, and the warnings."""
+    made = structured(case_of(BAR).parts[0].mesh)  # type: ignore[arg-type]
+    plane = {"kind": "symmetry", "axis": "x", "at": at}
+    case = case_of({"shape": "file", "path": "a.inp", "unit": "1 mm"}, plane)
+    sim = build(case, [TetMesh(points(made.points), made.tets)])
+    heights = conditions.heights(case.boundaries[0], sim.model)  # type: ignore[arg-type]
+    return int((heights == 0.0).sum()), sim.warnings
+
+
+def test_nodes_just_off_a_plane_of_symmetry_are_told() -> None:
+    assert beside_a_plane(lambda x: x, "0 mm") == (25, ())
+    on, (text, other) = beside_a_plane(lambda x: x + np.array([2e-6, 0.0, 0.0]), "0 mm")
+    assert on == 0
+    assert text.startswith("boundaries[0]: 25 nodes start up to 2e-06 m off this plane of symmetry, less than")
+    assert other.startswith("boundaries[0]: no node starts on this plane of symmetry")
+
+
+def test_a_file_whose_digits_are_few_lies_on_its_plane_of_symmetry() -> None:
+    """A face at x = 1/3 of a metre, in six digits of a millimetre, and a plane written with more."""
+    shift = np.array([1000.0 / 3.0, 0.0, 0.0])
+    assert beside_a_plane(lambda x: scaled(SIX_DIGITS(1e3 * x + shift), 1e-3), "333.333333 mm") == (25, ())
 
 
 @pytest.mark.parametrize("angle", [0, 90, 180, 270])
