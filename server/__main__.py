@@ -1,4 +1,5 @@
-"""``python -m conoid.server``: runs the server; ``token add | list | revoke`` decides who may use it."""
+"""``python -m conoid.server``: runs the server; ``token add | list | revoke`` decides who may use it, ``adopt`` takes
+over a folder that was moved or restored."""
 
 import argparse
 import logging
@@ -10,6 +11,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from . import identity
+from .alone import only_one
 from .settings import Caps, Settings, SettingsError, StartError, capped, command, site_of
 from .store import Store
 from .tokens import SCOPES, TokenError, create_token
@@ -73,7 +76,11 @@ def _common(parser: argparse.ArgumentParser) -> None:
 
 
 def _token_commands(parser: argparse.ArgumentParser) -> None:
-    token = parser.add_subparsers(metavar="token").add_parser("token", help="who may use the server")
+    first = parser.add_subparsers(metavar="token|adopt")
+    adopt = first.add_parser("adopt", help="a folder that was moved or restored belongs to its database, here")
+    adopt.add_argument("--runs", type=Path, default=argparse.SUPPRESS, help="folder of the server's runs")
+    adopt.set_defaults(act=_adopt)
+    token = first.add_parser("token", help="who may use the server")
     commands = token.add_subparsers(required=True, metavar="add|list|revoke")
     add = commands.add_parser("add", help="make a token and print it, once")
     add.add_argument("name", help="whose runs it is for")
@@ -163,6 +170,19 @@ def _add(options: argparse.Namespace) -> None:
     if new:
         told = f"{settings.database_file} is new: the token is valid at a server with this --runs"
         print(f"conoid.server: {told}", file=sys.stderr)
+
+
+def _adopt(options: argparse.Namespace) -> None:
+    """Raises SettingsError where a server uses the folder, or there is none."""
+    settings = _settings(options)
+    if not settings.runs.is_dir():
+        raise SettingsError(f"--runs {settings.runs}: there is no such folder")
+    os.umask(0o077)
+    with only_one(settings.runs):
+        store = Store(settings.database_url)
+        before = identity.adopt(settings.runs, store)
+        store.close()
+    print(f"{settings.runs} and its database belong together; {before}")
 
 
 def _list(options: argparse.Namespace) -> None:

@@ -8,7 +8,7 @@ from fastapi import Depends, FastAPI
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from . import connections, errors, keeper, limits, openapi, page, reader
+from . import connections, errors, identity, keeper, limits, openapi, page, reader
 from .bell import Bell
 from .crowd import Crowd
 from .door import Door
@@ -60,12 +60,13 @@ _SAFE_HEADERS = {
 def opened(settings: Settings) -> Iterator[Service]:
     """The parts of a server, the supervisor last; closed in reverse, while workers go on.
 
-    Raises StoreError, TelemetryError, OSError.
+    Raises StoreError, IdentityError, TelemetryError, OSError.
     """
     settings.runs.mkdir(0o700, parents=True, exist_ok=True)
     with ExitStack() as stack:
         store = Store(settings.database_url)
         stack.callback(store.close)
+        identity.require(settings.runs, store)
         telemetry = None
         if settings.zenoh_port is not None:
             tokens = store.tokens() if settings.auth else None

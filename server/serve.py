@@ -1,24 +1,22 @@
 """The server as a process: one a folder of runs, its address in server.json, a clean end on SIGTERM."""
 
-import fcntl
 import json
 import os
 import signal
 import socket
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
-from pathlib import Path
+from contextlib import contextmanager
 from types import FrameType
 
 import uvicorn
 
 from . import connections, durable, heap, quiet
+from .alone import only_one
 from .app import build_app, opened
 from .service import Service
 from .settings import Settings, StartError
 
 ADDRESS_FILE = "server.json"
-_LOCK = "server.lock"
 _FAREWELL = 3
 """s that open requests get when the server stops."""
 
@@ -36,7 +34,7 @@ def serve(settings: Settings) -> None:
     heap.share()
     quiet.install()
     settings.runs.mkdir(parents=True, exist_ok=True)
-    with _only_one(settings.runs), _listening(settings) as listener:
+    with only_one(settings.runs), _listening(settings) as listener:
         (settings.runs / ADDRESS_FILE).unlink(missing_ok=True)
         _answer(settings, listener)
 
@@ -100,26 +98,6 @@ def announce(service: Service, listener: socket.socket, page_problem: str | None
 def _leave(_signal: int, _frame: FrameType | None) -> None:
     """uvicorn raises the signal again once it has shut down; then this ends the process with code 0."""
     raise SystemExit(0)
-
-
-@contextmanager
-def _only_one(runs: Path) -> Iterator[None]:
-    """Two servers on one folder would start every run twice. The folder itself is locked, which nobody deletes by the
-    way, and a file in it for file systems that lock files only."""
-    with ExitStack() as stack:
-        folder = os.open(runs, os.O_RDONLY | os.O_DIRECTORY)
-        stack.callback(os.close, folder)
-        file = os.open(runs / _LOCK, os.O_WRONLY | os.O_CREAT, 0o600)
-        stack.callback(os.close, file)
-        for descriptor in (folder, file):
-            try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                raise ServeError(f"--runs {runs}: another server uses this folder") from None
-            except OSError:
-                if descriptor == file:
-                    raise ServeError(f"--runs {runs}: this file system has no locks") from None
-        yield
 
 
 @contextmanager

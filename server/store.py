@@ -5,10 +5,12 @@ Runs, labels and keys are an index over the runs' folders and can be rebuilt fro
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any
 
+import msgspec
 import sqlalchemy as sa
 from sqlalchemy.exc import SQLAlchemyError
 
@@ -54,6 +56,15 @@ _labels = sa.Table(
     sa.PrimaryKeyConstraint("run", "name"),
     sa.Index("runs_of_label", "owner", "name", "value", "run"),
 )
+_bonds = sa.Table(
+    "bond",
+    _meta,
+    sa.Column("number", sa.Integer, primary_key=True),
+    sa.Column("server", sa.String(64), nullable=False),
+    sa.Column("place", sa.Text, nullable=False),
+)
+_ONLY = 1
+"""The number of the one bond that there may be."""
 _tokens = sa.Table(
     "tokens",
     _meta,
@@ -88,6 +99,13 @@ class StoreError(StartError):
     """The database cannot be used; the text is one line."""
 
 
+class Bond(msgspec.Struct, frozen=True):
+    """Which server the folder of runs at ``place`` and a database belong to."""
+
+    server: str
+    place: str
+
+
 class Store:
     """All methods may be called from any thread; each is one transaction and raises SQLAlchemyError when it fails."""
 
@@ -119,6 +137,25 @@ class Store:
             else:
                 connection.execute(sa.select(1))
             connection.rollback()
+
+    # The server -------------------------------------------------------------------------------------------------------
+
+    def bond(self) -> "Bond | None":
+        """To which server and folder of runs the database belongs; None where it is new."""
+        with self._engine.connect() as connection:
+            row = connection.execute(sa.select(_bonds.c.server, _bonds.c.place)).first()
+        return None if row is None else Bond(row[0], row[1])
+
+    def bind(self, bond: "Bond") -> None:
+        """The first bond; where another server has been faster, its bond stays."""
+        with suppress(sa.exc.IntegrityError), self._engine.begin() as connection:
+            connection.execute(sa.insert(_bonds).values(number=_ONLY, server=bond.server, place=bond.place))
+
+    def rebind(self, bond: "Bond") -> None:
+        """Another bond in the place of the one that there is."""
+        with self._engine.begin() as connection:
+            connection.execute(sa.delete(_bonds))
+            connection.execute(sa.insert(_bonds).values(number=_ONLY, server=bond.server, place=bond.place))
 
     # Runs -------------------------------------------------------------------------------------------------------------
 

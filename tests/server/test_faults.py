@@ -15,9 +15,9 @@ import pytest
 from conoid.cases import layout
 from conoid.cases.run import State
 from conoid.server import durable, folder, holds
+from conoid.server.alone import AloneError, only_one
 from conoid.server.events import Run
 from conoid.server.launch import processes
-from conoid.server.serve import ServeError, _only_one
 
 from .faulty import House
 from .running import PATIENCE, TOML, MakeProcess, Running, User, case_text
@@ -120,11 +120,11 @@ def test_files_are_for_their_user_alone(process: MakeProcess) -> None:
 
 
 def test_a_deleted_lock_lets_no_second_server_in(tmp_path: Path) -> None:
-    with _only_one(tmp_path):
+    with only_one(tmp_path):
         (tmp_path / "server.lock").unlink()
-        with pytest.raises(ServeError, match="another server"), _only_one(tmp_path):
+        with pytest.raises(AloneError, match="another server"), only_one(tmp_path):
             pass
-    with _only_one(tmp_path):
+    with only_one(tmp_path):
         pass
 
 

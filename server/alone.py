@@ -1,0 +1,35 @@
+"""One process a folder of runs."""
+
+import fcntl
+import os
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+from .settings import StartError
+
+_LOCK = "server.lock"
+
+
+class AloneError(StartError):
+    """Another server uses the folder; the text is one line."""
+
+
+@contextmanager
+def only_one(runs: Path) -> Iterator[None]:
+    """Two servers on one folder would start every run twice. The folder itself is locked, which nobody deletes by the
+    way, and a file in it for file systems that lock files only."""
+    with ExitStack() as stack:
+        folder = os.open(runs, os.O_RDONLY | os.O_DIRECTORY)
+        stack.callback(os.close, folder)
+        file = os.open(runs / _LOCK, os.O_WRONLY | os.O_CREAT, 0o600)
+        stack.callback(os.close, file)
+        for descriptor in (folder, file):
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise AloneError(f"--runs {runs}: another server uses this folder") from None
+            except OSError:
+                if descriptor == file:
+                    raise AloneError(f"--runs {runs}: this file system has no locks") from None
+        yield
