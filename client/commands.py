@@ -9,7 +9,7 @@ import typer
 from conoid.cases import layout
 from conoid.cases.run import ExitCode, State
 
-from . import tables
+from . import local_run, tables
 from .batch import cancel_folder, slurm_of
 from .console import echo, echo_json
 from .errors import UnfinishedError, UsageError
@@ -26,6 +26,7 @@ from .options import (
     aloud,
     complain,
     find,
+    folder_of,
     labels_of,
     named,
     show,
@@ -45,7 +46,9 @@ def _filled(key: str | None) -> str | None:
     return key
 
 
-RunArgument = Annotated[str, typer.Argument(metavar="RUN", callback=named, help="The id of a run, or 'last'.")]
+RunArgument = Annotated[
+    str, typer.Argument(metavar="RUN", callback=named, help="The id of a run or its beginning, or 'last'.")
+]
 
 
 def submit(
@@ -107,10 +110,13 @@ def list_runs(
         echo("no runs")
 
 
-def show_run(run: RunArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
+def show_run(run: SourceArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
     """Show one run: where it is, or how it ended."""
-    with connect(url, token) as session:
-        info = find(session, run).status()
+    if (folder := folder_of(run)) is not None:
+        info = local_run.status(folder)
+    else:
+        with connect(url, token) as session:
+            info = find(session, run).status()
     if as_json:
         echo_json(info)
         return
@@ -131,9 +137,9 @@ def watch_run(
     as_json: Annotated[bool, typer.Option("--json", help="Print every message as one line of JSON.")] = False,
 ) -> None:
     """Follow a run until it ends: 0 succeeded, 1 failed, 2 bad input, 4 cancelled. Ctrl-C leaves it running."""
-    if Path(run).is_dir():
-        LocalFolder(Path(run)).path(layout.JOURNAL)
-        followed = FolderRun(Path(run), slurm_of(None).bin)
+    if (folder := folder_of(run)) is not None:
+        LocalFolder(folder).path(layout.JOURNAL)
+        followed = FolderRun(folder, slurm_of(None).bin)
         known = _print_messages(followed) if as_json else watch(followed, False if plain else None)
     else:
         known = _watched(run, plain, url, token, as_json)
@@ -172,32 +178,38 @@ def _tell(info: RunInfo, text: str, as_json: bool) -> None:
         echo(text)
 
 
-def cancel(run: RunArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
+def cancel(run: SourceArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
     """Stop a run at its next step; of a run without a server, name the folder."""
-    if Path(run).is_dir():
-        echo(cancel_folder(Path(run)))
+    if (folder := folder_of(run)) is not None and local_run.at_hand(folder):
+        echo(cancel_folder(folder))
         return
     with connect(url, token) as session:
         info = find(session, run).cancel()
     _tell(info, f"{info.id} {info.state.value}", as_json)
 
 
-def checkpoint(run: RunArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
+def checkpoint(run: SourceArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
     """Ask a run for a checkpoint, from which it can go on if it is lost."""
+    if (folder := folder_of(run)) is not None and local_run.at_hand(folder):
+        echo(local_run.ask(folder, layout.CHECKPOINT_REQUEST, "a checkpoint"))
+        return
     with connect(url, token) as session:
         info = find(session, run).checkpoint()
     _tell(info, f"{info.id} asked for a checkpoint", as_json)
 
 
-def snapshot(run: RunArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
+def snapshot(run: SourceArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
     """Ask a run for a snapshot of its fragments; watch tells when it is there."""
+    if (folder := folder_of(run)) is not None and local_run.at_hand(folder):
+        echo(local_run.ask(folder, layout.SNAPSHOT_REQUEST, "a snapshot"))
+        return
     with connect(url, token) as session:
         info = find(session, run).take_snapshot()
     _tell(info, f"{info.id} asked for a snapshot", as_json)
 
 
 def get(
-    run: RunArgument,
+    run: SourceArgument,
     names: Annotated[
         list[str] | None,
         typer.Argument(metavar="[FILE]...", help="Files to fetch; all when none, but for checkpoints."),
@@ -208,22 +220,28 @@ def get(
     as_json: Annotated[bool, typer.Option("--json", help="List the run's files as JSON; copies nothing.")] = False,
 ) -> None:
     """Copy a run's files here; those that it lacks are named, and the command ends with 1 then."""
+    if (folder := folder_of(run)) is not None and local_run.at_hand(folder):
+        _copy(local_run.FolderFiles(folder), names, out, as_json)
+        return
     with connect(url, token) as session:
-        found = find(session, run)
-        if as_json:
-            echo_json(found.files())
-            return
-        target = out or Path(found.id)
-        every = (file.path for file in found.files())
-        lacks = False
-        for name in names or [path for path in every if not path.startswith(f"{layout.CHECKPOINTS}/")]:
-            try:
-                with aloud(f"fetching {name}"):
-                    fetched = found.download(target, name)
-            except UnfinishedError as error:
-                complain(str(error))
-                lacks = True
-            else:
-                echo(str(fetched))
-        if lacks:
-            raise typer.Exit(ExitCode.CRASHED)
+        _copy(find(session, run), names, out, as_json)
+
+
+def _copy(found: Run | local_run.FolderFiles, names: list[str] | None, out: Path | None, as_json: bool) -> None:
+    if as_json:
+        echo_json(found.files())
+        return
+    target = out or Path(found.id)
+    every = (file.path for file in found.files())
+    lacks = False
+    for name in names or [path for path in every if not path.startswith(f"{layout.CHECKPOINTS}/")]:
+        try:
+            with aloud(f"fetching {name}"):
+                fetched = found.download(target, name)
+        except UnfinishedError as error:
+            complain(str(error))
+            lacks = True
+        else:
+            echo(fetched)
+    if lacks:
+        raise typer.Exit(ExitCode.CRASHED)

@@ -36,9 +36,7 @@ class Key(msgspec.Struct, frozen=True):
 
 
 class Value(msgspec.Struct, frozen=True):
-    """A number of both runs, NaN where it is not known; ``difference`` is b - a, ``relative`` that over the larger
-    magnitude.
-    """
+    """A number of both runs, NaN where it is not known; ``difference`` is b - a, ``relative`` that over |a|."""
 
     name: str
     unit: str
@@ -52,10 +50,10 @@ class Value(msgspec.Struct, frozen=True):
 
     @property
     def relative(self) -> float:
-        """Of the larger magnitude; 0 where both are 0, NaN where one is not known."""
-        if math.isnan(self.difference):
-            return math.nan
-        return self.difference / max(abs(self.a), abs(self.b)) if self.difference else 0.0
+        """Of the magnitude of a; 0 where both are the same, NaN where one is not known, or a is 0."""
+        if self.difference == 0.0:
+            return 0.0
+        return self.difference / abs(self.a) if self.a else math.nan
 
 
 @dataclass(frozen=True)

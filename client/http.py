@@ -47,6 +47,7 @@ _LONGEST = 1 << 28
 """Bytes of an answer that is read at once, or does not say how long it is. Chosen: ten times the largest snapshot."""
 UNAUTHORIZED = 401
 """HTTP's status of a request without a valid token."""
+NOT_FOUND = 404
 _TRIES = 3
 """Times a request is sent that may be repeated, 0.3 and 0.6 s apart. Chosen: a lost connection is back by then."""
 
@@ -254,6 +255,10 @@ class Http:
             return msgspec.json.decode(content, type=kind)
         except (msgspec.MsgspecError, RecursionError) as error:
             raise self._unreadable(error) from None
+
+    def endless(self, what: str) -> ClientError:
+        """Of a list whose pages have no end."""
+        return AnswerError(f"the list of {what} of {self.url} has no end")
 
     def _unreadable(self, error: Exception) -> ClientError:
         """Of another program, or of a newer server."""

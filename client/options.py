@@ -13,11 +13,11 @@ from conoid.cases.estimate import estimate
 from conoid.cases.figures import duration
 from conoid.cases.load import CaseError, materials, parse_case, shipped
 from conoid.cases.plausible import doubts
-from conoid.cases.problems import Problem
+from conoid.cases.problems import Problem, shown
 
 from . import silence
 from .console import PlainConsole, echo, one_line
-from .errors import ClientError, NotFoundError, UsageError
+from .errors import NotFoundError, UsageError
 from .result import Result
 from .run import Run
 from .session import Session, connect
@@ -63,11 +63,25 @@ def named(text: str) -> str:
     """The id of a run or a sweep as it was given, or a folder. Raises UsageError for an empty one: a variable that is
     not set; NotFoundError for a path at which there is no folder: no id has a ``/``.
     """
-    if not text.strip():
-        raise UsageError("the name is empty: write an id, or 'last'")
-    if "/" in text and not Path(text).is_dir():
+    sweep_named(text)
+    if ("/" in text or "\0" in text) and folder_of(text) is None:
         raise NotFoundError(f"{text}: this is no folder of a run; write its folder, its id, or 'last'")
     return text
+
+
+def sweep_named(text: str) -> str:
+    """The id of a sweep as it was given. Raises UsageError for an empty one."""
+    if not text.strip():
+        raise UsageError("the name is empty: write an id, or 'last'")
+    return text
+
+
+def folder_of(text: str) -> Path | None:
+    """The folder that is meant, None where there is none of this name."""
+    try:
+        return Path(text) if Path(text).is_dir() else None
+    except (OSError, ValueError):  # a name that is too long, or that no file can have
+        return None
 
 
 CaseArgument = Annotated[
@@ -85,7 +99,7 @@ Labels = Annotated[
     typer.Option("--label", metavar="NAME=VALUE", help="By which runs are found again; may be repeated."),
 ]
 SourceArgument = Annotated[
-    str, typer.Argument(metavar="RUN", callback=named, help="The id of a run, 'last', or its folder.")
+    str, typer.Argument(metavar="RUN", callback=named, help="The id of a run or its beginning, 'last', or its folder.")
 ]
 
 
@@ -158,22 +172,17 @@ def aloud(what: str) -> Iterator[Callable[[str], None]]:
 
 
 def find(session: Session, run: str) -> Run:
-    """The run of an id, or the newest one for ``last``. Raises ClientError when there is none yet, or for a folder."""
+    """The run of an id or its beginning, or the newest one for ``last``. Raises NotFoundError, UsageError."""
     if "/" in run:
-        raise UsageError(f"run = {run!r}: this asks a server; write the id of a run, or 'last'")
-    if run != "last":
-        return session.run(run)
-    newest = session.runs(limit=1)
-    if not newest:
-        raise ClientError("there is no run yet")
-    return session.run(newest[0].id)
+        raise UsageError(f"run = {shown(run)}: this asks a server; write the id of a run, or 'last'")
+    return session.run(run)
 
 
 @contextmanager
 def opened(source: str, url: str | None, token: str | None) -> Iterator[Result]:
     """The result of a run by its id, or in its folder."""
-    if Path(source).is_dir():
-        yield Result.open(source)
+    if (folder := folder_of(source)) is not None:
+        yield Result.open(folder)
         return
     with connect(url, token) as session:
         yield find(session, source).result()

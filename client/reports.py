@@ -14,7 +14,7 @@ from . import replay, tables
 from . import report as reporting
 from .console import echo, echo_json
 from .errors import ViewError
-from .options import Json, SourceArgument, Token, Url, aloud, opened, show
+from .options import Json, SourceArgument, Token, Url, aloud, named, opened, show
 from .pictures import require_field
 
 figures = typer.Typer(no_args_is_help=True, help="Charts from what a run has told.")
@@ -95,7 +95,7 @@ def report(
 
 def compare(
     a: SourceArgument,
-    b: Annotated[str, typer.Argument(metavar="OTHER", help="Another run, likewise.")],
+    b: Annotated[str, typer.Argument(metavar="OTHER", callback=named, help="Another run, likewise.")],
     out: Annotated[Path | None, typer.Option("--out", help="Draw both histories and fragment masses here.")] = None,
     column: Annotated[
         list[str] | None,

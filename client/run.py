@@ -190,12 +190,14 @@ class Run:
     def events(self, after: int = 0) -> list[AnyMessage]:
         """The messages in its journal with a number above ``after``."""
         found: list[AnyMessage] = []
-        more = True
-        while more:
+        while True:
             page = self.session.get(EventPage, f"{self.path}/events", after=after)
             found += [self.session.line(event) for event in page.events]
-            after, more = page.last, page.more
-        return found
+            if not page.more:
+                return found
+            if page.last <= after:
+                raise self.session.endless("messages")
+            after = page.last
 
     def messages(self, after: int = 0, link: Link | None = None) -> Generator[AnyMessage]:
         """Every message after ``after``, once and in order: what was said, then what is said, to the run's end.

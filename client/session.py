@@ -1,8 +1,10 @@
 """A server and the words of its API."""
 
+import re
 import uuid
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import islice, takewhile
+from typing import Any, Protocol
 from urllib.parse import urlencode
 
 import msgspec
@@ -11,16 +13,30 @@ from conoid.cases.load import CaseError, Overrides, Problem
 from conoid.cases.problems import shown
 
 from .config import target
-from .errors import ClientError, UsageError
-from .http import Http
-from .run import Run, RunInfo, quoted
+from .errors import MissingError, NotFoundError, ServiceError, UsageError
+from .http import NOT_FOUND, Http
+from .run import ID, Run, RunInfo, quoted
 from .submission import CaseSource, body_of, data_of, to_json
 from .sweep import Point, Sweep, SweepInfo, SweepPage, listed, points_along
 
+_CANDIDATES = 8
+"""Ids that are named where several begin as one was given. Chosen: as many as a line has room for."""
+_LAST = "z" * 22
+"""Behind the beginning of an id: no id that begins so comes after it."""
+_MOST_PAGES = 10_000
+"""Of a list. Chosen: a million runs; a server that has more pages has no end."""
 _POINT = 0.5
 """s that a server may take for each point of a sweep, which it reads, checks and writes to disk before it answers.
 Chosen: ten times what one takes on two cores at a load of 4.
 """
+
+
+class _Known(Protocol):
+    """A run or a sweep that a server tells of."""
+
+    @property
+    def id(self) -> str:
+        """Its id."""
 
 
 class Verdict(msgspec.Struct, kw_only=True, frozen=True):
@@ -102,25 +118,72 @@ class Session(Http):
 
     def sweeps(self) -> list[SweepInfo]:
         """Our sweeps, newest first, without their points."""
-        page = self.get(SweepPage, "/v1/sweeps", limit=500)
-        found = [*page.sweeps]
-        while page.next is not None:
-            page = self.get(SweepPage, "/v1/sweeps", limit=500, before=page.next)
-            found += page.sweeps
-        return found
+        return list(self._sweeps())
+
+    def _sweeps(self, beginning: str = "") -> Iterator[SweepInfo]:
+        """Newest first, from those that begin so on."""
+        query = {"before": beginning + _LAST} if beginning else {}
+        for _ in range(_MOST_PAGES):
+            page = self.get(SweepPage, "/v1/sweeps", limit=500, **query)
+            yield from page.sweeps
+            if page.next is None:
+                return
+            query = {"before": page.next}
+        raise self.endless("sweeps")
 
     def find_sweep(self, sweep_id: str) -> Sweep:
-        """A handle of a sweep by its id, or of the newest one for ``last``. Raises ClientError when there is none."""
-        if sweep_id != "last":
-            return Sweep(self, sweep_id)
-        newest = self.sweeps()
-        if not newest:
-            raise ClientError("there is no sweep yet")
-        return Sweep(self, newest[0].id)
+        """A handle of a sweep: by its id, by a beginning of it that no other has, or of the newest one for ``last``.
+
+        Raises NotFoundError where there is none, UsageError where several begin so.
+        """
+        if sweep_id == "last":
+            newest = next(self._sweeps(), None)
+            if newest is None:
+                raise NotFoundError("there is no sweep yet")
+            return Sweep(self, newest.id)
+        return Sweep(self, self._named("sweep", "/v1/sweeps", sweep_id, self._sweeps))
 
     def run(self, run_id: str) -> Run:
-        """A handle of a run; the server is not asked yet."""
-        return Run(self, run_id)
+        """A handle of a run: by its id, by a beginning of it that no other one has, or of the newest one for ``last``.
+
+        Raises NotFoundError where there is none, UsageError where several begin so.
+        """
+        if run_id == "last":
+            newest = self.runs(limit=1)
+            if not newest:
+                raise NotFoundError("there is no run yet")
+            return Run(self, newest[0].id)
+        return Run(self, self._named("run", "/v1/runs", run_id, self._beginning))
+
+    def _beginning(self, beginning: str) -> Iterable[RunInfo]:
+        return self.get(Page, "/v1/runs", limit=_CANDIDATES + 1, prefix=beginning).runs
+
+    def _named(self, what: str, path: str, name: str, after: Callable[[str], Iterable[_Known]]) -> str:
+        """The id that is meant; ``after`` gives runs, or sweeps, from a beginning of an id on."""
+        if not re.fullmatch(ID, name):
+            raise NotFoundError(f"{what} {shown(name)}: there is none; an id has letters and digits")
+        try:
+            self.get(dict[str, Any], f"{path}/{quoted(name)}")
+        except MissingError as error:
+            if error.status != NOT_FOUND:
+                raise
+            found = self._candidates(name, after)
+            if not found:
+                raise
+        else:
+            return name
+        if len(found) > 1:
+            more = " and more" if len(found) > _CANDIDATES else ""
+            raise UsageError(f"{what} = {name!r}: several begin so: {', '.join(found[:_CANDIDATES])}{more}")
+        return found[0]
+
+    def _candidates(self, name: str, after: Callable[[str], Iterable[_Known]]) -> list[str]:
+        """Ids that begin so, some of them; none where the server is too old to be asked."""
+        try:
+            named = takewhile(lambda one: one.id.startswith(name), after(name))
+            return [one.id for one in islice(named, _CANDIDATES + 1)]
+        except ServiceError:
+            return []
 
     def runs(
         self, states: Sequence[str] = (), limit: int = 50, labels: Mapping[str, str] | None = None
@@ -131,13 +194,13 @@ class Session(Http):
         query: dict[str, str | list[str]] = {"state": wanted} if wanted else {}
         if labels:
             query["label"] = _words(labels)
-        while len(found) < limit:
+        for _ in range(_MOST_PAGES):
             page = self.get(Page, "/v1/runs", limit=min(100, limit - len(found)), **query)
             found += page.runs
-            if page.next is None:
-                break
+            if page.next is None or len(found) >= limit:
+                return found[:limit]
             query["cursor"] = page.next
-        return found[:limit]
+        raise self.endless("runs")
 
 
 def _words(labels: Mapping[str, str] | None) -> list[str]:

@@ -10,12 +10,14 @@ from conoid.cases.run import State
 
 from .console import echo, echo_json
 from .errors import UsageError
-from .options import CaseArgument, Json, Token, Url, aloud, complain, named
+from .options import CaseArgument, Json, Token, Url, aloud, complain, sweep_named
 from .saving import save_text
 from .session import connect
 from .sweep import SweepInfo, SweepPoint, points_in, points_of
 
-SweepArgument = Annotated[str, typer.Argument(metavar="SWEEP", callback=named, help="Id of a sweep, or 'last'.")]
+SweepArgument = Annotated[
+    str, typer.Argument(metavar="SWEEP", callback=sweep_named, help="Id of a sweep or its beginning, or 'last'.")
+]
 Sets = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=A,B,C", help="Values of a key; may be given again.")
 ]

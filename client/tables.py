@@ -42,7 +42,7 @@ from .run import RunInfo
 
 _LONGEST = 60
 """Characters of the value of a key that are shown. Chosen: two lines beside another one; a description is a page."""
-_NUMBERS = ("A", "B", "difference", "%")
+_NUMBERS = ("A", "B", "B - A", "% of A")
 _LEAST = 26
 """Characters of names beside numbers. Chosen: what they leave of 80, and most names fit."""
 

@@ -1,5 +1,6 @@
 """The command ``view``: frames as a picture."""
 
+import re
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,6 +12,7 @@ from .console import echo, echo_json
 from .options import Json, Token, Url, aloud, complain, find
 from .pictures import FIELDS, SMALLEST
 from .result import seconds
+from .run import ID
 from .session import connect
 from .view import view
 
@@ -67,7 +69,7 @@ def view_frames(
         "size": size, "raw": raw, "edges": edges, "scale": scale, "transparent": transparent, "rate": rate,
     }  # fmt: skip
     with aloud("drawing"):
-        if Path(source).exists() or Path(source).suffix or "/" in source:
+        if not re.fullmatch(ID, source) or Path(source).exists() or Path(source).suffix:
             drawn = view(source, field, **options)
         else:
             with connect(url, token) as session:

@@ -3,7 +3,7 @@
 import json
 import time
 from collections.abc import Iterator
-from itertools import islice
+from itertools import islice, takewhile
 from typing import Annotated, Any
 
 import msgspec
@@ -29,6 +29,8 @@ router = APIRouter()
 Body = Annotated[bytes, Depends(read_body)]
 _MOST_RANKS = 1_000_000
 """That a number may be; the server has its own limit. Chosen."""
+_LAST = "z" * 22
+"""Behind the beginning of an id: no id that begins so comes after it."""
 MAX_WAIT = 60.0
 """s that ``?wait=`` may ask for."""
 
@@ -61,13 +63,14 @@ def page(
     cursor: Annotated[str | None, Query(json_schema_extra={"pattern": "^[A-Za-z0-9_-]{30}$"})] = None,
     limit: Annotated[int, Query(ge=1, le=500)] = 50,
     label: Annotated[list[str] | None, Query(description="NAME=VALUE; runs that have all of them")] = None,
+    prefix: Annotated[str, Query(pattern="^[0-9a-z]{0,22}$", description="the beginning of their ids")] = "",
 ) -> dict[str, Any]:
     """Own runs, newest first, without those that have been removed; ``next`` is the cursor of the following page, null
     on the last.
     """
-    before = None if cursor is None else view.from_cursor(cursor)
+    before = view.from_cursor(cursor) if cursor is not None else prefix + _LAST if prefix else None
     pages = _pages(service, identity.owner, _states(state), before, limit + 1, labels_of(label or ()))
-    runs = list(islice(pages, limit + 1))
+    runs = list(islice(takewhile(lambda run: run.id.startswith(prefix), pages), limit + 1))
     following = view.to_cursor(runs[limit - 1]) if len(runs) > limit else None
     return {"runs": view.briefs(service, runs[:limit]), "next": following}
 

@@ -1,6 +1,7 @@
 """Two runs side by side, columns as tables and data frames, and the charts that are drawn from them."""
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from typer.testing import CliRunner
 from conoid.client import curves
 from conoid.client.cli import app
 from conoid.client.columns import read_columns
-from conoid.client.compare import compare, differing, material
+from conoid.client.compare import Value, compare, differing, material
 from conoid.client.errors import ClientError, UnfinishedError
 from conoid.client.result import Result
 
@@ -181,3 +182,15 @@ def test_tables_show_themselves_in_notebooks() -> None:
     assert "&lt;19&gt;" in html
     assert "&lt;9&gt;" not in html
     assert "20 lines" in html
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "share"),
+    [(2.0, 3.0, 0.5), (3.0, 2.0, -1 / 3), (-2.0, -3.0, -0.5), (-2.0, 2.0, 2.0), (1.0, 1.0, 0.0), (0.0, 0.0, 0.0)],
+)
+def test_a_share_is_of_the_first_run(a: float, b: float, share: float) -> None:
+    assert Value("x", "", a, b).relative == pytest.approx(share)
+
+
+def test_of_a_first_run_that_has_none_there_is_no_share() -> None:
+    assert math.isnan(Value("x", "", 0.0, 1.0).relative)

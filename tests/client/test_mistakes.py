@@ -88,7 +88,7 @@ def test_a_path_at_which_there_is_no_run_asks_no_server(command: str, quiet_home
 
 def test_a_folder_is_told_that_a_server_wants_an_id(quiet_home: Path) -> None:
     (quiet_home / "runs" / "one").mkdir(parents=True)
-    assert refused(2, "show", "runs/one") == (
+    assert refused(2, "restart", "runs/one") == (
         "conoid: run = 'runs/one': this asks a server; write the id of a run, or 'last'"
     )
 

@@ -42,7 +42,7 @@ def test_a_damaged_file_of_a_server_is_named_by_its_run() -> None:
     session = served(lambda _: httpx2.Response(200, content=b"{"))
     for name, said in (("case.resolved.json", "case"), ("outcome.json", "outcome")):
         with pytest.raises(ClientError, match=f"^{name} of run r1 at http://conoid.test: this {said} cannot be read: "):
-            _ = session.run("r1").result().case if said == "case" else session.run("r1").result().outcome
+            _ = Run(session, "r1").result().case if said == "case" else Run(session, "r1").result().outcome
 
 
 @pytest.mark.parametrize(("overrides", "told"), [("run.ranks=2", "'run.ranks=2'"), (5, "5")])
@@ -152,7 +152,7 @@ def test_a_cancel_is_sent_once() -> None:
         raise httpx2.ReadError("connection reset")
 
     with pytest.raises(UnreachableError, match="connection reset"):
-        served(answer).run("r1").cancel()
+        Run(served(answer), "r1").cancel()
     assert sent == ["http://conoid.test/v1/runs/r1:cancel"]
 
 
@@ -190,7 +190,7 @@ def test_an_outcome_is_read_also_where_a_number_is_none() -> None:
 def test_a_download_that_arrives_damaged_is_not_kept(tmp_path: Path) -> None:
     answer = httpx2.Response(200, content=b"abc", headers={"Repr-Digest": "sha-256=:AAAA:"})
     with pytest.raises(UnreachableError, match="arrived damaged"):
-        served(lambda _: answer).run("r1").download(tmp_path, "outcome.json")
+        Run(served(lambda _: answer), "r1").download(tmp_path, "outcome.json")
     assert list(tmp_path.iterdir()) == []
 
 

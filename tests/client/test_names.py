@@ -1,0 +1,178 @@
+"""Runs and sweeps are named by an id, by its beginning, by 'last' or by a folder; by nothing else."""
+
+import fcntl
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from conoid.cases import layout, messages
+from conoid.client.cli import app
+from conoid.client.errors import AnswerError, NotFoundError, UsageError
+from conoid.client.session import Session
+
+from .hostile import Hostile, hostile, run_info, said
+
+IDS = ["1kbbx", "1kbbw", "1kaaa"]
+NONE = said({"detail": "run: there is none"}, 404)
+
+
+@pytest.fixture
+def server(quiet_home: Path) -> Iterator[Hostile]:
+    """A server with three runs and three sweeps of the same ids; it gives those up to what was asked for."""
+    with hostile() as made:
+        made.answers = {f"/v1/runs/{name}": said(run_info(id=name)) for name in IDS}
+        made.answers |= {f"/v1/sweeps/{name}": said(sweep(name)) for name in IDS}
+        made.answers["/v1/runs"] = said({"runs": [run_info(id=name) for name in IDS], "next": None})
+        made.answers["/v1/sweeps"] = said({"sweeps": [sweep(name) for name in IDS], "next": None})
+        yield made
+
+
+def sweep(name: str) -> dict[str, Any]:
+    return {"id": name, "name": "bar", "submitted": 0.0, "total": 0, "states": {}}
+
+
+def conoid(*words: object) -> str:
+    result = CliRunner().invoke(app, [str(word) for word in words])
+    assert result.exit_code == 0, result.output
+    return result.stdout
+
+
+def refused(code: int, *words: object) -> str:
+    result = CliRunner().invoke(app, [str(word) for word in words])
+    assert result.exit_code == code, result.output
+    (line,) = result.stderr.splitlines()
+    return line
+
+
+def test_a_name_that_nothing_has_raises(server: Hostile) -> None:
+    with Session(server.url) as session:
+        for name in ("nosuch", "", "..", "a b", "ü", "-x", "x" * 300, "a/b", "\0"):
+            with pytest.raises(NotFoundError):
+                session.run(name)
+            with pytest.raises(NotFoundError):
+                session.find_sweep(name)
+
+
+def test_a_beginning_that_one_has_is_enough(server: Hostile) -> None:
+    server.answers["/v1/runs"] = said({"runs": [run_info(id="1kaaa")], "next": None})
+    server.answers["/v1/sweeps"] = said({"sweeps": [sweep("1kaaa")], "next": None})
+    with Session(server.url) as session:
+        assert session.run("1ka").id == "1kaaa"
+        assert session.find_sweep("1ka").id == "1kaaa"
+        assert session.run("last").id == "1kaaa"
+    assert "1kaaa" in conoid("show", "1ka", "--url", server.url)
+    assert "/v1/runs?limit=9&prefix=1ka" in server.asked
+
+
+def test_a_beginning_that_several_have_is_one_line_with_them(server: Hostile) -> None:
+    with Session(server.url) as session:
+        with pytest.raises(UsageError, match="run = '1kbb': several begin so: 1kbbx, 1kbbw"):
+            session.run("1kbb")
+        with pytest.raises(UsageError, match="sweep = '1kbb': several begin so: 1kbbx, 1kbbw"):
+            session.find_sweep("1kbb")
+        assert session.run("1kbbx").id == "1kbbx", "the whole id is that of one"
+    assert "several begin so" in refused(2, "cancel", "1kbb", "--url", server.url)
+
+
+def test_a_server_too_old_for_beginnings_says_what_it_said(server: Hostile) -> None:
+    server.answers["/v1/runs"] = said({"detail": "prefix: no such parameter"}, 400)
+    with Session(server.url) as session, pytest.raises(NotFoundError, match="there is none"):
+        session.run("1kb")
+
+
+def test_a_list_without_end_is_given_up(server: Hostile, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("conoid.client.session._MOST_PAGES", 5)
+    server.answers["/v1/runs"] = said({"runs": [], "next": "x"})
+    server.answers["/v1/sweeps"] = said({"sweeps": [], "next": "x"})
+    server.answers["/v1/runs/1kaaa/events"] = said({"events": [], "last": 0, "more": True})
+    with Session(server.url) as session:
+        for endless in (session.runs, session.sweeps, session.run("1kaaa").events):
+            with pytest.raises(AnswerError, match="has no end"):
+                endless()
+
+
+# Folders --------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def folder(quiet_home: Path) -> Path:
+    """A run that works, in a folder whose name is no id."""
+    made = quiet_home / "my runs" / "a%b ü"
+    made.mkdir(parents=True)
+    told: list[messages.AnyMessage] = [
+        messages.Status(run="r", seq=1, wall=1.7e9, state="queued"),
+        messages.Status(run="r", seq=2, wall=1.7e9 + 5, state="running"),
+    ]
+    (made / layout.JOURNAL).write_bytes(b"".join(messages.to_json(each) + b"\n" for each in told))
+    (made / layout.RESOLVED_CASE).write_text(json.dumps({"name": "bar", "title": "A bar", "run": {"ranks": 3}}))
+    return made
+
+
+@pytest.fixture
+def worker(folder: Path) -> Iterator[None]:
+    """Rank 0 holds the lock of the folder."""
+    with open(folder / layout.LOCK, "a") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
+@pytest.mark.usefixtures("worker")
+def test_a_run_in_a_folder_is_shown_and_asked(folder: Path) -> None:
+    told = json.loads(conoid("show", folder, "--json"))
+    assert (told["id"], told["state"], told["ranks"], told["name"]) == ("a%b ü", "running", 3, "bar")
+    assert "A bar" in conoid("show", folder)
+    assert "asked for a checkpoint" in conoid("checkpoint", folder)
+    assert "asked for a snapshot" in conoid("snapshot", folder)
+    assert "asked to stop" in conoid("cancel", folder)
+    assert {layout.CHECKPOINT_REQUEST, layout.SNAPSHOT_REQUEST, layout.STOP_REQUEST} <= {
+        p.name for p in folder.iterdir()
+    }
+
+
+def test_a_run_in_a_folder_that_nobody_computes_is_lost(folder: Path) -> None:
+    assert json.loads(conoid("show", folder, "--json"))["state"] == "lost"
+    assert "no worker writes into it" in refused(1, "checkpoint", folder)
+
+
+def test_the_end_of_a_run_in_a_folder_is_shown(folder: Path) -> None:
+    (folder / layout.OUTCOME).write_text('{"state": "failed", "cause": "energy", "message": "made energy", "steps": 7}')
+    text = conoid("show", folder)
+    assert "failed (energy)" in text
+    assert "made energy" in text
+    assert "7 steps" in text
+
+
+def test_files_of_a_folder_are_copied(folder: Path, quiet_home: Path) -> None:
+    assert conoid("get", folder, layout.JOURNAL, "--out", "copy").strip() == f"copy/{layout.JOURNAL}"
+    assert Path("copy", layout.JOURNAL).read_bytes() == (folder / layout.JOURNAL).read_bytes()
+    listed = json.loads(conoid("get", folder, "--json"))
+    assert {each["path"] for each in listed} == {layout.JOURNAL, layout.RESOLVED_CASE}
+    assert "has no none" in refused(1, "get", folder, "none", "--out", "copy")
+
+
+def test_what_only_a_server_can_do_says_so(folder: Path) -> None:
+    assert "this asks a server" in refused(2, "restart", folder)
+    assert "there is none" in refused(1, "sweep-table", folder)
+
+
+def test_a_copy_of_a_run_does_not_stand_for_the_one_of_the_server(folder: Path, server: Hostile) -> None:
+    """conoid get makes a folder that is called as the run is."""
+    name = "1kaaa".ljust(22, "0")
+    folder.rename(Path(name))
+    server.answers[f"/v1/runs/{name}"] = said(run_info(id=name))
+    server.answers[f"/v1/runs/{name}:cancel"] = said(run_info(id=name, state="stopping"))
+    assert conoid("cancel", name, "--url", server.url) == f"{name} stopping\n"
+    assert "no worker writes into it" in conoid("cancel", f"./{name}/../{name}")
+
+
+@pytest.mark.parametrize("name", ["-x", "a%b", "a\\b", "a b", "ü", "[red]", "%s{0}"])
+def test_a_folder_may_have_any_name(name: str, folder: Path, quiet_home: Path) -> None:
+    (folder / layout.OUTCOME).write_text('{"state": "succeeded"}')
+    folder.rename(quiet_home / name)
+    for command in ("watch", "show"):
+        assert CliRunner().invoke(app, [command, "--", name]).exit_code == 0
+    assert name in conoid("show", f"./{name}")
