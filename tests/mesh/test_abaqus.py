@@ -7,7 +7,7 @@ import pytest
 
 from conoid.worker.errors import MeshError
 from conoid.worker.mesh.abaqus.reading import read_inp
-from conoid.worker.mesh.gmsh_session import NamedMesh
+from conoid.worker.mesh.named import NamedMesh
 
 PART = """*HEADING
  a comment line, with, commas

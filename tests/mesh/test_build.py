@@ -2,6 +2,8 @@
 
 import hashlib
 import os
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -169,3 +171,29 @@ def test_without_gmsh_the_cure_is_named(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(MeshError, match=r"mesh: gmsh is not installed here; .*generator = 'structured'"):
         build(BAR, HERE)
+
+
+UNDER_LIMITS = """
+import resource, sys
+from pathlib import Path
+from conoid.cases.bodies import Box
+from conoid.worker.errors import MeshError
+from conoid.worker.mesh.build import build
+memory, cpu = (int(word) for word in sys.argv[1:])
+resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+resource.setrlimit(resource.RLIMIT_CPU, (cpu, cpu))
+body = Box(shape="box", low=(0, 0, 0), high=(1, 1, 1), element_size=0.5)
+try:
+    print(len(build(body, Path()).tets) > 0)
+except MeshError as error:
+    print(error)
+"""
+
+
+@pytest.mark.parametrize(("memory", "says"), [(3 * 2**30, "True"), (2**28, "needs more than the 0.25 GiB of memory")])
+def test_a_child_asks_for_no_more_than_is_allowed(memory: int, says: str, cache: Path) -> None:
+    """Under hard limits, as of ``ulimit -v`` and ``ulimit -t`` or of a batch system, which nobody can raise."""
+    command = [sys.executable, "-c", UNDER_LIMITS, str(memory), "200"]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    assert says in ended.stdout
+    assert ended.stdout.count("\n") == 1

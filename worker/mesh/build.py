@@ -32,8 +32,8 @@ def build(
     What needs gmsh, and every file, is handled by a child process within ``limits``. Raises MeshError.
     """
     source = _source(mesh, folder, key) if isinstance(mesh, MeshFile) else None
-    if isinstance(mesh, MeshFile) or mesh.generator == "gmsh":
-        _need_gmsh(mesh, key)
+    if not isinstance(mesh, MeshFile) and mesh.generator == "gmsh":
+        _need_gmsh(key)
     name = _content(mesh, source, key) + ".npz"
     cached = cache_folder()
     found = load(cached / name)
@@ -87,11 +87,10 @@ def _source(mesh: MeshFile, folder: Path, key: str) -> Path:
     return path.absolute()
 
 
-def _need_gmsh(mesh: Mesh, key: str) -> None:
-    text_only = isinstance(mesh, MeshFile) and mesh.path.lower().endswith(".inp")
-    if not text_only and importlib.util.find_spec("gmsh") is None:
-        cure = "" if isinstance(mesh, MeshFile) else ", or use generator = 'structured'"
-        raise MeshError(f"{key}: gmsh is not installed here; pip install 'conoid[mesh]'{cure}")
+def _need_gmsh(key: str) -> None:
+    if importlib.util.find_spec("gmsh") is None:
+        cure = "pip install 'conoid[mesh]', or use generator = 'structured'"
+        raise MeshError(f"{key}: gmsh is not installed here; {cure}")
 
 
 def _content(mesh: Mesh, source: Path | None, key: str) -> str:

@@ -14,7 +14,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from pydantic import TypeAdapter
@@ -34,6 +34,9 @@ _LOOK = 0.2
 _FULL = 0.97
 """A child with this share of its memory limit has no room left to say so."""
 
+_GRACE = 5
+"""CPU seconds between the signal that its time is used up and the end of a child. Chosen."""
+
 _DIES_WITH_PARENT = 1
 """Linux: prctl(PR_SET_PDEATHSIG)."""
 
@@ -46,6 +49,16 @@ class Limits:
     cpu: int = 900
     wall: int = 900
 
+    def allowed(self) -> "Limits":
+        """These, or what a hard limit of this process (``ulimit -H``) leaves of them."""
+        memory, cpu = (resource.getrlimit(which)[1] for which in (resource.RLIMIT_AS, resource.RLIMIT_CPU))
+        none = resource.RLIM_INFINITY
+        return replace(
+            self,
+            memory=self.memory if memory == none else min(self.memory, memory),
+            cpu=self.cpu if cpu == none else min(self.cpu, cpu),
+        )
+
 
 def run_child(mesh: Mesh, source: Path | None, target: Path, key: str, limits: Limits) -> None:
     """Makes ``mesh`` (reads ``source`` when it is a file) in a child process, which leaves it in ``target``.
@@ -53,6 +66,7 @@ def run_child(mesh: Mesh, source: Path | None, target: Path, key: str, limits: L
     Raises MeshError with the child's own line, or with the limit that it broke; StoppedError where the run was asked to
     stop: launchers tell all processes of a rank.
     """
+    limits = limits.allowed()
     request = {
         "mesh": mesh.model_dump(mode="json"),
         "source": None if source is None else str(source),
@@ -153,7 +167,9 @@ def _perform(mesh: Mesh, key: str, source: str | None, target: Path) -> None:
 
 def _limit(limits: Limits) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (limits.memory, limits.memory))
-    resource.setrlimit(resource.RLIMIT_CPU, (limits.cpu, limits.cpu + 5))
+    hard = resource.getrlimit(resource.RLIMIT_CPU)[1]
+    last = limits.cpu + _GRACE if hard == resource.RLIM_INFINITY else min(limits.cpu + _GRACE, hard)
+    resource.setrlimit(resource.RLIMIT_CPU, (limits.cpu, last))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_DIES_WITH_PARENT, signal.SIGKILL)

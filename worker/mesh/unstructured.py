@@ -48,7 +48,7 @@ def unstructured(body: Generated, key: str = "mesh") -> TetMesh:
         gmsh.model.occ.synchronize()
         _size(gmsh, body, scale)
         gmsh.model.mesh.generate(3)
-        mesh = tet_mesh(gmsh).mesh
+        mesh = tet_mesh(gmsh)
     if mesh.volumes().sum() < 0:
         mesh = TetMesh(mesh.points, mesh.tets[:, [0, 2, 1, 3]])
     skin, points = Skin.of(body, mesh, scale)

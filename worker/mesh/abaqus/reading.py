@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ...errors import MeshError
 from ...turning import sine_and_cosine
-from ..gmsh_session import NamedMesh, gathered
 from ..model import Floats, Ids, Names
+from ..named import NamedMesh, gathered
 from .choosing import Chosen, everything, grouped
 from .deck import Deck
 from .elements import ElementType, Kind

@@ -1,0 +1,199 @@
+"""The sections of a .msh file, and the numbers in one of them.
+
+Layout: gmsh reference manual, "MSH file format". A section stands between ``$Name`` and ``$EndName``; in a binary file
+numbers are stored as they are in memory, names are text.
+"""
+
+import warnings
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import MeshError
+from ..model import Floats, Ids
+
+VERSIONS = ("4.1", "2.2")
+_MARK = b"\xef\xbb\xbf"
+_SINGLE = ("MeshFormat", "PhysicalNames", "Entities", "PartitionedEntities", "Nodes", "ParametricNodes", "Elements")
+"""Sections of which a file has one."""
+_LARGEST = 2**53
+"""Whole numbers up to this one are exact as float64."""
+
+
+@dataclass(frozen=True)
+class Sections:
+    """The file: its version, its sections by name, and the order of bytes where it is binary (else empty)."""
+
+    version: str
+    parts: dict[str, bytes]
+    order: str
+
+    def numbers(self, name: str) -> "Numbers":
+        """The numbers of a section. Raises MeshError where it is missing."""
+        if name not in self.parts:
+            raise MeshError(f"the file has no section ${name}")
+        content = self.parts[name]
+        return Stored(name, content, self.order) if self.order else Written(name, content)
+
+
+def read_sections(path: Path) -> Sections:
+    """Divides a file. Raises MeshError for one that is no .msh file, is damaged, or is of another version."""
+    data = path.read_bytes().removeprefix(_MARK)
+    parts: dict[str, bytes] = {}
+    at = 0
+    while (line := data[at : at + 1].strip()) or at < len(data):
+        if not line:
+            at += 1
+            continue
+        end = data.find(b"\n", at)
+        word = data[at : end if end >= 0 else len(data)].strip()
+        name = word[1:].decode("ascii", "replace")
+        if not word.startswith(b"$") or not name.isalnum():
+            raise MeshError(_stray(parts, word))
+        stop = data.find(b"$End" + word[1:], at + len(word))
+        if end < 0 or stop < 0:
+            raise MeshError(f"the file is damaged or cut off: the section ${name} has no end")
+        if name in parts and name in (
+            "MeshFormat",
+            "PhysicalNames",
+            "Entities",
+            "PartitionedEntities",
+            "Nodes",
+            "Elements",
+        ):
+            raise MeshError(f"the file is damaged: it has two sections ${name}")
+        parts[name] = data[end + 1 : stop]
+        at = stop + len(word) + 3
+    return _formatted(parts)
+
+
+def _stray(parts: dict[str, bytes], word: bytes) -> str:
+    if not parts:
+        return "this is not a .msh file; its first line must be $MeshFormat"
+    shown = word[:40].decode("latin-1")
+    return f"the file is damaged: {shown!r} stands in no section"
+
+
+def _formatted(parts: dict[str, bytes]) -> Sections:
+    if next((name for name in parts if name != "Comments"), "") != "MeshFormat":
+        raise MeshError("this is not a .msh file; its first line must be $MeshFormat")
+    line, _, rest = parts["MeshFormat"].partition(b"\n")
+    words = line.decode("ascii", "replace").split()
+    version, kind, size = (*words, "", "", "")[:3]
+    if version not in VERSIONS:
+        raise MeshError(f"the .msh format {version!r} is not read; save it as {' or '.join(VERSIONS)}")
+    if kind not in ("0", "1") or size != "8":
+        raise MeshError(f"the file is damaged: its format is {line.decode('ascii', 'replace').strip()!r}")
+    order = ""
+    if kind == "1":
+        order = next((sign for sign in "<>" if rest[:4] == np.array(1, f"{sign}i4").tobytes()), "")
+        if not order:
+            raise MeshError("the file is damaged: the order of its bytes is not that of any machine")
+    return Sections(version, parts, order)
+
+
+class Numbers(ABC):
+    """Reads numbers of a section one after the other. What does not fit raises MeshError."""
+
+    def __init__(self, name: str, content: bytes, order: str) -> None:
+        """``content`` is what stands in the section ``name``; ``order`` that of its bytes."""
+        self.name, self.content, self.order, self.at = name, content, order, 0
+
+    def count(self) -> int:
+        """A number of things."""
+        return int(self.sizes(1)[0])
+
+    @abstractmethod
+    def ints(self, n: int) -> Ids:
+        """(n,) whole numbers of 4 bytes."""
+
+    @abstractmethod
+    def sizes(self, n: int) -> Ids:
+        """(n,) counts, or numbers of nodes and elements, of 8 bytes."""
+
+    @abstractmethod
+    def floats(self, n: int) -> Floats:
+        """(n,) floating point numbers."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Raises MeshError where numbers are left."""
+
+    def damaged(self, why: str) -> MeshError:
+        """The error of a section that does not hold what it says."""
+        return MeshError(f"the file is damaged or cut off: the section ${self.name} {why}")
+
+
+class Written(Numbers):
+    """As text."""
+
+    def __init__(self, name: str, content: bytes) -> None:
+        """Reads all numbers of the section."""
+        super().__init__(name, content, "")
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            try:
+                self.values: Floats = np.fromstring(content.decode("latin-1"), sep=" ")
+            except (DeprecationWarning, ValueError):
+                raise self.damaged("has a word that is no number") from None
+
+    def ints(self, n: int) -> Ids:
+        found = self.floats(n)
+        whole: NDArray[np.bool_] = (np.abs(found) < _LARGEST) & (found == np.floor(found))
+        if not whole.all():
+            raise self.damaged(f"has {found[~whole][0]:g} where a whole number is expected")
+        return found.astype(np.int64)
+
+    sizes = ints
+
+    def floats(self, n: int) -> Floats:
+        if n < 0 or self.at + n > len(self.values):
+            raise self.damaged("has fewer numbers than it says")
+        found = self.values[self.at : self.at + n]
+        self.at += n
+        return found
+
+    def close(self) -> None:
+        if self.at < len(self.values):
+            raise self.damaged("has more numbers than it says")
+
+
+class Stored(Numbers):
+    """As in memory; of the format 2.2 the counts are text (``line``)."""
+
+    def line(self) -> int:
+        """A count that is text, on a line of its own."""
+        text, _, _ = self.content[self.at :].partition(b"\n")
+        self.at += len(text) + 1
+        if not text.strip().isdigit():
+            raise self.damaged("has no count")
+        return int(text)
+
+    def rows(self, n: int, layout: Any) -> NDArray[Any]:
+        """(n,) records of a layout of numpy."""
+        kind = np.dtype(layout).newbyteorder(self.order)
+        if n < 0 or self.at + n * kind.itemsize > len(self.content):
+            raise self.damaged("has fewer numbers than it says")
+        found = np.frombuffer(self.content, kind, n, self.at)
+        self.at += n * kind.itemsize
+        return found
+
+    def ints(self, n: int) -> Ids:
+        return self.rows(n, "i4").astype(np.int64)
+
+    def sizes(self, n: int) -> Ids:
+        found = self.rows(n, "u8")
+        if len(found) and found.max() >= _LARGEST:
+            raise self.damaged(f"has the number {found.max()}")
+        return found.astype(np.int64)
+
+    def floats(self, n: int) -> Floats:
+        return self.rows(n, "f8").astype(np.float64)
+
+    def close(self) -> None:
+        if self.content[self.at :].strip():
+            raise self.damaged("has more numbers than it says")
