@@ -204,8 +204,9 @@ class MeshFile(Model):
     shape: Literal["file"]
     """The kind of body."""
     path: str
-    """Of the file; a relative one begins in the folder of the case. ``python -m conoid.worker`` and ``conoid batch``
-    read mesh files; a server refuses them, and so do ``conoid run``, ``converge`` and ``sweep``, which use one."""
+    """Of the file; a relative one begins in the folder of the case. ``conoid validate``, ``conoid batch``
+    and ``python -m conoid.worker`` read mesh files; a server refuses them, and so do ``conoid run``, ``converge`` and
+    ``sweep``, which use one."""
     unit: Annotated[Length, Positive]
     """Length of 1 in the file: ``"1 mm"``."""
     group: str | None = None

@@ -17,6 +17,7 @@ from .mesh_size import MeshSize, mesh_size, surface_faces
 from .placed import Bulk, bulk, driven
 from .schema import Case, Part, Rotation, Symmetry
 from .stages import AVERAGED, CONTACT, STATE, STEPS, STRENGTH, TETS
+from .survey import Survey, Surveyed
 
 NANOSECONDS = {"tet": 80.0, "nodal": 45.0, "split": 90.0, "eos": 15.0}
 """Core time per tet and step: what every tet takes, and what each feature adds; laws say theirs (cases/laws). Measured
@@ -98,10 +99,14 @@ class Estimate:
     parts: tuple[PartEstimate, ...]
 
 
-def estimate(case: Case, folder: Path | None = None) -> Estimate:
-    """What ``case`` costs; relative paths of mesh files start in ``folder``. Raises CaseError, unknown material."""
-    sizes = [_size(part, folder or Path()) for part in case.parts]
-    parts = tuple(_part(case, part, size) for part, size in zip(case.parts, sizes, strict=True))
+def estimate(case: Case, folder: Path | None = None, survey: Survey = Survey()) -> Estimate:  # noqa: B008
+    """What ``case`` costs; relative paths of mesh files start in ``folder``, ``survey`` has what was read of them.
+
+    Raises CaseError, unknown material.
+    """
+    known = [survey.of(index) for index in range(len(case.parts))]
+    sizes = [_size(part, folder or Path(), found) for part, found in zip(case.parts, known, strict=True)]
+    parts = tuple(_part(case, *each) for each in zip(case.parts, sizes, known, strict=True))
     dt = _least([part.dt for part in parts])
     shrunk = [
         None if p.dt is None else p.dt / shrinkage(case, q, speed)
@@ -109,7 +114,7 @@ def estimate(case: Case, folder: Path | None = None) -> Estimate:
     ]
     mean = _least(shrunk)
     steps = None if mean is None else min(math.ceil(case.run.end_time / mean), case.run.max_steps)
-    costs = _costs(case, parts, steps)
+    costs = _costs(case, parts, steps, sum(found.faces for found in survey.parts))
     return Estimate(
         elements=_total([part.elements for part in parts]),
         nodes=_total([part.nodes for part in parts]),
@@ -124,8 +129,10 @@ def estimate(case: Case, folder: Path | None = None) -> Estimate:
     )
 
 
-def _size(part: Part, folder: Path) -> MeshSize | int | None:
+def _size(part: Part, folder: Path, found: Surveyed | None) -> MeshSize | int | None:
     """What is known of a part's mesh: sizes, the number of tets only, or nothing."""
+    if found is not None:
+        return MeshSize(found.elements, found.nodes, found.step_length)
     if not isinstance(part.mesh, MeshFile):
         return mesh_size(part.mesh)
     path = folder / part.mesh.path
@@ -135,12 +142,19 @@ def _size(part: Part, folder: Path) -> MeshSize | int | None:
         return None
 
 
-def _part(case: Case, part: Part, size: MeshSize | int | None) -> PartEstimate:
+def _part(case: Case, part: Part, size: MeshSize | int | None, found: Surveyed | None) -> PartEstimate:
     if not isinstance(size, MeshSize):
         return PartEstimate(part.name, size, None, None)
     made = material(case, part.material)
     slowest = wave_speed(made) * _viscous_factor(case)
-    brings = None if isinstance(part.mesh, MeshFile) else bulk(driven(case, part), part.mesh, made.density)
+    if isinstance(part.mesh, MeshFile):
+        brings = (
+            None
+            if found is None
+            else Bulk(found.mass, found.low, found.high, found.momentum, found.energy, found.speed)
+        )
+    else:
+        brings = bulk(driven(case, part), part.mesh, made.density)
     return PartEstimate(
         part.name, size.elements, size.nodes, case.numerics.dt_safety * size.step_length / slowest, brings
     )
@@ -206,15 +220,15 @@ def _tet_bytes(case: Case, part: Part) -> int:
     return TET_BYTES["tet"] + TET_BYTES.get(case.numerics.pressure, 0) + features
 
 
-def _costs(case: Case, parts: tuple[PartEstimate, ...], steps: int | None) -> dict[str, float]:
-    """Core seconds by stage; none where a mesh file does not tell the tets."""
+def _costs(case: Case, parts: tuple[PartEstimate, ...], steps: int | None, faces: int) -> dict[str, float]:
+    """Core seconds by stage, of mesh files with so many ``faces``; none where a mesh file does not tell the tets."""
     if steps is None or any(size.elements is None for size in parts):
         return {}
     found = {STEPS: steps * case.run.ranks * STEP_OVERHEAD + case.run.ranks * START}
     for size, part in zip(parts, case.parts, strict=True):
         for name, nanoseconds in _nanoseconds(case, part).items():
             found[name] = found.get(name, 0.0) + 1e-9 * steps * (size.elements or 0) * nanoseconds
-    found[CONTACT] = 1e-9 * steps * _contact(case)
+    found[CONTACT] = 1e-9 * steps * _contact(case, faces)
     return {name: seconds for name, seconds in found.items() if seconds > 0.0}
 
 
@@ -255,11 +269,11 @@ def _tets_that_break(case: Case, parts: tuple[PartEstimate, ...]) -> int:
     return sum(size.elements or 0 for size, part in pairs if part.fracture is not None)
 
 
-def _contact(case: Case) -> float:
-    """Nanoseconds of contact in a step; parts from mesh files, whose surface is not known, are left out."""
+def _contact(case: Case, faces: int) -> float:
+    """Nanoseconds of contact in a step; ``faces``: of the parts from mesh files, as far as they are known."""
     if not case.in_contact:
         return 0.0
-    faces = sum(surface_faces(part.mesh) for part in case.parts if not isinstance(part.mesh, MeshFile))
+    faces += sum(surface_faces(part.mesh) for part in case.parts if not isinstance(part.mesh, MeshFile))
     return faces * FACE_NANOSECONDS["erosion" if case.erodes else "contact"]
 
 

@@ -26,6 +26,9 @@ from .units import QUANTITY
 
 DAY = 86_400.0
 """Core seconds. Chosen: who wants more than a day knows it."""
+FEW_STEPS = 10
+"""Chosen: a wave takes two steps or so through a tet; what ends before it has crossed five shows nothing. A slip of the
+unit of a mesh file is the commonest cause."""
 LIKELY: dict[str, tuple[float, float, str]] = {
     "density": (10.0, 23_000.0, "kg/m^3: foams have 10, osmium has 22,590"),
     "wave speed": (20.0, 20_000.0, "m/s: soft rubber has 30, diamond has 18,000"),
@@ -129,6 +132,9 @@ def _effort(case: Case, expected: Estimate) -> Iterator[Problem]:
     end, where = case.run.end_time, ("run", "end_time")
     if expected.dt is not None and end < expected.dt:
         yield problem(where, f"{end:g} s", f"is shorter than the first time step, {expected.dt:.3g} s")
+    elif expected.dt is not None and end < FEW_STEPS * expected.dt:
+        few = f"is {end / expected.dt:.2g} time steps of {expected.dt:.3g} s: no wave crosses more than a few tets"
+        yield problem(where, f"{end:g} s", few)
     if expected.steps is None or expected.core_seconds is None:
         return
     if expected.steps >= case.run.max_steps:

@@ -20,7 +20,8 @@ from conoid.cases.run import State
 
 from .console import echo, echo_json
 from .errors import ClientError
-from .options import CaseArgument, Json, Overrides, warn_of
+from .examination import examine
+from .options import CaseArgument, Json, Overrides, aloud, warn
 from .result import LocalFolder
 from .submission import data_of, locate
 
@@ -58,8 +59,10 @@ def batch_run(
 
     The same command again makes no second job: it tells the one that there is, or goes on with a run that was lost.
     """
-    warn_of(case, overrides or ())
     words = [*(overrides or ()), *([f"run.ranks={ranks}"] if ranks is not None else [])]
+    with aloud("reading mesh files"):
+        found = examine(data_of(case, words), locate(case).parent)
+    warn(found.odd)
     handed = hand_over(case, words, out, profile, slurm_of(site))
     if as_json:
         echo_json({"folder": str(handed.folder), "job": handed.job, "attempt": handed.attempt})

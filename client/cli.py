@@ -10,24 +10,22 @@ from typing import Annotated, Any, cast
 import typer
 from typer.core import TyperGroup
 
-from conoid.cases.estimate import estimate
 from conoid.cases.figures import counted
-from conoid.cases.load import CaseError, parse_case
+from conoid.cases.load import CaseError
 from conoid.cases.loaded import loads
-from conoid.cases.mesh_checks import missing_files
-from conoid.cases.plausible import doubts
-from conoid.cases.problems import Problem
 from conoid.cases.run import ExitCode
 
 from . import benches, commands, converging, hard, reports, shelf, sweeping, tables, viewing
 from .batch import batch_run
 from .console import echo, echo_json, one_line, prepare
 from .errors import ClientError
+from .examination import examine
 from .once import run_once
 from .options import (
     CaseArgument,
     Json,
     Overrides,
+    aloud,
     complain,
     show,
     warn,
@@ -104,25 +102,22 @@ def serve(ctx: typer.Context) -> None:
 def validate(case: CaseArgument, overrides: Overrides = None, as_json: Json = False) -> None:
     """Check a case: what is wrong with it, what is odd, what its parts bring along and what it needs.
 
-    No server is asked. Warnings go to standard error and leave the exit code 0.
+    Mesh files are read. No server is asked. Warnings go to standard error and leave the exit code 0.
     """
-    data = data_of(case, overrides or ())
-    checked, folder = parse_case(data), locate(case).parent
-    missing = list(missing_files((part.mesh for part in checked.parts), folder))
-    if missing:
-        raise CaseError(missing)
-    try:
-        expected = estimate(checked, folder)
-    except (ArithmeticError, ValueError):
-        raise CaseError([Problem("parts", "", "the elements are too many or too small to be counted")]) from None
-    odd = doubts(data, checked, expected)
+    with aloud("reading mesh files"):
+        found = examine(data_of(case, overrides or ()), locate(case).parent)
+    checked, expected, odd = found.case, found.expected, found.odd
     if as_json:
-        echo_json({"name": checked.name, "valid": True, "warnings": odd, "estimate": expected, "loads": loads(checked)})
+        told = {"estimate": expected, "loads": loads(checked), "files": found.survey.parts}
+        echo_json({"name": checked.name, "valid": True, "warnings": odd, **told})
         return
     warn(odd)
-    found = f", {counted(len(odd), 'warning')}" if odd else ""
-    show(f"{checked.name}: valid{found}")
+    warned = f", {counted(len(odd), 'warning')}" if odd else ""
+    show(f"{checked.name}: valid{warned}")
     show(tables.parts_table(checked, expected))
+    if found.survey.parts:
+        show("")
+        show(tables.files_table(checked, found.survey))
     if acted_on := loads(checked):
         show("")
         show(tables.loads_table(checked, acted_on))

@@ -8,6 +8,7 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
+from conoid.cases.bodies import MeshFile
 from conoid.cases.estimate import Estimate, estimate
 from conoid.cases.figures import (
     UNKNOWN,
@@ -26,7 +27,7 @@ from conoid.cases.figures import (
     size,
     vectors,
 )
-from conoid.cases.library import Constant
+from conoid.cases.library import Constant, material
 from conoid.cases.loaded import Load
 from conoid.cases.materials import Material
 from conoid.cases.outcome import Check, Outcome
@@ -34,6 +35,7 @@ from conoid.cases.placed import Bulk
 from conoid.cases.run import State
 from conoid.cases.schema import Boundary, Case, Traction
 from conoid.cases.stages import without
+from conoid.cases.survey import Survey
 
 from .compare import AT_THE_END, Comparison
 from .display import STATE_STYLE
@@ -144,6 +146,19 @@ def parts_table(case: Case, expected: Estimate) -> Table:
     brought = _brings([each.bulk for each in expected.parts])
     for part, each, bulk in zip(case.parts, expected.parts, brought, strict=True):
         made.add_row(part.name, part.material, count(each.elements), *bulk)
+    return made
+
+
+def files_table(case: Case, survey: Survey) -> Table:
+    """What was read of mesh files: the volumes and the smallest altitude of a tet, which decides the time step."""
+    right = ("nodes", "volume", "smallest altitude")
+    made = table("part", "file", "group", *right, right=right, wide=("file",))
+    for each in survey.parts:
+        part = case.parts[each.part]
+        assert isinstance(part.mesh, MeshFile)
+        volume = f"{1e9 * each.mass / material(case, part.material).density:.6g} mm^3"
+        group = part.mesh.group or "all tets"
+        made.add_row(part.name, part.mesh.path, group, count(each.nodes), volume, si(each.altitude, "m"))
     return made
 
 

@@ -14,15 +14,16 @@ from conoid.cases.library import material as find_material
 
 from . import selection
 from .contact import overlap, pairing
-from .errors import InputError
+from .errors import InputError, MeshError
 from .fracture.connectivity import components
 from .hashing import uniform
 from .mesh.build import build as build_mesh
 from .mesh.faces import FACES, across, normals
 from .mesh.model import TetMesh
+from .mesh.sharing import Placed, shared_nodes
 from .selection import Nearness, Selected
+from .setting import turned, velocities
 from .state import Flags, Floats, Indices, Ints, Load
-from .turning import sine_and_cosine
 
 log = logging.getLogger("conoid.worker")
 
@@ -63,7 +64,7 @@ def quiet(what: str) -> None:
 def assemble(case: schema.Case, folder: Path, say: Say = quiet) -> Whole:
     """Builds the meshes of all parts; ``folder`` is where relative mesh paths start. Raises MeshError."""
     points, tets, node_part, tet_part, density, warnings = [], [], [], [], [], list[str]()
-    bodies, part_of_body = [], list[int]()
+    bodies, part_of_body, placed = [], list[int](), list[Placed]()
     offset = 0
     for index, part in enumerate(case.parts):
         meshing = f"meshing {part.name}, part {index + 1} of {len(case.parts)}"
@@ -72,12 +73,17 @@ def assemble(case: schema.Case, folder: Path, say: Say = quiet) -> Whole:
         warnings += told
         bodies.append(piece + len(part_of_body))
         part_of_body += [index] * (int(piece.max(initial=0)) + 1)
-        points.append(mesh.points if part.turn is None else _turned(mesh.points, part.turn))
+        points.append(turned(mesh.points, part.turn))
+        if mesh.origin is not None:
+            placed.append((index, mesh.origin, points[-1]))
+            warnings += [f"parts[{index}].mesh: {note}" for note in mesh.origin.notes]
         tets.append(mesh.tets.astype(np.int64) + offset)
         node_part.append(np.full(len(mesh.points), index, np.int32))
         tet_part.append(np.full(len(mesh.tets), index, np.int32))
         density.append(find_material(case, part.material).density)
         offset += len(mesh.points)
+    for refusal in shared_nodes(case, placed):
+        raise MeshError(refusal)
     x, t = np.concatenate(points), np.concatenate(tets).astype(np.int32)
     part_of_tet = np.concatenate(tet_part)
     volumes = _volumes(x, t)
@@ -124,16 +130,6 @@ def _pieces(case: schema.Case, index: int, mesh: TetMesh) -> tuple[Indices, list
     if many > _MANY:
         return whole, [f"{pieces}: whether they overlap each other at the start is found out for {_MANY} at most"]
     return piece.reshape(-1).astype(np.int32), []
-
-
-def _turned(points: Floats, turn: schema.Turn) -> Floats:
-    """Points (n, 3) after the rotation."""
-    i, j = ((1, 2), (2, 0), (0, 1))["xyz".index(turn.axis)]
-    sine, cosine = sine_and_cosine(turn.angle)
-    arms, turned = points - np.array(turn.centre), points.copy()
-    turned[:, i] = turn.centre[i] + cosine * arms[:, i] - sine * arms[:, j]
-    turned[:, j] = turn.centre[j] + sine * arms[:, i] + cosine * arms[:, j]
-    return turned
 
 
 def _apart(case: schema.Case, x: Floats, tets: Indices, body: Indices, part: Ints, exposed: Flags) -> Floats:
@@ -206,11 +202,7 @@ def _velocities(case: schema.Case, x: Floats, part: Indices) -> Floats:
     v = np.zeros_like(x)
     for index, spec in enumerate(case.parts):
         chosen = part == index
-        v[chosen] = spec.velocity
-        if spec.spin is not None:
-            v[chosen] += np.cross(np.array(spec.spin.rate), x[chosen] - np.array(spec.spin.centre))
-        if spec.stretch is not None:
-            v[chosen] += np.array(spec.stretch.rate) * (x[chosen] - np.array(spec.stretch.centre))
+        v[chosen] = velocities(spec, x[chosen])
         if spec.jitter > 0.0:
             places = 3 * np.flatnonzero(chosen)[:, None] + np.arange(3)
             v[chosen] += spec.jitter * (2.0 * uniform(places, _JITTER) - 1.0)

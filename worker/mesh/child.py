@@ -133,7 +133,7 @@ def main() -> int:
     """Answers the request on stdin; the exit code."""
     request = json.load(sys.stdin)
     limits = Limits(**request["limits"])
-    _limit(limits)
+    limit(limits)
     key, target = str(request["key"]), Path(request["target"])
     try:
         mesh: Mesh = TypeAdapter[Mesh](Mesh).validate_python(request["mesh"])
@@ -165,7 +165,8 @@ def _perform(mesh: Mesh, key: str, source: str | None, target: Path) -> None:
     save(morton_ordered(made), target)
 
 
-def _limit(limits: Limits) -> None:
+def limit(limits: Limits) -> None:
+    """Binds this process to ``limits``; on Linux it ends when its parent does."""
     resource.setrlimit(resource.RLIMIT_AS, (limits.memory, limits.memory))
     hard = resource.getrlimit(resource.RLIMIT_CPU)[1]
     last = limits.cpu + _GRACE if hard == resource.RLIM_INFINITY else min(limits.cpu + _GRACE, hard)

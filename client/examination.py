@@ -1,0 +1,91 @@
+"""Everything that is known of a case before it runs: what is wrong, what is odd, what it will cost.
+
+Mesh files are read by a program of the worker, where that is installed: a process of its own.
+"""
+
+import importlib.util
+import subprocess
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from conoid.cases import survey
+from conoid.cases.bodies import MeshFile
+from conoid.cases.estimate import Estimate, estimate
+from conoid.cases.load import CaseError, parse_case
+from conoid.cases.mesh_checks import missing_files
+from conoid.cases.plausible import doubts
+from conoid.cases.problems import Problem, problem
+from conoid.cases.schema import Case
+from conoid.cases.survey import Survey
+
+from .errors import ClientError
+
+_PROGRAM = "conoid.worker.survey"
+
+
+@dataclass(frozen=True)
+class Examination:
+    """A case that may run: ``odd`` are its warnings, ``survey`` is what its mesh files hold."""
+
+    case: Case
+    expected: Estimate
+    odd: list[Problem]
+    survey: Survey
+
+
+def examine(data: Mapping[str, Any], folder: Path) -> Examination:
+    """Checks a case in plain data whose mesh files are in ``folder``, or have full paths.
+
+    Raises CaseError with every reason why a run of it would be refused that can be known without one; ClientError where
+    the program that reads mesh files breaks off.
+    """
+    case = parse_case(data)
+    if missing := list(missing_files((part.mesh for part in case.parts), folder)):
+        raise CaseError(missing)
+    found, unread = _survey(case, folder)
+    if found.refused:
+        raise CaseError(Problem("", "", line) for line in found.refused)
+    try:
+        expected = estimate(case, folder, found)
+    except (ArithmeticError, ValueError):
+        raise CaseError([Problem("parts", "", "the elements are too many or too small to be counted")]) from None
+    return Examination(case, expected, [*unread, *_notes(case, found), *doubts(data, case, expected)], found)
+
+
+def _survey(case: Case, folder: Path) -> tuple[Survey, list[Problem]]:
+    """What the mesh files hold; a warning for each of them where nothing here can read it."""
+    files = [(i, part.mesh) for i, part in enumerate(case.parts) if isinstance(part.mesh, MeshFile)]
+    if not files:
+        return Survey(), []
+    if not _installed():
+        cure = "was not read: the solver is not installed here (pip install 'conoid[worker]')"
+        return Survey(), [problem(("parts", i, "mesh", "path"), mesh.path, cure) for i, mesh in files]
+    asked = survey.question(case.model_dump(mode="json"), folder)
+    ended = subprocess.run([sys.executable, "-m", _PROGRAM], input=asked, capture_output=True, check=False)
+    try:
+        if ended.returncode:
+            raise ValueError
+        return survey.from_json(ended.stdout), []
+    except (ValueError, msgspec.MsgspecError):
+        said = ended.stderr.decode("utf-8", "replace").strip().splitlines()
+        why = said[-1] if said else f"it ended with code {ended.returncode}"
+        raise ClientError(f"the program that reads mesh files has failed: {why}") from None
+
+
+def _installed() -> bool:
+    """Whether the worker can be started here."""
+    return all(importlib.util.find_spec(name) is not None for name in ("conoid.worker", "numpy"))
+
+
+def _notes(case: Case, found: Survey) -> list[Problem]:
+    """What of the files is not in the meshes, as warnings."""
+    return [
+        problem(("parts", each.part, "mesh", "path"), getattr(case.parts[each.part].mesh, "path", ...), note)
+        for each in found.parts
+        for note in each.notes
+    ]

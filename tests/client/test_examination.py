@@ -1,0 +1,82 @@
+"""``conoid validate`` and ``conoid batch`` read mesh files: what they hold, and a line where a run would be refused."""
+
+import importlib.util
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from conoid.client.cli import app
+
+BAR = """*NODE
+1, 0, 0, 0
+2, 10, 0, 0
+3, 0, 10, 0
+4, 0, 0, 10
+*ELEMENT, TYPE=C3D4, ELSET=All
+1, 1, 2, 3, 4
+*ELEMENT, TYPE=MASS
+2, 1
+"""
+CASE = """
+name = "bar"
+contact = "none"
+run.end_time = "100 us"
+[[parts]]
+name = "bar"
+material = "steel"
+mesh = { shape = "file", path = "bar.inp", unit = "1 mm", group = "All" }
+"""
+
+
+@pytest.fixture
+def folder(quiet_home: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A case with a mesh file of one tet, 10 mm large."""
+    monkeypatch.setenv("CONOID_CACHE_DIR", str(quiet_home / "cache"))
+    (quiet_home / "bar.inp").write_text(BAR)
+    (quiet_home / "bar.toml").write_text(CASE)
+    return quiet_home
+
+
+def conoid(*words: object) -> Result:
+    return CliRunner().invoke(app, [str(word) for word in words])
+
+
+def test_a_mesh_file_is_measured_and_its_estimate_is_that_of_its_tets(folder: Path) -> None:
+    result = conoid("validate", "bar.toml", "--json")
+    assert result.exit_code == 0, result.output
+    told = json.loads(result.stdout)
+    assert told["estimate"]["parts"][0]["bulk"]["mass"] == pytest.approx(7850.0 * 1e-6 / 6.0)
+    assert told["estimate"]["elements"] == 1
+    assert told["estimate"]["dt"] == pytest.approx(0.9 * told["files"][0]["step_length"] / 5900.0, rel=0.2)
+    assert [each["message"] for each in told["warnings"]] == ["elements that carry no volume are skipped: 1 MASS"]
+    assert told["warnings"][0]["key"] == "parts[0].mesh.path"
+
+
+def test_a_slip_of_the_unit_is_told_as_of_any_body(folder: Path) -> None:
+    result = conoid("validate", "bar.toml", "--set", "parts[0].mesh.unit='1 m'")
+    assert result.exit_code == 0, result.output
+    assert "warning: run.end_time = '0.0001 s': is shorter than the first time step" in result.stderr
+    assert "10 x 10 x 10 m" in result.stdout
+    assert "577 cm" in result.stdout or "5.77 m" in result.stdout
+
+
+@pytest.mark.parametrize("command", ["validate", "batch"])
+def test_what_a_run_would_refuse_is_refused_before(command: str, folder: Path) -> None:
+    result = conoid(command, "bar.toml", "--set", "parts[0].mesh.group='ice'")
+    assert result.exit_code == 2
+    assert result.stderr == (
+        "conoid: parts[0].mesh.group = 'ice': no such element set, instance or part; known: All\n"
+    )  # fmt: skip
+    assert not (folder / "runs").exists()
+
+
+def test_where_the_worker_is_not_installed_a_file_that_was_not_read_is_told(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "conoid.worker" else found(name))
+    result = conoid("validate", "bar.toml")
+    assert result.exit_code == 0
+    assert "parts[0].mesh.path = 'bar.inp': was not read: the solver is not installed here" in result.stderr
