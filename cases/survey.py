@@ -6,6 +6,7 @@ from typing import Any
 import msgspec
 
 from .geometry import Vector
+from .touching import Touch
 
 
 class Question(msgspec.Struct, kw_only=True, frozen=True):
@@ -46,6 +47,8 @@ class Survey(msgspec.Struct, kw_only=True, frozen=True):
 
     parts: list[Surveyed] = []
     refused: list[str] = []
+    touching: list[Touch] = []
+    """Of the pairs of parts at least one of which has a mesh from a file."""
 
     def of(self, part: int) -> Surveyed | None:
         """What is known of part ``part``; None where its mesh is generated, or was not read."""

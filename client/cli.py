@@ -108,7 +108,7 @@ def validate(case: CaseArgument, overrides: Overrides = None, as_json: Json = Fa
         found = examine(data_of(case, overrides or ()), locate(case).parent)
     checked, expected, odd = found.case, found.expected, found.odd
     if as_json:
-        told = {"estimate": expected, "loads": loads(checked), "files": found.survey.parts}
+        told = {"estimate": expected, "loads": loads(checked), "files": found.survey.parts, "touching": found.touching}
         echo_json({"name": checked.name, "valid": True, "warnings": odd, **told})
         return
     warn(odd)
@@ -118,6 +118,9 @@ def validate(case: CaseArgument, overrides: Overrides = None, as_json: Json = Fa
     if found.survey.parts:
         show("")
         show(tables.files_table(checked, found.survey))
+    if found.touching:
+        show("")
+        show(tables.touching_table(checked, found.touching))
     if acted_on := loads(checked):
         show("")
         show(tables.loads_table(checked, acted_on))

@@ -22,6 +22,8 @@ from conoid.cases.plausible import doubts
 from conoid.cases.problems import Problem, problem
 from conoid.cases.schema import Case
 from conoid.cases.survey import Survey
+from conoid.cases.touching import Touch, apart
+from conoid.cases.touching import touching as touches
 
 from .errors import ClientError
 
@@ -30,12 +32,14 @@ _PROGRAM = "conoid.worker.survey"
 
 @dataclass(frozen=True)
 class Examination:
-    """A case that may run: ``odd`` are its warnings, ``survey`` is what its mesh files hold."""
+    """A case that may run: ``odd`` are its warnings, ``survey`` is what its mesh files hold, ``touching`` are the parts
+    whose surfaces coincide."""
 
     case: Case
     expected: Estimate
     odd: list[Problem]
     survey: Survey
+    touching: list[Touch]
 
 
 def examine(data: Mapping[str, Any], folder: Path) -> Examination:
@@ -54,7 +58,9 @@ def examine(data: Mapping[str, Any], folder: Path) -> Examination:
         expected = estimate(case, folder, found)
     except (ArithmeticError, ValueError):
         raise CaseError([Problem("parts", "", "the elements are too many or too small to be counted")]) from None
-    return Examination(case, expected, [*unread, *_notes(case, found), *doubts(data, case, expected)], found)
+    touching = [*touches(case), *found.touching]
+    odd = [*unread, *_notes(case, found), *doubts(data, case, expected), *apart(case, touching)]
+    return Examination(case, expected, odd, found, touching)
 
 
 def _survey(case: Case, folder: Path) -> tuple[Survey, list[Problem]]:

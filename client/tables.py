@@ -36,6 +36,7 @@ from conoid.cases.run import State
 from conoid.cases.schema import Boundary, Case, Traction
 from conoid.cases.stages import without
 from conoid.cases.survey import Survey
+from conoid.cases.touching import Touch
 
 from .compare import AT_THE_END, Comparison
 from .display import STATE_STYLE
@@ -159,6 +160,15 @@ def files_table(case: Case, survey: Survey) -> Table:
         volume = f"{1e9 * each.mass / material(case, part.material).density:.6g} mm^3"
         group = part.mesh.group or "all tets"
         made.add_row(part.name, part.mesh.path, group, count(each.nodes), volume, si(each.altitude, "m"))
+    return made
+
+
+def touching_table(case: Case, touches: Sequence[Touch]) -> Table:
+    """Which parts touch at the start; none of them are joined."""
+    made = table("parts that touch, not joined", "area", right=("area",), wide=("parts that touch, not joined",))
+    for touch in touches:
+        names = " and ".join(case.parts[i].name for i in (touch.one, touch.other))
+        made.add_row(names, f"about {1e6 * touch.area:.3g} mm^2")
     return made
 
 

@@ -23,12 +23,14 @@ from .mesh.child import Limits, limit
 from .mesh.faces import FACES, areas, boundary_faces
 from .mesh.model import Floats, TetMesh
 from .mesh.sharing import Placed, shared_nodes
+from .mesh.touching import Surface, touches
 from .setting import turned, velocities
 
 
 def surveyed(case: Case, folder: Path) -> Survey:
     """Reads the files of all parts; what is wrong with one of them hides nothing that is wrong with another."""
     parts, refused, placed = list[Surveyed](), list[str](), list[Placed]()
+    surfaces = dict[int, Surface]()
     for index, part in enumerate(case.parts):
         if not isinstance(part.mesh, MeshFile):
             continue
@@ -38,13 +40,16 @@ def surveyed(case: Case, folder: Path) -> Survey:
             refused.append(str(error))
             continue
         points = turned(mesh.points, part.turn)
-        parts.append(_facts(case, index, mesh, points))
+        surfaces[index] = points, boundary_faces(mesh.tets)
+        parts.append(_facts(case, index, mesh, surfaces[index]))
         if mesh.origin is not None:
             placed.append((index, mesh.origin, points))
-    return Survey(parts=parts, refused=[*refused, *shared_nodes(case, placed)])
+    refused += shared_nodes(case, placed)
+    return Survey(parts=parts, refused=refused, touching=[] if refused else list(touches(case, surfaces)))
 
 
-def _facts(case: Case, index: int, mesh: TetMesh, points: Floats) -> Surveyed:
+def _facts(case: Case, index: int, mesh: TetMesh, surface: Surface) -> Surveyed:
+    points, faces = surface
     part = driven(case, case.parts[index])
     volumes = mesh.volumes()
     quarters = np.repeat(volumes / 4.0, 4)
@@ -53,7 +58,7 @@ def _facts(case: Case, index: int, mesh: TetMesh, points: Floats) -> Surveyed:
     squares = (v * v).sum(axis=1)
     low, high, momentum = points.min(axis=0), points.max(axis=0), (masses[:, None] * v).sum(axis=0)
     return Surveyed(
-        part=index, elements=len(mesh.tets), nodes=len(points), faces=len(boundary_faces(mesh.tets)),
+        part=index, elements=len(mesh.tets), nodes=len(points), faces=len(faces),
         step_length=float(mesh.step_lengths().min()), altitude=_smallest_altitude(mesh, volumes),
         mass=float(masses.sum()), low=tuple(low.tolist()), high=tuple(high.tolist()),
         momentum=tuple(momentum.tolist()), energy=float(0.5 * (masses * squares).sum()),

@@ -137,7 +137,7 @@ def main() -> int:
     key, target = str(request["key"]), Path(request["target"])
     try:
         mesh: Mesh = TypeAdapter[Mesh](Mesh).validate_python(request["mesh"])
-        _perform(mesh, key, request["source"], target)
+        perform(mesh, key, request["source"], target)
     except InputError as error:
         text = str(error)
         return _told(text if text.startswith(key) else f"{key}: {text}", ExitCode.BAD_INPUT)
@@ -148,7 +148,7 @@ def main() -> int:
     return ExitCode.SUCCEEDED
 
 
-def _perform(mesh: Mesh, key: str, source: str | None, target: Path) -> None:
+def perform(mesh: Mesh, key: str, source: str | None, target: Path) -> None:
     """Makes or reads, checks, orders and stores. Imports gmsh and numpy only now, within the limits."""
     from .model import check
     from .order import morton_ordered

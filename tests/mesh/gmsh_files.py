@@ -1,0 +1,137 @@
+"""Writes .msh and .inp files with gmsh in random options: ``python gmsh_files.py FOLDER SEED COUNT``.
+
+A process of its own, since gmsh is GPL. ``truth.json`` says what each group of each file holds, from gmsh's own model.
+"""
+
+import itertools
+import json
+import random
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+
+def main(folder: Path, seed: int, count: int) -> None:
+    """One model after the other."""
+    import gmsh
+
+    gmsh.initialize(readConfigFiles=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    truth = {}
+    for index in range(count):
+        gmsh.clear()
+        gmsh.option.restoreDefaults()
+        gmsh.option.setNumber("General.Terminal", 0)
+        name, groups = _model(gmsh, random.Random(f"{seed}/{index}"), folder, index)
+        truth[name] = groups
+    (folder / "truth.json").write_text(json.dumps(truth))
+    gmsh.finalize()
+
+
+def _model(gmsh: Any, chance: random.Random, folder: Path, index: int) -> tuple[str, dict[str, list[float]]]:
+    volumes = _bodies(gmsh, chance)
+    groups = _groups(gmsh, chance, volumes)
+    gmsh.option.setNumber("Mesh.MeshSizeMax", chance.choice((0.5, 0.7, 1.0)))
+    gmsh.model.mesh.generate(3)
+    second = chance.random() < 0.07
+    if second:
+        gmsh.model.mesh.setOrder(2)
+    options = {
+        "MshFileVersion": chance.choice((2.2, 4.1)),
+        "Binary": chance.randrange(2),
+        "SaveAll": int(chance.random() < 0.25 or not groups),
+        "SaveParametric": int(chance.random() < 0.25),
+        "FirstNodeTag": chance.choice((1, 1, 1000)),
+        "FirstElementTag": chance.choice((1, 1, 500)),
+    }
+    inp = chance.random() < 0.12
+    for name, value in options.items():
+        gmsh.option.setNumber(f"Mesh.{name}", value)
+    truth = {} if second else _measured(gmsh, volumes, groups, options, inp)
+    if not inp and chance.random() < 0.35:
+        gmsh.option.setNumber("Mesh.PartitionCreateGhostCells", chance.randrange(2))
+        gmsh.option.setNumber("Mesh.PartitionCreateTopology", chance.randrange(2))
+        gmsh.model.mesh.partition(chance.randint(2, 3))
+    gmsh.option.setNumber("Mesh.SaveGroupsOfElements", 1)
+    file = f"g{index:03d}.{'inp' if inp else 'msh'}"
+    gmsh.write(str(folder / file))
+    if chance.random() < 0.15 and not (inp or second):
+        truth = _renamed(chance, folder / file, truth, groups)
+    return file, truth
+
+
+def _bodies(gmsh: Any, chance: random.Random) -> list[int]:
+    """One to three bodies, with common faces where they touch or overlap."""
+    occ = gmsh.model.occ
+    for i in range(chance.randint(1, 3)):
+        kind, x = chance.randrange(3), 1.2 * i
+        if kind == 0:
+            occ.addBox(x, 0, 0, 1.2, 1, chance.choice((1, 2)))
+        elif kind == 1:
+            occ.addSphere(x, 0, 0, 0.8)
+        else:
+            occ.addCylinder(x, 0, 0, 0, 0, 1.5, 0.6)
+    entities = occ.getEntities(3)
+    if len(entities) > 1:
+        occ.fragment(entities[:1], entities[1:])
+    occ.synchronize()
+    return [tag for _, tag in gmsh.model.getEntities(3)]
+
+
+def _groups(gmsh: Any, chance: random.Random, volumes: list[int]) -> dict[str, list[int]]:
+    """Physical groups of volumes, some of which overlap or leave bodies out, and one of a surface."""
+    found: dict[str, list[int]] = {}
+    for i in range(chance.choice((0, 1, 2, 2, 3))):
+        name = chance.choice(("steel", "Körper 1", "a b", "x")) + str(i) if chance.random() < 0.85 else ""
+        members = chance.sample(volumes, chance.randint(1, len(volumes)))
+        tag = gmsh.model.addPhysicalGroup(3, members, chance.choice((-1, 50 + i)), name=name)
+        found[name or str(tag)] = members
+    if chance.random() < 0.5:
+        gmsh.model.addPhysicalGroup(2, [gmsh.model.getEntities(2)[0][1]], name=chance.choice(("steel0", "face")))
+    return found
+
+
+def _measured(
+    gmsh: Any, volumes: list[int], groups: dict[str, list[int]], options: dict[str, Any], inp: bool
+) -> dict[str, list[float]]:
+    """Volume and first moments by group; the empty name is the whole file."""
+    tags, coordinates, _ = gmsh.model.mesh.getNodes()
+    order = np.argsort(tags)
+    points, tags = coordinates.reshape(-1, 3)[order], tags[order]
+
+    def of(entities: list[int]) -> Any:
+        total = np.zeros(4)
+        for entity in entities:
+            corners = gmsh.model.mesh.getElementsByType(4, entity)[1].reshape(-1, 4)
+            x = points[np.searchsorted(tags, corners)]
+            each = np.abs(np.linalg.det(x[:, 1:] - x[:, :1])) / 6.0
+            total += np.concatenate([[each.sum()], (each[:, None] * x.mean(axis=1)).sum(axis=0)])
+        return total.tolist()
+
+    saved = volumes if options["SaveAll"] else [v for v in volumes if any(v in members for members in groups.values())]
+    truth = {"": of(saved)}
+    if inp:  # gmsh writes blanks of names as _, and a name of its own for a group without one
+        groups = {name.replace(" ", "_"): members for name, members in groups.items() if not name.isdigit()}
+    lost = not inp and options["SaveAll"] and options["MshFileVersion"] == 2.2  # gmsh leaves the groups out there
+    if not truth[""][0]:
+        return {}
+    return truth if lost else truth | {name: of(members) for name, members in groups.items()}
+
+
+def _renamed(
+    chance: random.Random, file: Path, truth: dict[str, list[float]], groups: dict[str, list[int]]
+) -> dict[str, list[float]]:
+    """Gives two groups the name of the first, where they have no body in common."""
+    names = [name for name in groups if not name.isdigit()]
+    for one, other in itertools.combinations(names, 2):
+        if other in truth and not set(groups[one]) & set(groups[other]):
+            file.write_bytes(file.read_bytes().replace(f'"{other}"'.encode(), f'"{one}"'.encode()))
+            both = (np.array(truth[one]) + np.array(truth[other])).tolist()
+            return {name: value for name, value in truth.items() if name != other} | {one: both}
+    return truth
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]))

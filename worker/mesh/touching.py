@@ -1,0 +1,70 @@
+"""Parts from mesh files whose surfaces coincide with those of other parts, without a gap."""
+
+from collections.abc import Iterator, Mapping
+from itertools import combinations
+
+import numpy as np
+
+from conoid.cases.bodies import Loose, MeshFile
+from conoid.cases.placed import Placed
+from conoid.cases.schema import Case
+from conoid.cases.touching import NEAR, Touch, size
+
+from .faces import normals
+from .model import Floats, Ids, Ints
+
+_MOST = 20_000
+"""Faces within the box round a generated body that are looked at. Chosen: half a second."""
+
+Surface = tuple[Floats, Ints]
+"""Nodes (n, 3), m, and faces (k, 3), outward."""
+
+
+def touches(case: Case, surfaces: Mapping[int, Surface]) -> Iterator[Touch]:
+    """The pairs of parts that touch of which at least one has a mesh from a file: ``surfaces`` of these by part.
+
+    Two meshes from files touch where faces have the same corners; with a generated body all faces that lie on it count.
+    """
+    for (i, one), (j, other) in combinations(surfaces.items(), 2):
+        if area := _matched(one, other):
+            yield Touch(one=i, other=j, area=area)
+    for i, surface in surfaces.items():
+        for j, part in enumerate(case.parts):
+            if isinstance(part.mesh, MeshFile | Loose):
+                continue
+            if area := _lying(surface, Placed(part.mesh, part.turn)):
+                yield Touch(one=min(i, j), other=max(i, j), area=area)
+
+
+def _matched(one: Surface, other: Surface) -> float:
+    """Area, m^2, of the faces that both surfaces have."""
+    grain = NEAR * max(float(np.ptp(points, axis=0).max()) for points, _ in (one, other))
+    keys = [_corners(points, faces, grain) for points, faces in (one, other)]
+    unique = [np.unique(key, axis=0, return_index=True) for key in keys]
+    both = np.concatenate([unique[0][0], unique[1][0]])
+    _, first, times = np.unique(both, axis=0, return_index=True, return_counts=True)
+    common = unique[0][1][first[times > 1]]
+    return float(0.5 * np.linalg.norm(normals(one[0], one[1][common]), axis=1).sum())
+
+
+def _corners(points: Floats, faces: Ints, grain: float) -> Ids:
+    """(k, 9) corners of faces in whole grains, in one order."""
+    cells = np.floor(points / grain + 0.5).astype(np.int64)[faces]
+    order = np.lexsort((cells[..., 2], cells[..., 1], cells[..., 0]), axis=1)
+    return np.take_along_axis(cells, order[..., None], axis=1).reshape(len(faces), 9)
+
+
+def _lying(surface: Surface, body: Placed) -> float:
+    """Area, m^2, of the faces behind which a generated body begins."""
+    points, faces = surface
+    margin = NEAR * min(size(body), float(np.ptp(points, axis=0).max()))
+    centres, across = points[faces].mean(axis=1), normals(points, faces)
+    areas = 0.5 * np.linalg.norm(across, axis=1)
+    low, high = (np.array(corner) for corner in body.bounds())
+    near = np.flatnonzero(((centres >= low - margin) & (centres <= high + margin)).all(axis=1))[:_MOST]
+    step = margin * across[near] / (2.0 * areas[near, None])
+    area = 0.0
+    for face, own, far in zip(near, centres[near] - step, centres[near] + step, strict=True):
+        if body.holds(tuple(far.tolist())) and not body.holds(tuple(own.tolist())):
+            area += float(areas[face])
+    return area
