@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from .bodies import Box, Cylinder, Loose, MeshFile, Plate, Sphere, Tube
@@ -52,7 +52,7 @@ class Load:
     fewest: int = 0
     """Of them, those in a box that is not widened by half an element on all sides."""
     exact: bool = False
-    """Whether nodes are counted and not estimated."""
+    """Whether nodes, or faces of a mesh that was read, are counted and not estimated."""
 
     def agrees(self, nodes: int, faces: int, area: float) -> bool:
         """Whether a mesh has about as much: ``nodes`` that are driven, or ``faces`` with an ``area``, m^2."""
@@ -67,14 +67,19 @@ class Load:
     def words(self) -> str:
         """``about 32 faces, 4 mm^2``."""
         if self.area is not None:
-            return f"about {self.faces} faces, {1e6 * self.area:.6g} mm^2"
+            return f"{'' if self.exact else 'about '}{self.faces} faces, {1e6 * self.area:.6g} mm^2"
         if self.nodes is not None:
             return f"{self.nodes} nodes" if self.exact else f"about {self.nodes} nodes"
         return "not known before there is a mesh"
 
 
-def loads(case: Case) -> list[Load]:
-    """Of each traction and each prescribed velocity of a case."""
+def loads(case: Case, counted: Sequence[Load] = ()) -> list[Load]:
+    """Of each traction and each prescribed velocity of a case; ``counted``: in meshes that have been read."""
+    known = {load.boundary: load for load in counted}
+    return [known.get(load.boundary, load) for load in _loads(case)]
+
+
+def _loads(case: Case) -> list[Load]:
     found = [_acted_on(case, number, spec) for number, spec in case.boundaries_of(Traction)]
     found += [_held(case, number, spec) for number, spec in case.boundaries_of(Prescribed)]
     return sorted(found, key=lambda load: load.boundary)

@@ -6,6 +6,7 @@ from typing import Any
 import msgspec
 
 from .geometry import Vector
+from .loaded import Load
 from .touching import Touch
 
 
@@ -46,6 +47,8 @@ class Survey(msgspec.Struct, kw_only=True, frozen=True):
     """What the mesh files of a case hold, and every reason why a run of it would be refused, a line each."""
 
     parts: list[Surveyed] = []
+    loads: list[Load] = []
+    """Of the tractions and prescribed velocities that are for parts from mesh files alone."""
     refused: list[str] = []
     touching: list[Touch] = []
     """Of the pairs of parts at least one of which has a mesh from a file."""

@@ -108,7 +108,12 @@ def validate(case: CaseArgument, overrides: Overrides = None, as_json: Json = Fa
         found = examine(data_of(case, overrides or ()), locate(case).parent)
     checked, expected, odd = found.case, found.expected, found.odd
     if as_json:
-        told = {"estimate": expected, "loads": loads(checked), "files": found.survey.parts, "touching": found.touching}
+        told = {
+            "estimate": expected,
+            "loads": loads(checked, found.survey.loads),
+            "files": found.survey.parts,
+            "touching": found.touching,
+        }
         echo_json({"name": checked.name, "valid": True, "warnings": odd, **told})
         return
     warn(odd)
@@ -121,7 +126,7 @@ def validate(case: CaseArgument, overrides: Overrides = None, as_json: Json = Fa
     if found.touching:
         show("")
         show(tables.touching_table(checked, found.touching))
-    if acted_on := loads(checked):
+    if acted_on := loads(checked, found.survey.loads):
         show("")
         show(tables.loads_table(checked, acted_on))
     show("")

@@ -219,24 +219,20 @@ def _loads(
     loads, found, told = list[Load](), list[Selected](), list[str]()
     tet, face = np.nonzero(across(tets) < 0) if tractions else (np.zeros(0, np.int64), np.zeros(0, np.int64))
     faces = tets[tet[:, None], FACES[face]]
-    names = [each.name for each in case.parts]
     for index, spec in tractions:
-        chosen = selection.named(spec, names)[part] & selection.inside(spec, x, part, near.slack)
-        inside = chosen[faces].all(axis=1)
-        loaded = faces[inside]
+        selected, chosen = selection.counted(case, index, x, part, faces, near)
+        loaded = faces[chosen]
         if not len(loaded):
             where = "its box and its parts" if spec.cylinder is None else "its cylinder, its box and its parts"
             raise InputError(f"boundaries[{index}]: acts on no face; check {where}")
+        found.append(selected)
+        told += selection.missed(case, index, x, part, near, np.isin(np.arange(len(case.parts)), part[loaded[:, 0]]))
         outward = 0.5 * normals(x, loaded)
-        areas = np.linalg.norm(outward, axis=1)
-        took = np.bincount(part[loaded[:, 0]], minlength=len(names)) > 0
-        told += selection.missed(case, index, x, part, near, took)
-        found.append(Selected(index, int(chosen.sum()), len(loaded), float(areas.sum())))
         if spec.stress is not None:
-            force = areas[:, None] / 3.0 * np.array(spec.stress)
+            force = np.linalg.norm(outward, axis=1)[:, None] / 3.0 * np.array(spec.stress)
         else:
             force = -(spec.pressure or 0.0) / 3.0 * outward
-        of, nodes = np.repeat(tet[inside], 3).astype(np.int64), loaded.reshape(-1).astype(np.int64)
+        of, nodes = np.repeat(tet[chosen], 3).astype(np.int64), loaded.reshape(-1).astype(np.int64)
         loads.append(Load(np.arange(len(of)), of, nodes, np.repeat(force, 3, axis=0)))
     return loads, found, told
 
@@ -244,10 +240,9 @@ def _loads(
 def _driven(case: schema.Case, x: Floats, part: Indices, near: Nearness) -> tuple[list[Selected], list[str]]:
     """What the boxes of prescribed velocities hold, and warnings."""
     found, told = list[Selected](), list[str]()
-    names = [each.name for each in case.parts]
-    for index, spec in case.boundaries_of(schema.Prescribed):
-        held = selection.named(spec, names)[part] & selection.inside(spec, x, part, near.slack)
-        took = np.bincount(part[held], minlength=len(names)) > 0
-        found.append(Selected(index, int(held.sum())))
-        told += selection.missed(case, index, x, part, near, took) if held.any() else []
+    for index, _ in case.boundaries_of(schema.Prescribed):
+        selected, held = selection.counted(case, index, x, part, np.zeros((0, 3), np.int32), near)
+        found.append(selected)
+        if held.any():
+            told += selection.missed(case, index, x, part, near, np.isin(np.arange(len(case.parts)), part[held]))
     return found, told

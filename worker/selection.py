@@ -9,6 +9,7 @@ import numpy as np
 from conoid.cases import loaded, region, schema
 from conoid.cases.region import Region
 
+from .mesh.faces import normals
 from .state import Flags, Floats, Indices
 
 log = logging.getLogger("conoid.worker")
@@ -110,6 +111,23 @@ def missed(case: schema.Case, number: int, x: Floats, part: Indices, near: Nearn
             f"boundaries[{number}]: {fringe} nodes lie outside of its region by less than a tenth of an edge and are "
             "not in it; move its border away from them"
         )
+
+
+def counted(
+    case: schema.Case, number: int, x: Floats, part: Indices, faces: Indices, near: Nearness
+) -> tuple[Selected, Flags]:
+    """What boundary ``number`` selects of nodes (n, 3) and of exposed faces (m, 3); which nodes of a velocity, or faces
+    of a traction, that are.
+    """
+    spec = case.boundaries[number]
+    assert isinstance(spec, schema.Prescribed | schema.Traction)
+    held = named(spec, [each.name for each in case.parts])[part] & inside(spec, x, part, near.slack)
+    nodes = int(held.sum())
+    if isinstance(spec, schema.Prescribed):
+        return Selected(number, nodes), held
+    chosen: Flags = np.asarray(held[faces].all(axis=1))
+    area = float(0.5 * np.linalg.norm(normals(x, faces[chosen]), axis=1).sum())
+    return Selected(number, nodes, int(chosen.sum()), area), chosen
 
 
 def off_planes(case: schema.Case, x: Floats, part: Indices, near: Nearness) -> Iterator[str]:

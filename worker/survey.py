@@ -17,6 +17,7 @@ from conoid.cases.placed import driven
 from conoid.cases.schema import Case
 from conoid.cases.survey import Survey, Surveyed
 
+from . import counting
 from .errors import ConoidError
 from .mesh.build import build
 from .mesh.child import Limits, limit
@@ -25,12 +26,13 @@ from .mesh.model import Floats, TetMesh
 from .mesh.sharing import Placed, shared_nodes
 from .mesh.touching import Surface, touches
 from .setting import turned, velocities
+from .state import Indices
 
 
 def surveyed(case: Case, folder: Path) -> Survey:
     """Reads the files of all parts; what is wrong with one of them hides nothing that is wrong with another."""
     parts, refused, placed = list[Surveyed](), list[str](), list[Placed]()
-    surfaces = dict[int, Surface]()
+    surfaces, meshes = dict[int, Surface](), dict[int, tuple[Floats, Indices]]()
     for index, part in enumerate(case.parts):
         if not isinstance(part.mesh, MeshFile):
             continue
@@ -40,12 +42,14 @@ def surveyed(case: Case, folder: Path) -> Survey:
             refused.append(str(error))
             continue
         points = turned(mesh.points, part.turn)
-        surfaces[index] = points, boundary_faces(mesh.tets)
+        surfaces[index], meshes[index] = (points, boundary_faces(mesh.tets)), (points, mesh.tets)
         parts.append(_facts(case, index, mesh, surfaces[index]))
         if mesh.origin is not None:
             placed.append((index, mesh.origin, points))
-    refused += shared_nodes(case, placed)
-    return Survey(parts=parts, refused=refused, touching=[] if refused else list(touches(case, surfaces)))
+    loads = list(counting.loads(case, meshes))
+    refused += [*shared_nodes(case, placed), *counting.empty(case, loads)]
+    touching = [] if refused else list(touches(case, surfaces))
+    return Survey(parts=parts, loads=loads, refused=refused, touching=touching)
 
 
 def _facts(case: Case, index: int, mesh: TetMesh, surface: Surface) -> Surveyed:

@@ -122,3 +122,32 @@ def test_surfaces_that_coincide_are_measured(folder: Path) -> None:
         below = {"mesh": {**plate, "thickness": "5 mm", "element_size": "1 mm"}}
         found = surveyed(case(below, part("Upper")), folder).touching
         assert [each.area for each in found] == pytest.approx(area)
+
+
+def loaded(folder: Path, *boundaries: dict[str, Any]) -> survey.Survey:
+    data = case(part(None)).model_dump(mode="json", exclude_unset=True) | {"boundaries": boundaries}
+    return surveyed(parse_case(data), folder)
+
+
+def test_what_tractions_and_boxes_act_on_is_counted_in_the_file(folder: Path) -> None:
+    """The upper tet has a face of 9 mm^2 on each of the planes x = 0 and y = 0, and three nodes at z = 0."""
+    plane = {"low": [0, 0, 0], "high": [0, "6 mm", "3 mm"]}
+    found = loaded(
+        folder, {"kind": "traction", "pressure": "1 MPa", **plane}, {"kind": "velocity", "x": 0, **plane},
+        {"kind": "traction", "pressure": "1 MPa"},
+    )  # fmt: skip
+    face, held, surface = found.loads
+    assert (face.boundary, face.faces, face.exact) == (0, 1, True)
+    assert face.area == pytest.approx(9e-6)
+    assert (held.boundary, held.nodes, held.exact) == (1, 3, True)
+    assert (surface.boundary, surface.faces) == (2, 6)
+    assert survey.from_json(survey.to_json(found)) == found
+
+
+def test_a_box_in_which_a_file_has_nothing_is_refused(folder: Path) -> None:
+    off = {"low": [0, 0, "1 mm"], "high": ["6 mm", "6 mm", "2 mm"]}
+    found = loaded(folder, {"kind": "traction", "pressure": "1 MPa", **off}, {"kind": "velocity", "x": 0, **off})
+    assert found.refused == [
+        "boundaries[0]: no face of the meshes that it is for lies in its region",
+        "boundaries[1]: no node of the meshes that it is for lies in its region",
+    ]
