@@ -5,7 +5,7 @@ import pytest
 
 from conoid.cases import load
 
-from . import comparable_rod, kalthoff
+from . import comparable_rod, kalthoff, plugging
 from .cracks import Crack, Run, prepared
 
 
@@ -18,6 +18,15 @@ def test_a_variant_of_the_rod_is_a_case(variant: comparable_rod.Variant) -> None
         for other in comparable_rod.VARIANTS
         if comparable_rod.data_of(other) == comparable_rod.data_of(variant)
     ]
+    assert alike == [variant.name]
+
+
+@pytest.mark.parametrize("variant", [*plugging.CURVE, *plugging.CAUSES], ids=lambda variant: variant.name)
+def test_a_variant_of_the_plate_is_a_case(variant: plugging.Variant) -> None:
+    """Whole, and each with something of its own."""
+    data = plugging.data_of(variant)
+    load.parse_case(data)
+    alike = [other.name for other in (*plugging.CURVE, *plugging.CAUSES) if plugging.data_of(other) == data]
     assert alike == [variant.name]
 
 
