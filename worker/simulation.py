@@ -16,13 +16,14 @@ from .clock import Clock
 from .contact.stage import Contact
 from .elements.averaging import AveragedElements
 from .elements.forms import Elements
+from .elements.matter import whose
 from .energy import Ledger
 from .erosion import Erosion
 from .fracture.record import Record
 from .fracture.stage import Fracture
 from .materials.elementary import power
 from .materials.law import BULK, DENSITY, SHEAR
-from .materials.models import equation_of, moduli
+from .materials.models import eos_of, equation_of, parameters
 from .migration import model as model_of
 from .migration.parcel import Parcel
 from .migration.route import Arrived
@@ -251,10 +252,11 @@ def _elements(
     if form == "standard":
         return Elements(model, comm, neighbours, timers)
     materials = [find_material(case, part.material) for part in case.parts]
-    bulk = np.array([moduli(each)[0] for each in materials])[model.nodes.part]
+    params = np.array([parameters(each, None) for each in materials])
+    kinds = np.array([whose(eos_of(each), own) for each, own in zip(materials, params, strict=True)])
     more = any(equation_of(each).averaged for each in materials)
     return AveragedElements(
-        model, comm, neighbours, timers, 1.0 / node_volume, bulk, scene, form == "split", more
+        model, comm, neighbours, timers, 1.0 / node_volume, params, kinds, scene, form == "split", more
     )  # fmt: skip
 
 

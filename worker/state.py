@@ -69,8 +69,8 @@ PORES = 21
 """Of the pores that a tension cut-off has opened: their volume over that of the solid matter; with a linear pressure
 the logarithm of one and that."""
 HEAT = 22
-"""Energy that the pressure sees, a volume of matter, over the bulk modulus at rest (averaged pressure forms, where the
-equation of state has heat)."""
+"""Energy that the pressure of a flat tet sees, a volume of matter, over the bulk modulus at rest (averaged pressure
+forms, where the equation of state has heat; that of the others is of their nodes, elements/matter.py)."""
 UNTOLD = 22
 """The same row in Johnson-Holmquist's law: bulking of the last step, Pa, that the nodes do not have yet (averaged
 pressure forms)."""

@@ -3,13 +3,14 @@
 import numpy as np
 
 from ..boundaries import Boundary
+from ..materials.law import BULK
 from ..migration.parcel import Parcel
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum
 from ..parallel.tags import Tag
-from ..state import Block, Copies, Floats, Model, extended
+from ..state import Block, Copies, Floats, Ints, Model, extended
 from ..timers import Timers
-from . import pressure, sweep
+from . import matter, pressure, sweep
 from .flat import flat_tets
 from .forms import Elements
 from .records import Body, Marks, Means, Motion
@@ -20,11 +21,11 @@ class AveragedElements(Elements):
 
     def __init__(
         self, model: Model, comm: Comm, neighbours: list[Neighbour], timers: Timers,
-        weight: Floats, bulk: Floats, scene: list[Boundary], split: bool, more: bool,
+        weight: Floats, params: Floats, kinds: Ints, scene: list[Boundary], split: bool, more: bool,
     ) -> None:  # fmt: skip
-        """``weight`` (nodes,): one over the reference volume, 1/m^3; ``bulk`` (nodes,): modulus of the part, Pa;
-        ``scene``: its planes of symmetry have mirror images behind them; ``more``: whether an equation of state of the
-        case has means besides, of heat or bulking.
+        """``weight`` (nodes,): one over the reference volume, 1/m^3; ``params`` (parts, SIZE): constants of each part;
+        ``kinds`` (parts,): whose the pressure is (matter.whose); ``scene``: its planes of symmetry have mirror images
+        behind them; ``more``: whether an equation of state of the case has means besides, of heat or bulking.
         """
         n = model.nodes.n
         self.split = split
@@ -32,7 +33,9 @@ class AveragedElements(Elements):
         self._gradient = np.zeros((n if split else 1, 3), np.int64)
         super().__init__(model, comm, neighbours, timers)
         self._weight = weight
-        self._bulk = bulk
+        self._params, self._kinds = params, kinds
+        self._bulk = params[model.nodes.part, BULK]
+        self._matter = matter.at_start(n if kinds.any() else 1)
         self._scene = scene
         self._volumes = np.zeros((n, self._columns), np.int64)
         self._strain, self._more = np.zeros(n), np.zeros(n)
@@ -51,7 +54,10 @@ class AveragedElements(Elements):
     def grow(self, copies: Copies) -> None:
         super().grow(copies)
         parents = copies.parents
-        for name in ("_weight", "_bulk", "_volumes", *(("_gradient", "_projected", "pressure") if self.split else ())):
+        names = ["_weight", "_bulk", "_volumes"]
+        names += ["_gradient", "_projected", "pressure"] if self.split else []
+        names += ["_matter"] if self._kinds.any() else []
+        for name in names:
             values = getattr(self, name)
             setattr(self, name, extended(values, values[parents]))
 
@@ -67,7 +73,8 @@ class AveragedElements(Elements):
 
     @property
     def _kept(self) -> tuple[str, ...]:
-        return ("_weight", "pressure", "_projected") if self.split else ("_weight",)
+        of_split = ("pressure", "_projected") if self.split else ()
+        return "_weight", *of_split, *(("_matter",) if self._kinds.any() else ())
 
     def _exchanges(self) -> list[SharedSum]:
         return [self.shared_forces, self.shared_volumes, *([self.shared_gradients] if self.split else [])]
@@ -84,6 +91,9 @@ class AveragedElements(Elements):
             self._more = pressure.nodal_strains(self._volumes, 2)
         if self.split:
             self.pressure -= self._bulk * self._strain
+        if self._kinds.any():
+            heat, part = self._more if self._columns > 2 else np.zeros_like(self._strain), self.model.nodes.part
+            matter.press_nodes(self._matter, self._strain, heat, part, self._kinds, self._params)
         self._begin(scale)
         self._gradient[:] = 0
         self._scale = scale
@@ -107,7 +117,7 @@ class AveragedElements(Elements):
     def _means(self) -> Means:
         return Means(
             self._volumes, self._weight, self._strain, self._more, self.split, self.pressure, self._projected,
-            self._gradient,
+            self._gradient, self._matter,
         )  # fmt: skip
 
     def _strains(self, block: Block, begin: int, end: int, dt: float) -> None:

@@ -19,7 +19,7 @@ from ..materials.law import (
     Q_SHOCK,
     SHEAR,
 )
-from ..materials.models import press, strengthen
+from ..materials.models import strengthen
 from ..materials.viscosity import bulk_viscosity
 from . import pressure as averaged
 from . import tet4
@@ -68,12 +68,11 @@ def return_at_pressure(strength, w, s, params, n, dt):  # type: ignore[no-untype
         deviatoric_work(w, s, n, dt)
 
 
-@njit(types.void(_I, _F1, _F1, _F1, _I, _F, _B), cache=True, error_model="numpy")
-def pressure_and_limit(eos, w, s, params, n, dt, averaged):  # type: ignore[no-untyped-def]
-    """Equation of state, bulk viscosity and stable step of a chunk; ``averaged``: of the forms with means, where what
+@njit(types.void(_F1, _F1, _F1, _I, _F, _B), cache=True, error_model="numpy")
+def viscosity_and_limit(w, s, params, n, dt, averaged):  # type: ignore[no-untyped-def]
+    """Bulk viscosity and stable step of a chunk at its new pressure; ``averaged``: of the forms with means, where what
     dilates sees its own volume all the same.
     """
-    press(eos, w, s, params, n)
     if params[ORDER] == FROM_SHAPE:
         stiffen(w, s, params, n)
     linear, shock, quadratic = params[Q_LINEAR], params[Q_SHOCK], params[Q_QUADRATIC]

@@ -9,11 +9,13 @@ import numpy as np
 
 from ..jit import njit
 from ..materials.law import BULK, DENSITY, DILATES
+from ..materials.models import press
 from ..mesh.faces import FACES, normals
 from ..state import CHUNK, DILATION, HEAT, MASS, TOLD, Block, Flags, Floats
 from .heat_and_bulking import stretch_corner
+from .mean import book_averaged
 from .pressure import STABILISE
-from .tet4 import CHANGE, SEEN, VOLUME, VOLUME_MID
+from .tet4 import CHANGE, MODULUS, SEEN, VOLUME, VOLUME_MID
 
 THINNEST = 0.1
 """Smallest altitude over longest edge of a tet whose volume strain is averaged; 0.82 for a regular tet. Chosen: what
@@ -62,6 +64,26 @@ def see_own(w, s, params, flat, rows, n):  # type: ignore[no-untyped-def]
                     stretch_corner(w, s, i, k, w[SEEN + i])
             elif rows > TOLD:
                 s[_HEAT + i] = unit * s[_TOLD + i] / s[_MASS + i]
+
+
+@njit(
+    "void(int64, float64[::1], float64[::1], float64[::1], float64[::1], boolean[::1], int64, int64)",
+    cache=True,
+    error_model="numpy",
+)
+def press_alone(eos, w, s, alone, params, flat, rows, n):  # type: ignore[no-untyped-def]
+    """Pressure, its work and MODULUS of flat tets, where those of others are of their nodes: ``alone`` is the state
+    before the pressure, and is used up.
+    """
+    modulus = w[MODULUS : MODULUS + CHUNK].copy()
+    press(eos, w, alone, params, n)
+    book_averaged(w, alone, params, n)
+    for i in range(n):
+        if flat[i]:
+            for row in range(rows):
+                s[row * CHUNK + i] = alone[row * CHUNK + i]
+        else:
+            w[MODULUS + i] = modulus[i]
 
 
 @njit("void(int64[::1], boolean[::1], int64)", cache=True)

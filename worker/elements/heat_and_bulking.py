@@ -8,12 +8,12 @@ import numpy as np
 
 from ..jit import njit
 from ..materials.law import BULK, DENSITY
-from ..state import BULKING, CHUNK, CORNERS, HEAT, MASS, TOLD, UNTOLD, WORK, WORK_AVERAGED, WORK_VISCOUS
+from ..state import BULKING, CHUNK, CORNERS, MASS, TOLD, UNTOLD, WORK, WORK_AVERAGED, WORK_VISCOUS
 from .pressure import QUANTA
 from .tet4 import CORNER_CHANGE, VOLUME_MID
 
 _WORK, _WORK_VISCOUS, _TAKEN = WORK * CHUNK, WORK_VISCOUS * CHUNK, WORK_AVERAGED * CHUNK
-_MASS, _HEAT, _TOLD = MASS * CHUNK, HEAT * CHUNK, TOLD * CHUNK
+_MASS, _TOLD = MASS * CHUNK, TOLD * CHUNK
 _BULKING, _UNTOLD, _CORNERS = BULKING * CHUNK, UNTOLD * CHUNK, CORNERS * CHUNK
 _HEATED = TOLD + 1
 """Rows of a tet with heat; one with bulking has more."""
@@ -80,13 +80,6 @@ def scatter_more(sums, w, s, params, weight, tets, rows, n):  # type: ignore[no-
         scatter_bulking(sums, w, s, params, weight, tets, n)
 
 
-@njit("void(float64[::1], float64[::1], uint32[:, ::1], int64)", cache=True)
-def gather_heat(s, heat, tets, n):  # type: ignore[no-untyped-def]
-    """HEAT: what the pressure of each tet sees grows by the mean of the four nodes."""
-    for i in range(n):
-        s[_HEAT + i] += 0.25 * ((heat[tets[i, 0]] + heat[tets[i, 1]]) + (heat[tets[i, 2]] + heat[tets[i, 3]]))
-
-
 @njit("void(float64[::1], float64[::1], float64[::1], uint32[:, ::1], boolean[::1], int64)", cache=True)
 def gather_bulking(s, params, bulking, tets, flat, n):  # type: ignore[no-untyped-def]
     """BULKING: that of each tet grows by the mean of the four nodes; ``flat`` (n,), or (0,), have their own."""
@@ -106,18 +99,15 @@ def stretch_corner(w, s, i, k, strain):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    "void(float64[::1], float64[::1], float64[::1], float64[::1], uint32[:, ::1], float64[::1], boolean[::1], int64, "
-    "int64)",
+    "void(float64[::1], float64[::1], float64[::1], float64[::1], uint32[:, ::1], float64[::1], boolean[::1], int64)",
     cache=True,
 )
-def gather_more(w, s, params, more, tets, strain, flat, rows, n):  # type: ignore[no-untyped-def]
-    """What ``scatter_more`` has given, as means over nodes; with bulking the ratio of volumes at each node, too, and
-    CORNER_CHANGE, by how much it has changed.
+def gather_corners(w, s, params, bulking, tets, strain, flat, n):  # type: ignore[no-untyped-def]
+    """Bulking as a mean over nodes, the ratio of volumes at each node, and CORNER_CHANGE, by how much it has changed.
+
+    Heat stays at the nodes (matter.py).
     """
-    if rows == _HEATED:
-        gather_heat(s, more, tets, n)
-        return
-    gather_bulking(s, params, more, tets, flat, n)
+    gather_bulking(s, params, bulking, tets, flat, n)
     for i in range(n):
         if len(flat) == 0 or not flat[i]:
             for k in range(4):

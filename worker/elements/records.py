@@ -126,12 +126,14 @@ class Means(NamedTuple):
     """(nodes, 3) projected gradient of the pressure, Pa/m."""
     gradient: Ints
     """(nodes, 3) its sums, quanta."""
+    matter: Floats
+    """(nodes, COLUMNS) see matter.py; of one row where no pressure is of the nodes."""
 
     @classmethod
     def none(cls) -> "Means":
         """Of the ``standard`` form."""
         row, lines = np.zeros(1), np.zeros((1, 3), np.int64)
-        return cls(lines, row, row, row, False, row, np.zeros((1, 3)), lines)
+        return cls(lines, row, row, row, False, row, np.zeros((1, 3)), lines, np.zeros((1, 8)))
 
 
 _F1, _F2, _I1, _I2 = types.float64[::1], types.float64[:, ::1], types.int64[::1], types.int64[:, ::1]
@@ -140,4 +142,4 @@ MOTION = record(Motion, _F2, _F2, _F2, _I2)
 BODY = record(Body, types.uint32[:, ::1], _I1, _F1, _INT, _F1, _INT, _INT, _I2, _B1)
 MARKS = record(Marks, _B1, _F1, types.uint8[::1], _F1, types.float64)
 SCRATCH = record(Scratch, _F1, _I1, _I1, _I1)
-MEANS = record(Means, _I2, _F1, _F1, _F1, _FLAG, _F1, _F2, _I2)
+MEANS = record(Means, _I2, _F1, _F1, _F1, _FLAG, _F1, _F2, _I2, _F2)

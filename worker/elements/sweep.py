@@ -12,13 +12,14 @@ Chunks at rest, which no wave has reached, are passed over (rest.py).
 
 from ..jit import njit, types
 from ..materials.law import AFTER_PRESSURE, DILATES, FROM_SHAPE, ORDER
-from ..materials.models import strengthen, swell
+from ..materials.models import press, strengthen, swell
 from ..state import CHUNK, UNTOLD
 from . import chunks, rest, tet4
+from . import matter as matter_of
 from . import pressure as averaged
 from .barrier import resist
-from .flat import keep_out, see_own
-from .heat_and_bulking import gather_more, scatter_more
+from .flat import keep_out, press_alone, see_own
+from .heat_and_bulking import gather_corners, scatter_more
 from .mean import book_averaged, keep_before
 from .records import BODY, LARGEST_LIMIT, LIMITING_TET, MARKS, MEANS, MOTION, SCRATCH
 from .wear import any_inside_out, let_go
@@ -59,7 +60,8 @@ def standard_pass(motion, body, marks, scratch, begin, end, dt, scale):  # type:
             chunks.from_rates(strength, w, s, params, n, dt)
             tet4.end_gradients(w, n)
             averaged.own_strains(w, n, dt)
-        chunks.pressure_and_limit(eos, w, s, params, n, dt, False)
+        press(eos, w, s, params, n)
+        chunks.viscosity_and_limit(w, s, params, n, dt, False)
         chunks.return_at_pressure(strength, w, s, params, n, dt)
         if len(upset) > 0:
             let_go(w, s, upset, x, v, t, rows, n, dt)
@@ -148,8 +150,9 @@ def force_pass(motion, body, marks, scratch, means, begin, end, dt, scale):  # t
     worn, life, hot, weakest, shear = marks.worn, marks.life, marks.hot, marks.weakest, marks.shear
     w, wi, bits, peaks, id, noted = scratch.w, scratch.wi, scratch.bits, scratch.peaks, body.id, body.quiet
     strain, told, gradient, pressure = means.strain, means.more, means.gradient, means.pressure
-    split, apart = means.split, body.flat
+    split, apart, matter = means.split, body.flat, means.matter
     shape, more, erodes = params[ORDER] == FROM_SHAPE, rows > UNTOLD, len(worn) > 0
+    kind = matter_of.whose(eos, params)
     for c in range(begin, end):
         t, s = tets[c * CHUNK : (c + 1) * CHUNK], state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
         first, last, n = c * CHUNK, c * CHUNK + len(t), len(t)
@@ -173,8 +176,8 @@ def force_pass(motion, body, marks, scratch, means, begin, end, dt, scale):  # t
         if shape and not more:
             strengthen(strength, w, s, params, n, dt)
         averaged.gather_strains(w, strain, t, n)
-        if more:
-            gather_more(w, s, params, told, t, strain, flat, rows, n)
+        if more and kind == matter_of.TETS:
+            gather_corners(w, s, params, told, t, strain, flat, n)
         if shape:
             averaged.recall_growth(w, s, n, dt)
             if dt <= 0.0:
@@ -185,11 +188,19 @@ def force_pass(motion, body, marks, scratch, means, begin, end, dt, scale):  # t
             see_own(w, s, params, flat, rows, n)
         swell(eos, w, s, params, n)
         keep_before(w, s, params, n)
-        chunks.pressure_and_limit(eos, w, s, params, n, dt, True)
+        if kind == matter_of.TETS:
+            press(eos, w, s, params, n)
+        else:
+            alone = s.copy() if len(flat) > 0 else s[:0]
+            matter_of.take_means(w, s, params, matter, t, kind, n)
+            if len(flat) > 0:
+                press_alone(eos, w, s, alone, params, flat, rows, n)
+        chunks.viscosity_and_limit(w, s, params, n, dt, True)
         if not erodes:
             resist(w, s, params, n)
         chunks.return_at_pressure(strength, w, s, params, n, dt)
-        book_averaged(w, s, params, n)
+        if kind == matter_of.TETS:
+            book_averaged(w, s, params, n)
         if len(upset) > 0:
             let_go(w, s, upset, x, v, t, rows, n, 0.0)
         marked = chunks.mark(

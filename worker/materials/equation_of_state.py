@@ -41,13 +41,13 @@ _LEAST = 0.05
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def linear(w, s, params, n):  # type: ignore[no-untyped-def]
     """p -= K d(volume strain): integrates to p = -K ln(V/V0)."""
-    bulk, modulus = params[BULK], params[BULK] + 4.0 / 3.0 * params[SHEAR]
+    bulk, stiff = params[BULK], params[BULK] + 4.0 / 3.0 * params[SHEAR]
     for i in range(n):
         old = s[_P + i]
         new = old - bulk * w[SEEN + i]
         s[_P + i] = new
         s[_WORK + i] -= 0.5 * (old + new) * w[CHANGE + i]
-        w[MODULUS + i] = modulus
+        w[MODULUS + i] = stiff
     if params[SPALL] < np.inf:
         _tear_linear(w, s, params, n)
 
@@ -100,7 +100,7 @@ def volumes_by_pressure(w, s, params, n):  # type: ignore[no-untyped-def]
 
 
 @njit("UniTuple(float64, 2)(float64[::1], float64)", cache=True, error_model="numpy", forceinline=True)
-def _cold(params, ratio):  # type: ignore[no-untyped-def]
+def cold(params, ratio):  # type: ignore[no-untyped-def]
     """The pressure without heat at a volume ratio, p_H (1 - gamma chi / 2), and its slope by chi less gamma p_H / 2.
 
     Not a number where there is no Hugoniot: from the pole of p_H on, chi = 1 / S, and without a volume.
@@ -118,7 +118,7 @@ def _cold(params, ratio):  # type: ignore[no-untyped-def]
 
 
 @njit("float64(float64[::1], float64, float64, float64)", cache=True, error_model="numpy", forceinline=True)
-def _modulus(params, ratio, tangent, pressure):  # type: ignore[no-untyped-def]
+def modulus(params, ratio, tangent, pressure):  # type: ignore[no-untyped-def]
     """rho c^2, Pa: of the bulk at least _LEAST of that at rest, since strong tension makes it negative; NaN stays."""
     bulk, least = ratio * (tangent + params[_GAMMA] * pressure), _LEAST * params[BULK]
     return (least if bulk < least else bulk) + 4.0 / 3.0 * params[SHEAR]
@@ -130,15 +130,15 @@ def mie_gruneisen(w, s, params, n):  # type: ignore[no-untyped-def]
 
     e is the work done so far (stress, plastic and viscous) over the mass. The energy equation with the mean pressure
     of the step is linear in the new pressure and solved in closed form. The factor 1 - gamma chi / 2 applies to
-    compression only. Where the volume strain is averaged e is, too (HEAT, up to this step's work of the pressure), and
-    that work is the one of the volume that the pressure sees.
+    compression only. In the averaged forms this is the pressure of flat tets alone: e is HEAT, up to this step's work
+    of the pressure on the volume that it sees. The others have that of their nodes (elements/matter.py).
     """
     gamma, heating = params[_GAMMA], params[_GAMMA] * params[DENSITY]
     averaged, bulk = len(s) > TOLD * CHUNK, params[BULK]
     for i in range(n):
         half = 0.5 * w[SEEN + i]
         ratio = s[_RATIO + i] * (1.0 + half) / (1.0 - half)
-        cold, tangent = _cold(params, ratio)
+        base, tangent = cold(params, ratio)
         change = w[CHANGE + i]
         mass, old = s[_MASS + i], s[_P + i]
         if averaged:
@@ -148,12 +148,12 @@ def mie_gruneisen(w, s, params, n):  # type: ignore[no-untyped-def]
             coefficient = heating / mass
             known = coefficient * (s[_WORK + i] + s[_WORK_VISCOUS + i] - 0.5 * old * change)
             factor = 1.0 + 0.5 * coefficient * change
-        new = (cold + known) / factor
+        new = (base + known) / factor
         w[_OLD + i], w[_KNOWN + i], w[_FACTOR + i] = old, known, factor
         s[_P + i] = new
         s[_RATIO + i] = ratio
         s[_WORK + i] -= 0.5 * (old + new) * change
-        w[MODULUS + i] = _modulus(params, ratio, tangent, new)
+        w[MODULUS + i] = modulus(params, ratio, tangent, new)
     if params[SPALL] < np.inf:
         _tear(w, s, params, n)
 
@@ -175,11 +175,11 @@ def _tear(w, s, params, n):  # type: ignore[no-untyped-def]
         ratio = 1.0 - (new * factor - known) / stiffness
         if ratio > whole:
             ratio = whole
-            new = (_cold(params, ratio)[0] + known) / factor
+            new = (cold(params, ratio)[0] + known) / factor
         s[_P + i], s[_RATIO + i], s[_PORES + i] = new, ratio, whole / ratio - 1.0
         s[_WORK + i] = before - 0.5 * (old + new) * change
         _book_pores(w, s, params, i, 1.0 - (1.0 + pores) * ratio / whole, 0.5 * (old + new))
-        w[MODULUS + i] = _modulus(params, ratio, _cold(params, ratio)[1], new)
+        w[MODULUS + i] = modulus(params, ratio, cold(params, ratio)[1], new)
 
 
 def _gruneisen(eos: MieGruneisen) -> tuple[float, ...]:
