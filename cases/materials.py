@@ -68,7 +68,8 @@ class Scatter(Model):
 
 
 class Brittle(Model):
-    """What breaks facets between tets: tensile strength, Pa, and fracture energy G_c, J/m^2, of the crack."""
+    """What breaks facets between tets: tensile strength, Pa, and fracture energy G_c, J/m^2, of the crack. Without
+    ``strength`` the material breaks in tension alone and bears any compression."""
 
     strength: Annotated[Stress, Positive]
     """Tensile strength: the traction at which a facet breaks."""

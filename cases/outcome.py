@@ -20,6 +20,14 @@ class Check(msgspec.Struct, kw_only=True, frozen=True):
     source: str = ""
 
 
+class Made(msgspec.Struct, kw_only=True, frozen=True):
+    """The most that a line of the ledger has made, a share of the largest energy until then, at ``time``, s."""
+
+    line: str
+    share: float
+    time: float
+
+
 class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     """How a run ended; times in s, energies in J.
 
@@ -67,6 +75,8 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     energy: Energy | None = None
     worst_residual: float = math.nan
     """The largest energy residual of any ledger line of the run."""
+    made: list[Made] = []
+    """What lines of the ledger have made (``run.made_limit``), the worst first; none that has made nothing."""
     phases: dict[str, list[float]] = {}
     """CPU seconds per phase, one number a rank."""
     without: list[str] = []

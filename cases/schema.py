@@ -183,8 +183,9 @@ class Numerics(Model):
 
     pressure: Literal["standard", "nodal", "split"] = "nodal"
     """``standard``: pressure from each tet (locks in plastic flow). ``nodal``: averaged nodal pressure. ``split``: the
-    operator split, stabilised by pressure-gradient projection. Tets whose smallest altitude is below a tenth of their
-    longest edge at the start keep a pressure of their own in both."""
+    operator split, stabilised by pressure-gradient projection, which damps elastic motion: a free ball of 6,400 tets
+    that breathes loses 15 % of its energy in ten periods, and none with the others. Tets whose smallest altitude is
+    below a tenth of their longest edge at the start keep a pressure of their own in both."""
     viscosity: Annotated[Viscosity | None, BeforeValidator(_off), Switch()] = Viscosity()
     """``viscosity = "none"`` switches it off."""
     dt_safety: Annotated[Ratio, Field(gt=0, le=1)] = 0.9
@@ -235,8 +236,13 @@ class Run(Model):
     """Wall time between checkpoints; one is also written when somebody asks for it, and when a run is stopped on
     request or by ``max_wall_time``. ``"none"``: only then."""
     residual_limit: Annotated[Ratio, Positive] = 0.05
-    """The run fails with cause ``energy`` when the energy residual, what contact has made, what moves beyond all energy
-    that has come in, or what unequal steps took passes this."""
+    """The run fails with cause ``energy`` when the energy residual, or what moves beyond all energy that has come in,
+    passes this share of the largest energy so far."""
+    made_limit: Annotated[Ratio, Positive] = 0.02
+    """The run fails with cause ``energy`` when a line of the ledger has made more than this share of the largest energy
+    so far: one that takes for good has fallen (``plastic``, ``viscous``, ``friction``, ``fracture``), one that gives
+    back what it has taken is below zero (``contact``, ``averaging``, ``eroded``, ``cohesive``), or unequal time steps
+    have made or taken it (``stepping``). Two hundredths of an energy are one of a speed."""
 
 
 class Balance(Model):

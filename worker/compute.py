@@ -12,7 +12,7 @@ import numpy as np
 from conoid.cases import messages
 from conoid.cases.checkpoints import Manifest
 from conoid.cases.history import of_parts
-from conoid.cases.outcome import Outcome
+from conoid.cases.outcome import Made, Outcome
 from conoid.cases.quantities import FIELD_UNITS
 from conoid.cases.run import State
 from conoid.cases.schema import Case
@@ -176,14 +176,16 @@ def _sum_up(
         broken=sim.fracture.broken if sim.fracture is not None else 0,
         inside=inside.nodes if inside else 0, deepest=inside.deepest if inside else 0.0,
         overlapping=common.large if common else 0, overlap=common.share if common else 0.0, energy=loop.energy,
-        worst_residual=sim.ledger.worst, rebalances=loop.balance.events, balancing_cost=loop.balance.spent,
+        worst_residual=sim.ledger.worst,
+        made=[Made(line=name, share=made.share, time=made.t) for name, made in sim.ledger.making.ranked()],
+        rebalances=loop.balance.events, balancing_cost=loop.balance.spent,
         balancing_saved=loop.balance.saved,
         phases={name: [s[name] for s in seconds] for name in PHASES} if seconds else {},
         without=without(sim.case), peak_memory=memory or [],
         element_updates_per_second=(loop.updates - start.updates) / total_cpu if total_cpu > 0.0 else 0.0,
         reference=checks,
         warnings=[
-            *start.warnings, *loop.warnings, *loop.lost, *sim.ledger.warnings,
+            *start.warnings, *loop.warnings, *loop.lost, *sim.ledger.warnings(sim.case.numerics.dt_safety),
             *(sim.erosion.warnings(eroded) if sim.erosion is not None else []),
             *(sim.fracture.warnings if sim.fracture is not None else []), *(inside.warnings if inside else []),
             *(common.warnings if common else []), *(sim.contact.need.warnings if sim.contact else []),

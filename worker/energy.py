@@ -11,9 +11,12 @@ The sums over nodes and tets are made part by part, in the quanta of the whole: 
 same integers, so that their bits do not know of parts, and what each part has costs no further pass.
 """
 
+from typing import Any
+
 import numpy as np
 
 from conoid.cases.messages import Energy, PartEnergy
+from conoid.cases.schema import Run
 
 from .boundaries import Boundary
 from .clock import Clock
@@ -23,16 +26,11 @@ from .erosion import Erosion
 from .errors import EnergyError
 from .fracture.stage import Fracture
 from .jit import njit
+from .making import STRAIN, TOLD, Making
+from .materials.law import BULK, DENSITY
 from .parallel.comm import Comm
 from .parallel.fixed_point import Columns, Grouped, Table, Tally, exact_sums, totals_and_words
 from .state import WORKS, Floats, Model
-
-_GROWTH = "a smaller numerics.dt_growth, 1.005 say, lowers it"
-"""What helps against the energy of unequal time steps (docs/numerics.md, "Restitution")."""
-_TOLD = 0.01
-"""Share of the largest energy that may be missing, that unequal steps may take or make and averaged pressures make,
-without a word, and of the energy of fracture that may come back. Chosen: what the other lines are usually read to.
-"""
 
 _NODAL = 10
 """Sums over the nodes (``_of_nodes``), before those of the tets."""
@@ -56,20 +54,16 @@ class Ledger:
         self.initial = float(self._node_sum(0.5 * nodes.mass * (nodes.v * nodes.v).sum(axis=1)))
         self.worst = 0.0
         """Largest residual so far."""
+        self.making = Making(self._rounding())
+        """What each line has made."""
         self.lost = 0.0
         """Share of the initial energy that contact has taken, friction included, at the last call."""
-        self.stepping = 0.0
-        """Magnitude of what unequal steps have taken, over the largest energy, at the last call: of what has come in so
-        far, of the work of the stress and of motion."""
         self.residual = 0.0
-        """What does not add up, over the same, at the last call."""
-        self.averaged = 0.0
-        """What averaged pressures have given beyond all that they have taken, over the same, at the last call."""
+        """What does not add up, over the largest energy, at the last call: of what has come in so far, of the work of
+        the stress and of motion."""
         self.beyond = 0.0
         """Energy of motion beyond all that has come in, over the same, at the last call: all other lines add up to less
         than nothing."""
-        self.made = 0.0
-        """What contact has given beyond all that it has taken, over ``came``, at the last call."""
         self.unpaid = 0.0
         """Most that the energy lost to fracture has fallen by so far, over what all broken facets take: facets gave
         what nobody had paid."""
@@ -86,14 +80,15 @@ class Ledger:
         self.parts: dict[str, PartEnergy] = {}
         """Of each part at the last call; empty where there is one part alone."""
 
-    def keep(self) -> tuple[tuple[float, float, float, float, float, float], Floats, Floats, float]:
+    def keep(self) -> tuple[Any, ...]:
         """What it remembers, equal on all ranks."""
         largest = self.initial, self.came, self.worst, self.lost, self._taken, self.unpaid
-        return largest, self.momentum, self.angular_momentum, self.eroded_mass
+        return largest, self.momentum, self.angular_momentum, self.eroded_mass, self.making.keep()
 
-    def resume(self, known: tuple[tuple[float, float, float, float, float, float], Floats, Floats, float]) -> None:
+    def resume(self, known: tuple[Any, ...]) -> None:
         """Takes it back."""
-        largest, self.momentum, self.angular_momentum, self.eroded_mass = known
+        largest, self.momentum, self.angular_momentum, self.eroded_mass, made = known
+        self.making.resume(made)
         self.initial, self.came, self.worst, self.lost, self._taken, self.unpaid = largest
 
     def close(self, before: Floats) -> Energy:
@@ -121,43 +116,47 @@ class Ledger:
         scale = max(self.came, abs(float(work)), kinetic_sum)
         left = abs(total - self.initial - external_sum)
         self.residual = left / scale if scale != 0.0 else left
-        self.stepping = abs(stepping) / scale if scale != 0.0 else 0.0
-        self.averaged = max(-averaging, 0.0) / scale if scale != 0.0 else 0.0
         self.beyond = max(kinetic_sum - self.initial - external_sum, 0.0) / scale if scale != 0.0 else 0.0
-        self.made = max(friction - loss_sum, 0.0) / self.came if self.came > 0.0 else 0.0
         self.worst = max(self.worst, self.residual)
-        return Energy(
+        closed = Energy(
             kinetic=kinetic_sum, elastic=elastic, plastic=plastic_sum, viscous=viscous_sum, averaging=averaging,
             contact=loss_sum - friction, friction=friction, eroded=eroded, fracture=lost, cohesive=cohesive,
             stepping=stepping, external=external_sum, initial=self.initial, residual=self.residual,
         )  # fmt: skip
+        self.making.look(closed, scale, self._clock.t)
+        return closed
 
-    @property
-    def warnings(self) -> list[str]:
-        """What the user should know of the account, by the last call."""
-        step, form = "a smaller numerics.dt_safety lowers it", "with numerics.pressure = 'standard' there is none"
+    def warnings(self, safety: float) -> list[str]:
+        """What the user should know of the account so far; ``safety``: numerics.dt_safety."""
+        paid = "of the energy that all broken facets take, which nobody had paid"
         told = [
-            (self.worst, "the account of the energy has not closed by up to {:.2g} of the largest energy", step),
-            (self.stepping, "unequal time steps have taken or made {:.2g} of the largest energy", _GROWTH),
-            (self.averaged, "averaged pressures have made {:.2g} of the largest energy", form),
-            (
-                self.unpaid,
-                "facets that closed have given {:.2g} of the energy that all broken facets take, which nobody had paid",
-                step,
-            ),
+            (self.worst, "the account of the energy has not closed by up to {:.2g} of the largest energy"),
+            (self.unpaid, f"facets that closed have given {{:.2g}} {paid}"),
         ]
-        return [f"{text.format(share)}; {remedy}" for share, text, remedy in told if share > _TOLD]
+        compare = f"compare with numerics.dt_safety = {0.5 * safety:.2g}"
+        open_ = [f"{text.format(share)}; {compare}" for share, text in told if share > TOLD]
+        return open_ + self.making.warnings(safety)
 
-    def require(self, limit: float, when: str) -> None:
-        """Raises EnergyError when the last call has found more than ``limit``, run.residual_limit; ``when``: of it."""
-        for what, share, remedy in (
-            ("the energy that contact has made", self.made, ""),
-            ("the energy of motion beyond all that has come in", self.beyond, ""),
-            ("the energy residual", self.residual, ""),
-            ("the energy of unequal time steps", self.stepping, f"; {_GROWTH}"),
+    def require(self, run: Run, safety: float, when: str) -> None:
+        """Raises EnergyError where a limit of ``run`` is passed: run.residual_limit by the last call, run.made_limit by
+        any; ``safety``: numerics.dt_safety.
+        """
+        limit = run.residual_limit
+        for what, share in (
+            ("the energy of motion beyond all that has come in", self.beyond),
+            ("the energy residual", self.residual),
         ):
             if not share <= limit:
-                raise EnergyError(f"{what}, {share:.3g}, passed run.residual_limit {limit:g} {when}{remedy}")
+                raise EnergyError(f"{what}, {share:.3g}, passed run.residual_limit {limit:g} {when}")
+        self.making.require(run.made_limit, safety, when)
+
+    def _rounding(self) -> float:
+        """Energy of a volume strain of making.STRAIN everywhere, J; all ranks take part."""
+        nodes, bulk = self._model.nodes, np.zeros(len(self._model.parts))
+        for block in self._model.blocks:
+            bulk[block.part] = block.params[BULK] / block.params[DENSITY]
+        bulk = self._comm.maximum(bulk)
+        return self._node_sum(0.5 * STRAIN * STRAIN * nodes.mass * bulk[nodes.part])
 
     def _node_sum(self, values: Floats) -> float:
         return float(exact_sums(self._comm, values[self._model.nodes.owned][:, None])[0])

@@ -253,7 +253,8 @@ class Loop:
             parts = [value for part in self._parts.values() for value in msgspec.structs.astuple(part)]
             extra = [*sim.ledger.momentum, *sim.ledger.angular_momentum, *parts, *probes]
             self._history.write(clock.step, clock.t, clock.dt, limiter, self.energy, extra)
-        sim.ledger.require(sim.case.run.residual_limit, f"at step {clock.step}, t = {clock.t:.6g} s")
+        when = f"at step {clock.step}, t = {clock.t:.6g} s"
+        sim.ledger.require(sim.case.run, sim.case.numerics.dt_safety, when)
 
     def _tell_losses(self) -> None:
         for text in self._losses.found() if self._losses is not None else ():

@@ -64,21 +64,25 @@ def test_the_ledger_has_the_same_half_of_friction_and_of_the_normal_impulse(mu: 
 
 
 def test_contact_that_makes_energy_ends_the_run() -> None:
-    """More of it than run.residual_limit, over what came in."""
+    """More of it than run.made_limit, over what came in."""
     low, high = block((2, 2, 2), 1e-3), block((2, 2, 2), 1e-3)
     case = meeting_of([{}, {"velocity": (0.0, 0.0, -5.0)}], {}, end=1e-7)
     sim = build(case, [low, moved(high, (0.0, 0.0, 2.1e-3))])
     assert sim.contact is not None
     v = sim.model.nodes.v
     sim.ledger.close(v)
-    sim.ledger.require(1e-9, "at the start")
-    sim.contact.books.contact_loss[0] = -0.04 * sim.ledger.initial
+    sim.ledger.require(sim.case.run, 0.9, "at the start")
+    assert sim.ledger.making.worst == {}
+    sim.contact.books.contact_loss[0] = -0.015 * sim.ledger.initial
     sim.ledger.close(v)
-    assert sim.ledger.made == pytest.approx(0.04, rel=1e-9)
+    sim.ledger.require(sim.case.run, 0.9, "soon")
+    assert sim.ledger.making.worst["contact"].share == pytest.approx(0.015, rel=1e-9)
+    assert any("the line contact of the energy has made 0.015" in text for text in sim.ledger.warnings(0.9))
     sim.contact.books.contact_loss[1] = -0.02 * sim.ledger.initial
     sim.ledger.close(v)
-    with pytest.raises(EnergyError, match=r"the energy that contact has made, 0\.06, passed run\.residual_limit 0\.05"):
-        sim.ledger.require(0.05, "at the end")
+    said = r"the line contact of the energy has made 0\.035 of the largest energy, above run\.made_limit 0\.02, at the"
+    with pytest.raises(EnergyError, match=said):
+        sim.ledger.require(sim.case.run, 0.9, "at the end")
 
 
 def test_the_cost_of_an_impulse_is_the_work_between_two_half_steps() -> None:

@@ -1,6 +1,7 @@
 """The ledger: every line closes, whatever the step does and whatever pushes."""
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -157,7 +158,7 @@ def test_motion_that_nobody_has_paid_for_ends_the_run() -> None:
         if sim.clock.step != 5:
             return
         sim.ledger.close(before)
-        sim.ledger.require(0.05, "now")
+        sim.ledger.require(sim.case.run, 0.9, "now")
         gained = 0.2 * sim.ledger.initial
         (part,) = sim.model.blocks
         for row in (WORK, WORK_PLASTIC):
@@ -168,7 +169,7 @@ def test_motion_that_nobody_has_paid_for_ends_the_run() -> None:
         with pytest.raises(
             EnergyError, match=r"the energy of motion beyond all that has come in, 0\.\d+, passed run\."
         ):
-            sim.ledger.require(0.05, "now")
+            sim.ledger.require(sim.case.run, 0.9, "now")
         ran = True
 
     run(sim, gain)
@@ -179,16 +180,69 @@ def test_errors_are_shares_of_the_largest_energy_there_has_been() -> None:
     """A pressure that comes at once and gives back all its work: the share is that of what it has done at most."""
     push = {"kind": "traction", "pressure": 1e6}
     sim = build(scene(STEEL, end=10e-6, boundaries=(push,), viscosity={}), [block((1, 1, 1), 1e-3)])
-    most, shares = 0.0, list[float]()
+    most, biggest, worst, shares = 0.0, 0.0, 0.0, list[float]()
 
     def look(sim: Simulation, before: Floats) -> None:
-        nonlocal most
+        nonlocal most, biggest, worst
         line = sim.ledger.close(before)
         most = max(most, abs(line.external))
         if most > 0.0:
             largest = max(most, abs(line.elastic), line.kinetic)
             shares.append(max(abs(line.external), abs(line.elastic), line.kinetic) / largest)
-            assert sim.ledger.stepping == pytest.approx(abs(line.stepping) / largest, rel=1e-12)
+            biggest = max(biggest, largest)
+            worst = max(worst, abs(line.stepping) / biggest)
 
     run(sim, look)
     assert min(shares) < 0.5
+    assert sim.ledger.making.worst["stepping"].share == pytest.approx(worst, rel=1e-12)
+
+
+def named_safety(sim: Simulation) -> float:
+    """What the warning of ``stepping`` names; 0 where there is none."""
+    for text in sim.ledger.warnings(sim.case.numerics.dt_safety):
+        if text.startswith("the line stepping"):
+            return float(text.partition("numerics.dt_safety = ")[2].split()[0])
+    return 0.0
+
+
+def shattered(form: Form, safety: float) -> Simulation:
+    """A cube of steel that rings from random velocities of its nodes: its step falls for good."""
+    return build(scene(STEEL, form, end=6e-6, jitter=800.0, dt_safety=safety), [block((4, 4, 4), 0.75e-3, shake=0.0)])
+
+
+def crushed(form: Form, safety: float) -> Simulation:
+    """A bar without viscosity that a wall shortens: its step falls with its shock and recovers."""
+    part = {"velocity": (0.0, 0.0, -900.0), "boundaries": (WALL,)}
+    return build(scene(STEEL, form, end=4e-6, dt_safety=safety, **part), [MESH])
+
+
+def rebounding(form: Form, safety: float) -> Simulation:
+    """The same between walls, some growth of the step with each rebound: it falls and recovers."""
+    box = [{"kind": "wall", "point": (at,) * 3, "normal": normal} for at, normal in (
+        (-1e-5, (0.0, 0.0, 1.0)), (3.01e-3, (0.0, 0.0, -1.0)),
+    )]  # fmt: skip
+    keys: dict[str, Any] = {"jitter": 900.0, "dt_safety": safety, "dt_growth": 1.2, "boundaries": box}
+    return build(scene(STEEL, form, end=4e-6, **keys), [block((4, 4, 4), 0.75e-3, shake=0.0)])
+
+
+@pytest.mark.parametrize("made", [shattered, rebounding])
+@pytest.mark.parametrize("form", ["standard", "nodal"])
+def test_what_is_advised_against_unequal_steps_helps(made: Callable[[Form, float], Simulation], form: Form) -> None:
+    """At the safety that the warning names the line is within half of its limit."""
+    sim = made(form, 0.9)
+    lines(sim)
+    safety = named_safety(sim)
+    assert sim.ledger.making.worst["stepping"].share > 0.01
+    assert 0.1 < safety < 0.9
+    better = made(form, safety)
+    lines(better)
+    assert better.ledger.making.worst["stepping"].share < 0.01
+    assert named_safety(better) == 0.0
+
+
+def test_nothing_is_advised_where_steps_fall_and_cost_nothing() -> None:
+    """In the shock of a wall they fall by a third."""
+    sim = crushed("standard", 0.9)
+    lines(sim)
+    assert sim.ledger.making.worst["stepping"].share < 0.01
+    assert named_safety(sim) == 0.0

@@ -57,7 +57,7 @@ class CommonVolume:
         return [
             f"{self.large} of {self.tets} tets at surfaces lie in other bodies or fragments by more than a tenth of "
             f"their volume, one by {self.largest:.2g} of it, all together by {self.share:.2g}: contact has not held "
-            "them; refine the mesh there"
+            "them; compare with a finer mesh there"
         ]
 
 

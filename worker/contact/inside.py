@@ -62,7 +62,7 @@ class Inside:
             how.append(f"{'the others ' if self.buried else ''}up to {self.deepest:.2g} of a face deep")
         return [
             f"contact has let {self.nodes} of {self.looked} nodes into other bodies or fragments, {', '.join(how)}: "
-            "refine the mesh there"
+            "compare with a finer mesh there"
         ]
 
 

@@ -45,7 +45,7 @@ _KEPT = 2
 _FREE = {
     "run": {
         "ranks", "profile", "cut_scale", "max_steps", "max_wall_time", "checkpoint_every", "residual_limit",
-        "snapshots",
+        "made_limit", "snapshots",
     },
     "contact": {"skin", "domain"},
 }  # fmt: skip
