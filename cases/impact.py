@@ -37,22 +37,22 @@ def impact_speeds(case: Case, walls: bool = True) -> list[float]:
     """The largest speed, m/s, at which each part may meet another part, or a wall where ``walls`` count: by the bounds
     of their velocities, so up to sqrt(3) times what it is where a body turns.
     """
-    bounds = [_velocities(case, part) for part in case.parts]
+    bounds = [velocities(case, part) for part in case.parts]
     there = Counter(bounds)
     if walls and any(True for _ in case.boundaries_of(Wall)):
         there[_REST, _REST] += 1
     return [
-        max((_apart(*own, *other) for other, many in there.items() if other != own or many > 1), default=0.0)
+        max((apart(*own, *other) for other, many in there.items() if other != own or many > 1), default=0.0)
         for own in bounds
     ]
 
 
-def _apart(low: Vector, high: Vector, low2: Vector, high2: Vector) -> float:
+def apart(low: Vector, high: Vector, low2: Vector, high2: Vector) -> float:
     """The largest distance of a point of one box from a point of another."""
     return math.hypot(*(max(b - c, d - a) for a, b, c, d in zip(low, high, low2, high2, strict=True)))
 
 
-def _velocities(case: Case, part: Part) -> tuple[Vector, Vector]:
+def velocities(case: Case, part: Part) -> tuple[Vector, Vector]:
     """Bounds of the velocities, m/s, that nodes of a part start with or are driven with; a mesh file neither turns nor
     stretches here.
     """
@@ -104,12 +104,12 @@ def pressed(case: Case) -> list[bool]:
     if _fast(case, PRESSING):
         return [True] * len(case.parts)
     return [
-        part.fracture is None and _flows(material(case, part.material), speed)
+        part.fracture is None and flows(material(case, part.material), speed)
         for part, speed in zip(case.parts, impact_speeds(case, walls=False), strict=True)
     ]
 
 
-def _flows(made: Material, speed: float) -> bool:
+def flows(made: Material, speed: float) -> bool:
     """Whether an impact on its like at ``speed``, m/s, has more than its flow stress."""
     return made.strength is not None and 0.5 * made.density * wave_speed(made) * speed > made.strength.flow_stress()
 

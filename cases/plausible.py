@@ -10,6 +10,8 @@ from itertools import chain
 from typing import Any
 
 from .approach import strangers
+from .compression import crushed
+from .damping import damped
 from .driven import passing
 from .estimate import Estimate
 from .impact import impact_speeds, wave_speed
@@ -60,6 +62,8 @@ def doubts(data: Mapping[str, Any], case: Case, expected: Estimate) -> list[Prob
         *_materials(case),
         *_bodies(case, expected),
         *_shocks(case),
+        *crushed(case),
+        *damped(case),
         *grazes(enumerate(case.parts), case.contact),
         *strangers(case),
         *passing(case),

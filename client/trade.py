@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from conoid.cases.damping import WORDS
 from conoid.cases.figures import duration, exact, si
 
 from .convergence import Mesh, Series
@@ -106,6 +107,7 @@ def advice(all_series: Sequence[Series], number: Number, goal: Target, accuracy:
     chosen = enough[0] if enough else line[-1]
     name, size = chosen.variant.form, si(own_size * chosen.mesh.factor, "m")
     said = f"{name} at {size}: {number.name} within {_percent(chosen.error)} for {duration(chosen.cost)} of CPU time"
+    said += f"; {name} {WORDS}" if name == "split" else ""
     order, growth = _order(all_series, number, chosen.variant), _growth(all_series, chosen.variant)
     if math.isnan(order):
         return f"{said}; no order was observed, so nothing is known of finer meshes"

@@ -67,7 +67,7 @@ HARMS: dict[str, Callable[[Path], Any]] = {
     "a manifest of nothing": lambda place: (place / MANIFEST).write_text("null"),
     "a manifest of other things": lambda place: (place / MANIFEST).write_text(json.dumps({"format": FORMAT})),
     "a manifest that is a list": lambda place: resealed(place, b"[]"),
-    "a manifest of wrong types": lambda place: resealed(place, b'{"format": 15, "step": "3", "files": null}'),
+    "a manifest of wrong types": lambda place: resealed(place, b'{"format": 16, "step": "3", "files": null}'),
     "a manifest with another number": lambda place: flipped(place / MANIFEST, b'"step": 3', b'"step": 4'),
     "a manifest that is a folder": lambda place: put(place / MANIFEST, Path.mkdir),
     "a manifest that is a pipe": lambda place: put(place / MANIFEST, os.mkfifo),
