@@ -1,0 +1,140 @@
+"""``python -m tests.bench.energy_lines [NAME]...``: every hard and every shipped case, with the line of the ledger that
+has made most energy, its share and its limit; writes docs/energy_lines.md.
+
+Each case is a run of one rank without frames. What has been measured stays in build/energy_lines, a file a case, and is
+not measured again there; the cheap cases come first. ``write`` writes the page of what there is.
+"""
+
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from conoid.cases.estimate import estimate
+from conoid.cases.load import apply_overrides, parse_case, read_data, shipped
+from conoid.cases.outcome import Outcome, from_json
+from conoid.cases.suite import suite
+
+from .table import Cell, table
+
+ROOT = Path(__file__).parents[2]
+OUT, PAGE = ROOT / "build" / "energy_lines", ROOT / "docs" / "energy_lines.md"
+_QUIET = ("run.ranks=1", "run.frames=0", "run.snapshots=0", "run.checkpoint_every=none")
+_COLUMNS = ("case", "state", "worst line", "made", "at, s", "limit", "residual", "tets", "steps", "CPU s")
+
+
+@dataclass(frozen=True)
+class Row:
+    """How a case ended, and which line has made most."""
+
+    case: str
+    state: str
+    message: str
+    line: str
+    made: float
+    at: float | None
+    limit: float
+    residual: float
+    tets: int
+    steps: int
+    cpu: float
+
+    @property
+    def bad(self) -> bool:
+        """Whether a line is above its limit in a run that succeeded."""
+        return self.state == "succeeded" and self.made > self.limit
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A case with what is changed of it."""
+
+    name: str
+    path: Path
+    changes: tuple[str, ...]
+
+    @property
+    def seconds(self) -> float:
+        """What it is expected to take, core s."""
+        return estimate(parse_case(apply_overrides(read_data(self.path), self.changes))).core_seconds or 0.0
+
+
+def plans() -> list[Plan]:
+    """All, the cheap ones first."""
+    found = [Plan(f"hard/{each.name}", each.path, (*each.changes, *_QUIET)) for each in suite()]
+    found += [Plan(f"shipped/{name}", path, _QUIET) for name, path in sorted(shipped().items())]
+    return sorted(found, key=lambda plan: plan.seconds)
+
+
+def measured(plan: Plan) -> Row:
+    """Runs a case."""
+    with tempfile.TemporaryDirectory() as passing:
+        sets = [word for change in plan.changes for word in ("--set", change)]
+        command = [sys.executable, "-m", "conoid.worker", str(plan.path), "--out", passing, *sets]
+        subprocess.run(command, check=False, capture_output=True)
+        outcome = from_json((Path(passing) / "outcome.json").read_bytes())
+    case = parse_case(apply_overrides(read_data(plan.path), plan.changes))
+    return row_of(plan.name, outcome, case.run.made_limit)
+
+
+def row_of(name: str, outcome: Outcome, limit: float) -> Row:
+    """The row of a run that has ended."""
+    worst = outcome.made[0] if outcome.made else None
+    return Row(
+        name, outcome.state, outcome.message, worst.line if worst else "none", worst.share if worst else 0.0,
+        worst.time if worst else None, limit, outcome.worst_residual, outcome.elements or 0, outcome.steps or 0,
+        outcome.cpu,
+    )  # fmt: skip
+
+
+def rows() -> Iterator[Row]:
+    """Those that have been measured, hard cases first."""
+    for path in sorted(OUT.glob("*.json")):
+        yield Row(**json.loads(path.read_text(encoding="utf-8")))
+
+
+def page(found: Sequence[Row]) -> str:
+    """The page: a table, and what is wrong."""
+    lines: list[list[Cell]] = [
+        [r.case, r.state, r.line, r.made, r.at, r.limit, r.residual, r.tets, r.steps, round(r.cpu, 1)] for r in found
+    ]
+    wrong = [f"- {r.case}: {r.line} has made {r.made:.3g}" for r in found if r.bad]
+    wrong += [f"- {r.case}: {r.message}" for r in found if r.state != "succeeded"]
+    total = len(plans())
+    return "\n\n".join([
+        "# Energy that lines of the ledger make",
+        "Written by `python -m tests.bench.energy_lines`: every hard and every shipped case, one rank, with the line "
+        "of the ledger that has made most energy at any time, as a share of the largest energy until then, and its "
+        "limit, `run.made_limit`. How it is counted: [numerics.md](numerics.md), \"Energy that a line makes\".",
+        f"{len(found)} of {total} cases; {sum(r.bad for r in found)} succeeded above the limit.",
+        *(["\n".join(wrong)] if wrong else []),
+        table(_COLUMNS, lines),
+    ]) + "\n"  # fmt: skip
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Measures the named cases, or all that have not been measured, and writes the page."""
+    known = plans()
+    unknown = [name for name in arguments if name != "write" and name not in [plan.name for plan in known]]
+    if unknown:
+        print(f"{' '.join(unknown)}: cases are {', '.join(plan.name for plan in known)}")
+        return 2
+    OUT.mkdir(parents=True, exist_ok=True)
+    for plan in known if "write" not in arguments else ():
+        file = OUT / f"{plan.name.replace('/', '-')}.json"
+        if file.is_file() if not arguments else plan.name not in arguments:
+            continue
+        row = measured(plan)
+        file.write_text(json.dumps(asdict(row), indent=1), encoding="utf-8")
+        print(f"{row.case}: {row.state}, {row.line} {row.made:.2g}, {row.cpu:.1f} s {row.message}", flush=True)
+    found = list(rows())
+    PAGE.write_text(page(found), encoding="utf-8")
+    print(f"{PAGE.relative_to(ROOT)}: {len(found)} of {len(known)}, {sum(row.bad for row in found)} above the limit")
+    return any(row.bad for row in found)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
