@@ -14,6 +14,7 @@ stepping  the time integration                        its magnitude: an error ei
 (docs/numerics.md, Time integration). Nor is any line while the largest energy is that of rounding.
 """
 
+import math
 from typing import NamedTuple
 
 from conoid.cases.messages import Energy
@@ -99,7 +100,7 @@ class Making:
 def _cure(name: str, share: float, safety: float) -> str:
     """What helps, as far as it is derived and measured (docs/numerics.md, Energy that a line makes)."""
     if name == STEPPING:
-        wanted = safety * (0.5 * TOLD / share) ** 0.5
+        wanted = safety * math.sqrt(0.5 * TOLD / share)
         return f"; it falls with the square of the step: numerics.dt_safety = {wanted:.2g} would leave half a per cent"
     if name == "averaging":
         return "; with numerics.pressure = 'standard' there is none, but tets lock where they flow"

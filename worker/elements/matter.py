@@ -39,6 +39,7 @@ TETS, LINEAR, GRUNEISEN = range(3)
 """Whose the pressure is: of the tets; of the nodes, linear with a tension cut-off; of the nodes, with heat."""
 
 _GAMMA = EQUATION + 2
+"""Place of gamma0 among the constants of Mie-Grueneisen's equation (equation_of_state.py)."""
 _P, _MASS, _WORK, _RATIO, _PORES = (row * CHUNK for row in (PRESSURE, MASS, WORK, VOLUME_RATIO, PORES))
 _TAKEN, _PLASTIC = WORK_AVERAGED * CHUNK, WORK_PLASTIC * CHUNK
 
