@@ -97,10 +97,13 @@ class RunInfo(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class FileInfo(msgspec.Struct, kw_only=True, frozen=True):
-    """A file in a run's folder: its path there, its bytes."""
+    """A file in a run's folder: its path there, its bytes, and where it is fetched. Bytes of a name that are no UTF-8
+    are shown as ``\\xff``: the address alone has them.
+    """
 
     path: str
     size: int
+    url: str = ""
 
 
 class Listing(msgspec.Struct, kw_only=True, frozen=True):
@@ -262,13 +265,18 @@ class Run:
     def download(self, folder: Path | str, name: str | None = None) -> Path:
         """Copies one file, or all, into ``folder`` and returns the path of the file, or the folder."""
         root = Path(folder)
-        names = [name] if name is not None else [file.path for file in self.files()]
-        for each in names:
+        files = self.files() if name is None else [FileInfo(path=name, size=0)]
+        for each, address in ((file.path, self._address(file)) for file in files):
             try:
-                self.session.download(f"{self.path}/files/{quoted(each, safe='/')}", inside(root, each))
+                self.session.download(address, inside(root, each))
             except NotFoundError:
                 raise self._lacks(each) from None
         return inside(root, name) if name is not None else root
+
+    def _address(self, file: FileInfo) -> str:
+        """The one that the server tells, if it is of this run; else that of its path."""
+        own = f"{self.path}/files/"
+        return file.url if file.url.startswith(own) else f"{own}{quoted(file.path, safe='/')}"
 
     def _lacks(self, what: str) -> ClientError:
         """What is raised for something that the run has not written, or for a run that there is none of."""

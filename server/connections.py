@@ -6,8 +6,11 @@ from collections import Counter
 from itertools import islice
 from typing import Any
 
+import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+BODY = 1 << 20
+"""Bytes of the largest body (``limits``)."""
 HEADER = 10.0
 """s in which a request's header must arrive, from its first byte or from the opening of its connection. Chosen."""
 READ = 30.0
@@ -44,6 +47,8 @@ class Connection(H11Protocol):
     """Whose token the last request has shown."""
     _overdue: asyncio.TimerHandle | None = None
     _unread: asyncio.TimerHandle | None = None
+    _useless = 0
+    """Bytes of bodies that were answered before their end."""
     _left = 0
     """Bytes that waited to be sent at the last look."""
 
@@ -81,7 +86,14 @@ class Connection(H11Protocol):
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
-        """The time of a header begins with its first byte, and more bytes do not make it longer."""
+        """The time of a header begins with its first byte, and more bytes do not make it longer. Of a body that was
+        answered before its end no more is read than a body may have.
+        """
+        if self.conn.our_state is h11.DONE and self.conn.their_state is h11.SEND_BODY:
+            self._useless += len(data)
+            if self._useless > BODY:
+                self.transport.close()
+                return
         super().data_received(data)
         if self.cycle is not None and not self.cycle.response_complete:
             self.idle.pop(self, None)

@@ -1,6 +1,7 @@
 """Middleware: who asks, and whether it is the turn of the request. What a user holds is bounded here (``crowd``)."""
 
 import hashlib
+import time
 from collections import OrderedDict
 from typing import Any
 
@@ -19,7 +20,9 @@ ALIVE = "/healthz"
 LOCAL_OWNER = "local"
 """Owns all runs of a server without access control."""
 _SEEN = 1000
-"""Tokens that were valid lately, of which the owner is kept. Chosen."""
+"""Tokens that were valid lately and are kept. Chosen."""
+_FRESH = 1.0
+"""s for which a token that was valid is taken for valid. Chosen: who is revoked is answered with 401 after that."""
 
 
 class Door:
@@ -27,8 +30,8 @@ class Door:
 
     def __init__(self, app: ASGIApp, service: Service) -> None:
         self._app, self._service = app, service
-        self._owners: OrderedDict[bytes, str] = OrderedDict()
-        """By hash of a token that was valid lately: in whose lane the database is asked for it again."""
+        self._seen: OrderedDict[bytes, tuple[float, Token]] = OrderedDict()
+        """By its hash: until when a token is taken for valid; after that the database is asked in its owner's lane."""
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answers 429 and 503 itself where a request does not come in."""
@@ -70,7 +73,10 @@ class Door:
         if scheme.lower() != "bearer" or not self._service.settings.auth:
             return None
         shown = hashlib.sha256(text.strip().encode()).digest()
-        asking.set(self._owners.get(shown) or _address(scope))
+        until, known = self._seen.get(shown, (0.0, None))
+        if time.monotonic() < until:
+            return known
+        asking.set(known.owner if known is not None else _address(scope))
         try:
             token = await self._service.lanes.run(check_token, self._service.store, text.strip())
         except SQLAlchemyError as error:
@@ -79,11 +85,11 @@ class Door:
         return token
 
     def _note(self, shown: bytes, token: Token | None) -> None:
-        self._owners.pop(shown, None)
+        self._seen.pop(shown, None)
         if token is not None:
-            self._owners[shown] = token.owner
-            if len(self._owners) > _SEEN:
-                self._owners.popitem(last=False)
+            self._seen[shown] = time.monotonic() + _FRESH, token
+            if len(self._seen) > _SEEN:
+                self._seen.popitem(last=False)
 
 
 def _address(scope: Scope) -> str:

@@ -21,11 +21,10 @@ from conoid.cases.problems import Problem
 from conoid.cases.schema import Case
 from conoid.cases.similar import allowed
 
+from .connections import BODY
 from .errors import ServiceError
 from .settings import Caps, Settings
 
-BODY = 1 << 20
-"""Bytes of the largest body."""
 _BODY_TIMEOUT = 30.0
 """s for a whole body: 1 MiB at 35 kB/s. Chosen."""
 

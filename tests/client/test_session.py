@@ -203,6 +203,24 @@ def test_a_file_name_cannot_leave_the_folder(name: str, tmp_path: Path) -> None:
 # The case that is sent ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("elsewhere", ["http://evil.test/v1/runs/r1/files/a", "/v1/runs/r2/files/a", ""])
+def test_files_are_fetched_where_the_server_says_and_nowhere_else(tmp_path: Path, elsewhere: str) -> None:
+    """A name that is no text is shown as one, and its address has its bytes."""
+    asked: list[str] = []
+
+    def answer(request: httpx2.Request) -> httpx2.Response:
+        asked.append(str(request.url))
+        files = [
+            {"path": "a\\xffb", "size": 1, "url": "/v1/runs/r1/files/a%FFb"},
+            {"path": "a b", "size": 1, "url": elsewhere},
+        ]
+        return httpx2.Response(200, json={"files": files})
+
+    served(answer).run("r1").download(tmp_path)
+    assert asked == [f"http://conoid.test/v1/runs/r1/files{name}" for name in ("", "/a%FFb", "/a%20b")]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a b", "a\\xffb"]
+
+
 def test_a_download_for_which_there_is_no_room_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: object) -> Iterator[bytes]:
         yield b"x"

@@ -27,6 +27,7 @@ class Grounds:
         self._ends = ExitStack()
         self._make: dict[str, Callable[[Path], Stand]] = {
             "plain": Stand, "wide": lambda root: Stand(root, slots=40, before=UNPRIVILEGED),
+            "odd": lambda root: Stand(_odd(root)),
             "narrow": lambda root: Stand(root, slots=3, before=UNPRIVILEGED),
             "unprivileged": lambda root: Stand(root, before=UNPRIVILEGED), "disk": self._on_a_disk, "clock": _clock,
             "slurm": lambda root: cluster.stand(root, self._slurm()),
@@ -89,6 +90,13 @@ class Grounds:
         subprocess.run(["mount", "-t", "tmpfs", "-o", f"{DISK},mode=0700", "conoid-drill", str(made.runs)], check=True)
         self._mounts.append(made.runs)
         return made
+
+
+def _odd(root: Path) -> Path:
+    """A folder in it whose name has all that a pattern, an address or a shell takes for something else."""
+    made = root / "100%s a\\b #1?x=%20;[y] '\u00e4'"
+    made.mkdir()
+    return made
 
 
 def _clock(root: Path) -> Stand:

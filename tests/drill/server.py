@@ -1,8 +1,9 @@
 """A server whose disk fails on demand: ``python -m tests.drill.server ORDER ...`` runs ``conoid.server`` with the rest.
 
 While the file ORDER is there, what the server writes below its folder of runs fails as the file says, in JSON:
-``errno``; ``what``: "write" (files that are opened for writing, renamed, made, removed, written, flushed), "open" (all
-files, as without descriptors), "fsync" or "rename"; ``every``: one in so many fails.
+``errno``, 0 for what hangs until the file is gone; ``what``: "write" (files that are opened for writing, renamed, made,
+removed, written, flushed), "open" (all files, as without descriptors), "fsync" or "rename"; ``every``: one in so many
+fails.
 """
 
 import errno
@@ -34,7 +35,10 @@ class Order:
             return
         words = self._read()
         if words and words["what"] in kinds and next(self.calls) % words["every"] == 0:
-            raise OSError(words["errno"], os.strerror(words["errno"]))
+            if words["errno"]:
+                raise OSError(words["errno"], os.strerror(words["errno"]))
+            while self.path.exists():
+                time.sleep(LOOK)
 
     def _mine(self, path: object) -> bool:
         return isinstance(path, str | bytes | os.PathLike) and os.fsdecode(path).startswith(self.root)
@@ -76,7 +80,7 @@ def install(order: Order) -> None:
 
 def order(number: int, what: str = "write", every: int = 1) -> str:
     """The text of an order."""
-    assert number in errno.errorcode
+    assert number in {0, *errno.errorcode}
     return json.dumps({"errno": number, "what": what, "every": every})
 
 

@@ -110,6 +110,10 @@ def disks() -> Iterator[Strike]:
     for code in ("ENOSPC", "EIO"):
         deed = and_killed(fails(getattr(errno, code)))
         yield Strike(f"{code} and the server killed", "storage", deed, and_started(mend))
+    for what, where in (("open", "opening"), ("write", "write"), ("fsync", "flush")):
+        yield Strike(f"the server's disk hangs at every {where}", "hang", fails(0, what), mend, waits=2.0)
+    hangs = and_killed(fails(0, "write"))
+    yield Strike("the server's disk hangs and the server killed", "hang", hangs, and_started(mend), waits=2.0)
     real: tuple[tuple[str, Deed, Deed, str], ...] = (
         ("a full disk", filled, emptied, "disk"),
         ("a disk without inodes", crowded, thinned, "disk"),
@@ -355,6 +359,7 @@ def kills() -> Iterator[Strike]:
     yield Strike("the reader of cases killed", "kill", partial(reader_gets, number=signal.SIGKILL), nothing)
     stop, go = partial(reader_gets, number=signal.SIGSTOP), partial(reader_gets, number=signal.SIGCONT)
     yield Strike("the reader of cases paused", "kill", stop, go, waits=3.0)
+    yield Strike("the reader of cases hangs for good", "hang", stop, nothing)
 
 
 def everything() -> list[Strike]:

@@ -128,3 +128,50 @@ def test_a_flood_of_one_line_is_short_in_the_log(monkeypatch: pytest.MonkeyPatch
     last = say()
     assert last is not None
     assert last.getMessage() == "run x (and 9980 more like this)"
+
+
+def test_a_body_that_was_refused_is_not_read_to_its_end(ann: User) -> None:
+    """It says that it has a gigabyte."""
+    place = ann.http.base_url.host, ann.http.base_url.port
+    head = f"POST /v1/runs HTTP/1.1\r\nHost: x\r\nAuthorization: {ann.http.headers['Authorization']}\r\n"
+    with socket.create_connection(place, timeout=PATIENCE) as one:
+        one.sendall(f"{head}Content-Type: application/toml\r\nContent-Length: {1 << 30}\r\n\r\n".encode())
+        assert one.recv(1 << 16).startswith(b"HTTP/1.1 413")
+        sent = 0
+        with suppress(ConnectionError):
+            while sent < 1 << 28:
+                sent += one.send(b"#" * (1 << 16))
+    assert sent < 1 << 25
+
+
+def test_an_answer_that_nobody_reads_is_cut_off(ann: User, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connections, "READ", 0.3)
+    run = ann.submit()
+    ann.wait_for(run)
+    (ann.runs / run / "large.bin").write_bytes(bytes(1 << 25))
+    place = ann.http.base_url.host, ann.http.base_url.port
+    head = f"GET /v1/runs/{run}/files/large.bin HTTP/1.1\r\nHost: x\r\n"
+    with socket.create_connection(place, timeout=PATIENCE) as one:
+        one.sendall(f"{head}Authorization: {ann.http.headers['Authorization']}\r\n\r\n".encode())
+        time.sleep(2.0)
+        received = 0
+        with suppress(ConnectionError):
+            while chunk := one.recv(1 << 20):
+                received += len(chunk)
+    assert received < 1 << 25
+
+
+def test_a_user_with_many_idle_connections_keeps_nobody_out(ann: User) -> None:
+    """20 connections are let in at a time."""
+    place = ann.http.base_url.host, ann.http.base_url.port
+    request = f"GET /v1/me HTTP/1.1\r\nHost: x\r\nAuthorization: {ann.http.headers['Authorization']}\r\n\r\n".encode()
+    crowd = [socket.create_connection(place, timeout=PATIENCE) for _ in range(30)]
+    for one in crowd:
+        with suppress(ConnectionError):
+            one.sendall(request)
+            one.recv(1 << 16)
+    for _ in range(5):
+        with httpx2.Client(base_url=ann.http.base_url, timeout=5.0) as other:
+            assert other.get("/healthz").status_code == 200
+    for one in crowd:
+        one.close()

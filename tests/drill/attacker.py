@@ -1,0 +1,215 @@
+"""``python -m tests.drill.attacker KIND URL TOKEN RUN LONG SECONDS``: one who takes all that he gets.
+
+A process of its own, for so many seconds, bounded in connections. Prints as JSON how often each status was answered; 0
+where a connection was closed without an answer.
+"""
+
+import itertools
+import json
+import random
+import socket
+import sys
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field
+from urllib.parse import urlsplit
+
+from ..server.hostile import quadratic
+from ..server.running import case_text
+
+MOST = 400
+"""Connections at a time."""
+
+
+@dataclass
+class Attack:
+    """What is sent on each connection, and how often."""
+
+    requests: Callable[["Target"], Iterator[bytes]]
+    """One after the other on one connection; the next one when the answer is there."""
+    crowd: int
+    """Connections at a time."""
+    reads: bool = True
+    """Whether the answers are read."""
+    drips: bool = False
+    """Whether what is sent comes a byte at a time."""
+
+
+@dataclass
+class Target:
+    """A server, somebody's token there, a run of his that goes on, and one with a long journal."""
+
+    url: str
+    token: str
+    run: str
+    long: str
+    until: float
+    answers: Counter[int] = field(default_factory=Counter)
+
+    def get(self, path: str, method: str = "GET", more: str = "", token: bool = True) -> bytes:
+        """A request."""
+        shown = f"Authorization: Bearer {self.token}\r\n" if token else ""
+        return f"{method} {path} HTTP/1.1\r\nHost: 127.0.0.1\r\n{shown}{more}\r\n".encode()
+
+    def post(self, path: str, body: bytes, kind: str = "application/toml", length: int | None = None) -> bytes:
+        """A request with a body, which has ``length`` bytes as is said."""
+        size = len(body) if length is None else length
+        return self.get(path, "POST", f"Content-Type: {kind}\r\nContent-Length: {size}\r\n") + body
+
+
+def again(*paths: str, method: str = "GET", more: str = "", token: bool = True) -> Callable[[Target], Iterator[bytes]]:
+    """The same requests without end; RUN and LONG stand for the two runs, {n} for a number that is always another."""
+
+    def requests(target: Target) -> Iterator[bytes]:
+        for n in itertools.count(random.randrange(1000)):
+            path = paths[n % len(paths)].replace("RUN", target.run).replace("LONG", target.long)
+            yield target.get(path.replace("{n}", str(n % 4000 + 1)), method, more, token)
+
+    return requests
+
+
+def once(*words: str, token: bool = True) -> Callable[[Target], Iterator[bytes]]:
+    """One request, and no more."""
+    return lambda target: itertools.islice(again(*words, token=token)(target), 1)
+
+
+def nothing(target: Target) -> Iterator[bytes]:
+    """Silence."""
+    yield b""
+
+
+def half_a_header(target: Target) -> Iterator[bytes]:
+    yield target.get("/v1/me")[:-2] + b"X-Long: "
+
+
+def half_a_body(target: Target) -> Iterator[bytes]:
+    """All of a mebibyte but its end."""
+    yield target.post("/v1/cases:validate", b"#" * ((1 << 20) - 1), length=1 << 20)
+
+
+def endless_chunks(target: Target) -> Iterator[bytes]:
+    """Of a body whose length is not said, half a mebibyte."""
+    head = target.get("/v1/cases:validate", "POST", "Content-Type: application/toml\r\nTransfer-Encoding: chunked\r\n")
+    yield head + b"8000\r\n%s\r\n" % (b"#" * 0x8000) * 16
+
+
+def hostile_bodies(target: Target) -> Iterator[bytes]:
+    bodies = quadratic()
+    for n in itertools.count(random.randrange(len(bodies))):
+        _, kind, body = bodies[n % len(bodies)]
+        yield target.post("/v1/cases:validate", body, kind)
+
+
+def cases(target: Target) -> Iterator[bytes]:
+    while True:
+        yield target.post("/v1/cases:validate", case_text().encode())
+
+
+def guesses(target: Target) -> Iterator[bytes]:
+    for n in itertools.count():
+        yield target.get("/v1/runs", more=f"Authorization: Bearer conoid_guess_{n}\r\n", token=False)
+
+
+def many_at_once(target: Target) -> Iterator[bytes]:
+    """On one connection, before any answer."""
+    while True:
+        yield target.get("/v1/cases") * 200
+
+
+KINDS: dict[str, Attack] = {
+    "event streams": Attack(once("/v1/runs/RUN/stream"), 300),
+    "event streams that nobody reads": Attack(once("/v1/runs/RUN/stream"), 300, reads=False),
+    "followed logs": Attack(once("/v1/runs/RUN/logs/0?follow=true"), 300),
+    "waits for a change": Attack(once("/v1/runs/RUN?wait=60"), 300),
+    "silent connections without a token": Attack(nothing, 300),
+    "half headers without a token": Attack(half_a_header, 300),
+    "idle connections of a user": Attack(once("/v1/me"), 300),
+    "half bodies of a mebibyte": Attack(half_a_body, 400),
+    "bodies in chunks without end": Attack(endless_chunks, 300),
+    "bodies a byte at a time": Attack(cases, 200, drips=True),
+    "headers a byte at a time": Attack(again("/v1/me"), 200, drips=True),
+    "10,000 events of 20 kB": Attack(again("/v1/runs/LONG/events?limit=10000"), 12),
+    "10,000 events that nobody reads": Attack(again("/v1/runs/LONG/events?limit=10000"), 60, reads=False),
+    "events from everywhere in a long journal": Attack(again("/v1/runs/LONG/events?after={n}&limit=10000"), 40),
+    "histories of a long run": Attack(again("/v1/runs/LONG/history"), 60),
+    "histories with ever other points": Attack(again("/v1/runs/LONG/history?points={n}"), 60),
+    "snapshots of a long run": Attack(again("/v1/runs/LONG/snapshots"), 40),
+    "label filters": Attack(again("/v1/runs?label=point%3D{n}", "/v1/runs?label=a%3Db&label=c%3Dd"), 40),
+    "lists of 500 runs": Attack(again("/v1/runs?limit=500"), 40),
+    "the gallery": Attack(again("/v1/cases"), 40),
+    "HEADs of a large file": Attack(again("/v1/runs/RUN/files/large.bin", method="HEAD"), 40),
+    "downloads that nobody reads": Attack(again("/v1/runs/RUN/files/large.bin"), 200, reads=False),
+    "ranges of a byte": Attack(again("/v1/runs/RUN/files/large.bin", more="Range: bytes=7-7\r\n"), 60),
+    "lists of many files": Attack(again("/v1/runs/RUN/files"), 40),
+    "readiness without a token": Attack(again("/readyz", token=False), 60),
+    "metrics": Attack(again("/metrics"), 40),
+    "who asks": Attack(again("/v1/me"), 60),
+    "hostile bodies": Attack(hostile_bodies, 50),
+    "cases to be read": Attack(cases, 100),
+    "OpenAPI that nobody reads, without a token": Attack(again("/openapi.json", token=False), 200, reads=False),
+    "the schema of a case without a token": Attack(again("/v1/case.schema.json", token=False), 40),
+    "guessed tokens": Attack(guesses, 60),
+    "many requests on one connection": Attack(many_at_once, 20),
+    "cancels of a run": Attack(again("/v1/runs/RUN:cancel?x", method="POST"), 40),
+    "sweeps": Attack(again("/v1/sweeps?limit=500"), 40),
+    "addresses that are none": Attack(again("/v1/runs/{n}", "/%00{n}", "/v1/runs/%FF/files/x"), 60),
+}
+
+
+def attack(kind: str, target: Target) -> None:
+    """Until the time is over; then all connections are closed."""
+    chosen = KINDS[kind]
+    crowd = [threading.Thread(target=one, args=(chosen, target), daemon=True) for _ in range(min(MOST, chosen.crowd))]
+    for each in crowd:
+        each.start()
+    time.sleep(max(0.0, target.until - time.monotonic()))
+
+
+def one(chosen: Attack, target: Target) -> None:
+    """Connects again when it was sent away, ten times a second at most."""
+    while time.monotonic() < target.until:
+        with suppress(OSError):
+            place = urlsplit(target.url)
+            with socket.create_connection((place.hostname or "", place.port or 0), timeout=60.0) as connection:
+                talk(chosen, target, connection)
+        time.sleep(0.1)
+
+
+def talk(chosen: Attack, target: Target, connection: socket.socket) -> None:
+    for request in chosen.requests(target):
+        if time.monotonic() > target.until:
+            return
+        if chosen.drips:
+            for n in range(len(request)):
+                connection.sendall(request[n : n + 1])
+                time.sleep(0.5)
+        connection.sendall(request)
+        if chosen.reads and not answered(target, connection):
+            return
+        if not chosen.reads:
+            target.answers[-1] += 1
+    while time.monotonic() < target.until and chosen.reads and connection.recv(1 << 16):
+        pass
+    time.sleep(max(0.0, target.until - time.monotonic()))
+
+
+def answered(target: Target, connection: socket.socket) -> bool:
+    """Reads an answer; False where the connection is closed, or the answer has no end that is known."""
+    with connection.makefile("rb") as answer:
+        words = answer.readline().split()
+        target.answers[int(words[1]) if len(words) > 1 else 0] += 1
+        length = 0
+        while line := answer.readline().strip().lower():
+            if line.startswith(b"content-length:"):
+                length = int(line.partition(b":")[2])
+        answer.read(length)
+        return bool(words)
+
+
+if __name__ == "__main__":
+    aimed = Target(*sys.argv[2:6], time.monotonic() + float(sys.argv[6]))
+    attack(sys.argv[1], aimed)
+    print(json.dumps({str(status): count for status, count in sorted(aimed.answers.items())}))

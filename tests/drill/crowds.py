@@ -1,0 +1,225 @@
+"""What one user takes from two others who are beside him: an attacker of his own process, two who ask as people do.
+
+True is an attack during which 99 of 100 GETs of the other two are answered within 0.2 s and none later than 1 s, by a
+server that gives no wrong answer and does not grow. Where the machine has much else to do, its load is told.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+
+import httpx2
+
+from conoid.cases import layout
+from conoid.cases.messages import Log, Status, to_json
+from conoid.cases.run import State
+from conoid.server import folder
+from conoid.server.folder import Submission
+from conoid.server.store import Store
+from conoid.server.tokens import create_token
+
+from ..server.spoken import told, write
+from .attacker import KINDS
+from .judge import TRUE, Row
+from .stand import Stand
+
+SECONDS = 6.0
+"""Of each attack."""
+P99, WORST = 0.2, 1.0
+"""s that a GET of somebody else may take."""
+REST = 2.0
+"""s after an attack, in which what is left of it ends."""
+GROWTH = 200 << 20
+"""Bytes by which the server may grow meanwhile."""
+PAUSE = 0.02
+"""s between two GETs of a person."""
+RUNS, EVENTS, REPORTS, FILES = 3000, 2500, 20_000, 2000
+"""Of the attacker: runs with labels; events of 20 kB, and reports, of his long run; files of another one."""
+SAID = {-1, 200, 202, 204, 206, 304, 400, 401, 404, 405, 408, 409, 413, 415, 416, 422, 429, 503}
+"""What the attacker may be answered; -1: he does not read it."""
+
+
+@dataclass
+class Person:
+    """Who asks for a run of his own now and then; how long each answer took, s."""
+
+    http: httpx2.Client
+    paths: tuple[str, ...]
+    took: list[float] = field(default_factory=list)
+    wrong: list[str] = field(default_factory=list)
+
+    def asks(self, until: float) -> None:
+        """One GET after the other."""
+        n = 0
+        while time.monotonic() < until:
+            began, n = time.monotonic(), n + 1
+            try:
+                status = self.http.get(self.paths[n % len(self.paths)]).status_code
+            except httpx2.HTTPError as error:
+                self.wrong.append(type(error).__name__)
+            else:
+                self.wrong += [str(status)] if status != 200 else []
+            self.took.append(time.monotonic() - began)
+            time.sleep(PAUSE)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Who is there: the attacker's token and runs, the two others."""
+
+    token: str
+    run: str
+    long: str
+    people: tuple[Person, Person]
+
+
+_scenes: dict[int, Scene] = {}
+"""By server process."""
+
+
+def groups() -> dict[str, tuple[str, Callable[[Stand], Iterator[Row]]]]:
+    """Each attack is a group of its own."""
+    return {f"beside others: {kind}": ("plain", partial(rows, kind=kind)) for kind in KINDS}
+
+
+def rows(stand: Stand, kind: str) -> Iterator[Row]:
+    """One attack."""
+    assert stand.http is not None
+    assert stand.child is not None
+    scene = _scenes.get(stand.child.pid) or _scenes.setdefault(stand.child.pid, _made(stand))
+    url = str(stand.http.base_url)
+    time.sleep(REST)
+    quiet = _asked(scene.people, 1.0)
+    before, load = _memory(stand), os.getloadavg()[0]
+    words = [sys.executable, "-m", "tests.drill.attacker", kind, url, scene.token, scene.run, scene.long, str(SECONDS)]
+    attacker = subprocess.Popen(words, stdout=subprocess.PIPE, cwd=Path(__file__).parents[2])
+    grown = _Growth(stand, before)
+    during = _asked(scene.people, SECONDS + 1.0)
+    said = {int(status): n for status, n in json.loads(attacker.communicate(timeout=120.0)[0]).items()}
+    p99, worst = during.took[int(0.99 * (len(during.took) - 1))], during.took[-1]
+    happened = (
+        f"GET p99 {p99 * 1e3:.0f} ms, worst {worst * 1e3:.0f} ms of {len(during.took)} "
+        f"(alone p99 {quiet.took[int(0.99 * (len(quiet.took) - 1))] * 1e3:.0f} ms); answers "
+        f"{' '.join(f'{status}: {n}' for status, n in said.items())}; {grown.end() / 1e6:+.0f} MB; load {load:.0f}"
+    )
+    yield Row(f"beside others: {kind}", "crowd", happened, worst, _verdict(during, said, grown.most))
+
+
+def _verdict(during: Person, said: dict[int, int], grown: int) -> str:
+    p99, worst = during.took[int(0.99 * (len(during.took) - 1))], during.took[-1]
+    if during.wrong:
+        return f"others refused: {len(during.wrong)} times, {during.wrong[0]}"
+    if odd := [status for status in said if status not in SAID and status != 0]:
+        return f"lie: the attacker is answered {odd[0]}"
+    if grown > GROWTH:
+        return f"grown: by {grown >> 20} MiB"
+    return f"slow: p99 {p99:.2f} s, worst {worst:.2f} s" if p99 > P99 or worst > WORST else TRUE
+
+
+def _asked(people: tuple[Person, Person], seconds: float) -> Person:
+    """What both found, the shortest answer first."""
+    for person in people:
+        person.took, person.wrong = [], []
+    until = time.monotonic() + seconds
+    crowd = [threading.Thread(target=person.asks, args=(until,)) for person in people]
+    for one in crowd:
+        one.start()
+    for one in crowd:
+        one.join()
+    took = sorted(time for person in people for time in person.took)
+    return Person(people[0].http, (), took, [word for person in people for word in person.wrong])
+
+
+class _Growth:
+    """The memory of the server, looked at while an attack goes on."""
+
+    def __init__(self, stand: Stand, before: int) -> None:
+        self._stand, self._before, self.most = stand, before, 0
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._look)
+        self._thread.start()
+
+    def _look(self) -> None:
+        while not self._over.wait(0.1):
+            self.most = max(self.most, _memory(self._stand) - self._before)
+
+    def end(self) -> int:
+        """The most by which it has grown, bytes."""
+        self._over.set()
+        self._thread.join()
+        return self.most
+
+
+def _memory(stand: Stand) -> int:
+    """Bytes of the server in memory."""
+    assert stand.child is not None
+    with suppress(OSError):
+        return int(Path(f"/proc/{stand.child.pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    return 0
+
+
+# Who is there ---------------------------------------------------------------------------------------------------------
+
+
+def _made(stand: Stand) -> Scene:
+    """The attacker has 3,000 runs, one with a long journal, one with many files that goes on."""
+    assert stand.http is not None
+    store = Store(f"sqlite:///{stand.runs / 'server.sqlite'}")
+    token = create_token(store, "mallory", frozenset({"read", "submit", "metrics"}))
+    people = tuple(_person(stand, store, name) for name in ("bob", "eve"))
+    with store._engine.begin() as connection:
+        for n in range(RUNS):
+            ended = replace(folder.first(_record(f"{n:022d}")), state=State.SUCCEEDED, started=1.0, finished=2.0)
+            store._put(connection, ended)
+            store._label(connection, ended, {"point": str(n % 100), "a": "b", "c": "d"})
+    store.close()
+    mallory = httpx2.Client(
+        base_url=str(stand.http.base_url), headers={"Authorization": f"Bearer {token}"}, timeout=60.0
+    )
+    stand.http, own = mallory, stand.http
+    run, long = stand.running(), stand.submit()
+    stand.reached(long)
+    stand.reached(run, "running")
+    stand.http = own
+    mallory.close()
+    _long_journal(stand.runs / long)
+    for n in range(FILES):
+        (stand.runs / run / f"file-{n}.txt").touch()
+    with (stand.runs / run / "large.bin").open("wb") as file:
+        file.truncate(1 << 28)
+    return Scene(token, run, long, (people[0], people[1]))
+
+
+def _person(stand: Stand, store: Store, name: str) -> Person:
+    assert stand.http is not None
+    token = create_token(store, name, frozenset({"read", "submit"}))
+    http = httpx2.Client(base_url=stand.http.base_url, headers={"Authorization": f"Bearer {token}"}, timeout=60.0)
+    stand.http, own = http, stand.http
+    run = stand.submit()
+    stand.reached(run)
+    stand.http = own
+    paths = (f"/v1/runs/{run}", "/v1/runs", f"/v1/runs/{run}/events", f"/v1/runs/{run}/history", "/healthz")
+    return Person(http, paths)
+
+
+def _record(run: str) -> Submission:
+    return Submission(
+        id=run, owner="mallory", name="bar", title="", ranks=1, submitted=1.0, case_file="case.toml", body_sha256="",
+        idempotency_key=None, wall_time=None, estimate={},
+    )  # fmt: skip
+
+
+def _long_journal(path: Path) -> None:
+    """20,000 reports, and 2,500 lines of 20 kB."""
+    last = write(path, (message for message in told(REPORTS) if not isinstance(message, Status)), 100)
+    with (path / layout.JOURNAL).open("ab") as file:
+        for n in range(EVENTS):
+            file.write(to_json(Log(run=path.name, seq=last + 1 + n, level="info", text="x" * 20_000)) + b"\n")
