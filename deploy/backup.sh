@@ -6,11 +6,12 @@ set -eu
 umask 077
 rm -f "$2.part"
 "${PYTHON:-/opt/conoid/bin/python}" - "$1" "$2.part" <<'END'
+import pathlib
 import sqlite3
 import sys
 
 source, copy = sys.argv[1:]
-with sqlite3.connect(f"file:{source}?mode=rw", uri=True, timeout=30.0) as database:
+with sqlite3.connect(f"{pathlib.Path(source).absolute().as_uri()}?mode=rw", uri=True, timeout=30.0) as database:
     database.execute("VACUUM INTO ?", (copy,))
 END
 mv "$2.part" "$2"

@@ -144,11 +144,12 @@ async def show(
             left = deadline - time.monotonic()
             if changed or left <= 0:
                 break
-            await listener.wait(min(left, may.left))
+            news = await listener.wait(min(left, may.left))
             listener.clear()
             if not await may.holds():
                 raise unauthorized()
-            latest = await service.lanes.run(lambda: view.snapshot(service, find(service, identity, run.id)))
+            if news:
+                latest = await service.lanes.run(lambda: view.snapshot(service, find(service, identity, run.id)))
     headers = {"ETag": latest.etag, "Cache-Control": "private, no-cache"}
     if known is not None and download.is_known(latest.etag, known):
         return Response(status_code=304, headers=headers)

@@ -6,6 +6,7 @@ where a connection was closed without an answer.
 
 import itertools
 import json
+import os
 import random
 import socket
 import sys
@@ -20,6 +21,8 @@ from urllib.parse import urlsplit
 from ..server.hostile import quadratic
 from ..server.running import case_text
 
+NICE = 10
+"""Steps of priority below the server: an attacker has a processor of his own elsewhere."""
 MOST = 400
 """Connections at a time."""
 
@@ -210,6 +213,7 @@ def answered(target: Target, connection: socket.socket) -> bool:
 
 
 if __name__ == "__main__":
+    os.nice(NICE)
     aimed = Target(*sys.argv[2:6], time.monotonic() + float(sys.argv[6]))
     attack(sys.argv[1], aimed)
     print(json.dumps({str(status): count for status, count in sorted(aimed.answers.items())}))

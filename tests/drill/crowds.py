@@ -23,6 +23,7 @@ from conoid.cases.messages import Log, Status, to_json
 from conoid.cases.run import State
 from conoid.server import folder
 from conoid.server.folder import Submission
+from conoid.server.settings import Settings
 from conoid.server.store import Store
 from conoid.server.tokens import create_token
 
@@ -172,7 +173,7 @@ def _memory(stand: Stand) -> int:
 def _made(stand: Stand) -> Scene:
     """The attacker has 3,000 runs, one with a long journal, one with many files that goes on."""
     assert stand.http is not None
-    store = Store(f"sqlite:///{stand.runs / 'server.sqlite'}")
+    store = Store(Settings(runs=stand.runs).database_url)
     token = create_token(store, "mallory", frozenset({"read", "submit", "metrics"}))
     people = tuple(_person(stand, store, name) for name in ("bob", "eve"))
     with store._engine.begin() as connection:

@@ -14,7 +14,7 @@ from .strikes import killed, started
 NAMES: tuple[bytes, ...] = (
     b"a blank", b"50%", b"%41", b"%00", b"a<b>c", b"a#b", b"a?b=c", b"back\\slash", b"a\nline", b"a\ttab", b'a"quote',
     b"not-\xff-utf-8", b"\xc3\x28", b"\xed\xa0\x80", "\u4e2d\u6587".encode(), "\u202egnp.exe".encode(), b"\x1b[31m",
-    b"a;b&c+d=e", b"~tilde", b"x" * 255, b"..more", b"{}[]", b"'", b"*",
+    b"a;b&c+d=e", b"~tilde", b"x" * 255, b"more..", b"{}[]", b"'", b"*",
 )  # fmt: skip
 ADDRESSES: tuple[str, ...] = (
     "/%00", "/app.js%00", "/v1/runs/%00", "/v1/runs/%ff", "/v1/runs/RUN%00", "/v1/runs/RUN/files/%00",

@@ -17,6 +17,7 @@ import httpx2
 
 from conoid.cases.run import State
 from conoid.server.launch import processes
+from conoid.server.settings import Settings
 from conoid.server.store import Store
 from conoid.server.tokens import create_token
 
@@ -114,7 +115,7 @@ class Stand:
 
     def token(self) -> str:
         """Of a user, made by the operator."""
-        store = Store(f"sqlite:///{self.runs / 'server.sqlite'}")
+        store = Store(Settings(runs=self.runs).database_url)
         made = create_token(store, "ann", frozenset({"read", "submit", "metrics"}))
         store.close()
         return made

@@ -16,6 +16,7 @@ import httpx2
 
 from conoid.cases.run import State
 from conoid.server.service import Service
+from conoid.server.settings import Settings
 from conoid.server.store import Store
 from conoid.server.tokens import create_token
 
@@ -130,7 +131,7 @@ class Process:
 
     def user(self, url: str, name: str = "ann") -> User:
         """One with a new token."""
-        store = Store(f"sqlite:///{self.runs / 'server.sqlite'}")
+        store = Store(Settings(runs=self.runs).database_url)
         token = create_token(store, name, frozenset({"read", "submit"}))
         store.close()
         client = httpx2.Client(base_url=url, headers={"Authorization": f"Bearer {token}"}, timeout=PATIENCE)

@@ -7,6 +7,7 @@ import socket
 import ssl
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -124,6 +125,28 @@ def test_events_pass_through_nginx_when_they_happen(process: MakeProcess, tmp_pa
         assert far.get("/readyz").status_code == 200
         far.headers["Authorization"] = "Bearer wrong"
         assert far.get("/v1/me").status_code == 401
+
+
+@WITH_NGINX
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_a_silent_log_passes_through_nginx(process: MakeProcess, tmp_path: Path) -> None:
+    """Which cuts an answer of which it gets nothing for 90 s."""
+    server = process("--no-zenoh")
+    ann = server.user(server.start()["url"])
+    run = ann.submit(wait=str(tmp_path / "go"))
+    ann.wait_for(run, State.RUNNING)
+    port = ann.http.base_url.port
+    assert port is not None
+    with (
+        proxy(tmp_path, port) as outside,
+        visitor(tmp_path, outside, ann.http.headers["authorization"]) as far,
+        far.stream("GET", f"/v1/runs/{run}/logs/0", params={"follow": True}) as log,
+    ):
+        threading.Timer(100.0, (tmp_path / "go").touch).start()
+        text = b"".join(log.iter_raw())
+    assert text.count(b"\0") >= 5
+    assert text.replace(b"\0", b"") == b"rank 0 says hello\n"
 
 
 def test_a_backup_taken_beside_the_server_brings_tokens_and_runs_back(process: MakeProcess, tmp_path: Path) -> None:

@@ -3,6 +3,8 @@
 import json
 import os
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -12,6 +14,7 @@ from typing import Any
 import pytest
 
 from conoid.cases.run import State
+from conoid.server.__main__ import main
 from conoid.server.folder import Submission, create, new_id
 
 from .running import PATIENCE, TOML, MakeProcess, Process, User, case_text, processes
@@ -200,6 +203,37 @@ def living(run: str) -> bool:
             except OSError:
                 continue
     return False
+
+
+def test_the_folder_of_the_runs_may_have_any_name(tmp_path: Path) -> None:
+    """For the database, the launcher, the log and the backup."""
+    name = "100%s a%20b\\c #1?mode=ro&x=y;[z] 'q' \"w\" {v} $u \u00e4"
+    place = tmp_path / name
+    place.mkdir()
+    with processes(place) as make:
+        server = make("--no-zenoh")
+        ann = server.user(server.start()["url"])
+        run = ann.submit(ranks=2)
+        assert ann.wait_for(run)["state"] == "succeeded"
+        server.end(signal.SIGTERM)
+        again = server.user(server.start()["url"])
+        assert again.show(run)["state"] == "succeeded"
+        files = again.http.get(f"/v1/runs/{run}/files").json()["files"]
+        assert all(again.http.get(file["url"]).status_code == 200 for file in files)
+        assert sorted(path.name for path in tmp_path.iterdir()) == [name]
+        script = Path(__file__).parents[2] / "deploy" / "backup.sh"
+        command = [str(script), str(server.runs / "server.sqlite"), str(place / "kept.sqlite")]
+        subprocess.run(command, check=True, env={**os.environ, "PYTHON": sys.executable})
+        assert (place / "kept.sqlite").stat().st_size > 0
+
+
+def test_the_help_has_the_folder_of_the_runs(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("CONOID_RUNS", "/100%s/runs")
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    assert "/100%s/runs" in capsys.readouterr().out
 
 
 def test_a_server_leaves_nothing_of_its_reader(
