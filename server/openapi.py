@@ -72,13 +72,14 @@ _REFUSALS = {
     400: "a parameter is wrong", 401: "no valid token", 403: "the token lacks the scope", 404: "there is none",
     408: "the body did not arrive in time", 409: "not in this state", 410: "the run's folder has been removed",
     413: "the body is too large", 415: "not a type of a case", 416: "no such range", 422: "the case is wrong",
-    429: "too many wait", 500: "the server failed", 503: "not now", 507: "the disk is full",
+    429: "too many requests of the user are in progress or wait", 500: "the server failed", 503: "not now",
+    507: "the disk is full",
 }  # fmt: skip
 
 
 def refusals(method: str, path: str) -> set[int]:
     """The statuses other than success that a route may answer with."""
-    found = {400, 500, 503} | (set() if path in _OPEN else {401, 403})
+    found = {400, 500, 503} | (set() if path in _OPEN else {401, 403}) | (set() if path == "/healthz" else {429})
     if "{" in path:
         found |= {404}
     if "{run_id}" in path:

@@ -18,7 +18,9 @@ router = APIRouter()
 @router.get("/v1/me")
 @blocking
 def me(request: Request, service: ServiceOf, identity: Annotated[Identity, Depends(identify)]) -> dict[str, Any]:
-    """Name and scopes; how to subscribe over Zenoh (null: not possible); slots, caps, quota and what is used of it."""
+    """Name and scopes; how to subscribe over Zenoh (null: not possible); slots, caps, requests and long answers at a
+    time, quota and what is used of it.
+    """
     caps = service.settings.caps
     return {
         "owner": identity.owner,
@@ -34,6 +36,7 @@ def me(request: Request, service: ServiceOf, identity: Annotated[Identity, Depen
             "core_seconds": caps.core_seconds,
             "wall_time": caps.wall_time,
             "output_bytes": caps.output_bytes,
+            **{name: getattr(service.settings.site.http, name) for name in ("requests", "waiting", "streams")},
         },
         "quota": _quota(service),
         "used": _used(service, identity.owner),
