@@ -5,9 +5,9 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, Request
 
 from ..auth import Identity, identify
+from ..connections import BODY
 from ..errors import ServiceError
 from ..lanes import blocking
-from ..limits import BODY
 from ..service import Service, ServiceOf
 from ..settings import loopback
 from ..telemetry import TelemetryError

@@ -214,6 +214,7 @@ def answered(target: Target, connection: socket.socket) -> bool:
 
 if __name__ == "__main__":
     os.nice(NICE)
-    aimed = Target(*sys.argv[2:6], time.monotonic() + float(sys.argv[6]))
-    attack(sys.argv[1], aimed)
+    kind, url, token, run, long, seconds = sys.argv[1:]
+    aimed = Target(url, token, run, long, time.monotonic() + float(seconds))
+    attack(kind, aimed)
     print(json.dumps({str(status): count for status, count in sorted(aimed.answers.items())}))

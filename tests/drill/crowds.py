@@ -1,7 +1,8 @@
 """What one user takes from two others who are beside him: an attacker of his own process, two who ask as people do.
 
 True is an attack during which 99 of 100 GETs of the other two are answered within 0.2 s and none later than 1 s, by a
-server that gives no wrong answer and does not grow. Where the machine has much else to do, its load is told.
+server that gives no wrong answer and does not grow. A machine that has much else to do makes a GET late by itself: how
+late a thread is that only sleeps is told, and a slow attack beside much other work is tried again.
 """
 
 import json
@@ -10,7 +11,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -36,6 +37,10 @@ SECONDS = 6.0
 """Of each attack."""
 P99, WORST = 0.2, 1.0
 """s that a GET of somebody else may take."""
+BUSY, TRIES = 0.02, 3
+"""s by which a thread that only sleeps is late, at p99, on a machine with much else to do; tries there. Chosen: a GET
+is handed from thread to thread some ten times.
+"""
 REST = 2.0
 """s after an attack, in which what is left of it ends."""
 GROWTH = 200 << 20
@@ -92,7 +97,16 @@ def groups() -> dict[str, tuple[str, Callable[[Stand], Iterator[Row]]]]:
 
 
 def rows(stand: Stand, kind: str) -> Iterator[Row]:
-    """One attack."""
+    """One attack, tried again while it is slow and the machine busy."""
+    for _ in range(TRIES):
+        row, late = _tried(stand, kind)
+        if not row.verdict.startswith("slow") or late < BUSY:
+            break
+    yield row
+
+
+def _tried(stand: Stand, kind: str) -> tuple[Row, float]:
+    """And by how much a thread that only sleeps was late, s at p99."""
     assert stand.http is not None
     assert stand.child is not None
     scene = _scenes.get(stand.child.pid) or _scenes.setdefault(stand.child.pid, _made(stand))
@@ -102,27 +116,32 @@ def rows(stand: Stand, kind: str) -> Iterator[Row]:
     before, load = _memory(stand), os.getloadavg()[0]
     words = [sys.executable, "-m", "tests.drill.attacker", kind, url, scene.token, scene.run, scene.long, str(SECONDS)]
     attacker = subprocess.Popen(words, stdout=subprocess.PIPE, cwd=Path(__file__).parents[2])
-    grown = _Growth(stand, before)
+    grown, machine = _Growth(stand, before), _Machine()
     during = _asked(scene.people, SECONDS + 1.0)
     said = {int(status): n for status, n in json.loads(attacker.communicate(timeout=120.0)[0]).items()}
-    p99, worst = during.took[int(0.99 * (len(during.took) - 1))], during.took[-1]
+    worst, late = during.took[-1], machine.end()
     happened = (
-        f"GET p99 {p99 * 1e3:.0f} ms, worst {worst * 1e3:.0f} ms of {len(during.took)} "
-        f"(alone p99 {quiet.took[int(0.99 * (len(quiet.took) - 1))] * 1e3:.0f} ms); answers "
-        f"{' '.join(f'{status}: {n}' for status, n in said.items())}; {grown.end() / 1e6:+.0f} MB; load {load:.0f}"
+        f"GET p99 {p99(during.took) * 1e3:.0f} ms, worst {worst * 1e3:.0f} ms of {len(during.took)} (alone p99 "
+        f"{p99(quiet.took) * 1e3:.0f} ms, a sleeper is {late * 1e3:.0f} ms late, load {load:.0f}); answers "
+        f"{' '.join(f'{status}: {n}' for status, n in said.items())}; {grown.end() / 1e6:+.0f} MB"
     )
-    yield Row(f"beside others: {kind}", "crowd", happened, worst, _verdict(during, said, grown.most))
+    return Row(f"beside others: {kind}", "crowd", happened, worst, _verdict(during, said, grown.most)), late
+
+
+def p99(times: Sequence[float]) -> float:
+    """Of the shortest first."""
+    return times[int(0.99 * (len(times) - 1))]
 
 
 def _verdict(during: Person, said: dict[int, int], grown: int) -> str:
-    p99, worst = during.took[int(0.99 * (len(during.took) - 1))], during.took[-1]
+    most, worst = p99(during.took), during.took[-1]
     if during.wrong:
         return f"others refused: {len(during.wrong)} times, {during.wrong[0]}"
     if odd := [status for status in said if status not in SAID and status != 0]:
         return f"lie: the attacker is answered {odd[0]}"
     if grown > GROWTH:
         return f"grown: by {grown >> 20} MiB"
-    return f"slow: p99 {p99:.2f} s, worst {worst:.2f} s" if p99 > P99 or worst > WORST else TRUE
+    return f"slow: p99 {most:.2f} s, worst {worst:.2f} s" if most > P99 or worst > WORST else TRUE
 
 
 def _asked(people: tuple[Person, Person], seconds: float) -> Person:
@@ -137,6 +156,28 @@ def _asked(people: tuple[Person, Person], seconds: float) -> Person:
         one.join()
     took = sorted(time for person in people for time in person.took)
     return Person(people[0].http, (), took, [word for person in people for word in person.wrong])
+
+
+class _Machine:
+    """How late a thread is that only sleeps."""
+
+    def __init__(self) -> None:
+        self._late: list[float] = []
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._sleep)
+        self._thread.start()
+
+    def _sleep(self) -> None:
+        while not self._over.is_set():
+            began = time.monotonic()
+            time.sleep(PAUSE)
+            self._late.append(time.monotonic() - began - PAUSE)
+
+    def end(self) -> float:
+        """s at p99."""
+        self._over.set()
+        self._thread.join()
+        return p99(sorted(self._late))
 
 
 class _Growth:

@@ -18,8 +18,9 @@ from starlette.testclient import TestClient
 from conoid.cases.reference import json_schema
 from conoid.server import shapes
 from conoid.server.app import ROUTERS, build_app, opened
+from conoid.server.connections import BODY
 from conoid.server.errors import ServiceError
-from conoid.server.limits import BODY, read_body
+from conoid.server.limits import read_body
 from conoid.server.settings import Caps, Settings
 from conoid.server.tokens import check_token, create_token
 
