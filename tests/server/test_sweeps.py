@@ -46,7 +46,7 @@ def test_a_sweep_ends_in_a_table(server: Running) -> None:
     assert {(line["state"], line["steps"]) for line in lines} == {("succeeded", "3")}
     assert [one["id"] for one in server.ann.http.get("/v1/sweeps").json()["sweeps"]] == [sweep["id"]]
     assert server.bob.http.get(sweep["url"]).status_code == 404
-    assert server.bob.http.get("/v1/sweeps").json() == {"sweeps": []}
+    assert server.bob.http.get("/v1/sweeps").json() == {"sweeps": [], "next": None}
 
 
 def test_one_key_is_one_sweep(server: Running) -> None:
@@ -173,7 +173,7 @@ def test_a_sweep_for_which_there_is_no_room_makes_no_run(narrow: User, tmp_path:
         said = handed_in(narrow, wish(), "k", 429)
         assert "1 of your runs have not ended, and the sweep has 4; this server allows 4" in said["detail"]
     assert [run["id"] for run in narrow.http.get("/v1/runs").json()["runs"]] == [first]
-    assert narrow.http.get("/v1/sweeps").json() == {"sweeps": []}
+    assert narrow.http.get("/v1/sweeps").json() == {"sweeps": [], "next": None}
     (tmp_path / "go").touch()
     narrow.wait_for(first)
     assert len(handed_in(narrow, wish(), "k")["points"]) == len(ENDS)
@@ -200,7 +200,7 @@ def test_a_sweep_that_is_refused_in_the_middle_leaves_nothing_that_runs(
     monkeypatch.undo()
     runs = server.ann.http.get("/v1/runs").json()["runs"]
     assert [run["state"] for run in runs] == ["cancelled"] * 2
-    assert server.ann.http.get("/v1/sweeps").json() == {"sweeps": []}
+    assert server.ann.http.get("/v1/sweeps").json() == {"sweeps": [], "next": None}
     assert not list((server.service.settings.runs / "sweeps").glob("*.json"))
     made = handed_in(server.ann, wish(), "k")
     assert len(made["points"]) == len(ENDS)
