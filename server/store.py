@@ -18,63 +18,11 @@ from conoid.cases.run import Cause, State
 
 from .events import Run
 from .settings import StartError
+from .tables import BONDS, KEYS, LABELS, META, RUNS, TOKENS
 from .usage import Took
 
-_meta = sa.MetaData()
-_runs = sa.Table(
-    "runs",
-    _meta,
-    sa.Column("id", sa.String(22), primary_key=True),
-    sa.Column("owner", sa.String(64), nullable=False),
-    sa.Column("name", sa.String(64), nullable=False),
-    sa.Column("ranks", sa.Integer, nullable=False),
-    sa.Column("submitted", sa.Float(53), nullable=False),
-    sa.Column("state", sa.String(16), nullable=False),
-    sa.Column("cause", sa.String(16)),
-    sa.Column("message", sa.Text, nullable=False),
-    sa.Column("started", sa.Float(53), nullable=False),
-    sa.Column("finished", sa.Float(53), nullable=False),
-    sa.Column("stopping_for", sa.String(16)),
-    sa.Index("runs_of_owner", "owner", "id"),
-    sa.Index("runs_by_state", "state"),
-)
-_keys = sa.Table(
-    "idempotency",
-    _meta,
-    sa.Column("owner", sa.String(64), nullable=False),
-    sa.Column("key", sa.String(255), nullable=False),
-    sa.Column("run", sa.String(22), nullable=False),
-    sa.UniqueConstraint("owner", "key"),
-)
-_labels = sa.Table(
-    "labels",
-    _meta,
-    sa.Column("run", sa.String(22), nullable=False),
-    sa.Column("name", sa.String(63), nullable=False),
-    sa.Column("owner", sa.String(64), nullable=False),
-    sa.Column("value", sa.String(200), nullable=False),
-    sa.PrimaryKeyConstraint("run", "name"),
-    sa.Index("runs_of_label", "owner", "name", "value", "run"),
-)
-_bonds = sa.Table(
-    "bond",
-    _meta,
-    sa.Column("number", sa.Integer, primary_key=True),
-    sa.Column("server", sa.String(64), nullable=False),
-    sa.Column("place", sa.Text, nullable=False),
-)
 _ONLY = 1
 """The number of the one bond that there may be."""
-_tokens = sa.Table(
-    "tokens",
-    _meta,
-    sa.Column("id", sa.String(16), primary_key=True),
-    sa.Column("owner", sa.String(64), nullable=False),
-    sa.Column("sha256", sa.String(64), nullable=False),
-    sa.Column("scopes", sa.String(64), nullable=False),
-    sa.Column("created", sa.Float(53), nullable=False),
-    sa.Column("revoked", sa.Boolean, nullable=False),
-)
 _BUSY = 2000
 """ms that SQLite waits for another process to let go. Chosen: longer than any transaction of this server takes, shorter
 than what a caller waits for."""
@@ -113,9 +61,9 @@ class Store:
         """Opens the database and makes its tables where they are missing. Raises StoreError."""
         try:
             self._engine = _engine(url)
-            self.unlabelled = not sa.inspect(self._engine).has_table(_labels.name)
+            self.unlabelled = not sa.inspect(self._engine).has_table(LABELS.name)
             """Whether the labels of all runs are to be read from their folders: the database is new, or an old one."""
-            _meta.create_all(self._engine)
+            META.create_all(self._engine)
             self._file = _identity(self._engine)
         except (SQLAlchemyError, ImportError) as error:
             failure = StoreError(f"the database cannot be opened: {str(error).splitlines()[0]}")
@@ -143,29 +91,29 @@ class Store:
     def bond(self) -> "Bond | None":
         """To which server and folder of runs the database belongs; None where it is new."""
         with self._engine.connect() as connection:
-            row = connection.execute(sa.select(_bonds.c.server, _bonds.c.place)).first()
+            row = connection.execute(sa.select(BONDS.c.server, BONDS.c.place)).first()
         return None if row is None else Bond(row[0], row[1])
 
     def bind(self, bond: "Bond") -> None:
         """The first bond; where another server has been faster, its bond stays."""
         with suppress(sa.exc.IntegrityError), self._engine.begin() as connection:
-            connection.execute(sa.insert(_bonds).values(number=_ONLY, server=bond.server, place=bond.place))
+            connection.execute(sa.insert(BONDS).values(number=_ONLY, server=bond.server, place=bond.place))
 
     def rebind(self, bond: "Bond") -> None:
         """Another bond in the place of the one that there is."""
         with self._engine.begin() as connection:
-            connection.execute(sa.delete(_bonds))
-            connection.execute(sa.insert(_bonds).values(number=_ONLY, server=bond.server, place=bond.place))
+            connection.execute(sa.delete(BONDS))
+            connection.execute(sa.insert(BONDS).values(number=_ONLY, server=bond.server, place=bond.place))
 
     # Runs -------------------------------------------------------------------------------------------------------------
 
     def add(self, run: Run, key: str | None, labels: Mapping[str, str] | None = None) -> None:
         """A run, its labels, and the idempotency key that made it; adding it again changes its state and labels."""
-        known = sa.select(_keys.c.run).where(_keys.c.owner == run.owner, _keys.c.key == key)
+        known = sa.select(KEYS.c.run).where(KEYS.c.owner == run.owner, KEYS.c.key == key)
         with self._engine.begin() as connection:
             self._put(connection, run)
             if key is not None and connection.execute(known).first() is None:
-                connection.execute(sa.insert(_keys).values(owner=run.owner, key=key, run=run.id))
+                connection.execute(sa.insert(KEYS).values(owner=run.owner, key=key, run=run.id))
             self._label(connection, run, labels or {})
 
     def relabel(self, run: Run, labels: Mapping[str, str]) -> None:
@@ -175,17 +123,17 @@ class Store:
 
     @staticmethod
     def _label(connection: sa.Connection, run: Run, labels: Mapping[str, str]) -> None:
-        connection.execute(sa.delete(_labels).where(_labels.c.run == run.id))
+        connection.execute(sa.delete(LABELS).where(LABELS.c.run == run.id))
         if labels:
             rows = [{"run": run.id, "name": name, "owner": run.owner, "value": labels[name]} for name in labels]
-            connection.execute(sa.insert(_labels), rows)
+            connection.execute(sa.insert(LABELS), rows)
 
     def labels(self, run_ids: Sequence[str]) -> dict[str, dict[str, str]]:
         """The labels of some runs, by their ids."""
         found: dict[str, dict[str, str]] = {run_id: {} for run_id in run_ids}
         with self._engine.connect() as connection:
             for some in _parts(run_ids):
-                rows = connection.execute(sa.select(_labels).where(_labels.c.run.in_(some)))
+                rows = connection.execute(sa.select(LABELS).where(LABELS.c.run.in_(some)))
                 for run_id, name, _, value in rows:
                     found[run_id][name] = value
         return found
@@ -198,24 +146,24 @@ class Store:
     @staticmethod
     def _put(connection: sa.Connection, run: Run) -> None:
         values = {name: str(value) if isinstance(value, StrEnum) else value for name, value in asdict(run).items()}
-        if connection.execute(sa.update(_runs).where(_runs.c.id == run.id).values(values)).rowcount == 0:
-            connection.execute(sa.insert(_runs).values(values))
+        if connection.execute(sa.update(RUNS).where(RUNS.c.id == run.id).values(values)).rowcount == 0:
+            connection.execute(sa.insert(RUNS).values(values))
 
     def all(self) -> list[Run]:
         """Every run of every owner."""
         with self._engine.connect() as connection:
-            return [_run(row) for row in connection.execute(sa.select(_runs)).mappings()]
+            return [_run(row) for row in connection.execute(sa.select(RUNS)).mappings()]
 
     def get(self, run_id: str) -> Run | None:
         """The run, whoever owns it."""
         with self._engine.connect() as connection:
-            row = connection.execute(sa.select(_runs).where(_runs.c.id == run_id)).mappings().first()
+            row = connection.execute(sa.select(RUNS).where(RUNS.c.id == run_id)).mappings().first()
         return None if row is None else _run(row)
 
     def some(self, run_ids: Sequence[str]) -> dict[str, Run]:
         """Those of the runs that are known, whoever owns them, by their ids."""
         with self._engine.connect() as connection:
-            rows = (connection.execute(sa.select(_runs).where(_runs.c.id.in_(some))) for some in _parts(run_ids))
+            rows = (connection.execute(sa.select(RUNS).where(RUNS.c.id.in_(some))) for some in _parts(run_ids))
             return {row["id"]: _run(row) for found in rows for row in found.mappings()}
 
     def page(
@@ -225,50 +173,50 @@ class Store:
         """At most ``limit`` runs of ``owner``, newest first, older than the run ``before``; all states when none; those
         that have all ``labels``.
         """
-        query = sa.select(_runs).where(_runs.c.owner == owner).order_by(_runs.c.id.desc()).limit(limit)
+        query = sa.select(RUNS).where(RUNS.c.owner == owner).order_by(RUNS.c.id.desc()).limit(limit)
         if states:
-            query = query.where(_runs.c.state.in_([state.value for state in states]))
+            query = query.where(RUNS.c.state.in_([state.value for state in states]))
         if before is not None:
-            query = query.where(_runs.c.id < before)
+            query = query.where(RUNS.c.id < before)
         for name, value in (labels or {}).items():
-            same = (_labels.c.owner == owner, _labels.c.name == name, _labels.c.value == value)
-            query = query.where(_runs.c.id.in_(sa.select(_labels.c.run).where(*same)))
+            same = (LABELS.c.owner == owner, LABELS.c.name == name, LABELS.c.value == value)
+            query = query.where(RUNS.c.id.in_(sa.select(LABELS.c.run).where(*same)))
         with self._engine.connect() as connection:
             return [_run(row) for row in connection.execute(query).mappings()]
 
     def open_runs(self, owner: str) -> int:
         """How many runs of ``owner`` have not ended."""
-        query = sa.select(sa.func.count()).select_from(_runs).where(_runs.c.owner == owner, _runs.c.state.in_(_OPEN))
+        query = sa.select(sa.func.count()).select_from(RUNS).where(RUNS.c.owner == owner, RUNS.c.state.in_(_OPEN))
         with self._engine.connect() as connection:
             return connection.execute(query).scalar_one()
 
     def ended(self) -> set[str]:
         """The ids of all runs that are known to have ended."""
         with self._engine.connect() as connection:
-            return set(connection.execute(sa.select(_runs.c.id).where(_runs.c.state.not_in(_OPEN))).scalars())
+            return set(connection.execute(sa.select(RUNS.c.id).where(RUNS.c.state.not_in(_OPEN))).scalars())
 
     def open(self) -> dict[str, Run]:
         """All runs that are not known to have ended, by id."""
-        query = sa.select(_runs).where(_runs.c.state.in_(_OPEN))
+        query = sa.select(RUNS).where(RUNS.c.state.in_(_OPEN))
         with self._engine.connect() as connection:
             return {row["id"]: _run(row) for row in connection.execute(query).mappings()}
 
     def taken(self) -> list[Took]:
         """What every run that has ended took."""
-        query = sa.select(_runs.c.owner, _runs.c.ranks, _runs.c.started, _runs.c.finished)
-        ended = query.where(_runs.c.state.not_in(_OPEN), _runs.c.started > 0.0)
+        query = sa.select(RUNS.c.owner, RUNS.c.ranks, RUNS.c.started, RUNS.c.finished)
+        ended = query.where(RUNS.c.state.not_in(_OPEN), RUNS.c.started > 0.0)
         with self._engine.connect() as connection:
             return [Took(*row) for row in connection.execute(ended)]
 
     def count_by_state(self) -> Mapping[State, int]:
         """How many runs are in each state; no entry for none."""
-        query = sa.select(_runs.c.state, sa.func.count()).group_by(_runs.c.state)
+        query = sa.select(RUNS.c.state, sa.func.count()).group_by(RUNS.c.state)
         with self._engine.connect() as connection:
             return {State(state): number for state, number in connection.execute(query).all()}
 
     def run_of_key(self, owner: str, key: str) -> str | None:
         """The run that ``owner`` made with this idempotency key."""
-        query = sa.select(_keys.c.run).where(_keys.c.owner == owner, _keys.c.key == key)
+        query = sa.select(KEYS.c.run).where(KEYS.c.owner == owner, KEYS.c.key == key)
         with self._engine.connect() as connection:
             return connection.execute(query).scalar_one_or_none()
 
@@ -278,24 +226,24 @@ class Store:
         """A new token."""
         values = {**asdict(token), "scopes": " ".join(sorted(token.scopes)), "revoked": False}
         with self._engine.begin() as connection:
-            connection.execute(sa.insert(_tokens).values(values))
+            connection.execute(sa.insert(TOKENS).values(values))
 
     def token(self, token_id: str) -> Token | None:
         """The token, unless it was revoked."""
-        query = sa.select(_tokens).where(_tokens.c.id == token_id, _tokens.c.revoked.is_(False))
+        query = sa.select(TOKENS).where(TOKENS.c.id == token_id, TOKENS.c.revoked.is_(False))
         with self._engine.connect() as connection:
             row = connection.execute(query).mappings().first()
         return None if row is None else _token(row)
 
     def tokens(self) -> list[Token]:
         """Every token that is not revoked, oldest first."""
-        query = sa.select(_tokens).where(_tokens.c.revoked.is_(False)).order_by(_tokens.c.created, _tokens.c.id)
+        query = sa.select(TOKENS).where(TOKENS.c.revoked.is_(False)).order_by(TOKENS.c.created, TOKENS.c.id)
         with self._engine.connect() as connection:
             return [_token(row) for row in connection.execute(query).mappings()]
 
     def revoke(self, token_id: str) -> bool:
         """Ends a token for good; False when there is none to end."""
-        query = sa.update(_tokens).where(_tokens.c.id == token_id, _tokens.c.revoked.is_(False)).values(revoked=True)
+        query = sa.update(TOKENS).where(TOKENS.c.id == token_id, TOKENS.c.revoked.is_(False)).values(revoked=True)
         with self._engine.begin() as connection:
             return connection.execute(query).rowcount == 1
 

@@ -1,0 +1,57 @@
+"""The tables of the server's database, as SQLAlchemy has them; ``store`` reads and writes them."""
+
+import sqlalchemy as sa
+
+META = sa.MetaData()
+RUNS = sa.Table(
+    "runs",
+    META,
+    sa.Column("id", sa.String(22), primary_key=True),
+    sa.Column("owner", sa.String(64), nullable=False),
+    sa.Column("name", sa.String(64), nullable=False),
+    sa.Column("ranks", sa.Integer, nullable=False),
+    sa.Column("submitted", sa.Float(53), nullable=False),
+    sa.Column("state", sa.String(16), nullable=False),
+    sa.Column("cause", sa.String(16)),
+    sa.Column("message", sa.Text, nullable=False),
+    sa.Column("started", sa.Float(53), nullable=False),
+    sa.Column("finished", sa.Float(53), nullable=False),
+    sa.Column("stopping_for", sa.String(16)),
+    sa.Index("runs_of_owner", "owner", "id"),
+    sa.Index("runs_by_state", "state"),
+)
+KEYS = sa.Table(
+    "idempotency",
+    META,
+    sa.Column("owner", sa.String(64), nullable=False),
+    sa.Column("key", sa.String(255), nullable=False),
+    sa.Column("run", sa.String(22), nullable=False),
+    sa.UniqueConstraint("owner", "key"),
+)
+LABELS = sa.Table(
+    "labels",
+    META,
+    sa.Column("run", sa.String(22), nullable=False),
+    sa.Column("name", sa.String(63), nullable=False),
+    sa.Column("owner", sa.String(64), nullable=False),
+    sa.Column("value", sa.String(200), nullable=False),
+    sa.PrimaryKeyConstraint("run", "name"),
+    sa.Index("runs_of_label", "owner", "name", "value", "run"),
+)
+BONDS = sa.Table(
+    "bond",
+    META,
+    sa.Column("number", sa.Integer, primary_key=True),
+    sa.Column("server", sa.String(64), nullable=False),
+    sa.Column("place", sa.Text, nullable=False),
+)
+TOKENS = sa.Table(
+    "tokens",
+    META,
+    sa.Column("id", sa.String(16), primary_key=True),
+    sa.Column("owner", sa.String(64), nullable=False),
+    sa.Column("sha256", sa.String(64), nullable=False),
+    sa.Column("scopes", sa.String(64), nullable=False),
+    sa.Column("created", sa.Float(53), nullable=False),
+    sa.Column("revoked", sa.Boolean, nullable=False),
+)
