@@ -98,8 +98,9 @@ def groups() -> dict[str, tuple[str, Callable[[Stand], Iterator[Row]]]]:
 
 def rows(stand: Stand, kind: str) -> Iterator[Row]:
     """One attack, tried again while it is slow and the machine busy."""
-    for _ in range(TRIES):
+    for n in range(1, TRIES + 1):
         row, late = _tried(stand, kind)
+        row.happened += f"; try {n}" if n > 1 else ""
         if not row.verdict.startswith("slow") or late < BUSY:
             break
     yield row

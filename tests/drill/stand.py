@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import shutil
 import signal
 import subprocess
@@ -78,7 +79,7 @@ class Stand:
         address = self.runs / "server.json"
         with suppress(OSError):
             address.unlink()
-        worker = f"env -u LD_PRELOAD {sys.executable} {HERE / 'worker.py'} {self.book}"
+        worker = shlex.join(["env", "-u", "LD_PRELOAD", sys.executable, str(HERE / "worker.py"), str(self.book)])
         command = [
             *self.before, sys.executable, "-m", "tests.drill.server", str(self.order), "--runs", str(self.runs),
             "--port", "0", "--no-zenoh", "--worker", worker, "--slots", str(self.slots), "--grace", "1.5",
