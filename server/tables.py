@@ -3,6 +3,7 @@
 import sqlalchemy as sa
 
 META = sa.MetaData()
+"""Of all tables."""
 RUNS = sa.Table(
     "runs",
     META,
@@ -20,6 +21,7 @@ RUNS = sa.Table(
     sa.Index("runs_of_owner", "owner", "id"),
     sa.Index("runs_by_state", "state"),
 )
+"""Every run that the server has accepted, as it was last saved."""
 KEYS = sa.Table(
     "idempotency",
     META,
@@ -28,6 +30,7 @@ KEYS = sa.Table(
     sa.Column("run", sa.String(22), nullable=False),
     sa.UniqueConstraint("owner", "key"),
 )
+"""Which run an owner has made with which idempotency key."""
 LABELS = sa.Table(
     "labels",
     META,
@@ -38,6 +41,7 @@ LABELS = sa.Table(
     sa.PrimaryKeyConstraint("run", "name"),
     sa.Index("runs_of_label", "owner", "name", "value", "run"),
 )
+"""The labels of each run."""
 BONDS = sa.Table(
     "bond",
     META,
@@ -45,6 +49,7 @@ BONDS = sa.Table(
     sa.Column("server", sa.String(64), nullable=False),
     sa.Column("place", sa.Text, nullable=False),
 )
+"""To which server and folder of runs the database belongs: one line."""
 TOKENS = sa.Table(
     "tokens",
     META,
@@ -55,3 +60,4 @@ TOKENS = sa.Table(
     sa.Column("created", sa.Float(53), nullable=False),
     sa.Column("revoked", sa.Boolean, nullable=False),
 )
+"""Every token that was made, by its hash."""

@@ -145,7 +145,15 @@ def test_a_body_that_was_refused_is_not_read_to_its_end(ann: User) -> None:
 
 
 def test_an_answer_that_nobody_reads_is_cut_off(ann: User, monkeypatch: pytest.MonkeyPatch) -> None:
+    real, gone = Connection._look, threading.Event()
+
+    def look(self: Connection) -> None:
+        real(self)
+        if self.transport.is_closing():
+            gone.set()
+
     monkeypatch.setattr(connections, "READ", 0.3)
+    monkeypatch.setattr(Connection, "_look", look)
     run = ann.submit()
     ann.wait_for(run)
     (ann.runs / run / "large.bin").write_bytes(bytes(1 << 25))
@@ -153,7 +161,7 @@ def test_an_answer_that_nobody_reads_is_cut_off(ann: User, monkeypatch: pytest.M
     head = f"GET /v1/runs/{run}/files/large.bin HTTP/1.1\r\nHost: x\r\n"
     with socket.create_connection(place, timeout=PATIENCE) as one:
         one.sendall(f"{head}Authorization: {ann.http.headers['Authorization']}\r\n\r\n".encode())
-        time.sleep(2.0)
+        assert gone.wait(PATIENCE)
         received = 0
         with suppress(ConnectionError):
             while chunk := one.recv(1 << 20):
