@@ -394,7 +394,7 @@ def test_an_unknown_parameter_is_told_what_is_known(server: Running) -> None:
     told = refusal(server.ann.http.get("/v1/runs?stat=failed"), 400, "bad_parameter")
     assert (
         told["detail"]
-        == "stat: /v1/runs knows no such parameter; allowed: cursor, label, limit, state; did you mean 'state'?"
+        == "stat: /v1/runs knows no such parameter; allowed: cursor, label, limit, prefix, state; did you mean 'state'?"
     )
 
 
