@@ -6,6 +6,7 @@ VTK ends the process with a segmentation fault where it finds no way to draw off
 clear message.
 """
 
+import math
 import os
 import re
 import subprocess
@@ -211,6 +212,8 @@ def require_field(name: str) -> None:
         raise LookError(f"field = {name!r}: {allowed(name, FIELDS)}")
 
 
+_FARTHEST = 1e6
+"""m from the origin that a plane may lie. Chosen: VTK draws in single precision."""
 _NUMBER = r"[+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?\d+)?"
 _PLANE = re.compile(rf"\s*([xyz])\s*(?:=\s*({_NUMBER}))?\s*")
 _AXIS = re.compile(r"\s*([+-]?)([xyz])\s*")
@@ -227,7 +230,12 @@ def mirrors(text: str, scene: Scene, option: str = "mirror") -> tuple[Mirror, ..
     if None in planes:
         auto = "auto, none, or " if option == "mirror" else ""
         raise LookError(f"{option} = {text!r}: write {auto}planes such as x or x,y=0.002 (in m)")
-    return tuple(Mirror("xyz".index(plane[1]), float(plane[2] or 0.0)) for plane in planes if plane is not None)
+    found = tuple(Mirror("xyz".index(plane[1]), float(plane[2] or 0.0)) for plane in planes if plane is not None)
+    if not all(abs(plane.at) < _FARTHEST for plane in found):
+        raise LookError(f"{option} = {text!r}: a plane within {number(_FARTHEST)} m")
+    if option == "mirror" and len({plane.axis for plane in found}) < len(found):
+        raise LookError(f"{option} = {text!r}: one plane across each axis")
+    return found
 
 
 def direction(text: str, option: str) -> tuple[float, float, float] | None:
@@ -238,9 +246,12 @@ def direction(text: str, option: str) -> tuple[float, float, float] | None:
         sign = -1.0 if axis[1] == "-" else 1.0
         return sign * (axis[2] == "x"), sign * (axis[2] == "y"), sign * (axis[2] == "z")
     found = _DIRECTION.fullmatch(text)
-    if found is None or not any(float(each) for each in found.groups()):
+    parts = [float(each) for each in found.groups()] if found is not None else []
+    largest = max(map(abs, parts), default=0.0)
+    if not 0.0 < largest < math.inf:
         raise LookError(f"{option} = {text!r}: write an axis such as -x, or a direction such as 1,-1.5,0.6")
-    return float(found[1]), float(found[2]), float(found[3])
+    x, y, z = (each / largest for each in parts)
+    return x, y, z
 
 
 def render(picture: Picture) -> Drawn:

@@ -108,6 +108,8 @@ def _surface(mesh: Any, picture: Picture) -> Any:
     for plane in picture.sections:
         mesh = _cut(mesh, plane, float(towards[plane.axis]), bounds[plane.axis])
     surface = mesh.extract_surface(algorithm="dataset_surface")
+    if picture.mirrors:
+        surface = surface.triangulate()  # a section leaves faces of three to six corners
     for mirror in picture.mirrors:
         surface = _reflected(surface, mirror, length)
     return surface

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from .errors import ViewError
 from .pictures import Field, Look
 
 PALETTE = (
@@ -36,7 +37,10 @@ def ends(values: Sequence[Any], field: Field, look: Look) -> tuple[float, float,
     if look.limits is not None:
         return (*look.limits, _PARTS)
     every = np.concatenate([np.asarray(each, float).reshape(-1) for each in values])
-    low, high = (float(end) for end in np.percentile(every[np.isfinite(every)], look.percentiles))
+    known = every[np.isfinite(every)]
+    if not len(known):
+        raise ViewError(f"{field.label}: no value of these frames is a number")
+    low, high = (float(end) for end in np.percentile(known, look.percentiles))
     if field.kind == "centred":
         low, high = -max(abs(low), abs(high)), max(abs(low), abs(high))
     elif 0 < low < 0.1 * high:

@@ -305,3 +305,35 @@ def test_a_picture_for_which_the_disk_is_too_small_leaves_the_old_one(name: str,
 
 def test_what_a_failure_is_told_by() -> None:
     assert reason(OSError(28, "No space left on device"), "bar.gif") == "bar.gif: No space left on device"
+
+
+@pytest.mark.usefixtures("warm")
+@pytest.mark.parametrize(
+    ("mirror", "section"),
+    [("x", "y=0.002"), ("x,y", "z=0.01"), ("y", "x=0.001,z=0.01"), ("auto", "z=0.02"), ("z", "x=0.001,y=0.001")],
+)
+def test_a_body_is_cut_and_mirrored_at_once(mirror: str, section: str, folder: Path, tmp_path: Path) -> None:
+    """A section leaves faces of three to six corners."""
+    cut = view(folder, "mises", tmp_path / "a.png", size=(64, 64), section=section)
+    both = view(folder, "mises", tmp_path / "b.png", size=(64, 64), section=section, mirror=mirror)
+    assert both.faces > cut.faces
+    assert both.high == pytest.approx(cut.high)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"mirror": "x,x=0.001"}, {"mirror": "x", "section": "x=0.001"}, {"camera": "0,0,0"}, {"up": "1e999,0,0"},
+        {"section": "x=1e99"}, {"camera": "1e-999,0,0"},
+    ],
+)  # fmt: skip
+def test_what_cannot_be_seen_is_one_line(options: dict[str, Any], folder: Path, tmp_path: Path) -> None:
+    with pytest.raises(LookError) as told:
+        view(folder, "mises", tmp_path / "a.png", size=(64, 64), **options)
+    assert "\n" not in str(told.value)
+
+
+@pytest.mark.usefixtures("warm")
+def test_a_direction_of_any_length_is_one(folder: Path, tmp_path: Path) -> None:
+    for seen, up in (("1e-300,0,0", "0,0,1e300"), ("1e300,-1e300,1e300", "z")):
+        assert view(folder, "mises", tmp_path / "a.png", size=(64, 64), camera=seen, up=up).faces
