@@ -2,6 +2,7 @@
 
 import csv
 import io
+import re
 from collections import Counter
 from collections.abc import Sequence
 from typing import Annotated, Any
@@ -57,6 +58,15 @@ def show(service: ServiceOf, identity: Reader, sweep_id: str) -> dict[str, Any]:
     return _shown(service, _find(service, identity, sweep_id))
 
 
+_FORMULA = re.compile(r"[=@\t\r]|[+-](?!(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?( [^\W\d][\w*/^ -]*)?$)")
+"""The beginning of a text that a spreadsheet computes. A number with a sign, and perhaps a unit, is not one."""
+
+
+def cell(value: Any) -> Any:
+    """A value of a CSV table. A text that a spreadsheet would compute gets an apostrophe, which makes it a text."""
+    return f"'{value}" if isinstance(value, str) and _FORMULA.match(value) else value
+
+
 @router.get("/v1/sweeps/{sweep_id}/table")
 @blocking
 def table(service: ServiceOf, identity: Reader, sweep_id: str) -> Response:
@@ -65,9 +75,9 @@ def table(service: ServiceOf, identity: Reader, sweep_id: str) -> Response:
     lines = [_line(service, point, run) for point, run in _pairs(service, plan)]
     out = io.StringIO()
     columns = list(dict.fromkeys(name for line in lines for name in line))
-    writer = csv.DictWriter(out, columns, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(lines)
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(cell(name) for name in columns)
+    writer.writerows([cell(line.get(name, "")) for name in columns] for line in lines)
     return Response(out.getvalue(), media_type="text/csv; charset=utf-8")
 
 

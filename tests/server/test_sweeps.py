@@ -22,6 +22,7 @@ from conoid.cases.run import State
 from conoid.server import folder, limits, reader, view
 from conoid.server.app import build_app, opened
 from conoid.server.errors import ServiceError
+from conoid.server.routes.sweeps import cell
 from conoid.server.settings import Caps, Settings
 from conoid.server.submission import Desk
 from conoid.server.sweeps import Sweeps
@@ -303,3 +304,13 @@ def test_nobody_who_hands_in_a_run_waits_for_sweeps(settings: Settings, monkeypa
                 thread.join()
         assert told == {"ann /v1/runs": 202, "ann /v1/sweeps": 202, "bob /v1/sweeps": 202}
         service.supervisor.end_all()
+
+
+@pytest.mark.parametrize("text", ["=1+1", "@SUM(A1)", "+cmd|' /C calc'!A0", "-2+3+cmd|x", "\t=1", "\r=1", "- 1", "+-1"])
+def test_a_text_that_a_spreadsheet_would_compute_is_marked_as_text(text: str) -> None:
+    assert cell(text) == f"'{text}"
+
+
+@pytest.mark.parametrize("value", ["-1", "+1.5e-3", "-210 m/s", "-.5 kg/m^3", "-1e6 Pa", "steel", "", 3, -2.5, None])
+def test_numbers_and_names_stand_in_a_table_as_they_are(value: object) -> None:
+    assert cell(value) == value
