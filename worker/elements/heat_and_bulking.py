@@ -8,14 +8,14 @@ import numpy as np
 
 from ..jit import njit
 from ..materials.law import BULK, DENSITY
-from ..state import BULKING, CHUNK, CORNERS, MASS, TOLD, UNTOLD, WORK, WORK_AVERAGED, WORK_VISCOUS
+from ..state import BULKING, CHUNK, CORNERS, HEAT, MASS, TOLD, UNTOLD, WORK, WORK_AVERAGED, WORK_VISCOUS
 from .pressure import QUANTA
 from .tet4 import CORNER_CHANGE, VOLUME_MID
 
 _WORK, _WORK_VISCOUS, _TAKEN = WORK * CHUNK, WORK_VISCOUS * CHUNK, WORK_AVERAGED * CHUNK
-_MASS, _TOLD = MASS * CHUNK, TOLD * CHUNK
+_MASS, _HEAT, _TOLD = MASS * CHUNK, HEAT * CHUNK, TOLD * CHUNK
 _BULKING, _UNTOLD, _CORNERS = BULKING * CHUNK, UNTOLD * CHUNK, CORNERS * CHUNK
-_HEATED = TOLD + 1
+HEATED = TOLD + 1
 """Rows of a tet with heat; one with bulking has more."""
 
 
@@ -74,10 +74,17 @@ def scatter_bulking(sums, w, s, params, weight, tets, n):  # type: ignore[no-unt
 )
 def scatter_more(sums, w, s, params, weight, tets, rows, n):  # type: ignore[no-untyped-def]
     """Heat, or bulking: what a tet with so many ``rows`` has."""
-    if rows == _HEATED:
+    if rows == HEATED:
         scatter_heat(sums, w, s, params, weight, tets, n)
     else:
         scatter_bulking(sums, w, s, params, weight, tets, n)
+
+
+@njit("void(float64[::1], float64[::1], uint32[:, ::1], int64)", cache=True)
+def gather_heat(s, heat, tets, n):  # type: ignore[no-untyped-def]
+    """HEAT: what the pressure of each tet sees grows by the mean of the four nodes."""
+    for i in range(n):
+        s[_HEAT + i] += 0.25 * ((heat[tets[i, 0]] + heat[tets[i, 1]]) + (heat[tets[i, 2]] + heat[tets[i, 3]]))
 
 
 @njit("void(float64[::1], float64[::1], float64[::1], uint32[:, ::1], boolean[::1], int64)", cache=True)

@@ -19,7 +19,7 @@ from . import matter as matter_of
 from . import pressure as averaged
 from .barrier import resist
 from .flat import keep_out, press_alone, see_own
-from .heat_and_bulking import gather_corners, scatter_more
+from .heat_and_bulking import HEATED, gather_corners, gather_heat, scatter_more
 from .mean import book_averaged, keep_before
 from .records import BODY, LARGEST_LIMIT, LIMITING_TET, MARKS, MEANS, MOTION, SCRATCH
 from .wear import any_inside_out, let_go
@@ -177,7 +177,10 @@ def force_pass(motion, body, marks, scratch, means, begin, end, dt, scale):  # t
             strengthen(strength, w, s, params, n, dt)
         averaged.gather_strains(w, strain, t, n)
         if more and kind == matter_of.TETS:
-            gather_corners(w, s, params, told, t, strain, flat, n)
+            if rows == HEATED:
+                gather_heat(s, told, t, n)
+            else:
+                gather_corners(w, s, params, told, t, strain, flat, n)
         if shape:
             averaged.recall_growth(w, s, n, dt)
             if dt <= 0.0:
