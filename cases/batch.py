@@ -224,16 +224,17 @@ def sbatch_words(job: Job, profile: Profile, folder: Path) -> list[str]:
     """The arguments of sbatch. TERM reaches the script alone ``notice`` before the limit; the script's program tells
     the ranks.
     """
-    return _words(job, profile, folder, folder / layout.LOGS / layout.LAUNCHER_LOG)
+    return _words(job, profile, folder, f"{layout.LOGS}/{layout.LAUNCHER_LOG}")
 
 
 def array_words(job: Job, profile: Profile, tasks: Iterable[int]) -> list[str]:
     """The arguments of sbatch for some tasks of an array, of which ``job`` is one."""
     folder = Path(job.array)
-    return [f"--array={','.join(map(str, tasks))}", *_words(job, profile, folder, folder / "%a.log")]
+    return [f"--array={','.join(map(str, tasks))}", *_words(job, profile, folder, "%a.log")]
 
 
-def _words(job: Job, profile: Profile, folder: Path, log: Path) -> list[str]:
+def _words(job: Job, profile: Profile, folder: Path, log: str) -> list[str]:
+    """``log`` below ``folder``: Slurm replaces what follows a percent sign in it, and the folder may have one."""
     words = [
         "--parsable", f"--job-name={job.name}", f"--ntasks={job.ranks}", f"--chdir={folder}", f"--output={log}",
         "--open-mode=append", "--requeue", "--export=ALL", f"--signal=B:TERM@{job.notice:.0f}",

@@ -1,14 +1,17 @@
 """Slurm by its commands, with output for machines: hand a job over once, look at the queue, end jobs.
 
-A command that fails says one of two things: RefusedError, the controller has read the request and will not have it;
-or AwayError, nobody knows. After that a job may be there all the same, so it is looked for before it is handed over
-again. The controller writes a new job to disk some seconds after it has said yes, and a crash in between forgets it.
+A command that fails says one of three things: RefusedError, the controller has read the request and will not have it;
+LaterError, it will not have it now; or AwayError, nobody knows. After that a job may be there all the same, so it is
+looked for before it is handed over again. The controller writes a new job to disk some seconds after it has said yes,
+and a crash in between forgets it.
 """
 
 import fcntl
 import os
+import re
 import subprocess
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Mapping, Sequence, Set
 from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
@@ -25,13 +28,26 @@ FINAL = frozenset(
      "TIMEOUT"}
 )  # fmt: skip
 """States of squeue(1); in all others a job has its cores."""
-_LONGEST = 30.0
-"""s that a command may take. Chosen: three times Slurm's own MessageTimeout."""
+_LONGEST = {"squeue": 30.0, "sbatch": 30.0, "scancel": 15.0, "scontrol": 15.0, "sacct": 10.0}
+"""s that a command may take. Chosen: one to three times Slurm's own MessageTimeout."""
+_RESTS = 20.0
+"""s for which a command that took longer is not tried again, so that it holds up nobody else. Chosen."""
+_ONE_BY_ONE = 200
+"""Names that squeue is asked for at once. Chosen: 10 kB of its command line."""
 _REFUSALS = (
     "invalid", "not permitted", "unspecified", "violates", "not available", "unrecognized", "denied", "more processors",
     "not supported", "exceeds", "disabled", "limit", "unknown", "ambiguous", "too ",
 )  # fmt: skip
-"""Words of sbatch's refusals. What is none of these (a connection, a socket, munge) may be over in a minute."""
+"""Words of sbatch's refusals, in its last line. What is none of these (a connection, a socket, munge) may be over in a
+minute."""
+_PASSING = (
+    "submit limit", "submitjob", "not available now", "inactive", "is down", "drain", "temporarily", "try again",
+    "standby", "maintenance", "i/o error writing", "maxjobs", "grpjobs", "perusers", "peruser", "peraccount",
+)  # fmt: skip
+"""Words of refusals that pass, anywhere in what sbatch says: limits by what else is in the queue, a partition that is
+not up (slurm_errno.c; reasons of squeue(1))."""
+_LASTING = ("perjob", "wall", "minc", "mintres", "pernode", "perminute")
+"""Words, in what sbatch says, of limits that this job will never keep."""
 _PASSED_ON = (
     "PATH", "HOME", "USER", "LOGNAME", "SHELL", "LANG", "SLURM_CONF", "CONOID_CACHE_DIR", "MODULEPATH", "MODULESHOME",
     "LD_LIBRARY_PATH", "BASH_ENV", "MPI4PY_LIBMPI", "MPI4PY_MPIABI", "PYTHONPATH",
@@ -39,12 +55,22 @@ _PASSED_ON = (
 """Variables that a job inherits from who hands it over. No token, database or default for sbatch is among them."""
 
 
+_NUMBER = re.compile(r"\d+(_\d+|_\[[^|]*\])?(\+\d+)?")
+"""Of a job, of a task of an array, of tasks that wait, of a part of a job of several."""
+
+
 class SlurmError(Exception):
     """A command of Slurm failed; the text is one line."""
 
 
 class AwayError(SlurmError):
-    """The controller was not reached, or not in time: nobody knows."""
+    """The controller was not reached, or not in time: nobody knows. ``command``: which one did not answer."""
+
+    command = ""
+
+
+class LaterError(SlurmError):
+    """The controller will not do it now: a limit of user, account or QOS is reached, or a partition is down."""
 
 
 class RefusedError(SlurmError):
@@ -71,23 +97,45 @@ class Entry(NamedTuple):
 def call(place: str, words: Sequence[str], keep: int | None = None) -> str:
     """What a command of Slurm prints. ``place``: its folder, or empty; ``keep``: a file that it holds open.
 
-    Raises AwayError, or RefusedError with the last line that it said.
+    Raises AwayError, or LaterError or RefusedError with what it said.
     """
-    path = str(Path(place) / words[0]) if place else words[0]
+    path, longest = str(Path(place) / words[0]) if place else words[0], _LONGEST[words[0]]
+    if _hung.get(path, 0.0) > time.monotonic():
+        raise _away(words[0], f"{words[0]} has not answered within {longest:g} s, and is tried again soon")
     try:
         done = subprocess.run(
             [path, *words[1:]], stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace",
-            timeout=_LONGEST, check=False, env=environment(os.environ), pass_fds=() if keep is None else (keep,),
+            timeout=longest, check=False, env=environment(os.environ), pass_fds=() if keep is None else (keep,),
         )  # fmt: skip
     except subprocess.TimeoutExpired:
-        raise AwayError(f"{words[0]} has not answered within {_LONGEST:g} s") from None
+        if words[0] != "squeue":
+            _hung[path] = time.monotonic() + _RESTS
+        raise _away(words[0], f"{words[0]} has not answered within {longest:g} s") from None
     except OSError as error:
-        raise AwayError(f"{path}: {error.strerror}") from None
+        raise _away(words[0], f"{path}: {error.strerror}") from None
     if done.returncode == 0:
         return done.stdout
-    said = done.stderr.strip().splitlines() or [f"{words[0]} ended with code {done.returncode}"]
-    refused = any(word in said[-1].lower() for word in _REFUSALS)
-    raise (RefusedError if refused else AwayError)(said[-1][:300])
+    raise _failure(words[0], done.stderr.strip().splitlines() or [f"{words[0]} ended with code {done.returncode}"])
+
+
+_hung: dict[str, float] = {}
+"""Until when, by the clock that nobody sets, a command is not tried again."""
+
+
+def _away(command: str, why: str) -> AwayError:
+    error = AwayError(why)
+    error.command = command
+    return error
+
+
+def _failure(command: str, said: Sequence[str]) -> SlurmError:
+    """What a command means that has failed. sbatch names the limit in a line of its own, before the last one."""
+    text, last = " ".join(said).lower(), said[-1][:300]
+    named = said[-2].rpartition(": ")[2] if len(said) > 1 else ""
+    told = f"{last} ({named[:100]})" if named and " " not in named else last
+    if command == "sbatch" and any(word in text for word in _PASSING) and not any(word in text for word in _LASTING):
+        return LaterError(told)
+    return RefusedError(told) if any(word in last.lower() for word in _REFUSALS) else _away(command, last)
 
 
 def environment(base: Mapping[str, str]) -> dict[str, str]:
@@ -96,21 +144,37 @@ def environment(base: Mapping[str, str]) -> dict[str, str]:
     return {**kept, "SLURM_TIME_FORMAT": "%s"}
 
 
-def jobs(place: str, name: str = "") -> list[Entry]:
-    """This user's jobs that Slurm remembers, of one name or all. Raises AwayError, RefusedError."""
+def jobs(place: str, *names: str) -> list[Entry]:
+    """This user's jobs that Slurm remembers, of these names or all: other jobs may have names that break a list.
+
+    Raises AwayError, RefusedError.
+    """
+    found: list[Entry] = []
     words = ["squeue", "--noheader", "--array", "--states=all", f"--user={os.getuid()}", "--format=%i|%T|%S|%j|%r"]
-    told = call(place, [*words, *([f"--name={name}"] if name else [])])
-    if told and not told.endswith("\n"):
-        raise AwayError("squeue has broken off in the middle of its list")
-    return [_entry(line) for line in told.splitlines()]
+    for begin in range(0, max(1, len(names)), _ONE_BY_ONE):
+        some = names[begin : begin + _ONE_BY_ONE]
+        told = call(place, [*words, *([f"--name={','.join(some)}"] if some else [])])
+        if told and not told.endswith("\n"):
+            raise _away("squeue", "squeue has broken off in the middle of its list")
+        found += _entries(told.split("\n")[:-1], set(some))
+    return found
 
 
-def _entry(line: str) -> Entry:
-    """What is no line of a list makes the whole no list: a job that is not on it may be there all the same."""
-    row = line.strip().split("|", 4)
-    if len(row) != 5 or not row[0][:1].isdigit() or not row[1].isupper():
-        raise AwayError(f"squeue has answered what is no list: {line.strip()[:60]!r}")
-    return Entry(row[0], row[1], _time(row[2]), _key(row[0], row[3]), row[4])
+def _entries(lines: Sequence[str], names: Set[str]) -> list[Entry]:
+    """What is no line of a list makes the whole no list: a job that is not on it may be there all the same. A line that
+    another job's name has broken is none of these jobs; what follows it belongs to it.
+    """
+    found, broken = [], False
+    for line in lines:
+        row = line.strip().split("|", 4)
+        head = len(row) >= 4 and _NUMBER.fullmatch(row[0]) is not None and row[1].isupper()
+        own = head and len(row) == 5 and (row[3] in names or not names)
+        if own:
+            found.append(Entry(row[0], row[1], _time(row[2]), _key(row[0], row[3]), row[4]))
+        elif not head and not broken:
+            raise _away("squeue", f"squeue has answered what is no list: {line.strip()[:60]!r}")
+        broken = not own if head else broken
+    return found
 
 
 def _key(job: str, name: str) -> str:
@@ -127,18 +191,28 @@ def _time(text: str) -> float:
 
 
 def details(place: str, job: str) -> dict[str, str]:
-    """Everything that the controller knows of a job. Raises AwayError, RefusedError when it knows none."""
+    """Everything that the controller knows of a job; of a word that comes twice, the first: paths and comments come
+    last. Raises AwayError, RefusedError when it knows none.
+    """
     told = call(place, ["scontrol", "show", "job", "--oneliner", job])
-    pairs = (word.partition("=") for word in told.split())
-    return {name: value for name, equals, value in pairs if equals}
+    found: dict[str, str] = {}
+    for name, equals, value in (word.partition("=") for word in told.split()):
+        if equals:
+            found.setdefault(name, value)
+    return found
 
 
 def accounting(place: str, job: str) -> dict[str, str]:
-    """What a job that has ended took: from the controller, and from the accounting database where there is one."""
+    """What a job that has ended took, as the controller has it."""
     wanted = ("JobState", "ExitCode", "RunTime", "StartTime", "EndTime", "NodeList", "Restarts")
-    found: dict[str, str] = {}
     with suppress(SlurmError):
-        found = {name: value for name, value in details(place, job).items() if name in wanted}
+        return {name: value for name, value in details(place, job).items() if name in wanted}
+    return {}
+
+
+def taken(place: str, job: str) -> dict[str, str]:
+    """What a job that has ended took, as the accounting database has it, where there is one."""
+    found: dict[str, str] = {}
     fields = ("State", "ExitCode", "Elapsed", "TotalCPU", "MaxRSS", "NodeList")
     with suppress(SlurmError):
         told = call(place, ["sacct", "--noheader", "--parsable2", f"--jobs={job}", f"--format={','.join(fields)}"])
@@ -151,7 +225,7 @@ def submit(place: str, folder: Path, job: Job, profile: Profile) -> str:
     """The number of the one job for ``job``: of one that is there already, else of a new one.
 
     sbatch holds a lock of the folder, even when who has started it dies; while it is held nobody submits.
-    Raises AwayError, RefusedError, OSError.
+    Raises AwayError, LaterError, RefusedError, OSError.
     """
     with open(folder / ".submit.lock", "a") as lock:
         try:
@@ -162,7 +236,7 @@ def submit(place: str, folder: Path, job: Job, profile: Profile) -> str:
             return known[0].job
         try:
             told = call(place, ["sbatch", *batch.sbatch_words(job, profile, folder)], lock.fileno())
-        except RefusedError:
+        except (RefusedError, LaterError):
             if known := jobs(place, job.name):
                 return known[0].job
             raise

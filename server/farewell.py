@@ -9,6 +9,10 @@ from conoid.cases import layout, whole
 
 _TAIL = 1 << 14
 """Bytes at the end of the log in which the banner of the launcher is looked for. Chosen: a banner has 700."""
+_ABORTS = "Abort("
+"""What MPICH begins with where a rank ends all others."""
+_LAST_WORDS = 300
+"""Characters of the last line that are told. Chosen."""
 _COMPLAINTS = [
     os.strerror(number).encode()
     for number in (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.ESTALE, errno.EFBIG)
@@ -30,6 +34,15 @@ def rank_killed(folder: Path) -> int | None:
     return int(found[-1]) if found else None
 
 
+def last_words(folder: Path, log: Path | None = None) -> str:
+    """The last line of the launcher's log, or of another ``log``, that is neither of the launcher's own banner nor of
+    MPI, which says that a rank has ended; empty where there is none.
+    """
+    text = _tail(folder, log).decode(errors="replace")
+    said = [line.strip() for line in text.partition("=====")[0].splitlines() if not line.startswith(_ABORTS)]
+    return next((line[:_LAST_WORDS] for line in reversed(said) if line), "")
+
+
 def disk_failed(folder: Path) -> bool:
     """Whether a rank complained of its disk, or could not because there is no room for a complaint."""
     said = _tail(folder)
@@ -42,10 +55,10 @@ def disk_failed(folder: Path) -> bool:
     return disk.f_bavail * disk.f_frsize < _TAIL or bool(disk.f_flag & os.ST_RDONLY)
 
 
-def _tail(folder: Path) -> bytes:
+def _tail(folder: Path, log: Path | None = None) -> bytes:
     try:
-        with whole.opened(folder / layout.LOGS / layout.LAUNCHER_LOG) as log:
-            log.seek(max(0, os.fstat(log.fileno()).st_size - _TAIL))
-            return log.read()
+        with whole.opened(log or folder / layout.LOGS / layout.LAUNCHER_LOG) as file:
+            file.seek(max(0, os.fstat(file.fileno()).st_size - _TAIL))
+            return file.read()
     except OSError:
         return b""

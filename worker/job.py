@@ -142,6 +142,10 @@ def _interrupted(folder: Path, job: Job, number: str, further: bool) -> int | No
     verdict = judge(_details(job.bin, number), int(os.environ.get("SLURM_RESTART_COUNT", "0")), job.notice, time.time())
     if verdict == "cancelled":
         return _cancelled(folder, job, f"Slurm job {number} was cancelled")
+    if verdict == "nobody":
+        message = f"Slurm job {number} was told to stop from outside, neither by its owner nor by Slurm"
+        end(folder, job, _so_far(folder, State.FAILED, Cause.PREEMPTED, message))
+        return ExitCode.INTERRUPTED
     if verdict == "time limit" and not further:
         message = "the job's time limit came before a checkpoint that is newer than the last"
         end(folder, job, _so_far(folder, State.TIMED_OUT, Cause.WALLTIME, message))
@@ -156,8 +160,8 @@ def _interrupted(folder: Path, job: Job, number: str, further: bool) -> int | No
 
 def judge(found: Mapping[str, str], restarts: int, notice: float, now: float) -> str:
     """What the batch system has meant by its signal: ``cancelled``, ``time limit``, ``preempted``, ``requeued`` (it
-    has put the job back by itself) or ``unknown``; from what scontrol says of the job that was started ``restarts``
-    times before.
+    has put the job back by itself), ``nobody`` (the signal came from elsewhere) or ``unknown``; from what scontrol
+    says of the job that was started ``restarts`` times before.
     """
     if not found:
         return "unknown"
@@ -169,7 +173,7 @@ def judge(found: Mapping[str, str], restarts: int, notice: float, now: float) ->
     start = found.get("StartTime", "")
     if limit is not None and start.isdigit() and now >= int(start) + limit - notice - _EARLY:
         return "time limit" if found.get("JobState") == "RUNNING" else "unknown"
-    return "cancelled"
+    return "cancelled" if found.get("JobState") in {"CANCELLED", "COMPLETING"} else "nobody"
 
 
 def _seconds(text: str) -> float | None:

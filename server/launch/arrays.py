@@ -73,6 +73,10 @@ class Arrays:
         profile = batch.profile_of(self._site, records[0].profile)[1]
         try:
             numbers = slurm.submit_array(self._site.bin, records, profile)
+        except slurm.LaterError as error:
+            for worker in members:
+                worker.wait(str(error))
+            return
         except slurm.RefusedError as error:
             _log.warning("Slurm refuses the array %s, whose runs go one by one: %s", records[0].name, error)
             for worker in members:

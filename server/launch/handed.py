@@ -1,6 +1,7 @@
 """A run that was handed to Slurm. Its number is its identity; its folder says how it ends, Slurm how it waits."""
 
 import time
+from collections.abc import Mapping, Set
 from pathlib import Path
 
 import msgspec
@@ -10,7 +11,9 @@ from conoid.cases.batch import Job
 from conoid.cases.run import Cause, State
 from conoid.cases.slurm import Entry
 
+from .. import farewell
 from . import Exit, Phase, Reading
+from .clerk import Clerk
 
 _LAG = 5.0
 """s after the end of a job in which its last files may still come over a network file system. Chosen."""
@@ -21,6 +24,8 @@ _MOST = 20
 _RELEASES = 3
 """Times that a job is released which a node did not start: a node that is busy or restarts is over it, a broken one is
 not. Chosen."""
+_POLITE, _LONGEST_PAUSE = 2.0, 60.0
+"""s after which Slurm is asked again that takes no job now: at first, and at most. Chosen."""
 _READINGS: dict[str, Reading] = {
     "CANCELLED": (State.CANCELLED, Cause.CANCELLED, "was cancelled"),
     "TIMEOUT": (State.TIMED_OUT, Cause.WALLTIME, "has reached its time limit"),
@@ -35,18 +40,21 @@ _READINGS: dict[str, Reading] = {
 class SlurmWorker:
     """Its first methods may be called from any thread and wait for nothing; ``turn`` belongs to the launcher's."""
 
-    def __init__(self, folder: Path, job: Job, site: batch.Slurm, group: str = "") -> None:
+    def __init__(
+        self, folder: Path, job: Job, site: batch.Slurm, group: str = "", clerk: Clerk | None = None
+    ) -> None:  # fmt: skip
         """``job`` may be one that an earlier server has handed over, or was about to. ``group``: runs that are handed
         over as one array where they start together; only of one that nobody has tried to hand over yet.
         """
         self.folder = self._folder = folder
-        self._job, self._site = job, site
+        self._job, self._site, self._clerk = job, site, clerk or Clerk()
         self.group, self.since = group, time.monotonic()
         self._entry: Entry | None = None
         self._exit: Exit | None = None
         self._stop, self._kill, self._told = (folder / layout.STOP_REQUEST).exists(), False, ""
         self._missing, self._ended, self._away, self._why = 0, 0.0, 0.0, ""
         self._released = 0
+        self._later, self._pause, self._not_before = "", _POLITE, 0.0
 
     @property
     def name(self) -> str:
@@ -66,7 +74,8 @@ class SlurmWorker:
     @property
     def waits_for_array(self) -> bool:
         """True when it is to be handed over as a task of an array."""
-        return not self._job.job and self._job.task is not None and not self._stop and self._exit is None
+        waits = not self._job.job and self._job.task is not None and not self._stop and self._exit is None
+        return waits and time.monotonic() >= self._not_before
 
     # From any thread --------------------------------------------------------------------------------------------------
 
@@ -88,6 +97,8 @@ class SlurmWorker:
         if self._away:
             last = f"; job {number} was {entry.state.lower()} then" if entry else ""
             return f"unknown: Slurm has not answered for {time.monotonic() - self._away:.0f} s ({self._why}){last}"
+        if self._later and entry is None:
+            return f"Slurm takes no job now, and is asked again: {self._later}"
         if entry is None:
             return f"Slurm is asked about job {number}" if number else "is being handed to Slurm"
         return f"Slurm job {number} is pending: {entry.reason}" if entry.state in slurm.PENDING else ""
@@ -125,13 +136,14 @@ class SlurmWorker:
         """Slurm does not answer. What was known stays."""
         self._away, self._why = self._away or time.monotonic(), why
 
-    def turn(self, entries: list[Entry]) -> None:
-        """What is due now; ``entries``: the jobs of this name that Slurm knows. Raises SlurmError, OSError.
+    def turn(self, entries: list[Entry], arrays: Set[str] = frozenset()) -> None:
+        """What is due now; ``entries``: the jobs of this name that Slurm knows, ``arrays``: the numbers of all arrays
+        of which it knows a task. Raises SlurmError, OSError.
 
         A controller that has crashed may have forgotten that it has started a job, which then waits in vain.
         """
         self._away = 0.0
-        if self.waits_for_array:
+        if self.waits_for_array or (self._job.task is not None and not self._job.job and not self._stop):
             return
         self.group = ""
         if not self._job.job:
@@ -139,7 +151,7 @@ class SlurmWorker:
             return
         entry = self._chosen(entries)
         if entry is None:
-            self._look_for_it()
+            self._look_for_it(arrays)
             return
         self._missing, self._entry = 0, entry
         if entry.state in slurm.FINAL:
@@ -173,11 +185,21 @@ class SlurmWorker:
             else:
                 self._exit = Exit(None, False, "")
             return
+        if time.monotonic() < self._not_before:
+            return
         profile = batch.profile_of(self._site, self._job.profile)[1]
         try:
             self.write_down(job=slurm.submit(self._site.bin, self._folder, self._job, profile))
+            self._later, self._pause = "", _POLITE
+        except slurm.LaterError as error:
+            self.wait(str(error))
         except slurm.RefusedError as error:
             self._exit = Exit(None, False, "", (State.FAILED, Cause.LAUNCH, f"Slurm refuses the job: {error}"))
+
+    def wait(self, why: str) -> None:
+        """Slurm takes no job now: it is asked again after a pause that doubles."""
+        self._later, self._not_before = why, time.monotonic() + self._pause
+        self._pause = min(2.0 * self._pause, _LONGEST_PAUSE)
 
     def leave_array(self) -> None:
         """It is handed over alone, under a name of its own: the array was refused. Raises OSError."""
@@ -203,7 +225,7 @@ class SlurmWorker:
             self.write_down(job=ordered[0].job)
         return ordered[0] if ordered else None
 
-    def _look_for_it(self) -> None:
+    def _look_for_it(self, arrays: Set[str]) -> None:
         """Slurm knows no job of this name: two lists in a row say so before anything is done."""
         self._missing += 1
         if self._missing < 2 or slurm.held(self._folder):
@@ -212,9 +234,28 @@ class SlurmWorker:
             self._exit = Exit(None, False, "")
         elif slurm.begun(self._folder, self._job):
             self._again("Slurm has forgotten the job")
+        elif self._array_number in arrays or self._others_began():
+            why = f"Slurm job {self._job.job} was cancelled while it waited"
+            self._exit = Exit(None, False, "", (State.CANCELLED, Cause.CANCELLED, why))
         else:
             self._missing = 0
             self.write_down(job="")
+
+    @property
+    def _array_number(self) -> str:
+        """Of the array that its job is a task of."""
+        number, task, _ = self._job.job.partition("_")
+        return number if task else ""
+
+    def _others_began(self) -> bool:
+        """Whether another task of the array has started: Slurm has the array on its disk, and forgets none of it. A
+        task that is cancelled while it waits leaves no trace in the list.
+        """
+        if not self._array_number:
+            return False
+        folders = msgspec.json.decode(whole.read(Path(self._job.array) / layout.ARRAY), type=list[str])
+        begun = (slurm.begun(Path(folder), self._job) for folder in folders)
+        return any(number.partition("_")[0] == self._array_number for number in begun)
 
     def _end(self, entry: Entry) -> None:
         """Its job is over; the folder says what that means."""
@@ -228,7 +269,19 @@ class SlurmWorker:
         if not there and (left or entry.state in {"PREEMPTED", "NODE_FAIL", "BOOT_FAIL"}):
             self._again(f"job {entry.job} ended as {entry.state}")
         else:
-            self._exit = Exit(self._code(), False, "", self._reading(entry))
+            self._exit = Exit(self._code(), False, self._last_words(), self._reading(entry))
+            self._clerk.note(self, entry.job)
+
+    def took(self, found: Mapping[str, str]) -> None:
+        """What the accounting database says of its last job. Raises OSError."""
+        self.write_down(accounting={**self._job.accounting, **found})
+
+    def _last_words(self) -> str:
+        """Of the ranks; of a task of an array that ended before them, those of its script."""
+        own = farewell.last_words(self._folder)
+        if own or not self._job.array:
+            return own
+        return farewell.last_words(self._folder, Path(self._job.array) / f"{self._job.task}.log")
 
     def _again(self, why: str) -> None:
         """Another job goes on from the checkpoint that is there, unless somebody has asked for the end."""

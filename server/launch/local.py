@@ -23,11 +23,6 @@ _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NU
 _NOT_FOR_WORKERS = ("CONOID_DATABASE", "CONOID_TOKEN")
 _CROWDED = 4
 """Ranks a core from which MPICH's waiting ranks had better sleep than spin."""
-_ABORTS = "Abort("
-"""What MPICH begins with where a rank ends all others."""
-_LAST_WORDS, _LOG_TAIL = 300, 1 << 14
-"""Characters of a launcher's last line that are told; bytes at the end of its log in which that line is looked for.
-Chosen."""
 _BURIAL = 1.0
 """s for which a killed launcher is waited for, so that it leaves no zombie. Chosen: it takes milliseconds."""
 _FRESH = 1.0
@@ -176,7 +171,7 @@ class LocalWorker:
         if self.alive() or processes.end_run(self._run):
             return None
         starved = self._kills.ended(farewell.rank_killed(self._folder) or self.process.pid)
-        return Exit(self._child.returncode if self._child else None, starved, self._last_words())
+        return Exit(self._child.returncode if self._child else None, starved, farewell.last_words(self._folder))
 
     def stop(self) -> None:
         """SIGTERM to ``mpiexec``, which passes it on to every rank."""
@@ -193,14 +188,3 @@ class LocalWorker:
         if self._child is not None:
             with suppress(subprocess.TimeoutExpired):
                 self._child.wait(_BURIAL)
-
-    def _last_words(self) -> str:
-        """The last line that is neither of the launcher's own banner nor of MPI, which says that a rank has ended."""
-        try:
-            with whole.opened(self._folder / layout.LOGS / layout.LAUNCHER_LOG) as log:
-                log.seek(max(0, os.fstat(log.fileno()).st_size - _LOG_TAIL))
-                text = log.read().decode(errors="replace")
-        except OSError:
-            return ""
-        said = [line.strip() for line in text.partition("=====")[0].splitlines() if not line.startswith(_ABORTS)]
-        return next((line[:_LAST_WORDS] for line in reversed(said) if line), "")

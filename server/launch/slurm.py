@@ -4,6 +4,7 @@ import logging
 import sys
 import threading
 import time
+from collections.abc import Set
 from functools import partial
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from conoid.cases.slurm import Entry
 from ..settings import Settings
 from . import DamagedError, Job, LaunchError, Trace
 from .arrays import Arrays
+from .clerk import Clerk
 from .handed import SlurmWorker
 from .local import find_mpiexec
 
@@ -29,7 +31,7 @@ class SlurmLauncher:
     def __init__(self, settings: Settings, site: batch.Slurm) -> None:
         """The thread starts with the first run."""
         self._mpiexec, self._worker, self._site = settings.mpiexec, settings.worker, site
-        self._arrays = Arrays(settings.runs, site)
+        self._arrays, self._clerk = Arrays(settings.runs, site), Clerk(site.bin)
         self._workers: dict[str, SlurmWorker] = {}
         self._lock, self._thread = threading.Lock(), threading.Thread(target=self._work, name="slurm", daemon=True)
 
@@ -47,7 +49,7 @@ class SlurmLauncher:
         except (OSError, ValueError) as error:
             failed = DamagedError if isinstance(error, OSError) else LaunchError
             raise failed(f"the job cannot be written down: {error}") from None
-        return self._take(job.run, SlurmWorker(job.folder, record, self._site, job.group))
+        return self._take(job.run, SlurmWorker(job.folder, record, self._site, job.group, self._clerk))
 
     def find(self, run: str, folder: Path) -> Trace:
         """By its record: what that says is handed over, or was about to be. Raises OSError, ValueError."""
@@ -57,7 +59,7 @@ class SlurmLauncher:
             raise ValueError(f"{layout.JOB}: {error}") from None
         if record is None:
             return Trace(None, False, False)
-        return Trace(self._take(run, SlurmWorker(folder, record, self._site)), True, False)
+        return Trace(self._take(run, SlurmWorker(folder, record, self._site, clerk=self._clerk)), True, False)
 
     def tidy(self) -> None:
         """Nodes are Slurm's to clean."""
@@ -103,7 +105,8 @@ class SlurmLauncher:
             return
         try:
             found: dict[str, list[Entry]] = {}
-            for entry in slurm.jobs(self._site.bin):
+            names = sorted({worker.record.name for _, worker in workers})
+            for entry in slurm.jobs(self._site.bin, *names):
                 found.setdefault(entry.name, []).append(entry)
         except slurm.SlurmError as error:
             _log.warning("Slurm does not answer: %s", error)
@@ -111,8 +114,9 @@ class SlurmLauncher:
                 worker.silent(str(error))
             return
         growing = self._hand_over_arrays([worker for _, worker in workers])
+        arrays = {entry.job.partition("_")[0] for same in found.values() for entry in same if "_" in entry.job}
         for run, worker in workers:
-            if worker.name not in growing and not self._attend(run, worker, found.get(worker.name, [])):
+            if worker.name not in growing and not self._attend(run, worker, found.get(worker.name, []), arrays):
                 return
 
     def _hand_over_arrays(self, workers: list[SlurmWorker]) -> set[str]:
@@ -123,14 +127,16 @@ class SlurmLauncher:
             _log.warning("an array is handed over later: %s", error)
             return {worker.name for worker in workers if worker.fresh or worker.waits_for_array}
 
-    def _attend(self, run: str, worker: SlurmWorker, entries: list[Entry]) -> bool:
-        """False when Slurm has not answered, so that nobody else waits for it."""
+    def _attend(self, run: str, worker: SlurmWorker, entries: list[Entry], arrays: Set[str]) -> bool:
+        """False when the controller has not answered, so that nobody else waits for it. A command that hangs is not
+        tried again at once, and keeps nobody from the others.
+        """
         try:
-            worker.turn(entries)
+            worker.turn(entries, arrays)
         except slurm.SlurmError as error:
             _log.warning("run %s: Slurm does not answer: %s", run, error)
             worker.silent(str(error))
-            return False
+            return isinstance(error, slurm.AwayError) and error.command not in {"squeue", "sbatch"}
         except (OSError, ValueError) as error:
             _log.error("run %s: %s", run, error)
         return True

@@ -243,15 +243,17 @@ RUNNING = {"JobState": "RUNNING", "Restarts": "0", "StartTime": "1000", "TimeLim
 @pytest.mark.parametrize(
     ("changes", "now", "verdict"),
     [
-        ({}, 1100.0, "cancelled"),
+        ({}, 1100.0, "nobody"),
+        ({"JobState": "CANCELLED"}, 1100.0, "cancelled"),
         ({}, 4450.0, "time limit"),
         ({"JobState": "COMPLETING"}, 1100.0, "cancelled"),
         ({"JobState": "COMPLETING"}, 4600.0, "unknown"),
         ({"PreemptTime": "1090"}, 1100.0, "preempted"),
         ({"PreemptTime": "1090", "JobState": "COMPLETING"}, 1100.0, "unknown"),
         ({"JobState": "COMPLETING", "Restarts": "1"}, 1100.0, "requeued"),
-        ({"TimeLimit": "UNLIMITED"}, 9e9, "cancelled"),
-        ({"TimeLimit": "1-00:00:00"}, 4450.0, "cancelled"),
+        ({"TimeLimit": "UNLIMITED"}, 9e9, "nobody"),
+        ({"TimeLimit": "1-00:00:00"}, 4450.0, "nobody"),
+        ({"TimeLimit": "1-00:00:00", "JobState": "COMPLETING"}, 4450.0, "cancelled"),
     ],
 )
 def test_what_a_signal_has_meant(changes: dict[str, str], now: float, verdict: str) -> None:
