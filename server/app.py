@@ -80,6 +80,7 @@ def opened(settings: Settings) -> Iterator[Service]:
         sweeps = Sweeps(settings, desk)
         supervisor.held_back = sweeps.held
         supervisor.start()
+        sweeps.complete()
         stack.callback(supervisor.close)
         if settings.end_runs:
             stack.callback(supervisor.end_all)

@@ -114,6 +114,10 @@ class Desk:
         limits.check_output(self.kept(owner), self._settings.site.quota)
         limits.check_room(self._settings.runs, self._store.open_runs(owner), self._settings.caps, more)
 
+    def runs_of(self, owner: str, keys: Sequence[str]) -> list[str]:
+        """The runs that were made with these idempotency keys."""
+        return [run_id for key in keys if (run_id := self._store.run_of_key(owner, key)) is not None]
+
     def take_back(self, run_id: str) -> None:
         """Cancels a run; what keeps it from being cancelled is logged."""
         try:

@@ -1,12 +1,16 @@
 """Sweeps: one case at many points, each a run of its own. A plain file a sweep, ``<runs>/sweeps/<id>.json``.
 
 The file is there before the first run is; each run has an idempotency key made of the sweep's id and its place. So a
-request that broke off is completed by sending it again, and makes no run twice.
+request that broke off is completed by sending it again, and makes no run twice. A server that was killed in the middle
+completes the sweep when it is started again, or takes it back where it has no key: until all runs are accepted none
+starts.
 """
 
 import hashlib
 import json
+import logging
 import threading
+import time
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -24,7 +28,10 @@ from .shapes import MOST_POINTS
 from .submission import Desk, Wishes
 from .waiting import Need
 
+_log = logging.getLogger("conoid.server")
 FOLDER = "sweeps"
+_AGAIN = 2.0
+"""s after which a sweep that could not be completed is tried again. Chosen."""
 _MOST_BYTES = 16 << 20
 """Of all cases of a sweep together. Chosen: what is expanded in a second."""
 _JSON = "application/json"
@@ -43,6 +50,8 @@ class Plan(msgspec.Struct, kw_only=True, frozen=True):
     """Runs of the sweep that run at a time; None: as many as there are slots."""
     points: list[dict[str, Any]]
     runs: list[str] = []
+    case: dict[str, Any] | None = None
+    """What is changed at each point, until all runs are accepted."""
 
     @property
     def whole(self) -> bool:
@@ -73,11 +82,58 @@ class Sweeps:
         """By owner: who hands in many points does not hold up others."""
         self._plans: dict[str, Plan] = {}
         self._filling: set[str] = set()
+        self._cancelled: set[str] = set()
         for path in sorted(self._folder.glob("*.json")):
             try:
                 self._keep(msgspec.json.decode(whole.read(path), type=Plan))
             except (OSError, msgspec.MsgspecError):
                 continue
+        self._left = [plan for plan in self._plans.values() if not plan.whole]
+        self._filling |= {plan.id for plan in self._left}
+
+    def complete(self) -> None:
+        """Goes on with the sweeps that an earlier server was killed in, in a thread; their runs wait meanwhile."""
+        for plan in self._left:
+            self._plans[plan.id] = msgspec.structs.replace(plan, runs=self._desk.runs_of(plan.owner, plan.keys))
+        self._complete_later(self._left)
+
+    def _complete_later(self, plans: Sequence[Plan]) -> None:
+        if plans:
+            threading.Thread(target=self._complete_all, args=(plans,), name="sweeps", daemon=True).start()
+
+    def _complete_all(self, plans: Sequence[Plan]) -> None:
+        for plan in plans:
+            while not self._completed(plan):
+                time.sleep(_AGAIN)
+
+    def _completed(self, plan: Plan) -> bool:
+        """False where it has to be tried again. A sweep that cannot be completed is taken back; so is one without a
+        key: whoever has handed it in got no answer, and hands in another one.
+        """
+        with self._locks.setdefault(plan.owner, threading.Lock()):
+            if self._plans.get(plan.id, plan).whole or plan.id not in self._plans:
+                return True
+            try:
+                if plan.case is None or plan.key is None:
+                    raise ServiceError(409, "no_key", "its request broke off, and has no Idempotency-Key")
+                self._fill(plan, self._cases(plan.case, plan.points))
+            except ServiceError as error:
+                if error.body["retryable"] and plan.id not in self._cancelled:
+                    return False
+                _log.error("sweep %s is taken back: %s", plan.id, error)
+                self._take_back(plan)
+                return True
+            except Exception:
+                _log.exception("sweep %s is completed later", plan.id)
+                return False
+            self._filling.discard(plan.id)
+            return True
+
+    def cancel(self, plan: Plan) -> list[str]:
+        """The runs that are there; of a sweep that is being handed in no other one follows."""
+        if not plan.whole:
+            self._cancelled.add(plan.id)
+        return self._plans.get(plan.id, plan).runs
 
     def get(self, sweep_id: str, owner: str) -> Plan | None:
         """The sweep, when it belongs to the owner."""
@@ -95,20 +151,24 @@ class Sweeps:
             plan = self._earlier(owner, key, digest)
             if plan is not None and plan.whole:
                 return plan
-            cases = self._cases(body)
-            fresh = plan or self._new(owner, body, key, digest)
+            wish = _wish(body)
+            cases = self._cases(wish.case, wish.points)
+            fresh = plan or self._new(owner, wish, key, digest)
             self._desk.check_room(owner, fresh.keys)
             if plan is None:
                 self._write(fresh)
             plan = fresh
             self._filling.add(plan.id)
             try:
-                return self._fill(plan, cases)
+                filled = self._fill(plan, cases)
             except ServiceError:
-                self._take_back(plan.id)
+                self._take_back(plan)
                 raise
-            finally:
-                self._filling.discard(plan.id)
+            except Exception:
+                self._complete_later([plan])
+                raise
+            self._filling.discard(plan.id)
+            return filled
 
     def held(self, need: Need, active: Iterable[Need]) -> str:
         """Why a run waits for its sweep: for all its runs to be there, or for those that are ``active``. The label of
@@ -131,10 +191,9 @@ class Sweeps:
             raise ServiceError(422, "key_reused", detail, pointer="Idempotency-Key", hint="use a new key")
         return found[0] if found else None
 
-    def _cases(self, body: bytes) -> list[tuple[bytes, Reading]]:
+    def _cases(self, case: dict[str, Any], points: Sequence[dict[str, Any]]) -> list[tuple[bytes, Reading]]:
         """The case of each point, each of which can be run. Raises ServiceError with what is wrong."""
-        wish = _wish(body)
-        made = [_changed(wish.case, point, n) for n, point in enumerate(wish.points)]
+        made = [_changed(case, point, n) for n, point in enumerate(points)]
         if sum(map(len, made)) > _MOST_BYTES:
             raise ServiceError(413, "too_large", f"the cases have more than {size(_MOST_BYTES)} together")
         cases = []
@@ -145,30 +204,34 @@ class Sweeps:
                 raise _at(n, error) from None
         return cases
 
-    def _new(self, owner: str, body: bytes, key: str | None, digest: str) -> Plan:
-        wish = _wish(body)
+    def _new(self, owner: str, wish: Wish, key: str | None, digest: str) -> Plan:
         sweep_id, now = folder.new_id()
         return Plan(
             id=sweep_id, owner=owner, name=str(wish.case.get("name", "")), submitted=now, key=key, digest=digest,
-            at_once=wish.at_once, points=wish.points,
+            at_once=wish.at_once, points=wish.points, case=wish.case,
         )  # fmt: skip
 
     def _fill(self, plan: Plan, cases: Sequence[tuple[bytes, Reading]]) -> Plan:
         plan = msgspec.structs.replace(plan, runs=[])
         for n, ((body, reading), key) in enumerate(zip(cases, plan.keys, strict=True)):
+            if plan.id in self._cancelled:
+                raise ServiceError(409, "cancelled", f"sweep {plan.id} was cancelled while it was handed in")
             wishes = Wishes({"sweep": plan.id, "point": str(n)})
             receipt = self._desk.submit(plan.owner, body, _JSON, key, wishes, reading)
             plan = msgspec.structs.replace(plan, runs=[*plan.runs, receipt["id"]])
             self._plans[plan.id] = plan
+        plan = msgspec.structs.replace(plan, case=None)
         self._write(plan)
         return plan
 
-    def _take_back(self, sweep_id: str) -> None:
+    def _take_back(self, plan: Plan) -> None:
         """Cancels the runs of a sweep that was refused in the middle, before any of them has started."""
-        for run_id in self._plans[sweep_id].runs:
+        for run_id in self._desk.runs_of(plan.owner, plan.keys):
             self._desk.take_back(run_id)
-        del self._plans[sweep_id]
-        (self._folder / f"{sweep_id}.json").unlink(missing_ok=True)
+        del self._plans[plan.id]
+        self._cancelled.discard(plan.id)
+        self._filling.discard(plan.id)
+        (self._folder / f"{plan.id}.json").unlink(missing_ok=True)
 
     def _keep(self, plan: Plan) -> None:
         self._plans[plan.id] = plan

@@ -89,7 +89,7 @@ async def cancel(service: ServiceOf, identity: Submitter, sweep_id: str) -> dict
 
 def _cancelled(service: Service, identity: Identity, sweep_id: str) -> dict[str, Any]:
     plan = _find(service, identity, sweep_id)
-    for run_id in plan.runs:
+    for run_id in service.sweeps.cancel(plan):
         if service.supervisor.is_open(run_id):
             ask_to_stop(service, run_id)
     return _shown(service, plan)

@@ -6,6 +6,7 @@ import io
 import json
 import math
 import threading
+import time
 import tomllib
 from collections.abc import Iterator
 from dataclasses import replace
@@ -22,13 +23,15 @@ from conoid.cases.run import State
 from conoid.server import folder, limits, reader, view
 from conoid.server.app import build_app, opened
 from conoid.server.errors import ServiceError
+from conoid.server.events import Run
 from conoid.server.routes.sweeps import cell
+from conoid.server.service import Service
 from conoid.server.settings import Caps, Settings
 from conoid.server.submission import Desk
 from conoid.server.sweeps import Sweeps
 from conoid.server.tokens import create_token
 
-from .running import Running, User, case_text
+from .running import PATIENCE, Running, User, case_text
 from .swept import ENDS, handed_in, wish
 
 
@@ -72,7 +75,6 @@ def test_a_sweep_that_broke_off_is_completed(server: Running, monkeypatch: pytes
     answer = server.ann.http.post("/v1/sweeps", content=wish(), headers=headers)
     assert (answer.status_code, answer.json()["code"]) == (503, "unavailable")
     monkeypatch.undo()
-    server.service.sweeps.__init__(server.service.settings, server.service.desk)  # type: ignore[misc]
     assert len(handed_in(server.ann, wish(), "k")["points"]) == len(ENDS)
     assert len(server.ann.http.get("/v1/runs").json()["runs"]) == len(ENDS)
 
@@ -206,6 +208,70 @@ def test_a_sweep_that_is_refused_in_the_middle_leaves_nothing_that_runs(
     made = handed_in(server.ann, wish(), "k")
     assert len(made["points"]) == len(ENDS)
     assert {server.ann.wait_for(point["run"]["id"])["state"] for point in made["points"]} == {"succeeded"}
+
+
+class Killed(BaseException):
+    """The server is killed."""
+
+
+def broken_off(settings: Settings, monkeypatch: pytest.MonkeyPatch, key: str | None) -> str:
+    """A sweep of four points of which two were accepted when the server died."""
+    with opened(settings) as service:
+        real, left = service.desk.submit, [2]
+
+        def dies(*arguments: Any) -> dict[str, Any]:
+            left[0] -= 1
+            if left[0] < 0:
+                raise Killed
+            return real(*arguments)
+
+        monkeypatch.setattr(service.desk, "submit", dies)
+        monkeypatch.setattr(service.sweeps, "_filling", Never())
+        with pytest.raises(Killed):
+            service.sweeps.submit("ann", wish(), key)
+        return next((settings.runs / "sweeps").glob("*.json")).stem
+
+
+class Never(set[str]):
+    """Nothing leaves it: no run starts before the end of the server."""
+
+    def discard(self, _: object) -> None:
+        """Stays."""
+
+
+def after(service: Service, sweep: str, states: set[State]) -> list[Run]:
+    """The runs of the sweep once all are in one of these states."""
+    deadline = time.monotonic() + PATIENCE
+    while True:
+        runs = [run for run in service.store.all() if folder.submission(service.settings.runs / run.id).labels]
+        if not service.sweeps._filling and {run.state for run in runs} <= states:
+            return runs
+        assert time.monotonic() < deadline, runs
+        time.sleep(0.05)
+
+
+def test_a_sweep_that_a_killed_server_left_is_completed_before_any_run_starts(
+    settings: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sweep = broken_off(settings, monkeypatch, "k")
+    with opened(settings) as service:
+        runs = after(service, sweep, {State.SUCCEEDED})
+        plan = service.sweeps.get(sweep, "ann")
+        assert plan is not None
+        assert plan.whole
+        assert sorted(plan.runs) == sorted(run.id for run in runs)
+        assert len(runs) == len(ENDS)
+
+
+def test_a_sweep_that_cannot_be_completed_is_cancelled_with_its_runs(
+    settings: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sweep = broken_off(settings, monkeypatch, None)
+    with opened(settings) as service:
+        runs = after(service, sweep, {State.CANCELLED})
+        assert len(runs) == 2
+        assert service.sweeps.get(sweep, "ann") is None
+    assert not list((settings.runs / "sweeps").glob("*.json"))
 
 
 # What is told of one --------------------------------------------------------------------------------------------------

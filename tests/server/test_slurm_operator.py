@@ -1,0 +1,103 @@
+"""What an operator does to a real Slurm while a server hands its runs over to it."""
+
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from conoid.cases.run import State
+
+from . import real_slurm
+from .real_slurm import Cluster
+from .running import case_text, processes
+from .test_slurm import SITE, Site, job_of, processes_of, sweep_of
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(bool(real_slurm.missing()), reason=real_slurm.missing() or "a Slurm is here"),
+]
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
+    with real_slurm.running(tmp_path_factory.mktemp("slurm")) as up:
+        yield up
+
+
+@pytest.fixture(params=["runs of a site", "50%j of \\n"])
+def site(cluster: Cluster, tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Site]:
+    """In folders with odd names."""
+    cluster.await_node()
+    place = tmp_path / request.param
+    place.mkdir()
+    (place / "site.toml").write_text(SITE)
+    with processes(place) as make:
+        server = make("--site", str(place / "site.toml"), "--slots", "1000", "--no-zenoh", "--grace", "5")
+        yield Site(cluster, server, server.user(server.start()["url"]))
+
+
+def partition(_: Site) -> str:
+    """Of the profile that runs take."""
+    return "low"
+
+
+@pytest.mark.parametrize("state", ["INACTIVE", "DRAIN"])
+def test_a_run_waits_for_a_partition_and_is_told_why(site: Site, state: str) -> None:
+    name = partition(site)
+    site.cluster.command("scontrol", "update", f"PartitionName={name}", f"State={state}")
+    try:
+        run = site.submit(case_text(steps=3))
+        deadline = time.monotonic() + 30.0
+        while "takes no job now" not in (seen := site.ann.show(run))["reason"]:
+            assert seen["state"] in {"accepted", "queued"}, seen
+            assert time.monotonic() < deadline, seen
+            time.sleep(0.2)
+    finally:
+        site.cluster.command("scontrol", "update", f"PartitionName={name}", "State=UP")
+    assert site.ended(run, 90.0)["state"] == "succeeded"
+    assert site.tail(run) != "no log", "in its folder, whatever the name of that"
+
+
+def test_a_job_of_an_odd_name_blinds_nobody(site: Site, tmp_path: Path) -> None:
+    script = tmp_path / "odd.sh"
+    script.write_text("#!/bin/sh\nsleep 20\n")
+    odd = site.cluster.command("sbatch", "--parsable", "--job-name=a\nb|c", "--chdir", str(tmp_path), str(script))
+    assert site.ended(site.submit(case_text(steps=3)), 60.0)["state"] == "succeeded"
+    site.cluster.command("scancel", odd)
+
+
+def test_a_task_that_is_cancelled_by_hand_while_it_waits_is_cancelled(site: Site, tmp_path: Path) -> None:
+    runs = sweep_of(site, 8, wait=str(tmp_path / "go"))
+    jobs = [job_of(site, run) for run in runs]
+    site.reached(runs[0], 60.0, State.RUNNING)
+    waits = [n for n, run in enumerate(runs) if site.ann.show(run)["state"] == "queued"]
+    site.cluster.command("scancel", jobs[waits[-1]].job)
+    ended = site.ended(runs[waits[-1]], 60.0)
+    assert (ended["state"], ended["cause"]) == ("cancelled", "cancelled")
+    (tmp_path / "go").touch()
+    assert all(site.ended(run, 120.0)["state"] == "succeeded" for n, run in enumerate(runs) if n != waits[-1])
+    assert job_of(site, runs[waits[-1]]).job == jobs[waits[-1]].job, "no second job"
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_a_job_that_was_killed_by_hand_is_not_cancelled(site: Site, number: signal.Signals) -> None:
+    run = site.submit(case_text(steps=100_000, pace=0.02))
+    site.reached(run, 30.0, State.RUNNING)
+    script = subprocess.run(
+        ["pgrep", "-f", f"conoid.worker.job .*{run}"], capture_output=True, text=True, check=True
+    ).stdout.split()
+    for pid in script if number is signal.SIGTERM else [*script, *map(str, processes_of(run))]:
+        os.kill(int(pid), number)
+    ended = site.ended(run, 60.0)
+    assert ended["state"] in {"failed", "lost"}, ended
+    assert ended["cause"] in {"preempted", "node", "service"}, ended
+
+
+def test_a_point_that_crashes_is_told_by_what_it_said(site: Site) -> None:
+    ended = site.ended(sweep_of(site, 2, end="crash")[1], 60.0)
+    assert ended["state"] == "failed"
+    assert "its last words: " in ended["message"], ended
