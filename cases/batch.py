@@ -234,7 +234,11 @@ def array_words(job: Job, profile: Profile, tasks: Iterable[int]) -> list[str]:
 
 
 def _words(job: Job, profile: Profile, folder: Path, log: str) -> list[str]:
-    """``log`` below ``folder``: Slurm replaces what follows a percent sign in it, and the folder may have one."""
+    """``log`` below ``folder``. Slurm replaces what follows a percent sign, and takes a backslash away, in the name of
+    the folder, too: where that has one, the job opens its log itself.
+    """
+    if set(str(folder)) & {"%", "\\"}:
+        log = "/dev/null"
     words = [
         "--parsable", f"--job-name={job.name}", f"--ntasks={job.ranks}", f"--chdir={folder}", f"--output={log}",
         "--open-mode=append", "--requeue", "--export=ALL", f"--signal=B:TERM@{job.notice:.0f}",

@@ -60,6 +60,8 @@ def main(arguments: list[str]) -> int:
     told = Told()
     told.listen()
     folder, number, name = *_place(Path(arguments[0]), os.environ), arguments[1]
+    if os.path.samestat(os.fstat(1), os.stat(os.devnull)):
+        _write_into(folder)
     job = batch.read_job(folder)
     if job is None or job.name != name or not claim(folder, job, number):
         print(f"job {number}: another job has this run", flush=True)
@@ -85,11 +87,16 @@ def _place(given: Path, env: Mapping[str, str]) -> tuple[Path, str]:
     if not task or not (given / layout.ARRAY).exists():
         return given, env.get("SLURM_JOB_ID", str(os.getpid()))
     folder = Path(msgspec.json.decode((given / layout.ARRAY).read_bytes(), type=list[str])[int(task)])
+    _write_into(folder)
+    return folder, f"{env['SLURM_ARRAY_JOB_ID']}_{task}"
+
+
+def _write_into(folder: Path) -> None:
+    """What this process and the ranks print goes to the launcher's log of the run. Raises OSError."""
     log = os.open(folder / layout.LOGS / layout.LAUNCHER_LOG, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
     for stream in (1, 2):
         os.dup2(log, stream)
     os.close(log)
-    return folder, f"{env['SLURM_ARRAY_JOB_ID']}_{task}"
 
 
 def claim(folder: Path, job: Job, number: str) -> bool:

@@ -17,7 +17,7 @@ from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
-from . import cluster, crowds, damage, odd, strike, strikes, workers
+from . import cluster, crowds, damage, odd, operator, strike, strikes, workers
 from .grounds import Grounds, grounds
 from .judge import TRUE, Row
 from .table import write
@@ -30,9 +30,10 @@ Group = tuple[str, Callable[[Grounds], Iterator[Row]]]
 def groups() -> dict[str, Group]:
     """What is tried together, by name."""
     found: dict[str, Group] = {}
-    for one in [*strikes.everything(), *odd.everything(), *cluster.everything()]:
+    for one in [*strikes.everything(), *odd.everything(), *cluster.everything(), *operator.strikes()]:
         found[one.name] = (one.stand, partial(_struck, one))
-    for name, (kind, deed) in [*damage.groups().items(), *odd.groups().items(), *crowds.groups().items()]:
+    families = (damage.groups(), odd.groups(), crowds.groups(), operator.groups())
+    for name, (kind, deed) in [group for family in families for group in family.items()]:
         found[name] = (kind, partial(_on, kind, deed))
     for adopted in (False, True):
         name = f"workers struck, {'adopted' if adopted else 'own'}"

@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import socket
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -59,10 +60,33 @@ def locked_away(path: Path) -> None:
     path.chmod(0o000)
 
 
+def pipe(path: Path) -> None:
+    path.unlink()
+    os.mkfifo(path)
+
+
+def endless(path: Path) -> None:
+    path.unlink()
+    path.symlink_to("/dev/zero")
+
+
+def listening(path: Path) -> None:
+    """A socket that nobody answers at; its path is longer than such a name may be."""
+    path.unlink()
+    folder = os.open(path.parent, os.O_RDONLY)
+    with socket.socket(socket.AF_UNIX) as made:
+        made.bind(f"/proc/self/fd/{folder}/{path.name}")
+    os.close(folder)
+
+
 WAYS: dict[str, Callable[[Path], None]] = {
     "deleted": deleted, "emptied": emptied, "cut to half": halved, "garbled": garbled,
     "a folder in its place": folder_in_place, "a file in its place": file_in_place, "not permitted": locked_away,
 }  # fmt: skip
+IRREGULAR: dict[str, Callable[[Path], None]] = {
+    "a pipe in its place": pipe, "a link to an endless device": endless, "a socket in its place": listening,
+}  # fmt: skip
+"""What is no file, and would keep a reader waiting."""
 OF_FILES = ("deleted", "emptied", "cut to half", "garbled", "a folder in its place", "not permitted")
 OF_FOLDERS = ("deleted", "emptied", "a file in its place", "not permitted")
 
@@ -85,7 +109,7 @@ class Damage:
     @property
     def beyond_use(self) -> bool:
         """Whether nobody can write there any more."""
-        return self.way in {"a folder in its place", "a file in its place", "not permitted"}
+        return self.way in {"a folder in its place", "a file in its place", "not permitted", *IRREGULAR}
 
     def states(self) -> frozenset[str]:
         """What is true of the run afterwards."""
@@ -141,7 +165,7 @@ def rows(stand: Stand, some: Sequence[Damage]) -> Iterator[Row]:
     if some[0].down:
         stand.kill()
     for one, run in zip(some, made, strict=True):
-        WAYS[one.way](stand.runs / run / one.name)
+        (WAYS | IRREGULAR)[one.way](stand.runs / run / one.name)
     if some[0].down:
         assert stand.start(), stand.said()
     for run in made:

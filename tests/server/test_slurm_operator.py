@@ -14,7 +14,7 @@ from conoid.cases.run import State
 from . import real_slurm
 from .real_slurm import Cluster
 from .running import case_text, processes
-from .test_slurm import SITE, Site, job_of, processes_of, sweep_of
+from .slurm_site import SITE, Site, job_of, processes_of, sweep_of
 
 pytestmark = [
     pytest.mark.slow,
@@ -71,7 +71,7 @@ def test_a_job_of_an_odd_name_blinds_nobody(site: Site, tmp_path: Path) -> None:
 
 
 def test_a_task_that_is_cancelled_by_hand_while_it_waits_is_cancelled(site: Site, tmp_path: Path) -> None:
-    runs = sweep_of(site, 8, wait=str(tmp_path / "go"))
+    runs = sweep_of(site, 4, ranks=real_slurm.CORES, wait=str(tmp_path / "go"))
     jobs = [job_of(site, run) for run in runs]
     site.reached(runs[0], 60.0, State.RUNNING)
     waits = [n for n, run in enumerate(runs) if site.ann.show(run)["state"] == "queued"]
@@ -92,7 +92,7 @@ def test_a_job_that_was_killed_by_hand_is_not_cancelled(site: Site, number: sign
     ).stdout.split()
     for pid in script if number is signal.SIGTERM else [*script, *map(str, processes_of(run))]:
         os.kill(int(pid), number)
-    ended = site.ended(run, 60.0)
+    ended = site.ended(run, 120.0)
     assert ended["state"] in {"failed", "lost"}, ended
     assert ended["cause"] in {"preempted", "node", "service"}, ended
 

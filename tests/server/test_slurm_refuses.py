@@ -220,7 +220,7 @@ def test_a_task_that_crashed_is_told_by_what_it_said(place: Path) -> None:
 
 def test_the_names_of_folders_are_no_pattern_for_slurm() -> None:
     job = batch.new_job("r", 1, ("a", Profile()), ["true"], 0.0)
-    folder = Path("/runs/50%j\\n")
-    words = batch.sbatch_words(job, Profile(), folder)
-    assert [word for word in words if word.startswith("--output=")] == ["--output=log/launcher.log"]
-    assert f"--chdir={folder}" in words
+    for name, log in (("/runs/50%j", "/dev/null"), ("/runs/a\\n", "/dev/null"), ("/a b", "log/launcher.log")):
+        words = batch.sbatch_words(job, Profile(), Path(name))
+        assert [word for word in words if word.startswith("--output=")] == [f"--output={log}"]
+        assert f"--chdir={name}" in words

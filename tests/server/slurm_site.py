@@ -1,0 +1,111 @@
+"""A cluster with a server that hands its runs over to it, for tests with a real Slurm."""
+
+import json
+import signal
+import time
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from conoid.cases import layout
+from conoid.cases.batch import Job, read_job
+from conoid.cases.run import State
+
+from .real_slurm import Cluster
+from .running import TOML, Process, User, case_text
+
+SITE = """
+launcher = "slurm"
+[slurm]
+poll = 0.3
+[slurm.profiles.standard]
+partition = "low"
+lines = ["export HYDRA_IFACE=lo"]
+[slurm.profiles.pmi2]
+partition = "low"
+mpi = "srun"
+[slurm.profiles.grace]
+partition = "grace"
+[slurm.profiles.gone]
+partition = "gone"
+[slurm.profiles.wrong]
+partition = "nowhere"
+[slurm.profiles.brief]
+partition = "low"
+time = "2 min"
+notice = "60 s"
+"""
+
+
+@dataclass
+class Site:
+    """A cluster, a server that hands its runs over to it, and one who uses it."""
+
+    cluster: Cluster
+    server: Process
+    ann: User
+
+    def submit(self, text: str, profile: str = "standard") -> str:
+        """The id of a new run."""
+        answer = self.ann.http.post("/v1/runs", params={"profile": profile}, content=text, headers=TOML)
+        assert answer.status_code == 202, answer.text
+        return str(answer.json()["id"])
+
+    def ended(self, run: str, seconds: float = 60.0) -> dict[str, Any]:
+        """The run once it has ended."""
+        return self.reached(run, seconds, *(state for state in State if state.final))
+
+    def reached(self, run: str, seconds: float, *states: State) -> dict[str, Any]:
+        """The run once it is in one of these states."""
+        deadline = time.monotonic() + seconds
+        while (seen := self.ann.show(run))["state"] not in states:
+            assert time.monotonic() < deadline, f"{seen['state']} ({seen['reason']}), not {states}: {self.tail(run)}"
+            time.sleep(0.1)
+        return seen
+
+    def tail(self, run: str) -> str:
+        """The end of the launcher's log."""
+        log = self.server.runs / run / layout.LOGS / layout.LAUNCHER_LOG
+        return log.read_text()[-2000:] if log.exists() else "no log"
+
+    def jobs(self, run: str) -> list[tuple[str, str]]:
+        """Number and state of every job that was made for the run."""
+        return self.cluster.jobs(f"conoid-{run}-")
+
+    def again(self, number: signal.Signals = signal.SIGKILL) -> None:
+        """Ends the server and starts the next one."""
+        self.server.end(number)
+        self.ann = self.server.user(self.server.start()["url"])
+
+
+def sweep_of(site: Site, number: int, **plan: Any) -> list[str]:
+    """The runs of a new sweep, in the order of its points."""
+    points = [{"run.end_time": f"{1 + n} us"} for n in range(number)]
+    body = json.dumps({"case": tomllib.loads(case_text(**plan)), "points": points})
+    answer = site.ann.http.post("/v1/sweeps", content=body, headers={"Content-Type": "application/json"})
+    assert answer.status_code == 202, answer.text
+    return [point["run"]["id"] for point in answer.json()["points"]]
+
+
+def job_of(site: Site, run: str) -> Job:
+    """The record of a run, once Slurm has given it a number."""
+    deadline = time.monotonic() + 30.0
+    while (found := read_job(site.server.runs / run)) is None or not found.job:
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
+    return found
+
+
+def processes_of(run: str) -> list[int]:
+    """The ranks of a run."""
+    found = []
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            try:
+                words = (entry / "cmdline").read_bytes().split(b"\0")
+            except OSError:
+                continue
+            if b"mpi4py" in words and run.encode() in words and words[0].endswith(b"python"):
+                found.append(int(entry.name))
+    return found
