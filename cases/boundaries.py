@@ -14,7 +14,8 @@ Course = tuple[tuple[Time, Ratio], ...]
 
 class Symmetry(Model):
     """Nodes that start on the plane ``axis = at`` stay on it. What flies at it meets its mirror image there: no node
-    passes the plane, and none sticks to it. No friction. All parts when ``parts`` is empty. No crack opens in the plane
+    passes the plane, and none sticks to it. Nodes without tets do not meet each other: they are reflected, and nothing
+    holds them on the plane. No friction. All parts when ``parts`` is empty. No crack opens in the plane
     itself, as the one below a blow in the middle of a plate would: half of a body that fractures is not the whole.
     """
 

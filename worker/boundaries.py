@@ -13,7 +13,7 @@ import numpy as np
 from .growing import Rooms
 from .jit import njit
 from .migration.parcel import Parcel, length
-from .state import Bits, Flags, Floats, Indices, Ints, Nodes
+from .state import Bits, Flags, Floats, Indices, Ints, Nodes, extended
 from .topology import Split
 
 FREE, PRESCRIBED, MIRRORED = range(3)
@@ -69,6 +69,14 @@ class Boundary(ABC):
     def apply(self, state: Nodes, dt: float, t: float) -> None:
         """Corrects v(n+1/2) at time ``t``, s; ``dt`` is the step ahead, s."""
 
+    def after_move(self, state: Nodes) -> None:  # noqa: B027 (most boundaries act on velocities alone)
+        """Corrects x(n+1)."""
+
+    def release(self, loose: Flags, bounds: "list[Boundary]") -> None:  # noqa: B027 (most hold a node, tets or not)
+        """Nodes without tets that fly on, ``loose`` (nodes,), are particles from now on; ``bounds``: all of the scene,
+        those before this one have released theirs.
+        """
+
     def grow(self, split: Split, ids: Ints) -> None:
         """Takes up the copies of its nodes; ``ids``: of the local nodes.
 
@@ -103,13 +111,19 @@ class Boundary(ABC):
 
 
 class SymmetryPlane(Boundary):
-    """Nodes that start on a plane across an axis have no velocity along it."""
+    """Nodes that start on a plane across an axis have no velocity along it, while they have tets: these are mirrored,
+    and hold the node on the plane. A node without tets and its images are particles (mirrors.py).
+    """
 
     mirrors = True
 
-    def __init__(self, nodes: Indices, axis: int) -> None:
+    def __init__(self, nodes: Indices, axis: int, beside: Flags | None = None) -> None:
+        """``beside`` (n,): nodes of bodies that lie on one side of the plane, where their images are on the other; all
+        if not given. A node of a body that lies on both sides stays on the plane.
+        """
         super().__init__(nodes)
         self._axis = axis
+        self._beside = np.ones(len(nodes), bool) if beside is None else beside
 
     def held_components(self) -> Bits:
         held = free(self.nodes)
@@ -124,6 +138,15 @@ class SymmetryPlane(Boundary):
 
     def mirror(self, vectors: Floats) -> None:
         _hold(vectors, self.nodes, self._axis)
+
+    def release(self, loose: Flags, bounds: list[Boundary]) -> None:
+        stay = ~(loose[self.nodes] & self._beside)
+        if not stay.all():
+            for name in ("nodes", "_beside", "_before", *KEPT):
+                setattr(self, name, getattr(self, name)[stay])
+
+    def _inherit(self, at: Ints) -> None:
+        self._beside = extended(self._beside, self._beside[at])
 
 
 def mirrored(n: int, bounds: Iterable[Boundary]) -> Flags:

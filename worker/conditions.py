@@ -29,9 +29,9 @@ def loads(parcel: Parcel) -> list[Load]:
     return [Load(table["key"], table["tets"], table["of"], table["force"]) for table in tables]
 
 
-def build(case: schema.Case, model: Model, loads: list[Load]) -> list[Boundary]:
+def build(case: schema.Case, model: Model, loads: list[Load], comm: Comm) -> list[Boundary]:
     """The boundaries of a case on this rank's nodes: gravity and tractions first, so that what is held stays held;
-    walls last, and they leave alone what has a prescribed motion. ``loads``: of the tractions.
+    walls last, and they leave alone what has a prescribed motion. ``loads``: of the tractions. All ranks take part.
     """
     nodes = model.nodes
     held = [_held_by(spec, model) for spec in case.boundaries]
@@ -43,7 +43,9 @@ def build(case: schema.Case, model: Model, loads: list[Load]) -> list[Boundary]:
         Traction(nodes.places(load.nodes), load, Course(spec.course))
         for (_, spec), load in zip(case.boundaries_of(schema.Traction), loads, strict=True)
     ]
-    boundaries += [SymmetryPlane(_indices(held[i]), AXES[spec.axis]) for i, spec in case.boundaries_of(schema.Symmetry)]
+    for i, plane in case.boundaries_of(schema.Symmetry):
+        side, on = part_sides(plane, model, comm), _indices(held[i])
+        boundaries.append(SymmetryPlane(on, AXES[plane.axis], side[nodes.part[on]] != 0.0))
     for spec, h in zip(case.boundaries, held, strict=True):
         if isinstance(spec, schema.Prescribed):
             velocity = np.array([np.nan if c is None else c for c in (spec.x, spec.y, spec.z)])
@@ -124,6 +126,17 @@ def heights(spec: schema.Symmetry, model: Model) -> Floats:
 def sides(spec: schema.Symmetry, model: Model) -> Floats:
     """(n,) on which side of a symmetry plane that holds them nodes start: 1 above, -1 below, else 0."""
     return np.where(_of_parts(spec, model), np.sign(heights(spec, model)), 0.0)
+
+
+def part_sides(spec: schema.Symmetry, model: Model, comm: Comm) -> Floats:
+    """(parts,) 1 for a part that lies above a symmetry plane that holds it, -1 below; 0 where it is not held or has
+    nodes on both sides. All ranks take part.
+    """
+    side, found = sides(spec, model), np.zeros((2, len(model.parts)))
+    for way, sign in enumerate((1.0, -1.0)):
+        found[way, model.nodes.part[side == sign]] = 1.0
+    above, below = comm.maximum(found.ravel()).reshape(found.shape)
+    return np.asarray(above - below)
 
 
 def _walls(case: schema.Case, held: list[Flags], planes: Flags) -> list[Boundary]:

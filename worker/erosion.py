@@ -35,6 +35,7 @@ from .state import (
     VISCOUS,
     WORKS,
     Block,
+    Flags,
     Floats,
     Ints,
     Model,
@@ -59,7 +60,7 @@ class Erosion:
     ) -> None:  # fmt: skip
         """``extremes``: largest nodal mass, kg, speed, m/s, and distance from the origin, m, of the scene."""
         self._model, self._neighbours, self._contact = model, neighbours, contact
-        self._loads = [bound for bound in bounds if bound.on_faces]
+        self._bounds = bounds
         self._comm, self._clock = comm, clock
         self._specs = [part.erosion for part in case.parts]
         leaves = np.array([spec is not None and spec.nodes == "remove" for spec in self._specs])
@@ -123,6 +124,7 @@ class Erosion:
         self.removed, self._tets_at = parcel.nodes["erosion.removed"], parcel.nodes["erosion.tets_at"]
         last = parcel.rows["erosion.last"]
         self._last = [(np.searchsorted(parcel.nodes["id"], last["with"]), last["force"])]
+        self._release()
 
     def decide(self, found: int) -> None:
         """``found`` of all ranks (elements/wear.py): whether there is something to remove now."""
@@ -151,7 +153,7 @@ class Erosion:
     def particles(self) -> int:
         """Nodes without tets that fly on; all ranks take part."""
         nodes = self._model.nodes
-        return int(self._comm.sum(np.array([(nodes.owned & (self._tets_at == 0) & ~self.removed).sum()]))[0])
+        return int(self._comm.sum(np.array([(nodes.owned & self._loose).sum()]))[0])
 
     def note(self, state: Nodes) -> None:
         """Before the kick: books the second half of what the last removal has begun."""
@@ -203,17 +205,28 @@ class Erosion:
         leaving = self._leaves & alone & ~self.removed
         self._leaving, self.removed = np.flatnonzero(leaving), self.removed | leaving
         self._before = state.v[self._leaving]
+        self._release()
         if self._contact is not None:
-            self._contact.uncover(np.concatenate(gone), alone & ~self.removed, self.removed)
+            self._contact.uncover(np.concatenate(gone), self._loose, self.removed)
+
+    @property
+    def _loose(self) -> Flags:
+        """(nodes,) those without tets that fly on."""
+        return np.asarray((self._tets_at == 0) & ~self.removed)
+
+    def _release(self) -> None:
+        """Boundaries take nodes without tets for particles."""
+        for bound in self._bounds:
+            bound.release(self._loose, self._bounds)
 
     def _unload(self, gone: Ints) -> None:
         """Tets ``gone`` from this rank, global ids, carry no boundary any more, which acts on every rank that holds a
         node of theirs; all ranks take part.
         """
-        if self._loads:
+        if any(bound.on_faces for bound in self._bounds):
             gone = self._comm.join(gone)
-            for load in self._loads:
-                load.drop(gone)
+            for bound in self._bounds:
+                bound.drop(gone)
 
     def _completed(self, tets: list[Ints]) -> Ints:
         """(nodes,) how many of these tets of all ranks have each node; all ranks take part."""

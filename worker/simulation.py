@@ -142,7 +142,7 @@ def build(case: Case, folder: Path, comm: Comm, say: Say = quiet) -> Simulation:
     """
     model, piece = domain.build(case, folder, comm, say)
     say("setting up the first step")
-    scene = conditions.build(case, model, piece.loads)
+    scene = conditions.build(case, model, piece.loads, comm)
     told = conditions.start(case, model, scene, comm)
     sim = _assemble(case, model, piece.neighbours, scene, piece.node_volume, comm, Timers(comm))
     sim.warnings = *piece.warnings, *told
@@ -166,7 +166,7 @@ def _assemble(
     if case.erodes:
         erosion = Erosion(case, model, neighbours, contact, scene, comm, clock, extremes)
     if case.boundaries_of(Symmetry):
-        scene.append(Mirrors.of(case, model, scene))
+        scene.append(Mirrors.of(case, model, scene, comm))
     walls = next((bound for bound in scene if type(bound) is RigidWalls), None)
     probes = Probes(case, model, contact, walls, clock, comm)
     elements = _elements(case, model, neighbours, scene, node_volume, comm, timers)
@@ -210,7 +210,7 @@ def resume(case: Case, arrived: Arrived, comm: Comm, timers: Timers) -> Simulati
     """Goes on with what has arrived; all ranks take part."""
     parcel, known = arrived.parcel, arrived.parcel.known
     model = model_of.resume(case, arrived, comm)
-    scene = conditions.build(case, model, conditions.loads(parcel))
+    scene = conditions.build(case, model, conditions.loads(parcel), comm)
     sim = _assemble(case, model, arrived.neighbours, scene, np.ones(model.nodes.n), comm, timers)
     sim.reduction.resume(known["reduction"])
     sim.clock.resume(known["clock"])

@@ -14,7 +14,7 @@ and at once f(n+1) from it, so a step begins with forces that are already at han
  8  contact: impulses of active contacts                   v*(n+1/2)
  9  walls, mirror images behind symmetry planes            v*(n+1/2) -> v(n+1/2)
 10  output at time n: ledger, probes, frames               x(n), stress(n)
-11  positions                                              x(n) -> x(n+1)
+11  positions; debris past a plane becomes its image       x(n) -> x(n+1)
 12  velocity gradient at x(n+1/2), stress, pressure        stress(n) -> stress(n+1)
 13  internal forces, limits of the next step               f(n+1)
 14  complete shared nodes, step reduction                  the exchange of the step
@@ -110,6 +110,8 @@ def second_half(sim: Simulation) -> None:
     with sim.timers.phase("nodes"):
         # 11: x(n+1) = x(n) + dt v(n+1/2)
         move(nodes.x, nodes.v, nodes.force, nodes.stepping, clock.dt, clock.shorter / sim.scale)
+        for boundary in sim.boundaries:
+            boundary.after_move(nodes)  # images of debris that passes a symmetry plane
         clock.advance()
         if sim.contact is not None:
             own = sim.reduction.own

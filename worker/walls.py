@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .boundaries import KEPT, Boundary, book_half, free
+from .boundaries import KEPT, Boundary, book_half, free, mirrored
 from .jit import njit
 from .migration.parcel import Parcel
 from .state import Bits, Flags, Floats, Indices, Ints, Nodes, extended
@@ -57,6 +57,9 @@ class RigidWalls(Boundary):
             behind = ((point - state.x[self.nodes[self._held[:, k]]]) * normal).sum(axis=1)
             depths[k] = behind.max(initial=-np.inf)
         return depths
+
+    def release(self, loose: Flags, bounds: list[Boundary]) -> None:
+        self._mirrored = mirrored(len(loose), bounds)[self.nodes]
 
     def _inherit(self, at: Ints) -> None:
         self._held = extended(self._held, self._held[at])

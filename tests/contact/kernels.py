@@ -169,11 +169,12 @@ class Solver:
         self.total = np.zeros((n, 3), np.int64)
         nothing, every, part = np.zeros((0, 3)), np.arange(n, dtype=np.int32), np.ones(n, np.int32)
         part[0] = 0
-        self.active = active or ActiveSet(scale, stops or Stops(nothing, nothing, np.zeros((0, 2)), np.zeros(0)))
+        none = Stops(nothing, nothing, np.zeros((0, 2)), np.zeros(0), np.zeros(0, bool))
+        self.active = active or ActiveSet(scale, stops or none)
         self._crowd = Crowd(np.arange(n), every, part, part, mobility, np.zeros((n, 3)), self.v, self.v)
         self._nodes: Any = SimpleNamespace(v=self.v, part=part, owned=np.ones(n, bool))
         alone = Company([], SerialComm()).agree(met.nodes, every)
-        self.active.begin(met, many(met), self._crowd, alone, size=1.0, dt=1.0)
+        self.active.begin(met, many(met), self._crowd, np.zeros(n, bool), alone, size=1.0, dt=1.0)
         self.active.weigh()
 
     @property

@@ -18,7 +18,7 @@ CUBE = block((1, 1, 1), 1.0)
 def wall(normal: Floats, side: float = 1.0, at: float = 0.0, friction: float = 0.0) -> Stops:
     """Of the first node alone."""
     unit = np.array([normal]) / np.linalg.norm(normal)
-    return Stops(np.array([[at, 0.0, 0.0]]), unit, np.array([[side, 0.0]]), np.array([friction]))
+    return Stops(np.array([[at, 0.0, 0.0]]), unit, np.array([[side, 0.0]]), np.array([friction]), np.zeros(1, bool))
 
 
 def pressed(stops: Stops, speed: float = 1.0, n: int = 3, mobility: Floats | None = None) -> Solver:
@@ -97,3 +97,4 @@ def test_walls_and_planes_hold_the_parts_that_they_name_on_their_side() -> None:
         assert stops.normals == pytest.approx(np.array([[0.0, 0.6, 0.8], [0.0, 0.0, 1.0]]))
         assert stops.sides.tolist() == [[0.0, 1.0, 0.0], [1.0, -1.0, 0.0]]
         assert stops.friction.tolist() == [0.3, 0.0]
+        assert stops.mirrors.tolist() == [False, True]

@@ -424,23 +424,24 @@ def flying(velocity: float, side: float) -> Simulation:
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_a_particle_does_not_cross_a_symmetry_plane(side: float) -> None:
+def test_a_particle_turns_round_at_a_symmetry_plane(side: float) -> None:
+    """With all of its energy; what starts on the plane is held there first, and has none."""
     sim = flying(-side * 2000.0, side)
     nodes, part = sim.model.nodes, sim.model.blocks[0]
-    mine = nodes.part == 0
+    mine, kinetic = nodes.part == 0, sim.ledger.initial
     residuals = [tick(sim, part.id.copy())]
     residuals += [tick(sim) for _ in range(25)]
     assert sim.clock.t * 2000.0 > 2.0 * MM
     assert (side * nodes.x[mine, 0] >= -1e-15).all()
-    assert (np.abs(nodes.x[mine, 0]) < 1e-15).all()
+    assert side * nodes.v[mine & (nodes.x0[:, 0] != 0.0), 0] == pytest.approx(2000.0, rel=1e-9)
     assert max(residuals) < 1e-12
     loss = sum(bound.contact_loss.sum() for bound in sim.boundaries if isinstance(bound, Mirrors))
-    assert loss == pytest.approx(sim.ledger.initial, rel=1e-12)
+    assert abs(loss) < 1e-12 * kinetic
 
 
-def test_mirrors_hold_what_starts_off_the_plane() -> None:
+def test_mirrors_hold_what_starts_off_the_plane_or_may_leave_it() -> None:
     sim = flying(0.0, 1.0)
-    assert sum(len(bound.nodes) for bound in sim.boundaries if isinstance(bound, Mirrors)) == 18
+    assert sum(len(bound.nodes) for bound in sim.boundaries if isinstance(bound, Mirrors)) == 27
 
 
 @pytest.mark.parametrize("ranks", [1, 2])

@@ -29,7 +29,9 @@ class Exterior:
     ) -> None:
         """``edges``: whether sharp edges meet each other; all ranks take part."""
         self._model, self._neighbours, self._comm, self._edges = model, neighbours, comm, edges
-        self._planes = symmetry_planes(model.nodes.n, bounds)
+        self._bounds, self._planes = bounds, symmetry_planes(model.nodes.n, bounds)
+        self._loose = np.zeros(model.nodes.n, bool)
+        """(nodes,) those without tets that fly on."""
         self.cracks = Cracks.none(model.nodes.id)
         self._tiring: Ints | None = None
         """Ids, ascending, of the tets here that the last search has expected to leave; None before any tet has left."""
@@ -47,6 +49,7 @@ class Exterior:
         parcel.nodes["family"] = self.cracks.families.root
         parcel.rows["contact.turned"] = {"tet": self.surface.turned >> 34, "name": self.surface.turned}
         parcel.nodes["contact.flags"], parcel.nodes["contact.moments"] = self.surface.flags, self._moments
+        parcel.nodes["contact.loose"] = self._loose
 
     def resume(self, parcel: Parcel, size: float, broken: bool) -> None:
         """Takes them back; all ranks take part."""
@@ -56,8 +59,9 @@ class Exterior:
         self.surface.turned = turned  # those at cracks, too, which the next search brings to the surface
         self.surface.flags = np.array(parcel.nodes["contact.flags"])
         self._moments = np.array(parcel.nodes["contact.moments"])
+        self._loose = np.array(parcel.nodes["contact.loose"])
         nodes = self._model.nodes
-        self.flight = Flight(self.surface, nodes, self.flight.mobility, size, self._comm)
+        self.flight = Flight(self.surface, nodes, mobilities(nodes, self._bounds), size, self._comm)
         root = np.array(parcel.nodes["family"])
         self.cracks = Cracks.resume(parcel.rows["contact.cracks"], root, self._model.blocks, nodes)
 
@@ -114,6 +118,7 @@ class Exterior:
         flags |= loose
         flags &= ~removed
         self.flight.forget(removed)
+        self._loosen(loose)
         self.turn()
         if scene is not None:
             scene.node_face.wake()
@@ -121,7 +126,13 @@ class Exterior:
             return True
         scene.uncover(laid.gone, laid.bare, scene.own.place[removed])
         self.show(scene, scene.own.local)
+        scene.crowd.mobility[scene.own.slots] = self.flight.mobility[scene.own.local]
         return False
+
+    def _loosen(self, loose: Flags) -> None:
+        """Nodes without tets move as what still holds them lets them."""
+        if (loose & ~self._loose).any():
+            self._loose, self.flight.mobility = loose, mobilities(self._model.nodes, self._bounds)
 
     def crack(self, tets: Ints, nodes: Indices, sides: Indices) -> None:
         """Takes up broken facets; see ``Cracks.add``."""
@@ -152,6 +163,7 @@ class Exterior:
         local, place = local[place >= 0], place[place >= 0]
         scene.slots.normals[place] = normals.means(self._moments[local])
         scene.slots.on_surface[place] = self.surface.flags[local]
+        scene.slots.loose[place] = self._loose[local]
         return np.asarray(place)
 
     def refresh(self, course: Floats, t: float) -> None:
@@ -213,6 +225,7 @@ class Exterior:
     def grow(self, split: Split) -> None:
         """Takes up the copies of nodes."""
         parents, flight = split.copies.parents, self.flight
+        self._loose = extended(self._loose, np.zeros(len(parents), bool))
         self._planes = extended(self._planes, self._planes[parents])
         flight.mobility = extended(flight.mobility, flight.mobility[parents])
         for some in (parents, split.first + np.arange(split.copies.n)):

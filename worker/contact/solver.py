@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 
 from ..parallel.fixed_point import Tally
-from ..state import Floats, Indices, Ints, Nodes
+from ..state import Flags, Floats, Indices, Ints, Nodes
 from . import booking, held, need, stops, sweeps
 from .account import Account
 from .active import IMPULSE, PUSH, PUSH_T, ActiveContacts, ActiveNodes, Kept, Loaded
@@ -38,9 +38,11 @@ class ActiveSet:
         """Of a run that goes on; ``sides`` as of its stops."""
         self.scale, self.stops = scale, self.stops._replace(sides=sides.reshape(self.stops.sides.shape))
 
-    def begin(self, found: ContactRows, n: int, crowd: Crowd, shared: ActiveSum, size: float, dt: float) -> None:
+    def begin(
+        self, found: ContactRows, n: int, crowd: Crowd, loose: Flags, shared: ActiveSum, size: float, dt: float
+    ) -> None:
         """Takes up the first ``n`` contacts that were ``found`` in a step ``dt``, s, and the nodes whose sums are
-        ``shared``; ``size``: of a face, m.
+        ``shared``; ``loose`` (crowd,): nodes without tets; ``size``: of a face, m.
         """
         self._sum = shared
         if len(self._slot) != crowd.n:
@@ -55,7 +57,7 @@ class ActiveSet:
         self.places = room.places[: self._n]
         shared.number(slot)
         self._fastest = held.load(room.active, self.places, crowd.v, crowd.mobility)
-        stops.find(room.braced, room.active, self.stops, self.places, crowd.x, crowd.part, size, dt)
+        stops.find(room.braced, room.active, self.stops, self.places, crowd.x, crowd.part, loose, size, dt)
         stops.stop(room.active, room.braced)
         self._contacts = ActiveContacts(
             room.slots, found.weights, found.normals, found.wanted, found.friction, found.pair, room.reach

@@ -15,11 +15,11 @@ import numpy as np
 from conoid.cases import schema
 from conoid.cases.schema import Case
 
-from ..conditions import AXES, sides
+from ..conditions import AXES, part_sides
 from ..jit import njit, record, types
 from ..parallel.comm import Comm
 from ..selection import named
-from ..state import Floats, Indices, Ints, Model
+from ..state import Flags, Floats, Indices, Ints, Model
 from ..walls import ACROSS
 from .active import MOBILITY, NODES, V
 
@@ -39,6 +39,8 @@ class Stops(NamedTuple):
     """(k, parts) 1 where a part stays in front, -1 behind, 0 where it is not held."""
     friction: Floats
     """(k,) Coulomb's coefficient."""
+    mirrors: Flags
+    """(k,) which are planes of symmetry: they let nodes without tets pass."""
 
     @classmethod
     def of(cls, case: Case, model: Model, comm: Comm) -> "Stops":
@@ -51,17 +53,15 @@ class Stops(NamedTuple):
         heights = [plane.at for _, plane in planes]
         points = [wall.point for _, wall in walls] + [at * axis for at, axis in zip(heights, axes, strict=True)]
         normals = np.array([wall.normal for _, wall in walls] + axes, float).reshape(-1, 3)
-        found = np.zeros((2, len(points), len(model.parts)))
+        held = np.zeros((len(points), len(model.parts)))
         for k, (_, wall) in enumerate(walls):
-            found[0, k] = named(wall, model.parts)
+            held[k] = named(wall, model.parts)
         for k, (_, plane) in enumerate(planes, len(walls)):
-            side = sides(plane, model)
-            for way, sign in enumerate((1.0, -1.0)):
-                found[way, k, model.nodes.part[side == sign]] = 1.0
-        ahead, behind = comm.maximum(found.ravel()).reshape(found.shape)
+            held[k] = part_sides(plane, model, comm)
         normals /= np.linalg.norm(normals, axis=1)[:, None]
         friction = np.array([*(wall.friction for _, wall in walls), *(0.0 for _ in planes)])
-        return cls(np.array(points, float).reshape(-1, 3), normals, ahead - behind, friction)
+        mirrors = np.arange(len(points)) >= len(walls)
+        return cls(np.array(points, float).reshape(-1, 3), normals, held, friction, mirrors)
 
 
 class Braced(NamedTuple):
@@ -92,19 +92,22 @@ class Braced(NamedTuple):
 
 
 _F1, _F2, _N1, _N2 = types.float64[::1], types.float64[:, ::1], types.int32[::1], types.int32[:, ::1]
-STOPS = record(Stops, _F2, _F2, _F2, _F1)
+_B1 = types.boolean[::1]
+STOPS = record(Stops, _F2, _F2, _F2, _F1, _B1)
 BRACED = record(Braced, _N2, _F2, _F1, _F1, _F2, _F1, types.int64[::1])
 
 
-@njit(types.void(BRACED, NODES, STOPS, _N1, _F2, _N1, types.float64, types.float64), cache=True)
-def find(braced, active, stops, places, x, part, size, dt):  # type: ignore[no-untyped-def]
-    """The slots near a stop in a step ``dt``, s; ``x`` and ``part`` of the crowd, ``size`` of a face, m."""
+@njit(types.void(BRACED, NODES, STOPS, _N1, _F2, _N1, _B1, types.float64, types.float64), cache=True)
+def find(braced, active, stops, places, x, part, loose, size, dt):  # type: ignore[no-untyped-def]
+    """The slots near a stop in a step ``dt``, s; ``x``, ``part`` and who is ``loose``, without tets, of the crowd;
+    ``size`` of a face, m.
+    """
     fixed, n = active.fixed, 0
     for k in range(len(stops.points)):
         for s in range(len(places)):
             a = places[s]
             side = stops.sides[k, part[a]]
-            if side == 0.0:
+            if side == 0.0 or (stops.mirrors[k] and loose[a]):
                 continue
             gap, along = 0.0, 0.0
             for i in range(3):

@@ -1,0 +1,151 @@
+"""A quarter, a half and the whole of a rod that erodes in a target: ``python -m tests.bench.sectors [SIZE]``.
+
+A rod of tungsten alloy, 5 x 20 mm, hits a cylinder of 4340 steel, 40 x 45 mm, at 1.5 km/s; both erode at a strain of
+1.5; ``SIZE`` of the tets in mm, 1 if not given. gmsh makes each mesh anew; ``mirrored`` is the whole whose mesh is that
+of the quarter and its images. After 60 us: depth of the hole; share of the mass of the nodes without tets within a
+quarter of SIZE of the axis, and within the radius of the rod; what a uniform spread over the rod's radius would have
+within a quarter of SIZE; momentum along the axis that the rod still has.
+"""
+
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+
+from conoid.cases import schema
+from conoid.cases.load import parse_case
+from conoid.worker import assembly, penetration, reference, simulation, step
+from conoid.worker.mesh.build import build
+from conoid.worker.mesh.model import TetMesh
+from conoid.worker.parallel.comm import SerialComm
+from conoid.worker.simulation import Simulation
+
+MM = 1e-3
+ROD = 2.5 * MM
+IMAGES = {"quarter": 4, "half": 2, "full": 1}
+
+
+def case_of(
+    sector: str, size: float, end: float = 60e-6, rod: float = 20 * MM,
+    target: tuple[float, float] = (20 * MM, 45 * MM), strain: float = 1.5, **keys: Any,
+) -> schema.Case:  # fmt: skip
+    """The scene: length of the ``rod``, radius and length of the ``target``, m, the ``strain`` at which tets leave;
+    ``keys`` of both meshes besides.
+    """
+
+    def part(name: str, material: str, speed: float, low: float, radius: float, length: float) -> dict[str, Any]:
+        mesh = {
+            "shape": "cylinder", "base": [0.0, 0.0, low], "radius": radius, "length": length, "sector": sector,
+            "element_size": size, **keys,
+        }  # fmt: skip
+        return {
+            "name": name, "material": material, "velocity": [0.0, 0.0, speed], "temperature": 298.0,
+            "erosion": {"plastic_strain": strain}, "mesh": mesh,
+        }  # fmt: skip
+
+    parts = [
+        part("rod", "tungsten_alloy", 1500.0, -rod, ROD, rod),
+        part("target", "steel_4340", 0.0, 0.0, *target),
+    ]
+    if keys.get("generator") != "structured":
+        parts[1]["mesh"]["grading"] = {"axis": "z", "near": 4 * MM, "far": 18 * MM, "far_size": 4 * MM}
+    planes = [{"kind": "symmetry", "axis": axis} for axis in {"quarter": "xy", "half": "x", "full": ""}[sector]]
+    depth = {
+        "quantity": "penetration", "part": "rod", "axis": "z", "value": 25 * MM, "tolerance": 25 * MM, "source": "-",
+    }  # fmt: skip
+    return parse_case({
+        "name": "sectors", "parts": parts, "boundaries": planes, "run": {"end_time": end, "frames": 0},
+        "reference": [depth],
+    })  # fmt: skip
+
+
+def images(mesh: TetMesh, axes: tuple[int, ...]) -> TetMesh:
+    """The mesh and its images at the planes across these axes, which have their nodes in common."""
+    x, tets = mesh.points.copy(), mesh.tets
+    for axis in axes:
+        on = np.abs(x[:, axis]) < 1e-9
+        x[on, axis] = 0.0
+        image = x[~on]
+        image[:, axis] *= -1.0
+        number = np.where(on, np.arange(len(x)), len(x) + np.cumsum(~on) - 1)
+        x = np.concatenate([x, image])
+        tets = np.concatenate([tets, number[tets][:, [0, 2, 1, 3]].astype(tets.dtype)])
+    return TetMesh(np.ascontiguousarray(x), np.ascontiguousarray(tets))
+
+
+def mirrored(case: schema.Case) -> Simulation:
+    """The whole, whose mesh is that of the quarter and its images."""
+
+    def images_of(mesh: Any, *args: Any, **keys: Any) -> TetMesh:
+        return images(build(mesh.model_copy(update={"sector": "quarter"}), *args, **keys), (0, 1))
+
+    with patch.object(assembly, "build_mesh", images_of):
+        return simulation.build(case, Path(), SerialComm())
+
+
+@dataclass(frozen=True)
+class End:
+    """What is left of a run; masses and momenta of the whole body."""
+
+    depth: float
+    """m."""
+    rod: float
+    """Momentum of the rod and its debris along the axis, kg m/s."""
+    near: tuple[float, float]
+    """Mass of nodes without tets within a quarter of an element of the axis, and within the radius of the rod, kg."""
+    kinetic: float
+    """J."""
+
+
+def run(sim: Simulation) -> End:
+    """To the end time."""
+    step.prepare(sim)
+    thick = reference.thicknesses(sim)
+    while True:
+        before = sim.model.nodes.v.copy()
+        step.first_half(sim)
+        if sim.clock.done:
+            step.end(sim, before)
+            return _end(sim, thick[0])
+        step.second_half(sim)
+
+
+def _end(sim: Simulation, thick: Any) -> End:
+    nodes, (spec,) = sim.model.nodes, sim.case.reference
+    mesh: Any = sim.case.parts[0].mesh
+    many, rod = IMAGES[mesh.sector], nodes.part == 0
+    loose = np.ones(nodes.n, bool)
+    for block in sim.model.blocks:
+        loose[block.tets] = False
+    away = np.hypot(nodes.x[:, 0], nodes.x[:, 1])
+    rows, radius = reference._passed(sim, spec)
+    near = [float(many * nodes.mass[loose & (away < limit)].sum()) for limit in (0.25 * mesh.element_size, ROD)]
+    return End(
+        penetration.depth(rows, np.array(thick), radius), float(many * (nodes.mass * nodes.v[:, 2])[rod].sum()),
+        (near[0], near[1]), float(0.5 * many * (nodes.mass * (nodes.v * nodes.v).sum(axis=1)).sum()),
+    )  # fmt: skip
+
+
+def main(size: float = 1.0) -> None:
+    """Prints the table."""
+    spread = (0.25 * size * MM / ROD) ** 2
+    print(f"| mesh of {size:g} mm | tets | CPU s | depth mm | near the axis | expected | momentum left, kg m/s |")
+    print("| --- | ---: | ---: | ---: | ---: | ---: | ---: |")
+    for name in ("quarter", "half", "full", "mirrored"):
+        case = case_of("full" if name == "mirrored" else name, size * MM)
+        sim = mirrored(case) if name == "mirrored" else simulation.build(case, Path(), SerialComm())
+        tets, began = sim.model.elements_global, time.process_time()
+        end = run(sim)
+        print(
+            f"| {name} | {tets:,} | {time.process_time() - began:.0f} | {end.depth / MM:.1f} | "
+            f"{end.near[0] / end.near[1]:.1%} | {spread:.1%} | {end.rod:.2f} |",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main(*(float(word) for word in sys.argv[1:2]))
