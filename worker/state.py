@@ -69,8 +69,8 @@ PORES = 21
 """Of the pores that a tension cut-off has opened: their volume over that of the solid matter; with a linear pressure
 the logarithm of one and that."""
 HEAT = 22
-"""Energy that the pressure of a flat tet sees, a volume of matter, over the bulk modulus at rest (averaged pressure
-forms, where the equation of state has heat; that of the others is of their nodes, elements/matter.py)."""
+"""Energy that the pressure of a tet is computed with, a volume of matter, over the bulk modulus at rest (averaged
+pressure forms, where the equation of state has heat): of a flat tet its own, of the others a mean over their nodes."""
 UNTOLD = 22
 """The same row in Johnson-Holmquist's law: bulking of the last step, Pa, that the nodes do not have yet (averaged
 pressure forms)."""

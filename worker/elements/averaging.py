@@ -92,8 +92,7 @@ class AveragedElements(Elements):
         if self.split:
             self.pressure -= self._bulk * self._strain
         if self._kinds.any():
-            heat, part = self._more if self._columns > 2 else np.zeros_like(self._strain), self.model.nodes.part
-            matter.press_nodes(self._matter, self._strain, heat, part, self._kinds, self._params)
+            matter.press_nodes(self._matter, self._strain, self.model.nodes.part, self._kinds, self._params)
         self._begin(scale)
         self._gradient[:] = 0
         self._scale = scale

@@ -1,27 +1,26 @@
 """The matter at the nodes, in the averaged pressure forms: where the pressure is not linear in the volume strain.
 
-The volume strain of a node is a mean over its tets, so each node has a ratio of volumes, heat and pores of its own, and
-a pressure of these. The pressure of a tet is the mean of its four nodes. Then the work of the forces on the own volumes
+The volume strain of a node is a mean over its tets, so each node has a ratio of volumes and pores of its own, and a
+pressure of these. The pressure of a tet is the mean of its four nodes. Then the work of the forces on the own volumes
 of the tets is what the pressures of the nodes do on the volumes of the nodes:
 
     sum_e V_e e_e mean_a(p_a) = sum_a p_a V_a e_a,    V_a e_a = sum_e V_e e_e / 4
 
-and no energy is made or lost by the mean (docs/numerics.md, What averaging takes). A pressure that is linear in the
-strain is a mean of four by itself, and stays with the tet.
+and no energy is made or lost by the mean (docs/numerics.md, "Matter at the nodes"). Nodes have the pressure of a linear
+material with a tension cut-off. A pressure that is linear in the strain is a mean of four by itself, and stays with the
+tet; so does the pressure of an equation of state with heat.
 """
 
 import numpy as np
 
 from ..jit import njit
 from ..materials.elastic import sheared
-from ..materials.equation_of_state import cold, modulus
-from ..materials.law import BULK, DENSITY, DILATES, EQUATION, FROM_SHAPE, ORDER, SHEAR, SPALL
+from ..materials.law import BULK, DENSITY, DILATES, FROM_SHAPE, ORDER, SHEAR, SPALL
 from ..state import (
     CHUNK,
     MASS,
     PORES,
     PRESSURE,
-    VOLUME_RATIO,
     WORK,
     WORK_AVERAGED,
     WORK_PLASTIC,
@@ -29,24 +28,22 @@ from ..state import (
 )
 from .tet4 import CHANGE, MODULUS
 
-RATIO, HEAT, PORES_AT, PRESSURE_AT, WORKED, TORN, OPENED, STIFF = range(8)
-"""Columns by node. Of the state: ratio of volumes, of the matter with an equation of state and of the whole else;
-energy a volume over the bulk modulus; pores as in state.PORES; pressure, Pa. Of the step, each a volume at the start:
-work of the pressure, J/m^3; what of it is lost in pores, J/m^3; volume of new pores. Modulus of the wave speed, Pa."""
+RATIO, PORES_AT, PRESSURE_AT, WORKED, TORN, OPENED, STIFF = range(7)
+"""Columns by node. Of the state: ratio of volumes; pores as in state.PORES; pressure, Pa. Of the step, each a volume at
+the start: work of the pressure, J/m^3; the part of it that is lost in pores, J/m^3; volume of new pores. Modulus of the
+wave speed, Pa."""
 COLUMNS = 8
-"""How many: a line of the cache by node."""
-TETS, LINEAR, GRUNEISEN = range(3)
-"""Whose the pressure is: of the tets; of the nodes, linear with a tension cut-off; of the nodes, with heat."""
+"""The columns above and one that is not used: a row is a cache line."""
+TETS, LINEAR = range(2)
+"""Where the pressure is computed: in the tets; at the nodes, linear with a tension cut-off."""
 
-_GAMMA = EQUATION + 2
-"""Place of gamma0 among the constants of Mie-Grueneisen's equation (equation_of_state.py)."""
-_P, _MASS, _WORK, _RATIO, _PORES = (row * CHUNK for row in (PRESSURE, MASS, WORK, VOLUME_RATIO, PORES))
+_P, _MASS, _WORK, _PORES = (row * CHUNK for row in (PRESSURE, MASS, WORK, PORES))
 _TAKEN, _PLASTIC = WORK_AVERAGED * CHUNK, WORK_PLASTIC * CHUNK
 
 
 @njit("int64(int64, float64[::1])", cache=True)
 def whose(eos, params):  # type: ignore[no-untyped-def]
-    """TETS, LINEAR or GRUNEISEN, by the number of the equation of state and the constants of a part.
+    """TETS or LINEAR, by the number of the equation of state and the constants of a part.
 
     With heat it stays with the tets: a node at the surface of a strong shock is compressed further than the mean of
     four (at 10 km/s beyond what the step follows). That of what dilates has a share of the tet's own flow.
@@ -83,46 +80,15 @@ def _linear(at, params, strain):  # type: ignore[no-untyped-def]
     _book(at, bulk, old, before, after, opened)
 
 
-@njit("void(float64[::1], float64[::1], float64, float64)", cache=True, error_model="numpy")
-def _gruneisen(at, params, strain, heat):  # type: ignore[no-untyped-def]
-    """As materials/equation_of_state.py has it for a tet, with the heat of the node."""
-    bulk, gamma, spall = params[BULK], params[_GAMMA], params[SPALL]
-    old, pores, half = at[PRESSURE_AT], at[PORES_AT], 0.5 * strain
-    at[HEAT] += heat
-    ratio = at[RATIO] * (1.0 + half) / (1.0 - half)
-    moved = ratio - at[RATIO]
-    before, after, opened = (1.0 + pores) * at[RATIO], (1.0 + pores) * ratio, 0.0
-    known, factor = gamma * (bulk * at[HEAT] - 0.5 * old * moved), 1.0 + 0.5 * gamma * moved
-    base, tangent = cold(params, ratio)
-    p = (base + known) / factor
-    if p < -spall or (pores > 0.0 and p > 0.0):
-        p = -spall if p < 0.0 else 0.0
-        ratio = 1.0 - (p * factor - known) / bulk
-        if ratio > after:
-            ratio = after
-            p = (cold(params, ratio)[0] + known) / factor
-        tangent = cold(params, ratio)[1]
-        at[PORES_AT] = after / ratio - 1.0
-        opened = 0.5 * (before + after) * (1.0 - (1.0 + pores) * ratio / after)
-    at[RATIO], at[PRESSURE_AT], at[STIFF] = ratio, p, modulus(params, ratio, tangent, p)
-    _book(at, bulk, old, before, after, opened)
-
-
-@njit(
-    "void(float64[:, ::1], float64[::1], float64[::1], int32[::1], int64[::1], float64[:, ::1])",
-    cache=True,
-    error_model="numpy",
-)
-def press_nodes(matter, strain, heat, part, kinds, params):  # type: ignore[no-untyped-def]
-    """The columns of n+1 of ``matter`` (nodes, COLUMNS), from volume strain and heat (nodes,) of the step; ``part``
+@njit("void(float64[:, ::1], float64[::1], int32[::1], int64[::1], float64[:, ::1])", cache=True, error_model="numpy")
+def press_nodes(matter, strain, part, kinds, params):  # type: ignore[no-untyped-def]
+    """The columns of n+1 of ``matter`` (nodes, COLUMNS), from the volume strain (nodes,) of the step; ``part``
     (nodes,), ``kinds`` (parts,) as ``whose`` has it and ``params`` (parts, SIZE).
     """
     for a in range(len(part)):
         k = part[a]
         if kinds[k] == LINEAR:
             _linear(matter[a], params[k], strain[a])
-        elif kinds[k] == GRUNEISEN:
-            _gruneisen(matter[a], params[k], strain[a], heat[a])
 
 
 @njit("float64(float64[:, ::1], uint32[:, ::1], int64, int64)", cache=True, error_model="numpy", forceinline=True)
@@ -132,11 +98,11 @@ def _mean(matter, tets, i, k):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    "void(float64[::1], float64[::1], float64[::1], float64[:, ::1], uint32[:, ::1], int64, int64)",
+    "void(float64[::1], float64[::1], float64[::1], float64[:, ::1], uint32[:, ::1], int64)",
     cache=True,
     error_model="numpy",
 )
-def take_means(w, s, params, matter, tets, kind, n):  # type: ignore[no-untyped-def]
+def take_means(w, s, params, matter, tets, n):  # type: ignore[no-untyped-def]
     """Pressure, its work and MODULUS of ``n`` tets from the matter at their nodes; WORK_AVERAGED: what it has done on
     the own volume less what at the nodes.
     """
@@ -148,9 +114,6 @@ def take_means(w, s, params, matter, tets, kind, n):  # type: ignore[no-untyped-
         s[_WORK + i] += work
         s[_TAKEN + i] += work - whole * _mean(matter, tets, i, WORKED)
         w[MODULUS + i] = _mean(matter, tets, i, STIFF)
-    if kind == GRUNEISEN:
-        for i in range(n):
-            s[_RATIO + i] = _mean(matter, tets, i, RATIO)
     if porous:
         for i in range(n):
             stored = 0.0 if shaped else sheared(s, params, i)
@@ -160,7 +123,7 @@ def take_means(w, s, params, matter, tets, kind, n):  # type: ignore[no-untyped-
 
 
 def at_start(nodes: int) -> Floats:
-    """(nodes, COLUMNS) of matter that is neither strained nor hot."""
+    """(nodes, COLUMNS) of matter that is not strained."""
     made = np.zeros((nodes, COLUMNS))
     made[:, RATIO] = 1.0
     return made

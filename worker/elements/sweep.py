@@ -152,7 +152,7 @@ def force_pass(motion, body, marks, scratch, means, begin, end, dt, scale):  # t
     strain, told, gradient, pressure = means.strain, means.more, means.gradient, means.pressure
     split, apart, matter = means.split, body.flat, means.matter
     shape, more, erodes = params[ORDER] == FROM_SHAPE, rows > UNTOLD, len(worn) > 0
-    kind = matter_of.whose(eos, params)
+    by_tets = matter_of.whose(eos, params) == matter_of.TETS
     for c in range(begin, end):
         t, s = tets[c * CHUNK : (c + 1) * CHUNK], state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
         first, last, n = c * CHUNK, c * CHUNK + len(t), len(t)
@@ -176,7 +176,7 @@ def force_pass(motion, body, marks, scratch, means, begin, end, dt, scale):  # t
         if shape and not more:
             strengthen(strength, w, s, params, n, dt)
         averaged.gather_strains(w, strain, t, n)
-        if more and kind == matter_of.TETS:
+        if more:
             if rows == HEATED:
                 gather_heat(s, told, t, n)
             else:
@@ -191,18 +191,18 @@ def force_pass(motion, body, marks, scratch, means, begin, end, dt, scale):  # t
             see_own(w, s, params, flat, rows, n)
         swell(eos, w, s, params, n)
         keep_before(w, s, params, n)
-        if kind == matter_of.TETS:
+        if by_tets:
             press(eos, w, s, params, n)
         else:
             alone = s.copy() if len(flat) > 0 else s[:0]
-            matter_of.take_means(w, s, params, matter, t, kind, n)
+            matter_of.take_means(w, s, params, matter, t, n)
             if len(flat) > 0:
                 press_alone(eos, w, s, alone, params, flat, rows, n)
         chunks.viscosity_and_limit(w, s, params, n, dt, True)
         if not erodes:
             resist(w, s, params, n)
         chunks.return_at_pressure(strength, w, s, params, n, dt)
-        if kind == matter_of.TETS:
+        if by_tets:
             book_averaged(w, s, params, n)
         if len(upset) > 0:
             let_go(w, s, upset, x, v, t, rows, n, 0.0)

@@ -130,8 +130,8 @@ def mie_gruneisen(w, s, params, n):  # type: ignore[no-untyped-def]
 
     e is the work done so far (stress, plastic and viscous) over the mass. The energy equation with the mean pressure
     of the step is linear in the new pressure and solved in closed form. The factor 1 - gamma chi / 2 applies to
-    compression only. In the averaged forms this is the pressure of flat tets alone: e is HEAT, up to this step's work
-    of the pressure on the volume that it sees. The others have that of their nodes (elements/matter.py).
+    compression only. In the averaged forms e is HEAT, a mean over nodes but for flat tets, up to this step's work of
+    the pressure; that work is the one on the averaged volume.
     """
     gamma, heating = params[_GAMMA], params[_GAMMA] * params[DENSITY]
     averaged, bulk = len(s) > TOLD * CHUNK, params[BULK]
