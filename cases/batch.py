@@ -153,7 +153,7 @@ _TEMPLATE = """#!/bin/bash
 def read_site(path: Path) -> Site:
     """The settings file of a site. Raises SiteError."""
     try:
-        site = msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), Site)
+        site = msgspec.convert(tomllib.loads(whole.read_text(path)), Site)
         if site.slurm is not None:
             _check(site.slurm)
         policy.check(site.queue, site.quota, site.caps, site.retention, site.http)

@@ -11,6 +11,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from . import whole
 from .checks import check, check_parts
 from .library import library, material
 from .problems import CaseError, Problem, from_pydantic, problem, shown
@@ -70,7 +71,7 @@ def read_data(path: Path) -> dict[str, Any]:
     if path.suffix not in {".toml", ".json"}:
         raise CaseError([Problem("case", shown(str(path)), "a case file ends in .toml or .json")])
     try:
-        text = path.read_text(encoding="utf-8")
+        text = whole.read_text(path)
     except UnicodeDecodeError:
         raise CaseError([Problem("case", shown(str(path)), "this file is not UTF-8 text")]) from None
     except OSError as error:

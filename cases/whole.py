@@ -3,7 +3,7 @@
 import errno
 import os
 import stat
-from io import FileIO
+from io import BytesIO, FileIO, TextIOWrapper
 from pathlib import Path
 
 MOST = 256 << 20
@@ -71,6 +71,11 @@ def read(path: str | Path, most: int = MOST) -> bytes:
             pieces.append(piece)
             left -= len(piece)
     return b"".join(pieces)
+
+
+def read_text(path: str | Path) -> str:
+    """The text, in UTF-8, of such a file; line ends become line feeds. Raises UnicodeDecodeError besides."""
+    return TextIOWrapper(BytesIO(read(path)), encoding="utf-8").read()
 
 
 def check(path: str | Path, most: int = MOST) -> None:

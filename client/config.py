@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import urlsplit
 
+from conoid.cases import whole
 from conoid.cases.problems import shown
 
 from .errors import ClientError, UsageError
@@ -64,7 +65,7 @@ def read_config() -> dict[str, str]:
     """The keys of the configuration file; empty when there is none. Raises ClientError when it cannot be used."""
     path = config_file()
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        data = tomllib.loads(whole.read_text(path))
     except FileNotFoundError:
         return {}
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:

@@ -13,6 +13,7 @@ from typing import Annotated, Any
 
 import msgspec
 
+from conoid.cases import whole
 from conoid.cases.load import CaseError, Problem, apply_overrides
 from conoid.cases.problems import shown
 from conoid.cases.run import State
@@ -174,8 +175,8 @@ def points_in(path: Path) -> list[Point]:
     """The points in a CSV file: its first line has the keys. Raises CaseError."""
     named = repr(str(path))
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            head, *lines = [line for line in csv.reader(file) if line] or [[]]
+        text = whole.read_text(path).removeprefix("\ufeff")
+        head, *lines = [line for line in csv.reader(io.StringIO(text)) if line] or [[]]
     except OSError as error:
         raise CaseError([Problem("--list", named, str(error.strerror))]) from None
     except UnicodeDecodeError:

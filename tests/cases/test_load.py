@@ -1,6 +1,7 @@
 """From text to a case: every error at once, each one line under the key that the user wrote."""
 
 import json
+import os
 import time
 from pathlib import Path
 
@@ -178,9 +179,13 @@ def test_files(tmp_path: Path) -> None:
     good.write_text(ROD, encoding="utf-8")
     assert read_case(good) == parse_toml(ROD)
     (tmp_path / "bad.toml").write_bytes(b"\xff")
+    os.mkfifo(tmp_path / "pipe.toml")
+    (tmp_path / "endless.toml").symlink_to("/dev/zero")
     for name, message in (
         ("bad.toml", "this file is not UTF-8 text"),
         ("none.toml", "cannot read this file: No such file or directory"),
+        ("pipe.toml", "cannot read this file: is not a regular file"),
+        ("endless.toml", "cannot read this file: is not a regular file"),
         ("case.yaml", "a case file ends in .toml or .json"),
     ):
         with pytest.raises(CaseError) as caught:

@@ -305,6 +305,8 @@ def test_a_part_without_an_instance_is_told(tmp_path: Path) -> None:
         (f"{FLAT}*ELSET, ELSET=s\n1 2\n", "line 19: '1 2' is no element and no element set"),
         (f"{FLAT}*ELSET, ELSET=s, GENERATE\n1, 4, 2\n", "line 19: no steps of 2 lead from 1 to 4"),
         (f"{FLAT}*ELSET, ELSET=s, GENERATE\n4, 1\n", "line 19: no steps of 1 lead from 4 to 1"),
+        (f"{FLAT}*ELSET, ELSET=s, GENERATE\n1, 4, 0\n", "line 19: no steps of 0 lead from 1 to 4"),
+        (f"{FLAT}*ELSET, ELSET=s, GENERATE\n1, 99999999999, 1\n", "line 19: GENERATE makes 99999999999 numbers"),
         (f"{FLAT}*ELSET, ELSET=s, GENERATE\n1\n", "line 19: GENERATE takes a first number, a last one and a step"),
         (f"{FLAT}*ELSET, ELSET=s, GENERATED\n1, 2\n", r"line 18: \*ELSET: the parameter GENERATED is not followed"),
         (f"{FLAT}*ELSET, ELSET=s, G=1\n1, 2\n", r"line 18: \*ELSET: GENERATE has no value"),

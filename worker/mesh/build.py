@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 
+from conoid.cases import whole
 from conoid.cases.bodies import Mesh, MeshFile
 
 from ..errors import MeshError
@@ -104,7 +105,7 @@ def _content(mesh: Mesh, source: Path | None, key: str) -> str:
 
 def _file_digest(source: Path, mesh: MeshFile, key: str) -> str:
     try:
-        with source.open("rb") as file:
+        with whole.opened(source) as file:
             found = hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
         raise MeshError(f"{key}.path = {mesh.path!r}: {error.strerror}") from error

@@ -11,6 +11,8 @@ from .lines import fields, numbers, wholes
 
 _AXIS = 7
 """Numbers of a rotation: two points and an angle."""
+_MOST_MADE = 20_000_000
+"""Numbers that one line of GENERATE may make. Chosen: more than a mesh has that a machine of some 100 GB can run."""
 
 
 def element_rows(lines: Iterator[tuple[int, str]], kind: ElementType) -> Iterator[tuple[int, list[str]]]:
@@ -55,9 +57,12 @@ def numbers_of(line: int, text: str) -> "array[int]":
             f"line {line}: GENERATE takes a first number, a last one and a step; found {len(items)} numbers"
         )
     first, last, step = (*wholes(line, items), 1)[:3]
-    if last < first or (last - first) % step:
+    if step < 1 or last < first or (last - first) % step:
         raise MeshError(f"line {line}: no steps of {step} lead from {first} to {last}")
-    return array("q", range(first, last + 1, step))
+    made = range(first, last + 1, step)
+    if made.stop - made.start > step * _MOST_MADE:
+        raise MeshError(f"line {line}: GENERATE makes {(last - first) // step + 1} numbers; allowed are {_MOST_MADE}")
+    return array("q", made)
 
 
 def translation(line: int, text: str) -> tuple[float, ...]:
