@@ -17,6 +17,7 @@ from conoid.cases.figures import (
     counted,
     day,
     duration,
+    exact,
     exacts,
     fixed,
     large,
@@ -157,7 +158,7 @@ def files_table(case: Case, survey: Survey) -> Table:
     for each in survey.parts:
         part = case.parts[each.part]
         assert isinstance(part.mesh, MeshFile)
-        volume = f"{1e9 * each.mass / material(case, part.material).density:.6g} mm^3"
+        volume = exact(1e9 * each.mass / material(case, part.material).density, "mm^3")
         group = part.mesh.group or "all tets"
         made.add_row(part.name, part.mesh.path, group, count(each.nodes), volume, si(each.altitude, "m"))
     return made
@@ -168,7 +169,7 @@ def touching_table(case: Case, touches: Sequence[Touch]) -> Table:
     made = table("parts that touch, not joined", "area", right=("area",), wide=("parts that touch, not joined",))
     for touch in touches:
         names = " and ".join(case.parts[i].name for i in (touch.one, touch.other))
-        made.add_row(names, f"about {1e6 * touch.area:.3g} mm^2")
+        made.add_row(names, _about(touch.area, lambda value: si(value, "m^2")))
     return made
 
 

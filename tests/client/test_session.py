@@ -217,7 +217,7 @@ def test_files_are_fetched_where_the_server_says_and_nowhere_else(tmp_path: Path
         return httpx2.Response(200, json={"files": files})
 
     served(answer).run("r1").download(tmp_path)
-    assert asked == [f"http://conoid.test/v1/runs/r1/files{name}" for name in ("", "/a%FFb", "/a%20b")]
+    assert asked == [f"http://conoid.test/v1/runs/r1{name}" for name in ("", "/files", "/files/a%FFb", "/files/a%20b")]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a b", "a\\xffb"]
 
 

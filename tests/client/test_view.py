@@ -263,7 +263,7 @@ def test_a_fragment_keeps_its_colour_from_frame_to_frame() -> None:
 def test_cameras_are_read() -> None:
     assert direction("", "camera") is None
     assert direction("-x", "camera") == (-1.0, 0.0, 0.0)
-    assert direction("1, -1.5,.6", "camera") == (1.0, -1.5, 0.6)
+    assert direction("1, -1.5,.6", "camera") == pytest.approx((2 / 3, -1.0, 0.4))
     for wrong in ("q", "0,0,0", "1,2"):
         with pytest.raises(ViewError, match="write an axis such as -x"):
             direction(wrong, "camera")
