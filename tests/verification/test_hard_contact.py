@@ -334,6 +334,8 @@ def test_a_fine_plate_does_not_fold_into_the_rim_of_a_coarse_punch() -> None:
     punch = {"base": [0, 0, 0.01e-3], "radius": 2e-3, "length": 6e-3, "element_size": 0.6e-3}
     plate = {"base": [0, 0, -1.5e-3], "radius": 8e-3, "length": 1.5e-3, "element_size": 0.22e-3}
     graded = {"grading": {"axis": "z", "near": 2.6e-3, "far": 8e-3, "far_size": 0.9e-3}}
+    plate_steel = library()["weldox_460e"].model_dump()
+    plate_steel["strength"]["damage"]["softening"] = 0.0  # strong to the end, so that the rim presses on it
     case = parse_case(
         {
             "name": "rim", "run": {"end_time": 1.7e-6, "frames": 0},
@@ -341,9 +343,10 @@ def test_a_fine_plate_does_not_fold_into_the_rim_of_a_coarse_punch() -> None:
             "parts": [
                 {"name": name, "material": metal, "velocity": [0, 0, speed], "mesh": {**round_, **mesh}}
                 for name, metal, speed, mesh in (
-                    ("punch", "steel_4340", -400, punch), ("plate", "weldox_460e", 0, {**plate, **graded}),
+                    ("punch", "steel_4340", -400, punch), ("plate", "plate", 0, {**plate, **graded}),
                 )
             ],
+            "materials": {"plate": plate_steel},
         }
     )  # fmt: skip
     common = volume_in_common(case)
