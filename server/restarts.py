@@ -43,13 +43,17 @@ def _taken(source: Path, target: Path) -> bool:
     its newest ones. Raises ServiceError 409 when there is none.
     """
     damaged: list[str] = []
+    taken = 0
     places = checkpoints.found(source)
     for place in places:
         try:
             checkpoints.manifest_of(place)
             shutil.copytree(place, target / place.name, copy_function=_link)
+            taken += 1
         except checkpoints.DamagedError as error:
-            damaged += [f"{place.name}: {error}"] if place.is_dir() else []
+            if place.is_dir():
+                damaged.append(f"{place.name}: {error}")
+                _describe(place, target / place.name)
         except OSError:  # shutil.Error is one
             shutil.rmtree(target / place.name, ignore_errors=True)
             if place.is_dir():
@@ -57,7 +61,17 @@ def _taken(source: Path, target: Path) -> bool:
     if not places or len(damaged) == len(places):
         why = f"all are damaged; {'; '.join(damaged)}" if damaged else _why(source)
         raise ServiceError(409, "no_checkpoint", f"run {source.name} has no checkpoint: {why}")
-    return bool(checkpoints.found(target.parent))
+    return taken > 0
+
+
+def _describe(place: Path, target: Path) -> None:
+    """Copies the two files that describe a damaged checkpoint. The worker finds it by them, and writes the warning that
+    it is passed over.
+    """
+    shutil.rmtree(target, ignore_errors=True)
+    target.mkdir(parents=True)
+    for name in (checkpoints.MANIFEST, checkpoints.SEAL):
+        _copy(str(place / name), str(target / name))
 
 
 def _why(source: Path) -> str:
