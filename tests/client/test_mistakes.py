@@ -150,7 +150,7 @@ def test_a_damaged_case_is_named(damaged: Path, command: str) -> None:
     ("words", "code", "said"),
     [
         (("sweep", "demo", "--list", "missing.csv"), 2, "--list = 'missing.csv': No such file or directory"),
-        (("sweep", "demo", "--list", "."), 2, "--list = '.': Is a directory"),
+        (("sweep", "demo", "--list", "."), 2, "--list = '.': is not a regular file"),
         (("run", "demo", "--out", "/proc/none"), 1, "/proc/none: No such file or directory"),
         (("run", "demo", "--out", "file"), 1, "file: File exists"),
     ],
