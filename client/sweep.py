@@ -36,7 +36,9 @@ class SweepPoint(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class SweepInfo(msgspec.Struct, kw_only=True, frozen=True):
-    """What the server tells of a sweep; ``submitted`` in Unix s, ``states`` counts its runs."""
+    """What the server tells of a sweep; ``submitted`` in Unix s, ``states`` counts its runs, ``removed`` those whose
+    folder is gone.
+    """
 
     id: Annotated[str, msgspec.Meta(pattern=ID)]
     name: str
@@ -44,12 +46,13 @@ class SweepInfo(msgspec.Struct, kw_only=True, frozen=True):
     total: int
     states: dict[str, int]
     at_once: int | None = None
+    removed: int = 0
     points: list[SweepPoint] = []
 
     @property
     def over(self) -> bool:
-        """True when every run has ended."""
-        return sum(n for state, n in self.states.items() if State(state).final) == self.total
+        """True when every run has ended, or has been removed after that."""
+        return sum(n for state, n in self.states.items() if State(state).final) + self.removed == self.total
 
 
 class SweepPage(msgspec.Struct, kw_only=True, frozen=True):

@@ -22,6 +22,7 @@ from .launch import Launcher
 from .launch.local import LocalLauncher
 from .launch.slurm import SlurmLauncher
 from .metrics import Metrics, Timed
+from .present import Present
 from .readiness import Readiness
 from .routes import cases, events, files, health, history, logs, me, runs, snapshots
 from .routes import sweeps as sweep_routes
@@ -107,6 +108,7 @@ def opened(settings: Settings) -> Iterator[Service]:
             sweeps=sweeps,
             keeper=watchman,
             farewells=lines,
+            present=Present(settings.runs),
         )
 
 

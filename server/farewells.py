@@ -87,9 +87,6 @@ class Farewells:
         with suppress(msgspec.MsgspecError):
             self._at[_farewell.decode(raw).id] = place
 
-    def __contains__(self, run_id: str) -> bool:
-        return run_id in self._at
-
     def __iter__(self) -> Iterator[str]:
         """The ids of all."""
         return iter(tuple(self._at))

@@ -1,6 +1,7 @@
 """What Prometheus reads: runs, slots, streams, and the time that answers take."""
 
 import time
+from collections import Counter as Counts
 from collections.abc import Callable, Iterable
 
 from prometheus_client import CollectorRegistry, Counter, Histogram, ProcessCollector, generate_latest
@@ -53,12 +54,18 @@ class _Runs(Collector):
     def __init__(self, service: Service) -> None:
         self._service = service
 
+    def _counts(self) -> Counts[State]:
+        """Of the runs that are there. Raises SQLAlchemyError, OSError."""
+        ended = self._service.store.ended()
+        gone = Counts(ended[run_id] for run_id in self._service.present.gone(ended.keys()))
+        return Counts(self._service.store.count_by_state()) - gone
+
     def collect(self) -> Iterable[Metric]:
         """The gauges."""
-        counts = self._service.store.count_by_state()
+        counts = self._counts()
         runs = GaugeMetricFamily("conoid_runs", "Runs by state.", labels=["state"])
         for state in State:
-            runs.add_metric([state.value], counts.get(state, 0))
+            runs.add_metric([state.value], counts[state])
         yield runs
         supervisor = self._service.supervisor
         told: tuple[tuple[str, str, Callable[[], float]], ...] = (

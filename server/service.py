@@ -12,6 +12,7 @@ from .farewells import Farewells
 from .history import Histories
 from .keeper import Keeper
 from .lanes import Lanes
+from .present import Present
 from .readiness import Readiness
 from .settings import Settings
 from .store import Store
@@ -44,6 +45,7 @@ class Service:
     sweeps: Sweeps
     keeper: Keeper
     farewells: Farewells
+    present: Present
 
 
 def _service(request: Request) -> Service:

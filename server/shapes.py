@@ -165,7 +165,7 @@ class Wish(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
 
 
 class SweepLine(msgspec.Struct, kw_only=True):
-    """A sweep in a list: how many of its runs are in each state."""
+    """A sweep in a list: how many of its runs are in each state, and how many have been removed."""
 
     id: str
     owner: str
@@ -174,6 +174,7 @@ class SweepLine(msgspec.Struct, kw_only=True):
     at_once: int | None
     total: int
     states: dict[str, int]
+    removed: int
     url: str
 
 

@@ -190,10 +190,11 @@ class Store:
         with self._engine.connect() as connection:
             return connection.execute(query).scalar_one()
 
-    def ended(self) -> set[str]:
-        """The ids of all runs that are known to have ended."""
+    def ended(self) -> dict[str, State]:
+        """All runs that are known to have ended: how, by id."""
+        query = sa.select(RUNS.c.id, RUNS.c.state).where(RUNS.c.state.not_in(_OPEN))
         with self._engine.connect() as connection:
-            return set(connection.execute(sa.select(RUNS.c.id).where(RUNS.c.state.not_in(_OPEN))).scalars())
+            return {run_id: State(state) for run_id, state in connection.execute(query)}
 
     def open(self) -> dict[str, Run]:
         """All runs that are not known to have ended, by id."""

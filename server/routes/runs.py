@@ -65,8 +65,8 @@ def page(
     label: Annotated[list[str] | None, Query(description="NAME=VALUE; runs that have all of them")] = None,
     prefix: Annotated[str, Query(pattern="^[0-9a-z]{0,22}$", description="the beginning of their ids")] = "",
 ) -> dict[str, Any]:
-    """Own runs, newest first, without those that have been removed; ``next`` is the cursor of the following page, null
-    on the last.
+    """Own runs, newest first, without those whose folder has been removed; ``next`` is the cursor of the following
+    page, null on the last.
     """
     before = view.from_cursor(cursor) if cursor is not None else prefix + _LAST if prefix else None
     pages = _pages(service, identity.owner, _states(state), before, limit + 1, labels_of(label or ()))
@@ -78,9 +78,9 @@ def page(
 def _pages(
     service: Service, owner: str, states: list[State], before: str | None, size: int, labels: dict[str, str]
 ) -> Iterator[Run]:
-    """The runs of an owner that have not been removed, newest first, so many at a time from the store."""
+    """The runs of an owner that are there, newest first, so many at a time from the store."""
     while some := service.store.page(owner, states, before, size, labels):
-        yield from (run for run in some if run.id not in service.farewells)
+        yield from service.present.left(some)
         if len(some) < size:
             return
         before = some[-1].id
@@ -104,11 +104,13 @@ OwnedRun = Annotated[Run, Depends(owned_run)]
 
 
 def find(service: Service, identity: Identity, run_id: str) -> Run:
-    """The run as it is now. Raises ServiceError 404, and 410 when it has ended and its folder is gone."""
+    """The run as it is now. Raises ServiceError 404, 410 when it has ended and its folder is gone, and OSError when the
+    folder of all runs is not there.
+    """
     run = (service.supervisor.current(run_id) or service.store.get(run_id)) if folder.is_id(run_id) else None
     if run is None or run.owner != identity.owner:
         raise not_found(f"run {run_id[:40]!r}")
-    if run.state.final and not (service.settings.runs / run.id).is_dir():
+    if run.state.final and not service.present.there(run.id):
         raise _gone(service, run)
     return run
 
@@ -165,6 +167,7 @@ def purge(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
         raise ServiceError(409, "not_ended", f"run {run.id} is {run.state.value}; a run that has ended can be removed")
     try:
         service.keeper.remove(run, f"by {identity.owner}")
+        service.present.there(run.id)
     except FileNotFoundError:
         raise _gone(service, run) from None
     except OSError as error:

@@ -103,10 +103,11 @@ def _find(service: Service, identity: Identity, sweep_id: str) -> Plan:
 
 
 def _pairs(service: Service, plan: Plan) -> list[tuple[dict[str, Any], Run]]:
-    """Each point with its run; without those of which the server knows nothing any more."""
+    """Each point with its run; without those whose folder has been removed, or of which nothing is known any more."""
     kept = service.store.some(plan.runs)
-    found = (service.supervisor.current(run_id) or kept.get(run_id) for run_id in plan.runs)
-    return [(point, run) for point, run in zip(plan.points, found, strict=False) if run is not None]
+    found = [run for run_id in plan.runs if (run := service.supervisor.current(run_id) or kept.get(run_id))]
+    left = {run.id: run for run in service.present.left(found)}
+    return [(point, left[run_id]) for point, run_id in zip(plan.points, plan.runs, strict=False) if run_id in left]
 
 
 def _brief(service: Service, plan: Plan) -> dict[str, Any]:
@@ -117,7 +118,8 @@ def _headed(plan: Plan, pairs: Sequence[tuple[dict[str, Any], Run]]) -> dict[str
     states = Counter(run.state.value for _, run in pairs)
     return {
         "id": plan.id, "owner": plan.owner, "name": plan.name, "submitted": plan.submitted, "at_once": plan.at_once,
-        "total": len(plan.points), "states": dict(states), "url": f"/v1/sweeps/{plan.id}",
+        "total": len(plan.points), "states": dict(states), "removed": len(plan.runs) - len(pairs),
+        "url": f"/v1/sweeps/{plan.id}",
     }  # fmt: skip
 
 

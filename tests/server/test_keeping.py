@@ -1,5 +1,7 @@
 """How long runs are kept: by age, by size, for good; what is told of one that has been removed."""
 
+import os
+import shutil
 import threading
 import time
 from dataclasses import replace
@@ -12,9 +14,10 @@ import pytest
 from conoid.cases.batch import Site
 from conoid.cases.policy import Retention
 from conoid.cases.run import State
-from conoid.server import keeper, pins
+from conoid.server import keeper, pins, present
 from conoid.server.farewells import FILE, Farewells
 from conoid.server.keeper import Keeper
+from conoid.server.present import Present
 from conoid.server.store import Store
 
 from .running import TOML, Running, User, case_text
@@ -87,6 +90,67 @@ def test_what_has_been_removed_is_in_no_list(server: Running) -> None:
     second = server.ann.http.get("/v1/runs", params={"limit": 1, "cursor": first["next"]}).json()
     assert [[run["id"] for run in page["runs"]] for page in (first, second)] == [[runs[2]], [runs[0]]]
     assert second["next"] is None
+
+
+def told(user: User, run: str) -> dict[str, bool]:
+    """Where a run that has succeeded is told of."""
+    text = user.http.get("/metrics").text
+    return {
+        "list": run in [line["id"] for line in user.http.get("/v1/runs").json()["runs"]],
+        "prefix": bool(user.http.get("/v1/runs", params={"prefix": run}).json()["runs"]),
+        "metrics": 'conoid_runs{state="succeeded"} 2.0' in text,
+        "show": user.http.get(f"/v1/runs/{run}").status_code == 200,
+    }
+
+
+def test_a_run_whose_folder_was_removed_by_hand_is_told_of_nowhere(
+    server: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(present, "_FRESH", 0.0)
+    run, _ = ended(server.ann), ended(server.ann)
+    everywhere, nowhere = dict.fromkeys(told(server.ann, run), True), dict.fromkeys(told(server.ann, run), False)
+    assert told(server.ann, run) == everywhere
+    folder = server.ann.runs / run
+    folder.rename(folder.with_name("away"))
+    assert told(server.ann, run) == nowhere
+    folder.with_name("away").rename(folder)
+    assert told(server.ann, run) == everywhere
+
+
+def test_a_list_reads_names_once_a_second_and_no_folder(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    runs = [ended(server.ann) for _ in range(3)]
+    shutil.rmtree(server.ann.runs / runs[0])
+    looked: list[str] = []
+    there, names = Present.there, os.listdir
+
+    def one(self: Present, run: str) -> bool:
+        looked.append(run)
+        return there(self, run)
+
+    def every(path: Path) -> list[str]:
+        looked.append("names")
+        return names(path)
+
+    monkeypatch.setattr(Present, "there", one)
+    monkeypatch.setattr(os, "listdir", every)
+    listed = Present(server.ann.runs)
+    known = [run for run in server.service.store.all() if run.id in runs]
+    for _ in range(20):
+        assert sorted(run.id for run in listed.left(known)) == sorted(runs[1:])
+    assert looked == ["names", runs[0]]
+
+
+def test_no_run_is_gone_because_the_folder_of_all_is_not_there(server: Running) -> None:
+    run, runs = ended(server.ann), server.ann.runs
+    runs.rename(runs.with_name("away"))
+    runs.mkdir()
+    try:
+        assert server.ann.http.get(f"/v1/runs/{run}").status_code == 503
+        assert server.ann.http.get("/v1/runs").status_code in {200, 503}
+    finally:
+        runs.rmdir()
+        runs.with_name("away").rename(runs)
+    assert server.ann.show(run)["state"] == "succeeded"
 
 
 def test_lines_survive_a_lost_database_and_a_torn_end(server: Running, tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ import csv
 import io
 import json
 import math
+import shutil
 import threading
 import time
 import tomllib
@@ -14,12 +15,14 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
 from conoid.cases.problems import CaseError
 from conoid.cases.run import State
+from conoid.client.sweep import SweepInfo
 from conoid.server import folder, limits, reader, view
 from conoid.server.app import build_app, opened
 from conoid.server.errors import ServiceError
@@ -51,6 +54,19 @@ def test_a_sweep_ends_in_a_table(server: Running) -> None:
     assert [one["id"] for one in server.ann.http.get("/v1/sweeps").json()["sweeps"]] == [sweep["id"]]
     assert server.bob.http.get(sweep["url"]).status_code == 404
     assert server.bob.http.get("/v1/sweeps").json() == {"sweeps": [], "next": None}
+
+
+def test_a_sweep_counts_the_runs_whose_folders_were_removed(server: Running) -> None:
+    sweep = handed_in(server.ann, wish())
+    ids = [point["run"]["id"] for point in sweep["points"]]
+    for run in ids:
+        server.ann.wait_for(run)
+    shutil.rmtree(server.ann.runs / ids[1])
+    assert server.ann.http.get(f"/v1/runs/{ids[1]}").status_code == 410
+    seen = server.ann.http.get(sweep["url"]).json()
+    assert (seen["states"], seen["removed"], seen["total"]) == ({"succeeded": len(ENDS) - 1}, 1, len(ENDS))
+    assert [point["run"]["id"] for point in seen["points"]] == [ids[0], *ids[2:]]
+    assert msgspec.convert(seen, SweepInfo).over
 
 
 def test_one_key_is_one_sweep(server: Running) -> None:
