@@ -3,6 +3,8 @@
 import errno
 import os
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from io import BytesIO, FileIO, TextIOWrapper
 from pathlib import Path
 
@@ -15,10 +17,22 @@ _NO_FILE = frozenset({errno.ELOOP, errno.ENXIO, errno.ENODEV, errno.EOPNOTSUPP})
 """What open(2) says of a link to itself, of a socket, and of a device without a driver."""
 
 
+@contextmanager
+def named(path: str | Path) -> Iterator[None]:
+    """An OSError of the block names ``path`` where it names no file: write(2) and fsync(2) know none."""
+    try:
+        yield
+    except OSError as error:
+        if error.filename is None:
+            error.filename = str(path)
+        raise
+
+
 def write(path: Path, content: bytes, mode: int = 0o644) -> None:
     """Written beside, flushed to disk, renamed. Raises OSError, also where a link lies beside."""
     beside = path.with_name(f"{path.name}.part")
-    with open(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | _NO_LINK, mode), "wb") as file:
+    flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | _NO_LINK
+    with named(path), open(os.open(beside, flags, mode), "wb") as file:
         file.write(content)
         file.flush()
         os.fsync(file.fileno())

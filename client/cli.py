@@ -1,6 +1,5 @@
 """The command line: ``conoid serve | validate | submit | ls | show | watch | cancel | get | view | run``, and more."""
 
-import errno
 import os
 import sys
 from importlib import metadata
@@ -41,6 +40,14 @@ _Mistake = cast(type[typer.BadParameter], typer.BadParameter.__base__)
 class Guarded(TyperGroup):
     """Turns what can go wrong into one clear line on standard error, and an exit code."""
 
+    def main(self, *arguments: Any, **options: Any) -> Any:
+        """Reads the words and runs the command; also a help text may meet a full disk."""
+        try:
+            return super().main(*arguments, **options)
+        except OSError as error:
+            complain(f"{error.filename}: {error.strerror}" if error.filename else str(error.strerror or error))
+            sys.exit(1)
+
     def invoke(self, ctx: Any) -> Any:
         """Runs the command."""
         try:
@@ -51,11 +58,6 @@ class Guarded(TyperGroup):
         except ClientError as error:
             complain(str(error))
             raise typer.Exit(error.exit_code) from None
-        except OSError as error:
-            if error.errno == errno.EPIPE:  # who reads has gone: typer ends without a word
-                raise
-            complain(f"{error.filename}: {error.strerror}" if error.filename else str(error))
-            raise typer.Exit(1) from None
         except _Mistake as error:
             error.message = one_line(error.message)
             raise

@@ -17,6 +17,8 @@ from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 from rich.text import Text
 
+from conoid.cases.whole import named
+
 _HIDDEN = re.compile(
     r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\xad\u034f\u061c\u115f\u1160\u17b4\u17b5\u180b-\u180f\u200b-\u200f"
     r"\u2028-\u202e\u2060-\u206f\u3164\ufeff\uffa0\ufff9-\ufffb\ud800-\udfff\U000e0000-\U000e0fff]|\r(?!\n)"
@@ -47,7 +49,8 @@ def one_line(text: str) -> str:
 
 def echo(thing: object = "", *, nl: bool = True, err: bool = False) -> None:
     """Prints a text, or what ``str`` makes of ``thing``."""
-    typer.echo(plain(str(thing)), nl=nl, err=err)
+    with named("standard error" if err else "standard output"):
+        typer.echo(plain(str(thing)), nl=nl, err=err)
 
 
 def echo_json(thing: Any, *, indent: bool = True) -> None:
@@ -74,6 +77,11 @@ class PlainConsole(Console):
     def __init__(self, **options: Any) -> None:
         """``options`` are those of rich."""
         super().__init__(**{"markup": False, "emoji": False, "highlight": False, **options})
+
+    def print(self, *things: Any, **options: Any) -> None:
+        """Raises OSError that names the stream."""
+        with named("standard output"):
+            super().print(*things, **options)
 
     def render_str(self, text: str, **options: Any) -> Text:
         """Escaped before anything is laid out: an escape takes up room."""

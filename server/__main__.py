@@ -11,10 +11,12 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from sqlalchemy.exc import SQLAlchemyError
+
 from . import identity
 from .alone import only_one
 from .settings import Caps, Settings, SettingsError, StartError, capped, command, site_of
-from .store import Store
+from .store import Store, failure
 from .tokens import SCOPES, TokenError, create_token
 
 
@@ -29,7 +31,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"conoid.server: {error}", file=sys.stderr)
         return error.exit_code
     except OSError as error:
-        print(f"conoid.server: {error.filename or ''}: {error.strerror}", file=sys.stderr)
+        place = "" if error.filename is None else f"{error.filename}: "
+        print(f"conoid.server: {place}{error.strerror or error}", file=sys.stderr)
+        return 1
+    except SQLAlchemyError as error:
+        print(f"conoid.server: {failure(_settings(options).database_url, error)}", file=sys.stderr)
         return 1
     return 0
 

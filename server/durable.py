@@ -3,6 +3,8 @@
 import os
 from pathlib import Path
 
+from conoid.cases import whole
+
 _PROBE = 1 << 16
 """Bytes that are written to find out whether a folder takes any: more than a launch writes. Chosen."""
 
@@ -10,7 +12,7 @@ _PROBE = 1 << 16
 def write(path: Path, content: bytes, mode: int = 0o600) -> None:
     """Puts ``content`` at ``path`` whole or not at all: a temporary name, fsync, rename, fsync of the folder."""
     beside = path.with_name(f".{path.name}.new")
-    with open(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, mode), "wb") as file:
+    with whole.named(path), open(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, mode), "wb") as file:
         file.write(content)
         file.flush()
         os.fsync(file.fileno())
@@ -21,7 +23,7 @@ def write(path: Path, content: bytes, mode: int = 0o600) -> None:
 def probe(folder: Path) -> None:
     """Raises OSError when nothing can be written in ``folder`` now: it is gone, full, or no descriptor is left."""
     path = folder / ".probe"
-    with open(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), "wb") as file:
+    with whole.named(path), open(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), "wb") as file:
         file.write(bytes(_PROBE))
         file.flush()
         os.fsync(file.fileno())
@@ -30,7 +32,7 @@ def probe(folder: Path) -> None:
 
 def write_new(path: Path, content: bytes) -> None:
     """A file in a folder that nobody reads yet; the caller syncs the folder. Raises FileExistsError."""
-    with open(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
+    with whole.named(path), open(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
         file.write(content)
         file.flush()
         os.fsync(file.fileno())
@@ -40,6 +42,7 @@ def sync_folder(folder: Path) -> None:
     """Makes the names in ``folder`` durable."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
-        os.fsync(descriptor)
+        with whole.named(folder):
+            os.fsync(descriptor)
     finally:
         os.close(descriptor)

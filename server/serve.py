@@ -1,6 +1,8 @@
 """The server as a process: one a folder of runs, its address in server.json, a clean end on SIGTERM."""
 
+import asyncio
 import json
+import logging
 import os
 import signal
 import socket
@@ -17,7 +19,10 @@ from .app import build_app, opened
 from .service import Service
 from .settings import Settings, StartError
 
+_log = logging.getLogger("conoid.server")
 ADDRESS_FILE = "server.json"
+_AGAIN = 5.0
+"""s after which an address that could not be written is written again. Chosen."""
 _SWITCH = 0.001
 """s after which a thread that computes lets another one go on: the event loop has to wait so long for each lane that is
 busy, some times an answer. Chosen: a fifth of Python's own.
@@ -56,11 +61,14 @@ def _answer(settings: Settings, listener: socket.socket) -> None:
 
 
 class _Server(uvicorn.Server):
-    """Tells its address once it answers, and ends open streams before it waits for open requests."""
+    """Writes its address once it answers, and ends open streams before it waits for open requests. On a full disk it
+    answers without server.json, so that runs can be read and removed, and writes it when there is room.
+    """
 
     def __init__(self, service: Service) -> None:
         self._service = service
         self._app = build_app(service)
+        self._writing: asyncio.Task[None] | None = None
         super().__init__(
             uvicorn.Config(
                 self._app,
@@ -77,20 +85,31 @@ class _Server(uvicorn.Server):
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)
         if sockets and self.started:
-            announce(self._service, sockets[0], self._app.state.page_problem)
+            address = announce(self._service, sockets[0], self._app.state.page_problem)
+            self._writing = asyncio.create_task(self._write(address))
+
+    async def _write(self, address: bytes) -> None:
+        path = self._service.settings.runs / ADDRESS_FILE
+        while True:
+            try:
+                return durable.write(path, address)
+            except OSError as error:
+                _log.error("%s: not written, and tried again in %g s: %s", path, _AGAIN, error.strerror)
+            await asyncio.sleep(_AGAIN)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         self._service.bell.close()
+        if self._writing is not None:
+            self._writing.cancel()
         await super().shutdown(sockets)
 
 
-def announce(service: Service, listener: socket.socket, page_problem: str | None) -> None:
-    """Writes server.json, prints one line, and with a page the address to open; None: there is no page."""
+def announce(service: Service, listener: socket.socket, page_problem: str | None) -> bytes:
+    """Prints one line, and with a page the address to open; None: there is no page. Returns what server.json has."""
     host, port = listener.getsockname()[:2]
     url = f"http://{f'[{host}]' if ':' in host else host}:{port}"
     endpoint = service.telemetry.local_endpoint if service.telemetry else None
     address = {"url": url, "zenoh": endpoint, "pid": os.getpid(), "auth": service.settings.auth}
-    durable.write(service.settings.runs / ADDRESS_FILE, json.dumps(address, indent=2).encode() + b"\n")
     slots = service.settings.slots
     print(
         f"conoid.server: {url}  zenoh {endpoint or 'off'}  {slots} slots  runs in {service.settings.runs}", flush=True
@@ -99,6 +118,7 @@ def announce(service: Service, listener: socket.socket, page_problem: str | None
         print(f"conoid.server: the page is without charts and 3-D: {page_problem}", flush=True)
     if page_problem is not None:
         print(f"open {url}", flush=True)
+    return json.dumps(address, indent=2).encode() + b"\n"
 
 
 def _leave(_signal: int, _frame: FrameType | None) -> None:

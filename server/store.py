@@ -4,10 +4,12 @@ Runs, labels and keys are an index over the runs' folders and can be rebuilt fro
 """
 
 import os
+import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from enum import StrEnum
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -28,6 +30,8 @@ _BUSY = 2000
 than what a caller waits for."""
 _AT_ONCE = 500
 """Ids in one statement. Chosen: SQLite takes 999 in its older versions."""
+_TABLES = 1 << 16
+"""Bytes without which SQLite opens no database: its log and what it shares with others. By hand: 32 KiB."""
 _OPEN = [state.value for state in State if not state.final]
 
 
@@ -66,10 +70,7 @@ class Store:
             META.create_all(self._engine)
             self._file = _identity(self._engine)
         except (SQLAlchemyError, ImportError) as error:
-            failure = StoreError(f"the database cannot be opened: {str(error).splitlines()[0]}")
-            if isinstance(error, sa.exc.ArgumentError):  # this URL is none
-                failure.exit_code = 2
-            raise failure from None
+            raise failure(url, error, "opened") from None
 
     def close(self) -> None:
         """Closes every connection."""
@@ -264,6 +265,27 @@ def _run(row: sa.RowMapping) -> Run:
 
 def _token(row: sa.RowMapping) -> Token:
     return Token(row["id"], row["owner"], row["sha256"], frozenset(row["scopes"].split()), row["created"])
+
+
+def failure(url: str | sa.URL, error: Exception, deed: str = "used") -> StoreError:
+    """What is told of a database: its file, or its address without the password, and why it cannot be ``deed``."""
+    try:
+        made = sa.make_url(url)
+        sqlite = made.get_backend_name() == "sqlite" and made.database
+        place = made.database if sqlite else made.render_as_string(hide_password=True)
+    except sa.exc.ArgumentError:
+        sqlite, place = None, repr(url)
+    full = " (its disk is full)" if sqlite and _full(Path(sqlite).parent) else ""
+    told = StoreError(f"the database cannot be {deed}: {place}: {str(error).splitlines()[0]}{full}")
+    told.exit_code = 2 if isinstance(error, sa.exc.ArgumentError) else 1
+    return told
+
+
+def _full(folder: Path) -> bool:
+    try:
+        return shutil.disk_usage(folder).free < _TABLES
+    except OSError:
+        return False
 
 
 def _engine(url: str | sa.URL) -> sa.Engine:

@@ -62,8 +62,9 @@ class Telemetry:
         self, runs: Path, host: str, port: int, tokens: Iterable[Token] | None, nodes: Slurm | None = None
     ) -> None:
         """``tokens`` is None for a router without access control; ``nodes``: where it listens for those of a cluster.
+        On a full disk there is no router until ``follow`` can open one.
 
-        Raises TelemetryError.
+        Raises TelemetryError, OSError where the secret cannot be made.
         """
         self._runs, self._host, self._nodes = runs, host, nodes
         self.port = port or _free_port(host)
@@ -72,7 +73,11 @@ class Telemetry:
         """Sessions, and connections that have not said who they are, at a time."""
         self._lock = threading.Lock()
         self._tokens = None if tokens is None else frozenset((token.id, token.owner) for token in tokens)
-        self._session: zenoh.Session | None = self._open()
+        self._session: zenoh.Session | None = None
+        try:
+            self._session = self._open()
+        except OSError as error:
+            _log.error("the Zenoh router is opened later: %s: %s", error.filename, error.strerror)
 
     @property
     def local_endpoint(self) -> str:
@@ -110,7 +115,10 @@ class Telemetry:
                 return
             self._close()
             self._tokens = wanted
-            self._session = self._open()
+            try:
+                self._session = self._open()
+            except OSError as error:
+                raise TelemetryError(f"the Zenoh router cannot be opened: {error.filename}: {error.strerror}") from None
 
     def publish(self, owner: str, status: Status) -> None:
         """Tells the subscribers; the journal has it already, so a loss here loses nothing."""
@@ -136,6 +144,7 @@ class Telemetry:
         return hmac.new(self._secret, user.encode(), hashlib.sha256).hexdigest()
 
     def _open(self) -> zenoh.Session:
+        """Raises TelemetryError, OSError where the file of its users cannot be written."""
         users = self._runs / _USERS
         config = zenoh.Config()
         for key, value in self._config(users).items():
@@ -216,13 +225,13 @@ def _worker_user(owner: str) -> str:
 
 def _read_secret(runs: Path) -> bytes:
     """The bytes from which all passwords follow, made at the first start. Raises TelemetryError for a file that others
-    can read, or that anybody could guess.
+    can read, or that anybody could guess; OSError where it cannot be made.
     """
     path = runs / _SECRET
     remedy = "remove it, and the server makes a new one; whoever watches a run asks for a new password by himself"
+    if not os.path.lexists(path):
+        durable.write(path, secrets.token_bytes(_SECRET_BYTES), mode=0o600)
     try:
-        if not path.exists():
-            durable.write(path, secrets.token_bytes(_SECRET_BYTES), mode=0o600)
         with whole.opened(path) as file:
             status, found = os.fstat(file.fileno()), file.read(_SECRET_MOST)
     except OSError as error:
