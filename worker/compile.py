@@ -1,8 +1,8 @@
 """All kernels compiled ahead, on several cores: ``python -m conoid.worker.compile``.
 
-One child process a core takes module after module and compiles its kernels into the cache folder. A module comes after
-those that it imports, so that no kernel is compiled twice. numba keeps files of its own for each kernel: children never
-write the same one.
+Modules whose sources have not changed since an earlier folder are linked from there. One child process a core compiles
+the kernels of the others into the cache folder, module after module. A module comes after those that it imports, so
+that no kernel is compiled twice. numba keeps files of its own for each kernel: children never write the same one.
 """
 
 import fcntl
@@ -36,6 +36,8 @@ _MOST_WORDS = 500
 """Characters of numba's report: what is wrong comes first."""
 _PATIENCE = 900.0
 """s that a module may take: the largest takes ten on an idle core."""
+_HASH = "hash"
+"""The file in a module's folder that says that all its kernels are there, and what they are made of."""
 _LOCK, _LOOK = "lock", 0.3
 """The file that whoever compiles holds, and s between two checks of it: a tenth of WORD_EVERY."""
 
@@ -52,7 +54,9 @@ def compile_all(folder: Path, tell: Tell, root: Path = kernels.ROOT, package: st
     said = _Saying(tell, folder, total)
     with _alone(folder, said):
         if not (folder / COMPLETE).exists():
-            _in_parallel(_order(set(counts)), folder, said, lambda path: _module(path, root, package))
+            modules = {path: _Module.of(path, root, package) for path in counts}
+            kept = {path for path, module in modules.items() if module.take_over(folder)}
+            _in_parallel(_order(set(counts) - kept), folder, said, modules)
             (folder / COMPLETE).touch()
     tell(total, total)
     return True
@@ -90,8 +94,55 @@ def _alone(folder: Path, said: _Saying) -> Iterator[None]:
         yield
 
 
-def _module(path: Path, root: Path, package: str) -> str:
-    return ".".join((package, *path.relative_to(root).with_suffix("").parts))
+@dataclass(frozen=True)
+class _Module:
+    """A file with kernels."""
+
+    name: str
+    """As Python imports it, and as its folder is called."""
+    hash: str
+    """Of all that its kernels are made of."""
+
+    @classmethod
+    def of(cls, path: Path, root: Path, package: str) -> "_Module":
+        name = ".".join((package, *path.relative_to(root).with_suffix("").parts))
+        return cls(name, kernels.module_hash(path, root))
+
+    def take_over(self, folder: Path) -> bool:
+        """Links its kernels from another folder beside ``folder`` that has them whole, unless they are there; whether
+        they are.
+        """
+        own = folder / self.name
+        if self._whole(own):
+            return True
+        for other in folder.parent.glob(f"*/{self.name}"):
+            if self._whole(other):
+                return self._link(other, own)
+        return False
+
+    def done(self, folder: Path) -> None:
+        """All its kernels are in the folder."""
+        own = folder / self.name
+        own.mkdir(exist_ok=True)
+        (own / _HASH).write_text(self.hash)
+
+    def _whole(self, own: Path) -> bool:
+        try:
+            return (own / _HASH).read_text() == self.hash
+        except OSError:
+            return False
+
+    def _link(self, other: Path, own: Path) -> bool:
+        """False where files cannot be linked: the kernels are compiled then."""
+        try:
+            own.mkdir(exist_ok=True)
+            for path in other.glob("*.nb[ci]"):
+                (own / path.name).unlink(missing_ok=True)
+                (own / path.name).hardlink_to(path)
+        except OSError:
+            return False
+        self.done(own.parent)
+        return True
 
 
 # The order --------------------------------------------------------------------------------------------------------
@@ -109,17 +160,10 @@ def _order(files: set[Path]) -> dict[Path, set[Path]]:
 
 def _needed(path: Path, files: set[Path]) -> set[Path]:
     """The ``files`` that ``path`` imports, at any depth."""
-    found: set[Path] = set()
-    waiting = kernels.imported(path)
-    while waiting:
-        other = waiting.pop()
-        if other not in found:
-            found.add(other)
-            waiting += kernels.imported(other)
-    return (found & files) - {path}
+    return (kernels.reached([path]) & files) - {path}
 
 
-def _in_parallel(needs: dict[Path, set[Path]], folder: Path, said: _Saying, name: Callable[[Path], str]) -> None:
+def _in_parallel(needs: dict[Path, set[Path]], folder: Path, said: _Saying, modules: dict[Path, _Module]) -> None:
     """Compiles the files of ``needs``, each after those that it needs, by as many children as there are cores."""
     children: queue.SimpleQueue[_Child] = queue.SimpleQueue()
     number = min(_MOST, len(os.sched_getaffinity(0)), len(needs))
@@ -134,14 +178,16 @@ def _in_parallel(needs: dict[Path, set[Path]], folder: Path, said: _Saying, name
             ready = [path for path in waiting if needs[path] <= done][: number - len(running)]
             for path in ready:
                 waiting.remove(path)
-                running[threads.submit(_by_one, children, name(path))] = path
+                running[threads.submit(_by_one, children, modules[path].name)] = path
             finished, _ = wait(running, timeout=_LOOK, return_when=FIRST_COMPLETED)
             for future in finished:
                 future.result()
-                done.add(running.pop(future))
+                done.add(path := running.pop(future))
+                modules[path].done(folder)
                 last = time.monotonic()
             if time.monotonic() - last > _PATIENCE:
-                raise CompileError(f"kernels of {name(min(running.values()))}: not compiled after {_PATIENCE:.0f} s")
+                name = modules[min(running.values())].name
+                raise CompileError(f"kernels of {name}: not compiled after {_PATIENCE:.0f} s")
 
 
 def _by_one(children: "queue.SimpleQueue[_Child]", module: str) -> None:

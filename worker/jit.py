@@ -17,8 +17,9 @@ from types import ModuleType
 from typing import Any
 
 from llvmlite import ir
-from numba import types
+from numba import config, types
 from numba.core.bytecode import FunctionIdentity
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.sigutils import normalize_signature
@@ -42,6 +43,48 @@ DECLARED: list["Kernel"] = []
 """Every kernel of the modules that are imported."""
 
 
+def _folder() -> str:
+    """The folder of all kernels, empty where it has no name."""
+    return str(config.CACHE_DIR)  # type: ignore[attr-defined]
+
+
+class _ModuleFolder(_CacheLocator):
+    """Where numba keeps the kernels of a module: below the folder that the sources name (kernels.py)."""
+
+    def __init__(self, function: Callable[..., Any], file: str) -> None:
+        self._py_file, self._line = file, function.__code__.co_firstlineno
+        self._path = os.path.join(_folder(), function.__module__)
+        os.makedirs(self._path, exist_ok=True)
+
+    def get_cache_path(self) -> str:
+        """The folder."""
+        return self._path
+
+    def get_source_stamp(self) -> str:
+        """The same at any time: other sources have another folder."""
+        return ""
+
+    def get_disambiguator(self) -> str:
+        """Tells kernels of one name apart."""
+        return str(self._line)
+
+    @classmethod
+    def from_function(cls, function: Callable[..., Any], file: str) -> "_ModuleFolder | None":
+        """None where the folder has no name, or cannot be made: numba then takes one of its own choice."""
+        try:
+            return cls(function, file) if _folder() else None
+        except OSError:
+            return None
+
+
+class _Kept(CompileResultCacheImpl):
+    _locator_classes = [_ModuleFolder, *CompileResultCacheImpl._locator_classes]  # noqa: RUF012
+
+
+class _Cache(FunctionCache):
+    _impl_class = _Kept
+
+
 class Kernel(CPUDispatcher):
     """A compiled function with one signature."""
 
@@ -52,6 +95,10 @@ class Kernel(CPUDispatcher):
     def result(self) -> Any:
         """The type of what it returns."""
         return normalize_signature(self.signature)[1]  # type: ignore[no-untyped-call]
+
+    def enable_caching(self) -> None:
+        """Keeps the kernel in the folder of its module."""
+        self._cache = _Cache(self.py_func)  # type: ignore[no-untyped-call]
 
     def load(self) -> None:
         """Compiles the kernel, or loads it from the cache, and what it calls; once, whatever thread asks."""

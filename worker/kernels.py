@@ -1,9 +1,9 @@
 """Where compiled kernels are kept.
 
 numba's disk cache does not see an edited callee in another file, so the cache folder is named by a hash of every source
-that a kernel is made of (files with kernels, and what they import from the worker), the versions and the processor.
-Within the folder numba goes by the place and the time of a source: they are in the hash, too, or a copy of the sources
-elsewhere would find the folder complete, and its ranks would compile every kernel at its first call, all at once.
+that a kernel is made of (files with kernels, and what they import from the worker), the versions and the processor. The
+place and the time of a source are not in it: equal sources share a folder. Below it each module has a folder of its own
+(worker/jit.py), with the hash of what its kernels are made of: a new folder takes over modules that an earlier one has.
 Rank 0 hashes the sources once a run and compiles what is missing (worker/compile.py); the other ranks get the hash from
 it.
 """
@@ -25,28 +25,43 @@ DECLARATION = "\n@njit("
 
 @cache
 def source_hash(root: Path = ROOT) -> str:
-    """Names what the kernels below ``root`` are made of: sources, with their places and times, and versions. 0.08 CPU
-    seconds on an idle core.
-    """
+    """A hash of the sources of all kernels below ``root``, and of the versions. 0.08 CPU seconds on an idle core."""
+    return _hashed(kernel_sources(root), root)
+
+
+def module_hash(path: Path, root: Path) -> str:
+    """A hash of what the kernels of a file are made of: it, what it imports, the versions and the processor."""
+    return _named(f"{path.relative_to(root)} {_hashed(reached([path]), root)}")
+
+
+def _hashed(sources: set[Path], root: Path) -> str:
     h = hashlib.sha256()
-    for source in sorted(kernel_sources(root)):
-        h.update(f"{source} {source.stat().st_mtime_ns} ".encode() + source.read_bytes())
+    for source in sorted(sources):
+        h.update(f"{os.path.relpath(source, root)} ".encode() + source.read_bytes())
     for part in (version("numba"), version("llvmlite"), version("numpy"), platform.python_version()):
         h.update(part.encode())
     return h.hexdigest()
 
 
+def _named(sources: str) -> str:
+    return hashlib.sha256(f"{sources} {_processor()}".encode()).hexdigest()[:16]
+
+
 def cache_folder(sources: str | None = None) -> Path:
     """The folder of this source tree's kernels on this machine; ``sources`` is ``source_hash()`` where it is known."""
-    h = hashlib.sha256(f"{sources or source_hash()} {_processor()}".encode())
     base = os.environ.get("CONOID_CACHE_DIR") or Path.home() / ".cache" / "conoid"
-    return Path(base) / "kernels" / h.hexdigest()[:16]
+    return Path(base) / "kernels" / _named(sources or source_hash())
 
 
 def kernel_sources(root: Path) -> set[Path]:
     """The files below ``root`` that hold kernels, and those whose names they import from there, to any depth."""
+    return reached(kernel_files(root))
+
+
+def reached(paths: list[Path]) -> set[Path]:
+    """The files ``paths``, and those that they import relatively, to any depth."""
     found: set[Path] = set()
-    waiting = kernel_files(root)
+    waiting = list(paths)
     while waiting:
         path = waiting.pop()
         if path not in found:
@@ -70,6 +85,7 @@ def imported(path: Path) -> list[Path]:
     return [file for file in files if file.is_file()]
 
 
+@cache
 def _processor() -> str:
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()

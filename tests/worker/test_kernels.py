@@ -73,14 +73,13 @@ def test_an_edited_source_of_a_kernel_names_another_folder(tree: Path, edited: s
     assert (kernels.cache_folder(kernels.source_hash(tree)) != kernels.cache_folder(before)) == another
 
 
-def test_a_copy_elsewhere_and_one_that_was_written_again_have_folders_of_their_own(tree: Path, tmp_path: Path) -> None:
-    """numba would take none of the kernels in this one's."""
+def test_a_copy_elsewhere_and_one_that_was_written_again_have_the_same_folder(tree: Path, tmp_path: Path) -> None:
     before = kernels.source_hash(tree)
     copied = shutil.copytree(tree, tmp_path / "copied")
-    assert kernels.source_hash(copied) != before
+    assert kernels.source_hash(copied) == before
     os.utime(tree / "above.py", (1e9, 1e9))
     kernels.source_hash.cache_clear()
-    assert kernels.source_hash(tree) != before
+    assert kernels.source_hash(tree) == before
 
 
 def test_ranks_but_the_first_hash_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -193,10 +192,36 @@ def test_all_kernels_are_compiled_and_the_progress_is_told(tree: Path, tmp_path:
     assert not ahead.compile_all(folder, lambda *numbers: told.append(numbers), tree, "tiny"), "all are there"
 
 
+def test_modules_that_have_not_changed_are_linked_from_an_earlier_folder(tree: Path, tmp_path: Path) -> None:
+    """And their ranks load them from there."""
+    folders = [tmp_path / "cache" / name for name in ("first", "second", "third")]
+    text = "import numpy as np; from tiny.above import scale; x = np.ones(2); scale(x); "
+    text += "print(x, sum(scale.stats.cache_hits.values()))"
+    edits = [
+        ("above", ABOVE),
+        ("above", ABOVE.replace("values[i] = s", "values[i] += s")),
+        ("numbers", "FACTOR = 3.0\n"),
+    ]
+    told = []
+    for folder, (name, edited) in zip(folders, edits, strict=True):
+        (tree / f"{name}.py").write_text(edited)
+        assert ahead.compile_all(folder, lambda *_: None, tree, "tiny")
+        environment = os.environ | {kernels.VARIABLE: str(folder)}
+        ask = [sys.executable, "-c", text]
+        told.append(subprocess.run(ask, env=environment, capture_output=True, text=True, check=True).stdout)
+    assert told == ["[2. 2.] 1\n", "[3. 3.] 1\n", "[4. 4.] 1\n"]
+    assert [compiled(folder) for folder in folders] == [{"below.scaled", "above.scale", "above.total"}] * 3
+    below, above = (
+        [next(folder.rglob(f"{name}*.nbc")).stat().st_ino for folder in folders] for name in ("below.sc", "above.sc")
+    )
+    assert below[0] == below[1] != below[2], "what it imports has changed at last"
+    assert len(set(above)) == 3
+
+
 def test_every_kernel_of_the_worker_is_counted() -> None:
     files = kernels.kernel_files(kernels.ROOT)
     for path in files:
-        importlib.import_module(ahead._module(path, kernels.ROOT, "conoid.worker"))
+        importlib.import_module(ahead._Module.of(path, kernels.ROOT, "conoid.worker").name)
     mine = [kernel for kernel in jit.DECLARED if kernel.py_func.__module__.startswith("conoid.worker.")]
     assert sum(path.read_text(encoding="utf-8").count(kernels.DECLARATION) for path in files) == len(mine)
 
