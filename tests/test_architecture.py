@@ -137,8 +137,6 @@ SMALL = ("worker/contact", "worker/fracture")
 LONGEST_FILE, MOST_ATTRIBUTES, MOST_PARAMETERS = 300, 12, 12
 """Chosen: a file that is read at one sitting, an object and a call that are taken in at a glance."""
 LARGE = {
-    "worker/contact/columns.py: SceneSlots": 13,
-    "worker/contact/exterior.py: Exterior": 14,
     "worker/contact/scene.py: Scene": 13,
     "worker/contact/stage.py: Contact": 14,
 }

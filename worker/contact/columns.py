@@ -11,7 +11,7 @@ from .normals import COLUMNS
 from .records import AGED, OPEN, Crowd
 
 _FRESH = {
-    **dict.fromkeys(("slave", "pushes", "live", "new", "fresh", "tracked", "on_surface", "loose"), False),
+    **dict.fromkeys(("slave", "pushes", "live", "new", "fresh", "tracked", "on_surface"), False),
     "first": -1, "normals": 0.0, "total": 0,
 }  # fmt: skip
 """What a slot begins with."""
@@ -79,8 +79,6 @@ class SceneSlots:
     """(slots,) nodes of what is searched."""
     on_surface: Flags
     """(slots,) of nodes that are held here: only those on the surface meet faces."""
-    loose: Flags
-    """(slots,) of nodes that are held here: those without tets."""
     first: Indices
     """(slots,) the first pair with a face, -1 for none."""
     normals: Floats
@@ -95,11 +93,11 @@ class SceneSlots:
     def at_rest(cls, slave: Flags, pushes: Flags) -> "SceneSlots":
         """Nothing is searched yet."""
         n = len(slave)
-        live, new, fresh, tracked, on_surface, loose = np.zeros((6, n), bool)
+        live, new, fresh, tracked, on_surface = np.zeros((5, n), bool)
         first, normals, total, before = (
             np.full(n, -1, np.int32), np.zeros((n, COLUMNS)), np.zeros((n, 3), np.int64), np.zeros((n, 3)),
         )  # fmt: skip
-        return cls(slave, pushes, live, new, fresh, tracked, on_surface, loose, first, normals, total, before)
+        return cls(slave, pushes, live, new, fresh, tracked, on_surface, first, normals, total, before)
 
     def add(self, rows: Crowd) -> None:
         """Takes up more slots."""

@@ -29,9 +29,7 @@ class Exterior:
     ) -> None:
         """``edges``: whether sharp edges meet each other; all ranks take part."""
         self._model, self._neighbours, self._comm, self._edges = model, neighbours, comm, edges
-        self._bounds, self._planes = bounds, symmetry_planes(model.nodes.n, bounds)
-        self._loose = np.zeros(model.nodes.n, bool)
-        """(nodes,) those without tets that fly on."""
+        self._bounds = bounds
         self.cracks = Cracks.none(model.nodes.id)
         self._tiring: Ints | None = None
         """Ids, ascending, of the tets here that the last search has expected to leave; None before any tet has left."""
@@ -49,7 +47,7 @@ class Exterior:
         parcel.nodes["family"] = self.cracks.families.root
         parcel.rows["contact.turned"] = {"tet": self.surface.turned >> 34, "name": self.surface.turned}
         parcel.nodes["contact.flags"], parcel.nodes["contact.moments"] = self.surface.flags, self._moments
-        parcel.nodes["contact.loose"] = self._loose
+        parcel.nodes["contact.loose"] = self.flight.loose
 
     def resume(self, parcel: Parcel, size: float, broken: bool) -> None:
         """Takes them back; all ranks take part."""
@@ -59,9 +57,9 @@ class Exterior:
         self.surface.turned = turned  # those at cracks, too, which the next search brings to the surface
         self.surface.flags = np.array(parcel.nodes["contact.flags"])
         self._moments = np.array(parcel.nodes["contact.moments"])
-        self._loose = np.array(parcel.nodes["contact.loose"])
         nodes = self._model.nodes
         self.flight = Flight(self.surface, nodes, mobilities(nodes, self._bounds), size, self._comm)
+        self.flight.loose = np.array(parcel.nodes["contact.loose"])
         root = np.array(parcel.nodes["family"])
         self.cracks = Cracks.resume(parcel.rows["contact.cracks"], root, self._model.blocks, nodes)
 
@@ -131,8 +129,8 @@ class Exterior:
 
     def _loosen(self, loose: Flags) -> None:
         """Nodes without tets move as what still holds them lets them."""
-        if (loose & ~self._loose).any():
-            self._loose, self.flight.mobility = loose, mobilities(self._model.nodes, self._bounds)
+        if (loose & ~self.flight.loose).any():
+            self.flight.loose, self.flight.mobility = loose, mobilities(self._model.nodes, self._bounds)
 
     def crack(self, tets: Ints, nodes: Indices, sides: Indices) -> None:
         """Takes up broken facets; see ``Cracks.add``."""
@@ -151,6 +149,10 @@ class Exterior:
         """
         return self._edges and self.cracks.age(self._comm.sum(self.cracks.ages))
 
+    @property
+    def _planes(self) -> Flags:
+        return symmetry_planes(self._model.nodes.n, self._bounds)
+
     def turn(self) -> None:
         """Mean normals of all nodes anew; all ranks take part."""
         self._moments = normals.moments(self._model, self._planes, self.size, self._neighbours, self._comm)
@@ -163,7 +165,6 @@ class Exterior:
         local, place = local[place >= 0], place[place >= 0]
         scene.slots.normals[place] = normals.means(self._moments[local])
         scene.slots.on_surface[place] = self.surface.flags[local]
-        scene.slots.loose[place] = self._loose[local]
         return np.asarray(place)
 
     def refresh(self, course: Floats, t: float) -> None:
@@ -225,8 +226,6 @@ class Exterior:
     def grow(self, split: Split) -> None:
         """Takes up the copies of nodes."""
         parents, flight = split.copies.parents, self.flight
-        self._loose = extended(self._loose, np.zeros(len(parents), bool))
-        self._planes = extended(self._planes, self._planes[parents])
         flight.mobility = extended(flight.mobility, flight.mobility[parents])
         for some in (parents, split.first + np.arange(split.copies.n)):
             free = flight.mobility[some] > 0.0

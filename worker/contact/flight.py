@@ -29,6 +29,8 @@ class Flight:
         self.until = 0.0
         """Time to which the last search is good if nothing strays, s."""
         self.mobility = mobility
+        self.loose = np.zeros(nodes.n, bool)
+        """(nodes,) those without tets."""
         self.begin(nodes, nodes.v, 0.0)
         self.follow(found, nodes)
 
@@ -64,6 +66,7 @@ class Flight:
         found = self.found
         found.flags = extended(found.flags, found.flags[parents])
         self._watched = extended(self._watched, self._watched[parents])
+        self.loose = extended(self.loose, np.zeros(len(parents), bool))
         self._x, self._course = extended(self._x, self._x[parents]), extended(self._course, self._course[parents])
 
     def here(self, nodes: Nodes) -> Crowd:

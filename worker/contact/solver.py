@@ -42,7 +42,7 @@ class ActiveSet:
         self, found: ContactRows, n: int, crowd: Crowd, loose: Flags, shared: ActiveSum, size: float, dt: float
     ) -> None:
         """Takes up the first ``n`` contacts that were ``found`` in a step ``dt``, s, and the nodes whose sums are
-        ``shared``; ``loose`` (crowd,): nodes without tets; ``size``: of a face, m.
+        ``shared``; ``loose`` (nodes,): those without tets; ``size``: of a face, m.
         """
         self._sum = shared
         if len(self._slot) != crowd.n:
@@ -57,7 +57,7 @@ class ActiveSet:
         self.places = room.places[: self._n]
         shared.number(slot)
         self._fastest = held.load(room.active, self.places, crowd.v, crowd.mobility)
-        stops.find(room.braced, room.active, self.stops, self.places, crowd.x, crowd.part, loose, size, dt)
+        stops.find(room.braced, room.active, self.stops, self.places, crowd.x, crowd.part, crowd.local, loose, size, dt)
         stops.stop(room.active, room.braced)
         self._contacts = ActiveContacts(
             room.slots, found.weights, found.normals, found.wanted, found.friction, found.pair, room.reach

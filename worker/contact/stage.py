@@ -257,7 +257,8 @@ class Contact:
         self._meet(now, give, dt)
         retarget(now.active.room, now.active.n, crowd.v, now.slots.before, self._scheme.restitution, give)
         shared = now.messages.company.agree(now.active.room.nodes[: now.active.n], crowd.local)
-        active.begin(now.active.room, now.active.n, crowd, now.slots.loose, shared, self.exterior.size, dt)
+        surface = self.exterior
+        active.begin(now.active.room, now.active.n, crowd, surface.flight.loose, shared, surface.size, dt)
         active.weigh()
         kept = Kept(now.node_face.kept, self.exterior.cracks.kept.reshape(-1, 4))
         active.resume(kept, self._resume(give))

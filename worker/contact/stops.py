@@ -97,17 +97,17 @@ STOPS = record(Stops, _F2, _F2, _F2, _F1, _B1)
 BRACED = record(Braced, _N2, _F2, _F1, _F1, _F2, _F1, types.int64[::1])
 
 
-@njit(types.void(BRACED, NODES, STOPS, _N1, _F2, _N1, _B1, types.float64, types.float64), cache=True)
-def find(braced, active, stops, places, x, part, loose, size, dt):  # type: ignore[no-untyped-def]
-    """The slots near a stop in a step ``dt``, s; ``x``, ``part`` and who is ``loose``, without tets, of the crowd;
-    ``size`` of a face, m.
+@njit(types.void(BRACED, NODES, STOPS, _N1, _F2, _N1, _N1, _B1, types.float64, types.float64), cache=True)
+def find(braced, active, stops, places, x, part, local, loose, size, dt):  # type: ignore[no-untyped-def]
+    """The slots near a stop in a step ``dt``, s; ``x``, ``part`` and ``local`` of the crowd; ``loose`` (nodes,): those
+    of this rank without tets, which are nobody else's; ``size`` of a face, m.
     """
     fixed, n = active.fixed, 0
     for k in range(len(stops.points)):
         for s in range(len(places)):
             a = places[s]
             side = stops.sides[k, part[a]]
-            if side == 0.0 or (stops.mirrors[k] and loose[a]):
+            if side == 0.0 or (stops.mirrors[k] and local[a] >= 0 and loose[local[a]]):
                 continue
             gap, along = 0.0, 0.0
             for i in range(3):
