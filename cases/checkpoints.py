@@ -17,8 +17,8 @@ import msgspec
 
 from . import layout, whole
 
-FORMAT = 16
-"""Of the files; 16 has the matter at the nodes and what lines of the ledger have made. Others are not read."""
+FORMAT = 17
+"""Of the files; 17 has the compression that brittle parts have met. Others are not read."""
 MANIFEST, SEAL = "manifest.json", "manifest.sha256"
 _FILE = re.compile(r"rank-[0-9]+\.h5")
 _PIECE = 1 << 24

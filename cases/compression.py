@@ -13,17 +13,24 @@ s1 + 3 s3 > 0. In the plane wave of an impact nothing moves aside, so that s3 = 
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from .boundaries import Wall
+from .figures import si
 from .impact import apart, velocities, wave_speed
 from .library import library, material
 from .materials import Material
+from .outcome import Compressed
 from .problems import Problem, problem
 from .schema import Case
 
 CRUSHING = ("mohr_coulomb", "johnson_holmquist")
 """Laws of strength under which brittle matter fails in compression, too."""
+
+
+def bears_all(made: Material) -> bool:
+    """Whether it breaks in tension alone and bears any compression."""
+    return made.brittle is not None and made.strength is None
 
 
 def griffith(made: Material) -> float:
@@ -64,9 +71,8 @@ def crushed(case: Case) -> Iterator[Problem]:
             most[part.material] = stress, i
     for name, (stress, i) in most.items():
         made = material(case, name)
-        if made.brittle is None or made.strength is not None or stress <= griffith(made):
+        if not bears_all(made) or stress <= griffith(made):
             continue
-        law = " or ".join(repr(law) for law in CRUSHING)
         alike = f" ({', '.join(_alike(name))})" if _alike(name) else ""
         met = f"{case.parts[i].name!r} may be compressed with {stress * 1e-9:.2g} GPa by an impact"
         crush = (
@@ -75,8 +81,24 @@ def crushed(case: Case) -> Iterator[Problem]:
         yield problem(
             ("materials", name, "strength"), "none",
             f"{met}; without strength it breaks in tension alone and bears any compression, where matter {crush}: "
-            f"strength.model = {law} can fail so{alike}",
+            f"{_cure()}{alike}",
         )  # fmt: skip
+
+
+def borne(found: Sequence[Compressed]) -> list[str]:
+    """A warning for each part that a run has compressed beyond the criterion."""
+    return [
+        f"{each.part} has met a compression of {si(each.most, 'Pa')}, with {si(each.least, 'Pa')} across it, "
+        f"{each.times:.2g} times what cracks matter of its tensile strength (Griffith 1924), in tet {each.tet} at "
+        f"({each.x:.4g}, {each.y:.4g}, {each.z:.4g}) m, at {each.time:.4g} s; no law of its material fails in "
+        f"compression, and it has borne it: {_cure()}"
+        for each in found
+        if each.times > 1.0
+    ]
+
+
+def _cure() -> str:
+    return f"strength.model = {' or '.join(repr(law) for law in CRUSHING)} can fail so"
 
 
 def _alike(name: str) -> list[str]:

@@ -28,6 +28,25 @@ class Made(msgspec.Struct, kw_only=True, frozen=True):
     time: float
 
 
+class Compressed(msgspec.Struct, kw_only=True, frozen=True):
+    """The hardest compression that a part without a law of compressive failure has met (worker/crushing.py)."""
+
+    part: str
+    times: float
+    """How many times that of Griffith's criterion (compression.py)."""
+    most: float
+    """The largest pressure on any plane, Pa; tension is below zero."""
+    least: float
+    """The smallest, Pa."""
+    tet: int
+    x: float
+    """The place at that time, m."""
+    y: float
+    z: float
+    time: float
+    """s."""
+
+
 class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     """How a run ended; times in s, energies in J.
 
@@ -77,6 +96,8 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     """The largest energy residual of any ledger line of the run."""
     made: list[Made] = []
     """What lines of the ledger have made (``run.made_limit``), the worst first; none that has made nothing."""
+    compressed: list[Compressed] = []
+    """Of each part that breaks in tension alone and has been under compression, the hardest first."""
     phases: dict[str, list[float]] = {}
     """CPU seconds per phase, one number a rank."""
     without: list[str] = []

@@ -31,7 +31,7 @@ from conoid.cases.figures import (
 from conoid.cases.library import Constant, material
 from conoid.cases.loaded import Load
 from conoid.cases.materials import Material
-from conoid.cases.outcome import Check, Outcome
+from conoid.cases.outcome import Check, Compressed, Outcome
 from conoid.cases.placed import Bulk
 from conoid.cases.run import State
 from conoid.cases.schema import Boundary, Case, Traction
@@ -250,9 +250,15 @@ def outcome_table(outcome: Outcome) -> Table:
             "speed": "" if math.isnan(speed) else f"{large(speed)} element updates a CPU-second and core",
             "memory": f"{size(max(outcome.peak_memory))} in the largest rank" if outcome.peak_memory else "",
             "energy": "" if energy is None else f"residual {rough(energy.residual)}, worst {worst}",
+            "compression": "; ".join(map(_compressed, outcome.compressed)),
             "digest": outcome.digest[:16],
         }
     return pairs({**entries, "warnings": "\n".join(outcome.warnings)})
+
+
+def _compressed(met: Compressed) -> str:
+    """The compression that a part without a law against it has met."""
+    return f"{met.part} up to {si(met.most, 'Pa')}, {fixed(met.times)} times Griffith's criterion"
 
 
 def balance_table(accounts: Sequence[Account], happened: Account) -> Table:

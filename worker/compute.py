@@ -11,6 +11,7 @@ import numpy as np
 
 from conoid.cases import messages
 from conoid.cases.checkpoints import Manifest
+from conoid.cases.compression import borne
 from conoid.cases.history import of_parts
 from conoid.cases.outcome import Made, Outcome
 from conoid.cases.quantities import FIELD_UNITS
@@ -163,6 +164,7 @@ def _sum_up(
     labels = sim.record.labels if sim.record else None
     inside = look(sim.contact, sim.model, labels, sim.comm) if sim.contact else None
     common = common_volume.measure(sim.contact, sim.model, labels, sim.comm) if sim.contact else None
+    compressed = sim.crushing.found() if sim.crushing is not None else []
     state, cause, message = State.SUCCEEDED, None, ""
     if loop.stopped:
         state, cause, message = *STOPS[loop.stopped][:2], loop.reason()
@@ -178,6 +180,7 @@ def _sum_up(
         overlapping=common.large if common else 0, overlap=common.share if common else 0.0, energy=loop.energy,
         worst_residual=sim.ledger.worst,
         made=[Made(line=name, share=made.share, time=made.t) for name, made in sim.ledger.making.ranked()],
+        compressed=compressed,
         rebalances=loop.balance.events, balancing_cost=loop.balance.spent,
         balancing_saved=loop.balance.saved,
         phases={name: [s[name] for s in seconds] for name in PHASES} if seconds else {},
@@ -185,7 +188,8 @@ def _sum_up(
         element_updates_per_second=(loop.updates - start.updates) / total_cpu if total_cpu > 0.0 else 0.0,
         reference=checks,
         warnings=[
-            *start.warnings, *loop.warnings, *loop.lost, *sim.ledger.warnings(sim.case.numerics.dt_safety),
+            *borne(compressed), *start.warnings, *loop.warnings, *loop.lost,
+            *sim.ledger.warnings(sim.case.numerics.dt_safety),
             *(sim.erosion.warnings(eroded) if sim.erosion is not None else []),
             *(sim.fracture.warnings if sim.fracture is not None else []), *(inside.warnings if inside else []),
             *(common.warnings if common else []), *(sim.contact.need.warnings if sim.contact else []),

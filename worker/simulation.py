@@ -14,6 +14,7 @@ from .assembly import Say, quiet
 from .boundaries import Boundary
 from .clock import Clock
 from .contact.stage import Contact
+from .crushing import Crushing
 from .elements.averaging import AveragedElements
 from .elements.forms import Elements
 from .elements.matter import whose
@@ -61,6 +62,7 @@ class Simulation:
     timers: Timers
     record: Record | None
     """Of the fragments."""
+    crushing: Crushing | None
     neighbours: list[Neighbour]
     assembled: float
     """CPU time that it took to make the stages on the slowest rank, s."""
@@ -178,6 +180,7 @@ def _assemble(
         case=case, comm=comm, model=model, elements=elements, boundaries=scene, contact=contact, erosion=erosion,
         fracture=fracture, clock=clock, ledger=Ledger(model, scene, contact, erosion, fracture, comm, clock),
         probes=probes, timers=timers, record=Record(model, fracture, comm) if fracture is not None else None,
+        crushing=Crushing.of(case, model, comm, clock),
         neighbours=neighbours, floor=_force_floor(model, comm), reduction=StepReduction(comm.size, comm.rank),
         assembled=float(comm.maximum(np.array([worked(comm) - began]))[0]),
     )  # fmt: skip
@@ -203,6 +206,8 @@ def keep(sim: Simulation) -> Parcel:
         sim.fracture.keep(parcel)
     if sim.record is not None:
         sim.record.keep(parcel)
+    if sim.crushing is not None:
+        parcel.known["crushing"] = sim.crushing.keep()
     return parcel
 
 
@@ -230,6 +235,8 @@ def resume(case: Case, arrived: Arrived, comm: Comm, timers: Timers) -> Simulati
         sim.fracture.resume(parcel)
     if sim.record is not None:
         sim.record.resume(parcel)
+    if sim.crushing is not None:
+        sim.crushing.resume(known["crushing"])
     return sim
 
 

@@ -119,6 +119,9 @@ def second_half(sim: Simulation) -> None:
             own.stray = sim.contact.stray
             own.costs[sim.comm.rank], own.unsettled[sim.comm.rank] = sim.contact.costs, sim.contact.need.unsettled
     _elements(sim, clock.dt, sim.fracture)  # 12 to 14
+    if sim.crushing is not None:
+        with sim.timers.phase("elements"):
+            sim.crushing.look()
     if sim.fracture is not None:
         with sim.timers.phase("fracture"):
             # 15: facets break, nodes separate, f(n+1) goes with them

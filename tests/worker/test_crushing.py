@@ -1,0 +1,162 @@
+"""The compression that brittle matter without a law of compressive failure meets."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from conoid.cases import materials, schema
+from conoid.cases.compression import borne, griffith
+from conoid.cases.outcome import Compressed
+from conoid.worker import step
+from conoid.worker.crushing import hardest, principal
+from conoid.worker.simulation import Simulation
+from conoid.worker.state import CHUNK, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ
+
+from . import formulas
+from .brittle import random_deviators
+from .kernels import GLASS, HARD, Patch, scene
+from .meshes import Floats, block
+from .simulations import kept_again, on, tick
+
+STRENGTH = 60e6
+BRITTLE = materials.Material(
+    density=2500.0, elastic=GLASS.elastic, brittle=materials.Brittle(strength=STRENGTH, energy=8.0)
+)  # fmt: skip
+DEVIATOR = (S_XX, S_YY, S_ZZ, S_YZ, S_ZX, S_XY)
+
+
+def chunks(stress: Floats) -> Floats:
+    """The state of tets with these stresses (n, 3, 3), Pa, positive in tension."""
+    n, s = len(stress), formulas.deviator(stress)
+    state = np.zeros((-(-n // CHUNK), PRESSURE + 1, CHUNK))
+    rows = [s[:, 0, 0], s[:, 1, 1], s[:, 2, 2], s[:, 1, 2], s[:, 2, 0], s[:, 0, 1]]
+    for row, values in [*zip(DEVIATOR, rows, strict=True), (PRESSURE, -np.trace(stress, axis1=1, axis2=2) / 3.0)]:
+        for c in range(len(state)):
+            part = values[c * CHUNK : (c + 1) * CHUNK]
+            state[c, row, : len(part)] = part
+    return state
+
+
+def stresses(n: int) -> Floats:
+    """All kinds: two equal principal values, nearly equal ones, tension and compression from all sides."""
+    random = np.random.default_rng(5)
+    s = random_deviators(n, random)
+    return s - (random.normal(size=n) * formulas.mises(s))[:, None, None] * np.eye(3)
+
+
+def beyond(stress: Floats) -> Floats:
+    """(n,) times Griffith's criterion, by numpy's eigenvalues."""
+    pressures = -np.linalg.eigvalsh(stress)
+    s1, s3 = pressures[:, 0], np.maximum(pressures[:, 2], 0.0)
+    times: Floats = np.divide((s1 - s3) ** 2, 8.0 * STRENGTH * (s1 + s3), out=np.zeros(len(s1)), where=s1 > 0.0)
+    return times
+
+
+def test_principal_pressures_are_those_of_numpy() -> None:
+    """To the root of round-off where two are equal, for they are double roots."""
+    stress = stresses(2000)
+    state, known = chunks(stress), -np.linalg.eigvalsh(stress)
+    found = np.array([principal(state[i // CHUNK].reshape(-1), i % CHUNK) for i in range(len(stress))])
+    assert (np.abs(found - known[:, [0, 2]]).max(axis=1) / np.abs(known).max(axis=1)).max() < 1e-7
+
+
+def test_no_stress_has_none() -> None:
+    assert principal(chunks(np.zeros((1, 3, 3)))[0].reshape(-1), 0) == (0.0, 0.0)
+
+
+def test_the_hardest_is_that_of_all_tets() -> None:
+    """The bounds pass over no tet that counts: whatever is known already, and wherever the hardest stands."""
+    stress = stresses(1500)
+    for last in (1500, 700, 300, 40, 5, 1):
+        expected = beyond(stress[:last])
+        place, times = hardest(chunks(stress[:last]), np.arange(last), last, STRENGTH, 0.0)
+        assert times == pytest.approx(expected.max(initial=0.0), rel=1e-6)
+        if times > 0.0:
+            assert place == expected.argmax()
+            assert hardest(chunks(stress[:last]), np.arange(last), last, STRENGTH, times) == (-1, times)
+
+
+def test_of_equal_tets_the_smallest_id_is_named() -> None:
+    stress = np.tile(np.diag([-3e9, -1e9, -1e9]), (4, 1, 1))
+    assert hardest(chunks(stress), np.array([7, 3, 5, 9]), 4, STRENGTH, 0.0)[0] == 1
+
+
+def test_a_plane_wave_and_a_bar_meet_the_criterion_where_the_warning_says() -> None:
+    """griffith(), from which on ``conoid validate`` warns, and 8 T of a bar."""
+    k = 0.22 / 0.78
+    wave = griffith(BRITTLE) * np.diag([-1.0, -k, -k])
+    bar = 8.0 * STRENGTH * np.diag([-1.0, 0.0, 0.0])
+    for stress in (wave, bar):
+        assert hardest(chunks(stress[None]), np.arange(1), 1, STRENGTH, 0.0)[1] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("stress", "times"), [
+    ([1e9, 1e9, 1e9], 0.0), ([3e9, 1e9, 0.0], 0.0), ([-1e9, -1e9, -1e9], 0.0), ([5e9, -8e8, 0.0], 1e8 / STRENGTH),
+])  # fmt: skip
+def test_tension_and_equal_pressures_crush_nothing(stress: list[float], times: float) -> None:
+    """Tension beside a pressure changes nothing: the tensile law answers for it."""
+    assert hardest(chunks(np.diag(stress)[None]), np.arange(1), 1, STRENGTH, 0.0)[1] == pytest.approx(times, abs=1e-9)
+
+
+MESH = block((5, 3, 3), 1e-3, seed=2)
+WALL = schema.Wall(kind="wall", point=(0.0, 0.0, 0.0), normal=(1.0, 0.0, 0.0))
+CASE = scene(BRITTLE, end=2e-6, velocity=(-400.0, 0.0, 0.0), boundaries=(WALL,))
+STEPS = 12
+
+
+def met(sim: Simulation, steps: int = STEPS) -> list[Compressed]:
+    """After so many steps."""
+    if sim.clock.step == 0:
+        step.prepare(sim)
+    for _ in range(steps):
+        tick(sim)
+    assert sim.crushing is not None
+    return sim.crushing.found()
+
+
+@pytest.fixture(scope="module")
+def alone() -> Compressed:
+    """What one rank meets."""
+    ((found,),) = on(1, CASE, [MESH], met)
+    return found
+
+
+def test_what_hits_a_wall_meets_the_stress_of_the_wave(alone: Compressed) -> None:
+    """Density times wave speed times speed, 5.4 GPa, in front of the wall; a coarse mesh overshoots."""
+    wave = 2500.0 * 400.0 * (72e9 * 0.78 / (1.22 * 0.56) / 2500.0) ** 0.5
+    assert 0.9 * wave < alone.most < 1.5 * wave
+    assert alone.x < 2e-3
+    assert 0.0 < alone.time < 1e-6
+    assert alone.times > wave / griffith(BRITTLE) * 0.9
+    (text,) = borne([alone])
+    assert "body has met a compression of" in text
+    assert "strength.model = 'mohr_coulomb' or 'johnson_holmquist' can fail so" in text
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_all_ranks_say_what_one_alone_says(ranks: int, alone: Compressed) -> None:
+    assert on(ranks, CASE, [MESH], met) == [[alone]] * ranks
+
+
+def test_a_run_that_goes_on_remembers(tmp_path: Path, alone: Compressed) -> None:
+    """Also where the hardest was met before the checkpoint."""
+
+    def work(sim: Simulation) -> list[Compressed]:
+        met(sim, STEPS)
+        return met(kept_again(sim, CASE, tmp_path), 3)
+
+    (found,) = on(1, CASE, [MESH], work)[0]
+    assert found.times >= alone.times
+    assert found == alone or found.time > alone.time
+
+
+def test_what_fails_in_compression_or_does_not_break_has_none() -> None:
+    assert Patch(MESH, GLASS).sim.crushing is None
+    assert Patch(MESH, HARD).sim.crushing is None
+
+
+def test_a_part_below_the_criterion_is_no_warning(alone: Compressed) -> None:
+    (slow,) = on(1, scene(BRITTLE, velocity=(-4.0, 0.0, 0.0), boundaries=(WALL,)), [MESH], met)[0]
+    assert slow.times < 1.0 < alone.times
+    assert borne([slow]) == []

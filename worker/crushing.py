@@ -1,0 +1,155 @@
+"""The compression that brittle matter without a law of compressive failure meets, in every step, beside Griffith's
+criterion (cases/compression.py).
+
+Such matter breaks in tension alone and bears any compression. Each stress is compared with the criterion of Griffith
+(1924): (s1 - s3)^2 / (8 T (s1 + s3)) for the largest and the smallest pressure, s1 and s3, and the tensile strength T.
+Matter of this strength cracks at 1, and the number grows in proportion to the stress. Tension, s3 < 0, counts as none:
+it is for the law that the matter has. The stress is that of the tets at the end of a step, without its viscous part.
+"""
+
+from dataclasses import astuple, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from conoid.cases.compression import bears_all
+from conoid.cases.library import material
+from conoid.cases.outcome import Compressed
+from conoid.cases.schema import Case
+
+from .clock import Clock
+from .jit import njit
+from .parallel.comm import Comm
+from .state import CHUNK, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, Block, Floats, Model
+
+_SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
+_SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
+_P = PRESSURE * CHUNK
+_MOST = 100
+"""Steps of Newton at most. Chosen: 6 do, and where two principal stresses are nearly equal each halves the distance, so
+that 30 reach what rounding leaves."""
+_ROUNDING = 1e-15
+"""Of the cube of the root: a few last bits of a float64. What is below it is noise; a double root is known to the root
+of that."""
+
+
+@njit("float64(float64, float64)", cache=True, error_model="numpy")
+def _largest_root(j2, j3):  # type: ignore[no-untyped-def]
+    """The largest principal value of a deviator with these invariants: of x^3 - j2 x - j3 = 0, by Newton from above."""
+    x = 2.0 * np.sqrt(j2 / 3.0)
+    for _ in range(_MOST):
+        left, slope = (x * x - j2) * x - j3, 3.0 * x * x - j2
+        if left <= _ROUNDING * x * x * x or slope <= 0.0:
+            break
+        x -= left / slope
+    return x
+
+
+@njit("UniTuple(float64, 2)(float64[::1], int64)", cache=True, error_model="numpy")
+def principal(s, i):  # type: ignore[no-untyped-def]
+    """The largest and the smallest pressure of tet ``i`` of a chunk, Pa."""
+    xx, yy, zz, yz, zx, xy = s[_SXX + i], s[_SYY + i], s[_SZZ + i], s[_SYZ + i], s[_SZX + i], s[_SXY + i]
+    j2 = 0.5 * (xx * xx + yy * yy + zz * zz) + yz * yz + zx * zx + xy * xy
+    j3 = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * zx) + zx * (xy * yz - yy * zx)
+    return s[_P + i] + _largest_root(j2, -j3), s[_P + i] - _largest_root(j2, j3)
+
+
+@njit("float64(float64, float64, float64)", cache=True, error_model="numpy")
+def _beyond(s1, s3, strength):  # type: ignore[no-untyped-def]
+    """How many times these pressures are those of the criterion."""
+    s3 = max(s3, 0.0)
+    return (s1 - s3) ** 2 / (8.0 * strength * (s1 + s3)) if s1 > 0.0 else 0.0
+
+
+@njit("Tuple((int64, float64))(float64[:, :, ::1], int64[::1], int64, float64, float64)", cache=True,
+      error_model="numpy")  # fmt: skip
+def hardest(state, ids, n, strength, known):  # type: ignore[no-untyped-def]
+    """The place of the tet that exceeds the criterion most, and by how many times, where that is more than ``known``;
+    -1 where none is. Of equal ones that with the smallest id.
+
+    Most tets are passed over by two bounds of the invariants. The number is at most s1 / 8 T, and s1 <= p + 2 r,
+    r = sqrt(J2 / 3). And s1 - s3 <= 2 sqrt(J2), s1 + s3 >= 2 p - r.
+    """
+    place, best = -1, known
+    for c in range((n + CHUNK - 1) // CHUNK):
+        s = state[c].reshape(-1)
+        for i in range(min(CHUNK, n - c * CHUNK)):
+            xx, yy, zz = s[_SXX + i], s[_SYY + i], s[_SZZ + i]
+            yz, zx, xy = s[_SYZ + i], s[_SZX + i], s[_SXY + i]
+            j2 = 0.5 * (xx * xx + yy * yy + zz * zz) + yz * yz + zx * zx + xy * xy
+            r, p = np.sqrt(j2 / 3.0), s[_P + i]
+            if p + 2.0 * r < 8.0 * strength * best or 4.0 * j2 < 8.0 * strength * best * (2.0 * p - r):
+                continue
+            s1, s3 = principal(s, i)
+            share, at = _beyond(s1, s3, strength), c * CHUNK + i
+            if share > best or (share == best and place >= 0 and ids[at] < ids[place]):
+                place, best = at, share
+    return place, best
+
+
+@dataclass(frozen=True)
+class Met:
+    """What a tet has met: how many times the criterion, pressures, Pa, its id, its centre, m, and the time, s."""
+
+    times: float = 0.0
+    most: float = 0.0
+    least: float = 0.0
+    tet: int = -1
+    centre: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    time: float = 0.0
+
+
+class Crushing:
+    """The hardest that each part of such matter has met; on this rank until ranks compare."""
+
+    def __init__(self, model: Model, strengths: Floats, comm: Comm, clock: Clock) -> None:
+        """``strengths`` (parts,): of tension, Pa; 0 for other matter."""
+        self._model, self._strengths, self._comm, self._clock = model, strengths, comm, clock
+        self._met = [Met() for _ in model.parts]
+
+    @classmethod
+    def of(cls, case: Case, model: Model, comm: Comm, clock: Clock) -> "Crushing | None":
+        """None where no part is of such matter."""
+        made = [material(case, part.material) for part in case.parts]
+        strengths = [each.brittle.strength if each.brittle and bears_all(each) else 0.0 for each in made]
+        return cls(model, np.array(strengths), comm, clock) if any(strengths) else None
+
+    def look(self) -> None:
+        """The stresses as they are now."""
+        for block in self._model.blocks:
+            strength = float(self._strengths[block.part])
+            if strength > 0.0:
+                place, times = hardest(block.state, block.id, block.n, strength, self._met[block.part].times)
+                if place >= 0:
+                    self._met[block.part] = self._of(block, place, times)
+
+    def _of(self, block: Block, place: int, times: float) -> Met:
+        chunk, i = divmod(place, CHUNK)
+        corners = self._model.nodes.x[block.tets[place]]
+        x, y, z = (0.25 * ((corners[0] + corners[1]) + (corners[2] + corners[3]))).tolist()
+        most, least = principal(block.state[chunk].reshape(-1), i)
+        return Met(times, most, least, int(block.id[place]), (x, y, z), self._clock.t)
+
+    def _of_all(self) -> list[Met]:
+        """Of each part the hardest of all ranks, the earliest of equal ones; all ranks take part."""
+        shared = self._comm.share(self._met)
+        return [min(found, key=lambda met: (-met.times, met.time, met.tet)) for found in zip(*shared, strict=True)]
+
+    def keep(self) -> list[tuple[Any, ...]]:
+        """What has been met, equal on all ranks; all take part."""
+        return [astuple(met) for met in self._of_all()]
+
+    def resume(self, known: list[tuple[Any, ...]]) -> None:
+        """Takes it back."""
+        self._met = [replace(Met(*met), centre=tuple(met[4])) for met in known]
+
+    def found(self) -> list[Compressed]:
+        """Of each part of such matter, the hardest first; all ranks take part."""
+        met = [
+            Compressed(
+                part=name, times=each.times, most=each.most, least=each.least, tet=each.tet,
+                x=each.centre[0], y=each.centre[1], z=each.centre[2], time=each.time,
+            )
+            for name, each in zip(self._model.parts, self._of_all(), strict=True) if each.tet >= 0
+        ]  # fmt: skip
+        return sorted(met, key=lambda each: (-each.times, each.part))
