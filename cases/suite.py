@@ -28,6 +28,9 @@ class Hard:
     changes: tuple[str, ...] = ()
     limit: float = RESIDUAL
     """Of the energy residual."""
+    refused: str = ""
+    """The line of the energy that is known to make more than ``run.made_limit``: that ends the run. Without it the run
+    has to succeed."""
 
     @property
     def path(self) -> Path:
@@ -39,9 +42,12 @@ def suite() -> list[Hard]:
     """Every case, in the order of the table."""
     listed = tomllib.loads(_TABLE.read_text(encoding="utf-8"))["hard"]
     return [
-        Hard(e["name"], tuple(e["rows"]), e["case"], tuple(e.get("set", ())), float(e.get("limit", RESIDUAL)))
+        Hard(
+            e["name"], tuple(e["rows"]), e["case"], tuple(e.get("set", ())), float(e.get("limit", RESIDUAL)),
+            e.get("refused", ""),
+        )
         for e in listed
-    ]
+    ]  # fmt: skip
 
 
 def is_free(case: Case) -> bool:
@@ -62,7 +68,10 @@ def drift(case: Case, momenta: Sequence[tuple[float, float, float]]) -> float:
 def faults(hard: Hard, outcome: Outcome, drifted: float | None) -> list[str]:
     """What is wrong with a run of it; nothing where it ended well."""
     found = []
-    if outcome.state != "succeeded":
+    if hard.refused:
+        if outcome.cause != "energy" or f"the line {hard.refused} of the energy" not in outcome.message:
+            found.append(f"not refused for what {hard.refused} makes: {outcome.state}, {outcome.message}")
+    elif outcome.state != "succeeded":
         found.append(f"{outcome.state}: {outcome.message}")
     if not outcome.worst_residual <= hard.limit:
         found.append(f"energy residual {outcome.worst_residual:.2g} above {hard.limit:g}")

@@ -42,6 +42,14 @@ def test_a_run_that_ended_well_has_no_faults_and_every_fault_is_named() -> None:
     assert [fault.split()[0] for fault in faults(hard, bad, 1e-3)] == ["failed:", "energy", "momentum", "radius"]
 
 
+def test_a_case_whose_energy_is_made_must_be_refused_for_that_line() -> None:
+    hard = named("closing_bore")
+    text = f"the line {hard.refused} of the energy has made 0.0213 of the largest energy"
+    assert faults(hard, Outcome(state="failed", cause="energy", message=text, worst_residual=1e-6), None) == []
+    for wrong in (GOOD, Outcome(state="failed", cause="energy", message="the energy residual", worst_residual=1e-6)):
+        assert [fault.split(":")[0] for fault in faults(hard, wrong, None)] == ["not refused for what averaging makes"]
+
+
 def test_momentum_drifts_over_the_motion_of_the_parts_not_over_its_sum() -> None:
     """Two equal parts that meet: their momenta cancel, and yet a drift of one of them is one half."""
     case = case_of(named("scissors"))
