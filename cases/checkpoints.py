@@ -18,7 +18,7 @@ import msgspec
 from . import layout, whole
 
 FORMAT = 17
-"""Of the files; 17 has the compression that brittle parts have met. Others are not read."""
+"""Of the files; 17 has the compression that brittle parts have met, and the heat that eroded. Others are not read."""
 MANIFEST, SEAL = "manifest.json", "manifest.sha256"
 _FILE = re.compile(r"rank-[0-9]+\.h5")
 _PIECE = 1 << 24

@@ -97,7 +97,7 @@ class Ledger:
         node_sums, (work, viscous, plastic, averaged) = sums[:_NODAL], sums[_NODAL : _NODAL + len(WORKS)]
         self.parts = _named(self._model.parts, of_parts[:, 0], of_parts[:, _NODAL] + of_parts[:, _NODAL + 1])
         gone, gone_kinetic, gone_momenta = self._gone(told)
-        gone_work, gone_viscous, gone_plastic, gone_averaged = gone.tolist()
+        gone_work, gone_viscous, gone_plastic, gone_averaged, gone_heat = gone.tolist()
         self.momentum, self.angular_momentum = node_sums[3:6] + gone_momenta[:3], node_sums[7:] + gone_momenta[3:]
         self.lost = float(node_sums[1]) / self.initial if self.initial > 0.0 else 0.0
         kinetic_sum, loss_sum, external_sum, stepping = (float(v) for v in (*node_sums[:3], node_sums[6]))
@@ -123,7 +123,7 @@ class Ledger:
             contact=loss_sum - friction, friction=friction, eroded=eroded, fracture=lost, cohesive=cohesive,
             stepping=stepping, external=external_sum, initial=self.initial, residual=self.residual,
         )  # fmt: skip
-        self.making.look(closed, scale, self._clock.t)
+        self.making.look(closed, scale, self._clock.t, gone_heat)
         return closed
 
     def warnings(self, safety: float) -> list[str]:
@@ -205,9 +205,11 @@ class Ledger:
         return [Table(np.where(owned[nodes], loss, 0.0)[:, None], parts) for nodes, loss in pairs]
 
     def _gone(self, told: dict[str, Floats]) -> tuple[Floats, float, Floats]:
-        """(4,) WORKS of eroded tets, J; of eroded nodes energy, J, momentum, kg m/s, and angular momentum, kg m^2/s."""
+        """(5,) WORKS of eroded tets and the heat that their pressure has seen, J; of eroded nodes energy, J, momentum,
+        kg m/s, and angular momentum, kg m^2/s.
+        """
         if self._erosion is None:
-            return np.zeros(len(WORKS)), 0.0, np.zeros(6)
+            return np.zeros(len(WORKS) + 1), 0.0, np.zeros(6)
         kinetic, mass, *momenta = told["nodes"]
         self.eroded_mass = float(mass)
         return told["tets"], float(kinetic), np.array(momenta)

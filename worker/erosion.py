@@ -15,6 +15,8 @@ from .clock import Clock
 from .contact import bare
 from .contact.stage import Contact
 from .elements.wear import BROKEN, DAMAGED, FREQUENCY, SOUND, life
+from .materials.equation_of_state import GRUNEISEN
+from .materials.models import EQUATIONS
 from .mesh.faces import FACES
 from .mesh.faces import normals as face_normals
 from .migration.parcel import Parcel
@@ -33,6 +35,8 @@ from .state import (
     S_ZX,
     S_ZZ,
     VISCOUS,
+    WORK_PLASTIC,
+    WORK_VISCOUS,
     WORKS,
     Block,
     Flags,
@@ -73,8 +77,8 @@ class Erosion:
         """Nodes that leave in this step, and their v(n-1/2), m/s."""
         mass, speed, arm = extremes
         energy, momentum, spin = mass * speed * speed, mass * speed, mass * speed * arm
-        self.work = Tally(np.full(len(WORKS), energy))
-        """WORKS of the tets that have left, J."""
+        self.work = Tally(np.full(len(WORKS) + 1, energy))
+        """WORKS of the tets that have left, J, and of those whose pressure sees heat the heat."""
         self.nodal = Tally(np.array([energy, mass, *[momentum] * 3, *[spin] * 3]))
         """Energy, J, mass, kg, momentum, kg m/s, and angular momentum, kg m^2/s, of the nodes that have left."""
         self._half = self.nodal.quanta(np.zeros((0, len(self.nodal.scale))))
@@ -242,7 +246,7 @@ class Erosion:
             for corner in range(4):
                 for i in range(3):
                     work -= 0.5 * self._clock.last_dt * forces[:, corner, i] * state.v[tets[:, corner], i]
-            self.work.add(np.column_stack([work, np.zeros((len(work), len(WORKS) - 1))]))
+            self.work.add(np.column_stack([work, np.zeros((len(work), len(WORKS)))]))
         self._last = []
 
 
@@ -252,8 +256,11 @@ def _rows(block: Block, chosen: Ints, rows: "np.ndarray") -> Floats:
 
 
 def _energies(block: Block, chosen: Ints) -> Floats:
-    """(k, 4) WORKS of some tets, J."""
-    return np.column_stack([block.at(row, chosen) if block.has(row) else np.zeros(len(chosen)) for row in WORKS])
+    """(k, 5) WORKS of some tets, and the heat that their pressure has seen, J."""
+    none = np.zeros(len(chosen))
+    found = {row: block.at(row, chosen) if block.has(row) else none for row in WORKS}
+    heat = found[WORK_VISCOUS] + found[WORK_PLASTIC] if EQUATIONS[block.eos] is GRUNEISEN else none
+    return np.column_stack([*found.values(), heat])
 
 
 def _forces(block: Block, chosen: Ints, x: Floats) -> Floats:

@@ -11,7 +11,9 @@ stepping  the time integration                        its magnitude: an error ei
 ========  ==========================================  =============================================
 
 ``elastic`` is not judged: with an equation of state that sees heat it is below zero in hot matter that has expanded
-(docs/numerics.md, Time integration). Nor is any line while the largest energy is that of rounding.
+(docs/numerics.md, Time integration). Where such matter erodes, its elastic energy goes to ``eroded`` and its heat stays
+in ``plastic`` and ``viscous``: so ``eroded`` may be below zero by that heat, and no more. No line is judged while the
+largest energy is that of rounding.
 """
 
 import math
@@ -60,10 +62,13 @@ class Making:
         self._largest, self._energy, worst = known
         self.worst = {name: Made(*made) for name, made in worst.items()}
 
-    def look(self, energy: Energy, largest: float, t: float) -> None:
-        """Takes the lines of time ``t``, s; ``largest``: of what has come in, work of the stress and motion now, J."""
+    def look(self, energy: Energy, largest: float, t: float, heat: float = 0.0) -> None:
+        """Takes the lines of time ``t``, s; ``largest``: of what has come in, work of the stress and motion now, J;
+        ``heat``: of what has eroded and has a pressure that sees heat, J.
+        """
         self._energy = max(self._energy, largest)
         found = {name: -getattr(energy, name) for name in RETURNED}
+        found["eroded"] -= heat
         for name in LASTING:
             value = getattr(energy, name)
             self._largest[name] = max(self._largest[name], value)

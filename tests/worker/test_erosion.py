@@ -114,6 +114,19 @@ def test_the_accounts_close_for_a_spinning_body_without_contact(form: Form, node
     assert (sim.ledger.eroded_mass > 0.0) == (nodes == "remove")
 
 
+@pytest.mark.parametrize("material", [COPPER_GAS, COPPER, STEEL_42CRMO4])
+def test_the_heat_of_what_leaves_is_counted_where_its_pressure_sees_heat(material: Material) -> None:
+    """What the line ``eroded`` may be below zero by: 2 J of viscosity in each tet, nothing for another pressure."""
+    sim = alone(block((2, 2, 2), MM), material=material)
+    part = sim.model.blocks[0]
+    part.state[:, state.WORK_VISCOUS] = 2.0
+    step.prepare(sim)
+    tick(sim, part.id[:5].copy())
+    assert sim.erosion is not None
+    heat = sim.erosion.work.total(sim.comm)[-1]
+    assert heat == pytest.approx(10.0 if material is COPPER_GAS else 0.0, rel=1e-6)
+
+
 GRAVITY = {"kind": "gravity", "acceleration": (0.0, 0.0, -1e7)}
 DRIVEN = {"kind": "velocity", "z": 100.0, "low": (0.0, 0.0, 2.9 * MM), "high": (1.0, 1.0, 1.0)}
 MIRROR = {"kind": "symmetry", "axis": "x"}

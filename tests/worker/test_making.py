@@ -43,6 +43,14 @@ def test_what_gives_back_may_give_no_more_than_it_has(name: str) -> None:
     making.require(0.04, 0.9, "at step 3")
 
 
+def test_hot_matter_that_erodes_may_have_given_its_heat() -> None:
+    making = Making(0.0)
+    making.look(lines(eroded=-0.05), 1.0, 1e-6, heat=0.06)
+    assert making.worst == {}
+    making.look(lines(eroded=-0.09), 1.0, 2e-6, heat=0.06)
+    assert making.worst["eroded"].share == pytest.approx(0.03)
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_unequal_steps_count_either_way_and_their_cure_is_derived(sign: float) -> None:
     """An error of the second order in the step: half of TOLD is left at the named share of the present one."""
