@@ -23,6 +23,7 @@ from . import (
     gates,
     glass_bar,
     growth,
+    guard,
     long_rod,
     machine,
     speed,
@@ -210,10 +211,21 @@ def _long_rod(extent: Extent, book: Book) -> None:
         )
 
 
+def _guard(extent: Extent, book: Book) -> None:
+    try:
+        place = guard.sources(guard.BASE)
+    except guard.NoCommitError as error:
+        book.add("Guard", f"not measured: {error}", None)
+        return
+    found = list(guard.measure(guard.QUICK if extent is QUICK else guard.SCENES, place))
+    book.add("Guard", guard.report(found, guard.BASE), {each.scene.name: each.ratio() for each in found})
+
+
 PARTS: dict[str, Callable[[Extent, Book], None]] = {
     "speed": _speed, "akantu": _akantu, "taylor": _taylor, "growth": _growth, "startup": _startup,
     "accuracy": _accuracy, "telemetry": _telemetry, "contact": _contact, "contact_domain": _contact_domain,
     "fracture": _fracture, "cracks": _cracks, "glass_bar": _glass_bar, "long_rod": _long_rod,
+    "guard": _guard,
 }  # fmt: skip
 
 

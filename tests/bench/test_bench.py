@@ -9,7 +9,7 @@ import pytest
 from conoid.cases import messages
 from conoid.worker.mesh.structured import structured
 
-from . import accuracy, contact_cost, gates, growth, switch, taylor_cost
+from . import accuracy, contact_cost, gates, growth, guard, switch, taylor_cost
 from .gather_scatter import GatherScatter
 from .refine import refined
 from .scene import Ride, box, case
@@ -162,3 +162,19 @@ def test_contact_domains_are_compared_rank_by_rank_over_both_runs() -> None:
     assert rows[2][:7] == ["faces of a search", *["80 / 40"] * 4, "2.00", "2.00"]
     assert rows[4] == ["contact, CPU s", "14 / 7", "24 / 12", "4 / 2", "24 / 12", "2.00", "2.00", "> 2 (fig. 5)"]
     assert rows[6][1:3] == ["40 / 20", "40 / 20"], "kB a step"
+
+
+def paid(elements: float, contact: float, digest: str) -> guard.Paid:
+    phases = {"elements": [elements], "contact": [contact], "fracture": [0.001]}
+    outcome = {"phases": phases, "digest": digest, "elements": 10, "steps": 3, "worst_residual": 1e-6}
+    return guard.Paid(outcome)
+
+
+def test_the_guard_compares_medians_of_rounds_and_says_whether_the_answer_is_the_same() -> None:
+    rounds = [(paid(1.0, 3.0, "abcdefghi"), paid(1.0, contact, "abcdefghi")) for contact in (3.0, 6.0, 9.0)]
+    found = guard.Compared(guard.QUICK[0], rounds)
+    assert (found.ratio("contact"), found.ratio("elements"), found.ratio("fracture")) == (2.0, 1.0, 1.0)
+    assert found.ratio() == pytest.approx(7.001 / 4.001)
+    assert "equal, abcdefgh" in guard.report([found], guard.BASE)
+    other = guard.Compared(guard.QUICK[0], [(rounds[0][0], paid(1.0, 3.0, "other"))])
+    assert "another; residuals 1.0e-06, 1.0e-06" in guard.report([other], guard.BASE)
