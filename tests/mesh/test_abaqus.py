@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from conoid.worker.errors import MeshError
+from conoid.worker.mesh.abaqus import keywords
 from conoid.worker.mesh.abaqus.reading import read_inp
 from conoid.worker.mesh.named import NamedMesh
 
@@ -280,6 +281,13 @@ def test_a_part_without_an_instance_is_told(tmp_path: Path) -> None:
         ("*NODE\n1, 0,0,0,0,0,0,0\n", "line 2: a node has up to 6 values; found 7"),
         ("*NODE\n1.5, 0, 0, 0\n", "line 2: '1.5' is not a number of a node or element"),
         ("*NODE\n, 0, 0, 0\n", "line 2: '' is not a number of a node or element"),
+        ("*NODE\n0, 0, 0, 0\n", "line 2: '0' is not a number of a node or element; the first one is 1"),
+        (f"{ONE}*ELEMENT, TYPE=C3D4\n0, 1, 2, 3, 4\n", "line 7: '0' is not a number of a node or element; the first"),
+        (f"{ONE}*ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 0\n", "line 7: '0' is not a number of a node or element; the first"),
+        (f"{FLAT}*ELSET, ELSET=s\n0, 1\n", "line 19: '0' is not a number of a node or element; the first one is 1"),
+        (f"{FLAT}*ELSET, ELSET=s, GENERATE\n0, 4, 2\n", "line 19: '0' is not a number of a node or element; the first"),
+        (f"{FLAT}*ELSET, ELSET=s\n1, s\n", "line 19: the set 's' has itself among its members"),
+        (f"{FLAT}*ELSET, ELSET=UPPER\n upper\n", "line 19: the set 'upper' has itself among its members"),
         ("*NODE\n1, 0, 0, 0\n1, 1, 1, 1\n", "node 1 is defined twice"),
         (f"{ONE}{TET}{TET}", "element 1 is defined twice"),
         (f"{ONE}{TET}*ELEMENT, TYPE=S3\n1, 1, 2, 3\n", "element 1 is defined twice"),
@@ -379,6 +387,17 @@ U, V
 1, 2, 3
 *End Step
 """
+
+
+def test_what_would_join_or_remove_bodies_is_counted(tmp_path: Path) -> None:
+    """In the model, in the assembly and in a step, shortened too."""
+    assert keywords.JOINING.keys() <= keywords.ANALYSIS
+    joined = "*TIE, NAME=t\na, b\n*Tie, name=u\nb, c\n*Embedded Element\nx\n*END ASSEMBLY"
+    later = "*EQUA\n2\n1, 1, 1., 2, 1, -1.\n*STEP\n*MODEL CHANGE, REMOVE\nx\n"
+    text = PART + TWO.replace("*END ASSEMBLY", joined) + later
+    told = "keywords that join, hold or remove bodies are passed over: "
+    assert read(text, tmp_path).notes[-1] == f"{told}1 *EMBEDDED ELEMENT, 1 *EQUATION, 1 *MODEL CHANGE, 2 *TIE"
+    assert not any(told in note for note in read(PART + TWO, tmp_path).notes)
 
 
 def test_keywords_of_the_analysis_are_passed_over(tmp_path: Path) -> None:

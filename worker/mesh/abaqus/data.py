@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from ...errors import MeshError
 from ...turning import sine_and_cosine
 from .elements import ElementType, Kind
-from .lines import fields, numbers, wholes
+from .lines import fields, is_whole, numbers, whole, wholes
 
 _AXIS = 7
 """Numbers of a rotation: two points and an angle."""
@@ -56,13 +56,20 @@ def numbers_of(line: int, text: str) -> "array[int]":
         raise MeshError(
             f"line {line}: GENERATE takes a first number, a last one and a step; found {len(items)} numbers"
         )
-    first, last, step = (*wholes(line, items), 1)[:3]
+    (first, last), step = wholes(line, items[:2]), _step(line, items)
     if step < 1 or last < first or (last - first) % step:
         raise MeshError(f"line {line}: no steps of {step} lead from {first} to {last}")
     made = range(first, last + 1, step)
     if made.stop - made.start > step * _MOST_MADE:
         raise MeshError(f"line {line}: GENERATE makes {(last - first) // step + 1} numbers; allowed are {_MOST_MADE}")
     return array("q", made)
+
+
+def _step(line: int, items: list[str]) -> int:
+    """The third number, which may be 0; 1 where there is none. Raises MeshError."""
+    if not items[2:]:
+        return 1
+    return int(items[2]) if is_whole(items[2]) else whole(line, items[2])
 
 
 def translation(line: int, text: str) -> tuple[float, ...]:

@@ -1,13 +1,14 @@
 """Reads the keywords of an Abaqus input file that make a mesh, each in the scope where it stands."""
 
 from array import array
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
 from ...errors import MeshError
 from .data import axis, cylindrical, element_rows, numbers_of, translation
 from .elements import Kind, element_type
-from .keywords import MESH, REFUSED, known, needed, options
+from .keywords import JOINING, MESH, REFUSED, known, needed, options
 from .labels import Label, Labelled, label
 from .lines import Block, Source, fields, is_whole, numbers, shortened, whole, wholes
 from .scopes import OWN, ElementSet, Instance, Scope
@@ -25,6 +26,8 @@ class Deck:
         self.root = Scope(_ROOT, 0)
         self.parts: Labelled[Scope] = Labelled()
         self.instances: Labelled[Instance] = Labelled()
+        self.joining: Counter[str] = Counter()
+        """How often keywords that join, hold or remove bodies stand in the file."""
         self._here: Scope = self.root
         self._assembly = self._step = False
         self._source = Source(path)
@@ -40,6 +43,8 @@ class Deck:
         if word in REFUSED or (word in MESH and "INPUT" in dict(block.parameters)):
             extra = "" if word in REFUSED else ", INPUT"
             raise MeshError(f"line {block.line}: *{word}{extra} is not followed; write the nodes and elements out")
+        if word in JOINING:
+            self.joining[word] += 1
         reader = _READERS.get(word)
         if reader is not None:
             reader(self, block, options(block, word))
@@ -165,6 +170,8 @@ class Deck:
         other = self._here.sets.get(label(item)) if instance is None else instance.set_named(label(item))
         if other is None and instance is None and isinstance(self._here, Instance):
             other = self._here.part.sets.get(label(item))
+        if other is one:
+            raise MeshError(f"line {line}: the set {label(item).text!r} has itself among its members")
         if other is not None:
             one.include(other, owner)
             return

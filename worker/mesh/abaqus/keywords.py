@@ -115,6 +115,51 @@ ANALYSIS = _words(
 """Keywords of materials, loads, steps, output and node sets: they and their data lines are passed over."""
 
 
+JOINING = {
+    "".join(words.split()): words
+    for words in (
+        "ACTIVATE ELEMENTS",
+        "ADJUST",
+        "BOND",
+        "CLEARANCE",
+        "COHESIVE BEHAVIOR",
+        "CONTACT",
+        "CONTACT CLEARANCE",
+        "CONTACT INITIALIZATION DATA",
+        "CONTACT INTERFERENCE",
+        "CONTACT PAIR",
+        "COUPLING",
+        "CRACK PROPAGATION",
+        "CYCLIC SYMMETRY",
+        "DEBOND",
+        "DISPLAY BODY",
+        "DISTRIBUTING",
+        "DISTRIBUTING COUPLING",
+        "ELEMENT PROGRESSIVE ACTIVATION",
+        "EMBEDDED ELEMENT",
+        "ENRICHMENT",
+        "EQUATION",
+        "FASTENER",
+        "FLEXIBLE BODY",
+        "INTERFACE",
+        "KINEMATIC",
+        "KINEMATIC COUPLING",
+        "MODEL CHANGE",
+        "MPC",
+        "NETWORK MPC",
+        "PERIODIC",
+        "PRETENSION SECTION",
+        "RELEASE",
+        "RIGID BODY",
+        "SHELL TO SOLID COUPLING",
+        "SURFACE FLAW",
+        "TIE",
+    )
+}
+"""Keywords of ``ANALYSIS`` that join bodies, hold them together, move their nodes to each other, crack or remove them,
+as they are written. None of it is done here."""
+
+
 def known(block: Block, in_step: bool = False) -> str:
     """The whole word of a keyword, of any of the three kinds. Raises MeshError for none, or for several.
 

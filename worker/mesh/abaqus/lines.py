@@ -148,8 +148,8 @@ def numbers(line: int, text: str) -> list[float]:
 
 def whole(line: int, item: str) -> int:
     """The number of a node or of an element. Raises MeshError."""
-    if not _WHOLE.fullmatch(item):
-        raise MeshError(f"line {line}: {shortened(item)} is not a number of a node or element")
+    if not _WHOLE.fullmatch(item) or not int(item):
+        raise MeshError(f"line {line}: {shortened(item)} is not a number of a node or element; the first one is 1")
     return int(item)
 
 
@@ -157,7 +157,9 @@ def wholes(line: int, items: list[str]) -> list[int]:
     """The numbers of nodes or elements in several fields. Raises MeshError."""
     if _WHOLES.fullmatch(",".join(items)):
         with suppress(ValueError):
-            return [int(item) for item in items]
+            found = [int(item) for item in items]
+            if all(found):
+                return found
     return [whole(line, item) for item in items]
 
 

@@ -15,6 +15,7 @@ from ..named import NamedMesh, gathered
 from .choosing import Chosen, everything, grouped
 from .deck import Deck
 from .elements import ElementType, Kind
+from .keywords import JOINING
 from .scopes import Piece, Scope
 
 
@@ -118,6 +119,9 @@ def _notes(deck: Deck, pieces: list[Piece], group: str | None) -> Iterator[str]:
         yield f"elements that carry no volume are skipped: {empty}"
     if solid := ", ".join(filter(None, (_counted(counts, kind) for kind in (Kind.VOLUME, Kind.UNKNOWN)))):
         yield f"elements that are no 4-node tets are outside of the group: {solid}"
+    if deck.joining:
+        words = ", ".join(f"{n} *{JOINING[word]}" for word, n in sorted(deck.joining.items()))
+        yield f"keywords that join, hold or remove bodies are passed over: {words}"
     placed = {id(piece.mesh) for piece in pieces}
     left = [part for _, part in deck.parts if id(part) not in placed and part.tets]
     if left:
