@@ -56,8 +56,12 @@ _UNLIKE = 1000.0
 
 def doubts(data: Mapping[str, Any], case: Case, expected: Estimate) -> list[Problem]:
     """Every warning: ``data`` is the case as it was written, ``expected`` its estimate."""
+    return [*bare_numbers(data), *oddities(case, expected)]
+
+
+def oddities(case: Case, expected: Estimate) -> list[Problem]:
+    """Those that do not depend on how the case is written."""
     return [
-        *bare_numbers(data),
         *_effort(case, expected),
         *_materials(case),
         *_bodies(case, expected),

@@ -52,6 +52,8 @@ class Survey(msgspec.Struct, kw_only=True, frozen=True):
     refused: list[str] = []
     touching: list[Touch] = []
     """Of the pairs of parts at least one of which has a mesh from a file."""
+    told: list[str] = []
+    """Warnings that the meshes themselves give rise to, a line each, as a run gives them."""
 
     def of(self, part: int) -> Surveyed | None:
         """What is known of part ``part``; None where its mesh is generated, or was not read."""

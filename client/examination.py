@@ -18,12 +18,13 @@ from conoid.cases.bodies import MeshFile
 from conoid.cases.estimate import Estimate, estimate
 from conoid.cases.load import CaseError, parse_case
 from conoid.cases.mesh_checks import missing_files
-from conoid.cases.plausible import doubts
+from conoid.cases.plausible import bare_numbers
 from conoid.cases.problems import Problem, problem
 from conoid.cases.schema import Case
 from conoid.cases.survey import Survey
-from conoid.cases.touching import Touch, apart
+from conoid.cases.touching import Touch
 from conoid.cases.touching import touching as touches
+from conoid.cases.warned import warned
 
 from .errors import ClientError
 
@@ -59,7 +60,7 @@ def examine(data: Mapping[str, Any], folder: Path) -> Examination:
     except (ArithmeticError, ValueError):
         raise CaseError([Problem("parts", "", "the elements are too many or too small to be counted")]) from None
     touching = [*touches(case), *found.touching]
-    odd = [*unread, *_notes(case, found), *doubts(data, case, expected), *apart(case, touching)]
+    odd = [*unread, *bare_numbers(data), *warned(case, expected, found, touching)]
     return Examination(case, expected, odd, found, touching)
 
 
@@ -86,12 +87,3 @@ def _survey(case: Case, folder: Path) -> tuple[Survey, list[Problem]]:
 def _installed() -> bool:
     """Whether the worker can be started here."""
     return all(importlib.util.find_spec(name) is not None for name in ("conoid.worker", "numpy"))
-
-
-def _notes(case: Case, found: Survey) -> list[Problem]:
-    """What of the files is not in the meshes, as warnings."""
-    return [
-        problem(("parts", each.part, "mesh", "path"), getattr(case.parts[each.part].mesh, "path", ...), note)
-        for each in found.parts
-        for note in each.notes
-    ]

@@ -12,8 +12,11 @@ from rich.console import RenderableType
 from conoid.cases.estimate import estimate
 from conoid.cases.figures import duration
 from conoid.cases.load import CaseError, materials, parse_case, shipped
-from conoid.cases.plausible import doubts
+from conoid.cases.plausible import bare_numbers
 from conoid.cases.problems import Problem, shown
+from conoid.cases.survey import Survey
+from conoid.cases.touching import touching
+from conoid.cases.warned import warned
 
 from . import silence
 from .console import PlainConsole, echo, one_line
@@ -133,7 +136,8 @@ def warn_of(case: str, overrides: Iterable[str]) -> None:
     with suppress(CaseError, ArithmeticError):
         data = data_of(case, overrides)
         checked = parse_case(data)
-        warn(doubts(data, checked, estimate(checked, locate(case).parent)))
+        expected = estimate(checked, locate(case).parent)
+        warn([*bare_numbers(data), *warned(checked, expected, Survey(), touching(checked))])
 
 
 def show(thing: RenderableType) -> None:

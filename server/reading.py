@@ -19,8 +19,11 @@ import msgspec
 
 from conoid.cases.estimate import Estimate, estimate
 from conoid.cases.load import CaseError, Problem, json_data, parse_case, resolved_json, shipped_path, toml_data
-from conoid.cases.plausible import doubts
+from conoid.cases.plausible import bare_numbers
 from conoid.cases.schema import Case
+from conoid.cases.survey import Survey
+from conoid.cases.touching import touching
+from conoid.cases.warned import warned
 
 from . import limits
 from .limits import Limits
@@ -86,10 +89,11 @@ def _read(question: Question) -> Reading:
     data = json_data(text) if question.json else toml_data(text)
     case = parse_case(data)
     expected = _estimate(case, question.limits)
+    odd = [*bare_numbers(data), *warned(case, expected, Survey(), touching(case))]
     return Reading(
         name=case.name, title=case.title, ranks=case.run.ranks, profile=case.run.profile,
         wall_time=limits.wall_time(case, question.limits), estimate=limits.figures(expected),
-        resolved=resolved_json(case), case=case.model_dump_json().encode(), doubts=doubts(data, case, expected),
+        resolved=resolved_json(case), case=case.model_dump_json().encode(), doubts=odd,
     )  # fmt: skip
 
 

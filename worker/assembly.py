@@ -1,7 +1,7 @@
 """The whole mesh of a case, on rank 0: the parts as they are meshed, turned, moved apart, loaded and set in motion."""
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -11,16 +11,18 @@ import numpy as np
 from conoid.cases import schema
 from conoid.cases.bodies import MeshFile
 from conoid.cases.library import material as find_material
+from conoid.cases.survey import Survey
 
 from . import selection
 from .contact import overlap, pairing
 from .errors import InputError, MeshError
-from .fracture.connectivity import components
+from .facts import Facts
 from .hashing import uniform
 from .mesh.build import build as build_mesh
 from .mesh.faces import FACES, across, normals
 from .mesh.model import TetMesh
 from .mesh.sharing import Placed, shared_nodes
+from .pieces import UNSEEN, pieces
 from .selection import Nearness, Selected
 from .setting import turned, velocities
 from .state import Flags, Floats, Indices, Ints, Load
@@ -31,9 +33,6 @@ Say = Callable[[str], None]
 """Reports what the start is doing."""
 _JITTER = 0x6A697474
 """Seed of the random velocities of the start."""
-_MANY = 1_000
-"""Pieces of a part beyond which nothing finds out whether they overlap each other. Chosen: the table of who meets whom
-grows with their square."""
 
 
 @dataclass
@@ -55,6 +54,8 @@ class Whole:
     near: Nearness
     warnings: list[str]
     """What the user should know of the meshes, and of what the boundaries of the case select of them."""
+    survey: Survey
+    """What is measured of meshes from files."""
 
 
 def quiet(what: str) -> None:
@@ -62,25 +63,43 @@ def quiet(what: str) -> None:
 
 
 def assemble(case: schema.Case, folder: Path, say: Say = quiet) -> Whole:
-    """Builds the meshes of all parts; ``folder`` is where relative mesh paths start. Raises MeshError."""
-    points, tets, node_part, tet_part, density, warnings = [], [], [], [], [], list[str]()
-    bodies, part_of_body, placed = [], list[int](), list[Placed]()
-    offset = 0
+    """Builds the meshes of all parts; ``folder`` is where relative mesh paths start. Raises MeshError, InputError."""
+    facts = Facts(case)
+    whole = assembled(case, _built(case, folder, say, facts))
+    whole.survey = facts.survey()
+    return whole
+
+
+def _built(case: schema.Case, folder: Path, say: Say, facts: Facts) -> Iterator[tuple[int, TetMesh]]:
+    """The meshes of all parts by their numbers; those from files are measured."""
     for index, part in enumerate(case.parts):
         meshing = f"meshing {part.name}, part {index + 1} of {len(case.parts)}"
         mesh = build_mesh(part.mesh, folder, key=f"parts[{index}].mesh", made=partial(say, meshing))
-        piece, told = _pieces(case, index, mesh)
+        if isinstance(part.mesh, MeshFile):
+            facts.take(index, mesh)
+        yield index, mesh
+
+
+def assembled(case: schema.Case, meshes: Iterable[tuple[int, TetMesh]], overlaps: bool = True) -> Whole:
+    """The whole of the ``meshes`` of parts by their numbers. Where these are not all parts, as before a run, what
+    boundaries select is found for those whose parts are all there. Bodies that overlap are looked for only where
+    ``overlaps`` is set. Raises MeshError, InputError.
+    """
+    points, tets, node_part, tet_part, warnings = [], [], [], [], list[str]()
+    bodies, part_of_body, placed = [], list[int](), list[Placed]()
+    density = np.array([find_material(case, part.material).density for part in case.parts])
+    offset = 0
+    for index, mesh in meshes:
+        piece, told = pieces(case, index, mesh, overlaps)
         warnings += told
         bodies.append(piece + len(part_of_body))
         part_of_body += [index] * (int(piece.max(initial=0)) + 1)
-        points.append(turned(mesh.points, part.turn))
+        points.append(turned(mesh.points, case.parts[index].turn))
         if mesh.origin is not None:
             placed.append((index, mesh.origin, points[-1]))
-            warnings += [f"parts[{index}].mesh: {note}" for note in mesh.origin.notes]
         tets.append(mesh.tets.astype(np.int64) + offset)
         node_part.append(np.full(len(mesh.points), index, np.int32))
         tet_part.append(np.full(len(mesh.tets), index, np.int32))
-        density.append(find_material(case, part.material).density)
         offset += len(mesh.points)
     for refusal in shared_nodes(case, placed):
         raise MeshError(refusal)
@@ -89,47 +108,26 @@ def assemble(case: schema.Case, folder: Path, say: Say = quiet) -> Whole:
     volumes = _volumes(x, t)
     part_of_node = np.concatenate(node_part)
     behind = across(t) if case.in_contact or case.fractures else np.zeros((0, 4), np.int32)
-    if case.in_contact:
+    if case.in_contact and not overlaps:
+        warnings.append(f"contact: {UNSEEN}")
+    elif case.in_contact:
         x = _apart(case, x, t, np.concatenate(bodies), np.array(part_of_body), behind < 0)
         volumes = _volumes(x, t)
     near = selection.nearness(case, x, part_of_node, t, part_of_tet)
-    loads, found, told = _loads(case, x, part_of_node, t, near)
-    driven, more = _driven(case, x, part_of_node, near)
+    known = selection.settled(case, part_of_body)
+    loads, found, told = _loads(case, x, part_of_node, t, near, known)
+    driven, more = _driven(case, x, part_of_node, near, known)
     return Whole(
         points=x, node_part=part_of_node, tets=t, tet_part=part_of_tet, volumes=volumes,
         across=behind,
-        node_volume=_quarters(t, volumes, len(x)), mass=_quarters(t, volumes * np.array(density)[part_of_tet], len(x)),
+        node_volume=_quarters(t, volumes, len(x)), mass=_quarters(t, volumes * density[part_of_tet], len(x)),
         velocity=_velocities(case, x, part_of_node), loads=loads, near=near,
         warnings=[
-            *warnings, *told, *more, *selection.off_planes(case, x, part_of_node, near),
+            *warnings, *told, *more, *selection.off_planes(case, x, part_of_node, near, known),
             *selection.compared(case, [*found, *driven]),
         ],
+        survey=Survey(),
     )  # fmt: skip
-
-
-def _pieces(case: schema.Case, index: int, mesh: TetMesh) -> tuple[Indices, list[str]]:
-    """(nodes,) which piece of its part each node belongs to, where the mesh is from a file and the part meets itself;
-    else all to the first.
-
-    A warning where a part in several pieces does not: nodes that coincide and are not merged are the commonest slip in
-    a mesh.
-    """
-    whole = np.zeros(len(mesh.points), np.int32)
-    if not isinstance(case.parts[index].mesh, MeshFile):
-        return whole, []
-    sides = np.concatenate([mesh.tets[:, [0, k]] for k in (1, 2, 3)])
-    first, piece = np.unique(components(len(mesh.points), sides), return_inverse=True)
-    many, pieces = len(first), f"parts[{index}].mesh: {len(first)} pieces that share no node"
-    if many == 1:
-        return whole, []
-    if case.contact is None or np.isnan(pairing.friction(case)[index, index]):
-        return whole, [
-            f"{pieces}, and they do not meet each other: merge the nodes where they coincide, or let the part meet "
-            "itself (contact.self_contact)"
-        ]
-    if many > _MANY:
-        return whole, [f"{pieces}: whether they overlap each other at the start is found out for {_MANY} at most"]
-    return piece.reshape(-1).astype(np.int32), []
 
 
 def _apart(case: schema.Case, x: Floats, tets: Indices, body: Indices, part: Ints, exposed: Flags) -> Floats:
@@ -210,16 +208,21 @@ def _velocities(case: schema.Case, x: Floats, part: Indices) -> Floats:
 
 
 def _loads(
-    case: schema.Case, x: Floats, part: Indices, tets: Indices, near: Nearness
+    case: schema.Case, x: Floats, part: Indices, tets: Indices, near: Nearness, known: list[bool]
 ) -> tuple[list[Load], list[Selected], list[str]]:
     """The tractions of the case: a third of the force on each face for each of its nodes, in the order of the tets;
-    what they act on, and warnings. Raises InputError for one that acts on no face.
+    what they act on, and warnings. Those that are not ``known`` act on nothing. Raises InputError for another one that
+    acts on no face.
     """
     tractions = case.boundaries_of(schema.Traction)
     loads, found, told = list[Load](), list[Selected](), list[str]()
     tet, face = np.nonzero(across(tets) < 0) if tractions else (np.zeros(0, np.int64), np.zeros(0, np.int64))
     faces = tets[tet[:, None], FACES[face]]
     for index, spec in tractions:
+        if not known[index]:
+            none = np.zeros(0, np.int64)
+            loads.append(Load(none, none, none, np.zeros((0, 3))))
+            continue
         selected, chosen = selection.counted(case, index, x, part, faces, near)
         loaded = faces[chosen]
         if not len(loaded):
@@ -237,10 +240,12 @@ def _loads(
     return loads, found, told
 
 
-def _driven(case: schema.Case, x: Floats, part: Indices, near: Nearness) -> tuple[list[Selected], list[str]]:
-    """What the boxes of prescribed velocities hold, and warnings."""
+def _driven(
+    case: schema.Case, x: Floats, part: Indices, near: Nearness, known: list[bool]
+) -> tuple[list[Selected], list[str]]:
+    """What the boxes of prescribed velocities that are ``known`` hold, and warnings."""
     found, told = list[Selected](), list[str]()
-    for index, _ in case.boundaries_of(schema.Prescribed):
+    for index in (index for index, _ in case.boundaries_of(schema.Prescribed) if known[index]):
         selected, held = selection.counted(case, index, x, part, np.zeros((0, 3), np.int32), near)
         found.append(selected)
         if held.any():

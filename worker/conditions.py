@@ -57,17 +57,21 @@ def build(case: schema.Case, model: Model, loads: list[Load], comm: Comm) -> lis
     return [*boundaries, *_walls(case, [h & ~moved for h in held], mirrored(nodes.n, boundaries))]
 
 
-def start(case: schema.Case, model: Model, boundaries: list[Boundary], comm: Comm) -> list[str]:
+def start(
+    case: schema.Case, model: Model, boundaries: list[Boundary], comm: Comm, known: Sequence[bool] | None = None
+) -> list[str]:
     """Makes the initial velocities agree with the boundaries; what the user should know of them. All ranks take part.
+    ``known``: those all of whose parts are in the model, of the others less is asked and told; None for all.
 
     Raises InputError, on every rank alike, for a boundary that holds no node, two that drive a node in two ways, a body
     that starts behind a wall or through a symmetry plane, and motion prescribed across one.
     """
     held = [_held_by(spec, model) for spec in case.boundaries]
+    known = [True] * len(held) if known is None else known
     counts = comm.sum(np.array([int(each.sum()) for each in held], np.int64))
     beside = _beside(case, model, comm)
     for index in np.flatnonzero(counts == 0).tolist():
-        if index not in beside:
+        if index not in beside and known[index]:
             raise InputError(f"boundaries[{index}]: holds no node; check its place and its parts")
     _refuse_two_drives(case.boundaries, held, comm)
     _refuse_conflicts(case.boundaries, held, boundaries, model.nodes, comm)
@@ -75,9 +79,9 @@ def start(case: schema.Case, model: Model, boundaries: list[Boundary], comm: Com
     _refuse_crossings(case, model, comm)
     told = [
         f"boundaries[{index}]: no node starts on this plane of symmetry; it holds what comes to it later"
-        for index in beside if counts[index] == 0
+        for index in beside if counts[index] == 0 and known[index]
     ]  # fmt: skip
-    told += _stopped(case, held, model.nodes, comm)
+    told += _stopped(case, held, model.nodes, comm, known)
     for boundary in boundaries:
         boundary.start(model.nodes)
     return told
@@ -90,7 +94,9 @@ def _beside(case: schema.Case, model: Model, comm: Comm) -> list[int]:
     return [index for (index, _), many in zip(planes, found, strict=True) if many]
 
 
-def _stopped(case: schema.Case, held: list[Flags], nodes: Nodes, comm: Comm) -> list[str]:
+def _stopped(
+    case: schema.Case, held: list[Flags], nodes: Nodes, comm: Comm, known: Sequence[bool]
+) -> list[str]:  # fmt: skip
     """Where symmetry planes take a velocity from nodes that start on them."""
     planes = case.boundaries_of(schema.Symmetry)
     across = [np.abs(nodes.v[held[index], AXES[spec.axis]]).max(initial=0.0) for index, spec in planes]
@@ -98,7 +104,8 @@ def _stopped(case: schema.Case, held: list[Flags], nodes: Nodes, comm: Comm) -> 
     return [
         f"boundaries[{index}]: nodes start on this plane of symmetry with up to {speed:.3g} m/s across it, and are "
         "stopped; is the motion symmetric?"
-        for (index, _), speed in zip(planes, speeds[:-1], strict=True) if speed > _ASIDE * speeds[-1]
+        for (index, _), speed in zip(planes, speeds[:-1], strict=True)
+        if known[index] and speed > _ASIDE * speeds[-1]
     ]  # fmt: skip
 
 

@@ -9,10 +9,11 @@ from conoid.cases.schema import Case, Prescribed, Traction
 
 from . import selection
 from .mesh.faces import boundary_faces
-from .state import Floats, Indices
+from .mesh.model import TetMesh
+from .setting import turned
 
-Meshes = Mapping[int, tuple[Floats, Indices]]
-"""Points (n, 3), m, where they are at the start, and tets (m, 4) of parts by their numbers."""
+Meshes = Mapping[int, TetMesh]
+"""Of parts by their numbers, not yet turned."""
 
 
 def loads(case: Case, meshes: Meshes) -> Iterator[Load]:
@@ -25,7 +26,8 @@ def loads(case: Case, meshes: Meshes) -> Iterator[Load]:
 
 
 def _load(case: Case, number: int, meshes: Meshes) -> Load:
-    points, tets = (list(each) for each in zip(*meshes.values(), strict=True))
+    points = [turned(mesh.points, case.parts[index].turn) for index, mesh in meshes.items()]
+    tets = [mesh.tets for mesh in meshes.values()]
     starts = np.cumsum([0, *map(len, points)])
     x, t = np.concatenate(points), np.concatenate([each + first for each, first in zip(tets, starts, strict=False)])
     part = np.repeat(np.array(list(meshes), np.int32), np.diff(starts))

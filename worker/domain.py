@@ -11,7 +11,11 @@ from pathlib import Path
 import numpy as np
 
 from conoid.cases import schema
+from conoid.cases.estimate import estimate
 from conoid.cases.library import material as find_material
+from conoid.cases.survey import Survey
+from conoid.cases.touching import touching
+from conoid.cases.warned import warned
 
 from . import assembly
 from .assembly import Say, Whole
@@ -97,7 +101,7 @@ def cut(whole: Whole, ranks: int, scale: tuple[float, float, float] = (1.0, 1.0,
         holders[nodes] += 1
     home, grouped = _home(whole, owner), _grouped(whole, centres)
     starts = np.searchsorted(whole.tet_part, np.arange(whole.tet_part[-1] + 1))
-    means = np.array([math.fsum(part) / len(part) for part in np.split(whole.volumes, starts[1:])])
+    means = np.array([math.fsum(part) / max(len(part), 1) for part in np.split(whole.volumes, starts[1:])])
     shared = holders > 1
     totals = (len(whole.tets), len(whole.points), int(shared.sum()))
     return [
@@ -157,6 +161,7 @@ def build(case: schema.Case, folder: Path, comm: Comm, say: Say = assembly.quiet
     if comm.rank == 0:
         try:
             whole = assembly.assemble(case, folder, say)
+            whole.warnings[:0] = _warned(case, folder, whole.survey)
             say(f"cutting {len(whole.tets)} tets for {comm.size} rank{'s' if comm.size > 1 else ''}")
             pieces = cut(whole, comm.size, case.run.cut_scale)
         except Exception as error:
@@ -165,6 +170,21 @@ def build(case: schema.Case, folder: Path, comm: Comm, say: Say = assembly.quiet
     if failure is not None:
         raise failure
     piece: Piece = comm.scatter(pieces)
+    return _model(case, piece), piece
+
+
+def _warned(case: schema.Case, folder: Path, survey: Survey) -> list[str]:
+    """What is odd about the case, as who checks it before is told."""
+    try:
+        expected = estimate(case, folder, survey)
+    except (ArithmeticError, ValueError):  # too many elements to be counted: it is refused where it is checked
+        return []
+    return [str(each) for each in warned(case, expected, survey, [*touching(case), *survey.touching])]
+
+
+def alone(case: schema.Case, whole: Whole) -> tuple[Model, Piece]:
+    """The model of a single rank."""
+    (piece,) = cut(whole, 1)
     return _model(case, piece), piece
 
 

@@ -10,9 +10,12 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import msgspec
+
 from conoid.cases import layout, load, messages, whole
 from conoid.cases import outcome as outcomes
 from conoid.cases.outcome import Outcome
+from conoid.cases.plausible import bare_numbers
 from conoid.cases.problems import CaseError
 from conoid.cases.run import Cause, ExitCode, State
 from conoid.cases.schema import Case
@@ -112,10 +115,14 @@ def _outcome(
 ) -> tuple[Outcome, int]:
     """Runs the case; whatever is wrong with it or happens in it on purpose becomes a failed outcome."""
     try:
-        case = _case(options, comm)
+        case, told = _case(options, comm)
         if comm.rank == 0:
             (options.out / layout.RESOLVED_CASE).write_bytes(load.resolved_json(case))
+        if journal is not None:
+            for text in told:
+                journal.write(messages.Log, level="warning", text=text)
         outcome = _compute(case, options, comm, journal, signals, began)
+        outcome = msgspec.structs.replace(outcome, warnings=[*told, *outcome.warnings])
         return outcome, _CODES[State(outcome.state)]
     except CaseError as error:
         return _unbegun(State.FAILED, Cause.INPUT, str(error), comm, began), ExitCode.BAD_INPUT
@@ -148,28 +155,30 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
     return options
 
 
-def _case(options: argparse.Namespace, comm: Comm) -> Case:
-    """The case with its overrides, read by rank 0; it runs on as many ranks as MPI has started."""
-    case: Case | None = None
+def _case(options: argparse.Namespace, comm: Comm) -> tuple[Case, list[str]]:
+    """The case with its overrides, read by rank 0, and what is odd about how it is written; it runs on as many ranks as
+    MPI has started.
+    """
+    found: tuple[Case, list[str]] | None = None
     failure: Exception | None = None
     if comm.rank == 0:
         try:
-            case = _read(options, comm.size)
+            found = _read(options, comm.size)
         except (CaseError, OSError) as error:
             failure = error
-    case, failure = comm.broadcast((case, failure))
+    found, failure = comm.broadcast((found, failure))
     if failure is not None:
         raise failure
-    assert case is not None
-    return case
+    assert found is not None
+    return found
 
 
-def _read(options: argparse.Namespace, ranks: int) -> Case:
+def _read(options: argparse.Namespace, ranks: int) -> tuple[Case, list[str]]:
     path = Path(options.case)
     if not path.exists() and not path.suffix:
         path = load.shipped_path(options.case)
     data = load.apply_overrides(load.read_data(path), options.set)
-    return load.parse_case(load.apply_overrides(data, {"run.ranks": ranks}))
+    return load.parse_case(load.apply_overrides(data, {"run.ranks": ranks})), [str(each) for each in bare_numbers(data)]
 
 
 def _prepare_folder(folder: Path, comm: Comm) -> AbstractContextManager[Any] | None:

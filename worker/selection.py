@@ -1,7 +1,7 @@
 """Nodes and faces that the regions of a case select, and whether they are those that ``validate`` expects."""
 
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,6 +54,12 @@ def nearness(case: schema.Case, x: Floats, part: Indices, tets: Indices, tet_par
 def named(spec: schema.Boundary, parts: Sequence[str]) -> Flags:
     """(parts,) the parts that a boundary names; all where it names none."""
     return np.array([not spec.parts or name in spec.parts for name in parts])
+
+
+def settled(case: schema.Case, there: Container[int]) -> list[bool]:
+    """Of each boundary, whether all parts that it is for are among those that are ``there``, by number."""
+    names = [part.name for part in case.parts]
+    return [all(index in there for index in np.flatnonzero(named(spec, names)).tolist()) for spec in case.boundaries]
 
 
 def inside(spec: schema.Prescribed | schema.Traction, x: Floats, part: Indices, near: Floats) -> Flags:
@@ -130,10 +136,16 @@ def counted(
     return Selected(number, nodes, int(chosen.sum()), area), chosen
 
 
-def off_planes(case: schema.Case, x: Floats, part: Indices, near: Nearness) -> Iterator[str]:
-    """A warning for each plane of symmetry off which nodes lie so little that they were hardly meant to."""
+def off_planes(
+    case: schema.Case, x: Floats, part: Indices, near: Nearness, known: Sequence[bool]
+) -> Iterator[str]:  # fmt: skip
+    """A warning for each plane of symmetry that is ``known`` off which nodes lie so little that they were hardly meant
+    to.
+    """
     names = [each.name for each in case.parts]
     for number, plane in case.boundaries_of(schema.Symmetry):
+        if not known[number]:
+            continue
         away = np.abs(x[:, "xyz".index(plane.axis)] - plane.at)
         off = named(plane, names)[part] & (away > near.rounding[part]) & (away <= near.slack[part])
         if off.sum() >= _FEWEST:

@@ -217,7 +217,9 @@ def test_a_body_may_fly_at_a_symmetry_plane() -> None:
     """No node starts on it, which is told; what arrives is thrown back."""
     plane = {"kind": "symmetry", "axis": "z", "at": -1e-5}
     sim = with_boundary(plane, velocity=(0.0, 0.0, -100.0), end=1.5e-6)
-    assert sim.warnings == ("boundaries[0]: no node starts on this plane of symmetry; it holds what comes to it later",)
+    assert sim.warnings[-1] == (
+        "boundaries[0]: no node starts on this plane of symmetry; it holds what comes to it later"
+    )
     run(sim)
     assert sim.model.nodes.x[:, 2].min() >= -1e-5 - 1e-12
     assert np.average(sim.model.nodes.v[:, 2], weights=sim.model.nodes.mass) > 50.0
@@ -225,9 +227,10 @@ def test_a_body_may_fly_at_a_symmetry_plane() -> None:
 
 def test_motion_that_a_symmetry_plane_stops_at_the_start_is_told() -> None:
     sim = with_boundary({"kind": "symmetry", "axis": "z"}, velocity=(5.0, 0.0, 30.0))
-    (told,) = sim.warnings
+    told = sim.warnings[-1]
     assert told.startswith("boundaries[0]: nodes start on this plane of symmetry with up to 30 m/s across it")
-    assert with_boundary({"kind": "symmetry", "axis": "z"}, velocity=(5.0, 0.0, 0.0)).warnings == ()
+    fine = with_boundary({"kind": "symmetry", "axis": "z"}, velocity=(5.0, 0.0, 0.0)).warnings
+    assert not any("symmetry" in text for text in fine)
 
 
 @pytest.mark.parametrize("order", [1, -1], ids=["plane first", "wall first"])

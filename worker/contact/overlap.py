@@ -114,6 +114,23 @@ def nested(points: Floats, tets: Indices, part: Indices, surface: Surface, allow
     return np.column_stack([outer[pairs[inside, 0]], pairs[inside, 1]])
 
 
+def within(points: Floats, tets: Indices, body: Indices) -> tuple[Indices, Indices]:
+    """Nodes, and tets by their centres, that lie inside a tet of another body, their surfaces left out; ``body`` (n,)
+    of the nodes.
+    """
+    every = np.concatenate([points, points[tets].mean(axis=1)])
+    of = np.concatenate([body, body[tets[:, 0]]])
+    places = np.arange(len(every), dtype=np.int32)
+    small, large = (
+        Things(rows, np.zeros(len(rows))) for rows in (places[:, None], np.ascontiguousarray(tets, np.int32))
+    )
+    others = ~np.eye(int(body.max(initial=0)) + 1, dtype=bool)
+    pairs = search.find(small, large, every, np.zeros_like(every), of, others, 0.0, None)
+    inside = (_shares(every[pairs[:, 0]], points[tets[pairs[:, 1]]]) > _ROUNDING).all(axis=1)
+    found = np.unique(pairs[inside, 0])
+    return found[found < len(points)], found[found >= len(points)] - len(points)
+
+
 def crossing(points: Floats, part: Indices, surface: Surface, allowed: Flags) -> Indices:
     """(n, 2) nodes at one end of edges of the surface that go through a face of another part that theirs meets, and at
     a corner of these faces: bodies that cross each other may have no node inside each other.
