@@ -4,7 +4,7 @@ import errno
 import os
 import stat
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from io import BytesIO, FileIO, TextIOWrapper
 from pathlib import Path
 
@@ -29,13 +29,20 @@ def named(path: str | Path) -> Iterator[None]:
 
 
 def write(path: Path, content: bytes, mode: int = 0o644) -> None:
-    """Written beside, flushed to disk, renamed. Raises OSError, also where a link lies beside."""
+    """Written beside, flushed to disk, renamed; what a full disk cuts off is removed. Raises OSError, also where a link
+    lies beside.
+    """
     beside = path.with_name(f"{path.name}.part")
     flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | _NO_LINK
     with named(path), open(os.open(beside, flags, mode), "wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
+        try:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        except OSError:
+            with suppress(OSError):
+                beside.unlink()
+            raise
     beside.rename(path)
 
 

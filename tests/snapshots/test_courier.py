@@ -4,6 +4,7 @@ import hashlib
 import io
 import json
 import os
+import resource
 import shutil
 import signal
 import sys
@@ -80,6 +81,21 @@ def test_a_folder_that_is_removed_costs_one_snapshot(courier: Courier, tmp_path:
     with pytest.raises(FileNotFoundError, match="snapshots was removed"):
         packer._awaited(tmp_path / "none" / layout.SNAPSHOTS / "share")
     assert time.monotonic() - began < 1.0
+
+
+def test_a_disk_that_fills_under_the_packer_costs_one_snapshot(courier: Courier, tmp_path: Path) -> None:
+    """No file of it grows: the snapshot is named with the reason, and nothing of it is left to fill the disk."""
+    (mine,) = shattered(2, 2).shares(1)
+    courier.send(task(0), mine)
+    answer(courier)
+    assert courier.packer is not None
+    limits = resource.prlimit(courier.packer, resource.RLIMIT_FSIZE, (64, resource.getrlimit(resource.RLIMIT_FSIZE)[1]))
+    courier.send(task(1), mine)
+    assert "File too large: '" in answer(courier)[0]["error"]
+    assert [path.name for path in (tmp_path / layout.SNAPSHOTS).iterdir()] == ["000000.snap"]
+    resource.prlimit(courier.packer, resource.RLIMIT_FSIZE, limits)
+    courier.send(task(2), mine)
+    assert answer(courier)[0]["bytes"] > 0
 
 
 def test_a_packer_that_dies_costs_one_snapshot(courier: Courier) -> None:

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from conoid.cases import layout
+from conoid.cases import whole as whole_file
 
 from . import blob, share
 from .births import Births
@@ -64,7 +65,7 @@ def _made(folder: Path, task: dict[str, Any], births: Births) -> dict[str, Any]:
     told = {name: task[name] for name in ("n", "step", "t", "ranks")}
     made = blob.made(whole, told, lambda labels: births.at(task["t"], labels, first), blob.Budget())
     place = layout.snapshot(folder, task["n"])
-    _write(place, made.data)
+    whole_file.write(place, made.data)
     return {
         "path": str(place.relative_to(folder)), "bytes": len(made.data), "triangles": made.triangles,
         "fragments": made.fragments, "sha256": hashlib.sha256(made.data).hexdigest(), "smallest": made.smallest,
@@ -81,15 +82,6 @@ def _awaited(path: Path) -> share.Share:
             raise TimeoutError(f"{path.name} has not come within {_PATIENCE:g} s")
         time.sleep(_LOOK)
     return share.read(path)
-
-
-def _write(place: Path, data: bytes) -> None:
-    beside = place.with_suffix(".part")
-    with beside.open("wb") as file:
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-    beside.rename(place)
 
 
 if __name__ == "__main__":

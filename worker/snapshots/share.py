@@ -11,6 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
+from conoid.cases.whole import named
+
 from ..ids import located
 from ..state import DAMAGE, MASS, PLASTIC_STRAIN, TEMPERATURE, Block, Floats, Ints, Model, Nodes
 
@@ -38,13 +40,17 @@ def copied(model: Model, held: Ints, counting: set[int]) -> Share:
 
 
 def write(path: Path, share: Share) -> None:
-    """Writes a share; it appears whole or not at all."""
+    """Writes a share; it appears whole or not at all. Raises OSError that names it."""
     beside = path.with_name(path.name + ".part")
-    with beside.open("wb") as file:
-        file.write(json.dumps(list(share)).encode() + b"\n")
-        for values in share.values():
-            np.save(file, np.ascontiguousarray(values), allow_pickle=False)
-    os.rename(beside, path)
+    try:
+        with named(path), beside.open("wb") as file:
+            file.write(json.dumps(list(share)).encode() + b"\n")
+            for values in share.values():
+                np.save(file, np.ascontiguousarray(values), allow_pickle=False)
+        os.rename(beside, path)
+    except OSError:
+        beside.unlink(missing_ok=True)
+        raise
 
 
 def read(path: Path) -> Share:
