@@ -133,6 +133,7 @@ def build_app(service: Service) -> FastAPI:
         version="1",
         docs_url=None,
         redoc_url=None,
+        redirect_slashes=False,
         lifespan=lifespan,
         dependencies=[Depends(limits.check_query)],
     )

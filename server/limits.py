@@ -4,8 +4,10 @@ caps, full queues and disks.
 
 import asyncio
 import shutil
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any, get_args, get_origin
 
 import msgspec
 from fastapi import Request
@@ -17,7 +19,7 @@ from conoid.cases.bodies import MeshFile
 from conoid.cases.estimate import Estimate
 from conoid.cases.figures import count, number, size
 from conoid.cases.policy import Quota
-from conoid.cases.problems import Problem
+from conoid.cases.problems import Problem, shown
 from conoid.cases.schema import Case
 from conoid.cases.similar import allowed
 
@@ -34,19 +36,31 @@ _COUNTABLE = 1 << 53
 
 
 async def check_query(request: Request) -> None:
-    """Raises ServiceError 400 for a parameter that the route does not know: a misspelt one would pass as left out."""
+    """Raises ServiceError 400 for a parameter that the route does not know, since a misspelt one would pass as left
+    out, and 422 for one that is given twice and has one value: nobody knows which was meant.
+    """
     if not request.query_params:
         return
     route: APIRoute = request.scope["route"]
-    known = sorted(set(_query(route.dependant)))
-    for name in request.query_params:
+    fields = {field.alias: field for field in _query(route.dependant)}
+    known = sorted(fields)
+    for name, values in Counter(name for name, _ in request.query_params.multi_items()).items():
+        if values > 1 and name in fields and not _many(fields[name].field_info.annotation):
+            detail = f"{name} = {shown(request.query_params[name])}: it has one value, and is given {values} times"
+            raise ServiceError(422, "bad_parameter", detail, pointer=name)
         if name not in known:
             detail = f"{name[:80]}: {request.url.path} knows no such parameter; {allowed(name, known)}"
             raise ServiceError(400, "bad_parameter", detail, pointer=name[:80])
 
 
-def _query(dependant: Dependant) -> Iterator[str]:
-    yield from (field.alias for field in dependant.query_params)
+def _many(annotation: Any) -> bool:
+    """Whether a parameter of this type may be given several times."""
+    return any(get_origin(each) is list for each in (annotation, *get_args(annotation)))
+
+
+def _query(dependant: Dependant) -> Iterator[Any]:
+    """The parameters of a route, as FastAPI has them."""
+    yield from dependant.query_params
     for inner in dependant.dependencies:
         yield from _query(inner)
 

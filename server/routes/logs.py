@@ -39,12 +39,13 @@ async def log(
     follow: bool = False,
     seconds: Seconds = None,
 ) -> Response:
-    """The log of one rank, or of the launcher; Range as for files. ``follow`` goes on until the run has ended; after
-    each 15 s without news a byte 0 is sent, which is no part of the log: text has none.
+    """The log of one rank, or of the launcher; Range as for files. ``follow`` goes on until the run has ended, and is
+    nothing more where it has; after each 15 s without news a byte 0 is sent, which is no part of the log: text has
+    none.
     """
     folder = service.settings.runs / run.id
     relative = f"{layout.LOGS}/{layout.LAUNCHER_LOG if rank == 'launcher' else f'rank-{rank}.log'}"
-    if not follow:
+    if not follow or not service.supervisor.is_open(run.id):
         return await service.downloads.respond(request, folder, relative, run.state.final)
     if rank != "launcher" and int(rank) >= run.ranks:
         raise ServiceError(404, "not_found", f"rank {rank}: the run has ranks 0 to {run.ranks - 1}")

@@ -578,3 +578,39 @@ def test_a_body_that_breaks_off_is_no_fault_of_the_server() -> None:
     with pytest.raises(ServiceError, match="the body broke off") as told:
         asyncio.run(read())
     assert told.value.status == 400
+
+
+# Addresses and parameters ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("path", ["/v1/runs/", "/v1/me/", "/healthz/", "/v1/sweeps/", "/readyz//"])
+def test_no_answer_leads_to_where_the_asker_says(server: Running, path: str) -> None:
+    """A redirect of a trailing slash was made of the header Host."""
+    answer = server.ann.http.get(path, headers={"Host": "evil.test"}, follow_redirects=False)
+    assert answer.status_code == 404
+    assert "evil.test" not in f"{answer.headers} {answer.text}"
+
+
+@pytest.mark.parametrize(
+    "query", ["limit=1&limit=2", "state=running&state=failed", "prefix=a&prefix=a", "cursor=&cursor="]
+)
+def test_a_parameter_of_one_value_is_given_once(server: Running, query: str) -> None:
+    said = refusal(server.ann.http.get(f"/v1/runs?{query}"), 422, "bad_parameter")
+    assert "it has one value, and is given 2 times" in said["detail"]
+    assert said["pointer"] == query.partition("=")[0]
+
+
+def test_labels_may_be_several(server: Running) -> None:
+    assert server.ann.http.get("/v1/runs?label=a=b&label=c=d").json()["runs"] == []
+
+
+def test_the_log_of_a_run_that_has_ended_is_as_without_following(server: Running) -> None:
+    run = server.ann.submit()
+    server.ann.wait_for(run)
+    while server.service.supervisor.is_open(run):
+        time.sleep(0.01)
+    log = server.ann.runs / run / "log" / "rank-0.log"
+    log.write_text("a line\n")
+    assert server.ann.http.get(f"/v1/runs/{run}/logs/0?follow=true").text == "a line\n"
+    log.unlink()
+    refusal(server.ann.http.get(f"/v1/runs/{run}/logs/0?follow=true"), 404, "not_found")
