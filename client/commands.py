@@ -34,7 +34,7 @@ from .options import (
     warn_of,
 )
 from .result import LocalFolder
-from .run import Run, RunInfo
+from .run import FileInfo, Run, RunInfo
 from .session import connect
 from .watch import watch
 
@@ -232,12 +232,13 @@ def _copy(found: Run | local_run.FolderFiles, names: list[str] | None, out: Path
         echo_json(found.files())
         return
     target = out or Path(found.id)
-    every = (file.path for file in found.files())
+    final = found.over()
+    listed = {file.path: file for file in found.files()}
     lacks = False
-    for name in names or [path for path in every if not path.startswith(f"{layout.CHECKPOINTS}/")]:
+    for name in names or [path for path in listed if not path.startswith(f"{layout.CHECKPOINTS}/")]:
         try:
             with aloud(f"fetching {name}"):
-                fetched = found.download(target, name)
+                fetched = found.fetch(target, listed.get(name, FileInfo(path=name)), final)
         except UnfinishedError as error:
             complain(str(error))
             lacks = True

@@ -32,7 +32,7 @@ class Titled:
 
 
 class _File:
-    name = "journal"
+    name, trouble = "journal", ""
 
     def get(self, timeout: float) -> AnyMessage | None:
         """Nothing comes by itself."""

@@ -50,6 +50,9 @@ UNAUTHORIZED = 401
 NOT_FOUND = 404
 _TRIES = 3
 """Times a request is sent that may be repeated, 0.3 and 0.6 s apart. Chosen: a lost connection is back by then."""
+_PATIENCE = 10.0
+"""s after which a request that has failed is not sent again: a server that has not answered for so long hangs. Chosen:
+three connections that time out are tried, and one answer that does."""
 
 
 class Router(msgspec.Struct, kw_only=True, frozen=True):
@@ -131,8 +134,9 @@ class Http:
         """The body at ``path``. Raises ServiceError, UnreachableError."""
         return self._request("GET", path)
 
-    def download(self, path: str, target: Path) -> None:
-        """Writes the body at ``path`` to a file that appears whole, with the server's sha256, or not at all.
+    def download(self, path: str, target: Path, listed: int | None = None) -> None:
+        """Writes the body at ``path`` to a file that appears whole, with the server's sha256 and as many bytes as are
+        ``listed``, where that is known, or not at all.
 
         Raises ServiceError, UnreachableError, and OSError with the name of the file.
         """
@@ -144,6 +148,8 @@ class Http:
                 for chunk in self._chunks(response, _most(response, target)):
                     digest.update(chunk)
                     file.write(chunk)
+            if listed is not None and (got := beside.stat().st_size) != listed:
+                raise AnswerError(f"{path} has {got} bytes, where the list of files has {listed}")
             told = response.headers.get("Repr-Digest")
             if told is not None and told != f"sha-256=:{base64.b64encode(digest.digest()).decode()}:":
                 raise AnswerError(f"{path} arrived damaged: its sha256 is not the one that the server told")
@@ -171,13 +177,13 @@ class Http:
 
     def _request(self, method: str, path: str, repeat: bool = False, **options: Any) -> bytes:
         """The whole answer; a GET, and what says ``repeat``, is tried again when the network fails."""
-        tries = _TRIES if repeat or method == "GET" else 1
+        tries, began = _TRIES if repeat or method == "GET" else 1, time.monotonic()
         for attempt in range(tries):
             try:
                 with self._opened(method, path, **options) as response:
                     return self._body(response)
             except UnreachableError as error:
-                if attempt == tries - 1 or not passes(error):
+                if attempt == tries - 1 or not passes(error) or time.monotonic() - began > _PATIENCE:
                     raise
                 time.sleep(0.3 * 2**attempt)
         raise AssertionError("unreachable")

@@ -9,6 +9,8 @@ class Link(Protocol):
     """Messages as they arrive, perhaps with gaps and repeats."""
 
     name: str
+    trouble: str
+    """Why nothing comes by it any more; empty where something may."""
 
     def get(self, timeout: float) -> AnyMessage | None:
         """The next message; None after ``timeout`` s without one."""

@@ -83,8 +83,13 @@ class FolderFiles:
         """What lies in the folder."""
         return [FileInfo(path=name, size=(self._folder.root / name).stat().st_size) for name in self._folder.names()]
 
-    def download(self, folder: Path, name: str) -> Path:
+    def over(self) -> bool:
+        """Nothing is known of its end, and nothing lost on the way from a folder."""
+        return False
+
+    def fetch(self, folder: Path, file: FileInfo, final: bool) -> Path:
         """Copies a file and returns the path of the copy. Raises UnfinishedError, ClientError, OSError."""
+        name = file.path
         inside(self._folder.root, name)
         source, target = self._folder.path(name), inside(folder, name)
         if target.exists() and source.samefile(target):

@@ -20,6 +20,7 @@ from conoid.cases.figures import exacts, number
 from . import camera, scales, sheet
 from .camera import Camera
 from .errors import LookError, ViewError
+from .frame import require_whole
 from .pictures import FIELDS, Drawn, Field, Mirror, Picture, Wall, reason
 from .sheet import Sheet
 
@@ -86,7 +87,8 @@ def read_mesh(path: Path) -> Any:
 
 
 def _read(path: str) -> tuple[Any, float | None]:
-    """The whole mesh of a frame, its pieces merged, and the frame's time."""
+    """The whole mesh of a frame, its pieces merged, and the frame's time. Raises ViewError for a damaged frame."""
+    require_whole(path)
     mesh = pv.read(path)
     data = mesh.field_data
     if isinstance(mesh, pv.PartitionedDataSet | pv.MultiBlock):

@@ -102,7 +102,8 @@ class FileInfo(msgspec.Struct, kw_only=True, frozen=True):
     """
 
     path: str
-    size: int
+    size: int | None = None
+    """None where it is not known."""
     url: str = ""
 
 
@@ -265,13 +266,24 @@ class Run:
     def download(self, folder: Path | str, name: str | None = None) -> Path:
         """Copies one file, or all, into ``folder`` and returns the path of the file, or the folder."""
         root = Path(folder)
-        files = self.files() if name is None else [FileInfo(path=name, size=0)]
-        for each, address in ((file.path, self._address(file)) for file in files):
-            try:
-                self.session.download(address, inside(root, each))
-            except NotFoundError:
-                raise self._lacks(each) from None
+        for file in self.files() if name is None else [FileInfo(path=name)]:
+            self.fetch(root, file)
         return inside(root, name) if name is not None else root
+
+    def over(self) -> bool:
+        """Whether it has ended: its files change no more."""
+        return self.status().state.final
+
+    def fetch(self, folder: Path, file: FileInfo, final: bool = False) -> Path:
+        """Copies a file of the list into ``folder`` and returns its path; of a run that has ended, ``final``, it must
+        be as large as the list has it.
+        """
+        target = inside(folder, file.path)
+        try:
+            self.session.download(self._address(file), target, file.size if final else None)
+        except NotFoundError:
+            raise self._lacks(file.path) from None
+        return target
 
     def _address(self, file: FileInfo) -> str:
         """The one that the server tells, if it is of this run; else that of its path."""

@@ -18,10 +18,10 @@ import zenoh
 
 from conoid.cases import keys
 from conoid.cases.figures import duration
-from conoid.cases.messages import AnyMessage, Snapshot, Status, fragments_from_msgpack, from_msgpack
+from conoid.cases.messages import AnyMessage, Log, Snapshot, Status, fragments_from_msgpack, from_msgpack
 from conoid.cases.run import State
 
-from .errors import ClientError, passes
+from .errors import AnswerError, ClientError, passes
 from .http import Router
 from .link import Link
 from .order import InOrder, Refill
@@ -72,7 +72,7 @@ class Mailbox:
 class ZenohLink:
     """A native subscription to everything that a run says."""
 
-    name = "Zenoh"
+    name, trouble = "Zenoh", ""
 
     def __init__(self, router: Router, prefix: str) -> None:
         """Opens a session and subscribes. Raises StreamError when that does not succeed within seconds."""
@@ -145,7 +145,7 @@ def _within(seconds: float, work: Callable[[], T]) -> T:
 class SseLink:
     """The server's SSE bridge, read in a thread; when it breaks off it says no more, and the journal is polled."""
 
-    name = "SSE"
+    name, trouble = "SSE", ""
 
     def __init__(self, events: Callable[[], Iterator[AnyMessage]]) -> None:
         """``events`` opens the stream and gives its messages."""
@@ -154,11 +154,15 @@ class SseLink:
         threading.Thread(target=self._read, args=(events,), name="sse", daemon=True).start()
 
     def _read(self, events: Callable[[], Iterator[AnyMessage]]) -> None:
-        with suppress(ClientError):
+        try:
             for message in events():
                 if self._closed.is_set():
                     return
                 self._mailbox.put(message)
+        except AnswerError as error:
+            self.trouble = f"the events cannot be followed, and the journal is read instead: {error}"
+        except ClientError:  # it has broken off, or is refused: so will the journal be
+            return
 
     def get(self, timeout: float) -> AnyMessage | None:
         """The next message; None after ``timeout`` s without one."""
@@ -174,11 +178,15 @@ def follow(link: Link, refill: Refill, ended: Callable[[], bool], after: int = 0
 
     ``refill`` reads the journal, ``ended`` asks the server whether the run is over. While the link is silent both are
     asked every few seconds, so a dead router delays messages and loses none. A server that does not answer, or answers
-    that it cannot now, is waited for, a minute long; then UnreachableError or ServiceError is raised.
+    that it cannot now, is waited for, a minute long; then UnreachableError or ServiceError is raised. Where the link
+    gives what nobody can read, a warning comes before the next message; it is in no journal and has no number.
     """
-    order = InOrder(_patient(refill), after)
+    order, said = InOrder(_patient(refill), after), False
     try:
         for message in _told(link, order, ended):
+            if link.trouble and not said:
+                said = True
+                yield Log(run=message.run, level="warning", text=link.trouble)
             yield message
             if isinstance(message, Status) and State(message.state).final:
                 return

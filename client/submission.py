@@ -16,6 +16,8 @@ _SUFFIXES = {".toml": "application/toml", ".json": "application/json"}
 
 def locate(source: str | Path) -> Path:
     """The file that is meant: a path, or the name of a shipped case. Raises CaseError."""
+    if not str(source).strip():
+        raise CaseError([Problem("case", "''", "the name is empty: write a .toml or .json file, or a shipped case")])
     path = Path(source)
     if str(source) in shipped():
         return shipped_path(str(source))

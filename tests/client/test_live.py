@@ -217,7 +217,7 @@ def test_a_server_that_is_gone_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
 class Nothing:
     """A subscription over which nothing comes."""
 
-    name = "none"
+    name, trouble = "none", ""
 
     def get(self, timeout: float) -> AnyMessage | None:
         return None

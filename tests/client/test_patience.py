@@ -35,7 +35,7 @@ class Away(httpx2.BaseTransport):
 class Silent:
     """A subscription over which nothing comes."""
 
-    name = "none"
+    name, trouble = "none", ""
 
     def get(self, timeout: float) -> AnyMessage | None:
         time.sleep(timeout)

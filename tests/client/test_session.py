@@ -14,7 +14,7 @@ import pytest
 from conoid.cases.load import CaseError
 from conoid.cases.problems import ConoidError
 from conoid.client.config import DEFAULT_URL, target
-from conoid.client.errors import ClientError, NotFoundError, ServiceError, UnreachableError, UsageError
+from conoid.client.errors import AnswerError, ClientError, NotFoundError, ServiceError, UnreachableError, UsageError
 from conoid.client.result import Result
 from conoid.client.run import Run, inside
 from conoid.client.session import Session
@@ -300,3 +300,51 @@ def test_what_a_worker_raises_is_of_the_same_tree() -> None:
 
     with pytest.raises(ConoidError, match="slipped"):
         raise errors.MeshError("the mesh has slipped")
+
+
+def listing(size: int, state: str = "succeeded") -> Answer:
+    """A server that lists a file of this size, and sends three bytes."""
+
+    def answer(request: httpx2.Request) -> httpx2.Response:
+        if request.url.path.endswith("/files"):
+            return httpx2.Response(200, json={"files": [{"path": "a.csv", "size": size, "url": ""}]})
+        if request.url.path.endswith("a.csv"):
+            return httpx2.Response(200, content=b"abc")
+        return httpx2.Response(200, json=RECEIPT | {"state": state})
+
+    return answer
+
+
+def test_a_file_that_is_not_as_large_as_it_is_listed_is_refused(tmp_path: Path) -> None:
+    run = Run(served(listing(5)), "r1")
+    (file,) = run.files()
+    with pytest.raises(AnswerError, match=r"a.csv has 3 bytes, where the list of files has 5"):
+        run.fetch(tmp_path, file, run.over())
+    assert not list(tmp_path.iterdir())
+    for fits in (Run(served(listing(3)), "r1"), Run(served(listing(5, "running")), "r1")):
+        (file,) = fits.files()
+        assert fits.fetch(tmp_path, file, fits.over()).read_bytes() == b"abc"
+
+
+@pytest.mark.parametrize(("seconds", "times"), [(0.0, 3), (30.0, 1)])
+def test_a_server_that_hangs_is_asked_once(seconds: float, times: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It took 93 s until a server that never answers was given up."""
+    asked, clock = [0], [0.0]
+    monkeypatch.setattr("conoid.client.http.time.monotonic", lambda: clock[0])
+
+    def answer(_: httpx2.Request) -> httpx2.Response:
+        asked[0] += 1
+        clock[0] += seconds
+        raise httpx2.ReadTimeout("timed out")
+
+    with pytest.raises(UnreachableError, match=r"no answer from http://conoid\.test"):
+        served(answer).me()
+    assert asked == [times]
+
+
+def test_an_empty_name_of_a_case_is_told() -> None:
+    for name in ("", " "):
+        with pytest.raises(
+            CaseError, match=r"^case = '': the name is empty: write a .toml or .json file, or a shipped"
+        ):
+            body_of(name)

@@ -8,9 +8,9 @@ import msgspec
 import pytest
 
 from conoid.cases import keys
-from conoid.cases.messages import AnyMessage
+from conoid.cases.messages import AnyMessage, Log
 from conoid.client import stream
-from conoid.client.errors import UnreachableError
+from conoid.client.errors import AnswerError, UnreachableError
 from conoid.client.http import Router
 from conoid.client.link import Link
 from conoid.client.stream import SseLink, StreamError, ZenohLink, follow
@@ -190,3 +190,18 @@ def test_a_full_mailbox_drops_instead_of_waiting() -> None:
     first = mailbox.get(0.0)
     assert first is not None
     assert first.seq == 1
+
+
+def test_a_stream_that_nobody_can_read_is_told_once_and_the_journal_is_read() -> None:
+    def unreadable() -> Iterator[AnyMessage]:
+        raise AnswerError("the answer of http://conoid.test cannot be read")
+        yield
+
+    journal = Journal()
+    journal.lines = [stories.status(1, "running"), stories.status(2, "succeeded")]
+    link = SseLink(unreadable)
+    until(lambda: bool(link.trouble))
+    warning, *told = follow(link, journal.after, lambda: True)
+    assert [message.seq for message in told] == [1, 2]
+    assert isinstance(warning, Log)
+    assert warning.text.startswith("the events cannot be followed, and the journal is read instead: the answer of http")

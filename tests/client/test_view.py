@@ -15,6 +15,7 @@ from PIL import Image
 
 from conoid.client import camera, pictures, scales
 from conoid.client.errors import LookError, UnfinishedError, ViewError
+from conoid.client.frame import require_whole
 from conoid.client.pictures import FIELDS, Look, Mirror, Picture, Scene, direction, explain, mirrors, reason
 from conoid.client.view import view
 
@@ -337,3 +338,54 @@ def test_what_cannot_be_seen_is_one_line(options: dict[str, Any], folder: Path, 
 def test_a_direction_of_any_length_is_one(folder: Path, tmp_path: Path) -> None:
     for seen, up in (("1e-300,0,0", "0,0,1e300"), ("1e300,-1e300,1e300", "z")):
         assert view(folder, "mises", tmp_path / "a.png", size=(64, 64), camera=seen, up=up).faces
+
+
+def cut(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-2000])
+
+
+def torn(path: Path) -> None:
+    data = path.read_bytes()
+    path.write_bytes(data[:1000] + bytes(3000) + data[4000:])
+
+
+def astray(path: Path) -> None:
+    with h5py.File(path, "r+") as file:
+        file["VTKHDF/Connectivity"][7] = 10**6
+
+
+def short(path: Path) -> None:
+    with h5py.File(path, "r+") as file:
+        file["VTKHDF/NumberOfPoints"][0] += 5
+
+
+def lacks(path: Path) -> None:
+    with h5py.File(path, "r+") as file:
+        del file["VTKHDF/Types"]
+
+
+def other(path: Path) -> None:
+    path.write_text("no frame at all")
+
+
+def empty(path: Path) -> None:
+    path.write_bytes(b"")
+
+
+@pytest.mark.parametrize("damage", [cut, torn, astray, short, lacks, other, empty])
+def test_a_damaged_frame_is_named(damage: Any, tmp_path: Path) -> None:
+    """VTK has words of its own for some, and reads beyond the ends of arrays of others."""
+    path = tmp_path / "000001.vtkhdf"
+    write_frame(path)
+    require_whole(str(path))
+    damage(path)
+    with pytest.raises(ViewError, match=f"^{path}: this is no frame, or a damaged one: ") as told:
+        require_whole(str(path))
+    assert "\n" not in str(told.value)
+
+
+def test_a_picture_of_a_damaged_frame_is_one_line(tmp_path: Path) -> None:
+    folder = write_run(tmp_path / "bar")
+    astray(folder / "frames" / "000007.vtkhdf")
+    with pytest.raises(ViewError, match=r"7\.vtkhdf: this is no frame, or a damaged one: cells of piece 0 have"):
+        view(folder, "mises", tmp_path / "t.png", size=SIZE)

@@ -244,7 +244,7 @@ class Heard:
     """A link that remembers what has come over it."""
 
     def __init__(self, link: Link) -> None:
-        self.name, self._link = link.name, link
+        self.name, self.trouble, self._link = link.name, "", link
         self.heard: list[AnyMessage] = []
 
     def get(self, timeout: float) -> AnyMessage | None:

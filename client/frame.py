@@ -1,0 +1,59 @@
+"""Whether the file of a frame is whole: VTK reads a damaged one beyond the ends of its arrays, or speaks of its own."""
+
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from .errors import ViewError
+
+_LISTS = ("Points", "Connectivity", "Offsets", "Types")
+
+
+def require_whole(path: str) -> None:
+    """Raises ViewError that names ``path`` where it is no frame or a damaged one, OSError where it cannot be opened."""
+    with Path(path).open("rb"):  # its own words for a file that is not there, or not for this user
+        pass
+    try:
+        with h5py.File(path, "r") as file:
+            wrong = _wrong(file)
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError) as error:
+        wrong = " ".join(str(error).split())[:200]
+    if wrong:
+        raise ViewError(f"{path}: this is no frame, or a damaged one: {wrong}")
+
+
+def _wrong(file: Any) -> str:
+    """What of a VTKHDF file cannot be drawn; empty for nothing. Raises what h5py does for what it cannot read."""
+    root = file.get("VTKHDF")
+    if not isinstance(root, h5py.Group):
+        return "it has no group VTKHDF"
+    if missing := [name for name in _LISTS if name not in root]:
+        return f"it has no {missing[0]}"
+    points, cells, ids = (np.asarray(root[f"NumberOf{name}"]) for name in ("Points", "Cells", "ConnectivityIds"))
+    sizes = {"Points": points.sum(), "Connectivity": ids.sum(), "Offsets": (cells + 1).sum(), "Types": cells.sum()}
+    lists = {name: np.asarray(root[name]) for name in _LISTS}
+    for name, size in sizes.items():
+        if len(lists[name]) != size:
+            return f"{name} has {len(lists[name])} entries, where {size} are told"
+    for group, size in (("PointData", points.sum()), ("CellData", cells.sum())):
+        for name, values in root.get(group, {}).items():
+            if len(np.asarray(values)) != size:
+                return f"{group}/{name} has {len(values)} entries, where {size} are told"
+    return _astray(lists, points, cells, ids)
+
+
+def _astray(lists: dict[str, Any], points: Any, cells: Any, ids: Any) -> str:
+    """Which of the pieces of a frame has cells with nodes that it does not have."""
+    if not np.isfinite(lists["Points"]).all():
+        return "a coordinate is not finite"
+    first = first_cell = 0
+    for n, (of_points, of_cells, of_ids) in enumerate(zip(points, cells, ids, strict=True)):
+        corners = lists["Connectivity"][first : first + of_ids]
+        offsets = lists["Offsets"][first_cell : first_cell + of_cells + 1]
+        within = not len(corners) or (corners.min() >= 0 and corners.max() < of_points)
+        if not within or offsets[0] != 0 or offsets[-1] != of_ids or (np.diff(offsets) < 0).any():
+            return f"cells of piece {n} have nodes that it does not have"
+        first, first_cell = first + of_ids, first_cell + of_cells + 1
+    return ""
