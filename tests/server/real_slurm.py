@@ -84,7 +84,7 @@ class Cluster:
     def jobs(self, name: str) -> list[tuple[str, str]]:
         """Number and state of all jobs whose names begin with ``name``."""
         rows = [row.split("|") for row in self.command("squeue", "-h", "-t", "all", "-o", "%i|%T|%j").splitlines()]
-        return [(row[0], row[1]) for row in rows if row[2].startswith(name)]
+        return [(row[0], row[1]) for row in rows if len(row) > 2 and row[2].startswith(name)]
 
     def start(self) -> None:
         """Starts the controller."""

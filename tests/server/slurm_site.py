@@ -98,7 +98,7 @@ def job_of(site: Site, run: str) -> Job:
 
 
 def processes_of(run: str) -> list[int]:
-    """The ranks of a run."""
+    """The ranks of a run, of the solver or of the worker that computes nothing."""
     found = []
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit():
@@ -106,6 +106,7 @@ def processes_of(run: str) -> list[int]:
                 words = (entry / "cmdline").read_bytes().split(b"\0")
             except OSError:
                 continue
-            if b"mpi4py" in words and run.encode() in words and words[0].endswith(b"python"):
+            worker = b"mpi4py" in words or any(word.endswith(b"fake_worker.py") for word in words[:2])
+            if worker and run.encode() in words and words[0].endswith(b"python"):
                 found.append(int(entry.name))
     return found

@@ -83,18 +83,42 @@ def test_a_task_that_is_cancelled_by_hand_while_it_waits_is_cancelled(site: Site
     assert job_of(site, runs[waits[-1]]).job == jobs[waits[-1]].job, "no second job"
 
 
+def script_of(run: str) -> list[int]:
+    """The process that the script of the run's job has become."""
+    found = subprocess.run(["pgrep", "-f", f"conoid.worker.job .*{run}"], capture_output=True, text=True, check=True)
+    return [int(pid) for pid in found.stdout.split()]
+
+
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
 def test_a_job_that_was_killed_by_hand_is_not_cancelled(site: Site, number: signal.Signals) -> None:
+    """SIGTERM to its script, SIGKILL to its ranks and its script."""
     run = site.submit(case_text(steps=100_000, pace=0.02))
     site.reached(run, 30.0, State.RUNNING)
-    script = subprocess.run(
-        ["pgrep", "-f", f"conoid.worker.job .*{run}"], capture_output=True, text=True, check=True
-    ).stdout.split()
-    for pid in script if number is signal.SIGTERM else [*script, *map(str, processes_of(run))]:
-        os.kill(int(pid), number)
+    ranks, script = processes_of(run), script_of(run)
+    assert ranks
+    for pid in script if number is signal.SIGTERM else [*ranks, *script]:
+        os.kill(pid, number)
     ended = site.ended(run, 120.0)
     assert ended["state"] in {"failed", "lost"}, ended
     assert ended["cause"] in {"preempted", "node", "service"}, ended
+    assert len(site.jobs(run)) == 1
+
+
+def test_a_run_whose_script_alone_was_killed_goes_on_from_its_checkpoint(site: Site) -> None:
+    """Slurm ends the ranks of such a job, and these leave a checkpoint; it ends as it is asked to."""
+    run = site.submit(case_text(steps=100_000, pace=0.02))
+    site.reached(run, 30.0, State.RUNNING)
+    for pid in script_of(run):
+        os.kill(pid, signal.SIGKILL)
+    deadline = time.monotonic() + 120.0
+    while not any("attempt 2" in event.get("message", "") for event in site.ann.events(run, after=4)):
+        assert time.monotonic() < deadline, site.ann.show(run)
+        time.sleep(0.5)
+    site.reached(run, 60.0, State.RUNNING)
+    site.ann.http.post(f"/v1/runs/{run}:cancel")
+    ended = site.ended(run, 60.0)
+    assert (ended["state"], ended["cause"]) == ("cancelled", "cancelled")
+    assert len(site.jobs(run)) == 2
 
 
 def test_a_point_that_crashes_is_told_by_what_it_said(site: Site) -> None:
