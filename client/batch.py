@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import msgspec
 import typer
 
-from conoid.cases import batch, layout, messages, slurm, whole
+from conoid.cases import batch, layout, messages, slurm, slurm_call, whole
 from conoid.cases.batch import Job, Slurm
 from conoid.cases.load import parse_case, resolved_json
 from conoid.cases.run import State
@@ -105,9 +105,9 @@ def hand_over(case: str, overrides: Iterable[str], out: Path | None, profile: st
         number = slurm.submit(site.bin, folder, job, batch.profile_of(site, job.profile)[1])
         noted = batch.Job(**{**{name: getattr(job, name) for name in job.__struct_fields__}, "job": number})
         whole.write(folder / layout.JOB, batch.to_json(noted))
-    except slurm.AwayError as error:
+    except slurm_call.AwayError as error:
         raise ClientError(f"{error}; nobody knows whether there is a job: the same command again finds out") from None
-    except (slurm.SlurmError, ValueError) as error:
+    except (slurm_call.SlurmError, ValueError) as error:
         raise ClientError(str(error)) from None
     except OSError as error:
         raise ClientError(f"{error.filename or folder}: {error.strerror}") from None
@@ -205,6 +205,6 @@ def cancel_folder(folder: Path) -> str:
         if not any((entry.job, entry.name) == (job.job, job.key) for entry in slurm.jobs(place, job.name)):
             return f"{folder} is asked to stop; Slurm has no job {job.job} of the name {job.name}"
         slurm.notify(place, job.job)
-    except slurm.SlurmError as error:
+    except slurm_call.SlurmError as error:
         return f"{folder} is asked to stop; Slurm does not answer: {error}"
     return f"{folder} is asked to stop, job {job.job}"

@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 
-from conoid.cases import batch, layout, slurm, whole
+from conoid.cases import batch, layout, slurm, slurm_call, whole
 from conoid.cases.messages import AnyMessage, Status
 from conoid.cases.outcome import from_json
 from conoid.cases.run import Cause, State
@@ -142,7 +142,7 @@ class FolderRun:
             return
         try:
             entries = slurm.jobs(self._place, job.name)
-        except slurm.SlurmError as error:
+        except slurm_call.SlurmError as error:
             yield from self._pending(state, f"Slurm does not answer: {error}")
             return
         for entry in entries[:1]:

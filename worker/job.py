@@ -18,7 +18,7 @@ from pathlib import Path
 
 import msgspec
 
-from conoid.cases import batch, checkpoints, layout, messages, outcome, slurm, whole
+from conoid.cases import batch, checkpoints, layout, messages, outcome, slurm, slurm_call, whole
 from conoid.cases.batch import Job
 from conoid.cases.outcome import Outcome
 from conoid.cases.run import Cause, ExitCode, State
@@ -197,7 +197,7 @@ def _details(place: str, number: str) -> dict[str, str]:
     while time.monotonic() < deadline:
         try:
             return slurm.details(place, number)
-        except slurm.SlurmError:
+        except slurm_call.SlurmError:
             time.sleep(1.0)
     return {}
 
@@ -205,7 +205,7 @@ def _details(place: str, number: str) -> dict[str, str]:
 def _again(place: str, number: str) -> int | None:
     try:
         slurm.requeue(place, number)
-    except slurm.SlurmError as error:
+    except slurm_call.SlurmError as error:
         print(f"job {number}: it cannot be put back: {error}", flush=True)
         return None
     return 0

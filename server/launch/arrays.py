@@ -13,7 +13,7 @@ from pathlib import Path
 
 import msgspec
 
-from conoid.cases import batch, layout, slurm, whole
+from conoid.cases import batch, layout, slurm, slurm_call, whole
 
 from .handed import SlurmWorker
 
@@ -73,11 +73,11 @@ class Arrays:
         profile = batch.profile_of(self._site, records[0].profile)[1]
         try:
             numbers = slurm.submit_array(self._site.bin, records, profile)
-        except slurm.LaterError as error:
+        except slurm_call.LaterError as error:
             for worker in members:
                 worker.wait(str(error))
             return
-        except slurm.RefusedError as error:
+        except slurm_call.RefusedError as error:
             _log.warning("Slurm refuses the array %s, whose runs go one by one: %s", records[0].name, error)
             for worker in members:
                 worker.leave_array()

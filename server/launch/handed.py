@@ -6,7 +6,7 @@ from pathlib import Path
 
 import msgspec
 
-from conoid.cases import batch, layout, slurm, whole
+from conoid.cases import batch, layout, slurm, slurm_call, whole
 from conoid.cases.batch import Job
 from conoid.cases.run import Cause, State
 from conoid.cases.slurm import Entry
@@ -191,9 +191,9 @@ class SlurmWorker:
         try:
             self.write_down(job=slurm.submit(self._site.bin, self._folder, self._job, profile))
             self._later, self._pause = "", _POLITE
-        except slurm.LaterError as error:
+        except slurm_call.LaterError as error:
             self.wait(str(error))
-        except slurm.RefusedError as error:
+        except slurm_call.RefusedError as error:
             self._exit = Exit(None, False, "", (State.FAILED, Cause.LAUNCH, f"Slurm refuses the job: {error}"))
 
     def wait(self, why: str) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import msgspec
 
-from conoid.cases import batch, layout, slurm, whole
+from conoid.cases import batch, layout, slurm, slurm_call, whole
 from conoid.cases.slurm import Entry
 
 from ..settings import Settings
@@ -108,7 +108,7 @@ class SlurmLauncher:
             names = sorted({worker.record.name for _, worker in workers})
             for entry in slurm.jobs(self._site.bin, *names):
                 found.setdefault(entry.name, []).append(entry)
-        except slurm.SlurmError as error:
+        except slurm_call.SlurmError as error:
             _log.warning("Slurm does not answer: %s", error)
             for _, worker in workers:
                 worker.silent(str(error))
@@ -123,7 +123,7 @@ class SlurmLauncher:
         """The names of those that are handed over later."""
         try:
             return self._arrays.hand_over(workers)
-        except (slurm.SlurmError, OSError) as error:
+        except (slurm_call.SlurmError, OSError) as error:
             _log.warning("an array is handed over later: %s", error)
             return {worker.name for worker in workers if worker.fresh or worker.waits_for_array}
 
@@ -133,10 +133,10 @@ class SlurmLauncher:
         """
         try:
             worker.turn(entries, arrays)
-        except slurm.SlurmError as error:
+        except slurm_call.SlurmError as error:
             _log.warning("run %s: Slurm does not answer: %s", run, error)
             worker.silent(str(error))
-            return isinstance(error, slurm.AwayError) and error.command not in {"squeue", "sbatch"}
+            return isinstance(error, slurm_call.AwayError) and error.command not in {"squeue", "sbatch"}
         except (OSError, ValueError) as error:
             _log.error("run %s: %s", run, error)
         return True

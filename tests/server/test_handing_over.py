@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from conoid.cases import batch, layout, slurm
+from conoid.cases import batch, layout, slurm, slurm_call
 from conoid.cases.batch import Job, Profile, Slurm
 from conoid.cases.messages import Status
 from conoid.cases.run import Cause, State
@@ -44,7 +44,7 @@ def calls(place: Path) -> int:
 
 def test_a_job_whose_number_was_lost_on_the_way_is_not_handed_over_again(place: Path) -> None:
     found = commands(place, f"{ACCEPT}; echo 'sbatch: error: Socket timed out on send/recv operation' >&2; exit 1")
-    with pytest.raises(slurm.AwayError):
+    with pytest.raises(slurm_call.AwayError):
         slurm.submit(found, place / "run", JOB, Profile())
     assert slurm.submit(found, place / "run", JOB, Profile()) == "101"
     assert calls(place) == 1
@@ -53,7 +53,7 @@ def test_a_job_whose_number_was_lost_on_the_way_is_not_handed_over_again(place: 
 def test_nobody_hands_over_while_the_queue_cannot_be_read(place: Path) -> None:
     found = commands(place, f"{ACCEPT}; echo 101")
     (place / "away").touch()
-    with pytest.raises(slurm.AwayError):
+    with pytest.raises(slurm_call.AwayError):
         slurm.submit(found, place / "run", JOB, Profile())
     assert calls(place) == 0
 
@@ -65,7 +65,7 @@ def test_a_list_that_is_none_is_no_empty_list(place: Path, said: bytes) -> None:
     """A run whose job is not on it would be handed over again."""
     found = commands(place, "echo 101")
     (place / "queue").write_bytes(said)
-    with pytest.raises(slurm.AwayError, match="squeue"):
+    with pytest.raises(slurm_call.AwayError, match="squeue"):
         slurm.submit(found, place / "run", JOB, Profile())
     assert calls(place) == 0
 
@@ -73,7 +73,7 @@ def test_a_list_that_is_none_is_no_empty_list(place: Path, said: bytes) -> None:
 @pytest.mark.parametrize("said", ["", "<html>", "101 102"])
 def test_a_number_that_is_none_is_looked_for(place: Path, said: str) -> None:
     found = commands(place, f"{ACCEPT}; echo '{said}'")
-    with pytest.raises(slurm.AwayError, match="sbatch"):
+    with pytest.raises(slurm_call.AwayError, match="sbatch"):
         slurm.submit(found, place / "run", JOB, Profile())
     assert slurm.submit(found, place / "run", JOB, Profile()) == "101"
     assert calls(place) == 1
@@ -91,7 +91,7 @@ def test_an_sbatch_that_outlives_its_server_keeps_the_next_from_a_second(place: 
         assert server.poll() is None
     server.kill()
     server.wait(10)
-    with pytest.raises(slurm.AwayError, match="under way"):
+    with pytest.raises(slurm_call.AwayError, match="under way"):
         slurm.submit(found, place / "run", JOB, Profile())
     assert calls(place) == 1
 
@@ -99,23 +99,23 @@ def test_an_sbatch_that_outlives_its_server_keeps_the_next_from_a_second(place: 
 @pytest.mark.parametrize(
     ("said", "kind"),
     [
-        ("sbatch: error: Batch job submission failed: Invalid partition name specified", slurm.RefusedError),
+        ("sbatch: error: Batch job submission failed: Invalid partition name specified", slurm_call.RefusedError),
         (
             "sbatch: error: Batch job submission failed: Requested node configuration is not available",
-            slurm.RefusedError,
+            slurm_call.RefusedError,
         ),
         (
             "sbatch: error: Batch job submission failed: Unable to contact slurm controller (connect failure)",
-            slurm.AwayError,
+            slurm_call.AwayError,
         ),
-        ("slurm_load_jobs error: Zero Bytes were transmitted or received", slurm.AwayError),
-        ("sbatch: error: If munged is up, restart with --num-threads=10", slurm.AwayError),
+        ("slurm_load_jobs error: Zero Bytes were transmitted or received", slurm_call.AwayError),
+        ("sbatch: error: If munged is up, restart with --num-threads=10", slurm_call.AwayError),
     ],
 )
 def test_a_refusal_is_told_from_silence(place: Path, said: str, kind: type[Exception]) -> None:
     found = commands(place, f"echo '{said}' >&2; exit 1")
     with pytest.raises(kind):
-        slurm.call(found, ["sbatch"])
+        slurm_call.call(found, ["sbatch"])
 
 
 def test_of_two_jobs_the_one_that_has_begun_stays(place: Path) -> None:
@@ -344,7 +344,7 @@ def test_an_array_whose_number_was_lost_is_not_handed_over_again(place: Path) ->
     """Nor is it by the next server, which knows the records alone; a task that is not there is handed over."""
     lost = 'echo "101_0|PENDING|N/A|$name|R" >> queue; echo "sbatch: error: Socket timed out" >&2; exit 1'
     arrays, workers = group_of(place, 2, lost)
-    with pytest.raises(slurm.AwayError):
+    with pytest.raises(slurm_call.AwayError):
         arrays.hand_over(workers)
     records = [batch.read_job(worker.folder) for worker in workers]
     again = [SlurmWorker(w.folder, job, w._site) for w, job in zip(workers, records, strict=True) if job]

@@ -6,7 +6,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from conoid.cases import batch, layout, slurm
+from conoid.cases import batch, layout, slurm, slurm_call
 from conoid.cases.batch import Profile, Slurm
 from conoid.cases.run import Cause, State
 from conoid.cases.slurm import Entry
@@ -99,7 +99,7 @@ def test_a_refusal_that_lasts_fails_the_run(place: Path, said: str) -> None:
 @pytest.mark.parametrize("said", AWAY)
 def test_a_controller_that_is_away_has_refused_nothing(place: Path, said: str) -> None:
     says(place, said)
-    with pytest.raises(slurm.AwayError):
+    with pytest.raises(slurm_call.AwayError):
         worker_of(place).turn([])
 
 
@@ -130,7 +130,7 @@ def test_a_name_of_another_job_hides_no_run(place: Path, name: str, first: bool)
 def test_what_is_no_list_is_not_taken_for_an_empty_one(place: Path, told: str) -> None:
     commands(place, "echo 7")
     (place / "queue").write_text(told)
-    with pytest.raises(slurm.AwayError):
+    with pytest.raises(slurm_call.AwayError):
         slurm.jobs(str(place / "bin"), "conoid-run-1")
 
 
@@ -183,12 +183,12 @@ def test_tasks_that_a_crash_has_swallowed_with_their_array_are_handed_over_again
 
 
 def test_a_command_that_hangs_is_left_alone_for_a_while(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(slurm._LONGEST, "scancel", 0.1)
+    monkeypatch.setitem(slurm_call._LONGEST, "scancel", 0.1)
     commands(place, "echo 7")
     (place / "bin" / "scancel").write_text("#!/bin/sh\nexec sleep 20\n")
     for why in ("has not answered within", "tried again soon"):
         began = time.monotonic()
-        with pytest.raises(slurm.AwayError, match=why) as told:
+        with pytest.raises(slurm_call.AwayError, match=why) as told:
             slurm.cancel(str(place / "bin"), "7")
         assert told.value.command == "scancel"
         assert time.monotonic() < began + 5.0
