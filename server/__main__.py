@@ -15,8 +15,9 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from . import identity
 from .alone import only_one
+from .engine import failure
 from .settings import Caps, Settings, SettingsError, StartError, capped, command, site_of
-from .store import Store, failure
+from .store import Store
 from .tokens import SCOPES, TokenError, create_token
 
 

@@ -3,13 +3,10 @@
 Runs, labels and keys are an index over the runs' folders and can be rebuilt from them; tokens live here only.
 """
 
-import os
-import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from enum import StrEnum
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -18,20 +15,15 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from conoid.cases.run import Cause, State
 
+from .engine import engine_of, failure, identity_of
 from .events import Run
-from .settings import StartError
 from .tables import BONDS, KEYS, LABELS, META, RUNS, TOKENS
 from .usage import Took
 
 _ONLY = 1
 """The number of the one bond that there may be."""
-_BUSY = 2000
-"""ms that SQLite waits for another process to let go. Chosen: longer than any transaction of this server takes, shorter
-than what a caller waits for."""
 _AT_ONCE = 500
 """Ids in one statement. Chosen: SQLite takes 999 in its older versions."""
-_TABLES = 1 << 16
-"""Bytes without which SQLite opens no database: its log and what it shares with others. By hand: 32 KiB."""
 _OPEN = [state.value for state in State if not state.final]
 
 
@@ -47,10 +39,6 @@ class Token:
     """Unix s."""
 
 
-class StoreError(StartError):
-    """The database cannot be used; the text is one line."""
-
-
 class Bond(msgspec.Struct, frozen=True):
     """Which server the folder of runs at ``place`` and a database belong to."""
 
@@ -64,11 +52,11 @@ class Store:
     def __init__(self, url: str | sa.URL) -> None:
         """Opens the database and makes its tables where they are missing. Raises StoreError."""
         try:
-            self._engine = _engine(url)
+            self._engine = engine_of(url)
             self.unlabelled = not sa.inspect(self._engine).has_table(LABELS.name)
             """Whether the labels of all runs are to be read from their folders: the database is new, or an old one."""
             META.create_all(self._engine)
-            self._file = _identity(self._engine)
+            self._file = identity_of(self._engine)
         except (SQLAlchemyError, ImportError) as error:
             raise failure(url, error, "opened") from None
 
@@ -78,7 +66,7 @@ class Store:
 
     def probe(self) -> None:
         """Raises SQLAlchemyError when nothing can be written now, or what is written is in no file any more."""
-        if _identity(self._engine) != self._file:
+        if identity_of(self._engine) != self._file:
             raise SQLAlchemyError("the file of the database has been removed or replaced")
         with self._engine.connect() as connection:
             if self._engine.dialect.name == "sqlite":
@@ -265,48 +253,3 @@ def _run(row: sa.RowMapping) -> Run:
 
 def _token(row: sa.RowMapping) -> Token:
     return Token(row["id"], row["owner"], row["sha256"], frozenset(row["scopes"].split()), row["created"])
-
-
-def failure(url: str | sa.URL, error: Exception, deed: str = "used") -> StoreError:
-    """What is told of a database: its file, or its address without the password, and why it cannot be ``deed``."""
-    try:
-        made = sa.make_url(url)
-        sqlite = made.get_backend_name() == "sqlite" and made.database
-        place = made.database if sqlite else made.render_as_string(hide_password=True)
-    except sa.exc.ArgumentError:
-        sqlite, place = None, repr(url)
-    full = " (its disk is full)" if sqlite and _full(Path(sqlite).parent) else ""
-    told = StoreError(f"the database cannot be {deed}: {place}: {str(error).splitlines()[0]}{full}")
-    told.exit_code = 2 if isinstance(error, sa.exc.ArgumentError) else 1
-    return told
-
-
-def _full(folder: Path) -> bool:
-    try:
-        return shutil.disk_usage(folder).free < _TABLES
-    except OSError:
-        return False
-
-
-def _engine(url: str | sa.URL) -> sa.Engine:
-    made = sa.make_url(url)
-    engine = sa.create_engine(made, pool_pre_ping=made.get_backend_name() != "sqlite")
-    if engine.dialect.name == "sqlite":
-        sa.event.listen(engine, "connect", _tune)
-    return engine
-
-
-def _tune(connection: Any, _record: object) -> None:
-    """WAL lets readers go on while one writes."""
-    for pragma in ("journal_mode=wal", f"busy_timeout={_BUSY}"):
-        connection.execute(f"pragma {pragma}").close()
-
-
-def _identity(engine: sa.Engine) -> tuple[int, int] | None:
-    """Device and number of the file of an SQLite database; None where there is none, as for other databases."""
-    place = engine.url.database if engine.dialect.name == "sqlite" else None
-    try:
-        status = os.stat(place) if place else None
-    except OSError:
-        return None
-    return (status.st_dev, status.st_ino) if status else None

@@ -12,10 +12,11 @@ from pathlib import Path
 import pytest
 
 from conoid.server.__main__ import main
+from conoid.server.engine import StoreError
 from conoid.server.launch import Access, Job, LaunchError, processes
 from conoid.server.launch.local import environment, find_mpiexec
 from conoid.server.settings import Settings, SettingsError, loopback, usable_cores
-from conoid.server.store import Store, StoreError
+from conoid.server.store import Store
 from conoid.server.tokens import check_token
 
 from .running import MakeProcess

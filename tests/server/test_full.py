@@ -13,7 +13,7 @@ from typing import Any
 import httpx2
 import pytest
 
-from conoid.server import serve, store
+from conoid.server import engine, serve
 from conoid.server.__main__ import main
 from conoid.server.settings import Settings
 from conoid.server.store import Store
@@ -74,14 +74,14 @@ def test_a_token_on_a_full_disk(
     runs: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     capsys.readouterr()
-    tuned = store._tune
+    tuned = engine._tune
 
     def full(connection: Any, record: object) -> None:
         tuned(connection, record)
         pages = connection.execute("pragma page_count").fetchone()[0]
         connection.execute(f"pragma max_page_count={pages}").close()
 
-    monkeypatch.setattr(store, "_tune", full)
+    monkeypatch.setattr(engine, "_tune", full)
     codes = [main(["--runs", str(runs), "token", "add", f"user{n}"]) for n in range(60)]
     assert set(codes) == {0, 1}
     told = capsys.readouterr().err.splitlines()
