@@ -8,8 +8,9 @@ from conoid.cases.problems import CaseError, ConoidError
 
 from .errors import ClientError, NotFoundError, ServiceError, UnfinishedError, UnreachableError, ViewError
 from .result import Result
-from .run import Run, RunInfo
+from .run import Run
 from .session import Session, connect
+from .told import RunInfo
 
 __all__ = [
     "CaseError", "ClientError", "ConoidError", "NotFoundError", "Result", "Run", "RunInfo", "ServiceError", "Session",

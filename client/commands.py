@@ -34,8 +34,9 @@ from .options import (
     warn_of,
 )
 from .result import LocalFolder
-from .run import FileInfo, Run, RunInfo
+from .run import Run
 from .session import connect
+from .told import FileInfo, RunInfo
 from .watch import watch
 
 

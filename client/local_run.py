@@ -12,9 +12,10 @@ from conoid.cases.run import Cause, State
 
 from .errors import ClientError, UnfinishedError
 from .live import Live
+from .places import inside
 from .result import LocalFolder, Result
-from .run import FileInfo, RunInfo, inside
 from .saving import whole as whole_file
+from .told import FileInfo, RunInfo
 
 _ID = re.compile(r"[0-9a-z]{22}")
 """The id of a run of a server, by which ``conoid get`` calls the folder that it copies into."""

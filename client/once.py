@@ -21,8 +21,9 @@ from .live import Live, exit_code
 from .local import GRACE, LocalServer
 from .pictures import FIELDS, Drawn
 from .result import Result
-from .run import Run, RunInfo
+from .run import Run
 from .submission import data_of
+from .told import RunInfo
 from .view import view
 from .watch import explained, show, tell
 

@@ -1,7 +1,6 @@
 """A handle of a run on a server: status, wait, watch, cancel, events, files, download, result."""
 
 import math
-import os
 import shutil
 import tempfile
 import time
@@ -9,122 +8,27 @@ import weakref
 from collections.abc import Generator
 from contextlib import suppress
 from dataclasses import dataclass
-from html import escape
-from pathlib import Path, PurePosixPath, PureWindowsPath
-from typing import Annotated, Any
-from urllib.parse import quote
-
-import msgspec
+from pathlib import Path
+from typing import Any
 
 from conoid.cases import keys
 from conoid.cases.figures import duration
-from conoid.cases.messages import AnyMessage, Progress
+from conoid.cases.messages import AnyMessage
 from conoid.cases.messages import Snapshot as Told
-from conoid.cases.outcome import Outcome
-from conoid.cases.problems import shown
-from conoid.cases.run import State
 
 from .errors import ClientError, NotFoundError, ServiceError, UnfinishedError, UnreachableError, passes
 from .http import Http
 from .link import Link
 from .live import Live
-from .result import Result, outcome_of
+from .places import inside, quoted
+from .result import Result
 from .snapshots import Snapshot
+from .told import EventPage, FileInfo, Listing, RunInfo, SnapshotPage
 
-ID = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,127}\Z"
-"""Of a run or a sweep: a name of a folder, too."""
 _WAIT = 20.0
 """s of a single request that waits for the end of a run: below the 30 s after which a request is given up (http.py)."""
 _PATIENCE = 120.0
 """s that a server may be away while the end of a run is waited for. Chosen: time for a restart, twice over."""
-
-
-_LONGEST_NAME = 255
-"""Bytes of the name of a file: NAME_MAX of Linux."""
-_OF_ONE = {"title", "estimate", "progress", "outcome_json"}
-"""What is told of one run, not in a list."""
-
-
-class RunInfo(msgspec.Struct, kw_only=True, frozen=True):
-    """What the server tells of a run. Times are Unix s, None when they have not come yet."""
-
-    id: Annotated[str, msgspec.Meta(pattern=ID)]
-    owner: str
-    name: str
-    state: State
-    ranks: int
-    submitted: float
-    cause: str | None = None
-    message: str = ""
-    reason: str = ""
-    """What a queued run waits for."""
-    started: float | None = None
-    finished: float | None = None
-    labels: dict[str, str] = {}
-    title: str = ""
-    """This and what follows is told of one run, not in a list (_OF_ONE)."""
-    estimate: dict[str, Any] = {}
-    progress: Progress | None = None
-    outcome_json: msgspec.Raw = msgspec.field(name="outcome", default=msgspec.Raw(b"null"))
-
-    def _repr_html_(self) -> str:
-        """For notebooks."""
-        labels = ", ".join(f"{name}={value}" for name, value in self.labels.items())
-        rows = {
-            "run": self.id,
-            "case": self.title or self.name,
-            "state": self.state.value,
-            "why": self.message,
-            "labels": labels,
-        }
-        lines = (f"<tr><th>{name}</th><td>{escape(text)}</td></tr>" for name, text in rows.items() if text)
-        return f"<table>{''.join(lines)}</table>"
-
-    @property
-    def listed(self) -> dict[str, Any]:
-        """What a list tells of it, as plain data."""
-        return {name: getattr(self, name) for name in self.__struct_fields__ if name not in _OF_ONE}
-
-    @property
-    def outcome(self) -> Outcome | None:
-        """How it ended; None before its end. Raises ClientError when this client cannot read it."""
-        if bytes(self.outcome_json) == b"null":
-            return None
-        try:
-            return outcome_of(bytes(self.outcome_json))
-        except msgspec.MsgspecError as error:
-            raise ClientError(f"the outcome of run {self.id} cannot be read: {error}") from None
-
-
-class FileInfo(msgspec.Struct, kw_only=True, frozen=True):
-    """A file in a run's folder: its path there, its bytes, and where it is fetched. Bytes of a name that are no UTF-8
-    are shown as ``\\xff``: the address alone has them.
-    """
-
-    path: str
-    size: int | None = None
-    """None where it is not known."""
-    url: str = ""
-
-
-class Listing(msgspec.Struct, kw_only=True, frozen=True):
-    """What lies in a run's folder."""
-
-    files: list[FileInfo]
-
-
-class EventPage(msgspec.Struct, kw_only=True, frozen=True):
-    """Journal lines, the number of the last one, and whether there are more."""
-
-    events: list[msgspec.Raw]
-    last: int
-    more: bool
-
-
-class SnapshotPage(msgspec.Struct, kw_only=True, frozen=True):
-    """The snapshots of a run."""
-
-    snapshots: list[Told]
 
 
 @dataclass
@@ -329,33 +233,3 @@ class RemoteFolder:
     def told(self, name: str) -> str:
         """Its run and server: the local copy goes away."""
         return f"{name} of run {self.run.id} at {self.run.session.url}"
-
-
-def quoted(text: str, safe: str = "") -> str:
-    """``text`` as a part of an address."""
-    return quote(text, safe=safe)
-
-
-def inside(root: Path, name: str) -> Path:
-    """The path of ``name``, which a server or a user has given, below ``root``.
-
-    Raises ClientError for a name that would leave it, here or on another system, also by a link that lies in ``root``,
-    and for one that no file can have.
-    """
-    path, other = PurePosixPath(name), PureWindowsPath(name)
-    if path.is_absolute() or other.anchor or ".." in (*path.parts, *other.parts) or not path.parts:
-        raise ClientError(f"{shown(name)} lies outside the run's folder")
-    if "\0" in name or not _writable(name):
-        raise ClientError(f"{shown(name)}: no file can have this name")
-    target = root.joinpath(*path.parts)
-    if not target.parent.resolve().is_relative_to(root.resolve()):
-        raise ClientError(f"{shown(name)}: a link in {root} leads out of it")
-    return target
-
-
-def _writable(name: str) -> bool:
-    """Whether each part of it fits a file system."""
-    try:
-        return all(len(os.fsencode(part)) <= _LONGEST_NAME for part in name.split("/"))
-    except UnicodeEncodeError:
-        return False

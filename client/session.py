@@ -15,9 +15,11 @@ from conoid.cases.problems import shown
 from .config import target
 from .errors import MissingError, NotFoundError, ServiceError, UsageError
 from .http import NOT_FOUND, Http
-from .run import ID, Run, RunInfo, quoted
+from .places import quoted
+from .run import Run
 from .submission import CaseSource, body_of, data_of, to_json
 from .sweep import Point, Sweep, SweepInfo, SweepPage, listed, points_along
+from .told import ID, RunInfo
 
 _CANDIDATES = 8
 """Ids that are named where several begin as one was given. Chosen: as many as a line has room for."""

@@ -20,7 +20,9 @@ from conoid.cases.run import State
 
 from .errors import AnswerError, ClientError
 from .http import Http
-from .run import ID, Run, RunInfo, quoted
+from .places import quoted
+from .run import Run
+from .told import ID, RunInfo
 
 _COLUMNS = {"run", "state"}
 """That the table of every sweep has."""

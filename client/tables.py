@@ -42,7 +42,7 @@ from conoid.cases.touching import Touch
 from .compare import AT_THE_END, Comparison
 from .display import STATE_STYLE
 from .replay import Account
-from .run import RunInfo
+from .told import RunInfo
 
 _LONGEST = 60
 """Characters of the value of a key that are shown. Chosen: two lines beside another one; a description is a page."""

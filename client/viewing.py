@@ -12,8 +12,8 @@ from .console import echo, echo_json
 from .options import Json, Token, Url, aloud, complain, find
 from .pictures import FIELDS, SMALLEST
 from .result import seconds
-from .run import ID
 from .session import connect
+from .told import ID
 from .view import view
 
 _NEAR = 0.005

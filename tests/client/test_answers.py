@@ -17,7 +17,8 @@ from conoid.client.cli import app
 from conoid.client.config import address
 from conoid.client.errors import AnswerError, ClientError, UsageError
 from conoid.client.http import Http
-from conoid.client.run import Run, inside
+from conoid.client.places import inside
+from conoid.client.run import Run
 
 from .hostile import Answer, Hostile, head, hostile, run_info, said
 

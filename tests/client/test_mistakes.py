@@ -13,7 +13,7 @@ from conoid.client.cli import app
 from conoid.client.config import DEFAULT_URL
 from conoid.client.errors import ClientError
 from conoid.client.following import FolderRun
-from conoid.client.run import inside
+from conoid.client.places import inside
 from conoid.client.session import Session
 from conoid.client.sweep import SweepInfo
 

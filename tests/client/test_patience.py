@@ -10,10 +10,11 @@ from conoid.cases.messages import AnyMessage, Status
 from conoid.cases.run import State
 from conoid.client.errors import ServiceError, UnreachableError
 from conoid.client.http import Http
-from conoid.client.run import Run, RunInfo
+from conoid.client.run import Run
 from conoid.client.session import Session
 from conoid.client.stream import follow
 from conoid.client.sweep import SweepInfo
+from conoid.client.told import RunInfo
 
 
 class Away(httpx2.BaseTransport):

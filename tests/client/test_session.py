@@ -15,8 +15,9 @@ from conoid.cases.load import CaseError
 from conoid.cases.problems import ConoidError
 from conoid.client.config import DEFAULT_URL, target
 from conoid.client.errors import AnswerError, ClientError, NotFoundError, ServiceError, UnreachableError, UsageError
+from conoid.client.places import inside
 from conoid.client.result import Result
-from conoid.client.run import Run, inside
+from conoid.client.run import Run
 from conoid.client.session import Session
 from conoid.client.submission import body_of
 

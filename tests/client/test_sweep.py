@@ -9,8 +9,8 @@ from conoid.cases.load import CaseError
 from conoid.cases.run import State
 from conoid.client import sweeping, swept
 from conoid.client.errors import ClientError
-from conoid.client.run import RunInfo
 from conoid.client.sweep import SweepPoint, listed, points_along, points_in, points_of
+from conoid.client.told import RunInfo
 
 
 def test_keys_go_together_or_each_with_each() -> None:

@@ -7,8 +7,8 @@ import pytest
 from conoid.cases.run import State
 from conoid.client.console import PlainConsole
 from conoid.client.options import show_lines
-from conoid.client.run import RunInfo
 from conoid.client.tables import runs_table
+from conoid.client.told import RunInfo
 
 NAME, ID = "glass_steel_bar_at_210_metres_a_second", "0mb3k2d9x7f1q0a5z8w4ty"
 RUNS = [
