@@ -2,8 +2,8 @@
 
 A drill that was interrupted goes on where it was: what was true in build/drill/faults.jsonl is not tried again unless
 ``--fresh`` says so; the table names what has not been tried yet. ``--shard 2/4`` tries every fourth group from the
-second on, ``--only WORDS`` those whose names have the words, or whose kind of stand is of that name (``slurm``),
-``--list`` names them. The exit code is 0 when every state became true in time.
+second on, ``--only WORDS`` those whose names have the words, or whose kind of stand is of that name (``slurm``), of
+several ``--only`` those that fit one, ``--list`` names them. The exit code is 0 when every state became true in time.
 """
 
 import argparse
@@ -17,7 +17,7 @@ from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
-from . import cluster, crowds, damage, odd, operator, strike, strikes, workers
+from . import clients, cluster, crowds, damage, odd, operator, strike, strikes, workers
 from .grounds import Grounds, grounds
 from .judge import TRUE, Row
 from .table import write
@@ -32,7 +32,7 @@ def groups() -> dict[str, Group]:
     found: dict[str, Group] = {}
     for one in [*strikes.everything(), *odd.everything(), *cluster.everything(), *operator.strikes()]:
         found[one.name] = (one.stand, partial(_struck, one))
-    families = (damage.groups(), odd.groups(), crowds.groups(), operator.groups())
+    families = (damage.groups(), odd.groups(), crowds.groups(), clients.groups(), operator.groups())
     for name, (kind, deed) in [group for family in families for group in family.items()]:
         found[name] = (kind, partial(_on, kind, deed))
     for adopted in (False, True):
@@ -52,7 +52,8 @@ def _on(kind: str, deed: Callable[..., Iterator[Row]], made: Grounds) -> Iterato
 def main() -> int:
     options = _options()
     known = groups()
-    chosen = {name: group for name, group in known.items() if options.only in name or options.only == group[0]}
+    wanted = options.only or [""]
+    chosen = {name: group for name, group in known.items() if any(w in name or w == group[0] for w in wanted)}
     names = list(chosen)[options.shard[0] - 1 :: options.shard[1]]
     if options.list:
         print(*names, sep="\n")
@@ -99,7 +100,9 @@ def _done(book: Path) -> dict[str, list[Row]]:
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser("python -m tests.drill", description="Faults, and whether states stay true.")
     parser.add_argument("--shard", type=_shard, default=(1, 1), metavar="I/N", help="every N-th group, from I on")
-    parser.add_argument("--only", default="", metavar="WORDS", help="groups whose names have the words")
+    parser.add_argument(
+        "--only", action="append", metavar="WORDS", help="groups whose names have the words; repeatable"
+    )
     parser.add_argument("--fresh", action="store_true", help="forget what was tried before")
     parser.add_argument("--list", action="store_true", help="name the groups and try nothing")
     return parser.parse_args()

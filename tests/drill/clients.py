@@ -1,0 +1,162 @@
+"""Servers and disks that fail the client: every command ends in time, with one line and its code, and no half file."""
+
+import gzip
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from functools import partial
+from itertools import repeat
+from pathlib import Path
+
+from ..client.hostile import Answer, head, hostile, run_info, said
+from .judge import TRUE, Row
+from .stand import Stand
+from .strikes import emptied, filled
+
+RUN = "0123456789abcdefghjkmn"
+PATIENCE = 60.0
+"""s in which a command has given up: 40 for the head of an answer, and some for its start on a busy machine."""
+Deed = Callable[[Stand], Iterator[Row]]
+
+
+def groups() -> dict[str, tuple[str, Deed]]:
+    """What is tried together, by name."""
+    found: dict[str, tuple[str, Deed]] = {
+        f"clients, {name}": ("plain", partial(answered, name, answer)) for name, answer in ANSWERS.items()
+    }
+    found["clients, files that are not as they are listed"] = ("plain", files)
+    found["clients, a full disk"] = ("disk", full)
+    return found
+
+
+def hangs() -> Iterator[bytes]:
+    """Nothing, for longer than anybody waits."""
+    time.sleep(2 * PATIENCE)
+    yield b""
+
+
+def endless(first: bytes, piece: bytes) -> Iterator[bytes]:
+    """A beginning, and the same again and again."""
+    yield first
+    yield from repeat(piece)
+
+
+def drips() -> Iterator[bytes]:
+    """A letter of the head a second."""
+    for letter in head(200, 10).decode():
+        yield letter.encode()
+        time.sleep(1.0)
+
+
+def slow() -> Iterator[bytes]:
+    """A byte of the body a second."""
+    yield head(200, 1 << 20)
+    for _ in range(round(2 * PATIENCE)):
+        yield b" "
+        time.sleep(1.0)
+
+
+ANSWERS: dict[str, Answer] = {
+    "garbage": lambda: [os.urandom(4096)],
+    "an answer that is no JSON": said(b"<html>It works!</html>", kind="text/html"),
+    "JSON of something else": said({"version": 7, "items": []}),
+    "JSON that is nested too deeply": said(b"[" * 100_000),
+    "half of an answer": lambda: [head(200, 5000), b'{"runs": ['],
+    "more than was said": lambda: [head(200, 2), b'{"runs": []' * 1000],
+    "no answer at all": lambda: [],
+    "an answer without end": partial(endless, head(200, None), b" " * 65536),
+    "a head without end": partial(endless, b"HTTP/1.1 200 X\r\n", b"X-A: b\r\n" * 999),
+    "a body that is packed a thousandfold": lambda: [
+        head(200, None, more="Content-Encoding: gzip\r\n"), gzip.compress(b" " * (1 << 29)),
+    ],
+    "a redirect to elsewhere": lambda: [head(307, 0, more="Location: http://127.0.0.1:9/v1/runs\r\n")],
+    "a status that is none": lambda: [head(999, 0)],
+    "a server that hangs": hangs,
+    "a head that comes by letters": drips,
+    "a body that comes by letters": slow,
+}  # fmt: skip
+
+
+def answered(name: str, answer: Answer, stand: Stand) -> Iterator[Row]:
+    """The same answer to whatever is asked."""
+    with hostile() as server:
+        for path in ("/v1/me", "/v1/runs", f"/v1/runs/{RUN}", f"/v1/runs/{RUN}/files", f"/v1/runs/{RUN}/events"):
+            server.answers[path] = answer
+        for words in (["ls"], ["show", RUN], ["get", RUN, "--out", str(stand.root / "copy")]):
+            yield _row(f"{name}: {words[0]}", server.url, words, stand.root / "copy")
+
+
+def files(stand: Stand) -> Iterator[Row]:
+    """A list that says another size, a body that breaks off, a sum that is another one, a name that leads out."""
+    told = {"longer than it is": 9, "shorter than it is": 1}
+    wrong: dict[str, tuple[dict[str, object], Answer]] = {
+        name: ({"path": "a.csv", "size": size}, said(b"12345")) for name, size in told.items()
+    }
+    wrong["cut off"] = ({"path": "a.csv", "size": 5}, lambda: [head(200, 5), b"12"])
+    digest = "Repr-Digest: sha-256=:AAAA:\r\n"
+    wrong["of another sum"] = ({"path": "a.csv", "size": 5}, lambda: [head(200, 5, more=digest), b"12345"])
+    wrong["named out of the folder"] = ({"path": "../a.csv", "size": 5}, said(b"12345"))
+    for name, (line, body) in wrong.items():
+        with hostile() as server:
+            server.answers[f"/v1/runs/{RUN}"] = said(run_info(id=RUN, state="succeeded"))
+            server.answers[f"/v1/runs/{RUN}/files"] = said({"files": [line]})
+            server.answers[f"/v1/runs/{RUN}/files/a.csv"] = body
+            yield _row(
+                f"a file {name}: get", server.url, ["get", RUN, "--out", str(stand.root / "copy")], stand.root / "copy"
+            )
+
+
+def full(stand: Stand) -> Iterator[Row]:
+    """Every command that writes, to a disk on which nothing is left; a file that is there stays as it was."""
+    run = stand.submit()
+    stand.reached(run)
+    assert stand.http is not None
+    url, token = str(stand.http.base_url).rstrip("/"), stand.http.headers["Authorization"].partition(" ")[2]
+    out, kept = stand.runs / "out", stand.runs / "out.toml"
+    kept.write_text("as it was\n")
+    filled(stand)
+    try:
+        commands = (
+            ["get", run, "--out", str(out)], ["schema", "--out", str(kept)], ["schema", "--page", "--out", str(kept)],
+            ["cases", "copy", "demo"], ["batch", "demo", "--out", str(out)],
+            ["run", "demo", "--out", str(out)], ["materials", "--json"],
+        )  # fmt: skip
+        for words in commands:
+            stdout = Path("/dev/full") if words[0] == "materials" else None
+            yield _row(f"a full disk: {' '.join(words[:2])}", url, words, out, token, stdout, stand.runs)
+        verdict = TRUE if kept.read_text() == "as it was\n" else "lie: a file that was there is another one"
+        yield Row("a full disk: a file that was there", "client", "kept", 0.0, verdict)
+    finally:
+        emptied(stand)
+
+
+def _row(
+    name: str, url: str, words: list[str], copy: Path, token: str = "", stdout: Path | None = None,
+    place: Path | None = None,
+) -> Row:  # fmt: skip
+    """One command, in the folder ``place``."""
+    began = time.monotonic()
+    environment = {**os.environ, "CONOID_URL": url, "CONOID_TOKEN": token, "NO_COLOR": "1"}
+    out = stdout.open("w") if stdout else subprocess.PIPE
+    try:
+        done = subprocess.run(
+            [sys.executable, "-m", "conoid.client.cli", *words], stdin=subprocess.DEVNULL, stdout=out,
+            stderr=subprocess.PIPE, text=True, timeout=2 * PATIENCE, env=environment, check=False, cwd=place,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        return Row(name, "client", "hangs", 2 * PATIENCE, "stranded: it has not ended")
+    took, lines = time.monotonic() - began, [line for line in done.stderr.splitlines() if " so far" not in line]
+    left = [path for path in copy.rglob("*") if path.is_file()] if copy.exists() else []
+    return Row(name, "client", f"code {done.returncode}", took, _verdict(done.returncode, lines, left, took))
+
+
+def _verdict(code: int, lines: list[str], left: list[Path], took: float) -> str:
+    if code not in {1, 2}:
+        return f"lie: it ends with {code}"
+    if len(lines) != 1 or not lines[0].startswith("conoid: "):
+        return f"not one line: {lines[-1] if lines else 'nothing'} ({len(lines)} lines)"
+    if [path for path in left if path.suffix == ".part" or ".part" in path.name]:
+        return f"a half is left: {left[0].name}"
+    return TRUE if took <= PATIENCE else f"late: after {took:.0f} s"
