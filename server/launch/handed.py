@@ -11,9 +11,9 @@ from conoid.cases.batch import Job
 from conoid.cases.run import Cause, State
 from conoid.cases.slurm import Entry
 
-from .. import farewell
-from . import Exit, Phase, Reading
+from . import Exit, Phase
 from .clerk import Clerk
+from .ended import exit_of
 
 _LAG = 5.0
 """s after the end of a job in which its last files may still come over a network file system. Chosen."""
@@ -26,15 +26,6 @@ _RELEASES = 3
 not. Chosen."""
 _POLITE, _LONGEST_PAUSE = 2.0, 60.0
 """s after which Slurm is asked again that takes no job now: at first, and at most. Chosen."""
-_READINGS: dict[str, Reading] = {
-    "CANCELLED": (State.CANCELLED, Cause.CANCELLED, "was cancelled"),
-    "TIMEOUT": (State.TIMED_OUT, Cause.WALLTIME, "has reached its time limit"),
-    "DEADLINE": (State.TIMED_OUT, Cause.WALLTIME, "has missed its deadline"),
-    "OUT_OF_MEMORY": (State.FAILED, Cause.MEMORY, "has used more memory than it has"),
-    "BOOT_FAIL": (State.LOST, Cause.NODE, "has lost its node"),
-    "NODE_FAIL": (State.LOST, Cause.NODE, "has lost its node"),
-    "REVOKED": (State.LOST, Cause.NODE, "was revoked"),
-}
 
 
 class SlurmWorker:
@@ -269,19 +260,12 @@ class SlurmWorker:
         if not there and (left or entry.state in {"PREEMPTED", "NODE_FAIL", "BOOT_FAIL"}):
             self._again(f"job {entry.job} ended as {entry.state}")
         else:
-            self._exit = Exit(self._code(), False, self._last_words(), self._reading(entry))
+            self._exit = exit_of(self._folder, self._job, entry)
             self._clerk.note(self, entry.job)
 
     def took(self, found: Mapping[str, str]) -> None:
         """What the accounting database says of its last job. Raises OSError."""
         self.write_down(accounting={**self._job.accounting, **found})
-
-    def _last_words(self) -> str:
-        """Of the ranks; of a task of an array that ended before them, those of its script."""
-        own = farewell.last_words(self._folder)
-        if own or not self._job.array:
-            return own
-        return farewell.last_words(self._folder, Path(self._job.array) / f"{self._job.task}.log")
 
     def _again(self, why: str) -> None:
         """Another job goes on from the checkpoint that is there, unless somebody has asked for the end."""
@@ -294,16 +278,3 @@ class SlurmWorker:
         whole.write(self._folder / layout.JOB, batch.to_json(fresh))
         self._job, self._entry, self._ended, self._missing, self._told = fresh, None, 0.0, 0, ""
         self._released = 0
-
-    def _code(self) -> int | None:
-        """Of the job's script; minus the signal that has ended it; None when nobody knows."""
-        code, _, number = self._job.accounting.get("ExitCode", "").partition(":")
-        if not code.isdigit() or not number.isdigit():
-            return None
-        return -int(number) if int(number) else int(code)
-
-    def _reading(self, entry: Entry) -> Reading | None:
-        if entry.state not in _READINGS:
-            return None
-        state, cause, message = _READINGS[entry.state]
-        return state, cause, f"Slurm job {entry.job} {message}"

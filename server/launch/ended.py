@@ -1,0 +1,48 @@
+"""How a job of Slurm has ended, by its record, the run's folder and what Slurm says of it."""
+
+from pathlib import Path
+
+from conoid.cases.batch import Job
+from conoid.cases.run import Cause, State
+from conoid.cases.slurm import Entry
+
+from .. import farewell
+from . import Exit, Reading
+
+_READINGS: dict[str, Reading] = {
+    "CANCELLED": (State.CANCELLED, Cause.CANCELLED, "was cancelled"),
+    "TIMEOUT": (State.TIMED_OUT, Cause.WALLTIME, "has reached its time limit"),
+    "DEADLINE": (State.TIMED_OUT, Cause.WALLTIME, "has missed its deadline"),
+    "OUT_OF_MEMORY": (State.FAILED, Cause.MEMORY, "has used more memory than it has"),
+    "BOOT_FAIL": (State.LOST, Cause.NODE, "has lost its node"),
+    "NODE_FAIL": (State.LOST, Cause.NODE, "has lost its node"),
+    "REVOKED": (State.LOST, Cause.NODE, "was revoked"),
+}
+
+
+def exit_of(folder: Path, job: Job, entry: Entry) -> Exit:
+    """The end of the job ``entry`` of the run in ``folder``; ``job`` is its record, with what Slurm's accounting says."""
+    return Exit(_code(job), False, _last_words(folder, job), _reading(entry))
+
+
+def _code(job: Job) -> int | None:
+    """Of the job's script; minus the signal that has ended it; None when nobody knows."""
+    code, _, number = job.accounting.get("ExitCode", "").partition(":")
+    if not code.isdigit() or not number.isdigit():
+        return None
+    return -int(number) if int(number) else int(code)
+
+
+def _last_words(folder: Path, job: Job) -> str:
+    """Of the ranks; of a task of an array that ended before them, those of its script."""
+    own = farewell.last_words(folder)
+    if own or not job.array:
+        return own
+    return farewell.last_words(folder, Path(job.array) / f"{job.task}.log")
+
+
+def _reading(entry: Entry) -> Reading | None:
+    if entry.state not in _READINGS:
+        return None
+    state, cause, message = _READINGS[entry.state]
+    return state, cause, f"Slurm job {entry.job} {message}"
