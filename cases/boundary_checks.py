@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from .bodies import Box, Loose, MeshFile, Plate, Tube
 from .drives import clash
 from .geometry import Vector, index, lowest_along
-from .loaded import idle, near
+from .idle import idle
+from .loaded import near
 from .placed import Placed
 from .problems import Location, Problem, problem
 from .region import GENERATED

@@ -148,11 +148,7 @@ def _part(case: Case, part: Part, size: MeshSize | int | None, found: Surveyed |
     made = material(case, part.material)
     slowest = wave_speed(made) * _viscous_factor(case)
     if isinstance(part.mesh, MeshFile):
-        brings = (
-            None
-            if found is None
-            else Bulk(found.mass, found.low, found.high, found.momentum, found.energy, found.speed)
-        )
+        brings = None if found is None else found.bulk
     else:
         brings = bulk(driven(case, part), part.mesh, made.density)
     return PartEstimate(

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from .bodies import Box, Cylinder, Loose, MeshFile, Plate, Sphere, Tube
@@ -10,7 +10,6 @@ from .boundaries import Prescribed, Traction
 from .geometry import Generated, Vector, surface, volume
 from .mesh_size import FACES_PER_SURFACE, grid, mesh_size, surface_faces
 from .placed import Placed, lattice
-from .problems import Problem, problem
 from .region import Region, slack
 from .schema import Case, Part
 from .sheets import sheets
@@ -85,37 +84,8 @@ def _loads(case: Case) -> list[Load]:
     return sorted(found, key=lambda load: load.boundary)
 
 
-def idle(case: Case, number: int) -> Iterator[Problem]:
-    """An error for a boundary in whose box no node, or no face, of structured blocks lies that are not turned."""
-    spec = case.boundaries[number]
-    assert isinstance(spec, Prescribed | Traction)
-    if all(_empty(part, spec) for part in _parts(case, spec)):
-        what = "node" if isinstance(spec, Prescribed) else "face"
-        message = f"no {what} of the bodies that it is for lies in its box; let it reach over the nodes that are meant"
-        yield problem(("boundaries", number), ..., message)
-
-
-def _empty(part: Part, spec: Traction | Prescribed) -> bool:
-    """Whether a boundary is sure to find nothing of a part in its box."""
-    if isinstance(part.mesh, MeshFile):
-        return False
-    body, region = Placed(part.mesh, part.turn), Region.of(spec)
-    planes = _planes(body, region)
-    if planes is None:
-        return False
-    return 0 in planes if isinstance(spec, Prescribed) else _block_faces(body, region) is None
-
-
-def unloaded(case: Case) -> Iterator[Problem]:
-    """A warning for each boundary in whose region no face or node seems to lie."""
-    for load in loads(case):
-        if load.faces == 0 or load.nodes == 0:
-            what = "face" if load.faces == 0 else "node"
-            message = f"no {what} of the bodies that it is for seems to lie in it; where there is none no run starts"
-            yield problem(("boundaries", load.boundary), ..., message)
-
-
-def _parts(case: Case, spec: Traction | Prescribed) -> list[Part]:
+def parts_of(case: Case, spec: Traction | Prescribed) -> list[Part]:
+    """Those that a boundary is for."""
     return [part for part in case.parts if not spec.parts or part.name in spec.parts]
 
 
@@ -137,30 +107,43 @@ def _meets(region: Region, body: Placed) -> bool:
 # Faces ----------------------------------------------------------------------------------------------------------------
 
 
+def _reached(case: Case, spec: Traction | Prescribed) -> list[Placed] | None:
+    """The bodies of a boundary into which its box reaches; None where a mesh file, loose tets or too many bodies do not
+    tell.
+    """
+    region, found = Region.of(spec), list[Placed]()
+    for part in parts_of(case, spec):
+        if isinstance(part.mesh, MeshFile):
+            return None
+        body = Placed(part.mesh, part.turn)
+        if not region.everything:
+            if not _meets(region, body):
+                continue
+            if isinstance(part.mesh, Loose) or len(found) == _MOST:
+                return None
+        found.append(body)
+    return found
+
+
 def _acted_on(case: Case, number: int, spec: Traction) -> Load:
-    region, left = Region.of(spec), _MOST
-    area, faces, spread = 0.0, 0.0, 0.0
-    for part in _parts(case, spec):
-        mesh = part.mesh
-        if isinstance(mesh, MeshFile):
-            return Load(number)
-        body = Placed(mesh, part.turn)
-        if region.everything:
-            area, faces, spread = (
-                area + surface(mesh),
-                faces + surface_faces(mesh),
-                spread + _facets(mesh) * surface(mesh),
-            )
-        elif _meets(region, body):
-            if isinstance(mesh, Loose) or not left:
-                return Load(number)
-            exact = _block_faces(body, region)
-            more, count, rim = (*exact, _FLAT * exact[0]) if exact is not None else _inside(body, region)
-            area, faces, spread, left = area + more, faces + count, spread + rim, left - 1
+    bodies = _reached(case, spec)
+    if bodies is None:
+        return Load(number)
+    found = [_faces(body, Region.of(spec)) for body in bodies]
+    area, faces, spread = (sum(column) for column in zip(*found, strict=True)) if found else (0.0, 0.0, 0.0)
     return Load(number, area, round(faces), spread)
 
 
-def _planes(body: Placed, region: Region) -> list[int] | None:
+def _faces(body: Placed, region: Region) -> tuple[float, float, float]:
+    """Area, m^2, and faces that a region has of a body, and by how much the area may be another."""
+    mesh = body.mesh
+    if region.everything:
+        return surface(mesh), surface_faces(mesh), _facets(mesh) * surface(mesh)
+    exact = block_faces(body, region)
+    return (*exact, _FLAT * exact[0]) if exact is not None else _inside(body, region)
+
+
+def planes_of(body: Placed, region: Region) -> list[int] | None:
     """How many planes of nodes across x, y and z a box holds of a block of cubes that is neither turned nor slit; None
     of other bodies and regions.
     """
@@ -177,9 +160,9 @@ def _planes(body: Placed, region: Region) -> list[int] | None:
     return found
 
 
-def _block_faces(body: Placed, region: Region) -> tuple[float, int] | None:
+def block_faces(body: Placed, region: Region) -> tuple[float, int] | None:
     """Area, m^2, and faces that a box holds of such a block; None of other bodies and regions, and without a face."""
-    planes, mesh, margin = _planes(body, region), body.mesh, near(body)
+    planes, mesh, margin = planes_of(body, region), body.mesh, near(body)
     if planes is None or not isinstance(mesh, Box | Plate) or region.low is None or region.high is None:
         return None
     area, faces, rows = 0.0, 0, grid(mesh)
@@ -244,26 +227,21 @@ def _quad(a: Vector, b: Vector, c: Vector, d: Vector) -> float:
 
 
 def _held(case: Case, number: int, spec: Prescribed) -> Load:
-    region, left = Region.of(spec), _MOST
-    nodes, fewest, exact = 0, 0, True
-    for part in _parts(case, spec):
-        mesh = part.mesh
-        if isinstance(mesh, MeshFile):
-            return Load(number)
-        body = Placed(mesh, part.turn)
-        if region.everything:
-            few = many = mesh_size(mesh).nodes
-            exact = exact and _counted(mesh)
-        elif not _meets(region, body):
-            continue
-        elif isinstance(mesh, Loose) or not left:
-            return Load(number)
-        else:
-            count, left = _grid_nodes(body, region), left - 1
-            few, many = (count, count) if count is not None else _between(body, region)
-            exact = exact and count is not None
-        nodes, fewest = nodes + many, fewest + few
-    return Load(number, nodes=nodes, fewest=fewest, exact=exact)
+    bodies = _reached(case, spec)
+    if bodies is None:
+        return Load(number)
+    found = [_nodes(body, Region.of(spec)) for body in bodies]
+    fewest, nodes = (sum(each[k] for each in found) for k in (0, 1))
+    return Load(number, nodes=nodes, fewest=fewest, exact=all(exact for _, _, exact in found))
+
+
+def _nodes(body: Placed, region: Region) -> tuple[int, int, bool]:
+    """How many nodes a region has of a body, at least and at most, and whether they are counted."""
+    if region.everything:
+        every = mesh_size(body.mesh).nodes
+        return every, every, _counted(body.mesh)
+    count = _grid_nodes(body, region)
+    return (count, count, True) if count is not None else (*_between(body, region), False)
 
 
 def _counted(mesh: Generated) -> bool:
@@ -273,7 +251,7 @@ def _counted(mesh: Generated) -> bool:
 
 def _grid_nodes(body: Placed, region: Region) -> int | None:
     """The nodes of a block of cubes in a box; None for other meshes, and for turned ones of many nodes."""
-    if (planes := _planes(body, region)) is not None:
+    if (planes := planes_of(body, region)) is not None:
         return math.prod(planes)
     mesh, margin = body.mesh, near(body)
     if not isinstance(mesh, Box | Plate) or not _regular(mesh) or mesh.slit is not None:

@@ -14,9 +14,9 @@ from .compression import crushed
 from .damping import damped
 from .driven import passing
 from .estimate import Estimate
+from .idle import unloaded
 from .impact import impact_speeds, wave_speed
 from .library import material
-from .loaded import unloaded
 from .materials import Material
 from .overlap import grazes
 from .problems import Location, Problem, problem

@@ -7,6 +7,7 @@ import msgspec
 
 from .geometry import Vector
 from .loaded import Load
+from .placed import Bulk
 from .touching import Touch
 
 
@@ -41,6 +42,11 @@ class Surveyed(msgspec.Struct, kw_only=True, frozen=True):
     """The largest of a node."""
     notes: list[str]
     """What of the file is not in the mesh, or is taken otherwise than one might think."""
+
+    @property
+    def bulk(self) -> Bulk:
+        """What it brings along, as of a part that is generated."""
+        return Bulk(self.mass, self.low, self.high, self.momentum, self.energy, self.speed)
 
 
 class Survey(msgspec.Struct, kw_only=True, frozen=True):

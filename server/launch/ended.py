@@ -21,7 +21,7 @@ _READINGS: dict[str, Reading] = {
 
 
 def exit_of(folder: Path, job: Job, entry: Entry) -> Exit:
-    """The end of the job ``entry`` of the run in ``folder``; ``job`` is its record, with what Slurm's accounting says."""
+    """The end of the job ``entry`` of the run in ``folder``; ``job``: its record, with what the accounting says."""
     return Exit(_code(job), False, _last_words(folder, job), _reading(entry))
 
 

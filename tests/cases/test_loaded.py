@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from conoid.cases.idle import unloaded
 from conoid.cases.load import CaseError, parse_case
-from conoid.cases.loaded import loads, unloaded
+from conoid.cases.loaded import loads
 from conoid.cases.region import Region
 from conoid.cases.schema import Case
 from conoid.worker.mesh.faces import boundary_faces, normals
