@@ -21,8 +21,8 @@ from conoid.cases.run import State
 from .console import echo, echo_json
 from .errors import ClientError
 from .examination import examine
+from .folders import LocalFolder
 from .options import CaseArgument, Json, Overrides, aloud, warn
-from .result import LocalFolder
 from .submission import data_of, locate
 
 _CASE = "case.json"

@@ -13,6 +13,7 @@ from . import local_run, tables
 from .batch import cancel_folder, slurm_of
 from .console import echo, echo_json
 from .errors import UnfinishedError, UsageError
+from .folders import LocalFolder
 from .following import FolderRun
 from .live import Live, exit_code
 from .options import (
@@ -33,7 +34,6 @@ from .options import (
     show_lines,
     warn_of,
 )
-from .result import LocalFolder
 from .run import Run
 from .session import connect
 from .told import FileInfo, RunInfo

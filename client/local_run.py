@@ -11,9 +11,10 @@ from conoid.cases import layout, slurm, whole
 from conoid.cases.run import Cause, State
 
 from .errors import ClientError, UnfinishedError
+from .folders import LocalFolder
 from .live import Live
 from .places import inside
-from .result import LocalFolder, Result
+from .result import Result
 from .saving import whole as whole_file
 from .told import FileInfo, RunInfo
 

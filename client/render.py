@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -19,19 +19,11 @@ from conoid.cases.figures import exacts, number
 
 from . import camera, scales, sheet
 from .camera import Camera
+from .captions import INK, PAPER, Scale, add_side, add_title
 from .errors import LookError, ViewError
 from .frame import require_whole
 from .pictures import FIELDS, Drawn, Field, Mirror, Picture, Wall, reason
 from .sheet import Sheet
-
-_INK, _PAPER = "#1d2733", "#ffffff"
-_BAR = {
-    "vertical": True, "position_x": 0.05, "position_y": 0.2, "width": 0.30, "height": 0.6, "title": "",
-    "color": _INK, "font_family": "arial", "fmt": " %.4g",
-}  # fmt: skip
-
-Scale: TypeAlias = tuple[float, float, int] | None
-"""Ends of the colour bar and its labels; None where colours are names."""
 
 
 @dataclass(frozen=True)
@@ -190,10 +182,10 @@ def _image(shots: Sequence[Shot], picture: Picture, scale: Scale, every: Sequenc
         _set_camera(plotter, laid.eye)
         _add_marks(plotter, laid, place, [shot.time for shot in shots], picture)
     if title:
-        _add_title(plotter, title, picture)
+        add_title(plotter, title, picture)
     if laid.side:
         plotter.subplot(*laid.beside)
-        _add_side(plotter, picture, scale, drawn, [shot.surface["shown"] for shot in every])
+        add_side(plotter, picture, scale, drawn, [shot.surface["shown"] for shot in every])
     return _pixels(plotter, picture.look.transparent)
 
 
@@ -204,7 +196,7 @@ def _plotter(laid: Sheet, picture: Picture) -> Any:
     plotter: Any = pv.Plotter(
         off_screen=True, window_size=list(picture.look.size), lighting="none", border=False, **grid
     )
-    plotter.set_background(_PAPER, all_renderers=True)
+    plotter.set_background(PAPER, all_renderers=True)
     plotter.enable_anti_aliasing("ssaa", all_renderers=True)
     return plotter
 
@@ -223,7 +215,7 @@ def _add_body(plotter: Any, surface: Any, field: Field, picture: Picture, scale:
     look = {
         "scalars": "shown", "smooth_shading": not raw, "split_sharp_edges": not raw, "feature_angle": 35.0,
         "ambient": 0.38, "diffuse": 0.85, "specular": 0.10, "specular_power": 20.0, "show_scalar_bar": False,
-        "show_edges": picture.look.edges, "edge_color": _INK, "edge_opacity": 0.25,
+        "show_edges": picture.look.edges, "edge_color": INK, "edge_opacity": 0.25,
     }  # fmt: skip
     if scale is None:
         paint = scales.class_colours if field.kind == "classes" else scales.fragment_colours
@@ -255,10 +247,10 @@ def _add_marks(plotter: Any, laid: Sheet, place: int, times: Sequence[float | No
     size, last, whens = sheet.font(14, picture.look.size[1]), len(times) - 1, sheet.when(times)
     if last:
         top = 1.0 - 40.0 / laid.height
-        plotter.add_text(whens[place], position=(0.03, top), viewport=True, font_size=size, color=_INK)
+        plotter.add_text(whens[place], position=(0.03, top), viewport=True, font_size=size, color=INK)
     if place == last - last % laid.columns:
         share = min(0.16 * picture.look.size[1] / laid.height, 0.3)
-        plotter.add_axes(color=_INK, line_width=3, viewport=(0.0, 0.0, share / max(laid.aspect, 1.0), share))
+        plotter.add_axes(color=INK, line_width=3, viewport=(0.0, 0.0, share / max(laid.aspect, 1.0), share))
     if place == last and picture.look.scale:
         _add_scale(plotter, laid, size)
 
@@ -270,34 +262,10 @@ def _add_scale(plotter: Any, laid: Sheet, size: int) -> None:
     corner = 0.95 * aspect * eye.half * eye.right - 0.95 * eye.half * eye.above
     end = eye.centre + corner + 50.0 * eye.half * eye.towards
     line = pv.Line(end - length * eye.right, end)
-    plotter.add_mesh(line, color=_INK, line_width=max(2, size // 3), lighting=False, reset_camera=False)
+    plotter.add_mesh(line, color=INK, line_width=max(2, size // 3), lighting=False, reset_camera=False)
     plotter.renderer.ResetCameraClippingRange()
     start = 0.5 + 0.5 * (0.95 - length / (aspect * eye.half))
-    plotter.add_text(text, position=(start, 0.035), viewport=True, font_size=size, color=_INK)
-
-
-def _add_title(plotter: Any, title: str, picture: Picture) -> None:
-    plotter.subplot(0, 0)
-    width, height = picture.look.size
-    size = min(sheet.font(15, height), max(6, round(1.05 * width / len(title))))
-    plotter.add_text(title, position=(0.02, 0.3), viewport=True, font_size=size, color=_INK)
-
-
-def _add_side(plotter: Any, picture: Picture, scale: Scale, drawn: Any, values: Sequence[Any]) -> None:
-    """The colour bar with the extremes of the values, or the legend."""
-    height, field = picture.look.size[1], FIELDS[picture.field]
-    if scale is None:
-        names = sheet.legend(values, picture)
-        size = (0.85, 0.035 * len(names) + 0.01)
-        plotter.add_legend(names, face="rectangle", bcolor=None, border=False, loc="upper left", size=size)
-        return
-    plotter.add_scalar_bar(**_BAR, n_labels=scale[2], label_font_size=sheet.font(26, height), mapper=drawn.mapper)
-    name = f"{field.label}\n{field.unit}" if field.unit else field.label
-    plotter.add_text(name, position=(0.02, 0.85), viewport=True, font_size=sheet.font(13, height), color=_INK)
-    low, high = min(float(np.min(each)) for each in values), max(float(np.max(each)) for each in values)
-    if low < scale[0] or high > scale[1]:
-        text = "values from {}\nto {}".format(*exacts((low, high), "", 4))
-        plotter.add_text(text, position=(0.02, 0.11), viewport=True, font_size=sheet.font(9, height), color=_INK)
+    plotter.add_text(text, position=(start, 0.035), viewport=True, font_size=size, color=INK)
 
 
 def _add_wall(plotter: Any, surface: Any, wall: Wall) -> None:
