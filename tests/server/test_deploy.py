@@ -18,7 +18,7 @@ import pytest
 
 from conoid.cases.run import State
 
-from .running import MakeProcess
+from .running import MakeProcess, User
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 NGINX = shutil.which("nginx", path=f"{os.environ.get('PATH', '')}:/usr/sbin:/sbin")
@@ -101,17 +101,35 @@ def visitor(place: Path, port: int, token: str) -> httpx2.Client:
     return httpx2.Client(base_url=f"https://127.0.0.1:{port}", verify=trust, headers=headers, timeout=20.0)
 
 
-@WITH_NGINX
-def test_events_pass_through_nginx_when_they_happen(process: MakeProcess, tmp_path: Path) -> None:
+def running(process: MakeProcess, place: Path) -> tuple[User, str]:
+    """A user of a new server and a run that waits for the file "go"."""
     server = process("--no-zenoh")
     ann = server.user(server.start()["url"])
-    run = ann.submit(wait=str(tmp_path / "go"))
+    run = ann.submit(wait=str(place / "go"))
     ann.wait_for(run, State.RUNNING)
+    return ann, run
+
+
+@contextmanager
+def behind(ann: User, place: Path) -> Iterator[httpx2.Client]:
+    """The same user, who comes through nginx."""
     port = ann.http.base_url.port
     assert port is not None
+    with proxy(place, port) as outside, visitor(place, outside, ann.http.headers["authorization"]) as far:
+        yield far
+
+
+def backup(*words: Path) -> "subprocess.CompletedProcess[bytes]":
+    """The shipped script, with this Python."""
+    command = [str(DEPLOY / "backup.sh"), *map(str, words)]
+    return subprocess.run(command, check=False, capture_output=True, env={**os.environ, "PYTHON": sys.executable})
+
+
+@WITH_NGINX
+def test_events_pass_through_nginx_when_they_happen(process: MakeProcess, tmp_path: Path) -> None:
+    ann, run = running(process, tmp_path)
     with (
-        proxy(tmp_path, port) as outside,
-        visitor(tmp_path, outside, ann.http.headers["authorization"]) as far,
+        behind(ann, tmp_path) as far,
         far.stream("GET", f"/v1/runs/{run}/stream") as stream,
     ):
         assert stream.headers["content-type"].startswith("text/event-stream")
@@ -132,15 +150,9 @@ def test_events_pass_through_nginx_when_they_happen(process: MakeProcess, tmp_pa
 @pytest.mark.timeout(300)
 def test_a_silent_log_passes_through_nginx(process: MakeProcess, tmp_path: Path) -> None:
     """Which cuts an answer of which it gets nothing for 90 s."""
-    server = process("--no-zenoh")
-    ann = server.user(server.start()["url"])
-    run = ann.submit(wait=str(tmp_path / "go"))
-    ann.wait_for(run, State.RUNNING)
-    port = ann.http.base_url.port
-    assert port is not None
+    ann, run = running(process, tmp_path)
     with (
-        proxy(tmp_path, port) as outside,
-        visitor(tmp_path, outside, ann.http.headers["authorization"]) as far,
+        behind(ann, tmp_path) as far,
         far.stream("GET", f"/v1/runs/{run}/logs/0", params={"follow": True}) as log,
     ):
         threading.Timer(100.0, (tmp_path / "go").touch).start()
@@ -155,8 +167,7 @@ def test_a_backup_taken_beside_the_server_brings_tokens_and_runs_back(process: M
     run = ann.submit()
     ann.wait_for(run)
     database, kept = server.runs / "server.sqlite", tmp_path / "kept.sqlite"
-    command = [str(DEPLOY / "backup.sh"), str(database), str(kept)]
-    subprocess.run(command, check=True, env={**os.environ, "PYTHON": sys.executable})
+    assert backup(database, kept).returncode == 0
     assert kept.stat().st_mode & 0o077 == 0
     later = ann.submit()
     ann.wait_for(later)
@@ -173,7 +184,5 @@ def test_a_backup_taken_beside_the_server_brings_tokens_and_runs_back(process: M
 def test_a_backup_that_fails_leaves_the_last_one(tmp_path: Path) -> None:
     kept = tmp_path / "kept.sqlite"
     kept.write_bytes(b"the last one")
-    command = [str(DEPLOY / "backup.sh"), str(tmp_path / "nothing.sqlite"), str(kept)]
-    done = subprocess.run(command, check=False, capture_output=True, env={**os.environ, "PYTHON": sys.executable})
-    assert done.returncode != 0
+    assert backup(tmp_path / "nothing.sqlite", kept).returncode != 0
     assert kept.read_bytes() == b"the last one"
