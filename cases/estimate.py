@@ -62,6 +62,8 @@ FILE_BYTES = {".msh": 42, ".inp": 48}
 DEEPEST, DEEPEST_ERODING = 12.0, 4.0
 """The mean time step of a crushed body is never taken to be smaller than the initial one over this: the flattest tets
 of a part that erodes leave."""
+FOOT, SLENDER = 0.9, 4.5
+"""See shrinkage."""
 
 
 @dataclass(frozen=True)
@@ -167,8 +169,11 @@ def shrinkage(case: Case, part: Part, speed: float) -> float:
     """Initial over mean time step of a part that is met at a ``speed``, m/s: impact flattens the tets, and compression
     makes waves faster.
 
-    Free to flow, a metal that stops from the speed v takes the strain density v^2 / (2 yield stress); the mean step
-    falls as exp(4 strain), which fits Taylor bars of copper and steel. Held on all sides, it is compressed by a shock.
+    Free to flow, a metal that stops from the speed v takes the strain density v^2 / (2 yield stress) in the mean, and
+    its foot, which is about as long as wide, what the whole length takes: the mean step falls as exp(k strain) with
+    k = 0.9 length / width, at most 4 (``slenderness``). Measured: square bars that are 1, 2 and 4 times as long as wide
+    have k up to 0.9, 1.8 and 2.8, less where they harden much (``python -m tests.bench.flattening``), Taylor bars of
+    copper and steel 4. Held on all sides, it is compressed by a shock.
     """
     made = material(case, part.material)
     deepest = DEEPEST if part.erosion is None else DEEPEST_ERODING
@@ -178,7 +183,22 @@ def shrinkage(case: Case, part: Part, speed: float) -> float:
         return min(deepest, faster / (1.0 - min(speed / shock, 0.9)))
     if made.strength is None:
         return 1.0
-    return min(deepest, math.exp(min(4.0 * made.density * speed**2 / (2.0 * made.strength.flow_stress()), 10.0)))
+    strain = made.density * speed**2 / (2.0 * made.strength.flow_stress())
+    return min(deepest, math.exp(min(FOOT * slenderness(case) * strain, 10.0)))
+
+
+def slenderness(case: Case) -> float:
+    """The largest length over width of the parts, 1 to SLENDER: the longest extent over the mean of the other two. What
+    is slender strains what it meets, too. SLENDER where a part is a mesh file.
+    """
+    most = 1.0
+    for part in case.parts:
+        body = None if isinstance(part.mesh, MeshFile) else bounds(part.mesh)
+        if body is None:
+            return SLENDER
+        wide, broad, length = sorted(high - low for low, high in zip(*body, strict=True))
+        most = max(most, length / math.sqrt(wide * broad))
+    return min(most, SLENDER)
 
 
 def _confined(case: Case, part: Part) -> bool:

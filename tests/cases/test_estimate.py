@@ -14,17 +14,22 @@ from conoid.cases.estimate import (
     BROKEN_NANOSECONDS,
     PRESSED_NANOSECONDS,
     RANK_BYTES,
+    SLENDER,
     START,
     broken_share,
     estimate,
+    shrinkage,
+    slenderness,
 )
 from conoid.cases.geometry import Generated, surface, volume
+from conoid.cases.impact import impact_speeds
 from conoid.cases.load import apply_overrides, parse_case, read_case, read_data, shipped, shipped_path, toml_data
 from conoid.cases.mesh_size import mesh_size, size_at
 from conoid.cases.suite import Hard, suite
 from conoid.worker.mesh.build import build
 from conoid.worker.mesh.structured import structured
 
+from ..bench import flattening
 from ..mesh.quality import quality
 from .scenes import rod
 
@@ -274,3 +279,29 @@ def test_a_mesh_file_tells_its_tets_by_its_size_only(tmp_path: Path) -> None:
 
 def test_max_steps_bounds_the_estimate() -> None:
     assert estimate(parse_case(rod("run.max_steps=3"))).steps == 3
+
+
+FLATTENED = {
+    (150e6, 1, 100.0): 1.15, (150e6, 1, 300.0): 2.79, (800e6, 1, 400.0): 2.15, (150e6, 2, 200.0): 2.95,
+    (800e6, 2, 200.0): 1.44, (800e6, 2, 400.0): 4.68, (150e6, 4, 300.0): 9.01, (800e6, 4, 400.0): 8.59,
+}  # fmt: skip
+"""Yield stress, length over width, speed: by what the mean step fell (``python -m tests.bench.flattening``)."""
+
+
+@pytest.mark.parametrize(("bar", "measured"), FLATTENED.items())
+def test_bars_that_flatten_take_no_more_steps_than_expected(bar: tuple[float, int, float], measured: float) -> None:
+    """And more than 3 in 8 of what is expected: they may harden."""
+    case = parse_case(flattening.data_of(*bar))
+    (speed,) = impact_speeds(case)
+    assert 0.99 < shrinkage(case, case.parts[0], speed) / measured < 2.7
+
+
+def test_what_is_slender_strains_what_it_meets() -> None:
+    cube, bar = (flattening.data_of(150e6, length, 100.0)["parts"][0] for length in (1, 3))
+    data = flattening.data_of(150e6, 1, 100.0)
+    assert slenderness(parse_case(data)) == pytest.approx(1.0)
+    bar["mesh"] |= {"low": [0.0, 0.0, 0.1], "high": [0.003, 0.003, 0.109]}
+    data["parts"] = [cube, bar | {"name": "other"}]
+    assert slenderness(parse_case(data)) == pytest.approx(3.0)
+    data["parts"][1]["mesh"] = {"shape": "file", "path": "body.msh", "unit": "1 mm"}
+    assert slenderness(parse_case(data)) == SLENDER
