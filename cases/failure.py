@@ -23,9 +23,11 @@ class Erosion(Model):
     """Smallest and largest volume, of the initial one."""
     time_step: Annotated[Ratio, Field(gt=0, lt=1)] = 0.02
     """Smallest stable step of a tet, of the first step of the run."""
-    nodes: Literal["particles", "remove"] = "particles"
-    """What becomes of a node without tets: it flies on with its mass and meets faces, or it leaves with its mass,
-    momentum and energy, which are booked."""
+    nodes: Literal["strike", "particles", "remove"] = "strike"
+    """What becomes of a node without tets, a particle with its mass and no volume. ``strike``: it flies on and leaves
+    after contact with a face has pushed it. ``particles``: it flies on for ever; many of them gather on a line and dig
+    a hole there that matter with a volume would not dig. ``remove``: it leaves at once. Mass, momentum and energy of
+    what leaves are booked."""
 
 
 class Fracture(Model):

@@ -3,7 +3,8 @@
 A tet is marked in the pass over the elements (elements/wear.py), with its force at n+1 already in the nodal sums. It
 leaves before the contact of the next step, so that what it covered meets other bodies in that very step. Its last force
 acts through one more kick: the second half of that work is booked a step later, as for a boundary. Tets that have only
-strained enough are gathered for a few steps, because every removal calls for new mean normals.
+strained enough are gathered for a few steps, because every removal calls for new mean normals. So are nodes without
+tets that contact has pushed, where their part wants them to leave then.
 """
 
 import numpy as np
@@ -14,7 +15,7 @@ from .boundaries import Boundary
 from .clock import Clock
 from .contact import bare
 from .contact.stage import Contact
-from .elements.wear import BROKEN, DAMAGED, FREQUENCY, SOUND, life
+from .elements.wear import BROKEN, DAMAGED, FREQUENCY, SOUND, TIRED, life
 from .materials.equation_of_state import GRUNEISEN
 from .materials.models import EQUATIONS
 from .mesh.faces import FACES
@@ -67,8 +68,10 @@ class Erosion:
         self._bounds = bounds
         self._comm, self._clock = comm, clock
         self._specs = [part.erosion for part in case.parts]
-        leaves = np.array([spec is not None and spec.nodes == "remove" for spec in self._specs])
-        self._leaves = leaves[model.nodes.part]
+        self._leaves, self._strikes = (
+            np.array([spec is not None and spec.nodes == kind for spec in self._specs])[model.nodes.part]
+            for kind in ("remove", "strike")
+        )
         self.removed = np.zeros(model.nodes.n, bool)
         """(nodes,) which have left; they stand still where they were."""
         self._tets_at = self._completed([block.tets.astype(np.int64) for block in model.blocks])
@@ -103,6 +106,7 @@ class Erosion:
         parents = split.copies.parents
         self.removed = extended(self.removed, self.removed[parents])
         self._leaves = extended(self._leaves, self._leaves[parents])
+        self._strikes = extended(self._strikes, self._strikes[parents])
         self._tets_at = extended(self._tets_at, np.ones(len(parents), np.int64))
 
     def keep(self, parcel: Parcel) -> None:
@@ -112,6 +116,7 @@ class Erosion:
         for key, words in (("work", self.work.words), ("nodal", self.nodal.words), ("half", self._half)):
             parcel.sums[f"erosion.{key}"] = words
         parcel.nodes["erosion.removed"], parcel.nodes["erosion.tets_at"] = self.removed, self._tets_at
+        parcel.nodes["erosion.leaves"] = self._leaves
         alone = np.flatnonzero((self._tets_at == 0) & nodes.owned)
         parcel.rows["erosion.alone"] = {"at": nodes.x[alone], "with": ids[alone][:, None]}
         tets = np.concatenate([np.zeros((0, 4), np.int64), *(tets for tets, _ in self._last)])
@@ -126,9 +131,19 @@ class Erosion:
             parcel.sums[f"erosion.{key}"].copy() for key in ("work", "nodal", "half")
         )
         self.removed, self._tets_at = parcel.nodes["erosion.removed"], parcel.nodes["erosion.tets_at"]
+        self._leaves = parcel.nodes["erosion.leaves"]
         last = parcel.rows["erosion.last"]
         self._last = [(np.searchsorted(parcel.nodes["id"], last["with"]), last["force"])]
         self._release()
+
+    def strikes(self) -> int:
+        """After contact: nodes without tets that it has pushed in this step will leave, where their part wants that.
+        TIRED (elements/wear.py) if this rank has nodes that will leave, else SOUND.
+        """
+        if self._contact is not None:
+            flying = np.flatnonzero(self._strikes & self._loose)
+            self._leaves[flying[self._contact.searches.pushed(flying)]] = True
+        return TIRED if (self._leaves & self._loose).any() else SOUND
 
     def decide(self, found: int) -> None:
         """``found`` of all ranks (elements/wear.py): whether there is something to remove now."""

@@ -144,6 +144,8 @@ def _elements(sim: Simulation, dt: float, fracture: Fracture | None) -> None:
             own.breaking = fracture.find(own.touched)
     with sim.timers.phase("exchange"):
         own.limit, own.force, own.worn = elements.limit, elements.force, elements.worn
+        if sim.erosion is not None:
+            own.worn = max(own.worn, sim.erosion.strikes())
         own.nodes = sim.model.nodes_global
         pending = reduction.begin(sim.comm)
         if fracture is None:

@@ -106,7 +106,7 @@ def test_the_rod_is_sound() -> None:
         (["parts[0].erosion={volume=0.1}"], "parts[0].erosion.volume", "expected a list of 2"),
         (["parts[0].erosion={time_step=1}"], "parts[0].erosion.time_step", "less than 1"),
         (["parts[0].erosion={time_step=0}"], "parts[0].erosion.time_step", "greater than 0"),
-        (["parts[0].erosion={nodes='keep'}"], "parts[0].erosion.nodes", "'particles' or 'remove'"),
+        (["parts[0].erosion={nodes='keep'}"], "parts[0].erosion.nodes", "'strike', 'particles' or 'remove'"),
         (["parts[0].material=steel_42crmo4", "parts[0].erosion={damage=1}"], "parts[0].erosion.damage",
          "allowed with johnson_holmquist, and with johnson_cook with a table damage"),
         (["parts[0].erosion={damage=1}"], "parts[0].erosion.damage", "steel counts no damage"),

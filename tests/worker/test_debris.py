@@ -21,10 +21,12 @@ SPEED = 300.0
 EROSION = schema.Erosion()
 
 
-def fallen(contact: dict[str, Any], until: float = 7e-6) -> tuple[Simulation, int]:
+def fallen(
+    contact: dict[str, Any], until: float = 7e-6, erosion: schema.Erosion = EROSION
+) -> tuple[Simulation, int]:  # fmt: skip
     """A block of 4 x 4 x 4 mm whose upper middle node has lost its tets and flies down and aside, and that node."""
     beside = moved(block((1, 1, 1), MM), (9 * MM, 0.0, 0.0))
-    case = meeting_of([{"erosion": EROSION}, {}], contact, material=STEEL)
+    case = meeting_of([{"erosion": erosion}, {}], contact, material=STEEL)
     sim = build(case, [block((4, 4, 4), MM, shake=0.0), beside])
     nodes, part = sim.model.nodes, sim.model.blocks[0]
     node = int(np.abs(nodes.x0 - np.array([2.0, 2.0, 4.0]) * MM).sum(axis=1).argmin())
@@ -44,6 +46,28 @@ def test_a_node_without_tets_stays_outside_of_the_part_that_it_comes_from() -> N
     assert sim.model.nodes.v[node, 2] > -0.1 * SPEED
     found = look(sim.contact, sim.model, None, SerialComm())
     assert (found.nodes, found.own) == (0, 0)
+
+
+@pytest.mark.parametrize(
+    ("nodes", "until", "leaves"),
+    [("strike", 2e-6, False), ("strike", 7e-6, True), ("particles", 7e-6, False)],
+    ids=["in flight", "after it has struck", "for ever"],
+)
+def test_a_node_without_tets_leaves_after_it_has_struck(nodes: Any, until: float, leaves: bool) -> None:
+    """The slope that it strikes has most of its momentum; what it leaves with, along the slope, is in the ledger."""
+    sim, node = fallen({}, until, schema.Erosion(nodes=nodes))
+    state, erosion = sim.model.nodes, sim.erosion
+    assert erosion is not None
+    momentum = sim.ledger.momentum.copy()
+    brought = np.abs(state.mass[node] * SPEED)
+    assert erosion.removed.sum() == leaves
+    assert erosion.removed[node] == leaves
+    assert sim.ledger.eroded_mass == pytest.approx(state.mass[node] if leaves else 0.0)
+    if leaves:
+        assert not state.v[node].any()
+        assert (state.mass * state.v[:, 2]).sum() < -0.6 * brought
+    tick(sim)
+    assert np.abs(sim.ledger.momentum - momentum).max() < 1e-9 * brought
 
 
 def test_without_self_contact_it_passes_and_is_counted() -> None:

@@ -19,7 +19,7 @@ from .meshes import Floats, block
 from .simulations import kept_again, on, tick
 
 MM = 1e-3
-EROSION = schema.Erosion()
+EROSION = schema.Erosion(nodes="particles")
 PLANES: tuple[Any, ...] = ({"kind": "symmetry", "axis": "x"}, {"kind": "symmetry", "axis": "y"})
 
 

@@ -11,7 +11,7 @@ from ..clock import Clock
 from ..migration.parcel import Parcel
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
-from ..state import Floats, Ints, Model, Nodes
+from ..state import Flags, Floats, Ints, Model, Nodes
 from ..topology import Split
 from . import layout, normals, pairing, registration
 from .course import courses
@@ -169,6 +169,13 @@ class Searches:
         follower.follow(heard, self._exterior.cracks, self._model.blocks, self._neighbours)
         if self._comm.size > 1:
             follower.share(heard, self._neighbours)
+
+    def pushed(self, nodes: Ints) -> Flags:
+        """(k,) which of these ``nodes`` (k,) of this rank contact has pushed in the last step."""
+        if (now := self.scene) is None:
+            return np.zeros(len(nodes), bool)
+        places = now.own.place[nodes]
+        return np.asarray((places >= 0) & now.slots.total[places].any(axis=1))
 
     def free(self) -> None:
         """Gives the messages back to MPI."""
