@@ -122,6 +122,7 @@ VARIANTS = (
     Variant("block at strain 1.5", eroding((1,), plastic_strain=1.5)),
     Variant("1 mm, strain 1.5", (*meshed(1.0), *eroding(_BOTH, plastic_strain=1.5))),
     Variant("nodes removed", eroding(_BOTH, plastic_strain=2.0, nodes='"remove"')),
+    Variant("particles for ever", eroding(_BOTH, plastic_strain=2.0, nodes='"particles"')),
     Variant("rod wha", ("parts[0].material=wha",)),
     Variant("rod 20 % stronger", (), scaled("tungsten_alloy", 1.2)),
     Variant("block 20 % weaker", (), scaled("steel_4340", 0.8)),

@@ -59,6 +59,12 @@ def meshed(size: float, **grading: float) -> tuple[str, ...]:
     return *sizes, *(f"parts[{k}].mesh.grading.{key}={v:g} mm" for k in PARTS[1:] for key, v in grading.items())
 
 
+def sector(name: str, *planes: str) -> tuple[str, ...]:
+    """Another sector of every part, and symmetry at the planes across these axes."""
+    bounds = ", ".join(f'{{kind="symmetry", axis="{axis}"}}' for axis in planes)
+    return *(f"parts[{k}].mesh.sector={name}" for k in PARTS), f"boundaries=[{bounds}]"
+
+
 COARSE = meshed(1.4)
 SPEEDS = tuple(
     Variant(speed, (f"parts[0].velocity=['0 m/s', '0 m/s', '{speed}']", "run.end_time=180 us")) for speed in BANDS
@@ -66,6 +72,8 @@ SPEEDS = tuple(
 MESHES = (
     Variant("2 mm", meshed(2.0)), Variant("1.4 mm", COARSE), Variant("1 mm"), Variant("0.7 mm", meshed(0.7)),
     Variant("1 mm, fine out to 8 mm", meshed(1.0, near=8.0)),
+    Variant("2 mm, half", (*meshed(2.0), *sector("half", "x"))),
+    Variant("2 mm, whole", (*meshed(2.0), *sector("full"))),
 )  # fmt: skip
 OTHERS = (
     Variant("erosion at 1.5", (*COARSE, *eroding("plastic_strain", 1.5))),
@@ -73,6 +81,7 @@ OTHERS = (
     Variant("erosion at 4", (*COARSE, *eroding("plastic_strain", 4.0))),
     Variant("time step of erosion 0.1", (*COARSE, *eroding("time_step", 0.1))),
     Variant("nodes removed", (*COARSE, *eroding("nodes", '"remove"'))),
+    Variant("particles for ever", (*COARSE, *eroding("nodes", '"particles"'))),
     Variant("pressure standard", (*COARSE, 'numerics.pressure="standard"')),
     Variant("pressure split", (*COARSE, 'numerics.pressure="split"')),
     Variant("friction 0.1", (*COARSE, "contact.friction=0.1")),
