@@ -16,7 +16,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from .boundaries import Wall
-from .figures import si
+from .figures import counted, si
 from .impact import apart, velocities, wave_speed
 from .library import library, material
 from .materials import Material
@@ -90,8 +90,8 @@ def borne(found: Sequence[Compressed]) -> list[str]:
     return [
         f"{each.part} has met a compression of {si(each.most, 'Pa')}, with {si(each.least, 'Pa')} across it, "
         f"{each.times:.2g} times what cracks matter of its tensile strength (Griffith 1924), in tet {each.tet} at "
-        f"({each.x:.4g}, {each.y:.4g}, {each.z:.4g}) m, at {each.time:.4g} s; no law of its material fails in "
-        f"compression, and it has borne it: {_cure()}"
+        f"({each.x:.4g}, {each.y:.4g}, {each.z:.4g}) m, at {each.time:.4g} s; at most {counted(each.tets, 'tet')} were "
+        f"beyond that at once. No law of its material fails in compression, and it has borne it: {_cure()}"
         for each in found
         if each.times > 1.0
     ]

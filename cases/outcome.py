@@ -38,7 +38,10 @@ class Compressed(msgspec.Struct, kw_only=True, frozen=True):
     """The largest pressure on any plane, Pa; tension is below zero."""
     least: float
     """The smallest, Pa."""
+    tets: int
+    """The most tets of the part that were beyond the criterion at once, of all lines of the history."""
     tet: int
+    """The one with the hardest."""
     x: float
     """The place at that time, m."""
     y: float

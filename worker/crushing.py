@@ -87,6 +87,18 @@ def hardest(state, ids, n, strength, known):  # type: ignore[no-untyped-def]
     return place, best
 
 
+@njit("int64(float64[:, :, ::1], int64, float64)", cache=True, error_model="numpy")
+def crushed(state, n, strength):  # type: ignore[no-untyped-def]
+    """How many of the ``n`` tets are beyond the criterion."""
+    found = 0
+    for c in range((n + CHUNK - 1) // CHUNK):
+        s = state[c].reshape(-1)
+        for i in range(min(CHUNK, n - c * CHUNK)):
+            s1, s3 = principal(s, i)
+            found += _beyond(s1, s3, strength) > 1.0
+    return found
+
+
 @dataclass(frozen=True)
 class Met:
     """What a tet has met: how many times the criterion, pressures, Pa, its id, its centre, m, and the time, s."""
@@ -106,6 +118,8 @@ class Crushing:
         """``strengths`` (parts,): of tension, Pa; 0 for other matter."""
         self._model, self._strengths, self._comm, self._clock = model, strengths, comm, clock
         self._met = [Met() for _ in model.parts]
+        self._most = np.zeros(len(model.parts), np.int64)
+        """(parts,) tets beyond the criterion at once, the most so far."""
 
     @classmethod
     def of(cls, case: Case, model: Model, comm: Comm, clock: Clock) -> "Crushing | None":
@@ -123,6 +137,14 @@ class Crushing:
                 if place >= 0:
                     self._met[block.part] = self._of(block, place, times)
 
+    def count(self) -> None:
+        """How many tets are beyond the criterion now; all ranks take part."""
+        found = np.zeros(len(self._most), np.int64)
+        for block in self._model.blocks:
+            if self._strengths[block.part] > 0.0:
+                found[block.part] = crushed(block.state, block.n, float(self._strengths[block.part]))
+        self._most = np.maximum(self._most, self._comm.sum(found))
+
     def _of(self, block: Block, place: int, times: float) -> Met:
         chunk, i = divmod(place, CHUNK)
         corners = self._model.nodes.x[block.tets[place]]
@@ -135,21 +157,22 @@ class Crushing:
         shared = self._comm.share(self._met)
         return [min(found, key=lambda met: (-met.times, met.time, met.tet)) for found in zip(*shared, strict=True)]
 
-    def keep(self) -> list[tuple[Any, ...]]:
+    def keep(self) -> tuple[list[tuple[Any, ...]], list[int]]:
         """What has been met, equal on all ranks; all take part."""
-        return [astuple(met) for met in self._of_all()]
+        return [astuple(met) for met in self._of_all()], self._most.tolist()
 
-    def resume(self, known: list[tuple[Any, ...]]) -> None:
+    def resume(self, known: tuple[list[tuple[Any, ...]], list[int]]) -> None:
         """Takes it back."""
-        self._met = [replace(Met(*met), centre=tuple(met[4])) for met in known]
+        self._met = [replace(Met(*met), centre=tuple(met[4])) for met in known[0]]
+        self._most = np.array(known[1], np.int64)
 
     def found(self) -> list[Compressed]:
         """Of each part of such matter, the hardest first; all ranks take part."""
         met = [
             Compressed(
                 part=name, times=each.times, most=each.most, least=each.least, tet=each.tet,
-                x=each.centre[0], y=each.centre[1], z=each.centre[2], time=each.time,
+                tets=int(most), x=each.centre[0], y=each.centre[1], z=each.centre[2], time=each.time,
             )
-            for name, each in zip(self._model.parts, self._of_all(), strict=True) if each.tet >= 0
+            for name, each, most in zip(self._model.parts, self._of_all(), self._most, strict=True) if each.tet >= 0
         ]  # fmt: skip
         return sorted(met, key=lambda each: (-each.times, each.part))

@@ -246,6 +246,8 @@ class Loop:
         self.energy, self._parts = sim.ledger.close(before), sim.ledger.parts
         if ending:
             step.end(sim, before)
+        if sim.crushing is not None:
+            sim.crushing.count()
         probes = sim.probes.measure()
         self._sample = int(clock.t * sim.case.run.samples / sim.case.run.end_time) + 1
         limiter = sim.limiter()
