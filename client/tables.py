@@ -258,7 +258,8 @@ def outcome_table(outcome: Outcome) -> Table:
 
 def _compressed(met: Compressed) -> str:
     """The compression that a part without a law against it has met."""
-    return f"{met.part} up to {si(met.most, 'Pa')}, {fixed(met.times)} times Griffith's criterion"
+    beyond = f", {counted(met.tets, 'tet')} beyond it at once" if met.tets else ""
+    return f"{met.part} up to {si(met.most, 'Pa')}, {fixed(met.times)} times Griffith's criterion{beyond}"
 
 
 def balance_table(accounts: Sequence[Account], happened: Account) -> Table:

@@ -4,10 +4,11 @@ import io
 
 import pytest
 
+from conoid.cases.outcome import Compressed, Outcome
 from conoid.cases.run import State
 from conoid.client.console import PlainConsole
 from conoid.client.options import show_lines
-from conoid.client.tables import runs_table
+from conoid.client.tables import outcome_table, runs_table
 from conoid.client.told import RunInfo
 
 NAME, ID = "glass_steel_bar_at_210_metres_a_second", "0mb3k2d9x7f1q0a5z8w4ty"
@@ -33,3 +34,15 @@ def test_a_run_is_one_line_with_its_whole_id(width: int) -> None:
 def test_a_pipe_gets_whole_names(capsys: pytest.CaptureFixture[str]) -> None:
     show_lines(runs_table(RUNS))
     assert [line.split()[1] for line in capsys.readouterr().out.splitlines()[2:]] == [run.name for run in RUNS]
+
+
+def test_the_end_of_a_run_says_how_much_compression_matter_of_tension_alone_has_met() -> None:
+    met = Compressed(part="tile", times=21.1, most=50.6e9, least=0.0, tets=509, tet=1, x=0.0, y=0.0, z=0.0, time=1e-6)
+    out = io.StringIO()
+    for compressed in ([met], []):
+        table = outcome_table(Outcome(state="succeeded", steps=851, compressed=compressed))
+        PlainConsole(file=out, width=160, highlight=False).print(table)
+    (line,) = [line for line in out.getvalue().splitlines() if "Griffith" in line]
+    assert line.split(maxsplit=1)[1].strip() == (
+        "tile up to 50.6 GPa, 21.10 times Griffith's criterion, 509 tets beyond it at once"
+    )
