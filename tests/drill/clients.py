@@ -5,8 +5,8 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
-from functools import partial
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import cache, partial
 from itertools import repeat
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from .strikes import emptied, filled
 
 RUN = "0123456789abcdefghjkmn"
 PATIENCE = 60.0
-"""s in which a command has given up: 40 for the head of an answer, and some for its start on a busy machine."""
+"""s after its first question in which a command has given up: 40 for the head of an answer, some on a busy machine."""
 Deed = Callable[[Stand], Iterator[Row]]
 
 
@@ -35,6 +35,12 @@ def hangs() -> Iterator[bytes]:
     """Nothing, for longer than anybody waits."""
     time.sleep(2 * PATIENCE)
     yield b""
+
+
+@cache
+def bomb() -> bytes:
+    """Half a gibibyte of blanks."""
+    return gzip.compress(b" " * (1 << 29), 1)
 
 
 def endless(first: bytes, piece: bytes) -> Iterator[bytes]:
@@ -68,9 +74,7 @@ ANSWERS: dict[str, Answer] = {
     "no answer at all": lambda: [],
     "an answer without end": partial(endless, head(200, None), b" " * 65536),
     "a head without end": partial(endless, b"HTTP/1.1 200 X\r\n", b"X-A: b\r\n" * 999),
-    "a body that is packed a thousandfold": lambda: [
-        head(200, None, more="Content-Encoding: gzip\r\n"), gzip.compress(b" " * (1 << 29)),
-    ],
+    "a body that is packed a thousandfold": lambda: [head(200, None, more="Content-Encoding: gzip\r\n"), bomb()],
     "a redirect to elsewhere": lambda: [head(307, 0, more="Location: http://127.0.0.1:9/v1/runs\r\n")],
     "a status that is none": lambda: [head(999, 0)],
     "a server that hangs": hangs,
@@ -81,11 +85,18 @@ ANSWERS: dict[str, Answer] = {
 
 def answered(name: str, answer: Answer, stand: Stand) -> Iterator[Row]:
     """The same answer to whatever is asked."""
+    asked = list[float]()
+
+    def noted() -> Iterable[bytes]:
+        asked.append(time.monotonic())
+        return answer()
+
     with hostile() as server:
         for path in ("/v1/me", "/v1/runs", f"/v1/runs/{RUN}", f"/v1/runs/{RUN}/files", f"/v1/runs/{RUN}/events"):
-            server.answers[path] = answer
+            server.answers[path] = noted
         for words in (["ls"], ["show", RUN], ["get", RUN, "--out", str(stand.root / "copy")]):
-            yield _row(f"{name}: {words[0]}", server.url, words, stand.root / "copy")
+            asked.clear()
+            yield _row(f"{name}: {words[0]}", server.url, words, stand.root / "copy", asked=asked)
 
 
 def files(stand: Stand) -> Iterator[Row]:
@@ -134,9 +145,9 @@ def full(stand: Stand) -> Iterator[Row]:
 
 def _row(
     name: str, url: str, words: list[str], copy: Path, token: str = "", stdout: Path | None = None,
-    place: Path | None = None,
+    place: Path | None = None, asked: Sequence[float] = (),
 ) -> Row:  # fmt: skip
-    """One command, in the folder ``place``."""
+    """One command, in the folder ``place``; ``asked``: when the server has been asked, from which its time counts."""
     began = time.monotonic()
     environment = {**os.environ, "CONOID_URL": url, "CONOID_TOKEN": token, "NO_COLOR": "1"}
     out = stdout.open("w") if stdout else subprocess.PIPE
@@ -147,7 +158,8 @@ def _row(
         )  # fmt: skip
     except subprocess.TimeoutExpired:
         return Row(name, "client", "hangs", 2 * PATIENCE, "stranded: it has not ended")
-    took, lines = time.monotonic() - began, [line for line in done.stderr.splitlines() if " so far" not in line]
+    took = time.monotonic() - (asked[0] if asked else began)
+    lines = [line for line in done.stderr.splitlines() if " so far" not in line]
     left = [path for path in copy.rglob("*") if path.is_file()] if copy.exists() else []
     return Row(name, "client", f"code {done.returncode}", took, _verdict(done.returncode, lines, left, took))
 
