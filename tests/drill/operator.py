@@ -125,11 +125,14 @@ def _runs(stand: Stand) -> list[dict[str, str]]:
 
 
 def _settled(stand: Stand, before: set[str]) -> list[dict[str, str]]:
-    """The runs of the sweep once none of them is open."""
-    deadline = time.monotonic() + stand.patience
+    """The runs of the sweep once none of them is open, or none has ended for long: they run one after the other."""
+    ended, deadline = -1, 0.0
     while True:
         made = [run for run in _runs(stand) if run["id"] not in before]
-        if time.monotonic() > deadline or all(run["state"] in {"succeeded", "cancelled"} for run in made):
+        over = sum(run["state"] in {"succeeded", "cancelled"} for run in made)
+        if over > ended:
+            ended, deadline = over, time.monotonic() + stand.patience
+        if over == len(made) or time.monotonic() > deadline:
             return made
         time.sleep(0.2)
 
