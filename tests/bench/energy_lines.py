@@ -103,13 +103,15 @@ def page(found: Sequence[Row]) -> str:
     ]
     wrong = [f"- {r.case}: {r.line} has made {r.made:.3g}" for r in found if r.bad]
     wrong += [f"- {r.case}: {r.message}" for r in found if r.state != "succeeded"]
-    total = len(plans())
+    known = [plan.name for plan in plans()]
+    left = sorted(set(known) - {r.case for r in found})
     return "\n\n".join([
         "# Energy that lines of the ledger make",
         "Written by `python -m tests.bench.energy_lines`: every hard and every shipped case, one rank, with the line "
         "of the ledger that has made most energy at any time, as a share of the largest energy until then, and its "
         "limit, `run.made_limit`. How it is counted: [numerics.md](numerics.md), \"Energy that a line makes\".",
-        f"{len(found)} of {total} cases; {sum(r.bad for r in found)} succeeded above the limit.",
+        f"{len(found)} of {len(known)} cases; {sum(r.bad for r in found)} succeeded above the limit."
+        + (f" Not measured: {', '.join(left)}." if left else ""),
         *(["\n".join(wrong)] if wrong else []),
         table(_COLUMNS, lines),
     ]) + "\n"  # fmt: skip
