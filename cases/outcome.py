@@ -67,7 +67,7 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     setup: float = math.nan
     """s from the worker's start to its first step."""
     cpu: float = math.nan
-    """CPU s of all ranks together, in the step loop."""
+    """CPU s of all ranks and their threads together, in the step loop; of threads, while they work."""
     digest: str = ""
     """sha256 over node and tet state in global-id order: equal for any number of ranks."""
     elements: int | None = None

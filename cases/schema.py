@@ -152,7 +152,7 @@ class Numerics(Model):
 Scale = Annotated[Ratio, Field(gt=0)]
 
 
-MOST_RANKS, MOST_PARTS = 4096, 256
+MOST_RANKS, MOST_THREADS, MOST_PARTS = 4096, 256, 256
 """Of a run, of a case. Chosen: far beyond what has been run."""
 
 
@@ -163,6 +163,9 @@ class Run(Model):
     """Simulated time at which the run ends; it begins at 0."""
     ranks: Annotated[Count, Field(ge=1, le=MOST_RANKS)] = 1
     """MPI processes that share the work. The answer does not depend on it."""
+    threads: Annotated[Count, Field(ge=1, le=MOST_THREADS)] = 1
+    """Threads of each MPI process that share its passes over elements and nodes. The answer does not depend on it.
+    Job server and batch systems count cores by ranks alone so far: more threads than cores make a run slower."""
     profile: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{0,32}$")] = ""
     """Where a batch system runs it: a profile of the site (docs/cluster.md). The submitter's choice comes before it."""
     cut_scale: tuple[Scale, Scale, Scale] = (1.0, 1.0, 1.0)

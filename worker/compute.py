@@ -33,6 +33,7 @@ from .output import rewind
 from .output.history import History
 from .output.journal import Journal
 from .parallel.comm import Comm
+from .parallel.team import team
 from .preload import preload
 from .signals import Signals
 from .simulation import Simulation
@@ -68,13 +69,14 @@ def compute(
     setup = time.monotonic() - began
     _announce(sim, journal, setup)
     loop = Loop(sim, folder, journal, history, signals, Balance.of(sim), start)
-    cpu = cpu_time()
+    threads = team(case.run.threads)
+    cpu = cpu_time() + threads.helped
     failure = None
     try:
         loop.run()
     except PhysicsError as error:
         failure = error
-    cpu = cpu_time() - cpu
+    cpu = cpu_time() + threads.helped - cpu
     loop.sim.free()
     if comm.rank == 0 and failure is None and not loop.stopped:
         checkpoint.forget(folder)

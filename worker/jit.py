@@ -18,6 +18,7 @@ from typing import Any
 
 from llvmlite import ir
 from numba import config, types
+from numba.core import cgutils
 from numba.core.bytecode import FunctionIdentity
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
 from numba.core.compiler_lock import global_compiler_lock
@@ -25,7 +26,7 @@ from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.sigutils import normalize_signature
 from numba.extending import intrinsic
 
-__all__ = ["DECLARED", "Kernel", "njit", "prefetch", "record", "several", "types"]
+__all__ = ["DECLARED", "Kernel", "intrinsic", "njit", "packed", "prefetch", "record", "several", "types"]
 
 _BLAS = "scipy.linalg"
 _TO_READ, _TO_SECOND, _DATA = 0, 2, 1
@@ -90,6 +91,7 @@ class Kernel(CPUDispatcher):
 
     signature: Any = ""
     """As it is declared: in numba's notation, or made of its ``types``."""
+    _address: int | None = None
 
     @property
     def result(self) -> Any:
@@ -109,6 +111,15 @@ class Kernel(CPUDispatcher):
                 self.targetoptions.setdefault("_nrt", _makes_arrays(self))
                 super().compile(self.signature)
             self.disable_compile()
+
+    @property
+    def address(self) -> int:
+        """Where its machine code begins, for calls that pass arguments as C does."""
+        if self._address is None:
+            self.load()
+            compiled: Any = next(iter(self.overloads.values()))
+            self._address = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name)
+        return self._address
 
     def compile(self, sig: Any) -> Any:
         """As numba asks for it when another kernel calls this one: for the declared signature, whatever ``sig`` is."""
@@ -161,6 +172,10 @@ def record(name: type, *kinds: Any) -> Any:
     if len(set(kinds)) == 1:
         return types.NamedUniTuple(kinds[0], len(kinds), name)  # type: ignore[no-untyped-call]
     return types.NamedTuple(kinds, name)  # type: ignore[no-untyped-call]
+
+
+packed: Any = cgutils.pack_array
+"""Makes LLVM's array of a list of values, for intrinsics."""
 
 
 def _prefetch(_: Any, array: Any, index: Any) -> Any:

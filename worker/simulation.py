@@ -29,9 +29,11 @@ from .migration import model as model_of
 from .migration.parcel import Parcel
 from .migration.route import Arrived
 from .mirrors import Mirrors
+from .motion import Leapfrog
 from .parallel import fixed_point
 from .parallel.comm import Comm
 from .parallel.ownership import Neighbour
+from .parallel.team import Team, team
 from .probes import Probes
 from .reduction import StepReduction
 from .state import MASS, Floats, Model
@@ -51,6 +53,7 @@ class Simulation:
     comm: Comm
     model: Model
     elements: Elements
+    leapfrog: Leapfrog
     boundaries: list[Boundary]
     """In the order in which they act."""
     contact: Contact | None
@@ -171,15 +174,17 @@ def _assemble(
         scene.append(Mirrors.of(case, model, scene, comm))
     walls = next((bound for bound in scene if type(bound) is RigidWalls), None)
     probes = Probes(case, model, contact, walls, clock, comm)
-    elements = _elements(case, model, neighbours, scene, node_volume, comm, timers)
+    threads = team(run.threads)
+    elements = _elements(case, model, neighbours, scene, node_volume, comm, timers, threads)
     fracture = None
     if case.fractures:
         by_node: list[KeptByNode] = [*scene, *(stage for stage in (erosion, contact) if stage is not None)]
         fracture = Fracture(case, model, neighbours, elements, by_node, contact, comm, clock)
+    ledger = Ledger(model, scene, contact, erosion, fracture, comm, clock)
     return Simulation(
-        case=case, comm=comm, model=model, elements=elements, boundaries=scene, contact=contact, erosion=erosion,
-        fracture=fracture, clock=clock, ledger=Ledger(model, scene, contact, erosion, fracture, comm, clock),
-        probes=probes, timers=timers, record=Record(model, fracture, comm) if fracture is not None else None,
+        case=case, comm=comm, model=model, elements=elements, leapfrog=Leapfrog(threads), boundaries=scene,
+        contact=contact, erosion=erosion, fracture=fracture, clock=clock, ledger=ledger, probes=probes, timers=timers,
+        record=Record(model, fracture, comm) if fracture is not None else None,
         crushing=Crushing.of(case, model, comm, clock),
         neighbours=neighbours, floor=_force_floor(model, comm), reduction=StepReduction(comm.size, comm.rank),
         assembled=float(comm.maximum(np.array([worked(comm) - began]))[0]),
@@ -253,17 +258,17 @@ def _extremes(model: Model, comm: Comm) -> tuple[float, float, float]:
 
 def _elements(
     case: Case, model: Model, neighbours: list[Neighbour], scene: list[Boundary], node_volume: Floats, comm: Comm,
-    timers: Timers,
+    timers: Timers, threads: Team,
 ) -> Elements:  # fmt: skip
     form = case.numerics.pressure
     if form == "standard":
-        return Elements(model, comm, neighbours, timers)
+        return Elements(model, comm, neighbours, timers, threads)
     materials = [find_material(case, part.material) for part in case.parts]
     params = np.array([parameters(each, None) for each in materials])
     kinds = np.array([whose(eos_of(each), own) for each, own in zip(materials, params, strict=True)])
     more = any(equation_of(each).averaged for each in materials)
     return AveragedElements(
-        model, comm, neighbours, timers, 1.0 / node_volume, params, kinds, scene, form == "split", more
+        model, comm, neighbours, timers, threads, 1.0 / node_volume, params, kinds, scene, form == "split", more
     )  # fmt: skip
 
 

@@ -240,6 +240,8 @@ class Block:
     """CPU time of the passes over the block so far."""
     group: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
     """(n,) see Model.groups; (0,) where nobody asks."""
+    moved: int = 0
+    """Tets that have left so far, for each of which another may stand in another chunk."""
     quiet: Ints = field(default_factory=lambda: np.zeros((0, 3), np.int64))
     """(chunks, 3) which chunks are at rest (elements/rest.py)."""
 
@@ -275,6 +277,7 @@ class Block:
                 table[holes] = table[movers]
         self.state[holes // CHUNK, :, holes % CHUNK] = self.state[movers // CHUNK, :, movers % CHUNK]
         self.n, self.quiet[:] = left, 0
+        self.moved += len(gone)
         self.tets, self.id = self.tets[:left], self.id[:left]
         self.across, self.worn, self.group = self.across[:left], self.worn[:left], self.group[:left]
         self.flat = self.flat[:left]

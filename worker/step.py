@@ -34,7 +34,6 @@ import math
 from . import failed
 from .errors import PhysicsError
 from .fracture.stage import NOTHING, OVERSTRESSED, Fracture
-from .motion import kick, move
 from .parallel import fixed_point
 from .simulation import Simulation
 from .state import Floats
@@ -63,7 +62,7 @@ def first_half(sim: Simulation) -> None:
         if sim.fracture is not None:
             sim.fracture.let_go()  # 5: f(n), less where cohesive facets would give what nobody has paid
         # v*(n+1/2) = v(n-1/2) + dt f(n) / m
-        kick(nodes.v, nodes.force, nodes.mass, nodes.stepping, mean_dt / sim.scale, clock.shorter / sim.scale)
+        sim.leapfrog.kick(nodes, mean_dt / sim.scale, clock.shorter / sim.scale)
         _after_kick(sim)  # 6 to 9: v(n+1/2)
 
 
@@ -109,7 +108,7 @@ def second_half(sim: Simulation) -> None:
     nodes, clock = sim.model.nodes, sim.clock
     with sim.timers.phase("nodes"):
         # 11: x(n+1) = x(n) + dt v(n+1/2)
-        move(nodes.x, nodes.v, nodes.force, nodes.stepping, clock.dt, clock.shorter / sim.scale)
+        sim.leapfrog.move(nodes, clock.dt, clock.shorter / sim.scale)
         for boundary in sim.boundaries:
             boundary.after_move(nodes)  # images of debris that passes a symmetry plane
         clock.advance()

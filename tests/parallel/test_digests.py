@@ -36,10 +36,10 @@ def shattering() -> str:
     return "\n".join(line for line in lines if not line.startswith(("brittle.scatter", "fracture")))
 
 
-def arguments(name: str, place: Path) -> list[str]:
+def arguments(name: str, place: Path, threads: int) -> list[str]:
     """The worker's, for a scene by its name."""
     case, form = name, name.partition("_")[2]
-    words = ["run.frames=0", "run.samples=10", "reference=[]"]
+    words = ["run.frames=0", "run.samples=10", "reference=[]", f"run.threads={threads}"]
     if name in SHORT:
         words.append(f"run.end_time={SHORT[name]}")
     elif name in GIVEN:
@@ -50,24 +50,30 @@ def arguments(name: str, place: Path) -> list[str]:
     return [case, *(word for change in words for word in ("--set", change)), "--out", str(place / name)]
 
 
-def ended(place: Path) -> dict[str, str]:
-    """The digest of every scene, by its name, on three ranks."""
+def ended(place: Path, ranks: int = 3, threads: int = 1) -> dict[str, str]:
+    """The digest of every scene, by its name."""
     (place / "shattering.toml").write_text(shattering(), encoding="utf-8")
-    together(3, place, [arguments(name, place) for name in EVERYWHERE])
+    together(ranks, place, [arguments(name, place, threads) for name in EVERYWHERE])
     ends = {name: from_json((place / name / layout.OUTCOME).read_bytes()) for name in EVERYWHERE}
     assert {end.state for end in ends.values()} == {"succeeded"}
     assert all((end.broken or 0) > 100 for name, end in ends.items() if name.startswith(("shattering", "breaking")))
     return {name: str(end.digest)[:16] for name, end in ends.items()}
 
 
-@pytest.fixture(scope="module")
-def digests(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    return ended(tmp_path_factory.mktemp("digests"))
+@pytest.fixture(scope="module", params=[(3, 1), (1, 3)], ids=["3 ranks", "3 threads"])
+def digests(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    return ended(tmp_path_factory.mktemp("digests"), *request.param)
 
 
 @pytest.mark.parametrize("name", EVERYWHERE)
 def test_the_digest_is_the_committed_one(name: str, digests: dict[str, str]) -> None:
     assert digests[name] == KNOWN[name]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("ranks", "threads"), [(1, 1), (1, 2), (2, 3), (3, 2), (7, 3), (16, 2)])
+def test_it_is_on_any_number_of_ranks_and_threads(ranks: int, threads: int, tmp_path: Path) -> None:
+    assert ended(tmp_path, ranks, threads) == KNOWN
 
 
 @pytest.mark.slow

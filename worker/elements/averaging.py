@@ -3,24 +3,26 @@
 import numpy as np
 
 from ..boundaries import Boundary
+from ..jit import Kernel
 from ..materials.law import BULK
 from ..migration.parcel import Parcel
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum
 from ..parallel.tags import Tag
+from ..parallel.team import Team
 from ..state import Block, Copies, Floats, Ints, Model, extended
 from ..timers import Timers
-from . import matter, pressure, sweep
+from . import matter, pressure, tasks
 from .flat import flat_tets
 from .forms import Elements
-from .records import Body, Marks, Means, Motion
+from .records import Marks, Means
 
 
 class AveragedElements(Elements):
     """The ``nodal`` and ``split`` forms: two passes with the completed nodal volume sums between them."""
 
     def __init__(
-        self, model: Model, comm: Comm, neighbours: list[Neighbour], timers: Timers,
+        self, model: Model, comm: Comm, neighbours: list[Neighbour], timers: Timers, team: Team,
         weight: Floats, params: Floats, kinds: Ints, scene: list[Boundary], split: bool, more: bool,
     ) -> None:  # fmt: skip
         """``weight`` (nodes,): one over the reference volume, 1/m^3; ``params`` (parts, SIZE): constants of each part;
@@ -31,7 +33,7 @@ class AveragedElements(Elements):
         self.split = split
         self._columns = 3 if more else 2
         self._gradient = np.zeros((n if split else 1, 3), np.int64)
-        super().__init__(model, comm, neighbours, timers)
+        super().__init__(model, comm, neighbours, timers, team)
         self._weight = weight
         self._params, self._kinds = params, kinds
         self._bulk = params[model.nodes.part, BULK]
@@ -80,10 +82,10 @@ class AveragedElements(Elements):
         return [self.shared_forces, self.shared_volumes, *([self.shared_gradients] if self.split else [])]
 
     def advance(self, dt: float, scale: float) -> None:
-        self.peaks[:] = 0
+        self._forget_peaks()
         self._volumes[:] = 0
         send = self.shared_volumes.begin
-        self._both_regions(lambda block, begin, end: self._strains(block, begin, end, dt), lambda: send(self._volumes))
+        self._both_regions(lambda block: self._strains(block, dt), lambda: send(self._volumes))
         with self._timers.phase("exchange"):
             self.shared_volumes.finish(self._volumes)
         self._strain = pressure.nodal_strains(self._volumes, 0)
@@ -96,7 +98,7 @@ class AveragedElements(Elements):
         self._begin(scale)
         self._gradient[:] = 0
         self._scale = scale
-        self._both_regions(lambda block, begin, end: self._forces(block, begin, end, dt, scale), self._send)
+        self._both_regions(lambda block: self._forces(block, dt, scale), self._send)
 
     def again(self, scale: float) -> None:
         self._gradient[:] = 0
@@ -119,10 +121,9 @@ class AveragedElements(Elements):
             self._gradient, self._matter,
         )  # fmt: skip
 
-    def _strains(self, block: Block, begin: int, end: int, dt: float) -> None:
-        motion, body, marks = Motion.of(self.model.nodes), Body.of(block), Marks.of(block)
-        sweep.strain_pass(motion, body, marks, self._scratch, self._means(), begin, end, dt)
+    def _strains(self, block: Block, dt: float) -> tuple[Kernel, int]:
+        return self._pass(tasks.strains, tasks.STRAINS, block, Marks.of(block), self._scratches, self._means(), dt)
 
-    def _forces(self, block: Block, begin: int, end: int, dt: float, scale: float) -> None:
-        motion, body, marks = Motion.of(self.model.nodes), Body.of(block), Marks.of(block)
-        sweep.force_pass(motion, body, marks, self._scratch, self._means(), begin, end, dt, scale)
+    def _forces(self, block: Block, dt: float, scale: float) -> tuple[Kernel, int]:
+        marks = Marks.of(block)
+        return self._pass(tasks.forces, tasks.FORCES, block, marks, self._scratches, self._means(), dt, scale)

@@ -100,6 +100,18 @@ def note_peaks(peaks, bits, ids, n, force):  # type: ignore[no-untyped-def]
                 peaks[LIMITING_TET] = min(peaks[LIMITING_TET], ids[i])
 
 
+@njit(types.void(_I1, _I2), cache=True)
+def gather_peaks(peaks, threads):  # type: ignore[no-untyped-def]
+    """Raises the peaks of a rank by those of its ``threads`` (threads, 8)."""
+    for mine in threads:
+        for place in (LARGEST_FORCE, WORN, HOT):
+            peaks[place] = max(peaks[place], mine[place])
+        if mine[LARGEST_LIMIT] > peaks[LARGEST_LIMIT]:
+            peaks[LARGEST_LIMIT], peaks[LIMITING_TET] = mine[LARGEST_LIMIT], mine[LIMITING_TET]
+        elif mine[LARGEST_LIMIT] == peaks[LARGEST_LIMIT]:
+            peaks[LIMITING_TET] = min(peaks[LIMITING_TET], mine[LIMITING_TET])
+
+
 @njit(_I(_I2, _F1, _I1, _I1, _I1, _T2, _F1, _I1, _I, _F), cache=True, error_model="numpy")
 def sum_forces(force, w, wi, bits, peaks, t, s, ids, n, scale):  # type: ignore[no-untyped-def]
     """Adds the forces of a chunk of tets with these global ids; returns the largest."""

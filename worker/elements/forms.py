@@ -9,16 +9,19 @@ from typing import Protocol
 
 import numpy as np
 
-from ..jit import cpu_time
+from ..jit import Kernel, cpu_time
 from ..migration.parcel import Parcel
 from ..parallel import fixed_point
+from ..parallel.arguments import Arguments
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum
 from ..parallel.tags import Tag
+from ..parallel.team import Team
 from ..state import Block, Copies, Floats, Ints, Model
 from ..timers import Timers
-from . import records, sweep
-from .records import Body, Marks, Means, Motion, Scratch
+from . import chunks, records, tasks
+from .colours import Coloured, coloured, whole
+from .records import Body, Marks, Means, Motion, Scratches
 
 
 class Bridges(Protocol):
@@ -43,17 +46,25 @@ class Herald(Protocol):
         """Takes those of the neighbours."""
 
 
+Pass = Callable[[Block], tuple[Kernel, int]]
+"""Of a pass over a block: the kernel, and the address of its arguments."""
+
+
 class Elements:
     """The elements of one rank in the ``standard`` pressure form; the averaged forms extend it."""
 
     split = False
 
-    def __init__(self, model: Model, comm: Comm, neighbours: list[Neighbour], timers: Timers) -> None:
+    def __init__(self, model: Model, comm: Comm, neighbours: list[Neighbour], timers: Timers, team: Team) -> None:
         self.model = model
-        self._timers = timers
-        self._scratch = Scratch.of_rank()
-        self.peaks: Ints = self._scratch.peaks
+        self._timers, self._team = timers, team
+        self._scratches = Scratches.of(team.threads)
+        self.peaks: Ints = np.zeros(records.PEAKS, np.int64)
         """(5,) see elements/records.py."""
+        self._arguments: dict[tuple[Kernel, int], Arguments] = {}
+        """By kernel and part."""
+        self._coloured: dict[tuple[int, int], tuple[int, Coloured]] = {}
+        """By part and first chunk, with how many tets had left the block then."""
         self._comm, self._neighbours = comm, neighbours
         self._herald: Herald | None = None
         self._connect()
@@ -94,16 +105,16 @@ class Elements:
 
     def advance(self, dt: float, scale: float) -> None:
         """Stress and forces at n+1; the completion of the shared forces is under way when it returns."""
-        self.peaks[:] = 0
+        self._forget_peaks()
         self._begin(scale)
-        self._both_regions(lambda block, begin, end: self._standard(block, begin, end, dt, scale), self._send)
+        self._both_regions(lambda block: self._standard(block, dt, scale), self._send)
 
     def again(self, scale: float) -> None:
         """The forces of the present stress in a coarser quantum."""
         limit = self.peaks[[records.LARGEST_LIMIT, records.LIMITING_TET]]
-        self.peaks[records.LARGEST_FORCE] = 0
+        self._forget_peaks()
         self._begin(scale, again=True)
-        self._both_regions(lambda block, begin, end: self._again(block, begin, end, scale), self._send)
+        self._both_regions(lambda block: self._again(block, scale), self._send)
         self.peaks[[records.LARGEST_LIMIT, records.LIMITING_TET]] = limit
 
     def _begin(self, scale: float, again: bool = False) -> None:
@@ -160,27 +171,48 @@ class Elements:
         words = None if self._herald is None else self._herald.words(self.hot)
         self.shared_forces.begin(self.model.nodes.force, words)
 
-    def _both_regions(self, work: Callable[[Block, int, int], None], send: Callable[[], None]) -> None:
+    def _forget_peaks(self) -> None:
+        self.peaks[:] = 0
+        self._scratches.peaks[:] = 0
+
+    def _both_regions(self, work: Pass, send: Callable[[], None]) -> None:
         self._over_blocks(work, lambda block: (0, block.border_chunks))
         send()
         self._over_blocks(work, lambda block: (block.border_chunks, block.chunks))
 
-    def _over_blocks(self, work: Callable[[Block, int, int], None], chunks: Callable[[Block], tuple[int, int]]) -> None:
+    def _over_blocks(self, work: Pass, region: Callable[[Block], tuple[int, int]]) -> None:
         now = cpu_time()
         for block in self.model.blocks:
-            begin, end = chunks(block)
+            begin, end = region(block)
             if begin < end:
-                work(block, begin, end)
+                some = self._tasks(block, begin, end)
+                self._team.run(*work(block), some.tasks, some.starts)
             start, now = now, cpu_time()
             block.seconds += now - start
+        chunks.gather_peaks(self.peaks, self._scratches.peaks)
 
-    def _standard(self, block: Block, begin: int, end: int, dt: float, scale: float) -> None:
-        motion, body, marks = Motion.of(self.model.nodes), Body.of(block), Marks.of(block)
-        sweep.standard_pass(motion, body, marks, self._scratch, begin, end, dt, scale)
+    def _tasks(self, block: Block, begin: int, end: int) -> Coloured:
+        if self._team.threads == 1:
+            return whole(begin, end)
+        moved, known = self._coloured.get((block.part, begin), (-1, None))
+        if known is None or moved != block.moved:
+            known = coloured(block, begin, end, self.model.nodes.n)
+            self._coloured[block.part, begin] = block.moved, known
+        return known
 
-    def _again(self, block: Block, begin: int, end: int, scale: float) -> None:
-        motion, body = Motion.of(self.model.nodes), Body.of(block)
-        sweep.forces_again(motion, body, self._scratch, self._means(), begin, end, scale)
+    def _pass(self, kernel: Kernel, kinds: tuple[object, ...], block: Block, *values: object) -> tuple[Kernel, int]:
+        """The kernel and the address of its arguments for a block: those of all passes, then ``values``."""
+        key = kernel, block.part
+        if key not in self._arguments:
+            self._arguments[key] = Arguments(*kinds)
+        return kernel, self._arguments[key].set(Motion.of(self.model.nodes), Body.of(block), *values)
+
+    def _standard(self, block: Block, dt: float, scale: float) -> tuple[Kernel, int]:
+        marks = Marks.of(block)
+        return self._pass(tasks.standard, tasks.STANDARD, block, marks, self._scratches, dt, scale)
+
+    def _again(self, block: Block, scale: float) -> tuple[Kernel, int]:
+        return self._pass(tasks.again, tasks.AGAIN, block, self._scratches, self._means(), scale)
 
     def _means(self) -> Means:
         return Means.none()

@@ -11,7 +11,7 @@ from . import tet4
 LARGEST_LIMIT, LIMITING_TET, LARGEST_FORCE, WORN, HOT = range(5)
 """Places in ``Scratch.peaks``: bits of the largest one-over-stable-step, 1/s; smallest global id of the tets that have
 it; bits of the largest force, N; what is found of worn-out tets (wear.py); whether faces are hot (hot.py)."""
-_PEAKS = 5
+PEAKS = 5
 """Number of these places."""
 _LINE = 8
 """Numbers in a line of the cache."""
@@ -88,7 +88,7 @@ class Marks(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Room for one chunk, and what the step needs of all tets of a rank."""
+    """Room for one chunk, and what the step needs of all tets of a thread."""
 
     w: Floats
     """Rows of CHUNK numbers, see tet4.py."""
@@ -99,12 +99,26 @@ class Scratch(NamedTuple):
     peaks: Ints
     """(5,) see LARGEST_LIMIT and the names beside it."""
 
+
+class Scratches(NamedTuple):
+    """A scratch for each thread."""
+
+    w: Floats
+    """(threads, SCRATCH)."""
+    wi: Ints
+    """(threads, 9 * CHUNK)."""
+    bits: Ints
+    """``w`` once more, as integers."""
+    peaks: Ints
+    """(threads, 8) a line of the cache for each."""
+
     @classmethod
-    def of_rank(cls) -> "Scratch":
+    def of(cls, threads: int) -> "Scratches":
         """Rows that begin on a cache line: the same speed wherever memory is given."""
-        room = np.zeros(tet4.SCRATCH + _LINE)
-        w = room[-(room.ctypes.data // room.itemsize) % _LINE :][: tet4.SCRATCH]
-        return cls(w, np.zeros(9 * CHUNK, np.int64), w.view(np.int64), np.zeros(_PEAKS, np.int64))
+        room = np.zeros(threads * tet4.SCRATCH + _LINE)
+        first = -(room.ctypes.data // room.itemsize) % _LINE
+        w = room[first:][: threads * tet4.SCRATCH].reshape(threads, -1)
+        return cls(w, np.zeros((threads, 9 * CHUNK), np.int64), w.view(np.int64), np.zeros((threads, _LINE), np.int64))
 
 
 class Means(NamedTuple):
@@ -142,4 +156,5 @@ MOTION = record(Motion, _F2, _F2, _F2, _I2)
 BODY = record(Body, types.uint32[:, ::1], _I1, _F1, _INT, _F1, _INT, _INT, _I2, _B1)
 MARKS = record(Marks, _B1, _F1, types.uint8[::1], _F1, types.float64)
 SCRATCH = record(Scratch, _F1, _I1, _I1, _I1)
+SCRATCHES = record(Scratches, _F2, _I2, _I2, _I2)
 MEANS = record(Means, _I2, _F1, _F1, _F1, _FLAG, _F1, _F2, _I2, _F2)

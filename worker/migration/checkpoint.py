@@ -44,7 +44,7 @@ _KEPT = 2
 """Checkpoints that stay; the older ones go."""
 _FREE = {
     "run": {
-        "ranks", "profile", "cut_scale", "max_steps", "max_wall_time", "checkpoint_every", "residual_limit",
+        "ranks", "threads", "profile", "cut_scale", "max_steps", "max_wall_time", "checkpoint_every", "residual_limit",
         "made_limit", "snapshots",
     },
     "contact": {"skin", "domain"},

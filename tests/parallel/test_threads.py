@@ -1,0 +1,102 @@
+"""Threads of a rank: tasks are done once each, colour after colour, and kernels get their arguments from a table."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from conoid.worker.elements.colours import coloured
+from conoid.worker.jit import njit, several, types
+from conoid.worker.mesh.structured import structured
+from conoid.worker.parallel.arguments import Arguments, reader
+from conoid.worker.parallel.team import TASK, team
+from conoid.worker.state import CHUNK, Block
+from tests.bench.scene import box
+
+_I1, _F2 = types.int64[::1], types.float64[:, ::1]
+KINDS = several(_F2, types.boolean, _I1), types.float64, types.int64
+COUNTS = (_I1, _I1)
+_arguments, _counts = reader(*KINDS), reader(*COUNTS)
+
+
+@njit("UniTuple(float64, 5)(int64)", cache=False)
+def told(table):  # type: ignore[no-untyped-def]
+    (values, flag, numbers), factor, shift = _arguments(table)
+    return values[1, 2], 1.0 if flag else 0.0, float(numbers[-1]), factor, float(shift)
+
+
+@njit(TASK, cache=False)
+def count(table, first, end, thread):  # type: ignore[no-untyped-def]
+    """Counts each number of its range, and keeps who has done it."""
+    done, who = _counts(table)
+    for k in range(first, end):
+        done[k] += 1
+        who[k] = thread
+
+
+def test_a_kernel_gets_what_the_table_was_given_last() -> None:
+    table, values = Arguments(*KINDS), np.arange(6.0).reshape(2, 3)
+    assert told(table.set((values, True, np.array([7, 8])), 0.5, -3)) == (5.0, 1.0, 8.0, 0.5, -3.0)
+    values[1, 2] = 9.0
+    grown = np.array([1, 2, 3])
+    assert told(table.set((values, False, grown), 0.25, 4)) == (9.0, 0.0, 3.0, 0.25, 4.0)
+
+
+def test_arrays_of_a_table_lie_in_c_order() -> None:
+    with pytest.raises(ValueError, match="C order"):
+        Arguments(*KINDS).set((np.zeros((3, 2)).T, True, np.zeros(1, np.int64)), 1.0, 1)
+
+
+@pytest.mark.parametrize("threads", [1, 2, 5])
+def test_every_task_is_done_once_in_each_of_many_passes(threads: int) -> None:
+    done, who = np.zeros(600, np.int64), np.zeros(600, np.int64)
+    tasks = np.column_stack([np.arange(0, 600, 6), np.arange(6, 606, 6)])
+    starts = np.array([0, 1, 40, 40, 100])
+    table = Arguments(*COUNTS)
+    for k in range(2000):
+        team(threads).run(count, table.set(done, who), tasks, starts)
+        if k % 500 == 0:
+            time.sleep(0.01)  # helpers fall asleep, and wake up for the next pass
+    assert (done == 2000).all()
+    assert who.min() >= 0
+    assert who.max() < threads
+
+
+def test_helpers_take_part_and_are_there_once() -> None:
+    done, who = np.zeros(10**6, np.int64), np.zeros(10**6, np.int64)
+    tasks = np.column_stack([np.arange(0, 10**6, 5000), np.arange(5000, 10**6 + 5000, 5000)])
+    before, table = team(3).helped, Arguments(*COUNTS)
+    began = time.monotonic()
+    while len(np.unique(who)) < 3 and time.monotonic() < began + 60.0:
+        team(3).run(count, table.set(done, who), tasks, np.array([0, len(tasks)]))
+    assert np.unique(who).tolist() == [0, 1, 2]
+    assert team(3).helped > before
+    assert team(3) is team(3)
+    names = [thread.name for thread in threading.enumerate()]
+    assert names.count("helper 2") <= 2  # of the teams of three and of five
+
+
+def test_chunks_of_one_colour_share_no_node_and_every_chunk_has_one() -> None:
+    mesh = structured(box(20_000, "structured"))
+    n = len(mesh.tets)
+    block = Block(0, n, mesh.tets.astype(np.uint32), np.arange(n), np.zeros((0, 0, 0)), 0, 0, np.zeros(0))
+    for begin, end in ((0, 5), (5, block.chunks)):
+        found = coloured(block, begin, end, len(mesh.points))
+        assert sorted(map(tuple, found.tasks.tolist())) == [(c, c + 1) for c in range(begin, end)]
+        for first, last in zip(found.starts[:-1], found.starts[1:], strict=True):
+            owners = np.zeros(len(mesh.points), np.int64)
+            for c, _ in found.tasks[first:last]:
+                owners[np.unique(mesh.tets[c * CHUNK : (c + 1) * CHUNK])] += 1
+            assert owners.max() == 1
+    assert len(found.starts) - 1 < block.chunks - 5
+    assert len(found.starts) - 1 <= 20
+
+
+def test_chunks_that_all_share_a_node_have_a_colour_each() -> None:
+    n = 70 * CHUNK
+    tets = np.column_stack([np.zeros(n), *(np.arange(n) * 3 + k for k in (1, 2, 3))]).astype(np.uint32)
+    block = Block(0, n, tets, np.arange(n), np.zeros((0, 0, 0)), 0, 0, np.zeros(0))
+    found = coloured(block, 0, 70, 3 * n + 1)
+    assert found.starts.tolist() == list(range(71))
+    assert found.tasks[:, 0].tolist() == list(range(70))

@@ -1,0 +1,120 @@
+"""Arguments of a kernel in one table of 64-bit words, so that a kernel takes an address instead of records of arrays.
+
+A call with records costs 4 us and more, since numba unpacks every array of theirs; a call with an address costs 0.2 us,
+and any thread can make it. An array takes 1 + ndim words, its address and its shape; a number or a flag takes one. What
+a kernel reads from the table are arrays without an owner: nobody counts references to them, and ``Arguments`` keeps
+them alive.
+"""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+
+from ..jit import intrinsic, packed, several, types
+
+_WORD, _BIT = ir.IntType(64), ir.IntType(1)
+"""LLVM's types of a word of the table, and of a flag."""
+
+
+class Arguments:
+    """A table for arguments of the numba types ``kinds``; records count as one argument each."""
+
+    def __init__(self, *kinds: Any) -> None:
+        leaves = [_words(kind) for kind in _leaves(several(*kinds))]
+        self._places = np.cumsum([0, *leaves])[:-1].tolist()
+        self._words = np.zeros(sum(leaves), np.int64)
+        self._kept: list[Any] = [None] * len(leaves)
+        self.address = int(self._words.ctypes.data)
+        """Of the table: what kernels take."""
+
+    def set(self, *values: Any) -> int:
+        """Takes the arguments, records of them among them; returns the address. Raises ValueError where an array does
+        not lie in C order.
+        """
+        kept = self._kept
+        for k, value in enumerate(_flat(values)):
+            if kept[k] is not value:
+                self._put(self._places[k], value)
+                kept[k] = value
+        return self.address
+
+    def _put(self, at: int, value: Any) -> None:
+        words = self._words
+        if isinstance(value, np.ndarray):
+            if not value.flags.c_contiguous:
+                raise ValueError("an array of a table lies in C order")
+            words[at] = value.ctypes.data
+            words[at + 1 : at + 1 + value.ndim] = value.shape
+        else:
+            words[at] = np.float64(value).view(np.int64) if isinstance(value, float) else int(value)
+
+
+def _flat(values: tuple[Any, ...]) -> Iterator[Any]:
+    for value in values:
+        if isinstance(value, tuple):
+            yield from _flat(value)
+        else:
+            yield value
+
+
+def _leaves(kind: Any) -> Iterator[Any]:
+    if isinstance(kind, types.BaseTuple):
+        for each in kind.types:  # type: ignore[attr-defined]
+            yield from _leaves(each)
+    else:
+        yield kind
+
+
+def _words(kind: Any) -> int:
+    return 1 + kind.ndim if isinstance(kind, types.Array) else 1
+
+
+def reader(*kinds: Any) -> Any:
+    """For kernels: a function of an address that returns the arguments of these types as a tuple."""
+    kind = several(*kinds)
+
+    def read(_: Any, address: Any) -> Any:
+        def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            return _read(context, builder, kind, builder.inttoptr(args[0], _WORD.as_pointer()), 0)[0]
+
+        return kind(address), emit
+
+    return intrinsic(read)
+
+
+def _read(context: Any, builder: Any, kind: Any, base: Any, at: int) -> tuple[Any, int]:
+    """The value of that type at a place of the table ``base``, and the place behind it."""
+    if isinstance(kind, types.BaseTuple):
+        values = []
+        for each in kind.types:  # type: ignore[attr-defined]
+            value, at = _read(context, builder, each, base, at)
+            values.append(value)
+        return context.make_tuple(builder, kind, values), at
+    words = [builder.load(builder.gep(base, [_WORD(at + k)])) for k in range(_words(kind))]
+    return _value(context, builder, kind, words), at + len(words)
+
+
+def _value(context: Any, builder: Any, kind: Any, words: list[Any]) -> Any:
+    if isinstance(kind, types.Array):
+        return _array(context, builder, kind, words[0], words[1:])
+    if kind == types.float64:
+        return builder.bitcast(words[0], ir.DoubleType())
+    return builder.trunc(words[0], _BIT) if kind == types.boolean else words[0]
+
+
+def _array(context: Any, builder: Any, kind: Any, address: Any, shape: list[Any]) -> Any:
+    item = context.get_data_type(kind.dtype)
+    size = _WORD(context.get_abi_sizeof(item))
+    strides: list[Any] = []
+    step = size
+    for length in reversed(shape):
+        strides.insert(0, step)
+        step = builder.mul(step, length)
+    array = context.make_array(kind)(context, builder)
+    context.populate_array(
+        array, data=builder.inttoptr(address, item.as_pointer()), shape=packed(builder, shape),
+        strides=packed(builder, strides), itemsize=size, meminfo=None, parent=None,
+    )  # fmt: skip
+    return array._getvalue()

@@ -1,0 +1,220 @@
+"""The threads of a rank: a pass is cut into tasks, and each task goes to whichever thread is free.
+
+A task is a range of whatever the pass goes over: chunks of tets, nodes. Tasks of one colour touch nothing in common,
+so threads need no locks and no sums of their own; colours come one after the other. All sums are of integers, so the
+answer is the same on any number of threads.
+
+The thread that asks works, too, and waits for tasks that have begun, not for threads: where another program has the
+core of a helper it does the tasks itself. OpenMP waits for every thread at the end of every region, which takes
+milliseconds then (docs/scaling.md, "Threads"). One word says which tasks there are: their number, and the next one. A
+thread takes a task by adding one to the word. A colour does not end before its last task, so the arguments of a task
+stay as they are. Helpers look at the word for some 50 us, then sleep until the next pass.
+"""
+
+import ctypes
+import threading
+from functools import cache
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+
+from ..jit import Kernel, intrinsic, njit, types
+from ..state import Ints
+
+_WORD = ir.IntType(64)
+TASK = "void(int64, int64, int64, int64)"
+"""The signature of a kernel that does a task: address of its arguments (arguments.py), first, end, number of the
+thread."""
+_NEXT, _DONE, _ASLEEP, _KERNEL, _TABLE, _TASKS, _SEMAPHORE, _THREADS = 0, 8, 16, 24, 25, 26, 32, 40
+"""Places in a job's words; what several threads write has a cache line of its own. From _THREADS on a line for each
+thread: how long it has done tasks, ns, and room for the time."""
+_MONOTONIC, _SECOND = 1, 1_000_000_000
+"""The clock of that number counts from some moment on, in all threads alike; ns in a second."""
+_BITS, _MASK = 20, (1 << 20) - 1
+"""Of the next task in the word _NEXT; above it stands the number of tasks."""
+_LINE = 8
+"""Words in a line of the cache."""
+_LOOKS = 4000
+"""How often a helper looks for a task before it sleeps, and the asking thread before it lets others run. Chosen: some
+50 us, longer than what lies between two colours, much shorter than a step."""
+
+
+def _call(_: Any, kernel: Any, table: Any, first: Any, end: Any, thread: Any) -> Any:
+    def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        kind = ir.FunctionType(ir.VoidType(), [_WORD] * 4)
+        builder.call(builder.inttoptr(args[0], kind.as_pointer()), args[1:])
+        return context.get_dummy_value()
+
+    return types.void(*[types.int64] * 5), emit
+
+
+def _place(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    data = context.make_array(signature.args[0])(context, builder, args[0]).data
+    return builder.gep(data, [args[1]])
+
+
+def _added(_: Any, words: Any, at: Any, number: Any) -> Any:
+    def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.atomic_rmw("add", _place(context, builder, signature, args), args[2], "seq_cst")
+
+    return types.int64(words, at, number), emit
+
+
+def _swapped(_: Any, words: Any, at: Any, number: Any) -> Any:
+    def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.atomic_rmw("xchg", _place(context, builder, signature, args), args[2], "seq_cst")
+
+    return types.int64(words, at, number), emit
+
+
+def _loaded(_: Any, words: Any, at: Any) -> Any:
+    def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.load_atomic(_place(context, builder, signature, args), "acquire", 8)
+
+    return types.int64(words, at), emit
+
+
+def _read(_: Any, address: Any, k: Any) -> Any:
+    def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.load(builder.gep(builder.inttoptr(args[0], _WORD.as_pointer()), [args[1]]))
+
+    return types.int64(address, k), emit
+
+
+def _now(_: Any, words: Any, at: Any) -> Any:
+    def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        kind = ir.FunctionType(ir.IntType(32), [_WORD, _WORD.as_pointer()])
+        name = "clock_gettime"
+        ask = builder.module.globals.get(name) or ir.Function(builder.module, kind, name)
+        place = _place(context, builder, signature, args)
+        builder.call(ask, [_WORD(_MONOTONIC), place])
+        whole, rest = builder.load(place), builder.load(builder.gep(place, [_WORD(1)]))
+        return builder.add(builder.mul(whole, _WORD(_SECOND)), rest)
+
+    return types.int64(words, at), emit
+
+
+def _library(name: str, signature: Any) -> Any:
+    """A call of a function of the C library, whose answer is of no interest."""
+
+    def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        kind = ir.FunctionType(ir.IntType(32), [_WORD] * len(args))
+        builder.call(builder.module.globals.get(name) or ir.Function(builder.module, kind, name), args)
+        return context.get_dummy_value()
+
+    return signature, emit
+
+
+_call_task: Any = intrinsic(_call)
+_add: Any = intrinsic(_added)
+"""In a kernel: adds to a word, and returns what it was; two threads never get the same."""
+_swap: Any = intrinsic(_swapped)
+"""In a kernel: sets a word, and returns what it was. What the thread has written before is there for others that see
+it."""
+_load: Any = intrinsic(_loaded)
+"""In a kernel: a word that other threads write."""
+_time: Any = intrinsic(_now)
+"""In a kernel: the time, ns; two words at a place are its room."""
+_word_at: Any = intrinsic(_read)
+"""In a kernel: word ``k`` at an address."""
+_sched_yield: Any = intrinsic(lambda _: _library("sched_yield", types.void()))
+_sem_wait: Any = intrinsic(lambda _, semaphore: _library("sem_wait", types.void(semaphore)))
+_sem_post: Any = intrinsic(lambda _, semaphore: _library("sem_post", types.void(semaphore)))
+
+
+@njit("boolean(int64[::1], int64)", cache=True)
+def _do_one(job, thread):  # type: ignore[no-untyped-def]
+    """Does a task that nobody has taken; False where there is none."""
+    word = _load(job, _NEXT)
+    if word & _MASK >= word >> _BITS:
+        return False
+    word = _add(job, _NEXT, 1)
+    k = word & _MASK
+    if k >= word >> _BITS:
+        return False
+    tasks = _load(job, _TASKS)
+    first, end = _word_at(tasks, 2 * k), _word_at(tasks, 2 * k + 1)
+    own = _THREADS + _LINE * thread
+    begin = _time(job, own + 1)
+    _call_task(_load(job, _KERNEL), _load(job, _TABLE), first, end, thread)
+    job[own] += _time(job, own + 1) - begin
+    _add(job, _DONE, 1)
+    return True
+
+
+@njit("void(int64[::1], int64, int64)", cache=True, nogil=True)
+def _help(job, semaphore, thread):  # type: ignore[no-untyped-def]
+    """Does tasks for ever; sleeps where there has been none for a while."""
+    idle = 0
+    while True:
+        if _do_one(job, thread):
+            idle = 0
+            continue
+        idle += 1
+        if idle == _LOOKS:
+            _add(job, _ASLEEP, 1)
+            _sem_wait(semaphore)
+            idle = 0
+
+
+@njit("void(int64[::1], int64, int64, int64, int64, int64[::1])", cache=True)
+def _ask(job, semaphore, kernel, table, tasks, starts):  # type: ignore[no-untyped-def]
+    """Colour after colour; returns when all tasks are done."""
+    for colour in range(len(starts) - 1):
+        many = starts[colour + 1] - starts[colour]
+        job[_KERNEL], job[_TABLE], job[_TASKS] = kernel, table, tasks + 16 * starts[colour]
+        _swap(job, _DONE, 0)
+        _swap(job, _NEXT, many << _BITS)
+        if many > 1:
+            for _ in range(_swap(job, _ASLEEP, 0)):
+                _sem_post(semaphore)
+        while _do_one(job, 0):
+            pass
+        looked = 0
+        while _load(job, _DONE) < many:
+            looked += 1
+            if looked > _LOOKS:
+                _sched_yield()
+
+
+@njit("void(int64, int64, int64[:, ::1])", cache=True)
+def _alone(kernel, table, tasks):  # type: ignore[no-untyped-def]
+    """All tasks, one after the other."""
+    for k in range(len(tasks)):
+        _call_task(kernel, table, tasks[k, 0], tasks[k, 1], 0)
+
+
+class Team:
+    """So many threads, this one among them; they are there until the process ends: see ``team``."""
+
+    def __init__(self, threads: int) -> None:
+        self.threads = threads
+        size = _THREADS + _LINE * threads
+        room = np.zeros(size + _LINE, np.int64)
+        self._job: Ints = room[-(room.ctypes.data // room.itemsize) % _LINE :][:size]
+        self._semaphore = int(self._job[_SEMAPHORE:].ctypes.data)
+        ctypes.CDLL(None).sem_init(ctypes.c_void_p(self._semaphore), 0, 0)
+        for thread in range(1, threads):
+            arguments = self._job, self._semaphore, thread
+            threading.Thread(target=_help, args=arguments, name=f"helper {thread}", daemon=True).start()
+
+    @property
+    def helped(self) -> float:
+        """How long the threads besides this one have done tasks so far, all together, s."""
+        return float(self._job[_THREADS + _LINE :: _LINE].sum()) / _SECOND
+
+    def run(self, kernel: Kernel, table: int, tasks: Ints, starts: Ints) -> None:
+        """Does ``tasks`` (k, 2), first and end, by a ``kernel`` of the signature TASK with the arguments at the address
+        ``table``; those from ``starts[c]`` to ``starts[c + 1]``, at most 2^20, touch nothing in common.
+        """
+        if self.threads == 1:
+            _alone(kernel.address, table, tasks)
+        else:
+            _ask(self._job, self._semaphore, kernel.address, table, tasks.ctypes.data, starts)
+
+
+@cache
+def team(threads: int) -> Team:
+    """The team of so many threads of this process."""
+    return Team(threads)
