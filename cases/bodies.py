@@ -83,7 +83,16 @@ class Box(Primitive):
     """A crack that is there from the start, with ``generator = "structured"``."""
 
 
-class Plate(Primitive):
+class Symmetric(Primitive):
+    """What bodies have in common that are symmetric about the planes at which sectors are cut."""
+
+    aligned: bool | None = None
+    """Whether a half or a whole is meshed as quarters that have faces in common, with ``generator = "gmsh"``: the tets
+    at the axis are those of a quarter then, else up to twice as large. By default where the part erodes: the hole of a
+    rod is as deep in a whole as in a quarter (docs/numerics.md)."""
+
+
+class Plate(Symmetric):
     """A rectangular plate: ``thickness`` along ``axis``, ``width`` x ``height`` across it, centred on ``base``'s axis.
 
     ``base`` is the centre of the face from which the thickness is measured in the positive direction.
@@ -105,7 +114,7 @@ class Plate(Primitive):
     """A crack that is there from the start, with ``generator = "structured"``."""
 
 
-class Cylinder(Primitive):
+class Cylinder(Symmetric):
     """A solid cylinder; ``base`` is the centre of its lower end face."""
 
     shape: Literal["cylinder"]
@@ -120,7 +129,7 @@ class Cylinder(Primitive):
     """Extent along ``axis``."""
 
 
-class Tube(Primitive):
+class Tube(Symmetric):
     """A hollow cylinder."""
 
     shape: Literal["tube"]
@@ -137,7 +146,7 @@ class Tube(Primitive):
     """Extent along ``axis``."""
 
 
-class Sphere(Primitive):
+class Sphere(Symmetric):
     """A ball."""
 
     shape: Literal["sphere"]

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from conoid.cases import schema
-from conoid.cases.bodies import MeshFile
+from conoid.cases.bodies import Mesh, MeshFile, Symmetric
 from conoid.cases.library import material as find_material
 from conoid.cases.survey import Survey
 
@@ -74,10 +74,18 @@ def _built(case: schema.Case, folder: Path, say: Say, facts: Facts) -> Iterator[
     """The meshes of all parts by their numbers; those from files are measured."""
     for index, part in enumerate(case.parts):
         meshing = f"meshing {part.name}, part {index + 1} of {len(case.parts)}"
-        mesh = build_mesh(part.mesh, folder, key=f"parts[{index}].mesh", made=partial(say, meshing))
+        mesh = build_mesh(_asked(part), folder, key=f"parts[{index}].mesh", made=partial(say, meshing))
         if isinstance(part.mesh, MeshFile):
             facts.take(index, mesh)
         yield index, mesh
+
+
+def _asked(part: schema.Part) -> Mesh:
+    """The mesh of a part, with the default that its erosion decides."""
+    mesh = part.mesh
+    if isinstance(mesh, Symmetric) and mesh.aligned is None:
+        return mesh.model_copy(update={"aligned": part.erosion is not None})
+    return mesh
 
 
 def assembled(case: schema.Case, meshes: Iterable[tuple[int, TetMesh]], overlaps: bool = True) -> Whole:

@@ -185,7 +185,7 @@ def test_a_file_is_read_again_when_it_has_changed(tmp_path: Path) -> None:
 
 
 def test_reading_has_limits(tmp_path: Path) -> None:
-    (tmp_path / "long.inp").write_text("*NODE\n" + "".join(f"{i}, 0, 0, 0\n" for i in range(600_000)))
+    (tmp_path / "long.inp").write_text("*NODE\n" + "".join(f"{i}, 0, 0, 0\n" for i in range(1, 600_001)))
     file = MeshFile(shape="file", path="long.inp", unit=1.0)
     with pytest.raises(MeshError, match=r"memory"):
         build(file, tmp_path, limits=Limits(memory=160 * 2**20))

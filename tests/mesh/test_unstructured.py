@@ -84,6 +84,28 @@ def assert_quality(made: Generated, mesh: TetMesh) -> None:
     assert 5.5 < tets < 14
 
 
+@pytest.mark.parametrize("shape", ["plate", "cylinder", "tube", "sphere"])
+@pytest.mark.parametrize("sector", ["half", "full"])
+def test_an_aligned_mesh_has_the_tets_of_a_quarter_at_the_axis(shape: str, sector: str) -> None:
+    """One that is not has tets of up to twice the volume there, and no node on the axis."""
+    made = body(shape, axis="z", sector=sector, aligned=True)
+    quarter, share = build(body(shape, axis="z", sector="quarter"), HERE), {"half": 2, "full": 4}[sector]
+    mesh = check(build(made, HERE))
+    assert mesh.volumes().sum() == pytest.approx(share * quarter.volumes().sum(), rel=0.01)
+    assert len(mesh.tets) == pytest.approx(share * len(quarter.tets), rel=0.05)
+    assert set(face_counts(mesh.tets).tolist()) == {1, 2}
+    assert_quality(made, mesh)
+    if shape != "tube":
+        assert at_axis(made, mesh) == pytest.approx(at_axis(made, quarter), rel=0.15)
+
+
+def at_axis(made: Generated, mesh: TetMesh) -> float:
+    """Mean volume of the tets within an element of the axis z."""
+    x = mesh.points[:, :2] - np.array(centre(made))[:2]
+    near = np.linalg.norm(x[mesh.tets].mean(axis=1), axis=1) < made.element_size
+    return float(mesh.volumes()[near].mean())
+
+
 @pytest.mark.parametrize("shape", ["cylinder", "plate"])
 def test_end_faces_are_exactly_flat(shape: str) -> None:
     """A wall meets the whole face at once."""

@@ -58,7 +58,9 @@ def unstructured(body: Generated, key: str = "mesh") -> TetMesh:
 
 def _draw(gmsh: Any, body: Generated, scale: float) -> None:
     """The body in its frame, lengths over ``scale``: gmsh's tolerances are absolute."""
-    if isinstance(body, Box | Plate):
+    if isinstance(body, Plate | Cylinder | Tube | Sphere) and body.aligned and body.sector != "quarter":
+        _draw_quarters(gmsh, body, scale)
+    elif isinstance(body, Box | Plate):
         low, high = ([v / scale for v in corner] for corner in block(body))
         gmsh.model.occ.addBox(*low, *(b - a for a, b in zip(low, high, strict=True)))
     elif isinstance(body, Sphere):
@@ -67,6 +69,20 @@ def _draw(gmsh: Any, body: Generated, scale: float) -> None:
         _draw_cylinder(gmsh.model.occ, body, scale)
     else:
         raise MeshError(f"gmsh does not draw {body.shape}; use generator = 'structured'")
+
+
+def _draw_quarters(gmsh: Any, body: Plate | Cylinder | Tube | Sphere, scale: float) -> None:
+    """A half or a whole of a quarter and its images, which share their faces: gmsh puts nodes on these faces and on the
+    axis, most of which smoothing leaves near them.
+    """
+    occ = gmsh.model.occ
+    _draw(gmsh, body.model_copy(update={"sector": "quarter"}), scale)
+    made = occ.getEntities(3)
+    for normal in ((0, 1), (1, 0))[: 1 if body.sector == "half" else 2]:
+        images = occ.copy(made)
+        occ.mirror(images, *normal, 0, 0)
+        made = made + images
+    occ.fragment(made[:1], made[1:])
 
 
 def _draw_sphere(occ: Any, body: Sphere, scale: float) -> None:
