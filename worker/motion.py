@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .jit import njit, types
+from .jit import Kernel, njit, types
 from .parallel.arguments import Arguments, reader
 from .parallel.team import TASK, Team
 from .state import Ints, Nodes
@@ -43,18 +43,24 @@ class Leapfrog:
     def __init__(self, team: Team) -> None:
         self._team = team
         self._of_kick, self._of_move = Arguments(*_KICK), Arguments(*_MOVE)
+        self._n, self._tasks = 0, _tasks(0)
 
     def kick(self, nodes: Nodes, impulse_quantum: float, shorter: float) -> None:
         """v(n-1/2) to v*(n+1/2); ``impulse_quantum`` is the mean step over the force scale, N s; ``shorter``: a quarter
         of what the step ahead is shorter than the one behind, over the force scale, for the account ``stepping``, J.
         """
         table = self._of_kick.set(nodes.v, nodes.force, nodes.mass, nodes.stepping, impulse_quantum, shorter)
-        self._team.run(_kick, table, *_tasks(nodes.n))
+        self._run(_kick, table, nodes.n)
 
     def move(self, nodes: Nodes, dt: float, shorter: float) -> None:
         """x(n) to x(n+1), in a step ``dt``, s; ends the account that ``kick`` has begun, with the same f(n)."""
         table = self._of_move.set(nodes.x, nodes.v, nodes.force, nodes.stepping, dt, shorter)
-        self._team.run(_move, table, *_tasks(nodes.n))
+        self._run(_move, table, nodes.n)
+
+    def _run(self, kernel: Kernel, table: int, n: int) -> None:
+        if n != self._n:
+            self._n, self._tasks = n, _tasks(n)
+        self._team.run(kernel, table, *self._tasks)
 
 
 def _tasks(n: int) -> tuple[Ints, Ints]:

@@ -62,7 +62,7 @@ def test_half_flat_is_no_reason_to_say_anything(tmp_path: Path) -> None:
     assert (end.state, told(end)) == ("succeeded", [])
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_flat_is(tmp_path: Path, ranks: int) -> None:
     end = outcome(tmp_path, "1.1 ms", ranks)
     assert end.state == "failed"

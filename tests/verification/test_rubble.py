@@ -23,6 +23,7 @@ def test_what_is_driven_is_as_stiff_as_with_many_more_sweeps() -> None:
     assert few / converged < 0.6
 
 
+@pytest.mark.slow
 def test_what_flies_rebounds_as_with_many_more_sweeps() -> None:
     """From 200 m/s with 112; with five sweeps 40, so that the check can fail."""
     converged, own, few = (measure(press(sweeps, FLYING)).speed for sweeps in (80, None, 5))

@@ -192,11 +192,10 @@ class Elements:
         chunks.gather_peaks(self.peaks, self._scratches.peaks)
 
     def _tasks(self, block: Block, begin: int, end: int) -> Coloured:
-        if self._team.threads == 1:
-            return whole(begin, end)
         moved, known = self._coloured.get((block.part, begin), (-1, None))
         if known is None or moved != block.moved:
-            known = coloured(block, begin, end, self.model.nodes.n)
+            alone = self._team.threads == 1
+            known = whole(begin, end) if alone else coloured(block, begin, end, self.model.nodes.n)
             self._coloured[block.part, begin] = block.moved, known
         return known
 
