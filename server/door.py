@@ -1,4 +1,6 @@
-"""Middleware: who asks, and whether it is the turn of the request. What a user holds is bounded here (``crowd``)."""
+"""Middleware: who asks, and whether it is the turn of the request (``turns``). What a user holds is bounded here
+(``crowd``).
+"""
 
 import hashlib
 import time
@@ -14,9 +16,10 @@ from .lanes import asking
 from .service import Service
 from .store import Token
 from .tokens import check_token
+from .turns import Turns
 
 ALIVE = "/healthz"
-"""Is answered at once, whatever else the server does."""
+"""Waits for its turn, and for nothing else that the server does."""
 LOCAL_OWNER = "local"
 """Owns all runs of a server without access control."""
 _SEEN = 1000
@@ -32,10 +35,15 @@ class Door:
         self._app, self._service = app, service
         self._seen: OrderedDict[bytes, tuple[float, Token]] = OrderedDict()
         """By its hash: until when a token is taken for valid; after that the database is asked in its owner's lane."""
+        self._turns = Turns()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answers 429 and 503 itself where a request does not come in."""
-        if scope["type"] != "http" or scope["path"] == ALIVE:
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        if scope["path"] == ALIVE:
+            await self._turns.wait(_address(scope))
             await self._app(scope, receive, send)
             return
         began = False
@@ -70,13 +78,19 @@ class Door:
     async def _token(self, scope: Scope) -> Token | None:
         """The token of the request; None where it shows none that is valid. Raises ServiceError 429, 503, 507."""
         scheme, _, text = Headers(scope=scope).get("authorization", "").partition(" ")
-        if scheme.lower() != "bearer" or not self._service.settings.auth:
+        if not self._service.settings.auth:
+            await self._turns.wait(LOCAL_OWNER)
+            return None
+        if scheme.lower() != "bearer":
+            await self._turns.wait(_address(scope))
             return None
         shown = hashlib.sha256(text.strip().encode()).digest()
         until, known = self._seen.get(shown, (0.0, None))
+        who = known.owner if known is not None else _address(scope)
+        await self._turns.wait(who)
         if time.monotonic() < until:
             return known
-        asking.set(known.owner if known is not None else _address(scope))
+        asking.set(who)
         try:
             token = await self._service.lanes.run(check_token, self._service.store, text.strip())
         except SQLAlchemyError as error:

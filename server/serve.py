@@ -85,6 +85,7 @@ class _Server(uvicorn.Server):
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)
         if sockets and self.started:
+            connections.queue(sockets[0])
             address = announce(self._service, sockets[0], self._app.state.page_problem)
             self._writing = asyncio.create_task(self._write(address))
 

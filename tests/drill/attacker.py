@@ -37,8 +37,10 @@ class Attack:
     """Connections at a time."""
     reads: bool = True
     """Whether the answers are read."""
-    drips: bool = False
-    """Whether what is sent comes a byte at a time."""
+    drip: float = 0.0
+    """s after each byte, where what is sent comes a byte at a time; else 0."""
+    pause: float = 0.1
+    """s after which he connects again when he was sent away."""
 
 
 @dataclass
@@ -88,6 +90,11 @@ def half_a_header(target: Target) -> Iterator[bytes]:
     yield target.get("/v1/me")[:-2] + b"X-Long: "
 
 
+def no_http(target: Target) -> Iterator[bytes]:
+    while True:
+        yield b"\x16\x03\x01 no request\r\n\r\n"
+
+
 def half_a_body(target: Target) -> Iterator[bytes]:
     """All of a mebibyte but its end."""
     yield target.post("/v1/cases:validate", b"#" * ((1 << 20) - 1), length=1 << 20)
@@ -132,8 +139,9 @@ KINDS: dict[str, Attack] = {
     "idle connections of a user": Attack(once("/v1/me"), 300),
     "half bodies of a mebibyte": Attack(half_a_body, 400),
     "bodies in chunks without end": Attack(endless_chunks, 300),
-    "bodies a byte at a time": Attack(cases, 200, drips=True),
-    "headers a byte at a time": Attack(again("/v1/me"), 200, drips=True),
+    "bodies a byte at a time": Attack(cases, 200, drip=0.5),
+    "headers a byte at a time": Attack(again("/v1/me"), 200, drip=0.5),
+    "headers a byte at a time, at once": Attack(again("/v1/me", more=f"X-Long: {'x' * 20_000}\r\n"), 400, drip=1e-4),
     "10,000 events of 20 kB": Attack(again("/v1/runs/LONG/events?limit=10000"), 12),
     "10,000 events that nobody reads": Attack(again("/v1/runs/LONG/events?limit=10000"), 60, reads=False),
     "events from everywhere in a long journal": Attack(again("/v1/runs/LONG/events?after={n}&limit=10000"), 40),
@@ -157,6 +165,10 @@ KINDS: dict[str, Attack] = {
     "guessed tokens": Attack(guesses, 60),
     "many requests on one connection": Attack(many_at_once, 20),
     "cancels of a run": Attack(again("/v1/runs/RUN:cancel?x", method="POST"), 40),
+    "refusals without a token": Attack(again("/v1/runs", token=False), 60),
+    "health without a token": Attack(again("/healthz", token=False), 60),
+    "a connection for each request": Attack(again("/v1/me", more="Connection: close\r\n"), 60, pause=0.0),
+    "lines that are no HTTP": Attack(no_http, 200, pause=0.0),
     "sweeps": Attack(again("/v1/sweeps?limit=500"), 40),
     "addresses that are none": Attack(again("/v1/runs/{n}", "/%00{n}", "/v1/runs/%FF/files/x"), 60),
 }
@@ -172,23 +184,23 @@ def attack(kind: str, target: Target) -> None:
 
 
 def one(chosen: Attack, target: Target) -> None:
-    """Connects again when it was sent away, ten times a second at most."""
+    """Connects again when it was sent away."""
     while time.monotonic() < target.until:
         with suppress(OSError):
             place = urlsplit(target.url)
             with socket.create_connection((place.hostname or "", place.port or 0), timeout=60.0) as connection:
                 talk(chosen, target, connection)
-        time.sleep(0.1)
+        time.sleep(chosen.pause)
 
 
 def talk(chosen: Attack, target: Target, connection: socket.socket) -> None:
     for request in chosen.requests(target):
         if time.monotonic() > target.until:
             return
-        if chosen.drips:
+        if chosen.drip:
             for n in range(len(request)):
                 connection.sendall(request[n : n + 1])
-                time.sleep(0.5)
+                time.sleep(chosen.drip)
         connection.sendall(request)
         if chosen.reads and not answered(target, connection):
             return
@@ -203,7 +215,7 @@ def answered(target: Target, connection: socket.socket) -> bool:
     """Reads an answer; False where the connection is closed, or the answer has no end that is known."""
     with connection.makefile("rb") as answer:
         words = answer.readline().split()
-        target.answers[int(words[1]) if len(words) > 1 else 0] += 1
+        target.answers[int(words[1]) if len(words) > 1 and words[1].isdigit() else 0] += 1
         length = 0
         while line := answer.readline().strip().lower():
             if line.startswith(b"content-length:"):

@@ -2,6 +2,7 @@
 
 import logging
 import socket
+import struct
 import threading
 import time
 from collections.abc import Iterator
@@ -16,7 +17,7 @@ from conoid.server import auth, connections
 from conoid.server.app import opened
 from conoid.server.connections import Connection
 from conoid.server.quiet import Quiet
-from conoid.server.serve import _listening, _Server
+from conoid.server.serve import ADDRESS_FILE, _listening, _Server
 from conoid.server.settings import Settings
 from conoid.server.tokens import create_token
 
@@ -49,6 +50,23 @@ def knock(user: User) -> socket.socket:
     made = socket.create_connection((user.http.base_url.host, user.http.base_url.port))
     made.sendall(HALF)
     return made
+
+
+def test_few_connections_are_accepted_in_a_turn_of_the_loop_and_as_many_wait_as_may_be_open(settings: Settings) -> None:
+    assert connections.options()["backlog"] <= 4
+    with opened(settings) as service, _listening(settings) as listener:
+        server = _Server(service)
+        thread = threading.Thread(target=server.run, args=([listener],))
+        thread.start()
+        try:
+            deadline = time.monotonic() + PATIENCE
+            while not (settings.runs / ADDRESS_FILE).exists() and time.monotonic() < deadline:
+                time.sleep(0.01)
+            longest = struct.unpack_from("=8xIIIIII", listener.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, 104))[5]
+        finally:
+            server.should_exit = True
+            thread.join(PATIENCE)
+    assert longest == min(connections._MOST, int(Path("/proc/sys/net/core/somaxconn").read_text()))
 
 
 def test_half_requests_keep_nobody_out(ann: User) -> None:
