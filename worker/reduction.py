@@ -1,147 +1,139 @@
-"""The reduction of the step: the one maximum over all ranks by which they agree on what the next step does.
+"""The reduction of the step: what all ranks agree on, by which they decide alike what the next step does.
 
-A field is one int64 word. This file alone decides where a field is and how it is encoded: as an integer, as a flag (0
-or 1), or as the bits of a non-negative float64. Such bits have the order of the floats, and a NaN is larger than any
-number, so that the maximum over int64 words is right for every field. Behind the fields there
-are words for every rank: the others give less there than the rank itself, so that the maximum is its own word.
+A maximum of int64 words over all ranks, one word a field: an integer, a flag (0 or 1), or the bits of a float64 that is
+not negative. Such bits have the order of the floats, and a NaN is larger than any number, so that the maximum of words
+is right for every field. Where parts fracture a word for every rank follows. Where there is contact a sum of six words
+is added up at the same time. One rank sends nothing and encodes nothing.
 """
 
-from typing import Generic, Self, TypeVar, overload
+import struct
+from operator import attrgetter
+from typing import Self
 
 import numpy as np
 
-from .parallel import fixed_point
 from .parallel.comm import Comm, Pending
 from .state import Ints
 
 _COSTS, _UNSETTLED = 4, 2
-"""Words of a rank about what contact takes, and about what its sweeps leave undone."""
-Value = TypeVar("Value", int, bool, float)
-
-
-class _Field(Generic[Value]):
-    """A word of a record; the places follow the order of the definitions."""
-
-    def __set_name__(self, owner: "type[Fields]", name: str) -> None:
-        self.place = owner.size
-        owner.size += 1
-
-    @overload
-    def __get__(self, record: None, owner: "type[Fields]") -> Self: ...
-    @overload
-    def __get__(self, record: "Fields", owner: "type[Fields]") -> Value: ...
-    def __get__(self, record: "Fields | None", owner: "type[Fields]") -> Self | Value:
-        return self if record is None else self._decoded(int(record.words[self.place]))
-
-    def __set__(self, record: "Fields", value: Value) -> None:
-        record.words[self.place] = self._encoded(value)
-
-    def word(self, record: "Fields") -> int:
-        """The field of a record as it is encoded."""
-        return int(record.words[self.place])
-
-    def _decoded(self, word: int) -> Value:
-        raise NotImplementedError
-
-    def _encoded(self, value: Value) -> int:
-        return int(value)
-
-
-class Number(_Field[int]):
-    """An integer."""
-
-    def _decoded(self, word: int) -> int:
-        return word
-
-
-class Flag(_Field[bool]):
-    """True where it is true on any rank."""
-
-    def _decoded(self, word: int) -> bool:
-        return bool(word)
-
-
-class Real(_Field[float]):
-    """A float64 that is not negative, or NaN without sign; by its bits."""
-
-    def _decoded(self, word: int) -> float:
-        return fixed_point.float_of(word)
-
-    def _encoded(self, value: float) -> int:
-        return fixed_point.bits_of(value)
+"""Words of the sum: what contact has taken, and what its sweeps leave undone."""
 
 
 class Fields:
     """The fields of the reduction."""
 
-    size = 0
-    """Number of fields."""
+    def __init__(self) -> None:
+        """Nothing is asked for, nothing limits."""
+        self.limit = 0.0
+        """Largest one-over-stable-step of all tets, 1/s; NaN when some tet is inverted or not a number."""
+        self.force = 0.0
+        """Largest contribution to a nodal force, N."""
+        self.stop = 0
+        """Reason to stop, 0 for none (worker/loop.py): the largest wins."""
+        self.report = False
+        """Rank 0 wants the loads of all ranks."""
+        self.groups = False
+        """Rank 0 wants the loads of groups besides."""
+        self.approach = 0.0
+        """Largest one-over-step in which a node passes half of a tet that it meets, 1/s."""
+        self.opening = False
+        """A crack has become so wide that its sides are surface from now on."""
+        self.stray = False
+        """In the next step a slot will have strayed so far that it is registered anew."""
+        self.search = False
+        """The surface of a rank has used up the last search for contact."""
+        self.worn = 0
+        """What a rank has found of worn-out tets (elements/wear.py)."""
+        self.breaking = 0
+        """What a rank has found of facets that break (fracture/stage.py)."""
+        self.grown = False
+        """A rank has more surface nodes than the balance allows it."""
+        self.checkpoint = False
+        """A checkpoint is asked for."""
+        self.snapshot = False
+        """A snapshot of the fragments is due."""
+        self.nodes = 0
+        """All nodes; a rank knows of those that have separated elsewhere since the last reduction when this is done."""
 
-    limit = Real()
-    """Largest one-over-stable-step of all tets, 1/s; NaN when some tet is inverted or not a number."""
-    force = Real()
-    """Largest contribution to a nodal force, N."""
-    stop = Number()
-    """Reason to stop, 0 for none (worker/loop.py): the largest wins."""
-    report = Flag()
-    """Rank 0 wants the loads of all ranks."""
-    groups = Flag()
-    """Rank 0 wants the loads of groups besides."""
-    approach = Real()
-    """Largest one-over-step in which a node passes half of a tet that it meets, 1/s."""
-    opening = Flag()
-    """A crack has become so wide that its sides are surface from now on."""
-    stray = Flag()
-    """In the next step a slot will have strayed so far that it is registered anew."""
-    search = Flag()
-    """The surface of a rank has used up the last search for contact."""
-    worn = Number()
-    """What a rank has found of worn-out tets (elements/wear.py)."""
-    breaking = Number()
-    """What a rank has found of facets that break (fracture/stage.py)."""
-    grown = Flag()
-    """A rank has more surface nodes than the balance allows it."""
-    checkpoint = Flag()
-    """A checkpoint is asked for."""
-    snapshot = Flag()
-    """A snapshot of the fragments is due."""
-    nodes = Number()
-    """All nodes; a rank knows of those that have separated elsewhere since the last reduction when this one is done."""
+    def pack(self, words: Ints) -> None:
+        """Encodes the fields in the first ``words``."""
+        _LAYOUT.pack_into(words.data, 0, *_values(self))
 
-    def __init__(self, ranks: int = 1) -> None:
-        """A word or some for each of the ``ranks`` stand behind the fields."""
-        self.words: Ints = np.zeros(self.size + (1 + _COSTS + _UNSETTLED) * ranks, np.int64)
-        """What the ranks exchange."""
-        self.touched: Ints = self.words[self.size :][:ranks]
+    def unpack(self, words: Ints) -> None:
+        """Takes the fields that are encoded in the first ``words``."""
+        vars(self).update(zip(NAMES, _LAYOUT.unpack_from(words.data), strict=True))
+
+
+NAMES = tuple(vars(Fields()))
+"""Of the fields, in the order of their words."""
+_values = attrgetter(*NAMES)
+_LAYOUT = struct.Struct("=" + "".join("d" if isinstance(value, float) else "q" for value in vars(Fields()).values()))
+
+
+class Offer(Fields):
+    """What a rank gives to a reduction."""
+
+    def __init__(self, ranks: int) -> None:
+        """Of so many."""
+        super().__init__()
+        self.touched: Ints = np.zeros(ranks, np.int64)
         """(ranks,) whom the facets that break concern (fracture/separation.py)."""
-        each = self.words[self.size + ranks :].reshape(ranks, -1)
-        self.costs: Ints = each[:, :_COSTS]
-        """(ranks, 4) what contact has taken from the bodies on each rank (contact/account.py)."""
-        self.unsettled: Ints = each[:, _COSTS:]
-        """(ranks, 2) what the sweeps of contact leave undone on each rank (contact/need.py)."""
+        self.sums: Ints = np.zeros(_COSTS + _UNSETTLED, np.int64)
+        self.costs: Ints = self.sums[:_COSTS]
+        """(4,) what contact has taken from the bodies on this rank (contact/account.py)."""
+        self.unsettled: Ints = self.sums[_COSTS:]
+        """(2,) what the sweeps of contact leave undone on this rank (contact/need.py)."""
 
 
 class StepReduction(Fields):
     """What all ranks have agreed on in the last reduction; ``own`` is what this rank gives to the next one."""
 
-    def __init__(self, ranks: int = 1, rank: int = 0) -> None:
-        """On this ``rank`` of so many."""
-        super().__init__(ranks)
-        self.own = Fields(ranks)
-        for words in (self.own.costs, self.own.unsettled):
-            words[np.arange(ranks) != rank] = np.iinfo(np.int64).min
+    def __init__(self, ranks: int = 1, *, fractures: bool = True, contact: bool = True) -> None:
+        """On so many ranks; whether parts of the case fracture, and whether there is contact."""
+        super().__init__()
+        self.own = Offer(ranks)
+        self._alone, self._contact = ranks == 1, contact
+        self._given, self._agreed = (np.zeros(len(NAMES) + ranks * fractures, np.int64) for _ in range(2))
+        self.touched: Ints = self.own.touched if self._alone else self._agreed[len(NAMES) :]
+        """(ranks,) the maximum of what the ranks have given."""
+        self._sums: Ints = np.zeros(_COSTS + _UNSETTLED, np.int64)
+        self.costs: Ints = self._sums[:_COSTS]
+        """(4,) of all ranks."""
+        self.unsettled: Ints = self._sums[_COSTS:]
+        """(2,) of all ranks."""
+        self._pending: list[Pending] = []
 
     def keep(self) -> Ints:
         """(fields,) what a run that goes on must know, on any number of ranks."""
-        return self.words[: self.size].copy()
+        words = np.zeros(len(NAMES), np.int64)
+        self.pack(words)
+        return words
 
     def resume(self, words: Ints) -> None:
         """Takes it back."""
-        self.words[: self.size] = words
+        self.unpack(words)
 
-    def begin(self, comm: Comm) -> Pending:
-        """Starts the reduction; the fields are those of all ranks once it is finished. All ranks take part."""
-        return comm.begin_maximum(self.own.words, self.words)
+    def begin(self, comm: Comm) -> Self:
+        """Starts the reduction. All ranks take part."""
+        own = self.own
+        if self._alone:
+            vars(self).update(zip(NAMES, _values(own), strict=True))
+            self._sums[:] = own.sums
+            return self
+        own.pack(self._given)
+        self._given[len(NAMES) :] = own.touched[: len(self.touched)]
+        self._pending = [comm.begin_maximum(self._given, self._agreed)]
+        if self._contact:
+            self._pending.append(comm.begin_sum(own.sums, self._sums))
+        return self
+
+    def finish(self) -> None:
+        """Returns when the fields are those of all ranks."""
+        if self._alone:
+            return
+        for pending in self._pending:
+            pending.finish()
+        self.unpack(self._agreed)
 
     def begin_again(self) -> None:
         """Clears what was asked for once: a run that goes on from a checkpoint does not stop or report again, and

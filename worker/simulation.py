@@ -96,7 +96,7 @@ class Simulation:
 
     def limiting_id(self) -> int:
         """The tet that holds the time step down, the smallest id when several do; all ranks take part."""
-        mine = self.elements.limit_bits == StepReduction.limit.word(self.reduction)
+        mine = self.elements.limit_bits == fixed_point.bits_of(self.reduction.limit)
         return -int(self.comm.maximum(np.array([-float(self.elements.limiting) if mine else -np.inf]))[0])
 
     def limiting_tet(self) -> str:
@@ -186,7 +186,8 @@ def _assemble(
         contact=contact, erosion=erosion, fracture=fracture, clock=clock, ledger=ledger, probes=probes, timers=timers,
         record=Record(model, fracture, comm) if fracture is not None else None,
         crushing=Crushing.of(case, model, comm, clock),
-        neighbours=neighbours, floor=_force_floor(model, comm), reduction=StepReduction(comm.size, comm.rank),
+        neighbours=neighbours, floor=_force_floor(model, comm),
+        reduction=StepReduction(comm.size, fractures=case.fractures, contact=contact is not None),
         assembled=float(comm.maximum(np.array([worked(comm) - began]))[0]),
     )  # fmt: skip
 

@@ -116,7 +116,7 @@ def second_half(sim: Simulation) -> None:
             own = sim.reduction.own
             own.search, own.approach, own.opening = sim.contact.spent(nodes), sim.contact.approach, sim.contact.opening
             own.stray = sim.contact.stray
-            own.costs[sim.comm.rank], own.unsettled[sim.comm.rank] = sim.contact.costs, sim.contact.need.unsettled
+            own.costs[:], own.unsettled[:] = sim.contact.costs, sim.contact.need.unsettled
     _elements(sim, clock.dt, sim.fracture)  # 12 to 14
     if sim.crushing is not None:
         with sim.timers.phase("elements"):
@@ -146,10 +146,10 @@ def _elements(sim: Simulation, dt: float, fracture: Fracture | None) -> None:
         if sim.erosion is not None:
             own.worn = max(own.worn, sim.erosion.strikes())
         own.nodes = sim.model.nodes_global
-        pending = reduction.begin(sim.comm)
+        reduction.begin(sim.comm)
         if fracture is None:
             elements.finish()
-        pending.finish()
+        reduction.finish()
         sim.model.nodes_global = reduction.nodes
     if not (math.isfinite(reduction.limit) and math.isfinite(reduction.force)):
         raise PhysicsError(f"{_when(sim)}: {sim.limiting_tet()} {failed.why(sim)}")

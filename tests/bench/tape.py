@@ -64,6 +64,10 @@ class Recorder:
             self._crowd = 1.0
         return _Noted(self, self._comm.begin_maximum(words, result), [result])
 
+    def begin_sum(self, words: Ints, result: Ints) -> Pending:
+        """See Comm."""
+        return _Noted(self, self._comm.begin_sum(words, result), [result])
+
     def exchange(self, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: Tag) -> Exchange:
         """See Comm."""
         return _Noted(self, self._comm.exchange(sends, receives, tag), [words for _, words in receives])
@@ -139,6 +143,8 @@ class Player:
         self.note(enters=True)
         self.posted()
         return _Played(self, {"leaves": 1, "size": words.nbytes * self.size}, [], [result])
+
+    begin_sum = begin_maximum
 
     def exchange(self, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: Tag) -> Exchange:
         """See Comm."""

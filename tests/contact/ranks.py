@@ -73,6 +73,11 @@ class ThreadComm:
         self.sent.collective(values.nbytes)
         return np.asarray(np.max(self._table(values.copy()), axis=0))
 
+    def begin_sum(self, words: Ints, result: Ints) -> "Finished":
+        self.sent.collective(words.nbytes)
+        result[:] = np.sum(self._table(words.copy()), axis=0)
+        return Finished()
+
     def begin_maximum(self, words: Ints, result: Ints) -> "Finished":
         self.sent.collective(words.nbytes)
         result[:] = np.max(self._table(words.copy()), axis=0)

@@ -31,6 +31,7 @@ def talk(comm: Comm) -> list[tuple[str, dict[str, int]]]:
         "sum": lambda: comm.sum(words),
         "maximum": lambda: comm.maximum(np.zeros(2)),
         "begin_maximum": lambda: comm.begin_maximum(words, result).finish(),
+        "begin_sum": lambda: comm.begin_sum(words, result).finish(),
         "share": lambda: comm.share(bytes(1000)),
         "barrier": comm.barrier,
     }

@@ -23,6 +23,7 @@ KNOWN = {
     "sum": (0, 0, 1, 72),
     "maximum": (0, 0, 1, 16),
     "begin_maximum": (0, 0, 1, 72),
+    "begin_sum": (0, 0, 1, 72),
 }
 """Messages, their bytes, collectives and what a rank gives to them; nothing is sent to itself; an empty message
 is sent by ``trade`` alone."""

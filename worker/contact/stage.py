@@ -166,8 +166,8 @@ class Contact:
 
     def agree(self, all_ranks: StepReduction) -> None:
         """Takes what all ranks have found in the step; all ranks take part."""
-        self.need.agree(all_ranks.unsettled.sum(axis=0))
-        self.books.agreed = all_ranks.costs.sum(axis=0).reshape(2, 2)
+        self.need.agree(all_ranks.unsettled)
+        self.books.agreed = all_ranks.costs.reshape(2, 2)
         self.searches.due |= all_ranks.search
         self.found.stray = all_ranks.stray
         self.limit = all_ranks.approach

@@ -51,6 +51,10 @@ class MpiComm:
         self.sent.collective(words.nbytes)
         return _MpiPending(self, self._world.Iallreduce(words, result, self._mpi.MAX))
 
+    def begin_sum(self, words: Ints, result: Ints) -> Pending:
+        self.sent.collective(words.nbytes)
+        return _MpiPending(self, self._world.Iallreduce(words, result, self._mpi.SUM))
+
     def sum(self, words: Ints) -> Ints:
         result = np.empty_like(words)
         self.sent.collective(words.nbytes)
