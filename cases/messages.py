@@ -44,6 +44,8 @@ class Started(Message, frozen=True):
     end_time: float
     setup: float
     parts: dict[str, int]
+    threads: int = 1
+    """Of each rank."""
 
 
 class Energy(msgspec.Struct, kw_only=True, frozen=True):
@@ -122,6 +124,12 @@ class Load(Message, frozen=True):
     """That the rank puts into them."""
     outside: list[int] = []
     """Nodes of the surface that each rank owns."""
+    serial: list[float] = []
+    """Wall time in which one thread of the rank works, s, but for the waiting."""
+    parallel: list[float] = []
+    """Wall time in regions, whose tasks the threads of the rank share, s."""
+    helped: list[float] = []
+    """That all threads of the rank but the first have done tasks, together, s."""
 
 
 class Counts(Message, frozen=True):

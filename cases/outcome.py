@@ -63,6 +63,8 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     steps: int | None = None
     time: float = math.nan
     ranks: int = 1
+    threads: int = 1
+    """Of each rank."""
     elapsed: float = math.nan
     setup: float = math.nan
     """s from the worker's start to its first step."""
@@ -102,7 +104,14 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     compressed: list[Compressed] = []
     """Of each part that breaks in tension alone and has been under compression, the hardest first."""
     phases: dict[str, list[float]] = {}
-    """CPU seconds per phase, one number a rank."""
+    """CPU seconds per phase, one number a rank; of its first thread."""
+    serial: dict[str, list[float]] = {}
+    """Of the wall time of each phase, s, one number a rank: what one thread of the rank did alone, but for the waiting
+    for other ranks. It limits what more threads can gain. Other programs on the same cores make it larger."""
+    parallel: dict[str, list[float]] = {}
+    """The rest of it: in regions, whose tasks the threads of a rank share; with one thread, what more could share."""
+    helped: list[float] = []
+    """s that all threads of a rank but its first have done tasks, together; at most threads - 1 times ``parallel``."""
     without: list[str] = []
     """Stages that the case does not have (cases/stages.py): none of its phases has computed them."""
     peak_memory: list[int] = []

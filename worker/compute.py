@@ -107,7 +107,8 @@ def _resumed(case: Case, folder: Path, comm: Comm, journal: Journal | None) -> t
     assert found is not None
     place, manifest = found
     parcel = checkpoint.read(place, manifest, comm)
-    sim = simulation.resume(case, route(parcel, case.run.cut_scale, comm), comm, Timers(comm))
+    timers = Timers(comm, team(case.run.threads))
+    sim = simulation.resume(case, route(parcel, case.run.cut_scale, comm), comm, timers)
     sim.reduction.begin_again()
     log.info("goes on from %s, step %d, t %.6g s", place.name, sim.clock.step, sim.clock.t)
     return sim, replace(Start(**parcel.known["start"]), resumed=True)
@@ -138,8 +139,13 @@ def _announce(sim: Simulation, journal: Journal | None, setup: float) -> None:
     journal.write(messages.Status, state=State.RUNNING)
     journal.write(
         messages.Started, ranks=sim.comm.size, elements=model.elements_global, nodes=model.nodes_global,
-        end_time=sim.case.run.end_time, setup=setup, parts=parts,
+        end_time=sim.case.run.end_time, setup=setup, parts=parts, threads=sim.case.run.threads,
     )  # fmt: skip
+
+
+def _by_phase(seconds: list[dict[str, float]]) -> dict[str, list[float]]:
+    """One number a rank; nothing where this rank does not have them."""
+    return {name: [each[name] for each in seconds] for name in PHASES} if seconds else {}
 
 
 def _sum_up(
@@ -152,7 +158,8 @@ def _sum_up(
     elapsed: float,
 ) -> Outcome:
     sim = loop.sim
-    seconds = sim.comm.gather(sim.timers.seconds)
+    sim.timers.since_last()
+    spent = sim.comm.gather(sim.timers.spent)
     total_cpu = sum(sim.comm.gather(cpu) or [])
     memory = sim.comm.gather(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
     hexdigest = digest.digest(sim.model, sim.comm, [sim.elements.pressure] if sim.elements.split else [])
@@ -185,7 +192,9 @@ def _sum_up(
         compressed=compressed,
         rebalances=loop.balance.events, balancing_cost=loop.balance.spent,
         balancing_saved=loop.balance.saved,
-        phases={name: [s[name] for s in seconds] for name in PHASES} if seconds else {},
+        threads=sim.case.run.threads, phases=_by_phase([each.cpu for each in spent or []]),
+        serial=_by_phase([each.serial for each in spent or []]),
+        parallel=_by_phase([each.parallel for each in spent or []]), helped=[each.helped for each in spent or []],
         without=without(sim.case), peak_memory=memory or [],
         element_updates_per_second=(loop.updates - start.updates) / total_cpu if total_cpu > 0.0 else 0.0,
         reference=checks,

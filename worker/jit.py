@@ -198,21 +198,22 @@ harm. It changes no value."""
 
 
 class _Loading:
-    """CPU seconds of this thread in loading kernels; a kernel that another one loads is within its time."""
+    """CPU and wall seconds of this thread in loading kernels; a kernel that another one loads is within its time."""
 
     def __init__(self) -> None:
-        self.spent = 0.0
+        self.spent = self.passed = 0.0
         self._depth = 0
 
     def __enter__(self) -> None:
         if not self._depth:
-            self._began = time.thread_time()
+            self._began = time.thread_time(), time.monotonic()
         self._depth += 1
 
     def __exit__(self, *_: object) -> None:
         self._depth -= 1
         if not self._depth:
-            self.spent += time.thread_time() - self._began
+            self.spent += time.thread_time() - self._began[0]
+            self.passed += time.monotonic() - self._began[1]
 
 
 _loading = _Loading()
@@ -240,3 +241,8 @@ _begin()
 def cpu_time() -> float:
     """CPU time of this thread so far without the loading of kernels, s: what the work itself costs, in any step."""
     return time.thread_time() - _loading.spent
+
+
+def wall_time() -> float:
+    """s on a clock of this process that stands still while kernels are loaded."""
+    return time.monotonic() - _loading.passed

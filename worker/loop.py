@@ -285,13 +285,13 @@ class Loop:
     def _report(self) -> None:
         """Progress and loads to the journal; all ranks take part."""
         sim, clock = self.sim, self.sim.clock
-        seconds, waiting = sim.timers.since_last()
+        spent = sim.timers.since_last()
         with sim.timers.phase("output"):
             limiter = sim.limiter()
             outside = sim.contact.outside if sim.contact is not None else 0
-            sent = {"waiting": waiting, "outside": outside, **sim.comm.sent.since_last()}
+            sent = {"outside": outside, **spent.of_all_phases(), **sim.comm.sent.since_last()}
             ending = clock.done or bool(sim.reduction.stop)
-            loads = sim.comm.share((seconds, sent, self._counter.due(sim, time.monotonic(), ending=ending)))
+            loads = sim.comm.share((spent.cpu, sent, self._counter.due(sim, time.monotonic(), ending=ending)))
             if loads[0][2]:
                 self._counter.find(sim)
             sim.count_nodes()

@@ -149,7 +149,7 @@ def build(case: Case, folder: Path, comm: Comm, say: Say = quiet) -> Simulation:
     say("setting up the first step")
     scene = conditions.build(case, model, piece.loads, comm)
     told = conditions.start(case, model, scene, comm)
-    sim = _assemble(case, model, piece.neighbours, scene, piece.node_volume, comm, Timers(comm))
+    sim = _assemble(case, model, piece.neighbours, scene, piece.node_volume, comm, Timers(comm, team(case.run.threads)))
     sim.warnings = *piece.warnings, *told
     sim.probes.require_tets(case)
     if sim.contact is not None:

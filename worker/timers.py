@@ -1,11 +1,17 @@
-"""CPU seconds per phase of the step, by the clock of this thread.
+"""Seconds per phase of the step: CPU time by the clock of this thread, and wall time inside and outside regions.
 
 MPI polls while it waits: what a phase spends in calls that wait for other ranks counts as ``exchange``, whichever phase
 it is in; the other phases are work. Kernels are loaded at their first call: that counts in no phase.
+
+A region is a call of ``Team.run``, whose tasks all threads of the rank share. Wall time within regions is ``parallel``,
+the rest but for the waiting is ``serial``: one thread works then, and the others of the rank have nothing to do.
 """
 
-from .jit import cpu_time
+from dataclasses import dataclass, field
+
+from .jit import cpu_time, wall_time
 from .parallel.comm import Comm
+from .parallel.team import Team
 
 PHASES = ("elements", "exchange", "nodes", "contact", "fracture", "output", "balance", "rest")
 """``rest`` is what lies between the others."""
@@ -16,61 +22,106 @@ def worked(comm: Comm) -> float:
     return cpu_time() - comm.waited
 
 
-class Timers:
-    """Accumulates CPU time per phase."""
+def _none() -> dict[str, float]:
+    return dict.fromkeys(PHASES, 0.0)
 
-    def __init__(self, comm: Comm) -> None:
-        self._comm = comm
+
+def _less(now: dict[str, float], before: dict[str, float]) -> dict[str, float]:
+    return {name: now[name] - before[name] for name in PHASES}
+
+
+@dataclass
+class Spent:
+    """s by phase, and of all phases the waiting."""
+
+    cpu: dict[str, float] = field(default_factory=_none)
+    """Of this thread."""
+    serial: dict[str, float] = field(default_factory=_none)
+    """Wall time outside regions, but for the waiting. Where others use the cores, too, it has their time in it."""
+    parallel: dict[str, float] = field(default_factory=_none)
+    """Wall time within regions."""
+    waiting: float = 0.0
+    """CPU time in calls that wait for other ranks; ``exchange`` of ``cpu`` has it, too."""
+    helped: float = 0.0
+    """That the other threads have done tasks, all together."""
+
+    def since(self, before: "Spent") -> "Spent":
+        """What has been added."""
+        return Spent(
+            _less(self.cpu, before.cpu), _less(self.serial, before.serial), _less(self.parallel, before.parallel),
+            self.waiting - before.waiting, self.helped - before.helped,
+        )  # fmt: skip
+
+    def of_all_phases(self) -> dict[str, float]:
+        """What messages.Load has besides CPU time by phase."""
+        return {
+            "serial": sum(self.serial.values()), "parallel": sum(self.parallel.values()), "waiting": self.waiting,
+            "helped": self.helped,
+        }  # fmt: skip
+
+    def copy(self) -> "Spent":
+        """As it is now."""
+        return Spent(dict(self.cpu), dict(self.serial), dict(self.parallel), self.waiting, self.helped)
+
+
+class Timers:
+    """Accumulates time per phase."""
+
+    def __init__(self, comm: Comm, team: Team) -> None:
+        self._comm, self._team = comm, team
+        self.spent = Spent()
         self.begin()
-        self.seconds = dict.fromkeys(PHASES, 0.0)
-        self._reported = dict.fromkeys(PHASES, 0.0)
-        self._inner = 0.0
-        self._booked = self._told = 0.0
-        """Of the waiting: what has been added to ``exchange``, and how much of it has been reported."""
+
+    @property
+    def seconds(self) -> dict[str, float]:
+        """CPU time by phase so far, s."""
+        return self.spent.cpu
 
     def begin(self) -> None:
         """Counts ``rest`` from here on."""
-        self._asked = cpu_time()
+        self._phase = "rest"
+        self._marks = cpu_time(), self._comm.waited, wall_time(), self._team.within
+        for each in (self.spent.cpu, self.spent.serial, self.spent.parallel):
+            each["rest"] = 0.0
+        self._reported, self._helped = self.spent.copy(), self._team.helped
 
     def phase(self, name: str) -> "_Phase":
-        """Adds the CPU time of the block to a phase; a phase within it takes its own time out."""
+        """Adds the time of the block to a phase; a phase within it takes its own time out."""
         return _Phase(self, name)
 
-    def enter(self) -> tuple[float, float, float]:
-        """CPU time and waiting so far, and the time of phases so far that lie within the one that goes on."""
-        outside, self._inner = self._inner, 0.0
-        return cpu_time(), self._comm.waited - self._booked, outside
+    def switch(self, name: str) -> str:
+        """Ends the present phase, which it returns, and begins another one."""
+        now = cpu_time(), self._comm.waited, wall_time(), self._team.within
+        cpu, idle, wall, within = (new - old for new, old in zip(now, self._marks, strict=True))
+        ended, spent = self._phase, self.spent
+        spent.cpu[ended] += cpu - idle
+        spent.parallel[ended] += within
+        spent.serial[ended] += wall - within - idle
+        if idle:
+            spent.cpu["exchange"] += idle
+            spent.waiting += idle
+        self._phase, self._marks = name, now
+        return ended
 
-    def leave(self, name: str, start: float, waited: float, outside: float) -> None:
-        """The phase that has been entered ends."""
-        spent = cpu_time() - start
-        idle = self._comm.waited - self._booked - waited
-        self._booked += idle
-        self.seconds[name] += spent - self._inner - idle
-        self.seconds["exchange"] += idle
-        self._inner = outside + spent
-
-    def since_last(self) -> tuple[dict[str, float], float]:
-        """Seconds per phase since the last call, and how many of ``exchange`` were waiting; asked between phases."""
-        spent = cpu_time() - self._asked
-        self.begin()
-        self.seconds["rest"] += spent - (sum(self.seconds.values()) - sum(self._reported.values()))
-        delta = {name: self.seconds[name] - self._reported[name] for name in PHASES}
-        waiting = self._booked - self._told
-        self._reported, self._told = dict(self.seconds), self._booked
-        return delta, waiting
+    def since_last(self) -> Spent:
+        """What was spent since the last call; asked between phases."""
+        self.switch(self._phase)
+        self.spent.helped = self._team.helped - self._helped
+        added = self.spent.since(self._reported)
+        self._reported = self.spent.copy()
+        return added
 
 
 class _Phase:
     """A block of the step; there are two dozen in every step, too many for generators."""
 
-    __slots__ = ("_entered", "_name", "_timers")
+    __slots__ = ("_name", "_outer", "_timers")
 
     def __init__(self, timers: Timers, name: str) -> None:
         self._timers, self._name = timers, name
 
     def __enter__(self) -> None:
-        self._entered = self._timers.enter()
+        self._outer = self._timers.switch(self._name)
 
     def __exit__(self, *_: object) -> None:
-        self._timers.leave(self._name, *self._entered)
+        self._timers.switch(self._outer)

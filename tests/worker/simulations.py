@@ -12,6 +12,7 @@ from conoid.worker import assembly, simulation, step
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.migration import checkpoint
 from conoid.worker.migration.route import route
+from conoid.worker.parallel.team import team
 from conoid.worker.simulation import Simulation
 from conoid.worker.timers import Timers
 
@@ -54,6 +55,6 @@ def kept_again(sim: Simulation, case: schema.Case, folder: Path) -> Simulation:
     place, manifest, _ = checkpoint.latest(folder)
     checkpoint.require_same(case, manifest)
     arrived = route(checkpoint.read(place, manifest, sim.comm), (1.0, 1.0, 1.0), sim.comm)
-    resumed = simulation.resume(case, arrived, sim.comm, Timers(sim.comm))
+    resumed = simulation.resume(case, arrived, sim.comm, Timers(sim.comm, team(case.run.threads)))
     resumed.reduction.begin_again()
     return resumed

@@ -8,7 +8,8 @@ The thread that asks works, too, and waits for tasks that have begun, not for th
 core of a helper it does the tasks itself. OpenMP waits for every thread at the end of every region, which takes
 milliseconds then (docs/scaling.md, "Threads"). One word says which tasks there are: their number, and the next one. A
 thread takes a task by adding one to the word. A colour does not end before its last task, so the arguments of a task
-stay as they are. Helpers look at the word for some 50 us, then sleep until the next pass.
+stay as they are. Helpers look at the word for some 50 us, then sleep until the next pass. To wake a thread takes its
+waker some 20 us, so the asking thread wakes one or two, and whoever is woken wakes two more while there are tasks.
 """
 
 import ctypes
@@ -26,15 +27,20 @@ _WORD = ir.IntType(64)
 TASK = "void(int64, int64, int64, int64)"
 """The signature of a kernel that does a task: address of its arguments (arguments.py), first, end, number of the
 thread."""
-_NEXT, _DONE, _ASLEEP, _KERNEL, _TABLE, _TASKS, _SEMAPHORE, _THREADS = 0, 8, 16, 24, 25, 26, 32, 40
-"""Places in a job's words; what several threads write has a cache line of its own. From _THREADS on a line for each
-thread: how long it has done tasks, ns, and room for the time."""
+_NEXT, _DONE, _ASLEEP, _KERNEL, _TABLE, _TASKS, _MOST, _WITHIN, _CLOCK, _SEMAPHORE, _THREADS = (
+    0, 8, 16, 24, 25, 26, 27, 28, 29, 32, 40,
+)  # fmt: skip
+"""Places in a job's words; what several threads write has a cache line of its own. _MOST is how many threads may work,
+_WITHIN how long regions have taken so far, ns, and _CLOCK two words of room for the time. From _THREADS on a line for
+each thread: how long it has done tasks, ns, and room for the time."""
 _MONOTONIC, _SECOND = 1, 1_000_000_000
 """The clock of that number counts from some moment on, in all threads alike; ns in a second."""
 _BITS, _MASK = 20, (1 << 20) - 1
 """Of the next task in the word _NEXT; above it stands the number of tasks."""
 _LINE = 8
 """Words in a line of the cache."""
+_WAKES = 2
+"""Threads that a thread wakes."""
 _LOOKS = 4000
 """How often a helper looks for a task before it sleeps, and the asking thread before it lets others run. Chosen: some
 50 us, longer than what lies between two colours, much shorter than a step."""
@@ -143,6 +149,21 @@ def _do_one(job, thread):  # type: ignore[no-untyped-def]
     return True
 
 
+@njit("void(int64[::1], int64)", cache=True)
+def _wake(job, semaphore):  # type: ignore[no-untyped-def]
+    """Wakes some of those that sleep, as many as there are tasks for and may work."""
+    word, threads = _load(job, _NEXT), (len(job) - _THREADS) // _LINE
+    helpers = min((word >> _BITS) - (word & _MASK), _load(job, _MOST)) - 1
+    for _ in range(_WAKES):
+        asleep = _load(job, _ASLEEP)
+        if asleep <= 0 or threads - 1 - asleep >= helpers:
+            return
+        if _add(job, _ASLEEP, -1) > 0:
+            _sem_post(semaphore)
+        else:  # another thread was faster
+            _add(job, _ASLEEP, 1)
+
+
 @njit("void(int64[::1], int64, int64)", cache=True, nogil=True)
 def _help(job, semaphore, thread):  # type: ignore[no-untyped-def]
     """Does tasks for ever; sleeps where there has been none for a while."""
@@ -155,20 +176,21 @@ def _help(job, semaphore, thread):  # type: ignore[no-untyped-def]
         if idle == _LOOKS:
             _add(job, _ASLEEP, 1)
             _sem_wait(semaphore)
+            _wake(job, semaphore)
             idle = 0
 
 
 @njit("void(int64[::1], int64, int64, int64, int64, int64[::1])", cache=True)
 def _ask(job, semaphore, kernel, table, tasks, starts):  # type: ignore[no-untyped-def]
     """Colour after colour; returns when all tasks are done."""
+    begin = _time(job, _CLOCK)
     for colour in range(len(starts) - 1):
         many = starts[colour + 1] - starts[colour]
         job[_KERNEL], job[_TABLE], job[_TASKS] = kernel, table, tasks + 16 * starts[colour]
         _swap(job, _DONE, 0)
         _swap(job, _NEXT, many << _BITS)
         if many > 1:
-            for _ in range(_swap(job, _ASLEEP, 0)):
-                _sem_post(semaphore)
+            _wake(job, semaphore)
         while _do_one(job, 0):
             pass
         looked = 0
@@ -176,13 +198,16 @@ def _ask(job, semaphore, kernel, table, tasks, starts):  # type: ignore[no-untyp
             looked += 1
             if looked > _LOOKS:
                 _sched_yield()
+    job[_WITHIN] += _time(job, _CLOCK) - begin
 
 
-@njit("void(int64, int64, int64[:, ::1])", cache=True)
-def _alone(kernel, table, tasks):  # type: ignore[no-untyped-def]
+@njit("void(int64[::1], int64, int64, int64[:, ::1])", cache=True)
+def _alone(job, kernel, table, tasks):  # type: ignore[no-untyped-def]
     """All tasks, one after the other."""
+    begin = _time(job, _CLOCK)
     for k in range(len(tasks)):
         _call_task(kernel, table, tasks[k, 0], tasks[k, 1], 0)
+    job[_WITHIN] += _time(job, _CLOCK) - begin
 
 
 class Team:
@@ -193,11 +218,18 @@ class Team:
         size = _THREADS + _LINE * threads
         room = np.zeros(size + _LINE, np.int64)
         self._job: Ints = room[-(room.ctypes.data // room.itemsize) % _LINE :][:size]
+        self._job[_MOST] = threads
+        self._words = self._job.data
         self._semaphore = int(self._job[_SEMAPHORE:].ctypes.data)
         ctypes.CDLL(None).sem_init(ctypes.c_void_p(self._semaphore), 0, 0)
         for thread in range(1, threads):
             arguments = self._job, self._semaphore, thread
             threading.Thread(target=_help, args=arguments, name=f"helper {thread}", daemon=True).start()
+
+    @property
+    def within(self) -> float:
+        """How long ``run`` has taken so far, by the clock, s: what more threads could share."""
+        return int(self._words[_WITHIN]) / _SECOND
 
     @property
     def helped(self) -> float:
@@ -209,7 +241,7 @@ class Team:
         ``table``; those from ``starts[c]`` to ``starts[c + 1]``, at most 2^20, touch nothing in common.
         """
         if self.threads == 1:
-            _alone(kernel.address, table, tasks)
+            _alone(self._job, kernel.address, table, tasks)
         else:
             _ask(self._job, self._semaphore, kernel.address, table, tasks.ctypes.data, starts)
 
