@@ -75,7 +75,7 @@ class Slurm(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
     poll: float = 2.0
     """s between two looks at the queue: one squeue for all runs. Chosen."""
     slots: int = 100_000
-    """Ranks that the server hands over at a time, pending ones included. Chosen: Slurm has the limits."""
+    """Cores that the server hands over at a time, pending ones included. Chosen: Slurm has the limits."""
 
 
 class Site(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -125,6 +125,8 @@ class Job(msgspec.Struct, kw_only=True, frozen=True):
     """The number that the batch system gave; empty until it is known."""
     accounting: dict[str, str] = {}
     """What the batch system tells of a job that has ended."""
+    threads: int = 1
+    """Of each rank: cores that it gets."""
 
     @property
     def key(self) -> str:
@@ -198,11 +200,12 @@ def new_job(
     now: float,
     attempt: int = 1,
     place: str = "",
+    threads: int = 1,
 ) -> Job:
     """The record of an attempt that nobody has handed over yet."""
     word = re.sub(r"[^A-Za-z0-9_.-]", "_", run)[:60]
     return Job(
-        run=run, name=f"conoid-{word}-{attempt}-{secrets.token_hex(4)}", attempt=attempt, ranks=ranks,
+        run=run, name=f"conoid-{word}-{attempt}-{secrets.token_hex(4)}", attempt=attempt, ranks=ranks, threads=threads,
         profile=profile[0], command=command, submitted=now, notice=_seconds(profile[1].notice),
         bin=place,
     )  # fmt: skip
@@ -240,7 +243,8 @@ def _words(job: Job, profile: Profile, folder: Path, log: str) -> list[str]:
     if set(str(folder)) & {"%", "\\"}:
         log = "/dev/null"
     words = [
-        "--parsable", f"--job-name={job.name}", f"--ntasks={job.ranks}", f"--chdir={folder}", f"--output={log}",
+        "--parsable", f"--job-name={job.name}", f"--ntasks={job.ranks}", f"--cpus-per-task={job.threads}",
+        f"--chdir={folder}", f"--output={log}",
         "--open-mode=append", "--requeue", "--export=ALL", f"--signal=B:TERM@{job.notice:.0f}",
     ]  # fmt: skip
     named = (("partition", profile.partition), ("account", profile.account), ("qos", profile.qos))
@@ -250,12 +254,13 @@ def _words(job: Job, profile: Profile, folder: Path, log: str) -> list[str]:
     return [*words, *profile.options, str(folder / layout.JOB_SCRIPT), str(folder), job.name]
 
 
-def starter(profile: Profile, ranks: int, found: Callable[[], Sequence[str]]) -> list[str]:
-    """What starts ``ranks`` ranks inside a job, before the worker's command; ``found`` gives an mpiexec where the
-    profile has none of its own. PMI2 is what the wheel of MPICH speaks.
+def starter(profile: Profile, ranks: int, found: Callable[[], Sequence[str]], threads: int = 1) -> list[str]:
+    """What starts ``ranks`` ranks of so many ``threads`` inside a job, before the worker's command; ``found`` gives an
+    mpiexec where the profile has none of its own. PMI2 is what the wheel of MPICH speaks. srun takes neither number
+    from the job (srun(1)), and gives each rank cores of its own.
     """
     if profile.mpi == "srun":
-        return ["srun", "--mpi=pmi2", f"--ntasks={ranks}"]
+        return ["srun", "--mpi=pmi2", f"--ntasks={ranks}", f"--cpus-per-task={threads}", "--cpu-bind=cores"]
     return [*(shlex.split(profile.mpiexec) or found()), "-n", str(ranks)]
 
 

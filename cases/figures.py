@@ -137,6 +137,11 @@ def counted(value: float | None, noun: str, plural: str = "") -> str:
     return f"{count(value)} {noun if value == 1 else plural or f'{noun}s'}"
 
 
+def crew(ranks: int, threads: int = 1) -> str:
+    """``2 ranks``, ``1 rank x 16 threads``."""
+    return counted(ranks, "rank") + (f" x {counted(threads, 'thread')}" if threads > 1 else "")
+
+
 def size(value: float | None) -> str:
     """Bytes: ``38.2 GB``."""
     return si(value, "B")

@@ -130,6 +130,8 @@ class Load(Message, frozen=True):
     """Wall time in regions, whose tasks the threads of the rank share, s."""
     helped: list[float] = []
     """That all threads of the rank but the first have done tasks, together, s."""
+    threads: int = 1
+    """Of each rank."""
 
 
 class Counts(Message, frozen=True):

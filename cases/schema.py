@@ -164,8 +164,8 @@ class Run(Model):
     ranks: Annotated[Count, Field(ge=1, le=MOST_RANKS)] = 1
     """MPI processes that share the work. The answer does not depend on it."""
     threads: Annotated[Count, Field(ge=1, le=MOST_THREADS)] = 1
-    """Threads of each MPI process that share its passes over elements and nodes. The answer does not depend on it.
-    Job server and batch systems count cores by ranks alone so far: more threads than cores make a run slower."""
+    """Threads of each MPI process that share its work. The answer does not depend on it. A run takes ``ranks`` times
+    ``threads`` cores; more threads than cores make it slower."""
     profile: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{0,32}$")] = ""
     """Where a batch system runs it: a profile of the site (docs/cluster.md). The submitter's choice comes before it."""
     cut_scale: tuple[Scale, Scale, Scale] = (1.0, 1.0, 1.0)
@@ -198,6 +198,11 @@ class Run(Model):
     so far: one that takes for good has fallen (``plastic``, ``viscous``, ``friction``, ``fracture``), one that gives
     back what it has taken is below zero (``contact``, ``averaging``, ``eroded``, ``cohesive``), or unequal time steps
     have made or taken it (``stepping``). Two hundredths of an energy are one of a speed."""
+
+    @property
+    def cores(self) -> int:
+        """That it takes."""
+        return self.ranks * self.threads
 
 
 class Balance(Model):

@@ -17,12 +17,13 @@ from conoid.cases import batch, layout, messages, slurm, slurm_call, whole
 from conoid.cases.batch import Job, Slurm
 from conoid.cases.load import parse_case, resolved_json
 from conoid.cases.run import State
+from conoid.cases.schema import Run
 
 from .console import echo, echo_json
 from .errors import ClientError
 from .examination import examine
 from .folders import LocalFolder
-from .options import CaseArgument, Json, Overrides, aloud, warn
+from .options import CaseArgument, Json, Overrides, Ranks, Threads, aloud, on_cores, warn
 from .submission import data_of, locate
 
 _CASE = "case.json"
@@ -42,9 +43,8 @@ class Handed:
 
 def batch_run(
     case: CaseArgument,
-    ranks: Annotated[
-        int | None, typer.Option("--ranks", min=1, help="MPI ranks; the case's own number if not given.")
-    ] = None,
+    ranks: Ranks = None,
+    threads: Threads = None,
     profile: Annotated[
         str, typer.Option("--slurm", metavar="PROFILE", help="A profile of the site; its default.")
     ] = "",
@@ -59,7 +59,7 @@ def batch_run(
 
     The same command again makes no second job: it tells the one that there is, or goes on with a run that was lost.
     """
-    words = [*(overrides or ()), *([f"run.ranks={ranks}"] if ranks is not None else [])]
+    words = [*(overrides or ()), *on_cores(ranks, threads)]
     with aloud("reading mesh files"):
         found = examine(data_of(case, words), locate(case).parent)
     warn(found.odd)
@@ -101,7 +101,7 @@ def hand_over(case: str, overrides: Iterable[str], out: Path | None, profile: st
             raise ClientError("sbatch: there is none; Slurm's commands are in PATH, or [slurm] bin names their folder")
         job = _known(folder, resolved, profile, site) if folder.exists() else None
         if job is None:
-            job = _prepared(folder, data, resolved, checked.run.ranks, chosen, site.bin)
+            job = _prepared(folder, data, resolved, checked.run, chosen, site.bin)
         number = slurm.submit(site.bin, folder, job, batch.profile_of(site, job.profile)[1])
         noted = batch.Job(**{**{name: getattr(job, name) for name in job.__struct_fields__}, "job": number})
         whole.write(folder / layout.JOB, batch.to_json(noted))
@@ -126,38 +126,41 @@ def _known(folder: Path, resolved: bytes, profile: str, site: Slurm) -> Job | No
     if (folder / layout.OUTCOME).exists():
         raise ClientError(f"{folder}: this run has ended; --out names another folder")
     if resolved_json(parse_case(json.loads((folder / _CASE).read_bytes()))) != resolved:
-        raise ClientError(f"{folder}: handed to Slurm with another case or other ranks; --out names another folder")
+        raise ClientError(
+            f"{folder}: handed to Slurm with another case, other ranks or threads; --out names another folder"
+        )
     if profile not in ("", job.profile):
         raise ClientError(f"{folder}: handed to Slurm with the profile {job.profile!r}; --out names another folder")
     chosen = batch.profile_of(site, job.profile)
-    command = _command(folder, job.ranks, chosen[1])
+    command = _command(folder, job.ranks, job.threads, chosen[1])
     known = slurm.jobs(site.bin, job.name)
     if not job.job or any(entry.state not in slurm.FINAL for entry in known) or slurm.held(folder):
         return _written(folder, msgspec.structs.replace(job, command=command, bin=site.bin), chosen[1])
     (folder / layout.STOP_REQUEST).unlink(missing_ok=True)
-    fresh = batch.new_job(folder.name, job.ranks, chosen, command, time.time(), job.attempt + 1, site.bin)
+    fresh = batch.new_job(folder.name, job.ranks, chosen, command, time.time(), job.attempt + 1, site.bin, job.threads)
     return _written(folder, fresh, chosen[1])
 
 
 def _prepared(
-    folder: Path, data: dict[str, Any], resolved: bytes, ranks: int, profile: tuple[str, batch.Profile], place: str
+    folder: Path, data: dict[str, Any], resolved: bytes, run: Run, profile: tuple[str, batch.Profile], place: str
 ) -> Job:  # fmt: skip
     """The run's folder, complete on disk before Slurm hears of it."""
     (folder / layout.LOGS).mkdir(parents=True, exist_ok=True)
     case = folder / _CASE
     case.write_text(json.dumps(data, indent=2, default=str), encoding="utf-8")
     (folder / layout.RESOLVED_CASE).write_bytes(resolved)
-    job = batch.new_job(folder.name, ranks, profile, _command(folder, ranks, profile[1]), time.time(), place=place)
+    command = _command(folder, run.ranks, run.threads, profile[1])
+    job = batch.new_job(folder.name, run.ranks, profile, command, time.time(), place=place, threads=run.threads)
     told = messages.Status(run=folder.name, seq=1, wall=time.time(), state=State.QUEUED, message="handed to Slurm")
     (folder / layout.JOURNAL).write_bytes(messages.to_json(told) + b"\n")
     return _written(folder, job, profile[1])
 
 
-def _command(folder: Path, ranks: int, profile: batch.Profile) -> list[str]:
+def _command(folder: Path, ranks: int, threads: int, profile: batch.Profile) -> list[str]:
     """What starts the ranks. It is made anew for every job: a record that lies in a folder chooses no program."""
     worker = [sys.executable, "-m", "mpi4py", "-m", "conoid.worker", str(folder / _CASE), "--out", str(folder)]
     words = ["--run", folder.name, "--ranks", str(ranks), "--interruptible"]
-    return [*batch.starter(profile, ranks, _mpiexec), *worker, *words]
+    return [*batch.starter(profile, ranks, _mpiexec, threads), *worker, *words]
 
 
 def _written(folder: Path, job: Job, profile: batch.Profile) -> Job:

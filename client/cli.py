@@ -24,8 +24,11 @@ from .options import (
     CaseArgument,
     Json,
     Overrides,
+    Ranks,
+    Threads,
     aloud,
     complain,
+    on_cores,
     show,
     warn,
     warn_of,
@@ -163,9 +166,8 @@ app.command(name="sweep-cancel", short_help="Cancel the runs of a sweep.")(sweep
 @app.command(name="run", short_help="Do it all on this machine: run, watch, check, draw.")
 def run_case(
     case: CaseArgument,
-    ranks: Annotated[
-        int | None, typer.Option("--ranks", min=1, help="MPI ranks; the case's own number if not given.")
-    ] = None,
+    ranks: Ranks = None,
+    threads: Threads = None,
     overrides: Overrides = None,
     out: Annotated[Path, typer.Option("--out", help="Folder of the runs.")] = Path("runs/local"),
     picture: Annotated[Path | None, typer.Option("--view", help="Draw the last frame to this PNG.")] = None,
@@ -175,7 +177,7 @@ def run_case(
     as_json: Annotated[bool, typer.Option("--json", help="Print the outcome as JSON and nothing else.")] = False,
 ) -> None:
     """Do it all here: start a server, submit, watch, check, draw, stop the server. Ctrl-C cancels the run."""
-    chosen = [*(overrides or ()), *([f"run.ranks={ranks}"] if ranks is not None else [])]
+    chosen = [*(overrides or ()), *on_cores(ranks, threads)]
     warn_of(case, chosen)
     raise typer.Exit(run_once(case, chosen, out, picture, field, plain=plain, check=check, as_json=as_json))
 

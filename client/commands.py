@@ -21,7 +21,9 @@ from .options import (
     Json,
     Labels,
     Overrides,
+    Ranks,
     SourceArgument,
+    Threads,
     Token,
     Url,
     aloud,
@@ -30,6 +32,7 @@ from .options import (
     folder_of,
     labels_of,
     named,
+    on_cores,
     show,
     show_lines,
     warn_of,
@@ -59,6 +62,8 @@ def submit(
         str | None,
         typer.Option("--key", callback=_filled, help="Idempotency key: the same one makes no second run."),
     ] = None,
+    ranks: Ranks = None,
+    threads: Threads = None,
     label: Labels = None,
     profile: Annotated[str, typer.Option("--profile", help="Of the site's batch system; its default.")] = "",
     priority: Annotated[int, typer.Option("--priority", help="Among your own runs: -100 to 100.")] = 0,
@@ -67,9 +72,10 @@ def submit(
     as_json: Json = False,
 ) -> None:
     """Hand a case to the server; prints the run's id."""
-    warn_of(case, overrides or ())
+    changes = [*(overrides or ()), *on_cores(ranks, threads)]
+    warn_of(case, changes)
     with connect(url, token) as session:
-        run = session.submit(case, overrides or (), key, labels_of(label), profile, priority)
+        run = session.submit(case, changes, key, labels_of(label), profile, priority)
         if as_json:
             echo_json(run.status())
         else:
@@ -78,14 +84,15 @@ def submit(
 
 def restart(
     run: RunArgument,
-    ranks: Annotated[int | None, typer.Option("--ranks", min=1, help="Another number of MPI ranks.")] = None,
+    ranks: Ranks = None,
+    threads: Threads = None,
     url: Url = None,
     token: Token = None,
     as_json: Json = False,
 ) -> None:
     """Go on from the newest checkpoint of a run, as a new run with the same answer; prints its id."""
     with connect(url, token) as session:
-        made = session.restart(find(session, run).id, ranks)
+        made = session.restart(find(session, run).id, ranks, threads=threads)
         if as_json:
             echo_json(made.status())
         else:

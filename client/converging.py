@@ -45,6 +45,7 @@ def converge(
     ] = None,
     vary: Annotated[str, typer.Option("--vary", help="What differs in an ensemble: steps or seeds.")] = STEPS,
     ranks: Annotated[int, typer.Option("--ranks", min=1, help="Of each run.")] = 1,
+    threads: Annotated[int, typer.Option("--threads", min=1, help="Of each rank.")] = 1,
     quantity: Annotated[str | None, typer.Option("--quantity", help="What the advice is about.")] = None,
     accuracy: Annotated[float, typer.Option("--accuracy", min=1e-6, help="Wanted error, in per cent.")] = 1.0,
     out: Annotated[
@@ -64,13 +65,13 @@ def converge(
         raise UsageError(f"--quantity = {shown(quantity)}: a part of a name; {allowed(quantity, names(checked))}")
     members = ensemble or (_ENSEMBLE if chaotic(checked) else 1)
     plan = Plan(_numbers("--meshes", meshes), _forms(forms), _numbers("--dt-safety", safeties), members,
-                _one_of("--vary", vary, (STEPS, SEEDS)), ranks)  # fmt: skip
+                _one_of("--vary", vary, (STEPS, SEEDS)), ranks, threads)  # fmt: skip
     done: list[Done] = []
     many = len(plan.points(checked))
     with (
         tempfile.TemporaryDirectory() as passing,
         aloud(f"0 of {many} runs have ended") as name,
-        _session(out or Path(passing), ranks, on_server, url, token) as at,
+        _session(out or Path(passing), ranks * threads, on_server, url, token) as at,
     ):
         for each in run_all(at, data, plan):
             done.append(each)
@@ -82,13 +83,13 @@ def converge(
 
 
 @contextmanager
-def _session(out: Path, ranks: int, on_server: bool, url: str | None, token: str | None) -> Iterator[Session]:
+def _session(out: Path, cores: int, on_server: bool, url: str | None, token: str | None) -> Iterator[Session]:
     """The server that is named, or one of our own with a slot a core."""
     if on_server or url is not None:
         with connect(url, token) as session:
             yield session
         return
-    with LocalServer(out / "runs", max(ranks, CORES)) as server:
+    with LocalServer(out / "runs", max(cores, CORES)) as server:
         yield server.session
 
 

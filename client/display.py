@@ -124,7 +124,7 @@ def _ranks(live: Live) -> RenderableType:
     grid.add_column(justify="right", no_wrap=True)
     for rank in range(min(len(totals), _MOST_RANKS)):
         parts = {name: seconds[rank] for name, seconds in phases.items()}
-        grid.add_row(f"rank {rank}", _stacked(parts, longest), f"{percent(busy[rank], 0):>5} busy")
+        grid.add_row(f"rank {rank}", _stacked(parts, longest), f"{percent(busy[rank], 0):>5} busy{_helped(live, rank)}")
     legend = Text("  ").join(Text(f"■ {name}", style=_PHASE_STYLE[name]) for name in phases)
     imbalance = live.load.imbalance if live.load is not None else 1.0
     more = len(totals) - _MOST_RANKS
@@ -132,6 +132,11 @@ def _ranks(live: Live) -> RenderableType:
         "", legend.append(f"   and {counted(more, 'more rank')}" if more > 0 else ""), f"imbalance {fixed(imbalance)}"
     )
     return grid
+
+
+def _helped(live: Live, rank: int) -> str:
+    """How busy the other threads of a rank are."""
+    return f", its threads {percent(live.helped[rank], 0)}" if rank < len(live.helped) else ""
 
 
 def _stacked(parts: dict[str, float], longest: float) -> Text:

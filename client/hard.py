@@ -48,6 +48,7 @@ def hard(
         list[str] | None, typer.Argument(metavar="[NAME]...", help="Some of them, or rows as H14.")
     ] = None,
     ranks: Annotated[int, typer.Option("--ranks", min=1, help="Of each run; the answers are the same.")] = 1,
+    threads: Annotated[int, typer.Option("--threads", min=1, help="Of each rank; the answers are the same.")] = 1,
     listed: Annotated[bool, typer.Option("--list", help="List them and run none.")] = False,
     out: Annotated[Path | None, typer.Option("--out", help="Folder for hard.md, hard.json and the runs.")] = None,
 ) -> None:
@@ -63,10 +64,10 @@ def hard(
     with (
         tempfile.TemporaryDirectory() as passing,
         aloud(f"0 of {len(some)} runs have ended") as name,
-        LocalServer((out or Path(passing)) / "runs", max(ranks, CORES)) as at,
+        LocalServer((out or Path(passing)) / "runs", max(ranks * threads, CORES)) as at,
     ):
         ended = []
-        for verdict in run_all(at.session, some, ranks):
+        for verdict in run_all(at.session, some, ranks, threads):
             ended.append(verdict)
             name(f"{len(ended)} of {len(some)} runs have ended")
             complain(f"{len(ended)} of {len(some)}: {verdict.hard.name}: {'; '.join(verdict.faults) or 'ended well'}")
@@ -87,9 +88,12 @@ def chosen(known: Sequence[Hard], words: Sequence[str]) -> list[Hard]:
     return [each for each in known if not words or each.name in words or set(each.rows) & set(words)]
 
 
-def run_all(session: Session, some: Sequence[Hard], ranks: int) -> Iterator[Verdict]:
+def run_all(session: Session, some: Sequence[Hard], ranks: int, threads: int = 1) -> Iterator[Verdict]:
     """Hands in all, and yields each when it has ended. Raises CaseError for a case that is none."""
-    quiet = {"run.ranks": ranks, "run.frames": 0, "run.snapshots": 0, "run.checkpoint_every": "none"}
+    quiet = {
+        "run.ranks": ranks, "run.threads": threads, "run.frames": 0, "run.snapshots": 0,
+        "run.checkpoint_every": "none",
+    }  # fmt: skip
     made = [apply_overrides(apply_overrides(read_data(each.path), each.changes), quiet) for each in some]
     cases = [parse_case(data) for data in made]
     runs = [session.submit(json.loads(json.dumps(data, default=str))) for data in made]

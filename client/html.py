@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from html import escape
 from importlib import metadata
 
-from conoid.cases.figures import count, counted, duration, exacts, rough, si
+from conoid.cases.figures import count, counted, crew, duration, exacts, rough, si
 from conoid.cases.outcome import Outcome
 
 
@@ -35,7 +35,7 @@ def head(name: str, title: str, ended: Outcome | None) -> str:
         state = f"<span class={good}>{escape(ended.state)}</span> {escape(ended.message)}"
         rows = [
             ["run", name], ["simulated", f"{si(ended.time, 's')} in {counted(ended.steps, 'step')}"],
-            ["took", f"{duration(ended.elapsed)} on {counted(ended.ranks, 'rank')}"],
+            ["took", f"{duration(ended.elapsed)} on {crew(ended.ranks, ended.threads)}"],
             ["tets", f"{count(ended.elements)}, of which {count(ended.eroded)} eroded"],
             ["nodes", f"{count(ended.nodes_initial)} at first, {count(ended.nodes)} at the end"],
             ["fragments", f"{count(ended.fragments)}; {counted(ended.broken, 'facet')} broken"],

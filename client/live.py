@@ -39,6 +39,10 @@ class Live:
     load: Load | None = None
     phases: dict[str, list[float]] = field(default_factory=dict)
     """Seconds of each rank in each of PHASE_GROUPS between the last two Load messages."""
+    helped: list[float] = field(default_factory=list)
+    """Share of that interval that the threads of each rank besides its first have done tasks; empty where it has one
+    thread.
+    """
     loaded: float = 0.0
     """Unix time of the last Load message, at first that of Started, s."""
     counts: Counts | None = None
@@ -82,6 +86,8 @@ class Live:
         interval = message.wall - self.loaded if self.loaded else 0.0
         self.load, self.loaded = message, message.wall
         self.phases = grouped(message.phases, interval)
+        others = (message.threads - 1) * interval
+        self.helped = [seconds / others for seconds in message.helped] if others > 0.0 else []
 
     @property
     def told(self) -> str:

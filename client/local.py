@@ -42,7 +42,7 @@ class LocalServer:
     """
 
     def __init__(self, runs: Path, slots: int) -> None:
-        """``runs`` is the folder of the runs, ``slots`` the number of ranks that may run at a time."""
+        """``runs`` is the folder of the runs, ``slots`` how many cores runs may take at a time."""
         self.runs = runs.resolve()
         self.slots = slots
         self._process: subprocess.Popen[bytes] | None = None

@@ -44,16 +44,19 @@ def status(folder: Path) -> RunInfo:
     first, last = (messages[0].wall, messages[-1].wall) if messages else (0.0, 0.0)
     return RunInfo(
         id=result.folder.name, owner="", name=str(case.get("name") or ""), title=str(case.get("title") or ""),
-        state=known.state, cause=known.cause, message=known.message, ranks=_ranks(case, known), submitted=first,
+        state=known.state, cause=known.cause, message=known.message, submitted=first,
+        ranks=_cores(case, known, "ranks"), threads=_cores(case, known, "threads"),
         started=known.began, finished=last if known.state.final else None,
         progress=None if known.state.final else known.progress, outcome_json=msgspec.Raw(text),
     )  # fmt: skip
 
 
-def _ranks(case: dict[str, Any], known: Live) -> int:
-    """Those that have started, or that the case asks for."""
-    asked = case.get("run", {}).get("ranks", 1) if isinstance(case.get("run"), dict) else 1
-    return known.started.ranks if known.started is not None else asked if isinstance(asked, int) else 1
+def _cores(case: dict[str, Any], known: Live, what: str) -> int:
+    """The ``ranks`` or ``threads`` that have started, or that the case asks for."""
+    if known.started is not None:
+        return int(getattr(known.started, what))
+    asked = case.get("run", {}).get(what, 1) if isinstance(case.get("run"), dict) else 1
+    return asked if isinstance(asked, int) else 1
 
 
 def ask(folder: Path, request: str, wish: str) -> str:

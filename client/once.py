@@ -55,7 +55,7 @@ def run_once(
         raise UsageError(f"field = {field!r}: no frame of {checked.name} has it; {allowed(field, there)}")
     out = PlainConsole(quiet=as_json)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    server = LocalServer(runs, checked.run.ranks)
+    server = LocalServer(runs, checked.run.cores)
     with ExitStack() as up:
         with silence.broken(out.print, lambda: "the server is starting"):
             up.enter_context(server)

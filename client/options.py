@@ -97,6 +97,10 @@ Overrides = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Change a key of the case, as run.end_time='20 us'."),
 ]
+Ranks = Annotated[int | None, typer.Option("--ranks", min=1, help="MPI ranks; the case's own number if not given.")]
+Threads = Annotated[
+    int | None, typer.Option("--threads", min=1, help="Threads of each rank; the case's own number if not given.")
+]
 Labels = Annotated[
     list[str] | None,
     typer.Option("--label", metavar="NAME=VALUE", help="By which runs are found again; may be repeated."),
@@ -104,6 +108,12 @@ Labels = Annotated[
 SourceArgument = Annotated[
     str, typer.Argument(metavar="RUN", callback=named, help="The id of a run or its beginning, 'last', or its folder.")
 ]
+
+
+def on_cores(ranks: int | None, threads: int | None) -> list[str]:
+    """The overrides that these options stand for."""
+    chosen = (("run.ranks", ranks), ("run.threads", threads))
+    return [f"{key}={number}" for key, number in chosen if number is not None]
 
 
 def labels_of(words: Sequence[str] | None) -> dict[str, str]:

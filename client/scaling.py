@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from conoid.cases import layout
+from conoid.cases.cores import usable_cores
 from conoid.cases.load import resolved_json
 from conoid.cases.outcome import from_json
 from conoid.cases.run import State
@@ -17,7 +18,7 @@ from .errors import ClientError
 from .projection import Network, Projection, read
 from .submission import case_of, locate
 
-CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+CORES = usable_cores()
 """That this process may use."""
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _ENVIRONMENT = {**dict.fromkeys(_THREADS, "1"), "HYDRA_LAUNCHER": "fork", "HYDRA_IFACE": "lo"}

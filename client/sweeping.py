@@ -10,9 +10,10 @@ from conoid.cases.run import State
 
 from .console import echo, echo_json
 from .errors import UsageError
-from .options import CaseArgument, Json, Token, Url, aloud, complain, sweep_named
+from .options import CaseArgument, Json, Ranks, Threads, Token, Url, aloud, complain, on_cores, sweep_named
 from .saving import save_text
 from .session import connect
+from .submission import data_of
 from .sweep import SweepInfo, SweepPoint, points_in, points_of
 
 SweepArgument = Annotated[
@@ -30,6 +31,8 @@ def sweep(
     listed: Annotated[
         Path | None, typer.Option("--list", metavar="FILE", help="Points from a CSV file; its first line has the keys.")
     ] = None,
+    ranks: Ranks = None,
+    threads: Threads = None,
     at_once: Annotated[int | None, typer.Option("--at-once", min=1, help="Runs of it that run at a time.")] = None,
     wait: Annotated[bool, typer.Option("--wait", help="Return when all runs have ended; 1 when one failed.")] = False,
     url: Url = None,
@@ -43,7 +46,7 @@ def sweep(
     with connect(url, token) as session:
         try:
             with aloud(f"handing {counted(len(points), 'point')} in"):
-                made = session.sweep(case, points, at_once=at_once)
+                made = session.sweep(data_of(case, on_cores(ranks, threads)), points, at_once=at_once)
         except KeyboardInterrupt:
             complain(
                 "the server may have the points already; conoid sweep-cancel last stops them once it has taken all in"

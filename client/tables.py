@@ -15,6 +15,7 @@ from conoid.cases.figures import (
     alike,
     count,
     counted,
+    crew,
     day,
     duration,
     exact,
@@ -91,8 +92,12 @@ def runs_table(runs: Sequence[RunInfo]) -> Table:
         name, state = Text(run.name), state_text(run.state, run.cause)
         for text in (name, state):
             text.no_wrap, text.overflow = True, "ellipsis"
-        made.add_row(run.id, name, state, str(run.ranks), day(run.submitted), took)
+        made.add_row(run.id, name, state, _cores(run), day(run.submitted), took)
     return made
+
+
+def _cores(run: RunInfo) -> str:
+    return str(run.ranks) if run.threads == 1 else f"{run.ranks}x{run.threads}"
 
 
 def run_table(run: RunInfo) -> Table:
@@ -105,7 +110,7 @@ def run_table(run: RunInfo) -> Table:
         "state": state_text(run.state, run.cause),
         "why": run.message or run.reason,
         "owner": run.owner,
-        "ranks": str(run.ranks),
+        "ranks": crew(run.ranks, run.threads),
         "submitted": day(run.submitted),
         "started": day(run.started) if run.started else "",
         "finished": day(run.finished) if run.finished else "",
@@ -239,7 +244,7 @@ def sources_table(constants: Sequence[Constant]) -> Table:
 
 def outcome_table(outcome: Outcome) -> Table:
     """How a run ended."""
-    energy, ranks = outcome.energy, counted(outcome.ranks, "rank")
+    energy, ranks = outcome.energy, crew(outcome.ranks, outcome.threads)
     entries: dict[str, str | Text] = {"state": state_text(State(outcome.state), outcome.cause), "why": outcome.message}
     speed, setup, worst = outcome.element_updates_per_second, outcome.setup, rough(outcome.worst_residual)
     if outcome.steps:

@@ -35,6 +35,8 @@ class RunInfo(msgspec.Struct, kw_only=True, frozen=True):
     started: float | None = None
     finished: float | None = None
     labels: dict[str, str] = {}
+    threads: int = 1
+    """Of each rank."""
     title: str = ""
     """This and what follows is told of one run, not in a list (_OF_ONE)."""
     estimate: dict[str, Any] = {}

@@ -53,6 +53,7 @@ class Plan:
     members: int = 1
     vary: str = STEPS
     ranks: int = 1
+    threads: int = 1
 
     def variants(self, case: Case) -> list[Variant]:
         """All combinations."""
@@ -66,7 +67,8 @@ class Plan:
             Point(variant, factor, member, {
                 **sizes(case, factor), **(seeds(case, member) if self.vary == SEEDS else {}),
                 "numerics.pressure": variant.form, "numerics.dt_safety": variant.safety * (1.0 - shares[member]),
-                "run.ranks": self.ranks, "run.frames": 0, "run.snapshots": 0, "run.checkpoint_every": "none",
+                "run.ranks": self.ranks, "run.threads": self.threads, "run.frames": 0, "run.snapshots": 0,
+                "run.checkpoint_every": "none",
             })
             for factor in sorted(self.factors) for variant in self.variants(case) for member in range(self.members)
         ]  # fmt: skip

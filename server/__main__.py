@@ -50,7 +50,11 @@ def _parser() -> argparse.ArgumentParser:
     add("--port", type=int, default=8750, help="0: any free port (default 8750)")
     add("--zenoh-port", type=int, default=7447, help="port of the Zenoh router; 0: any free port (default 7447)")
     add("--no-zenoh", action="store_true", help="no Zenoh router; clients watch over SSE")
-    add("--slots", type=int, help="ranks that may run at a time (default: the cores of this machine, or the site's)")
+    add(
+        "--slots",
+        type=int,
+        help="cores that runs may take at a time (default: the cores of this machine, or the site's)",
+    )
     site = os.environ.get("CONOID_SITE")
     add("--site", type=Path, default=site, help="the site's settings file: Slurm and its profiles [CONOID_SITE]")
     add("--no-auth", action="store_true", help="no tokens; only on a loopback address")

@@ -23,6 +23,13 @@ class Run:
     finished: float = 0.0
     stopping_for: Cause | None = None
     """Why a stop was asked for."""
+    threads: int = 1
+    """Of each rank."""
+
+    @property
+    def cores(self) -> int:
+        """That it takes while it runs."""
+        return self.ranks * self.threads
 
 
 # Events ---------------------------------------------------------------------------------------------------------------

@@ -42,6 +42,7 @@ class Farewell(msgspec.Struct, kw_only=True, frozen=True):
     time: float | None = None
     digest: str = ""
     bytes: int = 0
+    threads: int = 1
 
     @property
     def run(self) -> Run:
@@ -49,7 +50,7 @@ class Farewell(msgspec.Struct, kw_only=True, frozen=True):
         cause = Cause(self.cause) if self.cause else None
         return Run(
             self.id, self.owner, self.name, self.ranks, self.submitted, State(self.state), cause, self.message,
-            self.started, self.finished,
+            self.started, self.finished, threads=self.threads,
         )  # fmt: skip
 
 
@@ -63,9 +64,10 @@ def of(run: Run, path: Path, why: str) -> Farewell:
         {} if ended is None else {"steps": ended.steps, "time": known(ended.time), "digest": ended.digest}
     )
     return Farewell(
-        id=run.id, owner=run.owner, name=run.name, ranks=run.ranks, submitted=run.submitted, started=run.started,
-        finished=run.finished, state=run.state.value, cause=run.cause.value if run.cause else None,
-        message=run.message, removed=time.time(), why=why, bytes=folder.size(path), **results,
+        id=run.id, owner=run.owner, name=run.name, ranks=run.ranks, threads=run.threads, submitted=run.submitted,
+        started=run.started, finished=run.finished, state=run.state.value,
+        cause=run.cause.value if run.cause else None, message=run.message, removed=time.time(), why=why,
+        bytes=folder.size(path), **results,
     )  # fmt: skip
 
 

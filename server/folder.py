@@ -59,6 +59,13 @@ class Submission(msgspec.Struct, kw_only=True, frozen=True):
     """Among the runs of its owner."""
     wishes_sha256: str = ""
     """Of labels, profile and priority as they were asked for; empty in what earlier servers wrote."""
+    threads: int = 1
+    """Of each rank."""
+
+    @property
+    def cores(self) -> int:
+        """That the run takes."""
+        return self.ranks * self.threads
 
 
 class Process(msgspec.Struct, kw_only=True, frozen=True):
@@ -187,7 +194,7 @@ def run(folder: Path) -> Run:
 
 def first(made: Submission) -> Run:
     """The run as it was accepted."""
-    return Run(made.id, made.owner, made.name, made.ranks, made.submitted)
+    return Run(made.id, made.owner, made.name, made.ranks, made.submitted, threads=made.threads)
 
 
 def replay(accepted: Run, told: Iterable[Status]) -> Run:

@@ -58,7 +58,11 @@ def advance(run: Run, event: Event, now: float) -> Next:
         case LaunchFailed() | LaunchPutOff() if run.state is State.STOPPING:
             return _exited(run, WorkerExited(None, None), now)
         case LaunchFailed(message, cause) if run.state in {State.QUEUED, State.STARTING}:
-            return _end(run, now, Outcome(state=State.FAILED, cause=cause, message=message, ranks=run.ranks))
+            return _end(
+                run,
+                now,
+                Outcome(state=State.FAILED, cause=cause, message=message, ranks=run.ranks, threads=run.threads),
+            )
         case LaunchPutOff(message) if run.state is State.STARTING:
             return _enter(replace(run, started=0.0), State.QUEUED, message)
         case Broken():
@@ -104,7 +108,7 @@ def _broken(run: Run, event: Broken, now: float) -> Next:
     asked = run.stopping_for is Cause.CANCELLED
     state, cause = (State.CANCELLED, Cause.CANCELLED) if asked else (State.LOST, Cause.STORAGE)
     message = f"stopped on request, without results: {event.message}" if asked else event.message
-    outcome = Outcome(state=state, cause=cause, message=message, ranks=run.ranks)
+    outcome = Outcome(state=state, cause=cause, message=message, ranks=run.ranks, threads=run.threads)
     ended, actions = _end(run, now, outcome)
     return ended, (Kill(), *actions) if event.writable else (Kill(),)
 
@@ -112,7 +116,13 @@ def _broken(run: Run, event: Broken, now: float) -> Next:
 def _cancel(run: Run, now: float, handed: bool) -> Next:
     if run.state is State.ACCEPTED or (run.state is State.QUEUED and not handed):
         message = "cancelled before it started"
-        return _end(run, now, Outcome(state=State.CANCELLED, cause=Cause.CANCELLED, message=message, ranks=run.ranks))
+        return _end(
+            run,
+            now,
+            Outcome(
+                state=State.CANCELLED, cause=Cause.CANCELLED, message=message, ranks=run.ranks, threads=run.threads
+            ),
+        )
     return (run, ()) if run.state is State.STOPPING else _stop(run, Cause.CANCELLED)
 
 
@@ -160,7 +170,7 @@ def _without_outcome(run: Run, event: WorkerExited) -> Outcome:
     """The end of a worker that could not write its own: the exit code is a hint, never a proof of success."""
     state, cause, message = _reading_of(run, event)
     said = f"; {event.traces}" if event.traces else ""
-    return Outcome(state=state, cause=cause, message=f"{message}{said}", ranks=run.ranks)
+    return Outcome(state=state, cause=cause, message=f"{message}{said}", ranks=run.ranks, threads=run.threads)
 
 
 def _reading_of(run: Run, event: WorkerExited) -> tuple[State, Cause, str]:
@@ -206,8 +216,14 @@ def _found(run: Run, event: Found, now: float) -> Next:
     if event.code is not None or event.disk_failed:
         return _exited(run, WorkerExited(event.code, None, disk_failed=event.disk_failed, at=event.at), now)
     if event.rebooted:
-        lost = Outcome(state=State.LOST, cause=Cause.NODE, message="the machine was restarted", ranks=run.ranks)
+        lost = Outcome(
+            state=State.LOST,
+            cause=Cause.NODE,
+            message="the machine was restarted",
+            ranks=run.ranks,
+            threads=run.threads,
+        )
     else:
         message = "the worker ended without an outcome while no server was there to see it"
-        lost = Outcome(state=State.LOST, cause=Cause.SERVICE, message=message, ranks=run.ranks)
+        lost = Outcome(state=State.LOST, cause=Cause.SERVICE, message=message, ranks=run.ranks, threads=run.threads)
     return _end(run, _at(run, event, now), lost)

@@ -17,7 +17,7 @@ from starlette.requests import ClientDisconnect
 
 from conoid.cases.bodies import MeshFile
 from conoid.cases.estimate import Estimate
-from conoid.cases.figures import count, number, size
+from conoid.cases.figures import count, crew, number, size
 from conoid.cases.policy import Quota
 from conoid.cases.problems import Problem, shown
 from conoid.cases.schema import Case
@@ -118,7 +118,7 @@ def of(settings: Settings) -> Limits:
 
 def check(case: Case, limits: Limits) -> list[Problem]:
     """Everything that a valid case says and this server does not allow."""
-    return [*_ranks(case, limits), *_files(case), *_time(case, limits)]
+    return [*_cores(case, limits), *_files(case), *_time(case, limits)]
 
 
 def check_size(estimate: Estimate, caps: Limits) -> list[Problem]:
@@ -136,11 +136,13 @@ def check_size(estimate: Estimate, caps: Limits) -> list[Problem]:
     ]
 
 
-def _ranks(case: Case, settings: Limits) -> Iterator[Problem]:
-    if case.run.ranks > settings.slots:
-        yield Problem(
-            "run.ranks", str(case.run.ranks), f"this server has {settings.slots} slots; allowed: 1 to {settings.slots}"
-        )
+def _cores(case: Case, settings: Limits) -> Iterator[Problem]:
+    run, slots = case.run, settings.slots
+    if run.ranks > slots:
+        yield Problem("run.ranks", str(run.ranks), f"this server has {slots} slots; allowed: 1 to {slots}")
+    elif run.cores > slots:
+        told = f"{crew(run.ranks, run.threads)} take {run.cores} slots, and this server has {slots}"
+        yield Problem("run.threads", str(run.threads), f"{told}; allowed: 1 to {slots // run.ranks}")
 
 
 def _files(case: Case) -> Iterator[Problem]:
@@ -177,7 +179,7 @@ def figures(estimate: Estimate) -> dict[str, int | float]:
 
 def wall_time(case: Case, caps: Limits) -> float | None:
     """Seconds after which the run is stopped; None: never."""
-    cost = None if caps.core_seconds is None else caps.core_seconds / case.run.ranks
+    cost = None if caps.core_seconds is None else caps.core_seconds / case.run.cores
     asked = [limit for limit in (case.run.max_wall_time, caps.wall_time, cost) if limit is not None]
     return min(asked) if asked else None
 

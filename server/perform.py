@@ -116,7 +116,7 @@ class Performer:
                 raise DamagedError(f"{made.case_file} is not what was accepted")
             case = path / made.case_file
             group = f"{made.owner}/{made.labels['sweep']}" if "sweep" in made.labels else ""
-            job = Job(run.id, run.ranks, case, path, access, made.profile, made.wall_time, group)
+            job = Job(run.id, run.ranks, case, path, access, made.profile, made.wall_time, group, run.threads)
             worker = self._launcher.start(job)
         except (OSError, msgspec.MsgspecError) as error:
             raise DamagedError(str(error)) from error

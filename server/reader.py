@@ -13,12 +13,12 @@ from functools import cache
 
 import msgspec
 
+from conoid.cases.cores import usable_cores
 from conoid.cases.load import CaseError
 
 from .errors import ServiceError
 from .lanes import Lanes
 from .reading import CPU, PID, WALL, Answer, Question, Reading
-from .settings import usable_cores
 
 _log = logging.getLogger("conoid.server")
 _LOAD = 30.0

@@ -52,6 +52,7 @@ class Reading(msgspec.Struct, frozen=True, kw_only=True):
     name: str
     title: str
     ranks: int
+    threads: int
     profile: str
     """Of a batch system, by the case; empty for the site's own."""
     wall_time: float | None
@@ -90,7 +91,7 @@ def _read(question: Question) -> Reading:
     expected = _estimate(case, question.limits)
     odd = [*bare_numbers(data), *warned(case, expected, Survey(), ())]  # without parts that touch: it takes seconds
     return Reading(
-        name=case.name, title=case.title, ranks=case.run.ranks, profile=case.run.profile,
+        name=case.name, title=case.title, ranks=case.run.ranks, threads=case.run.threads, profile=case.run.profile,
         wall_time=limits.wall_time(case, question.limits), estimate=limits.figures(expected),
         resolved=resolved_json(case), case=case.model_dump_json().encode(), doubts=odd,
     )  # fmt: skip

@@ -19,10 +19,11 @@ LABEL = "restart"
 """Of the new run: the id of the other one."""
 
 
-def body(case: Path, ranks: int | None) -> dict[str, object]:
-    """The case of a run, on so many ranks. Raises CaseError, OSError."""
+def body(case: Path, ranks: int | None, threads: int | None = None) -> dict[str, object]:
+    """The case of a run, on so many ranks and threads; None: as it has them. Raises CaseError, OSError."""
     whole.check(case)
-    return apply_overrides(read_data(case), {} if ranks is None else {"run.ranks": ranks})
+    wanted = {"run.ranks": ranks, "run.threads": threads}
+    return apply_overrides(read_data(case), {key: value for key, value in wanted.items() if value is not None})
 
 
 def fill(source: Path, folder: Path) -> None:

@@ -1,4 +1,4 @@
-"""What a site decides: where runs live, how many ranks at a time, how workers are started, the caps."""
+"""What a site decides: where runs live, how many cores they take, how workers are started, the caps."""
 
 import ipaddress
 import os
@@ -10,6 +10,7 @@ from pathlib import Path
 from sqlalchemy import URL
 
 from conoid.cases.batch import Site, SiteError, read_site
+from conoid.cases.cores import usable_cores
 
 WORKER = (sys.executable, "-m", "mpi4py", "-m", "conoid.worker")
 """The worker's command after ``mpiexec -n N``; ``-m mpi4py`` makes one rank's exception end all ranks."""
@@ -26,11 +27,6 @@ class SettingsError(StartError):
     """A setting cannot be used; the text names it, its value and what is allowed."""
 
     exit_code = 2
-
-
-def usable_cores() -> int:
-    """Cores that this process may run on, which can be fewer than the machine has."""
-    return len(os.sched_getaffinity(0))
 
 
 def memory_bytes() -> int:
@@ -68,7 +64,7 @@ class Settings:
     zenoh_port: int | None = 7447
     """0: any free port; None: no Zenoh router, clients watch over SSE."""
     slots: int = field(default_factory=usable_cores)
-    """Ranks that may run at a time, of all runs together."""
+    """Cores that all runs together may take at a time; a run takes its ranks times its threads."""
     auth: bool = True
     web: Path | None = None
     """Folder of the live page, served at ``/``."""
@@ -89,7 +85,7 @@ class Settings:
         if not self.auth and not loopback(self.host):
             raise SettingsError(f"--no-auth with --host {self.host}: allowed only on a loopback address")
         if self.slots < 1:
-            raise SettingsError(f"--slots {self.slots}: at least one rank must be able to run")
+            raise SettingsError(f"--slots {self.slots}: at least one core is needed")
         if not self.grace > 0:
             raise SettingsError(f"--grace {self.grace}: a number of seconds above 0")
         for name, port in (("--port", self.port), ("--zenoh-port", self.zenoh_port or 0)):

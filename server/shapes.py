@@ -46,6 +46,7 @@ class Receipt(msgspec.Struct, kw_only=True):
     title: str
     state: State
     ranks: int
+    threads: int
     submitted: float
     estimate: dict[str, float]
     url: str
@@ -62,6 +63,7 @@ class RunLine(msgspec.Struct, kw_only=True):
     message: str
     reason: str
     ranks: int
+    threads: int
     submitted: float
     started: float | None
     finished: float | None

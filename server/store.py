@@ -56,6 +56,7 @@ class Store:
             self.unlabelled = not sa.inspect(self._engine).has_table(LABELS.name)
             """Whether the labels of all runs are to be read from their folders: the database is new, or an old one."""
             META.create_all(self._engine)
+            _complete(self._engine)
             self._file = identity_of(self._engine)
         except (SQLAlchemyError, ImportError) as error:
             raise failure(url, error, "opened") from None
@@ -193,7 +194,7 @@ class Store:
 
     def taken(self) -> list[Took]:
         """What every run that has ended took."""
-        query = sa.select(RUNS.c.owner, RUNS.c.ranks, RUNS.c.started, RUNS.c.finished)
+        query = sa.select(RUNS.c.owner, RUNS.c.ranks * RUNS.c.threads, RUNS.c.started, RUNS.c.finished)
         ended = query.where(RUNS.c.state.not_in(_OPEN), RUNS.c.started > 0.0)
         with self._engine.connect() as connection:
             return [Took(*row) for row in connection.execute(ended)]
@@ -236,6 +237,15 @@ class Store:
         query = sa.update(TOKENS).where(TOKENS.c.id == token_id, TOKENS.c.revoked.is_(False)).values(revoked=True)
         with self._engine.begin() as connection:
             return connection.execute(query).rowcount == 1
+
+
+def _complete(engine: sa.Engine) -> None:
+    """Adds the columns of runs that the table of an earlier server lacks; those that it has had get their default."""
+    there = {column["name"] for column in sa.inspect(engine).get_columns(RUNS.name)}
+    with engine.begin() as connection:
+        for column in (each for each in RUNS.columns if each.name not in there):
+            made = sa.schema.CreateColumn(column).compile(dialect=engine.dialect)
+            connection.exec_driver_sql(f"alter table {RUNS.name} add column {made}")
 
 
 def _parts(items: Sequence[str]) -> Iterator[Sequence[str]]:

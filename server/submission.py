@@ -164,7 +164,8 @@ class Desk:
         self._check_room(owner)
         run_id, now = folder.new_id()
         made = Submission(
-            id=run_id, owner=owner, name=reading.name, title=reading.title, ranks=reading.ranks, submitted=now,
+            id=run_id, owner=owner, name=reading.name, title=reading.title, ranks=reading.ranks,
+            threads=reading.threads, submitted=now,
             case_file=_file_name(content_type), body_sha256=digest, idempotency_key=key,
             wall_time=reading.wall_time, estimate=reading.estimate, labels=dict(wishes.labels),
             profile=wishes.profile, priority=wishes.priority, wishes_sha256=asked,
@@ -209,7 +210,8 @@ def receipt(made: Submission) -> dict[str, Any]:
     """What the submitter is told; it does not depend on when it is asked."""
     return {
         "id": made.id, "owner": made.owner, "name": made.name, "title": made.title, "state": "accepted",
-        "ranks": made.ranks, "submitted": made.submitted, "estimate": made.estimate, "url": f"/v1/runs/{made.id}",
+        "ranks": made.ranks, "threads": made.threads, "submitted": made.submitted, "estimate": made.estimate,
+        "url": f"/v1/runs/{made.id}",
     }  # fmt: skip
 
 

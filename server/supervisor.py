@@ -131,7 +131,7 @@ class Supervisor:
 
     def slots_used(self) -> int:
         """Ranks that run now."""
-        return sum(run.ranks for run_id in tuple(self._watches) if (run := self._open.get(run_id)))
+        return sum(run.cores for run_id in tuple(self._watches) if (run := self._open.get(run_id)))
 
     def reason(self, run_id: str) -> str:
         """What a queued run waits for, and what a batch system has to say of any; else empty."""

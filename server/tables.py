@@ -18,6 +18,7 @@ RUNS = sa.Table(
     sa.Column("started", sa.Float(53), nullable=False),
     sa.Column("finished", sa.Float(53), nullable=False),
     sa.Column("stopping_for", sa.String(16)),
+    sa.Column("threads", sa.Integer, nullable=False, server_default="1"),
     sa.Index("runs_of_owner", "owner", "id"),
     sa.Index("runs_by_state", "state"),
 )

@@ -8,7 +8,7 @@ class Took(NamedTuple):
     """What one run has taken; times are Unix s."""
 
     owner: str
-    ranks: int
+    cores: int
     started: float
     finished: float
 
@@ -28,7 +28,7 @@ class Usage:
 
     def add(self, took: Took) -> None:
         """A run has given its cores back."""
-        seconds = took.ranks * max(0.0, took.finished - took.started)
+        seconds = took.cores * max(0.0, took.finished - took.started)
         self._taken[took.owner] = (self.of(took.owner, took.finished) + seconds, took.finished)
 
     def of(self, owner: str, now: float) -> float:

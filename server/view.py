@@ -75,6 +75,7 @@ def brief(service: Service, run: Run, labels: Mapping[str, str] | None = None) -
         "message": run.message,
         "reason": service.supervisor.reason(run.id),
         "ranks": run.ranks,
+        "threads": run.threads,
         "submitted": run.submitted,
         "started": run.started or None,
         "finished": run.finished or None,

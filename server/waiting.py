@@ -28,7 +28,7 @@ class Need:
 
     run: str
     owner: str
-    ranks: int
+    cores: int
     memory: float = 0.0
     """Bytes of all ranks, by the estimate; 0: not known."""
     seconds: float = 0.0
@@ -44,25 +44,25 @@ class Need:
 class Busy:
     """What a run that has its cores holds, and the Unix time at which it is expected to end; 0: any moment."""
 
-    ranks: int
+    cores: int
     memory: float = 0.0
     ends: float = 0.0
 
 
 @dataclass(frozen=True)
 class Room:
-    """Ranks, and bytes of memory."""
+    """Cores, and bytes of memory."""
 
-    ranks: int
+    cores: int
     memory: float = math.inf
 
     def fits(self, need: Need) -> bool:
         """True when the run can have what it asks for."""
-        return need.ranks <= self.ranks and need.memory <= self.memory
+        return need.cores <= self.cores and need.memory <= self.memory
 
     def less(self, *taken: Need | Busy) -> "Room":
         """What is left beside these."""
-        return Room(self.ranks - sum(one.ranks for one in taken), self.memory - sum(one.memory for one in taken))
+        return Room(self.cores - sum(one.cores for one in taken), self.memory - sum(one.memory for one in taken))
 
 
 @dataclass
@@ -98,7 +98,7 @@ def ordered(needs: Iterable[Need], taken: Mapping[str, float], users: Mapping[st
         found.append(need)
         if of_owner[name]:
             share = users.get(name, Share()).share
-            cost = max(_LEAST, need.ranks * need.seconds)
+            cost = max(_LEAST, need.cores * need.seconds)
             heapq.heappush(heap, _place(users, name, used * share + cost, of_owner[name][0]))
     return found
 
@@ -128,7 +128,7 @@ def plan(
             made.why[need.run] = why
         elif free.fits(need) and (first is None or _passes(need, first, holds, free, now)):
             starts.append(need)
-            holds.append(Busy(need.ranks, need.memory, now + need.seconds if need.seconds else 0.0))
+            holds.append(Busy(need.cores, need.memory, now + need.seconds if need.seconds else 0.0))
         else:
             made.why[need.run] = _reason(need, room, free, waits)
             first, waits = first or need, waits + 1
@@ -138,8 +138,8 @@ def plan(
 
 def _beyond(need: Need, room: Room) -> str:
     """Why a run can never start; a server may have been started again with less."""
-    if need.ranks > room.ranks:
-        return f"it needs {counted(need.ranks, 'slot')}, and this server has {room.ranks}: it cannot start here"
+    if need.cores > room.cores:
+        return f"it needs {counted(need.cores, 'slot')}, and this server has {room.cores}: it cannot start here"
     if need.memory > room.memory:
         return f"it needs {size(need.memory)} of memory, and this server has {size(room.memory)}: it cannot start here"
     return ""
@@ -148,8 +148,8 @@ def _beyond(need: Need, room: Room) -> str:
 def _reason(need: Need, room: Room, free: Room, waits: int) -> str:
     if waits:
         return f"waiting for {counted(waits, 'run')} before it"
-    if need.ranks > free.ranks:
-        return f"waiting for {need.ranks} of {room.ranks} slots; {max(0, free.ranks)} free"
+    if need.cores > free.cores:
+        return f"waiting for {need.cores} of {room.cores} slots; {max(0, free.cores)} free"
     return f"waiting for {size(need.memory)} of {size(room.memory)} of memory; {size(max(0.0, free.memory))} free"
 
 
@@ -161,7 +161,7 @@ def _passes(need: Need, first: Need, busy: Sequence[Busy], free: Room, now: floa
 def _earliest(first: Need, busy: Sequence[Busy], free: Room, now: float) -> float:
     """When ``first`` can start, Unix s: by the estimates of what runs; one that is overdue may end at any moment."""
     for one in sorted(busy, key=lambda one: one.ends):
-        free = Room(free.ranks + one.ranks, free.memory + one.memory)
+        free = Room(free.cores + one.cores, free.memory + one.memory)
         if free.fits(first):
             return max(now, one.ends)
     return now
@@ -170,14 +170,14 @@ def _earliest(first: Need, busy: Sequence[Busy], free: Room, now: float) -> floa
 def _beside(need: Need, first: Need, busy: Sequence[Busy], free: Room) -> bool:
     """Whether ``first`` has its cores at the same moment with ``need`` as without, in whichever order others end.
 
-    The ranks that may come free are the sums over some of ``busy``: the least that lets ``first`` start must leave
+    The cores that may come free are the sums over some of ``busy``: the least that lets ``first`` start must leave
     enough for ``need``. Where memory holds ``first`` up, nobody passes in this way.
     """
     if free.memory - first.memory < need.memory:
         return False
     sums = 1
     for one in busy:
-        sums |= sums << one.ranks
-    lacking = max(0, first.ranks - free.ranks)
+        sums |= sums << one.cores
+    lacking = max(0, first.cores - free.cores)
     least = lacking + ((sums >> lacking) & -(sums >> lacking)).bit_length() - 1
-    return free.ranks + least - first.ranks >= need.ranks
+    return free.cores + least - first.cores >= need.cores

@@ -53,7 +53,7 @@ class Waitlist:
         """A run has made a step: what it has taken counts from the moment at which it has its cores no more."""
         self._due = 0.0
         if before is not None and before.started and (after.state.final or not after.started):
-            self.usage.add(Took(before.owner, before.ranks, before.started, after.finished or time.time()))
+            self.usage.add(Took(before.owner, before.cores, before.started, after.finished or time.time()))
         if after.state.final:
             self._needs.pop(after.id, None)
             self._why.pop(after.id, None)
@@ -65,7 +65,7 @@ class Waitlist:
     def used(self, owner: str, runs: Iterable[Run]) -> float:
         """Core-seconds of an owner that count now, with those of what runs of ``runs``."""
         now = time.time()
-        own = (run.ranks * (now - run.started) for run in runs if run.owner == owner and run.started)
+        own = (run.cores * (now - run.started) for run in runs if run.owner == owner and run.started)
         return self.usage.of(owner, now) + sum(own)
 
     def turn(self, runs: Sequence[Run], active: Iterable[str], held: Held) -> list[str]:
@@ -91,7 +91,7 @@ class Waitlist:
         """Core-seconds by owner; a run that works counts for what it is expected to take, or for more if it has."""
         taken = defaultdict(float, self.usage.all(now))
         for run, need in working:
-            taken[run.owner] += run.ranks * max(need.seconds, now - run.started if run.started else 0.0, 1.0)
+            taken[run.owner] += run.cores * max(need.seconds, now - run.started if run.started else 0.0, 1.0)
         return taken
 
     def _blocks(self, working: Sequence[tuple[Run, Need]], held: Held) -> Callable[[Need, Sequence[Need]], str]:
@@ -113,12 +113,12 @@ class Waitlist:
         return blocked
 
     def _need(self, run: Run) -> Need:
-        """By the run's folder, read once; where that is damaged nothing is known but the ranks."""
+        """By the run's folder, read once; where that is damaged nothing is known but its cores."""
         if run.id not in self._needs:
             try:
                 made = folder.submission(self._settings.runs / run.id)
             except (OSError, msgspec.MsgspecError):
-                return Need(run.id, run.owner, run.ranks)
+                return Need(run.id, run.owner, run.cores)
             self._needs[run.id] = need_of(made, self._settings.grace, self._room().memory)
         return self._needs[run.id]
 
@@ -127,15 +127,15 @@ def need_of(made: Submission, grace: float, room: float = math.inf) -> Need:
     """What a submission asks for; ``grace``: s after its limit at which the run is ended by force at the latest. Bodies
     that may break take memory as if they were dust, but for a run that would not fit into ``room``, bytes, for that.
     """
-    seconds = made.estimate.get("core_seconds", 0.0) / made.ranks
+    seconds = made.estimate.get("core_seconds", 0.0) / made.cores
     limit = math.inf if made.wall_time is None else made.wall_time + 2.0 * grace
     whole = float(made.estimate.get("memory_bytes", 0.0))
     memory = max(whole, min(whole + made.estimate.get("dust_bytes", 0.0), room))
     return Need(
-        made.id, made.owner, made.ranks, memory, seconds, limit, made.priority, made.labels.get("sweep", "")
+        made.id, made.owner, made.cores, memory, seconds, limit, made.priority, made.labels.get("sweep", "")
     )  # fmt: skip
 
 
 def _busy(run: Run, need: Need) -> Busy:
     """One that has its cores: it ends when its estimate says so."""
-    return Busy(run.ranks, need.memory, run.started + need.seconds if run.started and need.seconds else 0.0)
+    return Busy(run.cores, need.memory, run.started + need.seconds if run.started and need.seconds else 0.0)

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import msgspec
 
-from conoid.cases import batch, checkpoints, layout, messages, outcome, slurm, slurm_call, whole
+from conoid.cases import batch, checkpoints, figures, layout, messages, outcome, slurm, slurm_call, whole
 from conoid.cases.batch import Job
 from conoid.cases.outcome import Outcome
 from conoid.cases.run import Cause, ExitCode, State
@@ -119,7 +119,7 @@ def _run(folder: Path, job: Job, number: str, told: Told) -> int:
     """Starts the ranks and waits for their end, however long it takes after a signal."""
     (folder / layout.INTERRUPTED).unlink(missing_ok=True)
     again = int(os.environ.get("SLURM_RESTART_COUNT", "0"))
-    attempt = f"attempt {job.attempt + again}" if job.attempt + again > 1 else f"{job.ranks} ranks"
+    attempt = f"attempt {job.attempt + again}" if job.attempt + again > 1 else figures.crew(job.ranks, job.threads)
     _say(folder, job, State.STARTING, f"Slurm job {number} on {os.environ.get('SLURM_JOB_NODELIST', '?')}, {attempt}")
     access = batch.read_access(folder)
     words = [*job.command, *(["--restart"] if latest(folder) >= 0 else [])]
@@ -133,7 +133,7 @@ def _run(folder: Path, job: Job, number: str, told: Told) -> int:
 
 
 def environment(base: Mapping[str, str], job: Job, access: batch.Access | None) -> dict[str, str]:
-    """Of the ranks: one thread each, the run's mark, its credentials."""
+    """Of the ranks: libraries with one thread, the run's mark, its credentials."""
     env = {**base, **dict.fromkeys(_ONE_THREAD, "1"), "CONOID_RUN": job.run}
     if access is not None and access.user:
         env |= {"CONOID_ZENOH_USER": access.user, "CONOID_ZENOH_PASSWORD": access.password}
@@ -228,7 +228,7 @@ def _so_far(folder: Path, state: State, cause: Cause, message: str) -> Outcome:
 def end(folder: Path, job: Job, ended: Outcome) -> None:
     """The outcome, and the last message. Raises OSError."""
     lock = hold(folder)
-    last = msgspec.structs.replace(ended, ranks=job.ranks)
+    last = msgspec.structs.replace(ended, ranks=job.ranks, threads=job.threads)
     whole.write(folder / layout.OUTCOME, outcome.to_json(last))
     (folder / layout.INTERRUPTED).unlink(missing_ok=True)
     journal = Journal(folder, job.run)

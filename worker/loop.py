@@ -318,7 +318,14 @@ class Loop:
                 worst_residual=sim.ledger.worst,
                 updates_per_second=(self.updates - self._reported_updates) / elapsed, parts=self._parts,
             )  # fmt: skip
-        self._tell(messages.Load, phases=work, imbalance=window.imbalance, steps=window.steps, **told)
+        self._tell(
+            messages.Load,
+            phases=work,
+            imbalance=window.imbalance,
+            steps=window.steps,
+            threads=sim.case.run.threads,
+            **told,
+        )
         self._reported, self._reported_updates = now, self.updates
 
     def _record(self) -> None:

@@ -144,6 +144,7 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("--run", help="the run's id; the folder's name when absent")
     parser.add_argument("--telemetry", metavar="ENDPOINT", help="a Zenoh router, such as tcp/127.0.0.1:7447")
     parser.add_argument("--ranks", type=int, help="end at once when MPI has started another number of ranks")
+    parser.add_argument("--threads", type=int, help="of each rank; run.threads of the case when absent")
     parser.add_argument(
         "--interruptible", action="store_true",
         help=f"a stop that {layout.STOP_REQUEST} does not ask for leaves a checkpoint and no outcome: the run goes on",
@@ -178,7 +179,8 @@ def _read(options: argparse.Namespace, ranks: int) -> tuple[Case, list[str]]:
     if not path.exists() and not path.suffix:
         path = load.shipped_path(options.case)
     data = load.apply_overrides(load.read_data(path), options.set)
-    return load.parse_case(load.apply_overrides(data, {"run.ranks": ranks})), [str(each) for each in bare_numbers(data)]
+    there = {"run.ranks": ranks} | ({} if options.threads is None else {"run.threads": options.threads})
+    return load.parse_case(load.apply_overrides(data, there)), [str(each) for each in bare_numbers(data)]
 
 
 def _prepare_folder(folder: Path, comm: Comm) -> AbstractContextManager[Any] | None:

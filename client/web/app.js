@@ -108,7 +108,7 @@ function row(run, marked, mark) {
     h("td", {}, h("a.name", { href: link }, run.name), h("span.id", {}, run.id)),
     h("td", { title: run.message || run.reason }, pill(run.state)),
     h("td.bar", { style: { minWidth: "120px" } }, meter(run.state, share)),
-    h("td.ranks-of", {}, String(run.ranks)),
+    h("td.ranks-of", {}, run.threads > 1 ? `${run.ranks}x${run.threads}` : String(run.ranks)),
     h("td.right.when", {}, moment(run.submitted) + took),
     h("td.mark", { onclick: (event) => event.stopPropagation() }, box));
 }

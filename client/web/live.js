@@ -48,9 +48,11 @@ export class Live {
   }
 
   on_load(message) {
-    const groups = grouped(message, this.loaded ? message.wall - this.loaded : 0);
+    const interval = this.loaded ? message.wall - this.loaded : 0;
+    const groups = grouped(message, interval);
+    const others = ((message.threads ?? 1) - 1) * interval; // s of the threads of a rank besides its first
     this.loaded = message.wall;
-    this.load = { ...message, groups, totals: totals(groups) };
+    this.load = { ...message, groups, totals: totals(groups), helped: others > 0 ? message.helped.map((seconds) => seconds / others) : [] };
     keep(this.loads, { t: message.t, imbalance: message.imbalance, ...compared(groups) });
   }
 

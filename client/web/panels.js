@@ -12,13 +12,13 @@ export class Ranks {
   }
 
   draw({ load }) {
-    const { groups = {}, totals = [] } = load ?? {};
+    const { groups = {}, totals = [], helped = [] } = load ?? {};
     const longest = Math.max(...totals, 1e-300);
     const share = (rank) => (totals[rank] > 0 ? (groups.compute?.[rank] ?? 0) + (groups.contact?.[rank] ?? 0) : 0) / (totals[rank] || 1);
     const rows = totals.slice(0, MOST_RANKS).flatMap((_, rank) => {
       const pieces = Object.entries(groups).map(([name, seconds]) =>
         h("i", { title: `${name} ${si(seconds[rank], "s")}`, style: { width: `${(100 * seconds[rank]) / longest}%`, background: `var(--${name})` } }));
-      return [h("span.who", {}, `rank ${rank}`), h("div.stack", {}, pieces), h("span.busy", {}, `${percent(share(rank), 0)} busy`)];
+      return [h("span.who", {}, `rank ${rank}`), h("div.stack", {}, pieces), h("span.busy", {}, `${percent(share(rank), 0)} busy${rank in helped ? `, its threads ${percent(helped[rank], 0)}` : ""}`)];
     });
     const more = totals.length - MOST_RANKS;
     this.element.replaceChildren(

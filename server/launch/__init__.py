@@ -45,6 +45,8 @@ class Job:
     """s that the run may take from its start."""
     group: str = ""
     """Runs that belong together, such as those of a sweep, and may be handed over as one; empty: it is alone."""
+    threads: int = 1
+    """Of each rank."""
 
 
 @dataclass(frozen=True)

@@ -44,7 +44,7 @@ class Arrays:
             if worker.waits_for_array:
                 known.setdefault(job.name, []).append(worker)
             elif worker.fresh:
-                fresh.setdefault((worker.group, job.profile, job.ranks), []).append(worker)
+                fresh.setdefault((worker.group, job.profile, job.ranks, job.threads), []).append(worker)
         growing = {each.name for group in fresh.values() if not _settled(group) for each in group}
         for group in fresh.values():
             if _settled(group) and len(group) > 1:

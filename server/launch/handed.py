@@ -196,7 +196,9 @@ class SlurmWorker:
         """It is handed over alone, under a name of its own: the array was refused. Raises OSError."""
         job, self.group = self._job, ""
         profile = batch.profile_of(self._site, job.profile)
-        fresh = batch.new_job(job.run, job.ranks, profile, job.command, job.submitted, job.attempt, job.bin)
+        fresh = batch.new_job(
+            job.run, job.ranks, profile, job.command, job.submitted, job.attempt, job.bin, job.threads
+        )
         self.write_down(name=fresh.name, task=None, array="")
 
     def write_down(self, **changes: object) -> None:
@@ -274,7 +276,7 @@ class SlurmWorker:
             return
         profile = batch.profile_of(self._site, self._job.profile)
         job, attempt = self._job, self._job.attempt + 1
-        fresh = batch.new_job(job.run, job.ranks, profile, job.command, time.time(), attempt, job.bin)
+        fresh = batch.new_job(job.run, job.ranks, profile, job.command, time.time(), attempt, job.bin, job.threads)
         whole.write(self._folder / layout.JOB, batch.to_json(fresh))
         self._job, self._entry, self._ended, self._missing, self._told = fresh, None, 0.0, 0, ""
         self._released = 0

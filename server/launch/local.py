@@ -6,17 +6,18 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO
 
 from conoid.cases import checkpoints, layout, whole
+from conoid.cases.cores import core_numbers, usable_cores
 
 from .. import farewell
 from .. import folder as run_folder
 from ..folder import Process
-from ..settings import Settings, command, usable_cores
+from ..settings import Settings, command
 from . import DamagedError, Exit, Job, LaunchError, Phase, Trace, Worker, memory, processes
 
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -45,7 +46,8 @@ class LocalLauncher:
 
     def start(self, job: Job) -> Worker:
         """Starts the ranks; their terminal output goes to log/launcher.log. Raises LaunchError."""
-        argv = [*find_mpiexec(self._mpiexec), "-n", str(job.ranks), *self._worker, *_arguments(job)]
+        bound = [] if self._mpiexec else binding(job.ranks, job.threads, core_numbers())
+        argv = [*find_mpiexec(self._mpiexec), *bound, "-n", str(job.ranks), *self._worker, *_arguments(job)]
         with _log_of(job.folder) as log:
             try:
                 child = subprocess.Popen(
@@ -108,8 +110,20 @@ def find_mpiexec(chosen: str) -> tuple[str, ...]:
     return (found,)
 
 
+def binding(ranks: int, threads: int, cores: Sequence[int]) -> list[str]:
+    """Words for MPICH's mpiexec that give each rank cores of its own, so that its threads share no core with those of
+    another rank; none where the run does not take all ``cores``: others may run on the rest.
+    """
+    if ranks == 1 or threads == 1 or ranks * threads != len(cores):
+        return []
+    shares = (cores[first : first + threads] for first in range(0, len(cores), threads))
+    return ["-bind-to", "user:" + ",".join("+".join(map(str, share)) for share in shares)]
+
+
 def environment(base: Mapping[str, str], job: Job) -> dict[str, str]:
-    """The worker's environment: one thread a rank, the run's mark, its Zenoh credentials, none of the server's own."""
+    """The worker's environment: libraries with one thread, the run's mark, its Zenoh credentials, and nothing that is
+    the server's own.
+    """
     env = {name: value for name, value in base.items() if name not in _NOT_FOR_WORKERS}
     env.update(dict.fromkeys(_ONE_THREAD, "1"))
     env[processes.RUN_VARIABLE] = job.run

@@ -39,9 +39,11 @@ class SlurmLauncher:
         """Writes down what is to be handed over. Raises LaunchError."""
         try:
             profile = batch.profile_of(self._site, job.profile)
-            starter = batch.starter(profile[1], job.ranks, partial(find_mpiexec, self._mpiexec))
+            starter = batch.starter(profile[1], job.ranks, partial(find_mpiexec, self._mpiexec), job.threads)
             command = [*starter, *self._words(job)]
-            record = batch.new_job(job.run, job.ranks, profile, command, time.time(), place=self._site.bin)
+            record = batch.new_job(
+                job.run, job.ranks, profile, command, time.time(), place=self._site.bin, threads=job.threads
+            )
             if job.telemetry is not None:
                 self._write_access(job)
             whole.write(job.folder / layout.JOB_SCRIPT, batch.script(profile[1], sys.executable).encode(), 0o755)

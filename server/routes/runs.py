@@ -27,7 +27,7 @@ from ..submission import Wishes, labels_of
 
 router = APIRouter()
 Body = Annotated[bytes, Depends(read_body)]
-_MOST_RANKS = 1_000_000
+_MOST_RANKS = _MOST_THREADS = 1_000_000
 """That a number may be; the server has its own limit. Chosen."""
 _LAST = "z" * 22
 """Behind the beginning of an id: no id that begins so comes after it."""
@@ -223,6 +223,7 @@ async def restart(
     identity: Submitter,
     idempotency_key: Annotated[str | None, Header()] = None,
     ranks: Annotated[int | None, Query(ge=1, le=_MOST_RANKS, description="those of the case if not given")] = None,
+    threads: Annotated[int | None, Query(ge=1, le=_MOST_THREADS, description="of each rank, likewise")] = None,
     profile: Annotated[str, Query(description="of the site's batch system")] = "",
     priority: Annotated[int, Query(ge=-PRIORITY, le=PRIORITY, description="among your own runs")] = 0,
 ) -> Response:
@@ -230,15 +231,17 @@ async def restart(
     This one stays as it is."""
     run = await service.lanes.run(find, service, identity, run_id)
     wishes = Wishes({restarts.LABEL: run.id}, profile, priority, run.id)
-    receipt = await service.readers.run(_restarted, service, run, ranks, idempotency_key, wishes)
+    receipt = await service.readers.run(_restarted, service, run, (ranks, threads), idempotency_key, wishes)
     return JSONResponse(receipt, 202, {"Location": receipt["url"]})
 
 
-def _restarted(service: Service, run: Run, ranks: int | None, key: str | None, wishes: Wishes) -> dict[str, Any]:
+def _restarted(
+    service: Service, run: Run, cores: tuple[int | None, int | None], key: str | None, wishes: Wishes
+) -> dict[str, Any]:
     path = service.settings.runs / run.id
     try:
         case = path / folder.submission(path).case_file
-        body = json.dumps(restarts.body(case, ranks)).encode()
+        body = json.dumps(restarts.body(case, *cores)).encode()
     except (OSError, msgspec.MsgspecError) as error:
         raise ServiceError(409, "no_case", f"run {run.id}: its case cannot be read") from error
     except CaseError as error:

@@ -261,14 +261,15 @@ def a_run_runs(runs: Path) -> bool:
 
 def test_run_does_it_all_and_leaves_no_process(alone: Path) -> None:
     case = case_file(alone, steps=3)
-    words = ["run", str(case), "--ranks", "2", "--set", "title=Short", "--out", str(alone / "runs")]
+    words = ["run", str(case), "--ranks", "2", "--threads", "2", "--set", "title=Short", "--out", str(alone / "runs")]
     done = subprocess.run([*CONOID, *words], capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0, done.stderr
     assert "extent of rod" in done.stdout
     assert "pass" in done.stdout
     assert "FAIL" in done.stdout
     folders = [path for path in (alone / "runs").iterdir() if path.is_dir()]
-    assert json.loads((folders[0] / "case.resolved.json").read_bytes())["run"]["ranks"] == 2
+    resolved = json.loads((folders[0] / "case.resolved.json").read_bytes())["run"]
+    assert (resolved["ranks"], resolved["threads"]) == (2, 2)
     assert f"results    {folders[0]}" in done.stdout
     assert processes_of(alone / "runs") == []
     checked = conoid(*words, "--check", "--json")

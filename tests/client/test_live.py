@@ -4,10 +4,11 @@ import io
 import threading
 from collections.abc import Iterator
 
+import msgspec
 import pytest
 from rich.console import Console
 
-from conoid.cases.messages import AnyMessage
+from conoid.cases.messages import AnyMessage, Load
 from conoid.cases.run import State
 from conoid.client import display, silence
 from conoid.client.errors import UnreachableError
@@ -42,6 +43,15 @@ def test_phases_are_grouped_and_the_rest_of_the_interval_is_the_wait() -> None:
         "wait": pytest.approx([0.5, 0.5]),
     }  # fmt: skip
     assert live.busy == pytest.approx([1.3 / 2.0, 0.7 / 2.0])
+
+
+def test_the_other_threads_of_a_rank_are_busy_by_the_time_of_their_tasks() -> None:
+    live = told(6)
+    load = next(each for each in stories.whole() if isinstance(each, Load))
+    live.take(msgspec.structs.replace(load, threads=4, helped=[3.0, 0.0]))
+    assert live.helped == [3.0 / (3 * 2.0), 0.0]
+    assert "65 % busy, its threads 50 %" in rendered(live)
+    assert told(7).helped == []
 
 
 def test_a_wait_that_the_worker_times_is_taken_as_it_is() -> None:

@@ -2,10 +2,12 @@
 
 import threading
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from conoid.worker import main
 from conoid.worker.elements.colours import coloured
 from conoid.worker.jit import njit, several, types
 from conoid.worker.mesh.structured import structured
@@ -100,3 +102,9 @@ def test_chunks_that_all_share_a_node_have_a_colour_each() -> None:
     found = coloured(block, 0, 70, 3 * n + 1)
     assert found.starts.tolist() == list(range(71))
     assert found.tasks[:, 0].tolist() == list(range(70))
+
+
+def test_the_worker_takes_another_number_of_threads_than_the_case_has(tmp_path: Path) -> None:
+    words = ["two_tets", "--out", str(tmp_path), "--set", "run.threads=2"]
+    assert main._read(main._parse(words), 3)[0].run.cores == 6
+    assert main._read(main._parse([*words, "--threads", "5"]), 3)[0].run.cores == 15

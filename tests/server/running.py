@@ -27,7 +27,9 @@ START = 180.0
 TOML = {"Content-Type": "application/toml"}
 
 
-def case_text(name: str = "bar", ranks: int = 1, end_time: str = "1 us", extra: str = "", **plan: Any) -> str:
+def case_text(
+    name: str = "bar", ranks: int = 1, end_time: str = "1 us", extra: str = "", threads: int = 1, **plan: Any
+) -> str:
     """A small case in TOML; ``plan`` is for the fake worker."""
     return f"""
 name = "{name}"
@@ -51,6 +53,7 @@ elastic = {{ young = "200 GPa", poisson = 0.3 }}
 [run]
 end_time = "{end_time}"
 ranks = {ranks}
+threads = {threads}
 {extra}
 """
 

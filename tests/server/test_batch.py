@@ -110,6 +110,7 @@ def test_the_shipped_profile_and_script_belong_together() -> None:
     job = batch.new_job("run", 8, (name, profile), ["mpiexec"], 0.0)
     words = batch.sbatch_words(job, profile, Path("/runs/run"))
     assert {"--partition=compute", "--account=physics", "--time=720", "--ntasks=8", "--requeue"} <= set(words)
+    assert "--cpus-per-task=1" in words
     assert words[-3:] == ["/runs/run/job.sh", "/runs/run", job.name]
 
 
@@ -117,9 +118,15 @@ def test_an_mpiexec_is_looked_for_only_where_the_profile_needs_one() -> None:
     def none() -> list[str]:
         raise AssertionError("nobody asked for it")
 
-    assert batch.starter(batch.Profile(mpi="srun"), 4, none) == ["srun", "--mpi=pmi2", "--ntasks=4"]
+    words = ["srun", "--mpi=pmi2", "--ntasks=4", "--cpus-per-task=2", "--cpu-bind=cores"]
+    assert batch.starter(batch.Profile(mpi="srun"), 4, none, 2) == words
     assert batch.starter(batch.Profile(mpiexec="/opt/mpiexec -x"), 4, none) == ["/opt/mpiexec", "-x", "-n", "4"]
     assert batch.starter(batch.Profile(), 4, lambda: ["mpiexec"]) == ["mpiexec", "-n", "4"]
+
+
+def test_a_rank_gets_a_core_for_each_of_its_threads() -> None:
+    job = batch.new_job("run", 4, ("a", batch.Profile()), ["true"], 0.0, threads=16)
+    assert {"--ntasks=4", "--cpus-per-task=16"} <= set(batch.sbatch_words(job, batch.Profile(), Path("/runs/run")))
 
 
 def test_what_a_run_is_called_is_no_word_for_a_shell(tmp_path: Path) -> None:
@@ -162,8 +169,8 @@ def test_a_folder_is_handed_over_for_one_case(elsewhere: Path) -> None:
     assert conoid(*words).exit_code == 0
     assert "job 101" in conoid(*words).stdout
     for more, wrong in (
-        (["--set", "run.end_time=1us"], "another case or other ranks"),
-        (["--ranks", 2], "another case or other ranks"),
+        (["--set", "run.end_time=1us"], "another case, other ranks or threads"),
+        (["--ranks", 2], "another case, other ranks or threads"),
         (["--slurm", "long"], "with the profile 'standard'"),
     ):
         other = conoid(*words, *more)

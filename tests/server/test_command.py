@@ -11,11 +11,12 @@ from pathlib import Path
 
 import pytest
 
+from conoid.cases.cores import usable_cores
 from conoid.server.__main__ import main
 from conoid.server.engine import StoreError
 from conoid.server.launch import Access, Job, LaunchError, processes
-from conoid.server.launch.local import environment, find_mpiexec
-from conoid.server.settings import Settings, SettingsError, loopback, usable_cores
+from conoid.server.launch.local import binding, environment, find_mpiexec
+from conoid.server.settings import Settings, SettingsError, loopback
 from conoid.server.store import Store
 from conoid.server.tokens import check_token
 
@@ -40,7 +41,7 @@ def say(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Said:
     ("arguments", "words"),
     [
         (["--host", "0.0.0.0", "--no-auth"], "--no-auth with --host 0.0.0.0: allowed only on a loopback address"),
-        (["--slots", "0"], "--slots 0: at least one rank"),
+        (["--slots", "0"], "--slots 0: at least one core"),
         (["--port", "70000"], "--port 70000: 0 (any free port) to 65535"),
         (["--web", "/no/such/folder"], "--web /no/such/folder: there is no such folder"),
         (["--grace", "0"], "--grace 0.0: a number of seconds above 0"),
@@ -176,6 +177,12 @@ def test_crowded_ranks_sleep_while_they_wait() -> None:
     assert environment({}, job(4 * usable_cores()))["MPIR_CVAR_ENABLE_HEAVY_YIELD"] == "1"
     chosen = {"MPIR_CVAR_ENABLE_HEAVY_YIELD": "0"}
     assert environment(chosen, job(1000))["MPIR_CVAR_ENABLE_HEAVY_YIELD"] == "0"
+
+
+def test_ranks_that_take_the_whole_machine_get_cores_of_their_own() -> None:
+    assert binding(2, 2, [0, 1, 4, 5]) == ["-bind-to", "user:0+1,4+5"]
+    assert binding(4, 1, [0, 1, 2, 3]) == binding(1, 4, [0, 1, 2, 3]) == []
+    assert binding(2, 2, list(range(8))) == [], "another run may have the rest"
 
 
 def test_the_environment_of_a_worker() -> None:

@@ -42,11 +42,12 @@ def test_a_new_run_takes_over_the_checkpoints(server: Running, tmp_path: Path) -
     server.ann.http.post(f"/v1/runs/{run}:cancel")
     server.ann.wait_for(run)
     (tmp_path / "go").touch()
-    made = [server.ann.http.post(f"/v1/runs/{run}:restart?ranks=2", headers={"Idempotency-Key": "k"}) for _ in range(2)]
+    ask = f"/v1/runs/{run}:restart?ranks=1&threads=2"
+    made = [server.ann.http.post(ask, headers={"Idempotency-Key": "k"}) for _ in range(2)]
     assert [answer.status_code for answer in made] == [202, 202]
     fresh = made[0].json()["id"]
     assert fresh == made[1].json()["id"] != run
-    assert made[0].json()["ranks"] == 2
+    assert (made[0].json()["ranks"], made[0].json()["threads"]) == (1, 2)
     folder = server.ann.runs / fresh
     assert sorted(path.name for path in (folder / layout.CHECKPOINTS).iterdir()) == ["000000007", "000000040"]
     frame, history = folder / layout.FRAMES / "000000.vtkhdf", folder / layout.HISTORY
@@ -67,6 +68,7 @@ def test_without_a_checkpoint_there_is_nothing_to_go_on_from(server: Running) ->
     assert server.bob.http.post(f"/v1/runs/{run}:restart").status_code == 404
     with_checkpoint(server, run, 3)
     assert server.ann.http.post(f"/v1/runs/{run}:restart?ranks=3").status_code == 422, "there are 2 slots"
+    assert server.ann.http.post(f"/v1/runs/{run}:restart?ranks=2&threads=2").status_code == 422
 
 
 def test_a_run_that_has_none_yet_says_how_it_gets_some(server: Running) -> None:

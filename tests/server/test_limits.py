@@ -2,6 +2,7 @@
 
 import json
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +11,14 @@ import sqlalchemy as sa
 
 from conoid.cases import layout
 from conoid.cases.messages import Log, to_json
+from conoid.cases.run import State
 from conoid.server import digests, folder, series, view
 from conoid.server.app import opened
+from conoid.server.events import Run
 from conoid.server.routes import events
 from conoid.server.routes.cases import _gallery
 from conoid.server.store import Store
+from conoid.server.usage import Took
 
 from .running import TOML, Running, case_text
 
@@ -145,6 +149,22 @@ def test_a_database_without_labels_gets_them_from_the_folders(server: Running) -
     with opened(settings) as service:
         assert [one.id for one in service.store.page("ann", [], None, 10, {"colour": "red"})] == [red]
         assert not Store(settings.database_url).unlabelled
+
+
+def test_a_database_without_threads_has_runs_of_one_thread(tmp_path: Path) -> None:
+    """It is of an earlier version of the server."""
+    url = f"sqlite:///{tmp_path / 'old.sqlite'}"
+    run = Run("r1", "ann", "bar", 3, 0.0, State.SUCCEEDED, started=10.0, finished=20.0, threads=4)
+    store = Store(url)
+    store.add(run, None)
+    assert store.taken() == [Took("ann", 12, 10.0, 20.0)]
+    store.close()
+    with sa.create_engine(url).begin() as connection:
+        connection.execute(sa.text("alter table runs drop column threads"))
+    store = Store(url)
+    assert store.get("r1") == replace(run, threads=1)
+    assert store.taken() == [Took("ann", 3, 10.0, 20.0)]
+    store.close()
 
 
 def test_three_thousand_runs_are_searched_in_a_moment(tmp_path: Path) -> None:

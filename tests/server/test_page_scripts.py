@@ -117,6 +117,16 @@ def test_waiting_is_told_from_not_being_run(ask: Ask) -> None:
     }  # fmt: skip
 
 
+def test_the_other_threads_of_a_rank_are_busy_by_the_time_of_their_tasks(ask: Ask) -> None:
+    first = {"type": "load", "seq": 1, "wall": 4.0, "t": 0.0, "imbalance": 1.0, "phases": {"elements": [1.0]}}
+    told = [first, {**first, "seq": 2, "wall": 6.0, "threads": 3, "helped": [1.0]}]
+    script = (
+        "(() => { const live = new page.Live('r'); data.forEach((m) => live.take(m)); return live.load.helped; })()"
+    )
+    assert ask("live.js", script, told) == [0.25]
+    assert ask("live.js", script, [first, {**first, "seq": 2, "wall": 6.0}]) == []
+
+
 def test_a_long_series_is_thinned_and_keeps_its_ends(ask: Ask) -> None:
     script = """(() => {
       const live = new page.Live("r");

@@ -185,6 +185,7 @@ def test_a_wrong_content_type(server: Running, kind: str | None, path: str) -> N
         (case_text().replace("element_size", "element_sise"), "parts[0].mesh.element_sise", "element_size"),
         (case_text().replace('material = "steel"', 'material = "steal"'), "parts[0].material", "steel"),
         (case_text(ranks=3), "run.ranks", "2 slots"),
+        (case_text(ranks=2, threads=2), "run.threads", "2 ranks x 2 threads take 4 slots, and this server has 2"),
         (case_text().replace('"0.5 mm"', '"1e-300 m"'), "parts[0].mesh.element_size", "not between"),
         ("name = = 3", "line 1", "TOML"),
     ],

@@ -59,6 +59,17 @@ def test_use_counts_half_after_a_half_life() -> None:
     assert usage.of("bob", 250.0) == 0.0
 
 
+def test_a_run_waits_for_a_core_for_each_thread_of_each_rank() -> None:
+    submission = Submission(
+        id="r", owner="ann", name="bar", title="", ranks=2, threads=3, submitted=NOW, case_file="case.toml",
+        body_sha256="", idempotency_key=None, wall_time=None, estimate={"core_seconds": 60.0},
+    )  # fmt: skip
+    asked = need_of(submission, 0.0)
+    assert (asked.cores, asked.seconds) == (6, 10.0)
+    assert plan([asked], [Busy(3)], Room(8), NOW, free).why == {"r": "waiting for 6 of 8 slots; 5 free"}
+    assert started([asked], [Busy(2)], Room(8)) == ["r"]
+
+
 def test_a_small_run_that_ends_in_time_passes_a_large_one() -> None:
     busy = [Busy(3, ends=NOW + 100.0)]
     large = need("large", ranks=4)
@@ -128,29 +139,29 @@ def test_no_backfill_ever_delays_the_first_that_waits() -> None:
     for _ in range(300):
         room = Room(dice.randint(4, 12))
         ends: list[tuple[int, float]] = []
-        ranks = room.ranks
+        ranks = room.cores
         while ranks > 1 and len(ends) < 4:
             one = dice.randint(1, max(1, ranks - 1))
             ends.append((one, dice.uniform(1.0, 50.0)))
             ranks -= one
-        large = need("large", ranks=min(room.ranks, ranks + dice.randint(1, 3)))
+        large = need("large", ranks=min(room.cores, ranks + dice.randint(1, 3)))
         small = [need(f"s{n}", ranks=dice.randint(1, 2), seconds=0.0) for n in range(3)]
         begins = plan([large, *small], [Busy(ranks_) for ranks_, _ in ends], room, NOW, free).start
         if "large" in begins:
             continue
-        taken = sum(one.ranks for one in small if one.run in begins)
+        taken = sum(one.cores for one in small if one.run in begins)
         passed += bool(taken)
-        assert first_fit(large, ends, room.ranks) == first_fit(large, ends, room.ranks - taken)
+        assert first_fit(large, ends, room.cores) == first_fit(large, ends, room.cores - taken)
     assert passed > 20
 
 
 def first_fit(large: Need, ends: list[tuple[int, float]], slots: int) -> float:
     """When so many ranks are free, with the true ends of what runs."""
     left = slots - sum(ranks for ranks, _ in ends)
-    if left >= large.ranks:
+    if left >= large.cores:
         return 0.0
     for ranks, end in sorted(ends, key=lambda one: one[1]):
         left += ranks
-        if left >= large.ranks:
+        if left >= large.cores:
             return end
     return math.inf

@@ -1,0 +1,49 @@
+"""The cores that this process may use: by its affinity, and by the CPU quota of its control groups."""
+
+import os
+from pathlib import Path
+
+_GROUPS, _OWN = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup")
+
+
+def usable_cores() -> int:
+    """How many, at least one; a machine can have more."""
+    quotas = _quotas(_GROUPS, _OWN)
+    return max(1, min([len(core_numbers()), *(int(quota) for quota in quotas)]))
+
+
+def core_numbers() -> list[int]:
+    """The numbers of the cores on which this process may run, as the system has them."""
+    if hasattr(os, "sched_getaffinity"):
+        return sorted(os.sched_getaffinity(0))
+    return list(range(os.cpu_count() or 1))
+
+
+def _quotas(groups: Path, own: Path) -> list[float]:
+    """Cores' worth of time that each of the groups of a process may take, of those that have a limit: cpu.max of
+    version 2, cpu.cfs_quota_us of version 1. Also the root's, which is that of the container inside of one.
+    """
+    found = []
+    for line in _text(own).splitlines():
+        _, kinds, place = line.split(":", 2)
+        root = groups if not kinds else groups / kinds if "cpu" in kinds.split(",") else None
+        if root is not None:
+            inside = Path(place.lstrip("/"))
+            found += [_quota(root / part) for part in (inside, *inside.parents)]
+    return [quota for quota in found if quota is not None]
+
+
+def _quota(group: Path) -> float | None:
+    words = _text(group / "cpu.max").split()
+    if not words:
+        words = [_text(group / f"cpu.cfs_{name}_us").strip() for name in ("quota", "period")]
+    if len(words) != 2 or not all(word.isdigit() for word in words) or int(words[1]) == 0:
+        return None  # "max", and -1, are no limit
+    return int(words[0]) / int(words[1])
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text()
+    except OSError:
+        return ""
