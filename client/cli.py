@@ -31,7 +31,6 @@ from .options import (
     on_cores,
     show,
     warn,
-    warn_of,
 )
 from .pictures import FIELDS
 from .submission import data_of, locate
@@ -178,7 +177,6 @@ def run_case(
 ) -> None:
     """Do it all here: start a server, submit, watch, check, draw, stop the server. Ctrl-C cancels the run."""
     chosen = [*(overrides or ()), *on_cores(ranks, threads)]
-    warn_of(case, chosen)
     raise typer.Exit(run_once(case, chosen, out, picture, field, plain=plain, check=check, as_json=as_json))
 
 

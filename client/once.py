@@ -60,11 +60,11 @@ def run_once(
         with silence.broken(out.print, lambda: "the server is starting"):
             up.enter_context(server)
             run = server.session.submit(data)
-        info = _follow(run, checked, out, plain)
+        info, told = _follow(run, checked, out, plain)
     result = Result.open(server.runs / run.id)
     drawn = None
     if info.outcome is not None:
-        _report(result, info.outcome, out)
+        _report(result, info.outcome, told, out)
         if picture is not None and result.frames:
             with silence.broken(out.print, lambda: f"drawing {picture}"):
                 drawn = view(result, field or _telling_field(checked), picture)
@@ -74,9 +74,11 @@ def run_once(
     return _code(info, check)
 
 
-def _follow(run: Run, case: Case, out: Console, plain: bool) -> RunInfo:
-    """Shows the run to its end; a first Ctrl-C cancels it, further ones change nothing."""
-    known = Live(run.id, title=case.title or case.name)
+def _follow(run: Run, case: Case, out: Console, plain: bool) -> tuple[RunInfo, set[str]]:
+    """Shows the run to its end; a first Ctrl-C cancels it, further ones change nothing. Returns also the texts of its
+    log that are printed as lines: a panel has its last ones alone.
+    """
+    known, told = Live(run.id, title=case.title or case.name), set[str]()
     try:
         link = run.link()
         known.link = link.name
@@ -86,18 +88,20 @@ def _follow(run: Run, case: Case, out: Console, plain: bool) -> RunInfo:
                 show(messages, known, out)
             else:
                 tell(messages, known, lambda text: out.print(one_line(text), soft_wrap=True))
+                told = {entry.text for entry in known.log}
     except KeyboardInterrupt:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
         out.print("cancelling: the run stops at its next step")
         run.cancel()
-        return run.wait(GRACE + _LAST_WORDS)
-    return run.wait(_LAST_WORDS)
+        return run.wait(GRACE + _LAST_WORDS), told
+    return run.wait(_LAST_WORDS), told
 
 
-def _report(result: Result, outcome: Outcome, out: Console) -> None:
+def _report(result: Result, outcome: Outcome, told: set[str], out: Console) -> None:
+    """``told``: warnings that need not be printed again."""
     out.print()
-    out.print(tables.outcome_table(outcome))
+    out.print(tables.outcome_table(outcome, told))
     if outcome.reference:
         out.print()
         out.print(tables.checks_table(outcome.reference))

@@ -168,11 +168,17 @@ class Run:
         return self.session.get(Listing, f"{self.path}/files").files
 
     def download(self, folder: Path | str, name: str | None = None) -> Path:
-        """Copies one file, or all, into ``folder`` and returns the path of the file, or the folder."""
+        """Copies one file, or all, into ``folder`` and returns the path of the file, or the folder.
+
+        Raises AnswerError where a file of a run that has ended is not as large as the server lists it.
+        """
         root = Path(folder)
-        for file in self.files() if name is None else [FileInfo(path=name)]:
-            self.fetch(root, file)
-        return inside(root, name) if name is not None else root
+        if name is not None:
+            return self.fetch(root, FileInfo(path=name))
+        final = self.over()
+        for file in self.files():
+            self.fetch(root, file, final)
+        return root
 
     def over(self) -> bool:
         """Whether it has ended: its files change no more."""

@@ -1,7 +1,7 @@
 """What the command line prints once: lists of runs, one run, estimates, outcomes, reference numbers."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Literal
 
 from rich import box
@@ -242,8 +242,8 @@ def sources_table(constants: Sequence[Constant]) -> Table:
     return pairs({each.source: each.cited for each in constants})
 
 
-def outcome_table(outcome: Outcome) -> Table:
-    """How a run ended."""
+def outcome_table(outcome: Outcome, told: Collection[str] = ()) -> Table:
+    """How a run ended, with its warnings but for those that are ``told`` already."""
     energy, ranks = outcome.energy, crew(outcome.ranks, outcome.threads)
     entries: dict[str, str | Text] = {"state": state_text(State(outcome.state), outcome.cause), "why": outcome.message}
     speed, setup, worst = outcome.element_updates_per_second, outcome.setup, rough(outcome.worst_residual)
@@ -258,7 +258,7 @@ def outcome_table(outcome: Outcome) -> Table:
             "compression": "; ".join(map(_compressed, outcome.compressed)),
             "digest": outcome.digest[:16],
         }
-    return pairs({**entries, "warnings": "\n".join(outcome.warnings)})
+    return pairs({**entries, "warnings": "\n".join(each for each in outcome.warnings if each not in told)})
 
 
 def _compressed(met: Compressed) -> str:

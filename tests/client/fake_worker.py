@@ -1,7 +1,8 @@
 """A worker that computes nothing: it tells the story of a short run, in its journal and over Zenoh, and leaves files.
 
 What it does stands in the case's ``description`` as JSON: ``steps``, ``pace`` (s a step), ``lose`` (every so many-th
-message is not sent over Zenoh), ``fail`` (a cause), ``snapshots`` (one in each of the first steps).
+message is not sent over Zenoh), ``fail`` (a cause), ``snapshots`` (one in each of the first steps),
+``warn`` (a warning of the log and of the outcome).
 """
 
 import argparse
@@ -101,6 +102,9 @@ def main() -> int:
     voice = Voice(options, plan.get("lose", 0))
     voice.say(messages.Status, state="running")
     voice.say(messages.Started, ranks=2, elements=5, nodes=8, end_time=1.0, setup=0.1, parts={"rod": 5})
+    warnings = [plan["warn"]] if "warn" in plan else []
+    for text in warnings:
+        voice.say(messages.Log, level="warning", text=text)
     steps = plan.get("steps", 5)
     for step in range(1, steps + 1):
         if stop:
@@ -112,7 +116,7 @@ def main() -> int:
     state, cause = (
         ("cancelled", "cancelled") if stop else ("failed", plan["fail"]) if "fail" in plan else ("succeeded", None)
     )
-    leave(options.out, state, cause, step)
+    leave(options.out, state, cause, step, warnings)
     voice.say(messages.Finished, state=state, digest="d" * 64, steps=step, elapsed=0.1)
     if voice.session is not None:
         voice.session.close()  # type: ignore[no-untyped-call]
@@ -130,12 +134,12 @@ def tell_step(voice: Voice, step: int, steps: int) -> None:
     voice.say(messages.Load, phases={"elements": [0.1, 0.2], "exchange": [0.1, 0.0]}, imbalance=1.33)
 
 
-def leave(folder: Path, state: str, cause: str | None, steps: int) -> None:
+def leave(folder: Path, state: str, cause: str | None, steps: int, warnings: list[str]) -> None:
     check = outcome.Check(name="extent of rod", value=1.01, expected=1.0, tolerance=0.1, passed=True, unit="m")
     missed = outcome.Check(name="contact time", value=3.0, expected=1.0, tolerance=0.1, passed=False, unit="s")
     ended = outcome.Outcome(
         state=state, cause=cause, message=f"the {cause} of the tale" if cause else "", steps=steps, time=1.0, ranks=2,
-        digest="d" * 64, elements=5, nodes=8, reference=[check, missed],
+        digest="d" * 64, elements=5, nodes=8, reference=[check, missed], warnings=warnings,
     )  # fmt: skip
     (folder / layout.HISTORY).write_text("step,t [s]\n1,0.5\n2,1.0\n")
     (folder / layout.OUTCOME).write_bytes(outcome.to_json(ended))

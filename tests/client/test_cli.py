@@ -260,10 +260,13 @@ def a_run_runs(runs: Path) -> bool:
 
 
 def test_run_does_it_all_and_leaves_no_process(alone: Path) -> None:
-    case = case_file(alone, steps=3)
-    words = ["run", str(case), "--ranks", "2", "--threads", "2", "--set", "title=Short", "--out", str(alone / "runs")]
+    case = case_file(alone, steps=3, warn="run.end_time = 1e-06: no unit, taken for 1e-06 s")
+    short = ("title=Short", "run.end_time=1e-6")
+    cores = ("--ranks", "2", "--threads", "2")
+    words = ["run", str(case), *cores, *(f"--set={each}" for each in short), "--out", str(alone / "runs")]
     done = subprocess.run([*CONOID, *words], capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0, done.stderr
+    assert (done.stdout + done.stderr).count("no unit") == 1, "a warning is printed once"
     assert "extent of rod" in done.stdout
     assert "pass" in done.stdout
     assert "FAIL" in done.stdout

@@ -215,10 +215,12 @@ def test_files_are_fetched_where_the_server_says_and_nowhere_else(tmp_path: Path
             {"path": "a\\xffb", "size": 1, "url": "/v1/runs/r1/files/a%FFb"},
             {"path": "a b", "size": 1, "url": elsewhere},
         ]
-        return httpx2.Response(200, json={"files": files})
+        return httpx2.Response(200, json={**RECEIPT, "files": files})
 
     served(answer).run("r1").download(tmp_path)
-    assert asked == [f"http://conoid.test/v1/runs/r1{name}" for name in ("", "/files", "/files/a%FFb", "/files/a%20b")]
+    assert asked == [
+        f"http://conoid.test/v1/runs/r1{name}" for name in ("", "", "/files", "/files/a%FFb", "/files/a%20b")
+    ]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a b", "a\\xffb"]
 
 
@@ -319,8 +321,9 @@ def listing(size: int, state: str = "succeeded") -> Answer:
 def test_a_file_that_is_not_as_large_as_it_is_listed_is_refused(tmp_path: Path) -> None:
     run = Run(served(listing(5)), "r1")
     (file,) = run.files()
-    with pytest.raises(AnswerError, match=r"a.csv has 3 bytes, where the list of files has 5"):
-        run.fetch(tmp_path, file, run.over())
+    for fetched in (lambda: run.fetch(tmp_path, file, run.over()), lambda: run.download(tmp_path)):
+        with pytest.raises(AnswerError, match=r"a.csv has 3 bytes, where the list of files has 5"):
+            fetched()
     assert not list(tmp_path.iterdir())
     for fits in (Run(served(listing(3)), "r1"), Run(served(listing(5, "running")), "r1")):
         (file,) = fits.files()

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import httpx2
 import pytest
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from conoid.cases.run import State
 from conoid.server import auth, connections
@@ -67,6 +68,20 @@ def test_few_connections_are_accepted_in_a_turn_of_the_loop_and_as_many_wait_as_
             server.should_exit = True
             thread.join(PATIENCE)
     assert longest == min(connections._MOST, int(Path("/proc/sys/net/core/somaxconn").read_text()))
+
+
+def test_a_header_that_comes_a_byte_at_a_time_is_read_in_few_pieces(ann: User, monkeypatch: pytest.MonkeyPatch) -> None:
+    pieces: list[int] = []
+    read = H11Protocol.data_received
+    monkeypatch.setattr(H11Protocol, "data_received", lambda self, data: (pieces.append(len(data)), read(self, data)))
+    began = time.monotonic()
+    with knock(ann) as one:
+        one.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        for byte in b"x" * 300 + b"\r\nConnection: close\r\n\r\n":
+            one.sendall(bytes([byte]))
+            time.sleep(0.001)
+        assert one.makefile("rb").readline() == b"HTTP/1.1 200 OK\r\n"
+    assert len(pieces) <= 4 + 1 + (time.monotonic() - began) / 0.05
 
 
 def test_half_requests_keep_nobody_out(ann: User) -> None:
