@@ -14,9 +14,9 @@ BODY = 1 << 20
 """Bytes of the largest body (``limits``)."""
 HEADER = 10.0
 """s in which a request's header must arrive, from its first byte or from the opening of its connection. Chosen."""
-_PIECES, _PAUSE = 4, 0.05
+_PIECES, _PAUSE = 4, 0.5
 """Pieces of a header that are read as they arrive; s between two further ones. Chosen: a client sends its header in one
-piece, and what 400 connections send a byte at a time takes 16 ms of the event loop in each of its turns.
+piece, and each piece that is read takes 0.1 ms of the event loop.
 """
 READ = 30.0
 """s in which a client must read something of an answer that waits to be sent. Chosen: a laptop sleeps longer, and asks

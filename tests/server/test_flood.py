@@ -81,7 +81,7 @@ def test_a_header_that_comes_a_byte_at_a_time_is_read_in_few_pieces(ann: User, m
             one.sendall(bytes([byte]))
             time.sleep(0.001)
         assert one.makefile("rb").readline() == b"HTTP/1.1 200 OK\r\n"
-    assert len(pieces) <= 4 + 1 + (time.monotonic() - began) / 0.05
+    assert len(pieces) <= 4 + 1 + (time.monotonic() - began) / 0.5
 
 
 def test_half_requests_keep_nobody_out(ann: User) -> None:
