@@ -73,7 +73,12 @@ def test_few_connections_are_accepted_in_a_turn_of_the_loop_and_as_many_wait_as_
 def test_a_header_that_comes_a_byte_at_a_time_is_read_in_few_pieces(ann: User, monkeypatch: pytest.MonkeyPatch) -> None:
     pieces: list[int] = []
     read = H11Protocol.data_received
-    monkeypatch.setattr(H11Protocol, "data_received", lambda self, data: (pieces.append(len(data)), read(self, data)))
+
+    def noted(self: H11Protocol, data: bytes) -> None:
+        pieces.append(len(data))
+        read(self, data)
+
+    monkeypatch.setattr(H11Protocol, "data_received", noted)
     began = time.monotonic()
     with knock(ann) as one:
         one.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
