@@ -5,17 +5,17 @@ factor of two; core time as good as the constants below, which were measured on 
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from .bodies import MeshFile
-from .geometry import AXES, bounds
+from .geometry import bounds
 from .impact import driven_together, impact_speeds, wave_speed
 from .library import material
 from .mesh_size import MeshSize, mesh_size, surface_faces
 from .placed import Bulk, bulk, driven
-from .schema import Case, Part, Rotation, Symmetry
+from .schema import Case, Part, Rotation
+from .shrinkage import shrinkage
 from .stages import AVERAGED, CONTACT, STATE, STEPS, STRENGTH, TETS
 from .survey import Survey, Surveyed
 
@@ -58,12 +58,6 @@ kB in glass_steel_demo and glass_ball_cohesive, 15 and 20 kB in tiles of 16,800 
 9,000 and 39,000 tets, had 7 and 5 kB."""
 FILE_BYTES = {".msh": 42, ".inp": 48}
 """Bytes of a text mesh file a tet, its share of the node lines included."""
-
-DEEPEST, DEEPEST_ERODING = 12.0, 4.0
-"""The mean time step of a crushed body is never taken to be smaller than the initial one over this: the flattest tets
-of a part that erodes leave."""
-FOOT, SLENDER = 0.9, 4.5
-"""See shrinkage."""
 
 
 @dataclass(frozen=True)
@@ -163,60 +157,6 @@ def _viscous_factor(case: Case) -> float:
     viscosity = case.numerics.viscosity
     linear = viscosity.linear if viscosity is not None else 0.0
     return linear + math.hypot(1.0, linear)
-
-
-def shrinkage(case: Case, part: Part, speed: float) -> float:
-    """Initial over mean time step of a part that is met at a ``speed``, m/s: impact flattens the tets, and compression
-    makes waves faster.
-
-    Free to flow, a metal that stops from the speed v takes the strain density v^2 / (2 yield stress) in the mean, and
-    its foot, which is about as long as wide, what the whole length takes: the mean step falls as exp(k strain) with
-    k = 0.9 length / width, at most 4 (``slenderness``). Measured: square bars that are 1, 2 and 4 times as long as wide
-    have k up to 0.9, 1.8 and 2.8, less where they harden much (``python -m tests.bench.flattening``), Taylor bars of
-    copper and steel 4. Held on all sides, it is compressed by a shock.
-    """
-    made = material(case, part.material)
-    deepest = DEEPEST if part.erosion is None else DEEPEST_ERODING
-    if _confined(case, part):
-        shock = made.eos.c0 + made.eos.S * speed if made.eos is not None else wave_speed(made)
-        faster = 1.0 + 2.0 * made.eos.S * speed / made.eos.c0 if made.eos is not None else 1.0
-        return min(deepest, faster / (1.0 - min(speed / shock, 0.9)))
-    if made.strength is None:
-        return 1.0
-    strain = made.density * speed**2 / (2.0 * made.strength.flow_stress())
-    return min(deepest, math.exp(min(FOOT * slenderness(case) * strain, 10.0)))
-
-
-def slenderness(case: Case) -> float:
-    """The largest length over width of the parts, 1 to SLENDER: the longest extent over the mean of the other two. What
-    is slender strains what it meets, too. SLENDER where a part is a mesh file.
-    """
-    most = 1.0
-    for part in case.parts:
-        body = None if isinstance(part.mesh, MeshFile) else bounds(part.mesh)
-        if body is None:
-            return SLENDER
-        wide, broad, length = sorted(high - low for low, high in zip(*body, strict=True))
-        most = max(most, length / math.sqrt(wide * broad))
-    return min(most, SLENDER)
-
-
-def _confined(case: Case, part: Part) -> bool:
-    """Whether planes of symmetry hold a part on both sides in two directions."""
-    body = None if isinstance(part.mesh, MeshFile) else bounds(part.mesh)
-    if body is None:
-        return False
-    planes = [
-        (boundary.axis, boundary.at)
-        for boundary in case.boundaries
-        if isinstance(boundary, Symmetry) and (not boundary.parts or part.name in boundary.parts)
-    ]
-    held = [all(_on(planes, d, side[d]) for side in body) for d in range(3)]
-    return sum(held) >= 2
-
-
-def _on(planes: Sequence[tuple[str, float]], direction: int, at: float) -> bool:
-    return any(axis == AXES[direction] and math.isclose(where, at, abs_tol=1e-9) for axis, where in planes)
 
 
 def _memory(case: Case, parts: tuple[PartEstimate, ...]) -> int | None:

@@ -11,9 +11,10 @@ import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from pathlib import Path
 
-from conoid.cases.estimate import estimate
+from conoid.cases.estimate import Estimate, estimate
 from conoid.cases.load import apply_overrides, parse_case, read_data, shipped
 from conoid.cases.outcome import Outcome, from_json
 from conoid.cases.suite import suite
@@ -23,7 +24,7 @@ from .table import Cell, table
 ROOT = Path(__file__).parents[2]
 OUT, PAGE = ROOT / "build" / "energy_lines", ROOT / "docs" / "energy_lines.md"
 _QUIET = ("run.ranks=1", "run.frames=0", "run.snapshots=0", "run.checkpoint_every=none")
-_COLUMNS = ("case", "state", "worst line", "made", "at, s", "limit", "residual", "tets", "steps", "CPU s")
+_COLUMNS = ("case", "state", "worst line", "made", "at, s", "limit", "residual", "tets", "steps", "estimated", "CPU s")
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,16 @@ class Plan:
     @property
     def seconds(self) -> float:
         """What it is expected to take, core s."""
-        return estimate(parse_case(apply_overrides(read_data(self.path), self.changes))).core_seconds or 0.0
+        return self._estimate.core_seconds or 0.0
+
+    @property
+    def steps(self) -> int | None:
+        """Steps that are expected."""
+        return self._estimate.steps
+
+    @cached_property
+    def _estimate(self) -> Estimate:
+        return estimate(parse_case(apply_overrides(read_data(self.path), self.changes)), self.path.parent)
 
 
 def plans() -> list[Plan]:
@@ -98,8 +108,10 @@ def rows() -> Iterator[Row]:
 
 def page(found: Sequence[Row]) -> str:
     """The page: a table, and what is wrong."""
+    expected = {plan.name: plan.steps for plan in plans()}
     lines: list[list[Cell]] = [
-        [r.case, r.state, r.line, r.made, r.at, r.limit, r.residual, r.tets, r.steps, round(r.cpu, 1)] for r in found
+        [r.case, r.state, r.line, r.made, r.at, r.limit, r.residual, r.tets, r.steps, expected[r.case], round(r.cpu, 1)]
+        for r in found
     ]
     wrong = [f"- {r.case}: {r.line} has made {r.made:.3g}" for r in found if r.bad]
     wrong += [f"- {r.case}: {r.message}" for r in found if r.state != "succeeded"]
@@ -109,7 +121,8 @@ def page(found: Sequence[Row]) -> str:
         "# Energy that lines of the ledger make",
         "Written by `python -m tests.bench.energy_lines`: every hard and every shipped case, one rank, with the line "
         "of the ledger that has made most energy at any time, as a share of the largest energy until then, and its "
-        "limit, `run.made_limit`. How it is counted: [numerics.md](numerics.md), \"Energy that a line makes\".",
+        "limit, `run.made_limit`, and the steps beside what `conoid validate` expects. How it is counted: "
+        "[numerics.md](numerics.md), \"Energy that a line makes\".",
         f"{len(found)} of {len(known)} cases; {sum(r.bad for r in found)} succeeded above the limit."
         + (f" Not measured: {', '.join(left)}." if left else ""),
         *(["\n".join(wrong)] if wrong else []),

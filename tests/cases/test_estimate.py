@@ -14,17 +14,16 @@ from conoid.cases.estimate import (
     BROKEN_NANOSECONDS,
     PRESSED_NANOSECONDS,
     RANK_BYTES,
-    SLENDER,
     START,
     broken_share,
     estimate,
-    shrinkage,
-    slenderness,
 )
 from conoid.cases.geometry import Generated, surface, volume
 from conoid.cases.impact import impact_speeds
+from conoid.cases.library import material
 from conoid.cases.load import apply_overrides, parse_case, read_case, read_data, shipped, shipped_path, toml_data
 from conoid.cases.mesh_size import mesh_size, size_at
+from conoid.cases.shrinkage import DEEPEST, SLENDER, shrinkage, slenderness
 from conoid.cases.suite import Hard, suite
 from conoid.worker.mesh.build import build
 from conoid.worker.mesh.structured import structured
@@ -305,3 +304,37 @@ def test_what_is_slender_strains_what_it_meets() -> None:
     assert slenderness(parse_case(data)) == pytest.approx(3.0)
     data["parts"][1]["mesh"] = {"shape": "file", "path": "body.msh", "unit": "1 mm"}
     assert slenderness(parse_case(data)) == SLENDER
+
+
+HARD_STEPS = {
+    "closing_bore": 3034,
+    "closing_bore_to_the_end": 4540,
+    "head_on": 1182,
+    "flying_debris": 241,
+    "needle": 1088,
+}
+"""Steps that hard cases were seen to take whose step falls most (docs/energy_lines.md)."""
+
+
+@pytest.mark.parametrize(("name", "steps"), HARD_STEPS.items())
+def test_the_step_of_what_implodes_or_is_shocked_falls_as_expected(name: str, steps: int) -> None:
+    hard = next(each for each in suite() if each.name == name)
+    expected = estimate(parse_case(apply_overrides(read_data(hard.path), hard.changes))).steps
+    assert expected is not None
+    assert 0.5 < expected / steps < 2.0
+
+
+def test_a_tube_under_pressure_strains_as_far_as_its_wall_has_moved() -> None:
+    """The area of its section stays; what its strength holds does not move it."""
+    hard = next(each for each in suite() if each.name == "closing_bore")
+    found = []
+    for pressure, end_time in (("0.1 GPa", "10 us"), ("1.1615 GPa", "2 us"), ("6 GPa", "10 us")):
+        load = (f"boundaries[4].pressure={pressure}", f"run.end_time={end_time}", "boundaries[4].course=[]")
+        case = parse_case(apply_overrides(read_data(hard.path), load))
+        found.append(shrinkage(case, case.parts[0], 0.0))
+    density, inner, outer, strength = 8960.0, 4e-3, 8e-3, material(case, "copper_ofhc").strength
+    assert strength is not None
+    pace = (1.1615e9 - strength.flow_stress() * math.log(2.0)) * outer / (density * (outer**2 - inner**2) / 2.0)
+    moved = outer - pace * (2e-6) ** 2 / 2.0
+    bore = math.sqrt(moved**2 - (outer**2 - inner**2))
+    assert found == [1.0, pytest.approx(inner / bore, rel=0.02), DEEPEST]
