@@ -132,6 +132,8 @@ class Load(Message, frozen=True):
     """That all threads of the rank but the first have done tasks, together, s."""
     threads: int = 1
     """Of each rank."""
+    projected: dict[int, dict[str, list[float]]] = {}
+    """By number of threads: the CPU seconds of each phase without the waiting, as they would be with so many."""
 
 
 class Counts(Message, frozen=True):

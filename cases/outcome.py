@@ -50,6 +50,23 @@ class Compressed(msgspec.Struct, kw_only=True, frozen=True):
     """s."""
 
 
+class Sharing(msgspec.Struct, kw_only=True, frozen=True):
+    """Of what the regions of rank 0 were made, and what it was taken to cost to share them (worker/parallel/
+    projecting.py); times in s.
+    """
+
+    steps: int
+    regions: int
+    colours: int
+    tasks: int
+    turn: float
+    """Of a colour."""
+    call: float
+    """Of a thread that sleeps, by its caller."""
+    wake: float
+    """Until it works."""
+
+
 class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     """How a run ended; times in s, energies in J.
 
@@ -110,6 +127,11 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     for other ranks. It limits what more threads can gain. Other programs on the same cores make it larger."""
     parallel: dict[str, list[float]] = {}
     """The rest of it: in regions, whose tasks the threads of a rank share; with one thread, what more could share."""
+    projected: dict[int, dict[str, list[float]]] = {}
+    """By number of threads: seconds per phase, without the waiting, that each rank would take with so many threads; of
+    a run that was asked for it (docs/scaling.md)."""
+    sharing: "Sharing | None" = None
+    """Of what these follow."""
     helped: list[float] = []
     """s that all threads of a rank but its first have done tasks, together; at most threads - 1 times ``parallel``."""
     without: list[str] = []

@@ -13,7 +13,7 @@ from conoid.cases import messages
 from conoid.cases.checkpoints import Manifest
 from conoid.cases.compression import borne
 from conoid.cases.history import of_parts
-from conoid.cases.outcome import Made, Outcome
+from conoid.cases.outcome import Made, Outcome, Sharing
 from conoid.cases.quantities import FIELD_UNITS
 from conoid.cases.run import State
 from conoid.cases.schema import Case
@@ -37,20 +37,24 @@ from .parallel.team import team
 from .preload import preload
 from .signals import Signals
 from .simulation import Simulation
-from .timers import PHASES, Timers
+from .timers import Timers, by_phase
 
 log = logging.getLogger("conoid.worker")
 
 
 def compute(
     case: Case, meshes: Path, folder: Path, comm: Comm, journal: Journal | None, signals: Signals, began: float,
-    restart: bool,
+    restart: bool, project: bool = False,
 ) -> Outcome:  # fmt: skip
     """Runs the case in ``folder`` on all ranks; relative mesh paths start at ``meshes``.
 
-    With ``restart`` from the latest checkpoint that is there. Raises ConoidError.
+    With ``restart`` from the latest checkpoint that is there; with ``project`` on one thread, and what more would take
+    is in the outcome. Raises ConoidError.
     """
     say = journal.starting if journal is not None else quiet
+    threads = team(case.run.threads)
+    if project:
+        threads.project()
     if comm.size > 1:
         preload(case)
     if restart:
@@ -69,7 +73,6 @@ def compute(
     setup = time.monotonic() - began
     _announce(sim, journal, setup)
     loop = Loop(sim, folder, journal, history, signals, Balance.of(sim), start)
-    threads = team(case.run.threads)
     cpu = cpu_time() + threads.helped
     failure = None
     try:
@@ -143,9 +146,16 @@ def _announce(sim: Simulation, journal: Journal | None, setup: float) -> None:
     )  # fmt: skip
 
 
-def _by_phase(seconds: list[dict[str, float]]) -> dict[str, list[float]]:
-    """One number a rank; nothing where this rank does not have them."""
-    return {name: [each[name] for each in seconds] for name in PHASES} if seconds else {}
+def _sharing(sim: Simulation) -> Sharing | None:
+    """Of what regions are made on this rank, where that was asked for."""
+    made = team(sim.case.run.threads).projecting
+    if made is None:
+        return None
+    costs = made.costs
+    return Sharing(
+        steps=max(sim.clock.step, 1), regions=made.regions, colours=made.colours, tasks=made.tasks,
+        turn=1e-9 * costs.turn, call=1e-9 * costs.call, wake=1e-9 * costs.wake,
+    )  # fmt: skip
 
 
 def _sum_up(
@@ -192,9 +202,12 @@ def _sum_up(
         compressed=compressed,
         rebalances=loop.balance.events, balancing_cost=loop.balance.spent,
         balancing_saved=loop.balance.saved,
-        threads=sim.case.run.threads, phases=_by_phase([each.cpu for each in spent or []]),
-        serial=_by_phase([each.serial for each in spent or []]),
-        parallel=_by_phase([each.parallel for each in spent or []]), helped=[each.helped for each in spent or []],
+        threads=sim.case.run.threads, phases=by_phase([each.cpu for each in spent or []]),
+        serial=by_phase([each.serial for each in spent or []]),
+        parallel=by_phase([each.parallel for each in spent or []]), helped=[each.helped for each in spent or []],
+        projected={
+            crew: by_phase([each.projected[crew] for each in spent or []]) for crew in sim.timers.spent.projected
+        }, sharing=_sharing(sim),
         without=without(sim.case), peak_memory=memory or [],
         element_updates_per_second=(loop.updates - start.updates) / total_cpu if total_cpu > 0.0 else 0.0,
         reference=checks,

@@ -29,6 +29,7 @@ from .signals import Signals
 from .simulation import Simulation
 from .snapshots.stage import Snapshots
 from .state import Floats
+from .timers import by_phase
 
 CANCELLED, WALL_TIME, MAX_STEPS = 1, 2, 3
 """Reasons to stop early, in the reduction of the step: the largest wins."""
@@ -291,13 +292,15 @@ class Loop:
             outside = sim.contact.outside if sim.contact is not None else 0
             sent = {"outside": outside, **spent.of_all_phases(), **sim.comm.sent.since_last()}
             ending = clock.done or bool(sim.reduction.stop)
-            loads = sim.comm.share((spent.cpu, sent, self._counter.due(sim, time.monotonic(), ending=ending)))
+            counting = self._counter.due(sim, time.monotonic(), ending=ending)
+            loads = sim.comm.share((spent.cpu, sent, counting, spent.projected))
             if loads[0][2]:
                 self._counter.find(sim)
             sim.count_nodes()
             if counted := self._counter.changed(sim, self.balance.events):
                 self._tell(messages.Counts, **counted)
         work, told = ({name: [load[i][name] for load in loads] for name in loads[0][i]} for i in (0, 1))
+        projected = {crew: by_phase([load[3][crew] for load in loads]) for crew in spent.projected}
         window = Window(clock.step - self._reported_step, work)
         self._reported_step = clock.step
         self.balance.look(window)
@@ -324,6 +327,7 @@ class Loop:
             imbalance=window.imbalance,
             steps=window.steps,
             threads=sim.case.run.threads,
+            projected=projected,
             **told,
         )
         self._reported, self._reported_updates = now, self.updates

@@ -146,6 +146,10 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("--ranks", type=int, help="end at once when MPI has started another number of ranks")
     parser.add_argument("--threads", type=int, help="of each rank; run.threads of the case when absent")
     parser.add_argument(
+        "--project", action="store_true",
+        help="time the tasks of regions one after the other, on one thread, and say what 2, 4, ... threads would take",
+    )  # fmt: skip
+    parser.add_argument(
         "--interruptible", action="store_true",
         help=f"a stop that {layout.STOP_REQUEST} does not ask for leaves a checkpoint and no outcome: the run goes on",
     )  # fmt: skip
@@ -208,7 +212,7 @@ def _compute(
     from . import compute
 
     meshes = Path(options.case).resolve().parent
-    return compute.compute(case, meshes, options.out, comm, journal, signals, began, options.restart)
+    return compute.compute(case, meshes, options.out, comm, journal, signals, began, options.restart, options.project)
 
 
 def ready_kernels(comm: Comm, journal: Journal | None) -> None:

@@ -7,6 +7,7 @@ A region is a call of ``Team.run``, whose tasks all threads of the rank share. W
 the rest but for the waiting is ``serial``: one thread works then, and the others of the rank have nothing to do.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from .jit import cpu_time, wall_time
@@ -20,6 +21,11 @@ PHASES = ("elements", "exchange", "nodes", "contact", "fracture", "output", "bal
 def worked(comm: Comm) -> float:
     """CPU time of this thread so far, but for its waiting and for the loading of kernels, s."""
     return cpu_time() - comm.waited
+
+
+def by_phase(seconds: Sequence[dict[str, float]]) -> dict[str, list[float]]:
+    """One number a rank, of the ``seconds`` by phase of each; nothing of no rank."""
+    return {name: [each[name] for each in seconds] for name in PHASES} if seconds else {}
 
 
 def _none() -> dict[str, float]:
@@ -44,12 +50,15 @@ class Spent:
     """CPU time in calls that wait for other ranks; ``exchange`` of ``cpu`` has it, too."""
     helped: float = 0.0
     """That the other threads have done tasks, all together."""
+    projected: dict[int, dict[str, float]] = field(default_factory=dict)
+    """By number of threads: ``cpu`` but for the waiting, as it would be with so many (parallel/projecting.py)."""
 
     def since(self, before: "Spent") -> "Spent":
         """What has been added."""
         return Spent(
             _less(self.cpu, before.cpu), _less(self.serial, before.serial), _less(self.parallel, before.parallel),
             self.waiting - before.waiting, self.helped - before.helped,
+            {crew: _less(now, before.projected[crew]) for crew, now in self.projected.items()},
         )  # fmt: skip
 
     def of_all_phases(self) -> dict[str, float]:
@@ -61,7 +70,8 @@ class Spent:
 
     def copy(self) -> "Spent":
         """As it is now."""
-        return Spent(dict(self.cpu), dict(self.serial), dict(self.parallel), self.waiting, self.helped)
+        projected = {crew: dict(seconds) for crew, seconds in self.projected.items()}
+        return Spent(dict(self.cpu), dict(self.serial), dict(self.parallel), self.waiting, self.helped, projected)
 
 
 class Timers:
@@ -79,6 +89,10 @@ class Timers:
 
     def begin(self) -> None:
         """Counts ``rest`` from here on."""
+        projecting = self._team.projecting
+        self._spans = projecting.spans if projecting is not None else []
+        for crew in projecting.crews if projecting is not None else ():
+            self.spent.projected.setdefault(crew, _none())["rest"] = 0.0
         self._phase = "rest"
         self._marks = cpu_time(), self._comm.waited, wall_time(), self._team.within
         for each in (self.spent.cpu, self.spent.serial, self.spent.parallel):
@@ -97,11 +111,21 @@ class Timers:
         spent.cpu[ended] += cpu - idle
         spent.parallel[ended] += within
         spent.serial[ended] += wall - within - idle
+        if self._spans:
+            self._project(ended, cpu - idle - within)
         if idle:
             spent.cpu["exchange"] += idle
             spent.waiting += idle
         self._phase, self._marks = name, now
         return ended
+
+    def _project(self, phase: str, serial: float) -> None:
+        """Adds to a phase the CPU time outside regions, and what each crew would take within them."""
+        assert self._team.projecting is not None
+        spans = self._team.projecting.spans
+        for seconds, now, before in zip(self.spent.projected.values(), spans, self._spans, strict=True):
+            seconds[phase] += serial + now - before
+        self._spans = spans
 
     def since_last(self) -> Spent:
         """What was spent since the last call; asked between phases."""

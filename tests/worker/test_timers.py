@@ -18,6 +18,7 @@ class Team:
 
     within: float = 0.0
     helped: float = 0.0
+    projecting: None = None
 
 
 class Clocks:

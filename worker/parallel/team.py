@@ -15,26 +15,26 @@ waker some 20 us, so the asking thread wakes one or two, and whoever is woken wa
 import ctypes
 import threading
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from llvmlite import ir
 
-from ..jit import Kernel, intrinsic, njit, types
+from ..jit import Kernel, njit
 from ..state import Ints
+from .words import SECOND, TASK, add, call_task, load, now, sched_yield, sem_post, sem_wait, swap, word_at
 
-_WORD = ir.IntType(64)
-TASK = "void(int64, int64, int64, int64)"
-"""The signature of a kernel that does a task: address of its arguments (arguments.py), first, end, number of the
-thread."""
+if TYPE_CHECKING:
+    from .projecting import Projecting
+
+__all__ = ["TASK", "Team", "team"]
+
+
 _NEXT, _DONE, _ASLEEP, _KERNEL, _TABLE, _TASKS, _MOST, _WITHIN, _CLOCK, _SEMAPHORE, _THREADS = (
     0, 8, 16, 24, 25, 26, 27, 28, 29, 32, 40,
 )  # fmt: skip
 """Places in a job's words; what several threads write has a cache line of its own. _MOST is how many threads may work,
 _WITHIN how long regions have taken so far, ns, and _CLOCK two words of room for the time. From _THREADS on a line for
 each thread: how long it has done tasks, ns, and room for the time."""
-_MONOTONIC, _SECOND = 1, 1_000_000_000
-"""The clock of that number counts from some moment on, in all threads alike; ns in a second."""
 _BITS, _MASK = 20, (1 << 20) - 1
 """Of the next task in the word _NEXT; above it stands the number of tasks."""
 _LINE = 8
@@ -46,122 +46,39 @@ _LOOKS = 4000
 50 us, longer than what lies between two colours, much shorter than a step."""
 
 
-def _call(_: Any, kernel: Any, table: Any, first: Any, end: Any, thread: Any) -> Any:
-    def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        kind = ir.FunctionType(ir.VoidType(), [_WORD] * 4)
-        builder.call(builder.inttoptr(args[0], kind.as_pointer()), args[1:])
-        return context.get_dummy_value()
-
-    return types.void(*[types.int64] * 5), emit
-
-
-def _place(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-    data = context.make_array(signature.args[0])(context, builder, args[0]).data
-    return builder.gep(data, [args[1]])
-
-
-def _added(_: Any, words: Any, at: Any, number: Any) -> Any:
-    def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.atomic_rmw("add", _place(context, builder, signature, args), args[2], "seq_cst")
-
-    return types.int64(words, at, number), emit
-
-
-def _swapped(_: Any, words: Any, at: Any, number: Any) -> Any:
-    def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.atomic_rmw("xchg", _place(context, builder, signature, args), args[2], "seq_cst")
-
-    return types.int64(words, at, number), emit
-
-
-def _loaded(_: Any, words: Any, at: Any) -> Any:
-    def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.load_atomic(_place(context, builder, signature, args), "acquire", 8)
-
-    return types.int64(words, at), emit
-
-
-def _read(_: Any, address: Any, k: Any) -> Any:
-    def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.load(builder.gep(builder.inttoptr(args[0], _WORD.as_pointer()), [args[1]]))
-
-    return types.int64(address, k), emit
-
-
-def _now(_: Any, words: Any, at: Any) -> Any:
-    def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        kind = ir.FunctionType(ir.IntType(32), [_WORD, _WORD.as_pointer()])
-        name = "clock_gettime"
-        ask = builder.module.globals.get(name) or ir.Function(builder.module, kind, name)
-        place = _place(context, builder, signature, args)
-        builder.call(ask, [_WORD(_MONOTONIC), place])
-        whole, rest = builder.load(place), builder.load(builder.gep(place, [_WORD(1)]))
-        return builder.add(builder.mul(whole, _WORD(_SECOND)), rest)
-
-    return types.int64(words, at), emit
-
-
-def _library(name: str, signature: Any) -> Any:
-    """A call of a function of the C library, whose answer is of no interest."""
-
-    def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        kind = ir.FunctionType(ir.IntType(32), [_WORD] * len(args))
-        builder.call(builder.module.globals.get(name) or ir.Function(builder.module, kind, name), args)
-        return context.get_dummy_value()
-
-    return signature, emit
-
-
-_call_task: Any = intrinsic(_call)
-_add: Any = intrinsic(_added)
-"""In a kernel: adds to a word, and returns what it was; two threads never get the same."""
-_swap: Any = intrinsic(_swapped)
-"""In a kernel: sets a word, and returns what it was. What the thread has written before is there for others that see
-it."""
-_load: Any = intrinsic(_loaded)
-"""In a kernel: a word that other threads write."""
-_time: Any = intrinsic(_now)
-"""In a kernel: the time, ns; two words at a place are its room."""
-_word_at: Any = intrinsic(_read)
-"""In a kernel: word ``k`` at an address."""
-_sched_yield: Any = intrinsic(lambda _: _library("sched_yield", types.void()))
-_sem_wait: Any = intrinsic(lambda _, semaphore: _library("sem_wait", types.void(semaphore)))
-_sem_post: Any = intrinsic(lambda _, semaphore: _library("sem_post", types.void(semaphore)))
-
-
 @njit("boolean(int64[::1], int64)", cache=True)
 def _do_one(job, thread):  # type: ignore[no-untyped-def]
     """Does a task that nobody has taken; False where there is none."""
-    word = _load(job, _NEXT)
+    word = load(job, _NEXT)
     if word & _MASK >= word >> _BITS:
         return False
-    word = _add(job, _NEXT, 1)
+    word = add(job, _NEXT, 1)
     k = word & _MASK
     if k >= word >> _BITS:
         return False
-    tasks = _load(job, _TASKS)
-    first, end = _word_at(tasks, 2 * k), _word_at(tasks, 2 * k + 1)
+    tasks = load(job, _TASKS)
+    first, end = word_at(tasks, 2 * k), word_at(tasks, 2 * k + 1)
     own = _THREADS + _LINE * thread
-    begin = _time(job, own + 1)
-    _call_task(_load(job, _KERNEL), _load(job, _TABLE), first, end, thread)
-    job[own] += _time(job, own + 1) - begin
-    _add(job, _DONE, 1)
+    begin = now(job, own + 1)
+    call_task(load(job, _KERNEL), load(job, _TABLE), first, end, thread)
+    job[own] += now(job, own + 1) - begin
+    add(job, _DONE, 1)
     return True
 
 
 @njit("void(int64[::1], int64)", cache=True)
 def _wake(job, semaphore):  # type: ignore[no-untyped-def]
     """Wakes some of those that sleep, as many as there are tasks for and may work."""
-    word, threads = _load(job, _NEXT), (len(job) - _THREADS) // _LINE
-    helpers = min((word >> _BITS) - (word & _MASK), _load(job, _MOST)) - 1
+    word, threads = load(job, _NEXT), (len(job) - _THREADS) // _LINE
+    helpers = min((word >> _BITS) - (word & _MASK), load(job, _MOST)) - 1
     for _ in range(_WAKES):
-        asleep = _load(job, _ASLEEP)
+        asleep = load(job, _ASLEEP)
         if asleep <= 0 or threads - 1 - asleep >= helpers:
             return
-        if _add(job, _ASLEEP, -1) > 0:
-            _sem_post(semaphore)
+        if add(job, _ASLEEP, -1) > 0:
+            sem_post(semaphore)
         else:  # another thread was faster
-            _add(job, _ASLEEP, 1)
+            add(job, _ASLEEP, 1)
 
 
 @njit("void(int64[::1], int64, int64)", cache=True, nogil=True)
@@ -174,8 +91,8 @@ def _help(job, semaphore, thread):  # type: ignore[no-untyped-def]
             continue
         idle += 1
         if idle == _LOOKS:
-            _add(job, _ASLEEP, 1)
-            _sem_wait(semaphore)
+            add(job, _ASLEEP, 1)
+            sem_wait(semaphore)
             _wake(job, semaphore)
             idle = 0
 
@@ -183,31 +100,31 @@ def _help(job, semaphore, thread):  # type: ignore[no-untyped-def]
 @njit("void(int64[::1], int64, int64, int64, int64, int64[::1])", cache=True)
 def _ask(job, semaphore, kernel, table, tasks, starts):  # type: ignore[no-untyped-def]
     """Colour after colour; returns when all tasks are done."""
-    begin = _time(job, _CLOCK)
+    begin = now(job, _CLOCK)
     for colour in range(len(starts) - 1):
         many = starts[colour + 1] - starts[colour]
         job[_KERNEL], job[_TABLE], job[_TASKS] = kernel, table, tasks + 16 * starts[colour]
-        _swap(job, _DONE, 0)
-        _swap(job, _NEXT, many << _BITS)
+        swap(job, _DONE, 0)
+        swap(job, _NEXT, many << _BITS)
         if many > 1:
             _wake(job, semaphore)
         while _do_one(job, 0):
             pass
         looked = 0
-        while _load(job, _DONE) < many:
+        while load(job, _DONE) < many:
             looked += 1
             if looked > _LOOKS:
-                _sched_yield()
-    job[_WITHIN] += _time(job, _CLOCK) - begin
+                sched_yield()
+    job[_WITHIN] += now(job, _CLOCK) - begin
 
 
 @njit("void(int64[::1], int64, int64, int64[:, ::1])", cache=True)
 def _alone(job, kernel, table, tasks):  # type: ignore[no-untyped-def]
     """All tasks, one after the other."""
-    begin = _time(job, _CLOCK)
+    begin = now(job, _CLOCK)
     for k in range(len(tasks)):
-        _call_task(kernel, table, tasks[k, 0], tasks[k, 1], 0)
-    job[_WITHIN] += _time(job, _CLOCK) - begin
+        call_task(kernel, table, tasks[k, 0], tasks[k, 1], 0)
+    job[_WITHIN] += now(job, _CLOCK) - begin
 
 
 class Team:
@@ -215,6 +132,7 @@ class Team:
 
     def __init__(self, threads: int) -> None:
         self.threads = threads
+        self.projecting: Projecting | None = None
         size = _THREADS + _LINE * threads
         room = np.zeros(size + _LINE, np.int64)
         self._job: Ints = room[-(room.ctypes.data // room.itemsize) % _LINE :][:size]
@@ -226,21 +144,31 @@ class Team:
             arguments = self._job, self._semaphore, thread
             threading.Thread(target=_help, args=arguments, name=f"helper {thread}", daemon=True).start()
 
+    def project(self) -> None:
+        """From now on tasks are done one after the other, and what this team would take, and smaller ones, is added up
+        in ``projecting``.
+        """
+        from .projecting import Projecting
+
+        self.projecting = Projecting(self.threads)
+
     @property
     def within(self) -> float:
         """How long ``run`` has taken so far, by the clock, s: what more threads could share."""
-        return int(self._words[_WITHIN]) / _SECOND
+        return int(self._words[_WITHIN]) / SECOND
 
     @property
     def helped(self) -> float:
         """How long the threads besides this one have done tasks so far, all together, s."""
-        return float(self._job[_THREADS + _LINE :: _LINE].sum()) / _SECOND
+        return float(self._job[_THREADS + _LINE :: _LINE].sum()) / SECOND
 
     def run(self, kernel: Kernel, table: int, tasks: Ints, starts: Ints) -> None:
         """Does ``tasks`` (k, 2), first and end, by a ``kernel`` of the signature TASK with the arguments at the address
         ``table``; those from ``starts[c]`` to ``starts[c + 1]``, at most 2^20, touch nothing in common.
         """
-        if self.threads == 1:
+        if self.projecting is not None:
+            self._words[_WITHIN] += self.projecting.run(kernel, table, tasks, starts)
+        elif self.threads == 1:
             _alone(self._job, kernel.address, table, tasks)
         else:
             _ask(self._job, self._semaphore, kernel.address, table, tasks.ctypes.data, starts)

@@ -1,0 +1,77 @@
+"""What a team would take: the greedy list schedule by plain Python, and the tasks of regions that are timed."""
+
+import numpy as np
+import pytest
+
+from conoid.worker.jit import njit, types
+from conoid.worker.parallel import projecting
+from conoid.worker.parallel.arguments import Arguments, reader
+from conoid.worker.parallel.projecting import Costs, Projecting, crews_of
+from conoid.worker.parallel.team import TASK, Team
+
+KINDS = (types.int64[::1],)
+_counts = reader(*KINDS)
+
+
+@njit(TASK, cache=False)
+def count(table, first, end, thread):  # type: ignore[no-untyped-def]
+    """Counts each number of its range."""
+    (done,) = _counts(table)
+    for k in range(first, end):
+        done[k] += 1
+
+
+def schedule(took: list[int], threads: int, begins: list[int]) -> int:
+    """When the last task ends; each goes to the thread that is free first."""
+    free, last = begins[:threads], 0
+    for each in took:
+        first = free.index(min(free))
+        free[first] += each
+        last = max(last, free[first])
+    return last
+
+
+@pytest.mark.parametrize("asleep", [False, True])
+def test_tasks_go_to_the_thread_that_is_free_first(asleep: bool) -> None:
+    took = np.random.default_rng(7).integers(1, 90, 40).tolist()
+    crews, free = np.array([1, 2, 5, 16]), np.zeros((4, 17), np.int64)
+    projecting._ready(asleep, np.array([3, 11, 20]), crews, free)
+    for each in took:
+        projecting._give(each, crews, free)
+    woken = [11, *[20] * 2, *[40] * 4, *[60] * 8, 80]  # two are woken by the first, and two by each of these
+    begins = woken if asleep else [0] * 16
+    assert [int(free[c, n]) for c, n in enumerate(crews)] == [schedule(took, int(n), begins) for n in crews]
+
+
+def test_teams_of_powers_of_two_and_the_whole_one() -> None:
+    assert [crews_of(n) for n in (1, 2, 6, 16)] == [[1], [1, 2], [1, 2, 4, 6], [1, 2, 4, 8, 16]]
+
+
+def test_timed_tasks_are_done_once_and_more_threads_never_take_longer(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(projecting, "measured", lambda: Costs(turn=0, call=0, wake=0))
+    done, team = np.zeros(600_000, np.int64), Team(6)
+    team.project()
+    tasks = np.column_stack([np.arange(0, 600_000, 10_000), np.arange(10_000, 610_000, 10_000)])
+    team.run(count, Arguments(*KINDS).set(done), tasks, np.array([0, 1, 30, 30, 60]))
+    assert (done == 1).all()
+    made = team.projecting
+    assert made is not None
+    assert (made.regions, made.colours, made.tasks) == (1, 4, 60)
+    one, two, four, six = made.spans
+    assert team.within >= one > two > four > six > one / 6
+    assert team.helped == 0.0
+
+
+def test_a_colour_costs_its_turn_and_sleeping_threads_their_call(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(projecting, "measured", lambda: Costs(turn=10**9, call=10**10, wake=0))
+    made, table = Projecting(2), Arguments(*KINDS)
+    two = np.array([[0, 1], [1, 2]])
+    made.run(count, table.set(np.zeros(2, np.int64)), two, np.array([0, 1, 2]))
+    assert made.spans[1] < 0.5, "colours of one task are not shared"
+    made.run(count, table.set(np.zeros(2, np.int64)), two, np.array([0, 2]))
+    assert 0.5 < made.spans[1] <= 1.5, "the second thread has both tasks done while the first one calls it"
+
+
+def test_what_it_costs_to_share_is_measured() -> None:
+    costs = projecting.measured()
+    assert min(costs.turn, costs.call, costs.wake) >= 0

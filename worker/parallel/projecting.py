@@ -1,0 +1,157 @@
+"""What regions would take on more threads than there are cores: their tasks are timed one after the other, and given
+out as a team of each size would do it.
+
+The next task goes to the thread that is free first, colour after colour. What it costs to share is measured first, on
+two threads: the ``turn`` of a colour, and after a pause the ``call`` of a thread that sleeps, which its caller pays,
+and its ``wake``, the time until it works. Whoever wakes wakes two more (team.py). That tasks which run together slow
+each other down, through the memory that they share, is not in it.
+"""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..jit import Kernel, njit, types
+from ..state import Ints
+from .arguments import Arguments, reader
+from .team import Team
+from .words import TASK, call_task, now
+
+_PAUSE = 100_000
+"""ns after which threads sleep that have found no task. Chosen: twice what they look for one (team.py)."""
+_REPEATS = 50
+_ROUNDS = 100_000
+"""Of the loop of a task that lasts longer than a thread takes to wake. Chosen: some 100 us."""
+_WORDS = types.int64[::1], types.int64
+_words = reader(*_WORDS)
+
+
+def crews_of(threads: int) -> list[int]:
+    """The teams that are projected: of 1, 2, 4, 8, ... and ``threads`` threads."""
+    return sorted({threads} | {1 << k for k in range(threads.bit_length()) if 1 << k <= threads})
+
+
+@dataclass(frozen=True)
+class Costs:
+    """ns, see above."""
+
+    turn: int
+    call: int
+    wake: int
+
+
+@njit("void(boolean, int64[::1], int64[::1], int64[:, ::1])", cache=True)
+def _ready(asleep, costs, crews, free):  # type: ignore[no-untyped-def]
+    """When each thread of each crew can begin with the first task of a colour; last the end of a crew's last task."""
+    for c in range(len(crews)):
+        free[c, : crews[c]] = 0
+        free[c, crews[c]] = 0
+        if asleep:
+            free[c, 0], woken, wake = costs[1], 2, costs[2]
+            for k in range(1, crews[c]):
+                if k > woken:
+                    woken, wake = 2 * woken + 2, wake + costs[2]
+                free[c, k] = wake
+
+
+@njit("void(int64, int64[::1], int64[:, ::1])", cache=True)
+def _give(took, crews, free):  # type: ignore[no-untyped-def]
+    """Gives a task to the thread of each crew that is free first."""
+    for c in range(len(crews)):
+        first = 0
+        for k in range(1, crews[c]):
+            if free[c, k] < free[c, first]:
+                first = k
+        free[c, first] += took
+        free[c, crews[c]] = max(free[c, crews[c]], free[c, first])
+
+
+@njit("int64(int64[::1], int64, int64, int64[:, ::1], int64[::1], int64[::1], int64[::1], int64[:, ::1], int64[::1])",
+      cache=True)  # fmt: skip
+def _timed(clock, kernel, table, tasks, starts, costs, crews, free, spans):  # type: ignore[no-untyped-def]
+    """Does all tasks; in ``spans`` (crews,) what each crew would take, ns. How long it has taken, ns."""
+    begin = now(clock, 0)
+    asleep = begin - clock[2] > _PAUSE
+    spans[:] = 0
+    for colour in range(len(starts) - 1):
+        shared = starts[colour + 1] - starts[colour] > 1
+        _ready(asleep and shared, costs, crews, free)
+        asleep = asleep and not shared
+        for k in range(starts[colour], starts[colour + 1]):
+            began = now(clock, 0)
+            call_task(kernel, table, tasks[k, 0], tasks[k, 1], 0)
+            _give(now(clock, 0) - began, crews, free)
+        for c in range(len(crews)):
+            spans[c] += free[c, crews[c]] + (costs[0] if shared and crews[c] > 1 else 0)
+    clock[2] = now(clock, 0)
+    return clock[2] - begin
+
+
+class Projecting:
+    """Does the tasks of regions one after the other, and adds up what crews would take."""
+
+    def __init__(self, threads: int) -> None:
+        """``threads``: of the largest crew."""
+        self.crews = crews_of(threads)
+        self.costs = measured()
+        self.regions = self.colours = self.tasks = 0
+        self._crews = np.array(self.crews)
+        self._costs = np.array([self.costs.turn, self.costs.call, self.costs.wake])
+        self._free = np.zeros((len(self.crews), threads + 1), np.int64)
+        self._clock, self._region = np.zeros(3, np.int64), np.zeros(len(self.crews), np.int64)
+        self._spans = np.zeros(len(self.crews))
+
+    @property
+    def spans(self) -> list[float]:
+        """What each crew would have taken for all regions so far, s."""
+        return (1e-9 * self._spans).tolist()  # type: ignore[no-any-return]
+
+    def run(self, kernel: Kernel, table: int, tasks: Ints, starts: Ints) -> int:
+        """As ``Team.run``; the CPU time that it has taken, ns. Where another program has had the core, what tasks have
+        taken by the clock is too long by the same factor for all of them.
+        """
+        self.regions, self.colours, self.tasks = (
+            self.regions + 1,
+            self.colours + len(starts) - 1,
+            self.tasks + len(tasks),
+        )
+        began = time.thread_time_ns()
+        passed = _timed(
+            self._clock, kernel.address, table, tasks, starts, self._costs, self._crews, self._free, self._region
+        )
+        spent = time.thread_time_ns() - began
+        self._spans += self._region * min(1.0, spent / max(passed, 1))
+        return spent
+
+
+@njit(TASK, cache=True)
+def _spin(table, first, end, thread):  # type: ignore[no-untyped-def]
+    """Work of some length that cannot be left out."""
+    told, rounds = _words(table)
+    total = told[thread]
+    for k in range(rounds):
+        total = total * 6364136223846793005 + k
+    told[thread] = total
+
+
+def measured() -> Costs:
+    """What it costs to share, on two threads of this process; a tenth of all measurements is below it: others may
+    have the cores.
+    """
+    two, told = Team(2), np.zeros(2, np.int64)
+    table, tasks = Arguments(*_WORDS), np.array([[0, 1], [1, 2]])
+
+    def took(rounds: int, pause: bool, number: int) -> int:
+        address, found = table.set(told, rounds), []
+        for _ in range(_REPEATS):
+            if pause:
+                time.sleep(3e-9 * _PAUSE)
+            began = time.monotonic_ns()
+            two.run(_spin, address, tasks[:number], np.array([0, number]))
+            found.append(time.monotonic_ns() - began)
+        return int(np.percentile(found, 10))
+
+    alone, turn = took(1, False, 1), took(1, False, 2)
+    call, woken, single = took(1, True, 2) - took(1, True, 1), took(_ROUNDS, True, 2), took(_ROUNDS, True, 1)
+    return Costs(max(turn - alone, 0), max(call, 0), min(max(woken - single, 0), single))

@@ -1,0 +1,97 @@
+"""Words that threads share, the clock, and calls of the C library, as kernels use them."""
+
+from typing import Any
+
+from llvmlite import ir
+
+from ..jit import intrinsic, types
+
+_WORD = ir.IntType(64)
+_MONOTONIC, SECOND = 1, 1_000_000_000
+"""The clock of that number counts from some moment on, in all threads alike; ns in a second."""
+TASK = "void(int64, int64, int64, int64)"
+"""The signature of a kernel that does a task: address of its arguments (arguments.py), first, end, number of the
+thread."""
+
+
+def _call(_: Any, kernel: Any, table: Any, first: Any, end: Any, thread: Any) -> Any:
+    def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        kind = ir.FunctionType(ir.VoidType(), [_WORD] * 4)
+        builder.call(builder.inttoptr(args[0], kind.as_pointer()), args[1:])
+        return context.get_dummy_value()
+
+    return types.void(*[types.int64] * 5), emit
+
+
+def _place(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    data = context.make_array(signature.args[0])(context, builder, args[0]).data
+    return builder.gep(data, [args[1]])
+
+
+def _added(_: Any, words: Any, at: Any, number: Any) -> Any:
+    def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.atomic_rmw("add", _place(context, builder, signature, args), args[2], "seq_cst")
+
+    return types.int64(words, at, number), emit
+
+
+def _swapped(_: Any, words: Any, at: Any, number: Any) -> Any:
+    def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.atomic_rmw("xchg", _place(context, builder, signature, args), args[2], "seq_cst")
+
+    return types.int64(words, at, number), emit
+
+
+def _loaded(_: Any, words: Any, at: Any) -> Any:
+    def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.load_atomic(_place(context, builder, signature, args), "acquire", 8)
+
+    return types.int64(words, at), emit
+
+
+def _read(_: Any, address: Any, k: Any) -> Any:
+    def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.load(builder.gep(builder.inttoptr(args[0], _WORD.as_pointer()), [args[1]]))
+
+    return types.int64(address, k), emit
+
+
+def _read_clock(_: Any, words: Any, at: Any) -> Any:
+    def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        kind = ir.FunctionType(ir.IntType(32), [_WORD, _WORD.as_pointer()])
+        name = "clock_gettime"
+        ask = builder.module.globals.get(name) or ir.Function(builder.module, kind, name)
+        place = _place(context, builder, signature, args)
+        builder.call(ask, [_WORD(_MONOTONIC), place])
+        whole, rest = builder.load(place), builder.load(builder.gep(place, [_WORD(1)]))
+        return builder.add(builder.mul(whole, _WORD(SECOND)), rest)
+
+    return types.int64(words, at), emit
+
+
+def _library(name: str, signature: Any) -> Any:
+    """A call of a function of the C library, whose answer is of no interest."""
+
+    def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        kind = ir.FunctionType(ir.IntType(32), [_WORD] * len(args))
+        builder.call(builder.module.globals.get(name) or ir.Function(builder.module, kind, name), args)
+        return context.get_dummy_value()
+
+    return signature, emit
+
+
+call_task: Any = intrinsic(_call)
+add: Any = intrinsic(_added)
+"""In a kernel: adds to a word, and returns what it was; two threads never get the same."""
+swap: Any = intrinsic(_swapped)
+"""In a kernel: sets a word, and returns what it was. What the thread has written before is there for others that see
+it."""
+load: Any = intrinsic(_loaded)
+"""In a kernel: a word that other threads write."""
+now: Any = intrinsic(_read_clock)
+"""In a kernel: the time, ns; two words at a place are its room."""
+word_at: Any = intrinsic(_read)
+"""In a kernel: word ``k`` at an address."""
+sched_yield: Any = intrinsic(lambda _: _library("sched_yield", types.void()))
+sem_wait: Any = intrinsic(lambda _, semaphore: _library("sem_wait", types.void(semaphore)))
+sem_post: Any = intrinsic(lambda _, semaphore: _library("sem_post", types.void(semaphore)))
