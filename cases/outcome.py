@@ -175,7 +175,7 @@ def from_json(text: bytes | str) -> Outcome:
         _null_to_nan(Energy, data.get("energy"))
         for check in checks if isinstance(checks, list) else ():
             _null_to_nan(Check, check)
-    return msgspec.convert(data, Outcome)
+    return msgspec.convert(data, Outcome, str_keys=True)
 
 
 def _null_to_nan(kind: type[msgspec.Struct], table: Any) -> None:

@@ -10,7 +10,7 @@ import typer
 from conoid.cases.figures import counted, duration
 from conoid.cases.problems import shown
 from conoid.cases.run import ExitCode
-from conoid.cases.schema import MOST_RANKS
+from conoid.cases.schema import MOST_RANKS, MOST_THREADS
 from conoid.cases.units import parse_quantity
 
 from . import chart, study
@@ -19,16 +19,19 @@ from .errors import UsageError
 from .options import CaseArgument, Overrides, aloud, complain
 from .projection import Network, bandwidth
 from .saving import save_text
-from .scaling import CORES, scale
+from .scaling import CORES, Layout, scale
 from .submission import case_of
 
 bench = typer.Typer(no_args_is_help=True, help="Measure.")
 
 
-@bench.command(name="scale", short_help="Run a case on several numbers of ranks; speed-up, projected beyond the cores.")
+@bench.command(name="scale", short_help="A case on several ranks and threads: speed-up, projected beyond the cores.")
 def bench_scale(
     case: CaseArgument,
-    ranks: Annotated[str, typer.Option("--ranks", help="Numbers of ranks; one is always among them.")] = "1,2,4,8",
+    ranks: Annotated[
+        str,
+        typer.Option("--ranks", metavar="R,RxT,...", help="Numbers of ranks, or ranks x threads; 1 is always there."),
+    ] = "1,2,4,8",
     overrides: Overrides = None,
     latency: Annotated[str, typer.Option("--latency", help="Of a message, for the projection.")] = "2 us",
     width: Annotated[str, typer.Option("--bandwidth", help="Of a rank's messages, for the projection.")] = "5 GB/s",
@@ -39,18 +42,19 @@ def bench_scale(
         ),
     ] = None,
 ) -> None:
-    """Run a case on several numbers of ranks: speed-up, where it is lost, and whether all give the same answer.
+    """Run a case on several numbers of ranks and threads: speed-up, where it is lost, whether all answers are equal.
 
-    Ends with 1 when they do not.
+    Where there are fewer cores than threads, what they would take is projected from the tasks of one. Ends with 1 when
+    answers differ.
     """
-    numbers = _numbers(ranks)
+    layouts = layouts_of(ranks)
     network = Network(_read("--latency", latency, _time), _read("--bandwidth", width, bandwidth))
-    with tempfile.TemporaryDirectory() as passing, aloud(f"0 of {len(numbers)} runs have ended") as name:
+    with tempfile.TemporaryDirectory() as passing, aloud("the first run") as name:
         runs = []
-        for run in scale(case, overrides or (), numbers, out or Path(passing), network):
-            complain(f"ranks {run.ranks}: {counted(run.steps, 'step')} in {duration(run.wall)}")
+        for run in scale(case, overrides or (), layouts, out or Path(passing), network):
+            complain(f"{run.name}: {counted(run.steps, 'step')} in {duration(run.wall)}")
             runs.append(run)
-            name(f"{len(runs)} of {len(numbers)} runs have ended")
+            name(f"the run after {run.name}")
     done = study.Study(case_of(case, overrides or ()).name, overrides or (), CORES, network, runs)
     if out is not None:
         save_text(out / "scale.md", study.to_markdown(done))
@@ -60,13 +64,20 @@ def bench_scale(
     raise typer.Exit(ExitCode.SUCCEEDED if done.equal else ExitCode.CRASHED)
 
 
-def _numbers(text: str) -> list[int]:
-    """Numbers of ranks such as ``1,2,4``. Raises ClientError."""
-    words = [word.strip() for word in text.split(",")]
-    if not all(word.isascii() and word.isdigit() and 1 <= int(word[:9]) <= MOST_RANKS for word in words):
-        message = f"allowed: whole numbers from 1 to {MOST_RANKS} with commas between them, such as 1,2,4"
-        raise UsageError(f"--ranks = {shown(text)}: {message}")
-    return [int(word) for word in words]
+def layouts_of(text: str) -> list[Layout]:
+    """Ranks, and threads of each, of ``1,2,4x4``. Raises ClientError."""
+    found = []
+    for word in text.split(","):
+        numbers = [int(each[:9]) if each.isascii() and each.isdigit() else 0 for each in word.strip().split("x")]
+        ranks, threads = (*numbers, 1)[:2]
+        if len(numbers) > 2 or not 1 <= ranks <= MOST_RANKS or not 1 <= threads <= MOST_THREADS:
+            most = f"up to {MOST_RANKS} ranks, up to {MOST_THREADS} threads"
+            message = (
+                f"allowed: numbers of ranks, or ranks x threads, with commas between them, such as 1,2,4x4; {most}"
+            )
+            raise UsageError(f"--ranks = {shown(text)}: {message}")
+        found.append((ranks, threads))
+    return found
 
 
 def _read(option: str, text: str, reading: Callable[[str], float]) -> float:

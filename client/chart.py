@@ -1,4 +1,4 @@
-"""Speed-up against ranks, drawn as SVG: projected, as measured where there are cores enough, and as others measured."""
+"""Speed-up against cores, drawn as SVG: projected, as measured where there are cores enough, and as others measured."""
 
 import math
 from collections.abc import Mapping
@@ -47,9 +47,11 @@ class _Frame:
 
 def speed_up(study: Study, others: Mapping[int, float] | None = None, source: str = "") -> str:
     """The figure; both axes are logarithmic. ``others``: the speed-ups that ``source`` measured, by ranks."""
-    projected = {run.ranks: study.speed_up(run) for run in study.runs}
-    worst = {run.ranks: study.runs[0].time / run.worst for run in study.runs}
-    measured = {run.ranks: study.runs[0].wall / run.wall for run in study.runs if run.ranks <= study.cores}
+    best = {run.cores: run for run in sorted(study.runs, key=study.speed_up)}
+    projected = {cores: study.speed_up(run) for cores, run in sorted(best.items())}
+    worst = {cores: study.runs[0].time / best[cores].worst for cores in projected}
+    within = sorted((run for run in study.runs if study.within(run)), key=lambda run: run.cores)
+    measured = {run.cores: study.runs[0].wall / run.wall for run in within}
     values = (*worst.values(), *measured.values())
     others = others or {}
     most = max(1, math.ceil(math.log2(max(*projected, *others, 2))))
@@ -63,11 +65,12 @@ def speed_up(study: Study, others: Mapping[int, float] | None = None, source: st
         frame.marks(projected, _BLUE, _BLUE), frame.marks(measured, _BLUE, "white"),
         frame.marks(others, _RED, _RED), frame.labels(others, 8, 4),
         frame.labels({ranks: value for ranks, value in projected.items() if ranks > 1}, -10, -10),
-        _legend(0, "projected, a core a rank; dots: at worst", _BLUE, _BLUE),
+        _legend(0, "projected, the best ranks x threads; dots: at worst", _BLUE, _BLUE),
         _legend(1, "wall time, this machine", _BLUE, "white"),
         *([_legend(2, f"measured, {source}", _RED, _RED)] if others else []),
         f'<text x="{_LEFT}" y="20" font-size="14">{study.case}: speed-up</text>',
-        f'<text x="{_LEFT + _SIDE / 2}" y="{_TOP + _SIDE + 36}" text-anchor="middle">ranks</text>', "</svg>", "",
+        f'<text x="{_LEFT + _SIDE / 2}" y="{_TOP + _SIDE + 36}" text-anchor="middle">ranks x threads</text>',
+        "</svg>", "",
     ])  # fmt: skip
 
 

@@ -1,4 +1,5 @@
-"""What a run on P ranks would take on P cores: projected from CPU seconds and messages, rank by rank, report by report.
+"""What a run on P ranks would take with a core for each thread: projected from CPU seconds and messages, rank by rank,
+report by report.
 
 ::
 
@@ -6,7 +7,8 @@
                              + collectives * 2 ceil(log2 P) * latency + bytes put into them by all / bandwidth )
 
 A window is what lies between two reports of the worker; work is the CPU time of a rank but for its waiting. Within a
-window ranks are taken to wait for each other once, and no message is hidden behind work.
+window ranks are taken to wait for each other once, and no message is hidden behind work. Of a run whose tasks were
+timed one after the other (``--project`` of the worker) work is what a rank would take with so many threads.
 """
 
 import re
@@ -18,7 +20,7 @@ import msgspec
 
 from conoid.cases import layout
 from conoid.cases.messages import AnyMessage, Counts, Load
-from conoid.cases.outcome import Outcome, from_json
+from conoid.cases.outcome import Outcome, Sharing, from_json
 
 from .journal import from_line
 
@@ -47,7 +49,7 @@ class Phase(msgspec.Struct, frozen=True):
 
 
 class Projection(msgspec.Struct, frozen=True, kw_only=True):
-    """A run, and what it would take with a core a rank; times in s, what is sent per step."""
+    """A run, and what it would take with a core a thread; times in s, what is sent per step."""
 
     ranks: int
     steps: int
@@ -74,6 +76,28 @@ class Projection(msgspec.Struct, frozen=True, kw_only=True):
     """In these messages, by all ranks, a node that ranks share."""
     rebalances: int
     digest: str
+    threads: int = 1
+    """Of each rank."""
+    by_tasks: bool = False
+    """Whether ``work`` follows from tasks that were timed one after the other; else it is that of so many threads."""
+    helped: float = 0.0
+    """What all threads but the first of each rank have worked."""
+    serial: dict[str, float] = {}
+    """By phase: what one thread of a rank did alone, of the rank with most of all phases; wall time."""
+    parallel: dict[str, float] = {}
+    """By phase: in regions, which threads share, of the same rank."""
+    sharing: Sharing | None = None
+
+    @property
+    def cores(self) -> int:
+        """A core a thread."""
+        return self.ranks * self.threads
+
+    @property
+    def name(self) -> str:
+        """``4``, or ``4x4`` with several threads; with a star where ``by_tasks``."""
+        threads = f"x{self.threads}" if self.threads > 1 or self.by_tasks else ""
+        return f"{self.ranks}{threads}{'*' if self.by_tasks else ''}"
 
     @property
     def time(self) -> float:
@@ -105,14 +129,16 @@ def bandwidth(text: str) -> float:
     return float(match[1]) * 1000.0 ** " kMGT".index(match[2] or " ")
 
 
-def read(folder: Path, network: Network) -> Projection:
-    """The projection of a run that has ended."""
+def read(folder: Path, network: Network, threads: int | None = None) -> Projection:
+    """The projection of a run that has ended; see ``project``."""
     lines = (folder / layout.JOURNAL).read_bytes().splitlines()
-    return project(map(from_line, lines), from_json((folder / layout.OUTCOME).read_bytes()), network)
+    return project(map(from_line, lines), from_json((folder / layout.OUTCOME).read_bytes()), network, threads)
 
 
-def project(journal: Iterable[AnyMessage], outcome: Outcome, network: Network) -> Projection:
-    """The projection of a run's messages and outcome."""
+def project(
+    journal: Iterable[AnyMessage], outcome: Outcome, network: Network, threads: int | None = None
+) -> Projection:
+    """The projection of a run's messages and outcome; with so many ``threads`` by its tasks, None: as it was."""
     loads: list[Load] = []
     shared_steps = shared = 0
     for message in journal:
@@ -121,7 +147,7 @@ def project(journal: Iterable[AnyMessage], outcome: Outcome, network: Network) -
         elif isinstance(message, Load):
             loads.append(message)
             shared_steps += shared * message.steps
-    works = [_work(load) for load in loads]
+    works = [_work(load) if threads is None else load.projected[threads] for load in loads]
     busy = [_busy(work) for work in works]
     ranks, steps = outcome.ranks, outcome.steps or 1
     sent = sum(sum(load.bytes) for load in loads)
@@ -135,8 +161,16 @@ def project(journal: Iterable[AnyMessage], outcome: Outcome, network: Network) -
         messages_sent=sum(sum(load.messages) for load in loads) / ranks / steps, bytes_sent=sent / ranks / steps,
         collectives_made=sum(max(load.collectives) for load in loads) / steps,
         bytes_shared=sent / shared_steps if shared_steps else 0.0, rebalances=outcome.rebalances or 0,
-        digest=outcome.digest,
+        digest=outcome.digest, threads=outcome.threads if threads is None else threads, by_tasks=threads is not None,
+        helped=sum(outcome.helped), serial=_of_one(outcome, outcome.serial),
+        parallel=_of_one(outcome, outcome.parallel), sharing=outcome.sharing,
     )  # fmt: skip
+
+
+def _of_one(outcome: Outcome, seconds: Seconds) -> dict[str, float]:
+    """Those of the rank that has most serial seconds."""
+    totals = _busy(outcome.serial) if outcome.serial else []
+    return {name: each[totals.index(max(totals))] for name, each in seconds.items()} if totals else {}
 
 
 def _work(load: Load) -> Seconds:

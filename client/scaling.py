@@ -1,11 +1,12 @@
-"""A case on several numbers of ranks: what each run took, and what it would take with a core a rank."""
+"""A case on several numbers of ranks and threads: what each run took, and what it would take with a core a thread."""
 
 import os
 import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from conoid.cases import layout
@@ -24,19 +25,75 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA
 _ENVIRONMENT = {**dict.fromkeys(_THREADS, "1"), "HYDRA_LAUNCHER": "fork", "HYDRA_IFACE": "lo"}
 
 
+Layout = tuple[int, int]
+"""Ranks, and threads of each."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One run of a study."""
+
+    ranks: int
+    threads: int
+    by_tasks: bool = False
+    """On one thread a rank, with tasks that are timed: what ``threads`` and fewer would take follows from them."""
+
+    @property
+    def folder(self) -> str:
+        """Below that of the study."""
+        threads = f"x{self.threads}" if self.threads > 1 else ""
+        return f"ranks-{self.ranks}{threads}{'-tasks' if self.by_tasks else ''}"
+
+    def changes(self, overrides: Sequence[str]) -> list[str]:
+        """Keys of the case."""
+        return [*overrides, f"run.ranks={self.ranks}", f"run.threads={self.threads}"]
+
+
+def trials(layouts: Iterable[Layout], cores: int) -> list[Trial]:
+    """The runs that a study of ``layouts`` takes on a machine with so many ``cores``: one rank first; then what there
+    are cores for, and ranks of one thread, which can take turns; then, for layouts whose threads have no cores, runs
+    with tasks that are timed, and two threads that show how right they are.
+    """
+    wanted = sorted({(1, 1), *layouts})
+    beyond = {ranks: threads for ranks, threads in wanted if threads > 1 and ranks * threads > cores}
+    if beyond:
+        beyond.setdefault(1, max(beyond.values()))
+        wanted = sorted({*wanted, (1, 2)} if cores > 1 else wanted)
+    there = [Trial(*each) for each in wanted if each[1] == 1 or each[0] * each[1] <= cores]
+    return [*there, *(Trial(ranks, threads, by_tasks=True) for ranks, threads in sorted(beyond.items()))]
+
+
 def scale(
-    case: str, overrides: Sequence[str], ranks: Sequence[int], folder: Path, network: Network
+    case: str, overrides: Sequence[str], layouts: Sequence[Layout], folder: Path, network: Network
 ) -> Iterator[Projection]:
-    """Runs a case on one rank and on each number of ``ranks``, one after the other, each in its own folder.
+    """Runs a case on one rank and in each of the ``layouts``, one after the other, each in its own folder.
 
     A run that is there already, of the same case, is only read. Raises CaseError, and ClientError for a run that does
     not succeed.
     """
-    for number in sorted({1, *ranks}):
-        place = folder / f"ranks-{number}"
-        if not _there(place, resolved_json(case_of(case, [*overrides, f"run.ranks={number}"]))):
-            _run(locate(case), overrides, number, place)
-        yield read(place, network)
+    for trial in trials(layouts, CORES):
+        run(case, overrides, trial, folder)
+        yield from found(trial, folder, layouts, network)
+
+
+def run(case: str, overrides: Sequence[str], trial: Trial, folder: Path, seconds: float | None = None) -> None:
+    """Makes a run of a study that is not there yet. Raises ClientError where it does not succeed, TimeoutExpired when
+    it has not ended after so many ``seconds``.
+    """
+    place = folder / trial.folder
+    if not _there(place, resolved_json(case_of(case, trial.changes(overrides)))):
+        _run(locate(case), trial, overrides, place, seconds)
+
+
+def found(trial: Trial, folder: Path, layouts: Sequence[Layout], network: Network) -> list[Projection]:
+    """What a run says of its layout, or of those of ``layouts`` that follow from its tasks."""
+    place = folder / trial.folder
+    if not trial.by_tasks:
+        return [read(place, network)]
+    also = {2} if trial.ranks == 1 else set()  # beside two threads that are measured
+    known = from_json((place / layout.OUTCOME).read_bytes()).projected
+    asked = {threads for ranks, threads in layouts if ranks == trial.ranks and ranks * threads > CORES}
+    return [read(place, network, threads) for threads in sorted((asked | also) & set(known))]
 
 
 def _there(folder: Path, case: bytes) -> bool:
@@ -59,16 +116,22 @@ def _succeeded(folder: Path) -> bool:
     return True
 
 
-def _run(case: Path, overrides: Sequence[str], ranks: int, folder: Path) -> None:
+def _run(case: Path, trial: Trial, overrides: Sequence[str], folder: Path, seconds: float | None) -> None:
     (folder / layout.LOGS).mkdir(parents=True)
-    command = [*mpiexec(), "-n", str(ranks), sys.executable, "-m", "mpi4py", "-m", "conoid.worker", str(case)]
-    changes = [word for override in overrides for word in ("--set", override)]
-    crowded = {"MPIR_CVAR_ENABLE_HEAVY_YIELD": "1"} if ranks > CORES else {}
+    command = [*mpiexec(), "-n", str(trial.ranks), sys.executable, "-m", "mpi4py", "-m", "conoid.worker", str(case)]
+    words = [word for change in trial.changes(overrides) for word in ("--set", change)]
+    words += ["--project"] if trial.by_tasks else []
+    crowded = {"MPIR_CVAR_ENABLE_HEAVY_YIELD": "1"} if trial.ranks > CORES else {}
     with (folder / layout.LOGS / layout.LAUNCHER_LOG).open("wb") as log:
-        subprocess.run(
-            [*command, "--out", str(folder), *changes], stdin=subprocess.DEVNULL, stdout=log, stderr=log, check=False,
+        child = subprocess.Popen(
+            [*command, "--out", str(folder), *words], stdin=subprocess.DEVNULL, stdout=log, stderr=log,
             env={**os.environ, **_ENVIRONMENT, **crowded},
         )  # fmt: skip
+        try:
+            child.wait(seconds)
+        finally:
+            child.terminate()  # mpiexec tells its ranks
+            child.wait()
     _succeeded(folder)
 
 

@@ -1,18 +1,20 @@
-"""The runs of one case on several numbers of ranks, as tables: speed-up, what is lost and where, what is sent."""
+"""The runs of one case on several numbers of ranks and threads, as tables: speed-up, what is lost and where, what is
+sent, what one thread does alone.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import msgspec
 
-from conoid.cases.figures import count, fixed, percent, si
+from conoid.cases.figures import alike, count, crew, fixed, percent, si
 
 from .projection import Network, Projection
 
 
 @dataclass(frozen=True)
 class Study:
-    """Runs of a case by their ranks; the first is on one."""
+    """Runs of a case by their ranks and threads; the first is on one of each."""
 
     case: str
     changes: Sequence[str]
@@ -30,10 +32,21 @@ class Study:
         """Projected."""
         return self.runs[0].time / run.time
 
+    def within(self, run: Projection) -> bool:
+        """Whether there was a core for each thread, so that its wall time says something."""
+        return run.cores <= self.cores and not run.by_tasks
+
+    @property
+    def error(self) -> tuple[Projection, Projection] | None:
+        """Two threads by the tasks of one, and as they were; None where there are not both."""
+        two = {run.by_tasks: run for run in self.runs if (run.ranks, run.threads) == (1, 2)}
+        return (two[True], two[False]) if len(two) == 2 else None
+
     def losses(self, run: Projection) -> dict[str, tuple[float, float]]:
         """What each phase adds to the time of a rank, s: its share of the work beyond that of one rank, imbalance."""
         one = self.runs[0].phases
-        found = {name: ((p.total - one[name].total) / run.ranks, p.imbalance) for name, p in run.phases.items()}
+        share = {name: one[name].total / run.threads for name in run.phases}
+        found = {name: ((p.total - share[name]) / run.ranks, p.imbalance) for name, p in run.phases.items()}
         return {**found, "messages": (run.messages, 0.0), "collectives": (run.collectives, 0.0)}
 
 
@@ -63,19 +76,20 @@ def from_json(data: bytes) -> Study:
 
 def to_markdown(study: Study) -> str:
     """The tables, with what they mean."""
-    network, crowded = study.network, [str(run.ranks) for run in study.runs if run.ranks > study.cores]
+    network, crowded = study.network, [run.name for run in study.runs if run.cores > study.cores and not run.by_tasks]
     parts = [
         ", ".join(f"`{text}`" for text in (study.case, *study.changes)),
-        f"On {study.cores} cores. Projected: with a core a rank, {si(network.latency, 's')} a message, "
+        f"On {study.cores} cores. Projected: with a core a thread, {si(network.latency, 's')} a message, "
         f"{si(network.bandwidth, 'B/s')}; coarser: from windows twice as long; at worst: if ranks waited for each "
         "other after every phase.",
         f"Ranks took turns on the cores, with MPIR_CVAR_ENABLE_HEAVY_YIELD=1: {', '.join(crowded)}." if crowded else "",
         _speeds(study),
-        "Projected time of a rank beyond that of one rank over the number of ranks, s: more work + imbalance, and the "
+        _by_tasks(study),
+        *_serial(study),
+        "Projected time of a rank beyond that of one rank over ranks and threads, s: more work + imbalance, and the "
         "share in all of it.",
         _losses(study),
-        "Sent in a step:",
-        _traffic(study),
+        *_traffic(study),
         f"Digests: equal, {study.runs[0].digest[:16]}." if study.equal else "Digests: NOT EQUAL.",
     ]
     return "\n\n".join(filter(None, parts)) + "\n"
@@ -89,15 +103,59 @@ def _speeds(study: Study) -> str:
     )  # fmt: skip
     rows = [
         [
-            str(run.ranks), count(run.steps), fixed(run.steps / run.windows, 1),
-            fixed(run.wall, 1) if run.ranks <= study.cores else "-", fixed(100 * study.runs[0].work / run.work, 0),
+            run.name, count(run.steps), fixed(run.steps / run.windows, 1),
+            fixed(run.wall, 1) if study.within(run) else "-",
+            fixed(100 * study.runs[0].work / (run.work + run.helped), 0) if not run.by_tasks else "-",
             _seconds(run.time), _seconds(run.coarse), _seconds(run.worst), fixed(study.speed_up(run)),
-            fixed(100 * study.speed_up(run) / run.ranks, 0), fixed(study.runs[0].time / run.worst),
+            fixed(100 * study.speed_up(run) / run.cores, 0), fixed(study.runs[0].time / run.worst),
             fixed(run.imbalance), str(run.rebalances),
         ]
         for run in study.runs
     ]  # fmt: skip
     return table(head, rows)
+
+
+def _by_tasks(study: Study) -> str:
+    """What stars mean, and how right they are."""
+    sharing = next((run.sharing for run in study.runs if run.by_tasks), None)
+    if sharing is None:
+        return ""
+    a_step = f"{fixed(sharing.regions / sharing.steps, 1)} regions a step"
+    made = (
+        f"{fixed(sharing.colours / sharing.regions, 1)} colours a region, {fixed(sharing.tasks / sharing.colours, 1)}"
+    )
+    turn, call, wake = alike((sharing.turn, sharing.call, sharing.wake), "s")
+    text = (
+        "With a star: there are fewer cores than threads, so the tasks of each region were timed one after the other, "
+        f"and their times given out to so many threads, colour after colour: {a_step}, {made} tasks a colour. "
+        f"To share a colour was taken to cost {turn}, to call a sleeping thread {call}, until it works {wake}, as "
+        "measured here. That threads slow each other down through the memory is not in it."
+    )
+    if study.error is None:
+        return text
+    told, was = study.error
+    off = percent(told.time / was.time - 1.0, 0)
+    return f"{text} Two threads take {fixed(told.time)} s so, and {fixed(was.time)} s when they are there: {off} off."
+
+
+def _serial(study: Study) -> list[str]:
+    """What limits the gain by threads; nothing of runs that do not say it."""
+    runs = [run for run in study.runs if run.serial and not run.by_tasks]
+    names = [name for name in (runs[0].serial if runs else ()) if any(run.serial[name] for run in runs)]
+    rows = [[name, *(_parted(run, [name]) for run in runs)] for name in names]
+    if not runs:
+        return []
+    rows.append(["all", *(_parted(run, names) for run in runs)])
+    said = (
+        "Milliseconds a step of the busiest rank, by the clock: what one thread does alone + what is in regions, which "
+        "threads share."
+    )
+    return [said, table(["phase", *(run.name for run in runs)], rows)]
+
+
+def _parted(run: Projection, names: Sequence[str]) -> str:
+    serial, parallel = (1e3 * sum(each[name] for name in names) / run.steps for each in (run.serial, run.parallel))
+    return f"{fixed(serial, 3)} + {fixed(parallel, 3)}"
 
 
 def _losses(study: Study) -> str:
@@ -110,7 +168,9 @@ def _losses(study: Study) -> str:
         for name in (tables[0] if tables else ())
         if any(sum(table[name]) for table in tables)
     ]
-    return table(["phase", "one rank s", *(f"{run.ranks} ranks" for run in runs)], rows)
+    return table(
+        ["phase", "one rank s", *(crew(run.ranks, run.threads) + ("*" if run.by_tasks else "") for run in runs)], rows
+    )
 
 
 def _loss(more: float, imbalance: float, whole: float) -> str:
@@ -118,16 +178,16 @@ def _loss(more: float, imbalance: float, whole: float) -> str:
     return f"{_seconds(more)} + {_seconds(imbalance)}{share}"
 
 
-def _traffic(study: Study) -> str:
+def _traffic(study: Study) -> list[str]:
     head = ("ranks", "messages a rank", "kB a rank", "bytes a shared node", "collectives")
     rows = [
         [
-            str(run.ranks), fixed(run.messages_sent, 1), fixed(run.bytes_sent / 1000, 1), fixed(run.bytes_shared, 0),
+            run.name, fixed(run.messages_sent, 1), fixed(run.bytes_sent / 1000, 1), fixed(run.bytes_shared, 0),
             fixed(run.collectives_made, 1),
         ]
-        for run in study.runs[1:]
+        for run in study.runs[1:] if run.ranks > 1 and not run.by_tasks
     ]  # fmt: skip
-    return table(head, rows)
+    return ["Sent in a step:", table(head, rows)] if rows else []
 
 
 def _seconds(value: float) -> str:

@@ -3,7 +3,7 @@
 from typing import Any
 
 from conoid.cases.messages import AnyMessage, Counts, Load
-from conoid.cases.outcome import Outcome
+from conoid.cases.outcome import Outcome, Sharing
 from conoid.client.projection import Network, Projection, project
 from conoid.client.study import Study
 
@@ -42,6 +42,34 @@ def one_rank() -> Projection:
         bytes=[0], collectives=[0], collective_bytes=[0],
     )  # fmt: skip
     return project([counts(0), alone], Outcome(state="succeeded", steps=4, elapsed=9.0, setup=0.0, digest="abc"), SLOW)
+
+
+def two_threads() -> Projection:
+    """One rank of two threads, the second of which has worked for 2 s."""
+    alone = load(
+        phases={"elements": [2.5], "exchange": [0.0], "contact": [1.5]}, waiting=[0.0], steps=4, messages=[0],
+        bytes=[0], collectives=[0], collective_bytes=[0],
+    )  # fmt: skip
+    outcome = Outcome(
+        state="succeeded", steps=4, elapsed=6.0, setup=1.0, digest="abc", threads=2, helped=[2.0],
+        serial={"elements": [1.0], "contact": [2.0]}, parallel={"elements": [2.0], "contact": [0.0]},
+    )  # fmt: skip
+    return project([counts(0), alone], outcome, SLOW)
+
+
+def by_tasks(threads: int) -> Projection:
+    """One rank whose tasks were timed, as 2 or 4 threads would do them."""
+    seconds = {
+        2: {"elements": [3.0], "exchange": [0.0], "contact": [2.0]},
+        4: {"elements": [1.5], "exchange": [0.0], "contact": [2.0]},
+    }
+    alone = load(
+        phases={"elements": [6.0], "contact": [2.0]}, waiting=[0.0], steps=4, messages=[0], bytes=[0], collectives=[0],
+        collective_bytes=[0], projected=seconds,
+    )  # fmt: skip
+    sharing = Sharing(steps=4, regions=40, colours=120, tasks=480, turn=1e-6, call=2e-5, wake=4e-5)
+    outcome = Outcome(state="succeeded", steps=4, elapsed=9.0, setup=0.0, digest="abc", threads=4, sharing=sharing)
+    return project([counts(0), alone], outcome, SLOW, threads)
 
 
 def study(*runs: Projection, case: str = "long_rod") -> Study:

@@ -13,9 +13,10 @@ from conoid.cases.outcome import Outcome
 from conoid.client import benches, cli
 from conoid.client.chart import speed_up
 from conoid.client.projection import Projection, bandwidth, project
+from conoid.client.scaling import Trial, trials
 from conoid.client.study import from_json, to_json, to_markdown
 
-from .studies import SLOW, load, one_rank, study, two_ranks
+from .studies import SLOW, by_tasks, load, one_rank, study, two_ranks, two_threads
 
 
 def test_the_projection_is_the_sum_by_hand() -> None:
@@ -71,6 +72,43 @@ def test_the_tables_say_it() -> None:
     assert "Digests: NOT EQUAL." in to_markdown(study(one_rank(), two_ranks("xyz")))
 
 
+def test_layouts_are_ranks_and_threads() -> None:
+    assert benches.layouts_of("1, 2,4x4,1x16") == [(1, 1), (2, 1), (4, 4), (1, 16)]
+
+
+def test_threads_without_cores_are_projected_and_two_show_how_right_that_is() -> None:
+    some = [(1, 16), (4, 4), (1, 4), (16, 1)]
+    assert trials(some, 2) == [
+        Trial(1, 1), Trial(1, 2), Trial(16, 1), Trial(1, 16, by_tasks=True), Trial(4, 4, by_tasks=True),
+    ]  # fmt: skip
+    assert trials(some, 16) == [Trial(1, 1), Trial(1, 4), Trial(1, 16), Trial(4, 4), Trial(16, 1)]
+    assert trials([(4, 4)], 1) == [Trial(1, 1), Trial(1, 4, by_tasks=True), Trial(4, 4, by_tasks=True)]
+    assert len({trial.folder for trial in [*trials(some, 2), *trials(some, 16)]}) == 8
+
+
+def test_a_projection_by_tasks_takes_the_work_of_so_many_threads() -> None:
+    one, run = one_rank(), by_tasks(4)
+    assert (run.name, run.cores, run.time) == ("1x4*", 4, 3.5)
+    assert by_tasks(2).time == 5.0
+    found = study(one, by_tasks(2), run)
+    assert found.speed_up(run) == 2.0
+    assert found.losses(run)["elements"] == pytest.approx((1.5 - 5.0 / 4, 0.0))
+    text = to_markdown(found)
+    assert "10.0 regions a step, 3.0 colours a region, 4.0 tasks a colour" in text
+    assert "off." not in text, "nothing was measured with two threads"
+    two = to_markdown(study(one, two_threads(), by_tasks(2), run))
+    assert "Two threads take 5.00 s so, and 4.00 s when they are there: 25 % off." in two
+
+
+def test_what_one_thread_does_alone_is_told_by_phase() -> None:
+    text = to_markdown(study(one_rank(), two_threads()))
+    lines = [line.replace(" ", "") for line in text.splitlines()]
+    assert "|phase|1x2|" in lines
+    assert "|elements|250.000+500.000|" in lines
+    assert "|contact|500.000+0.000|" in lines
+    assert "|all|750.000+500.000|" in lines
+
+
 def test_the_figure_marks_what_others_measured() -> None:
     svg = "{http://www.w3.org/2000/svg}"
     for others in ({}, {32: 23.79}, {16: 12.32, 32: 18.74}):
@@ -121,13 +159,18 @@ def test_what_cannot_be_read_is_one_line(option: str, value: str) -> None:
     assert result.stderr.startswith(f"conoid: {option} = '{value}': ")
 
 
-@pytest.mark.parametrize("ranks", ["two", "0", "-1", "1,,2", "1 2", "2.5", "4097", "9" * 5000, "²", ""])
+@pytest.mark.parametrize(
+    "ranks", ["two", "0", "-1", "1,,2", "1 2", "2.5", "4097", "9" * 5000, "²", "", "x4", "4x", "1x257", "2x2x2"]
+)
 def test_numbers_of_ranks_that_cannot_be(ranks: str) -> None:
     result = conoid("demo", "--ranks", ranks)
     assert result.exit_code == 2
-    said = "allowed: whole numbers from 1 to 4096 with commas between them, such as 1,2,4\n"
+    said = (
+        "allowed: numbers of ranks, or ranks x threads, with commas between them, such as 1,2,4x4; up to 4096 ranks, "
+        "up to 256 threads\n"
+    )
     assert result.stderr.endswith(said)
-    assert len(result.stderr) < 200
+    assert len(result.stderr) < 250
 
 
 def test_a_folder_with_something_else_is_left_alone(tmp_path: Path) -> None:
