@@ -33,6 +33,7 @@ from .output import rewind
 from .output.history import History
 from .output.journal import Journal
 from .parallel.comm import Comm
+from .parallel.projecting import Projecting
 from .parallel.team import team
 from .preload import preload
 from .signals import Signals
@@ -54,7 +55,7 @@ def compute(
     say = journal.starting if journal is not None else quiet
     threads = team(case.run.threads)
     if project:
-        threads.project()
+        threads.projecting = Projecting(case.run.threads)
     if comm.size > 1:
         preload(case)
     if restart:
@@ -149,7 +150,7 @@ def _announce(sim: Simulation, journal: Journal | None, setup: float) -> None:
 def _sharing(sim: Simulation) -> Sharing | None:
     """Of what regions are made on this rank, where that was asked for."""
     made = team(sim.case.run.threads).projecting
-    if made is None:
+    if not isinstance(made, Projecting):
         return None
     costs = made.costs
     return Sharing(

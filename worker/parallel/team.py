@@ -15,16 +15,13 @@ waker some 20 us, so the asking thread wakes one or two, and whoever is woken wa
 import ctypes
 import threading
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
 from ..jit import Kernel, njit
 from ..state import Ints
 from .words import SECOND, TASK, add, call_task, load, now, sched_yield, sem_post, sem_wait, swap, word_at
-
-if TYPE_CHECKING:
-    from .projecting import Projecting
 
 __all__ = ["TASK", "Team", "team"]
 
@@ -127,12 +124,26 @@ def _alone(job, kernel, table, tasks):  # type: ignore[no-untyped-def]
     job[_WITHIN] += now(job, _CLOCK) - begin
 
 
+class Timed(Protocol):
+    """Does tasks one after the other, and adds up what ``crews``, teams of so many threads, would take."""
+
+    crews: list[int]
+
+    @property
+    def spans(self) -> list[float]:
+        """What each crew would have taken for all regions so far, s."""
+
+    def run(self, kernel: Kernel, table: int, tasks: Ints, starts: Ints) -> int:
+        """As ``Team.run``; the CPU time that it has taken, ns."""
+
+
 class Team:
     """So many threads, this one among them; they are there until the process ends: see ``team``."""
 
     def __init__(self, threads: int) -> None:
         self.threads = threads
-        self.projecting: Projecting | None = None
+        self.projecting: Timed | None = None
+        """Who does all tasks instead of the threads, where they are to be timed."""
         size = _THREADS + _LINE * threads
         room = np.zeros(size + _LINE, np.int64)
         self._job: Ints = room[-(room.ctypes.data // room.itemsize) % _LINE :][:size]
@@ -143,14 +154,6 @@ class Team:
         for thread in range(1, threads):
             arguments = self._job, self._semaphore, thread
             threading.Thread(target=_help, args=arguments, name=f"helper {thread}", daemon=True).start()
-
-    def project(self) -> None:
-        """From now on tasks are done one after the other, and what this team would take, and smaller ones, is added up
-        in ``projecting``.
-        """
-        from .projecting import Projecting
-
-        self.projecting = Projecting(self.threads)
 
     @property
     def within(self) -> float:
