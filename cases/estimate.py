@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .bodies import MeshFile
+from .clock_time import ClockTime, clock_time
 from .geometry import bounds
 from .impact import driven_together, impact_speeds, wave_speed
 from .library import material
@@ -85,6 +86,8 @@ class Estimate:
     """Of all ranks together, while nothing breaks."""
     core_seconds: float | None
     """CPU time of all ranks together, s."""
+    clock: ClockTime | None
+    """What its ranks and threads take by the clock."""
     costs: dict[str, float]
     """What of it each stage of the case takes (cases/stages.py), s; empty where it is not known. What breaks costs
     more: nobody knows before how much."""
@@ -111,6 +114,7 @@ def estimate(case: Case, folder: Path | None = None, survey: Survey = Survey()) 
     mean = _least(shrunk)
     steps = None if mean is None else min(math.ceil(case.run.end_time / mean), case.run.max_steps)
     costs = _costs(case, parts, steps, sum(found.faces for found in survey.parts))
+    breaking = _breaking(case, parts, steps) if costs else 0.0
     return Estimate(
         elements=_total([part.elements for part in parts]),
         nodes=_total([part.nodes for part in parts]),
@@ -118,8 +122,9 @@ def estimate(case: Case, folder: Path | None = None, survey: Survey = Survey()) 
         steps=steps,
         memory_bytes=_memory(case, parts),
         core_seconds=sum(costs.values()) if costs else None,
+        clock=clock_time(case, costs, breaking) if costs else None,
         costs=costs,
-        breaking=_breaking(case, parts, steps) if costs else 0.0,
+        breaking=breaking,
         dust_bytes=DUST_BYTES * _tets_that_break(case, parts),
         parts=parts,
     )

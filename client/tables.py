@@ -132,9 +132,24 @@ def estimate_table(case: Case, expected: Estimate) -> Table:
         "steps": _about(expected.steps, count),
         "memory": _up_to(expected.memory_bytes, expected.dust_bytes, size),
         "core time": _up_to(expected.core_seconds, expected.breaking, duration, "what breaks becomes dust"),
+        "clock time": _clock(case, expected),
         "of which": ", ".join(f"{name} {percent(seconds / total, 0)}" for name, seconds in shares),
         "without": ", ".join(without(case)),
     })  # fmt: skip
+
+
+def _clock(case: Case, expected: Estimate) -> str:
+    """What ranks and threads take, with what is assumed of them."""
+    clock, run = expected.clock, case.run
+    if clock is None:
+        return UNKNOWN
+    took = _up_to(clock.seconds, clock.breaking, duration, "what breaks becomes dust")
+    assumed = [f"ranks {percent(clock.ranks, 0)} efficient"] if run.ranks > 1 else []
+    if run.threads > 1:
+        assumed.append(
+            f"threads share {percent(clock.shared, 0)} of the core time, {percent(clock.threads, 0)} efficient"
+        )
+    return f"{took}, on {crew(run.ranks, run.threads)}{'; assumed: ' if assumed else ''}{', '.join(assumed)}"
 
 
 def _up_to(

@@ -162,7 +162,8 @@ def _time(case: Case, caps: Limits) -> Iterator[Problem]:
 
 
 def figures(estimate: Estimate) -> dict[str, int | float]:
-    """The numbers of an estimate that are known: elements, nodes, dt, steps, memory_bytes, core_seconds; dust_bytes
+    """The numbers of an estimate that are known: elements, nodes, dt, steps, memory_bytes, core_seconds, seconds
+    by the clock; dust_bytes
     where something may break.
     """
     values = {
@@ -172,6 +173,7 @@ def figures(estimate: Estimate) -> dict[str, int | float]:
         "steps": estimate.steps,
         "memory_bytes": estimate.memory_bytes,
         "core_seconds": estimate.core_seconds,
+        "seconds": None if estimate.clock is None else estimate.clock.seconds,
         "dust_bytes": estimate.dust_bytes or None,
     }
     return {name: value for name, value in values.items() if value is not None}

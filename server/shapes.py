@@ -38,7 +38,9 @@ class Problem(msgspec.Struct, kw_only=True, omit_defaults=True):
 
 
 class Receipt(msgspec.Struct, kw_only=True):
-    """What a submitter is told; estimate: elements, nodes, dt, steps, memory_bytes, core_seconds where known."""
+    """What a submitter is told; estimate: elements, nodes, dt, steps, memory_bytes, core_seconds, seconds by the clock
+    where known.
+    """
 
     id: str
     owner: str

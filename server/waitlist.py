@@ -127,7 +127,7 @@ def need_of(made: Submission, grace: float, room: float = math.inf) -> Need:
     """What a submission asks for; ``grace``: s after its limit at which the run is ended by force at the latest. Bodies
     that may break take memory as if they were dust, but for a run that would not fit into ``room``, bytes, for that.
     """
-    seconds = made.estimate.get("core_seconds", 0.0) / made.cores
+    seconds = made.estimate.get("seconds", made.estimate.get("core_seconds", 0.0) / made.cores)
     limit = math.inf if made.wall_time is None else made.wall_time + 2.0 * grace
     whole = float(made.estimate.get("memory_bytes", 0.0))
     memory = max(whole, min(whole + made.estimate.get("dust_bytes", 0.0), room))
