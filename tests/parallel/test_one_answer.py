@@ -14,8 +14,8 @@ from conoid.cases.outcome import Outcome, from_json
 from .launching import command, ended, together
 
 RANKS = (2, 3, 4, 7)
-QUICK = (2, 3)
-"""Numbers of ranks at which the scene of everything is compared in seconds; the rest is a drill."""
+QUICK = 3
+"""Ranks on which the scenes of this folder are compared with one in seconds; the rest is a drill."""
 SHORT = {
     "bar_on_bar": "3 us",
     "branching_plate": "9 us",
@@ -192,7 +192,7 @@ TETS = {"two_tets": 2, "breathing_facet": 2}
 
 def slowly(name: str, ranks: int = 1) -> list[pytest.MarkDecorator]:
     """The marks of a comparison."""
-    return [] if name in SCENES and ranks in (1, *QUICK) else [pytest.mark.slow]
+    return [] if name in SCENES and ranks in (1, QUICK) else [pytest.mark.slow]
 
 
 def test_every_shipped_case_is_here() -> None:
@@ -249,5 +249,5 @@ def test_other_runs_have_other_digests(answers: Answers) -> None:
 def test_the_answer_is_the_same_again(answers: Answers, tmp_path: Path) -> None:
     """Twice the same run, started by the plain command line."""
     (tmp_path / "everything.toml").write_text(everything(), encoding="utf-8")
-    assert ended(command(2, *arguments(EVERYTHING[0], tmp_path / "again"))).returncode == 0
-    assert outcome(tmp_path / "again" / EVERYTHING[0]).digest == outcome(answers(2, EVERYTHING[0])).digest
+    assert ended(command(QUICK, *arguments(EVERYTHING[0], tmp_path / "again"))).returncode == 0
+    assert outcome(tmp_path / "again" / EVERYTHING[0]).digest == outcome(answers(QUICK, EVERYTHING[0])).digest

@@ -1,6 +1,7 @@
 """Servers to test: one in this process, one of its own, both with a worker that computes nothing."""
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -13,15 +14,36 @@ from conoid.server.tokens import create_token
 from .running import FAKE, MakeProcess, Running, User, processes
 
 
-@pytest.fixture
-def settings(tmp_path: Path) -> Settings:
+def settings_in(place: Path) -> Settings:
+    """Of a server whose runs lie below ``place``."""
     return Settings(
-        runs=tmp_path / "runs", port=0, zenoh_port=None, slots=2, worker=FAKE, grace=0.5, caps=Caps(free_disk=0)
+        runs=place / "runs", port=0, zenoh_port=None, slots=2, worker=FAKE, grace=0.5, caps=Caps(free_disk=0)
     )
 
 
 @pytest.fixture
+def settings(tmp_path: Path) -> Settings:
+    return settings_in(tmp_path)
+
+
+@pytest.fixture
 def server(settings: Settings) -> Iterator[Running]:
+    with running(settings) as made:
+        yield made
+
+
+@pytest.fixture(scope="module")
+def ended(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Running, str]]:
+    """A server, and a run of two ranks that has ended; for tests that only read, or put back what they change."""
+    with running(settings_in(tmp_path_factory.mktemp("ended"))) as made:
+        run = made.ann.submit(ranks=2)
+        made.ann.wait_for(run)
+        yield made, run
+
+
+@contextmanager
+def running(settings: Settings) -> Iterator[Running]:
+    """A server in this process; no worker outlives it."""
     with opened(settings) as service, TestClient(build_app(service), base_url="http://127.0.0.1") as client:
         users = []
         for name in ("ann", "bob"):

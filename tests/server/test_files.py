@@ -4,7 +4,9 @@ import asyncio
 import base64
 import hashlib
 import os
+import shutil
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -42,15 +44,24 @@ OUTSIDE = [
 
 
 @pytest.fixture
-def run(server: Running) -> str:
-    made = server.ann.submit(ranks=2)
-    server.ann.wait_for(made)
-    return made
+def server(ended: tuple[Running, str]) -> Running:
+    return ended[0]
 
 
 @pytest.fixture
-def folder(server: Running, run: str) -> Path:
-    return server.service.settings.runs / run
+def run(ended: tuple[Running, str], folder: Path) -> str:
+    return ended[1]
+
+
+@pytest.fixture
+def folder(ended: tuple[Running, str], tmp_path: Path) -> Iterator[Path]:
+    """Of the run; as it was before, when a test ends."""
+    server, run = ended
+    path = server.service.settings.runs / run
+    kept = shutil.copytree(path, tmp_path / "kept")
+    yield path
+    shutil.rmtree(path)
+    shutil.copytree(kept, path)
 
 
 def test_the_listing(server: Running, run: str, folder: Path) -> None:

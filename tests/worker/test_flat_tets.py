@@ -1,5 +1,7 @@
 """Flat tets with averaged pressures: they resist as in the standard form, and nothing else knows of them."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -39,6 +41,7 @@ def flattened(cells: tuple[int, int, int], aspect: float, seed: int = 1) -> tupl
     raise AssertionError("no node can come down")
 
 
+@cache
 def lowest(form: Form, aspect: float, speed: float, seed: int) -> tuple[float, float]:
     """Smallest volume over the initial one of the flat tet of a copper block against a wall; the worst residual."""
     mesh, flat = flattened((4, 4, 4), aspect, seed)
