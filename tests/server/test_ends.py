@@ -107,5 +107,5 @@ def test_a_run_that_never_started_has_no_numbers(server: Running, tmp_path: Path
     server.ann.http.post(f"/v1/runs/{waits}:cancel")
     ended = server.ann.wait_for(waits)["outcome"]
     known = {name for name, value in ended.items() if value not in (None, [], {})}
-    assert known == {"state", "cause", "message", "ranks", "digest"}
+    assert known == {"state", "cause", "message", "ranks", "threads", "digest"}
     go.touch()

@@ -79,6 +79,7 @@ def test_a_header_that_comes_a_byte_at_a_time_is_read_in_few_pieces(ann: User, m
         read(self, data)
 
     monkeypatch.setattr(H11Protocol, "data_received", noted)
+    monkeypatch.setattr(connections, "HEADER", PATIENCE)
     began = time.monotonic()
     with knock(ann) as one:
         one.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
