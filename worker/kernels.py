@@ -78,11 +78,17 @@ def kernel_files(root: Path) -> list[Path]:
 def imported(path: Path) -> list[Path]:
     """Files that ``path`` imports relatively at its top level: what a kernel can see."""
     files = []
-    for node in ast.parse(path.read_text(encoding="utf-8")).body:
-        if isinstance(node, ast.ImportFrom) and node.level > 0:
-            base = path.parents[node.level - 1].joinpath(*(node.module or "").split("."))
-            files += [base.with_suffix(".py"), *((base / alias.name).with_suffix(".py") for alias in node.names)]
+    for level, module, names in _imports(path.read_text(encoding="utf-8")):
+        base = path.parents[level - 1].joinpath(*module.split("."))
+        files += [base.with_suffix(".py"), *((base / name).with_suffix(".py") for name in names)]
     return [file for file in files if file.is_file()]
+
+
+@cache
+def _imports(text: str) -> list[tuple[int, str, list[str]]]:
+    """Level, module and names of each relative import at the top level of a source; each source is parsed once."""
+    found = [node for node in ast.parse(text).body if isinstance(node, ast.ImportFrom) and node.level > 0]
+    return [(node.level, node.module or "", [alias.name for alias in node.names]) for node in found]
 
 
 @cache
