@@ -8,7 +8,7 @@ report by report.
 
 A window is what lies between two reports of the worker; work is the CPU time of a rank but for its waiting. Within a
 window ranks are taken to wait for each other once, and no message is hidden behind work. Of a run whose tasks were
-timed one after the other (``--project`` of the worker) work is what a rank would take with so many threads.
+timed one after the other (``--use project`` of the worker) work is what a rank would take with so many threads.
 """
 
 import re

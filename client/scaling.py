@@ -120,7 +120,7 @@ def _run(case: Path, trial: Trial, overrides: Sequence[str], folder: Path, secon
     (folder / layout.LOGS).mkdir(parents=True)
     command = [*mpiexec(), "-n", str(trial.ranks), sys.executable, "-m", "mpi4py", "-m", "conoid.worker", str(case)]
     words = [word for change in trial.changes(overrides) for word in ("--set", change)]
-    words += ["--project"] if trial.by_tasks else []
+    words += ["--use", "project" if trial.by_tasks else "all"]
     crowded = {"MPIR_CVAR_ENABLE_HEAVY_YIELD": "1"} if trial.ranks > CORES else {}
     with (folder / layout.LOGS / layout.LAUNCHER_LOG).open("wb") as log:
         child = subprocess.Popen(

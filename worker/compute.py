@@ -32,6 +32,7 @@ from .migration.route import route
 from .output import rewind
 from .output.history import History
 from .output.journal import Journal
+from .parallel.choice import Choice
 from .parallel.comm import Comm
 from .parallel.projecting import Projecting
 from .parallel.team import team
@@ -40,21 +41,24 @@ from .signals import Signals
 from .simulation import Simulation
 from .timers import Timers, by_phase
 
+CHOSEN, ALL, PROJECT = "chosen", "all", "project"
+"""What is done with the threads of a rank."""
+
 log = logging.getLogger("conoid.worker")
 
 
 def compute(
     case: Case, meshes: Path, folder: Path, comm: Comm, journal: Journal | None, signals: Signals, began: float,
-    restart: bool, project: bool = False,
+    restart: bool, use: str = CHOSEN,
 ) -> Outcome:  # fmt: skip
     """Runs the case in ``folder`` on all ranks; relative mesh paths start at ``meshes``.
 
-    With ``restart`` from the latest checkpoint that is there; with ``project`` on one thread, and what more would take
-    is in the outcome. Raises ConoidError.
+    With ``restart`` from the latest checkpoint that is there. ``use`` of the threads: CHOSEN, as many
+    as make it faster; ALL; PROJECT, one, and what more would take is in the outcome. Raises ConoidError.
     """
     say = journal.starting if journal is not None else quiet
     threads = team(case.run.threads)
-    if project:
+    if use == PROJECT:
         threads.projecting = Projecting(case.run.threads)
     if comm.size > 1:
         preload(case)
@@ -74,6 +78,8 @@ def compute(
     setup = time.monotonic() - began
     _announce(sim, journal, setup)
     loop = Loop(sim, folder, journal, history, signals, Balance.of(sim), start)
+    if use == CHOSEN and threads.threads > 1:
+        loop.choice = Choice(threads)
     cpu = cpu_time() + threads.helped
     failure = None
     try:

@@ -25,6 +25,7 @@ from .output.damage import damage
 from .output.history import History
 from .output.journal import Journal
 from .output.losses import Losses
+from .parallel.choice import Choice
 from .signals import Signals
 from .simulation import Simulation
 from .snapshots.stage import Snapshots
@@ -117,6 +118,8 @@ class Loop:
         self._groups = Groups(sim, balance.trigger.cost)
         self.snapshots = Snapshots(sim, folder, journal)
         self._losses = Losses(folder) if journal is not None else None
+        self.choice: Choice | None = None
+        """Of the threads of this rank; None: all are used."""
 
     def run(self) -> None:
         """Steps until the end time, or until a reason to stop. Raises PhysicsError."""
@@ -144,6 +147,8 @@ class Loop:
                 return
             self.updates += sim.model.elements_global
             step.second_half(sim)
+            if self.choice is not None and (said := self.choice.step()):
+                self._tell(messages.Log, level="info", text=said)
 
     def _first_half(self) -> None:
         sim, clock = self.sim, self.sim.clock

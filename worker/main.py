@@ -146,8 +146,9 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("--ranks", type=int, help="end at once when MPI has started another number of ranks")
     parser.add_argument("--threads", type=int, help="of each rank; run.threads of the case when absent")
     parser.add_argument(
-        "--project", action="store_true",
-        help="time the tasks of regions one after the other, on one thread, and say what 2, 4, ... threads would take",
+        "--use", choices=("chosen", "all", "project"), default="chosen",
+        help="of the threads: as many as make the run faster; all; one, which times each task and says what more would "
+        "take (default: chosen)",
     )  # fmt: skip
     parser.add_argument(
         "--interruptible", action="store_true",
@@ -212,7 +213,7 @@ def _compute(
     from . import compute
 
     meshes = Path(options.case).resolve().parent
-    return compute.compute(case, meshes, options.out, comm, journal, signals, began, options.restart, options.project)
+    return compute.compute(case, meshes, options.out, comm, journal, signals, began, options.restart, options.use)
 
 
 def ready_kernels(comm: Comm, journal: Journal | None) -> None:

@@ -111,7 +111,7 @@ class Timers:
         spent.cpu[ended] += cpu - idle
         spent.parallel[ended] += within
         spent.serial[ended] += wall - within - idle
-        if self._spans:
+        if self.spent.projected:
             self._project(ended, cpu - idle - within)
         if idle:
             spent.cpu["exchange"] += idle

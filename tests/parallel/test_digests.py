@@ -47,7 +47,7 @@ def arguments(name: str, place: Path, threads: int) -> list[str]:
     else:
         case = str(place / "shattering.toml")
         words += [f"numerics.pressure={form}", *(f"parts[{k}].fracture.{each}" for k in (0, 1) for each in AT_ONCE)]
-    return [case, *(word for change in words for word in ("--set", change)), "--out", str(place / name)]
+    return [case, *(word for change in words for word in ("--set", change)), "--out", str(place / name), "--use", "all"]
 
 
 def ended(place: Path, ranks: int, threads: int) -> dict[str, str]:

@@ -78,6 +78,14 @@ def test_a_run_waits_with_a_reason_runs_and_is_cancelled(site: Site, tmp_path: P
     assert record["accounting"]["NodeList"] == site.cluster.host
 
 
+def test_a_job_asks_for_a_core_for_each_thread_of_each_rank(site: Site) -> None:
+    run = site.submit(case_text(ranks=2, threads=3))
+    told = site.cluster.command("scontrol", "show", "job", job_of(site, run).job)
+    assert {"NumTasks=2", "CPUs/Task=3"} <= set(told.split())
+    site.ann.http.post(f"/v1/runs/{run}:cancel")
+    site.ended(run)
+
+
 def test_a_job_that_slurm_refuses_fails_at_once_with_its_words(site: Site) -> None:
     ended = site.ended(site.submit(case_text(), "wrong"))
     assert (ended["state"], ended["cause"]) == ("failed", "launch")
@@ -232,12 +240,13 @@ def test_a_controller_that_hangs_makes_no_second_job(site: Site) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("profile", ["standard", "pmi2"])
-def test_two_ranks_by_both_launchers(solver: Site, profile: str) -> None:
-    run = solver.submit(with_ranks(2), profile)
+@pytest.mark.parametrize(("profile", "ranks", "threads"), [("standard", 2, 1), ("pmi2", 2, 1), ("pmi2", 1, 2)])
+def test_ranks_and_threads_by_both_launchers(solver: Site, profile: str, ranks: int, threads: int) -> None:
+    run = solver.submit(with_ranks(ranks, threads=threads), profile)
     ended = solver.ended(run, 300.0)
     assert ended["state"] == "succeeded", (ended["message"], solver.tail(run))
-    assert (ended["outcome"]["ranks"], ended["outcome"]["digest"][:16]) == (2, DIGEST)
+    taken = ended["outcome"]
+    assert (taken["ranks"], taken["threads"], taken["digest"][:16]) == (ranks, threads, DIGEST)
 
 
 class Heard:
@@ -340,11 +349,13 @@ def test_a_run_that_reaches_the_time_limit_goes_on_to_the_same_digest(solver: Si
     assert len(solver.jobs(run)) == 1
 
 
-def with_ranks(ranks: int, end_time: str = "1.5 us") -> str:
-    """The breaking case with so many ranks, to another end."""
+def with_ranks(ranks: int, end_time: str = "1.5 us", threads: int = 1) -> str:
+    """The breaking case with so many ranks and threads, to another end."""
     text = BREAKING.read_text()
     assert '[run]\nend_time = "1.5 us"\n' in text
-    return text.replace('[run]\nend_time = "1.5 us"\n', f'[run]\nranks = {ranks}\nend_time = "{end_time}"\n')
+    return text.replace(
+        '[run]\nend_time = "1.5 us"\n', f'[run]\nranks = {ranks}\nthreads = {threads}\nend_time = "{end_time}"\n'
+    )
 
 
 def await_progress(solver: Site, run: str) -> None:

@@ -91,10 +91,10 @@ def _timed(clock, kernel, table, tasks, starts, costs, crews, free, spans):  # t
 class Projecting:
     """Does the tasks of regions one after the other, and adds up what crews would take."""
 
-    def __init__(self, threads: int) -> None:
-        """``threads``: of the largest crew."""
+    def __init__(self, threads: int, costs: Costs | None = None) -> None:
+        """``threads``: of the largest crew; ``costs`` are measured where they are not known."""
         self.crews = crews_of(threads)
-        self.costs = measured()
+        self.costs = costs or measured()
         self.regions = self.colours = self.tasks = 0
         self._crews = np.array(self.crews)
         self._costs = np.array([self.costs.turn, self.costs.call, self.costs.wake])

@@ -156,6 +156,15 @@ class Team:
             threading.Thread(target=_help, args=arguments, name=f"helper {thread}", daemon=True).start()
 
     @property
+    def most(self) -> int:
+        """How many of the threads may work."""
+        return int(self._words[_MOST])
+
+    @most.setter
+    def most(self, threads: int) -> None:
+        self._words[_MOST] = threads
+
+    @property
     def within(self) -> float:
         """How long ``run`` has taken so far, by the clock, s: what more threads could share."""
         return int(self._words[_WITHIN]) / SECOND
@@ -171,7 +180,7 @@ class Team:
         """
         if self.projecting is not None:
             self._words[_WITHIN] += self.projecting.run(kernel, table, tasks, starts)
-        elif self.threads == 1:
+        elif self._words[_MOST] == 1:
             _alone(self._job, kernel.address, table, tasks)
         else:
             _ask(self._job, self._semaphore, kernel.address, table, tasks.ctypes.data, starts)

@@ -1,0 +1,79 @@
+"""A rank uses as many of its threads as make its regions shorter, and says once where that is fewer."""
+
+import numpy as np
+import pytest
+
+from conoid.worker.jit import njit, types
+from conoid.worker.parallel import choice, projecting
+from conoid.worker.parallel.arguments import Arguments, reader
+from conoid.worker.parallel.choice import Choice, best_crew
+from conoid.worker.parallel.projecting import Costs
+from conoid.worker.parallel.team import TASK, Team
+
+KINDS = (types.int64[::1],)
+_counts = reader(*KINDS)
+
+
+@njit(TASK, cache=False)
+def count(table, first, end, thread):  # type: ignore[no-untyped-def]
+    """Counts each number of its range."""
+    (done,) = _counts(table)
+    for k in range(first, end):
+        done[k] += 1
+
+
+@pytest.mark.parametrize(
+    ("spans", "threads"), [([8.0, 4.0, 2.0, 1.0], 16), ([8.0, 8.5, 9.0, 9.5], 1), ([8.0, 4.1, 4.05, 4.04], 2),
+                           ([8.0, 8.1, 7.0, 6.9], 8)],
+)  # fmt: skip
+def test_more_threads_are_taken_where_they_are_worth_it(spans: list[float], threads: int) -> None:
+    assert best_crew([1, 2, 8, 16], spans) == threads
+
+
+def steps(team: Team, chosen: Choice, number: int) -> tuple[list[str], "np.ndarray"]:
+    """What is said in so many steps of a region of twelve tasks, and how often each was done."""
+    done, table = np.zeros(120_000, np.int64), Arguments(*KINDS)
+    tasks = np.column_stack([np.arange(0, 120_000, 10_000), np.arange(10_000, 130_000, 10_000)])
+    said = []
+    for _ in range(number):
+        team.run(count, table.set(done), tasks, np.array([0, 12]))
+        said.append(chosen.step())
+    return [text for text in said if text], done
+
+
+def test_a_scene_that_is_too_small_is_told_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(projecting, "measured", lambda: Costs(turn=10**8, call=0, wake=10**7))
+    monkeypatch.setattr(choice, "_AGAIN", 0.0)
+    team = Team(4)
+    said, done = steps(team, Choice(team), 40)
+    assert len(said) == 1
+    assert said[0].startswith("the scene is too small for 4 threads: 1 are used. A colour has 12.0 tasks of ")
+    assert "to share one costs 100 ms, to wake a thread 10.0 ms" in said[0]
+    assert team.most == 1
+    assert (done == 40).all()
+
+
+def test_a_scene_that_is_large_enough_keeps_its_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(projecting, "measured", lambda: Costs(turn=0, call=0, wake=0))
+    team = Team(4)
+    chosen = Choice(team)
+    said, done = steps(team, chosen, 40)
+    assert said == []
+    assert (team.most, team.projecting) == (4, None)
+    assert (done == 40).all()
+
+
+def test_few_threads_are_tried_again_and_all_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    costs = [Costs(turn=10**8, call=0, wake=0)]
+    monkeypatch.setattr(projecting, "measured", lambda: costs[0])
+    monkeypatch.setattr(choice, "_AGAIN", 0.0)
+    team = Team(4)
+    chosen = Choice(team)
+    steps(team, chosen, 20)
+    assert team.most == 1
+    while team.projecting is not None:
+        steps(team, chosen, 1)
+    chosen._costs = None  # as where there is more to do in a region
+    costs[0] = Costs(turn=0, call=0, wake=0)
+    steps(team, chosen, 30)
+    assert team.most == 4
