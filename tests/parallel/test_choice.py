@@ -47,7 +47,7 @@ def test_a_scene_that_is_too_small_is_told_once(monkeypatch: pytest.MonkeyPatch)
     team = Team(4)
     said, done = steps(team, Choice(team), 40)
     assert len(said) == 1
-    assert said[0].startswith("the scene is too small for 4 threads: 1 are used. A colour has 12.0 tasks of ")
+    assert said[0].startswith("the scene is too small for 4 threads and uses 1. A colour has 12.0 tasks of ")
     assert "to share one costs 100 ms, to wake a thread 10.0 ms" in said[0]
     assert team.most == 1
     assert (done == 40).all()
