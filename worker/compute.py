@@ -57,9 +57,9 @@ def compute(
     as make it faster; ALL; PROJECT, one, and what more would take is in the outcome. Raises ConoidError.
     """
     say = journal.starting if journal is not None else quiet
-    threads = team(case.run.threads)
-    if use == PROJECT:
-        threads.projecting = Projecting(case.run.threads)
+    threads = team(case.run.threads)  # of a process that may have had other runs
+    threads.most = threads.threads
+    threads.projecting = Projecting(threads.threads) if use == PROJECT else None
     if comm.size > 1:
         preload(case)
     if restart:
