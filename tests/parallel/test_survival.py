@@ -79,19 +79,23 @@ def must_be_one(whole: Path, other: Path) -> None:
     assert numbers == list(range(1, len(numbers) + 1))
 
 
-def go(words: Sequence[str], legs: Sequence[tuple[int, int]]) -> None:
-    """Runs a case in legs (ranks, the step before which to stop); the last leg should reach the end."""
-    for k, (ranks, last) in enumerate(legs):
-        again = ["--restart"] if k else []
-        launched = ended(command(ranks, str(last), *words, *again, module=[str(STOPPING)]))
+Leg = tuple[int, int, int]
+"""Ranks, threads, and the step before which to stop."""
+
+
+def go(words: Sequence[str], legs: Sequence[Leg]) -> None:
+    """Runs a case in legs; the last one should reach the end."""
+    for k, (ranks, threads, last) in enumerate(legs):
+        more = ["--threads", str(threads), "--use", "all", *(["--restart"] if k else [])]
+        launched = ended(command(ranks, str(last), *words, *more, module=[str(STOPPING)]))
         assert launched.returncode == (0 if last > 10**6 else 4), launched.stdout + launched.stderr
 
 
-def sample(seed: int, legs: int, steps: int) -> list[tuple[int, int]]:
-    """Random ranks and steps."""
+def sample(seed: int, legs: int, steps: int) -> list[Leg]:
+    """Random ranks, threads and steps."""
     draw = random.Random(seed)
     stops = sorted(draw.sample(range(2, steps), legs - 1))
-    return [(draw.choice([1, 2, 3, 4, 7]), stop) for stop in [*stops, 10**9]]
+    return [(draw.choice([1, 2, 3, 4, 7]), draw.choice([1, 2, 3]), stop) for stop in [*stops, 10**9]]
 
 
 @pytest.mark.parametrize(
@@ -129,7 +133,7 @@ def test_triggers_change_no_bit(policy: str, whole: Made, tmp_path: Path) -> Non
         assert outcome(tmp_path / "instant").rebalances
 
 
-FIXED = [(2, 11), (3, 24), (1, 10**9)]
+FIXED = [(2, 2, 11), (3, 1, 24), (1, 3, 10**9)]
 
 
 @pytest.mark.parametrize(
@@ -143,11 +147,11 @@ FIXED = [(2, 11), (3, 24), (1, 10**9)]
         ),
     ],
 )
-def test_a_run_goes_on_on_other_ranks(name: str, legs: list[tuple[int, int]], whole: Made, tmp_path: Path) -> None:
+def test_a_run_goes_on_on_other_ranks(name: str, legs: list[Leg], whole: Made, tmp_path: Path) -> None:
     go(case(name, tmp_path, tmp_path), legs)
     must_be_one(whole(name), tmp_path / name)
     kept = [message for message in journal(tmp_path / name) if isinstance(message, Checkpoint)]
-    assert [message.step for message in kept] == [last for _, last in legs[:-1]]
+    assert [message.step for message in kept] == [last for *_, last in legs[:-1]]
 
 
 @pytest.mark.parametrize("kills", [2, pytest.param(50, marks=[pytest.mark.slow, pytest.mark.timeout(1200)])])
@@ -203,7 +207,7 @@ def test_what_cannot_go_on_says_why(tmp_path: Path) -> None:
     words = case("nodal", tmp_path, tmp_path)
     none = f"--restart: {tmp_path / 'nodal'} has no checkpoint that is whole: "
     assert refused(words) == f"{none}it has none"
-    go(words, [(1, 4)])
+    go(words, [(1, 1, 4)])
     assert refused([*words, "--set", "run.end_time=2 us"]) == (
         "run.end_time: differs from the case of the checkpoint, and --restart goes on with that one"
     )
