@@ -94,7 +94,8 @@ class Timers:
         for crew in projecting.crews if projecting is not None else ():
             self.spent.projected.setdefault(crew, _none())["rest"] = 0.0
         self._phase = "rest"
-        self._marks = cpu_time(), self._comm.waited, wall_time(), self._team.within
+        self._cpu, self._wall = cpu_time(), wall_time()
+        self._waited, self._within = self._comm.waited, self._team.within
         for each in (self.spent.cpu, self.spent.serial, self.spent.parallel):
             each["rest"] = 0.0
         self._reported, self._helped = self.spent.copy(), self._team.helped
@@ -105,18 +106,19 @@ class Timers:
 
     def switch(self, name: str) -> str:
         """Ends the present phase, which it returns, and begins another one."""
-        now = cpu_time(), self._comm.waited, wall_time(), self._team.within
-        cpu, idle, wall, within = (new - old for new, old in zip(now, self._marks, strict=True))
+        cpu, wall, waited, within = cpu_time(), wall_time(), self._comm.waited, self._team.within
         ended, spent = self._phase, self.spent
-        spent.cpu[ended] += cpu - idle
-        spent.parallel[ended] += within
-        spent.serial[ended] += wall - within - idle
-        if self.spent.projected:
-            self._project(ended, cpu - idle - within)
+        idle, inside = waited - self._waited, within - self._within
+        spent.cpu[ended] += cpu - self._cpu - idle
+        spent.serial[ended] += wall - self._wall - inside - idle
+        if inside:
+            spent.parallel[ended] += inside
         if idle:
             spent.cpu["exchange"] += idle
             spent.waiting += idle
-        self._phase, self._marks = name, now
+        if spent.projected:
+            self._project(ended, cpu - self._cpu - idle - inside)
+        self._phase, self._cpu, self._wall, self._waited, self._within = name, cpu, wall, waited, within
         return ended
 
     def _project(self, phase: str, serial: float) -> None:

@@ -167,7 +167,7 @@ class Team:
     @property
     def within(self) -> float:
         """How long ``run`` has taken so far, by the clock, s: what more threads could share."""
-        return int(self._words[_WITHIN]) / SECOND
+        return self._words[_WITHIN] / SECOND
 
     @property
     def helped(self) -> float:
