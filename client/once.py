@@ -8,6 +8,8 @@ from typing import Any
 from rich.console import Console
 
 from conoid.cases import fields
+from conoid.cases.cores import usable_cores
+from conoid.cases.figures import counted, crew
 from conoid.cases.load import material, parse_case
 from conoid.cases.outcome import Outcome
 from conoid.cases.run import ExitCode
@@ -19,6 +21,7 @@ from .console import PlainConsole, echo_json, one_line
 from .errors import UsageError
 from .live import Live, exit_code
 from .local import GRACE, LocalServer
+from .options import complain
 from .pictures import FIELDS, Drawn
 from .result import Result
 from .run import Run
@@ -55,6 +58,7 @@ def run_once(
         raise UsageError(f"field = {field!r}: no frame of {checked.name} has it; {allowed(field, there)}")
     out = PlainConsole(quiet=as_json)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+    _warn_of_cores(checked)
     server = LocalServer(runs, checked.run.cores)
     with ExitStack() as up:
         with silence.broken(out.print, lambda: "the server is starting"):
@@ -72,6 +76,14 @@ def run_once(
     if as_json:
         echo_json(_document(run.id, result, info, drawn))
     return _code(info, check)
+
+
+def _warn_of_cores(case: Case) -> None:
+    """Threads that take turns on a core make a run slower than fewer threads."""
+    run, there = case.run, usable_cores()
+    if run.cores > there:
+        wanted = f"{crew(run.ranks, run.threads)} want {counted(run.cores, 'core')}"
+        complain(f"warning: {wanted}, and there {'is' if there == 1 else 'are'} {there}: they take turns")
 
 
 def _follow(run: Run, case: Case, out: Console, plain: bool) -> tuple[RunInfo, set[str]]:

@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner, Result
 
+from conoid.cases.cores import usable_cores
 from conoid.cases.load import read_case, resolved_json, shipped_path
 from conoid.client.cli import app
 from conoid.client.local import LocalServer
@@ -273,6 +274,7 @@ def test_run_does_it_all_and_leaves_no_process(alone: Path) -> None:
     folders = [path for path in (alone / "runs").iterdir() if path.is_dir()]
     resolved = json.loads((folders[0] / "case.resolved.json").read_bytes())["run"]
     assert (resolved["ranks"], resolved["threads"]) == (2, 2)
+    assert ("2 ranks x 2 threads want 4 cores" in done.stderr) == (usable_cores() < 4)
     assert f"results    {folders[0]}" in done.stdout
     assert processes_of(alone / "runs") == []
     checked = conoid(*words, "--check", "--json")
