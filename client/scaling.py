@@ -90,7 +90,7 @@ def found(trial: Trial, folder: Path, layouts: Sequence[Layout], network: Networ
     place = folder / trial.folder
     if not trial.by_tasks:
         return [read(place, network)]
-    also = {2} if trial.ranks == 1 else set()  # beside two threads that are measured
+    also = {1, 2} if trial.ranks == 1 else set()  # to compare with, and beside two threads that are measured
     known = from_json((place / layout.OUTCOME).read_bytes()).projected
     asked = {threads for ranks, threads in layouts if ranks == trial.ranks and ranks * threads > CORES}
     return [read(place, network, threads) for threads in sorted((asked | also) & set(known))]

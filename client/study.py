@@ -29,8 +29,9 @@ class Study:
         return len({run.digest for run in self.runs}) == 1
 
     def speed_up(self, run: Projection) -> float:
-        """Projected."""
-        return self.runs[0].time / run.time
+        """Projected; of threads by their tasks, beside one by the same tasks: others have used the cores as much."""
+        alone = next((each for each in self.runs if each.by_tasks and each.cores == 1), self.runs[0])
+        return (alone if run.by_tasks else self.runs[0]).time / run.time
 
     def within(self, run: Projection) -> bool:
         """Whether there was a core for each thread, so that its wall time says something."""
@@ -134,8 +135,10 @@ def _by_tasks(study: Study) -> str:
     if study.error is None:
         return text
     told, was = study.error
-    off = percent(told.time / was.time - 1.0, 0)
-    return f"{text} Two threads take {fixed(told.time)} s so, and {fixed(was.time)} s when they are there: {off} off."
+    so, there = study.speed_up(told), study.speed_up(was)
+    off = percent(so / there - 1.0, 0)
+    told_so = f"Two threads are {fixed(so)} times as fast as one so, and {fixed(there)} times when they are there"
+    return f"{text} {told_so}: {off} off."
 
 
 def _serial(study: Study) -> list[str]:

@@ -266,6 +266,7 @@ def outcome_table(outcome: Outcome, told: Collection[str] = ()) -> Table:
         entries |= {
             "simulated": f"{si(outcome.time, 's')} in {counted(outcome.steps, 'step')}",
             "took": f"{duration(outcome.elapsed)} on {ranks}, {duration(setup)} to the first step",
+            "a step": _a_step(outcome),
             "model": f"{counted(outcome.elements, 'tet')}, {counted(outcome.nodes, 'node')}",
             "speed": "" if math.isnan(speed) else f"{large(speed)} element updates a CPU-second and core",
             "memory": f"{size(max(outcome.peak_memory))} in the largest rank" if outcome.peak_memory else "",
@@ -274,6 +275,21 @@ def outcome_table(outcome: Outcome, told: Collection[str] = ()) -> Table:
             "digest": outcome.digest[:16],
         }
     return pairs({**entries, "warnings": "\n".join(each for each in outcome.warnings if each not in told)})
+
+
+def _a_step(outcome: Outcome) -> str:
+    """What one thread does alone, and what threads share, of the rank that is alone for longest."""
+    alone, steps = [sum(each) for each in zip(*outcome.serial.values(), strict=True)], outcome.steps
+    if not alone or not steps:
+        return ""
+    rank = alone.index(max(alone))
+    shared = sum(each[rank] for each in outcome.parallel.values())
+    serial, regions = alike((alone[rank] / steps, shared / steps), "s")
+    told = f"{serial} by one thread alone, {regions} in what threads share"
+    if outcome.threads == 1 or not shared:
+        return told
+    busy = outcome.helped[rank] / ((outcome.threads - 1) * shared)
+    return f"{told}, in which the others are busy for {percent(busy, 0)}"
 
 
 def _compressed(met: Compressed) -> str:

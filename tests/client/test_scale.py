@@ -97,7 +97,9 @@ def test_a_projection_by_tasks_takes_the_work_of_so_many_threads() -> None:
     assert "10.0 regions a step, 3.0 colours a region, 4.0 tasks a colour" in text
     assert "off." not in text, "nothing was measured with two threads"
     two = to_markdown(study(one, two_threads(), by_tasks(2), run))
-    assert "Two threads take 5.00 s so, and 4.00 s when they are there: 25 % off." in two
+    assert "Two threads are 1.40 times as fast as one so, and 1.75 times when they are there: -20 % off." in two
+    alone = study(one, by_tasks(1), run)
+    assert (run.time, by_tasks(1).time, alone.speed_up(run)) == (3.5, 8.0, 8.0 / 3.5)
 
 
 def test_what_one_thread_does_alone_is_told_by_phase() -> None:
