@@ -14,7 +14,7 @@ from conoid.cases.load import CaseError
 from conoid.cases.loaded import loads
 from conoid.cases.run import ExitCode
 
-from . import benches, commands, converging, hard, reports, shelf, sweeping, tables, viewing
+from . import benches, commands, converging, hard, reports, shelf, sweeping, validated, viewing
 from .batch import batch_run
 from .console import echo, echo_json, one_line, prepare
 from .errors import ClientError
@@ -123,18 +123,18 @@ def validate(case: CaseArgument, overrides: Overrides = None, as_json: Json = Fa
     warn(odd)
     warned = f", {counted(len(odd), 'warning')}" if odd else ""
     show(f"{checked.name}: valid{warned}")
-    show(tables.parts_table(checked, expected))
+    show(validated.parts_table(checked, expected))
     if found.survey.parts:
         show("")
-        show(tables.files_table(checked, found.survey))
+        show(validated.files_table(checked, found.survey))
     if found.touching:
         show("")
-        show(tables.touching_table(checked, found.touching))
+        show(validated.touching_table(checked, found.touching))
     if acted_on := loads(checked, found.survey.loads):
         show("")
-        show(tables.loads_table(checked, acted_on))
+        show(validated.loads_table(checked, acted_on))
     show("")
-    show(tables.estimate_table(checked, expected))
+    show(validated.estimate_table(checked, expected))
 
 
 app.command(short_help="Hand a case to the server.")(commands.submit)

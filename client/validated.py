@@ -1,0 +1,124 @@
+"""What ``conoid validate`` prints of a case: its parts, files, loads, what touches, and what it will cost."""
+
+import math
+from collections.abc import Callable, Sequence
+
+from rich.table import Table
+
+from conoid.cases.bodies import MeshFile
+from conoid.cases.estimate import Estimate
+from conoid.cases.figures import UNKNOWN, alike, count, crew, duration, exact, percent, si, size, vectors
+from conoid.cases.library import material
+from conoid.cases.loaded import Load
+from conoid.cases.placed import Bulk
+from conoid.cases.schema import Boundary, Case, Traction
+from conoid.cases.stages import without
+from conoid.cases.survey import Survey
+from conoid.cases.touching import Touch
+
+from .tables import pairs, table
+
+
+def estimate_table(case: Case, expected: Estimate) -> Table:
+    """What a case needs, about; a dash where a mesh file does not tell. And what of it which stage takes."""
+    total = expected.core_seconds or 1.0
+    shares = sorted(expected.costs.items(), key=lambda cost: -cost[1])
+    return pairs({
+        "tets": _about(expected.elements, count),
+        "nodes": _about(expected.nodes, count),
+        "time step": _about(expected.dt, lambda value: si(value, "s")),
+        "steps": _about(expected.steps, count),
+        "memory": _up_to(expected.memory_bytes, expected.dust_bytes, size),
+        "core time": _up_to(expected.core_seconds, expected.breaking, duration, "what breaks becomes dust"),
+        "clock time": _clock(case, expected),
+        "of which": ", ".join(f"{name} {percent(seconds / total, 0)}" for name, seconds in shares),
+        "without": ", ".join(without(case)),
+    })  # fmt: skip
+
+
+def _clock(case: Case, expected: Estimate) -> str:
+    """What ranks and threads take, with what is assumed of them."""
+    clock, run = expected.clock, case.run
+    if clock is None:
+        return UNKNOWN
+    took = _up_to(clock.seconds, clock.breaking, duration, "what breaks becomes dust")
+    assumed = [f"ranks {percent(clock.ranks, 0)} efficient"] if run.ranks > 1 else []
+    if run.threads > 1:
+        assumed.append(
+            f"threads share {percent(clock.shared, 0)} of the core time, {percent(clock.threads, 0)} efficient"
+        )
+    return f"{took}, on {crew(run.ranks, run.threads)}{'; assumed: ' if assumed else ''}{', '.join(assumed)}"
+
+
+def _up_to(
+    value: float | None, more: float, shown: Callable[[float], str], when: str = "all that may break turns to dust"
+) -> str:
+    """What it takes, and what ``when`` bodies turn to dust, which takes so much ``more``."""
+    if value is None or not more:
+        return _about(value, shown)
+    return f"{_about(value, shown)}, up to {shown(value + more)} if {when}"
+
+
+def parts_table(case: Case, expected: Estimate) -> Table:
+    """What is modelled of each part, about: its size, and what it brings along at the start."""
+    right = ("tets", "mass", "extent", "momentum", "energy")
+    made = table("part", "material", *right, right=right, wide=("material",))
+    brought = _brings([each.bulk for each in expected.parts])
+    for part, each, bulk in zip(case.parts, expected.parts, brought, strict=True):
+        made.add_row(part.name, part.material, count(each.elements), *bulk)
+    return made
+
+
+def files_table(case: Case, survey: Survey) -> Table:
+    """What was read of mesh files: the volumes and the smallest altitude of a tet, which decides the time step."""
+    right = ("nodes", "volume", "smallest altitude")
+    made = table("part", "file", "group", *right, right=right, wide=("file",))
+    for each in survey.parts:
+        part = case.parts[each.part]
+        assert isinstance(part.mesh, MeshFile)
+        volume = exact(1e9 * each.mass / material(case, part.material).density, "mm^3")
+        group = part.mesh.group or "all tets"
+        made.add_row(part.name, part.mesh.path, group, count(each.nodes), volume, si(each.altitude, "m"))
+    return made
+
+
+def touching_table(case: Case, touches: Sequence[Touch]) -> Table:
+    """Which parts touch at the start; none of them are joined."""
+    made = table("parts that touch, not joined", "area", right=("area",), wide=("parts that touch, not joined",))
+    for touch in touches:
+        names = " and ".join(case.parts[i].name for i in (touch.one, touch.other))
+        made.add_row(names, _about(touch.area, lambda value: si(value, "m^2")))
+    return made
+
+
+def loads_table(case: Case, acted_on: Sequence[Load]) -> Table:
+    """What each traction and each prescribed velocity acts on, about, of what is modelled."""
+    columns = ("area", "faces", "nodes")
+    made = table("boundary", "acts by", *columns, right=columns, wide=("acts by",))
+    for load in acted_on:
+        area = _about(load.area, lambda value: si(value, "m^2"))
+        nodes = count(load.nodes) if load.nodes is not None and load.exact else _about(load.nodes, count)
+        acts = _acts(case.boundaries[load.boundary])
+        made.add_row(f"boundaries[{load.boundary}]", acts, area, _about(load.faces, count), nodes)
+    return made
+
+
+def _acts(spec: Boundary) -> str:
+    if isinstance(spec, Traction):
+        return f"pressure of {si(spec.pressure, 'Pa')}" if spec.pressure is not None else "stress"
+    return spec.kind
+
+
+def _brings(parts: Sequence[Bulk | None]) -> list[tuple[str, ...]]:
+    """Mass, extent, momentum and kinetic energy of each part; dashes where a mesh file does not tell."""
+    known = [bulk for bulk in parts if bulk is not None]
+    columns = (
+        alike([bulk.mass for bulk in known], "kg"), vectors([bulk.extent for bulk in known], "m", between=" x "),
+        alike([math.hypot(*bulk.momentum) for bulk in known], "N s"), alike([bulk.energy for bulk in known], "J"),
+    )  # fmt: skip
+    rows = zip(*columns, strict=True)
+    return [(UNKNOWN,) * len(columns) if bulk is None else next(rows) for bulk in parts]
+
+
+def _about(value: float | None, shown: Callable[[float], str]) -> str:
+    return "–" if value is None else f"about {shown(value)}"
