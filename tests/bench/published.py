@@ -35,7 +35,8 @@ PAPER = {
 
 def compared(study: Study) -> str:
     """The published speed-ups beside the projected ones, as Markdown. Raises KeyError for a case that has none."""
-    paper, projected = PAPER[study.case], {run.ranks: study.speed_up(run) for run in study.runs}
+    paper = PAPER[study.case]
+    projected = {run.ranks: study.speed_up(run) for run in study.runs if run.threads == 1 and not run.by_tasks}
     rows = []
     for ranks in sorted({*paper.speed_up, *projected} - {1}):
         cells = [f"{each[ranks]:.2f}" if ranks in each else "-" for each in (paper.speed_up, projected)]
