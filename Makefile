@@ -8,7 +8,8 @@
 #
 # Each target first brings .venv to the versions of requirements.lock, when that file or pyproject.toml has changed.
 # Kernels are compiled while pip installs what they do not need. Nothing takes 10 s without a word. What a worker, a server and
-# the command line import is kept as bytecode, also where the environment (that of many containers) lets nothing be kept.
+# the command line import is kept as bytecode, also where the environment (that of many containers) lets nothing be kept; before the
+# tests so are sources that have changed: else each of some hundred processes compiles them.
 
 PYTHON ?= $(firstword $(foreach name,python3.11 python3.12 python3.13 python3,$(shell command -v $(name))))
 BIN := .venv/bin
@@ -24,7 +25,7 @@ told = @echo "$(1)"; began=$$(date +%s); \
 	while sleep 5 >/dev/null 2>&1; do echo "$(1): $$(($$(date +%s) - began)) s"; done & clock=$$!; \
 	trap "kill $$clock" EXIT; $(2)
 
-.PHONY: demo test lint style types check check-solver check-services bench accuracy reference drill clean
+.PHONY: demo test lint style types check kept check-solver check-services bench accuracy reference drill clean
 .DEFAULT_GOAL := test
 
 demo: $(READY)
@@ -44,10 +45,13 @@ types: $(READY)
 
 check: check-solver check-services
 
-check-solver: $(READY)
+kept: $(READY)
+	@$(KEPT) -m compileall -q $(HOUSES)
+
+check-solver: kept
 	$(CHECK) $(SERVICES:%=--ignore=%) tests
 
-check-services: $(READY)
+check-services: kept
 	$(CHECK) $(SERVICES)
 
 bench: $(READY)
@@ -74,7 +78,7 @@ $(READY): requirements.lock pyproject.toml
 		&& $(PIP) -c requirements.lock --no-build-isolation -e ".[worker]")
 	$(call told,installing the rest,$(KEPT) -m conoid.worker.compile & kernels=$$!; \
 		$(PIP) --no-deps -r requirements.lock || { kill $$kernels; exit 1; }; wait $$kernels)
-	@$(KEPT) -c "import conoid.client.cli, conoid.server.serve"
+	@$(KEPT) -c "import conoid.client.cli, conoid.client.render, conoid.server.serve, matplotlib.pyplot, pandas"
 	@mkdir -p build/types/conoid
 	@for house in $(HOUSES); do ln -sfn ../../../$$house build/types/conoid/$$house; done
 	@touch $(READY)
