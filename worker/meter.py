@@ -42,7 +42,7 @@ class Meter:
     @classmethod
     def of(cls, sim: Simulation) -> Self:
         """Set at the present."""
-        return cls(sim.clock.step, dict(sim.timers.seconds), _on_parts(sim))
+        return cls(sim.clock.step, dict(sim.timers.seconds), on_parts(sim))
 
     def costs(self, sim: Simulation, effort: float) -> Costs:
         """What things cost when this rank has ``effort`` candidates; all ranks take part."""
@@ -51,7 +51,7 @@ class Meter:
             tets[block.part] = block.n
         spent = {name: (sim.timers.seconds[name] - self.seconds[name]) / steps for name in WORK}
         around = [spent["nodes"], effort, spent["contact"]]
-        mine = np.concatenate([(_on_parts(sim) - self.on_parts) / steps, tets, around])
+        mine = np.concatenate([(on_parts(sim) - self.on_parts) / steps, tets, around])
         ranks = np.array(sim.comm.share(mine))
         (on_tets, tets), on_nodes = ranks[:, :-3].sum(axis=0).reshape(2, -1), float(ranks[:, -3].sum())
         had, took = ranks[:, -2:].T
@@ -67,8 +67,9 @@ def _candidates(had: Floats, took: Floats) -> Floats:
     return np.asarray(np.clip(took / np.maximum(had, 1.0), mean / _FARTHEST, mean * _FARTHEST))
 
 
-def _on_parts(sim: Simulation) -> Floats:
-    seconds = np.zeros(len(sim.model.parts))
-    for block in sim.model.blocks:
-        seconds[block.part] = block.seconds
+def on_parts(sim: Simulation) -> Floats:
+    """(parts,) CPU time of the passes over the tets of each so far, s; that over one block alone is the phase."""
+    seconds, blocks = np.zeros(len(sim.model.parts)), sim.model.blocks
+    for block in blocks:
+        seconds[block.part] = block.seconds if len(blocks) > 1 else sim.timers.seconds["elements"]
     return seconds

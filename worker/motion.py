@@ -1,14 +1,11 @@
 """Nodes: forces to velocities, velocities to positions. Increments are added, positions never recomputed."""
 
-import numpy as np
-
-from .jit import Kernel, njit, types
+from .jit import njit, types
 from .parallel.arguments import Arguments, reader
+from .parallel.nodes import OverNodes
 from .parallel.team import TASK, Team
-from .state import Ints, Nodes
+from .state import Nodes
 
-_TASK = 4096
-"""Nodes a task. Chosen: 10 us of work, against 2 us that a region of threads costs."""
 _F, _F1, _F2 = types.float64, types.float64[::1], types.float64[:, ::1]
 _KICK = _F2, types.int64[:, ::1], _F1, _F1, _F, _F
 _MOVE = _F2, _F2, types.int64[:, ::1], _F1, _F, _F
@@ -34,6 +31,7 @@ def _move(table, begin, end, thread):  # type: ignore[no-untyped-def]
         for k in range(3):
             x[i, k] += dt * v[i, k]
             power += v[i, k] * force[i, k]
+            force[i, k] = 0
         stepping[i] -= shorter * power
 
 
@@ -41,28 +39,19 @@ class Leapfrog:
     """Moves the nodes of a rank, by the threads of its ``team``."""
 
     def __init__(self, team: Team) -> None:
-        self._team = team
+        self._nodes = OverNodes(team)
         self._of_kick, self._of_move = Arguments(*_KICK), Arguments(*_MOVE)
-        self._n, self._tasks = 0, _tasks(0)
 
     def kick(self, nodes: Nodes, impulse_quantum: float, shorter: float) -> None:
         """v(n-1/2) to v*(n+1/2); ``impulse_quantum`` is the mean step over the force scale, N s; ``shorter``: a quarter
         of what the step ahead is shorter than the one behind, over the force scale, for the account ``stepping``, J.
         """
         table = self._of_kick.set(nodes.v, nodes.force, nodes.mass, nodes.stepping, impulse_quantum, shorter)
-        self._run(_kick, table, nodes.n)
+        self._nodes.run(_kick, table, nodes.n)
 
     def move(self, nodes: Nodes, dt: float, shorter: float) -> None:
-        """x(n) to x(n+1), in a step ``dt``, s; ends the account that ``kick`` has begun, with the same f(n)."""
+        """x(n) to x(n+1), in a step ``dt``, s; ends the account that ``kick`` has begun, with the same f(n), and leaves
+        no force.
+        """
         table = self._of_move.set(nodes.x, nodes.v, nodes.force, nodes.stepping, dt, shorter)
-        self._run(_move, table, nodes.n)
-
-    def _run(self, kernel: Kernel, table: int, n: int) -> None:
-        if n != self._n:
-            self._n, self._tasks = n, _tasks(n)
-        self._team.run(kernel, table, *self._tasks)
-
-
-def _tasks(n: int) -> tuple[Ints, Ints]:
-    first = np.arange(0, n, _TASK)
-    return np.column_stack([first, np.minimum(first + _TASK, n)]), np.array([0, len(first)])
+        self._nodes.run(_move, table, nodes.n)

@@ -237,7 +237,7 @@ class Block:
     life: Floats = field(default_factory=lambda: np.zeros(5))
     """What a tet lives through (elements/wear.py)."""
     seconds: float = 0.0
-    """CPU time of the passes over the block so far."""
+    """CPU time of the passes over the block so far, where a rank has several."""
     group: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
     """(n,) see Model.groups; (0,) where nobody asks."""
     moved: int = 0
@@ -250,6 +250,13 @@ class Block:
         """Number of chunks."""
         return -(-self.n // CHUNK)
 
+    def __post_init__(self) -> None:
+        """The state is the same array for good."""
+        self.flat_state: Floats = self.state.reshape(-1)
+        """All of the state in one row."""
+        self.rows = int(self.state.shape[1])
+        """Of the state, in a chunk."""
+
     def row(self, row: int) -> Floats:
         """(n,) copy of one row of the state."""
         return np.ascontiguousarray(self.state[:, row, :]).reshape(-1)[: self.n]
@@ -261,7 +268,7 @@ class Block:
 
     def has(self, row: int) -> bool:
         """Whether the block carries that row."""
-        return row < int(self.state.shape[1])
+        return row < self.rows
 
     def exposed(self) -> Flags:
         """(n, 4) which faces are part of the surface."""

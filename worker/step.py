@@ -41,6 +41,7 @@ from .state import Floats
 
 def prepare(sim: Simulation) -> None:
     """Forces and limits of the initial state: a pass over the elements in no time at all."""
+    sim.model.nodes.force[:] = 0
     _elements(sim, 0.0, None)
     if sim.erosion is not None:
         sim.erosion.begin(sim.reduction.limit)

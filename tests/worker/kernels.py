@@ -117,6 +117,7 @@ class Patch:
         if self.block.params[law.ORDER] == law.FROM_SHAPE:
             self.put(state.TET_VOLUME, formulas.volumes(self.corners(self.nodes.x - dt * self.nodes.v)))
         self._used = self.scale or self.sim.next_scale()
+        self.nodes.force[:] = 0
         self.elements.advance(dt, self._used)
         self.elements.finish()
         largest = self.elements.force

@@ -10,7 +10,7 @@ from conoid.cases.balancing import WORK
 from conoid.worker import domain, step
 from conoid.worker.balance import Balance, Window
 from conoid.worker.groups import Groups
-from conoid.worker.meter import Costs, Meter, _candidates
+from conoid.worker.meter import Costs, Meter, _candidates, on_parts
 from conoid.worker.simulation import Simulation
 
 from ..contact.bodies import meeting_of, moved
@@ -129,10 +129,10 @@ def test_costs_add_up_to_the_work_of_all_ranks() -> None:
         step.prepare(sim)
         groups = Groups(sim, 0.0)
         groups.record(sim)
-        then = sum(sim.timers.seconds[name] for name in WORK[1:]) + sum(b.seconds for b in sim.model.blocks)
+        then = sum(sim.timers.seconds[name] for name in WORK[1:]) + on_parts(sim).sum()
         for _ in range(5):
             tick(sim)
-        now = sum(sim.timers.seconds[name] for name in WORK[1:]) + sum(b.seconds for b in sim.model.blocks)
+        now = sum(sim.timers.seconds[name] for name in WORK[1:]) + on_parts(sim).sum()
         told = groups.record(sim)
         return 1e-9 * (sum(told["load"]) + sim.comm.size * told["rank"]), (now - then) / 5
 

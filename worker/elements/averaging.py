@@ -3,19 +3,20 @@
 import numpy as np
 
 from ..boundaries import Boundary
-from ..jit import Kernel
 from ..materials.law import BULK
 from ..migration.parcel import Parcel
+from ..parallel.arguments import Arguments
 from ..parallel.comm import Comm
+from ..parallel.nodes import OverNodes
 from ..parallel.ownership import Neighbour, SharedSum
 from ..parallel.tags import Tag
 from ..parallel.team import Team
-from ..state import Block, Copies, Floats, Ints, Model, extended
+from ..state import Copies, Floats, Ints, Model, extended
 from ..timers import Timers
-from . import matter, pressure, tasks
+from . import matter, nodal, tasks
 from .flat import flat_tets
 from .forms import Elements
-from .records import Marks, Means
+from .passes import Pass, Values
 
 
 class AveragedElements(Elements):
@@ -37,13 +38,18 @@ class AveragedElements(Elements):
         self._weight = weight
         self._params, self._kinds = params, kinds
         self._bulk = params[model.nodes.part, BULK]
+        self._pressed = bool(kinds.any())
+        """Whether pressures are of nodes (matter.py)."""
         self._matter = matter.at_start(n if kinds.any() else 1)
         self._scene = scene
         self._volumes = np.zeros((n, self._columns), np.int64)
-        self._strain, self._more = np.zeros(n), np.zeros(n)
+        self._strain, self._more, self._sizes = np.zeros(n), np.zeros(n), np.zeros(n if split else 1)
         self._projected = np.zeros((n if split else 1, 3))
         self.pressure = np.zeros(n if split else 1)
         self._scale = 1.0
+        self._strains, self._forces = Pass(tasks.strains, tasks.STRAINS), Pass(tasks.forces, tasks.FORCES)
+        self._nodes = OverNodes(team)
+        self._table, self._projections = Arguments(*nodal.COMPLETE), Arguments(*nodal.PROJECT)
         for block in model.blocks:
             block.flat = flat_tets(block, model.nodes.x0)
 
@@ -58,7 +64,7 @@ class AveragedElements(Elements):
         parents = copies.parents
         names = ["_weight", "_bulk", "_volumes"]
         names += ["_gradient", "_projected", "pressure"] if self.split else []
-        names += ["_matter"] if self._kinds.any() else []
+        names += ["_matter"] if self._pressed else []
         for name in names:
             values = getattr(self, name)
             setattr(self, name, extended(values, values[parents]))
@@ -76,29 +82,22 @@ class AveragedElements(Elements):
     @property
     def _kept(self) -> tuple[str, ...]:
         of_split = ("pressure", "_projected") if self.split else ()
-        return "_weight", *of_split, *(("_matter",) if self._kinds.any() else ())
+        return "_weight", *of_split, *(("_matter",) if self._pressed else ())
 
     def _exchanges(self) -> list[SharedSum]:
         return [self.shared_forces, self.shared_volumes, *([self.shared_gradients] if self.split else [])]
 
     def advance(self, dt: float, scale: float) -> None:
-        self._forget_peaks()
-        self._volumes[:] = 0
-        send = self.shared_volumes.begin
-        self._both_regions(lambda block: self._strains(block, dt), lambda: send(self._volumes))
-        with self._timers.phase("exchange"):
-            self.shared_volumes.finish(self._volumes)
-        self._strain = pressure.nodal_strains(self._volumes, 0)
-        if self._columns > 2:
-            self._more = pressure.nodal_strains(self._volumes, 2)
-        if self.split:
-            self.pressure -= self._bulk * self._strain
-        if self._kinds.any():
-            matter.press_nodes(self._matter, self._strain, self.model.nodes.part, self._kinds, self._params)
-        self._begin(scale)
-        self._gradient[:] = 0
+        self._scratches.peaks[:] = 0
         self._scale = scale
-        self._both_regions(lambda block: self._forces(block, dt, scale), self._send)
+        means = self._means()
+        self._over(self._strains, means, (dt,), lambda: self.shared_volumes.begin(self._volumes))
+        if self._neighbours:
+            with self._timers.phase("exchange"):
+                self.shared_volumes.finish(self._volumes)
+        self._nodes.run(nodal.complete, self._table.set(means, self._sizes, *self._constants()), self.model.nodes.n)
+        self._bridge(scale, opens=True)
+        self._over(self._forces, means, (dt, scale), self._send)
 
     def again(self, scale: float) -> None:
         self._gradient[:] = 0
@@ -110,20 +109,20 @@ class AveragedElements(Elements):
         if self.split:
             self.shared_gradients.begin(self._gradient)
             self.shared_gradients.finish(self._gradient)
-            volumes = np.maximum(self._volumes[:, 1], 1) / (self._weight * pressure.QUANTA)
-            self._projected = self._gradient / (self._scale * volumes[:, None])
+            table = self._projections.set(self._means(), self._sizes, self._scale)
+            self._nodes.run(nodal.project, table, self.model.nodes.n)
             for boundary in self._scene:
                 boundary.mirror(self._projected)
 
-    def _means(self) -> Means:
-        return Means(
+    def _means(self) -> Values:
+        n = self.model.nodes.n
+        if len(self._strain) != n:
+            self._strain, self._more, self._sizes = np.zeros(n), np.zeros(n), np.zeros(n if self.split else 1)
+        return (
             self._volumes, self._weight, self._strain, self._more, self.split, self.pressure, self._projected,
             self._gradient, self._matter,
         )  # fmt: skip
 
-    def _strains(self, block: Block, dt: float) -> tuple[Kernel, int]:
-        return self._pass(tasks.strains, tasks.STRAINS, block, Marks.of(block), self._scratches, self._means(), dt)
-
-    def _forces(self, block: Block, dt: float, scale: float) -> tuple[Kernel, int]:
-        marks = Marks.of(block)
-        return self._pass(tasks.forces, tasks.FORCES, block, marks, self._scratches, self._means(), dt, scale)
+    def _constants(self) -> Values:
+        """What ``nodal.complete`` takes besides means and volumes."""
+        return self._columns > 2, self._bulk, self._pressed, self.model.nodes.part, self._kinds, self._params

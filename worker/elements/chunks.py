@@ -100,10 +100,12 @@ def note_peaks(peaks, bits, ids, n, force):  # type: ignore[no-untyped-def]
                 peaks[LIMITING_TET] = min(peaks[LIMITING_TET], ids[i])
 
 
-@njit(types.void(_I1, _I2), cache=True)
-def gather_peaks(peaks, threads):  # type: ignore[no-untyped-def]
-    """Raises the peaks of a rank by those of its ``threads`` (threads, 8)."""
-    for mine in threads:
+@njit(types.void(_I2), cache=True)
+def gather_peaks(threads):  # type: ignore[no-untyped-def]
+    """Raises the peaks of the first of the ``threads`` (threads, 8) by those of the others."""
+    peaks = threads[0]
+    for t in range(1, len(threads)):
+        mine = threads[t]
         for place in (LARGEST_FORCE, WORN, HOT):
             peaks[place] = max(peaks[place], mine[place])
         if mine[LARGEST_LIMIT] > peaks[LARGEST_LIMIT]:

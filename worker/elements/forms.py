@@ -9,10 +9,9 @@ from typing import Protocol
 
 import numpy as np
 
-from ..jit import Kernel, cpu_time
+from ..jit import cpu_time
 from ..migration.parcel import Parcel
 from ..parallel import fixed_point
-from ..parallel.arguments import Arguments
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum
 from ..parallel.tags import Tag
@@ -21,7 +20,8 @@ from ..state import Block, Copies, Floats, Ints, Model
 from ..timers import Timers
 from . import chunks, records, tasks
 from .colours import Coloured, coloured, whole
-from .records import Body, Marks, Means, Motion, Scratches
+from .passes import Pass, Values
+from .records import Means, Scratches
 
 
 class Bridges(Protocol):
@@ -46,10 +46,6 @@ class Herald(Protocol):
         """Takes those of the neighbours."""
 
 
-Pass = Callable[[Block], tuple[Kernel, int]]
-"""Of a pass over a block: the kernel, and the address of its arguments."""
-
-
 class Elements:
     """The elements of one rank in the ``standard`` pressure form; the averaged forms extend it."""
 
@@ -59,10 +55,12 @@ class Elements:
         self.model = model
         self._timers, self._team = timers, team
         self._scratches = Scratches.of(team.threads)
-        self.peaks: Ints = np.zeros(records.PEAKS, np.int64)
+        self.peaks: Ints = self._scratches.peaks[0, : records.PEAKS]
         """(5,) see elements/records.py."""
-        self._arguments: dict[tuple[Kernel, int], Arguments] = {}
-        """By kernel and part."""
+        self._words = self.peaks.data
+        self._reals = self.peaks.view(np.float64).data
+        self._standard = Pass(tasks.standard, tasks.STANDARD)
+        self._again = Pass(tasks.again, tasks.AGAIN, marked=False)
         self._coloured: dict[tuple[int, int], tuple[int, Coloured]] = {}
         """By part and first chunk, with how many tets had left the block then."""
         self._comm, self._neighbours = comm, neighbours
@@ -76,56 +74,59 @@ class Elements:
     @property
     def limit_bits(self) -> int:
         """Bits of the largest one-over-stable-step of this rank's tets."""
-        return int(self.peaks[records.LARGEST_LIMIT])
+        return self._words[records.LARGEST_LIMIT]
 
     @property
     def limit(self) -> float:
         """The largest one-over-stable-step of this rank's tets, 1/s; NaN when a tet is inverted or not a number."""
-        return fixed_point.float_of(self.limit_bits)
+        return self._reals[records.LARGEST_LIMIT]
 
     @property
     def limiting(self) -> int:
         """Smallest global id of the tets of this rank that have the limit."""
-        return int(self.peaks[records.LIMITING_TET])
+        return self._words[records.LIMITING_TET]
 
     @property
     def force(self) -> float:
         """Largest contribution to a nodal force of this rank, N."""
-        return fixed_point.float_of(int(self.peaks[records.LARGEST_FORCE]))
+        return self._reals[records.LARGEST_FORCE]
 
     @property
     def worn(self) -> int:
         """What has been found of worn-out tets (elements/wear.py)."""
-        return int(self.peaks[records.WORN])
+        return self._words[records.WORN]
 
     @property
     def hot(self) -> bool:
         """Whether some face passes the strength by its tet's own stress."""
-        return bool(self.peaks[records.HOT])
+        return self._words[records.HOT] != 0
 
     def advance(self, dt: float, scale: float) -> None:
-        """Stress and forces at n+1; the completion of the shared forces is under way when it returns."""
-        self._forget_peaks()
-        self._begin(scale)
-        self._both_regions(lambda block: self._standard(block, dt, scale), self._send)
+        """Stress and forces at n+1, added to nodal forces that are zero; the completion of the shared ones is under way
+        when it returns.
+        """
+        self._scratches.peaks[:] = 0
+        self._bridge(scale, opens=True)
+        self._over(self._standard, (), (dt, scale), self._send)
 
     def again(self, scale: float) -> None:
         """The forces of the present stress in a coarser quantum."""
         limit = self.peaks[[records.LARGEST_LIMIT, records.LIMITING_TET]]
-        self._forget_peaks()
-        self._begin(scale, again=True)
-        self._both_regions(lambda block: self._again(block, scale), self._send)
+        self._scratches.peaks[:] = 0
+        self.model.nodes.force[:] = 0
+        self._bridge(scale, opens=False)
+        self._over(self._again, self._means(), (scale,), self._send)
         self.peaks[[records.LARGEST_LIMIT, records.LIMITING_TET]] = limit
 
-    def _begin(self, scale: float, again: bool = False) -> None:
+    def _bridge(self, scale: float, *, opens: bool) -> None:
         """Forces other than those of tets."""
+        if self.cohesion is None:
+            return
         nodes = self.model.nodes
-        nodes.force[:] = 0
-        if self.cohesion is not None:
-            if not again:
-                self.cohesion.open(nodes.x)
-            largest = self.cohesion.scatter(nodes.force, scale)
-            self.peaks[records.LARGEST_FORCE] = max(int(self.peaks[records.LARGEST_FORCE]), largest)
+        if opens:
+            self.cohesion.open(nodes.x)
+        largest = self.cohesion.scatter(nodes.force, scale)
+        self.peaks[records.LARGEST_FORCE] = max(int(self.peaks[records.LARGEST_FORCE]), largest)
 
     def grow(self, copies: Copies) -> None:
         """Takes up copies of nodes; they are shared already."""
@@ -171,25 +172,28 @@ class Elements:
         words = None if self._herald is None else self._herald.words(self.hot)
         self.shared_forces.begin(self.model.nodes.force, words)
 
-    def _forget_peaks(self) -> None:
-        self.peaks[:] = 0
-        self._scratches.peaks[:] = 0
+    def _over(self, work: Pass, means: Values, numbers: Values, send: Callable[[], None]) -> None:
+        """A pass over all tets; ``send``: what the neighbours want as soon as the border chunks are done."""
+        if self._neighbours:
+            self._over_blocks(work, means, numbers, border=True)
+            send()
+        self._over_blocks(work, means, numbers, border=False)
 
-    def _both_regions(self, work: Pass, send: Callable[[], None]) -> None:
-        self._over_blocks(work, lambda block: (0, block.border_chunks))
-        send()
-        self._over_blocks(work, lambda block: (block.border_chunks, block.chunks))
-
-    def _over_blocks(self, work: Pass, region: Callable[[Block], tuple[int, int]]) -> None:
-        now = cpu_time()
-        for block in self.model.blocks:
-            begin, end = region(block)
+    def _over_blocks(self, work: Pass, means: Values, numbers: Values, *, border: bool) -> None:
+        blocks, nodes = self.model.blocks, self.model.nodes
+        now = cpu_time() if len(blocks) > 1 else 0.0
+        for block in blocks:
+            first = block.border_chunks if self._neighbours else 0
+            begin, end = (0, first) if border else (first, block.chunks)
             if begin < end:
                 some = self._tasks(block, begin, end)
-                self._team.run(*work(block), some.tasks, some.starts)
-            start, now = now, cpu_time()
-            block.seconds += now - start
-        chunks.gather_peaks(self.peaks, self._scratches.peaks)
+                table = work.address(nodes, block, self._scratches, means, numbers)
+                self._team.run(work.kernel, table, some.tasks, some.starts)
+            if len(blocks) > 1:
+                start, now = now, cpu_time()
+                block.seconds += now - start
+        if self._team.threads > 1:
+            chunks.gather_peaks(self._scratches.peaks)
 
     def _tasks(self, block: Block, begin: int, end: int) -> Coloured:
         moved, known = self._coloured.get((block.part, begin), (-1, None))
@@ -199,19 +203,5 @@ class Elements:
             self._coloured[block.part, begin] = block.moved, known
         return known
 
-    def _pass(self, kernel: Kernel, kinds: tuple[object, ...], block: Block, *values: object) -> tuple[Kernel, int]:
-        """The kernel and the address of its arguments for a block: those of all passes, then ``values``."""
-        key = kernel, block.part
-        if key not in self._arguments:
-            self._arguments[key] = Arguments(*kinds)
-        return kernel, self._arguments[key].set(Motion.of(self.model.nodes), Body.of(block), *values)
-
-    def _standard(self, block: Block, dt: float, scale: float) -> tuple[Kernel, int]:
-        marks = Marks.of(block)
-        return self._pass(tasks.standard, tasks.STANDARD, block, marks, self._scratches, dt, scale)
-
-    def _again(self, block: Block, scale: float) -> tuple[Kernel, int]:
-        return self._pass(tasks.again, tasks.AGAIN, block, self._scratches, self._means(), scale)
-
-    def _means(self) -> Means:
+    def _means(self) -> Values:
         return Means.none()

@@ -80,15 +80,11 @@ def _linear(at, params, strain):  # type: ignore[no-untyped-def]
     _book(at, bulk, old, before, after, opened)
 
 
-@njit("void(float64[:, ::1], float64[::1], int32[::1], int64[::1], float64[:, ::1])", cache=True, error_model="numpy")
-def press_nodes(matter, strain, part, kinds, params):  # type: ignore[no-untyped-def]
-    """The columns of n+1 of ``matter`` (nodes, COLUMNS), from the volume strain (nodes,) of the step; ``part``
-    (nodes,), ``kinds`` (parts,) as ``whose`` has it and ``params`` (parts, SIZE).
-    """
-    for a in range(len(part)):
-        k = part[a]
-        if kinds[k] == LINEAR:
-            _linear(matter[a], params[k], strain[a])
+@njit("void(float64[::1], float64, int64, float64[::1])", cache=True, error_model="numpy")
+def press_node(at, strain, kind, params):  # type: ignore[no-untyped-def]
+    """The columns of n+1 of a node, ``at``, from the volume strain of the step; ``kind`` as ``whose`` has it."""
+    if kind == LINEAR:
+        _linear(at, params, strain)
 
 
 @njit("float64(float64[:, ::1], uint32[:, ::1], int64, int64)", cache=True, error_model="numpy", forceinline=True)

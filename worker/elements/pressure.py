@@ -219,15 +219,3 @@ def scatter_fluxes(gradient, wi, tets, n):  # type: ignore[no-untyped-def]
             gradient[b, k] += flux
             gradient[c, k] += flux
             gradient[d, k] += flux
-
-
-@njit("float64[::1](int64[:, ::1], int64)", cache=True, error_model="numpy")
-def nodal_strains(sums, column):  # type: ignore[no-untyped-def]
-    """(n,) volume strain of the step at the nodes from the completed sums (n, 2 or 3), of ``column`` 0; of 2 heat or
-    bulking; zero at a node without tets.
-    """
-    strains = np.empty(len(sums))
-    for a in range(len(sums)):
-        volume = sums[a, 1]
-        strains[a] = sums[a, column] / volume if volume > 0 else 0.0
-    return strains

@@ -1,11 +1,12 @@
 """What the passes over the elements take: records of arrays, and their numba types, which signatures name."""
 
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
 
 from ..jit import record, types
-from ..state import CHUNK, Bits, Block, Flags, Floats, Ints, Nodes, Tets
+from ..state import CHUNK, Bits, Flags, Floats, Ints, Tets
 from . import tet4
 
 LARGEST_LIMIT, LIMITING_TET, LARGEST_FORCE, WORN, HOT = range(5)
@@ -28,11 +29,6 @@ class Motion(NamedTuple):
     """(nodes, 3) velocities at n+1/2, m/s."""
     force: Ints
     """(nodes, 3) quanta."""
-
-    @classmethod
-    def of(cls, nodes: Nodes) -> "Motion":
-        """That of ``nodes`` as they are now."""
-        return cls(nodes.x0, nodes.x, nodes.v, nodes.force)
 
 
 class Body(NamedTuple):
@@ -57,15 +53,6 @@ class Body(NamedTuple):
     flat: Flags
     """(n,) tets whose volume strain is not averaged; (0,) where there is none."""
 
-    @classmethod
-    def of(cls, block: Block) -> "Body":
-        """That of a block as it is now."""
-        rows = int(block.state.shape[1])
-        return cls(
-            block.tets, block.id, block.state.reshape(-1), rows, block.params, block.kind, block.eos, block.quiet,
-            block.flat,
-        )  # fmt: skip
-
 
 class Marks(NamedTuple):
     """What the passes look for in the tets of a block, and whom they mark."""
@@ -80,11 +67,6 @@ class Marks(NamedTuple):
     """(n,) smallest strength of the faces of each tet, Pa."""
     shear: float
     """Weight of shear against normal traction."""
-
-    @classmethod
-    def of(cls, block: Block) -> "Marks":
-        """Those of a block as it is now."""
-        return cls(block.worn, block.life, block.hot, block.weakest, block.shear_weight)
 
 
 class Scratch(NamedTuple):
@@ -150,6 +132,12 @@ class Means(NamedTuple):
         return cls(lines, row, row, row, False, row, np.zeros((1, 3)), lines, np.zeros((1, 8)))
 
 
+motion_of = attrgetter("x0", "x", "v", "force")
+"""A function of ``Nodes``: the fields of their Motion."""
+body_of = attrgetter("tets", "id", "flat_state", "rows", "params", "kind", "eos", "quiet", "flat")
+"""A function of a block: the fields of its Body."""
+marks_of = attrgetter("worn", "life", "hot", "weakest", "shear_weight")
+"""A function of a block: the fields of its Marks."""
 _F1, _F2, _I1, _I2 = types.float64[::1], types.float64[:, ::1], types.int64[::1], types.int64[:, ::1]
 _B1, _INT, _FLAG = types.boolean[::1], types.int64, types.boolean
 MOTION = record(Motion, _F2, _F2, _F2, _I2)

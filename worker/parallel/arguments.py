@@ -7,6 +7,8 @@ them alive.
 """
 
 from collections.abc import Iterator
+from itertools import compress
+from operator import is_not
 from typing import Any
 
 import numpy as np
@@ -22,41 +24,44 @@ class Arguments:
     """A table for arguments of the numba types ``kinds``; records count as one argument each."""
 
     def __init__(self, *kinds: Any) -> None:
-        leaves = [_words(kind) for kind in _leaves(several(*kinds))]
+        self._kinds = list(_leaves(several(*kinds)))
+        leaves = [_words(kind) for kind in self._kinds]
         self._places = np.cumsum([0, *leaves])[:-1].tolist()
-        self._words = np.zeros(sum(leaves), np.int64)
+        words = np.zeros(sum(leaves), np.int64)
+        self._words = words.data
+        self._reals = self._words.cast("B").cast("d")
         self._kept: list[Any] = [None] * len(leaves)
-        self.address = int(self._words.ctypes.data)
+        self._all = range(len(leaves))
+        self.address = int(words.ctypes.data)
         """Of the table: what kernels take."""
 
     def set(self, *values: Any) -> int:
-        """Takes the arguments, records of them among them; returns the address. Raises ValueError where an array does
-        not lie in C order.
+        """Takes the arguments, tuples of them among them; returns the address. Only what is not the object that the
+        table had before is written. Raises ValueError where an array does not lie in C order.
         """
-        kept = self._kept
-        for k, value in enumerate(_flat(values)):
-            if kept[k] is not value:
-                self._put(self._places[k], value)
-                kept[k] = value
+        flat: list[Any] = []
+        for value in values:
+            if isinstance(value, tuple):
+                flat += value
+            else:
+                flat.append(value)
+        for k in compress(self._all, map(is_not, flat, self._kept)):
+            self._put(k, flat[k])
+        self._kept = flat
         return self.address
 
-    def _put(self, at: int, value: Any) -> None:
-        words = self._words
-        if isinstance(value, np.ndarray):
+    def _put(self, k: int, value: Any) -> None:
+        at, kind = self._places[k], self._kinds[k]
+        if isinstance(kind, types.Array):
             if not value.flags.c_contiguous:
                 raise ValueError("an array of a table lies in C order")
-            words[at] = value.ctypes.data
-            words[at + 1 : at + 1 + value.ndim] = value.shape
+            self._words[at] = value.ctypes.data
+            for axis, length in enumerate(value.shape):
+                self._words[at + 1 + axis] = length
+        elif kind == types.float64:
+            self._reals[at] = value
         else:
-            words[at] = np.float64(value).view(np.int64) if isinstance(value, float) else int(value)
-
-
-def _flat(values: tuple[Any, ...]) -> Iterator[Any]:
-    for value in values:
-        if isinstance(value, tuple):
-            yield from _flat(value)
-        else:
-            yield value
+            self._words[at] = int(value)
 
 
 def _leaves(kind: Any) -> Iterator[Any]:

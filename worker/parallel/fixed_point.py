@@ -6,6 +6,7 @@ repeated in a coarser quantum. A contribution has 51 bits; node 0 of a tet may g
 """
 
 import math
+import struct
 from collections.abc import Sequence
 from typing import Protocol
 
@@ -28,18 +29,19 @@ _MAGNITUDE, _INFINITE = 0x7FFFFFFFFFFFFFFF, 0x7FF0000000000000
 _LIMB_BITS = 30
 _LIMB = 2.0**_LIMB_BITS
 """Quanta of the low limb in one of the high: 60 bits in two limbs, each of which sums 2^32 values in an int64."""
+_WORD, _REAL = struct.Struct("=q"), struct.Struct("=d")
 _SMALLEST = -993
 """Exponent of columns of smaller values: at a lower one the scale would have no bound."""
 
 
 def float_of(bits: int) -> float:
     """The float64 with these bits."""
-    return float(np.int64(bits).view(np.float64))
+    return float(_REAL.unpack(_WORD.pack(bits))[0])
 
 
 def bits_of(value: float) -> int:
     """The bits of a float64."""
-    return int(np.float64(value).view(np.int64))
+    return int(_WORD.unpack(_REAL.pack(value))[0])
 
 
 def scale_for(largest: float) -> float:

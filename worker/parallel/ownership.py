@@ -87,6 +87,8 @@ class SharedSum:
         """Sends the local sums of the shared nodes; the tets of shared nodes must all have been summed. ``words``
         (neighbours,) go along.
         """
+        if not self._nodes:
+            return
         if words is not None:
             self._out[self._heads, 0] = words
         _pack(self._out, self._every, sums)
@@ -94,6 +96,8 @@ class SharedSum:
 
     def finish(self, sums: Ints) -> None:
         """Adds what the neighbours sent: the sums of the shared nodes are complete."""
+        if not self._nodes:
+            return
         self._exchange.finish()
         _add(sums, self._every, self._in)
 

@@ -1,0 +1,51 @@
+"""The nodes of the averaged pressure forms: what is done with their sums between the passes over the tets, as tasks."""
+
+from ..jit import njit, types
+from ..parallel.arguments import reader
+from ..parallel.team import TASK
+from .matter import press_node
+from .pressure import QUANTA
+from .records import MEANS
+
+_FLAG, _F1 = types.boolean, types.float64[::1]
+COMPLETE = (MEANS, _F1, _FLAG, _F1, _FLAG, types.int32[::1], types.int64[::1], types.float64[:, ::1])
+"""Means, (nodes,) room for volumes, whether there are means of heat or bulking, (nodes,) bulk modulus, Pa, whether
+pressures are of nodes, (nodes,) part of each, (parts,) whose the pressure is and (parts, SIZE) constants."""
+PROJECT = (MEANS, _F1, types.float64)
+"""Means, those volumes and the quanta per newton of the sums."""
+_complete, _project = reader(*COMPLETE), reader(*PROJECT)
+
+
+@njit(TASK, cache=True, error_model="numpy")
+def complete(table, begin, end, thread):  # type: ignore[no-untyped-def]
+    """Volume strain of the step, and heat or bulking, of nodes from their completed sums, zero at a node without tets;
+    the pressures of n+1 that are of nodes; their volumes, m^3, where ``project`` follows. All sums begin anew.
+    """
+    means, volumes, more, bulk, pressed, part, kinds, params = _complete(table)
+    sums, strain, told, split, matter = means.sums, means.strain, means.more, means.split, means.matter
+    pressure, gradient = means.pressure, means.gradient
+    for a in range(begin, end):
+        volume = sums[a, 1]
+        found = sums[a, 0] / volume if volume > 0 else 0.0
+        strain[a] = found
+        if more:
+            told[a] = sums[a, 2] / volume if volume > 0 else 0.0
+        if pressed:
+            press_node(matter[a], found, kinds[part[a]], params[part[a]])
+        if split:
+            pressure[a] -= bulk[a] * found
+            gradient[a, 0] = gradient[a, 1] = gradient[a, 2] = 0
+            volumes[a] = max(volume, 1) / (means.weight[a] * QUANTA)
+        for k in range(sums.shape[1]):
+            sums[a, k] = 0
+
+
+@njit(TASK, cache=True, error_model="numpy")
+def project(table, begin, end, thread):  # type: ignore[no-untyped-def]
+    """The projected gradient of the pressure of nodes from their completed sums."""
+    means, volumes, scale = _project(table)
+    gradient, projected = means.gradient, means.projected
+    for a in range(begin, end):
+        per_volume = scale * volumes[a]
+        for k in range(3):
+            projected[a, k] = gradient[a, k] / per_volume

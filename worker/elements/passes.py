@@ -1,0 +1,30 @@
+"""A pass over the tets as the threads get it: the kernel of its tasks, and a table of arguments for each block."""
+
+from typing import Any
+
+from ..jit import Kernel
+from ..parallel.arguments import Arguments
+from ..state import Block, Nodes
+from .records import Scratches, body_of, marks_of, motion_of
+
+Values = tuple[Any, ...]
+
+
+class Pass:
+    """Of a kernel with the arguments ``kinds``: Motion, Body, Marks where it is ``marked``, Scratches, Means where it
+    has some, and numbers.
+    """
+
+    def __init__(self, kernel: Kernel, kinds: tuple[object, ...], *, marked: bool = True) -> None:
+        self.kernel = kernel
+        self._kinds, self._marked = kinds, marked
+        self._tables: dict[int, Arguments] = {}
+        """By part."""
+
+    def address(self, nodes: Nodes, block: Block, scratches: Scratches, means: Values, numbers: Values) -> int:
+        """Of the arguments for a block; ``means``: the fields of Means, or none."""
+        table = self._tables.get(block.part)
+        if table is None:
+            table = self._tables[block.part] = Arguments(*self._kinds)
+        marks = marks_of(block) if self._marked else ()
+        return table.set(motion_of(nodes), body_of(block), marks, scratches, means, *numbers)
