@@ -7,6 +7,8 @@ second is booked when ``note`` is called before the next kick.
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -147,6 +149,29 @@ class SymmetryPlane(Boundary):
 
     def _inherit(self, at: Ints) -> None:
         self._beside = extended(self._beside, self._beside[at])
+
+
+@dataclass(frozen=True)
+class Acts:
+    """The boundaries that have something to do at each place of a step, in the order in which they act."""
+
+    boundaries: int
+    """Number of all."""
+    noting: tuple[Boundary, ...]
+    before_contact: tuple[Boundary, ...]
+    after_contact: tuple[Boundary, ...]
+    moving: tuple[Boundary, ...]
+
+    @classmethod
+    def of(cls, scene: list[Boundary]) -> Self:
+        """Those of a scene."""
+        return cls(
+            len(scene),
+            tuple(each for each in scene if type(each).note is not Boundary.note),
+            tuple(each for each in scene if not each.after_contact),
+            tuple(each for each in scene if each.after_contact),
+            tuple(each for each in scene if type(each).after_move is not Boundary.after_move),
+        )
 
 
 def mirrored(n: int, bounds: Iterable[Boundary]) -> Flags:

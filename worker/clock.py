@@ -38,6 +38,10 @@ class Clock:
         self._frames = frames
         self.frame = 0
         """Index of the next frame time to land on."""
+        self._of = -1
+        """Of which frame the two times are."""
+        self._landing = self._after = 0.0
+        """Times of the next frame and of the one after it, s."""
 
     def keep(self) -> dict[str, float]:
         """Its whole state."""
@@ -59,7 +63,9 @@ class Clock:
     @property
     def frame_due(self) -> bool:
         """Whether a frame belongs to the present time."""
-        return self._frames > 0 and self.frame <= self._frames and self.t >= self.frame_time(self.frame)
+        if self._of != self.frame:
+            self._of, self._landing, self._after = self.frame, *map(self.frame_time, (self.frame, self.frame + 1))
+        return self.t >= self._landing and self._frames > 0 and self.frame <= self._frames
 
     def choose(self, limit: float) -> float:
         """The next step, s: ``limit`` is the largest one-over-stable-step of all tets, 1/s, zero when none is left.
@@ -72,7 +78,7 @@ class Clock:
         """
         self.last_dt = self.dt
         self._stable = min(self._safety / limit if limit > 0.0 else math.inf, self._growth * self._stable)
-        left = self.frame_time(self.frame + 1 if self.frame_due else self.frame) - self.t
+        left = (self._after if self.frame_due else self._landing) - self.t
         following = min(self._stable, self.last_dt)
         self.dt = left / max(math.ceil(left / self._stable), 1) if left > 0.0 else following
         self._first = self._first or self._stable
@@ -121,6 +127,6 @@ class Clock:
         self._lost = (new - self.t) - increment
         self.t = new
         self.step += 1
-        target = self.frame_time(self.frame)
+        target = self._landing if self._of == self.frame else self.frame_time(self.frame)
         if abs(target - self.t) <= 1e-9 * self.dt:
             self.t, self._lost = target, 0.0

@@ -25,6 +25,7 @@ from .output.damage import damage
 from .output.history import History
 from .output.journal import Journal
 from .output.losses import Losses
+from .pace import Pace
 from .parallel.choice import Choice
 from .signals import Signals
 from .simulation import Simulation
@@ -39,8 +40,6 @@ STOPS = {
     WALL_TIME: (State.TIMED_OUT, Cause.WALLTIME, "run.max_wall_time is used up"),
     MAX_STEPS: (State.TIMED_OUT, Cause.STEPS, "run.max_steps is used up before run.end_time"),
 }
-_KEPT = (CANCELLED, WALL_TIME, MAX_STEPS)
-"""Reasons after which the run can go on from a checkpoint."""
 _REPORT_EVERY = 0.25
 """s of wall time between two reports: four a second look alive. Chosen."""
 _LOG_EVERY = 10.0
@@ -66,24 +65,6 @@ class Start:
     """See Simulation."""
 
 
-class Pace:
-    """Simulated seconds per second of wall time, as a mean that forgets over some ten reports."""
-
-    def __init__(self, t: float, began: float) -> None:
-        self._last = (t, began)
-        self._rate: float | None = None
-
-    def add(self, t: float, now: float) -> None:
-        """Notes that time ``t`` was reached at wall time ``now``."""
-        rate = (t - self._last[0]) / (now - self._last[1])
-        self._rate = rate if self._rate is None else 0.9 * self._rate + 0.1 * rate
-        self._last = (t, now)
-
-    def left(self, t: float) -> float:
-        """Wall time for another ``t``, s."""
-        return t / self._rate if self._rate else 0.0
-
-
 class Loop:
     """Advances a simulation to its end and runs the outputs that are due. ``journal`` and ``history``: on rank 0."""
 
@@ -107,6 +88,13 @@ class Loop:
         self._signals = signals
         self._start = start
         self._sample = start.sample
+        self._sample_time = start.sample * sim.case.run.end_time / sim.case.run.samples
+        """When the next line of the history is due, s."""
+        self._max_steps = sim.case.run.max_steps
+        self._asks, self._watches = True, sim.case.balance.policy == "outside"
+        """Whether this rank has asked for something in the last step; whether it counts its outside nodes in each."""
+        self._ask_at = self._ask_time = 0.0
+        """Wall time and simulated time, s, before which there is nothing to ask for."""
         self._began = self._reported = self._kept = time.monotonic()
         self.updates = self._reported_updates = start.updates
         """Tets times steps so far."""
@@ -131,11 +119,7 @@ class Loop:
             step.prepare(self.sim)
         self._record()
         while True:
-            if self.sim.reduction.report:
-                self._report()
-            self._move()
-            self._checkpoint()
-            self._propose()
+            self._attend()
             sim = self.sim
             self._first_half()
             if sim.clock.done or sim.reduction.stop:
@@ -150,21 +134,39 @@ class Loop:
             if self.choice is not None and (said := self.choice.step()):
                 self._tell(messages.Log, level="info", text=said)
 
+    def _attend(self) -> None:
+        """What the ranks have agreed on for this step, and what is to be agreed on for the next one."""
+        if self.sim.reduction.report:
+            self._report()
+        if self.sim.comm.size > 1:
+            self._move()
+        if self.sim.reduction.checkpoint or self.sim.reduction.stop:
+            self._checkpoint()
+        clock, now = self.sim.clock, time.monotonic()
+        last = clock.step + 1 >= self._max_steps
+        if now >= self._ask_at or clock.t >= self._ask_time or self._asks or self._signals.raised or last:
+            self._propose(now)
+
     def _first_half(self) -> None:
         sim, clock = self.sim, self.sim.clock
         ending = clock.done or bool(sim.reduction.stop)
-        sampling = ending or clock.t >= self._sample * sim.case.run.end_time / sim.case.run.samples
-        before = sim.model.nodes.v.copy() if sampling else None
+        before = sim.model.nodes.v.copy() if ending or clock.t >= self._sample_time else None
         step.first_half(sim)
         if clock.starved and not self.warnings:
             self._warn_of_steps()
+        if before is not None or clock.frame_due or sim.reduction.snapshot or clock.step == 0:
+            self._put_out(before, ending=ending)
+        self.snapshots.tell()
+
+    def _put_out(self, before: Floats | None, *, ending: bool) -> None:
+        """What is due at time n."""
+        sim, clock = self.sim, self.sim.clock
         with sim.timers.phase("output"):
             if before is not None:
                 self._look(before, ending=ending)
             if clock.frame_due:
                 self._write_frame()
             self.snapshots.look(sim, due=sim.reduction.snapshot, ending=ending)
-        self.snapshots.tell()
 
     def _fallen(self, so_far: str) -> str:
         """That the stable step has fallen ``so_far``, which tet holds it down, and what helps; all ranks take part."""
@@ -204,8 +206,6 @@ class Loop:
     def _checkpoint(self) -> None:
         """The complete state to disk, when that is due."""
         sim, stop = self.sim, self.sim.reduction.stop
-        if not sim.reduction.checkpoint and stop not in _KEPT:
-            return
         began, clock = time.monotonic(), sim.clock
         with sim.timers.phase("output"):
             parcel = simulation.keep(sim)
@@ -224,9 +224,9 @@ class Loop:
     def _asked(self) -> bool:
         return (self._folder / layout.CHECKPOINT_REQUEST).exists()
 
-    def _propose(self) -> None:
-        """What this rank gives to the next reduction."""
-        sim, own, now = self.sim, self.sim.reduction.own, time.monotonic()
+    def _propose(self, now: float) -> None:
+        """What this rank gives to the next reduction; it stays as it is until something is due."""
+        sim, own = self.sim, self.sim.reduction.own
         limit = sim.case.run.max_wall_time
         own.report = sim.comm.rank == 0 and now - self._reported > _REPORT_EVERY
         self._told |= sim.comm.rank == 0 and own.report and (self._folder / layout.STOP_REQUEST).exists()
@@ -245,6 +245,13 @@ class Loop:
         own.checkpoint = sim.comm.rank == 0 and (
             (every is not None and now - self._kept > every) or (own.report and self._asked())
         )
+        self._asks = bool(own.stop or own.report or own.groups or own.snapshot or own.checkpoint) or self._watches
+        self._ask_time = 0.0 if self.snapshots.asked_for else self.snapshots.next_time
+        self._ask_at = min(
+            self._reported + _REPORT_EVERY if sim.comm.rank == 0 else math.inf,
+            self._began + limit if limit is not None else math.inf,
+            self._kept + every if every is not None else math.inf,
+        )
 
     def _look(self, before: Floats, *, ending: bool) -> None:
         """A line of the history: ledger, momenta and probes at time n; ``ending``: after the last step."""
@@ -256,6 +263,7 @@ class Loop:
             sim.crushing.count()
         probes = sim.probes.measure()
         self._sample = int(clock.t * sim.case.run.samples / sim.case.run.end_time) + 1
+        self._sample_time = self._sample * sim.case.run.end_time / sim.case.run.samples
         limiter = sim.limiter()
         if self._history is not None:
             parts = [value for part in self._parts.values() for value in msgspec.structs.astuple(part)]

@@ -11,7 +11,7 @@ from conoid.cases.schema import Case, Symmetry
 
 from . import conditions, domain
 from .assembly import Say, quiet
-from .boundaries import Boundary
+from .boundaries import Acts, Boundary
 from .clock import Clock
 from .contact.stage import Contact
 from .crushing import Crushing
@@ -74,6 +74,14 @@ class Simulation:
     reduction: StepReduction
     warnings: tuple[str, ...] = ()
     """What the user should know of the meshes, of a run that begins."""
+    _acts: Acts | None = None
+
+    @property
+    def acts(self) -> Acts:
+        """What the boundaries do in a step."""
+        if self._acts is None or self._acts.boundaries != len(self.boundaries):
+            self._acts = Acts.of(self.boundaries)
+        return self._acts
 
     @property
     def scale(self) -> float:

@@ -32,6 +32,7 @@ has some and whom they concern; which cracks open is found in 8, and they open a
 import math
 
 from . import failed
+from .boundaries import Acts
 from .errors import PhysicsError
 from .fracture.stage import NOTHING, OVERSTRESSED, Fracture
 from .parallel import fixed_point
@@ -45,26 +46,28 @@ def prepare(sim: Simulation) -> None:
     _elements(sim, 0.0, None)
     if sim.erosion is not None:
         sim.erosion.begin(sim.reduction.limit)
+    sim.timers.switch("rest")
 
 
 def first_half(sim: Simulation) -> None:
     """1 to 9: from f(n) to v(n+1/2)."""
     nodes, clock = sim.model.nodes, sim.clock
-    with sim.timers.phase("nodes"):
-        mean_dt = clock.choose(sim.limit)  # 1: dt between n and n+1
-        if clock.collapsed:
-            raise PhysicsError(
-                f"{_when(sim)}: {sim.limiting_tet()} is crushed; the stable step is {clock.stable:.3g} s. Where its "
-                "part erodes (parts[].erosion) such a tet leaves"
-            )
-        _before_kick(sim)  # 2 to 4
-        if sim.contact is not None and clock.step == 0 and sim.contact.look_ahead(nodes):
-            mean_dt = clock.choose_again(sim.limit)
-        if sim.fracture is not None:
-            sim.fracture.let_go()  # 5: f(n), less where cohesive facets would give what nobody has paid
-        # v*(n+1/2) = v(n-1/2) + dt f(n) / m
-        sim.leapfrog.kick(nodes, mean_dt / sim.scale, clock.shorter / sim.scale)
-        _after_kick(sim)  # 6 to 9: v(n+1/2)
+    sim.timers.switch("nodes")
+    mean_dt = clock.choose(sim.limit)  # 1: dt between n and n+1
+    if clock.collapsed:
+        raise PhysicsError(
+            f"{_when(sim)}: {sim.limiting_tet()} is crushed; the stable step is {clock.stable:.3g} s. Where its "
+            "part erodes (parts[].erosion) such a tet leaves"
+        )
+    acts = sim.acts
+    _before_kick(sim, acts)  # 2 to 4
+    if sim.contact is not None and clock.step == 0 and sim.contact.look_ahead(nodes):
+        mean_dt = clock.choose_again(sim.limit)
+    if sim.fracture is not None:
+        sim.fracture.let_go()  # 5: f(n), less where cohesive facets would give what nobody has paid
+    # v*(n+1/2) = v(n-1/2) + dt f(n) / m
+    sim.leapfrog.kick(nodes, mean_dt / nodes.scale, clock.shorter / nodes.scale)
+    _after_kick(sim, acts)  # 6 to 9: v(n+1/2)
 
 
 def end(sim: Simulation, before: Floats) -> None:
@@ -77,55 +80,53 @@ def end(sim: Simulation, before: Floats) -> None:
         nodes.v[sim.erosion.removed] = 0.0
 
 
-def _before_kick(sim: Simulation) -> None:
+def _before_kick(sim: Simulation, acts: Acts) -> None:
     """2 to 4, with v(n-1/2)."""
     nodes, erosion, contact = sim.model.nodes, sim.erosion, sim.contact
-    for stage in (*sim.boundaries, erosion, contact):
-        if stage is not None:
-            stage.note(nodes)  # 2: half of the impulse times v(n-1/2)
+    for boundary in acts.noting:
+        boundary.note(nodes)  # 2: half of the impulse times v(n-1/2)
+    if erosion is not None:
+        erosion.note(nodes)
+    if contact is not None:
+        contact.note(nodes)
     if erosion is not None:
         erosion.remove(nodes)  # 3: what the tets covered is surface now
     if contact is not None:
         contact.search_if_due(nodes)  # 4: candidate pairs of the surface as it is now
 
 
-def _after_kick(sim: Simulation) -> None:
+def _after_kick(sim: Simulation, acts: Acts) -> None:
     """6 to 9: from v*(n+1/2) to v(n+1/2)."""
     nodes, dt, t = sim.model.nodes, sim.clock.dt, sim.clock.t
-    for boundary in sim.boundaries:
-        if not boundary.after_contact:
-            boundary.apply(nodes, dt, t)  # 6
+    for boundary in acts.before_contact:
+        boundary.apply(nodes, dt, t)  # 6
     if sim.erosion is not None:
         sim.erosion.stop_removed(nodes)  # 7
     if sim.contact is not None:
         sim.contact.solve(nodes, dt, t)  # 8
-    for boundary in sim.boundaries:
-        if boundary.after_contact:
-            boundary.apply(nodes, dt, t)  # 9
+    for boundary in acts.after_contact:
+        boundary.apply(nodes, dt, t)  # 9
 
 
 def second_half(sim: Simulation) -> None:
     """11 to 15: from v(n+1/2) to f(n+1)."""
     nodes, clock = sim.model.nodes, sim.clock
-    with sim.timers.phase("nodes"):
-        # 11: x(n+1) = x(n) + dt v(n+1/2)
-        sim.leapfrog.move(nodes, clock.dt, clock.shorter / sim.scale)
-        for boundary in sim.boundaries:
-            boundary.after_move(nodes)  # images of debris that passes a symmetry plane
-        clock.advance()
-        if sim.contact is not None:
-            own = sim.reduction.own
-            own.search, own.approach, own.opening = sim.contact.spent(nodes), sim.contact.approach, sim.contact.opening
-            own.stray = sim.contact.stray
-            own.costs[:], own.unsettled[:] = sim.contact.costs, sim.contact.need.unsettled
+    # 11: x(n+1) = x(n) + dt v(n+1/2)
+    sim.leapfrog.move(nodes, clock.dt, clock.shorter / nodes.scale)
+    for boundary in sim.acts.moving:
+        boundary.after_move(nodes)  # images of debris that passes a symmetry plane
+    clock.advance()
+    if sim.contact is not None:
+        own = sim.reduction.own
+        own.search, own.approach, own.opening = sim.contact.spent(nodes), sim.contact.approach, sim.contact.opening
+        own.stray = sim.contact.stray
+        own.costs[:], own.unsettled[:] = sim.contact.costs, sim.contact.need.unsettled
     _elements(sim, clock.dt, sim.fracture)  # 12 to 14
-    if sim.crushing is not None:
-        with sim.timers.phase("elements"):
-            sim.crushing.look()
-    if sim.fracture is not None:
-        with sim.timers.phase("fracture"):
-            # 15: facets break, nodes separate, f(n+1) goes with them
-            sim.fracture.advance(sim.reduction.breaking, sim.reduction.touched)
+    if sim.fracture is not None and sim.reduction.breaking != NOTHING:
+        sim.timers.switch("fracture")
+        # 15: facets break, nodes separate, f(n+1) goes with them
+        sim.fracture.advance(sim.reduction.breaking, sim.reduction.touched)
+    sim.timers.switch("rest")
 
 
 def _elements(sim: Simulation, dt: float, fracture: Fracture | None) -> None:
@@ -133,37 +134,39 @@ def _elements(sim: Simulation, dt: float, fracture: Fracture | None) -> None:
     present one.
     """
     elements, reduction, own = sim.elements, sim.reduction, sim.reduction.own
-    sim.scale = sim.next_scale()
-    with sim.timers.phase("elements"):
-        elements.advance(dt, sim.scale)
+    scale = sim.scale = sim.next_scale()
+    sim.timers.switch("elements")
+    elements.advance(dt, scale)
+    if sim.crushing is not None:
+        sim.crushing.look()
     own.breaking = OVERSTRESSED if elements.hot else NOTHING
+    sim.timers.switch("exchange")
     if fracture is not None:
-        with sim.timers.phase("exchange"):
-            elements.finish()
-        with sim.timers.phase("fracture"):
-            own.breaking = fracture.find(own.touched)
-    with sim.timers.phase("exchange"):
-        own.limit, own.force, own.worn = elements.limit, elements.force, elements.worn
-        if sim.erosion is not None:
-            own.worn = max(own.worn, sim.erosion.strikes())
-        own.nodes = sim.model.nodes_global
-        reduction.begin(sim.comm)
-        if fracture is None:
-            elements.finish()
-        reduction.finish()
-        sim.model.nodes_global = reduction.nodes
+        elements.finish()
+        sim.timers.switch("fracture")
+        own.breaking = fracture.find(own.touched)
+        sim.timers.switch("exchange")
+    own.limit, own.force, own.worn = elements.limit, elements.force, elements.worn
+    if sim.erosion is not None:
+        own.worn = max(own.worn, sim.erosion.strikes())
+    own.nodes = sim.model.nodes_global
+    reduction.begin(sim.comm)
+    if fracture is None:
+        elements.finish()
+    reduction.finish()
+    sim.model.nodes_global = reduction.nodes
     if not (math.isfinite(reduction.limit) and math.isfinite(reduction.force)):
         raise PhysicsError(f"{_when(sim)}: {sim.limiting_tet()} {failed.why(sim)}")
     if sim.contact is not None:
         sim.contact.agree(reduction)
     if sim.erosion is not None:
         sim.erosion.decide(reduction.worn)
-    if fixed_point.outgrown(reduction.force, sim.scale):
+    if fixed_point.outgrown(reduction.force, scale):
         sim.scale = fixed_point.scale_for(reduction.force)
-        with sim.timers.phase("elements"):
-            elements.again(sim.scale)
-        with sim.timers.phase("exchange"):
-            elements.finish()
+        sim.timers.switch("elements")
+        elements.again(sim.scale)
+        sim.timers.switch("exchange")
+        elements.finish()
 
 
 def _when(sim: Simulation) -> str:

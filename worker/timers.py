@@ -79,6 +79,7 @@ class Timers:
 
     def __init__(self, comm: Comm, team: Team) -> None:
         self._comm, self._team = comm, team
+        self._blocks = {name: _Phase(self, name) for name in PHASES}
         self.spent = Spent()
         self.begin()
 
@@ -102,10 +103,12 @@ class Timers:
 
     def phase(self, name: str) -> "_Phase":
         """Adds the time of the block to a phase; a phase within it takes its own time out."""
-        return _Phase(self, name)
+        return self._blocks[name]
 
     def switch(self, name: str) -> str:
-        """Ends the present phase, which it returns, and begins another one."""
+        """Ends the present phase, which it returns, and begins another one. Each change of the phase reads the clock of
+        the thread, a call of the system of up to 1 us: a step makes as few as it can.
+        """
         cpu, wall, waited, within = cpu_time(), wall_time(), self._comm.waited, self._team.within
         ended, spent = self._phase, self.spent
         idle, inside = waited - self._waited, within - self._within
@@ -139,15 +142,16 @@ class Timers:
 
 
 class _Phase:
-    """A block of the step; there are two dozen in every step, too many for generators."""
+    """Blocks of the step, which may lie within each other; two dozen in every step, too many for generators."""
 
     __slots__ = ("_name", "_outer", "_timers")
 
     def __init__(self, timers: Timers, name: str) -> None:
         self._timers, self._name = timers, name
+        self._outer: list[str] = []
 
     def __enter__(self) -> None:
-        self._outer = self._timers.switch(self._name)
+        self._outer.append(self._timers.switch(self._name))
 
     def __exit__(self, *_: object) -> None:
-        self._timers.switch(self._outer)
+        self._timers.switch(self._outer.pop())

@@ -10,11 +10,11 @@ if __name__ == "__main__":
     from conoid.worker.main import main
     from conoid.worker.parallel.mpi import leave
 
-    last, propose = int(sys.argv[1]), Loop._propose
+    last, attend = int(sys.argv[1]), Loop._attend
 
     def stop_there(loop: Loop) -> None:
         loop._signals.raised |= loop.sim.clock.step + 1 >= last
-        propose(loop)
+        attend(loop)
 
-    Loop._propose = stop_there  # type: ignore[method-assign,assignment]
+    Loop._attend = stop_there  # type: ignore[method-assign,assignment]
     leave(main(sys.argv[2:]))

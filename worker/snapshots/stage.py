@@ -28,6 +28,9 @@ _CROWDED = 1.0 / 20.0
 """The same of a core, for the process that makes snapshots, where ranks have all cores: all wait for the one that
 shares its core. Chosen: a run takes a twentieth longer at most, and a body of 150,000 tets is still seen every 6 s."""
 
+_EARLY = 1e-6
+"""Of the time between two snapshots: far more than what rounding does."""
+
 
 class Snapshots:
     """The snapshots of a run; ``journal`` exists on rank 0 only."""
@@ -37,7 +40,9 @@ class Snapshots:
         self._folder, self._journal, self._case, self._comm = folder, journal, sim.case, sim.comm
         self._n: int = sim.comm.broadcast(journal.snapshots if journal is not None else 0)
         self._courier = Courier(folder, sim.comm.rank)
-        self._next = self._place(sim.clock) + 1
+        self.next_time = math.inf
+        """Until then, in simulated time, s, none is due but one that is asked for."""
+        self._wait(self._place(sim.clock) + 1)
         self._taken = self._took = self._packed = 0.0
         self._crowded = len(os.sched_getaffinity(0)) <= sim.comm.size
         self._dropped = 0
@@ -54,6 +59,11 @@ class Snapshots:
             return False
         apart = pause(self._took, self._packed, crowded=self._crowded)
         return self._asked_for or (self._place(clock) >= self._next and now - self._taken >= apart)
+
+    @property
+    def asked_for(self) -> bool:
+        """Whether somebody has asked for one that is not made yet."""
+        return self._asked_for
 
     def look(self, sim: Simulation, *, due: bool, ending: bool) -> None:
         """Gives away a copy of the present state when one is due, or when it is the first or the last."""
@@ -93,6 +103,13 @@ class Snapshots:
         self.tell()
         self._comm.await_all()
 
+    def _wait(self, place: int) -> None:
+        """The next one is due at the evenly spaced time of that number; a little earlier it is asked whether it is."""
+        self._next = place
+        run = self._case.run
+        if run.snapshots:
+            self.next_time = (place - _EARLY) / run.snapshots * run.end_time
+
     def _place(self, clock: Clock) -> int:
         """How many evenly spaced times have come."""
         run = self._case.run
@@ -105,7 +122,8 @@ class Snapshots:
             (self._folder / layout.SNAPSHOT_REQUEST).unlink(missing_ok=True)
         self._asked_for = False
         place = self._place(clock)
-        passed, self._next = max(0, place - self._next) + self._dropped, max(self._next, place + 1)
+        passed = max(0, place - self._next) + self._dropped
+        self._wait(max(self._next, place + 1))
         self._dropped = 0
         return {
             "n": self._n, "step": clock.step, "t": clock.t, "ranks": sim.comm.size, "parts": sim.model.parts,
