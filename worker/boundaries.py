@@ -12,9 +12,13 @@ from typing import Self
 
 import numpy as np
 
+from . import impulses
 from .growing import Rooms
 from .jit import njit
 from .migration.parcel import Parcel, length
+from .parallel.arguments import Arguments
+from .parallel.nodes import OverNodes
+from .parallel.team import team
 from .state import Bits, Flags, Floats, Indices, Ints, Nodes, extended
 from .topology import Split
 
@@ -50,6 +54,9 @@ class Boundary(ABC):
         """(n, 3) v(n-1/2), m/s."""
         self._impulse = np.zeros((len(nodes), 3))
         """(n, 3) of the last step, N s."""
+        self.over = OverNodes(team(1))
+        """Whose threads go over its nodes."""
+        self._notes = Arguments(*impulses.NOTE)
         self._rooms = Rooms("nodes", *KEPT, "_before")
         self._kept: tuple[str, ...] = KEPT
         """What it remembers of its nodes."""
@@ -63,6 +70,11 @@ class Boundary(ABC):
 
     def note(self, state: Nodes) -> None:  # noqa: B027 (a symmetry plane does no work)
         """Before the kick: keeps v(n-1/2), and books the second half of the last impulses' work."""
+
+    def _note(self, state: Nodes, account: Floats, factor: float) -> None:
+        """``note`` with an account of the work of its impulses, J; ``factor``: a half with its sign there."""
+        table = self._notes.set(state.v, self.nodes, self._before, self._impulse, account, factor)
+        self.over.run(impulses.note, table, len(self.nodes))
 
     def mirror(self, vectors: Floats) -> None:  # noqa: B027 (most boundaries mirror nothing)
         """Takes what the mirror image cancels out of the means of ``vectors`` (nodes, 3) over the tets of its nodes."""
@@ -137,6 +149,11 @@ class SymmetryPlane(Boundary):
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
         _hold(state.v, self.nodes, self._axis)
+
+    def _note(self, state: Nodes, account: Floats, factor: float) -> None:
+        """``note`` with an account of the work of its impulses, J; ``factor``: a half with its sign there."""
+        table = self._notes.set(state.v, self.nodes, self._before, self._impulse, account, factor)
+        self.over.run(impulses.note, table, len(self.nodes))
 
     def mirror(self, vectors: Floats) -> None:
         _hold(vectors, self.nodes, self._axis)
@@ -214,18 +231,6 @@ def _inherit(nodes, loss, work, impulse, before, n, parents, first):  # type: ig
         at[k] = p
         k += 1
     return at[:k].copy()
-
-
-@njit("void(float64[::1], float64[:, ::1], float64[:, ::1], float64)", cache=True)
-def book_half(account, impulse, v, factor):  # type: ignore[no-untyped-def]
-    """Adds ``factor``, a half with a sign, times the work of the impulses (n, 3) at velocities ``v`` (n, 3) to an
-    ``account`` (n,), J.
-    """
-    for j in range(len(account)):
-        work = 0.0
-        for i in range(3):
-            work += impulse[j, i] * v[j, i]
-        account[j] += factor * work
 
 
 @njit("void(float64[:, ::1], int32[::1], int64)", cache=True)

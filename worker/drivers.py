@@ -2,11 +2,15 @@
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from .boundaries import FREE, KEPT, PRESCRIBED, Boundary, book_half, free
+from . import impulses
+from .boundaries import FREE, KEPT, PRESCRIBED, Boundary, free
+from .jit import Kernel
 from .migration.parcel import Parcel
+from .parallel.arguments import Arguments
 from .state import Bits, Floats, Indices, Ints, Load, Nodes, extended
 from .topology import Split
 from .turning import sine_and_cosine
@@ -16,11 +20,14 @@ class Driver(Boundary):
     """A boundary whose impulses are work from outside."""
 
     def note(self, state: Nodes) -> None:
-        self._before = state.v[self.nodes]
-        self._book()
+        self._note(state, self.external_work, 0.5)
 
-    def _book(self) -> None:
-        book_half(self.external_work, self._impulse, self._before, 0.5)
+    def _act(self, kernel: Kernel, arguments: Arguments, state: Nodes, *values: Any) -> None:
+        """Applies a kernel (impulses.py) with what it takes besides the nodes."""
+        table = arguments.set(
+            state.v, state.mass, self.nodes, self._before, self._impulse, self.external_work, *values
+        )  # fmt: skip
+        self.over.run(kernel, table, len(self.nodes))
 
 
 class Course:
@@ -30,9 +37,12 @@ class Course:
 
     def __init__(self, points: Sequence[tuple[float, float]] = ()) -> None:
         self._times, self._factors = np.array(list(points) or [(0.0, 1.0)]).T
+        self._constant = float(self._factors[0]) if len(self._factors) == 1 else None
 
     def mean(self, begin: float, end: float) -> float:
         """Of the factor between two times, s, exactly; its value where they are one."""
+        if self._constant is not None:
+            return self._constant
         within = self._times[(self._times > begin) & (self._times < end)]
         times = np.array([begin, *within, end])
         values = np.interp(times, self._times, self._factors)
@@ -49,6 +59,7 @@ class Gravity(Driver):
     def __init__(self, nodes: Indices, acceleration: Floats, course: Course) -> None:
         super().__init__(nodes)
         self._acceleration, self._course = acceleration, course
+        self._arguments = Arguments(*impulses.ACCELERATE)
         self._last_dt = 0.0
 
     def held_components(self) -> Bits:
@@ -62,9 +73,7 @@ class Gravity(Driver):
         factor = self._course.mean(t - 0.5 * self._last_dt, t + 0.5 * dt)
         gained = 0.5 * (self._last_dt + dt) * factor * self._acceleration
         self._last_dt = dt
-        self._impulse = state.mass[self.nodes, None] * gained
-        state.v[self.nodes] += gained
-        self._book()
+        self._act(impulses.accelerate, self._arguments, state, gained)
 
 
 class Traction(Driver):
@@ -79,6 +88,7 @@ class Traction(Driver):
     def __init__(self, corners: Indices, load: Load, course: Course) -> None:
         super().__init__(np.unique(corners))
         self._corners, self._load, self._course = corners, load, course
+        self._arguments = Arguments(*impulses.PUSH)
         self.force = self._summed()
         """(n, 3) N."""
         self._last_dt = 0.0
@@ -120,10 +130,9 @@ class Traction(Driver):
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
         mean_dt = 0.5 * (self._last_dt + dt)
-        self._impulse = mean_dt * self._course.mean(t - 0.5 * self._last_dt, t + 0.5 * dt) * self.force
+        factor = mean_dt * self._course.mean(t - 0.5 * self._last_dt, t + 0.5 * dt)
         self._last_dt = dt
-        state.v[self.nodes] += self._impulse / state.mass[self.nodes, None]
-        self._book()
+        self._act(impulses.push, self._arguments, state, self.force, factor)
 
 
 class PrescribedVelocity(Driver):
@@ -134,8 +143,8 @@ class PrescribedVelocity(Driver):
 
     def __init__(self, nodes: Indices, velocity: Floats, course: Course) -> None:
         super().__init__(nodes)
-        self._course = course
-        self._velocity = np.broadcast_to(velocity, (len(nodes), 3))
+        self._course, self._arguments = course, Arguments(*impulses.PRESCRIBE)
+        self._velocity: Floats = np.array(np.broadcast_to(velocity, (len(nodes), 3)), order="C")
 
     def held_components(self) -> Bits:
         return np.where(np.isnan(self._velocity), FREE, PRESCRIBED).astype(np.uint8)
@@ -143,29 +152,34 @@ class PrescribedVelocity(Driver):
     def _inherit(self, at: Ints) -> None:
         self._velocity = extended(self._velocity, self._velocity[at])
 
-    def _target(self, state: Nodes, dt: float, t: float) -> Floats:
-        free = state.v[self.nodes]
-        return np.where(np.isnan(self._velocity), free, self._course.mean(t, t + dt) * self._velocity)
-
     def start(self, state: Nodes) -> None:
-        state.v[self.nodes] = self._target(state, 0.0, 0.0)
+        free = np.isnan(self._velocity)
+        state.v[self.nodes] = np.where(free, state.v[self.nodes], self._course.mean(0.0, 0.0) * self._velocity)
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
-        new = self._target(state, dt, t)
-        self._impulse = state.mass[self.nodes, None] * (new - state.v[self.nodes])
-        state.v[self.nodes] = new
-        self._book()
+        self._act(impulses.prescribe, self._arguments, state, self._velocity, self._course.mean(t, t + dt))
 
 
-class PrescribedRotation(PrescribedVelocity):
+class PrescribedRotation(Driver):
     """Nodes that turn rigidly: each step is the chord of the exact rotation."""
 
     def __init__(self, nodes: Indices, centre: Floats, rate: Floats) -> None:
-        super().__init__(nodes, np.zeros(3), Course())
-        self._centre = centre
-        self._rate = rate
+        super().__init__(nodes)
+        self._centre, self._rate = centre, rate
+        self._arguments = Arguments(*impulses.PRESCRIBE)
 
-    def _target(self, state: Nodes, dt: float, t: float) -> Floats:
+    def held_components(self) -> Bits:
+        return np.full((len(self.nodes), 3), PRESCRIBED, np.uint8)
+
+    def start(self, state: Nodes) -> None:
+        state.v[self.nodes] = self._chord(state, 0.0)
+
+    def apply(self, state: Nodes, dt: float, t: float) -> None:
+        chord = np.ascontiguousarray(self._chord(state, dt))
+        self._act(impulses.prescribe, self._arguments, state, chord, 1.0)
+
+    def _chord(self, state: Nodes, dt: float) -> Floats:
+        """(n, 3) the velocities of a step ``dt``, s, m/s."""
         r = state.x[self.nodes] - self._centre
         speed = math.sqrt(sum(float(component) ** 2 for component in self._rate))
         if dt == 0.0 or speed == 0.0:

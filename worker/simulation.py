@@ -32,6 +32,7 @@ from .mirrors import Mirrors
 from .motion import Leapfrog
 from .parallel import fixed_point
 from .parallel.comm import Comm
+from .parallel.nodes import OverNodes
 from .parallel.ownership import Neighbour
 from .parallel.team import Team, team
 from .probes import Probes
@@ -183,6 +184,8 @@ def _assemble(
     walls = next((bound for bound in scene if type(bound) is RigidWalls), None)
     probes = Probes(case, model, contact, walls, clock, comm)
     threads = team(run.threads)
+    for bound in scene:
+        bound.over = OverNodes(threads)
     elements = _elements(case, model, neighbours, scene, node_volume, comm, timers, threads)
     fracture = None
     if case.fractures:

@@ -2,9 +2,12 @@
 
 import numpy as np
 
-from .boundaries import KEPT, Boundary, book_half, free, mirrored
-from .jit import njit
+from .boundaries import KEPT, Boundary, free, mirrored
+from .impulses import book
+from .jit import njit, types
 from .migration.parcel import Parcel
+from .parallel.arguments import Arguments, reader
+from .parallel.team import TASK
 from .state import Bits, Flags, Floats, Indices, Ints, Nodes, extended
 
 _SWEEPS = 4
@@ -40,6 +43,7 @@ class RigidWalls(Boundary):
         self._normals = normals / np.linalg.norm(normals, axis=1)[:, None]
         self._held = held
         self._pushed = False
+        self._pushes = Arguments(*_PUSH)
         self.given = np.zeros((len(nodes), 3 * len(points)))
         """(n, 3 walls) what each wall has given each node so far, N s."""
         self._kept = (*KEPT, "given")
@@ -73,43 +77,52 @@ class RigidWalls(Boundary):
         self._pushed = True
 
     def note(self, state: Nodes) -> None:
-        self._before = state.v[self.nodes]
+        self._note(state, self.contact_loss, -0.5)
         if self._pushed:
-            self._book()
+            if self.friction_loss is not None:
+                book_all(self.friction_loss, self._rubbed, self._before)
             self._impulse[:], self._rubbed[:] = 0.0, 0.0
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
-        self._pushed = _push_out(
-            state.x, state.v, self._impulse, self._rubbed, self.given, state.mass, self.nodes, self._points,
-            self._normals, self._friction, self._held, self._mirrored, dt,
+        pushed = np.zeros((self.over.threads, 8))
+        rubs = self.friction_loss is not None
+        table = self._pushes.set(
+            state.x, state.v, state.mass, self.nodes, self._before, self._impulse, self._rubbed, self.given,
+            self.contact_loss, self.friction_loss if rubs else self.contact_loss[:0], self._points, self._normals,
+            self._friction, self._held, self._mirrored, pushed, dt,
         )  # fmt: skip
+        self.over.run(_push_out, table, len(self.nodes))
+        self._pushed = bool(pushed[:, 0].any())
         if self._pushed:
             self.last_push = t
-            self._book()
-
-    def _book(self) -> None:
-        book_half(self.contact_loss, self._impulse, self._before, -0.5)
-        if self.friction_loss is not None:
-            book_half(self.friction_loss, self._rubbed, self._before, -0.5)
 
 
-@njit(
-    "boolean(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], "
-    "int32[::1], float64[:, ::1], float64[:, ::1], float64[::1], boolean[:, ::1], boolean[:, ::1], float64)",
-    cache=True,
-    error_model="numpy",
-)
-def _push_out(  # type: ignore[no-untyped-def]
-    x, v, impulse, rubbed, given, mass, nodes, points, normals, friction, held, mirrored, dt
-):
+_F, _F1, _F2, _B2 = types.float64, types.float64[::1], types.float64[:, ::1], types.boolean[:, ::1]
+_PUSH = _F2, _F2, _F1, types.int32[::1], _F2, _F2, _F2, _F2, _F1, _F1, _F2, _F2, _F1, _B2, _B2, _F2, _F
+_of_push = reader(*_PUSH)
+
+
+@njit("void(float64[::1], float64[:, ::1], float64[:, ::1])", cache=True)
+def book_all(loss, impulse, before):  # type: ignore[no-untyped-def]
+    """Half of what the impulses (n, 3) take at the velocities ``before`` them."""
+    for j in range(len(loss)):
+        book(loss, impulse, before, j, -0.5)
+
+
+@njit(TASK, cache=True, error_model="numpy")
+def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
     """Impulse form: the gap at the end of the step is never negative; the impulse is along what is left of the normal
     without the ``mirrored`` components, and that of friction across it. Adds to ``impulse``, to what of it friction has
-    ``rubbed``, where there is some, and to what each wall has ``given``; whether a wall pushed.
+    ``rubbed``, where there is some, and to what each wall has ``given``, and books half of the work; ``pushed``
+    (threads, 8): whether a wall did, and room.
     """
-    pushed = False
-    slide = np.empty(3)
-    for j in range(len(nodes)):
-        a = nodes[j]
+    (
+        x, v, mass, nodes, before, impulse, rubbed, given, loss, friction_loss, points, normals, friction, held,
+        mirrored, pushed, dt,
+    ) = _of_push(table)  # fmt: skip
+    slide = pushed[thread, 1:4]
+    for j in range(begin, end):
+        a, any_moved = nodes[j], False
         for _ in range(_SWEEPS):
             moved = False
             for k in range(len(points)):
@@ -128,7 +141,7 @@ def _push_out(  # type: ignore[no-untyped-def]
                         v[a, i] += change
                         impulse[j, i] += mass[a] * change
                         given[j, 3 * k + i] += mass[a] * change
-                    moved = pushed = True
+                    moved = any_moved = True
                     if friction[k] == 0.0:
                         continue
                     speed, size = 0.0, 0.0
@@ -146,4 +159,8 @@ def _push_out(  # type: ignore[no-untyped-def]
                         given[j, 3 * k + i] -= mass[a] * share * slide[i]
             if not moved or len(points) == 1:
                 break
-    return pushed
+        if any_moved:
+            pushed[thread, 0] = 1.0
+            book(loss, impulse, before, j, -0.5)
+            if len(friction_loss) > 0:
+                book(friction_loss, rubbed, before, j, -0.5)

@@ -50,6 +50,12 @@ def test_arrays_of_a_table_lie_in_c_order() -> None:
         Arguments(*KINDS).set((np.zeros((3, 2)).T, True, np.zeros(1, np.int64)), 1.0, 1)
 
 
+def test_arrays_of_a_table_are_of_its_types() -> None:
+    for values in (np.zeros((2, 3), np.float32), np.zeros(6)):
+        with pytest.raises(ValueError, match="instead of"):
+            Arguments(*KINDS).set((values, True, np.zeros(1, np.int64)), 1.0, 1)
+
+
 @pytest.mark.parametrize("threads", [1, 2, 5])
 def test_every_task_is_done_once_in_each_of_many_passes(threads: int) -> None:
     done, who = np.zeros(600, np.int64), np.zeros(600, np.int64)

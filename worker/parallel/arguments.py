@@ -37,7 +37,8 @@ class Arguments:
 
     def set(self, *values: Any) -> int:
         """Takes the arguments, tuples of them among them; returns the address. Only what is not the object that the
-        table had before is written. Raises ValueError where an array does not lie in C order.
+        table had before is written. Raises ValueError where an array does not lie in C order or is not of its
+        type.
         """
         flat: list[Any] = []
         for value in values:
@@ -55,6 +56,8 @@ class Arguments:
         if isinstance(kind, types.Array):
             if not value.flags.c_contiguous:
                 raise ValueError("an array of a table lies in C order")
+            if (value.ndim, value.dtype) != (kind.ndim, _dtype(kind)):
+                raise ValueError(f"an array of a table is {value.dtype} with {value.ndim} axes instead of {kind}")
             self._words[at] = value.ctypes.data
             for axis, length in enumerate(value.shape):
                 self._words[at + 1 + axis] = length
@@ -62,6 +65,10 @@ class Arguments:
             self._reals[at] = value
         else:
             self._words[at] = int(value)
+
+
+def _dtype(kind: Any) -> np.dtype[Any]:
+    return np.dtype(str(kind.dtype).replace("boolean", "bool"))
 
 
 def _leaves(kind: Any) -> Iterator[Any]:

@@ -14,7 +14,7 @@ class OverNodes:
     """Has the threads of a team run kernels over nodes."""
 
     def __init__(self, team: Team) -> None:
-        self._team = team
+        self._team, self.threads = team, team.threads
         self._n, self._tasks = 0, _tasks(0)
 
     def run(self, kernel: Kernel, table: int, n: int) -> None:
