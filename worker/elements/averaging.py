@@ -62,8 +62,8 @@ class AveragedElements(Elements):
     def grow(self, copies: Copies) -> None:
         super().grow(copies)
         parents = copies.parents
-        names = ["_weight", "_bulk", "_volumes"]
-        names += ["_gradient", "_projected", "pressure"] if self.split else []
+        names = ["_weight", "_bulk", "_volumes", "_strain", "_more"]
+        names += ["_gradient", "_projected", "pressure", "_sizes"] if self.split else []
         names += ["_matter"] if self._pressed else []
         for name in names:
             values = getattr(self, name)
@@ -115,9 +115,6 @@ class AveragedElements(Elements):
                 boundary.mirror(self._projected)
 
     def _means(self) -> Values:
-        n = self.model.nodes.n
-        if len(self._strain) != n:
-            self._strain, self._more, self._sizes = np.zeros(n), np.zeros(n), np.zeros(n if self.split else 1)
         return (
             self._volumes, self._weight, self._strain, self._more, self.split, self.pressure, self._projected,
             self._gradient, self._matter,

@@ -25,6 +25,8 @@ class Arguments:
 
     def __init__(self, *kinds: Any) -> None:
         self._kinds = list(_leaves(several(*kinds)))
+        self._is_array = [isinstance(kind, types.Array) for kind in self._kinds]
+        self._is_real = [kind == types.float64 for kind in self._kinds]
         leaves = [_words(kind) for kind in self._kinds]
         self._places = np.cumsum([0, *leaves])[:-1].tolist()
         words = np.zeros(sum(leaves), np.int64)
@@ -52,8 +54,9 @@ class Arguments:
         return self.address
 
     def _put(self, k: int, value: Any) -> None:
-        at, kind = self._places[k], self._kinds[k]
-        if isinstance(kind, types.Array):
+        at = self._places[k]
+        if self._is_array[k]:
+            kind = self._kinds[k]
             if not value.flags.c_contiguous:
                 raise ValueError("an array of a table lies in C order")
             if (value.ndim, value.dtype) != (kind.ndim, _dtype(kind)):
@@ -61,7 +64,7 @@ class Arguments:
             self._words[at] = value.ctypes.data
             for axis, length in enumerate(value.shape):
                 self._words[at + 1 + axis] = length
-        elif kind == types.float64:
+        elif self._is_real[k]:
             self._reals[at] = value
         else:
             self._words[at] = int(value)
