@@ -12,7 +12,7 @@ SCENE = str(Path(__file__).with_name("breaking.toml"))
 
 
 def test_contact_and_fracture_load_no_kernel_once_steps_have_begun(tmp_path: Path) -> None:
-    finished = ended(command(3, SCENE, "--out", str(tmp_path / "run"), module=[PROGRAM]))
+    finished = ended(command(2, SCENE, "--out", str(tmp_path / "run"), module=[PROGRAM]))
     assert finished.returncode == 0, finished.stderr
     late = [line.removeprefix("late: conoid.worker.") for line in finished.stdout.splitlines() if "late: " in line]
     assert late, "those that all ranks call in their first step are loaded there"

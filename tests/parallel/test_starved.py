@@ -73,7 +73,7 @@ def test_flat_is(tmp_path: Path, ranks: int) -> None:
     assert " of block): about " in line
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.slow), 2])
 def test_what_is_used_up_says_how_short_the_steps_were(tmp_path: Path, ranks: int) -> None:
     """A fifth of its height is left."""
     end = outcome(tmp_path, "1.1 ms", ranks, "--set", "run.max_steps=300")

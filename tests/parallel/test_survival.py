@@ -140,7 +140,6 @@ FIXED = [(2, 2, 11), (3, 1, 24), (1, 3, 10**9)]
     ("name", "legs"),
     [
         pytest.param("nodal", FIXED, id="nodal, fixed"),
-        pytest.param("nodal", sample(SEED, 3, STEPS), id=f"nodal, sample {SEED}"),
         *(
             pytest.param(name, sample(SEED + k, 5, STEPS), id=f"{name}, sample {SEED + k}", marks=pytest.mark.slow)
             for k, name in enumerate([*SCENES, "eroding"])
