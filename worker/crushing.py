@@ -61,24 +61,41 @@ def _beyond(s1, s3, strength):  # type: ignore[no-untyped-def]
     return (s1 - s3) ** 2 / (8.0 * strength * (s1 + s3)) if s1 > 0.0 else 0.0
 
 
+@njit("boolean(float64[::1], int64, float64)", cache=True, error_model="numpy", forceinline=True)
+def _below(s, i, least):  # type: ignore[no-untyped-def]
+    """Whether 8 T times the number of tet ``i`` of a chunk is below ``least``, Pa, by two bounds of the invariants. The
+    number is at most s1 / 8 T, and s1 <= p + 2 r, r = sqrt(J2 / 3). And s1 - s3 <= 2 sqrt(J2), s1 + s3 >= 2 p - r.
+    """
+    xx, yy, zz, yz, zx, xy = s[_SXX + i], s[_SYY + i], s[_SZZ + i], s[_SYZ + i], s[_SZX + i], s[_SXY + i]
+    j2 = 0.5 * (xx * xx + yy * yy + zz * zz) + yz * yz + zx * zx + xy * xy
+    r, p = np.sqrt(j2 / 3.0), s[_P + i]
+    return (p + 2.0 * r < least) | (4.0 * j2 < least * (2.0 * p - r))
+
+
+@njit("int64(float64[::1], int64, float64)", cache=True, error_model="numpy")
+def _not_below(s, n, least):  # type: ignore[no-untyped-def]
+    """How many of the ``n`` tets of a chunk are not. The loop has no branch: it uses vector instructions."""
+    some = 0
+    for i in range(n):
+        some += 0 if _below(s, i, least) else 1
+    return some
+
+
 @njit("Tuple((int64, float64))(float64[:, :, ::1], int64[::1], int64, float64, float64)", cache=True,
       error_model="numpy")  # fmt: skip
 def hardest(state, ids, n, strength, known):  # type: ignore[no-untyped-def]
     """The place of the tet that exceeds the criterion most, and by how many times, where that is more than ``known``;
     -1 where none is. Of equal ones that with the smallest id.
 
-    Most tets are passed over by two bounds of the invariants. The number is at most s1 / 8 T, and s1 <= p + 2 r,
-    r = sqrt(J2 / 3). And s1 - s3 <= 2 sqrt(J2), s1 + s3 >= 2 p - r.
+    Most chunks, and most tets of the others, are passed over by a bound.
     """
     place, best = -1, known
     for c in range((n + CHUNK - 1) // CHUNK):
-        s = state[c].reshape(-1)
-        for i in range(min(CHUNK, n - c * CHUNK)):
-            xx, yy, zz = s[_SXX + i], s[_SYY + i], s[_SZZ + i]
-            yz, zx, xy = s[_SYZ + i], s[_SZX + i], s[_SXY + i]
-            j2 = 0.5 * (xx * xx + yy * yy + zz * zz) + yz * yz + zx * zx + xy * xy
-            r, p = np.sqrt(j2 / 3.0), s[_P + i]
-            if p + 2.0 * r < 8.0 * strength * best or 4.0 * j2 < 8.0 * strength * best * (2.0 * p - r):
+        s, here = state[c].reshape(-1), min(CHUNK, n - c * CHUNK)
+        if _not_below(s, here, 8.0 * strength * best) == 0:
+            continue
+        for i in range(here):
+            if _below(s, i, 8.0 * strength * best):
                 continue
             s1, s3 = principal(s, i)
             share, at = _beyond(s1, s3, strength), c * CHUNK + i
