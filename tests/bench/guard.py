@@ -1,4 +1,4 @@
-"""What a change costs: four scenes at this commit and at an earlier one, in turn, in one run.
+"""What a change costs: six scenes at this commit and at an earlier one, in turn, in one run.
 
 ``python -m tests.bench.guard [COMMIT] [--only SCENE ...]``; the commit is ``BASE`` where none is given. The earlier
 sources are checked out below build/guard and run by the same Python with the same libraries, one rank each, first the
@@ -42,11 +42,14 @@ class Scene:
 
 _FRAMES = "run.frames=0", "run.snapshots=0", "reference=[]"
 _COARSE = tuple(f"parts[{k}].mesh.element_size=1 mm" for k in range(4))
+_APART = 'contact="none"', "run.end_time=400 us", "run.samples=10"
 SCENES = (
     Scene("shattering bar", "guard_shattering_bar.toml", _FRAMES, 3),
     Scene("glass bar to 40 us", "glass_steel_bar", (*_FRAMES, "run.end_time=40 us", "numerics.dt_safety=0.9"), 1),
     Scene("long rod to 20 us", "long_rod", (*_FRAMES, "run.end_time=20 us"), 2),
     Scene("cradle, fixed costs", "newton_cradle", (*_FRAMES, *_COARSE, "run.end_time=300 us"), 3),
+    Scene("two tets", "two_tets", (*_FRAMES, "run.samples=10"), 5),
+    Scene("crossed bars without contact", "crossed_bars", (*_FRAMES, *_APART), 5),
 )
 QUICK = SCENES[0], SCENES[3]
 
@@ -142,7 +145,7 @@ def _answer(there: Paid, here: Paid) -> str:
 
 def main(arguments: Sequence[str]) -> int:
     """Prints the table; 2 where the commit or a scene is not known."""
-    parser = argparse.ArgumentParser(prog="tests.bench.guard", description="CPU time of four scenes here and there.")
+    parser = argparse.ArgumentParser(prog="tests.bench.guard", description="CPU time of six scenes here and there.")
     parser.add_argument("commit", nargs="?", default=BASE)
     parser.add_argument("--only", action="append", metavar="SCENE", help="a scene by how its name begins")
     asked = parser.parse_args(arguments)
