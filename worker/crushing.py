@@ -106,13 +106,16 @@ def hardest(state, ids, n, strength, known):  # type: ignore[no-untyped-def]
 
 @njit("int64(float64[:, :, ::1], int64, float64)", cache=True, error_model="numpy")
 def crushed(state, n, strength):  # type: ignore[no-untyped-def]
-    """How many of the ``n`` tets are beyond the criterion."""
-    found = 0
+    """How many of the ``n`` tets are beyond the criterion. Chunks and tets are passed over as in ``hardest``."""
+    found, least = 0, 8.0 * strength
     for c in range((n + CHUNK - 1) // CHUNK):
-        s = state[c].reshape(-1)
-        for i in range(min(CHUNK, n - c * CHUNK)):
-            s1, s3 = principal(s, i)
-            found += _beyond(s1, s3, strength) > 1.0
+        s, here = state[c].reshape(-1), min(CHUNK, n - c * CHUNK)
+        if _not_below(s, here, least) == 0:
+            continue
+        for i in range(here):
+            if not _below(s, i, least):
+                s1, s3 = principal(s, i)
+                found += _beyond(s1, s3, strength) > 1.0
     return found
 
 
