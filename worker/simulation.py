@@ -172,18 +172,18 @@ def _assemble(
 ) -> Simulation:  # fmt: skip
     """The stages that the case needs, round a model and its boundaries; ``node_volume`` (nodes,): at the start, m^3."""
     began, run, numerics = worked(comm), case.run, case.numerics
+    threads = team(run.threads)
     clock = Clock(run.end_time, numerics.dt_safety, case.dt_growth, run.frames)
     extremes = _extremes(model, comm)
     contact, erosion = None, None
     if case.in_contact:
-        contact = Contact(case, model, neighbours, scene, comm, clock, timers, extremes[:2])
+        contact = Contact(case, model, neighbours, scene, comm, clock, timers, threads, extremes[:2])
     if case.erodes:
         erosion = Erosion(case, model, neighbours, contact, scene, comm, clock, extremes)
     if case.boundaries_of(Symmetry):
         scene.append(Mirrors.of(case, model, scene, comm))
     walls = next((bound for bound in scene if type(bound) is RigidWalls), None)
     probes = Probes(case, model, contact, walls, clock, comm)
-    threads = team(run.threads)
     for bound in scene:
         bound.over = OverNodes(threads)
     elements = _elements(case, model, neighbours, scene, node_volume, comm, timers, threads)

@@ -16,15 +16,18 @@ from conoid.worker.contact.narrow_phase import (
     ContactRows,
     EdgeTable,
     FaceTable,
+    Pairs,
     SlotTable,
     Step,
 )
 from conoid.worker.contact.pairs import PairTable
 from conoid.worker.contact.records import Crowd
+from conoid.worker.contact.rows import ActiveRows
 from conoid.worker.contact.solver import ActiveSet
 from conoid.worker.contact.stops import Stops
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.parallel.fixed_point import Tally
+from conoid.worker.parallel.team import team
 
 from ..worker.meshes import Floats
 from .bodies import Indices
@@ -91,13 +94,13 @@ def step_of(x: Floats, v: Floats, part: "np.ndarray", dt: float, mu: Floats | No
 def slot_table(first: Indices, normals: Floats, left: Floats, course: Floats) -> SlotTable:
     """Slots that are all on the surface; see narrow_phase.SlotTable."""
     n = len(first)
-    return SlotTable(normals, np.ones(n, bool), first, left, course, np.zeros(n, bool), np.empty(n, np.int32))
+    return SlotTable(normals, np.ones(n, bool), first, left, course, np.zeros(n, bool))
 
 
 def face_table(corners: Indices, size: Floats, left: Floats) -> FaceTable:
     """Exposed faces, by ascending id."""
     n, none = len(corners), np.zeros(len(corners), bool)
-    return FaceTable(corners, size, np.arange(n), ~none, left, none.copy(), np.empty((n, 3)), none.copy())
+    return FaceTable(corners, size, np.arange(n), ~none, left, none.copy())
 
 
 def edge_table(corners: Indices, size: Floats, deep: Floats, left: Floats) -> EdgeTable:
@@ -113,6 +116,25 @@ def pair_table(pairs: Indices) -> PairTable:
     return table
 
 
+def faces_met(pairs: Pairs, slots: SlotTable, faces: FaceTable, step: Step, end: float) -> tuple[ContactRows, int]:
+    """The contacts of nodes and faces, and how many pairs were tested: ``pairs.active`` begins with them."""
+    n = len(pairs.rows)
+    room, depth, found = ContactRows.room(n), np.zeros(n), np.arange(n, dtype=np.int32)
+    tested = int(face_kernels.due(pairs, slots, faces, end + step.beyond, 0, n))
+    met, _ = face_kernels.node_face(room, depth, 0, pairs, slots, faces, step, end, 0, tested)
+    holder = np.full(len(step.x), -1, np.int32)
+    held = face_kernels.nearest(found[:met], room, depth, pairs, faces, step.part, holder)
+    assert (holder == -1).all()
+    return taken(room, found[:held]), tested
+
+
+def edges_met(pairs: Pairs, edges: EdgeTable, step: Step, course: Floats, end: float) -> tuple[ContactRows, int]:
+    """The contacts of edges, and how many pairs were tested: ``pairs.active`` begins with them."""
+    room = ContactRows.room(len(pairs.rows))
+    met, tested = edge_kernels.edge_edge(room, 0, pairs, edges, step, course, end, 0, len(pairs.rows))
+    return taken(room, np.arange(met)), int(tested)
+
+
 def node_face(
     x: Floats, v: Floats, faces: Indices, pairs: Indices, dt: float, part: "np.ndarray | None" = None,
     mu: Floats | None = None, out: Floats | None = None, normals: Floats | None = None,
@@ -123,27 +145,27 @@ def node_face(
     ``normals`` (n, 12), see SlotTable.
     """
     own = np.where(np.isin(np.arange(len(x)), faces), 0, 1) if part is None else part
-    room, table, first = ContactRows.room(len(pairs)), pair_table(pairs), np.full(len(x), -1, np.int32)
+    table, first = pair_table(pairs), np.full(len(x), -1, np.int32)
     table.hang(first, 0)
     if normals is None:
         normals = np.zeros((len(x), 12)) if out is None else moments(out)
     slots = slot_table(first, normals, np.zeros(len(x)), v.copy())
     of = face_table(faces, face_sizes(x, faces), np.zeros(len(faces)))
-    found, tested, _ = face_kernels.node_face(room, 0, table.arrays(), slots, of, step_of(x, v, own, dt, mu), 0.0)
+    met, tested = faces_met(table.arrays(), slots, of, step_of(x, v, own, dt, mu), 0.0)
     assert tested == len(pairs)
-    return taken(room, np.arange(found))
+    return met
 
 
 def edge_edge(
     x: Floats, v: Floats, edges: Indices, pairs: Indices, dt: float, mu: Floats | None = None, *, never: int = 0
 ) -> ContactRows:  # fmt: skip
     """The edges that pass an edge; ``never``: how many of the pairs cannot."""
-    room, table = ContactRows.room(len(pairs)), pair_table(pairs)
+    table = pair_table(pairs)
     of = edge_table(edges, edge_sizes(x, edges), edge_depths(x, edges), np.zeros(len(edges)))
     step = step_of(x, v, np.zeros(len(x)), dt, mu)
-    found, tested = edge_kernels.edge_edge(room, 0, table.arrays(), of, step, np.zeros_like(x), 0.0)
+    met, tested = edges_met(table.arrays(), of, step, np.zeros_like(x), 0.0)
     assert tested == len(pairs) - never
-    return taken(room, np.arange(found))
+    return met
 
 
 def column(n: int) -> ContactRows:
@@ -152,6 +174,29 @@ def column(n: int) -> ContactRows:
     weights, normals = np.tile([1.0, -1.0, 0.0, 0.0], (n - 1, 1)), np.tile([1.0, 0.0, 0.0], (n - 1, 1))
     none = np.full(n - 1, -1, np.int32)
     return ContactRows(nodes, weights, normals, np.zeros(n - 1), np.zeros(n - 1), none)
+
+
+def unit(random: np.random.Generator, n: int) -> Floats:
+    """(n, 3) random directions."""
+    directions = random.normal(size=(n, 3))
+    return np.asarray(directions / np.linalg.norm(directions, axis=1)[:, None])
+
+
+def network(
+    seed: int, meetings: int = 30, nodes: int = 25, friction: float = 0.0, wanted: float = 0.0, one_normal: bool = False
+) -> tuple[ContactRows, Floats, Floats]:
+    """Random meetings that share nodes, of nodes with faces and of edges; velocities, and masses of 1000:1."""
+    random = np.random.default_rng(seed)
+    rows = np.array([random.choice(nodes, 4, replace=False) for _ in range(meetings)], np.int32).reshape(-1, 4)
+    share, s, t = random.dirichlet(np.ones(3), meetings), random.uniform(size=meetings), random.uniform(size=meetings)
+    faces = np.column_stack([np.ones(meetings), -share])
+    edges = np.column_stack([1.0 - t, t, s - 1.0, -s])
+    weights = np.where(random.uniform(size=(meetings, 1)) < 0.7, faces, edges)
+    normals = np.tile(unit(random, 1), (meetings, 1)) if one_normal else unit(random, meetings)
+    want, mu = -wanted * random.uniform(size=meetings), np.full(meetings, friction)
+    mobility = np.repeat(10.0 ** random.uniform(-1.5, 1.5, (nodes, 1)), 3, axis=1)
+    pair = np.arange(meetings, dtype=np.int32)
+    return ContactRows(rows, weights, normals, want, mu, pair), 10.0 * random.normal(size=(nodes, 3)), mobility
 
 
 class Solver:
@@ -170,11 +215,17 @@ class Solver:
         nothing, every, part = np.zeros((0, 3)), np.arange(n, dtype=np.int32), np.ones(n, np.int32)
         part[0] = 0
         none = Stops(nothing, nothing, np.zeros((0, 2)), np.zeros(0), np.zeros(0, bool))
-        self.active = active or ActiveSet(scale, stops or none)
+        self.active = active or ActiveSet(scale, stops or none, team(1))
         self._crowd = Crowd(np.arange(n), every, part, part, mobility, np.zeros((n, 3)), self.v, self.v)
         self._nodes: Any = SimpleNamespace(v=self.v, part=part, owned=np.ones(n, bool))
-        alone = Company([], SerialComm()).agree(met.nodes, every)
-        self.active.begin(met, many(met), self._crowd, np.zeros(n, bool), alone, size=1.0, dt=1.0)
+        self.begin(np.zeros((n, 3)))
+
+    def begin(self, x: Floats) -> None:
+        """A step begins, with the nodes at ``x``."""
+        self._crowd.x, met = x, self.met
+        rows = ActiveRows(met, np.arange(many(met), dtype=np.int32), n=many(met))
+        alone = Company([], SerialComm()).agree(rows, self._crowd.local)
+        self.active.begin(rows, self._crowd, np.zeros(len(x), bool), alone, size=1.0, dt=1.0)
         self.active.weigh()
 
     @property

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from conoid.worker.contact.company import Company
+from conoid.worker.contact.narrow_phase import ContactRows
+from conoid.worker.contact.rows import ActiveRows
 from conoid.worker.parallel.comm import Comm
 from conoid.worker.parallel.ownership import Neighbour
 
@@ -35,7 +37,9 @@ def test_who_pushes_or_holds_a_node_has_the_sum_of_all_and_nothing_else_is_sent(
         local[slots[held[me]]] = 0
         contacts = np.repeat(slots[pushed[me]][:, None], 4, axis=1)
         comm.sent.since_last()
-        agreed = company.agree(contacts, local)
+        n = len(contacts)
+        rows = ActiveRows(ContactRows.room(n)._replace(nodes=contacts), np.arange(n, dtype=np.int32), n=n)
+        agreed = company.agree(rows, local)
         told = comm.sent.since_last()["bytes"]
         agreed.number(np.arange(NODES, dtype=np.int32))
         words = np.zeros((NODES, 5), np.int64)

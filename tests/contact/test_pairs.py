@@ -7,9 +7,7 @@ import pytest
 
 from conoid.cases.load import parse_case, read_data
 from conoid.worker import simulation, step
-from conoid.worker.contact.edge_edge import edge_edge
 from conoid.worker.contact.narrow_phase import ContactRows, EdgeTable, FaceTable, Pairs, SlotTable, Step
-from conoid.worker.contact.node_face import node_face
 from conoid.worker.contact.pairs import PairTable
 from conoid.worker.contact.tracks import Lines, Tracks
 from conoid.worker.digest import digest
@@ -21,13 +19,14 @@ from .kernels import (
     edge_depths,
     edge_sizes,
     edge_table,
+    edges_met,
     face_sizes,
     face_table,
+    faces_met,
     moments,
     pair_table,
     slot_table,
     step_of,
-    taken,
 )
 from .shards import CORNERS, EDGES, FACES
 
@@ -70,14 +69,13 @@ class Tables:
         first = np.full(len(shards.x), -1, np.int32)
         self.node_face.hang(first, 0)
         slots, faces, edges, of = shards.tables(first, dt)
-        nodes, ridges = ContactRows.room(len(self.node_face)), ContactRows.room(len(self.edge_edge))
         end, pairs, two = shards.tracks.end, self.node_face.arrays(), self.edge_edge.arrays()
         known, familiar = known_of(pairs, slots.fresh, faces.fresh), known_of(two, edges.fresh, edges.fresh)
-        n, some, _ = node_face(nodes, 0, pairs, slots, faces, of, end)
-        m, few = edge_edge(ridges, 0, two, edges, of, slots.course, end)
+        nodes, some = faces_met(pairs, slots, faces, of, end)
+        ridges, few = edges_met(two, edges, of, slots.course, end)
         self.tested += some + few
         self.unforced += int(known[pairs.active[:some]].sum() + familiar[two.active[:few]].sum())
-        return [taken(nodes, np.arange(n)), taken(ridges, np.arange(m))]
+        return [nodes, ridges]
 
 
 class Shards:
@@ -258,7 +256,7 @@ class Pair:
         faces = face_table(np.array([[1, 2, 3, 4]], np.int32), np.ones(1), np.zeros(1))
         faces = faces._replace(fresh=self.face_fresh, exposed=self.exposed)
         of = step_of(self.x, still, np.array([1, 0, 0, 0, 0]), 1.0)
-        return int(node_face(ContactRows.room(1), 0, self.table.arrays(), slots, faces, of, 1.0)[1])
+        return faces_met(self.table.arrays(), slots, faces, of, 1.0)[1]
 
 
 @pytest.mark.parametrize("cause", ["corners", "normals", "lines", "stray"])

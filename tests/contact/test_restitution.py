@@ -14,7 +14,13 @@ from conoid.worker.parallel.comm import SerialComm
 
 from ..worker.kernels import run
 from ..worker.meshes import Floats
-from .kernels import Solver, column, many
+from .bodies import Indices
+from .kernels import Solver, column
+
+
+def every(met: ContactRows) -> Indices:
+    """The numbers of all rows."""
+    return np.arange(len(met.nodes), dtype=np.int32)
 
 
 def energy(v: Floats, mobility: Floats) -> float:
@@ -29,7 +35,7 @@ def test_a_node_parts_from_a_face_with_a_share_of_its_speed(share: float) -> Non
     met = ContactRows(nodes, weights, normals, wanted, np.zeros(1), np.full(1, -1, np.int32))
     mobility = 1.0 / np.repeat(np.arange(1.0, 5.0)[:, None], 3, axis=1)
     v = np.array([[1.0, -3.0, -5.0], [0.5, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 2.0]])
-    rebound(met, 1, v, v, share)
+    rebound(met, every(met), v, v, share, 0, 1)
     speed = float(normals[0] @ (weights[0] @ v))
     after = Solver(met, v, mobility).sweep(1)
     assert normals[0] @ (weights[0] @ after) == pytest.approx(-share * speed, abs=1e-7)
@@ -46,13 +52,13 @@ def test_a_contact_that_was_parting_is_given_nothing() -> None:
     mobility = 1.0 / np.repeat(np.arange(1.0, 5.0)[:, None], 3, axis=1)
     before, v = np.zeros((4, 3)), np.zeros((4, 3))
     before[0], v[0] = 3.0 * normals[0], -6.0 * normals[0]
-    hold_back(met, 1, before)
+    hold_back(met, every(met), before, 0, 1)
     pushed = Solver(met, v, mobility).sweep(1)
     assert normals[0] @ (weights[0] @ pushed) == pytest.approx(-3.0, abs=1e-7)
     impulse = (pushed - v) / mobility
     assert impulse[0] @ normals[0] > 0.0
     assert float((impulse * (before + pushed)).sum()) == pytest.approx(0.0, abs=1e-6)
-    hold_back(met, 1, v)
+    hold_back(met, every(met), v, 0, 1)
     assert met.wanted[0] == -3.0
 
 
@@ -62,7 +68,7 @@ def test_contacts_that_share_nodes_take_nothing_together() -> None:
     v[:, 0] = -np.array([0.0, 1.0, 3.0, 4.0, 4.5, 7.0])
     mobility = np.repeat(np.array([1.0, 2.0, 0.5, 1.0, 3.0, 1.0])[:, None], 3, axis=1)
     met = column(6)
-    rebound(met, many(met), v, v, 1.0)
+    rebound(met, every(met), v, v, 1.0, 0, len(met.nodes))
     after = Solver(met, v, mobility).sweep(3000)
     assert np.diff(after[:, 0]) == pytest.approx(-np.diff(v[:, 0]), abs=1e-6)
     assert energy(after, mobility) == pytest.approx(energy(v, mobility), rel=1e-6)

@@ -7,31 +7,9 @@ from conoid.worker.contact.narrow_phase import CRACK, ContactRows
 
 from ..worker.meshes import Floats
 from .bodies import rotation
-from .kernels import Solver, many, taken
+from .kernels import Solver, many, network, taken, unit
 
 SEEDS = range(40)
-
-
-def unit(random: np.random.Generator, n: int) -> Floats:
-    directions = random.normal(size=(n, 3))
-    return np.asarray(directions / np.linalg.norm(directions, axis=1)[:, None])
-
-
-def network(
-    seed: int, meetings: int = 30, nodes: int = 25, friction: float = 0.0, wanted: float = 0.0, one_normal: bool = False
-) -> tuple[ContactRows, Floats, Floats]:
-    """Random meetings that share nodes, of nodes with faces and of edges; velocities, and masses of 1000:1."""
-    random = np.random.default_rng(seed)
-    rows = np.array([random.choice(nodes, 4, replace=False) for _ in range(meetings)], np.int32).reshape(-1, 4)
-    share, s, t = random.dirichlet(np.ones(3), meetings), random.uniform(size=meetings), random.uniform(size=meetings)
-    faces = np.column_stack([np.ones(meetings), -share])
-    edges = np.column_stack([1.0 - t, t, s - 1.0, -s])
-    weights = np.where(random.uniform(size=(meetings, 1)) < 0.7, faces, edges)
-    normals = np.tile(unit(random, 1), (meetings, 1)) if one_normal else unit(random, meetings)
-    want, mu = -wanted * random.uniform(size=meetings), np.full(meetings, friction)
-    mobility = np.repeat(10.0 ** random.uniform(-1.5, 1.5, (nodes, 1)), 3, axis=1)
-    pair = np.arange(meetings, dtype=np.int32)
-    return ContactRows(rows, weights, normals, want, mu, pair), 10.0 * random.normal(size=(nodes, 3)), mobility
 
 
 def energy(v: Floats, mobility: Floats) -> float:

@@ -18,10 +18,8 @@ from conoid.cases.load import apply_overrides, parse_case, read_data, shipped
 from conoid.cases.schema import Case
 from conoid.worker import simulation, step
 from conoid.worker.contact import domain, search
-from conoid.worker.contact.edge_edge import edge_edge
 from conoid.worker.contact.flight import Flight
 from conoid.worker.contact.narrow_phase import ContactRows, Step
-from conoid.worker.contact.node_face import node_face
 from conoid.worker.contact.normals import means
 from conoid.worker.contact.pairs import PairTable
 from conoid.worker.contact.records import AGED, OPEN
@@ -33,7 +31,7 @@ from conoid.worker.simulation import Simulation
 from conoid.worker.state import Ints
 
 from ..contact.bodies import Flags, Indices
-from ..contact.kernels import edge_table, face_table, slot_table
+from ..contact.kernels import edge_table, edges_met, face_table, faces_met, slot_table, taken
 from ..contact.ranks import on_ranks
 from ..worker.meshes import Floats
 
@@ -66,9 +64,9 @@ NAMES = [*OURS, *(name for name, case in CASES.items() if case.in_contact and no
 """Where nothing separates: the surface of all pairs is made anew at each look, without the cracks of the search."""
 
 
-def written(room: ContactRows, n: int, ids: "np.ndarray") -> Met:
-    """The first ``n`` meetings, by the global ids of their nodes."""
-    columns = ids[room.nodes[:n]], room.weights[:n], room.normals[:n], room.wanted[:n, None]
+def written(met: ContactRows, ids: "np.ndarray") -> Met:
+    """The meetings, by the global ids of their nodes."""
+    columns = ids[met.nodes], met.weights, met.normals, met.wanted[:, None]
     return Counter(tuple(np.ascontiguousarray(row).tobytes() for row in rows) for rows in zip(*columns, strict=True))
 
 
@@ -82,7 +80,7 @@ class Found:
 
     def meet(self, now: Scene, give: float, dt: float) -> None:
         self._meet(now, give, dt)
-        self.at[self.sim.clock.step] = written(now.active.room, now.active.n, now.crowd.id)
+        self.at[self.sim.clock.step] = written(taken(now.active.room, now.active.found[: now.active.n]), now.crowd.id)
 
     def run(self) -> dict[int, Met]:
         """Of some steps, each with the meetings that this rank computed; boundaries and forces act as ever."""
@@ -127,14 +125,14 @@ class Brute(Found):
         mean, on_surface = means(self.contact.exterior._moments[local]), self.contact.exterior.surface.flags[local]
         none = np.zeros(len(local))
         for pairs in self._pairs(sides, slaves[:, None], faces[:, :3]):
-            room, table, first = ContactRows.room(len(pairs)), PairTable(), np.full(len(local), -1, np.int32)
+            table, first = PairTable(), np.full(len(local), -1, np.int32)
             table.add(np.column_stack([slaves[pairs[:, 0]], pairs[:, 1]]).astype(np.int32))
             table.hang(first, 0)
             slots = slot_table(first, mean, none, step.v)._replace(on_surface=on_surface)
             of = face_table(faces, sides.faces.size, np.zeros(len(faces)))
             of = of._replace(id=sides.faces.id, exposed=sides.faces.exposed)
-            n, _, _ = node_face(room, 0, table.arrays(), slots, of, step, 0.0)
-            met += written(room, n, sides.crowd.id)
+            room, _ = faces_met(table.arrays(), slots, of, step, 0.0)
+            met += written(room, sides.crowd.id)
         return met
 
     def _edges(self, sides: Sides, step: Step) -> Met:
@@ -147,10 +145,9 @@ class Brute(Found):
         )
         for every in self._pairs(sides, places[:, :2], places[:, :2]):
             pairs, table = every[every[:, 0] < every[:, 1]], PairTable()
-            room = ContactRows.room(len(pairs))
             table.add(pairs)
-            n, _ = edge_edge(room, 0, table.arrays(), of, step, np.zeros_like(step.x), 0.0)
-            met += written(room, n, sides.crowd.id)
+            room, _ = edges_met(table.arrays(), of, step, np.zeros_like(step.x), 0.0)
+            met += written(room, sides.crowd.id)
         return met
 
     def _pairs(self, sides: Sides, small: Indices, large: Indices) -> Iterator[Indices]:

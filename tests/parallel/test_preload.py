@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from conoid.worker import preload
-from conoid.worker.contact import follower, held, kin, stage
+from conoid.worker.contact import detection, follower, held, kin, tasks
 
 from .launching import command, ended
 
@@ -28,4 +28,4 @@ def test_kernels_that_functions_name_are_found_as_their_own_and_as_those_of_othe
     assert {follower._flagged, kin.follow_faces, kin.apart_from_edges} <= found
     assert kin._become not in found, "which kernels alone call"
     assert held.gather not in found
-    assert held.take in {*preload.called(stage)}, "named in a method, within a class"
+    assert tasks.take in {*preload.called(detection)}, "named in a method, within a class"

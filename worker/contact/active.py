@@ -24,10 +24,16 @@ ROW_NORM_T, PUSH_T = 4, 5
 
 
 class ActiveContacts(NamedTuple):
-    """What the narrow phase has found, in its order; see narrow_phase.ContactRows."""
+    """The active contacts in the order of their sets (zones.py), and the rows that the narrow phase has made of them:
+    see narrow_phase.ContactRows.
+    """
 
+    row: Indices
+    """(contacts,) which row each has."""
     slots: Indices
-    """(room, 4) of the nodes; the third is -1 in the row of a crack (cracks.across): two nodes, weights 1 and -1."""
+    """(contacts, 4) the third is -1 in a row of two nodes, of weights 1 and -1."""
+    reach: Floats
+    """(contacts,) the sum of the paths of its nodes up to which an idle contact stays idle, m/s."""
     weights: Floats
     """(room, 4)."""
     normals: Floats
@@ -38,8 +44,6 @@ class ActiveContacts(NamedTuple):
     """(room,) Coulomb's coefficient."""
     pair: Indices
     """(room,) see narrow_phase.ContactRows."""
-    reach: Floats
-    """(room,) the sum of the paths of its nodes up to which an idle contact stays idle, m/s."""
 
 
 class Kept(NamedTuple):
@@ -74,37 +78,37 @@ class ActiveNodes(NamedTuple):
 
 
 class Loaded(NamedTuple):
-    """Contacts that have asked for an impulse in the step, and those that are idle."""
+    """Contacts that have asked for an impulse in the step, and those that are idle, in the order of their sets
+    (zones.py): set k has the places from ``begin[k]`` on, and no more than that many contacts.
+    """
 
     normal: Floats
-    """(room, 8) unit normal, target velocity, row norm along it, 1/kg, impulse along it, N s, Coulomb's coefficient,
-    impulse before momentum took it ahead."""
+    """(contacts, 8) unit normal, target velocity, row norm along it, 1/kg, impulse along it, N s, Coulomb's
+    coefficient, impulse before momentum took it ahead."""
     tangent: Floats
-    """(room, 8) weights, row norm across, 1/kg, impulse of friction (3), N s."""
+    """(contacts, 8) weights, row norm across, 1/kg, impulse of friction (3), N s."""
     slots: Indices
-    """(room, 4) as of ActiveContacts."""
+    """(contacts, 4) the third is -1 in a row of two nodes, of weights 1 and -1."""
     row: Indices
-    """(room,) which active contact."""
+    """(contacts,) row of each that is loaded."""
     idle: Indices
-    """(room,) which active contacts have not asked for an impulse yet."""
+    """(contacts,) which active contacts have not asked for an impulse yet."""
+    begin: Ints
+    """(sets + 1,)."""
     many: Ints
-    """(2,) how many are loaded, how many idle."""
-
-    def part(self, first: int, end: int, idle: Indices) -> "Loaded":
-        """Room from ``first`` to ``end`` for as many contacts, the first of those in ``idle``; none is loaded."""
-        some, count = slice(first, end), np.array([0, end - first], np.int64)
-        return Loaded(self.normal[some], self.tangent[some], self.slots[some], self.row[some], idle, count)
+    """(sets, 2) how many are loaded, how many idle."""
 
     @classmethod
-    def of(cls, room: int) -> "Loaded":
+    def of(cls, room: int, sets: int) -> "Loaded":
         """Room for as many."""
         lines, numbers = np.empty((2, room, 8)), np.empty((2, room), np.int32)
-        return cls(lines[0], lines[1], np.empty((room, 4), np.int32), numbers[0], numbers[1], np.zeros(2, np.int64))
+        ends, many = np.zeros(sets + 1, np.int64), np.zeros((sets, 2), np.int64)
+        return cls(lines[0], lines[1], np.empty((room, 4), np.int32), numbers[0], numbers[1], ends, many)
 
 
 _I2, _N1, _N2 = types.int64[:, ::1], types.int32[::1], types.int32[:, ::1]
 _F1, _F2 = types.float64[::1], types.float64[:, ::1]
-CONTACTS = record(ActiveContacts, _N2, _F2, _F2, _F1, _F1, _N1, _F1)
+CONTACTS = record(ActiveContacts, _N1, _N2, _F1, _F2, _F2, _F1, _F1, _N1)
 NODES = record(ActiveNodes, _F2, _I2, _F2, _I2, _I2, _F1)
 KEPT = record(Kept, _F2, _F2)
-LOADED = record(Loaded, _F2, _F2, _N2, _N1, _N1, types.int64[::1])
+LOADED = record(Loaded, _F2, _F2, _N2, _N1, _N1, types.int64[::1], _I2)

@@ -71,13 +71,10 @@ def reaches_over(normals, s, b, e, f, size):  # type: ignore[no-untyped-def]
 
 @njit(_VECTOR(FACES, types.float64[:, :], types.int64), cache=True, error_model="numpy", forceinline=True)
 def plane(faces, ahead, f):  # type: ignore[no-untyped-def]
-    """Unit normal of face ``f`` at the end of the step, which is found once a step; ``ahead``: where slots are then."""
-    if not faces.known[f]:
-        i, j, k = faces.corners[f, 0], faces.corners[f, 1], faces.corners[f, 2]
-        _, m = height(at(ahead, i), at(ahead, i), at(ahead, j), at(ahead, k))
-        faces.normal[f, 0], faces.normal[f, 1], faces.normal[f, 2] = m
-        faces.known[f] = True
-    return faces.normal[f, 0], faces.normal[f, 1], faces.normal[f, 2]
+    """Unit normal of face ``f`` at the end of the step; ``ahead``: where slots are then."""
+    i, j, k = faces.corners[f, 0], faces.corners[f, 1], faces.corners[f, 2]
+    _, m = height(at(ahead, i), at(ahead, i), at(ahead, j), at(ahead, k))
+    return m
 
 
 @njit(types.boolean(PAIRS, FACES, types.int32[::1], types.int64, types.int64, _F, _F), cache=True, forceinline=True)
@@ -100,7 +97,8 @@ def outside(pairs, first, faces, x, part, p, depth, strayed, end):  # type: igno
     Then it is beside an acute edge and not in the body: the nearest face decides on which side a node is. Only faces
     within the share of their size that every list of candidates has are asked, and of these none that its pair is left
     alone for: it is further away. ``strayed``: how far the node leaves its line, infinite when pairs are not known;
-    ``end``: of the step, with the length of the step once more, for a pair may just have been measured at its end.
+    ``end``: of the step, with the length of the step once more, for a pair may just have been measured at its end, by
+    another thread.
     """
     rows, corners, size = pairs.rows, faces.corners, faces.size
     s, body = rows[p, 0], part[corners[rows[p, 1], 0]]

@@ -5,8 +5,10 @@ import numpy as np
 from ..migration.parcel import Parcel
 from ..parallel import fixed_point
 from ..parallel.comm import Comm
+from ..parallel.passes import Pass
+from ..parallel.team import Team
 from ..state import Floats, Indices, Ints, Nodes, extended
-from . import booking
+from . import tasks
 from .account import Account
 from .scene import Scene
 
@@ -14,8 +16,9 @@ from .scene import Scene
 class Books:
     """One half of the work of an impulse is booked in the step that gives it, the other in the next one."""
 
-    def __init__(self, nodes: int, parts: int, impulse: float, energy: float) -> None:
+    def __init__(self, nodes: int, parts: int, impulse: float, energy: float, team: Team) -> None:
         """The most that may be on one node in a step: ``impulse``, N s, and ``energy``, J."""
+        self._book = Pass(team, tasks.book, *tasks.BOOK, size=tasks.SLOTS_OF_A_TASK)
         self.contact_loss = np.zeros(nodes)
         """(nodes,) energy lost by impact and friction, J."""
         self.external_work = np.zeros(nodes)
@@ -74,9 +77,9 @@ class Books:
 
     def book(self, scene: Scene, places: Indices) -> None:
         """Half of the work of the last impulses, at the ``places`` of the scene, with the velocities in ``before``."""
-        booking.book(
-            self.contact_loss, self.external_work, places, scene.crowd.local, scene.slots.before, scene.slots.total,
-            scene.crowd.mobility, self.scale,
+        self._book.run(
+            len(places), self.contact_loss, self.external_work, places, scene.crowd.local, scene.slots.before,
+            scene.slots.total, scene.crowd.mobility, self.scale,
         )  # fmt: skip
 
     def book_resumed(self, nodes: Nodes, mobility: Floats) -> None:
@@ -84,7 +87,7 @@ class Books:
         if len(self.open):
             some = np.flatnonzero(self.open.any(axis=1)).astype(np.int32)
             every = np.arange(len(self.open), dtype=np.int32)
-            booking.book(
-                self.contact_loss, self.external_work, some, every, nodes.v, self.open, mobility, self.scale
+            self._book.run(
+                len(some), self.contact_loss, self.external_work, some, every, nodes.v, self.open, mobility, self.scale
             )  # fmt: skip
             self.open = self.open[:0]

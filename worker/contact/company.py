@@ -13,6 +13,7 @@ from ..parallel.comm import Comm, Exchange
 from ..parallel.ownership import Neighbour
 from ..parallel.tags import Tag
 from ..state import Indices, Ints
+from .rows import ActiveRows
 
 _WORD = 63
 """Bits of a word that are used."""
@@ -49,13 +50,13 @@ class Company:
         begins, ends = self._words[:-1], self._words[1:]
         return [(o.rank, words[a:b]) for o, a, b in zip(self.neighbours, begins, ends, strict=True)]
 
-    def agree(self, contacts: Indices, local: Indices) -> "ActiveSum":
-        """The sums of a step with active ``contacts`` (n, 4), slots; ``local`` (slots,): -1 for what is not held."""
+    def agree(self, contacts: ActiveRows, local: Indices) -> "ActiveSum":
+        """The sums of a step with active ``contacts``; ``local`` (crowd,): -1 for what is not held."""
         if not self.neighbours:
             nothing = np.zeros(0, np.int32)
             return ActiveSum([], nothing, nothing, np.zeros((0, 2), np.int64), self._comm)
         assert self._exchange is not None
-        _tell(self._out, self._every, self._ends, self._words, contacts, local)
+        _tell(self._out, self._every, self._ends, self._words, contacts.nodes, local)
         self._exchange.begin()
         self._exchange.finish()
         sends, receives, counts = _agreed(self._out, self._in, self._every, self._ends, self._words)

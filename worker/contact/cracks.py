@@ -8,7 +8,7 @@ open: they, their nodes and edges are surface like all other from the next step 
 that opening calls for none. However finely a body shatters, what has not moved costs no search.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -17,8 +17,9 @@ from ..jit import njit, prefetch, types
 from ..migration.parcel import Table, once
 from ..state import WIDE, Block, Flags, Floats, Indices, Ints, Nodes, extended
 from ..topology import Split
-from .families import Families
+from .families import Corners, Families, by_family
 from .geometry import at, cross, dot, half, minus, plus
+from .kin import touching
 from .narrow_phase import CONTACT_ROWS, CRACK, DEEP_SELF, NEAR, STEP, needed
 from .records import CrackSides
 
@@ -59,6 +60,8 @@ class Cracks:
     was not active, along the normal and across (3), m/s; of one that another rank computes, nothing that counts."""
     families: Families
     """Of all nodes here."""
+    _corners: dict[int, Corners] = field(default_factory=dict)
+    """By block; none after a change."""
 
     @classmethod
     def none(cls, ids: Ints) -> "Cracks":
@@ -80,6 +83,14 @@ class Cracks:
         self.aged = extended(self.aged, np.zeros(len(faces), bool))
         self.places = extended(self.places, np.full((len(faces), 6), -1, np.int32))
         self.kept = extended(self.kept, np.zeros((len(faces), _KEPT)))
+        self._corners = {}
+
+    def corners(self, block: int) -> Corners:
+        """Those of narrow sides of a block; see entering.py."""
+        if block not in self._corners:
+            families = self.families
+            self._corners[block] = by_family(self.nodes, self.sides, block, families.ring, families.leader)
+        return self._corners[block]
 
     def follow(self, split: Split, ids: Ints) -> None:
         """Takes up the copies of a split; ``ids``: of the local nodes."""
@@ -88,6 +99,7 @@ class Cracks:
         rows = touching(self.nodes, parents)
         self.nodes[rows] = split.followed_sides(self.nodes[rows], ids, self.faces[rows] // 4)
         self.families.grow(split)
+        self._corners = {}
 
     def keep(self, ids: Ints) -> Table:
         """The facets as a table, a row a side; ``ids``: of the local nodes."""
@@ -154,6 +166,7 @@ class Cracks:
         order = np.argsort(self.places[:, 0], kind="stable")
         for column in self._columns().values():
             column[:] = column[order]
+        self._corners = {}
 
     def open(self, faces: Ints, blocks: list[Block]) -> None:
         """Makes surface of the cracks whose first sides are among ``faces``, ascending, and forgets them: the last ones
@@ -171,10 +184,11 @@ class Cracks:
         for name, column in self._columns().items():
             column[holes] = column[movers]
             setattr(self, name, column[:left])
+        self._corners = {}
 
     def _columns(self) -> "dict[str, np.ndarray]":
         """What has a row for each facet."""
-        return {name: column for name, column in vars(self).items() if name != "families"}
+        return {name: column for name, column in vars(self).items() if name not in ("families", "_corners")}
 
 
 @njit("int64[::1](int32[:, ::1], float64[:, ::1], float64)", cache=True)
@@ -210,20 +224,6 @@ def named(ids, wanted):  # type: ignore[no-untyped-def]
     return rows[:n].copy()
 
 
-@njit("int64[::1](int32[:, ::1], boolean[::1])", cache=True)
-def touching(table, flags):  # type: ignore[no-untyped-def]
-    """Rows of ``table`` (n, k) with an entry that is flagged."""
-    rows = np.empty(len(table), np.int64)
-    n = 0
-    for i in range(len(table)):
-        for k in range(table.shape[1]):
-            if flags[table[i, k]]:
-                rows[n] = i
-                n += 1
-                break
-    return rows[:n].copy()
-
-
 @njit("int64[::1](int64[::1], int32[:, ::1], int32[:, :, ::1])", cache=True)
 def computed(rows, nodes, sides):  # type: ignore[no-untyped-def]
     """Those of some ``rows`` of the cracks that have nodes that have separated, and the first side here: this rank
@@ -240,21 +240,21 @@ def computed(rows, nodes, sides):  # type: ignore[no-untyped-def]
 
 @njit(
     types.UniTuple(types.int64, 2)(  # type: ignore[no-untyped-call]
-        CONTACT_ROWS, types.int64, types.int64[::1], types.int32[:, ::1], types.float64, STEP
+        CONTACT_ROWS, types.int64, types.int64[::1], types.int32[:, ::1], types.float64, STEP, types.int64, types.int64
     ),
     cache=True,
     error_model="numpy",
 )
-def across(out, n, opening, cracks, typical, step):  # type: ignore[no-untyped-def]
-    """Nodes across ``cracks`` (m, 6; -1 for those that do not count) that close on each other, from row ``n`` of
-    ``out`` on.
+def across(out, base, opening, cracks, typical, step, first, stop):  # type: ignore[no-untyped-def]
+    """Nodes across the ``cracks`` (m, 6; -1 for those that do not count) from ``first`` to ``stop`` that close on each
+    other: rows of ``out`` from ``base + 3 first`` on.
 
-    ``typical``: size of a face, m. Returns the new number of rows, and how many of the cracks have become so wide that
-    they open; ``opening`` (m,) says which.
+    ``typical``: size of a face, m. Returns how many, and how many of the cracks have become so wide that they open;
+    ``opening`` (m,) says which, from ``first`` on.
     """
     x, v, part, mu, dt = step.x, step.v, step.part, step.mu, step.dt
-    wide = 0
-    for c in range(len(cracks)):
+    n, wide = base + 3 * first, first
+    for c in range(first, stop):
         for k in range(6):
             near = max(cracks[min(c + _AHEAD, len(cracks) - 1), k], 0)
             prefetch(x, LINE * near)
@@ -287,4 +287,4 @@ def across(out, n, opening, cracks, typical, step):  # type: ignore[no-untyped-d
         if most >= (_WIDE * typical) ** 2:
             opening[wide] = c
             wide += 1
-    return n, wide
+    return n - base - 3 * first, wide - first

@@ -4,19 +4,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..state import Floats, Indices, Ints
-from . import registration
-from .cracks import across
-from .edge_edge import edge_edge
-from .entering import pushed_out
+from ..parallel.passes import Pass
+from ..parallel.team import Team
+from ..state import Block, Floats, Ints, Nodes
+from . import registration, tasks
+from .cracks import Cracks
+from .entering import Narrow
 from .exterior import Exterior
-from .haste import approach, spread
+from .families import Corners
+from .haste import spread
 from .narrow_phase import HASTY, Step
-from .node_face import node_face
+from .node_face import nearest
 from .scene import Scene
+from .tasks import CONTACTS_OF_A_TASK, CRACKS_OF_A_TASK, FAMILIES_OF_A_TASK, PAIRS_OF_A_TASK, SLOTS_OF_A_TASK
 
 _KINEMATIC = 2.0
 """One over the share of a tet's altitude that anything may pass in a step."""
+_FACES, _EDGES, _CRACKS = 0, 1, 2
+"""Kinds of contacts (rows.py): nodes and faces, edges, nodes across cracks; behind them those at corners."""
 _JOIN = 0.6
 """Of the distance at which a slot has to be registered anew: a rank whose slots have strayed so far does it when
 another one has to, so that ranks do not wait for one after the other. No bit of the answer depends on it."""
@@ -24,10 +29,8 @@ another one has to, so that ranks do not wait for one after the other. No bit of
 
 @dataclass
 class Detected:
-    """What a step has found; the active contacts themselves are the first rows of the scene's room."""
+    """What a step has found; the active contacts themselves are rows of the scene."""
 
-    contacts: int
-    """How many."""
     approach: float
     """One over the step in which no node passes more than half of a tet that it meets, or will in the next step,
     1/s."""
@@ -40,7 +43,7 @@ class Detected:
     @classmethod
     def nothing(cls) -> "Detected":
         """Before the first step."""
-        return cls(0, 0.0, np.zeros(0, np.int64), False)
+        return cls(0.0, np.zeros(0, np.int64), False)
 
 
 @dataclass(frozen=True)
@@ -64,30 +67,135 @@ class Ahead:
         return self.most if fastest * self.most > HASTY * self.size else 0.0
 
 
-def detect(
-    now: Scene, surface: Exterior, mu: Floats, give: float, ahead: Ahead, redraw: bool, together: bool
-) -> Detected:  # fmt: skip
-    """The active contacts of the step ahead, of the positions and velocities of the scene's nodes.
+class Detection:
+    """Finds the active contacts of a rank, by the threads of its ``team``."""
 
-    ``surface``: of this rank; ``mu`` (parts, parts): friction, NaN where two parts do not meet; ``give``: see
-    narrow_phase.PUSH_OUT; ``redraw``: whether short lines are drawn anew (tracks.py); ``together``: whether some rank
-    registers what has strayed.
-    """
-    crowd, tracks = now.crowd, now.tracks
-    beyond = ahead.beyond(crowd.v)
-    tracks.advance(ahead.dt, beyond)
-    if redraw:
-        tracks.shorten(crowd.x)
-        now.node_face.wake()
-        now.edge_edge.wake()
-    tracks.measure(crowd.x, crowd.v, now.faces.corners, now.edges.corners)
-    stray = _renewed(now, together)
-    step = Step.of(crowd.x, crowd.v, crowd.part, mu, give, ahead.dt, now.step_room)
-    inside = surface.entering(now, step)
-    now.reserve(sum(len(nodes) for nodes, _ in inside))
-    step = step.followed(beyond, HASTY * ahead.size, ahead.rebound, now.face_table())
-    contacts, approach, opening = _test(now, step, ahead.size, inside)
-    return Detected(contacts, approach, opening, stray)
+    def __init__(self, team: Team) -> None:
+        self.found = Detected.nothing()
+        """What the last step has found here."""
+        pairs, some = PAIRS_OF_A_TASK, CONTACTS_OF_A_TASK
+        self._take = Pass(team, tasks.take, *tasks.TAKE, size=SLOTS_OF_A_TASK)
+        self._rebound = Pass(team, tasks.rebound, *tasks.REBOUND, size=some)
+        self._due_faces = Pass(team, tasks.due_faces, *tasks.DUE_FACES, size=pairs)
+        self._node_face = Pass(team, tasks.node_face_pairs, *tasks.NODE_FACE, size=pairs)
+        self._edge_edge = Pass(team, tasks.edge_edge_pairs, *tasks.EDGE_EDGE, size=pairs)
+        self._approach = Pass(team, tasks.approach, *tasks.APPROACH, size=some)
+        self._across = Pass(team, tasks.across_cracks, *tasks.ACROSS, size=CRACKS_OF_A_TASK)
+        self._entering = Pass(team, tasks.entering_nodes, *tasks.ENTERING, size=FAMILIES_OF_A_TASK)
+        self._rows_of_corner = 1
+        """Rows that there is room for, for each corner of a narrow side in the mean of a task."""
+
+    def take(self, now: Scene, nodes: Nodes) -> None:
+        """Positions and velocities of the nodes of this rank, for the scene."""
+        own, crowd = now.own, now.crowd
+        self._take.run(len(own.slots), crowd.x, crowd.v, own.slots, nodes.x, nodes.v, own.local)
+
+    def retarget(self, now: Scene, share: float, give: float) -> None:
+        """Target velocities of the active contacts: see restitution.rebound for a ``share``, and ``hold_back`` where
+        there is nothing to ``give`` of penetrations (narrow_phase.PUSH_OUT).
+        """
+        if share > 0.0 or give == 0.0:
+            rows = now.active
+            self._rebound.run(rows.n, rows.room, rows.found, now.crowd.v, now.slots.before, share, give == 0.0)
+
+    def detect(
+        self, now: Scene, surface: Exterior, mu: Floats, give: float, ahead: Ahead, redraw: bool, together: bool
+    ) -> Detected:  # fmt: skip
+        """The active contacts of the step ahead, of the positions and velocities of the scene's nodes.
+
+        ``surface``: of this rank; ``mu`` (parts, parts): friction, NaN where two parts do not meet; ``give``: see
+        narrow_phase.PUSH_OUT; ``redraw``: whether short lines are drawn anew (tracks.py); ``together``: whether some
+        rank registers what has strayed.
+        """
+        crowd, tracks = now.crowd, now.tracks
+        beyond = ahead.beyond(crowd.v)
+        tracks.advance(ahead.dt, beyond)
+        if redraw:
+            tracks.shorten(crowd.x)
+            now.node_face.wake()
+            now.edge_edge.wake()
+        tracks.measure(crowd.x, crowd.v, now.faces.corners, now.edges.corners)
+        stray = _renewed(now, together)
+        step = Step.of(crowd.x, crowd.v, crowd.part, mu, give, ahead.dt, now.step_room)
+        step = step.followed(beyond, HASTY * ahead.size, ahead.rebound, now.face_table())
+        now.active.begin(len(now.node_face), len(now.edge_edge), 3 * len(now.cracks))
+        for block, corners in surface.narrow():
+            self._corners(now, block, corners, surface.cracks, step)
+        opening = self._cracks(now, ahead.size, step)
+        limit = self._nodes_and_faces(now, step)
+        self._edges(now, step)
+        now.faces.fresh[:], now.edges.fresh[:], now.slots.fresh[:] = False, False, False
+        self.found = Detected(_KINEMATIC * limit, opening, stray)
+        return self.found
+
+    def _nodes_and_faces(self, now: Scene, step: Step) -> float:
+        """Adds contacts of nodes and faces; returns the largest speed over the altitude of a tet, 1/s."""
+        table, rows, slots, faces, end = now.node_face, now.active, now.slot_table(), now.face_table(), now.tracks.end
+        pairs, n = table.arrays(), len(table)
+        due, counts = np.zeros((2, self._due_faces.many(n)), np.int64)
+        coming, depth = np.zeros(len(counts)), rows.depth
+        self._due_faces.run(n, pairs, slots, faces, end + step.beyond, due)
+        self._node_face.run(
+            n, rows.room, depth, rows.begins(_FACES), pairs, slots, faces, step, end, due, counts, coming
+        )
+        begins = PAIRS_OF_A_TASK * np.arange(len(due))
+        table.take_tested(pairs.active, begins, due)
+        before = rows.n
+        rows.collect(_FACES, begins, counts)
+        found, holder = rows.found[before : rows.n], rows.holder(now.crowd.n)
+        m = int(nearest(found, rows.room, depth, pairs, faces, step.part, holder))
+        rows.n = before + m
+        most = np.zeros(self._approach.many(m))
+        self._approach.run(m, rows.room, found, pairs, faces, step, most)
+        return float(np.sqrt(max(coming.max(initial=0.0), most.max(initial=0.0))))
+
+    def _edges(self, now: Scene, step: Step) -> None:
+        """Adds contacts of edges."""
+        table, rows, tracks = now.edge_edge, now.active, now.tracks
+        pairs, n = table.arrays(), len(table)
+        due, counts = np.zeros((2, self._edge_edge.many(n)), np.int64)
+        self._edge_edge.run(
+            n,
+            rows.room,
+            rows.begins(_EDGES),
+            pairs,
+            now.edge_table(),
+            step,
+            tracks.short.course,
+            tracks.end,
+            due,
+            counts,
+        )
+        begins = PAIRS_OF_A_TASK * np.arange(len(due))
+        table.take_tested(pairs.active, begins, due)
+        rows.collect(_EDGES, begins, counts)
+
+    def _cracks(self, now: Scene, size: float, step: Step) -> Ints:
+        """Adds contacts across cracks; returns which cracks open."""
+        rows, n = now.active, len(now.cracks)
+        counts, wide = np.zeros((2, self._across.many(n)), np.int64)
+        opening = np.empty(n, np.int64)
+        self._across.run(n, rows.room, rows.begins(_CRACKS), opening, now.cracks, size, step, counts, wide)
+        begins = CRACKS_OF_A_TASK * np.arange(len(wide))
+        rows.collect(_CRACKS, 3 * begins, counts)
+        return np.concatenate([opening[:0], *(opening[k : k + m] for k, m in zip(begins, wide, strict=True) if m)])
+
+    def _corners(self, now: Scene, block: Block, corners: Corners, cracks: Cracks, step: Step) -> None:
+        """Adds contacts of nodes that come in at ``corners`` of a block."""
+        n = len(corners.start) - 1
+        begins = corners.start[:n:FAMILIES_OF_A_TASK].astype(np.int64)
+        counts, spaces = np.zeros(len(begins), np.int64), np.diff(np.append(begins, corners.start[-1]))
+        narrow = Narrow(
+            cracks.nodes, cracks.sides, block.tets, block.across, block.bond, cracks.families.ring, now.own.place
+        )  # fmt: skip
+        while True:
+            each, rows = self._rows_of_corner, now.active
+            kind = rows.more(each * len(corners.corners))
+            self._entering.run(n, rows.room, rows.begins(kind), each, narrow, corners, step, counts)
+            if (counts <= each * spaces).all():
+                break
+            self._rows_of_corner *= 2
+        now.active.collect(kind, each * begins, counts)
 
 
 def _renewed(now: Scene, together: bool) -> bool:
@@ -99,20 +207,3 @@ def _renewed(now: Scene, together: bool) -> bool:
         registration.renew(now, now.crowd.x, now.crowd.v, due)
         before = tracks.strayed = tracks.farthest(now.slots.tracked)
     return 2.0 * tracks.strayed - before > most
-
-
-def _test(now: Scene, step: Step, size: float, inside: list[tuple[Indices, Floats]]) -> tuple[int, float, Ints]:
-    """The narrow phase: contacts, approach and opening of ``Detected``; ``inside``: see Exterior.entering."""
-    tracks, faces, pairs = now.tracks, now.face_table(), now.node_face.arrays()
-    n, tested, coming = node_face(now.active.room, 0, pairs, now.slot_table(), faces, step, tracks.end)
-    now.node_face.tested = pairs.active[:tested]
-    limit = _KINEMATIC * max(coming, approach(now.active.room, n, pairs, faces, step))
-    pairs = now.edge_edge.arrays()
-    n, tested = edge_edge(now.active.room, n, pairs, now.edge_table(), step, tracks.short.course, tracks.end)
-    now.edge_edge.tested = pairs.active[:tested]
-    now.faces.fresh[:], now.edges.fresh[:], now.slots.fresh[:] = False, False, False
-    opening = np.empty(len(now.cracks), np.int64)
-    n, wide = across(now.active.room, n, opening, now.cracks, size, step)
-    for nodes, weights in inside:
-        n = pushed_out(now.active.room, n, nodes, weights, step)
-    return int(n), float(limit), opening[:wide]

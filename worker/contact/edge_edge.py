@@ -26,7 +26,7 @@ _WORTH = 0.02
 """The same: a pair with less to spare is tested in every step, which costs less than to measure it."""
 _X2, _V2, _N2 = "float64[:, :]", "float64[:, ::1]", "int32[:, ::1]"
 _SECTOR = f"Tuple((float64, {VECTOR}, {VECTOR}))"
-_PAIR = types.Tuple((types.int64, types.int64))  # type: ignore[no-untyped-call]
+_I = types.int64
 
 
 @njit(f"{_SECTOR}({VECTOR}, {_X2}, {_V2}, {_N2}, int64, float64)", cache=True, error_model="numpy")
@@ -100,23 +100,26 @@ def _opposite(edges, one, two):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    _PAIR(CONTACT_ROWS, types.int64, PAIRS, EDGES, STEP, types.float64[:, ::1], types.float64),
+    types.UniTuple(_I, 2)(CONTACT_ROWS, _I, PAIRS, EDGES, STEP, types.float64[:, ::1], types.float64, _I, _I),  # type: ignore[no-untyped-call]
     cache=True,
     error_model="numpy",
 )
-def edge_edge(out, n, pairs, edges, step, course, end):  # type: ignore[no-untyped-def]
-    """Edges that pass an edge, from row ``n`` on; returns the new number of rows, and how many pairs were tested.
+def edge_edge(out, base, pairs, edges, step, course, end, first, stop):  # type: ignore[no-untyped-def]
+    """Edges that pass an edge, of the pairs from ``first`` to ``stop``: rows of ``out`` from ``base + first`` on;
+    returns how many, and how many pairs were tested, ``pairs.active`` from ``first`` on.
 
-    ``course`` (slots, 3): velocities of the reference motions, m/s; ``end``: of the step, s after the search. An edge
-    whose ends are one node has gone. The opposite edges of a flat tet do not pass each other: it is as thick as they
-    are apart.
+    An edge whose ends are one node has gone. The opposite edges of a flat tet do not pass each other: it is as thick as
+    they are apart. Pairs of these, and of what is no surface, are left alone until that changes.
+
+    ``course`` (slots, 3): velocities of the reference motions, m/s; ``end``: of the step, s after the search.
     """
-    rows, until, speed, active = pairs.rows, pairs.until, pairs.speed, pairs.active
-    corners, size, meets, left, fresh = edges.corners, edges.size, edges.meets, edges.left, edges.fresh
+    rows, until, speed, active = pairs.rows[first:], pairs.until[first:], pairs.speed[first:], pairs.active[first:]
+    meets, fresh = edges.meets, edges.fresh
+    corners, size, left = edges.corners, edges.size, edges.left
     nodes, weights, normals, wanted = out.nodes, out.weights, out.normals, out.wanted
     x, v, ahead, dt = step.x, step.v, step.ahead, step.dt
-    tested = 0
-    for p in range(len(rows)):
+    n, tested = base + first, 0
+    for p in range(stop - first):
         one, two = rows[p, 0], rows[p, 1]
         if fresh[one] or fresh[two]:
             until[p], speed[p] = -np.inf, np.nan
@@ -126,7 +129,7 @@ def edge_edge(out, n, pairs, edges, step, course, end):  # type: ignore[no-untyp
         if not (meets[one] and meets[two]) or a == b or c == d or _opposite(corners, one, two):
             until[p], speed[p] = np.inf, 0.0
             continue
-        active[tested] = p
+        active[tested] = first + p
         tested += 1
         if not np.isnan(until[p]):  # left alone while it cannot meet
             if np.isnan(speed[p]):
@@ -177,4 +180,4 @@ def edge_edge(out, n, pairs, edges, step, course, end):  # type: ignore[no-untyp
         wanted[n] = rate + needed(gap0, gap1, rate, step.give, dt)
         out.friction[n], out.pair[n] = step.mu[step.part[a], step.part[c]], -1
         n += 1
-    return n, tested
+    return n - base - first, tested

@@ -9,18 +9,18 @@ The corners of narrow sides are taken family by family: what each member is to t
 loops over these, in rows of a few kilobytes that compilers make vectors of. Few of them are looked at on their own.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ..cache_lines import LINE
-from ..jit import njit, prefetch, several, types
-from ..state import INTACT
-from .families import by_family
+from ..jit import njit, prefetch, record, types
+from ..state import INTACT, Bits, Indices, Tets
+from .families import CORNERS
 from .geometry import VECTOR, at, cross, dot, height, minus
 from .narrow_phase import CONTACT_ROWS, DEEP_SELF, STEP, needed
 from .sharp import SHARP
 
-_FEWEST = 64
-"""Rows that there is room for at first."""
 _BENT = 1.0 - SHARP * SHARP
 """Square of the sine of the angle by which two faces of one surface may be bent: that of edges that are not sharp."""
 _MANY = 64
@@ -39,6 +39,26 @@ _LATER = np.array([0, 1, 2, 0, 1])
 """Corners of a side, one after the other."""
 _I, _F, _F1, _F2 = types.int64, types.float64, types.float64[::1], types.float64[:, ::1]
 _N1, _N2, _N3 = types.int32[::1], types.int32[:, ::1], types.int32[:, :, ::1]
+
+
+class Narrow(NamedTuple):
+    """Cracks, and a block of tets beside them."""
+
+    cracks: Indices
+    """(m, 6) local nodes of all cracks."""
+    sides: Indices
+    """(m, 2, 3) see Cracks."""
+    tets: Tets
+    """(n, 4), ``across`` (n, 4) and ``bond`` (n, 4): of the block."""
+    across: Indices
+    bond: Bits
+    ring: Indices
+    """(nodes,) see Families."""
+    place: Indices
+    """(nodes,) in the scene."""
+
+
+NARROW = record(Narrow, _N2, _N3, types.uint32[:, ::1], _N2, types.uint8[:, ::1], _N1, _N1)
 
 
 @njit("int64(uint32[:, ::1], int32[:, ::1], uint8[:, ::1], int64, int64, int64)", cache=True, forceinline=True)
@@ -165,25 +185,65 @@ def _under(flags, w, n, member, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    several(_N2, _F2)(_N2, _N3, _I, types.uint32[:, ::1], _N2, types.uint8[:, ::1], _N1, _N1, _N1, STEP),
+    _I(CONTACT_ROWS, STEP, _I, _I),
     cache=True,
     error_model="numpy",
 )
-def entering(cracks, sides, block, tets, across, bond, ring, leader, place, step):  # type: ignore[no-untyped-def]
-    """Nodes that would come in through a narrow side of a tet of a ``block`` at a corner that they were one with, their
-    twins across left out: (n, 4) slots of the node, of the corner and of the rest of the side, clockwise seen from
-    outside; and (n, 3) the weights of the side's nodes at the foot.
-
-    ``cracks`` (m, 6) local nodes of all cracks, and their ``sides`` (m, 2, 3); ``tets``, ``across`` and ``bond`` of the
-    block; ``ring`` and ``leader``: see Families; ``place`` (nodes,) in the scene. A node of the side that has
-    not separated is pushed by nobody: what would be its due the others get.
+def _pushed_out(out, step, first, stop):  # type: ignore[no-untyped-def]
+    """Contacts of the nodes that come in, rows of ``out`` from ``first`` to ``stop``, in their place: so far these have
+    the slots of the node, of the corner and of the rest of the side, clockwise seen from outside, and the weights of
+    these three at its foot. Returns how many there are: without those that have been deeper than DEEP_SELF at the
+    beginning of the step.
     """
-    ahead, part, mu = step.ahead, step.part, step.mu
-    nodes, weights, n = np.empty((_FEWEST, 4), np.int32), np.empty((_FEWEST, 3)), 0
-    members, begin, among, corners, start = by_family(cracks, sides, block, ring, leader)
+    x, v, ahead, n = step.x, step.v, step.ahead, first
+    for r in range(first, stop):
+        s, a, f, g = out.nodes[r, 0], out.nodes[r, 1], out.nodes[r, 2], out.nodes[r, 3]
+        gap1, m = height(at(ahead, s), at(ahead, a), at(ahead, g), at(ahead, f))
+        gap0, _ = height(at(x, s), at(x, a), at(x, g), at(x, f))
+        area = cross(minus(at(x, f), at(x, a)), minus(at(x, g), at(x, a)))
+        if not gap0 >= -DEEP_SELF * np.sqrt(np.sqrt(dot(area, area))):
+            continue
+        every = out.weights[r, 0] + out.weights[r, 1] + out.weights[r, 2]
+        w, w_f, w_g = -out.weights[r, 0] / every, -out.weights[r, 1] / every, -out.weights[r, 2] / every
+        if w_f == 0.0:  # two equal slots in the middle are a row of two nodes
+            f, w_f, g, w_g = g, w_g, f, w_f
+        if w_f == 0.0:
+            f, w = a, -1.0
+        if w_g == 0.0:
+            g = a
+        out.nodes[n, 0], out.nodes[n, 1], out.nodes[n, 2], out.nodes[n, 3] = s, a, f, g
+        out.weights[n, 0], out.weights[n, 1], out.weights[n, 2], out.weights[n, 3] = 1.0, w, w_f, w_g
+        rate = 0.0
+        for i in range(3):
+            out.normals[n, i] = m[i]
+            rate += m[i] * (v[s, i] + w * v[a, i] + w_f * v[f, i] + w_g * v[g, i])
+        out.wanted[n] = rate + needed(gap0, gap1, rate, step.give, step.dt)
+        out.friction[n], out.pair[n] = step.mu[step.part[s], step.part[a]], -1
+        n += 1
+    return n - first
+
+
+@njit(
+    _I(CONTACT_ROWS, _I, _I, NARROW, CORNERS, STEP, _I, _I),
+    cache=True,
+    error_model="numpy",
+)
+def entering(out, base, each, narrow, of, step, first, stop):  # type: ignore[no-untyped-def]
+    """Nodes that would come in through a narrow side of a tet at a corner that they were one with, their twins across
+    left out: of the families ``of`` a block from ``first`` to ``stop``.
+
+    They are rows of ``out``, ``each`` for every corner of the block in the mean: from ``base`` and ``each`` times the
+    first corner of the first family on. Returns how many there are; where there are more than that, not all have a row.
+    A node of the side that has not separated gets no weight, and the others its share.
+    """
+    ahead, part, mu, nodes, weights = step.ahead, step.part, step.mu, out.nodes, out.weights
+    members, begin, among, corners, start = of
+    cracks, sides, tets, across, bond, ring, place = narrow
+    begins, end = base + each * start[first], base + each * start[stop]
+    n = begins
     w, flags, some = np.zeros(_ROWS * _MANY), np.zeros(_MANY, np.uint8), np.empty(_WORD, np.int64)
     words, opened, rest = flags.view(np.uint64), np.empty(_MANY, np.int64), np.empty((_MANY, 3), np.int32)
-    for family in range(len(start) - 1):
+    for family in range(first, stop):
         kind = part[place[members[begin[family]]]]
         if not mu[kind, kind] >= 0.0:
             continue
@@ -224,46 +284,13 @@ def entering(cracks, sides, block, tets, across, bond, ring, leader, place, step
                         along_f, along_g = dot(to_f, r), dot(to_g, r)
                         w_f = max(w[_GG + i] * along_f - w[_FG + i] * along_g, 0.0) / w[_SQUARE + i]
                         w_g = max(w[_FF + i] * along_g - w[_FG + i] * along_f, 0.0) / w[_SQUARE + i]
-                        if n == len(nodes):
-                            nodes, weights = np.concatenate((nodes, nodes)), np.concatenate((weights, weights))
                         p, f, g = rest[i, 0], rest[i, 1], rest[i, 2]
-                        nodes[n, 0], nodes[n, 1], nodes[n, 2], nodes[n, 3] = d, place[p], place[f], place[g]
-                        weights[n, 0], weights[n, 1], weights[n, 2] = 1.0 - w_f - w_g, w_f, w_g
-                        weights[n, 1] *= ring[f] != f
-                        weights[n, 2] *= ring[g] != g
+                        if n < end:
+                            nodes[n, 0], nodes[n, 1], nodes[n, 2], nodes[n, 3] = d, place[p], place[f], place[g]
+                            weights[n, 0], weights[n, 1], weights[n, 2] = 1.0 - w_f - w_g, w_f, w_g
+                            weights[n, 1] *= ring[f] != f
+                            weights[n, 2] *= ring[g] != g
                         n += 1
-    return nodes[:n].copy(), weights[:n].copy()
-
-
-@njit(types.int64(CONTACT_ROWS, _I, _N2, _F2, STEP), cache=True, error_model="numpy")
-def pushed_out(out, n, nodes, weights, step):  # type: ignore[no-untyped-def]
-    """The active contacts of what ``entering`` has found, from row ``n`` of ``out`` on; returns the new number of rows.
-    Left out is who has been deeper than DEEP_SELF at the beginning of the step.
-    """
-    x, v, ahead = step.x, step.v, step.ahead
-    for r in range(len(nodes)):
-        s, a, f, g = nodes[r, 0], nodes[r, 1], nodes[r, 2], nodes[r, 3]
-        gap1, m = height(at(ahead, s), at(ahead, a), at(ahead, g), at(ahead, f))
-        gap0, _ = height(at(x, s), at(x, a), at(x, g), at(x, f))
-        e, b = minus(at(x, f), at(x, a)), minus(at(x, g), at(x, a))
-        area = cross(e, b)
-        if not gap0 >= -DEEP_SELF * np.sqrt(np.sqrt(dot(area, area))):
-            continue
-        every = weights[r, 0] + weights[r, 1] + weights[r, 2]
-        w, w_f, w_g = -weights[r, 0] / every, -weights[r, 1] / every, -weights[r, 2] / every
-        if w_f == 0.0:  # two equal slots in the middle are a row of two nodes
-            f, w_f, g, w_g = g, w_g, f, w_f
-        if w_f == 0.0:
-            f, w = a, -1.0
-        if w_g == 0.0:
-            g = a
-        out.nodes[n, 0], out.nodes[n, 1], out.nodes[n, 2], out.nodes[n, 3] = s, a, f, g
-        out.weights[n, 0], out.weights[n, 1], out.weights[n, 2], out.weights[n, 3] = 1.0, w, w_f, w_g
-        rate = 0.0
-        for i in range(3):
-            out.normals[n, i] = m[i]
-            rate += m[i] * (v[s, i] + w * v[a, i] + w_f * v[f, i] + w_g * v[g, i])
-        out.wanted[n] = rate + needed(gap0, gap1, rate, step.give, step.dt)
-        out.friction[n], out.pair[n] = step.mu[step.part[s], step.part[a]], -1
-        n += 1
-    return n
+    if n > end:
+        return n - begins
+    return _pushed_out(out, step, begins, n)

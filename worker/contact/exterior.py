@@ -8,13 +8,12 @@ from ..ids import among
 from ..migration.parcel import Parcel
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
-from ..state import Flags, Floats, Indices, Ints, Model, Nodes, extended
+from ..state import Block, Flags, Floats, Indices, Ints, Model, Nodes, extended
 from ..topology import Split
 from . import bare, normals, surface
 from .cracks import Cracks
-from .entering import entering
+from .families import Corners
 from .flight import Flight, typical
-from .narrow_phase import Step
 from .scene import Scene
 
 _WORDS = 9 + 2 * normals.SHARE
@@ -205,14 +204,10 @@ class Exterior:
             scene.cracks = self.cracks.places
         return bool((told[:, 0] == 0).any())
 
-    def entering(self, scene: Scene, step: Step) -> list[tuple[Indices, Floats]]:
-        """Of each block, the nodes that would come in through a narrow side; see entering.py."""
-        some, family = self.cracks, self.cracks.families
-        where = family.ring, family.leader, scene.own.place, step
-        return [
-            entering(some.nodes, some.sides, b, block.tets, block.across, block.bond, *where)
-            for b, block in enumerate(self._model.blocks) if len(block.bond) and len(some.faces)
-        ]  # fmt: skip
+    def narrow(self) -> list[tuple[Block, Corners]]:
+        """Blocks that have broken, and the corners of their narrow sides; see entering.py."""
+        some = enumerate(self._model.blocks) if len(self.cracks.faces) else ()
+        return [(block, self.cracks.corners(b)) for b, block in some if len(block.bond)]
 
     def separate(self, split: Split) -> None:
         """Follows nodes as they separate on any rank."""

@@ -79,7 +79,10 @@ class Corners(NamedTuple):
     """(families + 1,) where those of each begin."""
 
 
-@njit(record(Corners, *(5 * [_N1]))(_N2, types.int32[:, :, ::1], types.int64, _N1, _N1), cache=True)
+CORNERS = record(Corners, _N1, _N1, _N1, _N1, _N1)
+
+
+@njit(CORNERS(_N2, types.int32[:, :, ::1], types.int64, _N1, _N1), cache=True)
 def by_family(cracks, sides, block, ring, leader):  # type: ignore[no-untyped-def]
     """``Corners`` of a ``block``.
 

@@ -11,7 +11,7 @@ from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
 from ..state import Block, Flags, Indices, Ints, Nodes, extended
 from . import ghosts, kin
-from .cracks import Cracks, computed, touching
+from .cracks import Cracks, computed
 from .kin import Family
 from .news import News, meets
 from .records import Crowd
@@ -35,7 +35,7 @@ class Follower:
 
     def follow(self, heard: News, cracks: Cracks, blocks: list[Block], neighbours: list[Neighbour]) -> None:
         """Faces, edges and candidates after the split, and the places of the cracks."""
-        rows = touching(cracks.nodes, _flagged(self._nodes.id, heard.rows.id))
+        rows = kin.touching(cracks.nodes, _flagged(self._nodes.id, heard.rows.id))
         near, apart = cracks.beside(rows, blocks)
         rows = computed(rows, cracks.nodes, cracks.sides)
         self._join(heard, neighbours)

@@ -42,14 +42,19 @@ def haste(step, corners, s, f, fastest):  # type: ignore[no-untyped-def]
     return step.rebound**2 * fastest / min(one, two, altitude(x, d, a, b, c), step.least[s])
 
 
-@njit(types.float64(CONTACT_ROWS, types.int64, PAIRS, FACES, STEP), cache=True, error_model="numpy")
-def approach(out, n, pairs, faces, step):  # type: ignore[no-untyped-def]
-    """Largest relative speed of a node over the altitude of its face's tet, 1/s, of the first ``n`` active contacts; or
-    ``haste``.
+@njit(
+    types.float64(CONTACT_ROWS, types.int32[::1], PAIRS, FACES, STEP, types.int64, types.int64),
+    cache=True,
+    error_model="numpy",
+)
+def approach(out, found, pairs, faces, step, first, stop):  # type: ignore[no-untyped-def]
+    """Square of the largest relative speed of a node over the altitude of its face's tet, 1/s^2, of the active contacts
+    ``found`` from ``first`` to ``stop``, rows of ``out``; or ``haste``.
     """
     e, f, r = np.empty(3), np.empty(3), np.empty(3)
     x, most = step.x, 0.0
-    for row in range(n):
+    for q in range(first, stop):
+        row = found[q]
         s, face = pairs.rows[out.pair[row], 0], pairs.rows[out.pair[row], 1]
         corners, fastest = faces.corners[face], fastest_of(step, faces.corners, s, face)
         a, b, c, d = corners[0], corners[1], corners[2], corners[3]
@@ -60,4 +65,4 @@ def approach(out, n, pairs, faces, step):  # type: ignore[no-untyped-def]
         most = max(most, fastest / square)
         if step.beyond > 0.0:
             most = max(most, haste(step, faces.corners, s, face, fastest))
-    return np.sqrt(most)
+    return most

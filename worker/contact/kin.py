@@ -205,3 +205,17 @@ def apart_from_edges(old, now, first, own):  # type: ignore[no-untyped-def]
                     many += 1
             i = j
     return pairs
+
+
+@njit("int64[::1](int32[:, ::1], boolean[::1])", cache=True)
+def touching(table, flags):  # type: ignore[no-untyped-def]
+    """Rows of ``table`` (n, k) with an entry that is flagged."""
+    rows = np.empty(len(table), np.int64)
+    n = 0
+    for i in range(len(table)):
+        for k in range(table.shape[1]):
+            if flags[table[i, k]]:
+                rows[n] = i
+                n += 1
+                break
+    return rows[:n].copy()

@@ -140,8 +140,6 @@ class SlotTable(NamedTuple):
     """(slots, 3) velocities of the reference motions, m/s."""
     fresh: Flags
     """(slots,) whose mean normals have changed."""
-    holder: Indices
-    """(slots,) room for the last contact that holds a node that is inside of a body."""
 
 
 class FaceTable(NamedTuple):
@@ -158,10 +156,6 @@ class FaceTable(NamedTuple):
     """(f,) the largest of its corners, m."""
     fresh: Flags
     """(f,) with new corners, or exposed since the last step."""
-    normal: Floats
-    """(f, 3) unit normal at the end of the step, where it is ``known``."""
-    known: Flags
-    """(f,)."""
 
 
 class EdgeTable(NamedTuple):
@@ -188,8 +182,8 @@ _F1, _F2 = types.float64[::1], types.float64[:, ::1]
 CONTACT_ROWS = record(ContactRows, _N2, _F2, _F2, _F1, _F1, _N1)
 STEP = record(Step, types.float64[:, :], _F2, types.float64[:, :], _N1, _F2, *(5 * [types.float64]), _F1)
 PAIRS = record(Pairs, _N2, _F1, _F1, _B1, _N1, _N1)
-SLOTS = record(SlotTable, _F2, _B1, _N1, _F1, _F2, _B1, _N1)
-FACES = record(FaceTable, _N2, _F1, _I1, _B1, _F1, _B1, _F2, _B1)
+SLOTS = record(SlotTable, _F2, _B1, _N1, _F1, _F2, _B1)
+FACES = record(FaceTable, _N2, _F1, _I1, _B1, _F1, _B1)
 EDGES = record(EdgeTable, _N2, _F1, _F1, _B1, _F1, _B1)
 
 

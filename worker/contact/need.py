@@ -4,9 +4,7 @@ import numpy as np
 
 from conoid.cases.impact import Sweeps
 
-from ..jit import njit, types
 from ..state import Ints
-from .active import CHANGED, IMPULSE, NODES
 
 _SETTLED = 0.0015
 """Of the impulses of a step, the most that its last sweep may have changed them by. Chosen by rubble between a ram and
@@ -18,14 +16,6 @@ _MORE = 4
 """One over the share by which sweeps grow in a step."""
 _TOLD = 2.0
 """Times _SETTLED, what was left of all impulses of the run, from which on there is a warning. Chosen."""
-
-
-@njit(types.void(NODES, types.int64), cache=True)
-def measure(active, n):  # type: ignore[no-untyped-def]
-    """Keeps how much the completed impulses of a sweep are at ``n`` slots, in the last of a step."""
-    words, changed = active.moving_words, active.fixed_words
-    for s in range(n):
-        changed[s, CHANGED] = abs(words[s, IMPULSE]) + abs(words[s, IMPULSE + 1]) + abs(words[s, IMPULSE + 2])
 
 
 class Need:

@@ -20,7 +20,7 @@ _BEND = 0.1
 """Largest motion of two corners of a face against each other, of the face's two sides, that is allowed for."""
 
 _X2, _V2, _N2 = "float64[:, :]", "float64[:, ::1]", "int32[:, ::1]"
-_TRIPLE, _F = types.Tuple((types.int64, types.int64, types.float64)), types.float64  # type: ignore[no-untyped-call]
+_F, _I, _N1 = types.float64, types.int64, types.int32[::1]
 _VECTOR = types.UniTuple(types.float64, 3)  # type: ignore[no-untyped-call]
 
 
@@ -112,51 +112,74 @@ def _coming(step, normals, faces, s, f, m, gap):  # type: ignore[no-untyped-def]
     return haste(step, corners, s, f, fastest_of(step, corners, s, f))
 
 
-@njit(_TRIPLE(CONTACT_ROWS, types.int64, PAIRS, SLOTS, FACES, STEP, types.float64), cache=True, error_model="numpy")
-def node_face(out, n, pairs, slots, faces, step, end):  # type: ignore[no-untyped-def]
-    """Nodes that pass a face, from row ``n`` on; returns the new number of rows, how many pairs were tested, and the
-    largest speed over the altitude of a tet, 1/s, of those that will meet in the next step (``_coming``).
+@njit(_I(PAIRS, SLOTS, FACES, _F, _I, _I), cache=True, error_model="numpy")
+def due(pairs, slots, faces, end, first, stop):  # type: ignore[no-untyped-def]
+    """Which of the pairs from ``first`` to ``stop`` are to be tested: ``pairs.active`` from ``first`` on; returns how
+    many. ``end``: of the step and what is looked ahead, s after the search.
 
-    A node meets a face that it faces: the rim of a bar not the side of another one of the same width, the surface under
-    a block that slides not its front, which stands across. One that is inside of several parts is held by the nearest
-    face of each. ``end``: of the step, s after the search.
+    Nothing is known of them from now on, but that some are too close to be left alone, so that a thread that asks for
+    one (beside.py) while another measures it takes it as one to be asked. Those that are no surface are left alone
+    until they are.
     """
-    rows, until, speed, turned, active = pairs.rows, pairs.until, pairs.speed, pairs.turned, pairs.active
-    corners, size, exposed, left, fresh = faces.corners, faces.size, faces.exposed, faces.left, faces.fresh
-    holder = slots.holder
-    normals, on_surface, strayed, other, course = slots.normals, slots.on_surface, slots.left, slots.fresh, slots.course
-    nodes, weights, out_normals, wanted, pair = out.nodes, out.weights, out.normals, out.wanted, out.pair
-    x, v, ahead, part = step.x, step.v, step.ahead, step.part
-    first = slots.first
-    holder[:] = -1
-    earlier, deepest = np.empty(len(rows), np.int32), np.empty(len(rows))
-    tested, most = 0, 0.0
-    for p in range(len(rows)):
+    rows, until, speed, turned = pairs.rows[first:], pairs.until[first:], pairs.speed[first:], pairs.turned[first:]
+    active, exposed, on_surface = pairs.active[first:], faces.exposed, slots.on_surface
+    left, fresh, strayed, other = faces.left, faces.fresh, slots.left, slots.fresh
+    n, m = 0, 0
+    for p in range(stop - first):
         s, f = rows[p, 0], rows[p, 1]
-        if other[s] or fresh[f]:
-            until[p], speed[p] = -np.inf, np.nan
-        if until[p] > strayed[s] + left[f] + speed[p] * (end + step.beyond):
-            continue
+        active[n] = p
+        n += other[s] | fresh[f] | (not until[p] > strayed[s] + left[f] + speed[p] * end)
+    for q in range(n):
+        p = active[q]
+        s, f = rows[p, 0], rows[p, 1]
         if not exposed[f] or not on_surface[s]:
             until[p], speed[p] = np.inf, 0.0
             continue
-        active[tested] = p
-        tested += 1
+        if other[s] or fresh[f] or not np.isnan(until[p]):
+            until[p], speed[p], turned[p] = -np.inf, np.nan, True
+        active[m] = first + p
+        m += 1
+    return m
+
+
+@njit(
+    types.Tuple((_I, _F))(CONTACT_ROWS, types.float64[::1], _I, PAIRS, SLOTS, FACES, STEP, _F, _I, _I),  # type: ignore[no-untyped-call]
+    cache=True,
+    error_model="numpy",
+)
+def node_face(out, depth, base, pairs, slots, faces, step, end, first, stop):  # type: ignore[no-untyped-def]
+    """Nodes that pass a face, of the pairs in ``pairs.active`` from ``first`` to ``stop``: rows of ``out`` from
+    ``base + first`` on; returns how many, and the largest square of a speed over the altitude of a tet, 1/s^2, of those
+    that will meet in the next step (``_coming``).
+
+    A node meets a face that it faces: the rim of a bar not the side of another one of the same width, the surface under
+    a block that slides not its front, which stands across. ``depth`` (room,): of a node that is inside, by which the
+    nearest face of each part is taken (``nearest``), m; else 0. ``end``: of the step, s after the search.
+    """
+    rows, until, speed, turned, active = pairs.rows, pairs.until, pairs.speed, pairs.turned, pairs.active
+    corners, size, left = faces.corners, faces.size, faces.left
+    normals, strayed, other, course = slots.normals, slots.left, slots.fresh, slots.course
+    nodes, weights, out_normals, wanted, pair = out.nodes, out.weights, out.normals, out.wanted, out.pair
+    x, v, ahead, part = step.x, step.v, step.ahead, step.part
+    chains, n, most = slots.first, base + first, 0.0
+    for q in range(first, stop):
+        p = active[q]
+        s, f = rows[p, 0], rows[p, 1]
         i, j, k = corners[f, 0], corners[f, 1], corners[f, 2]
         m = plane(faces, ahead, f)
         gap1 = dot(m, minus(at(ahead, s), at(ahead, i)))
         reach = DEEP_SELF if part[s] == part[i] else DEEP
         if not np.isnan(until[p]):  # left alone while it cannot meet
             a, b, c = at(course, i), at(course, j), at(course, k)
-            if np.isnan(speed[p]) or turned[p]:
-                speed[p] = max(distance(at(course, s), a), distance(at(course, s), b), distance(at(course, s), c))
+            rate = max(distance(at(course, s), a), distance(at(course, s), b), distance(at(course, s), c))
             slack = _distance(ahead, s, i, j, k) - (_ROUND + max(reach, NEAR)) * size[f]
-            turned[p] = not slack > _WORTH * size[f]
-            if turned[p]:
+            bends = not slack > _WORTH * size[f]
+            if bends:
                 every, some = facing(normals, s, m)
                 slack = _bent(every if part[s] == part[i] else some, ahead, i, j, k)
-                speed[p] = max(distance(a, b), distance(a, c))
-            until[p] = slack - strayed[s] - left[f] + speed[p] * end if slack > _WORTH * size[f] else np.nan
+                rate = max(distance(a, b), distance(a, c))
+            speed[p], turned[p] = rate, bends
+            until[p] = slack - strayed[s] - left[f] + rate * end if slack > _WORTH * size[f] else np.nan
         if not gap1 <= NEAR * size[f]:
             if step.beyond > 0.0:
                 most = max(most, _coming(step, normals, faces, s, f, m, gap1))
@@ -173,29 +196,50 @@ def node_face(out, n, pairs, slots, faces, step, end):  # type: ignore[no-untype
         leaves, until_end = np.inf if other[s] else strayed[s], end + step.dt
         sides = minus(at(x, j), at(x, i)), minus(at(x, k), at(x, i))
         beside = min(b[0], b[1], b[2]) <= RIM and not reaches_over(normals, s, b, sides[0], sides[1], size[f])
-        if beside and in_front(pairs, first, faces, step, normals, p, gap0, gap1, leaves, until_end):
+        if beside and in_front(pairs, chains, faces, step, normals, p, gap0, gap1, leaves, until_end):
             continue
-        row = n
+        depth[n] = 0.0
         if gap0 < -TOUCHING * size[f]:
-            row = holder[s]
-            while row >= 0 and part[nodes[row, 1]] != part[i]:
-                row = earlier[row]
-            if row >= 0:
-                same = gap0 == deepest[row] and faces.id[f] < faces.id[rows[pair[row], 1]]
-                if not (gap0 > deepest[row] or same):
-                    continue
-            if outside(pairs, first, faces, x, part, p, -gap0, leaves, until_end):
+            if outside(pairs, chains, faces, x, part, p, -gap0, leaves, until_end):
                 continue
-            if row < 0:
-                row, earlier[n], holder[s] = n, holder[s], n
-            deepest[row] = gap0
-        n += row == n
-        nodes[row, 0], nodes[row, 1], nodes[row, 2], nodes[row, 3] = s, i, j, k
-        weights[row, 0], weights[row, 1], weights[row, 2], weights[row, 3] = 1.0, -b[0], -b[1], -b[2]
+            depth[n] = -gap0
+        nodes[n, 0], nodes[n, 1], nodes[n, 2], nodes[n, 3] = s, i, j, k
+        weights[n, 0], weights[n, 1], weights[n, 2], weights[n, 3] = 1.0, -b[0], -b[1], -b[2]
         rate = 0.0
         for a in range(3):
-            out_normals[row, a] = m[a]
+            out_normals[n, a] = m[a]
             rate += m[a] * (v[s, a] - (b[0] * v[i, a] + b[1] * v[j, a] + b[2] * v[k, a]))
-        wanted[row] = rate + needed(gap0, gap1, rate, step.give, step.dt)
-        out.friction[row], pair[row] = step.mu[part[s], part[i]], p
-    return n, tested, np.sqrt(most)
+        wanted[n] = rate + needed(gap0, gap1, rate, step.give, step.dt)
+        out.friction[n], pair[n] = step.mu[part[s], part[i]], p
+        n += 1
+    return n - base - first, most
+
+
+@njit(_I(_N1, CONTACT_ROWS, types.float64[::1], PAIRS, FACES, _N1, _N1), cache=True)
+def nearest(found, out, depth, pairs, faces, part, holder):  # type: ignore[no-untyped-def]
+    """Of the contacts ``found``, rows of ``out``, those that hold: a node that is inside of
+    several faces of a part is held by the nearest of them, of two as near by that of the lower id. Returns how many;
+    ``holder`` (slots,): -1, and so again.
+    """
+    earlier, m = np.empty(len(found), np.int32), 0
+    for q in range(len(found)):
+        row = found[q]
+        found[m] = row
+        if depth[row] == 0.0:
+            m += 1
+            continue
+        s = out.nodes[row, 0]
+        h = holder[s]
+        while h >= 0 and part[out.nodes[found[h], 1]] != part[out.nodes[row, 1]]:
+            h = earlier[h]
+        if h < 0:
+            earlier[m], holder[s] = holder[s], m
+            m += 1
+            continue
+        same = depth[row] == depth[found[h]]
+        lower = faces.id[pairs.rows[out.pair[row], 1]] < faces.id[pairs.rows[out.pair[found[h]], 1]]
+        if depth[row] < depth[found[h]] or (same and lower):
+            found[h] = row
+    for q in range(m):
+        holder[out.nodes[found[q], 0]] = -1
+    return m

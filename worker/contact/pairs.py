@@ -40,8 +40,8 @@ class PairTable:
     """(p, 4) the pair's impulse of the last step times its row norm, zero where it was not active: along the normal,
     and across, m/s."""
     next: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
-    tested: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
-    """Pairs that the narrow phase of the last step has tested."""
+    _active: Indices = field(default_factory=lambda: np.zeros(0, np.int32), init=False, repr=False)
+    _tested: tuple[Indices, Ints, Ints] | None = field(default=None, init=False, repr=False)
     _rooms: Rooms = field(default_factory=lambda: Rooms("rows", *_FRESH), init=False, repr=False)
 
     def __len__(self) -> int:
@@ -53,6 +53,18 @@ class PairTable:
         if len(rows):
             self._rooms.append(self, len(rows), rows=rows, **_FRESH)
 
+    def take_tested(self, active: Indices, begins: Ints, counts: Ints) -> None:
+        """The pairs that tasks have tested: of ``active``, ``counts`` from each of ``begins`` on."""
+        self._tested = active, begins, counts
+
+    @property
+    def tested(self) -> Indices:
+        """(k,) pairs that the narrow phase of the last step has tested."""
+        if self._tested is None:
+            return np.zeros(0, np.int32)
+        active, begins, counts = self._tested
+        return np.concatenate([active[:0], *(active[b : b + n] for b, n in zip(begins, counts, strict=True))])
+
     def hang(self, first: Indices, begin: int) -> None:
         """Hangs the pairs from row ``begin`` on into the chains of their nodes, ``first`` (slots,)."""
         chain(first, self.next, self.rows, begin)
@@ -62,7 +74,7 @@ class PairTable:
         n = _drop(self.rows, self.until, self.speed, self.turned, self.kept, one, two)
         for name in ("rows", "until", "speed", "turned", "kept", "next"):
             setattr(self, name, getattr(self, name)[:n])
-        self.tested = self.tested[:0]
+        self._tested = None
 
     @property
     def pushed(self) -> Ints:
@@ -91,7 +103,9 @@ class PairTable:
 
     def arrays(self) -> Pairs:
         """As kernels take it."""
-        return Pairs(self.rows, self.until, self.speed, self.turned, self.next, np.empty(len(self.rows), np.int32))
+        if len(self._active) < len(self.rows):
+            self._active = np.empty(2 * len(self.rows), np.int32)
+        return Pairs(self.rows, self.until, self.speed, self.turned, self.next, self._active)
 
 
 @njit("void(float64[:, ::1], int32[::1], int32[::1], int32[:, ::1], int32[:, ::1], float64[:, ::1])", cache=True)

@@ -7,28 +7,19 @@ in the metric of the masses of Cirak and West (2005), Decomposition contact resp
 """
 
 from ..jit import njit, types
-from ..state import Floats
-from .narrow_phase import CONTACT_ROWS, ContactRows
+from .narrow_phase import CONTACT_ROWS
 
-_V = types.float64[:, ::1]
+_V, _N1, _I = types.float64[:, ::1], types.int32[::1], types.int64
 
 
-def retarget(rows: ContactRows, n: int, v: Floats, before: Floats, share: float, give: float) -> None:
-    """Target velocities of the first ``n`` active contacts after detection: see ``rebound``, and ``hold_back`` where
-    there is nothing to ``give`` of penetrations (narrow_phase.PUSH_OUT).
+@njit(types.void(CONTACT_ROWS, _N1, _V, _V, types.float64, _I, _I), cache=True)
+def rebound(rows, found, v, before, share, first, stop):  # type: ignore[no-untyped-def]
+    """Raises the target velocity of those of the contacts ``found``, from ``first`` to ``stop``, that ask for an
+    impulse to ``share`` of the speed at which they approached; ``v``, ``before`` (slots, 3): velocities without contact
+    and v(n-1/2), m/s.
     """
-    if share > 0.0:
-        rebound(rows, n, v, before, share)
-    if give == 0.0:
-        hold_back(rows, n, before)
-
-
-@njit(types.void(CONTACT_ROWS, types.int64, _V, _V, types.float64), cache=True)
-def rebound(rows, n, v, before, share):  # type: ignore[no-untyped-def]
-    """Raises the target velocity of those of the first ``n`` active contacts that ask for an impulse to ``share`` of
-    the speed at which they approached; ``v``, ``before`` (slots, 3): velocities without contact and v(n-1/2), m/s.
-    """
-    for p in range(n):
+    for q in range(first, stop):
+        p = found[q]
         closing, approach = 0.0, 0.0
         for k in range(4):
             s, weight = rows.nodes[p, k], rows.weights[p, k]
@@ -39,12 +30,13 @@ def rebound(rows, n, v, before, share):  # type: ignore[no-untyped-def]
             rows.wanted[p] = max(rows.wanted[p], share * approach)
 
 
-@njit(types.void(CONTACT_ROWS, types.int64, _V), cache=True)
-def hold_back(rows, n, before):  # type: ignore[no-untyped-def]
-    """Lowers the target velocity of those of the first ``n`` active contacts that were parting, at u- of ``before``
-    (slots, 3), v(n-1/2), to -u-: less closing than that is energy that nobody paid.
+@njit(types.void(CONTACT_ROWS, _N1, _V, _I, _I), cache=True)
+def hold_back(rows, found, before, first, stop):  # type: ignore[no-untyped-def]
+    """Lowers the target velocity of those of the contacts ``found``, from ``first`` to ``stop``, that were parting, at
+    u- of ``before`` (slots, 3), v(n-1/2), to -u-: less closing than that is energy that was not taken before.
     """
-    for p in range(n):
+    for q in range(first, stop):
+        p = found[q]
         parting = 0.0
         for k in range(4):
             s, weight = rows.nodes[p, k], rows.weights[p, k]

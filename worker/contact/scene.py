@@ -14,25 +14,12 @@ from . import ghosts, held, sharp
 from .columns import OwnSlots, SceneEdges, SceneFaces, SceneSlots
 from .company import Company
 from .ghosts import Copies
-from .narrow_phase import ContactRows, EdgeTable, FaceTable, SlotTable, step_room
+from .narrow_phase import EdgeTable, FaceTable, SlotTable, step_room
 from .pairs import PairTable
 from .records import AGED, OPEN, Crowd
+from .rows import ActiveRows
 from .sides import Rules
 from .tracks import Tracks
-
-
-@dataclass
-class ActiveRows:
-    """The active contacts of the last step: the first ``n`` rows of the ``room``."""
-
-    room: ContactRows = field(default_factory=lambda: ContactRows.room(0))
-    n: int = 0
-
-    def reserve(self, most: int) -> None:
-        """Room for ``most`` contacts; the rows of the last step stay."""
-        if most > len(self.room.nodes):
-            nodes, self.room = self.room.nodes[: self.n], ContactRows.room(2 * most)
-            self.room.nodes[: self.n] = nodes
 
 
 @dataclass
@@ -67,6 +54,7 @@ class Scene:
     """Of a slot and a face."""
     edge_edge: PairTable = field(default_factory=PairTable)
     active: ActiveRows = field(default_factory=ActiveRows)
+    """Of the last step."""
     messages: Messages = field(init=False)
     _step_room: Floats = field(default_factory=lambda: step_room(0), init=False)
 
@@ -86,7 +74,7 @@ class Scene:
 
     def look(self, nodes: Nodes) -> None:
         """Takes v(n-1/2), before the kick."""
-        held.gather(self.slots.before, nodes.v, self.own.slots, self.own.local)
+        held.gather(self.slots.before, nodes.v, self.own.slots, self.own.local, 0, len(self.own.local))
         self.messages.copies.note(nodes)
 
     @property
@@ -95,10 +83,6 @@ class Scene:
         if len(self._step_room) < self.crowd.n:
             self._step_room = step_room(2 * self.crowd.n)
         return self._step_room
-
-    def reserve(self, more: int) -> None:
-        """Room for every contact that may become active, and for ``more``; the rows of the last step stay."""
-        self.active.reserve(len(self.node_face) + len(self.edge_edge) + 3 * len(self.cracks) + more)
 
     @property
     def kept(self) -> tuple[Ints, Floats]:
@@ -194,19 +178,13 @@ class Scene:
 
     def slot_table(self) -> SlotTable:
         """The slots as kernels take them."""
-        n, slots, lines = self.crowd.n, self.slots, self.tracks.short
-        return SlotTable(
-            slots.normals, slots.on_surface, slots.first, lines.left, lines.course, slots.fresh,
-            np.empty(n, np.int32),
-        )  # fmt: skip
+        slots, lines = self.slots, self.tracks.short
+        return SlotTable(slots.normals, slots.on_surface, slots.first, lines.left, lines.course, slots.fresh)
 
     def face_table(self) -> FaceTable:
         """The faces."""
-        faces, n = self.faces, len(self.faces.corners)
-        return FaceTable(
-            faces.corners, faces.size, faces.id, faces.exposed, self.tracks.faces, faces.fresh, np.empty((n, 3)),
-            np.zeros(n, bool),
-        )  # fmt: skip
+        faces = self.faces
+        return FaceTable(faces.corners, faces.size, faces.id, faces.exposed, self.tracks.faces, faces.fresh)
 
     def edge_table(self) -> EdgeTable:
         """The edges."""

@@ -17,18 +17,18 @@ from ..clock import Clock
 from ..migration.parcel import Parcel
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
+from ..parallel.team import Team
 from ..reduction import StepReduction
 from ..state import Flags, Floats, Indices, Ints, Model, Nodes
 from ..timers import Timers
 from ..topology import Split
-from . import held, normals, pairing, sharp
+from . import normals, pairing, sharp
 from .active import Kept
 from .books import Books
-from .detection import Ahead, Detected, detect
+from .detection import Ahead, Detected, Detection
 from .exterior import Exterior
 from .narrow_phase import PUSH_OUT
 from .need import Need
-from .restitution import retarget
 from .scene import Scene
 from .searches import Searches
 from .solver import ActiveSet
@@ -65,7 +65,7 @@ class Contact:
 
     def __init__(
         self, case: Case, model: Model, neighbours: list[Neighbour], bounds: list[Boundary],
-        comm: Comm, clock: Clock, timers: Timers, extremes: tuple[float, float],
+        comm: Comm, clock: Clock, timers: Timers, team: Team, extremes: tuple[float, float],
     ) -> None:  # fmt: skip
         """``extremes``: largest nodal mass, kg, and speed, m/s, of the scene."""
         assert case.contact is not None
@@ -74,11 +74,10 @@ class Contact:
         self.searches = Searches(case, model, neighbours, self.exterior, comm, clock)
         largest, speed = extremes
         mass = pairing.lighter(self.searches.mu, model.nodes, self.exterior.flight.mobility, comm) or largest
-        self.books = Books(model.nodes.n, len(case.parts), mass * speed, mass * speed * speed)
-        self._active = ActiveSet(self.books.scale, Stops.of(case, model, comm))
+        self.books = Books(model.nodes.n, len(case.parts), mass * speed, mass * speed * speed, team)
+        self._active = ActiveSet(self.books.scale, Stops.of(case, model, comm), team)
         self._scheme, self.need = _Scheme.of(case), Need(sweeps(case))
-        self.found = Detected.nothing()
-        """What the last step has found here."""
+        self._detection = Detection(team)
         self.limit = 0.0
         """One over the step in which no node of any rank passes more than half of a tet that it meets, 1/s."""
         self.last_push = 0.0
@@ -136,7 +135,7 @@ class Contact:
             for effort, weight, slots in (
                 (search, _LISTED, np.concatenate([nodes, firsts])),
                 (push, _TESTED, tested),
-                (push, _ACTIVE, now.active.room.nodes[: now.active.n, 0]),
+                (push, _ACTIVE, now.active.nodes[:, 0]),
             ):
                 at = now.crowd.local[slots]
                 effort += weight * np.bincount(at[at >= 0], minlength=n)
@@ -173,6 +172,11 @@ class Contact:
         self.limit = all_ranks.approach
         if all_ranks.opening:
             self.open_cracks()
+
+    @property
+    def found(self) -> Detected:
+        """What the last step has found here."""
+        return self._detection.found
 
     @property
     def approach(self) -> float:
@@ -230,16 +234,14 @@ class Contact:
             return self.searches.spent(state)
 
     def look_ahead(self, state: Nodes) -> bool:
-        """Before the first step, whose bound no step before has found: bounds it by what comes near, and says whether
-        it has; all ranks take part.
-        """
+        """Before the first step: bounds it by what comes near; whether anything does. All ranks take part."""
         if (now := self.searches.scene) is None:
             return False
         with self._timers.phase("contact"):
-            held.take(now.crowd.x, now.crowd.v, now.own.slots, state.x, state.v, now.own.local)
+            self._detection.take(now, state)
             ahead = Ahead(0.0, self._clock.dt, self.exterior.size, 1.0 + self._scheme.restitution)
-            own = detect(now, self.exterior, self.searches.mu, 0.0, ahead, redraw=True, together=False).approach
-            self.limit = float(self._comm.maximum(np.array([own]))[0])
+            found = self._detection.detect(now, self.exterior, self.searches.mu, 0.0, ahead, True, together=False)
+            self.limit = float(self._comm.maximum(np.array([found.approach]))[0])
         return self.limit > 0.0
 
     def solve(self, state: Nodes, dt: float, t: float) -> None:
@@ -251,14 +253,14 @@ class Contact:
     def _push(self, now: Scene, state: Nodes, dt: float, t: float) -> None:
         crowd, books, active = now.crowd, self.books, self._active
         now.messages.copies.begin(state)
-        held.take(crowd.x, crowd.v, now.own.slots, state.x, state.v, now.own.local)
+        self._detection.take(now, state)
         now.messages.copies.finish(crowd.x, crowd.v, now.slots.before)
         give = PUSH_OUT if books.account.settle(books.agreed) else 0.0
         self._meet(now, give, dt)
-        retarget(now.active.room, now.active.n, crowd.v, now.slots.before, self._scheme.restitution, give)
-        shared = now.messages.company.agree(now.active.room.nodes[: now.active.n], crowd.local)
+        self._detection.retarget(now, self._scheme.restitution, give)
+        shared = now.messages.company.agree(now.active, crowd.local)
         surface = self.exterior
-        active.begin(now.active.room, now.active.n, crowd, surface.flight.loose, shared, surface.size, dt)
+        active.begin(now.active, crowd, surface.flight.loose, shared, surface.size, dt)
         active.weigh()
         kept = Kept(now.node_face.kept, self.exterior.cracks.kept.reshape(-1, 4))
         active.resume(kept, self._resume(give))
@@ -290,8 +292,7 @@ class Contact:
         if step % self._scheme.looks == 0:
             self.exterior.sharpen(now, self._scheme.sharp)
         ahead = Ahead(dt, self._clock.longest, self.exterior.size, 1.0 + self._scheme.restitution)
-        self.found = detect(now, self.exterior, self.searches.mu, give, ahead, redraw, self.found.stray)
-        now.active.n = self.found.contacts
+        self._detection.detect(now, self.exterior, self.searches.mu, give, ahead, redraw, self.found.stray)
 
     def free(self) -> None:
         """Gives the messages back to MPI."""

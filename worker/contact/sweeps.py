@@ -20,6 +20,7 @@ import numpy as np
 
 from ..jit import njit, types
 from .active import (
+    CHANGED,
     CONTACTS,
     IMPULSE,
     KEPT,
@@ -37,7 +38,6 @@ from .active import (
     V,
 )  # fmt: skip
 from .narrow_phase import CRACK
-from .need import measure
 from .stops import BRACED, stop
 
 SHARES = float(2**30)
@@ -54,14 +54,14 @@ _ROUNDING = 2.0**-40
 _ROWS, _F2, _F, _I = types.int32[::1], types.float64[:, ::1], types.float64, types.int64
 
 
-@njit(types.void(NODES, CONTACTS, _ROWS), cache=True)
-def add_row_weights(active, contacts, some):  # type: ignore[no-untyped-def]
-    """Adds |w| |n_i| and |w| of ``some`` contacts to the row weights of their nodes, in quanta."""
+@njit(types.void(NODES, CONTACTS, LOADED, _I), cache=True)
+def add_row_weights(active, contacts, loaded, k):  # type: ignore[no-untyped-def]
+    """Adds |w| |n_i| and |w| of the contacts of set ``k``, all idle, to the row weights of their nodes, in quanta."""
     sums, slots, weights, normals = active.row_weights, contacts.slots, contacts.weights, contacts.normals
-    for p in some:
-        two = slots[p, 2] < 0
-        for k in range(2 if two else 4):
-            a, weight = slots[p, k], SHARES if two else abs(weights[p, k]) * SHARES
+    for q in range(loaded.begin[k], loaded.begin[k] + loaded.many[k, 1]):
+        p, two = contacts.row[q], slots[q, 2] < 0
+        for m in range(2 if two else 4):
+            a, weight = slots[q, m], SHARES if two else abs(weights[p, m]) * SHARES
             for i in range(3):
                 sums[a, i] += np.int64(np.rint(weight * abs(normals[p, i])))
             sums[a, 3] += np.int64(np.rint(weight))
@@ -69,7 +69,8 @@ def add_row_weights(active, contacts, some):  # type: ignore[no-untyped-def]
 
 @njit(types.void(LOADED, CONTACTS, NODES, _I, _I), cache=True, error_model="numpy")
 def fill(loaded, contacts, active, first, end):  # type: ignore[no-untyped-def]
-    """The data of the loaded contacts from ``first`` to ``end``, whose rows are known; none has an impulse yet.
+    """The data of the loaded contacts from ``first`` to ``end``, without impulses; ``loaded.row`` has their numbers,
+    then their rows.
 
     Row norms are bounds of l1 norms along the normal and across, 1/kg; infinite where nothing moves.
     """
@@ -78,15 +79,16 @@ def fill(loaded, contacts, active, first, end):  # type: ignore[no-untyped-def]
     )  # fmt: skip
     normal, tangent = loaded.normal, loaded.tangent
     for q in range(first, end):
-        p = loaded.row[q]
-        two = slots[p, 2] < 0
+        c = loaded.row[q]
+        p, two = contacts.row[c], slots[c, 2] < 0
+        loaded.row[q] = p
         for k in range(4):
-            tangent[q, k], loaded.slots[q, k] = _ACROSS[k] if two else weights[p, k], slots[p, k]
+            tangent[q, k], loaded.slots[q, k] = _ACROSS[k] if two else weights[p, k], slots[c, k]
         for i in range(3):
             normal[q, i], tangent[q, PUSH_T + i] = normals[p, i], 0.0
         along, across = 0.0, 0.0
         for k in range(2 if two else 4):
-            s, weight, most = slots[p, k], abs(tangent[q, k]) / SHARES, 0.0
+            s, weight, most = slots[c, k], abs(tangent[q, k]) / SHARES, 0.0
             for i in range(3):
                 along += weight * abs(normal[q, i]) * sums[s, i] * fixed[s, MOBILITY + i]
                 most = max(most, fixed[s, MOBILITY + i])
@@ -97,71 +99,76 @@ def fill(loaded, contacts, active, first, end):  # type: ignore[no-untyped-def]
         tangent[q, ROW_NORM_T] = across if across > 0.0 else np.inf
 
 
-@njit(types.void(LOADED, CONTACTS, NODES, _F), cache=True, error_model="numpy")
-def load(loaded, contacts, active, fastest):  # type: ignore[no-untyped-def]
-    """Takes those of the idle contacts among the loaded that close faster than they may.
+@njit(types.void(LOADED, CONTACTS, NODES, _F, _I), cache=True, error_model="numpy")
+def load(loaded, contacts, active, fastest, k):  # type: ignore[no-untyped-def]
+    """Takes those of the idle contacts of set ``k`` among the loaded that close faster than they may.
 
     The speed of a contact changes by no more than the paths of its nodes times the largest of its weights; an idle one
     is computed anew when they may have used up what it had left. ``fastest``: bound of the l1 norm of any velocity at
     the beginning of the step, m/s.
     """
     slots, weights, normals, wanted = contacts.slots, contacts.weights, contacts.normals, contacts.wanted
-    moving, path, reach, idle, count = active.moving, active.path, contacts.reach, loaded.idle, loaded.many
-    n, m, row = count[0], 0, loaded.row
-    for q in range(count[1]):
-        p = idle[q]
-        a, b, c, d = slots[p, 0], slots[p, 1], slots[p, 2], slots[p, 3]
-        paths = path[a] + path[b] if c < 0 else path[a] + path[b] + path[c] + path[d]
+    moving, path, reach, count, first = active.moving, active.path, contacts.reach, loaded.many, loaded.begin[k]
+    idle, row = loaded.idle[first:], loaded.row[first:]
+    n, m = count[k, 0], 0
+    for q in range(count[k, 1]):
+        each = idle[q]
+        a, b, c, d = slots[each, 0], slots[each, 1], slots[each, 2], slots[each, 3]
+        two = c < 0
+        paths = path[a] + path[b] if two else path[a] + path[b] + path[c] + path[d]
         asks = False
-        if paths >= reach[p]:
-            speed, most = 0.0, 1.0
+        if paths >= reach[each]:
+            p, speed, most = contacts.row[each], 0.0, 1.0
             for i in range(3):
-                if c < 0:
+                if two:
                     rate = 0.0 + moving[a, V + i] - moving[b, V + i]
                 else:
                     rate = 0.0 + weights[p, 0] * moving[a, V + i] + weights[p, 1] * moving[b, V + i]
                     rate = rate + weights[p, 2] * moving[c, V + i] + weights[p, 3] * moving[d, V + i]
                 speed += normals[p, i] * rate
             asks = wanted[p] > speed
-            if c >= 0:
-                for k in range(4):
-                    most = max(most, abs(weights[p, k]))
+            if not two:
+                for j in range(4):
+                    most = max(most, abs(weights[p, j]))
             left = (speed - wanted[p]) / most
-            reach[p] = paths + left - _ROUNDING * (fastest + paths + left + abs(wanted[p]))
-        row[n], idle[m] = p, p
+            reach[each] = paths + left - _ROUNDING * (fastest + paths + left + abs(wanted[p]))
+        row[n], idle[m] = each, each
         n += asks
         m += not asks
-    fill(loaded, contacts, active, count[0], n)
-    count[0], count[1] = n, m
+    fill(loaded, contacts, active, first + count[k, 0], first + n)
+    count[k, 0], count[k, 1] = n, m
 
 
-@njit(types.void(LOADED, CONTACTS, NODES, KEPT), cache=True)
-def load_kept(loaded, contacts, active, kept):  # type: ignore[no-untyped-def]
-    """Takes those of the idle contacts among the loaded that have ``kept`` an impulse of the step before."""
+@njit(types.void(LOADED, CONTACTS, NODES, KEPT, _I), cache=True)
+def load_kept(loaded, contacts, active, kept, k):  # type: ignore[no-untyped-def]
+    """Takes those of the contacts of set ``k``, all idle, among the loaded that have ``kept`` an impulse of the step
+    before.
+    """
     pair, idle, count, pairs, cracks = contacts.pair, loaded.idle, loaded.many, kept.pairs, kept.cracks
-    n, m = 0, 0
-    for q in range(count[1]):
-        p = idle[q]
-        k = pair[p]
-        if (k >= 0 and pairs[k, 0] > 0.0) or (k <= CRACK and cracks[CRACK - k, 0] > 0.0):
-            loaded.row[n] = p
+    first = loaded.begin[k]
+    n, m = first, first
+    for q in range(first, first + count[k, 1]):
+        each = idle[q]
+        j = pair[contacts.row[each]]
+        if (j >= 0 and pairs[j, 0] > 0.0) or (j <= CRACK and cracks[CRACK - j, 0] > 0.0):
+            loaded.row[n] = each
             n += 1
         else:
-            idle[m] = p
+            idle[m] = each
             m += 1
-    fill(loaded, contacts, active, 0, n)
-    count[0], count[1] = n, m
+    fill(loaded, contacts, active, first, n)
+    count[k, 0], count[k, 1] = n - first, m - first
 
 
-@njit(types.void(NODES, LOADED, KEPT, _ROWS, _F, _F), cache=True)
-def resume(active, loaded, kept, pair, ratio, scale):  # type: ignore[no-untyped-def]
-    """The loaded contacts begin with ``ratio`` times what they have ``kept``, along and across the normal as it is now:
-    over the row norms as they are now, so that a node that has separated, and is lighter, or that shares its load with
-    others begins with less.
+@njit(types.void(NODES, LOADED, KEPT, _ROWS, _F, _F, _I), cache=True)
+def resume(active, loaded, kept, pair, ratio, scale, k):  # type: ignore[no-untyped-def]
+    """The loaded contacts of set ``k`` begin with ``ratio`` times what they have ``kept``, along and across the normal
+    as it is now: over the row norms as they are now, so that a node that has separated, and is lighter, or that shares
+    its load with others begins with less.
     """
     words, normal, tangent, slots, row = active.moving_words, loaded.normal, loaded.tangent, loaded.slots, loaded.row
     pairs, cracks, last = kept.pairs, kept.cracks, np.empty(4)
-    for q in range(loaded.many[0]):
+    for q in range(loaded.begin[k], loaded.begin[k] + loaded.many[k, 0]):
         p, along = pair[row[q]], 0.0
         for i in range(4):
             last[i] = pairs[p, i] if p >= 0 else cracks[CRACK - p, i]
@@ -172,9 +179,9 @@ def resume(active, loaded, kept, pair, ratio, scale):  # type: ignore[no-untyped
             tangent[q, PUSH_T + i] = ratio * (last[1 + i] - along * normal[q, i]) / tangent[q, ROW_NORM_T]
             change = normal[q, PUSH] * normal[q, i] + tangent[q, PUSH_T + i]
             rest = np.int64(0)
-            for k in range(1, 4 if p >= 0 else 2):
-                part = np.int64(np.rint(tangent[q, k] * change * scale))
-                words[slots[q, k], IMPULSE + i] += part
+            for j in range(1, 4 if p >= 0 else 2):
+                part = np.int64(np.rint(tangent[q, j] * change * scale))
+                words[slots[q, j], IMPULSE + i] += part
                 rest += part
             words[slots[q, 0], IMPULSE + i] -= rest
 
@@ -187,15 +194,16 @@ def momentum(k, many):  # type: ignore[no-untyped-def]
     return k / (k + 3.0) if k + 1 < many else 0.0
 
 
-@njit(types.void(NODES, LOADED, _F, _F), cache=True, error_model="numpy")
-def sweep(active, loaded, ahead, scale):  # type: ignore[no-untyped-def]
-    """Adds the corrections of the loaded contacts to the impulses of their nodes; they add up to zero. ``ahead``: of
-    what an impulse along the normal has changed by since the last sweep, how much it goes on.
+@njit(types.void(NODES, LOADED, _F, _F, _I), cache=True, error_model="numpy")
+def sweep(active, loaded, ahead, scale, k):  # type: ignore[no-untyped-def]
+    """Adds the corrections of the loaded contacts of set ``k`` to the impulses of their nodes; they add up to zero.
+    ``ahead``: of what an impulse along the normal has changed by since the last sweep, how much it goes on.
     """
     values, words = active.moving, active.moving_words
-    normal, tangent, slots = loaded.normal, loaded.tangent, loaded.slots
+    first = loaded.begin[k]
+    normal, tangent, slots = loaded.normal[first:], loaded.tangent[first:], loaded.slots[first:]
     rate, change = np.empty(3), np.empty(3)
-    for q in range(loaded.many[0]):
+    for q in range(loaded.many[k, 0]):
         a, b, c, d = slots[q, 0], slots[q, 1], slots[q, 2], slots[q, 3]
         speed = 0.0
         for i in range(3):
@@ -239,15 +247,17 @@ def sweep(active, loaded, ahead, scale):  # type: ignore[no-untyped-def]
             words[a, IMPULSE + i] -= rest
 
 
-@njit(types.void(NODES, _I, _F), cache=True)
-def give(active, n, scale):  # type: ignore[no-untyped-def]
-    """Turns the completed impulses of a sweep at ``n`` slots into velocities, adds them to those of the step and clears
-    them.
+@njit(types.void(NODES, _F, types.boolean, _I, _I), cache=True)
+def give(active, scale, last, first, stop):  # type: ignore[no-untyped-def]
+    """Turns the completed impulses of a sweep at the slots from ``first`` to ``stop`` into velocities, adds them to
+    those of the step and clears them; keeps how much they are in the ``last`` sweep of a step.
     """
-    v, words, mobility, total, path = (
-        active.moving, active.moving_words, active.fixed, active.fixed_words, active.path,
-    )  # fmt: skip
-    for s in range(n):
+    v, words, path = active.moving[first:stop], active.moving_words[first:stop], active.path[first:stop]
+    mobility, total = active.fixed[first:stop], active.fixed_words[first:stop]
+    if last:
+        for s in range(stop - first):
+            total[s, CHANGED] = abs(words[s, IMPULSE]) + abs(words[s, IMPULSE + 1]) + abs(words[s, IMPULSE + 2])
+    for s in range(stop - first):
         if words[s, IMPULSE] | words[s, IMPULSE + 1] | words[s, IMPULSE + 2]:
             length = 0.0
             for i in range(3):
@@ -260,30 +270,23 @@ def give(active, n, scale):  # type: ignore[no-untyped-def]
             path[s] += length
 
 
-@njit(types.void(NODES, LOADED, CONTACTS, _F, _F, _F), cache=True)
-def correct(active, loaded, contacts, fastest, ahead, scale):  # type: ignore[no-untyped-def]
-    """``load`` and ``sweep``."""
-    load(loaded, contacts, active, fastest)
-    sweep(active, loaded, ahead, scale)
-
-
-@njit(types.void(NODES, LOADED, CONTACTS, BRACED, _F, _I, _F, _I), cache=True)
-def sweep_all(active, loaded, contacts, braced, fastest, n, scale, many):  # type: ignore[no-untyped-def]
-    """``many`` sweeps (``correct``, ``give``, ``stop``) of contacts of which no other rank shares a node."""
+@njit(types.void(NODES, LOADED, CONTACTS, BRACED, _I, _F, _F, _I), cache=True)
+def sweep_all(active, loaded, contacts, braced, n, fastest, scale, many):  # type: ignore[no-untyped-def]
+    """``many`` sweeps (``load``, ``sweep``, ``give``, ``stop``) of all sets and ``n`` slots, none of them shared."""
     for k in range(many):
-        correct(active, loaded, contacts, fastest, momentum(k, many), scale)
-        if k + 1 == many:
-            measure(active, n)
-        give(active, n, scale)
+        for each in range(len(loaded.many)):
+            load(loaded, contacts, active, fastest, each)
+            sweep(active, loaded, momentum(k, many), scale, each)
+        give(active, scale, k + 1 == many, 0, n)
         stop(active, braced)
 
 
-@njit(types.void(KEPT, LOADED, _ROWS), cache=True)
-def store(kept, loaded, pair):  # type: ignore[no-untyped-def]
-    """What loaded contacts have ``kept``: their impulses times their row norms."""
+@njit(types.void(KEPT, LOADED, _ROWS, _I), cache=True)
+def store(kept, loaded, pair, k):  # type: ignore[no-untyped-def]
+    """What the loaded contacts of set ``k`` have ``kept``: their impulses times their row norms."""
     pairs, cracks, normal, tangent, row = kept.pairs, kept.cracks, loaded.normal, loaded.tangent, loaded.row
     last = np.empty(4)
-    for q in range(loaded.many[0]):
+    for q in range(loaded.begin[k], loaded.begin[k] + loaded.many[k, 0]):
         p = pair[row[q]]
         last[0] = normal[q, PUSH] * normal[q, ROW_NORM]
         if not last[0] > 0.0:

@@ -1,0 +1,224 @@
+"""The passes over candidates, faces and contacts as tasks of a team (parallel/team.py).
+
+Each task puts its rows behind each other from a place of its own on, and into ``counts`` how many they are.
+"""
+
+from ..jit import njit, types
+from ..parallel.arguments import reader
+from ..parallel.team import TASK
+from . import booking, cracks, edge_edge, entering, haste, held, node_face, restitution, sweeps
+from .active import CONTACTS, KEPT, LOADED, NODES
+from .entering import NARROW
+from .families import CORNERS
+from .narrow_phase import CONTACT_ROWS, EDGES, FACES, PAIRS, SLOTS, STEP
+
+PAIRS_OF_A_TASK = 1024
+"""Chosen: some 20 us of work, of which a region of threads costs 2."""
+CRACKS_OF_A_TASK = 512
+FAMILIES_OF_A_TASK = 128
+CONTACTS_OF_A_TASK = 1024
+SLOTS_OF_A_TASK = 2048
+"""Chosen likewise."""
+_F, _I = types.float64, types.int64
+_F1, _F2, _I1, _I2 = types.float64[::1], types.float64[:, ::1], types.int64[::1], types.int64[:, ::1]
+_N1, _N2, _U1 = types.int32[::1], types.int32[:, ::1], types.uint8[::1]
+DUE_FACES = PAIRS, SLOTS, FACES, _F, _I1
+NODE_FACE = CONTACT_ROWS, _F1, _I, PAIRS, SLOTS, FACES, STEP, _F, _I1, _I1, _F1
+EDGE_EDGE = CONTACT_ROWS, _I, PAIRS, EDGES, STEP, _F2, _F, _I1, _I1
+ACROSS = CONTACT_ROWS, _I, _I1, _N2, _F, STEP, _I1, _I1
+ENTERING = CONTACT_ROWS, _I, _I, NARROW, CORNERS, STEP, _I1
+APPROACH = CONTACT_ROWS, _N1, PAIRS, FACES, STEP, _F1
+REBOUND = CONTACT_ROWS, _N1, _F2, _F2, _F, types.boolean
+MARK = _U1, _N1, _N2, _N1, _N1, _U1, _I2
+SORT = _N1, _N1, _N2, _F1, _I2, _N1, _N1, _N2, _N1
+LOAD = NODES, _N1, _F2, _F2, _F1
+WEIGH = NODES, CONTACTS, LOADED
+RESUME = NODES, CONTACTS, LOADED, KEPT, _F, _F
+SWEEP = NODES, CONTACTS, LOADED, _F, _F, _F
+GIVE = NODES, _F, types.boolean
+STORE = KEPT, LOADED, _N1
+COST = types.int64[:, :, ::1], LOADED, NODES, _F2, _N1, _F
+LEAVE = _F2, types.int64[:, :, ::1], _I2, _I2, NODES, _N1, _N1, _N1, types.boolean[::1]
+BOOK = _F1, _F1, _N1, _N1, _F2, _I2, _F2, _F
+TAKE = _F2, _F2, _N1, _F2, _F2, _N1
+GATHER = _F2, _F2, _N1, _N1
+_due_faces, _node_face, _edge_edge = reader(*DUE_FACES), reader(*NODE_FACE), reader(*EDGE_EDGE)
+_across, _entering, _approach = reader(*ACROSS), reader(*ENTERING), reader(*APPROACH)
+_rebound, _mark, _sort, _load, _weigh = reader(*REBOUND), reader(*MARK), reader(*SORT), reader(*LOAD), reader(*WEIGH)
+_resume, _sweep, _give, _store, _cost = reader(*RESUME), reader(*SWEEP), reader(*GIVE), reader(*STORE), reader(*COST)
+_leave, _book, _take, _gather = reader(*LEAVE), reader(*BOOK), reader(*TAKE), reader(*GATHER)
+
+
+@njit(TASK, cache=True)
+def due_faces(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``node_face.due``."""
+    pairs, slots, faces, end, counts = _due_faces(table)
+    counts[first // PAIRS_OF_A_TASK] = node_face.due(pairs, slots, faces, end, first, stop)
+
+
+@njit(TASK, cache=True)
+def node_face_pairs(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``node_face.node_face`` of those that are due."""
+    out, depth, base, pairs, slots, faces, step, end, due, counts, coming = _node_face(table)
+    k = first // PAIRS_OF_A_TASK
+    counts[k], coming[k] = node_face.node_face(out, depth, base, pairs, slots, faces, step, end, first, first + due[k])
+
+
+@njit(TASK, cache=True)
+def edge_edge_pairs(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``edge_edge.edge_edge``."""
+    out, base, pairs, edges, step, course, end, tested, counts = _edge_edge(table)
+    k = first // PAIRS_OF_A_TASK
+    counts[k], tested[k] = edge_edge.edge_edge(out, base, pairs, edges, step, course, end, first, stop)
+
+
+@njit(TASK, cache=True)
+def across_cracks(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``cracks.across``."""
+    out, base, opening, some, typical, step, counts, wide = _across(table)
+    k = first // CRACKS_OF_A_TASK
+    counts[k], wide[k] = cracks.across(out, base, opening, some, typical, step, first, stop)
+
+
+@njit(TASK, cache=True)
+def entering_nodes(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``entering.entering``."""
+    out, base, each, narrow, of, step, counts = _entering(table)
+    counts[first // FAMILIES_OF_A_TASK] = entering.entering(out, base, each, narrow, of, step, first, stop)
+
+
+@njit(TASK, cache=True)
+def approach(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``haste.approach``."""
+    out, found, pairs, faces, step, most = _approach(table)
+    most[first // CONTACTS_OF_A_TASK] = haste.approach(out, found, pairs, faces, step, first, stop)
+
+
+@njit(TASK, cache=True)
+def rebound(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``restitution.rebound`` where there is a share, and ``hold_back`` where that is asked for."""
+    out, found, v, before, share, back = _rebound(table)
+    if share > 0.0:
+        restitution.rebound(out, found, v, before, share, first, stop)
+    if back:
+        restitution.hold_back(out, found, before, first, stop)
+
+
+@njit(TASK, cache=True)
+def mark(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``held.mark``."""
+    touched, set_of, nodes, found, zone, shared, many = _mark(table)
+    held.mark(touched, set_of, nodes, found, zone, shared, many, first // CONTACTS_OF_A_TASK, first, stop)
+
+
+@njit(TASK, cache=True)
+def sort(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``held.sort``."""
+    idle, row, slots, reach, begins, set_of, found, nodes, slot = _sort(table)
+    task = first // CONTACTS_OF_A_TASK
+    held.sort(idle, row, slots, reach, begins, set_of, found, nodes, slot, task, first, stop)
+
+
+@njit(TASK, cache=True)
+def load(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``held.load``."""
+    active, places, v, mobility, fastest = _load(table)
+    fastest[first // SLOTS_OF_A_TASK] = held.load(active, places, v, mobility, first, stop)
+
+
+@njit(TASK, cache=True)
+def weigh(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``sweeps.add_row_weights`` of some sets of contacts."""
+    active, contacts, loaded = _weigh(table)
+    for k in range(first, stop):
+        sweeps.add_row_weights(active, contacts, loaded, k)
+
+
+@njit(TASK, cache=True)
+def resume(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``sweeps.load_kept`` and ``sweeps.resume`` of some sets of contacts."""
+    active, contacts, loaded, kept, ratio, scale = _resume(table)
+    for k in range(first, stop):
+        sweeps.load_kept(loaded, contacts, active, kept, k)
+        sweeps.resume(active, loaded, kept, contacts.pair, ratio, scale, k)
+
+
+@njit(TASK, cache=True)
+def sweep(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``sweeps.load`` and ``sweeps.sweep`` of some sets of contacts."""
+    active, contacts, loaded, fastest, ahead, scale = _sweep(table)
+    for k in range(first, stop):
+        sweeps.load(loaded, contacts, active, fastest, k)
+        sweeps.sweep(active, loaded, ahead, scale, k)
+
+
+@njit(TASK, cache=True)
+def give(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``sweeps.give``."""
+    active, scale, last = _give(table)
+    sweeps.give(active, scale, last, first, stop)
+
+
+@njit(TASK, cache=True)
+def store(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``sweeps.store`` of some sets of contacts."""
+    kept, loaded, pair = _store(table)
+    for k in range(first, stop):
+        sweeps.store(kept, loaded, pair, k)
+
+
+@njit(TASK, cache=True)
+def cost(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``booking.cost`` of some sets of contacts, with words for each."""
+    words, loaded, active, before, places, joule = _cost(table)
+    for k in range(first, stop):
+        booking.cost(words[k], loaded, active, before, places, joule, k)
+
+
+@njit(TASK, cache=True)
+def heat(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``booking.heat`` of some sets of contacts, with words for each."""
+    words, loaded, active, before, places, joule = _cost(table)
+    for k in range(first, stop):
+        booking.heat(words[k], loaded, active, before, places, joule, k)
+
+
+@njit(TASK, cache=True)
+def leave(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``held.leave``, with sums of each task."""
+    node_v, parts, unsettled, total, active, places, index, part, owned = _leave(table)
+    k = first // SLOTS_OF_A_TASK
+    held.leave(node_v, parts[k], unsettled[k], total, active, places, index, part, owned, first, stop)
+
+
+@njit(TASK, cache=True)
+def book(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``booking.book``."""
+    loss, external, places, index, before, total, mobility, scale = _book(table)
+    booking.book(loss, external, places, index, before, total, mobility, scale, first, stop)
+
+
+@njit(TASK, cache=True)
+def take(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``held.take``."""
+    x, v, slots, node_x, node_v, local = _take(table)
+    held.take(x, v, slots, node_x, node_v, local, first, stop)
+
+
+@njit(TASK, cache=True)
+def gather(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``held.gather``."""
+    out, v, slots, local = _gather(table)
+    held.gather(out, v, slots, local, first, stop)
+
+
+@njit("int64(int32[::1], int64, int64[::1], int64[::1])", cache=True)
+def collected(found, n, begins, counts):  # type: ignore[no-untyped-def]
+    """Numbers of the rows of tasks, ``counts`` from each of ``begins`` on: in ``found`` from ``n`` on; returns how many
+    there are with them.
+    """
+    for k in range(len(counts)):
+        for row in range(begins[k], begins[k] + counts[k]):
+            found[n] = row
+            n += 1
+    return n

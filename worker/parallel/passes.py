@@ -1,0 +1,44 @@
+"""A pass: a kernel over a range, cut into tasks of one size, by the threads of a rank."""
+
+from typing import Any
+
+import numpy as np
+
+from ..jit import Kernel
+from ..state import Ints
+from .arguments import Arguments
+from .team import Team
+
+
+class Pass:
+    """A kernel of the signature team.TASK with its table of arguments.
+
+    Tasks may run at the same time, so what they write must not overlap. The task that begins at ``first`` has the
+    number ``first // size``.
+    """
+
+    def __init__(self, team: Team, kernel: Kernel, *kinds: Any, size: int) -> None:
+        """``kinds``: numba types of the arguments; ``size``: of a task."""
+        self.size = size
+        self._team, self._kernel, self._arguments = team, kernel, Arguments(*kinds)
+        self._tasks, self._starts, self._n = np.zeros((0, 2), np.int64), np.zeros(2, np.int64), 0
+
+    def run(self, n: int, *values: Any) -> None:
+        """The range from 0 to ``n``; ``values``: the arguments."""
+        if n:
+            self._team.run(self._kernel, self._arguments.set(*values), self._cut(n), self._starts)
+
+    def many(self, n: int) -> int:
+        """Tasks of the range from 0 to ``n``."""
+        return -(-n // self.size)
+
+    def _cut(self, n: int) -> Ints:
+        many = self.many(n)
+        if many > len(self._tasks):
+            first = self.size * np.arange(2 * many)
+            self._tasks = np.column_stack([first, first + self.size])
+        if n != self._n:
+            before = self.many(self._n) - 1
+            self._tasks[before, 1] = self._tasks[before, 0] + self.size
+            self._tasks[many - 1, 1], self._starts[1], self._n = n, many, n
+        return self._tasks[:many]
