@@ -17,7 +17,7 @@ from .growing import Rooms
 from .jit import njit
 from .migration.parcel import Parcel, length
 from .parallel.arguments import Arguments
-from .parallel.nodes import OverNodes
+from .parallel.passes import Ranges
 from .parallel.team import team
 from .state import Bits, Flags, Floats, Indices, Ints, Nodes, extended
 from .topology import Split
@@ -54,7 +54,7 @@ class Boundary(ABC):
         """(n, 3) v(n-1/2), m/s."""
         self._impulse = np.zeros((len(nodes), 3))
         """(n, 3) of the last step, N s."""
-        self.over = OverNodes(team(1))
+        self.over = Ranges(team(1))
         """Whose threads go over its nodes."""
         self._notes = Arguments(*impulses.NOTE)
         self._rooms = Rooms("nodes", *KEPT, "_before")
@@ -149,11 +149,6 @@ class SymmetryPlane(Boundary):
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
         _hold(state.v, self.nodes, self._axis)
-
-    def _note(self, state: Nodes, account: Floats, factor: float) -> None:
-        """``note`` with an account of the work of its impulses, J; ``factor``: a half with its sign there."""
-        table = self._notes.set(state.v, self.nodes, self._before, self._impulse, account, factor)
-        self.over.run(impulses.note, table, len(self.nodes))
 
     def mirror(self, vectors: Floats) -> None:
         _hold(vectors, self.nodes, self._axis)

@@ -15,6 +15,7 @@ from conoid.cases.messages import Energy, PartEnergy
 from conoid.cases.run import Cause, State
 
 from . import simulation, step
+from .asking import CANCELLED, MAX_STEPS, WALL_TIME, Asking
 from .balance import Balance, Window
 from .clock import SLOWED
 from .groups import Groups
@@ -33,15 +34,12 @@ from .snapshots.stage import Snapshots
 from .state import Floats
 from .timers import by_phase
 
-CANCELLED, WALL_TIME, MAX_STEPS = 1, 2, 3
-"""Reasons to stop early, in the reduction of the step: the largest wins."""
 STOPS = {
     CANCELLED: (State.CANCELLED, Cause.CANCELLED, "stopped on request"),
     WALL_TIME: (State.TIMED_OUT, Cause.WALLTIME, "run.max_wall_time is used up"),
     MAX_STEPS: (State.TIMED_OUT, Cause.STEPS, "run.max_steps is used up before run.end_time"),
 }
-_REPORT_EVERY = 0.25
-"""s of wall time between two reports: four a second look alive. Chosen."""
+"""State, cause and words for each reason to stop early."""
 _LOG_EVERY = 10.0
 """s of wall time between two lines of the log. Chosen."""
 
@@ -73,7 +71,7 @@ class Loop:
         balance: Balance, start: Start,
     ) -> None:  # fmt: skip
         """``start``: what is known when the first step begins."""
-        self.sim = sim
+        self.sim, self.balance = sim, balance
         self.energy: Energy | None = None
         self._parts: dict[str, PartEnergy] = {}
         self.stopped = 0
@@ -81,29 +79,17 @@ class Loop:
         """What the steps have given reason for; equal on all ranks."""
         self.lost: list[str] = []
         """What somebody has removed of the run's files; on rank 0."""
-        self._told = False
-        self._folder = folder
-        self._journal = journal
-        self._history = history
-        self._signals = signals
-        self._start = start
-        self._sample = start.sample
+        self._folder, self._journal, self._history = folder, journal, history
+        self._start, self._sample = start, start.sample
         self._sample_time = start.sample * sim.case.run.end_time / sim.case.run.samples
         """When the next line of the history is due, s."""
-        self._max_steps = sim.case.run.max_steps
-        self._asks, self._watches = True, sim.case.balance.policy == "outside"
-        """Whether this rank has asked for something in the last step; whether it counts its outside nodes in each."""
-        self._ask_at = self._ask_time = 0.0
-        """Wall time and simulated time, s, before which there is nothing to ask for."""
-        self._began = self._reported = self._kept = time.monotonic()
+        began = time.monotonic()
         self.updates = self._reported_updates = start.updates
         """Tets times steps so far."""
-        self._reported_step = sim.clock.step
-        self._pace = Pace(sim.clock.t, self._began)
-        self._logged = -math.inf
-        self._counter = Counter()
-        self.balance = balance
+        self._reported_step, self._logged = sim.clock.step, -math.inf
+        self._pace, self._counter = Pace(sim.clock.t, began), Counter()
         self._groups = Groups(sim, balance.trigger.cost)
+        self._asking = Asking(sim.case, folder, signals, self._groups, began)
         self.snapshots = Snapshots(sim, folder, journal)
         self._losses = Losses(folder) if journal is not None else None
         self.choice: Choice | None = None
@@ -142,10 +128,8 @@ class Loop:
             self._move()
         if self.sim.reduction.checkpoint or self.sim.reduction.stop:
             self._checkpoint()
-        clock, now = self.sim.clock, time.monotonic()
-        last = clock.step + 1 >= self._max_steps
-        if now >= self._ask_at or clock.t >= self._ask_time or self._asks or self._signals.raised or last:
-            self._propose(now)
+        if self._asking.due(self.sim.clock, now := time.monotonic()):
+            self._asking.propose(self.sim, self.balance, self.snapshots, now)
 
     def _first_half(self) -> None:
         sim, clock = self.sim, self.sim.clock
@@ -212,46 +196,14 @@ class Loop:
             self.balance.weigh(sim, parcel)
             parcel.known["start"] = asdict(replace(self._start, sample=self._sample, updates=self.updates))
             place, size = checkpoint.write(parcel, sim.case, self._folder, clock.step, clock.t, sim.comm)
-        cause = "the run stops" if stop else ("asked for" if self._asked() else "run.checkpoint_every")
+        cause = "the run stops" if stop else ("asked for" if self._asking.for_checkpoint else "run.checkpoint_every")
         if sim.comm.rank == 0:
             (self._folder / layout.CHECKPOINT_REQUEST).unlink(missing_ok=True)
-        self._kept = time.monotonic()
+        self._asking.kept = time.monotonic()
         self._tell(
             messages.Checkpoint, path=str(place.relative_to(self._folder)), bytes=size, cause=cause,
-            seconds=self._kept - began,
+            seconds=self._asking.kept - began,
         )  # fmt: skip
-
-    def _asked(self) -> bool:
-        return (self._folder / layout.CHECKPOINT_REQUEST).exists()
-
-    def _propose(self, now: float) -> None:
-        """What this rank gives to the next reduction; it stays as it is until something is due."""
-        sim, own = self.sim, self.sim.reduction.own
-        limit = sim.case.run.max_wall_time
-        own.report = sim.comm.rank == 0 and now - self._reported > _REPORT_EVERY
-        self._told |= sim.comm.rank == 0 and own.report and (self._folder / layout.STOP_REQUEST).exists()
-        stop = CANCELLED if self._signals.raised or self._told else 0
-        if limit is not None and now - self._began > limit:
-            stop = WALL_TIME
-        if sim.clock.step + 1 >= sim.case.run.max_steps:
-            stop = MAX_STEPS
-        own.stop = stop
-        own.groups = own.report and self._groups.due(sim.clock.t, now)
-        own.grown = self.balance.grown(sim)
-        own.snapshot = (
-            sim.comm.rank == 0 and not sim.reduction.snapshot and self.snapshots.due(sim.clock, now, look=own.report)
-        )
-        every = sim.case.run.checkpoint_every
-        own.checkpoint = sim.comm.rank == 0 and (
-            (every is not None and now - self._kept > every) or (own.report and self._asked())
-        )
-        self._asks = bool(own.stop or own.report or own.groups or own.snapshot or own.checkpoint) or self._watches
-        self._ask_time = 0.0 if self.snapshots.asked_for else self.snapshots.next_time
-        self._ask_at = min(
-            self._reported + _REPORT_EVERY if sim.comm.rank == 0 else math.inf,
-            self._began + limit if limit is not None else math.inf,
-            self._kept + every if every is not None else math.inf,
-        )
 
     def _look(self, before: Floats, *, ending: bool) -> None:
         """A line of the history: ledger, momenta and probes at time n; ``ending``: after the last step."""
@@ -269,8 +221,7 @@ class Loop:
             parts = [value for part in self._parts.values() for value in msgspec.structs.astuple(part)]
             extra = [*sim.ledger.momentum, *sim.ledger.angular_momentum, *parts, *probes]
             self._history.write(clock.step, clock.t, clock.dt, limiter, self.energy, extra)
-        when = f"at step {clock.step}, t = {clock.t:.6g} s"
-        sim.ledger.require(sim.case.run, sim.case.numerics.dt_safety, when)
+        sim.ledger.require(sim.case.run, sim.case.numerics.dt_safety, f"at step {clock.step}, t = {clock.t:.6g} s")
 
     def _tell_losses(self) -> None:
         for text in self._losses.found() if self._losses is not None else ():
@@ -278,8 +229,7 @@ class Loop:
             self._tell(messages.Log, level="warning", text=text)
 
     def _write_frame(self) -> None:
-        sim, clock = self.sim, self.sim.clock
-        index = clock.frame
+        sim, clock, index = self.sim, self.sim.clock, self.sim.clock.frame
         sim.count_nodes()
         self._tell_losses()
         cohesion = sim.fracture.cohesion if sim.fracture is not None else None
@@ -325,7 +275,7 @@ class Loop:
         if now - self._logged > _LOG_EVERY:
             self._logged = now
             log.info("step %d, t %.4g s, dt %.3g s, %s", clock.step, clock.t, clock.dt, limiter)
-        elapsed = now - self._reported
+        elapsed = now - self._asking.reported
         self._pace.add(clock.t, now)
         if self.energy is not None:
             self._tell(
@@ -335,15 +285,10 @@ class Loop:
                 updates_per_second=(self.updates - self._reported_updates) / elapsed, parts=self._parts,
             )  # fmt: skip
         self._tell(
-            messages.Load,
-            phases=work,
-            imbalance=window.imbalance,
-            steps=window.steps,
-            threads=sim.case.run.threads,
-            projected=projected,
-            **told,
-        )
-        self._reported, self._reported_updates = now, self.updates
+            messages.Load, phases=work, imbalance=window.imbalance, steps=window.steps, threads=sim.case.run.threads,
+            projected=projected, **told,
+        )  # fmt: skip
+        self._asking.reported, self._reported_updates = now, self.updates
 
     def _record(self) -> None:
         """Loads of groups to the journal; all ranks take part."""

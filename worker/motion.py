@@ -1,8 +1,8 @@
 """Nodes: forces to velocities, velocities to positions. Increments are added, positions never recomputed."""
 
 from .jit import njit, types
-from .parallel.arguments import Arguments, reader
-from .parallel.nodes import OverNodes
+from .parallel.arguments import reader
+from .parallel.passes import Pass
 from .parallel.team import TASK, Team
 from .state import Nodes
 
@@ -39,19 +39,16 @@ class Leapfrog:
     """Moves the nodes of a rank, by the threads of its ``team``."""
 
     def __init__(self, team: Team) -> None:
-        self._nodes = OverNodes(team)
-        self._of_kick, self._of_move = Arguments(*_KICK), Arguments(*_MOVE)
+        self._kick, self._move = Pass(team, _kick, *_KICK), Pass(team, _move, *_MOVE)
 
     def kick(self, nodes: Nodes, impulse_quantum: float, shorter: float) -> None:
         """v(n-1/2) to v*(n+1/2); ``impulse_quantum`` is the mean step over the force scale, N s; ``shorter``: a quarter
         of what the step ahead is shorter than the one behind, over the force scale, for the account ``stepping``, J.
         """
-        table = self._of_kick.set(nodes.v, nodes.force, nodes.mass, nodes.stepping, impulse_quantum, shorter)
-        self._nodes.run(_kick, table, nodes.n)
+        self._kick.run(nodes.n, nodes.v, nodes.force, nodes.mass, nodes.stepping, impulse_quantum, shorter)
 
     def move(self, nodes: Nodes, dt: float, shorter: float) -> None:
         """x(n) to x(n+1), in a step ``dt``, s; ends the account that ``kick`` has begun, with the same f(n), and leaves
         no force.
         """
-        table = self._of_move.set(nodes.x, nodes.v, nodes.force, nodes.stepping, dt, shorter)
-        self._nodes.run(_move, table, nodes.n)
+        self._move.run(nodes.n, nodes.x, nodes.v, nodes.force, nodes.stepping, dt, shorter)

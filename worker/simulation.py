@@ -32,8 +32,8 @@ from .mirrors import Mirrors
 from .motion import Leapfrog
 from .parallel import fixed_point
 from .parallel.comm import Comm
-from .parallel.nodes import OverNodes
 from .parallel.ownership import Neighbour
+from .parallel.passes import Ranges
 from .parallel.team import Team, team
 from .probes import Probes
 from .reduction import StepReduction
@@ -185,7 +185,7 @@ def _assemble(
     walls = next((bound for bound in scene if type(bound) is RigidWalls), None)
     probes = Probes(case, model, contact, walls, clock, comm)
     for bound in scene:
-        bound.over = OverNodes(threads)
+        bound.over = Ranges(threads)
     elements = _elements(case, model, neighbours, scene, node_volume, comm, timers, threads)
     fracture = None
     if case.fractures:

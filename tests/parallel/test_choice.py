@@ -3,23 +3,13 @@
 import numpy as np
 import pytest
 
-from conoid.worker.jit import njit, types
 from conoid.worker.parallel import choice, projecting
-from conoid.worker.parallel.arguments import Arguments, reader
+from conoid.worker.parallel.arguments import Arguments
 from conoid.worker.parallel.choice import Choice, best_crew
 from conoid.worker.parallel.projecting import Costs
-from conoid.worker.parallel.team import TASK, Team
+from conoid.worker.parallel.team import Team
 
-KINDS = (types.int64[::1],)
-_counts = reader(*KINDS)
-
-
-@njit(TASK, cache=False)
-def count(table, first, end, thread):  # type: ignore[no-untyped-def]
-    """Counts each number of its range."""
-    (done,) = _counts(table)
-    for k in range(first, end):
-        done[k] += 1
+from .counted import KINDS, count
 
 
 @pytest.mark.parametrize(

@@ -75,14 +75,11 @@ class ActiveSum:
     def __init__(self, ranks: list[int], sends: Indices, receives: Indices, counts: Ints, comm: Comm) -> None:
         """``sends`` and ``receives``: slots of the crowd, rank after rank; ``counts`` (ranks, 2): how many of each."""
         self._sends, self._receives = sends, receives
+        self.shared: Indices = np.concatenate([sends, receives])
+        """Slots of the crowd that are sent or received; some stand there several times."""
         self._out, self._in = (np.zeros((len(some), _COLUMNS), np.int64) for some in (sends, receives))
         out, into = (_parts(words, ranks, many) for words, many in zip((self._out, self._in), counts.T, strict=True))
         self._exchange = comm.exchange(out, into, Tag.CONTACT)
-
-    @property
-    def shared(self) -> Indices:
-        """Slots that are sent or received; some stand there several times."""
-        return np.concatenate([self._sends, self._receives])
 
     def number(self, slots: Indices) -> None:
         """From now on ``slots`` (crowd,) are the rows of what is summed."""

@@ -135,9 +135,8 @@ class Detection:
         due, counts = np.zeros((2, self._due_faces.many(n)), np.int64)
         coming, depth = np.zeros(len(counts)), rows.depth
         self._due_faces.run(n, pairs, slots, faces, end + step.beyond, due)
-        self._node_face.run(
-            n, rows.room, depth, rows.begins(_FACES), pairs, slots, faces, step, end, due, counts, coming
-        )
+        some = rows.room, depth, rows.begins(_FACES), pairs, slots, faces, step, end
+        self._node_face.run(n, *some, due, counts, coming)
         begins = PAIRS_OF_A_TASK * np.arange(len(due))
         table.take_tested(pairs.active, begins, due)
         before = rows.n
@@ -154,18 +153,8 @@ class Detection:
         table, rows, tracks = now.edge_edge, now.active, now.tracks
         pairs, n = table.arrays(), len(table)
         due, counts = np.zeros((2, self._edge_edge.many(n)), np.int64)
-        self._edge_edge.run(
-            n,
-            rows.room,
-            rows.begins(_EDGES),
-            pairs,
-            now.edge_table(),
-            step,
-            tracks.short.course,
-            tracks.end,
-            due,
-            counts,
-        )
+        some = rows.room, rows.begins(_EDGES), pairs, now.edge_table(), step, tracks.short.course, tracks.end
+        self._edge_edge.run(n, *some, due, counts)
         begins = PAIRS_OF_A_TASK * np.arange(len(due))
         table.take_tested(pairs.active, begins, due)
         rows.collect(_EDGES, begins, counts)

@@ -21,10 +21,10 @@ _F1, _F2, _F, _I, _I1, _B1 = (
 )  # fmt: skip
 
 
-@njit(types.void(_F2, _F2, _N1, _N1, _I, _I), cache=True)
-def gather(out, v, held, local, first, stop):  # type: ignore[no-untyped-def]
-    """Velocities of the held nodes from ``first`` to ``stop``."""
-    for h in range(first, stop):
+@njit(types.void(_F2, _F2, _N1, _N1), cache=True)
+def gather(out, v, held, local):  # type: ignore[no-untyped-def]
+    """Velocities of the held nodes."""
+    for h in range(len(local)):
         prefetch(v, 3 * local[min(h + _AHEAD, len(local) - 1)])
         for i in range(3):
             out[held[h], i] = v[local[h], i]

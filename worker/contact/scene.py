@@ -74,7 +74,7 @@ class Scene:
 
     def look(self, nodes: Nodes) -> None:
         """Takes v(n-1/2), before the kick."""
-        held.gather(self.slots.before, nodes.v, self.own.slots, self.own.local, 0, len(self.own.local))
+        held.gather(self.slots.before, nodes.v, self.own.slots, self.own.local)
         self.messages.copies.note(nodes)
 
     @property

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from ..jit import Kernel
 from ..parallel.fixed_point import Tally
 from ..parallel.team import Team
 from ..state import Flags, Floats, Indices, Ints, Nodes
@@ -110,18 +109,19 @@ class ActiveSet:
 
     def cost(self, account: Account, before: Floats) -> None:
         """Books what the impulses take from the bodies; ``before`` (crowd, 3): v(n-1/2)."""
-        self._add(tasks.cost, account.words, before, account.scale)
+        self._add(account.words, before, account.scale, rubs=False)
         account.carry()
 
     def heat(self, friction: Tally, before: Floats) -> None:
         """Books the work of friction, see booking.heat."""
-        self._add(tasks.heat, friction.words, before, float(friction.scale[0]))
+        self._add(friction.words, before, float(friction.scale[0]), rubs=True)
         friction.carry()
 
-    def _add(self, kernel: Kernel, words: Ints, before: Floats, joule: float) -> None:
+    def _add(self, words: Ints, before: Floats, joule: float, *, rubs: bool) -> None:
         room = self._room
         each = np.zeros((len(room.loaded.many), *words.shape), np.int64)
-        self._sets.run(kernel, self._sets.cost.set(each, room.loaded, room.active, before, self.places, joule))
+        table = self._sets.cost.set(each, room.loaded, room.active, before, self.places, joule, rubs)
+        self._sets.run(tasks.cost, table)
         words += each.sum(axis=0)
 
     def store(self, kept: Kept) -> None:
@@ -135,8 +135,8 @@ class ActiveSet:
         """
         room, n = self._room, len(self.places)
         stops.let_go(room.active, room.braced)
-        tasks_of, left = self._passes.leave.many(n), np.zeros((self._passes.leave.many(n), 3), np.int64)
-        pushes = np.zeros((tasks_of, *parts.shape), np.int64)
+        many = self._passes.leave.many(n)
+        left, pushes = np.zeros((many, 3), np.int64), np.zeros((many, *parts.shape), np.int64)
         some = crowd.local, state.part, state.owned
         self._passes.leave.run(n, state.v, pushes, left, total, room.active, self.places, *some)
         parts += pushes.sum(axis=0)

@@ -37,16 +37,15 @@ RESUME = NODES, CONTACTS, LOADED, KEPT, _F, _F
 SWEEP = NODES, CONTACTS, LOADED, _F, _F, _F
 GIVE = NODES, _F, types.boolean
 STORE = KEPT, LOADED, _N1
-COST = types.int64[:, :, ::1], LOADED, NODES, _F2, _N1, _F
+COST = types.int64[:, :, ::1], LOADED, NODES, _F2, _N1, _F, types.boolean
 LEAVE = _F2, types.int64[:, :, ::1], _I2, _I2, NODES, _N1, _N1, _N1, types.boolean[::1]
 BOOK = _F1, _F1, _N1, _N1, _F2, _I2, _F2, _F
 TAKE = _F2, _F2, _N1, _F2, _F2, _N1
-GATHER = _F2, _F2, _N1, _N1
 _due_faces, _node_face, _edge_edge = reader(*DUE_FACES), reader(*NODE_FACE), reader(*EDGE_EDGE)
 _across, _entering, _approach = reader(*ACROSS), reader(*ENTERING), reader(*APPROACH)
 _rebound, _mark, _sort, _load, _weigh = reader(*REBOUND), reader(*MARK), reader(*SORT), reader(*LOAD), reader(*WEIGH)
 _resume, _sweep, _give, _store, _cost = reader(*RESUME), reader(*SWEEP), reader(*GIVE), reader(*STORE), reader(*COST)
-_leave, _book, _take, _gather = reader(*LEAVE), reader(*BOOK), reader(*TAKE), reader(*GATHER)
+_leave, _book, _take = reader(*LEAVE), reader(*BOOK), reader(*TAKE)
 
 
 @njit(TASK, cache=True)
@@ -169,18 +168,13 @@ def store(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def cost(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``booking.cost`` of some sets of contacts, with words for each."""
-    words, loaded, active, before, places, joule = _cost(table)
+    """``booking.cost`` of some sets of contacts, or ``booking.heat`` where they rub; with words for each."""
+    words, loaded, active, before, places, joule, rubs = _cost(table)
     for k in range(first, stop):
-        booking.cost(words[k], loaded, active, before, places, joule, k)
-
-
-@njit(TASK, cache=True)
-def heat(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``booking.heat`` of some sets of contacts, with words for each."""
-    words, loaded, active, before, places, joule = _cost(table)
-    for k in range(first, stop):
-        booking.heat(words[k], loaded, active, before, places, joule, k)
+        if rubs:
+            booking.heat(words[k], loaded, active, before, places, joule, k)
+        else:
+            booking.cost(words[k], loaded, active, before, places, joule, k)
 
 
 @njit(TASK, cache=True)
@@ -203,13 +197,6 @@ def take(table, first, stop, thread):  # type: ignore[no-untyped-def]
     """``held.take``."""
     x, v, slots, node_x, node_v, local = _take(table)
     held.take(x, v, slots, node_x, node_v, local, first, stop)
-
-
-@njit(TASK, cache=True)
-def gather(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``held.gather``."""
-    out, v, slots, local = _gather(table)
-    held.gather(out, v, slots, local, first, stop)
 
 
 @njit("int64(int32[::1], int64, int64[::1], int64[::1])", cache=True)

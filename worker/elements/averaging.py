@@ -5,10 +5,9 @@ import numpy as np
 from ..boundaries import Boundary
 from ..materials.law import BULK
 from ..migration.parcel import Parcel
-from ..parallel.arguments import Arguments
 from ..parallel.comm import Comm
-from ..parallel.nodes import OverNodes
 from ..parallel.ownership import Neighbour, SharedSum
+from ..parallel.passes import Pass
 from ..parallel.tags import Tag
 from ..parallel.team import Team
 from ..state import Copies, Floats, Ints, Model, extended
@@ -16,7 +15,7 @@ from ..timers import Timers
 from . import matter, nodal, tasks
 from .flat import flat_tets
 from .forms import Elements
-from .passes import Pass, Values
+from .passes import BlockPass, Values
 
 
 class AveragedElements(Elements):
@@ -47,9 +46,9 @@ class AveragedElements(Elements):
         self._projected = np.zeros((n if split else 1, 3))
         self.pressure = np.zeros(n if split else 1)
         self._scale = 1.0
-        self._strains, self._forces = Pass(tasks.strains, tasks.STRAINS), Pass(tasks.forces, tasks.FORCES)
-        self._nodes = OverNodes(team)
-        self._table, self._projections = Arguments(*nodal.COMPLETE), Arguments(*nodal.PROJECT)
+        self._strains, self._forces = BlockPass(tasks.strains, tasks.STRAINS), BlockPass(tasks.forces, tasks.FORCES)
+        self._complete = Pass(team, nodal.complete, *nodal.COMPLETE)
+        self._project = Pass(team, nodal.project, *nodal.PROJECT)
         for block in model.blocks:
             block.flat = flat_tets(block, model.nodes.x0)
 
@@ -95,7 +94,7 @@ class AveragedElements(Elements):
         if self._neighbours:
             with self._timers.phase("exchange"):
                 self.shared_volumes.finish(self._volumes)
-        self._nodes.run(nodal.complete, self._table.set(means, self._sizes, *self._constants()), self.model.nodes.n)
+        self._complete.run(self.model.nodes.n, means, self._sizes, *self._constants())
         self._bridge(scale, opens=True)
         self._over(self._forces, means, (dt, scale), self._send)
 
@@ -109,8 +108,7 @@ class AveragedElements(Elements):
         if self.split:
             self.shared_gradients.begin(self._gradient)
             self.shared_gradients.finish(self._gradient)
-            table = self._projections.set(self._means(), self._sizes, self._scale)
-            self._nodes.run(nodal.project, table, self.model.nodes.n)
+            self._project.run(self.model.nodes.n, self._means(), self._sizes, self._scale)
             for boundary in self._scene:
                 boundary.mirror(self._projected)
 

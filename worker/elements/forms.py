@@ -20,7 +20,7 @@ from ..state import Block, Copies, Floats, Ints, Model
 from ..timers import Timers
 from . import chunks, records, tasks
 from .colours import Coloured, coloured, whole
-from .passes import Pass, Values
+from .passes import BlockPass, Values
 from .records import Means, Scratches
 
 
@@ -59,8 +59,8 @@ class Elements:
         """(5,) see elements/records.py."""
         self._words = self.peaks.data
         self._reals = self.peaks.view(np.float64).data
-        self._standard = Pass(tasks.standard, tasks.STANDARD)
-        self._again = Pass(tasks.again, tasks.AGAIN, marked=False)
+        self._standard = BlockPass(tasks.standard, tasks.STANDARD)
+        self._again = BlockPass(tasks.again, tasks.AGAIN, marked=False)
         self._coloured: dict[tuple[int, int], tuple[int, Coloured]] = {}
         """By part and first chunk, with how many tets had left the block then."""
         self._comm, self._neighbours = comm, neighbours
@@ -172,14 +172,14 @@ class Elements:
         words = None if self._herald is None else self._herald.words(self.hot)
         self.shared_forces.begin(self.model.nodes.force, words)
 
-    def _over(self, work: Pass, means: Values, numbers: Values, send: Callable[[], None]) -> None:
+    def _over(self, work: BlockPass, means: Values, numbers: Values, send: Callable[[], None]) -> None:
         """A pass over all tets; ``send``: what the neighbours want as soon as the border chunks are done."""
         if self._neighbours:
             self._over_blocks(work, means, numbers, border=True)
             send()
         self._over_blocks(work, means, numbers, border=False)
 
-    def _over_blocks(self, work: Pass, means: Values, numbers: Values, *, border: bool) -> None:
+    def _over_blocks(self, work: BlockPass, means: Values, numbers: Values, *, border: bool) -> None:
         blocks, nodes = self.model.blocks, self.model.nodes
         now = cpu_time() if len(blocks) > 1 else 0.0
         for block in blocks:

@@ -10,7 +10,7 @@ from .records import Scratches, body_of, marks_of, motion_of
 Values = tuple[Any, ...]
 
 
-class Pass:
+class BlockPass:
     """Of a kernel with the arguments ``kinds``: Motion, Body, Marks where it is ``marked``, Scratches, Means where it
     has some, and numbers.
     """

@@ -1,4 +1,4 @@
-"""A pass: a kernel over a range, cut into tasks of one size, by the threads of a rank."""
+"""Passes over a range, cut into tasks of one size, by the threads of a rank."""
 
 from typing import Any
 
@@ -9,24 +9,27 @@ from ..state import Ints
 from .arguments import Arguments
 from .team import Team
 
+NODES_OF_A_TASK = 4096
+"""Chosen: 10 us of work, against 2 us that a region of threads costs."""
 
-class Pass:
-    """A kernel of the signature team.TASK with its table of arguments.
+
+class Ranges:
+    """Has the threads of a team run kernels of the signature team.TASK over ranges.
 
     Tasks may run at the same time, so what they write must not overlap. The task that begins at ``first`` has the
     number ``first // size``.
     """
 
-    def __init__(self, team: Team, kernel: Kernel, *kinds: Any, size: int) -> None:
-        """``kinds``: numba types of the arguments; ``size``: of a task."""
-        self.size = size
-        self._team, self._kernel, self._arguments = team, kernel, Arguments(*kinds)
+    def __init__(self, team: Team, size: int = NODES_OF_A_TASK) -> None:
+        """``size``: of a task."""
+        self.threads, self.size = team.threads, size
+        self._team = team
         self._tasks, self._starts, self._n = np.zeros((0, 2), np.int64), np.zeros(2, np.int64), 0
 
-    def run(self, n: int, *values: Any) -> None:
-        """The range from 0 to ``n``; ``values``: the arguments."""
+    def run(self, kernel: Kernel, table: int, n: int) -> None:
+        """The range from 0 to ``n``, with the arguments at the address ``table``."""
         if n:
-            self._team.run(self._kernel, self._arguments.set(*values), self._cut(n), self._starts)
+            self._team.run(kernel, table, self._cut(n), self._starts)
 
     def many(self, n: int) -> int:
         """Tasks of the range from 0 to ``n``."""
@@ -42,3 +45,20 @@ class Pass:
             self._tasks[before, 1] = self._tasks[before, 0] + self.size
             self._tasks[many - 1, 1], self._starts[1], self._n = n, many, n
         return self._tasks[:many]
+
+
+class Pass:
+    """A kernel with its table of arguments, over ranges."""
+
+    def __init__(self, team: Team, kernel: Kernel, *kinds: Any, size: int = NODES_OF_A_TASK) -> None:
+        """``kinds``: numba types of the arguments; ``size``: of a task."""
+        self._ranges, self._kernel, self._arguments = Ranges(team, size), kernel, Arguments(*kinds)
+
+    def run(self, n: int, *values: Any) -> None:
+        """The range from 0 to ``n``; ``values``: the arguments."""
+        if n:
+            self._ranges.run(self._kernel, self._arguments.set(*values), n)
+
+    def many(self, n: int) -> int:
+        """Tasks of the range from 0 to ``n``."""
+        return self._ranges.many(n)

@@ -1,0 +1,16 @@
+"""A kernel of tasks that can be checked: it counts what it goes over."""
+
+from conoid.worker.jit import njit, types
+from conoid.worker.parallel.arguments import reader
+from conoid.worker.parallel.team import TASK
+
+KINDS = (types.int64[::1],)
+_counts = reader(*KINDS)
+
+
+@njit(TASK, cache=False)
+def count(table, first, end, thread):  # type: ignore[no-untyped-def]
+    """Counts each number of its range."""
+    (done,) = _counts(table)
+    for k in range(first, end):
+        done[k] += 1
