@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from .bodies import MeshFile
+from .bond_checks import check_bonds
 from .boundary_checks import ROUNDING, check_boundaries, check_walls, ordered
 from .geometry import AXES, bounds, centre, cut_directions, whole_bounds
 from .history import COLUMNS
@@ -42,7 +43,8 @@ Read = TypeVar("Read", bound=BaseModel)
 def check(case: Case) -> list[Problem]:
     """Every cross-field problem of a case, in the order of its keys."""
     checks: tuple[Callable[[Case], Iterable[Problem]], ...] = (
-        _materials, _parts, _overlaps, _sectors, check_boundaries, check_walls, _contact, _probes, _references,
+        _materials, _parts, _overlaps, _sectors, check_boundaries, check_walls, check_bonds, _contact, _probes,
+        _references,
     )  # fmt: skip
     return list(chain.from_iterable(found(case) for found in checks))
 

@@ -2,7 +2,7 @@
 
 ``parse_case`` in ``cases/load.py`` is the way in: it reads TOML or JSON and reports every error at once. Bodies and
 their meshes are in ``cases/bodies.py``, how they move in ``motion``, materials in ``materials``, what holds them in
-``boundaries``, how they fail in ``failure``, what is measured in ``measures``.
+``boundaries``, what holds them together in ``bonds``, how they fail in ``failure``, what is measured in ``measures``.
 """
 
 from typing import Annotated, Any, Literal, TypeVar
@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import BeforeValidator, Field
 
 from .bodies import Mesh
+from .bonds import Bond
 from .boundaries import Around, Boundary, Gravity, Prescribed, Rotation, Symmetry, Traction, Wall
 from .failure import Erosion, Fracture
 from .materials import Material
@@ -19,8 +20,8 @@ from .tables import Count, Model, Name, Positive, Switch, Velocity
 from .units import Ratio, Speed, Temperature, Time
 
 __all__ = [
-    "MOST_RANKS", "Around", "Balance", "Boundary", "Case", "Contact", "ContactPair", "Erosion", "Fracture", "Gravity",
-    "Numerics", "Part", "Prescribed", "Probe", "Reference", "Rotation", "Run", "Spin", "Stretch", "Symmetry",
+    "MOST_RANKS", "Around", "Balance", "Bond", "Boundary", "Case", "Contact", "ContactPair", "Erosion", "Fracture",
+    "Gravity", "Numerics", "Part", "Prescribed", "Probe", "Reference", "Rotation", "Run", "Spin", "Stretch", "Symmetry",
     "Traction", "Turn", "Viscosity", "Wall",
 ]  # fmt: skip
 
@@ -238,6 +239,9 @@ class Case(Model):
     """The bodies, in TOML one ``[[parts]]`` each."""
     boundaries: tuple[Boundary, ...] = ()
     """What holds or drives nodes, in TOML one ``[[boundaries]]`` each; ``kind`` says which."""
+    bond: tuple[Bond, ...] = ()
+    """Parts that hold together, in TOML one ``[[bond]]`` each; ``kind`` says how their meshes are joined. Parts without
+    a bond are bodies of their own, also where their surfaces coincide."""
     contact: Annotated[Contact | None, BeforeValidator(_off), Switch()] = Contact()
     """How bodies meet; they do by default. ``contact = "none"`` lets them pass through each other. A single part meets
     only itself, if it may."""

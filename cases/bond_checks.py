@@ -1,0 +1,74 @@
+"""What the models cannot check one by one in bonds: parts that must be there, keys that go together, meshes."""
+
+from collections.abc import Iterator
+
+from .bodies import Box, Loose, MeshFile, Plate
+from .bonds import Bonded, SharedBond
+from .problems import Location, Problem, problem
+from .schema import Case, Part
+from .similar import choices, nearest
+
+
+def check_bonds(case: Case) -> Iterator[Problem]:
+    """Every problem of the bonds of a case."""
+    parts = {part.name: part for part in case.parts}
+    for i, bond in enumerate(case.bond):
+        location: Location = ("bond", i)
+        yield from _keys(bond, location)
+        unknown = [k for k, name in enumerate(bond.parts) if name not in parts]
+        for k in unknown:
+            message = f"no part of this name; {nearest(bond.parts[k], parts)}"
+            yield problem((*location, "parts", k), bond.parts[k], message)
+        if bond.parts[0] == bond.parts[1]:
+            message = "a part cannot be bonded to itself; name two parts"
+            yield problem((*location, "parts"), _both(bond), message)
+        elif not unknown:
+            yield from _twice(case, i)
+            if isinstance(bond, SharedBond):
+                yield from _meshes(parts[bond.parts[0]], parts[bond.parts[1]], (*location, "parts"))
+
+
+def _both(bond: Bonded) -> str:
+    return ", ".join(bond.parts)
+
+
+def _keys(bond: Bonded, location: Location) -> Iterator[Problem]:
+    if not bond.breaks:
+        given = (("shear_strength", bond.shear_strength), ("energy", bond.energy), ("shear_energy", bond.shear_energy))
+        for key, value in given:
+            if key in bond.model_fields_set and value is not None:
+                yield problem((*location, key), value, "a bond without strength never breaks; give strength too")
+        return
+    normal, shear = bond.energies
+    if (normal > 0.0) != (shear > 0.0):
+        key, value = ("shear_energy", shear) if shear == 0.0 else ("energy", normal)
+        message = "energy and shear_energy are both 0, and the bond lets go at once, or both above 0"
+        yield problem((*location, key), value, message)
+
+
+def _twice(case: Case, number: int) -> Iterator[Problem]:
+    bond = case.bond[number]
+    for k, earlier in enumerate(case.bond[:number]):
+        if sorted(earlier.parts) == sorted(bond.parts):
+            message = f"bond[{k}] is of these parts; keep one of the two"
+            yield problem(("bond", number, "parts"), _both(bond), message)
+
+
+def _meshes(one: Part, other: Part, location: Location) -> Iterator[Problem]:
+    """Parts whose meshes cannot have nodes in common."""
+    names, pair = f"{one.name}, {other.name}", (one.mesh, other.mesh)
+    way = "set kind = 'tied'"
+    loose = [part.name for part in (one, other) if isinstance(part.mesh, Loose)]
+    if loose:
+        yield problem(location, names, f"{choices(loose)}: loose tets share no node with other parts; {way}")
+    elif isinstance(one.mesh, MeshFile) or isinstance(other.mesh, MeshFile):
+        if not all(isinstance(mesh, MeshFile) for mesh in pair):
+            message = f"a mesh of a file and one that is generated have no nodes in common; {way}"
+            yield problem(location, names, message)
+    elif one.mesh.generator != other.mesh.generator:
+        yield problem(location, names, f"their meshes have two generators; give both the same, or {way}")
+    elif one.mesh.generator == "structured" and not all(isinstance(mesh, Box | Plate) for mesh in pair):
+        message = f"structured meshes have nodes in common where both are boxes or plates; use gmsh, or {way}"
+        yield problem(location, names, message)
+    if one.turn != other.turn:
+        yield problem(location, names, f"their turns differ, and their nodes do not stay together; {way}")

@@ -1,0 +1,66 @@
+"""Bonds: two parts that hold together where they lie face to face, for ever or up to a strength and an energy."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from .tables import Model, Name, Positive
+from .units import FractureEnergy, Stress
+
+
+class Bonded(Model):
+    """What all bonds have in common: the two parts, and what it takes to part them."""
+
+    parts: tuple[Name, Name]
+    """The names of the two parts. A pair has one bond at most; a part may have bonds with several others."""
+    strength: Annotated[Stress, Positive] | None = None
+    """Traction across the interface, in tension, at which the bond breaks. Without it the bond never breaks."""
+    shear_strength: Annotated[Stress, Positive] | None = None
+    """Traction along the interface at which it breaks; by default ``strength``. Both together break it where
+    ``(t_n / strength)^2 + (t_s / shear_strength)^2`` reaches 1; pressure across the interface does not count."""
+    energy: Annotated[FractureEnergy, Field(ge=0)] = 0.0
+    """Per area of the interface, that it takes to pull the parts from each other: the traction falls linearly with the
+    opening from then on. At 0 the bond lets go at once."""
+    shear_energy: Annotated[FractureEnergy, Field(ge=0)] | None = None
+    """The same for parts that slide along each other; by default ``energy``. Both are 0, or both are above 0."""
+
+    @property
+    def breaks(self) -> bool:
+        """Whether it may break."""
+        return self.strength is not None
+
+    @property
+    def cohesive(self) -> bool:
+        """Whether it takes energy when it breaks."""
+        return self.breaks and self.energy > 0.0
+
+    @property
+    def strengths(self) -> tuple[float, float]:
+        """Normal and in shear, Pa, of a bond that breaks."""
+        assert self.strength is not None
+        return self.strength, self.strength if self.shear_strength is None else self.shear_strength
+
+    @property
+    def energies(self) -> tuple[float, float]:
+        """Normal and in shear, J/m^2."""
+        return self.energy, self.energy if self.shear_energy is None else self.shear_energy
+
+
+class SharedBond(Bonded):
+    """Two parts whose meshes have the nodes of the interface in common: one body of two materials, without contact at
+    the interface. The parts are groups of one mesh file that share nodes, or generated shapes that touch and are meshed
+    together.
+    """
+
+    kind: Literal["shared"]
+    """The meshes of the two have nodes in common."""
+
+
+class TiedBond(Bonded):
+    """Two parts whose meshes do not match at the interface: nodes of one are tied to faces of the other."""
+
+    kind: Literal["tied"]
+    """The meshes of the two have no nodes in common."""
+
+
+Bond = Annotated[SharedBond | TiedBond, Field(discriminator="kind")]
