@@ -1,0 +1,262 @@
+"""The text of an LS-DYNA keyword deck: keywords, their cards, and the fields of a card.
+
+Rules of the LS-DYNA Keyword User's Manual, "Getting started": a line that begins with ``*`` is a keyword, one that
+begins with ``$`` a comment, every other one a card of the last keyword. A card has fields of fixed widths, or fields
+between commas. Widths below 20 are 20 in the long format (``*KEYWORD LONG=Y``, or ``+`` behind a keyword), those below
+10 are 10 in the format I10 (``*KEYWORD I10=Y``, or ``%`` behind a keyword); ``-`` behind a keyword is the standard one.
+"""
+
+import re
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import NamedTuple
+
+from .included import Included, lines
+from .problems import ConoidError, shown
+
+Widths = tuple[int, ...]
+
+_STANDARD, _I10, _LONG = 0, 10, 20
+"""Least width of a field in the three formats (the manual, "General card format")."""
+_SUFFIXES = {"+": _LONG, "%": _I10, "-": _STANDARD}
+_KEYWORD = re.compile(r"\*\s*([A-Za-z0-9_\-/&.]*[A-Za-z0-9_/&.])\s*([+%-])?\s*(.*)", re.ASCII)
+_REMARK = re.compile(r"\(.*\)")
+_SETTING = re.compile(r"(LONG|I10)\s*=\s*([A-Za-z])", re.ASCII | re.IGNORECASE)
+_WHOLE = re.compile(r"[+-]?[0-9]{1,18}(\.0*)?", re.ASCII)
+_REAL = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))(?:[eEdD]([+-]?[0-9]{1,4})|([+-][0-9]{1,4}))?", re.ASCII)
+_PARAMETER = re.compile(r"([IiRrCc])\s*([A-Za-z_][A-Za-z0-9_]*)", re.ASCII)
+
+
+class CardError(ConoidError, ValueError):
+    """A deck cannot be followed; one line, which begins with the place in it."""
+
+
+class Card(NamedTuple):
+    """A line of a deck that is neither a keyword nor a comment."""
+
+    number: int
+    """Of the line in its file."""
+    text: str
+    """Without its end."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """A keyword and its cards, empty ones among them."""
+
+    name: str
+    """In upper case, without ``*``: ``ELEMENT_SOLID``, ``SET_NODE_LIST_TITLE``."""
+    number: int
+    """Line of the keyword in its file."""
+    file: str = ""
+    """The included file as the deck names it; empty for the deck itself."""
+    cards: list[Card] = field(default_factory=list)
+    least: int = _STANDARD
+    """Least width of a field: 0, 10 or 20."""
+    remark: str = ""
+    """What stands in brackets behind the keyword: ``ten nodes format``."""
+    parameters: Mapping[str, str] = field(default_factory=dict)
+    """Values of ``*PARAMETER`` by name, in lower case."""
+
+    def filled(self) -> Iterator[Card]:
+        """The cards that are not empty."""
+        return (card for card in self.cards if card.text.strip())
+
+    def parted(self, options: Collection[str]) -> tuple[str, frozenset[str]]:
+        """The name without those of ``options`` that stand at its end, and these: ``("SET_NODE", {"TITLE"})``."""
+        name, found = self.name, set[str]()
+        while (last := name.rpartition("_"))[2] in options and last[0]:
+            name = last[0]
+            found.add(last[2])
+        return name, frozenset(found)
+
+    def place(self, number: int | None = None) -> str:
+        """``line 7`` or ``'sub/mesh.k', line 7``: of a card, or of the keyword."""
+        return placed(self.file, self.number if number is None else number)
+
+    def error(self, card: Card | None, text: str) -> CardError:
+        """What is wrong with a card, or with the keyword, as an error to raise."""
+        return CardError(f"{self.place(card.number if card else None)}: {text}")
+
+    def fields(self, card: Card, *widths: int) -> list[str]:
+        """The fields of a card without outer blanks, parameters replaced; empty where the card ends before them.
+
+        Raises CardError for a card that has more, and for a parameter that is not defined.
+        """
+        found = self._between_commas(card, widths) if "," in card.text else self._cut(card, widths)
+        return [self._valued(card, item) for item in found] if "&" in card.text else found
+
+    def whole(self, card: Card, item: str, what: str) -> int:
+        """A whole number; 0 for an empty field. Raises CardError, which names the field by ``what``."""
+        if not item:
+            return 0
+        if not _WHOLE.fullmatch(item):
+            raise self.error(card, f"{what} = {shown(item)} is not a whole number{_crossed(card)}")
+        return int(item.partition(".")[0])
+
+    def real(self, card: Card, item: str, what: str) -> float:
+        """A number, also ``1.5-3`` and ``1D5``; 0 for an empty field. Raises CardError."""
+        if not item:
+            return 0.0
+        found = _REAL.fullmatch(item)
+        if found is None or abs(value := float(f"{found[1]}e{found[2] or found[3] or 0}")) == float("inf"):
+            raise self.error(card, f"{what} = {shown(item)} is not a number{_crossed(card)}")
+        return -value if item[0] == "-" and value > 0 else value
+
+    def _cut(self, card: Card, widths: Widths) -> list[str]:
+        text, found, at = card.text, [], 0
+        if "\t" in text:
+            raise self.error(card, "a tab in a card of fixed widths; write blanks, or commas between the fields")
+        for width in widths:
+            end = at + max(width, self.least)
+            found.append(text[at:end].strip())
+            at = end
+        if rest := text[at:].strip():
+            raise self.error(card, f"{shown(rest)} stands behind the last field, beyond column {at}")
+        return found
+
+    def _between_commas(self, card: Card, widths: Widths) -> list[str]:
+        found = [item.strip() for item in card.text.split(",")]
+        while len(found) > len(widths) and not found[-1]:
+            found.pop()
+        if len(found) > len(widths):
+            raise self.error(card, f"{len(found)} fields between commas; *{self.name} has {len(widths)} here")
+        return found + [""] * (len(widths) - len(found))
+
+    def _valued(self, card: Card, item: str) -> str:
+        sign, mark, name = item.partition("&")
+        if not mark:
+            return item
+        value = self.parameters.get(name.strip().lower())
+        if value is None or sign not in ("", "-", "+"):
+            known = ", ".join(self.parameters) or "none"
+            raise self.error(card, f"the parameter {shown(item)} is not defined above; known: {known}")
+        return value if sign in ("", "+") else value[1:] if value[0] == "-" else f"-{value.lstrip('+')}"
+
+
+def _crossed(card: Card) -> str:
+    return "" if "," in card.text else " (fields have fixed widths)"
+
+
+def placed(file: str, number: int) -> str:
+    """``line 7`` or ``'sub/mesh.k', line 7``."""
+    return f"{shown(file)}, line {number}" if file else f"line {number}"
+
+
+class Deck:
+    """The keywords of a deck and of the files that it includes, read once from its start."""
+
+    def __init__(self, path: Path) -> None:
+        """Opens nothing yet."""
+        self.included = Included(path)
+        """The files that have been read; the deck itself is the first."""
+        self._parameters: dict[str, str] = {}
+
+    def blocks(self) -> Iterator[Block]:
+        """Every keyword up to ``*END`` but ``*COMMENT``, ``*INCLUDE`` and ``*PARAMETER``, which are followed, in order.
+
+        Raises CardError; OSError where the deck itself cannot be opened.
+        """
+        return self._of(self.included.start(), "", _STANDARD)
+
+    def _of(self, path: Path, file: str, least: int) -> Iterator[Block]:
+        for block in self._plain(path, file, least):
+            if block.name == "INCLUDE":
+                for name, number in _names(block):
+                    try:
+                        entered = self.included.enter(name, path)
+                    except ValueError as error:
+                        raise CardError(f"{block.place(number)}: {error}") from None
+                    yield from self._of(entered, name, block.least)
+                    self.included.leave()
+            elif block.name in ("PARAMETER", "PARAMETER_GLOBAL"):
+                self._define(block)
+            elif block.name.startswith(("INCLUDE_", "PARAMETER_")):
+                raise block.error(None, f"*{block.name} is not followed; write out what it stands for")
+            elif block.name != "COMMENT":
+                yield block
+
+    def _plain(self, path: Path, file: str, standing: int) -> Iterator[Block]:
+        """The keywords of one file; ``standing``: the least width of a field where a keyword has no suffix."""
+        block: Block | None = None
+        for number, text in _text(path, file):
+            if text.startswith("*"):
+                if block is not None:
+                    yield block
+                block = self._keyword(text, number, file, standing)
+                standing = block.least if block.name == "KEYWORD" else standing
+                if block.name == "END":
+                    return
+            elif block is not None:
+                block.cards.append(Card(number, text))
+            elif text.strip():
+                raise CardError(f"{placed(file, number)}: {shown(text.strip())} stands before the first keyword")
+        if block is None:
+            raise CardError(f"{placed(file, 1)}: the file has no keyword; this is no keyword deck")
+        yield block
+
+    def _keyword(self, text: str, number: int, file: str, standing: int) -> Block:
+        found = _KEYWORD.fullmatch(text.partition("$")[0].strip())
+        if found is None:
+            raise CardError(f"{placed(file, number)}: {shown(text.strip())} is no keyword")
+        name, suffix, rest = found[1].upper(), found[2], found[3]
+        least = _SUFFIXES.get(suffix or "", standing)
+        block = Block(name, number, file, [], least, rest[1:-1].strip(), self._parameters)
+        if name == "KEYWORD":
+            return _formatted(block, rest)
+        if rest and not _REMARK.fullmatch(rest):
+            raise block.error(None, f"{shown(rest)} stands behind *{name}")
+        return block
+
+    def _define(self, block: Block) -> None:
+        for card in block.filled():
+            items = block.fields(card, *(10,) * 8)
+            for name, value in zip(items[::2], items[1::2], strict=True):
+                if not name and not value:
+                    continue
+                found = _PARAMETER.fullmatch(name)
+                if found is None or not value:
+                    raise block.error(card, f"{shown(name)} with the value {shown(value)} defines no parameter")
+                key = found[2].lower()
+                if self._parameters.setdefault(key, value) != value:
+                    raise block.error(card, f"the parameter {shown(key)} has another value above")
+
+
+def _formatted(block: Block, rest: str) -> Block:
+    """``*KEYWORD``: ``LONG=Y`` and ``LONG=K`` mean long input, ``LONG=S`` standard input and long output."""
+    found = {word.upper(): letter.upper() for word, letter in _SETTING.findall(rest)}
+    if found.get("LONG", "S") not in "YKS" or found.get("I10", "Y") not in "YN":
+        raise block.error(None, f"*KEYWORD {rest}: expected LONG = Y, K or S, and I10 = Y or N")
+    if found.get("LONG", "S") != "S":
+        return replace(block, least=_LONG)
+    return replace(block, least=_I10 if found.get("I10") == "Y" else _STANDARD)
+
+
+def _names(block: Block) -> Iterator[tuple[str, int]]:
+    """File names and their lines; one that ends with `` +`` goes on in the next line."""
+    whole, first = "", 0
+    for card in block.filled():
+        first = first if whole else card.number
+        whole += card.text.strip()
+        if whole.endswith(" +"):
+            whole = whole[:-2].rstrip()
+            continue
+        yield whole, first
+        whole = ""
+    if whole or not first:
+        raise block.error(None, "*INCLUDE names no file, or half of a name")
+
+
+def _text(path: Path, file: str) -> Iterator[tuple[int, str]]:
+    """The lines that are no comments."""
+    try:
+        for number, text in lines(path):
+            if not text.startswith("$"):
+                yield number, text
+    except ValueError as error:
+        raise CardError(f"{shown(file)}: {error}" if file else str(error)) from None
+    except OSError as error:
+        if not file:
+            raise
+        raise CardError(f"{shown(file)}: {error.strerror}") from None

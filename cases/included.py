@@ -1,0 +1,85 @@
+"""The files of a deck: itself and those that it includes, all below its folder."""
+
+import io
+from collections.abc import Iterator
+from pathlib import Path
+
+from . import whole
+
+_DEEPEST, _MOST = 8, 1000
+"""Includes within each other, and in all. Chosen: decks of whole vehicles have some hundred, three deep."""
+_UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+_LONGEST = 4096
+"""Characters of a line. Chosen: the longest format has 200."""
+
+
+class Included:
+    """The files of a deck: which have been read, and which are being read."""
+
+    def __init__(self, path: Path) -> None:
+        """``path``: of the deck."""
+        self.files: list[Path] = []
+        """Every file that has been begun, once, in order."""
+        self._path = path
+        self._open: list[Path] = []
+        self._count = 0
+
+    def start(self) -> Path:
+        """Begins with the deck itself; its path."""
+        self._open = [self._path.resolve()]
+        self.files = [self._open[0]]
+        return self._path
+
+    def enter(self, name: str, including: Path) -> Path:
+        """Begins with a file that ``including`` names, from the folder of the deck on, else from its own.
+
+        Raises ValueError where there is none, it is not below the folder of the deck, or it includes itself.
+        """
+        folder = self._path.resolve().parent
+        places = [(start / name.replace("\\", "/")) for start in (folder, including.resolve().parent)]
+        inside = list(dict.fromkeys(place.resolve() for place in places if "\0" not in name))
+        there = [place for place in inside if place.is_relative_to(folder) and place.is_file()]
+        if not there:
+            away = not any(place.is_relative_to(folder) for place in inside)
+            why = "is not below the folder of the deck" if away else "is no file there"
+            raise ValueError(f"the included file {name[:80]!r} {why}")
+        if len(there) > 1:
+            raise ValueError(f"the included file {name[:80]!r} is in the folder of the deck and in that of this file")
+        if there[0] in self._open:
+            raise ValueError(f"the file {name[:80]!r} includes itself")
+        self._open.append(there[0])
+        self._count += 1
+        if len(self._open) > _DEEPEST or self._count > _MOST:
+            raise ValueError(f"more than {_MOST} files are included, or more than {_DEEPEST} within each other")
+        if there[0] not in self.files:
+            self.files.append(there[0])
+        return there[0]
+
+    def leave(self) -> None:
+        """Ends with the file that was entered last."""
+        self._open.pop()
+
+
+def lines(path: Path) -> Iterator[tuple[int, str]]:
+    """Lines of a text file with their numbers, without their ends; UTF-8 where a line is that, else Latin-1.
+
+    Raises ValueError for what is no text, OSError where there is no regular file.
+    """
+    with whole.opened(path) as raw, io.BufferedReader(raw) as data:
+        if data.peek(2)[:2] in _UTF_16:
+            raise ValueError("the file is UTF-16; save it as UTF-8 text")
+        number = 0
+        while line := data.readline(_LONGEST):
+            number += 1
+            if len(line) == _LONGEST:
+                raise ValueError(f"line {number}: a line of more than {_LONGEST} characters; this is no text file")
+            if b"\0" in line:
+                raise ValueError(f"line {number}: a null byte; this is no text file")
+            yield number, _decoded(line.rstrip(b"\r\n").removeprefix(b"\xef\xbb\xbf" if number == 1 else b""))
+
+
+def _decoded(line: bytes) -> str:
+    try:
+        return line.decode()
+    except UnicodeDecodeError:
+        return line.decode("latin-1")
