@@ -35,7 +35,8 @@ def refusal(folder: Path, text: str) -> str:
 
 def row(block: Block, place: int = 0) -> tuple[int, float, float]:
     number, x, y, *_ = block.fields(block.cards[place], *NODE)
-    return block.whole(block.cards[place], number, "nid"), *(block.real(block.cards[place], v, "x") for v in (x, y))
+    card = block.cards[place]
+    return block.whole(card, number, "nid"), block.real(card, x, "x"), block.real(card, y, "y")
 
 
 def test_a_deck_is_its_keywords_with_their_cards_up_to_its_end(tmp_path: Path) -> None:
@@ -46,7 +47,7 @@ def test_a_deck_is_its_keywords_with_their_cards_up_to_its_end(tmp_path: Path) -
     keyword, nodes, solid = deck(tmp_path, text)
     assert (keyword.name, nodes.name, nodes.number) == ("KEYWORD", "SET_NODE_LIST_TITLE", 3)
     assert [(card.number, card.text) for card in nodes.cards] == [(4, "clamp, left"), (5, "         1"), (6, "")]
-    assert nodes.parted({"LIST", "TITLE"}) == ("SET_NODE", {"LIST", "TITLE"})
+    assert nodes.parted({"LIST", "TITLE"}) == ("SET_NODE", frozenset({"LIST", "TITLE"}))
     assert (solid.name, solid.remark) == ("ELEMENT_SOLID", "ten nodes format")
 
 
@@ -63,8 +64,8 @@ def test_a_deck_is_its_keywords_with_their_cards_up_to_its_end(tmp_path: Path) -
         ("*KEYWORD 100000 LONG=S\n*NODE", f"{12:8}{'1.5':>16}{'200':>16}"),
         ("*KEYWORD I10=Y\n*NODE", f"{12:10}{'1.5':>16}{'200':>16}"),
         (
-            "*PARAMETER\nR      L       1.5I      N        12\nR h, -200\n*NODE",
-            "      &n              &L             -&h",
+            f"*PARAMETER\nR  L      {'1.5':>10}I      N  {12:10}\nR h, -200\n*NODE",
+            f"{'&n':>8}{'&L':>16}{'-&h':>16}",
         ),
     ],
 )
