@@ -4,10 +4,11 @@ import math
 from array import array
 from collections.abc import Iterator
 
+from conoid.cases.inp import fields, is_whole, numbers, whole, wholes
+
 from ...errors import MeshError
 from ...turning import sine_and_cosine
 from .elements import ElementType, Kind
-from .lines import fields, is_whole, numbers, whole, wholes
 
 _AXIS = 7
 """Numbers of a rotation: two points and an angle."""

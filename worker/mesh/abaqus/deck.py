@@ -5,12 +5,13 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
+from conoid.cases.inp import Block, Source, fields, is_whole, numbers, shortened, whole, wholes
+
 from ...errors import MeshError
 from .data import axis, cylindrical, element_rows, numbers_of, translation
 from .elements import Kind, element_type
 from .keywords import JOINING, MESH, REFUSED, known, needed, options
 from .labels import Label, Labelled, label
-from .lines import Block, Source, fields, is_whole, numbers, shortened, whole, wholes
 from .scopes import OWN, ElementSet, Instance, Scope
 
 _ROOT = Label("", "")

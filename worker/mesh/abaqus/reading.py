@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from conoid.cases.inp import InpError
+
 from ...errors import MeshError
 from ...turning import sine_and_cosine
 from ..model import Floats, Ids, Names
@@ -26,7 +28,10 @@ def read_inp(path: Path, group: str | None, key: str) -> NamedMesh:
     instance, a part, or a set that one part alone has. Raises MeshError, with the number of the line where there is
     one. Node and tet names are the numbers in the file.
     """
-    deck = Deck(path)
+    try:
+        deck = Deck(path)
+    except InpError as error:
+        raise MeshError(str(error)) from None
     pieces = list(_pieces(deck))
     if not any(piece.mesh.nodes for piece in pieces):
         raise MeshError("the file has no nodes")

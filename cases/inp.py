@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...errors import MeshError
+from .problems import ConoidError
 
 _FIELD = re.compile(r'(?:"[^"]*"|[^",])*')
 _NUMBERS = re.compile(r"[0-9+\-.eEdD,\s]*", re.ASCII)
@@ -22,6 +22,10 @@ _LONGEST = 60
 """Characters of a line that a message shows. Chosen: half a line of a terminal."""
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 _UTF_8 = b"\xef\xbb\xbf"
+
+
+class InpError(ConoidError, ValueError):
+    """An input file cannot be followed; one line, with the number of the line in the file."""
 
 
 @dataclass(frozen=True)
@@ -37,23 +41,23 @@ class Source:
     """The lines of a file, read once from its start: a block, then its data lines."""
 
     def __init__(self, path: Path) -> None:
-        """Opens ``path``. Raises MeshError for a file that is not text."""
+        """Opens ``path``. Raises InpError for a file that is not text."""
         self._name = path
         self._number = 0
         self._ahead: tuple[int, str] | None = None
 
     def blocks(self) -> Iterator[Block]:
-        """Every keyword line; data lines that were not read are passed over. Raises MeshError."""
+        """Every keyword line; data lines that were not read are passed over. Raises InpError."""
         with self._name.open("rb") as start:
             if start.read(2) in _UTF_16:
-                raise MeshError("the file is UTF-16; save it as UTF-8 text")
+                raise InpError("the file is UTF-16; save it as UTF-8 text")
         with self._name.open(encoding="latin-1", newline=None) as file:
             self._lines = self._useful(file)
             for number, text in self.data():
                 if text.strip():
-                    raise MeshError(f"line {number}: data before the first keyword; this is not an .inp file")
+                    raise InpError(f"line {number}: data before the first keyword; this is not an .inp file")
             if self._ahead is None:
-                raise MeshError("the file has no keyword; this is not an .inp file")
+                raise InpError("the file has no keyword; this is not an .inp file")
             while self._ahead is not None:
                 number, text = self._ahead
                 self._ahead = None
@@ -83,7 +87,7 @@ class Source:
             if not text.isascii():
                 text = _decoded(text)
             if "\0" in text:
-                raise MeshError(f"line {number}: a null byte; this is not a text file")
+                raise InpError(f"line {number}: a null byte; this is not a text file")
             if not text.lstrip().startswith("**"):
                 yield number, text
 
@@ -108,7 +112,7 @@ def _decoded(text: str) -> str:
 
 def _block(text: str, line: int) -> Block:
     if text.count('"') % 2:
-        raise MeshError(f"line {line}: {shortened(text)} has a quotation mark without its partner")
+        raise InpError(f"line {line}: {shortened(text)} has a quotation mark without its partner")
     word, *rest = fields(text[1:])
     pairs = (_parameter(item) for item in rest if item)
     return Block("".join(word.split()).replace("-", "").upper(), list(pairs), line)
@@ -134,7 +138,7 @@ def fields(text: str) -> list[str]:
 
 
 def numbers(line: int, text: str) -> list[float]:
-    """The numbers of a data line; 0 for an empty field, none for the one after a last comma. Raises MeshError."""
+    """The numbers of a data line; 0 for an empty field, none for the one after a last comma. Raises InpError."""
     if _NUMBERS.fullmatch(text):
         try:
             items = text.translate(_D).split(",")
@@ -143,18 +147,18 @@ def numbers(line: int, text: str) -> list[float]:
             return [float(item) if item.strip() else 0.0 for item in items]
         except ValueError:
             pass
-    raise MeshError(f"line {line}: {shortened(text)} is not a list of numbers")
+    raise InpError(f"line {line}: {shortened(text)} is not a list of numbers")
 
 
 def whole(line: int, item: str) -> int:
-    """The number of a node or of an element. Raises MeshError."""
+    """The number of a node or of an element. Raises InpError."""
     if not _WHOLE.fullmatch(item) or not int(item):
-        raise MeshError(f"line {line}: {shortened(item)} is not a number of a node or element; the first one is 1")
+        raise InpError(f"line {line}: {shortened(item)} is not a number of a node or element; the first one is 1")
     return int(item)
 
 
 def wholes(line: int, items: list[str]) -> list[int]:
-    """The numbers of nodes or elements in several fields. Raises MeshError."""
+    """The numbers of nodes or elements in several fields. Raises InpError."""
     if _WHOLES.fullmatch(",".join(items)):
         with suppress(ValueError):
             found = [int(item) for item in items]
