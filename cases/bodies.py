@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from .tables import Axis, Count, Model, Point, Positive
+from .tables import Axis, Count, Model, Point, Positive, Sha256
 from .units import Angle, Length, Ratio
 
 Edge = Annotated[Count, Field(ge=1, le=1000)]
@@ -221,8 +221,8 @@ class MeshFile(Model):
     group: str | None = None
     """Of tets: a physical group of gmsh by its name or number; of Abaqus an element set, ``Bar-1.Set-1`` (a set of an
     instance or a part), an instance or a part. All tets when absent. docs/meshes.md has what is read of a file."""
-    sha256: str | None = None
-    """Of the file; another one is refused. Not checked when absent."""
+    sha256: Sha256 | None = None
+    """Of the file, 64 hexadecimal digits; a file with another one is refused. Not checked when absent."""
 
 
 Mesh = Annotated[Box | Plate | Cylinder | Tube | Sphere | TwoTets | Shards | MeshFile, Field(discriminator="shape")]

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from .bodies import MeshFile
 from .clock_time import ClockTime, clock_time
+from .files import located
 from .geometry import bounds
 from .impact import driven_together, impact_speeds, wave_speed
 from .library import material
@@ -99,12 +100,13 @@ class Estimate:
 
 
 def estimate(case: Case, folder: Path | None = None, survey: Survey = Survey()) -> Estimate:  # noqa: B008
-    """What ``case`` costs; relative paths of mesh files start in ``folder``, ``survey`` has what was read of them.
+    """What ``case`` costs; relative paths of mesh files start in ``folder`` (without one no file is looked
+    at), ``survey`` has what was read of them.
 
     Raises CaseError, unknown material.
     """
     known = [survey.of(index) for index in range(len(case.parts))]
-    sizes = [_size(part, folder or Path(), found) for part, found in zip(case.parts, known, strict=True)]
+    sizes = [_size(part, folder, found) for part, found in zip(case.parts, known, strict=True)]
     parts = tuple(_part(case, *each) for each in zip(case.parts, sizes, known, strict=True))
     dt = _least([part.dt for part in parts])
     shrunk = [
@@ -130,13 +132,15 @@ def estimate(case: Case, folder: Path | None = None, survey: Survey = Survey()) 
     )
 
 
-def _size(part: Part, folder: Path, found: Surveyed | None) -> MeshSize | int | None:
+def _size(part: Part, folder: Path | None, found: Surveyed | None) -> MeshSize | int | None:
     """What is known of a part's mesh: sizes, the number of tets only, or nothing."""
     if found is not None:
         return MeshSize(found.elements, found.nodes, found.step_length)
     if not isinstance(part.mesh, MeshFile):
         return mesh_size(part.mesh)
-    path = folder / part.mesh.path
+    if folder is None:
+        return None
+    path = located(part.mesh.path, part.mesh.sha256, folder)
     try:
         return path.stat().st_size // FILE_BYTES.get(path.suffix, FILE_BYTES[".msh"])
     except OSError:

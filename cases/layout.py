@@ -11,6 +11,7 @@
       snapshots/000012.snap  surface and table of the fragments (cases/snapshot.py); snapshot.request asks for one
       checkpoints/000001200/ complete state, by global ids; checkpoint.request asks for one
       job.json, job.sh       the job of a batch system that runs it (cases/batch.py); stop.request ends it for good
+      files/<sha256>.inp     the run's own copies of the files that its case names (cases/files.py)
       log/rank-0.log         one a rank            log/launcher.log
       outcome.json           written last
 """
@@ -30,6 +31,7 @@ CHECKPOINT_REQUEST = "checkpoint.request"
 SNAPSHOTS = "snapshots"
 SNAPSHOT_REQUEST = "snapshot.request"
 """Whoever makes this file asks the worker for a snapshot; the worker takes it away."""
+FILES = "files"
 LOGS = "log"
 LAUNCHER_LOG = "launcher.log"
 SUBMISSION = "submission.json"

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from .bodies import Box, Loose, Mesh, MeshFile, Plate, Primitive, Tube
+from .files import located
 from .geometry import AXES, across, cut_directions, index, thinnest
 from .mesh_size import Row, grid, slit_lines
 from .problems import Location, Problem, problem
@@ -41,8 +42,8 @@ def check_mesh(mesh: Mesh, location: Location) -> Iterator[Problem]:
 def missing_files(parts: Iterable[Mesh], folder: Path) -> Iterator[Problem]:
     """Mesh files of the ``parts`` that are not where the case says, from its ``folder`` on."""
     for i, mesh in enumerate(parts):
-        if isinstance(mesh, MeshFile) and not (folder / mesh.path).is_file():
-            yield problem(("parts", i, "mesh", "path"), mesh.path, f"no such file ({(folder / mesh.path).absolute()})")
+        if isinstance(mesh, MeshFile) and not (path := located(mesh.path, mesh.sha256, folder)).is_file():
+            yield problem(("parts", i, "mesh", "path"), mesh.path, f"no such file ({path.absolute()})")
 
 
 def _slit(mesh: Box | Plate, location: Location) -> Iterator[Problem]:

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
+from .files import HASH
 from .units import Length, Speed, usable
 
 Axis = Literal["x", "y", "z"]
@@ -27,6 +28,16 @@ def _no_truth(value: Any) -> Any:
 Count = Annotated[int, BeforeValidator(_no_truth)]
 _Component = Annotated[float, AfterValidator(usable)]
 Direction = Annotated[tuple[_Component, _Component, _Component], BeforeValidator(_floats)]
+
+
+def _hash(value: str) -> str:
+    if not HASH.fullmatch(value.lower()):
+        raise ValueError("expected 64 hexadecimal digits, as sha256sum prints them")
+    return value.lower()
+
+
+Sha256 = Annotated[str, AfterValidator(_hash), Field(json_schema_extra={"pattern": "^[0-9a-fA-F]{64}$"})]
+"""Of a file that a case names, in lower case."""
 
 
 class Switch:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from conoid.cases import whole
 from conoid.cases.bodies import Mesh, MeshFile
+from conoid.cases.files import located
 
 from ..errors import MeshError
 from .child import Limits, run_child
@@ -82,7 +83,7 @@ def _source(mesh: MeshFile, folder: Path, key: str) -> Path:
     """The file itself; MeshError when it is not there, or not the one that was meant."""
     if "://" in mesh.path:
         raise MeshError(f"{key}.path = {mesh.path!r}: expected a file, not an address")
-    path = folder / mesh.path
+    path = located(mesh.path, mesh.sha256, folder)
     if not path.is_file():
         raise MeshError(f"{key}.path = {mesh.path!r}: no such file ({path.absolute()})")
     return path.absolute()
@@ -96,7 +97,7 @@ def _need_gmsh(key: str) -> None:
 
 def _content(mesh: Mesh, source: Path | None, key: str) -> str:
     """sha256 over everything that decides the mesh: what is asked for, the file's bytes, our source, the versions."""
-    digest = hashlib.sha256("\n".join((_maker(), mesh.model_dump_json(exclude={"path"}))).encode())
+    digest = hashlib.sha256("\n".join((_maker(), mesh.model_dump_json(exclude={"path", "sha256"}))).encode())
     if source is not None and isinstance(mesh, MeshFile):
         file = _file_digest(source, mesh, key)
         digest.update(f"{source.suffix.lower()} {file}".encode())
@@ -109,7 +110,7 @@ def _file_digest(source: Path, mesh: MeshFile, key: str) -> str:
             found = hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
         raise MeshError(f"{key}.path = {mesh.path!r}: {error.strerror}") from error
-    if mesh.sha256 is not None and mesh.sha256.lower() != found:
+    if mesh.sha256 is not None and mesh.sha256 != found:
         raise MeshError(f"{key}.sha256 = {mesh.sha256!r}: {mesh.path!r} has {found}")
     return found
 
